@@ -4,4 +4,6 @@
 //! offline. Distances between moving bodies are small convex programs, solved here in microseconds, and every answer is
 //! a bracket proven to contain the truth.
 
+pub mod body;
+pub mod optimize;
 pub mod polynomial;

@@ -132,4 +132,4 @@ impl PartialEq for Polynomial {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
