@@ -5,5 +5,6 @@
 //! a bracket proven to contain the truth.
 
 pub mod body;
+pub mod measure;
 pub mod optimize;
 pub mod polynomial;

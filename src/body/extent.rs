@@ -68,12 +68,13 @@ fn support(
     });
     let point = inverse * z + placement.origin();
     let mut reach = n.dot(&(point - anchor)) + 8.0 * f64::EPSILON * (point.norm() + anchor.norm());
+    reach += 2.0 * placement.displacement(&point);
     let mut residual = *n;
     let mut slope = 0.0;
     for (constraint, multiplier) in constraints.iter().zip(multipliers) {
         let lambda = multiplier * length;
         let sample = placement.sample(constraint, &point);
-        reach += lambda * (1.0 - sample.jet.value + sample.value_error) * (1.0 + 1e-15);
+        reach += lambda * (1.0 - sample.jet.value + sample.nearby_value_error) * (1.0 + 1e-15);
         residual -= sample.jet.gradient * lambda;
         slope += lambda * (sample.gradient_error + 1e-14 * sample.jet.gradient.norm());
     }

@@ -190,7 +190,7 @@ impl Body {
         for (index, constraint) in constraints.iter().enumerate() {
             constraint.gram.prove(&constraint.polynomial).map_err(|source| BodyError::Certificate { index, source })?;
         }
-        let placement = Placement::new(normalization.linear, normalization.center, 0.0, 0.0);
+        let placement = Placement::new(normalization.linear, &inverse, normalization.center, 0.0, 0.0);
         let interior_point =
             interior.unwrap_or_else(|| inverse * extent::deepest_point(&constraints).0 + normalization.center);
         let min_value = largest(constraints.iter().map(|c| placement.sample(c, &interior_point).value_upper()));
@@ -200,7 +200,7 @@ impl Body {
         let Extent { bounding_box, circumscribed } =
             Extent::prove(&constraints, &placement, &inverse, &interior_point)?;
         let boundary = surface::proven_boundary(&constraints, &placement, &inverse, &interior_point);
-        let in_radius = surface::in_radius(&boundary, &interior_point);
+        let in_radius = surface::in_radius(&boundary, &interior_point, inverse.determinant() < 0.0);
         if !(in_radius > 0.0) {
             return Err(BodyError::Interior { min_value });
         }
@@ -244,6 +244,11 @@ impl Body {
     /// Map to the normalized frame.
     pub fn normalization(&self) -> &Normalization {
         &self.normalization
+    }
+
+    /// Inverse of the normalization's `linear`, metres; rounded.
+    pub fn inverse(&self) -> &Matrix3<f64> {
+        &self.inverse
     }
 
     /// The constraints `g_i <= 1`, in the normalized frame.

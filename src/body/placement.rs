@@ -1,18 +1,24 @@
 //! Where a body stands: the map from a frame of points in metres to the body's normalized frame, with its error.
+//!
+//! A computed map `z = M (v - o)` never is the exact one, and its product rounds. Both errors are the same as moving the
+//! point: the computed z is the exact image of a point v̂ near v. [`Placement::displacement`] bounds |v̂ - v|. A distance
+//! then loses just that displacement; a claim about the point v itself ([`Sample::value_upper`]) needs the polynomial's
+//! change over it.
 
 use super::Constraint;
 use crate::polynomial::{Jet, gamma};
 use nalgebra::{Matrix3, Vector3};
 
-/// The affine map `z = M (v - o)` from points v of some frame to the normalized frame of a body, as computed, with bounds
-/// of how far it is from the exact one. Within the body's own frame M is its `linear` and o its `center`.
+/// The affine map `z = M (v - o)` from points v of some frame to the normalized frame of a body. Within the body's own frame
+/// M is its `linear` and o its `center`.
 #[derive(Clone, Debug)]
 pub struct Placement {
     linear: Matrix3<f64>,
     origin: Vector3<f64>,
-    /// Bound of the relative error of each row of `linear`, as a rotation error.
-    rotation_error: f64,
-    /// Bound of the distance between `origin` and the exact origin.
+    row_norms: Vector3<f64>,
+    /// Displacement per distance from the origin.
+    relative_error: f64,
+    /// Displacement at the origin.
     origin_error: f64,
 }
 
@@ -21,23 +27,42 @@ pub struct Placement {
 pub struct Sample {
     /// Value, and gradient and Hessian with respect to the point.
     pub jet: Jet,
-    /// Bound of the error of the value.
+    /// Bound of the error of the value as that of the point itself.
     pub value_error: f64,
-    /// Bound of the Euclidean norm of the error of the gradient.
+    /// Bound of the error of the value as that of a point within the displacement.
+    pub nearby_value_error: f64,
+    /// Bound of the Euclidean norm of the error of the gradient at that nearby point.
     pub gradient_error: f64,
 }
 
 impl Sample {
-    /// Rigorous upper bound of the value.
+    /// Rigorous upper bound of the value at the point itself.
     pub fn value_upper(&self) -> f64 {
         (self.jet.value + self.value_error).next_up()
+    }
+
+    /// Rigorous upper bound of the value at a point within the displacement.
+    pub fn nearby_value_upper(&self) -> f64 {
+        (self.jet.value + self.nearby_value_error).next_up()
     }
 }
 
 impl Placement {
-    /// Map with `linear` and `origin` exact but for the bounds given.
-    pub fn new(linear: Matrix3<f64>, origin: Vector3<f64>, rotation_error: f64, origin_error: f64) -> Self {
-        Self { linear, origin, rotation_error, origin_error }
+    /// The map with `linear = L Rᵀ`, computed with at most three roundings per entry from an invertible `L` with `inverse`,
+    /// where `R` is within `rotation_error` of the exact rotation and `origin` within `origin_error` of the exact origin.
+    pub fn new(
+        linear: Matrix3<f64>,
+        inverse: &Matrix3<f64>,
+        origin: Vector3<f64>,
+        rotation_error: f64,
+        origin_error: f64,
+    ) -> Self {
+        let row_norms = Vector3::from_fn(|i, _| linear.row(i).norm() * (1.0 + 1e-14));
+        // An error of at most ε |M_i| |v - o| in each z_i is a displacement of at most ε K |v - o|, K = ||L⁻¹| |M_i||:
+        // √3 when the rows of L are orthogonal. The entries of M and the product with v - o round seven times together.
+        let k = (inverse.abs() * row_norms).norm() * (1.0 + 1e-5);
+        let relative_error = rotation_error + gamma(16) * k;
+        Self { linear, origin, row_norms, relative_error, origin_error }
     }
 
     /// `M` in `z = M (v - o)`.
@@ -50,6 +75,12 @@ impl Placement {
         &self.origin
     }
 
+    /// Bound of the distance between v and the point whose exact image is the computed one of v.
+    #[inline]
+    pub fn displacement(&self, v: &Vector3<f64>) -> f64 {
+        (self.relative_error * (v - self.origin).norm() + self.origin_error) * (1.0 + 1e-14)
+    }
+
     /// Constraint at the point v, without error bounds.
     #[inline]
     pub fn jet(&self, constraint: &Constraint, v: &Vector3<f64>) -> Jet {
@@ -57,25 +88,28 @@ impl Placement {
     }
 
     /// Constraint at the point v, with error bounds.
+    #[inline]
     pub fn sample(&self, constraint: &Constraint, v: &Vector3<f64>) -> Sample {
-        let offset = v - self.origin;
-        let z = self.linear * offset;
-        // v - o rounds once, the product with a row of M thrice more; M and o carry errors of their own.
-        let moved = self.rotation_error * offset.norm() + self.origin_error;
-        let dz = Vector3::from_fn(|i, _| {
-            let row = self.linear.row(i);
-            let rounding = gamma(6) * row.iter().zip(&offset).map(|(m, x)| (m * x).abs()).sum::<f64>();
-            (rounding + row.norm() * moved) * (1.0 + 1e-14)
-        });
-        let jet = constraint.polynomial.evaluate(&z);
-        let value_error = constraint.polynomial.value_error(&z, &jet.gradient, &dz);
-        let rotated = gamma(6) + self.rotation_error;
-        let gradient_error = self.linear.norm()
-            * (2.0 * constraint.polynomial.gradient_error(&z, &dz) + rotated * jet.gradient.norm())
-            * (1.0 + 1e-14);
-        Sample { jet: self.pull_back(jet), value_error, gradient_error }
+        self.sample_within(constraint, v, 0.0)
     }
 
+    /// Constraint at the point v; the `value_error` holds for every point within `distance` of v.
+    pub fn sample_within(&self, constraint: &Constraint, v: &Vector3<f64>, distance: f64) -> Sample {
+        let polynomial = &constraint.polynomial;
+        let z = self.linear * (v - self.origin);
+        let jet = polynomial.evaluate(&z);
+        let dz = self.row_norms * (self.displacement(v) + distance);
+        let value_error = polynomial.value_error(&z, &jet.gradient, &dz);
+        let none = Vector3::zeros();
+        let nearby_value_error = polynomial.value_error(&z, &jet.gradient, &none);
+        let pulled = self.pull_back(jet);
+        // Pulling back turns and rounds the gradient; the polynomial's own error passes through M.
+        let gradient_error = (self.relative_error + gamma(8)) * pulled.gradient.norm()
+            + (2.0 * polynomial.gradient_error(&z, &none) + gamma(8) * jet.gradient.norm()) * self.row_norms.norm();
+        Sample { jet: pulled, value_error, nearby_value_error, gradient_error: gradient_error * (1.0 + 1e-14) }
+    }
+
+    #[inline]
     fn pull_back(&self, jet: Jet) -> Jet {
         let transposed = self.linear.transpose();
         Jet { value: jet.value, gradient: transposed * jet.gradient, hessian: transposed * jet.hessian * self.linear }

@@ -83,16 +83,19 @@ pub(super) fn proven_boundary(
 
 /// Radius of a ball about the interior point inside the body: the body contains the tetrahedra that the interior point
 /// spans with the triangles of its proven boundary points.
-pub(super) fn in_radius(boundary: &[Vector3<f64>], interior: &Vector3<f64>) -> f64 {
+///
+/// `mirrored` says that the map from directions to boundary points reverses orientation.
+pub(super) fn in_radius(boundary: &[Vector3<f64>], interior: &Vector3<f64>, mirrored: bool) -> f64 {
+    let outward = if mirrored { -1.0 } else { 1.0 };
     let smallest = Sphere::shared()
         .triangles()
         .iter()
         .map(|&[a, b, c]| {
             let normal = (boundary[b] - boundary[a]).cross(&(boundary[c] - boundary[a]));
-            normal.dot(&(boundary[a] - interior)) / normal.norm()
+            outward * normal.dot(&(boundary[a] - interior)) / normal.norm()
         })
         .fold(f64::INFINITY, |least, value| if value.is_nan() || value < least { value } else { least });
-    let slack = 64.0 * f64::EPSILON * (interior.norm() + boundary.iter().map(|x| x.norm()).fold(0.0, f64::max));
+    let slack = 64.0 * f64::EPSILON * (interior.norm() + boundary.iter().map(Vector3::norm).fold(0.0, f64::max));
     (smallest - slack) * (1.0 - 1e-13)
 }
 

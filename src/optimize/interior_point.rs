@@ -1,5 +1,6 @@
-//! Primal-dual interior-point method with strictly feasible iterates (Boyd and Vandenberghe, Convex Optimization,
-//! section 11.7) and Mehrotra's choice of the centring.
+//! Primal-dual interior-point method with slacks (Nocedal and Wright, Numerical Optimization, chapter 19) and Mehrotra's
+//! choice of the centring. Slacks let a full Newton step leave a curved boundary, which a method of feasible points has to
+//! creep along.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use std::ops::ControlFlow;
@@ -10,8 +11,11 @@ pub const MAX_ROWS: usize = 32;
 /// Most iterations of [`minimise`]; 12 to 25 are usual.
 const MAX_ITERATIONS: u32 = 80;
 
-/// Largest fraction of the way to the boundary one step may go.
+/// Largest fraction of the way to zero one step may take slacks and multipliers.
 const TO_BOUNDARY: f64 = 0.995;
+
+/// Most halvings of one step.
+const MAX_BACKTRACKS: u32 = 30;
 
 /// Value, gradient and curvature of one constraint `c(v) <= 0`.
 #[derive(Clone, Copy, Debug)]
@@ -69,13 +73,13 @@ pub trait Program<const N: usize> {
     fn constraints(&self, v: &SVector<f64, N>, rows: &mut Rows<N>);
 }
 
-/// What the caller sees of the solve after each step: a strictly feasible point and positive multipliers.
+/// What the caller sees of the solve after each step.
 pub struct Iterate<'a, const N: usize> {
-    /// Strictly feasible point.
+    /// Point; constraints may be violated by little.
     pub v: &'a SVector<f64, N>,
     /// Multipliers of the constraints, in their order; all positive.
     pub multipliers: &'a [f64],
-    /// Complementarity `Σ -c_i λ_i`: the duality gap once the gradient of the Lagrangian vanishes.
+    /// Complementarity `Σ s_i λ_i` with the slacks s: the duality gap once all else is optimal.
     pub gap: f64,
 }
 
@@ -98,105 +102,116 @@ pub fn minimise<const N: usize, P: Program<N>>(
     if m == 0 || !current.as_slice().iter().all(|row| row.value < 0.0) {
         return 0;
     }
-    let mut multipliers = [0.0; MAX_ROWS];
-    for (multiplier, row) in multipliers.iter_mut().zip(current.as_slice()) {
-        *multiplier = gap / m as f64 / -row.value;
+    let mut dual = Dual { multipliers: [0.0; MAX_ROWS], slacks: [0.0; MAX_ROWS] };
+    for (i, row) in current.as_slice().iter().enumerate() {
+        dual.slacks[i] = -row.value;
+        dual.multipliers[i] = gap / m as f64 / -row.value;
     }
+    let mut last = 1.0;
     for iteration in 1..=MAX_ITERATIONS {
         let (gradient, hessian) = program.objective(v);
         let rows = current.as_slice();
-        let Some(system) = System::factor(&gradient, hessian, rows, &multipliers) else {
+        let Some(system) = System::factor(&gradient, hessian, rows, &dual) else {
             return iteration;
         };
         // Predictor: aim at zero complementarity and see how far the multipliers and slacks allow it.
-        let complementarity = complementarity(rows, &multipliers);
-        let affine = system.step(&gradient, rows, &multipliers, 0.0);
-        let reach = affine.longest(rows, &multipliers).min(1.0);
-        let centring = (1.0 - reach).powi(3).clamp(1e-4, 0.8);
+        let complementarity = dual.complementarity(m);
+        let affine = system.step(&gradient, rows, &dual, 0.0);
+        let (primal, multipliers) = affine.longest(&dual, m);
+        let reach = primal.min(multipliers).min(1.0);
+        // Complementarity must not run ahead of the other conditions, or the next steps are short.
+        let infeasibility = dual.residual(&gradient, rows, complementarity / m as f64);
+        // A short step shows that the last target was out of reach: centre first.
+        let floor = if last < 0.5 { 0.5 } else { (0.1 * infeasibility / complementarity).clamp(1e-4, 0.3) };
+        let centring = (1.0 - reach).powi(3).clamp(floor, 0.8);
         let target = centring * complementarity / m as f64;
-        let step = system.step(&gradient, rows, &multipliers, target);
+        let step = system.step(&gradient, rows, &dual, target);
 
-        let before = residual(&gradient, rows, &multipliers, target);
-        let mut length = (TO_BOUNDARY * step.longest(rows, &multipliers)).min(1.0);
+        let before = dual.residual(&gradient, rows, target);
+        let (primal, multipliers) = step.longest(&dual, m);
+        let mut lengths = [primal, multipliers].map(|longest| (TO_BOUNDARY * longest).min(1.0));
         let mut accepted = false;
-        for _ in 0..40 {
-            let trial = *v + step.v * length;
+        for _ in 0..MAX_BACKTRACKS {
+            let trial = *v + step.v * lengths[0];
+            let trial_dual = dual.moved(&step, lengths);
             trial_rows.len = 0;
             program.constraints(&trial, trial_rows);
-            let inside =
-                trial_rows.as_slice().iter().zip(rows).all(|(new, old)| new.value < (1.0 - TO_BOUNDARY) * old.value);
-            if inside {
-                let mut trial_multipliers = multipliers;
-                for (multiplier, change) in trial_multipliers.iter_mut().zip(&step.multipliers) {
-                    *multiplier += length * change;
-                }
-                let (trial_gradient, _) = program.objective(&trial);
-                let after = residual(&trial_gradient, trial_rows.as_slice(), &trial_multipliers, target);
-                if after <= (1.0 - 0.01 * length) * before || after < 1e-15 {
-                    (*v, multipliers, accepted) = (trial, trial_multipliers, true);
-                    break;
-                }
+            let (trial_gradient, _) = program.objective(&trial);
+            let after = trial_dual.residual(&trial_gradient, trial_rows.as_slice(), target);
+            if after <= 4.0 * before {
+                (*v, dual, accepted) = (trial, trial_dual, true);
+                break;
             }
-            length *= 0.6;
+            // Unequal steps need not reduce the residual; equal ones do.
+            let shorter = 0.5 * lengths[0].min(lengths[1]);
+            lengths = if lengths[0] == lengths[1] { [shorter; 2] } else { [2.0 * shorter; 2] };
         }
         if !accepted {
             return iteration;
         }
+        last = lengths[0].min(lengths[1]);
         (current, trial_rows) = (trial_rows, current);
-        let gap = self::complementarity(current.as_slice(), &multipliers);
-        if inspect(&Iterate { v, multipliers: &multipliers[..m], gap }).is_break() {
+        let gap = dual.complementarity(m);
+        if inspect(&Iterate { v, multipliers: &dual.multipliers[..m], gap }).is_break() {
             return iteration;
         }
     }
     MAX_ITERATIONS
 }
 
-/// `Σ -c_i λ_i`.
-fn complementarity<const N: usize>(rows: &[Row<N>], multipliers: &[f64; MAX_ROWS]) -> f64 {
-    rows.iter().zip(multipliers).map(|(row, multiplier)| -row.value * multiplier).sum()
+/// Multipliers λ > 0 and slacks s > 0 of the rows, `c_i(v) + s_i = 0` at the solution.
+#[derive(Clone, Copy)]
+struct Dual {
+    multipliers: [f64; MAX_ROWS],
+    slacks: [f64; MAX_ROWS],
 }
 
-/// Norm of the perturbed optimality conditions `∇f + Σ λ_i ∇c_i = 0`, `-c_i λ_i = target`.
-fn residual<const N: usize>(
-    gradient: &SVector<f64, N>,
-    rows: &[Row<N>],
-    multipliers: &[f64; MAX_ROWS],
-    target: f64,
-) -> f64 {
-    let mut dual = *gradient;
-    let mut central = 0.0;
-    for (row, multiplier) in rows.iter().zip(multipliers) {
-        dual += row.gradient * *multiplier;
-        let deviation = -row.value * multiplier - target;
-        central += deviation * deviation;
+impl Dual {
+    /// `Σ s_i λ_i` over the first m rows.
+    fn complementarity(&self, m: usize) -> f64 {
+        self.slacks.iter().zip(&self.multipliers).take(m).map(|(slack, multiplier)| slack * multiplier).sum()
     }
-    (dual.norm_squared() + central).sqrt()
+
+    /// Norm of the perturbed optimality conditions `∇f + Σ λ_i ∇c_i = 0`, `c_i + s_i = 0`, `s_i λ_i = target`.
+    fn residual<const N: usize>(&self, gradient: &SVector<f64, N>, rows: &[Row<N>], target: f64) -> f64 {
+        let mut stationarity = *gradient;
+        let mut rest = 0.0;
+        for (i, row) in rows.iter().enumerate() {
+            stationarity += row.gradient * self.multipliers[i];
+            rest += (row.value + self.slacks[i]).powi(2) + (self.slacks[i] * self.multipliers[i] - target).powi(2);
+        }
+        (stationarity.norm_squared() + rest).sqrt()
+    }
+
+    fn moved<const N: usize>(&self, step: &Step<N>, [primal, multipliers]: [f64; 2]) -> Self {
+        let mut moved = *self;
+        for i in 0..MAX_ROWS {
+            moved.slacks[i] += primal * step.slacks[i];
+            moved.multipliers[i] += multipliers * step.multipliers[i];
+        }
+        moved
+    }
 }
 
-/// A step in the variables and multipliers.
+/// A step in the variables, multipliers and slacks.
 struct Step<const N: usize> {
     v: SVector<f64, N>,
     multipliers: [f64; MAX_ROWS],
+    slacks: [f64; MAX_ROWS],
 }
 
 impl<const N: usize> Step<N> {
-    /// Longest step that keeps the multipliers and the linearized constraints at or above zero, at most 2.
-    fn longest(&self, rows: &[Row<N>], multipliers: &[f64; MAX_ROWS]) -> f64 {
-        let mut longest = 2.0_f64;
-        for ((row, multiplier), change) in rows.iter().zip(multipliers).zip(&self.multipliers) {
-            if *change < 0.0 {
-                longest = longest.min(-multiplier / change);
-            }
-            let slope = row.gradient.dot(&self.v);
-            if slope > 0.0 {
-                longest = longest.min(-row.value / slope);
-            }
-        }
-        longest
+    /// Longest steps that keep the slacks and the multipliers of the first m rows at or above zero, at most 2.
+    fn longest(&self, dual: &Dual, m: usize) -> (f64, f64) {
+        let longest = |values: &[f64; MAX_ROWS], changes: &[f64; MAX_ROWS]| {
+            let ratios = values.iter().zip(changes).take(m).filter(|(_, change)| **change < 0.0);
+            ratios.map(|(value, change)| -value / change).fold(2.0, f64::min)
+        };
+        (longest(&dual.slacks, &self.slacks), longest(&dual.multipliers, &self.multipliers))
     }
 }
 
-/// The factorized Newton matrix `∇²L + Σ λ_i / -c_i ∇c_i ∇c_iᵀ`.
+/// The factorized Newton matrix `∇²L + Σ λ_i / s_i ∇c_i ∇c_iᵀ`.
 struct System<const N: usize> {
     factor: SMatrix<f64, N, N>,
 }
@@ -206,13 +221,12 @@ impl<const N: usize> System<N> {
         gradient: &SVector<f64, N>,
         mut hessian: SMatrix<f64, N, N>,
         rows: &[Row<N>],
-        multipliers: &[f64; MAX_ROWS],
+        dual: &Dual,
     ) -> Option<Self> {
-        for (row, multiplier) in rows.iter().zip(multipliers) {
+        for (i, row) in rows.iter().enumerate() {
             let mut block = hessian.fixed_view_mut::<3, 3>(row.block, row.block);
-            block += row.hessian * *multiplier;
-            let weight = multiplier / -row.value;
-            hessian.ger(weight, &row.gradient, &row.gradient, 1.0);
+            block += row.hessian * dual.multipliers[i];
+            hessian.ger(dual.multipliers[i] / dual.slacks[i], &row.gradient, &row.gradient, 1.0);
         }
         // Flat starts have no curvature at all; the gradient then sets the scale.
         let scale = hessian.diagonal().amax().max(1e-6 * gradient.amax());
@@ -230,18 +244,21 @@ impl<const N: usize> System<N> {
         None
     }
 
-    /// Newton step towards complementarity `target` in every row.
-    fn step(&self, gradient: &SVector<f64, N>, rows: &[Row<N>], multipliers: &[f64; MAX_ROWS], target: f64) -> Step<N> {
+    /// Newton step towards `s_i λ_i = target` in every row.
+    fn step(&self, gradient: &SVector<f64, N>, rows: &[Row<N>], dual: &Dual, target: f64) -> Step<N> {
         let mut v = -*gradient;
-        for row in rows {
-            v -= row.gradient * (target / -row.value);
+        for (i, row) in rows.iter().enumerate() {
+            let infeasibility = row.value + dual.slacks[i];
+            v -= row.gradient * ((target + dual.multipliers[i] * infeasibility) / dual.slacks[i]);
         }
         substitute(&self.factor, &mut v);
-        let mut changes = [0.0; MAX_ROWS];
-        for ((change, row), multiplier) in changes.iter_mut().zip(rows).zip(multipliers) {
-            *change = (target + multiplier * row.gradient.dot(&v)) / -row.value - multiplier;
+        let mut step = Step { v, multipliers: [0.0; MAX_ROWS], slacks: [0.0; MAX_ROWS] };
+        for (i, row) in rows.iter().enumerate() {
+            let (slack, multiplier) = (dual.slacks[i], dual.multipliers[i]);
+            step.slacks[i] = -(row.value + slack) - row.gradient.dot(&v);
+            step.multipliers[i] = (target - multiplier * step.slacks[i]) / slack - multiplier;
         }
-        Step { v, multipliers: changes }
+        step
     }
 }
 

@@ -1,0 +1,318 @@
+//! Euclidean distance between two bodies.
+
+use super::Status;
+use super::bracket::{Multipliers, distance_lower, distance_upper};
+use super::newton::{Active, DistanceNewton};
+use super::pair::{Pair, Posed};
+use super::pose::Pose;
+use super::programs::{Closest, Level, points};
+use super::warm::{Hint, WarmStart};
+use crate::body::{Body, MAX_CONSTRAINTS};
+use crate::optimize::minimise;
+use nalgebra::{SVector, Vector3};
+use std::ops::ControlFlow;
+
+/// Distance of two bodies with its proof, lengths in metres, vectors in the world frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Distance {
+    /// How the solve ended.
+    pub status: Status,
+    /// Proven lower bound; 0 when the bodies are not proven apart.
+    pub lower: f64,
+    /// Proven upper bound, attained by the witnesses; 0 on overlap.
+    pub upper: f64,
+    /// A point of the first body.
+    pub witness_a: Vector3<f64>,
+    /// A point of the second body; on overlap the same common point.
+    pub witness_b: Vector3<f64>,
+    /// Unit normal from the second body to the first; none on overlap.
+    pub normal: Option<Vector3<f64>>,
+    /// Iterations of all methods together.
+    pub iterations: u32,
+}
+
+impl Distance {
+    /// The answer inside the bracket: the upper bound, which the witnesses attain.
+    pub fn value(&self) -> f64 {
+        self.upper
+    }
+}
+
+/// Euclidean distance between body `a` at `pose_a` and body `b` at `pose_b` (body to world), 0 when they touch or overlap.
+///
+/// The bracket is at most `accuracy` times the circumradius of the larger body wide, or the status says that it is not.
+/// Far from contact minimises ½|x - y|²; near contact, where that loses its curvature, the point deepest in both bodies
+/// decides between overlap and a gap. `warm` is read and then replaced by the hint for the next query of this pair.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use sublevel::body::Body;
+/// use sublevel::measure::{DEFAULT_ACCURACY, Pose, WarmStart, distance};
+///
+/// let ball = Body::ball("ball", Vector3::zeros(), 0.5)?;
+/// let crate_ = Body::cuboid("crate", Vector3::new(1.0, 1.0, 1.0))?;
+/// let apart = Pose::from_quaternion(Vector3::new(3.0, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0])?;
+/// let answer = distance(&crate_, &Pose::identity(), &ball, &apart, DEFAULT_ACCURACY, &mut WarmStart::default());
+/// assert!((answer.value() - 1.5).abs() < 1e-8);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, accuracy: f64, warm: &mut WarmStart) -> Distance {
+    let pair = Pair::new(a, pose_a, b, pose_b);
+    let mut search = Search::new(&pair, accuracy * pair.size());
+    search.run(&warm.hint);
+    *warm = search.hint();
+    search.answer()
+}
+
+/// A solve in progress: the best bracket so far and where it was attained, in query units.
+struct Search<'a> {
+    pair: &'a Pair<'a>,
+    tolerance: f64,
+    lower: f64,
+    upper: f64,
+    x: Vector3<f64>,
+    y: Vector3<f64>,
+    /// Normal of the best lower bound.
+    n: Vector3<f64>,
+    active: (Active, Active),
+    iterations: u32,
+}
+
+/// Below this distance relative to the larger body, ½|x - y|² has too little curvature to aim by.
+const NEAR: f64 = 1e-3;
+
+impl<'a> Search<'a> {
+    fn new(pair: &'a Pair<'a>, tolerance: f64) -> Self {
+        let (x, y) = (pair.a.interior, pair.b.interior);
+        let n = (x - y).try_normalize(0.0).unwrap_or_else(Vector3::x);
+        let mut search = Self {
+            pair,
+            tolerance,
+            lower: 0.0,
+            upper: f64::INFINITY,
+            x,
+            y,
+            n,
+            active: (Active::default(), Active::default()),
+            iterations: 0,
+        };
+        search.attain(&x, &y);
+        search
+    }
+
+    fn done(&self) -> bool {
+        self.upper - self.lower <= self.tolerance
+    }
+
+    fn run(&mut self, hint: &Hint) {
+        match hint {
+            Hint::Apart { x_a, y_b, normal_a, active_a, active_b } => {
+                let active =
+                    (Active::from_bits(*active_a, self.pair.a.len()), Active::from_bits(*active_b, self.pair.b.len()));
+                if let (Some(a), Some(b)) = active {
+                    self.newton(self.pair.from_a(x_a), self.pair.from_b(y_b), *normal_a, a, b);
+                }
+            }
+            Hint::Overlap { point_a } => {
+                self.common(&self.pair.from_a(point_a));
+            }
+            Hint::Cold | Hint::Level { .. } => {}
+        }
+        if !self.done() {
+            self.closest();
+        }
+        if !self.done() && self.lower < NEAR * self.pair.size() {
+            self.contact();
+        }
+    }
+
+    /// Interior-point method on ½|x - y|², with Newton's method tried as soon as it shows the active constraints.
+    fn closest(&mut self) {
+        let (start_x, start_y) = (self.pair.a.interior, self.pair.b.interior);
+        let mut v = SVector::<f64, 6>::zeros();
+        v.fixed_rows_mut::<3>(0).copy_from(&start_x);
+        v.fixed_rows_mut::<3>(3).copy_from(&start_y);
+        let first = 0.5 * (start_x - start_y).norm_squared();
+        let near = NEAR * self.pair.size();
+        let mut attempt = 1e-1;
+        let iterations = minimise(&Closest(self.pair), &mut v, first.max(1e-6), |iterate| {
+            let (x, y) = points(iterate.v);
+            let apart = (x - y).norm();
+            let value = 0.5 * apart * apart;
+            // A midpoint inside both settles overlaps within the first steps.
+            if apart < self.pair.size() && self.common(&((x + y) * 0.5)) {
+                return ControlFlow::Break(());
+            }
+            if apart < near {
+                self.attain(&x, &y);
+                return ControlFlow::Break(());
+            }
+            if iterate.gap < attempt * value {
+                attempt = (iterate.gap / value) * 1e-2;
+                let (of_a, of_b) = split(self.pair, iterate.multipliers, 1.0 / apart);
+                let n = (x - y) / apart;
+                self.bound(&x, &y, &of_a, &of_b);
+                self.attain(&x, &y);
+                if !self.done() {
+                    self.newton(x, y, n, Active::from_multipliers(&of_a), Active::from_multipliers(&of_b));
+                }
+                if self.done() || attempt < 1e-18 {
+                    return ControlFlow::Break(());
+                }
+            }
+            ControlFlow::Continue(())
+        });
+        self.iterations += iterations;
+    }
+
+    /// The point deepest in both bodies: inside both, it proves overlap; else its multipliers show the normal.
+    fn contact(&mut self) {
+        let pair = self.pair;
+        let start = (self.x + self.y) * 0.5;
+        let depth = |v: &Vector3<f64>| {
+            let values = (0..pair.a.len()).map(|i| pair.a.jet(i, v).value);
+            values.chain((0..pair.b.len()).map(|i| pair.b.jet(i, v).value)).fold(f64::MIN, f64::max)
+        };
+        let first = depth(&start) + 0.5;
+        let mut v = SVector::from([start.x, start.y, start.z, first]);
+        let mut attempt = 1e-1;
+        let program = Level { pair, both: true, scale: 1.0 };
+        let iterations = minimise(&program, &mut v, 1.0, |iterate| {
+            let x = iterate.v.xyz();
+            if iterate.v[3] < 1.0 && self.common(&x) {
+                return ControlFlow::Break(());
+            }
+            if iterate.gap < attempt {
+                attempt = iterate.gap * 1e-2;
+                let (mut of_a, mut of_b) = split(pair, iterate.multipliers, 1.0);
+                let (u, w) = (gradient(&pair.a, &x, &of_a), gradient(&pair.b, &x, &of_b));
+                if u.norm() > 0.0 && w.norm() > 0.0 {
+                    let n = (w / w.norm() - u / u.norm()).try_normalize(0.0).unwrap_or(self.n);
+                    of_a.iter_mut().for_each(|m| *m /= u.norm());
+                    of_b.iter_mut().for_each(|m| *m /= w.norm());
+                    // First order: each body's surface is (g - 1) / |∇g| away along n.
+                    let (mut x_a, mut y_b) = (x, x);
+                    x_a += n * excess(&pair.a, &x, &of_a);
+                    y_b -= n * excess(&pair.b, &x, &of_b);
+                    self.bound(&x, &x, &of_a, &of_b);
+                    self.attain(&x_a, &y_b);
+                    if !self.done() {
+                        self.newton(x_a, y_b, n, Active::from_multipliers(&of_a), Active::from_multipliers(&of_b));
+                    }
+                }
+            }
+            if self.done() || attempt < 1e-18 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        self.iterations += iterations;
+    }
+
+    fn newton(&mut self, x: Vector3<f64>, y: Vector3<f64>, n: Vector3<f64>, a: Active, b: Active) {
+        if ![x, y, n].iter().all(|v| v.iter().all(|value| value.is_finite())) {
+            return;
+        }
+        let distance = n.dot(&(x - y)).max(0.0);
+        let mut newton = DistanceNewton { x, y, distance, n, a, b };
+        let (steps, _) = newton.run(self.pair, |at| {
+            // Stationary points of the overlap are of no use here.
+            if at.distance <= 0.0 {
+                return false;
+            }
+            let (of_a, of_b) = (at.a.multipliers(), at.b.multipliers());
+            let lower = distance_lower(self.pair, &at.x, &at.y, &at.n, &of_a, &of_b);
+            if self.raise(lower, &at.n) | self.attain(&at.x, &at.y) {
+                self.active = (at.a, at.b);
+            }
+            self.done()
+        });
+        self.iterations += steps;
+    }
+
+    /// Improves the lower bound with multipliers for unit normals, trying each body's idea of the normal.
+    fn bound(&mut self, x: &Vector3<f64>, y: &Vector3<f64>, of_a: &Multipliers, of_b: &Multipliers) {
+        let (u, w) = (gradient(&self.pair.a, x, of_a), gradient(&self.pair.b, y, of_b));
+        let (lu, lw) = (u.norm(), w.norm());
+        if !(lu > 0.0 && lw > 0.0) {
+            return;
+        }
+        let (of_a, of_b) = (of_a.map(|m| m / lu), of_b.map(|m| m / lw));
+        for n in [-u / lu, w / lw] {
+            self.raise(distance_lower(self.pair, x, y, &n, &of_a, &of_b), &n);
+        }
+    }
+
+    /// Takes a lower bound and its normal if it is the best so far.
+    fn raise(&mut self, lower: f64, n: &Vector3<f64>) -> bool {
+        let better = lower > self.lower;
+        if better {
+            (self.lower, self.n) = (lower, *n);
+        }
+        better
+    }
+
+    /// Pulls trial points into their bodies and takes them if they are the closest so far.
+    fn attain(&mut self, x: &Vector3<f64>, y: &Vector3<f64>) -> bool {
+        let (Some(x), Some(y)) = (self.pair.a.pull_in(x), self.pair.b.pull_in(y)) else { return false };
+        let upper = distance_upper(self.pair, &x, &y);
+        let better = upper < self.upper;
+        if better {
+            (self.upper, self.x, self.y) = (upper, x, y);
+        }
+        better
+    }
+
+    /// Whether v is proven to lie in both bodies; if so the answer is 0.
+    fn common(&mut self, v: &Vector3<f64>) -> bool {
+        let both = self.pair.a.contains(v) && self.pair.b.contains(v);
+        if both {
+            (self.lower, self.upper, self.x, self.y) = (0.0, 0.0, *v, *v);
+        }
+        both
+    }
+
+    fn hint(&self) -> WarmStart {
+        if self.upper == 0.0 {
+            WarmStart { hint: Hint::Overlap { point_a: self.pair.to_a(&self.x) } }
+        } else {
+            WarmStart::apart(self.pair, &self.x, &self.y, &self.n, self.active.0.bits(), self.active.1.bits())
+        }
+    }
+
+    fn answer(&self) -> Distance {
+        let unit = self.pair.unit();
+        let witness_a = self.pair.to_world(&self.x);
+        let (witness_b, normal) = if self.upper == 0.0 {
+            (witness_a, None)
+        } else {
+            let n = self.n.try_normalize(0.0).map(|n| self.pair.direction_to_world(&n));
+            (self.pair.to_world(&self.y), n)
+        };
+        Distance {
+            status: if self.done() { Status::Converged } else { Status::BracketWide },
+            lower: self.lower * unit,
+            upper: self.upper * unit,
+            witness_a,
+            witness_b,
+            normal,
+            iterations: self.iterations,
+        }
+    }
+}
+
+/// Splits the multipliers of a program's rows into those of A and of B, times `factor`.
+pub(super) fn split(pair: &Pair<'_>, rows: &[f64], factor: f64) -> (Multipliers, Multipliers) {
+    let (mut of_a, mut of_b) = ([0.0; MAX_CONSTRAINTS], [0.0; MAX_CONSTRAINTS]);
+    let (first, second) = rows.split_at(pair.a.len());
+    for (to, from) in of_a.iter_mut().zip(first).chain(of_b.iter_mut().zip(second)) {
+        *to = from * factor;
+    }
+    (of_a, of_b)
+}
+
+fn gradient(body: &Posed<'_>, v: &Vector3<f64>, multipliers: &Multipliers) -> Vector3<f64> {
+    (0..body.len()).map(|i| body.jet(i, v).gradient * multipliers[i]).sum()
+}
+
+/// `Σ λ_i (g_i - 1)` over the constraints with multipliers.
+fn excess(body: &Posed<'_>, v: &Vector3<f64>, multipliers: &Multipliers) -> f64 {
+    (0..body.len()).map(|i| (body.jet(i, v).value - 1.0) * multipliers[i]).sum()
+}

@@ -1,0 +1,211 @@
+//! Level distance `d(A‖B) = min p_A(x)` over x in B, p the largest constraint.
+
+use super::Status;
+use super::bracket::level_lower;
+use super::distance::split;
+use super::newton::{Active, LevelNewton};
+use super::pair::Pair;
+use super::pose::Pose;
+use super::programs::Level;
+use super::warm::{Hint, WarmStart};
+use crate::body::Body;
+use crate::optimize::minimise;
+use nalgebra::{SVector, Vector3};
+use std::ops::ControlFlow;
+
+/// Level distance with its proof; unit-free but for the witness.
+#[derive(Clone, Copy, Debug)]
+pub struct LevelDistance {
+    /// How the solve ended.
+    pub status: Status,
+    /// Proven lower bound.
+    pub lower: f64,
+    /// Proven upper bound, attained at the witness.
+    pub upper: f64,
+    /// A point of the second body where the first one's polynomial is at most `upper`; world frame, metres.
+    pub witness: Vector3<f64>,
+    /// Iterations of all methods together.
+    pub iterations: u32,
+}
+
+impl LevelDistance {
+    /// The answer inside the bracket: the upper bound, which the witness attains.
+    pub fn value(&self) -> f64 {
+        self.upper
+    }
+}
+
+/// Level distance of `a` over `b`: the smallest value that the stored polynomial of `a` (the largest of its constraints)
+/// takes on `b`. Above 1 the bodies are apart, at 1 they touch, below 1 they overlap; it is not symmetric.
+///
+/// The bracket is at most `accuracy · max(1, |d|)` wide, or the status says that it is not. When the minimiser of `a`'s
+/// polynomial lies in `b`, the answer is its minimum ([`Body::min_value`]) and says no more about depth. `warm` is read and
+/// then replaced by the hint for the next query of this pair in this order.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use sublevel::body::Body;
+/// use sublevel::measure::{DEFAULT_ACCURACY, Pose, WarmStart, level_distance};
+///
+/// let ball = Body::ball("ball", Vector3::zeros(), 1.0)?;
+/// let apart = Pose::from_quaternion(Vector3::new(3.0, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0])?;
+/// let d = level_distance(&ball, &Pose::identity(), &ball, &apart, DEFAULT_ACCURACY, &mut WarmStart::default());
+/// assert!((d.value() - 4.0).abs() < 1e-8); // |x|² is 4 at (2, 0, 0)
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn level_distance(
+    a: &Body,
+    pose_a: &Pose,
+    b: &Body,
+    pose_b: &Pose,
+    accuracy: f64,
+    warm: &mut WarmStart,
+) -> LevelDistance {
+    let pair = Pair::new(a, pose_a, b, pose_b);
+    let mut search = Search::new(&pair, accuracy);
+    search.run(&warm.hint);
+    *warm = WarmStart {
+        hint: Hint::Level {
+            x_b: pair.to_b(&search.x),
+            active_a: search.active.0.bits(),
+            active_b: search.active.1.bits(),
+        },
+    };
+    search.answer()
+}
+
+/// Most changes of scale; each is by a thousand, and values reach about 1e12 at degree 8.
+const MAX_ROUNDS: u32 = 6;
+
+/// A solve in progress: the best bracket so far and where it was attained, in query units.
+struct Search<'a> {
+    pair: &'a Pair<'a>,
+    accuracy: f64,
+    lower: f64,
+    upper: f64,
+    x: Vector3<f64>,
+    active: (Active, Active),
+    iterations: u32,
+}
+
+impl<'a> Search<'a> {
+    fn new(pair: &'a Pair<'a>, accuracy: f64) -> Self {
+        let x = pair.b.interior;
+        let active = (Active::default(), Active::default());
+        let mut search =
+            Self { pair, accuracy, lower: f64::NEG_INFINITY, upper: f64::INFINITY, x, active, iterations: 0 };
+        search.attain(&x);
+        search
+    }
+
+    fn done(&self) -> bool {
+        self.upper - self.lower <= self.accuracy * self.upper.abs().max(1.0)
+    }
+
+    fn run(&mut self, hint: &Hint) {
+        if let Hint::Level { x_b, active_a, active_b } = hint {
+            let active =
+                (Active::from_bits(*active_a, self.pair.a.len()), Active::from_bits(*active_b, self.pair.b.len()));
+            if let (Some(a), Some(b)) = active {
+                self.newton(self.pair.from_b(x_b), a, b);
+            }
+        }
+        if !self.done() {
+            self.interior_point();
+        }
+    }
+
+    /// Interior-point method from a point of B on the side of A, with Newton's method tried as soon as it shows the active
+    /// constraints. Values of A fall by orders of magnitude on the way in: each round scales them anew.
+    fn interior_point(&mut self) {
+        let pair = self.pair;
+        let value = |x: &Vector3<f64>| (0..pair.a.len()).map(|i| pair.a.jet(i, x).value).fold(f64::MIN, f64::max);
+        self.attain(&pair.a.interior);
+        let mut inset = 0.1;
+        for _ in 0..MAX_ROUNDS {
+            // Strictly inside, by less each round: the scale must not rise again.
+            let start = self.x + (pair.b.interior - self.x) * inset;
+            inset *= 0.1;
+            let first = value(&start);
+            let scale = first.abs().max(1.0);
+            let mut v = SVector::from([start.x, start.y, start.z, first / scale + 0.5]);
+            let mut attempt = 1e-1;
+            let mut rescale = false;
+            let program = Level { pair, both: false, scale };
+            let iterations = minimise(&program, &mut v, 1.0, |iterate| {
+                let x = iterate.v.xyz();
+                if scale > 1.0 && value(&x) < 1e-3 * scale && self.attain(&x) && self.upper < 1e-2 * scale {
+                    rescale = true;
+                    return ControlFlow::Break(());
+                }
+                let value = iterate.v[3].abs().max(1.0 / scale);
+                if iterate.gap < attempt * value {
+                    attempt = (iterate.gap / value) * 1e-2;
+                    self.examine(&x, iterate.multipliers, scale);
+                }
+                if self.done() || attempt < 1e-18 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            });
+            self.iterations += iterations;
+            if !rescale {
+                break;
+            }
+        }
+    }
+
+    /// Brackets the answer from an iterate of the interior-point method and tries Newton's method from it.
+    fn examine(&mut self, x: &Vector3<f64>, rows: &[f64], scale: f64) {
+        let (of_a, mut of_b) = split(self.pair, rows, 1.0);
+        of_b.iter_mut().for_each(|multiplier| *multiplier *= scale);
+        self.attain(x);
+        self.bound(level_lower(self.pair, x, &of_a, &of_b));
+        if !self.done() {
+            self.newton(*x, Active::from_multipliers(&of_a), Active::from_multipliers(&of_b));
+        }
+        // A vanishing multiplier means that B does not hold the minimiser back.
+        if !self.done() && self.pair.b.contains(x) {
+            self.newton(*x, Active::from_multipliers(&of_a), Active::default());
+        }
+    }
+
+    fn newton(&mut self, x: Vector3<f64>, a: Active, b: Active) {
+        if !x.iter().all(|value| value.is_finite()) {
+            return;
+        }
+        let mut newton = LevelNewton { x, a, b };
+        let (steps, _) = newton.run(self.pair, |at| {
+            self.bound(level_lower(self.pair, &at.x, &at.a.multipliers(), &at.b.multipliers()));
+            if self.attain(&at.x) {
+                self.active = (at.a, at.b);
+            }
+            self.done()
+        });
+        self.iterations += steps;
+    }
+
+    fn bound(&mut self, lower: f64) {
+        if lower > self.lower {
+            self.lower = lower;
+        }
+    }
+
+    /// Pulls a trial point into B and takes it if A's polynomial is the smallest there so far.
+    fn attain(&mut self, x: &Vector3<f64>) -> bool {
+        let Some(x) = self.pair.b.pull_in(x) else { return false };
+        let upper = self.pair.a.value_upper(&x, self.pair.b.displacement(&x));
+        let better = upper < self.upper;
+        if better {
+            (self.upper, self.x) = (upper, x);
+        }
+        better
+    }
+
+    fn answer(&self) -> LevelDistance {
+        LevelDistance {
+            status: if self.done() { Status::Converged } else { Status::BracketWide },
+            lower: self.lower,
+            upper: self.upper,
+            witness: self.pair.to_world(&self.x),
+            iterations: self.iterations,
+        }
+    }
+}

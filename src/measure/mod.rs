@@ -1,0 +1,37 @@
+//! Measures between two posed bodies: Euclidean distance and level distance, each inside a proven bracket.
+//!
+//! Every measure is a convex program. A warm start is corrected by Newton's method on the optimality system of its active
+//! constraints ([`newton`]); where that does not apply or does not converge, an interior-point method
+//! ([`crate::optimize`]) does, from a start that is always feasible. Neither is trusted: an answer is accepted when its
+//! bracket, which holds for any trial point ([`bracket`]), is narrow enough. This room knows neither clock nor allocator nor
+//! threads.
+
+mod bracket;
+mod distance;
+mod level;
+mod linear;
+mod newton;
+mod pair;
+mod pose;
+mod programs;
+mod warm;
+
+pub use distance::{Distance, distance};
+pub use level::{LevelDistance, level_distance};
+pub use pose::{Pose, PoseError};
+pub use warm::WarmStart;
+
+/// Default accuracy: relative to the circumradius of the larger body for lengths, to `max(1, |d|)` for level distances.
+pub const DEFAULT_ACCURACY: f64 = 1e-9;
+
+/// How a solve ended. The bracket is true in every case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// The bracket is as narrow as asked for.
+    Converged,
+    /// The iteration limit or the rounding floor was reached first; the bracket says what is known.
+    BracketWide,
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,369 @@
+//! Newton's method on the optimality systems, for a given set of active constraints.
+//!
+//! Distance, regular through contact: the unknowns are x, y, the distance D and multipliers λ of A, μ of B, with
+//! `u = Σ λ_i ∇g_i(x) = -n` and `w = Σ μ_j ∇h_j(y) = n`:
+//!
+//! ```text
+//! x - y + D u = 0,   u + w = 0,   (|u|² - 1) / 2 = 0,   g_i(x) = 1,   h_j(y) = 1   (active i, j)
+//! ```
+//!
+//! Level distance: the unknowns are x, s and the multipliers:
+//!
+//! ```text
+//! Σ ν_i ∇g_i + Σ μ_j ∇h_j = 0,   Σ ν_i = 1,   g_i(x) = s,   h_j(x) = 1
+//! ```
+
+use super::bracket::Multipliers;
+use super::linear::{Augmented, MAX_UNKNOWNS, solve};
+use super::pair::{Pair, Posed};
+use super::warm::ActiveSet;
+use nalgebra::{Matrix3, Vector3};
+
+/// Most constraints of one body that can be active at once in general position in space.
+const MAX_ACTIVE: usize = 3;
+
+/// The active constraints of one body with their multipliers.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Active {
+    index: [usize; MAX_ACTIVE],
+    multiplier: [f64; MAX_ACTIVE],
+    len: usize,
+}
+
+impl Active {
+    /// The set with these bits, all multipliers zero. None if too many for general position.
+    pub(super) fn from_bits(bits: ActiveSet, constraints: usize) -> Option<Self> {
+        let mut active = Self::default();
+        for i in (0..constraints).filter(|i| bits >> i & 1 == 1) {
+            if active.len == MAX_ACTIVE {
+                return None;
+            }
+            active.index[active.len] = i;
+            active.len += 1;
+        }
+        Some(active)
+    }
+
+    /// The constraints that carry the largest of these multipliers.
+    pub(super) fn from_multipliers(multipliers: &Multipliers) -> Self {
+        let largest = multipliers.iter().fold(0.0_f64, |most, &m| most.max(m));
+        let mut active = Self::default();
+        while active.len < MAX_ACTIVE {
+            let next = (0..multipliers.len())
+                .filter(|i| !active.index[..active.len].contains(i))
+                .max_by(|&i, &j| multipliers[i].total_cmp(&multipliers[j]));
+            match next {
+                Some(i) if multipliers[i] > 1e-3 * largest => {
+                    active.index[active.len] = i;
+                    active.multiplier[active.len] = multipliers[i];
+                    active.len += 1;
+                }
+                _ => break,
+            }
+        }
+        active
+    }
+
+    pub(super) fn bits(&self) -> ActiveSet {
+        self.index[..self.len].iter().fold(0, |bits, i| bits | 1 << i)
+    }
+
+    /// Multipliers of all constraints, negative ones cut off.
+    pub(super) fn multipliers(&self) -> Multipliers {
+        let mut all = [0.0; crate::body::MAX_CONSTRAINTS];
+        for (i, multiplier) in self.iter() {
+            all[i] = multiplier.max(0.0);
+        }
+        all
+    }
+
+    fn iter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.index[..self.len].iter().copied().zip(self.multiplier[..self.len].iter().copied())
+    }
+
+    fn push(&mut self, index: usize) -> bool {
+        let room = self.len < MAX_ACTIVE;
+        if room {
+            self.index[self.len] = index;
+            self.multiplier[self.len] = 0.0;
+            self.len += 1;
+        }
+        room
+    }
+
+    /// Drops the constraint with the most negative multiplier; whether there was one.
+    fn drop_negative(&mut self) -> bool {
+        let worst = (0..self.len).min_by(|&i, &j| self.multiplier[i].total_cmp(&self.multiplier[j]));
+        match worst {
+            Some(k) if self.multiplier[k] < 0.0 && self.len > 1 => {
+                self.len -= 1;
+                self.index.swap(k, self.len);
+                self.multiplier.swap(k, self.len);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Least-squares multipliers of `Σ λ_i ∇g_i = target` at v. False if the gradients are dependent.
+    fn fit(&mut self, body: &Posed<'_>, v: &Vector3<f64>, target: &Vector3<f64>) -> bool {
+        let gradients: [Vector3<f64>; MAX_ACTIVE] =
+            std::array::from_fn(|k| if k < self.len { body.jet(self.index[k], v).gradient } else { Vector3::zeros() });
+        let mut system: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
+        for i in 0..self.len {
+            for j in 0..self.len {
+                system[i][j] = gradients[i].dot(&gradients[j]);
+            }
+            system[i][self.len] = gradients[i].dot(target);
+        }
+        let Some(solution) = solve(&mut system, self.len) else { return self.len == 0 };
+        self.multiplier[..self.len].copy_from_slice(&solution[..self.len]);
+        true
+    }
+
+    /// The most violated constraint that is not in the set, if violated by more than rounding.
+    fn violated(&self, body: &Posed<'_>, v: &Vector3<f64>, level: f64) -> Option<usize> {
+        (0..body.len())
+            .filter(|i| !self.index[..self.len].contains(i))
+            .map(|i| (i, body.jet(i, v).value - level))
+            .filter(|(_, excess)| *excess > 1e-10 * level.abs().max(1.0))
+            .max_by(|p, q| p.1.total_cmp(&q.1))
+            .map(|(i, _)| i)
+    }
+}
+
+/// Values, gradients and weighted sums of the active constraints of one body at one point.
+struct At {
+    value: [f64; MAX_ACTIVE],
+    gradient: [Vector3<f64>; MAX_ACTIVE],
+    sum: Vector3<f64>,
+    hessian: Matrix3<f64>,
+}
+
+impl At {
+    fn new(body: &Posed<'_>, active: &Active, v: &Vector3<f64>) -> Self {
+        let mut at = Self {
+            value: [0.0; MAX_ACTIVE],
+            gradient: [Vector3::zeros(); MAX_ACTIVE],
+            sum: Vector3::zeros(),
+            hessian: Matrix3::zeros(),
+        };
+        for (k, (i, multiplier)) in active.iter().enumerate() {
+            let jet = body.jet(i, v);
+            at.value[k] = jet.value;
+            at.gradient[k] = jet.gradient;
+            at.sum += jet.gradient * multiplier;
+            at.hessian += jet.hessian * multiplier;
+        }
+        at
+    }
+}
+
+/// Largest number of Newton steps and of changes of the active set.
+const MAX_STEPS: u32 = 16;
+
+/// Newton iterates of the distance system.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct DistanceNewton {
+    pub(super) x: Vector3<f64>,
+    pub(super) y: Vector3<f64>,
+    pub(super) distance: f64,
+    /// Direction from B to A; of length about 1.
+    pub(super) n: Vector3<f64>,
+    pub(super) a: Active,
+    pub(super) b: Active,
+}
+
+impl DistanceNewton {
+    /// Iterates until `accept` takes one or they stop converging; returns the steps taken and whether one was taken.
+    pub(super) fn run(&mut self, pair: &Pair<'_>, mut accept: impl FnMut(&Self) -> bool) -> (u32, bool) {
+        let n = self.n;
+        if self.a.len == 0 || self.b.len == 0 || !self.a.fit(&pair.a, &self.x, &-n) || !self.b.fit(&pair.b, &self.y, &n)
+        {
+            return (0, false);
+        }
+        // Where both are flat the system is singular, but the point at hand with fitted multipliers may do.
+        if accept(self) {
+            return (0, true);
+        }
+        let mut last = f64::INFINITY;
+        for step in 1..=MAX_STEPS {
+            let Some(length) = self.step(pair) else { return (step, false) };
+            if accept(self) {
+                return (step, true);
+            }
+            // Near its solution Newton's step shrinks fast; one that does not is not near.
+            let settled = length < 1e-9;
+            if settled || step % 4 == 0 {
+                let changed = self.a.drop_negative()
+                    | self.b.drop_negative()
+                    | self.a.violated(&pair.a, &self.x, 1.0).is_some_and(|i| self.a.push(i))
+                    | self.b.violated(&pair.b, &self.y, 1.0).is_some_and(|i| self.b.push(i));
+                let stuck = !changed && (length > 0.9 * last || length < 1e-14);
+                if stuck {
+                    return (step, false);
+                }
+            }
+            last = length;
+        }
+        (MAX_STEPS, false)
+    }
+
+    /// One Newton step; its length, or none if the system is singular.
+    fn step(&mut self, pair: &Pair<'_>) -> Option<f64> {
+        let a = At::new(&pair.a, &self.a, &self.x);
+        let b = At::new(&pair.b, &self.b, &self.y);
+        let size = 7 + self.a.len + self.b.len;
+        let mut m: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
+        let scaled = a.hessian * self.distance;
+        let turned = a.hessian * a.sum;
+        let offset = self.x - self.y + a.sum * self.distance;
+        for i in 0..3 {
+            for j in 0..3 {
+                m[i][j] = scaled[(i, j)] + f64::from(u8::from(i == j));
+                m[3 + i][j] = a.hessian[(i, j)];
+                m[3 + i][3 + j] = b.hessian[(i, j)];
+            }
+            m[i][3 + i] = -1.0;
+            m[i][6] = a.sum[i];
+            m[i][size] = -offset[i];
+            m[3 + i][size] = -(a.sum[i] + b.sum[i]);
+            m[6][i] = turned[i];
+            for k in 0..self.a.len {
+                m[i][7 + k] = self.distance * a.gradient[k][i];
+                m[3 + i][7 + k] = a.gradient[k][i];
+                m[7 + k][i] = a.gradient[k][i];
+            }
+            for k in 0..self.b.len {
+                m[3 + i][7 + self.a.len + k] = b.gradient[k][i];
+                m[7 + self.a.len + k][3 + i] = b.gradient[k][i];
+            }
+        }
+        for k in 0..self.a.len {
+            m[6][7 + k] = a.sum.dot(&a.gradient[k]);
+            m[7 + k][size] = 1.0 - a.value[k];
+        }
+        for k in 0..self.b.len {
+            m[7 + self.a.len + k][size] = 1.0 - b.value[k];
+        }
+        m[6][size] = 0.5 * (1.0 - a.sum.norm_squared());
+        let d = solve(&mut m, size)?;
+        let (dx, dy) = (Vector3::new(d[0], d[1], d[2]), Vector3::new(d[3], d[4], d[5]));
+        let length = dx.norm().max(dy.norm());
+        // Bodies have size 1 here: a longer step leaves where the linearization means anything.
+        let damping = (0.5 / length).min(1.0);
+        self.x += dx * damping;
+        self.y += dy * damping;
+        self.distance += d[6] * damping;
+        for k in 0..self.a.len {
+            self.a.multiplier[k] += d[7 + k] * damping;
+        }
+        for k in 0..self.b.len {
+            self.b.multiplier[k] += d[7 + self.a.len + k] * damping;
+        }
+        // Both sides of u + w = 0 say what n is; their mean splits the residual.
+        let (a, b) = (At::new(&pair.a, &self.a, &self.x), At::new(&pair.b, &self.b, &self.y));
+        self.n = (b.sum - a.sum) * 0.5;
+        Some(length)
+    }
+}
+
+/// Newton iterates of the level-distance system.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LevelNewton {
+    pub(super) x: Vector3<f64>,
+    pub(super) a: Active,
+    pub(super) b: Active,
+}
+
+impl LevelNewton {
+    /// Iterates until `accept` takes one or they stop converging; returns the steps taken and whether one was taken.
+    pub(super) fn run(&mut self, pair: &Pair<'_>, mut accept: impl FnMut(&Self) -> bool) -> (u32, bool) {
+        if self.a.len == 0 {
+            return (0, false);
+        }
+        let mut s = self.start(pair);
+        // Where both are flat the system is singular, but the point at hand with fitted multipliers may do.
+        if accept(self) {
+            return (0, true);
+        }
+        let mut last = f64::INFINITY;
+        for step in 1..=MAX_STEPS {
+            let Some(length) = self.step(pair, &mut s) else { return (step, false) };
+            if accept(self) {
+                return (step, true);
+            }
+            if length < 1e-9 || step % 4 == 0 {
+                let inactive = self.b.len == 1 && self.b.multiplier[0] < 0.0;
+                if inactive {
+                    self.b.len = 0;
+                }
+                let changed = inactive
+                    | self.a.drop_negative()
+                    | self.b.drop_negative()
+                    | self.a.violated(&pair.a, &self.x, s).is_some_and(|i| self.a.push(i))
+                    | self.b.violated(&pair.b, &self.x, 1.0).is_some_and(|i| self.b.push(i));
+                if !changed && (length > 0.9 * last || length < 1e-14) {
+                    return (step, false);
+                }
+            }
+            last = length;
+        }
+        (MAX_STEPS, false)
+    }
+
+    /// First multipliers: equal weights of A, and those of B that fit; returns the first s.
+    fn start(&mut self, pair: &Pair<'_>) -> f64 {
+        self.a.multiplier = [1.0 / self.a.len as f64; MAX_ACTIVE];
+        let a = At::new(&pair.a, &self.a, &self.x);
+        if !self.b.fit(&pair.b, &self.x, &-a.sum) {
+            self.b.len = 0;
+        }
+        a.value[..self.a.len].iter().sum::<f64>() / self.a.len as f64
+    }
+
+    fn step(&mut self, pair: &Pair<'_>, s: &mut f64) -> Option<f64> {
+        let a = At::new(&pair.a, &self.a, &self.x);
+        let b = At::new(&pair.b, &self.b, &self.x);
+        let size = 4 + self.a.len + self.b.len;
+        let hessian = a.hessian + b.hessian;
+        let mut m: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
+        for i in 0..3 {
+            for j in 0..3 {
+                m[i][j] = hessian[(i, j)];
+            }
+            m[i][size] = -(a.sum[i] + b.sum[i]);
+            for k in 0..self.a.len {
+                m[i][4 + k] = a.gradient[k][i];
+                m[4 + k][i] = a.gradient[k][i];
+            }
+            for k in 0..self.b.len {
+                m[i][4 + self.a.len + k] = b.gradient[k][i];
+                m[4 + self.a.len + k][i] = b.gradient[k][i];
+            }
+        }
+        m[3][size] = 1.0;
+        for k in 0..self.a.len {
+            m[3][4 + k] = 1.0;
+            m[3][size] -= self.a.multiplier[k];
+            m[4 + k][3] = -1.0;
+            m[4 + k][size] = *s - a.value[k];
+        }
+        for k in 0..self.b.len {
+            m[4 + self.a.len + k][size] = 1.0 - b.value[k];
+        }
+        let d = solve(&mut m, size)?;
+        let dx = Vector3::new(d[0], d[1], d[2]);
+        let length = dx.norm();
+        let damping = (0.5 / length).min(1.0);
+        self.x += dx * damping;
+        *s += d[3] * damping;
+        for k in 0..self.a.len {
+            self.a.multiplier[k] += d[4 + k] * damping;
+        }
+        for k in 0..self.b.len {
+            self.b.multiplier[k] += d[4 + self.a.len + k] * damping;
+        }
+        Some(length)
+    }
+}

@@ -1,0 +1,207 @@
+//! Two bodies in one frame: the query frame of a measure.
+//!
+//! The query frame is the frame of the first body, moved to the centre of its circumscribed ball and scaled by a power of
+//! two near the larger circumradius, so that lengths are about 1 whatever the unit, and absolute positions play no part.
+
+use super::pose::{Pose, ROTATION_ERROR};
+use crate::body::{Body, Placement, Sample};
+use crate::polynomial::gamma;
+use nalgebra::{Matrix3, Vector3};
+
+/// A body in the query frame.
+pub(super) struct Posed<'a> {
+    pub(super) body: &'a Body,
+    placement: Placement,
+    /// Stored interior point.
+    pub(super) interior: Vector3<f64>,
+    center: Vector3<f64>,
+    radius: f64,
+}
+
+impl Posed<'_> {
+    /// Number of constraints.
+    pub(super) fn len(&self) -> usize {
+        self.body.constraints().len()
+    }
+
+    /// Constraint i at the point v.
+    pub(super) fn jet(&self, i: usize, v: &Vector3<f64>) -> crate::polynomial::Jet {
+        self.placement.jet(&self.body.constraints()[i], v)
+    }
+
+    /// Constraint i at the point v with its error bounds.
+    pub(super) fn sample(&self, i: usize, v: &Vector3<f64>) -> Sample {
+        self.placement.sample(&self.body.constraints()[i], v)
+    }
+
+    /// Bound of the distance between v and the point of the exact frame that its samples are of.
+    pub(super) fn displacement(&self, v: &Vector3<f64>) -> f64 {
+        self.placement.displacement(v)
+    }
+
+    /// Rigorous upper bound of the largest constraint at all points within `distance` of v.
+    pub(super) fn value_upper(&self, v: &Vector3<f64>, distance: f64) -> f64 {
+        let constraints = self.body.constraints().iter();
+        largest(constraints.map(|c| self.placement.sample_within(c, v, distance).value_upper()))
+    }
+
+    /// Rigorous upper bound of the largest constraint at some point within the displacement of v.
+    fn nearby_value_upper(&self, v: &Vector3<f64>) -> f64 {
+        largest(self.body.constraints().iter().map(|c| self.placement.sample(c, v).nearby_value_upper()))
+    }
+
+    /// Whether v is proven to lie in the body.
+    pub(super) fn contains(&self, v: &Vector3<f64>) -> bool {
+        self.value_upper(v, 0.0) <= 1.0
+    }
+
+    /// Upper bound ρ of the distance from v to any point of the body.
+    pub(super) fn reach(&self, v: &Vector3<f64>) -> f64 {
+        ((v - self.center).norm() + self.radius) * (1.0 + 1e-14)
+    }
+
+    /// A point within whose displacement a point of the body is proven to lie, from v towards the interior point.
+    ///
+    /// Convexity along the segment gives the factor `s = (1 - g(a)) / (g(v) - g(a))` from a; rounding takes a little more.
+    /// None if even the interior point is not proven inside in this frame.
+    pub(super) fn pull_in(&self, v: &Vector3<f64>) -> Option<Vector3<f64>> {
+        let mut value = self.nearby_value_upper(v);
+        if value <= 1.0 {
+            return Some(*v);
+        }
+        let deepest = self.nearby_value_upper(&self.interior);
+        if !(deepest < 1.0) {
+            return None;
+        }
+        let mut margin = 4.0 * f64::EPSILON;
+        let mut point = *v;
+        for _ in 0..24 {
+            if !value.is_finite() {
+                return Some(self.interior);
+            }
+            let factor = ((1.0 - deepest) / (value - deepest)).min(1.0) * (1.0 - margin);
+            point = self.interior + (point - self.interior) * factor;
+            value = self.nearby_value_upper(&point);
+            if value <= 1.0 {
+                return Some(point);
+            }
+            margin *= 4.0;
+        }
+        Some(self.interior)
+    }
+}
+
+/// Largest of the values; NaN if any is NaN, which `f64::max` would pass over.
+fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(f64::NEG_INFINITY, |most, value| if value.is_nan() || value > most { value } else { most })
+}
+
+/// Two bodies in the query frame.
+pub(super) struct Pair<'a> {
+    pub(super) a: Posed<'a>,
+    pub(super) b: Posed<'a>,
+    /// Metres per unit of the query frame: a power of two.
+    unit: f64,
+    /// Origin of the query frame in the frame of the first body, metres.
+    origin: Vector3<f64>,
+    /// Rotation and translation of the second body's frame in the first's, metres.
+    rotation: Matrix3<f64>,
+    translation: Vector3<f64>,
+    pose_a: Pose,
+}
+
+impl<'a> Pair<'a> {
+    pub(super) fn new(a: &'a Body, pose_a: &Pose, b: &'a Body, pose_b: &Pose) -> Self {
+        // Differences of translations are exact to one rounding, however far from the world origin.
+        let inverse_a = pose_a.rotation().to_rotation_matrix().transpose().into_inner();
+        let rotation = inverse_a * pose_b.rotation().to_rotation_matrix().into_inner();
+        let translation = inverse_a * (pose_b.translation() - pose_a.translation());
+        let (ball_a, ball_b) = (a.circumscribed(), b.circumscribed());
+        let unit = ball_a.radius.max(ball_b.radius).log2().round().exp2();
+        let origin = ball_a.center;
+
+        let own_center = a.normalization().center;
+        let placement_a = Placement::new(
+            a.normalization().linear * unit,
+            &(a.inverse() / unit),
+            (own_center - origin) / unit,
+            0.0,
+            gamma(2) * (own_center.norm() + origin.norm()) / unit,
+        );
+        let to_query = |point: &Vector3<f64>| (rotation * point + translation - origin) / unit;
+        let other_center = b.normalization().center;
+        // Both rotations are off by at most ROTATION_ERROR; their product and the sums round a few times more.
+        let relative = 2.0 * ROTATION_ERROR + gamma(16);
+        let off = |point: &Vector3<f64>| {
+            (relative * (point.norm() + translation.norm()) + gamma(8) * origin.norm()) / unit * (1.0 + 1e-14)
+        };
+        let placement_b = Placement::new(
+            b.normalization().linear * rotation.transpose() * unit,
+            &(b.inverse() / unit),
+            to_query(&other_center),
+            relative,
+            off(&other_center),
+        );
+        Self {
+            a: Posed {
+                body: a,
+                placement: placement_a,
+                interior: (a.interior_point() - origin) / unit,
+                center: Vector3::zeros(),
+                radius: ball_a.radius / unit,
+            },
+            b: Posed {
+                body: b,
+                placement: placement_b,
+                interior: to_query(b.interior_point()),
+                center: to_query(&ball_b.center),
+                radius: ball_b.radius / unit + off(&ball_b.center),
+            },
+            unit,
+            origin,
+            rotation,
+            translation,
+            pose_a: *pose_a,
+        }
+    }
+
+    /// Metres per unit of the query frame.
+    pub(super) fn unit(&self) -> f64 {
+        self.unit
+    }
+
+    /// Circumradius of the larger body in query units: what accuracies of lengths are relative to.
+    pub(super) fn size(&self) -> f64 {
+        self.a.radius.max(self.b.body.circumscribed().radius / self.unit)
+    }
+
+    /// World position of a point of the query frame, metres.
+    pub(super) fn to_world(&self, v: &Vector3<f64>) -> Vector3<f64> {
+        self.pose_a.transform_point(&self.to_a(v))
+    }
+
+    /// World direction of a direction of the query frame.
+    pub(super) fn direction_to_world(&self, n: &Vector3<f64>) -> Vector3<f64> {
+        self.pose_a.transform_direction(n)
+    }
+
+    /// Point of the query frame in the first body's frame, metres.
+    pub(super) fn to_a(&self, v: &Vector3<f64>) -> Vector3<f64> {
+        v * self.unit + self.origin
+    }
+
+    /// Inverse of [`Pair::to_a`].
+    pub(super) fn from_a(&self, x: &Vector3<f64>) -> Vector3<f64> {
+        (x - self.origin) / self.unit
+    }
+
+    /// Point of the query frame in the second body's frame, metres.
+    pub(super) fn to_b(&self, v: &Vector3<f64>) -> Vector3<f64> {
+        self.rotation.transpose() * (self.to_a(v) - self.translation)
+    }
+
+    /// Inverse of [`Pair::to_b`].
+    pub(super) fn from_b(&self, y: &Vector3<f64>) -> Vector3<f64> {
+        self.from_a(&(self.rotation * y + self.translation))
+    }
+}

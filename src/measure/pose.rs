@@ -1,0 +1,121 @@
+//! Poses: rigid motions from a body frame to the world frame.
+
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+
+/// Largest deviation from a rigid motion that is normalised away; worse is refused.
+const TOLERANCE: f64 = 1e-6;
+
+/// Bound of the distance (operator norm) between the rotation matrix of a pose, as computed, and the exactly normalised
+/// rotation it stands for. Normalising a quaternion costs 4 roundings of its length, hence 8 of the matrix, and each entry 8
+/// more: below 24 u in operator norm; the polar iteration and its conversion to a quaternion at most as much again.
+pub(super) const ROTATION_ERROR: f64 = 32.0 * f64::EPSILON;
+
+/// A rigid motion `x_world = R x_body + t`, lengths in metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    rotation: UnitQuaternion<f64>,
+    translation: Vector3<f64>,
+}
+
+/// Why numbers are not a pose.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum PoseError {
+    /// A coordinate is NaN or infinite.
+    #[error("{field} is not finite; poses are finite numbers")]
+    NotFinite {
+        /// Which part.
+        field: &'static str,
+    },
+    /// A translation beyond any use.
+    #[error("translation reaches {0:e} m; at most 1e15 m can be told apart from rounding")]
+    TooFar(f64),
+    /// A quaternion that is not of length one.
+    #[error(
+        "rotation is not a unit quaternion: its length deviates by {0:.3e}, at most 1e-6 is accepted; normalise it"
+    )]
+    NotUnit(f64),
+    /// A matrix that is not a rotation.
+    #[error(
+        "rotation is not a rotation matrix: it deviates by {0:.3e} from the nearest one, at most 1e-6 is accepted; orthonormalise it"
+    )]
+    NotRotation(f64),
+}
+
+impl Pose {
+    /// The pose that leaves everything where it is.
+    pub fn identity() -> Self {
+        Self { rotation: UnitQuaternion::identity(), translation: Vector3::zeros() }
+    }
+
+    /// Pose from a translation (m) and a quaternion `[x, y, z, w]` within 1e-6 of unit length, which is normalised.
+    ///
+    /// # Errors
+    /// Numbers that are not finite, or a quaternion that is farther from unit length.
+    pub fn from_quaternion(translation: Vector3<f64>, [x, y, z, w]: [f64; 4]) -> Result<Self, PoseError> {
+        check_translation(&translation)?;
+        let quaternion = Quaternion::new(w, x, y, z);
+        if ![x, y, z, w].iter().all(|value| value.is_finite()) {
+            return Err(PoseError::NotFinite { field: "rotation" });
+        }
+        let deviation = (quaternion.norm() - 1.0).abs();
+        if deviation > TOLERANCE {
+            return Err(PoseError::NotUnit(deviation));
+        }
+        Ok(Self { rotation: UnitQuaternion::new_normalize(quaternion), translation })
+    }
+
+    /// Pose from a rotation matrix within 1e-6 of a rotation and a translation (m); the rotation used is the polar factor.
+    ///
+    /// # Errors
+    /// Numbers that are not finite, or a matrix that is farther from its polar factor or a reflection.
+    pub fn from_matrix(matrix: &Matrix3<f64>, translation: Vector3<f64>) -> Result<Self, PoseError> {
+        check_translation(&translation)?;
+        if !matrix.iter().all(|value| value.is_finite()) {
+            return Err(PoseError::NotFinite { field: "rotation" });
+        }
+        // Far from orthonormal the nearest rotation does not matter: say how far the columns are.
+        let skew = (matrix.transpose() * matrix - Matrix3::identity()).norm();
+        if skew > 0.1 || matrix.determinant() <= 0.0 {
+            return Err(PoseError::NotRotation(skew.max((matrix.determinant() - 1.0).abs())));
+        }
+        // Newton's iteration for the polar factor converges quadratically (Higham 1986).
+        let mut polar = *matrix;
+        for _ in 0..8 {
+            let Some(inverse) = polar.try_inverse() else { return Err(PoseError::NotRotation(skew)) };
+            polar = (polar + inverse.transpose()) * 0.5;
+        }
+        let deviation = (matrix - polar).norm();
+        if !(deviation <= TOLERANCE) {
+            return Err(PoseError::NotRotation(deviation));
+        }
+        let rotation = nalgebra::Rotation3::from_matrix_unchecked(polar);
+        Ok(Self { rotation: UnitQuaternion::from_rotation_matrix(&rotation), translation })
+    }
+
+    /// Rotation from the body frame to the world frame.
+    pub fn rotation(&self) -> &UnitQuaternion<f64> {
+        &self.rotation
+    }
+
+    /// World position of the body frame's origin, metres.
+    pub fn translation(&self) -> &Vector3<f64> {
+        &self.translation
+    }
+
+    /// World position of a point of the body frame.
+    pub fn transform_point(&self, point: &Vector3<f64>) -> Vector3<f64> {
+        self.rotation * point + self.translation
+    }
+
+    /// World direction of a direction of the body frame.
+    pub fn transform_direction(&self, direction: &Vector3<f64>) -> Vector3<f64> {
+        self.rotation * direction
+    }
+}
+
+fn check_translation(translation: &Vector3<f64>) -> Result<(), PoseError> {
+    if !translation.iter().all(|value| value.is_finite()) {
+        return Err(PoseError::NotFinite { field: "translation" });
+    }
+    if translation.amax() > 1e15 { Err(PoseError::TooFar(translation.amax())) } else { Ok(()) }
+}

@@ -1,0 +1,281 @@
+//! Measures against closed forms and independent bounds.
+
+use super::*;
+use crate::body::{Body, Sphere};
+use crate::polynomial::tests::Seeded;
+use nalgebra::{Matrix3, Vector3};
+use std::sync::OnceLock;
+
+fn at(x: f64, y: f64, z: f64) -> Pose {
+    Pose::from_quaternion(Vector3::new(x, y, z), [0.0, 0.0, 0.0, 1.0]).unwrap()
+}
+
+fn unit(random: &mut Seeded) -> Vector3<f64> {
+    loop {
+        let v = Vector3::from_fn(|_, _| random.signed());
+        if v.norm() > 0.1 && v.norm() <= 1.0 {
+            return v.normalize();
+        }
+    }
+}
+
+fn random_pose(random: &mut Seeded, distance: f64) -> Pose {
+    let q = loop {
+        let q: [f64; 4] = std::array::from_fn(|_| random.signed());
+        let norm = q.iter().map(|c| c * c).sum::<f64>().sqrt();
+        if norm > 0.1 {
+            break q.map(|c| c / norm);
+        }
+    };
+    Pose::from_quaternion(unit(random) * distance, q).unwrap()
+}
+
+fn cold(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose) -> Distance {
+    distance(a, pose_a, b, pose_b, DEFAULT_ACCURACY, &mut WarmStart::default())
+}
+
+fn cold_level(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose) -> LevelDistance {
+    level_distance(a, pose_a, b, pose_b, DEFAULT_ACCURACY, &mut WarmStart::default())
+}
+
+/// Body-frame support point of `body` in direction `n`, by brute force over rays then projected ascent.
+fn largest_along(body: &Body, n: &Vector3<f64>) -> f64 {
+    static SPHERE: OnceLock<Sphere> = OnceLock::new();
+    SPHERE
+        .get_or_init(|| Sphere::subdivided(4))
+        .vertices()
+        .iter()
+        .map(|u| n.dot(&body.boundary_along(u)))
+        .fold(f64::MIN, f64::max)
+}
+
+#[test]
+fn ball_pairs() {
+    for seed in 0..300 {
+        let mut random = Seeded(seed);
+        let scale = 10_f64.powi((seed % 5) as i32 * 4 - 8);
+        let ratio = 10_f64.powf(3.0 * random.signed());
+        let (ra, rb) = (scale, scale * ratio);
+        let s = ra.max(rb);
+        let (a, b) = (Body::ball("a", Vector3::zeros(), ra).unwrap(), Body::ball("b", Vector3::zeros(), rb).unwrap());
+        let width = 1e-9 * a.circumscribed().radius.max(b.circumscribed().radius);
+        // From deep overlap through grazing to far.
+        let gap = s * [-0.5, -1e-6, -1e-10, 0.0, 1e-12, 1e-9, 1e-7, 1e-5, 1e-3, 1.0, 30.0][(seed % 11) as usize];
+        let pose_a = random_pose(&mut random, scale * 5.0);
+        let direction = unit(&mut random);
+        let moved = pose_a.translation() + direction * (ra + rb + gap);
+        let pose_b = Pose::from_quaternion(moved, [0.5, 0.5, 0.5, 0.5]).unwrap();
+        let truth = gap.max(0.0);
+        let answer = cold(&a, &pose_a, &b, &pose_b);
+        let label = format!("seed {seed}, gap {gap:e}, s {s:e}: {answer:?}");
+        assert_eq!(answer.status, Status::Converged, "{label}");
+        let floor = 1e-14 * (s + pose_a.translation().norm());
+        assert!(answer.lower <= truth + floor && truth - floor <= answer.upper, "{label}");
+        assert!(answer.upper - answer.lower <= width, "{label}");
+        if let Some(normal) = answer.normal.filter(|_| gap > 1e-8 * s) {
+            assert!((normal + direction).norm() < 1e-4, "{label}");
+        }
+        assert_eq!(answer.normal.is_none(), answer.witness_a == answer.witness_b, "{label}");
+        if gap < -2e-9 * s {
+            assert!(answer.upper == 0.0, "{label}");
+        }
+    }
+}
+
+#[test]
+fn coaxial_powers_have_closed_forms() {
+    for seed in 0..320 {
+        let mut random = Seeded(seed);
+        let degrees = [2_u8, 4, 6, 8];
+        let (ka, kb) = (degrees[(seed % 4) as usize], degrees[(seed / 4 % 4) as usize]);
+        let half = |random: &mut Seeded| Vector3::from_fn(|_, _| 10_f64.powf(random.signed()));
+        let (ha, hb) = (half(&mut random), half(&mut random));
+        let a = Body::superellipsoid("a", Vector3::zeros(), ha, ka).unwrap();
+        let b = Body::superellipsoid("b", Vector3::zeros(), hb, kb).unwrap();
+        let s = a.circumscribed().radius.max(b.circumscribed().radius);
+        let axis = (seed / 16 % 3) as usize;
+        let gap = s * [0.0, 1e-9, 1e-6, 1e-3, 0.1, 10.0][(seed / 48 % 6) as usize];
+        let offset = ha[axis] + hb[axis] + gap;
+        let mut shift = Vector3::zeros();
+        shift[axis] = if seed % 2 == 0 { offset } else { -offset };
+        let pose = at(shift.x, shift.y, shift.z);
+        let answer = cold(&a, &Pose::identity(), &b, &pose);
+        let label = format!("seed {seed} ({ka}, {kb}), gap {gap:e}: {answer:?}");
+        assert_eq!(answer.status, Status::Converged, "{label}");
+        assert!(answer.lower <= gap + 1e-13 * s && gap <= answer.upper + 1e-13 * s, "{label}");
+        assert!((answer.value() - gap).abs() <= 1e-9 * s, "{label}");
+        let level = cold_level(&a, &Pose::identity(), &b, &pose);
+        let truth = ((offset - hb[axis]) / ha[axis]).powi(i32::from(ka));
+        let label = format!("seed {seed} ({ka}, {kb}), level {truth:e}: {level:?}");
+        assert_eq!(level.status, Status::Converged, "{label}");
+        assert!(level.lower <= truth * (1.0 + 1e-12) && truth <= level.upper * (1.0 + 1e-12), "{label}");
+        assert!(level.upper - level.lower <= 1e-9 * truth.max(1.0), "{label}");
+    }
+}
+
+#[test]
+fn boxes_meet_face_edge_and_corner() {
+    let a = Body::cuboid("a", Vector3::new(1.0, 2.0, 3.0)).unwrap();
+    let b = Body::cuboid("b", Vector3::new(0.5, 0.25, 1.0)).unwrap();
+    let turned = |x: f64, y: f64, z: f64| {
+        let half = std::f64::consts::FRAC_PI_8;
+        Pose::from_quaternion(Vector3::new(x, y, z), [0.0, 0.0, half.sin(), half.cos()]).unwrap()
+    };
+    let diagonal = (0.5 + 0.25) / 2_f64.sqrt();
+    let cases = [
+        (at(3.0, 0.3, 0.2), 1.5),
+        (at(0.1, 2.25 + 1e-7, 0.0), 1e-7),
+        (at(0.0, 0.0, -14.0), 10.0),
+        (at(1.5 + 3.0, 2.25 + 4.0, 0.0), 5.0),
+        (at(1.5 + 2.0, 2.25 + 3.0, 4.0 + 6.0), 7.0),
+        (turned(1.0 + diagonal + 0.5, 0.0, 0.0), 0.5),
+        (at(1.4, 0.0, 0.0), 0.0),
+        (at(0.0, 0.0, 0.0), 0.0),
+    ];
+    for (i, (pose, truth)) in cases.into_iter().enumerate() {
+        for (first, pose_a, second, pose_b) in [(&a, Pose::identity(), &b, pose), (&b, pose, &a, Pose::identity())] {
+            let answer = cold(first, &pose_a, second, &pose_b);
+            assert_eq!(answer.status, Status::Converged, "case {i}: {answer:?}");
+            assert!((answer.value() - truth).abs() <= 1e-9 * 4.0, "case {i}: {answer:?}");
+            assert!(answer.lower <= truth + 1e-13 && truth <= answer.upper + 1e-13, "case {i}: {answer:?}");
+            let level = cold_level(first, &pose_a, second, &pose_b);
+            assert_eq!(level.status, Status::Converged, "case {i}: {level:?}");
+        }
+    }
+    // d(A‖B) for the box A is ((L - b) / a)² along the face axis.
+    let level = cold_level(&a, &Pose::identity(), &b, &at(3.0, 0.3, 0.2));
+    assert!((level.value() - 2.5 * 2.5).abs() < 1e-8, "{level:?}");
+}
+
+/// A mixed collection: curved, flat, edged, elongated.
+fn zoo(random: &mut Seeded) -> Vec<Body> {
+    let mut half = |aspect: f64| Vector3::from_fn(|_, _| aspect.powf(random.signed()));
+    vec![
+        Body::ball("ball", Vector3::zeros(), 0.7).unwrap(),
+        Body::ellipsoid("egg", Vector3::new(0.3, -0.2, 0.1), half(3.0)).unwrap(),
+        Body::superellipsoid("q4", Vector3::zeros(), half(3.0), 4).unwrap(),
+        Body::superellipsoid("q6", Vector3::new(1.0, 0.0, 0.0), half(2.0), 6).unwrap(),
+        Body::superellipsoid("q8", Vector3::zeros(), half(2.0), 8).unwrap(),
+        Body::cuboid("box", half(3.0)).unwrap(),
+        Body::cylinder("can", 0.4, 1.3).unwrap(),
+        Body::ellipsoid("needle", Vector3::zeros(), Vector3::new(0.01, 0.01, 2.0)).unwrap(),
+        Body::cuboid("plate", Vector3::new(1.0, 1.0, 0.005)).unwrap(),
+    ]
+}
+
+#[test]
+fn random_pairs_converge_and_agree_in_all_ways() {
+    for seed in 0..600 {
+        let mut random = Seeded(seed);
+        let bodies = zoo(&mut random);
+        let (i, j) = (random.next() as usize % bodies.len(), random.next() as usize % bodies.len());
+        let (a, b) = (&bodies[i], &bodies[j]);
+        let reach = a.circumscribed().radius + b.circumscribed().radius;
+        let far = reach * 3_f64.powf(1.5 * random.signed());
+        let (pose_a, pose_b) = (random_pose(&mut random, 0.0), random_pose(&mut random, far));
+        let s = a.circumscribed().radius.max(b.circumscribed().radius);
+        let answer = cold(a, &pose_a, b, &pose_b);
+        let label = format!("seed {seed} {}-{}: {answer:?}", a.name(), b.name());
+        assert_eq!(answer.status, Status::Converged, "{label}");
+        assert!(answer.upper - answer.lower <= 1e-9 * s, "{label}");
+
+        // Witnesses lie in their bodies and attain the value.
+        let inside = |body: &Body, pose: &Pose, x: &Vector3<f64>| {
+            body.value(&pose.rotation().inverse_transform_vector(&(x - pose.translation()))) <= 1.0 + 1e-9
+        };
+        assert!(inside(a, &pose_a, &answer.witness_a) && inside(b, &pose_b, &answer.witness_b), "{label}");
+        assert!(((answer.witness_a - answer.witness_b).norm() - answer.value()).abs() < 1e-12 * s, "{label}");
+
+        // Swapping the arguments, and moving both, change nothing beyond the bracket.
+        let swapped = cold(b, &pose_b, a, &pose_a);
+        assert!(swapped.lower <= answer.upper && answer.lower <= swapped.upper, "{label} swapped {swapped:?}");
+        if let Some(n) = answer.normal {
+            // The normal separates: the support of A along -n and of B along n are the value apart.
+            let local = |pose: &Pose, n: Vector3<f64>| pose.rotation().inverse_transform_vector(&n);
+            let low_a = n.dot(pose_a.translation()) - largest_along(a, &local(&pose_a, -n));
+            let high_b = n.dot(pose_b.translation()) + largest_along(b, &local(&pose_b, n));
+            assert!(low_a - high_b >= answer.lower - 1e-6 * s, "{label}: support gap {}", low_a - high_b);
+        }
+
+        // Level distances tell the same side of contact.
+        for (p, pose_p, q, pose_q) in [(a, &pose_a, b, &pose_b), (b, &pose_b, a, &pose_a)] {
+            let level = cold_level(p, pose_p, q, pose_q);
+            let label = format!("seed {seed} level {}-{}: {level:?}", p.name(), q.name());
+            assert_eq!(level.status, Status::Converged, "{label}");
+            assert!(inside(q, pose_q, &level.witness), "{label}");
+            if answer.lower > 0.0 {
+                assert!(level.upper > 1.0, "{label}");
+            } else if answer.upper == 0.0 {
+                assert!(level.lower <= 1.0, "{label}");
+            }
+        }
+    }
+}
+
+#[test]
+fn warm_starts_change_time_not_answers() {
+    for seed in 0..60 {
+        let mut random = Seeded(9000 + seed);
+        let bodies = zoo(&mut random);
+        let (i, j) = (random.next() as usize % bodies.len(), random.next() as usize % bodies.len());
+        let (a, b) = (&bodies[i], &bodies[j]);
+        let s = a.circumscribed().radius.max(b.circumscribed().radius);
+        let (mut warm, mut warm_level) = (WarmStart::default(), WarmStart::default());
+        let start = unit(&mut random) * (a.circumscribed().radius + b.circumscribed().radius) * 1.2;
+        let step = unit(&mut random) * 0.02 * s;
+        for k in 0..40 {
+            let angle = 0.01 * f64::from(k);
+            let pose =
+                Pose::from_quaternion(start + step * f64::from(k), [angle.sin(), 0.0, 0.0, angle.cos()]).unwrap();
+            let (one, other) = (cold(a, &Pose::identity(), b, &pose), cold_level(a, &Pose::identity(), b, &pose));
+            // Now and then the hint is of another pair.
+            if k % 13 == 5 {
+                let stranger = &bodies[random.next() as usize % bodies.len()];
+                distance(stranger, &pose, a, &Pose::identity(), 1e-9, &mut warm);
+                level_distance(a, &pose, stranger, &Pose::identity(), 1e-9, &mut warm_level);
+            }
+            let answer = distance(a, &Pose::identity(), b, &pose, DEFAULT_ACCURACY, &mut warm);
+            let label = format!("seed {seed} {}-{} step {k}: {answer:?} against {one:?}", a.name(), b.name());
+            assert_eq!(answer.status, Status::Converged, "{label}");
+            assert!(answer.lower <= one.upper && one.lower <= answer.upper, "{label}");
+            let level = level_distance(a, &Pose::identity(), b, &pose, DEFAULT_ACCURACY, &mut warm_level);
+            assert_eq!(level.status, Status::Converged, "seed {seed} step {k}: {level:?}");
+            assert!(level.lower <= other.upper && other.lower <= level.upper, "seed {seed} step {k}");
+        }
+    }
+}
+
+#[test]
+fn impossible_accuracy_is_admitted() {
+    let a = Body::superellipsoid("a", Vector3::zeros(), Vector3::new(1.0, 2.0, 3.0), 8).unwrap();
+    let pose = random_pose(&mut Seeded(5), 7.0);
+    for accuracy in [0.0, 1e-18, -1.0, f64::NAN] {
+        let answer = distance(&a, &Pose::identity(), &a, &pose, accuracy, &mut WarmStart::default());
+        assert_eq!(answer.status, Status::BracketWide);
+        assert!(answer.lower <= answer.upper && answer.upper - answer.lower < 1e-9, "{answer:?}");
+        let level = level_distance(&a, &Pose::identity(), &a, &pose, accuracy, &mut WarmStart::default());
+        assert_eq!(level.status, Status::BracketWide);
+        assert!(level.lower <= level.upper && level.upper - level.lower < 1e-9 * level.upper, "{level:?}");
+    }
+}
+
+#[test]
+fn poses_are_normalised_or_refused() {
+    let none = Vector3::zeros();
+    assert!(Pose::from_quaternion(none, [0.0, 0.0, 0.0, 1.0 + 9e-7]).is_ok());
+    assert!(matches!(Pose::from_quaternion(none, [0.0, 0.0, 0.0, 1.0 + 2e-6]), Err(PoseError::NotUnit(_))));
+    assert!(matches!(Pose::from_quaternion(none, [0.0; 4]), Err(PoseError::NotUnit(_))));
+    assert!(matches!(Pose::from_quaternion(none, [f64::NAN, 0.0, 0.0, 1.0]), Err(PoseError::NotFinite { .. })));
+    let far = Vector3::new(f64::INFINITY, 0.0, 0.0);
+    assert!(matches!(Pose::from_quaternion(far, [0.0, 0.0, 0.0, 1.0]), Err(PoseError::NotFinite { .. })));
+    let exact = *random_pose(&mut Seeded(3), 1.0).rotation().to_rotation_matrix().matrix();
+    let near = exact + Matrix3::new(1.0, -2.0, 3.0, 0.5, 1.0, -1.0, 2.0, 0.0, 1.0) * 1e-7;
+    let pose = Pose::from_matrix(&near, none).unwrap();
+    // The polar factor is the nearest rotation: UVᵀ of the singular value decomposition.
+    let svd = near.svd(true, true);
+    let polar = svd.u.unwrap() * svd.v_t.unwrap();
+    assert!((pose.rotation().to_rotation_matrix().matrix() - polar).norm() < 1e-14);
+    for bad in [exact * 1.00001, exact * -1.0, Matrix3::zeros(), exact + Matrix3::repeat(1e-5)] {
+        assert!(matches!(Pose::from_matrix(&bad, none), Err(PoseError::NotRotation(d)) if d > 1e-6));
+    }
+}

@@ -1,0 +1,41 @@
+//! Warm starts: what one answer tells the next query of the same pair.
+
+use super::pair::Pair;
+use nalgebra::Vector3;
+
+/// Constraints of one body that hold with equality, as a bit set.
+pub(super) type ActiveSet = u16;
+
+/// A caller-owned hint from an earlier answer; [`WarmStart::default`] is a cold start.
+///
+/// It may change the time a query takes, never its answer beyond the bracket: a hint of another pair, of a pose far away,
+/// or of nonsense is found out by the bracket and the solve starts cold.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WarmStart {
+    pub(super) hint: Hint,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) enum Hint {
+    #[default]
+    Cold,
+    /// Witnesses in the frames of their own bodies, normal in A's frame.
+    Apart { x_a: Vector3<f64>, y_b: Vector3<f64>, normal_a: Vector3<f64>, active_a: ActiveSet, active_b: ActiveSet },
+    /// A common point in A's frame.
+    Overlap { point_a: Vector3<f64> },
+    /// Minimiser of a level distance in B's frame.
+    Level { x_b: Vector3<f64>, active_a: ActiveSet, active_b: ActiveSet },
+}
+
+impl WarmStart {
+    pub(super) fn apart(
+        pair: &Pair<'_>,
+        x: &Vector3<f64>,
+        y: &Vector3<f64>,
+        n: &Vector3<f64>,
+        active_a: ActiveSet,
+        active_b: ActiveSet,
+    ) -> Self {
+        Self { hint: Hint::Apart { x_a: pair.to_a(x), y_b: pair.to_b(y), normal_a: *n, active_a, active_b } }
+    }
+}
