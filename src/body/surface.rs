@@ -9,42 +9,37 @@ use std::f64::consts::PI;
 /// Distance from the interior point `start` along `direction` to the boundary, all in the normalized frame: the smallest
 /// root of `g_i = 1` over the constraints. Infinite where no constraint bounds the ray.
 ///
-/// Each `g_i` is convex along the ray and below 1 at its start, so Newton's method from outside decreases monotonically to
-/// the root; the start outside is found by doubling.
+/// Each `g_i` is convex along the ray and below 1 at its start, so Newton's method lands outside at once and then decreases
+/// monotonically to the root. Its first guess takes `g_i` for a pure power of the distance.
 pub(super) fn radius(constraints: &[Constraint], start: &Vector3<f64>, direction: &Vector3<f64>) -> f64 {
     let mut smallest = f64::INFINITY;
-    for constraint in constraints {
+    for Constraint { polynomial, .. } in constraints {
         let along = |r: f64| {
-            let jet = constraint.polynomial.evaluate(&(start + direction * r));
+            let jet = polynomial.evaluate(&(start + direction * r));
             (jet.value - 1.0, jet.gradient.dot(direction))
         };
-        let mut r = if smallest.is_finite() { smallest } else { 1.0 };
-        let mut at = along(r);
-        if at.0 <= 0.0 && smallest.is_finite() {
-            continue;
-        }
-        while at.0 <= 0.0 && r < 1e9 {
-            r *= 2.0;
-            at = along(r);
-        }
-        if at.0 <= 0.0 {
-            continue;
-        }
+        let unit = smallest.min(1.0);
+        let (excess, _) = along(unit);
+        let depth = 1.0 - polynomial.evaluate(start).value;
+        let mut r = unit * (depth / (excess + depth)).max(1e-16).powf(1.0 / polynomial.degree() as f64);
+        let mut outside = false;
         for _ in 0..200 {
-            let next = r - at.0 / at.1;
-            // Rounding ends the monotone descent.
-            if !(next < r && next > 0.0) {
+            let (excess, slope) = along(r);
+            if outside && excess <= 0.0 {
+                // Only rounding brings the descent from outside to the other side.
                 break;
             }
-            let done = r - next <= 1e-15 * r;
+            outside = excess >= 0.0;
+            if excess < 0.0 && r >= smallest.min(1e9) {
+                // Another constraint is met first, or none bounds the ray.
+                r = f64::INFINITY;
+                break;
+            }
+            let next = if slope > 0.0 { (r - excess / slope).min(4.0 * r) } else { 4.0 * r };
+            if !next.is_finite() || (next - r).abs() <= 4e-16 * r || outside && next >= r {
+                break;
+            }
             r = next;
-            if done {
-                break;
-            }
-            at = along(r);
-            if at.0 <= 0.0 {
-                break;
-            }
         }
         smallest = smallest.min(r);
     }

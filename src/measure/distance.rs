@@ -184,16 +184,11 @@ impl<'a> Search<'a> {
             }
             if iterate.gap < attempt {
                 attempt = iterate.gap * 1e-2;
-                let (mut of_a, mut of_b) = split(pair, iterate.multipliers, 1.0);
+                let (of_a, of_b) = split(pair, iterate.multipliers, 1.0);
                 let (u, w) = (gradient(&pair.a, &x, &of_a), gradient(&pair.b, &x, &of_b));
                 if u.norm() > 0.0 && w.norm() > 0.0 {
                     let n = (w / w.norm() - u / u.norm()).try_normalize(0.0).unwrap_or(self.n);
-                    of_a.iter_mut().for_each(|m| *m /= u.norm());
-                    of_b.iter_mut().for_each(|m| *m /= w.norm());
-                    // First order: each body's surface is (g - 1) / |∇g| away along n.
-                    let (mut x_a, mut y_b) = (x, x);
-                    x_a += n * excess(&pair.a, &x, &of_a);
-                    y_b -= n * excess(&pair.b, &x, &of_b);
+                    let (x_a, y_b) = (pair.a.enter(&x, &n), pair.b.enter(&x, &-n));
                     self.bound(&x, &x, &of_a, &of_b);
                     self.attain(&x_a, &y_b);
                     if !self.done() {
@@ -310,9 +305,4 @@ pub(super) fn split(pair: &Pair<'_>, rows: &[f64], factor: f64) -> (Multipliers,
 
 fn gradient(body: &Posed<'_>, v: &Vector3<f64>, multipliers: &Multipliers) -> Vector3<f64> {
     (0..body.len()).map(|i| body.jet(i, v).gradient * multipliers[i]).sum()
-}
-
-/// `Σ λ_i (g_i - 1)` over the constraints with multipliers.
-fn excess(body: &Posed<'_>, v: &Vector3<f64>, multipliers: &Multipliers) -> f64 {
-    (0..body.len()).map(|i| (body.jet(i, v).value - 1.0) * multipliers[i]).sum()
 }

@@ -60,6 +60,25 @@ impl Posed<'_> {
         ((v - self.center).norm() + self.radius) * (1.0 + 1e-14)
     }
 
+    /// The point where the line from v along the unit vector `direction` enters the body, up to rounding; v itself if it is
+    /// inside, anywhere if the line misses.
+    ///
+    /// Each constraint is convex along the line, so Newton's method for its root never passes it.
+    pub(super) fn enter(&self, v: &Vector3<f64>, direction: &Vector3<f64>) -> Vector3<f64> {
+        let mut point = *v;
+        for _ in 0..16 {
+            let steps =
+                (0..self.len()).map(|i| self.jet(i, &point)).map(|jet| (jet.value - 1.0, -jet.gradient.dot(direction)));
+            let longest =
+                steps.filter(|(excess, _)| *excess > 0.0).map(|(excess, slope)| excess / slope).fold(0.0, f64::max);
+            point += direction * longest;
+            if longest < 1e-15 {
+                break;
+            }
+        }
+        point
+    }
+
     /// A point within whose displacement a point of the body is proven to lie, from v towards the interior point.
     ///
     /// Convexity along the segment gives the factor `s = (1 - g(a)) / (g(v) - g(a))` from a; rounding takes a little more.
