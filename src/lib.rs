@@ -1,1 +1,3 @@
 //! Sublevel
+pub mod chart;
+pub mod demo;

@@ -1,0 +1,3 @@
+//! The whole job on shapes the program makes itself.
+
+pub mod shapes;
