@@ -54,6 +54,8 @@ pub struct LineChart {
 }
 
 const SIZE: (u32, u32) = (760, 440);
+/// Left end of the axes, pixels.
+const LEFT: i32 = 80;
 const FONT: &str = "sans-serif";
 /// Decades below the mark at which a curve is cut off: nothing can be told apart there.
 const DECADES_BELOW: i32 = 3;
@@ -89,15 +91,16 @@ impl LineChart {
         let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
         let grey = color(Ink::Grey);
         let text = |size: i32| (FONT, size).into_font().color(&grey);
-        root.draw(&Text::new(self.title.as_str(), (68, 10), text(17)))?;
+        root.draw(&Text::new(self.title.as_str(), (LEFT, 10), text(17)))?;
         self.draw_legend(&root)?;
 
         let (_, body) = root.split_vertically(58);
         let mut chart = ChartBuilder::on(&body)
+            .margin_left(14)
             .margin_right(24)
             .margin_bottom(6)
             .x_label_area_size(46)
-            .y_label_area_size(68)
+            .y_label_area_size(66)
             .build_cartesian_2d(frame.x.0..frame.x.1, (frame.y.0..frame.y.1).log_scale())?;
         chart
             .configure_mesh()
@@ -138,7 +141,7 @@ impl LineChart {
         &self,
         root: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
     ) -> Result<(), Box<dyn std::error::Error>> {
-        let mut left = 68;
+        let mut left = LEFT;
         for series in &self.series {
             let style = color(series.ink).stroke_width(3);
             let ends = [(left, 45), (left + 34, 45)];

@@ -253,10 +253,13 @@ fn write_outline(svg: &mut String, outline: &Outline, origin: [f64; 2], scale: f
     };
     let _ = write!(svg, "{style} stroke-linejoin=\"round\" d=\"");
     for polygon in &outline.polygons {
+        // Steps in tenths of a pixel: thousands of triangles would else make a file of megabytes.
+        let mut last = [0, 0];
         for (corner, point) in polygon.iter().enumerate() {
-            let command = if corner == 0 { 'M' } else { 'L' };
-            let (x, y) = (origin[0] + point[0] * scale, origin[1] - point[1] * scale);
-            let _ = write!(svg, "{command}{x:.1} {y:.1}");
+            let pixel = [origin[0] + point[0] * scale, origin[1] - point[1] * scale].map(|c| (c * 10.0).round() as i64);
+            let step = [pixel[0] - last[0], pixel[1] - last[1]].map(|c| c as f64 / 10.0);
+            let _ = write!(svg, "{}{} {}", if corner == 0 { 'M' } else { 'l' }, step[0], step[1]);
+            last = pixel;
         }
         svg.push('Z');
     }

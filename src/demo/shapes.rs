@@ -83,9 +83,9 @@ impl Shape {
 }
 
 /// Corners of a ring of a tube.
-const SIDES: usize = 20;
+const SIDES: usize = 16;
 /// Rings of a rounded cap.
-const CAP_RINGS: usize = 5;
+const CAP_RINGS: usize = 4;
 
 /// One elliptic cross-section of a tube, in metres.
 #[derive(Clone, Copy)]
@@ -160,6 +160,11 @@ pub fn human() -> Shape {
         human.tube(&[limb(0.0, 0.095, 0.9, 0.085), limb(0.005, 0.115, 0.5, 0.055)]);
         human.tube(&[limb(0.005, 0.115, 0.5, 0.055), limb(-0.015, 0.13, 0.1, 0.038)]);
         human.tube(&[ring(-0.04, side * 0.13, 0.04, 0.038, 0.04), ring(0.15, side * 0.15, 0.03, 0.045, 0.03)]);
+    }
+    // The feet slope a little, so the lowest point is only nearly on the floor.
+    let (low, high) = human.vertices.iter().fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v.z), high.max(v.z)));
+    for vertex in &mut human.vertices {
+        vertex.z = (vertex.z - low) / (high - low) * 1.75;
     }
     human
 }
