@@ -1,0 +1,293 @@
+//! The body file: JSON that any program can read, re-proven whenever it is read.
+
+use super::{Aabb, Ball, Body, BodyError, Constraint, ContainedPoints, Normalization, Provenance};
+use crate::polynomial::{HessianGram, HessianMonomial, Polynomial};
+use nalgebra::{DMatrix, Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+use serde_json::ser::{CompactFormatter, Formatter};
+use std::io;
+
+const FORMAT: &str = "sublevel/1";
+const KIND: &str = "body";
+
+/// Relative difference at which a stored derived value is called wrong: far above what another machine's rounding does to
+/// it, far below what anybody could mean. Answers always use the recomputed value.
+const TOLERANCE: f64 = 1e-7;
+
+/// Why a text is not a valid body file.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BodyFileError {
+    /// Not JSON, or not of this shape.
+    #[error("not a body file: {0}; write it with 'sublevel fit' or see the format in the README")]
+    Json(String),
+    /// Another format or kind.
+    #[error("{field} is {found:?} but this version reads {expected:?}; use a matching version of sublevel")]
+    Format {
+        /// Key in the file.
+        field: &'static str,
+        /// What it says.
+        found: String,
+        /// What it should say.
+        expected: &'static str,
+    },
+    /// A defining value is not valid.
+    #[error("{field}: {reason}")]
+    Field {
+        /// Key in the file.
+        field: String,
+        /// What is wrong with it, with the remedy.
+        reason: String,
+    },
+    /// A stored value that is derived from others differs from what they give.
+    #[error(
+        "{field} does not follow from the polynomials: stored {stored}, recomputed {recomputed}; the file was changed, fit the body again"
+    )]
+    Derived {
+        /// Key in the file.
+        field: &'static str,
+        /// Value in the file.
+        stored: String,
+        /// Value that follows.
+        recomputed: String,
+    },
+    /// The proof fails.
+    #[error(transparent)]
+    Body(#[from] BodyError),
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    format: String,
+    kind: String,
+    id: String,
+    name: String,
+    degree: usize,
+    normalization: FileNormalization,
+    constraints: Vec<FileConstraint>,
+    interior_point_m: [f64; 3],
+    min_value: f64,
+    in_radius_m: f64,
+    circumscribed_ball: FileBall,
+    bounding_box: FileBox,
+    volume_m3: f64,
+    volume_error_m3: f64,
+    gap_m: Option<f64>,
+    contained_points: Option<ContainedPoints>,
+    provenance: Option<Provenance>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileNormalization {
+    center: [f64; 3],
+    linear: [[f64; 3]; 3],
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileConstraint {
+    exponents: Vec<[u8; 3]>,
+    coefficients: Vec<f64>,
+    certificate: FileCertificate,
+}
+
+/// `gram` belongs to the basis `y_i z^(a, b, c)`, each element stored as `[i, a, b, c]`.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileCertificate {
+    basis: Vec<[u8; 4]>,
+    gram: Vec<Vec<f64>>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileBall {
+    center_m: [f64; 3],
+    radius_m: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileBox {
+    min_m: [f64; 3],
+    max_m: [f64; 3],
+}
+
+impl Body {
+    /// The body file of this body; reading it back gives the same numbers exactly.
+    pub fn to_json(&self) -> String {
+        let mut text = Vec::new();
+        let mut serializer = serde_json::Serializer::with_formatter(&mut text, LinePerKey::default());
+        // Writing plain data to memory does not fail, and JSON is UTF-8.
+        let _ = File::from(self).serialize(&mut serializer);
+        text.push(b'\n');
+        String::from_utf8_lossy(&text).into_owned()
+    }
+
+    /// Reads a body file and re-proves it: the id is recomputed, the certificates are checked, every derived value is
+    /// recomputed and compared.
+    ///
+    /// # Errors
+    /// The field that is wrong, the reason and the remedy.
+    pub fn from_json(text: &str) -> Result<Self, BodyFileError> {
+        let file: File = serde_json::from_str(text).map_err(|error| BodyFileError::Json(error.to_string()))?;
+        for (field, found, expected) in [("format", &file.format, FORMAT), ("kind", &file.kind, KIND)] {
+            if found != expected {
+                return Err(BodyFileError::Format { field, found: found.clone(), expected });
+            }
+        }
+        let constraints = file
+            .constraints
+            .iter()
+            .enumerate()
+            .map(|(i, constraint)| read_constraint(i, constraint))
+            .collect::<Result<Vec<_>, _>>()?;
+        let normalization = Normalization {
+            center: file.normalization.center.into(),
+            linear: Matrix3::from_fn(|i, j| file.normalization.linear[i][j]),
+        };
+        let interior = Vector3::from(file.interior_point_m);
+        let recomputed = super::BodyId::of(&normalization, &constraints).to_string();
+        if recomputed != file.id {
+            return Err(BodyFileError::Derived { field: "id", stored: file.id, recomputed });
+        }
+        let mut body = Self::with_interior(&file.name, normalization, constraints, Some(interior))?;
+        check_derived(&file, &body)?;
+        body.points = file.contained_points;
+        body.provenance = file.provenance;
+        Ok(body)
+    }
+}
+
+fn read_constraint(i: usize, constraint: &FileConstraint) -> Result<Constraint, BodyFileError> {
+    let field = |key: &str, reason: String| BodyFileError::Field { field: format!("constraints[{i}].{key}"), reason };
+    let FileConstraint { exponents, coefficients, certificate } = constraint;
+    if exponents.len() != coefficients.len() {
+        let reason =
+            format!("has {} entries for {} exponents; one is needed per exponent", coefficients.len(), exponents.len());
+        return Err(field("coefficients", reason));
+    }
+    let terms: Vec<_> = exponents.iter().copied().zip(coefficients.iter().copied()).collect();
+    let polynomial = Polynomial::new(terms.clone()).map_err(|error| field("coefficients", error.to_string()))?;
+    if polynomial.terms() != terms {
+        return Err(field("exponents", "must be in lexicographic order with non-zero coefficients".into()));
+    }
+    let n = certificate.basis.len();
+    if certificate.gram.len() != n || certificate.gram.iter().any(|row| row.len() != n) {
+        return Err(field("certificate.gram", format!("must be {n}x{n} like its basis")));
+    }
+    let basis = certificate
+        .basis
+        .iter()
+        .map(|&[direction, a, b, c]| HessianMonomial { direction, exponents: [a, b, c] })
+        .collect();
+    let matrix = DMatrix::from_fn(n, n, |row, column| certificate.gram[row][column]);
+    let gram = HessianGram::new(basis, matrix).map_err(|error| field("certificate", error.to_string()))?;
+    Ok(Constraint { polynomial, gram })
+}
+
+/// Compares every derived value with the one recomputed from the polynomials.
+fn check_derived(file: &File, body: &Body) -> Result<(), BodyFileError> {
+    let size = body.circumscribed.radius;
+    let place = size + body.circumscribed.center.amax();
+    let scalar = |field, stored: f64, recomputed: f64, scale: f64| {
+        // Not `>`: a NaN is wrong too.
+        if (stored - recomputed).abs() <= TOLERANCE * scale {
+            Ok(())
+        } else {
+            Err(BodyFileError::Derived { field, stored: stored.to_string(), recomputed: recomputed.to_string() })
+        }
+    };
+    let vector = |field, stored: [f64; 3], recomputed: &Vector3<f64>| {
+        (0..3).try_for_each(|i| scalar(field, stored[i], recomputed[i], place))
+    };
+    // The stored interior point was taken as it is; it must be as deep as the deepest.
+    let deepest = super::extent::deepest_point(&body.constraints).1;
+    scalar("degree", file.degree as f64, body.degree() as f64, 0.0)?;
+    scalar("interior_point_m", body.min_value, deepest, 1.0 + deepest.abs())?;
+    scalar("min_value", file.min_value, body.min_value, 1.0 + body.min_value.abs())?;
+    scalar("in_radius_m", file.in_radius_m, body.in_radius, size)?;
+    vector("circumscribed_ball.center_m", file.circumscribed_ball.center_m, &body.circumscribed.center)?;
+    scalar("circumscribed_ball.radius_m", file.circumscribed_ball.radius_m, size, size)?;
+    vector("bounding_box.min_m", file.bounding_box.min_m, &body.bounding_box.min)?;
+    vector("bounding_box.max_m", file.bounding_box.max_m, &body.bounding_box.max)?;
+    scalar("volume_m3", file.volume_m3, body.volume.volume_m3, body.volume.volume_m3)?;
+    scalar("volume_error_m3", file.volume_error_m3, body.volume.error_m3, body.volume.volume_m3)?;
+    if let Some(gap) = file.gap_m {
+        let recomputed = "unknown (null)".to_owned();
+        return Err(BodyFileError::Derived { field: "gap_m", stored: gap.to_string(), recomputed });
+    }
+    Ok(())
+}
+
+impl From<&Body> for File {
+    fn from(body: &Body) -> Self {
+        let Ball { center, radius } = body.circumscribed;
+        let Aabb { min, max } = body.bounding_box;
+        let Normalization { center: origin, linear } = body.normalization;
+        Self {
+            format: FORMAT.into(),
+            kind: KIND.into(),
+            id: body.id.to_string(),
+            name: body.name.clone(),
+            degree: body.degree(),
+            normalization: FileNormalization { center: origin.into(), linear: linear.transpose().into() },
+            constraints: body.constraints.iter().map(FileConstraint::from).collect(),
+            interior_point_m: body.interior_point.into(),
+            min_value: body.min_value,
+            in_radius_m: body.in_radius,
+            circumscribed_ball: FileBall { center_m: center.into(), radius_m: radius },
+            bounding_box: FileBox { min_m: min.into(), max_m: max.into() },
+            volume_m3: body.volume.volume_m3,
+            volume_error_m3: body.volume.error_m3,
+            gap_m: None,
+            contained_points: body.points.clone(),
+            provenance: body.provenance.clone(),
+        }
+    }
+}
+
+impl From<&Constraint> for FileConstraint {
+    fn from(constraint: &Constraint) -> Self {
+        let Constraint { polynomial, gram } = constraint;
+        let (exponents, coefficients) = polynomial.terms().iter().copied().unzip();
+        let basis =
+            gram.basis().iter().map(|b| [b.direction, b.exponents[0], b.exponents[1], b.exponents[2]]).collect();
+        let gram = gram.matrix().row_iter().map(|row| row.iter().copied().collect()).collect();
+        Self { exponents, coefficients, certificate: FileCertificate { basis, gram } }
+    }
+}
+
+/// Compact JSON but for a line break before each key of the outermost object, so that a file can be looked at.
+#[derive(Default)]
+struct LinePerKey {
+    depth: usize,
+}
+
+impl Formatter for LinePerKey {
+    fn begin_object<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.depth += 1;
+        CompactFormatter.begin_object(writer)
+    }
+
+    fn end_object<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        self.depth -= 1;
+        if self.depth == 0 {
+            writer.write_all(b"\n")?;
+        }
+        CompactFormatter.end_object(writer)
+    }
+
+    fn begin_object_key<W: ?Sized + io::Write>(&mut self, writer: &mut W, first: bool) -> io::Result<()> {
+        CompactFormatter.begin_object_key(writer, first)?;
+        if self.depth == 1 {
+            writer.write_all(b"\n  ")?;
+        }
+        Ok(())
+    }
+
+    fn begin_object_value<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
+        writer.write_all(if self.depth == 1 { b": " } else { b":" })
+    }
+}

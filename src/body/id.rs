@@ -1,0 +1,71 @@
+//! Identity of a body: a hash of what it is, not of what it is called.
+
+use super::{Constraint, Normalization};
+use sha2::{Digest, Sha256};
+use std::fmt;
+use std::str::FromStr;
+
+/// SHA-256 of a body's content: center, linear (rows), then per constraint the number of its terms and each term's three
+/// exponents and coefficient in lexicographic order of the exponents, everything as little-endian f64.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct BodyId([u8; 32]);
+
+impl BodyId {
+    pub(super) fn of(normalization: &Normalization, constraints: &[Constraint]) -> Self {
+        let mut hash = Sha256::new();
+        let mut feed = |value: f64| hash.update(value.to_le_bytes());
+        normalization.center.iter().for_each(|&value| feed(value));
+        normalization.linear.transpose().iter().for_each(|&value| feed(value));
+        for constraint in constraints {
+            let terms = constraint.polynomial.terms();
+            feed(terms.len() as f64);
+            for (exponents, coefficient) in terms {
+                exponents.iter().for_each(|&e| feed(f64::from(e)));
+                feed(*coefficient);
+            }
+        }
+        Self(hash.finalize().into())
+    }
+}
+
+/// SHA-256 of points in metres, in their order, as little-endian f64.
+pub(super) fn hash_points(points: &[nalgebra::Vector3<f64>]) -> String {
+    let mut hash = Sha256::new();
+    for point in points {
+        point.iter().for_each(|value| hash.update(value.to_le_bytes()));
+    }
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+impl fmt::Display for BodyId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+    }
+}
+
+impl fmt::Debug for BodyId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "BodyId({self})")
+    }
+}
+
+/// A text that is not the id of a body.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{0}' is not a body id; an id is 64 hexadecimal digits, as 'sublevel show' prints it")]
+pub struct ParseIdError(String);
+
+impl FromStr for BodyId {
+    type Err = ParseIdError;
+
+    fn from_str(text: &str) -> Result<Self, ParseIdError> {
+        let error = || ParseIdError(text.chars().take(80).collect());
+        if text.len() != 64 || !text.bytes().all(|b| b.is_ascii_hexdigit()) {
+            return Err(error());
+        }
+        let mut bytes = [0; 32];
+        for (i, byte) in bytes.iter_mut().enumerate() {
+            *byte = u8::from_str_radix(&text[2 * i..2 * i + 2], 16).map_err(|_| error())?;
+        }
+        Ok(Self(bytes))
+    }
+}

@@ -1,0 +1,379 @@
+//! Certified convex bodies: `{x : g_1(x) <= 1, ..., g_m(x) <= 1}` with sos-convex `g_i`, proven bounded and non-empty.
+//!
+//! A [`Body`] exists only with its proofs: making one, from numbers or from a file, checks every certificate and proves or
+//! recomputes everything derived from the polynomials. Lengths are metres in the body frame unless a name says otherwise;
+//! `z` is the unit-free normalized frame, `z = L (x - c)`.
+
+mod extent;
+mod file;
+mod id;
+mod placement;
+mod shapes;
+mod sphere;
+mod surface;
+
+pub use file::BodyFileError;
+pub use id::{BodyId, ParseIdError};
+pub use placement::{Placement, Sample};
+pub use sphere::Sphere;
+pub use surface::Volume;
+
+use crate::polynomial::{CertificateError, HessianGram, Polynomial};
+use extent::Extent;
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Most constraints a body may have.
+pub const MAX_CONSTRAINTS: usize = 16;
+
+/// Smallest depth `1 - min g` of a body; below it the interior drowns in rounding.
+const MIN_DEPTH: f64 = 1e-9;
+
+/// The affine map `z = linear (x - center)` from the body frame (x, metres) to the normalized frame (z, unit-free).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Normalization {
+    /// Point of the body frame that z = 0 stands for, metres.
+    pub center: Vector3<f64>,
+    /// Matrix per metre.
+    pub linear: Matrix3<f64>,
+}
+
+/// One sos-convex constraint `g(z) <= 1` with the certificate that it is sos-convex.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Constraint {
+    /// The polynomial g, in the normalized frame.
+    pub polynomial: Polynomial,
+    /// Gram matrix of its Hessian form.
+    pub gram: HessianGram,
+}
+
+/// A ball, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball {
+    /// Centre.
+    pub center: Vector3<f64>,
+    /// Radius.
+    pub radius: f64,
+}
+
+/// An axis-aligned box, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// Smallest coordinates.
+    pub min: Vector3<f64>,
+    /// Largest coordinates.
+    pub max: Vector3<f64>,
+}
+
+/// Which points a body was proven to contain.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ContainedPoints {
+    /// Number of points.
+    pub count: usize,
+    /// SHA-256 of their coordinates in metres as little-endian f64, in input order, as 64 hexadecimal digits.
+    pub sha256: String,
+}
+
+/// Where a fitted body comes from; information only, not part of its identity.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Provenance {
+    /// Name of the input, without its folder.
+    pub input: String,
+    /// Objective of the fit, such as `logdet-p`.
+    pub objective: String,
+    /// Whether the volume was refined after the fit.
+    pub refined: bool,
+    /// Vertices of the convex hull of the input.
+    pub hull_vertices: usize,
+    /// Volume of the convex hull, m³.
+    pub hull_volume_m3: f64,
+}
+
+/// Why numbers do not make a body.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BodyError {
+    /// A name that is empty, too long or has control characters.
+    #[error("name {0:?} must have 1 to 200 characters and no control characters")]
+    Name(String),
+    /// No constraint or too many.
+    #[error("a body has 1 to {MAX_CONSTRAINTS} constraints, not {0}; intersect fewer or fit one polynomial")]
+    ConstraintCount(usize),
+    /// A degree other than 2, 4, 6, 8.
+    #[error("degree {0} is not one of 2, 4, 6, 8")]
+    Degree(u8),
+    /// The normalization is not an invertible affine map.
+    #[error("normalization: {0}; it must be finite and invertible, with lengths between 1e-30 and 1e30 m")]
+    Normalization(&'static str),
+    /// A constraint is not proven sos-convex.
+    #[error("constraints[{index}]: {source}")]
+    Certificate {
+        /// Which constraint.
+        index: usize,
+        /// What is missing.
+        source: CertificateError,
+    },
+    /// The interior is empty or too shallow.
+    #[error(
+        "the body has no proven interior: min g = {min_value}, which must be at most 1 - {MIN_DEPTH:e}; \
+         renormalise g to 1 + (g - 1)/(1 - min g) if the set is meant to have one"
+    )]
+    Interior {
+        /// Smallest value found of the largest constraint.
+        min_value: f64,
+    },
+    /// No proof that the body is bounded.
+    #[error(
+        "the body is not proven bounded (residual {residual:.1e}); add constraints that close it in every direction"
+    )]
+    Unbounded {
+        /// Largest residual of a support bound along an axis.
+        residual: f64,
+    },
+}
+
+/// A point that is not proven inside.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("point {index} is not proven inside: largest constraint {value} > 1")]
+pub struct NotContained {
+    /// Position of the point.
+    pub index: usize,
+    /// Rigorous upper bound of the largest constraint there.
+    pub value: f64,
+}
+
+/// A closed bounded convex set with non-empty interior, certified; immutable.
+#[derive(Clone, Debug)]
+pub struct Body {
+    name: String,
+    id: BodyId,
+    normalization: Normalization,
+    inverse: Matrix3<f64>,
+    constraints: Vec<Constraint>,
+    placement: Placement,
+    interior_point: Vector3<f64>,
+    min_value: f64,
+    in_radius: f64,
+    bounding_box: Aabb,
+    circumscribed: Ball,
+    boundary: Vec<Vector3<f64>>,
+    volume: Volume,
+    points: Option<ContainedPoints>,
+    provenance: Option<Provenance>,
+}
+
+impl Body {
+    /// Makes a body of its defining numbers: proves every constraint sos-convex and the set bounded with an interior, and
+    /// computes everything derived. No semidefinite program is solved.
+    ///
+    /// # Errors
+    /// What could not be proven, and by how much it failed.
+    pub fn new(name: &str, normalization: Normalization, constraints: Vec<Constraint>) -> Result<Self, BodyError> {
+        Self::with_interior(name, normalization, constraints, None)
+    }
+
+    /// As [`Body::new`], with an interior point that is already known (and is re-proven).
+    fn with_interior(
+        name: &str,
+        normalization: Normalization,
+        constraints: Vec<Constraint>,
+        interior: Option<Vector3<f64>>,
+    ) -> Result<Self, BodyError> {
+        if name.is_empty() || name.chars().count() > 200 || name.chars().any(char::is_control) {
+            return Err(BodyError::Name(name.chars().take(200).collect()));
+        }
+        if !(1..=MAX_CONSTRAINTS).contains(&constraints.len()) {
+            return Err(BodyError::ConstraintCount(constraints.len()));
+        }
+        let inverse = invert(&normalization)?;
+        for (index, constraint) in constraints.iter().enumerate() {
+            constraint.gram.prove(&constraint.polynomial).map_err(|source| BodyError::Certificate { index, source })?;
+        }
+        let placement = Placement::new(normalization.linear, normalization.center, 0.0, 0.0);
+        let interior_point =
+            interior.unwrap_or_else(|| inverse * extent::deepest_point(&constraints).0 + normalization.center);
+        let min_value = largest(constraints.iter().map(|c| placement.sample(c, &interior_point).value_upper()));
+        if !(min_value <= 1.0 - MIN_DEPTH) {
+            return Err(BodyError::Interior { min_value });
+        }
+        let Extent { bounding_box, circumscribed } =
+            Extent::prove(&constraints, &placement, &inverse, &interior_point)?;
+        let boundary = surface::proven_boundary(&constraints, &placement, &inverse, &interior_point);
+        let in_radius = surface::in_radius(&boundary, &interior_point);
+        if !(in_radius > 0.0) {
+            return Err(BodyError::Interior { min_value });
+        }
+        let interior_z = normalization.linear * (interior_point - normalization.center);
+        let volume = surface::volume(&constraints, &normalization.linear, &interior_z);
+        let id = BodyId::of(&normalization, &constraints);
+        Ok(Self {
+            name: name.to_owned(),
+            id,
+            normalization,
+            inverse,
+            constraints,
+            placement,
+            interior_point,
+            min_value,
+            in_radius,
+            bounding_box,
+            circumscribed,
+            boundary,
+            volume,
+            points: None,
+            provenance: None,
+        })
+    }
+
+    /// Name given by its maker; not part of the identity.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Hash of the content.
+    pub fn id(&self) -> &BodyId {
+        &self.id
+    }
+
+    /// Highest degree of the constraints.
+    pub fn degree(&self) -> usize {
+        self.constraints.iter().map(|c| c.polynomial.degree()).max().unwrap_or(0)
+    }
+
+    /// Map to the normalized frame.
+    pub fn normalization(&self) -> &Normalization {
+        &self.normalization
+    }
+
+    /// The constraints `g_i <= 1`, in the normalized frame.
+    pub fn constraints(&self) -> &[Constraint] {
+        &self.constraints
+    }
+
+    /// The body's place in its own frame.
+    pub fn placement(&self) -> &Placement {
+        &self.placement
+    }
+
+    /// Minimiser of the largest constraint, up to the accuracy of its computation; proven to lie inside.
+    pub fn interior_point(&self) -> &Vector3<f64> {
+        &self.interior_point
+    }
+
+    /// Upper bound of the largest constraint at the interior point: `min p` up to the accuracy of its computation.
+    pub fn min_value(&self) -> f64 {
+        self.min_value
+    }
+
+    /// Radius of a ball about the interior point that is proven to lie inside.
+    pub fn in_radius(&self) -> f64 {
+        self.in_radius
+    }
+
+    /// A ball proven to contain the body.
+    pub fn circumscribed(&self) -> &Ball {
+        &self.circumscribed
+    }
+
+    /// A box proven to contain the body.
+    pub fn bounding_box(&self) -> &Aabb {
+        &self.bounding_box
+    }
+
+    /// Points proven to lie in the body, close to its boundary, spread all around.
+    pub fn boundary(&self) -> &[Vector3<f64>] {
+        &self.boundary
+    }
+
+    /// Volume by quadrature.
+    pub fn volume(&self) -> Volume {
+        self.volume
+    }
+
+    /// Which points the body was proven to contain.
+    pub fn points(&self) -> Option<&ContainedPoints> {
+        self.points.as_ref()
+    }
+
+    /// Where the body comes from.
+    pub fn provenance(&self) -> Option<&Provenance> {
+        self.provenance.as_ref()
+    }
+
+    /// The largest constraint at a point of the body frame, up to rounding: at most 1 inside.
+    pub fn value(&self, x: &Vector3<f64>) -> f64 {
+        largest(self.constraints.iter().map(|c| self.placement.jet(c, x).value))
+    }
+
+    /// Rigorous upper bound of the largest constraint at a point of the body frame.
+    pub fn value_upper(&self, x: &Vector3<f64>) -> f64 {
+        largest(self.constraints.iter().map(|c| self.placement.sample(c, x).value_upper()))
+    }
+
+    /// Boundary point of the body frame met by the ray from the interior point along `direction` of the normalized frame.
+    pub fn boundary_along(&self, direction: &Vector3<f64>) -> Vector3<f64> {
+        let start = self.normalization.linear * (self.interior_point - self.normalization.center);
+        let radius = surface::radius(&self.constraints, &start, direction);
+        self.inverse * (direction * radius) + self.interior_point
+    }
+
+    /// Proves every point inside, rounding included; with convexity their whole convex hull is.
+    ///
+    /// # Errors
+    /// The point that fails most.
+    pub fn prove_contains(&self, points: &[Vector3<f64>]) -> Result<f64, NotContained> {
+        let mut worst = NotContained { index: 0, value: f64::MIN };
+        for (index, point) in points.iter().enumerate() {
+            let value = self.value_upper(point);
+            // A NaN is never inside.
+            if !(value <= worst.value) {
+                worst = NotContained { index, value };
+                if value.is_nan() {
+                    break;
+                }
+            }
+        }
+        if worst.value <= 1.0 { Ok(worst.value) } else { Err(worst) }
+    }
+
+    /// The same body with the record of the points it is proven to contain.
+    ///
+    /// # Errors
+    /// The point that fails most.
+    pub fn with_points(mut self, points: &[Vector3<f64>]) -> Result<Self, NotContained> {
+        self.prove_contains(points)?;
+        self.points = Some(ContainedPoints { count: points.len(), sha256: id::hash_points(points) });
+        Ok(self)
+    }
+
+    /// The same body with its origin noted.
+    pub fn with_provenance(mut self, provenance: Provenance) -> Self {
+        self.provenance = Some(provenance);
+        self
+    }
+}
+
+/// Largest of the values; NaN if any is NaN, which `f64::max` would pass over.
+fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(f64::NEG_INFINITY, |most, value| if value.is_nan() || value > most { value } else { most })
+}
+
+fn invert(normalization: &Normalization) -> Result<Matrix3<f64>, BodyError> {
+    let Normalization { center, linear } = normalization;
+    if !center.iter().chain(linear.iter()).all(|value| value.is_finite()) {
+        return Err(BodyError::Normalization("an entry is not finite"));
+    }
+    if center.amax() > 1e30 || !(1e-30..=1e30).contains(&linear.amax()) {
+        return Err(BodyError::Normalization("an entry is out of range"));
+    }
+    let inverse = linear.try_inverse().ok_or(BodyError::Normalization("linear is singular"))?;
+    if (linear * inverse - Matrix3::identity()).amax() < 1e-6 && inverse.amax() <= 1e30 {
+        Ok(inverse)
+    } else {
+        Err(BodyError::Normalization("linear is numerically singular"))
+    }
+}
+
+#[cfg(test)]
+mod tests;

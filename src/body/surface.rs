@@ -1,0 +1,150 @@
+//! The boundary as seen from the interior point: radii along rays, an inscribed ball, the volume.
+
+use super::Constraint;
+use super::placement::Placement;
+use super::sphere::Sphere;
+use nalgebra::{Matrix3, Vector3};
+use std::f64::consts::PI;
+
+/// Distance from the interior point `start` along `direction` to the boundary, all in the normalized frame: the smallest
+/// root of `g_i = 1` over the constraints. Infinite where no constraint bounds the ray.
+///
+/// Each `g_i` is convex along the ray and below 1 at its start, so Newton's method from outside decreases monotonically to
+/// the root; the start outside is found by doubling.
+pub(super) fn radius(constraints: &[Constraint], start: &Vector3<f64>, direction: &Vector3<f64>) -> f64 {
+    let mut smallest = f64::INFINITY;
+    for constraint in constraints {
+        let along = |r: f64| {
+            let jet = constraint.polynomial.evaluate(&(start + direction * r));
+            (jet.value - 1.0, jet.gradient.dot(direction))
+        };
+        let mut r = if smallest.is_finite() { smallest } else { 1.0 };
+        let mut at = along(r);
+        if at.0 <= 0.0 && smallest.is_finite() {
+            continue;
+        }
+        while at.0 <= 0.0 && r < 1e9 {
+            r *= 2.0;
+            at = along(r);
+        }
+        if at.0 <= 0.0 {
+            continue;
+        }
+        for _ in 0..200 {
+            let next = r - at.0 / at.1;
+            // Rounding ends the monotone descent.
+            if !(next < r && next > 0.0) {
+                break;
+            }
+            let done = r - next <= 1e-15 * r;
+            r = next;
+            if done {
+                break;
+            }
+            at = along(r);
+            if at.0 <= 0.0 {
+                break;
+            }
+        }
+        smallest = smallest.min(r);
+    }
+    smallest
+}
+
+/// Points proven to lie in the body, close to its boundary, one per direction of the shared sphere.
+pub(super) fn proven_boundary(
+    constraints: &[Constraint],
+    placement: &Placement,
+    inverse: &Matrix3<f64>,
+    interior: &Vector3<f64>,
+) -> Vec<Vector3<f64>> {
+    let start = placement.linear() * (interior - placement.origin());
+    let inside = |x: &Vector3<f64>| constraints.iter().all(|c| placement.sample(c, x).value_upper() <= 1.0);
+    Sphere::shared()
+        .vertices()
+        .iter()
+        .map(|u| {
+            let ray = inverse * u * radius(constraints, &start, u);
+            // Pull in until rounding is paid for; the interior point itself is inside.
+            let mut pull = 1e-15;
+            loop {
+                let x = interior + ray * (1.0 - pull);
+                if inside(&x) {
+                    return x;
+                }
+                if pull >= 0.5 {
+                    return *interior;
+                }
+                pull *= 4.0;
+            }
+        })
+        .collect()
+}
+
+/// Radius of a ball about the interior point inside the body: the body contains the tetrahedra that the interior point
+/// spans with the triangles of its proven boundary points.
+pub(super) fn in_radius(boundary: &[Vector3<f64>], interior: &Vector3<f64>) -> f64 {
+    let smallest = Sphere::shared()
+        .triangles()
+        .iter()
+        .map(|&[a, b, c]| {
+            let normal = (boundary[b] - boundary[a]).cross(&(boundary[c] - boundary[a]));
+            normal.dot(&(boundary[a] - interior)) / normal.norm()
+        })
+        .fold(f64::INFINITY, |least, value| if value.is_nan() || value < least { value } else { least });
+    let slack = 64.0 * f64::EPSILON * (interior.norm() + boundary.iter().map(|x| x.norm()).fold(0.0, f64::max));
+    (smallest - slack) * (1.0 - 1e-13)
+}
+
+/// Volume in cubic metres and an estimate of its quadrature error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Volume {
+    /// Volume, m³.
+    pub volume_m3: f64,
+    /// Difference to the rule of half the resolution, m³.
+    pub error_m3: f64,
+}
+
+/// `V = ⅓ ∫ r(u)³ du / |det L|` over the unit sphere of the normalized frame about the interior point.
+pub(super) fn volume(constraints: &[Constraint], linear: &Matrix3<f64>, start: &Vector3<f64>) -> Volume {
+    let scale = 1.0 / linear.determinant().abs();
+    let rule = |rings: usize| {
+        let sectors = 2 * rings;
+        let mut sum = 0.0;
+        for (cosine, weight) in gauss_legendre(rings) {
+            let sine = (1.0 - cosine * cosine).sqrt();
+            for k in 0..sectors {
+                let angle = PI * (2 * k + 1) as f64 / sectors as f64;
+                let u = Vector3::new(sine * angle.cos(), sine * angle.sin(), cosine);
+                sum += weight * radius(constraints, start, &u).powi(3);
+            }
+        }
+        sum * 2.0 * PI / sectors as f64 / 3.0 * scale
+    };
+    let (fine, coarse) = (rule(40), rule(20));
+    Volume { volume_m3: fine, error_m3: (fine - coarse).abs() }
+}
+
+/// Nodes and weights of the Gauss-Legendre rule on [-1, 1] (Newton on the Legendre polynomial).
+fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
+    (0..n)
+        .map(|i| {
+            let mut x = (PI * (i as f64 + 0.75) / (n as f64 + 0.5)).cos();
+            let mut slope = 1.0;
+            for _ in 0..100 {
+                let (mut previous, mut value) = (1.0, x);
+                for k in 2..=n {
+                    let k = k as f64;
+                    (previous, value) = (value, ((2.0 * k - 1.0) * x * value - (k - 1.0) * previous) / k);
+                }
+                slope = n as f64 * (x * value - previous) / (x * x - 1.0);
+                let step = value / slope;
+                x -= step;
+                if step.abs() < 1e-15 {
+                    break;
+                }
+            }
+            (x, 2.0 / ((1.0 - x * x) * slope * slope))
+        })
+        .collect()
+}

@@ -1,0 +1,10 @@
+//! A globally convergent solver for the tiny convex programs of this service: up to six variables, up to 32 rows.
+//!
+//! Support points, deepest points, distances and level distances are all `min f(v)` subject to `c_i(v) <= 0` with smooth
+//! convex data, and all have a strictly feasible start at hand. The solver is a primal-dual interior-point method that
+//! keeps every iterate strictly feasible; it knows no tolerance: the caller looks at each iterate and stops when its own
+//! proven bracket is narrow enough. Nothing is allocated.
+
+mod interior_point;
+
+pub use interior_point::{Iterate, MAX_ROWS, Program, Row, Rows, minimise};

@@ -1,0 +1,75 @@
+//! Monomials in three variables, in the graded order the evaluation table is laid out in.
+
+/// Exponents of a monomial `z1^e1 z2^e2 z3^e3`.
+pub type Exponents = [u8; 3];
+
+/// Total degree of a monomial.
+pub fn degree_of(exponents: Exponents) -> usize {
+    exponents.iter().map(|&e| usize::from(e)).sum()
+}
+
+/// Number of monomials of degree at most `degree`: C(degree + 3, 3).
+pub(crate) const fn count(degree: usize) -> usize {
+    (degree + 1) * (degree + 2) * (degree + 3) / 6
+}
+
+/// All monomials of degree at most `max_degree`, by degree, within a degree from `z1^t` to `z3^t`.
+///
+/// Each degree's block follows from the one before: all of it times z1, its z1-free tail times z2, its last times z3.
+/// [`fill`] computes the values in the same order.
+pub fn monomials(max_degree: usize) -> Vec<Exponents> {
+    let mut list = Vec::with_capacity(count(max_degree));
+    for total in 0..=max_degree as u8 {
+        for e1 in (0..=total).rev() {
+            for e2 in (0..=total - e1).rev() {
+                list.push([e1, e2, total - e1 - e2]);
+            }
+        }
+    }
+    list
+}
+
+/// Values of all monomials of degree at most `degree` at `z`, in the order of [`monomials`]; `K` is their number.
+///
+/// A monomial of degree t costs t - 1 multiplications in sequence, hence at most t - 1 roundings.
+#[inline(always)]
+pub(crate) fn fill<const K: usize>(degree: usize, z: [f64; 3], values: &mut [f64; K]) {
+    debug_assert_eq!(K, count(degree));
+    values[0] = 1.0;
+    let (mut block, mut next) = (0, 1);
+    for total in 1..=degree {
+        let size = total * (total + 1) / 2;
+        for i in 0..size {
+            values[next + i] = z[0] * values[block + i];
+        }
+        for i in 0..total {
+            values[next + size + i] = z[1] * values[block + size - total + i];
+        }
+        values[next + size + total] = z[2] * values[block + size - 1];
+        block = next;
+        next += size + total + 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_follow_the_order_of_the_list() {
+        let z = [1.5, -0.75, 0.3125];
+        let mut values = [0.0; 84];
+        fill::<84>(6, z, &mut values);
+        for (exponents, value) in monomials(6).into_iter().zip(values) {
+            let direct: f64 = (0..3).map(|i| z[i].powi(i32::from(exponents[i]))).product();
+            assert!((value - direct).abs() <= 1e-14 * direct.abs(), "{exponents:?}: {value} against {direct}");
+        }
+    }
+
+    #[test]
+    fn counts_match() {
+        for degree in 0..=8 {
+            assert_eq!(monomials(degree).len(), count(degree));
+        }
+    }
+}
