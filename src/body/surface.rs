@@ -84,14 +84,19 @@ pub(super) fn proven_boundary(
 /// Radius of a ball about the interior point inside the body: the body contains the tetrahedra that the interior point
 /// spans with the triangles of its proven boundary points.
 pub(super) fn in_radius(boundary: &[Vector3<f64>], interior: &Vector3<f64>) -> f64 {
-    let smallest = Sphere::shared()
+    let (smallest, largest) = Sphere::shared()
         .triangles()
         .iter()
         .map(|&[a, b, c]| {
             let normal = (boundary[b] - boundary[a]).cross(&(boundary[c] - boundary[a]));
             normal.dot(&(boundary[a] - interior)) / normal.norm()
         })
-        .fold(f64::INFINITY, |least, value| if value.is_nan() || value < least { value } else { least });
+        // A NaN stays: it proves nothing.
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), value| {
+            if value.is_nan() || least.is_nan() { (f64::NAN, f64::NAN) } else { (least.min(value), most.max(value)) }
+        });
+    // A normalization that mirrors turns every triangle around.
+    let smallest = if largest < 0.0 { -largest } else { smallest };
     let slack = 64.0 * f64::EPSILON * (interior.norm() + boundary.iter().map(|x| x.norm()).fold(0.0, f64::max));
     (smallest - slack) * (1.0 - 1e-13)
 }
