@@ -4,7 +4,9 @@ use super::shapes::Shape;
 use super::sweep::{Answer, Sample, Sweep};
 use super::table::crossings;
 use crate::body::Body;
-use crate::chart::{ChartError, Ink, LineChart, Mark, Outline, Panel, Series, Silhouettes, View, boundary_points, outline};
+use crate::chart::{
+    ChartError, Ink, LineChart, Mark, Outline, Panel, Series, Silhouettes, View, boundary_points, outline,
+};
 use nalgebra::Vector3;
 
 /// Boundary points that an outline is made of.
@@ -45,14 +47,18 @@ pub(super) fn silhouettes(sweep: &Sweep, posed: [(&Shape, &Body); 2]) -> String 
     let rows = [View::Side, View::Top].map(|view| {
         let panel = |(state, x): (&str, f64)| {
             let moves = [(Ink::Orange, x), (Ink::Blue, 0.0)];
-            let moved = |points: &[Vector3<f64>], x: f64| points.iter().map(|p| p + Vector3::x() * x).collect::<Vec<_>>();
+            let moved =
+                |points: &[Vector3<f64>], x: f64| points.iter().map(|p| p + Vector3::x() * x).collect::<Vec<_>>();
             // The human stands behind, the outlines in front.
             let surfaces = posed.iter().zip(moves).rev().map(|((shape, _), (ink, x))| {
                 Outline::surface(ink, &moved(&shape.vertices, x), &shape.triangles, view)
             });
             let outlines =
                 boundaries.iter().zip(moves).rev().map(|(b, (ink, x))| Outline::body(ink, outline(&moved(b, x), view)));
-            Panel { caption: format!("{state}, x = {x:.2} m, {}", view.name()), outlines: surfaces.chain(outlines).collect() }
+            Panel {
+                caption: format!("{state}, x = {x:.2} m, {}", view.name()),
+                outlines: surfaces.chain(outlines).collect(),
+            }
         };
         stages.map(panel).into()
     });

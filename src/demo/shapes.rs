@@ -17,17 +17,25 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// The surface as the text of an OFF file. Coordinates are rounded to a micrometre.
+    /// The surface as the text of an OFF file; a reader gets exactly these coordinates back.
     pub fn to_off(&self) -> String {
         let mut text = format!("OFF\n{} {} 0\n", self.vertices.len(), self.triangles.len());
         // Writing to a string can not fail.
         for v in &self.vertices {
-            let _ = writeln!(text, "{:.6} {:.6} {:.6}", v.x, v.y, v.z);
+            let _ = writeln!(text, "{} {} {}", v.x, v.y, v.z);
         }
         for [a, b, c] in &self.triangles {
             let _ = writeln!(text, "3 {a} {b} {c}");
         }
         text
+    }
+
+    /// The same surface with coordinates rounded to a micrometre, which keeps files short.
+    fn to_micrometres(mut self) -> Shape {
+        for vertex in &mut self.vertices {
+            *vertex = vertex.map(|c| (c * 1e6).round() / 1e6 + 0.0); // + 0.0: no negative zero
+        }
+        self
     }
 
     /// Adds the quadrilateral a, b, c, d (counter-clockwise from outside).
@@ -138,7 +146,7 @@ pub fn chair() -> Shape {
         let x = -0.2 - 0.06 * (z - 0.47) / 0.43;
         chair.bar(at(x, 0.0, z), at(x - 0.011, 0.0, z + 0.08), [0.01, 0.2]);
     }
-    subdivided(&chair, 0.06)
+    subdivided(&chair, 0.06).to_micrometres()
 }
 
 /// A standing human figure, 1.75 m tall, arms somewhat out; limbs and head are swept ellipses.
@@ -166,7 +174,7 @@ pub fn human() -> Shape {
     for vertex in &mut human.vertices {
         vertex.z = (vertex.z - low) / (high - low) * 1.75;
     }
-    human
+    human.to_micrometres()
 }
 
 /// The same surface with every edge halved until none is longer than `longest` metres: a scan has many vertices too.
@@ -239,5 +247,7 @@ mod tests {
         let text = shape.to_off();
         assert_eq!(text.lines().count(), 2 + shape.vertices.len() + shape.triangles.len());
         assert!(text.starts_with("OFF\n"));
+        let first: Vec<f64> = text.lines().nth(2).unwrap().split(' ').map(|c| c.parse().unwrap()).collect();
+        assert_eq!(first, shape.vertices[0].as_slice(), "coordinates survive exactly");
     }
 }
