@@ -140,9 +140,9 @@ impl Silhouettes {
         let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
         let boxes: Vec<Vec<Range2>> = self.rows.iter().map(|row| ranges(row)).collect();
         let all = || boxes.iter().flatten();
-        let span = all().map(|b| b.width()).fold(0.0, f64::max);
+        let span = all().map(Range2::width).fold(0.0, f64::max);
         let span = if span > 0.0 { span } else { 1.0 };
-        let tallest = all().map(|b| b.height()).fold(0.0, f64::max);
+        let tallest = all().map(Range2::height).fold(0.0, f64::max);
         // Pixels per metre, so that neither side of a panel grows out of hand.
         let scale = (PANEL / span).min(1.4 * PANEL / tallest.max(1e-300));
         let cell = (span * scale).max(150.0);
@@ -263,7 +263,7 @@ fn write_scale_bar(svg: &mut String, top: f64, scale: f64, cell: f64) {
     } else if length >= 0.01 {
         format!("{:.0} cm", length * 100.0)
     } else {
-        format!("{:.1e} m", length)
+        format!("{length:.1e} m")
     };
     let _ = writeln!(
         svg,

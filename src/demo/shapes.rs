@@ -31,7 +31,7 @@ impl Shape {
     }
 
     /// The same surface with coordinates rounded to a micrometre, which keeps files short.
-    fn to_micrometres(mut self) -> Shape {
+    fn in_micrometres(mut self) -> Shape {
         for vertex in &mut self.vertices {
             *vertex = vertex.map(|c| (c * 1e6).round() / 1e6 + 0.0); // + 0.0: no negative zero
         }
@@ -146,7 +146,7 @@ pub fn chair() -> Shape {
         let x = -0.2 - 0.06 * (z - 0.47) / 0.43;
         chair.bar(at(x, 0.0, z), at(x - 0.011, 0.0, z + 0.08), [0.01, 0.2]);
     }
-    subdivided(&chair, 0.06).to_micrometres()
+    subdivided(&chair, 0.06).in_micrometres()
 }
 
 /// A standing human figure, 1.75 m tall, arms somewhat out; limbs and head are swept ellipses.
@@ -174,7 +174,7 @@ pub fn human() -> Shape {
     for vertex in &mut human.vertices {
         vertex.z = (vertex.z - low) / (high - low) * 1.75;
     }
-    human.to_micrometres()
+    human.in_micrometres()
 }
 
 /// The same surface with every edge halved until none is longer than `longest` metres: a scan has many vertices too.
