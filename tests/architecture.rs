@@ -14,7 +14,8 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
     ("measure", &["body", "polynomial", "optimize"]),
     ("fit", &["body", "polynomial"]),
     ("scene", &["measure", "body"]),
-    ("store", &["body", "scene"]),
+    // Of measure, the pose.
+    ("store", &["body", "scene", "measure"]),
     ("service", &["store", "scene", "measure", "body"]),
     ("chart", &["fit", "measure", "body"]),
     ("demo", ANY),
