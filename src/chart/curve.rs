@@ -174,7 +174,7 @@ fn color(ink: Ink) -> RGBColor {
 
 /// A tick label without trailing zeros and without the noise of binary fractions.
 fn tidy(value: f64) -> String {
-    let text = if value != 0.0 && (value.abs() >= 1e5 || value.abs() < 1e-3) {
+    let text = if value != 0.0 && (value.abs() >= 1e4 || value.abs() < 1e-3) {
         return format!("{value:.0e}");
     } else {
         format!("{value:.4}")

@@ -63,8 +63,10 @@ fn state(sample: &Sample) -> &'static str {
         "apart"
     } else if levels.iter().any(|level| level.upper < 1.0) {
         "overlapping"
+    } else if levels.iter().any(|level| level.upper - level.lower < 1e-6) {
+        "touching" // within a millionth
     } else {
-        "touching"
+        "undecided"
     }
 }
 
