@@ -70,10 +70,10 @@ fn state(sample: &Sample) -> &'static str {
     }
 }
 
-/// Positions where an answer passes 1, by linear interpolation between the steps.
+/// Positions where an answer passes 1, interpolated between the steps in the logarithm: level distances grow like a power.
 pub(super) fn crossings(samples: &[Sample], answer: fn(&Sample) -> Answer) -> Vec<f64> {
     let steps = samples.windows(2).filter_map(|pair| {
-        let [before, after] = [answer(&pair[0]).value - 1.0, answer(&pair[1]).value - 1.0];
+        let [before, after] = [&pair[0], &pair[1]].map(|sample| answer(sample).value.max(f64::MIN_POSITIVE).ln());
         (before * after < 0.0).then(|| pair[0].x + (pair[1].x - pair[0].x) * before / (before - after))
     });
     steps.collect()
