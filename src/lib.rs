@@ -5,6 +5,7 @@
 //! a bracket proven to contain the truth.
 
 pub mod body;
+pub mod chart;
 pub mod measure;
 pub mod optimize;
 pub mod polynomial;

@@ -46,6 +46,15 @@ fn extents_of_exact_bodies_match_closed_forms() {
 }
 
 #[test]
+fn a_normalization_may_mirror() {
+    let ellipsoid = Body::ellipsoid("egg", Vector3::new(0.1, 0.2, 0.3), Vector3::new(1.0, 2.0, 0.5)).unwrap();
+    let mut normalization = *ellipsoid.normalization();
+    normalization.linear = -normalization.linear;
+    let mirrored = Body::new("egg", normalization, ellipsoid.constraints().to_vec()).unwrap();
+    assert!((mirrored.in_radius() - ellipsoid.in_radius()).abs() < 1e-12);
+}
+
+#[test]
 fn boxes_and_cylinders_are_tight() {
     let h = Vector3::new(0.5, 1.0, 2.0);
     let body = Body::cuboid("box", h).unwrap();

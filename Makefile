@@ -1,0 +1,25 @@
+# Everything a fresh Debian or Ubuntu machine needs beyond Rust (rustup), make and a C compiler.
+.PHONY: help setup demo test
+
+help:
+	@echo 'make demo    fit two shapes, serve them, sweep one through the other, draw the curves'
+	@echo 'make test    run all tests'
+	@echo 'make setup   install missing system packages (demo and test do this first)'
+
+setup:
+	@.ci/setup
+
+# rustup puts cargo here; a shell opened before the installation does not know it yet.
+export PATH := $(PATH):$(or $(CARGO_HOME),$(HOME)/.cargo)/bin
+
+demo: setup
+	cargo run --release -- demo
+
+# One profile for tests and demo: nothing is built twice.
+test: setup
+	@if cargo nextest --version >/dev/null 2>&1; then \
+	    echo 'cargo nextest run --release'; cargo nextest run --release; \
+	else \
+	    echo 'cargo test --release --lib --bins --tests'; cargo test --release --lib --bins --tests; \
+	fi
+	cargo test --doc --release

@@ -1,0 +1,224 @@
+//! Line charts with a logarithmic vertical axis.
+
+use super::Ink;
+use plotters::coord::combinators::IntoLogRange;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+/// Why a chart could not be drawn.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum ChartError {
+    /// No series holds a finite point.
+    #[error("a chart needs at least one finite point; none of its series has any")]
+    Empty,
+    /// The drawing library gave up.
+    #[error("the chart can not be drawn: {0}")]
+    Drawing(String),
+}
+
+/// One curve.
+#[derive(Clone, Debug)]
+pub struct Series {
+    /// Name in the legend.
+    pub label: String,
+    /// Colour of the line.
+    pub ink: Ink,
+    /// Dashed instead of solid, so that two curves differ by more than their colour.
+    pub dashed: bool,
+    /// Points in drawing order. A value at or below zero is drawn on the lower edge.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// A horizontal line with a name.
+#[derive(Clone, Debug)]
+pub struct Mark {
+    /// Height of the line.
+    pub value: f64,
+    /// Text at its right end, above the line.
+    pub label: String,
+}
+
+/// Curves over a common axis; the vertical axis is logarithmic.
+#[derive(Clone, Debug)]
+pub struct LineChart {
+    /// Heading.
+    pub title: String,
+    /// Name and unit of the horizontal axis.
+    pub x_label: String,
+    /// Name and unit of the vertical axis.
+    pub y_label: String,
+    /// The curves.
+    pub series: Vec<Series>,
+    /// A marked height.
+    pub mark: Mark,
+}
+
+const SIZE: (u32, u32) = (760, 440);
+/// Left end of the axes, pixels.
+const LEFT: i32 = 80;
+const FONT: &str = "sans-serif";
+/// Decades below the mark at which a curve is cut off: nothing can be told apart there.
+const DECADES_BELOW: i32 = 3;
+
+impl LineChart {
+    /// The chart as an SVG document.
+    ///
+    /// # Errors
+    /// [`ChartError::Empty`] if there is nothing to draw.
+    pub fn to_svg(&self) -> Result<String, ChartError> {
+        let frame = self.frame().ok_or(ChartError::Empty)?;
+        let mut svg = String::new();
+        self.draw(&mut svg, &frame).map_err(|error| ChartError::Drawing(error.to_string()))?;
+        Ok(svg)
+    }
+
+    /// Ranges that hold all finite points and the mark, the vertical one in whole decades.
+    fn frame(&self) -> Option<Frame> {
+        let finite = || self.series.iter().flat_map(|s| &s.points).filter(|(x, y)| x.is_finite() && y.is_finite());
+        finite().next()?;
+        let heights = || finite().map(|(_, y)| *y).filter(|y| *y > 0.0).chain([self.mark.value]);
+        let cut = self.mark.value * 10f64.powi(-DECADES_BELOW);
+        let low = heights().fold(f64::INFINITY, f64::min).max(cut).log10().floor();
+        let high = heights().fold(0.0, f64::max).log10().ceil();
+        let left = finite().map(|(x, _)| *x).fold(f64::INFINITY, f64::min);
+        let right = finite().map(|(x, _)| *x).fold(f64::NEG_INFINITY, f64::max);
+        let pad = if right > left { 0.0 } else { 1.0 };
+        // A little more than a decade above a curve that ends on one.
+        Some(Frame { x: (left - pad, right + pad), y: (10f64.powf(low), 10f64.powf(high.max(low + 1.0)) * 1.05) })
+    }
+
+    fn draw(&self, svg: &mut String, frame: &Frame) -> Result<(), Box<dyn std::error::Error>> {
+        let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
+        let grey = color(Ink::Grey);
+        let text = |size: i32| (FONT, size).into_font().color(&grey);
+        root.draw(&Text::new(self.title.as_str(), (LEFT, 10), text(17)))?;
+        self.draw_legend(&root)?;
+
+        let (_, body) = root.split_vertically(58);
+        let mut chart = ChartBuilder::on(&body)
+            .margin_left(14)
+            .margin_right(24)
+            .margin_bottom(6)
+            .x_label_area_size(46)
+            .y_label_area_size(66)
+            .build_cartesian_2d(frame.x.0..frame.x.1, (frame.y.0..frame.y.1).log_scale())?;
+        chart
+            .configure_mesh()
+            .bold_line_style(grey.mix(0.25))
+            .light_line_style(TRANSPARENT)
+            .axis_style(grey)
+            .x_labels(9)
+            .x_label_formatter(&|x| tidy(*x))
+            .y_label_formatter(&|y| tidy(*y))
+            .x_desc(self.x_label.as_str())
+            .y_desc(self.y_label.as_str())
+            .label_style(text(13))
+            .axis_desc_style(text(14))
+            .draw()?;
+
+        let mark = self.mark.value;
+        chart.draw_series(LineSeries::new([(frame.x.0, mark), (frame.x.1, mark)], grey.stroke_width(2)))?;
+        let anchored = text(13).pos(Pos::new(HPos::Right, VPos::Bottom));
+        let (right, height) = chart.backend_coord(&(frame.x.1, mark));
+        root.draw(&Text::new(self.mark.label.as_str(), (right - 4, height - 4), anchored))?;
+
+        for series in &self.series {
+            let points = series.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite());
+            let points: Vec<(f64, f64)> = points.map(|(x, y)| (*x, y.max(frame.y.0))).collect();
+            let style = color(series.ink).stroke_width(3);
+            if series.dashed {
+                chart.draw_series(DashedLineSeries::new(points, 9, 6, style))?;
+            } else {
+                chart.draw_series(LineSeries::new(points, style))?;
+            }
+        }
+        root.present()?;
+        Ok(())
+    }
+
+    /// Names of the curves in a row between heading and axes, where no curve can run behind them.
+    fn draw_legend(
+        &self,
+        root: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+    ) -> Result<(), Box<dyn std::error::Error>> {
+        let mut left = LEFT;
+        for series in &self.series {
+            let style = color(series.ink).stroke_width(3);
+            let ends = [(left, 45), (left + 34, 45)];
+            if series.dashed {
+                let dashes = [(0, 9), (13, 22), (26, 34)];
+                for (from, to) in dashes {
+                    root.draw(&PathElement::new([(left + from, 45), (left + to, 45)], style))?;
+                }
+            } else {
+                root.draw(&PathElement::new(ends, style))?;
+            }
+            let text = (FONT, 14).into_font().color(&color(Ink::Grey)).pos(Pos::new(HPos::Left, VPos::Center));
+            root.draw(&Text::new(series.label.as_str(), (left + 42, 45), text))?;
+            // The width of a letter is a guess: the reader's font is not known here.
+            left += 70 + 8 * series.label.chars().count() as i32;
+        }
+        Ok(())
+    }
+}
+
+struct Frame {
+    x: (f64, f64),
+    y: (f64, f64),
+}
+
+fn color(ink: Ink) -> RGBColor {
+    let (red, green, blue) = ink.rgb();
+    RGBColor(red, green, blue)
+}
+
+/// A tick label without trailing zeros and without the noise of binary fractions.
+fn tidy(value: f64) -> String {
+    let text = if value != 0.0 && (value.abs() >= 1e4 || value.abs() < 1e-3) {
+        return format!("{value:.0e}");
+    } else {
+        format!("{value:.4}")
+    };
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".into() } else { text.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chart(points: Vec<(f64, f64)>) -> LineChart {
+        LineChart {
+            title: "Title".into(),
+            x_label: "position (m)".into(),
+            y_label: "level distance".into(),
+            series: vec![Series { label: "first".into(), ink: Ink::Blue, dashed: true, points }],
+            mark: Mark { value: 1.0, label: "touching".into() },
+        }
+    }
+
+    #[test]
+    fn a_chart_names_its_axes_and_curves() {
+        let svg = chart((0..50).map(|i| (f64::from(i) / 50.0, 0.2 + f64::from(i))).collect()).to_svg().unwrap();
+        for text in ["Title", "position (m)", "level distance", "first", "touching"] {
+            assert!(svg.contains(text), "{text} is missing");
+        }
+        assert!(!svg.contains("NaN"));
+    }
+
+    #[test]
+    fn odd_values_are_drawn_or_refused() {
+        assert_eq!(chart(vec![(f64::NAN, 1.0)]).to_svg(), Err(ChartError::Empty));
+        assert!(chart(vec![(0.0, 1.0)]).to_svg().is_ok());
+        assert!(chart(vec![(0.0, -2.0), (1.0, 0.0), (2.0, f64::INFINITY), (3.0, 1e300)]).to_svg().is_ok());
+    }
+
+    #[test]
+    fn tick_labels_are_short() {
+        for (value, text) in
+            [(0.0, "0"), (-1e-17, "-1e-17"), (0.1, "0.1"), (100.0, "100"), (-1.5, "-1.5"), (1e6, "1e6")]
+        {
+            assert_eq!(tidy(value), text);
+        }
+    }
+}

@@ -1,0 +1,327 @@
+//! Silhouettes of convex bodies, and drawings of them in a grid of panels with one common scale.
+
+use super::Ink;
+use nalgebra::Vector3;
+use std::f64::consts::TAU;
+use std::fmt::Write;
+
+/// Where the onlooker stands; the picture's axes are in metres, the second one upwards.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum View {
+    /// Seen from `-y`: x to the right, z up.
+    Side,
+    /// Seen from `+x`: y to the right, z up.
+    Front,
+    /// Seen from `+z`: x to the right, y up.
+    Top,
+}
+
+impl View {
+    /// The picture coordinates of a point, metres.
+    pub fn project(self, point: &Vector3<f64>) -> [f64; 2] {
+        match self {
+            View::Side => [point.x, point.z],
+            View::Front => [point.y, point.z],
+            View::Top => [point.x, point.y],
+        }
+    }
+
+    /// Names of the picture's two axes and of the direction.
+    pub fn name(self) -> &'static str {
+        match self {
+            View::Side => "side (x, z)",
+            View::Front => "front (y, z)",
+            View::Top => "top (x, y)",
+        }
+    }
+}
+
+/// `count` boundary points of a body, one along each of as many even directions (a Fibonacci lattice).
+///
+/// `along` gives the boundary point met by the ray in a unit direction, such as `Body::boundary_along`.
+pub fn boundary_points(along: impl Fn(&Vector3<f64>) -> Vector3<f64>, count: usize) -> Vec<Vector3<f64>> {
+    let golden = TAU * (3.0 - 5f64.sqrt()) / 2.0;
+    let direction = |i: usize| {
+        let z = 1.0 - (2 * i + 1) as f64 / count as f64;
+        let (sin, cos) = (golden * i as f64).sin_cos();
+        let across = (1.0 - z * z).sqrt();
+        Vector3::new(across * cos, across * sin, z)
+    };
+    (0..count).map(|i| along(&direction(i))).collect()
+}
+
+/// The silhouette of the convex hull of `points`: its corners in picture coordinates, metres, counter-clockwise.
+pub fn outline(points: &[Vector3<f64>], view: View) -> Vec<[f64; 2]> {
+    let mut flat: Vec<[f64; 2]> = points.iter().map(|point| view.project(point)).collect();
+    flat.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    flat.dedup();
+    // Andrew's monotone chain: the lower side from left to right, the upper side back.
+    let half = |points: &mut dyn Iterator<Item = [f64; 2]>| {
+        let mut chain: Vec<[f64; 2]> = Vec::new();
+        for point in points {
+            while let [.., a, b] = chain[..] {
+                if turn(a, b, point) > 0.0 {
+                    break;
+                }
+                chain.pop();
+            }
+            chain.push(point);
+        }
+        chain.pop(); // the first of the other side
+        chain
+    };
+    let mut hull = half(&mut flat.iter().copied());
+    hull.extend(half(&mut flat.iter().rev().copied()));
+    hull
+}
+
+/// Twice the signed area of the triangle a, b, c; positive if counter-clockwise.
+fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}
+
+/// One drawn thing: the outline of a body, or the triangles of an object.
+#[derive(Clone, Debug)]
+pub struct Outline {
+    /// Colour.
+    pub ink: Ink,
+    /// Polygons in picture coordinates, metres.
+    pub polygons: Vec<Vec<[f64; 2]>>,
+    /// Drawn as one filled area, the union of the polygons; otherwise as lines over a faint area.
+    pub solid: bool,
+}
+
+impl Outline {
+    /// The outline of a body.
+    pub fn body(ink: Ink, polygon: Vec<[f64; 2]>) -> Outline {
+        Outline { ink, polygons: vec![polygon], solid: false }
+    }
+
+    /// The picture of a triangle surface, the triangles facing the onlooker or not.
+    pub fn surface(ink: Ink, vertices: &[Vector3<f64>], triangles: &[[usize; 3]], view: View) -> Outline {
+        let flat: Vec<[f64; 2]> = vertices.iter().map(|vertex| view.project(vertex)).collect();
+        let corners = triangles.iter().map(|[a, b, c]| [flat[*a], flat[*b], flat[*c]]);
+        // One half of a closed surface covers the whole picture of it.
+        let seen = corners.filter(|[a, b, c]| turn(*a, *b, *c) > 0.0);
+        Outline { ink, polygons: seen.map(Vec::from).collect(), solid: true }
+    }
+}
+
+/// One picture with its caption.
+#[derive(Clone, Debug)]
+pub struct Panel {
+    /// Text above the picture.
+    pub caption: String,
+    /// What is drawn, from back to front.
+    pub outlines: Vec<Outline>,
+}
+
+/// Panels in rows, all at one scale, with a scale bar and a legend.
+#[derive(Clone, Debug)]
+pub struct Silhouettes {
+    /// Heading.
+    pub title: String,
+    /// Colours and their meaning.
+    pub legend: Vec<(Ink, String)>,
+    /// Rows of panels.
+    pub rows: Vec<Vec<Panel>>,
+}
+
+/// Side of the widest panel, pixels.
+const PANEL: f64 = 250.0;
+const GAP: f64 = 18.0;
+const CAPTION: f64 = 22.0;
+const HEADER: f64 = 58.0;
+const FOOTER: f64 = 34.0;
+
+impl Silhouettes {
+    /// The drawing as an SVG document. Panels of a row share their vertical range, so that floors line up.
+    pub fn to_svg(&self) -> String {
+        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
+        let boxes: Vec<Vec<Range2>> = self.rows.iter().map(|row| ranges(row)).collect();
+        let all = || boxes.iter().flatten();
+        let span = all().map(Range2::width).fold(0.0, f64::max);
+        let span = if span > 0.0 { span } else { 1.0 };
+        let tallest = all().map(Range2::height).fold(0.0, f64::max);
+        // Pixels per metre, so that neither side of a panel grows out of hand.
+        let scale = (PANEL / span).min(1.4 * PANEL / tallest.max(1e-300));
+        let cell = (span * scale).max(150.0);
+        let width = (GAP + columns as f64 * (cell + GAP)).max(420.0);
+        let row_heights: Vec<f64> = boxes.iter().map(|row| row.first().map_or(0.0, |b| b.height() * scale)).collect();
+        let height = HEADER + row_heights.iter().map(|h| h + CAPTION + GAP).sum::<f64>() + FOOTER;
+
+        let mut svg = String::new();
+        let grey = Ink::Grey.hex();
+        // Writing to a string can not fail.
+        let _ = writeln!(
+            svg,
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width:.0} {height:.0}\" width=\"{width:.0}\" \
+             height=\"{height:.0}\" font-family=\"sans-serif\" font-size=\"13\" fill=\"{grey}\">"
+        );
+        let _ = writeln!(svg, "<text x=\"{GAP}\" y=\"24\" font-size=\"17\">{}</text>", escaped(&self.title));
+        self.write_legend(&mut svg);
+        let mut top = HEADER;
+        for ((row, boxes), tall) in self.rows.iter().zip(&boxes).zip(&row_heights) {
+            for (column, (panel, range)) in row.iter().zip(boxes).enumerate() {
+                let left = GAP + column as f64 * (cell + GAP);
+                let _ =
+                    writeln!(svg, "<text x=\"{left:.1}\" y=\"{:.1}\">{}</text>", top + 14.0, escaped(&panel.caption));
+                let middle = left + (cell - range.width() * scale) / 2.0;
+                let origin = [middle - range.low[0] * scale, top + CAPTION + tall + range.low[1] * scale];
+                for outline in &panel.outlines {
+                    write_outline(&mut svg, outline, origin, scale);
+                }
+            }
+            top += CAPTION + tall + GAP;
+        }
+        write_scale_bar(&mut svg, top + 6.0, scale, cell);
+        svg.push_str("</svg>\n");
+        svg
+    }
+
+    fn write_legend(&self, svg: &mut String) {
+        let mut left = GAP;
+        for (ink, label) in &self.legend {
+            let color = ink.hex();
+            let _ = writeln!(
+                svg,
+                "<rect x=\"{left}\" y=\"35\" width=\"14\" height=\"12\" fill=\"{color}\" fill-opacity=\"0.35\" \
+                 stroke=\"{color}\" stroke-width=\"2\"/><text x=\"{}\" y=\"46\">{}</text>",
+                left + 21.0,
+                escaped(label)
+            );
+            left += 46.0 + 7.5 * label.chars().count() as f64;
+        }
+    }
+}
+
+/// A rectangle in picture coordinates, metres.
+#[derive(Clone, Copy)]
+struct Range2 {
+    low: [f64; 2],
+    high: [f64; 2],
+}
+
+impl Range2 {
+    fn width(&self) -> f64 {
+        self.high[0] - self.low[0]
+    }
+
+    fn height(&self) -> f64 {
+        self.high[1] - self.low[1]
+    }
+}
+
+/// The range of each panel of a row, the vertical one common to all.
+fn ranges(row: &[Panel]) -> Vec<Range2> {
+    let range = |points: &mut dyn Iterator<Item = [f64; 2]>| {
+        let empty = Range2 { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
+        let wide = points.filter(|p| p.iter().all(|c| c.is_finite())).fold(empty, |range, p| Range2 {
+            low: [range.low[0].min(p[0]), range.low[1].min(p[1])],
+            high: [range.high[0].max(p[0]), range.high[1].max(p[1])],
+        });
+        if wide.width() >= 0.0 { wide } else { Range2 { low: [0.0; 2], high: [0.0; 2] } }
+    };
+    let points =
+        |panel: &Panel| panel.outlines.iter().flat_map(|o| o.polygons.iter().flatten().copied()).collect::<Vec<_>>();
+    let common = range(&mut row.iter().flat_map(points));
+    let own = row.iter().map(|panel| range(&mut points(panel).into_iter()));
+    own.map(|r| Range2 { low: [r.low[0], common.low[1]], high: [r.high[0], common.high[1]] }).collect()
+}
+
+fn write_outline(svg: &mut String, outline: &Outline, origin: [f64; 2], scale: f64) {
+    let color = outline.ink.hex();
+    let style = if outline.solid {
+        // Strokes close the hair lines between triangles; the group fades the union, not each triangle.
+        format!("<g opacity=\"0.5\" stroke=\"{color}\" stroke-width=\"0.6\"><path fill=\"{color}\"")
+    } else {
+        format!("<g stroke=\"{color}\" stroke-width=\"2\"><path fill=\"{color}\" fill-opacity=\"0.12\"")
+    };
+    let _ = write!(svg, "{style} stroke-linejoin=\"round\" d=\"");
+    for polygon in &outline.polygons {
+        // Steps in tenths of a pixel: thousands of triangles would else make a file of megabytes.
+        let mut last = [0, 0];
+        for (corner, point) in polygon.iter().enumerate() {
+            let pixel = [origin[0] + point[0] * scale, origin[1] - point[1] * scale].map(|c| (c * 10.0).round() as i64);
+            let step = [pixel[0] - last[0], pixel[1] - last[1]].map(|c| c as f64 / 10.0);
+            let _ = write!(svg, "{}{} {}", if corner == 0 { 'M' } else { 'l' }, step[0], step[1]);
+            last = pixel;
+        }
+        svg.push('Z');
+    }
+    svg.push_str("\"/></g>\n");
+}
+
+/// A bar of a round length, about a quarter of a panel.
+fn write_scale_bar(svg: &mut String, top: f64, scale: f64, cell: f64) {
+    let target = cell / 4.0 / scale;
+    let decade = 10f64.powf(target.log10().floor());
+    let length = [5.0, 2.0, 1.0].into_iter().find(|m| m * decade <= target).unwrap_or(1.0) * decade;
+    let end = GAP + length * scale;
+    let label = if length >= 1.0 {
+        format!("{length:.0} m")
+    } else if length >= 0.01 {
+        format!("{:.0} cm", length * 100.0)
+    } else {
+        format!("{length:.1e} m")
+    };
+    let _ = writeln!(
+        svg,
+        "<path d=\"M{GAP} {0:.1}v8M{GAP} {1:.1}H{end:.1}M{end:.1} {0:.1}v8\" stroke=\"{2}\" fill=\"none\"/>\
+         <text x=\"{3:.1}\" y=\"{4:.1}\">{label}</text>",
+        top,
+        top + 4.0,
+        Ink::Grey.hex(),
+        end + 8.0,
+        top + 9.0
+    );
+}
+
+/// Text as XML wants it.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_outline_of_an_ellipsoid_is_full() {
+        let axes = Vector3::new(1.0, 0.5, 2.0);
+        let points = boundary_points(|u| u.component_mul(&axes) + Vector3::new(1.0, -2.0, 0.5), 4000);
+        let outline = outline(&points, View::Top);
+        let high = outline.iter().map(|p| p[0]).fold(f64::NEG_INFINITY, f64::max);
+        assert!((high - 2.0).abs() < 5e-3, "{high}");
+        let area: f64 =
+            outline.iter().zip(outline.iter().cycle().skip(1)).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum();
+        assert!((area / 2.0 / (std::f64::consts::PI * 0.5) - 1.0).abs() < 0.01, "counter-clockwise and full");
+    }
+
+    #[test]
+    fn the_outline_of_a_square_has_four_corners() {
+        let corner = |x: f64, z: f64| Vector3::new(x, 0.3, z);
+        let points = [
+            corner(0.0, 0.0),
+            corner(1.0, 0.0),
+            corner(0.5, 0.5),
+            corner(1.0, 1.0),
+            corner(0.0, 1.0),
+            corner(0.5, 0.0),
+        ];
+        assert_eq!(outline(&points, View::Side), [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
+    }
+
+    #[test]
+    fn degenerate_drawings_hold_no_nan() {
+        let panel = |polygon: Vec<[f64; 2]>| Panel {
+            caption: "a < b".into(),
+            outlines: vec![Outline::body(Ink::Blue, polygon)],
+        };
+        for rows in [vec![], vec![vec![]], vec![vec![panel(vec![])]], vec![vec![panel(vec![[1.0, 1.0]])]]] {
+            let svg = Silhouettes { title: "R&D".into(), legend: vec![], rows }.to_svg();
+            assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+            assert!(svg.contains("R&amp;D") && !svg.contains("a < b"));
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! The whole job on shapes the program makes itself: a chair and a human figure become certified bodies, a server keeps
+//! them, and a client sweeps the chair through the human and asks for distances at every step.
+
+mod fits;
+mod plots;
+pub mod shapes;
+mod sweep;
+mod table;
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// Why the demo stopped.
+#[derive(Debug, thiserror::Error)]
+pub enum DemoError {
+    /// A file or folder can not be read or written.
+    #[error("can not use {}: {source}; choose another folder with --out", .path.display())]
+    File {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The tables can not be printed.
+    #[error("can not print: {0}")]
+    Print(#[from] io::Error),
+    /// A shape can not be fitted, or its body is not proven.
+    #[error("no degree-{degree} body for the {name}: {why}")]
+    Fit {
+        /// Name of the shape.
+        name: String,
+        /// Degree asked for.
+        degree: usize,
+        /// The reason.
+        why: String,
+    },
+    /// The server does not start or does not answer.
+    #[error("{step}: {why}")]
+    Server {
+        /// What was being done.
+        step: &'static str,
+        /// The reason.
+        why: String,
+    },
+    /// A plot can not be drawn.
+    #[error(transparent)]
+    Chart(#[from] crate::chart::ChartError),
+}
+
+/// Runs the demo: prints its tables to `text`, writes bodies, meshes, numbers and plots into the folder `out`.
+///
+/// # Errors
+/// The first step that fails; files written before it stay.
+pub fn run(out: &Path, text: &mut impl Write) -> Result<(), DemoError> {
+    std::fs::create_dir_all(out).map_err(|source| DemoError::File { path: out.into(), source })?;
+    let objects = [("chair", shapes::chair()), ("human", shapes::human())];
+
+    writeln!(text, "Two shapes become certified convex bodies:\n")?;
+    fits::print_head(text)?;
+    let mut files = Vec::new();
+    let mut fitted = Vec::new();
+    for (name, shape) in &objects {
+        files.push(write(&out.join(format!("{name}.off")), &shape.to_off())?);
+        for degree in [2, 4, 6] {
+            let fit = fits::fit(name, shape, degree, out)?;
+            fits::print_row(text, &fit)?;
+            files.push(fit.file.clone());
+            fitted.push(fit);
+        }
+    }
+    writeln!(
+        text,
+        "\nhull: convex hull of the shape; no convex body that contains the shape is smaller.\n\
+         proven: the written file alone proves its body convex, bounded and around every point of the shape.\n"
+    )?;
+
+    // The last of each shape's bodies, the tightest, takes part in the sweep.
+    let tightest = |name: &str| fitted.iter().rfind(|fit| fit.name == name);
+    let (Some(chair), Some(human)) = (tightest("chair"), tightest("human")) else { return Ok(()) };
+    let sweep = sweep::run(&chair.file, &human.file)?;
+    table::print(text, &sweep)?;
+
+    files.push(write(&out.join("sweep.csv"), &table::csv(&sweep))?);
+    files.push(write(&out.join("level-distance.svg"), &plots::level_distances(&sweep)?)?);
+    let posed = [(&objects[0].1, &chair.body), (&objects[1].1, &human.body)];
+    files.push(write(&out.join("silhouettes.svg"), &plots::silhouettes(&sweep, posed))?);
+    writeln!(text, "\nWritten:")?;
+    for file in files {
+        writeln!(text, "  {}", file.display())?;
+    }
+    Ok(())
+}
+
+fn write(path: &Path, content: &str) -> Result<PathBuf, DemoError> {
+    std::fs::write(path, content).map_err(|source| DemoError::File { path: path.into(), source })?;
+    Ok(path.into())
+}

@@ -1,0 +1,300 @@
+//! Keeps the rooms of the house apart: who may import whom, and which words belong to one room only.
+//!
+//! The sources are read as text, with comments, literals and test modules blanked out, and every path that starts at
+//! `crate::` (or climbs out of a room with `super::`) is held against the table of allowed directions.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// For each room (folder or file of `src/`), the rooms it may import.
+const DIRECTIONS: &[(&str, &[&str])] = &[
+    ("polynomial", &[]),
+    ("optimize", &[]),
+    ("body", &["polynomial", "optimize"]),
+    ("measure", &["body", "polynomial", "optimize"]),
+    ("fit", &["body", "polynomial"]),
+    ("scene", &["measure", "body"]),
+    // Of measure, the pose.
+    ("store", &["body", "scene", "measure"]),
+    ("service", &["store", "scene", "measure", "body"]),
+    ("chart", &["fit", "measure", "body"]),
+    ("demo", ANY),
+    ("cli", ANY),
+];
+
+const ANY: &[&str] =
+    &["polynomial", "optimize", "body", "measure", "fit", "scene", "store", "service", "chart", "demo"];
+
+/// Words that one room (or a few) may name, and no other: wire formats, bytes on disk.
+const PRIVATE_WORDS: &[(&str, &[&str])] = &[
+    ("prost", &["service"]),
+    ("tonic", &["service"]),
+    ("tonic_prost", &["service"]),
+    ("tonic_health", &["service"]),
+    ("tonic_reflection", &["service"]),
+    ("tonic_types", &["service"]),
+    ("redb", &["store"]),
+    ("clarabel", &["fit"]),
+    ("plotters", &["chart"]),
+];
+
+/// Words that a room may not name: `measure` knows neither clock nor allocator nor threads.
+const FORBIDDEN_WORDS: &[(&str, &[&str])] = &[(
+    "measure",
+    &[
+        "Instant",
+        "SystemTime",
+        "thread",
+        "Vec",
+        "vec",
+        "Box",
+        "Rc",
+        "Arc",
+        "String",
+        "format",
+        "collect",
+        "to_vec",
+        "DMatrix",
+        "DVector",
+    ],
+)];
+
+#[test]
+fn every_room_keeps_to_its_directions() {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut complaints = Vec::new();
+    for file in rust_files(&source) {
+        let inside = file.strip_prefix(&source).expect("the walk starts there");
+        let room = room_of(inside);
+        if ["lib", "main"].contains(&room.as_str()) || is_test_file(inside) {
+            continue;
+        }
+        let text = fs::read_to_string(&file).expect("a source file is readable");
+        let siblings = siblings_of(&file);
+        complaints
+            .extend(check(&room, &text, &siblings).into_iter().map(|what| format!("src/{}: {what}", inside.display())));
+    }
+    assert!(complaints.is_empty(), "\n{}", complaints.join("\n"));
+}
+
+#[test]
+fn a_violation_is_found() {
+    let found = |room: &str, text: &str| !check(room, text, &[]).is_empty();
+    assert!(found("polynomial", "use crate::body::Body;"));
+    assert!(found("body", "fn f() { crate::measure::distance() }"));
+    assert!(found("measure", "use crate::{body::Body, fit::{self, Options}};"));
+    assert!(found("store", "use super::service::wire;"));
+    assert!(found("fit", "use sublevel::service::Server;"));
+    assert!(found("scene", "fn f(status: tonic::Status) {}"));
+    assert!(found("service", "let table = redb::Database::open(path);"));
+    assert!(found("measure", "let list: Vec<f64> = Vec::new();"));
+    assert!(found("measure", "let start = std::time::Instant::now();"));
+    assert!(found("measure", "use std::{thread, f64};"));
+    assert!(found("newcomer", "fn f() {}"), "a room that the table does not know is a violation");
+}
+
+#[test]
+fn what_is_allowed_passes() {
+    let clean = |room: &str, text: &str| assert_eq!(check(room, text, &[]), Vec::<String>::new());
+    clean("measure", "use crate::{body::{Body, Ball}, polynomial::Jet, measure::Pose};");
+    clean("measure", "// Vec and String in a comment\n/* crate::fit */ const NAME: &str = \"Vec crate::fit\";");
+    clean("measure", "#[cfg(test)]\nmod tests { use crate::fit::fit; fn f() { vec![1]; } }");
+    clean("measure", "fn f<'a>(quote: char) -> bool { quote == '\"' || quote == '\\'' }");
+    clean("service", "use tonic::Status; use crate::store::Catalogue;");
+    // A file of the same room may bear the name of another room.
+    assert!(check("service", "use super::store::table;", &["store".into()]).is_empty());
+}
+
+/// Everything wrong with one file of `room`; `siblings` are the modules that lie beside it in the same room.
+fn check(room: &str, text: &str, siblings: &[String]) -> Vec<String> {
+    let code = without_tests(&without_comments_and_literals(text));
+    let Some((_, allowed)) = DIRECTIONS.iter().find(|(name, _)| *name == room) else {
+        return vec![format!("room {room} has no row in the table of directions")];
+    };
+    let is_room = |name: &str| DIRECTIONS.iter().any(|(room, _)| *room == name);
+    let mut complaints = Vec::new();
+    for name in names_after(&code, "crate::").into_iter().chain(names_after(&code, "sublevel::")) {
+        if is_room(&name) && name != room && !allowed.contains(&name.as_str()) {
+            complaints.push(format!("{room} may not import {name}"));
+        }
+    }
+    for name in names_after(&code, "super::") {
+        if is_room(&name) && name != room && !siblings.contains(&name) {
+            complaints.push(format!("{room} reaches {name} through super; write crate::{name}"));
+        }
+    }
+    let words: Vec<&str> = code.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
+    for (word, rooms) in PRIVATE_WORDS {
+        if words.contains(word) && !rooms.contains(&room) {
+            complaints.push(format!("only {} may name {word}", rooms.join(", ")));
+        }
+    }
+    for (_, forbidden) in FORBIDDEN_WORDS.iter().filter(|(name, _)| *name == room) {
+        let named = forbidden.iter().filter(|word| words.contains(word));
+        complaints.extend(named.map(|word| format!("{room} may not name {word}")));
+    }
+    complaints
+}
+
+/// First path segments after each `prefix`, those of a braced group one by one.
+fn names_after(code: &str, prefix: &str) -> Vec<String> {
+    let mut names = Vec::new();
+    for (at, _) in code.match_indices(prefix) {
+        if code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_') {
+            continue;
+        }
+        let rest = code[at + prefix.len()..].trim_start();
+        let Some(group) = rest.strip_prefix('{') else {
+            names.push(identifier(rest));
+            continue;
+        };
+        let mut depth = 0;
+        let mut at_start = true;
+        for (offset, c) in group.char_indices() {
+            match c {
+                '{' => depth += 1,
+                '}' if depth == 0 => break,
+                '}' => depth -= 1,
+                ',' if depth == 0 => at_start = true,
+                c if at_start && !c.is_whitespace() => {
+                    names.push(identifier(&group[offset..]));
+                    at_start = false;
+                }
+                _ => {}
+            }
+        }
+    }
+    names
+}
+
+fn identifier(text: &str) -> String {
+    text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()
+}
+
+/// The same text with comments and the contents of string and character literals removed.
+fn without_comments_and_literals(text: &str) -> String {
+    let mut code = String::new();
+    let mut rest = text;
+    while let Some(c) = rest.chars().next() {
+        let skip = if rest.starts_with("//") {
+            rest.find('\n').unwrap_or(rest.len())
+        } else if rest.starts_with("/*") {
+            block_comment(rest)
+        } else if let Some(length) = raw_string(rest, &code) {
+            length
+        } else if c == '"' {
+            quoted(rest, '"')
+        } else if c == '\'' && (rest[1..].starts_with('\\') || rest.chars().nth(2) == Some('\'')) {
+            quoted(rest, '\'') // and not a lifetime
+        } else {
+            code.push(c);
+            rest = &rest[c.len_utf8()..];
+            continue;
+        };
+        code.push(' ');
+        rest = &rest[skip..];
+    }
+    code
+}
+
+/// Length of a block comment, which may hold others.
+fn block_comment(text: &str) -> usize {
+    let (mut depth, mut at) = (0, 0);
+    while at < text.len() {
+        let rest = &text[at..];
+        if rest.starts_with("/*") {
+            depth += 1;
+            at += 2;
+        } else if rest.starts_with("*/") {
+            depth -= 1;
+            at += 2;
+            if depth == 0 {
+                return at;
+            }
+        } else {
+            at += rest.chars().next().map_or(1, char::len_utf8);
+        }
+    }
+    text.len()
+}
+
+/// Length of a raw string such as `r#"..."#`, if one starts here.
+fn raw_string(text: &str, before: &str) -> Option<usize> {
+    if before.ends_with(|c: char| c.is_alphanumeric() && c != 'b' || c == '_') {
+        return None;
+    }
+    let hashes = text.strip_prefix('r')?.chars().take_while(|c| *c == '#').count();
+    let body = text[1 + hashes..].strip_prefix('"')?;
+    let end = format!("\"{}", "#".repeat(hashes));
+    Some(2 + hashes + body.find(&end).map_or(body.len(), |at| at + end.len()))
+}
+
+/// Length of a literal between two `quote`s, escapes respected.
+fn quoted(text: &str, quote: char) -> usize {
+    let mut escaped = false;
+    for (at, c) in text.char_indices().skip(1) {
+        match c {
+            _ if escaped => escaped = false,
+            '\\' => escaped = true,
+            c if c == quote => return at + c.len_utf8(),
+            _ => {}
+        }
+    }
+    text.len()
+}
+
+/// The same code without the items under `#[cfg(test)]`.
+fn without_tests(code: &str) -> String {
+    let mut kept = String::new();
+    let mut rest = code;
+    while let Some(at) = rest.find("#[cfg(test)]") {
+        kept.push_str(&rest[..at]);
+        rest = &rest[at..];
+        let mut depth = 0;
+        let end = rest.char_indices().find_map(|(at, c)| {
+            match c {
+                '{' => depth += 1,
+                '}' => depth -= 1,
+                _ => {}
+            }
+            (depth == 0 && (c == '}' || c == ';')).then_some(at + 1)
+        });
+        rest = &rest[end.unwrap_or(rest.len())..];
+    }
+    kept + rest
+}
+
+fn rust_files(folder: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).expect("a source folder is readable") {
+        let path = entry.expect("a folder entry is readable").path();
+        if path.is_dir() {
+            files.extend(rust_files(&path));
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            files.push(path);
+        }
+    }
+    files
+}
+
+/// `measure/pose.rs` and `measure.rs` both belong to `measure`.
+fn room_of(inside: &Path) -> String {
+    let first = inside.iter().next().expect("the path of a file is not empty");
+    Path::new(first).file_stem().expect("a file has a name").to_string_lossy().into_owned()
+}
+
+fn is_test_file(inside: &Path) -> bool {
+    inside.iter().any(|part| part == "tests" || part == "tests.rs")
+}
+
+/// Modules beside a file in the same room; none for the room's own `mod.rs`, whose `super` is the crate.
+fn siblings_of(file: &Path) -> Vec<String> {
+    let is_root = file.file_name().is_some_and(|name| name == "mod.rs");
+    let folder = file.parent().expect("a file lies in a folder");
+    if is_root || folder.ends_with("src") {
+        return Vec::new();
+    }
+    let entries = fs::read_dir(folder).expect("a source folder is readable");
+    let stems = entries.filter_map(|entry| Some(entry.ok()?.path().file_stem()?.to_string_lossy().into_owned()));
+    stems.collect()
+}
