@@ -1,0 +1,196 @@
+//! The file: opening, locking, reading whole, committing.
+
+use std::fmt;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+
+use redb::{Database, DatabaseError, Durability, ReadableDatabase, ReadableTable, TableHandle, WriteTransaction};
+use serde::de::DeserializeOwned;
+
+use super::StoreError;
+use super::rows::{BODIES, FORMAT, META, OBJECTS, ObjectRow, SCENES, SceneRow};
+
+/// The catalogue's file, locked by this process. Hand it to [`super::Catalogue::load`].
+pub struct Store {
+    dir: PathBuf,
+    opener: Opener,
+    /// `None` after a failed commit, until opening again succeeds.
+    database: Option<Database>,
+}
+
+type Opener = Box<dyn Fn() -> Result<Database, DatabaseError> + Send>;
+
+/// Everything in the file, as stored.
+pub(super) struct Contents {
+    pub(super) bodies: Vec<(String, String)>,
+    pub(super) scenes: Vec<(String, SceneRow)>,
+    /// Scene, object, row; in the order of scene and object.
+    pub(super) objects: Vec<(String, String, ObjectRow)>,
+    pub(super) revision_floor: u64,
+}
+
+impl Store {
+    /// Opens the catalogue in a directory, making both as needed, and locks it.
+    ///
+    /// # Errors
+    /// [`StoreError::InUse`] when another process has it open; otherwise the reason why it can not be opened.
+    pub fn open(dir: &Path) -> Result<Self, StoreError> {
+        let unusable = |source| StoreError::Directory { dir: dir.into(), source };
+        fs::create_dir_all(dir).map_err(unusable)?;
+        let file = dir.join("catalogue.redb");
+        let fresh = !file.exists();
+        let store = Self::open_with(dir, Box::new(move || Database::create(&file)))?;
+        if fresh {
+            // A synced file is of no use when its directory entry is lost.
+            File::open(dir).and_then(|dir| dir.sync_all()).map_err(unusable)?;
+            if let Some(parent) = dir.parent().filter(|parent| !parent.as_os_str().is_empty()) {
+                // The directory may be new as well; a parent that may not be read is not an error.
+                let _ = File::open(parent).and_then(|parent| parent.sync_all());
+            }
+        }
+        Ok(store)
+    }
+
+    pub(super) fn open_with(dir: &Path, opener: Opener) -> Result<Self, StoreError> {
+        let mut store = Self { dir: dir.into(), opener, database: None };
+        store.reopen()?;
+        Ok(store)
+    }
+
+    pub(super) fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    pub(super) fn is_closed(&self) -> bool {
+        self.database.is_none()
+    }
+
+    /// Opens the file again after a failed commit.
+    pub(super) fn reopen(&mut self) -> Result<(), StoreError> {
+        self.database = None;
+        let database = match (self.opener)() {
+            Ok(database) => database,
+            Err(DatabaseError::UpgradeRequired(found)) => {
+                return Err(StoreError::damaged(&self.dir, format!("it is a redb file of the old version {found}")));
+            }
+            Err(error) => return Err(StoreError::from_redb(&self.dir, error)),
+        };
+        self.check_format(&database)?;
+        self.database = Some(database);
+        Ok(())
+    }
+
+    /// Checks the format of the tables, or makes them in a new file.
+    fn check_format(&self, database: &Database) -> Result<(), StoreError> {
+        let (tables, found) = (|| {
+            let read = database.begin_read()?;
+            let tables = read.list_tables()?.map(|table| table.name().to_owned()).collect::<Vec<_>>();
+            let known = tables.iter().any(|name| name == META.name());
+            let found = if known { read.open_table(META)?.get("format")?.map(|value| value.value()) } else { None };
+            Ok::<_, redb::Error>((tables, found))
+        })()
+        .map_err(|error| StoreError::from_redb(&self.dir, error))?;
+        match found {
+            Some(FORMAT) => Ok(()),
+            Some(found) => Err(StoreError::Format { dir: self.dir.clone(), found, expected: FORMAT }),
+            None if tables.is_empty() => commit(database, |transaction| {
+                transaction.open_table(META)?.insert("format", FORMAT)?;
+                transaction.open_table(BODIES)?;
+                transaction.open_table(SCENES)?;
+                transaction.open_table(OBJECTS)?;
+                Ok(())
+            })
+            .map_err(|error| StoreError::from_redb(&self.dir, error)),
+            None => Err(StoreError::damaged(&self.dir, "it names no format")),
+        }
+    }
+
+    /// Commits one transaction durably: when this returns `Ok`, it is on disk. After an error the file is closed, since
+    /// the database can not tell what reached the disk; [`Store::reopen`] and [`Store::read`] can.
+    pub(super) fn commit(
+        &mut self,
+        write: impl FnOnce(&WriteTransaction) -> Result<(), redb::Error>,
+    ) -> Result<(), StoreError> {
+        let database = self.database.as_ref().ok_or_else(|| self.closed())?;
+        commit(database, write).map_err(|error| {
+            self.database = None;
+            StoreError::from_redb(&self.dir, error)
+        })
+    }
+
+    /// Reads everything.
+    pub(super) fn read(&self) -> Result<Contents, StoreError> {
+        let database = self.database.as_ref().ok_or_else(|| self.closed())?;
+        self.read_tables(database).map_err(|error| match error {
+            ReadError::Redb(error) => StoreError::from_redb(&self.dir, error),
+            ReadError::Row(what) => StoreError::damaged(&self.dir, what),
+        })
+    }
+
+    fn read_tables(&self, database: &Database) -> Result<Contents, ReadError> {
+        let read = database.begin_read()?;
+        let mut contents = Contents {
+            bodies: Vec::new(),
+            scenes: Vec::new(),
+            objects: Vec::new(),
+            revision_floor: read.open_table(META)?.get("revision_floor")?.map_or(0, |value| value.value()),
+        };
+        for entry in read.open_table(BODIES)?.iter()? {
+            let (id, file) = entry?;
+            let id = id.value().to_owned();
+            let file = String::from_utf8(file.value().to_vec())
+                .map_err(|error| ReadError::Row(format!("body {id} is no text: {error}")))?;
+            contents.bodies.push((id, file));
+        }
+        for entry in read.open_table(SCENES)?.iter()? {
+            let (name, row) = entry?;
+            let name = name.value().to_owned();
+            let row = parse(row.value(), || format!("scene \"{name}\""))?;
+            contents.scenes.push((name, row));
+        }
+        for entry in read.open_table(OBJECTS)?.iter()? {
+            let (key, row) = entry?;
+            let (scene, name) = key.value();
+            let row = parse(row.value(), || format!("object \"{name}\" of scene \"{scene}\""))?;
+            contents.objects.push((scene.to_owned(), name.to_owned(), row));
+        }
+        Ok(contents)
+    }
+
+    fn closed(&self) -> StoreError {
+        StoreError::Disk { dir: self.dir.clone(), source: Box::new(redb::Error::DatabaseClosed) }
+    }
+}
+
+impl fmt::Debug for Store {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Store").field("dir", &self.dir).finish_non_exhaustive()
+    }
+}
+
+fn commit(
+    database: &Database,
+    write: impl FnOnce(&WriteTransaction) -> Result<(), redb::Error>,
+) -> Result<(), redb::Error> {
+    let mut transaction = database.begin_write()?;
+    // The default, said aloud because every promise of this room rests on it.
+    transaction.set_durability(Durability::Immediate)?;
+    write(&transaction)?;
+    transaction.commit()?;
+    Ok(())
+}
+
+enum ReadError {
+    Redb(redb::Error),
+    Row(String),
+}
+
+impl<E: Into<redb::Error>> From<E> for ReadError {
+    fn from(error: E) -> Self {
+        Self::Redb(error.into())
+    }
+}
+
+fn parse<T: DeserializeOwned>(bytes: &[u8], what: impl Fn() -> String) -> Result<T, ReadError> {
+    serde_json::from_slice(bytes).map_err(|error| ReadError::Row(format!("{}: {error}", what())))
+}

@@ -1,0 +1,60 @@
+//! Tables of the catalogue and what their rows hold. JSON: a few hundred bytes each, readable with any redb viewer, and
+//! numbers survive the round trip exactly.
+
+use redb::TableDefinition;
+use serde::{Deserialize, Serialize};
+
+use crate::measure::{Pose, PoseError};
+use crate::scene::{Object, Scene};
+
+/// Raised whenever older programs could not read the tables any more.
+pub(super) const FORMAT: u64 = 1;
+
+/// `format`, and `revision_floor`: no new scene starts at or below it.
+pub(super) const META: TableDefinition<&str, u64> = TableDefinition::new("meta");
+/// Body id to body file.
+pub(super) const BODIES: TableDefinition<&str, &[u8]> = TableDefinition::new("bodies");
+/// Scene name to [`SceneRow`].
+pub(super) const SCENES: TableDefinition<&str, &[u8]> = TableDefinition::new("scenes");
+/// Scene and object name to [`ObjectRow`]: a new pose rewrites one row, whatever the size of the scene.
+pub(super) const OBJECTS: TableDefinition<(&str, &str), &[u8]> = TableDefinition::new("objects");
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SceneRow {
+    pub(super) revision: u64,
+    pub(super) allowed: Vec<(String, String)>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ObjectRow {
+    pub(super) body: String,
+    translation_m: [f64; 3],
+    /// x, y, z, w.
+    rotation: [f64; 4],
+    pub(super) group: String,
+}
+
+impl SceneRow {
+    pub(super) fn of(scene: &Scene) -> Self {
+        let allowed = scene.allowed_pairs().map(|(a, b)| (a.to_string(), b.to_string())).collect();
+        Self { revision: scene.revision(), allowed }
+    }
+}
+
+impl ObjectRow {
+    pub(super) fn of(object: &Object) -> Self {
+        Self {
+            body: object.body.id().to_string(),
+            translation_m: (*object.pose.translation()).into(),
+            rotation: object.pose.rotation().coords.into(),
+            group: object.group.to_string(),
+        }
+    }
+
+    /// The pose with the very bits that were stored: a pose is normalised when it comes in, and once only.
+    pub(super) fn pose(&self) -> Result<Pose, PoseError> {
+        Pose::from_quaternion(self.translation_m.into(), self.rotation)
+    }
+}

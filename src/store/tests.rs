@@ -1,0 +1,220 @@
+//! The catalogue on a disk that fails, fills up, or holds something else.
+
+use std::io::{self, ErrorKind};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+
+use nalgebra::Vector3;
+use redb::{Database, StorageBackend};
+
+use super::rows::{BODIES, META, OBJECTS, SCENES};
+use super::{Catalogue, CatalogueError, Store, StoreError};
+use crate::body::Body;
+use crate::measure::Pose;
+use crate::scene::{Placement, Update};
+
+/// A disk in memory that outlives the databases on it and is full on demand: it takes one more write, cut short, and
+/// refuses every other.
+#[derive(Debug, Clone, Default)]
+struct Disk {
+    bytes: Arc<Mutex<Vec<u8>>>,
+    full: Arc<AtomicBool>,
+    torn: Arc<AtomicBool>,
+}
+
+impl Disk {
+    fn refuse(&self) -> io::Result<()> {
+        if self.full.load(Ordering::Relaxed) { Err(ErrorKind::StorageFull.into()) } else { Ok(()) }
+    }
+
+    fn set_full(&self, full: bool) {
+        self.full.store(full, Ordering::Relaxed);
+        self.torn.store(false, Ordering::Relaxed);
+    }
+
+    fn open(&self) -> Result<Store, StoreError> {
+        let disk = self.clone();
+        let open = move || Database::builder().create_with_backend(disk.clone());
+        Store::open_with(Path::new("disk"), Box::new(open))
+    }
+
+    fn load(&self) -> Result<Catalogue, StoreError> {
+        Catalogue::load(self.open()?)
+    }
+
+    /// Writes to the tables behind the catalogue's back.
+    fn meddle(&self, write: impl FnOnce(&redb::WriteTransaction)) {
+        self.open()
+            .and_then(|mut store| {
+                store.commit(|transaction| {
+                    write(transaction);
+                    Ok(())
+                })
+            })
+            .expect("written");
+    }
+}
+
+impl StorageBackend for Disk {
+    fn len(&self) -> io::Result<u64> {
+        Ok(self.bytes.lock().expect("sound").len() as u64)
+    }
+
+    fn read(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
+        let start = usize::try_from(offset).expect("small");
+        let bytes = self.bytes.lock().expect("sound");
+        out.copy_from_slice(bytes.get(start..start + out.len()).ok_or(ErrorKind::UnexpectedEof)?);
+        Ok(())
+    }
+
+    fn set_len(&self, len: u64) -> io::Result<()> {
+        self.refuse()?;
+        self.bytes.lock().expect("sound").resize(usize::try_from(len).expect("small"), 0);
+        Ok(())
+    }
+
+    fn sync_data(&self) -> io::Result<()> {
+        self.refuse()
+    }
+
+    fn write(&self, offset: u64, data: &[u8]) -> io::Result<()> {
+        let torn = self.refuse().is_err();
+        if torn && self.torn.swap(true, Ordering::Relaxed) {
+            return self.refuse();
+        }
+        let kept = if torn { data.len() / 2 } else { data.len() };
+        let start = usize::try_from(offset).expect("small");
+        self.bytes.lock().expect("sound")[start..start + kept].copy_from_slice(&data[..kept]);
+        self.refuse()
+    }
+}
+
+fn ball(radius: f64) -> Body {
+    Body::ball("ball", Vector3::zeros(), radius).expect("a ball")
+}
+
+fn at(x: f64) -> Pose {
+    Pose::from_quaternion(Vector3::new(x, 0.0, 0.0), [0.6, 0.0, 0.0, 0.8]).expect("a pose")
+}
+
+fn placed(name: &str, body: &Body) -> Update {
+    let placement = Placement { name: name.into(), body: *body.id(), pose: at(0.1), group: "g".into() };
+    Update { upserts: vec![placement], ..Update::default() }
+}
+
+fn moved(x: f64) -> Update {
+    Update { poses: vec![("o".into(), at(x))], ..Update::default() }
+}
+
+fn furnished(disk: &Disk) -> Catalogue {
+    let catalogue = disk.load().expect("a new catalogue");
+    catalogue.create_body(ball(1.0)).expect("stored");
+    catalogue.create_scene("room").expect("made");
+    catalogue.update_scene("room", &placed("o", &ball(1.0))).expect("placed");
+    catalogue
+}
+
+#[test]
+fn a_full_disk_is_reported_and_changes_nothing() {
+    let disk = Disk::default();
+    let catalogue = furnished(&disk);
+    for round in 0..3 {
+        disk.set_full(true);
+        let before = catalogue.scene("room").expect("there");
+        let failed = catalogue.update_scene("room", &moved(1.0)).expect_err("full");
+        assert!(matches!(failed, CatalogueError::Store(StoreError::Full { .. })), "{failed}");
+        assert!(catalogue.create_body(ball(2.0 + f64::from(round))).is_err());
+        assert!(catalogue.create_scene("hall").is_err());
+        assert!(catalogue.delete_scene("room").is_err());
+        let still = catalogue.scene("room").expect("still there");
+        assert_eq!(still.revision(), before.revision());
+        assert_eq!(still.object("o").map(|object| object.pose), before.object("o").map(|object| object.pose));
+        assert_eq!(catalogue.counts(), (1, 1));
+
+        // With room again, the next change works without a restart.
+        disk.set_full(false);
+        let next = catalogue.update_scene("room", &moved(f64::from(round))).expect("room again");
+        assert_eq!(next.revision(), before.revision() + 1);
+        assert_eq!(catalogue.scene("room").expect("there").revision(), next.revision());
+    }
+    let revision = catalogue.scene("room").expect("there").revision();
+    drop(catalogue);
+    let again = disk.load().expect("loads");
+    assert_eq!(again.counts(), (1, 1));
+    let scene = again.scene("room").expect("there");
+    assert_eq!((scene.revision(), scene.object("o").expect("there").pose), (revision, at(2.0)));
+}
+
+/// What is on disk between two commits is one of the two states, however the process ends.
+#[test]
+fn every_acknowledged_change_is_on_disk() {
+    let disk = Disk::default();
+    let catalogue = furnished(&disk);
+    for step in 0..20 {
+        let revision = catalogue.update_scene("room", &moved(f64::from(step) / 3.0)).expect("moved").revision();
+        // A copy of the bytes is what a killed process leaves.
+        let copy = Disk::default();
+        copy.bytes.lock().expect("sound").clone_from(&disk.bytes.lock().expect("sound"));
+        let scene = copy.load().expect("loads").scene("room").expect("there");
+        assert_eq!(scene.revision(), revision);
+        let object = scene.object("o").expect("there");
+        assert_eq!((object.pose, &*object.group), (at(f64::from(step) / 3.0), "g"));
+    }
+}
+
+#[test]
+fn what_it_did_not_write_is_refused_by_name() {
+    let damage: [(&str, fn(&redb::WriteTransaction)); 6] = [
+        ("format 7", |t| drop(t.open_table(META).expect("a table").insert("format", 7))),
+        ("body", |t| drop(t.open_table(BODIES).expect("a table").insert("feed", &b"{}"[..]))),
+        ("scene \"room\"", |t| drop(t.open_table(SCENES).expect("a table").insert("room", &b"{}"[..]))),
+        ("is made of a body", |t| {
+            let row = br#"{"body":"?","translation_m":[0,0,0],"rotation":[0,0,0,1],"group":""}"#;
+            drop(t.open_table(OBJECTS).expect("a table").insert(("room", "p"), &row[..]));
+        }),
+        ("has no pose", |t| {
+            let row =
+                format!(r#"{{"body":"{}","translation_m":[0,0,0],"rotation":[0,0,0,2],"group":""}}"#, ball(1.0).id());
+            drop(t.open_table(OBJECTS).expect("a table").insert(("room", "p"), row.as_bytes()));
+        }),
+        ("does not have", |t| {
+            let row = br#"{"revision":9,"allowed":[["a","b"]]}"#;
+            drop(t.open_table(SCENES).expect("a table").insert("room", &row[..]));
+        }),
+    ];
+    for (word, write) in damage {
+        let disk = Disk::default();
+        drop(furnished(&disk));
+        disk.meddle(write);
+        let error = disk.load().expect_err(word).to_string();
+        assert!(error.contains(word) && error.contains("disk"), "{error}");
+    }
+}
+
+#[test]
+fn a_body_in_use_is_kept() {
+    let catalogue = furnished(&Disk::default());
+    let id = *ball(1.0).id();
+    assert!(matches!(catalogue.delete_body(&id), Err(CatalogueError::BodyUsed { .. })));
+    catalogue.delete_scene("room").expect("deleted");
+    catalogue.delete_body(&id).expect("deleted");
+    assert!(matches!(catalogue.delete_body(&id), Err(CatalogueError::NoBody(_))));
+    assert!(catalogue.create_scene("room").expect("made").revision() > 2);
+}
+
+#[test]
+fn pages_cover_everything_once() {
+    let catalogue = Disk::default().load().expect("a new catalogue");
+    for name in ["d", "a", "c", "b", "e"] {
+        catalogue.create_scene(name).expect("made");
+    }
+    let names = |after, count| {
+        let (page, more) = catalogue.scenes(after, count);
+        (page.iter().map(|scene| scene.name().to_string()).collect::<Vec<_>>().concat(), more)
+    };
+    assert_eq!(names(None, 2), ("ab".into(), true));
+    assert_eq!(names(Some("b"), 2), ("cd".into(), true));
+    assert_eq!(names(Some("d"), 2), ("e".into(), false));
+    assert_eq!(names(Some("bb"), 9), ("cde".into(), false));
+}
