@@ -6,6 +6,10 @@
 
 pub mod body;
 pub mod chart;
+pub mod cli;
 pub mod measure;
 pub mod optimize;
 pub mod polynomial;
+pub mod scene;
+pub mod service;
+pub mod store;

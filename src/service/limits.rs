@@ -1,0 +1,30 @@
+//! What one call may ask for. Documented in `proto/` where users meet them.
+
+use std::time::Duration;
+
+/// Largest message in both directions, in bytes; tonic answers OUT_OF_RANGE above it.
+pub const MAX_MESSAGE_BYTES: usize = 4 << 20;
+
+/// Most results (pairs times measures) of one Evaluate.
+pub const MAX_EVALUATIONS: usize = 4096;
+
+/// Items of a page when the request does not say.
+pub const DEFAULT_PAGE: usize = 100;
+
+/// Most items of a page.
+pub const MAX_PAGE: usize = 1000;
+
+/// How long a call that arrives while the catalogue is loading waits for it before it gets UNAVAILABLE.
+pub const LOADING_PATIENCE: Duration = Duration::from_secs(10);
+
+/// How long open calls may go on after a stop was asked for. A second signal ends the wait.
+pub const DRAIN: Duration = Duration::from_secs(5);
+
+/// Concurrent calls of one connection.
+pub const MAX_STREAMS: u32 = 256;
+
+/// Silence after which a connection is asked for a sign of life.
+pub const KEEPALIVE: Duration = Duration::from_secs(30);
+
+/// Time to give the sign of life before the connection is closed.
+pub const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(10);

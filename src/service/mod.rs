@@ -1,0 +1,20 @@
+//! The gRPC door: handlers, conversion between wire and domain, limits, errors, starting and stopping.
+//!
+//! The one room that knows protobuf. A call walks straight through: a handler (`bodies`, `scenes`, `queries`) reads its
+//! message with `wire`, asks the catalogue or a scene's snapshot, and writes the answer with `wire`; whatever fails
+//! becomes a status in `error`. Handlers are dropped when a client goes away, so every change runs in a task of its own
+//! and is finished or not begun.
+
+mod bodies;
+mod error;
+pub mod limits;
+pub mod proto;
+mod push;
+mod queries;
+mod ready;
+mod scenes;
+mod server;
+mod wire;
+
+pub use push::{PushError, Pushed, push};
+pub use server::{ServeError, ServeOptions, Server, serve};

@@ -1,0 +1,128 @@
+//! The client side of `sublevel push`.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use tonic::transport::{Channel, Endpoint};
+use tonic::{Code, Status};
+
+use crate::body::Body;
+
+use super::limits::MAX_MESSAGE_BYTES;
+use super::proto::body_service_client::BodyServiceClient;
+use super::proto::{BodySummary, CreateBodyRequest};
+
+/// A body file that is stored in the server.
+#[derive(Debug, Clone)]
+pub struct Pushed {
+    /// The file.
+    pub file: PathBuf,
+    /// The body as the server has it.
+    pub body: BodySummary,
+    /// False when the server had it before.
+    pub created: bool,
+}
+
+/// Why a body file is not stored.
+#[derive(Debug, thiserror::Error)]
+pub enum PushError {
+    /// The address of the server can not be read.
+    #[error("--server {url} is no address of a server: {why}; write it like http://127.0.0.1:50051")]
+    Url {
+        /// As given.
+        url: String,
+        /// The reason.
+        why: String,
+    },
+    /// Nobody answers there.
+    #[error("can not reach a server at {url}: {why}; start one with `sublevel serve` or name another with --server")]
+    Unreachable {
+        /// As given.
+        url: String,
+        /// The reason.
+        why: String,
+    },
+    /// The file can not be read.
+    #[error("can not read {}: {source}", .file.display())]
+    Read {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is no valid body file.
+    #[error("{} is no valid body file: {why}; write it again with `sublevel fit`", .file.display())]
+    File {
+        /// The file.
+        file: PathBuf,
+        /// The reason.
+        why: String,
+    },
+    /// The server refused.
+    #[error("the server did not store {}: {} ({:?})", .file.display(), .status.message(), .status.code())]
+    Refused {
+        /// The file.
+        file: PathBuf,
+        /// Its answer.
+        status: Box<Status>,
+    },
+}
+
+/// Stores body files in a running server. All files are checked before the first is sent; storing a file twice is no error.
+///
+/// # Errors
+/// The first file that can not be stored; those before it are.
+pub async fn push(url: &str, files: &[PathBuf]) -> Result<Vec<Pushed>, PushError> {
+    let mut contents = Vec::with_capacity(files.len());
+    for file in files {
+        contents.push((file, read(file)?));
+    }
+    let mut client = BodyServiceClient::new(connect(url).await?)
+        .max_decoding_message_size(MAX_MESSAGE_BYTES)
+        .max_encoding_message_size(MAX_MESSAGE_BYTES);
+    let mut pushed = Vec::with_capacity(files.len());
+    for (file, text) in contents {
+        let request = CreateBodyRequest { body_file_json: text.into_bytes().into() };
+        let refused = |status| PushError::Refused { file: file.clone(), status: Box::new(status) };
+        let response = client.create_body(request).await.map_err(refused)?.into_inner();
+        let body = response.body.ok_or_else(|| {
+            refused(Status::new(
+                Code::Internal,
+                "it answered without saying what it stored; are the versions the same?",
+            ))
+        })?;
+        pushed.push(Pushed { file: file.clone(), body, created: response.created });
+    }
+    Ok(pushed)
+}
+
+fn read(file: &Path) -> Result<String, PushError> {
+    let text = std::fs::read_to_string(file).map_err(|source| PushError::Read { file: file.into(), source })?;
+    match Body::from_json(&text) {
+        Ok(_) => Ok(text),
+        Err(error) => Err(PushError::File { file: file.into(), why: error.to_string() }),
+    }
+}
+
+async fn connect(url: &str) -> Result<Channel, PushError> {
+    let unusable = |why: String| PushError::Url { url: url.into(), why };
+    let endpoint = Endpoint::from_shared(url.to_owned()).map_err(|error| unusable(error.to_string()))?;
+    if endpoint.uri().scheme_str() != Some("http") {
+        return Err(unusable("its scheme is not http (there is no TLS yet)".into()));
+    }
+    endpoint
+        .connect_timeout(Duration::from_secs(5))
+        .tcp_nodelay(true)
+        .connect()
+        .await
+        .map_err(|error| PushError::Unreachable { url: url.into(), why: root_cause(&error) })
+}
+
+/// tonic's own message is "transport error"; the reason is at the bottom.
+fn root_cause(error: &dyn std::error::Error) -> String {
+    let mut cause = error;
+    while let Some(deeper) = cause.source() {
+        cause = deeper;
+    }
+    cause.to_string()
+}

@@ -1,0 +1,225 @@
+//! Starting, announcing, draining.
+
+use std::future::Future;
+use std::io::{self, Write};
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use tokio::net::TcpListener;
+use tokio::signal::unix::{Signal, SignalKind, signal};
+use tokio::sync::{oneshot, watch};
+use tonic::transport::server::{Router, TcpIncoming};
+use tonic_health::ServingStatus;
+use tonic_health::server::HealthReporter;
+
+use crate::store::{Catalogue, Store, StoreError};
+
+use super::bodies::Bodies;
+use super::limits::{DRAIN, KEEPALIVE, KEEPALIVE_TIMEOUT, MAX_MESSAGE_BYTES, MAX_STREAMS};
+use super::proto::FILE_DESCRIPTOR_SET;
+use super::proto::body_service_server::{self, BodyServiceServer};
+use super::proto::query_service_server::{self, QueryServiceServer};
+use super::proto::scene_service_server::{self, SceneServiceServer};
+use super::queries::Queries;
+use super::ready::Ready;
+use super::scenes::Scenes;
+
+/// What a server needs to know.
+#[derive(Debug, Clone)]
+pub struct ServeOptions {
+    /// Address to listen on; a loopback address, port 0 for any free one.
+    pub listen: SocketAddr,
+    /// Directory of the catalogue; made when it is not there.
+    pub data: PathBuf,
+}
+
+/// Why a server could not start or ended before it was told to.
+#[derive(Debug, thiserror::Error)]
+pub enum ServeError {
+    /// Everybody on the network could change the catalogue.
+    #[error("--listen {0} is no loopback address, and there is no TLS yet; listen on 127.0.0.1 or [::1]")]
+    NotLoopback(SocketAddr),
+    /// The address can not be listened on.
+    #[error("can not listen on {addr}: {source}; choose another address, or port 0 for any free port")]
+    Bind {
+        /// The address.
+        addr: SocketAddr,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The catalogue can not be opened or loaded.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// A task of the server panicked.
+    #[error("loading the catalogue was ended by a defect: {0}; please report it")]
+    Defect(String),
+    /// The transport gave up.
+    #[error("serving ended: {0}")]
+    Transport(#[from] tonic::transport::Error),
+    /// Signals can not be listened for, or standard output is closed.
+    #[error("can not set the server up: {0}")]
+    Setup(#[from] io::Error),
+}
+
+/// A server that listens and holds the lock of its catalogue, but does not answer yet.
+#[derive(Debug)]
+pub struct Server {
+    incoming: TcpIncoming,
+    addr: SocketAddr,
+    store: Store,
+}
+
+impl Server {
+    /// Binds the address and locks the catalogue. Connections queue until [`Server::run`].
+    ///
+    /// # Errors
+    /// When the address is not loopback or taken, or when the catalogue is in use or can not be opened.
+    pub async fn bind(options: ServeOptions) -> Result<Self, ServeError> {
+        let ServeOptions { listen, data } = options;
+        if !listen.ip().is_loopback() {
+            return Err(ServeError::NotLoopback(listen));
+        }
+        let bind = |source| ServeError::Bind { addr: listen, source };
+        let listener = TcpListener::bind(listen).await.map_err(bind)?;
+        let addr = listener.local_addr().map_err(bind)?;
+        let store = tokio::task::spawn_blocking(move || Store::open(&data))
+            .await
+            .map_err(|error| ServeError::Defect(error.to_string()))??;
+        // Set here, since tonic's own setting is ignored for listeners it did not make.
+        let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
+        Ok(Self { incoming, addr, store })
+    }
+
+    /// Where it listens; the port that was found when port 0 was asked for.
+    pub fn local_addr(&self) -> SocketAddr {
+        self.addr
+    }
+
+    /// Serves until `stop` resolves, then lets open calls finish for at most [`DRAIN`]. Health says NOT_SERVING until the
+    /// catalogue is loaded and from `stop` on.
+    ///
+    /// # Errors
+    /// When the catalogue can not be loaded or the transport gives up.
+    pub async fn run(self, stop: impl Future<Output = ()> + Send) -> Result<(), ServeError> {
+        let (loaded, catalogue) = watch::channel(None);
+        let (health, health_service) = tonic_health::server::health_reporter();
+        // It starts as SERVING.
+        set_health(&health, ServingStatus::NotServing).await;
+        let router = router(Ready::new(catalogue)).add_service(health_service);
+
+        let loading = load(self.store, loaded, health.clone());
+        let (failed, failure) = oneshot::channel();
+        let loader = tokio::spawn(async move {
+            if let Err(error) = loading.await {
+                let _ = failed.send(error);
+            }
+        });
+
+        let (draining, drain) = oneshot::channel();
+        let serving = router.serve_with_incoming_shutdown(self.incoming, async {
+            let _ = drain.await;
+        });
+        tokio::pin!(serving);
+        let ended = tokio::select! {
+            result = &mut serving => return Ok(result?),
+            () = stop => Ok(()),
+            Ok(error) = failure => Err(error),
+        };
+        loader.abort();
+        set_health(&health, ServingStatus::NotServing).await;
+        let _ = draining.send(());
+        // Streams may stay open as long as their clients like; waiting for them ends here.
+        if let Ok(result) = tokio::time::timeout(DRAIN, serving).await {
+            result?;
+        } else {
+            tracing::warn!("some connections were still open after {DRAIN:?} and are cut");
+        }
+        ended
+    }
+}
+
+/// Runs a server until SIGTERM or Ctrl-C, which it obeys with an orderly stop; a second one cuts it short. Prints `listening on ADDR` as the first line
+/// on standard output when clients may connect.
+///
+/// # Errors
+/// See [`Server::bind`] and [`Server::run`].
+pub async fn serve(options: ServeOptions) -> Result<(), ServeError> {
+    let mut terminate = signal(SignalKind::terminate())?;
+    let data = options.data.clone();
+    let server = Server::bind(options).await?;
+    let mut stdout = io::stdout();
+    writeln!(stdout, "listening on {}", server.local_addr())?;
+    stdout.flush()?;
+    tracing::info!(addr = %server.local_addr(), data = %data.display(), "started");
+
+    let (stopping, stop) = oneshot::channel();
+    let running = server.run(async {
+        let _ = stop.await;
+    });
+    tokio::pin!(running);
+    tokio::select! {
+        result = &mut running => return result,
+        name = stop_signal(&mut terminate) => tracing::info!("{name}: stopping"),
+    }
+    let _ = stopping.send(());
+    tokio::select! {
+        result = running => result?,
+        name = stop_signal(&mut terminate) => tracing::warn!("{name} again: open connections are cut"),
+    }
+    tracing::info!("stopped");
+    Ok(())
+}
+
+async fn stop_signal(terminate: &mut Signal) -> &'static str {
+    tokio::select! {
+        _ = terminate.recv() => "SIGTERM",
+        _ = tokio::signal::ctrl_c() => "Ctrl-C",
+    }
+}
+
+fn router(ready: Ready) -> Router {
+    let reflection = || {
+        tonic_reflection::server::Builder::configure()
+            .register_encoded_file_descriptor_set(FILE_DESCRIPTOR_SET)
+            .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+    };
+    let sized = MAX_MESSAGE_BYTES;
+    let bodies = BodyServiceServer::new(Bodies(ready.clone()));
+    let scenes = SceneServiceServer::new(Scenes(ready.clone()));
+    let queries = QueryServiceServer::new(Queries(ready));
+    tonic::transport::Server::builder()
+        .max_concurrent_streams(MAX_STREAMS)
+        .http2_keepalive_interval(Some(KEEPALIVE))
+        .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
+        .add_service(bodies.max_decoding_message_size(sized).max_encoding_message_size(sized))
+        .add_service(scenes.max_decoding_message_size(sized).max_encoding_message_size(sized))
+        .add_service(queries.max_decoding_message_size(sized).max_encoding_message_size(sized))
+        // Older clients know v1alpha only. The descriptors are compiled in, so they are read or a test fails.
+        .add_optional_service(reflection().build_v1().ok())
+        .add_optional_service(reflection().build_v1alpha().ok())
+}
+
+/// Loads the catalogue on a thread that may block, then opens the doors.
+async fn load(
+    store: Store,
+    loaded: watch::Sender<Option<Arc<Catalogue>>>,
+    health: HealthReporter,
+) -> Result<(), ServeError> {
+    let catalogue = tokio::task::spawn_blocking(move || Catalogue::load(store))
+        .await
+        .map_err(|error| ServeError::Defect(error.to_string()))??;
+    let (bodies, scenes) = catalogue.counts();
+    tracing::info!(bodies, scenes, "catalogue loaded");
+    loaded.send_replace(Some(Arc::new(catalogue)));
+    set_health(&health, ServingStatus::Serving).await;
+    Ok(())
+}
+
+async fn set_health(health: &HealthReporter, status: ServingStatus) {
+    let services =
+        ["", body_service_server::SERVICE_NAME, scene_service_server::SERVICE_NAME, query_service_server::SERVICE_NAME];
+    for service in services {
+        health.set_service_status(service, status).await;
+    }
+}
