@@ -1,0 +1,195 @@
+//! Real server processes on loopback, and clients for them.
+
+use std::io::{BufRead, BufReader, Read};
+use std::net::SocketAddr;
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use sublevel::body::Body;
+use sublevel::service::proto::body_service_client::BodyServiceClient;
+use sublevel::service::proto::query_service_client::QueryServiceClient;
+use sublevel::service::proto::scene_service_client::SceneServiceClient;
+use sublevel::service::proto::{
+    CreateBodyRequest, CreateSceneRequest, GetSceneRequest, Object, ObjectPair, ObjectPose, Pose, Quaternion, Scene,
+    UpdateSceneRequest, Vector3,
+};
+use tonic::transport::{Channel, Endpoint};
+use tonic_types::StatusExt;
+
+pub(crate) fn ball(radius: f64) -> Body {
+    Body::ball("ball", nalgebra::Vector3::zeros(), radius).expect("a ball")
+}
+
+/// A server that ends with the test, whatever the test does.
+pub(crate) struct Running {
+    child: Child,
+    pub(crate) addr: SocketAddr,
+}
+
+pub(crate) fn command(dir: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sublevel"));
+    command.args(["serve", "--listen", "127.0.0.1:0", "--data"]).arg(dir);
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null()).env("RUST_LOG", "info");
+    command
+}
+
+impl Running {
+    pub(crate) fn start(dir: &Path) -> Self {
+        let mut child = command(dir).spawn().expect("the server starts");
+        let mut line = String::new();
+        let stdout = child.stdout.as_mut().expect("stdout is piped");
+        BufReader::new(stdout).read_line(&mut line).expect("a first line");
+        let addr = line.strip_prefix("listening on ").map(|addr| addr.trim_end().parse());
+        let Some(Ok(addr)) = addr else {
+            let _ = child.kill();
+            let _ = child.wait();
+            panic!("the first line is {line:?}");
+        };
+        Self { child, addr }
+    }
+
+    pub(crate) fn url(&self) -> String {
+        format!("http://{}", self.addr)
+    }
+
+    pub(crate) async fn connect(&self) -> Clients {
+        let endpoint = Endpoint::from_shared(self.url()).expect("a url").tcp_nodelay(true);
+        let channel = endpoint.connect().await.expect("the server answers");
+        Clients {
+            bodies: BodyServiceClient::new(channel.clone()),
+            scenes: SceneServiceClient::new(channel.clone()),
+            queries: QueryServiceClient::new(channel.clone()),
+            channel,
+        }
+    }
+
+    /// SIGKILL: no time to tidy up.
+    pub(crate) fn kill(mut self) {
+        self.child.kill().expect("killed");
+        self.child.wait().expect("waited for");
+    }
+
+    /// SIGTERM.
+    pub(crate) fn terminate(&self) {
+        let pid = self.child.id().to_string();
+        assert!(Command::new("kill").args(["-TERM", &pid]).status().expect("kill runs").success());
+    }
+
+    /// Waits for the end, at most so long.
+    pub(crate) fn wait(&mut self, longest: Duration) -> ExitStatus {
+        let start = Instant::now();
+        loop {
+            if let Some(status) = self.child.try_wait().expect("waited for") {
+                let mut rest = String::new();
+                self.child.stdout.take().expect("stdout is piped").read_to_string(&mut rest).expect("text");
+                assert_eq!(rest, "", "stdout holds the first line only");
+                return status;
+            }
+            assert!(start.elapsed() < longest, "still running after {longest:?}");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+pub(crate) fn run(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sublevel")).args(args).stdin(Stdio::null()).output().expect("the command runs")
+}
+
+pub(crate) struct Clients {
+    pub(crate) bodies: BodyServiceClient<Channel>,
+    pub(crate) scenes: SceneServiceClient<Channel>,
+    pub(crate) queries: QueryServiceClient<Channel>,
+    pub(crate) channel: Channel,
+}
+
+impl Clients {
+    /// Stores a body and returns its id.
+    pub(crate) async fn put(&mut self, body: &Body) -> String {
+        let request = CreateBodyRequest { body_file_json: body.to_json().into_bytes().into() };
+        self.bodies.create_body(request).await.expect("stored").into_inner().body.expect("a body").id
+    }
+
+    pub(crate) async fn make_scene(&mut self, name: &str) -> u64 {
+        let response = self.scenes.create_scene(CreateSceneRequest { name: name.into() }).await.expect("a scene");
+        response.into_inner().scene.expect("a scene").revision
+    }
+
+    pub(crate) async fn update(&mut self, update: UpdateSceneRequest) -> u64 {
+        self.scenes.update_scene(update).await.expect("updated").into_inner().revision
+    }
+
+    pub(crate) async fn scene(&mut self, name: &str) -> Scene {
+        let response = self.scenes.get_scene(GetSceneRequest { name: name.into() }).await.expect("a scene");
+        response.into_inner().scene.expect("a scene")
+    }
+}
+
+pub(crate) fn pose(translation: [f64; 3], rotation: [f64; 4]) -> Pose {
+    let [x, y, z] = translation;
+    let translation_m = Some(Vector3 { x, y, z });
+    let [x, y, z, w] = rotation;
+    Pose { translation_m, rotation: Some(Quaternion { x, y, z, w }) }
+}
+
+pub(crate) fn at(x: f64) -> Pose {
+    pose([x, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0])
+}
+
+pub(crate) fn object(name: &str, body_id: &str, pose: Pose) -> Object {
+    Object { name: name.into(), body_id: body_id.into(), pose: Some(pose), group: String::new() }
+}
+
+pub(crate) fn moved(name: &str, pose: Pose) -> ObjectPose {
+    ObjectPose { name: name.into(), pose: Some(pose) }
+}
+
+pub(crate) fn pair(a: &str, b: &str) -> ObjectPair {
+    ObjectPair { a: a.into(), b: b.into() }
+}
+
+/// Every number of a pose, bit for bit.
+pub(crate) fn bits(pose: &Pose) -> [u64; 7] {
+    let (t, r) = (pose.translation_m.as_ref().expect("t"), pose.rotation.as_ref().expect("r"));
+    [t.x, t.y, t.z, r.x, r.y, r.z, r.w].map(f64::to_bits)
+}
+
+/// The field a refusal names first.
+pub(crate) fn field(status: &tonic::Status) -> String {
+    let details = status.get_error_details();
+    let violation = details.bad_request().and_then(|bad| bad.field_violations.first());
+    violation.map(|violation| violation.field.clone()).unwrap_or_default()
+}
+
+/// The machine-readable reason of a refusal.
+pub(crate) fn reason(status: &tonic::Status) -> String {
+    status.get_error_details().error_info().map(|info| info.reason.clone()).unwrap_or_default()
+}
+
+/// A small generator of test numbers in [-1, 1) that use all their bits.
+pub(crate) struct Numbers(pub(crate) u64);
+
+impl Numbers {
+    pub(crate) fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let mixed = (self.0 ^ (self.0 >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        ((mixed >> 11) as f64) / (1u64 << 52) as f64 - 1.0
+    }
+
+    pub(crate) fn pose(&mut self) -> Pose {
+        let mut q = [0.0; 4];
+        let mut norm: f64 = 0.0;
+        while !(0.1..=1.0).contains(&norm) {
+            q = [(); 4].map(|()| self.next());
+            norm = q.iter().map(|q| q * q).sum::<f64>().sqrt();
+        }
+        pose([(); 3].map(|()| 3.0 * self.next()), q.map(|q| q / norm))
+    }
+}

@@ -1,0 +1,6 @@
+//! The server as its users meet it: a real process, gRPC, signals, and a disk.
+
+mod harness;
+mod keeping;
+mod lifecycle;
+mod refusals;
