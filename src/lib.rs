@@ -6,6 +6,8 @@
 
 pub mod body;
 pub mod chart;
+#[cfg(feature = "fit")]
+pub mod fit;
 pub mod measure;
 pub mod optimize;
 pub mod polynomial;
