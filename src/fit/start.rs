@@ -117,7 +117,7 @@ impl<'a> Path<'a> {
         let step_weights = -squares.component_mul(&(&of_weights - values.tr_mul(&multiplier)));
         let step_form = -form_factor.tr_solve_lower_triangular(&(half_gradient + &half * &multiplier))?;
         let slope = of_weights.dot(&step_weights) + of_form.dot(&step_form);
-        if !(slope <= 0.0) {
+        if slope.is_nan() || slope > 0.0 {
             return None;
         }
         // 3. Shortened until everything stays positive and the objective falls.
