@@ -130,11 +130,9 @@ fn the_optimum_is_feasible_and_its_bound_holds() {
 fn few_points_and_points_on_quadrics() {
     // the smallest ellipsoid of a tetrahedron has 8.162 times its volume
     let tetrahedron = [Vector3::zeros(), Vector3::x(), Vector3::y(), Vector3::z()];
-    for degree in [2, 4, 6, 8] {
+    for degree in [2, 4, 6] {
         let fit = fitted(&tetrahedron, degree);
         assert!(fit.report.volume_m3 > 1.0 / 6.0 && fit.report.volume_m3 < 1.361);
-    }
-    for degree in [2, 4, 6] {
         let fit = fitted(&cube(2.0), degree);
         assert!(fit.report.volume_m3 > 8.0 && fit.report.volume_m3 < 22.0, "{}", fit.report.volume_m3);
     }
