@@ -7,6 +7,10 @@
 pub mod body;
 pub mod chart;
 pub mod cli;
+#[cfg(feature = "fit")]
+pub mod demo;
+#[cfg(feature = "fit")]
+pub mod fit;
 pub mod measure;
 pub mod optimize;
 pub mod polynomial;

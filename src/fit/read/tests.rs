@@ -1,0 +1,188 @@
+use super::*;
+
+const CORNERS: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 0.5]];
+
+fn read(extension: &str, bytes: impl AsRef<[u8]>) -> Result<Vec<Vector3<f64>>, String> {
+    parse(bytes.as_ref(), extension, Path::new("shape"), 1.0).map_err(|error| error.to_string())
+}
+
+fn assert_corners(extension: &str, bytes: impl AsRef<[u8]>) {
+    let points = read(extension, bytes).unwrap();
+    assert_eq!(points.len(), 4);
+    for corner in CORNERS {
+        assert!(points.contains(&Vector3::from(corner)), "{extension}: {corner:?} is missing from {points:?}");
+    }
+}
+
+fn assert_fails(extension: &str, bytes: impl AsRef<[u8]>, parts: &[&str]) {
+    let error = read(extension, bytes).expect_err("a broken file must not be read");
+    assert!(error.starts_with("shape"), "{error}");
+    assert!(!error.contains('\n'), "{error}");
+    for part in parts {
+        assert!(error.contains(part), "{error:?} does not say {part:?}");
+    }
+}
+
+#[test]
+fn off_in_its_variants() {
+    let body = "0 0 0\n1 0 0\n0 2 0 # tip\n\n0 0 0.5\n3 0 1 2\n";
+    assert_corners("off", format!("OFF\n4 1 0\n{body}"));
+    assert_corners("off", format!("# made by hand\nOFF 4 1 0\n{body}"));
+    assert_corners("off", format!("OFF4 1 0\r\n{}", body.replace('\n', "\r\n")));
+    assert_corners("off", format!("4 1\n{body}"));
+    assert_corners("off", "COFF\n4 0 0\n0 0 0 255 0 0 1\n1 0 0 255 0 0 1\n0 2 0 1 1 1 1\n0 0 .5 1 1 1 1");
+}
+
+#[test]
+fn broken_off() {
+    assert_fails("off", "", &["end of file"]);
+    assert_fails("off", "OFF\n", &["end of file"]);
+    assert_fails("off", "OFF\nmany 1 0\n", &["line 2", "counts"]);
+    assert_fails("off", "OFF\n4 1 0\n0 0 0\n1 0 0\n", &["vertex 2 of 4"]);
+    assert_fails("off", "OFF\n18446744073709551615 1 0\n0 0 0\n", &["vertex 1 of"]);
+    assert_fails("off", "OFF\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n", &["face 1 of 2"]);
+    assert_fails("off", "OFF\n4 0 0\n0 0 0\n1 0\n0 1 0\n0 0 1\n", &["line 4", "2 coordinates"]);
+    assert_fails("off", "OFF\n4 0 0\n0 0 0\n1 x 0\n0 1 0\n0 0 1\n", &["line 4", "\"x\""]);
+    assert_fails("off", "OFF\n4 0 0\n0 0 0\n1 nan 0\n0 1 0\n0 0 1\n", &["vertex 1", "NaN"]);
+    assert_fails("off", "OFF\n4 0 0\n0 0 0\n1 0 0\n0 1e999 0\n0 0 1\n", &["vertex 2", "inf"]);
+    assert_fails("off", "OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n", &["3 points", "at least 4"]);
+    assert_fails("off", "OFF BINARY\n\0\0", &["not supported"]);
+    assert_fails("off", b"OFF\n4 0 0\n\xff\xfe", &["line 3", "not text"]);
+}
+
+#[test]
+fn obj_takes_every_vertex() {
+    assert_corners(
+        "obj",
+        "# cube\nmtllib a.mtl\no a\nv 0 0 0\nv 1 0 0 1.0\nvn 0 0 1\nvt 0 0\nv 0 2 0\nf 1/1/1 2//1 3\no b\nv 0 0 .5",
+    );
+    assert_fails("obj", "v 0 0 0\nv 1 0\n", &["line 2", "2 coordinates"]);
+    assert_fails("obj", "v 0 0 0\nv 1 0 0\nv 0 inf 0\nv 0 0 1", &["vertex 2"]);
+}
+
+#[test]
+fn xyz_with_any_separator() {
+    assert_corners("xyz", "# cloud\n0 0 0\n1,0,0\n0; 2; 0\n0\t0\t0.5 0.1 0.2 0.3\n");
+    assert_fails("xyz", "x y z\n0 0 0\n", &["line 1", "\"x\""]);
+}
+
+fn ply_header(format: &str, count: usize) -> String {
+    format!(
+        "ply\nformat {format} 1.0\ncomment test\nelement vertex {count}\nproperty float x\nproperty double y\n\
+         property float z\nproperty uchar red\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+}
+
+fn ply_binary(big: bool) -> Vec<u8> {
+    let mut bytes = ply_header(if big { "binary_big_endian" } else { "binary_little_endian" }, 4).into_bytes();
+    for [x, y, z] in CORNERS {
+        let (x, z) = (x as f32, z as f32);
+        if big {
+            bytes.extend(x.to_be_bytes().iter().chain(&y.to_be_bytes()).chain(&z.to_be_bytes()));
+        } else {
+            bytes.extend(x.to_le_bytes().iter().chain(&y.to_le_bytes()).chain(&z.to_le_bytes()));
+        }
+        bytes.push(7);
+    }
+    bytes.extend([3, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0]);
+    bytes
+}
+
+#[test]
+fn ply_text_and_binary() {
+    assert_corners("ply", format!("{}0 0 0 1\n1 0 0 1\n0 2 0 1\n0 0 0.5 1\n3 0 1 2\n", ply_header("ascii", 4)));
+    assert_corners("ply", ply_binary(false));
+    assert_corners("ply", ply_binary(true));
+}
+
+#[test]
+fn broken_ply() {
+    assert_fails("ply", "", &["header"]);
+    assert_fails("ply", "ply\nformat ascii 1.0\n", &["header"]);
+    assert_fails("ply", ply_header("ascii", usize::MAX), &["element \"vertex\"", "do not fit"]);
+    assert_fails("ply", format!("{}0 0 0 1\n1 0 0 1\n", ply_header("ascii", 4)), &["element \"vertex\""]);
+    let binary = ply_binary(false);
+    assert_fails("ply", &binary[..binary.len() - 40], &["element \"vertex\""]);
+    assert_fails(
+        "ply",
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nend_header\n1\n1\n1\n1\n",
+        &["x, y and z"],
+    );
+    assert_fails("ply", "ply\nformat ascii 1.0\nelement face 0\nproperty float x\nend_header\n", &["no element"]);
+    assert_fails(
+        "ply",
+        "ply\nformat binary_little_endian 1.0\nelement nothing 1000000000\nend_header\n",
+        &["element \"nothing\""],
+    );
+}
+
+const TRIANGLES: [[usize; 3]; 2] = [[0, 1, 2], [0, 1, 3]];
+
+fn stl_text(first: &str) -> String {
+    let mut text = format!("{first}\n");
+    for triangle in TRIANGLES {
+        text += "facet normal 0 0 1\n outer loop\n";
+        for [x, y, z] in triangle.map(|i| CORNERS[i]) {
+            text += &format!("  vertex {x} {y} {z:e}\n");
+        }
+        text += " endloop\nendfacet\n";
+    }
+    text + "endsolid\n"
+}
+
+fn stl_binary(header: &[u8]) -> Vec<u8> {
+    let mut bytes = header.to_vec();
+    bytes.resize(80, b' ');
+    bytes.extend(2_u32.to_le_bytes());
+    for triangle in TRIANGLES {
+        bytes.extend([0; 12]);
+        for value in triangle.iter().flat_map(|&i| CORNERS[i]) {
+            bytes.extend((value as f32).to_le_bytes());
+        }
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
+#[test]
+fn stl_text_and_binary() {
+    assert_corners("stl", stl_text("solid thing"));
+    assert_corners("stl", stl_text("solid"));
+    assert_corners("stl", stl_text("solid "));
+    assert_corners("stl", stl_binary(b"made by nobody"));
+    assert_corners("stl", stl_binary(b"solid but binary"));
+}
+
+#[test]
+fn broken_stl() {
+    assert_fails("stl", "", &["too few"]);
+    let binary = stl_binary(b"");
+    assert_fails("stl", &binary[..binary.len() - 3], &["triangle count", "the file has"]);
+    let mut lying = binary;
+    lying[80..84].fill(0xff);
+    assert_fails("stl", &lying, &["triangle count"]);
+    let text = stl_text("solid thing");
+    assert_fails("stl", &text[..text.len() / 2], &["triangles"]);
+    let mut nan = stl_binary(b"");
+    nan[96..100].copy_from_slice(&f32::NAN.to_le_bytes());
+    assert_fails("stl", &nan, &["vertex 0", "NaN"]);
+}
+
+#[test]
+fn files_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cloud.XYZ");
+    std::fs::write(&path, "0 0 0\n1000 0 0\n0 1000 0\n0 0 1000\n").unwrap();
+    assert_eq!(read_points(&path, 0.001).unwrap()[1], Vector3::x());
+    assert!(matches!(read_points(&path, 1e308), Err(ReadError::NotFinite { vertex: 1, .. })));
+    for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(matches!(read_points(&path, scale), Err(ReadError::Scale(_))));
+    }
+    let missing = read_points(&folder.path().join("absent.off"), 1.0).unwrap_err();
+    assert!(missing.to_string().contains("absent.off") && missing.to_string().contains("check the path"), "{missing}");
+    for name in ["shape.step", "shape"] {
+        let error = read_points(Path::new(name), 1.0).unwrap_err();
+        assert!(error.to_string().contains(".off, .obj, .ply, .stl"), "{error}");
+    }
+    assert!(matches!(read_points(folder.path(), 1.0), Err(ReadError::UnknownFormat { .. })));
+}

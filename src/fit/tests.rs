@@ -1,0 +1,200 @@
+use super::*;
+use nalgebra::{DMatrix, DVector, Matrix3, Rotation3};
+
+fn unwatched(_: Progress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+fn fitted(points: &[Vector3<f64>], degree: usize) -> Fit {
+    fit("test", points, &FitOptions { degree, ..FitOptions::default() }, &mut unwatched).unwrap()
+}
+
+/// A lopsided blob: points on a sphere with bumps.
+fn blob(count: usize) -> Vec<Vector3<f64>> {
+    (0..count)
+        .map(|i| {
+            let (height, turn) = (1.0 - (2 * i + 1) as f64 / count as f64, i as f64 * 2.399_963);
+            let r = (1.0 - height * height).sqrt();
+            let u = Vector3::new(r * turn.cos(), r * turn.sin(), height);
+            u * (1.0 + 0.3 * (3.0 * u.x + 1.0).sin() * u.y) + Vector3::new(0.0, 0.0, 0.4 * u.x * u.x)
+        })
+        .collect()
+}
+
+fn cube(side: f64) -> Vec<Vector3<f64>> {
+    (0..8_usize).map(|i| Vector3::from_fn(|axis, _| side * (((i >> axis) & 1) as f64 - 0.5))).collect()
+}
+
+#[test]
+fn degree_two_is_the_smallest_ellipsoid() {
+    let points = blob(300);
+    let fit = fitted(&points, 2);
+    // -log det prefers the representation 1/4 + 3/4 |z|² of the unit ball
+    for (exponents, coefficient) in fit.body.constraints()[0].polynomial.terms() {
+        let expected = match exponents.map(u32::from).iter().sum::<u32>() {
+            0 => 0.25,
+            2 if exponents.contains(&2) => 0.75,
+            _ => 0.0,
+        };
+        assert!((coefficient - expected).abs() < 1e-5, "{exponents:?}: {coefficient}");
+    }
+    let ellipsoid = minimum_ellipsoid(&points).unwrap();
+    assert!((fit.report.volume_m3 / ellipsoid.volume() - 1.0).abs() < 1e-5);
+    assert!(fit.report.optimality_gap.unwrap().abs() < 1e-6);
+}
+
+#[test]
+fn fits_follow_affine_maps() {
+    let points = blob(200);
+    let turn = Rotation3::from_euler_angles(0.4, -1.1, 2.0).into_inner();
+    let map = turn * Matrix3::new(2.0, 0.3, 0.0, 0.0, 0.5, -0.2, 0.1, 0.0, 4.0);
+    let moved: Vec<_> = points.iter().map(|p| map * p + Vector3::new(3.0, -50.0, 7.0)).collect();
+    for degree in [4, 6] {
+        let (first, second) = (fitted(&points, degree), fitted(&moved, degree));
+        let ratio = second.report.volume_m3 / first.report.volume_m3 / map.determinant().abs();
+        // the margin is imposed in a frame that a rotation is free in, hence not exact
+        assert!((ratio - 1.0).abs() < 1e-4, "degree {degree}: {ratio}");
+        for (p, q) in points.iter().zip(&moved).step_by(7) {
+            assert!((first.body.value(p) - second.body.value(q)).abs() < 1e-3);
+        }
+    }
+}
+
+#[test]
+fn higher_degrees_are_smaller_and_never_below_the_hull() {
+    let points = blob(250);
+    let mut last = f64::INFINITY;
+    for degree in [2, 4, 6] {
+        let Fit { body, report } = fitted(&points, degree);
+        assert!(report.volume_m3 < last && report.volume_m3 > report.hull_volume_m3);
+        assert!(body.prove_contains(&points).is_ok());
+        assert_eq!((report.points, body.degree()), (points.len(), degree));
+        // pulled tight: some point is on the boundary
+        let highest = points.iter().map(|p| body.value_upper(p)).fold(0.0, f64::max);
+        assert!(highest > 1.0 - 1e-13, "{highest}");
+        last = report.volume_m3;
+    }
+}
+
+/// Feasibility, weak duality and a small gap together prove the optimum, each checked without the solver.
+#[test]
+fn the_optimum_is_feasible_and_its_bound_holds() {
+    let points = blob(150);
+    let hull = hull::convex_hull(&points).unwrap();
+    let conditioned: Vec<_> = hull.vertices.iter().map(|&i| hull.frame.apply(&points[i])).collect();
+    let ellipsoid = minimum_ellipsoid(&conditioned).unwrap();
+    let whitened: Vec<_> = conditioned.iter().map(|u| ellipsoid.linear * (u - ellipsoid.center)).collect();
+    let margin = 1e-4;
+    for degree in [4, 6] {
+        let structure = Structure::new(degree);
+        let optimum = generate(&structure, &whitened, margin, &mut unwatched).unwrap();
+        assert!(optimum.gap.unwrap().abs() < 1e-5);
+        assert!(optimum.hessian.symmetric_eigenvalues().min() > 0.99 * margin);
+        for z in &whitened {
+            assert!(structure.values(z).dot(&optimum.coefficients) < 1.0 + 1e-5);
+        }
+        let terms = structure.monomials.iter().copied().zip(optimum.coefficients.iter().copied()).collect();
+        let polynomial = Polynomial::new(terms).unwrap();
+        for (z, y) in whitened.iter().zip(whitened.iter().skip(5)) {
+            let w = DVector::from_iterator(
+                structure.hessian.size,
+                structure.hessian_basis.iter().map(|m| {
+                    (0..3).map(|i| z[i].powi(i32::from(m.exponents[i]))).product::<f64>() * y[usize::from(m.direction)]
+                }),
+            );
+            let (left, right) = (y.dot(&(polynomial.evaluate(z).hessian * y)), w.dot(&(&optimum.hessian * &w)));
+            assert!((left - right).abs() < 1e-5 * left.abs().max(1.0), "{left} {right}");
+        }
+        // -log det P at the optimum, against a feasible polynomial Σ wⱼ |z|²ʲ with its diagonal Gram matrix
+        let objective = optimum.objective.unwrap();
+        let mut simple = f64::INFINITY;
+        for share in [0.2, 0.4, 0.6] {
+            let parts = degree / 2 + 1;
+            let gram = DMatrix::from_diagonal(&DVector::from_iterator(
+                structure.gram.size,
+                crate::polynomial::monomials(degree / 2).iter().map(|e| {
+                    let total: u8 = e.iter().sum();
+                    let factorial = |n: u8| (1..=n).map(f64::from).product::<f64>();
+                    let multinomial = factorial(total) / e.iter().map(|&n| factorial(n)).product::<f64>();
+                    let weight = if total == 0 { share } else { (1.0 - share) / (parts - 1) as f64 };
+                    weight * multinomial
+                }),
+            ));
+            simple = simple.min(-program::log_det(&gram).unwrap());
+        }
+        assert!(objective < simple, "{objective} against {simple}");
+    }
+}
+
+#[test]
+fn few_points_and_points_on_quadrics() {
+    // the smallest ellipsoid of a tetrahedron has 8.162 times its volume
+    let tetrahedron = [Vector3::zeros(), Vector3::x(), Vector3::y(), Vector3::z()];
+    for degree in [2, 4, 6] {
+        let fit = fitted(&tetrahedron, degree);
+        assert!(fit.report.volume_m3 > 1.0 / 6.0 && fit.report.volume_m3 < 1.361);
+        let fit = fitted(&cube(2.0), degree);
+        assert!(fit.report.volume_m3 > 8.0 && fit.report.volume_m3 < 22.0, "{}", fit.report.volume_m3);
+    }
+}
+
+#[test]
+fn scale_offset_and_duplicates_do_not_matter() {
+    let points = blob(120);
+    let volume = fitted(&points, 4).report.volume_m3;
+    for (scale, offset) in [(1e-6, 0.0), (1e6, 0.0), (1.0, 1e6), (1e-3, -20.0)] {
+        let moved: Vec<_> =
+            points.iter().chain(&points).map(|p| p * scale + Vector3::new(offset, 0.5 * offset, -offset)).collect();
+        let fit = fitted(&moved, 4);
+        let relative = fit.report.volume_m3 / scale.powi(3) / volume;
+        assert!((relative - 1.0).abs() < 1e-4, "scale {scale}, offset {offset}: {relative}");
+        assert_eq!(fit.body.points().map(|p| p.count), Some(240));
+    }
+}
+
+#[test]
+fn a_thin_sheet_is_fitted() {
+    let sheet: Vec<_> = cube(1.0).iter().map(|p| Vector3::new(p.x, p.y, 1e-4 * p.z)).collect();
+    let fit = fitted(&sheet, 4);
+    assert!(fit.report.volume_m3 > 1e-4 && fit.report.volume_m3 < 2.72e-4, "{}", fit.report.volume_m3);
+}
+
+#[test]
+fn bad_input_is_refused_by_field() {
+    let good = blob(50);
+    let attempt = |points: &[Vector3<f64>], degree, margin| {
+        let options = FitOptions { degree, margin, input: String::new() };
+        fit("test", points, &options, &mut unwatched).expect_err("bad input must be refused")
+    };
+    for degree in [0, 1, 3, 7, 10, usize::MAX] {
+        let error = attempt(&good, degree, 1e-5);
+        assert_eq!(error, FitError::Degree(degree));
+        assert!(error.to_string().contains("degree") && error.to_string().contains("2, 4, 6, 8"));
+    }
+    for margin in [0.0, -1.0, 0.5] {
+        assert_eq!(attempt(&good, 4, margin), FitError::Margin(margin));
+    }
+    assert!(matches!(attempt(&good, 4, f64::NAN), FitError::Margin(_)));
+    assert_eq!(attempt(&good[..3], 4, 1e-5), FitError::TooFewPoints(3));
+    let mut broken = good.clone();
+    broken[17].y = f64::NAN;
+    assert_eq!(attempt(&broken, 4, 1e-5), FitError::NotFinite(17));
+    let flat: Vec<_> = good.iter().map(|p| Vector3::new(p.x, p.y, 0.2 * p.x + p.y)).collect();
+    let error = attempt(&flat, 4, 1e-5).to_string();
+    assert!(error.contains("coplanar") && error.contains("add thickness"), "{error}");
+    let line: Vec<_> = (0..40).map(|i| Vector3::new(1.0, 0.1, 7.0) * f64::from(i)).collect();
+    assert!(attempt(&line, 4, 1e-5).to_string().contains("collinear"));
+    assert!(attempt(&[good[0]; 9], 4, 1e-5).to_string().contains("coincident"));
+}
+
+#[test]
+fn progress_is_reported_and_can_stop_the_fit() {
+    let mut rounds = Vec::new();
+    let options = FitOptions { degree: 4, ..FitOptions::default() };
+    let stopped = fit("test", &blob(100), &options, &mut |progress| {
+        rounds.push(progress.round);
+        if rounds.len() == 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    assert_eq!(stopped.err(), Some(FitError::Cancelled));
+    assert_eq!(rounds.len(), 2);
+}
