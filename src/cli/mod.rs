@@ -1,4 +1,109 @@
 //! The commands: arguments in, tables or JSON out, errors as one line.
+//!
+//! Standard output holds results only; progress and logs go to standard error.
 
-pub mod push;
-pub mod serve;
+#[cfg(feature = "fit")]
+mod demo;
+#[cfg(feature = "fit")]
+mod fit;
+mod measure;
+mod push;
+mod serve;
+mod show;
+mod verify;
+
+use crate::body::Body;
+use clap::Parser;
+use std::error::Error;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// What a command returns: whether what it was asked to check holds, or the error to print.
+type Outcome = Result<bool, Box<dyn Error>>;
+
+/// Real-time collision and proximity queries on certified convex polynomial bodies
+///
+/// Objects are stored as sets {x : p(x) <= 1} of sos-convex polynomials, fitted offline around meshes and proven to contain
+/// them. Every answer is a bracket that is proven to hold the truth.
+///
+/// A first tour: 'sublevel demo'. With meshes of your own: 'fit', then 'measure' without a server, or 'serve' and 'push'.
+#[derive(Debug, Parser)]
+#[command(version, max_term_width = 100)]
+enum Command {
+    #[cfg(feature = "fit")]
+    Demo(demo::DemoArgs),
+    #[cfg(feature = "fit")]
+    Fit(fit::FitArgs),
+    Show(show::ShowArgs),
+    Verify(verify::VerifyArgs),
+    Measure(measure::MeasureArgs),
+    Serve(serve::ServeArgs),
+    Push(push::PushArgs),
+}
+
+/// Runs the command line of this process. Exit code 0: done; 1: failed, with one line on standard error, or a checked claim
+/// does not hold; 2: the arguments are wrong.
+pub fn main() -> ExitCode {
+    let done = |()| true;
+    let outcome: Outcome = match Command::parse() {
+        #[cfg(feature = "fit")]
+        Command::Demo(args) => demo::run(&args).map(done).map_err(Into::into),
+        #[cfg(feature = "fit")]
+        Command::Fit(args) => fit::run(&args).map(done),
+        Command::Show(args) => show::run(&args).map(done),
+        Command::Verify(args) => verify::run(&args),
+        Command::Measure(args) => measure::run(&args).map(done),
+        Command::Serve(args) => serve::run(&args).map(done).map_err(Into::into),
+        Command::Push(args) => push::run(&args).map(done),
+    };
+    match outcome {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        // Whoever reads our output went away; nobody is left to tell.
+        Err(error) if is_broken_pipe(error.as_ref()) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn is_broken_pipe(error: &(dyn Error + 'static)) -> bool {
+    let mut cause = Some(error);
+    while let Some(error) = cause {
+        if error.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe) {
+            return true;
+        }
+        cause = error.source();
+    }
+    false
+}
+
+/// Reads a text file, naming it in the error.
+fn read(path: &Path) -> Result<String, Box<dyn Error>> {
+    std::fs::read_to_string(path).map_err(|error| format!("{}: {error}; check the path", path.display()).into())
+}
+
+/// Reads and re-proves a body file, naming it in the error.
+fn read_body(path: &Path) -> Result<Body, Box<dyn Error>> {
+    Body::from_json(&read(path)?).map_err(|error| format!("{}: {error}", path.display()).into())
+}
+
+/// Writes a file whole or not at all: under a temporary name beside it, then renamed.
+fn write_atomically(path: &Path, content: &str) -> Result<(), Box<dyn Error>> {
+    use std::io::Write;
+    let failed =
+        |error: std::io::Error| format!("can not write {}: {error}; check the folder and its space", path.display());
+    let mut name = path.file_name().ok_or_else(|| format!("{} names no file", path.display()))?.to_owned();
+    name.push(format!(".{}.tmp", std::process::id()));
+    let temporary = path.with_file_name(name);
+    let written = std::fs::File::create(&temporary)
+        .and_then(|mut file| file.write_all(content.as_bytes()).and_then(|()| file.sync_all()))
+        .and_then(|()| std::fs::rename(&temporary, path));
+    if let Err(error) = written {
+        // What is left of the attempt only takes space.
+        let _ = std::fs::remove_file(&temporary);
+        return Err(failed(error).into());
+    }
+    Ok(())
+}

@@ -1,0 +1,169 @@
+//! `sublevel measure`.
+
+mod poses;
+mod timing;
+
+use super::{read, read_body};
+use crate::body::Body;
+use crate::measure::{DEFAULT_ACCURACY, Distance, LevelDistance, Pose, Status, WarmStart, distance, level_distance};
+use serde::Serialize;
+use std::error::Error;
+use std::io::{self, BufWriter, Write};
+use std::path::PathBuf;
+
+/// Measure distances between two bodies, without a server
+///
+/// Prints the Euclidean distance and both level distances d(A‖B) = min p_A on B and d(B‖A), each with its proven bracket,
+/// for one relative pose or for each pose of a file. Successive poses of a trajectory are warm-started.
+///
+/// A pose maps the frame of B into the frame of A; witnesses and normal are in A's frame, metres, the normal from B to A
+/// (none on overlap). Level distances are above 1 apart, 1 touching, below 1 overlapping, and use the polynomials as they
+/// are stored: 'show' tells their minimum.
+///
+/// Example: sublevel measure a.json b.json --pose 0.5,0,0,0,0,0,1
+#[derive(Debug, clap::Args)]
+pub(super) struct MeasureArgs {
+    /// Body file of A
+    a: PathBuf,
+    /// Body file of B
+    b: PathBuf,
+    /// Pose of B in A's frame: translation (m) and quaternion [default: identity]
+    #[arg(long, value_name = "X,Y,Z,QX,QY,QZ,QW", allow_hyphen_values = true, conflicts_with = "poses")]
+    pose: Option<String>,
+    /// File of poses of B in A's frame, one a line: r00 r01 r02 r10 .. r22 tx ty tz; a blank line starts a new trajectory
+    #[arg(long, value_name = "FILE")]
+    poses: Option<PathBuf>,
+    /// Width asked of the brackets: relative to the larger body's circumradius, and to max(1, |d|)
+    #[arg(long, value_name = "WIDTH", default_value_t = DEFAULT_ACCURACY)]
+    accuracy: f64,
+    /// Print one JSON object a line instead of a table
+    #[arg(long)]
+    json: bool,
+    /// Print instead one JSON object of nanoseconds per query, cold and warm: medians of 9 passes over the poses, everything
+    /// a JSON line holds included; warm starts are cold at each trajectory. 'level' is d(A‖B)
+    #[arg(long)]
+    time: bool,
+}
+
+/// One pose's answers.
+#[derive(Serialize)]
+struct Line {
+    status: &'static str,
+    distance_m: f64,
+    distance_lower_m: f64,
+    distance_upper_m: f64,
+    level_ab: f64,
+    level_ab_lower: Option<f64>,
+    level_ab_upper: f64,
+    level_ba: f64,
+    level_ba_lower: Option<f64>,
+    level_ba_upper: f64,
+    witness_a: [f64; 3],
+    witness_b: [f64; 3],
+    normal: Option<[f64; 3]>,
+    /// Of the distance.
+    iterations: u32,
+}
+
+impl Line {
+    fn new(distance: &Distance, ab: &LevelDistance, ba: &LevelDistance) -> Self {
+        let converged = [distance.status, ab.status, ba.status].iter().all(|&status| status == Status::Converged);
+        let finite = |value: f64| value.is_finite().then_some(value);
+        Self {
+            status: if converged { "converged" } else { "bracket_wide" },
+            distance_m: distance.value(),
+            distance_lower_m: distance.lower,
+            distance_upper_m: distance.upper,
+            level_ab: ab.value(),
+            level_ab_lower: finite(ab.lower),
+            level_ab_upper: ab.upper,
+            level_ba: ba.value(),
+            level_ba_lower: finite(ba.lower),
+            level_ba_upper: ba.upper,
+            witness_a: distance.witness_a.into(),
+            witness_b: distance.witness_b.into(),
+            normal: distance.normal.map(Into::into),
+            iterations: distance.iterations,
+        }
+    }
+}
+
+/// Two bodies and the accuracy asked for.
+struct Query {
+    a: Body,
+    b: Body,
+    accuracy: f64,
+}
+
+impl Query {
+    fn distance(&self, pose: &Pose, warm: &mut WarmStart) -> Distance {
+        distance(&self.a, &Pose::identity(), &self.b, pose, self.accuracy, warm)
+    }
+
+    fn level_ab(&self, pose: &Pose, warm: &mut WarmStart) -> LevelDistance {
+        level_distance(&self.a, &Pose::identity(), &self.b, pose, self.accuracy, warm)
+    }
+
+    fn level_ba(&self, pose: &Pose, warm: &mut WarmStart) -> LevelDistance {
+        level_distance(&self.b, pose, &self.a, &Pose::identity(), self.accuracy, warm)
+    }
+}
+
+/// Measures and prints.
+pub(super) fn run(args: &MeasureArgs) -> Result<(), Box<dyn Error>> {
+    if !(args.accuracy > 0.0 && args.accuracy <= 1.0) {
+        return Err(format!(
+            "--accuracy: {} is not above 0 and at most 1; the default is {DEFAULT_ACCURACY:e}",
+            args.accuracy
+        )
+        .into());
+    }
+    let trajectories = match (&args.pose, &args.poses) {
+        (Some(text), _) => vec![vec![poses::parse_one(text).map_err(|error| format!("--pose: {error}"))?]],
+        (None, Some(path)) => {
+            poses::parse_file(&read(path)?).map_err(|error| format!("{}: {error}", path.display()))?
+        }
+        (None, None) => vec![vec![Pose::identity()]],
+    };
+    let query = Query { a: read_body(&args.a)?, b: read_body(&args.b)?, accuracy: args.accuracy };
+    let mut out = BufWriter::new(io::stdout().lock());
+    if args.time {
+        serde_json::to_writer(&mut out, &timing::time(&query, &trajectories))?;
+        writeln!(out)?;
+        return Ok(out.flush()?);
+    }
+    if !args.json {
+        writeln!(
+            out,
+            "{:>5}  {:>14}  {:>8}  {:>14}  {:>8}  {:>14}  {:>8}  status",
+            "pose", "distance m", "± m", "d(A‖B)", "±", "d(B‖A)", "±"
+        )?;
+    }
+    let mut number = 0;
+    for trajectory in &trajectories {
+        let mut warm = [WarmStart::default(); 3];
+        for pose in trajectory {
+            let distance = query.distance(pose, &mut warm[0]);
+            let (ab, ba) = (query.level_ab(pose, &mut warm[1]), query.level_ba(pose, &mut warm[2]));
+            let line = Line::new(&distance, &ab, &ba);
+            if args.json {
+                serde_json::to_writer(&mut out, &line)?;
+                writeln!(out)?;
+            } else {
+                number += 1;
+                writeln!(
+                    out,
+                    "{number:>5}  {:>14.9}  {:>8.1e}  {:>14.9}  {:>8.1e}  {:>14.9}  {:>8.1e}  {}",
+                    line.distance_m,
+                    distance.upper - distance.lower,
+                    line.level_ab,
+                    ab.upper - ab.lower,
+                    line.level_ba,
+                    ba.upper - ba.lower,
+                    line.status
+                )?;
+            }
+        }
+    }
+    Ok(out.flush()?)
+}

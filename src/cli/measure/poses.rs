@@ -1,0 +1,91 @@
+//! Poses as text.
+
+use crate::measure::{Pose, PoseError};
+use nalgebra::{Matrix3, Vector3};
+
+/// Why a text holds no poses.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum PosesError {
+    /// A number is none.
+    #[error("{place}'{text}' is not a number")]
+    Number { place: String, text: String },
+    /// Too few or too many numbers.
+    #[error("{place}{found} numbers where {expected} are needed: {order}")]
+    Count { place: String, found: usize, expected: usize, order: &'static str },
+    /// The numbers are no rigid motion.
+    #[error("{place}{source}")]
+    Pose { place: String, source: PoseError },
+    /// No pose at all.
+    #[error("there is no pose in the file; give one a line")]
+    Empty,
+}
+
+fn numbers<const N: usize>(
+    words: impl Iterator<Item = impl AsRef<str>>,
+    place: &str,
+    order: &'static str,
+) -> Result<[f64; N], PosesError> {
+    let mut found = Vec::with_capacity(N);
+    for word in words {
+        let text = word.as_ref();
+        let number = text
+            .parse()
+            .map_err(|_| PosesError::Number { place: place.into(), text: text.chars().take(40).collect() })?;
+        found.push(number);
+    }
+    let count = found.len();
+    found.try_into().map_err(|_| PosesError::Count { place: place.into(), found: count, expected: N, order })
+}
+
+/// The pose `x,y,z,qx,qy,qz,qw`.
+pub(super) fn parse_one(text: &str) -> Result<Pose, PosesError> {
+    let [x, y, z, qx, qy, qz, qw] = numbers(text.split(',').map(str::trim), "", "x,y,z,qx,qy,qz,qw")?;
+    Pose::from_quaternion(Vector3::new(x, y, z), [qx, qy, qz, qw])
+        .map_err(|source| PosesError::Pose { place: String::new(), source })
+}
+
+/// Trajectories of poses `r00 r01 r02 r10 .. r22 tx ty tz`, one a line, separated by blank lines.
+pub(super) fn parse_file(text: &str) -> Result<Vec<Vec<Pose>>, PosesError> {
+    let mut trajectories = vec![Vec::new()];
+    for (index, line) in text.lines().enumerate() {
+        if line.trim().is_empty() {
+            trajectories.push(Vec::new());
+            continue;
+        }
+        let place = format!("line {}: ", index + 1);
+        let n: [f64; 12] = numbers(line.split_whitespace(), &place, "r00 r01 r02 r10 r11 r12 r20 r21 r22 tx ty tz")?;
+        let pose = Pose::from_matrix(&Matrix3::from_row_slice(&n[..9]), Vector3::new(n[9], n[10], n[11]))
+            .map_err(|source| PosesError::Pose { place, source })?;
+        if let Some(last) = trajectories.last_mut() {
+            last.push(pose);
+        }
+    }
+    trajectories.retain(|trajectory| !trajectory.is_empty());
+    if trajectories.is_empty() { Err(PosesError::Empty) } else { Ok(trajectories) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_split_into_trajectories() {
+        let line = "1 0 0 0 1 0 0 0 1 0.5 0 0";
+        let text = format!("{line}\n{line}\n\n\n{line}\n");
+        let lengths: Vec<_> = parse_file(&text).unwrap().iter().map(Vec::len).collect();
+        assert_eq!(lengths, [2, 1]);
+    }
+
+    #[test]
+    fn bad_poses_are_named() {
+        let message = |text: &str| parse_file(text).unwrap_err().to_string();
+        assert!(message("1 0 0 0 1 0 0 0 1 0.5 0").starts_with("line 1: 11 numbers where 12"));
+        assert!(message("\n1 0 0 0 1 0 0 0 1 0.5 0 zero").starts_with("line 2: 'zero'"));
+        assert!(message("1 0 0 0 1 0 0 0 1.001 0 0 0").contains("deviates by 1.0"));
+        assert!(message("1 0 0 0 1 0 0 0 NaN 0 0 0").contains("not finite"));
+        assert!(message(" \n\n").contains("no pose"));
+        assert!(parse_one("0,0,0,0,0,0,1").is_ok());
+        assert!(parse_one("0,0,0,0,0,0").unwrap_err().to_string().contains("6 numbers where 7"));
+        assert!(parse_one("0,0,0,0,0,0,2").unwrap_err().to_string().contains("unit quaternion"));
+    }
+}

@@ -1,0 +1,89 @@
+//! `sublevel verify`.
+
+use super::{Outcome, read};
+use crate::body::Body;
+use serde::Serialize;
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+/// Re-prove a body from its stored numbers alone
+///
+/// Recomputes the id, checks every certificate (no program is solved), proves the body bounded and compares every derived
+/// value. With --points it also proves that every point of a mesh is inside. Exit code 0 only if every claim holds.
+///
+/// Example: sublevel verify bodies/mug-d6.json --points mug.obj --scale 0.001
+#[derive(Debug, clap::Args)]
+pub(super) struct VerifyArgs {
+    /// Body file
+    file: PathBuf,
+    /// Mesh or points that the body must contain
+    #[cfg(feature = "fit")]
+    #[arg(long, value_name = "MESH")]
+    points: Option<PathBuf>,
+    /// Metres per unit of the points
+    #[cfg(feature = "fit")]
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, requires = "points")]
+    scale: f64,
+    /// Print one JSON object instead of sentences
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Report {
+    sos_convex_proven: bool,
+    contains_all_points_proven: Option<bool>,
+    /// Rigorous upper bound of the largest constraint over the points.
+    max_value: Option<f64>,
+    degree: Option<usize>,
+}
+
+/// Proves, prints, and tells whether every claim holds.
+pub(super) fn run(args: &VerifyArgs) -> Outcome {
+    let text = read(&args.file)?;
+    let (report, trouble) = match Body::from_json(&text) {
+        Ok(body) => contained(args, &body)?,
+        Err(error) => {
+            let report =
+                Report { sos_convex_proven: false, contains_all_points_proven: None, max_value: None, degree: None };
+            (report, Some(format!("{}: {error}", args.file.display())))
+        }
+    };
+    let mut out = io::stdout().lock();
+    if args.json {
+        serde_json::to_writer(&mut out, &report)?;
+        writeln!(out)?;
+    } else if report.sos_convex_proven {
+        writeln!(out, "{}: proven sos-convex, bounded, and as its file says", args.file.display())?;
+        if let (Some(true), Some(value)) = (report.contains_all_points_proven, report.max_value) {
+            writeln!(out, "proven to contain every point: the largest value is at most {value}")?;
+        }
+    }
+    if let Some(trouble) = &trouble {
+        eprintln!("error: {trouble}");
+    }
+    Ok(trouble.is_none())
+}
+
+#[cfg(feature = "fit")]
+fn contained(args: &VerifyArgs, body: &Body) -> Result<(Report, Option<String>), Box<dyn std::error::Error>> {
+    let mut report = proven(body);
+    let Some(path) = &args.points else { return Ok((report, None)) };
+    let points = crate::fit::read_points(path, args.scale)?;
+    let (value, trouble) = match body.prove_contains(&points) {
+        Ok(value) => (value, None),
+        Err(failure) => (failure.value, Some(format!("{}: {failure}", path.display()))),
+    };
+    report.contains_all_points_proven = Some(trouble.is_none());
+    report.max_value = Some(value);
+    Ok((report, trouble))
+}
+
+#[cfg(not(feature = "fit"))]
+fn contained(_: &VerifyArgs, body: &Body) -> Result<(Report, Option<String>), Box<dyn std::error::Error>> {
+    Ok((proven(body), None))
+}
+
+fn proven(body: &Body) -> Report {
+    Report { sos_convex_proven: true, contains_all_points_proven: None, max_value: None, degree: Some(body.degree()) }
+}
