@@ -259,7 +259,8 @@ fn certify(
     let gram = HessianGram::nearest(&polynomial, structure.hessian_basis.clone(), optimum.hessian.clone())
         .map_err(|source| BodyError::Certificate { index: 0, source })?;
     let mut constraint = Constraint { polynomial, gram };
-    let placement = Placement::new(normalization.linear, normalization.center, 0.0, 0.0);
+    let inverse = normalization.linear.try_inverse().ok_or(ProgramError::Singular)?;
+    let placement = Placement::new(normalization.linear, &inverse, normalization.center, 0.0, 0.0);
     // The bound of the rounding moves a little with the constant: a second pass settles it.
     for _ in 0..3 {
         let highest =
