@@ -165,7 +165,8 @@ fn every_acknowledged_change_is_on_disk() {
 
 #[test]
 fn what_it_did_not_write_is_refused_by_name() {
-    let damage: [(&str, fn(&redb::WriteTransaction)); 6] = [
+    type Write = fn(&redb::WriteTransaction);
+    let damage: [(&str, Write); 6] = [
         ("format 7", |t| drop(t.open_table(META).expect("a table").insert("format", 7))),
         ("body", |t| drop(t.open_table(BODIES).expect("a table").insert("feed", &b"{}"[..]))),
         ("scene \"room\"", |t| drop(t.open_table(SCENES).expect("a table").insert("room", &b"{}"[..]))),

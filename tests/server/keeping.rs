@@ -85,7 +85,7 @@ async fn everything_acknowledged_survives_a_kill() {
         let mut acknowledged = (revision, at(0.0));
         loop {
             let pose = numbers.pose();
-            let set_poses = vec![moved("racer", pose.clone())];
+            let set_poses = vec![moved("racer", pose)];
             let update = UpdateSceneRequest { name: "room".into(), set_poses, ..Default::default() };
             match racing.scenes.update_scene(update).await {
                 Ok(response) => acknowledged = (response.into_inner().revision, pose),
