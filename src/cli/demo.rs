@@ -9,16 +9,16 @@ use std::path::PathBuf;
 /// Prints the table of fits and the level-distance curve; writes meshes, body files, the numbers as CSV and the plots as
 /// SVG. Needs no input, and takes about half a minute.
 #[derive(Debug, clap::Args)]
-pub struct DemoArgs {
+pub(super) struct DemoArgs {
     /// Folder for everything the demo writes; made when it is not there
     #[arg(long, value_name = "DIR", default_value = "sublevel-demo")]
-    pub out: PathBuf,
+    pub(super) out: PathBuf,
 }
 
 /// Runs the demo and prints its tables to standard output.
 ///
 /// # Errors
 /// The first step that fails, and why.
-pub fn run(args: &DemoArgs) -> Result<(), DemoError> {
+pub(super) fn run(args: &DemoArgs) -> Result<(), DemoError> {
     demo::run(&args.out, &mut io::stdout().lock())
 }

@@ -10,16 +10,16 @@ use crate::service::{self, Pushed};
 
 /// Store body files in a running server.
 #[derive(Debug, clap::Args)]
-pub struct PushArgs {
+pub(super) struct PushArgs {
     /// Body files, as `sublevel fit` writes them
     #[arg(required = true, value_name = "FILE")]
-    pub files: Vec<PathBuf>,
+    pub(super) files: Vec<PathBuf>,
     /// Address of the server
     #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:50051")]
-    pub server: String,
+    pub(super) server: String,
     /// Print a JSON array instead of a table
     #[arg(long)]
-    pub json: bool,
+    pub(super) json: bool,
 }
 
 #[derive(Serialize)]
@@ -36,7 +36,7 @@ struct Row<'a> {
 ///
 /// # Errors
 /// The first file that could not be stored, and why.
-pub fn run(args: &PushArgs) -> Result<(), Box<dyn Error>> {
+pub(super) fn run(args: &PushArgs) -> Result<(), Box<dyn Error>> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let pushed = runtime.block_on(service::push(&args.server, &args.files))?;
     let rows: Vec<_> = pushed.iter().map(row).collect();

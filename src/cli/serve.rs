@@ -7,13 +7,13 @@ use crate::service::{self, ServeError, ServeOptions};
 
 /// Run the gRPC server: bodies and scenes on disk, distances on request.
 #[derive(Debug, clap::Args)]
-pub struct ServeArgs {
+pub(super) struct ServeArgs {
     /// Address to listen on; loopback only until there is TLS. Port 0 takes any free port
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:50051")]
-    pub listen: SocketAddr,
+    pub(super) listen: SocketAddr,
     /// Directory that keeps bodies and scenes; made when it is not there. One server at a time
     #[arg(long, value_name = "DIR", default_value = "sublevel-data")]
-    pub data: PathBuf,
+    pub(super) data: PathBuf,
 }
 
 /// Serves until SIGTERM or Ctrl-C. Prints `listening on ADDR` first; logs go to standard error, as much as the environment
@@ -21,7 +21,7 @@ pub struct ServeArgs {
 ///
 /// # Errors
 /// Why the server could not start, or ended by itself.
-pub fn run(args: &ServeArgs) -> Result<(), ServeError> {
+pub(super) fn run(args: &ServeArgs) -> Result<(), ServeError> {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
     // A second subscriber in one process is no reason not to serve.
     let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_ansi(false).try_init();

@@ -220,14 +220,16 @@ pub fn fit(
     Ok(Fit { body, report })
 }
 
-/// The map from the frame of the points to that of the ellipsoid around the conditioned points: symmetric and positive
-/// definite, which leaves the axes where they are.
+/// The map from the frame of the points to that of the ellipsoid around the conditioned points, with orthogonal rows: such a
+/// map amplifies no rounding, however long the ellipsoid is.
 fn whitening(frame: &Frame, ellipsoid: &Ellipsoid) -> Option<Normalization> {
     let center = frame.center + frame.linear.try_inverse()? * ellipsoid.center;
     let decomposition = (ellipsoid.linear * frame.linear).svd(false, true);
-    let turn = decomposition.v_t?;
-    let linear = turn.transpose() * Matrix3::from_diagonal(&decomposition.singular_values) * turn;
-    Some(Normalization { center, linear: (linear + linear.transpose()) * 0.5 })
+    let mut turn = decomposition.v_t?;
+    if turn.determinant() < 0.0 {
+        turn.row_mut(2).neg_mut();
+    }
+    Some(Normalization { center, linear: Matrix3::from_diagonal(&decomposition.singular_values) * turn })
 }
 
 fn check(points: &[Vector3<f64>], options: &FitOptions) -> Result<(), FitError> {

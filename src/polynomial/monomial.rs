@@ -16,7 +16,7 @@ pub(crate) const fn count(degree: usize) -> usize {
 /// All monomials of degree at most `max_degree`, by degree, within a degree from `z1^t` to `z3^t`.
 ///
 /// Each degree's block follows from the one before: all of it times z1, its z1-free tail times z2, its last times z3.
-/// [`fill`] computes the values in the same order.
+/// `fill` computes the values in the same order.
 pub fn monomials(max_degree: usize) -> Vec<Exponents> {
     let mut list = Vec::with_capacity(count(max_degree));
     for total in 0..=max_degree as u8 {

@@ -5,7 +5,7 @@ mod timing;
 
 use super::{read, read_body};
 use crate::body::Body;
-use crate::measure::{DEFAULT_ACCURACY, Distance, LevelDistance, Pose, Status, WarmStart, distance, level_distance};
+use crate::measure::{Distance, LevelDistance, Pose, Status, WarmStart, distance, level_distance};
 use serde::Serialize;
 use std::error::Error;
 use std::io::{self, BufWriter, Write};
@@ -34,7 +34,7 @@ pub(super) struct MeasureArgs {
     #[arg(long, value_name = "FILE")]
     poses: Option<PathBuf>,
     /// Width asked of the brackets: relative to the larger body's circumradius, and to max(1, |d|)
-    #[arg(long, value_name = "WIDTH", default_value_t = DEFAULT_ACCURACY)]
+    #[arg(long, value_name = "WIDTH", default_value = "1e-9")]
     accuracy: f64,
     /// Print one JSON object a line instead of a table
     #[arg(long)]
