@@ -112,11 +112,7 @@ impl Query {
 /// Measures and prints.
 pub(super) fn run(args: &MeasureArgs) -> Result<(), Box<dyn Error>> {
     if !(args.accuracy > 0.0 && args.accuracy <= 1.0) {
-        return Err(format!(
-            "--accuracy: {} is not above 0 and at most 1; the default is {DEFAULT_ACCURACY:e}",
-            args.accuracy
-        )
-        .into());
+        return Err(format!("--accuracy: {} is not above 0 and at most 1; the default is 1e-9", args.accuracy).into());
     }
     let trajectories = match (&args.pose, &args.poses) {
         (Some(text), _) => vec![vec![poses::parse_one(text).map_err(|error| format!("--pose: {error}"))?]],
