@@ -1,0 +1,228 @@
+//! The command line as a script uses it: JSON on standard output, one line and an exit code on errors.
+
+#![cfg(feature = "fit")]
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+fn sublevel(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sublevel")).args(args).output().unwrap()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// Standard output as JSON, after checking that the command succeeded and said nothing else.
+fn json(args: &[&str]) -> Value {
+    let output = sublevel(args);
+    assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{args:?}: {e}"))
+}
+
+/// The error line of a command that must fail without panic and without output.
+fn refusal(args: &[&str]) -> String {
+    let output = sublevel(args);
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(matches!(output.status.code(), Some(1 | 2)), "{args:?}: {:?} {error}", output.status);
+    assert!(!error.contains("panicked"), "{error}");
+    error
+}
+
+/// A cube of side 2 as OFF text.
+fn cube() -> String {
+    let mut text = "OFF\n8 0 0\n".to_owned();
+    for corner in 0..8 {
+        let sign = |bit: i32| if corner >> bit & 1 == 1 { 1.0 } else { -1.0 };
+        text += &format!("{} {} {}\n", sign(0), sign(1), sign(2));
+    }
+    text
+}
+
+struct Fitted {
+    folder: tempfile::TempDir,
+    report: Value,
+}
+
+impl Fitted {
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn body(&self) -> PathBuf {
+        self.path("new/bodies/cube-d4.json")
+    }
+}
+
+/// A cube fitted at degree 4, once for all tests.
+fn fitted() -> &'static Fitted {
+    static FITTED: OnceLock<Fitted> = OnceLock::new();
+    FITTED.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let mesh = folder.path().join("cube.off");
+        std::fs::write(&mesh, cube()).unwrap();
+        let out = folder.path().join("new/bodies");
+        let report = json(&["fit", "--json", text(&mesh), "--out", text(&out), "--degree", "4"]);
+        Fitted { folder, report }
+    })
+}
+
+fn keys(value: &Value) -> Vec<&str> {
+    value.as_object().unwrap().keys().map(String::as_str).collect()
+}
+
+fn sorted(names: &str) -> Vec<&str> {
+    let mut names: Vec<_> = names.split(' ').collect();
+    names.sort_unstable();
+    names
+}
+
+#[test]
+fn fit_reports_and_writes_a_proven_body() {
+    let fitted = fitted();
+    let [row] = fitted.report.as_array().unwrap().as_slice() else { panic!("{}", fitted.report) };
+    let expected =
+        "input body degree objective refined points hull_vertices volume_m3 hull_volume_m3 seconds status proven";
+    assert_eq!(keys(row), sorted(expected));
+    assert_eq!(row["body"], text(&fitted.body()));
+    assert_eq!((&row["degree"], &row["points"], &row["proven"]), (&4.into(), &8.into(), &true.into()));
+    assert!((row["hull_volume_m3"].as_f64().unwrap() - 8.0).abs() < 1e-9);
+    assert!((8.0..16.0).contains(&row["volume_m3"].as_f64().unwrap()));
+
+    let file: Value = serde_json::from_str(&std::fs::read_to_string(fitted.body()).unwrap()).unwrap();
+    assert_eq!((&file["format"], &file["kind"]), (&"sublevel/1".into(), &"body".into()));
+    // The stored numbers mean what they say: p(L (x - c)) <= 1 at every corner.
+    let number = |v: &Value| v.as_f64().unwrap();
+    for corner in 0..8 {
+        let x: [f64; 3] = std::array::from_fn(|i| if corner >> i & 1 == 1 { 1.0 } else { -1.0 });
+        let normalization = &file["normalization"];
+        let z: [f64; 3] = std::array::from_fn(|i| {
+            (0..3).map(|j| number(&normalization["linear"][i][j]) * (x[j] - number(&normalization["center"][j]))).sum()
+        });
+        let constraint = &file["constraints"][0];
+        let terms =
+            constraint["exponents"].as_array().unwrap().iter().zip(constraint["coefficients"].as_array().unwrap());
+        let p: f64 = terms
+            .map(|(e, c)| number(c) * (0..3).map(|i| z[i].powi(e[i].as_i64().unwrap() as i32)).product::<f64>())
+            .sum();
+        assert!(p <= 1.0 + 1e-14 && p > 0.99, "{p}");
+    }
+}
+
+#[test]
+fn verify_proves_and_refuses() {
+    let fitted = fitted();
+    let (body, mesh) = (fitted.body(), fitted.path("cube.off"));
+    let plain = json(&["verify", "--json", text(&body)]);
+    assert_eq!(keys(&plain), sorted("sos_convex_proven contains_all_points_proven max_value degree"));
+    assert_eq!(plain["contains_all_points_proven"], Value::Null);
+    let full = json(&["verify", "--json", text(&body), "--points", text(&mesh)]);
+    assert_eq!((&full["sos_convex_proven"], &full["contains_all_points_proven"]), (&true.into(), &true.into()));
+    assert!(full["max_value"].as_f64().unwrap() <= 1.0);
+
+    let output = sublevel(&["verify", "--json", text(&body), "--points", text(&mesh), "--scale", "1.01"]);
+    let outside: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((output.status.code(), &outside["contains_all_points_proven"]), (Some(1), &false.into()));
+
+    let stored = std::fs::read_to_string(&body).unwrap();
+    let mut value: Value = serde_json::from_str(&stored).unwrap();
+    value["constraints"][0]["coefficients"][3] = 0.5.into();
+    let changed = fitted.path("changed.json");
+    std::fs::write(&changed, value.to_string()).unwrap();
+    let output = sublevel(&["verify", "--json", text(&changed)]);
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((output.status.code(), &report["sos_convex_proven"]), (Some(1), &false.into()));
+    assert!(refusal(&["show", text(&changed)]).contains("id does not follow"));
+    std::fs::write(&changed, &stored[..stored.len() / 2]).unwrap();
+    assert!(refusal(&["measure", text(&changed), text(&body)]).contains("not a body file"));
+}
+
+#[test]
+fn measure_prints_one_line_a_pose() {
+    let fitted = fitted();
+    let (body, poses) = (fitted.body(), fitted.path("poses.txt"));
+    let file: Value = serde_json::from_str(&std::fs::read_to_string(&body).unwrap()).unwrap();
+    let reach = file["bounding_box"]["max_m"][0].as_f64().unwrap();
+    std::fs::write(&poses, "1 0 0 0 1 0 0 0 1 5 0 0\n1 0 0 0 1 0 0 0 1 5.01 0 0\n\n1 0 0 0 1 0 0 0 1 0.5 0 0\n")
+        .unwrap();
+    let output = sublevel(&["measure", text(&body), text(&body), "--poses", text(&poses), "--json"]);
+    let lines: Vec<Value> =
+        std::str::from_utf8(&output.stdout).unwrap().lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    assert_eq!(lines.len(), 3);
+    let expected = "status distance_m distance_lower_m distance_upper_m level_ab level_ab_lower level_ab_upper level_ba \
+                    level_ba_lower level_ba_upper witness_a witness_b normal iterations";
+    let expected = expected.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert_eq!(keys(&lines[0]), sorted(&expected));
+    assert!(lines.iter().all(|line| line["status"] == "converged"));
+    let d = lines[0]["distance_m"].as_f64().unwrap();
+    assert!((d - (5.0 - 2.0 * reach)).abs() < 1e-8, "{d} against {}", 5.0 - 2.0 * reach);
+    // From B to A: B stands at +x.
+    assert!(lines[0]["normal"][0].as_f64().unwrap() < -0.999);
+    assert_eq!((&lines[2]["distance_m"], &lines[2]["normal"]), (&0.0.into(), &Value::Null));
+    assert_eq!(lines[2]["witness_a"], lines[2]["witness_b"]);
+
+    let one = json(&["measure", text(&body), text(&body), "--json", "--pose", "-5,0,0,0,0,0,1"]);
+    assert!((one["distance_m"].as_f64().unwrap() - d).abs() < 1e-8);
+    let times = json(&["measure", text(&body), text(&body), "--poses", text(&poses), "--time"]);
+    assert_eq!(keys(&times), ["distance", "level"]);
+    for measure in ["distance", "level"] {
+        assert_eq!(keys(&times[measure]), sorted("queries cold_ns warm_ns"));
+        assert_eq!(times[measure]["queries"], 3);
+        assert!(times[measure]["cold_ns"].as_f64().unwrap() > 0.0);
+    }
+}
+
+#[test]
+fn show_describes_and_draws() {
+    let fitted = fitted();
+    let (body, mesh, picture) = (fitted.body(), fitted.path("surface.obj"), fitted.path("cube.svg"));
+    let shown = json(&["show", text(&body), "--json", "--mesh", text(&mesh), "--svg", text(&picture)]);
+    assert_eq!(shown["degree"], 4);
+    assert!(shown["min_value"].as_f64().unwrap() < 1.0);
+    assert!(std::fs::read_to_string(&picture).unwrap().starts_with("<svg"));
+    // The exported surface can be fitted again, inside the body it came from.
+    let again = json(&["fit", "--json", text(&mesh), "--out", text(&fitted.path("again")), "--degree", "2"]);
+    let inscribed = again[0]["hull_volume_m3"].as_f64().unwrap();
+    let volume = shown["volume_m3"].as_f64().unwrap();
+    assert!(inscribed <= volume && inscribed > 0.99 * volume, "{inscribed} of {volume}");
+}
+
+#[test]
+fn bad_input_is_refused_in_one_line() {
+    let fitted = fitted();
+    let (body, out) = (fitted.body(), fitted.path("refused"));
+    let write = |name: &str, content: &str| {
+        let path = fitted.path(name);
+        std::fs::write(&path, content).unwrap();
+        path
+    };
+    let files = [
+        (write("nan.xyz", "0 0 0\n1 0 0\n0 1 nan\n0 0 1\n"), "not all finite"),
+        (write("three.xyz", "0 0 0\n1 0 0\n0 1 0\n"), "at least 4"),
+        (write("flat.xyz", "0 0 0\n1 0 0\n0 1 0\n1 1 0\n0.5 0.5 0\n"), "coplanar"),
+        (write("short.off", "OFF\n8 6 0\n0 0 0\n1 1 1\n"), "truncated"),
+        (write("mesh.blend", "x"), "is not known"),
+        (fitted.path("missing.off"), "check the path"),
+    ];
+    for (path, reason) in &files {
+        let error = refusal(&["fit", text(path), "--out", text(&out)]);
+        assert!(error.contains(reason) && error.trim_end().lines().count() == 1, "{error}");
+        assert!(error.contains(path.file_name().unwrap().to_str().unwrap()), "{error}");
+    }
+    let cube = fitted.path("cube.off");
+    for degree in ["3", "10", "0"] {
+        assert!(refusal(&["fit", text(&cube), "--out", text(&out), "--degree", degree]).contains("2, 4, 6, 8"));
+    }
+    assert!(refusal(&["fit", text(&cube), text(&cube), "--out", text(&out)]).contains("would both become"));
+    assert!(refusal(&["fit", text(&cube), "--out", text(&out), "--scale", "0"]).contains("scale"));
+    assert_eq!(std::fs::read_dir(&out).map_or(0, Iterator::count), 0, "nothing is stored");
+
+    let pose = |text_: &str| refusal(&["measure", text(&body), text(&body), "--pose", text_]);
+    assert!(pose("0,0,0,0,0,0,1.1").contains("deviates by 1.000e-1"));
+    assert!(pose("0,0,0,0,0,1").contains("6 numbers where 7"));
+    assert!(pose("inf,0,0,0,0,0,1").contains("not finite"));
+    let accuracy = refusal(&["measure", text(&body), text(&body), "--accuracy", "0"]);
+    assert!(accuracy.contains("--accuracy"), "{accuracy}");
+}
