@@ -85,7 +85,7 @@ impl<'a> Search<'a> {
     fn new(pair: &'a Pair<'a>, tolerance: f64) -> Self {
         let (x, y) = (pair.a.interior, pair.b.interior);
         let n = (x - y).try_normalize(0.0).unwrap_or_else(Vector3::x);
-        let mut search = Self {
+        Self {
             pair,
             tolerance,
             lower: 0.0,
@@ -95,9 +95,7 @@ impl<'a> Search<'a> {
             n,
             active: (Active::default(), Active::default()),
             iterations: 0,
-        };
-        search.attain(&x, &y);
-        search
+        }
     }
 
     fn done(&self) -> bool {
@@ -132,6 +130,7 @@ impl<'a> Search<'a> {
         let mut v = SVector::<f64, 6>::zeros();
         v.fixed_rows_mut::<3>(0).copy_from(&start_x);
         v.fixed_rows_mut::<3>(3).copy_from(&start_y);
+        self.attain(&start_x, &start_y);
         let first = 0.5 * (start_x - start_y).norm_squared();
         let near = NEAR * self.pair.size();
         let mut attempt = 1e-1;

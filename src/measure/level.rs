@@ -90,16 +90,19 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     fn new(pair: &'a Pair<'a>, accuracy: f64) -> Self {
-        let x = pair.b.interior;
-        let active = (Active::default(), Active::default());
-        let mut search =
-            Self { pair, accuracy, lower: f64::NEG_INFINITY, upper: f64::INFINITY, x, active, iterations: 0 };
-        search.attain(&x);
-        search
+        Self {
+            pair,
+            accuracy,
+            lower: f64::NEG_INFINITY,
+            upper: f64::INFINITY,
+            x: pair.b.interior,
+            active: (Active::default(), Active::default()),
+            iterations: 0,
+        }
     }
 
     fn done(&self) -> bool {
-        self.upper - self.lower <= self.accuracy * self.upper.abs().max(1.0)
+        self.upper.is_finite() && self.upper - self.lower <= self.accuracy * self.upper.abs().max(1.0)
     }
 
     fn run(&mut self, hint: &Hint) {
@@ -120,6 +123,7 @@ impl<'a> Search<'a> {
     fn interior_point(&mut self) {
         let pair = self.pair;
         let value = |x: &Vector3<f64>| (0..pair.a.len()).map(|i| pair.a.jet(i, x).value).fold(f64::MIN, f64::max);
+        self.attain(&pair.b.interior);
         self.attain(&pair.a.interior);
         let mut inset = 0.1;
         for _ in 0..MAX_ROUNDS {

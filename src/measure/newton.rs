@@ -183,12 +183,14 @@ impl DistanceNewton {
             return (0, false);
         }
         // Where both are flat the system is singular, but the point at hand with fitted multipliers may do.
+        let mut at = self.evaluate(pair);
         if accept(self) {
             return (0, true);
         }
         let mut last = f64::INFINITY;
         for step in 1..=MAX_STEPS {
-            let Some(length) = self.step(pair) else { return (step, false) };
+            let Some(length) = self.step(&at) else { return (step, false) };
+            at = self.evaluate(pair);
             if accept(self) {
                 return (step, true);
             }
@@ -203,16 +205,25 @@ impl DistanceNewton {
                 if stuck {
                     return (step, false);
                 }
+                if changed {
+                    at = self.evaluate(pair);
+                }
             }
             last = length;
         }
         (MAX_STEPS, false)
     }
 
-    /// One Newton step; its length, or none if the system is singular.
-    fn step(&mut self, pair: &Pair<'_>) -> Option<f64> {
+    /// Both bodies at the current iterate; the mean of both sides of u + w = 0 says what n is.
+    fn evaluate(&mut self, pair: &Pair<'_>) -> (At, At) {
         let a = At::new(&pair.a, &self.a, &self.x);
         let b = At::new(&pair.b, &self.b, &self.y);
+        self.n = (b.sum - a.sum) * 0.5;
+        (a, b)
+    }
+
+    /// One Newton step; its length, or none if the system is singular.
+    fn step(&mut self, (a, b): &(At, At)) -> Option<f64> {
         let size = 7 + self.a.len + self.b.len;
         let mut m: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
         let scaled = a.hessian * self.distance;
@@ -261,9 +272,6 @@ impl DistanceNewton {
         for k in 0..self.b.len {
             self.b.multiplier[k] += d[7 + self.a.len + k] * damping;
         }
-        // Both sides of u + w = 0 say what n is; their mean splits the residual.
-        let (a, b) = (At::new(&pair.a, &self.a, &self.x), At::new(&pair.b, &self.b, &self.y));
-        self.n = (b.sum - a.sum) * 0.5;
         Some(length)
     }
 }

@@ -82,21 +82,18 @@ impl Posed<'_> {
     /// A point within whose displacement a point of the body is proven to lie, from v towards the interior point.
     ///
     /// Convexity along the segment gives the factor `s = (1 - g(a)) / (g(v) - g(a))` from a; rounding takes a little more.
-    /// None if even the interior point is not proven inside in this frame.
+    /// None if not even the interior point is proven inside in this frame.
     pub(super) fn pull_in(&self, v: &Vector3<f64>) -> Option<Vector3<f64>> {
         let mut value = self.nearby_value_upper(v);
         if value <= 1.0 {
             return Some(*v);
         }
-        let deepest = self.nearby_value_upper(&self.interior);
-        if !(deepest < 1.0) {
-            return None;
-        }
+        let deepest = self.body.min_value();
         let mut margin = 4.0 * f64::EPSILON;
         let mut point = *v;
         for _ in 0..24 {
             if !value.is_finite() {
-                return Some(self.interior);
+                break;
             }
             let factor = ((1.0 - deepest) / (value - deepest)).min(1.0) * (1.0 - margin);
             point = self.interior + (point - self.interior) * factor;
@@ -106,7 +103,7 @@ impl Posed<'_> {
             }
             margin *= 4.0;
         }
-        Some(self.interior)
+        (self.nearby_value_upper(&self.interior) <= 1.0).then_some(self.interior)
     }
 }
 

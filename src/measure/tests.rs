@@ -75,7 +75,8 @@ fn ball_pairs() {
         if let Some(normal) = answer.normal.filter(|_| gap > 1e-8 * s) {
             assert!((normal + direction).norm() < 1e-4, "{label}");
         }
-        assert_eq!(answer.normal.is_none(), answer.witness_a == answer.witness_b, "{label}");
+        assert_eq!(answer.normal.is_none(), answer.upper == 0.0, "{label}");
+        assert!(answer.upper > 0.0 || answer.witness_a == answer.witness_b, "{label}");
         if gap < -2e-9 * s {
             assert!(answer.upper == 0.0, "{label}");
         }
@@ -165,7 +166,7 @@ fn zoo(random: &mut Seeded) -> Vec<Body> {
 
 #[test]
 fn random_pairs_converge_and_agree_in_all_ways() {
-    for seed in 0..600 {
+    for seed in 0..300 {
         let mut random = Seeded(seed);
         let bodies = zoo(&mut random);
         let (i, j) = (random.next() as usize % bodies.len(), random.next() as usize % bodies.len());

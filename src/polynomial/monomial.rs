@@ -29,26 +29,40 @@ pub fn monomials(max_degree: usize) -> Vec<Exponents> {
     list
 }
 
-/// Values of all monomials of degree at most `degree` at `z`, in the order of [`monomials`]; `K` is their number.
+/// Values of all monomials of degree at most `degree` <= 6 at `z`, in the order of [`monomials`]; `K` is their number.
 ///
-/// A monomial of degree t costs t - 1 multiplications in sequence, hence at most t - 1 roundings.
+/// A monomial of degree t costs t - 1 multiplications in sequence, hence at most t - 1 roundings. With a constant degree
+/// every loop unrolls.
 #[inline(always)]
 pub(crate) fn fill<const K: usize>(degree: usize, z: [f64; 3], values: &mut [f64; K]) {
-    debug_assert_eq!(K, count(degree));
+    debug_assert!(K == count(degree) && degree <= 6);
     values[0] = 1.0;
-    let (mut block, mut next) = (0, 1);
-    for total in 1..=degree {
-        let size = total * (total + 1) / 2;
-        for i in 0..size {
-            values[next + i] = z[0] * values[block + i];
-        }
-        for i in 0..total {
-            values[next + size + i] = z[1] * values[block + size - total + i];
-        }
-        values[next + size + total] = z[2] * values[block + size - 1];
-        block = next;
-        next += size + total + 1;
+    if degree >= 2 {
+        block::<1, K>(z, values);
+        block::<2, K>(z, values);
     }
+    if degree >= 4 {
+        block::<3, K>(z, values);
+        block::<4, K>(z, values);
+    }
+    if degree >= 6 {
+        block::<5, K>(z, values);
+        block::<6, K>(z, values);
+    }
+}
+
+/// The monomials of degree `TOTAL` from those of one degree less.
+#[inline(always)]
+fn block<const TOTAL: usize, const K: usize>(z: [f64; 3], values: &mut [f64; K]) {
+    let (before, start) = (count(TOTAL - 1) - TOTAL * (TOTAL + 1) / 2, count(TOTAL - 1));
+    let size = TOTAL * (TOTAL + 1) / 2;
+    for i in 0..size {
+        values[start + i] = z[0] * values[before + i];
+    }
+    for i in 0..TOTAL {
+        values[start + size + i] = z[1] * values[before + size - TOTAL + i];
+    }
+    values[start + size + TOTAL] = z[2] * values[before + size - 1];
 }
 
 #[cfg(test)]
