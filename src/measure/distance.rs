@@ -102,6 +102,11 @@ impl<'a> Search<'a> {
         self.upper - self.lower <= self.tolerance
     }
 
+    /// Whether the bracket is narrow enough and says on which side of contact the bodies are.
+    fn decided(&self) -> bool {
+        self.done() && (self.lower > 0.0 || self.upper == 0.0)
+    }
+
     fn run(&mut self, hint: &Hint) {
         match hint {
             Hint::Apart { x_a, y_b, normal_a, active_a, active_b } => {
@@ -119,7 +124,7 @@ impl<'a> Search<'a> {
         if !self.done() {
             self.closest();
         }
-        if !self.done() && self.lower < NEAR * self.pair.size() {
+        if !self.decided() && self.lower < NEAR * self.pair.size() {
             self.contact();
         }
     }
@@ -195,7 +200,7 @@ impl<'a> Search<'a> {
                     }
                 }
             }
-            if self.done() || attempt < 1e-18 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            if self.decided() || attempt < 1e-18 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
         self.iterations += iterations;
     }
