@@ -74,7 +74,8 @@ fn support(
     for (constraint, multiplier) in constraints.iter().zip(multipliers) {
         let lambda = multiplier * length;
         let sample = placement.sample(constraint, &point);
-        reach += lambda * (1.0 - sample.jet.value + sample.nearby_value_error) * (1.0 + 1e-15);
+        reach += lambda * (1.0 - sample.jet.value + sample.nearby_value_error);
+        reach += 1e-14 * lambda * (1.0 + sample.jet.value.abs());
         residual -= sample.jet.gradient * lambda;
         slope += lambda * (sample.gradient_error + 1e-14 * sample.jet.gradient.norm());
     }

@@ -152,6 +152,7 @@ impl Body {
         if recomputed != file.id {
             return Err(BodyFileError::Derived { field: "id", stored: file.id, recomputed });
         }
+        check_notes(&file)?;
         let mut body = Self::with_interior(&file.name, normalization, constraints, Some(interior))?;
         check_derived(&file, &body)?;
         body.points = file.contained_points;
@@ -187,6 +188,33 @@ fn read_constraint(i: usize, constraint: &FileConstraint) -> Result<Constraint, 
     Ok(Constraint { polynomial, gram })
 }
 
+/// Checks what no proof covers, as far as it can be: notes about the input must at least be possible and printable.
+fn check_notes(file: &File) -> Result<(), BodyFileError> {
+    let check = |good: bool, field: &str, reason: &str| {
+        let error = || BodyFileError::Field { field: field.into(), reason: reason.into() };
+        if good { Ok(()) } else { Err(error()) }
+    };
+    if let Some(ContainedPoints { count, sha256 }) = &file.contained_points {
+        let digits = sha256.len() == 64 && sha256.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'));
+        check(digits, "contained_points.sha256", "must be 64 lowercase hexadecimal digits")?;
+        check(
+            (1..=1 << 40).contains(count),
+            "contained_points.count",
+            "must be the number of points that were hashed",
+        )?;
+    }
+    if let Some(Provenance { input, objective, hull_volume_m3, .. }) = &file.provenance {
+        for (field, text) in [("provenance.input", input), ("provenance.objective", objective)] {
+            let printable = text.is_empty() || super::check_name(text).is_ok();
+            check(printable, field, "must have at most 200 characters and no control characters")?;
+        }
+        // A hull inside the body is no larger than the body, up to the quadrature.
+        let possible = *hull_volume_m3 >= 0.0 && *hull_volume_m3 <= 1.01 * file.volume_m3;
+        check(possible, "provenance.hull_volume_m3", "must be between 0 and the volume of the body")?;
+    }
+    Ok(())
+}
+
 /// Compares every derived value with the one recomputed from the polynomials.
 fn check_derived(file: &File, body: &Body) -> Result<(), BodyFileError> {
     let size = body.circumscribed.radius;
@@ -196,7 +224,7 @@ fn check_derived(file: &File, body: &Body) -> Result<(), BodyFileError> {
         if (stored - recomputed).abs() <= TOLERANCE * scale {
             Ok(())
         } else {
-            Err(BodyFileError::Derived { field, stored: stored.to_string(), recomputed: recomputed.to_string() })
+            Err(BodyFileError::Derived { field, stored: format!("{stored:e}"), recomputed: format!("{recomputed:e}") })
         }
     };
     let vector = |field, stored: [f64; 3], recomputed: &Vector3<f64>| {

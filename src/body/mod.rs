@@ -75,6 +75,13 @@ pub struct ContainedPoints {
     pub sha256: String,
 }
 
+impl ContainedPoints {
+    /// Count and hash of these points.
+    pub fn of(points: &[Vector3<f64>]) -> Self {
+        Self { count: points.len(), sha256: id::hash_points(points) }
+    }
+}
+
 /// Where a fitted body comes from; information only, not part of its identity.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -116,13 +123,19 @@ pub enum BodyError {
     },
     /// The interior is empty or too shallow.
     #[error(
-        "the body has no proven interior: min g = {min_value}, which must be at most 1 - {MIN_DEPTH:e}; \
+        "the body has no proven interior: min g = {min_value:e}, which must be at most 1 - {MIN_DEPTH:e}; \
          renormalise g to 1 + (g - 1)/(1 - min g) if the set is meant to have one"
     )]
     Interior {
         /// Smallest value found of the largest constraint.
         min_value: f64,
     },
+    /// No ball inside survives rounding.
+    #[error(
+        "no ball around the interior point is proven inside: the body is too thin, or too far from the origin of its frame \
+         for its size; move the frame to the body"
+    )]
+    Thin,
     /// No proof that the body is bounded.
     #[error(
         "the body is not proven bounded (residual {residual:.1e}); add constraints that close it in every direction"
@@ -180,9 +193,7 @@ impl Body {
         constraints: Vec<Constraint>,
         interior: Option<Vector3<f64>>,
     ) -> Result<Self, BodyError> {
-        if name.is_empty() || name.chars().count() > 200 || name.chars().any(char::is_control) {
-            return Err(BodyError::Name(name.chars().take(200).collect()));
-        }
+        check_name(name)?;
         if !(1..=MAX_CONSTRAINTS).contains(&constraints.len()) {
             return Err(BodyError::ConstraintCount(constraints.len()));
         }
@@ -202,7 +213,7 @@ impl Body {
         let boundary = surface::proven_boundary(&constraints, &placement, &inverse, &interior_point);
         let in_radius = surface::in_radius(&boundary, &interior_point, inverse.determinant() < 0.0);
         if !(in_radius > 0.0) {
-            return Err(BodyError::Interior { min_value });
+            return Err(BodyError::Thin);
         }
         let interior_z = normalization.linear * (interior_point - normalization.center);
         let volume = surface::volume(&constraints, &normalization.linear, &interior_z);
@@ -348,19 +359,30 @@ impl Body {
     /// The point that fails most.
     pub fn with_points(mut self, points: &[Vector3<f64>]) -> Result<Self, NotContained> {
         self.prove_contains(points)?;
-        self.points = Some(ContainedPoints { count: points.len(), sha256: id::hash_points(points) });
+        self.points = Some(ContainedPoints::of(points));
         Ok(self)
     }
 
-    /// The same body with its origin noted.
+    /// The same body with its origin noted; texts should pass [`check_name`], or the body's file is refused.
     pub fn with_provenance(mut self, provenance: Provenance) -> Self {
         self.provenance = Some(provenance);
         self
     }
 }
 
+/// Whether a text can name a body, or what it was made from.
+///
+/// # Errors
+/// [`BodyError::Name`].
+pub fn check_name(name: &str) -> Result<(), BodyError> {
+    if name.is_empty() || name.chars().count() > 200 || name.chars().any(char::is_control) {
+        return Err(BodyError::Name(name.chars().take(200).collect()));
+    }
+    Ok(())
+}
+
 /// Largest of the values; NaN if any is NaN, which `f64::max` would pass over.
-fn largest(values: impl Iterator<Item = f64>) -> f64 {
+pub(crate) fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(f64::NEG_INFINITY, |most, value| if value.is_nan() || value > most { value } else { most })
 }
 
@@ -373,7 +395,10 @@ fn invert(normalization: &Normalization) -> Result<Matrix3<f64>, BodyError> {
         return Err(BodyError::Normalization("an entry is out of range"));
     }
     let inverse = linear.try_inverse().ok_or(BodyError::Normalization("linear is singular"))?;
-    if (linear * inverse - Matrix3::identity()).amax() < 1e-6 && inverse.amax() <= 1e30 {
+    // Relative to the rows, whose lengths may differ by any factor: the bounds of a placement rest on it.
+    let rows = Vector3::from_fn(|i, _| linear.row(i).norm());
+    let error = (linear * inverse - Matrix3::identity()).abs() * rows;
+    if (0..3).all(|i| error[i] <= 1e-6 * rows[i]) && inverse.amax() <= 1e30 {
         Ok(inverse)
     } else {
         Err(BodyError::Normalization("linear is numerically singular"))

@@ -104,8 +104,8 @@ impl Placement {
         let nearby_value_error = polynomial.value_error(&z, &jet.gradient, &none);
         let pulled = self.pull_back(jet);
         // Pulling back turns and rounds the gradient; the polynomial's own error passes through M.
-        let gradient_error = (self.relative_error + gamma(8)) * pulled.gradient.norm()
-            + (2.0 * polynomial.gradient_error(&z, &none) + gamma(8) * jet.gradient.norm()) * self.row_norms.norm();
+        let gradient_error = (self.relative_error + gamma(12)) * pulled.gradient.norm()
+            + (2.0 * polynomial.gradient_error(&z, &none) + gamma(12) * jet.gradient.norm()) * self.row_norms.norm();
         Sample { jet: pulled, value_error, nearby_value_error, gradient_error: gradient_error * (1.0 + 1e-14) }
     }
 

@@ -82,16 +82,19 @@ pub(super) fn proven_boundary(
 /// `mirrored` says that the map from directions to boundary points reverses orientation.
 pub(super) fn in_radius(boundary: &[Vector3<f64>], interior: &Vector3<f64>, mirrored: bool) -> f64 {
     let outward = if mirrored { -1.0 } else { 1.0 };
+    let size = interior.norm() + boundary.iter().map(Vector3::norm).fold(0.0, f64::max);
     let smallest = Sphere::shared()
         .triangles()
         .iter()
         .map(|&[a, b, c]| {
-            let normal = (boundary[b] - boundary[a]).cross(&(boundary[c] - boundary[a]));
-            outward * normal.dot(&(boundary[a] - interior)) / normal.norm()
+            let (ab, ac) = (boundary[b] - boundary[a], boundary[c] - boundary[a]);
+            let normal = ab.cross(&ac);
+            // Sharp triangles lose digits of their normal.
+            let slack = 64.0 * f64::EPSILON * size * (1.0 + ab.norm() * ac.norm() / normal.norm());
+            outward * normal.dot(&(boundary[a] - interior)) / normal.norm() - slack
         })
         .fold(f64::INFINITY, |least, value| if value.is_nan() || value < least { value } else { least });
-    let slack = 64.0 * f64::EPSILON * (interior.norm() + boundary.iter().map(Vector3::norm).fold(0.0, f64::max));
-    (smallest - slack) * (1.0 - 1e-13)
+    smallest * (1.0 - 1e-13)
 }
 
 /// Volume in cubic metres and an estimate of its quadrature error.

@@ -113,6 +113,17 @@ fn open_flat_and_shallow_sets_are_refused() {
 }
 
 #[test]
+fn overflowing_polynomials_are_refused() {
+    let unit = Normalization { center: Vector3::zeros(), linear: Matrix3::identity() };
+    let ball = Body::ball("b", Vector3::zeros(), 1.0).unwrap().constraints()[0].clone();
+    for constant in [-1e307, -1e308, 1e308] {
+        let mut deep = ball.clone();
+        deep.polynomial = deep.polynomial.with_constant_shifted(constant);
+        assert!(Body::new("deep", unit, vec![deep]).is_err(), "{constant:e}");
+    }
+}
+
+#[test]
 fn containment_is_proven_point_by_point() {
     let body = Body::ball("b", Vector3::zeros(), 2.0).unwrap();
     let inside = [Vector3::new(1.9, 0.0, 0.0), Vector3::new(0.0, -1.0, 1.0)];
@@ -147,6 +158,7 @@ fn files_round_trip_exactly() {
 #[test]
 fn changed_files_are_refused_by_name() {
     let body = Body::ellipsoid("egg", Vector3::zeros(), Vector3::new(0.3, 0.4, 0.5)).unwrap();
+    let body = body.with_points(&[Vector3::zeros()]).unwrap().with_provenance(Provenance::default());
     let text = body.to_json();
     let value: serde_json::Value = serde_json::from_str(&text).unwrap();
     let change = |pointer: &str, new: serde_json::Value| {
@@ -171,6 +183,10 @@ fn changed_files_are_refused_by_name() {
         ("/degree", 4.into(), "degree"),
         ("/constraints/0/exponents/0/0", 1.into(), "constraints[0]"),
         ("/name", "".into(), "name"),
+        ("/contained_points/sha256", "zz\nproven".into(), "contained_points.sha256"),
+        ("/contained_points/count", 0.into(), "contained_points.count"),
+        ("/provenance/input", "\u{1b}[2J".into(), "provenance.input"),
+        ("/provenance/hull_volume_m3", 7.0.into(), "provenance.hull_volume_m3"),
         ("/volume_m3", serde_json::Value::Null, "not a body file"),
     ];
     for (pointer, new, expected) in cases {

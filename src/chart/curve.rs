@@ -53,7 +53,10 @@ pub struct LineChart {
     pub mark: Mark,
 }
 
+/// Width and height, pixels.
 const SIZE: (u32, u32) = (760, 440);
+/// The backend rounds to whole units: drawing this many to a pixel keeps curves smooth.
+const FINE: u32 = 10;
 /// Left end of the axes, pixels.
 const LEFT: i32 = 80;
 const FONT: &str = "sans-serif";
@@ -69,7 +72,10 @@ impl LineChart {
         let frame = self.frame().ok_or(ChartError::Empty)?;
         let mut svg = String::new();
         self.draw(&mut svg, &frame).map_err(|error| ChartError::Drawing(error.to_string()))?;
-        Ok(svg)
+        // Drawn fine, shown at its size: the view box keeps the fine units.
+        let (width, height) = SIZE;
+        let fine = format!("width=\"{}\" height=\"{}\"", width * FINE, height * FINE);
+        Ok(svg.replacen(&fine, &format!("width=\"{width}\" height=\"{height}\""), 1))
     }
 
     /// Ranges that hold all finite points and the mark, the vertical one in whole decades.
@@ -88,25 +94,26 @@ impl LineChart {
     }
 
     fn draw(&self, svg: &mut String, frame: &Frame) -> Result<(), Box<dyn std::error::Error>> {
-        let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
+        let root = SVGBackend::with_string(svg, (SIZE.0 * FINE, SIZE.1 * FINE)).into_drawing_area();
         let grey = color(Ink::Grey);
-        let text = |size: i32| (FONT, size).into_font().color(&grey);
-        root.draw(&Text::new(self.title.as_str(), (LEFT, 10), text(17)))?;
+        let text = |size: i32| (FONT, px(size)).into_font().color(&grey);
+        root.draw(&Text::new(self.title.as_str(), (px(LEFT), px(10)), text(17)))?;
         self.draw_legend(&root)?;
 
-        let (_, body) = root.split_vertically(58);
+        let (_, body) = root.split_vertically(px(58));
         let mut chart = ChartBuilder::on(&body)
-            .margin_left(14)
-            .margin_right(24)
-            .margin_bottom(6)
-            .x_label_area_size(46)
-            .y_label_area_size(66)
+            .margin_left(px(14))
+            .margin_right(px(24))
+            .margin_bottom(px(6))
+            .x_label_area_size(px(46))
+            .y_label_area_size(px(66))
             .build_cartesian_2d(frame.x.0..frame.x.1, (frame.y.0..frame.y.1).log_scale())?;
         chart
             .configure_mesh()
-            .bold_line_style(grey.mix(0.25))
+            .bold_line_style(grey.mix(0.25).stroke_width(FINE))
             .light_line_style(TRANSPARENT)
-            .axis_style(grey)
+            .axis_style(grey.stroke_width(FINE))
+            .set_all_tick_mark_size(px(5))
             .x_labels(9)
             .x_label_formatter(&|x| tidy(*x))
             .y_label_formatter(&|y| tidy(*y))
@@ -117,17 +124,17 @@ impl LineChart {
             .draw()?;
 
         let mark = self.mark.value;
-        chart.draw_series(LineSeries::new([(frame.x.0, mark), (frame.x.1, mark)], grey.stroke_width(2)))?;
+        chart.draw_series(LineSeries::new([(frame.x.0, mark), (frame.x.1, mark)], grey.stroke_width(2 * FINE)))?;
         let anchored = text(13).pos(Pos::new(HPos::Right, VPos::Bottom));
         let (right, height) = chart.backend_coord(&(frame.x.1, mark));
-        root.draw(&Text::new(self.mark.label.as_str(), (right - 4, height - 4), anchored))?;
+        root.draw(&Text::new(self.mark.label.as_str(), (right - px(4), height - px(4)), anchored))?;
 
         for series in &self.series {
             let points = series.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite());
             let points: Vec<(f64, f64)> = points.map(|(x, y)| (*x, y.max(frame.y.0))).collect();
-            let style = color(series.ink).stroke_width(3);
+            let style = color(series.ink).stroke_width(3 * FINE);
             if series.dashed {
-                chart.draw_series(DashedLineSeries::new(points, 9, 6, style))?;
+                chart.draw_series(DashedLineSeries::new(points, 9 * FINE, 6 * FINE, style))?;
             } else {
                 chart.draw_series(LineSeries::new(points, style))?;
             }
@@ -143,23 +150,28 @@ impl LineChart {
     ) -> Result<(), Box<dyn std::error::Error>> {
         let mut left = LEFT;
         for series in &self.series {
-            let style = color(series.ink).stroke_width(3);
-            let ends = [(left, 45), (left + 34, 45)];
+            let style = color(series.ink).stroke_width(3 * FINE);
+            let ends = [(px(left), px(45)), (px(left + 34), px(45))];
             if series.dashed {
                 let dashes = [(0, 9), (13, 22), (26, 34)];
                 for (from, to) in dashes {
-                    root.draw(&PathElement::new([(left + from, 45), (left + to, 45)], style))?;
+                    root.draw(&PathElement::new([(px(left + from), px(45)), (px(left + to), px(45))], style))?;
                 }
             } else {
                 root.draw(&PathElement::new(ends, style))?;
             }
-            let text = (FONT, 14).into_font().color(&color(Ink::Grey)).pos(Pos::new(HPos::Left, VPos::Center));
-            root.draw(&Text::new(series.label.as_str(), (left + 42, 45), text))?;
+            let text = (FONT, px(14)).into_font().color(&color(Ink::Grey)).pos(Pos::new(HPos::Left, VPos::Center));
+            root.draw(&Text::new(series.label.as_str(), (px(left + 42), px(45)), text))?;
             // The width of a letter is a guess: the reader's font is not known here.
             left += 70 + 8 * series.label.chars().count() as i32;
         }
         Ok(())
     }
+}
+
+/// Pixels in the units of the drawing.
+fn px(pixels: i32) -> i32 {
+    pixels * FINE as i32
 }
 
 struct Frame {

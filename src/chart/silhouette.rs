@@ -258,12 +258,10 @@ fn write_scale_bar(svg: &mut String, top: f64, scale: f64, cell: f64) {
     let decade = 10f64.powf(target.log10().floor());
     let length = [5.0, 2.0, 1.0].into_iter().find(|m| m * decade <= target).unwrap_or(1.0) * decade;
     let end = GAP + length * scale;
-    let label = if length >= 1.0 {
-        format!("{length:.0} m")
-    } else if length >= 0.01 {
-        format!("{:.0} cm", length * 100.0)
-    } else {
-        format!("{length:.1e} m")
+    let units = [(1.0, "m"), (1e-2, "cm"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm")];
+    let label = match units.into_iter().find(|(unit, _)| length > 0.99 * unit) {
+        Some((unit, name)) => format!("{:.0} {name}", length / unit),
+        None => format!("{length:.0e} m"),
     };
     let _ = writeln!(
         svg,

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 /// Run the whole job on shapes made here: fit a chair and a human, serve them, sweep one through the other
 ///
 /// Prints the table of fits and the level-distance curve; writes meshes, body files, the numbers as CSV and the plots as
-/// SVG. Needs no input, and takes about half a minute.
+/// SVG. Needs no input, and takes a few seconds.
 #[derive(Debug, clap::Args)]
 pub(super) struct DemoArgs {
     /// Folder for everything the demo writes; made when it is not there

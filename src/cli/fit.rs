@@ -20,7 +20,6 @@ use std::time::Duration;
 ///
 /// Example: sublevel fit mug.obj --scale 0.001 --out bodies
 #[derive(Debug, clap::Args)]
-#[command(verbatim_doc_comment)]
 pub(super) struct FitArgs {
     /// Mesh or point files; the ending tells the format
     #[arg(required = true, value_name = "INPUT")]
@@ -32,7 +31,7 @@ pub(super) struct FitArgs {
     #[arg(long, value_name = "N", default_value_t = 6)]
     degree: usize,
     /// Metres per unit of the input: 0.001 for files in millimetres
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, allow_negative_numbers = true)]
     scale: f64,
     /// Print a JSON array of reports instead of a table
     #[arg(long)]
@@ -68,11 +67,22 @@ pub(super) fn run(args: &FitArgs) -> Result<(), Box<dyn Error>> {
             .into());
         }
     }
+    for (input, stem) in args.inputs.iter().zip(&stems) {
+        options(args, input).check(stem).map_err(|error| format!("{}: {error}", input.display()))?;
+    }
     std::fs::create_dir_all(&args.out)
         .map_err(|error| format!("can not make {}: {error}; choose another --out", args.out.display()))?;
     let mut rows = Vec::new();
+    let mut failure = None;
     for (input, stem) in args.inputs.iter().zip(&stems) {
-        rows.push(one(args, input, stem)?);
+        match one(args, input, stem) {
+            Ok(row) => rows.push(row),
+            // What was fitted before is on disk: it is reported before the error.
+            Err(error) => {
+                failure = Some(error);
+                break;
+            }
+        }
     }
     let mut out = io::stdout().lock();
     if args.json {
@@ -81,7 +91,12 @@ pub(super) fn run(args: &FitArgs) -> Result<(), Box<dyn Error>> {
     } else {
         table(&mut out, &rows)?;
     }
-    Ok(())
+    failure.map_or(Ok(()), Err)
+}
+
+fn options(args: &FitArgs, input: &Path) -> FitOptions {
+    let name = input.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    FitOptions { degree: args.degree, input: name, ..FitOptions::default() }
 }
 
 fn stem(input: &Path) -> Result<String, Box<dyn Error>> {
@@ -93,8 +108,6 @@ fn one(args: &FitArgs, input: &Path, stem: &str) -> Result<Row, Box<dyn Error>> 
     let bar = progress_bar(stem);
     bar.set_message("reading");
     let points = read_points(input, args.scale)?;
-    let name = input.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let options = FitOptions { degree: args.degree, input: name, ..FitOptions::default() };
     let mut tell = |progress: Progress| {
         let Progress { round, active_points, worst_violation, decrement } = progress;
         let left = decrement.map_or_else(|| "preparing".to_owned(), |d| format!("{d:.1e} from the optimum"));
@@ -103,8 +116,8 @@ fn one(args: &FitArgs, input: &Path, stem: &str) -> Result<Row, Box<dyn Error>> 
         ));
         ControlFlow::Continue(())
     };
-    let Fit { body, report } =
-        fit(stem, &points, &options, &mut tell).map_err(|error| format!("{}: {error}", input.display()))?;
+    let Fit { body, report } = fit(stem, &points, &options(args, input), &mut tell)
+        .map_err(|error| format!("{}: {error}", input.display()))?;
     bar.finish_and_clear();
     let file = args.out.join(format!("{stem}-d{}.json", args.degree));
     write_atomically(&file, &body.to_json())?;

@@ -15,6 +15,7 @@ mod verify;
 use crate::body::Body;
 use clap::Parser;
 use std::error::Error;
+use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -26,7 +27,11 @@ type Outcome = Result<bool, Box<dyn Error>>;
 /// Objects are stored as sets {x : p(x) <= 1} of sos-convex polynomials, fitted offline around meshes and proven to contain
 /// them. Every answer is a bracket that is proven to hold the truth.
 ///
-/// A first tour: 'sublevel demo'. With meshes of your own: 'fit', then 'measure' without a server, or 'serve' and 'push'.
+#[cfg_attr(
+    feature = "fit",
+    doc = "A first tour: 'sublevel demo'. With meshes of your own: 'fit', then 'measure' without a server, or 'serve' and 'push'."
+)]
+#[cfg_attr(not(feature = "fit"), doc = "Built without the feature 'fit': 'fit' and 'demo' are left out.")]
 #[derive(Debug, Parser)]
 #[command(version, max_term_width = 100)]
 enum Command {
@@ -62,7 +67,9 @@ pub fn main() -> ExitCode {
         // Whoever reads our output went away; nobody is left to tell.
         Err(error) if is_broken_pipe(error.as_ref()) => ExitCode::FAILURE,
         Err(error) => {
-            eprintln!("error: {error}");
+            // Nothing but standard output gives a bare system error: files are named.
+            let place = if error.is::<io::Error>() { "can not write the output: " } else { "" };
+            eprintln!("error: {place}{}", one_line(&error.to_string()));
             ExitCode::FAILURE
         }
     }
@@ -71,12 +78,28 @@ pub fn main() -> ExitCode {
 fn is_broken_pipe(error: &(dyn Error + 'static)) -> bool {
     let mut cause = Some(error);
     while let Some(error) = cause {
-        if error.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe) {
+        let plain = error.downcast_ref::<io::Error>().map(io::Error::kind);
+        let in_json = error.downcast_ref::<serde_json::Error>().and_then(serde_json::Error::io_error_kind);
+        if plain.or(in_json) == Some(io::ErrorKind::BrokenPipe) {
             return true;
         }
         cause = error.source();
     }
     false
+}
+
+/// One printable line of at most about a thousand characters: messages quote input, which may hold anything.
+fn one_line(text: &str) -> String {
+    const LONGEST: usize = 1000;
+    let mut line: String = text
+        .chars()
+        .take(LONGEST)
+        .flat_map(|c| if c.is_control() { c.escape_default().collect() } else { vec![c] })
+        .collect();
+    if text.chars().nth(LONGEST).is_some() {
+        line.push_str(" ...");
+    }
+    line
 }
 
 /// Reads a text file, naming it in the error.

@@ -8,7 +8,11 @@ use serde::Serialize;
 
 use crate::service::{self, Pushed};
 
-/// Store body files in a running server.
+/// Store body files in a running server
+///
+/// Each file is re-proven here and by the server. Storing a body again changes nothing and succeeds.
+///
+/// Example: sublevel push bodies/*.json --server http://127.0.0.1:50051
 #[derive(Debug, clap::Args)]
 pub(super) struct PushArgs {
     /// Body files, as `sublevel fit` writes them

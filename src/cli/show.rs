@@ -72,7 +72,10 @@ fn summary(body: &Body) -> serde_json::Value {
 }
 
 fn describe(out: &mut impl Write, body: &Body) -> io::Result<()> {
-    let list = |v: &nalgebra::Vector3<f64>| format!("({:.6}, {:.6}, {:.6})", v.x, v.y, v.z);
+    // Digits as small bodies need them.
+    let places = (7 - body.circumscribed().radius.log10().ceil() as i32).clamp(3, 15) as usize;
+    let length = |x: f64| format!("{x:.places$}");
+    let list = |v: &nalgebra::Vector3<f64>| format!("({}, {}, {})", length(v.x), length(v.y), length(v.z));
     let (ball, bounds) = (body.circumscribed(), body.bounding_box());
     let terms: Vec<_> = body.constraints().iter().map(|c| c.polynomial.terms().len().to_string()).collect();
     writeln!(out, "{}", body.name())?;
@@ -85,16 +88,20 @@ fn describe(out: &mut impl Write, body: &Body) -> io::Result<()> {
         body.volume().error_m3
     )?;
     writeln!(out, "  bounding box    {} to {} m", list(&bounds.min), list(&bounds.max))?;
-    writeln!(out, "  circumscribed   ball of radius {:.6} m about {} m", ball.radius, list(&ball.center))?;
+    writeln!(out, "  circumscribed   ball of radius {} m about {} m", length(ball.radius), list(&ball.center))?;
     writeln!(
         out,
-        "  interior point  {} m, with a ball of radius {:.6} m inside",
+        "  interior point  {} m, with a ball of radius {} m inside",
         list(body.interior_point()),
-        body.in_radius()
+        length(body.in_radius())
     )?;
     writeln!(out, "  min value       {:.6e}", body.min_value())?;
     if let Some(points) = body.points() {
-        writeln!(out, "  contains        {} points, sha256 {}", points.count, points.sha256)?;
+        writeln!(
+            out,
+            "  fitted around   {} points, sha256 {} ('verify --points' proves it)",
+            points.count, points.sha256
+        )?;
     }
     if let Some(provenance) = body.provenance() {
         let refined = if provenance.refined { ", refined" } else { "" };

@@ -1,6 +1,6 @@
 //! `sublevel verify`.
 
-use super::{Outcome, read};
+use super::{Outcome, one_line, read};
 use crate::body::Body;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -22,7 +22,7 @@ pub(super) struct VerifyArgs {
     points: Option<PathBuf>,
     /// Metres per unit of the points
     #[cfg(feature = "fit")]
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, requires = "points")]
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, requires = "points", allow_negative_numbers = true)]
     scale: f64,
     /// Print one JSON object instead of sentences
     #[arg(long)]
@@ -60,7 +60,7 @@ pub(super) fn run(args: &VerifyArgs) -> Outcome {
         }
     }
     if let Some(trouble) = &trouble {
-        eprintln!("error: {trouble}");
+        eprintln!("error: {}", one_line(trouble));
     }
     Ok(trouble.is_none())
 }
@@ -70,6 +70,9 @@ fn contained(args: &VerifyArgs, body: &Body) -> Result<(Report, Option<String>),
     let mut report = proven(body);
     let Some(path) = &args.points else { return Ok((report, None)) };
     let points = crate::fit::read_points(path, args.scale)?;
+    if body.points().is_some_and(|recorded| *recorded != crate::body::ContainedPoints::of(&points)) {
+        eprintln!("note: these are not the points that the body was fitted to");
+    }
     let (value, trouble) = match body.prove_contains(&points) {
         Ok(value) => (value, None),
         Err(failure) => (failure.value, Some(format!("{}: {failure}", path.display()))),

@@ -145,13 +145,17 @@ struct Scratch(PathBuf);
 
 impl Scratch {
     fn new() -> Result<Scratch, DemoError> {
-        let path = std::env::temp_dir().join(format!("sublevel-demo-{}", std::process::id()));
-        // A name that is taken (by a process long gone, or by somebody else) is an error, never a shared folder.
-        std::fs::create_dir(&path).map_err(|source| DemoError::Server {
-            step: "making a folder for the server's data",
-            why: format!("{}: {source}", path.display()),
-        })?;
-        Ok(Scratch(path))
+        let folder = std::env::temp_dir();
+        // A name that is taken (by a process long gone, or by somebody else) is passed over, never shared.
+        let attempts = (0..1000).map(|k| folder.join(format!("sublevel-demo-{}-{k}", std::process::id())));
+        let mut why = String::new();
+        for path in attempts {
+            match std::fs::create_dir(&path) {
+                Ok(()) => return Ok(Scratch(path)),
+                Err(error) => why = format!("{}: {error}; set TMPDIR to a folder that can be written", path.display()),
+            }
+        }
+        Err(DemoError::Server { step: "making a folder for the server's data", why })
     }
 }
 

@@ -34,6 +34,17 @@ pub enum HullError {
         /// Extent in the longest principal direction, metres.
         extent_m: f64,
     },
+    /// Points so far from the origin that their coordinates round away their shape.
+    #[error(
+        "the points are {extent_m:.3e} m long but {distance_m:.3e} m from the origin, where coordinates keep too few digits; \
+         move the origin to the object"
+    )]
+    TooFar {
+        /// Longest extent, metres.
+        extent_m: f64,
+        /// Largest coordinate, metres.
+        distance_m: f64,
+    },
     /// The hull code failed, also after a perturbation.
     #[error("the convex hull of the points could not be computed ({0}); remove near-duplicate points")]
     Failed(String),
@@ -111,7 +122,10 @@ fn principal_frame(points: &[Vector3<f64>]) -> Result<Frame, HullError> {
     }
     let size = (high - low).max();
     let largest = low.amax().max(high.amax());
-    if points.is_empty() || size.is_nan() || size <= COORDINATE_ROUNDINGS * largest {
+    if size > 0.0 && size <= COORDINATE_ROUNDINGS * largest {
+        return Err(HullError::TooFar { extent_m: size, distance_m: largest });
+    }
+    if points.is_empty() || !(size > 0.0) {
         return Err(HullError::Flat { shape: "coincident", thickness_m: 0.0, extent_m: size.max(0.0) });
     }
     // Unit size first: squares of tiny or huge coordinates stay in range.
@@ -130,7 +144,10 @@ fn principal_frame(points: &[Vector3<f64>]) -> Result<Frame, HullError> {
     });
     let mut sorted = [extents.x, extents.y, extents.z];
     sorted.sort_by(f64::total_cmp);
-    let needed = (FLATNESS * sorted[2]).max(COORDINATE_ROUNDINGS * largest);
+    let needed = FLATNESS * sorted[2];
+    if sorted[0] > needed && sorted[0] <= COORDINATE_ROUNDINGS * largest {
+        return Err(HullError::TooFar { extent_m: sorted[2], distance_m: largest });
+    }
     if sorted[0] <= needed {
         let shape = if sorted[1] <= needed { "collinear" } else { "coplanar" };
         return Err(HullError::Flat { shape, thickness_m: sorted[0], extent_m: sorted[2] });

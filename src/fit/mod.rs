@@ -17,7 +17,7 @@ pub use hull::HullError;
 pub use program::ProgramError;
 pub use read::{ReadError, read_points};
 
-use crate::body::{Body, BodyError, Constraint, Normalization, NotContained, Placement, Provenance};
+use crate::body::{Body, BodyError, Constraint, Normalization, NotContained, Placement, Provenance, check_name};
 use crate::polynomial::{HessianGram, Polynomial, PolynomialError};
 use ellipsoid::{Ellipsoid, minimum_ellipsoid};
 use generate::{Optimum, generate};
@@ -49,6 +49,23 @@ pub struct FitOptions {
 impl Default for FitOptions {
     fn default() -> Self {
         Self { degree: 6, margin: DEFAULT_MARGIN, input: String::new() }
+    }
+}
+
+impl FitOptions {
+    /// Checks the options and the name of a body to be fitted, before any work.
+    ///
+    /// # Errors
+    /// [`FitError::Degree`], [`FitError::Margin`] or [`FitError::Name`].
+    pub fn check(&self, name: &str) -> Result<(), FitError> {
+        if ![2, 4, 6, 8].contains(&self.degree) {
+            return Err(FitError::Degree(self.degree));
+        }
+        if !(self.margin > 0.0 && self.margin <= 1e-2) {
+            return Err(FitError::Margin(self.margin));
+        }
+        check_name(name).map_err(FitError::Name)?;
+        if self.input.is_empty() { Ok(()) } else { check_name(&self.input).map_err(FitError::Name) }
     }
 }
 
@@ -137,6 +154,14 @@ pub enum FitError {
     /// A coordinate is not finite.
     #[error("points: point {0} (counted from 0) has a NaN or infinite coordinate; remove it or repair the mesh")]
     NotFinite(usize),
+    /// The coordinates or their extent are beyond what any scene needs.
+    #[error(
+        "points: coordinates reach {0:.1e} m; between 1e-15 and 1e15 m can be fitted, change the units with the scale"
+    )]
+    OutOfRange(f64),
+    /// A name that no body can have.
+    #[error(transparent)]
+    Name(BodyError),
     /// The points have no usable convex hull.
     #[error("points: {0}")]
     Hull(#[from] HullError),
@@ -147,19 +172,19 @@ pub enum FitError {
     #[error(transparent)]
     Program(#[from] ProgramError),
     /// The Newton iteration did not end.
-    #[error("the fit did not converge in {rounds} steps; lower the degree or raise the margin")]
+    #[error("the fit did not converge in {rounds} steps; lower the degree")]
     NoConvergence {
         /// Steps taken.
         rounds: usize,
     },
     /// The solver's polynomial is none.
-    #[error("the solver's polynomial is unusable: {0}; lower the degree or raise the margin")]
+    #[error("the solver's polynomial is unusable: {0}; lower the degree")]
     Polynomial(#[from] PolynomialError),
     /// The body could not be proven.
-    #[error("the fitted polynomial could not be proven: {0}; raise the margin")]
+    #[error("the fitted polynomial could not be proven, also with a hundred times the margin: {0}; lower the degree")]
     Unproven(#[from] BodyError),
     /// A point could not be proven inside.
-    #[error("the fitted polynomial could not be proven to contain the points: {0}; raise the margin")]
+    #[error("the fitted polynomial could not be proven to contain the points: {0}; lower the degree")]
     NotContained(#[from] NotContained),
 }
 
@@ -177,7 +202,8 @@ pub fn fit(
     progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Fit, FitError> {
     let start = Instant::now();
-    check(points, options)?;
+    options.check(name)?;
+    check(points)?;
     let hull = hull::convex_hull(points)?;
     let conditioned: Vec<Vector3<f64>> = hull.vertices.iter().map(|&i| hull.frame.apply(&points[i])).collect();
     let ellipsoid = minimum_ellipsoid(&conditioned).ok_or(ProgramError::Singular)?;
@@ -232,20 +258,16 @@ fn whitening(frame: &Frame, ellipsoid: &Ellipsoid) -> Option<Normalization> {
     Some(Normalization { center, linear: Matrix3::from_diagonal(&decomposition.singular_values) * turn })
 }
 
-fn check(points: &[Vector3<f64>], options: &FitOptions) -> Result<(), FitError> {
-    if ![2, 4, 6, 8].contains(&options.degree) {
-        return Err(FitError::Degree(options.degree));
-    }
-    if !(options.margin > 0.0 && options.margin <= 1e-2) {
-        return Err(FitError::Margin(options.margin));
-    }
+fn check(points: &[Vector3<f64>]) -> Result<(), FitError> {
     if points.len() < 4 {
         return Err(FitError::TooFewPoints(points.len()));
     }
-    match points.iter().position(|p| !p.iter().all(|v| v.is_finite())) {
-        Some(index) => Err(FitError::NotFinite(index)),
-        None => Ok(()),
+    if let Some(index) = points.iter().position(|p| !p.iter().all(|v| v.is_finite())) {
+        return Err(FitError::NotFinite(index));
     }
+    let reach = points.iter().map(Vector3::amax).fold(0.0, f64::max);
+    // Coinciding points at the origin are told as such later.
+    if reach > 1e15 || reach > 0.0 && reach < 1e-15 { Err(FitError::OutOfRange(reach)) } else { Ok(()) }
 }
 
 /// Pulls all points inside by the constant coefficient, which leaves the Hessian as it is, and proves the body.

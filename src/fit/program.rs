@@ -29,7 +29,7 @@ use openblas_src as _;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProgramError {
     /// The solver refused or gave up.
-    #[error("the semidefinite solver stopped with {0}; lower the degree or raise the margin")]
+    #[error("the semidefinite solver stopped with {0}; lower the degree")]
     Solver(String),
     /// A moment matrix lost its definiteness.
     #[error("the points do not span the polynomials of this degree numerically; lower the degree")]

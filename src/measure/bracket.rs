@@ -64,8 +64,7 @@ pub(super) fn distance_lower(
     // n is a unit vector up to 4 roundings: the slack on the leading term and on the reaches covers them.
     let magnitude = x.norm() + y.norm() + a.magnitude + b.magnitude + rest;
     let slack = SLACK * (magnitude + pair.a.reach(x) + pair.b.reach(y));
-    // Twice: the points move, and with them the distances ρ to the farthest points of the bodies, by a factor below 1.
-    let displaced = 2.0 * (pair.a.displacement(x) + pair.b.displacement(y));
+    let displaced = (pair.a.displacement(x) + pair.b.displacement(y)) * (1.0 + 1e-14);
     let bound = leading - a.slack - b.slack - rest - slack - displaced;
     // Not `max`: a NaN bounds nothing.
     if bound > 0.0 { bound } else { 0.0 }
@@ -80,8 +79,9 @@ pub(super) fn distance_upper(pair: &Pair<'_>, x: &Vector3<f64>, y: &Vector3<f64>
 /// Lower bound of the level distance d(A‖B), from a trial point and multipliers of both bodies; those of A are normalized
 /// here to sum 1. Minus infinity where they bound nothing.
 pub(super) fn level_lower(pair: &Pair<'_>, x: &Vector3<f64>, of_a: &Multipliers, of_b: &Multipliers) -> f64 {
+    let of_a = of_a.map(|multiplier| if multiplier > 0.0 { multiplier } else { 0.0 });
     let total: f64 = of_a.iter().sum();
-    if !(total > 0.0) {
+    if !(total > 0.0 && total.is_finite()) {
         return f64::NEG_INFINITY;
     }
     let a = weigh(&pair.a, x, &of_a.map(|multiplier| multiplier / total));

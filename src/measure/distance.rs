@@ -78,8 +78,11 @@ struct Search<'a> {
     iterations: u32,
 }
 
-/// Below this distance relative to the larger body, ½|x - y|² has too little curvature to aim by.
+/// Below this distance relative to the larger body, ½|x - y|² has little curvature to aim by.
 const NEAR: f64 = 1e-3;
+
+/// Below this one it has none that rounding leaves.
+const NEAREST: f64 = 1e-7;
 
 impl<'a> Search<'a> {
     fn new(pair: &'a Pair<'a>, tolerance: f64) -> Self {
@@ -99,7 +102,7 @@ impl<'a> Search<'a> {
     }
 
     fn done(&self) -> bool {
-        self.upper - self.lower <= self.tolerance
+        self.upper.is_finite() && self.upper - self.lower <= self.tolerance
     }
 
     /// Whether the bracket is narrow enough and says on which side of contact the bodies are.
@@ -122,22 +125,27 @@ impl<'a> Search<'a> {
             Hint::Cold | Hint::Level { .. } => {}
         }
         if !self.done() {
-            self.closest();
+            self.closest(NEAR);
         }
         if !self.decided() && self.lower < NEAR * self.pair.size() {
             self.contact();
         }
+        // Where both are elongated or edged, first order from the deepest point is not close enough.
+        if !self.done() {
+            self.closest(NEAREST);
+        }
     }
 
-    /// Interior-point method on ½|x - y|², with Newton's method tried as soon as it shows the active constraints.
-    fn closest(&mut self) {
+    /// Interior-point method on ½|x - y|², with Newton's method tried as soon as it shows the active constraints; ends at
+    /// distances below `near` times the size.
+    fn closest(&mut self, near: f64) {
         let (start_x, start_y) = (self.pair.a.interior, self.pair.b.interior);
         let mut v = SVector::<f64, 6>::zeros();
         v.fixed_rows_mut::<3>(0).copy_from(&start_x);
         v.fixed_rows_mut::<3>(3).copy_from(&start_y);
         self.attain(&start_x, &start_y);
         let first = 0.5 * (start_x - start_y).norm_squared();
-        let near = NEAR * self.pair.size();
+        let near = near * self.pair.size();
         let mut attempt = 1e-1;
         let iterations = minimise(&Closest(self.pair), &mut v, first.max(1e-6), |iterate| {
             let (x, y) = points(iterate.v);
@@ -211,7 +219,7 @@ impl<'a> Search<'a> {
         }
         let distance = n.dot(&(x - y)).max(0.0);
         let mut newton = DistanceNewton { x, y, distance, n, a, b };
-        let (steps, _) = newton.run(self.pair, |at| {
+        let steps = newton.run(self.pair, |at| {
             // Stationary points of the overlap are of no use here.
             if at.distance <= 0.0 {
                 return false;

@@ -8,7 +8,7 @@ use super::pair::Pair;
 use super::pose::Pose;
 use super::programs::Level;
 use super::warm::{Hint, WarmStart};
-use crate::body::Body;
+use crate::body::{Body, MAX_CONSTRAINTS};
 use crate::optimize::minimise;
 use nalgebra::{SVector, Vector3};
 use std::ops::ControlFlow;
@@ -125,6 +125,15 @@ impl<'a> Search<'a> {
         let value = |x: &Vector3<f64>| (0..pair.a.len()).map(|i| pair.a.jet(i, x).value).fold(f64::MIN, f64::max);
         self.attain(&pair.b.interior);
         self.attain(&pair.a.interior);
+        if pair.b.contains(&pair.a.interior) {
+            // Saturated: B does not hold the minimiser back.
+            let mut first = [0.0; MAX_CONSTRAINTS];
+            first[0] = 1.0;
+            self.newton(pair.a.interior, Active::from_multipliers(&first), Active::default());
+            if self.done() {
+                return;
+            }
+        }
         let mut inset = 0.1;
         for _ in 0..MAX_ROUNDS {
             // Strictly inside, by less each round: the scale must not rise again.
@@ -176,7 +185,7 @@ impl<'a> Search<'a> {
             return;
         }
         let mut newton = LevelNewton { x, a, b };
-        let (steps, _) = newton.run(self.pair, |at| {
+        let steps = newton.run(self.pair, |at| {
             self.bound(level_lower(self.pair, &at.x, &at.a.multipliers(), &at.b.multipliers()));
             if self.attain(&at.x) {
                 self.active = (at.a, at.b);

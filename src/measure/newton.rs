@@ -116,7 +116,7 @@ impl Active {
             }
             system[i][self.len] = gradients[i].dot(target);
         }
-        let Some(solution) = solve(&mut system, self.len) else { return self.len == 0 };
+        let Some(solution) = solve(&mut system, self.len) else { return false };
         self.multiplier[..self.len].copy_from_slice(&solution[..self.len]);
         true
     }
@@ -175,24 +175,24 @@ pub(super) struct DistanceNewton {
 }
 
 impl DistanceNewton {
-    /// Iterates until `accept` takes one or they stop converging; returns the steps taken and whether one was taken.
-    pub(super) fn run(&mut self, pair: &Pair<'_>, mut accept: impl FnMut(&Self) -> bool) -> (u32, bool) {
+    /// Iterates until `accept` takes one or they stop converging; returns the steps taken.
+    pub(super) fn run(&mut self, pair: &Pair<'_>, mut accept: impl FnMut(&Self) -> bool) -> u32 {
         let n = self.n;
         if self.a.len == 0 || self.b.len == 0 || !self.a.fit(&pair.a, &self.x, &-n) || !self.b.fit(&pair.b, &self.y, &n)
         {
-            return (0, false);
+            return 0;
         }
         // Where both are flat the system is singular, but the point at hand with fitted multipliers may do.
         let mut at = self.evaluate(pair);
         if accept(self) {
-            return (0, true);
+            return 0;
         }
         let mut last = f64::INFINITY;
         for step in 1..=MAX_STEPS {
-            let Some(length) = self.step(&at) else { return (step, false) };
+            let Some(length) = self.step(&at) else { return step };
             at = self.evaluate(pair);
             if accept(self) {
-                return (step, true);
+                return step;
             }
             // Near its solution Newton's step shrinks fast; one that does not is not near.
             let settled = length < 1e-9;
@@ -203,7 +203,7 @@ impl DistanceNewton {
                     | self.b.violated(&pair.b, &self.y, 1.0).is_some_and(|i| self.b.push(i));
                 let stuck = !changed && (length > 0.9 * last || length < 1e-14);
                 if stuck {
-                    return (step, false);
+                    return step;
                 }
                 if changed {
                     at = self.evaluate(pair);
@@ -211,7 +211,7 @@ impl DistanceNewton {
             }
             last = length;
         }
-        (MAX_STEPS, false)
+        MAX_STEPS
     }
 
     /// Both bodies at the current iterate; the mean of both sides of u + w = 0 says what n is.
@@ -285,21 +285,21 @@ pub(super) struct LevelNewton {
 }
 
 impl LevelNewton {
-    /// Iterates until `accept` takes one or they stop converging; returns the steps taken and whether one was taken.
-    pub(super) fn run(&mut self, pair: &Pair<'_>, mut accept: impl FnMut(&Self) -> bool) -> (u32, bool) {
+    /// Iterates until `accept` takes one or they stop converging; returns the steps taken.
+    pub(super) fn run(&mut self, pair: &Pair<'_>, mut accept: impl FnMut(&Self) -> bool) -> u32 {
         if self.a.len == 0 {
-            return (0, false);
+            return 0;
         }
         let mut s = self.start(pair);
         // Where both are flat the system is singular, but the point at hand with fitted multipliers may do.
         if accept(self) {
-            return (0, true);
+            return 0;
         }
         let mut last = f64::INFINITY;
         for step in 1..=MAX_STEPS {
-            let Some(length) = self.step(pair, &mut s) else { return (step, false) };
+            let Some(length) = self.step(pair, &mut s) else { return step };
             if accept(self) {
-                return (step, true);
+                return step;
             }
             if length < 1e-9 || step % 4 == 0 {
                 let inactive = self.b.len == 1 && self.b.multiplier[0] < 0.0;
@@ -312,12 +312,12 @@ impl LevelNewton {
                     | self.a.violated(&pair.a, &self.x, s).is_some_and(|i| self.a.push(i))
                     | self.b.violated(&pair.b, &self.x, 1.0).is_some_and(|i| self.b.push(i));
                 if !changed && (length > 0.9 * last || length < 1e-14) {
-                    return (step, false);
+                    return step;
                 }
             }
             last = length;
         }
-        (MAX_STEPS, false)
+        MAX_STEPS
     }
 
     /// First multipliers: equal weights of A, and those of B that fit; returns the first s.

@@ -4,7 +4,7 @@
 //! two near the larger circumradius, so that lengths are about 1 whatever the unit, and absolute positions play no part.
 
 use super::pose::{Pose, ROTATION_ERROR};
-use crate::body::{Body, Placement, Sample};
+use crate::body::{Body, Placement, Sample, largest};
 use crate::polynomial::gamma;
 use nalgebra::{Matrix3, Vector3};
 
@@ -55,9 +55,9 @@ impl Posed<'_> {
         self.value_upper(v, 0.0) <= 1.0
     }
 
-    /// Upper bound ρ of the distance from v to any point of the body.
+    /// Upper bound ρ of the distance from v, or a point within its displacement, to any point of the body.
     pub(super) fn reach(&self, v: &Vector3<f64>) -> f64 {
-        ((v - self.center).norm() + self.radius) * (1.0 + 1e-14)
+        ((v - self.center).norm() + self.radius + self.displacement(v)) * (1.0 + 1e-14)
     }
 
     /// The point where the line from v along the unit vector `direction` enters the body, up to rounding; v itself if it is
@@ -105,11 +105,6 @@ impl Posed<'_> {
         }
         (self.nearby_value_upper(&self.interior) <= 1.0).then_some(self.interior)
     }
-}
-
-/// Largest of the values; NaN if any is NaN, which `f64::max` would pass over.
-fn largest(values: impl Iterator<Item = f64>) -> f64 {
-    values.fold(f64::NEG_INFINITY, |most, value| if value.is_nan() || value > most { value } else { most })
 }
 
 /// Two bodies in the query frame.

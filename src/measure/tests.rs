@@ -247,6 +247,61 @@ fn warm_starts_change_time_not_answers() {
 }
 
 #[test]
+fn near_contact_distances_shrink_by_what_is_moved() {
+    for seed in 0..200 {
+        let mut random = Seeded(5000 + seed);
+        let bodies = zoo(&mut random);
+        let (i, j) = (random.next() as usize % bodies.len(), random.next() as usize % bodies.len());
+        let (a, b) = (&bodies[i], &bodies[j]);
+        let s = a.circumscribed().radius.max(b.circumscribed().radius);
+        let far = 1.5 * (a.circumscribed().radius + b.circumscribed().radius);
+        let pose = random_pose(&mut random, far);
+        let apart = cold(a, &Pose::identity(), b, &pose);
+        let normal = apart.normal.unwrap();
+        // Moving B along the normal brings it nearer by exactly as much.
+        let gap = s * 10_f64.powf(-5.0 + 3.0 * random.signed());
+        let moved = pose.translation() + normal * (apart.value() - gap);
+        let q = pose.rotation().coords;
+        let pose = Pose::from_quaternion(moved, q.into()).unwrap();
+        let answer = cold(a, &Pose::identity(), b, &pose);
+        let label = format!("seed {seed} {}-{} gap {gap:e}: {answer:?}", a.name(), b.name());
+        assert_eq!(answer.status, Status::Converged, "{label}");
+        // The first bracket and the rounded normal are what the gap is known to.
+        assert!(answer.lower <= gap + 2e-9 * s && gap - 2e-9 * s <= answer.upper, "{label}");
+        let level = cold_level(a, &Pose::identity(), b, &pose);
+        assert_eq!(level.status, Status::Converged, "seed {seed}: {level:?}");
+    }
+}
+
+#[test]
+fn overflow_ends_in_a_wide_bracket() {
+    let tiny = Body::superellipsoid("tiny", Vector3::zeros(), Vector3::repeat(1e-24), 8).unwrap();
+    let ball = Body::ball("ball", Vector3::zeros(), 1e-24).unwrap();
+    let level = cold_level(&tiny, &Pose::identity(), &ball, &at(1e15, 1e15, 0.0));
+    assert!(level.status == Status::BracketWide || level.upper.is_finite(), "{level:?}");
+    let answer = cold(&tiny, &Pose::identity(), &ball, &at(1e15, 1e15, 0.0));
+    assert!(answer.status == Status::BracketWide || answer.upper.is_finite(), "{answer:?}");
+}
+
+#[test]
+fn multipliers_that_bound_nothing_claim_nothing() {
+    let ball = Body::ball("ball", Vector3::zeros(), 1.0).unwrap();
+    let pair = pair::Pair::new(&ball, &Pose::identity(), &ball, &at(0.5, 0.0, 0.0));
+    let with = |first: f64| {
+        let mut multipliers = [0.0; crate::body::MAX_CONSTRAINTS];
+        multipliers[0] = first;
+        multipliers
+    };
+    let x = Vector3::zeros();
+    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let lower = bracket::level_lower(&pair, &x, &with(bad), &with(0.0));
+        assert!(lower == f64::NEG_INFINITY, "{bad}: {lower}");
+        let lower = bracket::distance_lower(&pair, &x, &x, &Vector3::x(), &with(bad), &with(bad));
+        assert!(lower == 0.0, "{bad}: {lower}");
+    }
+}
+
+#[test]
 fn impossible_accuracy_is_admitted() {
     let a = Body::superellipsoid("a", Vector3::zeros(), Vector3::new(1.0, 2.0, 3.0), 8).unwrap();
     let pose = random_pose(&mut Seeded(5), 7.0);

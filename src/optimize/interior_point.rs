@@ -121,6 +121,9 @@ pub fn minimise<const N: usize, P: Program<N>>(
         let reach = primal.min(multipliers).min(1.0);
         // Complementarity must not run ahead of the other conditions, or the next steps are short.
         let infeasibility = dual.residual(&gradient, rows, complementarity / m as f64);
+        if !(complementarity.is_finite() && infeasibility.is_finite()) {
+            return iteration;
+        }
         // A short step shows that the last target was out of reach: centre first.
         let floor = if last < 0.5 { 0.5 } else { (0.1 * infeasibility / complementarity).clamp(1e-4, 0.3) };
         let centring = (1.0 - reach).powi(3).clamp(floor, 0.8);

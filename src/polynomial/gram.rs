@@ -47,7 +47,7 @@ pub enum CertificateError {
     /// The smallest eigenvalue does not exceed the residual.
     #[error(
         "the Gram matrix is not proven positive definite beyond its residual {residual:.3e} \
-         (smallest eigenvalue about {smallest_eigenvalue:.3e}); fit with a larger margin"
+         (smallest eigenvalue about {smallest_eigenvalue:.3e}); use one farther from singular"
     )]
     NotDefinite {
         /// Bound δ of the correction.
@@ -212,7 +212,8 @@ impl HessianGram {
     /// # Errors
     /// What is missing for a proof, and by how much.
     pub fn prove(&self, polynomial: &Polynomial) -> Result<Margin, CertificateError> {
-        let mut squares = 0.0;
+        // Above zero: squares of tiny residuals may underflow.
+        let mut squares = f64::MIN_POSITIVE;
         for ((i, j, exponents), (sum, count)) in self.residuals(polynomial) {
             let residual = sum.magnitude_bound();
             if count == 0 {

@@ -18,7 +18,7 @@ pub const fn gamma(m: usize) -> f64 {
 }
 
 /// Slack for products that underflow: fewer than 2¹⁰ operations lose at most 2⁻¹⁰⁷⁵ each, and what follows multiplies
-/// that loss by at most `56 (1 + max |c|) max(1, r)^8`.
+/// that loss by at most `56 (1 + max |c|) max(1, r)^k`.
 const UNDERFLOW: f64 = 1e-300;
 
 /// `Q(r) = Σ_j C_j r^j` with the rounding count of the evaluation it bounds.
@@ -27,6 +27,7 @@ pub(super) struct AbsolutePolynomial {
     by_degree: [f64; 9],
     gamma: f64,
     sum: f64,
+    degree: i32,
 }
 
 impl AbsolutePolynomial {
@@ -39,7 +40,7 @@ impl AbsolutePolynomial {
         // which only scale the bound by 1 + γ and are covered by counting 2 roundings more.
         let gamma = gamma(count(degree - 2) + degree + 12);
         let sum = by_degree.iter().sum();
-        Self { by_degree, gamma, sum }
+        Self { by_degree, gamma, sum, degree: degree as i32 }
     }
 
     /// `Q(r)`, `Q'(r)`, `Q''(r)`.
@@ -54,7 +55,7 @@ impl AbsolutePolynomial {
     }
 
     fn underflow(&self, r: f64) -> f64 {
-        UNDERFLOW * (1.0 + self.sum) * r.max(1.0).powi(8)
+        UNDERFLOW * (1.0 + self.sum) * r.max(1.0).powi(self.degree)
     }
 
     pub(super) fn value_error(&self, z: &Vector3<f64>, gradient: &Vector3<f64>, dz: &Vector3<f64>) -> f64 {

@@ -7,6 +7,8 @@ type Points = Result<Vec<Vector3<f64>>, Defect>;
 
 /// Lines that hold something, numbered, without comments.
 fn lines(bytes: &[u8]) -> Result<Vec<(usize, &str)>, Defect> {
+    // Some editors start files with a byte order mark.
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let line = bytes[..error.valid_up_to()].iter().filter(|&&b| b == b'\n').count();
         Defect::line(line, "not text")
