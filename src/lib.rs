@@ -4,6 +4,11 @@
 //! offline. Distances between moving bodies are small convex programs, solved here in microseconds, and every answer is
 //! a bracket proven to contain the truth.
 
+/// The README's example, kept true by the doc tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 pub mod body;
 pub mod chart;
 pub mod cli;
