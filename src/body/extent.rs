@@ -87,6 +87,8 @@ fn support(
 pub(super) struct Extent {
     pub(super) bounding_box: Aabb,
     pub(super) circumscribed: Ball,
+    /// Bounds of the normalized coordinates' magnitudes.
+    pub(super) z_extent: Vector3<f64>,
 }
 
 impl Extent {
@@ -122,6 +124,18 @@ impl Extent {
             max: Vector3::from_fn(|i, _| (interior[i] + reaches[i]).next_up()),
         };
 
+        // The normalized coordinates are heights along the rows of `linear`.
+        let z_extent = Vector3::from_fn(|i, _| {
+            let row = placement.linear().row(i).transpose();
+            let n = row.normalize();
+            let heights = [1.0, -1.0].map(|sign| {
+                let side = n * sign;
+                close(&bound(&side), radius) + side.dot(&(interior - placement.origin()))
+            });
+            let rounding = 16.0 * f64::EPSILON * (interior.norm() + placement.origin().norm() + radius);
+            (largest(heights.into_iter()) + rounding) * row.norm() * (1.0 + 1e-13)
+        });
+
         // Every point of the body is within `covering` of some direction of the sphere, as seen from the centre.
         let center = (bounding_box.min + bounding_box.max) * 0.5;
         let half_diagonal = (bounding_box.max - bounding_box.min).norm() * 0.5;
@@ -130,7 +144,7 @@ impl Extent {
             largest(sphere.vertices().iter().map(|n| close(&bound(n), radius) + n.dot(&(interior - center))));
         let slack = 16.0 * f64::EPSILON * (half_diagonal + center.norm());
         let radius = (from_center / sphere.covering_cosine()).min(half_diagonal) * (1.0 + 1e-14) + slack;
-        Ok(Self { bounding_box, circumscribed: Ball { center, radius } })
+        Ok(Self { bounding_box, circumscribed: Ball { center, radius }, z_extent })
     }
 }
 

@@ -170,6 +170,7 @@ pub struct Body {
     in_radius: f64,
     bounding_box: Aabb,
     circumscribed: Ball,
+    z_extent: Vector3<f64>,
     boundary: Vec<Vector3<f64>>,
     volume: Volume,
     points: Option<ContainedPoints>,
@@ -201,14 +202,14 @@ impl Body {
         for (index, constraint) in constraints.iter().enumerate() {
             constraint.gram.prove(&constraint.polynomial).map_err(|source| BodyError::Certificate { index, source })?;
         }
-        let placement = Placement::new(normalization.linear, &inverse, normalization.center, 0.0, 0.0);
+        let placement = Placement::new(normalization.linear, inverse, normalization.center, 0.0, 0.0);
         let interior_point =
             interior.unwrap_or_else(|| inverse * extent::deepest_point(&constraints).0 + normalization.center);
         let min_value = largest(constraints.iter().map(|c| placement.sample(c, &interior_point).value_upper()));
         if !(min_value <= 1.0 - MIN_DEPTH) {
             return Err(BodyError::Interior { min_value });
         }
-        let Extent { bounding_box, circumscribed } =
+        let Extent { bounding_box, circumscribed, z_extent } =
             Extent::prove(&constraints, &placement, &inverse, &interior_point)?;
         let boundary = surface::proven_boundary(&constraints, &placement, &inverse, &interior_point);
         let in_radius = surface::in_radius(&boundary, &interior_point, inverse.determinant() < 0.0);
@@ -230,6 +231,7 @@ impl Body {
             in_radius,
             bounding_box,
             circumscribed,
+            z_extent,
             boundary,
             volume,
             points: None,
@@ -295,6 +297,11 @@ impl Body {
     /// A box proven to contain the body.
     pub fn bounding_box(&self) -> &Aabb {
         &self.bounding_box
+    }
+
+    /// Bounds of `|z_i|` over the body, z its normalized coordinates; proven.
+    pub fn z_extent(&self) -> &Vector3<f64> {
+        &self.z_extent
     }
 
     /// Points proven to lie in the body, close to its boundary, spread all around.

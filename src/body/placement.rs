@@ -14,6 +14,9 @@ use nalgebra::{Matrix3, Vector3};
 #[derive(Clone, Debug)]
 pub struct Placement {
     linear: Matrix3<f64>,
+    inverse: Matrix3<f64>,
+    /// Bounds of the distance of each column of `inverse` from that of the exact inverse.
+    inverse_errors: Vector3<f64>,
     origin: Vector3<f64>,
     row_norms: Vector3<f64>,
     /// Displacement per distance from the origin.
@@ -33,6 +36,10 @@ pub struct Sample {
     pub nearby_value_error: f64,
     /// Bound of the Euclidean norm of the error of the gradient at that nearby point.
     pub gradient_error: f64,
+    /// Gradient with respect to the normalized coordinates z.
+    pub z_gradient: Vector3<f64>,
+    /// Bound of the error of each component of `z_gradient` at that nearby point.
+    pub z_gradient_error: f64,
 }
 
 impl Sample {
@@ -48,21 +55,29 @@ impl Sample {
 }
 
 impl Placement {
-    /// The map with `linear = L Rᵀ`, computed with at most three roundings per entry from an invertible `L` with `inverse`,
-    /// where `R` is within `rotation_error` of the exact rotation and `origin` within `origin_error` of the exact origin.
+    /// The map with `linear = L Rᵀ` and its `inverse`, both computed with at most three roundings per entry from an
+    /// invertible `L` and its inverse, where `R` is within `rotation_error` of the exact rotation and `origin` within `origin_error` of the exact origin.
     pub fn new(
         linear: Matrix3<f64>,
-        inverse: &Matrix3<f64>,
+        inverse: Matrix3<f64>,
         origin: Vector3<f64>,
         rotation_error: f64,
         origin_error: f64,
     ) -> Self {
         let row_norms = Vector3::from_fn(|i, _| linear.row(i).norm() * (1.0 + 1e-14));
-        // An error of at most ε |M_i| |v - o| in each z_i is a displacement of at most ε K |v - o|, K = ||L⁻¹| |M_i||:
-        // √3 when the rows of L are orthogonal. The entries of M and the product with v - o round seven times together.
-        let k = (inverse.abs() * row_norms).norm() * (1.0 + 1e-5);
+        // An error of at most ε |M_i| |v - o| in each z_i is a displacement of at most ε K |v - o|, with K the sum of row
+        // norms of M times column norms of its inverse: 3 when the rows of L are orthogonal. The entries of M and the
+        // product with v - o round seven times together.
+        let columns = Vector3::from_fn(|i, _| inverse.column(i).norm() * (1.0 + 1e-14));
+        let k = row_norms.dot(&columns) * (1.0 + 1e-5);
         let relative_error = rotation_error + gamma(16) * k;
-        Self { linear, origin, row_norms, relative_error, origin_error }
+        // The exact inverse is inverse (I + E)⁻¹, E what the exact M times `inverse` is off the identity.
+        let off = (linear * inverse - Matrix3::identity()).abs();
+        let inverse_errors = Vector3::from_fn(|i, _| {
+            let off = |j: usize| off[(j, i)] + (rotation_error + gamma(12)) * row_norms[j] * columns[i];
+            1.01 * (0..3).map(|j| columns[j] * off(j)).sum::<f64>() + gamma(8) * columns[i]
+        });
+        Self { linear, inverse, inverse_errors, origin, row_norms, relative_error, origin_error }
     }
 
     /// `M` in `z = M (v - o)`.
@@ -73,6 +88,18 @@ impl Placement {
     /// `o` in `z = M (v - o)`.
     pub fn origin(&self) -> &Vector3<f64> {
         &self.origin
+    }
+
+    /// A linear functional `r·(v' - v̂)` of points as one of their normalized coordinates, `M⁻ᵀ r`, with a bound of the error
+    /// of each component.
+    pub fn functional(&self, r: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+        (self.inverse.transpose() * r, self.inverse_errors * (r.norm() * (1.0 + 1e-14)))
+    }
+
+    /// Bounds of `|z'_i - z_i|` between the image of v and those of points with `|z'_i| <= extent_i`.
+    pub fn spans(&self, v: &Vector3<f64>, extent: &Vector3<f64>) -> Vector3<f64> {
+        let z = self.linear * (v - self.origin);
+        (extent + z.abs() + self.row_norms * self.displacement(v)) * (1.0 + 1e-14)
     }
 
     /// Bound of the distance between v and the point whose exact image is the computed one of v.
@@ -102,11 +129,19 @@ impl Placement {
         let value_error = polynomial.value_error(&z, &jet.gradient, &dz);
         let none = Vector3::zeros();
         let nearby_value_error = polynomial.value_error(&z, &jet.gradient, &none);
+        let z_gradient_error = polynomial.gradient_error(&z, &none);
         let pulled = self.pull_back(jet);
         // Pulling back turns and rounds the gradient; the polynomial's own error passes through M.
         let gradient_error = (self.relative_error + gamma(12)) * pulled.gradient.norm()
-            + (2.0 * polynomial.gradient_error(&z, &none) + gamma(12) * jet.gradient.norm()) * self.row_norms.norm();
-        Sample { jet: pulled, value_error, nearby_value_error, gradient_error: gradient_error * (1.0 + 1e-14) }
+            + (2.0 * z_gradient_error + gamma(12) * jet.gradient.norm()) * self.row_norms.norm();
+        Sample {
+            jet: pulled,
+            value_error,
+            nearby_value_error,
+            gradient_error: gradient_error * (1.0 + 1e-14),
+            z_gradient: jet.gradient,
+            z_gradient_error,
+        }
     }
 
     #[inline]

@@ -284,7 +284,7 @@ fn certify(
         .map_err(|source| BodyError::Certificate { index: 0, source })?;
     let mut constraint = Constraint { polynomial, gram };
     let inverse = normalization.linear.try_inverse().ok_or(ProgramError::Singular)?;
-    let placement = Placement::new(normalization.linear, &inverse, normalization.center, 0.0, 0.0);
+    let placement = Placement::new(normalization.linear, inverse, normalization.center, 0.0, 0.0);
     // The bound of the rounding moves a little with the constant: a second pass settles it.
     for _ in 0..3 {
         let highest =

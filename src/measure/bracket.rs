@@ -1,17 +1,24 @@
 //! Brackets proven for any trial point: lower bounds by convexity and Lagrange duality, upper bounds by feasible points.
 //!
-//! With n a unit vector, λ, μ >= 0, and ρ bounding the distance from the trial point to any point of the body:
+//! For a linear functional r and multipliers λ >= 0 of the constraints of one body, every point x' of the body satisfies
 //!
 //! ```text
-//! D >= n·(x - y) - Σ λ_i (1 - g_i(x)) - Σ μ_j (1 - h_j(y)) - |n + Σ λ_i ∇g_i(x)| ρ_A - |n - Σ μ_j ∇h_j(y)| ρ_B
-//! d >= Σ ν_i g_i(x) + Σ μ_j (h_j(x) - 1) - |Σ ν_i ∇g_i(x) + Σ μ_j ∇h_j(x)| ρ_B,   ν >= 0, Σ ν = 1
+//! r·(x' - x) >= -Σ λ_i (1 - g_i(x)) - |r + Σ λ_i ∇g_i(x)| · |x' - x|
 //! ```
 //!
-//! Both follow from `g(x') >= g(x) + ∇g(x)·(x' - x)` summed over the constraints. Errors of values and gradients
-//! ([`crate::body::Sample`]) enter with the sign that loses. The samples are exact for points displaced by at most δ_A, δ_B
-//! from the trial points ([`crate::body::Placement::displacement`]): distances lose or gain the displacements, level
-//! distances those times |Σ ν_i ∇g_i|. The few dozen roundings of the sums themselves are covered by a relative slack on the
-//! sum of magnitudes.
+//! by `1 >= g_i(x') >= g_i(x) + ∇g_i(x)·(x' - x)`. The last product is taken in the body's normalized coordinates, component by
+//! component, where a body has size about 1 in every direction: needles and plates then cost no digits. Hence, for a unit
+//! vector n, and with ν >= 0, Σ ν = 1,
+//!
+//! ```text
+//! D >= n·(x - y) + min over A of n·(x' - x) + min over B of -n·(y' - y)
+//! d >= Σ ν_i g_i(x) + min over B of (Σ ν_i ∇g_i(x))·(x' - x)
+//! ```
+//!
+//! Errors of values and gradients ([`crate::body::Sample`]) enter with the sign that loses. The samples are exact for points
+//! displaced by at most δ_A, δ_B from the trial points ([`crate::body::Placement::displacement`]): distances lose or gain the
+//! displacements, level distances those times |Σ ν_i ∇g_i|. The few dozen roundings of the sums themselves are covered by a
+//! relative slack on the sum of magnitudes.
 
 use super::pair::{Pair, Posed};
 use crate::body::MAX_CONSTRAINTS;
@@ -23,26 +30,23 @@ const SLACK: f64 = 64.0 * f64::EPSILON;
 /// Multipliers of the constraints of one body; zero where inactive.
 pub(super) type Multipliers = [f64; MAX_CONSTRAINTS];
 
-/// `Σ λ_i (1 - g_i)` rounded up, `Σ λ_i ∇g_i`, a bound of the gradient sum's error, and the magnitude of the first sum.
-struct Weighted {
-    slack: f64,
-    gradient: Vector3<f64>,
-    gradient_error: f64,
-    magnitude: f64,
-}
-
-fn weigh(body: &Posed<'_>, v: &Vector3<f64>, multipliers: &Multipliers) -> Weighted {
-    let mut sum = Weighted { slack: 0.0, gradient: Vector3::zeros(), gradient_error: 0.0, magnitude: 0.0 };
+/// Upper bound of `-min r·(x' - v)` over the points x' of a body, from multipliers of its constraints; at least 0 in exact
+/// arithmetic for v inside.
+fn descent(body: &Posed<'_>, v: &Vector3<f64>, r: &Vector3<f64>, multipliers: &Multipliers) -> f64 {
+    let (mut residual, mut error) = body.functional(r);
+    let (mut slack, mut magnitude) = (0.0, 0.0);
+    error += residual.abs() * SLACK;
     for (i, &multiplier) in multipliers.iter().enumerate().take(body.len()) {
         if multiplier > 0.0 {
             let sample = body.sample(i, v);
-            sum.slack += multiplier * (1.0 - sample.jet.value + sample.nearby_value_error);
-            sum.gradient += sample.jet.gradient * multiplier;
-            sum.gradient_error += multiplier * (sample.gradient_error + SLACK * sample.jet.gradient.norm());
-            sum.magnitude += multiplier * (1.0 + sample.jet.value.abs());
+            slack += multiplier * (1.0 - sample.jet.value + sample.nearby_value_error);
+            magnitude += multiplier * (1.0 + sample.jet.value.abs());
+            residual += sample.z_gradient * multiplier;
+            error += (sample.z_gradient.abs() * SLACK).add_scalar(sample.z_gradient_error) * multiplier;
         }
     }
-    sum
+    let rest = (residual.abs() + error).dot(&body.spans(v));
+    slack + rest * (1.0 + SLACK) + SLACK * magnitude
 }
 
 /// Lower bound of the distance in query units, from trial points x and y, a direction `n` from B to A (normalized here) and
@@ -56,16 +60,11 @@ pub(super) fn distance_lower(
     of_b: &Multipliers,
 ) -> f64 {
     let n = n / n.norm();
-    let a = weigh(&pair.a, x, of_a);
-    let b = weigh(&pair.b, y, of_b);
-    let leading = n.dot(&(x - y));
-    let rest = ((n + a.gradient).norm() + a.gradient_error) * pair.a.reach(x)
-        + ((n - b.gradient).norm() + b.gradient_error) * pair.b.reach(y);
-    // n is a unit vector up to 4 roundings: the slack on the leading term and on the reaches covers them.
-    let magnitude = x.norm() + y.norm() + a.magnitude + b.magnitude + rest;
-    let slack = SLACK * (magnitude + pair.a.reach(x) + pair.b.reach(y));
+    let falls = descent(&pair.a, x, &n, of_a) + descent(&pair.b, y, &-n, of_b);
     let displaced = (pair.a.displacement(x) + pair.b.displacement(y)) * (1.0 + 1e-14);
-    let bound = leading - a.slack - b.slack - rest - slack - displaced;
+    // n is a unit vector up to 4 roundings: a length of 1 + ε scales the bound by as much.
+    let slack = SLACK * (x.norm() + y.norm() + falls.abs());
+    let bound = n.dot(&(x - y)) - falls - displaced - slack;
     // Not `max`: a NaN bounds nothing.
     if bound > 0.0 { bound } else { 0.0 }
 }
@@ -84,13 +83,20 @@ pub(super) fn level_lower(pair: &Pair<'_>, x: &Vector3<f64>, of_a: &Multipliers,
     if !(total > 0.0 && total.is_finite()) {
         return f64::NEG_INFINITY;
     }
-    let a = weigh(&pair.a, x, &of_a.map(|multiplier| multiplier / total));
-    let b = weigh(&pair.b, x, of_b);
-    let rest = ((a.gradient + b.gradient).norm() + a.gradient_error + b.gradient_error) * pair.b.reach(x);
-    let slack = SLACK * (1.0 + a.magnitude + b.magnitude + rest);
-    let steepest = a.gradient.norm() + a.gradient_error + b.gradient.norm() + b.gradient_error;
-    let displaced = (pair.a.displacement(x) + pair.b.displacement(x)) * steepest;
-    // Σ ν g = 1 - Σ ν (1 - g).
-    let bound = 1.0 - a.slack - b.slack - rest - slack - displaced;
+    // Σ ν g and its gradient with their errors; the weights sum to 1 up to the slack on the magnitude.
+    let (mut value, mut magnitude) = (0.0, 0.0);
+    let (mut gradient, mut gradient_error) = (Vector3::zeros(), 0.0);
+    for (i, multiplier) in of_a.iter().enumerate().take(pair.a.len()).filter(|(_, multiplier)| **multiplier > 0.0) {
+        let weight = multiplier / total;
+        let sample = pair.a.sample(i, x);
+        value += weight * (sample.jet.value - sample.nearby_value_error);
+        magnitude += weight * sample.jet.value.abs();
+        gradient += sample.jet.gradient * weight;
+        gradient_error += weight * (sample.gradient_error + SLACK * sample.jet.gradient.norm());
+    }
+    let fall = descent(&pair.b, x, &gradient, of_b);
+    let displaced = (pair.a.displacement(x) + pair.b.displacement(x)) * (gradient.norm() + gradient_error);
+    let rest = gradient_error * pair.b.reach(x) + displaced;
+    let bound = value - fall - rest * (1.0 + SLACK) - SLACK * (magnitude + fall.abs());
     if bound.is_nan() { f64::NEG_INFINITY } else { bound }
 }

@@ -39,6 +39,16 @@ impl Posed<'_> {
         self.placement.displacement(v)
     }
 
+    /// A linear functional of points in the body's normalized coordinates, with a bound of each component's error.
+    pub(super) fn functional(&self, r: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+        self.placement.functional(r)
+    }
+
+    /// Bounds of how far the normalized coordinates of points of the body are from those of v.
+    pub(super) fn spans(&self, v: &Vector3<f64>) -> Vector3<f64> {
+        self.placement.spans(v, self.body.z_extent())
+    }
+
     /// Rigorous upper bound of the largest constraint at all points within `distance` of v.
     pub(super) fn value_upper(&self, v: &Vector3<f64>, distance: f64) -> f64 {
         let constraints = self.body.constraints().iter();
@@ -134,7 +144,7 @@ impl<'a> Pair<'a> {
         let own_center = a.normalization().center;
         let placement_a = Placement::new(
             a.normalization().linear * unit,
-            &(a.inverse() / unit),
+            a.inverse() / unit,
             (own_center - origin) / unit,
             0.0,
             gamma(2) * (own_center.norm() + origin.norm()) / unit,
@@ -148,7 +158,7 @@ impl<'a> Pair<'a> {
         };
         let placement_b = Placement::new(
             b.normalization().linear * rotation.transpose() * unit,
-            &(b.inverse() / unit),
+            rotation * b.inverse() / unit,
             to_query(&other_center),
             relative,
             off(&other_center),

@@ -268,6 +268,8 @@ fn near_contact_distances_shrink_by_what_is_moved() {
         assert_eq!(answer.status, Status::Converged, "{label}");
         // The first bracket and the rounded normal are what the gap is known to.
         assert!(answer.lower <= gap + 2e-9 * s && gap - 2e-9 * s <= answer.upper, "{label}");
+        let level = cold_level(a, &Pose::identity(), b, &pose);
+        assert_eq!(level.status, Status::Converged, "seed {seed} {}-{}: {level:?}", a.name(), b.name());
     }
 }
 
