@@ -8,6 +8,9 @@ pub const MAX_MESSAGE_BYTES: usize = 4 << 20;
 /// Most results (pairs times measures) of one Evaluate.
 pub const MAX_EVALUATIONS: usize = 4096;
 
+/// Pairs an Evaluate solves before it lets other calls go first: some tens of milliseconds at worst.
+pub const PAIRS_AT_ONCE: usize = 32;
+
 /// Items of a page when the request does not say.
 pub const DEFAULT_PAGE: usize = 100;
 
