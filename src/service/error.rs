@@ -122,7 +122,9 @@ fn store(error: &StoreError) -> Status {
     tracing::error!(%error, "the catalogue could not be written");
     let (code, reason) = match error {
         StoreError::Full { .. } => (Code::ResourceExhausted, "DISK_FULL"),
-        StoreError::Damaged { .. } | StoreError::Format { .. } => (Code::DataLoss, "CATALOGUE_DAMAGED"),
+        StoreError::Damaged { .. } | StoreError::Empty { .. } | StoreError::Format { .. } => {
+            (Code::DataLoss, "CATALOGUE_DAMAGED")
+        }
         StoreError::InUse { .. } | StoreError::Directory { .. } | StoreError::Disk { .. } => {
             (Code::Internal, "DISK_FAILED")
         }

@@ -229,8 +229,10 @@ impl Catalogue {
         write: impl FnOnce(&WriteTransaction) -> Result<(), redb::Error>,
     ) -> Result<(), StoreError> {
         store.commit(write).inspect_err(|_| {
-            // Should this fail too, the next change tries again.
-            let _ = self.reread(store);
+            // The next change tries again; until then nothing can be changed, and somebody should know.
+            if let Err(error) = self.reread(store) {
+                tracing::error!(%error, "the catalogue can not be read back after a failed change; changes are refused");
+            }
         })
     }
 

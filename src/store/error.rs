@@ -39,6 +39,15 @@ pub enum StoreError {
         /// What this program reads and writes.
         expected: u64,
     },
+    /// The file is there and holds nothing: it was cut, or the first start did not get far.
+    #[error(
+        "{} is empty; restore it from a backup, or remove it to start with an empty catalogue",
+        .file.display()
+    )]
+    Empty {
+        /// The catalogue's file.
+        file: PathBuf,
+    },
     /// The file holds something this program did not write.
     #[error(
         "the catalogue in {} is damaged: {what}; restore catalogue.redb from a backup or use another directory",

@@ -36,7 +36,7 @@ impl Disk {
     fn open(&self) -> Result<Store, StoreError> {
         let disk = self.clone();
         let open = move || Database::builder().create_with_backend(disk.clone());
-        Store::open_with(Path::new("disk"), Box::new(open))
+        Store::open_with(Path::new("disk"), open(), Box::new(open))
     }
 
     fn load(&self) -> Result<Catalogue, StoreError> {
@@ -191,6 +191,30 @@ fn what_it_did_not_write_is_refused_by_name() {
         let error = disk.load().expect_err(word).to_string();
         assert!(error.contains(word) && error.contains("disk"), "{error}");
     }
+}
+
+/// Were a new file made, the scenes would be gone from memory too and their revisions given out again.
+#[test]
+fn a_file_that_went_away_is_not_made_anew() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (file, aside) = (dir.path().join("catalogue.redb"), dir.path().join("aside.redb"));
+    let mut store = Store::open(dir.path()).expect("a new catalogue");
+    std::fs::rename(&file, &aside).expect("moved");
+    let gone = store.reopen().expect_err("gone").to_string();
+    assert!(!file.exists() && store.is_closed(), "{gone}");
+    drop(redb::Database::create(&file).expect("another database"));
+    assert!(store.reopen().expect_err("another one").to_string().contains("replaced"));
+    std::fs::rename(&aside, &file).expect("moved back");
+    store.reopen().expect("there again");
+}
+
+#[test]
+fn an_empty_file_is_not_taken_for_a_new_catalogue() {
+    let dir = tempfile::tempdir().expect("a directory");
+    std::fs::write(dir.path().join("catalogue.redb"), "").expect("written");
+    let error = Store::open(dir.path()).expect_err("empty").to_string();
+    assert!(error.contains("catalogue.redb is empty"), "{error}");
+    assert_eq!(std::fs::metadata(dir.path().join("catalogue.redb")).expect("still there").len(), 0);
 }
 
 #[test]
