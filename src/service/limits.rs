@@ -31,3 +31,15 @@ pub const KEEPALIVE: Duration = Duration::from_secs(30);
 
 /// Time to give the sign of life before the connection is closed.
 pub const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Connections open at once; further ones queue in the system. Half of the 1024 file descriptors a process mostly has.
+pub const MAX_CONNECTIONS: usize = 512;
+
+/// How long a new connection may say nothing.
+pub const MUTE_PATIENCE: Duration = Duration::from_secs(10);
+
+/// The same while more than half of the places are taken.
+pub const MUTE_PATIENCE_CROWDED: Duration = Duration::from_secs(1);
+
+/// Pause after a connection could not be accepted.
+pub const ACCEPT_PAUSE: Duration = Duration::from_millis(100);

@@ -7,6 +7,7 @@
 
 mod bodies;
 mod error;
+mod incoming;
 pub mod limits;
 pub mod proto;
 mod push;

@@ -9,13 +9,14 @@ use std::sync::Arc;
 use tokio::net::TcpListener;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::{oneshot, watch};
-use tonic::transport::server::{Router, TcpIncoming};
+use tonic::transport::server::Router;
 use tonic_health::ServingStatus;
 use tonic_health::server::HealthReporter;
 
 use crate::store::{Catalogue, Store, StoreError};
 
 use super::bodies::Bodies;
+use super::incoming::Incoming;
 use super::limits::{DRAIN, KEEPALIVE, KEEPALIVE_TIMEOUT, MAX_MESSAGE_BYTES, MAX_STREAMS};
 use super::proto::FILE_DESCRIPTOR_SET;
 use super::proto::body_service_server::{self, BodyServiceServer};
@@ -65,7 +66,7 @@ pub enum ServeError {
 /// A server that listens and holds the lock of its catalogue, but does not answer yet.
 #[derive(Debug)]
 pub struct Server {
-    incoming: TcpIncoming,
+    listener: TcpListener,
     addr: SocketAddr,
     store: Store,
 }
@@ -86,9 +87,7 @@ impl Server {
         let store = tokio::task::spawn_blocking(move || Store::open(&data))
             .await
             .map_err(|error| ServeError::Defect(error.to_string()))??;
-        // Set here, since tonic's own setting is ignored for listeners it did not make.
-        let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
-        Ok(Self { incoming, addr, store })
+        Ok(Self { listener, addr, store })
     }
 
     /// Where it listens; the port that was found when port 0 was asked for.
@@ -117,7 +116,7 @@ impl Server {
         });
 
         let (draining, drain) = oneshot::channel();
-        let serving = router.serve_with_incoming_shutdown(self.incoming, async {
+        let serving = router.serve_with_incoming_shutdown(Incoming::new(self.listener), async {
             let _ = drain.await;
         });
         tokio::pin!(serving);

@@ -1,12 +1,16 @@
 //! Many calls and many connections at once.
 
+use std::io::{Read, Write};
+use std::net::TcpStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
 
 use sublevel::body::Body;
+use sublevel::service::limits::{MAX_CONNECTIONS, MUTE_PATIENCE};
 use sublevel::service::proto::{Accuracy, EvaluateRequest, Measure, UpdateSceneRequest};
 
-use crate::harness::{Running, at, object, pair};
+use crate::harness::{Clients, Running, at, object, pair};
 
 /// As many long calls as would take every core for themselves; none of them is over when the short one is answered.
 #[tokio::test(flavor = "multi_thread")]
@@ -37,7 +41,7 @@ async fn a_short_query_does_not_wait_for_long_ones() {
             results
         }));
     }
-    tokio::time::sleep(std::time::Duration::from_millis(30)).await;
+    tokio::time::sleep(Duration::from_millis(30)).await;
     assert_eq!(over.load(Ordering::SeqCst), 0, "the long calls are too short for this test");
     for _ in 0..3 {
         clients.queries.evaluate(ask(1)).await.expect("an answer");
@@ -47,4 +51,46 @@ async fn a_short_query_does_not_wait_for_long_ones() {
         let results = call.await.expect("a call");
         assert!((0..4096).eq(results.iter().map(|result| result.pair_index)), "every pair once and in order");
     }
+}
+
+/// A call on a connection of its own, however long it takes to get in.
+async fn call(server: &Running) -> Clients {
+    let mut clients = server.connect().await;
+    clients.make_scene("hall").await;
+    clients
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn silent_connections_are_closed_and_do_not_lock_others_out() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(dir.path());
+    let mut mute: Vec<_> =
+        (0..MAX_CONNECTIONS + 20).map(|_| TcpStream::connect(server.addr).expect("connected")).collect();
+    // Half a greeting is as good as none.
+    mute[0].write_all(b"PRI * HT").expect("written");
+    let patience = MUTE_PATIENCE + Duration::from_secs(5);
+    let mut clients = tokio::time::timeout(patience, call(&server)).await.expect("there is room again");
+    mute[0].set_read_timeout(Some(patience)).expect("set");
+    match mute[0].read(&mut [0; 64]) {
+        Ok(count) => assert_eq!(count, 0, "nothing but the end"),
+        Err(error) => assert_eq!(error.kind(), std::io::ErrorKind::ConnectionReset),
+    }
+    assert_eq!(clients.scene("hall").await.revision, 1, "who speaks may pause as long as it likes");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn running_out_of_file_descriptors_is_waited_out() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start_limited(dir.path(), 40);
+    let mute: Vec<_> = (0..60).map(|_| TcpStream::connect(server.addr).expect("connected")).collect();
+    tokio::time::sleep(Duration::from_millis(200)).await;
+    let before = server.cpu();
+    tokio::time::sleep(Duration::from_secs(2)).await;
+    let spent = server.cpu() - before;
+    assert!(spent < 0.5, "{spent} s of work in 2 s of waiting");
+    drop(mute);
+    tokio::time::timeout(Duration::from_secs(10), call(&server)).await.expect("there is room again");
+    // One line for each time it begins to fail, not one for each try.
+    let lines = Running::log(dir.path()).matches("can not accept").count();
+    assert!((1..=8).contains(&lines), "{lines} lines");
 }
