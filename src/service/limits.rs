@@ -23,8 +23,15 @@ pub const LOADING_PATIENCE: Duration = Duration::from_secs(10);
 /// How long open calls may go on after a stop was asked for. A second signal ends the wait.
 pub const DRAIN: Duration = Duration::from_secs(5);
 
-/// Concurrent calls of one connection.
-pub const MAX_STREAMS: u32 = 256;
+/// Concurrent calls of one connection; clients queue further ones.
+pub const MAX_STREAMS: u32 = 32;
+
+/// Concurrent calls of all connections together. Each may hold a message of [`MAX_MESSAGE_BYTES`] in both directions and
+/// what is made of it; further calls wait unread.
+pub const MAX_CALLS: usize = 64;
+
+/// Longest time from the start of a call behind the gate to its answer.
+pub const CALL_LIMIT: Duration = Duration::from_secs(120);
 
 /// Silence after which a connection is asked for a sign of life.
 pub const KEEPALIVE: Duration = Duration::from_secs(30);

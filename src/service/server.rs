@@ -16,6 +16,7 @@ use tonic_health::server::HealthReporter;
 use crate::store::{Catalogue, Store, StoreError};
 
 use super::bodies::Bodies;
+use super::gate::Gate;
 use super::incoming::Incoming;
 use super::limits::{DRAIN, KEEPALIVE, KEEPALIVE_TIMEOUT, MAX_MESSAGE_BYTES, MAX_STREAMS};
 use super::proto::FILE_DESCRIPTOR_SET;
@@ -183,7 +184,7 @@ fn router(ready: Ready) -> Router {
             .register_encoded_file_descriptor_set(FILE_DESCRIPTOR_SET)
             .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
     };
-    let sized = MAX_MESSAGE_BYTES;
+    let (sized, gate) = (MAX_MESSAGE_BYTES, Gate::new());
     let bodies = BodyServiceServer::new(Bodies(ready.clone()));
     let scenes = SceneServiceServer::new(Scenes(ready.clone()));
     let queries = QueryServiceServer::new(Queries(ready));
@@ -191,9 +192,9 @@ fn router(ready: Ready) -> Router {
         .max_concurrent_streams(MAX_STREAMS)
         .http2_keepalive_interval(Some(KEEPALIVE))
         .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
-        .add_service(bodies.max_decoding_message_size(sized).max_encoding_message_size(sized))
-        .add_service(scenes.max_decoding_message_size(sized).max_encoding_message_size(sized))
-        .add_service(queries.max_decoding_message_size(sized).max_encoding_message_size(sized))
+        .add_service(gate.before(bodies.max_decoding_message_size(sized).max_encoding_message_size(sized)))
+        .add_service(gate.before(scenes.max_decoding_message_size(sized).max_encoding_message_size(sized)))
+        .add_service(gate.before(queries.max_decoding_message_size(sized).max_encoding_message_size(sized)))
         // Older clients know v1alpha only. The descriptors are compiled in, so they are read or a test fails.
         .add_optional_service(reflection().build_v1().ok())
         .add_optional_service(reflection().build_v1alpha().ok())

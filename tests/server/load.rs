@@ -7,8 +7,11 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
 use sublevel::body::Body;
-use sublevel::service::limits::{MAX_CONNECTIONS, MUTE_PATIENCE};
-use sublevel::service::proto::{Accuracy, EvaluateRequest, Measure, UpdateSceneRequest};
+use sublevel::service::limits::{MAX_CONNECTIONS, MAX_MESSAGE_BYTES, MUTE_PATIENCE};
+use sublevel::service::proto::{Accuracy, CreateBodyRequest, EvaluateRequest, Measure, UpdateSceneRequest};
+
+use tonic_health::pb::HealthCheckRequest;
+use tonic_health::pb::health_client::HealthClient;
 
 use crate::harness::{Clients, Running, at, object, pair};
 
@@ -93,4 +96,37 @@ async fn running_out_of_file_descriptors_is_waited_out() {
     // One line for each time it begins to fail, not one for each try.
     let lines = Running::log(dir.path()).matches("can not accept").count();
     assert!((1..=8).contains(&lines), "{lines} lines");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_flood_of_large_messages_stays_within_bounds_and_health_answers() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(dir.path());
+    let mut clients = call(&server).await;
+    // Spaces are read to their end before the file is refused.
+    let body_file_json: tonic::codegen::Bytes = vec![b' '; MAX_MESSAGE_BYTES - 64].into();
+    let mut flood = Vec::new();
+    for _ in 0..12 {
+        let bodies = server.connect().await.bodies;
+        for _ in 0..20 {
+            let (mut bodies, body_file_json) = (bodies.clone(), body_file_json.clone());
+            flood.push(tokio::spawn(async move {
+                bodies.create_body(CreateBodyRequest { body_file_json }).await.expect_err("refused").code()
+            }));
+        }
+    }
+    let mut health = HealthClient::new(clients.channel.clone());
+    for _ in 0..5 {
+        tokio::time::sleep(Duration::from_millis(50)).await;
+        let check = health.check(HealthCheckRequest::default());
+        tokio::time::timeout(Duration::from_secs(3), check).await.expect("in time").expect("an answer");
+    }
+    for call in flood {
+        // They wait for their turn; none is turned away for the crowd.
+        assert_eq!(call.await.expect("a call"), tonic::Code::InvalidArgument);
+    }
+    let peak = server.peak_memory_mib();
+    println!("{peak} MiB at the peak");
+    assert!(peak < 500, "{peak} MiB at the peak, of 960 MiB sent");
+    assert_eq!(clients.scene("hall").await.revision, 1);
 }
