@@ -146,7 +146,11 @@ async fn push_stores_files_and_says_what_went_wrong() {
     std::fs::write(&changed, ball(1.0).to_json().replacen("ball", "b\\u0000", 1)).expect("written");
     let free = std::net::TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("an address");
     let nobody = format!("http://{free}");
+    let large = dir.path().join("large.json");
+    std::fs::write(&large, " ".repeat((4 << 20) + 1)).expect("written");
     for (args, word) in [
+        (["push", large.to_str().expect("text"), "--server", &url], "4194305 bytes"),
+        (["push", "missing.json", "--server", &url], "check the path"),
         (["push", changed.to_str().expect("text"), "--server", &url], "changed.json"),
         (["push", "missing.json", "--server", &url], "missing.json"),
         (["push", file, "--server", &nobody], "sublevel serve"),
@@ -156,5 +160,6 @@ async fn push_stores_files_and_says_what_went_wrong() {
         let stderr = String::from_utf8_lossy(&refused.stderr);
         assert!(!refused.status.success() && refused.stdout.is_empty());
         assert!(stderr.contains(word) && stderr.trim_end().lines().count() == 1, "{stderr}");
+        assert!(stderr.matches("sublevel fit").count() <= 1 && stderr.matches("; ").count() <= 1, "{stderr}");
     }
 }
