@@ -145,8 +145,10 @@ impl Server {
 /// # Errors
 /// See [`Server::bind`] and [`Server::run`].
 pub async fn serve(options: ServeOptions) -> Result<(), ServeError> {
-    let mut terminate = signal(SignalKind::terminate())?;
-    let data = options.data.clone();
+    // Both before the first line on standard output: who has read it may send a signal.
+    let mut signals = Signals::new()?;
+    // What a relative path means is not in the log otherwise.
+    let data = std::path::absolute(&options.data)?;
     let server = Server::bind(options).await?;
     let mut stdout = io::stdout();
     writeln!(stdout, "listening on {}", server.local_addr())?;
@@ -160,21 +162,33 @@ pub async fn serve(options: ServeOptions) -> Result<(), ServeError> {
     tokio::pin!(running);
     tokio::select! {
         result = &mut running => return result,
-        name = stop_signal(&mut terminate) => tracing::info!("{name}: stopping"),
+        name = signals.next() => tracing::info!("{name}: stopping"),
     }
     let _ = stopping.send(());
     tokio::select! {
         result = running => result?,
-        name = stop_signal(&mut terminate) => tracing::warn!("{name} again: open connections are cut"),
+        name = signals.next() => tracing::warn!("{name} again: open connections are cut"),
     }
     tracing::info!("stopped");
     Ok(())
 }
 
-async fn stop_signal(terminate: &mut Signal) -> &'static str {
-    tokio::select! {
-        _ = terminate.recv() => "SIGTERM",
-        _ = tokio::signal::ctrl_c() => "Ctrl-C",
+/// The two signals that ask for a stop, caught from the moment this is made.
+struct Signals {
+    terminate: Signal,
+    interrupt: Signal,
+}
+
+impl Signals {
+    fn new() -> io::Result<Self> {
+        Ok(Self { terminate: signal(SignalKind::terminate())?, interrupt: signal(SignalKind::interrupt())? })
+    }
+
+    async fn next(&mut self) -> &'static str {
+        tokio::select! {
+            _ = self.terminate.recv() => "SIGTERM",
+            _ = self.interrupt.recv() => "Ctrl-C",
+        }
     }
 }
 

@@ -103,6 +103,17 @@ async fn idle_connections_do_not_hold_up_the_stop() {
     }
 }
 
+/// As soon as the first line is out, both signals mean an orderly stop.
+#[test]
+fn the_first_line_promises_an_orderly_stop() {
+    for _ in 0..20 {
+        let dir = tempfile::tempdir().expect("a directory");
+        let mut server = Running::start(dir.path());
+        server.interrupt();
+        assert_eq!(server.wait(Duration::from_secs(5)).code(), Some(0));
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn reflection_lists_the_services() {
     let dir = tempfile::tempdir().expect("a directory");
