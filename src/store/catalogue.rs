@@ -11,7 +11,7 @@ use crate::body::{Body, BodyId};
 use crate::scene::{NameError, Object, Scene, SceneError, Update, check_name};
 
 use super::disk::Contents;
-use super::rows::{BODIES, META, OBJECTS, ObjectRow, SCENES, SceneRow};
+use super::rows::{BODIES, META, OBJECTS, ObjectRow, REVISIONS, SCENES, SceneRow};
 use super::{Store, StoreError};
 
 /// The catalogue of one server. Reading takes a lock for the time of a map look-up; changes are made one after the other,
@@ -176,7 +176,11 @@ impl Catalogue {
             return Ok(next);
         }
         self.commit(&mut store, |transaction| {
-            put_scene(transaction, &next)?;
+            if next.same_allowed_pairs(&scene) {
+                put_revision(transaction, &next)?;
+            } else {
+                put_scene(transaction, &next)?;
+            }
             let mut objects = transaction.open_table(OBJECTS)?;
             for removed in &update.removals {
                 objects.remove((name, &**removed))?;
@@ -201,6 +205,7 @@ impl Catalogue {
         self.commit(&mut store, |transaction| {
             transaction.open_table(META)?.insert("revision_floor", floor)?;
             transaction.open_table(SCENES)?.remove(name)?;
+            transaction.open_table(REVISIONS)?.remove(name)?;
             let mut objects = transaction.open_table(OBJECTS)?;
             for object in scene.objects() {
                 objects.remove((name, &*object.name))?;
@@ -325,6 +330,11 @@ fn prove(files: &[(String, String)], known: &BTreeMap<BodyId, Arc<Body>>) -> Res
 
 fn put_scene(transaction: &WriteTransaction, scene: &Scene) -> Result<(), redb::Error> {
     transaction.open_table(SCENES)?.insert(&**scene.name(), json(&SceneRow::of(scene))?.as_slice())?;
+    put_revision(transaction, scene)
+}
+
+fn put_revision(transaction: &WriteTransaction, scene: &Scene) -> Result<(), redb::Error> {
+    transaction.open_table(REVISIONS)?.insert(&**scene.name(), scene.revision())?;
     Ok(())
 }
 

@@ -9,7 +9,7 @@ use redb::{Database, DatabaseError, Durability, ReadableDatabase, ReadableTable,
 use serde::de::DeserializeOwned;
 
 use super::StoreError;
-use super::rows::{BODIES, FORMAT, META, OBJECTS, ObjectRow, SCENES, SceneRow};
+use super::rows::{BODIES, FORMAT, FORMAT_1, META, OBJECTS, ObjectRow, REVISIONS, SCENES, SceneRow};
 
 /// The catalogue's file, locked by this process. Hand it to [`super::Catalogue::load`].
 pub struct Store {
@@ -112,16 +112,23 @@ impl Store {
         .map_err(|error| StoreError::from_redb(&self.dir, error))
     }
 
-    /// Checks the format of the tables, or makes them in a new file.
+    /// Checks the format of the tables, makes them in a new file, or takes over those of the format before.
     fn check_format(&self, database: &Database) -> Result<(), StoreError> {
         let (tables, found) = self.format(database)?;
         match found {
             Some(FORMAT) => Ok(()),
+            Some(FORMAT_1) => commit(database, |transaction| {
+                transaction.open_table(REVISIONS)?;
+                transaction.open_table(META)?.insert("format", FORMAT)?;
+                Ok(())
+            })
+            .map_err(|error| StoreError::from_redb(&self.dir, error)),
             Some(found) => Err(StoreError::Format { dir: self.dir.clone(), found, expected: FORMAT }),
             None if !tables => commit(database, |transaction| {
                 transaction.open_table(META)?.insert("format", FORMAT)?;
                 transaction.open_table(BODIES)?;
                 transaction.open_table(SCENES)?;
+                transaction.open_table(REVISIONS)?;
                 transaction.open_table(OBJECTS)?;
                 Ok(())
             })
@@ -167,10 +174,14 @@ impl Store {
                 .map_err(|error| ReadError::Row(format!("body {id} is no text: {error}")))?;
             contents.bodies.push((id, file));
         }
+        let revisions = read.open_table(REVISIONS)?;
         for entry in read.open_table(SCENES)?.iter()? {
             let (name, row) = entry?;
             let name = name.value().to_owned();
-            let row = parse(row.value(), || format!("scene \"{name}\""))?;
+            let mut row: SceneRow = parse(row.value(), || format!("scene \"{name}\""))?;
+            if let Some(revision) = revisions.get(name.as_str())? {
+                row.revision = revision.value();
+            }
             contents.scenes.push((name, row));
         }
         for entry in read.open_table(OBJECTS)?.iter()? {

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 use nalgebra::Vector3;
 use redb::{Database, StorageBackend};
 
-use super::rows::{BODIES, META, OBJECTS, SCENES};
+use super::rows::{BODIES, META, OBJECTS, REVISIONS, SCENES};
 use super::{Catalogue, CatalogueError, Store, StoreError};
 use crate::body::Body;
 use crate::measure::Pose;
@@ -215,6 +215,29 @@ fn an_empty_file_is_not_taken_for_a_new_catalogue() {
     let error = Store::open(dir.path()).expect_err("empty").to_string();
     assert!(error.contains("catalogue.redb is empty"), "{error}");
     assert_eq!(std::fs::metadata(dir.path().join("catalogue.redb")).expect("still there").len(), 0);
+}
+
+/// A catalogue of format 1 is taken over with its revisions; a new pose then leaves the scene's row alone.
+#[test]
+fn revisions_lie_apart_from_the_allowed_pairs() {
+    let disk = Disk::default();
+    drop(furnished(&disk));
+    disk.meddle(|t| {
+        drop(t.delete_table(REVISIONS));
+        drop(t.open_table(META).expect("a table").insert("format", 1));
+        let row = br#"{"revision":41,"allowed":[]}"#;
+        drop(t.open_table(SCENES).expect("a table").insert("room", &row[..]));
+    });
+    let catalogue = disk.load().expect("taken over");
+    assert_eq!(catalogue.scene("room").expect("there").revision(), 41);
+    assert_eq!(catalogue.update_scene("room", &moved(1.0)).expect("moved").revision(), 42);
+    drop(catalogue);
+    disk.meddle(|t| {
+        let table = t.open_table(SCENES).expect("a table");
+        let row = redb::ReadableTable::get(&table, "room").expect("read").expect("a row").value().to_vec();
+        assert_eq!(row, br#"{"revision":41,"allowed":[]}"#);
+    });
+    assert_eq!(disk.load().expect("loads").scene("room").expect("there").revision(), 42);
 }
 
 #[test]
