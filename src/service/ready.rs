@@ -55,7 +55,7 @@ impl Ready {
         on_thread(&self.changing, move || change(&catalogue)).await?.map_err(|error| error::catalogue(&error, field))
     }
 
-    /// Answers a share of a query; keep it short, for others wait in turn.
+    /// Answers a share of a query, or writes a large answer; keep it short, for others wait in turn.
     pub(super) async fn solve<T: Send + 'static>(
         &self,
         solve: impl FnOnce() -> T + Send + 'static,
