@@ -116,6 +116,7 @@ impl Catalogue {
         })?;
         let body = Arc::new(body);
         self.write(|state| state.bodies.insert(*body.id(), body.clone()));
+        tracing::debug!(id = %body.id(), "body created");
         Ok((body, true))
     }
 
@@ -144,6 +145,7 @@ impl Catalogue {
             Ok(())
         })?;
         self.write(|state| state.bodies.remove(id));
+        tracing::debug!(%id, "body deleted");
         Ok(())
     }
 
@@ -161,6 +163,7 @@ impl Catalogue {
         let scene = Arc::new(Scene::new(name, floor + 1)?);
         self.commit(&mut store, |transaction| put_scene(transaction, &scene))?;
         self.write(|state| state.scenes.insert(scene.name().clone(), scene.clone()));
+        tracing::debug!(scene = name, revision = scene.revision(), "scene created");
         Ok(scene)
     }
 
@@ -191,6 +194,7 @@ impl Catalogue {
             Ok(())
         })?;
         self.write(|state| state.scenes.insert(next.name().clone(), next.clone()));
+        tracing::debug!(scene = name, revision = next.revision(), "scene updated");
         Ok(next)
     }
 
@@ -216,6 +220,7 @@ impl Catalogue {
             state.revision_floor = floor;
             state.scenes.remove(name)
         });
+        tracing::debug!(scene = name, revision = scene.revision(), "scene deleted");
         Ok(())
     }
 
@@ -266,6 +271,11 @@ impl State {
     fn read(store: &Store, known: &BTreeMap<BodyId, Arc<Body>>) -> Result<Self, StoreError> {
         let damaged = |what: String| StoreError::damaged(store.dir(), what);
         let Contents { bodies, scenes, objects, revision_floor } = store.read()?;
+        tracing::info!(
+            bodies = bodies.len(),
+            scenes = scenes.len(),
+            "loading; every body that is not known is re-proven"
+        );
         let bodies: BTreeMap<_, _> =
             prove(&bodies, known).map_err(damaged)?.into_iter().map(|body| (*body.id(), body)).collect();
         let ids: HashMap<String, &Arc<Body>> = bodies.iter().map(|(id, body)| (id.to_string(), body)).collect();

@@ -39,13 +39,13 @@ impl Running {
         Self::spawn(command(dir))
     }
 
-    /// With so few file descriptors, and its log in the directory.
+    /// With so few file descriptors, and all it logs in a file in the directory.
     pub(crate) fn start_limited(dir: &Path, descriptors: u32) -> Self {
         let mut limited = Command::new("sh");
         limited.args(["-c", &format!("ulimit -n {descriptors}; exec \"$0\" \"$@\"")]);
         limited.arg(env!("CARGO_BIN_EXE_sublevel")).args(["serve", "--listen", "127.0.0.1:0", "--data"]).arg(dir);
         let log = std::fs::File::create(dir.join("log")).expect("a log");
-        limited.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(log).env("RUST_LOG", "info");
+        limited.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(log).env("RUST_LOG", "sublevel=debug");
         Self::spawn(limited)
     }
 

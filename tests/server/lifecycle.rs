@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use sublevel::body::Body;
-use sublevel::service::proto::ListBodiesRequest;
+use sublevel::service::proto::{CreateSceneRequest, ListBodiesRequest};
 use tonic_health::pb::health_client::HealthClient;
 use tonic_health::pb::{HealthCheckRequest, health_check_response::ServingStatus};
 use tonic_reflection::pb::v1::server_reflection_client::ServerReflectionClient;
@@ -111,6 +111,20 @@ fn the_first_line_promises_an_orderly_stop() {
         let mut server = Running::start(dir.path());
         server.interrupt();
         assert_eq!(server.wait(Duration::from_secs(5)).code(), Some(0));
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_log_tells_what_was_loaded_changed_and_refused() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start_limited(dir.path(), 256);
+    let mut clients = server.connect().await;
+    let id = clients.put(&ball(1.0)).await;
+    clients.make_scene("room").await;
+    clients.scenes.create_scene(CreateSceneRequest { name: "room".into() }).await.expect_err("taken");
+    let log = Running::log(dir.path());
+    for word in [dir.path().to_str().expect("text"), "loading", &id, "scene created", "refused", "CreateScene"] {
+        assert!(log.contains(word), "no {word} in\n{log}");
     }
 }
 
