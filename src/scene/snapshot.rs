@@ -27,7 +27,8 @@ pub struct Scene {
     pub(super) name: Arc<str>,
     pub(super) revision: u64,
     pub(super) objects: BTreeMap<Arc<str>, Object>,
-    pub(super) allowed: BTreeSet<(Arc<str>, Arc<str>)>,
+    /// Shared with the snapshot before as long as no update changes it.
+    pub(super) allowed: Arc<BTreeSet<(Arc<str>, Arc<str>)>>,
 }
 
 /// Why a name is not usable.
@@ -67,7 +68,7 @@ impl Scene {
     /// When the name is not usable, see [`check_name`].
     pub fn new(name: &str, revision: u64) -> Result<Self, NameError> {
         check_name(name)?;
-        Ok(Self { name: name.into(), revision, objects: BTreeMap::new(), allowed: BTreeSet::new() })
+        Ok(Self { name: name.into(), revision, objects: BTreeMap::new(), allowed: Arc::default() })
     }
 
     /// A scene as it was stored. The caller vouches that the names are usable and that every allowed pair is made of two
@@ -79,7 +80,8 @@ impl Scene {
         allowed: impl IntoIterator<Item = (Arc<str>, Arc<str>)>,
     ) -> Self {
         let objects = objects.into_iter().map(|object| (object.name.clone(), object)).collect();
-        let allowed = allowed.into_iter().map(|(a, b)| ordered(a, b)).collect();
+        let allowed = allowed.into_iter().map(|(a, b)| ordered(a, b)).collect::<BTreeSet<_>>();
+        let allowed = Arc::new(allowed);
         Self { name, revision, objects, allowed }
     }
 
@@ -106,6 +108,11 @@ impl Scene {
     /// Pairs of object names that may touch, each with the smaller name first, in order.
     pub fn allowed_pairs(&self) -> impl ExactSizeIterator<Item = &(Arc<str>, Arc<str>)> {
         self.allowed.iter()
+    }
+
+    /// Whether the allowed pairs are untouched since `before`, an earlier snapshot of this scene. Takes no time.
+    pub fn same_allowed_pairs(&self, before: &Self) -> bool {
+        Arc::ptr_eq(&self.allowed, &before.allowed)
     }
 
     /// Whether two objects may touch; the order of the names does not matter.

@@ -186,8 +186,9 @@ impl Scene {
         for (at, name) in entries(List::Removals, &update.removals) {
             next.objects.remove(name).ok_or_else(|| SceneError::NoObject { at, name: name.clone() })?;
         }
-        if !update.removals.is_empty() {
-            next.allowed.retain(|(a, b)| next.objects.contains_key(a) && next.objects.contains_key(b));
+        let stays = |(a, b): &(Arc<str>, Arc<str>)| next.objects.contains_key(a) && next.objects.contains_key(b);
+        if !update.removals.is_empty() && !next.allowed.iter().all(stays) {
+            Arc::make_mut(&mut next.allowed).retain(stays);
         }
         for (at, (name, pose)) in entries(List::Poses, &update.poses) {
             let object = next.objects.get_mut(name).ok_or_else(|| SceneError::NoObject { at, name: name.clone() })?;
@@ -199,11 +200,15 @@ impl Scene {
         }
         for (at, (a, b)) in entries(List::Allow, &update.allow) {
             let pair = next.pair(at, a, b)?;
-            next.allowed.insert(pair);
+            if !next.allowed.contains(&pair) {
+                Arc::make_mut(&mut next.allowed).insert(pair);
+            }
         }
         for (at, (a, b)) in entries(List::Forbid, &update.forbid) {
             let pair = next.pair(at, a, b)?;
-            next.allowed.remove(&pair);
+            if next.allowed.contains(&pair) {
+                Arc::make_mut(&mut next.allowed).remove(&pair);
+            }
         }
         within("objects", next.objects.len(), MAX_OBJECTS)?;
         within("allowed pairs", next.allowed.len(), MAX_ALLOWED_PAIRS)?;
@@ -299,6 +304,17 @@ mod tests {
         assert_eq!(next.allowed_pairs().len(), 0);
         assert_eq!(scene.object("b").expect("b").pose, at(0.0));
         assert_eq!(scene.objects().len(), 2);
+    }
+
+    #[test]
+    fn allowed_pairs_are_shared_until_they_change() {
+        let (scene, _) = two();
+        let shares = |update: Update| scene.updated(&update, |_| None).expect("an update").same_allowed_pairs(&scene);
+        let d = Update::default;
+        assert!(shares(Update { poses: vec![("a".into(), at(1.0))], ..d() }));
+        assert!(shares(Update { allow: vec![("a".into(), "b".into())], ..d() }), "allowed before");
+        assert!(!shares(Update { forbid: vec![("a".into(), "b".into())], ..d() }));
+        assert!(!shares(Update { removals: vec!["a".into()], ..d() }));
     }
 
     #[test]

@@ -28,7 +28,14 @@ impl BodyService for Bodies {
         let id = wire::body_id(&request.get_ref().id, "id")?;
         let body =
             self.0.catalogue().await?.body(&id).ok_or_else(|| error::catalogue(&CatalogueError::NoBody(id), "id"))?;
-        let body_file_json = body.to_json().into_bytes().into();
+        // Up to a whole message: not a thing for a thread that serves connections.
+        let (body, body_file_json) = self
+            .0
+            .solve(move || {
+                let file = body.to_json().into_bytes().into();
+                (body, file)
+            })
+            .await?;
         Ok(Response::new(GetBodyResponse { body: Some(wire::summary(&body)), body_file_json }))
     }
 

@@ -3,6 +3,7 @@
 
 use std::collections::HashMap;
 use std::fmt;
+use std::time::Duration;
 
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt};
@@ -46,6 +47,12 @@ pub(super) fn not_found(kind: &str, name: &str, field: &str, why: impl fmt::Disp
 /// UNAVAILABLE: the client may try again.
 pub(super) fn unavailable(reason: &str, message: &str) -> Status {
     Status::with_error_details(Code::Unavailable, message, details(reason))
+}
+
+/// DEADLINE_EXCEEDED: a call that was too much, or whose message did not come.
+pub(super) fn too_slow(limit: Duration) -> Status {
+    let message = format!("the call was not read and answered within {} s; ask for less in one call", limit.as_secs());
+    Status::with_error_details(Code::DeadlineExceeded, message, details("CALL_TOO_LONG"))
 }
 
 /// INTERNAL for a task that panicked: a defect of this program.
@@ -122,7 +129,9 @@ fn store(error: &StoreError) -> Status {
     tracing::error!(%error, "the catalogue could not be written");
     let (code, reason) = match error {
         StoreError::Full { .. } => (Code::ResourceExhausted, "DISK_FULL"),
-        StoreError::Damaged { .. } | StoreError::Format { .. } => (Code::DataLoss, "CATALOGUE_DAMAGED"),
+        StoreError::Damaged { .. } | StoreError::Empty { .. } | StoreError::Format { .. } => {
+            (Code::DataLoss, "CATALOGUE_DAMAGED")
+        }
         StoreError::InUse { .. } | StoreError::Directory { .. } | StoreError::Disk { .. } => {
             (Code::Internal, "DISK_FAILED")
         }

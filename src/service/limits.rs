@@ -8,6 +8,9 @@ pub const MAX_MESSAGE_BYTES: usize = 4 << 20;
 /// Most results (pairs times measures) of one Evaluate.
 pub const MAX_EVALUATIONS: usize = 4096;
 
+/// Pairs an Evaluate solves before it lets other calls go first: some tens of milliseconds at worst.
+pub const PAIRS_AT_ONCE: usize = 32;
+
 /// Items of a page when the request does not say.
 pub const DEFAULT_PAGE: usize = 100;
 
@@ -20,11 +23,30 @@ pub const LOADING_PATIENCE: Duration = Duration::from_secs(10);
 /// How long open calls may go on after a stop was asked for. A second signal ends the wait.
 pub const DRAIN: Duration = Duration::from_secs(5);
 
-/// Concurrent calls of one connection.
-pub const MAX_STREAMS: u32 = 256;
+/// Concurrent calls of one connection; clients queue further ones.
+pub const MAX_STREAMS: u32 = 32;
+
+/// Concurrent calls of all connections together. Each may hold a message of [`MAX_MESSAGE_BYTES`] in both directions and
+/// what is made of it; further calls wait unread.
+pub const MAX_CALLS: usize = 64;
+
+/// Longest time from the start of a call behind the gate to its answer.
+pub const CALL_LIMIT: Duration = Duration::from_secs(120);
 
 /// Silence after which a connection is asked for a sign of life.
 pub const KEEPALIVE: Duration = Duration::from_secs(30);
 
 /// Time to give the sign of life before the connection is closed.
 pub const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Connections open at once; further ones queue in the system. Half of the 1024 file descriptors a process mostly has.
+pub const MAX_CONNECTIONS: usize = 512;
+
+/// How long a new connection may say nothing.
+pub const MUTE_PATIENCE: Duration = Duration::from_secs(10);
+
+/// The same while more than half of the places are taken.
+pub const MUTE_PATIENCE_CROWDED: Duration = Duration::from_secs(1);
+
+/// Pause after a connection could not be accepted.
+pub const ACCEPT_PAUSE: Duration = Duration::from_millis(100);

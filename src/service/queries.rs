@@ -1,8 +1,8 @@
 //! QueryService: snapshot, pairs, solver, answers.
 
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use tonic::{Request, Response, Status};
 
@@ -12,7 +12,7 @@ use crate::scene::Scene;
 use crate::store::CatalogueError;
 
 use super::error::{self, Invalid};
-use super::limits::MAX_EVALUATIONS;
+use super::limits::{MAX_EVALUATIONS, PAIRS_AT_ONCE};
 use super::proto::evaluate_result::Outcome;
 use super::proto::query_service_server::QueryService;
 use super::proto::{EvaluateRequest, EvaluateResponse, EvaluateResult, Measure};
@@ -51,22 +51,19 @@ impl QueryService for Queries {
             .await?
             .scene(&request.scene)
             .ok_or_else(|| error::catalogue(&CatalogueError::NoScene(request.scene.clone()), "scene"))?;
-        let pairs = resolve(&request, &scene, &overrides)?;
+        let pairs: Arc<[_]> = resolve(&request, &scene, &overrides)?.into();
+        let measures: Arc<[_]> = measures.into();
         let revision = scene.revision();
 
-        let stop = StopOnDrop(Arc::default());
-        let stopped = stop.0.clone();
-        let results = self.0.solve(move || evaluate(&pairs, &measures, accuracy, revision, &stopped)).await?;
+        // Every share queues anew behind the calls that came meanwhile, so a long call does not hold up short ones; and
+        // when the client goes away this handler is dropped and no further share is begun.
+        let mut results = Vec::with_capacity(count);
+        for from in (0..pairs.len()).step_by(PAIRS_AT_ONCE) {
+            let (pairs, measures) = (pairs.clone(), measures.clone());
+            let share = from..(from + PAIRS_AT_ONCE).min(pairs.len());
+            results.extend(self.0.solve(move || evaluate(&pairs, share, &measures, accuracy, revision)).await?);
+        }
         Ok(Response::new(EvaluateResponse { results }))
-    }
-}
-
-/// Set when the handler is dropped because its client went away: then nobody wants the rest.
-struct StopOnDrop(Arc<AtomicBool>);
-
-impl Drop for StopOnDrop {
-    fn drop(&mut self) {
-        self.0.store(true, Ordering::Relaxed);
     }
 }
 
@@ -98,19 +95,17 @@ fn resolve(
     Ok(pairs)
 }
 
-/// Solves cold, pair by pair, so that an answer depends on nothing but its own pair.
+/// Solves a share of the pairs cold, one by one, so that an answer depends on nothing but its own pair.
 fn evaluate(
     pairs: &[(Placed, Placed)],
+    share: Range<usize>,
     measures: &[Measure],
     accuracy: Accuracy,
     scene_revision: u64,
-    stopped: &AtomicBool,
 ) -> Vec<EvaluateResult> {
-    let mut results = Vec::with_capacity(pairs.len() * measures.len());
-    for (index, (a, b)) in pairs.iter().enumerate() {
-        if stopped.load(Ordering::Relaxed) {
-            break;
-        }
+    let mut results = Vec::with_capacity(share.len() * measures.len());
+    for index in share {
+        let (a, b) = &pairs[index];
         for &measure in measures {
             let outcome = one(a, b, measure, accuracy);
             results.push(EvaluateResult { pair_index: wire::count(index), scene_revision, outcome });

@@ -15,7 +15,7 @@ use super::limits::LOADING_PATIENCE;
 #[derive(Debug, Clone)]
 pub(super) struct Ready {
     catalogue: watch::Receiver<Option<Arc<Catalogue>>>,
-    /// One query per core: more at once would only wait for each other and hold memory.
+    /// One share of a query per core; who waits is let in in turn.
     solving: Arc<Semaphore>,
     /// Half the cores at most re-prove new bodies, which takes long; queries go on beside it.
     proving: Arc<Semaphore>,
@@ -55,7 +55,7 @@ impl Ready {
         on_thread(&self.changing, move || change(&catalogue)).await?.map_err(|error| error::catalogue(&error, field))
     }
 
-    /// Answers a query.
+    /// Answers a share of a query, or writes a large answer; keep it short, for others wait in turn.
     pub(super) async fn solve<T: Send + 'static>(
         &self,
         solve: impl FnOnce() -> T + Send + 'static,

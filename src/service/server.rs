@@ -9,13 +9,15 @@ use std::sync::Arc;
 use tokio::net::TcpListener;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::{oneshot, watch};
-use tonic::transport::server::{Router, TcpIncoming};
+use tonic::transport::server::Router;
 use tonic_health::ServingStatus;
 use tonic_health::server::HealthReporter;
 
 use crate::store::{Catalogue, Store, StoreError};
 
 use super::bodies::Bodies;
+use super::gate::Gate;
+use super::incoming::Incoming;
 use super::limits::{DRAIN, KEEPALIVE, KEEPALIVE_TIMEOUT, MAX_MESSAGE_BYTES, MAX_STREAMS};
 use super::proto::FILE_DESCRIPTOR_SET;
 use super::proto::body_service_server::{self, BodyServiceServer};
@@ -65,7 +67,7 @@ pub enum ServeError {
 /// A server that listens and holds the lock of its catalogue, but does not answer yet.
 #[derive(Debug)]
 pub struct Server {
-    incoming: TcpIncoming,
+    listener: TcpListener,
     addr: SocketAddr,
     store: Store,
 }
@@ -86,9 +88,7 @@ impl Server {
         let store = tokio::task::spawn_blocking(move || Store::open(&data))
             .await
             .map_err(|error| ServeError::Defect(error.to_string()))??;
-        // Set here, since tonic's own setting is ignored for listeners it did not make.
-        let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
-        Ok(Self { incoming, addr, store })
+        Ok(Self { listener, addr, store })
     }
 
     /// Where it listens; the port that was found when port 0 was asked for.
@@ -117,7 +117,7 @@ impl Server {
         });
 
         let (draining, drain) = oneshot::channel();
-        let serving = router.serve_with_incoming_shutdown(self.incoming, async {
+        let serving = router.serve_with_incoming_shutdown(Incoming::new(self.listener), async {
             let _ = drain.await;
         });
         tokio::pin!(serving);
@@ -145,8 +145,10 @@ impl Server {
 /// # Errors
 /// See [`Server::bind`] and [`Server::run`].
 pub async fn serve(options: ServeOptions) -> Result<(), ServeError> {
-    let mut terminate = signal(SignalKind::terminate())?;
-    let data = options.data.clone();
+    // Both before the first line on standard output: who has read it may send a signal.
+    let mut signals = Signals::new()?;
+    // What a relative path means is not in the log otherwise.
+    let data = std::path::absolute(&options.data)?;
     let server = Server::bind(options).await?;
     let mut stdout = io::stdout();
     writeln!(stdout, "listening on {}", server.local_addr())?;
@@ -160,21 +162,33 @@ pub async fn serve(options: ServeOptions) -> Result<(), ServeError> {
     tokio::pin!(running);
     tokio::select! {
         result = &mut running => return result,
-        name = stop_signal(&mut terminate) => tracing::info!("{name}: stopping"),
+        name = signals.next() => tracing::info!("{name}: stopping"),
     }
     let _ = stopping.send(());
     tokio::select! {
         result = running => result?,
-        name = stop_signal(&mut terminate) => tracing::warn!("{name} again: open connections are cut"),
+        name = signals.next() => tracing::warn!("{name} again: open connections are cut"),
     }
     tracing::info!("stopped");
     Ok(())
 }
 
-async fn stop_signal(terminate: &mut Signal) -> &'static str {
-    tokio::select! {
-        _ = terminate.recv() => "SIGTERM",
-        _ = tokio::signal::ctrl_c() => "Ctrl-C",
+/// The two signals that ask for a stop, caught from the moment this is made.
+struct Signals {
+    terminate: Signal,
+    interrupt: Signal,
+}
+
+impl Signals {
+    fn new() -> io::Result<Self> {
+        Ok(Self { terminate: signal(SignalKind::terminate())?, interrupt: signal(SignalKind::interrupt())? })
+    }
+
+    async fn next(&mut self) -> &'static str {
+        tokio::select! {
+            _ = self.terminate.recv() => "SIGTERM",
+            _ = self.interrupt.recv() => "Ctrl-C",
+        }
     }
 }
 
@@ -184,7 +198,7 @@ fn router(ready: Ready) -> Router {
             .register_encoded_file_descriptor_set(FILE_DESCRIPTOR_SET)
             .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
     };
-    let sized = MAX_MESSAGE_BYTES;
+    let (sized, gate) = (MAX_MESSAGE_BYTES, Gate::new());
     let bodies = BodyServiceServer::new(Bodies(ready.clone()));
     let scenes = SceneServiceServer::new(Scenes(ready.clone()));
     let queries = QueryServiceServer::new(Queries(ready));
@@ -192,9 +206,9 @@ fn router(ready: Ready) -> Router {
         .max_concurrent_streams(MAX_STREAMS)
         .http2_keepalive_interval(Some(KEEPALIVE))
         .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
-        .add_service(bodies.max_decoding_message_size(sized).max_encoding_message_size(sized))
-        .add_service(scenes.max_decoding_message_size(sized).max_encoding_message_size(sized))
-        .add_service(queries.max_decoding_message_size(sized).max_encoding_message_size(sized))
+        .add_service(gate.before(bodies.max_decoding_message_size(sized).max_encoding_message_size(sized)))
+        .add_service(gate.before(scenes.max_decoding_message_size(sized).max_encoding_message_size(sized)))
+        .add_service(gate.before(queries.max_decoding_message_size(sized).max_encoding_message_size(sized)))
         // Older clients know v1alpha only. The descriptors are compiled in, so they are read or a test fails.
         .add_optional_service(reflection().build_v1().ok())
         .add_optional_service(reflection().build_v1alpha().ok())

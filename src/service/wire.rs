@@ -179,7 +179,7 @@ pub(super) fn scene(scene: &Scene) -> proto::Scene {
 
 pub(super) fn distance(found: &Distance) -> proto::DistanceResult {
     proto::DistanceResult {
-        status: status(found.status).into(),
+        status: status(found.status, found.lower, found.upper).into(),
         value_m: found.value(),
         lower_m: found.lower,
         upper_m: found.upper,
@@ -192,7 +192,7 @@ pub(super) fn distance(found: &Distance) -> proto::DistanceResult {
 
 pub(super) fn level_distance(found: &LevelDistance) -> proto::LevelDistanceResult {
     proto::LevelDistanceResult {
-        status: status(found.status).into(),
+        status: status(found.status, found.lower, found.upper).into(),
         value: found.value(),
         lower: found.lower,
         upper: found.upper,
@@ -201,10 +201,11 @@ pub(super) fn level_distance(found: &LevelDistance) -> proto::LevelDistanceResul
     }
 }
 
-fn status(status: Status) -> proto::SolveStatus {
+/// A bracket without an end is never narrow enough, as `proto/` promises.
+fn status(status: Status, lower: f64, upper: f64) -> proto::SolveStatus {
     match status {
-        Status::Converged => proto::SolveStatus::Converged,
-        Status::BracketWide => proto::SolveStatus::BracketWide,
+        Status::Converged if lower.is_finite() && upper.is_finite() => proto::SolveStatus::Converged,
+        Status::Converged | Status::BracketWide => proto::SolveStatus::BracketWide,
     }
 }
 
@@ -222,4 +223,26 @@ fn vector(v: &Vector3<f64>) -> proto::Vector3 {
 
 pub(super) fn count(count: usize) -> u32 {
     u32::try_from(count).unwrap_or(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bracket_without_an_end_has_not_converged() {
+        let (converged, wide) = (proto::SolveStatus::Converged, proto::SolveStatus::BracketWide);
+        for (lower, upper, says) in [
+            (1.0, 1.0, converged),
+            (f64::NEG_INFINITY, 1.0, wide),
+            (1.0, f64::INFINITY, wide),
+            (f64::NAN, f64::NAN, wide),
+        ] {
+            let (witness, iterations) = (Vector3::zeros(), 1);
+            let found = LevelDistance { status: Status::Converged, lower, upper, witness, iterations };
+            let sent = level_distance(&found);
+            assert_eq!(sent.status(), says);
+            assert_eq!((sent.lower.to_bits(), sent.upper.to_bits()), (lower.to_bits(), upper.to_bits()));
+        }
+    }
 }

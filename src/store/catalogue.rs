@@ -11,7 +11,7 @@ use crate::body::{Body, BodyId};
 use crate::scene::{NameError, Object, Scene, SceneError, Update, check_name};
 
 use super::disk::Contents;
-use super::rows::{BODIES, META, OBJECTS, ObjectRow, SCENES, SceneRow};
+use super::rows::{BODIES, META, OBJECTS, ObjectRow, REVISIONS, SCENES, SceneRow};
 use super::{Store, StoreError};
 
 /// The catalogue of one server. Reading takes a lock for the time of a map look-up; changes are made one after the other,
@@ -116,6 +116,7 @@ impl Catalogue {
         })?;
         let body = Arc::new(body);
         self.write(|state| state.bodies.insert(*body.id(), body.clone()));
+        tracing::debug!(id = %body.id(), "body created");
         Ok((body, true))
     }
 
@@ -144,6 +145,7 @@ impl Catalogue {
             Ok(())
         })?;
         self.write(|state| state.bodies.remove(id));
+        tracing::debug!(%id, "body deleted");
         Ok(())
     }
 
@@ -161,6 +163,7 @@ impl Catalogue {
         let scene = Arc::new(Scene::new(name, floor + 1)?);
         self.commit(&mut store, |transaction| put_scene(transaction, &scene))?;
         self.write(|state| state.scenes.insert(scene.name().clone(), scene.clone()));
+        tracing::debug!(scene = name, revision = scene.revision(), "scene created");
         Ok(scene)
     }
 
@@ -176,7 +179,11 @@ impl Catalogue {
             return Ok(next);
         }
         self.commit(&mut store, |transaction| {
-            put_scene(transaction, &next)?;
+            if next.same_allowed_pairs(&scene) {
+                put_revision(transaction, &next)?;
+            } else {
+                put_scene(transaction, &next)?;
+            }
             let mut objects = transaction.open_table(OBJECTS)?;
             for removed in &update.removals {
                 objects.remove((name, &**removed))?;
@@ -187,6 +194,7 @@ impl Catalogue {
             Ok(())
         })?;
         self.write(|state| state.scenes.insert(next.name().clone(), next.clone()));
+        tracing::debug!(scene = name, revision = next.revision(), "scene updated");
         Ok(next)
     }
 
@@ -201,6 +209,7 @@ impl Catalogue {
         self.commit(&mut store, |transaction| {
             transaction.open_table(META)?.insert("revision_floor", floor)?;
             transaction.open_table(SCENES)?.remove(name)?;
+            transaction.open_table(REVISIONS)?.remove(name)?;
             let mut objects = transaction.open_table(OBJECTS)?;
             for object in scene.objects() {
                 objects.remove((name, &*object.name))?;
@@ -211,6 +220,7 @@ impl Catalogue {
             state.revision_floor = floor;
             state.scenes.remove(name)
         });
+        tracing::debug!(scene = name, revision = scene.revision(), "scene deleted");
         Ok(())
     }
 
@@ -229,8 +239,10 @@ impl Catalogue {
         write: impl FnOnce(&WriteTransaction) -> Result<(), redb::Error>,
     ) -> Result<(), StoreError> {
         store.commit(write).inspect_err(|_| {
-            // Should this fail too, the next change tries again.
-            let _ = self.reread(store);
+            // The next change tries again; until then nothing can be changed, and somebody should know.
+            if let Err(error) = self.reread(store) {
+                tracing::error!(%error, "the catalogue can not be read back after a failed change; changes are refused");
+            }
         })
     }
 
@@ -259,6 +271,11 @@ impl State {
     fn read(store: &Store, known: &BTreeMap<BodyId, Arc<Body>>) -> Result<Self, StoreError> {
         let damaged = |what: String| StoreError::damaged(store.dir(), what);
         let Contents { bodies, scenes, objects, revision_floor } = store.read()?;
+        tracing::info!(
+            bodies = bodies.len(),
+            scenes = scenes.len(),
+            "loading; every body that is not known is re-proven"
+        );
         let bodies: BTreeMap<_, _> =
             prove(&bodies, known).map_err(damaged)?.into_iter().map(|body| (*body.id(), body)).collect();
         let ids: HashMap<String, &Arc<Body>> = bodies.iter().map(|(id, body)| (id.to_string(), body)).collect();
@@ -323,6 +340,11 @@ fn prove(files: &[(String, String)], known: &BTreeMap<BodyId, Arc<Body>>) -> Res
 
 fn put_scene(transaction: &WriteTransaction, scene: &Scene) -> Result<(), redb::Error> {
     transaction.open_table(SCENES)?.insert(&**scene.name(), json(&SceneRow::of(scene))?.as_slice())?;
+    put_revision(transaction, scene)
+}
+
+fn put_revision(transaction: &WriteTransaction, scene: &Scene) -> Result<(), redb::Error> {
+    transaction.open_table(REVISIONS)?.insert(&**scene.name(), scene.revision())?;
     Ok(())
 }
 

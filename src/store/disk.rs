@@ -2,13 +2,14 @@
 
 use std::fmt;
 use std::fs::{self, File};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use redb::{Database, DatabaseError, Durability, ReadableDatabase, ReadableTable, TableHandle, WriteTransaction};
 use serde::de::DeserializeOwned;
 
 use super::StoreError;
-use super::rows::{BODIES, FORMAT, META, OBJECTS, ObjectRow, SCENES, SceneRow};
+use super::rows::{BODIES, FORMAT, FORMAT_1, META, OBJECTS, ObjectRow, REVISIONS, SCENES, SceneRow};
 
 /// The catalogue's file, locked by this process. Hand it to [`super::Catalogue::load`].
 pub struct Store {
@@ -38,8 +39,15 @@ impl Store {
         let unusable = |source| StoreError::Directory { dir: dir.into(), source };
         fs::create_dir_all(dir).map_err(unusable)?;
         let file = dir.join("catalogue.redb");
-        let fresh = !file.exists();
-        let store = Self::open_with(dir, Box::new(move || Database::create(&file)))?;
+        let fresh = match fs::metadata(&file) {
+            // redb would make a new database of it, and whatever was in it would be forgotten without a word.
+            Ok(found) if found.len() == 0 => return Err(StoreError::Empty { file }),
+            Ok(_) => false,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => true,
+            Err(error) => return Err(unusable(error)),
+        };
+        let first = if fresh { Database::create(&file) } else { Database::open(&file) };
+        let store = Self::open_with(dir, first, Box::new(move || Database::open(&file)))?;
         if fresh {
             // A synced file is of no use when its directory entry is lost.
             File::open(dir).and_then(|dir| dir.sync_all()).map_err(unusable)?;
@@ -51,9 +59,16 @@ impl Store {
         Ok(store)
     }
 
-    pub(super) fn open_with(dir: &Path, opener: Opener) -> Result<Self, StoreError> {
+    /// `first` is opened now; `opener` opens what is there, and never makes anything new, after a failed commit.
+    pub(super) fn open_with(
+        dir: &Path,
+        first: Result<Database, DatabaseError>,
+        opener: Opener,
+    ) -> Result<Self, StoreError> {
         let mut store = Self { dir: dir.into(), opener, database: None };
-        store.reopen()?;
+        let database = store.opened(first)?;
+        store.check_format(&database)?;
+        store.database = Some(database);
         Ok(store)
     }
 
@@ -65,38 +80,55 @@ impl Store {
         self.database.is_none()
     }
 
-    /// Opens the file again after a failed commit.
+    /// Opens the file again after a failed commit. One that lacks its tables is not the one that was open.
     pub(super) fn reopen(&mut self) -> Result<(), StoreError> {
         self.database = None;
-        let database = match (self.opener)() {
-            Ok(database) => database,
-            Err(DatabaseError::UpgradeRequired(found)) => {
-                return Err(StoreError::damaged(&self.dir, format!("it is a redb file of the old version {found}")));
-            }
-            Err(error) => return Err(StoreError::from_redb(&self.dir, error)),
-        };
-        self.check_format(&database)?;
-        self.database = Some(database);
+        let database = self.opened((self.opener)())?;
+        match self.format(&database)?.1 {
+            Some(FORMAT) => self.database = Some(database),
+            _ => return Err(StoreError::damaged(&self.dir, "the file was replaced while it was in use")),
+        }
         Ok(())
     }
 
-    /// Checks the format of the tables, or makes them in a new file.
-    fn check_format(&self, database: &Database) -> Result<(), StoreError> {
-        let (tables, found) = (|| {
+    fn opened(&self, result: Result<Database, DatabaseError>) -> Result<Database, StoreError> {
+        result.map_err(|error| match error {
+            DatabaseError::UpgradeRequired(found) => {
+                StoreError::damaged(&self.dir, format!("it is a redb file of the old version {found}"))
+            }
+            error => StoreError::from_redb(&self.dir, error),
+        })
+    }
+
+    /// Whether there are tables at all, and the format they say they have.
+    fn format(&self, database: &Database) -> Result<(bool, Option<u64>), StoreError> {
+        (|| {
             let read = database.begin_read()?;
             let tables = read.list_tables()?.map(|table| table.name().to_owned()).collect::<Vec<_>>();
             let known = tables.iter().any(|name| name == META.name());
             let found = if known { read.open_table(META)?.get("format")?.map(|value| value.value()) } else { None };
-            Ok::<_, redb::Error>((tables, found))
+            Ok::<_, redb::Error>((!tables.is_empty(), found))
         })()
-        .map_err(|error| StoreError::from_redb(&self.dir, error))?;
+        .map_err(|error| StoreError::from_redb(&self.dir, error))
+    }
+
+    /// Checks the format of the tables, makes them in a new file, or takes over those of the format before.
+    fn check_format(&self, database: &Database) -> Result<(), StoreError> {
+        let (tables, found) = self.format(database)?;
         match found {
             Some(FORMAT) => Ok(()),
+            Some(FORMAT_1) => commit(database, |transaction| {
+                transaction.open_table(REVISIONS)?;
+                transaction.open_table(META)?.insert("format", FORMAT)?;
+                Ok(())
+            })
+            .map_err(|error| StoreError::from_redb(&self.dir, error)),
             Some(found) => Err(StoreError::Format { dir: self.dir.clone(), found, expected: FORMAT }),
-            None if tables.is_empty() => commit(database, |transaction| {
+            None if !tables => commit(database, |transaction| {
                 transaction.open_table(META)?.insert("format", FORMAT)?;
                 transaction.open_table(BODIES)?;
                 transaction.open_table(SCENES)?;
+                transaction.open_table(REVISIONS)?;
                 transaction.open_table(OBJECTS)?;
                 Ok(())
             })
@@ -142,10 +174,14 @@ impl Store {
                 .map_err(|error| ReadError::Row(format!("body {id} is no text: {error}")))?;
             contents.bodies.push((id, file));
         }
+        let revisions = read.open_table(REVISIONS)?;
         for entry in read.open_table(SCENES)?.iter()? {
             let (name, row) = entry?;
             let name = name.value().to_owned();
-            let row = parse(row.value(), || format!("scene \"{name}\""))?;
+            let mut row: SceneRow = parse(row.value(), || format!("scene \"{name}\""))?;
+            if let Some(revision) = revisions.get(name.as_str())? {
+                row.revision = revision.value();
+            }
             contents.scenes.push((name, row));
         }
         for entry in read.open_table(OBJECTS)?.iter()? {

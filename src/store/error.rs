@@ -39,6 +39,15 @@ pub enum StoreError {
         /// What this program reads and writes.
         expected: u64,
     },
+    /// The file is there and holds nothing: it was cut, or the first start did not get far.
+    #[error(
+        "{} is empty; restore it from a backup, or remove it to start with an empty catalogue",
+        .file.display()
+    )]
+    Empty {
+        /// The catalogue's file.
+        file: PathBuf,
+    },
     /// The file holds something this program did not write.
     #[error(
         "the catalogue in {} is damaged: {what}; restore catalogue.redb from a backup or use another directory",
@@ -84,6 +93,9 @@ impl StoreError {
                 io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
                     Self::Damaged { dir, what: source.to_string() }
                 }
+                io::ErrorKind::NotFound | io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+                    Self::Directory { dir, source }
+                }
                 _ => Self::Disk { dir, source: Box::new(redb::Error::Io(source)) },
             },
             error @ (redb::Error::Corrupted(_)
@@ -92,6 +104,27 @@ impl StoreError {
             | redb::Error::TableIsNotMultimap(_)
             | redb::Error::TypeDefinitionChanged { .. }) => Self::Damaged { dir, what: error.to_string() },
             error => Self::Disk { dir, source: Box::new(error) },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_failure_of_the_system_has_its_remedy() {
+        use io::ErrorKind;
+        for (kind, remedy) in [
+            (ErrorKind::PermissionDenied, "permissions"),
+            (ErrorKind::ReadOnlyFilesystem, "permissions"),
+            (ErrorKind::NotFound, "check the path"),
+            (ErrorKind::StorageFull, "free some"),
+            (ErrorKind::UnexpectedEof, "backup"),
+            (ErrorKind::Other, "check the disk"),
+        ] {
+            let error = StoreError::from_redb(Path::new("data"), redb::Error::Io(kind.into())).to_string();
+            assert!(error.contains(remedy) && error.contains("data"), "{kind}: {error}");
         }
     }
 }

@@ -17,6 +17,8 @@
 //!   database is opened again and read back, since a failed sync leaves open which root is on disk; memory then says
 //!   what the disk says. Reading goes on meanwhile, and the next change tries again.
 //! * **The first start:** the directory entry of the new file is synced too.
+//! * **The file is gone or another one** when it is opened again: changes are refused until it is back. Nothing is made
+//!   anew but on a start that finds no file at all; one that finds an empty file is refused.
 //!
 //! Memory is thus never ahead of the disk, and a revision that was seen is never given out again: a scene's revision is
 //! part of every commit that changes it, and deleting a scene raises the floor from which later scenes start.

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 use nalgebra::Vector3;
 use redb::{Database, StorageBackend};
 
-use super::rows::{BODIES, META, OBJECTS, SCENES};
+use super::rows::{BODIES, META, OBJECTS, REVISIONS, SCENES};
 use super::{Catalogue, CatalogueError, Store, StoreError};
 use crate::body::Body;
 use crate::measure::Pose;
@@ -36,7 +36,7 @@ impl Disk {
     fn open(&self) -> Result<Store, StoreError> {
         let disk = self.clone();
         let open = move || Database::builder().create_with_backend(disk.clone());
-        Store::open_with(Path::new("disk"), Box::new(open))
+        Store::open_with(Path::new("disk"), open(), Box::new(open))
     }
 
     fn load(&self) -> Result<Catalogue, StoreError> {
@@ -191,6 +191,53 @@ fn what_it_did_not_write_is_refused_by_name() {
         let error = disk.load().expect_err(word).to_string();
         assert!(error.contains(word) && error.contains("disk"), "{error}");
     }
+}
+
+/// Were a new file made, the scenes would be gone from memory too and their revisions given out again.
+#[test]
+fn a_file_that_went_away_is_not_made_anew() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (file, aside) = (dir.path().join("catalogue.redb"), dir.path().join("aside.redb"));
+    let mut store = Store::open(dir.path()).expect("a new catalogue");
+    std::fs::rename(&file, &aside).expect("moved");
+    let gone = store.reopen().expect_err("gone").to_string();
+    assert!(!file.exists() && store.is_closed(), "{gone}");
+    drop(redb::Database::create(&file).expect("another database"));
+    assert!(store.reopen().expect_err("another one").to_string().contains("replaced"));
+    std::fs::rename(&aside, &file).expect("moved back");
+    store.reopen().expect("there again");
+}
+
+#[test]
+fn an_empty_file_is_not_taken_for_a_new_catalogue() {
+    let dir = tempfile::tempdir().expect("a directory");
+    std::fs::write(dir.path().join("catalogue.redb"), "").expect("written");
+    let error = Store::open(dir.path()).expect_err("empty").to_string();
+    assert!(error.contains("catalogue.redb is empty"), "{error}");
+    assert_eq!(std::fs::metadata(dir.path().join("catalogue.redb")).expect("still there").len(), 0);
+}
+
+/// A catalogue of format 1 is taken over with its revisions; a new pose then leaves the scene's row alone.
+#[test]
+fn revisions_lie_apart_from_the_allowed_pairs() {
+    let disk = Disk::default();
+    drop(furnished(&disk));
+    disk.meddle(|t| {
+        drop(t.delete_table(REVISIONS));
+        drop(t.open_table(META).expect("a table").insert("format", 1));
+        let row = br#"{"revision":41,"allowed":[]}"#;
+        drop(t.open_table(SCENES).expect("a table").insert("room", &row[..]));
+    });
+    let catalogue = disk.load().expect("taken over");
+    assert_eq!(catalogue.scene("room").expect("there").revision(), 41);
+    assert_eq!(catalogue.update_scene("room", &moved(1.0)).expect("moved").revision(), 42);
+    drop(catalogue);
+    disk.meddle(|t| {
+        let table = t.open_table(SCENES).expect("a table");
+        let row = redb::ReadableTable::get(&table, "room").expect("read").expect("a row").value().to_vec();
+        assert_eq!(row, br#"{"revision":41,"allowed":[]}"#);
+    });
+    assert_eq!(disk.load().expect("loads").scene("room").expect("there").revision(), 42);
 }
 
 #[test]

@@ -36,7 +36,41 @@ pub(crate) fn command(dir: &Path) -> Command {
 
 impl Running {
     pub(crate) fn start(dir: &Path) -> Self {
-        let mut child = command(dir).spawn().expect("the server starts");
+        Self::spawn(command(dir))
+    }
+
+    /// With so few file descriptors, and all it logs in a file in the directory.
+    pub(crate) fn start_limited(dir: &Path, descriptors: u32) -> Self {
+        let mut limited = Command::new("sh");
+        limited.args(["-c", &format!("ulimit -n {descriptors}; exec \"$0\" \"$@\"")]);
+        limited.arg(env!("CARGO_BIN_EXE_sublevel")).args(["serve", "--listen", "127.0.0.1:0", "--data"]).arg(dir);
+        let log = std::fs::File::create(dir.join("log")).expect("a log");
+        limited.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(log).env("RUST_LOG", "sublevel=debug");
+        Self::spawn(limited)
+    }
+
+    /// What a server that was started with a log has said.
+    pub(crate) fn log(dir: &Path) -> String {
+        std::fs::read_to_string(dir.join("log")).expect("a log")
+    }
+
+    /// Most memory it ever held.
+    pub(crate) fn peak_memory_mib(&self) -> u64 {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).expect("it runs");
+        let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).expect("a peak");
+        peak.trim().trim_end_matches(" kB").parse::<u64>().expect("a number") / 1024
+    }
+
+    /// Seconds of work it has done on all cores.
+    pub(crate) fn cpu(&self) -> f64 {
+        let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.child.id())).expect("it runs");
+        let fields: Vec<_> = stat.rsplit(')').next().expect("fields").split_whitespace().collect();
+        // User and system time in ticks, a hundred a second.
+        fields[11..13].iter().map(|ticks| ticks.parse::<f64>().expect("a number")).sum::<f64>() / 100.0
+    }
+
+    fn spawn(mut command: Command) -> Self {
+        let mut child = command.spawn().expect("the server starts");
         let mut line = String::new();
         let stdout = child.stdout.as_mut().expect("stdout is piped");
         BufReader::new(stdout).read_line(&mut line).expect("a first line");
@@ -72,8 +106,17 @@ impl Running {
 
     /// SIGTERM.
     pub(crate) fn terminate(&self) {
+        self.signal("-TERM");
+    }
+
+    /// SIGINT, as Ctrl-C sends it.
+    pub(crate) fn interrupt(&self) {
+        self.signal("-INT");
+    }
+
+    fn signal(&self, name: &str) {
         let pid = self.child.id().to_string();
-        assert!(Command::new("kill").args(["-TERM", &pid]).status().expect("kill runs").success());
+        assert!(Command::new("kill").args([name, &pid]).status().expect("kill runs").success());
     }
 
     /// Waits for the end, at most so long.

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use sublevel::body::Body;
-use sublevel::service::proto::ListBodiesRequest;
+use sublevel::service::proto::{CreateSceneRequest, ListBodiesRequest};
 use tonic_health::pb::health_client::HealthClient;
 use tonic_health::pb::{HealthCheckRequest, health_check_response::ServingStatus};
 use tonic_reflection::pb::v1::server_reflection_client::ServerReflectionClient;
@@ -103,6 +103,31 @@ async fn idle_connections_do_not_hold_up_the_stop() {
     }
 }
 
+/// As soon as the first line is out, both signals mean an orderly stop.
+#[test]
+fn the_first_line_promises_an_orderly_stop() {
+    for _ in 0..20 {
+        let dir = tempfile::tempdir().expect("a directory");
+        let mut server = Running::start(dir.path());
+        server.interrupt();
+        assert_eq!(server.wait(Duration::from_secs(5)).code(), Some(0));
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_log_tells_what_was_loaded_changed_and_refused() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start_limited(dir.path(), 256);
+    let mut clients = server.connect().await;
+    let id = clients.put(&ball(1.0)).await;
+    clients.make_scene("room").await;
+    clients.scenes.create_scene(CreateSceneRequest { name: "room".into() }).await.expect_err("taken");
+    let log = Running::log(dir.path());
+    for word in [dir.path().to_str().expect("text"), "loading", &id, "scene created", "refused", "CreateScene"] {
+        assert!(log.contains(word), "no {word} in\n{log}");
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn reflection_lists_the_services() {
     let dir = tempfile::tempdir().expect("a directory");
@@ -146,7 +171,11 @@ async fn push_stores_files_and_says_what_went_wrong() {
     std::fs::write(&changed, ball(1.0).to_json().replacen("ball", "b\\u0000", 1)).expect("written");
     let free = std::net::TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("an address");
     let nobody = format!("http://{free}");
+    let large = dir.path().join("large.json");
+    std::fs::write(&large, " ".repeat((4 << 20) + 1)).expect("written");
     for (args, word) in [
+        (["push", large.to_str().expect("text"), "--server", &url], "4194305 bytes"),
+        (["push", "missing.json", "--server", &url], "check the path"),
         (["push", changed.to_str().expect("text"), "--server", &url], "changed.json"),
         (["push", "missing.json", "--server", &url], "missing.json"),
         (["push", file, "--server", &nobody], "sublevel serve"),
@@ -156,5 +185,6 @@ async fn push_stores_files_and_says_what_went_wrong() {
         let stderr = String::from_utf8_lossy(&refused.stderr);
         assert!(!refused.status.success() && refused.stdout.is_empty());
         assert!(stderr.contains(word) && stderr.trim_end().lines().count() == 1, "{stderr}");
+        assert!(stderr.matches("sublevel fit").count() <= 1 && stderr.matches("; ").count() <= 1, "{stderr}");
     }
 }

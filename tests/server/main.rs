@@ -3,4 +3,5 @@
 mod harness;
 mod keeping;
 mod lifecycle;
+mod load;
 mod refusals;

@@ -1,0 +1,72 @@
+//! One gate before all calls of the three services: what is behind it holds messages in memory, what is before it does not.
+//!
+//! A call that waits here has not been read: HTTP/2's flow control keeps its message with the client. Health and
+//! reflection do not pass the gate, so they are answered however many calls wait.
+
+use std::convert::Infallible;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+
+use tokio::sync::Semaphore;
+use tonic::Status;
+use tonic::body::Body;
+use tonic::codegen::{BoxFuture, Service, http};
+use tonic::server::NamedService;
+
+use super::error;
+use super::limits::{CALL_LIMIT, MAX_CALLS};
+
+/// Makes services share one gate.
+#[derive(Debug, Clone)]
+pub(super) struct Gate(Arc<Semaphore>);
+
+/// A service behind the gate.
+#[derive(Debug, Clone)]
+pub(super) struct Gated<S> {
+    inner: S,
+    gate: Gate,
+}
+
+impl Gate {
+    pub(super) fn new() -> Self {
+        Self(Arc::new(Semaphore::new(MAX_CALLS)))
+    }
+
+    pub(super) fn before<S>(&self, inner: S) -> Gated<S> {
+        Gated { inner, gate: self.clone() }
+    }
+}
+
+impl<S: NamedService> NamedService for Gated<S> {
+    const NAME: &'static str = S::NAME;
+}
+
+impl<S> Service<http::Request<Body>> for Gated<S>
+where
+    S: Service<http::Request<Body>, Response = http::Response<Body>, Error = Infallible> + Clone + Send + 'static,
+    S::Future: Send,
+{
+    type Response = http::Response<Body>;
+    type Error = Infallible;
+    type Future = BoxFuture<Self::Response, Infallible>;
+
+    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
+        self.inner.poll_ready(context)
+    }
+
+    fn call(&mut self, request: http::Request<Body>) -> Self::Future {
+        // Generated services are always ready, so the clone is as ready as the original.
+        let (mut inner, gate) = (self.inner.clone(), self.gate.0.clone());
+        Box::pin(async move {
+            let _permit = gate.acquire_owned().await;
+            let path = request.uri().path().to_owned();
+            // A message that never comes to its end would keep its place for ever.
+            let answer = tokio::time::timeout(CALL_LIMIT, inner.call(request)).await;
+            let response = answer.unwrap_or_else(|_| Ok(error::too_slow(CALL_LIMIT).into_http()))?;
+            if let Some(status) = Status::from_header_map(response.headers()) {
+                tracing::debug!(call = path, code = ?status.code(), why = status.message(), "refused");
+            }
+            Ok(response)
+        })
+    }
+}
