@@ -116,11 +116,11 @@ impl<'a> Search<'a> {
                 let active =
                     (Active::from_bits(*active_a, self.pair.a.len()), Active::from_bits(*active_b, self.pair.b.len()));
                 if let (Some(a), Some(b)) = active {
-                    self.newton(self.pair.from_a(x_a), self.pair.from_b(y_b), *normal_a, a, b);
+                    self.newton(self.pair.a_to_query(x_a), self.pair.b_to_query(y_b), *normal_a, a, b);
                 }
             }
             Hint::Overlap { point_a } => {
-                self.common(&self.pair.from_a(point_a));
+                self.common(&self.pair.a_to_query(point_a));
             }
             Hint::Cold | Hint::Level { .. } => {}
         }

@@ -110,7 +110,7 @@ impl<'a> Search<'a> {
             let active =
                 (Active::from_bits(*active_a, self.pair.a.len()), Active::from_bits(*active_b, self.pair.b.len()));
             if let (Some(a), Some(b)) = active {
-                self.newton(self.pair.from_b(x_b), a, b);
+                self.newton(self.pair.b_to_query(x_b), a, b);
             }
         }
         if !self.done() {

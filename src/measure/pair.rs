@@ -212,7 +212,7 @@ impl<'a> Pair<'a> {
     }
 
     /// Inverse of [`Pair::to_a`].
-    pub(super) fn from_a(&self, x: &Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn a_to_query(&self, x: &Vector3<f64>) -> Vector3<f64> {
         (x - self.origin) / self.unit
     }
 
@@ -222,7 +222,7 @@ impl<'a> Pair<'a> {
     }
 
     /// Inverse of [`Pair::to_b`].
-    pub(super) fn from_b(&self, y: &Vector3<f64>) -> Vector3<f64> {
-        self.from_a(&(self.rotation * y + self.translation))
+    pub(super) fn b_to_query(&self, y: &Vector3<f64>) -> Vector3<f64> {
+        self.a_to_query(&(self.rotation * y + self.translation))
     }
 }

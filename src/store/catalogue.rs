@@ -291,11 +291,11 @@ impl State {
             placed.entry(scene).or_default().push(object);
         }
         let mut state = Self { scenes: BTreeMap::new(), revision_floor, bodies: BTreeMap::new() };
-        for (name, row) in scenes {
+        for (name, revision, row) in scenes {
             check_name(&name).map_err(|error| damaged(format!("scene {name:?} {error}")))?;
             let objects = placed.remove(&name).unwrap_or_default();
             let allowed = row.allowed.into_iter().map(|(a, b)| (a.into(), b.into()));
-            let scene = Scene::restored(name.as_str().into(), row.revision, objects, allowed);
+            let scene = Scene::restored(name.as_str().into(), revision, objects, allowed);
             if scene.allowed_pairs().any(|(a, b)| scene.object(a).is_none() || scene.object(b).is_none()) {
                 return Err(damaged(format!("scene \"{name}\" allows a pair of objects it does not have")));
             }

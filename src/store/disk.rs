@@ -9,7 +9,7 @@ use redb::{Database, DatabaseError, Durability, ReadableDatabase, ReadableTable,
 use serde::de::DeserializeOwned;
 
 use super::StoreError;
-use super::rows::{BODIES, FORMAT, FORMAT_1, META, OBJECTS, ObjectRow, REVISIONS, SCENES, SceneRow};
+use super::rows::{BODIES, FORMAT, META, OBJECTS, ObjectRow, REVISIONS, SCENES, SceneRow};
 
 /// The catalogue's file, locked by this process. Hand it to [`super::Catalogue::load`].
 pub struct Store {
@@ -24,7 +24,8 @@ type Opener = Box<dyn Fn() -> Result<Database, DatabaseError> + Send>;
 /// Everything in the file, as stored.
 pub(super) struct Contents {
     pub(super) bodies: Vec<(String, String)>,
-    pub(super) scenes: Vec<(String, SceneRow)>,
+    /// Scene, revision, row.
+    pub(super) scenes: Vec<(String, u64, SceneRow)>,
     /// Scene, object, row; in the order of scene and object.
     pub(super) objects: Vec<(String, String, ObjectRow)>,
     pub(super) revision_floor: u64,
@@ -112,17 +113,11 @@ impl Store {
         .map_err(|error| StoreError::from_redb(&self.dir, error))
     }
 
-    /// Checks the format of the tables, makes them in a new file, or takes over those of the format before.
+    /// Checks the format of the tables, or makes them in a new file.
     fn check_format(&self, database: &Database) -> Result<(), StoreError> {
         let (tables, found) = self.format(database)?;
         match found {
             Some(FORMAT) => Ok(()),
-            Some(FORMAT_1) => commit(database, |transaction| {
-                transaction.open_table(REVISIONS)?;
-                transaction.open_table(META)?.insert("format", FORMAT)?;
-                Ok(())
-            })
-            .map_err(|error| StoreError::from_redb(&self.dir, error)),
             Some(found) => Err(StoreError::Format { dir: self.dir.clone(), found, expected: FORMAT }),
             None if !tables => commit(database, |transaction| {
                 transaction.open_table(META)?.insert("format", FORMAT)?;
@@ -178,11 +173,10 @@ impl Store {
         for entry in read.open_table(SCENES)?.iter()? {
             let (name, row) = entry?;
             let name = name.value().to_owned();
-            let mut row: SceneRow = parse(row.value(), || format!("scene \"{name}\""))?;
-            if let Some(revision) = revisions.get(name.as_str())? {
-                row.revision = revision.value();
-            }
-            contents.scenes.push((name, row));
+            let row = parse(row.value(), || format!("scene \"{name}\""))?;
+            let revision = revisions.get(name.as_str())?.map(|value| value.value());
+            let revision = revision.ok_or_else(|| ReadError::Row(format!("scene \"{name}\" has no revision")))?;
+            contents.scenes.push((name, revision, row));
         }
         for entry in read.open_table(OBJECTS)?.iter()? {
             let (key, row) = entry?;

@@ -8,10 +8,7 @@ use crate::measure::{Pose, PoseError};
 use crate::scene::{Object, Scene};
 
 /// Raised whenever older programs could not read the tables any more.
-pub(super) const FORMAT: u64 = 2;
-
-/// The format before it: it has no [`REVISIONS`], and every revision is in its [`SceneRow`]. Taken over on opening.
-pub(super) const FORMAT_1: u64 = 1;
+pub(super) const FORMAT: u64 = 1;
 
 /// `format`, and `revision_floor`: no new scene starts at or below it.
 pub(super) const META: TableDefinition<&str, u64> = TableDefinition::new("meta");
@@ -19,8 +16,7 @@ pub(super) const META: TableDefinition<&str, u64> = TableDefinition::new("meta")
 pub(super) const BODIES: TableDefinition<&str, &[u8]> = TableDefinition::new("bodies");
 /// Scene name to [`SceneRow`].
 pub(super) const SCENES: TableDefinition<&str, &[u8]> = TableDefinition::new("scenes");
-/// Scene name to revision: apart from the scene's row, so that a new pose does not rewrite the allowed pairs. A scene
-/// without an entry is at the revision in its row.
+/// Scene name to revision: apart from the scene's row, so that a new pose does not rewrite the allowed pairs.
 pub(super) const REVISIONS: TableDefinition<&str, u64> = TableDefinition::new("revisions");
 /// Scene and object name to [`ObjectRow`]: a new pose rewrites one row, whatever the size of the scene.
 pub(super) const OBJECTS: TableDefinition<(&str, &str), &[u8]> = TableDefinition::new("objects");
@@ -28,8 +24,6 @@ pub(super) const OBJECTS: TableDefinition<(&str, &str), &[u8]> = TableDefinition
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneRow {
-    /// The one at which the pairs were last changed.
-    pub(super) revision: u64,
     pub(super) allowed: Vec<(String, String)>,
 }
 
@@ -46,7 +40,7 @@ pub(super) struct ObjectRow {
 impl SceneRow {
     pub(super) fn of(scene: &Scene) -> Self {
         let allowed = scene.allowed_pairs().map(|(a, b)| (a.to_string(), b.to_string())).collect();
-        Self { revision: scene.revision(), allowed }
+        Self { allowed }
     }
 }
 
