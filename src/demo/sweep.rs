@@ -11,7 +11,7 @@ use crate::service::proto::{
 use crate::service::{ServeOptions, Server};
 use std::fmt::Display;
 use std::net::{Ipv4Addr, SocketAddr};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// The chair goes from `-REACH` to `REACH` along x, metres; the human stands at the origin and faces `+x`.
@@ -54,12 +54,16 @@ pub(super) struct Sweep {
 
 /// Starts a server with an empty catalogue, stores both bodies, sweeps, and stops the server.
 pub(super) fn run(chair: &Path, human: &Path) -> Result<Sweep, DemoError> {
-    let data = Scratch::new()?;
+    // Goes away with the demo, also when it fails.
+    let data = tempfile::Builder::new().prefix("sublevel-demo-").tempdir().map_err(|error| DemoError::Server {
+        step: "making a folder for the server's data",
+        why: format!("{error}; set TMPDIR to a folder that can be written"),
+    })?;
     let step = "starting the server";
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(failed(step))?;
     let result = runtime.block_on(async {
         let listen = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-        let server = Server::bind(ServeOptions { listen, data: data.0.clone() }).await.map_err(failed(step))?;
+        let server = Server::bind(ServeOptions { listen, data: data.path().to_owned() }).await.map_err(failed(step))?;
         let url = format!("http://{}", server.local_addr());
         let (stop, stopped) = tokio::sync::oneshot::channel::<()>();
         let serving = tokio::spawn(server.run(async {
@@ -138,29 +142,4 @@ fn sample(x: f64, outcomes: &[Outcome]) -> Option<Sample> {
 
 fn failed<E: Display>(step: &'static str) -> impl Fn(E) -> DemoError {
     move |error| DemoError::Server { step, why: error.to_string() }
-}
-
-/// A folder for the server's data that goes away with the demo, also when it fails.
-struct Scratch(PathBuf);
-
-impl Scratch {
-    fn new() -> Result<Scratch, DemoError> {
-        let folder = std::env::temp_dir();
-        // A name that is taken (by a process long gone, or by somebody else) is passed over, never shared.
-        let attempts = (0..1000).map(|k| folder.join(format!("sublevel-demo-{}-{k}", std::process::id())));
-        let mut why = String::new();
-        for path in attempts {
-            match std::fs::create_dir(&path) {
-                Ok(()) => return Ok(Scratch(path)),
-                Err(error) => why = format!("{}: {error}; set TMPDIR to a folder that can be written", path.display()),
-            }
-        }
-        Err(DemoError::Server { step: "making a folder for the server's data", why })
-    }
-}
-
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
 }
