@@ -162,6 +162,9 @@ impl At {
 /// Largest number of Newton steps and of changes of the active set.
 const MAX_STEPS: u32 = 16;
 
+/// Longest Newton step, in query units, after which a bracket may be narrow: what remains is about its square.
+const WORTH_A_BRACKET: f64 = 1e-3;
+
 /// Newton iterates of the distance system.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DistanceNewton {
@@ -182,16 +185,17 @@ impl DistanceNewton {
         {
             return 0;
         }
-        // Where both are flat the system is singular, but the point at hand with fitted multipliers may do.
         let mut at = self.evaluate(pair);
-        if accept(self) {
-            return 0;
-        }
         let mut last = f64::INFINITY;
         for step in 1..=MAX_STEPS {
-            let Some(length) = self.step(&at) else { return step };
+            let Some(length) = self.step(&at) else {
+                // Where both are flat the system is singular, but the point at hand with its multipliers may do.
+                accept(self);
+                return step;
+            };
             at = self.evaluate(pair);
-            if accept(self) {
+            // A long step has not converged: its bracket is not worth its cost, but for flat bodies now and then.
+            if (length < WORTH_A_BRACKET || step % 4 == 0) && accept(self) {
                 return step;
             }
             // Near its solution Newton's step shrinks fast; one that does not is not near.
@@ -291,14 +295,14 @@ impl LevelNewton {
             return 0;
         }
         let mut s = self.start(pair);
-        // Where both are flat the system is singular, but the point at hand with fitted multipliers may do.
-        if accept(self) {
-            return 0;
-        }
         let mut last = f64::INFINITY;
         for step in 1..=MAX_STEPS {
-            let Some(length) = self.step(pair, &mut s) else { return step };
-            if accept(self) {
+            let Some(length) = self.step(pair, &mut s) else {
+                // Where both are flat the system is singular, but the point at hand with its multipliers may do.
+                accept(self);
+                return step;
+            };
+            if (length < WORTH_A_BRACKET || step % 4 == 0) && accept(self) {
                 return step;
             }
             if length < 1e-9 || step % 4 == 0 {
