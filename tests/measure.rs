@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 use sublevel::body::Body;
 use sublevel::demo::shapes;
 use sublevel::fit::{FitOptions, fit};
-use sublevel::measure::{DEFAULT_ACCURACY, Distance, Pose, Status, WarmStart, distance, level_distance};
+use sublevel::measure::{Distance, Options, Pose, Status, WarmStart, distance, level_distance};
 
 /// SplitMix64: a failing seed can be replayed.
 struct Seeded(u64);
@@ -73,7 +73,7 @@ fn two_hundred_random_poses_of_fitted_bodies() {
         let size = chair.circumscribed().radius.max(human.circumscribed().radius);
         let far = size * (1.2 + 1.1 * random.signed());
         let (pose_a, pose_b) = (random.pose(0.3), random.pose(far));
-        let answer = distance(chair, &pose_a, human, &pose_b, DEFAULT_ACCURACY, &mut WarmStart::default());
+        let answer = distance(chair, &pose_a, human, &pose_b, &Options::default(), &mut WarmStart::default());
         let label = format!("seed {seed}: {answer:?}");
         assert_eq!(answer.status, Status::Converged, "{label}");
         assert!(answer.lower <= answer.upper && answer.upper - answer.lower <= 1e-9 * size, "{label}");
@@ -86,7 +86,7 @@ fn two_hundred_random_poses_of_fitted_bodies() {
             check_optimality(&answer, (chair, &pose_a), (human, &pose_b), &label);
         }
         for (p, pose_p, q, pose_q) in [(chair, &pose_a, human, &pose_b), (human, &pose_b, chair, &pose_a)] {
-            let level = level_distance(p, pose_p, q, pose_q, DEFAULT_ACCURACY, &mut WarmStart::default());
+            let level = level_distance(p, pose_p, q, pose_q, &Options::default(), &mut WarmStart::default());
             let label = format!("seed {seed}: {level:?}");
             assert_eq!(level.status, Status::Converged, "{label}");
             assert!(level.upper - level.lower <= 1e-9 * level.upper.abs().max(1.0), "{label}");
@@ -116,7 +116,7 @@ fn a_box_against_a_fitted_chair() {
         let other = if seed % 2 == 0 { &crate_ } else { &can };
         let size = chair.circumscribed().radius;
         let (pose_a, pose_b) = (random.pose(0.1), random.pose(size * 1.5));
-        let answer = distance(other, &pose_a, chair, &pose_b, DEFAULT_ACCURACY, &mut WarmStart::default());
+        let answer = distance(other, &pose_a, chair, &pose_b, &Options::default(), &mut WarmStart::default());
         let label = format!("seed {seed}: {answer:?}");
         assert_eq!(answer.status, Status::Converged, "{label}");
         assert!(answer.upper - answer.lower <= 1e-9 * size, "{label}");
@@ -130,7 +130,7 @@ fn a_box_against_a_fitted_chair() {
             assert!(gap >= answer.lower - 1e-9, "{label}: boundary points are only {gap} apart");
         }
         for (p, pose_p, q, pose_q) in [(other, &pose_a, chair, &pose_b), (chair, &pose_b, other, &pose_a)] {
-            let level = level_distance(p, pose_p, q, pose_q, DEFAULT_ACCURACY, &mut WarmStart::default());
+            let level = level_distance(p, pose_p, q, pose_q, &Options::default(), &mut WarmStart::default());
             assert_eq!(level.status, Status::Converged, "seed {seed}: {level:?}");
         }
     }
@@ -147,8 +147,8 @@ fn a_solve_allocates_nothing() {
         let (mut warm, mut warm_level) = (WarmStart::default(), WarmStart::default());
         let counted = allocation_counter::measure(|| {
             for _ in 0..2 {
-                distance(chair, &pose_a, other, &pose_b, DEFAULT_ACCURACY, &mut warm);
-                level_distance(chair, &pose_a, other, &pose_b, DEFAULT_ACCURACY, &mut warm_level);
+                distance(chair, &pose_a, other, &pose_b, &Options::default(), &mut warm);
+                level_distance(chair, &pose_a, other, &pose_b, &Options::default(), &mut warm_level);
             }
         });
         assert_eq!(counted.count_total, 0, "seed {seed}");

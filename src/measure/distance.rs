@@ -3,6 +3,7 @@
 use super::Status;
 use super::bracket::{Multipliers, distance_lower, distance_upper};
 use super::newton::{Active, DistanceNewton};
+use super::options::Options;
 use super::pair::{Pair, Posed};
 use super::pose::Pose;
 use super::programs::{Closest, Level, points};
@@ -40,25 +41,25 @@ impl Distance {
 
 /// Euclidean distance between body `a` at `pose_a` and body `b` at `pose_b` (body to world), 0 when they touch or overlap.
 ///
-/// The bracket is at most `accuracy` times the circumradius of the larger body wide, or the status says that it is not.
+/// The bracket is as narrow as `options` ask, or the status says that it is not.
 /// Far from contact minimises ½|x - y|²; near contact, where that loses its curvature, the point deepest in both bodies
 /// decides between overlap and a gap. `warm` is read and then replaced by the hint for the next query of this pair.
 ///
 /// ```
 /// use nalgebra::Vector3;
 /// use sublevel::body::Body;
-/// use sublevel::measure::{DEFAULT_ACCURACY, Pose, WarmStart, distance};
+/// use sublevel::measure::{Options, Pose, WarmStart, distance};
 ///
 /// let ball = Body::ball("ball", Vector3::zeros(), 0.5)?;
 /// let crate_ = Body::cuboid("crate", Vector3::new(1.0, 1.0, 1.0))?;
 /// let apart = Pose::from_quaternion(Vector3::new(3.0, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0])?;
-/// let answer = distance(&crate_, &Pose::identity(), &ball, &apart, DEFAULT_ACCURACY, &mut WarmStart::default());
+/// let answer = distance(&crate_, &Pose::identity(), &ball, &apart, &Options::default(), &mut WarmStart::default());
 /// assert!((answer.value() - 1.5).abs() < 1e-8);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, accuracy: f64, warm: &mut WarmStart) -> Distance {
+pub fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, options: &Options<'_>, warm: &mut WarmStart) -> Distance {
     let pair = Pair::new(a, pose_a, b, pose_b);
-    let mut search = Search::new(&pair, accuracy * pair.size());
+    let mut search = Search::new(&pair, options);
     search.run(&warm.hint);
     *warm = search.hint();
     search.answer()
@@ -67,6 +68,7 @@ pub fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, accuracy: f64,
 /// A solve in progress: the best bracket so far and where it was attained, in query units.
 struct Search<'a> {
     pair: &'a Pair<'a>,
+    options: &'a Options<'a>,
     tolerance: f64,
     lower: f64,
     upper: f64,
@@ -85,12 +87,13 @@ const NEAR: f64 = 1e-3;
 const NEAREST: f64 = 1e-7;
 
 impl<'a> Search<'a> {
-    fn new(pair: &'a Pair<'a>, tolerance: f64) -> Self {
+    fn new(pair: &'a Pair<'a>, options: &'a Options<'a>) -> Self {
         let (x, y) = (pair.a.interior, pair.b.interior);
         let n = (x - y).try_normalize(0.0).unwrap_or_else(Vector3::x);
         Self {
             pair,
-            tolerance,
+            options,
+            tolerance: pair.tolerance(options.accuracy()),
             lower: 0.0,
             upper: f64::INFINITY,
             x,

@@ -4,6 +4,7 @@ use super::Status;
 use super::bracket::level_lower;
 use super::distance::split;
 use super::newton::{Active, LevelNewton};
+use super::options::Options;
 use super::pair::Pair;
 use super::pose::Pose;
 use super::programs::Level;
@@ -38,18 +39,18 @@ impl LevelDistance {
 /// Level distance of `a` over `b`: the smallest value that the stored polynomial of `a` (the largest of its constraints)
 /// takes on `b`. Above 1 the bodies are apart, at 1 they touch, below 1 they overlap; it is not symmetric.
 ///
-/// The bracket is at most `accuracy · max(1, |d|)` wide, or the status says that it is not. When the minimiser of `a`'s
+/// The bracket is as narrow as `options` ask, relative to `max(1, |d|)`, or the status says that it is not. When the minimiser of `a`'s
 /// polynomial lies in `b`, the answer is its minimum ([`Body::min_value`]) and says no more about depth. `warm` is read and
 /// then replaced by the hint for the next query of this pair in this order.
 ///
 /// ```
 /// use nalgebra::Vector3;
 /// use sublevel::body::Body;
-/// use sublevel::measure::{DEFAULT_ACCURACY, Pose, WarmStart, level_distance};
+/// use sublevel::measure::{Options, Pose, WarmStart, level_distance};
 ///
 /// let ball = Body::ball("ball", Vector3::zeros(), 1.0)?;
 /// let apart = Pose::from_quaternion(Vector3::new(3.0, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0])?;
-/// let d = level_distance(&ball, &Pose::identity(), &ball, &apart, DEFAULT_ACCURACY, &mut WarmStart::default());
+/// let d = level_distance(&ball, &Pose::identity(), &ball, &apart, &Options::default(), &mut WarmStart::default());
 /// assert!((d.value() - 4.0).abs() < 1e-8); // |x|² is 4 at (2, 0, 0)
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -58,11 +59,11 @@ pub fn level_distance(
     pose_a: &Pose,
     b: &Body,
     pose_b: &Pose,
-    accuracy: f64,
+    options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> LevelDistance {
     let pair = Pair::new(a, pose_a, b, pose_b);
-    let mut search = Search::new(&pair, accuracy);
+    let mut search = Search::new(&pair, options);
     search.run(&warm.hint);
     *warm = WarmStart {
         hint: Hint::Level {
@@ -80,7 +81,7 @@ const MAX_ROUNDS: u32 = 6;
 /// A solve in progress: the best bracket so far and where it was attained, in query units.
 struct Search<'a> {
     pair: &'a Pair<'a>,
-    accuracy: f64,
+    options: &'a Options<'a>,
     lower: f64,
     upper: f64,
     x: Vector3<f64>,
@@ -89,10 +90,10 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(pair: &'a Pair<'a>, accuracy: f64) -> Self {
+    fn new(pair: &'a Pair<'a>, options: &'a Options<'a>) -> Self {
         Self {
             pair,
-            accuracy,
+            options,
             lower: f64::NEG_INFINITY,
             upper: f64::INFINITY,
             x: pair.b.interior,
@@ -102,7 +103,7 @@ impl<'a> Search<'a> {
     }
 
     fn done(&self) -> bool {
-        self.upper.is_finite() && self.upper - self.lower <= self.accuracy * self.upper.abs().max(1.0)
+        self.upper.is_finite() && self.upper - self.lower <= self.options.accuracy() * self.upper.abs().max(1.0)
     }
 
     fn run(&mut self, hint: &Hint) {

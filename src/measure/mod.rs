@@ -11,6 +11,7 @@ mod distance;
 mod level;
 mod linear;
 mod newton;
+mod options;
 mod pair;
 mod pose;
 mod programs;
@@ -18,18 +19,16 @@ mod warm;
 
 pub use distance::{Distance, distance};
 pub use level::{LevelDistance, level_distance};
+pub use options::{DEFAULT_ACCURACY, MAX_ITERATIONS, Options, OptionsError};
 pub use pose::{Pose, PoseError};
 pub use warm::WarmStart;
-
-/// Default accuracy: relative to the circumradius of the larger body for lengths, to `max(1, |d|)` for level distances.
-pub const DEFAULT_ACCURACY: f64 = 1e-9;
 
 /// How a solve ended. The bracket is true in every case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     /// The bracket is as narrow as asked for.
     Converged,
-    /// The iteration limit or the rounding floor was reached first; the bracket says what is known.
+    /// The iteration limit, the stop flag or the rounding floor came first; the bracket says what is known.
     BracketWide,
 }
 

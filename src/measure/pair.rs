@@ -191,7 +191,13 @@ impl<'a> Pair<'a> {
         self.unit
     }
 
-    /// Circumradius of the larger body in query units: what accuracies of lengths are relative to.
+    /// Width in query units of a bracket of this accuracy: see [`super::Options::with_accuracy`].
+    pub(super) fn tolerance(&self, accuracy: f64) -> f64 {
+        let other = self.b.body.circumscribed().radius / self.unit;
+        accuracy * self.a.radius.min(other)
+    }
+
+    /// Circumradius of the larger body in query units.
     pub(super) fn size(&self) -> f64 {
         self.a.radius.max(self.b.body.circumscribed().radius / self.unit)
     }

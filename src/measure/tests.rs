@@ -31,11 +31,11 @@ fn random_pose(random: &mut Seeded, distance: f64) -> Pose {
 }
 
 fn cold(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose) -> Distance {
-    distance(a, pose_a, b, pose_b, DEFAULT_ACCURACY, &mut WarmStart::default())
+    distance(a, pose_a, b, pose_b, &Options::default(), &mut WarmStart::default())
 }
 
 fn cold_level(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose) -> LevelDistance {
-    level_distance(a, pose_a, b, pose_b, DEFAULT_ACCURACY, &mut WarmStart::default())
+    level_distance(a, pose_a, b, pose_b, &Options::default(), &mut WarmStart::default())
 }
 
 /// Body-frame support point of `body` in direction `n`, by brute force over rays then projected ascent.
@@ -232,14 +232,14 @@ fn warm_starts_change_time_not_answers() {
             // Now and then the hint is of another pair.
             if k % 13 == 5 {
                 let stranger = &bodies[random.next() as usize % bodies.len()];
-                distance(stranger, &pose, a, &Pose::identity(), 1e-9, &mut warm);
-                level_distance(a, &pose, stranger, &Pose::identity(), 1e-9, &mut warm_level);
+                distance(stranger, &pose, a, &Pose::identity(), &Options::default(), &mut warm);
+                level_distance(a, &pose, stranger, &Pose::identity(), &Options::default(), &mut warm_level);
             }
-            let answer = distance(a, &Pose::identity(), b, &pose, DEFAULT_ACCURACY, &mut warm);
+            let answer = distance(a, &Pose::identity(), b, &pose, &Options::default(), &mut warm);
             let label = format!("seed {seed} {}-{} step {k}: {answer:?} against {one:?}", a.name(), b.name());
             assert_eq!(answer.status, Status::Converged, "{label}");
             assert!(answer.lower <= one.upper && one.lower <= answer.upper, "{label}");
-            let level = level_distance(a, &Pose::identity(), b, &pose, DEFAULT_ACCURACY, &mut warm_level);
+            let level = level_distance(a, &Pose::identity(), b, &pose, &Options::default(), &mut warm_level);
             assert_eq!(level.status, Status::Converged, "seed {seed} step {k}: {level:?}");
             assert!(level.lower <= other.upper && other.lower <= level.upper, "seed {seed} step {k}");
         }
@@ -305,11 +305,16 @@ fn multipliers_that_bound_nothing_claim_nothing() {
 fn impossible_accuracy_is_admitted() {
     let a = Body::superellipsoid("a", Vector3::zeros(), Vector3::new(1.0, 2.0, 3.0), 8).unwrap();
     let pose = random_pose(&mut Seeded(5), 7.0);
-    for accuracy in [0.0, 1e-18, -1.0, f64::NAN] {
-        let answer = distance(&a, &Pose::identity(), &a, &pose, accuracy, &mut WarmStart::default());
+    for accuracy in [0.0, 1.1, -1.0, f64::NAN] {
+        assert!(Options::default().with_accuracy(accuracy).is_err());
+    }
+    assert!(Options::default().with_max_iterations(0).is_err());
+    for accuracy in [1e-18, 1e-300] {
+        let options = Options::default().with_accuracy(accuracy).unwrap();
+        let answer = distance(&a, &Pose::identity(), &a, &pose, &options, &mut WarmStart::default());
         assert_eq!(answer.status, Status::BracketWide);
         assert!(answer.lower <= answer.upper && answer.upper - answer.lower < 1e-9, "{answer:?}");
-        let level = level_distance(&a, &Pose::identity(), &a, &pose, accuracy, &mut WarmStart::default());
+        let level = level_distance(&a, &Pose::identity(), &a, &pose, &options, &mut WarmStart::default());
         assert_eq!(level.status, Status::BracketWide);
         assert!(level.lower <= level.upper && level.upper - level.lower < 1e-9 * level.upper, "{level:?}");
     }

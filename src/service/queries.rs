@@ -117,14 +117,14 @@ fn evaluate(
 fn one(a: &Placed, b: &Placed, measure: Measure, accuracy: Accuracy) -> Option<Outcome> {
     let level = |on: &Placed, of: &Placed| {
         let warm = &mut WarmStart::default();
-        let found = measure::level_distance(&on.body, &on.pose, &of.body, &of.pose, accuracy.level_relative, warm);
+        let found = measure::level_distance(&on.body, &on.pose, &of.body, &of.pose, &accuracy.level, warm);
         wire::level_distance(&found)
     };
     match measure {
         Measure::Unspecified => None,
         Measure::Distance => {
             let warm = &mut WarmStart::default();
-            let found = measure::distance(&a.body, &a.pose, &b.body, &b.pose, accuracy.distance_relative, warm);
+            let found = measure::distance(&a.body, &a.pose, &b.body, &b.pose, &accuracy.distance, warm);
             Some(Outcome::Distance(wire::distance(&found)))
         }
         Measure::LevelDistanceAOnB => Some(Outcome::LevelDistanceAOnB(level(a, b))),

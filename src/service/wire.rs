@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use crate::body::{Body, BodyId};
-use crate::measure::{DEFAULT_ACCURACY, Distance, LevelDistance, Pose, PoseError, Status};
+use crate::measure::{Distance, LevelDistance, Options, Pose, PoseError, Status};
 use crate::scene::{Placement, Scene, Update, check_name};
 
 use super::error::Invalid;
@@ -118,23 +118,22 @@ pub(super) fn measures(request: &proto::EvaluateRequest) -> Result<Vec<proto::Me
 /// How narrow the brackets of one call have to be, see `Accuracy` in `proto/`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Accuracy {
-    pub(super) distance_relative: f64,
-    pub(super) level_relative: f64,
+    pub(super) distance: Options<'static>,
+    pub(super) level: Options<'static>,
 }
 
 pub(super) fn accuracy(accuracy: Option<&proto::Accuracy>) -> Result<Accuracy, Invalid> {
-    let mut result = Accuracy { distance_relative: DEFAULT_ACCURACY, level_relative: DEFAULT_ACCURACY };
+    let mut result = Accuracy { distance: Options::default(), level: Options::default() };
     let asked = accuracy.copied().unwrap_or_default();
     for (leaf, asked, target) in [
-        ("distance_relative", asked.distance_relative, &mut result.distance_relative),
-        ("level_relative", asked.level_relative, &mut result.level_relative),
+        ("distance_relative", asked.distance_relative, &mut result.distance),
+        ("level_relative", asked.level_relative, &mut result.level),
     ] {
         if let Some(value) = asked {
-            if !(value > 0.0 && value <= 1.0) {
+            *target = target.with_accuracy(value).map_err(|_| {
                 let why = format!("is {value}; send a number above 0 and at most 1, or leave it out for 1e-9");
-                return Err(Invalid::new(format!("accuracy.{leaf}"), why));
-            }
-            *target = value;
+                Invalid::new(format!("accuracy.{leaf}"), why)
+            })?;
         }
     }
     Ok(result)

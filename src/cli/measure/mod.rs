@@ -5,7 +5,7 @@ mod timing;
 
 use super::{read, read_body};
 use crate::body::Body;
-use crate::measure::{Distance, LevelDistance, Pose, Status, WarmStart, distance, level_distance};
+use crate::measure::{Distance, LevelDistance, Options, Pose, Status, WarmStart, distance, level_distance};
 use serde::Serialize;
 use std::error::Error;
 use std::io::{self, BufWriter, Write};
@@ -33,7 +33,7 @@ pub(super) struct MeasureArgs {
     /// File of poses of B in A's frame, one a line: r00 r01 r02 r10 .. r22 tx ty tz; a blank line starts a new trajectory
     #[arg(long, value_name = "FILE")]
     poses: Option<PathBuf>,
-    /// Width asked of the brackets: relative to the larger body's circumradius, and to max(1, |d|)
+    /// Width asked of the brackets: relative to the smaller body's circumradius, and to max(1, |d|)
     #[arg(long, value_name = "WIDTH", default_value = "1e-9")]
     accuracy: f64,
     /// Print one JSON object a line instead of a table
@@ -92,28 +92,26 @@ impl Line {
 struct Query {
     a: Body,
     b: Body,
-    accuracy: f64,
+    options: Options<'static>,
 }
 
 impl Query {
     fn distance(&self, pose: &Pose, warm: &mut WarmStart) -> Distance {
-        distance(&self.a, &Pose::identity(), &self.b, pose, self.accuracy, warm)
+        distance(&self.a, &Pose::identity(), &self.b, pose, &self.options, warm)
     }
 
     fn level_ab(&self, pose: &Pose, warm: &mut WarmStart) -> LevelDistance {
-        level_distance(&self.a, &Pose::identity(), &self.b, pose, self.accuracy, warm)
+        level_distance(&self.a, &Pose::identity(), &self.b, pose, &self.options, warm)
     }
 
     fn level_ba(&self, pose: &Pose, warm: &mut WarmStart) -> LevelDistance {
-        level_distance(&self.b, pose, &self.a, &Pose::identity(), self.accuracy, warm)
+        level_distance(&self.b, pose, &self.a, &Pose::identity(), &self.options, warm)
     }
 }
 
 /// Measures and prints.
 pub(super) fn run(args: &MeasureArgs) -> Result<(), Box<dyn Error>> {
-    if !(args.accuracy > 0.0 && args.accuracy <= 1.0) {
-        return Err(format!("--accuracy: {} is not above 0 and at most 1; the default is 1e-9", args.accuracy).into());
-    }
+    let options = Options::default().with_accuracy(args.accuracy).map_err(|error| format!("--accuracy: {error}"))?;
     let trajectories = match (&args.pose, &args.poses) {
         (Some(text), _) => vec![vec![poses::parse_one(text).map_err(|error| format!("--pose: {error}"))?]],
         (None, Some(path)) => {
@@ -121,7 +119,7 @@ pub(super) fn run(args: &MeasureArgs) -> Result<(), Box<dyn Error>> {
         }
         (None, None) => vec![vec![Pose::identity()]],
     };
-    let query = Query { a: read_body(&args.a)?, b: read_body(&args.b)?, accuracy: args.accuracy };
+    let query = Query { a: read_body(&args.a)?, b: read_body(&args.b)?, options };
     let mut out = BufWriter::new(io::stdout().lock());
     if args.time {
         serde_json::to_writer(&mut out, &timing::time(&query, &trajectories))?;
