@@ -8,11 +8,13 @@ mod gram;
 mod hessian_form;
 mod monomial;
 mod rounding;
+mod simd;
 
 pub use gram::{CertificateError, HessianGram, HessianMonomial, Margin};
-pub use hessian_form::Jet;
+pub use hessian_form::{Jet, NumberJet};
 pub use monomial::{Exponents, degree_of, monomials};
 pub use rounding::gamma;
+pub use simd::{Arch, Lanes, Number, Simd, WithSimd, dispatch};
 
 use hessian_form::HessianForm;
 use nalgebra::Vector3;
@@ -95,6 +97,12 @@ impl Polynomial {
         self.form.evaluate(z)
     }
 
+    /// Value, gradient and Hessian at the points `z`, a lane each, to be inlined into work for [`dispatch`].
+    #[inline(always)]
+    pub fn jet<S: Simd, N: Number<S>>(&self, simd: S, z: [N; 3]) -> NumberJet<N> {
+        self.form.jet(simd, z)
+    }
+
     /// Bound of `|computed value - p(z')|` over all `z'` with `|z'_i - z_i| <= dz_i`, `gradient` being the computed one.
     ///
     /// Covers every rounding of [`Polynomial::evaluate`], the rounded products of its table included.
@@ -107,6 +115,11 @@ impl Polynomial {
     #[inline]
     pub fn gradient_error(&self, z: &Vector3<f64>, dz: &Vector3<f64>) -> f64 {
         self.absolute.gradient_error(z, dz)
+    }
+
+    /// Upper bound of the second derivatives along unit vectors at all points with `|z_i| <= half_i`.
+    pub fn curvature_ceiling(&self, half: &Vector3<f64>) -> f64 {
+        self.absolute.curvature_ceiling(half.amax())
     }
 
     /// The same polynomial with `delta` added to its constant coefficient (rounded once); every other coefficient, and

@@ -67,6 +67,12 @@ impl AbsolutePolynomial {
         (self.gamma * q + first + second) * (1.0 + 1e-13) + self.underflow(r)
     }
 
+    /// Bound of second derivatives along unit vectors within `|z_i| <= r`: along the largest component Q'' bounds them, and
+    /// no component of a unit vector exceeds 1.
+    pub(super) fn curvature_ceiling(&self, r: f64) -> f64 {
+        self.jet(r).2 * (1.0 + 1e-13) + self.underflow(r)
+    }
+
     pub(super) fn gradient_error(&self, z: &Vector3<f64>, dz: &Vector3<f64>) -> f64 {
         let (r, d) = (z.amax(), dz.amax());
         let (_, dq, ddq) = self.jet(r + d);
