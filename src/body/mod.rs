@@ -219,7 +219,8 @@ impl Body {
         if !(in_radius > 0.0) {
             return Err(BodyError::Thin);
         }
-        let trust = Trust::new(&constraints, &normalization.linear, &inverse, &z_extent);
+        let boundary_z = boundary.iter().map(|x| normalization.linear * (x - normalization.center));
+        let trust = Trust::new(&constraints, &normalization.linear, &inverse, &z_extent, boundary_z);
         let interior_z = normalization.linear * (interior_point - normalization.center);
         let volume = surface::volume(&constraints, &normalization.linear, &interior_z);
         let id = BodyId::of(&normalization, &constraints);

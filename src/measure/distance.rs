@@ -61,14 +61,11 @@ impl Distance {
 /// ```
 pub fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, options: &Options<'_>, warm: &mut WarmStart) -> Distance {
     let mut spent = 0;
-    if let Hint::Smooth(trace) = &warm.hint {
+    if let Hint::Smooth(trace) = &mut warm.hint {
         let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
         let follow = Follow { a, pose_a, b, pose_b, tolerance, limit: options.max_iterations(), trace };
         match dispatch(follow) {
-            Ok(proven) => {
-                warm.hint = Hint::Smooth(proven.trace);
-                return proven.answer(a, pose_a);
-            }
+            Ok(proven) => return proven.answer(a, pose_a),
             Err(rounds) => spent = rounds,
         }
     }

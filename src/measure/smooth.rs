@@ -6,31 +6,31 @@
 //! nearly the same each time, and is added on. One evaluation then mostly proves the answer or leaves one more step to it.
 
 use super::pose::Pose;
-use super::tangent::{Relative, Seen, Side, bracket, moved, newton};
+use super::tangent::{Bend, Plane, Relative, Side, Step, bracket, moved, newton};
 use super::vector::{M3, V3, apply, apply_transposed, basis, dot, subtract};
 use crate::body::Body;
-use crate::polynomial::{NumberJet, Simd, WithSimd};
+use crate::polynomial::{NumberJet, Scalar, Simd, WithSimd};
 use nalgebra::Vector3;
 
 /// What is kept of an answer for the next query of the pair.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Trace {
     /// Active constraint of A and of B.
-    pub(super) active: [u8; 2],
+    active: [u8; 2],
     /// Point of A, in A's frame from its normalization's centre on, metres.
-    pub(super) x: V3<f64>,
+    x: V3<f64>,
     /// Point of B, in B's frame from its normalization's centre on, metres.
-    pub(super) y: V3<f64>,
-    /// Normal in A's frame.
-    pub(super) n: V3<f64>,
-    /// Constraint of A at x, in normalized coordinates.
-    pub(super) jet_a: NumberJet<f64>,
-    /// Constraint of B at y, in normalized coordinates.
-    pub(super) jet_b: NumberJet<f64>,
+    y: V3<f64>,
+    /// Basis in A's frame whose third vector is the normal.
+    frame: M3<f64>,
+    /// Constraint of A at x, in the basis.
+    a: (Plane<f64>, Bend<f64>),
+    /// Constraint of B at y, in B's normalized coordinates.
+    jet_b: NumberJet<f64>,
     /// What the last prediction missed at x, in A's frame.
-    pub(super) drift_x: V3<f64>,
+    drift_x: V3<f64>,
     /// What the last prediction missed at y, in B's frame.
-    pub(super) drift_y: V3<f64>,
+    drift_y: V3<f64>,
 }
 
 impl Trace {
@@ -43,6 +43,7 @@ impl Trace {
         n: &Vector3<f64>,
         active: [u8; 2],
     ) -> Self {
+        let simd = Scalar;
         let local = |body: &Body, v: &Vector3<f64>, active: u8| {
             let from_center = v - body.normalization().center;
             let z = body.normalization().linear * from_center;
@@ -50,11 +51,14 @@ impl Trace {
             (from_center.into(), NumberJet::from(jet))
         };
         let ((x, jet_a), (y, jet_b)) = (local(a, x, active[0]), local(b, y, active[1]));
-        Self { active, x, y, n: (*n).into(), jet_a, jet_b, drift_x: [0.0; 3], drift_y: [0.0; 3] }
+        let frame = basis(simd, (*n).into());
+        let localized = Side::at_home(simd, a, usize::from(active[0])).localize(simd, &frame);
+        let a = (Plane::new(simd, &jet_a, &localized), Bend::new(simd, &jet_a, &localized));
+        Self { active, x, y, frame, a, jet_b, drift_x: [0.0; 3], drift_y: [0.0; 3] }
     }
 }
 
-/// A proven bracket and where it is attained; query frame, metres.
+/// A proven bracket and where it is attained, from the centre of A's normalization on, in A's frame, metres.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Proven {
     pub(super) lower: f64,
@@ -64,14 +68,10 @@ pub(super) struct Proven {
     pub(super) n: V3<f64>,
     /// Evaluations of both bodies.
     pub(super) rounds: u32,
-    pub(super) trace: Trace,
 }
 
-/// Most evaluations before the bracket decides that another method is better.
+/// Most evaluations before another method takes over.
 const MAX_ROUNDS: u32 = 8;
-
-/// Mismatch of the gradients, as an angle, above which a bracket is not worth its cost.
-const WORTH_A_BRACKET: f64 = 1e-3;
 
 /// Longest step relative to the bodies' sizes that the linearization may mean anything for.
 const LONGEST: f64 = 0.5;
@@ -86,7 +86,8 @@ pub(super) struct Follow<'a> {
     pub(super) tolerance: f64,
     /// Most rounds.
     pub(super) limit: u32,
-    pub(super) trace: &'a Trace,
+    /// Read, and replaced if the answer is proven.
+    pub(super) trace: &'a mut Trace,
 }
 
 impl WithSimd for Follow<'_> {
@@ -95,90 +96,90 @@ impl WithSimd for Follow<'_> {
     /// The proven answer, or how many rounds were spent in vain.
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Result<Proven, u32> {
-        let Trace { active, n, .. } = *self.trace;
-        if usize::from(active[0]) >= self.a.constraints().len() || usize::from(active[1]) >= self.b.constraints().len() {
+        let trace = self.trace;
+        let [active_a, active_b] = [usize::from(trace.active[0]), usize::from(trace.active[1])];
+        if active_a >= self.a.constraints().len() || active_b >= self.b.constraints().len() {
             return Err(0);
         }
         let relative = Relative::new(simd, self.a, self.pose_a, self.b, self.pose_b);
-        let side_a = Side::at_home(simd, self.a, usize::from(active[0]));
-        let side_b = Side::away(self.b, usize::from(active[1]), &relative);
-        let size = self.a.trust().reach.min(self.b.trust().reach);
+        let side_a = Side::at_home(simd, self.a, active_a);
+        let side_b = Side::away(self.b, active_b, &relative);
+        let longest = LONGEST * self.a.trust().reach.min(self.b.trust().reach);
 
         // Prediction from the old jets at the new poses.
-        let turned = apply::<S, f64>(&relative.rotation, self.trace.y);
-        let mut at = Iterate { x: self.trace.x, y: plus(turned, relative.origin), n };
-        let frame = basis(simd, at.n);
-        let (a, b) = (side_a.see(simd, &self.trace.jet_a, &frame), side_b.see(simd, &self.trace.jet_b, &frame));
-        if !at.advance(simd, &a, &b, &frame, LONGEST * size) {
+        let y = plus(apply::<S, f64>(&relative.rotation, trace.y), relative.origin);
+        let mut at = Iterate { x: trace.x, y, frame: trace.frame };
+        let local_b = side_b.localize(simd, &at.frame);
+        let b = (Plane::new(simd, &trace.jet_b, &local_b), Bend::new(simd, &trace.jet_b, &local_b));
+        let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
+        let step = newton(simd, (&trace.a.0, &trace.a.1), (&b.0, &b.1), difference, 0.0);
+        if !step.within(longest) {
             return Err(0);
         }
+        at.advance(simd, &step);
         let predicted = (at.x, at.y);
-        at.x = plus(at.x, self.trace.drift_x);
-        at.y = plus(at.y, apply::<S, f64>(&relative.rotation, self.trace.drift_y));
+        at.x = plus(at.x, trace.drift_x);
+        at.y = plus(at.y, apply::<S, f64>(&relative.rotation, trace.drift_y));
 
         for rounds in 1..=MAX_ROUNDS.min(self.limit) {
             let ((jet_a, inside_a), (jet_b, inside_b)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
             if !(inside_a && inside_b) {
                 return Err(rounds);
             }
-            let frame = basis(simd, at.n);
-            let (a, b) = (side_a.see(simd, &jet_a, &frame), side_b.see(simd, &jet_b, &frame));
-            let difference = apply::<S, f64>(&frame, subtract::<S, f64>(at.x, at.y));
-            if a.mismatch(&b) < WORTH_A_BRACKET {
-                let found = bracket(simd, (&side_a, &a), (&side_b, &b), difference);
-                if found.upper - found.lower <= self.tolerance && found.lower > 0.0 {
-                    let (x, y) = (moved::<S, f64>(at.x, found.to_a, &frame), moved::<S, f64>(at.y, found.to_b, &frame));
-                    if !(side_a.others_hold(simd, x) && side_b.others_hold(simd, y)) {
-                        return Err(rounds);
-                    }
-                    let n = apply_transposed::<S, f64>(&frame, found.normal);
-                    let drift_y = apply_transposed::<S, f64>(&relative.rotation, subtract::<S, f64>(at.y, predicted.1));
-                    let own_y = apply_transposed::<S, f64>(&relative.rotation, subtract::<S, f64>(at.y, relative.origin));
-                    let drift_x = subtract::<S, f64>(at.x, predicted.0);
-                    let trace = Trace { active, x: at.x, y: own_y, n, jet_a, jet_b, drift_x, drift_y };
-                    return Ok(Proven {
-                        lower: found.lower,
-                        upper: found.upper,
-                        x,
-                        y,
-                        n,
-                        rounds,
-                        trace,
-                    });
-                }
-            }
-            if !at.advance(simd, &a, &b, &frame, LONGEST * size) {
+            let (local_a, local_b) = (side_a.localize(simd, &at.frame), side_b.localize(simd, &at.frame));
+            let (a, b) = (Plane::new(simd, &jet_a, &local_a), Plane::new(simd, &jet_b, &local_b));
+            let (bend_a, bend_b) = (Bend::new(simd, &jet_a, &local_a), Bend::new(simd, &jet_b, &local_b));
+            let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
+            let step = newton(simd, (&a, &bend_a), (&b, &bend_b), difference, 0.0);
+            if !step.within(longest) {
                 return Err(rounds);
             }
+            // The bracket where Newton's step leads, by extrapolation: mostly no other evaluation is needed.
+            let next_a = side_a.extrapolate(simd, &jet_a, &local_a, step.dx);
+            let next_b = side_b.extrapolate(simd, &jet_b, &local_b, step.dy);
+            let next = subtract::<S, f64>(plus(difference, step.dx), step.dy);
+            let found = bracket(simd, (&side_a, &next_a), (&side_b, &next_b), next);
+            if found.upper - found.lower <= self.tolerance && found.lower > 0.0 {
+                let x = moved::<S, f64>(at.x, plus(step.dx, found.to_a), &at.frame);
+                let y = moved::<S, f64>(at.y, plus(step.dy, found.to_b), &at.frame);
+                let in_balls = side_a.contains(simd, x) && side_b.contains(simd, y);
+                if !(in_balls && side_a.others_hold(simd, x) && side_b.others_hold(simd, y)) {
+                    return Err(rounds);
+                }
+                trace.x = at.x;
+                trace.y = apply_transposed::<S, f64>(&relative.rotation, subtract::<S, f64>(at.y, relative.origin));
+                trace.frame = at.frame;
+                trace.a = (a, bend_a);
+                trace.jet_b = jet_b;
+                trace.drift_x = subtract::<S, f64>(x, predicted.0);
+                let drift_y = subtract::<S, f64>(y, predicted.1);
+                trace.drift_y = apply_transposed::<S, f64>(&relative.rotation, drift_y);
+                let n = apply_transposed::<S, f64>(&at.frame, found.normal);
+                return Ok(Proven { lower: found.lower, upper: found.upper, x, y, n, rounds });
+            }
+            at.advance(simd, &step);
         }
         Err(MAX_ROUNDS)
     }
 }
 
-/// Trial points and normal in the query frame.
+/// Trial points in the query frame and the basis whose third vector is the trial normal.
 #[derive(Clone, Copy)]
 struct Iterate {
     x: V3<f64>,
     y: V3<f64>,
-    n: V3<f64>,
+    frame: M3<f64>,
 }
 
 impl Iterate {
-    /// Takes one Newton step, unless it is longer than `longest` or not a number.
+    /// Takes a step; the basis follows the normal.
     #[inline(always)]
-    fn advance<S: Simd>(&mut self, simd: S, a: &Seen<f64>, b: &Seen<f64>, frame: &M3<f64>, longest: f64) -> bool {
-        let difference = apply::<S, f64>(frame, subtract::<S, f64>(self.x, self.y));
-        let step = newton(simd, a, b, difference, 0.0);
-        let length = dot::<S, f64>(step.dx, step.dx).max(dot::<S, f64>(step.dy, step.dy));
-        if !(length <= longest * longest) {
-            return false;
-        }
-        self.x = moved::<S, f64>(self.x, step.dx, frame);
-        self.y = moved::<S, f64>(self.y, step.dy, frame);
-        let turned = moved::<S, f64>(self.n, [step.dn[0], step.dn[1], 0.0], frame);
+    fn advance<S: Simd>(&mut self, simd: S, step: &Step<f64>) {
+        self.x = moved::<S, f64>(self.x, step.dx, &self.frame);
+        self.y = moved::<S, f64>(self.y, step.dy, &self.frame);
+        let turned = moved::<S, f64>(self.frame[2], [step.dn[0], step.dn[1], 0.0], &self.frame);
         let inverse = 1.0 / dot::<S, f64>(turned, turned).sqrt();
-        self.n = turned.map(|entry| entry * inverse);
-        true
+        self.frame = basis(simd, [turned[0] * inverse, turned[1] * inverse, turned[2] * inverse]);
     }
 }
 

@@ -28,17 +28,23 @@ use super::vector::{
     M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, dot, subtract, times_transposed,
 };
 use crate::body::{Body, ConstraintTrust};
-use crate::polynomial::{Number, NumberJet, Simd, gamma};
+use crate::polynomial::{NEAR_LEVEL, Number, NumberJet, Simd, gamma};
 use nalgebra::{Matrix3, Vector3};
 
 /// Bound of the error of a relative rotation in operator norm: both rotations are off by at most [`ROTATION_ERROR`]; their
 /// product, its matrix and sums with it round a few times more.
 const TURNED: f64 = 2.0 * ROTATION_ERROR + gamma(40);
 
-/// The matrix by rows.
+/// The matrix by rows, the same in every lane.
 #[inline(always)]
-fn rows(m: &Matrix3<f64>) -> M3<f64> {
-    [[m.m11, m.m12, m.m13], [m.m21, m.m22, m.m23], [m.m31, m.m32, m.m33]]
+fn rows<S: Simd, N: Number<S>>(simd: S, m: &Matrix3<f64>) -> M3<N> {
+    let mut rows = [[N::splat(simd, 0.0); 3]; 3];
+    for i in 0..3 {
+        for j in 0..3 {
+            rows[i][j] = N::splat(simd, m[(i, j)]);
+        }
+    }
+    rows
 }
 
 /// Where B stands as seen from A.
@@ -50,7 +56,7 @@ pub(super) struct Relative<N> {
     pub(super) origin: V3<N>,
     /// `M` of B: `z = M (y - origin)`.
     pub(super) linear: M3<N>,
-    /// Bound of the displacement of a computed z of B within its box, metres.
+    /// Bound of the displacement of a computed z of B within its ball, metres.
     pub(super) displacement: N,
 }
 
@@ -62,7 +68,7 @@ impl Relative<f64> {
         let conjugate = pose_a.rotation().conjugate();
         let moved = conjugate * (pose_b.translation() - pose_a.translation());
         let rotation = (conjugate * pose_b.rotation()).to_rotation_matrix();
-        Self::from_parts(simd, a, rows(rotation.matrix()), moved.into(), b)
+        Self::from_parts(simd, a, rows(simd, rotation.matrix()), [moved.x, moved.y, moved.z], b)
     }
 }
 
@@ -81,7 +87,7 @@ impl<N: Copy> Relative<N> {
         for i in 0..3 {
             origin[i] = turned[i] + (translation[i] - from[i]);
         }
-        let linear = rows(&b.normalization().linear).map(|row| row.map(|entry| N::splat(simd, entry)));
+        let linear = rows(simd, &b.normalization().linear);
         let trust = b.trust();
         let fixed = (TURNED + trust.rounding) * trust.reach
             + TURNED * center_b.norm()
@@ -118,7 +124,7 @@ impl<'a, N: Copy> Side<'a, N> {
         Self {
             body,
             active,
-            linear: rows(&body.normalization().linear).map(|row| row.map(|entry| N::splat(simd, entry))),
+            linear: rows(simd, &body.normalization().linear),
             origin: [zero; 3],
             displacement: N::splat(simd, body.trust().rounding * body.trust().reach),
         }
@@ -136,7 +142,7 @@ impl<'a, N: Copy> Side<'a, N> {
         &self.body.trust().constraints[self.active]
     }
 
-    /// The active constraint at a point in its normalized coordinates, and whether the point lies in the box of the body's
+    /// The active constraint at a point in its normalized coordinates, and whether the point lies in the ball of the body's
     /// [`crate::body::Trust`].
     #[inline(always)]
     pub(super) fn jet<S: Simd>(&self, simd: S, v: V3<N>) -> (NumberJet<N>, N::Mask)
@@ -144,60 +150,133 @@ impl<'a, N: Copy> Side<'a, N> {
         N: Number<S>,
     {
         let z = apply(&self.linear, subtract(v, self.origin));
-        let half = self.body.trust().half;
-        let inside = |i: usize| z[i].abs().le(N::splat(simd, half[i]));
-        let inside = N::and(simd, inside(0), N::and(simd, inside(1), inside(2)));
+        let radius = self.body.trust().radius;
+        let inside = dot(z, z).le(N::splat(simd, radius * radius));
         (self.body.constraints()[self.active].polynomial.jet(simd, z), inside)
     }
 
-    /// The constraint with this jet as seen in the basis.
+    /// The plane a step from where the jet is of, by Taylor's formula. With T the ceiling of third derivatives it is off by at
+    /// most `T |δ|³ / 6` in value and `T |δ|² / 2` in gradient, δ the step in normalized coordinates; that holds from a point
+    /// near the level for steps no longer than the leeway, else the errors are NaN. The step is in the basis that `local` is of.
     #[inline(always)]
-    pub(super) fn see<S: Simd>(&self, _: S, jet: &NumberJet<N>, basis: &M3<N>) -> Seen<N>
+    pub(super) fn extrapolate<S: Simd>(
+        &self,
+        simd: S,
+        jet: &NumberJet<N>,
+        local: &M3<N>,
+        step: V3<N>,
+    ) -> Extrapolated<N>
     where
         N: Number<S>,
     {
-        // The basis in normalized coordinates.
-        let [t0, t1, n] = [apply(&self.linear, basis[0]), apply(&self.linear, basis[1]), apply(&self.linear, basis[2])];
-        let (h0, h1) = (apply_symmetric(&jet.hessian, t0), apply_symmetric(&jet.hessian, t1));
-        Seen {
-            value: jet.value,
-            gradient: [dot(jet.gradient, t0), dot(jet.gradient, t1), dot(jet.gradient, n)],
-            curvature: [dot(h0, t0), dot(h0, t1), dot(h1, t1)],
-            tilt: [dot(h0, n), dot(h1, n)],
+        let half = N::splat(simd, 0.5);
+        let delta = apply_transposed(local, step);
+        let bent = apply_symmetric(&jet.hessian, delta);
+        let gradient = [jet.gradient[0] + bent[0], jet.gradient[1] + bent[1], jet.gradient[2] + bent[2]];
+        let value = jet.value + dot(delta, add_scaled(jet.gradient, half, bent));
+        let square = dot(delta, delta);
+        let third = N::splat(simd, self.trust().third.ceiling * (0.5 * (1.0 + 1e-12))) * square;
+        let leeway = self.trust().third.leeway;
+        let near = (jet.value - N::splat(simd, 1.0)).abs().le(N::splat(simd, NEAR_LEVEL));
+        let near = N::and(simd, near, square.le(N::splat(simd, 0.25 * leeway * leeway)));
+        let third = third.select(near, N::splat(simd, f64::NAN));
+        let plane = Plane { value, gradient: [dot(gradient, local[0]), dot(gradient, local[1]), dot(gradient, local[2])] };
+        // Second derivatives fall by at most T per length. Within 3 μ / (2 T) a rise of ½ μ |δ|² keeps half of it, and being
+        // convex it only steepens after that.
+        let ceiling = N::splat(simd, self.trust().third.ceiling);
+        let error = N::splat(simd, self.trust().curvature_error);
+        let curvature = smallest_eigenvalue(simd, &jet.hessian) - error - ceiling * square.sqrt();
+        let radius = (N::splat(simd, 1.5) * curvature / ceiling).min(N::splat(simd, 0.5 * leeway));
+        Extrapolated {
+            plane,
+            curvature,
+            radius,
+            value_error: third * square.sqrt() * N::splat(simd, 1.0 / 3.0 + 1e-9),
+            gradient_error: third * N::splat(simd, self.body.trust().linear_norm),
         }
+    }
+
+    /// The vectors of the basis, each in normalized coordinates.
+    #[inline(always)]
+    pub(super) fn localize<S: Simd>(&self, _: S, basis: &M3<N>) -> M3<N>
+    where
+        N: Number<S>,
+    {
+        [apply(&self.linear, basis[0]), apply(&self.linear, basis[1]), apply(&self.linear, basis[2])]
     }
 }
 
 impl Side<'_, f64> {
+    /// Whether v lies in the ball of the body's [`crate::body::Trust`].
+    #[inline(always)]
+    pub(super) fn contains<S: Simd>(&self, _: S, v: V3<f64>) -> bool {
+        let z = apply::<S, f64>(&self.linear, subtract::<S, f64>(v, self.origin));
+        dot::<S, f64>(z, z) <= self.body.trust().radius * self.body.trust().radius
+    }
+
     /// Whether all constraints but the active one are proven to hold at (a point within the displacement of) v.
     #[inline(always)]
     pub(super) fn others_hold<S: Simd>(&self, simd: S, v: V3<f64>) -> bool {
-        (0..self.body.constraints().len()).filter(|&i| i != self.active).all(|i| {
-            let (jet, inside) = Self { active: i, ..*self }.jet(simd, v);
-            inside && jet.value + self.body.trust().constraints[i].value_error <= 1.0
-        })
+        let mut hold = true;
+        if self.body.constraints().len() > 1 {
+            for i in (0..self.body.constraints().len()).filter(|&i| i != self.active) {
+                let (jet, inside) = Self { active: i, ..*self }.jet(simd, v);
+                hold &= inside && jet.value + self.body.trust().constraints[i].value_error <= 1.0;
+            }
+        }
+        hold
     }
 }
 
-/// A constraint at a point: its value, and its derivatives in the basis.
+/// Value and gradient of a constraint at a point, the gradient along the two tangents and the normal.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seen<N> {
+pub(super) struct Plane<N> {
     pub(super) value: N,
-    /// Along the two tangents and the normal.
     pub(super) gradient: V3<N>,
+}
+
+/// A plane that a Taylor polynomial gives, and by how much it may be off but for rounding.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extrapolated<N> {
+    pub(super) plane: Plane<N>,
+    value_error: N,
+    gradient_error: N,
+    /// Curvature μ, by z: the constraint rises from its tangent plane by at least `¼ μ |δ|²` within `radius`.
+    curvature: N,
+    /// Where that holds, by z; farther away the rise is at least in proportion to the distance.
+    radius: N,
+}
+
+impl<N: Copy> Plane<N> {
+    /// The constraint with this jet, along the vectors of a basis in its normalized coordinates.
+    #[inline(always)]
+    pub(super) fn new<S: Simd>(_: S, jet: &NumberJet<N>, [t0, t1, n]: &M3<N>) -> Self
+    where
+        N: Number<S>,
+    {
+        let g = jet.gradient;
+        Self { value: jet.value, gradient: [dot(g, *t0), dot(g, *t1), dot(g, *n)] }
+    }
+}
+
+/// Second derivatives of a constraint at a point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bend<N> {
     /// `TᵀHT`: 00, 01, 11.
     curvature: [N; 3],
     /// `TᵀHn`.
     tilt: [N; 2],
 }
 
-impl Seen<f64> {
-    /// Angle between the gradients of A and of B, up to its third power.
+impl<N: Copy> Bend<N> {
+    /// The constraint with this jet, along the vectors of a basis in its normalized coordinates.
     #[inline(always)]
-    pub(super) fn mismatch(&self, b: &Self) -> f64 {
-        let (of_a, of_b) = (1.0 / self.gradient[2], 1.0 / b.gradient[2]);
-        let across = |i: usize| self.gradient[i] * of_a - b.gradient[i] * of_b;
-        across(0).abs() + across(1).abs()
+    pub(super) fn new<S: Simd>(_: S, jet: &NumberJet<N>, [t0, t1, n]: &M3<N>) -> Self
+    where
+        N: Number<S>,
+    {
+        let (h0, h1) = (apply_symmetric(&jet.hessian, *t0), apply_symmetric(&jet.hessian, *t1));
+        Self { curvature: [dot(h0, *t0), dot(h0, *t1), dot(h1, *t1)], tilt: [dot(h0, *n), dot(h1, *n)] }
     }
 }
 
@@ -215,6 +294,17 @@ fn inverse2<S: Simd, N: Number<S>>(simd: S, m: &Symmetric2<N>) -> Symmetric2<N> 
     [m[2] * factor, -m[1] * factor, m[0] * factor]
 }
 
+/// Lower bound of the smallest eigenvalue of a positive definite matrix: the determinant over the square of half the trace
+/// bounds it, as the product of two numbers is at most the square of their mean. Not above 0 for any other matrix.
+#[inline(always)]
+fn smallest_eigenvalue<S: Simd, N: Number<S>>(simd: S, [xx, xy, xz, yy, yz, zz]: &[N; 6]) -> N {
+    let half_trace = (*xx + *yy + *zz) * N::splat(simd, 0.5);
+    let first = *yy * *zz - *yz * *yz;
+    let determinant = *xx * first - *xy * (*xy * *zz - *yz * *xz) + *xz * (*xy * *yz - *yy * *xz);
+    // Some 20 roundings of terms of at most the cube of the trace.
+    (determinant / (half_trace * half_trace)) - half_trace * N::splat(simd, 256.0 * f64::EPSILON)
+}
+
 /// One Newton step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Step<N> {
@@ -226,31 +316,37 @@ pub(super) struct Step<N> {
     pub(super) dn: [N; 2],
 }
 
+impl Step<f64> {
+    /// Whether the step is no longer than `longest`, and a number.
+    #[inline(always)]
+    pub(super) fn within(&self, longest: f64) -> bool {
+        let square = |v: V3<f64>| v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+        square(self.dx).max(square(self.dy)) <= longest * longest
+    }
+}
+
 /// Newton's step from points x and y with `difference = x - y` in the basis whose third vector is n.
 ///
 /// `smallest` is added to the curvature that is divided by: where both bodies are flat it bounds the step.
 #[inline(always)]
 pub(super) fn newton<S: Simd, N: Number<S>>(
     simd: S,
-    a: &Seen<N>,
-    b: &Seen<N>,
+    (a, bend_a): (&Plane<N>, &Bend<N>),
+    (b, bend_b): (&Plane<N>, &Bend<N>),
     difference: V3<N>,
     smallest: N,
 ) -> Step<N> {
     let one = N::splat(simd, 1.0);
     let (of_a, of_b) = (-one / a.gradient[2], one / b.gradient[2]);
     let (shift_a, shift_b) = ((a.value - one) * of_a, (one - b.value) * of_b);
-    let right = |seen: &Seen<N>, multiplier: N, shift: N| {
+    let right = |plane: &Plane<N>, bend: &Bend<N>, multiplier: N, shift: N| {
         [
-            -multiplier * shift.mul_add(seen.tilt[0], seen.gradient[0]),
-            -multiplier * shift.mul_add(seen.tilt[1], seen.gradient[1]),
+            -multiplier * shift.mul_add(bend.tilt[0], plane.gradient[0]),
+            -multiplier * shift.mul_add(bend.tilt[1], plane.gradient[1]),
         ]
     };
-    let (right_a, right_b) = (right(a, of_a, shift_a), right(b, of_b, shift_b));
-    let curved = |seen: &Seen<N>, multiplier: N| {
-        [seen.curvature[0] * multiplier, seen.curvature[1] * multiplier, seen.curvature[2] * multiplier]
-    };
-    let (w_a, w_b) = (curved(a, of_a), curved(b, of_b));
+    let (right_a, right_b) = (right(a, bend_a, of_a, shift_a), right(b, bend_b, of_b, shift_b));
+    let (w_a, w_b) = (scaled(bend_a.curvature, of_a), scaled(bend_b.curvature, of_b));
     let distance = difference[2] + shift_a - shift_b;
     let tau = [difference[0], difference[1]];
 
@@ -295,10 +391,10 @@ pub(super) struct Bracket<N> {
 const SLACK: f64 = 128.0 * f64::EPSILON;
 
 /// How much farther a point is moved than its constraint's linearization asks, for the rounding of its gradient.
-const NUDGE: f64 = 1e-9;
+const NUDGE: f64 = 1e-4;
 
 /// The bracket from the constraints at x and y with `difference = x - y` in the basis. NaN where it proves nothing; it
-/// holds only if both points lie in their boxes.
+/// holds only if both points, and those extrapolated from, lie in their balls.
 ///
 /// Lower bound. For a unit vector n and any multipliers, convexity with the curvature floor c of `g(z)` gives for every
 /// point of a body `r·(x' - x) >= -λ (1 - g(x)) - |M⁻ᵀ(r + λ∇g)|² / (2 λ c)`: what the tangent plane loses to a normal that
@@ -310,12 +406,13 @@ const NUDGE: f64 = 1e-9;
 #[inline(always)]
 pub(super) fn bracket<S: Simd, N: Number<S>>(
     simd: S,
-    (side_a, a): (&Side<'_, N>, &Seen<N>),
-    (side_b, b): (&Side<'_, N>, &Seen<N>),
+    (side_a, extrapolated_a): (&Side<'_, N>, &Extrapolated<N>),
+    (side_b, extrapolated_b): (&Side<'_, N>, &Extrapolated<N>),
     difference: V3<N>,
 ) -> Bracket<N> {
     let splat = |value: f64| N::splat(simd, value);
     let one = splat(1.0);
+    let (a, b) = (&extrapolated_a.plane, &extrapolated_b.plane);
     let (near_a, near_b) = (Near::new(side_a), Near::new(side_b));
     let (length_a, length_b) = (dot(a.gradient, a.gradient).sqrt(), dot(b.gradient, b.gradient).sqrt());
     let (inverse_a, inverse_b) = (one / length_a, one / length_b);
@@ -324,7 +421,8 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
     let rounding = splat(SLACK) * (difference[0].abs() + difference[1].abs() + difference[2].abs());
 
     // The flatter body keeps its own normal; the other one's gradient leaves a residual across it.
-    let a_keeps = (splat(near_a.floor) * inverse_a).le(splat(near_b.floor) * inverse_b);
+    let a_keeps = (extrapolated_a.curvature * splat(near_b.inverse_square) * inverse_a)
+        .le(extrapolated_b.curvature * splat(near_a.inverse_square) * inverse_b);
     let either = |of_a: N, of_b: N| of_a.select(a_keeps, of_b);
     let either_constant = |of_a: f64, of_b: f64| splat(of_a).select(a_keeps, splat(of_b));
     let mut normal = [one; 3];
@@ -336,16 +434,28 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
     let along = dot(normal, other);
     let multiplier = one / along;
     let residual = add_scaled(normal, -multiplier, other);
-    let turned = either_constant(near_b.turn, near_a.turn) * either(length_b, length_a)
-        + either_constant(near_b.gradient_error, near_a.gradient_error);
+    let gradient_error_a = extrapolated_a.gradient_error + splat(near_a.gradient_error);
+    let gradient_error_b = extrapolated_b.gradient_error + splat(near_b.gradient_error);
+    let turned = either_constant(near_b.turn, near_a.turn)
+        .mul_add(either(length_b, length_a), either(gradient_error_b, gradient_error_a));
     let off = dot(residual, residual).sqrt() + turned.mul_add(multiplier, splat(SLACK));
-    let curved = off * off / (splat(2.0) * multiplier * either_constant(near_b.floor, near_a.floor));
-    let loss = curved.min(off * either_constant(near_b.span, near_a.span));
-    let keeper_turned = either_constant(near_a.gradient_error, near_b.gradient_error)
-        .mul_add(either(inverse_a, inverse_b), either_constant(near_a.turn + SLACK, near_b.turn + SLACK));
-    let keeper_loss = keeper_turned * either_constant(near_a.span, near_b.span);
+    let loss_of = |near: &Near, extrapolated: &Extrapolated<N>, off: N, multiplier: N| {
+        near.loss(simd, extrapolated, off, multiplier)
+    };
+    let loss = either(
+        loss_of(&near_b, extrapolated_b, off, multiplier),
+        loss_of(&near_a, extrapolated_a, off, multiplier),
+    );
+    let keeper = either(inverse_a, inverse_b);
+    let keeper_off = either(gradient_error_a, gradient_error_b)
+        .mul_add(keeper, either_constant(near_a.turn + SLACK, near_b.turn + SLACK));
+    let keeper_loss = either(
+        loss_of(&near_a, extrapolated_a, keeper_off, keeper),
+        loss_of(&near_b, extrapolated_b, keeper_off, keeper),
+    );
 
-    let (error_a, error_b) = (splat(side_a.trust().value_error), splat(side_b.trust().value_error));
+    let error_a = extrapolated_a.value_error + splat(side_a.trust().value_error);
+    let error_b = extrapolated_b.value_error + splat(side_b.trust().value_error);
     let (of_a, of_b) = (either(inverse_a, multiplier), either(multiplier, inverse_b));
     let slack_a = of_a * (one - a.value + error_a);
     let slack_b = of_b * (one - b.value + error_b);
@@ -358,8 +468,8 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
     // Gradients that do not even point the same way leave no multiplier.
     let lower = lower.select(splat(0.0).le(along), splat(f64::NAN));
 
-    let (move_a, fine_a) = near_a.move_inside(simd, a.value - one + error_a, length_a, inverse_a);
-    let (move_b, fine_b) = near_b.move_inside(simd, b.value - one + error_b, length_b, inverse_b);
+    let (move_a, fine_a) = near_a.move_inside(simd, a.value - one + error_a, length_a, inverse_a, gradient_error_a);
+    let (move_b, fine_b) = near_b.move_inside(simd, b.value - one + error_b, length_b, inverse_b, gradient_error_b);
     let (to_a, to_b) = (scaled(outward_a, move_a), scaled(outward_b, move_b));
     let between = subtract(add_scaled(difference, one, to_a), to_b);
     let upper = dot(between, between).sqrt() * splat(1.0 + SLACK) + displaced + rounding;
@@ -369,44 +479,63 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
 
 /// What is known of one body's active constraint near the body, in metres.
 struct Near {
-    /// Curvature floor, per m².
     floor: f64,
-    /// Curvature ceiling, per m².
     ceiling: f64,
-    /// Bound of the error of a gradient by the rounding of the polynomial, per metre.
     gradient_error: f64,
     /// Bound of the relative error of a gradient by the rounding of the body's map and of the basis.
     turn: f64,
-    /// Bound of the distance between points of the box, metres.
     span: f64,
-    /// Longest move that keeps a point of the box where the ceiling holds, metres.
-    longest: f64,
+    leeway: f64,
+    /// Square of the bound of `|M⁻¹ r| / |r|`, m².
+    inverse_square: f64,
 }
 
 impl Near {
     #[inline(always)]
     fn new<N: Copy>(side: &Side<'_, N>) -> Self {
         let (body, constraint) = (side.body.trust(), side.trust());
-        let (norm, inverse) = (body.linear_norm, body.inverse_norm);
         Self {
-            floor: constraint.curvature_floor / (inverse * inverse) * (1.0 - 1e-13),
-            ceiling: constraint.curvature_ceiling * (norm * norm) * (1.0 + 1e-13),
-            gradient_error: 1.8 * constraint.gradient_error * norm,
-            turn: TURNED + gamma(64) * norm * inverse,
-            span: 2.0 * body.reach,
-            longest: body.leeway / norm * (1.0 - 1e-13),
+            floor: constraint.curvature_floor,
+            ceiling: constraint.curvature_ceiling,
+            gradient_error: constraint.gradient_error,
+            turn: TURNED + gamma(64) * body.condition,
+            span: body.span,
+            leeway: body.leeway,
+            inverse_square: body.inverse_norm * body.inverse_norm,
         }
+    }
+
+    /// Bound of what a plane off by `off` in direction loses: the largest of `r·δ - λ (rise over the tangent plane)`, `|r| = off`,
+    /// by the curvature at the point, by the one anywhere, and by the length of δ.
+    #[inline(always)]
+    fn loss<S: Simd, N: Number<S>>(&self, simd: S, at: &Extrapolated<N>, off: N, multiplier: N) -> N {
+        let splat = |value: f64| N::splat(simd, value);
+        // By z, r is at most the bound of the inverse times as long.
+        let square = off * off * splat(self.inverse_square);
+        let strength = multiplier * at.curvature;
+        let slope = splat(0.25) * strength * at.radius;
+        let here = (square / strength).select(square.le(slope * slope), splat(f64::INFINITY));
+        let here = here.select(splat(0.0).le(slope), splat(f64::INFINITY));
+        let anywhere = (off * off) / (splat(2.0 * self.floor) * multiplier);
+        here.min(anywhere).min(off * splat(self.span))
     }
 
     /// How far along the outward gradient to move so that an excess of the value over 1 is undone, and whether that is proven.
     #[inline(always)]
-    fn move_inside<S: Simd, N: Number<S>>(&self, simd: S, excess: N, length: N, inverse: N) -> (N, N::Mask) {
+    fn move_inside<S: Simd, N: Number<S>>(
+        &self,
+        simd: S,
+        excess: N,
+        length: N,
+        inverse: N,
+        gradient_error: N,
+    ) -> (N, N::Mask) {
         let splat = |value: f64| N::splat(simd, value);
         let q = splat(self.ceiling) * excess.abs() * inverse * inverse;
         let distance = (excess.abs().mul_add(q + q + splat(NUDGE), excess)) * inverse;
-        let error = (splat(self.turn) * length + splat(self.gradient_error)) * splat(4.0 / NUDGE);
-        let fine = N::and(simd, q.le(splat(0.1)), N::and(simd, error.le(length), distance.abs().le(splat(self.longest))));
-        (-distance, fine)
+        let error = splat(self.turn).mul_add(length, gradient_error) * splat(4.0 / NUDGE);
+        let near = N::and(simd, error.le(length), distance.abs().le(splat(self.leeway)));
+        (-distance, N::and(simd, q.le(splat(0.1)), near))
     }
 }
 

@@ -9,7 +9,7 @@ use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::sync::LazyLock;
 
-pub use pulp::{Arch, Simd, WithSimd};
+pub use pulp::{Arch, Scalar, Simd, WithSimd};
 
 /// Does the work with the widest arithmetic of this processor.
 #[inline]
