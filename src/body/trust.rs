@@ -75,7 +75,7 @@ impl Trust {
             gradient_error: 1.8 * polynomial.gradient_error(&at, &none) * norm,
             curvature_floor: gram.curvature_floor(polynomial) / (inverse_norm * inverse_norm) * (1.0 - 1e-13),
             // A little farther, for points that are moved from within the ball by a little.
-            curvature_ceiling: polynomial.curvature_ceiling(1.1 * ball) * norm * norm * (1.0 + 1e-13),
+            curvature_ceiling: polynomial.curvature_ceiling(1.25 * ball) * norm * norm * (1.0 + 1e-13),
             curvature_error: polynomial.curvature_error(ball),
             third: polynomial.third_ceiling(ball),
         });

@@ -96,17 +96,17 @@ impl WithSimd for Follow<'_> {
     /// The proven answer, or how many rounds were spent in vain.
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Result<Proven, u32> {
-        let trace = self.trace;
-        let [active_a, active_b] = [usize::from(trace.active[0]), usize::from(trace.active[1])];
-        if active_a >= self.a.constraints().len() || active_b >= self.b.constraints().len() {
+        let active = self.trace.active.map(usize::from);
+        if active[0] >= self.a.constraints().len() || active[1] >= self.b.constraints().len() {
             return Err(0);
         }
         let relative = Relative::new(simd, self.a, self.pose_a, self.b, self.pose_b);
-        let side_a = Side::at_home(simd, self.a, active_a);
-        let side_b = Side::away(self.b, active_b, &relative);
+        let side_a = Side::at_home(simd, self.a, active[0]);
+        let side_b = Side::away(self.b, active[1], &relative);
         let longest = LONGEST * self.a.trust().reach.min(self.b.trust().reach);
 
         // Prediction from the old jets at the new poses.
+        let trace = &*self.trace;
         let y = plus(apply::<S, f64>(&relative.rotation, trace.y), relative.origin);
         let mut at = Iterate { x: trace.x, y, frame: trace.frame };
         let local_b = side_b.localize(simd, &at.frame);
@@ -121,7 +121,35 @@ impl WithSimd for Follow<'_> {
         at.x = plus(at.x, trace.drift_x);
         at.y = plus(at.y, apply::<S, f64>(&relative.rotation, trace.drift_y));
 
-        for rounds in 1..=MAX_ROUNDS.min(self.limit) {
+        let correct = Correct { sides: (side_a, side_b), tolerance: self.tolerance, limit: MAX_ROUNDS.min(self.limit), longest };
+        let proven = correct.run(simd, &relative, at, self.trace)?;
+        self.trace.drift_x = subtract::<S, f64>(proven.x, predicted.0);
+        let drift_y = subtract::<S, f64>(proven.y, predicted.1);
+        self.trace.drift_y = apply_transposed::<S, f64>(&relative.rotation, drift_y);
+        Ok(proven)
+    }
+}
+
+/// Correction of a start by Newton's method until the bracket is narrow.
+struct Correct<'a> {
+    sides: (Side<'a, f64>, Side<'a, f64>),
+    tolerance: f64,
+    limit: u32,
+    /// Longest step, metres.
+    longest: f64,
+}
+
+impl Correct<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(
+        &self,
+        simd: S,
+        relative: &Relative<f64>,
+        mut at: Iterate,
+        trace: &mut Trace,
+    ) -> Result<Proven, u32> {
+        let (side_a, side_b) = &self.sides;
+        for rounds in 1..=self.limit {
             let ((jet_a, inside_a), (jet_b, inside_b)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
             if !(inside_a && inside_b) {
                 return Err(rounds);
@@ -131,19 +159,18 @@ impl WithSimd for Follow<'_> {
             let (bend_a, bend_b) = (Bend::new(simd, &jet_a, &local_a), Bend::new(simd, &jet_b, &local_b));
             let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
             let step = newton(simd, (&a, &bend_a), (&b, &bend_b), difference, 0.0);
-            if !step.within(longest) {
+            if !step.within(self.longest) {
                 return Err(rounds);
             }
             // The bracket where Newton's step leads, by extrapolation: mostly no other evaluation is needed.
             let next_a = side_a.extrapolate(simd, &jet_a, &local_a, step.dx);
             let next_b = side_b.extrapolate(simd, &jet_b, &local_b, step.dy);
             let next = subtract::<S, f64>(plus(difference, step.dx), step.dy);
-            let found = bracket(simd, (&side_a, &next_a), (&side_b, &next_b), next);
+            let found = bracket(simd, (side_a, &next_a), (side_b, &next_b), next);
             if found.upper - found.lower <= self.tolerance && found.lower > 0.0 {
                 let x = moved::<S, f64>(at.x, plus(step.dx, found.to_a), &at.frame);
                 let y = moved::<S, f64>(at.y, plus(step.dy, found.to_b), &at.frame);
-                let in_balls = side_a.contains(simd, x) && side_b.contains(simd, y);
-                if !(in_balls && side_a.others_hold(simd, x) && side_b.others_hold(simd, y)) {
+                if !(side_a.others_hold(simd, x) && side_b.others_hold(simd, y)) {
                     return Err(rounds);
                 }
                 trace.x = at.x;
@@ -151,15 +178,12 @@ impl WithSimd for Follow<'_> {
                 trace.frame = at.frame;
                 trace.a = (a, bend_a);
                 trace.jet_b = jet_b;
-                trace.drift_x = subtract::<S, f64>(x, predicted.0);
-                let drift_y = subtract::<S, f64>(y, predicted.1);
-                trace.drift_y = apply_transposed::<S, f64>(&relative.rotation, drift_y);
                 let n = apply_transposed::<S, f64>(&at.frame, found.normal);
                 return Ok(Proven { lower: found.lower, upper: found.upper, x, y, n, rounds });
             }
             at.advance(simd, &step);
         }
-        Err(MAX_ROUNDS)
+        Err(self.limit)
     }
 }
 

@@ -207,13 +207,6 @@ impl<'a, N: Copy> Side<'a, N> {
 }
 
 impl Side<'_, f64> {
-    /// Whether v lies in the ball of the body's [`crate::body::Trust`].
-    #[inline(always)]
-    pub(super) fn contains<S: Simd>(&self, _: S, v: V3<f64>) -> bool {
-        let z = apply::<S, f64>(&self.linear, subtract::<S, f64>(v, self.origin));
-        dot::<S, f64>(z, z) <= self.body.trust().radius * self.body.trust().radius
-    }
-
     /// Whether all constraints but the active one are proven to hold at (a point within the displacement of) v.
     #[inline(always)]
     pub(super) fn others_hold<S: Simd>(&self, simd: S, v: V3<f64>) -> bool {
@@ -439,20 +432,25 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
     let turned = either_constant(near_b.turn, near_a.turn)
         .mul_add(either(length_b, length_a), either(gradient_error_b, gradient_error_a));
     let off = dot(residual, residual).sqrt() + turned.mul_add(multiplier, splat(SLACK));
-    let loss_of = |near: &Near, extrapolated: &Extrapolated<N>, off: N, multiplier: N| {
-        near.loss(simd, extrapolated, off, multiplier)
+    let bent = Bound {
+        curvature: either(extrapolated_b.curvature, extrapolated_a.curvature),
+        radius: either(extrapolated_b.radius, extrapolated_a.radius),
+        inverse_square: either_constant(near_b.inverse_square, near_a.inverse_square),
+        floor: either_constant(near_b.floor, near_a.floor),
+        span: either_constant(near_b.span, near_a.span),
     };
-    let loss = either(
-        loss_of(&near_b, extrapolated_b, off, multiplier),
-        loss_of(&near_a, extrapolated_a, off, multiplier),
-    );
+    let loss = bent.loss(simd, off, multiplier);
     let keeper = either(inverse_a, inverse_b);
     let keeper_off = either(gradient_error_a, gradient_error_b)
         .mul_add(keeper, either_constant(near_a.turn + SLACK, near_b.turn + SLACK));
-    let keeper_loss = either(
-        loss_of(&near_a, extrapolated_a, keeper_off, keeper),
-        loss_of(&near_b, extrapolated_b, keeper_off, keeper),
-    );
+    let kept = Bound {
+        curvature: either(extrapolated_a.curvature, extrapolated_b.curvature),
+        radius: either(extrapolated_a.radius, extrapolated_b.radius),
+        inverse_square: either_constant(near_a.inverse_square, near_b.inverse_square),
+        floor: either_constant(near_a.floor, near_b.floor),
+        span: either_constant(near_a.span, near_b.span),
+    };
+    let keeper_loss = kept.loss(simd, keeper_off, keeper);
 
     let error_a = extrapolated_a.value_error + splat(side_a.trust().value_error);
     let error_b = extrapolated_b.value_error + splat(side_b.trust().value_error);
@@ -505,21 +503,6 @@ impl Near {
         }
     }
 
-    /// Bound of what a plane off by `off` in direction loses: the largest of `r·δ - λ (rise over the tangent plane)`, `|r| = off`,
-    /// by the curvature at the point, by the one anywhere, and by the length of δ.
-    #[inline(always)]
-    fn loss<S: Simd, N: Number<S>>(&self, simd: S, at: &Extrapolated<N>, off: N, multiplier: N) -> N {
-        let splat = |value: f64| N::splat(simd, value);
-        // By z, r is at most the bound of the inverse times as long.
-        let square = off * off * splat(self.inverse_square);
-        let strength = multiplier * at.curvature;
-        let slope = splat(0.25) * strength * at.radius;
-        let here = (square / strength).select(square.le(slope * slope), splat(f64::INFINITY));
-        let here = here.select(splat(0.0).le(slope), splat(f64::INFINITY));
-        let anywhere = (off * off) / (splat(2.0 * self.floor) * multiplier);
-        here.min(anywhere).min(off * splat(self.span))
-    }
-
     /// How far along the outward gradient to move so that an excess of the value over 1 is undone, and whether that is proven.
     #[inline(always)]
     fn move_inside<S: Simd, N: Number<S>>(
@@ -536,6 +519,35 @@ impl Near {
         let error = splat(self.turn).mul_add(length, gradient_error) * splat(4.0 / NUDGE);
         let near = N::and(simd, error.le(length), distance.abs().le(splat(self.leeway)));
         (-distance, N::and(simd, q.le(splat(0.1)), near))
+    }
+}
+
+/// What bounds the rise of a constraint over its tangent plane.
+struct Bound<N> {
+    curvature: N,
+    radius: N,
+    inverse_square: N,
+    floor: N,
+    span: N,
+}
+
+impl<N: Copy> Bound<N> {
+    /// Bound of what a plane off by `off` in direction loses: the largest of `r·δ - λ (rise over the tangent plane)`, `|r| = off`,
+    /// by the curvature at the point, by the one anywhere, and by the length of δ.
+    #[inline(always)]
+    fn loss<S: Simd>(&self, simd: S, off: N, multiplier: N) -> N
+    where
+        N: Number<S>,
+    {
+        let splat = |value: f64| N::splat(simd, value);
+        // By z, r is at most the bound of the inverse times as long.
+        let square = off * off * self.inverse_square;
+        let strength = multiplier * self.curvature;
+        let slope = splat(0.25) * strength * self.radius;
+        let fine = N::and(simd, square.le(slope * slope), splat(0.0).le(slope));
+        let here = (square / strength).select(fine, splat(f64::INFINITY));
+        let anywhere = off * off / (splat(2.0) * self.floor * multiplier);
+        here.min(anywhere).min(off * self.span)
     }
 }
 
