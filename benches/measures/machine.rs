@@ -41,6 +41,10 @@ impl Machine {
     pub(crate) fn print_load(&self) {
         if let [Some(before), Some(after)] = self.load {
             println!("load     {before} before, {after} after, on {} cores", self.cores);
+            // The bench itself is one.
+            if before.max(after) > 1.5 {
+                println!("         the machine was busy: repeat this on a quiet one before quoting it");
+            }
         }
     }
 

@@ -97,7 +97,7 @@ fn compare(pair: &Pair, kind: Kind, effort: &Effort, coal: Option<&Coal>) -> Res
     let mut coal = coal.map(|coal| coal.start(&scene)).transpose()?;
     for _ in 0..effort.passes {
         if let Some(coal) = &mut coal {
-            coal.run()?;
+            coal.pass()?;
         }
         rows.iter_mut().for_each(sweep::Row::pass);
     }

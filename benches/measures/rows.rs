@@ -6,7 +6,6 @@ use crate::peers::{Hulls, parry_pose};
 use crate::sweep::{Answer, Row, Target};
 use std::error::Error;
 use std::fs;
-use std::path::PathBuf;
 use sublevel::measure::{Options, Pose, WarmStart, distance, level_distance};
 
 /// Label of coal's rows.
@@ -23,8 +22,6 @@ pub(crate) struct Scene<'a> {
     pub(crate) pair: &'a Pair,
     pub(crate) kind: Kind,
     pub(crate) hulls: Hulls,
-    /// Where the poses of degree 6 are, for peers.
-    pub(crate) poses_file: PathBuf,
     /// Poses for the bodies of each degree: the same for all, unless grazing.
     poses: Vec<(usize, Vec<Trajectory>)>,
     parry_poses: Vec<Vec<parry3d_f64::math::Pose>>,
@@ -47,11 +44,12 @@ impl<'a> Scene<'a> {
                 })
                 .collect::<Result<_, Box<dyn Error>>>()?,
         };
-        let poses_file = folder()?.join(format!("{}-{}.poses", pair.name, kind.name()));
-        let mut scene = Self { pair, kind, hulls: Hulls::new(pair)?, poses_file, poses, parry_poses: Vec::new() };
+        let mut scene = Self { pair, kind, hulls: Hulls::new(pair)?, poses, parry_poses: Vec::new() };
         scene.parry_poses = scene.poses(DEGREE).iter().map(|t| t.iter().map(parry_pose).collect()).collect();
-        fs::write(&scene.poses_file, motion::to_text(scene.poses(DEGREE)))
-            .map_err(|error| format!("{}: {error}", scene.poses_file.display()))?;
+        // For a look at single poses with `sublevel measure --poses`.
+        let path = folder()?.join(format!("{}-{}.poses", pair.name, kind.name()));
+        fs::write(&path, motion::to_text(scene.poses(DEGREE)))
+            .map_err(|error| format!("{}: {error}", path.display()))?;
         Ok(scene)
     }
 

@@ -59,9 +59,9 @@ pub(crate) struct Row<'a> {
     pub(crate) label: String,
     pub(crate) targets: Vec<Target>,
     pub(crate) tally: Tally,
-    /// Nanoseconds per query of each pass so far.
-    passes: Vec<f64>,
-    time: Box<dyn Fn() -> f64 + 'a>,
+    /// Nanoseconds of each trajectory in each pass so far.
+    passes: Vec<Vec<f64>>,
+    time: Box<dyn Fn() -> Vec<f64> + 'a>,
 }
 
 impl<'a> Row<'a> {
@@ -73,14 +73,18 @@ impl<'a> Row<'a> {
     ) -> Self {
         let mut tally = Tally::default();
         // Counted before and not while timing.
-        walk(trajectories, &query, |answer| tally.add(&answer));
-        let queries = tally.queries as f64;
+        for trajectory in trajectories {
+            walk(trajectory, &query, |answer| tally.add(&answer));
+        }
         let time = Box::new(move || {
-            let start = Instant::now();
-            walk(trajectories, &query, |answer| {
-                black_box(answer);
-            });
-            start.elapsed().as_nanos() as f64 / queries
+            let timed = |trajectory: &Vec<P>| {
+                let start = Instant::now();
+                walk(trajectory, &query, |answer| {
+                    black_box(answer);
+                });
+                start.elapsed().as_nanos() as f64
+            };
+            trajectories.iter().map(timed).collect()
         });
         Self { label: label.into(), targets: Vec::new(), tally, passes: Vec::new(), time }
     }
@@ -105,19 +109,22 @@ impl<'a> Row<'a> {
         self.passes.push((self.time)());
     }
 
-    /// Nanoseconds per query, median of the passes.
+    /// Nanoseconds per query: the median pass of each trajectory, summed.
+    ///
+    /// Whole passes are long enough that other processes interrupt every one on a busy machine; trajectories are not.
     pub(crate) fn nanoseconds(&self) -> f64 {
-        median(&self.passes)
+        let trajectories = self.passes.first().map_or(0, Vec::len);
+        let of = |trajectory: usize| median(&self.passes.iter().map(|pass| pass[trajectory]).collect::<Vec<_>>());
+        (0..trajectories).map(of).sum::<f64>() / self.tally.queries as f64
     }
 }
 
+/// All poses of a trajectory, one after the other.
 #[inline(always)]
-fn walk<P, T: Default>(trajectories: &[Vec<P>], query: &impl Fn(&P, &mut T) -> Answer, mut record: impl FnMut(Answer)) {
-    for trajectory in trajectories {
-        let mut kept = T::default();
-        for pose in trajectory {
-            record(query(black_box(pose), &mut kept));
-        }
+fn walk<P, T: Default>(trajectory: &[P], query: &impl Fn(&P, &mut T) -> Answer, mut record: impl FnMut(Answer)) {
+    let mut kept = T::default();
+    for pose in trajectory {
+        record(query(black_box(pose), &mut kept));
     }
 }
 
