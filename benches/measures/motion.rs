@@ -13,7 +13,7 @@ pub(crate) type Trajectory = Vec<Pose>;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Kind {
-    /// Bodies of every degree are apart, mostly by 5 to 75 cm.
+    /// Bodies of every degree are apart, the closest of them mostly by 5 to 75 cm.
     Separated,
     /// The gap goes between a micrometre and a centimetre.
     Grazing,
@@ -192,6 +192,39 @@ fn settle(
 fn gap(a: &Body, b: &Body, pose: &Pose, warm: &mut WarmStart) -> (f64, Option<Vector3<f64>>) {
     let answer = distance(a, &Pose::identity(), b, pose, &Options::default(), warm);
     (answer.lower, answer.normal)
+}
+
+/// What a motion is like, in metres.
+#[derive(Clone, Copy, Debug, serde::Serialize)]
+pub(crate) struct Character {
+    /// Smallest, median and largest gap.
+    pub(crate) gaps: [f64; 3],
+    /// Median and largest way of the middle of `b` from pose to pose.
+    pub(crate) steps: [f64; 2],
+}
+
+impl Character {
+    /// Of `b` moving about `a`.
+    pub(crate) fn new(a: &Body, b: &Body, trajectories: &[Trajectory]) -> Self {
+        let poses = trajectories.iter().flatten();
+        let gaps = sorted(poses.map(|pose| gap(a, b, pose, &mut WarmStart::default()).0));
+        let middle = b.circumscribed().center;
+        let steps = sorted(trajectories.iter().flat_map(|trajectory| {
+            let way = |pair: &[Pose]| (pair[1].transform_point(&middle) - pair[0].transform_point(&middle)).norm();
+            trajectory.windows(2).map(way).collect::<Vec<_>>()
+        }));
+        let at = |values: &[f64], part: f64| {
+            let last = values.len().saturating_sub(1) as f64;
+            values.get((part * last).round() as usize).copied().unwrap_or(f64::NAN)
+        };
+        Self { gaps: [0.0, 0.5, 1.0].map(|part| at(&gaps, part)), steps: [0.5, 1.0].map(|part| at(&steps, part)) }
+    }
+}
+
+fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted
 }
 
 /// The poses as text: `r00 r01 r02 r10 .. r22 tx ty tz` on a line each, an empty line after each trajectory.

@@ -1,7 +1,7 @@
 //! Tables: times, ratios to coal, targets and whether they are met.
 
 use crate::machine::Machine;
-use crate::motion::Kind;
+use crate::motion::{Character, Kind};
 use crate::peers::Coal;
 use crate::rows::{COAL_COLD, COAL_WARM, DEGREE, Scene};
 use crate::sweep::{Row, Target};
@@ -21,6 +21,8 @@ pub(crate) struct Table {
     kind: Kind,
     hull_vertices: [usize; 2],
     poses: usize,
+    /// Of the bodies of degree 6.
+    motion: Character,
     rows: Vec<Line>,
 }
 
@@ -123,7 +125,9 @@ impl Table {
         if coal.is_some() {
             lines.extend([COAL_COLD, COAL_WARM].map(|label| line(label, None)));
         }
+        let (a, b) = scene.pair.bodies(DEGREE);
         Self {
+            motion: Character::new(a, b, scene.poses(DEGREE)),
             pair: scene.pair.name.clone(),
             kind: scene.kind,
             hull_vertices: [&scene.pair.a, &scene.pair.b].map(|object| object.hull.len()),
@@ -136,6 +140,12 @@ impl Table {
     pub(crate) fn print(&self, separated: Option<&Table>) {
         let [a, b] = self.hull_vertices;
         println!("\n{}, {}: {} poses, hulls of {a} and {b} vertices", self.pair, self.kind.name(), self.poses);
+        let Character { gaps: [least, middle, most], steps: [step, longest] } = self.motion;
+        println!(
+            "gaps of degree {DEGREE}: {least:.1e}, median {middle:.3}, {most:.3} m; steps: median {:.2}, longest {:.2} cm",
+            100.0 * step,
+            100.0 * longest
+        );
         println!(
             "{:<32} {:>9} {:>7} {:>7} {:>7} {:>6} {:>6} {:>7} {:>8}  targets",
             "", "ns", "x warm", "x cold", "x sep.", "mean", "worst", "failed", "overlaps"

@@ -45,7 +45,7 @@ impl Tally {
 pub(crate) enum Target {
     /// Part of the time of the row with this label.
     PartOf(&'static str, f64),
-    /// Nanoseconds, machines of this class.
+    /// Nanoseconds on machines of the class named in the figures: growth distance, rays, depth and batches have such.
     #[allow(dead_code)]
     Nanoseconds(f64),
     /// Iterations on average.
