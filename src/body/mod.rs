@@ -7,6 +7,7 @@
 mod extent;
 mod file;
 mod id;
+mod outline;
 mod placement;
 mod shapes;
 mod sphere;
@@ -15,6 +16,7 @@ mod trust;
 
 pub use file::BodyFileError;
 pub use id::{BodyId, ParseIdError};
+pub use outline::Outline;
 pub use placement::{Placement, Sample};
 pub use sphere::Sphere;
 pub use surface::Volume;
@@ -175,6 +177,7 @@ pub struct Body {
     z_extent: Vector3<f64>,
     trust: Trust,
     boundary: Vec<Vector3<f64>>,
+    outline: Outline,
     volume: Volume,
     points: Option<ContainedPoints>,
     provenance: Option<Provenance>,
@@ -222,6 +225,11 @@ impl Body {
         let boundary_z = boundary.iter().map(|x| normalization.linear * (x - normalization.center));
         let trust = Trust::new(&constraints, &normalization.linear, &inverse, &z_extent, boundary_z);
         let interior_z = normalization.linear * (interior_point - normalization.center);
+        let rays = Sphere::fine().vertices().iter().map(|u| {
+            let ray = inverse * u * surface::radius(&constraints, &interior_z, u);
+            (interior_point + ray - normalization.center, placement.highest(&constraints, &(interior_point + ray)))
+        });
+        let outline = Outline::new(rays.collect());
         let volume = surface::volume(&constraints, &normalization.linear, &interior_z);
         let id = BodyId::of(&normalization, &constraints);
         Ok(Self {
@@ -239,6 +247,7 @@ impl Body {
             z_extent,
             trust,
             boundary,
+            outline,
             volume,
             points: None,
             provenance: None,
@@ -313,6 +322,11 @@ impl Body {
     /// Error and curvature bounds near the body.
     pub fn trust(&self) -> &Trust {
         &self.trust
+    }
+
+    /// Where the body reaches farthest, roughly.
+    pub fn outline(&self) -> &Outline {
+        &self.outline
     }
 
     /// Points proven to lie in the body, close to its boundary, spread all around.

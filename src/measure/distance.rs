@@ -7,7 +7,7 @@ use super::options::Options;
 use super::pair::{Pair, Posed};
 use super::pose::Pose;
 use super::programs::{Closest, Level, points};
-use super::smooth::{Follow, Proven, Trace};
+use super::smooth::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
 use super::warm::{Hint, WarmStart};
 use crate::body::{Body, MAX_CONSTRAINTS};
 use crate::optimize::minimise;
@@ -68,12 +68,22 @@ pub fn distance(
     warm: &mut WarmStart,
 ) -> Distance {
     let mut spent = 0;
+    let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
     if let Hint::Smooth(trace) = &mut warm.hint {
-        let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
         let follow = Follow { a, pose_a, b, pose_b, tolerance, limit: options.max_iterations(), trace };
         match dispatch(follow) {
-            Ok(proven) => return proven.answer(a, pose_a),
+            Ok(proven) => return proven.answer(a, pose_a, tolerance),
             Err(rounds) => spent = rounds,
+        }
+    }
+    if matches!(warm.hint, Hint::Cold | Hint::Smooth(_)) && !options.exhausted(spent) {
+        let seek = Seek { a, pose_a, b, pose_b, tolerance, limit: SEEK_ROUNDS.min(options.max_iterations() - spent) };
+        match dispatch(seek) {
+            Ok((proven, trace)) => {
+                warm.hint = Hint::Smooth(trace);
+                return proven.answer(a, pose_a, tolerance);
+            }
+            Err(rounds) => spent += rounds,
         }
     }
     let pair = Pair::new(a, pose_a, b, pose_b);
@@ -132,6 +142,11 @@ impl<'a> Search<'a> {
         self.done() && (self.lower > 0.0 || self.upper == 0.0)
     }
 
+    /// Whether the bracket is narrow enough or no more may be done.
+    fn ended(&self) -> bool {
+        self.done() || self.options.exhausted(self.iterations)
+    }
+
     fn run(&mut self, hint: &Hint) {
         match hint {
             Hint::Apart { x_a, y_b, normal_a, active_a, active_b } => {
@@ -146,14 +161,14 @@ impl<'a> Search<'a> {
             }
             Hint::Cold | Hint::Level { .. } | Hint::Smooth(_) => {}
         }
-        if !self.done() {
+        if !self.ended() {
             self.closest(NEAR);
         }
-        if !self.decided() && self.lower < NEAR * self.pair.size() {
+        if !self.ended() && !self.decided() && self.lower < NEAR * self.pair.size() {
             self.contact();
         }
         // Where both are elongated or edged, first order from the deepest point is not close enough.
-        if !self.done() {
+        if !self.ended() {
             self.closest(NEAREST);
         }
     }
@@ -169,7 +184,8 @@ impl<'a> Search<'a> {
         let first = 0.5 * (start_x - start_y).norm_squared();
         let near = near * self.pair.size();
         let mut attempt = 1e-1;
-        let iterations = minimise(&Closest(self.pair), &mut v, first.max(1e-6), |iterate| {
+        minimise(&Closest(self.pair), &mut v, first.max(1e-6), |iterate| {
+            self.iterations += 1;
             let (x, y) = points(iterate.v);
             let apart = (x - y).norm();
             let value = 0.5 * apart * apart;
@@ -194,9 +210,13 @@ impl<'a> Search<'a> {
                     return ControlFlow::Break(());
                 }
             }
+            if self.options.exhausted(self.iterations) {
+                // What is known by now is the answer.
+                self.attain(&x, &y);
+                return ControlFlow::Break(());
+            }
             ControlFlow::Continue(())
         });
-        self.iterations += iterations;
     }
 
     /// The point deepest in both bodies: inside both, it proves overlap; else its multipliers show the normal.
@@ -211,7 +231,8 @@ impl<'a> Search<'a> {
         let mut v = SVector::from([start.x, start.y, start.z, first]);
         let mut attempt = 1e-1;
         let program = Level { pair, both: true, scale: 1.0 };
-        let iterations = minimise(&program, &mut v, 1.0, |iterate| {
+        minimise(&program, &mut v, 1.0, |iterate| {
+            self.iterations += 1;
             let x = iterate.v.xyz();
             if iterate.v[3] < 1.0 && self.common(&x) {
                 return ControlFlow::Break(());
@@ -230,9 +251,9 @@ impl<'a> Search<'a> {
                     }
                 }
             }
-            if self.decided() || attempt < 1e-18 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            let ended = self.decided() || attempt < 1e-18 || self.options.exhausted(self.iterations);
+            if ended { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
-        self.iterations += iterations;
     }
 
     fn newton(&mut self, x: Vector3<f64>, y: Vector3<f64>, n: Vector3<f64>, a: Active, b: Active) {
@@ -241,7 +262,8 @@ impl<'a> Search<'a> {
         }
         let distance = n.dot(&(x - y)).max(0.0);
         let mut newton = DistanceNewton { x, y, distance, n, a, b };
-        let steps = newton.run(self.pair, |at| {
+        let left = self.options.max_iterations() - self.iterations.min(self.options.max_iterations());
+        let steps = newton.run(self.pair, left, |at| {
             // Stationary points of the overlap are of no use here.
             if at.distance <= 0.0 {
                 return false;
@@ -251,7 +273,7 @@ impl<'a> Search<'a> {
             if self.raise(lower, &at.n) | self.attain(&at.x, &at.y) {
                 self.active = (at.a, at.b);
             }
-            self.done()
+            self.done() || self.options.exhausted(0)
         });
         self.iterations += steps;
     }
@@ -337,11 +359,11 @@ impl<'a> Search<'a> {
 }
 
 impl Proven {
-    fn answer(&self, a: &Body, pose_a: &Pose) -> Distance {
+    fn answer(&self, a: &Body, pose_a: &Pose, tolerance: f64) -> Distance {
         let center = a.normalization().center;
         let to_world = |v: [f64; 3]| pose_a.transform_point(&(center + Vector3::from(v)));
         Distance {
-            status: Status::Converged,
+            status: if self.upper - self.lower <= tolerance { Status::Converged } else { Status::BracketWide },
             lower: self.lower,
             upper: self.upper,
             witness_a: to_world(self.x),

@@ -183,8 +183,8 @@ pub(super) struct DistanceNewton {
 }
 
 impl DistanceNewton {
-    /// Iterates until `accept` takes one or they stop converging; returns the steps taken.
-    pub(super) fn run(&mut self, pair: &Pair<'_>, mut accept: impl FnMut(&Self) -> bool) -> u32 {
+    /// Iterates until `accept` takes one, they stop converging or the limit is reached; returns the steps taken.
+    pub(super) fn run(&mut self, pair: &Pair<'_>, limit: u32, mut accept: impl FnMut(&Self) -> bool) -> u32 {
         let n = self.n;
         if self.a.len == 0 || self.b.len == 0 || !self.a.fit(&pair.a, &self.x, &-n) || !self.b.fit(&pair.b, &self.y, &n)
         {
@@ -192,7 +192,7 @@ impl DistanceNewton {
         }
         let mut at = self.evaluate(pair);
         let mut last = f64::INFINITY;
-        for step in 1..=MAX_STEPS {
+        for step in 1..=MAX_STEPS.min(limit) {
             let Some(length) = self.step(&at) else {
                 // Where both are flat the system is singular, but the point at hand with its multipliers may do.
                 accept(self);
@@ -200,7 +200,8 @@ impl DistanceNewton {
             };
             at = self.evaluate(pair);
             // A long step has not converged: its bracket is not worth its cost, but for flat bodies now and then.
-            if (length < WORTH_A_BRACKET || step % 4 == 0) && accept(self) {
+            let last_step = step == MAX_STEPS.min(limit);
+            if (length < WORTH_A_BRACKET || step % 4 == 0 || last_step) && accept(self) {
                 return step;
             }
             // Near its solution Newton's step shrinks fast; one that does not is not near.
@@ -220,7 +221,7 @@ impl DistanceNewton {
             }
             last = length;
         }
-        MAX_STEPS
+        MAX_STEPS.min(limit)
     }
 
     /// Both bodies at the current iterate; the mean of both sides of u + w = 0 says what n is.
