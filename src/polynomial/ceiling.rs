@@ -190,7 +190,9 @@ mod tests {
         )
         .unwrap();
         let ceiling = p.third_ceiling(1.1).ceiling;
-        let change = |u: Vector3<f64>, v: Vector3<f64>| (p.evaluate(&u).hessian - p.evaluate(&v).hessian).symmetric_eigenvalues().amax() / (u - v).norm();
+        let change = |u: Vector3<f64>, v: Vector3<f64>| {
+            (p.evaluate(&u).hessian - p.evaluate(&v).hessian).symmetric_eigenvalues().amax() / (u - v).norm()
+        };
         let met = change(Vector3::new(1.0, 0.0, 0.0), Vector3::new(1.001, 0.0, 0.0));
         assert!(ceiling < 8.0 * met, "{ceiling} where {met} is met");
     }
