@@ -8,6 +8,7 @@
 
 mod bracket;
 mod distance;
+mod entry;
 mod level;
 mod linear;
 mod newton;
@@ -15,12 +16,14 @@ mod options;
 mod pair;
 mod pose;
 mod programs;
+mod ray;
 mod warm;
 
 pub use distance::{Distance, distance};
 pub use level::{LevelDistance, level_distance};
 pub use options::{DEFAULT_ACCURACY, MAX_ITERATIONS, Options, OptionsError};
 pub use pose::{Pose, PoseError};
+pub use ray::{Ray, RayCast, RayError, RayHit, cast_ray};
 pub use warm::WarmStart;
 
 /// How a solve ended. The bracket is true in every case.
