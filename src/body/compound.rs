@@ -9,13 +9,20 @@ pub const MAX_PARTS: usize = 256;
 /// What measures ask of a solid: the convex bodies it is the union of, all in one frame, and a ball around them.
 ///
 /// A [`Body`] is the union of itself; a measure of a single body pays nothing for this.
-pub trait Solid {
+pub trait Solid: sealed::Sealed {
     /// The parts, at least one and at most [`MAX_PARTS`].
     fn parts(&self) -> &[Body];
     /// A ball proven to contain all parts, metres.
     fn circumscribed(&self) -> &Ball;
     /// A box proven to contain all parts, metres.
     fn bounding_box(&self) -> &Aabb;
+}
+
+mod sealed {
+    /// Keeps the promise of at least one part.
+    pub trait Sealed {}
+    impl Sealed for super::Body {}
+    impl Sealed for super::Compound {}
 }
 
 impl Solid for Body {

@@ -2,13 +2,15 @@
 
 use super::Status;
 use super::bracket::{Multipliers, distance_lower, distance_upper};
+use super::decide::Goal;
 use super::newton::{Active, DistanceNewton};
 use super::options::Options;
 use super::pair::{Pair, Posed};
 use super::pose::Pose;
 use super::programs::{Closest, Level, points};
+use super::union;
 use super::warm::{Hint, WarmStart};
-use crate::body::{Body, MAX_CONSTRAINTS};
+use crate::body::{Body, MAX_CONSTRAINTS, Solid};
 use crate::optimize::minimise;
 use nalgebra::{SVector, Vector3};
 use std::ops::ControlFlow;
@@ -39,7 +41,8 @@ impl Distance {
     }
 }
 
-/// Euclidean distance between body `a` at `pose_a` and body `b` at `pose_b` (body to world), 0 when they touch or overlap.
+/// Euclidean distance between solid `a` at `pose_a` and solid `b` at `pose_b` (body to world), 0 when they touch or overlap;
+/// of solids with several parts, that of their closest parts.
 ///
 /// The bracket is as narrow as `options` ask, or the status says that it is not.
 /// Far from contact minimises ½|x - y|²; near contact, where that loses its curvature, the point deepest in both bodies
@@ -58,15 +61,26 @@ impl Distance {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn distance(
-    a: &Body,
+    a: &impl Solid,
     pose_a: &Pose,
-    b: &Body,
+    b: &impl Solid,
     pose_b: &Pose,
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> Distance {
+    union::distance(a, pose_a, b, pose_b, &Goal::NARROW, options, warm)
+}
+
+/// Distance of two bodies, or as much of it as the goal needs.
+pub(super) fn between(
+    (a, pose_a): (&Body, &Pose),
+    (b, pose_b): (&Body, &Pose),
+    goal: &Goal,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> Distance {
     let pair = Pair::new(a, pose_a, b, pose_b);
-    let mut search = Search::new(&pair, options);
+    let mut search = Search::new(&pair, goal, options);
     search.run(&warm.hint);
     *warm = search.hint();
     search.answer()
@@ -77,6 +91,7 @@ struct Search<'a> {
     pair: &'a Pair<'a>,
     options: &'a Options<'a>,
     tolerance: f64,
+    goal: Goal,
     lower: f64,
     upper: f64,
     x: Vector3<f64>,
@@ -94,13 +109,14 @@ const NEAR: f64 = 1e-3;
 const NEAREST: f64 = 1e-7;
 
 impl<'a> Search<'a> {
-    fn new(pair: &'a Pair<'a>, options: &'a Options<'a>) -> Self {
+    fn new(pair: &'a Pair<'a>, goal: &Goal, options: &'a Options<'a>) -> Self {
         let (x, y) = (pair.a.interior, pair.b.interior);
         let n = (x - y).try_normalize(0.0).unwrap_or_else(Vector3::x);
         Self {
             pair,
             options,
             tolerance: pair.tolerance(options.accuracy()),
+            goal: goal.in_units_of(pair.unit()),
             lower: 0.0,
             upper: f64::INFINITY,
             x,
@@ -111,8 +127,13 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn done(&self) -> bool {
+    /// Whether the bracket is as narrow as asked for.
+    fn narrow(&self) -> bool {
         self.upper.is_finite() && self.upper - self.lower <= self.tolerance
+    }
+
+    fn done(&self) -> bool {
+        self.narrow() || self.goal.met(self.lower, self.upper)
     }
 
     /// Whether the bracket is narrow enough and says on which side of contact the bodies are.
@@ -154,6 +175,9 @@ impl<'a> Search<'a> {
         v.fixed_rows_mut::<3>(0).copy_from(&start_x);
         v.fixed_rows_mut::<3>(3).copy_from(&start_y);
         self.attain(&start_x, &start_y);
+        if self.done() {
+            return;
+        }
         let first = 0.5 * (start_x - start_y).norm_squared();
         let near = near * self.pair.size();
         let mut attempt = 1e-1;
@@ -165,7 +189,8 @@ impl<'a> Search<'a> {
             if apart < self.pair.size() && self.common(&((x + y) * 0.5)) {
                 return ControlFlow::Break(());
             }
-            if apart < near {
+            // Early iterates, still outside the bodies, may meet by chance.
+            if apart < near && iterate.gap < near {
                 self.attain(&x, &y);
                 return ControlFlow::Break(());
             }
@@ -288,7 +313,7 @@ impl<'a> Search<'a> {
 
     fn hint(&self) -> WarmStart {
         if self.upper == 0.0 {
-            WarmStart { hint: Hint::Overlap { point_a: self.pair.to_a(&self.x) } }
+            Hint::Overlap { point_a: self.pair.to_a(&self.x) }.into()
         } else {
             WarmStart::apart(self.pair, &self.x, &self.y, &self.n, self.active.0.bits(), self.active.1.bits())
         }
@@ -304,7 +329,7 @@ impl<'a> Search<'a> {
             (self.pair.to_world(&self.y), n)
         };
         Distance {
-            status: if self.done() { Status::Converged } else { Status::BracketWide },
+            status: if self.narrow() { Status::Converged } else { Status::BracketWide },
             lower: self.lower * unit,
             upper: self.upper * unit,
             witness_a,

@@ -7,6 +7,7 @@
 //! threads.
 
 mod bracket;
+mod decide;
 mod distance;
 mod entry;
 mod level;
@@ -17,8 +18,10 @@ mod pair;
 mod pose;
 mod programs;
 mod ray;
+mod union;
 mod warm;
 
+pub use decide::{Decision, ThresholdError, WithinMargin, nearer_than, overlap, within_margin};
 pub use distance::{Distance, distance};
 pub use level::{LevelDistance, level_distance};
 pub use options::{DEFAULT_ACCURACY, MAX_ITERATIONS, Options, OptionsError};
