@@ -153,7 +153,7 @@ impl<'a> Search<'a> {
             Hint::Overlap { point_a } => {
                 self.common(&self.pair.a_to_query(point_a));
             }
-            Hint::Cold | Hint::Level { .. } => {}
+            Hint::Cold | Hint::Level { .. } | Hint::Single { .. } => {}
         }
         if !self.done() {
             self.closest(NEAR);

@@ -10,23 +10,30 @@ mod bracket;
 mod decide;
 mod distance;
 mod entry;
+mod half_space;
 mod level;
 mod linear;
 mod newton;
 mod options;
 mod pair;
+mod point;
 mod pose;
 mod programs;
 mod ray;
+mod single;
+mod sweep;
 mod union;
 mod warm;
 
 pub use decide::{Decision, ThresholdError, WithinMargin, nearer_than, overlap, within_margin};
 pub use distance::{Distance, distance};
+pub use half_space::{HalfSpace, HalfSpaceDistance, HalfSpaceError, distance_to_half_space};
 pub use level::{LevelDistance, level_distance};
 pub use options::{DEFAULT_ACCURACY, MAX_ITERATIONS, Options, OptionsError};
+pub use point::{PointDistance, PointError, PoseGradient, distance_to_point};
 pub use pose::{Pose, PoseError};
 pub use ray::{Ray, RayCast, RayError, RayHit, cast_ray};
+pub use sweep::{Sweep, cast_ball};
 pub use warm::WarmStart;
 
 /// How a solve ended. The bracket is true in every case.

@@ -27,6 +27,8 @@ pub(super) enum Hint {
     Overlap { point_a: Vector3<f64> },
     /// Minimiser of a level distance in B's frame.
     Level { x_b: Vector3<f64>, active_a: ActiveSet, active_b: ActiveSet },
+    /// Witness of a single body in its frame.
+    Single { y: Vector3<f64>, active: ActiveSet },
 }
 
 impl WarmStart {
