@@ -590,7 +590,7 @@ mod tests {
                     assert!((hit.upper - first.upper).abs() < 1e-8 && hit.lower <= first.upper, "seed {seed}");
                 }
                 (found, first) => {
-                    assert!(found == RayCast::Miss && first.is_none(), "seed {seed}: {found:?} {first:?}")
+                    assert!(found == RayCast::Miss && first.is_none(), "seed {seed}: {found:?} {first:?}");
                 }
             }
         }
