@@ -4,6 +4,7 @@
 //! recomputes everything derived from the polynomials. Lengths are metres in the body frame unless a name says otherwise;
 //! `z` is the unit-free normalized frame, `z = L (x - c)`.
 
+mod compound;
 mod extent;
 mod file;
 mod id;
@@ -14,6 +15,7 @@ mod sphere;
 mod surface;
 mod trust;
 
+pub use compound::{Compound, CompoundError, MAX_PARTS, Solid};
 pub use file::BodyFileError;
 pub use id::{BodyId, ParseIdError};
 pub use outline::Outline;
@@ -24,7 +26,7 @@ pub use trust::{ConstraintTrust, Trust};
 
 use crate::polynomial::{CertificateError, HessianGram, Polynomial};
 use extent::Extent;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Most constraints a body may have.
@@ -204,10 +206,20 @@ impl Body {
         if !(1..=MAX_CONSTRAINTS).contains(&constraints.len()) {
             return Err(BodyError::ConstraintCount(constraints.len()));
         }
-        let inverse = invert(&normalization)?;
         for (index, constraint) in constraints.iter().enumerate() {
             constraint.gram.prove(&constraint.polynomial).map_err(|source| BodyError::Certificate { index, source })?;
         }
+        Self::of_proven(name, normalization, constraints, interior)
+    }
+
+    /// The body of constraints that are proven sos-convex: proves the rest and computes everything derived.
+    fn of_proven(
+        name: &str,
+        normalization: Normalization,
+        constraints: Vec<Constraint>,
+        interior: Option<Vector3<f64>>,
+    ) -> Result<Self, BodyError> {
+        let inverse = invert(&normalization)?;
         let placement = Placement::new(normalization.linear, inverse, normalization.center, 0.0, 0.0);
         let interior_point =
             interior.unwrap_or_else(|| inverse * extent::deepest_point(&constraints).0 + normalization.center);
@@ -252,6 +264,22 @@ impl Body {
             points: None,
             provenance: None,
         })
+    }
+
+    /// The same set moved within its frame by `x -> rotation x + translation` (metres): another normalization for the same
+    /// constraints with the same certificates. Bounds are proven anew; the record of contained points does not move along.
+    ///
+    /// # Errors
+    /// Numbers that are not finite, or a place so far away that the body drowns in rounding.
+    pub fn moved(&self, rotation: &UnitQuaternion<f64>, translation: &Vector3<f64>) -> Result<Self, BodyError> {
+        let matrix = rotation.to_rotation_matrix();
+        let place = |x: &Vector3<f64>| matrix * x + translation;
+        // z = L (x - c) and x' = R x + t give z = L Rᵀ (x' - (R c + t)).
+        let Normalization { center, linear } = &self.normalization;
+        let normalization = Normalization { center: place(center), linear: linear * matrix.inverse().matrix() };
+        let interior = place(&self.interior_point);
+        let body = Self::of_proven(&self.name, normalization, self.constraints.clone(), Some(interior))?;
+        Ok(Self { provenance: self.provenance.clone(), ..body })
     }
 
     /// Name given by its maker; not part of the identity.

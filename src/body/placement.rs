@@ -90,6 +90,11 @@ impl Placement {
         &self.origin
     }
 
+    /// Bounds of the norms of the rows of `M`: how much each z_i changes per metre.
+    pub fn row_norms(&self) -> &Vector3<f64> {
+        &self.row_norms
+    }
+
     /// A linear functional `r·(v' - v̂)` of points as one of their normalized coordinates, `M⁻ᵀ r`, with a bound of the error
     /// of each component.
     pub fn functional(&self, r: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {

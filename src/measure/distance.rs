@@ -2,14 +2,16 @@
 
 use super::Status;
 use super::bracket::{Multipliers, distance_lower, distance_upper};
+use super::decide::Goal;
 use super::newton::{Active, DistanceNewton};
 use super::options::Options;
 use super::pair::{Pair, Posed};
 use super::pose::Pose;
 use super::programs::{Closest, Level, points};
 use super::smooth::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
+use super::union;
 use super::warm::{Hint, WarmStart};
-use crate::body::{Body, MAX_CONSTRAINTS};
+use crate::body::{Body, MAX_CONSTRAINTS, Solid};
 use crate::optimize::minimise;
 use crate::polynomial::dispatch;
 use nalgebra::{SVector, Vector3};
@@ -41,7 +43,8 @@ impl Distance {
     }
 }
 
-/// Euclidean distance between body `a` at `pose_a` and body `b` at `pose_b` (body to world), 0 when they touch or overlap.
+/// Euclidean distance between solid `a` at `pose_a` and solid `b` at `pose_b` (body to world), 0 when they touch or overlap;
+/// of solids with several parts, that of their closest parts.
 ///
 /// The bracket is as narrow as `options` ask, or the status says that it is not.
 /// Far from contact minimises ½|x - y|²; near contact, where that loses its curvature, the point deepest in both bodies
@@ -60,34 +63,49 @@ impl Distance {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn distance(
-    a: &Body,
+    a: &impl Solid,
     pose_a: &Pose,
-    b: &Body,
+    b: &impl Solid,
     pose_b: &Pose,
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> Distance {
-    let mut spent = 0;
+    union::distance(a, pose_a, b, pose_b, &Goal::NARROW, options, warm)
+}
+
+/// Distance of two bodies, or as much of it as the goal needs.
+pub(super) fn between(
+    (a, pose_a): (&Body, &Pose),
+    (b, pose_b): (&Body, &Pose),
+    goal: &Goal,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> Distance {
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
+    let mut spent = 0;
     if let Hint::Smooth(trace) = &mut warm.hint {
-        let follow = Follow { a, pose_a, b, pose_b, tolerance, limit: options.max_iterations(), trace };
+        let follow = Follow { a, pose_a, b, pose_b, goal, tolerance, limit: options.max_iterations(), trace };
         match dispatch(follow) {
             Ok(proven) => return proven.answer(a, pose_a, tolerance),
             Err(rounds) => spent = rounds,
         }
     }
-    if matches!(warm.hint, Hint::Cold | Hint::Smooth(_)) && !options.exhausted(spent) {
-        let seek = Seek { a, pose_a, b, pose_b, tolerance, limit: SEEK_ROUNDS.min(options.max_iterations() - spent) };
-        match dispatch(seek) {
+    let still_overlapping = matches!(warm.hint, Hint::Overlap { .. }) && {
+        let pair = Pair::new(a, pose_a, b, pose_b);
+        matches!(&warm.hint, Hint::Overlap { point_a } if pair.common(&pair.a_to_query(point_a)))
+    };
+    if !still_overlapping && !options.exhausted(spent) {
+        let limit = SEEK_ROUNDS.min(options.max_iterations() - spent);
+        match dispatch(Seek { a, pose_a, b, pose_b, goal, tolerance, limit }) {
             Ok((proven, trace)) => {
-                warm.hint = Hint::Smooth(trace);
-                return proven.answer(a, pose_a, tolerance);
+                *warm = Hint::Smooth(trace).into();
+                return Distance { iterations: spent + proven.rounds, ..proven.answer(a, pose_a, tolerance) };
             }
             Err(rounds) => spent += rounds,
         }
     }
     let pair = Pair::new(a, pose_a, b, pose_b);
-    let mut search = Search::new(&pair, options);
+    let mut search = Search::new(&pair, goal, options);
     search.iterations = spent;
     search.run(&warm.hint);
     *warm = search.hint();
@@ -99,6 +117,7 @@ struct Search<'a> {
     pair: &'a Pair<'a>,
     options: &'a Options<'a>,
     tolerance: f64,
+    goal: Goal,
     lower: f64,
     upper: f64,
     x: Vector3<f64>,
@@ -116,13 +135,14 @@ const NEAR: f64 = 1e-3;
 const NEAREST: f64 = 1e-7;
 
 impl<'a> Search<'a> {
-    fn new(pair: &'a Pair<'a>, options: &'a Options<'a>) -> Self {
+    fn new(pair: &'a Pair<'a>, goal: &Goal, options: &'a Options<'a>) -> Self {
         let (x, y) = (pair.a.interior, pair.b.interior);
         let n = (x - y).try_normalize(0.0).unwrap_or_else(Vector3::x);
         Self {
             pair,
             options,
             tolerance: pair.tolerance(options.accuracy()),
+            goal: goal.in_units_of(pair.unit()),
             lower: 0.0,
             upper: f64::INFINITY,
             x,
@@ -133,8 +153,13 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn done(&self) -> bool {
+    /// Whether the bracket is as narrow as asked for.
+    fn narrow(&self) -> bool {
         self.upper.is_finite() && self.upper - self.lower <= self.tolerance
+    }
+
+    fn done(&self) -> bool {
+        self.narrow() || self.goal.met(self.lower, self.upper)
     }
 
     /// Whether the bracket is narrow enough and says on which side of contact the bodies are.
@@ -159,7 +184,7 @@ impl<'a> Search<'a> {
             Hint::Overlap { point_a } => {
                 self.common(&self.pair.a_to_query(point_a));
             }
-            Hint::Cold | Hint::Level { .. } | Hint::Smooth(_) => {}
+            Hint::Cold | Hint::Level { .. } | Hint::Single { .. } | Hint::Smooth(_) => {}
         }
         if !self.ended() {
             self.closest(NEAR);
@@ -181,6 +206,9 @@ impl<'a> Search<'a> {
         v.fixed_rows_mut::<3>(0).copy_from(&start_x);
         v.fixed_rows_mut::<3>(3).copy_from(&start_y);
         self.attain(&start_x, &start_y);
+        if self.done() {
+            return;
+        }
         let first = 0.5 * (start_x - start_y).norm_squared();
         let near = near * self.pair.size();
         let mut attempt = 1e-1;
@@ -193,7 +221,8 @@ impl<'a> Search<'a> {
             if apart < self.pair.size() && self.common(&((x + y) * 0.5)) {
                 return ControlFlow::Break(());
             }
-            if apart < near {
+            // Early iterates, still outside the bodies, may meet by chance.
+            if apart < near && iterate.gap < near {
                 self.attain(&x, &y);
                 return ControlFlow::Break(());
             }
@@ -313,7 +342,7 @@ impl<'a> Search<'a> {
 
     /// Whether v is proven to lie in both bodies; if so the answer is 0.
     fn common(&mut self, v: &Vector3<f64>) -> bool {
-        let both = self.pair.a.contains(v) && self.pair.b.contains(v);
+        let both = self.pair.common(v);
         if both {
             (self.lower, self.upper, self.x, self.y) = (0.0, 0.0, *v, *v);
         }
@@ -322,9 +351,9 @@ impl<'a> Search<'a> {
 
     fn hint(&self) -> WarmStart {
         if self.upper == 0.0 {
-            WarmStart { hint: Hint::Overlap { point_a: self.pair.to_a(&self.x) } }
+            Hint::Overlap { point_a: self.pair.to_a(&self.x) }.into()
         } else if let Some(trace) = self.trace() {
-            WarmStart { hint: Hint::Smooth(trace) }
+            Hint::Smooth(trace).into()
         } else {
             WarmStart::apart(self.pair, &self.x, &self.y, &self.n, self.active.0.bits(), self.active.1.bits())
         }
@@ -347,7 +376,7 @@ impl<'a> Search<'a> {
             (self.pair.to_world(&self.y), n)
         };
         Distance {
-            status: if self.done() { Status::Converged } else { Status::BracketWide },
+            status: if self.narrow() { Status::Converged } else { Status::BracketWide },
             lower: self.lower * unit,
             upper: self.upper * unit,
             witness_a,

@@ -65,13 +65,8 @@ pub fn level_distance(
     let pair = Pair::new(a, pose_a, b, pose_b);
     let mut search = Search::new(&pair, options);
     search.run(&warm.hint);
-    *warm = WarmStart {
-        hint: Hint::Level {
-            x_b: pair.to_b(&search.x),
-            active_a: search.active.0.bits(),
-            active_b: search.active.1.bits(),
-        },
-    };
+    let (active_a, active_b) = (search.active.0.bits(), search.active.1.bits());
+    *warm = Hint::Level { x_b: pair.to_b(&search.x), active_a, active_b }.into();
     search.answer()
 }
 

@@ -140,6 +140,28 @@ impl Posed<'_> {
     }
 }
 
+impl<'a> Posed<'a> {
+    /// A body in its own frame, moved to the centre of its circumscribed ball and scaled to units of so many metres, a power
+    /// of two.
+    pub(super) fn own(body: &'a Body, unit: f64) -> Self {
+        let (origin, center) = (body.circumscribed().center, body.normalization().center);
+        let placement = Placement::new(
+            body.normalization().linear * unit,
+            body.inverse() / unit,
+            (center - origin) / unit,
+            0.0,
+            gamma(2) * (center.norm() + origin.norm()) / unit,
+        );
+        Self {
+            body,
+            placement,
+            interior: (body.interior_point() - origin) / unit,
+            center: Vector3::zeros(),
+            radius: body.circumscribed().radius / unit,
+        }
+    }
+}
+
 /// Two bodies in the query frame.
 pub(super) struct Pair<'a> {
     pub(super) a: Posed<'a>,
@@ -207,6 +229,11 @@ impl<'a> Pair<'a> {
             translation,
             pose_a: *pose_a,
         }
+    }
+
+    /// Whether v is proven to lie in both bodies.
+    pub(super) fn common(&self, v: &Vector3<f64>) -> bool {
+        self.a.contains(v) && self.b.contains(v)
     }
 
     /// Metres per unit of the query frame.

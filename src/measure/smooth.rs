@@ -5,6 +5,7 @@
 //! no evaluation: it is the sensitivity of the last answer to the motion. Along a smooth trajectory what that step misses is
 //! nearly the same each time, and is added on. One evaluation then mostly proves the answer or leaves one more step to it.
 
+use super::decide::Goal;
 use super::pose::Pose;
 use super::tangent::{Bend, Plane, Relative, Side, Step, bracket, moved, newton};
 use super::vector::{M3, V3, add_scaled, apply, apply_transposed, basis, dot, subtract};
@@ -101,6 +102,8 @@ pub(super) struct Follow<'a> {
     pub(super) pose_a: &'a Pose,
     pub(super) b: &'a Body,
     pub(super) pose_b: &'a Pose,
+    /// What the bracket has to decide, if that is less than being narrow.
+    pub(super) goal: &'a Goal,
     /// Width of the bracket that is narrow enough, metres.
     pub(super) tolerance: f64,
     /// Most rounds.
@@ -141,7 +144,7 @@ impl WithSimd for Follow<'_> {
         at.y = plus(at.y, apply::<S, f64>(&relative.rotation, trace.drift_y));
 
         let correct =
-            Correct { sides: (side_a, side_b), tolerance: self.tolerance, limit: MAX_ROUNDS.min(self.limit), longest };
+            Correct { sides: (side_a, side_b), goal: self.goal, tolerance: self.tolerance, limit: MAX_ROUNDS.min(self.limit), longest };
         let proven = correct.run(simd, &relative, at, self.trace)?;
         self.trace.drift_x = subtract::<S, f64>(proven.x, predicted.0);
         let drift_y = subtract::<S, f64>(proven.y, predicted.1);
@@ -157,6 +160,8 @@ pub(super) struct Seek<'a> {
     pub(super) pose_a: &'a Pose,
     pub(super) b: &'a Body,
     pub(super) pose_b: &'a Pose,
+    /// What the bracket has to decide, if that is less than being narrow.
+    pub(super) goal: &'a Goal,
     /// Width of the bracket that is narrow enough, metres.
     pub(super) tolerance: f64,
     /// Most rounds.
@@ -200,7 +205,7 @@ impl WithSimd for Seek<'_> {
         let side_a = Side::at_home(simd, self.a, usize::from(active[0]));
         let side_b = Side::away(self.b, usize::from(active[1]), &relative);
         let longest = LONGEST * self.a.trust().reach.min(self.b.trust().reach);
-        let correct = Correct { sides: (side_a, side_b), tolerance: self.tolerance, limit: self.limit, longest };
+        let correct = Correct { sides: (side_a, side_b), goal: self.goal, tolerance: self.tolerance, limit: self.limit, longest };
         let mut trace = Trace::blank(active);
         let proven = correct.run(simd, &relative, Iterate { x, y, frame }, &mut trace)?;
         Ok((proven, trace))
@@ -210,6 +215,7 @@ impl WithSimd for Seek<'_> {
 /// Correction of a start by Newton's method until the bracket is narrow.
 struct Correct<'a> {
     sides: (Side<'a, f64>, Side<'a, f64>),
+    goal: &'a Goal,
     tolerance: f64,
     limit: u32,
     /// Longest step, metres.
@@ -261,7 +267,8 @@ impl Correct<'_> {
             let found = bracket(simd, (side_a, &next_a), (side_b, &next_b), next);
             // Below the rounding floor no bracket gets, however long Newton's method goes on.
             let narrow = found.upper - found.lower <= self.tolerance.max(4.0 * found.rounding);
-            if narrow && found.lower > 0.0 {
+            let decided = narrow || self.goal.met(found.lower, found.upper);
+            if decided && found.lower > 0.0 {
                 let x = moved::<S, f64>(at.x, plus(step.dx, found.to_a), &at.frame);
                 let y = moved::<S, f64>(at.y, plus(step.dy, found.to_b), &at.frame);
                 if !(side_a.others_hold(simd, x) && side_b.others_hold(simd, y)) {

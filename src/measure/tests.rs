@@ -10,7 +10,7 @@ fn at(x: f64, y: f64, z: f64) -> Pose {
     Pose::from_quaternion(Vector3::new(x, y, z), [0.0, 0.0, 0.0, 1.0]).unwrap()
 }
 
-fn unit(random: &mut Seeded) -> Vector3<f64> {
+pub(super) fn unit(random: &mut Seeded) -> Vector3<f64> {
     loop {
         let v = Vector3::from_fn(|_, _| random.signed());
         if v.norm() > 0.1 && v.norm() <= 1.0 {
@@ -19,7 +19,7 @@ fn unit(random: &mut Seeded) -> Vector3<f64> {
     }
 }
 
-fn random_pose(random: &mut Seeded, distance: f64) -> Pose {
+pub(super) fn random_pose(random: &mut Seeded, distance: f64) -> Pose {
     let q = loop {
         let q: [f64; 4] = std::array::from_fn(|_| random.signed());
         let norm = q.iter().map(|c| c * c).sum::<f64>().sqrt();
@@ -152,7 +152,7 @@ fn boxes_meet_face_edge_and_corner() {
 }
 
 /// A mixed collection: curved, flat, edged, elongated.
-fn zoo(random: &mut Seeded) -> Vec<Body> {
+pub(super) fn zoo(random: &mut Seeded) -> Vec<Body> {
     let mut half = |aspect: f64| Vector3::from_fn(|_, _| aspect.powf(random.signed()));
     vec![
         Body::ball("ball", Vector3::zeros(), 0.7).unwrap(),
