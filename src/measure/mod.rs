@@ -8,6 +8,7 @@
 
 mod bracket;
 mod distance;
+mod growth;
 mod level;
 mod linear;
 mod newton;
@@ -15,12 +16,15 @@ mod options;
 mod pair;
 mod pose;
 mod programs;
+mod twist;
 mod warm;
 
 pub use distance::{Distance, distance};
+pub use growth::{GrowthDistance, growth_distance};
 pub use level::{LevelDistance, level_distance};
-pub use options::{DEFAULT_ACCURACY, MAX_ITERATIONS, Options, OptionsError};
+pub use options::{DEFAULT_ACCURACY, DEFAULT_DEPTH_ACCURACY, MAX_ITERATIONS, Options, OptionsError};
 pub use pose::{Pose, PoseError};
+pub use twist::Twist;
 pub use warm::WarmStart;
 
 /// How a solve ended. The bracket is true in every case.

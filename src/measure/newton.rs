@@ -20,14 +20,14 @@ use super::warm::ActiveSet;
 use nalgebra::{Matrix3, Vector3};
 
 /// Most constraints of one body that can be active at once in general position in space.
-const MAX_ACTIVE: usize = 3;
+pub(super) const MAX_ACTIVE: usize = 3;
 
 /// The active constraints of one body with their multipliers.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Active {
-    index: [usize; MAX_ACTIVE],
-    multiplier: [f64; MAX_ACTIVE],
-    len: usize,
+    pub(super) index: [usize; MAX_ACTIVE],
+    pub(super) multiplier: [f64; MAX_ACTIVE],
+    pub(super) len: usize,
 }
 
 impl Active {
@@ -77,11 +77,11 @@ impl Active {
         all
     }
 
-    fn iter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+    pub(super) fn iter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         self.index[..self.len].iter().copied().zip(self.multiplier[..self.len].iter().copied())
     }
 
-    fn push(&mut self, index: usize) -> bool {
+    pub(super) fn push(&mut self, index: usize) -> bool {
         let room = self.len < MAX_ACTIVE;
         if room {
             self.index[self.len] = index;
@@ -92,7 +92,7 @@ impl Active {
     }
 
     /// Drops the constraint with the most negative multiplier; whether there was one.
-    fn drop_negative(&mut self) -> bool {
+    pub(super) fn drop_negative(&mut self) -> bool {
         let worst = (0..self.len).min_by(|&i, &j| self.multiplier[i].total_cmp(&self.multiplier[j]));
         match worst {
             Some(k) if self.multiplier[k] < 0.0 && self.len > 1 => {
@@ -106,7 +106,7 @@ impl Active {
     }
 
     /// Least-squares multipliers of `Σ λ_i ∇g_i = target` at v. False if the gradients are dependent.
-    fn fit(&mut self, body: &Posed<'_>, v: &Vector3<f64>, target: &Vector3<f64>) -> bool {
+    pub(super) fn fit(&mut self, body: &Posed<'_>, v: &Vector3<f64>, target: &Vector3<f64>) -> bool {
         let gradients: [Vector3<f64>; MAX_ACTIVE] =
             std::array::from_fn(|k| if k < self.len { body.jet(self.index[k], v).gradient } else { Vector3::zeros() });
         let mut system: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
@@ -122,7 +122,7 @@ impl Active {
     }
 
     /// The most violated constraint that is not in the set, if violated by more than rounding.
-    fn violated(&self, body: &Posed<'_>, v: &Vector3<f64>, level: f64) -> Option<usize> {
+    pub(super) fn violated(&self, body: &Posed<'_>, v: &Vector3<f64>, level: f64) -> Option<usize> {
         (0..body.len())
             .filter(|i| !self.index[..self.len].contains(i))
             .map(|i| (i, body.jet(i, v).value - level))

@@ -231,4 +231,12 @@ impl<'a> Pair<'a> {
     pub(super) fn b_to_query(&self, y: &Vector3<f64>) -> Vector3<f64> {
         self.a_to_query(&(self.rotation * y + self.translation))
     }
+
+    /// Growth centres of both bodies, and a bound of the error of either.
+    pub(super) fn growth_centers(&self) -> (Vector3<f64>, Vector3<f64>, f64) {
+        let (a, b) = (self.a.body.growth_ball().center, self.b.body.growth_ball().center);
+        let relative = 2.0 * ROTATION_ERROR + gamma(16);
+        let lengths = a.norm() + b.norm() + self.translation.norm() + self.origin.norm();
+        (self.a_to_query(&a), self.b_to_query(&b), relative * lengths / self.unit * (1.0 + 1e-14))
+    }
 }
