@@ -239,4 +239,23 @@ impl<'a> Pair<'a> {
         let lengths = a.norm() + b.norm() + self.translation.norm() + self.origin.norm();
         (self.a_to_query(&a), self.b_to_query(&b), relative * lengths / self.unit * (1.0 + 1e-14))
     }
+
+    /// Of the stored boundary points of the first body the one farthest along a direction of the query frame.
+    pub(super) fn farthest_a(&self, n: &Vector3<f64>) -> Vector3<f64> {
+        self.a_to_query(&farthest(self.a.body.boundary(), n))
+    }
+
+    /// The same of the second body.
+    pub(super) fn farthest_b(&self, n: &Vector3<f64>) -> Vector3<f64> {
+        self.b_to_query(&farthest(self.b.body.boundary(), &(self.rotation.transpose() * n)))
+    }
+}
+
+fn farthest(points: &[Vector3<f64>], n: &Vector3<f64>) -> Vector3<f64> {
+    let first = (f64::NEG_INFINITY, Vector3::zeros());
+    let (_, point) = points.iter().fold(first, |best, point| {
+        let height = point.dot(n);
+        if height > best.0 { (height, *point) } else { best }
+    });
+    point
 }

@@ -34,7 +34,7 @@ use super::warm::{Hint, WarmStart};
 use crate::body::Body;
 use crate::optimize::minimise;
 use crate::polynomial::gamma;
-use nalgebra::{SVector, Vector3};
+use nalgebra::Vector3;
 use reach::{ReachNewton, ReachProgram};
 use std::ops::ControlFlow;
 

@@ -10,11 +10,11 @@
 //! Σ λ_i ∇g_i(x) = n,   Σ μ_j ∇h_j(y) = -n,   n·u = 1.
 //! ```
 
-use crate::body::largest;
 use crate::measure::linear::{Curvature, eliminate};
 use crate::measure::newton::{Active, MAX_ACTIVE};
 use crate::measure::options::Options;
 use crate::measure::pair::{Pair, Posed};
+use crate::measure::programs::near_boundary;
 use crate::optimize::{Program, Row, Rows};
 use crate::polynomial::Jet;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
@@ -46,18 +46,9 @@ impl<'a> ReachProgram<'a> {
     /// A strictly feasible start: most of the way from the centres to the boundaries, where these are curved.
     pub(super) fn start(&self) -> SVector<f64, 4> {
         let u = self.axes.column(0).into_owned();
-        let along = |body: &Posed<'_>, center: &Vector3<f64>, u: Vector3<f64>| {
-            let outside = center + u * (2.0 * body.reach(center));
-            let mut length = 0.9 * (body.enter(&outside, &-u) - center).dot(&u);
-            // Newton's method from far outside may have ended early.
-            let value = |length: f64| largest((0..body.len()).map(|i| body.jet(i, &(center + u * length)).value));
-            while length > 0.0 && !(value(length) < 1.0) {
-                length *= 0.7;
-            }
-            length
-        };
-        let (a, b) = (&self.pair.a, &self.pair.b);
-        SVector::from([along(a, &self.center_a, u), 0.0, 0.0, -along(b, &self.center_b, -u)])
+        let x = near_boundary(&self.pair.a, &self.center_a, &u);
+        let y = near_boundary(&self.pair.b, &self.center_b, &-u);
+        SVector::from([(x - self.center_a).dot(&u), 0.0, 0.0, (y - self.center_b).dot(&u)])
     }
 
     /// The two points of the variables.

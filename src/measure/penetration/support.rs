@@ -1,0 +1,138 @@
+//! Support points: the point of a body farthest along a direction, near enough to the best and proven inside.
+
+use crate::body::MAX_CONSTRAINTS;
+use crate::measure::linear::{Curvature, eliminate};
+use crate::measure::newton::{Active, MAX_ACTIVE};
+use crate::measure::pair::Posed;
+use crate::measure::programs::{Support, near_boundary};
+use crate::measure::warm::ActiveSet;
+use crate::optimize::minimise;
+use crate::polynomial::Jet;
+use nalgebra::{Matrix3, Vector3};
+use std::ops::ControlFlow;
+
+/// A point within whose displacement a point of the body lies, with the constraints that hold it back.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SupportPoint {
+    pub(super) x: Vector3<f64>,
+    pub(super) active: ActiveSet,
+}
+
+/// Most Newton steps before the interior-point method is taken.
+const MAX_STEPS: u32 = 8;
+
+/// Least cosine between n and the normal at a start worth starting from.
+const USEFUL: f64 = 0.7;
+
+/// Point of the body within about `tolerance` of the farthest along the unit vector n: by Newton's method from `start`, if
+/// that fails from `restart`, if that fails by the interior-point method. None only if rounding leaves no point inside.
+pub(super) fn support(
+    body: &Posed<'_>,
+    n: &Vector3<f64>,
+    tolerance: f64,
+    start: &SupportPoint,
+    restart: impl FnOnce() -> Vector3<f64>,
+) -> Option<SupportPoint> {
+    let found = newton(body, n, tolerance, start)
+        .or_else(|| {
+            let x = restart();
+            newton(body, n, tolerance, &SupportPoint { x, active: nearest_active(body, &x) })
+        })
+        .unwrap_or_else(|| interior_point(body, n, tolerance));
+    body.pull_in(&found.x).map(|x| SupportPoint { x, ..found })
+}
+
+/// The constraint nearest to being active.
+pub(super) fn nearest_active(body: &Posed<'_>, x: &Vector3<f64>) -> ActiveSet {
+    let values = (0..body.len()).map(|i| (i, body.jet(i, x).value));
+    1 << values.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(i, _)| i)
+}
+
+/// Newton's method on `Σ λ_i ∇g_i(x) = n, g_i(x) = 1`. None if it does not arrive.
+fn newton(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &SupportPoint) -> Option<SupportPoint> {
+    let mut x = start.x;
+    let mut active = Active::from_bits(start.active, body.len()).filter(|active| active.len > 0)?;
+    let blank = Jet { value: 0.0, gradient: Vector3::zeros(), hessian: Matrix3::zeros() };
+    for step in 0..MAX_STEPS {
+        let mut jets = [blank; MAX_ACTIVE];
+        for (jet, (i, _)) in jets.iter_mut().zip(active.iter()) {
+            *jet = body.jet(i, &x);
+        }
+        let jets = &jets[..active.len];
+        if step == 0 {
+            let normal = jets.iter().map(|jet| jet.gradient / jet.gradient.norm()).sum::<Vector3<f64>>();
+            if active.len == 1 && !(normal.dot(n) > USEFUL) {
+                return None;
+            }
+            fit(&mut active, jets, n)?;
+        }
+        let hessian = jets.iter().zip(active.multiplier).fold(Matrix3::zeros(), |h, (jet, m)| h + jet.hessian * m);
+        let curvature = Curvature::new(&hessian)?;
+        // M dx + Σ λ_i ∇g_i = n and ∇g_i·dx = 1 - g_i.
+        let mut dx = curvature.solve(n);
+        let mut columns = [Vector3::zeros(); MAX_ACTIVE];
+        let (mut m, mut r) = ([[0.0; MAX_ACTIVE]; MAX_ACTIVE], [0.0; MAX_ACTIVE]);
+        (0..MAX_ACTIVE).for_each(|i| m[i][i] = 1.0);
+        for (column, jet) in columns.iter_mut().zip(jets) {
+            *column = curvature.solve(&jet.gradient);
+        }
+        for (i, jet) in jets.iter().enumerate() {
+            for (j, column) in columns[..jets.len()].iter().enumerate() {
+                m[i][j] = jet.gradient.dot(column);
+            }
+            r[i] = jet.gradient.dot(&dx) - (1.0 - jet.value);
+        }
+        if jets.len() == 1 {
+            r[0] /= m[0][0];
+        } else {
+            eliminate(&mut m, &mut r)?;
+        }
+        for (column, multiplier) in columns.iter().zip(r) {
+            dx -= column * multiplier;
+        }
+        active.multiplier = r;
+        let length = dx.norm();
+        if !length.is_finite() {
+            return None;
+        }
+        x += dx * (0.5 / length).min(1.0);
+        // What is left to gain is below what this step promised, times the degree for pulling in.
+        if n.dot(&dx).abs() < 0.1 * tolerance && length < 0.5 {
+            let changed = active.drop_negative()
+                | (body.len() > active.len && active.violated(body, &x, 1.0).is_some_and(|i| active.push(i)));
+            if !changed {
+                let holds = active.multiplier[..active.len].iter().all(|&m| m >= 0.0);
+                return holds.then_some(SupportPoint { x, active: active.bits() });
+            }
+        }
+    }
+    None
+}
+
+/// Least-squares multipliers of `Σ λ_i ∇g_i = n`.
+fn fit(active: &mut Active, jets: &[Jet], n: &Vector3<f64>) -> Option<()> {
+    let (mut m, mut r) = ([[0.0; MAX_ACTIVE]; MAX_ACTIVE], [0.0; MAX_ACTIVE]);
+    for i in 0..MAX_ACTIVE {
+        m[i][i] = 1.0;
+        if let Some(jet) = jets.get(i) {
+            jets.iter().enumerate().for_each(|(j, other)| m[i][j] = jet.gradient.dot(&other.gradient));
+            r[i] = jet.gradient.dot(n);
+        }
+    }
+    eliminate(&mut m, &mut r)?;
+    active.multiplier = r;
+    Some(())
+}
+
+fn interior_point(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64) -> SupportPoint {
+    let mut x = near_boundary(body, &body.interior, n);
+    let mut active = nearest_active(body, &x);
+    let first = 0.1 * body.reach(&body.interior);
+    minimise(&Support { body, n: *n }, &mut x, first, |iterate| {
+        let mut multipliers = [0.0; MAX_CONSTRAINTS];
+        multipliers[..iterate.multipliers.len()].copy_from_slice(iterate.multipliers);
+        active = Active::from_multipliers(&multipliers).bits();
+        if iterate.gap < 0.1 * tolerance { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    SupportPoint { x, active }
+}
