@@ -33,13 +33,15 @@ pub(super) fn support(
     start: &SupportPoint,
     restart: impl FnOnce() -> Vector3<f64>,
 ) -> Option<SupportPoint> {
-    let found = newton(body, n, tolerance, start)
+    newton(body, n, tolerance, start)
         .or_else(|| {
             let x = restart();
             newton(body, n, tolerance, &SupportPoint { x, active: nearest_active(body, &x) })
         })
-        .unwrap_or_else(|| interior_point(body, n, tolerance));
-    body.pull_in(&found.x).map(|x| SupportPoint { x, ..found })
+        .or_else(|| {
+            let found = interior_point(body, n, tolerance);
+            body.pull_in(&found.x).map(|x| SupportPoint { x, ..found })
+        })
 }
 
 /// The constraint nearest to being active.
@@ -48,7 +50,7 @@ pub(super) fn nearest_active(body: &Posed<'_>, x: &Vector3<f64>) -> ActiveSet {
     1 << values.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(i, _)| i)
 }
 
-/// Newton's method on `Σ λ_i ∇g_i(x) = n, g_i(x) = 1`. None if it does not arrive.
+/// Newton's method on `Σ λ_i ∇g_i(x) = n, g_i(x) = 1`, ended by pulling in. None if it does not arrive.
 fn newton(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &SupportPoint) -> Option<SupportPoint> {
     let mut x = start.x;
     let mut active = Active::from_bits(start.active, body.len()).filter(|active| active.len > 0)?;
@@ -96,13 +98,20 @@ fn newton(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &SupportPoi
             return None;
         }
         x += dx * (0.5 / length).min(1.0);
-        // What is left to gain is below what this step promised, times the degree for pulling in.
-        if n.dot(&dx).abs() < 0.1 * tolerance && length < 0.5 {
+        // What this step gains across the surface and along it, n·dx = Σ λ_i (1 - g_i) + dx·M dx; the two may cancel. What
+        // is left is less, times the degree for pulling in.
+        let across: f64 = jets.iter().zip(r).map(|(jet, m)| (m * (1.0 - jet.value)).abs()).sum();
+        if across + dx.dot(&(hessian * dx)).abs() < 0.1 * tolerance && length < 0.5 {
             let changed = active.drop_negative()
                 | (body.len() > active.len && active.violated(body, &x, 1.0).is_some_and(|i| active.push(i)));
-            if !changed {
-                let holds = active.multiplier[..active.len].iter().all(|&m| m >= 0.0);
-                return holds.then_some(SupportPoint { x, active: active.bits() });
+            let holds = active.multiplier[..active.len].iter().all(|&m| m >= 0.0);
+            if !changed && holds {
+                let inside = body.pull_in(&x)?;
+                // Where the surface is flat a step means little: it may have gone far outside.
+                if n.dot(&(x - inside)) < tolerance {
+                    return Some(SupportPoint { x: inside, active: active.bits() });
+                }
+                x = inside;
             }
         }
     }
@@ -132,7 +141,11 @@ fn interior_point(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64) -> Support
         let mut multipliers = [0.0; MAX_CONSTRAINTS];
         multipliers[..iterate.multipliers.len()].copy_from_slice(iterate.multipliers);
         active = Active::from_multipliers(&multipliers).bits();
-        if iterate.gap < 0.1 * tolerance { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        // Complementarity vanishes with the slacks, before the surface is met.
+        let rows = || iterate.multipliers.iter().enumerate();
+        let outside = || rows().map(|(i, m)| m * (body.jet(i, iterate.v).value - 1.0).abs()).sum::<f64>();
+        let arrived = iterate.gap < 0.1 * tolerance && outside() < 0.1 * tolerance;
+        if arrived { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     SupportPoint { x, active }
 }
