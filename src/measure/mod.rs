@@ -17,6 +17,7 @@ mod pair;
 mod penetration;
 mod pose;
 mod programs;
+mod signed;
 mod twist;
 mod warm;
 
@@ -26,6 +27,7 @@ pub use level::{LevelDistance, level_distance};
 pub use options::{DEFAULT_ACCURACY, DEFAULT_DEPTH_ACCURACY, MAX_ITERATIONS, Options, OptionsError};
 pub use penetration::{Penetration, penetration};
 pub use pose::{Pose, PoseError};
+pub use signed::{SignedDistance, signed_distance};
 pub use twist::Twist;
 pub use warm::WarmStart;
 

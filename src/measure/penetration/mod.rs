@@ -85,10 +85,7 @@ pub fn penetration(
 ) -> Penetration {
     let pair = Pair::new(a, pose_a, b, pose_b);
     let mut best = Best::new(&pair);
-    if let Hint::Apart { x_a, y_b, normal_a, active_a, active_b } = &warm.hint {
-        let (a, b) = (SupportPoint { x: pair.a_to_query(x_a), active: *active_a }, SupportPoint { x: pair.b_to_query(y_b), active: *active_b });
-        best.polish(&pair, options, &a, &b, normal_a);
-    }
+    best.follow(&pair, options, &warm.hint);
     let proof = prove(&pair, options, &mut best);
     if let Some(hint) = best.hint(&pair) {
         *warm = hint;
@@ -150,6 +147,15 @@ impl Best {
         Self { depth: f64::INFINITY, n: None, x, y, active: Default::default(), iterations: 0 }
     }
 
+    /// Starts from the answer to an earlier query.
+    pub(super) fn follow(&mut self, pair: &Pair<'_>, options: &Options<'_>, hint: &Hint) {
+        if let Hint::Apart { x_a, y_b, normal_a, active_a, active_b } = hint {
+            let a = SupportPoint { x: pair.a_to_query(x_a), active: *active_a };
+            let b = SupportPoint { x: pair.b_to_query(y_b), active: *active_b };
+            self.polish(pair, options, &a, &b, normal_a);
+        }
+    }
+
     /// Newton's method on the optimality system of the distance, with a negative distance, from near support points.
     fn polish(&mut self, pair: &Pair<'_>, options: &Options<'_>, x: &SupportPoint, y: &SupportPoint, n: &Vector3<f64>) {
         let (a, b) = (Active::from_bits(x.active, pair.a.len()), Active::from_bits(y.active, pair.b.len()));
@@ -196,7 +202,7 @@ pub(super) struct Proof {
 
 /// Tables of directions: one that costs little to lay out and serves nearly all pairs, and one for ties.
 const FEW: usize = 256;
-const MANY: usize = 4096;
+const MANY: usize = 4608;
 
 /// Bounds the depth from below, improving the best direction on the way.
 pub(super) fn prove(pair: &Pair<'_>, options: &Options<'_>, best: &mut Best) -> Proof {

@@ -19,7 +19,7 @@ pub(super) struct SupportPoint {
 }
 
 /// Most Newton steps before the interior-point method is taken.
-const MAX_STEPS: u32 = 8;
+const MAX_STEPS: u32 = 12;
 
 /// Least cosine between n and the normal at a start worth starting from.
 const USEFUL: f64 = 0.7;
@@ -33,15 +33,18 @@ pub(super) fn support(
     start: &SupportPoint,
     restart: impl FnOnce() -> Vector3<f64>,
 ) -> Option<SupportPoint> {
-    newton(body, n, tolerance, start)
-        .or_else(|| {
-            let x = restart();
-            newton(body, n, tolerance, &SupportPoint { x, active: nearest_active(body, &x) })
-        })
-        .or_else(|| {
-            let found = interior_point(body, n, tolerance);
-            body.pull_in(&found.x).map(|x| SupportPoint { x, ..found })
-        })
+    if let Some(found) = newton(body, n, tolerance, start) {
+        return Some(found);
+    }
+    let x = restart();
+    let restart = SupportPoint { x, active: nearest_active(body, &x) };
+    if let Some(found) = newton(body, n, tolerance, &restart) {
+        return Some(found);
+    }
+    // The last resort ends early on surfaces that are flat at all scales, where what was known may be better.
+    let found = [interior_point(body, n, tolerance), *start, restart];
+    let inside = found.into_iter().filter_map(|point| body.pull_in(&point.x).map(|x| SupportPoint { x, ..point }));
+    inside.max_by(|p, q| n.dot(&p.x).total_cmp(&n.dot(&q.x)))
 }
 
 /// The constraint nearest to being active.
@@ -55,18 +58,32 @@ fn newton(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &SupportPoi
     let mut x = start.x;
     let mut active = Active::from_bits(start.active, body.len()).filter(|active| active.len > 0)?;
     let blank = Jet { value: 0.0, gradient: Vector3::zeros(), hessian: Matrix3::zeros() };
-    for step in 0..MAX_STEPS {
+    let mut fitted = false;
+    for _ in 0..MAX_STEPS {
         let mut jets = [blank; MAX_ACTIVE];
         for (jet, (i, _)) in jets.iter_mut().zip(active.iter()) {
             *jet = body.jet(i, &x);
         }
         let jets = &jets[..active.len];
-        if step == 0 {
+        if let [jet] = jets
+            && !(0.3..2.0).contains(&jet.value)
+        {
+            // A step along a flat surface went far: back to the level 1, exactly if g - min g is a power of the distance.
+            let (depth, degree) = (body.body.min_value(), body.body.degree() as f64);
+            let factor = ((1.0 - depth) / (jet.value - depth)).powf(1.0 / degree);
+            if !factor.is_finite() {
+                return None;
+            }
+            x = body.interior + (x - body.interior) * factor;
+            continue;
+        }
+        if !fitted {
             let normal = jets.iter().map(|jet| jet.gradient / jet.gradient.norm()).sum::<Vector3<f64>>();
             if active.len == 1 && !(normal.dot(n) > USEFUL) {
                 return None;
             }
             fit(&mut active, jets, n)?;
+            fitted = true;
         }
         let hessian = jets.iter().zip(active.multiplier).fold(Matrix3::zeros(), |h, (jet, m)| h + jet.hessian * m);
         let curvature = Curvature::new(&hessian)?;
