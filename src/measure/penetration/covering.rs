@@ -11,6 +11,10 @@
 //! Nothing is asked of the w, nor of where a cone is cut: better choices only give better bounds. A triangle with corners
 //! n_i whose support points w_i are known is cut into three parts, one for each w_i, that meet where two or three of the
 //! bounds are equal; for a smooth body what they lose falls with the square of the triangle's size.
+//!
+//! A triangle is split at the edge over which the support point turns most, where the bounds of its ends are equal. So
+//! triangles become narrow across the great circles where a flat face or a long edge makes the support point jump, and stay
+//! long along them.
 
 use super::support::SupportPoint;
 use nalgebra::{Matrix3, Vector3};
@@ -69,7 +73,27 @@ impl<const N: usize> Covering<N> {
 
     /// Whether one more triangle can be split.
     pub(super) fn has_room(&self) -> bool {
-        self.len + 3 <= N && self.open + 4 <= 2 * N
+        self.len < N && self.open + 2 <= 2 * N
+    }
+
+    /// The corners in an order that has the edge to be split first.
+    pub(super) fn widest_first(&self, [i, j, k]: [u16; 3]) -> [u16; 3] {
+        let turn = |[i, j, _]: &[u16; 3]| {
+            let [p, q] = [i, j].map(|i| &self.directions[usize::from(*i)]);
+            (p.w() - q.w()).dot(&(p.n - q.n))
+        };
+        let orders = [[i, j, k], [j, k, i], [k, i, j]];
+        orders.into_iter().max_by(|p, q| turn(p).total_cmp(&turn(q))).unwrap_or([i, j, k])
+    }
+
+    /// The direction between two others where their bounds are equal, not too near either.
+    pub(super) fn between(&self, i: u16, j: u16) -> Vector3<f64> {
+        let [p, q] = [i, j].map(|i| &self.directions[usize::from(i)]);
+        let turn = p.w() - q.w();
+        let (alpha, beta) = (-turn.dot(&q.n), turn.dot(&p.n));
+        let share = if alpha >= 0.0 && beta >= 0.0 && alpha + beta > 0.0 { alpha / (alpha + beta) } else { 0.5 };
+        let share = share.clamp(0.1, 0.9);
+        (p.n * share + q.n * (1.0 - share)).normalize()
     }
 
     pub(super) fn add(&mut self, direction: Direction) -> u16 {
@@ -169,6 +193,11 @@ fn lower_bound(n: [Vector3<f64>; 3], w: [Vector3<f64>; 3]) -> f64 {
     // Row i: the bound by w_i at each corner.
     let g = Matrix3::from_fn(|i, j| w[i].dot(&n[j]));
     let mut lowest = g[(0, 0)].min(g[(1, 1)]).min(g[(2, 2)]);
+    let mut meeting = 0.0_f64;
+    let mut offer = |a: Vector3<f64>| {
+        let value = (g * a).min() / (n[0] * a[0] + n[1] * a[1] + n[2] * a[2]).norm();
+        meeting = meeting.max(value);
+    };
     // Where on an edge the bounds of its two ends are equal.
     for (i, j) in [(0, 1), (1, 2), (2, 0)] {
         let (alpha, beta) = (g[(j, j)] - g[(i, j)], g[(i, i)] - g[(j, i)]);
@@ -176,17 +205,17 @@ fn lower_bound(n: [Vector3<f64>; 3], w: [Vector3<f64>; 3]) -> f64 {
         let c = n[i] * alpha + n[j] * beta;
         let value = (alpha * g[(i, i)] + beta * g[(i, j)]).min(alpha * g[(j, i)] + beta * g[(j, j)]);
         lowest = lowest.min(value / c.norm());
+        let mut a = Vector3::zeros();
+        (a[i], a[j]) = (alpha, beta);
+        offer(a);
     }
-    // Where all three are, or a point of the triangle near there.
+    // Where all three are equal, or a point of the triangle near there: the best of those at hand, for any will do.
     let row = |i: usize| g.row(i).transpose();
     let normal = (row(0) - row(1)).cross(&(row(0) - row(2)));
-    let normal = if normal.sum() < 0.0 { -normal } else { normal };
-    let mut a = normal.map(|a| a.max(0.0));
-    if !(a.sum() > 0.0) {
-        a = Vector3::repeat(1.0);
-    }
-    let m = n[0] * a[0] + n[1] * a[1] + n[2] * a[2];
-    lowest = lowest.min((g * a).min() / m.norm());
+    offer(normal.map(|a| a.max(0.0)));
+    offer(normal.map(|a| (-a).max(0.0)));
+    offer(Vector3::repeat(1.0));
+    lowest = lowest.min(meeting);
     // A NaN bounds nothing, and a negative r proves nothing; depths are at least 0.
     if lowest > 0.0 { lowest } else { 0.0 }
 }

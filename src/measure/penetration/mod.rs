@@ -94,7 +94,11 @@ pub fn penetration(
     let upper = best.depth.max(0.0);
     let unit = pair.unit();
     Penetration {
-        status: if upper - proof.lower <= tolerance(&pair, options, upper) { Status::Converged } else { Status::BracketWide },
+        status: if upper - proof.lower <= tolerance(&pair, options, upper) {
+            Status::Converged
+        } else {
+            Status::BracketWide
+        },
         lower: proof.lower * unit,
         upper: upper * unit,
         direction: best.n.filter(|_| !apart).map(|n| pair.direction_to_world(&n)),
@@ -123,7 +127,8 @@ pub(super) fn depth_along(
 ) -> f64 {
     let length = n.norm();
     let n = n / length;
-    let falls = descent(&pair.a, x, &n, &of_a.map(|m| m / length)) + descent(&pair.b, y, &-n, &of_b.map(|m| m / length));
+    let falls =
+        descent(&pair.a, x, &n, &of_a.map(|m| m / length)) + descent(&pair.b, y, &-n, &of_b.map(|m| m / length));
     let displaced = (pair.a.displacement(x) + pair.b.displacement(y)) * (1.0 + 1e-14);
     let bound = n.dot(&(y - x)) + falls + displaced + SLACK * (x.norm() + y.norm() + falls.abs());
     // A NaN bounds nothing.
@@ -176,7 +181,15 @@ impl Best {
     }
 
     /// Takes a direction if it is the shortest way out so far; returns its depth.
-    fn try_direction(&mut self, pair: &Pair<'_>, x: &Vector3<f64>, y: &Vector3<f64>, n: &Vector3<f64>, a: Active, b: Active) -> f64 {
+    fn try_direction(
+        &mut self,
+        pair: &Pair<'_>,
+        x: &Vector3<f64>,
+        y: &Vector3<f64>,
+        n: &Vector3<f64>,
+        a: Active,
+        b: Active,
+    ) -> f64 {
         let depth = depth_along(pair, x, y, n, &a.multipliers(), &b.multipliers());
         if depth < self.depth {
             if let Some(n) = n.try_normalize(0.0) {
@@ -201,7 +214,7 @@ pub(super) struct Proof {
 }
 
 /// Tables of directions: one that costs little to lay out and serves nearly all pairs, and one for ties.
-const FEW: usize = 256;
+const FEW: usize = 192;
 const MANY: usize = 4608;
 
 /// Bounds the depth from below, improving the best direction on the way.
@@ -216,7 +229,7 @@ pub(super) fn prove(pair: &Pair<'_>, options: &Options<'_>, best: &mut Best) -> 
 }
 
 /// Triangles split in one iteration.
-const SPLITS: u32 = 16;
+const SPLITS: u32 = 64;
 
 /// Support points are computed to this fraction of the width of the bracket asked for.
 const SUPPORT_ACCURACY: f64 = 0.1;
@@ -224,11 +237,16 @@ const SUPPORT_ACCURACY: f64 = 0.1;
 /// Sweeps the sphere of directions until the bracket is narrow; also tells whether the table was full first.
 #[inline(never)]
 fn sweep<const N: usize>(pair: &Pair<'_>, options: &Options<'_>, best: &mut Best) -> (Proof, bool) {
-    let mut sweep = Sweep { pair, options, covering: Covering::<N>::new(), floor: f64::INFINITY, error: 0.0, size: 0.0 };
+    let mut sweep =
+        Sweep { pair, options, covering: Covering::<N>::new(), floor: f64::INFINITY, error: 0.0, size: 0.0 };
     let full = sweep.run(best).is_none();
     let lower = sweep.covering.lowest().unwrap_or(f64::INFINITY).min(sweep.floor);
     let lower = if sweep.covering.directions().len() < 6 || best.depth <= 0.0 { 0.0 } else { lower.max(0.0) };
-    let proof = Proof { lower: lower.min(best.depth.max(0.0)), tied: sweep.tied(best), directions: sweep.covering.directions().len() as u32 };
+    let proof = Proof {
+        lower: lower.min(best.depth.max(0.0)),
+        tied: sweep.tied(best),
+        directions: sweep.covering.directions().len() as u32,
+    };
     (proof, full)
 }
 
@@ -293,7 +311,14 @@ impl<const N: usize> Sweep<'_, N> {
     }
 
     /// Support points along n and against it.
-    fn direction(&mut self, n: Vector3<f64>, parents: [u16; 2], a: &SupportPoint, b: &SupportPoint, best: &Best) -> Option<Direction> {
+    fn direction(
+        &mut self,
+        n: Vector3<f64>,
+        parents: [u16; 2],
+        a: &SupportPoint,
+        b: &SupportPoint,
+        best: &Best,
+    ) -> Option<Direction> {
         let depth = if best.depth.is_finite() { best.depth.abs() } else { self.size };
         let tolerance = SUPPORT_ACCURACY * tolerance(self.pair, self.options, depth);
         let a = support(&self.pair.a, &-n, tolerance, a, || self.pair.farthest_a(&-n))?;
@@ -332,13 +357,10 @@ impl<const N: usize> Sweep<'_, N> {
     }
 
     fn split(&mut self, cell: Cell, best: &Best) -> bool {
-        let [i, j, k] = cell.corners;
-        let Some(ij) = self.middle(i, j, best) else { return false };
-        let Some(jk) = self.middle(j, k, best) else { return false };
-        let Some(ki) = self.middle(k, i, best) else { return false };
-        for corners in [[i, ij, ki], [j, jk, ij], [k, ki, jk], [ij, jk, ki]] {
-            self.open(corners, best);
-        }
+        let [i, j, k] = self.covering.widest_first(cell.corners);
+        let Some(middle) = self.middle(i, j, best) else { return false };
+        self.open([i, middle, k], best);
+        self.open([middle, j, k], best);
         true
     }
 
@@ -347,7 +369,7 @@ impl<const N: usize> Sweep<'_, N> {
             return Some(index);
         }
         let [p, q] = [i, j].map(|i| self.covering.directions()[usize::from(i)]);
-        let n = (p.n + q.n).normalize();
+        let n = self.covering.between(i, j);
         let start = |p: &SupportPoint, q: &SupportPoint, n: &Vector3<f64>, single: bool| {
             let half = (p.x + q.x) * 0.5;
             let farther = if n.dot(&p.x) > n.dot(&q.x) { *p } else { *q };

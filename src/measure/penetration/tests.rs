@@ -73,7 +73,8 @@ fn coaxial_powers_come_out_along_the_axis_or_shorter() {
         let degrees = [2_u8, 4, 6, 8];
         let (ka, kb) = (degrees[(seed % 4) as usize], degrees[(seed / 4 % 4) as usize]);
         // Thin along the axis, so that no other way out is shorter.
-        let mut half = |_| Vector3::new(1.0, 3.0 + random.signed(), 3.0 + random.signed()) * 2_f64.powf(random.signed());
+        let mut half =
+            |_| Vector3::new(1.0, 3.0 + random.signed(), 3.0 + random.signed()) * 2_f64.powf(random.signed());
         let (ha, hb) = (half(0), half(1));
         let a = Body::superellipsoid("a", Vector3::zeros(), ha, ka).unwrap();
         let b = Body::superellipsoid("b", Vector3::zeros(), hb, kb).unwrap();
@@ -128,7 +129,10 @@ fn ellipsoid_pairs_against_brute_force() {
             let answer = penetration(&a, &pose_a, &b, &pose_b, &options, &mut WarmStart::default());
             let label = format!("seed {seed}, accuracy {accuracy:e}");
             // Brute force is above the truth by little.
-            assert!(answer.lower <= truth && truth <= answer.upper * (1.0 + 2.0 * accuracy), "{label}, {truth}: {answer:?}");
+            assert!(
+                answer.lower <= truth && truth <= answer.upper * (1.0 + 2.0 * accuracy),
+                "{label}, {truth}: {answer:?}"
+            );
             assert_eq!(answer.status, Status::Converged, "{label}: {answer:?}");
             assert!(answer.upper - answer.lower <= accuracy * answer.upper, "{label}: {answer:?}");
         }
@@ -165,7 +169,10 @@ fn moving_out_by_the_depth_separates_and_by_less_does_not() {
             assert!(still.lower == 0.0, "{label}: {still:?}");
         }
         let swapped = cold(b, &pose_b, a, &pose_a);
-        assert!(swapped.lower <= answer.upper * (1.0 + 1e-12) && answer.lower <= swapped.upper * (1.0 + 1e-12), "{label} swapped {swapped:?}");
+        assert!(
+            swapped.lower <= answer.upper * (1.0 + 1e-12) && answer.lower <= swapped.upper * (1.0 + 1e-12),
+            "{label} swapped {swapped:?}"
+        );
     }
     assert!(met > 60, "{met}");
 }
@@ -178,9 +185,12 @@ fn ties_are_flagged_and_limits_admitted() {
     assert!(concentric.tied, "{concentric:?}");
     let cube = Body::cuboid("cube", Vector3::repeat(1.0)).unwrap();
     let slab = Body::cuboid("slab", Vector3::new(1.0, 2.0, 3.0)).unwrap();
-    for (body, pose, depth, tied) in
-        [(&cube, at(0.5, 0.5, 0.0), 1.5, true), (&cube, at(0.5, 0.1, 0.0), 1.5, false), (&slab, at(0.0, 0.0, 0.0), 2.0, true), (&slab, at(0.1, 0.0, 0.0), 1.9, false)]
-    {
+    for (body, pose, depth, tied) in [
+        (&cube, at(0.5, 0.5, 0.0), 1.5, true),
+        (&cube, at(0.5, 0.1, 0.0), 1.5, false),
+        (&slab, at(0.0, 0.0, 0.0), 2.0, true),
+        (&slab, at(0.1, 0.0, 0.0), 1.9, false),
+    ] {
         let answer = cold(body, &Pose::identity(), body, &pose);
         check(&answer, depth, 1e-3, 2.0, body.name());
         assert_eq!(answer.tied, tied, "{answer:?}");
@@ -192,11 +202,23 @@ fn ties_are_flagged_and_limits_admitted() {
     assert!(wide.lower > 1.99 && wide.lower <= 2.0 && wide.upper >= 2.0, "{wide:?}");
     for limit in 1..=3 {
         let options = Options::default().with_max_iterations(limit).unwrap();
-        let answer = penetration(&cube, &Pose::identity(), &ball, &at(0.7, 0.3, 0.1), &options, &mut WarmStart::default());
+        let answer =
+            penetration(&cube, &Pose::identity(), &ball, &at(0.7, 0.3, 0.1), &options, &mut WarmStart::default());
         assert!(answer.lower <= 1.3 && 1.3 <= answer.upper * (1.0 + 1e-12), "{answer:?}");
-        assert_eq!(answer.status == Status::Converged, answer.upper - answer.lower <= 1e-3 * answer.upper, "{answer:?}");
+        assert_eq!(
+            answer.status == Status::Converged,
+            answer.upper - answer.lower <= 1e-3 * answer.upper,
+            "{answer:?}"
+        );
     }
     let stop = std::sync::atomic::AtomicBool::new(true);
-    let answer = penetration(&cube, &Pose::identity(), &ball, &at(0.7, 0.3, 0.1), &Options::default().with_stop(&stop), &mut WarmStart::default());
+    let answer = penetration(
+        &cube,
+        &Pose::identity(),
+        &ball,
+        &at(0.7, 0.3, 0.1),
+        &Options::default().with_stop(&stop),
+        &mut WarmStart::default(),
+    );
     assert!(answer.lower <= 1.3 && 1.3 <= answer.upper * (1.0 + 1e-12) && answer.iterations <= 2, "{answer:?}");
 }

