@@ -76,24 +76,44 @@ impl<const N: usize> Covering<N> {
         self.len < N && self.open + 2 <= 2 * N
     }
 
-    /// The corners in an order that has the edge to be split first.
-    pub(super) fn widest_first(&self, [i, j, k]: [u16; 3]) -> [u16; 3] {
-        let turn = |[i, j, _]: &[u16; 3]| {
-            let [p, q] = [i, j].map(|i| &self.directions[usize::from(*i)]);
-            (p.w() - q.w()).dot(&(p.n - q.n))
-        };
-        let orders = [[i, j, k], [j, k, i], [k, i, j]];
-        orders.into_iter().max_by(|p, q| turn(p).total_cmp(&turn(q))).unwrap_or([i, j, k])
-    }
-
-    /// The direction between two others where their bounds are equal, not too near either.
-    pub(super) fn between(&self, i: u16, j: u16) -> Vector3<f64> {
-        let [p, q] = [i, j].map(|i| &self.directions[usize::from(i)]);
-        let turn = p.w() - q.w();
-        let (alpha, beta) = (-turn.dot(&q.n), turn.dot(&p.n));
+    /// The corners of a triangle in an order that has the edge to be split first, and the direction to split it at: where
+    /// the bounds of its ends are equal, but not too near either.
+    pub(super) fn widest_edge(&self, [i, j, k]: [u16; 3]) -> ([u16; 3], Vector3<f64>) {
+        let (n, w) = self.known([i, j, k]);
+        let turn = |p: usize, q: usize| (w[p] - w[q]).dot(&(n[p] - n[q]));
+        let edges = [([i, j, k], (0, 1)), ([j, k, i], (1, 2)), ([k, i, j], (2, 0))];
+        let widest = edges.into_iter().max_by(|e, f| turn(e.1.0, e.1.1).total_cmp(&turn(f.1.0, f.1.1)));
+        let (order, (p, q)) = widest.unwrap_or(edges[0]);
+        let (alpha, beta) = ((w[q] - w[p]).dot(&n[q]), (w[p] - w[q]).dot(&n[p]));
         let share = if alpha >= 0.0 && beta >= 0.0 && alpha + beta > 0.0 { alpha / (alpha + beta) } else { 0.5 };
         let share = share.clamp(0.1, 0.9);
-        (p.n * share + q.n * (1.0 - share)).normalize()
+        (order, (n[p] * share + n[q] * (1.0 - share)).normalize())
+    }
+
+    /// The corners' directions with a point of B - A that is all but the farthest for each: of those of A and of B known at
+    /// the corners, which go together in any way, the farthest as seen from a little inside the triangle. At a corner where
+    /// the support point jumps that is the one on this side.
+    fn known(&self, corners: [u16; 3]) -> ([Vector3<f64>; 3], [Vector3<f64>; 3]) {
+        let corners = corners.map(|i| &self.directions[usize::from(i)]);
+        let n = corners.map(|corner| corner.n);
+        let middle = (n[0] + n[1] + n[2]) * 0.05;
+        let w = n.map(|n| {
+            let inside = n + middle;
+            let heights = |x: &Vector3<f64>| inside.dot(x);
+            let mut a = (corners[0].a.x, heights(&corners[0].a.x));
+            let mut b = (corners[0].b.x, heights(&corners[0].b.x));
+            for corner in &corners[1..] {
+                let (low, high) = (heights(&corner.a.x), heights(&corner.b.x));
+                if low < a.1 {
+                    a = (corner.a.x, low);
+                }
+                if high > b.1 {
+                    b = (corner.b.x, high);
+                }
+            }
+            b.0 - a.0
+        });
+        (n, w)
     }
 
     pub(super) fn add(&mut self, direction: Direction) -> u16 {
@@ -133,8 +153,8 @@ impl<const N: usize> Covering<N> {
 
     /// Lower bound of the support function on the triangle, but for rounding and the errors of the points.
     pub(super) fn bound(&self, corners: [u16; 3]) -> f64 {
-        let corners = corners.map(|i| &self.directions[usize::from(i)]);
-        lower_bound(corners.map(|c| c.n), corners.map(Direction::w))
+        let (n, w) = self.known(corners);
+        lower_bound(n, w)
     }
 
     /// The lowest bound of the open triangles.

@@ -357,19 +357,18 @@ impl<const N: usize> Sweep<'_, N> {
     }
 
     fn split(&mut self, cell: Cell, best: &Best) -> bool {
-        let [i, j, k] = self.covering.widest_first(cell.corners);
-        let Some(middle) = self.middle(i, j, best) else { return false };
+        let ([i, j, k], n) = self.covering.widest_edge(cell.corners);
+        let Some(middle) = self.middle(i, j, n, best) else { return false };
         self.open([i, middle, k], best);
         self.open([middle, j, k], best);
         true
     }
 
-    fn middle(&mut self, i: u16, j: u16, best: &Best) -> Option<u16> {
+    fn middle(&mut self, i: u16, j: u16, n: Vector3<f64>, best: &Best) -> Option<u16> {
         if let Some(index) = self.covering.middle(i, j) {
             return Some(index);
         }
         let [p, q] = [i, j].map(|i| self.covering.directions()[usize::from(i)]);
-        let n = self.covering.between(i, j);
         let start = |p: &SupportPoint, q: &SupportPoint, n: &Vector3<f64>, single: bool| {
             let half = (p.x + q.x) * 0.5;
             let farther = if n.dot(&p.x) > n.dot(&q.x) { *p } else { *q };
