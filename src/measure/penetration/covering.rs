@@ -79,7 +79,8 @@ impl<const N: usize> Covering<N> {
     /// The corners of a triangle in an order that has the edge to be split first, and the direction to split it at: where
     /// the bounds of its ends are equal, but not too near either.
     pub(super) fn widest_edge(&self, [i, j, k]: [u16; 3]) -> ([u16; 3], Vector3<f64>) {
-        let (n, w) = self.known([i, j, k]);
+        let corners = [i, j, k].map(|i| &self.directions[usize::from(i)]);
+        let (n, w) = (corners.map(|corner| corner.n), corners.map(Direction::w));
         let turn = |p: usize, q: usize| (w[p] - w[q]).dot(&(n[p] - n[q]));
         let edges = [([i, j, k], (0, 1)), ([j, k, i], (1, 2)), ([k, i, j], (2, 0))];
         let widest = edges.into_iter().max_by(|e, f| turn(e.1.0, e.1.1).total_cmp(&turn(f.1.0, f.1.1)));
@@ -90,30 +91,24 @@ impl<const N: usize> Covering<N> {
         (order, (n[p] * share + n[q] * (1.0 - share)).normalize())
     }
 
-    /// The corners' directions with a point of B - A that is all but the farthest for each: of those of A and of B known at
-    /// the corners, which go together in any way, the farthest as seen from a little inside the triangle. At a corner where
-    /// the support point jumps that is the one on this side.
-    fn known(&self, corners: [u16; 3]) -> ([Vector3<f64>; 3], [Vector3<f64>; 3]) {
-        let corners = corners.map(|i| &self.directions[usize::from(i)]);
-        let n = corners.map(|corner| corner.n);
-        let middle = (n[0] + n[1] + n[2]) * 0.05;
-        let w = n.map(|n| {
-            let inside = n + middle;
-            let heights = |x: &Vector3<f64>| inside.dot(x);
-            let mut a = (corners[0].a.x, heights(&corners[0].a.x));
-            let mut b = (corners[0].b.x, heights(&corners[0].b.x));
-            for corner in &corners[1..] {
-                let (low, high) = (heights(&corner.a.x), heights(&corner.b.x));
-                if low < a.1 {
-                    a = (corner.a.x, low);
+    /// For each corner a point of B - A: of those of A and of B known at the corners, which go together in any way, the
+    /// farthest as seen from a little inside the triangle. At a corner where the support point jumps that is the one on
+    /// this side.
+    fn mixed(corners: [&Direction; 3]) -> [Vector3<f64>; 3] {
+        let middle = (corners[0].n + corners[1].n + corners[2].n) * 0.01;
+        corners.map(|own| {
+            let inside = own.n + middle;
+            let (mut a, mut b) = (own.a.x, own.b.x);
+            for other in corners {
+                if inside.dot(&(other.a.x - a)) < 0.0 {
+                    a = other.a.x;
                 }
-                if high > b.1 {
-                    b = (corner.b.x, high);
+                if inside.dot(&(other.b.x - b)) > 0.0 {
+                    b = other.b.x;
                 }
             }
-            b.0 - a.0
-        });
-        (n, w)
+            b - a
+        })
     }
 
     pub(super) fn add(&mut self, direction: Direction) -> u16 {
@@ -153,8 +148,11 @@ impl<const N: usize> Covering<N> {
 
     /// Lower bound of the support function on the triangle, but for rounding and the errors of the points.
     pub(super) fn bound(&self, corners: [u16; 3]) -> f64 {
-        let (n, w) = self.known(corners);
-        lower_bound(n, w)
+        let corners = corners.map(|i| &self.directions[usize::from(i)]);
+        let n = corners.map(|corner| corner.n);
+        let (own, mixed) = (corners.map(Direction::w), Self::mixed(corners));
+        let bound = lower_bound(n, own);
+        if own == mixed { bound } else { bound.max(lower_bound(n, mixed)) }
     }
 
     /// The lowest bound of the open triangles.
