@@ -232,6 +232,12 @@ impl<'a> Pair<'a> {
         self.a_to_query(&(self.rotation * y + self.translation))
     }
 
+    /// Inverse of [`Pair::to_world`].
+    pub(super) fn world_to_query(&self, x: &Vector3<f64>) -> Vector3<f64> {
+        let from_a = x - self.pose_a.translation();
+        self.a_to_query(&self.pose_a.rotation().inverse_transform_vector(&from_a))
+    }
+
     /// Growth centres of both bodies, and a bound of the error of either.
     pub(super) fn growth_centers(&self) -> (Vector3<f64>, Vector3<f64>, f64) {
         let (a, b) = (self.a.body.growth_ball().center, self.b.body.growth_ball().center);

@@ -102,15 +102,19 @@ pub fn signed_distance(
         }
         best.follow(&pair, options, &warm.hint);
         known = Known::of(&pair, &best);
-        known.upper = known.upper.min(apart.upper / pair.unit());
+        known.attain(apart.upper / pair.unit(), pair.world_to_query(&apart.witness_a), pair.world_to_query(&apart.witness_b));
     }
     let mut tied = false;
     if best.depth > 0.0 && !known.narrow(&pair, options) {
         let proof = prove(&pair, options, &mut best);
         tied = proof.tied;
-        let before = known.upper;
+        let before = known;
         known = Known::of(&pair, &best);
-        known.upper = if proof.lower > 0.0 { -proof.lower } else { known.upper.min(before) };
+        if proof.lower > 0.0 {
+            known.upper = -proof.lower;
+        } else {
+            known.attain(before.upper, before.x, before.y);
+        }
     }
     if let Some(hint) = best.hint(&pair) {
         *warm = hint;
@@ -149,6 +153,13 @@ impl Known {
         match (pair.a.pull_in(&best.x), pair.b.pull_in(&best.y)) {
             (Some(x), Some(y)) => Self { lower, upper: distance_upper(pair, &x, &y), x, y },
             _ => Self { lower, upper: f64::INFINITY, x: best.x, y: best.y },
+        }
+    }
+
+    /// Takes points that are nearer.
+    fn attain(&mut self, upper: f64, x: Vector3<f64>, y: Vector3<f64>) {
+        if upper < self.upper {
+            (self.upper, self.x, self.y) = (upper, x, y);
         }
     }
 
