@@ -231,9 +231,6 @@ pub(super) fn prove(pair: &Pair<'_>, options: &Options<'_>, best: &mut Best) -> 
 /// Triangles split in one iteration.
 const SPLITS: u32 = 64;
 
-/// Support points are computed to this fraction of the width of the bracket asked for.
-const SUPPORT_ACCURACY: f64 = 0.1;
-
 /// Sweeps the sphere of directions until the bracket is narrow; also tells whether the table was full first.
 #[inline(never)]
 fn sweep<const N: usize>(pair: &Pair<'_>, options: &Options<'_>, best: &mut Best) -> (Proof, bool) {
@@ -319,8 +316,10 @@ impl<const N: usize> Sweep<'_, N> {
         b: &SupportPoint,
         best: &Best,
     ) -> Option<Direction> {
-        let depth = if best.depth.is_finite() { best.depth.abs() } else { self.size };
-        let tolerance = SUPPORT_ACCURACY * tolerance(self.pair, self.options, depth);
+        // Far above the best depth a rough bound will do.
+        let known = if best.depth.is_finite() { best.depth.abs() } else { self.size };
+        let surplus = n.dot(&(b.x - a.x)) - known;
+        let tolerance = (0.1 * tolerance(self.pair, self.options, known)).max(0.02 * surplus);
         let a = support(&self.pair.a, &-n, tolerance, a, || self.pair.farthest_a(&-n))?;
         let b = support(&self.pair.b, &n, tolerance, b, || self.pair.farthest_b(&n))?;
         self.error = self.error.max(self.pair.a.displacement(&a.x) + self.pair.b.displacement(&b.x));

@@ -53,8 +53,62 @@ pub(super) fn nearest_active(body: &Posed<'_>, x: &Vector3<f64>) -> ActiveSet {
     1 << values.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(i, _)| i)
 }
 
+/// [`newton`] for a body of one constraint: two solves and a few products per evaluation.
+fn smooth(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &Vector3<f64>) -> Option<SupportPoint> {
+    let mut x = *start;
+    let mut multiplier = None;
+    for _ in 0..MAX_STEPS {
+        let Jet { value, gradient, hessian } = body.jet(0, &x);
+        if !(0.3..2.0).contains(&value) {
+            // A step along a flat surface went far: back to the level 1, exactly if g - min g is a power of the distance.
+            let (depth, degree) = (body.body.min_value(), body.body.degree() as f64);
+            let factor = ((1.0 - depth) / (value - depth)).powf(1.0 / degree);
+            if !factor.is_finite() {
+                return None;
+            }
+            x = body.interior + (x - body.interior) * factor;
+            continue;
+        }
+        let squared = gradient.norm_squared();
+        let first = multiplier.is_none();
+        let old = multiplier.unwrap_or(gradient.dot(n) / squared);
+        if !(old > 0.0) || first && !(gradient.dot(n) > USEFUL * squared.sqrt()) {
+            return None;
+        }
+        // λ H dx + λ' g = n and g·dx = 1 - value, with H factored once.
+        let curvature = Curvature::new(&hessian)?;
+        let (along, across) = (curvature.solve(n), curvature.solve(&gradient));
+        let new = (gradient.dot(&along) - old * (1.0 - value)) / gradient.dot(&across);
+        let dx = (along - across * new) / old;
+        let length = dx.norm();
+        if !(length.is_finite() && new > 0.0) {
+            return None;
+        }
+        let bend = 0.5 * dx.dot(&(hessian * dx));
+        multiplier = Some(new);
+        if length > 0.5 {
+            x += dx * (0.5 / length);
+            continue;
+        }
+        // Second order: the surface bends away from the tangent by as much as the step gained along it.
+        x += dx - gradient * (bend / squared);
+        if (new * (1.0 - value)).abs() + 2.0 * new * bend < tolerance {
+            let inside = body.pull_in(&x)?;
+            // Where the surface is flat a step means little: it may have gone far outside.
+            if n.dot(&(x - inside)) < tolerance {
+                return Some(SupportPoint { x: inside, active: 1 });
+            }
+            x = inside;
+        }
+    }
+    None
+}
+
 /// Newton's method on `Σ λ_i ∇g_i(x) = n, g_i(x) = 1`, ended by pulling in. None if it does not arrive.
 fn newton(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &SupportPoint) -> Option<SupportPoint> {
+    if body.len() == 1 {
+        return smooth(body, n, tolerance, &start.x);
+    }
     let mut x = start.x;
     let mut active = Active::from_bits(start.active, body.len()).filter(|active| active.len > 0)?;
     let blank = Jet { value: 0.0, gradient: Vector3::zeros(), hessian: Matrix3::zeros() };
@@ -65,18 +119,6 @@ fn newton(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &SupportPoi
             *jet = body.jet(i, &x);
         }
         let jets = &jets[..active.len];
-        if let [jet] = jets
-            && !(0.3..2.0).contains(&jet.value)
-        {
-            // A step along a flat surface went far: back to the level 1, exactly if g - min g is a power of the distance.
-            let (depth, degree) = (body.body.min_value(), body.body.degree() as f64);
-            let factor = ((1.0 - depth) / (jet.value - depth)).powf(1.0 / degree);
-            if !factor.is_finite() {
-                return None;
-            }
-            x = body.interior + (x - body.interior) * factor;
-            continue;
-        }
         if !fitted {
             let normal = jets.iter().map(|jet| jet.gradient / jet.gradient.norm()).sum::<Vector3<f64>>();
             if active.len == 1 && !(normal.dot(n) > USEFUL) {

@@ -102,7 +102,11 @@ pub fn signed_distance(
         }
         best.follow(&pair, options, &warm.hint);
         known = Known::of(&pair, &best);
-        known.attain(apart.upper / pair.unit(), pair.world_to_query(&apart.witness_a), pair.world_to_query(&apart.witness_b));
+        known.attain(
+            apart.upper / pair.unit(),
+            pair.world_to_query(&apart.witness_a),
+            pair.world_to_query(&apart.witness_b),
+        );
     }
     let mut tied = false;
     if best.depth > 0.0 && !known.narrow(&pair, options) {
