@@ -1,10 +1,11 @@
-//! Measures between two posed bodies: Euclidean distance and level distance, each inside a proven bracket.
+//! Measures between two posed bodies: Euclidean, signed, level and growth distance and penetration depth, each inside a
+//! proven bracket.
 //!
-//! Every measure is a convex program. A warm start is corrected by Newton's method on the optimality system of its active
-//! constraints (`newton`); where that does not apply or does not converge, an interior-point method
-//! ([`crate::optimize`]) does, from a start that is always feasible. Neither is trusted: an answer is accepted when its
-//! bracket, which holds for any trial point (`bracket`), is narrow enough. This room knows neither clock nor allocator nor
-//! threads.
+//! Every measure but the depth, which is the least of many convex programs, is one convex program. A warm start is
+//! corrected by Newton's method on the optimality system of its active constraints (`newton`); where that does not apply or
+//! does not converge, an interior-point method ([`crate::optimize`]) does, from a start that is always feasible. Neither is
+//! trusted: an answer is accepted when its bracket, which holds for any trial point (`bracket`), is narrow enough. This room
+//! knows neither clock nor allocator nor threads.
 
 mod bracket;
 mod distance;

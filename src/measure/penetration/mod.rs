@@ -22,7 +22,7 @@ use super::warm::{Hint, WarmStart};
 use crate::body::Body;
 use covering::{Cell, Covering, Direction};
 use nalgebra::Vector3;
-use support::{SupportPoint, nearest_active, support};
+use support::{SupportPoint, facing, support};
 
 /// Penetration depth with its proof, lengths in metres, vectors in the world frame.
 #[derive(Clone, Copy, Debug)]
@@ -191,10 +191,10 @@ impl Best {
         b: Active,
     ) -> f64 {
         let depth = depth_along(pair, x, y, n, &a.multipliers(), &b.multipliers());
-        if depth < self.depth {
-            if let Some(n) = n.try_normalize(0.0) {
-                (self.depth, self.n, self.x, self.y, self.active) = (depth, Some(n), *x, *y, (a, b));
-            }
+        if depth < self.depth
+            && let Some(n) = n.try_normalize(0.0)
+        {
+            (self.depth, self.n, self.x, self.y, self.active) = (depth, Some(n), *x, *y, (a, b));
         }
         depth
     }
@@ -269,8 +269,8 @@ impl<const N: usize> Sweep<'_, N> {
             let mut n = Vector3::zeros();
             n[k % 3] = if k < 3 { 1.0 } else { -1.0 };
             let (x, y) = (self.pair.farthest_a(&-n), self.pair.farthest_b(&n));
-            let start_a = SupportPoint { x, active: nearest_active(&self.pair.a, &x) };
-            let start_b = SupportPoint { x: y, active: nearest_active(&self.pair.b, &y) };
+            let start_a = SupportPoint { x, active: facing(&self.pair.a, &x, &-n) };
+            let start_b = SupportPoint { x: y, active: facing(&self.pair.b, &y, &n) };
             let Some(direction) = self.direction(n, [0, 0], &start_a, &start_b, best) else { return Some(()) };
             self.covering.add(direction);
         }

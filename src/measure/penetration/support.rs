@@ -37,7 +37,7 @@ pub(super) fn support(
         return Some(found);
     }
     let x = restart();
-    let restart = SupportPoint { x, active: nearest_active(body, &x) };
+    let restart = SupportPoint { x, active: facing(body, &x, n) };
     if let Some(found) = newton(body, n, tolerance, &restart) {
         return Some(found);
     }
@@ -47,10 +47,17 @@ pub(super) fn support(
     inside.max_by(|p, q| n.dot(&p.x).total_cmp(&n.dot(&q.x)))
 }
 
-/// The constraint nearest to being active.
-pub(super) fn nearest_active(body: &Posed<'_>, x: &Vector3<f64>) -> ActiveSet {
-    let values = (0..body.len()).map(|i| (i, body.jet(i, x).value));
-    1 << values.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(i, _)| i)
+/// Of the constraints nearly active at x the one that faces n best.
+pub(super) fn facing(body: &Posed<'_>, x: &Vector3<f64>, n: &Vector3<f64>) -> ActiveSet {
+    let mut best = (0, f64::NEG_INFINITY);
+    for i in 0..body.len() {
+        let jet = body.jet(i, x);
+        let cosine = jet.gradient.dot(n) / jet.gradient.norm();
+        if jet.value > 0.9 && cosine > best.1 {
+            best = (i, cosine);
+        }
+    }
+    1 << best.0
 }
 
 /// [`newton`] for a body of one constraint: two solves and a few products per evaluation.
@@ -71,7 +78,9 @@ fn smooth(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &Vector3<f6
         }
         let squared = gradient.norm_squared();
         let first = multiplier.is_none();
-        let old = multiplier.unwrap_or(gradient.dot(n) / squared);
+        // At the solution n·v = λ g·v for every v, and along this one whatever the units of the axes.
+        let outward = x - body.interior;
+        let old = multiplier.unwrap_or(n.dot(&outward) / gradient.dot(&outward));
         if !(old > 0.0) || first && !(gradient.dot(n) > USEFUL * squared.sqrt()) {
             return None;
         }
@@ -92,7 +101,7 @@ fn smooth(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &Vector3<f6
         }
         // Second order: the surface bends away from the tangent by as much as the step gained along it.
         x += dx - gradient * (bend / squared);
-        if (new * (1.0 - value)).abs() + 2.0 * new * bend < tolerance {
+        if new * (1.0 - value).abs() + 2.0 * old.max(new) * bend < tolerance {
             let inside = body.pull_in(&x)?;
             // Where the surface is flat a step means little: it may have gone far outside.
             if n.dot(&(x - inside)) < tolerance {
@@ -157,10 +166,18 @@ fn newton(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &SupportPoi
             return None;
         }
         x += dx * (0.5 / length).min(1.0);
+        if length > 0.5 {
+            // Along a flat face, as far as the next one.
+            if let Some(next) = active.violated(body, &x, 1.0) {
+                active.push(next);
+            }
+            fitted = false;
+            continue;
+        }
         // What this step gains across the surface and along it, n·dx = Σ λ_i (1 - g_i) + dx·M dx; the two may cancel. What
         // is left is less, times the degree for pulling in.
         let across: f64 = jets.iter().zip(r).map(|(jet, m)| (m * (1.0 - jet.value)).abs()).sum();
-        if across + dx.dot(&(hessian * dx)).abs() < 0.1 * tolerance && length < 0.5 {
+        if across + dx.dot(&(hessian * dx)).abs() < 0.1 * tolerance {
             let changed = active.drop_negative()
                 | (body.len() > active.len && active.violated(body, &x, 1.0).is_some_and(|i| active.push(i)));
             let holds = active.multiplier[..active.len].iter().all(|&m| m >= 0.0);
@@ -194,7 +211,7 @@ fn fit(active: &mut Active, jets: &[Jet], n: &Vector3<f64>) -> Option<()> {
 
 fn interior_point(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64) -> SupportPoint {
     let mut x = near_boundary(body, &body.interior, n);
-    let mut active = nearest_active(body, &x);
+    let mut active = facing(body, &x, n);
     let first = 0.1 * body.reach(&body.interior);
     minimise(&Support { body, n: *n }, &mut x, first, |iterate| {
         let mut multipliers = [0.0; MAX_CONSTRAINTS];

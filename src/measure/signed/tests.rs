@@ -119,9 +119,9 @@ fn gradients_are_the_derivatives_on_both_sides() {
                 let exact = if component < 3 { gradient.linear } else { gradient.angular }.dot(&axis);
                 if (e1 - e2).abs() * unit < 1e-7 {
                     if answer.upper < 0.0 {
-                        inside += 1
+                        inside += 1;
                     } else {
-                        apart += 1
+                        apart += 1;
                     }
                     let error = (difference - exact).abs() * unit;
                     let label = format!("seed {seed} {}-{} body {which} component {component}", a.name(), b.name());
