@@ -68,6 +68,8 @@ struct File {
     interior_point_m: [f64; 3],
     min_value: f64,
     in_radius_m: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    growth_center_m: Option<[f64; 3]>,
     circumscribed_ball: FileBall,
     bounding_box: FileBox,
     volume_m3: f64,
@@ -148,13 +150,17 @@ impl Body {
             linear: Matrix3::from_fn(|i, j| file.normalization.linear[i][j]),
         };
         let interior = Vector3::from(file.interior_point_m);
-        let recomputed = super::BodyId::of(&normalization, &constraints).to_string();
+        let growth_center = file.growth_center_m.map(Vector3::from);
+        let recomputed = super::BodyId::of(&normalization, &constraints, growth_center.as_ref()).to_string();
         if recomputed != file.id {
             return Err(BodyFileError::Derived { field: "id", stored: file.id, recomputed });
         }
         check_notes(&file)?;
         let mut body = Self::with_interior(&file.name, normalization, constraints, Some(interior))?;
         check_derived(&file, &body)?;
+        if let Some(center) = growth_center {
+            body = body.with_growth_center(center)?;
+        }
         body.points = file.contained_points;
         body.provenance = file.provenance;
         Ok(body)
@@ -265,6 +271,7 @@ impl From<&Body> for File {
             interior_point_m: body.interior_point.into(),
             min_value: body.min_value,
             in_radius_m: body.in_radius,
+            growth_center_m: body.growth.map(|ball| ball.center.into()),
             circumscribed_ball: FileBall { center_m: center.into(), radius_m: radius },
             bounding_box: FileBox { min_m: min.into(), max_m: max.into() },
             volume_m3: body.volume.volume_m3,

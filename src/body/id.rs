@@ -1,17 +1,23 @@
 //! Identity of a body: a hash of what it is, not of what it is called.
 
 use super::{Constraint, Normalization};
+use nalgebra::Vector3;
 use sha2::{Digest, Sha256};
 use std::fmt;
 use std::str::FromStr;
 
 /// SHA-256 of a body's content: center, linear (rows), then per constraint the number of its terms and each term's three
-/// exponents and coefficient in lexicographic order of the exponents, everything as little-endian f64.
+/// exponents and coefficient in lexicographic order of the exponents, then, if one was set, -1 and the growth centre;
+/// everything as little-endian f64.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct BodyId([u8; 32]);
 
 impl BodyId {
-    pub(super) fn of(normalization: &Normalization, constraints: &[Constraint]) -> Self {
+    pub(super) fn of(
+        normalization: &Normalization,
+        constraints: &[Constraint],
+        growth_center: Option<&Vector3<f64>>,
+    ) -> Self {
         let mut hash = Sha256::new();
         let mut feed = |value: f64| hash.update(value.to_le_bytes());
         normalization.center.iter().for_each(|&value| feed(value));
@@ -24,12 +30,17 @@ impl BodyId {
                 feed(*coefficient);
             }
         }
+        if let Some(center) = growth_center {
+            // No number of terms is negative.
+            feed(-1.0);
+            center.iter().for_each(|&value| feed(value));
+        }
         Self(hash.finalize().into())
     }
 }
 
 /// SHA-256 of points in metres, in their order, as little-endian f64.
-pub(super) fn hash_points(points: &[nalgebra::Vector3<f64>]) -> String {
+pub(super) fn hash_points(points: &[Vector3<f64>]) -> String {
     let mut hash = Sha256::new();
     for point in points {
         point.iter().for_each(|value| hash.update(value.to_le_bytes()));

@@ -142,6 +142,15 @@ pub enum BodyError {
          for its size; move the frame to the body"
     )]
     Thin,
+    /// A growth centre that is not proven to lie well inside.
+    #[error(
+        "the growth centre {center:?} is not proven inside; take a point farther from the boundary, such as the interior \
+         point of the body"
+    )]
+    GrowthCenter {
+        /// The point, metres in the body frame.
+        center: [f64; 3],
+    },
     /// No proof that the body is bounded.
     #[error(
         "the body is not proven bounded (residual {residual:.1e}); add constraints that close it in every direction"
@@ -174,6 +183,7 @@ pub struct Body {
     interior_point: Vector3<f64>,
     min_value: f64,
     in_radius: f64,
+    growth: Option<Ball>,
     bounding_box: Aabb,
     circumscribed: Ball,
     z_extent: Vector3<f64>,
@@ -243,7 +253,7 @@ impl Body {
         });
         let outline = Outline::new(rays.collect());
         let volume = surface::volume(&constraints, &normalization.linear, &interior_z);
-        let id = BodyId::of(&normalization, &constraints);
+        let id = BodyId::of(&normalization, &constraints, None);
         Ok(Self {
             name: name.to_owned(),
             id,
@@ -254,6 +264,7 @@ impl Body {
             interior_point,
             min_value,
             in_radius,
+            growth: None,
             bounding_box,
             circumscribed,
             z_extent,
@@ -330,6 +341,12 @@ impl Body {
     /// Radius of a ball about the interior point that is proven to lie inside.
     pub fn in_radius(&self) -> f64 {
         self.in_radius
+    }
+
+    /// A ball proven to lie inside, about the centre from which the body grows in the growth distance: the interior point
+    /// unless [`Body::with_growth_center`] set another.
+    pub fn growth_ball(&self) -> Ball {
+        self.growth.unwrap_or(Ball { center: self.interior_point, radius: self.in_radius })
     }
 
     /// A ball proven to contain the body.
@@ -420,6 +437,23 @@ impl Body {
     pub fn with_points(mut self, points: &[Vector3<f64>]) -> Result<Self, NotContained> {
         self.prove_contains(points)?;
         self.points = Some(ContainedPoints::of(points));
+        Ok(self)
+    }
+
+    /// The same body growing from `center` (metres, body frame) in the growth distance. As it changes answers it changes the
+    /// id, and the body's file keeps it.
+    ///
+    /// # Errors
+    /// [`BodyError::GrowthCenter`] for a point that is not proven inside: it must lie within the polytope of
+    /// [`Body::boundary`], which all but reaches the boundary.
+    pub fn with_growth_center(mut self, center: Vector3<f64>) -> Result<Self, BodyError> {
+        let radius = surface::in_radius(&self.boundary, &center, self.inverse.determinant() < 0.0);
+        // Not `<=`: a NaN is not inside.
+        if !(radius > 0.0) {
+            return Err(BodyError::GrowthCenter { center: center.into() });
+        }
+        self.growth = Some(Ball { center, radius });
+        self.id = BodyId::of(&self.normalization, &self.constraints, Some(&center));
         Ok(self)
     }
 

@@ -145,6 +145,10 @@ fn files_round_trip_exactly() {
             .unwrap()
             .with_provenance(Provenance { input: "can.off".into(), ..Default::default() }),
         Body::superellipsoid("q8", Vector3::zeros(), Vector3::new(1.0, 2.0, 3.0), 8).unwrap(),
+        Body::ball("off", Vector3::zeros(), 1.0)
+            .unwrap()
+            .with_growth_center(Vector3::new(0.1, 1.0 / 3.0, 0.0))
+            .unwrap(),
     ];
     for body in bodies {
         let text = body.to_json();
@@ -196,4 +200,21 @@ fn changed_files_are_refused_by_name() {
     for length in [0, 1, text.len() / 2, text.len() - 3] {
         assert!(matches!(Body::from_json(&text[..length]), Err(BodyFileError::Json(_))));
     }
+}
+
+#[test]
+fn growth_centers_lie_inside_and_are_part_of_the_identity() {
+    let body = Body::cuboid("box", Vector3::new(1.0, 2.0, 3.0)).unwrap();
+    assert_eq!(body.growth_ball(), Ball { center: *body.interior_point(), radius: body.in_radius() });
+    assert!(!body.to_json().contains("growth_center_m"));
+    let moved = body.clone().with_growth_center(Vector3::new(0.5, 0.0, 0.0)).unwrap();
+    assert_ne!(moved.id(), body.id());
+    let ball = moved.growth_ball();
+    assert!(ball.center.x == 0.5 && ball.radius <= 0.5 && ball.radius > 0.4, "{ball:?}");
+    for bad in [Vector3::new(1.1, 0.0, 0.0), Vector3::repeat(f64::NAN), Vector3::new(0.0, f64::INFINITY, 0.0)] {
+        let error = body.clone().with_growth_center(bad).unwrap_err();
+        assert!(matches!(error, BodyError::GrowthCenter { .. }), "{error}");
+    }
+    let text = moved.to_json().replace("\"growth_center_m\": [0.5", "\"growth_center_m\": [0.25");
+    assert!(matches!(Body::from_json(&text), Err(BodyFileError::Derived { field: "id", .. })), "{text}");
 }

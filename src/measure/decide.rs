@@ -3,6 +3,7 @@
 //! Balls come first, then the slabs of the normalized coordinates along a direction or two, then the search for the
 //! distance, which stops as soon as its bracket decides.
 
+use super::active::ActiveConstraints;
 use super::bracket::distance_lower;
 use super::distance::{Distance, between};
 use super::options::Options;
@@ -252,6 +253,8 @@ fn balls((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose)) -> Distance {
         witness_a,
         witness_b,
         normal,
+        active_a: ActiveConstraints::default(),
+        active_b: ActiveConstraints::default(),
         iterations: 0,
     }
 }

@@ -1,6 +1,7 @@
 //! Euclidean distance between two bodies.
 
 use super::Status;
+use super::active::ActiveConstraints;
 use super::bracket::{Multipliers, distance_lower, distance_upper};
 use super::decide::Goal;
 use super::newton::{Active, DistanceNewton};
@@ -9,6 +10,7 @@ use super::pair::{Pair, Posed};
 use super::pose::Pose;
 use super::programs::{Closest, Level, points};
 use super::smooth::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
+use super::twist::Twist;
 use super::union;
 use super::warm::{Hint, WarmStart};
 use crate::body::{Body, MAX_CONSTRAINTS, Solid};
@@ -32,6 +34,10 @@ pub struct Distance {
     pub witness_b: Vector3<f64>,
     /// Unit normal from the second body to the first; none on overlap.
     pub normal: Option<Vector3<f64>>,
+    /// Constraints of the first body that the answer rests on, with multipliers: `-n = Σ λ_i ∇g_i`; none on overlap.
+    pub active_a: ActiveConstraints,
+    /// Constraints of the second body that the answer rests on: `n = Σ λ_i ∇g_i`; none on overlap.
+    pub active_b: ActiveConstraints,
     /// Iterations of all methods together.
     pub iterations: u32,
 }
@@ -40,6 +46,17 @@ impl Distance {
     /// The answer inside the bracket: the upper bound, which the witnesses attain.
     pub fn value(&self) -> f64 {
         self.upper
+    }
+
+    /// Derivatives with respect to the twists of the first and of the second body at the poses the distance was asked for
+    /// (envelope theorem: the witnesses count as fixed to their bodies). None unless the bodies are proven apart: at contact
+    /// the distance has no gradient, which is what [`super::signed_distance`] is for.
+    pub fn gradients(&self, pose_a: &Pose, pose_b: &Pose) -> Option<[Twist; 2]> {
+        let n = self.normal.filter(|_| self.lower > 0.0)?;
+        Some([
+            Twist::of_force(n, &self.witness_a, pose_a.translation()),
+            Twist::of_force(-n, &self.witness_b, pose_b.translation()),
+        ])
     }
 }
 
@@ -382,6 +399,8 @@ impl<'a> Search<'a> {
             witness_a,
             witness_b,
             normal,
+            active_a: self.active.0.reported(if normal.is_some() { unit } else { 0.0 }),
+            active_b: self.active.1.reported(if normal.is_some() { unit } else { 0.0 }),
             iterations: self.iterations,
         }
     }
@@ -398,6 +417,8 @@ impl Proven {
             witness_a: to_world(self.x),
             witness_b: to_world(self.y),
             normal: Some(pose_a.transform_direction(&Vector3::from(self.n))),
+            active_a: ActiveConstraints::single(self.active[0], self.multipliers[0]),
+            active_b: ActiveConstraints::single(self.active[1], self.multipliers[1]),
             iterations: self.rounds,
         }
     }

@@ -7,9 +7,9 @@
 use super::Status;
 use super::bracket::{SLACK, descent};
 use super::options::Options;
-use super::point::PoseGradient;
 use super::pose::{Pose, ROTATION_ERROR};
 use super::single::{Objective, Single, solve_single};
+use super::twist::Twist;
 use super::warm::{Hint, WarmStart};
 use crate::body::{Body, Solid};
 use crate::polynomial::gamma;
@@ -99,8 +99,8 @@ impl HalfSpaceDistance {
 
     /// Gradient with respect to the pose the distance was asked for: `n` and `(x - t) × n`, x the witness; through contact
     /// and in depth as well. It is unique where the witness is.
-    pub fn pose_gradient(&self, pose: &Pose, half_space: &HalfSpace) -> PoseGradient {
-        PoseGradient::of_force(half_space.normal, &self.witness, pose)
+    pub fn pose_gradient(&self, pose: &Pose, half_space: &HalfSpace) -> Twist {
+        Twist::of_force(half_space.normal, &self.witness, pose.translation())
     }
 }
 

@@ -1,15 +1,19 @@
-//! Measures between two posed bodies: Euclidean distance and level distance, each inside a proven bracket.
+//! Measures between two posed bodies: Euclidean, signed, level and growth distance and penetration depth, each inside a
+//! proven bracket.
 //!
-//! Every measure is a convex program. A warm start is corrected by Newton's method on the optimality system of its active
-//! constraints (`newton`); where that does not apply or does not converge, an interior-point method
-//! ([`crate::optimize`]) does, from a start that is always feasible. Neither is trusted: an answer is accepted when its
-//! bracket, which holds for any trial point (`bracket`), is narrow enough. This room knows neither clock nor allocator nor
-//! threads.
+//! Every measure but the depth, which is the least of many convex programs, is one convex program. A warm start is
+//! corrected by Newton's method on the optimality system of its active constraints (`newton`); where that does not apply or
+//! does not converge, an interior-point method ([`crate::optimize`]) does, from a start that is always feasible. Neither is
+//! trusted: an answer is accepted when its bracket, which holds for any trial point (`bracket`), is narrow enough. This room
+//! knows neither clock nor allocator nor threads.
 
+mod active;
 mod bracket;
+mod curvature;
 mod decide;
 mod distance;
 mod entry;
+mod growth;
 mod half_space;
 mod impact;
 mod level;
@@ -18,31 +22,40 @@ mod motion;
 mod newton;
 mod options;
 mod pair;
+mod penetration;
 mod point;
 mod pose;
 mod programs;
 mod ray;
+mod signed;
 mod single;
 mod smooth;
 mod sweep;
 mod tangent;
+mod twist;
 mod union;
 mod vector;
 mod warm;
 
+pub use active::ActiveConstraints;
+pub use curvature::translation_hessian;
 pub use decide::{Decision, ThresholdError, WithinMargin, nearer_than, overlap, within_margin};
 pub use distance::{Distance, distance};
+pub use growth::{GrowthDistance, growth_distance};
 pub use half_space::{HalfSpace, HalfSpaceDistance, HalfSpaceError, distance_to_half_space};
 pub use impact::{
     DEFAULT_CONTACT, Impact, ImpactOptions, ImpactOptionsError, ImpactStatus, MAX_QUERIES, time_of_impact,
 };
 pub use level::{LevelDistance, level_distance};
 pub use motion::{Motion, MotionError};
-pub use options::{DEFAULT_ACCURACY, MAX_ITERATIONS, Options, OptionsError};
-pub use point::{PointDistance, PointError, PoseGradient, distance_to_point};
+pub use options::{DEFAULT_ACCURACY, DEFAULT_DEPTH_ACCURACY, MAX_ITERATIONS, Options, OptionsError};
+pub use penetration::{Penetration, penetration};
+pub use point::{PointDistance, PointError, distance_to_point};
 pub use pose::{Pose, PoseError};
 pub use ray::{Ray, RayCast, RayError, RayHit, cast_ray};
+pub use signed::{SignedDistance, signed_distance};
 pub use sweep::{Sweep, cast_ball};
+pub use twist::Twist;
 pub use warm::WarmStart;
 
 /// How a solve ended. The bracket is true in every case.

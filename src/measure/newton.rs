@@ -13,21 +13,19 @@
 //! Σ ν_i ∇g_i + Σ μ_j ∇h_j = 0,   Σ ν_i = 1,   g_i(x) = s,   h_j(x) = 1
 //! ```
 
+use super::active::{ActiveConstraints, MAX_ACTIVE};
 use super::bracket::Multipliers;
 use super::linear::{Augmented, MAX_UNKNOWNS, solve};
 use super::pair::{Pair, Posed};
 use super::warm::ActiveSet;
 use nalgebra::{Matrix3, Vector3};
 
-/// Most constraints of one body that can be active at once in general position in space.
-const MAX_ACTIVE: usize = 3;
-
 /// The active constraints of one body with their multipliers.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Active {
-    index: [usize; MAX_ACTIVE],
-    multiplier: [f64; MAX_ACTIVE],
-    len: usize,
+    pub(super) index: [usize; MAX_ACTIVE],
+    pub(super) multiplier: [f64; MAX_ACTIVE],
+    pub(super) len: usize,
 }
 
 impl Active {
@@ -73,6 +71,15 @@ impl Active {
         self.index[..self.len].iter().fold(0, |bits, i| bits | 1 << i)
     }
 
+    /// The set for the user, with multipliers times `unit`; those not above zero are left out.
+    pub(super) fn reported(&self, unit: f64) -> ActiveConstraints {
+        let mut reported = ActiveConstraints::default();
+        for (index, multiplier) in self.iter().filter(|(_, multiplier)| multiplier * unit > 0.0) {
+            reported.push(index, multiplier * unit);
+        }
+        reported
+    }
+
     /// Multipliers of all constraints, negative ones cut off.
     pub(super) fn multipliers(&self) -> Multipliers {
         let mut all = [0.0; crate::body::MAX_CONSTRAINTS];
@@ -82,11 +89,11 @@ impl Active {
         all
     }
 
-    fn iter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+    pub(super) fn iter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         self.index[..self.len].iter().copied().zip(self.multiplier[..self.len].iter().copied())
     }
 
-    fn push(&mut self, index: usize) -> bool {
+    pub(super) fn push(&mut self, index: usize) -> bool {
         let room = self.len < MAX_ACTIVE;
         if room {
             self.index[self.len] = index;
@@ -97,7 +104,7 @@ impl Active {
     }
 
     /// Drops the constraint with the most negative multiplier; whether there was one.
-    fn drop_negative(&mut self) -> bool {
+    pub(super) fn drop_negative(&mut self) -> bool {
         let worst = (0..self.len).min_by(|&i, &j| self.multiplier[i].total_cmp(&self.multiplier[j]));
         match worst {
             Some(k) if self.multiplier[k] < 0.0 && self.len > 1 => {
@@ -111,7 +118,7 @@ impl Active {
     }
 
     /// Least-squares multipliers of `Σ λ_i ∇g_i = target` at v. False if the gradients are dependent.
-    fn fit(&mut self, body: &Posed<'_>, v: &Vector3<f64>, target: &Vector3<f64>) -> bool {
+    pub(super) fn fit(&mut self, body: &Posed<'_>, v: &Vector3<f64>, target: &Vector3<f64>) -> bool {
         let gradients: [Vector3<f64>; MAX_ACTIVE] =
             std::array::from_fn(|k| if k < self.len { body.jet(self.index[k], v).gradient } else { Vector3::zeros() });
         let mut system: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
@@ -127,7 +134,7 @@ impl Active {
     }
 
     /// The most violated constraint that is not in the set, if violated by more than rounding.
-    fn violated(&self, body: &Posed<'_>, v: &Vector3<f64>, level: f64) -> Option<usize> {
+    pub(super) fn violated(&self, body: &Posed<'_>, v: &Vector3<f64>, level: f64) -> Option<usize> {
         (0..body.len())
             .filter(|i| !self.index[..self.len].contains(i))
             .map(|i| (i, body.jet(i, v).value - level))

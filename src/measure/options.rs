@@ -5,6 +5,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Default accuracy: relative to the circumradius of the smaller body for lengths, to `max(1, |d|)` for level distances.
 pub const DEFAULT_ACCURACY: f64 = 1e-9;
 
+/// Default accuracy of penetration depths, relative to the depth.
+pub const DEFAULT_DEPTH_ACCURACY: f64 = 1e-3;
+
 /// Default and largest iteration limit: several times what the worst pairs of flat bodies met so far need.
 pub const MAX_ITERATIONS: u32 = 1000;
 
@@ -20,6 +23,7 @@ pub const MAX_ITERATIONS: u32 = 1000;
 #[derive(Clone, Copy, Debug)]
 pub struct Options<'a> {
     accuracy: f64,
+    depth_accuracy: f64,
     max_iterations: u32,
     stop: Option<&'a AtomicBool>,
 }
@@ -37,7 +41,12 @@ pub enum OptionsError {
 
 impl Default for Options<'_> {
     fn default() -> Self {
-        Self { accuracy: DEFAULT_ACCURACY, max_iterations: MAX_ITERATIONS, stop: None }
+        Self {
+            accuracy: DEFAULT_ACCURACY,
+            depth_accuracy: DEFAULT_DEPTH_ACCURACY,
+            max_iterations: MAX_ITERATIONS,
+            stop: None,
+        }
     }
 }
 
@@ -53,6 +62,20 @@ impl<'a> Options<'a> {
             Ok(Self { accuracy, ..self })
         } else {
             Err(OptionsError::Accuracy(accuracy))
+        }
+    }
+
+    /// The same with brackets of penetration depths at most this wide, relative to the depth. A depth is the least over all
+    /// directions: the proof costs more than the value, and more the nearer other directions come to the best. Where the
+    /// depth is so small that `accuracy` asks for less, that is what counts.
+    ///
+    /// # Errors
+    /// An accuracy that is not above 0 and at most 1.
+    pub fn with_depth_accuracy(self, depth_accuracy: f64) -> Result<Self, OptionsError> {
+        if depth_accuracy > 0.0 && depth_accuracy <= 1.0 {
+            Ok(Self { depth_accuracy, ..self })
+        } else {
+            Err(OptionsError::Accuracy(depth_accuracy))
         }
     }
 
@@ -76,6 +99,11 @@ impl<'a> Options<'a> {
     /// Width of the brackets asked for.
     pub fn accuracy(&self) -> f64 {
         self.accuracy
+    }
+
+    /// Width of the brackets of penetration depths asked for, relative to the depth.
+    pub fn depth_accuracy(&self) -> f64 {
+        self.depth_accuracy
     }
 
     /// Most iterations of a solve.

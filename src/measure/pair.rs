@@ -281,4 +281,37 @@ impl<'a> Pair<'a> {
     pub(super) fn b_to_query(&self, y: &Vector3<f64>) -> Vector3<f64> {
         self.a_to_query(&(self.rotation * y + self.translation))
     }
+
+    /// Inverse of [`Pair::to_world`].
+    pub(super) fn world_to_query(&self, x: &Vector3<f64>) -> Vector3<f64> {
+        let from_a = x - self.pose_a.translation();
+        self.a_to_query(&self.pose_a.rotation().inverse_transform_vector(&from_a))
+    }
+
+    /// Growth centres of both bodies, and a bound of the error of either.
+    pub(super) fn growth_centers(&self) -> (Vector3<f64>, Vector3<f64>, f64) {
+        let (a, b) = (self.a.body.growth_ball().center, self.b.body.growth_ball().center);
+        let relative = 2.0 * ROTATION_ERROR + gamma(16);
+        let lengths = a.norm() + b.norm() + self.translation.norm() + self.origin.norm();
+        (self.a_to_query(&a), self.b_to_query(&b), relative * lengths / self.unit * (1.0 + 1e-14))
+    }
+
+    /// Of the stored boundary points of the first body the one farthest along a direction of the query frame.
+    pub(super) fn farthest_a(&self, n: &Vector3<f64>) -> Vector3<f64> {
+        self.a_to_query(&farthest(self.a.body.boundary(), n))
+    }
+
+    /// The same of the second body.
+    pub(super) fn farthest_b(&self, n: &Vector3<f64>) -> Vector3<f64> {
+        self.b_to_query(&farthest(self.b.body.boundary(), &(self.rotation.transpose() * n)))
+    }
+}
+
+fn farthest(points: &[Vector3<f64>], n: &Vector3<f64>) -> Vector3<f64> {
+    let first = (f64::NEG_INFINITY, Vector3::zeros());
+    let (_, point) = points.iter().fold(first, |best, point| {
+        let height = point.dot(n);
+        if height > best.0 { (height, *point) } else { best }
+    });
+    point
 }

@@ -9,6 +9,7 @@ use super::bracket::{SLACK, descent};
 use super::options::Options;
 use super::pose::Pose;
 use super::single::{Objective, Single, Trial, solve_single};
+use super::twist::Twist;
 use super::warm::{ActiveSet, Hint, WarmStart};
 use crate::body::{Body, Solid};
 use nalgebra::Vector3;
@@ -32,23 +33,6 @@ pub struct PointDistance {
     pub iterations: u32,
 }
 
-/// How a value changes with the pose of a body: the derivatives along a twist that moves its points x by
-/// `v + ω × (x - t)`, t the translation of the pose. World frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PoseGradient {
-    /// With respect to v; per metre.
-    pub translation: Vector3<f64>,
-    /// With respect to ω; per radian.
-    pub rotation: Vector3<f64>,
-}
-
-impl PoseGradient {
-    /// Gradient of a value that a force `f` on the point `x` of the body would do work on.
-    pub(super) fn of_force(f: Vector3<f64>, x: &Vector3<f64>, pose: &Pose) -> Self {
-        Self { translation: f, rotation: (x - pose.translation()).cross(&f) }
-    }
-}
-
 impl PointDistance {
     /// The answer inside the bracket: the upper bound, which the witness attains.
     pub fn value(&self) -> f64 {
@@ -57,8 +41,8 @@ impl PointDistance {
 
     /// Gradient with respect to the pose the distance was asked for; that with respect to the point is `normal`. By the
     /// envelope theorem the witness counts as fixed to the body: `-n` and `-(y - t) × n`. None inside.
-    pub fn pose_gradient(&self, pose: &Pose) -> Option<PoseGradient> {
-        self.normal.map(|n| PoseGradient::of_force(-n, &self.witness, pose))
+    pub fn pose_gradient(&self, pose: &Pose) -> Option<Twist> {
+        self.normal.map(|n| Twist::of_force(-n, &self.witness, pose.translation()))
     }
 }
 

@@ -118,6 +118,11 @@ impl Pose {
         &self.translation
     }
 
+    /// The same orientation elsewhere.
+    pub(super) fn with_translation(&self, translation: Vector3<f64>) -> Self {
+        Self { translation, ..*self }
+    }
+
     /// World position of a point of the body frame.
     pub fn transform_point(&self, point: &Vector3<f64>) -> Vector3<f64> {
         self.rotation * point + self.translation

@@ -1,6 +1,7 @@
 //! The convex programs behind the measures, for the interior-point method.
 
-use super::pair::Pair;
+use super::pair::{Pair, Posed};
+use crate::body::largest;
 use crate::optimize::{Program, Row, Rows};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
@@ -36,6 +37,38 @@ impl Program<6> for Closest<'_> {
             }
         }
     }
+}
+
+/// `max n·x` over one body.
+pub(super) struct Support<'a> {
+    pub(super) body: &'a Posed<'a>,
+    pub(super) n: Vector3<f64>,
+}
+
+impl Program<3> for Support<'_> {
+    fn objective(&self, _: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
+        (-self.n, Matrix3::zeros())
+    }
+
+    fn constraints(&self, v: &Vector3<f64>, rows: &mut Rows<3>) {
+        for i in 0..self.body.len() {
+            let jet = self.body.jet(i, v);
+            rows.push(Row { value: jet.value - 1.0, gradient: jet.gradient, hessian: jet.hessian, block: 0 });
+        }
+    }
+}
+
+/// A point strictly inside, most of the way from the inner point `center` along the unit vector u to the boundary, where a
+/// body is curved; flat starts show a method nothing.
+pub(super) fn near_boundary(body: &Posed<'_>, center: &Vector3<f64>, u: &Vector3<f64>) -> Vector3<f64> {
+    let outside = center + u * (2.0 * body.reach(center));
+    let mut arm = (body.enter(&outside, &-u) - center) * 0.9;
+    // Newton's method from far outside may have ended early.
+    let value = |v: &Vector3<f64>| largest((0..body.len()).map(|i| body.jet(i, v).value));
+    while !(value(&(center + arm)) < 1.0) && arm.norm_squared() > 0.0 {
+        arm *= 0.7;
+    }
+    center + arm
 }
 
 /// `min s` over x and s subject to `g_i(x) <= s` for the constraints of A, and for those of B to `g_j(x) <= s` (the point

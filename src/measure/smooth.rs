@@ -77,6 +77,10 @@ pub(super) struct Proven {
     pub(super) x: V3<f64>,
     pub(super) y: V3<f64>,
     pub(super) n: V3<f64>,
+    /// Active constraint of A and of B.
+    pub(super) active: [u8; 2],
+    /// Their multipliers, metres.
+    pub(super) multipliers: [f64; 2],
     /// Evaluations of both bodies.
     pub(super) rounds: u32,
 }
@@ -143,8 +147,13 @@ impl WithSimd for Follow<'_> {
         at.x = plus(at.x, trace.drift_x);
         at.y = plus(at.y, apply::<S, f64>(&relative.rotation, trace.drift_y));
 
-        let correct =
-            Correct { sides: (side_a, side_b), goal: self.goal, tolerance: self.tolerance, limit: MAX_ROUNDS.min(self.limit), longest };
+        let correct = Correct {
+            sides: (side_a, side_b),
+            goal: self.goal,
+            tolerance: self.tolerance,
+            limit: MAX_ROUNDS.min(self.limit),
+            longest,
+        };
         let proven = correct.run(simd, &relative, at, self.trace)?;
         self.trace.drift_x = subtract::<S, f64>(proven.x, predicted.0);
         let drift_y = subtract::<S, f64>(proven.y, predicted.1);
@@ -205,7 +214,8 @@ impl WithSimd for Seek<'_> {
         let side_a = Side::at_home(simd, self.a, usize::from(active[0]));
         let side_b = Side::away(self.b, usize::from(active[1]), &relative);
         let longest = LONGEST * self.a.trust().reach.min(self.b.trust().reach);
-        let correct = Correct { sides: (side_a, side_b), goal: self.goal, tolerance: self.tolerance, limit: self.limit, longest };
+        let correct =
+            Correct { sides: (side_a, side_b), goal: self.goal, tolerance: self.tolerance, limit: self.limit, longest };
         let mut trace = Trace::blank(active);
         let proven = correct.run(simd, &relative, Iterate { x, y, frame }, &mut trace)?;
         Ok((proven, trace))
@@ -280,7 +290,16 @@ impl Correct<'_> {
                 trace.a = (a, bend_a);
                 trace.jet_b = jet_b;
                 let n = apply_transposed::<S, f64>(&at.frame, found.normal);
-                return Ok(Proven { lower: found.lower, upper: found.upper, x, y, n, rounds });
+                return Ok(Proven {
+                    lower: found.lower,
+                    upper: found.upper,
+                    x,
+                    y,
+                    n,
+                    active: trace.active,
+                    multipliers: found.multipliers,
+                    rounds,
+                });
             }
             if next[2] <= 0.0 {
                 // Stationary in an overlap.

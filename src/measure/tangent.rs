@@ -399,6 +399,8 @@ pub(super) struct Bracket<N> {
     pub(super) upper: N,
     /// What rounding alone leaves between them, about.
     pub(super) rounding: N,
+    /// Of A's and of B's constraint, metres.
+    pub(super) multipliers: [N; 2],
     /// Unit normal of the lower bound, in the basis.
     pub(super) normal: V3<N>,
     /// From x to a point of A, in the basis.
@@ -502,7 +504,7 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
     let upper = upper.select(N::and(simd, fine_a, fine_b), splat(f64::NAN));
     let evaluated = of_a * splat(side_a.trust().value_error) + of_b * splat(side_b.trust().value_error);
     let rounding = splat(2.0) * (displaced + rounding + evaluated);
-    Bracket { lower, upper, rounding, normal, to_a, to_b }
+    Bracket { lower, upper, rounding, multipliers: [of_a, of_b], normal, to_a, to_b }
 }
 
 /// What is known of one body's active constraint near the body, in metres.

@@ -6,7 +6,7 @@ use crate::polynomial::tests::Seeded;
 use nalgebra::{Matrix3, Vector3};
 use std::sync::OnceLock;
 
-fn at(x: f64, y: f64, z: f64) -> Pose {
+pub(super) fn at(x: f64, y: f64, z: f64) -> Pose {
     Pose::from_quaternion(Vector3::new(x, y, z), [0.0, 0.0, 0.0, 1.0]).unwrap()
 }
 
@@ -30,7 +30,17 @@ pub(super) fn random_pose(random: &mut Seeded, distance: f64) -> Pose {
     Pose::from_quaternion(unit(random) * distance, q).unwrap()
 }
 
-fn cold(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose) -> Distance {
+/// The pose after a translation by `h axis`, or a rotation by `h axis` about the body's own translation.
+pub(super) fn twisted(pose: &Pose, axis: &Vector3<f64>, turn: bool, h: f64) -> Pose {
+    if turn {
+        let rotation = nalgebra::UnitQuaternion::from_scaled_axis(axis * h) * pose.rotation();
+        Pose::from_quaternion(*pose.translation(), rotation.coords.into()).unwrap()
+    } else {
+        Pose::from_quaternion(pose.translation() + axis * h, pose.rotation().coords.into()).unwrap()
+    }
+}
+
+pub(super) fn cold(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose) -> Distance {
     distance(a, pose_a, b, pose_b, &Options::default(), &mut WarmStart::default())
 }
 
@@ -39,7 +49,7 @@ fn cold_level(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose) -> LevelDistance
 }
 
 /// Body-frame support point of `body` in direction `n`, by brute force over rays then projected ascent.
-fn largest_along(body: &Body, n: &Vector3<f64>) -> f64 {
+pub(super) fn largest_along(body: &Body, n: &Vector3<f64>) -> f64 {
     static SPHERE: OnceLock<Sphere> = OnceLock::new();
     SPHERE
         .get_or_init(|| Sphere::subdivided(4))

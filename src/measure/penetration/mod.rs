@@ -1,0 +1,390 @@
+//! Penetration depth: the shortest translation that takes two overlapping bodies apart.
+//!
+//! For a unit vector n let `f(n) = h_A(-n) + h_B(n)`, h the support functions: how far A has to move along n (or B along -n)
+//! until a plane across n parts them. f is the support function of the difference `B - A`, which contains 0 if and only if
+//! the bodies meet, and the depth is the least of f over all n: any n bounds it from above, but a bound from below has to
+//! cover the sphere ([`covering`]). Triangles of directions are split, those of the lowest bound first, until none is left
+//! below the best depth known by more than the accuracy asked for. Near a minimum that f leaves quadratically as many
+//! triangles are split at each size; where many directions are equally good, as for concentric balls, all of them are.
+
+mod covering;
+mod support;
+#[cfg(test)]
+mod tests;
+
+use super::Status;
+use super::bracket::{Multipliers, SLACK, descent};
+use super::newton::{Active, DistanceNewton};
+use super::options::Options;
+use super::pair::Pair;
+use super::pose::Pose;
+use super::warm::{Hint, WarmStart};
+use crate::body::Body;
+use covering::{Cell, Covering, Direction};
+use nalgebra::Vector3;
+use support::{SupportPoint, facing, support};
+
+/// Penetration depth with its proof, lengths in metres, vectors in the world frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Penetration {
+    /// How the solve ended.
+    pub status: Status,
+    /// Proven lower bound over all directions; 0 if the bodies are not proven to overlap.
+    pub lower: f64,
+    /// Proven upper bound: moving the first body by this much along `direction` (or the second against it) takes the bodies
+    /// apart, so that they touch at most; 0 if they are apart.
+    pub upper: f64,
+    /// Unit vector from the second body to the first: the normal of the distance, continued; none if they are apart.
+    pub direction: Option<Vector3<f64>>,
+    /// Point of the first body that is deepest in the second: the last to come out.
+    pub witness_a: Vector3<f64>,
+    /// Point of the second body that is deepest in the first.
+    pub witness_b: Vector3<f64>,
+    /// Whether a direction elsewhere was seen to be about as short: the direction may then jump.
+    pub tied: bool,
+    /// Directions whose support points were computed.
+    pub directions: u32,
+    /// Iterations: sweeps over triangles, and steps of Newton's method.
+    pub iterations: u32,
+}
+
+impl Penetration {
+    /// The answer inside the bracket: the upper bound, which the direction attains.
+    pub fn value(&self) -> f64 {
+        self.upper
+    }
+}
+
+/// Penetration depth of two bodies at their poses (body to world): 0 when they are apart or touch.
+///
+/// The bracket is as narrow as `options` ask, relative to the depth ([`Options::with_depth_accuracy`]), or the status says
+/// that it is not: with many equally short directions and an accuracy beyond about 1e-4 the table of directions is full
+/// first. `upper` is as accurate as a distance wherever its direction is the best: the bracket is about the others.
+/// `warm` is read and then replaced by the hint for the next query of this pair.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use sublevel::body::Body;
+/// use sublevel::measure::{Options, Pose, WarmStart, penetration};
+///
+/// let a = Body::cuboid("a", Vector3::new(1.0, 1.0, 1.0))?;
+/// let b = Body::ball("b", Vector3::zeros(), 0.5)?;
+/// let pose = Pose::from_quaternion(Vector3::new(1.25, 0.1, 0.0), [0.0, 0.0, 0.0, 1.0])?;
+/// let depth = penetration(&a, &Pose::identity(), &b, &pose, &Options::default(), &mut WarmStart::default());
+/// assert!((depth.value() - 0.25).abs() < 1e-8 && depth.lower > 0.2497);
+/// assert!((depth.direction.unwrap() + Vector3::x()).norm() < 1e-6); // a has to move back
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn penetration(
+    a: &Body,
+    pose_a: &Pose,
+    b: &Body,
+    pose_b: &Pose,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> Penetration {
+    let pair = Pair::new(a, pose_a, b, pose_b);
+    let mut best = Best::new(&pair);
+    best.follow(&pair, options, &warm.hint);
+    let proof = prove(&pair, options, &mut best);
+    if let Some(hint) = best.hint(&pair) {
+        *warm = hint;
+    }
+    let apart = best.depth <= 0.0;
+    let upper = best.depth.max(0.0);
+    let unit = pair.unit();
+    Penetration {
+        status: if upper - proof.lower <= tolerance(&pair, options, upper) {
+            Status::Converged
+        } else {
+            Status::BracketWide
+        },
+        lower: proof.lower * unit,
+        upper: upper * unit,
+        direction: best.n.filter(|_| !apart).map(|n| pair.direction_to_world(&n)),
+        witness_a: pair.to_world(&best.x),
+        witness_b: pair.to_world(&best.y),
+        tied: proof.tied,
+        directions: proof.directions,
+        iterations: best.iterations,
+    }
+}
+
+/// Width of a bracket asked for, in query units.
+pub(super) fn tolerance(pair: &Pair<'_>, options: &Options<'_>, depth: f64) -> f64 {
+    (options.depth_accuracy() * depth).max(pair.tolerance(options.accuracy()))
+}
+
+/// Rigorous upper bound of f(n), the depth along n (of any length above 0), from multipliers for -n of A and for n of B; with
+/// its sign turned, a lower bound of the signed distance.
+pub(super) fn depth_along(
+    pair: &Pair<'_>,
+    x: &Vector3<f64>,
+    y: &Vector3<f64>,
+    n: &Vector3<f64>,
+    of_a: &Multipliers,
+    of_b: &Multipliers,
+) -> f64 {
+    let length = n.norm();
+    let n = n / length;
+    let falls =
+        descent(&pair.a, x, &n, &of_a.map(|m| m / length)) + descent(&pair.b, y, &-n, &of_b.map(|m| m / length));
+    let displaced = (pair.a.displacement(x) + pair.b.displacement(y)) * (1.0 + 1e-14);
+    let bound = n.dot(&(y - x)) + falls + displaced + SLACK * (x.norm() + y.norm() + falls.abs());
+    // A NaN bounds nothing.
+    if bound.is_nan() { f64::INFINITY } else { bound }
+}
+
+/// The shortest way out known, in query units.
+pub(super) struct Best {
+    /// Rigorous upper bound of f along n; negative if n parts the bodies.
+    pub(super) depth: f64,
+    pub(super) n: Option<Vector3<f64>>,
+    pub(super) x: Vector3<f64>,
+    pub(super) y: Vector3<f64>,
+    pub(super) active: (Active, Active),
+    pub(super) iterations: u32,
+}
+
+impl Best {
+    pub(super) fn new(pair: &Pair<'_>) -> Self {
+        let (x, y) = (pair.a.interior, pair.b.interior);
+        Self { depth: f64::INFINITY, n: None, x, y, active: Default::default(), iterations: 0 }
+    }
+
+    /// Starts from the answer to an earlier query.
+    pub(super) fn follow(&mut self, pair: &Pair<'_>, options: &Options<'_>, hint: &Hint) {
+        if let Hint::Apart { x_a, y_b, normal_a, active_a, active_b } = hint {
+            let a = SupportPoint { x: pair.a_to_query(x_a), active: *active_a };
+            let b = SupportPoint { x: pair.b_to_query(y_b), active: *active_b };
+            self.polish(pair, options, &a, &b, normal_a);
+        }
+    }
+
+    /// Newton's method on the optimality system of the distance, with a negative distance, from near support points.
+    fn polish(&mut self, pair: &Pair<'_>, options: &Options<'_>, x: &SupportPoint, y: &SupportPoint, n: &Vector3<f64>) {
+        let (a, b) = (Active::from_bits(x.active, pair.a.len()), Active::from_bits(y.active, pair.b.len()));
+        let (Some(a), Some(b)) = (a, b) else { return };
+        let finite = x.x.iter().chain(&y.x).chain(n).all(|value| value.is_finite());
+        if !finite || options.exhausted(self.iterations) {
+            return;
+        }
+        let mut newton = DistanceNewton { x: x.x, y: y.x, distance: n.dot(&(x.x - y.x)), n: *n, a, b };
+        let tolerance = pair.tolerance(options.accuracy());
+        let limit = options.max_iterations() - self.iterations;
+        self.iterations += newton.run(pair, limit, |at| {
+            let depth = self.try_direction(pair, &at.x, &at.y, &at.n, at.a, at.b);
+            // The points attain what the normal proves: no better direction is near.
+            let attained = at.n.dot(&(at.y - at.x)) / at.n.norm();
+            let sideways = (at.x - at.y) + at.n * attained;
+            depth - attained <= tolerance && sideways.norm() <= tolerance || options.exhausted(self.iterations)
+        });
+    }
+
+    /// Takes a direction if it is the shortest way out so far; returns its depth.
+    fn try_direction(
+        &mut self,
+        pair: &Pair<'_>,
+        x: &Vector3<f64>,
+        y: &Vector3<f64>,
+        n: &Vector3<f64>,
+        a: Active,
+        b: Active,
+    ) -> f64 {
+        let depth = depth_along(pair, x, y, n, &a.multipliers(), &b.multipliers());
+        if depth < self.depth
+            && let Some(n) = n.try_normalize(0.0)
+        {
+            (self.depth, self.n, self.x, self.y, self.active) = (depth, Some(n), *x, *y, (a, b));
+        }
+        depth
+    }
+
+    pub(super) fn hint(&self, pair: &Pair<'_>) -> Option<WarmStart> {
+        let (a, b) = &self.active;
+        self.n.map(|n| WarmStart::apart(pair, &self.x, &self.y, &n, a.bits(), b.bits()))
+    }
+}
+
+/// What is known of all directions.
+pub(super) struct Proof {
+    /// Lower bound of the depth, query units.
+    pub(super) lower: f64,
+    pub(super) tied: bool,
+    pub(super) directions: u32,
+}
+
+/// Tables of directions: one that costs little to lay out and serves nearly all pairs, and one for ties.
+const FEW: usize = 192;
+const MANY: usize = 2048;
+
+/// Bounds the depth from below, improving the best direction on the way.
+pub(super) fn prove(pair: &Pair<'_>, options: &Options<'_>, best: &mut Best) -> Proof {
+    match sweep::<FEW>(pair, options, best) {
+        (proof, true) if !options.exhausted(best.iterations) => {
+            let (more, _) = sweep::<MANY>(pair, options, best);
+            Proof { lower: more.lower.max(proof.lower), directions: more.directions + proof.directions, ..more }
+        }
+        (proof, _) => proof,
+    }
+}
+
+/// Triangles split in one iteration.
+const SPLITS: u32 = 64;
+
+/// Sweeps the sphere of directions until the bracket is narrow; also tells whether the table was full first.
+#[inline(never)]
+fn sweep<const N: usize>(pair: &Pair<'_>, options: &Options<'_>, best: &mut Best) -> (Proof, bool) {
+    let mut sweep =
+        Sweep { pair, options, covering: Covering::<N>::new(), floor: f64::INFINITY, error: 0.0, size: 0.0 };
+    let full = sweep.run(best).is_none();
+    let lower = sweep.covering.lowest().unwrap_or(f64::INFINITY).min(sweep.floor);
+    let lower = if sweep.covering.directions().len() < 6 || best.depth <= 0.0 { 0.0 } else { lower.max(0.0) };
+    let proof = Proof {
+        lower: lower.min(best.depth.max(0.0)),
+        tied: sweep.tied(best),
+        directions: sweep.covering.directions().len() as u32,
+    };
+    (proof, full)
+}
+
+struct Sweep<'a, const N: usize> {
+    pair: &'a Pair<'a>,
+    options: &'a Options<'a>,
+    covering: Covering<N>,
+    /// Lowest bound of the triangles that were left as they are.
+    floor: f64,
+    /// Largest error of a known point of B - A.
+    error: f64,
+    /// Bound of |w| over B - A: how fast f can change.
+    size: f64,
+}
+
+impl<const N: usize> Sweep<'_, N> {
+    /// None if the table is full before the bracket is narrow.
+    fn run(&mut self, best: &mut Best) -> Option<()> {
+        let origin = Vector3::zeros();
+        self.size = self.pair.a.reach(&origin) + self.pair.b.reach(&origin);
+        // The octahedron: a box's own axes are among its corners.
+        for k in 0..6 {
+            let mut n = Vector3::zeros();
+            n[k % 3] = if k < 3 { 1.0 } else { -1.0 };
+            let (x, y) = (self.pair.farthest_a(&-n), self.pair.farthest_b(&n));
+            let start_a = SupportPoint { x, active: facing(&self.pair.a, &x, &-n) };
+            let start_b = SupportPoint { x: y, active: facing(&self.pair.b, &y, &n) };
+            let Some(direction) = self.direction(n, [0, 0], &start_a, &start_b, best) else { return Some(()) };
+            self.covering.add(direction);
+        }
+        self.improve(0, best);
+        for k in 0..8 {
+            let sign = |axis: u16| if k >> axis & 1 == 0 { axis } else { axis + 3 };
+            self.open([sign(0), sign(1), sign(2)], best);
+        }
+        loop {
+            let before = self.covering.directions().len();
+            for _ in 0..SPLITS {
+                if best.depth <= 0.0 || !self.covering.lowest().is_some_and(|lowest| lowest < self.target(best)) {
+                    return Some(());
+                }
+                if !self.covering.has_room() {
+                    return None;
+                }
+                let cell = self.covering.pop()?;
+                if !self.split(cell, best) {
+                    self.covering.push(cell);
+                    return Some(());
+                }
+            }
+            best.iterations += 1;
+            self.improve(before, best);
+            if self.options.exhausted(best.iterations) {
+                return Some(());
+            }
+        }
+    }
+
+    /// Triangles at or above this bound are good enough.
+    fn target(&self, best: &Best) -> f64 {
+        best.depth - tolerance(self.pair, self.options, best.depth)
+    }
+
+    /// Support points along n and against it.
+    fn direction(
+        &mut self,
+        n: Vector3<f64>,
+        parents: [u16; 2],
+        a: &SupportPoint,
+        b: &SupportPoint,
+        best: &Best,
+    ) -> Option<Direction> {
+        // Far above the best depth a rough bound will do.
+        let known = if best.depth.is_finite() { best.depth.abs() } else { self.size };
+        let surplus = n.dot(&(b.x - a.x)) - known;
+        let tolerance = (0.1 * tolerance(self.pair, self.options, known)).max(0.02 * surplus);
+        let a = support(&self.pair.a, &-n, tolerance, a, || self.pair.farthest_a(&-n))?;
+        let b = support(&self.pair.b, &n, tolerance, b, || self.pair.farthest_b(&n))?;
+        self.error = self.error.max(self.pair.a.displacement(&a.x) + self.pair.b.displacement(&b.x));
+        Some(Direction { n, a, b, parents })
+    }
+
+    /// Tries the best of the directions from `first` on, if it promises to be better than the best known.
+    fn improve(&mut self, first: usize, best: &mut Best) {
+        let directions = &self.covering.directions()[first..];
+        let Some(least) = directions.iter().min_by(|p, q| p.depth().total_cmp(&q.depth())) else { return };
+        let promising = best.depth - 0.5 * tolerance(self.pair, self.options, best.depth);
+        if !(least.depth() < promising) && best.depth.is_finite() {
+            return;
+        }
+        let (mut a, mut b) = (
+            Active::from_bits(least.a.active, self.pair.a.len()).unwrap_or_default(),
+            Active::from_bits(least.b.active, self.pair.b.len()).unwrap_or_default(),
+        );
+        if a.fit(&self.pair.a, &least.a.x, &-least.n) && b.fit(&self.pair.b, &least.b.x, &least.n) {
+            best.try_direction(self.pair, &least.a.x, &least.b.x, &least.n, a, b);
+        }
+        best.polish(self.pair, self.options, &least.a, &least.b, &least.n);
+    }
+
+    fn open(&mut self, corners: [u16; 3], best: &Best) {
+        // Middles are rounded, so neighbours of different size leave slivers open; f changes by little over one. The sums
+        // of the bound itself round too.
+        let lower = self.covering.bound(corners) - self.error - 4.0 * SLACK * self.size;
+        if lower >= self.target(best) {
+            self.floor = self.floor.min(lower);
+        } else {
+            self.covering.push(Cell { corners, lower: lower.max(0.0) });
+        }
+    }
+
+    fn split(&mut self, cell: Cell, best: &Best) -> bool {
+        let ([i, j, k], n) = self.covering.widest_edge(cell.corners);
+        let Some(middle) = self.middle(i, j, n, best) else { return false };
+        self.open([i, middle, k], best);
+        self.open([middle, j, k], best);
+        true
+    }
+
+    fn middle(&mut self, i: u16, j: u16, n: Vector3<f64>, best: &Best) -> Option<u16> {
+        if let Some(index) = self.covering.middle(i, j) {
+            return Some(index);
+        }
+        let [p, q] = [i, j].map(|i| self.covering.directions()[usize::from(i)]);
+        let start = |p: &SupportPoint, q: &SupportPoint, n: &Vector3<f64>, single: bool| {
+            let half = (p.x + q.x) * 0.5;
+            let farther = if n.dot(&p.x) > n.dot(&q.x) { *p } else { *q };
+            // Between near points of one smooth surface it has the right normal, and is inside by little.
+            if single && (p.x - q.x).norm() < 0.4 { SupportPoint { x: half, ..*p } } else { farther }
+        };
+        let a = start(&p.a, &q.a, &-n, self.pair.a.len() == 1);
+        let b = start(&p.b, &q.b, &n, self.pair.b.len() == 1);
+        let direction = self.direction(n, [i.min(j), i.max(j)], &a, &b, best)?;
+        Some(self.covering.add_middle(direction))
+    }
+
+    /// Whether a direction far from the best was seen to be about as good.
+    fn tied(&self, best: &Best) -> bool {
+        let Some(n) = best.n else { return false };
+        let close = best.depth + 2.0 * tolerance(self.pair, self.options, best.depth);
+        self.covering.directions().iter().any(|direction| direction.n.dot(&n) < 0.99 && direction.depth() <= close)
+    }
+}
