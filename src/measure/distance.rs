@@ -57,7 +57,14 @@ impl Distance {
 /// assert!((answer.value() - 1.5).abs() < 1e-8);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, options: &Options<'_>, warm: &mut WarmStart) -> Distance {
+pub fn distance(
+    a: &Body,
+    pose_a: &Pose,
+    b: &Body,
+    pose_b: &Pose,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> Distance {
     let pair = Pair::new(a, pose_a, b, pose_b);
     let mut search = Search::new(&pair, options);
     search.run(&warm.hint);
