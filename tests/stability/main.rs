@@ -14,3 +14,5 @@ mod contact;
 mod limits;
 mod placement;
 mod scale;
+#[cfg(feature = "fit")]
+mod sos;
