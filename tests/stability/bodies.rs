@@ -3,20 +3,24 @@
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use std::collections::BTreeMap;
 use sublevel::body::{Body, Constraint, Normalization};
+use sublevel::measure::Pose;
 use sublevel::polynomial::{Exponents, HessianGram, HessianMonomial, Polynomial, degree_of, monomials};
 
+/// A body at its pose.
+pub(crate) type Placed<'a> = (&'a Body, &'a Pose);
+
 /// E: ellipsoid with these half-axes.
-pub fn e(x: f64, y: f64, z: f64) -> Body {
+pub(crate) fn e(x: f64, y: f64, z: f64) -> Body {
     Body::ellipsoid("E", Vector3::zeros(), Vector3::new(x, y, z)).unwrap()
 }
 
 /// Q2k: `(x/a)^degree + (y/b)^degree + (z/c)^degree <= 1`.
-pub fn q(degree: u8, x: f64, y: f64, z: f64) -> Body {
+pub(crate) fn q(degree: u8, x: f64, y: f64, z: f64) -> Body {
     Body::superellipsoid(&format!("Q{degree}"), Vector3::zeros(), Vector3::new(x, y, z), degree).unwrap()
 }
 
 /// C2k: `((x² + y²)/r²)^k + (z/h)^2k <= 1`, degree 2k.
-pub fn c(degree: u8, radius: f64, half_height: f64) -> Body {
+pub(crate) fn c(degree: u8, radius: f64, half_height: f64) -> Body {
     let half = usize::from(degree / 2);
     let mut terms = Vec::new();
     for i in 0..=half {
@@ -55,7 +59,7 @@ pub fn c(degree: u8, radius: f64, half_height: f64) -> Body {
 }
 
 /// P2k: `Σ (a_i·x)^degree <= 1` with the a_i along the axes and the diagonals of a cube, of the given half-width.
-pub fn p(degree: u8, size: f64) -> Body {
+pub(crate) fn p(degree: u8, size: f64) -> Body {
     let third = 1.0 / 3.0_f64.sqrt();
     let mut directions = vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     directions
@@ -90,11 +94,11 @@ pub fn p(degree: u8, size: f64) -> Body {
 }
 
 /// B: box with these half-extents.
-pub fn b(x: f64, y: f64, z: f64) -> Body {
+pub(crate) fn b(x: f64, y: f64, z: f64) -> Body {
     Body::cuboid("B", Vector3::new(x, y, z)).unwrap()
 }
 
-pub fn cylinder(radius: f64, half_height: f64) -> Body {
+pub(crate) fn cylinder(radius: f64, half_height: f64) -> Body {
     Body::cylinder("cylinder", radius, half_height).unwrap()
 }
 
@@ -126,7 +130,7 @@ fn binomial(n: usize, k: usize) -> f64 {
 
 /// Support function `max n·x` in the body frame in closed form, for E, Q2k, C2k, boxes and cylinders about their origin: the
 /// norm dual to the body's own.
-pub fn support(body: &Body, n: &Vector3<f64>) -> f64 {
+pub(crate) fn support(body: &Body, n: &Vector3<f64>) -> f64 {
     let sizes = body.normalization().linear.diagonal().map(|l| 1.0 / l);
     let m = n.component_mul(&sizes).abs();
     let wall = m.x.hypot(m.y);
@@ -145,7 +149,7 @@ pub fn support(body: &Body, n: &Vector3<f64>) -> f64 {
 
 /// Fitted bodies: a chair and a human at degrees 2, 4 and 6.
 #[cfg(feature = "fit")]
-pub fn fitted() -> &'static [Body] {
+pub(crate) fn fitted() -> &'static [Body] {
     use std::ops::ControlFlow;
     use std::sync::OnceLock;
     use sublevel::demo::shapes;
@@ -168,12 +172,12 @@ pub fn fitted() -> &'static [Body] {
 
 /// Without fitting there are none.
 #[cfg(not(feature = "fit"))]
-pub fn fitted() -> &'static [Body] {
+pub(crate) fn fitted() -> &'static [Body] {
     &[]
 }
 
 /// One of each kind, of sizes about 1.
-pub fn zoo() -> Vec<Body> {
+pub(crate) fn zoo() -> Vec<Body> {
     let mut zoo =
         vec![e(1.0, 0.7, 0.4), b(0.6, 0.9, 0.3), cylinder(0.5, 0.8), c(4, 0.5, 1.0), c(6, 0.8, 0.3), c(8, 1.0, 0.7)];
     zoo.extend([4, 6, 8].map(|degree| q(degree, 0.8, 0.5, 1.1)));

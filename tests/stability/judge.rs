@@ -1,30 +1,28 @@
 //! What every answer is held against, whatever the family.
 
-use crate::reference::{self, DistanceTruth, LevelTruth};
+use crate::bodies::Placed;
+use crate::reference;
 use sublevel::body::Body;
 use sublevel::measure::{
-    Distance, LevelDistance, MAX_ITERATIONS, Options, Pose, Status, WarmStart, distance, level_distance,
+    Distance, LevelDistance, MAX_ITERATIONS, Options, Status, WarmStart, distance, level_distance,
 };
 
-/// A body at its pose.
-pub type Placed<'a> = (&'a Body, &'a Pose);
-
 /// The size that lengths are relative to: the circumradius of the smaller body.
-pub fn small(a: &Body, b: &Body) -> f64 {
+pub(crate) fn small(a: &Body, b: &Body) -> f64 {
     a.circumscribed().radius.min(b.circumscribed().radius)
 }
 
-pub fn large(a: &Body, b: &Body) -> f64 {
+pub(crate) fn large(a: &Body, b: &Body) -> f64 {
     a.circumscribed().radius.max(b.circumscribed().radius)
 }
 
 /// A cold distance, checked without a reference: the status is what the bracket says, the numbers are numbers, the caps hold.
-pub fn plain((a, pose_a): Placed<'_>, (b, pose_b): Placed<'_>, options: &Options<'_>, label: &str) -> Distance {
+pub(crate) fn plain((a, pose_a): Placed<'_>, (b, pose_b): Placed<'_>, options: &Options<'_>, label: &str) -> Distance {
     warm((a, pose_a), (b, pose_b), options, &mut WarmStart::default(), label)
 }
 
 /// As [`plain`], from a warm start.
-pub fn warm(
+pub(crate) fn warm(
     (a, pose_a): Placed<'_>,
     (b, pose_b): Placed<'_>,
     options: &Options<'_>,
@@ -45,14 +43,24 @@ pub fn warm(
 }
 
 /// A cold distance held against 200 bits.
-pub fn judged(a: Placed<'_>, b: Placed<'_>, options: &Options<'_>, label: &str) -> (Distance, DistanceTruth) {
+pub(crate) fn judged(
+    a: Placed<'_>,
+    b: Placed<'_>,
+    options: &Options<'_>,
+    label: &str,
+) -> (Distance, reference::distance::Truth) {
     let answer = plain(a, b, options, label);
     let truth = verdict(a, b, &answer, label);
     (answer, truth)
 }
 
 /// Holds an answer against 200 bits.
-pub fn verdict((a, pose_a): Placed<'_>, (b, pose_b): Placed<'_>, answer: &Distance, label: &str) -> DistanceTruth {
+pub(crate) fn verdict(
+    (a, pose_a): Placed<'_>,
+    (b, pose_b): Placed<'_>,
+    answer: &Distance,
+    label: &str,
+) -> reference::distance::Truth {
     let truth = reference::distance(a, pose_a, b, pose_b, answer);
     let label = format!("{label}: {}-{} {answer:?}, truth {:e}", a.name(), b.name(), truth.value());
     let sharp = 1e-16 * small(a, b);
@@ -62,12 +70,12 @@ pub fn verdict((a, pose_a): Placed<'_>, (b, pose_b): Placed<'_>, answer: &Distan
 }
 
 /// A cold level distance held against 200 bits.
-pub fn judged_level(
+pub(crate) fn judged_level(
     (a, pose_a): Placed<'_>,
     (b, pose_b): Placed<'_>,
     options: &Options<'_>,
     label: &str,
-) -> (LevelDistance, LevelTruth) {
+) -> (LevelDistance, reference::level::Truth) {
     let answer = level_distance(a, pose_a, b, pose_b, options, &mut WarmStart::default());
     let truth = reference::level_distance(a, pose_a, b, pose_b, &answer);
     let label = format!("{label}: {}-{} {answer:?}, truth {:e}", a.name(), b.name(), truth.value());
@@ -81,7 +89,7 @@ pub fn judged_level(
 }
 
 /// Distance and both level distances at the default accuracy, all converged and all true.
-pub fn all(a: Placed<'_>, b: Placed<'_>, label: &str) -> (Distance, DistanceTruth) {
+pub(crate) fn all(a: Placed<'_>, b: Placed<'_>, label: &str) -> (Distance, reference::distance::Truth) {
     let options = Options::default();
     let (answer, truth) = judged(a, b, &options, label);
     assert_eq!(answer.status, Status::Converged, "{label}: {}-{} {answer:?}", a.0.name(), b.0.name());

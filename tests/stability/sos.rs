@@ -26,7 +26,7 @@ type Terms = BTreeMap<Exponents, f64>;
 const ONE: Exponents = [0; 3];
 
 /// Distance of the bodies, metres; about 1e-8 of their size exact. None if the program could not be solved.
-pub fn distance((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose)) -> Option<f64> {
+pub(crate) fn distance((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose)) -> Option<f64> {
     let unit = a.circumscribed().radius.max(b.circumscribed().radius);
     let mut program = Program::default();
     let n: [usize; 3] = std::array::from_fn(|_| program.variable(0.0));
@@ -58,7 +58,7 @@ pub fn distance((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose)) -> Opt
 
 /// Level distance `d(A‖B)`; about 1e-8 of `max(1, |d|)` exact where bodies are of similar size and not far apart. None if the
 /// program could not be solved.
-pub fn level_distance((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose)) -> Option<f64> {
+pub(crate) fn level_distance((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose)) -> Option<f64> {
     // World coordinates about A's translation, in which z_i = L_i (x - c_i).
     let place = |body: &Body, pose: &Pose| {
         let turn = pose.rotation().to_rotation_matrix().into_inner();

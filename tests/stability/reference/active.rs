@@ -6,9 +6,9 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 /// A trial set of active constraints with first multipliers.
 #[derive(Clone, Debug)]
-pub struct Trial {
-    pub index: Vec<usize>,
-    pub multiplier: Vec<f64>,
+pub(crate) struct Trial {
+    pub(crate) index: Vec<usize>,
+    pub(crate) multiplier: Vec<f64>,
 }
 
 /// Values this close to the level may stand for equality.
@@ -18,7 +18,7 @@ const NEAR: f64 = 0.05;
 const MOST: usize = 5;
 
 /// Constraints of the body whose value at v is near `level` or above it, largest first, with their gradients.
-pub fn near(body: &Solid<'_>, v: &Vector, level: f64) -> Vec<(usize, Vector3<f64>)> {
+pub(crate) fn near(body: &Solid<'_>, v: &Vector, level: f64) -> Vec<(usize, Vector3<f64>)> {
     let mut all: Vec<_> = (0..body.len()).map(|i| (i, double(&body.value(i, v)))).collect();
     all.sort_by(|p, q| q.1.total_cmp(&p.1));
     let least = (level - NEAR * level.abs().max(1.0)).min(all[0].1);
@@ -28,13 +28,13 @@ pub fn near(body: &Solid<'_>, v: &Vector, level: f64) -> Vec<(usize, Vector3<f64
 }
 
 /// All subsets of 1 to 3 constraints.
-pub fn subsets(near: &[(usize, Vector3<f64>)]) -> Vec<Vec<(usize, Vector3<f64>)>> {
+pub(crate) fn subsets(near: &[(usize, Vector3<f64>)]) -> Vec<Vec<(usize, Vector3<f64>)>> {
     let chosen = |bits: u32| (0..near.len()).filter(|i| bits >> i & 1 == 1).map(|i| near[i]).collect();
     (1..1_u32 << near.len()).filter(|bits| bits.count_ones() <= 3).map(chosen).collect()
 }
 
 /// Least-squares multipliers of `columns · m = target`, negative ones cut off, with the residual they leave.
-pub fn fit(columns: &[DVector<f64>], target: &DVector<f64>) -> (Vec<f64>, f64) {
+pub(crate) fn fit(columns: &[DVector<f64>], target: &DVector<f64>) -> (Vec<f64>, f64) {
     let m = DMatrix::from_columns(columns);
     let solution = m.clone().svd(true, true).solve(target, 1e-12).expect("both factors are asked for");
     let multiplier = solution.map(|value| value.max(0.0));
@@ -43,7 +43,7 @@ pub fn fit(columns: &[DVector<f64>], target: &DVector<f64>) -> (Vec<f64>, f64) {
 }
 
 /// Trial sets for `Σ λ ∇g = target`, the best fit first and small sets before large ones.
-pub fn for_direction(body: &Solid<'_>, v: &Vector, target: &Vector3<f64>) -> Vec<Trial> {
+pub(crate) fn for_direction(body: &Solid<'_>, v: &Vector, target: &Vector3<f64>) -> Vec<Trial> {
     let target = DVector::from_column_slice(target.as_slice());
     let mut trials: Vec<_> = subsets(&near(body, v, 1.0))
         .into_iter()

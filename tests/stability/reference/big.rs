@@ -7,68 +7,68 @@ use dashu_float::round::mode::HalfEven;
 const BITS: usize = 200;
 
 /// A binary floating-point number of 200 bits.
-pub type Big = FBig<HalfEven, 2>;
+pub(crate) type Big = FBig<HalfEven, 2>;
 
 /// A point or direction.
-pub type Vector = [Big; 3];
+pub(crate) type Vector = [Big; 3];
 
 /// A number as it is.
 ///
 /// # Panics
 /// On NaN and infinities: a reference has no use for them.
-pub fn big(x: f64) -> Big {
+pub(crate) fn big(x: f64) -> Big {
     Big::try_from(x).expect("a finite number").with_precision(BITS).value()
 }
 
 /// The nearest double.
-pub fn double(x: &Big) -> f64 {
+pub(crate) fn double(x: &Big) -> f64 {
     x.to_f64().value()
 }
 
 /// The numbers of a nalgebra vector.
-pub fn vector(v: &nalgebra::Vector3<f64>) -> Vector {
+pub(crate) fn vector(v: &nalgebra::Vector3<f64>) -> Vector {
     [big(v.x), big(v.y), big(v.z)]
 }
 
 /// The nearest doubles.
-pub fn doubles(v: &Vector) -> nalgebra::Vector3<f64> {
+pub(crate) fn doubles(v: &Vector) -> nalgebra::Vector3<f64> {
     nalgebra::Vector3::from_fn(|i, _| double(&v[i]))
 }
 
 /// `|x|`.
-pub fn abs(x: &Big) -> Big {
+pub(crate) fn abs(x: &Big) -> Big {
     if *x < Big::ZERO { -x } else { x.clone() }
 }
 
-pub fn dot(a: &Vector, b: &Vector) -> Big {
+pub(crate) fn dot(a: &Vector, b: &Vector) -> Big {
     &a[0] * &b[0] + &a[1] * &b[1] + &a[2] * &b[2]
 }
 
-pub fn norm(a: &Vector) -> Big {
+pub(crate) fn norm(a: &Vector) -> Big {
     let square = dot(a, a);
     if square == Big::ZERO { square } else { square.sqrt() }
 }
 
-pub fn add(a: &Vector, b: &Vector) -> Vector {
+pub(crate) fn add(a: &Vector, b: &Vector) -> Vector {
     std::array::from_fn(|i| &a[i] + &b[i])
 }
 
-pub fn sub(a: &Vector, b: &Vector) -> Vector {
+pub(crate) fn sub(a: &Vector, b: &Vector) -> Vector {
     std::array::from_fn(|i| &a[i] - &b[i])
 }
 
-pub fn scaled(a: &Vector, s: &Big) -> Vector {
+pub(crate) fn scaled(a: &Vector, s: &Big) -> Vector {
     std::array::from_fn(|i| &a[i] * s)
 }
 
-pub fn cross(a: &Vector, b: &Vector) -> Vector {
+pub(crate) fn cross(a: &Vector, b: &Vector) -> Vector {
     let minor = |i: usize, j: usize| &a[i] * &b[j] - &a[j] * &b[i];
     [minor(1, 2), minor(2, 0), minor(0, 1)]
 }
 
 /// Solves `m x = r` by elimination with complete pivoting. What pivots below 1e-50 of the largest can not determine stays 0:
 /// where minimisers are not unique, one of them is found all the same.
-pub fn solve(mut m: Vec<Vec<Big>>, mut r: Vec<Big>) -> Vec<Big> {
+pub(crate) fn solve(mut m: Vec<Vec<Big>>, mut r: Vec<Big>) -> Vec<Big> {
     let n = r.len();
     let mut column: Vec<usize> = (0..n).collect();
     let mut rank = n;

@@ -9,34 +9,34 @@ use sublevel::measure::{Distance, Pose};
 
 /// The distance in a bracket of its own, metres.
 #[derive(Debug)]
-pub struct Truth {
-    pub lower: Big,
-    pub upper: Big,
+pub(crate) struct Truth {
+    pub(crate) lower: Big,
+    pub(crate) upper: Big,
     /// Closest points, relative to the translation of the first body; world directions.
-    pub x: Vector,
-    pub y: Vector,
+    pub(crate) x: Vector,
+    pub(crate) y: Vector,
     /// Unit normal from the second body to the first.
-    pub normal: Vector,
+    pub(crate) normal: Vector,
     /// Derivative with respect to the twists `(v_a, ω_a, v_b, ω_b)` of the bodies, each about its own translation.
-    pub gradient: [f64; 12],
+    pub(crate) gradient: [f64; 12],
 }
 
 impl Truth {
     /// Width of the bracket, metres.
-    pub fn width(&self) -> f64 {
+    pub(crate) fn width(&self) -> f64 {
         double(&(&self.upper - &self.lower))
     }
 
-    pub fn value(&self) -> f64 {
+    pub(crate) fn value(&self) -> f64 {
         double(&self.upper)
     }
 
     /// Whether the answer's bracket contains the distance.
-    pub fn inside(&self, answer: &Distance) -> bool {
+    pub(crate) fn inside(&self, answer: &Distance) -> bool {
         big(answer.lower) <= self.upper && self.lower <= big(answer.upper)
     }
 
-    pub fn normal(&self) -> Vector3<f64> {
+    pub(crate) fn normal(&self) -> Vector3<f64> {
         doubles(&self.normal)
     }
 }
@@ -55,7 +55,7 @@ const TARGET: f64 = 1e-40;
 
 /// Solves for the distance from the witnesses of an answer. The solve starts there and nowhere else, but what it finds is
 /// proven by its own bracket: an answer can not make it agree.
-pub fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer: &Distance) -> Truth {
+pub(crate) fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer: &Distance) -> Truth {
     let unit = a.circumscribed().radius.max(b.circumscribed().radius).log2().round().exp2();
     let origin = pose_a.translation();
     let (one, two) = (Solid::new(a, pose_a, origin, unit), Solid::new(b, pose_b, origin, unit));

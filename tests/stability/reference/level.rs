@@ -9,27 +9,27 @@ use sublevel::measure::{LevelDistance, Pose};
 
 /// The level distance in a bracket of its own.
 #[derive(Debug)]
-pub struct Truth {
-    pub lower: Big,
-    pub upper: Big,
+pub(crate) struct Truth {
+    pub(crate) lower: Big,
+    pub(crate) upper: Big,
     /// Minimiser, relative to the translation of the first body, metres; world directions.
-    pub x: Vector,
+    pub(crate) x: Vector,
     /// Derivative with respect to the twists `(v_a, ω_a, v_b, ω_b)` of the bodies, each about its own translation.
-    pub gradient: [f64; 12],
+    pub(crate) gradient: [f64; 12],
 }
 
 impl Truth {
     /// Width of the bracket relative to `max(1, |d|)`.
-    pub fn width(&self) -> f64 {
+    pub(crate) fn width(&self) -> f64 {
         double(&(&self.upper - &self.lower)) / double(&self.upper).abs().max(1.0)
     }
 
-    pub fn value(&self) -> f64 {
+    pub(crate) fn value(&self) -> f64 {
         double(&self.upper)
     }
 
     /// Whether the answer's bracket contains the level distance.
-    pub fn inside(&self, answer: &LevelDistance) -> bool {
+    pub(crate) fn inside(&self, answer: &LevelDistance) -> bool {
         (answer.lower == f64::NEG_INFINITY || big(answer.lower) <= self.upper)
             && (answer.upper == f64::INFINITY || self.lower <= big(answer.upper))
     }
@@ -54,7 +54,7 @@ impl Best {
 const TARGET: f64 = 1e-40;
 
 /// Solves for `d(A‖B)` from the witness of an answer; proven by its own bracket, as [`super::distance()`].
-pub fn level_distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer: &LevelDistance) -> Truth {
+pub(crate) fn level_distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer: &LevelDistance) -> Truth {
     let unit = b.circumscribed().radius.log2().round().exp2();
     let origin = pose_a.translation();
     let (one, two) = (Solid::new(a, pose_a, origin, unit), Solid::new(b, pose_b, origin, unit));

@@ -7,9 +7,9 @@
 
 mod active;
 mod big;
-mod distance;
-mod level;
+pub(crate) mod distance;
+pub(crate) mod level;
 mod solid;
 
-pub use distance::{Truth as DistanceTruth, distance};
-pub use level::{Truth as LevelTruth, level_distance};
+pub(crate) use distance::distance;
+pub(crate) use level::level_distance;

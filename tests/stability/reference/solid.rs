@@ -6,20 +6,20 @@ use sublevel::body::Body;
 use sublevel::measure::Pose;
 
 /// Value, gradient and Hessian of a constraint.
-pub struct Jet {
-    pub value: Big,
-    pub gradient: Vector,
-    pub hessian: [Vector; 3],
+pub(crate) struct Jet {
+    pub(crate) value: Big,
+    pub(crate) gradient: Vector,
+    pub(crate) hessian: [Vector; 3],
 }
 
 /// A body in the frame of work: world directions, origin at the first body's translation, lengths in `unit` metres.
-pub struct Solid<'a> {
+pub(crate) struct Solid<'a> {
     body: &'a Body,
     /// `z = linear v + offset` for points v of the frame of work.
     linear: [Vector; 3],
     offset: Vector,
     /// Stored interior point.
-    pub interior: Vector,
+    pub(crate) interior: Vector,
     center: Vector,
     /// Ten times the stored circumradius: no lower bound rests on that being sharp.
     radius: Big,
@@ -27,7 +27,7 @@ pub struct Solid<'a> {
 
 impl<'a> Solid<'a> {
     /// The body at its pose, the quaternion normalized exactly.
-    pub fn new(body: &'a Body, pose: &Pose, origin: &Vector3<f64>, unit: f64) -> Self {
+    pub(crate) fn new(body: &'a Body, pose: &Pose, origin: &Vector3<f64>, unit: f64) -> Self {
         let rotation = rotation(pose);
         let shift = sub(&vector(pose.translation()), &vector(origin));
         let own = body.normalization();
@@ -57,12 +57,12 @@ impl<'a> Solid<'a> {
         }
     }
 
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.body.constraints().len()
     }
 
     /// Constraint i at v.
-    pub fn jet(&self, i: usize, v: &Vector) -> Jet {
+    pub(crate) fn jet(&self, i: usize, v: &Vector) -> Jet {
         let z: Vector = std::array::from_fn(|i| dot(&self.linear[i], v) + &self.offset[i]);
         let jet = expand(self.body.constraints()[i].polynomial.terms(), &z);
         let column = |j: usize| -> Vector { std::array::from_fn(|i| self.linear[i][j].clone()) };
@@ -78,7 +78,7 @@ impl<'a> Solid<'a> {
     }
 
     /// Constraint i at v, nothing else.
-    pub fn value(&self, i: usize, v: &Vector) -> Big {
+    pub(crate) fn value(&self, i: usize, v: &Vector) -> Big {
         let z: Vector = std::array::from_fn(|i| dot(&self.linear[i], v) + &self.offset[i]);
         let powers = powers(&z);
         let terms = self.body.constraints()[i].polynomial.terms().iter();
@@ -89,18 +89,18 @@ impl<'a> Solid<'a> {
     }
 
     /// The largest constraint at v.
-    pub fn largest(&self, v: &Vector) -> Big {
+    pub(crate) fn largest(&self, v: &Vector) -> Big {
         let values = (0..self.len()).map(|i| self.value(i, v));
         values.reduce(|most, value| if value > most { value } else { most }).expect("a body has constraints")
     }
 
     /// Upper bound of the distance from v to points of the body.
-    pub fn reach(&self, v: &Vector) -> Big {
+    pub(crate) fn reach(&self, v: &Vector) -> Big {
         super::big::norm(&sub(v, &self.center)) + &self.radius
     }
 
     /// The point of the body where the segment from the interior point to v leaves it, or a little before; v if inside.
-    pub fn pull_in(&self, v: &Vector) -> Option<Vector> {
+    pub(crate) fn pull_in(&self, v: &Vector) -> Option<Vector> {
         let (mut point, mut value) = (v.clone(), self.largest(v));
         let deepest = self.largest(&self.interior);
         let one = big(1.0);
