@@ -1,7 +1,8 @@
-//! One block: ten thousand queries of one pair, each answer checked cheaply and one of them thoroughly.
+//! One block: ten thousand solves, each answer checked cheaply and one of them thoroughly.
 
 use crate::draw::{Draw, Style};
 use crate::measures::{Answer, MEASURES};
+use crate::random::Seeded;
 use crate::tally::{Tally, Worst};
 use sublevel::body::Body;
 use sublevel::measure::{MAX_ITERATIONS, Options, Pose, WarmStart};
@@ -9,57 +10,72 @@ use sublevel::measure::{MAX_ITERATIONS, Options, Pose, WarmStart};
 /// Solves of one block.
 pub(crate) const SOLVES: u64 = 10_000;
 
+/// Solves of one pair before the next is drawn.
+const ROUND: u64 = 250;
+
 /// Runs a block; `program` says whether its thorough check includes the semidefinite program.
 pub(crate) fn run(bodies: &[Body], seed: u64, block: u64, program: bool) -> Tally {
+    let mut random = Seeded(seed ^ block.wrapping_mul(0xd134_2543_de82_ef95));
     let mut tally = Tally::default();
-    let mut draw = Draw::new(bodies, MEASURES.len(), seed, block);
-    let (a, b, measure) = (draw.a, draw.b, &MEASURES[draw.measure]);
-    let options = Options::default();
-    let thorough = draw.random.next() % SOLVES;
-    let (mut warm, mut examined) = (WarmStart::default(), false);
+    let mut examine = Some(random.next() % SOLVES);
     let mut query = 0;
     while tally.solves < SOLVES {
-        let (pose_a, pose_b, continues) = draw.next();
-        let (p, q) = ((a, &pose_a), (b, &pose_b));
-        // A hint that does not continue is a bad one, which may change nothing but the time.
-        let hinted = continues || query % 4 == 0;
-        let mut start = if hinted { warm } else { WarmStart::default() };
-        let answer = (measure.solve)(p, q, &options, &mut start);
-        warm = start;
-        let name = |kind: &str| format!("{}, {kind}", measure.name);
-        let kind = if continues {
-            "warm"
-        } else if hinted {
-            "bad hint"
-        } else {
-            "cold"
-        };
-        let worst = Worst { iterations: answer.iterations(), block, query };
-        tally.solve(name(kind), worst);
-        let site = Site { a, pose_a: &pose_a, b, pose_b: &pose_b, style: draw.style, block, query };
-        site.cheap(&mut tally, measure.name, &answer);
-        // Every hinted answer off a trajectory, and every tenth on one, is held against a cold one.
-        if hinted && (!continues || query % 10 == 0) {
-            let cold = (measure.solve)(p, q, &options, &mut WarmStart::default());
-            tally.solve(name("cold"), Worst { iterations: cold.iterations(), block, query });
-            site.cheap(&mut tally, measure.name, &cold);
-            let ((l, u), (m, v)) = (answer.bracket(), cold.bracket());
-            let meet = l <= v && m <= u;
-            tally.check("warm and cold brackets meet", meet, block, query, || site.tell(&cold));
-        }
-        if query % 16 == 0 {
-            tally.check("witnesses feasible", answer.feasible(p, q), block, query, || site.tell(&answer));
-        }
-        if !examined && tally.solves > thorough {
-            examined = true;
-            site.thorough(&mut tally, &answer);
-            if program {
-                site.program(&mut tally, draw.measure, &answer);
-            }
-        }
-        query += 1;
+        let until = (tally.solves + ROUND).min(SOLVES);
+        let draw = Draw::new(bodies, MEASURES.len(), &mut random);
+        round(draw, &mut tally, (block, &mut query), until, (&mut examine, program));
     }
     tally
+}
+
+/// Runs the queries of one pair until so many solves are counted; the first one after `examine` solves is checked thoroughly.
+fn round(
+    mut draw: Draw<'_, '_>,
+    tally: &mut Tally,
+    (block, query): (u64, &mut u64),
+    until: u64,
+    (examine, program): (&mut Option<u64>, bool),
+) {
+    let (a, b, measure) = (draw.a, draw.b, &MEASURES[draw.measure]);
+    let options = Options::default();
+    let mut warm = WarmStart::default();
+    while tally.solves < until {
+        let (pose_a, pose_b, continues) = draw.next();
+        let (p, q) = ((a, &pose_a), (b, &pose_b));
+        let site = Site { a, pose_a: &pose_a, b, pose_b: &pose_b, style: draw.style, block, query: *query };
+        let mut solve = |tally: &mut Tally, kind: &str, start: &mut WarmStart| {
+            let answer = (measure.solve)(p, q, &options, start);
+            let worst = Worst { iterations: answer.iterations(), block, query: *query };
+            tally.solve(format!("{}, {kind}", measure.name), worst);
+            site.cheap(tally, measure.name, &answer);
+            answer
+        };
+        // A hint that does not continue is a bad one, which may change nothing but the time.
+        let hinted = continues || query.is_multiple_of(4);
+        let answer = if hinted {
+            solve(tally, if continues { "warm" } else { "bad hint" }, &mut warm)
+        } else {
+            warm = WarmStart::default();
+            solve(tally, "cold", &mut warm)
+        };
+        // Every hinted answer off a trajectory, and every tenth on one, is held against a cold one.
+        if hinted && (!continues || query.is_multiple_of(10)) {
+            let cold = solve(tally, "cold", &mut WarmStart::default());
+            let ((l, u), (m, v)) = (answer.bracket(), cold.bracket());
+            let meet = l <= v && m <= u;
+            tally.check("warm and cold brackets meet", meet, block, *query, || site.tell(&cold));
+        }
+        if query.is_multiple_of(16) {
+            tally.check("witnesses feasible", answer.feasible(p, q), block, *query, || site.tell(&answer));
+        }
+        if examine.is_some_and(|after| tally.solves > after) {
+            *examine = None;
+            site.thorough(tally, &answer);
+            if program {
+                site.program(tally, draw.measure, &answer);
+            }
+        }
+        *query += 1;
+    }
 }
 
 /// Where an answer is from.

@@ -1,11 +1,11 @@
-//! Queries of a block: all of one pair and one measure, drawn from the block's own seed.
+//! Queries of a round: all of one pair and one measure, drawn from the seed of their block.
 
 use crate::random::{Seeded, pose, shifted, turned};
 use nalgebra::{UnitQuaternion, Vector3};
 use sublevel::body::Body;
 use sublevel::measure::{Options, Pose, WarmStart, distance};
 
-/// How the poses of a block are drawn.
+/// How the poses of a round are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Style {
     /// Independent poses from deep overlap to far apart.
@@ -22,21 +22,20 @@ pub(crate) enum Style {
 
 const STYLES: [Style; 5] = [Style::Random, Style::Trajectory, Style::Grazing, Style::Aligned, Style::Far];
 
-/// The pair, the measure and the poses of one block.
-pub(crate) struct Draw<'a> {
+/// The pair, the measure and the poses of one round.
+pub(crate) struct Draw<'a, 'r> {
     pub(crate) a: &'a Body,
     pub(crate) b: &'a Body,
     pub(crate) measure: usize,
     pub(crate) style: Style,
-    pub(crate) random: Seeded,
+    random: &'r mut Seeded,
     at: (Pose, Pose),
     drift: (Vector3<f64>, Vector3<f64>),
     left: u32,
 }
 
-impl<'a> Draw<'a> {
-    pub(crate) fn new(bodies: &'a [Body], measures: usize, seed: u64, block: u64) -> Self {
-        let mut random = Seeded(seed ^ block.wrapping_mul(0xd134_2543_de82_ef95));
+impl<'a, 'r> Draw<'a, 'r> {
+    pub(crate) fn new(bodies: &'a [Body], measures: usize, random: &'r mut Seeded) -> Self {
         let (a, b) = (&bodies[random.index(bodies.len())], &bodies[random.index(bodies.len())]);
         let measure = random.index(measures);
         let style = STYLES[random.index(STYLES.len())];
@@ -51,7 +50,7 @@ impl<'a> Draw<'a> {
     /// Independent poses; the distance of the centres between overlap and a hundred sizes, mostly near.
     fn independent(&mut self) -> (Pose, Pose) {
         let sum = self.sum();
-        let random = &mut self.random;
+        let random = &mut *self.random;
         let reach = if random.index(4) == 0 { random.between(1.0, 100.0) } else { 1.6 * random.positive() };
         let first = random.pose(0.1 * sum);
         // About the interior points: the origin of a fitted body may lie at its foot.
@@ -104,7 +103,7 @@ impl<'a> Draw<'a> {
     }
 
     fn aligned(&mut self) -> (Pose, Pose) {
-        let random = &mut self.random;
+        let random = &mut *self.random;
         let axis = |random: &mut Seeded| [Vector3::x(), Vector3::y(), Vector3::z()][random.index(3)];
         let quarter = UnitQuaternion::from_scaled_axis(axis(random) * std::f64::consts::FRAC_PI_2);
         let turn = if random.index(2) == 0 { UnitQuaternion::identity() } else { quarter };

@@ -3,8 +3,9 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Most failures kept word by word.
+/// Most failures kept word by word, of all blocks and of each.
 const KEPT: usize = 500;
+const KEPT_OF_A_BLOCK: usize = 10;
 
 /// The hardest query of a kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -81,7 +82,10 @@ impl Tally {
 
     /// Counts a check; where it failed, with the detail.
     pub(crate) fn check(&mut self, kind: &str, passed: bool, block: u64, query: u64, detail: impl FnOnce() -> String) {
-        *self.checks.entry(kind.into()).or_default() += 1;
+        match self.checks.get_mut(kind) {
+            Some(count) => *count += 1,
+            None => _ = self.checks.insert(kind.into(), 1),
+        }
         if !passed {
             *self.failures.entry(kind.into()).or_default() += 1;
             self.kept.push(Failure { block, query, kind: kind.into(), detail: detail() });
@@ -103,7 +107,7 @@ impl Tally {
         for (kind, count) in other.failures {
             *self.failures.entry(kind).or_default() += count;
         }
-        self.kept.extend(other.kept);
+        self.kept.extend(other.kept.into_iter().take(KEPT_OF_A_BLOCK));
         self.kept.sort();
         self.kept.truncate(KEPT);
         self.deviation = self.deviation.max(other.deviation);
