@@ -11,12 +11,14 @@ mod placement;
 mod shapes;
 mod sphere;
 mod surface;
+mod trust;
 
 pub use file::BodyFileError;
 pub use id::{BodyId, ParseIdError};
 pub use placement::{Placement, Sample};
 pub use sphere::Sphere;
 pub use surface::Volume;
+pub use trust::{ConstraintTrust, Trust};
 
 use crate::polynomial::{CertificateError, HessianGram, Polynomial};
 use extent::Extent;
@@ -171,6 +173,7 @@ pub struct Body {
     bounding_box: Aabb,
     circumscribed: Ball,
     z_extent: Vector3<f64>,
+    trust: Trust,
     boundary: Vec<Vector3<f64>>,
     volume: Volume,
     points: Option<ContainedPoints>,
@@ -216,6 +219,8 @@ impl Body {
         if !(in_radius > 0.0) {
             return Err(BodyError::Thin);
         }
+        let boundary_z = boundary.iter().map(|x| normalization.linear * (x - normalization.center));
+        let trust = Trust::new(&constraints, &normalization.linear, &inverse, &z_extent, boundary_z);
         let interior_z = normalization.linear * (interior_point - normalization.center);
         let volume = surface::volume(&constraints, &normalization.linear, &interior_z);
         let id = BodyId::of(&normalization, &constraints);
@@ -232,6 +237,7 @@ impl Body {
             bounding_box,
             circumscribed,
             z_extent,
+            trust,
             boundary,
             volume,
             points: None,
@@ -302,6 +308,11 @@ impl Body {
     /// Bounds of `|z_i|` over the body, z its normalized coordinates; proven.
     pub fn z_extent(&self) -> &Vector3<f64> {
         &self.z_extent
+    }
+
+    /// Error and curvature bounds near the body.
+    pub fn trust(&self) -> &Trust {
+        &self.trust
     }
 
     /// Points proven to lie in the body, close to its boundary, spread all around.

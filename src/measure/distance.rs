@@ -7,9 +7,11 @@ use super::options::Options;
 use super::pair::{Pair, Posed};
 use super::pose::Pose;
 use super::programs::{Closest, Level, points};
+use super::smooth::{Follow, Proven, Trace};
 use super::warm::{Hint, WarmStart};
 use crate::body::{Body, MAX_CONSTRAINTS};
 use crate::optimize::minimise;
+use crate::polynomial::dispatch;
 use nalgebra::{SVector, Vector3};
 use std::ops::ControlFlow;
 
@@ -65,8 +67,18 @@ pub fn distance(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> Distance {
+    let mut spent = 0;
+    if let Hint::Smooth(trace) = &mut warm.hint {
+        let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
+        let follow = Follow { a, pose_a, b, pose_b, tolerance, limit: options.max_iterations(), trace };
+        match dispatch(follow) {
+            Ok(proven) => return proven.answer(a, pose_a),
+            Err(rounds) => spent = rounds,
+        }
+    }
     let pair = Pair::new(a, pose_a, b, pose_b);
     let mut search = Search::new(&pair, options);
+    search.iterations = spent;
     search.run(&warm.hint);
     *warm = search.hint();
     search.answer()
@@ -132,7 +144,7 @@ impl<'a> Search<'a> {
             Hint::Overlap { point_a } => {
                 self.common(&self.pair.a_to_query(point_a));
             }
-            Hint::Cold | Hint::Level { .. } => {}
+            Hint::Cold | Hint::Level { .. } | Hint::Smooth(_) => {}
         }
         if !self.done() {
             self.closest(NEAR);
@@ -289,9 +301,18 @@ impl<'a> Search<'a> {
     fn hint(&self) -> WarmStart {
         if self.upper == 0.0 {
             WarmStart { hint: Hint::Overlap { point_a: self.pair.to_a(&self.x) } }
+        } else if let Some(trace) = self.trace() {
+            WarmStart { hint: Hint::Smooth(trace) }
         } else {
             WarmStart::apart(self.pair, &self.x, &self.y, &self.n, self.active.0.bits(), self.active.1.bits())
         }
+    }
+
+    /// The answer as a start for continuation, if one constraint of each body is active.
+    fn trace(&self) -> Option<Trace> {
+        let active = [self.active.0.single()?, self.active.1.single()?];
+        let (x, y) = (self.pair.to_a(&self.x), self.pair.to_b(&self.y));
+        Some(Trace::new(self.pair.a.body, &x, self.pair.b.body, &y, &self.n, active))
     }
 
     fn answer(&self) -> Distance {
@@ -311,6 +332,22 @@ impl<'a> Search<'a> {
             witness_b,
             normal,
             iterations: self.iterations,
+        }
+    }
+}
+
+impl Proven {
+    fn answer(&self, a: &Body, pose_a: &Pose) -> Distance {
+        let center = a.normalization().center;
+        let to_world = |v: [f64; 3]| pose_a.transform_point(&(center + Vector3::from(v)));
+        Distance {
+            status: Status::Converged,
+            lower: self.lower,
+            upper: self.upper,
+            witness_a: to_world(self.x),
+            witness_b: to_world(self.y),
+            normal: Some(pose_a.transform_direction(&Vector3::from(self.n))),
+            iterations: self.rounds,
         }
     }
 }

@@ -15,6 +15,9 @@ mod options;
 mod pair;
 mod pose;
 mod programs;
+mod smooth;
+mod tangent;
+mod vector;
 mod warm;
 
 pub use distance::{Distance, distance};

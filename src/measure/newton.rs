@@ -64,6 +64,11 @@ impl Active {
         active
     }
 
+    /// The only constraint, if there is but one.
+    pub(super) fn single(&self) -> Option<u8> {
+        (self.len == 1).then_some(self.index[0] as u8)
+    }
+
     pub(super) fn bits(&self) -> ActiveSet {
         self.index[..self.len].iter().fold(0, |bits, i| bits | 1 << i)
     }

@@ -1,6 +1,7 @@
 //! Warm starts: what one answer tells the next query of the same pair.
 
 use super::pair::Pair;
+use super::smooth::Trace;
 use nalgebra::Vector3;
 
 /// Constraints of one body that hold with equality, as a bit set.
@@ -21,6 +22,8 @@ pub(super) enum Hint {
     Cold,
     /// Witnesses in the frames of their own bodies, normal in A's frame.
     Apart { x_a: Vector3<f64>, y_b: Vector3<f64>, normal_a: Vector3<f64>, active_a: ActiveSet, active_b: ActiveSet },
+    /// Witnesses on smooth parts of both surfaces, with all that is known there.
+    Smooth(Trace),
     /// A common point in A's frame.
     Overlap { point_a: Vector3<f64> },
     /// Minimiser of a level distance in B's frame.

@@ -3,16 +3,20 @@
 //! Pure mathematics in the normalized frame of a body (unit-free coordinates `z`); nothing here knows of metres, poses
 //! or bodies.
 
+mod ceiling;
 mod definite;
 mod gram;
 mod hessian_form;
 mod monomial;
 mod rounding;
+mod simd;
 
+pub use ceiling::{NEAR_LEVEL, ThirdCeiling};
 pub use gram::{CertificateError, HessianGram, HessianMonomial, Margin};
-pub use hessian_form::Jet;
+pub use hessian_form::{Jet, NumberJet};
 pub use monomial::{Exponents, degree_of, monomials};
 pub use rounding::gamma;
+pub use simd::{Arch, Lanes, Number, Scalar, Simd, WithSimd, dispatch};
 
 use hessian_form::HessianForm;
 use nalgebra::Vector3;
@@ -95,6 +99,12 @@ impl Polynomial {
         self.form.evaluate(z)
     }
 
+    /// Value, gradient and Hessian at the points `z`, a lane each, to be inlined into work for [`dispatch`].
+    #[inline(always)]
+    pub fn jet<S: Simd, N: Number<S>>(&self, simd: S, z: [N; 3]) -> NumberJet<N> {
+        self.form.jet(simd, z)
+    }
+
     /// Bound of `|computed value - p(z')|` over all `z'` with `|z'_i - z_i| <= dz_i`, `gradient` being the computed one.
     ///
     /// Covers every rounding of [`Polynomial::evaluate`], the rounded products of its table included.
@@ -107,6 +117,22 @@ impl Polynomial {
     #[inline]
     pub fn gradient_error(&self, z: &Vector3<f64>, dz: &Vector3<f64>) -> f64 {
         self.absolute.gradient_error(z, dz)
+    }
+
+    /// Upper bound of the second derivatives along unit vectors at all points with `|z_i| <= radius`.
+    pub fn curvature_ceiling(&self, radius: f64) -> f64 {
+        self.absolute.curvature_ceiling(radius)
+    }
+
+    /// Bound of the error of computed second derivatives along unit vectors at all points with `|z_i| <= radius`.
+    pub fn curvature_error(&self, radius: f64) -> f64 {
+        self.absolute.curvature_error(radius)
+    }
+
+    /// Upper bound of the third derivatives of this polynomial, which must be convex, over the points with `|z_i| <= radius` whose
+    /// values are within [`NEAR_LEVEL`] of 1.
+    pub fn third_ceiling(&self, radius: f64) -> ThirdCeiling {
+        ceiling::third_ceiling(self, radius, self.absolute.third_ceiling(2.0 * radius))
     }
 
     /// The same polynomial with `delta` added to its constant coefficient (rounded once); every other coefficient, and

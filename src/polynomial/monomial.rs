@@ -1,5 +1,7 @@
 //! Monomials in three variables, in the graded order the evaluation table is laid out in.
 
+use super::simd::{Number, Simd};
+
 /// Exponents of a monomial `z1^e1 z2^e2 z3^e3`.
 pub type Exponents = [u8; 3];
 
@@ -29,40 +31,42 @@ pub fn monomials(max_degree: usize) -> Vec<Exponents> {
     list
 }
 
-/// Values of all monomials of degree at most `degree` <= 6 at `z`, in the order of [`monomials`]; `K` is their number.
+/// Values of all monomials of degree at most `degree` <= 6 at `z`, in the order of [`monomials`]; `K` is their number and
+/// the first of `values` is 1 already.
 ///
 /// A monomial of degree t costs t - 1 multiplications in sequence, hence at most t - 1 roundings. With a constant degree
 /// every loop unrolls.
 #[inline(always)]
-pub(crate) fn fill<const K: usize>(degree: usize, z: [f64; 3], values: &mut [f64; K]) {
+pub(crate) fn fill<S: Simd, N: Number<S>, const K: usize>(degree: usize, z: [N; 3], values: &mut [N; K]) {
     debug_assert!(K == count(degree) && degree <= 6);
-    values[0] = 1.0;
     if degree >= 2 {
-        block::<1, K>(z, values);
-        block::<2, K>(z, values);
+        block::<S, N, 1, K>(z, values);
+        block::<S, N, 2, K>(z, values);
     }
     if degree >= 4 {
-        block::<3, K>(z, values);
-        block::<4, K>(z, values);
+        block::<S, N, 3, K>(z, values);
+        block::<S, N, 4, K>(z, values);
     }
     if degree >= 6 {
-        block::<5, K>(z, values);
-        block::<6, K>(z, values);
+        block::<S, N, 5, K>(z, values);
+        block::<S, N, 6, K>(z, values);
     }
 }
 
 /// The monomials of degree `TOTAL` from those of one degree less.
 #[inline(always)]
-fn block<const TOTAL: usize, const K: usize>(z: [f64; 3], values: &mut [f64; K]) {
-    let (before, start) = (count(TOTAL - 1) - TOTAL * (TOTAL + 1) / 2, count(TOTAL - 1));
+fn block<S: Simd, N: Number<S>, const TOTAL: usize, const K: usize>(z: [N; 3], values: &mut [N; K]) {
     let size = TOTAL * (TOTAL + 1) / 2;
-    for i in 0..size {
-        values[start + i] = z[0] * values[before + i];
+    let (known, next) = values.split_at_mut(count(TOTAL - 1));
+    let previous = &known[count(TOTAL - 1) - size..];
+    let (times_first, rest) = next.split_at_mut(size);
+    for (value, previous) in times_first.iter_mut().zip(previous) {
+        *value = z[0] * *previous;
     }
-    for i in 0..TOTAL {
-        values[start + size + i] = z[1] * values[before + size - TOTAL + i];
+    for (value, previous) in rest[..TOTAL].iter_mut().zip(&previous[size - TOTAL..]) {
+        *value = z[1] * *previous;
     }
-    values[start + size + TOTAL] = z[2] * values[before + size - 1];
+    rest[TOTAL] = z[2] * previous[size - 1];
 }
 
 #[cfg(test)]
@@ -72,8 +76,8 @@ mod tests {
     #[test]
     fn values_follow_the_order_of_the_list() {
         let z = [1.5, -0.75, 0.3125];
-        let mut values = [0.0; 84];
-        fill::<84>(6, z, &mut values);
+        let mut values = [1.0; 84];
+        fill::<pulp::Scalar, f64, 84>(6, z, &mut values);
         for (exponents, value) in monomials(6).into_iter().zip(values) {
             let direct: f64 = (0..3).map(|i| z[i].powi(i32::from(exponents[i]))).product();
             assert!((value - direct).abs() <= 1e-14 * direct.abs(), "{exponents:?}: {value} against {direct}");

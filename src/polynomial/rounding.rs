@@ -67,6 +67,28 @@ impl AbsolutePolynomial {
         (self.gamma * q + first + second) * (1.0 + 1e-13) + self.underflow(r)
     }
 
+    /// Bound of second derivatives along unit vectors within `|z_i| <= r`: along the largest component Q'' bounds them, and
+    /// no component of a unit vector exceeds 1.
+    pub(super) fn curvature_ceiling(&self, r: f64) -> f64 {
+        self.jet(r).2 * (1.0 + 1e-13) + self.underflow(r)
+    }
+
+    /// Bound of the error of second derivatives along unit vectors within `|z_i| <= r`, the Hessian's entries being sums of
+    /// fewer roundings than values.
+    pub(super) fn curvature_error(&self, r: f64) -> f64 {
+        3.0 * self.gamma * self.curvature_ceiling(r)
+    }
+
+    /// Bound of the Frobenius norm of the third derivative within `|z_i| <= r`: none of its 27 entries exceeds the third
+    /// derivative of Q.
+    pub(super) fn third_ceiling(&self, r: f64) -> f64 {
+        let mut third = 0.0;
+        for (k, &c) in self.by_degree.iter().enumerate().skip(3).rev() {
+            third = third * r + c * (k * (k - 1) * (k - 2)) as f64;
+        }
+        5.2 * third * (1.0 + 1e-13) + self.underflow(r)
+    }
+
     pub(super) fn gradient_error(&self, z: &Vector3<f64>, dz: &Vector3<f64>) -> f64 {
         let (r, d) = (z.amax(), dz.amax());
         let (_, dq, ddq) = self.jet(r + d);

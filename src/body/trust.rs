@@ -1,0 +1,94 @@
+//! Error bounds and curvature bounds that hold wherever the normalized coordinates of a point lie in a ball a little larger
+//! than the body: made once, so that a query near the body pays for none of them.
+
+use super::Constraint;
+use crate::polynomial::{ThirdCeiling, gamma};
+use nalgebra::{Matrix3, Vector3};
+
+/// How much larger than the body, as its boundary points show it, the ball is.
+const MARGIN: f64 = 1.0625;
+
+/// Bounds of a body's map and constraints where `|z| <= radius`; lengths in metres, z unit-free.
+#[derive(Clone, Debug)]
+pub struct Trust {
+    /// Radius of the ball of normalized coordinates where the bounds hold; checked at each point they are used at.
+    pub radius: f64,
+    /// Bound of the distance of points of the ball from the normalization's centre.
+    pub reach: f64,
+    /// Bound of the distance between points of the ball and of the body.
+    pub span: f64,
+    /// Bound of the displacement of a point per distance from the centre by the roundings of `z = M (v - o)`, for an M of
+    /// three roundings per entry; see [`super::Placement`].
+    pub rounding: f64,
+    /// Condition number of M: bound of `|M r| / |r|` times that of its inverse.
+    pub condition: f64,
+    /// Bound of `|M⁻¹ r| / |r|`, metres.
+    pub inverse_norm: f64,
+    /// Bound of `|M r| / |r|`, per metre.
+    pub linear_norm: f64,
+    /// How far a point of the ball may be moved where the curvature ceilings still hold.
+    pub leeway: f64,
+    /// Per constraint.
+    pub constraints: Vec<ConstraintTrust>,
+}
+
+/// Bounds of one constraint `g(z)` within the ball. What is said of z-derivatives is by unit vectors of z, what is said of
+/// derivatives in metres by unit vectors of any frame that M maps to z.
+#[derive(Clone, Copy, Debug)]
+pub struct ConstraintTrust {
+    /// Of the error of a computed value.
+    pub value_error: f64,
+    /// Of the error of a computed gradient, per metre.
+    pub gradient_error: f64,
+    /// Smallest second derivative anywhere in space, per square metre: with it
+    /// `g(x') >= g(x) + ∇g(x)·δ + ½ floor |δ|²`. 0 if there is none.
+    pub curvature_floor: f64,
+    /// Largest second derivative in the ball, per square metre.
+    pub curvature_ceiling: f64,
+    /// Of the error of computed second derivatives by z.
+    pub curvature_error: f64,
+    /// Bound of the third derivatives by z, where the value is within [`crate::polynomial::NEAR_LEVEL`] of 1.
+    pub third: ThirdCeiling,
+}
+
+impl Trust {
+    /// Bounds for a body whose boundary points, seen from the normalization's centre, are `boundary_z`.
+    pub(super) fn new(
+        constraints: &[Constraint],
+        linear: &Matrix3<f64>,
+        inverse: &Matrix3<f64>,
+        extent: &Vector3<f64>,
+        boundary_z: impl Iterator<Item = Vector3<f64>>,
+    ) -> Self {
+        let radius = boundary_z.map(|z| z.norm()).fold(0.0, f64::max) * MARGIN;
+        // Whether a point is in the ball is decided in floating point.
+        let ball = radius * (1.0 + 1e-12);
+        let rows = Vector3::from_fn(|i, _| linear.row(i).norm() * (1.0 + 1e-14));
+        let columns = Vector3::from_fn(|i, _| inverse.column(i).norm() * (1.0 + 1e-14));
+        // The computed inverse may be off by 1e-6 of its rows.
+        let slack = 1.0 + 1e-5;
+        let (norm, inverse_norm) = (linear.norm() * (1.0 + 1e-13), inverse.norm() * slack);
+        let (none, at) = (Vector3::zeros(), Vector3::repeat(ball));
+        let constraints = constraints.iter().map(|Constraint { polynomial, gram }| ConstraintTrust {
+            value_error: polynomial.value_error(&at, &none, &none),
+            // 1.8 > √3: the bound is one of each component.
+            gradient_error: 1.8 * polynomial.gradient_error(&at, &none) * norm,
+            curvature_floor: gram.curvature_floor(polynomial) / (inverse_norm * inverse_norm) * (1.0 - 1e-13),
+            // A little farther, for points that are moved from within the ball by a little.
+            curvature_ceiling: polynomial.curvature_ceiling(1.25 * ball) * norm * norm * (1.0 + 1e-13),
+            curvature_error: polynomial.curvature_error(ball),
+            third: polynomial.third_ceiling(ball),
+        });
+        Self {
+            radius,
+            reach: inverse_norm * ball,
+            span: inverse_norm * ball + columns.dot(extent) * slack,
+            rounding: gamma(16) * rows.dot(&columns) * slack,
+            condition: norm * inverse_norm,
+            inverse_norm,
+            linear_norm: norm,
+            leeway: 0.1 * radius / norm * (1.0 - 1e-13),
+            constraints: constraints.collect(),
+        }
+    }
+}

@@ -1,0 +1,559 @@
+//! Newton's method for the distance of two bodies with one active constraint each, in the tangent plane of their normal,
+//! and the bracket that comes with it.
+//!
+//! With the unit vector n from B to A, tangents T (3x2) across it, gradients `g`, Hessians `H` and multipliers
+//! `λ_A = -1/(n·g_A)`, `λ_B = 1/(n·g_B)`, the optimality conditions `n + λ_A g_A = 0`, `-n + λ_B g_B = 0`, `x - y = D n`,
+//! `g_A(x) = g_B(y) = 1` linearize, for steps `dx = T α + n a`, `dy = T β + n b`, `dn = T θ` and up to terms of second order,
+//! to
+//!
+//! ```text
+//! θ + W_A α = r_A,    W_A = λ_A TᵀH_A T,   r_A = -λ_A Tᵀ(g_A + a H_A n),   a = (g_A(x) - 1) λ_A
+//! W_B β - θ = r_B,    W_B = λ_B TᵀH_B T,   r_B = -λ_B Tᵀ(g_B + b H_B n),   b = (1 - g_B(y)) λ_B
+//! τ + α - β = D θ,    τ = Tᵀ(x - y),       D = n·(x - y) + a - b
+//! ```
+//!
+//! `W` are the curvatures of the surfaces. Eliminating θ and α leaves two systems of order two,
+//!
+//! ```text
+//! K = (I + D W_A)⁻¹,   (W_B + W_A K) β = r_A + r_B + W_A K (τ - D r_A),   α = K (β - τ + D r_A)
+//! ```
+//!
+//! which are regular through contact, D = 0 included, wherever one of the bodies is curved.
+//!
+//! Points are given in A's frame from the centre of A's normalization on, metres ("query frame" in this file); `T` and `n`
+//! are the rows of the basis.
+
+use super::pose::{Pose, ROTATION_ERROR};
+use super::vector::{M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, dot, subtract, times_transposed};
+use crate::body::{Body, ConstraintTrust};
+use crate::polynomial::{NEAR_LEVEL, Number, NumberJet, Simd, gamma};
+use nalgebra::{Matrix3, Vector3};
+
+/// Bound of the error of a relative rotation in operator norm: both rotations are off by at most [`ROTATION_ERROR`]; their
+/// product, its matrix and sums with it round a few times more.
+const TURNED: f64 = 2.0 * ROTATION_ERROR + gamma(40);
+
+/// The matrix by rows, the same in every lane.
+#[inline(always)]
+fn rows<S: Simd, N: Number<S>>(simd: S, m: &Matrix3<f64>) -> M3<N> {
+    let mut rows = [[N::splat(simd, 0.0); 3]; 3];
+    for i in 0..3 {
+        for j in 0..3 {
+            rows[i][j] = N::splat(simd, m[(i, j)]);
+        }
+    }
+    rows
+}
+
+/// Where B stands as seen from A.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Relative<N> {
+    /// Rotation from B's frame to A's.
+    pub(super) rotation: M3<N>,
+    /// Centre of B's normalization in the query frame.
+    pub(super) origin: V3<N>,
+    /// `M` of B: `z = M (y - origin)`.
+    pub(super) linear: M3<N>,
+    /// Bound of the displacement of a computed z of B within its ball, metres.
+    pub(super) displacement: N,
+}
+
+impl Relative<f64> {
+    /// B at `pose_b` as seen from A at `pose_a`.
+    #[inline(always)]
+    pub(super) fn new<S: Simd>(simd: S, a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose) -> Self {
+        // Differences of translations are exact to one rounding, however far from the world origin.
+        let conjugate = pose_a.rotation().conjugate();
+        let moved = conjugate * (pose_b.translation() - pose_a.translation());
+        let rotation = (conjugate * pose_b.rotation()).to_rotation_matrix();
+        Self::from_parts(simd, a, rows(simd, rotation.matrix()), [moved.x, moved.y, moved.z], b)
+    }
+}
+
+impl<N: Copy> Relative<N> {
+    /// B turned by `rotation` and then moved by `translation`, as seen from A.
+    #[inline(always)]
+    pub(super) fn from_parts<S: Simd>(simd: S, a: &Body, rotation: M3<N>, translation: V3<N>, b: &Body) -> Self
+    where
+        N: Number<S>,
+    {
+        let splat = |v: &Vector3<f64>| [N::splat(simd, v.x), N::splat(simd, v.y), N::splat(simd, v.z)];
+        let (center_a, center_b) = (a.normalization().center, b.normalization().center);
+        let turned = apply(&rotation, splat(&center_b));
+        let from = splat(&center_a);
+        let mut origin = from;
+        for i in 0..3 {
+            origin[i] = turned[i] + (translation[i] - from[i]);
+        }
+        let linear = rows(simd, &b.normalization().linear);
+        let trust = b.trust();
+        let fixed = (TURNED + trust.rounding) * trust.reach + TURNED * center_b.norm() + gamma(8) * center_a.norm();
+        let far = translation[0].abs() + translation[1].abs() + translation[2].abs();
+        Self {
+            rotation,
+            origin,
+            linear: times_transposed(&linear, &rotation),
+            displacement: N::splat(simd, TURNED + gamma(8)).mul_add(far, N::splat(simd, fixed * (1.0 + 1e-13))),
+        }
+    }
+}
+
+/// A body in the query frame: its map to normalized coordinates and what is known near it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Side<'a, N> {
+    body: &'a Body,
+    /// Which of the constraints is active.
+    pub(super) active: usize,
+    linear: M3<N>,
+    origin: V3<N>,
+    displacement: N,
+}
+
+impl<'a, N: Copy> Side<'a, N> {
+    /// The body whose frame the query frame is.
+    #[inline(always)]
+    pub(super) fn at_home<S: Simd>(simd: S, body: &'a Body, active: usize) -> Self
+    where
+        N: Number<S>,
+    {
+        let zero = N::splat(simd, 0.0);
+        Self {
+            body,
+            active,
+            linear: rows(simd, &body.normalization().linear),
+            origin: [zero; 3],
+            displacement: N::splat(simd, body.trust().rounding * body.trust().reach),
+        }
+    }
+
+    /// The other body.
+    #[inline(always)]
+    pub(super) fn away(body: &'a Body, active: usize, relative: &Relative<N>) -> Self {
+        let Relative { linear, origin, displacement, .. } = *relative;
+        Self { body, active, linear, origin, displacement }
+    }
+
+    #[inline(always)]
+    fn trust(&self) -> &'a ConstraintTrust {
+        &self.body.trust().constraints[self.active]
+    }
+
+    /// The active constraint at a point in its normalized coordinates, and whether the point lies in the ball of the body's
+    /// [`crate::body::Trust`].
+    #[inline(always)]
+    pub(super) fn jet<S: Simd>(&self, simd: S, v: V3<N>) -> (NumberJet<N>, N::Mask)
+    where
+        N: Number<S>,
+    {
+        let z = apply(&self.linear, subtract(v, self.origin));
+        let radius = self.body.trust().radius;
+        let inside = dot(z, z).le(N::splat(simd, radius * radius));
+        (self.body.constraints()[self.active].polynomial.jet(simd, z), inside)
+    }
+
+    /// The plane a step from where the jet is of, by Taylor's formula. With T the ceiling of third derivatives it is off by at
+    /// most `T |δ|³ / 6` in value and `T |δ|² / 2` in gradient, δ the step in normalized coordinates; that holds from a point
+    /// near the level for steps no longer than the leeway, else the errors are NaN. The step is in the basis that `local` is of.
+    #[inline(always)]
+    pub(super) fn extrapolate<S: Simd>(
+        &self,
+        simd: S,
+        jet: &NumberJet<N>,
+        local: &M3<N>,
+        step: V3<N>,
+    ) -> Extrapolated<N>
+    where
+        N: Number<S>,
+    {
+        let half = N::splat(simd, 0.5);
+        let delta = apply_transposed(local, step);
+        let bent = apply_symmetric(&jet.hessian, delta);
+        let gradient = [jet.gradient[0] + bent[0], jet.gradient[1] + bent[1], jet.gradient[2] + bent[2]];
+        let value = jet.value + dot(delta, add_scaled(jet.gradient, half, bent));
+        let square = dot(delta, delta);
+        let third = N::splat(simd, self.trust().third.ceiling * (0.5 * (1.0 + 1e-12))) * square;
+        let leeway = self.trust().third.leeway;
+        let near = (jet.value - N::splat(simd, 1.0)).abs().le(N::splat(simd, NEAR_LEVEL));
+        let near = N::and(simd, near, square.le(N::splat(simd, 0.25 * leeway * leeway)));
+        let third = third.select(near, N::splat(simd, f64::NAN));
+        let plane =
+            Plane { value, gradient: [dot(gradient, local[0]), dot(gradient, local[1]), dot(gradient, local[2])] };
+        // Second derivatives fall by at most T per length. Within 3 μ / (2 T) a rise of ½ μ |δ|² keeps half of it, and being
+        // convex it only steepens after that.
+        let ceiling = N::splat(simd, self.trust().third.ceiling);
+        let error = N::splat(simd, self.trust().curvature_error);
+        let curvature = smallest_eigenvalue(simd, &jet.hessian) - error - ceiling * square.sqrt();
+        let radius = (N::splat(simd, 1.5) * curvature / ceiling).min(N::splat(simd, 0.5 * leeway));
+        Extrapolated {
+            plane,
+            curvature,
+            radius,
+            value_error: third * square.sqrt() * N::splat(simd, 1.0 / 3.0 + 1e-9),
+            gradient_error: third * N::splat(simd, self.body.trust().linear_norm),
+        }
+    }
+
+    /// The vectors of the basis, each in normalized coordinates.
+    #[inline(always)]
+    pub(super) fn localize<S: Simd>(&self, _: S, basis: &M3<N>) -> M3<N>
+    where
+        N: Number<S>,
+    {
+        [apply(&self.linear, basis[0]), apply(&self.linear, basis[1]), apply(&self.linear, basis[2])]
+    }
+}
+
+impl Side<'_, f64> {
+    /// Whether all constraints but the active one are proven to hold at (a point within the displacement of) v.
+    #[inline(always)]
+    pub(super) fn others_hold<S: Simd>(&self, simd: S, v: V3<f64>) -> bool {
+        let mut hold = true;
+        if self.body.constraints().len() > 1 {
+            for i in (0..self.body.constraints().len()).filter(|&i| i != self.active) {
+                let (jet, inside) = Self { active: i, ..*self }.jet(simd, v);
+                hold &= inside && jet.value + self.body.trust().constraints[i].value_error <= 1.0;
+            }
+        }
+        hold
+    }
+}
+
+/// Value and gradient of a constraint at a point, the gradient along the two tangents and the normal.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plane<N> {
+    pub(super) value: N,
+    pub(super) gradient: V3<N>,
+}
+
+/// A plane that a Taylor polynomial gives, and by how much it may be off but for rounding.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extrapolated<N> {
+    pub(super) plane: Plane<N>,
+    value_error: N,
+    gradient_error: N,
+    /// Curvature μ, by z: the constraint rises from its tangent plane by at least `¼ μ |δ|²` within `radius`.
+    curvature: N,
+    /// Where that holds, by z; farther away the rise is at least in proportion to the distance.
+    radius: N,
+}
+
+impl<N: Copy> Plane<N> {
+    /// The constraint with this jet, along the vectors of a basis in its normalized coordinates.
+    #[inline(always)]
+    pub(super) fn new<S: Simd>(_: S, jet: &NumberJet<N>, [t0, t1, n]: &M3<N>) -> Self
+    where
+        N: Number<S>,
+    {
+        let g = jet.gradient;
+        Self { value: jet.value, gradient: [dot(g, *t0), dot(g, *t1), dot(g, *n)] }
+    }
+}
+
+/// Second derivatives of a constraint at a point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bend<N> {
+    /// `TᵀHT`: 00, 01, 11.
+    curvature: [N; 3],
+    /// `TᵀHn`.
+    tilt: [N; 2],
+}
+
+impl<N: Copy> Bend<N> {
+    /// The constraint with this jet, along the vectors of a basis in its normalized coordinates.
+    #[inline(always)]
+    pub(super) fn new<S: Simd>(_: S, jet: &NumberJet<N>, [t0, t1, n]: &M3<N>) -> Self
+    where
+        N: Number<S>,
+    {
+        let (h0, h1) = (apply_symmetric(&jet.hessian, *t0), apply_symmetric(&jet.hessian, *t1));
+        Self { curvature: [dot(h0, *t0), dot(h0, *t1), dot(h1, *t1)], tilt: [dot(h0, *n), dot(h1, *n)] }
+    }
+}
+
+/// A symmetric 2x2 matrix: entries 00, 01, 11.
+type Symmetric2<N> = [N; 3];
+
+#[inline(always)]
+fn apply2<S: Simd, N: Number<S>>(m: &Symmetric2<N>, v: [N; 2]) -> [N; 2] {
+    [m[1].mul_add(v[1], m[0] * v[0]), m[2].mul_add(v[1], m[1] * v[0])]
+}
+
+#[inline(always)]
+fn inverse2<S: Simd, N: Number<S>>(simd: S, m: &Symmetric2<N>) -> Symmetric2<N> {
+    let factor = N::splat(simd, 1.0) / (m[0] * m[2] - m[1] * m[1]);
+    [m[2] * factor, -m[1] * factor, m[0] * factor]
+}
+
+/// Lower bound of the smallest eigenvalue of a positive definite matrix: the determinant over the square of half the trace
+/// bounds it, as the product of two numbers is at most the square of their mean. Not above 0 for any other matrix.
+#[inline(always)]
+fn smallest_eigenvalue<S: Simd, N: Number<S>>(simd: S, [xx, xy, xz, yy, yz, zz]: &[N; 6]) -> N {
+    let half_trace = (*xx + *yy + *zz) * N::splat(simd, 0.5);
+    let first = *yy * *zz - *yz * *yz;
+    let determinant = *xx * first - *xy * (*xy * *zz - *yz * *xz) + *xz * (*xy * *yz - *yy * *xz);
+    // Some 20 roundings of terms of at most the cube of the trace.
+    (determinant / (half_trace * half_trace)) - half_trace * N::splat(simd, 256.0 * f64::EPSILON)
+}
+
+/// One Newton step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Step<N> {
+    /// Change of x in the basis.
+    pub(super) dx: V3<N>,
+    /// Change of y in the basis.
+    pub(super) dy: V3<N>,
+    /// Change of n along the tangents.
+    pub(super) dn: [N; 2],
+}
+
+impl Step<f64> {
+    /// Whether the step is no longer than `longest`, and a number.
+    #[inline(always)]
+    pub(super) fn within(&self, longest: f64) -> bool {
+        let square = |v: V3<f64>| v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+        square(self.dx).max(square(self.dy)) <= longest * longest
+    }
+}
+
+/// Newton's step from points x and y with `difference = x - y` in the basis whose third vector is n.
+///
+/// `smallest` is added to the curvature that is divided by: where both bodies are flat it bounds the step.
+#[inline(always)]
+pub(super) fn newton<S: Simd, N: Number<S>>(
+    simd: S,
+    (a, bend_a): (&Plane<N>, &Bend<N>),
+    (b, bend_b): (&Plane<N>, &Bend<N>),
+    difference: V3<N>,
+    smallest: N,
+) -> Step<N> {
+    let one = N::splat(simd, 1.0);
+    let (of_a, of_b) = (-one / a.gradient[2], one / b.gradient[2]);
+    let (shift_a, shift_b) = ((a.value - one) * of_a, (one - b.value) * of_b);
+    let right = |plane: &Plane<N>, bend: &Bend<N>, multiplier: N, shift: N| {
+        [
+            -multiplier * shift.mul_add(bend.tilt[0], plane.gradient[0]),
+            -multiplier * shift.mul_add(bend.tilt[1], plane.gradient[1]),
+        ]
+    };
+    let (right_a, right_b) = (right(a, bend_a, of_a, shift_a), right(b, bend_b, of_b, shift_b));
+    let (w_a, w_b) = (scaled(bend_a.curvature, of_a), scaled(bend_b.curvature, of_b));
+    let distance = difference[2] + shift_a - shift_b;
+    let tau = [difference[0], difference[1]];
+
+    let k = inverse2(simd, &[distance.mul_add(w_a[0], one), distance * w_a[1], distance.mul_add(w_a[2], one)]);
+    // W_A K: the two commute.
+    let both =
+        [w_a[1].mul_add(k[1], w_a[0] * k[0]), w_a[1].mul_add(k[2], w_a[0] * k[1]), w_a[2].mul_add(k[2], w_a[1] * k[1])];
+    let lever = [tau[0] - distance * right_a[0], tau[1] - distance * right_a[1]];
+    let pulled = apply2(&both, lever);
+    let sum = [w_b[0] + both[0] + smallest, w_b[1] + both[1], w_b[2] + both[2] + smallest];
+    let beta =
+        apply2(&inverse2(simd, &sum), [right_a[0] + right_b[0] + pulled[0], right_a[1] + right_b[1] + pulled[1]]);
+    let alpha = apply2(&k, [beta[0] - lever[0], beta[1] - lever[1]]);
+    let bent = apply2(&w_a, alpha);
+    // The tangential parts of the gradients, of second order, are at hand now.
+    let along_a = (a.gradient[0] * alpha[0] + a.gradient[1] * alpha[1]) * of_a;
+    let along_b = (b.gradient[0] * beta[0] + b.gradient[1] * beta[1]) * of_b;
+    Step {
+        dx: [alpha[0], alpha[1], shift_a + along_a],
+        dy: [beta[0], beta[1], shift_b - along_b],
+        dn: [right_a[0] - bent[0], right_a[1] - bent[1]],
+    }
+}
+
+/// A proven bracket of the distance with the points that attain the upper bound, in the basis from the trial points on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bracket<N> {
+    pub(super) lower: N,
+    pub(super) upper: N,
+    /// Unit normal of the lower bound, in the basis.
+    pub(super) normal: V3<N>,
+    /// From x to a point of A, in the basis.
+    pub(super) to_a: V3<N>,
+    /// From y to a point of B, in the basis.
+    pub(super) to_b: V3<N>,
+}
+
+/// Relative slack for the rounding of the bracket's own arithmetic, basis included: fewer than 256 operations on the sum
+/// of magnitudes.
+const SLACK: f64 = 128.0 * f64::EPSILON;
+
+/// How much farther a point is moved than its constraint's linearization asks, for the rounding of its gradient.
+const NUDGE: f64 = 1e-4;
+
+/// The bracket from the constraints at x and y with `difference = x - y` in the basis. NaN where it proves nothing; it
+/// holds only if both points, and those extrapolated from, lie in their balls.
+///
+/// Lower bound. For a unit vector n and any multipliers, convexity with the curvature floor c of `g(z)` gives for every
+/// point of a body `r·(x' - x) >= -λ (1 - g(x)) - |M⁻ᵀ(r + λ∇g)|² / (2 λ c)`: what the tangent plane loses to a normal that
+/// is off by ε is of the order ε². n is the normal of the body with the lower floor, which then loses only its rounding.
+///
+/// Upper bound. Along its gradient g of length G a constraint rises from its value by `t G` and at most `½ κ t²` more, so a
+/// move by `t = (e + |e| (2q + NUDGE)) / G` against the gradient, `e = g(x) + error - 1`, `q = κ |e| / G² <= 0.1`, leads to a
+/// point of the body (or, from within, no farther than to the boundary).
+#[inline(always)]
+pub(super) fn bracket<S: Simd, N: Number<S>>(
+    simd: S,
+    (side_a, extrapolated_a): (&Side<'_, N>, &Extrapolated<N>),
+    (side_b, extrapolated_b): (&Side<'_, N>, &Extrapolated<N>),
+    difference: V3<N>,
+) -> Bracket<N> {
+    let splat = |value: f64| N::splat(simd, value);
+    let one = splat(1.0);
+    let (a, b) = (&extrapolated_a.plane, &extrapolated_b.plane);
+    let (near_a, near_b) = (Near::new(side_a), Near::new(side_b));
+    let (length_a, length_b) = (dot(a.gradient, a.gradient).sqrt(), dot(b.gradient, b.gradient).sqrt());
+    let (inverse_a, inverse_b) = (one / length_a, one / length_b);
+    let (outward_a, outward_b) = (scaled(a.gradient, inverse_a), scaled(b.gradient, inverse_b));
+    let displaced = (side_a.displacement + side_b.displacement) * splat(1.0 + 1e-14);
+    let rounding = splat(SLACK) * (difference[0].abs() + difference[1].abs() + difference[2].abs());
+
+    // The flatter body keeps its own normal; the other one's gradient leaves a residual across it.
+    let a_keeps = (extrapolated_a.curvature * splat(near_b.inverse_square) * inverse_a)
+        .le(extrapolated_b.curvature * splat(near_a.inverse_square) * inverse_b);
+    let either = |of_a: N, of_b: N| of_a.select(a_keeps, of_b);
+    let either_constant = |of_a: f64, of_b: f64| splat(of_a).select(a_keeps, splat(of_b));
+    let mut normal = [one; 3];
+    let mut other = [one; 3];
+    for i in 0..3 {
+        normal[i] = either(-outward_a[i], outward_b[i]);
+        other[i] = either(b.gradient[i], -a.gradient[i]);
+    }
+    let along = dot(normal, other);
+    let multiplier = one / along;
+    let residual = add_scaled(normal, -multiplier, other);
+    let gradient_error_a = extrapolated_a.gradient_error + splat(near_a.gradient_error);
+    let gradient_error_b = extrapolated_b.gradient_error + splat(near_b.gradient_error);
+    let turned = either_constant(near_b.turn, near_a.turn)
+        .mul_add(either(length_b, length_a), either(gradient_error_b, gradient_error_a));
+    let off = dot(residual, residual).sqrt() + turned.mul_add(multiplier, splat(SLACK));
+    let bent = Bound {
+        curvature: either(extrapolated_b.curvature, extrapolated_a.curvature),
+        radius: either(extrapolated_b.radius, extrapolated_a.radius),
+        inverse_square: either_constant(near_b.inverse_square, near_a.inverse_square),
+        floor: either_constant(near_b.floor, near_a.floor),
+        span: either_constant(near_b.span, near_a.span),
+    };
+    let loss = bent.loss(simd, off, multiplier);
+    let keeper = either(inverse_a, inverse_b);
+    let keeper_off = either(gradient_error_a, gradient_error_b)
+        .mul_add(keeper, either_constant(near_a.turn + SLACK, near_b.turn + SLACK));
+    let kept = Bound {
+        curvature: either(extrapolated_a.curvature, extrapolated_b.curvature),
+        radius: either(extrapolated_a.radius, extrapolated_b.radius),
+        inverse_square: either_constant(near_a.inverse_square, near_b.inverse_square),
+        floor: either_constant(near_a.floor, near_b.floor),
+        span: either_constant(near_a.span, near_b.span),
+    };
+    let keeper_loss = kept.loss(simd, keeper_off, keeper);
+
+    let error_a = extrapolated_a.value_error + splat(side_a.trust().value_error);
+    let error_b = extrapolated_b.value_error + splat(side_b.trust().value_error);
+    let (of_a, of_b) = (either(inverse_a, multiplier), either(multiplier, inverse_b));
+    let slack_a = of_a * (one - a.value + error_a);
+    let slack_b = of_b * (one - b.value + error_b);
+    let magnitude = slack_a.abs() + slack_b.abs() + of_a + of_b + loss;
+    let lower = dot(normal, difference)
+        - (slack_a + slack_b)
+        - (loss + keeper_loss)
+        - (displaced + rounding)
+        - splat(SLACK) * magnitude;
+    // Gradients that do not even point the same way leave no multiplier.
+    let lower = lower.select(splat(0.0).le(along), splat(f64::NAN));
+
+    let (move_a, fine_a) = near_a.move_inside(simd, a.value - one + error_a, length_a, inverse_a, gradient_error_a);
+    let (move_b, fine_b) = near_b.move_inside(simd, b.value - one + error_b, length_b, inverse_b, gradient_error_b);
+    let (to_a, to_b) = (scaled(outward_a, move_a), scaled(outward_b, move_b));
+    let between = subtract(add_scaled(difference, one, to_a), to_b);
+    let upper = dot(between, between).sqrt() * splat(1.0 + SLACK) + displaced + rounding;
+    let upper = upper.select(N::and(simd, fine_a, fine_b), splat(f64::NAN));
+    Bracket { lower, upper, normal, to_a, to_b }
+}
+
+/// What is known of one body's active constraint near the body, in metres.
+struct Near {
+    floor: f64,
+    ceiling: f64,
+    gradient_error: f64,
+    /// Bound of the relative error of a gradient by the rounding of the body's map and of the basis.
+    turn: f64,
+    span: f64,
+    leeway: f64,
+    /// Square of the bound of `|M⁻¹ r| / |r|`, m².
+    inverse_square: f64,
+}
+
+impl Near {
+    #[inline(always)]
+    fn new<N: Copy>(side: &Side<'_, N>) -> Self {
+        let (body, constraint) = (side.body.trust(), side.trust());
+        Self {
+            floor: constraint.curvature_floor,
+            ceiling: constraint.curvature_ceiling,
+            gradient_error: constraint.gradient_error,
+            turn: TURNED + gamma(64) * body.condition,
+            span: body.span,
+            leeway: body.leeway,
+            inverse_square: body.inverse_norm * body.inverse_norm,
+        }
+    }
+
+    /// How far along the outward gradient to move so that an excess of the value over 1 is undone, and whether that is proven.
+    #[inline(always)]
+    fn move_inside<S: Simd, N: Number<S>>(
+        &self,
+        simd: S,
+        excess: N,
+        length: N,
+        inverse: N,
+        gradient_error: N,
+    ) -> (N, N::Mask) {
+        let splat = |value: f64| N::splat(simd, value);
+        let q = splat(self.ceiling) * excess.abs() * inverse * inverse;
+        let distance = (excess.abs().mul_add(q + q + splat(NUDGE), excess)) * inverse;
+        let error = splat(self.turn).mul_add(length, gradient_error) * splat(4.0 / NUDGE);
+        let near = N::and(simd, error.le(length), distance.abs().le(splat(self.leeway)));
+        (-distance, N::and(simd, q.le(splat(0.1)), near))
+    }
+}
+
+/// What bounds the rise of a constraint over its tangent plane.
+struct Bound<N> {
+    curvature: N,
+    radius: N,
+    inverse_square: N,
+    floor: N,
+    span: N,
+}
+
+impl<N: Copy> Bound<N> {
+    /// Bound of what a plane off by `off` in direction loses: the largest of `r·δ - λ (rise over the tangent plane)`, `|r| = off`,
+    /// by the curvature at the point, by the one anywhere, and by the length of δ.
+    #[inline(always)]
+    fn loss<S: Simd>(&self, simd: S, off: N, multiplier: N) -> N
+    where
+        N: Number<S>,
+    {
+        let splat = |value: f64| N::splat(simd, value);
+        // By z, r is at most the bound of the inverse times as long.
+        let square = off * off * self.inverse_square;
+        let strength = multiplier * self.curvature;
+        let slope = splat(0.25) * strength * self.radius;
+        let fine = N::and(simd, square.le(slope * slope), splat(0.0).le(slope));
+        let here = (square / strength).select(fine, splat(f64::INFINITY));
+        let anywhere = off * off / (splat(2.0) * self.floor * multiplier);
+        here.min(anywhere).min(off * self.span)
+    }
+}
+
+#[inline(always)]
+fn scaled<S: Simd, N: Number<S>>(v: V3<N>, s: N) -> V3<N> {
+    [v[0] * s, v[1] * s, v[2] * s]
+}
+
+/// A point moved by a step in the basis.
+#[inline(always)]
+pub(super) fn moved<S: Simd, N: Number<S>>(v: V3<N>, step: V3<N>, basis: &M3<N>) -> V3<N> {
+    let by = apply_transposed(basis, step);
+    [v[0] + by[0], v[1] + by[1], v[2] + by[2]]
+}

@@ -1,0 +1,68 @@
+//! Small vectors and matrices of [`Number`]s, which nalgebra's are not: a lane each, inlined into vectorised work.
+
+use crate::polynomial::{Number, Simd};
+
+/// Three numbers.
+pub(super) type V3<N> = [N; 3];
+
+/// A 3x3 matrix, by rows.
+pub(super) type M3<N> = [[N; 3]; 3];
+
+/// `a·b`.
+#[inline(always)]
+pub(super) fn dot<S: Simd, N: Number<S>>(a: V3<N>, b: V3<N>) -> N {
+    a[2].mul_add(b[2], a[1].mul_add(b[1], a[0] * b[0]))
+}
+
+/// `a + s b`.
+#[inline(always)]
+pub(super) fn add_scaled<S: Simd, N: Number<S>>(a: V3<N>, s: N, b: V3<N>) -> V3<N> {
+    [s.mul_add(b[0], a[0]), s.mul_add(b[1], a[1]), s.mul_add(b[2], a[2])]
+}
+
+/// `a - b`.
+#[inline(always)]
+pub(super) fn subtract<S: Simd, N: Number<S>>(a: V3<N>, b: V3<N>) -> V3<N> {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// `M v`.
+#[inline(always)]
+pub(super) fn apply<S: Simd, N: Number<S>>(m: &M3<N>, v: V3<N>) -> V3<N> {
+    [dot(m[0], v), dot(m[1], v), dot(m[2], v)]
+}
+
+/// `Mᵀ v`.
+#[inline(always)]
+pub(super) fn apply_transposed<S: Simd, N: Number<S>>(m: &M3<N>, v: V3<N>) -> V3<N> {
+    let mut result = [m[0][0] * v[0], m[0][1] * v[0], m[0][2] * v[0]];
+    for (row, factor) in m[1..].iter().zip(&v[1..]) {
+        result = add_scaled(result, *factor, *row);
+    }
+    result
+}
+
+/// `M Nᵀ`.
+#[inline(always)]
+pub(super) fn times_transposed<S: Simd, N: Number<S>>(m: &M3<N>, n: &M3<N>) -> M3<N> {
+    [apply(n, m[0]), apply(n, m[1]), apply(n, m[2])]
+}
+
+/// `H v` of the symmetric matrix with the entries xx, xy, xz, yy, yz, zz.
+#[inline(always)]
+pub(super) fn apply_symmetric<S: Simd, N: Number<S>>(h: &[N; 6], v: V3<N>) -> V3<N> {
+    [dot([h[0], h[1], h[2]], v), dot([h[1], h[3], h[4]], v), dot([h[2], h[4], h[5]], v)]
+}
+
+/// A right-handed orthonormal basis whose third vector is the unit vector `n` (Duff et al., Building an orthonormal basis,
+/// revisited, JCGT 6, 2017).
+#[inline(always)]
+pub(super) fn basis<S: Simd, N: Number<S>>(simd: S, n: V3<N>) -> M3<N> {
+    let (zero, one) = (N::splat(simd, 0.0), N::splat(simd, 1.0));
+    let sign = one.select(zero.le(n[2]), -one);
+    let a = -one / (sign + n[2]);
+    let b = n[0] * n[1] * a;
+    let first = [(sign * n[0] * n[0]).mul_add(a, one), sign * b, -sign * n[0]];
+    let second = [b, (n[1] * n[1]).mul_add(a, sign), -n[1]];
+    [first, second, n]
+}

@@ -1,0 +1,210 @@
+//! The widest arithmetic of the processor at hand, chosen when the program runs, and numbers that are one lane or several.
+//!
+//! Work for [`dispatch`] is compiled three times by `pulp`: for any processor, for AVX2 with fused multiply-add, and for
+//! AVX-512. Everything it calls has to be inlined into it to profit. Results differ between the versions only within the
+//! rounding bounds, which count the roundings of the plain one.
+
+use super::hessian_form::Row;
+use std::fmt::Debug;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::sync::LazyLock;
+
+pub use pulp::{Arch, Scalar, Simd, WithSimd};
+
+/// Does the work with the widest arithmetic of this processor.
+#[inline]
+pub fn dispatch<T: WithSimd>(work: T) -> T::Output {
+    static WIDEST: LazyLock<Arch> = LazyLock::new(Arch::new);
+    WIDEST.dispatch(work)
+}
+
+/// Entries of a row of the table that carry something.
+pub(super) const ENTRIES: usize = 10;
+
+/// Real numbers that are computed with: one double, or several side by side that know nothing of each other.
+pub trait Number<S: Simd>:
+    Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+{
+    /// Outcome of a comparison, lane by lane.
+    type Mask: Copy;
+
+    /// The same value in every lane.
+    fn splat(simd: S, value: f64) -> Self;
+    /// `self b + c`, with one rounding where that is fast and two where not.
+    fn mul_add(self, b: Self, c: Self) -> Self;
+    /// Square root.
+    fn sqrt(self) -> Self;
+    /// Absolute value.
+    fn abs(self) -> Self;
+    /// The smaller of two.
+    fn min(self, other: Self) -> Self;
+    /// The larger of two.
+    fn max(self, other: Self) -> Self;
+    /// `self <= other`; false where one is NaN.
+    fn le(self, other: Self) -> Self::Mask;
+    /// Both masks.
+    fn and(simd: S, a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// `self` where the mask holds, else `other`.
+    fn select(self, mask: Self::Mask, other: Self) -> Self;
+    /// Sums over the rows k of a table of `table[k][i] powers[k]`, for each of the ten entries i.
+    fn contract<const K: usize>(simd: S, table: &[Row; K], powers: &[Self; K]) -> [Self; ENTRIES];
+}
+
+impl<S: Simd> Number<S> for f64 {
+    type Mask = bool;
+
+    #[inline(always)]
+    fn splat(_: S, value: f64) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        // Without the instruction it would be a call.
+        if S::F64_LANES > 1 { f64::mul_add(self, b, c) } else { self * b + c }
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        f64::abs(self)
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        if self < other { self } else { other }
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> bool {
+        self <= other
+    }
+    #[inline(always)]
+    fn and(_: S, a: bool, b: bool) -> bool {
+        a & b
+    }
+    #[inline(always)]
+    fn select(self, mask: bool, other: Self) -> Self {
+        if mask { self } else { other }
+    }
+    /// The entries of a row lie side by side in vectors.
+    #[inline(always)]
+    fn contract<const K: usize>(simd: S, table: &[Row; K], powers: &[Self; K]) -> [Self; ENTRIES] {
+        // Four sums in turn: a single one would wait for each addition before the next.
+        let mut partial = [[simd.splat_f64s(0.0); ENTRIES]; 4];
+        let vectors = ENTRIES.div_ceil(S::F64_LANES);
+        for (rows, powers) in table.chunks(4).zip(powers.chunks(4)) {
+            for ((row, &power), sums) in rows.iter().zip(powers).zip(&mut partial) {
+                let power = simd.splat_f64s(power);
+                for (sum, &entries) in sums.iter_mut().zip(&S::as_simd_f64s(&row.0).0[..vectors]) {
+                    *sum = simd.mul_add_e_f64s(entries, power, *sum);
+                }
+            }
+        }
+        let mut stored = Row([0.0; 16]);
+        for (i, target) in S::as_mut_simd_f64s(&mut stored.0).0[..vectors].iter_mut().enumerate() {
+            let [a, b, c, d] = [partial[0][i], partial[1][i], partial[2][i], partial[3][i]];
+            *target = simd.add_f64s(simd.add_f64s(a, b), simd.add_f64s(c, d));
+        }
+        let mut sums = [0.0; ENTRIES];
+        sums.copy_from_slice(&stored.0[..ENTRIES]);
+        sums
+    }
+}
+
+/// As many doubles side by side as fit a vector.
+#[derive(Clone, Copy, Debug)]
+pub struct Lanes<S: Simd> {
+    simd: S,
+    values: S::f64s,
+}
+
+impl<S: Simd> Lanes<S> {
+    /// The first values of a slice of at least `S::F64_LANES`.
+    #[inline(always)]
+    pub fn load(simd: S, values: &[f64]) -> Self {
+        Self { simd, values: S::as_simd_f64s(&values[..S::F64_LANES]).0[0] }
+    }
+
+    /// Writes the lanes to the front of a slice of at least `S::F64_LANES`.
+    #[inline(always)]
+    pub fn store(self, target: &mut [f64]) {
+        S::as_mut_simd_f64s(&mut target[..S::F64_LANES]).0[0] = self.values;
+    }
+}
+
+macro_rules! lane_operator {
+    ($($trait:ident $method:ident $operation:ident),*) => {$(
+        impl<S: Simd> $trait for Lanes<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self { simd: self.simd, values: self.simd.$operation(self.values, other.values) }
+            }
+        }
+    )*};
+}
+lane_operator!(Add add add_f64s, Sub sub sub_f64s, Mul mul mul_f64s, Div div div_f64s);
+
+impl<S: Simd> Neg for Lanes<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self { simd: self.simd, values: self.simd.neg_f64s(self.values) }
+    }
+}
+
+impl<S: Simd> Number<S> for Lanes<S> {
+    type Mask = S::m64s;
+
+    #[inline(always)]
+    fn splat(simd: S, value: f64) -> Self {
+        Self { simd, values: simd.splat_f64s(value) }
+    }
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        Self { simd: self.simd, values: self.simd.mul_add_e_f64s(self.values, b.values, c.values) }
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self { simd: self.simd, values: self.simd.sqrt_f64s(self.values) }
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self { simd: self.simd, values: self.simd.abs_f64s(self.values) }
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self { simd: self.simd, values: self.simd.min_f64s(self.values, other.values) }
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self { simd: self.simd, values: self.simd.max_f64s(self.values, other.values) }
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> S::m64s {
+        self.simd.less_than_or_equal_f64s(self.values, other.values)
+    }
+    #[inline(always)]
+    fn and(simd: S, a: S::m64s, b: S::m64s) -> S::m64s {
+        simd.and_m64s(a, b)
+    }
+    #[inline(always)]
+    fn select(self, mask: S::m64s, other: Self) -> Self {
+        Self { simd: self.simd, values: self.simd.select_f64s(mask, self.values, other.values) }
+    }
+    /// The lanes' own powers lie side by side in vectors.
+    #[inline(always)]
+    fn contract<const K: usize>(simd: S, table: &[Row; K], powers: &[Self; K]) -> [Self; ENTRIES] {
+        let mut sums = [Self::splat(simd, 0.0); ENTRIES];
+        for (row, power) in table.iter().zip(powers) {
+            for (sum, &entry) in sums.iter_mut().zip(&row.0) {
+                *sum = Self::splat(simd, entry).mul_add(*power, *sum);
+            }
+        }
+        sums
+    }
+}
