@@ -8,8 +8,10 @@
 mod active;
 mod big;
 pub(crate) mod distance;
+pub(crate) mod growth;
 pub(crate) mod level;
 mod solid;
 
 pub(crate) use distance::distance;
+pub(crate) use growth::growth_distance;
 pub(crate) use level::level_distance;

@@ -18,6 +18,9 @@ pub(crate) struct Solid<'a> {
     /// `z = linear v + offset` for points v of the frame of work.
     linear: [Vector; 3],
     offset: Vector,
+    rotation: [Vector; 3],
+    shift: Vector,
+    unit: Big,
     /// Stored interior point.
     pub(crate) interior: Vector,
     center: Vector,
@@ -42,19 +45,27 @@ impl<'a> Solid<'a> {
         });
         let inner = add(&turned(&shift), &vector(&own.center));
         let offset = std::array::from_fn(|i| -dot(&l[i], &inner));
-        let placed = |x: &Vector3<f64>| {
-            let x = vector(x);
-            let world: Vector = std::array::from_fn(|i| dot(&rotation[i], &x) + &shift[i]);
-            scaled(&world, &(big(1.0) / &unit))
-        };
-        Self {
+        let mut solid = Self {
             body,
             linear,
             offset,
-            interior: placed(body.interior_point()),
-            center: placed(&body.circumscribed().center),
+            rotation,
+            shift,
+            interior: std::array::from_fn(|_| big(0.0)),
+            center: std::array::from_fn(|_| big(0.0)),
             radius: big(10.0 * body.circumscribed().radius) / &unit,
-        }
+            unit,
+        };
+        solid.interior = solid.placed(body.interior_point());
+        solid.center = solid.placed(&body.circumscribed().center);
+        solid
+    }
+
+    /// A point of the body frame (metres) in the frame of work.
+    pub(crate) fn placed(&self, x: &Vector3<f64>) -> Vector {
+        let x = vector(x);
+        let world: Vector = std::array::from_fn(|i| dot(&self.rotation[i], &x) + &self.shift[i]);
+        scaled(&world, &(big(1.0) / &self.unit))
     }
 
     pub(crate) fn len(&self) -> usize {
