@@ -42,7 +42,7 @@ fn round(
         let (pose_a, pose_b, continues) = draw.next();
         let (p, q) = ((a, &pose_a), (b, &pose_b));
         let site = Site { a, pose_a: &pose_a, b, pose_b: &pose_b, style: draw.style, block, query: *query };
-        let mut solve = |tally: &mut Tally, kind: &str, start: &mut WarmStart| {
+        let solve = |tally: &mut Tally, kind: &str, start: &mut WarmStart| {
             let answer = (measure.solve)(p, q, &options, start);
             let worst = Worst { iterations: answer.iterations(), block, query: *query };
             tally.solve(format!("{}, {kind}", measure.name), worst);

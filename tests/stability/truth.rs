@@ -68,7 +68,8 @@ fn growth_distances_have_closed_forms() {
     use crate::reference::growth::Start;
     let growth = |a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, start: &Start| {
         let centre = |body: &Body| *body.interior_point();
-        reference::growth_distance((a, pose_a, &centre(a)), (b, pose_b, &centre(b)), start).expect("centres apart")
+        reference::growth::growth_distance((a, pose_a, &centre(a)), (b, pose_b, &centre(b)), start)
+            .expect("centres apart")
     };
     for (degree, offset) in [(2, 2.5), (4, 0.3), (8, 1.5), (6, 9.0)] {
         let (a, b) = (q(degree, 1.0, 0.5, 2.0), q(degree, 0.5, 1.0, 0.25));

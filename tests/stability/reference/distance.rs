@@ -190,7 +190,7 @@ fn newton(
             let before = &best.upper - &best.lower;
             bracket(one, two, (p, &l), (q, &m), (&x, &y, &n), best);
             let width = &best.upper - &best.lower;
-            stalled = if width < before { 0 } else { stalled + 1 };
+            stalled = if width < before || length >= 1e-12 { 0 } else { stalled + 1 };
             if width <= big(TARGET) || stalled > 3 || length < 1e-57 {
                 return;
             }

@@ -166,7 +166,7 @@ impl Problem<'_> {
                 let before = best.width();
                 self.bracket((p, &l), (q, &m), (&u, &w, &s), best);
                 let width = best.width();
-                stalled = if before.is_none() || width < before { 0 } else { stalled + 1 };
+                stalled = if before.is_none() || width < before || length >= 1e-12 { 0 } else { stalled + 1 };
                 if width.is_some_and(|width| width <= big(TARGET)) || stalled > 3 || length < 1e-57 {
                     return;
                 }

@@ -155,7 +155,7 @@ fn newton(one: &Solid<'_>, two: &Solid<'_>, p: &Trial, q: &Trial, start: &Vector
             bracket(one, two, (p, &nu), (q, &mu), &x, best);
             let width = best.width();
             let better = before.is_none() || width < before;
-            stalled = if better { 0 } else { stalled + 1 };
+            stalled = if better || length >= 1e-12 { 0 } else { stalled + 1 };
             if width.is_some_and(|width| width <= big(TARGET)) || stalled > 3 || length < 1e-57 {
                 return;
             }

@@ -13,5 +13,4 @@ pub(crate) mod level;
 mod solid;
 
 pub(crate) use distance::distance;
-pub(crate) use growth::growth_distance;
 pub(crate) use level::level_distance;
