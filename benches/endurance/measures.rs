@@ -1,0 +1,130 @@
+//! The measures under test: a table to extend when one is added.
+
+use crate::bodies::Placed;
+use crate::reference;
+use sublevel::body::Body;
+use sublevel::measure::{Distance, LevelDistance, Options, Pose, Status, WarmStart, distance, level_distance};
+
+/// An answer of any measure.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Answer {
+    Distance(Distance),
+    Level(LevelDistance),
+}
+
+/// What 200 bits say of an answer.
+pub(crate) struct Verdict {
+    /// Whether the bracket contains the truth.
+    pub(crate) inside: bool,
+    /// Whether the reference is sharp enough to say so.
+    pub(crate) sharp: bool,
+    pub(crate) truth: f64,
+}
+
+type Solve = fn(Placed<'_>, Placed<'_>, &Options<'_>, &mut WarmStart) -> Answer;
+#[cfg_attr(not(feature = "fit"), allow(dead_code))]
+type Program = fn(Placed<'_>, Placed<'_>) -> Option<f64>;
+
+/// A measure: its name, its solver, and its semidefinite program.
+pub(crate) struct Measure {
+    pub(crate) name: &'static str,
+    pub(crate) solve: Solve,
+    #[cfg(feature = "fit")]
+    pub(crate) program: Option<Program>,
+}
+
+pub(crate) const MEASURES: &[Measure] = &[
+    Measure {
+        name: "distance",
+        solve: |a, b, options, warm| Answer::Distance(distance(a.0, a.1, b.0, b.1, options, warm)),
+        #[cfg(feature = "fit")]
+        program: Some(crate::sos::distance),
+    },
+    Measure {
+        name: "level distance",
+        solve: |a, b, options, warm| Answer::Level(level_distance(a.0, a.1, b.0, b.1, options, warm)),
+        #[cfg(feature = "fit")]
+        program: Some(crate::sos::level_distance),
+    },
+];
+
+impl Answer {
+    pub(crate) fn converged(&self) -> bool {
+        self.status() == Status::Converged
+    }
+
+    fn status(&self) -> Status {
+        match self {
+            Answer::Distance(answer) => answer.status,
+            Answer::Level(answer) => answer.status,
+        }
+    }
+
+    pub(crate) fn bracket(&self) -> (f64, f64) {
+        match self {
+            Answer::Distance(answer) => (answer.lower, answer.upper),
+            Answer::Level(answer) => (answer.lower, answer.upper),
+        }
+    }
+
+    pub(crate) fn iterations(&self) -> u32 {
+        match self {
+            Answer::Distance(answer) => answer.iterations,
+            Answer::Level(answer) => answer.iterations,
+        }
+    }
+
+    /// Width that a converged bracket may have.
+    pub(crate) fn tolerance(&self, a: &Body, b: &Body, accuracy: f64) -> f64 {
+        let scale = match self {
+            Answer::Distance(_) => a.circumscribed().radius.min(b.circumscribed().radius),
+            Answer::Level(answer) => answer.upper.abs().max(1.0),
+        };
+        accuracy * scale * (1.0 + 1e-12)
+    }
+
+    /// Whether the witnesses lie in their bodies, up to what rounding them to world coordinates moves them.
+    pub(crate) fn feasible(&self, a: Placed<'_>, b: Placed<'_>) -> bool {
+        match self {
+            Answer::Distance(answer) => within(a, &answer.witness_a) && within(b, &answer.witness_b),
+            Answer::Level(answer) => within(b, &answer.witness),
+        }
+    }
+
+    /// Holds the bracket against 200 bits.
+    pub(crate) fn verdict(&self, a: Placed<'_>, b: Placed<'_>) -> Verdict {
+        match self {
+            Answer::Distance(answer) => {
+                let truth = reference::distance(a.0, a.1, b.0, b.1, answer);
+                let small = a.0.circumscribed().radius.min(b.0.circumscribed().radius);
+                Verdict { inside: truth.inside(answer), sharp: truth.width() <= 1e-16 * small, truth: truth.value() }
+            }
+            Answer::Level(answer) => {
+                let truth = reference::level_distance(a.0, a.1, b.0, b.1, answer);
+                Verdict { inside: truth.inside(answer), sharp: truth.width() <= 1e-16, truth: truth.value() }
+            }
+        }
+    }
+
+    /// The answer's value and the size that an arbiter's 1e-6 is relative to. None where a semidefinite program in doubles can
+    /// not tell: sizes or values that are too far apart.
+    #[cfg(feature = "fit")]
+    pub(crate) fn comparable(&self, a: &Body, b: &Body) -> Option<(f64, f64)> {
+        let (small, large) = (a.circumscribed().radius, b.circumscribed().radius);
+        let (small, large) = (small.min(large), small.max(large));
+        let value = self.bracket().1;
+        match self {
+            Answer::Distance(_) => (value < 10.0 * large).then_some((value, large)),
+            Answer::Level(_) => (value < 1e3 && large < 10.0 * small).then_some((value, value.abs().max(1.0))),
+        }
+    }
+}
+
+fn within((body, pose): (&Body, &Pose), witness: &nalgebra::Vector3<f64>) -> bool {
+    let local = pose.rotation().inverse_transform_vector(&(witness - pose.translation()));
+    let moved = 16.0 * f64::EPSILON * (witness.norm() + pose.translation().norm() + local.norm());
+    body.constraints().iter().all(|constraint| {
+        let jet = body.placement().jet(constraint, &local);
+        jet.value <= 1.0 + jet.gradient.norm() * moved * (1.0 + 1e-3) + 1e-12
+    })
+}

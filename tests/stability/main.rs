@@ -1,0 +1,18 @@
+//! The stability catalogue: families of queries that broke collision libraries, one function per family.
+//!
+//! Every answer is held against the truth with 200 bits ([`reference`]) or in closed form. Sizes are small here; the same
+//! draws in their billions are the endurance bench.
+
+mod bodies;
+mod judge;
+mod random;
+#[allow(dead_code)]
+mod reference;
+mod truth;
+
+mod contact;
+mod limits;
+mod placement;
+mod scale;
+#[cfg(feature = "fit")]
+mod sos;

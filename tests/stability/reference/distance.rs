@@ -1,0 +1,244 @@
+//! The distance of two bodies with 200 bits.
+
+use super::active::{Trial, for_direction};
+use super::big::{Big, Vector, add, big, cross, dot, double, doubles, norm, scaled, solve, sub, vector};
+use super::solid::{Jet, Solid};
+use nalgebra::Vector3;
+use sublevel::body::Body;
+use sublevel::measure::{Distance, Pose};
+
+/// The distance in a bracket of its own, metres.
+#[derive(Debug)]
+pub(crate) struct Truth {
+    pub(crate) lower: Big,
+    pub(crate) upper: Big,
+    /// Closest points, relative to the translation of the first body; world directions.
+    pub(crate) x: Vector,
+    pub(crate) y: Vector,
+    /// Unit normal from the second body to the first.
+    pub(crate) normal: Vector,
+    /// Derivative with respect to the twists `(v_a, ω_a, v_b, ω_b)` of the bodies, each about its own translation.
+    pub(crate) gradient: [f64; 12],
+}
+
+impl Truth {
+    /// Width of the bracket, metres.
+    pub(crate) fn width(&self) -> f64 {
+        double(&(&self.upper - &self.lower))
+    }
+
+    pub(crate) fn value(&self) -> f64 {
+        double(&self.upper)
+    }
+
+    /// Whether the answer's bracket contains the distance.
+    pub(crate) fn inside(&self, answer: &Distance) -> bool {
+        big(answer.lower) <= self.upper && self.lower <= big(answer.upper)
+    }
+
+    pub(crate) fn normal(&self) -> Vector3<f64> {
+        doubles(&self.normal)
+    }
+}
+
+/// An iterate, with the lower and upper bound that it proves.
+struct Best {
+    lower: Big,
+    upper: Big,
+    x: Vector,
+    y: Vector,
+    n: Vector,
+}
+
+/// Bracket at which an iterate is taken, in units of the larger body.
+const TARGET: f64 = 1e-40;
+
+/// Solves for the distance from the witnesses of an answer. The solve starts there and nowhere else, but what it finds is
+/// proven by its own bracket: an answer can not make it agree.
+pub(crate) fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer: &Distance) -> Truth {
+    let unit = a.circumscribed().radius.max(b.circumscribed().radius).log2().round().exp2();
+    let origin = pose_a.translation();
+    let (one, two) = (Solid::new(a, pose_a, origin, unit), Solid::new(b, pose_b, origin, unit));
+    let local = |w: &Vector3<f64>| scaled(&sub(&vector(w), &vector(origin)), &(big(1.0) / big(unit)));
+    let (x, y) = (local(&answer.witness_a), local(&answer.witness_b));
+    let mut best =
+        Best { lower: big(0.0), upper: norm(&sub(&one.interior, &two.interior)), x, y, n: vector(&Vector3::x()) };
+    let (x, y) = (best.x.clone(), best.y.clone());
+    raise(&one, &two, &x, &y, &mut best);
+    let small = a.circumscribed().radius.min(b.circumscribed().radius) / unit;
+    // On overlap there is no normal: any that parts the largest constraints there.
+    let normal = answer.normal.unwrap_or_else(|| {
+        let steepest = |body: &Solid<'_>, v: &Vector| {
+            let i = (0..body.len()).max_by(|&i, &j| double(&body.value(i, v)).total_cmp(&double(&body.value(j, v))));
+            doubles(&body.jet(i.expect("a body has constraints"), v).gradient)
+        };
+        let (g, h) = (steepest(&one, &x), steepest(&two, &y));
+        (h.normalize() - g.normalize()).try_normalize(1e-300).unwrap_or_else(Vector3::x)
+    });
+    let done = |best: &Best| &best.upper - &best.lower <= big(TARGET);
+    if !done(&best) {
+        let (of_a, of_b) = (for_direction(&one, &x, &-normal), for_direction(&two, &y, &normal));
+        'search: for rank in 0..of_a.len() + of_b.len() {
+            for (i, j) in (0..=rank).map(|i| (i, rank - i)) {
+                if let (Some(p), Some(q)) = (of_a.get(i), of_b.get(j)) {
+                    newton(&one, &two, p, q, (&x, &y, &vector(&normal)), small, &mut best);
+                    if done(&best) {
+                        break 'search;
+                    }
+                }
+            }
+        }
+    }
+    let scale = big(unit);
+    let (x, y) = (scaled(&best.x, &scale), scaled(&best.y, &scale));
+    let arm = sub(&y, &sub(&vector(pose_b.translation()), &vector(origin)));
+    let minus = |v: &Vector| -> Vector { v.clone().map(|c| -c) };
+    let parts = [best.n.clone(), cross(&x, &best.n), minus(&best.n), minus(&cross(&arm, &best.n))];
+    Truth {
+        lower: best.lower * &scale,
+        upper: best.upper * &scale,
+        gradient: std::array::from_fn(|i| double(&parts[i / 3][i % 3])),
+        x,
+        y,
+        normal: best.n,
+    }
+}
+
+/// Values of a trial set at a point.
+struct At {
+    jets: Vec<Jet>,
+    sum: Vector,
+    hessian: [Vector; 3],
+}
+
+fn at(body: &Solid<'_>, index: &[usize], multiplier: &[Big], v: &Vector) -> At {
+    let jets: Vec<Jet> = index.iter().map(|&i| body.jet(i, v)).collect();
+    let mut sum: Vector = std::array::from_fn(|_| big(0.0));
+    let mut hessian: [Vector; 3] = std::array::from_fn(|_| sum.clone());
+    for (jet, m) in jets.iter().zip(multiplier) {
+        sum = add(&sum, &scaled(&jet.gradient, m));
+        hessian = std::array::from_fn(|i| add(&hessian[i], &scaled(&jet.hessian[i], m)));
+    }
+    At { jets, sum, hessian }
+}
+
+/// Newton's method on `x - y = D n`, `n + Σ λ ∇g = 0`, `n - Σ μ ∇h = 0`, `n·n = 1`, `g = 1`, `h = 1`.
+fn newton(
+    one: &Solid<'_>,
+    two: &Solid<'_>,
+    p: &Trial,
+    q: &Trial,
+    (x, y, n): (&Vector, &Vector, &Vector),
+    small: f64,
+    best: &mut Best,
+) {
+    let (mut x, mut y, mut n) = (x.clone(), y.clone(), n.clone());
+    let mut d = dot(&n, &sub(&x, &y));
+    let mut l: Vec<Big> = p.multiplier.iter().map(|&m| big(m)).collect();
+    let mut m: Vec<Big> = q.multiplier.iter().map(|&m| big(m)).collect();
+    let (la, lb) = (l.len(), m.len());
+    let size = 10 + la + lb;
+    let mut stalled = 0;
+    for step in 1..200 {
+        let (a, b) = (at(one, &p.index, &l, &x), at(two, &q.index, &m, &y));
+        let mut k = vec![vec![big(0.0); size]; size];
+        let mut r = vec![big(0.0); size];
+        for i in 0..3 {
+            k[i][i] = big(1.0);
+            k[i][3 + i] = big(-1.0);
+            k[i][6 + i] = -&d;
+            k[i][9] = -&n[i];
+            r[i] = &d * &n[i] - &x[i] + &y[i];
+            k[3 + i][6 + i] = big(1.0);
+            k[6 + i][6 + i] = big(1.0);
+            for j in 0..3 {
+                k[3 + i][j] = a.hessian[i][j].clone();
+                k[6 + i][3 + j] = -&b.hessian[i][j];
+            }
+            for (j, jet) in a.jets.iter().enumerate() {
+                k[3 + i][10 + j] = jet.gradient[i].clone();
+                k[10 + j][i] = jet.gradient[i].clone();
+            }
+            for (j, jet) in b.jets.iter().enumerate() {
+                k[6 + i][10 + la + j] = -&jet.gradient[i];
+                k[10 + la + j][3 + i] = jet.gradient[i].clone();
+            }
+            r[3 + i] = -(&n[i] + &a.sum[i]);
+            r[6 + i] = &b.sum[i] - &n[i];
+            k[9][6 + i] = &n[i] * big(2.0);
+        }
+        r[9] = big(1.0) - dot(&n, &n);
+        for (j, jet) in a.jets.iter().chain(&b.jets).enumerate() {
+            r[10 + j] = big(1.0) - &jet.value;
+        }
+        let s = solve(k, r);
+        let part = |from: usize| -> Vector { std::array::from_fn(|i| s[from + i].clone()) };
+        let (dx, dy, dn) = (part(0), part(3), part(6));
+        let length = double(&norm(&dx)).max(double(&norm(&dy))).max(double(&norm(&dn)) * small);
+        if !length.is_finite() {
+            return;
+        }
+        let damping = big((0.5 * small / length.max(1e-300)).min(1.0));
+        x = add(&x, &scaled(&dx, &damping));
+        y = add(&y, &scaled(&dy, &damping));
+        n = add(&n, &scaled(&dn, &damping));
+        d += &s[9] * &damping;
+        for (value, change) in l.iter_mut().chain(m.iter_mut()).zip(&s[10..]) {
+            *value += change * &damping;
+        }
+        if length < 1e-12 || step % 8 == 0 {
+            let before = &best.upper - &best.lower;
+            bracket(one, two, (p, &l), (q, &m), (&x, &y, &n), best);
+            let width = &best.upper - &best.lower;
+            stalled = if width < before || length >= 1e-12 { 0 } else { stalled + 1 };
+            if width <= big(TARGET) || stalled > 3 || length < 1e-57 {
+                return;
+            }
+        }
+    }
+}
+
+/// Takes the bounds that an iterate proves: numerics section 3.
+fn bracket(
+    one: &Solid<'_>,
+    two: &Solid<'_>,
+    (p, l): (&Trial, &[Big]),
+    (q, m): (&Trial, &[Big]),
+    (x, y, n): (&Vector, &Vector, &Vector),
+    best: &mut Best,
+) {
+    let n = scaled(n, &(big(1.0) / norm(n)));
+    let fall = |body: &Solid<'_>, trial: &Trial, multiplier: &[Big], v: &Vector, r: &Vector| {
+        let (mut slack, mut rest) = (big(0.0), r.clone());
+        for (&i, m) in trial.index.iter().zip(multiplier).filter(|(_, m)| **m > Big::ZERO) {
+            let jet = body.jet(i, v);
+            slack += m * (big(1.0) - jet.value);
+            rest = add(&rest, &scaled(&jet.gradient, m));
+        }
+        slack + norm(&rest) * body.reach(v)
+    };
+    let minus: Vector = n.clone().map(|c| -c);
+    let lower = dot(&n, &sub(x, y)) - fall(one, p, l, x, &n) - fall(two, q, m, y, &minus);
+    if lower > best.lower {
+        best.lower = lower;
+        best.n = n.clone();
+    } else if best.upper <= big(1e-30) {
+        best.n = n.clone();
+    }
+    raise(one, two, x, y, best);
+}
+
+/// Takes trial points, pulled into their bodies, if they are closer than the best so far; a common point is at distance 0.
+fn raise(one: &Solid<'_>, two: &Solid<'_>, x: &Vector, y: &Vector, best: &mut Best) {
+    let middle = scaled(&add(x, y), &big(0.5));
+    if one.largest(&middle) <= big(1.0) && two.largest(&middle) <= big(1.0) {
+        (best.upper, best.x, best.y) = (big(0.0), middle.clone(), middle);
+        return;
+    }
+    if let (Some(x), Some(y)) = (one.pull_in(x), two.pull_in(y)) {
+        let apart = norm(&sub(&x, &y));
+        if apart < best.upper {
+            (best.upper, best.x, best.y) = (apart, x, y);
+        }
+    }
+}
