@@ -328,8 +328,12 @@ impl<'a> Along<'a> {
         Some((Self { body, base, start, velocity, start_error, velocity_error, errors }, entry))
     }
 
-    /// Where to look first: the entry of a ball in the normalized coordinates, in which bodies have a radius of about 1.
+    /// Where to look first: the start of a ray that may start inside, else the entry of a ball in the normalized
+    /// coordinates, in which bodies have a radius of about 1.
     fn first(&self, entry: &Entry) -> f64 {
+        if entry.from <= -self.base {
+            return entry.from;
+        }
         let (a, b) = (self.velocity.norm_squared(), self.start.dot(&self.velocity));
         let c = self.start.norm_squared() - TYPICAL_RADIUS * TYPICAL_RADIUS;
         let guess = (-b - (b * b - a * c).max(0.0).sqrt()) / a;
