@@ -137,7 +137,7 @@ impl<'a> Search<'a> {
             Hint::Overlap { point_a } => {
                 self.common(&self.pair.a_to_query(point_a));
             }
-            Hint::Cold | Hint::Level { .. } | Hint::Smooth(_) => {}
+            Hint::Cold | Hint::Level { .. } | Hint::LevelSmooth(_) | Hint::Saturated | Hint::Smooth(_) => {}
         }
         if !self.done() {
             self.closest(NEAR);

@@ -9,6 +9,7 @@
 mod bracket;
 mod distance;
 mod level;
+mod level_smooth;
 mod linear;
 mod newton;
 mod options;
@@ -17,6 +18,7 @@ mod pose;
 mod programs;
 mod smooth;
 mod tangent;
+mod twist;
 mod vector;
 mod warm;
 
@@ -24,6 +26,7 @@ pub use distance::{Distance, distance};
 pub use level::{LevelDistance, level_distance};
 pub use options::{DEFAULT_ACCURACY, MAX_ITERATIONS, Options, OptionsError};
 pub use pose::{Pose, PoseError};
+pub use twist::Twist;
 pub use warm::WarmStart;
 
 /// How a solve ended. The bracket is true in every case.

@@ -21,6 +21,20 @@ pub const fn gamma(m: usize) -> f64 {
 /// that loss by at most `56 (1 + max |c|) max(1, r)^k`.
 const UNDERFLOW: f64 = 1e-300;
 
+/// How large a polynomial and its derivatives may be near a point, and how wrong when computed.
+#[derive(Clone, Copy, Debug)]
+pub struct Growth {
+    /// Bound of the error of a computed value, and of `value + gradient·δ + ½ δᵀHδ` computed at one point as what Taylor's
+    /// formula says, for δ that lead no farther than the bounds hold.
+    pub value_error: f64,
+    /// The same of a component of the gradient, and of `gradient + Hδ`.
+    pub gradient_error: f64,
+    /// Bound of the error of computed second derivatives along unit vectors.
+    pub curvature_error: f64,
+    /// Bound of the third derivatives along unit vectors.
+    pub third: f64,
+}
+
 /// `Q(r) = Σ_j C_j r^j` with the rounding count of the evaluation it bounds.
 #[derive(Clone, Debug)]
 pub(super) struct AbsolutePolynomial {
@@ -28,19 +42,30 @@ pub(super) struct AbsolutePolynomial {
     gamma: f64,
     sum: f64,
     degree: i32,
+    /// Entry j: the norm of the derivative of order j + 3 of the terms of degree j + 3, over j!.
+    third: [f64; 6],
+}
+
+fn factorial(n: usize) -> f64 {
+    (1..=n).fold(1.0, |product, i| product * i as f64)
 }
 
 impl AbsolutePolynomial {
     pub(super) fn new(degree: usize, terms: &[(Exponents, f64)]) -> Self {
         let mut by_degree = [0.0; 9];
+        let mut squares = [0.0; 9];
         for &(exponents, coefficient) in terms {
+            let factorials: f64 = exponents.iter().map(|&e| factorial(usize::from(e))).product();
             by_degree[degree_of(exponents)] += coefficient.abs();
+            squares[degree_of(exponents)] += coefficient * coefficient * factorials;
         }
+        // Σ over e of degree j of j! e! c_e² is the squared Frobenius norm of the derivative of order j.
+        let third = std::array::from_fn(|j| (squares[j + 3] * factorial(j + 3)).sqrt() / factorial(j) * (1.0 + 1e-13));
         // The sums, Horner's scheme and the arithmetic of the bounds below round too: fewer than 2 * 165 + 64 steps,
         // which only scale the bound by 1 + γ and are covered by counting 2 roundings more.
         let gamma = gamma(count(degree - 2) + degree + 12);
         let sum = by_degree.iter().sum();
-        Self { by_degree, gamma, sum, degree: degree as i32 }
+        Self { by_degree, gamma, sum, degree: degree as i32, third }
     }
 
     /// `Q(r)`, `Q'(r)`, `Q''(r)`.
@@ -87,6 +112,28 @@ impl AbsolutePolynomial {
             third = third * r + c * (k * (k - 1) * (k - 2)) as f64;
         }
         5.2 * third * (1.0 + 1e-13) + self.underflow(r)
+    }
+
+    /// Bounds where `|z_i| <= coordinate`, `|z| <= length`.
+    ///
+    /// With both point and step in that range, the sums of absolute values of Taylor's formula are at most `Q` there. `Q`
+    /// bounds its own derivatives: `r Q'(r) <= k Q(r)`. The third derivative of the terms of degree j is a tensor applied
+    /// j - 3 times to z.
+    #[inline(always)]
+    pub(super) fn growth(&self, coordinate: f64, length: f64) -> Growth {
+        let q = self.by_degree.iter().rev().fold(0.0, |sum, &c| sum * coordinate + c);
+        let third = self.third.iter().rev().fold(0.0, |sum, &c| sum * length + c);
+        // In this range underflow is out of the question for all terms but those below 1e-230.
+        let tame = (1e-8..=1e8).contains(&coordinate);
+        // Twice: for the roundings of the formula itself.
+        let value_error = if tame { 2.0 * self.gamma * q * (1.0 + 1e-13) + 1e-230 } else { f64::NAN };
+        let per_length = f64::from(self.degree) / coordinate;
+        Growth {
+            value_error,
+            gradient_error: value_error * per_length,
+            curvature_error: 3.0 * value_error * per_length * per_length,
+            third: third * (1.0 + 1e-13),
+        }
     }
 
     pub(super) fn gradient_error(&self, z: &Vector3<f64>, dz: &Vector3<f64>) -> f64 {
