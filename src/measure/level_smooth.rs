@@ -317,9 +317,9 @@ impl Sides<'_> {
         let half_third_a = 0.5 * growth.third * step_a * step_a * (1.0 + 1e-12);
         let error_a = growth.value_error + half_third_a * step_a * (1.0 / 3.0 + 1e-9);
         // 1.8 > √3.
-        let slope_error = trust_a.linear_norm * (1.8 * growth.gradient_error + half_third_a + gamma(16) * sum(gradient_z));
+        let gradient_error = 1.8 * growth.gradient_error + half_third_a + gamma(16) * sum(gradient_z);
         let gradient = apply_transposed::<S, f64>(&map.to_a, gradient_z);
-        let slope = norm(gradient) * (1.0 + 1e-14) + slope_error;
+        let slope = norm(gradient) * (1.0 + 1e-14) + trust_a.linear_norm * gradient_error;
         let pulled = apply_transposed::<S, f64>(&map.linear, gradient);
         let displaced = map.displacement + map.rounding * sum(at.x);
         let trace = |h: &[f64; 6]| h[0] + h[3] + h[5];
@@ -327,9 +327,10 @@ impl Sides<'_> {
         let ceiling_a = trace_a + growth.third * 2.0 * room + growth.curvature_error;
         let spread = map.both.iter().map(|row| dot::<S, f64>(*row, *row)).sum::<f64>().sqrt() * (1.0 + 1e-12)
             + trust_a.linear_norm * map.turn;
-        let pulled_error = trust_b.inverse_norm * slope_error
+        let rounded = gamma(16) * trust_a.linear_norm * trust_b.inverse_norm * sum(gradient_z);
+        let pulled_error = spread * (gradient_error + ceiling_a * trust_a.linear_norm * displaced)
             + slope * map.turn
-            + spread * ceiling_a * trust_a.linear_norm * displaced;
+            + rounded;
 
         // B at the end of the step.
         let bent = apply_symmetric::<S, f64>(&at.jet_b.hessian, step.delta);
@@ -353,14 +354,15 @@ impl Sides<'_> {
         let entries = spread * spread * growth.curvature_error
             + trace_a * spread * trust_a.linear_norm * (3.0 * map.turn + gamma(64) * trust_b.inverse_norm)
             + step.multiplier * (self.trust.curvature_error + gamma(64) * trace_b);
-        let bending = growth.third * spread * spread * spread + multiplier * third.ceiling;
+        let bending_a = growth.third * spread * spread;
+        let bending = bending_a * spread + multiplier * third.ceiling;
         let kept = if multiplier < step.multiplier { multiplier / step.multiplier } else { 1.0 };
-        let curvature = kept * (step.curvature - entries) - bending * step_b;
+        let curvature = kept * (step.curvature - entries) - (bending_a * step_a + multiplier * third.ceiling * step_b);
         let reach = room_b.min(room / spread);
         // Second derivatives fall by at most `bending` per length.
         let slope_there = 0.25 * curvature * if 1.5 * curvature < bending * reach { 1.5 * curvature / bending } else { reach };
         let span = trust_b.radius * (1.0 + ROOM) + self.b.z_extent().norm() * (1.0 + 1e-14);
-        let loss = if off <= slope_there { (off * off / curvature).min(off * span) } else { off * span };
+        let loss = if curvature > 0.0 && off <= slope_there { (off * off / curvature).min(off * span) } else { off * span };
         let fall = multiplier * (value_b - 1.0 - error_b);
         let slack = SLACK * (value_a.abs() + multiplier * (1.0 + value_b.abs()) + loss + error_a) + slope * displaced;
         let lower = value_a - error_a + fall - loss - slack;
