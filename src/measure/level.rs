@@ -325,3 +325,6 @@ impl LevelProven {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

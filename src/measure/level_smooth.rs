@@ -39,7 +39,7 @@ use super::pose::Pose;
 use super::tangent::{NUDGE, Relative, SLACK, Side, TURNED, rows};
 use super::vector::{M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, dot, subtract, times_transposed};
 use crate::body::{Body, ConstraintTrust};
-use crate::polynomial::{NEAR_LEVEL, NumberJet, Polynomial, Scalar, Simd, WithSimd, gamma};
+use crate::polynomial::{NEAR_LEVEL, Number, NumberJet, Polynomial, Scalar, Simd, WithSimd, gamma};
 use nalgebra::Vector3;
 
 /// What is kept of an answer for the next query of the pair.
@@ -182,7 +182,7 @@ impl Map {
         let inverse = rows(simd, &b.inverse().transpose());
         let (to_a, origin) = (rows(simd, &a.normalization().linear), relative.origin);
         let linear = times_transposed::<S, f64>(&relative.rotation, &inverse);
-        let both = to_a.map(|row| apply_transposed::<S, f64>(&linear, row));
+        let both = product::<S>(&to_a, &linear);
         let trust = b.trust();
         let turn = (TURNED + gamma(16)) * trust.inverse_norm + trust.inverse_error;
         let far = origin[0].abs() + origin[1].abs() + origin[2].abs();
@@ -259,16 +259,16 @@ impl Sides<'_> {
         let [b0, b1, b2] = b.gradient;
         let pulled = apply_transposed::<S, f64>(c, a.gradient);
         let multiplier = -dot::<S, f64>(pulled, b.gradient) / dot::<S, f64>(b.gradient, b.gradient);
-        let bent = [[a.hessian[0], a.hessian[1], a.hessian[2]], [a.hessian[1], a.hessian[3], a.hessian[4]], [
-            a.hessian[2],
-            a.hessian[4],
-            a.hessian[5],
-        ]]
-        .map(|row| apply_transposed::<S, f64>(c, row));
+        let [xx, xy, xz, yy, yz, zz] = a.hessian;
+        let bent = product::<S>(&[[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], c);
         let mut h = b.hessian;
-        for (entry, (i, j)) in h.iter_mut().zip([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]) {
-            let column = |m: &M3<f64>, i: usize| [m[0][i], m[1][i], m[2][i]];
-            *entry = multiplier * *entry + dot::<S, f64>(column(c, i), column(&bent, j));
+        let mut k = 0;
+        for i in 0..3 {
+            for j in i..3 {
+                let pulled = fused::<S>(c[2][i], bent[2][j], fused::<S>(c[1][i], bent[1][j], c[0][i] * bent[0][j]));
+                h[k] = fused::<S>(multiplier, h[k], pulled);
+                k += 1;
+            }
         }
         let [xx, xy, xz, yy, yz, zz] = h;
         let cofactors = [
@@ -472,9 +472,24 @@ impl WithSimd for Saturated<'_> {
     }
 }
 
+/// `M N`. No closures here: they would not be compiled for the widest arithmetic.
+#[inline(always)]
+fn product<S: Simd>(m: &M3<f64>, n: &M3<f64>) -> M3<f64> {
+    [
+        apply_transposed::<S, f64>(n, m[0]),
+        apply_transposed::<S, f64>(n, m[1]),
+        apply_transposed::<S, f64>(n, m[2]),
+    ]
+}
+
 #[inline(always)]
 fn plus(a: V3<f64>, b: V3<f64>) -> V3<f64> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+#[inline(always)]
+fn fused<S: Simd>(a: f64, b: f64, c: f64) -> f64 {
+    <f64 as Number<S>>::mul_add(a, b, c)
 }
 
 #[inline(always)]
