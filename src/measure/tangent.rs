@@ -544,7 +544,8 @@ impl<N: Copy> Bound<N> {
         let square = off * off * self.inverse_square;
         let strength = multiplier * self.curvature;
         let slope = splat(0.25) * strength * self.radius;
-        let fine = N::and(simd, square.le(slope * slope), splat(0.0).le(slope));
+        // Where neither the curvature nor the radius is positive, their product is.
+        let fine = N::and(simd, square.le(slope * slope), splat(0.0).le(strength));
         let here = (square / strength).select(fine, splat(f64::INFINITY));
         let anywhere = off * off / (splat(2.0) * self.floor * multiplier);
         here.min(anywhere).min(off * self.span)
