@@ -59,7 +59,14 @@ impl Distance {
 /// assert!((answer.value() - 1.5).abs() < 1e-8);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, options: &Options<'_>, warm: &mut WarmStart) -> Distance {
+pub fn distance(
+    a: &Body,
+    pose_a: &Pose,
+    b: &Body,
+    pose_b: &Pose,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> Distance {
     let mut spent = 0;
     if let Hint::Smooth(trace) = &mut warm.hint {
         let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);

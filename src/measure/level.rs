@@ -206,7 +206,11 @@ impl<'a> Search<'a> {
                     attempt = (iterate.gap / value) * 1e-2;
                     self.examine(&x, iterate.multipliers, scale);
                 }
-                if self.done() || self.exhausted() || attempt < 1e-18 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                if self.done() || self.exhausted() || attempt < 1e-18 {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
             });
             if !rescale || self.exhausted() {
                 break;
@@ -235,13 +239,17 @@ impl<'a> Search<'a> {
         }
         let mut newton = LevelNewton { x, a, b };
         let (options, before) = (self.options, self.iterations);
-        let steps = newton.run(self.pair, |steps| options.exhausted(before + steps), |at| {
-            self.bound(&at.x, &at.a.multipliers(), &at.b.multipliers());
-            if self.attain(&at.x) {
-                self.active = (at.a, at.b);
-            }
-            self.done()
-        });
+        let steps = newton.run(
+            self.pair,
+            |steps| options.exhausted(before + steps),
+            |at| {
+                self.bound(&at.x, &at.a.multipliers(), &at.b.multipliers());
+                if self.attain(&at.x) {
+                    self.active = (at.a, at.b);
+                }
+                self.done()
+            },
+        );
         self.iterations += steps;
     }
 

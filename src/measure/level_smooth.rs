@@ -328,9 +328,8 @@ impl Sides<'_> {
         let spread = map.both.iter().map(|row| dot::<S, f64>(*row, *row)).sum::<f64>().sqrt() * (1.0 + 1e-12)
             + trust_a.linear_norm * map.turn;
         let rounded = gamma(16) * trust_a.linear_norm * trust_b.inverse_norm * sum(gradient_z);
-        let pulled_error = spread * (gradient_error + ceiling_a * trust_a.linear_norm * displaced)
-            + slope * map.turn
-            + rounded;
+        let pulled_error =
+            spread * (gradient_error + ceiling_a * trust_a.linear_norm * displaced) + slope * map.turn + rounded;
 
         // B at the end of the step.
         let bent = apply_symmetric::<S, f64>(&at.jet_b.hessian, step.delta);
@@ -360,9 +359,11 @@ impl Sides<'_> {
         let curvature = kept * (step.curvature - entries) - (bending_a * step_a + multiplier * third.ceiling * step_b);
         let reach = room_b.min(room / spread);
         // Second derivatives fall by at most `bending` per length.
-        let slope_there = 0.25 * curvature * if 1.5 * curvature < bending * reach { 1.5 * curvature / bending } else { reach };
+        let slope_there =
+            0.25 * curvature * if 1.5 * curvature < bending * reach { 1.5 * curvature / bending } else { reach };
         let span = trust_b.radius * (1.0 + ROOM) + self.b.z_extent().norm() * (1.0 + 1e-14);
-        let loss = if curvature > 0.0 && off <= slope_there { (off * off / curvature).min(off * span) } else { off * span };
+        let loss =
+            if curvature > 0.0 && off <= slope_there { (off * off / curvature).min(off * span) } else { off * span };
         let fall = multiplier * (value_b - 1.0 - error_b);
         let slack = SLACK * (value_a.abs() + multiplier * (1.0 + value_b.abs()) + loss + error_a) + slope * displaced;
         let lower = value_a - error_a + fall - loss - slack;
@@ -374,7 +375,8 @@ impl Sides<'_> {
         let distance = (excess + excess.abs() * (2.0 * q + NUDGE)) * inverse;
         let way = distance.abs();
         let lift = spread * way + trust_a.linear_norm * displaced;
-        let upper = value_a + error_a
+        let upper = value_a
+            + error_a
             + distance * multiplier * square * inverse
             + (way * pulled_error + 0.5 * ceiling_a * lift * lift)
             + slack
@@ -464,7 +466,8 @@ impl WithSimd for Saturated<'_> {
         let mut hold = displaced <= trust.leeway;
         for (i, constraint) in trust.constraints.iter().enumerate() {
             let (jet, inside) = Side::away(b, i, &relative).jet(simd, x.into());
-            let slope = dot::<S, f64>(jet.gradient, jet.gradient).sqrt() + constraint.gradient_error / trust.linear_norm;
+            let slope =
+                dot::<S, f64>(jet.gradient, jet.gradient).sqrt() + constraint.gradient_error / trust.linear_norm;
             let rise = slope * dz + constraint.curvature_ceiling * displaced * displaced;
             hold &= inside && jet.value + constraint.value_error + 1.01 * rise <= 1.0;
         }
@@ -475,11 +478,7 @@ impl WithSimd for Saturated<'_> {
 /// `M N`. No closures here: they would not be compiled for the widest arithmetic.
 #[inline(always)]
 fn product<S: Simd>(m: &M3<f64>, n: &M3<f64>) -> M3<f64> {
-    [
-        apply_transposed::<S, f64>(n, m[0]),
-        apply_transposed::<S, f64>(n, m[1]),
-        apply_transposed::<S, f64>(n, m[2]),
-    ]
+    [apply_transposed::<S, f64>(n, m[0]), apply_transposed::<S, f64>(n, m[1]), apply_transposed::<S, f64>(n, m[2])]
 }
 
 #[inline(always)]

@@ -121,7 +121,8 @@ impl WithSimd for Follow<'_> {
         at.x = plus(at.x, trace.drift_x);
         at.y = plus(at.y, apply::<S, f64>(&relative.rotation, trace.drift_y));
 
-        let correct = Correct { sides: (side_a, side_b), tolerance: self.tolerance, limit: MAX_ROUNDS.min(self.limit), longest };
+        let correct =
+            Correct { sides: (side_a, side_b), tolerance: self.tolerance, limit: MAX_ROUNDS.min(self.limit), longest };
         let proven = correct.run(simd, &relative, at, self.trace)?;
         self.trace.drift_x = subtract::<S, f64>(proven.x, predicted.0);
         let drift_y = subtract::<S, f64>(proven.y, predicted.1);

@@ -24,9 +24,7 @@
 //! are the rows of the basis.
 
 use super::pose::{Pose, ROTATION_ERROR};
-use super::vector::{
-    M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, dot, subtract, times_transposed,
-};
+use super::vector::{M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, dot, subtract, times_transposed};
 use crate::body::{Body, ConstraintTrust};
 use crate::polynomial::{NEAR_LEVEL, Number, NumberJet, Simd, gamma};
 use nalgebra::{Matrix3, Vector3};
@@ -89,9 +87,7 @@ impl<N: Copy> Relative<N> {
         }
         let linear = rows(simd, &b.normalization().linear);
         let trust = b.trust();
-        let fixed = (TURNED + trust.rounding) * trust.reach
-            + TURNED * center_b.norm()
-            + gamma(8) * center_a.norm();
+        let fixed = (TURNED + trust.rounding) * trust.reach + TURNED * center_b.norm() + gamma(8) * center_a.norm();
         let far = translation[0].abs() + translation[1].abs() + translation[2].abs();
         Self {
             rotation,
@@ -180,7 +176,8 @@ impl<'a, N: Copy> Side<'a, N> {
         let near = (jet.value - N::splat(simd, 1.0)).abs().le(N::splat(simd, NEAR_LEVEL));
         let near = N::and(simd, near, square.le(N::splat(simd, 0.25 * leeway * leeway)));
         let third = third.select(near, N::splat(simd, f64::NAN));
-        let plane = Plane { value, gradient: [dot(gradient, local[0]), dot(gradient, local[1]), dot(gradient, local[2])] };
+        let plane =
+            Plane { value, gradient: [dot(gradient, local[0]), dot(gradient, local[1]), dot(gradient, local[2])] };
         // Second derivatives fall by at most T per length. Within 3 μ / (2 T) a rise of ½ μ |δ|² keeps half of it, and being
         // convex it only steepens after that.
         let ceiling = N::splat(simd, self.trust().third.ceiling);
@@ -345,15 +342,13 @@ pub(super) fn newton<S: Simd, N: Number<S>>(
 
     let k = inverse2(simd, &[distance.mul_add(w_a[0], one), distance * w_a[1], distance.mul_add(w_a[2], one)]);
     // W_A K: the two commute.
-    let both = [
-        w_a[1].mul_add(k[1], w_a[0] * k[0]),
-        w_a[1].mul_add(k[2], w_a[0] * k[1]),
-        w_a[2].mul_add(k[2], w_a[1] * k[1]),
-    ];
+    let both =
+        [w_a[1].mul_add(k[1], w_a[0] * k[0]), w_a[1].mul_add(k[2], w_a[0] * k[1]), w_a[2].mul_add(k[2], w_a[1] * k[1])];
     let lever = [tau[0] - distance * right_a[0], tau[1] - distance * right_a[1]];
     let pulled = apply2(&both, lever);
     let sum = [w_b[0] + both[0] + smallest, w_b[1] + both[1], w_b[2] + both[2] + smallest];
-    let beta = apply2(&inverse2(simd, &sum), [right_a[0] + right_b[0] + pulled[0], right_a[1] + right_b[1] + pulled[1]]);
+    let beta =
+        apply2(&inverse2(simd, &sum), [right_a[0] + right_b[0] + pulled[0], right_a[1] + right_b[1] + pulled[1]]);
     let alpha = apply2(&k, [beta[0] - lever[0], beta[1] - lever[1]]);
     let bent = apply2(&w_a, alpha);
     // The tangential parts of the gradients, of second order, are at hand now.

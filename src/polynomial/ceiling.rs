@@ -147,10 +147,13 @@ mod tests {
             let mut terms = std::collections::BTreeMap::new();
             for _ in 0..6 {
                 let a = Vector3::from_fn(|_, _| random.signed());
-                for e in super::super::monomials(usize::from(degree)).into_iter().filter(|e| e.iter().sum::<u8>() == degree) {
+                for e in
+                    super::super::monomials(usize::from(degree)).into_iter().filter(|e| e.iter().sum::<u8>() == degree)
+                {
                     let factorial = |n: u8| (1..=n).map(f64::from).product::<f64>();
                     let count = factorial(degree) / e.iter().map(|&n| factorial(n)).product::<f64>();
-                    *terms.entry(e).or_insert(0.0) += count * (0..3).map(|i| a[i].powi(i32::from(e[i]))).product::<f64>();
+                    *terms.entry(e).or_insert(0.0) +=
+                        count * (0..3).map(|i| a[i].powi(i32::from(e[i]))).product::<f64>();
                 }
             }
             let p = Polynomial::new(terms.into_iter().collect()).unwrap();

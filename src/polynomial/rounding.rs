@@ -142,3 +142,64 @@ impl AbsolutePolynomial {
         (self.gamma * dq + ddq * d) * (1.0 + 1e-13) + self.underflow(r)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::polynomial::tests::Seeded;
+    use crate::polynomial::{Polynomial, monomials};
+    use nalgebra::Vector3;
+
+    #[test]
+    fn growth_bounds_third_derivatives_and_extrapolations() {
+        for seed in 0..80 {
+            let mut random = Seeded(seed);
+            let degree = [2, 4, 6, 8][(seed % 4) as usize];
+            let terms = monomials(degree).into_iter().map(|e| (e, random.signed())).collect();
+            let p = Polynomial::new(terms).unwrap();
+            let mut tightest = f64::INFINITY;
+            for _ in 0..200 {
+                let z = Vector3::from_fn(|_, _| random.signed()) * 10_f64.powf(random.signed());
+                let step = Vector3::from_fn(|_, _| random.signed()) * 0.01 * z.norm();
+                let end = z + step;
+                let growth = p.growth(z.amax() + step.amax(), z.norm() + step.norm());
+                let (from, to) = (p.evaluate(&z), p.evaluate(&end));
+                let length = step.norm();
+                let slack = 2.0 * growth.value_error;
+                // Hessians differ by at most the third derivative times the length; gradients and values by its integrals.
+                let change = (to.hessian - from.hessian).symmetric_eigenvalues().amax();
+                assert!(change <= growth.third * length + 2.0 * growth.curvature_error, "seed {seed}");
+                let bent = from.hessian * step;
+                let gradient = (to.gradient - from.gradient - bent).norm();
+                assert!(gradient <= 0.5 * growth.third * length.powi(2) + 4.0 * growth.gradient_error, "seed {seed}");
+                let value = (to.value - from.value - from.gradient.dot(&step) - 0.5 * bent.dot(&step)).abs();
+                assert!(value <= growth.third * length.powi(3) / 6.0 + slack, "seed {seed}: {value}");
+                if degree > 2 {
+                    tightest = tightest.min(growth.third * length / change);
+                }
+            }
+            assert!(degree == 2 || tightest < 20.0, "seed {seed}: {tightest} times what is met");
+        }
+    }
+
+    #[test]
+    fn growth_bounds_the_rounding_of_small_steps() {
+        for seed in 0..40 {
+            let mut random = Seeded(100 + seed);
+            let degree = [2, 4, 6, 8][(seed % 4) as usize];
+            let terms = monomials(degree).into_iter().map(|e| (e, random.signed())).collect();
+            let p = Polynomial::new(terms).unwrap();
+            for _ in 0..200 {
+                let z = Vector3::from_fn(|_, _| random.signed()) * 10_f64.powf(random.signed());
+                // So short that the remainder is below rounding.
+                let step = Vector3::from_fn(|_, _| random.signed()) * 1e-7 * z.norm();
+                let end = z + step;
+                let exact = end - z;
+                let growth = p.growth(end.amax().max(z.amax()), end.norm().max(z.norm()));
+                let (from, to) = (p.evaluate(&z), p.evaluate(&end));
+                let value = from.value + from.gradient.dot(&exact) + 0.5 * exact.dot(&(from.hessian * exact));
+                let remainder = growth.third * exact.norm().powi(3) / 6.0;
+                assert!((value - to.value).abs() <= 2.0 * growth.value_error + remainder, "seed {seed}");
+            }
+        }
+    }
+}

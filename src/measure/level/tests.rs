@@ -53,8 +53,7 @@ fn continuation_through_all_regimes_meets_the_closed_form() {
             let mut shift = Vector3::zeros();
             shift[axis] = offset;
             let pose = at(shift.x, shift.y, shift.z);
-            let level =
-                level_distance(&a, &Pose::identity(), &b, &pose, &Options::default(), &mut warm);
+            let level = level_distance(&a, &Pose::identity(), &b, &pose, &Options::default(), &mut warm);
             let truth = ((offset - hb[axis]).max(0.0) / ha[axis]).powi(i32::from(ka));
             let slack = 1e-13 * truth.max(1.0);
             let label = format!("seed {seed} ({ka}, {kb}) step {k}, {truth:e}: {level:?}");
@@ -183,7 +182,9 @@ fn gradients_are_the_derivatives_of_the_value() {
         for answer in [cold(&a, &pose_a, &b, &pose_b, 1e-9), followed] {
             let label = format!("seed {seed} {}-{}: {answer:?} against {truth:?}", a.degree(), b.degree());
             assert_eq!(answer.status, Status::Converged, "{label}");
-            if regime == 3 && b.value(&pose_b.rotation().inverse_transform_vector(&(centre - pose_b.translation()))) < 1.0 {
+            if regime == 3
+                && b.value(&pose_b.rotation().inverse_transform_vector(&(centre - pose_b.translation()))) < 1.0
+            {
                 assert!(answer.saturated, "{label}");
             }
             let all = |twists: [Twist; 2]| {
