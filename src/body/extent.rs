@@ -7,8 +7,8 @@ use crate::optimize::{MAX_ROWS, Program, Row, Rows, minimise};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use std::ops::ControlFlow;
 
-/// Support points are refined until duality gap and dual residual are this small in the normalized frame, where a body
-/// has size about 1, or as small as rounding allows.
+/// Support points are refined until duality gap and dual residual together are this small in the normalized frame, where
+/// a body has size about 1, or as small as rounding allows.
 const SUPPORT_ACCURACY: f64 = 1e-14;
 
 /// The program `max m·z` over the body in its normalized frame.
@@ -54,18 +54,22 @@ fn support(
     let program = Support { constraints, direction: in_z / length };
     let reach = surface::radius(constraints, interior_z, &program.direction);
     let mut z = interior_z + program.direction * (0.9 * reach.min(1e6));
-    let mut multipliers = [0.0; MAX_ROWS];
+    // Past the accuracy of doubles the method drifts away again: the best iterate counts, not the last.
+    let mut best = (f64::INFINITY, z, [0.0; MAX_ROWS]);
     minimise(&program, &mut z, 1.0, |iterate| {
-        multipliers[..iterate.multipliers.len()].copy_from_slice(iterate.multipliers);
-        if iterate.gap > SUPPORT_ACCURACY {
-            return ControlFlow::Continue(());
-        }
         let mut residual = program.direction;
         for (constraint, multiplier) in constraints.iter().zip(iterate.multipliers) {
             residual -= constraint.polynomial.evaluate(iterate.v).gradient * *multiplier;
         }
-        if residual.norm() < SUPPORT_ACCURACY { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        let excess = iterate.gap + residual.norm();
+        if excess < best.0 {
+            best.2[..iterate.multipliers.len()].copy_from_slice(iterate.multipliers);
+            (best.0, best.1) = (excess, *iterate.v);
+        }
+        let settled = best.0 < SUPPORT_ACCURACY || iterate.gap < 1e-3 * SUPPORT_ACCURACY;
+        if settled { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
+    let (_, z, multipliers) = best;
     let point = inverse * z + placement.origin();
     let mut reach = n.dot(&(point - anchor)) + 8.0 * f64::EPSILON * (point.norm() + anchor.norm());
     reach += 2.0 * placement.displacement(&point);

@@ -4,17 +4,21 @@
 //! recomputes everything derived from the polynomials. Lengths are metres in the body frame unless a name says otherwise;
 //! `z` is the unit-free normalized frame, `z = L (x - c)`.
 
+mod compound;
 mod extent;
 mod file;
 mod id;
+mod outline;
 mod placement;
 mod shapes;
 mod sphere;
 mod surface;
 mod trust;
 
+pub use compound::{Compound, CompoundError, MAX_PARTS, Solid};
 pub use file::BodyFileError;
 pub use id::{BodyId, ParseIdError};
+pub use outline::Outline;
 pub use placement::{Placement, Sample};
 pub use sphere::Sphere;
 pub use surface::Volume;
@@ -22,7 +26,7 @@ pub use trust::{ConstraintTrust, Trust};
 
 use crate::polynomial::{CertificateError, HessianGram, Polynomial};
 use extent::Extent;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Most constraints a body may have.
@@ -175,6 +179,7 @@ pub struct Body {
     z_extent: Vector3<f64>,
     trust: Trust,
     boundary: Vec<Vector3<f64>>,
+    outline: Outline,
     volume: Volume,
     points: Option<ContainedPoints>,
     provenance: Option<Provenance>,
@@ -201,10 +206,20 @@ impl Body {
         if !(1..=MAX_CONSTRAINTS).contains(&constraints.len()) {
             return Err(BodyError::ConstraintCount(constraints.len()));
         }
-        let inverse = invert(&normalization)?;
         for (index, constraint) in constraints.iter().enumerate() {
             constraint.gram.prove(&constraint.polynomial).map_err(|source| BodyError::Certificate { index, source })?;
         }
+        Self::of_proven(name, normalization, constraints, interior)
+    }
+
+    /// The body of constraints that are proven sos-convex: proves the rest and computes everything derived.
+    fn of_proven(
+        name: &str,
+        normalization: Normalization,
+        constraints: Vec<Constraint>,
+        interior: Option<Vector3<f64>>,
+    ) -> Result<Self, BodyError> {
+        let inverse = invert(&normalization)?;
         let placement = Placement::new(normalization.linear, inverse, normalization.center, 0.0, 0.0);
         let interior_point =
             interior.unwrap_or_else(|| inverse * extent::deepest_point(&constraints).0 + normalization.center);
@@ -222,6 +237,11 @@ impl Body {
         let boundary_z = boundary.iter().map(|x| normalization.linear * (x - normalization.center));
         let interior_z = normalization.linear * (interior_point - normalization.center);
         let trust = Trust::new(&constraints, &normalization.linear, &inverse, &z_extent, boundary_z, &interior_z);
+        let rays = Sphere::fine().vertices().iter().map(|u| {
+            let ray = inverse * u * surface::radius(&constraints, &interior_z, u);
+            (interior_point + ray - normalization.center, placement.highest(&constraints, &(interior_point + ray)))
+        });
+        let outline = Outline::new(rays.collect());
         let volume = surface::volume(&constraints, &normalization.linear, &interior_z);
         let id = BodyId::of(&normalization, &constraints);
         Ok(Self {
@@ -239,10 +259,27 @@ impl Body {
             z_extent,
             trust,
             boundary,
+            outline,
             volume,
             points: None,
             provenance: None,
         })
+    }
+
+    /// The same set moved within its frame by `x -> rotation x + translation` (metres): another normalization for the same
+    /// constraints with the same certificates. Bounds are proven anew; the record of contained points does not move along.
+    ///
+    /// # Errors
+    /// Numbers that are not finite, or a place so far away that the body drowns in rounding.
+    pub fn moved(&self, rotation: &UnitQuaternion<f64>, translation: &Vector3<f64>) -> Result<Self, BodyError> {
+        let matrix = rotation.to_rotation_matrix();
+        let place = |x: &Vector3<f64>| matrix * x + translation;
+        // z = L (x - c) and x' = R x + t give z = L Rᵀ (x' - (R c + t)).
+        let Normalization { center, linear } = &self.normalization;
+        let normalization = Normalization { center: place(center), linear: linear * matrix.inverse().matrix() };
+        let interior = place(&self.interior_point);
+        let body = Self::of_proven(&self.name, normalization, self.constraints.clone(), Some(interior))?;
+        Ok(Self { provenance: self.provenance.clone(), ..body })
     }
 
     /// Name given by its maker; not part of the identity.
@@ -313,6 +350,11 @@ impl Body {
     /// Error and curvature bounds near the body.
     pub fn trust(&self) -> &Trust {
         &self.trust
+    }
+
+    /// Where the body reaches farthest, roughly.
+    pub fn outline(&self) -> &Outline {
+        &self.outline
     }
 
     /// Points proven to lie in the body, close to its boundary, spread all around.

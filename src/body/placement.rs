@@ -90,6 +90,11 @@ impl Placement {
         &self.origin
     }
 
+    /// Bounds of the norms of the rows of `M`: how much each z_i changes per metre.
+    pub fn row_norms(&self) -> &Vector3<f64> {
+        &self.row_norms
+    }
+
     /// A linear functional `r·(v' - v̂)` of points as one of their normalized coordinates, `M⁻ᵀ r`, with a bound of the error
     /// of each component.
     pub fn functional(&self, r: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
@@ -112,6 +117,12 @@ impl Placement {
     #[inline]
     pub fn jet(&self, constraint: &Constraint, v: &Vector3<f64>) -> Jet {
         self.pull_back(constraint.polynomial.evaluate(&(self.linear * (v - self.origin))))
+    }
+
+    /// Which of the constraints is largest at the point v, up to rounding.
+    pub(super) fn highest(&self, constraints: &[Constraint], v: &Vector3<f64>) -> u8 {
+        let values = constraints.iter().map(|constraint| self.jet(constraint, v).value);
+        (0_u8..).zip(values).max_by(|p, q| p.1.total_cmp(&q.1)).map_or(0, |(index, _)| index)
     }
 
     /// Constraint at the point v, with error bounds.

@@ -51,6 +51,12 @@ impl Sphere {
         SPHERE.get_or_init(|| Self::subdivided(2))
     }
 
+    /// The 642 directions of outlines.
+    pub(super) fn fine() -> &'static Self {
+        static SPHERE: OnceLock<Sphere> = OnceLock::new();
+        SPHERE.get_or_init(|| Self::subdivided(3))
+    }
+
     /// Unit vectors.
     pub fn vertices(&self) -> &[Vector3<f64>] {
         &self.vertices

@@ -25,14 +25,14 @@ use crate::body::MAX_CONSTRAINTS;
 use nalgebra::Vector3;
 
 /// Relative slack for the rounding of a bound's own arithmetic: fewer than 128 operations on the sum of magnitudes.
-const SLACK: f64 = 64.0 * f64::EPSILON;
+pub(super) const SLACK: f64 = 64.0 * f64::EPSILON;
 
 /// Multipliers of the constraints of one body; zero where inactive.
 pub(super) type Multipliers = [f64; MAX_CONSTRAINTS];
 
 /// Upper bound of `-min r·(x' - v)` over the points x' of a body, from multipliers of its constraints; at least 0 in exact
 /// arithmetic for v inside.
-fn descent(body: &Posed<'_>, v: &Vector3<f64>, r: &Vector3<f64>, multipliers: &Multipliers) -> f64 {
+pub(super) fn descent(body: &Posed<'_>, v: &Vector3<f64>, r: &Vector3<f64>, multipliers: &Multipliers) -> f64 {
     let (mut residual, mut error) = body.functional(r);
     let (mut slack, mut magnitude) = (0.0, 0.0);
     error += residual.abs() * SLACK;

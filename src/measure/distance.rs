@@ -2,14 +2,16 @@
 
 use super::Status;
 use super::bracket::{Multipliers, distance_lower, distance_upper};
+use super::decide::Goal;
 use super::newton::{Active, DistanceNewton};
 use super::options::Options;
 use super::pair::{Pair, Posed};
 use super::pose::Pose;
 use super::programs::{Closest, Level, points};
-use super::smooth::{Follow, Proven, Trace};
+use super::smooth::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
+use super::union;
 use super::warm::{Hint, WarmStart};
-use crate::body::{Body, MAX_CONSTRAINTS};
+use crate::body::{Body, MAX_CONSTRAINTS, Solid};
 use crate::optimize::minimise;
 use crate::polynomial::dispatch;
 use nalgebra::{SVector, Vector3};
@@ -41,7 +43,8 @@ impl Distance {
     }
 }
 
-/// Euclidean distance between body `a` at `pose_a` and body `b` at `pose_b` (body to world), 0 when they touch or overlap.
+/// Euclidean distance between solid `a` at `pose_a` and solid `b` at `pose_b` (body to world), 0 when they touch or overlap;
+/// of solids with several parts, that of their closest parts.
 ///
 /// The bracket is as narrow as `options` ask, or the status says that it is not.
 /// Far from contact minimises ½|x - y|²; near contact, where that loses its curvature, the point deepest in both bodies
@@ -60,24 +63,49 @@ impl Distance {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn distance(
-    a: &Body,
+    a: &impl Solid,
     pose_a: &Pose,
-    b: &Body,
+    b: &impl Solid,
     pose_b: &Pose,
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> Distance {
+    union::distance(a, pose_a, b, pose_b, &Goal::NARROW, options, warm)
+}
+
+/// Distance of two bodies, or as much of it as the goal needs.
+pub(super) fn between(
+    (a, pose_a): (&Body, &Pose),
+    (b, pose_b): (&Body, &Pose),
+    goal: &Goal,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> Distance {
+    let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
     let mut spent = 0;
     if let Hint::Smooth(trace) = &mut warm.hint {
-        let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
-        let follow = Follow { a, pose_a, b, pose_b, tolerance, limit: options.max_iterations(), trace };
+        let follow = Follow { a, pose_a, b, pose_b, goal, tolerance, limit: options.max_iterations(), trace };
         match dispatch(follow) {
-            Ok(proven) => return proven.answer(a, pose_a),
+            Ok(proven) => return proven.answer(a, pose_a, tolerance),
             Err(rounds) => spent = rounds,
         }
     }
+    let still_overlapping = matches!(warm.hint, Hint::Overlap { .. }) && {
+        let pair = Pair::new(a, pose_a, b, pose_b);
+        matches!(&warm.hint, Hint::Overlap { point_a } if pair.common(&pair.a_to_query(point_a)))
+    };
+    if !still_overlapping && !options.exhausted(spent) {
+        let limit = SEEK_ROUNDS.min(options.max_iterations() - spent);
+        match dispatch(Seek { a, pose_a, b, pose_b, goal, tolerance, limit }) {
+            Ok((proven, trace)) => {
+                *warm = Hint::Smooth(trace).into();
+                return Distance { iterations: spent + proven.rounds, ..proven.answer(a, pose_a, tolerance) };
+            }
+            Err(rounds) => spent += rounds,
+        }
+    }
     let pair = Pair::new(a, pose_a, b, pose_b);
-    let mut search = Search::new(&pair, options);
+    let mut search = Search::new(&pair, goal, options);
     search.iterations = spent;
     search.run(&warm.hint);
     *warm = search.hint();
@@ -89,6 +117,7 @@ struct Search<'a> {
     pair: &'a Pair<'a>,
     options: &'a Options<'a>,
     tolerance: f64,
+    goal: Goal,
     lower: f64,
     upper: f64,
     x: Vector3<f64>,
@@ -106,13 +135,14 @@ const NEAR: f64 = 1e-3;
 const NEAREST: f64 = 1e-7;
 
 impl<'a> Search<'a> {
-    fn new(pair: &'a Pair<'a>, options: &'a Options<'a>) -> Self {
+    fn new(pair: &'a Pair<'a>, goal: &Goal, options: &'a Options<'a>) -> Self {
         let (x, y) = (pair.a.interior, pair.b.interior);
         let n = (x - y).try_normalize(0.0).unwrap_or_else(Vector3::x);
         Self {
             pair,
             options,
             tolerance: pair.tolerance(options.accuracy()),
+            goal: goal.in_units_of(pair.unit()),
             lower: 0.0,
             upper: f64::INFINITY,
             x,
@@ -123,13 +153,23 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn done(&self) -> bool {
+    /// Whether the bracket is as narrow as asked for.
+    fn narrow(&self) -> bool {
         self.upper.is_finite() && self.upper - self.lower <= self.tolerance
+    }
+
+    fn done(&self) -> bool {
+        self.narrow() || self.goal.met(self.lower, self.upper)
     }
 
     /// Whether the bracket is narrow enough and says on which side of contact the bodies are.
     fn decided(&self) -> bool {
         self.done() && (self.lower > 0.0 || self.upper == 0.0)
+    }
+
+    /// Whether the bracket is narrow enough or no more may be done.
+    fn ended(&self) -> bool {
+        self.done() || self.options.exhausted(self.iterations)
     }
 
     fn run(&mut self, hint: &Hint) {
@@ -144,16 +184,21 @@ impl<'a> Search<'a> {
             Hint::Overlap { point_a } => {
                 self.common(&self.pair.a_to_query(point_a));
             }
-            Hint::Cold | Hint::Level { .. } | Hint::LevelSmooth(_) | Hint::Saturated | Hint::Smooth(_) => {}
+            Hint::Cold
+            | Hint::Level { .. }
+            | Hint::LevelSmooth(_)
+            | Hint::Saturated
+            | Hint::Single { .. }
+            | Hint::Smooth(_) => {}
         }
-        if !self.done() {
+        if !self.ended() {
             self.closest(NEAR);
         }
-        if !self.decided() && self.lower < NEAR * self.pair.size() {
+        if !self.ended() && !self.decided() && self.lower < NEAR * self.pair.size() {
             self.contact();
         }
         // Where both are elongated or edged, first order from the deepest point is not close enough.
-        if !self.done() {
+        if !self.ended() {
             self.closest(NEAREST);
         }
     }
@@ -166,10 +211,14 @@ impl<'a> Search<'a> {
         v.fixed_rows_mut::<3>(0).copy_from(&start_x);
         v.fixed_rows_mut::<3>(3).copy_from(&start_y);
         self.attain(&start_x, &start_y);
+        if self.done() {
+            return;
+        }
         let first = 0.5 * (start_x - start_y).norm_squared();
         let near = near * self.pair.size();
         let mut attempt = 1e-1;
-        let iterations = minimise(&Closest(self.pair), &mut v, first.max(1e-6), |iterate| {
+        minimise(&Closest(self.pair), &mut v, first.max(1e-6), |iterate| {
+            self.iterations += 1;
             let (x, y) = points(iterate.v);
             let apart = (x - y).norm();
             let value = 0.5 * apart * apart;
@@ -177,7 +226,8 @@ impl<'a> Search<'a> {
             if apart < self.pair.size() && self.common(&((x + y) * 0.5)) {
                 return ControlFlow::Break(());
             }
-            if apart < near {
+            // Early iterates, still outside the bodies, may meet by chance.
+            if apart < near && iterate.gap < near {
                 self.attain(&x, &y);
                 return ControlFlow::Break(());
             }
@@ -194,9 +244,13 @@ impl<'a> Search<'a> {
                     return ControlFlow::Break(());
                 }
             }
+            if self.options.exhausted(self.iterations) {
+                // What is known by now is the answer.
+                self.attain(&x, &y);
+                return ControlFlow::Break(());
+            }
             ControlFlow::Continue(())
         });
-        self.iterations += iterations;
     }
 
     /// The point deepest in both bodies: inside both, it proves overlap; else its multipliers show the normal.
@@ -211,7 +265,8 @@ impl<'a> Search<'a> {
         let mut v = SVector::from([start.x, start.y, start.z, first]);
         let mut attempt = 1e-1;
         let program = Level { pair, both: true, scale: 1.0 };
-        let iterations = minimise(&program, &mut v, 1.0, |iterate| {
+        minimise(&program, &mut v, 1.0, |iterate| {
+            self.iterations += 1;
             let x = iterate.v.xyz();
             if iterate.v[3] < 1.0 && self.common(&x) {
                 return ControlFlow::Break(());
@@ -230,9 +285,9 @@ impl<'a> Search<'a> {
                     }
                 }
             }
-            if self.decided() || attempt < 1e-18 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            let ended = self.decided() || attempt < 1e-18 || self.options.exhausted(self.iterations);
+            if ended { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
-        self.iterations += iterations;
     }
 
     fn newton(&mut self, x: Vector3<f64>, y: Vector3<f64>, n: Vector3<f64>, a: Active, b: Active) {
@@ -241,7 +296,8 @@ impl<'a> Search<'a> {
         }
         let distance = n.dot(&(x - y)).max(0.0);
         let mut newton = DistanceNewton { x, y, distance, n, a, b };
-        let steps = newton.run(self.pair, |at| {
+        let left = self.options.max_iterations() - self.iterations.min(self.options.max_iterations());
+        let steps = newton.run(self.pair, left, |at| {
             // Stationary points of the overlap are of no use here.
             if at.distance <= 0.0 {
                 return false;
@@ -251,7 +307,7 @@ impl<'a> Search<'a> {
             if self.raise(lower, &at.n) | self.attain(&at.x, &at.y) {
                 self.active = (at.a, at.b);
             }
-            self.done()
+            self.done() || self.options.exhausted(0)
         });
         self.iterations += steps;
     }
@@ -291,7 +347,7 @@ impl<'a> Search<'a> {
 
     /// Whether v is proven to lie in both bodies; if so the answer is 0.
     fn common(&mut self, v: &Vector3<f64>) -> bool {
-        let both = self.pair.a.contains(v) && self.pair.b.contains(v);
+        let both = self.pair.common(v);
         if both {
             (self.lower, self.upper, self.x, self.y) = (0.0, 0.0, *v, *v);
         }
@@ -300,9 +356,9 @@ impl<'a> Search<'a> {
 
     fn hint(&self) -> WarmStart {
         if self.upper == 0.0 {
-            WarmStart { hint: Hint::Overlap { point_a: self.pair.to_a(&self.x) } }
+            Hint::Overlap { point_a: self.pair.to_a(&self.x) }.into()
         } else if let Some(trace) = self.trace() {
-            WarmStart { hint: Hint::Smooth(trace) }
+            Hint::Smooth(trace).into()
         } else {
             WarmStart::apart(self.pair, &self.x, &self.y, &self.n, self.active.0.bits(), self.active.1.bits())
         }
@@ -325,7 +381,7 @@ impl<'a> Search<'a> {
             (self.pair.to_world(&self.y), n)
         };
         Distance {
-            status: if self.done() { Status::Converged } else { Status::BracketWide },
+            status: if self.narrow() { Status::Converged } else { Status::BracketWide },
             lower: self.lower * unit,
             upper: self.upper * unit,
             witness_a,
@@ -337,11 +393,11 @@ impl<'a> Search<'a> {
 }
 
 impl Proven {
-    fn answer(&self, a: &Body, pose_a: &Pose) -> Distance {
+    fn answer(&self, a: &Body, pose_a: &Pose, tolerance: f64) -> Distance {
         let center = a.normalization().center;
         let to_world = |v: [f64; 3]| pose_a.transform_point(&(center + Vector3::from(v)));
         Distance {
-            status: Status::Converged,
+            status: if self.upper - self.lower <= tolerance { Status::Converged } else { Status::BracketWide },
             lower: self.lower,
             upper: self.upper,
             witness_a: to_world(self.x),

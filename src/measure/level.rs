@@ -95,7 +95,7 @@ pub fn level_distance(
     let mut search = Search::new(&pair, options);
     search.iterations = spent;
     search.run(&warm.hint);
-    *warm = WarmStart { hint: search.hint() };
+    *warm = search.hint().into();
     search.answer(pose_a, pose_b)
 }
 

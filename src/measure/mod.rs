@@ -7,25 +7,44 @@
 //! threads.
 
 mod bracket;
+mod decide;
 mod distance;
+mod entry;
+mod half_space;
+mod impact;
 mod level;
 mod level_smooth;
 mod linear;
+mod motion;
 mod newton;
 mod options;
 mod pair;
+mod point;
 mod pose;
 mod programs;
+mod ray;
+mod single;
 mod smooth;
+mod sweep;
 mod tangent;
 mod twist;
+mod union;
 mod vector;
 mod warm;
 
+pub use decide::{Decision, ThresholdError, WithinMargin, nearer_than, overlap, within_margin};
 pub use distance::{Distance, distance};
+pub use half_space::{HalfSpace, HalfSpaceDistance, HalfSpaceError, distance_to_half_space};
+pub use impact::{
+    DEFAULT_CONTACT, Impact, ImpactOptions, ImpactOptionsError, ImpactStatus, MAX_QUERIES, time_of_impact,
+};
 pub use level::{LevelDistance, level_distance};
+pub use motion::{Motion, MotionError};
 pub use options::{DEFAULT_ACCURACY, MAX_ITERATIONS, Options, OptionsError};
+pub use point::{PointDistance, PointError, PoseGradient, distance_to_point};
 pub use pose::{Pose, PoseError};
+pub use ray::{Ray, RayCast, RayError, RayHit, cast_ray};
+pub use sweep::{Sweep, cast_ball};
 pub use twist::Twist;
 pub use warm::WarmStart;
 

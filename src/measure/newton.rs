@@ -170,6 +170,31 @@ const MAX_STEPS: u32 = 16;
 /// Longest Newton step, in query units, after which a bracket may be narrow: what remains is about its square.
 const WORTH_A_BRACKET: f64 = 1e-3;
 
+/// Where both surfaces are flat to the order j in a common direction, Newton's steps shrink by `(j - 2) / (j - 1)` each and no
+/// faster; the sum of all that would follow is then known (Aitken).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Flatness {
+    last: f64,
+    ratio: f64,
+}
+
+impl Default for Flatness {
+    fn default() -> Self {
+        Self { last: f64::INFINITY, ratio: 0.0 }
+    }
+}
+
+impl Flatness {
+    /// How many times itself a step of this length should be taken: more than once after two like ratios of steps.
+    #[inline(always)]
+    pub(super) fn stretch(&mut self, length: f64) -> f64 {
+        let ratio = length / self.last;
+        let steady = (0.4..0.95).contains(&ratio) && (ratio - self.ratio).abs() < 0.1;
+        (self.last, self.ratio) = if steady { (f64::INFINITY, 0.0) } else { (length, ratio) };
+        if steady { 1.0 / (1.0 - ratio) } else { 1.0 }
+    }
+}
+
 /// Newton iterates of the distance system.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DistanceNewton {
@@ -183,8 +208,8 @@ pub(super) struct DistanceNewton {
 }
 
 impl DistanceNewton {
-    /// Iterates until `accept` takes one or they stop converging; returns the steps taken.
-    pub(super) fn run(&mut self, pair: &Pair<'_>, mut accept: impl FnMut(&Self) -> bool) -> u32 {
+    /// Iterates until `accept` takes one, they stop converging or the limit is reached; returns the steps taken.
+    pub(super) fn run(&mut self, pair: &Pair<'_>, limit: u32, mut accept: impl FnMut(&Self) -> bool) -> u32 {
         let n = self.n;
         if self.a.len == 0 || self.b.len == 0 || !self.a.fit(&pair.a, &self.x, &-n) || !self.b.fit(&pair.b, &self.y, &n)
         {
@@ -192,15 +217,17 @@ impl DistanceNewton {
         }
         let mut at = self.evaluate(pair);
         let mut last = f64::INFINITY;
-        for step in 1..=MAX_STEPS {
-            let Some(length) = self.step(&at) else {
+        let mut flatness = Flatness::default();
+        for step in 1..=MAX_STEPS.min(limit) {
+            let Some(length) = self.step(&at, &mut flatness) else {
                 // Where both are flat the system is singular, but the point at hand with its multipliers may do.
                 accept(self);
                 return step;
             };
             at = self.evaluate(pair);
             // A long step has not converged: its bracket is not worth its cost, but for flat bodies now and then.
-            if (length < WORTH_A_BRACKET || step % 4 == 0) && accept(self) {
+            let last_step = step == MAX_STEPS.min(limit);
+            if (length < WORTH_A_BRACKET || step % 4 == 0 || last_step) && accept(self) {
                 return step;
             }
             // Near its solution Newton's step shrinks fast; one that does not is not near.
@@ -220,7 +247,7 @@ impl DistanceNewton {
             }
             last = length;
         }
-        MAX_STEPS
+        MAX_STEPS.min(limit)
     }
 
     /// Both bodies at the current iterate; the mean of both sides of u + w = 0 says what n is.
@@ -232,7 +259,7 @@ impl DistanceNewton {
     }
 
     /// One Newton step; its length, or none if the system is singular.
-    fn step(&mut self, (a, b): &(At, At)) -> Option<f64> {
+    fn step(&mut self, (a, b): &(At, At), flatness: &mut Flatness) -> Option<f64> {
         let size = 7 + self.a.len + self.b.len;
         let mut m: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
         let scaled = a.hessian * self.distance;
@@ -271,7 +298,7 @@ impl DistanceNewton {
         let (dx, dy) = (Vector3::new(d[0], d[1], d[2]), Vector3::new(d[3], d[4], d[5]));
         let length = dx.norm().max(dy.norm());
         // Bodies have size 1 here: a longer step leaves where the linearization means anything.
-        let damping = (0.5 / length).min(1.0);
+        let damping = (0.5 / length).min(flatness.stretch(length));
         self.x += dx * damping;
         self.y += dy * damping;
         self.distance += d[6] * damping;

@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Default accuracy: relative to the circumradius of the smaller body for lengths, to `max(1, |d|)` for level distances.
 pub const DEFAULT_ACCURACY: f64 = 1e-9;
 
-/// Default and largest iteration limit. No query met so far needed a third of it.
-pub const MAX_ITERATIONS: u32 = 200;
+/// Default and largest iteration limit: several times what the worst pairs of flat bodies met so far need.
+pub const MAX_ITERATIONS: u32 = 1000;
 
 /// How a query is to be solved; checked when made, so that no solve starts with a request it can not serve.
 ///

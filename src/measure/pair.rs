@@ -89,11 +89,34 @@ impl Posed<'_> {
         point
     }
 
-    /// A point within whose displacement a point of the body is proven to lie, from v towards the interior point.
+    /// A point within whose displacement a point of the body is proven to lie, near v.
     ///
-    /// Convexity along the segment gives the factor `s = (1 - g(a)) / (g(v) - g(a))` from a; rounding takes a little more.
-    /// None if not even the interior point is proven inside in this frame.
+    /// Against the gradient of the most violated constraint the way to the body is shortest; where steps that way do not lead
+    /// in, the line to the interior point does. None if not even that is proven inside in this frame.
     pub(super) fn pull_in(&self, v: &Vector3<f64>) -> Option<Vector3<f64>> {
+        let mut point = *v;
+        let mut nudge = 4.0 * f64::EPSILON;
+        for _ in 0..4 {
+            let samples = (0..self.len()).map(|i| self.sample(i, &point));
+            let worst = samples.max_by(|p, q| p.nearby_value_upper().total_cmp(&q.nearby_value_upper()))?;
+            let excess = worst.nearby_value_upper() - 1.0;
+            if excess <= 0.0 {
+                return Some(point);
+            }
+            let gradient = worst.jet.gradient;
+            let step = gradient * (excess / gradient.norm_squared());
+            if !(step.norm() <= 0.1 * self.radius) {
+                break;
+            }
+            point -= step * (1.0 + nudge);
+            nudge = 1e-6;
+        }
+        self.pull_towards_interior(v)
+    }
+
+    /// Convexity along the segment gives the factor `s = (1 - g(a)) / (g(v) - g(a))` from the interior point a; rounding takes a
+    /// little more.
+    fn pull_towards_interior(&self, v: &Vector3<f64>) -> Option<Vector3<f64>> {
         let mut value = self.nearby_value_upper(v);
         if value <= 1.0 {
             return Some(*v);
@@ -114,6 +137,28 @@ impl Posed<'_> {
             margin *= 4.0;
         }
         (self.nearby_value_upper(&self.interior) <= 1.0).then_some(self.interior)
+    }
+}
+
+impl<'a> Posed<'a> {
+    /// A body in its own frame, moved to the centre of its circumscribed ball and scaled to units of so many metres, a power
+    /// of two.
+    pub(super) fn own(body: &'a Body, unit: f64) -> Self {
+        let (origin, center) = (body.circumscribed().center, body.normalization().center);
+        let placement = Placement::new(
+            body.normalization().linear * unit,
+            body.inverse() / unit,
+            (center - origin) / unit,
+            0.0,
+            gamma(2) * (center.norm() + origin.norm()) / unit,
+        );
+        Self {
+            body,
+            placement,
+            interior: (body.interior_point() - origin) / unit,
+            center: Vector3::zeros(),
+            radius: body.circumscribed().radius / unit,
+        }
     }
 }
 
@@ -184,6 +229,11 @@ impl<'a> Pair<'a> {
             translation,
             pose_a: *pose_a,
         }
+    }
+
+    /// Whether v is proven to lie in both bodies.
+    pub(super) fn common(&self, v: &Vector3<f64>) -> bool {
+        self.a.contains(v) && self.b.contains(v)
     }
 
     /// Metres per unit of the query frame.

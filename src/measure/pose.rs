@@ -103,6 +103,11 @@ impl Pose {
         Ok(Self { rotation: UnitQuaternion::from_rotation_matrix(&rotation), translation })
     }
 
+    /// Pose of finite parts that were computed; the rotation is normalised.
+    pub(super) fn of_parts(rotation: UnitQuaternion<f64>, translation: Vector3<f64>) -> Self {
+        Self { rotation: UnitQuaternion::new_normalize(rotation.into_inner()), translation }
+    }
+
     /// Rotation from the body frame to the world frame.
     pub fn rotation(&self) -> &UnitQuaternion<f64> {
         &self.rotation

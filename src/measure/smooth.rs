@@ -5,9 +5,10 @@
 //! no evaluation: it is the sensitivity of the last answer to the motion. Along a smooth trajectory what that step misses is
 //! nearly the same each time, and is added on. One evaluation then mostly proves the answer or leaves one more step to it.
 
+use super::decide::Goal;
 use super::pose::Pose;
 use super::tangent::{Bend, Plane, Relative, Side, Step, bracket, moved, newton};
-use super::vector::{M3, V3, apply, apply_transposed, basis, dot, subtract};
+use super::vector::{M3, V3, add_scaled, apply, apply_transposed, basis, dot, subtract};
 use crate::body::Body;
 use crate::polynomial::{NumberJet, Scalar, Simd, WithSimd};
 use nalgebra::Vector3;
@@ -34,6 +35,16 @@ pub(super) struct Trace {
 }
 
 impl Trace {
+    /// A trace of nothing yet.
+    #[inline(always)]
+    fn blank(active: [u8; 2]) -> Self {
+        let none = [0.0; 3];
+        let plane = Plane { value: 0.0, gradient: none };
+        let bend = Bend { curvature: none, tilt: [0.0; 2] };
+        let jet_b = NumberJet { value: 0.0, gradient: none, hessian: [0.0; 6] };
+        Self { active, x: none, y: none, frame: [none; 3], a: (plane, bend), jet_b, drift_x: none, drift_y: none }
+    }
+
     /// The trace of witnesses x of A and y of B, each in its own frame, with the normal in A's frame.
     pub(super) fn new(
         a: &Body,
@@ -73,8 +84,17 @@ pub(super) struct Proven {
 /// Most evaluations before another method takes over.
 const MAX_ROUNDS: u32 = 8;
 
+/// Most evaluations from a cold start before another method takes over.
+pub(super) const SEEK_ROUNDS: u32 = 12;
+
+/// Slope of a gradient against the normal, beyond which the normal is chosen anew.
+const STEEP: f64 = 0.1;
+
+/// Length of a step relative to the longest, beyond which no extrapolation is close enough for a bracket.
+const WORTH_A_BRACKET: f64 = 1e-2;
+
 /// Longest step relative to the bodies' sizes that the linearization may mean anything for.
-const LONGEST: f64 = 0.5;
+const LONGEST: f64 = 0.25;
 
 /// Continuation as work for the widest arithmetic.
 pub(super) struct Follow<'a> {
@@ -82,6 +102,8 @@ pub(super) struct Follow<'a> {
     pub(super) pose_a: &'a Pose,
     pub(super) b: &'a Body,
     pub(super) pose_b: &'a Pose,
+    /// What the bracket has to decide, if that is less than being narrow.
+    pub(super) goal: &'a Goal,
     /// Width of the bracket that is narrow enough, metres.
     pub(super) tolerance: f64,
     /// Most rounds.
@@ -121,8 +143,13 @@ impl WithSimd for Follow<'_> {
         at.x = plus(at.x, trace.drift_x);
         at.y = plus(at.y, apply::<S, f64>(&relative.rotation, trace.drift_y));
 
-        let correct =
-            Correct { sides: (side_a, side_b), tolerance: self.tolerance, limit: MAX_ROUNDS.min(self.limit), longest };
+        let correct = Correct {
+            sides: (side_a, side_b),
+            goal: self.goal,
+            tolerance: self.tolerance,
+            limit: MAX_ROUNDS.min(self.limit),
+            longest,
+        };
         let proven = correct.run(simd, &relative, at, self.trace)?;
         self.trace.drift_x = subtract::<S, f64>(proven.x, predicted.0);
         let drift_y = subtract::<S, f64>(proven.y, predicted.1);
@@ -131,9 +158,70 @@ impl WithSimd for Follow<'_> {
     }
 }
 
+/// A start from nothing but the poses, as work for the widest arithmetic: the boundary points nearest to the other body, as
+/// the outlines of both show them, and Newton's method from there.
+pub(super) struct Seek<'a> {
+    pub(super) a: &'a Body,
+    pub(super) pose_a: &'a Pose,
+    pub(super) b: &'a Body,
+    pub(super) pose_b: &'a Pose,
+    /// What the bracket has to decide, if that is less than being narrow.
+    pub(super) goal: &'a Goal,
+    /// Width of the bracket that is narrow enough, metres.
+    pub(super) tolerance: f64,
+    /// Most rounds.
+    pub(super) limit: u32,
+}
+
+/// Steps of Gilbert's algorithm before Newton's.
+const PASSES: u32 = 8;
+
+impl WithSimd for Seek<'_> {
+    type Output = Result<(Proven, Trace), u32>;
+
+    /// The proven answer with its trace, or how many rounds were spent in vain.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Result<(Proven, Trace), u32> {
+        let relative = Relative::new(simd, self.a, self.pose_a, self.b, self.pose_b);
+        // Gilbert's algorithm on the outlines: `between` is a difference of points of the two, and shrinks towards the smallest
+        // one along the line to the extreme difference against it. The query frame starts at A's centre.
+        let mut between = [-relative.origin[0], -relative.origin[1], -relative.origin[2]];
+        let (mut x, mut y) = ([0.0; 3], relative.origin);
+        let mut active = [0, 0];
+        for _ in 0..PASSES {
+            (x, active[0]) = self.a.outline().farthest([-between[0], -between[1], -between[2]]);
+            let own = apply_transposed::<S, f64>(&relative.rotation, between);
+            let found = self.b.outline().farthest(own);
+            active[1] = found.1;
+            y = plus(apply::<S, f64>(&relative.rotation, found.0), relative.origin);
+            let extreme = subtract::<S, f64>(subtract::<S, f64>(x, y), between);
+            let square = dot::<S, f64>(extreme, extreme);
+            let fraction = (-dot::<S, f64>(between, extreme) / square).min(1.0);
+            if !(fraction > 1e-3) {
+                break;
+            }
+            between = add_scaled::<S, f64>(between, fraction, extreme);
+        }
+        let length = dot::<S, f64>(between, between).sqrt();
+        if !(length > 0.0) {
+            return Err(0);
+        }
+        let frame = basis(simd, [between[0] / length, between[1] / length, between[2] / length]);
+        let side_a = Side::at_home(simd, self.a, usize::from(active[0]));
+        let side_b = Side::away(self.b, usize::from(active[1]), &relative);
+        let longest = LONGEST * self.a.trust().reach.min(self.b.trust().reach);
+        let correct =
+            Correct { sides: (side_a, side_b), goal: self.goal, tolerance: self.tolerance, limit: self.limit, longest };
+        let mut trace = Trace::blank(active);
+        let proven = correct.run(simd, &relative, Iterate { x, y, frame }, &mut trace)?;
+        Ok((proven, trace))
+    }
+}
+
 /// Correction of a start by Newton's method until the bracket is narrow.
 struct Correct<'a> {
     sides: (Side<'a, f64>, Side<'a, f64>),
+    goal: &'a Goal,
     tolerance: f64,
     limit: u32,
     /// Longest step, metres.
@@ -153,22 +241,40 @@ impl Correct<'_> {
         for rounds in 1..=self.limit {
             let ((jet_a, inside_a), (jet_b, inside_b)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
             if !(inside_a && inside_b) {
-                return Err(rounds);
+                // A step has led too far.
+                (at.x, at.y) = (side_a.brought_near(simd, at.x), side_b.brought_near(simd, at.y));
+                continue;
             }
-            let (local_a, local_b) = (side_a.localize(simd, &at.frame), side_b.localize(simd, &at.frame));
-            let (a, b) = (Plane::new(simd, &jet_a, &local_a), Plane::new(simd, &jet_b, &local_b));
+            let (mut local_a, mut local_b) = (side_a.localize(simd, &at.frame), side_b.localize(simd, &at.frame));
+            let (mut a, mut b) = (Plane::new(simd, &jet_a, &local_a), Plane::new(simd, &jet_b, &local_b));
+            if a.slant(-1.0).max(b.slant(1.0)) > STEEP {
+                // Far from the solution the normals of the surfaces show the way better than the last guess.
+                let Some(frame) = at.between_normals(simd, &a, &b) else { return Err(rounds) };
+                at.frame = frame;
+                (local_a, local_b) = (side_a.localize(simd, &at.frame), side_b.localize(simd, &at.frame));
+                (a, b) = (Plane::new(simd, &jet_a, &local_a), Plane::new(simd, &jet_b, &local_b));
+            }
             let (bend_a, bend_b) = (Bend::new(simd, &jet_a, &local_a), Bend::new(simd, &jet_b, &local_b));
             let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
-            let step = newton(simd, (&a, &bend_a), (&b, &bend_b), difference, 0.0);
+            let mut step = newton(simd, (&a, &bend_a), (&b, &bend_b), difference, 0.0);
             if !step.within(self.longest) {
-                return Err(rounds);
+                step.shorten(self.longest);
+                at.advance(simd, &step);
+                continue;
+            }
+            if !step.within(WORTH_A_BRACKET * self.longest) {
+                at.advance(simd, &step);
+                continue;
             }
             // The bracket where Newton's step leads, by extrapolation: mostly no other evaluation is needed.
             let next_a = side_a.extrapolate(simd, &jet_a, &local_a, step.dx);
             let next_b = side_b.extrapolate(simd, &jet_b, &local_b, step.dy);
             let next = subtract::<S, f64>(plus(difference, step.dx), step.dy);
             let found = bracket(simd, (side_a, &next_a), (side_b, &next_b), next);
-            if found.upper - found.lower <= self.tolerance && found.lower > 0.0 {
+            // Below the rounding floor no bracket gets, however long Newton's method goes on.
+            let narrow = found.upper - found.lower <= self.tolerance.max(4.0 * found.rounding);
+            let decided = narrow || self.goal.met(found.lower, found.upper);
+            if decided && found.lower > 0.0 {
                 let x = moved::<S, f64>(at.x, plus(step.dx, found.to_a), &at.frame);
                 let y = moved::<S, f64>(at.y, plus(step.dy, found.to_b), &at.frame);
                 if !(side_a.others_hold(simd, x) && side_b.others_hold(simd, y)) {
@@ -181,6 +287,10 @@ impl Correct<'_> {
                 trace.jet_b = jet_b;
                 let n = apply_transposed::<S, f64>(&at.frame, found.normal);
                 return Ok(Proven { lower: found.lower, upper: found.upper, x, y, n, rounds });
+            }
+            if next[2] <= 0.0 {
+                // Stationary in an overlap.
+                return Err(rounds);
             }
             at.advance(simd, &step);
         }
@@ -197,6 +307,18 @@ struct Iterate {
 }
 
 impl Iterate {
+    /// The basis whose normal is halfway between those of the surfaces; none where they do not face each other.
+    #[inline(always)]
+    fn between_normals<S: Simd>(&self, simd: S, a: &Plane<f64>, b: &Plane<f64>) -> Option<M3<f64>> {
+        let (of_a, of_b) = (a.gradient, b.gradient);
+        let length_a = dot::<S, f64>(of_a, of_a).sqrt();
+        let length_b = dot::<S, f64>(of_b, of_b).sqrt();
+        let middle = [0, 1, 2].map(|i| of_b[i] / length_b - of_a[i] / length_a);
+        let length = dot::<S, f64>(middle, middle).sqrt();
+        let n = apply_transposed::<S, f64>(&self.frame, middle.map(|entry| entry / length));
+        (length > 0.5).then(|| basis(simd, n))
+    }
+
     /// Takes a step; the basis follows the normal.
     #[inline(always)]
     fn advance<S: Simd>(&mut self, simd: S, step: &Step<f64>) {

@@ -204,6 +204,16 @@ impl<'a, N: Copy> Side<'a, N> {
 }
 
 impl Side<'_, f64> {
+    /// The point itself if it lies in the ball of the body's [`crate::body::Trust`], else one a little inside on the line to the
+    /// centre.
+    #[inline(always)]
+    pub(super) fn brought_near<S: Simd>(&self, _: S, v: V3<f64>) -> V3<f64> {
+        let from = subtract::<S, f64>(v, self.origin);
+        let z = apply::<S, f64>(&self.linear, from);
+        let fraction = 0.97 * self.body.trust().radius / dot::<S, f64>(z, z).sqrt();
+        if fraction < 0.97 { add_scaled::<S, f64>(self.origin, fraction, from) } else { v }
+    }
+
     /// Whether all constraints but the active one are proven to hold at (a point within the displacement of) v.
     #[inline(always)]
     pub(super) fn others_hold<S: Simd>(&self, simd: S, v: V3<f64>) -> bool {
@@ -253,9 +263,9 @@ impl<N: Copy> Plane<N> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bend<N> {
     /// `TᵀHT`: 00, 01, 11.
-    curvature: [N; 3],
+    pub(super) curvature: [N; 3],
     /// `TᵀHn`.
-    tilt: [N; 2],
+    pub(super) tilt: [N; 2],
 }
 
 impl<N: Copy> Bend<N> {
@@ -306,7 +316,28 @@ pub(super) struct Step<N> {
     pub(super) dn: [N; 2],
 }
 
+impl Plane<f64> {
+    /// Slope of the gradient against the normal times `sign`; infinite or more where it points the other way.
+    #[inline(always)]
+    pub(super) fn slant(&self, sign: f64) -> f64 {
+        let [s0, s1, along] = self.gradient;
+        let along = sign * along;
+        let across = s0.abs() + s1.abs();
+        if along > 0.0 { across / along } else { f64::INFINITY }
+    }
+}
+
 impl Step<f64> {
+    /// Scales the step to the length `longest`; no step is left of one that is not a number.
+    #[inline(always)]
+    pub(super) fn shorten(&mut self, longest: f64) {
+        let square = |v: V3<f64>| v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+        let factor = longest / square(self.dx).max(square(self.dy)).sqrt();
+        for entry in self.dx.iter_mut().chain(&mut self.dy).chain(&mut self.dn) {
+            *entry *= factor;
+        }
+    }
+
     /// Whether the step is no longer than `longest`, and a number.
     #[inline(always)]
     pub(super) fn within(&self, longest: f64) -> bool {
@@ -366,6 +397,8 @@ pub(super) fn newton<S: Simd, N: Number<S>>(
 pub(super) struct Bracket<N> {
     pub(super) lower: N,
     pub(super) upper: N,
+    /// What rounding alone leaves between them, about.
+    pub(super) rounding: N,
     /// Unit normal of the lower bound, in the basis.
     pub(super) normal: V3<N>,
     /// From x to a point of A, in the basis.
@@ -467,7 +500,9 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
     let between = subtract(add_scaled(difference, one, to_a), to_b);
     let upper = dot(between, between).sqrt() * splat(1.0 + SLACK) + displaced + rounding;
     let upper = upper.select(N::and(simd, fine_a, fine_b), splat(f64::NAN));
-    Bracket { lower, upper, normal, to_a, to_b }
+    let evaluated = of_a * splat(side_a.trust().value_error) + of_b * splat(side_b.trust().value_error);
+    let rounding = splat(2.0) * (displaced + rounding + evaluated);
+    Bracket { lower, upper, rounding, normal, to_a, to_b }
 }
 
 /// What is known of one body's active constraint near the body, in metres.
@@ -539,7 +574,7 @@ impl<N: Copy> Bound<N> {
         let square = off * off * self.inverse_square;
         let strength = multiplier * self.curvature;
         let slope = splat(0.25) * strength * self.radius;
-        // Where neither the curvature nor the radius is positive, their product is.
+        // Both factors may be negative where the surface is flat.
         let fine = N::and(simd, square.le(slope * slope), splat(0.0).le(strength));
         let here = (square / strength).select(fine, splat(f64::INFINITY));
         let anywhere = off * off / (splat(2.0) * self.floor * multiplier);

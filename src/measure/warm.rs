@@ -15,6 +15,8 @@ pub(super) type ActiveSet = u16;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WarmStart {
     pub(super) hint: Hint,
+    /// Which parts of the two solids it is about.
+    pub(super) parts: (u16, u16),
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -33,9 +35,15 @@ pub(super) enum Hint {
     Saturated,
     /// Minimiser of a level distance in B's frame.
     Level { x_b: Vector3<f64>, active_a: ActiveSet, active_b: ActiveSet },
+    /// Witness of a single body in its frame.
+    Single { y: Vector3<f64>, active: ActiveSet },
 }
 
 impl WarmStart {
+    pub(super) fn is_cold(&self) -> bool {
+        matches!(self.hint, Hint::Cold)
+    }
+
     pub(super) fn apart(
         pair: &Pair<'_>,
         x: &Vector3<f64>,
@@ -44,6 +52,12 @@ impl WarmStart {
         active_a: ActiveSet,
         active_b: ActiveSet,
     ) -> Self {
-        Self { hint: Hint::Apart { x_a: pair.to_a(x), y_b: pair.to_b(y), normal_a: *n, active_a, active_b } }
+        Hint::Apart { x_a: pair.to_a(x), y_b: pair.to_b(y), normal_a: *n, active_a, active_b }.into()
+    }
+}
+
+impl From<Hint> for WarmStart {
+    fn from(hint: Hint) -> Self {
+        Self { hint, parts: (0, 0) }
     }
 }

@@ -14,6 +14,9 @@ const MAX_ITERATIONS: u32 = 80;
 /// Largest fraction of the way to zero one step may take slacks and multipliers.
 const TO_BOUNDARY: f64 = 0.995;
 
+/// Levenberg's regularization where nothing asks for more, relative to the largest curvature.
+const LEAST_REGULARIZATION: f64 = 1e-15;
+
 /// Most halvings of one step.
 const MAX_BACKTRACKS: u32 = 30;
 
@@ -108,10 +111,11 @@ pub fn minimise<const N: usize, P: Program<N>>(
         dual.multipliers[i] = gap / m as f64 / -row.value;
     }
     let mut last = 1.0;
+    let mut regularization = LEAST_REGULARIZATION;
     for iteration in 1..=MAX_ITERATIONS {
         let (gradient, hessian) = program.objective(v);
         let rows = current.as_slice();
-        let Some(system) = System::factor(&gradient, hessian, rows, &dual) else {
+        let Some(system) = System::factor(&gradient, hessian, rows, &dual, regularization) else {
             return iteration;
         };
         // Predictor: aim at zero complementarity and see how far the multipliers and slacks allow it.
@@ -150,8 +154,14 @@ pub fn minimise<const N: usize, P: Program<N>>(
             lengths = if lengths[0] == lengths[1] { [shorter; 2] } else { [2.0 * shorter; 2] };
         }
         if !accepted {
-            return iteration;
+            // A direction without curvature at this point makes the step longer than any halving mends.
+            if regularization > 1.0 {
+                return iteration;
+            }
+            regularization *= 1e3;
+            continue;
         }
+        regularization = (regularization * 1e-3).max(LEAST_REGULARIZATION);
         last = lengths[0].min(lengths[1]);
         (current, trial_rows) = (trial_rows, current);
         let gap = dual.complementarity(m);
@@ -225,6 +235,7 @@ impl<const N: usize> System<N> {
         mut hessian: SMatrix<f64, N, N>,
         rows: &[Row<N>],
         dual: &Dual,
+        regularization: f64,
     ) -> Option<Self> {
         for (i, row) in rows.iter().enumerate() {
             let mut block = hessian.fixed_view_mut::<3, 3>(row.block, row.block);
@@ -236,8 +247,8 @@ impl<const N: usize> System<N> {
         if !scale.is_finite() || !gradient.norm_squared().is_finite() {
             return None;
         }
-        // Levenberg's regularization, only as large as the factorization needs.
-        let mut regularization = 1e-15 * scale;
+        // Levenberg's regularization, only as large as the factorization and the line search need.
+        let mut regularization = regularization * scale;
         for _ in 0..8 {
             if let Some(factor) = cholesky(hessian + SMatrix::identity() * regularization) {
                 return Some(Self { factor });

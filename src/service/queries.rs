@@ -124,7 +124,7 @@ fn one(a: &Placed, b: &Placed, measure: Measure, accuracy: Accuracy) -> Option<O
         Measure::Unspecified => None,
         Measure::Distance => {
             let warm = &mut WarmStart::default();
-            let found = measure::distance(&a.body, &a.pose, &b.body, &b.pose, &accuracy.distance, warm);
+            let found = measure::distance(&*a.body, &a.pose, &*b.body, &b.pose, &accuracy.distance, warm);
             Some(Outcome::Distance(wire::distance(&found)))
         }
         Measure::LevelDistanceAOnB => Some(Outcome::LevelDistanceAOnB(level(a, b))),

@@ -1,0 +1,249 @@
+//! Counts the instructions of solves under valgrind's callgrind, which a busy machine does not change.
+//!
+//! `.ci/instructions` runs it: each row in a process of its own, on the AVX2 path (valgrind knows no AVX-512), on two fitted
+//! bodies that are kept beside this file, in poses that depend on nothing. The counts are compared with those recorded in
+//! `benches/instructions.json`; they belong to one version of the compiler, which is recorded with them.
+
+use clap::Parser;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::f64::consts::TAU;
+use std::fs;
+use std::hint::black_box;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+use sublevel::body::Body;
+use sublevel::demo::shapes;
+use sublevel::fit::{FitOptions, fit};
+use sublevel::measure::{Options, Pose, Status, WarmStart, distance, level_distance};
+
+/// Solves per row.
+const SOLVES: usize = 1000;
+
+/// Part by which a count may exceed the recorded one.
+const TOLERANCE: f64 = 0.03;
+
+/// A counted solve: what it returns is whether it converged, and its iterations.
+type Solve = fn(&Bodies, &Pose, &mut WarmStart) -> (Status, u32);
+
+/// The rows; those that are not warm forget the pose before.
+const ROWS: [(&str, bool, Solve); 4] = [
+    ("distance_warm", true, solve_distance),
+    ("distance_cold", false, solve_distance),
+    ("level_distance_warm", true, solve_level_distance),
+    ("level_distance_cold", false, solve_level_distance),
+];
+
+/// Count the instructions of solves and compare them with the recorded counts
+#[derive(Debug, Parser)]
+#[command(name = "instructions", max_term_width = 100)]
+struct Args {
+    /// Record the counts instead of comparing them
+    #[arg(long)]
+    record: bool,
+    /// Fit the bodies of benches/instructions anew; record the counts afterwards
+    #[arg(long)]
+    fit: bool,
+    /// Run the solves of one row, to be counted from outside
+    #[arg(long, value_name = "ROW", hide = true)]
+    run: Option<String>,
+    /// Given by cargo
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
+struct Bodies {
+    chair: Body,
+    human: Body,
+}
+
+/// What is recorded.
+#[derive(Default, Serialize, Deserialize)]
+struct Recorded {
+    rustc: String,
+    rows: BTreeMap<String, Count>,
+}
+
+/// Means over the solves of a row.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+struct Count {
+    instructions: u64,
+    iterations: f64,
+}
+
+fn main() -> Result<ExitCode, Box<dyn Error>> {
+    let args = Args::parse();
+    if let Some(row) = args.run {
+        return run(&row).map(|()| ExitCode::SUCCESS);
+    }
+    if args.fit {
+        for (name, shape) in [("chair", shapes::chair()), ("human", shapes::human())] {
+            let options = FitOptions { degree: 6, input: format!("{name}.off"), ..FitOptions::default() };
+            let body = fit(name, &shape.vertices, &options, &mut |_| ControlFlow::Continue(()))?.body;
+            write(&body_file(name), &body.to_json())?;
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
+    let rows =
+        ROWS.iter().map(|(row, ..)| Ok(((*row).to_owned(), count(row)?))).collect::<Result<_, Box<dyn Error>>>()?;
+    let counted = Recorded { rustc: rustc(), rows };
+    if args.record {
+        write(&recorded_file(), &(serde_json::to_string_pretty(&counted)? + "\n"))?;
+    }
+    let text = read(&recorded_file()).map_err(|error| format!("{error}; record the counts with --record"))?;
+    Ok(if compare(&counted, &serde_json::from_str(&text)?) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Prints the counts beside the recorded ones; whether none is too high.
+fn compare(counted: &Recorded, recorded: &Recorded) -> bool {
+    println!("{:<22} {:>12} {:>12} {:>8} {:>11}", "per solve", "instructions", "recorded", "change", "iterations");
+    let mut good = true;
+    for (row, now) in &counted.rows {
+        let Some(before) = recorded.rows.get(row) else {
+            println!("{row:<22} {:>12} not recorded: run again with --record", now.instructions);
+            good = false;
+            continue;
+        };
+        let change = now.instructions as f64 / before.instructions as f64 - 1.0;
+        let verdict = if !(change <= TOLERANCE) {
+            good = false;
+            "  TOO MANY"
+        } else if change < -TOLERANCE {
+            "  fewer: record it"
+        } else {
+            ""
+        };
+        println!(
+            "{row:<22} {:>12} {:>12} {:>+7.1}% {:>11.3}{verdict}",
+            now.instructions,
+            before.instructions,
+            100.0 * change,
+            now.iterations
+        );
+    }
+    if counted.rustc != recorded.rustc {
+        println!(
+            "recorded with {}, counted with {}: some of the change is the compiler's",
+            recorded.rustc, counted.rustc
+        );
+    }
+    good
+}
+
+/// Counts a row in a process of its own.
+fn count(row: &str) -> Result<Count, Box<dyn Error>> {
+    let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("callgrind.{row}"));
+    // A count of an earlier run must not pass for this one's.
+    if out.exists() {
+        fs::remove_file(&out)?;
+    }
+    let output = Command::new("valgrind")
+        .args(["--tool=callgrind", "--toggle-collect=*instructions::counted*"])
+        .arg(format!("--callgrind-out-file={}", out.display()))
+        .arg(std::env::current_exe()?)
+        .args(["--run", row])
+        .env("OPENBLAS_NUM_THREADS", "1")
+        .output()
+        .map_err(|error| format!("valgrind: {error}"))?;
+    let errors = String::from_utf8_lossy(&output.stderr);
+    if !output.status.success() {
+        return Err(format!("{row} failed under valgrind:\n{errors}").into());
+    }
+    let iterations: u64 = String::from_utf8(output.stdout)?.trim().parse()?;
+    let text = read(&out)?;
+    let total = text.lines().find_map(|line| line.strip_prefix("totals:").or(line.strip_prefix("summary:")));
+    let total: u64 = total.ok_or("callgrind wrote no total")?.trim().parse()?;
+    if total == 0 {
+        return Err("callgrind counted nothing: did the counted function lose its name?".into());
+    }
+    Ok(Count { instructions: total / SOLVES as u64, iterations: iterations as f64 / SOLVES as f64 })
+}
+
+/// Runs the solves of a row and prints the sum of their iterations.
+fn run(row: &str) -> Result<(), Box<dyn Error>> {
+    let (_, warm, solve) = ROWS.into_iter().find(|(known, ..)| *known == row).ok_or("--run: no such row")?;
+    let load = |name: &str| -> Result<Body, Box<dyn Error>> { Ok(Body::from_json(&read(&body_file(name))?)?) };
+    let bodies = Bodies { chair: load("chair")?, human: load("human")? };
+    let poses = poses()?;
+    // Once uncounted, to see that each is what it is meant to be: bodies apart, and converged.
+    for pose in &poses {
+        let options = Options::default();
+        let gap = distance(&bodies.chair, &Pose::identity(), &bodies.human, pose, &options, &mut WarmStart::default());
+        if !(gap.lower > 0.0) || solve(&bodies, pose, &mut WarmStart::default()).0 != Status::Converged {
+            return Err(format!("{row}: not apart or not converged at {pose:?}").into());
+        }
+    }
+    println!("{}", counted(&bodies, &poses, warm, solve));
+    Ok(())
+}
+
+/// What callgrind counts, by its name; the sum of the iterations.
+#[inline(never)]
+fn counted(bodies: &Bodies, poses: &[Pose], warm: bool, solve: Solve) -> u64 {
+    let mut kept = WarmStart::default();
+    let mut iterations = 0;
+    for pose in poses {
+        if !warm {
+            kept = WarmStart::default();
+        }
+        iterations += u64::from(solve(bodies, black_box(pose), &mut kept).1);
+    }
+    iterations
+}
+
+fn solve_distance(bodies: &Bodies, pose: &Pose, warm: &mut WarmStart) -> (Status, u32) {
+    let answer = distance(&bodies.chair, &Pose::identity(), &bodies.human, pose, &Options::default(), warm);
+    (answer.status, answer.iterations)
+}
+
+fn solve_level_distance(bodies: &Bodies, pose: &Pose, warm: &mut WarmStart) -> (Status, u32) {
+    let answer = level_distance(&bodies.chair, &Pose::identity(), &bodies.human, pose, &Options::default(), warm);
+    (answer.status, answer.iterations)
+}
+
+/// The human about the chair: round it at a varying distance, a centimetre a step, turning by a degree a step about an axis
+/// that moves.
+fn poses() -> Result<Vec<Pose>, Box<dyn Error>> {
+    let mut rotation = nalgebra::UnitQuaternion::identity();
+    (0..SOLVES)
+        .map(|step| {
+            let s = step as f64;
+            let radius = 1.9 + 0.3 * (TAU * s / 370.0).sin();
+            let (sin, cos) = (0.01 * s / 1.9).sin_cos();
+            let middle = Vector3::new(radius * cos, radius * sin, 0.5 + 0.2 * (TAU * s / 230.0).sin());
+            let axis = Vector3::new((TAU * s / 410.0).cos(), (TAU * s / 290.0).sin(), 0.7);
+            rotation = nalgebra::UnitQuaternion::new(axis.normalize() * (TAU / 360.0)) * rotation;
+            // The human's origin is between its feet, its middle 0.9 m above.
+            let translation = middle - rotation * Vector3::new(0.0, 0.0, 0.9);
+            Ok(Pose::from_quaternion(translation, rotation.coords.into())?)
+        })
+        .collect()
+}
+
+fn rustc() -> String {
+    let output = Command::new("rustc").arg("--version").output().ok();
+    output.and_then(|output| String::from_utf8(output.stdout).ok()).unwrap_or_default().trim().to_owned()
+}
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("benches")
+}
+
+fn recorded_file() -> PathBuf {
+    folder().join("instructions.json")
+}
+
+fn body_file(name: &str) -> PathBuf {
+    folder().join(format!("instructions/{name}-d6.json"))
+}
+
+fn read(path: &Path) -> Result<String, String> {
+    fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))
+}
+
+fn write(path: &Path, text: &str) -> Result<(), String> {
+    fs::write(path, text).map_err(|error| format!("{}: {error}", path.display()))
+}

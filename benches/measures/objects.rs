@@ -1,0 +1,84 @@
+//! The objects: meshes, the vertices of their convex hulls, and the bodies of each degree around them.
+
+use nalgebra::Vector3;
+use std::error::Error;
+use std::fs;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use sublevel::body::{Body, ContainedPoints};
+use sublevel::fit::{FitOptions, fit, hull::convex_hull, read_points};
+
+/// The pairs of the figures.
+pub(crate) const PAIRS: [(&str, &str); 3] = [("chair", "human"), ("hand", "vase"), ("octopus", "chair")];
+
+/// Numbers of the meshes in the Princeton Mesh Segmentation Benchmark.
+const MESHES: [(&str, u32); 5] = [("chair", 101), ("human", 10), ("hand", 181), ("vase", 361), ("octopus", 121)];
+
+/// The degrees that are timed.
+pub(crate) const DEGREES: [usize; 4] = [2, 4, 6, 8];
+
+/// An object as a hull and as bodies.
+pub(crate) struct Object {
+    pub(crate) name: String,
+    /// Vertices of the convex hull, metres.
+    pub(crate) hull: Vec<Vector3<f64>>,
+    /// One body for each of [`DEGREES`].
+    bodies: Vec<Body>,
+}
+
+/// Two objects; the poses are those of `b` in the frame of `a`.
+pub(crate) struct Pair {
+    pub(crate) name: String,
+    pub(crate) a: Object,
+    pub(crate) b: Object,
+}
+
+impl Pair {
+    /// Both bodies of a degree out of [`DEGREES`].
+    pub(crate) fn bodies(&self, degree: usize) -> (&Body, &Body) {
+        (self.a.body(degree), self.b.body(degree))
+    }
+}
+
+impl Object {
+    /// Reads the mesh and its bodies, and fits those that are not kept yet.
+    pub(crate) fn load(name: &str) -> Result<Self, Box<dyn Error>> {
+        let (_, number) = MESHES.into_iter().find(|(known, _)| *known == name).ok_or("no such mesh")?;
+        let data = std::env::var_os("SUBLEVEL_DATA").ok_or("SUBLEVEL_DATA does not name the folder with the meshes")?;
+        let path = PathBuf::from(data).join(format!("psb/{number}.off"));
+        let points = read_points(&path, 1.0).map_err(|error| format!("{}: {error}", path.display()))?;
+        let hull = convex_hull(&points)?.vertices.into_iter().map(|i| points[i]).collect();
+        let bodies = DEGREES.into_iter().map(|degree| kept(name, degree, &points)).collect::<Result<_, _>>()?;
+        Ok(Self { name: name.to_owned(), hull, bodies })
+    }
+
+    fn body(&self, degree: usize) -> &Body {
+        let index = DEGREES.iter().position(|&known| known == degree).expect("one of the degrees that are fitted");
+        &self.bodies[index]
+    }
+}
+
+/// Folder of what is kept between runs.
+pub(crate) fn folder() -> Result<PathBuf, Box<dyn Error>> {
+    let target = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
+    let folder = target.parent().ok_or("cargo names no target folder")?.join("bench-bodies");
+    fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    Ok(folder)
+}
+
+/// The body of an earlier run, if it holds these points, or a new fit.
+fn kept(name: &str, degree: usize, points: &[Vector3<f64>]) -> Result<Body, Box<dyn Error>> {
+    let path = folder()?.join(format!("{name}-d{degree}.json"));
+    let earlier = fs::read_to_string(&path).ok().and_then(|text| Body::from_json(&text).ok());
+    if let Some(body) = earlier
+        && body.degree() == degree
+        && body.points() == Some(&ContainedPoints::of(points))
+    {
+        return Ok(body);
+    }
+    eprintln!("fitting {name} at degree {degree} ...");
+    let options = FitOptions { degree, ..FitOptions::default() };
+    let body = fit(name, points, &options, &mut |_| ControlFlow::Continue(()))?.body;
+    fs::write(&path, body.to_json()).map_err(|error| format!("{}: {error}", path.display()))?;
+    Ok(body)
+}

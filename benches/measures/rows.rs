@@ -1,0 +1,139 @@
+//! The rows: one function each, listed in [`all`].
+
+use crate::motion::{self, Kind, Trajectory};
+use crate::objects::{DEGREES, Pair, folder};
+use crate::peers::{Hulls, parry_pose};
+use crate::sweep::{Answer, Row, Target};
+use std::error::Error;
+use std::fs;
+use sublevel::measure::{Options, Pose, WarmStart, distance, level_distance};
+
+/// Label of coal's rows.
+pub(crate) const COAL_WARM: &str = "coal GJK warm";
+pub(crate) const COAL_COLD: &str = "coal GJK cold";
+/// Label of parry's row.
+pub(crate) const PARRY_COLD: &str = "parry GJK cold";
+
+/// The degree of the peers' poses, and of the rows that are not timed at every degree.
+pub(crate) const DEGREE: usize = 6;
+
+/// A pair and its poses.
+pub(crate) struct Scene<'a> {
+    pub(crate) pair: &'a Pair,
+    pub(crate) kind: Kind,
+    pub(crate) hulls: Hulls,
+    /// Poses for the bodies of each degree: the same for all, unless grazing.
+    poses: Vec<(usize, Vec<Trajectory>)>,
+    parry_poses: Vec<Vec<parry3d_f64::math::Pose>>,
+}
+
+impl<'a> Scene<'a> {
+    pub(crate) fn new(pair: &'a Pair, kind: Kind, trajectories: usize, poses: usize) -> Result<Self, Box<dyn Error>> {
+        let poses: Vec<(usize, Vec<Trajectory>)> = match kind {
+            Kind::Separated => {
+                let bodies: Vec<_> = DEGREES.iter().map(|&degree| pair.bodies(degree)).collect();
+                let shared = motion::separated(&bodies, trajectories, poses)?;
+                DEGREES.iter().map(|&degree| (degree, shared.clone())).collect()
+            }
+            // Bodies that differ in size can not all graze in one pose: each degree walks the same way along its own.
+            Kind::Grazing => DEGREES
+                .iter()
+                .map(|&degree| {
+                    let (a, b) = pair.bodies(degree);
+                    Ok((degree, motion::grazing(a, b, trajectories, poses)?))
+                })
+                .collect::<Result<_, Box<dyn Error>>>()?,
+        };
+        let mut scene = Self { pair, kind, hulls: Hulls::new(pair)?, poses, parry_poses: Vec::new() };
+        scene.parry_poses = scene.poses(DEGREE).iter().map(|t| t.iter().map(parry_pose).collect()).collect();
+        // For a look at single poses with `sublevel measure --poses`.
+        let path = folder()?.join(format!("{}-{}.poses", pair.name, kind.name()));
+        fs::write(&path, motion::to_text(scene.poses(DEGREE)))
+            .map_err(|error| format!("{}: {error}", path.display()))?;
+        Ok(scene)
+    }
+
+    /// The poses for bodies of this degree.
+    pub(crate) fn poses(&self, degree: usize) -> &[Trajectory] {
+        self.poses.iter().find(|(known, _)| *known == degree).map_or(&[], |(_, poses)| poses)
+    }
+
+    /// Figures are for separated bodies; grazing ones may take twice as long.
+    fn part(&self, of: &'static str, part: f64) -> Target {
+        Target::PartOf(of, if self.kind == Kind::Grazing { 2.0 * part } else { part })
+    }
+}
+
+/// All rows of a table.
+pub(crate) fn all<'a>(scene: &'a Scene<'a>) -> Vec<Row<'a>> {
+    let mut rows = Vec::new();
+    rows.extend(DEGREES.map(|degree| distance_warm(scene, degree)));
+    rows.extend(DEGREES.map(|degree| distance_cold(scene, degree)));
+    rows.push(level_warm(scene));
+    rows.push(level_cold(scene));
+    rows.push(parry_cold(scene));
+    rows.push(parry_warm(scene));
+    rows
+}
+
+fn distance_warm<'a>(scene: &'a Scene<'a>, degree: usize) -> Row<'a> {
+    let (a, b) = scene.pair.bodies(degree);
+    let options = Options::default();
+    let row = Row::warm(format!("distance warm, degree {degree}"), scene.poses(degree), move |pose, warm| {
+        let answer = distance(a, &Pose::identity(), b, pose, &options, warm);
+        Answer::new(answer.iterations, answer.status, answer.lower <= 0.0)
+    });
+    let part = match degree {
+        2 => 0.2,
+        4 => 0.3,
+        6 => 0.45,
+        _ => 0.9,
+    };
+    let row = row
+        .at_most(scene.part(COAL_WARM, part))
+        .at_most(Target::MeanIterations(2.0))
+        .at_most(Target::MostIterations(30));
+    if degree == DEGREE { row.at_most(scene.part(PARRY_COLD, 0.1)) } else { row }
+}
+
+fn distance_cold<'a>(scene: &'a Scene<'a>, degree: usize) -> Row<'a> {
+    let (a, b) = scene.pair.bodies(degree);
+    let options = Options::default();
+    let row = Row::cold(format!("distance cold, degree {degree}"), scene.poses(degree), move |pose| {
+        let answer = distance(a, &Pose::identity(), b, pose, &options, &mut WarmStart::default());
+        Answer::new(answer.iterations, answer.status, answer.lower <= 0.0)
+    });
+    let row = row.at_most(Target::MostIterations(30));
+    if degree == DEGREE { row.at_most(scene.part(COAL_COLD, 0.9)) } else { row }
+}
+
+fn level_warm<'a>(scene: &'a Scene<'a>) -> Row<'a> {
+    let (a, b) = scene.pair.bodies(DEGREE);
+    let options = Options::default();
+    Row::warm(format!("level distance warm, degree {DEGREE}"), scene.poses(DEGREE), move |pose, warm| {
+        let answer = level_distance(a, &Pose::identity(), b, pose, &options, warm);
+        Answer::new(answer.iterations, answer.status, answer.upper <= 1.0)
+    })
+    .at_most(scene.part(COAL_WARM, 0.35))
+    .at_most(Target::MeanIterations(2.0))
+    .at_most(Target::MostIterations(30))
+}
+
+fn level_cold<'a>(scene: &'a Scene<'a>) -> Row<'a> {
+    let (a, b) = scene.pair.bodies(DEGREE);
+    let options = Options::default();
+    Row::cold(format!("level distance cold, degree {DEGREE}"), scene.poses(DEGREE), move |pose| {
+        let answer = level_distance(a, &Pose::identity(), b, pose, &options, &mut WarmStart::default());
+        Answer::new(answer.iterations, answer.status, answer.upper <= 1.0)
+    })
+    .at_most(Target::MostIterations(30))
+}
+
+fn parry_cold<'a>(scene: &'a Scene<'a>) -> Row<'a> {
+    Row::cold(PARRY_COLD, &scene.parry_poses, move |pose| scene.hulls.parry_cold(pose))
+}
+
+/// Parry's warm form: the direction between the closest points before.
+fn parry_warm<'a>(scene: &'a Scene<'a>) -> Row<'a> {
+    Row::warm("parry GJK warm", &scene.parry_poses, move |pose, direction| scene.hulls.parry_warm(pose, direction))
+}

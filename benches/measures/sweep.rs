@@ -1,0 +1,136 @@
+//! A row: one query over all poses, timed pass by pass.
+
+use std::hint::black_box;
+use std::time::Instant;
+use sublevel::measure::Status;
+
+/// What a row needs to know of an answer.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Answer {
+    /// None where the solver does not tell.
+    pub(crate) iterations: Option<u32>,
+    pub(crate) failed: bool,
+    /// Whether the bodies were found to overlap or touch.
+    pub(crate) overlap: bool,
+}
+
+impl Answer {
+    pub(crate) fn new(iterations: u32, status: Status, overlap: bool) -> Self {
+        Self { iterations: Some(iterations), failed: status != Status::Converged, overlap }
+    }
+}
+
+/// What came of all queries of a row.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Tally {
+    pub(crate) queries: usize,
+    pub(crate) failed: usize,
+    pub(crate) overlaps: usize,
+    pub(crate) iterations: u64,
+    pub(crate) most_iterations: u32,
+}
+
+impl Tally {
+    fn add(&mut self, answer: &Answer) {
+        self.queries += 1;
+        self.failed += usize::from(answer.failed);
+        self.overlaps += usize::from(answer.overlap);
+        self.iterations += u64::from(answer.iterations.unwrap_or(0));
+        self.most_iterations = self.most_iterations.max(answer.iterations.unwrap_or(0));
+    }
+}
+
+/// A bound that a row is to stay below.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Target {
+    /// Part of the time of the row with this label.
+    PartOf(&'static str, f64),
+    /// Nanoseconds on machines of the class named in the figures: growth distance, rays, depth and batches have such.
+    #[allow(dead_code)]
+    Nanoseconds(f64),
+    /// Iterations on average.
+    MeanIterations(f64),
+    /// Iterations in the worst case.
+    MostIterations(u32),
+}
+
+/// One line of a table.
+pub(crate) struct Row<'a> {
+    pub(crate) label: String,
+    pub(crate) targets: Vec<Target>,
+    pub(crate) tally: Tally,
+    /// Nanoseconds of each trajectory in each pass so far.
+    passes: Vec<Vec<f64>>,
+    time: Box<dyn Fn() -> Vec<f64> + 'a>,
+}
+
+impl<'a> Row<'a> {
+    /// A row of `query`, which keeps between the poses of a trajectory whatever `T` holds.
+    pub(crate) fn warm<P, T: Default>(
+        label: impl Into<String>,
+        trajectories: &'a [Vec<P>],
+        query: impl Fn(&P, &mut T) -> Answer + 'a,
+    ) -> Self {
+        let mut tally = Tally::default();
+        // Counted before and not while timing.
+        for trajectory in trajectories {
+            walk(trajectory, &query, |answer| tally.add(&answer));
+        }
+        let time = Box::new(move || {
+            let timed = |trajectory: &Vec<P>| {
+                let start = Instant::now();
+                walk(trajectory, &query, |answer| {
+                    black_box(answer);
+                });
+                start.elapsed().as_nanos() as f64
+            };
+            trajectories.iter().map(timed).collect()
+        });
+        Self { label: label.into(), targets: Vec::new(), tally, passes: Vec::new(), time }
+    }
+
+    /// A row of `query`, which knows nothing of the pose before.
+    pub(crate) fn cold<P>(
+        label: impl Into<String>,
+        trajectories: &'a [Vec<P>],
+        query: impl Fn(&P) -> Answer + 'a,
+    ) -> Self {
+        Self::warm(label, trajectories, move |pose, (): &mut ()| query(pose))
+    }
+
+    /// The same row with a target.
+    pub(crate) fn at_most(mut self, target: Target) -> Self {
+        self.targets.push(target);
+        self
+    }
+
+    /// Times one pass over all poses.
+    pub(crate) fn pass(&mut self) {
+        self.passes.push((self.time)());
+    }
+
+    /// Nanoseconds per query: the median pass of each trajectory, summed.
+    ///
+    /// Whole passes are long enough that other processes interrupt every one on a busy machine; trajectories are not.
+    pub(crate) fn nanoseconds(&self) -> f64 {
+        let trajectories = self.passes.first().map_or(0, Vec::len);
+        let of = |trajectory: usize| median(&self.passes.iter().map(|pass| pass[trajectory]).collect::<Vec<_>>());
+        (0..trajectories).map(of).sum::<f64>() / self.tally.queries as f64
+    }
+}
+
+/// All poses of a trajectory, one after the other.
+#[inline(always)]
+fn walk<P, T: Default>(trajectory: &[P], query: &impl Fn(&P, &mut T) -> Answer, mut record: impl FnMut(Answer)) {
+    let mut kept = T::default();
+    for pose in trajectory {
+        record(query(black_box(pose), &mut kept));
+    }
+}
+
+/// The middle value; NaN of none.
+pub(crate) fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
+}
