@@ -245,8 +245,8 @@ impl Body {
             return Err(BodyError::Thin);
         }
         let boundary_z = boundary.iter().map(|x| normalization.linear * (x - normalization.center));
-        let trust = Trust::new(&constraints, &normalization.linear, &inverse, &z_extent, boundary_z);
         let interior_z = normalization.linear * (interior_point - normalization.center);
+        let trust = Trust::new(&constraints, &normalization.linear, &inverse, &z_extent, boundary_z, &interior_z);
         let rays = Sphere::fine().vertices().iter().map(|u| {
             let ray = inverse * u * surface::radius(&constraints, &interior_z, u);
             (interior_point + ray - normalization.center, placement.highest(&constraints, &(interior_point + ray)))

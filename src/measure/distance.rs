@@ -201,7 +201,12 @@ impl<'a> Search<'a> {
             Hint::Overlap { point_a } => {
                 self.common(&self.pair.a_to_query(point_a));
             }
-            Hint::Cold | Hint::Level { .. } | Hint::Single { .. } | Hint::Smooth(_) => {}
+            Hint::Cold
+            | Hint::Level { .. }
+            | Hint::LevelSmooth(_)
+            | Hint::Saturated
+            | Hint::Single { .. }
+            | Hint::Smooth(_) => {}
         }
         if !self.ended() {
             self.closest(NEAR);

@@ -31,11 +31,11 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Bound of the error of a relative rotation in operator norm: both rotations are off by at most [`ROTATION_ERROR`]; their
 /// product, its matrix and sums with it round a few times more.
-const TURNED: f64 = 2.0 * ROTATION_ERROR + gamma(40);
+pub(super) const TURNED: f64 = 2.0 * ROTATION_ERROR + gamma(40);
 
 /// The matrix by rows, the same in every lane.
 #[inline(always)]
-fn rows<S: Simd, N: Number<S>>(simd: S, m: &Matrix3<f64>) -> M3<N> {
+pub(super) fn rows<S: Simd, N: Number<S>>(simd: S, m: &Matrix3<f64>) -> M3<N> {
     let mut rows = [[N::splat(simd, 0.0); 3]; 3];
     for i in 0..3 {
         for j in 0..3 {
@@ -411,10 +411,10 @@ pub(super) struct Bracket<N> {
 
 /// Relative slack for the rounding of the bracket's own arithmetic, basis included: fewer than 256 operations on the sum
 /// of magnitudes.
-const SLACK: f64 = 128.0 * f64::EPSILON;
+pub(super) const SLACK: f64 = 128.0 * f64::EPSILON;
 
 /// How much farther a point is moved than its constraint's linearization asks, for the rounding of its gradient.
-const NUDGE: f64 = 1e-4;
+pub(super) const NUDGE: f64 = 1e-4;
 
 /// The bracket from the constraints at x and y with `difference = x - y` in the basis. NaN where it proves nothing; it
 /// holds only if both points, and those extrapolated from, lie in their balls.
