@@ -40,15 +40,12 @@ pub struct Distance {
     pub active_b: ActiveConstraints,
     /// Iterations of all methods together.
     pub iterations: u32,
-    /// Distance of the witnesses in the frame they were computed in.
-    pub(super) attained: f64,
 }
 
 impl Distance {
-    /// The answer inside the bracket: the distance of the witnesses as computed, which the upper bound exceeds by the rounding
-    /// of the frames.
+    /// The answer: the middle of the bracket.
     pub fn value(&self) -> f64 {
-        self.attained
+        0.5 * (self.lower + self.upper)
     }
 
     /// Derivatives with respect to the twists of the first and of the second body at the poses the distance was asked for
@@ -132,6 +129,19 @@ pub(super) fn between(
     search.answer()
 }
 
+/// The point of B nearest to A in the query frame and the constraints that are active there; none on overlap.
+pub(super) fn nearest(
+    pair: &Pair<'_>,
+    options: &Options<'_>,
+    iterations: &mut u32,
+) -> Option<(Vector3<f64>, Active, Active)> {
+    let mut search = Search::new(pair, &Goal::NARROW, options);
+    search.iterations = *iterations;
+    search.run(&Hint::Cold);
+    *iterations = search.iterations;
+    (search.upper > 0.0).then_some((search.y, search.active.0, search.active.1))
+}
+
 /// A solve in progress: the best bracket so far and where it was attained, in query units.
 struct Search<'a> {
     pair: &'a Pair<'a>,
@@ -193,6 +203,11 @@ impl<'a> Search<'a> {
     }
 
     fn run(&mut self, hint: &Hint) {
+        if self.options.exhausted(self.iterations) {
+            // Any pair of points is an answer.
+            self.attain(&self.pair.a.interior.clone_owned(), &self.pair.b.interior.clone_owned());
+            return;
+        }
         match hint {
             Hint::Apart { x_a, y_b, normal_a, active_a, active_b } => {
                 let active =
@@ -411,7 +426,6 @@ impl<'a> Search<'a> {
             active_a: self.active.0.reported(if normal.is_some() { unit } else { 0.0 }),
             active_b: self.active.1.reported(if normal.is_some() { unit } else { 0.0 }),
             iterations: self.iterations,
-            attained: ((self.x - self.y).norm() * unit).min(self.upper * unit).max(self.lower * unit),
         }
     }
 
@@ -421,7 +435,7 @@ impl<'a> Search<'a> {
         let outward = |body: &Posed<'_>, v: &Vector3<f64>| {
             let jets = (0..body.len()).map(|i| body.jet(i, v));
             let highest = jets.max_by(|p, q| p.value.total_cmp(&q.value));
-            highest.map_or_else(Vector3::zeros, |jet| jet.gradient.normalize())
+            highest.and_then(|jet| jet.gradient.try_normalize(0.0)).unwrap_or_default()
         };
         outward(&self.pair.b, &self.y) - outward(&self.pair.a, &self.x)
     }
@@ -441,7 +455,6 @@ impl Proven {
             active_a: ActiveConstraints::single(self.active[0], self.multipliers[0]),
             active_b: ActiveConstraints::single(self.active[1], self.multipliers[1]),
             iterations: self.rounds,
-            attained: self.attained.min(self.upper).max(self.lower),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Status;
 use super::bracket::{Multipliers, level_lower};
-use super::distance::split;
+use super::distance::{self, split};
 use super::level_smooth::{FollowLevel, LevelProven, LevelTrace, Saturated};
 use super::newton::{Active, LevelNewton};
 use super::options::Options;
@@ -161,6 +161,17 @@ impl<'a> Search<'a> {
         if !self.done() && !self.exhausted() {
             self.interior_point();
         }
+        if !self.done() && !self.exhausted() {
+            self.from_nearest();
+        }
+    }
+
+    /// Newton's method from the point of B nearest to A: where A is tiny, its values rise so steeply that nothing else shows
+    /// the way, and near and low are about the same.
+    fn from_nearest(&mut self) {
+        let Some((x, a, b)) = distance::nearest(self.pair, self.options, &mut self.iterations) else { return };
+        self.attain(&x);
+        self.newton(x, a, b);
     }
 
     fn exhausted(&self) -> bool {

@@ -340,11 +340,12 @@ impl LevelNewton {
         }
         let mut s = self.start(pair);
         let mut last = f64::INFINITY;
+        let mut flatness = Flatness::default();
         for step in 1..=MAX_STEPS {
             if stop(step - 1) {
                 return step - 1;
             }
-            let Some(length) = self.step(pair, &mut s) else {
+            let Some(length) = self.step(pair, &mut s, &mut flatness) else {
                 // Where both are flat the system is singular, but the point at hand with its multipliers may do.
                 accept(self);
                 return step;
@@ -381,7 +382,7 @@ impl LevelNewton {
         a.value[..self.a.len].iter().sum::<f64>() / self.a.len as f64
     }
 
-    fn step(&mut self, pair: &Pair<'_>, s: &mut f64) -> Option<f64> {
+    fn step(&mut self, pair: &Pair<'_>, s: &mut f64, flatness: &mut Flatness) -> Option<f64> {
         let a = At::new(&pair.a, &self.a, &self.x);
         let b = At::new(&pair.b, &self.b, &self.x);
         let size = 4 + self.a.len + self.b.len;
@@ -414,7 +415,7 @@ impl LevelNewton {
         let d = solve(&mut m, size)?;
         let dx = Vector3::new(d[0], d[1], d[2]);
         let length = dx.norm();
-        let damping = (0.5 / length).min(1.0);
+        let damping = (0.5 / length).min(flatness.stretch(length));
         self.x += dx * damping;
         *s += d[3] * damping;
         for k in 0..self.a.len {

@@ -397,8 +397,6 @@ pub(super) fn newton<S: Simd, N: Number<S>>(
 pub(super) struct Bracket<N> {
     pub(super) lower: N,
     pub(super) upper: N,
-    /// Distance of the points that attain the upper bound, as computed.
-    pub(super) attained: N,
     /// What rounding alone leaves between them, about.
     pub(super) rounding: N,
     /// Of A's and of B's constraint, metres.
@@ -502,12 +500,11 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
     let (move_b, fine_b) = near_b.move_inside(simd, b.value - one + error_b, length_b, inverse_b, gradient_error_b);
     let (to_a, to_b) = (scaled(outward_a, move_a), scaled(outward_b, move_b));
     let between = subtract(add_scaled(difference, one, to_a), to_b);
-    let attained = dot(between, between).sqrt();
-    let upper = attained * splat(1.0 + SLACK) + displaced + rounding;
+    let upper = dot(between, between).sqrt() * splat(1.0 + SLACK) + displaced + rounding;
     let upper = upper.select(N::and(simd, fine_a, fine_b), splat(f64::NAN));
     let evaluated = of_a * splat(side_a.trust().value_error) + of_b * splat(side_b.trust().value_error);
     let rounding = splat(2.0) * (displaced + rounding + evaluated);
-    Bracket { lower, upper, attained, rounding, multipliers: [of_a, of_b], normal, to_a, to_b }
+    Bracket { lower, upper, rounding, multipliers: [of_a, of_b], normal, to_a, to_b }
 }
 
 /// What is known of one body's active constraint near the body, in metres.
