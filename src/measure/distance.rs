@@ -245,6 +245,9 @@ impl<'a> Search<'a> {
         let mut v = SVector::<f64, 6>::zeros();
         v.fixed_rows_mut::<3>(0).copy_from(&start_x);
         v.fixed_rows_mut::<3>(3).copy_from(&start_y);
+        if self.common(&((start_x + start_y) * 0.5)) {
+            return;
+        }
         self.attain(&start_x, &start_y);
         if self.done() {
             return;

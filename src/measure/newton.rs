@@ -177,31 +177,6 @@ const MAX_STEPS: u32 = 16;
 /// Longest Newton step, in query units, after which a bracket may be narrow: what remains is about its square.
 const WORTH_A_BRACKET: f64 = 1e-3;
 
-/// Where both surfaces are flat to the order j in a common direction, Newton's steps shrink by `(j - 2) / (j - 1)` each and no
-/// faster; the sum of all that would follow is then known (Aitken).
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Flatness {
-    last: f64,
-    ratio: f64,
-}
-
-impl Default for Flatness {
-    fn default() -> Self {
-        Self { last: f64::INFINITY, ratio: 0.0 }
-    }
-}
-
-impl Flatness {
-    /// How many times itself a step of this length should be taken: more than once after two like ratios of steps.
-    #[inline(always)]
-    pub(super) fn stretch(&mut self, length: f64) -> f64 {
-        let ratio = length / self.last;
-        let steady = (0.4..0.95).contains(&ratio) && (ratio - self.ratio).abs() < 0.1;
-        (self.last, self.ratio) = if steady { (f64::INFINITY, 0.0) } else { (length, ratio) };
-        if steady { 1.0 / (1.0 - ratio) } else { 1.0 }
-    }
-}
-
 /// Newton iterates of the distance system.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DistanceNewton {
@@ -224,9 +199,8 @@ impl DistanceNewton {
         }
         let mut at = self.evaluate(pair);
         let mut last = f64::INFINITY;
-        let mut flatness = Flatness::default();
         for step in 1..=MAX_STEPS.min(limit) {
-            let Some(length) = self.step(&at, &mut flatness) else {
+            let Some(length) = self.step(&at) else {
                 // Where both are flat the system is singular, but the point at hand with its multipliers may do.
                 accept(self);
                 return step;
@@ -266,7 +240,7 @@ impl DistanceNewton {
     }
 
     /// One Newton step; its length, or none if the system is singular.
-    fn step(&mut self, (a, b): &(At, At), flatness: &mut Flatness) -> Option<f64> {
+    fn step(&mut self, (a, b): &(At, At)) -> Option<f64> {
         let size = 7 + self.a.len + self.b.len;
         let mut m: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
         let scaled = a.hessian * self.distance;
@@ -305,7 +279,7 @@ impl DistanceNewton {
         let (dx, dy) = (Vector3::new(d[0], d[1], d[2]), Vector3::new(d[3], d[4], d[5]));
         let length = dx.norm().max(dy.norm());
         // Bodies have size 1 here: a longer step leaves where the linearization means anything.
-        let damping = (0.5 / length).min(flatness.stretch(length));
+        let damping = (0.5 / length).min(1.0);
         self.x += dx * damping;
         self.y += dy * damping;
         self.distance += d[6] * damping;
@@ -340,12 +314,11 @@ impl LevelNewton {
         }
         let mut s = self.start(pair);
         let mut last = f64::INFINITY;
-        let mut flatness = Flatness::default();
         for step in 1..=MAX_STEPS {
             if stop(step - 1) {
                 return step - 1;
             }
-            let Some(length) = self.step(pair, &mut s, &mut flatness) else {
+            let Some(length) = self.step(pair, &mut s) else {
                 // Where both are flat the system is singular, but the point at hand with its multipliers may do.
                 accept(self);
                 return step;
@@ -382,7 +355,7 @@ impl LevelNewton {
         a.value[..self.a.len].iter().sum::<f64>() / self.a.len as f64
     }
 
-    fn step(&mut self, pair: &Pair<'_>, s: &mut f64, flatness: &mut Flatness) -> Option<f64> {
+    fn step(&mut self, pair: &Pair<'_>, s: &mut f64) -> Option<f64> {
         let a = At::new(&pair.a, &self.a, &self.x);
         let b = At::new(&pair.b, &self.b, &self.x);
         let size = 4 + self.a.len + self.b.len;
@@ -415,7 +388,7 @@ impl LevelNewton {
         let d = solve(&mut m, size)?;
         let dx = Vector3::new(d[0], d[1], d[2]);
         let length = dx.norm();
-        let damping = (0.5 / length).min(flatness.stretch(length));
+        let damping = (0.5 / length).min(1.0);
         self.x += dx * damping;
         *s += d[3] * damping;
         for k in 0..self.a.len {

@@ -104,7 +104,8 @@ impl Posed<'_> {
                 return Some(point);
             }
             let gradient = worst.jet.gradient;
-            let step = gradient * (excess / gradient.norm_squared());
+            // Past the boundary by about the error that is paid for anyway, so that how rounding falls does not matter.
+            let step = gradient * ((excess + worst.nearby_value_error) / gradient.norm_squared());
             if !(step.norm() <= 0.1 * self.radius) {
                 break;
             }

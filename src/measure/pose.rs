@@ -9,11 +9,10 @@ const TOLERANCE: f64 = 1e-6;
 /// 1.5 epsilon.
 const NORMALISED: f64 = 2.0 * f64::EPSILON;
 
-/// Bound of the distance (operator norm) between the rotation matrix of a pose, as computed, and the exactly normalised
-/// rotation it stands for. The length of the quaternion is 1 within [`NORMALISED`] = 4 u and the 3 u of computing it, hence
-/// 14 u of the matrix, and each entry costs 8 u more: below 30 u in operator norm; the polar iteration and its conversion to
-/// a quaternion at most as much again.
-pub(super) const ROTATION_ERROR: f64 = 32.0 * f64::EPSILON;
+/// Bound of the distance (operator norm) between the rotation matrix of a pose, as computed, and the rotation of its quaternion
+/// normalised exactly, which is what the pose stands for. The length of the quaternion is 1 within [`NORMALISED`] = 4 u and
+/// the 3 u of computing it, hence 14 u of the matrix, and each entry costs 8 u more: below 30 u in operator norm.
+pub(super) const ROTATION_ERROR: f64 = 16.0 * f64::EPSILON;
 
 /// A rigid motion `x_world = R x_body + t`, lengths in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,7 +74,8 @@ impl Pose {
         Ok(Self { rotation, translation })
     }
 
-    /// Pose from a rotation matrix within 1e-6 of a rotation and a translation (m); the rotation used is the polar factor.
+    /// Pose from a rotation matrix within 1e-6 of a rotation and a translation (m); the rotation used is the quaternion of
+    /// the polar factor, rounded.
     ///
     /// # Errors
     /// Numbers that are not finite, or a matrix that is farther from its polar factor or a reflection.

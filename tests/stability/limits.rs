@@ -1,8 +1,9 @@
 //! Families about limits, hints and bad input: 2, 18, 25.
 
 use crate::bodies::{b, e, p, q, zoo};
-use crate::judge::{judged, judged_level, small, verdict, warm};
+use crate::judge::{judged, judged_level, plain, small, verdict, warm};
 use crate::random::{Seeded, pose, shifted};
+use crate::reference;
 use nalgebra::{DMatrix, Matrix3, UnitQuaternion, Vector3};
 use std::sync::atomic::AtomicBool;
 use sublevel::body::{Body, BodyError, Constraint, Normalization};
@@ -20,17 +21,29 @@ fn family_02_iteration_limit() {
         let sum = a.circumscribed().radius + b.circumscribed().radius;
         let reach = sum * random.between(0.2, 4.0);
         let (pose_a, pose_b) = (random.pose(0.2), random.pose(reach));
+        let full = plain((a, &pose_a), (b, &pose_b), &Options::default(), &format!("seed {seed}"));
+        let full_level = level_distance(a, &pose_a, b, &pose_b, &Options::default(), &mut WarmStart::default());
         for limit in 1..=3 {
             // The limit and the honest status are part of every verdict.
             let options = Options::default().with_max_iterations(limit).unwrap();
             let label = format!("seed {seed} limit {limit}");
-            let (answer, _) = judged((a, &pose_a), (b, &pose_b), &options, &label);
-            judged_level((a, &pose_a), (b, &pose_b), &options, &label);
+            let answer = plain((a, &pose_a), (b, &pose_b), &options, &label);
+            // The reference needs a start near the solution, which is what the limit denies.
+            let truth = reference::distance(a, &pose_a, b, &pose_b, &full);
+            assert!(truth.width() <= 1e-16 * small(a, b) && truth.inside(&answer), "{label}: {answer:?}");
+            let level = level_distance(a, &pose_a, b, &pose_b, &options, &mut WarmStart::default());
+            let truth = reference::level_distance(a, &pose_a, b, &pose_b, &full_level);
+            assert!(
+                truth.width() <= 1e-12 * truth.value().abs().max(1.0) && truth.inside(&level),
+                "{label}: {level:?}"
+            );
+            assert!(level.iterations <= limit, "{label}: {level:?}");
             *(if answer.status == Status::BracketWide { &mut wide } else { &mut narrow }) += 1;
         }
         let stop = AtomicBool::new(true);
         let options = Options::default().with_stop(&stop);
-        let (answer, _) = judged((a, &pose_a), (b, &pose_b), &options, &format!("seed {seed} stopped"));
+        let answer = plain((a, &pose_a), (b, &pose_b), &options, &format!("seed {seed} stopped"));
+        assert!(reference::distance(a, &pose_a, b, &pose_b, &full).inside(&answer), "seed {seed} stopped: {answer:?}");
         let level = level_distance(a, &pose_a, b, &pose_b, &options, &mut WarmStart::default());
         assert!(answer.iterations <= 1 && level.iterations <= 1, "stopped, yet {answer:?} {level:?}");
     }
