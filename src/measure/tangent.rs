@@ -24,26 +24,14 @@
 //! are the rows of the basis.
 
 use super::pose::{Pose, ROTATION_ERROR};
-use super::vector::{M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, dot, subtract, times_transposed};
+use super::vector::{M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, subtract, times_transposed};
 use crate::body::{Body, ConstraintTrust};
 use crate::polynomial::{NEAR_LEVEL, Number, NumberJet, Simd, gamma};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 /// Bound of the error of a relative rotation in operator norm: both rotations are off by at most [`ROTATION_ERROR`]; their
 /// product, its matrix and sums with it round a few times more.
 const TURNED: f64 = 2.0 * ROTATION_ERROR + gamma(40);
-
-/// The matrix by rows, the same in every lane.
-#[inline(always)]
-fn rows<S: Simd, N: Number<S>>(simd: S, m: &Matrix3<f64>) -> M3<N> {
-    let mut rows = [[N::splat(simd, 0.0); 3]; 3];
-    for i in 0..3 {
-        for j in 0..3 {
-            rows[i][j] = N::splat(simd, m[(i, j)]);
-        }
-    }
-    rows
-}
 
 /// Where B stands as seen from A.
 #[derive(Clone, Copy, Debug)]
@@ -131,6 +119,15 @@ impl<'a, N: Copy> Side<'a, N> {
     pub(super) fn away(body: &'a Body, active: usize, relative: &Relative<N>) -> Self {
         let Relative { linear, origin, displacement, .. } = *relative;
         Self { body, active, linear, origin, displacement }
+    }
+
+    /// A gradient by normalized coordinates as one by metres.
+    #[inline(always)]
+    pub(super) fn pulled_back<S: Simd>(&self, _: S, gradient: V3<N>) -> V3<N>
+    where
+        N: Number<S>,
+    {
+        apply_transposed(&self.linear, gradient)
     }
 
     #[inline(always)]
@@ -280,6 +277,32 @@ impl<N: Copy> Bend<N> {
     }
 }
 
+/// The constraint `2 (g - 1) / (g + 1) + 1` in place of g: the same set, and as it is nearly 1 + ln g, straighter along rays, so
+/// that Newton's method comes to the surface from farther away.
+#[inline(always)]
+pub(super) fn straightened<S: Simd, N: Number<S>>(simd: S, plane: &Plane<N>, bend: &Bend<N>) -> (Plane<N>, Bend<N>) {
+    let one = N::splat(simd, 1.0);
+    let half_sum = (plane.value + one) * N::splat(simd, 0.5);
+    // Deep inside there is nothing to straighten.
+    let inverse = one / half_sum.max(N::splat(simd, 0.25));
+    let first = inverse * inverse;
+    let second = -first * inverse;
+    let g = plane.gradient;
+    let (s0, s1) = (second * g[0], second * g[1]);
+    let (c, t) = (bend.curvature, bend.tilt);
+    (
+        Plane { value: (plane.value - one).mul_add(inverse, one), gradient: scaled(g, first) },
+        Bend {
+            curvature: [
+                first.mul_add(c[0], s0 * g[0]),
+                first.mul_add(c[1], s0 * g[1]),
+                first.mul_add(c[2], s1 * g[1]),
+            ],
+            tilt: [first.mul_add(t[0], s0 * g[2]), first.mul_add(t[1], s1 * g[2])],
+        },
+    )
+}
+
 /// A symmetric 2x2 matrix: entries 00, 01, 11.
 type Symmetric2<N> = [N; 3];
 
@@ -343,6 +366,21 @@ impl Step<f64> {
     pub(super) fn within(&self, longest: f64) -> bool {
         let square = |v: V3<f64>| v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
         square(self.dx).max(square(self.dy)) <= longest * longest
+    }
+}
+
+impl<N: Copy> Step<N> {
+    /// The step scaled to the length `longest` if it is longer, and its own length squared.
+    #[inline(always)]
+    pub(super) fn shortened<S: Simd>(self, simd: S, longest: f64) -> (Self, N)
+    where
+        N: Number<S>,
+    {
+        let square = dot(self.dx, self.dx).max(dot(self.dy, self.dy));
+        let most = N::splat(simd, longest);
+        let factor = most / square.sqrt().max(most);
+        let dn = [self.dn[0] * factor, self.dn[1] * factor];
+        (Self { dx: scaled(self.dx, factor), dy: scaled(self.dy, factor), dn }, square)
     }
 }
 

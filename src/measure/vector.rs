@@ -1,6 +1,7 @@
 //! Small vectors and matrices of [`Number`]s, which nalgebra's are not: a lane each, inlined into vectorised work.
 
 use crate::polynomial::{Number, Simd};
+use nalgebra::Matrix3;
 
 /// Three numbers.
 pub(super) type V3<N> = [N; 3];
@@ -40,6 +41,25 @@ pub(super) fn apply_transposed<S: Simd, N: Number<S>>(m: &M3<N>, v: V3<N>) -> V3
         result = add_scaled(result, *factor, *row);
     }
     result
+}
+
+/// The vector of length 1 along v.
+#[inline(always)]
+pub(super) fn normalized<S: Simd, N: Number<S>>(simd: S, v: V3<N>) -> V3<N> {
+    let inverse = N::splat(simd, 1.0) / dot(v, v).sqrt();
+    [v[0] * inverse, v[1] * inverse, v[2] * inverse]
+}
+
+/// The matrix by rows, the same in every lane.
+#[inline(always)]
+pub(super) fn rows<S: Simd, N: Number<S>>(simd: S, m: &Matrix3<f64>) -> M3<N> {
+    let mut rows = [[N::splat(simd, 0.0); 3]; 3];
+    for i in 0..3 {
+        for j in 0..3 {
+            rows[i][j] = N::splat(simd, m[(i, j)]);
+        }
+    }
+    rows
 }
 
 /// `M Nᵀ`.

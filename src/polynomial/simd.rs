@@ -48,6 +48,8 @@ pub trait Number<S: Simd>:
     fn select(self, mask: Self::Mask, other: Self) -> Self;
     /// Sums over the rows k of a table of `table[k][i] powers[k]`, for each of the ten entries i.
     fn contract<const K: usize>(simd: S, table: &[Row; K], powers: &[Self; K]) -> [Self; ENTRIES];
+    /// The rows of a table at whole-numbered places; the last one beyond its end, the first one for what is not a number.
+    fn gather<const K: usize>(simd: S, table: &[[f64; K]], place: Self) -> [Self; K];
 }
 
 impl<S: Simd> Number<S> for f64 {
@@ -113,7 +115,14 @@ impl<S: Simd> Number<S> for f64 {
         sums.copy_from_slice(&stored.0[..ENTRIES]);
         sums
     }
+    #[inline(always)]
+    fn gather<const K: usize>(_: S, table: &[[f64; K]], place: Self) -> [Self; K] {
+        table[(place as usize).min(table.len() - 1)]
+    }
 }
+
+/// Most lanes of any processor served.
+pub const MAX_LANES: usize = 8;
 
 /// As many doubles side by side as fit a vector.
 #[derive(Clone, Copy, Debug)]
@@ -133,6 +142,18 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     pub fn store(self, target: &mut [f64]) {
         S::as_mut_simd_f64s(&mut target[..S::F64_LANES]).0[0] = self.values;
+    }
+
+    /// The lanes where the mask holds, as bits.
+    #[inline(always)]
+    pub fn bits(simd: S, mask: S::m64s) -> u32 {
+        let mut ones = [0.0; MAX_LANES];
+        Self::splat(simd, 1.0).select(mask, Self::splat(simd, 0.0)).store(&mut ones);
+        let mut bits = 0;
+        for (lane, one) in ones.iter().enumerate() {
+            bits |= u32::from(*one != 0.0) << lane;
+        }
+        bits
     }
 }
 
@@ -206,5 +227,22 @@ impl<S: Simd> Number<S> for Lanes<S> {
             }
         }
         sums
+    }
+    #[inline(always)]
+    fn gather<const K: usize>(simd: S, table: &[[f64; K]], place: Self) -> [Self; K] {
+        let mut places = [0.0; MAX_LANES];
+        place.store(&mut places);
+        let mut columns = [[0.0; MAX_LANES]; K];
+        for (lane, place) in places[..S::F64_LANES].iter().enumerate() {
+            let row = &table[(*place as usize).min(table.len() - 1)];
+            for (column, entry) in columns.iter_mut().zip(row) {
+                column[lane] = *entry;
+            }
+        }
+        let mut result = [place; K];
+        for (result, column) in result.iter_mut().zip(&columns) {
+            *result = Self::load(simd, column);
+        }
+        result
     }
 }

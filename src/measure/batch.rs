@@ -1,0 +1,410 @@
+//! Distances of one pair at many poses at once, a pose in each lane of the vectors.
+//!
+//! All poses are solved cold: the start of [`super::start`], the first Newton step from the marks of the outlines, then rounds
+//! of evaluation and step until the bracket is narrow. A group of poses goes through a few rounds together; the poses that
+//! need more wait until there is a group of them, so that the slowest does not hold up the others. A lane computes from its
+//! own pose only and selects where a single query would branch, so that no answer depends on the other poses of the batch.
+
+use super::Status;
+use super::active::ActiveConstraints;
+use super::distance::{Distance, distance};
+use super::options::Options;
+use super::pose::Pose;
+use super::smooth::{LONGEST, WORTH_A_BRACKET};
+use super::start::facing;
+use super::tangent::{Bend, Plane, Relative, Side, Step, bracket, moved, newton, straightened};
+use super::vector::{M3, V3, add_scaled, apply, apply_transposed, basis, dot, normalized, rows, subtract};
+use super::warm::WarmStart;
+use crate::body::{Body, Outline, Solid};
+use crate::polynomial::{Lanes, MAX_LANES, Number, NumberJet, Simd, WithSimd, dispatch};
+use nalgebra::Vector3;
+
+/// Why a batch is refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BatchError {
+    /// No poses.
+    #[error("the batch is empty; give at least one pose")]
+    Empty,
+    /// Not a place for every answer.
+    #[error("{poses} poses but places for {answers} answers; give one place for each pose")]
+    Lengths {
+        /// Number of poses.
+        poses: usize,
+        /// Number of places for answers.
+        answers: usize,
+    },
+}
+
+/// Euclidean distances between solid `a` at `pose_a` and solid `b` at each of `poses_b` (body to world), written to `answers` in
+/// the order of the poses.
+///
+/// Each answer is one of [`distance`] from a cold start in all that is proven of it, and depends on its own pose only, to the
+/// last bit. Single bodies of one constraint are solved several poses at a time, which takes a fraction of the time of as
+/// many queries; all others, and poses that do not converge at once such as those in contact, are solved one by one.
+///
+/// # Errors
+/// No poses, or a number of places that is not the number of poses; nothing is computed then.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use sublevel::body::Body;
+/// use sublevel::measure::{Distance, Options, Pose, distance_batch};
+///
+/// let ball = Body::ball("ball", Vector3::zeros(), 0.5)?;
+/// let egg = Body::ellipsoid("egg", Vector3::zeros(), Vector3::new(1.0, 0.8, 0.6))?;
+/// let along = |x: f64| Pose::from_quaternion(Vector3::new(x, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0]);
+/// let poses = [along(2.0)?, along(3.0)?, along(4.0)?];
+/// let mut answers = [Distance::default(); 3];
+/// distance_batch(&egg, &Pose::identity(), &ball, &poses, &Options::default(), &mut answers)?;
+/// for (answer, gap) in answers.iter().zip([0.5, 1.5, 2.5]) {
+///     assert!((answer.value() - gap).abs() < 1e-8);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn distance_batch(
+    a: &impl Solid,
+    pose_a: &Pose,
+    b: &impl Solid,
+    poses_b: &[Pose],
+    options: &Options<'_>,
+    answers: &mut [Distance],
+) -> Result<(), BatchError> {
+    if poses_b.len() != answers.len() {
+        return Err(BatchError::Lengths { poses: poses_b.len(), answers: answers.len() });
+    }
+    if poses_b.is_empty() {
+        return Err(BatchError::Empty);
+    }
+    answers.fill(Distance::default());
+    if let ([a], [b]) = (a.parts(), b.parts())
+        && a.constraints().len() == 1
+        && b.constraints().len() == 1
+        && options.max_iterations() >= MOST_ROUNDS
+    {
+        in_lanes((a, pose_a), (b, poses_b), options, answers);
+    }
+    for (answer, pose_b) in answers.iter_mut().zip(poses_b).filter(|(answer, _)| answer.upper.is_infinite()) {
+        *answer = distance(a, pose_a, b, pose_b, options, &mut WarmStart::default());
+    }
+    Ok(())
+}
+
+/// Answers what can be answered several poses at a time.
+fn in_lanes((a, pose_a): (&Body, &Pose), (b, poses_b): (&Body, &[Pose]), options: &Options<'_>, answers: &mut [Distance]) {
+    let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
+    dispatch(Batch { a, pose_a, b, poses_b, options, tolerance, answers });
+}
+
+/// Rounds that a group of poses goes through together.
+const ROUNDS: u32 = 3;
+
+/// Most rounds of a pose before it is solved alone.
+const MOST_ROUNDS: u32 = 10;
+
+/// A batch as work for the widest arithmetic. Answers stay as they are where a pose is to be solved alone.
+struct Batch<'a> {
+    a: &'a Body,
+    pose_a: &'a Pose,
+    b: &'a Body,
+    poses_b: &'a [Pose],
+    options: &'a Options<'a>,
+    tolerance: f64,
+    answers: &'a mut [Distance],
+}
+
+impl WithSimd for Batch<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let lanes = S::F64_LANES;
+        let mut waiting = Waiting::default();
+        let mut next = 0;
+        while (next < self.poses_b.len() || waiting.len > 0) && !self.options.exhausted(0) {
+            let left = self.poses_b.len() - next;
+            let fresh = waiting.len < lanes && left > 0;
+            let mut group = Group { count: lanes.min(if fresh { left } else { waiting.len }), ..Group::default() };
+            if fresh {
+                // Lanes to spare solve the last pose once more.
+                for lane in 0..lanes {
+                    group.pose[lane] = next + lane.min(group.count - 1);
+                }
+                next += group.count;
+            } else {
+                waiting.fill(&mut group, lanes);
+            }
+            self.solve(simd, &mut group, fresh, &mut waiting);
+        }
+    }
+}
+
+/// Poses of the batch in lanes.
+#[derive(Default)]
+struct Group {
+    /// Lanes in use.
+    count: usize,
+    /// Index of the pose.
+    pose: [usize; MAX_LANES],
+    /// Rounds that are behind it.
+    rounds: [u32; MAX_LANES],
+    /// Coordinates of x, y and n where rounds are behind it.
+    at: [[f64; MAX_LANES]; 9],
+}
+
+/// Poses that need more rounds.
+#[derive(Default)]
+struct Waiting {
+    len: usize,
+    entries: [(usize, u32, [f64; 9]); 2 * MAX_LANES],
+}
+
+impl Waiting {
+    #[inline(always)]
+    fn push(&mut self, entry: (usize, u32, [f64; 9])) {
+        self.entries[self.len] = entry;
+        self.len += 1;
+    }
+
+    /// Moves the last entries to the group; lanes to spare get the first of them once more.
+    #[inline(always)]
+    fn fill(&mut self, group: &mut Group, lanes: usize) {
+        self.len -= group.count;
+        for lane in 0..lanes {
+            let (pose, rounds, at) = self.entries[self.len + if lane < group.count { lane } else { 0 }];
+            group.pose[lane] = pose;
+            group.rounds[lane] = rounds;
+            for (column, entry) in group.at.iter_mut().zip(at) {
+                column[lane] = entry;
+            }
+        }
+    }
+}
+
+/// Trial points and normal.
+#[derive(Clone, Copy)]
+struct Iterate<N> {
+    x: V3<N>,
+    y: V3<N>,
+    n: V3<N>,
+}
+
+/// A Newton step with the bases it was made in.
+struct Linearized<N> {
+    frame: M3<N>,
+    local: (M3<N>, M3<N>),
+    difference: V3<N>,
+    step: Step<N>,
+    /// Square of the length of the step before it was shortened.
+    square: N,
+}
+
+impl<N: Copy> Iterate<N> {
+    #[inline(always)]
+    fn linearize<S: Simd>(
+        &self,
+        simd: S,
+        (side_a, jet_a): (&Side<'_, N>, &NumberJet<N>),
+        (side_b, jet_b): (&Side<'_, N>, &NumberJet<N>),
+        longest: f64,
+    ) -> Linearized<N>
+    where
+        N: Number<S>,
+    {
+        let frame = basis(simd, self.n);
+        let local = (side_a.localize(simd, &frame), side_b.localize(simd, &frame));
+        let (a, b) = (Plane::new(simd, jet_a, &local.0), Plane::new(simd, jet_b, &local.1));
+        let (bend_a, bend_b) = (Bend::new(simd, jet_a, &local.0), Bend::new(simd, jet_b, &local.1));
+        let (a, bend_a) = straightened(simd, &a, &bend_a);
+        let (b, bend_b) = straightened(simd, &b, &bend_b);
+        let difference = apply(&frame, subtract(self.x, self.y));
+        let zero = N::splat(simd, 0.0);
+        let (step, square) = newton(simd, (&a, &bend_a), (&b, &bend_b), difference, zero).shortened(simd, longest);
+        Linearized { frame, local, difference, step, square }
+    }
+
+    #[inline(always)]
+    fn advance<S: Simd>(&mut self, simd: S, Linearized { frame, step, .. }: &Linearized<N>)
+    where
+        N: Number<S>,
+    {
+        self.x = moved(self.x, step.dx, frame);
+        self.y = moved(self.y, step.dy, frame);
+        let turned = add_scaled(add_scaled(self.n, step.dn[0], frame[0]), step.dn[1], frame[1]);
+        self.n = normalized(simd, turned);
+    }
+
+    /// Takes the direction halfway between the normals of the surfaces for n, unless they face the same way.
+    #[inline(always)]
+    fn face<S: Simd>(&mut self, simd: S, gradient_a: V3<N>, gradient_b: V3<N>)
+    where
+        N: Number<S>,
+    {
+        let (a, b) = (normalized(simd, gradient_a), normalized(simd, gradient_b));
+        let middle = subtract(b, a);
+        let square = dot(middle, middle);
+        let apart = N::splat(simd, 0.25).le(square);
+        let inverse = N::splat(simd, 1.0) / square.sqrt();
+        for i in 0..3 {
+            self.n[i] = (middle[i] * inverse).select(apart, self.n[i]);
+        }
+    }
+}
+
+impl Batch<'_> {
+    /// A few rounds of a group: writes the answers that get proven and lets the others wait.
+    #[inline(always)]
+    fn solve<S: Simd>(&mut self, simd: S, group: &mut Group, fresh: bool, waiting: &mut Waiting) {
+        let splat = |value: f64| Lanes::<S>::splat(simd, value);
+        let relative = self.relative(simd, &group.pose);
+        let side_a = Side::at_home(simd, self.a, 0);
+        let side_b = Side::away(self.b, 0, &relative);
+        let longest = LONGEST * self.a.trust().reach.min(self.b.trust().reach);
+        let worth = WORTH_A_BRACKET * longest;
+        let mut at = if fresh {
+            let n = facing(simd, self.a, self.b, &relative);
+            let own = apply_transposed(&relative.rotation, n);
+            let mark_a = self.a.outline().mark(simd, Outline::place(simd, [-n[0], -n[1], -n[2]]));
+            let mark_b = self.b.outline().mark(simd, Outline::place(simd, own));
+            let y = add_scaled(relative.origin, splat(1.0), apply(&relative.rotation, mark_b.point));
+            let mut at = Iterate { x: mark_a.point, y, n };
+            let first = at.linearize(simd, (&side_a, &mark_a.jet), (&side_b, &mark_b.jet), longest);
+            at.advance(simd, &first);
+            at
+        } else {
+            let column = |i: usize| Lanes::load(simd, &group.at[i]);
+            Iterate {
+                x: [column(0), column(1), column(2)],
+                y: [column(3), column(4), column(5)],
+                n: [column(6), column(7), column(8)],
+            }
+        };
+        let mut open = (1_u32 << group.count) - 1;
+        for round in 1..=if fresh { ROUNDS } else { 1 } {
+            let ((jet_a, inside_a), (jet_b, inside_b)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
+            if fresh && round == 1 {
+                // The first step may have led to where the surfaces face otherwise.
+                let (a, b) = (side_a.pulled_back(simd, jet_a.gradient), side_b.pulled_back(simd, jet_b.gradient));
+                at.face(simd, a, b);
+            }
+            let here = at.linearize(simd, (&side_a, &jet_a), (&side_b, &jet_b), longest);
+            let inside = Lanes::and(simd, inside_a, inside_b);
+            let short = Lanes::and(simd, inside, here.square.le(splat(worth * worth)));
+            if Lanes::bits(simd, short) & open != 0 {
+                let next_a = side_a.extrapolate(simd, &jet_a, &here.local.0, here.step.dx);
+                let next_b = side_b.extrapolate(simd, &jet_b, &here.local.1, here.step.dy);
+                let next = subtract(add_scaled(here.difference, splat(1.0), here.step.dx), here.step.dy);
+                let found = bracket(simd, (&side_a, &next_a), (&side_b, &next_b), next);
+                let enough = splat(self.tolerance).max(found.rounding * splat(4.0));
+                let narrow = Lanes::and(simd, short, (found.upper - found.lower).le(enough));
+                let proven = Lanes::bits(simd, Lanes::and(simd, narrow, splat(f64::MIN_POSITIVE).le(found.lower))) & open;
+                if proven != 0 {
+                    let step = |by: V3<_>, to: V3<_>| add_scaled(by, splat(1.0), to);
+                    let x = moved(at.x, step(here.step.dx, found.to_a), &here.frame);
+                    let y = moved(at.y, step(here.step.dy, found.to_b), &here.frame);
+                    let n = apply_transposed(&here.frame, found.normal);
+                    self.write(simd, group, proven, round, (found.lower, found.upper), found.multipliers, [x, y, n]);
+                    open &= !proven;
+                    if open == 0 {
+                        return;
+                    }
+                }
+            }
+            at.advance(simd, &here);
+        }
+        for (i, coordinate) in [at.x, at.y, at.n].as_flattened().iter().enumerate() {
+            coordinate.store(&mut group.at[i]);
+        }
+        for lane in 0..group.count {
+            let rounds = group.rounds[lane] + if fresh { ROUNDS } else { 1 };
+            if open >> lane & 1 == 1 && rounds < MOST_ROUNDS {
+                let mut entry = [0.0; 9];
+                for (entry, column) in entry.iter_mut().zip(&group.at) {
+                    *entry = column[lane];
+                }
+                waiting.push((group.pose[lane], rounds, entry));
+            }
+        }
+    }
+
+    /// B at the poses as seen from A.
+    #[inline(always)]
+    fn relative<S: Simd>(&self, simd: S, poses: &[usize; MAX_LANES]) -> Relative<Lanes<S>> {
+        let mut columns = [[0.0; MAX_LANES]; 7];
+        for lane in 0..S::F64_LANES {
+            let pose = &self.poses_b[poses[lane]];
+            let q = &pose.rotation().coords;
+            // Differences of translations are exact to one rounding, however far from the world origin.
+            let t = pose.translation() - self.pose_a.translation();
+            for (column, entry) in columns.iter_mut().zip([q.x, q.y, q.z, q.w, t.x, t.y, t.z]) {
+                column[lane] = entry;
+            }
+        }
+        let splat = |value: f64| Lanes::<S>::splat(simd, value);
+        let column = |i: usize| Lanes::load(simd, &columns[i]);
+        let own = &self.pose_a.rotation().coords;
+        let (u, v) = ([splat(-own.x), splat(-own.y), splat(-own.z)], [column(0), column(1), column(2)]);
+        let (u_w, v_w) = (splat(own.w), column(3));
+        // The product of the conjugate of A's quaternion with B's.
+        let w = u_w * v_w - dot(u, v);
+        let i = u_w.mul_add(v[0], v_w * u[0]) + (u[1] * v[2] - u[2] * v[1]);
+        let j = u_w.mul_add(v[1], v_w * u[1]) + (u[2] * v[0] - u[0] * v[2]);
+        let k = u_w.mul_add(v[2], v_w * u[2]) + (u[0] * v[1] - u[1] * v[0]);
+        let (ww, ii, jj, kk) = (w * w, i * i, j * j, k * k);
+        let two = splat(2.0);
+        let (ij, ik, jk) = (two * i * j, two * i * k, two * j * k);
+        let (wi, wj, wk) = (two * w * i, two * w * j, two * w * k);
+        let rotation = [
+            [ww + ii - jj - kk, ij - wk, wj + ik],
+            [wk + ij, ww - ii + jj - kk, jk - wi],
+            [ik - wj, wi + jk, ww - ii - jj + kk],
+        ];
+        let frame = rows(simd, self.pose_a.rotation().to_rotation_matrix().matrix());
+        let translation = apply_transposed(&frame, [column(4), column(5), column(6)]);
+        Relative::from_parts(simd, self.a, rotation, translation, self.b)
+    }
+
+    /// Writes the answers of the lanes that are set in `proven`.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    fn write<S: Simd>(
+        &mut self,
+        simd: S,
+        group: &Group,
+        proven: u32,
+        round: u32,
+        (lower, upper): (Lanes<S>, Lanes<S>),
+        [of_a, of_b]: [Lanes<S>; 2],
+        [x, y, n]: [V3<Lanes<S>>; 3],
+    ) {
+        let frame = rows(simd, self.pose_a.rotation().to_rotation_matrix().matrix());
+        let place = self.pose_a.transform_point(&self.a.normalization().center);
+        let splat = |value: f64| Lanes::<S>::splat(simd, value);
+        let place = [splat(place.x), splat(place.y), splat(place.z)];
+        let to_world = |v: V3<_>| add_scaled(place, splat(1.0), apply(&frame, v));
+        let (x, y, n) = (to_world(x), to_world(y), apply(&frame, n));
+        let mut columns = [[0.0; MAX_LANES]; 13];
+        let numbers = [lower, upper, of_a, of_b, x[0], x[1], x[2], y[0], y[1], y[2], n[0], n[1], n[2]];
+        for (number, column) in numbers.into_iter().zip(&mut columns) {
+            number.store(column);
+        }
+        for lane in 0..group.count {
+            if proven >> lane & 1 == 0 {
+                continue;
+            }
+            let entry = |i: usize| columns[i][lane];
+            let vector = |i: usize| Vector3::new(entry(i), entry(i + 1), entry(i + 2));
+            let narrow = entry(1) - entry(0) <= self.tolerance;
+            self.answers[group.pose[lane]] = Distance {
+                status: if narrow { Status::Converged } else { Status::BracketWide },
+                lower: entry(0),
+                upper: entry(1),
+                witness_a: vector(4),
+                witness_b: vector(7),
+                normal: Some(vector(10)),
+                active_a: ActiveConstraints::single(0, entry(2)),
+                active_b: ActiveConstraints::single(0, entry(3)),
+                iterations: group.rounds[lane] + round,
+            };
+        }
+    }
+}
