@@ -93,13 +93,7 @@ impl Outline {
         let face = axis + splat(0.0).select(splat(0.0).le(along), splat(1.0));
         let half = splat(0.5 * CELLS as f64);
         let scale = half / along.abs();
-        // Adding so much leaves no room for fractions; which side ties go to is of no matter.
-        let whole = splat(1.5 / f64::EPSILON);
-        let cell = |across: N| {
-            let rounded = (across.mul_add(scale, half) - splat(0.5) + whole) - whole;
-            rounded.max(splat(0.0)).min(splat(CELLS as f64 - 1.0))
-        };
-        let (i, j) = (cell(first), cell(second));
+        let (i, j) = (cell(simd, first, scale), cell(simd, second, scale));
         let cells = splat(CELLS as f64);
         face.mul_add(cells, i).mul_add(cells, j)
     }
@@ -117,6 +111,15 @@ impl Outline {
     pub fn active(&self, place: f64) -> usize {
         usize::from(self.active[(place as usize).min(self.active.len() - 1)])
     }
+}
+
+/// Which cell along one edge of a face.
+#[inline(always)]
+fn cell<S: Simd, N: Number<S>>(simd: S, across: N, scale: N) -> N {
+    // Adding so much leaves no room for fractions; which side ties go to is of no matter.
+    let whole = N::splat(simd, 1.5 / f64::EPSILON);
+    let rounded = (across.mul_add(scale, N::splat(simd, 0.5 * CELLS as f64 - 0.5)) + whole) - whole;
+    rounded.max(N::splat(simd, 0.0)).min(N::splat(simd, CELLS as f64 - 1.0))
 }
 
 /// The point of the body farthest along `e` (normalized coordinates), by Newton's method on `e = ν ∇g`, `g = 1`. None where it
@@ -183,16 +186,16 @@ mod tests {
     /// Marks for directions, in lanes.
     struct Look<'a> {
         body: &'a Body,
-        directions: [[f64; 8]; 3],
+        directions: [[f64; 16]; 3],
     }
 
     impl WithSimd for Look<'_> {
-        type Output = [[f64; 8]; 2];
+        type Output = [[f64; 16]; 2];
 
         #[inline(always)]
         fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-            let mut found = [[0.0; 8]; 2];
-            for start in (0..8).step_by(S::F64_LANES) {
+            let mut found = [[0.0; 16]; 2];
+            for start in (0..16).step_by(Lanes::<S>::COUNT) {
                 let direction = self.directions.map(|row| Lanes::load(simd, &row[start..]));
                 let mark = self.body.outline().mark(simd, Outline::place(simd, direction));
                 mark.point[1].store(&mut found[0][start..]);
@@ -207,10 +210,10 @@ mod tests {
         let body = Body::superellipsoid("q6", Vector3::zeros(), Vector3::new(1.0, 0.7, 0.4), 6).unwrap();
         let mut random = Seeded(5);
         for _ in 0..200 {
-            let mut directions = [[0.0; 8]; 3];
+            let mut directions = [[0.0; 16]; 3];
             directions.iter_mut().flatten().for_each(|entry| *entry = random.signed());
             let found = dispatch(Look { body: &body, directions });
-            for lane in 0..8 {
+            for lane in 0..16 {
                 let place = Outline::place::<_, f64>(Scalar, directions.map(|row| row[lane]));
                 let mark = body.outline().mark::<_, f64>(Scalar, place);
                 assert_eq!([mark.point[1], mark.jet.hessian[5]], [found[0][lane], found[1][lane]]);

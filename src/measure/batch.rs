@@ -13,7 +13,7 @@ use super::pose::Pose;
 use super::smooth::{LONGEST, WORTH_A_BRACKET};
 use super::start::facing;
 use super::tangent::{Bend, Plane, Relative, Side, Step, bracket, moved, newton, straightened};
-use super::vector::{M3, V3, add_scaled, apply, apply_transposed, basis, dot, normalized, rows, subtract};
+use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, normalized, rows, subtract};
 use super::warm::WarmStart;
 use crate::body::{Body, Outline, Solid};
 use crate::polynomial::{Lanes, MAX_LANES, Number, NumberJet, Simd, WithSimd, dispatch};
@@ -117,7 +117,7 @@ impl WithSimd for Batch<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        let lanes = S::F64_LANES;
+        let lanes = Lanes::<S>::COUNT;
         let mut waiting = Waiting::default();
         let mut next = 0;
         while (next < self.poses_b.len() || waiting.len > 0) && !self.options.exhausted(0) {
@@ -265,7 +265,7 @@ impl Batch<'_> {
             let own = apply_transposed(&relative.rotation, n);
             let mark_a = self.a.outline().mark(simd, Outline::place(simd, [-n[0], -n[1], -n[2]]));
             let mark_b = self.b.outline().mark(simd, Outline::place(simd, own));
-            let y = add_scaled(relative.origin, splat(1.0), apply(&relative.rotation, mark_b.point));
+            let y = add(relative.origin, apply(&relative.rotation, mark_b.point));
             let mut at = Iterate { x: mark_a.point, y, n };
             let first = at.linearize(simd, (&side_a, &mark_a.jet), (&side_b, &mark_b.jet), longest);
             at.advance(simd, &first);
@@ -292,15 +292,14 @@ impl Batch<'_> {
             if Lanes::bits(simd, short) & open != 0 {
                 let next_a = side_a.extrapolate(simd, &jet_a, &here.local.0, here.step.dx);
                 let next_b = side_b.extrapolate(simd, &jet_b, &here.local.1, here.step.dy);
-                let next = subtract(add_scaled(here.difference, splat(1.0), here.step.dx), here.step.dy);
+                let next = subtract(add(here.difference, here.step.dx), here.step.dy);
                 let found = bracket(simd, (&side_a, &next_a), (&side_b, &next_b), next);
                 let enough = splat(self.tolerance).max(found.rounding * splat(4.0));
                 let narrow = Lanes::and(simd, short, (found.upper - found.lower).le(enough));
                 let proven = Lanes::bits(simd, Lanes::and(simd, narrow, splat(f64::MIN_POSITIVE).le(found.lower))) & open;
                 if proven != 0 {
-                    let step = |by: V3<_>, to: V3<_>| add_scaled(by, splat(1.0), to);
-                    let x = moved(at.x, step(here.step.dx, found.to_a), &here.frame);
-                    let y = moved(at.y, step(here.step.dy, found.to_b), &here.frame);
+                    let x = moved(at.x, add(here.step.dx, found.to_a), &here.frame);
+                    let y = moved(at.y, add(here.step.dy, found.to_b), &here.frame);
                     let n = apply_transposed(&here.frame, found.normal);
                     self.write(simd, group, proven, round, (found.lower, found.upper), found.multipliers, [x, y, n]);
                     open &= !proven;
@@ -330,7 +329,7 @@ impl Batch<'_> {
     #[inline(always)]
     fn relative<S: Simd>(&self, simd: S, poses: &[usize; MAX_LANES]) -> Relative<Lanes<S>> {
         let mut columns = [[0.0; MAX_LANES]; 7];
-        for lane in 0..S::F64_LANES {
+        for lane in 0..Lanes::<S>::COUNT {
             let pose = &self.poses_b[poses[lane]];
             let q = &pose.rotation().coords;
             // Differences of translations are exact to one rounding, however far from the world origin.
@@ -380,8 +379,7 @@ impl Batch<'_> {
         let place = self.pose_a.transform_point(&self.a.normalization().center);
         let splat = |value: f64| Lanes::<S>::splat(simd, value);
         let place = [splat(place.x), splat(place.y), splat(place.z)];
-        let to_world = |v: V3<_>| add_scaled(place, splat(1.0), apply(&frame, v));
-        let (x, y, n) = (to_world(x), to_world(y), apply(&frame, n));
+        let (x, y, n) = (add(place, apply(&frame, x)), add(place, apply(&frame, y)), apply(&frame, n));
         let mut columns = [[0.0; MAX_LANES]; 13];
         let numbers = [lower, upper, of_a, of_b, x[0], x[1], x[2], y[0], y[1], y[2], n[0], n[1], n[2]];
         for (number, column) in numbers.into_iter().zip(&mut columns) {

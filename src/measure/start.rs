@@ -12,7 +12,7 @@
 //! outlines of the bodies have marks with all that Newton's method on the bodies themselves needs for its first step.
 
 use super::tangent::Relative;
-use super::vector::{V3, apply, dot, normalized, rows, times_transposed};
+use super::vector::{V3, add_scaled, apply, dot, normalized, rows, scaled, times_transposed};
 use crate::body::Body;
 use crate::polynomial::{Number, Simd};
 
@@ -21,6 +21,9 @@ const TURNS: usize = 2;
 
 /// Least distance that n is turned for, relative to the widths of the ellipsoids.
 const LEAST: f64 = 1e-3;
+
+/// Largest turn, tangent of the angle.
+const MOST: f64 = 0.5;
 
 /// The unit vector from B to A across the gap of the ellipsoids that stand for them, in A's frame.
 #[inline(always)]
@@ -40,25 +43,21 @@ pub(super) fn facing<S: Simd, N: Number<S>>(simd: S, a: &Body, b: &Body, relativ
         }
         let distance = dot(n, w);
         let least = distance.max((wide_a + wide_b) * N::splat(simd, LEAST));
-        let (cube_a, cube_b) = (of_a * of_a * of_a, of_b * of_b * of_b);
-        let entry = |i: usize, j: usize| {
+        let (scaled_a, scaled_b) = (scaled(u, of_a * of_a * of_a), scaled(v, of_b * of_b * of_b));
+        let mut matrix = [least; 6];
+        for (entry, (i, j)) in matrix.iter_mut().zip([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]) {
             let straight = of_a.mul_add(shape_a[i][j], of_b * shape_b[i][j]);
-            straight - (cube_a * u[i]).mul_add(u[j], cube_b * v[i] * v[j])
-        };
-        let matrix = [
-            entry(0, 0) + least,
-            entry(0, 1),
-            entry(0, 2),
-            entry(1, 1) + least,
-            entry(1, 2),
-            entry(2, 2) + least,
-        ];
+            let bent = scaled_a[i].mul_add(u[j], scaled_b[i] * v[j]);
+            *entry = if i == j { least + straight - bent } else { straight - bent };
+        }
         let mut residual = w;
         for i in 0..3 {
             residual[i] = w[i] - distance * n[i];
         }
         let turn = solve(simd, &matrix, residual);
-        n = normalized(simd, [n[0] + turn[0], n[1] + turn[1], n[2] + turn[2]]);
+        let most = N::splat(simd, MOST);
+        let factor = most / dot(turn, turn).sqrt().max(most);
+        n = normalized(simd, add_scaled(n, factor, turn));
     }
     n
 }

@@ -24,7 +24,7 @@
 //! are the rows of the basis.
 
 use super::pose::{Pose, ROTATION_ERROR};
-use super::vector::{M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, subtract, times_transposed};
+use super::vector::{M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, scaled, subtract, times_transposed};
 use crate::body::{Body, ConstraintTrust};
 use crate::polynomial::{NEAR_LEVEL, Number, NumberJet, Simd, gamma};
 use nalgebra::Vector3;
@@ -398,13 +398,7 @@ pub(super) fn newton<S: Simd, N: Number<S>>(
     let one = N::splat(simd, 1.0);
     let (of_a, of_b) = (-one / a.gradient[2], one / b.gradient[2]);
     let (shift_a, shift_b) = ((a.value - one) * of_a, (one - b.value) * of_b);
-    let right = |plane: &Plane<N>, bend: &Bend<N>, multiplier: N, shift: N| {
-        [
-            -multiplier * shift.mul_add(bend.tilt[0], plane.gradient[0]),
-            -multiplier * shift.mul_add(bend.tilt[1], plane.gradient[1]),
-        ]
-    };
-    let (right_a, right_b) = (right(a, bend_a, of_a, shift_a), right(b, bend_b, of_b, shift_b));
+    let (right_a, right_b) = (right_side(a, bend_a, of_a, shift_a), right_side(b, bend_b, of_b, shift_b));
     let (w_a, w_b) = (scaled(bend_a.curvature, of_a), scaled(bend_b.curvature, of_b));
     let distance = difference[2] + shift_a - shift_b;
     let tau = [difference[0], difference[1]];
@@ -428,6 +422,15 @@ pub(super) fn newton<S: Simd, N: Number<S>>(
         dy: [beta[0], beta[1], shift_b - along_b],
         dn: [right_a[0] - bent[0], right_a[1] - bent[1]],
     }
+}
+
+/// `-λ Tᵀ(g + a H n)`.
+#[inline(always)]
+fn right_side<S: Simd, N: Number<S>>(plane: &Plane<N>, bend: &Bend<N>, multiplier: N, shift: N) -> [N; 2] {
+    [
+        -multiplier * shift.mul_add(bend.tilt[0], plane.gradient[0]),
+        -multiplier * shift.mul_add(bend.tilt[1], plane.gradient[1]),
+    ]
 }
 
 /// A proven bracket of the distance with the points that attain the upper bound, in the basis from the trial points on.
@@ -620,11 +623,6 @@ impl<N: Copy> Bound<N> {
         let anywhere = off * off / (splat(2.0) * self.floor * multiplier);
         here.min(anywhere).min(off * self.span)
     }
-}
-
-#[inline(always)]
-fn scaled<S: Simd, N: Number<S>>(v: V3<N>, s: N) -> V3<N> {
-    [v[0] * s, v[1] * s, v[2] * s]
 }
 
 /// A point moved by a step in the basis.

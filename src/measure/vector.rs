@@ -21,6 +21,18 @@ pub(super) fn add_scaled<S: Simd, N: Number<S>>(a: V3<N>, s: N, b: V3<N>) -> V3<
     [s.mul_add(b[0], a[0]), s.mul_add(b[1], a[1]), s.mul_add(b[2], a[2])]
 }
 
+/// `s v`.
+#[inline(always)]
+pub(super) fn scaled<S: Simd, N: Number<S>>(v: V3<N>, s: N) -> V3<N> {
+    [v[0] * s, v[1] * s, v[2] * s]
+}
+
+/// `a + b`.
+#[inline(always)]
+pub(super) fn add<S: Simd, N: Number<S>>(a: V3<N>, b: V3<N>) -> V3<N> {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
 /// `a - b`.
 #[inline(always)]
 pub(super) fn subtract<S: Simd, N: Number<S>>(a: V3<N>, b: V3<N>) -> V3<N> {
