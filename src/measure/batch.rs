@@ -12,8 +12,8 @@ use super::options::Options;
 use super::pose::Pose;
 use super::smooth::{LONGEST, WORTH_A_BRACKET};
 use super::start::facing;
-use super::tangent::{Bend, Plane, Relative, Side, Step, bracket, moved, newton, straightened};
-use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, normalized, rows, subtract};
+use super::tangent::{Bend, Plane, Relative, Side, Step, bracket, moved, newton};
+use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, scaled, subtract};
 use super::warm::WarmStart;
 use crate::body::{Body, Outline, Solid};
 use crate::polynomial::{Lanes, MAX_LANES, Number, NumberJet, Simd, WithSimd, dispatch};
@@ -180,7 +180,7 @@ impl Waiting {
     }
 }
 
-/// Trial points and normal.
+/// Trial points, and a normal of any length.
 #[derive(Clone, Copy)]
 struct Iterate<N> {
     x: V3<N>,
@@ -194,7 +194,7 @@ struct Linearized<N> {
     local: (M3<N>, M3<N>),
     difference: V3<N>,
     step: Step<N>,
-    /// Square of the length of the step before it was shortened.
+    /// Square of its length.
     square: N,
 }
 
@@ -205,7 +205,6 @@ impl<N: Copy> Iterate<N> {
         simd: S,
         (side_a, jet_a): (&Side<'_, N>, &NumberJet<N>),
         (side_b, jet_b): (&Side<'_, N>, &NumberJet<N>),
-        longest: f64,
     ) -> Linearized<N>
     where
         N: Number<S>,
@@ -214,38 +213,38 @@ impl<N: Copy> Iterate<N> {
         let local = (side_a.localize(simd, &frame), side_b.localize(simd, &frame));
         let (a, b) = (Plane::new(simd, jet_a, &local.0), Plane::new(simd, jet_b, &local.1));
         let (bend_a, bend_b) = (Bend::new(simd, jet_a, &local.0), Bend::new(simd, jet_b, &local.1));
-        let (a, bend_a) = straightened(simd, &a, &bend_a);
-        let (b, bend_b) = straightened(simd, &b, &bend_b);
         let difference = apply(&frame, subtract(self.x, self.y));
         let zero = N::splat(simd, 0.0);
-        let (step, square) = newton(simd, (&a, &bend_a), (&b, &bend_b), difference, zero).shortened(simd, longest);
+        let step = newton(simd, (&a, &bend_a), (&b, &bend_b), difference, zero);
+        let square = step.square(simd);
         Linearized { frame, local, difference, step, square }
     }
 
+    /// Takes a step of at most this length.
     #[inline(always)]
-    fn advance<S: Simd>(&mut self, simd: S, Linearized { frame, step, .. }: &Linearized<N>)
+    fn advance<S: Simd>(&mut self, simd: S, Linearized { frame, step, square, .. }: &Linearized<N>, longest: f64)
     where
         N: Number<S>,
     {
+        let step = step.at_most(simd, longest, *square);
         self.x = moved(self.x, step.dx, frame);
         self.y = moved(self.y, step.dy, frame);
-        let turned = add_scaled(add_scaled(self.n, step.dn[0], frame[0]), step.dn[1], frame[1]);
-        self.n = normalized(simd, turned);
+        self.n = add_scaled(add_scaled(frame[2], step.dn[0], frame[0]), step.dn[1], frame[1]);
     }
 
     /// Takes the direction halfway between the normals of the surfaces for n, unless they face the same way.
     #[inline(always)]
-    fn face<S: Simd>(&mut self, simd: S, gradient_a: V3<N>, gradient_b: V3<N>)
+    fn face<S: Simd>(&mut self, simd: S, a: V3<N>, b: V3<N>)
     where
         N: Number<S>,
     {
-        let (a, b) = (normalized(simd, gradient_a), normalized(simd, gradient_b));
-        let middle = subtract(b, a);
-        let square = dot(middle, middle);
-        let apart = N::splat(simd, 0.25).le(square);
-        let inverse = N::splat(simd, 1.0) / square.sqrt();
+        let (length_a, length_b) = (dot(a, a).sqrt(), dot(b, b).sqrt());
+        // Both as long as the product of the lengths.
+        let middle = subtract(scaled(b, length_a), scaled(a, length_b));
+        let product = length_a * length_b;
+        let apart = (product * product * N::splat(simd, 0.25)).le(dot(middle, middle));
         for i in 0..3 {
-            self.n[i] = (middle[i] * inverse).select(apart, self.n[i]);
+            self.n[i] = middle[i].select(apart, self.n[i]);
         }
     }
 }
@@ -267,8 +266,8 @@ impl Batch<'_> {
             let mark_b = self.b.outline().mark(simd, Outline::place(simd, own));
             let y = add(relative.origin, apply(&relative.rotation, mark_b.point));
             let mut at = Iterate { x: mark_a.point, y, n };
-            let first = at.linearize(simd, (&side_a, &mark_a.jet), (&side_b, &mark_b.jet), longest);
-            at.advance(simd, &first);
+            let first = at.linearize(simd, (&side_a, &mark_a.jet), (&side_b, &mark_b.jet));
+            at.advance(simd, &first, longest);
             at
         } else {
             let column = |i: usize| Lanes::load(simd, &group.at[i]);
@@ -286,7 +285,7 @@ impl Batch<'_> {
                 let (a, b) = (side_a.pulled_back(simd, jet_a.gradient), side_b.pulled_back(simd, jet_b.gradient));
                 at.face(simd, a, b);
             }
-            let here = at.linearize(simd, (&side_a, &jet_a), (&side_b, &jet_b), longest);
+            let here = at.linearize(simd, (&side_a, &jet_a), (&side_b, &jet_b));
             let inside = Lanes::and(simd, inside_a, inside_b);
             let short = Lanes::and(simd, inside, here.square.le(splat(worth * worth)));
             if Lanes::bits(simd, short) & open != 0 {
@@ -308,7 +307,7 @@ impl Batch<'_> {
                     }
                 }
             }
-            at.advance(simd, &here);
+            at.advance(simd, &here, longest);
         }
         for (i, coordinate) in [at.x, at.y, at.n].as_flattened().iter().enumerate() {
             coordinate.store(&mut group.at[i]);

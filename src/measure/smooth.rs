@@ -203,9 +203,10 @@ impl WithSimd for Seek<'_> {
         let (a, b) = (Plane::new(simd, &mark_a.jet, &local_a), Plane::new(simd, &mark_b.jet, &local_b));
         let (bend_a, bend_b) = (Bend::new(simd, &mark_a.jet, &local_a), Bend::new(simd, &mark_b.jet, &local_b));
         let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
-        let (step, square) = newton(simd, (&a, &bend_a), (&b, &bend_b), difference, 0.0).shortened(simd, longest);
+        let step = newton(simd, (&a, &bend_a), (&b, &bend_b), difference, 0.0);
+        let square = step.square(simd);
         if square.is_finite() {
-            at.advance(simd, &step);
+            at.advance(simd, &step.at_most(simd, longest, square));
         }
         let mut trace = Trace::blank([active_a as u8, active_b as u8]);
         let proven = correct.run(simd, &relative, at, &mut trace)?;
@@ -318,9 +319,8 @@ impl Iterate {
         let length_a = dot::<S, f64>(of_a, of_a).sqrt();
         let length_b = dot::<S, f64>(of_b, of_b).sqrt();
         let middle = [0, 1, 2].map(|i| of_b[i] / length_b - of_a[i] / length_a);
-        let length = dot::<S, f64>(middle, middle).sqrt();
-        let n = apply_transposed::<S, f64>(&self.frame, middle.map(|entry| entry / length));
-        (length > 0.5).then(|| basis(simd, n))
+        let n = apply_transposed::<S, f64>(&self.frame, middle);
+        (dot::<S, f64>(middle, middle) > 0.25).then(|| basis(simd, n))
     }
 
     /// Takes a step; the basis follows the normal.
@@ -329,8 +329,7 @@ impl Iterate {
         self.x = moved::<S, f64>(self.x, step.dx, &self.frame);
         self.y = moved::<S, f64>(self.y, step.dy, &self.frame);
         let turned = moved::<S, f64>(self.frame[2], [step.dn[0], step.dn[1], 0.0], &self.frame);
-        let inverse = 1.0 / dot::<S, f64>(turned, turned).sqrt();
-        self.frame = basis(simd, [turned[0] * inverse, turned[1] * inverse, turned[2] * inverse]);
+        self.frame = basis(simd, turned);
     }
 }
 

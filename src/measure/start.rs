@@ -22,7 +22,7 @@ const TURNS: usize = 2;
 /// Least distance that n is turned for, relative to the widths of the ellipsoids.
 const LEAST: f64 = 1e-3;
 
-/// Largest turn, tangent of the angle.
+/// Largest turn, as the largest component of the tangent.
 const MOST: f64 = 0.5;
 
 /// The unit vector from B to A across the gap of the ellipsoids that stand for them, in A's frame.
@@ -36,7 +36,8 @@ pub(super) fn facing<S: Simd, N: Number<S>>(simd: S, a: &Body, b: &Body, relativ
     for _ in 0..TURNS {
         let (u, v) = (apply(&shape_a, n), apply(&shape_b, n));
         let (wide_a, wide_b) = (dot(n, u).sqrt(), dot(n, v).sqrt());
-        let (of_a, of_b) = (one / wide_a, one / wide_b);
+        let inverse = one / (wide_a * wide_b);
+        let (of_a, of_b) = (inverse * wide_b, inverse * wide_a);
         let mut w = [one; 3];
         for i in 0..3 {
             w[i] = -(relative.origin[i] + of_b.mul_add(v[i], of_a * u[i]));
@@ -54,21 +55,20 @@ pub(super) fn facing<S: Simd, N: Number<S>>(simd: S, a: &Body, b: &Body, relativ
         for i in 0..3 {
             residual[i] = w[i] - distance * n[i];
         }
-        let turn = solve(simd, &matrix, residual);
-        let most = N::splat(simd, MOST);
-        let factor = most / dot(turn, turn).sqrt().max(most);
-        n = normalized(simd, add_scaled(n, factor, turn));
+        n = turned(simd, n, &matrix, residual);
     }
     n
 }
 
-/// `M⁻¹ r` of the symmetric matrix with the entries xx, xy, xz, yy, yz, zz, by cofactors.
+/// The direction of `n + M⁻¹ r`, by cofactors of the symmetric matrix M with the entries xx, xy, xz, yy, yz, zz; the turn is
+/// limited.
 #[inline(always)]
-fn solve<S: Simd, N: Number<S>>(simd: S, [xx, xy, xz, yy, yz, zz]: &[N; 6], r: V3<N>) -> V3<N> {
+fn turned<S: Simd, N: Number<S>>(simd: S, n: V3<N>, [xx, xy, xz, yy, yz, zz]: &[N; 6], r: V3<N>) -> V3<N> {
     let first = [*yy * *zz - *yz * *yz, *xz * *yz - *xy * *zz, *xy * *yz - *xz * *yy];
     let (middle, mixed, last) = (*xx * *zz - *xz * *xz, *xy * *xz - *xx * *yz, *xx * *yy - *xy * *xy);
-    let inverse = N::splat(simd, 1.0) / dot([*xx, *xy, *xz], first);
-    let product =
-        [dot(first, r), dot([first[1], middle, mixed], r), dot([first[2], mixed, last], r)];
-    [product[0] * inverse, product[1] * inverse, product[2] * inverse]
+    let determinant = dot([*xx, *xy, *xz], first);
+    let turn = [dot(first, r), dot([first[1], middle, mixed], r), dot([first[2], mixed, last], r)];
+    let longest = turn[0].abs().max(turn[1].abs()).max(turn[2].abs());
+    let weight = determinant.max(longest * N::splat(simd, 1.0 / MOST));
+    normalized(simd, add_scaled(turn, weight, n))
 }

@@ -177,15 +177,17 @@ impl<'a, N: Copy> Side<'a, N> {
             Plane { value, gradient: [dot(gradient, local[0]), dot(gradient, local[1]), dot(gradient, local[2])] };
         // Second derivatives fall by at most T per length. Within 3 μ / (2 T) a rise of ½ μ |δ|² keeps half of it, and being
         // convex it only steepens after that.
-        let ceiling = N::splat(simd, self.trust().third.ceiling);
+        let third_ceiling = self.trust().third.ceiling;
+        let ceiling = N::splat(simd, third_ceiling);
+        let length = square.sqrt();
         let error = N::splat(simd, self.trust().curvature_error);
-        let curvature = smallest_eigenvalue(simd, &jet.hessian) - error - ceiling * square.sqrt();
-        let radius = (N::splat(simd, 1.5) * curvature / ceiling).min(N::splat(simd, 0.5 * leeway));
+        let curvature = smallest_eigenvalue(simd, &jet.hessian) - error - ceiling * length;
+        let radius = (N::splat(simd, 1.5 * (1.0 - 1e-12) / third_ceiling) * curvature).min(N::splat(simd, 0.5 * leeway));
         Extrapolated {
             plane,
             curvature,
             radius,
-            value_error: third * square.sqrt() * N::splat(simd, 1.0 / 3.0 + 1e-9),
+            value_error: third * length * N::splat(simd, 1.0 / 3.0 + 1e-9),
             gradient_error: third * N::splat(simd, self.body.trust().linear_norm),
         }
     }
@@ -277,44 +279,12 @@ impl<N: Copy> Bend<N> {
     }
 }
 
-/// The constraint `2 (g - 1) / (g + 1) + 1` in place of g: the same set, and as it is nearly 1 + ln g, straighter along rays, so
-/// that Newton's method comes to the surface from farther away.
-#[inline(always)]
-pub(super) fn straightened<S: Simd, N: Number<S>>(simd: S, plane: &Plane<N>, bend: &Bend<N>) -> (Plane<N>, Bend<N>) {
-    let one = N::splat(simd, 1.0);
-    let half_sum = (plane.value + one) * N::splat(simd, 0.5);
-    // Deep inside there is nothing to straighten.
-    let inverse = one / half_sum.max(N::splat(simd, 0.25));
-    let first = inverse * inverse;
-    let second = -first * inverse;
-    let g = plane.gradient;
-    let (s0, s1) = (second * g[0], second * g[1]);
-    let (c, t) = (bend.curvature, bend.tilt);
-    (
-        Plane { value: (plane.value - one).mul_add(inverse, one), gradient: scaled(g, first) },
-        Bend {
-            curvature: [
-                first.mul_add(c[0], s0 * g[0]),
-                first.mul_add(c[1], s0 * g[1]),
-                first.mul_add(c[2], s1 * g[1]),
-            ],
-            tilt: [first.mul_add(t[0], s0 * g[2]), first.mul_add(t[1], s1 * g[2])],
-        },
-    )
-}
-
 /// A symmetric 2x2 matrix: entries 00, 01, 11.
 type Symmetric2<N> = [N; 3];
 
 #[inline(always)]
 fn apply2<S: Simd, N: Number<S>>(m: &Symmetric2<N>, v: [N; 2]) -> [N; 2] {
     [m[1].mul_add(v[1], m[0] * v[0]), m[2].mul_add(v[1], m[1] * v[0])]
-}
-
-#[inline(always)]
-fn inverse2<S: Simd, N: Number<S>>(simd: S, m: &Symmetric2<N>) -> Symmetric2<N> {
-    let factor = N::splat(simd, 1.0) / (m[0] * m[2] - m[1] * m[1]);
-    [m[2] * factor, -m[1] * factor, m[0] * factor]
 }
 
 /// Lower bound of the smallest eigenvalue of a positive definite matrix: the determinant over the square of half the trace
@@ -370,21 +340,33 @@ impl Step<f64> {
 }
 
 impl<N: Copy> Step<N> {
-    /// The step scaled to the length `longest` if it is longer, and its own length squared.
+    /// Square of the larger length of the moves of x and of y.
     #[inline(always)]
-    pub(super) fn shortened<S: Simd>(self, simd: S, longest: f64) -> (Self, N)
+    pub(super) fn square<S: Simd>(&self, _: S) -> N
     where
         N: Number<S>,
     {
-        let square = dot(self.dx, self.dx).max(dot(self.dy, self.dy));
+        dot(self.dx, self.dx).max(dot(self.dy, self.dy))
+    }
+
+    /// The step scaled to the length `longest` if it is longer, by the square of its length.
+    #[inline(always)]
+    pub(super) fn at_most<S: Simd>(self, simd: S, longest: f64, square: N) -> Self
+    where
+        N: Number<S>,
+    {
         let most = N::splat(simd, longest);
         let factor = most / square.sqrt().max(most);
         let dn = [self.dn[0] * factor, self.dn[1] * factor];
-        (Self { dx: scaled(self.dx, factor), dy: scaled(self.dy, factor), dn }, square)
+        Self { dx: scaled(self.dx, factor), dy: scaled(self.dy, factor), dn }
     }
 }
 
 /// Newton's step from points x and y with `difference = x - y` in the basis whose third vector is n.
+///
+/// In place of each constraint g it takes `2 (g - 1) / (g + 1) + 1`: the same set, and nearly 1 + ln g, which is straighter along
+/// rays, so that the surface is found from farther away. Gradients are then those of g over the square of the mean m of g and
+/// 1, Hessians `H - ∇g ∇gᵀ / m` over the same.
 ///
 /// `smallest` is added to the curvature that is divided by: where both bodies are flat it bounds the step.
 #[inline(always)]
@@ -395,24 +377,46 @@ pub(super) fn newton<S: Simd, N: Number<S>>(
     difference: V3<N>,
     smallest: N,
 ) -> Step<N> {
-    let one = N::splat(simd, 1.0);
-    let (of_a, of_b) = (-one / a.gradient[2], one / b.gradient[2]);
-    let (shift_a, shift_b) = ((a.value - one) * of_a, (one - b.value) * of_b);
-    let (right_a, right_b) = (right_side(a, bend_a, of_a, shift_a), right_side(b, bend_b, of_b, shift_b));
-    let (w_a, w_b) = (scaled(bend_a.curvature, of_a), scaled(bend_b.curvature, of_b));
+    let (one, half) = (N::splat(simd, 1.0), N::splat(simd, 0.5));
+    // Deep inside there is nothing to straighten.
+    let deepest = N::splat(simd, 0.25);
+    let (mean_a, mean_b) = (half.mul_add(a.value, half).max(deepest), half.mul_add(b.value, half).max(deepest));
+    // Divisions are slow: one for four reciprocals.
+    let (both_a, both_b) = (a.gradient[2] * mean_a, b.gradient[2] * mean_b);
+    let inverse = one / (both_a * both_b);
+    let (inverse_a, inverse_b) = (inverse * both_b, inverse * both_a);
+    let (of_a, of_b) = (-mean_a * inverse_a, mean_b * inverse_b);
+    let straight_a = Straight::new(a, bend_a, of_a, (a.value - one) * mean_a, a.gradient[2] * inverse_a);
+    let straight_b = Straight::new(b, bend_b, of_b, (one - b.value) * mean_b, b.gradient[2] * inverse_b);
+    let (shift_a, shift_b) = (straight_a.shift, straight_b.shift);
+    let (right_a, right_b) = (straight_a.right, straight_b.right);
+    let (w_a, w_b) = (straight_a.curvature, straight_b.curvature);
     let distance = difference[2] + shift_a - shift_b;
     let tau = [difference[0], difference[1]];
 
-    let k = inverse2(simd, &[distance.mul_add(w_a[0], one), distance * w_a[1], distance.mul_add(w_a[2], one)]);
-    // W_A K: the two commute.
-    let both =
-        [w_a[1].mul_add(k[1], w_a[0] * k[0]), w_a[1].mul_add(k[2], w_a[0] * k[1]), w_a[2].mul_add(k[2], w_a[1] * k[1])];
+    // I + D W_A, its determinant, and that times W_A K: the two commute.
+    let m = [distance.mul_add(w_a[0], one), distance * w_a[1], distance.mul_add(w_a[2], one)];
+    let determinant = m[0] * m[2] - m[1] * m[1];
+    let more = distance * (w_a[0] * w_a[2] - w_a[1] * w_a[1]);
+    let both = [w_a[0] + more, w_a[1], w_a[2] + more];
     let lever = [tau[0] - distance * right_a[0], tau[1] - distance * right_a[1]];
     let pulled = apply2(&both, lever);
-    let sum = [w_b[0] + both[0] + smallest, w_b[1] + both[1], w_b[2] + both[2] + smallest];
-    let beta =
-        apply2(&inverse2(simd, &sum), [right_a[0] + right_b[0] + pulled[0], right_a[1] + right_b[1] + pulled[1]]);
-    let alpha = apply2(&k, [beta[0] - lever[0], beta[1] - lever[1]]);
+    let sum = [
+        determinant.mul_add(w_b[0] + smallest, both[0]),
+        determinant.mul_add(w_b[1], both[1]),
+        determinant.mul_add(w_b[2] + smallest, both[2]),
+    ];
+    let right =
+        [determinant.mul_add(right_a[0] + right_b[0], pulled[0]), determinant.mul_add(right_a[1] + right_b[1], pulled[1])];
+    let other = sum[0] * sum[2] - sum[1] * sum[1];
+    let inverse = one / (determinant * other);
+    let (of_m, of_sum) = (inverse * other, inverse * determinant);
+    let beta = [
+        (sum[2] * right[0] - sum[1] * right[1]) * of_sum,
+        (sum[0] * right[1] - sum[1] * right[0]) * of_sum,
+    ];
+    let rest = [beta[0] - lever[0], beta[1] - lever[1]];
+    let alpha = [(m[2] * rest[0] - m[1] * rest[1]) * of_m, (m[0] * rest[1] - m[1] * rest[0]) * of_m];
     let bent = apply2(&w_a, alpha);
     // The tangential parts of the gradients, of second order, are at hand now.
     let along_a = (a.gradient[0] * alpha[0] + a.gradient[1] * alpha[1]) * of_a;
@@ -424,13 +428,35 @@ pub(super) fn newton<S: Simd, N: Number<S>>(
     }
 }
 
-/// `-λ Tᵀ(g + a H n)`.
-#[inline(always)]
-fn right_side<S: Simd, N: Number<S>>(plane: &Plane<N>, bend: &Bend<N>, multiplier: N, shift: N) -> [N; 2] {
-    [
-        -multiplier * shift.mul_add(bend.tilt[0], plane.gradient[0]),
-        -multiplier * shift.mul_add(bend.tilt[1], plane.gradient[1]),
-    ]
+/// What the linearization needs of a constraint that is straightened.
+struct Straight<N> {
+    /// Change along the normal.
+    shift: N,
+    /// Right side.
+    right: [N; 2],
+    /// Curvature of the surface.
+    curvature: Symmetric2<N>,
+}
+
+impl<N: Copy> Straight<N> {
+    /// With the multiplier λ of the constraint itself, `(g - 1) m` or its negative, and `1 / m`, m the mean of g and 1.
+    #[inline(always)]
+    fn new<S: Simd>(plane: &Plane<N>, bend: &Bend<N>, multiplier: N, excess: N, inverse_mean: N) -> Self
+    where
+        N: Number<S>,
+    {
+        let g = plane.gradient;
+        let (s0, s1) = (inverse_mean * g[0], inverse_mean * g[1]);
+        let t = bend.tilt;
+        let shift = excess * multiplier;
+        let tilt = [t[0] - s0 * g[2], t[1] - s1 * g[2]];
+        Self {
+            shift,
+            right: [-multiplier * shift.mul_add(tilt[0], g[0]), -multiplier * shift.mul_add(tilt[1], g[1])],
+            // Without the tangential part of ∇g ∇gᵀ, which vanishes at the solution, it stays positive semidefinite.
+            curvature: scaled(bend.curvature, multiplier),
+        }
+    }
 }
 
 /// A proven bracket of the distance with the points that attain the upper bound, in the basis from the trial points on.
@@ -479,7 +505,8 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
     let (a, b) = (&extrapolated_a.plane, &extrapolated_b.plane);
     let (near_a, near_b) = (Near::new(side_a), Near::new(side_b));
     let (length_a, length_b) = (dot(a.gradient, a.gradient).sqrt(), dot(b.gradient, b.gradient).sqrt());
-    let (inverse_a, inverse_b) = (one / length_a, one / length_b);
+    let inverse = one / (length_a * length_b);
+    let (inverse_a, inverse_b) = (inverse * length_b, inverse * length_a);
     let (outward_a, outward_b) = (scaled(a.gradient, inverse_a), scaled(b.gradient, inverse_b));
     let displaced = (side_a.displacement + side_b.displacement) * splat(1.0 + 1e-14);
     let rounding = splat(SLACK) * (difference[0].abs() + difference[1].abs() + difference[2].abs());
@@ -615,13 +642,13 @@ impl<N: Copy> Bound<N> {
         let splat = |value: f64| N::splat(simd, value);
         // By z, r is at most the bound of the inverse times as long.
         let square = off * off * self.inverse_square;
-        let strength = multiplier * self.curvature;
-        let slope = splat(0.25) * strength * self.radius;
+        let slope = splat(0.25) * multiplier * self.curvature * self.radius;
         // Both factors may be negative where the surface is flat.
-        let fine = N::and(simd, square.le(slope * slope), splat(0.0).le(strength));
-        let here = (square / strength).select(fine, splat(f64::INFINITY));
-        let anywhere = off * off / (splat(2.0) * self.floor * multiplier);
-        here.min(anywhere).min(off * self.span)
+        let fine = N::and(simd, square.le(slope * slope), splat(0.0).le(self.curvature));
+        let here = self.curvature.select(fine, splat(0.0));
+        // The stiffer of the two bounds, of the curvature here by z and of twice the one anywhere by metres.
+        let stiffness = here.max(splat(2.0) * self.floor * self.inverse_square);
+        (square / (stiffness * multiplier)).min(off * self.span)
     }
 }
 

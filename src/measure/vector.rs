@@ -86,13 +86,19 @@ pub(super) fn apply_symmetric<S: Simd, N: Number<S>>(h: &[N; 6], v: V3<N>) -> V3
     [dot([h[0], h[1], h[2]], v), dot([h[1], h[3], h[4]], v), dot([h[2], h[4], h[5]], v)]
 }
 
-/// A right-handed orthonormal basis whose third vector is the unit vector `n` (Duff et al., Building an orthonormal basis,
+/// A right-handed orthonormal basis whose third vector is the direction of `v` (Duff et al., Building an orthonormal basis,
 /// revisited, JCGT 6, 2017).
 #[inline(always)]
-pub(super) fn basis<S: Simd, N: Number<S>>(simd: S, n: V3<N>) -> M3<N> {
+pub(super) fn basis<S: Simd, N: Number<S>>(simd: S, v: V3<N>) -> M3<N> {
     let (zero, one) = (N::splat(simd, 0.0), N::splat(simd, 1.0));
-    let sign = one.select(zero.le(n[2]), -one);
-    let a = -one / (sign + n[2]);
+    let sign = one.select(zero.le(v[2]), -one);
+    let square = dot(v, v);
+    let length = square.sqrt();
+    // With n = v / length, a = -1 / (sign + n_2): one division for both.
+    let reach = sign.mul_add(length, v[2]);
+    let inverse = one / (length * reach);
+    let n = scaled(v, reach * inverse);
+    let a = -square * inverse;
     let b = n[0] * n[1] * a;
     let first = [(sign * n[0] * n[0]).mul_add(a, one), sign * b, -sign * n[0]];
     let second = [b, (n[1] * n[1]).mul_add(a, sign), -n[1]];

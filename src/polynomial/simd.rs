@@ -152,13 +152,12 @@ impl<S: Simd> Lanes<S> {
     /// The lanes where the mask holds, as bits.
     #[inline(always)]
     pub fn bits(simd: S, mask: [S::m64s; 2]) -> u32 {
-        let mut ones = [0.0; MAX_LANES];
-        Self::splat(simd, 1.0).select(mask, Self::splat(simd, 0.0)).store(&mut ones);
-        let mut bits = 0;
-        for (lane, one) in ones[..Self::COUNT].iter().enumerate() {
-            bits |= u32::from(*one != 0.0) << lane;
+        let mut powers = [0.0; MAX_LANES];
+        for (lane, power) in powers.iter_mut().enumerate() {
+            *power = f64::from(1_u32 << lane);
         }
-        bits
+        let [a, b] = Self::load(simd, &powers).select(mask, Self::splat(simd, 0.0)).values;
+        simd.reduce_sum_f64s(simd.add_f64s(a, b)) as u32
     }
 }
 
