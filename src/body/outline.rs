@@ -39,12 +39,7 @@ pub struct Mark<N> {
 impl Outline {
     /// `interior` is the interior point in normalized coordinates, `reach` the largest norm of normalized coordinates of the
     /// body.
-    pub(super) fn new(
-        constraints: &[Constraint],
-        inverse: &Matrix3<f64>,
-        interior: &Vector3<f64>,
-        reach: f64,
-    ) -> Self {
+    pub(super) fn new(constraints: &[Constraint], inverse: &Matrix3<f64>, interior: &Vector3<f64>, reach: f64) -> Self {
         let rays: Vec<_> =
             Sphere::fine().vertices().iter().map(|u| interior + u * radius(constraints, interior, u)).collect();
         let cells = 6 * CELLS * CELLS;

@@ -90,7 +90,12 @@ pub fn distance_batch(
 }
 
 /// Answers what can be answered several poses at a time.
-fn in_lanes((a, pose_a): (&Body, &Pose), (b, poses_b): (&Body, &[Pose]), options: &Options<'_>, answers: &mut [Distance]) {
+fn in_lanes(
+    (a, pose_a): (&Body, &Pose),
+    (b, poses_b): (&Body, &[Pose]),
+    options: &Options<'_>,
+    answers: &mut [Distance],
+) {
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
     dispatch(Batch { a, pose_a, b, poses_b, options, tolerance, answers });
 }
@@ -99,7 +104,7 @@ fn in_lanes((a, pose_a): (&Body, &Pose), (b, poses_b): (&Body, &[Pose]), options
 const ROUNDS: u32 = 3;
 
 /// Most rounds of a pose before it is solved alone.
-const MOST_ROUNDS: u32 = 10;
+const MOST_ROUNDS: u32 = 16;
 
 /// A batch as work for the widest arithmetic. Answers stay as they are where a pose is to be solved alone.
 struct Batch<'a> {
@@ -288,14 +293,15 @@ impl Batch<'_> {
             let here = at.linearize(simd, (&side_a, &jet_a), (&side_b, &jet_b));
             let inside = Lanes::and(simd, inside_a, inside_b);
             let short = Lanes::and(simd, inside, here.square.le(splat(worth * worth)));
-            if Lanes::bits(simd, short) & open != 0 {
+            if (round > 1 || !fresh) && Lanes::bits(simd, short) & open != 0 {
                 let next_a = side_a.extrapolate(simd, &jet_a, &here.local.0, here.step.dx);
                 let next_b = side_b.extrapolate(simd, &jet_b, &here.local.1, here.step.dy);
                 let next = subtract(add(here.difference, here.step.dx), here.step.dy);
                 let found = bracket(simd, (&side_a, &next_a), (&side_b, &next_b), next);
                 let enough = splat(self.tolerance).max(found.rounding * splat(4.0));
                 let narrow = Lanes::and(simd, short, (found.upper - found.lower).le(enough));
-                let proven = Lanes::bits(simd, Lanes::and(simd, narrow, splat(f64::MIN_POSITIVE).le(found.lower))) & open;
+                let proven =
+                    Lanes::bits(simd, Lanes::and(simd, narrow, splat(f64::MIN_POSITIVE).le(found.lower))) & open;
                 if proven != 0 {
                     let x = moved(at.x, add(here.step.dx, found.to_a), &here.frame);
                     let y = moved(at.y, add(here.step.dy, found.to_b), &here.frame);
@@ -402,6 +408,170 @@ impl Batch<'_> {
                 active_b: ActiveConstraints::single(0, entry(3)),
                 iterations: group.rounds[lane] + round,
             };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{BatchError, distance_batch};
+    use crate::body::{Body, Compound};
+    use crate::measure::{Distance, Options, Pose, Status, WarmStart, distance};
+    use crate::polynomial::tests::Seeded;
+    use nalgebra::{Vector3, Vector4};
+    use std::sync::atomic::AtomicBool;
+
+    fn pose(random: &mut Seeded, far: f64) -> Pose {
+        let q = Vector4::from_fn(|_, _| random.signed()).normalize();
+        Pose::from_quaternion(Vector3::from_fn(|_, _| far * random.signed()), q.into()).unwrap()
+    }
+
+    fn body(random: &mut Seeded, degree: u8) -> Body {
+        let center = Vector3::from_fn(|_, _| random.signed());
+        let half = Vector3::from_fn(|_, _| 2_f64.powf(random.signed()));
+        if degree == 2 {
+            Body::ellipsoid("egg", center, half).unwrap()
+        } else {
+            Body::superellipsoid("q", center, half, degree).unwrap()
+        }
+    }
+
+    /// Every number of an answer, bit by bit.
+    fn bits(answer: &Distance) -> [u64; 18] {
+        let mut numbers = vec![answer.lower, answer.upper, f64::from(answer.iterations)];
+        numbers.extend(answer.witness_a.iter().chain(answer.witness_b.iter()));
+        numbers.extend(answer.normal.unwrap_or_default().iter());
+        numbers.push(f64::from(u8::from(answer.normal.is_some())));
+        numbers.push(f64::from(u8::from(answer.status == Status::Converged)));
+        for active in [answer.active_a, answer.active_b] {
+            let (sum, first) = active.iter().fold((0.0, 0.0), |(sum, _), (index, m)| (sum + m, index as f64));
+            numbers.extend([sum, first]);
+        }
+        std::array::from_fn(|i| numbers[i].to_bits())
+    }
+
+    fn solve(a: &Body, pose_a: &Pose, b: &Body, poses: &[Pose]) -> Vec<[u64; 18]> {
+        let mut answers = vec![Distance::default(); poses.len()];
+        distance_batch(a, pose_a, b, poses, &Options::default(), &mut answers).unwrap();
+        answers.iter().map(bits).collect()
+    }
+
+    #[test]
+    fn answers_are_those_of_single_queries() {
+        for seed in 0..60 {
+            let mut random = Seeded(seed);
+            let degrees = [2_u8, 4, 6, 8];
+            let (a, b) =
+                (body(&mut random, degrees[seed as usize % 4]), body(&mut random, degrees[seed as usize / 4 % 4]));
+            let pose_a = pose(&mut random, 2.0);
+            // Some in contact, some far away.
+            let poses: Vec<Pose> =
+                (0..64).map(|i| pose(&mut random, if i % 8 == 0 { 1e3 } else { 2.0 + 0.1 * i as f64 })).collect();
+            let mut answers = vec![Distance::default(); poses.len()];
+            distance_batch(&a, &pose_a, &b, &poses, &Options::default(), &mut answers).unwrap();
+            for (i, (answer, pose_b)) in answers.iter().zip(&poses).enumerate() {
+                let single = distance(&a, &pose_a, &b, pose_b, &Options::default(), &mut WarmStart::default());
+                let context = format!("seed {seed}, pose {i}: {answer:?} against {single:?}");
+                assert_eq!(answer.status, single.status, "{context}");
+                assert!(answer.lower <= single.upper && single.lower <= answer.upper, "{context}");
+                let between = (answer.witness_a - answer.witness_b).norm();
+                assert!((between - answer.upper).abs() <= 1e-9 * (1.0 + answer.upper), "{context}");
+                let inverse = |pose: &Pose, x: &Vector3<f64>| pose.rotation().inverse() * (x - pose.translation());
+                assert!(a.value(&inverse(&pose_a, &answer.witness_a)) <= 1.0 + 1e-9, "{context}");
+                assert!(b.value(&inverse(pose_b, &answer.witness_b)) <= 1.0 + 1e-9, "{context}");
+                if let (Some(n), Some(m)) = (answer.normal, single.normal) {
+                    // Each is good to the square root of its bracket.
+                    assert!((n - m).norm() < 1e-3, "{context}");
+                    let multiplier = |answer: &Distance| answer.active_a.iter().map(|(_, value)| value).sum::<f64>();
+                    let (of_batch, of_single) = (multiplier(answer), multiplier(&single));
+                    assert!((of_batch - of_single).abs() <= 1e-3 * of_single, "{context}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_answer_does_not_depend_on_its_neighbours() {
+        for seed in 0..12 {
+            let mut random = Seeded(seed);
+            let (a, b) = (body(&mut random, 6), body(&mut random, if seed % 2 == 0 { 6 } else { 4 }));
+            let pose_a = pose(&mut random, 1.0);
+            let poses: Vec<Pose> = (0..61).map(|_| pose(&mut random, 4.0)).collect();
+            let answers = solve(&a, &pose_a, &b, &poses);
+            let mut order: Vec<usize> = (0..poses.len()).collect();
+            for round in 0..4 {
+                for i in (1..order.len()).rev() {
+                    order.swap(i, ((random.signed().abs() * (i + 1) as f64) as usize).min(i));
+                }
+                let shuffled: Vec<Pose> = order.iter().map(|&i| poses[i]).collect();
+                for (found, &i) in solve(&a, &pose_a, &b, &shuffled).iter().zip(&order) {
+                    assert_eq!(*found, answers[i], "seed {seed}, round {round}, pose {i}");
+                }
+            }
+            for size in 1..=20 {
+                for (chunk, known) in poses.chunks(size).zip(answers.chunks(size)) {
+                    assert_eq!(solve(&a, &pose_a, &b, chunk), known, "seed {seed}, size {size}");
+                }
+            }
+            // Neighbours that overlap, that are far away, that are the same.
+            for neighbour in [pose_a, pose(&mut random, 1e6), poses[0]] {
+                for i in 0..poses.len() {
+                    let mut others = vec![neighbour; 17];
+                    others[i % 17] = poses[i];
+                    assert_eq!(solve(&a, &pose_a, &b, &others)[i % 17], answers[i], "seed {seed}, pose {i}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn other_solids_are_solved_one_by_one() {
+        let mut random = Seeded(3);
+        let ball = Body::ball("ball", Vector3::zeros(), 0.5).unwrap();
+        let cuboid = Body::cuboid("box", Vector3::new(1.0, 0.5, 0.7)).unwrap();
+        let compound = Compound::new("two", vec![ball.clone(), cuboid.clone()]).unwrap();
+        let poses: Vec<Pose> = (0..20).map(|_| pose(&mut random, 3.0)).collect();
+        let options = Options::default();
+        let mut answers = vec![Distance::default(); poses.len()];
+        distance_batch(&compound, &Pose::identity(), &ball, &poses, &options, &mut answers).unwrap();
+        for (answer, pose_b) in answers.iter().zip(&poses) {
+            let single = distance(&compound, &Pose::identity(), &ball, pose_b, &options, &mut WarmStart::default());
+            assert_eq!(bits(answer), bits(&single));
+        }
+        distance_batch(&cuboid, &Pose::identity(), &ball, &poses, &options, &mut answers).unwrap();
+        for (answer, pose_b) in answers.iter().zip(&poses) {
+            let single = distance(&cuboid, &Pose::identity(), &ball, pose_b, &options, &mut WarmStart::default());
+            assert_eq!(bits(answer), bits(&single));
+        }
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_refused() {
+        let ball = Body::ball("ball", Vector3::zeros(), 0.5).unwrap();
+        let here = Pose::identity();
+        let batch = |poses: &[Pose], answers: &mut [Distance]| {
+            distance_batch(&ball, &here, &ball, poses, &Options::default(), answers)
+        };
+        assert_eq!(batch(&[], &mut []), Err(BatchError::Empty));
+        let mut answers = [Distance::default(); 2];
+        assert_eq!(batch(&[here; 3], &mut answers), Err(BatchError::Lengths { poses: 3, answers: 2 }));
+        assert_eq!(batch(&[], &mut answers), Err(BatchError::Lengths { poses: 0, answers: 2 }));
+    }
+
+    #[test]
+    fn limits_and_stops_leave_true_brackets() {
+        let mut random = Seeded(8);
+        let (a, b) = (body(&mut random, 6), body(&mut random, 8));
+        let poses: Vec<Pose> = (0..40).map(|_| pose(&mut random, 6.0)).collect();
+        let stop = AtomicBool::new(true);
+        let limits = [Options::default().with_max_iterations(1).unwrap(), Options::default().with_stop(&stop)];
+        for options in limits {
+            let mut answers = vec![Distance::default(); poses.len()];
+            distance_batch(&a, &Pose::identity(), &b, &poses, &options, &mut answers).unwrap();
+            for (answer, pose_b) in answers.iter().zip(&poses) {
+                let truth = distance(&a, &Pose::identity(), &b, pose_b, &Options::default(), &mut WarmStart::default());
+                assert!(answer.lower <= truth.upper && truth.lower <= answer.upper, "{answer:?} {truth:?}");
+            }
         }
     }
 }

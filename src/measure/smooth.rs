@@ -90,7 +90,7 @@ pub(super) struct Proven {
 const MAX_ROUNDS: u32 = 8;
 
 /// Most evaluations from a cold start before another method takes over.
-pub(super) const SEEK_ROUNDS: u32 = 12;
+pub(super) const SEEK_ROUNDS: u32 = 16;
 
 /// Slope of a gradient against the normal, beyond which the normal is chosen anew.
 const STEEP: f64 = 0.1;

@@ -23,7 +23,7 @@ const TURNS: usize = 2;
 const LEAST: f64 = 1e-3;
 
 /// Largest turn, as the largest component of the tangent.
-const MOST: f64 = 0.5;
+const MOST: f64 = 0.3;
 
 /// The unit vector from B to A across the gap of the ellipsoids that stand for them, in A's frame.
 #[inline(always)]
@@ -71,4 +71,59 @@ fn turned<S: Simd, N: Number<S>>(simd: S, n: V3<N>, [xx, xy, xz, yy, yz, zz]: &[
     let longest = turn[0].abs().max(turn[1].abs()).max(turn[2].abs());
     let weight = determinant.max(longest * N::splat(simd, 1.0 / MOST));
     normalized(simd, add_scaled(turn, weight, n))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::facing;
+    use crate::body::Body;
+    use crate::measure::Pose;
+    use crate::measure::tangent::Relative;
+    use crate::polynomial::Scalar;
+    use crate::polynomial::tests::Seeded;
+    use nalgebra::Vector3;
+
+    fn pose(random: &mut Seeded, far: f64) -> Pose {
+        let q = nalgebra::Vector4::from_fn(|_, _| random.signed()).normalize();
+        let t = Vector3::from_fn(|_, _| random.signed()).normalize() * far;
+        Pose::from_quaternion(t, q.into()).unwrap()
+    }
+
+    #[test]
+    fn balls_face_each_other_along_their_centres() {
+        let (a, b) = (
+            Body::ball("a", Vector3::new(0.5, 0.0, 0.0), 1.0).unwrap(),
+            Body::ball("b", Vector3::zeros(), 2.0).unwrap(),
+        );
+        for seed in 0..100 {
+            let mut random = Seeded(seed);
+            let (pose_a, pose_b) = (pose(&mut random, 1.0), pose(&mut random, 6.0));
+            let relative = Relative::<f64>::new(Scalar, &a, &pose_a, &b, &pose_b);
+            let n = Vector3::from(facing::<_, f64>(Scalar, &a, &b, &relative));
+            let centres = pose_a.transform_point(&Vector3::new(0.5, 0.0, 0.0)) - pose_b.translation();
+            assert!((pose_a.transform_direction(&n) - centres.normalize()).norm() < 1e-12, "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn ellipsoids_nearly_face_each_other() {
+        // Where the stand-ins have the shape of the bodies the normals at the farthest points oppose each other.
+        let a = Body::ellipsoid("a", Vector3::zeros(), Vector3::new(1.0, 0.6, 0.4)).unwrap();
+        let b = Body::ellipsoid("b", Vector3::zeros(), Vector3::new(0.5, 0.9, 0.7)).unwrap();
+        let mut worst = 0.0_f64;
+        for seed in 0..500 {
+            let mut random = Seeded(seed);
+            let (pose_a, pose_b) = (Pose::identity(), pose(&mut random, 3.0));
+            let relative = Relative::<f64>::new(Scalar, &a, &pose_a, &b, &pose_b);
+            let n = Vector3::from(facing::<_, f64>(Scalar, &a, &b, &relative));
+            let farthest = |body: &Body, n: Vector3<f64>| {
+                let x = body.outline().shape() * n;
+                x / n.dot(&x).sqrt()
+            };
+            let x = farthest(&a, -n);
+            let y = pose_b.transform_point(&farthest(&b, pose_b.rotation().inverse() * n));
+            worst = worst.max((x - y).normalize().cross(&n).norm());
+        }
+        assert!(worst < 0.1, "{worst}");
+    }
 }

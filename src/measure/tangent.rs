@@ -24,7 +24,9 @@
 //! are the rows of the basis.
 
 use super::pose::{Pose, ROTATION_ERROR};
-use super::vector::{M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, scaled, subtract, times_transposed};
+use super::vector::{
+    M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, scaled, subtract, times_transposed,
+};
 use crate::body::{Body, ConstraintTrust};
 use crate::polynomial::{NEAR_LEVEL, Number, NumberJet, Simd, gamma};
 use nalgebra::Vector3;
@@ -182,7 +184,8 @@ impl<'a, N: Copy> Side<'a, N> {
         let length = square.sqrt();
         let error = N::splat(simd, self.trust().curvature_error);
         let curvature = smallest_eigenvalue(simd, &jet.hessian) - error - ceiling * length;
-        let radius = (N::splat(simd, 1.5 * (1.0 - 1e-12) / third_ceiling) * curvature).min(N::splat(simd, 0.5 * leeway));
+        let radius =
+            (N::splat(simd, 1.5 * (1.0 - 1e-12) / third_ceiling) * curvature).min(N::splat(simd, 0.5 * leeway));
         Extrapolated {
             plane,
             curvature,
@@ -406,15 +409,14 @@ pub(super) fn newton<S: Simd, N: Number<S>>(
         determinant.mul_add(w_b[1], both[1]),
         determinant.mul_add(w_b[2] + smallest, both[2]),
     ];
-    let right =
-        [determinant.mul_add(right_a[0] + right_b[0], pulled[0]), determinant.mul_add(right_a[1] + right_b[1], pulled[1])];
+    let right = [
+        determinant.mul_add(right_a[0] + right_b[0], pulled[0]),
+        determinant.mul_add(right_a[1] + right_b[1], pulled[1]),
+    ];
     let other = sum[0] * sum[2] - sum[1] * sum[1];
     let inverse = one / (determinant * other);
     let (of_m, of_sum) = (inverse * other, inverse * determinant);
-    let beta = [
-        (sum[2] * right[0] - sum[1] * right[1]) * of_sum,
-        (sum[0] * right[1] - sum[1] * right[0]) * of_sum,
-    ];
+    let beta = [(sum[2] * right[0] - sum[1] * right[1]) * of_sum, (sum[0] * right[1] - sum[1] * right[0]) * of_sum];
     let rest = [beta[0] - lever[0], beta[1] - lever[1]];
     let alpha = [(m[2] * rest[0] - m[1] * rest[1]) * of_m, (m[0] * rest[1] - m[1] * rest[0]) * of_m];
     let bent = apply2(&w_a, alpha);

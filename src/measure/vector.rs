@@ -104,3 +104,26 @@ pub(super) fn basis<S: Simd, N: Number<S>>(simd: S, v: V3<N>) -> M3<N> {
     let second = [b, (n[1] * n[1]).mul_add(a, sign), -n[1]];
     [first, second, n]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::basis;
+    use crate::polynomial::Scalar;
+    use crate::polynomial::tests::Seeded;
+    use nalgebra::{Matrix3, Vector3};
+
+    #[test]
+    fn bases_are_orthonormal_right_handed_and_along_their_vector() {
+        let mut random = Seeded(1);
+        for i in 0..10_000 {
+            // Also close to the poles, and of any length.
+            let near = 10_f64.powi(-(i % 20));
+            let pole = if i % 3 == 0 { 1.0 } else { -1.0 };
+            let v = Vector3::new(near * random.signed(), near * random.signed(), pole) * 10_f64.powi(i % 13 - 6);
+            let m = Matrix3::from(basis::<_, f64>(Scalar, v.into())).transpose();
+            assert!((m * m.transpose() - Matrix3::identity()).amax() < 8.0 * f64::EPSILON, "{v:?}");
+            assert!((m.determinant() - 1.0).abs() < 1e-14, "{v:?}");
+            assert!((m.row(2).transpose() - v.normalize()).amax() < 4.0 * f64::EPSILON, "{v:?}");
+        }
+    }
+}

@@ -224,18 +224,16 @@ impl<S: Simd> Number<S> for Lanes<S> {
     /// The lanes' own powers lie side by side in vectors.
     #[inline(always)]
     fn contract<const K: usize>(simd: S, table: &[Row; K], powers: &[Self; K]) -> [Self; ENTRIES] {
-        let mut sums = [Self::splat(simd, 0.0); ENTRIES];
-        // As many sums at a time as leave no processor without registers.
-        for half in [0, ENTRIES / 2] {
-            let mut part = [Self::splat(simd, 0.0); ENTRIES / 2];
-            for (row, power) in table.iter().zip(powers) {
-                for (sum, &entry) in part.iter_mut().zip(&row.0[half..]) {
-                    *sum = Self::splat(simd, entry).mul_add(*power, *sum);
-                }
-            }
-            sums[half..half + ENTRIES / 2].copy_from_slice(&part);
+        // As many sums at a time as there are registers for.
+        if S::F64_LANES == MAX_LANES / 2 {
+            return sums(simd, table, powers, 0);
         }
-        sums
+        let first: [Self; ENTRIES / 2] = sums(simd, table, powers, 0);
+        let last: [Self; ENTRIES / 2] = sums(simd, table, powers, ENTRIES / 2);
+        let mut all = [first[0]; ENTRIES];
+        all[..ENTRIES / 2].copy_from_slice(&first);
+        all[ENTRIES / 2..].copy_from_slice(&last);
+        all
     }
     #[inline(always)]
     fn gather<const K: usize>(simd: S, table: &[[f64; K]], place: Self) -> [Self; K] {
@@ -254,4 +252,30 @@ impl<S: Simd> Number<S> for Lanes<S> {
         }
         result
     }
+}
+
+/// Sums over the rows k of `table[k][from + i] powers[k]`, for some of the entries.
+#[inline(always)]
+fn sums<S: Simd, const K: usize, const COUNT: usize>(
+    simd: S,
+    table: &[Row; K],
+    powers: &[Lanes<S>; K],
+    from: usize,
+) -> [Lanes<S>; COUNT] {
+    let mut sums = [Lanes::splat(simd, 0.0); COUNT];
+    let (rows, last_rows) = table.as_chunks::<5>();
+    let (groups, last_powers) = powers.as_chunks::<5>();
+    for (rows, powers) in rows.iter().zip(groups) {
+        for (row, power) in rows.iter().zip(powers) {
+            for (sum, &entry) in sums.iter_mut().zip(&row.0[from..]) {
+                *sum = Lanes::splat(simd, entry).mul_add(*power, *sum);
+            }
+        }
+    }
+    for (row, power) in last_rows.iter().zip(last_powers) {
+        for (sum, &entry) in sums.iter_mut().zip(&row.0[from..]) {
+            *sum = Lanes::splat(simd, entry).mul_add(*power, *sum);
+        }
+    }
+    sums
 }
