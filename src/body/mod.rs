@@ -245,8 +245,8 @@ impl Body {
             return Err(BodyError::Thin);
         }
         let boundary_z = boundary.iter().map(|x| normalization.linear * (x - normalization.center));
-        let trust = Trust::new(&constraints, &normalization.linear, &inverse, &z_extent, boundary_z);
         let interior_z = normalization.linear * (interior_point - normalization.center);
+        let trust = Trust::new(&constraints, &normalization.linear, &inverse, &z_extent, boundary_z, &interior_z);
         let outline = Outline::new(&constraints, &inverse, &interior_z, trust.radius);
         let volume = surface::volume(&constraints, &normalization.linear, &interior_z);
         let id = BodyId::of(&normalization, &constraints, None);

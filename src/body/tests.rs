@@ -46,6 +46,50 @@ fn extents_of_exact_bodies_match_closed_forms() {
 }
 
 #[test]
+fn the_smallest_value_is_bounded_from_both_sides() {
+    for seed in 0..40 {
+        let mut random = Seeded(seed);
+        let aspect = [1.0, 10.0, 1e3][(seed % 3) as usize];
+        let a = axes(&mut random, aspect);
+        let center = Vector3::from_fn(|_, _| random.signed());
+        let bodies = [
+            Body::superellipsoid("q", center, a, [2, 4, 6, 8][(seed / 3 % 4) as usize]).unwrap(),
+            Body::cuboid("box", a).unwrap(),
+            Body::cylinder("can", a.x, a.y).unwrap(),
+        ];
+        for body in bodies {
+            // All have the minimum 0.
+            let least = body.trust().least;
+            assert!(least <= 0.0 && body.min_value() >= 0.0, "seed {seed} {}", body.name());
+            assert!(
+                body.min_value() - least <= 1e-9,
+                "seed {seed} {}: {least:e} to {:e}",
+                body.name(),
+                body.min_value()
+            );
+        }
+    }
+}
+
+#[test]
+fn the_error_of_the_inverse_is_bounded() {
+    for seed in 0..40 {
+        let mut random = Seeded(seed);
+        let a = axes(&mut random, 1e4);
+        let rotation = nalgebra::UnitQuaternion::from_scaled_axis(Vector3::from_fn(|_, _| 3.0 * random.signed()));
+        let ball = Body::ball("ball", Vector3::zeros(), 1.0).unwrap();
+        let linear = Matrix3::from_diagonal(&a.map(f64::recip)) * rotation.to_rotation_matrix().matrix();
+        let normalization = Normalization { center: Vector3::zeros(), linear };
+        let body = Body::new("turned", normalization, ball.constraints().to_vec()).unwrap();
+        // The inverse of the exact product, up to the rounding of the matrices themselves.
+        let exact = rotation.inverse().to_rotation_matrix().matrix() * Matrix3::from_diagonal(&a);
+        let error = (body.inverse() - exact).norm();
+        assert!(error <= body.trust().inverse_error + 1e-14 * a.amax() * 1e4, "seed {seed}: {error:e}");
+        assert!(body.trust().inverse_error <= 1e-10 * body.trust().inverse_norm, "seed {seed}");
+    }
+}
+
+#[test]
 fn a_normalization_may_mirror() {
     let ellipsoid = Body::ellipsoid("egg", Vector3::new(0.1, 0.2, 0.3), Vector3::new(1.0, 2.0, 0.5)).unwrap();
     let mut normalization = *ellipsoid.normalization();

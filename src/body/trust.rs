@@ -1,7 +1,7 @@
 //! Error bounds and curvature bounds that hold wherever the normalized coordinates of a point lie in a ball a little larger
 //! than the body: made once, so that a query near the body pays for none of them.
 
-use super::Constraint;
+use super::{Constraint, largest};
 use crate::polynomial::{ThirdCeiling, gamma};
 use nalgebra::{Matrix3, Vector3};
 
@@ -24,10 +24,15 @@ pub struct Trust {
     pub condition: f64,
     /// Bound of `|M⁻¹ r| / |r|`, metres.
     pub inverse_norm: f64,
+    /// Bound of `|(M⁻¹ - computed inverse) r| / |r|`, metres.
+    pub inverse_error: f64,
     /// Bound of `|M r| / |r|`, per metre.
     pub linear_norm: f64,
     /// How far a point of the ball may be moved where the curvature ceilings still hold.
     pub leeway: f64,
+    /// Lower bound of the largest constraint anywhere in space: what the smallest value can be; minus infinity if the interior
+    /// point proves none.
+    pub least: f64,
     /// Per constraint.
     pub constraints: Vec<ConstraintTrust>,
 }
@@ -59,6 +64,7 @@ impl Trust {
         inverse: &Matrix3<f64>,
         extent: &Vector3<f64>,
         boundary_z: impl Iterator<Item = Vector3<f64>>,
+        interior_z: &Vector3<f64>,
     ) -> Self {
         let radius = boundary_z.map(|z| z.norm()).fold(0.0, f64::max) * MARGIN;
         // Whether a point is in the ball is decided in floating point.
@@ -68,7 +74,16 @@ impl Trust {
         // The computed inverse may be off by 1e-6 of its rows.
         let slack = 1.0 + 1e-5;
         let (norm, inverse_norm) = (linear.norm() * (1.0 + 1e-13), inverse.norm() * slack);
+        let off = (linear * inverse - Matrix3::identity()).norm();
         let (none, at) = (Vector3::zeros(), Vector3::repeat(ball));
+        // The smallest value is attained in the body, which the interior point's tangent plane bounds from below.
+        let span = ball + extent.norm() * (1.0 + 1e-13);
+        let least = constraints.iter().map(|Constraint { polynomial, .. }| {
+            let jet = polynomial.evaluate(interior_z);
+            let slope = jet.gradient.norm() + 1.8 * polynomial.gradient_error(interior_z, &none);
+            (jet.value - polynomial.value_error(interior_z, &none, &none) - slope * span * (1.0 + 1e-13)).next_down()
+        });
+        let least = largest(least);
         let constraints = constraints.iter().map(|Constraint { polynomial, gram }| ConstraintTrust {
             value_error: polynomial.value_error(&at, &none, &none),
             // 1.8 > √3: the bound is one of each component.
@@ -86,7 +101,10 @@ impl Trust {
             rounding: gamma(16) * rows.dot(&columns) * slack,
             condition: norm * inverse_norm,
             inverse_norm,
+            // M⁻¹ = W - M⁻¹ (M W - I) for the computed inverse W.
+            inverse_error: inverse_norm * (off + gamma(8) * norm * inverse_norm) * (1.0 + 1e-13),
             linear_norm: norm,
+            least: if interior_z.norm() <= ball { least } else { f64::NEG_INFINITY },
             leeway: 0.1 * radius / norm * (1.0 - 1e-13),
             constraints: constraints.collect(),
         }

@@ -306,7 +306,15 @@ impl Batch<'_> {
                     let x = moved(at.x, add(here.step.dx, found.to_a), &here.frame);
                     let y = moved(at.y, add(here.step.dy, found.to_b), &here.frame);
                     let n = apply_transposed(&here.frame, found.normal);
-                    self.write(simd, group, proven, round, (found.lower, found.upper), found.multipliers, [x, y, n]);
+                    self.write(
+                        simd,
+                        group,
+                        proven,
+                        round,
+                        [found.lower, found.upper, found.attained],
+                        found.multipliers,
+                        [x, y, n],
+                    );
                     open &= !proven;
                     if open == 0 {
                         return;
@@ -376,7 +384,7 @@ impl Batch<'_> {
         group: &Group,
         proven: u32,
         round: u32,
-        (lower, upper): (Lanes<S>, Lanes<S>),
+        [lower, upper, attained]: [Lanes<S>; 3],
         [of_a, of_b]: [Lanes<S>; 2],
         [x, y, n]: [V3<Lanes<S>>; 3],
     ) {
@@ -385,8 +393,8 @@ impl Batch<'_> {
         let splat = |value: f64| Lanes::<S>::splat(simd, value);
         let place = [splat(place.x), splat(place.y), splat(place.z)];
         let (x, y, n) = (add(place, apply(&frame, x)), add(place, apply(&frame, y)), apply(&frame, n));
-        let mut columns = [[0.0; MAX_LANES]; 13];
-        let numbers = [lower, upper, of_a, of_b, x[0], x[1], x[2], y[0], y[1], y[2], n[0], n[1], n[2]];
+        let mut columns = [[0.0; MAX_LANES]; 14];
+        let numbers = [lower, upper, of_a, of_b, x[0], x[1], x[2], y[0], y[1], y[2], n[0], n[1], n[2], attained];
         for (number, column) in numbers.into_iter().zip(&mut columns) {
             number.store(column);
         }
@@ -406,6 +414,7 @@ impl Batch<'_> {
                 normal: Some(vector(10)),
                 active_a: ActiveConstraints::single(0, entry(2)),
                 active_b: ActiveConstraints::single(0, entry(3)),
+                attained: entry(13).min(entry(1)).max(entry(0)),
                 iterations: group.rounds[lane] + round,
             };
         }
@@ -437,8 +446,8 @@ mod tests {
     }
 
     /// Every number of an answer, bit by bit.
-    fn bits(answer: &Distance) -> [u64; 18] {
-        let mut numbers = vec![answer.lower, answer.upper, f64::from(answer.iterations)];
+    fn bits(answer: &Distance) -> [u64; 19] {
+        let mut numbers = vec![answer.lower, answer.upper, answer.value(), f64::from(answer.iterations)];
         numbers.extend(answer.witness_a.iter().chain(answer.witness_b.iter()));
         numbers.extend(answer.normal.unwrap_or_default().iter());
         numbers.push(f64::from(u8::from(answer.normal.is_some())));
@@ -450,7 +459,7 @@ mod tests {
         std::array::from_fn(|i| numbers[i].to_bits())
     }
 
-    fn solve(a: &Body, pose_a: &Pose, b: &Body, poses: &[Pose]) -> Vec<[u64; 18]> {
+    fn solve(a: &Body, pose_a: &Pose, b: &Body, poses: &[Pose]) -> Vec<[u64; 19]> {
         let mut answers = vec![Distance::default(); poses.len()];
         distance_batch(a, pose_a, b, poses, &Options::default(), &mut answers).unwrap();
         answers.iter().map(bits).collect()

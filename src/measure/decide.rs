@@ -250,6 +250,7 @@ fn balls((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose)) -> Distance {
         status: Status::BracketWide,
         lower: lower.max(0.0),
         upper: upper.max(0.0),
+        attained: upper.max(0.0),
         witness_a,
         witness_b,
         normal,

@@ -40,6 +40,8 @@ pub struct Distance {
     pub active_b: ActiveConstraints,
     /// Iterations of all methods together.
     pub iterations: u32,
+    /// Distance of the witnesses in the frame they were computed in.
+    pub(super) attained: f64,
 }
 
 impl Default for Distance {
@@ -54,15 +56,17 @@ impl Default for Distance {
             normal: None,
             active_a: ActiveConstraints::default(),
             active_b: ActiveConstraints::default(),
+            attained: f64::INFINITY,
             iterations: 0,
         }
     }
 }
 
 impl Distance {
-    /// The answer inside the bracket: the upper bound, which the witnesses attain.
+    /// The answer inside the bracket: the distance of the witnesses as computed, which the upper bound exceeds by the rounding
+    /// of the frames.
     pub fn value(&self) -> f64 {
-        self.upper
+        self.attained
     }
 
     /// Derivatives with respect to the twists of the first and of the second body at the poses the distance was asked for
@@ -218,7 +222,12 @@ impl<'a> Search<'a> {
             Hint::Overlap { point_a } => {
                 self.common(&self.pair.a_to_query(point_a));
             }
-            Hint::Cold | Hint::Level { .. } | Hint::Single { .. } | Hint::Smooth(_) => {}
+            Hint::Cold
+            | Hint::Level { .. }
+            | Hint::LevelSmooth(_)
+            | Hint::Saturated
+            | Hint::Single { .. }
+            | Hint::Smooth(_) => {}
         }
         if !self.ended() {
             self.closest(NEAR);
@@ -406,7 +415,8 @@ impl<'a> Search<'a> {
         let (witness_b, normal) = if self.upper == 0.0 {
             (witness_a, None)
         } else {
-            let n = self.n.try_normalize(0.0).map(|n| self.pair.direction_to_world(&n));
+            let n = if self.lower > 0.0 { self.n } else { self.between_normals() };
+            let n = n.try_normalize(0.0).map(|n| self.pair.direction_to_world(&n));
             (self.pair.to_world(&self.y), n)
         };
         Distance {
@@ -419,7 +429,19 @@ impl<'a> Search<'a> {
             active_a: self.active.0.reported(if normal.is_some() { unit } else { 0.0 }),
             active_b: self.active.1.reported(if normal.is_some() { unit } else { 0.0 }),
             iterations: self.iterations,
+            attained: ((self.x - self.y).norm() * unit).min(self.upper * unit).max(self.lower * unit),
         }
+    }
+
+    /// Halfway between the outward normal of B and the inward one of A at the witnesses: what the normal is where no lower bound
+    /// has proven one.
+    fn between_normals(&self) -> Vector3<f64> {
+        let outward = |body: &Posed<'_>, v: &Vector3<f64>| {
+            let jets = (0..body.len()).map(|i| body.jet(i, v));
+            let highest = jets.max_by(|p, q| p.value.total_cmp(&q.value));
+            highest.map_or_else(Vector3::zeros, |jet| jet.gradient.normalize())
+        };
+        outward(&self.pair.b, &self.y) - outward(&self.pair.a, &self.x)
     }
 }
 
@@ -437,6 +459,7 @@ impl Proven {
             active_a: ActiveConstraints::single(self.active[0], self.multipliers[0]),
             active_b: ActiveConstraints::single(self.active[1], self.multipliers[1]),
             iterations: self.rounds,
+            attained: self.attained.min(self.upper).max(self.lower),
         }
     }
 }

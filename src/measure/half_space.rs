@@ -323,7 +323,7 @@ mod tests {
                     Pose::from_quaternion(pose.translation() + e * t * 0.5, turn.coords.into()).unwrap()
                 };
                 let slope = (at(&turned(1e-4)).value() - at(&turned(-1e-4)).value()) / 2e-4;
-                let expected = gradient.rotation[axis] + 0.5 * gradient.translation[axis];
+                let expected = gradient.angular[axis] + 0.5 * gradient.linear[axis];
                 assert!((slope - expected).abs() < 1e-5, "seed {seed}: {slope} against {expected}");
             }
         }

@@ -276,8 +276,12 @@ impl Search<'_> {
     }
 
     fn exhausted(&self) -> bool {
-        let stopped = self.options.stop.is_some_and(|stop| stop.load(std::sync::atomic::Ordering::Relaxed));
-        stopped || self.queries >= self.options.max_queries
+        self.options().exhausted(0) || self.queries >= self.options.max_queries
+    }
+
+    /// For the queries on the way, with the stop flag.
+    fn options(&self) -> Options<'_> {
+        self.options.stop.map_or(Options::default(), |stop| Options::default().with_stop(stop))
     }
 
     /// Distance at time t, accurate enough to tell contact from half of it.
@@ -286,7 +290,7 @@ impl Search<'_> {
         let (a, b) = (self.a.body, self.b.body);
         let radius = a.circumscribed().radius.min(b.circumscribed().radius);
         let accuracy = (0.1 * self.contact / radius).min(1.0);
-        let options = Options::default().with_accuracy(accuracy).unwrap_or_default();
+        let options = self.options().with_accuracy(accuracy).unwrap_or(self.options());
         let (pose_a, pose_b) = (self.a.motion.pose(t), self.b.motion.pose(t));
         between((a, &pose_a), (b, &pose_b), &Goal::NARROW, &options, warm)
     }
@@ -330,7 +334,7 @@ impl Search<'_> {
     /// Lower bound of the gap between the supporting planes along n, known up to `error`, at time t.
     fn separation(&mut self, n: &Vector3<f64>, error: f64, from: f64, t: f64, found: &Distance) -> f64 {
         self.queries += 1;
-        let options = Options::default();
+        let options = self.options();
         let (pose_a, pose_b) = (self.a.motion.pose(t), self.b.motion.pose(t));
         let (a, b) = (Single::new(self.a.body, &pose_a), Single::new(self.b.body, &pose_b));
         let narrow = 0.05 * self.contact;

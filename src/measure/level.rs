@@ -1,16 +1,19 @@
 //! Level distance `d(A‖B) = min p_A(x)` over x in B, p the largest constraint.
 
 use super::Status;
-use super::bracket::level_lower;
+use super::bracket::{Multipliers, level_lower};
 use super::distance::split;
+use super::level_smooth::{FollowLevel, LevelProven, LevelTrace, Saturated};
 use super::newton::{Active, LevelNewton};
 use super::options::Options;
 use super::pair::Pair;
 use super::pose::Pose;
 use super::programs::Level;
+use super::twist::Twist;
 use super::warm::{Hint, WarmStart};
 use crate::body::{Body, MAX_CONSTRAINTS};
 use crate::optimize::minimise;
+use crate::polynomial::dispatch;
 use nalgebra::{SVector, Vector3};
 use std::ops::ControlFlow;
 
@@ -25,6 +28,17 @@ pub struct LevelDistance {
     pub upper: f64,
     /// A point of the second body where the first one's polynomial is at most `upper`; world frame, metres.
     pub witness: Vector3<f64>,
+    /// How fast d falls as the level of the second body rises from 1: the sum of the multipliers of its constraints.
+    pub multiplier: f64,
+    /// Whether the second body holds the minimiser of the first one's polynomial: d is its minimum, the multiplier and all
+    /// derivatives are 0, and d says no more about depth.
+    pub saturated: bool,
+    /// Derivative of d with respect to the pose of the first body, 1/m and 1/rad: a twist (v, ω) changes d by `-g·v - ((x - t) × g)·ω`,
+    /// g the gradient of the first body's polynomial at the witness x (of several active constraints, weighted by their
+    /// multipliers) and t the translation.
+    pub gradient_a: Twist,
+    /// Derivative of d with respect to the pose of the second body: the same force the other way, about its own translation.
+    pub gradient_b: Twist,
     /// Iterations of all methods together.
     pub iterations: u32,
 }
@@ -40,7 +54,8 @@ impl LevelDistance {
 /// takes on `b`. Above 1 the bodies are apart, at 1 they touch, below 1 they overlap; it is not symmetric.
 ///
 /// The bracket is as narrow as `options` ask, relative to `max(1, |d|)`, or the status says that it is not. When the minimiser of `a`'s
-/// polynomial lies in `b`, the answer is its minimum ([`Body::min_value`]) and says no more about depth. `warm` is read and
+/// polynomial lies in `b`, the answer is its minimum ([`Body::min_value`]) and says no more about depth. Derivatives are by the
+/// envelope theorem: at the minimiser x the gradients of both bodies balance, `g_a + μ g_b = 0`. `warm` is read and
 /// then replaced by the hint for the next query of this pair in this order.
 ///
 /// ```
@@ -52,6 +67,7 @@ impl LevelDistance {
 /// let apart = Pose::from_quaternion(Vector3::new(3.0, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0])?;
 /// let d = level_distance(&ball, &Pose::identity(), &ball, &apart, &Options::default(), &mut WarmStart::default());
 /// assert!((d.value() - 4.0).abs() < 1e-8); // |x|² is 4 at (2, 0, 0)
+/// assert!((d.gradient_b.linear - Vector3::new(4.0, 0.0, 0.0)).norm() < 1e-6); // and its slope there 4
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn level_distance(
@@ -62,12 +78,42 @@ pub fn level_distance(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> LevelDistance {
+    let mut spent = 0;
+    match &mut warm.hint {
+        Hint::LevelSmooth(trace) => match dispatch(FollowLevel { a, pose_a, b, pose_b, options, trace }) {
+            Ok(proven) => return proven.answer(a, pose_a, pose_b),
+            Err(rounds) => spent = rounds,
+        },
+        Hint::Saturated => {
+            if let Some(answer) = saturated(a, pose_a, b, pose_b, options) {
+                return answer;
+            }
+        }
+        _ => {}
+    }
     let pair = Pair::new(a, pose_a, b, pose_b);
     let mut search = Search::new(&pair, options);
+    search.iterations = spent;
     search.run(&warm.hint);
-    let (active_a, active_b) = (search.active.0.bits(), search.active.1.bits());
-    *warm = Hint::Level { x_b: pair.to_b(&search.x), active_a, active_b }.into();
-    search.answer()
+    *warm = search.hint().into();
+    search.answer(pose_a, pose_b)
+}
+
+/// The answer where the interior point of `a` is proven to lie in `b` and what is known of the minimum is enough.
+fn saturated(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, options: &Options<'_>) -> Option<LevelDistance> {
+    let (lower, upper) = (a.trust().least, a.min_value());
+    let narrow = upper - lower <= options.accuracy() * upper.abs().max(1.0);
+    (narrow && dispatch(Saturated { a, pose_a, b, pose_b })).then(|| LevelDistance {
+        status: Status::Converged,
+        lower,
+        upper,
+        witness: pose_a.transform_point(a.interior_point()),
+        multiplier: 0.0,
+        saturated: true,
+        gradient_a: Twist { linear: Vector3::zeros(), angular: Vector3::zeros() },
+        gradient_b: Twist { linear: Vector3::zeros(), angular: Vector3::zeros() },
+        iterations: 0,
+    })
 }
 
 /// Most changes of scale; each is by a thousand, and values reach about 1e12 at degree 8.
@@ -81,6 +127,8 @@ struct Search<'a> {
     upper: f64,
     x: Vector3<f64>,
     active: (Active, Active),
+    /// Those of the best lower bound, those of A of sum 1.
+    multipliers: (Multipliers, Multipliers),
     iterations: u32,
 }
 
@@ -89,10 +137,11 @@ impl<'a> Search<'a> {
         Self {
             pair,
             options,
-            lower: f64::NEG_INFINITY,
+            lower: pair.a.body.trust().least,
             upper: f64::INFINITY,
             x: pair.b.interior,
             active: (Active::default(), Active::default()),
+            multipliers: ([0.0; MAX_CONSTRAINTS], [0.0; MAX_CONSTRAINTS]),
             iterations: 0,
         }
     }
@@ -109,9 +158,13 @@ impl<'a> Search<'a> {
                 self.newton(self.pair.b_to_query(x_b), a, b);
             }
         }
-        if !self.done() {
+        if !self.done() && !self.exhausted() {
             self.interior_point();
         }
+    }
+
+    fn exhausted(&self) -> bool {
+        self.options.exhausted(self.iterations)
     }
 
     /// Interior-point method from a point of B on the side of A, with Newton's method tried as soon as it shows the active
@@ -126,7 +179,7 @@ impl<'a> Search<'a> {
             let mut first = [0.0; MAX_CONSTRAINTS];
             first[0] = 1.0;
             self.newton(pair.a.interior, Active::from_multipliers(&first), Active::default());
-            if self.done() {
+            if self.done() || self.exhausted() {
                 return;
             }
         }
@@ -141,7 +194,8 @@ impl<'a> Search<'a> {
             let mut attempt = 1e-1;
             let mut rescale = false;
             let program = Level { pair, both: false, scale };
-            let iterations = minimise(&program, &mut v, 1.0, |iterate| {
+            minimise(&program, &mut v, 1.0, |iterate| {
+                self.iterations += 1;
                 let x = iterate.v.xyz();
                 if scale > 1.0 && value(&x) < 1e-3 * scale && self.attain(&x) && self.upper < 1e-2 * scale {
                     rescale = true;
@@ -152,10 +206,13 @@ impl<'a> Search<'a> {
                     attempt = (iterate.gap / value) * 1e-2;
                     self.examine(&x, iterate.multipliers, scale);
                 }
-                if self.done() || attempt < 1e-18 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                if self.done() || self.exhausted() || attempt < 1e-18 {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
             });
-            self.iterations += iterations;
-            if !rescale {
+            if !rescale || self.exhausted() {
                 break;
             }
         }
@@ -166,7 +223,7 @@ impl<'a> Search<'a> {
         let (of_a, mut of_b) = split(self.pair, rows, 1.0);
         of_b.iter_mut().for_each(|multiplier| *multiplier *= scale);
         self.attain(x);
-        self.bound(level_lower(self.pair, x, &of_a, &of_b));
+        self.bound(x, &of_a, &of_b);
         if !self.done() {
             self.newton(*x, Active::from_multipliers(&of_a), Active::from_multipliers(&of_b));
         }
@@ -181,19 +238,26 @@ impl<'a> Search<'a> {
             return;
         }
         let mut newton = LevelNewton { x, a, b };
-        let steps = newton.run(self.pair, |at| {
-            self.bound(level_lower(self.pair, &at.x, &at.a.multipliers(), &at.b.multipliers()));
-            if self.attain(&at.x) {
-                self.active = (at.a, at.b);
-            }
-            self.done()
-        });
+        let (options, before) = (self.options, self.iterations);
+        let steps = newton.run(
+            self.pair,
+            |steps| options.exhausted(before + steps),
+            |at| {
+                self.bound(&at.x, &at.a.multipliers(), &at.b.multipliers());
+                if self.attain(&at.x) {
+                    self.active = (at.a, at.b);
+                }
+                self.done()
+            },
+        );
         self.iterations += steps;
     }
 
-    fn bound(&mut self, lower: f64) {
+    /// Takes the lower bound of a trial point and multipliers if it is the best so far.
+    fn bound(&mut self, x: &Vector3<f64>, of_a: &Multipliers, of_b: &Multipliers) {
+        let lower = level_lower(self.pair, x, of_a, of_b);
         if lower > self.lower {
-            self.lower = lower;
+            (self.lower, self.multipliers) = (lower, normalized(of_a, of_b));
         }
     }
 
@@ -208,13 +272,67 @@ impl<'a> Search<'a> {
         better
     }
 
-    fn answer(&self) -> LevelDistance {
+    fn hint(&self) -> Hint {
+        let (x, y) = (self.pair.to_a(&self.x), self.pair.to_b(&self.x));
+        let (a, b) = (self.pair.a.body, self.pair.b.body);
+        match (self.active.0.single(), self.active.1.single()) {
+            _ if self.saturated() => Hint::Saturated,
+            (Some(of_a), Some(of_b)) => Hint::LevelSmooth(LevelTrace::new(a, &x, b, &y, [of_a, of_b])),
+            _ => Hint::Level { x_b: y, active_a: self.active.0.bits(), active_b: self.active.1.bits() },
+        }
+    }
+
+    /// Whether B does not hold the minimiser of A's polynomial back: it holds the minimiser, or the bracket needed no
+    /// multiplier of B.
+    fn saturated(&self) -> bool {
+        let free = self.multipliers.1.iter().all(|multiplier| *multiplier == 0.0);
+        self.done() && (free || self.pair.b.contains(&self.pair.a.interior))
+    }
+
+    fn answer(&self, pose_a: &Pose, pose_b: &Pose) -> LevelDistance {
+        let (pair, saturated) = (self.pair, self.saturated());
+        let (of_a, of_b) = &self.multipliers;
+        let gradient = of_a.iter().enumerate().take(pair.a.len()).filter(|(_, weight)| **weight > 0.0);
+        let gradient: Vector3<f64> = gradient.map(|(i, weight)| pair.a.jet(i, &self.x).gradient * *weight).sum();
+        let force = pair.direction_to_world(&gradient) / pair.unit() * if saturated { 0.0 } else { 1.0 };
+        let witness = pair.to_world(&self.x);
         LevelDistance {
             status: if self.done() { Status::Converged } else { Status::BracketWide },
             lower: self.lower,
             upper: self.upper,
-            witness: self.pair.to_world(&self.x),
+            witness,
+            multiplier: if saturated { 0.0 } else { of_b.iter().sum() },
+            saturated,
+            gradient_a: Twist::of_force(-force, &witness, pose_a.translation()),
+            gradient_b: Twist::of_force(force, &witness, pose_b.translation()),
             iterations: self.iterations,
         }
     }
 }
+
+/// Multipliers scaled so that those of A have the sum 1.
+fn normalized(of_a: &Multipliers, of_b: &Multipliers) -> (Multipliers, Multipliers) {
+    let total: f64 = of_a.iter().sum();
+    (of_a.map(|multiplier| multiplier / total), of_b.map(|multiplier| multiplier / total))
+}
+
+impl LevelProven {
+    fn answer(&self, a: &Body, pose_a: &Pose, pose_b: &Pose) -> LevelDistance {
+        let witness = pose_a.transform_point(&(a.normalization().center + Vector3::from(self.x)));
+        let force = pose_a.transform_direction(&Vector3::from(self.gradient));
+        LevelDistance {
+            status: Status::Converged,
+            lower: self.lower,
+            upper: self.upper,
+            witness,
+            multiplier: self.multiplier,
+            saturated: false,
+            gradient_a: Twist::of_force(-force, &witness, pose_a.translation()),
+            gradient_b: Twist::of_force(force, &witness, pose_b.translation()),
+            iterations: self.rounds,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -18,6 +18,7 @@ mod growth;
 mod half_space;
 mod impact;
 mod level;
+mod level_smooth;
 mod linear;
 mod motion;
 mod newton;

@@ -328,14 +328,22 @@ pub(super) struct LevelNewton {
 }
 
 impl LevelNewton {
-    /// Iterates until `accept` takes one or they stop converging; returns the steps taken.
-    pub(super) fn run(&mut self, pair: &Pair<'_>, mut accept: impl FnMut(&Self) -> bool) -> u32 {
+    /// Iterates until `accept` takes one, they stop converging or `stop` says so after that many steps; returns the steps taken.
+    pub(super) fn run(
+        &mut self,
+        pair: &Pair<'_>,
+        stop: impl Fn(u32) -> bool,
+        mut accept: impl FnMut(&Self) -> bool,
+    ) -> u32 {
         if self.a.len == 0 {
             return 0;
         }
         let mut s = self.start(pair);
         let mut last = f64::INFINITY;
         for step in 1..=MAX_STEPS {
+            if stop(step - 1) {
+                return step - 1;
+            }
             let Some(length) = self.step(pair, &mut s) else {
                 // Where both are flat the system is singular, but the point at hand with its multipliers may do.
                 accept(self);

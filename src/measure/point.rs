@@ -321,10 +321,10 @@ mod tests {
                     Pose::from_quaternion(*pose.translation(), turn.coords.into()).unwrap()
                 };
                 let slope = (value(&moved(h)) - value(&moved(-h))) / (2.0 * h);
-                assert!((slope - gradient.translation[axis]).abs() < 1e-5, "seed {seed}: {slope} {gradient:?}");
+                assert!((slope - gradient.linear[axis]).abs() < 1e-5, "seed {seed}: {slope} {gradient:?}");
                 let slope = (value(&turned(1e-4)) - value(&turned(-1e-4))) / 2e-4;
                 assert!(
-                    (slope - gradient.rotation[axis]).abs() < 1e-5 * (1.0 + size),
+                    (slope - gradient.angular[axis]).abs() < 1e-5 * (1.0 + size),
                     "seed {seed}: {slope} {gradient:?}"
                 );
             }

@@ -124,7 +124,7 @@ pub struct RayHit {
     pub status: Status,
     /// No point of the body comes before this parameter; proven. 0 if the ray starts inside.
     pub lower: f64,
-    /// The ray is in the body at this parameter; proven. 0 if the ray starts inside.
+    /// The ray has entered the body by this parameter; proven. 0 if the ray starts inside.
     pub upper: f64,
     /// The point of the ray at `upper`; for a swept ball the point of the body that it touches.
     pub point: Vector3<f64>,
@@ -200,12 +200,15 @@ fn earlier(one: &RayCast, other: &RayCast, tolerance: f64) -> RayCast {
     }
 }
 
+/// Radius in normalized coordinates at which most surfaces lie; any value gives the same answers.
+const TYPICAL_RADIUS: f64 = 0.9;
+
 /// Most evaluations along one ray; 3 to 6 are usual, and halving the bracket alone would need about 50.
 const MAX_STEPS: u32 = 96;
 
 fn cast_at(body: &Body, pose: &Pose, ray: &Ray, tolerance: f64, options: &Options<'_>) -> RayCast {
     let Some((along, mut entry)) = Along::new(body, pose, ray) else { return RayCast::Miss };
-    let mut s = entry.from;
+    let mut s = along.first(&entry);
     let mut normal = Vector3::zeros();
     // The last two steps, and how many looks in a row have changed nothing.
     let (mut steps, mut idle) = ([f64::INFINITY; 2], 0);
@@ -323,6 +326,18 @@ impl<'a> Along<'a> {
             );
         }
         Some((Self { body, base, start, velocity, start_error, velocity_error, errors }, entry))
+    }
+
+    /// Where to look first: the start of a ray that may start inside, else the entry of a ball in the normalized
+    /// coordinates, in which bodies have a radius of about 1.
+    fn first(&self, entry: &Entry) -> f64 {
+        if entry.from <= -self.base {
+            return entry.from;
+        }
+        let (a, b) = (self.velocity.norm_squared(), self.start.dot(&self.velocity));
+        let c = self.start.norm_squared() - TYPICAL_RADIUS * TYPICAL_RADIUS;
+        let guess = (-b - (b * b - a * c).max(0.0).sqrt()) / a;
+        if guess > entry.from && guess < entry.to { guess } else { entry.from }
     }
 
     /// All constraints at τ = s: cuts the interval with their tangents.

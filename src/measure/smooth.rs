@@ -75,6 +75,8 @@ impl Trace {
 pub(super) struct Proven {
     pub(super) lower: f64,
     pub(super) upper: f64,
+    /// Distance of x and y as computed.
+    pub(super) attained: f64,
     pub(super) x: V3<f64>,
     pub(super) y: V3<f64>,
     pub(super) n: V3<f64>,
@@ -285,6 +287,7 @@ impl Correct<'_> {
                 return Ok(Proven {
                     lower: found.lower,
                     upper: found.upper,
+                    attained: found.attained,
                     x,
                     y,
                     n,

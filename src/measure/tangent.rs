@@ -33,7 +33,7 @@ use nalgebra::Vector3;
 
 /// Bound of the error of a relative rotation in operator norm: both rotations are off by at most [`ROTATION_ERROR`]; their
 /// product, its matrix and sums with it round a few times more.
-const TURNED: f64 = 2.0 * ROTATION_ERROR + gamma(40);
+pub(super) const TURNED: f64 = 2.0 * ROTATION_ERROR + gamma(40);
 
 /// Where B stands as seen from A.
 #[derive(Clone, Copy, Debug)]
@@ -466,6 +466,8 @@ impl<N: Copy> Straight<N> {
 pub(super) struct Bracket<N> {
     pub(super) lower: N,
     pub(super) upper: N,
+    /// Distance of the points that attain the upper bound, as computed.
+    pub(super) attained: N,
     /// What rounding alone leaves between them, about.
     pub(super) rounding: N,
     /// Of A's and of B's constraint, metres.
@@ -480,10 +482,10 @@ pub(super) struct Bracket<N> {
 
 /// Relative slack for the rounding of the bracket's own arithmetic, basis included: fewer than 256 operations on the sum
 /// of magnitudes.
-const SLACK: f64 = 128.0 * f64::EPSILON;
+pub(super) const SLACK: f64 = 128.0 * f64::EPSILON;
 
 /// How much farther a point is moved than its constraint's linearization asks, for the rounding of its gradient.
-const NUDGE: f64 = 1e-4;
+pub(super) const NUDGE: f64 = 1e-4;
 
 /// The bracket from the constraints at x and y with `difference = x - y` in the basis. NaN where it proves nothing; it
 /// holds only if both points, and those extrapolated from, lie in their balls.
@@ -570,11 +572,12 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
     let (move_b, fine_b) = near_b.move_inside(simd, b.value - one + error_b, length_b, inverse_b, gradient_error_b);
     let (to_a, to_b) = (scaled(outward_a, move_a), scaled(outward_b, move_b));
     let between = subtract(add_scaled(difference, one, to_a), to_b);
-    let upper = dot(between, between).sqrt() * splat(1.0 + SLACK) + displaced + rounding;
+    let attained = dot(between, between).sqrt();
+    let upper = attained * splat(1.0 + SLACK) + displaced + rounding;
     let upper = upper.select(N::and(simd, fine_a, fine_b), splat(f64::NAN));
     let evaluated = of_a * splat(side_a.trust().value_error) + of_b * splat(side_b.trust().value_error);
     let rounding = splat(2.0) * (displaced + rounding + evaluated);
-    Bracket { lower, upper, rounding, multipliers: [of_a, of_b], normal, to_a, to_b }
+    Bracket { lower, upper, attained, rounding, multipliers: [of_a, of_b], normal, to_a, to_b }
 }
 
 /// What is known of one body's active constraint near the body, in metres.

@@ -269,7 +269,9 @@ fn near_contact_distances_shrink_by_what_is_moved() {
         let s = a.circumscribed().radius.max(b.circumscribed().radius);
         let far = 1.5 * (a.circumscribed().radius + b.circumscribed().radius);
         let pose = random_pose(&mut random, far);
-        let apart = cold(a, &Pose::identity(), b, &pose);
+        // Needles feel how exact the normal is.
+        let exact = Options::default().with_accuracy(1e-13).unwrap();
+        let apart = distance(a, &Pose::identity(), b, &pose, &exact, &mut WarmStart::default());
         let normal = apart.normal.unwrap();
         // Moving B along the normal brings it nearer by exactly as much.
         let gap = s * 10_f64.powf(-5.0 + 3.0 * random.signed());

@@ -1,5 +1,6 @@
 //! Warm starts: what one answer tells the next query of the same pair.
 
+use super::level_smooth::LevelTrace;
 use super::pair::Pair;
 use super::smooth::Trace;
 use nalgebra::Vector3;
@@ -28,6 +29,10 @@ pub(super) enum Hint {
     Smooth(Trace),
     /// A common point in A's frame.
     Overlap { point_a: Vector3<f64> },
+    /// Minimiser of a level distance on smooth parts of both bodies, with all that is known there.
+    LevelSmooth(LevelTrace),
+    /// The interior point of the first body of a level distance lay in the second.
+    Saturated,
     /// Minimiser of a level distance in B's frame.
     Level { x_b: Vector3<f64>, active_a: ActiveSet, active_b: ActiveSet },
     /// Witness of a single body in its frame.

@@ -15,7 +15,7 @@ pub use ceiling::{NEAR_LEVEL, ThirdCeiling};
 pub use gram::{CertificateError, HessianGram, HessianMonomial, Margin};
 pub use hessian_form::{Jet, NumberJet};
 pub use monomial::{Exponents, degree_of, monomials};
-pub use rounding::gamma;
+pub use rounding::{Growth, gamma};
 pub use simd::{Arch, Lanes, MAX_LANES, Number, Scalar, Simd, WithSimd, dispatch};
 
 use hessian_form::HessianForm;
@@ -133,6 +133,12 @@ impl Polynomial {
     /// values are within [`NEAR_LEVEL`] of 1.
     pub fn third_ceiling(&self, radius: f64) -> ThirdCeiling {
         ceiling::third_ceiling(self, radius, self.absolute.third_ceiling(2.0 * radius))
+    }
+
+    /// Bounds at all points with `|z_i| <= coordinate`, `|z| <= length`: tighter by a power of √3 for knowing both.
+    #[inline(always)]
+    pub fn growth(&self, coordinate: f64, length: f64) -> Growth {
+        self.absolute.growth(coordinate, length)
     }
 
     /// The same polynomial with `delta` added to its constant coefficient (rounded once); every other coefficient, and

@@ -21,6 +21,20 @@ pub const fn gamma(m: usize) -> f64 {
 /// that loss by at most `56 (1 + max |c|) max(1, r)^k`.
 const UNDERFLOW: f64 = 1e-300;
 
+/// How large a polynomial and its derivatives may be near a point, and how wrong when computed.
+#[derive(Clone, Copy, Debug)]
+pub struct Growth {
+    /// Bound of the error of a computed value, and of `value + gradient·δ + ½ δᵀHδ` computed at one point as what Taylor's
+    /// formula says, for δ that lead no farther than the bounds hold.
+    pub value_error: f64,
+    /// The same of a component of the gradient, and of `gradient + Hδ`.
+    pub gradient_error: f64,
+    /// Bound of the error of computed second derivatives along unit vectors.
+    pub curvature_error: f64,
+    /// Bound of the third derivatives along unit vectors.
+    pub third: f64,
+}
+
 /// `Q(r) = Σ_j C_j r^j` with the rounding count of the evaluation it bounds.
 #[derive(Clone, Debug)]
 pub(super) struct AbsolutePolynomial {
@@ -28,19 +42,30 @@ pub(super) struct AbsolutePolynomial {
     gamma: f64,
     sum: f64,
     degree: i32,
+    /// Entry j: the norm of the derivative of order j + 3 of the terms of degree j + 3, over j!.
+    third: [f64; 6],
+}
+
+fn factorial(n: usize) -> f64 {
+    (1..=n).fold(1.0, |product, i| product * i as f64)
 }
 
 impl AbsolutePolynomial {
     pub(super) fn new(degree: usize, terms: &[(Exponents, f64)]) -> Self {
         let mut by_degree = [0.0; 9];
+        let mut squares = [0.0; 9];
         for &(exponents, coefficient) in terms {
+            let factorials: f64 = exponents.iter().map(|&e| factorial(usize::from(e))).product();
             by_degree[degree_of(exponents)] += coefficient.abs();
+            squares[degree_of(exponents)] += coefficient * coefficient * factorials;
         }
+        // Σ over e of degree j of j! e! c_e² is the squared Frobenius norm of the derivative of order j.
+        let third = std::array::from_fn(|j| (squares[j + 3] * factorial(j + 3)).sqrt() / factorial(j) * (1.0 + 1e-13));
         // The sums, Horner's scheme and the arithmetic of the bounds below round too: fewer than 2 * 165 + 64 steps,
         // which only scale the bound by 1 + γ and are covered by counting 2 roundings more.
         let gamma = gamma(count(degree - 2) + degree + 12);
         let sum = by_degree.iter().sum();
-        Self { by_degree, gamma, sum, degree: degree as i32 }
+        Self { by_degree, gamma, sum, degree: degree as i32, third }
     }
 
     /// `Q(r)`, `Q'(r)`, `Q''(r)`.
@@ -89,9 +114,92 @@ impl AbsolutePolynomial {
         5.2 * third * (1.0 + 1e-13) + self.underflow(r)
     }
 
+    /// Bounds where `|z_i| <= coordinate`, `|z| <= length`.
+    ///
+    /// With both point and step in that range, the sums of absolute values of Taylor's formula are at most `Q` there. `Q`
+    /// bounds its own derivatives: `r Q'(r) <= k Q(r)`. The third derivative of the terms of degree j is a tensor applied
+    /// j - 3 times to z.
+    #[inline(always)]
+    pub(super) fn growth(&self, coordinate: f64, length: f64) -> Growth {
+        let q = self.by_degree.iter().rev().fold(0.0, |sum, &c| sum * coordinate + c);
+        let third = self.third.iter().rev().fold(0.0, |sum, &c| sum * length + c);
+        // In this range underflow is out of the question for all terms but those below 1e-230.
+        let tame = (1e-8..=1e8).contains(&coordinate);
+        // Twice: for the roundings of the formula itself.
+        let value_error = if tame { 2.0 * self.gamma * q * (1.0 + 1e-13) + 1e-230 } else { f64::NAN };
+        let per_length = f64::from(self.degree) / coordinate;
+        Growth {
+            value_error,
+            gradient_error: value_error * per_length,
+            curvature_error: 3.0 * value_error * per_length * per_length,
+            third: third * (1.0 + 1e-13),
+        }
+    }
+
     pub(super) fn gradient_error(&self, z: &Vector3<f64>, dz: &Vector3<f64>) -> f64 {
         let (r, d) = (z.amax(), dz.amax());
         let (_, dq, ddq) = self.jet(r + d);
         (self.gamma * dq + ddq * d) * (1.0 + 1e-13) + self.underflow(r)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::polynomial::tests::Seeded;
+    use crate::polynomial::{Polynomial, monomials};
+    use nalgebra::Vector3;
+
+    #[test]
+    fn growth_bounds_third_derivatives_and_extrapolations() {
+        for seed in 0..80 {
+            let mut random = Seeded(seed);
+            let degree = [2, 4, 6, 8][(seed % 4) as usize];
+            let terms = monomials(degree).into_iter().map(|e| (e, random.signed())).collect();
+            let p = Polynomial::new(terms).unwrap();
+            let mut tightest = f64::INFINITY;
+            for _ in 0..200 {
+                let z = Vector3::from_fn(|_, _| random.signed()) * 10_f64.powf(random.signed());
+                let step = Vector3::from_fn(|_, _| random.signed()) * 0.01 * z.norm();
+                let end = z + step;
+                let growth = p.growth(z.amax() + step.amax(), z.norm() + step.norm());
+                let (from, to) = (p.evaluate(&z), p.evaluate(&end));
+                let length = step.norm();
+                let slack = 2.0 * growth.value_error;
+                // Hessians differ by at most the third derivative times the length; gradients and values by its integrals.
+                let change = (to.hessian - from.hessian).symmetric_eigenvalues().amax();
+                assert!(change <= growth.third * length + 2.0 * growth.curvature_error, "seed {seed}");
+                let bent = from.hessian * step;
+                let gradient = (to.gradient - from.gradient - bent).norm();
+                assert!(gradient <= 0.5 * growth.third * length.powi(2) + 4.0 * growth.gradient_error, "seed {seed}");
+                let value = (to.value - from.value - from.gradient.dot(&step) - 0.5 * bent.dot(&step)).abs();
+                assert!(value <= growth.third * length.powi(3) / 6.0 + slack, "seed {seed}: {value}");
+                if degree > 2 {
+                    tightest = tightest.min(growth.third * length / change);
+                }
+            }
+            assert!(degree == 2 || tightest < 20.0, "seed {seed}: {tightest} times what is met");
+        }
+    }
+
+    #[test]
+    fn growth_bounds_the_rounding_of_small_steps() {
+        for seed in 0..40 {
+            let mut random = Seeded(100 + seed);
+            let degree = [2, 4, 6, 8][(seed % 4) as usize];
+            let terms = monomials(degree).into_iter().map(|e| (e, random.signed())).collect();
+            let p = Polynomial::new(terms).unwrap();
+            for _ in 0..200 {
+                let z = Vector3::from_fn(|_, _| random.signed()) * 10_f64.powf(random.signed());
+                // So short that the remainder is below rounding.
+                let step = Vector3::from_fn(|_, _| random.signed()) * 1e-7 * z.norm();
+                let end = z + step;
+                let exact = end - z;
+                let growth = p.growth(end.amax().max(z.amax()), end.norm().max(z.norm()));
+                let (from, to) = (p.evaluate(&z), p.evaluate(&end));
+                let value = from.value + from.gradient.dot(&exact) + 0.5 * exact.dot(&(from.hessian * exact));
+                let remainder = growth.third * exact.norm().powi(3) / 6.0;
+                assert!((value - to.value).abs() <= 2.0 * growth.value_error + remainder, "seed {seed}");
+            }
+        }
     }
 }

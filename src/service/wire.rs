@@ -227,6 +227,7 @@ pub(super) fn count(count: usize) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::Twist;
 
     #[test]
     fn a_bracket_without_an_end_has_not_converged() {
@@ -237,8 +238,18 @@ mod tests {
             (1.0, f64::INFINITY, wide),
             (f64::NAN, f64::NAN, wide),
         ] {
-            let (witness, iterations) = (Vector3::zeros(), 1);
-            let found = LevelDistance { status: Status::Converged, lower, upper, witness, iterations };
+            let none = Twist { linear: Vector3::zeros(), angular: Vector3::zeros() };
+            let found = LevelDistance {
+                status: Status::Converged,
+                lower,
+                upper,
+                witness: Vector3::zeros(),
+                multiplier: 0.0,
+                saturated: false,
+                gradient_a: none,
+                gradient_b: none,
+                iterations: 1,
+            };
             let sent = level_distance(&found);
             assert_eq!(sent.status(), says);
             assert_eq!((sent.lower.to_bits(), sent.upper.to_bits()), (lower.to_bits(), upper.to_bits()));

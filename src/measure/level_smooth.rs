@@ -1,0 +1,499 @@
+//! Level distance by continuation: from the last answer of a pair along its motion, where one constraint of each body is
+//! active.
+//!
+//! Points are given in B's normalized coordinates w, in which B never moves and its constraint g is evaluated without any
+//! error of place. A is carried along by the affine map `z = M_A x`, `x = K w + o` to its own normalized coordinates, x in metres
+//! in A's frame from its normalization's centre on: `C = M_A K`. For A's constraint p the optimality conditions are
+//!
+//! ```text
+//! G + μ b = 0,   g(w) = 1,   μ >= 0,   G = Cᵀ∇p(z),   b = ∇g(w)
+//! ```
+//!
+//! and with `H = Cᵀ∇²p C + μ ∇²g` Newton's step δ and its multiplier μ' follow from `H δ + μ' b = -G`, `b·δ = 1 - g`:
+//!
+//! ```text
+//! μ' = -(1 - g + b·H⁻¹G) / (b·H⁻¹b),   δ = -H⁻¹(G + μ' b),   μ = -G·b / b·b before
+//! ```
+//!
+//! H is regular wherever one of the bodies is curved, H⁻¹ by its cofactors.
+//!
+//! **Prediction.** The last answer's jets of p and g stay true however the bodies move, but then belong to two different points,
+//! z and w: with `s = C w + M_A o - z` the quadratic model of p has at w's image the gradient `∇p + ∇²p s`. So the first step
+//! needs no evaluation. What it misses is nearly the same each time along a smooth trajectory, and is added on.
+//!
+//! **Bracket**, at the point w' = w + δ where the step leads, values and gradients there by Taylor's formula from the one
+//! evaluation; with its remainders and all rounding errors, `η` for the error of x, metres:
+//!
+//! - From below, for any μ >= 0 and every point w'' of B, by `g(w'') <= 1`,
+//!   `p >= p(z') - |M_Aᵀ∇p| η + μ (g(w') - 1) + ρ·(w'' - w') + rise`, `ρ = G + μ b`, where the rise of the convex `p + μ g` over its
+//!   tangent plane is at least `¼ λ |w'' - w'|²` near w', λ a lower bound of the smallest eigenvalue of H around w', and
+//!   farther away in proportion to the distance. So `d >= p(z') - |M_Aᵀ∇p| η + μ (g(w') - 1) - |ρ|²/λ`: an error of the
+//!   point costs the square.
+//! - From above by a point of B, moved there along b (see [`super::tangent::bracket`]), and p there by its slope and curvature.
+//!
+//! The values of p range over orders of magnitude, and z lies outside A, where what [`crate::body::Trust`] knows of A does not
+//! hold: bounds for p are made at each point ([`crate::polynomial::Growth`]).
+
+use super::options::Options;
+use super::pose::Pose;
+use super::tangent::{NUDGE, Relative, SLACK, Side, TURNED};
+use super::vector::{
+    M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, subtract, times_transposed,
+};
+use crate::body::{Body, ConstraintTrust};
+use crate::polynomial::{NEAR_LEVEL, Number, NumberJet, Polynomial, Scalar, Simd, WithSimd, gamma};
+use nalgebra::Vector3;
+
+/// What is kept of an answer for the next query of the pair.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LevelTrace {
+    /// Active constraint of A and of B.
+    active: [u8; 2],
+    /// Where in A's normalized coordinates A's jet is of.
+    z: V3<f64>,
+    jet_a: NumberJet<f64>,
+    /// Where in B's normalized coordinates B's jet is of.
+    w: V3<f64>,
+    jet_b: NumberJet<f64>,
+    /// What the last prediction missed, in B's normalized coordinates.
+    drift: V3<f64>,
+}
+
+impl LevelTrace {
+    /// The trace of a minimiser, x in A's frame and y in B's.
+    pub(super) fn new(a: &Body, x: &Vector3<f64>, b: &Body, y: &Vector3<f64>, active: [u8; 2]) -> Self {
+        let local = |body: &Body, v: &Vector3<f64>, active: u8| {
+            let z: V3<f64> = (body.normalization().linear * (v - body.normalization().center)).into();
+            (z, body.constraints()[usize::from(active)].polynomial.jet(Scalar, z))
+        };
+        let ((z, jet_a), (w, jet_b)) = (local(a, x, active[0]), local(b, y, active[1]));
+        Self { active, z, jet_a, w, jet_b, drift: [0.0; 3] }
+    }
+}
+
+/// A proven bracket and where it is attained, in A's frame from its normalization's centre on, metres.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LevelProven {
+    pub(super) lower: f64,
+    pub(super) upper: f64,
+    pub(super) x: V3<f64>,
+    /// Gradient of A's constraint at x, per metre.
+    pub(super) gradient: V3<f64>,
+    /// Multiplier of B's constraint.
+    pub(super) multiplier: f64,
+    /// Evaluations of both bodies.
+    pub(super) rounds: u32,
+}
+
+/// Most evaluations before another method takes over.
+const MAX_ROUNDS: u32 = 8;
+
+/// Longest step, relative to B, that the linearization may mean anything for.
+const LONGEST: f64 = 0.5;
+
+/// Longest step that bounds are made for: relative to the distance from A's centre, or to B.
+const ROOM: f64 = 1.0 / 16.0;
+
+/// Continuation as work for the widest arithmetic.
+pub(super) struct FollowLevel<'a> {
+    pub(super) a: &'a Body,
+    pub(super) pose_a: &'a Pose,
+    pub(super) b: &'a Body,
+    pub(super) pose_b: &'a Pose,
+    pub(super) options: &'a Options<'a>,
+    /// Read, and replaced if the answer is proven.
+    pub(super) trace: &'a mut LevelTrace,
+}
+
+impl WithSimd for FollowLevel<'_> {
+    type Output = Result<LevelProven, u32>;
+
+    /// The proven answer, or how many rounds were spent in vain.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Result<LevelProven, u32> {
+        let Self { a, b, options, trace, .. } = self;
+        let [active_a, active_b] = trace.active.map(usize::from);
+        if active_a >= a.constraints().len() || active_b >= b.constraints().len() {
+            return Err(0);
+        }
+        let sides = Sides {
+            a,
+            b,
+            p: &a.constraints()[active_a].polynomial,
+            g: &b.constraints()[active_b].polynomial,
+            trust: &b.trust().constraints[active_b],
+            map: Map::new(simd, a, b, &Relative::new(simd, a, self.pose_a, b, self.pose_b)),
+        };
+        let image = sides.map.to_a(simd, sides.map.apply(simd, trace.w));
+        let moved = shifted(simd, &trace.jet_a, subtract::<S, f64>(image, trace.z));
+        let Some(step) = sides.newton(simd, &moved, &trace.jet_b) else { return Err(0) };
+        let predicted = plus(trace.w, step.delta);
+        let mut w = plus(predicted, trace.drift);
+        for rounds in 1..=MAX_ROUNDS {
+            if options.exhausted(rounds - 1) {
+                return Err(rounds - 1);
+            }
+            let x = sides.map.apply(simd, w);
+            let z = sides.map.to_a(simd, x);
+            let at = Evaluated { x, z, jet_a: sides.p.jet(simd, z), w, jet_b: sides.g.jet(simd, w) };
+            let Some(step) = sides.newton(simd, &at.jet_a, &at.jet_b) else { return Err(rounds) };
+            let found = sides.bracket(simd, &at, &step);
+            if found.upper - found.lower <= options.accuracy() * found.upper.abs().max(1.0) {
+                let attained = plus(plus(w, step.delta), found.inward);
+                if !sides.others_hold(simd, active_a, active_b, attained, found.upper) {
+                    return Err(rounds);
+                }
+                let drift = subtract::<S, f64>(plus(w, step.delta), predicted);
+                *trace = LevelTrace { active: trace.active, z, jet_a: at.jet_a, w, jet_b: at.jet_b, drift };
+                return Ok(LevelProven {
+                    lower: found.lower,
+                    upper: found.upper,
+                    x: sides.map.apply(simd, attained),
+                    gradient: found.gradient,
+                    multiplier: found.multiplier,
+                    rounds,
+                });
+            }
+            w = plus(w, step.delta);
+        }
+        Err(MAX_ROUNDS)
+    }
+}
+
+/// The map from B's normalized coordinates w to A's, with its errors.
+struct Map {
+    /// `K` in `x = K w + o`.
+    linear: M3<f64>,
+    /// `o`.
+    origin: V3<f64>,
+    /// `M_A` in `z = M_A x`.
+    to_a: M3<f64>,
+    /// `M_A K`.
+    both: M3<f64>,
+    /// Bound of the error of x, for w and steps within B's ball, metres.
+    displacement: f64,
+    /// Relative bound of the displacement that the rounding of z amounts to.
+    rounding: f64,
+    /// Bound of the error of `K` in operator norm.
+    turn: f64,
+}
+
+impl Map {
+    #[inline(always)]
+    fn new<S: Simd>(simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> Self {
+        let inverse = rows(simd, &b.inverse().transpose());
+        let (to_a, origin) = (rows(simd, &a.normalization().linear), relative.origin);
+        let linear = times_transposed::<S, f64>(&relative.rotation, &inverse);
+        let both = product::<S>(&to_a, &linear);
+        let trust = b.trust();
+        let turn = (TURNED + gamma(16)) * trust.inverse_norm + trust.inverse_error;
+        let far = origin[0].abs() + origin[1].abs() + origin[2].abs();
+        let rounding = a.trust().rounding;
+        Self {
+            linear,
+            origin,
+            to_a,
+            both,
+            // Twice: w and the step.
+            displacement: (relative.displacement + 2.0 * turn * trust.radius + gamma(4) * far) * (1.0 + 1e-13)
+                + rounding * trust.inverse_norm * trust.radius,
+            rounding,
+            turn,
+        }
+    }
+
+    #[inline(always)]
+    fn apply<S: Simd>(&self, _: S, w: V3<f64>) -> V3<f64> {
+        plus(apply::<S, f64>(&self.linear, w), self.origin)
+    }
+
+    #[inline(always)]
+    fn to_a<S: Simd>(&self, _: S, x: V3<f64>) -> V3<f64> {
+        apply::<S, f64>(&self.to_a, x)
+    }
+}
+
+/// Both bodies with their active constraints.
+struct Sides<'a> {
+    a: &'a Body,
+    b: &'a Body,
+    p: &'a Polynomial,
+    g: &'a Polynomial,
+    trust: &'a ConstraintTrust,
+    map: Map,
+}
+
+/// Both constraints at one point.
+struct Evaluated {
+    x: V3<f64>,
+    z: V3<f64>,
+    jet_a: NumberJet<f64>,
+    w: V3<f64>,
+    jet_b: NumberJet<f64>,
+}
+
+/// A Newton step.
+struct Step {
+    /// Change of w.
+    delta: V3<f64>,
+    /// Multiplier before the step, in H.
+    multiplier: f64,
+    /// Lower bound of the smallest eigenvalue of H, but for the errors of its entries.
+    curvature: f64,
+}
+
+/// A bracket at the end of a step.
+struct Bracket {
+    lower: f64,
+    upper: f64,
+    /// From there to a point of B, by w.
+    inward: V3<f64>,
+    /// Gradient of A's constraint in A's frame, per metre.
+    gradient: V3<f64>,
+    multiplier: f64,
+}
+
+impl Sides<'_> {
+    /// Newton's step; none if it leads nowhere.
+    #[inline(always)]
+    fn newton<S: Simd>(&self, _: S, a: &NumberJet<f64>, b: &NumberJet<f64>) -> Option<Step> {
+        let c = &self.map.both;
+        let [b0, b1, b2] = b.gradient;
+        let pulled = apply_transposed::<S, f64>(c, a.gradient);
+        let multiplier = -dot::<S, f64>(pulled, b.gradient) / dot::<S, f64>(b.gradient, b.gradient);
+        let [xx, xy, xz, yy, yz, zz] = a.hessian;
+        let bent = product::<S>(&[[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], c);
+        let mut h = b.hessian;
+        let mut k = 0;
+        for i in 0..3 {
+            for j in i..3 {
+                let pulled = fused::<S>(c[2][i], bent[2][j], fused::<S>(c[1][i], bent[1][j], c[0][i] * bent[0][j]));
+                h[k] = fused::<S>(multiplier, h[k], pulled);
+                k += 1;
+            }
+        }
+        let [xx, xy, xz, yy, yz, zz] = h;
+        let cofactors = [
+            yy * zz - yz * yz,
+            xz * yz - xy * zz,
+            xy * yz - xz * yy,
+            xx * zz - xz * xz,
+            xy * xz - xx * yz,
+            xx * yy - xy * xy,
+        ];
+        let determinant = xx * cofactors[0] + xy * cofactors[1] + xz * cofactors[2];
+        let u = apply_symmetric::<S, f64>(&cofactors, pulled);
+        let v = apply_symmetric::<S, f64>(&cofactors, b.gradient);
+        let excess = b.value - 1.0;
+        let next = (determinant * excess - dot::<S, f64>(u, b.gradient)) / (b0 * v[0] + b1 * v[1] + b2 * v[2]);
+        let delta = scaled(add_scaled::<S, f64>(u, next, v), -1.0 / determinant);
+        // The determinant over the square of half the trace, as in the tangent plane's bracket.
+        let half_trace = 0.5 * (xx + yy + zz);
+        let curvature = determinant / (half_trace * half_trace) - 256.0 * f64::EPSILON * half_trace;
+        let longest = LONGEST * self.b.trust().radius;
+        (multiplier > 0.0 && dot::<S, f64>(delta, delta) <= longest * longest).then_some(Step {
+            delta,
+            multiplier,
+            curvature,
+        })
+    }
+
+    /// The bracket at the end of a step; NaN where nothing is proven.
+    #[inline(always)]
+    fn bracket<S: Simd>(&self, _: S, at: &Evaluated, step: &Step) -> Bracket {
+        let Self { map, .. } = self;
+        let (trust_a, trust_b) = (self.a.trust(), self.b.trust());
+        let norm = |v: V3<f64>| dot::<S, f64>(v, v).sqrt();
+        let sum = |v: V3<f64>| v[0].abs() + v[1].abs() + v[2].abs();
+
+        // A at the end of the step, with errors that hold as far again.
+        let dz = map.to_a_step::<S>(step.delta);
+        let bent = apply_symmetric::<S, f64>(&at.jet_a.hessian, dz);
+        let value_a = at.jet_a.value + dot::<S, f64>(dz, add_scaled::<S, f64>(at.jet_a.gradient, 0.5, bent));
+        let gradient_z = plus(at.jet_a.gradient, bent);
+        let length = norm(at.z);
+        let room = ROOM * if length > trust_a.radius { length } else { trust_a.radius };
+        let coordinate = at.z.iter().fold(0.0_f64, |most, entry| if entry.abs() > most { entry.abs() } else { most });
+        let growth = self.p.growth(coordinate + 2.0 * room, length + 2.0 * room);
+        let step_a = norm(dz);
+        let half_third_a = 0.5 * growth.third * step_a * step_a * (1.0 + 1e-12);
+        let error_a = growth.value_error + half_third_a * step_a * (1.0 / 3.0 + 1e-9);
+        // 1.8 > √3.
+        let gradient_error = 1.8 * growth.gradient_error + half_third_a + gamma(16) * sum(gradient_z);
+        let gradient = apply_transposed::<S, f64>(&map.to_a, gradient_z);
+        let slope = norm(gradient) * (1.0 + 1e-14) + trust_a.linear_norm * gradient_error;
+        let pulled = apply_transposed::<S, f64>(&map.linear, gradient);
+        let displaced = map.displacement + map.rounding * sum(at.x);
+        let trace = |h: &[f64; 6]| h[0] + h[3] + h[5];
+        let (trace_a, trace_b) = (trace(&at.jet_a.hessian), trace(&at.jet_b.hessian));
+        let ceiling_a = trace_a + growth.third * 2.0 * room + growth.curvature_error;
+        let spread = map.both.iter().map(|row| dot::<S, f64>(*row, *row)).sum::<f64>().sqrt() * (1.0 + 1e-12)
+            + trust_a.linear_norm * map.turn;
+        let rounded = gamma(16) * trust_a.linear_norm * trust_b.inverse_norm * sum(gradient_z);
+        let pulled_error =
+            spread * (gradient_error + ceiling_a * trust_a.linear_norm * displaced) + slope * map.turn + rounded;
+
+        // B at the end of the step.
+        let bent = apply_symmetric::<S, f64>(&at.jet_b.hessian, step.delta);
+        let value_b = at.jet_b.value + dot::<S, f64>(step.delta, add_scaled::<S, f64>(at.jet_b.gradient, 0.5, bent));
+        let b = plus(at.jet_b.gradient, bent);
+        let third = self.trust.third;
+        let room_b = (0.5 * third.leeway).min(ROOM * trust_b.radius);
+        let step_b = norm(step.delta);
+        let half_third_b = 0.5 * third.ceiling * step_b * step_b * (1.0 + 1e-12);
+        // Four times: twice for Taylor's formula, and (17/16)⁸ < 2 for the step out of the ball.
+        let error_b = 4.0 * self.trust.value_error + half_third_b * step_b * (1.0 / 3.0 + 1e-9);
+        let b_error = 4.0 * self.trust.gradient_error / trust_b.linear_norm + half_third_b;
+
+        // Lower bound.
+        let square = dot::<S, f64>(b, b);
+        let inverse = 1.0 / square.sqrt();
+        let multiplier = -dot::<S, f64>(pulled, b) * (inverse * inverse);
+        let off = norm(add_scaled::<S, f64>(pulled, multiplier, b))
+            + (pulled_error + multiplier * b_error)
+            + SLACK * sum(pulled);
+        let entries = spread * spread * growth.curvature_error
+            + trace_a * spread * trust_a.linear_norm * (3.0 * map.turn + gamma(64) * trust_b.inverse_norm)
+            + step.multiplier * (self.trust.curvature_error + gamma(64) * trace_b);
+        let bending_a = growth.third * spread * spread;
+        let bending = bending_a * spread + multiplier * third.ceiling;
+        let kept = if multiplier < step.multiplier { multiplier / step.multiplier } else { 1.0 };
+        let curvature = kept * (step.curvature - entries) - (bending_a * step_a + multiplier * third.ceiling * step_b);
+        let reach = room_b.min(room / spread);
+        // Second derivatives fall by at most `bending` per length.
+        let slope_there =
+            0.25 * curvature * if 1.5 * curvature < bending * reach { 1.5 * curvature / bending } else { reach };
+        let span = trust_b.radius * (1.0 + ROOM) + self.b.z_extent().norm() * (1.0 + 1e-14);
+        let loss =
+            if curvature > 0.0 && off <= slope_there { (off * off / curvature).min(off * span) } else { off * span };
+        let fall = multiplier * (value_b - 1.0 - error_b);
+        let slack = SLACK * (value_a.abs() + multiplier * (1.0 + value_b.abs()) + loss + error_a) + slope * displaced;
+        let lower = value_a - error_a + fall - loss - slack;
+
+        // Upper bound: into B along b, as far as its curvature may ask.
+        let excess = value_b - 1.0 + error_b;
+        let ceiling = trace_b + third.ceiling * (step_b + room_b) + 2.0 * self.trust.curvature_error;
+        let q = ceiling * excess.abs() * inverse * inverse * (1.0 + 1e-9);
+        let distance = (excess + excess.abs() * (2.0 * q + NUDGE)) * inverse;
+        let way = distance.abs();
+        let lift = spread * way + trust_a.linear_norm * displaced;
+        let upper = value_a
+            + error_a
+            + distance * multiplier * square * inverse
+            + (way * pulled_error + 0.5 * ceiling_a * lift * lift)
+            + slack
+            + SLACK * way * sum(pulled);
+
+        let inside = dot::<S, f64>(at.w, at.w) <= trust_b.radius * trust_b.radius
+            && (at.jet_b.value - 1.0).abs() <= NEAR_LEVEL
+            && step_b <= room_b
+            && way <= room_b
+            && step_a <= room
+            && lift <= room
+            && multiplier >= 0.0
+            && q <= 0.1
+            && b_error * (4.0 / NUDGE) * inverse <= 1.0;
+        Bracket {
+            lower: if inside { lower } else { f64::NAN },
+            upper,
+            inward: scaled(b, -distance * inverse),
+            gradient,
+            multiplier,
+        }
+    }
+
+    /// Whether at the point w of B's normalized coordinates the other constraints of B are proven to hold, and those of A not
+    /// to exceed `upper`.
+    #[inline(always)]
+    fn others_hold<S: Simd>(&self, simd: S, active_a: usize, active_b: usize, w: V3<f64>, upper: f64) -> bool {
+        let mut hold = true;
+        let (trust_a, trust_b) = (self.a.trust(), self.b.trust());
+        if self.b.constraints().len() > 1 {
+            hold &= dot::<S, f64>(w, w) <= trust_b.radius * trust_b.radius;
+            for (i, constraint) in self.b.constraints().iter().enumerate().filter(|(i, _)| *i != active_b) {
+                // Twice: w itself is rounded.
+                hold &= constraint.polynomial.jet(simd, w).value + 2.0 * trust_b.constraints[i].value_error <= 1.0;
+            }
+        }
+        if self.a.constraints().len() > 1 {
+            let x = self.map.apply(simd, w);
+            let z = Vector3::from(self.map.to_a(simd, x));
+            let far = x[0].abs() + x[1].abs() + x[2].abs();
+            let dz = Vector3::repeat(trust_a.linear_norm * (self.map.displacement + self.map.rounding * far));
+            for (_, constraint) in self.a.constraints().iter().enumerate().filter(|(i, _)| *i != active_a) {
+                let jet = constraint.polynomial.jet(simd, z.into());
+                hold &= jet.value + constraint.polynomial.value_error(&z, &Vector3::from(jet.gradient), &dz) < upper;
+            }
+        }
+        hold
+    }
+}
+
+impl Map {
+    /// Change of z by a step of w.
+    #[inline(always)]
+    fn to_a_step<S: Simd>(&self, delta: V3<f64>) -> V3<f64> {
+        apply::<S, f64>(&self.to_a, apply::<S, f64>(&self.linear, delta))
+    }
+}
+
+/// The quadratic model of a jet, about a point `by` away.
+#[inline(always)]
+fn shifted<S: Simd>(_: S, jet: &NumberJet<f64>, by: V3<f64>) -> NumberJet<f64> {
+    let bent = apply_symmetric::<S, f64>(&jet.hessian, by);
+    // The value is not needed for the step.
+    NumberJet { value: f64::NAN, gradient: plus(jet.gradient, bent), hessian: jet.hessian }
+}
+
+/// Whether the interior point of A is proven to lie in B: then B does not hold the minimiser of A's polynomial back.
+pub(super) struct Saturated<'a> {
+    pub(super) a: &'a Body,
+    pub(super) pose_a: &'a Pose,
+    pub(super) b: &'a Body,
+    pub(super) pose_b: &'a Pose,
+}
+
+impl WithSimd for Saturated<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> bool {
+        let Self { a, b, .. } = self;
+        let relative = Relative::new(simd, a, self.pose_a, b, self.pose_b);
+        let from = a.interior_point();
+        let x = from - a.normalization().center;
+        let displaced = relative.displacement + gamma(4) * (from.norm() + a.normalization().center.norm());
+        let trust = b.trust();
+        let dz = trust.linear_norm * displaced;
+        let mut hold = displaced <= trust.leeway;
+        for (i, constraint) in trust.constraints.iter().enumerate() {
+            let (jet, inside) = Side::away(b, i, &relative).jet(simd, x.into());
+            let slope =
+                dot::<S, f64>(jet.gradient, jet.gradient).sqrt() + constraint.gradient_error / trust.linear_norm;
+            let rise = slope * dz + constraint.curvature_ceiling * displaced * displaced;
+            hold &= inside && jet.value + constraint.value_error + 1.01 * rise <= 1.0;
+        }
+        hold
+    }
+}
+
+/// `M N`. No closures here: they would not be compiled for the widest arithmetic.
+#[inline(always)]
+fn product<S: Simd>(m: &M3<f64>, n: &M3<f64>) -> M3<f64> {
+    [apply_transposed::<S, f64>(n, m[0]), apply_transposed::<S, f64>(n, m[1]), apply_transposed::<S, f64>(n, m[2])]
+}
+
+#[inline(always)]
+fn plus(a: V3<f64>, b: V3<f64>) -> V3<f64> {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+#[inline(always)]
+fn fused<S: Simd>(a: f64, b: f64, c: f64) -> f64 {
+    <f64 as Number<S>>::mul_add(a, b, c)
+}
+
+#[inline(always)]
+fn scaled(v: V3<f64>, s: f64) -> V3<f64> {
+    [v[0] * s, v[1] * s, v[2] * s]
+}
