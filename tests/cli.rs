@@ -167,8 +167,8 @@ fn measure_prints_one_line_a_pose() {
     assert!((one["distance_m"].as_f64().unwrap() - d).abs() < 1e-8);
     let times = json(&["measure", text(&body), text(&body), "--poses", text(&poses), "--time"]);
     assert_eq!(keys(&times), ["distance", "level"]);
-    for measure in ["distance", "level"] {
-        assert_eq!(keys(&times[measure]), sorted("queries cold_ns warm_ns"));
+    for (measure, fields) in [("distance", "queries cold_ns warm_ns batch_ns"), ("level", "queries cold_ns warm_ns")] {
+        assert_eq!(keys(&times[measure]), sorted(fields));
         assert_eq!(times[measure]["queries"], 3);
         assert!(times[measure]["cold_ns"].as_f64().unwrap() > 0.0);
     }

@@ -70,7 +70,8 @@ fn cpu() -> String {
 }
 
 /// The widest vectors of this machine, which the kernel chooses at run time.
-fn simd() -> &'static str {
+/// The widest arithmetic of this processor.
+pub(crate) fn simd() -> &'static str {
     #[cfg(target_arch = "x86_64")]
     {
         if is_x86_feature_detected!("avx512f") {

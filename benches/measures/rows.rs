@@ -1,12 +1,13 @@
 //! The rows: one function each, listed in [`all`].
 
+use crate::machine;
 use crate::motion::{self, Kind, Trajectory};
 use crate::objects::{DEGREES, Pair, folder};
 use crate::peers::{Hulls, parry_pose};
 use crate::sweep::{Answer, Row, Target};
 use std::error::Error;
 use std::fs;
-use sublevel::measure::{Options, Pose, WarmStart, distance, level_distance};
+use sublevel::measure::{Distance, Options, Pose, WarmStart, distance, distance_batch, level_distance};
 
 /// Label of coal's rows.
 pub(crate) const COAL_WARM: &str = "coal GJK warm";
@@ -16,6 +17,9 @@ pub(crate) const PARRY_COLD: &str = "parry GJK cold";
 
 /// The degree of the peers' poses, and of the rows that are not timed at every degree.
 pub(crate) const DEGREE: usize = 6;
+
+/// Most poses of a batch.
+const BATCH: usize = 1024;
 
 /// A pair and its poses.
 pub(crate) struct Scene<'a> {
@@ -69,6 +73,7 @@ pub(crate) fn all<'a>(scene: &'a Scene<'a>) -> Vec<Row<'a>> {
     let mut rows = Vec::new();
     rows.extend(DEGREES.map(|degree| distance_warm(scene, degree)));
     rows.extend(DEGREES.map(|degree| distance_cold(scene, degree)));
+    rows.push(distance_batches(scene));
     rows.push(level_warm(scene));
     rows.push(level_cold(scene));
     rows.push(parry_cold(scene));
@@ -105,6 +110,22 @@ fn distance_cold<'a>(scene: &'a Scene<'a>, degree: usize) -> Row<'a> {
     });
     let row = row.at_most(Target::MostIterations(30));
     if degree == DEGREE { row.at_most(scene.part(COAL_COLD, 0.9)) } else { row }
+}
+
+/// Consecutive poses, cold, as many at a time as the figures ask.
+fn distance_batches<'a>(scene: &'a Scene<'a>) -> Row<'a> {
+    let (a, b) = scene.pair.bodies(DEGREE);
+    let options = Options::default();
+    let batch = move |poses: &[Pose], answers: &mut [Distance]| {
+        distance_batch(a, &Pose::identity(), b, poses, &options, answers)
+            .expect("there are poses, and places for answers");
+    };
+    let judge = |answer: &Distance| Answer::new(answer.iterations, answer.status, answer.lower <= 0.0);
+    let nanoseconds = if machine::simd() == "AVX-512" { 120.0 } else { 200.0 };
+    let nanoseconds = if scene.kind == Kind::Grazing { 2.0 * nanoseconds } else { nanoseconds };
+    Row::batches(format!("distance batches, degree {DEGREE}"), scene.poses(DEGREE), BATCH, batch, judge)
+        .at_most(Target::Nanoseconds(nanoseconds))
+        .at_most(Target::MostIterations(30))
 }
 
 fn level_warm<'a>(scene: &'a Scene<'a>) -> Row<'a> {

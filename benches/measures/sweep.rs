@@ -1,5 +1,6 @@
 //! A row: one query over all poses, timed pass by pass.
 
+use std::cell::RefCell;
 use std::hint::black_box;
 use std::time::Instant;
 use sublevel::measure::Status;
@@ -45,8 +46,7 @@ impl Tally {
 pub(crate) enum Target {
     /// Part of the time of the row with this label.
     PartOf(&'static str, f64),
-    /// Nanoseconds on machines of the class named in the figures: growth distance, rays, depth and batches have such.
-    #[allow(dead_code)]
+    /// Nanoseconds on machines of the class named in the figures.
     Nanoseconds(f64),
     /// Iterations on average.
     MeanIterations(f64),
@@ -96,6 +96,38 @@ impl<'a> Row<'a> {
         query: impl Fn(&P) -> Answer + 'a,
     ) -> Self {
         Self::warm(label, trajectories, move |pose, (): &mut ()| query(pose))
+    }
+
+    /// A row of batches of up to `most` consecutive poses; `batch` writes its answers where it is told to.
+    pub(crate) fn batches<P, T: Clone + Default>(
+        label: impl Into<String>,
+        trajectories: &'a [Vec<P>],
+        most: usize,
+        batch: impl Fn(&[P], &mut [T]) + 'a,
+        judge: impl Fn(&T) -> Answer,
+    ) -> Self {
+        let longest = trajectories.iter().map(Vec::len).max().unwrap_or(0);
+        let places = RefCell::new(vec![T::default(); longest.min(most)]);
+        let mut tally = Tally::default();
+        for poses in trajectories.iter().flat_map(|trajectory| trajectory.chunks(most)) {
+            let answers = &mut places.borrow_mut()[..poses.len()];
+            batch(poses, answers);
+            answers.iter().for_each(|answer| tally.add(&judge(answer)));
+        }
+        let time = Box::new(move || {
+            let timed = |trajectory: &Vec<P>| {
+                let mut places = places.borrow_mut();
+                let start = Instant::now();
+                for poses in trajectory.chunks(most) {
+                    let answers = &mut places[..poses.len()];
+                    batch(black_box(poses), answers);
+                    black_box(answers);
+                }
+                start.elapsed().as_nanos() as f64
+            };
+            trajectories.iter().map(timed).collect()
+        });
+        Self { label: label.into(), targets: Vec::new(), tally, passes: Vec::new(), time }
     }
 
     /// The same row with a target.

@@ -18,7 +18,7 @@ mod trust;
 pub use compound::{Compound, CompoundError, MAX_PARTS, Solid};
 pub use file::BodyFileError;
 pub use id::{BodyId, ParseIdError};
-pub use outline::Outline;
+pub use outline::{Mark, Outline};
 pub use placement::{Placement, Sample};
 pub use sphere::Sphere;
 pub use surface::Volume;
@@ -247,11 +247,7 @@ impl Body {
         let boundary_z = boundary.iter().map(|x| normalization.linear * (x - normalization.center));
         let interior_z = normalization.linear * (interior_point - normalization.center);
         let trust = Trust::new(&constraints, &normalization.linear, &inverse, &z_extent, boundary_z, &interior_z);
-        let rays = Sphere::fine().vertices().iter().map(|u| {
-            let ray = inverse * u * surface::radius(&constraints, &interior_z, u);
-            (interior_point + ray - normalization.center, placement.highest(&constraints, &(interior_point + ray)))
-        });
-        let outline = Outline::new(rays.collect());
+        let outline = Outline::new(&constraints, &inverse, &interior_z, trust.radius);
         let volume = surface::volume(&constraints, &normalization.linear, &interior_z);
         let id = BodyId::of(&normalization, &constraints, None);
         Ok(Self {

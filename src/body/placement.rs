@@ -119,12 +119,6 @@ impl Placement {
         self.pull_back(constraint.polynomial.evaluate(&(self.linear * (v - self.origin))))
     }
 
-    /// Which of the constraints is largest at the point v, up to rounding.
-    pub(super) fn highest(&self, constraints: &[Constraint], v: &Vector3<f64>) -> u8 {
-        let values = constraints.iter().map(|constraint| self.jet(constraint, v).value);
-        (0_u8..).zip(values).max_by(|p, q| p.1.total_cmp(&q.1)).map_or(0, |(index, _)| index)
-    }
-
     /// Constraint at the point v, with error bounds.
     #[inline]
     pub fn sample(&self, constraint: &Constraint, v: &Vector3<f64>) -> Sample {

@@ -42,6 +42,24 @@ pub struct Distance {
     pub iterations: u32,
 }
 
+impl Default for Distance {
+    /// What is known of any two bodies: a place for an answer.
+    fn default() -> Self {
+        Self {
+            status: Status::BracketWide,
+            lower: 0.0,
+            upper: f64::INFINITY,
+            witness_a: Vector3::zeros(),
+            witness_b: Vector3::zeros(),
+            normal: None,
+            active_a: ActiveConstraints::default(),
+            active_b: ActiveConstraints::default(),
+            attained: f64::INFINITY,
+            iterations: 0,
+        }
+    }
+}
+
 impl Distance {
     /// The answer: the middle of the bracket.
     pub fn value(&self) -> f64 {

@@ -36,8 +36,10 @@
 
 use super::options::Options;
 use super::pose::Pose;
-use super::tangent::{NUDGE, Relative, SLACK, Side, TURNED, rows};
-use super::vector::{M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, dot, subtract, times_transposed};
+use super::tangent::{NUDGE, Relative, SLACK, Side, TURNED};
+use super::vector::{
+    M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, subtract, times_transposed,
+};
 use crate::body::{Body, ConstraintTrust};
 use crate::polynomial::{NEAR_LEVEL, Number, NumberJet, Polynomial, Scalar, Simd, WithSimd, gamma};
 use nalgebra::Vector3;

@@ -8,6 +8,7 @@
 //! knows neither clock nor allocator nor threads.
 
 mod active;
+mod batch;
 mod bracket;
 mod curvature;
 mod decide;
@@ -31,6 +32,7 @@ mod ray;
 mod signed;
 mod single;
 mod smooth;
+mod start;
 mod sweep;
 mod tangent;
 mod twist;
@@ -39,6 +41,7 @@ mod vector;
 mod warm;
 
 pub use active::ActiveConstraints;
+pub use batch::{BatchError, distance_batch};
 pub use curvature::translation_hessian;
 pub use decide::{Decision, ThresholdError, WithinMargin, nearer_than, overlap, within_margin};
 pub use distance::{Distance, distance};

@@ -7,9 +7,10 @@
 
 use super::decide::Goal;
 use super::pose::Pose;
+use super::start::facing;
 use super::tangent::{Bend, Plane, Relative, Side, Step, bracket, moved, newton};
-use super::vector::{M3, V3, add_scaled, apply, apply_transposed, basis, dot, subtract};
-use crate::body::Body;
+use super::vector::{M3, V3, apply, apply_transposed, basis, dot, subtract};
+use crate::body::{Body, Outline};
 use crate::polynomial::{NumberJet, Scalar, Simd, WithSimd};
 use nalgebra::Vector3;
 
@@ -89,16 +90,16 @@ pub(super) struct Proven {
 const MAX_ROUNDS: u32 = 8;
 
 /// Most evaluations from a cold start before another method takes over.
-pub(super) const SEEK_ROUNDS: u32 = 12;
+pub(super) const SEEK_ROUNDS: u32 = 16;
 
 /// Slope of a gradient against the normal, beyond which the normal is chosen anew.
 const STEEP: f64 = 0.1;
 
 /// Length of a step relative to the longest, beyond which no extrapolation is close enough for a bracket.
-const WORTH_A_BRACKET: f64 = 1e-2;
+pub(super) const WORTH_A_BRACKET: f64 = 1e-2;
 
 /// Longest step relative to the bodies' sizes that the linearization may mean anything for.
-const LONGEST: f64 = 0.25;
+pub(super) const LONGEST: f64 = 0.25;
 
 /// Continuation as work for the widest arithmetic.
 pub(super) struct Follow<'a> {
@@ -162,8 +163,8 @@ impl WithSimd for Follow<'_> {
     }
 }
 
-/// A start from nothing but the poses, as work for the widest arithmetic: the boundary points nearest to the other body, as
-/// the outlines of both show them, and Newton's method from there.
+/// A start from nothing but the poses, as work for the widest arithmetic: where the bodies face each other, as their
+/// outlines show it, and Newton's method from there.
 pub(super) struct Seek<'a> {
     pub(super) a: &'a Body,
     pub(super) pose_a: &'a Pose,
@@ -177,9 +178,6 @@ pub(super) struct Seek<'a> {
     pub(super) limit: u32,
 }
 
-/// Steps of Gilbert's algorithm before Newton's.
-const PASSES: u32 = 8;
-
 impl WithSimd for Seek<'_> {
     type Output = Result<(Proven, Trace), u32>;
 
@@ -187,37 +185,31 @@ impl WithSimd for Seek<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Result<(Proven, Trace), u32> {
         let relative = Relative::new(simd, self.a, self.pose_a, self.b, self.pose_b);
-        // Gilbert's algorithm on the outlines: `between` is a difference of points of the two, and shrinks towards the smallest
-        // one along the line to the extreme difference against it. The query frame starts at A's centre.
-        let mut between = [-relative.origin[0], -relative.origin[1], -relative.origin[2]];
-        let (mut x, mut y) = ([0.0; 3], relative.origin);
-        let mut active = [0, 0];
-        for _ in 0..PASSES {
-            (x, active[0]) = self.a.outline().farthest([-between[0], -between[1], -between[2]]);
-            let own = apply_transposed::<S, f64>(&relative.rotation, between);
-            let found = self.b.outline().farthest(own);
-            active[1] = found.1;
-            y = plus(apply::<S, f64>(&relative.rotation, found.0), relative.origin);
-            let extreme = subtract::<S, f64>(subtract::<S, f64>(x, y), between);
-            let square = dot::<S, f64>(extreme, extreme);
-            let fraction = (-dot::<S, f64>(between, extreme) / square).min(1.0);
-            if !(fraction > 1e-3) {
-                break;
-            }
-            between = add_scaled::<S, f64>(between, fraction, extreme);
-        }
-        let length = dot::<S, f64>(between, between).sqrt();
-        if !(length > 0.0) {
-            return Err(0);
-        }
-        let frame = basis(simd, [between[0] / length, between[1] / length, between[2] / length]);
-        let side_a = Side::at_home(simd, self.a, usize::from(active[0]));
-        let side_b = Side::away(self.b, usize::from(active[1]), &relative);
+        let n = facing(simd, self.a, self.b, &relative);
+        let own = apply_transposed::<S, f64>(&relative.rotation, n);
+        let (place_a, place_b) = (Outline::place(simd, [-n[0], -n[1], -n[2]]), Outline::place(simd, own));
+        let (outline_a, outline_b) = (self.a.outline(), self.b.outline());
+        let (active_a, active_b) = (outline_a.active(place_a), outline_b.active(place_b));
+        let (mark_a, mark_b) = (outline_a.mark(simd, place_a), outline_b.mark(simd, place_b));
+        let side_a = Side::at_home(simd, self.a, active_a);
+        let side_b = Side::away(self.b, active_b, &relative);
         let longest = LONGEST * self.a.trust().reach.min(self.b.trust().reach);
         let correct =
             Correct { sides: (side_a, side_b), goal: self.goal, tolerance: self.tolerance, limit: self.limit, longest };
-        let mut trace = Trace::blank(active);
-        let proven = correct.run(simd, &relative, Iterate { x, y, frame }, &mut trace)?;
+        // The first step from the marks needs no evaluation.
+        let y = plus(apply::<S, f64>(&relative.rotation, mark_b.point), relative.origin);
+        let mut at = Iterate { x: mark_a.point, y, frame: basis(simd, n) };
+        let (local_a, local_b) = (side_a.localize(simd, &at.frame), side_b.localize(simd, &at.frame));
+        let (a, b) = (Plane::new(simd, &mark_a.jet, &local_a), Plane::new(simd, &mark_b.jet, &local_b));
+        let (bend_a, bend_b) = (Bend::new(simd, &mark_a.jet, &local_a), Bend::new(simd, &mark_b.jet, &local_b));
+        let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
+        let step = newton(simd, (&a, &bend_a), (&b, &bend_b), difference, 0.0);
+        let square = step.square(simd);
+        if square.is_finite() {
+            at.advance(simd, &step.at_most(simd, longest, square));
+        }
+        let mut trace = Trace::blank([active_a as u8, active_b as u8]);
+        let proven = correct.run(simd, &relative, at, &mut trace)?;
         Ok((proven, trace))
     }
 }
@@ -327,9 +319,8 @@ impl Iterate {
         let length_a = dot::<S, f64>(of_a, of_a).sqrt();
         let length_b = dot::<S, f64>(of_b, of_b).sqrt();
         let middle = [0, 1, 2].map(|i| of_b[i] / length_b - of_a[i] / length_a);
-        let length = dot::<S, f64>(middle, middle).sqrt();
-        let n = apply_transposed::<S, f64>(&self.frame, middle.map(|entry| entry / length));
-        (length > 0.5).then(|| basis(simd, n))
+        let n = apply_transposed::<S, f64>(&self.frame, middle);
+        (dot::<S, f64>(middle, middle) > 0.25).then(|| basis(simd, n))
     }
 
     /// Takes a step; the basis follows the normal.
@@ -338,8 +329,7 @@ impl Iterate {
         self.x = moved::<S, f64>(self.x, step.dx, &self.frame);
         self.y = moved::<S, f64>(self.y, step.dy, &self.frame);
         let turned = moved::<S, f64>(self.frame[2], [step.dn[0], step.dn[1], 0.0], &self.frame);
-        let inverse = 1.0 / dot::<S, f64>(turned, turned).sqrt();
-        self.frame = basis(simd, [turned[0] * inverse, turned[1] * inverse, turned[2] * inverse]);
+        self.frame = basis(simd, turned);
     }
 }
 

@@ -24,26 +24,16 @@
 //! are the rows of the basis.
 
 use super::pose::{Pose, ROTATION_ERROR};
-use super::vector::{M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, dot, subtract, times_transposed};
+use super::vector::{
+    M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, scaled, subtract, times_transposed,
+};
 use crate::body::{Body, ConstraintTrust};
 use crate::polynomial::{NEAR_LEVEL, Number, NumberJet, Simd, gamma};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 /// Bound of the error of a relative rotation in operator norm: both rotations are off by at most [`ROTATION_ERROR`]; their
 /// product, its matrix and sums with it round a few times more.
 pub(super) const TURNED: f64 = 2.0 * ROTATION_ERROR + gamma(40);
-
-/// The matrix by rows, the same in every lane.
-#[inline(always)]
-pub(super) fn rows<S: Simd, N: Number<S>>(simd: S, m: &Matrix3<f64>) -> M3<N> {
-    let mut rows = [[N::splat(simd, 0.0); 3]; 3];
-    for i in 0..3 {
-        for j in 0..3 {
-            rows[i][j] = N::splat(simd, m[(i, j)]);
-        }
-    }
-    rows
-}
 
 /// Where B stands as seen from A.
 #[derive(Clone, Copy, Debug)]
@@ -133,6 +123,15 @@ impl<'a, N: Copy> Side<'a, N> {
         Self { body, active, linear, origin, displacement }
     }
 
+    /// A gradient by normalized coordinates as one by metres.
+    #[inline(always)]
+    pub(super) fn pulled_back<S: Simd>(&self, _: S, gradient: V3<N>) -> V3<N>
+    where
+        N: Number<S>,
+    {
+        apply_transposed(&self.linear, gradient)
+    }
+
     #[inline(always)]
     fn trust(&self) -> &'a ConstraintTrust {
         &self.body.trust().constraints[self.active]
@@ -180,15 +179,18 @@ impl<'a, N: Copy> Side<'a, N> {
             Plane { value, gradient: [dot(gradient, local[0]), dot(gradient, local[1]), dot(gradient, local[2])] };
         // Second derivatives fall by at most T per length. Within 3 μ / (2 T) a rise of ½ μ |δ|² keeps half of it, and being
         // convex it only steepens after that.
-        let ceiling = N::splat(simd, self.trust().third.ceiling);
+        let third_ceiling = self.trust().third.ceiling;
+        let ceiling = N::splat(simd, third_ceiling);
+        let length = square.sqrt();
         let error = N::splat(simd, self.trust().curvature_error);
-        let curvature = smallest_eigenvalue(simd, &jet.hessian) - error - ceiling * square.sqrt();
-        let radius = (N::splat(simd, 1.5) * curvature / ceiling).min(N::splat(simd, 0.5 * leeway));
+        let curvature = smallest_eigenvalue(simd, &jet.hessian) - error - ceiling * length;
+        let radius =
+            (N::splat(simd, 1.5 * (1.0 - 1e-12) / third_ceiling) * curvature).min(N::splat(simd, 0.5 * leeway));
         Extrapolated {
             plane,
             curvature,
             radius,
-            value_error: third * square.sqrt() * N::splat(simd, 1.0 / 3.0 + 1e-9),
+            value_error: third * length * N::splat(simd, 1.0 / 3.0 + 1e-9),
             gradient_error: third * N::splat(simd, self.body.trust().linear_norm),
         }
     }
@@ -288,12 +290,6 @@ fn apply2<S: Simd, N: Number<S>>(m: &Symmetric2<N>, v: [N; 2]) -> [N; 2] {
     [m[1].mul_add(v[1], m[0] * v[0]), m[2].mul_add(v[1], m[1] * v[0])]
 }
 
-#[inline(always)]
-fn inverse2<S: Simd, N: Number<S>>(simd: S, m: &Symmetric2<N>) -> Symmetric2<N> {
-    let factor = N::splat(simd, 1.0) / (m[0] * m[2] - m[1] * m[1]);
-    [m[2] * factor, -m[1] * factor, m[0] * factor]
-}
-
 /// Lower bound of the smallest eigenvalue of a positive definite matrix: the determinant over the square of half the trace
 /// bounds it, as the product of two numbers is at most the square of their mean. Not above 0 for any other matrix.
 #[inline(always)]
@@ -346,7 +342,34 @@ impl Step<f64> {
     }
 }
 
+impl<N: Copy> Step<N> {
+    /// Square of the larger length of the moves of x and of y.
+    #[inline(always)]
+    pub(super) fn square<S: Simd>(&self, _: S) -> N
+    where
+        N: Number<S>,
+    {
+        dot(self.dx, self.dx).max(dot(self.dy, self.dy))
+    }
+
+    /// The step scaled to the length `longest` if it is longer, by the square of its length.
+    #[inline(always)]
+    pub(super) fn at_most<S: Simd>(self, simd: S, longest: f64, square: N) -> Self
+    where
+        N: Number<S>,
+    {
+        let most = N::splat(simd, longest);
+        let factor = most / square.sqrt().max(most);
+        let dn = [self.dn[0] * factor, self.dn[1] * factor];
+        Self { dx: scaled(self.dx, factor), dy: scaled(self.dy, factor), dn }
+    }
+}
+
 /// Newton's step from points x and y with `difference = x - y` in the basis whose third vector is n.
+///
+/// In place of each constraint g it takes `2 (g - 1) / (g + 1) + 1`: the same set, and nearly 1 + ln g, which is straighter along
+/// rays, so that the surface is found from farther away. Gradients are then those of g over the square of the mean m of g and
+/// 1, Hessians `H - ∇g ∇gᵀ / m` over the same.
 ///
 /// `smallest` is added to the curvature that is divided by: where both bodies are flat it bounds the step.
 #[inline(always)]
@@ -357,30 +380,45 @@ pub(super) fn newton<S: Simd, N: Number<S>>(
     difference: V3<N>,
     smallest: N,
 ) -> Step<N> {
-    let one = N::splat(simd, 1.0);
-    let (of_a, of_b) = (-one / a.gradient[2], one / b.gradient[2]);
-    let (shift_a, shift_b) = ((a.value - one) * of_a, (one - b.value) * of_b);
-    let right = |plane: &Plane<N>, bend: &Bend<N>, multiplier: N, shift: N| {
-        [
-            -multiplier * shift.mul_add(bend.tilt[0], plane.gradient[0]),
-            -multiplier * shift.mul_add(bend.tilt[1], plane.gradient[1]),
-        ]
-    };
-    let (right_a, right_b) = (right(a, bend_a, of_a, shift_a), right(b, bend_b, of_b, shift_b));
-    let (w_a, w_b) = (scaled(bend_a.curvature, of_a), scaled(bend_b.curvature, of_b));
+    let (one, half) = (N::splat(simd, 1.0), N::splat(simd, 0.5));
+    // Deep inside there is nothing to straighten.
+    let deepest = N::splat(simd, 0.25);
+    let (mean_a, mean_b) = (half.mul_add(a.value, half).max(deepest), half.mul_add(b.value, half).max(deepest));
+    // Divisions are slow: one for four reciprocals.
+    let (both_a, both_b) = (a.gradient[2] * mean_a, b.gradient[2] * mean_b);
+    let inverse = one / (both_a * both_b);
+    let (inverse_a, inverse_b) = (inverse * both_b, inverse * both_a);
+    let (of_a, of_b) = (-mean_a * inverse_a, mean_b * inverse_b);
+    let straight_a = Straight::new(a, bend_a, of_a, (a.value - one) * mean_a, a.gradient[2] * inverse_a);
+    let straight_b = Straight::new(b, bend_b, of_b, (one - b.value) * mean_b, b.gradient[2] * inverse_b);
+    let (shift_a, shift_b) = (straight_a.shift, straight_b.shift);
+    let (right_a, right_b) = (straight_a.right, straight_b.right);
+    let (w_a, w_b) = (straight_a.curvature, straight_b.curvature);
     let distance = difference[2] + shift_a - shift_b;
     let tau = [difference[0], difference[1]];
 
-    let k = inverse2(simd, &[distance.mul_add(w_a[0], one), distance * w_a[1], distance.mul_add(w_a[2], one)]);
-    // W_A K: the two commute.
-    let both =
-        [w_a[1].mul_add(k[1], w_a[0] * k[0]), w_a[1].mul_add(k[2], w_a[0] * k[1]), w_a[2].mul_add(k[2], w_a[1] * k[1])];
+    // I + D W_A, its determinant, and that times W_A K: the two commute.
+    let m = [distance.mul_add(w_a[0], one), distance * w_a[1], distance.mul_add(w_a[2], one)];
+    let determinant = m[0] * m[2] - m[1] * m[1];
+    let more = distance * (w_a[0] * w_a[2] - w_a[1] * w_a[1]);
+    let both = [w_a[0] + more, w_a[1], w_a[2] + more];
     let lever = [tau[0] - distance * right_a[0], tau[1] - distance * right_a[1]];
     let pulled = apply2(&both, lever);
-    let sum = [w_b[0] + both[0] + smallest, w_b[1] + both[1], w_b[2] + both[2] + smallest];
-    let beta =
-        apply2(&inverse2(simd, &sum), [right_a[0] + right_b[0] + pulled[0], right_a[1] + right_b[1] + pulled[1]]);
-    let alpha = apply2(&k, [beta[0] - lever[0], beta[1] - lever[1]]);
+    let sum = [
+        determinant.mul_add(w_b[0] + smallest, both[0]),
+        determinant.mul_add(w_b[1], both[1]),
+        determinant.mul_add(w_b[2] + smallest, both[2]),
+    ];
+    let right = [
+        determinant.mul_add(right_a[0] + right_b[0], pulled[0]),
+        determinant.mul_add(right_a[1] + right_b[1], pulled[1]),
+    ];
+    let other = sum[0] * sum[2] - sum[1] * sum[1];
+    let inverse = one / (determinant * other);
+    let (of_m, of_sum) = (inverse * other, inverse * determinant);
+    let beta = [(sum[2] * right[0] - sum[1] * right[1]) * of_sum, (sum[0] * right[1] - sum[1] * right[0]) * of_sum];
+    let rest = [beta[0] - lever[0], beta[1] - lever[1]];
+    let alpha = [(m[2] * rest[0] - m[1] * rest[1]) * of_m, (m[0] * rest[1] - m[1] * rest[0]) * of_m];
     let bent = apply2(&w_a, alpha);
     // The tangential parts of the gradients, of second order, are at hand now.
     let along_a = (a.gradient[0] * alpha[0] + a.gradient[1] * alpha[1]) * of_a;
@@ -389,6 +427,37 @@ pub(super) fn newton<S: Simd, N: Number<S>>(
         dx: [alpha[0], alpha[1], shift_a + along_a],
         dy: [beta[0], beta[1], shift_b - along_b],
         dn: [right_a[0] - bent[0], right_a[1] - bent[1]],
+    }
+}
+
+/// What the linearization needs of a constraint that is straightened.
+struct Straight<N> {
+    /// Change along the normal.
+    shift: N,
+    /// Right side.
+    right: [N; 2],
+    /// Curvature of the surface.
+    curvature: Symmetric2<N>,
+}
+
+impl<N: Copy> Straight<N> {
+    /// With the multiplier λ of the constraint itself, `(g - 1) m` or its negative, and `1 / m`, m the mean of g and 1.
+    #[inline(always)]
+    fn new<S: Simd>(plane: &Plane<N>, bend: &Bend<N>, multiplier: N, excess: N, inverse_mean: N) -> Self
+    where
+        N: Number<S>,
+    {
+        let g = plane.gradient;
+        let (s0, s1) = (inverse_mean * g[0], inverse_mean * g[1]);
+        let t = bend.tilt;
+        let shift = excess * multiplier;
+        let tilt = [t[0] - s0 * g[2], t[1] - s1 * g[2]];
+        Self {
+            shift,
+            right: [-multiplier * shift.mul_add(tilt[0], g[0]), -multiplier * shift.mul_add(tilt[1], g[1])],
+            // Without the tangential part of ∇g ∇gᵀ, which vanishes at the solution, it stays positive semidefinite.
+            curvature: scaled(bend.curvature, multiplier),
+        }
     }
 }
 
@@ -438,7 +507,8 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
     let (a, b) = (&extrapolated_a.plane, &extrapolated_b.plane);
     let (near_a, near_b) = (Near::new(side_a), Near::new(side_b));
     let (length_a, length_b) = (dot(a.gradient, a.gradient).sqrt(), dot(b.gradient, b.gradient).sqrt());
-    let (inverse_a, inverse_b) = (one / length_a, one / length_b);
+    let inverse = one / (length_a * length_b);
+    let (inverse_a, inverse_b) = (inverse * length_b, inverse * length_a);
     let (outward_a, outward_b) = (scaled(a.gradient, inverse_a), scaled(b.gradient, inverse_b));
     let displaced = (side_a.displacement + side_b.displacement) * splat(1.0 + 1e-14);
     let rounding = splat(SLACK) * (difference[0].abs() + difference[1].abs() + difference[2].abs());
@@ -574,19 +644,14 @@ impl<N: Copy> Bound<N> {
         let splat = |value: f64| N::splat(simd, value);
         // By z, r is at most the bound of the inverse times as long.
         let square = off * off * self.inverse_square;
-        let strength = multiplier * self.curvature;
-        let slope = splat(0.25) * strength * self.radius;
+        let slope = splat(0.25) * multiplier * self.curvature * self.radius;
         // Both factors may be negative where the surface is flat.
-        let fine = N::and(simd, square.le(slope * slope), splat(0.0).le(strength));
-        let here = (square / strength).select(fine, splat(f64::INFINITY));
-        let anywhere = off * off / (splat(2.0) * self.floor * multiplier);
-        here.min(anywhere).min(off * self.span)
+        let fine = N::and(simd, square.le(slope * slope), splat(0.0).le(self.curvature));
+        let here = self.curvature.select(fine, splat(0.0));
+        // The stiffer of the two bounds, of the curvature here by z and of twice the one anywhere by metres.
+        let stiffness = here.max(splat(2.0) * self.floor * self.inverse_square);
+        (square / (stiffness * multiplier)).min(off * self.span)
     }
-}
-
-#[inline(always)]
-fn scaled<S: Simd, N: Number<S>>(v: V3<N>, s: N) -> V3<N> {
-    [v[0] * s, v[1] * s, v[2] * s]
 }
 
 /// A point moved by a step in the basis.

@@ -1,6 +1,7 @@
 //! Small vectors and matrices of [`Number`]s, which nalgebra's are not: a lane each, inlined into vectorised work.
 
 use crate::polynomial::{Number, Simd};
+use nalgebra::Matrix3;
 
 /// Three numbers.
 pub(super) type V3<N> = [N; 3];
@@ -18,6 +19,18 @@ pub(super) fn dot<S: Simd, N: Number<S>>(a: V3<N>, b: V3<N>) -> N {
 #[inline(always)]
 pub(super) fn add_scaled<S: Simd, N: Number<S>>(a: V3<N>, s: N, b: V3<N>) -> V3<N> {
     [s.mul_add(b[0], a[0]), s.mul_add(b[1], a[1]), s.mul_add(b[2], a[2])]
+}
+
+/// `s v`.
+#[inline(always)]
+pub(super) fn scaled<S: Simd, N: Number<S>>(v: V3<N>, s: N) -> V3<N> {
+    [v[0] * s, v[1] * s, v[2] * s]
+}
+
+/// `a + b`.
+#[inline(always)]
+pub(super) fn add<S: Simd, N: Number<S>>(a: V3<N>, b: V3<N>) -> V3<N> {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 /// `a - b`.
@@ -42,6 +55,25 @@ pub(super) fn apply_transposed<S: Simd, N: Number<S>>(m: &M3<N>, v: V3<N>) -> V3
     result
 }
 
+/// The vector of length 1 along v.
+#[inline(always)]
+pub(super) fn normalized<S: Simd, N: Number<S>>(simd: S, v: V3<N>) -> V3<N> {
+    let inverse = N::splat(simd, 1.0) / dot(v, v).sqrt();
+    [v[0] * inverse, v[1] * inverse, v[2] * inverse]
+}
+
+/// The matrix by rows, the same in every lane.
+#[inline(always)]
+pub(super) fn rows<S: Simd, N: Number<S>>(simd: S, m: &Matrix3<f64>) -> M3<N> {
+    let mut rows = [[N::splat(simd, 0.0); 3]; 3];
+    for i in 0..3 {
+        for j in 0..3 {
+            rows[i][j] = N::splat(simd, m[(i, j)]);
+        }
+    }
+    rows
+}
+
 /// `M Nᵀ`.
 #[inline(always)]
 pub(super) fn times_transposed<S: Simd, N: Number<S>>(m: &M3<N>, n: &M3<N>) -> M3<N> {
@@ -54,15 +86,44 @@ pub(super) fn apply_symmetric<S: Simd, N: Number<S>>(h: &[N; 6], v: V3<N>) -> V3
     [dot([h[0], h[1], h[2]], v), dot([h[1], h[3], h[4]], v), dot([h[2], h[4], h[5]], v)]
 }
 
-/// A right-handed orthonormal basis whose third vector is the unit vector `n` (Duff et al., Building an orthonormal basis,
+/// A right-handed orthonormal basis whose third vector is the direction of `v` (Duff et al., Building an orthonormal basis,
 /// revisited, JCGT 6, 2017).
 #[inline(always)]
-pub(super) fn basis<S: Simd, N: Number<S>>(simd: S, n: V3<N>) -> M3<N> {
+pub(super) fn basis<S: Simd, N: Number<S>>(simd: S, v: V3<N>) -> M3<N> {
     let (zero, one) = (N::splat(simd, 0.0), N::splat(simd, 1.0));
-    let sign = one.select(zero.le(n[2]), -one);
-    let a = -one / (sign + n[2]);
+    let sign = one.select(zero.le(v[2]), -one);
+    let square = dot(v, v);
+    let length = square.sqrt();
+    // With n = v / length, a = -1 / (sign + n_2): one division for both.
+    let reach = sign.mul_add(length, v[2]);
+    let inverse = one / (length * reach);
+    let n = scaled(v, reach * inverse);
+    let a = -square * inverse;
     let b = n[0] * n[1] * a;
     let first = [(sign * n[0] * n[0]).mul_add(a, one), sign * b, -sign * n[0]];
     let second = [b, (n[1] * n[1]).mul_add(a, sign), -n[1]];
     [first, second, n]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::basis;
+    use crate::polynomial::Scalar;
+    use crate::polynomial::tests::Seeded;
+    use nalgebra::{Matrix3, Vector3};
+
+    #[test]
+    fn bases_are_orthonormal_right_handed_and_along_their_vector() {
+        let mut random = Seeded(1);
+        for i in 0..10_000 {
+            // Also close to the poles, and of any length.
+            let near = 10_f64.powi(-(i % 20));
+            let pole = if i % 3 == 0 { 1.0 } else { -1.0 };
+            let v = Vector3::new(near * random.signed(), near * random.signed(), pole) * 10_f64.powi(i % 13 - 6);
+            let m = Matrix3::from(basis::<_, f64>(Scalar, v.into())).transpose();
+            assert!((m * m.transpose() - Matrix3::identity()).amax() < 8.0 * f64::EPSILON, "{v:?}");
+            assert!((m.determinant() - 1.0).abs() < 1e-14, "{v:?}");
+            assert!((m.row(2).transpose() - v.normalize()).amax() < 4.0 * f64::EPSILON, "{v:?}");
+        }
+    }
 }

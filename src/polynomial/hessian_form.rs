@@ -156,20 +156,20 @@ mod tests {
         HessianForm::new(degree, &terms)
     }
 
-    /// Values, second gradient and xz Hessian entries at eight points, in lanes or one by one.
-    struct Eight<'a> {
+    /// Values, second gradient and xz Hessian entries at sixteen points, in lanes or one by one.
+    struct Points<'a> {
         form: &'a HessianForm,
-        points: [[f64; 8]; 3],
+        points: [[f64; 16]; 3],
         in_lanes: bool,
     }
 
-    impl WithSimd for Eight<'_> {
-        type Output = [[f64; 8]; 3];
+    impl WithSimd for Points<'_> {
+        type Output = [[f64; 16]; 3];
 
         #[inline(always)]
         fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-            let mut found = [[0.0; 8]; 3];
-            for start in (0..8).step_by(S::F64_LANES) {
+            let mut found = [[0.0; 16]; 3];
+            for start in (0..16).step_by(Lanes::<S>::COUNT) {
                 if self.in_lanes {
                     let jet = self.form.jet(simd, self.points.map(|row| Lanes::load(simd, &row[start..])));
                     let entries = [jet.value, jet.gradient[1], jet.hessian[2]];
@@ -177,7 +177,7 @@ mod tests {
                         entry.store(&mut row[start..]);
                     }
                 } else {
-                    for i in start..start + S::F64_LANES {
+                    for i in start..start + Lanes::<S>::COUNT {
                         let jet = self.form.jet(simd, self.points.map(|row| row[i]));
                         for (entry, row) in [jet.value, jet.gradient[1], jet.hessian[2]].into_iter().zip(&mut found) {
                             row[i] = entry;
@@ -193,11 +193,11 @@ mod tests {
     fn every_level_and_every_lane_agrees_within_rounding() {
         for degree in [2, 4, 6, 8] {
             let form = form(degree);
-            let points = [0.3, 0.2, -0.1].map(|step| std::array::from_fn(|i| 0.9 - step * i as f64));
-            let plain = Arch::Scalar.dispatch(Eight { form: &form, points, in_lanes: false });
+            let points = [0.3, 0.2, -0.1].map(|step| std::array::from_fn(|i| 0.9 - 0.5 * step * i as f64));
+            let plain = Arch::Scalar.dispatch(Points { form: &form, points, in_lanes: false });
             for arch in [Arch::Scalar, narrower(), Arch::new()] {
                 for in_lanes in [false, true] {
-                    let found = arch.dispatch(Eight { form: &form, points, in_lanes });
+                    let found = arch.dispatch(Points { form: &form, points, in_lanes });
                     for (a, b) in found.iter().flatten().zip(plain.iter().flatten()) {
                         assert!((a - b).abs() < 1e-13 * (1.0 + b.abs()), "degree {degree}, {arch:?}: {a} against {b}");
                     }

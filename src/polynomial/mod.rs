@@ -16,7 +16,7 @@ pub use gram::{CertificateError, HessianGram, HessianMonomial, Margin};
 pub use hessian_form::{Jet, NumberJet};
 pub use monomial::{Exponents, degree_of, monomials};
 pub use rounding::{Growth, gamma};
-pub use simd::{Arch, Lanes, Number, Scalar, Simd, WithSimd, dispatch};
+pub use simd::{Arch, Lanes, MAX_LANES, Number, Scalar, Simd, WithSimd, dispatch};
 
 use hessian_form::HessianForm;
 use nalgebra::Vector3;

@@ -48,6 +48,8 @@ pub trait Number<S: Simd>:
     fn select(self, mask: Self::Mask, other: Self) -> Self;
     /// Sums over the rows k of a table of `table[k][i] powers[k]`, for each of the ten entries i.
     fn contract<const K: usize>(simd: S, table: &[Row; K], powers: &[Self; K]) -> [Self; ENTRIES];
+    /// The rows of a table at whole-numbered places; the last one beyond its end, the first one for what is not a number.
+    fn gather<const K: usize>(simd: S, table: &[[f64; K]], place: Self) -> [Self; K];
 }
 
 impl<S: Simd> Number<S> for f64 {
@@ -113,26 +115,49 @@ impl<S: Simd> Number<S> for f64 {
         sums.copy_from_slice(&stored.0[..ENTRIES]);
         sums
     }
+    #[inline(always)]
+    fn gather<const K: usize>(_: S, table: &[[f64; K]], place: Self) -> [Self; K] {
+        table[(place as usize).min(table.len() - 1)]
+    }
 }
 
-/// As many doubles side by side as fit a vector.
+/// Most lanes of any processor served.
+pub const MAX_LANES: usize = 16;
+
+/// As many doubles side by side as fit two vectors: while one waits for a result the other computes.
 #[derive(Clone, Copy, Debug)]
 pub struct Lanes<S: Simd> {
     simd: S,
-    values: S::f64s,
+    values: [S::f64s; 2],
 }
 
 impl<S: Simd> Lanes<S> {
-    /// The first values of a slice of at least `S::F64_LANES`.
+    /// How many.
+    pub const COUNT: usize = 2 * S::F64_LANES;
+
+    /// The first values of a slice of at least [`Lanes::COUNT`].
     #[inline(always)]
     pub fn load(simd: S, values: &[f64]) -> Self {
-        Self { simd, values: S::as_simd_f64s(&values[..S::F64_LANES]).0[0] }
+        let vectors = S::as_simd_f64s(&values[..Self::COUNT]).0;
+        Self { simd, values: [vectors[0], vectors[1]] }
     }
 
-    /// Writes the lanes to the front of a slice of at least `S::F64_LANES`.
+    /// Writes the lanes to the front of a slice of at least [`Lanes::COUNT`].
     #[inline(always)]
     pub fn store(self, target: &mut [f64]) {
-        S::as_mut_simd_f64s(&mut target[..S::F64_LANES]).0[0] = self.values;
+        let vectors = S::as_mut_simd_f64s(&mut target[..Self::COUNT]).0;
+        (vectors[0], vectors[1]) = (self.values[0], self.values[1]);
+    }
+
+    /// The lanes where the mask holds, as bits.
+    #[inline(always)]
+    pub fn bits(simd: S, mask: [S::m64s; 2]) -> u32 {
+        let mut powers = [0.0; MAX_LANES];
+        for (lane, power) in powers.iter_mut().enumerate() {
+            *power = f64::from(1_u32 << lane);
+        }
+        let [a, b] = Self::load(simd, &powers).select(mask, Self::splat(simd, 0.0)).values;
+        simd.reduce_sum_f64s(simd.add_f64s(a, b)) as u32
     }
 }
 
@@ -142,7 +167,8 @@ macro_rules! lane_operator {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                Self { simd: self.simd, values: self.simd.$operation(self.values, other.values) }
+                let (simd, [a, b], [c, d]) = (self.simd, self.values, other.values);
+                Self { simd, values: [simd.$operation(a, c), simd.$operation(b, d)] }
             }
         }
     )*};
@@ -153,58 +179,103 @@ impl<S: Simd> Neg for Lanes<S> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self { simd: self.simd, values: self.simd.neg_f64s(self.values) }
+        let (simd, [a, b]) = (self.simd, self.values);
+        Self { simd, values: [simd.neg_f64s(a), simd.neg_f64s(b)] }
     }
 }
 
+macro_rules! lane_function {
+    ($($method:ident $operation:ident $($other:ident)?),*) => {$(
+        #[inline(always)]
+        fn $method(self $(, $other: Self)?) -> Self {
+            let (simd, [a, b]) = (self.simd, self.values);
+            Self { simd, values: [simd.$operation(a $(, $other.values[0])?), simd.$operation(b $(, $other.values[1])?)] }
+        }
+    )*};
+}
+
 impl<S: Simd> Number<S> for Lanes<S> {
-    type Mask = S::m64s;
+    type Mask = [S::m64s; 2];
 
     #[inline(always)]
     fn splat(simd: S, value: f64) -> Self {
-        Self { simd, values: simd.splat_f64s(value) }
+        Self { simd, values: [simd.splat_f64s(value); 2] }
     }
     #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
-        Self { simd: self.simd, values: self.simd.mul_add_e_f64s(self.values, b.values, c.values) }
+        let (simd, [p, q], b, c) = (self.simd, self.values, b.values, c.values);
+        Self { simd, values: [simd.mul_add_e_f64s(p, b[0], c[0]), simd.mul_add_e_f64s(q, b[1], c[1])] }
+    }
+    lane_function!(sqrt sqrt_f64s, abs abs_f64s, min min_f64s other, max max_f64s other);
+    #[inline(always)]
+    fn le(self, other: Self) -> [S::m64s; 2] {
+        let (simd, [a, b], [c, d]) = (self.simd, self.values, other.values);
+        [simd.less_than_or_equal_f64s(a, c), simd.less_than_or_equal_f64s(b, d)]
     }
     #[inline(always)]
-    fn sqrt(self) -> Self {
-        Self { simd: self.simd, values: self.simd.sqrt_f64s(self.values) }
+    fn and(simd: S, [a, b]: [S::m64s; 2], [c, d]: [S::m64s; 2]) -> [S::m64s; 2] {
+        [simd.and_m64s(a, c), simd.and_m64s(b, d)]
     }
     #[inline(always)]
-    fn abs(self) -> Self {
-        Self { simd: self.simd, values: self.simd.abs_f64s(self.values) }
-    }
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        Self { simd: self.simd, values: self.simd.min_f64s(self.values, other.values) }
-    }
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        Self { simd: self.simd, values: self.simd.max_f64s(self.values, other.values) }
-    }
-    #[inline(always)]
-    fn le(self, other: Self) -> S::m64s {
-        self.simd.less_than_or_equal_f64s(self.values, other.values)
-    }
-    #[inline(always)]
-    fn and(simd: S, a: S::m64s, b: S::m64s) -> S::m64s {
-        simd.and_m64s(a, b)
-    }
-    #[inline(always)]
-    fn select(self, mask: S::m64s, other: Self) -> Self {
-        Self { simd: self.simd, values: self.simd.select_f64s(mask, self.values, other.values) }
+    fn select(self, mask: [S::m64s; 2], other: Self) -> Self {
+        let (simd, [a, b], [c, d]) = (self.simd, self.values, other.values);
+        Self { simd, values: [simd.select_f64s(mask[0], a, c), simd.select_f64s(mask[1], b, d)] }
     }
     /// The lanes' own powers lie side by side in vectors.
     #[inline(always)]
     fn contract<const K: usize>(simd: S, table: &[Row; K], powers: &[Self; K]) -> [Self; ENTRIES] {
-        let mut sums = [Self::splat(simd, 0.0); ENTRIES];
-        for (row, power) in table.iter().zip(powers) {
-            for (sum, &entry) in sums.iter_mut().zip(&row.0) {
-                *sum = Self::splat(simd, entry).mul_add(*power, *sum);
+        // As many sums at a time as there are registers for.
+        if S::F64_LANES == MAX_LANES / 2 {
+            return sums(simd, table, powers, 0);
+        }
+        let first: [Self; ENTRIES / 2] = sums(simd, table, powers, 0);
+        let last: [Self; ENTRIES / 2] = sums(simd, table, powers, ENTRIES / 2);
+        let mut all = [first[0]; ENTRIES];
+        all[..ENTRIES / 2].copy_from_slice(&first);
+        all[ENTRIES / 2..].copy_from_slice(&last);
+        all
+    }
+    #[inline(always)]
+    fn gather<const K: usize>(simd: S, table: &[[f64; K]], place: Self) -> [Self; K] {
+        let mut places = [0.0; MAX_LANES];
+        place.store(&mut places);
+        let mut columns = [[0.0; MAX_LANES]; K];
+        for (lane, place) in places[..Self::COUNT].iter().enumerate() {
+            let row = &table[(*place as usize).min(table.len() - 1)];
+            for (column, entry) in columns.iter_mut().zip(row) {
+                column[lane] = *entry;
             }
         }
-        sums
+        let mut result = [place; K];
+        for (result, column) in result.iter_mut().zip(&columns) {
+            *result = Self::load(simd, column);
+        }
+        result
     }
+}
+
+/// Sums over the rows k of `table[k][from + i] powers[k]`, for some of the entries.
+#[inline(always)]
+fn sums<S: Simd, const K: usize, const COUNT: usize>(
+    simd: S,
+    table: &[Row; K],
+    powers: &[Lanes<S>; K],
+    from: usize,
+) -> [Lanes<S>; COUNT] {
+    let mut sums = [Lanes::splat(simd, 0.0); COUNT];
+    let (rows, last_rows) = table.as_chunks::<5>();
+    let (groups, last_powers) = powers.as_chunks::<5>();
+    for (rows, powers) in rows.iter().zip(groups) {
+        for (row, power) in rows.iter().zip(powers) {
+            for (sum, &entry) in sums.iter_mut().zip(&row.0[from..]) {
+                *sum = Lanes::splat(simd, entry).mul_add(*power, *sum);
+            }
+        }
+    }
+    for (row, power) in last_rows.iter().zip(last_powers) {
+        for (sum, &entry) in sums.iter_mut().zip(&row.0[from..]) {
+            *sum = Lanes::splat(simd, entry).mul_add(*power, *sum);
+        }
+    }
+    sums
 }

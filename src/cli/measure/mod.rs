@@ -39,8 +39,9 @@ pub(super) struct MeasureArgs {
     /// Print one JSON object a line instead of a table
     #[arg(long)]
     json: bool,
-    /// Print instead one JSON object of nanoseconds per query, cold and warm: medians of 9 passes over the poses, everything
-    /// a JSON line holds included; warm starts are cold at each trajectory. 'level' is d(A‖B)
+    /// Print instead one JSON object of nanoseconds per query, cold and warm, and of distances in batches of up to 1024 poses:
+    /// medians of 9 passes over the poses, everything a JSON line holds included; warm starts are cold at each trajectory.
+    /// 'level' is d(A‖B)
     #[arg(long)]
     time: bool,
 }

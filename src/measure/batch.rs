@@ -1,0 +1,586 @@
+//! Distances of one pair at many poses at once, a pose in each lane of the vectors.
+//!
+//! All poses are solved cold: the start of [`super::start`], the first Newton step from the marks of the outlines, then rounds
+//! of evaluation and step until the bracket is narrow. A group of poses goes through a few rounds together; the poses that
+//! need more wait until there is a group of them, so that the slowest does not hold up the others. A lane computes from its
+//! own pose only and selects where a single query would branch, so that no answer depends on the other poses of the batch.
+
+use super::Status;
+use super::active::ActiveConstraints;
+use super::distance::{Distance, distance};
+use super::options::Options;
+use super::pose::Pose;
+use super::smooth::{LONGEST, WORTH_A_BRACKET};
+use super::start::facing;
+use super::tangent::{Bend, Plane, Relative, Side, Step, bracket, moved, newton};
+use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, scaled, subtract};
+use super::warm::WarmStart;
+use crate::body::{Body, Outline, Solid};
+use crate::polynomial::{Lanes, MAX_LANES, Number, NumberJet, Simd, WithSimd, dispatch};
+use nalgebra::Vector3;
+
+/// Why a batch is refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BatchError {
+    /// No poses.
+    #[error("the batch is empty; give at least one pose")]
+    Empty,
+    /// Not a place for every answer.
+    #[error("{poses} poses but places for {answers} answers; give one place for each pose")]
+    Lengths {
+        /// Number of poses.
+        poses: usize,
+        /// Number of places for answers.
+        answers: usize,
+    },
+}
+
+/// Euclidean distances between solid `a` at `pose_a` and solid `b` at each of `poses_b` (body to world), written to `answers` in
+/// the order of the poses.
+///
+/// Each answer is one of [`distance`] from a cold start in all that is proven of it, and depends on its own pose only, to the
+/// last bit. Single bodies of one constraint are solved several poses at a time, which takes a fraction of the time of as
+/// many queries; all others, and poses that do not converge at once such as those in contact, are solved one by one.
+///
+/// # Errors
+/// No poses, or a number of places that is not the number of poses; nothing is computed then.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use sublevel::body::Body;
+/// use sublevel::measure::{Distance, Options, Pose, distance_batch};
+///
+/// let ball = Body::ball("ball", Vector3::zeros(), 0.5)?;
+/// let egg = Body::ellipsoid("egg", Vector3::zeros(), Vector3::new(1.0, 0.8, 0.6))?;
+/// let along = |x: f64| Pose::from_quaternion(Vector3::new(x, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0]);
+/// let poses = [along(2.0)?, along(3.0)?, along(4.0)?];
+/// let mut answers = [Distance::default(); 3];
+/// distance_batch(&egg, &Pose::identity(), &ball, &poses, &Options::default(), &mut answers)?;
+/// for (answer, gap) in answers.iter().zip([0.5, 1.5, 2.5]) {
+///     assert!((answer.value() - gap).abs() < 1e-8);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn distance_batch(
+    a: &impl Solid,
+    pose_a: &Pose,
+    b: &impl Solid,
+    poses_b: &[Pose],
+    options: &Options<'_>,
+    answers: &mut [Distance],
+) -> Result<(), BatchError> {
+    if poses_b.len() != answers.len() {
+        return Err(BatchError::Lengths { poses: poses_b.len(), answers: answers.len() });
+    }
+    if poses_b.is_empty() {
+        return Err(BatchError::Empty);
+    }
+    answers.fill(Distance::default());
+    if let ([a], [b]) = (a.parts(), b.parts())
+        && a.constraints().len() == 1
+        && b.constraints().len() == 1
+        && options.max_iterations() >= MOST_ROUNDS
+    {
+        in_lanes((a, pose_a), (b, poses_b), options, answers);
+    }
+    for (answer, pose_b) in answers.iter_mut().zip(poses_b).filter(|(answer, _)| answer.upper.is_infinite()) {
+        *answer = distance(a, pose_a, b, pose_b, options, &mut WarmStart::default());
+    }
+    Ok(())
+}
+
+/// Answers what can be answered several poses at a time.
+fn in_lanes(
+    (a, pose_a): (&Body, &Pose),
+    (b, poses_b): (&Body, &[Pose]),
+    options: &Options<'_>,
+    answers: &mut [Distance],
+) {
+    let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
+    dispatch(Batch { a, pose_a, b, poses_b, options, tolerance, answers });
+}
+
+/// Rounds that a group of poses goes through together.
+const ROUNDS: u32 = 3;
+
+/// Most rounds of a pose before it is solved alone.
+const MOST_ROUNDS: u32 = 16;
+
+/// A batch as work for the widest arithmetic. Answers stay as they are where a pose is to be solved alone.
+struct Batch<'a> {
+    a: &'a Body,
+    pose_a: &'a Pose,
+    b: &'a Body,
+    poses_b: &'a [Pose],
+    options: &'a Options<'a>,
+    tolerance: f64,
+    answers: &'a mut [Distance],
+}
+
+impl WithSimd for Batch<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let lanes = Lanes::<S>::COUNT;
+        let mut waiting = Waiting::default();
+        let mut next = 0;
+        while (next < self.poses_b.len() || waiting.len > 0) && !self.options.exhausted(0) {
+            let left = self.poses_b.len() - next;
+            let fresh = waiting.len < lanes && left > 0;
+            let mut group = Group { count: lanes.min(if fresh { left } else { waiting.len }), ..Group::default() };
+            if fresh {
+                // Lanes to spare solve the last pose once more.
+                for lane in 0..lanes {
+                    group.pose[lane] = next + lane.min(group.count - 1);
+                }
+                next += group.count;
+            } else {
+                waiting.fill(&mut group, lanes);
+            }
+            self.solve(simd, &mut group, fresh, &mut waiting);
+        }
+    }
+}
+
+/// Poses of the batch in lanes.
+#[derive(Default)]
+struct Group {
+    /// Lanes in use.
+    count: usize,
+    /// Index of the pose.
+    pose: [usize; MAX_LANES],
+    /// Rounds that are behind it.
+    rounds: [u32; MAX_LANES],
+    /// Coordinates of x, y and n where rounds are behind it.
+    at: [[f64; MAX_LANES]; 9],
+}
+
+/// Poses that need more rounds.
+#[derive(Default)]
+struct Waiting {
+    len: usize,
+    entries: [(usize, u32, [f64; 9]); 2 * MAX_LANES],
+}
+
+impl Waiting {
+    #[inline(always)]
+    fn push(&mut self, entry: (usize, u32, [f64; 9])) {
+        self.entries[self.len] = entry;
+        self.len += 1;
+    }
+
+    /// Moves the last entries to the group; lanes to spare get the first of them once more.
+    #[inline(always)]
+    fn fill(&mut self, group: &mut Group, lanes: usize) {
+        self.len -= group.count;
+        for lane in 0..lanes {
+            let (pose, rounds, at) = self.entries[self.len + if lane < group.count { lane } else { 0 }];
+            group.pose[lane] = pose;
+            group.rounds[lane] = rounds;
+            for (column, entry) in group.at.iter_mut().zip(at) {
+                column[lane] = entry;
+            }
+        }
+    }
+}
+
+/// Trial points, and a normal of any length.
+#[derive(Clone, Copy)]
+struct Iterate<N> {
+    x: V3<N>,
+    y: V3<N>,
+    n: V3<N>,
+}
+
+/// A Newton step with the bases it was made in.
+struct Linearized<N> {
+    frame: M3<N>,
+    local: (M3<N>, M3<N>),
+    difference: V3<N>,
+    step: Step<N>,
+    /// Square of its length.
+    square: N,
+}
+
+impl<N: Copy> Iterate<N> {
+    #[inline(always)]
+    fn linearize<S: Simd>(
+        &self,
+        simd: S,
+        (side_a, jet_a): (&Side<'_, N>, &NumberJet<N>),
+        (side_b, jet_b): (&Side<'_, N>, &NumberJet<N>),
+    ) -> Linearized<N>
+    where
+        N: Number<S>,
+    {
+        let frame = basis(simd, self.n);
+        let local = (side_a.localize(simd, &frame), side_b.localize(simd, &frame));
+        let (a, b) = (Plane::new(simd, jet_a, &local.0), Plane::new(simd, jet_b, &local.1));
+        let (bend_a, bend_b) = (Bend::new(simd, jet_a, &local.0), Bend::new(simd, jet_b, &local.1));
+        let difference = apply(&frame, subtract(self.x, self.y));
+        let zero = N::splat(simd, 0.0);
+        let step = newton(simd, (&a, &bend_a), (&b, &bend_b), difference, zero);
+        let square = step.square(simd);
+        Linearized { frame, local, difference, step, square }
+    }
+
+    /// Takes a step of at most this length.
+    #[inline(always)]
+    fn advance<S: Simd>(&mut self, simd: S, Linearized { frame, step, square, .. }: &Linearized<N>, longest: f64)
+    where
+        N: Number<S>,
+    {
+        let step = step.at_most(simd, longest, *square);
+        self.x = moved(self.x, step.dx, frame);
+        self.y = moved(self.y, step.dy, frame);
+        self.n = add_scaled(add_scaled(frame[2], step.dn[0], frame[0]), step.dn[1], frame[1]);
+    }
+
+    /// Takes the direction halfway between the normals of the surfaces for n, unless they face the same way.
+    #[inline(always)]
+    fn face<S: Simd>(&mut self, simd: S, a: V3<N>, b: V3<N>)
+    where
+        N: Number<S>,
+    {
+        let (length_a, length_b) = (dot(a, a).sqrt(), dot(b, b).sqrt());
+        // Both as long as the product of the lengths.
+        let middle = subtract(scaled(b, length_a), scaled(a, length_b));
+        let product = length_a * length_b;
+        let apart = (product * product * N::splat(simd, 0.25)).le(dot(middle, middle));
+        for i in 0..3 {
+            self.n[i] = middle[i].select(apart, self.n[i]);
+        }
+    }
+}
+
+impl Batch<'_> {
+    /// A few rounds of a group: writes the answers that get proven and lets the others wait.
+    #[inline(always)]
+    fn solve<S: Simd>(&mut self, simd: S, group: &mut Group, fresh: bool, waiting: &mut Waiting) {
+        let splat = |value: f64| Lanes::<S>::splat(simd, value);
+        let relative = self.relative(simd, &group.pose);
+        let side_a = Side::at_home(simd, self.a, 0);
+        let side_b = Side::away(self.b, 0, &relative);
+        let longest = LONGEST * self.a.trust().reach.min(self.b.trust().reach);
+        let worth = WORTH_A_BRACKET * longest;
+        let mut at = if fresh {
+            let n = facing(simd, self.a, self.b, &relative);
+            let own = apply_transposed(&relative.rotation, n);
+            let mark_a = self.a.outline().mark(simd, Outline::place(simd, [-n[0], -n[1], -n[2]]));
+            let mark_b = self.b.outline().mark(simd, Outline::place(simd, own));
+            let y = add(relative.origin, apply(&relative.rotation, mark_b.point));
+            let mut at = Iterate { x: mark_a.point, y, n };
+            let first = at.linearize(simd, (&side_a, &mark_a.jet), (&side_b, &mark_b.jet));
+            at.advance(simd, &first, longest);
+            at
+        } else {
+            let column = |i: usize| Lanes::load(simd, &group.at[i]);
+            Iterate {
+                x: [column(0), column(1), column(2)],
+                y: [column(3), column(4), column(5)],
+                n: [column(6), column(7), column(8)],
+            }
+        };
+        let mut open = (1_u32 << group.count) - 1;
+        for round in 1..=if fresh { ROUNDS } else { 1 } {
+            let ((jet_a, inside_a), (jet_b, inside_b)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
+            if fresh && round == 1 {
+                // The first step may have led to where the surfaces face otherwise.
+                let (a, b) = (side_a.pulled_back(simd, jet_a.gradient), side_b.pulled_back(simd, jet_b.gradient));
+                at.face(simd, a, b);
+            }
+            let here = at.linearize(simd, (&side_a, &jet_a), (&side_b, &jet_b));
+            let inside = Lanes::and(simd, inside_a, inside_b);
+            let short = Lanes::and(simd, inside, here.square.le(splat(worth * worth)));
+            if (round > 1 || !fresh) && Lanes::bits(simd, short) & open != 0 {
+                let next_a = side_a.extrapolate(simd, &jet_a, &here.local.0, here.step.dx);
+                let next_b = side_b.extrapolate(simd, &jet_b, &here.local.1, here.step.dy);
+                let next = subtract(add(here.difference, here.step.dx), here.step.dy);
+                let found = bracket(simd, (&side_a, &next_a), (&side_b, &next_b), next);
+                let enough = splat(self.tolerance).max(found.rounding * splat(4.0));
+                let narrow = Lanes::and(simd, short, (found.upper - found.lower).le(enough));
+                let proven =
+                    Lanes::bits(simd, Lanes::and(simd, narrow, splat(f64::MIN_POSITIVE).le(found.lower))) & open;
+                if proven != 0 {
+                    let x = moved(at.x, add(here.step.dx, found.to_a), &here.frame);
+                    let y = moved(at.y, add(here.step.dy, found.to_b), &here.frame);
+                    let n = apply_transposed(&here.frame, found.normal);
+                    self.write(
+                        simd,
+                        group,
+                        proven,
+                        round,
+                        [found.lower, found.upper, found.attained],
+                        found.multipliers,
+                        [x, y, n],
+                    );
+                    open &= !proven;
+                    if open == 0 {
+                        return;
+                    }
+                }
+            }
+            at.advance(simd, &here, longest);
+        }
+        for (i, coordinate) in [at.x, at.y, at.n].as_flattened().iter().enumerate() {
+            coordinate.store(&mut group.at[i]);
+        }
+        for lane in 0..group.count {
+            let rounds = group.rounds[lane] + if fresh { ROUNDS } else { 1 };
+            if open >> lane & 1 == 1 && rounds < MOST_ROUNDS {
+                let mut entry = [0.0; 9];
+                for (entry, column) in entry.iter_mut().zip(&group.at) {
+                    *entry = column[lane];
+                }
+                waiting.push((group.pose[lane], rounds, entry));
+            }
+        }
+    }
+
+    /// B at the poses as seen from A.
+    #[inline(always)]
+    fn relative<S: Simd>(&self, simd: S, poses: &[usize; MAX_LANES]) -> Relative<Lanes<S>> {
+        let mut columns = [[0.0; MAX_LANES]; 7];
+        for lane in 0..Lanes::<S>::COUNT {
+            let pose = &self.poses_b[poses[lane]];
+            let q = &pose.rotation().coords;
+            // Differences of translations are exact to one rounding, however far from the world origin.
+            let t = pose.translation() - self.pose_a.translation();
+            for (column, entry) in columns.iter_mut().zip([q.x, q.y, q.z, q.w, t.x, t.y, t.z]) {
+                column[lane] = entry;
+            }
+        }
+        let splat = |value: f64| Lanes::<S>::splat(simd, value);
+        let column = |i: usize| Lanes::load(simd, &columns[i]);
+        let own = &self.pose_a.rotation().coords;
+        let (u, v) = ([splat(-own.x), splat(-own.y), splat(-own.z)], [column(0), column(1), column(2)]);
+        let (u_w, v_w) = (splat(own.w), column(3));
+        // The product of the conjugate of A's quaternion with B's.
+        let w = u_w * v_w - dot(u, v);
+        let i = u_w.mul_add(v[0], v_w * u[0]) + (u[1] * v[2] - u[2] * v[1]);
+        let j = u_w.mul_add(v[1], v_w * u[1]) + (u[2] * v[0] - u[0] * v[2]);
+        let k = u_w.mul_add(v[2], v_w * u[2]) + (u[0] * v[1] - u[1] * v[0]);
+        let (ww, ii, jj, kk) = (w * w, i * i, j * j, k * k);
+        let two = splat(2.0);
+        let (ij, ik, jk) = (two * i * j, two * i * k, two * j * k);
+        let (wi, wj, wk) = (two * w * i, two * w * j, two * w * k);
+        let rotation = [
+            [ww + ii - jj - kk, ij - wk, wj + ik],
+            [wk + ij, ww - ii + jj - kk, jk - wi],
+            [ik - wj, wi + jk, ww - ii - jj + kk],
+        ];
+        let frame = rows(simd, self.pose_a.rotation().to_rotation_matrix().matrix());
+        let translation = apply_transposed(&frame, [column(4), column(5), column(6)]);
+        Relative::from_parts(simd, self.a, rotation, translation, self.b)
+    }
+
+    /// Writes the answers of the lanes that are set in `proven`.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    fn write<S: Simd>(
+        &mut self,
+        simd: S,
+        group: &Group,
+        proven: u32,
+        round: u32,
+        [lower, upper, attained]: [Lanes<S>; 3],
+        [of_a, of_b]: [Lanes<S>; 2],
+        [x, y, n]: [V3<Lanes<S>>; 3],
+    ) {
+        let frame = rows(simd, self.pose_a.rotation().to_rotation_matrix().matrix());
+        let place = self.pose_a.transform_point(&self.a.normalization().center);
+        let splat = |value: f64| Lanes::<S>::splat(simd, value);
+        let place = [splat(place.x), splat(place.y), splat(place.z)];
+        let (x, y, n) = (add(place, apply(&frame, x)), add(place, apply(&frame, y)), apply(&frame, n));
+        let mut columns = [[0.0; MAX_LANES]; 14];
+        let numbers = [lower, upper, of_a, of_b, x[0], x[1], x[2], y[0], y[1], y[2], n[0], n[1], n[2], attained];
+        for (number, column) in numbers.into_iter().zip(&mut columns) {
+            number.store(column);
+        }
+        for lane in 0..group.count {
+            if proven >> lane & 1 == 0 {
+                continue;
+            }
+            let entry = |i: usize| columns[i][lane];
+            let vector = |i: usize| Vector3::new(entry(i), entry(i + 1), entry(i + 2));
+            let narrow = entry(1) - entry(0) <= self.tolerance;
+            self.answers[group.pose[lane]] = Distance {
+                status: if narrow { Status::Converged } else { Status::BracketWide },
+                lower: entry(0),
+                upper: entry(1),
+                witness_a: vector(4),
+                witness_b: vector(7),
+                normal: Some(vector(10)),
+                active_a: ActiveConstraints::single(0, entry(2)),
+                active_b: ActiveConstraints::single(0, entry(3)),
+                attained: entry(13).min(entry(1)).max(entry(0)),
+                iterations: group.rounds[lane] + round,
+            };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{BatchError, distance_batch};
+    use crate::body::{Body, Compound};
+    use crate::measure::{Distance, Options, Pose, Status, WarmStart, distance};
+    use crate::polynomial::tests::Seeded;
+    use nalgebra::{Vector3, Vector4};
+    use std::sync::atomic::AtomicBool;
+
+    fn pose(random: &mut Seeded, far: f64) -> Pose {
+        let q = Vector4::from_fn(|_, _| random.signed()).normalize();
+        Pose::from_quaternion(Vector3::from_fn(|_, _| far * random.signed()), q.into()).unwrap()
+    }
+
+    fn body(random: &mut Seeded, degree: u8) -> Body {
+        let center = Vector3::from_fn(|_, _| random.signed());
+        let half = Vector3::from_fn(|_, _| 2_f64.powf(random.signed()));
+        if degree == 2 {
+            Body::ellipsoid("egg", center, half).unwrap()
+        } else {
+            Body::superellipsoid("q", center, half, degree).unwrap()
+        }
+    }
+
+    /// Every number of an answer, bit by bit.
+    fn bits(answer: &Distance) -> [u64; 19] {
+        let mut numbers = vec![answer.lower, answer.upper, answer.value(), f64::from(answer.iterations)];
+        numbers.extend(answer.witness_a.iter().chain(answer.witness_b.iter()));
+        numbers.extend(answer.normal.unwrap_or_default().iter());
+        numbers.push(f64::from(u8::from(answer.normal.is_some())));
+        numbers.push(f64::from(u8::from(answer.status == Status::Converged)));
+        for active in [answer.active_a, answer.active_b] {
+            let (sum, first) = active.iter().fold((0.0, 0.0), |(sum, _), (index, m)| (sum + m, index as f64));
+            numbers.extend([sum, first]);
+        }
+        std::array::from_fn(|i| numbers[i].to_bits())
+    }
+
+    fn solve(a: &Body, pose_a: &Pose, b: &Body, poses: &[Pose]) -> Vec<[u64; 19]> {
+        let mut answers = vec![Distance::default(); poses.len()];
+        distance_batch(a, pose_a, b, poses, &Options::default(), &mut answers).unwrap();
+        answers.iter().map(bits).collect()
+    }
+
+    #[test]
+    fn answers_are_those_of_single_queries() {
+        for seed in 0..60 {
+            let mut random = Seeded(seed);
+            let degrees = [2_u8, 4, 6, 8];
+            let (a, b) =
+                (body(&mut random, degrees[seed as usize % 4]), body(&mut random, degrees[seed as usize / 4 % 4]));
+            let pose_a = pose(&mut random, 2.0);
+            // Some in contact, some far away.
+            let poses: Vec<Pose> =
+                (0..64).map(|i| pose(&mut random, if i % 8 == 0 { 1e3 } else { 2.0 + 0.1 * i as f64 })).collect();
+            let mut answers = vec![Distance::default(); poses.len()];
+            distance_batch(&a, &pose_a, &b, &poses, &Options::default(), &mut answers).unwrap();
+            for (i, (answer, pose_b)) in answers.iter().zip(&poses).enumerate() {
+                let single = distance(&a, &pose_a, &b, pose_b, &Options::default(), &mut WarmStart::default());
+                let context = format!("seed {seed}, pose {i}: {answer:?} against {single:?}");
+                assert_eq!(answer.status, single.status, "{context}");
+                assert!(answer.lower <= single.upper && single.lower <= answer.upper, "{context}");
+                let between = (answer.witness_a - answer.witness_b).norm();
+                assert!((between - answer.upper).abs() <= 1e-9 * (1.0 + answer.upper), "{context}");
+                let inverse = |pose: &Pose, x: &Vector3<f64>| pose.rotation().inverse() * (x - pose.translation());
+                assert!(a.value(&inverse(&pose_a, &answer.witness_a)) <= 1.0 + 1e-9, "{context}");
+                assert!(b.value(&inverse(pose_b, &answer.witness_b)) <= 1.0 + 1e-9, "{context}");
+                if let (Some(n), Some(m)) = (answer.normal, single.normal) {
+                    // Each is good to the square root of its bracket.
+                    assert!((n - m).norm() < 1e-3, "{context}");
+                    let multiplier = |answer: &Distance| answer.active_a.iter().map(|(_, value)| value).sum::<f64>();
+                    let (of_batch, of_single) = (multiplier(answer), multiplier(&single));
+                    assert!((of_batch - of_single).abs() <= 1e-3 * of_single, "{context}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_answer_does_not_depend_on_its_neighbours() {
+        for seed in 0..12 {
+            let mut random = Seeded(seed);
+            let (a, b) = (body(&mut random, 6), body(&mut random, if seed % 2 == 0 { 6 } else { 4 }));
+            let pose_a = pose(&mut random, 1.0);
+            let poses: Vec<Pose> = (0..61).map(|_| pose(&mut random, 4.0)).collect();
+            let answers = solve(&a, &pose_a, &b, &poses);
+            let mut order: Vec<usize> = (0..poses.len()).collect();
+            for round in 0..4 {
+                for i in (1..order.len()).rev() {
+                    order.swap(i, ((random.signed().abs() * (i + 1) as f64) as usize).min(i));
+                }
+                let shuffled: Vec<Pose> = order.iter().map(|&i| poses[i]).collect();
+                for (found, &i) in solve(&a, &pose_a, &b, &shuffled).iter().zip(&order) {
+                    assert_eq!(*found, answers[i], "seed {seed}, round {round}, pose {i}");
+                }
+            }
+            for size in 1..=20 {
+                for (chunk, known) in poses.chunks(size).zip(answers.chunks(size)) {
+                    assert_eq!(solve(&a, &pose_a, &b, chunk), known, "seed {seed}, size {size}");
+                }
+            }
+            // Neighbours that overlap, that are far away, that are the same.
+            for neighbour in [pose_a, pose(&mut random, 1e6), poses[0]] {
+                for i in 0..poses.len() {
+                    let mut others = vec![neighbour; 17];
+                    others[i % 17] = poses[i];
+                    assert_eq!(solve(&a, &pose_a, &b, &others)[i % 17], answers[i], "seed {seed}, pose {i}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn other_solids_are_solved_one_by_one() {
+        let mut random = Seeded(3);
+        let ball = Body::ball("ball", Vector3::zeros(), 0.5).unwrap();
+        let cuboid = Body::cuboid("box", Vector3::new(1.0, 0.5, 0.7)).unwrap();
+        let compound = Compound::new("two", vec![ball.clone(), cuboid.clone()]).unwrap();
+        let poses: Vec<Pose> = (0..20).map(|_| pose(&mut random, 3.0)).collect();
+        let options = Options::default();
+        let mut answers = vec![Distance::default(); poses.len()];
+        distance_batch(&compound, &Pose::identity(), &ball, &poses, &options, &mut answers).unwrap();
+        for (answer, pose_b) in answers.iter().zip(&poses) {
+            let single = distance(&compound, &Pose::identity(), &ball, pose_b, &options, &mut WarmStart::default());
+            assert_eq!(bits(answer), bits(&single));
+        }
+        distance_batch(&cuboid, &Pose::identity(), &ball, &poses, &options, &mut answers).unwrap();
+        for (answer, pose_b) in answers.iter().zip(&poses) {
+            let single = distance(&cuboid, &Pose::identity(), &ball, pose_b, &options, &mut WarmStart::default());
+            assert_eq!(bits(answer), bits(&single));
+        }
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_refused() {
+        let ball = Body::ball("ball", Vector3::zeros(), 0.5).unwrap();
+        let here = Pose::identity();
+        let batch = |poses: &[Pose], answers: &mut [Distance]| {
+            distance_batch(&ball, &here, &ball, poses, &Options::default(), answers)
+        };
+        assert_eq!(batch(&[], &mut []), Err(BatchError::Empty));
+        let mut answers = [Distance::default(); 2];
+        assert_eq!(batch(&[here; 3], &mut answers), Err(BatchError::Lengths { poses: 3, answers: 2 }));
+        assert_eq!(batch(&[], &mut answers), Err(BatchError::Lengths { poses: 0, answers: 2 }));
+    }
+
+    #[test]
+    fn limits_and_stops_leave_true_brackets() {
+        let mut random = Seeded(8);
+        let (a, b) = (body(&mut random, 6), body(&mut random, 8));
+        let poses: Vec<Pose> = (0..40).map(|_| pose(&mut random, 6.0)).collect();
+        let stop = AtomicBool::new(true);
+        let limits = [Options::default().with_max_iterations(1).unwrap(), Options::default().with_stop(&stop)];
+        for options in limits {
+            let mut answers = vec![Distance::default(); poses.len()];
+            distance_batch(&a, &Pose::identity(), &b, &poses, &options, &mut answers).unwrap();
+            for (answer, pose_b) in answers.iter().zip(&poses) {
+                let truth = distance(&a, &Pose::identity(), &b, pose_b, &Options::default(), &mut WarmStart::default());
+                assert!(answer.lower <= truth.upper && truth.lower <= answer.upper, "{answer:?} {truth:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Where to begin when nothing is known but the poses.
+//!
+//! The distance of two convex sets is the largest value over unit vectors n of `-h_A(-n) - h_B(n)`, h the support functions:
+//! `n·w` where w is the difference of the points that are farthest along `-n` and along `n`. Ellipsoids stand for the bodies.
+//! Theirs are `h(n) = √(nᵀ Σ n)`, and Newton's method for `w = D n` turns n by
+//!
+//! ```text
+//! (D I + K_A + K_B) dn = w - (n·w) n,    K = (Σ - Σ n nᵀ Σ / h²) / h
+//! ```
+//!
+//! with K the derivative of the farthest point, so that two such turns find about where the bodies face each other. There the
+//! outlines of the bodies have marks with all that Newton's method on the bodies themselves needs for its first step.
+
+use super::tangent::Relative;
+use super::vector::{V3, add_scaled, apply, dot, normalized, rows, scaled, times_transposed};
+use crate::body::Body;
+use crate::polynomial::{Number, Simd};
+
+/// Turns of the normal.
+const TURNS: usize = 2;
+
+/// Least distance that n is turned for, relative to the widths of the ellipsoids.
+const LEAST: f64 = 1e-3;
+
+/// Largest turn, as the largest component of the tangent.
+const MOST: f64 = 0.3;
+
+/// The unit vector from B to A across the gap of the ellipsoids that stand for them, in A's frame.
+#[inline(always)]
+pub(super) fn facing<S: Simd, N: Number<S>>(simd: S, a: &Body, b: &Body, relative: &Relative<N>) -> V3<N> {
+    let one = N::splat(simd, 1.0);
+    let shape_a = rows(simd, a.outline().shape());
+    let shape_b = rows(simd, b.outline().shape());
+    let shape_b = times_transposed(&times_transposed(&relative.rotation, &shape_b), &relative.rotation);
+    let mut n = normalized(simd, [-relative.origin[0], -relative.origin[1], -relative.origin[2]]);
+    for _ in 0..TURNS {
+        let (u, v) = (apply(&shape_a, n), apply(&shape_b, n));
+        let (wide_a, wide_b) = (dot(n, u).sqrt(), dot(n, v).sqrt());
+        let inverse = one / (wide_a * wide_b);
+        let (of_a, of_b) = (inverse * wide_b, inverse * wide_a);
+        let mut w = [one; 3];
+        for i in 0..3 {
+            w[i] = -(relative.origin[i] + of_b.mul_add(v[i], of_a * u[i]));
+        }
+        let distance = dot(n, w);
+        let least = distance.max((wide_a + wide_b) * N::splat(simd, LEAST));
+        let (scaled_a, scaled_b) = (scaled(u, of_a * of_a * of_a), scaled(v, of_b * of_b * of_b));
+        let mut matrix = [least; 6];
+        for (entry, (i, j)) in matrix.iter_mut().zip([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]) {
+            let straight = of_a.mul_add(shape_a[i][j], of_b * shape_b[i][j]);
+            let bent = scaled_a[i].mul_add(u[j], scaled_b[i] * v[j]);
+            *entry = if i == j { least + straight - bent } else { straight - bent };
+        }
+        let mut residual = w;
+        for i in 0..3 {
+            residual[i] = w[i] - distance * n[i];
+        }
+        n = turned(simd, n, &matrix, residual);
+    }
+    n
+}
+
+/// The direction of `n + M⁻¹ r`, by cofactors of the symmetric matrix M with the entries xx, xy, xz, yy, yz, zz; the turn is
+/// limited.
+#[inline(always)]
+fn turned<S: Simd, N: Number<S>>(simd: S, n: V3<N>, [xx, xy, xz, yy, yz, zz]: &[N; 6], r: V3<N>) -> V3<N> {
+    let first = [*yy * *zz - *yz * *yz, *xz * *yz - *xy * *zz, *xy * *yz - *xz * *yy];
+    let (middle, mixed, last) = (*xx * *zz - *xz * *xz, *xy * *xz - *xx * *yz, *xx * *yy - *xy * *xy);
+    let determinant = dot([*xx, *xy, *xz], first);
+    let turn = [dot(first, r), dot([first[1], middle, mixed], r), dot([first[2], mixed, last], r)];
+    let longest = turn[0].abs().max(turn[1].abs()).max(turn[2].abs());
+    let weight = determinant.max(longest * N::splat(simd, 1.0 / MOST));
+    normalized(simd, add_scaled(turn, weight, n))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::facing;
+    use crate::body::Body;
+    use crate::measure::Pose;
+    use crate::measure::tangent::Relative;
+    use crate::polynomial::Scalar;
+    use crate::polynomial::tests::Seeded;
+    use nalgebra::Vector3;
+
+    fn pose(random: &mut Seeded, far: f64) -> Pose {
+        let q = nalgebra::Vector4::from_fn(|_, _| random.signed()).normalize();
+        let t = Vector3::from_fn(|_, _| random.signed()).normalize() * far;
+        Pose::from_quaternion(t, q.into()).unwrap()
+    }
+
+    #[test]
+    fn balls_face_each_other_along_their_centres() {
+        let (a, b) = (
+            Body::ball("a", Vector3::new(0.5, 0.0, 0.0), 1.0).unwrap(),
+            Body::ball("b", Vector3::zeros(), 2.0).unwrap(),
+        );
+        for seed in 0..100 {
+            let mut random = Seeded(seed);
+            let (pose_a, pose_b) = (pose(&mut random, 1.0), pose(&mut random, 6.0));
+            let relative = Relative::<f64>::new(Scalar, &a, &pose_a, &b, &pose_b);
+            let n = Vector3::from(facing::<_, f64>(Scalar, &a, &b, &relative));
+            let centres = pose_a.transform_point(&Vector3::new(0.5, 0.0, 0.0)) - pose_b.translation();
+            assert!((pose_a.transform_direction(&n) - centres.normalize()).norm() < 1e-12, "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn ellipsoids_nearly_face_each_other() {
+        // Where the stand-ins have the shape of the bodies the normals at the farthest points oppose each other.
+        let a = Body::ellipsoid("a", Vector3::zeros(), Vector3::new(1.0, 0.6, 0.4)).unwrap();
+        let b = Body::ellipsoid("b", Vector3::zeros(), Vector3::new(0.5, 0.9, 0.7)).unwrap();
+        let mut worst = 0.0_f64;
+        for seed in 0..500 {
+            let mut random = Seeded(seed);
+            let (pose_a, pose_b) = (Pose::identity(), pose(&mut random, 3.0));
+            let relative = Relative::<f64>::new(Scalar, &a, &pose_a, &b, &pose_b);
+            let n = Vector3::from(facing::<_, f64>(Scalar, &a, &b, &relative));
+            let farthest = |body: &Body, n: Vector3<f64>| {
+                let x = body.outline().shape() * n;
+                x / n.dot(&x).sqrt()
+            };
+            let x = farthest(&a, -n);
+            let y = pose_b.transform_point(&farthest(&b, pose_b.rotation().inverse() * n));
+            worst = worst.max((x - y).normalize().cross(&n).norm());
+        }
+        assert!(worst < 0.1, "{worst}");
+    }
+}
