@@ -306,15 +306,7 @@ impl Batch<'_> {
                     let x = moved(at.x, add(here.step.dx, found.to_a), &here.frame);
                     let y = moved(at.y, add(here.step.dy, found.to_b), &here.frame);
                     let n = apply_transposed(&here.frame, found.normal);
-                    self.write(
-                        simd,
-                        group,
-                        proven,
-                        round,
-                        [found.lower, found.upper, found.attained],
-                        found.multipliers,
-                        [x, y, n],
-                    );
+                    self.write(simd, group, proven, round, [found.lower, found.upper], found.multipliers, [x, y, n]);
                     open &= !proven;
                     if open == 0 {
                         return;
@@ -384,7 +376,7 @@ impl Batch<'_> {
         group: &Group,
         proven: u32,
         round: u32,
-        [lower, upper, attained]: [Lanes<S>; 3],
+        [lower, upper]: [Lanes<S>; 2],
         [of_a, of_b]: [Lanes<S>; 2],
         [x, y, n]: [V3<Lanes<S>>; 3],
     ) {
@@ -393,8 +385,8 @@ impl Batch<'_> {
         let splat = |value: f64| Lanes::<S>::splat(simd, value);
         let place = [splat(place.x), splat(place.y), splat(place.z)];
         let (x, y, n) = (add(place, apply(&frame, x)), add(place, apply(&frame, y)), apply(&frame, n));
-        let mut columns = [[0.0; MAX_LANES]; 14];
-        let numbers = [lower, upper, of_a, of_b, x[0], x[1], x[2], y[0], y[1], y[2], n[0], n[1], n[2], attained];
+        let mut columns = [[0.0; MAX_LANES]; 13];
+        let numbers = [lower, upper, of_a, of_b, x[0], x[1], x[2], y[0], y[1], y[2], n[0], n[1], n[2]];
         for (number, column) in numbers.into_iter().zip(&mut columns) {
             number.store(column);
         }
@@ -414,7 +406,6 @@ impl Batch<'_> {
                 normal: Some(vector(10)),
                 active_a: ActiveConstraints::single(0, entry(2)),
                 active_b: ActiveConstraints::single(0, entry(3)),
-                attained: entry(13).min(entry(1)).max(entry(0)),
                 iterations: group.rounds[lane] + round,
             };
         }

@@ -54,7 +54,6 @@ impl Default for Distance {
             normal: None,
             active_a: ActiveConstraints::default(),
             active_b: ActiveConstraints::default(),
-            attained: f64::INFINITY,
             iterations: 0,
         }
     }
