@@ -57,11 +57,6 @@ pub struct ConstraintTrust {
 }
 
 impl Trust {
-    /// Curvature floor of constraint i along unit vectors of z; rounded down.
-    pub fn floor_z(&self, i: usize) -> f64 {
-        self.constraints[i].curvature_floor * self.inverse_norm * self.inverse_norm * (1.0 - 1e-14)
-    }
-
     /// Bounds for a body whose boundary points, seen from the normalization's centre, are `boundary_z`.
     pub(super) fn new(
         constraints: &[Constraint],

@@ -6,8 +6,7 @@
 //! r·(x' - x) >= -Σ λ_i (1 - g_i(x)) - |r + Σ λ_i ∇g_i(x)| · |x' - x|
 //! ```
 //!
-//! by `1 >= g_i(x') >= g_i(x) + ∇g_i(x)·(x' - x)`. With a proven curvature floor c_i of each constraint (by z,
-//! [`crate::body::ConstraintTrust`]) the last term is at most `|r + Σ λ_i ∇g_i|² / (2 Σ λ_i c_i)` as well. The last product is taken in the body's normalized coordinates, component by
+//! by `1 >= g_i(x') >= g_i(x) + ∇g_i(x)·(x' - x)`. The last product is taken in the body's normalized coordinates, component by
 //! component, where a body has size about 1 in every direction: needles and plates then cost no digits. Hence, for a unit
 //! vector n, and with ν >= 0, Σ ν = 1,
 //!
@@ -35,7 +34,7 @@ pub(super) type Multipliers = [f64; MAX_CONSTRAINTS];
 /// arithmetic for v inside.
 pub(super) fn descent(body: &Posed<'_>, v: &Vector3<f64>, r: &Vector3<f64>, multipliers: &Multipliers) -> f64 {
     let (mut residual, mut error) = body.functional(r);
-    let (mut slack, mut magnitude, mut floor) = (0.0, 0.0, 0.0);
+    let (mut slack, mut magnitude) = (0.0, 0.0);
     error += residual.abs() * SLACK;
     for (i, &multiplier) in multipliers.iter().enumerate().take(body.len()) {
         if multiplier > 0.0 {
@@ -43,14 +42,10 @@ pub(super) fn descent(body: &Posed<'_>, v: &Vector3<f64>, r: &Vector3<f64>, mult
             slack += multiplier * (1.0 - sample.jet.value + sample.nearby_value_error);
             magnitude += multiplier * (1.0 + sample.jet.value.abs());
             residual += sample.z_gradient * multiplier;
-            floor += multiplier * body.body.trust().floor_z(i);
             error += (sample.z_gradient.abs() * SLACK).add_scalar(sample.z_gradient_error) * multiplier;
         }
     }
-    let off = residual.abs() + error;
-    // Where the constraints are curved everywhere, a residual costs only its square.
-    let curved = if floor > 0.0 { off.norm_squared() / (2.0 * floor) * (1.0 + 1e-13) } else { f64::INFINITY };
-    let rest = curved.min(off.dot(&body.spans(v)));
+    let rest = (residual.abs() + error).dot(&body.spans(v));
     slack + rest * (1.0 + SLACK) + SLACK * magnitude
 }
 
