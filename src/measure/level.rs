@@ -162,13 +162,13 @@ impl<'a> Search<'a> {
             self.interior_point();
         }
         if !self.done() && !self.exhausted() {
-            self.from_nearest();
+            self.start_nearest();
         }
     }
 
     /// Newton's method from the point of B nearest to A: where A is tiny, its values rise so steeply that nothing else shows
     /// the way, and near and low are about the same.
-    fn from_nearest(&mut self) {
+    fn start_nearest(&mut self) {
         let Some((x, a, b)) = distance::nearest(self.pair, self.options, &mut self.iterations) else { return };
         self.attain(&x);
         self.newton(x, a, b);
