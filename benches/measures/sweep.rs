@@ -99,7 +99,7 @@ impl<'a> Row<'a> {
     }
 
     /// A row of batches of up to `most` consecutive poses; `batch` writes its answers where it is told to.
-    pub(crate) fn batches<P, T: Clone + Default>(
+    pub(crate) fn batches<P, T: Clone + Default + 'a>(
         label: impl Into<String>,
         trajectories: &'a [Vec<P>],
         most: usize,
