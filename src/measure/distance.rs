@@ -118,7 +118,7 @@ pub(super) fn between(
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
     let mut spent = 0;
     if let Hint::Smooth(trace) = &mut warm.hint {
-        let follow = Follow { a, pose_a, b, pose_b, goal, tolerance, limit: options.max_iterations(), trace };
+        let follow = Follow { a, pose_a, b, pose_b, goal, tolerance, options, trace };
         match dispatch(follow) {
             Ok(proven) => return proven.answer(a, pose_a, tolerance),
             Err(rounds) => spent = rounds,
@@ -130,7 +130,7 @@ pub(super) fn between(
     };
     if !still_overlapping && !options.exhausted(spent) {
         let limit = SEEK_ROUNDS.min(options.max_iterations() - spent);
-        match dispatch(Seek { a, pose_a, b, pose_b, goal, tolerance, limit }) {
+        match dispatch(Seek { a, pose_a, b, pose_b, goal, tolerance, limit, options }) {
             Ok((proven, trace)) => {
                 *warm = Hint::Smooth(trace).into();
                 return Distance { iterations: spent + proven.rounds, ..proven.answer(a, pose_a, tolerance) };

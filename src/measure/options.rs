@@ -114,6 +114,12 @@ impl<'a> Options<'a> {
     /// Whether a solve that has taken this many iterations has to end.
     #[inline]
     pub(super) fn exhausted(&self, iterations: u32) -> bool {
-        iterations >= self.max_iterations || self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
+        iterations >= self.max_iterations || self.stopped()
+    }
+
+    /// Whether the stop flag is set.
+    #[inline(always)]
+    pub(super) fn stopped(&self) -> bool {
+        self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
     }
 }

@@ -6,10 +6,11 @@
 //! nearly the same each time, and is added on. One evaluation then mostly proves the answer or leaves one more step to it.
 
 use super::decide::Goal;
+use super::options::Options;
 use super::pose::Pose;
 use super::start::facing;
 use super::tangent::{Bend, Plane, Relative, Side, Step, bracket, moved, newton};
-use super::vector::{M3, V3, apply, apply_transposed, basis, dot, subtract};
+use super::vector::{M3, V3, add, apply, apply_transposed, basis, dot, subtract};
 use crate::body::{Body, Outline};
 use crate::polynomial::{NumberJet, Scalar, Simd, WithSimd};
 use nalgebra::Vector3;
@@ -111,8 +112,8 @@ pub(super) struct Follow<'a> {
     pub(super) goal: &'a Goal,
     /// Width of the bracket that is narrow enough, metres.
     pub(super) tolerance: f64,
-    /// Most rounds.
-    pub(super) limit: u32,
+    /// Whose iteration limit and stop flag end it.
+    pub(super) options: &'a Options<'a>,
     /// Read, and replaced if the answer is proven.
     pub(super) trace: &'a mut Trace,
 }
@@ -134,7 +135,7 @@ impl WithSimd for Follow<'_> {
 
         // Prediction from the old jets at the new poses.
         let trace = &*self.trace;
-        let y = plus(apply::<S, f64>(&relative.rotation, trace.y), relative.origin);
+        let y = add::<S, f64>(apply::<S, f64>(&relative.rotation, trace.y), relative.origin);
         let mut at = Iterate { x: trace.x, y, frame: trace.frame };
         let local_b = side_b.localize(simd, &at.frame);
         let b = (Plane::new(simd, &trace.jet_b, &local_b), Bend::new(simd, &trace.jet_b, &local_b));
@@ -145,14 +146,15 @@ impl WithSimd for Follow<'_> {
         }
         at.advance(simd, &step);
         let predicted = (at.x, at.y);
-        at.x = plus(at.x, trace.drift_x);
-        at.y = plus(at.y, apply::<S, f64>(&relative.rotation, trace.drift_y));
+        at.x = add::<S, f64>(at.x, trace.drift_x);
+        at.y = add::<S, f64>(at.y, apply::<S, f64>(&relative.rotation, trace.drift_y));
 
         let correct = Correct {
             sides: (side_a, side_b),
             goal: self.goal,
             tolerance: self.tolerance,
-            limit: MAX_ROUNDS.min(self.limit),
+            limit: MAX_ROUNDS.min(self.options.max_iterations()),
+            options: self.options,
             longest,
         };
         let proven = correct.run(simd, &relative, at, self.trace)?;
@@ -176,6 +178,8 @@ pub(super) struct Seek<'a> {
     pub(super) tolerance: f64,
     /// Most rounds.
     pub(super) limit: u32,
+    /// Whose stop flag is polled.
+    pub(super) options: &'a Options<'a>,
 }
 
 impl WithSimd for Seek<'_> {
@@ -194,10 +198,16 @@ impl WithSimd for Seek<'_> {
         let side_a = Side::at_home(simd, self.a, active_a);
         let side_b = Side::away(self.b, active_b, &relative);
         let longest = LONGEST * self.a.trust().reach.min(self.b.trust().reach);
-        let correct =
-            Correct { sides: (side_a, side_b), goal: self.goal, tolerance: self.tolerance, limit: self.limit, longest };
+        let correct = Correct {
+            sides: (side_a, side_b),
+            goal: self.goal,
+            tolerance: self.tolerance,
+            limit: self.limit,
+            options: self.options,
+            longest,
+        };
         // The first step from the marks needs no evaluation.
-        let y = plus(apply::<S, f64>(&relative.rotation, mark_b.point), relative.origin);
+        let y = add::<S, f64>(apply::<S, f64>(&relative.rotation, mark_b.point), relative.origin);
         let mut at = Iterate { x: mark_a.point, y, frame: basis(simd, n) };
         let (local_a, local_b) = (side_a.localize(simd, &at.frame), side_b.localize(simd, &at.frame));
         let (a, b) = (Plane::new(simd, &mark_a.jet, &local_a), Plane::new(simd, &mark_b.jet, &local_b));
@@ -220,6 +230,7 @@ struct Correct<'a> {
     goal: &'a Goal,
     tolerance: f64,
     limit: u32,
+    options: &'a Options<'a>,
     /// Longest step, metres.
     longest: f64,
 }
@@ -235,6 +246,9 @@ impl Correct<'_> {
     ) -> Result<Proven, u32> {
         let (side_a, side_b) = &self.sides;
         for rounds in 1..=self.limit {
+            if self.options.stopped() {
+                return Err(rounds - 1);
+            }
             let ((jet_a, inside_a), (jet_b, inside_b)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
             if !(inside_a && inside_b) {
                 // A step has led too far.
@@ -265,14 +279,14 @@ impl Correct<'_> {
             // The bracket where Newton's step leads, by extrapolation: mostly no other evaluation is needed.
             let next_a = side_a.extrapolate(simd, &jet_a, &local_a, step.dx);
             let next_b = side_b.extrapolate(simd, &jet_b, &local_b, step.dy);
-            let next = subtract::<S, f64>(plus(difference, step.dx), step.dy);
+            let next = subtract::<S, f64>(add::<S, f64>(difference, step.dx), step.dy);
             let found = bracket(simd, (side_a, &next_a), (side_b, &next_b), next);
             // Below the rounding floor no bracket gets, however long Newton's method goes on.
             let narrow = found.upper - found.lower <= self.tolerance.max(4.0 * found.rounding);
             let decided = narrow || self.goal.met(found.lower, found.upper);
             if decided && found.lower > 0.0 {
-                let x = moved::<S, f64>(at.x, plus(step.dx, found.to_a), &at.frame);
-                let y = moved::<S, f64>(at.y, plus(step.dy, found.to_b), &at.frame);
+                let x = moved::<S, f64>(at.x, add::<S, f64>(step.dx, found.to_a), &at.frame);
+                let y = moved::<S, f64>(at.y, add::<S, f64>(step.dy, found.to_b), &at.frame);
                 if !(side_a.others_hold(simd, x) && side_b.others_hold(simd, y)) {
                     return Err(rounds);
                 }
@@ -331,9 +345,4 @@ impl Iterate {
         let turned = moved::<S, f64>(self.frame[2], [step.dn[0], step.dn[1], 0.0], &self.frame);
         self.frame = basis(simd, turned);
     }
-}
-
-#[inline(always)]
-fn plus(a: V3<f64>, b: V3<f64>) -> V3<f64> {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
