@@ -9,7 +9,7 @@ use super::decide::Goal;
 use super::options::Options;
 use super::pose::Pose;
 use super::start::facing;
-use super::tangent::{Bend, Plane, Relative, Side, Step, bracket, moved, newton};
+use super::tangent::{ALIGNED, Bend, Plane, Relative, Side, Step, bracket, moved, newton};
 use super::vector::{M3, V3, add, apply, apply_transposed, basis, dot, subtract};
 use crate::body::{Body, Outline};
 use crate::polynomial::{NumberJet, Scalar, Simd, WithSimd};
@@ -282,7 +282,7 @@ impl Correct<'_> {
             let next = subtract::<S, f64>(add::<S, f64>(difference, step.dx), step.dy);
             let found = bracket(simd, (side_a, &next_a), (side_b, &next_b), next);
             // Below the rounding floor no bracket gets, however long Newton's method goes on.
-            let narrow = found.upper - found.lower <= self.tolerance.max(4.0 * found.rounding);
+            let narrow = found.upper - found.lower <= self.tolerance.max(4.0 * found.rounding) && found.off <= ALIGNED;
             let decided = narrow || self.goal.met(found.lower, found.upper);
             if decided && found.lower > 0.0 {
                 let x = moved::<S, f64>(at.x, add::<S, f64>(step.dx, found.to_a), &at.frame);

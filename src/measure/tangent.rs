@@ -468,6 +468,8 @@ pub(super) struct Bracket<N> {
     pub(super) upper: N,
     /// What rounding alone leaves between them, about.
     pub(super) rounding: N,
+    /// Bound of the angle between the outward normal of one body and the inward normal of the other, but for terms of third order.
+    pub(super) off: N,
     /// Of A's and of B's constraint, metres.
     pub(super) multipliers: [N; 2],
     /// Unit normal of the lower bound, in the basis.
@@ -481,6 +483,9 @@ pub(super) struct Bracket<N> {
 /// Relative slack for the rounding of the bracket's own arithmetic, basis included: fewer than 256 operations on the sum
 /// of magnitudes.
 pub(super) const SLACK: f64 = 128.0 * f64::EPSILON;
+
+/// Largest angle between the bodies' normals that an answer is taken at: its gradients are off by about as much.
+pub(super) const ALIGNED: f64 = 1e-6;
 
 /// How much farther a point is moved than its constraint's linearization asks, for the rounding of its gradient.
 pub(super) const NUDGE: f64 = 1e-4;
@@ -574,7 +579,7 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
     let upper = upper.select(N::and(simd, fine_a, fine_b), splat(f64::NAN));
     let evaluated = of_a * splat(side_a.trust().value_error) + of_b * splat(side_b.trust().value_error);
     let rounding = splat(2.0) * (displaced + rounding + evaluated);
-    Bracket { lower, upper, rounding, multipliers: [of_a, of_b], normal, to_a, to_b }
+    Bracket { lower, upper, rounding, off, multipliers: [of_a, of_b], normal, to_a, to_b }
 }
 
 /// What is known of one body's active constraint near the body, in metres.
