@@ -7,7 +7,8 @@ use crate::measure::Status;
 use crate::measure::pose::Pose;
 use crate::measure::relation::{Relation, Verdict};
 use crate::measure::smooth::Proven;
-use crate::measure::tangent::{Bend, Bracket, Plane, Relative, SLACK, Step, TURNED, newton_along};
+use crate::measure::start::facing_along;
+use crate::measure::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, SLACK, Step, TURNED, newton_along};
 use crate::measure::twist::Twist;
 use crate::measure::vector::{M3, V3, add, apply, dot, rows, scaled, subtract};
 use crate::polynomial::{Scalar, Simd, gamma};
@@ -99,8 +100,8 @@ impl Relation for Along {
     }
 
     #[inline(always)]
-    fn facing<S: Simd>(&self, _: S, _: &Body, _: &Body, _: &Relative<f64>) -> V3<f64> {
-        scaled::<S, f64>(self.delta, -1.0 / self.square.sqrt())
+    fn facing<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> V3<f64> {
+        facing_along(simd, a, b, relative, self.delta)
     }
 
     #[inline(always)]
@@ -132,7 +133,8 @@ impl Relation for Along {
         let rest = dot::<S, f64>(rest, rest).sqrt() + delta_error + t * found.rounding;
         let upper = (t + rest / self.radius) * (1.0 + SLACK);
         // The bracket of the distance is not a number where its points are not proven to be in the bodies.
-        if width > 0.0 && found.upper.is_finite() && upper - lower <= self.accuracy * upper {
+        let narrow = upper - lower <= self.accuracy * upper && found.off <= ALIGNED;
+        if width > 0.0 && found.upper.is_finite() && narrow {
             Verdict::Proven { lower: lower.max(0.0), upper }
         } else {
             Verdict::Wide
