@@ -70,6 +70,13 @@ impl Outline {
         Self { shape, marks, active }
     }
 
+    /// The point of the mark kept there.
+    #[inline(always)]
+    pub fn point(&self, place: f64) -> [f64; 3] {
+        let [x, y, z, ..] = self.marks[(place as usize).min(self.marks.len() - 1)];
+        [x, y, z]
+    }
+
     /// The ellipsoid, as the matrix Σ of its support function `√(nᵀ Σ n)`, m².
     pub fn shape(&self) -> &Matrix3<f64> {
         &self.shape

@@ -464,15 +464,14 @@ impl<'a> Search<'a> {
 
 impl Proven {
     fn answer(&self, a: &Body, pose_a: &Pose, tolerance: f64) -> Distance {
-        let center = a.normalization().center;
-        let to_world = |v: [f64; 3]| pose_a.transform_point(&(center + Vector3::from(v)));
+        let (witness_a, witness_b) = self.witnesses(a, pose_a);
         Distance {
             status: if self.upper - self.lower <= tolerance { Status::Converged } else { Status::BracketWide },
             lower: self.lower,
             upper: self.upper,
-            witness_a: to_world(self.x),
-            witness_b: to_world(self.y),
-            normal: Some(pose_a.transform_direction(&Vector3::from(self.n))),
+            witness_a,
+            witness_b,
+            normal: self.normal(pose_a),
             active_a: ActiveConstraints::single(self.active[0], self.multipliers[0]),
             active_b: ActiveConstraints::single(self.active[1], self.multipliers[1]),
             iterations: self.rounds,

@@ -297,6 +297,11 @@ impl<'a> Pair<'a> {
         (self.a_to_query(&a), self.b_to_query(&b), relative * lengths / self.unit * (1.0 + 1e-14))
     }
 
+    /// A direction of the query frame in that of the second body.
+    pub(super) fn direction_to_b(&self, n: &Vector3<f64>) -> Vector3<f64> {
+        self.rotation.transpose() * n
+    }
+
     /// Of the stored boundary points of the first body the one farthest along a direction of the query frame.
     pub(super) fn farthest_a(&self, n: &Vector3<f64>) -> Vector3<f64> {
         self.a_to_query(&farthest(self.a.body.boundary(), n))
@@ -304,7 +309,7 @@ impl<'a> Pair<'a> {
 
     /// The same of the second body.
     pub(super) fn farthest_b(&self, n: &Vector3<f64>) -> Vector3<f64> {
-        self.b_to_query(&farthest(self.b.body.boundary(), &(self.rotation.transpose() * n)))
+        self.b_to_query(&farthest(self.b.body.boundary(), &self.direction_to_b(n)))
     }
 }
 

@@ -5,7 +5,7 @@ use super::decide::Goal;
 use super::pose::Pose;
 use super::start::facing;
 use super::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, Step, newton};
-use super::vector::{M3, V3};
+use super::vector::{M3, V3, add, add_scaled, dot, subtract};
 use crate::body::Body;
 use crate::polynomial::Simd;
 
@@ -89,6 +89,64 @@ impl Relation for Apart<'_> {
         } else if difference[2] <= 0.0 {
             // Stationary in an overlap.
             Verdict::Hopeless
+        } else {
+            Verdict::Wide
+        }
+    }
+}
+
+/// The signed distance near a direction: x - y along the normal, one way or the other, so that Newton's method passes through
+/// contact without noticing.
+///
+/// The lower bound is one of the signed distance, for a plane across any n shows at least `-h_A(-n) - h_B(n)` of it; it is
+/// taken as proven where the points attain it, so that no normal nearby shows more. The upper bound is that of the distance.
+#[derive(Clone, Copy)]
+pub(super) struct Through<'a> {
+    pub(super) pose_a: &'a Pose,
+    pub(super) pose_b: &'a Pose,
+    /// From B to A, in A's frame, to start from; without one, across the gap of the ellipsoids that stand for the bodies.
+    pub(super) facing: Option<V3<f64>>,
+    /// How far from attained the lower bound may be, metres.
+    pub(super) tolerance: f64,
+}
+
+impl Relation for Through<'_> {
+    #[inline(always)]
+    fn relative<S: Simd>(&self, simd: S, a: &Body, b: &Body) -> Relative<f64> {
+        Relative::new(simd, a, self.pose_a, b, self.pose_b)
+    }
+
+    #[inline(always)]
+    fn facing<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> V3<f64> {
+        match self.facing {
+            Some(n) => n,
+            None => facing(simd, a, b, relative),
+        }
+    }
+
+    #[inline(always)]
+    fn newton<S: Simd>(
+        &self,
+        simd: S,
+        a: (&Plane<f64>, &Bend<f64>),
+        b: (&Plane<f64>, &Bend<f64>),
+        _: &M3<f64>,
+        difference: V3<f64>,
+    ) -> Step<f64> {
+        newton(simd, a, b, difference, 0.0)
+    }
+
+    #[inline(always)]
+    fn judge<S: Simd>(&self, _: S, found: &Bracket<f64>, _: &M3<f64>, difference: V3<f64>) -> Verdict {
+        let enough = self.tolerance.max(4.0 * found.rounding);
+        let between = subtract::<S, f64>(add::<S, f64>(difference, found.to_a), found.to_b);
+        let attained = dot::<S, f64>(found.normal, between);
+        let sideways = add_scaled::<S, f64>(between, -attained, found.normal);
+        let close = attained - found.lower <= enough && dot::<S, f64>(sideways, sideways) <= enough * enough;
+        let narrow = found.upper - found.lower <= enough;
+        // A bound that is not a number proves nothing.
+        if (narrow || close) && found.off <= ALIGNED && found.upper.is_finite() {
+            Verdict::Proven { lower: found.lower, upper: found.upper }
         } else {
             Verdict::Wide
         }

@@ -6,6 +6,7 @@
 //! nearly the same each time, and is added on. One evaluation then mostly proves the answer or leaves one more step to it.
 
 use super::options::Options;
+use super::pose::Pose;
 use super::relation::{Relation, Verdict};
 use super::tangent::{Bend, Plane, Relative, Side, Step, bracket, moved};
 use super::vector::{M3, V3, add, apply, apply_transposed, basis, dot, subtract};
@@ -83,6 +84,22 @@ pub(super) struct Proven {
     pub(super) multipliers: [f64; 2],
     /// Evaluations of both bodies.
     pub(super) rounds: u32,
+}
+
+impl Proven {
+    /// The points in the world frame.
+    #[inline]
+    pub(super) fn witnesses(&self, a: &Body, pose_a: &Pose) -> (Vector3<f64>, Vector3<f64>) {
+        let center = a.normalization().center;
+        let to_world = |v: V3<f64>| pose_a.transform_point(&(center + Vector3::from(v)));
+        (to_world(self.x), to_world(self.y))
+    }
+
+    /// The normal in the world frame.
+    #[inline]
+    pub(super) fn normal(&self, pose_a: &Pose) -> Option<Vector3<f64>> {
+        Some(pose_a.transform_direction(&Vector3::from(self.n)))
+    }
 }
 
 /// Most evaluations before another method takes over.

@@ -216,6 +216,20 @@ impl Side<'_, f64> {
         if fraction < 0.97 { add_scaled::<S, f64>(self.origin, fraction, from) } else { v }
     }
 
+    /// From a point with this plane to a point of the body nearby, against the gradient, in the basis of the plane; as far as
+    /// the active constraint goes. None if it is not proven to be one.
+    #[inline(always)]
+    pub(super) fn to_inside<S: Simd>(&self, simd: S, at: &Extrapolated<f64>) -> Option<V3<f64>> {
+        let gradient = at.plane.gradient;
+        let length = dot::<S, f64>(gradient, gradient).sqrt();
+        let inverse = 1.0 / length;
+        let excess = at.plane.value - 1.0 + (at.value_error + self.trust().value_error);
+        let near = Near::new(self);
+        let gradient_error = at.gradient_error + near.gradient_error;
+        let (distance, fine) = near.move_inside::<S, f64>(simd, excess, length, inverse, gradient_error);
+        fine.then(|| scaled::<S, f64>(gradient, inverse * distance))
+    }
+
     /// Whether all constraints but the active one are proven to hold at (a point within the displacement of) v.
     #[inline(always)]
     pub(super) fn others_hold<S: Simd>(&self, simd: S, v: V3<f64>) -> bool {

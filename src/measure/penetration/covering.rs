@@ -146,13 +146,14 @@ impl<const N: usize> Covering<N> {
         }
     }
 
-    /// Lower bound of the support function on the triangle, but for rounding and the errors of the points.
-    pub(super) fn bound(&self, corners: [u16; 3]) -> f64 {
+    /// Lower bound of the support function on the triangle, but for rounding and the errors of the points, if it is found to
+    /// be at least `enough`; else `known`, that of a larger triangle.
+    pub(super) fn bound(&self, corners: [u16; 3], enough: f64, known: f64) -> f64 {
         let corners = corners.map(|i| &self.directions[usize::from(i)]);
         let n = corners.map(|corner| corner.n);
-        let (own, mixed) = (corners.map(Direction::w), Self::mixed(corners));
-        let bound = lower_bound(n, own);
-        if own == mixed { bound } else { bound.max(lower_bound(n, mixed)) }
+        let own = corners.map(Direction::w);
+        let bound = lower_bound(n, own, enough).or_else(|| lower_bound(n, Self::mixed(corners), enough));
+        bound.unwrap_or(known)
     }
 
     /// The lowest bound of the open triangles.
@@ -206,37 +207,47 @@ impl<const N: usize> Covering<N> {
     }
 }
 
-/// `min over unit n in the cone of the n_i of max_i n·w_i`, from below; 0 where that is negative.
-fn lower_bound(n: [Vector3<f64>; 3], w: [Vector3<f64>; 3]) -> f64 {
+/// `min over unit n in the cone of the n_i of max_i n·w_i`, from below; none where that is less than `enough`, which is
+/// positive: a negative r proves nothing.
+fn lower_bound(n: [Vector3<f64>; 3], w: [Vector3<f64>; 3], enough: f64) -> Option<f64> {
     // Row i: the bound by w_i at each corner.
     let g = Matrix3::from_fn(|i, j| w[i].dot(&n[j]));
     let mut lowest = g[(0, 0)].min(g[(1, 1)]).min(g[(2, 2)]);
-    let mut meeting = 0.0_f64;
-    let mut offer = |a: Vector3<f64>| {
-        let value = (g * a).min() / (n[0] * a[0] + n[1] * a[1] + n[2] * a[2]).norm();
-        meeting = meeting.max(value);
-    };
     // Where on an edge the bounds of its two ends are equal.
-    for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+    let mut edges = [(0.0, 0.0); 3];
+    for (edge, (i, j)) in edges.iter_mut().zip(EDGES) {
         let (alpha, beta) = (g[(j, j)] - g[(i, j)], g[(i, i)] - g[(j, i)]);
         let (alpha, beta) = if alpha >= 0.0 && beta >= 0.0 && alpha + beta > 0.0 { (alpha, beta) } else { (1.0, 1.0) };
-        let c = n[i] * alpha + n[j] * beta;
         let value = (alpha * g[(i, i)] + beta * g[(i, j)]).min(alpha * g[(j, i)] + beta * g[(j, j)]);
-        lowest = lowest.min(value / c.norm());
-        let mut a = Vector3::zeros();
-        (a[i], a[j]) = (alpha, beta);
-        offer(a);
+        lowest = lowest.min(value / (n[i] * alpha + n[j] * beta).norm());
+        *edge = (alpha, beta);
     }
-    // Where all three are equal, or a point of the triangle near there: the best of those at hand, for any will do.
+    // Not `<`: a NaN bounds nothing.
+    if !(lowest >= enough) {
+        return None;
+    }
+    // Where all three are equal, or a point of the triangle near there: the first that will do.
+    let meets = |a: Vector3<f64>| (g * a).min() / (n[0] * a[0] + n[1] * a[1] + n[2] * a[2]).norm();
     let row = |i: usize| g.row(i).transpose();
     let normal = (row(0) - row(1)).cross(&(row(0) - row(2)));
-    offer(normal.map(|a| a.max(0.0)));
-    offer(normal.map(|a| (-a).max(0.0)));
-    offer(Vector3::repeat(1.0));
-    lowest = lowest.min(meeting);
-    // A NaN bounds nothing, and a negative r proves nothing; depths are at least 0.
-    if lowest > 0.0 { lowest } else { 0.0 }
+    let normal = if normal.sum() < 0.0 { -normal } else { normal };
+    let mut meeting = meets(normal.map(|a| a.max(0.0)));
+    if !(meeting >= enough) {
+        meeting = meets(Vector3::repeat(1.0));
+    }
+    for ((alpha, beta), (i, j)) in edges.into_iter().zip(EDGES) {
+        if meeting >= enough {
+            break;
+        }
+        let mut a = Vector3::zeros();
+        (a[i], a[j]) = (alpha, beta);
+        meeting = meets(a);
+    }
+    (meeting >= enough).then_some(lowest.min(meeting))
 }
+
+/// The edges of a triangle.
+const EDGES: [(usize, usize); 3] = [(0, 1), (1, 2), (2, 0)];
 
 #[cfg(test)]
 mod tests {

@@ -8,6 +8,8 @@
 //! triangles are split at each size; where many directions are equally good, as for concentric balls, all of them are.
 
 mod covering;
+mod farthest;
+mod scout;
 mod support;
 #[cfg(test)]
 mod tests;
@@ -18,10 +20,15 @@ use super::newton::{Active, DistanceNewton};
 use super::options::Options;
 use super::pair::Pair;
 use super::pose::Pose;
+use super::relation::Through;
+use super::smooth::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
 use super::warm::{Hint, WarmStart};
 use crate::body::Body;
+use crate::polynomial::dispatch;
 use covering::{Cell, Covering, Direction};
+use farthest::Farthest;
 use nalgebra::Vector3;
+use scout::Scout;
 use support::{SupportPoint, facing, support};
 
 /// Penetration depth with its proof, lengths in metres, vectors in the world frame.
@@ -84,10 +91,10 @@ pub fn penetration(
     warm: &mut WarmStart,
 ) -> Penetration {
     let pair = Pair::new(a, pose_a, b, pose_b);
-    let mut best = Best::new(&pair);
-    best.follow(&pair, options, &warm.hint);
-    let proof = prove(&pair, options, &mut best);
-    if let Some(hint) = best.hint(&pair) {
+    let mut best = Best::new(&pair, pose_a, pose_b, options);
+    best.follow(&warm.hint);
+    let proof = prove(&mut best);
+    if let Some(hint) = best.hint() {
         *warm = hint;
     }
     let apart = best.depth <= 0.0;
@@ -136,33 +143,102 @@ pub(super) fn depth_along(
 }
 
 /// The shortest way out known, in query units.
-pub(super) struct Best {
+pub(super) struct Best<'a> {
+    pub(super) pair: &'a Pair<'a>,
+    pose_a: &'a Pose,
+    pose_b: &'a Pose,
+    pub(super) options: &'a Options<'a>,
     /// Rigorous upper bound of f along n; negative if n parts the bodies.
     pub(super) depth: f64,
     pub(super) n: Option<Vector3<f64>>,
     pub(super) x: Vector3<f64>,
     pub(super) y: Vector3<f64>,
-    pub(super) active: (Active, Active),
+    /// Distance of points of the bodies at x and y, rounded up, where that was proven with the depth.
+    pub(super) attained: Option<f64>,
+    active: (Active, Active),
+    trace: Option<Trace>,
     pub(super) iterations: u32,
 }
 
-impl Best {
-    pub(super) fn new(pair: &Pair<'_>) -> Self {
-        let (x, y) = (pair.a.interior, pair.b.interior);
-        Self { depth: f64::INFINITY, n: None, x, y, active: Default::default(), iterations: 0 }
-    }
-
-    /// Starts from the answer to an earlier query.
-    pub(super) fn follow(&mut self, pair: &Pair<'_>, options: &Options<'_>, hint: &Hint) {
-        if let Hint::Apart { x_a, y_b, normal_a, active_a, active_b } = hint {
-            let a = SupportPoint { x: pair.a_to_query(x_a), active: *active_a };
-            let b = SupportPoint { x: pair.b_to_query(y_b), active: *active_b };
-            self.polish(pair, options, &a, &b, normal_a);
+impl<'a> Best<'a> {
+    pub(super) fn new(pair: &'a Pair<'a>, pose_a: &'a Pose, pose_b: &'a Pose, options: &'a Options<'a>) -> Self {
+        Self {
+            pair,
+            pose_a,
+            pose_b,
+            options,
+            depth: f64::INFINITY,
+            n: None,
+            x: pair.a.interior,
+            y: pair.b.interior,
+            attained: None,
+            active: Default::default(),
+            trace: None,
+            iterations: 0,
         }
     }
 
-    /// Newton's method on the optimality system of the distance, with a negative distance, from near support points.
-    fn polish(&mut self, pair: &Pair<'_>, options: &Options<'_>, x: &SupportPoint, y: &SupportPoint, n: &Vector3<f64>) {
+    /// Starts from the answer to an earlier query.
+    pub(super) fn follow(&mut self, hint: &Hint) {
+        match hint {
+            Hint::Smooth(trace) => {
+                let mut trace = *trace;
+                let (a, b, relation) = (self.pair.a.body, self.pair.b.body, self.through(None));
+                match dispatch(Follow { a, b, relation, options: self.options, trace: &mut trace }) {
+                    Ok(proven) => self.take(&proven, trace),
+                    Err(rounds) => self.iterations += rounds,
+                }
+            }
+            Hint::Apart { x_a, y_b, normal_a, active_a, active_b } => {
+                let a = SupportPoint { x: self.pair.a_to_query(x_a), active: *active_a };
+                let b = SupportPoint { x: self.pair.b_to_query(y_b), active: *active_b };
+                self.polish(&a, &b, normal_a);
+            }
+            _ => {}
+        }
+    }
+
+    /// Looks for the shortest way out near n, or where the bodies seem to face each other; whether it found one.
+    pub(super) fn seek(&mut self, n: Option<&Vector3<f64>>) -> bool {
+        let (pair, options, relation) = (self.pair, self.options, self.through(n));
+        if options.exhausted(self.iterations) {
+            return false;
+        }
+        let limit = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
+        match dispatch(Seek { a: pair.a.body, b: pair.b.body, relation, limit, options }) {
+            Ok((proven, trace)) => {
+                self.take(&proven, trace);
+                true
+            }
+            Err(rounds) => {
+                self.iterations += rounds;
+                false
+            }
+        }
+    }
+
+    fn through(&self, n: Option<&Vector3<f64>>) -> Through<'a> {
+        let tolerance = self.pair.tolerance(self.options.accuracy()) * self.pair.unit();
+        Through { pose_a: self.pose_a, pose_b: self.pose_b, facing: n.map(|n| (*n).into()), tolerance }
+    }
+
+    /// Takes a direction proven in metres if it is the shortest way out so far.
+    pub(super) fn take(&mut self, proven: &Proven, trace: Trace) {
+        self.iterations += proven.rounds;
+        let (pair, unit) = (self.pair, self.pair.unit());
+        if -proven.lower / unit < self.depth {
+            let center = pair.a.body.normalization().center;
+            (self.depth, self.n) = (-proven.lower / unit, Some(proven.n.into()));
+            self.x = pair.a_to_query(&(center + Vector3::from(proven.x)));
+            self.y = pair.a_to_query(&(center + Vector3::from(proven.y)));
+            (self.attained, self.trace) = (Some(proven.upper / unit), Some(trace));
+        }
+    }
+
+    /// Newton's method on the optimality system of the distance, with a negative distance, from near support points of any
+    /// number of active constraints.
+    fn polish(&mut self, x: &SupportPoint, y: &SupportPoint, n: &Vector3<f64>) {
+        let (pair, options) = (self.pair, self.options);
         let (a, b) = (Active::from_bits(x.active, pair.a.len()), Active::from_bits(y.active, pair.b.len()));
         let (Some(a), Some(b)) = (a, b) else { return };
         let finite = x.x.iter().chain(&y.x).chain(n).all(|value| value.is_finite());
@@ -173,7 +249,7 @@ impl Best {
         let tolerance = pair.tolerance(options.accuracy());
         let limit = options.max_iterations() - self.iterations;
         self.iterations += newton.run(pair, limit, |at| {
-            let depth = self.try_direction(pair, &at.x, &at.y, &at.n, at.a, at.b);
+            let depth = self.try_direction(&at.x, &at.y, &at.n, at.a, at.b);
             // The points attain what the normal proves: no better direction is near.
             let attained = at.n.dot(&(at.y - at.x)) / at.n.norm();
             let sideways = (at.x - at.y) + at.n * attained;
@@ -182,27 +258,26 @@ impl Best {
     }
 
     /// Takes a direction if it is the shortest way out so far; returns its depth.
-    fn try_direction(
-        &mut self,
-        pair: &Pair<'_>,
-        x: &Vector3<f64>,
-        y: &Vector3<f64>,
-        n: &Vector3<f64>,
-        a: Active,
-        b: Active,
-    ) -> f64 {
-        let depth = depth_along(pair, x, y, n, &a.multipliers(), &b.multipliers());
+    fn try_direction(&mut self, x: &Vector3<f64>, y: &Vector3<f64>, n: &Vector3<f64>, a: Active, b: Active) -> f64 {
+        let depth = depth_along(self.pair, x, y, n, &a.multipliers(), &b.multipliers());
         if depth < self.depth
             && let Some(n) = n.try_normalize(0.0)
         {
             (self.depth, self.n, self.x, self.y, self.active) = (depth, Some(n), *x, *y, (a, b));
+            (self.attained, self.trace) = (None, None);
         }
         depth
     }
 
-    pub(super) fn hint(&self, pair: &Pair<'_>) -> Option<WarmStart> {
+    pub(super) fn hint(&self) -> Option<WarmStart> {
         let (a, b) = &self.active;
-        self.n.map(|n| WarmStart::apart(pair, &self.x, &self.y, &n, a.bits(), b.bits()))
+        let apart = |n: &Vector3<f64>| WarmStart::apart(self.pair, &self.x, &self.y, n, a.bits(), b.bits());
+        self.n.as_ref().map(|n| self.trace.map_or_else(|| apart(n), |trace| Hint::Smooth(trace).into()))
+    }
+
+    /// Width of a bracket asked for.
+    pub(super) fn tolerance(&self) -> f64 {
+        tolerance(self.pair, self.options, self.depth)
     }
 }
 
@@ -219,10 +294,14 @@ const FEW: usize = 192;
 const MANY: usize = 2048;
 
 /// Bounds the depth from below, improving the best direction on the way.
-pub(super) fn prove(pair: &Pair<'_>, options: &Options<'_>, best: &mut Best) -> Proof {
-    match sweep::<FEW>(pair, options, best) {
-        (proof, true) if !options.exhausted(best.iterations) => {
-            let (more, _) = sweep::<MANY>(pair, options, best);
+pub(super) fn prove(best: &mut Best<'_>) -> Proof {
+    let (n, depth) = dispatch(Scout { a: best.pair.a.body, b: best.pair.b.body, pair: best.pair });
+    if !(best.depth <= depth) {
+        best.seek(Some(&n));
+    }
+    match sweep::<FEW>(best) {
+        (proof, true) if !best.options.exhausted(best.iterations) => {
+            let (more, _) = sweep::<MANY>(best);
             Proof { lower: more.lower.max(proof.lower), directions: more.directions + proof.directions, ..more }
         }
         (proof, _) => proof,
@@ -234,9 +313,15 @@ const SPLITS: u32 = 64;
 
 /// Sweeps the sphere of directions until the bracket is narrow; also tells whether the table was full first.
 #[inline(never)]
-fn sweep<const N: usize>(pair: &Pair<'_>, options: &Options<'_>, best: &mut Best) -> (Proof, bool) {
-    let mut sweep =
-        Sweep { pair, options, covering: Covering::<N>::new(), floor: f64::INFINITY, error: 0.0, size: 0.0 };
+fn sweep<const N: usize>(best: &mut Best<'_>) -> (Proof, bool) {
+    let mut sweep = Sweep {
+        pair: best.pair,
+        options: best.options,
+        covering: Covering::<N>::new(),
+        floor: f64::INFINITY,
+        error: 0.0,
+        size: 0.0,
+    };
     let full = sweep.run(best).is_none();
     let lower = sweep.covering.lowest().unwrap_or(f64::INFINITY).min(sweep.floor);
     let lower = if sweep.covering.directions().len() < 6 || best.depth <= 0.0 { 0.0 } else { lower.max(0.0) };
@@ -262,7 +347,7 @@ struct Sweep<'a, const N: usize> {
 
 impl<const N: usize> Sweep<'_, N> {
     /// None if the table is full before the bracket is narrow.
-    fn run(&mut self, best: &mut Best) -> Option<()> {
+    fn run(&mut self, best: &mut Best<'_>) -> Option<()> {
         let origin = Vector3::zeros();
         self.size = self.pair.a.reach(&origin) + self.pair.b.reach(&origin);
         // The octahedron: a box's own axes are among its corners.
@@ -278,7 +363,7 @@ impl<const N: usize> Sweep<'_, N> {
         self.improve(0, best);
         for k in 0..8 {
             let sign = |axis: u16| if k >> axis & 1 == 0 { axis } else { axis + 3 };
-            self.open([sign(0), sign(1), sign(2)], best);
+            self.open([sign(0), sign(1), sign(2)], 0.0, best);
         }
         loop {
             let before = self.covering.directions().len();
@@ -304,7 +389,7 @@ impl<const N: usize> Sweep<'_, N> {
     }
 
     /// Triangles at or above this bound are good enough.
-    fn target(&self, best: &Best) -> f64 {
+    fn target(&self, best: &Best<'_>) -> f64 {
         best.depth - tolerance(self.pair, self.options, best.depth)
     }
 
@@ -315,24 +400,41 @@ impl<const N: usize> Sweep<'_, N> {
         parents: [u16; 2],
         a: &SupportPoint,
         b: &SupportPoint,
-        best: &Best,
+        best: &Best<'_>,
     ) -> Option<Direction> {
         // Far above the best depth a rough bound will do.
         let known = if best.depth.is_finite() { best.depth.abs() } else { self.size };
         let surplus = n.dot(&(b.x - a.x)) - known;
         let tolerance = (0.1 * tolerance(self.pair, self.options, known)).max(0.02 * surplus);
-        let a = support(&self.pair.a, &-n, tolerance, a, || self.pair.farthest_a(&-n))?;
-        let b = support(&self.pair.b, &n, tolerance, b, || self.pair.farthest_b(&n))?;
+        let pair = self.pair;
+        let of_a = Farthest { body: pair.a.body, n: -n, tolerance: tolerance * pair.unit() };
+        let a = match dispatch(of_a) {
+            Some((x, active)) => {
+                SupportPoint { x: pair.a_to_query(&(x + pair.a.body.normalization().center)), active: 1 << active }
+            }
+            None => support(&pair.a, &-n, tolerance, a, || pair.farthest_a(&-n))?,
+        };
+        let of_b = Farthest { body: pair.b.body, n: pair.direction_to_b(&n), tolerance: tolerance * pair.unit() };
+        let b = match dispatch(of_b) {
+            Some((x, active)) => {
+                SupportPoint { x: pair.b_to_query(&(x + pair.b.body.normalization().center)), active: 1 << active }
+            }
+            None => support(&pair.b, &n, tolerance, b, || pair.farthest_b(&n))?,
+        };
         self.error = self.error.max(self.pair.a.displacement(&a.x) + self.pair.b.displacement(&b.x));
         Some(Direction { n, a, b, parents })
     }
 
     /// Tries the best of the directions from `first` on, if it promises to be better than the best known.
-    fn improve(&mut self, first: usize, best: &mut Best) {
+    fn improve(&mut self, first: usize, best: &mut Best<'_>) {
         let directions = &self.covering.directions()[first..];
         let Some(least) = directions.iter().min_by(|p, q| p.depth().total_cmp(&q.depth())) else { return };
-        let promising = best.depth - 0.5 * tolerance(self.pair, self.options, best.depth);
+        let promising = best.depth - 0.5 * best.tolerance();
         if !(least.depth() < promising) && best.depth.is_finite() {
+            return;
+        }
+        let smooth = self.pair.a.len() == 1 && self.pair.b.len() == 1;
+        if smooth && best.seek(Some(&least.n)) && best.depth <= least.depth() {
             return;
         }
         let (mut a, mut b) = (
@@ -340,31 +442,34 @@ impl<const N: usize> Sweep<'_, N> {
             Active::from_bits(least.b.active, self.pair.b.len()).unwrap_or_default(),
         );
         if a.fit(&self.pair.a, &least.a.x, &-least.n) && b.fit(&self.pair.b, &least.b.x, &least.n) {
-            best.try_direction(self.pair, &least.a.x, &least.b.x, &least.n, a, b);
+            best.try_direction(&least.a.x, &least.b.x, &least.n, a, b);
         }
-        best.polish(self.pair, self.options, &least.a, &least.b, &least.n);
+        best.polish(&least.a, &least.b, &least.n);
     }
 
-    fn open(&mut self, corners: [u16; 3], best: &Best) {
+    /// Bounds a triangle, a part of one with a known bound, and keeps it for later if that is not enough.
+    fn open(&mut self, corners: [u16; 3], known: f64, best: &Best<'_>) {
         // Middles are rounded, so neighbours of different size leave slivers open; f changes by little over one. The sums
         // of the bound itself round too.
-        let lower = self.covering.bound(corners) - self.error - 4.0 * SLACK * self.size;
-        if lower >= self.target(best) {
+        let (target, error) = (self.target(best), self.error + 4.0 * SLACK * self.size);
+        let enough = (target + error).max(f64::MIN_POSITIVE);
+        let lower = self.covering.bound(corners, enough, known + error) - error;
+        if lower >= target {
             self.floor = self.floor.min(lower);
         } else {
             self.covering.push(Cell { corners, lower: lower.max(0.0) });
         }
     }
 
-    fn split(&mut self, cell: Cell, best: &Best) -> bool {
+    fn split(&mut self, cell: Cell, best: &Best<'_>) -> bool {
         let ([i, j, k], n) = self.covering.widest_edge(cell.corners);
         let Some(middle) = self.middle(i, j, n, best) else { return false };
-        self.open([i, middle, k], best);
-        self.open([middle, j, k], best);
+        self.open([i, middle, k], cell.lower, best);
+        self.open([middle, j, k], cell.lower, best);
         true
     }
 
-    fn middle(&mut self, i: u16, j: u16, n: Vector3<f64>, best: &Best) -> Option<u16> {
+    fn middle(&mut self, i: u16, j: u16, n: Vector3<f64>, best: &Best<'_>) -> Option<u16> {
         if let Some(index) = self.covering.middle(i, j) {
             return Some(index);
         }
@@ -382,7 +487,7 @@ impl<const N: usize> Sweep<'_, N> {
     }
 
     /// Whether a direction far from the best was seen to be about as good.
-    fn tied(&self, best: &Best) -> bool {
+    fn tied(&self, best: &Best<'_>) -> bool {
         let Some(n) = best.n else { return false };
         let close = best.depth + 2.0 * tolerance(self.pair, self.options, best.depth);
         self.covering.directions().iter().any(|direction| direction.n.dot(&n) < 0.99 && direction.depth() <= close)

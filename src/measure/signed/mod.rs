@@ -15,9 +15,12 @@ use super::options::Options;
 use super::pair::Pair;
 use super::penetration::{Best, prove, tolerance};
 use super::pose::Pose;
+use super::relation::Through;
+use super::smooth::{Follow, Proven};
 use super::twist::Twist;
-use super::warm::WarmStart;
+use super::warm::{Hint, WarmStart};
 use crate::body::Body;
+use crate::polynomial::dispatch;
 use nalgebra::Vector3;
 
 /// Signed distance with its proof, lengths in metres, vectors in the world frame.
@@ -86,10 +89,27 @@ pub fn signed_distance(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> SignedDistance {
+    let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
+    let mut spent = 0;
+    if let Hint::Smooth(trace) = &mut warm.hint {
+        let relation = Through { pose_a, pose_b, facing: None, tolerance };
+        // Apart, or nearly, the normal proves all there is.
+        match dispatch(Follow { a, b, relation, options, trace }) {
+            Ok(proven) if proven.upper - proven.lower <= tolerance => {
+                return Answer::of(&proven).report(proven.witnesses(a, pose_a), proven.normal(pose_a), pose_a, pose_b);
+            }
+            Ok(proven) => spent = proven.rounds,
+            Err(rounds) => spent = rounds,
+        }
+    }
     let pair = Pair::new(a, pose_a, b, pose_b);
-    let mut best = Best::new(&pair);
-    best.follow(&pair, options, &warm.hint);
-    let mut known = Known::of(&pair, &best);
+    let mut best = Best::new(&pair, pose_a, pose_b, options);
+    best.iterations = spent;
+    best.follow(&warm.hint);
+    if best.depth.is_infinite() {
+        best.seek(None);
+    }
+    let mut known = Known::of(&best);
     if best.depth.is_infinite() {
         // Nothing to follow: the distance says on which side the bodies are.
         let apart = distance(a, pose_a, b, pose_b, options, warm);
@@ -98,10 +118,10 @@ pub fn signed_distance(
             let iterations = best.iterations;
             let answer =
                 Answer { lower: apart.lower, upper: apart.upper, tied: false, iterations, status: apart.status };
-            return answer.report(apart.witness_a, apart.witness_b, apart.normal, pose_a, pose_b);
+            return answer.report((apart.witness_a, apart.witness_b), apart.normal, pose_a, pose_b);
         }
-        best.follow(&pair, options, &warm.hint);
-        known = Known::of(&pair, &best);
+        best.follow(&warm.hint);
+        known = Known::of(&best);
         known.attain(
             apart.upper / pair.unit(),
             pair.world_to_query(&apart.witness_a),
@@ -109,21 +129,21 @@ pub fn signed_distance(
         );
     }
     let mut tied = false;
-    if best.depth > 0.0 && !known.narrow(&pair, options) {
-        let proof = prove(&pair, options, &mut best);
+    if best.depth > 0.0 && !known.narrow(&best) {
+        let proof = prove(&mut best);
         tied = proof.tied;
         let before = known;
-        known = Known::of(&pair, &best);
+        known = Known::of(&best);
         if proof.lower > 0.0 {
             known.upper = -proof.lower;
         } else {
             known.attain(before.upper, before.x, before.y);
         }
     }
-    if let Some(hint) = best.hint(&pair) {
+    if let Some(hint) = best.hint() {
         *warm = hint;
     }
-    if known.lower > 0.0 && !known.narrow(&pair, options) {
+    if known.lower > 0.0 && !known.narrow(&best) {
         let apart = distance(a, pose_a, b, pose_b, options, warm);
         let answer = Answer {
             lower: apart.lower.max(known.lower * pair.unit()),
@@ -132,14 +152,14 @@ pub fn signed_distance(
             iterations: best.iterations + apart.iterations,
             status: apart.status,
         };
-        return answer.report(apart.witness_a, apart.witness_b, apart.normal, pose_a, pose_b);
+        return answer.report((apart.witness_a, apart.witness_b), apart.normal, pose_a, pose_b);
     }
-    let status = if known.narrow(&pair, options) { Status::Converged } else { Status::BracketWide };
+    let status = if known.narrow(&best) { Status::Converged } else { Status::BracketWide };
     let unit = pair.unit();
     let answer =
         Answer { lower: known.lower * unit, upper: known.upper * unit, tied, iterations: best.iterations, status };
     let normal = best.n.map(|n| pair.direction_to_world(&n));
-    answer.report(pair.to_world(&known.x), pair.to_world(&known.y), normal, pose_a, pose_b)
+    answer.report((pair.to_world(&known.x), pair.to_world(&known.y)), normal, pose_a, pose_b)
 }
 
 /// A bracket of the signed distance in query units, and the points behind it.
@@ -152,8 +172,11 @@ struct Known {
 
 impl Known {
     /// What the best direction shows, and the points of the bodies there.
-    fn of(pair: &Pair<'_>, best: &Best) -> Self {
-        let lower = -best.depth;
+    fn of(best: &Best<'_>) -> Self {
+        let (lower, pair) = (-best.depth, best.pair);
+        if let Some(upper) = best.attained {
+            return Self { lower, upper, x: best.x, y: best.y };
+        }
         match (pair.a.pull_in(&best.x), pair.b.pull_in(&best.y)) {
             (Some(x), Some(y)) => Self { lower, upper: distance_upper(pair, &x, &y), x, y },
             _ => Self { lower, upper: f64::INFINITY, x: best.x, y: best.y },
@@ -167,9 +190,9 @@ impl Known {
         }
     }
 
-    fn narrow(&self, pair: &Pair<'_>, options: &Options<'_>) -> bool {
+    fn narrow(&self, best: &Best<'_>) -> bool {
         let depth = if self.upper < 0.0 { -self.lower } else { 0.0 };
-        self.upper - self.lower <= tolerance(pair, options, depth)
+        self.upper - self.lower <= tolerance(best.pair, best.options, depth)
     }
 }
 
@@ -182,10 +205,14 @@ struct Answer {
 }
 
 impl Answer {
+    fn of(proven: &Proven) -> Self {
+        let Proven { lower, upper, rounds, .. } = *proven;
+        Self { lower, upper, tied: false, iterations: rounds, status: Status::Converged }
+    }
+
     fn report(
         self,
-        witness_a: Vector3<f64>,
-        witness_b: Vector3<f64>,
+        (witness_a, witness_b): (Vector3<f64>, Vector3<f64>),
         normal: Option<Vector3<f64>>,
         pose_a: &Pose,
         pose_b: &Pose,

@@ -1,0 +1,107 @@
+//! Support points of smooth surfaces, from an outline's mark: mostly by one evaluation.
+//!
+//! The point z of a body farthest along e (both in normalized coordinates, `e·z = n·x`) has `λ ∇g(z) = e`, `g(z) = 1`. Newton's
+//! step for the two,
+//!
+//! ```text
+//! λ' = (g·H⁻¹e - λ (1 - g(z))) / (g·H⁻¹g),   dz = (H⁻¹e - λ' H⁻¹g) / λ
+//! ```
+//!
+//! gains `½ λ dz·H dz` along the surface; what is left to gain is about the square of that. The mark's jet gives the first
+//! step, and Taylor's formula proves the end of the last one to be in the body.
+
+use crate::body::{Body, Outline};
+use crate::measure::tangent::Side;
+use crate::measure::vector::{V3, add, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, scaled};
+use crate::polynomial::{NumberJet, Simd, WithSimd};
+use nalgebra::Vector3;
+
+/// The point of a body farthest along n within the tolerance, as work for the widest arithmetic.
+pub(super) struct Farthest<'a> {
+    pub(super) body: &'a Body,
+    /// Unit vector, body frame.
+    pub(super) n: Vector3<f64>,
+    /// What it may lack, metres.
+    pub(super) tolerance: f64,
+}
+
+/// Most evaluations.
+const MAX_ROUNDS: u32 = 4;
+
+/// What is left to gain after a step, relative to the square of the step's gain over the size of the body: more than is usual.
+const LEFT: f64 = 16.0;
+
+impl WithSimd for Farthest<'_> {
+    type Output = Option<(Vector3<f64>, usize)>;
+
+    /// A point within whose displacement (the rounding of its normalized coordinates) a point of the body is proven to lie,
+    /// from the centre of the normalization on, body frame, metres, and the active constraint; none where Newton's method does
+    /// not arrive.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Option<(Vector3<f64>, usize)> {
+        let Self { body, n, tolerance } = self;
+        let n: V3<f64> = n.into();
+        let place = Outline::place(simd, n);
+        let active = body.outline().active(place);
+        let mark = body.outline().mark(simd, place);
+        let side = Side::at_home(simd, body, active);
+        let inverse = rows(simd, body.inverse());
+        let e = apply_transposed::<S, f64>(&inverse, n);
+        let mut x = add::<S, f64>(mark.point, apply::<S, f64>(&inverse, step(simd, &mark.jet, e)?.dz));
+        let axes = side.localize(simd, &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+        for _ in 0..MAX_ROUNDS {
+            let (jet, inside) = side.jet(simd, x);
+            if !inside {
+                return None;
+            }
+            let Step { dz, gain } = step(simd, &jet, e)?;
+            let dx = apply::<S, f64>(&inverse, dz);
+            if LEFT * gain * gain <= tolerance * body.trust().reach {
+                let next = side.extrapolate(simd, &jet, &axes, dx);
+                if let Some(inward) = side.to_inside(simd, &next) {
+                    let x = add::<S, f64>(add::<S, f64>(x, dx), inward);
+                    return side.others_hold(simd, x).then(|| (x.into(), active));
+                }
+            }
+            x = add::<S, f64>(x, dx);
+        }
+        None
+    }
+}
+
+/// A Newton step.
+struct Step {
+    dz: V3<f64>,
+    /// What it gains along e, metres.
+    gain: f64,
+}
+
+/// Newton's step from a point near the surface; none if its normal has nothing to do with e.
+#[inline(always)]
+fn step<S: Simd>(_: S, jet: &NumberJet<f64>, e: V3<f64>) -> Option<Step> {
+    let g = jet.gradient;
+    let (square, along) = (dot::<S, f64>(g, g), dot::<S, f64>(g, e));
+    let [xx, xy, xz, yy, yz, zz] = jet.hessian;
+    let cofactors = [
+        yy * zz - yz * yz,
+        xz * yz - xy * zz,
+        xy * yz - xz * yy,
+        xx * zz - xz * xz,
+        xy * xz - xx * yz,
+        xx * yy - xy * xy,
+    ];
+    let determinant = xx * cofactors[0] + xy * cofactors[1] + xz * cofactors[2];
+    let (of_e, of_g) = (apply_symmetric::<S, f64>(&cofactors, e), apply_symmetric::<S, f64>(&cofactors, g));
+    let multiplier = along / square;
+    let missing = determinant * (1.0 - jet.value);
+    let next = (dot::<S, f64>(g, of_e) - multiplier * missing) / dot::<S, f64>(g, of_g);
+    let dz = scaled::<S, f64>(add_scaled::<S, f64>(of_e, -next, of_g), 1.0 / (multiplier * determinant));
+    let bend = 0.5 * dot::<S, f64>(dz, apply_symmetric::<S, f64>(&jet.hessian, dz));
+    // The surface bends away from the tangent plane by as much.
+    let dz = add_scaled::<S, f64>(dz, -bend / square, g);
+    let finite = along > 0.0 && next > 0.0 && dot::<S, f64>(dz, dz) < LONGEST * LONGEST;
+    finite.then_some(Step { dz, gain: multiplier.max(next) * bend })
+}
+
+/// Longest step, in normalized coordinates, that the linearization may mean anything for.
+const LONGEST: f64 = 0.5;
