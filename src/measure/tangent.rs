@@ -230,6 +230,29 @@ impl Side<'_, f64> {
         fine.then(|| scaled::<S, f64>(gradient, inverse * distance))
     }
 
+    /// Bound of how much farther along the unit vector n the body reaches than the point with this plane; infinite or not a
+    /// number if the plane faces another way. All in the basis of the plane.
+    #[inline(always)]
+    pub(super) fn lack<S: Simd>(&self, simd: S, at: &Extrapolated<f64>, n: V3<f64>) -> f64 {
+        let gradient = at.plane.gradient;
+        let along = dot::<S, f64>(n, gradient);
+        let multiplier = 1.0 / along;
+        let residual = add_scaled::<S, f64>(n, -multiplier, gradient);
+        let near = Near::new(self);
+        let length = dot::<S, f64>(gradient, gradient).sqrt();
+        let turned = near.turn * length + at.gradient_error + near.gradient_error;
+        let off = dot::<S, f64>(residual, residual).sqrt() + turned * multiplier + SLACK;
+        let bound = Bound {
+            curvature: at.curvature,
+            radius: at.radius,
+            inverse_square: near.inverse_square,
+            floor: near.floor,
+            span: near.span,
+        };
+        let slack = multiplier * (1.0 - at.plane.value + at.value_error + self.trust().value_error);
+        if along > 0.0 { slack + bound.loss(simd, off, multiplier) } else { f64::INFINITY }
+    }
+
     /// Whether all constraints but the active one are proven to hold at (a point within the displacement of) v.
     #[inline(always)]
     pub(super) fn others_hold<S: Simd>(&self, simd: S, v: V3<f64>) -> bool {

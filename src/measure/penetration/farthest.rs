@@ -7,8 +7,8 @@
 //! λ' = (g·H⁻¹e - λ (1 - g(z))) / (g·H⁻¹g),   dz = (H⁻¹e - λ' H⁻¹g) / λ
 //! ```
 //!
-//! gains `½ λ dz·H dz` along the surface; what is left to gain is about the square of that. The mark's jet gives the first
-//! step, and Taylor's formula proves the end of the last one to be in the body.
+//! leaves an error of the order of its square, and what that costs along e is of the square again. The mark's jet gives the
+//! first step; Taylor's formula proves how far the end of the last one is from the best, and a point of the body beside it.
 
 use crate::body::{Body, Outline};
 use crate::measure::tangent::Side;
@@ -28,9 +28,6 @@ pub(super) struct Farthest<'a> {
 /// Most evaluations.
 const MAX_ROUNDS: u32 = 4;
 
-/// What is left to gain after a step, relative to the square of the step's gain over the size of the body: more than is usual.
-const LEFT: f64 = 16.0;
-
 impl WithSimd for Farthest<'_> {
     type Output = Option<(Vector3<f64>, usize)>;
 
@@ -47,21 +44,20 @@ impl WithSimd for Farthest<'_> {
         let side = Side::at_home(simd, body, active);
         let inverse = rows(simd, body.inverse());
         let e = apply_transposed::<S, f64>(&inverse, n);
-        let mut x = add::<S, f64>(mark.point, apply::<S, f64>(&inverse, step(simd, &mark.jet, e)?.dz));
+        let mut x = add::<S, f64>(mark.point, apply::<S, f64>(&inverse, step(simd, &mark.jet, e)?));
         let axes = side.localize(simd, &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
         for _ in 0..MAX_ROUNDS {
             let (jet, inside) = side.jet(simd, x);
             if !inside {
                 return None;
             }
-            let Step { dz, gain } = step(simd, &jet, e)?;
-            let dx = apply::<S, f64>(&inverse, dz);
-            if LEFT * gain * gain <= tolerance * body.trust().reach {
-                let next = side.extrapolate(simd, &jet, &axes, dx);
-                if let Some(inward) = side.to_inside(simd, &next) {
-                    let x = add::<S, f64>(add::<S, f64>(x, dx), inward);
-                    return side.others_hold(simd, x).then(|| (x.into(), active));
-                }
+            let dx = apply::<S, f64>(&inverse, step(simd, &jet, e)?);
+            let next = side.extrapolate(simd, &jet, &axes, dx);
+            if let Some(inward) = side.to_inside(simd, &next)
+                && side.lack(simd, &next, n) - dot::<S, f64>(n, inward) <= tolerance
+            {
+                let x = add::<S, f64>(add::<S, f64>(x, dx), inward);
+                return side.others_hold(simd, x).then(|| (x.into(), active));
             }
             x = add::<S, f64>(x, dx);
         }
@@ -69,16 +65,9 @@ impl WithSimd for Farthest<'_> {
     }
 }
 
-/// A Newton step.
-struct Step {
-    dz: V3<f64>,
-    /// What it gains along e, metres.
-    gain: f64,
-}
-
 /// Newton's step from a point near the surface; none if its normal has nothing to do with e.
 #[inline(always)]
-fn step<S: Simd>(_: S, jet: &NumberJet<f64>, e: V3<f64>) -> Option<Step> {
+fn step<S: Simd>(_: S, jet: &NumberJet<f64>, e: V3<f64>) -> Option<V3<f64>> {
     let g = jet.gradient;
     let (square, along) = (dot::<S, f64>(g, g), dot::<S, f64>(g, e));
     let [xx, xy, xz, yy, yz, zz] = jet.hessian;
@@ -100,7 +89,7 @@ fn step<S: Simd>(_: S, jet: &NumberJet<f64>, e: V3<f64>) -> Option<Step> {
     // The surface bends away from the tangent plane by as much.
     let dz = add_scaled::<S, f64>(dz, -bend / square, g);
     let finite = along > 0.0 && next > 0.0 && dot::<S, f64>(dz, dz) < LONGEST * LONGEST;
-    finite.then_some(Step { dz, gain: multiplier.max(next) * bend })
+    finite.then_some(dz)
 }
 
 /// Longest step, in normalized coordinates, that the linearization may mean anything for.

@@ -18,7 +18,7 @@ use super::Status;
 use super::bracket::{Multipliers, SLACK, descent};
 use super::newton::{Active, DistanceNewton};
 use super::options::Options;
-use super::pair::Pair;
+use super::pair::{Pair, Posed};
 use super::pose::Pose;
 use super::relation::Through;
 use super::smooth::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
@@ -29,7 +29,7 @@ use covering::{Cell, Covering, Direction};
 use farthest::Farthest;
 use nalgebra::Vector3;
 use scout::Scout;
-use support::{SupportPoint, facing, support};
+use support::{SupportPoint, support};
 
 /// Penetration depth with its proof, lengths in metres, vectors in the world frame.
 #[derive(Clone, Copy, Debug)]
@@ -323,7 +323,7 @@ fn sweep<const N: usize>(best: &mut Best<'_>) -> (Proof, bool) {
         size: 0.0,
     };
     let full = sweep.run(best).is_none();
-    let lower = sweep.covering.lowest().unwrap_or(f64::INFINITY).min(sweep.floor);
+    let lower = sweep.lowest(best).min(sweep.floor);
     let lower = if sweep.covering.directions().len() < 6 || best.depth <= 0.0 { 0.0 } else { lower.max(0.0) };
     let proof = Proof {
         lower: lower.min(best.depth.max(0.0)),
@@ -345,6 +345,14 @@ struct Sweep<'a, const N: usize> {
     size: f64,
 }
 
+/// Where to look for the support point along n between two others.
+fn between_points(body: &Posed<'_>, p: &SupportPoint, q: &SupportPoint, n: &Vector3<f64>) -> SupportPoint {
+    let farther = if n.dot(&p.x) > n.dot(&q.x) { *p } else { *q };
+    // Between near points of one smooth surface it has the right normal, and is inside by little.
+    let smooth = body.len() == 1 && (p.x - q.x).norm() < 0.4;
+    if smooth { SupportPoint { x: (p.x + q.x) * 0.5, ..*p } } else { farther }
+}
+
 impl<const N: usize> Sweep<'_, N> {
     /// None if the table is full before the bracket is narrow.
     fn run(&mut self, best: &mut Best<'_>) -> Option<()> {
@@ -354,21 +362,18 @@ impl<const N: usize> Sweep<'_, N> {
         for k in 0..6 {
             let mut n = Vector3::zeros();
             n[k % 3] = if k < 3 { 1.0 } else { -1.0 };
-            let (x, y) = (self.pair.farthest_a(&-n), self.pair.farthest_b(&n));
-            let start_a = SupportPoint { x, active: facing(&self.pair.a, &x, &-n) };
-            let start_b = SupportPoint { x: y, active: facing(&self.pair.b, &y, &n) };
-            let Some(direction) = self.direction(n, [0, 0], &start_a, &start_b, best) else { return Some(()) };
+            let direction = self.direction(n, None, best)?;
             self.covering.add(direction);
         }
         self.improve(0, best);
         for k in 0..8 {
             let sign = |axis: u16| if k >> axis & 1 == 0 { axis } else { axis + 3 };
-            self.open([sign(0), sign(1), sign(2)], 0.0, best);
+            self.open([sign(0), sign(1), sign(2)], best);
         }
         loop {
             let before = self.covering.directions().len();
             for _ in 0..SPLITS {
-                if best.depth <= 0.0 || !self.covering.lowest().is_some_and(|lowest| lowest < self.target(best)) {
+                if best.depth <= 0.0 || self.covering.is_closed() {
                     return Some(());
                 }
                 if !self.covering.has_room() {
@@ -381,11 +386,27 @@ impl<const N: usize> Sweep<'_, N> {
                 }
             }
             best.iterations += 1;
+            let depth = best.depth;
             self.improve(before, best);
+            if best.depth < depth {
+                self.close(best);
+            }
             if self.options.exhausted(best.iterations) {
                 return Some(());
             }
         }
+    }
+
+    /// The lowest bound of the triangles that are left to split: until now these were only found not to be good enough.
+    fn lowest(&self, best: &Best<'_>) -> f64 {
+        let target = self.target(best);
+        let error = self.error + 4.0 * SLACK * self.size;
+        let bound = |cell: Cell| {
+            let shares = (0..10).map(|k| 1.0 - 1e-3 * f64::from(1 << k));
+            let mut bounds = shares.filter_map(|share| self.covering.bound(cell.corners, share * target + error).ok());
+            bounds.next().map_or(0.0, |bound| bound - error)
+        };
+        self.covering.cells().map(bound).fold(f64::INFINITY, f64::min)
     }
 
     /// Triangles at or above this bound are good enough.
@@ -393,35 +414,35 @@ impl<const N: usize> Sweep<'_, N> {
         best.depth - tolerance(self.pair, self.options, best.depth)
     }
 
-    /// Support points along n and against it.
-    fn direction(
-        &mut self,
-        n: Vector3<f64>,
-        parents: [u16; 2],
-        a: &SupportPoint,
-        b: &SupportPoint,
-        best: &Best<'_>,
-    ) -> Option<Direction> {
+    /// Support points along n and against it, n being between two directions or anywhere.
+    fn direction(&mut self, n: Vector3<f64>, between: Option<[u16; 2]>, best: &Best<'_>) -> Option<Direction> {
+        let pair = self.pair;
+        let ends = between.map(|ends| ends.map(|i| self.covering.directions()[usize::from(i)]));
         // Far above the best depth a rough bound will do.
         let known = if best.depth.is_finite() { best.depth.abs() } else { self.size };
-        let surplus = n.dot(&(b.x - a.x)) - known;
-        let tolerance = (0.1 * tolerance(self.pair, self.options, known)).max(0.02 * surplus);
-        let pair = self.pair;
-        let of_a = Farthest { body: pair.a.body, n: -n, tolerance: tolerance * pair.unit() };
-        let a = match dispatch(of_a) {
-            Some((x, active)) => {
-                SupportPoint { x: pair.a_to_query(&(x + pair.a.body.normalization().center)), active: 1 << active }
+        let surplus = ends.map_or(0.0, |ends| ends.iter().map(|end| n.dot(&end.w())).fold(0.0, f64::max) - known);
+        let tolerance = (0.1 * tolerance(pair, self.options, known)).max(0.02 * surplus);
+        let (a, b) = (&pair.a, &pair.b);
+        let to_a = |x: &Vector3<f64>| pair.a_to_query(&(x + a.body.normalization().center));
+        let to_b = |y: &Vector3<f64>| pair.b_to_query(&(y + b.body.normalization().center));
+        let of_a = dispatch(Farthest { body: a.body, n: -n, tolerance: tolerance * pair.unit() });
+        let of_b = dispatch(Farthest { body: b.body, n: pair.direction_to_b(&n), tolerance: tolerance * pair.unit() });
+        let a = match of_a {
+            Some((x, active)) => SupportPoint { x: to_a(&x), active: 1 << active },
+            None => {
+                let start = ends.map(|[p, q]| between_points(a, &p.a, &q.a, &-n));
+                support(a, &-n, tolerance, start, || pair.farthest_a(&-n))?
             }
-            None => support(&pair.a, &-n, tolerance, a, || pair.farthest_a(&-n))?,
         };
-        let of_b = Farthest { body: pair.b.body, n: pair.direction_to_b(&n), tolerance: tolerance * pair.unit() };
-        let b = match dispatch(of_b) {
-            Some((x, active)) => {
-                SupportPoint { x: pair.b_to_query(&(x + pair.b.body.normalization().center)), active: 1 << active }
+        let b = match of_b {
+            Some((y, active)) => SupportPoint { x: to_b(&y), active: 1 << active },
+            None => {
+                let start = ends.map(|[p, q]| between_points(b, &p.b, &q.b, &n));
+                support(b, &n, tolerance, start, || pair.farthest_b(&n))?
             }
-            None => support(&pair.b, &n, tolerance, b, || pair.farthest_b(&n))?,
         };
-        self.error = self.error.max(self.pair.a.displacement(&a.x) + self.pair.b.displacement(&b.x));
+        self.error = self.error.max(pair.a.displacement(&a.x) + pair.b.displacement(&b.x));
+        let parents = between.map_or([0, 0], |[i, j]| [i.min(j), i.max(j)]);
         Some(Direction { n, a, b, parents })
     }
 
@@ -447,25 +468,35 @@ impl<const N: usize> Sweep<'_, N> {
         best.polish(&least.a, &least.b, &least.n);
     }
 
-    /// Bounds a triangle, a part of one with a known bound, and keeps it for later if that is not enough.
-    fn open(&mut self, corners: [u16; 3], known: f64, best: &Best<'_>) {
+    /// Bounds a triangle, and keeps it for later if that is not enough.
+    fn open(&mut self, corners: [u16; 3], best: &Best<'_>) {
         // Middles are rounded, so neighbours of different size leave slivers open; f changes by little over one. The sums
         // of the bound itself round too.
         let (target, error) = (self.target(best), self.error + 4.0 * SLACK * self.size);
-        let enough = (target + error).max(f64::MIN_POSITIVE);
-        let lower = self.covering.bound(corners, enough, known + error) - error;
-        if lower >= target {
-            self.floor = self.floor.min(lower);
-        } else {
-            self.covering.push(Cell { corners, lower: lower.max(0.0) });
+        match self.covering.bound(corners, target + error) {
+            Ok(bound) => self.floor = self.floor.min(bound - error),
+            Err(guess) => self.covering.push(Cell { corners, guess }),
         }
+    }
+
+    /// Drops the triangles that are good enough for a better depth.
+    fn close(&mut self, best: &Best<'_>) {
+        let (target, error) = (self.target(best), self.error + 4.0 * SLACK * self.size);
+        let floor = &mut self.floor;
+        self.covering.close(|covering, cell| match covering.bound(cell.corners, target + error) {
+            Ok(bound) => {
+                *floor = floor.min(bound - error);
+                true
+            }
+            Err(_) => false,
+        });
     }
 
     fn split(&mut self, cell: Cell, best: &Best<'_>) -> bool {
         let ([i, j, k], n) = self.covering.widest_edge(cell.corners);
         let Some(middle) = self.middle(i, j, n, best) else { return false };
-        self.open([i, middle, k], cell.lower, best);
-        self.open([middle, j, k], cell.lower, best);
+        self.open([i, middle, k], best);
+        self.open([middle, j, k], best);
         true
     }
 
@@ -473,16 +504,7 @@ impl<const N: usize> Sweep<'_, N> {
         if let Some(index) = self.covering.middle(i, j) {
             return Some(index);
         }
-        let [p, q] = [i, j].map(|i| self.covering.directions()[usize::from(i)]);
-        let start = |p: &SupportPoint, q: &SupportPoint, n: &Vector3<f64>, single: bool| {
-            let half = (p.x + q.x) * 0.5;
-            let farther = if n.dot(&p.x) > n.dot(&q.x) { *p } else { *q };
-            // Between near points of one smooth surface it has the right normal, and is inside by little.
-            if single && (p.x - q.x).norm() < 0.4 { SupportPoint { x: half, ..*p } } else { farther }
-        };
-        let a = start(&p.a, &q.a, &-n, self.pair.a.len() == 1);
-        let b = start(&p.b, &q.b, &n, self.pair.b.len() == 1);
-        let direction = self.direction(n, [i.min(j), i.max(j)], &a, &b, best)?;
+        let direction = self.direction(n, Some([i, j]), best)?;
         Some(self.covering.add_middle(direction))
     }
 

@@ -31,10 +31,10 @@ pub(super) fn support(
     body: &Posed<'_>,
     n: &Vector3<f64>,
     tolerance: f64,
-    start: &SupportPoint,
+    start: Option<SupportPoint>,
     restart: impl FnOnce() -> Vector3<f64>,
 ) -> Option<SupportPoint> {
-    if let Some(found) = newton(body, n, tolerance, start) {
+    if let Some(found) = start.and_then(|start| newton(body, n, tolerance, &start)) {
         return Some(found);
     }
     let x = restart();
@@ -43,13 +43,14 @@ pub(super) fn support(
         return Some(found);
     }
     // The last resort ends early on surfaces that are flat at all scales, where what was known may be better.
-    let found = [interior_point(body, n, tolerance), *start, restart];
-    let inside = found.into_iter().filter_map(|point| body.pull_in(&point.x).map(|x| SupportPoint { x, ..point }));
+    let found = [Some(interior_point(body, n, tolerance)), start, Some(restart)];
+    let inside =
+        found.into_iter().flatten().filter_map(|point| body.pull_in(&point.x).map(|x| SupportPoint { x, ..point }));
     inside.max_by(|p, q| n.dot(&p.x).total_cmp(&n.dot(&q.x)))
 }
 
 /// Of the constraints nearly active at x the one that faces n best.
-pub(super) fn facing(body: &Posed<'_>, x: &Vector3<f64>, n: &Vector3<f64>) -> ActiveSet {
+fn facing(body: &Posed<'_>, x: &Vector3<f64>, n: &Vector3<f64>) -> ActiveSet {
     let mut best = (0, f64::NEG_INFINITY);
     for i in 0..body.len() {
         let jet = body.jet(i, x);

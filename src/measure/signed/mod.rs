@@ -128,6 +128,13 @@ pub fn signed_distance(
             pair.world_to_query(&apart.witness_b),
         );
     }
+    if known.lower < 0.0 && !known.narrow(&best) {
+        // Halfway between the deepest points is mostly a common one.
+        let middle = (known.x + known.y) * 0.5;
+        if pair.common(&middle) {
+            known.attain(0.0, middle, middle);
+        }
+    }
     let mut tied = false;
     if best.depth > 0.0 && !known.narrow(&best) {
         let proof = prove(&mut best);
