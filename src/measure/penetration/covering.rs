@@ -61,6 +61,7 @@ pub(super) struct Covering<const N: usize> {
 }
 
 impl<const N: usize> Covering<N> {
+    #[inline(always)]
     pub(super) fn new() -> Self {
         let point = SupportPoint { x: Vector3::zeros(), active: 0 };
         let blank = Direction { n: Vector3::zeros(), a: point, b: point, parents: [0, 0] };
@@ -153,8 +154,10 @@ impl<const N: usize> Covering<N> {
         let corners = corners.map(|i| &self.directions[usize::from(i)]);
         let n = corners.map(|corner| corner.n);
         let own = corners.map(Direction::w);
-        lower_bound(n, own, enough)
-            .or_else(|guess| lower_bound(n, Self::mixed(corners), enough).map_err(|other| guess.max(other)))
+        lower_bound(n, own, enough).or_else(|guess| {
+            let mixed = Self::mixed(corners);
+            if mixed == own { Err(guess) } else { lower_bound(n, mixed, enough).map_err(|other| guess.max(other)) }
+        })
     }
 
     /// The open triangles.

@@ -290,7 +290,7 @@ pub(super) struct Proof {
 }
 
 /// Tables of directions: one that costs little to lay out and serves nearly all pairs, and one for ties.
-const FEW: usize = 192;
+const FEW: usize = 128;
 const MANY: usize = 2048;
 
 /// Bounds the depth from below, improving the best direction on the way.
