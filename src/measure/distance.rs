@@ -38,6 +38,9 @@ pub struct Distance {
     pub active_a: ActiveConstraints,
     /// Constraints of the second body that the answer rests on: `n = Σ λ_i ∇g_i`; none on overlap.
     pub active_b: ActiveConstraints,
+    /// Whether another pair of parts may be as near, their brackets meeting: normal, witnesses and gradients may then jump.
+    /// Never for single bodies, nor on overlap.
+    pub tied: bool,
     /// Iterations of all methods together.
     pub iterations: u32,
 }
@@ -54,6 +57,7 @@ impl Default for Distance {
             normal: None,
             active_a: ActiveConstraints::default(),
             active_b: ActiveConstraints::default(),
+            tied: false,
             iterations: 0,
         }
     }
@@ -445,6 +449,7 @@ impl<'a> Search<'a> {
             normal,
             active_a: self.active.0.reported(if normal.is_some() { unit } else { 0.0 }),
             active_b: self.active.1.reported(if normal.is_some() { unit } else { 0.0 }),
+            tied: false,
             iterations: self.iterations,
         }
     }
@@ -474,6 +479,7 @@ impl Proven {
             normal: Some(pose_a.transform_direction(&Vector3::from(self.n))),
             active_a: ActiveConstraints::single(self.active[0], self.multipliers[0]),
             active_b: ActiveConstraints::single(self.active[1], self.multipliers[1]),
+            tied: false,
             iterations: self.rounds,
         }
     }

@@ -16,8 +16,9 @@ use super::pair::Pair;
 use super::penetration::{Best, prove, tolerance};
 use super::pose::Pose;
 use super::twist::Twist;
+use super::union;
 use super::warm::WarmStart;
-use crate::body::Body;
+use crate::body::{Body, Solid};
 use nalgebra::Vector3;
 
 /// Signed distance with its proof, lengths in metres, vectors in the world frame.
@@ -41,8 +42,8 @@ pub struct SignedDistance {
     /// Whether the bracket holds 0: the bodies may just touch. Smooth bodies have the same derivative on both sides; where
     /// edges or corners touch, the derivative in overlap may be another one.
     pub at_contact: bool,
-    /// Whether another direction out of an overlap was seen to be about as short: value and bracket hold, but normal and
-    /// gradients may jump.
+    /// Whether another direction out of an overlap was seen to be about as short, or another pair of parts may be as near: value
+    /// and bracket hold, but normal, witnesses and gradients may jump.
     pub tied: bool,
     /// Iterations of all methods together.
     pub iterations: u32,
@@ -62,6 +63,10 @@ impl SignedDistance {
 /// direction is a better one within that bracket. `warm` is read and then replaced by the hint for the next query of this
 /// pair; it carries through contact.
 ///
+/// Of solids with several parts it is their distance, or minus the depth of their overlap ([`super::penetration`]), which is
+/// known from a local search: in overlap the bracket may stay wide. There the gradients are those of all the pairs of parts
+/// that hold the solids back, and the witnesses belong to the one that does so most.
+///
 /// ```
 /// use nalgebra::Vector3;
 /// use sublevel::body::Body;
@@ -79,6 +84,18 @@ impl SignedDistance {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn signed_distance(
+    a: &impl Solid,
+    pose_a: &Pose,
+    b: &impl Solid,
+    pose_b: &Pose,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> SignedDistance {
+    union::signed_distance(a, pose_a, b, pose_b, options, warm)
+}
+
+/// Signed distance of two bodies.
+pub(super) fn between(
     a: &Body,
     pose_a: &Pose,
     b: &Body,
