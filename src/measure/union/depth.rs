@@ -44,7 +44,7 @@ pub(in crate::measure) fn penetration(
         return Penetration { directions, iterations, ..best };
     }
     let narrow = |depth: f64| narrow(a, b, depth, options);
-    let way = way::out((a, pose_a), (b, pose_b), &starts, narrow, options);
+    let way = way::out((a, pose_a), (b, pose_b), &starts, best.lower, narrow, options);
     let (lower, upper) = (best.lower, way.length);
     Penetration {
         status: status(upper - lower <= narrow(upper)),
@@ -94,7 +94,8 @@ pub(in crate::measure) fn signed_distance(
         let status = status(best.upper - lower <= narrow(a, b, 0.0, options));
         return SignedDistance { status, lower, tied, iterations, ..best };
     }
-    let way = way::out((a, pose_a), (b, pose_b), &starts, |depth| narrow(a, b, depth, options), options);
+    let least = (-best.upper).max(0.0);
+    let way = way::out((a, pose_a), (b, pose_b), &starts, least, |depth| narrow(a, b, depth, options), options);
     let (lower, upper) = (-way.length, best.upper);
     let [center_a, center_b] = [pose_a, pose_b].map(Pose::translation);
     let sum = |twist: fn(&Contact, &Vector3<f64>) -> Twist, center| {

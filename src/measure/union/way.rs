@@ -27,6 +27,9 @@ const FOLLOWED: usize = 3;
 /// Most translations on the way from one start.
 const MAX_ROUNDS: u32 = 40;
 
+/// How many times the last gain is hoped for at most.
+const HOPE: f64 = 4.0;
+
 /// Most planes kept at a time: those with the smallest gaps.
 const PLANES: usize = 24;
 
@@ -96,11 +99,13 @@ pub(super) struct Way {
     pub(super) iterations: u32,
 }
 
-/// The shortest way found from these starts and a few more; ways that differ by at most `narrow` metres count as tied.
+/// The shortest way found from these starts and a few more; none is shorter than `least` metres, and of ways as long as wanted
+/// the difference is at most `narrow` metres.
 pub(super) fn out(
     (a, pose_a): At<'_, impl Solid>,
     (b, pose_b): At<'_, impl Solid>,
     starts: &Starts,
+    least: f64,
     narrow: impl Fn(f64) -> f64,
     options: &Options<'_>,
 ) -> Way {
@@ -112,6 +117,7 @@ pub(super) fn out(
         b: b.parts(),
         pose_a: pose_a.with_translation(Vector3::zeros()),
         pose_b: pose_b.with_translation(pose_b.translation() - pose_a.translation()),
+        least,
         margin: MARGIN * options.accuracy() * radius(a.parts()).min(radius(b.parts())),
         options,
         iterations: 0,
@@ -125,9 +131,10 @@ pub(super) fn out(
         }
     }
     for k in 0..FOLLOWED {
-        // There may be fewer than that.
-        if k == 0 || ways[k] != ways[k - 1] {
-            ways[k] = search.shrink(ways[k]);
+        // There may be fewer than that, and one as short as can be is enough.
+        let shortest = ways[..k].iter().map(Vector3::norm).fold(f64::INFINITY, f64::min);
+        if k == 0 || ways[k] != ways[k - 1] && shortest - least > narrow(shortest) {
+            ways[k] = search.shrink(ways[k], shortest);
         }
     }
     let best = ways.into_iter().min_by(|v, w| v.norm().total_cmp(&w.norm())).unwrap_or_default();
@@ -150,6 +157,8 @@ struct Search<'a> {
     b: &'a [Body],
     pose_a: Pose,
     pose_b: Pose,
+    /// No way out is shorter: proven.
+    least: f64,
     margin: f64,
     options: Options<'a>,
     iterations: u32,
@@ -246,8 +255,8 @@ impl Search<'_> {
             .all(|pair| self.apart(pair, &pose) || length > 0.0 && self.depth_along(pair, &(way / length)) <= length)
     }
 
-    /// A way at most as long that separates all pairs as well.
-    fn shrink(&mut self, mut way: Vector3<f64>) -> Vector3<f64> {
+    /// A way at most as long that separates all pairs as well; not worked out if it does not get as short as `wanted`.
+    fn shrink(&mut self, mut way: Vector3<f64>, wanted: f64) -> Vector3<f64> {
         for _ in 0..MAX_ROUNDS {
             let Some(next) = self.beyond_planes(&way, self.margin).and_then(|(_, found)| found) else { break };
             let mut next = next.v;
@@ -260,7 +269,12 @@ impl Search<'_> {
             if self.ended() || !(next.norm() < way.norm() - self.margin) {
                 break;
             }
+            let gained = way.norm() - next.norm();
             way = next;
+            // What is gained falls from round to round.
+            if way.norm() - HOPE * gained > wanted {
+                break;
+            }
         }
         way
     }
@@ -269,17 +283,18 @@ impl Search<'_> {
     fn beyond_planes(&mut self, way: &Vector3<f64>, margin: f64) -> Option<(Planes, Option<Shortest>)> {
         let (pose, length) = (self.pose_after(way), way.norm());
         let mut planes = Planes::default();
+        // The shortest w beyond planes that v is beyond has |w - v|² <= |v|² - |w|²: pairs that are farther do not count.
+        let far = (length * length - self.least * self.least).max(0.0).sqrt() + 4.0 * margin.max(self.margin);
         for (i, j) in self.pairs() {
             if self.ended() {
                 return None;
             }
             let (a, b) = (&self.a[i], &self.b[j]);
             let mut hint = WarmStart::default();
-            // On the way back, which is no longer, pairs that are farther do not count.
-            let far = Goal::beyond(length);
+            let far = Goal::beyond(far);
             let found = settle((a, &pose), (b, &self.pose_b), &far, &self.options, &mut hint);
             self.iterations += found.iterations;
-            if found.lower > length {
+            if found.lower > far.far {
                 continue;
             }
             let proven = found.normal.filter(|_| found.lower > 0.0);
