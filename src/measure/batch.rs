@@ -12,7 +12,7 @@ use super::options::Options;
 use super::pose::Pose;
 use super::smooth::{LONGEST, WORTH_A_BRACKET};
 use super::start::facing;
-use super::tangent::{Bend, Plane, Relative, Side, Step, bracket, moved, newton};
+use super::tangent::{ALIGNED, Bend, Plane, Relative, Side, Step, bracket, moved, newton};
 use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, scaled, subtract};
 use super::warm::WarmStart;
 use crate::body::{Body, Outline, Solid};
@@ -299,7 +299,8 @@ impl Batch<'_> {
                 let next = subtract(add(here.difference, here.step.dx), here.step.dy);
                 let found = bracket(simd, (&side_a, &next_a), (&side_b, &next_b), next);
                 let enough = splat(self.tolerance).max(found.rounding * splat(4.0));
-                let narrow = Lanes::and(simd, short, (found.upper - found.lower).le(enough));
+                let aligned = found.off.le(splat(ALIGNED));
+                let narrow = Lanes::and(simd, short, Lanes::and(simd, aligned, (found.upper - found.lower).le(enough)));
                 let proven =
                     Lanes::bits(simd, Lanes::and(simd, narrow, splat(f64::MIN_POSITIVE).le(found.lower))) & open;
                 if proven != 0 {

@@ -9,6 +9,7 @@ use super::options::Options;
 use super::pair::{Pair, Posed};
 use super::pose::Pose;
 use super::programs::{Closest, Level, points};
+use super::relation::Apart;
 use super::smooth::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
 use super::twist::Twist;
 use super::union;
@@ -120,10 +121,10 @@ pub(super) fn between(
     warm: &mut WarmStart,
 ) -> Distance {
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
+    let relation = Apart { pose_a, pose_b, goal, tolerance };
     let mut spent = 0;
     if let Hint::Smooth(trace) = &mut warm.hint {
-        let follow = Follow { a, pose_a, b, pose_b, goal, tolerance, options, trace };
-        match dispatch(follow) {
+        match dispatch(Follow { a, b, relation, options, trace }) {
             Ok(proven) => return proven.answer(a, pose_a, tolerance),
             Err(rounds) => spent = rounds,
         }
@@ -134,7 +135,7 @@ pub(super) fn between(
     };
     if !still_overlapping && !options.exhausted(spent) {
         let limit = SEEK_ROUNDS.min(options.max_iterations() - spent);
-        match dispatch(Seek { a, pose_a, b, pose_b, goal, tolerance, limit, options }) {
+        match dispatch(Seek { a, b, relation, limit, options }) {
             Ok((proven, trace)) => {
                 *warm = Hint::Smooth(trace).into();
                 return Distance { iterations: spent + proven.rounds, ..proven.answer(a, pose_a, tolerance) };

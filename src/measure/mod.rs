@@ -29,6 +29,7 @@ mod point;
 mod pose;
 mod programs;
 mod ray;
+mod relation;
 mod signed;
 mod single;
 mod smooth;

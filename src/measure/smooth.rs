@@ -1,15 +1,13 @@
-//! Distance by continuation: from the last answer of a pair along its motion, where one constraint of each body is active.
+//! Measures by continuation: from the last answer of a pair along its motion, where one constraint of each body is active.
 //!
 //! What a hint keeps of the last answer is where it was attained and both constraints' value, gradient and Hessian there, each
 //! in its own body's coordinates, where they stay true however the bodies move. So the first Newton step at new poses needs
 //! no evaluation: it is the sensitivity of the last answer to the motion. Along a smooth trajectory what that step misses is
 //! nearly the same each time, and is added on. One evaluation then mostly proves the answer or leaves one more step to it.
 
-use super::decide::Goal;
 use super::options::Options;
-use super::pose::Pose;
-use super::start::facing;
-use super::tangent::{Bend, Plane, Relative, Side, Step, bracket, moved, newton};
+use super::relation::{Relation, Verdict};
+use super::tangent::{Bend, Plane, Relative, Side, Step, bracket, moved};
 use super::vector::{M3, V3, add, apply, apply_transposed, basis, dot, subtract};
 use crate::body::{Body, Outline};
 use crate::polynomial::{NumberJet, Scalar, Simd, WithSimd};
@@ -103,45 +101,39 @@ pub(super) const WORTH_A_BRACKET: f64 = 1e-2;
 pub(super) const LONGEST: f64 = 0.25;
 
 /// Continuation as work for the widest arithmetic.
-pub(super) struct Follow<'a> {
+pub(super) struct Follow<'a, R> {
     pub(super) a: &'a Body,
-    pub(super) pose_a: &'a Pose,
     pub(super) b: &'a Body,
-    pub(super) pose_b: &'a Pose,
-    /// What the bracket has to decide, if that is less than being narrow.
-    pub(super) goal: &'a Goal,
-    /// Width of the bracket that is narrow enough, metres.
-    pub(super) tolerance: f64,
+    pub(super) relation: R,
     /// Whose iteration limit and stop flag end it.
     pub(super) options: &'a Options<'a>,
     /// Read, and replaced if the answer is proven.
     pub(super) trace: &'a mut Trace,
 }
 
-impl WithSimd for Follow<'_> {
+impl<R: Relation> WithSimd for Follow<'_, R> {
     type Output = Result<Proven, u32>;
 
     /// The proven answer, or how many rounds were spent in vain.
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Result<Proven, u32> {
-        let active = self.trace.active.map(usize::from);
-        if active[0] >= self.a.constraints().len() || active[1] >= self.b.constraints().len() {
+        let Self { a, b, relation, options, trace } = self;
+        let active = trace.active.map(usize::from);
+        if active[0] >= a.constraints().len() || active[1] >= b.constraints().len() {
             return Err(0);
         }
-        let relative = Relative::new(simd, self.a, self.pose_a, self.b, self.pose_b);
-        let side_a = Side::at_home(simd, self.a, active[0]);
-        let side_b = Side::away(self.b, active[1], &relative);
-        let longest = LONGEST * self.a.trust().reach.min(self.b.trust().reach);
+        let relative = relation.relative(simd, a, b);
+        let limit = MAX_ROUNDS.min(options.max_iterations());
+        let correct = Correct::new(simd, a, b, active, &relative, relation, limit, options);
 
         // Prediction from the old jets at the new poses.
-        let trace = &*self.trace;
         let y = add::<S, f64>(apply::<S, f64>(&relative.rotation, trace.y), relative.origin);
         let mut at = Iterate { x: trace.x, y, frame: trace.frame };
-        let local_b = side_b.localize(simd, &at.frame);
-        let b = (Plane::new(simd, &trace.jet_b, &local_b), Bend::new(simd, &trace.jet_b, &local_b));
+        let local_b = correct.sides.1.localize(simd, &at.frame);
+        let jet_b = (Plane::new(simd, &trace.jet_b, &local_b), Bend::new(simd, &trace.jet_b, &local_b));
         let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
-        let step = newton(simd, (&trace.a.0, &trace.a.1), (&b.0, &b.1), difference, 0.0);
-        if !step.within(longest) {
+        let step = relation.newton(simd, (&trace.a.0, &trace.a.1), (&jet_b.0, &jet_b.1), &at.frame, difference);
+        if !step.within(correct.longest) {
             return Err(0);
         }
         at.advance(simd, &step);
@@ -149,93 +141,86 @@ impl WithSimd for Follow<'_> {
         at.x = add::<S, f64>(at.x, trace.drift_x);
         at.y = add::<S, f64>(at.y, apply::<S, f64>(&relative.rotation, trace.drift_y));
 
-        let correct = Correct {
-            sides: (side_a, side_b),
-            goal: self.goal,
-            tolerance: self.tolerance,
-            limit: MAX_ROUNDS.min(self.options.max_iterations()),
-            options: self.options,
-            longest,
-        };
-        let proven = correct.run(simd, &relative, at, self.trace)?;
-        self.trace.drift_x = subtract::<S, f64>(proven.x, predicted.0);
+        let proven = correct.run(simd, &relative, at, trace)?;
+        trace.drift_x = subtract::<S, f64>(proven.x, predicted.0);
         let drift_y = subtract::<S, f64>(proven.y, predicted.1);
-        self.trace.drift_y = apply_transposed::<S, f64>(&relative.rotation, drift_y);
+        trace.drift_y = apply_transposed::<S, f64>(&relative.rotation, drift_y);
         Ok(proven)
     }
 }
 
 /// A start from nothing but the poses, as work for the widest arithmetic: where the bodies face each other, as their
 /// outlines show it, and Newton's method from there.
-pub(super) struct Seek<'a> {
+pub(super) struct Seek<'a, R> {
     pub(super) a: &'a Body,
-    pub(super) pose_a: &'a Pose,
     pub(super) b: &'a Body,
-    pub(super) pose_b: &'a Pose,
-    /// What the bracket has to decide, if that is less than being narrow.
-    pub(super) goal: &'a Goal,
-    /// Width of the bracket that is narrow enough, metres.
-    pub(super) tolerance: f64,
+    pub(super) relation: R,
     /// Most rounds.
     pub(super) limit: u32,
     /// Whose stop flag is polled.
     pub(super) options: &'a Options<'a>,
 }
 
-impl WithSimd for Seek<'_> {
+impl<R: Relation> WithSimd for Seek<'_, R> {
     type Output = Result<(Proven, Trace), u32>;
 
     /// The proven answer with its trace, or how many rounds were spent in vain.
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Result<(Proven, Trace), u32> {
-        let relative = Relative::new(simd, self.a, self.pose_a, self.b, self.pose_b);
-        let n = facing(simd, self.a, self.b, &relative);
+        let Self { a, b, relation, limit, options } = self;
+        let relative = relation.relative(simd, a, b);
+        let n = relation.facing(simd, a, b, &relative);
         let own = apply_transposed::<S, f64>(&relative.rotation, n);
         let (place_a, place_b) = (Outline::place(simd, [-n[0], -n[1], -n[2]]), Outline::place(simd, own));
-        let (outline_a, outline_b) = (self.a.outline(), self.b.outline());
-        let (active_a, active_b) = (outline_a.active(place_a), outline_b.active(place_b));
-        let (mark_a, mark_b) = (outline_a.mark(simd, place_a), outline_b.mark(simd, place_b));
-        let side_a = Side::at_home(simd, self.a, active_a);
-        let side_b = Side::away(self.b, active_b, &relative);
-        let longest = LONGEST * self.a.trust().reach.min(self.b.trust().reach);
-        let correct = Correct {
-            sides: (side_a, side_b),
-            goal: self.goal,
-            tolerance: self.tolerance,
-            limit: self.limit,
-            options: self.options,
-            longest,
-        };
+        let active = [a.outline().active(place_a), b.outline().active(place_b)];
+        let (mark_a, mark_b) = (a.outline().mark(simd, place_a), b.outline().mark(simd, place_b));
+        let correct = Correct::new(simd, a, b, active, &relative, relation, limit, options);
         // The first step from the marks needs no evaluation.
         let y = add::<S, f64>(apply::<S, f64>(&relative.rotation, mark_b.point), relative.origin);
         let mut at = Iterate { x: mark_a.point, y, frame: basis(simd, n) };
+        let (side_a, side_b) = &correct.sides;
         let (local_a, local_b) = (side_a.localize(simd, &at.frame), side_b.localize(simd, &at.frame));
-        let (a, b) = (Plane::new(simd, &mark_a.jet, &local_a), Plane::new(simd, &mark_b.jet, &local_b));
-        let (bend_a, bend_b) = (Bend::new(simd, &mark_a.jet, &local_a), Bend::new(simd, &mark_b.jet, &local_b));
+        let jet_a = (Plane::new(simd, &mark_a.jet, &local_a), Bend::new(simd, &mark_a.jet, &local_a));
+        let jet_b = (Plane::new(simd, &mark_b.jet, &local_b), Bend::new(simd, &mark_b.jet, &local_b));
         let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
-        let step = newton(simd, (&a, &bend_a), (&b, &bend_b), difference, 0.0);
+        let step = relation.newton(simd, (&jet_a.0, &jet_a.1), (&jet_b.0, &jet_b.1), &at.frame, difference);
         let square = step.square(simd);
         if square.is_finite() {
-            at.advance(simd, &step.at_most(simd, longest, square));
+            at.advance(simd, &step.at_most(simd, correct.longest, square));
         }
-        let mut trace = Trace::blank([active_a as u8, active_b as u8]);
+        let mut trace = Trace::blank(active.map(|i| i as u8));
         let proven = correct.run(simd, &relative, at, &mut trace)?;
         Ok((proven, trace))
     }
 }
 
 /// Correction of a start by Newton's method until the bracket is narrow.
-struct Correct<'a> {
+struct Correct<'a, R> {
     sides: (Side<'a, f64>, Side<'a, f64>),
-    goal: &'a Goal,
-    tolerance: f64,
+    relation: R,
     limit: u32,
     options: &'a Options<'a>,
     /// Longest step, metres.
     longest: f64,
 }
 
-impl Correct<'_> {
+impl<'a, R: Relation> Correct<'a, R> {
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    fn new<S: Simd>(
+        simd: S,
+        a: &'a Body,
+        b: &'a Body,
+        active: [usize; 2],
+        relative: &Relative<f64>,
+        relation: R,
+        limit: u32,
+        options: &'a Options<'a>,
+    ) -> Self {
+        let sides = (Side::at_home(simd, a, active[0]), Side::away(b, active[1], relative));
+        Self { sides, relation, limit, options, longest: LONGEST * a.trust().reach.min(b.trust().reach) }
+    }
+
     #[inline(always)]
     fn run<S: Simd>(
         &self,
@@ -266,7 +251,7 @@ impl Correct<'_> {
             }
             let (bend_a, bend_b) = (Bend::new(simd, &jet_a, &local_a), Bend::new(simd, &jet_b, &local_b));
             let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
-            let mut step = newton(simd, (&a, &bend_a), (&b, &bend_b), difference, 0.0);
+            let mut step = self.relation.newton(simd, (&a, &bend_a), (&b, &bend_b), &at.frame, difference);
             if !step.within(self.longest) {
                 step.shorten(self.longest);
                 at.advance(simd, &step);
@@ -281,37 +266,26 @@ impl Correct<'_> {
             let next_b = side_b.extrapolate(simd, &jet_b, &local_b, step.dy);
             let next = subtract::<S, f64>(add::<S, f64>(difference, step.dx), step.dy);
             let found = bracket(simd, (side_a, &next_a), (side_b, &next_b), next);
-            // Below the rounding floor no bracket gets, however long Newton's method goes on.
-            let narrow = found.upper - found.lower <= self.tolerance.max(4.0 * found.rounding);
-            let decided = narrow || self.goal.met(found.lower, found.upper);
-            if decided && found.lower > 0.0 {
-                let x = moved::<S, f64>(at.x, add::<S, f64>(step.dx, found.to_a), &at.frame);
-                let y = moved::<S, f64>(at.y, add::<S, f64>(step.dy, found.to_b), &at.frame);
-                if !(side_a.others_hold(simd, x) && side_b.others_hold(simd, y)) {
-                    return Err(rounds);
+            match self.relation.judge(simd, &found, &at.frame, next) {
+                Verdict::Proven { lower, upper } => {
+                    let x = moved::<S, f64>(at.x, add::<S, f64>(step.dx, found.to_a), &at.frame);
+                    let y = moved::<S, f64>(at.y, add::<S, f64>(step.dy, found.to_b), &at.frame);
+                    if !(side_a.others_hold(simd, x) && side_b.others_hold(simd, y)) {
+                        return Err(rounds);
+                    }
+                    trace.x = at.x;
+                    let from_b = subtract::<S, f64>(at.y, relative.origin);
+                    trace.y = apply_transposed::<S, f64>(&relative.rotation, from_b);
+                    trace.frame = at.frame;
+                    trace.a = (a, bend_a);
+                    trace.jet_b = jet_b;
+                    let n = apply_transposed::<S, f64>(&at.frame, found.normal);
+                    let (active, multipliers) = (trace.active, found.multipliers);
+                    return Ok(Proven { lower, upper, x, y, n, active, multipliers, rounds });
                 }
-                trace.x = at.x;
-                trace.y = apply_transposed::<S, f64>(&relative.rotation, subtract::<S, f64>(at.y, relative.origin));
-                trace.frame = at.frame;
-                trace.a = (a, bend_a);
-                trace.jet_b = jet_b;
-                let n = apply_transposed::<S, f64>(&at.frame, found.normal);
-                return Ok(Proven {
-                    lower: found.lower,
-                    upper: found.upper,
-                    x,
-                    y,
-                    n,
-                    active: trace.active,
-                    multipliers: found.multipliers,
-                    rounds,
-                });
+                Verdict::Wide => at.advance(simd, &step),
+                Verdict::Hopeless => return Err(rounds),
             }
-            if next[2] <= 0.0 {
-                // Stationary in an overlap.
-                return Err(rounds);
-            }
-            at.advance(simd, &step);
         }
         Err(self.limit)
     }

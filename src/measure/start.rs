@@ -12,7 +12,9 @@
 //! outlines of the bodies have marks with all that Newton's method on the bodies themselves needs for its first step.
 
 use super::tangent::Relative;
-use super::vector::{V3, add_scaled, apply, dot, normalized, rows, scaled, times_transposed};
+use super::vector::{
+    M3, V3, add_scaled, apply, apply_symmetric, dot, normalized, rows, scaled, subtract, times_transposed,
+};
 use crate::body::Body;
 use crate::polynomial::{Number, Simd};
 
@@ -58,6 +60,41 @@ pub(super) fn facing<S: Simd, N: Number<S>>(simd: S, a: &Body, b: &Body, relativ
         n = turned(simd, n, &matrix, residual);
     }
     n
+}
+
+/// Of the ellipsoid that stands for the difference `A - B` the inward normal where the ray from 0 leaves it, in A's frame.
+///
+/// About the direction of the ray the ellipsoid with `(h_A + h_B) (Σ_A / h_A + Σ_B / h_B)` for its Σ is a tight bound of the sum of
+/// both ellipsoids (Kurzhanski and Vályi, Ellipsoidal calculus, 1997).
+#[inline(always)]
+pub(super) fn facing_along<S: Simd>(simd: S, a: &Body, b: &Body, relative: &Relative<f64>, ray: V3<f64>) -> V3<f64> {
+    let shape_a: M3<f64> = rows(simd, a.outline().shape());
+    let shape_b = rows(simd, b.outline().shape());
+    let turned = times_transposed::<S, f64>(&relative.rotation, &shape_b);
+    let shape_b = times_transposed::<S, f64>(&turned, &relative.rotation);
+    let width = |shape: &M3<f64>| dot::<S, f64>(ray, apply::<S, f64>(shape, ray)).sqrt();
+    let (wide_a, wide_b) = (width(&shape_a), width(&shape_b));
+    let (of_a, of_b) = (1.0 / wide_a, 1.0 / wide_b);
+    let entry = |i: usize, j: usize| of_a * shape_a[i][j] + of_b * shape_b[i][j];
+    let [xx, xy, xz, yy, yz, zz] = [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)];
+    let inverse = [
+        yy * zz - yz * yz,
+        xz * yz - xy * zz,
+        xy * yz - xz * yy,
+        xx * zz - xz * xz,
+        xy * xz - xx * yz,
+        xx * yy - xy * xy,
+    ];
+    // Times what makes it the inverse of Σ.
+    let scale = (xx * inverse[0] + xy * inverse[1] + xz * inverse[2]) * (wide_a + wide_b);
+    let center = scaled::<S, f64>(relative.origin, -1.0);
+    let of_ray = apply_symmetric::<S, f64>(&inverse, ray);
+    let of_center = apply_symmetric::<S, f64>(&inverse, center);
+    let (along, across) = (dot::<S, f64>(ray, of_ray), dot::<S, f64>(ray, of_center));
+    let inside = scale - dot::<S, f64>(center, of_center);
+    // 0 may lie outside of the ellipsoid, which is none of the body's.
+    let reach = (across + (across * across + along * inside.max(0.0)).sqrt()) / along;
+    subtract::<S, f64>(of_center, scaled::<S, f64>(of_ray, reach))
 }
 
 /// The direction of `n + M⁻¹ r`, by cofactors of the symmetric matrix M with the entries xx, xy, xz, yy, yz, zz; the turn is

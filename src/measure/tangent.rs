@@ -380,6 +380,61 @@ pub(super) fn newton<S: Simd, N: Number<S>>(
     difference: V3<N>,
     smallest: N,
 ) -> Step<N> {
+    let (straight_a, straight_b) = straighten(simd, (a, bend_a), (b, bend_b));
+    let distance = difference[2] + straight_a.shift - straight_b.shift;
+    let turn = turn(simd, &straight_a, &straight_b, distance, [difference[0], difference[1]], smallest);
+    let (alpha, beta) = (turn.alpha, turn.beta);
+    // The tangential parts of the gradients, of second order, are at hand now.
+    let along_a = (a.gradient[0] * alpha[0] + a.gradient[1] * alpha[1]) * straight_a.multiplier;
+    let along_b = (b.gradient[0] * beta[0] + b.gradient[1] * beta[1]) * straight_b.multiplier;
+    Step {
+        dx: [alpha[0], alpha[1], straight_a.shift + along_a],
+        dy: [beta[0], beta[1], straight_b.shift - along_b],
+        dn: turn.theta,
+    }
+}
+
+/// Newton's step towards points with `x - y` along a ray, a vector in the basis, and opposite normals: the system above with
+/// `D = 0` once B is moved by the multiple ρ of the ray that makes them touch, for which all but terms of second order are at
+/// hand before.
+#[inline(always)]
+pub(super) fn newton_along<S: Simd>(
+    simd: S,
+    (a, bend_a): (&Plane<f64>, &Bend<f64>),
+    (b, bend_b): (&Plane<f64>, &Bend<f64>),
+    difference: V3<f64>,
+    ray: V3<f64>,
+) -> Step<f64> {
+    let (straight_a, straight_b) = straighten(simd, (a, bend_a), (b, bend_b));
+    let inverse = 1.0 / ray[2];
+    let slope = [ray[0] * inverse, ray[1] * inverse];
+    let height = difference[2] + straight_a.shift - straight_b.shift;
+    let off = [difference[0] - height * slope[0], difference[1] - height * slope[1]];
+    let Turn { mut alpha, beta, theta } = turn(simd, &straight_a, &straight_b, 0.0, off, 0.0);
+    // What the surfaces fall below their tangent planes, of second order, changes where on the ray they meet.
+    let fallen = |plane: &Plane<f64>, straight: &Straight<f64>, along: [f64; 2]| {
+        let bent = apply2::<S, f64>(&straight.curvature, along);
+        let sloped = (plane.gradient[0] * along[0] + plane.gradient[1] * along[1]) * straight.multiplier;
+        sloped + 0.5 * (bent[0] * along[0] + bent[1] * along[1])
+    };
+    let fallen_a = fallen(a, &straight_a, alpha);
+    let fallen_b = fallen(b, &straight_b, beta);
+    alpha[0] += (fallen_a + fallen_b) * slope[0];
+    alpha[1] += (fallen_a + fallen_b) * slope[1];
+    Step {
+        dx: [alpha[0], alpha[1], straight_a.shift + fallen_a],
+        dy: [beta[0], beta[1], straight_b.shift - fallen_b],
+        dn: theta,
+    }
+}
+
+/// Both constraints straightened, B's seen from A: with `n` in place of its inward normal.
+#[inline(always)]
+fn straighten<S: Simd, N: Number<S>>(
+    simd: S,
+    (a, bend_a): (&Plane<N>, &Bend<N>),
+    (b, bend_b): (&Plane<N>, &Bend<N>),
+) -> (Straight<N>, Straight<N>) {
     let (one, half) = (N::splat(simd, 1.0), N::splat(simd, 0.5));
     // Deep inside there is nothing to straighten.
     let deepest = N::splat(simd, 0.25);
@@ -391,12 +446,28 @@ pub(super) fn newton<S: Simd, N: Number<S>>(
     let (of_a, of_b) = (-mean_a * inverse_a, mean_b * inverse_b);
     let straight_a = Straight::new(a, bend_a, of_a, (a.value - one) * mean_a, a.gradient[2] * inverse_a);
     let straight_b = Straight::new(b, bend_b, of_b, (one - b.value) * mean_b, b.gradient[2] * inverse_b);
-    let (shift_a, shift_b) = (straight_a.shift, straight_b.shift);
-    let (right_a, right_b) = (straight_a.right, straight_b.right);
-    let (w_a, w_b) = (straight_a.curvature, straight_b.curvature);
-    let distance = difference[2] + shift_a - shift_b;
-    let tau = [difference[0], difference[1]];
+    (straight_a, straight_b)
+}
 
+/// The tangential part of a step.
+struct Turn<N> {
+    alpha: [N; 2],
+    beta: [N; 2],
+    theta: [N; 2],
+}
+
+/// Solves the system at the head of this file for α, β and θ, with D and τ.
+#[inline(always)]
+fn turn<S: Simd, N: Number<S>>(
+    simd: S,
+    a: &Straight<N>,
+    b: &Straight<N>,
+    distance: N,
+    tau: [N; 2],
+    smallest: N,
+) -> Turn<N> {
+    let one = N::splat(simd, 1.0);
+    let (w_a, w_b, right_a, right_b) = (a.curvature, b.curvature, a.right, b.right);
     // I + D W_A, its determinant, and that times W_A K: the two commute.
     let m = [distance.mul_add(w_a[0], one), distance * w_a[1], distance.mul_add(w_a[2], one)];
     let determinant = m[0] * m[2] - m[1] * m[1];
@@ -420,18 +491,13 @@ pub(super) fn newton<S: Simd, N: Number<S>>(
     let rest = [beta[0] - lever[0], beta[1] - lever[1]];
     let alpha = [(m[2] * rest[0] - m[1] * rest[1]) * of_m, (m[0] * rest[1] - m[1] * rest[0]) * of_m];
     let bent = apply2(&w_a, alpha);
-    // The tangential parts of the gradients, of second order, are at hand now.
-    let along_a = (a.gradient[0] * alpha[0] + a.gradient[1] * alpha[1]) * of_a;
-    let along_b = (b.gradient[0] * beta[0] + b.gradient[1] * beta[1]) * of_b;
-    Step {
-        dx: [alpha[0], alpha[1], shift_a + along_a],
-        dy: [beta[0], beta[1], shift_b - along_b],
-        dn: [right_a[0] - bent[0], right_a[1] - bent[1]],
-    }
+    Turn { alpha, beta, theta: [right_a[0] - bent[0], right_a[1] - bent[1]] }
 }
 
 /// What the linearization needs of a constraint that is straightened.
 struct Straight<N> {
+    /// Multiplier λ of the constraint itself.
+    multiplier: N,
     /// Change along the normal.
     shift: N,
     /// Right side.
@@ -453,6 +519,7 @@ impl<N: Copy> Straight<N> {
         let shift = excess * multiplier;
         let tilt = [t[0] - s0 * g[2], t[1] - s1 * g[2]];
         Self {
+            multiplier,
             shift,
             right: [-multiplier * shift.mul_add(tilt[0], g[0]), -multiplier * shift.mul_add(tilt[1], g[1])],
             // Without the tangential part of ∇g ∇gᵀ, which vanishes at the solution, it stays positive semidefinite.
@@ -468,6 +535,8 @@ pub(super) struct Bracket<N> {
     pub(super) upper: N,
     /// What rounding alone leaves between them, about.
     pub(super) rounding: N,
+    /// Bound of the angle between the outward normal of one body and the inward normal of the other, but for terms of third order.
+    pub(super) off: N,
     /// Of A's and of B's constraint, metres.
     pub(super) multipliers: [N; 2],
     /// Unit normal of the lower bound, in the basis.
@@ -481,6 +550,9 @@ pub(super) struct Bracket<N> {
 /// Relative slack for the rounding of the bracket's own arithmetic, basis included: fewer than 256 operations on the sum
 /// of magnitudes.
 pub(super) const SLACK: f64 = 128.0 * f64::EPSILON;
+
+/// Largest angle between the bodies' normals that an answer is taken at: its gradients are off by about as much.
+pub(super) const ALIGNED: f64 = 1e-6;
 
 /// How much farther a point is moved than its constraint's linearization asks, for the rounding of its gradient.
 pub(super) const NUDGE: f64 = 1e-4;
@@ -574,7 +646,7 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
     let upper = upper.select(N::and(simd, fine_a, fine_b), splat(f64::NAN));
     let evaluated = of_a * splat(side_a.trust().value_error) + of_b * splat(side_b.trust().value_error);
     let rounding = splat(2.0) * (displaced + rounding + evaluated);
-    Bracket { lower, upper, rounding, multipliers: [of_a, of_b], normal, to_a, to_b }
+    Bracket { lower, upper, rounding, off, multipliers: [of_a, of_b], normal, to_a, to_b }
 }
 
 /// What is known of one body's active constraint near the body, in metres.

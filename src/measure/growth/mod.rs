@@ -18,6 +18,7 @@
 //!
 //! the left by duality, the right because a gauge is subadditive.
 
+mod along;
 mod reach;
 #[cfg(test)]
 mod tests;
@@ -29,12 +30,14 @@ use super::newton::Active;
 use super::options::Options;
 use super::pair::{Pair, Posed};
 use super::pose::{Pose, ROTATION_ERROR};
+use super::smooth::{Follow, SEEK_ROUNDS, Seek};
 use super::twist::Twist;
 use super::union;
 use super::warm::{Hint, WarmStart};
 use crate::body::{Body, Solid};
 use crate::optimize::minimise;
-use crate::polynomial::gamma;
+use crate::polynomial::{dispatch, gamma};
+use along::Along;
 use nalgebra::Vector3;
 use reach::{ReachNewton, ReachProgram};
 use std::ops::ControlFlow;
@@ -118,6 +121,25 @@ pub(super) fn between(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> GrowthDistance {
+    let along = Along::new(a, pose_a, b, pose_b, options.accuracy());
+    let mut spent = 0;
+    if let Hint::Smooth(trace) = &mut warm.hint {
+        match dispatch(Follow { a, b, relation: along, options, trace }) {
+            Ok(proven) => return along.answer(a, pose_a, pose_b, &proven),
+            Err(rounds) => spent = rounds,
+        }
+    }
+    if !options.exhausted(spent) {
+        let limit = SEEK_ROUNDS.min(options.max_iterations() - spent);
+        match dispatch(Seek { a, b, relation: along, limit, options }) {
+            Ok((proven, trace)) => {
+                *warm = Hint::Smooth(trace).into();
+                let answer = along.answer(a, pose_a, pose_b, &proven);
+                return GrowthDistance { iterations: spent + proven.rounds, ..answer };
+            }
+            Err(rounds) => spent += rounds,
+        }
+    }
     let (ball_a, ball_b) = (a.growth_ball(), b.growth_ball());
     let (arm_a, arm_b) = (pose_a.transform_direction(&ball_a.center), pose_b.transform_direction(&ball_b.center));
     // Only the orientation of the bodies matters to K: here their centres lie on each other.
@@ -148,7 +170,7 @@ pub(super) fn between(
         y: center_b,
         n: None,
         active: Default::default(),
-        iterations: 0,
+        iterations: spent,
     };
     search.run(&warm.hint);
     if let Some(hint) = search.hint() {

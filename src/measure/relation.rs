@@ -1,0 +1,96 @@
+//! What holds between the points of two bodies at the solution of a measure, and what proves it: the part of continuation in
+//! which the measures of pairs differ.
+
+use super::decide::Goal;
+use super::pose::Pose;
+use super::start::facing;
+use super::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, Step, newton};
+use super::vector::{M3, V3};
+use crate::body::Body;
+use crate::polynomial::Simd;
+
+/// A measure of two bodies that is attained by a point x of A and a point y of B with opposite normals.
+pub(super) trait Relation: Copy {
+    /// Where B stands as seen from A.
+    fn relative<S: Simd>(&self, simd: S, a: &Body, b: &Body) -> Relative<f64>;
+
+    /// A vector in A's frame, from B to A, to take the first normal from.
+    fn facing<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> V3<f64>;
+
+    /// Newton's step from points with `difference = x - y` in the frame, whose third vector is the normal from B to A.
+    fn newton<S: Simd>(
+        &self,
+        simd: S,
+        a: (&Plane<f64>, &Bend<f64>),
+        b: (&Plane<f64>, &Bend<f64>),
+        frame: &M3<f64>,
+        difference: V3<f64>,
+    ) -> Step<f64>;
+
+    /// What the bracket of the distance at points with `difference = x - y` in the frame says of the measure.
+    fn judge<S: Simd>(&self, simd: S, found: &Bracket<f64>, frame: &M3<f64>, difference: V3<f64>) -> Verdict;
+}
+
+/// What a bracket is good for.
+pub(super) enum Verdict {
+    /// Narrow enough.
+    Proven {
+        /// Lower bound of the measure.
+        lower: f64,
+        /// Upper bound of the measure.
+        upper: f64,
+    },
+    /// Not yet.
+    Wide,
+    /// No further step will make it so.
+    Hopeless,
+}
+
+/// The distance of bodies that are apart: x - y along the normal.
+#[derive(Clone, Copy)]
+pub(super) struct Apart<'a> {
+    pub(super) pose_a: &'a Pose,
+    pub(super) pose_b: &'a Pose,
+    /// What the bracket has to decide, if that is less than being narrow.
+    pub(super) goal: &'a Goal,
+    /// Width of the bracket that is narrow enough, metres.
+    pub(super) tolerance: f64,
+}
+
+impl Relation for Apart<'_> {
+    #[inline(always)]
+    fn relative<S: Simd>(&self, simd: S, a: &Body, b: &Body) -> Relative<f64> {
+        Relative::new(simd, a, self.pose_a, b, self.pose_b)
+    }
+
+    #[inline(always)]
+    fn facing<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> V3<f64> {
+        facing(simd, a, b, relative)
+    }
+
+    #[inline(always)]
+    fn newton<S: Simd>(
+        &self,
+        simd: S,
+        a: (&Plane<f64>, &Bend<f64>),
+        b: (&Plane<f64>, &Bend<f64>),
+        _: &M3<f64>,
+        difference: V3<f64>,
+    ) -> Step<f64> {
+        newton(simd, a, b, difference, 0.0)
+    }
+
+    #[inline(always)]
+    fn judge<S: Simd>(&self, _: S, found: &Bracket<f64>, _: &M3<f64>, difference: V3<f64>) -> Verdict {
+        // Below the rounding floor no bracket gets, however long Newton's method goes on.
+        let narrow = found.upper - found.lower <= self.tolerance.max(4.0 * found.rounding) && found.off <= ALIGNED;
+        if (narrow || self.goal.met(found.lower, found.upper)) && found.lower > 0.0 {
+            Verdict::Proven { lower: found.lower, upper: found.upper }
+        } else if difference[2] <= 0.0 {
+            // Stationary in an overlap.
+            Verdict::Hopeless
+        } else {
+            Verdict::Wide
+        }
+    }
+}
