@@ -6,7 +6,7 @@
 use super::least::{Least, least};
 use super::status;
 use super::way::{self, Contact, Start, Starts};
-use crate::body::{Body, Solid};
+use crate::body::Solid;
 use crate::measure::decide::ball_gap;
 use crate::measure::options::Options;
 use crate::measure::penetration::{self, Penetration};
@@ -31,15 +31,16 @@ pub(in crate::measure) fn penetration(
         return penetration::between(a, pose_a, b, pose_b, options, warm);
     }
     let (mut starts, mut directions) = (Starts::default(), 0);
-    let gap = |a: &Body, b: &Body| ball_gap((a, pose_a), (b, pose_b));
-    let Least { best, iterations, .. } = least((parts_a, parts_b), gap, f64::NEG_INFINITY, warm, |pair, _, hint| {
-        let found = penetration::between(&parts_a[pair.0], pose_a, &parts_b[pair.1], pose_b, options, hint);
-        directions += found.directions;
-        if let Some(direction) = found.direction {
-            starts.push(Start { pair, direction, depth: found.upper });
-        }
-        found
-    });
+    let gap = |(i, j): (usize, usize)| ball_gap((&parts_a[i], pose_a), (&parts_b[j], pose_b));
+    let Least { best, iterations, .. } =
+        least((parts_a.len(), parts_b.len()), gap, f64::NEG_INFINITY, warm, |pair, _, hint| {
+            let found = penetration::between(&parts_a[pair.0], pose_a, &parts_b[pair.1], pose_b, options, hint);
+            directions += found.directions;
+            if let Some(direction) = found.direction {
+                starts.push(Start { pair, direction, depth: found.upper });
+            }
+            found
+        });
     if starts.is_empty() {
         return Penetration { directions, iterations, ..best };
     }
@@ -80,8 +81,8 @@ pub(in crate::measure) fn signed_distance(
         return signed::between(a, pose_a, b, pose_b, options, warm);
     }
     let mut starts = Starts::default();
-    let gap = |a: &Body, b: &Body| ball_gap((a, pose_a), (b, pose_b));
-    let found = least((parts_a, parts_b), gap, f64::NEG_INFINITY, warm, |pair, _, hint| {
+    let gap = |(i, j): (usize, usize)| ball_gap((&parts_a[i], pose_a), (&parts_b[j], pose_b));
+    let found = least((parts_a.len(), parts_b.len()), gap, f64::NEG_INFINITY, warm, |pair, _, hint| {
         let found = signed::between(&parts_a[pair.0], pose_a, &parts_b[pair.1], pose_b, options, hint);
         if let Some(direction) = found.normal.filter(|_| found.lower <= 0.0) {
             starts.push(Start { pair, direction, depth: -found.lower });

@@ -1,15 +1,16 @@
-//! The least answer of all pairs of parts.
+//! The least answer of all parts, or pairs of parts.
 
-use crate::body::Body;
 use crate::measure::distance::Distance;
 use crate::measure::growth::GrowthDistance;
+use crate::measure::half_space::HalfSpaceDistance;
 use crate::measure::level::LevelDistance;
 use crate::measure::penetration::Penetration;
+use crate::measure::point::Projected;
 use crate::measure::signed::SignedDistance;
 use crate::measure::warm::WarmStart;
 
-/// What can be least: an answer about two bodies with its bracket.
-pub(super) trait Answer {
+/// What can be least: an answer about one or two bodies with its bracket.
+pub(in crate::measure) trait Answer {
     fn bracket(&self) -> [f64; 2];
     fn iterations(&self) -> u32;
 }
@@ -28,7 +29,7 @@ macro_rules! answer {
     )*};
 }
 
-answer!(Distance, GrowthDistance, LevelDistance, SignedDistance);
+answer!(Distance, GrowthDistance, HalfSpaceDistance, LevelDistance, Projected, SignedDistance);
 
 /// A depth counts as a negative distance.
 impl Answer for Penetration {
@@ -43,32 +44,31 @@ impl Answer for Penetration {
 
 /// The least of the answers, by their upper bounds, and what the others say of it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Least<T> {
-    pub(super) best: T,
+pub(in crate::measure) struct Least<T> {
+    pub(in crate::measure) best: T,
     /// Proven lower bound of all.
-    pub(super) lower: f64,
+    pub(in crate::measure) lower: f64,
     /// Whether the bracket of another pair meets that of the best: it may be the least as well.
-    pub(super) tied: bool,
+    pub(in crate::measure) tied: bool,
     /// Of all pairs together.
-    pub(super) iterations: u32,
+    pub(in crate::measure) iterations: u32,
 }
 
-/// Solves for the pairs of parts one by one, but for those whose `bound`, a cheap lower bound, exceeds the best upper bound;
+/// Solves for the pairs of so many parts one by one, but for those whose `bound`, a cheap lower bound, exceeds the best upper bound;
 /// ends early with an upper bound of at most `enough`. The bracket of the minimum is the minimum of the brackets.
 ///
 /// The pair of the last answer comes first, or that of the lowest bound: the smaller the first answer, the fewer of the
 /// others need be looked at. `solve` is told the best upper bound: beyond it an answer does not count.
-pub(super) fn least<T: Answer>(
-    (a, b): (&[Body], &[Body]),
-    bound: impl Fn(&Body, &Body) -> f64,
+pub(in crate::measure) fn least<T: Answer>(
+    (len_a, len_b): (usize, usize),
+    bound: impl Fn((usize, usize)) -> f64,
     enough: f64,
     warm: &mut WarmStart,
     mut solve: impl FnMut((usize, usize), f64, &mut WarmStart) -> T,
 ) -> Least<T> {
-    let pairs = || (0..a.len()).flat_map(|i| (0..b.len()).map(move |j| (i, j)));
-    let bound = |(i, j): (usize, usize)| bound(&a[i], &b[j]);
+    let pairs = || (0..len_a).flat_map(|i| (0..len_b).map(move |j| (i, j)));
     let mut first = (usize::from(warm.parts.0), usize::from(warm.parts.1));
-    if warm.is_cold() || first.0 >= a.len() || first.1 >= b.len() {
+    if warm.is_cold() || first.0 >= len_a || first.1 >= len_b {
         first = pairs().min_by(|p, q| bound(*p).total_cmp(&bound(*q))).unwrap_or((0, 0));
         *warm = WarmStart::default();
     }

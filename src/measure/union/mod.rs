@@ -21,7 +21,7 @@ use super::pose::Pose;
 use super::warm::WarmStart;
 use crate::body::{Body, Solid};
 pub(super) use depth::{penetration, signed_distance};
-use least::least;
+pub(super) use least::{Least, least};
 
 /// A part or a solid with its pose.
 type At<'a, T> = (&'a T, &'a Pose);
@@ -53,8 +53,8 @@ fn closest(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> Distance {
-    let gap = |a: &Body, b: &Body| ball_gap((a, pose_a), (b, pose_b));
-    let found = least((a, b), gap, goal.near.max(0.0), warm, |(i, j), nearest, hint| {
+    let gap = |(i, j): (usize, usize)| ball_gap((&a[i], pose_a), (&b[j], pose_b));
+    let found = least((a.len(), b.len()), gap, goal.near.max(0.0), warm, |(i, j), nearest, hint| {
         let goal = Goal { near: goal.near, far: goal.far.min(nearest) };
         settle((&a[i], pose_a), (&b[j], pose_b), &goal, options, hint)
     });
@@ -84,8 +84,8 @@ fn lowest(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> LevelDistance {
-    let bound = |a: &Body, b: &Body| level_bound((a, pose_a), (b, pose_b));
-    let found = least((a, b), bound, f64::NEG_INFINITY, warm, |(i, j), _, hint| {
+    let bound = |(i, j): (usize, usize)| level_bound((&a[i], pose_a), (&b[j], pose_b));
+    let found = least((a.len(), b.len()), bound, f64::NEG_INFINITY, warm, |(i, j), _, hint| {
         level::between(&a[i], pose_a, &b[j], pose_b, options, hint)
     });
     let narrow = found.best.upper - found.lower <= options.accuracy() * found.best.upper.abs().max(1.0);
@@ -129,8 +129,8 @@ fn first_to_touch(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> GrowthDistance {
-    let bound = |a: &Body, b: &Body| growth_bound((a, pose_a), (b, pose_b));
-    let found = least((a, b), bound, f64::NEG_INFINITY, warm, |(i, j), _, hint| {
+    let bound = |(i, j): (usize, usize)| growth_bound((&a[i], pose_a), (&b[j], pose_b));
+    let found = least((a.len(), b.len()), bound, f64::NEG_INFINITY, warm, |(i, j), _, hint| {
         growth::between(&a[i], pose_a, &b[j], pose_b, options, hint)
     });
     let narrow = found.best.upper - found.lower <= options.accuracy() * found.best.upper.max(1.0);
@@ -148,6 +148,7 @@ fn growth_bound((a, pose_a): At<'_, Body>, (b, pose_b): At<'_, Body>) -> f64 {
     (apart - error) / (reach(a) + reach(b)) * (1.0 - CARE)
 }
 
-fn status(narrow: bool) -> Status {
+/// How a solve ended, by whether its bracket is as narrow as asked for.
+pub(super) fn status(narrow: bool) -> Status {
     if narrow { Status::Converged } else { Status::BracketWide }
 }

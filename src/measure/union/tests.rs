@@ -4,7 +4,7 @@ use super::*;
 use crate::body::Compound;
 use crate::measure::signed::SignedDistance;
 use crate::measure::tests::{random_pose, twisted, unit};
-use crate::measure::{Decision, nearer_than, overlap};
+use crate::measure::{Decision, HalfSpace, distance_to_half_space, distance_to_point, nearer_than, overlap};
 use crate::polynomial::tests::Seeded;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::sync::OnceLock;
@@ -296,6 +296,14 @@ fn parts_that_are_about_as_near_are_told() {
             // The ball leaves between the others or past them: both hold it, and it has but one shortest way.
             assert!(signed.upper < 0.0, "{signed:?}");
         }
+        let center = *pose.translation();
+        let point = distance_to_point(&two, &here, &center, &options, &mut cold()).unwrap();
+        assert_eq!(point.tied, off == 0.0, "{x} {off} {point:?}");
+        let wall = HalfSpace::new(Vector3::x(), -2.0).unwrap();
+        let turned = UnitQuaternion::from_scaled_axis(Vector3::z() * off);
+        let pose = Pose::from_quaternion(Vector3::zeros(), turned.coords.into()).unwrap();
+        let low = distance_to_half_space(&two, &pose, &wall, &options, &mut cold());
+        assert_eq!(low.tied, off == 0.0, "{off} {low:?}");
         // Single bodies never are.
         assert!(!crate::measure::distance(&one, &here, &one, &pose, &options, &mut cold()).tied);
     }
