@@ -258,6 +258,7 @@ fn balls((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose)) -> Distance {
         normal,
         active_a: ActiveConstraints::default(),
         active_b: ActiveConstraints::default(),
+        parts: [0, 0],
         tied: false,
         iterations: 0,
     }

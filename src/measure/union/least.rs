@@ -58,7 +58,7 @@ pub(in crate::measure) struct Least<T> {
 /// ends early with an upper bound of at most `enough`. The bracket of the minimum is the minimum of the brackets.
 ///
 /// The pair of the last answer comes first, or that of the lowest bound: the smaller the first answer, the fewer of the
-/// others need be looked at. `solve` is told the best upper bound: beyond it an answer does not count.
+/// others need be looked at. `warm` is left with the hint and the parts of the least. `solve` is told the best upper bound: beyond it an answer does not count.
 pub(in crate::measure) fn least<T: Answer>(
     (len_a, len_b): (usize, usize),
     bound: impl Fn((usize, usize)) -> f64,

@@ -59,7 +59,8 @@ fn closest(
         settle((&a[i], pose_a), (&b[j], pose_b), &goal, options, hint)
     });
     let tied = found.tied && found.best.normal.is_some();
-    Distance { lower: found.lower, tied, iterations: found.iterations, ..found.best }
+    let parts = warm.parts.into();
+    Distance { lower: found.lower, parts, tied, iterations: found.iterations, ..found.best }
 }
 
 /// Level distance of one solid over another.

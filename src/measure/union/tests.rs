@@ -4,7 +4,9 @@ use super::*;
 use crate::body::Compound;
 use crate::measure::signed::SignedDistance;
 use crate::measure::tests::{random_pose, twisted, unit};
-use crate::measure::{Decision, HalfSpace, distance_to_half_space, distance_to_point, nearer_than, overlap};
+use crate::measure::{
+    Decision, HalfSpace, distance_to_half_space, distance_to_point, nearer_than, overlap, translation_hessian,
+};
 use crate::polynomial::tests::Seeded;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::sync::OnceLock;
@@ -307,4 +309,24 @@ fn parts_that_are_about_as_near_are_told() {
         // Single bodies never are.
         assert!(!crate::measure::distance(&one, &here, &one, &pose, &options, &mut cold()).tied);
     }
+}
+
+#[test]
+fn answers_tell_the_parts_they_are_about() {
+    let options = Options::default();
+    let mut curved = 0;
+    for seed in 0..40 {
+        let (a, b, pose_a, pose_b) = scene(seed);
+        let found = crate::measure::distance(a, &pose_a, b, &pose_b, &options, &mut WarmStart::default());
+        let (p, q) = (&a.parts()[usize::from(found.parts[0])], &b.parts()[usize::from(found.parts[1])]);
+        let one = crate::measure::distance(p, &pose_a, q, &pose_b, &options, &mut WarmStart::default());
+        assert!(one.lower <= found.upper && found.lower <= one.upper, "seed {seed}: {found:?} {one:?}");
+        let of_union = translation_hessian(a, &pose_a, b, &pose_b, &found);
+        let of_parts = translation_hessian(p, &pose_a, q, &pose_b, &one);
+        if let (Some(h), Some(k)) = (of_union, of_parts) {
+            curved += 1;
+            assert!((h - k).amax() <= 1e-3 * (1.0 + k.amax()), "seed {seed}: {h} {k}");
+        }
+    }
+    assert!(curved > 5, "{curved}");
 }

@@ -224,7 +224,8 @@ impl Search<'_> {
     /// A length at which, along the direction of the start, all pairs are proven apart; none that is below the limit.
     fn exit(&mut self, start: &Start, limit: f64) -> Option<f64> {
         let n = &start.direction;
-        let mut length = start.depth;
+        // Not 0: a way has a direction.
+        let mut length = start.depth.max(1e-3 * self.margin);
         loop {
             let before = length;
             for pair in self.pairs() {
@@ -266,7 +267,7 @@ impl Search<'_> {
                 next = if halvings < 3 { (next + way) * 0.5 } else { way };
                 halvings += 1;
             }
-            if self.ended() || !(next.norm() < way.norm() - self.margin) {
+            if self.ended() || next.norm() == 0.0 || !(next.norm() < way.norm() - self.margin) {
                 break;
             }
             let gained = way.norm() - next.norm();
