@@ -25,6 +25,14 @@ pub struct Twist {
     pub angular: Vector3<f64>,
 }
 
+impl std::ops::Add for Twist {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { linear: self.linear + other.linear, angular: self.angular + other.angular }
+    }
+}
+
 impl Twist {
     /// No change.
     pub(super) const ZERO: Self = Self { linear: Vector3::new(0.0, 0.0, 0.0), angular: Vector3::new(0.0, 0.0, 0.0) };

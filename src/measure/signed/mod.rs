@@ -69,7 +69,7 @@ impl SignedDistance {
 ///
 /// ```
 /// use nalgebra::Vector3;
-/// use sublevel::body::Body;
+/// use sublevel::body::{Body, Compound};
 /// use sublevel::measure::{Options, Pose, WarmStart, signed_distance};
 ///
 /// let ball = Body::ball("ball", Vector3::zeros(), 0.5)?;
@@ -81,6 +81,11 @@ impl SignedDistance {
 ///     assert!((answer.value() - (x - 1.5)).abs() < 1e-8);
 ///     assert!((answer.gradients.unwrap()[0].linear - Vector3::x()).norm() < 1e-6);
 /// }
+///
+/// let row = Compound::new("row", vec![crate_, Body::ball("far", Vector3::new(-5.0, 0.0, 0.0), 0.5)?])?;
+/// let pose = Pose::from_quaternion(Vector3::new(1.25, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0])?;
+/// let answer = signed_distance(&ball, &pose, &row, &Pose::identity(), &Options::default(), &mut warm);
+/// assert!((answer.value() + 0.25).abs() < 1e-8 && !answer.tied);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn signed_distance(

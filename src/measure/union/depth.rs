@@ -5,7 +5,7 @@
 
 use super::least::{Least, least};
 use super::status;
-use super::way::{self, Contact, Start, Starts};
+use super::way::{self, Contact, Start, Starts, Way};
 use crate::body::Solid;
 use crate::measure::decide::ball_gap;
 use crate::measure::options::Options;
@@ -14,7 +14,6 @@ use crate::measure::pose::Pose;
 use crate::measure::signed::{self, SignedDistance};
 use crate::measure::twist::Twist;
 use crate::measure::warm::WarmStart;
-use nalgebra::Vector3;
 
 /// Penetration depth of two solids.
 #[inline]
@@ -44,17 +43,18 @@ pub(in crate::measure) fn penetration(
     if starts.is_empty() {
         return Penetration { directions, iterations, ..best };
     }
-    let narrow = |depth: f64| narrow(a, b, depth, options);
-    let way = way::out((a, pose_a), (b, pose_b), &starts, best.lower, narrow, options);
+    let way = way::out((a, pose_a), (b, pose_b), &starts, best.lower, |depth| narrow(a, b, depth, options), options);
     let (lower, upper) = (best.lower, way.length);
+    let narrow = upper - lower <= narrow(a, b, upper, options);
     Penetration {
-        status: status(upper - lower <= narrow(upper)),
+        status: status(narrow),
         lower,
         upper,
         direction: Some(way.direction),
         witness_a: way.contacts[0].x,
         witness_b: way.contacts[0].y,
-        tied: way.tied || best.tied,
+        // Another way out for the deepest pair counts if that pair is what decides.
+        tied: way.tied || best.tied && narrow,
         directions,
         iterations: iterations + way.iterations,
     }
@@ -90,35 +90,34 @@ pub(in crate::measure) fn signed_distance(
         found
     });
     let Least { best, lower, tied, iterations } = found;
-    let tied = tied || best.tied;
     if lower > 0.0 || starts.is_empty() {
         let status = status(best.upper - lower <= narrow(a, b, 0.0, options));
-        return SignedDistance { status, lower, tied, iterations, ..best };
+        return SignedDistance { status, lower, tied: tied || best.tied, iterations, ..best };
     }
     let least = (-best.upper).max(0.0);
     let way = way::out((a, pose_a), (b, pose_b), &starts, least, |depth| narrow(a, b, depth, options), options);
     let (lower, upper) = (-way.length, best.upper);
-    let [center_a, center_b] = [pose_a, pose_b].map(Pose::translation);
-    let sum = |twist: fn(&Contact, &Vector3<f64>) -> Twist, center| {
-        let each = way.contacts.iter().map(|contact| twist(contact, center));
-        each.fold(Twist::ZERO, |sum, twist| Twist {
-            linear: sum.linear + twist.linear,
-            angular: sum.angular + twist.angular,
-        })
-    };
+    let narrow = upper - lower <= narrow(a, b, if upper < 0.0 { way.length } else { 0.0 }, options);
     SignedDistance {
-        status: status(upper - lower <= narrow(a, b, if upper < 0.0 { way.length } else { 0.0 }, options)),
+        status: status(narrow),
         lower,
         upper,
         witness_a: way.contacts[0].x,
         witness_b: way.contacts[0].y,
         normal: Some(way.direction),
-        gradients: Some([
-            sum(|contact, center| Twist::of_force(contact.pull, &contact.x, center), center_a),
-            sum(|contact, center| Twist::of_force(-contact.pull, &contact.y, center), center_b),
-        ]),
+        gradients: Some(gradients(&way, pose_a, pose_b)),
         at_contact: lower <= 0.0 && upper >= 0.0,
-        tied: tied || way.tied,
+        tied: way.tied || best.tied && narrow,
         iterations: iterations + way.iterations,
     }
+}
+
+/// Derivatives of minus the length of a way with respect to both poses: each pair of parts that holds the solids back adds
+/// its pull, at the points where it does (envelope theorem).
+fn gradients(way: &Way, pose_a: &Pose, pose_b: &Pose) -> [Twist; 2] {
+    way.contacts.iter().fold([Twist::ZERO; 2], |[a, b], Contact { pull, x, y }| {
+        let of_a = Twist::of_force(*pull, x, pose_a.translation());
+        let of_b = Twist::of_force(-pull, y, pose_b.translation());
+        [a + of_a, b + of_b]
+    })
 }

@@ -330,3 +330,60 @@ fn answers_tell_the_parts_they_are_about() {
     }
     assert!(curved > 5, "{curved}");
 }
+
+/// Where the closest pair of parts changes on a path, the normal jumps; there, and hardly anywhere else, the flag is set.
+#[test]
+fn normals_jump_only_where_ties_are_told() {
+    let options = Options::default();
+    let (mut changes, mut tied, mut queries) = (0, 0, 0);
+    for seed in 0..40 {
+        let (a, b, pose_a, pose_b) = scene(4 * seed + 3);
+        let along = unit(&mut Seeded(seed)) * 8.0;
+        let at = |t: f64| {
+            let pose = pose_b.with_translation(pose_b.translation() + along * t);
+            crate::measure::distance(a, &pose_a, b, &pose, &options, &mut WarmStart::default())
+        };
+        let steps: Vec<Distance> = (0..=50).map(|k| at(f64::from(k) / 50.0)).collect();
+        queries += steps.len();
+        tied += steps.iter().filter(|found| found.tied).count();
+        for (k, pair) in steps.windows(2).enumerate() {
+            if pair[0].parts == pair[1].parts || pair.iter().any(|found| found.lower < 0.01) {
+                continue;
+            }
+            let (mut low, mut high) = (k as f64 / 50.0, (k + 1) as f64 / 50.0);
+            for _ in 0..50 {
+                let middle = 0.5 * (low + high);
+                if at(middle).parts == pair[0].parts {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            changes += 1;
+            assert!(at(low).tied && at(high).tied, "seed {seed} at {low}: {:?} {:?}", at(low), at(high));
+        }
+    }
+    assert!(changes > 20 && tied * 100 <= queries, "{changes} changes, {tied} tied of {queries}");
+}
+
+#[test]
+fn ways_out_that_are_about_as_short_are_told() {
+    let ball = |x: f64| Body::ball("ball", Vector3::new(x, 0.0, 0.0), 0.5).unwrap();
+    let (two, one) = (Compound::new("two", vec![ball(0.3), ball(-0.3)]).unwrap(), ball(0.0));
+    let options = Options::default();
+    for (y, told) in [(0.0, true), (0.1, false)] {
+        let pose = Pose::from_quaternion(Vector3::new(0.0, y, 0.0), [0.0, 0.0, 0.0, 1.0]).unwrap();
+        let signed = signed_distance(&two, &Pose::identity(), &one, &pose, &options, &mut WarmStart::default());
+        let depth = penetration(&two, &Pose::identity(), &one, &pose, &options, &mut WarmStart::default());
+        // Out sideways the balls at the ends are passed at once: (y + d)² + 0.3² = 1.
+        let truth = 0.91_f64.sqrt() - y;
+        assert!((depth.upper - truth).abs() < 1e-6 && (signed.lower + truth).abs() < 1e-6, "{depth:?} {signed:?}");
+        assert!(depth.lower <= truth && signed.upper >= -truth, "{depth:?} {signed:?}");
+        assert_eq!((depth.tied, signed.tied), (told, told), "{depth:?} {signed:?}");
+        if !told {
+            let [of_two, of_one] = signed.gradients.unwrap();
+            assert!((of_two.linear + Vector3::y()).norm() < 1e-3 && (of_one.linear - Vector3::y()).norm() < 1e-3);
+            assert!(of_two.angular.norm() < 1e-3, "{of_two:?}");
+        }
+    }
+}
