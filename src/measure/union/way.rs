@@ -99,8 +99,8 @@ pub(super) struct Way {
     pub(super) iterations: u32,
 }
 
-/// The shortest way found from these starts and a few more; none is shorter than `least` metres, and of ways as long as wanted
-/// the difference is at most `narrow` metres.
+/// The shortest way found from these starts and a few more. No way is shorter than `least` metres; lengths that differ by at
+/// most `narrow` of them count as the same.
 pub(super) fn out(
     (a, pose_a): At<'_, impl Solid>,
     (b, pose_b): At<'_, impl Solid>,
