@@ -72,12 +72,15 @@ fn main() -> Result<(), Box<dyn Error>> {
             continue;
         }
         let pair = Pair { name, a: Object::load(a)?, b: Object::load(b)? };
-        for kind in [Kind::Separated, Kind::Grazing] {
+        for kind in [Kind::Separated, Kind::Grazing, Kind::Contact] {
             if args.kind.is_some_and(|only| only != kind) {
                 continue;
             }
-            let table = compare(&pair, kind, &effort, coal.as_ref())?;
-            table.print(report.table(&table.pair, Kind::Separated));
+            // Coal's rows are distances.
+            let coal = coal.as_ref().filter(|_| kind != Kind::Contact);
+            let separated = report.table(&pair.name, Kind::Separated);
+            let table = compare(&pair, kind, &effort, coal, separated)?;
+            table.print(separated);
             report.tables.push(table);
         }
     }
@@ -91,7 +94,13 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// One pair on one kind of motion: all rows and coal in turns.
-fn compare(pair: &Pair, kind: Kind, effort: &Effort, coal: Option<&Coal>) -> Result<Table, Box<dyn Error>> {
+fn compare(
+    pair: &Pair,
+    kind: Kind,
+    effort: &Effort,
+    coal: Option<&Coal>,
+    separated: Option<&Table>,
+) -> Result<Table, Box<dyn Error>> {
     let scene = rows::Scene::new(pair, kind, effort.trajectories, effort.poses)?;
     let mut rows = rows::all(&scene);
     let mut coal = coal.map(|coal| coal.start(&scene)).transpose()?;
@@ -104,5 +113,5 @@ fn compare(pair: &Pair, kind: Kind, effort: &Effort, coal: Option<&Coal>) -> Res
     if let Some(coal) = &coal {
         coal.check(&scene)?;
     }
-    Ok(Table::new(&scene, &rows, coal.as_ref().map(peers::CoalRun::times)))
+    Ok(Table::new(&scene, &rows, coal.as_ref().map(peers::CoalRun::times), separated))
 }

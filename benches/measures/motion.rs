@@ -1,10 +1,12 @@
-//! Smooth motions of one body about another in steps of one centimetre and one degree.
+//! Smooth motions of one body about another in steps of one centimetre and one degree; poses in overlap; screw motions; rays.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use sublevel::body::Body;
-use sublevel::measure::{Options, Pose, PoseError, WarmStart, distance};
+use sublevel::measure::{
+    Motion, MotionError, Options, Pose, PoseError, Ray, RayError, WarmStart, distance, signed_distance,
+};
 
 /// Poses of `b` in the frame of `a`.
 pub(crate) type Trajectory = Vec<Pose>;
@@ -17,6 +19,8 @@ pub(crate) enum Kind {
     Separated,
     /// The gap goes between a micrometre and a centimetre.
     Grazing,
+    /// Through contact and back: from a centimetre apart to five centimetres deep.
+    Contact,
 }
 
 impl Kind {
@@ -24,6 +28,7 @@ impl Kind {
         match self {
             Self::Separated => "separated",
             Self::Grazing => "grazing",
+            Self::Contact => "contact",
         }
     }
 }
@@ -41,8 +46,9 @@ const HALF_RANGE: f64 = 0.35;
 /// Below this gap of any pair a separated motion is thrown away, metres.
 const CLEAR: f64 = 0.01;
 
-/// Range of the gap of grazing motions, metres, and the poses in which they go through it.
+/// Ranges of the gap of grazing motions and of those through contact, metres, and the poses in which they go through them.
 const GRAZE: (f64, f64) = (1e-6, 0.01);
+const CONTACT: (f64, f64) = (-0.05, 0.01);
 const PERIOD: f64 = 90.0;
 
 /// SplitMix64 (Steele, Lea, Flood 2014): the same motions everywhere.
@@ -141,9 +147,35 @@ fn try_separated(pairs: &[(&Body, &Body)], poses: usize, seed: u64) -> Result<Op
 }
 
 /// Motions of one body along the other with the gap going up and down through [`GRAZE`].
+pub(crate) fn grazing(a: &Body, b: &Body, trajectories: usize, poses: usize) -> Result<Vec<Trajectory>, PoseError> {
+    along(a, b, trajectories, poses, GRAZE, settle)
+}
+
+/// Motions of one body along the other with the gap going up and down through [`CONTACT`].
+pub(crate) fn through_contact(
+    a: &Body,
+    b: &Body,
+    trajectories: usize,
+    poses: usize,
+) -> Result<Vec<Trajectory>, PoseError> {
+    along(a, b, trajectories, poses, CONTACT, settle_signed)
+}
+
+/// Moves a body until its gap to another is as wanted, from the normal of the pose before and with its hint; tells the new
+/// normal.
+type Settle = fn(&mut Walk, &Body, &Body, f64, Vector3<f64>, &mut WarmStart) -> Result<Vector3<f64>, PoseError>;
+
+/// Motions of one body along the other with the gap going up and down through a range.
 ///
 /// The step along the surface is a centimetre; turning adds what brings the gap back.
-pub(crate) fn grazing(a: &Body, b: &Body, trajectories: usize, poses: usize) -> Result<Vec<Trajectory>, PoseError> {
+fn along(
+    a: &Body,
+    b: &Body,
+    trajectories: usize,
+    poses: usize,
+    (least, most): (f64, f64),
+    settle: Settle,
+) -> Result<Vec<Trajectory>, PoseError> {
     (1..=trajectories as u64)
         .map(|seed| {
             let mut walk = Walk::new(a, b, seed);
@@ -152,7 +184,7 @@ pub(crate) fn grazing(a: &Body, b: &Body, trajectories: usize, poses: usize) -> 
             let mut trajectory = Vec::new();
             for pose in 0..poses {
                 let phase = TAU * pose as f64 / PERIOD;
-                let wanted = GRAZE.0 + (GRAZE.1 - GRAZE.0) * 0.5 * (1.0 - phase.cos());
+                let wanted = least + (most - least) * 0.5 * (1.0 - phase.cos());
                 normal = settle(&mut walk, a, b, wanted, normal, &mut warm)?;
                 trajectory.push(walk.pose()?);
                 walk.step(|heading| heading - normal * normal.dot(&heading));
@@ -188,6 +220,77 @@ fn settle(
     Ok(normal)
 }
 
+/// The same by the signed distance. In overlap a move to another face may be shorter by then: a few moves come close.
+fn settle_signed(
+    walk: &mut Walk,
+    a: &Body,
+    b: &Body,
+    wanted: f64,
+    mut normal: Vector3<f64>,
+    warm: &mut WarmStart,
+) -> Result<Vector3<f64>, PoseError> {
+    for _ in 0..10 {
+        let answer = signed_distance(a, &Pose::identity(), b, &walk.pose()?, &Options::default(), warm);
+        normal = answer.normal.unwrap_or(normal);
+        walk.position += normal * (answer.value() - wanted);
+        if (answer.value() - wanted).abs() <= 0.01 * (CONTACT.1 - CONTACT.0) {
+            break;
+        }
+    }
+    Ok(normal)
+}
+
+/// Poses that have nothing to do with each other in all of which the bodies overlap, from all but apart to all but
+/// concentric.
+pub(crate) fn overlapping(a: &Body, b: &Body, trajectories: usize, poses: usize) -> Result<Vec<Trajectory>, PoseError> {
+    let mut random = Random(0);
+    let reach = a.circumscribed().radius + b.circumscribed().radius;
+    let mut draw = || {
+        let rotation = UnitQuaternion::new(random.direction() * (TAU * random.signed()));
+        let place = a.interior_point() + random.direction() * (reach * random.signed());
+        Pose::from_quaternion(place - rotation * b.interior_point(), rotation.coords.into())
+    };
+    let mut trajectory = || {
+        let mut found = Vec::new();
+        while found.len() < poses {
+            let pose = draw()?;
+            let answer =
+                signed_distance(a, &Pose::identity(), b, &pose, &Options::default(), &mut WarmStart::default());
+            found.extend((answer.upper < 0.0).then_some(pose));
+        }
+        Ok(found)
+    };
+    (0..trajectories).map(|_| trajectory()).collect()
+}
+
+/// Screw motions of both bodies that start in these poses, two seconds of which bring their middles about together.
+pub(crate) fn screws(a: &Body, b: &Body, starts: &[Trajectory]) -> Result<Vec<Vec<(Motion, Motion)>>, MotionError> {
+    let mut random = Random(0);
+    let (middle_a, middle_b) = (a.circumscribed().center, b.circumscribed().center);
+    let size = a.circumscribed().radius + b.circumscribed().radius;
+    let mut screw = |start: Pose, velocity: Vector3<f64>, middle: Vector3<f64>| {
+        let center = middle + random.direction() * (0.3 * size * random.signed());
+        Motion::new(start, velocity, random.direction() * (2.0 * random.signed()), center)
+    };
+    let mut pair = |pose: &Pose| {
+        let middle = pose.transform_point(&middle_b);
+        let way = middle_a - middle;
+        Ok((screw(Pose::identity(), way * -0.25, middle_a)?, screw(*pose, way * 0.25, middle)?))
+    };
+    starts.iter().map(|trajectory| trajectory.iter().map(&mut pair).collect()).collect()
+}
+
+/// Rays from the middle of `b` to points all over the inside of `a`: all of them hit `a`.
+pub(crate) fn rays(a: &Body, b: &Body, poses: &[Trajectory]) -> Result<Vec<Vec<Ray>>, RayError> {
+    let targets: Vec<_> = a.boundary().iter().map(|point| a.interior_point().lerp(point, 0.95)).collect();
+    let mut targets = targets.iter().cycle();
+    let mut ray = |pose: &Pose| {
+        let from = pose.transform_point(&b.circumscribed().center);
+        Ray::new(from, targets.next().unwrap_or(a.interior_point()) - from, f64::INFINITY)
+    };
+    poses.iter().map(|trajectory| trajectory.iter().map(&mut ray).collect()).collect()
+}
+
 /// Distance proven, and the normal from `b` to `a`.
 fn gap(a: &Body, b: &Body, pose: &Pose, warm: &mut WarmStart) -> (f64, Option<Vector3<f64>>) {
     let answer = distance(a, &Pose::identity(), b, pose, &Options::default(), warm);
@@ -197,7 +300,7 @@ fn gap(a: &Body, b: &Body, pose: &Pose, warm: &mut WarmStart) -> (f64, Option<Ve
 /// What a motion is like, in metres.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub(crate) struct Character {
-    /// Smallest, median and largest gap.
+    /// Smallest, median and largest signed distance.
     pub(crate) gaps: [f64; 3],
     /// Median and largest way of the middle of `b` from pose to pose.
     pub(crate) steps: [f64; 2],
@@ -207,7 +310,9 @@ impl Character {
     /// Of `b` moving about `a`.
     pub(crate) fn new(a: &Body, b: &Body, trajectories: &[Trajectory]) -> Self {
         let poses = trajectories.iter().flatten();
-        let gaps = sorted(poses.map(|pose| gap(a, b, pose, &mut WarmStart::default()).0));
+        let signed =
+            |pose| signed_distance(a, &Pose::identity(), b, pose, &Options::default(), &mut WarmStart::default()).lower;
+        let gaps = sorted(poses.map(signed));
         let middle = b.circumscribed().center;
         let steps = sorted(trajectories.iter().flat_map(|trajectory| {
             let way = |pair: &[Pose]| (pair[1].transform_point(&middle) - pair[0].transform_point(&middle)).norm();

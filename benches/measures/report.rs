@@ -85,8 +85,8 @@ impl Report {
 }
 
 impl Table {
-    /// Gathers the rows; `coal` is cold and warm, in nanoseconds.
-    pub(crate) fn new(scene: &Scene<'_>, rows: &[Row<'_>], coal: Option<(f64, f64)>) -> Self {
+    /// Gathers the rows; `coal` is cold and warm, in nanoseconds, `separated` the table of the same pair on those motions.
+    pub(crate) fn new(scene: &Scene<'_>, rows: &[Row<'_>], coal: Option<(f64, f64)>, separated: Option<&Self>) -> Self {
         let queries = scene.poses(DEGREE).iter().map(Vec::len).sum();
         let mut times: Vec<(&str, f64)> = rows.iter().map(|row| (row.label.as_str(), row.nanoseconds())).collect();
         if let Some((cold, warm)) = coal {
@@ -95,16 +95,23 @@ impl Table {
         let time = |label: &str| times.iter().find(|(known, _)| *known == label).map(|(_, time)| *time);
         let line = |label: &str, row: Option<&Row<'_>>| {
             let nanoseconds = time(label).unwrap_or(f64::NAN);
-            let tally = row.map(|row| row.tally).unwrap_or_default();
-            let counted = tally.most_iterations > 0;
-            let mean = tally.iterations as f64 / tally.queries as f64;
+            let counts = row.and_then(|row| row.tally.iterations());
             let verdict = |target: &Target| {
                 let (target, at_most, reached) = match *target {
                     Target::PartOf(of, part) => (format!("of {of}"), part, time(of).map(|time| nanoseconds / time)),
                     Target::Nanoseconds(limit) => ("ns".to_owned(), limit, Some(nanoseconds)),
-                    Target::MeanIterations(limit) => ("iterations".to_owned(), limit, Some(mean)),
+                    Target::OfSeparated(limit) => {
+                        let before = separated.and_then(|table| table.nanoseconds(label));
+                        ("of separated".to_owned(), limit, before.map(|time| nanoseconds / time))
+                    }
+                    Target::MeanIterations(limit) => ("iterations".to_owned(), limit, counts.map(|(mean, ..)| mean)),
+                    Target::MedianIterations(limit) => {
+                        let median = counts.map(|(_, median, _)| median);
+                        ("iterations median".to_owned(), f64::from(limit), median)
+                    }
                     Target::MostIterations(limit) => {
-                        ("iterations worst".to_owned(), f64::from(limit), Some(f64::from(tally.most_iterations)))
+                        let most = counts.map(|(.., most)| f64::from(most));
+                        ("iterations worst".to_owned(), f64::from(limit), most)
                     }
                 };
                 Verdict { target, at_most, reached, met: reached.map(|value| value <= at_most) }
@@ -114,8 +121,8 @@ impl Table {
                 nanoseconds,
                 of_coal_warm: time(COAL_WARM).map(|time| nanoseconds / time),
                 of_coal_cold: time(COAL_COLD).map(|time| nanoseconds / time),
-                mean_iterations: counted.then_some(mean),
-                most_iterations: counted.then_some(tally.most_iterations),
+                mean_iterations: counts.map(|(mean, ..)| mean),
+                most_iterations: counts.map(|(.., most)| most),
                 failed: row.map(|row| row.tally.failed),
                 overlaps: row.map(|row| row.tally.overlaps),
                 targets: row.map_or(&[][..], |row| &row.targets).iter().map(verdict).collect(),
@@ -136,6 +143,11 @@ impl Table {
         }
     }
 
+    /// Time of the row with this label.
+    fn nanoseconds(&self, label: &str) -> Option<f64> {
+        self.rows.iter().find(|line| line.label == label).map(|line| line.nanoseconds)
+    }
+
     /// Prints the table; times are compared with those of `separated`, if this is another.
     pub(crate) fn print(&self, separated: Option<&Table>) {
         let [a, b] = self.hull_vertices;
@@ -151,14 +163,14 @@ impl Table {
             "", "ns", "x warm", "x cold", "x sep.", "mean", "worst", "failed", "overlaps"
         );
         for line in &self.rows {
-            let before = separated.and_then(|table| table.rows.iter().find(|other| other.label == line.label));
+            let before = separated.and_then(|table| table.nanoseconds(&line.label));
             println!(
                 "{:<32} {:>9.1} {:>7} {:>7} {:>7} {:>6} {:>6} {:>7} {:>8}  {}",
                 line.label,
                 line.nanoseconds,
                 number(line.of_coal_warm),
                 number(line.of_coal_cold),
-                number(before.map(|other| line.nanoseconds / other.nanoseconds)),
+                number(before.map(|time| line.nanoseconds / time)),
                 number(line.mean_iterations),
                 count(line.most_iterations),
                 count(line.failed),

@@ -7,7 +7,10 @@ use crate::peers::{Hulls, parry_pose};
 use crate::sweep::{Answer, Row, Target};
 use std::error::Error;
 use std::fs;
-use sublevel::measure::{Distance, Options, Pose, WarmStart, distance, distance_batch, level_distance};
+use sublevel::measure::{
+    Distance, ImpactOptions, ImpactStatus, Motion, Options, Pose, Ray, RayCast, Status, WarmStart, cast_ray, distance,
+    distance_batch, growth_distance, level_distance, penetration, signed_distance, time_of_impact,
+};
 
 /// Label of coal's rows.
 pub(crate) const COAL_WARM: &str = "coal GJK warm";
@@ -29,11 +32,18 @@ pub(crate) struct Scene<'a> {
     /// Poses for the bodies of each degree: the same for all, unless grazing.
     poses: Vec<(usize, Vec<Trajectory>)>,
     parry_poses: Vec<Vec<parry3d_f64::math::Pose>>,
+    /// From the second body of [`DEGREE`] to the first, in each pose.
+    rays: Vec<Vec<Ray>>,
+    /// Of both bodies of [`DEGREE`], from each pose on.
+    screws: Vec<Vec<(Motion, Motion)>>,
+    /// Poses in which the bodies of [`DEGREE`] overlap, where the kind is of contact.
+    overlapping: Vec<Trajectory>,
 }
 
 impl<'a> Scene<'a> {
     pub(crate) fn new(pair: &'a Pair, kind: Kind, trajectories: usize, poses: usize) -> Result<Self, Box<dyn Error>> {
-        let poses: Vec<(usize, Vec<Trajectory>)> = match kind {
+        let (a, b) = pair.bodies(DEGREE);
+        let all: Vec<(usize, Vec<Trajectory>)> = match kind {
             Kind::Separated => {
                 let bodies: Vec<_> = DEGREES.iter().map(|&degree| pair.bodies(degree)).collect();
                 let shared = motion::separated(&bodies, trajectories, poses)?;
@@ -47,8 +57,23 @@ impl<'a> Scene<'a> {
                     Ok((degree, motion::grazing(a, b, trajectories, poses)?))
                 })
                 .collect::<Result<_, Box<dyn Error>>>()?,
+            Kind::Contact => vec![(DEGREE, motion::through_contact(a, b, trajectories, poses)?)],
         };
-        let mut scene = Self { pair, kind, hulls: Hulls::new(pair)?, poses, parry_poses: Vec::new() };
+        let mut scene = Self {
+            pair,
+            kind,
+            hulls: Hulls::new(pair)?,
+            poses: all,
+            parry_poses: Vec::new(),
+            rays: Vec::new(),
+            screws: Vec::new(),
+            overlapping: Vec::new(),
+        };
+        if kind == Kind::Contact {
+            scene.overlapping = motion::overlapping(a, b, trajectories, poses)?;
+        }
+        scene.rays = motion::rays(a, b, scene.poses(DEGREE))?;
+        scene.screws = motion::screws(a, b, scene.poses(DEGREE))?;
         scene.parry_poses = scene.poses(DEGREE).iter().map(|t| t.iter().map(parry_pose).collect()).collect();
         // For a look at single poses with `sublevel measure --poses`.
         let path = folder()?.join(format!("{}-{}.poses", pair.name, kind.name()));
@@ -66,16 +91,28 @@ impl<'a> Scene<'a> {
     fn part(&self, of: &'static str, part: f64) -> Target {
         Target::PartOf(of, if self.kind == Kind::Grazing { 2.0 * part } else { part })
     }
+
+    /// The rule that a distance takes at most twice the time when the bodies graze.
+    fn near_as_far(&self, row: Row<'a>) -> Row<'a> {
+        if self.kind == Kind::Grazing { row.at_most(Target::OfSeparated(2.0)) } else { row }
+    }
 }
 
 /// All rows of a table.
 pub(crate) fn all<'a>(scene: &'a Scene<'a>) -> Vec<Row<'a>> {
+    if scene.kind == Kind::Contact {
+        return vec![signed_warm(scene), penetration_cold(scene), growth_warm(scene)];
+    }
     let mut rows = Vec::new();
     rows.extend(DEGREES.map(|degree| distance_warm(scene, degree)));
     rows.extend(DEGREES.map(|degree| distance_cold(scene, degree)));
     rows.push(distance_batches(scene));
     rows.push(level_warm(scene));
     rows.push(level_cold(scene));
+    rows.push(growth_warm(scene));
+    rows.push(signed_warm(scene));
+    rows.push(ray_cast(scene));
+    rows.push(impact(scene));
     rows.push(parry_cold(scene));
     rows.push(parry_warm(scene));
     rows
@@ -98,7 +135,8 @@ fn distance_warm<'a>(scene: &'a Scene<'a>, degree: usize) -> Row<'a> {
         .at_most(scene.part(COAL_WARM, part))
         .at_most(Target::MeanIterations(2.0))
         .at_most(Target::MostIterations(30));
-    if degree == DEGREE { row.at_most(scene.part(PARRY_COLD, 0.1)) } else { row }
+    let row = if degree == DEGREE { row.at_most(scene.part(PARRY_COLD, 0.1)) } else { row };
+    scene.near_as_far(row)
 }
 
 fn distance_cold<'a>(scene: &'a Scene<'a>, degree: usize) -> Row<'a> {
@@ -109,7 +147,8 @@ fn distance_cold<'a>(scene: &'a Scene<'a>, degree: usize) -> Row<'a> {
         Answer::new(answer.iterations, answer.status, answer.lower <= 0.0)
     });
     let row = row.at_most(Target::MostIterations(30));
-    if degree == DEGREE { row.at_most(scene.part(COAL_COLD, 0.9)) } else { row }
+    let row = if degree == DEGREE { row.at_most(scene.part(COAL_COLD, 0.9)) } else { row };
+    scene.near_as_far(row)
 }
 
 /// Consecutive poses, cold, as many at a time as the figures ask.
@@ -148,6 +187,62 @@ fn level_cold<'a>(scene: &'a Scene<'a>) -> Row<'a> {
         Answer::new(answer.iterations, answer.status, answer.upper <= 1.0)
     })
     .at_most(Target::MostIterations(30))
+}
+
+fn growth_warm<'a>(scene: &'a Scene<'a>) -> Row<'a> {
+    let (a, b) = scene.pair.bodies(DEGREE);
+    let options = Options::default();
+    Row::warm(format!("growth distance warm, degree {DEGREE}"), scene.poses(DEGREE), move |pose, warm| {
+        let answer = growth_distance(a, &Pose::identity(), b, pose, &options, warm);
+        Answer::new(answer.iterations, answer.status, answer.lower <= 1.0)
+    })
+    .at_most(Target::Nanoseconds(600.0))
+}
+
+fn signed_warm<'a>(scene: &'a Scene<'a>) -> Row<'a> {
+    let (a, b) = scene.pair.bodies(DEGREE);
+    let options = Options::default();
+    Row::warm(format!("signed distance warm, degree {DEGREE}"), scene.poses(DEGREE), move |pose, warm| {
+        let answer = signed_distance(a, &Pose::identity(), b, pose, &options, warm);
+        Answer::new(answer.iterations, answer.status, answer.lower <= 0.0)
+    })
+}
+
+fn penetration_cold<'a>(scene: &'a Scene<'a>) -> Row<'a> {
+    let (a, b) = scene.pair.bodies(DEGREE);
+    let options = Options::default();
+    Row::cold(format!("penetration cold, degree {DEGREE}"), &scene.overlapping, move |pose| {
+        let answer = penetration(a, &Pose::identity(), b, pose, &options, &mut WarmStart::default());
+        Answer::new(answer.iterations, answer.status, answer.upper > 0.0)
+    })
+    .at_most(Target::Nanoseconds(50_000.0))
+}
+
+fn ray_cast<'a>(scene: &'a Scene<'a>) -> Row<'a> {
+    let (a, _) = scene.pair.bodies(DEGREE);
+    let options = Options::default();
+    Row::cold(format!("ray cast, hits, degree {DEGREE}"), &scene.rays, move |ray| {
+        match cast_ray(a, &Pose::identity(), ray, &options) {
+            RayCast::Hit(hit) => Answer::new(hit.iterations, hit.status, hit.upper == 0.0),
+            _ => Answer::new(0, Status::BracketWide, false),
+        }
+    })
+    .at_most(Target::Nanoseconds(500.0))
+}
+
+/// Counts distance queries and evaluations of a separating plane as iterations.
+fn impact<'a>(scene: &'a Scene<'a>) -> Row<'a> {
+    let (a, b) = scene.pair.bodies(DEGREE);
+    let options = ImpactOptions::new(2.0).expect("two seconds are a duration");
+    Row::cold(format!("time of impact, degree {DEGREE}"), &scene.screws, move |(of_a, of_b)| {
+        let answer = time_of_impact(a, of_a, b, of_b, &options);
+        Answer {
+            iterations: Some(answer.queries),
+            failed: answer.status == ImpactStatus::Stopped,
+            overlap: answer.status == ImpactStatus::Contact,
+        }
+    })
+    .at_most(Target::MedianIterations(20))
 }
 
 fn parry_cold<'a>(scene: &'a Scene<'a>) -> Row<'a> {

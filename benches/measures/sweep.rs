@@ -22,13 +22,13 @@ impl Answer {
 }
 
 /// What came of all queries of a row.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Tally {
     pub(crate) queries: usize,
     pub(crate) failed: usize,
     pub(crate) overlaps: usize,
-    pub(crate) iterations: u64,
-    pub(crate) most_iterations: u32,
+    /// Of each query that tells.
+    iterations: Vec<u32>,
 }
 
 impl Tally {
@@ -36,8 +36,14 @@ impl Tally {
         self.queries += 1;
         self.failed += usize::from(answer.failed);
         self.overlaps += usize::from(answer.overlap);
-        self.iterations += u64::from(answer.iterations.unwrap_or(0));
-        self.most_iterations = self.most_iterations.max(answer.iterations.unwrap_or(0));
+        self.iterations.extend(answer.iterations);
+    }
+
+    /// Mean, median and worst number of iterations, if they are told.
+    pub(crate) fn iterations(&self) -> Option<(f64, f64, u32)> {
+        let counts: Vec<f64> = self.iterations.iter().copied().map(f64::from).collect();
+        let most = self.iterations.iter().max().filter(|most| **most > 0)?;
+        Some((counts.iter().sum::<f64>() / counts.len() as f64, median(&counts), *most))
     }
 }
 
@@ -48,8 +54,12 @@ pub(crate) enum Target {
     PartOf(&'static str, f64),
     /// Nanoseconds on machines of the class named in the figures.
     Nanoseconds(f64),
+    /// So many times the time of the row with the same label on separated motions.
+    OfSeparated(f64),
     /// Iterations on average.
     MeanIterations(f64),
+    /// Iterations, or queries of other measures, of the median query.
+    MedianIterations(u32),
     /// Iterations in the worst case.
     MostIterations(u32),
 }

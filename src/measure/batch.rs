@@ -399,6 +399,8 @@ impl Batch<'_> {
             let vector = |i: usize| Vector3::new(entry(i), entry(i + 1), entry(i + 2));
             let narrow = entry(1) - entry(0) <= self.tolerance;
             self.answers[group.pose[lane]] = Distance {
+                parts: [0, 0],
+                tied: false,
                 status: if narrow { Status::Converged } else { Status::BracketWide },
                 lower: entry(0),
                 upper: entry(1),

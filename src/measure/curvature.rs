@@ -2,7 +2,7 @@
 
 use super::distance::Distance;
 use super::pose::Pose;
-use crate::body::Body;
+use crate::body::{Body, Solid};
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector3};
 
 /// Hessian of the distance of `a` and `b` with respect to the translation of either body (world frame, 1/m), at an answer of
@@ -10,7 +10,8 @@ use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector3};
 ///
 /// With the normal n, tangents T across it and the curvatures `W_i = Tᵀ H_i T / |g_i|` of the surfaces at the witnesses, it is
 /// `T A (A + W_B)⁺ W_B Tᵀ`, `A = W_A (I + D W_A)⁻¹`: zero along n, and where either body is flat. None on overlap, at contact,
-/// and where several constraints of one body meet: the distance has no second derivative there.
+/// and where several constraints of one body meet: the distance has no second derivative there. Of compounds it is that of
+/// the parts the answer is about, which holds for the compounds unless the answer is tied.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -26,12 +27,13 @@ use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector3};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn translation_hessian(
-    a: &Body,
+    a: &impl Solid,
     pose_a: &Pose,
-    b: &Body,
+    b: &impl Solid,
     pose_b: &Pose,
     answer: &Distance,
 ) -> Option<Matrix3<f64>> {
+    let [a, b] = [a.parts().get(usize::from(answer.parts[0]))?, b.parts().get(usize::from(answer.parts[1]))?];
     let n = answer.normal?;
     if !(answer.lower > 0.0) {
         return None;

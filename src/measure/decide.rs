@@ -167,7 +167,7 @@ impl Goal {
     pub(super) const NARROW: Self = Self { near: f64::NEG_INFINITY, far: f64::INFINITY };
 
     /// Which side of this distance.
-    fn compare(distance: f64) -> Self {
+    pub(super) fn compare(distance: f64) -> Self {
         Self { near: distance, far: distance }
     }
 
@@ -217,7 +217,10 @@ pub(super) fn settle(
 }
 
 /// A vector from a point y of B to a point x of A, its length and a bound of their errors.
-fn across((pose_a, x): (&Pose, &Vector3<f64>), (pose_b, y): (&Pose, &Vector3<f64>)) -> (Vector3<f64>, f64, f64) {
+pub(super) fn across(
+    (pose_a, x): (&Pose, &Vector3<f64>),
+    (pose_b, y): (&Pose, &Vector3<f64>),
+) -> (Vector3<f64>, f64, f64) {
     let offset = pose_a.translation() - pose_b.translation();
     let vector = offset + (pose_a.transform_direction(x) - pose_b.transform_direction(y));
     let size = offset.norm() + x.norm() + y.norm();
@@ -255,6 +258,8 @@ fn balls((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose)) -> Distance {
         normal,
         active_a: ActiveConstraints::default(),
         active_b: ActiveConstraints::default(),
+        parts: [0, 0],
+        tied: false,
         iterations: 0,
     }
 }

@@ -35,10 +35,15 @@ pub struct Distance {
     pub witness_b: Vector3<f64>,
     /// Unit normal from the second body to the first; none on overlap.
     pub normal: Option<Vector3<f64>>,
-    /// Constraints of the first body that the answer rests on, with multipliers: `-n = Σ λ_i ∇g_i`; none on overlap.
+    /// Constraints of the first body, or of its part, that the answer rests on, with multipliers: `-n = Σ λ_i ∇g_i`; none on overlap.
     pub active_a: ActiveConstraints,
-    /// Constraints of the second body that the answer rests on: `n = Σ λ_i ∇g_i`; none on overlap.
+    /// Constraints of the second body, or of its part, that the answer rests on: `n = Σ λ_i ∇g_i`; none on overlap.
     pub active_b: ActiveConstraints,
+    /// Which part of each solid the answer is about: positions in [`Solid::parts`], 0 for single bodies.
+    pub parts: [u16; 2],
+    /// Whether another pair of parts may be as near, their brackets meeting: normal, witnesses and gradients may then jump.
+    /// Never for single bodies, nor on overlap.
+    pub tied: bool,
     /// Iterations of all methods together.
     pub iterations: u32,
 }
@@ -55,6 +60,8 @@ impl Default for Distance {
             normal: None,
             active_a: ActiveConstraints::default(),
             active_b: ActiveConstraints::default(),
+            parts: [0, 0],
+            tied: false,
             iterations: 0,
         }
     }
@@ -446,6 +453,8 @@ impl<'a> Search<'a> {
             normal,
             active_a: self.active.0.reported(if normal.is_some() { unit } else { 0.0 }),
             active_b: self.active.1.reported(if normal.is_some() { unit } else { 0.0 }),
+            parts: [0, 0],
+            tied: false,
             iterations: self.iterations,
         }
     }
@@ -474,6 +483,8 @@ impl Proven {
             normal: self.normal(pose_a),
             active_a: ActiveConstraints::single(self.active[0], self.multipliers[0]),
             active_b: ActiveConstraints::single(self.active[1], self.multipliers[1]),
+            parts: [0, 0],
+            tied: false,
             iterations: self.rounds,
         }
     }

@@ -10,6 +10,7 @@ use super::options::Options;
 use super::pose::{Pose, ROTATION_ERROR};
 use super::single::{Objective, Single, solve_single};
 use super::twist::Twist;
+use super::union::{Least, least, status};
 use super::warm::{Hint, WarmStart};
 use crate::body::{Body, Solid};
 use crate::polynomial::gamma;
@@ -87,6 +88,9 @@ pub struct HalfSpaceDistance {
     pub upper: f64,
     /// The point of the body nearest to the half-space, or deepest in it.
     pub witness: Vector3<f64>,
+    /// Whether another part may lie as low, their brackets meeting: witness and gradient may then jump. Never for single
+    /// bodies.
+    pub tied: bool,
     /// Iterations.
     pub iterations: u32,
 }
@@ -133,30 +137,17 @@ pub fn distance_to_half_space(
     if let [body] = parts {
         return from_body(body, pose, half_space, tolerance, options, warm);
     }
-    let first = usize::from(warm.parts.0).min(parts.len() - 1);
-    let mut best = from_body(&parts[first], pose, half_space, tolerance, options, warm);
-    warm.parts = (first as u16, 0);
-    for (i, part) in parts.iter().enumerate().filter(|(i, _)| *i != first) {
-        let ball = part.circumscribed();
+    let bound = |(i, _): (usize, usize)| {
+        let ball = parts[i].circumscribed();
         let center = pose.transform_point(&ball.center);
-        let above = half_space.normal.dot(&center) - half_space.offset - ball.radius;
         let size = center.norm() + half_space.offset.abs() + ball.radius;
-        if above - 1e-12 * size > best.upper {
-            continue;
-        }
-        let mut hint = WarmStart::default();
-        let found = from_body(part, pose, half_space, tolerance, options, &mut hint);
-        let (lower, iterations) = (best.lower.min(found.lower), best.iterations + found.iterations);
-        if found.upper < best.upper {
-            best = found;
-            *warm = hint;
-            warm.parts = (i as u16, 0);
-        }
-        (best.lower, best.iterations) = (lower, iterations);
-    }
-    let narrow = best.upper - best.lower <= tolerance;
-    best.status = if narrow { Status::Converged } else { Status::BracketWide };
-    best
+        half_space.normal.dot(&center) - half_space.offset - ball.radius - 1e-12 * size
+    };
+    let found = least((parts.len(), 1), bound, f64::NEG_INFINITY, warm, |(i, _), _, hint| {
+        from_body(&parts[i], pose, half_space, tolerance, options, hint)
+    });
+    let Least { best, lower, tied, iterations } = found;
+    HalfSpaceDistance { status: status(best.upper - lower <= tolerance), lower, tied, iterations, ..best }
 }
 
 fn from_body(
@@ -182,6 +173,7 @@ fn from_body(
         lower,
         upper,
         witness: single.to_world(&found.point),
+        tied: false,
         iterations: found.iterations,
     }
 }

@@ -10,8 +10,9 @@ use super::pair::Pair;
 use super::pose::Pose;
 use super::programs::Level;
 use super::twist::Twist;
+use super::union;
 use super::warm::{Hint, WarmStart};
-use crate::body::{Body, MAX_CONSTRAINTS};
+use crate::body::{Body, MAX_CONSTRAINTS, Solid};
 use crate::optimize::minimise;
 use crate::polynomial::dispatch;
 use nalgebra::{SVector, Vector3};
@@ -39,6 +40,9 @@ pub struct LevelDistance {
     pub gradient_a: Twist,
     /// Derivative of d with respect to the pose of the second body: the same force the other way, about its own translation.
     pub gradient_b: Twist,
+    /// Whether another pair of parts may be as low, their brackets meeting: witness, multiplier and gradients may then jump.
+    /// Never for single bodies.
+    pub tied: bool,
     /// Iterations of all methods together.
     pub iterations: u32,
 }
@@ -58,9 +62,12 @@ impl LevelDistance {
 /// envelope theorem: at the minimiser x the gradients of both bodies balance, `g_a + μ g_b = 0`. `warm` is read and
 /// then replaced by the hint for the next query of this pair in this order.
 ///
+/// Of solids with several parts it is the least over the pairs of parts, the polynomial of a union being the least of those
+/// of its parts: one part of `a` and the part of `b` where it is lowest, to which witness, multiplier and `saturated` belong.
+///
 /// ```
 /// use nalgebra::Vector3;
-/// use sublevel::body::Body;
+/// use sublevel::body::{Body, Compound};
 /// use sublevel::measure::{Options, Pose, WarmStart, level_distance};
 ///
 /// let ball = Body::ball("ball", Vector3::zeros(), 1.0)?;
@@ -68,9 +75,25 @@ impl LevelDistance {
 /// let d = level_distance(&ball, &Pose::identity(), &ball, &apart, &Options::default(), &mut WarmStart::default());
 /// assert!((d.value() - 4.0).abs() < 1e-8); // |x|² is 4 at (2, 0, 0)
 /// assert!((d.gradient_b.linear - Vector3::new(4.0, 0.0, 0.0)).norm() < 1e-6); // and its slope there 4
+///
+/// let pair = Compound::new("pair", vec![ball.clone(), Body::ball("far", Vector3::new(0.0, 5.0, 0.0), 1.0)?])?;
+/// let e = level_distance(&pair, &Pose::identity(), &ball, &apart, &Options::default(), &mut WarmStart::default());
+/// assert!((e.value() - d.value()).abs() < 1e-8 && !e.tied);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn level_distance(
+    a: &impl Solid,
+    pose_a: &Pose,
+    b: &impl Solid,
+    pose_b: &Pose,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> LevelDistance {
+    union::level_distance(a, pose_a, b, pose_b, options, warm)
+}
+
+/// Level distance of one body over another.
+pub(super) fn between(
     a: &Body,
     pose_a: &Pose,
     b: &Body,
@@ -110,8 +133,9 @@ fn saturated(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, options: &Options
         witness: pose_a.transform_point(a.interior_point()),
         multiplier: 0.0,
         saturated: true,
-        gradient_a: Twist { linear: Vector3::zeros(), angular: Vector3::zeros() },
-        gradient_b: Twist { linear: Vector3::zeros(), angular: Vector3::zeros() },
+        gradient_a: Twist::ZERO,
+        gradient_b: Twist::ZERO,
+        tied: false,
         iterations: 0,
     })
 }
@@ -316,6 +340,7 @@ impl<'a> Search<'a> {
             saturated,
             gradient_a: Twist::of_force(-force, &witness, pose_a.translation()),
             gradient_b: Twist::of_force(force, &witness, pose_b.translation()),
+            tied: false,
             iterations: self.iterations,
         }
     }
@@ -340,6 +365,7 @@ impl LevelProven {
             saturated: false,
             gradient_a: Twist::of_force(-force, &witness, pose_a.translation()),
             gradient_b: Twist::of_force(force, &witness, pose_b.translation()),
+            tied: false,
             iterations: self.rounds,
         }
     }

@@ -6,6 +6,9 @@
 //! does not converge, an interior-point method ([`crate::optimize`]) does, from a start that is always feasible. Neither is
 //! trusted: an answer is accepted when its bracket, which holds for any trial point (`bracket`), is narrow enough. This room
 //! knows neither clock nor allocator nor threads.
+//!
+//! Solids of several parts, compounds, are measured by pairs of parts (`union`). Where another pair may be as near, answers
+//! are marked as `tied`: their normals and gradients may jump.
 
 mod active;
 mod batch;

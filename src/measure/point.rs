@@ -10,6 +10,7 @@ use super::options::Options;
 use super::pose::Pose;
 use super::single::{Objective, Single, Trial, solve_single};
 use super::twist::Twist;
+use super::union::{Least, least};
 use super::warm::{ActiveSet, Hint, WarmStart};
 use crate::body::{Body, Solid};
 use nalgebra::Vector3;
@@ -29,6 +30,9 @@ pub struct PointDistance {
     pub witness: Vector3<f64>,
     /// Unit normal from the body to the point, at the witness; none inside.
     pub normal: Option<Vector3<f64>>,
+    /// Whether another part may be as near, their brackets meeting: witness, normal and gradient may then jump. Never for
+    /// single bodies, nor inside.
+    pub tied: bool,
     /// Iterations.
     pub iterations: u32,
 }
@@ -90,7 +94,7 @@ pub fn distance_to_point(
     })
 }
 
-/// The nearest part, that of the last answer first.
+/// The nearest part.
 fn nearest(
     parts: &[Body],
     pose: &Pose,
@@ -99,26 +103,17 @@ fn nearest(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> PointDistance {
-    let first = usize::from(warm.parts.0).min(parts.len() - 1);
-    let mut best = Projection::new(&parts[first], pose).to(point, tolerance, options, warm);
-    warm.parts = (first as u16, 0);
-    for (i, part) in parts.iter().enumerate().filter(|(i, _)| *i != first) {
-        let ball = part.circumscribed();
-        let gap = (point - pose.transform_point(&ball.center)).norm() - ball.radius;
-        if gap * (1.0 - 1e-9) > best.upper {
-            continue;
-        }
-        let mut hint = WarmStart::default();
-        let found = Projection::new(part, pose).to(point, tolerance, options, &mut hint);
-        let (lower, iterations) = (best.lower.min(found.lower), best.iterations + found.iterations);
-        if found.upper < best.upper {
-            best = found;
-            *warm = hint;
-            warm.parts = (i as u16, 0);
-        }
-        (best.lower, best.iterations) = (lower, iterations);
-    }
-    best.into_distance(tolerance)
+    let bound = |(i, _): (usize, usize)| {
+        let ball = parts[i].circumscribed();
+        let center = pose.transform_point(&ball.center);
+        (point - center).norm() - ball.radius - 1e-12 * (point.norm() + center.norm() + ball.radius)
+    };
+    let found = least((parts.len(), 1), bound, 0.0, warm, |(i, _), _, hint| {
+        Projection::new(&parts[i], pose).to(point, tolerance, options, hint)
+    });
+    let Least { best, lower, tied, iterations } = found;
+    let answer = Projected { lower, iterations, ..best }.into_distance(tolerance);
+    PointDistance { tied: tied && !answer.inside, ..answer }
 }
 
 /// A body to project points on.
@@ -147,6 +142,7 @@ impl Projected {
             inside,
             witness: self.witness,
             normal: if inside { None } else { self.normal.try_normalize(0.0) },
+            tied: false,
             iterations: self.iterations,
         }
     }

@@ -25,7 +25,18 @@ pub struct Twist {
     pub angular: Vector3<f64>,
 }
 
+impl std::ops::Add for Twist {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { linear: self.linear + other.linear, angular: self.angular + other.angular }
+    }
+}
+
 impl Twist {
+    /// No change.
+    pub(super) const ZERO: Self = Self { linear: Vector3::new(0.0, 0.0, 0.0), angular: Vector3::new(0.0, 0.0, 0.0) };
+
     /// Derivative of a measure that grows with `force · δx` when the body's material point at `point` moves by δx; `center`
     /// is the translation of the body's pose, all in the world frame.
     pub(super) fn of_force(force: Vector3<f64>, point: &Vector3<f64>, center: &Vector3<f64>) -> Self {

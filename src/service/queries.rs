@@ -117,7 +117,7 @@ fn evaluate(
 fn one(a: &Placed, b: &Placed, measure: Measure, accuracy: Accuracy) -> Option<Outcome> {
     let level = |on: &Placed, of: &Placed| {
         let warm = &mut WarmStart::default();
-        let found = measure::level_distance(&on.body, &on.pose, &of.body, &of.pose, &accuracy.level, warm);
+        let found = measure::level_distance(&*on.body, &on.pose, &*of.body, &of.pose, &accuracy.level, warm);
         wire::level_distance(&found)
     };
     match measure {

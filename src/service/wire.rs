@@ -248,6 +248,7 @@ mod tests {
                 saturated: false,
                 gradient_a: none,
                 gradient_b: none,
+                tied: false,
                 iterations: 1,
             };
             let sent = level_distance(&found);

@@ -77,6 +77,7 @@ impl Along {
         // ∂s/∂Δ = n / (H_A(n) + H_B(-n)) = s n / (n·Δ).
         let slope = normal * (proven.upper / n.dot(&delta));
         GrowthDistance {
+            tied: false,
             status: Status::Converged,
             lower: proven.lower,
             upper: proven.upper,

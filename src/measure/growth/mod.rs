@@ -32,8 +32,9 @@ use super::pair::{Pair, Posed};
 use super::pose::{Pose, ROTATION_ERROR};
 use super::smooth::{Follow, SEEK_ROUNDS, Seek};
 use super::twist::Twist;
+use super::union;
 use super::warm::{Hint, WarmStart};
-use crate::body::Body;
+use crate::body::{Body, Solid};
 use crate::optimize::minimise;
 use crate::polynomial::{dispatch, gamma};
 use along::Along;
@@ -57,6 +58,9 @@ pub struct GrowthDistance {
     /// Derivatives with respect to the twists of the first and of the second body (1/m and 1/rad), one of them where they
     /// are not unique; none if the centres coincide.
     pub gradients: Option<[Twist; 2]>,
+    /// Whether another pair of parts may be as soon to touch, their brackets meeting: normal, witness and gradients may then jump.
+    /// Never for single bodies.
+    pub tied: bool,
     /// Iterations of all methods together.
     pub iterations: u32,
 }
@@ -75,9 +79,15 @@ impl GrowthDistance {
 /// The bracket is as narrow as `options` ask, relative to `max(1, s)`, or the status says that it is not. `warm` is read and
 /// then replaced by the hint for the next query of this pair.
 ///
+/// Of solids with several parts it is the least over the pairs of parts, each of which grows about its own centre: the
+/// smallest s at which a grown part of `a` touches a grown part of `b`. About one common centre it would not be a measure of
+/// proximity: a union is not star-shaped about any point in general, so it does not grow in place, may leave what it touched
+/// before, and would not tell overlap by s < 1. Parts that contain their centres only ever grow, so that here, too, s > 1 if
+/// and only if the solids are apart. It depends on how a solid is cut into parts.
+///
 /// ```
 /// use nalgebra::Vector3;
-/// use sublevel::body::Body;
+/// use sublevel::body::{Body, Compound};
 /// use sublevel::measure::{Options, Pose, WarmStart, growth_distance};
 ///
 /// let ball = Body::ball("ball", Vector3::zeros(), 0.5)?;
@@ -85,9 +95,25 @@ impl GrowthDistance {
 /// let pose = Pose::from_quaternion(Vector3::new(0.75, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0])?;
 /// let s = growth_distance(&crate_, &Pose::identity(), &ball, &pose, &Options::default(), &mut WarmStart::default());
 /// assert!((s.value() - 0.5).abs() < 1e-9); // half a crate and half a ball meet at x = 0.5
+///
+/// let row = Compound::new("row", vec![crate_, Body::ball("far", Vector3::new(-5.0, 0.0, 0.0), 0.5)?])?;
+/// let t = growth_distance(&row, &Pose::identity(), &ball, &pose, &Options::default(), &mut WarmStart::default());
+/// assert!((t.value() - s.value()).abs() < 1e-9 && !t.tied); // the crate is the first to touch
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn growth_distance(
+    a: &impl Solid,
+    pose_a: &Pose,
+    b: &impl Solid,
+    pose_b: &Pose,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> GrowthDistance {
+    union::growth_distance(a, pose_a, b, pose_b, options, warm)
+}
+
+/// Growth distance of two bodies.
+pub(super) fn between(
     a: &Body,
     pose_a: &Pose,
     b: &Body,
@@ -350,6 +376,7 @@ impl Search<'_> {
                     Twist::of_force(slope, &witness, pose_b.translation()),
                 ]
             }),
+            tied: false,
             iterations: self.iterations,
         }
     }

@@ -22,8 +22,9 @@ use super::pair::{Pair, Posed};
 use super::pose::Pose;
 use super::relation::Through;
 use super::smooth::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
+use super::union;
 use super::warm::{Hint, WarmStart};
-use crate::body::Body;
+use crate::body::{Body, Solid};
 use crate::polynomial::dispatch;
 use covering::{Cell, Covering, Direction};
 use farthest::Farthest;
@@ -47,7 +48,8 @@ pub struct Penetration {
     pub witness_a: Vector3<f64>,
     /// Point of the second body that is deepest in the first.
     pub witness_b: Vector3<f64>,
-    /// Whether a direction elsewhere was seen to be about as short: the direction may then jump.
+    /// Whether a direction elsewhere, or another pair of parts, was seen to be about as short: direction and witnesses may then
+    /// jump.
     pub tied: bool,
     /// Directions whose support points were computed.
     pub directions: u32,
@@ -69,10 +71,15 @@ impl Penetration {
 /// first. `upper` is as accurate as a distance wherever its direction is the best: the bracket is about the others.
 /// `warm` is read and then replaced by the hint for the next query of this pair.
 ///
+/// Of solids with several parts it is the shortest translation that takes every part of one off every part of the other. It is
+/// at least the depth of any pair of parts, and at most the length of a translation proven to separate them all; the
+/// shortest such is a local search's, so that where parts interlock the bracket may stay wide, and `directions` counts those
+/// of all pairs.
+///
 /// ```
-/// use nalgebra::Vector3;
-/// use sublevel::body::Body;
-/// use sublevel::measure::{Options, Pose, WarmStart, penetration};
+/// use nalgebra::{UnitQuaternion, Vector3};
+/// use sublevel::body::{Body, Compound};
+/// use sublevel::measure::{Decision, Options, Pose, WarmStart, overlap, penetration};
 ///
 /// let a = Body::cuboid("a", Vector3::new(1.0, 1.0, 1.0))?;
 /// let b = Body::ball("b", Vector3::zeros(), 0.5)?;
@@ -80,9 +87,29 @@ impl Penetration {
 /// let depth = penetration(&a, &Pose::identity(), &b, &pose, &Options::default(), &mut WarmStart::default());
 /// assert!((depth.value() - 0.25).abs() < 1e-8 && depth.lower > 0.2497);
 /// assert!((depth.direction.unwrap() + Vector3::x()).norm() < 1e-6); // a has to move back
+///
+/// // Between two plates the ball has to leave sideways, not through one of them.
+/// let plate = |x: f64| Body::cuboid("plate", Vector3::new(0.1, 2.0, 2.0))?.moved(&UnitQuaternion::identity(), &Vector3::new(x, 0.0, 0.0));
+/// let slot = Compound::new("slot", vec![plate(0.55)?, plate(-0.55)?])?;
+/// let high = Pose::from_quaternion(Vector3::new(0.0, 0.0, 1.9), [0.0, 0.0, 0.0, 1.0])?;
+/// let depth = penetration(&b, &high, &slot, &Pose::identity(), &Options::default(), &mut WarmStart::default());
+/// let apart = Pose::from_quaternion(high.translation() + depth.direction.unwrap() * depth.upper, [0.0, 0.0, 0.0, 1.0])?;
+/// assert_ne!(overlap(&b, &apart, &slot, &Pose::identity(), &Options::default(), &mut WarmStart::default()), Decision::Yes);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn penetration(
+    a: &impl Solid,
+    pose_a: &Pose,
+    b: &impl Solid,
+    pose_b: &Pose,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> Penetration {
+    union::penetration(a, pose_a, b, pose_b, options, warm)
+}
+
+/// Penetration depth of two bodies.
+pub(super) fn between(
     a: &Body,
     pose_a: &Pose,
     b: &Body,

@@ -18,8 +18,9 @@ use super::pose::Pose;
 use super::relation::Through;
 use super::smooth::{Follow, Proven};
 use super::twist::Twist;
+use super::union;
 use super::warm::{Hint, WarmStart};
-use crate::body::Body;
+use crate::body::{Body, Solid};
 use crate::polynomial::dispatch;
 use nalgebra::Vector3;
 
@@ -44,8 +45,8 @@ pub struct SignedDistance {
     /// Whether the bracket holds 0: the bodies may just touch. Smooth bodies have the same derivative on both sides; where
     /// edges or corners touch, the derivative in overlap may be another one.
     pub at_contact: bool,
-    /// Whether another direction out of an overlap was seen to be about as short: value and bracket hold, but normal and
-    /// gradients may jump.
+    /// Whether another direction out of an overlap was seen to be about as short, or another pair of parts may be as near: value
+    /// and bracket hold, but normal, witnesses and gradients may jump.
     pub tied: bool,
     /// Iterations of all methods together.
     pub iterations: u32,
@@ -65,9 +66,13 @@ impl SignedDistance {
 /// direction is a better one within that bracket. `warm` is read and then replaced by the hint for the next query of this
 /// pair; it carries through contact.
 ///
+/// Of solids with several parts it is their distance, or minus the depth of their overlap ([`super::penetration`]), which is
+/// known from a local search: in overlap the bracket may stay wide. There the gradients are those of all the pairs of parts
+/// that hold the solids back, and the witnesses belong to the one that does so most.
+///
 /// ```
 /// use nalgebra::Vector3;
-/// use sublevel::body::Body;
+/// use sublevel::body::{Body, Compound};
 /// use sublevel::measure::{Options, Pose, WarmStart, signed_distance};
 ///
 /// let ball = Body::ball("ball", Vector3::zeros(), 0.5)?;
@@ -79,9 +84,26 @@ impl SignedDistance {
 ///     assert!((answer.value() - (x - 1.5)).abs() < 1e-8);
 ///     assert!((answer.gradients.unwrap()[0].linear - Vector3::x()).norm() < 1e-6);
 /// }
+///
+/// let row = Compound::new("row", vec![crate_, Body::ball("far", Vector3::new(-5.0, 0.0, 0.0), 0.5)?])?;
+/// let pose = Pose::from_quaternion(Vector3::new(1.25, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0])?;
+/// let answer = signed_distance(&ball, &pose, &row, &Pose::identity(), &Options::default(), &mut warm);
+/// assert!((answer.value() + 0.25).abs() < 1e-8 && !answer.tied);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn signed_distance(
+    a: &impl Solid,
+    pose_a: &Pose,
+    b: &impl Solid,
+    pose_b: &Pose,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> SignedDistance {
+    union::signed_distance(a, pose_a, b, pose_b, options, warm)
+}
+
+/// Signed distance of two bodies.
+pub(super) fn between(
     a: &Body,
     pose_a: &Pose,
     b: &Body,

@@ -1,0 +1,100 @@
+//! The least answer of all parts, or pairs of parts.
+
+use crate::measure::distance::Distance;
+use crate::measure::growth::GrowthDistance;
+use crate::measure::half_space::HalfSpaceDistance;
+use crate::measure::level::LevelDistance;
+use crate::measure::penetration::Penetration;
+use crate::measure::point::Projected;
+use crate::measure::signed::SignedDistance;
+use crate::measure::warm::WarmStart;
+
+/// What can be least: an answer about one or two bodies with its bracket.
+pub(in crate::measure) trait Answer {
+    fn bracket(&self) -> [f64; 2];
+    fn iterations(&self) -> u32;
+}
+
+macro_rules! answer {
+    ($($measure:ty),*) => {$(
+        impl Answer for $measure {
+            fn bracket(&self) -> [f64; 2] {
+                [self.lower, self.upper]
+            }
+
+            fn iterations(&self) -> u32 {
+                self.iterations
+            }
+        }
+    )*};
+}
+
+answer!(Distance, GrowthDistance, HalfSpaceDistance, LevelDistance, Projected, SignedDistance);
+
+/// A depth counts as a negative distance.
+impl Answer for Penetration {
+    fn bracket(&self) -> [f64; 2] {
+        [-self.upper, -self.lower]
+    }
+
+    fn iterations(&self) -> u32 {
+        self.iterations
+    }
+}
+
+/// The least of the answers, by their upper bounds, and what the others say of it.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::measure) struct Least<T> {
+    pub(in crate::measure) best: T,
+    /// Proven lower bound of all.
+    pub(in crate::measure) lower: f64,
+    /// Whether the bracket of another pair meets that of the best: it may be the least as well.
+    pub(in crate::measure) tied: bool,
+    /// Of all pairs together.
+    pub(in crate::measure) iterations: u32,
+}
+
+/// Solves for the pairs of so many parts one by one, but for those whose `bound`, a cheap lower bound, exceeds the best upper bound;
+/// ends early with an upper bound of at most `enough`. The bracket of the minimum is the minimum of the brackets.
+///
+/// The pair of the last answer comes first, or that of the lowest bound: the smaller the first answer, the fewer of the
+/// others need be looked at. `warm` is left with the hint and the parts of the least. `solve` is told the best upper bound: beyond it an answer does not count.
+pub(in crate::measure) fn least<T: Answer>(
+    (len_a, len_b): (usize, usize),
+    bound: impl Fn((usize, usize)) -> f64,
+    enough: f64,
+    warm: &mut WarmStart,
+    mut solve: impl FnMut((usize, usize), f64, &mut WarmStart) -> T,
+) -> Least<T> {
+    let pairs = || (0..len_a).flat_map(|i| (0..len_b).map(move |j| (i, j)));
+    let mut first = (usize::from(warm.parts.0), usize::from(warm.parts.1));
+    if warm.is_cold() || first.0 >= len_a || first.1 >= len_b {
+        first = pairs().min_by(|p, q| bound(*p).total_cmp(&bound(*q))).unwrap_or((0, 0));
+        *warm = WarmStart::default();
+    }
+    let mut best = solve(first, f64::INFINITY, warm);
+    warm.parts = (first.0 as u16, first.1 as u16);
+    let (mut iterations, mut rival) = (best.iterations(), f64::INFINITY);
+    for pair in pairs().filter(|pair| *pair != first) {
+        let [lower, upper] = best.bracket();
+        if upper <= enough {
+            break;
+        }
+        if bound(pair) > upper {
+            continue;
+        }
+        let mut hint = WarmStart::default();
+        let found = solve(pair, upper, &mut hint);
+        iterations += found.iterations();
+        if found.bracket()[1] < upper {
+            rival = rival.min(lower);
+            best = found;
+            *warm = hint;
+            warm.parts = (pair.0 as u16, pair.1 as u16);
+        } else {
+            rival = rival.min(found.bracket()[0]);
+        }
+    }
+    let [lower, upper] = best.bracket();
+    Least { best, lower: lower.min(rival), tied: rival <= upper, iterations }
+}
