@@ -10,7 +10,9 @@ mod big;
 pub(crate) mod distance;
 pub(crate) mod growth;
 pub(crate) mod level;
+pub(crate) mod signed;
 mod solid;
 
 pub(crate) use distance::distance;
 pub(crate) use level::level_distance;
+pub(crate) use signed::signed_distance;
