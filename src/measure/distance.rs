@@ -9,6 +9,7 @@ use super::options::Options;
 use super::pair::{Pair, Posed};
 use super::pose::Pose;
 use super::programs::{Closest, Level, points};
+use super::sharp::SharpPair;
 use super::smooth::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
 use super::twist::Twist;
 use super::union;
@@ -146,17 +147,18 @@ pub(super) fn between(
     search.answer()
 }
 
-/// The point of B nearest to A in the query frame and the constraints that are active there; none on overlap.
+/// The point of B nearest to A in the query frame and the constraints that are active there; on overlap a common point, and
+/// none.
 pub(super) fn nearest(
     pair: &Pair<'_>,
     options: &Options<'_>,
     iterations: &mut u32,
-) -> Option<(Vector3<f64>, Active, Active)> {
+) -> (Vector3<f64>, Option<(Active, Active)>) {
     let mut search = Search::new(pair, &Goal::NARROW, options);
     search.iterations = *iterations;
     search.run(&Hint::Cold);
     *iterations = search.iterations;
-    (search.upper > 0.0).then_some((search.y, search.active.0, search.active.1))
+    (search.y, (search.upper > 0.0).then_some(search.active))
 }
 
 /// A solve in progress: the best bracket so far and where it was attained, in query units.
@@ -172,6 +174,8 @@ struct Search<'a> {
     /// Normal of the best lower bound.
     n: Vector3<f64>,
     active: (Active, Active),
+    /// Where Newton's method was started last, and where it ended.
+    tried: [Option<DistanceNewton>; 2],
     iterations: u32,
 }
 
@@ -180,6 +184,9 @@ const NEAR: f64 = 1e-3;
 
 /// Below this one it has none that rounding leaves.
 const NEAREST: f64 = 1e-7;
+
+/// Values above this one are too steep to start from.
+const STEEP: f64 = 1e3;
 
 impl<'a> Search<'a> {
     fn new(pair: &'a Pair<'a>, goal: &Goal, options: &'a Options<'a>) -> Self {
@@ -196,6 +203,7 @@ impl<'a> Search<'a> {
             y,
             n,
             active: (Active::default(), Active::default()),
+            tried: [None; 2],
             iterations: 0,
         }
     }
@@ -252,6 +260,31 @@ impl<'a> Search<'a> {
         // Where both are elongated or edged, first order from the deepest point is not close enough.
         if !self.ended() {
             self.closest(NEAREST);
+        }
+        if !self.ended() {
+            self.sharpen();
+        }
+    }
+
+    /// Goes on in twice the precision where rounding keeps the bracket wide.
+    fn sharpen(&mut self) {
+        let pair = self.pair;
+        let sharp = SharpPair::new(pair);
+        for start in self.tried.into_iter().rev().flatten() {
+            let left = self.options.max_iterations() - self.iterations.min(self.options.max_iterations());
+            let steps = sharp.distance(&start, left, |found| {
+                if self.raise(found.lower, &found.n) {
+                    self.active = found.active;
+                }
+                if found.upper < self.upper {
+                    (self.upper, self.x, self.y) = (found.upper, found.x, found.y);
+                }
+                self.done() || self.options.stopped()
+            });
+            self.iterations += steps;
+            if self.ended() {
+                return;
+            }
         }
     }
 
@@ -311,11 +344,13 @@ impl<'a> Search<'a> {
     /// The point deepest in both bodies: inside both, it proves overlap; else its multipliers show the normal.
     fn contact(&mut self) {
         let pair = self.pair;
-        let start = (self.x + self.y) * 0.5;
         let depth = |v: &Vector3<f64>| {
             let values = (0..pair.a.len()).map(|i| pair.a.jet(i, v).value);
             values.chain((0..pair.b.len()).map(|i| pair.b.jet(i, v).value)).fold(f64::MIN, f64::max)
         };
+        // Far outside a small body its values would hide all else.
+        let starts = [(self.x + self.y) * 0.5, self.x, self.y];
+        let start = if depth(&starts[0]) < STEEP { starts[0] } else { least_of(starts, depth) };
         let first = depth(&start) + 0.5;
         let mut v = SVector::from([start.x, start.y, start.z, first]);
         let mut attempt = 1e-1;
@@ -365,6 +400,7 @@ impl<'a> Search<'a> {
             self.done() || self.options.exhausted(0)
         });
         self.iterations += steps;
+        self.tried = [Some(DistanceNewton { x, y, distance, n, a, b }), Some(newton)];
     }
 
     /// Improves the lower bound with multipliers for unit normals, trying each body's idea of the normal.
@@ -487,6 +523,11 @@ pub(super) fn split(pair: &Pair<'_>, rows: &[f64], factor: f64) -> (Multipliers,
         *to = from * factor;
     }
     (of_a, of_b)
+}
+
+/// Of three points the one of the least value.
+fn least_of(points: [Vector3<f64>; 3], value: impl Fn(&Vector3<f64>) -> f64) -> Vector3<f64> {
+    points.into_iter().min_by(|p, q| value(p).total_cmp(&value(q))).unwrap_or(points[0])
 }
 
 fn gradient(body: &Posed<'_>, v: &Vector3<f64>, multipliers: &Multipliers) -> Vector3<f64> {

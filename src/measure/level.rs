@@ -9,6 +9,7 @@ use super::options::Options;
 use super::pair::Pair;
 use super::pose::Pose;
 use super::programs::Level;
+use super::sharp::SharpPair;
 use super::twist::Twist;
 use super::warm::{Hint, WarmStart};
 use crate::body::{Body, MAX_CONSTRAINTS};
@@ -119,6 +120,9 @@ fn saturated(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, options: &Options
 /// Most changes of scale; each is by a thousand, and values reach about 1e12 at degree 8.
 const MAX_ROUNDS: u32 = 6;
 
+/// Starts of values above this, relative to the least known, are too steep.
+const STEEP: f64 = 1e3;
+
 /// A solve in progress: the best bracket so far and where it was attained, in query units.
 struct Search<'a> {
     pair: &'a Pair<'a>,
@@ -129,6 +133,8 @@ struct Search<'a> {
     active: (Active, Active),
     /// Those of the best lower bound, those of A of sum 1.
     multipliers: (Multipliers, Multipliers),
+    /// Where Newton's method was started last, and where it ended.
+    tried: [Option<LevelNewton>; 2],
     iterations: u32,
 }
 
@@ -142,6 +148,7 @@ impl<'a> Search<'a> {
             x: pair.b.interior,
             active: (Active::default(), Active::default()),
             multipliers: ([0.0; MAX_CONSTRAINTS], [0.0; MAX_CONSTRAINTS]),
+            tried: [None; 2],
             iterations: 0,
         }
     }
@@ -162,16 +169,55 @@ impl<'a> Search<'a> {
             self.interior_point();
         }
         if !self.done() && !self.exhausted() {
+            self.sharpen();
+        }
+        if !self.done() && !self.exhausted() {
             self.start_nearest();
+        }
+        if !self.done() && !self.exhausted() {
+            self.sharpen();
         }
     }
 
-    /// Newton's method from the point of B nearest to A: where A is tiny, its values rise so steeply that nothing else shows
-    /// the way, and near and low are about the same.
+    /// Starts again from the point of B nearest to A, or a common one: where A is tiny or thin, its values rise so steeply that
+    /// nothing else shows the way, and near and low are about the same.
     fn start_nearest(&mut self) {
-        let Some((x, a, b)) = distance::nearest(self.pair, self.options, &mut self.iterations) else { return };
+        let (x, active) = distance::nearest(self.pair, self.options, &mut self.iterations);
         self.attain(&x);
-        self.newton(x, a, b);
+        if let Some((a, b)) = active {
+            self.newton(x, a, b);
+        }
+        if !self.done() && !self.exhausted() {
+            let (pair, bound) = (self.pair, STEEP * self.upper.abs().max(1.0));
+            let mut inset = 0.1;
+            while inset > 1e-12 && !(value(pair, &inner(pair, &self.x, inset)) < bound) {
+                inset *= 0.1;
+            }
+            self.descend(inset);
+        }
+    }
+
+    /// Goes on in twice the precision where rounding keeps the bracket wide.
+    fn sharpen(&mut self) {
+        let pair = self.pair;
+        let sharp = SharpPair::new(pair);
+        for start in self.tried.into_iter().rev().flatten() {
+            let left = self.options.max_iterations() - self.iterations.min(self.options.max_iterations());
+            let steps = sharp.level(&start, left, |found| {
+                if found.lower > self.lower {
+                    let (a, b) = &found.active;
+                    (self.lower, self.multipliers) = (found.lower, normalized(&a.multipliers(), &b.multipliers()));
+                }
+                if found.upper < self.upper {
+                    (self.upper, self.x, self.active) = (found.upper, found.x, found.active);
+                }
+                self.done() || self.options.stopped()
+            });
+            self.iterations += steps;
+            if self.done() || self.exhausted() {
+                return;
+            }
+        }
     }
 
     fn exhausted(&self) -> bool {
@@ -182,7 +228,6 @@ impl<'a> Search<'a> {
     /// constraints. Values of A fall by orders of magnitude on the way in: each round scales them anew.
     fn interior_point(&mut self) {
         let pair = self.pair;
-        let value = |x: &Vector3<f64>| (0..pair.a.len()).map(|i| pair.a.jet(i, x).value).fold(f64::MIN, f64::max);
         self.attain(&pair.b.interior);
         self.attain(&pair.a.interior);
         if pair.b.contains(&pair.a.interior) {
@@ -194,12 +239,17 @@ impl<'a> Search<'a> {
                 return;
             }
         }
-        let mut inset = 0.1;
+        self.descend(0.1);
+    }
+
+    /// Rounds of the interior-point method from points that far inside B.
+    fn descend(&mut self, mut inset: f64) {
+        let pair = self.pair;
         for _ in 0..MAX_ROUNDS {
             // Strictly inside, by less each round: the scale must not rise again.
-            let start = self.x + (pair.b.interior - self.x) * inset;
+            let start = inner(pair, &self.x, inset);
             inset *= 0.1;
-            let first = value(&start);
+            let first = value(pair, &start);
             let scale = first.abs().max(1.0);
             let mut v = SVector::from([start.x, start.y, start.z, first / scale + 0.5]);
             let mut attempt = 1e-1;
@@ -208,7 +258,7 @@ impl<'a> Search<'a> {
             minimise(&program, &mut v, 1.0, |iterate| {
                 self.iterations += 1;
                 let x = iterate.v.xyz();
-                if scale > 1.0 && value(&x) < 1e-3 * scale && self.attain(&x) && self.upper < 1e-2 * scale {
+                if scale > 1.0 && value(pair, &x) < 1e-3 * scale && self.attain(&x) && self.upper < 1e-2 * scale {
                     rescale = true;
                     return ControlFlow::Break(());
                 }
@@ -262,6 +312,7 @@ impl<'a> Search<'a> {
             },
         );
         self.iterations += steps;
+        self.tried = [Some(LevelNewton { x, a, b }), Some(newton)];
     }
 
     /// Takes the lower bound of a trial point and multipliers if it is the best so far.
@@ -319,6 +370,16 @@ impl<'a> Search<'a> {
             iterations: self.iterations,
         }
     }
+}
+
+/// The largest constraint of A.
+fn value(pair: &Pair<'_>, x: &Vector3<f64>) -> f64 {
+    (0..pair.a.len()).map(|i| pair.a.jet(i, x).value).fold(f64::MIN, f64::max)
+}
+
+/// The point that part of the way from x to the interior point of B.
+fn inner(pair: &Pair<'_>, x: &Vector3<f64>, inset: f64) -> Vector3<f64> {
+    x + (pair.b.interior - x) * inset
 }
 
 /// Multipliers scaled so that those of A have the sum 1.
