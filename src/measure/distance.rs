@@ -174,7 +174,7 @@ struct Search<'a> {
     /// Normal of the best lower bound.
     n: Vector3<f64>,
     active: (Active, Active),
-    /// Where Newton's method was started last, and where it ended.
+    /// Where the lower bound was found, and where Newton's method ended last.
     tried: [Option<DistanceNewton>; 2],
     iterations: u32,
 }
@@ -264,13 +264,17 @@ impl<'a> Search<'a> {
         if !self.ended() {
             self.sharpen();
         }
+        // From points this near, values are no longer too steep to start from.
+        if !self.ended() && self.lower == 0.0 {
+            self.contact();
+        }
     }
 
     /// Goes on in twice the precision where rounding keeps the bracket wide.
     fn sharpen(&mut self) {
         let pair = self.pair;
         let sharp = SharpPair::new(pair);
-        for start in self.tried.into_iter().rev().flatten() {
+        for start in self.tried.into_iter().flatten() {
             let left = self.options.max_iterations() - self.iterations.min(self.options.max_iterations());
             let steps = sharp.distance(&start, left, |found| {
                 if self.raise(found.lower, &found.n) {
@@ -394,13 +398,17 @@ impl<'a> Search<'a> {
             }
             let (of_a, of_b) = (at.a.multipliers(), at.b.multipliers());
             let lower = distance_lower(self.pair, &at.x, &at.y, &at.n, &of_a, &of_b);
-            if self.raise(lower, &at.n) | self.attain(&at.x, &at.y) {
+            let raised = self.raise(lower, &at.n);
+            if raised {
+                self.tried[0] = Some(*at);
+            }
+            if raised | self.attain(&at.x, &at.y) {
                 self.active = (at.a, at.b);
             }
             self.done() || self.options.exhausted(0)
         });
         self.iterations += steps;
-        self.tried = [Some(DistanceNewton { x, y, distance, n, a, b }), Some(newton)];
+        self.tried[1] = Some(newton);
     }
 
     /// Improves the lower bound with multipliers for unit normals, trying each body's idea of the normal.
@@ -412,7 +420,11 @@ impl<'a> Search<'a> {
         }
         let (of_a, of_b) = (of_a.map(|m| m / lu), of_b.map(|m| m / lw));
         for n in [-u / lu, w / lw] {
-            self.raise(distance_lower(self.pair, x, y, &n, &of_a, &of_b), &n);
+            if self.raise(distance_lower(self.pair, x, y, &n, &of_a, &of_b), &n) {
+                let (a, b) =
+                    (Active::from_forces(&self.pair.a, x, &of_a), Active::from_forces(&self.pair.b, y, &of_b));
+                self.tried[0] = Some(DistanceNewton { x: *x, y: *y, distance: n.dot(&(x - y)), n, a, b });
+            }
         }
     }
 

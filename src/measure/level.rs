@@ -133,8 +133,10 @@ struct Search<'a> {
     active: (Active, Active),
     /// Those of the best lower bound, those of A of sum 1.
     multipliers: (Multipliers, Multipliers),
-    /// Where Newton's method was started last, and where it ended.
-    tried: [Option<LevelNewton>; 2],
+    /// Where that bound was found.
+    proven: Vector3<f64>,
+    /// Where Newton's method ended last.
+    ended: Option<LevelNewton>,
     iterations: u32,
 }
 
@@ -148,7 +150,8 @@ impl<'a> Search<'a> {
             x: pair.b.interior,
             active: (Active::default(), Active::default()),
             multipliers: ([0.0; MAX_CONSTRAINTS], [0.0; MAX_CONSTRAINTS]),
-            tried: [None; 2],
+            proven: pair.b.interior,
+            ended: None,
             iterations: 0,
         }
     }
@@ -201,7 +204,13 @@ impl<'a> Search<'a> {
     fn sharpen(&mut self) {
         let pair = self.pair;
         let sharp = SharpPair::new(pair);
-        for start in self.tried.into_iter().rev().flatten() {
+        let (of_a, of_b) = &self.multipliers;
+        let (a, b) = (
+            Active::from_forces(&pair.a, &self.proven, of_a),
+            Active::from_forces(&pair.b, &self.proven, of_b),
+        );
+        let proven = LevelNewton { x: self.proven, a, b };
+        for start in [Some(proven), self.ended].into_iter().flatten().filter(|start| start.a.len > 0) {
             let left = self.options.max_iterations() - self.iterations.min(self.options.max_iterations());
             let steps = sharp.level(&start, left, |found| {
                 if found.lower > self.lower {
@@ -312,7 +321,7 @@ impl<'a> Search<'a> {
             },
         );
         self.iterations += steps;
-        self.tried = [Some(LevelNewton { x, a, b }), Some(newton)];
+        self.ended = Some(newton);
     }
 
     /// Takes the lower bound of a trial point and multipliers if it is the best so far.
@@ -320,6 +329,7 @@ impl<'a> Search<'a> {
         let lower = level_lower(self.pair, x, of_a, of_b);
         if lower > self.lower {
             (self.lower, self.multipliers) = (lower, normalized(of_a, of_b));
+            self.proven = *x;
         }
     }
 

@@ -62,6 +62,16 @@ impl Active {
         active
     }
 
+    /// The constraints whose multipliers times gradients at v are largest: those of thin bodies have steep ones.
+    pub(super) fn from_forces(body: &Posed<'_>, v: &Vector3<f64>, multipliers: &Multipliers) -> Self {
+        let mut forces = *multipliers;
+        let carried = forces.iter_mut().enumerate().take(body.len()).filter(|(_, force)| **force > 0.0);
+        carried.for_each(|(i, force)| *force *= body.jet(i, v).gradient.norm());
+        let mut active = Self::from_multipliers(&forces);
+        (0..active.len).for_each(|k| active.multiplier[k] = multipliers[active.index[k]]);
+        active
+    }
+
     /// The only constraint, if there is but one.
     pub(super) fn single(&self) -> Option<u8> {
         (self.len == 1).then_some(self.index[0] as u8)

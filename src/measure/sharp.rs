@@ -265,7 +265,12 @@ impl<'a> SharpPair<'a> {
             of_a.add(&step_[7..7 + la], damping);
             of_b.add(&step_[7 + la..size], damping);
             if length < 1e-6 * self.small || step % 4 == 0 {
-                if d.is_positive() && accept(&self.distance_bracket(&x, &y, &of_a, &of_b)) {
+                let found = if d.is_positive() {
+                    Some(self.distance_bracket(&x, &y, &of_a, &of_b))
+                } else {
+                    self.common(&x, &y, &of_a, &of_b)
+                };
+                if found.is_some_and(|found| accept(&found)) {
                     return step;
                 }
                 let changed = of_a.revise(self.a.posed, &x, 1.0) | of_b.revise(self.b.posed, &y, 1.0);
@@ -275,6 +280,15 @@ impl<'a> SharpPair<'a> {
             }
         }
         MAX_STEPS.min(limit)
+    }
+
+    /// The answer 0 if halfway between the points lies in both bodies.
+    fn common(&self, x: &Twos, y: &Twos, of_a: &SharpActive, of_b: &SharpActive) -> Option<SharpDistance> {
+        let middle = times(&plus(x, y), Two::from(0.5));
+        let both = self.a.value_upper(&middle) <= 1.0 && self.b.value_upper(&middle) <= 1.0;
+        let v = doubles(&middle);
+        let active = (of_a.set, of_b.set);
+        both.then_some(SharpDistance { lower: 0.0, upper: 0.0, x: v, y: v, n: Vector3::x(), active })
     }
 
     fn distance_bracket(&self, x: &Twos, y: &Twos, of_a: &SharpActive, of_b: &SharpActive) -> SharpDistance {
