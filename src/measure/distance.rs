@@ -421,8 +421,7 @@ impl<'a> Search<'a> {
         let (of_a, of_b) = (of_a.map(|m| m / lu), of_b.map(|m| m / lw));
         for n in [-u / lu, w / lw] {
             if self.raise(distance_lower(self.pair, x, y, &n, &of_a, &of_b), &n) {
-                let (a, b) =
-                    (Active::from_forces(&self.pair.a, x, &of_a), Active::from_forces(&self.pair.b, y, &of_b));
+                let (a, b) = (Active::from_forces(&self.pair.a, x, &of_a), Active::from_forces(&self.pair.b, y, &of_b));
                 self.tried[0] = Some(DistanceNewton { x: *x, y: *y, distance: n.dot(&(x - y)), n, a, b });
             }
         }

@@ -135,6 +135,8 @@ struct Search<'a> {
     multipliers: (Multipliers, Multipliers),
     /// Where that bound was found.
     proven: Vector3<f64>,
+    /// Whether its multipliers are those of Newton's method: a bracket holds others to its root only.
+    refined: bool,
     /// Where Newton's method ended last.
     ended: Option<LevelNewton>,
     iterations: u32,
@@ -151,13 +153,18 @@ impl<'a> Search<'a> {
             active: (Active::default(), Active::default()),
             multipliers: ([0.0; MAX_CONSTRAINTS], [0.0; MAX_CONSTRAINTS]),
             proven: pair.b.interior,
+            refined: false,
             ended: None,
             iterations: 0,
         }
     }
 
     fn done(&self) -> bool {
-        self.upper.is_finite() && self.upper - self.lower <= self.options.accuracy() * self.upper.abs().max(1.0)
+        self.within(self.options.accuracy())
+    }
+
+    fn within(&self, accuracy: f64) -> bool {
+        self.upper.is_finite() && self.upper - self.lower <= accuracy * self.upper.abs().max(1.0)
     }
 
     fn run(&mut self, hint: &Hint) {
@@ -172,13 +179,16 @@ impl<'a> Search<'a> {
             self.interior_point();
         }
         if !self.done() && !self.exhausted() {
-            self.sharpen();
+            self.sharpen(self.options.accuracy());
         }
         if !self.done() && !self.exhausted() {
             self.start_nearest();
         }
         if !self.done() && !self.exhausted() {
-            self.sharpen();
+            self.sharpen(self.options.accuracy());
+        }
+        if !self.refined && !self.saturated() && !self.exhausted() {
+            self.sharpen(1e-3 * self.options.accuracy());
         }
     }
 
@@ -201,14 +211,12 @@ impl<'a> Search<'a> {
     }
 
     /// Goes on in twice the precision where rounding keeps the bracket wide.
-    fn sharpen(&mut self) {
+    fn sharpen(&mut self, accuracy: f64) {
         let pair = self.pair;
         let sharp = SharpPair::new(pair);
         let (of_a, of_b) = &self.multipliers;
-        let (a, b) = (
-            Active::from_forces(&pair.a, &self.proven, of_a),
-            Active::from_forces(&pair.b, &self.proven, of_b),
-        );
+        let (a, b) =
+            (Active::from_forces(&pair.a, &self.proven, of_a), Active::from_forces(&pair.b, &self.proven, of_b));
         let proven = LevelNewton { x: self.proven, a, b };
         for start in [Some(proven), self.ended].into_iter().flatten().filter(|start| start.a.len > 0) {
             let left = self.options.max_iterations() - self.iterations.min(self.options.max_iterations());
@@ -216,14 +224,15 @@ impl<'a> Search<'a> {
                 if found.lower > self.lower {
                     let (a, b) = &found.active;
                     (self.lower, self.multipliers) = (found.lower, normalized(&a.multipliers(), &b.multipliers()));
+                    self.refined = true;
                 }
                 if found.upper < self.upper {
                     (self.upper, self.x, self.active) = (found.upper, found.x, found.active);
                 }
-                self.done() || self.options.stopped()
+                self.within(accuracy) || self.options.stopped()
             });
             self.iterations += steps;
-            if self.done() || self.exhausted() {
+            if self.within(accuracy) || self.exhausted() {
                 return;
             }
         }
@@ -313,7 +322,7 @@ impl<'a> Search<'a> {
             self.pair,
             |steps| options.exhausted(before + steps),
             |at| {
-                self.bound(&at.x, &at.a.multipliers(), &at.b.multipliers());
+                self.refined |= self.bound(&at.x, &at.a.multipliers(), &at.b.multipliers());
                 if self.attain(&at.x) {
                     self.active = (at.a, at.b);
                 }
@@ -325,12 +334,14 @@ impl<'a> Search<'a> {
     }
 
     /// Takes the lower bound of a trial point and multipliers if it is the best so far.
-    fn bound(&mut self, x: &Vector3<f64>, of_a: &Multipliers, of_b: &Multipliers) {
+    fn bound(&mut self, x: &Vector3<f64>, of_a: &Multipliers, of_b: &Multipliers) -> bool {
         let lower = level_lower(self.pair, x, of_a, of_b);
-        if lower > self.lower {
+        let better = lower > self.lower;
+        if better {
             (self.lower, self.multipliers) = (lower, normalized(of_a, of_b));
-            self.proven = *x;
+            (self.proven, self.refined) = (*x, false);
         }
+        better
     }
 
     /// Pulls a trial point into B and takes it if A's polynomial is the smallest there so far.

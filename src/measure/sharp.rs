@@ -265,12 +265,8 @@ impl<'a> SharpPair<'a> {
             of_a.add(&step_[7..7 + la], damping);
             of_b.add(&step_[7 + la..size], damping);
             if length < 1e-6 * self.small || step % 4 == 0 {
-                let found = if d.is_positive() {
-                    Some(self.distance_bracket(&x, &y, &of_a, &of_b))
-                } else {
-                    self.common(&x, &y, &of_a, &of_b)
-                };
-                if found.is_some_and(|found| accept(&found)) {
+                let common = if d.is_positive() { None } else { self.common(&x, &y, &of_a, &of_b) };
+                if accept(&common.unwrap_or_else(|| self.distance_bracket(&x, &y, &of_a, &of_b))) {
                     return step;
                 }
                 let changed = of_a.revise(self.a.posed, &x, 1.0) | of_b.revise(self.b.posed, &y, 1.0);

@@ -36,6 +36,11 @@ impl Truth {
         big(answer.lower) <= self.upper && self.lower <= big(answer.upper)
     }
 
+    /// Whether the answer's bracket contains all that the distance may be.
+    pub(crate) fn all_inside(&self, answer: &Distance) -> bool {
+        big(answer.lower) <= self.lower && self.upper <= big(answer.upper)
+    }
+
     pub(crate) fn normal(&self) -> Vector3<f64> {
         doubles(&self.normal)
     }
