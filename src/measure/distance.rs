@@ -261,7 +261,9 @@ impl<'a> Search<'a> {
         if !self.ended() {
             self.closest(NEAREST);
         }
-        if !self.ended() {
+        // A bracket that holds 0 but is not sure of contact is as wide as rounding left it.
+        let unsure = self.narrow() && !self.decided() && !self.options.exhausted(self.iterations);
+        if !self.ended() || unsure {
             self.sharpen();
         }
         // From points this near, values are no longer too steep to start from.
@@ -283,10 +285,10 @@ impl<'a> Search<'a> {
                 if found.upper < self.upper {
                     (self.upper, self.x, self.y) = (found.upper, found.x, found.y);
                 }
-                self.done() || self.options.stopped()
+                self.decided() || self.options.stopped()
             });
             self.iterations += steps;
-            if self.ended() {
+            if self.decided() || self.options.exhausted(self.iterations) {
                 return;
             }
         }
