@@ -194,7 +194,7 @@ fn family_20_signed_gradients() {
                 tied += 1;
                 continue;
             }
-            let truth = reference::signed_distance(draw.a, &draw.pose_a, draw.b, &draw.pose_b, &answer)
+            let truth = reference::signed::signed_distance(draw.a, &draw.pose_a, draw.b, &draw.pose_b, &answer)
                 .unwrap_or_else(|| panic!("{}: no reference", label()));
             let found = answer.gradients.unwrap_or_else(|| panic!("{}: no gradients", label()));
             tally.add(deviation(&found, &truth.gradient, draw.bodies()), label);

@@ -15,4 +15,3 @@ mod solid;
 
 pub(crate) use distance::distance;
 pub(crate) use level::level_distance;
-pub(crate) use signed::signed_distance;
