@@ -10,6 +10,7 @@ use super::pair::{Pair, Posed};
 use super::pose::Pose;
 use super::programs::{Closest, Level, points};
 use super::relation::Apart;
+use super::sharp::SharpPair;
 use super::smooth::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
 use super::twist::Twist;
 use super::union;
@@ -154,17 +155,18 @@ pub(super) fn between(
     search.answer()
 }
 
-/// The point of B nearest to A in the query frame and the constraints that are active there; none on overlap.
+/// The point of B nearest to A in the query frame and the constraints that are active there; on overlap a common point, and
+/// none.
 pub(super) fn nearest(
     pair: &Pair<'_>,
     options: &Options<'_>,
     iterations: &mut u32,
-) -> Option<(Vector3<f64>, Active, Active)> {
+) -> (Vector3<f64>, Option<(Active, Active)>) {
     let mut search = Search::new(pair, &Goal::NARROW, options);
     search.iterations = *iterations;
     search.run(&Hint::Cold);
     *iterations = search.iterations;
-    (search.upper > 0.0).then_some((search.y, search.active.0, search.active.1))
+    (search.y, (search.upper > 0.0).then_some(search.active))
 }
 
 /// A solve in progress: the best bracket so far and where it was attained, in query units.
@@ -180,6 +182,8 @@ struct Search<'a> {
     /// Normal of the best lower bound.
     n: Vector3<f64>,
     active: (Active, Active),
+    /// Where the lower bound was found, and where Newton's method ended last.
+    tried: [Option<DistanceNewton>; 2],
     iterations: u32,
 }
 
@@ -188,6 +192,9 @@ const NEAR: f64 = 1e-3;
 
 /// Below this one it has none that rounding leaves.
 const NEAREST: f64 = 1e-7;
+
+/// Values above this one are too steep to start from.
+const STEEP: f64 = 1e3;
 
 impl<'a> Search<'a> {
     fn new(pair: &'a Pair<'a>, goal: &Goal, options: &'a Options<'a>) -> Self {
@@ -204,6 +211,7 @@ impl<'a> Search<'a> {
             y,
             n,
             active: (Active::default(), Active::default()),
+            tried: [None; 2],
             iterations: 0,
         }
     }
@@ -260,6 +268,37 @@ impl<'a> Search<'a> {
         // Where both are elongated or edged, first order from the deepest point is not close enough.
         if !self.ended() {
             self.closest(NEAREST);
+        }
+        // A bracket that holds 0 but is not sure of contact is as wide as rounding left it.
+        let unsure = self.narrow() && !self.decided() && !self.options.exhausted(self.iterations);
+        if !self.ended() || unsure {
+            self.sharpen();
+        }
+        // From points this near, values are no longer too steep to start from.
+        if !self.ended() && self.lower == 0.0 {
+            self.contact();
+        }
+    }
+
+    /// Goes on in twice the precision where rounding keeps the bracket wide.
+    fn sharpen(&mut self) {
+        let pair = self.pair;
+        let sharp = SharpPair::new(pair);
+        for start in self.tried.into_iter().flatten() {
+            let left = self.options.max_iterations() - self.iterations.min(self.options.max_iterations());
+            let steps = sharp.distance(&start, left, |found| {
+                if self.raise(found.lower, &found.n) {
+                    self.active = found.active;
+                }
+                if found.upper < self.upper {
+                    (self.upper, self.x, self.y) = (found.upper, found.x, found.y);
+                }
+                self.decided() || self.options.stopped()
+            });
+            self.iterations += steps;
+            if self.decided() || self.options.exhausted(self.iterations) {
+                return;
+            }
         }
     }
 
@@ -319,11 +358,13 @@ impl<'a> Search<'a> {
     /// The point deepest in both bodies: inside both, it proves overlap; else its multipliers show the normal.
     fn contact(&mut self) {
         let pair = self.pair;
-        let start = (self.x + self.y) * 0.5;
         let depth = |v: &Vector3<f64>| {
             let values = (0..pair.a.len()).map(|i| pair.a.jet(i, v).value);
             values.chain((0..pair.b.len()).map(|i| pair.b.jet(i, v).value)).fold(f64::MIN, f64::max)
         };
+        // Far outside a small body its values would hide all else.
+        let starts = [(self.x + self.y) * 0.5, self.x, self.y];
+        let start = if depth(&starts[0]) < STEEP { starts[0] } else { least_of(starts, depth) };
         let first = depth(&start) + 0.5;
         let mut v = SVector::from([start.x, start.y, start.z, first]);
         let mut attempt = 1e-1;
@@ -367,12 +408,17 @@ impl<'a> Search<'a> {
             }
             let (of_a, of_b) = (at.a.multipliers(), at.b.multipliers());
             let lower = distance_lower(self.pair, &at.x, &at.y, &at.n, &of_a, &of_b);
-            if self.raise(lower, &at.n) | self.attain(&at.x, &at.y) {
+            let raised = self.raise(lower, &at.n);
+            if raised {
+                self.tried[0] = Some(*at);
+            }
+            if raised | self.attain(&at.x, &at.y) {
                 self.active = (at.a, at.b);
             }
             self.done() || self.options.exhausted(0)
         });
         self.iterations += steps;
+        self.tried[1] = Some(newton);
     }
 
     /// Improves the lower bound with multipliers for unit normals, trying each body's idea of the normal.
@@ -384,7 +430,10 @@ impl<'a> Search<'a> {
         }
         let (of_a, of_b) = (of_a.map(|m| m / lu), of_b.map(|m| m / lw));
         for n in [-u / lu, w / lw] {
-            self.raise(distance_lower(self.pair, x, y, &n, &of_a, &of_b), &n);
+            if self.raise(distance_lower(self.pair, x, y, &n, &of_a, &of_b), &n) {
+                let (a, b) = (Active::from_forces(&self.pair.a, x, &of_a), Active::from_forces(&self.pair.b, y, &of_b));
+                self.tried[0] = Some(DistanceNewton { x: *x, y: *y, distance: n.dot(&(x - y)), n, a, b });
+            }
         }
     }
 
@@ -498,6 +547,11 @@ pub(super) fn split(pair: &Pair<'_>, rows: &[f64], factor: f64) -> (Multipliers,
         *to = from * factor;
     }
     (of_a, of_b)
+}
+
+/// Of three points the one of the least value.
+fn least_of(points: [Vector3<f64>; 3], value: impl Fn(&Vector3<f64>) -> f64) -> Vector3<f64> {
+    points.into_iter().min_by(|p, q| value(p).total_cmp(&value(q))).unwrap_or(points[0])
 }
 
 fn gradient(body: &Posed<'_>, v: &Vector3<f64>, multipliers: &Multipliers) -> Vector3<f64> {

@@ -9,6 +9,7 @@ use super::options::Options;
 use super::pair::Pair;
 use super::pose::Pose;
 use super::programs::Level;
+use super::sharp::SharpPair;
 use super::twist::Twist;
 use super::union;
 use super::warm::{Hint, WarmStart};
@@ -143,6 +144,9 @@ fn saturated(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, options: &Options
 /// Most changes of scale; each is by a thousand, and values reach about 1e12 at degree 8.
 const MAX_ROUNDS: u32 = 6;
 
+/// Starts of values above this, relative to the least known, are too steep.
+const STEEP: f64 = 1e3;
+
 /// A solve in progress: the best bracket so far and where it was attained, in query units.
 struct Search<'a> {
     pair: &'a Pair<'a>,
@@ -153,6 +157,12 @@ struct Search<'a> {
     active: (Active, Active),
     /// Those of the best lower bound, those of A of sum 1.
     multipliers: (Multipliers, Multipliers),
+    /// Where that bound was found.
+    proven: Vector3<f64>,
+    /// Whether its multipliers are those of Newton's method: a bracket holds others to its root only.
+    refined: bool,
+    /// Where Newton's method ended last.
+    ended: Option<LevelNewton>,
     iterations: u32,
 }
 
@@ -166,12 +176,19 @@ impl<'a> Search<'a> {
             x: pair.b.interior,
             active: (Active::default(), Active::default()),
             multipliers: ([0.0; MAX_CONSTRAINTS], [0.0; MAX_CONSTRAINTS]),
+            proven: pair.b.interior,
+            refined: false,
+            ended: None,
             iterations: 0,
         }
     }
 
     fn done(&self) -> bool {
-        self.upper.is_finite() && self.upper - self.lower <= self.options.accuracy() * self.upper.abs().max(1.0)
+        self.within(self.options.accuracy())
+    }
+
+    fn within(&self, accuracy: f64) -> bool {
+        self.upper.is_finite() && self.upper - self.lower <= accuracy * self.upper.abs().max(1.0)
     }
 
     fn run(&mut self, hint: &Hint) {
@@ -186,16 +203,63 @@ impl<'a> Search<'a> {
             self.interior_point();
         }
         if !self.done() && !self.exhausted() {
+            self.sharpen(self.options.accuracy());
+        }
+        if !self.done() && !self.exhausted() {
             self.start_nearest();
+        }
+        if !self.done() && !self.exhausted() {
+            self.sharpen(self.options.accuracy());
+        }
+        if !self.refined && !self.saturated() && !self.exhausted() {
+            self.sharpen(1e-3 * self.options.accuracy());
         }
     }
 
-    /// Newton's method from the point of B nearest to A: where A is tiny, its values rise so steeply that nothing else shows
-    /// the way, and near and low are about the same.
+    /// Starts again from the point of B nearest to A, or a common one: where A is tiny or thin, its values rise so steeply that
+    /// nothing else shows the way, and near and low are about the same.
     fn start_nearest(&mut self) {
-        let Some((x, a, b)) = distance::nearest(self.pair, self.options, &mut self.iterations) else { return };
+        let (x, active) = distance::nearest(self.pair, self.options, &mut self.iterations);
         self.attain(&x);
-        self.newton(x, a, b);
+        if let Some((a, b)) = active {
+            self.newton(x, a, b);
+        }
+        if !self.done() && !self.exhausted() {
+            let (pair, bound) = (self.pair, STEEP * self.upper.abs().max(1.0));
+            let mut inset = 0.1;
+            while inset > 1e-12 && !(value(pair, &inner(pair, &self.x, inset)) < bound) {
+                inset *= 0.1;
+            }
+            self.descend(inset);
+        }
+    }
+
+    /// Goes on in twice the precision where rounding keeps the bracket wide.
+    fn sharpen(&mut self, accuracy: f64) {
+        let pair = self.pair;
+        let sharp = SharpPair::new(pair);
+        let (of_a, of_b) = &self.multipliers;
+        let (a, b) =
+            (Active::from_forces(&pair.a, &self.proven, of_a), Active::from_forces(&pair.b, &self.proven, of_b));
+        let proven = LevelNewton { x: self.proven, a, b };
+        for start in [Some(proven), self.ended].into_iter().flatten().filter(|start| start.a.len > 0) {
+            let left = self.options.max_iterations() - self.iterations.min(self.options.max_iterations());
+            let steps = sharp.level(&start, left, |found| {
+                if found.lower > self.lower {
+                    let (a, b) = &found.active;
+                    (self.lower, self.multipliers) = (found.lower, normalized(&a.multipliers(), &b.multipliers()));
+                    self.refined = true;
+                }
+                if found.upper < self.upper {
+                    (self.upper, self.x, self.active) = (found.upper, found.x, found.active);
+                }
+                self.within(accuracy) || self.options.stopped()
+            });
+            self.iterations += steps;
+            if self.within(accuracy) || self.exhausted() {
+                return;
+            }
+        }
     }
 
     fn exhausted(&self) -> bool {
@@ -206,7 +270,6 @@ impl<'a> Search<'a> {
     /// constraints. Values of A fall by orders of magnitude on the way in: each round scales them anew.
     fn interior_point(&mut self) {
         let pair = self.pair;
-        let value = |x: &Vector3<f64>| (0..pair.a.len()).map(|i| pair.a.jet(i, x).value).fold(f64::MIN, f64::max);
         self.attain(&pair.b.interior);
         self.attain(&pair.a.interior);
         if pair.b.contains(&pair.a.interior) {
@@ -218,12 +281,17 @@ impl<'a> Search<'a> {
                 return;
             }
         }
-        let mut inset = 0.1;
+        self.descend(0.1);
+    }
+
+    /// Rounds of the interior-point method from points that far inside B.
+    fn descend(&mut self, mut inset: f64) {
+        let pair = self.pair;
         for _ in 0..MAX_ROUNDS {
             // Strictly inside, by less each round: the scale must not rise again.
-            let start = self.x + (pair.b.interior - self.x) * inset;
+            let start = inner(pair, &self.x, inset);
             inset *= 0.1;
-            let first = value(&start);
+            let first = value(pair, &start);
             let scale = first.abs().max(1.0);
             let mut v = SVector::from([start.x, start.y, start.z, first / scale + 0.5]);
             let mut attempt = 1e-1;
@@ -232,7 +300,7 @@ impl<'a> Search<'a> {
             minimise(&program, &mut v, 1.0, |iterate| {
                 self.iterations += 1;
                 let x = iterate.v.xyz();
-                if scale > 1.0 && value(&x) < 1e-3 * scale && self.attain(&x) && self.upper < 1e-2 * scale {
+                if scale > 1.0 && value(pair, &x) < 1e-3 * scale && self.attain(&x) && self.upper < 1e-2 * scale {
                     rescale = true;
                     return ControlFlow::Break(());
                 }
@@ -278,7 +346,7 @@ impl<'a> Search<'a> {
             self.pair,
             |steps| options.exhausted(before + steps),
             |at| {
-                self.bound(&at.x, &at.a.multipliers(), &at.b.multipliers());
+                self.refined |= self.bound(&at.x, &at.a.multipliers(), &at.b.multipliers());
                 if self.attain(&at.x) {
                     self.active = (at.a, at.b);
                 }
@@ -286,14 +354,18 @@ impl<'a> Search<'a> {
             },
         );
         self.iterations += steps;
+        self.ended = Some(newton);
     }
 
     /// Takes the lower bound of a trial point and multipliers if it is the best so far.
-    fn bound(&mut self, x: &Vector3<f64>, of_a: &Multipliers, of_b: &Multipliers) {
+    fn bound(&mut self, x: &Vector3<f64>, of_a: &Multipliers, of_b: &Multipliers) -> bool {
         let lower = level_lower(self.pair, x, of_a, of_b);
-        if lower > self.lower {
+        let better = lower > self.lower;
+        if better {
             (self.lower, self.multipliers) = (lower, normalized(of_a, of_b));
+            (self.proven, self.refined) = (*x, false);
         }
+        better
     }
 
     /// Pulls a trial point into B and takes it if A's polynomial is the smallest there so far.
@@ -344,6 +416,16 @@ impl<'a> Search<'a> {
             iterations: self.iterations,
         }
     }
+}
+
+/// The largest constraint of A.
+fn value(pair: &Pair<'_>, x: &Vector3<f64>) -> f64 {
+    (0..pair.a.len()).map(|i| pair.a.jet(i, x).value).fold(f64::MIN, f64::max)
+}
+
+/// The point that part of the way from x to the interior point of B.
+fn inner(pair: &Pair<'_>, x: &Vector3<f64>, inset: f64) -> Vector3<f64> {
+    x + (pair.b.interior - x) * inset
 }
 
 /// Multipliers scaled so that those of A have the sum 1.

@@ -62,6 +62,16 @@ impl Active {
         active
     }
 
+    /// The constraints whose multipliers times gradients at v are largest: those of thin bodies have steep ones.
+    pub(super) fn from_forces(body: &Posed<'_>, v: &Vector3<f64>, multipliers: &Multipliers) -> Self {
+        let mut forces = *multipliers;
+        let carried = forces.iter_mut().enumerate().take(body.len()).filter(|(_, force)| **force > 0.0);
+        carried.for_each(|(i, force)| *force *= body.jet(i, v).gradient.norm());
+        let mut active = Self::from_multipliers(&forces);
+        (0..active.len).for_each(|k| active.multiplier[k] = multipliers[active.index[k]]);
+        active
+    }
+
     /// The only constraint, if there is but one.
     pub(super) fn single(&self) -> Option<u8> {
         (self.len == 1).then_some(self.index[0] as u8)
@@ -145,21 +155,17 @@ impl Active {
 }
 
 /// Values, gradients and weighted sums of the active constraints of one body at one point.
-struct At {
-    value: [f64; MAX_ACTIVE],
-    gradient: [Vector3<f64>; MAX_ACTIVE],
-    sum: Vector3<f64>,
-    hessian: Matrix3<f64>,
+#[derive(Default)]
+pub(super) struct At {
+    pub(super) value: [f64; MAX_ACTIVE],
+    pub(super) gradient: [Vector3<f64>; MAX_ACTIVE],
+    pub(super) sum: Vector3<f64>,
+    pub(super) hessian: Matrix3<f64>,
 }
 
 impl At {
     fn new(body: &Posed<'_>, active: &Active, v: &Vector3<f64>) -> Self {
-        let mut at = Self {
-            value: [0.0; MAX_ACTIVE],
-            gradient: [Vector3::zeros(); MAX_ACTIVE],
-            sum: Vector3::zeros(),
-            hessian: Matrix3::zeros(),
-        };
+        let mut at = Self::default();
         for (k, (i, multiplier)) in active.iter().enumerate() {
             let jet = body.jet(i, v);
             at.value[k] = jet.value;
@@ -239,13 +245,12 @@ impl DistanceNewton {
         (a, b)
     }
 
-    /// One Newton step; its length, or none if the system is singular.
-    fn step(&mut self, (a, b): &(At, At)) -> Option<f64> {
-        let size = 7 + self.a.len + self.b.len;
+    /// Newton's matrix, from what is known at the iterate and the counts of active constraints; column `7 + la + lb` is left to
+    /// the residuals.
+    pub(super) fn matrix(distance: f64, a: &At, b: &At, la: usize, lb: usize) -> Augmented {
         let mut m: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
-        let scaled = a.hessian * self.distance;
+        let scaled = a.hessian * distance;
         let turned = a.hessian * a.sum;
-        let offset = self.x - self.y + a.sum * self.distance;
         for i in 0..3 {
             for j in 0..3 {
                 m[i][j] = scaled[(i, j)] + f64::from(u8::from(i == j));
@@ -254,21 +259,33 @@ impl DistanceNewton {
             }
             m[i][3 + i] = -1.0;
             m[i][6] = a.sum[i];
-            m[i][size] = -offset[i];
-            m[3 + i][size] = -(a.sum[i] + b.sum[i]);
             m[6][i] = turned[i];
-            for k in 0..self.a.len {
-                m[i][7 + k] = self.distance * a.gradient[k][i];
+            for k in 0..la {
+                m[i][7 + k] = distance * a.gradient[k][i];
                 m[3 + i][7 + k] = a.gradient[k][i];
                 m[7 + k][i] = a.gradient[k][i];
             }
-            for k in 0..self.b.len {
-                m[3 + i][7 + self.a.len + k] = b.gradient[k][i];
-                m[7 + self.a.len + k][3 + i] = b.gradient[k][i];
+            for k in 0..lb {
+                m[3 + i][7 + la + k] = b.gradient[k][i];
+                m[7 + la + k][3 + i] = b.gradient[k][i];
             }
         }
-        for k in 0..self.a.len {
+        for k in 0..la {
             m[6][7 + k] = a.sum.dot(&a.gradient[k]);
+        }
+        m
+    }
+
+    /// One Newton step; its length, or none if the system is singular.
+    fn step(&mut self, (a, b): &(At, At)) -> Option<f64> {
+        let size = 7 + self.a.len + self.b.len;
+        let mut m = Self::matrix(self.distance, a, b, self.a.len, self.b.len);
+        let offset = self.x - self.y + a.sum * self.distance;
+        for i in 0..3 {
+            m[i][size] = -offset[i];
+            m[3 + i][size] = -(a.sum[i] + b.sum[i]);
+        }
+        for k in 0..self.a.len {
             m[7 + k][size] = 1.0 - a.value[k];
         }
         for k in 0..self.b.len {
@@ -355,31 +372,41 @@ impl LevelNewton {
         a.value[..self.a.len].iter().sum::<f64>() / self.a.len as f64
     }
 
-    fn step(&mut self, pair: &Pair<'_>, s: &mut f64) -> Option<f64> {
-        let a = At::new(&pair.a, &self.a, &self.x);
-        let b = At::new(&pair.b, &self.b, &self.x);
-        let size = 4 + self.a.len + self.b.len;
+    /// Newton's matrix, as that of the distance; column `4 + la + lb` is left to the residuals.
+    pub(super) fn matrix(a: &At, b: &At, la: usize, lb: usize) -> Augmented {
         let hessian = a.hessian + b.hessian;
         let mut m: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
         for i in 0..3 {
             for j in 0..3 {
                 m[i][j] = hessian[(i, j)];
             }
-            m[i][size] = -(a.sum[i] + b.sum[i]);
-            for k in 0..self.a.len {
+            for k in 0..la {
                 m[i][4 + k] = a.gradient[k][i];
                 m[4 + k][i] = a.gradient[k][i];
             }
-            for k in 0..self.b.len {
-                m[i][4 + self.a.len + k] = b.gradient[k][i];
-                m[4 + self.a.len + k][i] = b.gradient[k][i];
+            for k in 0..lb {
+                m[i][4 + la + k] = b.gradient[k][i];
+                m[4 + la + k][i] = b.gradient[k][i];
             }
+        }
+        for k in 0..la {
+            m[3][4 + k] = 1.0;
+            m[4 + k][3] = -1.0;
+        }
+        m
+    }
+
+    fn step(&mut self, pair: &Pair<'_>, s: &mut f64) -> Option<f64> {
+        let a = At::new(&pair.a, &self.a, &self.x);
+        let b = At::new(&pair.b, &self.b, &self.x);
+        let size = 4 + self.a.len + self.b.len;
+        let mut m = Self::matrix(&a, &b, self.a.len, self.b.len);
+        for i in 0..3 {
+            m[i][size] = -(a.sum[i] + b.sum[i]);
         }
         m[3][size] = 1.0;
         for k in 0..self.a.len {
-            m[3][4 + k] = 1.0;
             m[3][size] -= self.a.multiplier[k];
-            m[4 + k][3] = -1.0;
             m[4 + k][size] = *s - a.value[k];
         }
         for k in 0..self.b.len {

@@ -175,6 +175,7 @@ pub(super) struct Pair<'a> {
     rotation: Matrix3<f64>,
     translation: Vector3<f64>,
     pose_a: Pose,
+    pose_b: Pose,
 }
 
 impl<'a> Pair<'a> {
@@ -229,6 +230,7 @@ impl<'a> Pair<'a> {
             rotation,
             translation,
             pose_a: *pose_a,
+            pose_b: *pose_b,
         }
     }
 
@@ -240,6 +242,16 @@ impl<'a> Pair<'a> {
     /// Metres per unit of the query frame.
     pub(super) fn unit(&self) -> f64 {
         self.unit
+    }
+
+    /// Origin of the query frame in the first body's frame, metres.
+    pub(super) fn origin(&self) -> &Vector3<f64> {
+        &self.origin
+    }
+
+    /// The poses of both bodies.
+    pub(super) fn poses(&self) -> (&Pose, &Pose) {
+        (&self.pose_a, &self.pose_b)
     }
 
     /// Width in query units of a bracket of this accuracy: see [`super::Options::with_accuracy`].

@@ -64,7 +64,9 @@ pub(crate) fn verdict(
     let truth = reference::distance(a, pose_a, b, pose_b, answer);
     let label = format!("{label}: {}-{} {answer:?}, truth {:e}", a.name(), b.name(), truth.value());
     let sharp = 1e-16 * small(a, b);
-    assert!(truth.width() <= sharp, "the reference is wide, {:e}, {label}", truth.width());
+    // Between flush faces the reference may stay wide: then all of it has to lie inside, which proves as much.
+    let sharp = truth.width() <= sharp || truth.all_inside(answer);
+    assert!(sharp, "the reference is wide, {:e}, {label}", truth.width());
     assert!(truth.inside(answer), "the bracket misses the truth, {label}");
     truth
 }

@@ -11,7 +11,10 @@ mod reference;
 mod truth;
 
 mod contact;
+mod depth;
+mod gradients;
 mod limits;
+mod motion;
 mod placement;
 mod scale;
 #[cfg(feature = "fit")]

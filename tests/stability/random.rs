@@ -3,6 +3,11 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use sublevel::measure::Pose;
 
+/// Number of random queries: `few`, or 1e5 where `SUBLEVEL_LONG` is set.
+pub(crate) fn draws(few: u64) -> u64 {
+    if std::env::var_os("SUBLEVEL_LONG").is_some() { 100_000 } else { few }
+}
+
 /// SplitMix64.
 pub(crate) struct Seeded(pub u64);
 

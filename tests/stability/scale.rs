@@ -9,7 +9,6 @@ use sublevel::measure::{Options, Pose, Status, WarmStart, level_distance};
 
 /// Size ratio: ratio 1e1..1e6; error <= 1e-9 s_small + 64 eps s_large (circumradii).
 #[test]
-#[ignore = "open: errors reach 80 epsilon of the larger body at ratios of 1e4 and 1e5, 64 are asked"]
 fn family_09_size_ratio() {
     for seed in 0..240 {
         let mut random = Seeded(90_000 + seed);
@@ -113,7 +112,7 @@ fn family_11_units() {
 
 /// Needles and plates: aspect 1e2..1e5, slab 1e-3, needle against slab.
 #[test]
-#[ignore = "open: level distances over needles of aspect 1e3 end 2e-9 wide, 1e-9 is asked"]
+#[ignore = "open: the 200-bit reference stays wide for a box needle of aspect 1e5 lying on an ellipsoid; all answers converge"]
 fn family_12_needles_and_plates() {
     for k in 2..=5 {
         let aspect = 10_f64.powi(k);
@@ -155,7 +154,6 @@ fn family_12_needles_and_plates() {
 
 /// The fitted bodies take part in 9 to 12 with a small partner.
 #[test]
-#[ignore = "open: the level distance of a needle over a far larger body may find no lower bound"]
 fn fitted_bodies_against_small_and_thin() {
     for (i, body) in fitted().iter().enumerate() {
         for (j, other) in [e(1e-3, 1e-3, 1e-3), q(8, 1e-4, 1e-4, 0.3), b(1.0, 1.0, 1e-3)].iter().enumerate() {

@@ -36,6 +36,11 @@ impl Truth {
         big(answer.lower) <= self.upper && self.lower <= big(answer.upper)
     }
 
+    /// Whether the answer's bracket contains all that the distance may be.
+    pub(crate) fn all_inside(&self, answer: &Distance) -> bool {
+        big(answer.lower) <= self.lower && self.upper <= big(answer.upper)
+    }
+
     pub(crate) fn normal(&self) -> Vector3<f64> {
         doubles(&self.normal)
     }
@@ -91,13 +96,10 @@ pub(crate) fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer:
     }
     let scale = big(unit);
     let (x, y) = (scaled(&best.x, &scale), scaled(&best.y, &scale));
-    let arm = sub(&y, &sub(&vector(pose_b.translation()), &vector(origin)));
-    let minus = |v: &Vector| -> Vector { v.clone().map(|c| -c) };
-    let parts = [best.n.clone(), cross(&x, &best.n), minus(&best.n), minus(&cross(&arm, &best.n))];
     Truth {
         lower: best.lower * &scale,
         upper: best.upper * &scale,
-        gradient: std::array::from_fn(|i| double(&parts[i / 3][i % 3])),
+        gradient: twists(&x, &y, &best.n, pose_a, pose_b),
         x,
         y,
         normal: best.n,
@@ -122,7 +124,7 @@ fn at(body: &Solid<'_>, index: &[usize], multiplier: &[Big], v: &Vector) -> At {
     At { jets, sum, hessian }
 }
 
-/// Newton's method on `x - y = D n`, `n + Σ λ ∇g = 0`, `n - Σ μ ∇h = 0`, `n·n = 1`, `g = 1`, `h = 1`.
+/// Newton's method until an iterate is taken, or nothing is gained any more.
 fn newton(
     one: &Solid<'_>,
     two: &Solid<'_>,
@@ -132,23 +134,65 @@ fn newton(
     small: f64,
     best: &mut Best,
 ) {
-    let (mut x, mut y, mut n) = (x.clone(), y.clone(), n.clone());
-    let mut d = dot(&n, &sub(&x, &y));
-    let mut l: Vec<Big> = p.multiplier.iter().map(|&m| big(m)).collect();
-    let mut m: Vec<Big> = q.multiplier.iter().map(|&m| big(m)).collect();
-    let (la, lb) = (l.len(), m.len());
-    let size = 10 + la + lb;
+    let mut iterate = Iterate::new(p, q, x, y, n);
     let mut stalled = 0;
     for step in 1..200 {
-        let (a, b) = (at(one, &p.index, &l, &x), at(two, &q.index, &m, &y));
+        let length = iterate.step(one, two, small);
+        if !length.is_finite() {
+            return;
+        }
+        if length < 1e-12 || step % 8 == 0 {
+            let before = &best.upper - &best.lower;
+            let Iterate { x, y, n, l, m, .. } = &iterate;
+            bracket(one, two, (p, l), (q, m), (x, y, n), best);
+            let width = &best.upper - &best.lower;
+            stalled = if width < before || length >= 1e-12 { 0 } else { stalled + 1 };
+            if width <= big(TARGET) || stalled > 3 || length < 1e-57 {
+                return;
+            }
+        }
+    }
+}
+
+/// An iterate of Newton's method on `x - y = D n`, `n + Σ λ ∇g = 0`, `n - Σ μ ∇h = 0`, `n·n = 1`, `g = 1`, `h = 1`; D has
+/// either sign.
+pub(super) struct Iterate<'a> {
+    index: (&'a [usize], &'a [usize]),
+    pub(super) x: Vector,
+    pub(super) y: Vector,
+    pub(super) n: Vector,
+    pub(super) d: Big,
+    pub(super) l: Vec<Big>,
+    pub(super) m: Vec<Big>,
+}
+
+impl<'a> Iterate<'a> {
+    pub(super) fn new(p: &'a Trial, q: &'a Trial, x: &Vector, y: &Vector, n: &Vector) -> Self {
+        Self {
+            index: (&p.index, &q.index),
+            x: x.clone(),
+            y: y.clone(),
+            n: n.clone(),
+            d: dot(n, &sub(x, y)),
+            l: p.multiplier.iter().map(|&m| big(m)).collect(),
+            m: q.multiplier.iter().map(|&m| big(m)).collect(),
+        }
+    }
+
+    /// One step; its length, NaN where the system is singular.
+    pub(super) fn step(&mut self, one: &Solid<'_>, two: &Solid<'_>, small: f64) -> f64 {
+        let Self { x, y, n, d, l, m, .. } = self;
+        let (la, lb) = (l.len(), m.len());
+        let size = 10 + la + lb;
+        let (a, b) = (at(one, self.index.0, l, x), at(two, self.index.1, m, y));
         let mut k = vec![vec![big(0.0); size]; size];
         let mut r = vec![big(0.0); size];
         for i in 0..3 {
             k[i][i] = big(1.0);
             k[i][3 + i] = big(-1.0);
-            k[i][6 + i] = -&d;
+            k[i][6 + i] = -&*d;
             k[i][9] = -&n[i];
-            r[i] = &d * &n[i] - &x[i] + &y[i];
+            r[i] = &*d * &n[i] - &x[i] + &y[i];
             k[3 + i][6 + i] = big(1.0);
             k[6 + i][6 + i] = big(1.0);
             for j in 0..3 {
@@ -167,7 +211,7 @@ fn newton(
             r[6 + i] = &b.sum[i] - &n[i];
             k[9][6 + i] = &n[i] * big(2.0);
         }
-        r[9] = big(1.0) - dot(&n, &n);
+        r[9] = big(1.0) - dot(n, n);
         for (j, jet) in a.jets.iter().chain(&b.jets).enumerate() {
             r[10 + j] = big(1.0) - &jet.value;
         }
@@ -176,26 +220,26 @@ fn newton(
         let (dx, dy, dn) = (part(0), part(3), part(6));
         let length = double(&norm(&dx)).max(double(&norm(&dy))).max(double(&norm(&dn)) * small);
         if !length.is_finite() {
-            return;
+            return f64::NAN;
         }
         let damping = big((0.5 * small / length.max(1e-300)).min(1.0));
-        x = add(&x, &scaled(&dx, &damping));
-        y = add(&y, &scaled(&dy, &damping));
-        n = add(&n, &scaled(&dn, &damping));
-        d += &s[9] * &damping;
+        *x = add(x, &scaled(&dx, &damping));
+        *y = add(y, &scaled(&dy, &damping));
+        *n = add(n, &scaled(&dn, &damping));
+        *d += &s[9] * &damping;
         for (value, change) in l.iter_mut().chain(m.iter_mut()).zip(&s[10..]) {
             *value += change * &damping;
         }
-        if length < 1e-12 || step % 8 == 0 {
-            let before = &best.upper - &best.lower;
-            bracket(one, two, (p, &l), (q, &m), (&x, &y, &n), best);
-            let width = &best.upper - &best.lower;
-            stalled = if width < before || length >= 1e-12 { 0 } else { stalled + 1 };
-            if width <= big(TARGET) || stalled > 3 || length < 1e-57 {
-                return;
-            }
-        }
+        length
     }
+}
+
+/// Derivative of the distance with respect to the twists of both bodies, from points relative to the first one's translation.
+pub(super) fn twists(x: &Vector, y: &Vector, n: &Vector, pose_a: &Pose, pose_b: &Pose) -> [f64; 12] {
+    let arm = sub(y, &sub(&vector(pose_b.translation()), &vector(pose_a.translation())));
+    let minus = |v: &Vector| -> Vector { v.clone().map(|c| -c) };
+    let parts = [n.clone(), cross(x, n), minus(n), minus(&cross(&arm, n))];
+    std::array::from_fn(|i| double(&parts[i / 3][i % 3]))
 }
 
 /// Takes the bounds that an iterate proves: numerics section 3.

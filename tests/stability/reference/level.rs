@@ -61,10 +61,14 @@ pub(crate) fn level_distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, a
     let start = scaled(&sub(&vector(&answer.witness), &vector(origin)), &(big(1.0) / big(unit)));
     let none: Vector = std::array::from_fn(|_| big(0.0));
     let mut best = Best { lower: None, upper: None, x: start.clone(), pull: (none.clone(), none) };
-    for (p, q) in trials(&one, &two, &start) {
-        newton(&one, &two, &p, &q, &start, &mut best);
-        if best.width().is_some_and(|width| width <= big(TARGET)) {
-            break;
+    let trials = trials(&one, &two, &start);
+    // Between flush faces the system is singular: there a ridge keeps the steps across short.
+    'search: for (ridge, target) in [(0.0, TARGET), (1e-6, 1e-13)] {
+        for (p, q) in &trials {
+            if best.width().is_some_and(|width| width <= big(target)) {
+                break 'search;
+            }
+            newton(&one, &two, p, q, (&start, ridge), &mut best);
         }
     }
     let x = scaled(&best.x, &big(unit));
@@ -108,7 +112,7 @@ fn trials(one: &Solid<'_>, two: &Solid<'_>, v: &Vector) -> Vec<(Trial, Trial)> {
 }
 
 /// Newton's method on `Σ ν ∇g + Σ μ ∇h = 0`, `Σ ν = 1`, `g = s`, `h = 1`.
-fn newton(one: &Solid<'_>, two: &Solid<'_>, p: &Trial, q: &Trial, start: &Vector, best: &mut Best) {
+fn newton(one: &Solid<'_>, two: &Solid<'_>, p: &Trial, q: &Trial, (start, ridge): (&Vector, f64), best: &mut Best) {
     let mut x = start.clone();
     let mut nu: Vec<Big> = p.multiplier.iter().map(|&m| big(m)).collect();
     let mut mu: Vec<Big> = q.multiplier.iter().map(|&m| big(m)).collect();
@@ -132,6 +136,8 @@ fn newton(one: &Solid<'_>, two: &Solid<'_>, p: &Trial, q: &Trial, start: &Vector
             }
             r[4 + j] = if j < la { &s - &jet.value } else { big(1.0) - &jet.value };
         }
+        let stiffest = (0..3).map(|i| double(&k[i][i])).fold(0.0, f64::max);
+        (0..3).for_each(|i| k[i][i] += big(ridge * stiffest));
         r[3] = big(1.0);
         for j in 0..la {
             k[3][4 + j] = big(1.0);

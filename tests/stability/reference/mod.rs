@@ -10,6 +10,7 @@ mod big;
 pub(crate) mod distance;
 pub(crate) mod growth;
 pub(crate) mod level;
+pub(crate) mod signed;
 mod solid;
 
 pub(crate) use distance::distance;
