@@ -147,10 +147,15 @@ const MAX_ROUNDS: u32 = 6;
 /// Starts of values above this, relative to the least known, are too steep.
 const STEEP: f64 = 1e3;
 
+/// How much narrower a bracket has to be that multipliers are taken from which Newton's method did not find.
+const REFINED: f64 = 1e-3;
+
 /// A solve in progress: the best bracket so far and where it was attained, in query units.
 struct Search<'a> {
     pair: &'a Pair<'a>,
     options: &'a Options<'a>,
+    /// Of the bracket that is being worked for.
+    accuracy: f64,
     lower: f64,
     upper: f64,
     x: Vector3<f64>,
@@ -171,6 +176,7 @@ impl<'a> Search<'a> {
         Self {
             pair,
             options,
+            accuracy: options.accuracy(),
             lower: pair.a.body.trust().least,
             upper: f64::INFINITY,
             x: pair.b.interior,
@@ -184,7 +190,7 @@ impl<'a> Search<'a> {
     }
 
     fn done(&self) -> bool {
-        self.within(self.options.accuracy())
+        self.within(self.accuracy)
     }
 
     fn within(&self, accuracy: f64) -> bool {
@@ -203,16 +209,22 @@ impl<'a> Search<'a> {
             self.interior_point();
         }
         if !self.done() && !self.exhausted() {
-            self.sharpen(self.options.accuracy());
+            self.sharpen(self.accuracy);
         }
         if !self.done() && !self.exhausted() {
             self.start_nearest();
         }
         if !self.done() && !self.exhausted() {
-            self.sharpen(self.options.accuracy());
+            self.sharpen(self.accuracy);
         }
         if !self.refined && !self.saturated() && !self.exhausted() {
-            self.sharpen(1e-3 * self.options.accuracy());
+            // Constraints whose slacks are as small as the bracket is wide may carry multipliers that are not theirs.
+            self.accuracy = REFINED * self.options.accuracy();
+            self.sharpen(self.accuracy);
+            if !self.done() && !self.exhausted() {
+                self.descend(REFINED);
+            }
+            self.accuracy = self.options.accuracy();
         }
     }
 

@@ -36,7 +36,7 @@
 
 use super::options::Options;
 use super::pose::Pose;
-use super::tangent::{NUDGE, Relative, SLACK, Side, TURNED};
+use super::tangent::{ALIGNED, NUDGE, Relative, SLACK, Side, TURNED};
 use super::vector::{
     M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, subtract, times_transposed,
 };
@@ -138,7 +138,8 @@ impl WithSimd for FollowLevel<'_> {
             let at = Evaluated { x, z, jet_a: sides.p.jet(simd, z), w, jet_b: sides.g.jet(simd, w) };
             let Some(step) = sides.newton(simd, &at.jet_a, &at.jet_b) else { return Err(rounds) };
             let found = sides.bracket(simd, &at, &step);
-            if found.upper - found.lower <= options.accuracy() * found.upper.abs().max(1.0) {
+            let narrow = found.upper - found.lower <= options.accuracy() * found.upper.abs().max(1.0);
+            if narrow && found.aligned {
                 let attained = plus(plus(w, step.delta), found.inward);
                 if !sides.others_hold(simd, active_a, active_b, attained, found.upper) {
                     return Err(rounds);
@@ -251,6 +252,8 @@ struct Bracket {
     /// Gradient of A's constraint in A's frame, per metre.
     gradient: V3<f64>,
     multiplier: f64,
+    /// Whether the gradients oppose each other well enough for gradients of the answer.
+    aligned: bool,
 }
 
 impl Sides<'_> {
@@ -393,12 +396,14 @@ impl Sides<'_> {
             && multiplier >= 0.0
             && q <= 0.1
             && b_error * (4.0 / NUDGE) * inverse <= 1.0;
+        let aligned = off <= ALIGNED * multiplier * square * inverse;
         Bracket {
             lower: if inside { lower } else { f64::NAN },
             upper,
             inward: scaled(b, -distance * inverse),
             gradient,
             multiplier,
+            aligned,
         }
     }
 

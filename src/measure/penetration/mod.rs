@@ -7,6 +7,7 @@
 //! below the best depth known by more than the accuracy asked for. Near a minimum that f leaves quadratically as many
 //! triangles are split at each size; where many directions are equally good, as for concentric balls, all of them are.
 
+mod best;
 mod covering;
 mod farthest;
 mod scout;
@@ -15,17 +16,15 @@ mod support;
 mod tests;
 
 use super::Status;
-use super::bracket::{Multipliers, SLACK, descent};
-use super::newton::{Active, DistanceNewton};
+use super::bracket::SLACK;
 use super::options::Options;
 use super::pair::{Pair, Posed};
 use super::pose::Pose;
-use super::relation::Through;
-use super::smooth::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
 use super::union;
-use super::warm::{Hint, WarmStart};
+use super::warm::WarmStart;
 use crate::body::{Body, Solid};
 use crate::polynomial::dispatch;
+pub(super) use best::{Best, tolerance};
 use covering::{Cell, Covering, Direction};
 use farthest::Farthest;
 use nalgebra::Vector3;
@@ -48,8 +47,8 @@ pub struct Penetration {
     pub witness_a: Vector3<f64>,
     /// Point of the second body that is deepest in the first.
     pub witness_b: Vector3<f64>,
-    /// Whether a direction elsewhere, or another pair of parts, was seen to be about as short: direction and witnesses may then
-    /// jump.
+    /// Whether a direction elsewhere, or another pair of parts, was seen to be about as short, or the direction is not known to
+    /// be the best of those near it: direction and witnesses may then jump.
     pub tied: bool,
     /// Directions whose support points were computed.
     pub directions: u32,
@@ -144,170 +143,6 @@ pub(super) fn between(
     }
 }
 
-/// Width of a bracket asked for, in query units.
-pub(super) fn tolerance(pair: &Pair<'_>, options: &Options<'_>, depth: f64) -> f64 {
-    (options.depth_accuracy() * depth).max(pair.tolerance(options.accuracy()))
-}
-
-/// Rigorous upper bound of f(n), the depth along n (of any length above 0), from multipliers for -n of A and for n of B; with
-/// its sign turned, a lower bound of the signed distance.
-pub(super) fn depth_along(
-    pair: &Pair<'_>,
-    x: &Vector3<f64>,
-    y: &Vector3<f64>,
-    n: &Vector3<f64>,
-    of_a: &Multipliers,
-    of_b: &Multipliers,
-) -> f64 {
-    let length = n.norm();
-    let n = n / length;
-    let falls =
-        descent(&pair.a, x, &n, &of_a.map(|m| m / length)) + descent(&pair.b, y, &-n, &of_b.map(|m| m / length));
-    let displaced = (pair.a.displacement(x) + pair.b.displacement(y)) * (1.0 + 1e-14);
-    let bound = n.dot(&(y - x)) + falls + displaced + SLACK * (x.norm() + y.norm() + falls.abs());
-    // A NaN bounds nothing.
-    if bound.is_nan() { f64::INFINITY } else { bound }
-}
-
-/// The shortest way out known, in query units.
-pub(super) struct Best<'a> {
-    pub(super) pair: &'a Pair<'a>,
-    pose_a: &'a Pose,
-    pose_b: &'a Pose,
-    pub(super) options: &'a Options<'a>,
-    /// Rigorous upper bound of f along n; negative if n parts the bodies.
-    pub(super) depth: f64,
-    pub(super) n: Option<Vector3<f64>>,
-    pub(super) x: Vector3<f64>,
-    pub(super) y: Vector3<f64>,
-    /// Distance of points of the bodies at x and y, rounded up, where that was proven with the depth.
-    pub(super) attained: Option<f64>,
-    active: (Active, Active),
-    trace: Option<Trace>,
-    pub(super) iterations: u32,
-}
-
-impl<'a> Best<'a> {
-    pub(super) fn new(pair: &'a Pair<'a>, pose_a: &'a Pose, pose_b: &'a Pose, options: &'a Options<'a>) -> Self {
-        Self {
-            pair,
-            pose_a,
-            pose_b,
-            options,
-            depth: f64::INFINITY,
-            n: None,
-            x: pair.a.interior,
-            y: pair.b.interior,
-            attained: None,
-            active: Default::default(),
-            trace: None,
-            iterations: 0,
-        }
-    }
-
-    /// Starts from the answer to an earlier query.
-    pub(super) fn follow(&mut self, hint: &Hint) {
-        match hint {
-            Hint::Smooth(trace) => {
-                let mut trace = *trace;
-                let (a, b, relation) = (self.pair.a.body, self.pair.b.body, self.through(None));
-                match dispatch(Follow { a, b, relation, options: self.options, trace: &mut trace }) {
-                    Ok(proven) => self.take(&proven, trace),
-                    Err(rounds) => self.iterations += rounds,
-                }
-            }
-            Hint::Apart { x_a, y_b, normal_a, active_a, active_b } => {
-                let a = SupportPoint { x: self.pair.a_to_query(x_a), active: *active_a };
-                let b = SupportPoint { x: self.pair.b_to_query(y_b), active: *active_b };
-                self.polish(&a, &b, normal_a);
-            }
-            _ => {}
-        }
-    }
-
-    /// Looks for the shortest way out near n, or where the bodies seem to face each other; whether it found one.
-    pub(super) fn seek(&mut self, n: Option<&Vector3<f64>>) -> bool {
-        let (pair, options, relation) = (self.pair, self.options, self.through(n));
-        if options.exhausted(self.iterations) {
-            return false;
-        }
-        let limit = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
-        match dispatch(Seek { a: pair.a.body, b: pair.b.body, relation, limit, options }) {
-            Ok((proven, trace)) => {
-                self.take(&proven, trace);
-                true
-            }
-            Err(rounds) => {
-                self.iterations += rounds;
-                false
-            }
-        }
-    }
-
-    fn through(&self, n: Option<&Vector3<f64>>) -> Through<'a> {
-        let tolerance = self.pair.tolerance(self.options.accuracy()) * self.pair.unit();
-        Through { pose_a: self.pose_a, pose_b: self.pose_b, facing: n.map(|n| (*n).into()), tolerance }
-    }
-
-    /// Takes a direction proven in metres if it is the shortest way out so far.
-    pub(super) fn take(&mut self, proven: &Proven, trace: Trace) {
-        self.iterations += proven.rounds;
-        let (pair, unit) = (self.pair, self.pair.unit());
-        if -proven.lower / unit < self.depth {
-            let center = pair.a.body.normalization().center;
-            (self.depth, self.n) = (-proven.lower / unit, Some(proven.n.into()));
-            self.x = pair.a_to_query(&(center + Vector3::from(proven.x)));
-            self.y = pair.a_to_query(&(center + Vector3::from(proven.y)));
-            (self.attained, self.trace) = (Some(proven.upper / unit), Some(trace));
-        }
-    }
-
-    /// Newton's method on the optimality system of the distance, with a negative distance, from near support points of any
-    /// number of active constraints.
-    fn polish(&mut self, x: &SupportPoint, y: &SupportPoint, n: &Vector3<f64>) {
-        let (pair, options) = (self.pair, self.options);
-        let (a, b) = (Active::from_bits(x.active, pair.a.len()), Active::from_bits(y.active, pair.b.len()));
-        let (Some(a), Some(b)) = (a, b) else { return };
-        let finite = x.x.iter().chain(&y.x).chain(n).all(|value| value.is_finite());
-        if !finite || options.exhausted(self.iterations) {
-            return;
-        }
-        let mut newton = DistanceNewton { x: x.x, y: y.x, distance: n.dot(&(x.x - y.x)), n: *n, a, b };
-        let tolerance = pair.tolerance(options.accuracy());
-        let limit = options.max_iterations() - self.iterations;
-        self.iterations += newton.run(pair, limit, |at| {
-            let depth = self.try_direction(&at.x, &at.y, &at.n, at.a, at.b);
-            // The points attain what the normal proves: no better direction is near.
-            let attained = at.n.dot(&(at.y - at.x)) / at.n.norm();
-            let sideways = (at.x - at.y) + at.n * attained;
-            depth - attained <= tolerance && sideways.norm() <= tolerance || options.exhausted(self.iterations)
-        });
-    }
-
-    /// Takes a direction if it is the shortest way out so far; returns its depth.
-    fn try_direction(&mut self, x: &Vector3<f64>, y: &Vector3<f64>, n: &Vector3<f64>, a: Active, b: Active) -> f64 {
-        let depth = depth_along(self.pair, x, y, n, &a.multipliers(), &b.multipliers());
-        if depth < self.depth
-            && let Some(n) = n.try_normalize(0.0)
-        {
-            (self.depth, self.n, self.x, self.y, self.active) = (depth, Some(n), *x, *y, (a, b));
-            (self.attained, self.trace) = (None, None);
-        }
-        depth
-    }
-
-    pub(super) fn hint(&self) -> Option<WarmStart> {
-        let (a, b) = &self.active;
-        let apart = |n: &Vector3<f64>| WarmStart::apart(self.pair, &self.x, &self.y, n, a.bits(), b.bits());
-        self.n.as_ref().map(|n| self.trace.map_or_else(|| apart(n), |trace| Hint::Smooth(trace).into()))
-    }
-
-    /// Width of a bracket asked for.
-    pub(super) fn tolerance(&self) -> f64 {
-        tolerance(self.pair, self.options, self.depth)
-    }
-}
-
 /// What is known of all directions.
 pub(super) struct Proof {
     /// Lower bound of the depth, query units.
@@ -351,6 +186,9 @@ fn sweep<const N: usize>(best: &mut Best<'_>) -> (Proof, bool) {
     };
     let full = sweep.run(best).is_none();
     let lower = sweep.lowest(best).min(sweep.floor);
+    if best.depth > 0.0 && !best.settled {
+        best.settle();
+    }
     let lower = if sweep.covering.directions().len() < 6 || best.depth <= 0.0 { 0.0 } else { lower.max(0.0) };
     let proof = Proof {
         lower: lower.min(best.depth.max(0.0)),
@@ -482,17 +320,9 @@ impl<const N: usize> Sweep<'_, N> {
             return;
         }
         let smooth = self.pair.a.len() == 1 && self.pair.b.len() == 1;
-        if smooth && best.seek(Some(&least.n)) && best.depth <= least.depth() {
-            return;
+        if !(smooth && best.seek(Some(&least.n)) && best.depth <= least.depth()) {
+            best.offer(&least.a, &least.b, &least.n);
         }
-        let (mut a, mut b) = (
-            Active::from_bits(least.a.active, self.pair.a.len()).unwrap_or_default(),
-            Active::from_bits(least.b.active, self.pair.b.len()).unwrap_or_default(),
-        );
-        if a.fit(&self.pair.a, &least.a.x, &-least.n) && b.fit(&self.pair.b, &least.b.x, &least.n) {
-            best.try_direction(&least.a.x, &least.b.x, &least.n, a, b);
-        }
-        best.polish(&least.a, &least.b, &least.n);
     }
 
     /// Bounds a triangle, and keeps it for later if that is not enough.
@@ -535,10 +365,33 @@ impl<const N: usize> Sweep<'_, N> {
         Some(self.covering.add_middle(direction))
     }
 
-    /// Whether a direction far from the best was seen to be about as good.
+    /// Whether a direction far from the best is about as good, or one near it may be better.
     fn tied(&self, best: &Best<'_>) -> bool {
-        let Some(n) = best.n else { return false };
-        let close = best.depth + 2.0 * tolerance(self.pair, self.options, best.depth);
-        self.covering.directions().iter().any(|direction| direction.n.dot(&n) < 0.99 && direction.depth() <= close)
+        let Some(n) = best.n.filter(|_| best.depth > 0.0) else { return false };
+        if !best.settled {
+            return true;
+        }
+        let close = best.depth + 2.0 * best.tolerance();
+        let elsewhere = |n_other: &Vector3<f64>| n_other.dot(&n) < ELSEWHERE;
+        let others = self.covering.directions().iter().filter(|direction| elsewhere(&direction.n));
+        let Some(least) = others.min_by(|p, q| p.depth().total_cmp(&q.depth())) else { return false };
+        if least.depth() <= close {
+            return true;
+        }
+        if least.depth() > WORTH_A_LOOK * best.depth {
+            return false;
+        }
+        // From there the way down may lead to another minimum.
+        let mut other = best.anew();
+        if !other.seek(Some(&least.n)) {
+            other.offer(&least.a, &least.b, &least.n);
+        }
+        other.depth <= close && other.n.is_some_and(|n| elsewhere(&n))
     }
 }
+
+/// Cosine of the angle beyond which a direction is another one than the best.
+const ELSEWHERE: f64 = 0.99;
+
+/// Relative to the best, depth of a direction elsewhere that may lead down to one as good.
+const WORTH_A_LOOK: f64 = 1.1;

@@ -45,8 +45,9 @@ pub struct SignedDistance {
     /// Whether the bracket holds 0: the bodies may just touch. Smooth bodies have the same derivative on both sides; where
     /// edges or corners touch, the derivative in overlap may be another one.
     pub at_contact: bool,
-    /// Whether another direction out of an overlap was seen to be about as short, or another pair of parts may be as near: value
-    /// and bracket hold, but normal, witnesses and gradients may jump.
+    /// Whether another direction out of an overlap was seen to be about as short, or the one found is not known to be the best
+    /// of those near it, or another pair of parts may be as near: value and bracket hold, but normal, witnesses and gradients
+    /// may jump.
     pub tied: bool,
     /// Iterations of all methods together.
     pub iterations: u32,

@@ -1,0 +1,242 @@
+//! The shortest way out of an overlap that is known.
+
+use super::support::{SupportPoint, support};
+use crate::measure::bracket::{Multipliers, SLACK, descent};
+use crate::measure::newton::{Active, DistanceNewton};
+use crate::measure::options::Options;
+use crate::measure::pair::Pair;
+use crate::measure::pose::Pose;
+use crate::measure::relation::Through;
+use crate::measure::smooth::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
+use crate::measure::warm::{Hint, WarmStart};
+use crate::polynomial::dispatch;
+use nalgebra::Vector3;
+
+/// First and last step of the search around a direction, as the tangent of the angle.
+const FIRST_STEP: f64 = 1e-4;
+const LAST_STEP: f64 = 1e-8;
+
+/// Width of a bracket asked for, in query units.
+pub(in crate::measure) fn tolerance(pair: &Pair<'_>, options: &Options<'_>, depth: f64) -> f64 {
+    (options.depth_accuracy() * depth).max(pair.tolerance(options.accuracy()))
+}
+
+/// Rigorous upper bound of f(n), the depth along n (of any length above 0), from multipliers for -n of A and for n of B; with
+/// its sign turned, a lower bound of the signed distance.
+pub(in crate::measure) fn depth_along(
+    pair: &Pair<'_>,
+    x: &Vector3<f64>,
+    y: &Vector3<f64>,
+    n: &Vector3<f64>,
+    of_a: &Multipliers,
+    of_b: &Multipliers,
+) -> f64 {
+    let length = n.norm();
+    let n = n / length;
+    let falls =
+        descent(&pair.a, x, &n, &of_a.map(|m| m / length)) + descent(&pair.b, y, &-n, &of_b.map(|m| m / length));
+    let displaced = (pair.a.displacement(x) + pair.b.displacement(y)) * (1.0 + 1e-14);
+    let bound = n.dot(&(y - x)) + falls + displaced + SLACK * (x.norm() + y.norm() + falls.abs());
+    // A NaN bounds nothing.
+    if bound.is_nan() { f64::INFINITY } else { bound }
+}
+
+/// The shortest way out known, in query units.
+pub(in crate::measure) struct Best<'a> {
+    pub(in crate::measure) pair: &'a Pair<'a>,
+    pose_a: &'a Pose,
+    pose_b: &'a Pose,
+    pub(in crate::measure) options: &'a Options<'a>,
+    /// Rigorous upper bound of f along n; negative if n parts the bodies.
+    pub(in crate::measure) depth: f64,
+    pub(in crate::measure) n: Option<Vector3<f64>>,
+    pub(in crate::measure) x: Vector3<f64>,
+    pub(in crate::measure) y: Vector3<f64>,
+    /// Distance of points of the bodies at x and y, rounded up, where that was proven with the depth.
+    pub(in crate::measure) attained: Option<f64>,
+    active: (Active, Active),
+    trace: Option<Trace>,
+    /// Whether no direction nearby is better: the points attain what the normal proves.
+    pub(in crate::measure) settled: bool,
+    pub(in crate::measure) iterations: u32,
+}
+
+impl<'a> Best<'a> {
+    pub(in crate::measure) fn new(
+        pair: &'a Pair<'a>,
+        pose_a: &'a Pose,
+        pose_b: &'a Pose,
+        options: &'a Options<'a>,
+    ) -> Self {
+        Self {
+            pair,
+            pose_a,
+            pose_b,
+            options,
+            depth: f64::INFINITY,
+            n: None,
+            x: pair.a.interior,
+            y: pair.b.interior,
+            attained: None,
+            active: Default::default(),
+            trace: None,
+            settled: false,
+            iterations: 0,
+        }
+    }
+
+    /// Starts from the answer to an earlier query.
+    pub(in crate::measure) fn follow(&mut self, hint: &Hint) {
+        match hint {
+            Hint::Smooth(trace) => {
+                let mut trace = *trace;
+                let (a, b, relation) = (self.pair.a.body, self.pair.b.body, self.through(None));
+                match dispatch(Follow { a, b, relation, options: self.options, trace: &mut trace }) {
+                    Ok(proven) => self.take(&proven, trace),
+                    Err(rounds) => self.iterations += rounds,
+                }
+            }
+            Hint::Apart { x_a, y_b, normal_a, active_a, active_b } => {
+                let a = SupportPoint { x: self.pair.a_to_query(x_a), active: *active_a };
+                let b = SupportPoint { x: self.pair.b_to_query(y_b), active: *active_b };
+                self.polish(&a, &b, normal_a);
+            }
+            _ => {}
+        }
+    }
+
+    /// Looks for the shortest way out near n, or where the bodies seem to face each other; whether it found one.
+    pub(in crate::measure) fn seek(&mut self, n: Option<&Vector3<f64>>) -> bool {
+        let (pair, options, relation) = (self.pair, self.options, self.through(n));
+        if options.exhausted(self.iterations) {
+            return false;
+        }
+        let limit = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
+        match dispatch(Seek { a: pair.a.body, b: pair.b.body, relation, limit, options }) {
+            Ok((proven, trace)) => {
+                self.take(&proven, trace);
+                true
+            }
+            Err(rounds) => {
+                self.iterations += rounds;
+                false
+            }
+        }
+    }
+
+    /// The same pair, with nothing known.
+    pub(in crate::measure) fn anew(&self) -> Self {
+        Self { iterations: self.iterations, ..Self::new(self.pair, self.pose_a, self.pose_b, self.options) }
+    }
+
+    /// Tries a direction with its support points, and Newton's method from there.
+    pub(in crate::measure) fn offer(&mut self, x: &SupportPoint, y: &SupportPoint, n: &Vector3<f64>) {
+        let pair = self.pair;
+        let (mut a, mut b) = (
+            Active::from_bits(x.active, pair.a.len()).unwrap_or_default(),
+            Active::from_bits(y.active, pair.b.len()).unwrap_or_default(),
+        );
+        if a.fit(&pair.a, &x.x, &-n) && b.fit(&pair.b, &y.x, n) {
+            self.try_direction(&x.x, &y.x, n, a, b);
+        }
+        self.polish(x, y, n);
+    }
+
+    /// Looks around the best direction for a better one, where edges and corners keep Newton's method from showing that there
+    /// is none: a compass search, its steps shrinking where they lead to nothing better.
+    pub(in crate::measure) fn settle(&mut self) {
+        let pair = self.pair;
+        let enough = 0.1 * pair.tolerance(self.options.accuracy());
+        let mut step = FIRST_STEP;
+        while step > LAST_STEP && !self.settled && !self.options.exhausted(self.iterations) {
+            let Some(n) = self.n else { return };
+            self.iterations += 1;
+            let mut least: Option<(f64, Vector3<f64>, SupportPoint, SupportPoint)> = None;
+            let basis = Vector3::ith(n.iamin(), 1.0);
+            let first = n.cross(&basis).normalize();
+            for tangent in [first, -first, n.cross(&first), -n.cross(&first)] {
+                let turned = (n + tangent * step).normalize();
+                let a = support(&pair.a, &-turned, enough, None, || pair.farthest_a(&-turned));
+                let b = support(&pair.b, &turned, enough, None, || pair.farthest_b(&turned));
+                let (Some(a), Some(b)) = (a, b) else { return };
+                let depth = turned.dot(&(b.x - a.x));
+                if least.as_ref().is_none_or(|(known, ..)| depth < *known) {
+                    least = Some((depth, turned, a, b));
+                }
+            }
+            let before = self.depth;
+            if let Some((depth, n, a, b)) = least
+                && depth < before - enough
+            {
+                self.offer(&a, &b, &n);
+            }
+            step *= if self.depth < before - enough { 2.0 } else { 0.05 };
+        }
+        self.settled |= step <= LAST_STEP;
+    }
+
+    fn through(&self, n: Option<&Vector3<f64>>) -> Through<'a> {
+        let tolerance = self.pair.tolerance(self.options.accuracy()) * self.pair.unit();
+        Through { pose_a: self.pose_a, pose_b: self.pose_b, facing: n.map(|n| (*n).into()), tolerance }
+    }
+
+    /// Takes a direction proven in metres if it is the shortest way out so far.
+    pub(in crate::measure) fn take(&mut self, proven: &Proven, trace: Trace) {
+        self.iterations += proven.rounds;
+        let (pair, unit) = (self.pair, self.pair.unit());
+        if -proven.lower / unit < self.depth {
+            let center = pair.a.body.normalization().center;
+            (self.depth, self.n) = (-proven.lower / unit, Some(proven.n.into()));
+            self.x = pair.a_to_query(&(center + Vector3::from(proven.x)));
+            self.y = pair.a_to_query(&(center + Vector3::from(proven.y)));
+            (self.attained, self.trace, self.settled) = (Some(proven.upper / unit), Some(trace), true);
+        }
+    }
+
+    /// Newton's method on the optimality system of the distance, with a negative distance, from near support points of any
+    /// number of active constraints.
+    fn polish(&mut self, x: &SupportPoint, y: &SupportPoint, n: &Vector3<f64>) {
+        let (pair, options) = (self.pair, self.options);
+        let (a, b) = (Active::from_bits(x.active, pair.a.len()), Active::from_bits(y.active, pair.b.len()));
+        let (Some(a), Some(b)) = (a, b) else { return };
+        let finite = x.x.iter().chain(&y.x).chain(n).all(|value| value.is_finite());
+        if !finite || options.exhausted(self.iterations) {
+            return;
+        }
+        let mut newton = DistanceNewton { x: x.x, y: y.x, distance: n.dot(&(x.x - y.x)), n: *n, a, b };
+        let tolerance = pair.tolerance(options.accuracy());
+        let limit = options.max_iterations() - self.iterations;
+        self.iterations += newton.run(pair, limit, |at| {
+            let depth = self.try_direction(&at.x, &at.y, &at.n, at.a, at.b);
+            // The points attain what the normal proves: no better direction is near.
+            let attained = at.n.dot(&(at.y - at.x)) / at.n.norm();
+            let sideways = (at.x - at.y) + at.n * (attained / at.n.norm());
+            let settled = depth - attained <= tolerance && sideways.norm() <= tolerance;
+            self.settled |= settled && depth <= self.depth;
+            settled || options.exhausted(self.iterations)
+        });
+    }
+
+    /// Takes a direction if it is the shortest way out so far; returns its depth.
+    fn try_direction(&mut self, x: &Vector3<f64>, y: &Vector3<f64>, n: &Vector3<f64>, a: Active, b: Active) -> f64 {
+        let depth = depth_along(self.pair, x, y, n, &a.multipliers(), &b.multipliers());
+        if depth < self.depth
+            && let Some(n) = n.try_normalize(0.0)
+        {
+            (self.depth, self.n, self.x, self.y, self.active) = (depth, Some(n), *x, *y, (a, b));
+            (self.attained, self.trace, self.settled) = (None, None, false);
+        }
+        depth
+    }
+
+    pub(in crate::measure) fn hint(&self) -> Option<WarmStart> {
+        let (a, b) = &self.active;
+        let apart = |n: &Vector3<f64>| WarmStart::apart(self.pair, &self.x, &self.y, n, a.bits(), b.bits());
+        self.n.as_ref().map(|n| self.trace.map_or_else(|| apart(n), |trace| Hint::Smooth(trace).into()))
+    }
+
+    /// Width of a bracket asked for.
+    pub(in crate::measure) fn tolerance(&self) -> f64 {
+        tolerance(self.pair, self.options, self.depth)
+    }
+}
