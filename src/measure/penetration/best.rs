@@ -8,13 +8,37 @@ use crate::measure::pair::Pair;
 use crate::measure::pose::Pose;
 use crate::measure::relation::Through;
 use crate::measure::smooth::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
-use crate::measure::warm::{Hint, WarmStart};
+use crate::measure::warm::{ActiveSet, Hint, WarmStart};
 use crate::polynomial::dispatch;
 use nalgebra::Vector3;
+
+/// The middle of support points with the constraints that are active at all of them.
+fn common(points: [SupportPoint; 4]) -> SupportPoint {
+    let sum: Vector3<f64> = points.iter().map(|point| point.x).sum();
+    let active = points.iter().fold(ActiveSet::MAX, |all, point| all & point.active);
+    SupportPoint { x: sum * 0.25, active }
+}
+
+/// Whether points of a difference of bodies, all at least that high along n, have a point on the axis along n between them:
+/// then no direction near n shows a smaller depth, but for what they lack in height.
+fn surrounds(n: &Vector3<f64>, across: &Vector3<f64>, w: &[Vector3<f64>; 4], height: f64) -> bool {
+    let other = n.cross(across);
+    let p = w.map(|w| (w.dot(across), w.dot(&other)));
+    let turns = |i: usize, j: usize| p[i].0 * p[j].1 - p[i].1 * p[j].0;
+    let holds = |i: usize, j: usize, k: usize| {
+        let [a, b, c] = [turns(i, j), turns(j, k), turns(k, i)];
+        a >= 0.0 && b >= 0.0 && c >= 0.0 || a <= 0.0 && b <= 0.0 && c <= 0.0
+    };
+    w.iter().all(|w| w.dot(n) >= height)
+        && [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]].iter().any(|t| holds(t[0], t[1], t[2]))
+}
 
 /// First and last step of the search around a direction, as the tangent of the angle.
 const FIRST_STEP: f64 = 1e-4;
 const LAST_STEP: f64 = 1e-8;
+
+/// Most rounds of that search.
+const MOST_ROUNDS: u32 = 24;
 
 /// Width of a bracket asked for, in query units.
 pub(in crate::measure) fn tolerance(pair: &Pair<'_>, options: &Options<'_>, depth: f64) -> f64 {
@@ -57,7 +81,7 @@ pub(in crate::measure) struct Best<'a> {
     active: (Active, Active),
     trace: Option<Trace>,
     /// Whether no direction nearby is better: the points attain what the normal proves.
-    pub(in crate::measure) settled: bool,
+    pub(super) settled: bool,
     pub(in crate::measure) iterations: u32,
 }
 
@@ -125,12 +149,12 @@ impl<'a> Best<'a> {
     }
 
     /// The same pair, with nothing known.
-    pub(in crate::measure) fn anew(&self) -> Self {
+    pub(super) fn anew(&self) -> Self {
         Self { iterations: self.iterations, ..Self::new(self.pair, self.pose_a, self.pose_b, self.options) }
     }
 
     /// Tries a direction with its support points, and Newton's method from there.
-    pub(in crate::measure) fn offer(&mut self, x: &SupportPoint, y: &SupportPoint, n: &Vector3<f64>) {
+    pub(super) fn offer(&mut self, x: &SupportPoint, y: &SupportPoint, n: &Vector3<f64>) {
         let pair = self.pair;
         let (mut a, mut b) = (
             Active::from_bits(x.active, pair.a.len()).unwrap_or_default(),
@@ -143,36 +167,44 @@ impl<'a> Best<'a> {
     }
 
     /// Looks around the best direction for a better one, where edges and corners keep Newton's method from showing that there
-    /// is none: a compass search, its steps shrinking where they lead to nothing better.
-    pub(in crate::measure) fn settle(&mut self) {
+    /// is none: what the constraints all around have in common may be the edge that is best, and otherwise a compass search
+    /// goes on, its needle turning and its steps shrinking where they lead to nothing better.
+    pub(super) fn settle(&mut self) {
         let pair = self.pair;
         let enough = 0.1 * pair.tolerance(self.options.accuracy());
         let mut step = FIRST_STEP;
-        while step > LAST_STEP && !self.settled && !self.options.exhausted(self.iterations) {
-            let Some(n) = self.n else { return };
+        for round in 0..MOST_ROUNDS {
+            let Some(n) = self.n.filter(|_| step > LAST_STEP && !self.options.exhausted(self.iterations)) else {
+                return;
+            };
             self.iterations += 1;
-            let mut least: Option<(f64, Vector3<f64>, SupportPoint, SupportPoint)> = None;
+            let angle = f64::from(round);
             let basis = Vector3::ith(n.iamin(), 1.0);
             let first = n.cross(&basis).normalize();
-            for tangent in [first, -first, n.cross(&first), -n.cross(&first)] {
+            let (sin, cos) = angle.sin_cos();
+            let needle = first * cos + n.cross(&first) * sin;
+            let mut around = [(f64::INFINITY, n, SupportPoint::NONE, SupportPoint::NONE); 4];
+            for (found, tangent) in around.iter_mut().zip([needle, -needle, n.cross(&needle), -n.cross(&needle)]) {
                 let turned = (n + tangent * step).normalize();
                 let a = support(&pair.a, &-turned, enough, None, || pair.farthest_a(&-turned));
                 let b = support(&pair.b, &turned, enough, None, || pair.farthest_b(&turned));
                 let (Some(a), Some(b)) = (a, b) else { return };
-                let depth = turned.dot(&(b.x - a.x));
-                if least.as_ref().is_none_or(|(known, ..)| depth < *known) {
-                    least = Some((depth, turned, a, b));
-                }
+                *found = (turned.dot(&(b.x - a.x)), turned, a, b);
+            }
+            self.polish(&common(around.map(|found| found.2)), &common(around.map(|found| found.3)), &n);
+            let w = around.map(|(_, _, a, b)| b.x - a.x);
+            self.settled |= self.n == Some(n) && surrounds(&n, &needle, &w, self.depth - 10.0 * enough);
+            if self.settled {
+                return;
             }
             let before = self.depth;
-            if let Some((depth, n, a, b)) = least
+            if let Some((depth, n, a, b)) = around.into_iter().min_by(|p, q| p.0.total_cmp(&q.0))
                 && depth < before - enough
             {
                 self.offer(&a, &b, &n);
             }
-            step *= if self.depth < before - enough { 2.0 } else { 0.05 };
+            step *= if self.depth < before - enough { 2.0 } else { 0.2 };
         }
-        self.settled |= step <= LAST_STEP;
     }
 
     fn through(&self, n: Option<&Vector3<f64>>) -> Through<'a> {
@@ -208,10 +240,14 @@ impl<'a> Best<'a> {
         let limit = options.max_iterations() - self.iterations;
         self.iterations += newton.run(pair, limit, |at| {
             let depth = self.try_direction(&at.x, &at.y, &at.n, at.a, at.b);
-            // The points attain what the normal proves: no better direction is near.
-            let attained = at.n.dot(&(at.y - at.x)) / at.n.norm();
-            let sideways = (at.x - at.y) + at.n * (attained / at.n.norm());
-            let settled = depth - attained <= tolerance && sideways.norm() <= tolerance;
+            // Points of the bodies attain what the normal proves: no better direction is near.
+            let n = at.n.normalize();
+            let attains = |x: &Vector3<f64>, y: &Vector3<f64>| {
+                let attained = n.dot(&(y - x));
+                depth - attained <= tolerance && (x - y + n * attained).norm() <= tolerance
+            };
+            let inside = || pair.a.pull_in(&at.x).zip(pair.b.pull_in(&at.y));
+            let settled = attains(&at.x, &at.y) && inside().is_some_and(|(x, y)| attains(&x, &y));
             self.settled |= settled && depth <= self.depth;
             settled || options.exhausted(self.iterations)
         });

@@ -19,6 +19,11 @@ pub(super) struct SupportPoint {
     pub(super) active: ActiveSet,
 }
 
+impl SupportPoint {
+    /// No point at all.
+    pub(super) const NONE: Self = Self { x: Vector3::new(f64::NAN, f64::NAN, f64::NAN), active: 0 };
+}
+
 /// Most Newton steps before the interior-point method is taken.
 const MAX_STEPS: u32 = 12;
 
