@@ -219,7 +219,7 @@ impl Side<'_, f64> {
     /// From a point with this plane to a point of the body nearby, against the gradient, in the basis of the plane; as far as
     /// the active constraint goes. None if it is not proven to be one.
     #[inline(always)]
-    pub(super) fn to_inside<S: Simd>(&self, simd: S, at: &Extrapolated<f64>) -> Option<V3<f64>> {
+    pub(super) fn inward<S: Simd>(&self, simd: S, at: &Extrapolated<f64>) -> Option<V3<f64>> {
         let gradient = at.plane.gradient;
         let length = dot::<S, f64>(gradient, gradient).sqrt();
         let inverse = 1.0 / length;

@@ -53,7 +53,7 @@ impl WithSimd for Farthest<'_> {
             }
             let dx = apply::<S, f64>(&inverse, step(simd, &jet, e)?);
             let next = side.extrapolate(simd, &jet, &axes, dx);
-            if let Some(inward) = side.to_inside(simd, &next)
+            if let Some(inward) = side.inward(simd, &next)
                 && side.lack(simd, &next, n) - dot::<S, f64>(n, inward) <= tolerance
             {
                 let x = add::<S, f64>(add::<S, f64>(x, dx), inward);
