@@ -38,7 +38,7 @@ use super::options::Options;
 use super::pose::Pose;
 use super::tangent::{ALIGNED, NUDGE, Relative, SLACK, Side, TURNED};
 use super::vector::{
-    M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, subtract, times_transposed,
+    M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, rows, subtract, times_transposed,
 };
 use crate::body::{Body, ConstraintTrust};
 use crate::polynomial::{NEAR_LEVEL, Number, NumberJet, Polynomial, Scalar, Simd, WithSimd, gamma};
@@ -259,7 +259,7 @@ struct Bracket {
 impl Sides<'_> {
     /// Newton's step; none if it leads nowhere.
     #[inline(always)]
-    fn newton<S: Simd>(&self, _: S, a: &NumberJet<f64>, b: &NumberJet<f64>) -> Option<Step> {
+    fn newton<S: Simd>(&self, simd: S, a: &NumberJet<f64>, b: &NumberJet<f64>) -> Option<Step> {
         let c = &self.map.both;
         let [b0, b1, b2] = b.gradient;
         let pulled = apply_transposed::<S, f64>(c, a.gradient);
@@ -275,23 +275,14 @@ impl Sides<'_> {
                 k += 1;
             }
         }
-        let [xx, xy, xz, yy, yz, zz] = h;
-        let cofactors = [
-            yy * zz - yz * yz,
-            xz * yz - xy * zz,
-            xy * yz - xz * yy,
-            xx * zz - xz * xz,
-            xy * xz - xx * yz,
-            xx * yy - xy * xy,
-        ];
-        let determinant = xx * cofactors[0] + xy * cofactors[1] + xz * cofactors[2];
+        let (cofactors, determinant) = cofactors(simd, h);
         let u = apply_symmetric::<S, f64>(&cofactors, pulled);
         let v = apply_symmetric::<S, f64>(&cofactors, b.gradient);
         let excess = b.value - 1.0;
         let next = (determinant * excess - dot::<S, f64>(u, b.gradient)) / (b0 * v[0] + b1 * v[1] + b2 * v[2]);
         let delta = scaled(add_scaled::<S, f64>(u, next, v), -1.0 / determinant);
         // The determinant over the square of half the trace, as in the tangent plane's bracket.
-        let half_trace = 0.5 * (xx + yy + zz);
+        let half_trace = 0.5 * (h[0] + h[3] + h[5]);
         let curvature = determinant / (half_trace * half_trace) - 256.0 * f64::EPSILON * half_trace;
         let longest = LONGEST * self.b.trust().radius;
         (multiplier > 0.0 && dot::<S, f64>(delta, delta) <= longest * longest).then_some(Step {

@@ -17,15 +17,19 @@ pub(super) trait Relation: Copy {
     /// A vector in A's frame, from B to A, to take the first normal from.
     fn facing<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> V3<f64>;
 
-    /// Newton's step from points with `difference = x - y` in the frame, whose third vector is the normal from B to A.
+    /// Newton's step from points with `difference = x - y` in the frame, whose third vector is the normal from B to A: towards
+    /// points with their difference along the normal.
+    #[inline(always)]
     fn newton<S: Simd>(
         &self,
         simd: S,
         a: (&Plane<f64>, &Bend<f64>),
         b: (&Plane<f64>, &Bend<f64>),
-        frame: &M3<f64>,
+        _frame: &M3<f64>,
         difference: V3<f64>,
-    ) -> Step<f64>;
+    ) -> Step<f64> {
+        newton(simd, a, b, difference, 0.0)
+    }
 
     /// What the bracket of the distance at points with `difference = x - y` in the frame says of the measure.
     fn judge<S: Simd>(&self, simd: S, found: &Bracket<f64>, frame: &M3<f64>, difference: V3<f64>) -> Verdict;
@@ -66,18 +70,6 @@ impl Relation for Apart<'_> {
     #[inline(always)]
     fn facing<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> V3<f64> {
         facing(simd, a, b, relative)
-    }
-
-    #[inline(always)]
-    fn newton<S: Simd>(
-        &self,
-        simd: S,
-        a: (&Plane<f64>, &Bend<f64>),
-        b: (&Plane<f64>, &Bend<f64>),
-        _: &M3<f64>,
-        difference: V3<f64>,
-    ) -> Step<f64> {
-        newton(simd, a, b, difference, 0.0)
     }
 
     #[inline(always)]
@@ -122,18 +114,6 @@ impl Relation for Through<'_> {
             Some(n) => n,
             None => facing(simd, a, b, relative),
         }
-    }
-
-    #[inline(always)]
-    fn newton<S: Simd>(
-        &self,
-        simd: S,
-        a: (&Plane<f64>, &Bend<f64>),
-        b: (&Plane<f64>, &Bend<f64>),
-        _: &M3<f64>,
-        difference: V3<f64>,
-    ) -> Step<f64> {
-        newton(simd, a, b, difference, 0.0)
     }
 
     #[inline(always)]

@@ -13,7 +13,7 @@
 
 use super::tangent::Relative;
 use super::vector::{
-    M3, V3, add_scaled, apply, apply_symmetric, dot, normalized, rows, scaled, subtract, times_transposed,
+    M3, V3, add_scaled, apply, apply_symmetric, cofactors, dot, normalized, rows, scaled, subtract, times_transposed,
 };
 use crate::body::Body;
 use crate::polynomial::{Number, Simd};
@@ -76,17 +76,10 @@ pub(super) fn facing_along<S: Simd>(simd: S, a: &Body, b: &Body, relative: &Rela
     let (wide_a, wide_b) = (width(&shape_a), width(&shape_b));
     let (of_a, of_b) = (1.0 / wide_a, 1.0 / wide_b);
     let entry = |i: usize, j: usize| of_a * shape_a[i][j] + of_b * shape_b[i][j];
-    let [xx, xy, xz, yy, yz, zz] = [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)];
-    let inverse = [
-        yy * zz - yz * yz,
-        xz * yz - xy * zz,
-        xy * yz - xz * yy,
-        xx * zz - xz * xz,
-        xy * xz - xx * yz,
-        xx * yy - xy * xy,
-    ];
+    let sum = [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)];
+    let (inverse, determinant) = cofactors(simd, sum);
     // Times what makes it the inverse of Σ.
-    let scale = (xx * inverse[0] + xy * inverse[1] + xz * inverse[2]) * (wide_a + wide_b);
+    let scale = determinant * (wide_a + wide_b);
     let center = scaled::<S, f64>(relative.origin, -1.0);
     let of_ray = apply_symmetric::<S, f64>(&inverse, ray);
     let of_center = apply_symmetric::<S, f64>(&inverse, center);

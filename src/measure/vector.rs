@@ -86,6 +86,21 @@ pub(super) fn apply_symmetric<S: Simd, N: Number<S>>(h: &[N; 6], v: V3<N>) -> V3
     [dot([h[0], h[1], h[2]], v), dot([h[1], h[3], h[4]], v), dot([h[2], h[4], h[5]], v)]
 }
 
+/// The cofactors of the symmetric matrix with the entries xx, xy, xz, yy, yz, zz, which are its determinant times its
+/// inverse, and the determinant.
+#[inline(always)]
+pub(super) fn cofactors<S: Simd>(_: S, [xx, xy, xz, yy, yz, zz]: [f64; 6]) -> ([f64; 6], f64) {
+    let cofactors = [
+        yy * zz - yz * yz,
+        xz * yz - xy * zz,
+        xy * yz - xz * yy,
+        xx * zz - xz * xz,
+        xy * xz - xx * yz,
+        xx * yy - xy * xy,
+    ];
+    (cofactors, xx * cofactors[0] + xy * cofactors[1] + xz * cofactors[2])
+}
+
 /// A right-handed orthonormal basis whose third vector is the direction of `v` (Duff et al., Building an orthonormal basis,
 /// revisited, JCGT 6, 2017).
 #[inline(always)]

@@ -10,7 +10,7 @@ use crate::measure::relation::Through;
 use crate::measure::smooth::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
 use crate::measure::warm::{ActiveSet, Hint, WarmStart};
 use crate::polynomial::dispatch;
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 /// The middle of support points with the constraints that are active at all of them.
 fn common(points: [SupportPoint; 4]) -> SupportPoint {
@@ -19,18 +19,24 @@ fn common(points: [SupportPoint; 4]) -> SupportPoint {
     SupportPoint { x: sum * 0.25, active }
 }
 
-/// Whether points of a difference of bodies, all at least that high along n, have a point on the axis along n between them:
-/// then no direction near n shows a smaller depth, but for what they lack in height.
-fn surrounds(n: &Vector3<f64>, across: &Vector3<f64>, w: &[Vector3<f64>; 4], height: f64) -> bool {
+/// Whether points of a difference of bodies, all at least that high along n, have between them a point on the axis along n, or
+/// one no farther from it than `near`: then no direction close to n shows a smaller depth, but for what they lack.
+fn surrounds(n: &Vector3<f64>, across: &Vector3<f64>, w: &[Vector3<f64>; 4], height: f64, near: f64) -> bool {
     let other = n.cross(across);
-    let p = w.map(|w| (w.dot(across), w.dot(&other)));
-    let turns = |i: usize, j: usize| p[i].0 * p[j].1 - p[i].1 * p[j].0;
-    let holds = |i: usize, j: usize, k: usize| {
-        let [a, b, c] = [turns(i, j), turns(j, k), turns(k, i)];
-        a >= 0.0 && b >= 0.0 && c >= 0.0 || a <= 0.0 && b <= 0.0 && c <= 0.0
+    let p = w.map(|w| Vector2::new(w.dot(across), w.dot(&other)));
+    let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+    let passes = |(i, j): (usize, usize)| {
+        let along: Vector2<f64> = p[j] - p[i];
+        let share = (-p[i].dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        (p[i] + along * share).norm() <= near
     };
-    w.iter().all(|w| w.dot(n) >= height)
-        && [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]].iter().any(|t| holds(t[0], t[1], t[2]))
+    // Strictly: points all in line with the axis have nothing but their segments.
+    let holds = |[i, j, k]: [usize; 3]| {
+        let turns = [p[i].perp(&p[j]), p[j].perp(&p[k]), p[k].perp(&p[i])];
+        turns.iter().all(|turn| *turn > 0.0) || turns.iter().all(|turn| *turn < 0.0)
+    };
+    let between = pairs.into_iter().any(passes) || [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]].into_iter().any(holds);
+    between && w.iter().all(|w| w.dot(n) >= height)
 }
 
 /// First and last step of the search around a direction, as the tangent of the angle.
@@ -193,7 +199,7 @@ impl<'a> Best<'a> {
             }
             self.polish(&common(around.map(|found| found.2)), &common(around.map(|found| found.3)), &n);
             let w = around.map(|(_, _, a, b)| b.x - a.x);
-            self.settled |= self.n == Some(n) && surrounds(&n, &needle, &w, self.depth - 10.0 * enough);
+            self.settled |= self.n == Some(n) && surrounds(&n, &needle, &w, self.depth - 10.0 * enough, enough);
             if self.settled {
                 return;
             }
@@ -274,5 +280,30 @@ impl<'a> Best<'a> {
     /// Width of a bracket asked for.
     pub(in crate::measure) fn tolerance(&self) -> f64 {
         tolerance(self.pair, self.options, self.depth)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::surrounds;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn points_surround_the_axis_only_if_it_passes_between_them() {
+        let (n, x) = (Vector3::z(), Vector3::x());
+        let at = |points: [(f64, f64); 4]| {
+            let w = points.map(|(x, y)| Vector3::new(x, y, 1.0));
+            surrounds(&n, &x, &w, 1.0, 1e-9)
+        };
+        assert!(at([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]));
+        assert!(at([(1.0, 1.0), (-2.0, -2.0), (1.0, 1.0), (-2.0, -2.0)]), "an edge across the axis");
+        assert!(at([(0.0, 0.0); 4]), "a point on the axis");
+        assert!(at([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (2.0, 1.0)]), "a corner on the axis");
+        assert!(!at([(0.3, 0.1); 4]), "one point beside the axis");
+        assert!(!at([(1.0, 1.0), (2.0, 2.0), (1.0, 1.0), (2.0, 2.0)]), "an edge in line with the axis");
+        assert!(!at([(1.0, 1.0), (2.0, -1.0), (3.0, 1.0), (1.0, -1.0)]), "all on one side");
+        // Too low.
+        let low = [Vector3::new(1.0, 0.0, 0.5), Vector3::new(-1.0, 0.0, 1.0), Vector3::z(), Vector3::z()];
+        assert!(!surrounds(&n, &x, &low, 1.0, 1e-9));
     }
 }

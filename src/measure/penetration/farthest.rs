@@ -12,7 +12,9 @@
 
 use crate::body::{Body, Outline};
 use crate::measure::tangent::Side;
-use crate::measure::vector::{V3, add, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, scaled};
+use crate::measure::vector::{
+    V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, rows, scaled,
+};
 use crate::polynomial::{NumberJet, Simd, WithSimd};
 use nalgebra::Vector3;
 
@@ -67,19 +69,10 @@ impl WithSimd for Farthest<'_> {
 
 /// Newton's step from a point near the surface; none if its normal has nothing to do with e.
 #[inline(always)]
-fn step<S: Simd>(_: S, jet: &NumberJet<f64>, e: V3<f64>) -> Option<V3<f64>> {
+fn step<S: Simd>(simd: S, jet: &NumberJet<f64>, e: V3<f64>) -> Option<V3<f64>> {
     let g = jet.gradient;
     let (square, along) = (dot::<S, f64>(g, g), dot::<S, f64>(g, e));
-    let [xx, xy, xz, yy, yz, zz] = jet.hessian;
-    let cofactors = [
-        yy * zz - yz * yz,
-        xz * yz - xy * zz,
-        xy * yz - xz * yy,
-        xx * zz - xz * xz,
-        xy * xz - xx * yz,
-        xx * yy - xy * xy,
-    ];
-    let determinant = xx * cofactors[0] + xy * cofactors[1] + xz * cofactors[2];
+    let (cofactors, determinant) = cofactors(simd, jet.hessian);
     let (of_e, of_g) = (apply_symmetric::<S, f64>(&cofactors, e), apply_symmetric::<S, f64>(&cofactors, g));
     let multiplier = along / square;
     let missing = determinant * (1.0 - jet.value);

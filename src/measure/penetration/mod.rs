@@ -157,7 +157,7 @@ const MANY: usize = 2048;
 
 /// Bounds the depth from below, improving the best direction on the way.
 pub(super) fn prove(best: &mut Best<'_>) -> Proof {
-    let (n, depth) = dispatch(Scout { a: best.pair.a.body, b: best.pair.b.body, pair: best.pair });
+    let (n, depth) = dispatch(Scout { pair: best.pair });
     if !(best.depth <= depth) {
         best.seek(Some(&n));
     }

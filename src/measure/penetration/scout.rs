@@ -1,7 +1,7 @@
 //! A first look around all directions for the shortest way out of an overlap, by the outlines of the bodies. It proves
 //! nothing: it only spares the proof from being about a way that is not the shortest.
 
-use crate::body::{Body, Outline};
+use crate::body::Outline;
 use crate::measure::pair::Pair;
 use crate::measure::vector::dot;
 use crate::polynomial::{Simd, WithSimd};
@@ -9,8 +9,6 @@ use nalgebra::Vector3;
 
 /// The look, as work for the widest arithmetic.
 pub(super) struct Scout<'a> {
-    pub(super) a: &'a Body,
-    pub(super) b: &'a Body,
     pub(super) pair: &'a Pair<'a>,
 }
 
@@ -23,7 +21,7 @@ impl WithSimd for Scout<'_> {
     /// The best of the directions, a unit vector from B to A, and about how deep A is in B along it; query frame.
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> (Vector3<f64>, f64) {
-        let Self { a, b, pair } = self;
+        let (pair, a, b) = (self.pair, self.pair.a.body, self.pair.b.body);
         let outline_a = a.outline();
         let offset = pair.a_to_query(&a.normalization().center) - pair.b_to_query(&b.normalization().center);
         let mut best = (f64::INFINITY, Vector3::x());
