@@ -18,7 +18,7 @@ mod trust;
 pub use compound::{Compound, CompoundError, MAX_PARTS, Solid};
 pub use file::BodyFileError;
 pub use id::{BodyId, ParseIdError};
-pub use outline::{Mark, Outline};
+pub use outline::{Cell, Outline};
 pub use placement::{Placement, Sample};
 pub use sphere::Sphere;
 pub use surface::Volume;

@@ -1,79 +1,74 @@
 //! What a body looks like from outside, roughly, for any direction: where a cold start begins. Nothing is proven by it.
+//!
+//! The point of a body farthest along a unit vector n, as a function of n, is the gradient of the support function: its
+//! derivative K is symmetric, not negative, and `K n = 0`. Over a small cell of directions about m it is nearly `x + K (n - m)`,
+//! that is `x + K n`; x and K are fitted to the support points along the corners and the middle of the cell, which also gives
+//! flat sides, edges and corners a K to go by.
 
 use super::Constraint;
 use super::sphere::Sphere;
 use super::surface::radius;
-use crate::polynomial::{Number, NumberJet, Simd};
-use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
+use crate::polynomial::{Number, Simd};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, Matrix4, Vector3, Vector4};
 
 /// Cells along each edge of the faces of a cube around all directions.
-const CELLS: usize = 12;
+const CELLS: usize = 16;
 
-/// Numbers of a mark: point, value, gradient, Hessian.
-const FIELDS: usize = 13;
+/// Numbers of a cell: x, and K by its distinct entries.
+const FIELDS: usize = 9;
 
 /// Size of the ellipsoid that stands for the body, relative to the smallest one of its shape around the body: between that and
 /// the largest one inside.
 const FULLNESS: f64 = 0.75;
 
-/// An ellipsoid about as large as the body, and for each cell of directions the point of the body that is farthest along the
-/// middle of the cell, with the constraint that is active there.
+/// An ellipsoid about as large as the body, and for each cell of directions about where the body is farthest along them, with
+/// the constraint that is active along its middle.
 ///
 /// Points are seen from the centre of the normalization, body frame, metres.
 #[derive(Clone, Debug)]
 pub struct Outline {
     shape: Matrix3<f64>,
-    marks: Vec<[f64; FIELDS]>,
+    cells: Vec<[f64; FIELDS]>,
     active: Vec<u8>,
 }
 
-/// A point of an outline, a lane each.
+/// Where a body is farthest along the unit vectors n of a cell: about `point + turn n`, a lane each.
 #[derive(Clone, Copy, Debug)]
-pub struct Mark<N> {
-    /// Point, from the centre of the normalization, body frame, metres.
+pub struct Cell<N> {
+    /// Point for the middle of the cell, from the centre of the normalization, body frame, metres.
     pub point: [N; 3],
-    /// The active constraint there, by normalized coordinates.
-    pub jet: NumberJet<N>,
+    /// Symmetric derivative by n, metres: xx, xy, xz, yy, yz, zz.
+    pub turn: [N; 6],
 }
 
 impl Outline {
     /// `interior` is the interior point in normalized coordinates, `reach` the largest norm of normalized coordinates of the
     /// body.
     pub(super) fn new(constraints: &[Constraint], inverse: &Matrix3<f64>, interior: &Vector3<f64>, reach: f64) -> Self {
-        let rays: Vec<_> =
-            Sphere::fine().vertices().iter().map(|u| interior + u * radius(constraints, interior, u)).collect();
-        let cells = 6 * CELLS * CELLS;
-        let (mut marks, mut active) = (Vec::with_capacity(cells), Vec::with_capacity(cells));
-        for cell in 0..cells {
-            let (face, i, j) = (cell / (CELLS * CELLS), cell / CELLS % CELLS, cell % CELLS);
-            let middle = |i: usize| (2 * i + 1) as f64 / CELLS as f64 - 1.0;
-            let mut direction = Vector3::zeros();
-            direction[face / 2] = if face % 2 == 0 { 1.0 } else { -1.0 };
-            direction[(face / 2 + 1) % 3] = middle(i);
-            direction[(face / 2 + 2) % 3] = middle(j);
-            let direction = (inverse.transpose() * direction).normalize();
-            let farthest = rays.iter().max_by(|p, q| direction.dot(p).total_cmp(&direction.dot(q)));
-            let start = farthest.copied().unwrap_or(*interior);
-            let value = |index: &usize| constraints[*index].polynomial.evaluate(&start).value;
-            let index = (0..constraints.len()).max_by(|i, j| value(i).total_cmp(&value(j))).unwrap_or(0);
-            let z = farther(constraints, index, &direction, &start).unwrap_or(start);
-            let jet = NumberJet::from(constraints[index].polynomial.evaluate(&z));
-            let mut mark = [0.0; FIELDS];
-            mark[..3].copy_from_slice((inverse * z).as_slice());
-            mark[3] = jet.value;
-            mark[4..7].copy_from_slice(&jet.gradient);
-            mark[7..].copy_from_slice(&jet.hessian);
-            marks.push(mark);
-            active.push(index as u8);
+        let mut support = Support::new(constraints, inverse, interior);
+        let (mut cells, mut active) = (Vec::with_capacity(6 * CELLS * CELLS), Vec::with_capacity(6 * CELLS * CELLS));
+        for face in 0..6 {
+            // Along the corners of all cells of the face.
+            let corners: Vec<_> = (0..(CELLS + 1) * (CELLS + 1))
+                .map(|k| support.along(direction(face, 2 * (k / (CELLS + 1)), 2 * (k % (CELLS + 1)))))
+                .collect();
+            for i in 0..CELLS {
+                for j in 0..CELLS {
+                    let middle = support.along(direction(face, 2 * i + 1, 2 * j + 1));
+                    active.push(support.active as u8);
+                    let corner = |di: usize, dj: usize| &corners[(i + di) * (CELLS + 1) + j + dj];
+                    cells.push(fitted(&middle, [corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)]));
+                }
+            }
         }
         let shape = inverse * inverse.transpose() * (FULLNESS * reach).powi(2);
-        Self { shape, marks, active }
+        Self { shape, cells, active }
     }
 
-    /// The point of the mark kept there.
+    /// The point of the cell kept there.
     #[inline(always)]
     pub fn point(&self, place: f64) -> [f64; 3] {
-        let [x, y, z, ..] = self.marks[(place as usize).min(self.marks.len() - 1)];
+        let [x, y, z, ..] = self.cells[(place as usize).min(self.cells.len() - 1)];
         [x, y, z]
     }
 
@@ -82,7 +77,7 @@ impl Outline {
         &self.shape
     }
 
-    /// Where the mark for a direction (body frame, any length) is kept.
+    /// Where the cell of a direction (body frame, any length) is kept.
     #[inline(always)]
     pub fn place<S: Simd, N: Number<S>>(simd: S, [x, y, z]: [N; 3]) -> N {
         let splat = |value: f64| N::splat(simd, value);
@@ -100,15 +95,14 @@ impl Outline {
         face.mul_add(cells, i).mul_add(cells, j)
     }
 
-    /// The mark kept there.
+    /// The cell kept there.
     #[inline(always)]
-    pub fn mark<S: Simd, N: Number<S>>(&self, simd: S, place: N) -> Mark<N> {
-        let [x, y, z, value, gx, gy, gz, xx, xy, xz, yy, yz, zz] = N::gather(simd, &self.marks, place);
-        let jet = NumberJet { value, gradient: [gx, gy, gz], hessian: [xx, xy, xz, yy, yz, zz] };
-        Mark { point: [x, y, z], jet }
+    pub fn cell<S: Simd, N: Number<S>>(&self, simd: S, place: N) -> Cell<N> {
+        let [x, y, z, xx, xy, xz, yy, yz, zz] = N::gather(simd, &self.cells, place);
+        Cell { point: [x, y, z], turn: [xx, xy, xz, yy, yz, zz] }
     }
 
-    /// The constraint of the mark kept there.
+    /// The active constraint of the cell kept there.
     #[inline(always)]
     pub fn active(&self, place: f64) -> usize {
         usize::from(self.active[(place as usize).min(self.active.len() - 1)])
@@ -124,56 +118,141 @@ fn cell<S: Simd, N: Number<S>>(simd: S, across: N, scale: N) -> N {
     rounded.max(N::splat(simd, 0.0)).min(N::splat(simd, CELLS as f64 - 1.0))
 }
 
-/// The point of the body farthest along `e` (normalized coordinates), by Newton's method on `e = ν ∇g`, `g = 1`. None where it
-/// does not converge, as on edges and where the surface is flat.
-fn farther(constraints: &[Constraint], active: usize, e: &Vector3<f64>, start: &Vector3<f64>) -> Option<Vector3<f64>> {
-    let mut z = *start;
-    for _ in 0..16 {
-        let jet = constraints[active].polynomial.evaluate(&z);
-        let along = jet.gradient.dot(e);
-        if !(along > 1e-3 * jet.gradient.norm()) {
-            return None;
-        }
-        let mut matrix = Matrix4::zeros();
-        matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&(jet.hessian / along));
-        matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&jet.gradient);
-        matrix.fixed_view_mut::<1, 3>(3, 0).copy_from(&jet.gradient.transpose());
-        let residual = e - jet.gradient / along;
-        let right = Vector4::new(residual.x, residual.y, residual.z, 1.0 - jet.value);
-        let step = matrix.lu().solve(&right)?.xyz();
-        let length = step.norm();
-        z += step * (0.25 / length).min(1.0);
-        if length < 1e-9 {
-            let inside = constraints.iter().all(|constraint| constraint.polynomial.evaluate(&z).value <= 1.0 + 1e-9);
-            return (inside && e.dot(&z) >= e.dot(start) - 1e-9).then_some(z);
+/// The direction that lies on the face of the cube after so many halves of cells, body frame.
+fn direction(face: usize, i: usize, j: usize) -> Vector3<f64> {
+    let across = |halves: usize| halves as f64 / CELLS as f64 - 1.0;
+    let mut direction = Vector3::zeros();
+    direction[face / 2] = if face.is_multiple_of(2) { 1.0 } else { -1.0 };
+    direction[(face / 2 + 1) % 3] = across(i);
+    direction[(face / 2 + 2) % 3] = across(j);
+    direction.normalize()
+}
+
+/// A direction and the support point along it, from the centre of the normalization, body frame, metres.
+type Sample = (Vector3<f64>, Vector3<f64>);
+
+/// The fields of the cell with these samples.
+fn fitted((n, x): &Sample, corners: [&Sample; 4]) -> [f64; FIELDS] {
+    let mean = corners.iter().fold(Vector3::zeros(), |sum, corner| sum + corner.1) / 4.0;
+    // What bends like a paraboloid is a third of the corners' value on average.
+    let point = (x * 2.0 + mean) / 3.0;
+    let first = n.cross(&Vector3::ith(n.iamin(), 1.0)).normalize();
+    let tangents = Matrix3x2::from_columns(&[first, n.cross(&first)]);
+    // Least squares for `turn Tᵀn = Tᵀx` with a symmetric matrix: its entries 00, 01, 11 have these coefficients.
+    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for (direction, corner) in corners {
+        let (n, x) = (tangents.tr_mul(direction), tangents.tr_mul(&(corner - mean)));
+        for (row, value) in [(Vector3::new(n.x, n.y, 0.0), x.x), (Vector3::new(0.0, n.x, n.y), x.y)] {
+            normal += row * row.transpose();
+            right += row * value;
         }
     }
-    None
+    let turn = normal.cholesky().map_or(Vector3::zeros(), |factor| factor.solve(&right));
+    let mut turn = Matrix2::new(turn.x, turn.y, turn.y, turn.z).symmetric_eigen();
+    turn.eigenvalues = turn.eigenvalues.map(|value: f64| value.max(0.0));
+    let turn = tangents * turn.recompose() * tangents.transpose();
+    [point.x, point.y, point.z, turn.m11, turn.m12, turn.m13, turn.m22, turn.m23, turn.m33]
+}
+
+/// Finds support points, one after the other along directions that lie close together.
+struct Support<'a> {
+    constraints: &'a [Constraint],
+    inverse: &'a Matrix3<f64>,
+    interior: &'a Vector3<f64>,
+    /// Boundary points all around, normalized coordinates.
+    rays: Vec<Vector3<f64>>,
+    /// The last support point, normalized coordinates, and the constraint active there.
+    last: Vector3<f64>,
+    active: usize,
+}
+
+impl<'a> Support<'a> {
+    fn new(constraints: &'a [Constraint], inverse: &'a Matrix3<f64>, interior: &'a Vector3<f64>) -> Self {
+        let ray = |u: &Vector3<f64>| interior + u * radius(constraints, interior, u);
+        let rays = Sphere::fine().vertices().iter().map(ray).collect();
+        Self { constraints, inverse, interior, rays, last: *interior, active: 0 }
+    }
+
+    fn along(&mut self, n: Vector3<f64>) -> Sample {
+        let e = (self.inverse.transpose() * n).normalize();
+        self.last = self.farther(&e, &self.last).unwrap_or_else(|| {
+            let farthest = self.rays.iter().max_by(|p, q| e.dot(p).total_cmp(&e.dot(q)));
+            let start = farthest.copied().unwrap_or(*self.interior);
+            let value = |index: &usize| self.constraints[*index].polynomial.evaluate(&start).value;
+            self.active = (0..self.constraints.len()).max_by(|i, j| value(i).total_cmp(&value(j))).unwrap_or(0);
+            self.farther(&e, &start).unwrap_or(start)
+        });
+        (n, self.inverse * self.last)
+    }
+
+    /// The point of the body farthest along `e` (normalized coordinates), by Newton's method on `e = ν ∇g`, `g = 1`. None where it
+    /// does not converge, as on edges and where the surface is flat.
+    fn farther(&self, e: &Vector3<f64>, start: &Vector3<f64>) -> Option<Vector3<f64>> {
+        let polynomial = &self.constraints[self.active].polynomial;
+        let mut z = *start;
+        for _ in 0..16 {
+            let jet = polynomial.evaluate(&z);
+            let along = jet.gradient.dot(e);
+            if !(along > 1e-3 * jet.gradient.norm()) {
+                return None;
+            }
+            let mut matrix = Matrix4::zeros();
+            matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&(jet.hessian / along));
+            matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&jet.gradient);
+            matrix.fixed_view_mut::<1, 3>(3, 0).copy_from(&jet.gradient.transpose());
+            let residual = e - jet.gradient / along;
+            let right = Vector4::new(residual.x, residual.y, residual.z, 1.0 - jet.value);
+            let step = matrix.lu().solve(&right)?.xyz();
+            let length = step.norm();
+            z += step * (0.25 / length).min(1.0);
+            if length < 1e-6 {
+                let inside = |constraint: &Constraint| constraint.polynomial.evaluate(&z).value <= 1.0 + 1e-9;
+                return self.constraints.iter().all(inside).then_some(z);
+            }
+        }
+        None
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::Outline;
+    use super::{Cell, Outline};
     use crate::body::Body;
     use crate::polynomial::tests::Seeded;
     use crate::polynomial::{Lanes, Scalar, Simd, WithSimd, dispatch};
-    use nalgebra::Vector3;
+    use nalgebra::{Matrix3, Vector3};
+
+    /// `point + turn n`.
+    fn support(body: &Body, n: &Vector3<f64>) -> Vector3<f64> {
+        let place = Outline::place::<_, f64>(Scalar, (*n).into());
+        assert_eq!(body.outline().active(place), 0);
+        let Cell { point, turn: [xx, xy, xz, yy, yz, zz] } = body.outline().cell::<_, f64>(Scalar, place);
+        Vector3::from(point) + Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * n
+    }
 
     #[test]
-    fn marks_reach_nearly_as_far_as_the_body() {
+    fn cells_reach_nearly_as_far_as_the_body() {
         let half = Vector3::new(1.0, 0.7, 0.4);
         let body = Body::superellipsoid("q6", Vector3::new(1.0, 2.0, 3.0), half, 6).unwrap();
         let mut random = Seeded(11);
         for _ in 0..2000 {
             let n = Vector3::from_fn(|_, _| random.signed()).normalize();
-            let place = Outline::place::<_, f64>(Scalar, n.into());
-            let mark = body.outline().mark::<_, f64>(Scalar, place);
-            let reach = n.dot(&(Vector3::from(mark.point)));
+            let reach = n.dot(&support(&body, &n));
             // The conjugate exponent of 6 is 6/5.
             let most = (0..3).map(|i| (half[i] * n[i]).abs().powf(1.2)).sum::<f64>().powf(1.0 / 1.2);
-            assert!(body.outline().active(place) == 0 && reach <= most + 1e-9, "{n:?}: {reach} of {most}");
-            assert!(reach > most - 0.02, "{n:?}: {reach} of {most}");
-            assert!((mark.jet.value - 1.0).abs() < 1e-6, "{n:?}: {mark:?}");
+            assert!((reach - most).abs() < 0.02, "{n:?}: {reach} of {most}");
+        }
+    }
+
+    #[test]
+    fn cells_of_an_ellipsoid_are_as_good_as_their_size() {
+        let half = Vector3::new(1.0, 0.7, 0.4);
+        let body = Body::ellipsoid("e", Vector3::new(1.0, 2.0, 3.0), half).unwrap();
+        let mut random = Seeded(12);
+        for _ in 0..2000 {
+            let n = Vector3::from_fn(|_, _| random.signed()).normalize();
+            let farthest = half.component_mul(&half).component_mul(&n) / half.component_mul(&n).norm();
+            assert!((support(&body, &n) - farthest).norm() < 0.01, "{n:?}");
         }
     }
 
@@ -185,7 +264,7 @@ mod tests {
         }
     }
 
-    /// Marks for directions, in lanes.
+    /// Cells of directions, in lanes.
     struct Look<'a> {
         body: &'a Body,
         directions: [[f64; 16]; 3],
@@ -199,16 +278,16 @@ mod tests {
             let mut found = [[0.0; 16]; 2];
             for start in (0..16).step_by(Lanes::<S>::COUNT) {
                 let direction = self.directions.map(|row| Lanes::load(simd, &row[start..]));
-                let mark = self.body.outline().mark(simd, Outline::place(simd, direction));
-                mark.point[1].store(&mut found[0][start..]);
-                mark.jet.hessian[5].store(&mut found[1][start..]);
+                let cell = self.body.outline().cell(simd, Outline::place(simd, direction));
+                cell.point[1].store(&mut found[0][start..]);
+                cell.turn[5].store(&mut found[1][start..]);
             }
             found
         }
     }
 
     #[test]
-    fn lanes_find_the_same_marks() {
+    fn lanes_find_the_same_cells() {
         let body = Body::superellipsoid("q6", Vector3::zeros(), Vector3::new(1.0, 0.7, 0.4), 6).unwrap();
         let mut random = Seeded(5);
         for _ in 0..200 {
@@ -217,12 +296,12 @@ mod tests {
             let found = dispatch(Look { body: &body, directions });
             for lane in 0..16 {
                 let place = Outline::place::<_, f64>(Scalar, directions.map(|row| row[lane]));
-                let mark = body.outline().mark::<_, f64>(Scalar, place);
-                assert_eq!([mark.point[1], mark.jet.hessian[5]], [found[0][lane], found[1][lane]]);
+                let cell = body.outline().cell::<_, f64>(Scalar, place);
+                assert_eq!([cell.point[1], cell.turn[5]], [found[0][lane], found[1][lane]]);
             }
         }
         // Nonsense finds something.
         let place = Outline::place::<_, f64>(Scalar, [f64::NAN; 3]);
-        assert!(body.outline().mark::<_, f64>(Scalar, place).point.iter().all(|entry| entry.is_finite()));
+        assert!(body.outline().cell::<_, f64>(Scalar, place).point.iter().all(|entry| entry.is_finite()));
     }
 }

@@ -1,9 +1,9 @@
 //! Distances of one pair at many poses at once, a pose in each lane of the vectors.
 //!
-//! All poses are solved cold: the start of [`super::start`], the first Newton step from the marks of the outlines, then rounds
-//! of evaluation and step until the bracket is narrow. A group of poses goes through a few rounds together; the poses that
-//! need more wait until there is a group of them, so that the slowest does not hold up the others. A lane computes from its
-//! own pose only and selects where a single query would branch, so that no answer depends on the other poses of the batch.
+//! All poses are solved cold: the start of [`super::start`], then rounds of evaluation and step until the bracket is narrow. A
+//! group of poses goes through a few rounds together; the poses that need more wait until there is a group of them, so that the
+//! slowest does not hold up the others. A lane computes from its own pose only and selects where a single query would branch,
+//! so that no answer depends on the other poses of the batch.
 
 use super::Status;
 use super::active::ActiveConstraints;
@@ -11,11 +11,11 @@ use super::distance::{Distance, distance};
 use super::options::Options;
 use super::pose::Pose;
 use super::smooth::{LONGEST, WORTH_A_BRACKET};
-use super::start::facing;
+use super::start::{Start, facing, meeting};
 use super::tangent::{ALIGNED, Bend, Plane, Relative, Side, Step, bracket, moved, newton};
 use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, scaled, subtract};
 use super::warm::WarmStart;
-use crate::body::{Body, Outline, Solid};
+use crate::body::{Body, Solid};
 use crate::polynomial::{Lanes, MAX_LANES, Number, NumberJet, Simd, WithSimd, dispatch};
 use nalgebra::Vector3;
 
@@ -266,14 +266,8 @@ impl Batch<'_> {
         let worth = WORTH_A_BRACKET * longest;
         let mut at = if fresh {
             let n = facing(simd, self.a, self.b, &relative);
-            let own = apply_transposed(&relative.rotation, n);
-            let mark_a = self.a.outline().mark(simd, Outline::place(simd, [-n[0], -n[1], -n[2]]));
-            let mark_b = self.b.outline().mark(simd, Outline::place(simd, own));
-            let y = add(relative.origin, apply(&relative.rotation, mark_b.point));
-            let mut at = Iterate { x: mark_a.point, y, n };
-            let first = at.linearize(simd, (&side_a, &mark_a.jet), (&side_b, &mark_b.jet));
-            at.advance(simd, &first, longest);
-            at
+            let Start { x, y, n, .. } = meeting(simd, self.a, self.b, &relative, n, None);
+            Iterate { x, y, n }
         } else {
             let column = |i: usize| Lanes::load(simd, &group.at[i]);
             Iterate {
@@ -283,17 +277,19 @@ impl Batch<'_> {
             }
         };
         let mut open = (1_u32 << group.count) - 1;
-        for round in 1..=if fresh { ROUNDS } else { 1 } {
+        let rounds = if fresh { ROUNDS } else { 1 };
+        for round in 1..=rounds {
             let ((jet_a, inside_a), (jet_b, inside_b)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
             if fresh && round == 1 {
-                // The first step may have led to where the surfaces face otherwise.
+                // The surfaces may face otherwise where the start is.
                 let (a, b) = (side_a.pulled_back(simd, jet_a.gradient), side_b.pulled_back(simd, jet_b.gradient));
                 at.face(simd, a, b);
             }
             let here = at.linearize(simd, (&side_a, &jet_a), (&side_b, &jet_b));
             let inside = Lanes::and(simd, inside_a, inside_b);
             let short = Lanes::and(simd, inside, here.square.le(splat(worth * worth)));
-            if (round > 1 || !fresh) && Lanes::bits(simd, short) & open != 0 {
+            // Before the last round hardly ever all lanes of a group are so far.
+            if round == rounds && Lanes::bits(simd, short) & open != 0 {
                 let next_a = side_a.extrapolate(simd, &jet_a, &here.local.0, here.step.dx);
                 let next_b = side_b.extrapolate(simd, &jet_b, &here.local.1, here.step.dy);
                 let next = subtract(add(here.difference, here.step.dx), here.step.dy);
@@ -320,13 +316,13 @@ impl Batch<'_> {
             coordinate.store(&mut group.at[i]);
         }
         for lane in 0..group.count {
-            let rounds = group.rounds[lane] + if fresh { ROUNDS } else { 1 };
-            if open >> lane & 1 == 1 && rounds < MOST_ROUNDS {
+            let spent = group.rounds[lane] + rounds;
+            if open >> lane & 1 == 1 && spent < MOST_ROUNDS {
                 let mut entry = [0.0; 9];
                 for (entry, column) in entry.iter_mut().zip(&group.at) {
                     *entry = column[lane];
                 }
-                waiting.push((group.pose[lane], rounds, entry));
+                waiting.push((group.pose[lane], spent, entry));
             }
         }
     }

@@ -3,7 +3,7 @@
 
 use super::decide::Goal;
 use super::pose::Pose;
-use super::start::facing;
+use super::start::{Start, facing, meeting};
 use super::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, Step, newton};
 use super::vector::{M3, V3, add, add_scaled, dot, subtract};
 use crate::body::Body;
@@ -14,8 +14,8 @@ pub(super) trait Relation: Copy {
     /// Where B stands as seen from A.
     fn relative<S: Simd>(&self, simd: S, a: &Body, b: &Body) -> Relative<f64>;
 
-    /// A vector in A's frame, from B to A, to take the first normal from.
-    fn facing<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> V3<f64>;
+    /// Where to start from nothing but the poses.
+    fn start<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> Start<f64>;
 
     /// Newton's step from points with `difference = x - y` in the frame, whose third vector is the normal from B to A: towards
     /// points with their difference along the normal.
@@ -68,8 +68,8 @@ impl Relation for Apart<'_> {
     }
 
     #[inline(always)]
-    fn facing<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> V3<f64> {
-        facing(simd, a, b, relative)
+    fn start<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> Start<f64> {
+        meeting(simd, a, b, relative, facing(simd, a, b, relative), None)
     }
 
     #[inline(always)]
@@ -109,11 +109,9 @@ impl Relation for Through<'_> {
     }
 
     #[inline(always)]
-    fn facing<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> V3<f64> {
-        match self.facing {
-            Some(n) => n,
-            None => facing(simd, a, b, relative),
-        }
+    fn start<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> Start<f64> {
+        let n = self.facing.unwrap_or_else(|| facing(simd, a, b, relative));
+        meeting(simd, a, b, relative, n, None)
     }
 
     #[inline(always)]

@@ -10,7 +10,7 @@ use super::pose::Pose;
 use super::relation::{Relation, Verdict};
 use super::tangent::{Bend, Plane, Relative, Side, Step, bracket, moved};
 use super::vector::{M3, V3, add, apply, apply_transposed, basis, dot, subtract};
-use crate::body::{Body, Outline};
+use crate::body::Body;
 use crate::polynomial::{NumberJet, Scalar, Simd, WithSimd};
 use nalgebra::Vector3;
 
@@ -186,25 +186,10 @@ impl<R: Relation> WithSimd for Seek<'_, R> {
     fn with_simd<S: Simd>(self, simd: S) -> Result<(Proven, Trace), u32> {
         let Self { a, b, relation, limit, options } = self;
         let relative = relation.relative(simd, a, b);
-        let n = relation.facing(simd, a, b, &relative);
-        let own = apply_transposed::<S, f64>(&relative.rotation, n);
-        let (place_a, place_b) = (Outline::place(simd, [-n[0], -n[1], -n[2]]), Outline::place(simd, own));
-        let active = [a.outline().active(place_a), b.outline().active(place_b)];
-        let (mark_a, mark_b) = (a.outline().mark(simd, place_a), b.outline().mark(simd, place_b));
+        let start = relation.start(simd, a, b, &relative);
+        let active = [a.outline().active(start.places[0]), b.outline().active(start.places[1])];
         let correct = Correct::new(simd, a, b, active, &relative, relation, limit, options);
-        // The first step from the marks needs no evaluation.
-        let y = add::<S, f64>(apply::<S, f64>(&relative.rotation, mark_b.point), relative.origin);
-        let mut at = Iterate { x: mark_a.point, y, frame: basis(simd, n) };
-        let (side_a, side_b) = &correct.sides;
-        let (local_a, local_b) = (side_a.localize(simd, &at.frame), side_b.localize(simd, &at.frame));
-        let jet_a = (Plane::new(simd, &mark_a.jet, &local_a), Bend::new(simd, &mark_a.jet, &local_a));
-        let jet_b = (Plane::new(simd, &mark_b.jet, &local_b), Bend::new(simd, &mark_b.jet, &local_b));
-        let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
-        let step = relation.newton(simd, (&jet_a.0, &jet_a.1), (&jet_b.0, &jet_b.1), &at.frame, difference);
-        let square = step.square(simd);
-        if square.is_finite() {
-            at.advance(simd, &step.at_most(simd, correct.longest, square));
-        }
+        let at = Iterate { x: start.x, y: start.y, frame: basis(simd, start.n) };
         let mut trace = Trace::blank(active.map(|i| i as u8));
         let proven = correct.run(simd, &relative, at, &mut trace)?;
         Ok((proven, trace))

@@ -8,18 +8,22 @@
 //! (D I + K_A + K_B) dn = w - (n·w) n,    K = (Σ - Σ n nᵀ Σ / h²) / h
 //! ```
 //!
-//! with K the derivative of the farthest point, so that two such turns find about where the bodies face each other. There the
-//! outlines of the bodies have marks with all that Newton's method on the bodies themselves needs for its first step.
+//! with K the derivative of the farthest point, so that such turns find about where the ellipsoids face each other. There the
+//! outlines of the bodies know about where these are farthest themselves and how that changes, for another such turn or two.
 
 use super::tangent::Relative;
 use super::vector::{
-    M3, V3, add_scaled, apply, apply_symmetric, cofactors, dot, normalized, rows, scaled, subtract, times_transposed,
+    M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, normalized, rows, scaled,
+    subtract, times_transposed,
 };
-use crate::body::Body;
+use crate::body::{Body, Outline};
 use crate::polynomial::{Number, Simd};
 
-/// Turns of the normal.
-const TURNS: usize = 2;
+/// Turns of the normal by ellipsoids.
+const ROUGH_TURNS: usize = 2;
+
+/// Turns of the normal by outlines.
+const TURNS: usize = 1;
 
 /// Least distance that n is turned for, relative to the widths of the ellipsoids.
 const LEAST: f64 = 1e-3;
@@ -35,7 +39,7 @@ pub(super) fn facing<S: Simd, N: Number<S>>(simd: S, a: &Body, b: &Body, relativ
     let shape_b = rows(simd, b.outline().shape());
     let shape_b = times_transposed(&times_transposed(&relative.rotation, &shape_b), &relative.rotation);
     let mut n = normalized(simd, [-relative.origin[0], -relative.origin[1], -relative.origin[2]]);
-    for _ in 0..TURNS {
+    for _ in 0..ROUGH_TURNS {
         let (u, v) = (apply(&shape_a, n), apply(&shape_b, n));
         let (wide_a, wide_b) = (dot(n, u).sqrt(), dot(n, v).sqrt());
         let inverse = one / (wide_a * wide_b);
@@ -88,6 +92,72 @@ pub(super) fn facing_along<S: Simd>(simd: S, a: &Body, b: &Body, relative: &Rela
     // 0 may lie outside of the ellipsoid, which is none of the body's.
     let reach = (across + (across * across + along * inside.max(0.0)).sqrt()) / along;
     subtract::<S, f64>(of_center, scaled::<S, f64>(of_ray, reach))
+}
+
+/// About where two bodies are nearest or deepest in each other.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Start<N> {
+    /// Point of A, from the centre of its normalization on, in A's frame, metres.
+    pub(super) x: V3<N>,
+    /// Point of B, the same way.
+    pub(super) y: V3<N>,
+    /// Unit vector from B to A, in A's frame.
+    pub(super) n: V3<N>,
+    /// Where A's outline keeps the cell of `-n` and B's that of n.
+    pub(super) places: [N; 2],
+}
+
+/// Where the outlines have `x - y` along n, or along a ray if one is given; from a unit vector n on, in A's frame.
+#[inline(always)]
+pub(super) fn meeting<S: Simd, N: Number<S>>(
+    simd: S,
+    a: &Body,
+    b: &Body,
+    relative: &Relative<N>,
+    mut n: V3<N>,
+    ray: Option<V3<N>>,
+) -> Start<N> {
+    let zero = N::splat(simd, 0.0);
+    let least = N::splat(simd, LEAST * (a.trust().reach + b.trust().reach));
+    let mut start = Start { x: n, y: n, n, places: [zero; 2] };
+    for _ in 0..TURNS {
+        let own = apply_transposed(&relative.rotation, n);
+        let places = [Outline::place(simd, scaled(n, -N::splat(simd, 1.0))), Outline::place(simd, own)];
+        let (cell_a, cell_b) = (a.outline().cell(simd, places[0]), b.outline().cell(simd, places[1]));
+        // Points for n, and how they turn with it.
+        let turn_a = cell_a.turn;
+        let turn_b = turned_symmetric(&relative.rotation, &cell_b.turn);
+        let of_a = cell_a.point;
+        let of_b = add(relative.origin, apply(&relative.rotation, cell_b.point));
+        let x = subtract(of_a, apply_symmetric(&turn_a, n));
+        let y = add(of_b, apply_symmetric(&turn_b, n));
+        let w = subtract(x, y);
+        let along = ray.unwrap_or(n);
+        let distance = dot(n, w) / dot(n, along);
+        let stiff = if ray.is_some() { least } else { distance.max(least) };
+        let mut matrix = [stiff; 6];
+        for i in 0..6 {
+            let bent = turn_a[i] + turn_b[i];
+            matrix[i] = if matches!(i, 0 | 3 | 5) { stiff + bent } else { bent };
+        }
+        n = turned(simd, n, &matrix, add_scaled(w, -distance, along));
+        // Of the same cells: where a side is flat a small turn leads far, to another cell for which it was not meant.
+        start = Start {
+            x: subtract(of_a, apply_symmetric(&turn_a, n)),
+            y: add(of_b, apply_symmetric(&turn_b, n)),
+            n,
+            places,
+        };
+    }
+    start
+}
+
+/// `R M Rᵀ` of a symmetric matrix with the entries xx, xy, xz, yy, yz, zz.
+#[inline(always)]
+fn turned_symmetric<S: Simd, N: Number<S>>(rotation: &M3<N>, m: &[N; 6]) -> [N; 6] {
+    let rows = [0, 1, 2].map(|i| apply_symmetric(m, rotation[i]));
+    let entry = |i: usize, j: usize| dot(rotation[i], rows[j]);
+    [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)]
 }
 
 /// The direction of `n + M⁻¹ r`, by cofactors of the symmetric matrix M with the entries xx, xy, xz, yy, yz, zz; the turn is

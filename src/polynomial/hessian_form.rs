@@ -35,7 +35,7 @@ impl From<Jet> for NumberJet<f64> {
 /// Row of the table: the ten distinct entries of `F` for one monomial, padded and aligned to the widest vectors.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-pub struct Row(pub(super) [f64; 16]);
+struct Row([f64; 16]);
 
 /// Index pairs (i, j), i <= j, of the ten distinct entries of the symmetric 4x4 matrix `F`, in table order.
 const ENTRIES: [(usize, usize); 10] = [(0, 0), (0, 1), (0, 2), (0, 3), (1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3)];
@@ -92,12 +92,12 @@ impl HessianForm {
 
     /// Value, gradient and Hessian, to be inlined into work for [`dispatch`].
     #[inline(always)]
-    pub(super) fn jet<S: Simd, N: Number<S>>(&self, simd: S, z: [N; 3]) -> NumberJet<N> {
+    pub(super) fn jet<S: Simd>(&self, simd: S, z: [f64; 3]) -> NumberJet<f64> {
         match self.degree {
-            2 => jet::<S, N, 2, { count(0) }>(simd, &self.table, z),
-            4 => jet::<S, N, 4, { count(2) }>(simd, &self.table, z),
-            6 => jet::<S, N, 6, { count(4) }>(simd, &self.table, z),
-            _ => jet::<S, N, 8, { count(6) }>(simd, &self.table, z),
+            2 => jet::<S, 2, { count(0) }>(simd, &self.table, z),
+            4 => jet::<S, 4, { count(2) }>(simd, &self.table, z),
+            6 => jet::<S, 6, { count(4) }>(simd, &self.table, z),
+            _ => jet::<S, 8, { count(6) }>(simd, &self.table, z),
         }
     }
 }
@@ -113,7 +113,7 @@ impl WithSimd for Evaluation<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Jet {
-        let NumberJet { value, gradient, hessian: h } = self.form.jet::<S, f64>(simd, [self.z.x, self.z.y, self.z.z]);
+        let NumberJet { value, gradient, hessian: h } = self.form.jet(simd, [self.z.x, self.z.y, self.z.z]);
         Jet {
             value,
             gradient: Vector3::from(gradient),
@@ -124,94 +124,48 @@ impl WithSimd for Evaluation<'_> {
 
 /// The product of table and monomials with the degree known at compile time, so that every loop unrolls.
 #[inline(always)]
-fn jet<S: Simd, N: Number<S>, const DEGREE: usize, const K: usize>(simd: S, table: &[Row], z: [N; 3]) -> NumberJet<N> {
-    let mut powers = [N::splat(simd, 1.0); K];
-    fill::<S, N, K>(DEGREE - 2, z, &mut powers);
+fn jet<S: Simd, const DEGREE: usize, const K: usize>(simd: S, table: &[Row], z: [f64; 3]) -> NumberJet<f64> {
+    let mut powers = [1.0; K];
+    fill::<K>(DEGREE - 2, z, &mut powers);
     // One check of the length here, none below.
     let table = table.first_chunk::<K>().expect("a table has as many rows as its degree has monomials");
-    let f = N::contract(simd, table, &powers);
-    let inverse = N::splat(simd, 1.0 / (DEGREE - 1) as f64);
+    let f = contract(simd, table, &powers);
+    let inverse = 1.0 / (DEGREE - 1) as f64;
     // F z̃, row by row, then z̃ᵀ F z̃.
-    let mut product = [N::splat(simd, 0.0); 4];
+    let fused = <f64 as Number<S>>::mul_add;
+    let mut product = [0.0; 4];
     for (product, [a, b, c, d]) in product.iter_mut().zip([[0, 1, 2, 3], [1, 4, 5, 6], [2, 5, 7, 8], [3, 6, 8, 9]]) {
-        *product = f[d].mul_add(z[2], f[c].mul_add(z[1], f[b].mul_add(z[0], f[a])));
+        *product = fused(f[d], z[2], fused(f[c], z[1], fused(f[b], z[0], f[a])));
     }
     let [g0, g1, g2, g3] = product;
-    let product = g3.mul_add(z[2], g2.mul_add(z[1], g1.mul_add(z[0], g0)));
+    let product = fused(g3, z[2], fused(g2, z[1], fused(g1, z[0], g0)));
     NumberJet {
-        value: product * N::splat(simd, 1.0 / (DEGREE * (DEGREE - 1)) as f64),
+        value: product * (1.0 / (DEGREE * (DEGREE - 1)) as f64),
         gradient: [g1 * inverse, g2 * inverse, g3 * inverse],
         hessian: [f[4], f[5], f[6], f[7], f[8], f[9]],
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::polynomial::simd::{Arch, Lanes};
-
-    fn form(degree: usize) -> HessianForm {
-        let terms: Vec<_> =
-            monomials(degree).into_iter().enumerate().map(|(i, e)| (e, (i as f64 * 0.7).sin())).collect();
-        HessianForm::new(degree, &terms)
-    }
-
-    /// Values, second gradient and xz Hessian entries at sixteen points, in lanes or one by one.
-    struct Points<'a> {
-        form: &'a HessianForm,
-        points: [[f64; 16]; 3],
-        in_lanes: bool,
-    }
-
-    impl WithSimd for Points<'_> {
-        type Output = [[f64; 16]; 3];
-
-        #[inline(always)]
-        fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-            let mut found = [[0.0; 16]; 3];
-            for start in (0..16).step_by(Lanes::<S>::COUNT) {
-                if self.in_lanes {
-                    let jet = self.form.jet(simd, self.points.map(|row| Lanes::load(simd, &row[start..])));
-                    let entries = [jet.value, jet.gradient[1], jet.hessian[2]];
-                    for (entry, row) in entries.into_iter().zip(&mut found) {
-                        entry.store(&mut row[start..]);
-                    }
-                } else {
-                    for i in start..start + Lanes::<S>::COUNT {
-                        let jet = self.form.jet(simd, self.points.map(|row| row[i]));
-                        for (entry, row) in [jet.value, jet.gradient[1], jet.hessian[2]].into_iter().zip(&mut found) {
-                            row[i] = entry;
-                        }
-                    }
-                }
-            }
-            found
-        }
-    }
-
-    #[test]
-    fn every_level_and_every_lane_agrees_within_rounding() {
-        for degree in [2, 4, 6, 8] {
-            let form = form(degree);
-            let points = [0.3, 0.2, -0.1].map(|step| std::array::from_fn(|i| 0.9 - 0.5 * step * i as f64));
-            let plain = Arch::Scalar.dispatch(Points { form: &form, points, in_lanes: false });
-            for arch in [Arch::Scalar, narrower(), Arch::new()] {
-                for in_lanes in [false, true] {
-                    let found = arch.dispatch(Points { form: &form, points, in_lanes });
-                    for (a, b) in found.iter().flatten().zip(plain.iter().flatten()) {
-                        assert!((a - b).abs() < 1e-13 * (1.0 + b.abs()), "degree {degree}, {arch:?}: {a} against {b}");
-                    }
-                }
+/// Sums over the rows k of `table[k][i] powers[k]`, for each of the ten entries i, which lie side by side in vectors.
+#[inline(always)]
+fn contract<S: Simd, const K: usize>(simd: S, table: &[Row; K], powers: &[f64; K]) -> [f64; ENTRIES.len()] {
+    // Four sums in turn: a single one would wait for each addition before the next.
+    let mut partial = [[simd.splat_f64s(0.0); ENTRIES.len()]; 4];
+    let vectors = ENTRIES.len().div_ceil(S::F64_LANES);
+    for (rows, powers) in table.chunks(4).zip(powers.chunks(4)) {
+        for ((row, &power), sums) in rows.iter().zip(powers).zip(&mut partial) {
+            let power = simd.splat_f64s(power);
+            for (sum, &entries) in sums.iter_mut().zip(&S::as_simd_f64s(&row.0).0[..vectors]) {
+                *sum = simd.mul_add_e_f64s(entries, power, *sum);
             }
         }
     }
-
-    /// One level below the widest, where there is one.
-    fn narrower() -> Arch {
-        #[cfg(target_arch = "x86_64")]
-        if let Some(simd) = pulp::x86::V3::try_new() {
-            return Arch::V3(simd);
-        }
-        Arch::Scalar
+    let mut stored = Row([0.0; 16]);
+    for (i, target) in S::as_mut_simd_f64s(&mut stored.0).0[..vectors].iter_mut().enumerate() {
+        let [a, b, c, d] = [partial[0][i], partial[1][i], partial[2][i], partial[3][i]];
+        *target = simd.add_f64s(simd.add_f64s(a, b), simd.add_f64s(c, d));
     }
+    let mut sums = [0.0; ENTRIES.len()];
+    sums.copy_from_slice(&stored.0[..ENTRIES.len()]);
+    sums
 }

@@ -8,6 +8,7 @@ mod definite;
 mod gram;
 mod hessian_form;
 mod monomial;
+mod nested;
 mod rounding;
 mod simd;
 
@@ -20,6 +21,7 @@ pub use simd::{Arch, Lanes, MAX_LANES, Number, Scalar, Simd, WithSimd, dispatch}
 
 use hessian_form::HessianForm;
 use nalgebra::Vector3;
+use nested::Nested;
 use rounding::AbsolutePolynomial;
 
 /// Highest degree a polynomial may have.
@@ -32,6 +34,7 @@ pub const MAX_DEGREE: usize = 8;
 pub struct Polynomial {
     terms: Vec<(Exponents, f64)>,
     form: HessianForm,
+    nested: Nested,
     absolute: AbsolutePolynomial,
 }
 
@@ -79,8 +82,9 @@ impl Polynomial {
             return Err(PolynomialError::Degree(degree));
         }
         let form = HessianForm::new(degree, &terms);
+        let nested = Nested::new(degree, &terms);
         let absolute = AbsolutePolynomial::new(degree, &terms);
-        Ok(Self { terms, form, absolute })
+        Ok(Self { terms, form, nested, absolute })
     }
 
     /// Degree: 2, 4, 6 or 8.
@@ -99,10 +103,11 @@ impl Polynomial {
         self.form.evaluate(z)
     }
 
-    /// Value, gradient and Hessian at the points `z`, a lane each, to be inlined into work for [`dispatch`].
+    /// Value, gradient and Hessian at the points `z`, a lane each, to be inlined into work for [`dispatch`]: as
+    /// [`Polynomial::evaluate`] for one point, by nested Horner schemes for several.
     #[inline(always)]
     pub fn jet<S: Simd, N: Number<S>>(&self, simd: S, z: [N; 3]) -> NumberJet<N> {
-        self.form.jet(simd, z)
+        N::jet(simd, self, z)
     }
 
     /// Bound of `|computed value - p(z')|` over all `z'` with `|z'_i - z_i| <= dz_i`, `gradient` being the computed one.
@@ -153,7 +158,8 @@ impl Polynomial {
         let absolute = AbsolutePolynomial::new(self.degree(), &terms);
         // The constant enters the table only through F_00, but the table is cheap to make anew.
         let form = HessianForm::new(self.degree(), &terms);
-        Self { terms, form, absolute }
+        let nested = Nested::new(self.degree(), &terms);
+        Self { terms, form, nested, absolute }
     }
 }
 

@@ -1,7 +1,5 @@
 //! Monomials in three variables, in the graded order the evaluation table is laid out in.
 
-use super::simd::{Number, Simd};
-
 /// Exponents of a monomial `z1^e1 z2^e2 z3^e3`.
 pub type Exponents = [u8; 3];
 
@@ -37,25 +35,25 @@ pub fn monomials(max_degree: usize) -> Vec<Exponents> {
 /// A monomial of degree t costs t - 1 multiplications in sequence, hence at most t - 1 roundings. With a constant degree
 /// every loop unrolls.
 #[inline(always)]
-pub(crate) fn fill<S: Simd, N: Number<S>, const K: usize>(degree: usize, z: [N; 3], values: &mut [N; K]) {
+pub(super) fn fill<const K: usize>(degree: usize, z: [f64; 3], values: &mut [f64; K]) {
     debug_assert!(K == count(degree) && degree <= 6);
     if degree >= 2 {
-        block::<S, N, 1, K>(z, values);
-        block::<S, N, 2, K>(z, values);
+        block::<1, K>(z, values);
+        block::<2, K>(z, values);
     }
     if degree >= 4 {
-        block::<S, N, 3, K>(z, values);
-        block::<S, N, 4, K>(z, values);
+        block::<3, K>(z, values);
+        block::<4, K>(z, values);
     }
     if degree >= 6 {
-        block::<S, N, 5, K>(z, values);
-        block::<S, N, 6, K>(z, values);
+        block::<5, K>(z, values);
+        block::<6, K>(z, values);
     }
 }
 
 /// The monomials of degree `TOTAL` from those of one degree less.
 #[inline(always)]
-fn block<S: Simd, N: Number<S>, const TOTAL: usize, const K: usize>(z: [N; 3], values: &mut [N; K]) {
+fn block<const TOTAL: usize, const K: usize>(z: [f64; 3], values: &mut [f64; K]) {
     let size = TOTAL * (TOTAL + 1) / 2;
     let (known, next) = values.split_at_mut(count(TOTAL - 1));
     let previous = &known[count(TOTAL - 1) - size..];
@@ -77,7 +75,7 @@ mod tests {
     fn values_follow_the_order_of_the_list() {
         let z = [1.5, -0.75, 0.3125];
         let mut values = [1.0; 84];
-        fill::<pulp::Scalar, f64, 84>(6, z, &mut values);
+        fill::<84>(6, z, &mut values);
         for (exponents, value) in monomials(6).into_iter().zip(values) {
             let direct: f64 = (0..3).map(|i| z[i].powi(i32::from(exponents[i]))).product();
             assert!((value - direct).abs() <= 1e-14 * direct.abs(), "{exponents:?}: {value} against {direct}");

@@ -3,7 +3,8 @@
 //! Every quantity [`super::Polynomial::evaluate`] returns is a sum of products of coefficients and coordinates, and each
 //! product passes through at most `M` roundings: 1 for its table entry, at most k - 3 for its monomial, 1 for the
 //! product of the two, K for the accumulation over the K monomials, then 4 for a row of `F z̃`, 4 for the product with
-//! `z̃`, and 3 for the division by k (k - 1), so `M = K + k + 10`. Hence (Higham, Accuracy and Stability of Numerical
+//! `z̃`, and 3 for the division by k (k - 1), so `M = K + k + 10`; in the nested schemes for many points at most 2 for each
+//! power of a coordinate and 3 for the three additions, which is less. Hence (Higham, Accuracy and Stability of Numerical
 //! Algorithms, section 3.1) the error is at most `γ_M` times the same expression with absolute values, which by Euler's
 //! identity is exactly `Σ |c_e| |z^e|`. With `r = max |z_i|` that is at most `Q(r) = Σ_j C_j r^j`, `C_j` the sum of
 //! `|c_e|` over degree j: one Horner scheme, valid everywhere. Derivatives of Q bound those of p in the same way.

@@ -4,7 +4,8 @@
 //! AVX-512. Everything it calls has to be inlined into it to profit. Results differ between the versions only within the
 //! rounding bounds, which count the roundings of the plain one.
 
-use super::hessian_form::Row;
+use super::Polynomial;
+use super::hessian_form::NumberJet;
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::sync::LazyLock;
@@ -17,9 +18,6 @@ pub fn dispatch<T: WithSimd>(work: T) -> T::Output {
     static WIDEST: LazyLock<Arch> = LazyLock::new(Arch::new);
     WIDEST.dispatch(work)
 }
-
-/// Entries of a row of the table that carry something.
-pub(super) const ENTRIES: usize = 10;
 
 /// Real numbers that are computed with: one double, or several side by side that know nothing of each other.
 pub trait Number<S: Simd>:
@@ -46,8 +44,8 @@ pub trait Number<S: Simd>:
     fn and(simd: S, a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// `self` where the mask holds, else `other`.
     fn select(self, mask: Self::Mask, other: Self) -> Self;
-    /// Sums over the rows k of a table of `table[k][i] powers[k]`, for each of the ten entries i.
-    fn contract<const K: usize>(simd: S, table: &[Row; K], powers: &[Self; K]) -> [Self; ENTRIES];
+    /// Value, gradient and Hessian of the polynomial at points z, by the scheme that suits as many of them.
+    fn jet(simd: S, polynomial: &Polynomial, z: [Self; 3]) -> NumberJet<Self>;
     /// The rows of a table at whole-numbered places; the last one beyond its end, the first one for what is not a number.
     fn gather<const K: usize>(simd: S, table: &[[f64; K]], place: Self) -> [Self; K];
 }
@@ -92,28 +90,9 @@ impl<S: Simd> Number<S> for f64 {
     fn select(self, mask: bool, other: Self) -> Self {
         if mask { self } else { other }
     }
-    /// The entries of a row lie side by side in vectors.
     #[inline(always)]
-    fn contract<const K: usize>(simd: S, table: &[Row; K], powers: &[Self; K]) -> [Self; ENTRIES] {
-        // Four sums in turn: a single one would wait for each addition before the next.
-        let mut partial = [[simd.splat_f64s(0.0); ENTRIES]; 4];
-        let vectors = ENTRIES.div_ceil(S::F64_LANES);
-        for (rows, powers) in table.chunks(4).zip(powers.chunks(4)) {
-            for ((row, &power), sums) in rows.iter().zip(powers).zip(&mut partial) {
-                let power = simd.splat_f64s(power);
-                for (sum, &entries) in sums.iter_mut().zip(&S::as_simd_f64s(&row.0).0[..vectors]) {
-                    *sum = simd.mul_add_e_f64s(entries, power, *sum);
-                }
-            }
-        }
-        let mut stored = Row([0.0; 16]);
-        for (i, target) in S::as_mut_simd_f64s(&mut stored.0).0[..vectors].iter_mut().enumerate() {
-            let [a, b, c, d] = [partial[0][i], partial[1][i], partial[2][i], partial[3][i]];
-            *target = simd.add_f64s(simd.add_f64s(a, b), simd.add_f64s(c, d));
-        }
-        let mut sums = [0.0; ENTRIES];
-        sums.copy_from_slice(&stored.0[..ENTRIES]);
-        sums
+    fn jet(simd: S, polynomial: &Polynomial, z: [Self; 3]) -> NumberJet<Self> {
+        polynomial.form.jet(simd, z)
     }
     #[inline(always)]
     fn gather<const K: usize>(_: S, table: &[[f64; K]], place: Self) -> [Self; K] {
@@ -122,42 +101,39 @@ impl<S: Simd> Number<S> for f64 {
 }
 
 /// Most lanes of any processor served.
-pub const MAX_LANES: usize = 16;
+pub const MAX_LANES: usize = 8;
 
-/// As many doubles side by side as fit two vectors: while one waits for a result the other computes.
+/// As many doubles side by side as fit a vector.
 #[derive(Clone, Copy, Debug)]
 pub struct Lanes<S: Simd> {
     simd: S,
-    values: [S::f64s; 2],
+    values: S::f64s,
 }
 
 impl<S: Simd> Lanes<S> {
     /// How many.
-    pub const COUNT: usize = 2 * S::F64_LANES;
+    pub const COUNT: usize = S::F64_LANES;
 
     /// The first values of a slice of at least [`Lanes::COUNT`].
     #[inline(always)]
     pub fn load(simd: S, values: &[f64]) -> Self {
-        let vectors = S::as_simd_f64s(&values[..Self::COUNT]).0;
-        Self { simd, values: [vectors[0], vectors[1]] }
+        Self { simd, values: S::as_simd_f64s(&values[..Self::COUNT]).0[0] }
     }
 
     /// Writes the lanes to the front of a slice of at least [`Lanes::COUNT`].
     #[inline(always)]
     pub fn store(self, target: &mut [f64]) {
-        let vectors = S::as_mut_simd_f64s(&mut target[..Self::COUNT]).0;
-        (vectors[0], vectors[1]) = (self.values[0], self.values[1]);
+        S::as_mut_simd_f64s(&mut target[..Self::COUNT]).0[0] = self.values;
     }
 
     /// The lanes where the mask holds, as bits.
     #[inline(always)]
-    pub fn bits(simd: S, mask: [S::m64s; 2]) -> u32 {
+    pub fn bits(simd: S, mask: S::m64s) -> u32 {
         let mut powers = [0.0; MAX_LANES];
         for (lane, power) in powers.iter_mut().enumerate() {
             *power = f64::from(1_u32 << lane);
         }
-        let [a, b] = Self::load(simd, &powers).select(mask, Self::splat(simd, 0.0)).values;
-        simd.reduce_sum_f64s(simd.add_f64s(a, b)) as u32
+        simd.reduce_sum_f64s(Self::load(simd, &powers).select(mask, Self::splat(simd, 0.0)).values) as u32
     }
 }
 
@@ -167,8 +143,7 @@ macro_rules! lane_operator {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                let (simd, [a, b], [c, d]) = (self.simd, self.values, other.values);
-                Self { simd, values: [simd.$operation(a, c), simd.$operation(b, d)] }
+                Self { simd: self.simd, values: self.simd.$operation(self.values, other.values) }
             }
         }
     )*};
@@ -179,8 +154,7 @@ impl<S: Simd> Neg for Lanes<S> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        let (simd, [a, b]) = (self.simd, self.values);
-        Self { simd, values: [simd.neg_f64s(a), simd.neg_f64s(b)] }
+        Self { simd: self.simd, values: self.simd.neg_f64s(self.values) }
     }
 }
 
@@ -188,52 +162,38 @@ macro_rules! lane_function {
     ($($method:ident $operation:ident $($other:ident)?),*) => {$(
         #[inline(always)]
         fn $method(self $(, $other: Self)?) -> Self {
-            let (simd, [a, b]) = (self.simd, self.values);
-            Self { simd, values: [simd.$operation(a $(, $other.values[0])?), simd.$operation(b $(, $other.values[1])?)] }
+            Self { simd: self.simd, values: self.simd.$operation(self.values $(, $other.values)?) }
         }
     )*};
 }
 
 impl<S: Simd> Number<S> for Lanes<S> {
-    type Mask = [S::m64s; 2];
+    type Mask = S::m64s;
 
     #[inline(always)]
     fn splat(simd: S, value: f64) -> Self {
-        Self { simd, values: [simd.splat_f64s(value); 2] }
+        Self { simd, values: simd.splat_f64s(value) }
     }
     #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
-        let (simd, [p, q], b, c) = (self.simd, self.values, b.values, c.values);
-        Self { simd, values: [simd.mul_add_e_f64s(p, b[0], c[0]), simd.mul_add_e_f64s(q, b[1], c[1])] }
+        Self { simd: self.simd, values: self.simd.mul_add_e_f64s(self.values, b.values, c.values) }
     }
     lane_function!(sqrt sqrt_f64s, abs abs_f64s, min min_f64s other, max max_f64s other);
     #[inline(always)]
-    fn le(self, other: Self) -> [S::m64s; 2] {
-        let (simd, [a, b], [c, d]) = (self.simd, self.values, other.values);
-        [simd.less_than_or_equal_f64s(a, c), simd.less_than_or_equal_f64s(b, d)]
+    fn le(self, other: Self) -> S::m64s {
+        self.simd.less_than_or_equal_f64s(self.values, other.values)
     }
     #[inline(always)]
-    fn and(simd: S, [a, b]: [S::m64s; 2], [c, d]: [S::m64s; 2]) -> [S::m64s; 2] {
-        [simd.and_m64s(a, c), simd.and_m64s(b, d)]
+    fn and(simd: S, a: S::m64s, b: S::m64s) -> S::m64s {
+        simd.and_m64s(a, b)
     }
     #[inline(always)]
-    fn select(self, mask: [S::m64s; 2], other: Self) -> Self {
-        let (simd, [a, b], [c, d]) = (self.simd, self.values, other.values);
-        Self { simd, values: [simd.select_f64s(mask[0], a, c), simd.select_f64s(mask[1], b, d)] }
+    fn select(self, mask: S::m64s, other: Self) -> Self {
+        Self { simd: self.simd, values: self.simd.select_f64s(mask, self.values, other.values) }
     }
-    /// The lanes' own powers lie side by side in vectors.
     #[inline(always)]
-    fn contract<const K: usize>(simd: S, table: &[Row; K], powers: &[Self; K]) -> [Self; ENTRIES] {
-        // As many sums at a time as there are registers for.
-        if S::F64_LANES == MAX_LANES / 2 {
-            return sums(simd, table, powers, 0);
-        }
-        let first: [Self; ENTRIES / 2] = sums(simd, table, powers, 0);
-        let last: [Self; ENTRIES / 2] = sums(simd, table, powers, ENTRIES / 2);
-        let mut all = [first[0]; ENTRIES];
-        all[..ENTRIES / 2].copy_from_slice(&first);
-        all[ENTRIES / 2..].copy_from_slice(&last);
-        all
+    fn jet(simd: S, polynomial: &Polynomial, z: [Self; 3]) -> NumberJet<Self> {
+        polynomial.nested.jet(simd, z)
     }
     #[inline(always)]
     fn gather<const K: usize>(simd: S, table: &[[f64; K]], place: Self) -> [Self; K] {
@@ -252,30 +212,4 @@ impl<S: Simd> Number<S> for Lanes<S> {
         }
         result
     }
-}
-
-/// Sums over the rows k of `table[k][from + i] powers[k]`, for some of the entries.
-#[inline(always)]
-fn sums<S: Simd, const K: usize, const COUNT: usize>(
-    simd: S,
-    table: &[Row; K],
-    powers: &[Lanes<S>; K],
-    from: usize,
-) -> [Lanes<S>; COUNT] {
-    let mut sums = [Lanes::splat(simd, 0.0); COUNT];
-    let (rows, last_rows) = table.as_chunks::<5>();
-    let (groups, last_powers) = powers.as_chunks::<5>();
-    for (rows, powers) in rows.iter().zip(groups) {
-        for (row, power) in rows.iter().zip(powers) {
-            for (sum, &entry) in sums.iter_mut().zip(&row.0[from..]) {
-                *sum = Lanes::splat(simd, entry).mul_add(*power, *sum);
-            }
-        }
-    }
-    for (row, power) in last_rows.iter().zip(last_powers) {
-        for (sum, &entry) in sums.iter_mut().zip(&row.0[from..]) {
-            *sum = Lanes::splat(simd, entry).mul_add(*power, *sum);
-        }
-    }
-    sums
 }

@@ -7,10 +7,10 @@ use crate::measure::Status;
 use crate::measure::pose::Pose;
 use crate::measure::relation::{Relation, Verdict};
 use crate::measure::smooth::Proven;
-use crate::measure::start::facing_along;
+use crate::measure::start::{Start, facing_along, meeting};
 use crate::measure::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, SLACK, Step, TURNED, newton_along};
 use crate::measure::twist::Twist;
-use crate::measure::vector::{M3, V3, add, apply, dot, rows, scaled, subtract};
+use crate::measure::vector::{M3, V3, add, apply, dot, normalized, rows, scaled, subtract};
 use crate::polynomial::{Scalar, Simd, gamma};
 use nalgebra::{Matrix3, Vector3};
 
@@ -101,8 +101,9 @@ impl Relation for Along {
     }
 
     #[inline(always)]
-    fn facing<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> V3<f64> {
-        facing_along(simd, a, b, relative, self.delta)
+    fn start<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> Start<f64> {
+        let n = normalized(simd, facing_along(simd, a, b, relative, self.delta));
+        meeting(simd, a, b, relative, n, Some(self.delta))
     }
 
     #[inline(always)]

@@ -1,4 +1,4 @@
-//! Support points of smooth surfaces, from an outline's mark: mostly by one evaluation.
+//! Support points of smooth surfaces, from an outline: mostly by one or two evaluations.
 //!
 //! The point z of a body farthest along e (both in normalized coordinates, `e·z = n·x`) has `λ ∇g(z) = e`, `g(z) = 1`. Newton's
 //! step for the two,
@@ -7,8 +7,8 @@
 //! λ' = (g·H⁻¹e - λ (1 - g(z))) / (g·H⁻¹g),   dz = (H⁻¹e - λ' H⁻¹g) / λ
 //! ```
 //!
-//! leaves an error of the order of its square, and what that costs along e is of the square again. The mark's jet gives the
-//! first step; Taylor's formula proves how far the end of the last one is from the best, and a point of the body beside it.
+//! leaves an error of the order of its square, and what that costs along e is of the square again. Taylor's formula proves how
+//! far the end of the last step is from the best, and a point of the body beside it.
 
 use crate::body::{Body, Outline};
 use crate::measure::tangent::Side;
@@ -42,11 +42,11 @@ impl WithSimd for Farthest<'_> {
         let n: V3<f64> = n.into();
         let place = Outline::place(simd, n);
         let active = body.outline().active(place);
-        let mark = body.outline().mark(simd, place);
+        let cell = body.outline().cell(simd, place);
         let side = Side::at_home(simd, body, active);
         let inverse = rows(simd, body.inverse());
         let e = apply_transposed::<S, f64>(&inverse, n);
-        let mut x = add::<S, f64>(mark.point, apply::<S, f64>(&inverse, step(simd, &mark.jet, e)?));
+        let mut x = add::<S, f64>(cell.point, apply_symmetric::<S, f64>(&cell.turn, n));
         let axes = side.localize(simd, &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
         for _ in 0..MAX_ROUNDS {
             let (jet, inside) = side.jet(simd, x);
