@@ -78,10 +78,10 @@ fn support(
     for (constraint, multiplier) in constraints.iter().zip(multipliers) {
         let lambda = multiplier * length;
         let sample = placement.sample(constraint, &point);
-        reach += lambda * (1.0 - sample.jet.value + sample.nearby_value_error);
-        reach += 1e-14 * lambda * (1.0 + sample.jet.value.abs());
-        residual -= sample.jet.gradient * lambda;
-        slope += lambda * (sample.gradient_error + 1e-14 * sample.jet.gradient.norm());
+        reach += lambda * (1.0 - sample.value() + sample.nearby_value_error());
+        reach += 1e-14 * lambda * (1.0 + sample.value().abs());
+        residual -= sample.gradient() * lambda;
+        slope += lambda * (sample.gradient_error() + 1e-14 * sample.gradient().norm());
     }
     slope += residual.norm() + 8.0 * f64::EPSILON;
     TangentBound { point, reach: reach + reach.abs() * 1e-14, slope: slope * (1.0 + 1e-14) }

@@ -233,7 +233,7 @@ impl Body {
         let placement = Placement::new(normalization.linear, inverse, normalization.center, 0.0, 0.0);
         let interior_point =
             interior.unwrap_or_else(|| inverse * extent::deepest_point(&constraints).0 + normalization.center);
-        let min_value = largest(constraints.iter().map(|c| placement.sample(c, &interior_point).value_upper()));
+        let min_value = largest(constraints.iter().map(|c| placement.sample(c, &interior_point).value_upper(0.0)));
         if !(min_value <= 1.0 - MIN_DEPTH) {
             return Err(BodyError::Interior { min_value });
         }
@@ -397,7 +397,7 @@ impl Body {
 
     /// Rigorous upper bound of the largest constraint at a point of the body frame.
     pub fn value_upper(&self, x: &Vector3<f64>) -> f64 {
-        largest(self.constraints.iter().map(|c| self.placement.sample(c, x).value_upper()))
+        largest(self.constraints.iter().map(|c| self.placement.sample(c, x).value_upper(0.0)))
     }
 
     /// Boundary point of the body frame met by the ray from the interior point along `direction` of the normalized frame.

@@ -9,7 +9,7 @@ use super::Constraint;
 use super::sphere::Sphere;
 use super::surface::radius;
 use crate::polynomial::{Number, Simd};
-use nalgebra::{Matrix2, Matrix3, Matrix3x2, Matrix4, Vector3, Vector4};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix3x2, Vector3};
 
 /// Cells along each edge of the faces of a cube around all directions.
 const CELLS: usize = 16;
@@ -55,9 +55,10 @@ impl Outline {
             for i in 0..CELLS {
                 for j in 0..CELLS {
                     let middle = support.along(direction(face, 2 * i + 1, 2 * j + 1));
-                    active.push(support.active as u8);
+                    active.push(support.active[0] as u8);
                     let corner = |di: usize, dj: usize| &corners[(i + di) * (CELLS + 1) + j + dj];
-                    cells.push(fitted(&middle, [corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)]));
+                    let around = [corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)];
+                    cells.push(fitted(&middle, around, constraints.len() == 1));
                 }
             }
         }
@@ -131,11 +132,11 @@ fn direction(face: usize, i: usize, j: usize) -> Vector3<f64> {
 /// A direction and the support point along it, from the centre of the normalization, body frame, metres.
 type Sample = (Vector3<f64>, Vector3<f64>);
 
-/// The fields of the cell with these samples.
-fn fitted((n, x): &Sample, corners: [&Sample; 4]) -> [f64; FIELDS] {
+/// The fields of the cell with these samples, of a body with a smooth surface or one with edges.
+fn fitted((n, x): &Sample, corners: [&Sample; 4], smooth: bool) -> [f64; FIELDS] {
     let mean = corners.iter().fold(Vector3::zeros(), |sum, corner| sum + corner.1) / 4.0;
-    // What bends like a paraboloid is a third of the corners' value on average.
-    let point = (x * 2.0 + mean) / 3.0;
+    // What bends like a paraboloid is a third of the corners' value on average; at corners of the body nothing bends.
+    let point = if smooth { (x * 2.0 + mean) / 3.0 } else { *x };
     let first = n.cross(&Vector3::ith(n.iamin(), 1.0)).normalize();
     let tangents = Matrix3x2::from_columns(&[first, n.cross(&first)]);
     // Least squares for `turn Tᵀn = Tᵀx` with a symmetric matrix: its entries 00, 01, 11 have these coefficients.
@@ -161,54 +162,79 @@ struct Support<'a> {
     interior: &'a Vector3<f64>,
     /// Boundary points all around, normalized coordinates.
     rays: Vec<Vector3<f64>>,
-    /// The last support point, normalized coordinates, and the constraint active there.
+    /// The last support point, normalized coordinates, and the constraints active there, the one with the most force first.
     last: Vector3<f64>,
-    active: usize,
+    active: Vec<usize>,
 }
 
 impl<'a> Support<'a> {
     fn new(constraints: &'a [Constraint], inverse: &'a Matrix3<f64>, interior: &'a Vector3<f64>) -> Self {
         let ray = |u: &Vector3<f64>| interior + u * radius(constraints, interior, u);
         let rays = Sphere::fine().vertices().iter().map(ray).collect();
-        Self { constraints, inverse, interior, rays, last: *interior, active: 0 }
+        Self { constraints, inverse, interior, rays, last: *interior, active: vec![0] }
     }
 
     fn along(&mut self, n: Vector3<f64>) -> Sample {
         let e = (self.inverse.transpose() * n).normalize();
-        self.last = self.farther(&e, &self.last).unwrap_or_else(|| {
-            let farthest = self.rays.iter().max_by(|p, q| e.dot(p).total_cmp(&e.dot(q)));
-            let start = farthest.copied().unwrap_or(*self.interior);
-            let value = |index: &usize| self.constraints[*index].polynomial.evaluate(&start).value;
-            self.active = (0..self.constraints.len()).max_by(|i, j| value(i).total_cmp(&value(j))).unwrap_or(0);
-            self.farther(&e, &start).unwrap_or(start)
-        });
+        let found = self.farther(&e, &self.last, &self.active);
+        (self.last, self.active) = found.unwrap_or_else(|| self.anew(&e));
         (n, self.inverse * self.last)
     }
 
-    /// The point of the body farthest along `e` (normalized coordinates), by Newton's method on `e = ν ∇g`, `g = 1`. None where it
-    /// does not converge, as on edges and where the surface is flat.
-    fn farther(&self, e: &Vector3<f64>, start: &Vector3<f64>) -> Option<Vector3<f64>> {
-        let polynomial = &self.constraints[self.active].polynomial;
+    /// A support point and its active constraints from the ray that leads farthest.
+    fn anew(&self, e: &Vector3<f64>) -> (Vector3<f64>, Vec<usize>) {
+        let farthest = self.rays.iter().max_by(|p, q| e.dot(p).total_cmp(&e.dot(q)));
+        let start = farthest.copied().unwrap_or(*self.interior);
+        let value = |index: &usize| self.constraints[*index].polynomial.evaluate(&start).value;
+        let mut order: Vec<usize> = (0..self.constraints.len()).collect();
+        order.sort_by(|i, j| value(j).total_cmp(&value(i)));
+        // Inside a surface, on an edge, at a corner.
+        let sets = (1..=order.len().min(3)).map(|count| &order[..count]);
+        let found = sets.filter_map(|set| self.farther(e, &start, set)).next();
+        found.unwrap_or((start, vec![order[0]]))
+    }
+
+    /// The point of the body farthest along `e` (normalized coordinates), by Newton's method on `e = Σ ν_i ∇g_i`, `g_i = 1` over
+    /// the active constraints. None where it does not converge, as where the surface is flat, or other ones are active.
+    fn farther(&self, e: &Vector3<f64>, start: &Vector3<f64>, active: &[usize]) -> Option<(Vector3<f64>, Vec<usize>)> {
+        let count = active.len();
         let mut z = *start;
+        let mut multipliers: Option<DVector<f64>> = None;
         for _ in 0..16 {
-            let jet = polynomial.evaluate(&z);
-            let along = jet.gradient.dot(e);
-            if !(along > 1e-3 * jet.gradient.norm()) {
-                return None;
+            let jets: Vec<_> = active.iter().map(|&i| self.constraints[i].polynomial.evaluate(&z)).collect();
+            let weights = match multipliers.take() {
+                Some(known) => known,
+                None => {
+                    let normal = DMatrix::from_fn(count, count, |i, j| jets[i].gradient.dot(&jets[j].gradient));
+                    normal.cholesky()?.solve(&DVector::from_fn(count, |i, _| jets[i].gradient.dot(e)))
+                }
+            };
+            let mut matrix = DMatrix::zeros(3 + count, 3 + count);
+            let mut right = DVector::zeros(3 + count);
+            right.fixed_rows_mut::<3>(0).copy_from(e);
+            for (i, (jet, weight)) in jets.iter().zip(&weights).enumerate() {
+                let mut corner = matrix.fixed_view_mut::<3, 3>(0, 0);
+                corner += jet.hessian * *weight;
+                matrix.fixed_view_mut::<3, 1>(0, 3 + i).copy_from(&jet.gradient);
+                matrix.fixed_view_mut::<1, 3>(3 + i, 0).copy_from(&jet.gradient.transpose());
+                right[3 + i] = 1.0 - jet.value;
             }
-            let mut matrix = Matrix4::zeros();
-            matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&(jet.hessian / along));
-            matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&jet.gradient);
-            matrix.fixed_view_mut::<1, 3>(3, 0).copy_from(&jet.gradient.transpose());
-            let residual = e - jet.gradient / along;
-            let right = Vector4::new(residual.x, residual.y, residual.z, 1.0 - jet.value);
-            let step = matrix.lu().solve(&right)?.xyz();
+            let solution = matrix.lu().solve(&right)?;
+            let step = solution.fixed_rows::<3>(0).into_owned();
             let length = step.norm();
             z += step * (0.25 / length).min(1.0);
+            let weights = solution.rows(3, count).into_owned();
             if length < 1e-6 {
                 let inside = |constraint: &Constraint| constraint.polynomial.evaluate(&z).value <= 1.0 + 1e-9;
-                return self.constraints.iter().all(inside).then_some(z);
+                let pressed = weights.iter().all(|&weight| weight > 0.0);
+                let mut active = active.to_vec();
+                let force = |i: &usize| weights[*i] * jets[*i].gradient.norm();
+                if let Some(first) = (0..count).max_by(|i, j| force(i).total_cmp(&force(j))) {
+                    active.swap(0, first);
+                }
+                return (pressed && self.constraints.iter().all(inside)).then_some((z, active));
             }
+            multipliers = Some(weights);
         }
         None
     }

@@ -6,7 +6,7 @@
 //! change over it.
 
 use super::Constraint;
-use crate::polynomial::{Jet, gamma};
+use crate::polynomial::{Jet, Polynomial, gamma};
 use nalgebra::{Matrix3, Vector3};
 
 /// The affine map `z = M (v - o)` from points v of some frame to the normalized frame of a body. Within the body's own frame
@@ -25,32 +25,62 @@ pub struct Placement {
     origin_error: f64,
 }
 
-/// A constraint at a point: its jet in the placement's frame and bounds of the errors.
+/// A constraint at a point, with bounds of the errors that are asked for.
 #[derive(Clone, Copy, Debug)]
-pub struct Sample {
-    /// Value, and gradient and Hessian with respect to the point.
-    pub jet: Jet,
-    /// Bound of the error of the value as that of the point itself.
-    pub value_error: f64,
-    /// Bound of the error of the value as that of a point within the displacement.
-    pub nearby_value_error: f64,
-    /// Bound of the Euclidean norm of the error of the gradient at that nearby point.
-    pub gradient_error: f64,
-    /// Gradient with respect to the normalized coordinates z.
-    pub z_gradient: Vector3<f64>,
-    /// Bound of the error of each component of `z_gradient` at that nearby point.
-    pub z_gradient_error: f64,
+pub struct Sample<'a> {
+    placement: &'a Placement,
+    polynomial: &'a Polynomial,
+    /// Normalized coordinates of the point.
+    z: Vector3<f64>,
+    /// Bound of the distance between the point and the one whose exact image z is.
+    displacement: f64,
+    /// The jet with respect to z.
+    jet: Jet,
 }
 
-impl Sample {
-    /// Rigorous upper bound of the value at the point itself.
-    pub fn value_upper(&self) -> f64 {
-        (self.jet.value + self.value_error).next_up()
+impl Sample<'_> {
+    /// Value.
+    pub fn value(&self) -> f64 {
+        self.jet.value
+    }
+
+    /// Gradient with respect to the point.
+    pub fn gradient(&self) -> Vector3<f64> {
+        self.placement.linear.tr_mul(&self.jet.gradient)
+    }
+
+    /// Gradient with respect to the normalized coordinates z.
+    pub fn z_gradient(&self) -> &Vector3<f64> {
+        &self.jet.gradient
+    }
+
+    /// Rigorous upper bound of the value at the point itself and all others within `distance` of it.
+    pub fn value_upper(&self, distance: f64) -> f64 {
+        let dz = self.placement.row_norms * (self.displacement + distance);
+        (self.jet.value + self.polynomial.value_error(&self.z, &self.jet.gradient, &dz)).next_up()
+    }
+
+    /// Bound of the error of the value as that of a point within the displacement.
+    pub fn nearby_value_error(&self) -> f64 {
+        self.polynomial.value_error(&self.z, &self.jet.gradient, &Vector3::zeros())
     }
 
     /// Rigorous upper bound of the value at a point within the displacement.
     pub fn nearby_value_upper(&self) -> f64 {
-        (self.jet.value + self.nearby_value_error).next_up()
+        (self.jet.value + self.nearby_value_error()).next_up()
+    }
+
+    /// Bound of the error of each component of [`Sample::z_gradient`] at that nearby point.
+    pub fn z_gradient_error(&self) -> f64 {
+        self.polynomial.gradient_error(&self.z, &Vector3::zeros())
+    }
+
+    /// Bound of the Euclidean norm of the error of [`Sample::gradient`] at that nearby point.
+    pub fn gradient_error(&self) -> f64 {
+        // Pulling back turns and rounds the gradient; the polynomial's own error passes through M.
+        let own =
+            (2.0 * self.z_gradient_error() + gamma(12) * self.jet.gradient.norm()) * self.placement.row_norms.norm();
+        ((self.placement.relative_error + gamma(12)) * self.gradient().norm() + own) * (1.0 + 1e-14)
     }
 }
 
@@ -121,32 +151,10 @@ impl Placement {
 
     /// Constraint at the point v, with error bounds.
     #[inline]
-    pub fn sample(&self, constraint: &Constraint, v: &Vector3<f64>) -> Sample {
-        self.sample_within(constraint, v, 0.0)
-    }
-
-    /// Constraint at the point v; the `value_error` holds for every point within `distance` of v.
-    pub fn sample_within(&self, constraint: &Constraint, v: &Vector3<f64>, distance: f64) -> Sample {
-        let polynomial = &constraint.polynomial;
+    pub fn sample<'a>(&'a self, constraint: &'a Constraint, v: &Vector3<f64>) -> Sample<'a> {
         let z = self.linear * (v - self.origin);
-        let jet = polynomial.evaluate(&z);
-        let dz = self.row_norms * (self.displacement(v) + distance);
-        let value_error = polynomial.value_error(&z, &jet.gradient, &dz);
-        let none = Vector3::zeros();
-        let nearby_value_error = polynomial.value_error(&z, &jet.gradient, &none);
-        let z_gradient_error = polynomial.gradient_error(&z, &none);
-        let pulled = self.pull_back(jet);
-        // Pulling back turns and rounds the gradient; the polynomial's own error passes through M.
-        let gradient_error = (self.relative_error + gamma(12)) * pulled.gradient.norm()
-            + (2.0 * z_gradient_error + gamma(12) * jet.gradient.norm()) * self.row_norms.norm();
-        Sample {
-            jet: pulled,
-            value_error,
-            nearby_value_error,
-            gradient_error: gradient_error * (1.0 + 1e-14),
-            z_gradient: jet.gradient,
-            z_gradient_error,
-        }
+        let polynomial = &constraint.polynomial;
+        Sample { placement: self, polynomial, z, displacement: self.displacement(v), jet: polynomial.evaluate(&z) }
     }
 
     #[inline]

@@ -54,7 +54,7 @@ pub(super) fn proven_boundary(
     interior: &Vector3<f64>,
 ) -> Vec<Vector3<f64>> {
     let start = placement.linear() * (interior - placement.origin());
-    let inside = |x: &Vector3<f64>| constraints.iter().all(|c| placement.sample(c, x).value_upper() <= 1.0);
+    let inside = |x: &Vector3<f64>| constraints.iter().all(|c| placement.sample(c, x).value_upper(0.0) <= 1.0);
     Sphere::shared()
         .vertices()
         .iter()

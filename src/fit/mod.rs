@@ -288,7 +288,7 @@ fn certify(
     // The bound of the rounding moves a little with the constant: a second pass settles it.
     for _ in 0..3 {
         let highest =
-            points.iter().map(|x| placement.sample(&constraint, x).value_upper()).fold(f64::NEG_INFINITY, f64::max);
+            points.iter().map(|x| placement.sample(&constraint, x).value_upper(0.0)).fold(f64::NEG_INFINITY, f64::max);
         let excess = highest - 1.0;
         if (-1e-15..=0.0).contains(&excess) {
             break;

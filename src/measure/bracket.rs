@@ -39,10 +39,10 @@ pub(super) fn descent(body: &Posed<'_>, v: &Vector3<f64>, r: &Vector3<f64>, mult
     for (i, &multiplier) in multipliers.iter().enumerate().take(body.len()) {
         if multiplier > 0.0 {
             let sample = body.sample(i, v);
-            slack += multiplier * (1.0 - sample.jet.value + sample.nearby_value_error);
-            magnitude += multiplier * (1.0 + sample.jet.value.abs());
-            residual += sample.z_gradient * multiplier;
-            error += (sample.z_gradient.abs() * SLACK).add_scalar(sample.z_gradient_error) * multiplier;
+            slack += multiplier * (1.0 - sample.value() + sample.nearby_value_error());
+            magnitude += multiplier * (1.0 + sample.value().abs());
+            residual += sample.z_gradient() * multiplier;
+            error += (sample.z_gradient().abs() * SLACK).add_scalar(sample.z_gradient_error()) * multiplier;
         }
     }
     let rest = (residual.abs() + error).dot(&body.spans(v));
@@ -89,10 +89,10 @@ pub(super) fn level_lower(pair: &Pair<'_>, x: &Vector3<f64>, of_a: &Multipliers,
     for (i, multiplier) in of_a.iter().enumerate().take(pair.a.len()).filter(|(_, multiplier)| **multiplier > 0.0) {
         let weight = multiplier / total;
         let sample = pair.a.sample(i, x);
-        value += weight * (sample.jet.value - sample.nearby_value_error);
-        magnitude += weight * sample.jet.value.abs();
-        gradient += sample.jet.gradient * weight;
-        gradient_error += weight * (sample.gradient_error + SLACK * sample.jet.gradient.norm());
+        value += weight * (sample.value() - sample.nearby_value_error());
+        magnitude += weight * sample.value().abs();
+        gradient += sample.gradient() * weight;
+        gradient_error += weight * (sample.gradient_error() + SLACK * sample.gradient().norm());
     }
     let fall = descent(&pair.b, x, &gradient, of_b);
     let displaced = (pair.a.displacement(x) + pair.b.displacement(x)) * (gradient.norm() + gradient_error);

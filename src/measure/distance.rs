@@ -11,6 +11,7 @@ use super::pose::Pose;
 use super::programs::{Closest, Level, points};
 use super::relation::Apart;
 use super::sharp::SharpPair;
+use super::simplex::approach;
 use super::smooth::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
 use super::twist::Twist;
 use super::union;
@@ -137,7 +138,9 @@ pub(super) fn between(
         let pair = Pair::new(a, pose_a, b, pose_b);
         matches!(&warm.hint, Hint::Overlap { point_a } if pair.common(&pair.a_to_query(point_a)))
     };
-    if !still_overlapping && !options.exhausted(spent) {
+    // Where edges face each other no single constraint is to be followed.
+    let smooth = a.constraints().len() == 1 && b.constraints().len() == 1;
+    if smooth && !still_overlapping && !options.exhausted(spent) {
         let limit = SEEK_ROUNDS.min(options.max_iterations() - spent);
         match dispatch(Seek { a, b, relation, limit, options }) {
             Ok((proven, trace)) => {
@@ -259,6 +262,9 @@ impl<'a> Search<'a> {
             | Hint::Single { .. }
             | Hint::Smooth(_) => {}
         }
+        if !self.ended() && !self.pair.smooth() {
+            self.outlined();
+        }
         if !self.ended() {
             self.closest(NEAR);
         }
@@ -278,6 +284,14 @@ impl<'a> Search<'a> {
         if !self.ended() && self.lower == 0.0 {
             self.contact();
         }
+    }
+
+    /// Newton's method from where the outlines are nearest, with the constraints that are active there.
+    fn outlined(&mut self) {
+        let Some((x, y)) = approach(self.pair, &self.n) else { return };
+        let n = (x - y).normalize();
+        let (a, b) = (Active::near(&self.pair.a, &x, &-n), Active::near(&self.pair.b, &y, &n));
+        self.newton(x, y, n, a, b);
     }
 
     /// Goes on in twice the precision where rounding keeps the bracket wide.

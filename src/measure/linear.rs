@@ -1,5 +1,6 @@
 //! Small dense linear systems on the stack.
 
+use crate::polynomial::{Simd, WithSimd, dispatch};
 use nalgebra::{Matrix3, Vector3};
 
 /// Most unknowns of an optimality system: seven, and three active constraints of each body.
@@ -8,37 +9,61 @@ pub(super) const MAX_UNKNOWNS: usize = 13;
 /// A system of n <= [`MAX_UNKNOWNS`] equations; the right-hand side is column `n`.
 pub(super) type Augmented = [[f64; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
 
-/// Solves the system by Gaussian elimination with row scaling and partial pivoting; the solution replaces the right-hand
-/// side's place in the returned array. None if the matrix is singular to working accuracy.
-pub(super) fn solve(system: &mut Augmented, n: usize) -> Option<[f64; MAX_UNKNOWNS]> {
-    for row in system.iter_mut().take(n) {
-        let scale = row[..n].iter().fold(0.0_f64, |most, entry| most.max(entry.abs()));
-        if !(scale > 0.0 && scale.is_finite()) {
-            return None;
+/// Solves the system of the first n equations, whose right-hand side is column n, by Gaussian elimination with row scaling and
+/// partial pivoting. None if the matrix is singular to working accuracy.
+pub(super) fn solve<const N: usize, const W: usize>(system: &mut [[f64; W]; N], n: usize) -> Option<[f64; N]> {
+    dispatch(Elimination { system, n })
+}
+
+/// An elimination as work for the widest arithmetic: rows as a whole, for loops of one length make vectors.
+struct Elimination<'a, const N: usize, const W: usize> {
+    system: &'a mut [[f64; W]; N],
+    n: usize,
+}
+
+impl<const N: usize, const W: usize> WithSimd for Elimination<'_, N, W> {
+    type Output = Option<[f64; N]>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Option<[f64; N]> {
+        let Self { system, n } = self;
+        for row in &mut system[..n] {
+            let scale = row[..n].iter().fold(0.0_f64, |most, entry| most.max(entry.abs()));
+            if !(scale > 0.0 && scale.is_finite()) {
+                return None;
+            }
+            let inverse = 1.0 / scale;
+            row.iter_mut().for_each(|entry| *entry *= inverse);
         }
-        row[..=n].iter_mut().for_each(|entry| *entry /= scale);
-    }
-    for k in 0..n {
-        let pivot = (k..n).max_by(|&i, &j| system[i][k].abs().total_cmp(&system[j][k].abs()))?;
-        if !(system[pivot][k].abs() > 1e-13) {
-            return None;
-        }
-        system.swap(k, pivot);
-        for i in k + 1..n {
-            let factor = system[i][k] / system[k][k];
-            if factor != 0.0 {
-                for j in k..=n {
-                    system[i][j] -= factor * system[k][j];
+        for k in 0..n {
+            let mut largest = (k, 0.0);
+            for (i, row) in system[..n].iter().enumerate().skip(k) {
+                if row[k].abs() > largest.1 {
+                    largest = (i, row[k].abs());
+                }
+            }
+            if !(largest.1 > 1e-13) {
+                return None;
+            }
+            system.swap(k, largest.0);
+            let (above, below) = system.split_at_mut(k + 1);
+            let pivot = &above[k];
+            let inverse = 1.0 / pivot[k];
+            for row in &mut below[..n - k - 1] {
+                let factor = row[k] * inverse;
+                for (entry, above) in row.iter_mut().zip(pivot) {
+                    *entry -= factor * above;
                 }
             }
         }
+        let mut solution = [0.0; N];
+        for i in (0..n).rev() {
+            let known: f64 =
+                system[i][i + 1..n].iter().zip(&solution[i + 1..n]).map(|(entry, value)| entry * value).sum();
+            solution[i] = (system[i][n] - known) / system[i][i];
+        }
+        solution[..n].iter().all(|value| value.is_finite()).then_some(solution)
     }
-    let mut solution = [0.0; MAX_UNKNOWNS];
-    for i in (0..n).rev() {
-        let known: f64 = (i + 1..n).map(|j| system[i][j] * solution[j]).sum();
-        solution[i] = (system[i][n] - known) / system[i][i];
-    }
-    solution[..n].iter().all(|value| value.is_finite()).then_some(solution)
 }
 
 /// Solves a system of N equations by Gaussian elimination with partial pivoting, rows scaled. None if it is singular to

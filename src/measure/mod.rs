@@ -35,6 +35,7 @@ mod ray;
 mod relation;
 mod sharp;
 mod signed;
+mod simplex;
 mod single;
 mod smooth;
 mod start;

@@ -72,6 +72,30 @@ impl Active {
         active
     }
 
+    /// The constraints that a point near the surface is at, as far as they carry a force `target`.
+    pub(super) fn near(body: &Posed<'_>, v: &Vector3<f64>, target: &Vector3<f64>) -> Self {
+        let mut values = [f64::NEG_INFINITY; crate::body::MAX_CONSTRAINTS];
+        (0..body.len()).for_each(|i| values[i] = body.jet(i, v).value);
+        let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let mut active = Self::default();
+        while active.len < MAX_ACTIVE {
+            let rest = (0..body.len()).filter(|i| !active.index[..active.len].contains(i));
+            match rest.max_by(|&i, &j| values[i].total_cmp(&values[j])) {
+                Some(i) if values[i] > highest - AT => _ = active.push(i),
+                _ => break,
+            }
+        }
+        while active.len > 1 {
+            if !active.fit(body, v, target) {
+                // Of dependent gradients the lowest constraint's goes.
+                active.len -= 1;
+            } else if !active.drop_negative() {
+                break;
+            }
+        }
+        active
+    }
+
     /// The only constraint, if there is but one.
     pub(super) fn single(&self) -> Option<u8> {
         (self.len == 1).then_some(self.index[0] as u8)
@@ -131,7 +155,7 @@ impl Active {
     pub(super) fn fit(&mut self, body: &Posed<'_>, v: &Vector3<f64>, target: &Vector3<f64>) -> bool {
         let gradients: [Vector3<f64>; MAX_ACTIVE] =
             std::array::from_fn(|k| if k < self.len { body.jet(self.index[k], v).gradient } else { Vector3::zeros() });
-        let mut system: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
+        let mut system = [[0.0; MAX_ACTIVE + 1]; MAX_ACTIVE];
         for i in 0..self.len {
             for j in 0..self.len {
                 system[i][j] = gradients[i].dot(&gradients[j]);
@@ -176,6 +200,9 @@ impl At {
         at
     }
 }
+
+/// How far below the highest the value of a constraint may be that counts as active.
+const AT: f64 = 0.1;
 
 /// Largest number of Newton steps and of changes of the active set.
 const MAX_STEPS: u32 = 16;
@@ -245,66 +272,67 @@ impl DistanceNewton {
         (a, b)
     }
 
-    /// Newton's matrix, from what is known at the iterate and the counts of active constraints; column `7 + la + lb` is left to
-    /// the residuals.
-    pub(super) fn matrix(distance: f64, a: &At, b: &At, la: usize, lb: usize) -> Augmented {
-        let mut m: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
-        let scaled = a.hessian * distance;
-        let turned = a.hessian * a.sum;
+    /// One Newton step; its length, or none if the system is singular.
+    ///
+    /// The first of the equations at the head of this file gives `dy = (I + D H_A) dx + u dD + D G_A dλ + (x - y + D u)`, G the
+    /// gradients and H the weighted Hessians, which leaves dx, dD and the multipliers.
+    fn step(&mut self, (a, b): &(At, At)) -> Option<f64> {
+        let (la, lb, distance) = (self.a.len, self.b.len, self.distance);
+        let size = 4 + la + lb;
+        // Four unknowns, three constraints of each body, a right-hand side.
+        let mut m = [[0.0; 12]; 10];
+        let offset = self.x - self.y + a.sum * distance;
+        let moved = Matrix3::identity() + a.hessian * distance;
+        // u + w = 0.
+        let (by_x, by_distance) = (a.hessian + b.hessian * moved, b.hessian * a.sum);
+        let right = -(a.sum + b.sum) - b.hessian * offset;
         for i in 0..3 {
             for j in 0..3 {
-                m[i][j] = scaled[(i, j)] + f64::from(u8::from(i == j));
-                m[3 + i][j] = a.hessian[(i, j)];
-                m[3 + i][3 + j] = b.hessian[(i, j)];
+                m[i][j] = by_x[(i, j)];
             }
-            m[i][3 + i] = -1.0;
-            m[i][6] = a.sum[i];
-            m[6][i] = turned[i];
-            for k in 0..la {
-                m[i][7 + k] = distance * a.gradient[k][i];
-                m[3 + i][7 + k] = a.gradient[k][i];
-                m[7 + k][i] = a.gradient[k][i];
-            }
-            for k in 0..lb {
-                m[3 + i][7 + la + k] = b.gradient[k][i];
-                m[7 + la + k][3 + i] = b.gradient[k][i];
-            }
+            m[i][3] = by_distance[i];
+            m[i][size] = right[i];
         }
-        for k in 0..la {
-            m[6][7 + k] = a.sum.dot(&a.gradient[k]);
+        for (k, gradient) in a.gradient[..la].iter().enumerate() {
+            let column = gradient + b.hessian * gradient * distance;
+            (0..3).for_each(|i| m[i][4 + k] = column[i]);
         }
-        m
-    }
-
-    /// One Newton step; its length, or none if the system is singular.
-    fn step(&mut self, (a, b): &(At, At)) -> Option<f64> {
-        let size = 7 + self.a.len + self.b.len;
-        let mut m = Self::matrix(self.distance, a, b, self.a.len, self.b.len);
-        let offset = self.x - self.y + a.sum * self.distance;
-        for i in 0..3 {
-            m[i][size] = -offset[i];
-            m[3 + i][size] = -(a.sum[i] + b.sum[i]);
+        for (k, gradient) in b.gradient[..lb].iter().enumerate() {
+            (0..3).for_each(|i| m[i][4 + la + k] = gradient[i]);
         }
-        for k in 0..self.a.len {
-            m[7 + k][size] = 1.0 - a.value[k];
+        // |u| = 1.
+        let turned = a.hessian * a.sum;
+        (0..3).for_each(|j| m[3][j] = turned[j]);
+        (0..la).for_each(|k| m[3][4 + k] = a.sum.dot(&a.gradient[k]));
+        m[3][size] = 0.5 * (1.0 - a.sum.norm_squared());
+        // g = 1 and h = 1.
+        for (row, (gradient, value)) in m[4..].iter_mut().zip(a.gradient[..la].iter().zip(&a.value)) {
+            row[..3].copy_from_slice(gradient.as_slice());
+            row[size] = 1.0 - value;
         }
-        for k in 0..self.b.len {
-            m[7 + self.a.len + k][size] = 1.0 - b.value[k];
+        for (row, (gradient, value)) in m[4 + la..].iter_mut().zip(b.gradient[..lb].iter().zip(&b.value)) {
+            row[..3].copy_from_slice(moved.tr_mul(gradient).as_slice());
+            row[3] = gradient.dot(&a.sum);
+            (0..la).for_each(|k| row[4 + k] = distance * gradient.dot(&a.gradient[k]));
+            row[size] = 1.0 - value - gradient.dot(&offset);
         }
-        m[6][size] = 0.5 * (1.0 - a.sum.norm_squared());
         let d = solve(&mut m, size)?;
-        let (dx, dy) = (Vector3::new(d[0], d[1], d[2]), Vector3::new(d[3], d[4], d[5]));
-        let length = dx.norm().max(dy.norm());
+        let dx = Vector3::new(d[0], d[1], d[2]);
+        let of_a: Vector3<f64> = (0..la).map(|k| a.gradient[k] * d[4 + k]).sum();
+        let dy = moved * dx + a.sum * d[3] + of_a * distance + offset;
+        // Of corners that stay where they are the normal turns.
+        let dn = a.hessian * dx + of_a;
+        let length = dx.norm().max(dy.norm()).max(dn.norm());
         // Bodies have size 1 here: a longer step leaves where the linearization means anything.
         let damping = (0.5 / length).min(1.0);
         self.x += dx * damping;
         self.y += dy * damping;
-        self.distance += d[6] * damping;
-        for k in 0..self.a.len {
-            self.a.multiplier[k] += d[7 + k] * damping;
+        self.distance += d[3] * damping;
+        for k in 0..la {
+            self.a.multiplier[k] += d[4 + k] * damping;
         }
-        for k in 0..self.b.len {
-            self.b.multiplier[k] += d[7 + self.a.len + k] * damping;
+        for k in 0..lb {
+            self.b.multiplier[k] += d[4 + la + k] * damping;
         }
         Some(length)
     }

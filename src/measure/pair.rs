@@ -30,7 +30,7 @@ impl Posed<'_> {
     }
 
     /// Constraint i at the point v with its error bounds.
-    pub(super) fn sample(&self, i: usize, v: &Vector3<f64>) -> Sample {
+    pub(super) fn sample(&self, i: usize, v: &Vector3<f64>) -> Sample<'_> {
         self.placement.sample(&self.body.constraints()[i], v)
     }
 
@@ -52,7 +52,7 @@ impl Posed<'_> {
     /// Rigorous upper bound of the largest constraint at all points within `distance` of v.
     pub(super) fn value_upper(&self, v: &Vector3<f64>, distance: f64) -> f64 {
         let constraints = self.body.constraints().iter();
-        largest(constraints.map(|c| self.placement.sample_within(c, v, distance).value_upper()))
+        largest(constraints.map(|c| self.placement.sample(c, v).value_upper(distance)))
     }
 
     /// Rigorous upper bound of the largest constraint at some point within the displacement of v.
@@ -91,25 +91,36 @@ impl Posed<'_> {
 
     /// A point within whose displacement a point of the body is proven to lie, near v.
     ///
-    /// Against the gradient of the most violated constraint the way to the body is shortest; where steps that way do not lead
-    /// in, the line to the interior point does. None if not even that is proven inside in this frame.
+    /// Against the gradients of the violated constraints the way to the body is shortest; where steps that way do not lead in,
+    /// the line to the interior point does. None if not even that is proven inside in this frame.
     pub(super) fn pull_in(&self, v: &Vector3<f64>) -> Option<Vector3<f64>> {
         let mut point = *v;
         let mut nudge = 4.0 * f64::EPSILON;
         for _ in 0..4 {
-            let samples = (0..self.len()).map(|i| self.sample(i, &point));
-            let worst = samples.max_by(|p, q| p.nearby_value_upper().total_cmp(&q.nearby_value_upper()))?;
-            let excess = worst.nearby_value_upper() - 1.0;
-            if excess <= 0.0 {
+            let (mut step, mut inside) = (Vector3::zeros(), true);
+            for i in 0..self.len() {
+                let sample = self.sample(i, &point);
+                let error = sample.nearby_value_error();
+                let excess = (sample.value() + error).next_up() - 1.0;
+                inside &= excess <= 0.0;
+                if excess.is_nan() {
+                    return self.pull_towards_interior(v);
+                }
+                let gradient = sample.gradient();
+                // What the steps for other constraints leave of it.
+                let left = excess + gradient.dot(&step);
+                if left > 0.0 {
+                    // Past the boundary by about the error that is paid for anyway, so that how rounding falls does not matter.
+                    step -= gradient * ((left + error) / gradient.norm_squared() * (1.0 + nudge));
+                }
+            }
+            if inside {
                 return Some(point);
             }
-            let gradient = worst.jet.gradient;
-            // Past the boundary by about the error that is paid for anyway, so that how rounding falls does not matter.
-            let step = gradient * ((excess + worst.nearby_value_error) / gradient.norm_squared());
             if !(step.norm() <= 0.1 * self.radius) {
                 break;
             }
-            point -= step * (1.0 + nudge);
+            point += step;
             nudge = 1e-6;
         }
         self.pull_towards_interior(v)
@@ -237,6 +248,11 @@ impl<'a> Pair<'a> {
     /// Whether v is proven to lie in both bodies.
     pub(super) fn common(&self, v: &Vector3<f64>) -> bool {
         self.a.contains(v) && self.b.contains(v)
+    }
+
+    /// Whether neither body has edges.
+    pub(super) fn smooth(&self) -> bool {
+        self.a.len() == 1 && self.b.len() == 1
     }
 
     /// Metres per unit of the query frame.

@@ -244,7 +244,7 @@ impl<'a> SharpPair<'a> {
             let (b, sum_b, values_b) = self.b.at(&of_b, &y);
             let (la, lb) = (of_a.set.len, of_b.set.len);
             let size = 7 + la + lb;
-            let mut m = DistanceNewton::matrix(d.double(), &a, &b, la, lb);
+            let mut m = newton_matrix(d.double(), &a, &b, la, lb);
             let offset = plus(&minus(&x, &y), &times(&sum_a, d));
             let balance = plus(&sum_a, &sum_b);
             for i in 0..3 {
@@ -385,6 +385,37 @@ impl<'a> SharpPair<'a> {
             active: (of_a.set, of_b.set),
         }
     }
+}
+
+/// Newton's matrix of the system of the distance for dx, dy, dD and the multipliers, from what is known at the iterate and the
+/// counts of active constraints; column `7 + la + lb` is left to the residuals.
+fn newton_matrix(distance: f64, a: &At, b: &At, la: usize, lb: usize) -> Augmented {
+    let mut m: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
+    let scaled = a.hessian * distance;
+    let turned = a.hessian * a.sum;
+    for i in 0..3 {
+        for j in 0..3 {
+            m[i][j] = scaled[(i, j)] + f64::from(u8::from(i == j));
+            m[3 + i][j] = a.hessian[(i, j)];
+            m[3 + i][3 + j] = b.hessian[(i, j)];
+        }
+        m[i][3 + i] = -1.0;
+        m[i][6] = a.sum[i];
+        m[6][i] = turned[i];
+        for k in 0..la {
+            m[i][7 + k] = distance * a.gradient[k][i];
+            m[3 + i][7 + k] = a.gradient[k][i];
+            m[7 + k][i] = a.gradient[k][i];
+        }
+        for k in 0..lb {
+            m[3 + i][7 + la + k] = b.gradient[k][i];
+            m[7 + la + k][3 + i] = b.gradient[k][i];
+        }
+    }
+    for k in 0..la {
+        m[6][7 + k] = a.sum.dot(&a.gradient[k]);
+    }
+    m
 }
 
 /// Solves a system with columns of one size: needles make them differ.

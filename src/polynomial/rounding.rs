@@ -42,7 +42,7 @@ pub(super) struct AbsolutePolynomial {
     by_degree: [f64; 9],
     gamma: f64,
     sum: f64,
-    degree: i32,
+    degree: usize,
     /// Entry j: the norm of the derivative of order j + 3 of the terms of degree j + 3, over j!.
     third: [f64; 6],
 }
@@ -66,13 +66,13 @@ impl AbsolutePolynomial {
         // which only scale the bound by 1 + γ and are covered by counting 2 roundings more.
         let gamma = gamma(count(degree - 2) + degree + 12);
         let sum = by_degree.iter().sum();
-        Self { by_degree, gamma, sum, degree: degree as i32, third }
+        Self { by_degree, gamma, sum, degree, third }
     }
 
     /// `Q(r)`, `Q'(r)`, `Q''(r)`.
     fn jet(&self, r: f64) -> (f64, f64, f64) {
         let (mut q, mut dq, mut half_ddq) = (0.0, 0.0, 0.0);
-        for &c in self.by_degree.iter().rev() {
+        for &c in self.by_degree[..=self.degree].iter().rev() {
             half_ddq = half_ddq * r + dq;
             dq = dq * r + q;
             q = q * r + c;
@@ -81,7 +81,10 @@ impl AbsolutePolynomial {
     }
 
     fn underflow(&self, r: f64) -> f64 {
-        UNDERFLOW * (1.0 + self.sum) * r.max(1.0).powi(self.degree)
+        // Without a call to a general power.
+        let square = r.max(1.0) * r.max(1.0);
+        let power = (1..self.degree / 2).fold(square, |power, _| power * square);
+        UNDERFLOW * (1.0 + self.sum) * power
     }
 
     pub(super) fn value_error(&self, z: &Vector3<f64>, gradient: &Vector3<f64>, dz: &Vector3<f64>) -> f64 {
@@ -128,7 +131,7 @@ impl AbsolutePolynomial {
         let tame = (1e-8..=1e8).contains(&coordinate);
         // Twice: for the roundings of the formula itself.
         let value_error = if tame { 2.0 * self.gamma * q * (1.0 + 1e-13) + 1e-230 } else { f64::NAN };
-        let per_length = f64::from(self.degree) / coordinate;
+        let per_length = self.degree as f64 / coordinate;
         Growth {
             value_error,
             gradient_error: value_error * per_length,

@@ -1,0 +1,101 @@
+//! About where two bodies with edges are nearest: the algorithm of Gilbert, Johnson and Keerthi (A fast procedure for computing
+//! the distance between complex objects in three-dimensional space, IEEE J. Robotics and Automation 4, 1988) on the support
+//! points that the outlines keep. Nothing is proven by it; it shows Newton's method which constraints are active.
+
+use super::pair::Pair;
+use crate::body::Outline;
+use crate::polynomial::Scalar;
+use nalgebra::{Matrix3, Vector3};
+
+/// Most support points asked for.
+const MAX_STEPS: usize = 16;
+
+/// How much nearer a support point must lead, relative to the square of the distance.
+const WORTH: f64 = 1e-6;
+
+/// Points of the outlines of both bodies, and their difference.
+#[derive(Clone, Copy)]
+struct Corner {
+    x: Vector3<f64>,
+    y: Vector3<f64>,
+    difference: Vector3<f64>,
+}
+
+/// Corners and the weights of the point nearest to 0 that they span; one with a weight of zero is none.
+#[derive(Clone, Copy)]
+struct Simplex {
+    corners: [Corner; 4],
+    weights: [f64; 4],
+    len: usize,
+}
+
+impl Simplex {
+    fn nearest(&self, of: impl Fn(&Corner) -> Vector3<f64>) -> Vector3<f64> {
+        (0..self.len).map(|k| of(&self.corners[k]) * self.weights[k]).sum()
+    }
+
+    /// The part of the simplex with one more corner that holds its point nearest to 0; the new corner belongs to it.
+    fn with(&self, corner: Corner) -> Self {
+        let alone = Self { corners: [corner; 4], weights: [1.0, 0.0, 0.0, 0.0], len: 1 };
+        let mut best = (alone, corner.difference.norm_squared());
+        for others in 1_usize..1 << self.len {
+            let mut part = Self { corners: [corner; 4], weights: [0.0; 4], len: 1 };
+            for k in (0..self.len).filter(|k| others >> k & 1 == 1) {
+                part.corners[part.len] = self.corners[k];
+                part.len += 1;
+            }
+            if part.weigh() {
+                let square = part.nearest(|corner| corner.difference).norm_squared();
+                if square < best.1 {
+                    best = (part, square);
+                }
+            }
+        }
+        best.0
+    }
+
+    /// Finds the weights of the point nearest to 0 of all that the corners span; whether none is negative.
+    fn weigh(&mut self) -> bool {
+        let edge = |k: usize| {
+            if k < self.len { self.corners[k].difference - self.corners[0].difference } else { Vector3::zeros() }
+        };
+        let edges = Matrix3::from_columns(&[edge(1), edge(2), edge(3)]);
+        let mut normal = edges.transpose() * edges;
+        for k in self.len - 1..3 {
+            normal[(k, k)] = 1.0;
+        }
+        let right = -edges.transpose() * self.corners[0].difference;
+        let Some(solution) = normal.cholesky().map(|factor| factor.solve(&right)) else { return false };
+        self.weights = [1.0 - solution.sum(), solution[0], solution[1], solution[2]];
+        self.weights.iter().all(|&weight| weight >= 0.0)
+    }
+}
+
+/// Points of A and of B near those nearest to each other, in the query frame, from a direction from B to A on; none where the
+/// outlines overlap.
+pub(super) fn approach(pair: &Pair<'_>, n: &Vector3<f64>) -> Option<(Vector3<f64>, Vector3<f64>)> {
+    let (a, b) = (pair.a.body, pair.b.body);
+    let support = |n: &Vector3<f64>| {
+        let own = pair.direction_to_b(n);
+        let x = a.outline().point(Outline::place::<_, f64>(Scalar, (-n).into()));
+        let y = b.outline().point(Outline::place::<_, f64>(Scalar, own.into()));
+        let x = pair.a_to_query(&(a.normalization().center + Vector3::from(x)));
+        let y = pair.b_to_query(&(b.normalization().center + Vector3::from(y)));
+        Corner { x, y, difference: x - y }
+    };
+    let first = support(n);
+    let mut simplex = Simplex { corners: [first; 4], weights: [1.0, 0.0, 0.0, 0.0], len: 1 };
+    for _ in 0..MAX_STEPS {
+        let nearest = simplex.nearest(|corner| corner.difference);
+        let square = nearest.norm_squared();
+        if simplex.len == 4 || !(square > WORTH * pair.size().powi(2)) {
+            return None;
+        }
+        let next = support(&nearest);
+        if square - nearest.dot(&next.difference) <= WORTH * square {
+            break;
+        }
+        simplex = simplex.with(next);
+    }
+    Some((simplex.nearest(|corner| corner.x), simplex.nearest(|corner| corner.y)))
+}
