@@ -76,7 +76,7 @@ fn main() {
     if let Some(number) = arguments.block {
         let tally = block::run(&bodies, arguments.seed, number, true);
         for failure in &tally.kept {
-            println!("query {}: {}: {}", failure.query, failure.kind, failure.detail);
+            println!("query {}: {}: {}", failure.query, failure.check.name(), failure.detail);
         }
         println!("{} solves, {} failures", tally.solves, tally.failed());
         return;
@@ -142,7 +142,7 @@ fn main() {
         state::write(path, &text);
     }
     for failure in state.tally.kept.iter().take(10) {
-        println!("block {} query {}: {}: {}", failure.block, failure.query, failure.kind, failure.detail);
+        println!("block {} query {}: {}: {}", failure.block, failure.query, failure.check.name(), failure.detail);
     }
     if state.tally.failed() > 0 {
         std::process::exit(1);

@@ -1,15 +1,19 @@
 //! The measures under test: a table to extend when one is added.
 
 use crate::bodies::Placed;
-use crate::reference;
+use crate::reference::{self, big, growth};
 use sublevel::body::Body;
-use sublevel::measure::{Distance, LevelDistance, Options, Pose, Status, WarmStart, distance, level_distance};
+use sublevel::measure::{
+    Distance, GrowthDistance, LevelDistance, Options, Pose, Status, WarmStart, distance, growth_distance,
+    level_distance,
+};
 
 /// An answer of any measure.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Answer {
     Distance(Distance),
     Level(LevelDistance),
+    Growth(GrowthDistance),
 }
 
 /// What 200 bits say of an answer.
@@ -46,6 +50,12 @@ pub(crate) const MEASURES: &[Measure] = &[
         #[cfg(feature = "fit")]
         program: Some(crate::sos::level_distance),
     },
+    Measure {
+        name: "growth distance",
+        solve: |a, b, options, warm| Answer::Growth(growth_distance(a.0, a.1, b.0, b.1, options, warm)),
+        #[cfg(feature = "fit")]
+        program: None,
+    },
 ];
 
 impl Answer {
@@ -57,6 +67,7 @@ impl Answer {
         match self {
             Answer::Distance(answer) => answer.status,
             Answer::Level(answer) => answer.status,
+            Answer::Growth(answer) => answer.status,
         }
     }
 
@@ -64,6 +75,7 @@ impl Answer {
         match self {
             Answer::Distance(answer) => (answer.lower, answer.upper),
             Answer::Level(answer) => (answer.lower, answer.upper),
+            Answer::Growth(answer) => (answer.lower, answer.upper),
         }
     }
 
@@ -71,6 +83,7 @@ impl Answer {
         match self {
             Answer::Distance(answer) => answer.iterations,
             Answer::Level(answer) => answer.iterations,
+            Answer::Growth(answer) => answer.iterations,
         }
     }
 
@@ -79,8 +92,17 @@ impl Answer {
         let scale = match self {
             Answer::Distance(_) => a.circumscribed().radius.min(b.circumscribed().radius),
             Answer::Level(answer) => answer.upper.abs().max(1.0),
+            Answer::Growth(answer) => answer.upper.max(1.0),
         };
         accuracy * scale * (1.0 + 1e-12)
+    }
+
+    /// Width that rounding may leave where it is more than that: see [`Options::with_accuracy`].
+    pub(crate) fn floor(&self, a: &Body, b: &Body) -> f64 {
+        match self {
+            Answer::Distance(answer) => 4e-13 * (answer.upper + a.circumscribed().radius.max(b.circumscribed().radius)),
+            Answer::Level(_) | Answer::Growth(_) => 0.0,
+        }
     }
 
     /// Whether the witnesses lie in their bodies, up to what rounding them to world coordinates moves them.
@@ -88,12 +110,14 @@ impl Answer {
         match self {
             Answer::Distance(answer) => within(a, &answer.witness_a) && within(b, &answer.witness_b),
             Answer::Level(answer) => within(b, &answer.witness),
+            // In the bodies as they have grown, which is theirs to check.
+            Answer::Growth(_) => true,
         }
     }
 
-    /// Holds the bracket against 200 bits.
-    pub(crate) fn verdict(&self, a: Placed<'_>, b: Placed<'_>) -> Verdict {
-        match self {
+    /// Holds the bracket against 200 bits; none where there is nothing to hold it against.
+    pub(crate) fn verdict(&self, a: Placed<'_>, b: Placed<'_>) -> Option<Verdict> {
+        Some(match self {
             Answer::Distance(answer) => {
                 let truth = reference::distance(a.0, a.1, b.0, b.1, answer);
                 let small = a.0.circumscribed().radius.min(b.0.circumscribed().radius);
@@ -103,7 +127,15 @@ impl Answer {
                 let truth = reference::level_distance(a.0, a.1, b.0, b.1, answer);
                 Verdict { inside: truth.inside(answer), sharp: truth.width() <= 1e-16, truth: truth.value() }
             }
-        }
+            Answer::Growth(answer) => {
+                // Where the centres coincide the answer is 0 and has no normal.
+                let start = growth::Start { witness: answer.witness, value: answer.upper, normal: answer.normal? };
+                let centres = (a.0.growth_ball().center, b.0.growth_ball().center);
+                let truth = growth::growth_distance((a.0, a.1, &centres.0), (b.0, b.1, &centres.1), &start)?;
+                let inside = truth.lower <= big(answer.upper) && big(answer.lower) <= truth.upper;
+                Verdict { inside, sharp: truth.width() <= 1e-16 * truth.value().max(1.0), truth: truth.value() }
+            }
+        })
     }
 
     /// The answer's value and the size that an arbiter's 1e-6 is relative to. None where a semidefinite program in doubles can
@@ -115,6 +147,7 @@ impl Answer {
         let value = self.bracket().1;
         match self {
             Answer::Distance(_) => (value < 10.0 * large).then_some((value, large)),
+            Answer::Growth(_) => None,
             Answer::Level(_) => (value < 1e3 && large < 10.0 * small).then_some((value, value.abs().max(1.0))),
         }
     }

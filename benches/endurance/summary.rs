@@ -16,15 +16,16 @@ pub(crate) fn markdown(state: &State, threads: usize) -> String {
     line(format_args!("| bracketed solves | {} |", grouped(tally.solves)));
     line(format_args!("| blocks | {} |", grouped(state.blocks())));
     line(format_args!("| failures | {} |", grouped(tally.failed())));
+    line(format_args!("| wider than asked for, as far as rounding goes | {} |", grouped(tally.floored)));
     let hours = state.seconds / 3600.0;
     line(format_args!("| hours on {threads} threads | {hours:.2} |"));
     line(format_args!("| largest deviation from the semidefinite program, of the size | {:.1e} |", tally.deviation));
     let commits: Vec<_> = state.commits.iter().map(String::as_str).collect();
     line(format_args!("| commits | {} |\n", commits.join(", ")));
     line(format_args!("| check | made | failed |\n|---|---:|---:|"));
-    for (kind, made) in &tally.checks {
-        let failed = tally.failures.get(kind).copied().unwrap_or(0);
-        line(format_args!("| {kind} | {} | {} |", grouped(*made), grouped(failed)));
+    for (check, made) in &tally.checks {
+        let failed = tally.failures.get(check).copied().unwrap_or(0);
+        line(format_args!("| {} | {} | {} |", check.name(), grouped(*made), grouped(failed)));
     }
     line(format_args!(
         "\n| iterations | solves | mean | median | 99.9 % | most | where |\n|---|---:|---:|---:|---:|---:|---|"
@@ -45,7 +46,7 @@ pub(crate) fn markdown(state: &State, threads: usize) -> String {
     if !tally.kept.is_empty() {
         line(format_args!("\n| first failures | block | query |\n|---|---:|---:|"));
         for failure in tally.kept.iter().take(20) {
-            line(format_args!("| {} | {} | {} |", failure.kind, failure.block, failure.query));
+            line(format_args!("| {} | {} | {} |", failure.check.name(), failure.block, failure.query));
         }
     }
     text

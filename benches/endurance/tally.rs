@@ -24,6 +24,11 @@ pub(crate) struct Iterations {
 }
 
 impl Iterations {
+    pub(crate) fn count(&mut self, solve: Worst) {
+        *self.histogram.entry(solve.iterations).or_default() += 1;
+        self.worst = harder(self.worst, solve);
+    }
+
     pub(crate) fn solves(&self) -> u64 {
         self.histogram.values().sum()
     }
@@ -46,12 +51,44 @@ impl Iterations {
     }
 }
 
+/// What is held against an answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub(crate) enum Check {
+    InOrder,
+    Converged,
+    Honest,
+    Capped,
+    Meet,
+    Feasible,
+    Truth,
+    Sharp,
+    Solved,
+    Agrees,
+}
+
+impl Check {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Check::InOrder => "bracket in order",
+            Check::Converged => "converged, or as narrow as rounding lets it be",
+            Check::Honest => "status honest",
+            Check::Capped => "iterations capped",
+            Check::Meet => "brackets of the same poses from another start meet",
+            Check::Feasible => "witnesses feasible",
+            Check::Truth => "truth with 200 bits in the bracket",
+            Check::Sharp => "reference sharp",
+            Check::Solved => "semidefinite program solved",
+            Check::Agrees => "semidefinite program agrees to 1e-6",
+        }
+    }
+}
+
 /// One failure, to be replayed with `--block`.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(crate) struct Failure {
     pub(crate) block: u64,
     pub(crate) query: u64,
-    pub(crate) kind: String,
+    pub(crate) check: Check,
     pub(crate) detail: String,
 }
 
@@ -60,46 +97,56 @@ pub(crate) struct Failure {
 pub(crate) struct Tally {
     /// Bracketed solves.
     pub(crate) solves: u64,
-    /// Per measure and start, such as `distance, warm`.
+    /// Per measure, kind of bodies and start, such as `distance, smooth, warm`.
     pub(crate) iterations: BTreeMap<String, Iterations>,
-    /// Checks made, per kind of check.
-    pub(crate) checks: BTreeMap<String, u64>,
-    /// Failures, per kind.
-    pub(crate) failures: BTreeMap<String, u64>,
-    /// The first of them.
+    /// Checks made.
+    pub(crate) checks: BTreeMap<Check, u64>,
+    /// Failures.
+    pub(crate) failures: BTreeMap<Check, u64>,
+    /// Those excused of [`Check::Converged`]: wider than asked for, but not than rounding leaves.
+    pub(crate) floored: u64,
+    /// The first failures.
     pub(crate) kept: Vec<Failure>,
     /// Largest deviation from the semidefinite program, relative to the size.
     pub(crate) deviation: f64,
 }
 
 impl Tally {
-    pub(crate) fn solve(&mut self, name: String, worst: Worst) {
-        self.solves += 1;
-        let iterations = self.iterations.entry(name).or_default();
-        *iterations.histogram.entry(worst.iterations).or_default() += 1;
-        iterations.worst = harder(iterations.worst, worst);
+    /// Takes the iterations of solves that are counted already.
+    pub(crate) fn iterations(&mut self, name: String, theirs: Iterations) {
+        if theirs.histogram.is_empty() {
+            return;
+        }
+        let ours = self.iterations.entry(name).or_default();
+        for (count, solves) in theirs.histogram {
+            *ours.histogram.entry(count).or_default() += solves;
+        }
+        ours.worst = harder(ours.worst, theirs.worst);
     }
 
     /// Counts a check; where it failed, with the detail.
-    pub(crate) fn check(&mut self, kind: &str, passed: bool, block: u64, query: u64, detail: impl FnOnce() -> String) {
-        match self.checks.get_mut(kind) {
-            Some(count) => *count += 1,
-            None => _ = self.checks.insert(kind.into(), 1),
-        }
+    pub(crate) fn check(
+        &mut self,
+        check: Check,
+        passed: bool,
+        block: u64,
+        query: u64,
+        detail: impl FnOnce() -> String,
+    ) {
+        *self.checks.entry(check).or_default() += 1;
         if !passed {
-            *self.failures.entry(kind.into()).or_default() += 1;
-            self.kept.push(Failure { block, query, kind: kind.into(), detail: detail() });
+            *self.failures.entry(check).or_default() += 1;
+            if self.kept.len() < KEPT_OF_A_BLOCK {
+                self.kept.push(Failure { block, query, check, detail: detail() });
+            }
         }
     }
 
     pub(crate) fn add(&mut self, other: Tally) {
         self.solves += other.solves;
+        self.floored += other.floored;
         for (name, theirs) in other.iterations {
-            let ours = self.iterations.entry(name).or_default();
-            for (count, solves) in theirs.histogram {
-                *ours.histogram.entry(count).or_default() += solves;
-            }
-            ours.worst = harder(ours.worst, theirs.worst);
+            self.iterations(name, theirs);
         }
         for (kind, count) in other.checks {
             *self.checks.entry(kind).or_default() += count;
@@ -107,7 +154,7 @@ impl Tally {
         for (kind, count) in other.failures {
             *self.failures.entry(kind).or_default() += count;
         }
-        self.kept.extend(other.kept.into_iter().take(KEPT_OF_A_BLOCK));
+        self.kept.extend(other.kept);
         self.kept.sort();
         self.kept.truncate(KEPT);
         self.deviation = self.deviation.max(other.deviation);

@@ -11,7 +11,7 @@ use super::pose::Pose;
 use super::programs::{Closest, Level, points};
 use super::relation::Apart;
 use super::sharp::SharpPair;
-use super::simplex::approach;
+use super::simplex::{Approach, approach};
 use super::smooth::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
 use super::twist::Twist;
 use super::union;
@@ -286,12 +286,18 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Newton's method from where the outlines are nearest, with the constraints that are active there.
+    /// Newton's method from where the outlines are nearest, with the constraints that are active there. Where two sides are all but
+    /// parallel that is anywhere on them, but the corners of one show.
     fn outlined(&mut self) {
-        let Some((x, y)) = approach(self.pair, &self.n) else { return };
+        let Some(Approach { x, y, corners }) = approach(self.pair, &self.n) else { return };
         let n = (x - y).normalize();
-        let (a, b) = (Active::near(&self.pair.a, &x, &-n), Active::near(&self.pair.b, &y, &n));
-        self.newton(x, y, n, a, b);
+        for (x, y) in [(x, y), (x, corners.1), (corners.0, y)] {
+            let (a, b) = (Active::near(&self.pair.a, &x, &-n), Active::near(&self.pair.b, &y, &n));
+            self.newton(x, y, n, a, b);
+            if self.ended() {
+                return;
+            }
+        }
     }
 
     /// Goes on in twice the precision where rounding keeps the bracket wide.

@@ -245,7 +245,7 @@ impl DistanceNewton {
                 return step;
             }
             // Near its solution Newton's step shrinks fast; one that does not is not near.
-            let settled = length < 1e-9;
+            let settled = length < WORTH_A_BRACKET;
             if settled || step % 4 == 0 {
                 let changed = self.a.drop_negative()
                     | self.b.drop_negative()

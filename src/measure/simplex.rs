@@ -3,7 +3,7 @@
 //! points that the outlines keep. Nothing is proven by it; it shows Newton's method which constraints are active.
 
 use super::pair::Pair;
-use crate::body::Outline;
+use crate::body::{Body, Outline};
 use crate::polynomial::Scalar;
 use nalgebra::{Matrix3, Vector3};
 
@@ -71,31 +71,46 @@ impl Simplex {
     }
 }
 
-/// Points of A and of B near those nearest to each other, in the query frame, from a direction from B to A on; none where the
-/// outlines overlap.
-pub(super) fn approach(pair: &Pair<'_>, n: &Vector3<f64>) -> Option<(Vector3<f64>, Vector3<f64>)> {
+/// What the outlines of two bodies that are apart show.
+pub(super) struct Approach {
+    /// Point of A near the one nearest to B, query frame.
+    pub(super) x: Vector3<f64>,
+    /// Point of B near the one nearest to A.
+    pub(super) y: Vector3<f64>,
+    /// Points of A and of B farthest towards the other one: corners where the nearest points may lie anywhere on a side.
+    pub(super) corners: (Vector3<f64>, Vector3<f64>),
+}
+
+/// Points of the outlines of A farthest along -n and of B farthest along n, query frame.
+pub(super) fn corners(pair: &Pair<'_>, n: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    let toward = |body: &Body, n: Vector3<f64>| {
+        let point = body.outline().point(Outline::place::<_, f64>(Scalar, n.into()));
+        body.normalization().center + Vector3::from(point)
+    };
     let (a, b) = (pair.a.body, pair.b.body);
+    (pair.a_to_query(&toward(a, -n)), pair.b_to_query(&toward(b, pair.direction_to_b(n))))
+}
+
+/// The approach of two bodies, from a direction from B to A on; none where the outlines overlap.
+pub(super) fn approach(pair: &Pair<'_>, n: &Vector3<f64>) -> Option<Approach> {
     let support = |n: &Vector3<f64>| {
-        let own = pair.direction_to_b(n);
-        let x = a.outline().point(Outline::place::<_, f64>(Scalar, (-n).into()));
-        let y = b.outline().point(Outline::place::<_, f64>(Scalar, own.into()));
-        let x = pair.a_to_query(&(a.normalization().center + Vector3::from(x)));
-        let y = pair.b_to_query(&(b.normalization().center + Vector3::from(y)));
+        let (x, y) = corners(pair, n);
         Corner { x, y, difference: x - y }
     };
-    let first = support(n);
-    let mut simplex = Simplex { corners: [first; 4], weights: [1.0, 0.0, 0.0, 0.0], len: 1 };
+    let mut last = support(n);
+    let mut simplex = Simplex { corners: [last; 4], weights: [1.0, 0.0, 0.0, 0.0], len: 1 };
     for _ in 0..MAX_STEPS {
         let nearest = simplex.nearest(|corner| corner.difference);
         let square = nearest.norm_squared();
         if simplex.len == 4 || !(square > WORTH * pair.size().powi(2)) {
             return None;
         }
-        let next = support(&nearest);
-        if square - nearest.dot(&next.difference) <= WORTH * square {
+        last = support(&nearest);
+        if square - nearest.dot(&last.difference) <= WORTH * square {
             break;
         }
-        simplex = simplex.with(next);
+        simplex = simplex.with(last);
     }
-    Some((simplex.nearest(|corner| corner.x), simplex.nearest(|corner| corner.y)))
+    let (x, y) = (simplex.nearest(|corner| corner.x), simplex.nearest(|corner| corner.y));
+    Some(Approach { x, y, corners: (last.x, last.y) })
 }

@@ -66,6 +66,11 @@ impl<const N: usize> Rows<N> {
     fn as_slice(&self) -> &[Row<N>] {
         &self.rows[..self.len]
     }
+
+    /// Largest value.
+    fn worst(&self) -> f64 {
+        self.as_slice().iter().fold(f64::NEG_INFINITY, |worst, row| worst.max(row.value))
+    }
 }
 
 /// A convex program `min f(v)` subject to `c_i(v) <= 0` in N variables.
@@ -92,6 +97,18 @@ pub struct Iterate<'a, const N: usize> {
 /// `gap` is the size of improvement expected of the objective; it sets the first multipliers. A start that is not strictly
 /// feasible returns at once.
 pub fn minimise<const N: usize, P: Program<N>>(
+    program: &P,
+    v: &mut SVector<f64, N>,
+    gap: f64,
+    inspect: impl FnMut(&Iterate<'_, N>) -> ControlFlow<()>,
+) -> u32 {
+    minimise_within(f64::INFINITY, program, v, gap, inspect)
+}
+
+/// As [`minimise`], with no step to where a constraint is above `farthest` that was not before: slower, but from far outside thin
+/// bodies the way back may be too long.
+pub fn minimise_within<const N: usize, P: Program<N>>(
+    farthest: f64,
     program: &P,
     v: &mut SVector<f64, N>,
     gap: f64,
@@ -145,7 +162,7 @@ pub fn minimise<const N: usize, P: Program<N>>(
             program.constraints(&trial, trial_rows);
             let (trial_gradient, _) = program.objective(&trial);
             let after = trial_dual.residual(&trial_gradient, trial_rows.as_slice(), target);
-            if after <= 4.0 * before {
+            if after <= 4.0 * before && trial_rows.worst() <= farthest.max(current.worst()) {
                 (*v, dual, accepted) = (trial, trial_dual, true);
                 break;
             }

@@ -7,4 +7,4 @@
 
 mod interior_point;
 
-pub use interior_point::{Iterate, MAX_ROWS, Program, Row, Rows, minimise};
+pub use interior_point::{Iterate, MAX_ROWS, Program, Row, Rows, minimise, minimise_within};

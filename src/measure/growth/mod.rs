@@ -30,12 +30,13 @@ use super::newton::Active;
 use super::options::Options;
 use super::pair::{Pair, Posed};
 use super::pose::{Pose, ROTATION_ERROR};
+use super::simplex::corners;
 use super::smooth::{Follow, SEEK_ROUNDS, Seek};
 use super::twist::Twist;
 use super::union;
 use super::warm::{Hint, WarmStart};
 use crate::body::{Body, Solid};
-use crate::optimize::minimise;
+use crate::optimize::minimise_within;
 use crate::polynomial::{dispatch, gamma};
 use along::Along;
 use nalgebra::Vector3;
@@ -277,18 +278,39 @@ impl Search<'_> {
             }
         }
         if !self.done() {
-            self.interior_point();
+            self.interior_point(f64::INFINITY);
+        }
+        if !self.done() && !pair.smooth() {
+            self.cornered();
+        }
+        if !self.done() {
+            self.interior_point(1.0);
         }
     }
 
-    /// Interior-point method, with Newton's method tried as soon as it shows the active constraints.
-    fn interior_point(&mut self) {
+    /// Newton's method from the corners of either body: where two sides are all but parallel, they show what touches first.
+    fn cornered(&mut self) {
+        let Some(n) = self.n else { return };
+        let pair = self.frame.pair;
+        let (x, y) = (self.x, self.y);
+        let (corner_a, corner_b) = corners(pair, &-n.normalize());
+        for (x, y) in [(x, corner_b), (corner_a, y)] {
+            let (a, b) = (Active::near(&pair.a, &x, &n), Active::near(&pair.b, &y, &-n));
+            if !self.done() {
+                self.newton(x, y, &n, a, b);
+            }
+        }
+    }
+
+    /// Interior-point method, with Newton's method tried as soon as it shows the active constraints; for how far constraints may
+    /// be violated see [`minimise_within`].
+    fn interior_point(&mut self, farthest: f64) {
         let pair = self.frame.pair;
         let program = ReachProgram::new(pair, &self.frame.delta, &self.frame.center_a, &self.frame.center_b);
         let mut v = program.start();
         let mut attempt = 1e-1;
         let options = self.options;
-        minimise(&program, &mut v, self.frame.radius_a + self.frame.radius_b, |iterate| {
+        minimise_within(farthest, &program, &mut v, self.frame.radius_a + self.frame.radius_b, |iterate| {
             self.iterations += 1;
             let (x, y) = program.points(iterate.v);
             // Complementarity is the missing part of ρ.

@@ -13,5 +13,6 @@ pub(crate) mod level;
 pub(crate) mod signed;
 mod solid;
 
+pub(crate) use big::big;
 pub(crate) use distance::distance;
 pub(crate) use level::level_distance;
