@@ -10,8 +10,8 @@ use super::active::ActiveConstraints;
 use super::distance::{Distance, distance};
 use super::options::Options;
 use super::pose::Pose;
-use super::smooth::{LONGEST, WORTH_A_BRACKET};
-use super::start::{Start, facing, meeting};
+use super::smooth::{limits, worth_a_bracket};
+use super::start::{Start, facing, meeting, middle};
 use super::tangent::{ALIGNED, Bend, Plane, Relative, Side, Step, bracket, moved, newton};
 use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, scaled, subtract};
 use super::warm::WarmStart;
@@ -199,7 +199,7 @@ struct Linearized<N> {
     local: (M3<N>, M3<N>),
     difference: V3<N>,
     step: Step<N>,
-    /// Square of its length.
+    /// Square of its moves relative to their limits.
     square: N,
 }
 
@@ -210,6 +210,7 @@ impl<N: Copy> Iterate<N> {
         simd: S,
         (side_a, jet_a): (&Side<'_, N>, &NumberJet<N>),
         (side_b, jet_b): (&Side<'_, N>, &NumberJet<N>),
+        limits: [f64; 2],
     ) -> Linearized<N>
     where
         N: Number<S>,
@@ -221,17 +222,17 @@ impl<N: Copy> Iterate<N> {
         let difference = apply(&frame, subtract(self.x, self.y));
         let zero = N::splat(simd, 0.0);
         let step = newton(simd, (&a, &bend_a), (&b, &bend_b), difference, zero);
-        let square = step.square(simd);
+        let square = step.square(simd, limits);
         Linearized { frame, local, difference, step, square }
     }
 
-    /// Takes a step of at most this length.
+    /// Takes a step, within its limits.
     #[inline(always)]
-    fn advance<S: Simd>(&mut self, simd: S, Linearized { frame, step, square, .. }: &Linearized<N>, longest: f64)
+    fn advance<S: Simd>(&mut self, simd: S, Linearized { frame, step, square, .. }: &Linearized<N>)
     where
         N: Number<S>,
     {
-        let step = step.at_most(simd, longest, *square);
+        let step = step.at_most(simd, *square);
         self.x = moved(self.x, step.dx, frame);
         self.y = moved(self.y, step.dy, frame);
         self.n = add_scaled(add_scaled(frame[2], step.dn[0], frame[0]), step.dn[1], frame[1]);
@@ -262,8 +263,8 @@ impl Batch<'_> {
         let relative = self.relative(simd, &group.pose);
         let side_a = Side::at_home(simd, self.a, 0);
         let side_b = Side::away(self.b, 0, &relative);
-        let longest = LONGEST * self.a.trust().reach.min(self.b.trust().reach);
-        let worth = WORTH_A_BRACKET * longest;
+        let limits = limits(self.a, self.b);
+        let worth = worth_a_bracket(limits);
         let mut at = if fresh {
             let n = facing(simd, self.a, self.b, &relative);
             let Start { x, y, n, .. } = meeting(simd, self.a, self.b, &relative, n, None);
@@ -277,6 +278,12 @@ impl Batch<'_> {
             }
         };
         let mut open = (1_u32 << group.count) - 1;
+        if fresh {
+            open &= !self.overlapping(simd, &at, (&side_a, &side_b));
+            if open == 0 {
+                return;
+            }
+        }
         let rounds = if fresh { ROUNDS } else { 1 };
         for round in 1..=rounds {
             let ((jet_a, inside_a), (jet_b, inside_b)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
@@ -285,9 +292,9 @@ impl Batch<'_> {
                 let (a, b) = (side_a.pulled_back(simd, jet_a.gradient), side_b.pulled_back(simd, jet_b.gradient));
                 at.face(simd, a, b);
             }
-            let here = at.linearize(simd, (&side_a, &jet_a), (&side_b, &jet_b));
+            let here = at.linearize(simd, (&side_a, &jet_a), (&side_b, &jet_b), limits);
             let inside = Lanes::and(simd, inside_a, inside_b);
-            let short = Lanes::and(simd, inside, here.square.le(splat(worth * worth)));
+            let short = Lanes::and(simd, inside, here.step.square(simd, worth).le(splat(1.0)));
             // Before the last round hardly ever all lanes of a group are so far.
             if round == rounds && Lanes::bits(simd, short) & open != 0 {
                 let next_a = side_a.extrapolate(simd, &jet_a, &here.local.0, here.step.dx);
@@ -310,7 +317,7 @@ impl Batch<'_> {
                     }
                 }
             }
-            at.advance(simd, &here, longest);
+            at.advance(simd, &here);
         }
         for (i, coordinate) in [at.x, at.y, at.n].as_flattened().iter().enumerate() {
             coordinate.store(&mut group.at[i]);
@@ -325,6 +332,24 @@ impl Batch<'_> {
                 waiting.push((group.pose[lane], spent, entry));
             }
         }
+    }
+
+    /// The lanes in which the middle between the points seems to lie in both bodies: single queries prove that fast.
+    #[inline(always)]
+    fn overlapping<S: Simd>(
+        &self,
+        simd: S,
+        at: &Iterate<Lanes<S>>,
+        (side_a, side_b): (&Side<'_, Lanes<S>>, &Side<'_, Lanes<S>>),
+    ) -> u32 {
+        let one = Lanes::<S>::splat(simd, 1.0);
+        let across = Lanes::bits(simd, dot(at.n, subtract(at.x, at.y)).le(Lanes::splat(simd, 0.0)));
+        if across == 0 {
+            return 0;
+        }
+        let middle = middle(simd, self.a, self.b, at.x, at.y);
+        let ((in_a, _), (in_b, _)) = (side_a.jet(simd, middle), side_b.jet(simd, middle));
+        across & Lanes::bits(simd, in_a.value.max(in_b.value).le(one))
     }
 
     /// B at the poses as seen from A.

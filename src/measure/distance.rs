@@ -127,11 +127,11 @@ pub(super) fn between(
 ) -> Distance {
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
     let relation = Apart { pose_a, pose_b, goal, tolerance };
-    let mut spent = 0;
+    let (mut spent, mut middle) = (0, None);
     if let Hint::Smooth(trace) = &mut warm.hint {
         match dispatch(Follow { a, b, relation, options, trace }) {
             Ok(proven) => return proven.answer(a, pose_a, tolerance),
-            Err(rounds) => spent = rounds,
+            Err(lost) => (spent, middle) = (lost.rounds, lost.middle),
         }
     }
     let still_overlapping = matches!(warm.hint, Hint::Overlap { .. }) && {
@@ -140,20 +140,24 @@ pub(super) fn between(
     };
     // Where edges face each other no single constraint is to be followed.
     let smooth = a.constraints().len() == 1 && b.constraints().len() == 1;
-    if smooth && !still_overlapping && !options.exhausted(spent) {
+    if smooth && !still_overlapping && middle.is_none() && !options.exhausted(spent) {
         let limit = SEEK_ROUNDS.min(options.max_iterations() - spent);
         match dispatch(Seek { a, b, relation, limit, options }) {
             Ok((proven, trace)) => {
                 *warm = Hint::Smooth(trace).into();
                 return Distance { iterations: spent + proven.rounds, ..proven.answer(a, pose_a, tolerance) };
             }
-            Err(rounds) => spent += rounds,
+            Err(lost) => (spent, middle) = (spent + lost.rounds, lost.middle),
         }
     }
     let pair = Pair::new(a, pose_a, b, pose_b);
     let mut search = Search::new(&pair, goal, options);
     search.iterations = spent;
-    search.run(&warm.hint);
+    let common = middle
+        .is_some_and(|middle| search.common(&pair.a_to_query(&(a.normalization().center + Vector3::from(middle)))));
+    if !common {
+        search.run(&warm.hint);
+    }
     *warm = search.hint();
     search.answer()
 }

@@ -17,6 +17,12 @@ pub(super) trait Relation: Copy {
     /// Where to start from nothing but the poses.
     fn start<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> Start<f64>;
 
+    /// Whether a common point is an answer, so that there is nothing to look for in an overlap.
+    #[inline(always)]
+    fn ends_at_contact(&self) -> bool {
+        false
+    }
+
     /// Newton's step from points with `difference = x - y` in the frame, whose third vector is the normal from B to A: towards
     /// points with their difference along the normal.
     #[inline(always)]
@@ -70,6 +76,11 @@ impl Relation for Apart<'_> {
     #[inline(always)]
     fn start<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> Start<f64> {
         meeting(simd, a, b, relative, facing(simd, a, b, relative), None)
+    }
+
+    #[inline(always)]
+    fn ends_at_contact(&self) -> bool {
+        true
     }
 
     #[inline(always)]

@@ -8,6 +8,7 @@
 use super::options::Options;
 use super::pose::Pose;
 use super::relation::{Relation, Verdict};
+use super::start::middle;
 use super::tangent::{Bend, Plane, Relative, Side, Step, bracket, moved};
 use super::vector::{M3, V3, add, apply, apply_transposed, basis, dot, subtract};
 use crate::body::Body;
@@ -102,6 +103,21 @@ impl Proven {
     }
 }
 
+/// What is left where nothing was proven.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lost {
+    /// Evaluations of both bodies.
+    pub(super) rounds: u32,
+    /// A point that seems to lie in both, from the centre of A's normalization on, in A's frame, metres.
+    pub(super) middle: Option<V3<f64>>,
+}
+
+impl Lost {
+    fn after(rounds: u32) -> Self {
+        Self { rounds, middle: None }
+    }
+}
+
 /// Most evaluations before another method takes over.
 const MAX_ROUNDS: u32 = 8;
 
@@ -112,10 +128,22 @@ pub(super) const SEEK_ROUNDS: u32 = 16;
 const STEEP: f64 = 0.1;
 
 /// Length of a step relative to the longest, beyond which no extrapolation is close enough for a bracket.
-pub(super) const WORTH_A_BRACKET: f64 = 1e-2;
+const WORTH_A_BRACKET: f64 = 1e-2;
 
-/// Longest step relative to the bodies' sizes that the linearization may mean anything for.
-pub(super) const LONGEST: f64 = 0.25;
+/// Moves, for the longest ones, beyond which no bracket is worth its evaluation; that is relative to the smaller body, too.
+#[inline(always)]
+pub(super) fn worth_a_bracket([of_x, of_y]: [f64; 2]) -> [f64; 2] {
+    [WORTH_A_BRACKET * of_x.min(of_y); 2]
+}
+
+/// Longest move relative to a body's size that the linearization may mean anything for.
+const LONGEST: f64 = 0.25;
+
+/// The longest moves of a point of A and of a point of B, metres.
+#[inline(always)]
+pub(super) fn limits(a: &Body, b: &Body) -> [f64; 2] {
+    [LONGEST * a.trust().reach, LONGEST * b.trust().reach]
+}
 
 /// Continuation as work for the widest arithmetic.
 pub(super) struct Follow<'a, R> {
@@ -129,15 +157,15 @@ pub(super) struct Follow<'a, R> {
 }
 
 impl<R: Relation> WithSimd for Follow<'_, R> {
-    type Output = Result<Proven, u32>;
+    type Output = Result<Proven, Lost>;
 
-    /// The proven answer, or how many rounds were spent in vain.
+    /// The proven answer, or what is left.
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Result<Proven, u32> {
+    fn with_simd<S: Simd>(self, simd: S) -> Result<Proven, Lost> {
         let Self { a, b, relation, options, trace } = self;
         let active = trace.active.map(usize::from);
         if active[0] >= a.constraints().len() || active[1] >= b.constraints().len() {
-            return Err(0);
+            return Err(Lost::after(0));
         }
         let relative = relation.relative(simd, a, b);
         let limit = MAX_ROUNDS.min(options.max_iterations());
@@ -150,8 +178,8 @@ impl<R: Relation> WithSimd for Follow<'_, R> {
         let jet_b = (Plane::new(simd, &trace.jet_b, &local_b), Bend::new(simd, &trace.jet_b, &local_b));
         let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
         let step = relation.newton(simd, (&trace.a.0, &trace.a.1), (&jet_b.0, &jet_b.1), &at.frame, difference);
-        if !step.within(correct.longest) {
-            return Err(0);
+        if !step.within(simd, correct.limits) {
+            return Err(Lost::after(0));
         }
         at.advance(simd, &step);
         let predicted = (at.x, at.y);
@@ -179,16 +207,23 @@ pub(super) struct Seek<'a, R> {
 }
 
 impl<R: Relation> WithSimd for Seek<'_, R> {
-    type Output = Result<(Proven, Trace), u32>;
+    type Output = Result<(Proven, Trace), Lost>;
 
-    /// The proven answer with its trace, or how many rounds were spent in vain.
+    /// The proven answer with its trace, or what is left.
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Result<(Proven, Trace), u32> {
+    fn with_simd<S: Simd>(self, simd: S) -> Result<(Proven, Trace), Lost> {
         let Self { a, b, relation, limit, options } = self;
         let relative = relation.relative(simd, a, b);
         let start = relation.start(simd, a, b, &relative);
         let active = [a.outline().active(start.places[0]), b.outline().active(start.places[1])];
         let correct = Correct::new(simd, a, b, active, &relative, relation, limit, options);
+        if relation.ends_at_contact() && dot::<S, f64>(start.n, subtract::<S, f64>(start.x, start.y)) < 0.0 {
+            let (middle, (side_a, side_b)) = (middle(simd, a, b, start.x, start.y), &correct.sides);
+            let ((in_a, _), (in_b, _)) = (side_a.jet(simd, middle), side_b.jet(simd, middle));
+            if in_a.value < 1.0 && in_b.value < 1.0 {
+                return Err(Lost { rounds: 1, middle: Some(middle) });
+            }
+        }
         let at = Iterate { x: start.x, y: start.y, frame: basis(simd, start.n) };
         let mut trace = Trace::blank(active.map(|i| i as u8));
         let proven = correct.run(simd, &relative, at, &mut trace)?;
@@ -202,8 +237,8 @@ struct Correct<'a, R> {
     relation: R,
     limit: u32,
     options: &'a Options<'a>,
-    /// Longest step, metres.
-    longest: f64,
+    /// Longest moves of x and of y, metres.
+    limits: [f64; 2],
 }
 
 impl<'a, R: Relation> Correct<'a, R> {
@@ -220,7 +255,7 @@ impl<'a, R: Relation> Correct<'a, R> {
         options: &'a Options<'a>,
     ) -> Self {
         let sides = (Side::at_home(simd, a, active[0]), Side::away(b, active[1], relative));
-        Self { sides, relation, limit, options, longest: LONGEST * a.trust().reach.min(b.trust().reach) }
+        Self { sides, relation, limit, options, limits: limits(a, b) }
     }
 
     #[inline(always)]
@@ -230,11 +265,11 @@ impl<'a, R: Relation> Correct<'a, R> {
         relative: &Relative<f64>,
         mut at: Iterate,
         trace: &mut Trace,
-    ) -> Result<Proven, u32> {
+    ) -> Result<Proven, Lost> {
         let (side_a, side_b) = &self.sides;
         for rounds in 1..=self.limit {
             if self.options.stopped() {
-                return Err(rounds - 1);
+                return Err(Lost::after(rounds - 1));
             }
             let ((jet_a, inside_a), (jet_b, inside_b)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
             if !(inside_a && inside_b) {
@@ -246,7 +281,7 @@ impl<'a, R: Relation> Correct<'a, R> {
             let (mut a, mut b) = (Plane::new(simd, &jet_a, &local_a), Plane::new(simd, &jet_b, &local_b));
             if a.slant(-1.0).max(b.slant(1.0)) > STEEP {
                 // Far from the solution the normals of the surfaces show the way better than the last guess.
-                let Some(frame) = at.between_normals(simd, &a, &b) else { return Err(rounds) };
+                let Some(frame) = at.between_normals(simd, &a, &b) else { return Err(Lost::after(rounds)) };
                 at.frame = frame;
                 (local_a, local_b) = (side_a.localize(simd, &at.frame), side_b.localize(simd, &at.frame));
                 (a, b) = (Plane::new(simd, &jet_a, &local_a), Plane::new(simd, &jet_b, &local_b));
@@ -254,12 +289,12 @@ impl<'a, R: Relation> Correct<'a, R> {
             let (bend_a, bend_b) = (Bend::new(simd, &jet_a, &local_a), Bend::new(simd, &jet_b, &local_b));
             let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
             let mut step = self.relation.newton(simd, (&a, &bend_a), (&b, &bend_b), &at.frame, difference);
-            if !step.within(self.longest) {
-                step.shorten(self.longest);
+            if !step.within(simd, self.limits) {
+                step.shorten(simd, self.limits);
                 at.advance(simd, &step);
                 continue;
             }
-            if !step.within(WORTH_A_BRACKET * self.longest) {
+            if !step.within(simd, worth_a_bracket(self.limits)) {
                 at.advance(simd, &step);
                 continue;
             }
@@ -273,7 +308,7 @@ impl<'a, R: Relation> Correct<'a, R> {
                     let x = moved::<S, f64>(at.x, add::<S, f64>(step.dx, found.to_a), &at.frame);
                     let y = moved::<S, f64>(at.y, add::<S, f64>(step.dy, found.to_b), &at.frame);
                     if !(side_a.others_hold(simd, x) && side_b.others_hold(simd, y)) {
-                        return Err(rounds);
+                        return Err(Lost::after(rounds));
                     }
                     trace.x = at.x;
                     let from_b = subtract::<S, f64>(at.y, relative.origin);
@@ -286,10 +321,15 @@ impl<'a, R: Relation> Correct<'a, R> {
                     return Ok(Proven { lower, upper, x, y, n, active, multipliers, rounds });
                 }
                 Verdict::Wide => at.advance(simd, &step),
-                Verdict::Hopeless => return Err(rounds),
+                Verdict::Hopeless => {
+                    return Err(Lost {
+                        rounds,
+                        middle: Some(middle(simd, self.sides.0.body(), self.sides.1.body(), at.x, at.y)),
+                    });
+                }
             }
         }
-        Err(self.limit)
+        Err(Lost::after(self.limit))
     }
 }
 

@@ -66,6 +66,18 @@ pub(super) fn facing<S: Simd, N: Number<S>>(simd: S, a: &Body, b: &Body, relativ
     n
 }
 
+/// A point on the line between those where two bodies are deepest in each other that is likely to lie in both: halfway, but no
+/// farther from either than its inscribed ball is large, as a small body in a large one asks for.
+#[inline(always)]
+pub(super) fn middle<S: Simd, N: Number<S>>(simd: S, a: &Body, b: &Body, x: V3<N>, y: V3<N>) -> V3<N> {
+    let between = subtract(x, y);
+    let inverse = N::splat(simd, 1.0) / dot(between, between).sqrt();
+    let radius = |body: &Body| N::splat(simd, body.in_radius()) * inverse;
+    let least = N::splat(simd, 1.0) - radius(a);
+    let share = N::splat(simd, 0.5).max(least).min(radius(b).max(least));
+    add_scaled(y, share, between)
+}
+
 /// Of the ellipsoid that stands for the difference `A - B` the inward normal where the ray from 0 leaves it, in A's frame.
 ///
 /// About the direction of the ray the ellipsoid with `(h_A + h_B) (Σ_A / h_A + Σ_B / h_B)` for its Σ is a tight bound of the sum of

@@ -123,6 +123,11 @@ impl<'a, N: Copy> Side<'a, N> {
         Self { body, active, linear, origin, displacement }
     }
 
+    #[inline(always)]
+    pub(super) fn body(&self) -> &'a Body {
+        self.body
+    }
+
     /// A gradient by normalized coordinates as one by metres.
     #[inline(always)]
     pub(super) fn pulled_back<S: Simd>(&self, _: S, gradient: V3<N>) -> V3<N>
@@ -361,42 +366,41 @@ impl Plane<f64> {
 }
 
 impl Step<f64> {
-    /// Scales the step to the length `longest`; no step is left of one that is not a number.
+    /// Scales the step until neither x nor y moves farther than its limit; no step is left of one that is not a number.
     #[inline(always)]
-    pub(super) fn shorten(&mut self, longest: f64) {
-        let square = |v: V3<f64>| v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-        let factor = longest / square(self.dx).max(square(self.dy)).sqrt();
+    pub(super) fn shorten<S: Simd>(&mut self, simd: S, limits: [f64; 2]) {
+        let factor = 1.0 / self.square(simd, limits).sqrt();
         for entry in self.dx.iter_mut().chain(&mut self.dy).chain(&mut self.dn) {
             *entry *= factor;
         }
     }
 
-    /// Whether the step is no longer than `longest`, and a number.
+    /// Whether neither x nor y moves farther than its limit, and the step is a number.
     #[inline(always)]
-    pub(super) fn within(&self, longest: f64) -> bool {
-        let square = |v: V3<f64>| v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-        square(self.dx).max(square(self.dy)) <= longest * longest
+    pub(super) fn within<S: Simd>(&self, simd: S, limits: [f64; 2]) -> bool {
+        self.square(simd, limits) <= 1.0
     }
 }
 
 impl<N: Copy> Step<N> {
-    /// Square of the larger length of the moves of x and of y.
+    /// Square of the moves of x and of y relative to their limits, the larger one.
     #[inline(always)]
-    pub(super) fn square<S: Simd>(&self, _: S) -> N
+    pub(super) fn square<S: Simd>(&self, simd: S, [of_x, of_y]: [f64; 2]) -> N
     where
         N: Number<S>,
     {
-        dot(self.dx, self.dx).max(dot(self.dy, self.dy))
+        let relative = |step: V3<N>, limit: f64| dot(step, step) * N::splat(simd, 1.0 / (limit * limit));
+        relative(self.dx, of_x).max(relative(self.dy, of_y))
     }
 
-    /// The step scaled to the length `longest` if it is longer, by the square of its length.
+    /// The step scaled to its limits if it exceeds them, by the square of what it is relative to them.
     #[inline(always)]
-    pub(super) fn at_most<S: Simd>(self, simd: S, longest: f64, square: N) -> Self
+    pub(super) fn at_most<S: Simd>(self, simd: S, square: N) -> Self
     where
         N: Number<S>,
     {
-        let most = N::splat(simd, longest);
-        let factor = most / square.sqrt().max(most);
+        let one = N::splat(simd, 1.0);
+        let factor = one / square.max(one).sqrt();
         let dn = [self.dn[0] * factor, self.dn[1] * factor];
         Self { dx: scaled(self.dx, factor), dy: scaled(self.dy, factor), dn }
     }

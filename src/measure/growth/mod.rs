@@ -127,7 +127,7 @@ pub(super) fn between(
     if let Hint::Smooth(trace) = &mut warm.hint {
         match dispatch(Follow { a, b, relation: along, options, trace }) {
             Ok(proven) => return along.answer(a, pose_a, pose_b, &proven),
-            Err(rounds) => spent = rounds,
+            Err(lost) => spent = lost.rounds,
         }
     }
     if !options.exhausted(spent) {
@@ -138,7 +138,7 @@ pub(super) fn between(
                 let answer = along.answer(a, pose_a, pose_b, &proven);
                 return GrowthDistance { iterations: spent + proven.rounds, ..answer };
             }
-            Err(rounds) => spent += rounds,
+            Err(lost) => spent += lost.rounds,
         }
     }
     let (ball_a, ball_b) = (a.growth_ball(), b.growth_ball());
@@ -261,6 +261,11 @@ impl Search<'_> {
         self.within(self.upper)
     }
 
+    /// Whether the bracket is narrow enough or no more may be done.
+    fn ended(&self) -> bool {
+        self.done() || self.options.exhausted(self.iterations)
+    }
+
     fn run(&mut self, hint: &Hint) {
         let (x, y) = (self.x, self.y);
         self.attain(&x, &y);
@@ -280,10 +285,10 @@ impl Search<'_> {
         if !self.done() {
             self.interior_point(f64::INFINITY);
         }
-        if !self.done() && !pair.smooth() {
+        if !self.ended() && !pair.smooth() {
             self.cornered();
         }
-        if !self.done() {
+        if !self.ended() {
             self.interior_point(1.0);
         }
     }
@@ -296,7 +301,7 @@ impl Search<'_> {
         let (corner_a, corner_b) = corners(pair, &-n.normalize());
         for (x, y) in [(x, corner_b), (corner_a, y)] {
             let (a, b) = (Active::near(&pair.a, &x, &n), Active::near(&pair.b, &y, &-n));
-            if !self.done() {
+            if !self.ended() {
                 self.newton(x, y, &n, a, b);
             }
         }
@@ -309,7 +314,6 @@ impl Search<'_> {
         let program = ReachProgram::new(pair, &self.frame.delta, &self.frame.center_a, &self.frame.center_b);
         let mut v = program.start();
         let mut attempt = 1e-1;
-        let options = self.options;
         minimise_within(farthest, &program, &mut v, self.frame.radius_a + self.frame.radius_b, |iterate| {
             self.iterations += 1;
             let (x, y) = program.points(iterate.v);
@@ -331,8 +335,7 @@ impl Search<'_> {
                     self.newton(x, y, &normals[0], a, b);
                 }
             }
-            let stop = self.done() || attempt < 1e-18 || options.exhausted(self.iterations);
-            if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            if self.ended() || attempt < 1e-18 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
     }
 

@@ -123,7 +123,7 @@ impl<'a> Best<'a> {
                 let (a, b, relation) = (self.pair.a.body, self.pair.b.body, self.through(None));
                 match dispatch(Follow { a, b, relation, options: self.options, trace: &mut trace }) {
                     Ok(proven) => self.take(&proven, trace),
-                    Err(rounds) => self.iterations += rounds,
+                    Err(lost) => self.iterations += lost.rounds,
                 }
             }
             Hint::Apart { x_a, y_b, normal_a, active_a, active_b } => {
@@ -147,8 +147,8 @@ impl<'a> Best<'a> {
                 self.take(&proven, trace);
                 true
             }
-            Err(rounds) => {
-                self.iterations += rounds;
+            Err(lost) => {
+                self.iterations += lost.rounds;
                 false
             }
         }

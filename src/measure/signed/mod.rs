@@ -122,7 +122,7 @@ pub(super) fn between(
                 return Answer::of(&proven).report(proven.witnesses(a, pose_a), proven.normal(pose_a), pose_a, pose_b);
             }
             Ok(proven) => spent = proven.rounds,
-            Err(rounds) => spent = rounds,
+            Err(lost) => spent = lost.rounds,
         }
     }
     let pair = Pair::new(a, pose_a, b, pose_b);
