@@ -1,7 +1,7 @@
 //! The measures under test: a table to extend when one is added.
 
 use crate::bodies::Placed;
-use crate::reference::{self, big, growth};
+use crate::reference::{self, big::big, growth};
 use sublevel::body::Body;
 use sublevel::measure::{
     Distance, GrowthDistance, LevelDistance, Options, Pose, Status, WarmStart, distance, growth_distance,

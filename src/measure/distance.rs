@@ -15,6 +15,7 @@ use super::simplex::{Approach, approach};
 use super::smooth::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
 use super::twist::Twist;
 use super::union;
+use super::vector::V3;
 use super::warm::{Hint, WarmStart};
 use crate::body::{Body, MAX_CONSTRAINTS, Solid};
 use crate::optimize::minimise;
@@ -128,9 +129,15 @@ pub(super) fn between(
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
     let relation = Apart { pose_a, pose_b, goal, tolerance };
     let (mut spent, mut middle) = (0, None);
+    let enough = |proven: &Proven| {
+        proven.upper - proven.lower <= tolerance
+            || goal.met(proven.lower, proven.upper)
+            || options.exhausted(proven.rounds)
+    };
     if let Hint::Smooth(trace) = &mut warm.hint {
         match dispatch(Follow { a, b, relation, options, trace }) {
-            Ok(proven) => return proven.answer(a, pose_a, tolerance),
+            Ok(proven) if enough(&proven) => return proven.answer(a, pose_a, tolerance),
+            Ok(proven) => return sharpened((a, pose_a), (b, pose_b), goal, options, &proven),
             Err(lost) => (spent, middle) = (lost.rounds, lost.middle),
         }
     }
@@ -145,7 +152,12 @@ pub(super) fn between(
         match dispatch(Seek { a, b, relation, limit, options }) {
             Ok((proven, trace)) => {
                 *warm = Hint::Smooth(trace).into();
-                return Distance { iterations: spent + proven.rounds, ..proven.answer(a, pose_a, tolerance) };
+                let proven = Proven { rounds: spent + proven.rounds, ..proven };
+                return if enough(&proven) {
+                    proven.answer(a, pose_a, tolerance)
+                } else {
+                    sharpened((a, pose_a), (b, pose_b), goal, options, &proven)
+                };
             }
             Err(lost) => (spent, middle) = (spent + lost.rounds, lost.middle),
         }
@@ -159,6 +171,35 @@ pub(super) fn between(
         search.run(&warm.hint);
     }
     *warm = search.hint();
+    search.answer()
+}
+
+/// A proven answer that rounding keeps wide, gone on with in twice the precision.
+#[cold]
+fn sharpened(
+    (a, pose_a): (&Body, &Pose),
+    (b, pose_b): (&Body, &Pose),
+    goal: &Goal,
+    options: &Options<'_>,
+    proven: &Proven,
+) -> Distance {
+    let pair = Pair::new(a, pose_a, b, pose_b);
+    let mut search = Search::new(&pair, goal, options);
+    let unit = pair.unit();
+    let to_query = |v: V3<f64>| pair.a_to_query(&(a.normalization().center + Vector3::from(v)));
+    let [of_a, of_b] = [0, 1].map(|i| {
+        let mut active = Active::default();
+        active.push(usize::from(proven.active[i]));
+        active.multiplier[0] = proven.multipliers[i] / unit;
+        active
+    });
+    (search.lower, search.upper) = (proven.lower / unit, proven.upper / unit);
+    (search.x, search.y, search.n) = (to_query(proven.x), to_query(proven.y), Vector3::from(proven.n));
+    search.active = (of_a, of_b);
+    search.iterations = proven.rounds;
+    let distance = search.n.dot(&(search.x - search.y));
+    search.tried[0] = Some(DistanceNewton { x: search.x, y: search.y, distance, n: search.n, a: of_a, b: of_b });
+    search.sharpen();
     search.answer()
 }
 

@@ -6,13 +6,12 @@
 //! that "the bracket of the answer contains the truth" is decided and not estimated.
 
 mod active;
-mod big;
+pub(crate) mod big;
 pub(crate) mod distance;
 pub(crate) mod growth;
 pub(crate) mod level;
 pub(crate) mod signed;
 mod solid;
 
-pub(crate) use big::big;
 pub(crate) use distance::distance;
 pub(crate) use level::level_distance;
