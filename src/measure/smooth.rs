@@ -122,7 +122,7 @@ impl Lost {
 const MAX_ROUNDS: u32 = 8;
 
 /// Most evaluations from a cold start before another method takes over.
-pub(super) const SEEK_ROUNDS: u32 = 16;
+pub(super) const SEEK_ROUNDS: u32 = 12;
 
 /// Slope of a gradient against the normal, beyond which the normal is chosen anew.
 const STEEP: f64 = 0.1;
