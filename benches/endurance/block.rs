@@ -52,7 +52,7 @@ pub(crate) fn run(bodies: &[Body], seed: u64, block: u64, program: bool) -> Tall
             round.one_by_one(draw);
         }
         let iterations = round.iterations;
-        let kind = if a.constraints().len() == 1 && b.constraints().len() == 1 { "smooth" } else { "edges" };
+        let kind = if a.is_smooth() && b.is_smooth() { "smooth" } else { "edges" };
         for ((_, start), iterations) in STARTS.iter().zip(iterations) {
             tally.iterations(format!("{}, {kind}, {start}", MEASURES[measure].name), iterations);
         }
@@ -191,13 +191,11 @@ impl Site<'_> {
         let (lower, upper) = answer.bracket();
         let (width, accuracy) = (upper - lower, Options::default().accuracy());
         let narrow = width <= answer.tolerance(self.a, self.b, accuracy);
-        let floored = !answer.converged() && width <= answer.floor(self.a, self.b);
-        tally.floored += u64::from(floored);
         let mut check = |check: Check, passed: bool| {
             tally.check(check, passed, self.block, self.query, || self.tell(answer));
         };
         check(Check::InOrder, lower <= upper);
-        check(Check::Converged, answer.converged() || floored);
+        check(Check::Converged, answer.converged());
         check(Check::Honest, narrow == answer.converged());
         check(Check::Capped, answer.iterations() <= MAX_ITERATIONS);
     }

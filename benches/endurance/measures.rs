@@ -97,14 +97,6 @@ impl Answer {
         accuracy * scale * (1.0 + 1e-12)
     }
 
-    /// Width that rounding may leave where it is more than that: see [`Options::with_accuracy`].
-    pub(crate) fn floor(&self, a: &Body, b: &Body) -> f64 {
-        match self {
-            Answer::Distance(answer) => 4e-13 * (answer.upper + a.circumscribed().radius.max(b.circumscribed().radius)),
-            Answer::Level(_) | Answer::Growth(_) => 0.0,
-        }
-    }
-
     /// Whether the witnesses lie in their bodies, up to what rounding them to world coordinates moves them.
     pub(crate) fn feasible(&self, a: Placed<'_>, b: Placed<'_>) -> bool {
         match self {

@@ -16,7 +16,6 @@ pub(crate) fn markdown(state: &State, threads: usize) -> String {
     line(format_args!("| bracketed solves | {} |", grouped(tally.solves)));
     line(format_args!("| blocks | {} |", grouped(state.blocks())));
     line(format_args!("| failures | {} |", grouped(tally.failed())));
-    line(format_args!("| wider than asked for, as far as rounding goes | {} |", grouped(tally.floored)));
     let hours = state.seconds / 3600.0;
     line(format_args!("| hours on {threads} threads | {hours:.2} |"));
     line(format_args!("| largest deviation from the semidefinite program, of the size | {:.1e} |", tally.deviation));

@@ -70,7 +70,7 @@ impl Check {
     pub(crate) fn name(self) -> &'static str {
         match self {
             Check::InOrder => "bracket in order",
-            Check::Converged => "converged, or as narrow as rounding lets it be",
+            Check::Converged => "converged",
             Check::Honest => "status honest",
             Check::Capped => "iterations capped",
             Check::Meet => "brackets of the same poses from another start meet",
@@ -103,8 +103,6 @@ pub(crate) struct Tally {
     pub(crate) checks: BTreeMap<Check, u64>,
     /// Failures.
     pub(crate) failures: BTreeMap<Check, u64>,
-    /// Those excused of [`Check::Converged`]: wider than asked for, but not than rounding leaves.
-    pub(crate) floored: u64,
     /// The first failures.
     pub(crate) kept: Vec<Failure>,
     /// Largest deviation from the semidefinite program, relative to the size.
@@ -144,7 +142,6 @@ impl Tally {
 
     pub(crate) fn add(&mut self, other: Tally) {
         self.solves += other.solves;
-        self.floored += other.floored;
         for (name, theirs) in other.iterations {
             self.iterations(name, theirs);
         }

@@ -395,6 +395,11 @@ impl Body {
         largest(self.constraints.iter().map(|c| self.placement.jet(c, x).value))
     }
 
+    /// Whether one constraint bounds the body, so that it has neither edges nor corners.
+    pub fn is_smooth(&self) -> bool {
+        self.constraints.len() == 1
+    }
+
     /// Rigorous upper bound of the largest constraint at a point of the body frame.
     pub fn value_upper(&self, x: &Vector3<f64>) -> f64 {
         largest(self.constraints.iter().map(|c| self.placement.sample(c, x).value_upper(0.0)))

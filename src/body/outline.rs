@@ -9,7 +9,7 @@ use super::Constraint;
 use super::sphere::Sphere;
 use super::surface::radius;
 use crate::polynomial::{Number, Simd};
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix3x2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector3};
 
 /// Cells along each edge of the faces of a cube around all directions.
 const CELLS: usize = 16;
@@ -199,42 +199,49 @@ impl<'a> Support<'a> {
     fn farther(&self, e: &Vector3<f64>, start: &Vector3<f64>, active: &[usize]) -> Option<(Vector3<f64>, Vec<usize>)> {
         let count = active.len();
         let mut z = *start;
-        let mut multipliers: Option<DVector<f64>> = None;
+        let mut weights: Option<Vector3<f64>> = None;
         for _ in 0..16 {
-            let jets: Vec<_> = active.iter().map(|&i| self.constraints[i].polynomial.evaluate(&z)).collect();
-            let weights = match multipliers.take() {
+            let mut gradients = Matrix3::zeros();
+            // What is left over of three constraints says that their multipliers are zero.
+            let mut matrix = SMatrix::<f64, 6, 6>::identity();
+            let mut right = SVector::<f64, 6>::zeros();
+            right.fixed_rows_mut::<3>(0).copy_from(e);
+            let jets = active.iter().map(|&i| self.constraints[i].polynomial.evaluate(&z));
+            let mut hessians = [Matrix3::zeros(); 3];
+            for (k, jet) in jets.enumerate() {
+                gradients.set_column(k, &jet.gradient);
+                matrix[(3 + k, 3 + k)] = 0.0;
+                right[3 + k] = 1.0 - jet.value;
+                hessians[k] = jet.hessian;
+            }
+            let known = match weights {
                 Some(known) => known,
                 None => {
-                    let normal = DMatrix::from_fn(count, count, |i, j| jets[i].gradient.dot(&jets[j].gradient));
-                    normal.cholesky()?.solve(&DVector::from_fn(count, |i, _| jets[i].gradient.dot(e)))
+                    let mut normal = gradients.tr_mul(&gradients);
+                    (count..3).for_each(|k| normal[(k, k)] = 1.0);
+                    normal.cholesky()?.solve(&gradients.tr_mul(e))
                 }
             };
-            let mut matrix = DMatrix::zeros(3 + count, 3 + count);
-            let mut right = DVector::zeros(3 + count);
-            right.fixed_rows_mut::<3>(0).copy_from(e);
-            for (i, (jet, weight)) in jets.iter().zip(&weights).enumerate() {
-                let mut corner = matrix.fixed_view_mut::<3, 3>(0, 0);
-                corner += jet.hessian * *weight;
-                matrix.fixed_view_mut::<3, 1>(0, 3 + i).copy_from(&jet.gradient);
-                matrix.fixed_view_mut::<1, 3>(3 + i, 0).copy_from(&jet.gradient.transpose());
-                right[3 + i] = 1.0 - jet.value;
-            }
+            let bent = hessians[0] * known.x + hessians[1] * known.y + hessians[2] * known.z;
+            matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&bent);
+            matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&gradients);
+            matrix.fixed_view_mut::<3, 3>(3, 0).copy_from(&gradients.transpose());
             let solution = matrix.lu().solve(&right)?;
             let step = solution.fixed_rows::<3>(0).into_owned();
+            let next = solution.fixed_rows::<3>(3).into_owned();
             let length = step.norm();
             z += step * (0.25 / length).min(1.0);
-            let weights = solution.rows(3, count).into_owned();
             if length < 1e-6 {
                 let inside = |constraint: &Constraint| constraint.polynomial.evaluate(&z).value <= 1.0 + 1e-9;
-                let pressed = weights.iter().all(|&weight| weight > 0.0);
+                let pressed = (0..count).all(|k| next[k] > 0.0);
+                let force = |k: &usize| next[*k] * gradients.column(*k).norm();
                 let mut active = active.to_vec();
-                let force = |i: &usize| weights[*i] * jets[*i].gradient.norm();
                 if let Some(first) = (0..count).max_by(|i, j| force(i).total_cmp(&force(j))) {
                     active.swap(0, first);
                 }
                 return (pressed && self.constraints.iter().all(inside)).then_some((z, active));
             }
-            multipliers = Some(weights);
+            weights = Some(next);
         }
         None
     }

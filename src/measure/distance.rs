@@ -146,8 +146,7 @@ pub(super) fn between(
         matches!(&warm.hint, Hint::Overlap { point_a } if pair.common(&pair.a_to_query(point_a)))
     };
     // Where edges face each other no single constraint is to be followed.
-    let smooth = a.constraints().len() == 1 && b.constraints().len() == 1;
-    if smooth && !still_overlapping && middle.is_none() && !options.exhausted(spent) {
+    if a.is_smooth() && b.is_smooth() && !still_overlapping && middle.is_none() && !options.exhausted(spent) {
         let limit = SEEK_ROUNDS.min(options.max_iterations() - spent);
         match dispatch(Seek { a, b, relation, limit, options }) {
             Ok((proven, trace)) => {

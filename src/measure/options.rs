@@ -52,7 +52,7 @@ impl Default for Options<'_> {
 
 impl<'a> Options<'a> {
     /// The same with brackets at most this wide: relative to the circumradius of the smaller body for lengths, to
-    /// `max(1, |d|)` for values without unit. Below the rounding floor no bracket gets, and the status says so: some 4e-13 of
+    /// `max(1, |d|)` for values without unit. Below the rounding floor no bracket gets, and the status says so: some 1e-13 of
     /// the larger body and of the distance between both, 1e-12 where surfaces are flat.
     ///
     /// # Errors

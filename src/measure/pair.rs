@@ -252,7 +252,7 @@ impl<'a> Pair<'a> {
 
     /// Whether neither body has edges.
     pub(super) fn smooth(&self) -> bool {
-        self.a.len() == 1 && self.b.len() == 1
+        self.a.body.is_smooth() && self.b.body.is_smooth()
     }
 
     /// Metres per unit of the query frame.

@@ -114,3 +114,71 @@ pub(super) fn approach(pair: &Pair<'_>, n: &Vector3<f64>) -> Option<Approach> {
     let (x, y) = (simplex.nearest(|corner| corner.x), simplex.nearest(|corner| corner.y));
     Some(Approach { x, y, corners: (last.x, last.y) })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::approach;
+    use crate::body::Body;
+    use crate::measure::Pose;
+    use crate::measure::pair::Pair;
+    use crate::measure::tests::{at, random_pose, unit};
+    use crate::polynomial::tests::Seeded;
+    use nalgebra::Vector3;
+
+    fn cuboid(x: f64, y: f64, z: f64) -> Body {
+        Body::cuboid("box", Vector3::new(x, y, z)).unwrap()
+    }
+
+    #[test]
+    fn boxes_approach_by_face_edge_and_corner() {
+        let (a, b) = (cuboid(1.0, 0.8, 0.6), cuboid(0.5, 0.4, 0.3));
+        // The gaps along the axes between boxes that stand side by side.
+        for gaps in [[0.3, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.3, 0.4], [0.2, 0.3, 0.6]] {
+            let sums = [1.5, 1.2, 0.9];
+            let place: [f64; 3] = std::array::from_fn(|i| if gaps[i] > 0.0 { sums[i] + gaps[i] } else { 0.1 });
+            let pose = at(place[0], place[1], place[2]);
+            let pair = Pair::new(&a, &Pose::identity(), &b, &pose);
+            let found = approach(&pair, &-Vector3::from(place).normalize()).unwrap();
+            let truth = Vector3::from(gaps).norm();
+            assert!(
+                ((found.x - found.y).norm() * pair.unit() - truth).abs() < 1e-9,
+                "gaps {gaps:?}: {} {}",
+                found.x,
+                found.y
+            );
+        }
+    }
+
+    #[test]
+    fn corners_of_turned_boxes_are_as_near_as_brute_force_finds() {
+        for seed in 0..60 {
+            let mut random = Seeded(seed);
+            let (a, b) = (cuboid(1.0, 0.8, 0.6), cuboid(0.5, 0.4, 0.3));
+            let pose = random_pose(&mut random, 3.0);
+            let pair = Pair::new(&a, &Pose::identity(), &b, &pose);
+            let found = approach(&pair, &unit(&mut random)).expect("three metres apart");
+            // Alternating projections between the boxes, a linear rate.
+            let clamp = |v: Vector3<f64>, h: [f64; 3]| Vector3::from_fn(|i, _| v[i].clamp(-h[i], h[i]));
+            let mut y = *pose.translation();
+            for _ in 0..10_000 {
+                let x = clamp(y, [1.0, 0.8, 0.6]);
+                let local = pose.rotation().inverse() * (x - pose.translation());
+                y = pose.transform_point(&clamp(local, [0.5, 0.4, 0.3]));
+            }
+            let truth = (clamp(y, [1.0, 0.8, 0.6]) - y).norm();
+            let distance = (found.x - found.y).norm() * pair.unit();
+            assert!((distance - truth).abs() < 1e-3 * truth, "seed {seed}: {distance} {truth}");
+        }
+    }
+
+    #[test]
+    fn nothing_approaches_what_it_overlaps() {
+        for seed in 0..100 {
+            let mut random = Seeded(seed);
+            let (a, b) = (cuboid(1.0, 0.8, 0.6), Body::cylinder("can", 0.4, 0.5).unwrap());
+            let pose = random_pose(&mut random, 0.5);
+            let pair = Pair::new(&a, &Pose::identity(), &b, &pose);
+            assert!(approach(&pair, &unit(&mut random)).is_none(), "seed {seed}");
+        }
+    }
+}

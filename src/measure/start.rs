@@ -9,7 +9,7 @@
 //! ```
 //!
 //! with K the derivative of the farthest point, so that such turns find about where the ellipsoids face each other. There the
-//! outlines of the bodies know about where these are farthest themselves and how that changes, for another such turn or two.
+//! outlines of the bodies know about where these are farthest themselves and how that changes, for another such turn.
 
 use super::tangent::Relative;
 use super::vector::{
@@ -20,10 +20,7 @@ use crate::body::{Body, Outline};
 use crate::polynomial::{Number, Simd};
 
 /// Turns of the normal by ellipsoids.
-const ROUGH_TURNS: usize = 2;
-
-/// Turns of the normal by outlines.
-const TURNS: usize = 1;
+const TURNS: usize = 2;
 
 /// Least distance that n is turned for, relative to the widths of the ellipsoids.
 const LEAST: f64 = 1e-3;
@@ -39,7 +36,7 @@ pub(super) fn facing<S: Simd, N: Number<S>>(simd: S, a: &Body, b: &Body, relativ
     let shape_b = rows(simd, b.outline().shape());
     let shape_b = times_transposed(&times_transposed(&relative.rotation, &shape_b), &relative.rotation);
     let mut n = normalized(simd, [-relative.origin[0], -relative.origin[1], -relative.origin[2]]);
-    for _ in 0..ROUGH_TURNS {
+    for _ in 0..TURNS {
         let (u, v) = (apply(&shape_a, n), apply(&shape_b, n));
         let (wide_a, wide_b) = (dot(n, u).sqrt(), dot(n, v).sqrt());
         let inverse = one / (wide_a * wide_b);
@@ -61,7 +58,7 @@ pub(super) fn facing<S: Simd, N: Number<S>>(simd: S, a: &Body, b: &Body, relativ
         for i in 0..3 {
             residual[i] = w[i] - distance * n[i];
         }
-        n = turned(simd, n, &matrix, residual);
+        n = turned(simd, n, matrix, residual);
     }
     n
 }
@@ -126,60 +123,49 @@ pub(super) fn meeting<S: Simd, N: Number<S>>(
     a: &Body,
     b: &Body,
     relative: &Relative<N>,
-    mut n: V3<N>,
+    n: V3<N>,
     ray: Option<V3<N>>,
 ) -> Start<N> {
-    let zero = N::splat(simd, 0.0);
     let least = N::splat(simd, LEAST * (a.trust().reach + b.trust().reach));
-    let mut start = Start { x: n, y: n, n, places: [zero; 2] };
-    for _ in 0..TURNS {
-        let own = apply_transposed(&relative.rotation, n);
-        let places = [Outline::place(simd, scaled(n, -N::splat(simd, 1.0))), Outline::place(simd, own)];
-        let (cell_a, cell_b) = (a.outline().cell(simd, places[0]), b.outline().cell(simd, places[1]));
-        // Points for n, and how they turn with it.
-        let turn_a = cell_a.turn;
-        let turn_b = turned_symmetric(&relative.rotation, &cell_b.turn);
-        let of_a = cell_a.point;
-        let of_b = add(relative.origin, apply(&relative.rotation, cell_b.point));
-        let x = subtract(of_a, apply_symmetric(&turn_a, n));
-        let y = add(of_b, apply_symmetric(&turn_b, n));
-        let w = subtract(x, y);
-        let along = ray.unwrap_or(n);
-        let distance = dot(n, w) / dot(n, along);
-        let stiff = if ray.is_some() { least } else { distance.max(least) };
-        let mut matrix = [stiff; 6];
-        for i in 0..6 {
-            let bent = turn_a[i] + turn_b[i];
-            matrix[i] = if matches!(i, 0 | 3 | 5) { stiff + bent } else { bent };
-        }
-        n = turned(simd, n, &matrix, add_scaled(w, -distance, along));
-        // Of the same cells: where a side is flat a small turn leads far, to another cell for which it was not meant.
-        start = Start {
-            x: subtract(of_a, apply_symmetric(&turn_a, n)),
-            y: add(of_b, apply_symmetric(&turn_b, n)),
-            n,
-            places,
-        };
+    let own = apply_transposed(&relative.rotation, n);
+    let places = [Outline::place(simd, scaled(n, -N::splat(simd, 1.0))), Outline::place(simd, own)];
+    let (cell_a, cell_b) = (a.outline().cell(simd, places[0]), b.outline().cell(simd, places[1]));
+    // Points for n, and how they turn with it.
+    let (turn_a, turn_b) = (cell_a.turn, turned_symmetric(&relative.rotation, &cell_b.turn));
+    let of_a = cell_a.point;
+    let of_b = add(relative.origin, apply(&relative.rotation, cell_b.point));
+    let x = subtract(of_a, apply_symmetric(&turn_a, n));
+    let y = add(of_b, apply_symmetric(&turn_b, n));
+    let w = subtract(x, y);
+    let along = ray.unwrap_or(n);
+    let distance = dot(n, w) / dot(n, along);
+    let stiff = if ray.is_some() { least } else { distance.max(least) };
+    let mut matrix = [stiff; 6];
+    for i in 0..6 {
+        let bent = turn_a[i] + turn_b[i];
+        matrix[i] = if matches!(i, 0 | 3 | 5) { stiff + bent } else { bent };
     }
-    start
+    let n = turned(simd, n, matrix, add_scaled(w, -distance, along));
+    // Of the same cells: where a side is flat a small turn leads far, to another cell for which it was not meant.
+    let x = subtract(of_a, apply_symmetric(&turn_a, n));
+    let y = add(of_b, apply_symmetric(&turn_b, n));
+    Start { x, y, n, places }
 }
 
 /// `R M Rᵀ` of a symmetric matrix with the entries xx, xy, xz, yy, yz, zz.
 #[inline(always)]
 fn turned_symmetric<S: Simd, N: Number<S>>(rotation: &M3<N>, m: &[N; 6]) -> [N; 6] {
-    let rows = [0, 1, 2].map(|i| apply_symmetric(m, rotation[i]));
-    let entry = |i: usize, j: usize| dot(rotation[i], rows[j]);
-    [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)]
+    let [r0, r1, r2] = *rotation;
+    let (m0, m1, m2) = (apply_symmetric(m, r0), apply_symmetric(m, r1), apply_symmetric(m, r2));
+    [dot(r0, m0), dot(r0, m1), dot(r0, m2), dot(r1, m1), dot(r1, m2), dot(r2, m2)]
 }
 
 /// The direction of `n + M⁻¹ r`, by cofactors of the symmetric matrix M with the entries xx, xy, xz, yy, yz, zz; the turn is
 /// limited.
 #[inline(always)]
-fn turned<S: Simd, N: Number<S>>(simd: S, n: V3<N>, [xx, xy, xz, yy, yz, zz]: &[N; 6], r: V3<N>) -> V3<N> {
-    let first = [*yy * *zz - *yz * *yz, *xz * *yz - *xy * *zz, *xy * *yz - *xz * *yy];
-    let (middle, mixed, last) = (*xx * *zz - *xz * *xz, *xy * *xz - *xx * *yz, *xx * *yy - *xy * *xy);
-    let determinant = dot([*xx, *xy, *xz], first);
-    let turn = [dot(first, r), dot([first[1], middle, mixed], r), dot([first[2], mixed, last], r)];
+fn turned<S: Simd, N: Number<S>>(simd: S, n: V3<N>, matrix: [N; 6], r: V3<N>) -> V3<N> {
+    let (cofactors, determinant) = cofactors(simd, matrix);
+    let turn = apply_symmetric(&cofactors, r);
     let longest = turn[0].abs().max(turn[1].abs()).max(turn[2].abs());
     let weight = determinant.max(longest * N::splat(simd, 1.0 / MOST));
     normalized(simd, add_scaled(turn, weight, n))

@@ -89,7 +89,7 @@ pub(super) fn apply_symmetric<S: Simd, N: Number<S>>(h: &[N; 6], v: V3<N>) -> V3
 /// The cofactors of the symmetric matrix with the entries xx, xy, xz, yy, yz, zz, which are its determinant times its
 /// inverse, and the determinant.
 #[inline(always)]
-pub(super) fn cofactors<S: Simd>(_: S, [xx, xy, xz, yy, yz, zz]: [f64; 6]) -> ([f64; 6], f64) {
+pub(super) fn cofactors<S: Simd, N: Number<S>>(_: S, [xx, xy, xz, yy, yz, zz]: [N; 6]) -> ([N; 6], N) {
     let cofactors = [
         yy * zz - yz * yz,
         xz * yz - xy * zz,
@@ -98,7 +98,7 @@ pub(super) fn cofactors<S: Simd>(_: S, [xx, xy, xz, yy, yz, zz]: [f64; 6]) -> ([
         xy * xz - xx * yz,
         xx * yy - xy * xy,
     ];
-    (cofactors, xx * cofactors[0] + xy * cofactors[1] + xz * cofactors[2])
+    (cofactors, dot([xx, xy, xz], [cofactors[0], cofactors[1], cofactors[2]]))
 }
 
 /// A right-handed orthonormal basis whose third vector is the direction of `v` (Duff et al., Building an orthonormal basis,

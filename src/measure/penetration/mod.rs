@@ -319,7 +319,7 @@ impl<const N: usize> Sweep<'_, N> {
         if !(least.depth() < promising) && best.depth.is_finite() {
             return;
         }
-        let smooth = self.pair.a.len() == 1 && self.pair.b.len() == 1;
+        let smooth = self.pair.smooth();
         if !(smooth && best.seek(Some(&least.n)) && best.depth <= least.depth()) {
             best.offer(&least.a, &least.b, &least.n);
         }
