@@ -244,10 +244,9 @@ impl Body {
         if !(in_radius > 0.0) {
             return Err(BodyError::Thin);
         }
-        let boundary_z = boundary.iter().map(|x| normalization.linear * (x - normalization.center));
         let interior_z = normalization.linear * (interior_point - normalization.center);
-        let trust = Trust::new(&constraints, &normalization.linear, &inverse, &z_extent, boundary_z, &interior_z);
-        let outline = Outline::new(&constraints, &inverse, &interior_z, trust.radius);
+        let outline = Outline::new(&constraints, &inverse, &interior_z);
+        let trust = Trust::new(&constraints, &normalization.linear, &inverse, &z_extent, outline.reach(), &interior_z);
         let volume = surface::volume(&constraints, &normalization.linear, &interior_z);
         let id = BodyId::of(&normalization, &constraints, None);
         Ok(Self {

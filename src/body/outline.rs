@@ -1,9 +1,11 @@
 //! What a body looks like from outside, roughly, for any direction: where a cold start begins. Nothing is proven by it.
 //!
-//! The point of a body farthest along a unit vector n, as a function of n, is the gradient of the support function: its
-//! derivative K is symmetric, not negative, and `K n = 0`. Over a small cell of directions about m it is nearly `x + K (n - m)`,
-//! that is `x + K n`; x and K are fitted to the support points along the corners and the middle of the cell, which also gives
-//! flat sides, edges and corners a K to go by.
+//! The point of a convex set farthest along a unit vector e, as a function of e, is the gradient of the support function: its
+//! derivative K is symmetric, not negative, and `K e = 0`. Over a small cell of directions about m it is nearly `z + K (e - m)`,
+//! that is `z + K e`; z and K are fitted to the support points along the corners and the middle of the cell, which also gives
+//! flat sides, edges and corners a K to go by. Cells are those of normalized coordinates, where no body is much longer than
+//! wide: with W the inverse of their map M, the body's point farthest along n is the one with the z for `e = Wᵀn / |Wᵀn|`, that is
+//! `W z + W K Wᵀ n / |Wᵀn|`.
 
 use super::Constraint;
 use super::sphere::Sphere;
@@ -14,7 +16,7 @@ use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector3};
 /// Cells along each edge of the faces of a cube around all directions.
 const CELLS: usize = 16;
 
-/// Numbers of a cell: x, and K by its distinct entries.
+/// Numbers of a cell: `W z`, and `W K Wᵀ` by its distinct entries.
 const FIELDS: usize = 9;
 
 /// Size of the ellipsoid that stands for the body, relative to the smallest one of its shape around the body: between that and
@@ -27,14 +29,19 @@ const FULLNESS: f64 = 0.75;
 /// Points are seen from the centre of the normalization, body frame, metres.
 #[derive(Clone, Debug)]
 pub struct Outline {
+    inverse: Matrix3<f64>,
+    reach: f64,
     shape: Matrix3<f64>,
     cells: Vec<[f64; FIELDS]>,
     active: Vec<u8>,
 }
 
-/// Where a body is farthest along the unit vectors n of a cell: about `point + turn n`, a lane each.
+/// Where a body is farthest along unit vectors n near the one that the cell was looked up for: about `point + turn n`, a lane
+/// each.
 #[derive(Clone, Copy, Debug)]
 pub struct Cell<N> {
+    /// Where the cell is kept.
+    pub place: N,
     /// Point for the middle of the cell, from the centre of the normalization, body frame, metres.
     pub point: [N; 3],
     /// Symmetric derivative by n, metres: xx, xy, xz, yy, yz, zz.
@@ -42,10 +49,9 @@ pub struct Cell<N> {
 }
 
 impl Outline {
-    /// `interior` is the interior point in normalized coordinates, `reach` the largest norm of normalized coordinates of the
-    /// body.
-    pub(super) fn new(constraints: &[Constraint], inverse: &Matrix3<f64>, interior: &Vector3<f64>, reach: f64) -> Self {
-        let mut support = Support::new(constraints, inverse, interior);
+    /// `interior` is the interior point in normalized coordinates.
+    pub(super) fn new(constraints: &[Constraint], inverse: &Matrix3<f64>, interior: &Vector3<f64>) -> Self {
+        let mut support = Support::new(constraints, interior);
         let (mut cells, mut active) = (Vec::with_capacity(6 * CELLS * CELLS), Vec::with_capacity(6 * CELLS * CELLS));
         for face in 0..6 {
             // Along the corners of all cells of the face.
@@ -58,12 +64,18 @@ impl Outline {
                     active.push(support.active[0] as u8);
                     let corner = |di: usize, dj: usize| &corners[(i + di) * (CELLS + 1) + j + dj];
                     let around = [corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)];
-                    cells.push(fitted(&middle, around, constraints.len() == 1));
+                    cells.push(fitted(&middle, around, constraints.len() == 1, inverse));
                 }
             }
         }
+        let reach = support.reach;
         let shape = inverse * inverse.transpose() * (FULLNESS * reach).powi(2);
-        Self { shape, cells, active }
+        Self { inverse: *inverse, reach, shape, cells, active }
+    }
+
+    /// Largest norm of the normalized coordinates of all support points: what lies between them reaches hardly farther.
+    pub fn reach(&self) -> f64 {
+        self.reach
     }
 
     /// The point of the cell kept there.
@@ -78,29 +90,32 @@ impl Outline {
         &self.shape
     }
 
-    /// Where the cell of a direction (body frame, any length) is kept.
+    /// Where the cell of a direction is kept; body frame, any length.
     #[inline(always)]
-    pub fn place<S: Simd, N: Number<S>>(simd: S, [x, y, z]: [N; 3]) -> N {
-        let splat = |value: f64| N::splat(simd, value);
-        let (ax, ay, az) = (x.abs(), y.abs(), z.abs());
-        let (on_x, on_y) = (N::and(simd, ay.le(ax), az.le(ax)), az.le(ay));
-        let along = x.select(on_x, y.select(on_y, z));
-        let first = y.select(on_x, z.select(on_y, x));
-        let second = z.select(on_x, x.select(on_y, y));
-        let axis = splat(0.0).select(on_x, splat(2.0).select(on_y, splat(4.0)));
-        let face = axis + splat(0.0).select(splat(0.0).le(along), splat(1.0));
-        let half = splat(0.5 * CELLS as f64);
-        let scale = half / along.abs();
-        let (i, j) = (cell(simd, first, scale), cell(simd, second, scale));
-        let cells = splat(CELLS as f64);
-        face.mul_add(cells, i).mul_add(cells, j)
+    pub fn place<S: Simd, N: Number<S>>(&self, simd: S, n: [N; 3]) -> N {
+        place(simd, self.normalized(simd, n))
     }
 
-    /// The cell kept there.
+    /// The cell of a unit vector, body frame.
     #[inline(always)]
-    pub fn cell<S: Simd, N: Number<S>>(&self, simd: S, place: N) -> Cell<N> {
+    pub fn cell<S: Simd, N: Number<S>>(&self, simd: S, n: [N; 3]) -> Cell<N> {
+        let e = self.normalized(simd, n);
+        let place = place(simd, e);
+        let scale = N::splat(simd, 1.0) / (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]).sqrt();
         let [x, y, z, xx, xy, xz, yy, yz, zz] = N::gather(simd, &self.cells, place);
-        Cell { point: [x, y, z], turn: [xx, xy, xz, yy, yz, zz] }
+        Cell { place, point: [x, y, z], turn: [xx * scale, xy * scale, xz * scale, yy * scale, yz * scale, zz * scale] }
+    }
+
+    /// `Wᵀ n`.
+    #[inline(always)]
+    fn normalized<S: Simd, N: Number<S>>(&self, simd: S, [x, y, z]: [N; 3]) -> [N; 3] {
+        let entry = N::splat;
+        let w = &self.inverse;
+        [
+            entry(simd, w.m11).mul_add(x, entry(simd, w.m21).mul_add(y, entry(simd, w.m31) * z)),
+            entry(simd, w.m12).mul_add(x, entry(simd, w.m22).mul_add(y, entry(simd, w.m32) * z)),
+            entry(simd, w.m13).mul_add(x, entry(simd, w.m23).mul_add(y, entry(simd, w.m33) * z)),
+        ]
     }
 
     /// The active constraint of the cell kept there.
@@ -108,6 +123,24 @@ impl Outline {
     pub fn active(&self, place: f64) -> usize {
         usize::from(self.active[(place as usize).min(self.active.len() - 1)])
     }
+}
+
+/// Where the cell of a direction of normalized coordinates is kept.
+#[inline(always)]
+fn place<S: Simd, N: Number<S>>(simd: S, [x, y, z]: [N; 3]) -> N {
+    let splat = |value: f64| N::splat(simd, value);
+    let (ax, ay, az) = (x.abs(), y.abs(), z.abs());
+    let (on_x, on_y) = (N::and(simd, ay.le(ax), az.le(ax)), az.le(ay));
+    let along = x.select(on_x, y.select(on_y, z));
+    let first = y.select(on_x, z.select(on_y, x));
+    let second = z.select(on_x, x.select(on_y, y));
+    let axis = splat(0.0).select(on_x, splat(2.0).select(on_y, splat(4.0)));
+    let face = axis + splat(0.0).select(splat(0.0).le(along), splat(1.0));
+    let half = splat(0.5 * CELLS as f64);
+    let scale = half / along.abs();
+    let (i, j) = (cell(simd, first, scale), cell(simd, second, scale));
+    let cells = splat(CELLS as f64);
+    face.mul_add(cells, i).mul_add(cells, j)
 }
 
 /// Which cell along one edge of a face.
@@ -119,7 +152,7 @@ fn cell<S: Simd, N: Number<S>>(simd: S, across: N, scale: N) -> N {
     rounded.max(N::splat(simd, 0.0)).min(N::splat(simd, CELLS as f64 - 1.0))
 }
 
-/// The direction that lies on the face of the cube after so many halves of cells, body frame.
+/// The direction that lies on the face of the cube after so many halves of cells.
 fn direction(face: usize, i: usize, j: usize) -> Vector3<f64> {
     let across = |halves: usize| halves as f64 / CELLS as f64 - 1.0;
     let mut direction = Vector3::zeros();
@@ -129,21 +162,21 @@ fn direction(face: usize, i: usize, j: usize) -> Vector3<f64> {
     direction.normalize()
 }
 
-/// A direction and the support point along it, from the centre of the normalization, body frame, metres.
+/// A direction and the support point along it, in normalized coordinates.
 type Sample = (Vector3<f64>, Vector3<f64>);
 
 /// The fields of the cell with these samples, of a body with a smooth surface or one with edges.
-fn fitted((n, x): &Sample, corners: [&Sample; 4], smooth: bool) -> [f64; FIELDS] {
+fn fitted((e, z): &Sample, corners: [&Sample; 4], smooth: bool, inverse: &Matrix3<f64>) -> [f64; FIELDS] {
     let mean = corners.iter().fold(Vector3::zeros(), |sum, corner| sum + corner.1) / 4.0;
     // What bends like a paraboloid is a third of the corners' value on average; at corners of the body nothing bends.
-    let point = if smooth { (x * 2.0 + mean) / 3.0 } else { *x };
-    let first = n.cross(&Vector3::ith(n.iamin(), 1.0)).normalize();
-    let tangents = Matrix3x2::from_columns(&[first, n.cross(&first)]);
-    // Least squares for `turn Tᵀn = Tᵀx` with a symmetric matrix: its entries 00, 01, 11 have these coefficients.
+    let point = inverse * if smooth { (z * 2.0 + mean) / 3.0 } else { *z };
+    let first = e.cross(&Vector3::ith(e.iamin(), 1.0)).normalize();
+    let tangents = Matrix3x2::from_columns(&[first, e.cross(&first)]);
+    // Least squares for `K Tᵀe = Tᵀz` with a symmetric matrix: its entries 00, 01, 11 have these coefficients.
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for (direction, corner) in corners {
-        let (n, x) = (tangents.tr_mul(direction), tangents.tr_mul(&(corner - mean)));
-        for (row, value) in [(Vector3::new(n.x, n.y, 0.0), x.x), (Vector3::new(0.0, n.x, n.y), x.y)] {
+        let (e, z) = (tangents.tr_mul(direction), tangents.tr_mul(&(corner - mean)));
+        for (row, value) in [(Vector3::new(e.x, e.y, 0.0), z.x), (Vector3::new(0.0, e.x, e.y), z.y)] {
             normal += row * row.transpose();
             right += row * value;
         }
@@ -151,6 +184,7 @@ fn fitted((n, x): &Sample, corners: [&Sample; 4], smooth: bool) -> [f64; FIELDS]
     let turn = normal.cholesky().map_or(Vector3::zeros(), |factor| factor.solve(&right));
     let mut turn = Matrix2::new(turn.x, turn.y, turn.y, turn.z).symmetric_eigen();
     turn.eigenvalues = turn.eigenvalues.map(|value: f64| value.max(0.0));
+    let tangents = inverse * tangents;
     let turn = tangents * turn.recompose() * tangents.transpose();
     [point.x, point.y, point.z, turn.m11, turn.m12, turn.m13, turn.m22, turn.m23, turn.m33]
 }
@@ -158,27 +192,28 @@ fn fitted((n, x): &Sample, corners: [&Sample; 4], smooth: bool) -> [f64; FIELDS]
 /// Finds support points, one after the other along directions that lie close together.
 struct Support<'a> {
     constraints: &'a [Constraint],
-    inverse: &'a Matrix3<f64>,
     interior: &'a Vector3<f64>,
     /// Boundary points all around, normalized coordinates.
     rays: Vec<Vector3<f64>>,
     /// The last support point, normalized coordinates, and the constraints active there, the one with the most force first.
     last: Vector3<f64>,
     active: Vec<usize>,
+    /// Largest norm of all support points so far.
+    reach: f64,
 }
 
 impl<'a> Support<'a> {
-    fn new(constraints: &'a [Constraint], inverse: &'a Matrix3<f64>, interior: &'a Vector3<f64>) -> Self {
+    fn new(constraints: &'a [Constraint], interior: &'a Vector3<f64>) -> Self {
         let ray = |u: &Vector3<f64>| interior + u * radius(constraints, interior, u);
         let rays = Sphere::fine().vertices().iter().map(ray).collect();
-        Self { constraints, inverse, interior, rays, last: *interior, active: vec![0] }
+        Self { constraints, interior, rays, last: *interior, active: vec![0], reach: 0.0 }
     }
 
-    fn along(&mut self, n: Vector3<f64>) -> Sample {
-        let e = (self.inverse.transpose() * n).normalize();
+    fn along(&mut self, e: Vector3<f64>) -> Sample {
         let found = self.farther(&e, &self.last, &self.active);
         (self.last, self.active) = found.unwrap_or_else(|| self.anew(&e));
-        (n, self.inverse * self.last)
+        self.reach = self.reach.max(self.last.norm());
+        (e, self.last)
     }
 
     /// A support point and its active constraints from the ray that leads farthest.
@@ -249,7 +284,7 @@ impl<'a> Support<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Cell, Outline};
+    use super::Cell;
     use crate::body::Body;
     use crate::polynomial::tests::Seeded;
     use crate::polynomial::{Lanes, Scalar, Simd, WithSimd, dispatch};
@@ -257,9 +292,8 @@ mod tests {
 
     /// `point + turn n`.
     fn support(body: &Body, n: &Vector3<f64>) -> Vector3<f64> {
-        let place = Outline::place::<_, f64>(Scalar, (*n).into());
+        let Cell { place, point, turn: [xx, xy, xz, yy, yz, zz] } = body.outline().cell::<_, f64>(Scalar, (*n).into());
         assert_eq!(body.outline().active(place), 0);
-        let Cell { point, turn: [xx, xy, xz, yy, yz, zz] } = body.outline().cell::<_, f64>(Scalar, place);
         Vector3::from(point) + Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * n
     }
 
@@ -273,7 +307,7 @@ mod tests {
             let reach = n.dot(&support(&body, &n));
             // The conjugate exponent of 6 is 6/5.
             let most = (0..3).map(|i| (half[i] * n[i]).abs().powf(1.2)).sum::<f64>().powf(1.0 / 1.2);
-            assert!((reach - most).abs() < 0.02, "{n:?}: {reach} of {most}");
+            assert!((reach - most).abs() < 0.025, "{n:?}: {reach} of {most}");
         }
     }
 
@@ -311,7 +345,7 @@ mod tests {
             let mut found = [[0.0; 16]; 2];
             for start in (0..16).step_by(Lanes::<S>::COUNT) {
                 let direction = self.directions.map(|row| Lanes::load(simd, &row[start..]));
-                let cell = self.body.outline().cell(simd, Outline::place(simd, direction));
+                let cell = self.body.outline().cell(simd, direction);
                 cell.point[1].store(&mut found[0][start..]);
                 cell.turn[5].store(&mut found[1][start..]);
             }
@@ -328,13 +362,11 @@ mod tests {
             directions.iter_mut().flatten().for_each(|entry| *entry = random.signed());
             let found = dispatch(Look { body: &body, directions });
             for lane in 0..16 {
-                let place = Outline::place::<_, f64>(Scalar, directions.map(|row| row[lane]));
-                let cell = body.outline().cell::<_, f64>(Scalar, place);
+                let cell = body.outline().cell::<_, f64>(Scalar, directions.map(|row| row[lane]));
                 assert_eq!([cell.point[1], cell.turn[5]], [found[0][lane], found[1][lane]]);
             }
         }
         // Nonsense finds something.
-        let place = Outline::place::<_, f64>(Scalar, [f64::NAN; 3]);
-        assert!(body.outline().cell::<_, f64>(Scalar, place).point.iter().all(|entry| entry.is_finite()));
+        assert!(body.outline().cell::<_, f64>(Scalar, [f64::NAN; 3]).point.iter().all(|entry| entry.is_finite()));
     }
 }

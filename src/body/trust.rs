@@ -57,16 +57,16 @@ pub struct ConstraintTrust {
 }
 
 impl Trust {
-    /// Bounds for a body whose boundary points, seen from the normalization's centre, are `boundary_z`.
+    /// Bounds for a body whose points hardly have normalized coordinates longer than `reach`.
     pub(super) fn new(
         constraints: &[Constraint],
         linear: &Matrix3<f64>,
         inverse: &Matrix3<f64>,
         extent: &Vector3<f64>,
-        boundary_z: impl Iterator<Item = Vector3<f64>>,
+        reach: f64,
         interior_z: &Vector3<f64>,
     ) -> Self {
-        let radius = boundary_z.map(|z| z.norm()).fold(0.0, f64::max) * MARGIN;
+        let radius = reach * MARGIN;
         // Whether a point is in the ball is decided in floating point.
         let ball = radius * (1.0 + 1e-12);
         let rows = Vector3::from_fn(|i, _| linear.row(i).norm() * (1.0 + 1e-14));

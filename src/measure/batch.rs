@@ -13,7 +13,7 @@ use super::pose::Pose;
 use super::smooth::{limits, worth_a_bracket};
 use super::start::{Start, facing, meeting, middle};
 use super::tangent::{ALIGNED, Bend, Plane, Relative, Side, Step, bracket, moved, newton};
-use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, scaled, subtract};
+use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, subtract};
 use super::warm::WarmStart;
 use crate::body::{Body, Solid};
 use crate::polynomial::{Lanes, MAX_LANES, Number, NumberJet, Simd, WithSimd, dispatch};
@@ -237,22 +237,6 @@ impl<N: Copy> Iterate<N> {
         self.y = moved(self.y, step.dy, frame);
         self.n = add_scaled(add_scaled(frame[2], step.dn[0], frame[0]), step.dn[1], frame[1]);
     }
-
-    /// Takes the direction halfway between the normals of the surfaces for n, unless they face the same way.
-    #[inline(always)]
-    fn face<S: Simd>(&mut self, simd: S, a: V3<N>, b: V3<N>)
-    where
-        N: Number<S>,
-    {
-        let (length_a, length_b) = (dot(a, a).sqrt(), dot(b, b).sqrt());
-        // Both as long as the product of the lengths.
-        let middle = subtract(scaled(b, length_a), scaled(a, length_b));
-        let product = length_a * length_b;
-        let apart = (product * product * N::splat(simd, 0.25)).le(dot(middle, middle));
-        for i in 0..3 {
-            self.n[i] = middle[i].select(apart, self.n[i]);
-        }
-    }
 }
 
 impl Batch<'_> {
@@ -267,7 +251,7 @@ impl Batch<'_> {
         let worth = worth_a_bracket(limits);
         let mut at = if fresh {
             let n = facing(simd, self.a, self.b, &relative);
-            let Start { x, y, n, .. } = meeting(simd, self.a, self.b, &relative, n, None);
+            let (Start { x, y, n }, _) = meeting(simd, self.a, self.b, &relative, n, None);
             Iterate { x, y, n }
         } else {
             let column = |i: usize| Lanes::load(simd, &group.at[i]);
@@ -287,11 +271,6 @@ impl Batch<'_> {
         let rounds = if fresh { ROUNDS } else { 1 };
         for round in 1..=rounds {
             let ((jet_a, inside_a), (jet_b, inside_b)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
-            if fresh && round == 1 {
-                // The surfaces may face otherwise where the start is.
-                let (a, b) = (side_a.pulled_back(simd, jet_a.gradient), side_b.pulled_back(simd, jet_b.gradient));
-                at.face(simd, a, b);
-            }
             let here = at.linearize(simd, (&side_a, &jet_a), (&side_b, &jet_b), limits);
             let inside = Lanes::and(simd, inside_a, inside_b);
             let short = Lanes::and(simd, inside, here.step.square(simd, worth).le(splat(1.0)));

@@ -12,7 +12,8 @@ use super::programs::{Closest, Level, points};
 use super::relation::Apart;
 use super::sharp::SharpPair;
 use super::simplex::{Approach, approach};
-use super::smooth::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
+use super::smooth::{Follow, Lost, Proven, SEEK_ROUNDS, Seek, Trace};
+use super::start::Start;
 use super::twist::Twist;
 use super::union;
 use super::vector::V3;
@@ -128,17 +129,12 @@ pub(super) fn between(
 ) -> Distance {
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
     let relation = Apart { pose_a, pose_b, goal, tolerance };
-    let (mut spent, mut middle) = (0, None);
-    let enough = |proven: &Proven| {
-        proven.upper - proven.lower <= tolerance
-            || goal.met(proven.lower, proven.upper)
-            || options.exhausted(proven.rounds)
-    };
+    let mut lost = Lost::after(0);
+    let mut proven = None;
     if let Hint::Smooth(trace) = &mut warm.hint {
         match dispatch(Follow { a, b, relation, options, trace }) {
-            Ok(proven) if enough(&proven) => return proven.answer(a, pose_a, tolerance),
-            Ok(proven) => return sharpened((a, pose_a), (b, pose_b), goal, options, &proven),
-            Err(lost) => (spent, middle) = (lost.rounds, lost.middle),
+            Ok(found) => proven = Some(found),
+            Err(left) => lost = left,
         }
     }
     let still_overlapping = matches!(warm.hint, Hint::Overlap { .. }) && {
@@ -146,31 +142,33 @@ pub(super) fn between(
         matches!(&warm.hint, Hint::Overlap { point_a } if pair.common(&pair.a_to_query(point_a)))
     };
     // Where edges face each other no single constraint is to be followed.
-    if a.is_smooth() && b.is_smooth() && !still_overlapping && middle.is_none() && !options.exhausted(spent) {
-        let limit = SEEK_ROUNDS.min(options.max_iterations() - spent);
-        match dispatch(Seek { a, b, relation, limit, options }) {
-            Ok((proven, trace)) => {
+    let smooth = a.is_smooth() && b.is_smooth();
+    if proven.is_none() && smooth && !still_overlapping && !lost.touching() && !options.exhausted(lost.rounds) {
+        let limit = SEEK_ROUNDS.min(options.max_iterations() - lost.rounds);
+        match dispatch(Seek { a, b, relation, from: None, limit, options }) {
+            Ok((found, trace)) => {
                 *warm = Hint::Smooth(trace).into();
-                let proven = Proven { rounds: spent + proven.rounds, ..proven };
-                return if enough(&proven) {
-                    proven.answer(a, pose_a, tolerance)
-                } else {
-                    sharpened((a, pose_a), (b, pose_b), goal, options, &proven)
-                };
+                proven = Some(Proven { rounds: lost.rounds + found.rounds, ..found });
             }
-            Err(lost) => (spent, middle) = (spent + lost.rounds, lost.middle),
+            Err(left) => lost = Lost { rounds: lost.rounds + left.rounds, ..left },
         }
     }
-    let pair = Pair::new(a, pose_a, b, pose_b);
-    let mut search = Search::new(&pair, goal, options);
-    search.iterations = spent;
-    let common = middle
-        .is_some_and(|middle| search.common(&pair.a_to_query(&(a.normalization().center + Vector3::from(middle)))));
-    if !common {
-        search.run(&warm.hint);
+    match proven {
+        Some(proven) if proven.width() <= tolerance || goal.met(proven.lower, proven.upper) => {
+            proven.answer(a, pose_a, tolerance)
+        }
+        Some(proven) => sharpened((a, pose_a), (b, pose_b), goal, options, &proven),
+        None => {
+            let pair = Pair::new(a, pose_a, b, pose_b);
+            let mut search = Search::new(&pair, goal, options);
+            search.take_over(&lost);
+            if !search.decided() {
+                search.run(&warm.hint);
+            }
+            *warm = search.hint();
+            search.answer()
+        }
     }
-    *warm = search.hint();
-    search.answer()
 }
 
 /// A proven answer that rounding keeps wide, gone on with in twice the precision.
@@ -184,20 +182,8 @@ fn sharpened(
 ) -> Distance {
     let pair = Pair::new(a, pose_a, b, pose_b);
     let mut search = Search::new(&pair, goal, options);
-    let unit = pair.unit();
-    let to_query = |v: V3<f64>| pair.a_to_query(&(a.normalization().center + Vector3::from(v)));
-    let [of_a, of_b] = [0, 1].map(|i| {
-        let mut active = Active::default();
-        active.push(usize::from(proven.active[i]));
-        active.multiplier[0] = proven.multipliers[i] / unit;
-        active
-    });
-    (search.lower, search.upper) = (proven.lower / unit, proven.upper / unit);
-    (search.x, search.y, search.n) = (to_query(proven.x), to_query(proven.y), Vector3::from(proven.n));
-    search.active = (of_a, of_b);
     search.iterations = proven.rounds;
-    let distance = search.n.dot(&(search.x - search.y));
-    search.tried[0] = Some(DistanceNewton { x: search.x, y: search.y, distance, n: search.n, a: of_a, b: of_b });
+    search.resume(proven);
     search.sharpen();
     search.answer()
 }
@@ -221,7 +207,8 @@ struct Search<'a> {
     pair: &'a Pair<'a>,
     options: &'a Options<'a>,
     tolerance: f64,
-    goal: Goal,
+    /// In metres, and in query units.
+    goals: (&'a Goal, Goal),
     lower: f64,
     upper: f64,
     x: Vector3<f64>,
@@ -229,6 +216,8 @@ struct Search<'a> {
     /// Normal of the best lower bound.
     n: Vector3<f64>,
     active: (Active, Active),
+    /// Of an answer by continuation.
+    trace: Option<Trace>,
     /// Where the lower bound was found, and where Newton's method ended last.
     tried: [Option<DistanceNewton>; 2],
     iterations: u32,
@@ -240,24 +229,28 @@ const NEAR: f64 = 1e-3;
 /// Below this one it has none that rounding leaves.
 const NEAREST: f64 = 1e-7;
 
+/// Share of the way to an interior point that leaves a surface behind.
+const DEEPER: f64 = 1e-6;
+
 /// Values above this one are too steep to start from.
 const STEEP: f64 = 1e3;
 
 impl<'a> Search<'a> {
-    fn new(pair: &'a Pair<'a>, goal: &Goal, options: &'a Options<'a>) -> Self {
+    fn new(pair: &'a Pair<'a>, goal: &'a Goal, options: &'a Options<'a>) -> Self {
         let (x, y) = (pair.a.interior, pair.b.interior);
         let n = (x - y).try_normalize(0.0).unwrap_or_else(Vector3::x);
         Self {
             pair,
             options,
             tolerance: pair.tolerance(options.accuracy()),
-            goal: goal.in_units_of(pair.unit()),
+            goals: (goal, goal.in_units_of(pair.unit())),
             lower: 0.0,
             upper: f64::INFINITY,
             x,
             y,
             n,
             active: (Active::default(), Active::default()),
+            trace: None,
             tried: [None; 2],
             iterations: 0,
         }
@@ -269,7 +262,7 @@ impl<'a> Search<'a> {
     }
 
     fn done(&self) -> bool {
-        self.narrow() || self.goal.met(self.lower, self.upper)
+        self.narrow() || self.goals.1.met(self.lower, self.upper)
     }
 
     /// Whether the bracket is narrow enough and says on which side of contact the bodies are.
@@ -306,7 +299,7 @@ impl<'a> Search<'a> {
             | Hint::Single { .. }
             | Hint::Smooth(_) => {}
         }
-        if !self.ended() && !self.pair.smooth() {
+        if !self.ended() {
             self.outlined();
         }
         if !self.ended() {
@@ -333,15 +326,84 @@ impl<'a> Search<'a> {
     /// Newton's method from where the outlines are nearest, with the constraints that are active there. Where two sides are all but
     /// parallel that is anywhere on them, but the corners of one show.
     fn outlined(&mut self) {
-        let Some(Approach { x, y, corners }) = approach(self.pair, &self.n) else { return };
-        let n = (x - y).normalize();
-        for (x, y) in [(x, y), (x, corners.1), (corners.0, y)] {
-            let (a, b) = (Active::near(&self.pair.a, &x, &-n), Active::near(&self.pair.b, &y, &n));
-            self.newton(x, y, n, a, b);
-            if self.ended() {
+        let pair = self.pair;
+        let found = approach(pair, &self.n);
+        if let Some(v) = found.common {
+            // Outlines of bodies with edges lie on their surfaces.
+            let deeper = |body: &Posed<'_>| v.lerp(&body.interior, DEEPER);
+            if [v, deeper(&pair.a), deeper(&pair.b)].iter().any(|v| self.common(v)) {
                 return;
             }
         }
+        let Approach { x, y, n, corners, .. } = found;
+        if pair.smooth() {
+            self.seek(&x, &y, &n);
+            return;
+        }
+        for (x, y) in [(x, y), (x, corners.1), (corners.0, y)] {
+            let (a, b) = (Active::near(&pair.a, &x, &-n), Active::near(&pair.b, &y, &n));
+            self.newton(x, y, n, a, b);
+            if self.ended() || found.common.is_some() {
+                return;
+            }
+        }
+    }
+
+    /// Continuation of smooth bodies from two points and a normal.
+    fn seek(&mut self, x: &Vector3<f64>, y: &Vector3<f64>, n: &Vector3<f64>) {
+        let (pair, options) = (self.pair, self.options);
+        if options.exhausted(self.iterations) {
+            return;
+        }
+        let (pose_a, pose_b) = pair.poses();
+        let relation = Apart { pose_a, pose_b, goal: self.goals.0, tolerance: self.tolerance * pair.unit() };
+        let center = pair.a.body.normalization().center;
+        let from_center = |v: &Vector3<f64>| (pair.to_a(v) - center).into();
+        let from = Some(Start { x: from_center(x), y: from_center(y), n: (*n).into() });
+        let limit = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
+        match dispatch(Seek { a: pair.a.body, b: pair.b.body, relation, from, limit, options }) {
+            Ok((proven, trace)) => {
+                self.iterations += proven.rounds;
+                self.resume(&proven);
+                self.trace = Some(trace);
+                if !self.done() {
+                    self.sharpen();
+                }
+            }
+            Err(lost) => self.take_over(&lost),
+        }
+    }
+
+    /// Goes on from what continuation has left: near contact in twice the precision.
+    fn take_over(&mut self, lost: &Lost) {
+        self.iterations += lost.rounds;
+        let pair = self.pair;
+        let center = pair.a.body.normalization().center;
+        let to_query = |v: V3<f64>| pair.a_to_query(&(center + Vector3::from(v)));
+        if lost.middle.is_some_and(|middle| self.common(&to_query(middle))) {
+            return;
+        }
+        if let Some(grazing) = &lost.grazing {
+            self.resume(grazing);
+            self.sharpen();
+        }
+    }
+
+    /// Takes the bracket of continuation and where it was attained.
+    fn resume(&mut self, proven: &Proven) {
+        let pair = self.pair;
+        let (unit, center) = (pair.unit(), pair.a.body.normalization().center);
+        let to_query = |v: V3<f64>| pair.a_to_query(&(center + Vector3::from(v)));
+        let [a, b] = [0, 1].map(|i| {
+            let mut active = Active::default();
+            active.push(usize::from(proven.active[i]));
+            active.multiplier[0] = proven.multipliers[i] / unit;
+            active
+        });
+        let (x, y, n) = (to_query(proven.x), to_query(proven.y), Vector3::from(proven.n));
+        (self.lower, self.upper) = (proven.lower / unit, proven.upper / unit);
+        (self.x, self.y, self.n, self.active) = (x, y, n, (a, b));
+        self.tried[0] = Some(DistanceNewton { x, y, distance: n.dot(&(x - y)), n, a, b });
     }
 
     /// Goes on in twice the precision where rounding keeps the bracket wide.
@@ -466,9 +528,9 @@ impl<'a> Search<'a> {
         let mut newton = DistanceNewton { x, y, distance, n, a, b };
         let left = self.options.max_iterations() - self.iterations.min(self.options.max_iterations());
         let steps = newton.run(self.pair, left, |at| {
-            // Stationary points of the overlap are of no use here.
+            // Stationary in an overlap.
             if at.distance <= 0.0 {
-                return false;
+                return self.common(&((at.x + at.y) * 0.5));
             }
             let (of_a, of_b) = (at.a.multipliers(), at.b.multipliers());
             let lower = distance_lower(self.pair, &at.x, &at.y, &at.n, &of_a, &of_b);
@@ -542,6 +604,9 @@ impl<'a> Search<'a> {
 
     /// The answer as a start for continuation, if one constraint of each body is active.
     fn trace(&self) -> Option<Trace> {
+        if self.trace.is_some() {
+            return self.trace;
+        }
         let active = [self.active.0.single()?, self.active.1.single()?];
         let (x, y) = (self.pair.to_a(&self.x), self.pair.to_b(&self.y));
         Some(Trace::new(self.pair.a.body, &x, self.pair.b.body, &y, &self.n, active))
@@ -585,10 +650,14 @@ impl<'a> Search<'a> {
 }
 
 impl Proven {
+    fn width(&self) -> f64 {
+        self.upper - self.lower
+    }
+
     fn answer(&self, a: &Body, pose_a: &Pose, tolerance: f64) -> Distance {
         let (witness_a, witness_b) = self.witnesses(a, pose_a);
         Distance {
-            status: if self.upper - self.lower <= tolerance { Status::Converged } else { Status::BracketWide },
+            status: if self.width() <= tolerance { Status::Converged } else { Status::BracketWide },
             lower: self.lower,
             upper: self.upper,
             witness_a,

@@ -1,11 +1,15 @@
 //! Newton's method on the optimality systems, for a given set of active constraints.
 //!
-//! Distance, regular through contact: the unknowns are x, y, the distance D and multipliers λ of A, μ of B, with
-//! `u = Σ λ_i ∇g_i(x) = -n` and `w = Σ μ_j ∇h_j(y) = n`:
+//! Distance, regular through contact: the unknowns are x, y, the distance D, the normal n and multipliers λ of A, μ of B, with
+//! `u = Σ λ_i ∇g_i(x)` and `w = Σ μ_j ∇h_j(y)`:
 //!
 //! ```text
-//! x - y + D u = 0,   u + w = 0,   (|u|² - 1) / 2 = 0,   g_i(x) = 1,   h_j(y) = 1   (active i, j)
+//! x - y = D n,   n + u = 0,   w - n = 0,   (|n|² - 1) / 2 = 0,   g_i(x) = 1,   h_j(y) = 1   (active i, j)
 //! ```
+//!
+//! The normal is an unknown of its own, although u and w say what it is: those of thin bodies turn so fast with the point that
+//! Newton's method goes astray by them from where it converges so (Albersmeyer and Diehl, The lifted Newton method and its
+//! application in optimization, SIAM J. Optimization 20, 2010).
 //!
 //! Level distance: the unknowns are x, s and the multipliers:
 //!
@@ -210,6 +214,9 @@ const MAX_STEPS: u32 = 16;
 /// Longest Newton step, in query units, after which a bracket may be narrow: what remains is about its square.
 const WORTH_A_BRACKET: f64 = 1e-3;
 
+/// Longest step of a point relative to its body's size, in normalized coordinates.
+const LONGEST: f64 = 0.25;
+
 /// Newton iterates of the distance system.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DistanceNewton {
@@ -231,9 +238,9 @@ impl DistanceNewton {
             return 0;
         }
         let mut at = self.evaluate(pair);
-        let mut last = f64::INFINITY;
+        let (mut last, mut stuck) = (f64::INFINITY, 0);
         for step in 1..=MAX_STEPS.min(limit) {
-            let Some(length) = self.step(&at) else {
+            let Some(length) = self.step(pair, &at) else {
                 // Where both are flat the system is singular, but the point at hand with its multipliers may do.
                 accept(self);
                 return step;
@@ -244,47 +251,45 @@ impl DistanceNewton {
             if (length < WORTH_A_BRACKET || step % 4 == 0 || last_step) && accept(self) {
                 return step;
             }
-            // Near its solution Newton's step shrinks fast; one that does not is not near.
             let settled = length < WORTH_A_BRACKET;
             if settled || step % 4 == 0 {
                 let changed = self.a.drop_negative()
                     | self.b.drop_negative()
                     | self.a.violated(&pair.a, &self.x, 1.0).is_some_and(|i| self.a.push(i))
                     | self.b.violated(&pair.b, &self.y, 1.0).is_some_and(|i| self.b.push(i));
-                let stuck = !changed && (length > 0.9 * last || length < 1e-14);
-                if stuck {
-                    return step;
-                }
                 if changed {
-                    at = self.evaluate(pair);
+                    (at, stuck) = (self.evaluate(pair), 0);
                 }
+            }
+            // Near its solution Newton's step shrinks fast; one that does not is not near.
+            stuck += u32::from(settled && length > 0.9 * last);
+            if stuck == 2 || length < 1e-14 {
+                return step;
             }
             last = length;
         }
         MAX_STEPS.min(limit)
     }
 
-    /// Both bodies at the current iterate; the mean of both sides of u + w = 0 says what n is.
-    fn evaluate(&mut self, pair: &Pair<'_>) -> (At, At) {
-        let a = At::new(&pair.a, &self.a, &self.x);
-        let b = At::new(&pair.b, &self.b, &self.y);
-        self.n = (b.sum - a.sum) * 0.5;
-        (a, b)
+    /// Both bodies at the current iterate.
+    fn evaluate(&self, pair: &Pair<'_>) -> (At, At) {
+        (At::new(&pair.a, &self.a, &self.x), At::new(&pair.b, &self.b, &self.y))
     }
 
     /// One Newton step; its length, or none if the system is singular.
     ///
-    /// The first of the equations at the head of this file gives `dy = (I + D H_A) dx + u dD + D G_A dλ + (x - y + D u)`, G the
-    /// gradients and H the weighted Hessians, which leaves dx, dD and the multipliers.
-    fn step(&mut self, (a, b): &(At, At)) -> Option<f64> {
-        let (la, lb, distance) = (self.a.len, self.b.len, self.distance);
+    /// The second of the equations at the head of this file gives `dn = -(n + u) - H_A dx - G_A dλ`, G the gradients and H the
+    /// weighted Hessians, and the first then `dy = (I + D H_A) dx - n dD + D G_A dλ + (x - y + D u)`, which leaves dx, dD and
+    /// the multipliers.
+    fn step(&mut self, pair: &Pair<'_>, (a, b): &(At, At)) -> Option<f64> {
+        let (la, lb, distance, n) = (self.a.len, self.b.len, self.distance, self.n);
         let size = 4 + la + lb;
         // Four unknowns, three constraints of each body, a right-hand side.
         let mut m = [[0.0; 12]; 10];
         let offset = self.x - self.y + a.sum * distance;
         let moved = Matrix3::identity() + a.hessian * distance;
         // u + w = 0.
-        let (by_x, by_distance) = (a.hessian + b.hessian * moved, b.hessian * a.sum);
+        let (by_x, by_distance) = (a.hessian + b.hessian * moved, -b.hessian * n);
         let right = -(a.sum + b.sum) - b.hessian * offset;
         for i in 0..3 {
             for j in 0..3 {
@@ -300,11 +305,11 @@ impl DistanceNewton {
         for (k, gradient) in b.gradient[..lb].iter().enumerate() {
             (0..3).for_each(|i| m[i][4 + la + k] = gradient[i]);
         }
-        // |u| = 1.
-        let turned = a.hessian * a.sum;
+        // |n| = 1.
+        let turned = a.hessian * n;
         (0..3).for_each(|j| m[3][j] = turned[j]);
-        (0..la).for_each(|k| m[3][4 + k] = a.sum.dot(&a.gradient[k]));
-        m[3][size] = 0.5 * (1.0 - a.sum.norm_squared());
+        (0..la).for_each(|k| m[3][4 + k] = n.dot(&a.gradient[k]));
+        m[3][size] = 0.5 * (n.norm_squared() - 1.0) - n.dot(&(n + a.sum));
         // g = 1 and h = 1.
         for (row, (gradient, value)) in m[4..].iter_mut().zip(a.gradient[..la].iter().zip(&a.value)) {
             row[..3].copy_from_slice(gradient.as_slice());
@@ -312,21 +317,23 @@ impl DistanceNewton {
         }
         for (row, (gradient, value)) in m[4 + la..].iter_mut().zip(b.gradient[..lb].iter().zip(&b.value)) {
             row[..3].copy_from_slice(moved.tr_mul(gradient).as_slice());
-            row[3] = gradient.dot(&a.sum);
+            row[3] = -gradient.dot(&n);
             (0..la).for_each(|k| row[4 + k] = distance * gradient.dot(&a.gradient[k]));
             row[size] = 1.0 - value - gradient.dot(&offset);
         }
         let d = solve(&mut m, size)?;
         let dx = Vector3::new(d[0], d[1], d[2]);
         let of_a: Vector3<f64> = (0..la).map(|k| a.gradient[k] * d[4 + k]).sum();
-        let dy = moved * dx + a.sum * d[3] + of_a * distance + offset;
+        let dy = moved * dx - n * d[3] + of_a * distance + offset;
         // Of corners that stay where they are the normal turns.
-        let dn = a.hessian * dx + of_a;
+        let dn = -(n + a.sum) - a.hessian * dx - of_a;
         let length = dx.norm().max(dy.norm()).max(dn.norm());
-        // Bodies have size 1 here: a longer step leaves where the linearization means anything.
-        let damping = (0.5 / length).min(1.0);
+        // A longer step leaves where the linearization means anything.
+        let relative = pair.a.relative_length(&dx).max(pair.b.relative_length(&dy));
+        let damping = (LONGEST / relative).min(1.0);
         self.x += dx * damping;
         self.y += dy * damping;
+        self.n += dn * damping;
         self.distance += d[3] * damping;
         for k in 0..la {
             self.a.multiplier[k] += d[4 + k] * damping;

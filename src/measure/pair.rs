@@ -65,6 +65,11 @@ impl Posed<'_> {
         self.value_upper(v, 0.0) <= 1.0
     }
 
+    /// How long a step is in normalized coordinates, relative to the body's size there.
+    pub(super) fn relative_length(&self, step: &Vector3<f64>) -> f64 {
+        (self.placement.linear() * step).norm() / self.body.trust().radius
+    }
+
     /// Upper bound ρ of the distance from v, or a point within its displacement, to any point of the body.
     pub(super) fn reach(&self, v: &Vector3<f64>) -> f64 {
         ((v - self.center).norm() + self.radius + self.displacement(v)) * (1.0 + 1e-14)

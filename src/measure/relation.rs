@@ -14,8 +14,8 @@ pub(super) trait Relation: Copy {
     /// Where B stands as seen from A.
     fn relative<S: Simd>(&self, simd: S, a: &Body, b: &Body) -> Relative<f64>;
 
-    /// Where to start from nothing but the poses.
-    fn start<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> Start<f64>;
+    /// Where to start from nothing but the poses, and where the outlines of A and of B keep that.
+    fn start<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> (Start<f64>, [f64; 2]);
 
     /// Whether a common point is an answer, so that there is nothing to look for in an overlap.
     #[inline(always)]
@@ -24,7 +24,7 @@ pub(super) trait Relation: Copy {
     }
 
     /// Newton's step from points with `difference = x - y` in the frame, whose third vector is the normal from B to A: towards
-    /// points with their difference along the normal.
+    /// points with their difference along the normal. `smallest`: see [`newton`].
     #[inline(always)]
     fn newton<S: Simd>(
         &self,
@@ -33,12 +33,21 @@ pub(super) trait Relation: Copy {
         b: (&Plane<f64>, &Bend<f64>),
         _frame: &M3<f64>,
         difference: V3<f64>,
+        smallest: f64,
     ) -> Step<f64> {
-        newton(simd, a, b, difference, 0.0)
+        newton(simd, a, b, difference, smallest)
     }
 
-    /// What the bracket of the distance at points with `difference = x - y` in the frame says of the measure.
-    fn judge<S: Simd>(&self, simd: S, found: &Bracket<f64>, frame: &M3<f64>, difference: V3<f64>) -> Verdict;
+    /// What the bracket of the distance at points with `difference = x - y` in the frame says of the measure. `settled`: Newton's
+    /// method has no step left to take.
+    fn judge<S: Simd>(
+        &self,
+        simd: S,
+        found: &Bracket<f64>,
+        frame: &M3<f64>,
+        difference: V3<f64>,
+        settled: bool,
+    ) -> Verdict;
 }
 
 /// What a bracket is good for.
@@ -52,8 +61,8 @@ pub(super) enum Verdict {
     },
     /// Not yet.
     Wide,
-    /// No further step will make it so.
-    Hopeless,
+    /// In an overlap by the look of it, or too close to one to tell.
+    Overlap,
 }
 
 /// The distance of bodies that are apart: x - y along the normal.
@@ -74,7 +83,7 @@ impl Relation for Apart<'_> {
     }
 
     #[inline(always)]
-    fn start<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> Start<f64> {
+    fn start<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> (Start<f64>, [f64; 2]) {
         meeting(simd, a, b, relative, facing(simd, a, b, relative), None)
     }
 
@@ -84,14 +93,13 @@ impl Relation for Apart<'_> {
     }
 
     #[inline(always)]
-    fn judge<S: Simd>(&self, _: S, found: &Bracket<f64>, _: &M3<f64>, difference: V3<f64>) -> Verdict {
+    fn judge<S: Simd>(&self, _: S, found: &Bracket<f64>, _: &M3<f64>, difference: V3<f64>, settled: bool) -> Verdict {
         // Below the rounding floor no bracket gets, however long Newton's method goes on.
-        let narrow = found.upper - found.lower <= self.tolerance.max(4.0 * found.rounding) && found.off <= ALIGNED;
-        if (narrow || self.goal.met(found.lower, found.upper)) && found.lower > 0.0 {
+        let narrow = settled || found.upper - found.lower <= self.tolerance.max(4.0 * found.rounding);
+        if (narrow && found.off <= ALIGNED || self.goal.met(found.lower, found.upper)) && found.lower > 0.0 {
             Verdict::Proven { lower: found.lower, upper: found.upper }
-        } else if difference[2] <= 0.0 {
-            // Stationary in an overlap.
-            Verdict::Hopeless
+        } else if settled || difference[2] <= 0.0 {
+            Verdict::Overlap
         } else {
             Verdict::Wide
         }
@@ -120,13 +128,13 @@ impl Relation for Through<'_> {
     }
 
     #[inline(always)]
-    fn start<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> Start<f64> {
+    fn start<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> (Start<f64>, [f64; 2]) {
         let n = self.facing.unwrap_or_else(|| facing(simd, a, b, relative));
         meeting(simd, a, b, relative, n, None)
     }
 
     #[inline(always)]
-    fn judge<S: Simd>(&self, _: S, found: &Bracket<f64>, _: &M3<f64>, difference: V3<f64>) -> Verdict {
+    fn judge<S: Simd>(&self, _: S, found: &Bracket<f64>, _: &M3<f64>, difference: V3<f64>, _settled: bool) -> Verdict {
         let enough = self.tolerance.max(4.0 * found.rounding);
         let between = subtract::<S, f64>(add::<S, f64>(difference, found.to_a), found.to_b);
         let attained = dot::<S, f64>(found.normal, between);

@@ -3,7 +3,7 @@
 //! points that the outlines keep. Nothing is proven by it; it shows Newton's method which constraints are active.
 
 use super::pair::Pair;
-use crate::body::{Body, Outline};
+use crate::body::Body;
 use crate::polynomial::Scalar;
 use nalgebra::{Matrix3, Vector3};
 
@@ -71,48 +71,55 @@ impl Simplex {
     }
 }
 
-/// What the outlines of two bodies that are apart show.
+/// What the outlines of two bodies show, in the query frame.
 pub(super) struct Approach {
     /// Point of A near the one nearest to B, query frame.
     pub(super) x: Vector3<f64>,
     /// Point of B near the one nearest to A.
     pub(super) y: Vector3<f64>,
+    /// Unit vector from B to A; where the outlines overlap, as it was when they did not yet seem to.
+    pub(super) n: Vector3<f64>,
     /// Points of A and of B farthest towards the other one: corners where the nearest points may lie anywhere on a side.
     pub(super) corners: (Vector3<f64>, Vector3<f64>),
+    /// A point of both outlines.
+    pub(super) common: Option<Vector3<f64>>,
 }
 
 /// Points of the outlines of A farthest along -n and of B farthest along n, query frame.
 pub(super) fn corners(pair: &Pair<'_>, n: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let toward = |body: &Body, n: Vector3<f64>| {
-        let point = body.outline().point(Outline::place::<_, f64>(Scalar, n.into()));
+        let point = body.outline().point(body.outline().place::<_, f64>(Scalar, n.into()));
         body.normalization().center + Vector3::from(point)
     };
     let (a, b) = (pair.a.body, pair.b.body);
     (pair.a_to_query(&toward(a, -n)), pair.b_to_query(&toward(b, pair.direction_to_b(n))))
 }
 
-/// The approach of two bodies, from a direction from B to A on; none where the outlines overlap.
-pub(super) fn approach(pair: &Pair<'_>, n: &Vector3<f64>) -> Option<Approach> {
+/// The approach of two bodies, from a direction from B to A on.
+pub(super) fn approach(pair: &Pair<'_>, n: &Vector3<f64>) -> Approach {
     let support = |n: &Vector3<f64>| {
         let (x, y) = corners(pair, n);
         Corner { x, y, difference: x - y }
     };
+    let points = |simplex: &Simplex| (simplex.nearest(|corner| corner.x), simplex.nearest(|corner| corner.y));
     let mut last = support(n);
     let mut simplex = Simplex { corners: [last; 4], weights: [1.0, 0.0, 0.0, 0.0], len: 1 };
+    let ((mut x, mut y), mut n) = (points(&simplex), *n);
     for _ in 0..MAX_STEPS {
         let nearest = simplex.nearest(|corner| corner.difference);
         let square = nearest.norm_squared();
         if simplex.len == 4 || !(square > WORTH * pair.size().powi(2)) {
-            return None;
+            let (of_a, of_b) = points(&simplex);
+            return Approach { x, y, n, corners: (last.x, last.y), common: Some((of_a + of_b) * 0.5) };
         }
+        ((x, y), n) = (points(&simplex), nearest / square.sqrt());
         last = support(&nearest);
         if square - nearest.dot(&last.difference) <= WORTH * square {
             break;
         }
         simplex = simplex.with(last);
     }
-    let (x, y) = (simplex.nearest(|corner| corner.x), simplex.nearest(|corner| corner.y));
-    Some(Approach { x, y, corners: (last.x, last.y) })
+    Approach { x, y, n, corners: (last.x, last.y), common: None }
 }
 
 #[cfg(test)]
@@ -138,7 +145,8 @@ mod tests {
             let place: [f64; 3] = std::array::from_fn(|i| if gaps[i] > 0.0 { sums[i] + gaps[i] } else { 0.1 });
             let pose = at(place[0], place[1], place[2]);
             let pair = Pair::new(&a, &Pose::identity(), &b, &pose);
-            let found = approach(&pair, &-Vector3::from(place).normalize()).unwrap();
+            let found = approach(&pair, &-Vector3::from(place).normalize());
+            assert!(found.common.is_none());
             let truth = Vector3::from(gaps).norm();
             assert!(
                 ((found.x - found.y).norm() * pair.unit() - truth).abs() < 1e-9,
@@ -156,7 +164,8 @@ mod tests {
             let (a, b) = (cuboid(1.0, 0.8, 0.6), cuboid(0.5, 0.4, 0.3));
             let pose = random_pose(&mut random, 3.0);
             let pair = Pair::new(&a, &Pose::identity(), &b, &pose);
-            let found = approach(&pair, &unit(&mut random)).expect("three metres apart");
+            let found = approach(&pair, &unit(&mut random));
+            assert!(found.common.is_none(), "three metres apart");
             // Alternating projections between the boxes, a linear rate.
             let clamp = |v: Vector3<f64>, h: [f64; 3]| Vector3::from_fn(|i, _| v[i].clamp(-h[i], h[i]));
             let mut y = *pose.translation();
@@ -172,13 +181,14 @@ mod tests {
     }
 
     #[test]
-    fn nothing_approaches_what_it_overlaps() {
+    fn a_common_point_shows_an_overlap() {
         for seed in 0..100 {
             let mut random = Seeded(seed);
             let (a, b) = (cuboid(1.0, 0.8, 0.6), Body::cylinder("can", 0.4, 0.5).unwrap());
             let pose = random_pose(&mut random, 0.5);
             let pair = Pair::new(&a, &Pose::identity(), &b, &pose);
-            assert!(approach(&pair, &unit(&mut random)).is_none(), "seed {seed}");
+            let common = approach(&pair, &unit(&mut random)).common.expect("half a metre apart");
+            assert!(pair.common(&common), "seed {seed}");
         }
     }
 }

@@ -8,7 +8,7 @@
 use super::options::Options;
 use super::pose::Pose;
 use super::relation::{Relation, Verdict};
-use super::start::middle;
+use super::start::{Start, middle};
 use super::tangent::{Bend, Plane, Relative, Side, Step, bracket, moved};
 use super::vector::{M3, V3, add, apply, apply_transposed, basis, dot, subtract};
 use crate::body::Body;
@@ -110,11 +110,18 @@ pub(super) struct Lost {
     pub(super) rounds: u32,
     /// A point that seems to lie in both, from the centre of A's normalization on, in A's frame, metres.
     pub(super) middle: Option<V3<f64>>,
+    /// Where Newton's method ended, so close to contact that doubles do not tell on which side.
+    pub(super) grazing: Option<Proven>,
 }
 
 impl Lost {
-    fn after(rounds: u32) -> Self {
-        Self { rounds, middle: None }
+    pub(super) fn after(rounds: u32) -> Self {
+        Self { rounds, middle: None, grazing: None }
+    }
+
+    /// Whether the bodies seem to touch or overlap.
+    pub(super) fn touching(&self) -> bool {
+        self.middle.is_some() || self.grazing.is_some()
     }
 }
 
@@ -122,13 +129,22 @@ impl Lost {
 const MAX_ROUNDS: u32 = 8;
 
 /// Most evaluations from a cold start before another method takes over.
-pub(super) const SEEK_ROUNDS: u32 = 12;
+pub(super) const SEEK_ROUNDS: u32 = 16;
 
-/// Slope of a gradient against the normal, beyond which the normal is chosen anew.
-const STEEP: f64 = 0.1;
+/// Evaluations from a cold start after which Newton's method should be near.
+const PATIENCE: u32 = 4;
+
+/// Length of a step relative to a body's size that counts as near.
+const NEARLY: f64 = 0.05;
+
+/// Curvature times size that counts as none.
+const FLATTEST: f64 = 1e-12;
 
 /// Length of a step relative to the longest, beyond which no extrapolation is close enough for a bracket.
 const WORTH_A_BRACKET: f64 = 1e-2;
+
+/// Length of a step relative to the longest, after which none is left but rounding.
+const SETTLED: f64 = 1e-9;
 
 /// Moves, for the longest ones, beyond which no bracket is worth its evaluation; that is relative to the smaller body, too.
 #[inline(always)]
@@ -169,7 +185,7 @@ impl<R: Relation> WithSimd for Follow<'_, R> {
         }
         let relative = relation.relative(simd, a, b);
         let limit = MAX_ROUNDS.min(options.max_iterations());
-        let correct = Correct::new(simd, a, b, active, &relative, relation, limit, options);
+        let correct = Correct::new(simd, a, b, active, &relative, relation, [limit, limit], options);
 
         // Prediction from the old jets at the new poses.
         let y = add::<S, f64>(apply::<S, f64>(&relative.rotation, trace.y), relative.origin);
@@ -177,7 +193,8 @@ impl<R: Relation> WithSimd for Follow<'_, R> {
         let local_b = correct.sides.1.localize(simd, &at.frame);
         let jet_b = (Plane::new(simd, &trace.jet_b, &local_b), Bend::new(simd, &trace.jet_b, &local_b));
         let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
-        let step = relation.newton(simd, (&trace.a.0, &trace.a.1), (&jet_b.0, &jet_b.1), &at.frame, difference);
+        let (of_a, of_b) = ((&trace.a.0, &trace.a.1), (&jet_b.0, &jet_b.1));
+        let step = relation.newton(simd, of_a, of_b, &at.frame, difference, correct.flattest());
         if !step.within(simd, correct.limits) {
             return Err(Lost::after(0));
         }
@@ -200,6 +217,8 @@ pub(super) struct Seek<'a, R> {
     pub(super) a: &'a Body,
     pub(super) b: &'a Body,
     pub(super) relation: R,
+    /// Where to begin instead, of smooth bodies.
+    pub(super) from: Option<Start<f64>>,
     /// Most rounds.
     pub(super) limit: u32,
     /// Whose stop flag is polled.
@@ -212,20 +231,26 @@ impl<R: Relation> WithSimd for Seek<'_, R> {
     /// The proven answer with its trace, or what is left.
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Result<(Proven, Trace), Lost> {
-        let Self { a, b, relation, limit, options } = self;
+        let Self { a, b, relation, from, limit, options } = self;
         let relative = relation.relative(simd, a, b);
-        let start = relation.start(simd, a, b, &relative);
-        let active = [a.outline().active(start.places[0]), b.outline().active(start.places[1])];
-        let correct = Correct::new(simd, a, b, active, &relative, relation, limit, options);
+        let (start, active) = match from {
+            Some(start) => (start, [0; 2]),
+            None => {
+                let (start, places) = relation.start(simd, a, b, &relative);
+                (start, [a.outline().active(places[0]) as u8, b.outline().active(places[1]) as u8])
+            }
+        };
+        let patience = if from.is_some() { limit } else { PATIENCE };
+        let correct =
+            Correct::new(simd, a, b, active.map(usize::from), &relative, relation, [patience, limit], options);
         if relation.ends_at_contact() && dot::<S, f64>(start.n, subtract::<S, f64>(start.x, start.y)) < 0.0 {
-            let (middle, (side_a, side_b)) = (middle(simd, a, b, start.x, start.y), &correct.sides);
-            let ((in_a, _), (in_b, _)) = (side_a.jet(simd, middle), side_b.jet(simd, middle));
-            if in_a.value < 1.0 && in_b.value < 1.0 {
-                return Err(Lost { rounds: 1, middle: Some(middle) });
+            let middle = correct.middle(simd, start.x, start.y);
+            if middle.is_some() {
+                return Err(Lost { middle, ..Lost::after(1) });
             }
         }
         let at = Iterate { x: start.x, y: start.y, frame: basis(simd, start.n) };
-        let mut trace = Trace::blank(active.map(|i| i as u8));
+        let mut trace = Trace::blank(active);
         let proven = correct.run(simd, &relative, at, &mut trace)?;
         Ok((proven, trace))
     }
@@ -235,7 +260,8 @@ impl<R: Relation> WithSimd for Seek<'_, R> {
 struct Correct<'a, R> {
     sides: (Side<'a, f64>, Side<'a, f64>),
     relation: R,
-    limit: u32,
+    /// Rounds after which steps should be short, and most rounds.
+    rounds: [u32; 2],
     options: &'a Options<'a>,
     /// Longest moves of x and of y, metres.
     limits: [f64; 2],
@@ -251,13 +277,31 @@ impl<'a, R: Relation> Correct<'a, R> {
         active: [usize; 2],
         relative: &Relative<f64>,
         relation: R,
-        limit: u32,
+        rounds: [u32; 2],
         options: &'a Options<'a>,
     ) -> Self {
         let sides = (Side::at_home(simd, a, active[0]), Side::away(b, active[1], relative));
-        Self { sides, relation, limit, options, limits: limits(a, b) }
+        Self { sides, relation, rounds, options, limits: limits(a, b) }
     }
 
+    /// Curvature that counts as none, per metre.
+    #[inline(always)]
+    fn flattest(&self) -> f64 {
+        FLATTEST / self.limits[0].min(self.limits[1])
+    }
+
+    /// A point between x and y if it seems to lie in both bodies.
+    #[inline(always)]
+    fn middle<S: Simd>(&self, simd: S, x: V3<f64>, y: V3<f64>) -> Option<V3<f64>> {
+        let (side_a, side_b) = &self.sides;
+        let middle = middle(simd, side_a.body(), side_b.body(), x, y);
+        let ((in_a, _), (in_b, _)) = (side_a.jet(simd, middle), side_b.jet(simd, middle));
+        let inside = in_a.value < 1.0 && in_b.value < 1.0;
+        (inside && side_a.others_hold(simd, middle) && side_b.others_hold(simd, middle)).then_some(middle)
+    }
+
+    // What is lost is about as large as what is proven, and there is no allocation in a solve.
+    #[allow(clippy::result_large_err)]
     #[inline(always)]
     fn run<S: Simd>(
         &self,
@@ -267,34 +311,39 @@ impl<'a, R: Relation> Correct<'a, R> {
         trace: &mut Trace,
     ) -> Result<Proven, Lost> {
         let (side_a, side_b) = &self.sides;
-        for rounds in 1..=self.limit {
+        let [patience, limit] = self.rounds;
+        let mut pace = Pace::default();
+        for rounds in 1..=limit {
             if self.options.stopped() {
                 return Err(Lost::after(rounds - 1));
             }
             let ((jet_a, inside_a), (jet_b, inside_b)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
             if !(inside_a && inside_b) {
                 // A step has led too far.
-                (at.x, at.y) = (side_a.brought_near(simd, at.x), side_b.brought_near(simd, at.y));
+                if rounds >= patience {
+                    return Err(Lost::after(rounds));
+                }
+                (at.x, at.y) =
+                    (side_a.brought_near(simd, at.x, jet_a.value), side_b.brought_near(simd, at.y, jet_b.value));
                 continue;
             }
-            let (mut local_a, mut local_b) = (side_a.localize(simd, &at.frame), side_b.localize(simd, &at.frame));
-            let (mut a, mut b) = (Plane::new(simd, &jet_a, &local_a), Plane::new(simd, &jet_b, &local_b));
-            if a.slant(-1.0).max(b.slant(1.0)) > STEEP {
-                // Far from the solution the normals of the surfaces show the way better than the last guess.
-                let Some(frame) = at.between_normals(simd, &a, &b) else { return Err(Lost::after(rounds)) };
-                at.frame = frame;
-                (local_a, local_b) = (side_a.localize(simd, &at.frame), side_b.localize(simd, &at.frame));
-                (a, b) = (Plane::new(simd, &jet_a, &local_a), Plane::new(simd, &jet_b, &local_b));
-            }
+            let (local_a, local_b) = (side_a.localize(simd, &at.frame), side_b.localize(simd, &at.frame));
+            let (a, b) = (Plane::new(simd, &jet_a, &local_a), Plane::new(simd, &jet_b, &local_b));
             let (bend_a, bend_b) = (Bend::new(simd, &jet_a, &local_a), Bend::new(simd, &jet_b, &local_b));
             let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
-            let mut step = self.relation.newton(simd, (&a, &bend_a), (&b, &bend_b), &at.frame, difference);
-            if !step.within(simd, self.limits) {
-                step.shorten(simd, self.limits);
-                at.advance(simd, &step);
-                continue;
-            }
+            let (of_a, of_b) = ((&a, &bend_a), (&b, &bend_b));
+            let mut step = self.relation.newton(simd, of_a, of_b, &at.frame, difference, self.flattest());
             if !step.within(simd, worth_a_bracket(self.limits)) {
+                let of_a = side_a.relative_square(simd, &local_a, step.dx);
+                let length = of_a.max(side_b.relative_square(simd, &local_b, step.dy)).sqrt();
+                if rounds >= patience && !(length * f64::from(1_u32 << (rounds - patience)) <= NEARLY) {
+                    return Err(Lost::after(rounds));
+                }
+                if length > LONGEST {
+                    step.shorten(LONGEST / length);
+                } else {
+                    pace.stretch(simd, &mut step, &at.frame);
+                }
                 at.advance(simd, &step);
                 continue;
             }
@@ -303,7 +352,8 @@ impl<'a, R: Relation> Correct<'a, R> {
             let next_b = side_b.extrapolate(simd, &jet_b, &local_b, step.dy);
             let next = subtract::<S, f64>(add::<S, f64>(difference, step.dx), step.dy);
             let found = bracket(simd, (side_a, &next_a), (side_b, &next_b), next);
-            match self.relation.judge(simd, &found, &at.frame, next) {
+            let settled = step.within(simd, self.limits.map(|limit| SETTLED * limit));
+            match self.relation.judge(simd, &found, &at.frame, next, settled) {
                 Verdict::Proven { lower, upper } => {
                     let x = moved::<S, f64>(at.x, add::<S, f64>(step.dx, found.to_a), &at.frame);
                     let y = moved::<S, f64>(at.y, add::<S, f64>(step.dy, found.to_b), &at.frame);
@@ -320,16 +370,71 @@ impl<'a, R: Relation> Correct<'a, R> {
                     let (active, multipliers) = (trace.active, found.multipliers);
                     return Ok(Proven { lower, upper, x, y, n, active, multipliers, rounds });
                 }
-                Verdict::Wide => at.advance(simd, &step),
-                Verdict::Hopeless => {
-                    return Err(Lost {
+                Verdict::Wide => {
+                    pace.stretch(simd, &mut step, &at.frame);
+                    at.advance(simd, &step);
+                }
+                Verdict::Overlap => {
+                    let middle = self.middle(simd, at.x, at.y);
+                    let deep = -next[2] > NEARLY * self.limits[0].min(self.limits[1]);
+                    if middle.is_none() && !settled {
+                        if deep && rounds >= PATIENCE {
+                            return Err(Lost::after(rounds));
+                        }
+                        at.advance(simd, &step);
+                        continue;
+                    }
+                    let grazing = (!deep).then(|| Proven {
+                        lower: 0.0,
+                        upper: f64::INFINITY,
+                        x: moved::<S, f64>(at.x, step.dx, &at.frame),
+                        y: moved::<S, f64>(at.y, step.dy, &at.frame),
+                        n: apply_transposed::<S, f64>(&at.frame, found.normal),
+                        active: trace.active,
+                        multipliers: found.multipliers,
                         rounds,
-                        middle: Some(middle(simd, self.sides.0.body(), self.sides.1.body(), at.x, at.y)),
                     });
+                    return Err(Lost { rounds, middle, grazing });
                 }
             }
         }
-        Err(Lost::after(self.limit))
+        Err(Lost::after(limit))
+    }
+}
+
+/// How Newton's steps shrink. Where both surfaces are flat to order j they do so by `(j - 2) / (j - 1)` each and in one direction;
+/// two of them then show where all of them lead (Aitken's extrapolation).
+#[derive(Clone, Copy, Default)]
+struct Pace {
+    /// Sum of the last moves of x and y.
+    last: V3<f64>,
+    /// How much shorter than the one before.
+    ratio: f64,
+}
+
+impl Pace {
+    /// Ratios of steps that shrink slowly.
+    const SLOW: std::ops::Range<f64> = 0.4..0.92;
+
+    /// Lengthens a step if it is one of a series.
+    #[inline(always)]
+    fn stretch<S: Simd>(&mut self, _: S, step: &mut Step<f64>, frame: &M3<f64>) {
+        let both = apply_transposed::<S, f64>(frame, add::<S, f64>(step.dx, step.dy));
+        let (along, square) = (dot::<S, f64>(both, self.last), dot::<S, f64>(self.last, self.last));
+        let ratio = along / square;
+        let straight = along * along > 0.99 * square * dot::<S, f64>(both, both);
+        let series = straight && Self::SLOW.contains(&ratio) && (ratio - self.ratio).abs() < 0.05;
+        *self = Self { last: both, ratio };
+        if series {
+            // The rest of the series, the same for x and y: they stay where they are seen from each other.
+            let rest = 0.5 * ratio / (1.0 - ratio);
+            for i in 0..2 {
+                let both = step.dx[i] + step.dy[i];
+                step.dx[i] += rest * both;
+                step.dy[i] += rest * both;
+            }
+            *self = Self::default();
+        }
     }
 }
 
@@ -342,17 +447,6 @@ struct Iterate {
 }
 
 impl Iterate {
-    /// The basis whose normal is halfway between those of the surfaces; none where they do not face each other.
-    #[inline(always)]
-    fn between_normals<S: Simd>(&self, simd: S, a: &Plane<f64>, b: &Plane<f64>) -> Option<M3<f64>> {
-        let (of_a, of_b) = (a.gradient, b.gradient);
-        let length_a = dot::<S, f64>(of_a, of_a).sqrt();
-        let length_b = dot::<S, f64>(of_b, of_b).sqrt();
-        let middle = [0, 1, 2].map(|i| of_b[i] / length_b - of_a[i] / length_a);
-        let n = apply_transposed::<S, f64>(&self.frame, middle);
-        (dot::<S, f64>(middle, middle) > 0.25).then(|| basis(simd, n))
-    }
-
     /// Takes a step; the basis follows the normal.
     #[inline(always)]
     fn advance<S: Simd>(&mut self, simd: S, step: &Step<f64>) {

@@ -16,7 +16,7 @@ use super::vector::{
     M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, normalized, rows, scaled,
     subtract, times_transposed,
 };
-use crate::body::{Body, Outline};
+use crate::body::Body;
 use crate::polynomial::{Number, Simd};
 
 /// Turns of the normal by ellipsoids.
@@ -112,11 +112,10 @@ pub(super) struct Start<N> {
     pub(super) y: V3<N>,
     /// Unit vector from B to A, in A's frame.
     pub(super) n: V3<N>,
-    /// Where A's outline keeps the cell of `-n` and B's that of n.
-    pub(super) places: [N; 2],
 }
 
-/// Where the outlines have `x - y` along n, or along a ray if one is given; from a unit vector n on, in A's frame.
+/// Where the outlines have `x - y` along n, or along a ray if one is given; from a unit vector n on, in A's frame. Also where A's
+/// outline keeps the cell of `-n` and B's that of n.
 #[inline(always)]
 pub(super) fn meeting<S: Simd, N: Number<S>>(
     simd: S,
@@ -125,11 +124,10 @@ pub(super) fn meeting<S: Simd, N: Number<S>>(
     relative: &Relative<N>,
     n: V3<N>,
     ray: Option<V3<N>>,
-) -> Start<N> {
+) -> (Start<N>, [N; 2]) {
     let least = N::splat(simd, LEAST * (a.trust().reach + b.trust().reach));
     let own = apply_transposed(&relative.rotation, n);
-    let places = [Outline::place(simd, scaled(n, -N::splat(simd, 1.0))), Outline::place(simd, own)];
-    let (cell_a, cell_b) = (a.outline().cell(simd, places[0]), b.outline().cell(simd, places[1]));
+    let (cell_a, cell_b) = (a.outline().cell(simd, scaled(n, -N::splat(simd, 1.0))), b.outline().cell(simd, own));
     // Points for n, and how they turn with it.
     let (turn_a, turn_b) = (cell_a.turn, turned_symmetric(&relative.rotation, &cell_b.turn));
     let of_a = cell_a.point;
@@ -149,7 +147,7 @@ pub(super) fn meeting<S: Simd, N: Number<S>>(
     // Of the same cells: where a side is flat a small turn leads far, to another cell for which it was not meant.
     let x = subtract(of_a, apply_symmetric(&turn_a, n));
     let y = add(of_b, apply_symmetric(&turn_b, n));
-    Start { x, y, n, places }
+    (Start { x, y, n }, [cell_a.place, cell_b.place])
 }
 
 /// `R M Rᵀ` of a symmetric matrix with the entries xx, xy, xz, yy, yz, zz.

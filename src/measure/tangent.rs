@@ -128,15 +128,6 @@ impl<'a, N: Copy> Side<'a, N> {
         self.body
     }
 
-    /// A gradient by normalized coordinates as one by metres.
-    #[inline(always)]
-    pub(super) fn pulled_back<S: Simd>(&self, _: S, gradient: V3<N>) -> V3<N>
-    where
-        N: Number<S>,
-    {
-        apply_transposed(&self.linear, gradient)
-    }
-
     #[inline(always)]
     fn trust(&self) -> &'a ConstraintTrust {
         &self.body.trust().constraints[self.active]
@@ -211,14 +202,27 @@ impl<'a, N: Copy> Side<'a, N> {
 }
 
 impl Side<'_, f64> {
-    /// The point itself if it lies in the ball of the body's [`crate::body::Trust`], else one a little inside on the line to the
-    /// centre.
+    /// The point itself if it lies in the ball of the body's [`crate::body::Trust`], else about where the line to the centre meets
+    /// the surface, by the value of the active constraint at the point.
     #[inline(always)]
-    pub(super) fn brought_near<S: Simd>(&self, _: S, v: V3<f64>) -> V3<f64> {
+    pub(super) fn brought_near<S: Simd>(&self, _: S, v: V3<f64>, value: f64) -> V3<f64> {
         let from = subtract::<S, f64>(v, self.origin);
         let z = apply::<S, f64>(&self.linear, from);
-        let fraction = 0.97 * self.body.trust().radius / dot::<S, f64>(z, z).sqrt();
-        if fraction < 0.97 { add_scaled::<S, f64>(self.origin, fraction, from) } else { v }
+        let fraction = self.body.trust().radius / dot::<S, f64>(z, z).sqrt();
+        if fraction >= 1.0 {
+            return v;
+        }
+        let degree = self.body.constraints()[self.active].polynomial.degree() as f64;
+        let fraction = fraction.min(value.powf(-1.0 / degree));
+        add_scaled::<S, f64>(self.origin, fraction, from)
+    }
+
+    /// Square of a step in the basis that `local` is of, in normalized coordinates, relative to the body's size there: however
+    /// thin a body is, its surface bends about as much over all steps of the same relative length.
+    #[inline(always)]
+    pub(super) fn relative_square<S: Simd>(&self, _: S, local: &M3<f64>, step: V3<f64>) -> f64 {
+        let delta = apply_transposed::<S, f64>(local, step);
+        dot::<S, f64>(delta, delta) / self.body.trust().radius.powi(2)
     }
 
     /// From a point with this plane to a point of the body nearby, against the gradient, in the basis of the plane; as far as
@@ -354,22 +358,10 @@ pub(super) struct Step<N> {
     pub(super) dn: [N; 2],
 }
 
-impl Plane<f64> {
-    /// Slope of the gradient against the normal times `sign`; infinite or more where it points the other way.
-    #[inline(always)]
-    pub(super) fn slant(&self, sign: f64) -> f64 {
-        let [s0, s1, along] = self.gradient;
-        let along = sign * along;
-        let across = s0.abs() + s1.abs();
-        if along > 0.0 { across / along } else { f64::INFINITY }
-    }
-}
-
 impl Step<f64> {
-    /// Scales the step until neither x nor y moves farther than its limit; no step is left of one that is not a number.
+    /// Takes only this much of the step.
     #[inline(always)]
-    pub(super) fn shorten<S: Simd>(&mut self, simd: S, limits: [f64; 2]) {
-        let factor = 1.0 / self.square(simd, limits).sqrt();
+    pub(super) fn shorten(&mut self, factor: f64) {
         for entry in self.dx.iter_mut().chain(&mut self.dy).chain(&mut self.dn) {
             *entry *= factor;
         }
@@ -412,7 +404,7 @@ impl<N: Copy> Step<N> {
 /// rays, so that the surface is found from farther away. Gradients are then those of g over the square of the mean m of g and
 /// 1, Hessians `H - ∇g ∇gᵀ / m` over the same.
 ///
-/// `smallest` is added to the curvature that is divided by: where both bodies are flat it bounds the step.
+/// `smallest` (per metre) is added to the curvature that is divided by: where both bodies are flat it bounds the step.
 #[inline(always)]
 pub(super) fn newton<S: Simd, N: Number<S>>(
     simd: S,
@@ -445,13 +437,14 @@ pub(super) fn newton_along<S: Simd>(
     (b, bend_b): (&Plane<f64>, &Bend<f64>),
     difference: V3<f64>,
     ray: V3<f64>,
+    smallest: f64,
 ) -> Step<f64> {
     let (straight_a, straight_b) = straighten(simd, (a, bend_a), (b, bend_b));
     let inverse = 1.0 / ray[2];
     let slope = [ray[0] * inverse, ray[1] * inverse];
     let height = difference[2] + straight_a.shift - straight_b.shift;
     let off = [difference[0] - height * slope[0], difference[1] - height * slope[1]];
-    let Turn { mut alpha, beta, theta } = turn(simd, &straight_a, &straight_b, 0.0, off, 0.0);
+    let Turn { mut alpha, beta, theta } = turn(simd, &straight_a, &straight_b, 0.0, off, smallest);
     // What the surfaces fall below their tangent planes, of second order, changes where on the ray they meet.
     let fallen = |plane: &Plane<f64>, straight: &Straight<f64>, along: [f64; 2]| {
         let bent = apply2::<S, f64>(&straight.curvature, along);

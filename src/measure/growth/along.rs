@@ -101,7 +101,7 @@ impl Relation for Along {
     }
 
     #[inline(always)]
-    fn start<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> Start<f64> {
+    fn start<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> (Start<f64>, [f64; 2]) {
         let n = normalized(simd, facing_along(simd, a, b, relative, self.delta));
         meeting(simd, a, b, relative, n, Some(self.delta))
     }
@@ -114,14 +114,22 @@ impl Relation for Along {
         b: (&Plane<f64>, &Bend<f64>),
         frame: &M3<f64>,
         difference: V3<f64>,
+        smallest: f64,
     ) -> Step<f64> {
-        newton_along(simd, a, b, difference, apply::<S, f64>(frame, self.delta))
+        newton_along(simd, a, b, difference, apply::<S, f64>(frame, self.delta), smallest)
     }
 
     /// With `H = H_A(n) + H_B(-n)`, which the bracket of the distance bounds, and a point w of the difference of the bodies,
     /// the two bounds at the head of [`super`].
     #[inline(always)]
-    fn judge<S: Simd>(&self, _: S, found: &Bracket<f64>, frame: &M3<f64>, difference: V3<f64>) -> Verdict {
+    fn judge<S: Simd>(
+        &self,
+        _: S,
+        found: &Bracket<f64>,
+        frame: &M3<f64>,
+        difference: V3<f64>,
+        _settled: bool,
+    ) -> Verdict {
         let delta = apply::<S, f64>(frame, self.delta);
         let gap = self.square.sqrt();
         let delta_error = self.delta_error + SLACK * gap;

@@ -142,7 +142,7 @@ impl<'a> Best<'a> {
             return false;
         }
         let limit = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
-        match dispatch(Seek { a: pair.a.body, b: pair.b.body, relation, limit, options }) {
+        match dispatch(Seek { a: pair.a.body, b: pair.b.body, relation, from: None, limit, options }) {
             Ok((proven, trace)) => {
                 self.take(&proven, trace);
                 true

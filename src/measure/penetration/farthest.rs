@@ -10,7 +10,7 @@
 //! leaves an error of the order of its square, and what that costs along e is of the square again. Taylor's formula proves how
 //! far the end of the last step is from the best, and a point of the body beside it.
 
-use crate::body::{Body, Outline};
+use crate::body::Body;
 use crate::measure::tangent::Side;
 use crate::measure::vector::{
     V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, rows, scaled,
@@ -40,9 +40,8 @@ impl WithSimd for Farthest<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> Option<(Vector3<f64>, usize)> {
         let Self { body, n, tolerance } = self;
         let n: V3<f64> = n.into();
-        let place = Outline::place(simd, n);
-        let active = body.outline().active(place);
-        let cell = body.outline().cell(simd, place);
+        let cell = body.outline().cell(simd, n);
+        let active = body.outline().active(cell.place);
         let side = Side::at_home(simd, body, active);
         let inverse = rows(simd, body.inverse());
         let e = apply_transposed::<S, f64>(&inverse, n);

@@ -1,7 +1,6 @@
 //! A first look around all directions for the shortest way out of an overlap, by the outlines of the bodies. It proves
 //! nothing: it only spares the proof from being about a way that is not the shortest.
 
-use crate::body::Outline;
 use crate::measure::pair::Pair;
 use crate::measure::vector::dot;
 use crate::polynomial::{Simd, WithSimd};
@@ -22,7 +21,7 @@ impl WithSimd for Scout<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> (Vector3<f64>, f64) {
         let (pair, a, b) = (self.pair, self.pair.a.body, self.pair.b.body);
-        let outline_a = a.outline();
+        let (outline_a, outline_b) = (a.outline(), b.outline());
         let offset = pair.a_to_query(&a.normalization().center) - pair.b_to_query(&b.normalization().center);
         let mut best = (f64::INFINITY, Vector3::x());
         for face in 0..6 {
@@ -33,8 +32,8 @@ impl WithSimd for Scout<'_> {
                     n[face / 2] = if face % 2 == 0 { 1.0 } else { -1.0 };
                     (n[(face / 2 + 1) % 3], n[(face / 2 + 2) % 3]) = (across(i), across(j));
                     let own = pair.direction_to_b(&n);
-                    let x = outline_a.point(Outline::place(simd, [-n.x, -n.y, -n.z]));
-                    let y = b.outline().point(Outline::place(simd, own.into()));
+                    let x = outline_a.point(outline_a.place(simd, [-n.x, -n.y, -n.z]));
+                    let y = outline_b.point(outline_b.place(simd, own.into()));
                     let along = dot::<S, f64>(own.into(), y) - dot::<S, f64>(n.into(), x);
                     let depth = (along / pair.unit() - n.dot(&offset)) / n.norm();
                     if depth < best.0 {
