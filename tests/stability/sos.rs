@@ -240,7 +240,7 @@ impl Program {
         solver.solve();
         // Thin bodies leave no progress at the last digits: then the residuals decide.
         let info = &solver.info;
-        let small = info.gap_abs.min(info.gap_rel).max(info.res_primal).max(info.res_dual) < 1e-7;
+        let small = info.gap_abs.min(info.gap_rel).max(info.res_primal).max(info.res_dual) < 1e-6;
         let stalled = [SolverStatus::AlmostSolved, SolverStatus::InsufficientProgress];
         let solved =
             solver.solution.status == SolverStatus::Solved || stalled.contains(&solver.solution.status) && small;
