@@ -132,7 +132,7 @@ const MAX_ROUNDS: u32 = 8;
 pub(super) const SEEK_ROUNDS: u32 = 16;
 
 /// Evaluations from a cold start after which Newton's method should be near.
-const PATIENCE: u32 = 4;
+const PATIENCE: u32 = 6;
 
 /// Length of a step relative to a body's size that counts as near.
 const NEARLY: f64 = 0.05;
