@@ -258,7 +258,8 @@ impl DistanceNewton {
                     | self.a.violated(&pair.a, &self.x, 1.0).is_some_and(|i| self.a.push(i))
                     | self.b.violated(&pair.b, &self.y, 1.0).is_some_and(|i| self.b.push(i));
                 if changed {
-                    (at, stuck) = (self.evaluate(pair), 0);
+                    (at, last, stuck) = (self.evaluate(pair), f64::INFINITY, 0);
+                    continue;
                 }
             }
             // Near its solution Newton's step shrinks fast; one that does not is not near.
