@@ -156,7 +156,7 @@ fn begin(arguments: &Arguments, bodies: &[Body]) -> State {
     let mut state = old.unwrap_or_else(|| State { seed: arguments.seed, bodies: hash.clone(), ..State::default() });
     assert!(state.seed == arguments.seed, "the state is of seed {}, not {}", state.seed, arguments.seed);
     assert!(state.bodies == hash, "the state is of other bodies; its queries can not be continued");
-    let git = std::process::Command::new("git").args(["rev-parse", "--short", "HEAD"]).output();
+    let git = std::process::Command::new("git").args(["describe", "--always", "--dirty"]).output();
     let commit = git.ok().and_then(|output| String::from_utf8(output.stdout).ok()).unwrap_or_default();
     state.commits.insert(if commit.is_empty() { "unknown".into() } else { commit.trim().into() });
     state

@@ -5,7 +5,7 @@ use super::{Constraint, largest};
 use crate::polynomial::{ThirdCeiling, gamma};
 use nalgebra::{Matrix3, Vector3};
 
-/// How much larger than the body, as its boundary points show it, the ball is.
+/// How much larger than the body, as its support points show it, the ball is.
 const MARGIN: f64 = 1.0625;
 
 /// Bounds of a body's map and constraints where `|z| <= radius`; lengths in metres, z unit-free.

@@ -125,7 +125,7 @@ impl WithSimd for Batch<'_> {
         let lanes = Lanes::<S>::COUNT;
         let mut waiting = Waiting::default();
         let mut next = 0;
-        while (next < self.poses_b.len() || waiting.len > 0) && !self.options.exhausted(0) {
+        while (next < self.poses_b.len() || waiting.len > 0) && !self.options.stopped() {
             let left = self.poses_b.len() - next;
             let fresh = waiting.len < lanes && left > 0;
             let mut group = Group { count: lanes.min(if fresh { left } else { waiting.len }), ..Group::default() };

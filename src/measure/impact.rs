@@ -276,7 +276,7 @@ impl Search<'_> {
     }
 
     fn exhausted(&self) -> bool {
-        self.options().exhausted(0) || self.queries >= self.options.max_queries
+        self.options().stopped() || self.queries >= self.options.max_queries
     }
 
     /// For the queries on the way, with the stop flag.

@@ -21,6 +21,7 @@ use super::active::{ActiveConstraints, MAX_ACTIVE};
 use super::bracket::Multipliers;
 use super::linear::{Augmented, MAX_UNKNOWNS, solve};
 use super::pair::{Pair, Posed};
+use super::smooth::LONGEST;
 use super::warm::ActiveSet;
 use nalgebra::{Matrix3, Vector3};
 
@@ -211,11 +212,27 @@ const AT: f64 = 0.1;
 /// Largest number of Newton steps and of changes of the active set.
 const MAX_STEPS: u32 = 16;
 
-/// Longest Newton step, in query units, after which a bracket may be narrow: what remains is about its square.
+/// Longest Newton step, relative to the bodies, after which a bracket may be narrow: what remains is about its square.
 const WORTH_A_BRACKET: f64 = 1e-3;
 
-/// Longest step of a point relative to its body's size, in normalized coordinates.
-const LONGEST: f64 = 0.25;
+/// Whether Newton's steps still shrink: fast near a solution, and those that do not are not near one.
+struct Pace {
+    last: f64,
+    /// How often a short step was hardly shorter than the one before.
+    stuck: u32,
+}
+
+impl Pace {
+    /// Of steps towards a system that none has been taken towards yet.
+    const FIRST: Self = Self { last: f64::INFINITY, stuck: 0 };
+
+    /// Whether no step is worth taking after one of this length, relative to the bodies.
+    fn ends_with(&mut self, length: f64) -> bool {
+        self.stuck += u32::from(length < WORTH_A_BRACKET && length > 0.9 * self.last);
+        self.last = length;
+        self.stuck == 2 || length < 1e-14
+    }
+}
 
 /// Newton iterates of the distance system.
 #[derive(Clone, Copy, Debug)]
@@ -238,7 +255,7 @@ impl DistanceNewton {
             return 0;
         }
         let mut at = self.evaluate(pair);
-        let (mut last, mut stuck) = (f64::INFINITY, 0);
+        let mut pace = Pace::FIRST;
         for step in 1..=MAX_STEPS.min(limit) {
             let Some(length) = self.step(pair, &at) else {
                 // Where both are flat the system is singular, but the point at hand with its multipliers may do.
@@ -251,23 +268,19 @@ impl DistanceNewton {
             if (length < WORTH_A_BRACKET || step % 4 == 0 || last_step) && accept(self) {
                 return step;
             }
-            let settled = length < WORTH_A_BRACKET;
-            if settled || step % 4 == 0 {
+            if length < WORTH_A_BRACKET || step % 4 == 0 {
                 let changed = self.a.drop_negative()
                     | self.b.drop_negative()
                     | self.a.violated(&pair.a, &self.x, 1.0).is_some_and(|i| self.a.push(i))
                     | self.b.violated(&pair.b, &self.y, 1.0).is_some_and(|i| self.b.push(i));
                 if changed {
-                    (at, last, stuck) = (self.evaluate(pair), f64::INFINITY, 0);
+                    (at, pace) = (self.evaluate(pair), Pace::FIRST);
                     continue;
                 }
             }
-            // Near its solution Newton's step shrinks fast; one that does not is not near.
-            stuck += u32::from(settled && length > 0.9 * last);
-            if stuck == 2 || length < 1e-14 {
+            if pace.ends_with(length) {
                 return step;
             }
-            last = length;
         }
         MAX_STEPS.min(limit)
     }
@@ -277,7 +290,7 @@ impl DistanceNewton {
         (At::new(&pair.a, &self.a, &self.x), At::new(&pair.b, &self.b, &self.y))
     }
 
-    /// One Newton step; its length, or none if the system is singular.
+    /// One Newton step; its length relative to the bodies, or none if the system is singular.
     ///
     /// The second of the equations at the head of this file gives `dn = -(n + u) - H_A dx - G_A dλ`, G the gradients and H the
     /// weighted Hessians, and the first then `dy = (I + D H_A) dx - n dD + D G_A dλ + (x - y + D u)`, which leaves dx, dD and
@@ -328,10 +341,9 @@ impl DistanceNewton {
         let dy = moved * dx - n * d[3] + of_a * distance + offset;
         // Of corners that stay where they are the normal turns.
         let dn = -(n + a.sum) - a.hessian * dx - of_a;
-        let length = dx.norm().max(dy.norm()).max(dn.norm());
+        let length = pair.a.relative_length(&dx).max(pair.b.relative_length(&dy));
         // A longer step leaves where the linearization means anything.
-        let relative = pair.a.relative_length(&dx).max(pair.b.relative_length(&dy));
-        let damping = (LONGEST / relative).min(1.0);
+        let damping = (LONGEST / length).min(1.0);
         self.x += dx * damping;
         self.y += dy * damping;
         self.n += dn * damping;
@@ -342,7 +354,7 @@ impl DistanceNewton {
         for k in 0..lb {
             self.b.multiplier[k] += d[4 + la + k] * damping;
         }
-        Some(length)
+        Some(length.max(dn.norm()))
     }
 }
 
@@ -366,7 +378,7 @@ impl LevelNewton {
             return 0;
         }
         let mut s = self.start(pair);
-        let mut last = f64::INFINITY;
+        let mut pace = Pace::FIRST;
         for step in 1..=MAX_STEPS {
             if stop(step - 1) {
                 return step - 1;
@@ -379,7 +391,7 @@ impl LevelNewton {
             if (length < WORTH_A_BRACKET || step % 4 == 0) && accept(self) {
                 return step;
             }
-            if length < 1e-9 || step % 4 == 0 {
+            if length < WORTH_A_BRACKET || step % 4 == 0 {
                 let inactive = self.b.len == 1 && self.b.multiplier[0] < 0.0;
                 if inactive {
                     self.b.len = 0;
@@ -389,11 +401,14 @@ impl LevelNewton {
                     | self.b.drop_negative()
                     | self.a.violated(&pair.a, &self.x, s).is_some_and(|i| self.a.push(i))
                     | self.b.violated(&pair.b, &self.x, 1.0).is_some_and(|i| self.b.push(i));
-                if !changed && (length > 0.9 * last || length < 1e-14) {
-                    return step;
+                if changed {
+                    pace = Pace::FIRST;
+                    continue;
                 }
             }
-            last = length;
+            if pace.ends_with(length) {
+                return step;
+            }
         }
         MAX_STEPS
     }
@@ -450,8 +465,8 @@ impl LevelNewton {
         }
         let d = solve(&mut m, size)?;
         let dx = Vector3::new(d[0], d[1], d[2]);
-        let length = dx.norm();
-        let damping = (0.5 / length).min(1.0);
+        let length = pair.b.relative_length(&dx);
+        let damping = (LONGEST / length).min(1.0);
         self.x += dx * damping;
         *s += d[3] * damping;
         for k in 0..self.a.len {

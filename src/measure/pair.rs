@@ -15,7 +15,7 @@ pub(super) struct Posed<'a> {
     /// Stored interior point.
     pub(super) interior: Vector3<f64>,
     center: Vector3<f64>,
-    radius: f64,
+    pub(super) radius: f64,
 }
 
 impl Posed<'_> {

@@ -38,19 +38,12 @@ pub(super) trait Relation: Copy {
         newton(simd, a, b, difference, smallest)
     }
 
-    /// What the bracket of the distance at points with `difference = x - y` in the frame says of the measure. `settled`: Newton's
-    /// method has no step left to take.
-    fn judge<S: Simd>(
-        &self,
-        simd: S,
-        found: &Bracket<f64>,
-        frame: &M3<f64>,
-        difference: V3<f64>,
-        settled: bool,
-    ) -> Verdict;
+    /// What the bracket of the distance at points with `difference = x - y` in the frame says of the measure.
+    fn judge<S: Simd>(&self, simd: S, found: &Bracket<f64>, frame: &M3<f64>, difference: V3<f64>) -> Verdict;
 }
 
 /// What a bracket is good for.
+#[derive(Clone, Copy)]
 pub(super) enum Verdict {
     /// Narrow enough.
     Proven {
@@ -93,12 +86,14 @@ impl Relation for Apart<'_> {
     }
 
     #[inline(always)]
-    fn judge<S: Simd>(&self, _: S, found: &Bracket<f64>, _: &M3<f64>, difference: V3<f64>, settled: bool) -> Verdict {
+    fn judge<S: Simd>(&self, _: S, found: &Bracket<f64>, _: &M3<f64>, difference: V3<f64>) -> Verdict {
         // Below the rounding floor no bracket gets, however long Newton's method goes on.
-        let narrow = settled || found.upper - found.lower <= self.tolerance.max(4.0 * found.rounding);
-        if (narrow && found.off <= ALIGNED || self.goal.met(found.lower, found.upper)) && found.lower > 0.0 {
+        let narrow = found.upper - found.lower <= self.tolerance.max(4.0 * found.rounding);
+        let enough = narrow && found.off <= ALIGNED || self.goal.met(found.lower, found.upper);
+        // A bound that is not a number proves nothing.
+        if enough && found.lower > 0.0 && found.upper.is_finite() {
             Verdict::Proven { lower: found.lower, upper: found.upper }
-        } else if settled || difference[2] <= 0.0 {
+        } else if difference[2] <= 0.0 {
             Verdict::Overlap
         } else {
             Verdict::Wide
@@ -134,14 +129,13 @@ impl Relation for Through<'_> {
     }
 
     #[inline(always)]
-    fn judge<S: Simd>(&self, _: S, found: &Bracket<f64>, _: &M3<f64>, difference: V3<f64>, _settled: bool) -> Verdict {
+    fn judge<S: Simd>(&self, _: S, found: &Bracket<f64>, _: &M3<f64>, difference: V3<f64>) -> Verdict {
         let enough = self.tolerance.max(4.0 * found.rounding);
         let between = subtract::<S, f64>(add::<S, f64>(difference, found.to_a), found.to_b);
         let attained = dot::<S, f64>(found.normal, between);
         let sideways = add_scaled::<S, f64>(between, -attained, found.normal);
         let close = attained - found.lower <= enough && dot::<S, f64>(sideways, sideways) <= enough * enough;
         let narrow = found.upper - found.lower <= enough;
-        // A bound that is not a number proves nothing.
         if (narrow || close) && found.off <= ALIGNED && found.upper.is_finite() {
             Verdict::Proven { lower: found.lower, upper: found.upper }
         } else {

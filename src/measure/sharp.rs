@@ -70,9 +70,11 @@ impl SharpBody<'_> {
         }
     }
 
-    /// Sum of the magnitudes that z is made of.
+    /// Bound of the sum of the magnitudes that z is made of; the rows of the map are sums of larger ones for bodies that are
+    /// long and turned.
     fn z_size(&self, v: &Twos) -> f64 {
-        (self.rounded.abs() * doubles(v).abs() + doubles(&self.offset).abs()).sum()
+        let rows: f64 = self.rounded.row_iter().map(|row| row.norm()).sum();
+        rows * doubles(v).lp_norm(1) + doubles(&self.offset).lp_norm(1)
     }
 
     /// Rigorous upper bound of `-min r·(x' - v)` over the points x' of the body: [`super::bracket::descent`].

@@ -1,6 +1,6 @@
-//! About where two bodies with edges are nearest: the algorithm of Gilbert, Johnson and Keerthi (A fast procedure for computing
+//! About where two bodies are nearest: the algorithm of Gilbert, Johnson and Keerthi (A fast procedure for computing
 //! the distance between complex objects in three-dimensional space, IEEE J. Robotics and Automation 4, 1988) on the support
-//! points that the outlines keep. Nothing is proven by it; it shows Newton's method which constraints are active.
+//! points that the outlines keep. Nothing is proven by it; it shows Newton's method where to begin and which constraints are active.
 
 use super::pair::Pair;
 use crate::body::Body;
@@ -10,7 +10,8 @@ use nalgebra::{Matrix3, Vector3};
 /// Most support points asked for.
 const MAX_STEPS: usize = 16;
 
-/// How much nearer a support point must lead, relative to the square of the distance.
+/// How much nearer a support point must lead, relative to the square of the distance; and the square of the distance relative to
+/// the smaller body that counts as none.
 const WORTH: f64 = 1e-6;
 
 /// Points of the outlines of both bodies, and their difference.
@@ -101,25 +102,32 @@ pub(super) fn approach(pair: &Pair<'_>, n: &Vector3<f64>) -> Approach {
         let (x, y) = corners(pair, n);
         Corner { x, y, difference: x - y }
     };
-    let points = |simplex: &Simplex| (simplex.nearest(|corner| corner.x), simplex.nearest(|corner| corner.y));
+    gjk(WORTH * pair.a.radius.min(pair.b.radius).powi(2), n, support)
+}
+
+/// What is nearest to 0 of a convex set that is known by its support points along -n, from a direction n on; a distance whose
+/// square is no larger than `none` counts as none.
+fn gjk(none: f64, n: &Vector3<f64>, support: impl Fn(&Vector3<f64>) -> Corner) -> Approach {
     let mut last = support(n);
     let mut simplex = Simplex { corners: [last; 4], weights: [1.0, 0.0, 0.0, 0.0], len: 1 };
-    let ((mut x, mut y), mut n) = (points(&simplex), *n);
-    for _ in 0..MAX_STEPS {
+    let mut found = Approach { x: last.x, y: last.y, n: *n, corners: (last.x, last.y), common: None };
+    for step in 1..=MAX_STEPS {
         let nearest = simplex.nearest(|corner| corner.difference);
+        let (x, y) = (simplex.nearest(|corner| corner.x), simplex.nearest(|corner| corner.y));
         let square = nearest.norm_squared();
-        if simplex.len == 4 || !(square > WORTH * pair.size().powi(2)) {
-            let (of_a, of_b) = points(&simplex);
-            return Approach { x, y, n, corners: (last.x, last.y), common: Some((of_a + of_b) * 0.5) };
+        if !(square > none) {
+            return Approach { common: Some((x + y) * 0.5), ..found };
         }
-        ((x, y), n) = (points(&simplex), nearest / square.sqrt());
         last = support(&nearest);
-        if square - nearest.dot(&last.difference) <= WORTH * square {
+        found = Approach { x, y, n: nearest / square.sqrt(), corners: (last.x, last.y), common: None };
+        // Four corners around 0 have no distance; if they do, rounding has the word.
+        let nearer = square - nearest.dot(&last.difference) > WORTH * square;
+        if !nearer || simplex.len == 4 || step == MAX_STEPS {
             break;
         }
         simplex = simplex.with(last);
     }
-    Approach { x, y, n, corners: (last.x, last.y), common: None }
+    found
 }
 
 #[cfg(test)]

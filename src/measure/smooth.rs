@@ -9,7 +9,7 @@ use super::options::Options;
 use super::pose::Pose;
 use super::relation::{Relation, Verdict};
 use super::start::{Start, middle};
-use super::tangent::{Bend, Plane, Relative, Side, Step, bracket, moved};
+use super::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, Side, Step, bracket, moved};
 use super::vector::{M3, V3, add, apply, apply_transposed, basis, dot, subtract};
 use crate::body::Body;
 use crate::polynomial::{NumberJet, Scalar, Simd, WithSimd};
@@ -110,7 +110,8 @@ pub(super) struct Lost {
     pub(super) rounds: u32,
     /// A point that seems to lie in both, from the centre of A's normalization on, in A's frame, metres.
     pub(super) middle: Option<V3<f64>>,
-    /// Where Newton's method ended, so close to contact that doubles do not tell on which side.
+    /// Where Newton's method ended without a narrow bracket, which only twice the precision may give: near contact, where
+    /// doubles do not tell on which side, or where the normals do not agree well enough.
     pub(super) grazing: Option<Proven>,
 }
 
@@ -131,7 +132,8 @@ const MAX_ROUNDS: u32 = 8;
 /// Most evaluations from a cold start before another method takes over.
 pub(super) const SEEK_ROUNDS: u32 = 16;
 
-/// Evaluations from a cold start after which Newton's method should be near.
+/// Evaluations from a cold start after which Newton's method should be near, and any in an overlap after which a common point
+/// should be.
 const PATIENCE: u32 = 6;
 
 /// Length of a step relative to a body's size that counts as near.
@@ -152,8 +154,9 @@ pub(super) fn worth_a_bracket([of_x, of_y]: [f64; 2]) -> [f64; 2] {
     [WORTH_A_BRACKET * of_x.min(of_y); 2]
 }
 
-/// Longest move relative to a body's size that the linearization may mean anything for.
-const LONGEST: f64 = 0.25;
+/// Longest move relative to a body's size, be that in metres or in normalized coordinates, that the linearization may mean
+/// anything for.
+pub(super) const LONGEST: f64 = 0.25;
 
 /// The longest moves of a point of A and of a point of B, metres.
 #[inline(always)]
@@ -184,8 +187,9 @@ impl<R: Relation> WithSimd for Follow<'_, R> {
             return Err(Lost::after(0));
         }
         let relative = relation.relative(simd, a, b);
-        let limit = MAX_ROUNDS.min(options.max_iterations());
-        let correct = Correct::new(simd, a, b, active, &relative, relation, [limit, limit], options);
+        let most = MAX_ROUNDS.min(options.max_iterations());
+        let sides = (Side::at_home(simd, a, active[0]), Side::away(b, active[1], &relative));
+        let correct = Correct { sides, relation, patience: most, most, options, limits: limits(a, b) };
 
         // Prediction from the old jets at the new poses.
         let y = add::<S, f64>(apply::<S, f64>(&relative.rotation, trace.y), relative.origin);
@@ -220,7 +224,7 @@ pub(super) struct Seek<'a, R> {
     /// Where to begin instead, of smooth bodies.
     pub(super) from: Option<Start<f64>>,
     /// Most rounds.
-    pub(super) limit: u32,
+    pub(super) most: u32,
     /// Whose stop flag is polled.
     pub(super) options: &'a Options<'a>,
 }
@@ -231,7 +235,7 @@ impl<R: Relation> WithSimd for Seek<'_, R> {
     /// The proven answer with its trace, or what is left.
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Result<(Proven, Trace), Lost> {
-        let Self { a, b, relation, from, limit, options } = self;
+        let Self { a, b, relation, from, most, options } = self;
         let relative = relation.relative(simd, a, b);
         let (start, active) = match from {
             Some(start) => (start, [0; 2]),
@@ -240,9 +244,9 @@ impl<R: Relation> WithSimd for Seek<'_, R> {
                 (start, [a.outline().active(places[0]) as u8, b.outline().active(places[1]) as u8])
             }
         };
-        let patience = if from.is_some() { limit } else { PATIENCE };
-        let correct =
-            Correct::new(simd, a, b, active.map(usize::from), &relative, relation, [patience, limit], options);
+        let patience = if from.is_some() { most } else { PATIENCE };
+        let sides = (Side::at_home(simd, a, active[0].into()), Side::away(b, active[1].into(), &relative));
+        let correct = Correct { sides, relation, patience, most, options, limits: limits(a, b) };
         if relation.ends_at_contact() && dot::<S, f64>(start.n, subtract::<S, f64>(start.x, start.y)) < 0.0 {
             let middle = correct.middle(simd, start.x, start.y);
             if middle.is_some() {
@@ -260,30 +264,16 @@ impl<R: Relation> WithSimd for Seek<'_, R> {
 struct Correct<'a, R> {
     sides: (Side<'a, f64>, Side<'a, f64>),
     relation: R,
-    /// Rounds after which steps should be short, and most rounds.
-    rounds: [u32; 2],
+    /// Rounds after which steps should be short.
+    patience: u32,
+    /// Most rounds.
+    most: u32,
     options: &'a Options<'a>,
     /// Longest moves of x and of y, metres.
     limits: [f64; 2],
 }
 
-impl<'a, R: Relation> Correct<'a, R> {
-    #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
-    fn new<S: Simd>(
-        simd: S,
-        a: &'a Body,
-        b: &'a Body,
-        active: [usize; 2],
-        relative: &Relative<f64>,
-        relation: R,
-        rounds: [u32; 2],
-        options: &'a Options<'a>,
-    ) -> Self {
-        let sides = (Side::at_home(simd, a, active[0]), Side::away(b, active[1], relative));
-        Self { sides, relation, rounds, options, limits: limits(a, b) }
-    }
-
+impl<R: Relation> Correct<'_, R> {
     /// Curvature that counts as none, per metre.
     #[inline(always)]
     fn flattest(&self) -> f64 {
@@ -311,18 +301,18 @@ impl<'a, R: Relation> Correct<'a, R> {
         trace: &mut Trace,
     ) -> Result<Proven, Lost> {
         let (side_a, side_b) = &self.sides;
-        let [patience, limit] = self.rounds;
         let mut pace = Pace::default();
-        for rounds in 1..=limit {
+        for rounds in 1..=self.most {
             if self.options.stopped() {
                 return Err(Lost::after(rounds - 1));
             }
             let ((jet_a, inside_a), (jet_b, inside_b)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
             if !(inside_a && inside_b) {
                 // A step has led too far.
-                if rounds >= patience {
+                if rounds >= self.patience || !at.is_finite() {
                     return Err(Lost::after(rounds));
                 }
+                pace = Pace::default();
                 (at.x, at.y) =
                     (side_a.brought_near(simd, at.x, jet_a.value), side_b.brought_near(simd, at.y, jet_b.value));
                 continue;
@@ -334,16 +324,13 @@ impl<'a, R: Relation> Correct<'a, R> {
             let (of_a, of_b) = ((&a, &bend_a), (&b, &bend_b));
             let mut step = self.relation.newton(simd, of_a, of_b, &at.frame, difference, self.flattest());
             if !step.within(simd, worth_a_bracket(self.limits)) {
-                let of_a = side_a.relative_square(simd, &local_a, step.dx);
-                let length = of_a.max(side_b.relative_square(simd, &local_b, step.dy)).sqrt();
-                if rounds >= patience && !(length * f64::from(1_u32 << (rounds - patience)) <= NEARLY) {
+                let length = self.relative_length(simd, &step, (&local_a, &local_b));
+                let late = rounds.saturating_sub(self.patience);
+                if rounds >= self.patience && !(length * f64::from(1_u32 << late) <= NEARLY) {
                     return Err(Lost::after(rounds));
                 }
-                if length > LONGEST {
-                    step.shorten(LONGEST / length);
-                } else {
-                    pace.stretch(simd, &mut step, &at.frame);
-                }
+                pace.stretch(simd, &mut step, &at.frame);
+                self.shorten(simd, &mut step, (&local_a, &local_b));
                 at.advance(simd, &step);
                 continue;
             }
@@ -353,7 +340,12 @@ impl<'a, R: Relation> Correct<'a, R> {
             let next = subtract::<S, f64>(add::<S, f64>(difference, step.dx), step.dy);
             let found = bracket(simd, (side_a, &next_a), (side_b, &next_b), next);
             let settled = step.within(simd, self.limits.map(|limit| SETTLED * limit));
-            match self.relation.judge(simd, &found, &at.frame, next, settled) {
+            let verdict = match self.relation.judge(simd, &found, &at.frame, next) {
+                // No step is left to take: rounding keeps the bracket wide.
+                Verdict::Wide if settled && self.relation.ends_at_contact() => last_resort(&found),
+                verdict => verdict,
+            };
+            match verdict {
                 Verdict::Proven { lower, upper } => {
                     let x = moved::<S, f64>(at.x, add::<S, f64>(step.dx, found.to_a), &at.frame);
                     let y = moved::<S, f64>(at.y, add::<S, f64>(step.dy, found.to_b), &at.frame);
@@ -372,33 +364,49 @@ impl<'a, R: Relation> Correct<'a, R> {
                 }
                 Verdict::Wide => {
                     pace.stretch(simd, &mut step, &at.frame);
+                    self.shorten(simd, &mut step, (&local_a, &local_b));
                     at.advance(simd, &step);
                 }
                 Verdict::Overlap => {
                     let middle = self.middle(simd, at.x, at.y);
                     let deep = -next[2] > NEARLY * self.limits[0].min(self.limits[1]);
-                    if middle.is_none() && !settled {
-                        if deep && rounds >= PATIENCE {
-                            return Err(Lost::after(rounds));
-                        }
-                        at.advance(simd, &step);
-                        continue;
+                    if middle.is_some() || settled || deep && rounds >= PATIENCE {
+                        let grazing = (!deep).then(|| at.grazing(simd, &step, &found, trace.active, rounds));
+                        return Err(Lost { rounds, middle, grazing });
                     }
-                    let grazing = (!deep).then(|| Proven {
-                        lower: 0.0,
-                        upper: f64::INFINITY,
-                        x: moved::<S, f64>(at.x, step.dx, &at.frame),
-                        y: moved::<S, f64>(at.y, step.dy, &at.frame),
-                        n: apply_transposed::<S, f64>(&at.frame, found.normal),
-                        active: trace.active,
-                        multipliers: found.multipliers,
-                        rounds,
-                    });
-                    return Err(Lost { rounds, middle, grazing });
+                    pace = Pace::default();
+                    self.shorten(simd, &mut step, (&local_a, &local_b));
+                    at.advance(simd, &step);
                 }
             }
         }
-        Err(Lost::after(limit))
+        Err(Lost::after(self.most))
+    }
+
+    /// How long a step is in normalized coordinates, relative to the bodies' sizes there.
+    #[inline(always)]
+    fn relative_length<S: Simd>(&self, simd: S, step: &Step<f64>, (local_a, local_b): (&M3<f64>, &M3<f64>)) -> f64 {
+        let (side_a, side_b) = &self.sides;
+        side_a.relative_square(simd, local_a, step.dx).max(side_b.relative_square(simd, local_b, step.dy)).sqrt()
+    }
+
+    /// Takes only as much of a step as the linearization may mean anything for.
+    #[inline(always)]
+    fn shorten<S: Simd>(&self, simd: S, step: &mut Step<f64>, local: (&M3<f64>, &M3<f64>)) {
+        let length = self.relative_length(simd, step, local);
+        if length > LONGEST {
+            step.shorten(LONGEST / length);
+        }
+    }
+}
+
+/// What a bracket is good for that no step makes narrower.
+#[inline(always)]
+fn last_resort(found: &Bracket<f64>) -> Verdict {
+    if found.off <= ALIGNED && found.lower > 0.0 && found.upper.is_finite() {
+        Verdict::Proven { lower: found.lower, upper: found.upper }
+    } else {
+        Verdict::Overlap
     }
 }
 
@@ -447,6 +455,10 @@ struct Iterate {
 }
 
 impl Iterate {
+    fn is_finite(&self) -> bool {
+        [self.x, self.y, self.frame[2]].as_flattened().iter().all(|entry| entry.is_finite())
+    }
+
     /// Takes a step; the basis follows the normal.
     #[inline(always)]
     fn advance<S: Simd>(&mut self, simd: S, step: &Step<f64>) {
@@ -454,5 +466,20 @@ impl Iterate {
         self.y = moved::<S, f64>(self.y, step.dy, &self.frame);
         let turned = moved::<S, f64>(self.frame[2], [step.dn[0], step.dn[1], 0.0], &self.frame);
         self.frame = basis(simd, turned);
+    }
+
+    /// Where a step leads that doubles prove nothing narrow at; a lower bound is one all the same.
+    #[inline(always)]
+    fn grazing<S: Simd>(&self, _: S, step: &Step<f64>, found: &Bracket<f64>, active: [u8; 2], rounds: u32) -> Proven {
+        Proven {
+            lower: found.lower.max(0.0),
+            upper: f64::INFINITY,
+            x: moved::<S, f64>(self.x, step.dx, &self.frame),
+            y: moved::<S, f64>(self.y, step.dy, &self.frame),
+            n: apply_transposed::<S, f64>(&self.frame, found.normal),
+            active,
+            multipliers: found.multipliers,
+            rounds,
+        }
     }
 }

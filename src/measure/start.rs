@@ -25,6 +25,9 @@ const TURNS: usize = 2;
 /// Least distance that n is turned for, relative to the widths of the ellipsoids.
 const LEAST: f64 = 1e-3;
 
+/// A length that is lost in any other, but has a square.
+const TINY: f64 = 1e-150;
+
 /// Largest turn, as the largest component of the tangent.
 const MOST: f64 = 0.3;
 
@@ -35,7 +38,9 @@ pub(super) fn facing<S: Simd, N: Number<S>>(simd: S, a: &Body, b: &Body, relativ
     let shape_a = rows(simd, a.outline().shape());
     let shape_b = rows(simd, b.outline().shape());
     let shape_b = times_transposed(&times_transposed(&relative.rotation, &shape_b), &relative.rotation);
-    let mut n = normalized(simd, [-relative.origin[0], -relative.origin[1], -relative.origin[2]]);
+    // Where both centres coincide any direction will do.
+    let first = N::splat(simd, TINY) - relative.origin[0];
+    let mut n = normalized(simd, [first, -relative.origin[1], -relative.origin[2]]);
     for _ in 0..TURNS {
         let (u, v) = (apply(&shape_a, n), apply(&shape_b, n));
         let (wide_a, wide_b) = (dot(n, u).sqrt(), dot(n, v).sqrt());

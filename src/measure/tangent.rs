@@ -213,7 +213,8 @@ impl Side<'_, f64> {
             return v;
         }
         let degree = self.body.constraints()[self.active].polynomial.degree() as f64;
-        let fraction = fraction.min(value.powf(-1.0 / degree));
+        // Well inside the ball, or rounding would leave it outside.
+        let fraction = (0.97 * fraction).min(value.powf(-1.0 / degree));
         add_scaled::<S, f64>(self.origin, fraction, from)
     }
 

@@ -338,6 +338,39 @@ fn impossible_accuracy_is_admitted() {
 }
 
 #[test]
+fn every_iteration_limit_leaves_a_bracket() {
+    let (round, thin) = (Vector3::new(1.0, 0.7, 0.4), Vector3::new(1.0, 1.0, 0.01));
+    let bodies = [
+        Body::ellipsoid("ellipsoid", Vector3::zeros(), round).unwrap(),
+        Body::ellipsoid("disc", Vector3::zeros(), thin).unwrap(),
+        Body::superellipsoid("plate", Vector3::zeros(), thin, 8).unwrap(),
+        Body::cuboid("box", round).unwrap(),
+        Body::cylinder("needle", 0.01, 1.0).unwrap(),
+    ];
+    let mut wide = 0;
+    for seed in 0..200 {
+        let mut random = Seeded(7000 + seed);
+        let [a, b] = [0, 1].map(|_| &bodies[random.next() as usize % bodies.len()]);
+        let far = 2.0 * random.signed().abs();
+        let pose = random_pose(&mut random, far);
+        let fine = cold(a, &Pose::identity(), b, &pose);
+        for limit in 1..60 {
+            let options = Options::default().with_max_iterations(limit).unwrap();
+            let mut warm = WarmStart::default();
+            // Cold, and from what that left.
+            for _ in 0..2 {
+                let found = distance(a, &Pose::identity(), b, &pose, &options, &mut warm);
+                let label = format!("seed {seed} limit {limit}: {found:?} against {fine:?}");
+                assert!(0.0 <= found.lower && found.lower <= found.upper && found.upper.is_finite(), "{label}");
+                assert!(found.lower <= fine.upper && fine.lower <= found.upper, "{label}");
+                wide += usize::from(found.status == Status::BracketWide);
+            }
+        }
+    }
+    assert!(wide > 500, "{wide}");
+}
+
+#[test]
 fn poses_are_normalised_or_refused() {
     let none = Vector3::zeros();
     assert!(Pose::from_quaternion(none, [0.0, 0.0, 0.0, 1.0 + 9e-7]).is_ok());

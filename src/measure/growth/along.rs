@@ -122,14 +122,7 @@ impl Relation for Along {
     /// With `H = H_A(n) + H_B(-n)`, which the bracket of the distance bounds, and a point w of the difference of the bodies,
     /// the two bounds at the head of [`super`].
     #[inline(always)]
-    fn judge<S: Simd>(
-        &self,
-        _: S,
-        found: &Bracket<f64>,
-        frame: &M3<f64>,
-        difference: V3<f64>,
-        _settled: bool,
-    ) -> Verdict {
+    fn judge<S: Simd>(&self, _: S, found: &Bracket<f64>, frame: &M3<f64>, difference: V3<f64>) -> Verdict {
         let delta = apply::<S, f64>(frame, self.delta);
         let gap = self.square.sqrt();
         let delta_error = self.delta_error + SLACK * gap;

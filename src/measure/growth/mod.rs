@@ -131,8 +131,8 @@ pub(super) fn between(
         }
     }
     if !options.exhausted(spent) {
-        let limit = SEEK_ROUNDS.min(options.max_iterations() - spent);
-        match dispatch(Seek { a, b, relation: along, from: None, limit, options }) {
+        let most = SEEK_ROUNDS.min(options.max_iterations() - spent);
+        match dispatch(Seek { a, b, relation: along, from: None, most, options }) {
             Ok((proven, trace)) => {
                 *warm = Hint::Smooth(trace).into();
                 let answer = along.answer(a, pose_a, pose_b, &proven);

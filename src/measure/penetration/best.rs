@@ -141,8 +141,8 @@ impl<'a> Best<'a> {
         if options.exhausted(self.iterations) {
             return false;
         }
-        let limit = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
-        match dispatch(Seek { a: pair.a.body, b: pair.b.body, relation, from: None, limit, options }) {
+        let most = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
+        match dispatch(Seek { a: pair.a.body, b: pair.b.body, relation, from: None, most, options }) {
             Ok((proven, trace)) => {
                 self.take(&proven, trace);
                 true

@@ -1,209 +1,28 @@
-//! Euclidean distance between two bodies.
+//! The search for a distance where continuation alone has not proven it: every method in turn, from the cheapest, each of them
+//! improving one bracket.
 
-use super::Status;
-use super::active::ActiveConstraints;
-use super::bracket::{Multipliers, distance_lower, distance_upper};
-use super::decide::Goal;
-use super::newton::{Active, DistanceNewton};
-use super::options::Options;
-use super::pair::{Pair, Posed};
-use super::pose::Pose;
-use super::programs::{Closest, Level, points};
-use super::relation::Apart;
-use super::sharp::SharpPair;
-use super::simplex::{Approach, approach};
-use super::smooth::{Follow, Lost, Proven, SEEK_ROUNDS, Seek, Trace};
-use super::start::Start;
-use super::twist::Twist;
-use super::union;
-use super::vector::V3;
-use super::warm::{Hint, WarmStart};
-use crate::body::{Body, MAX_CONSTRAINTS, Solid};
+use super::{Distance, split};
+use crate::measure::Status;
+use crate::measure::bracket::{Multipliers, distance_lower, distance_upper};
+use crate::measure::decide::{Goal, across};
+use crate::measure::newton::{Active, DistanceNewton};
+use crate::measure::options::Options;
+use crate::measure::pair::{Pair, Posed};
+use crate::measure::programs::{Closest, Level, points};
+use crate::measure::relation::Apart;
+use crate::measure::sharp::SharpPair;
+use crate::measure::simplex::{Approach, approach};
+use crate::measure::smooth::{Lost, Proven, SEEK_ROUNDS, Seek, Trace};
+use crate::measure::start::Start;
+use crate::measure::vector::V3;
+use crate::measure::warm::{Hint, WarmStart};
 use crate::optimize::minimise;
 use crate::polynomial::dispatch;
 use nalgebra::{SVector, Vector3};
 use std::ops::ControlFlow;
 
-/// Distance of two bodies with its proof, lengths in metres, vectors in the world frame.
-#[derive(Clone, Copy, Debug)]
-pub struct Distance {
-    /// How the solve ended.
-    pub status: Status,
-    /// Proven lower bound; 0 when the bodies are not proven apart.
-    pub lower: f64,
-    /// Proven upper bound, attained by the witnesses; 0 on overlap.
-    pub upper: f64,
-    /// A point of the first body.
-    pub witness_a: Vector3<f64>,
-    /// A point of the second body; on overlap the same common point.
-    pub witness_b: Vector3<f64>,
-    /// Unit normal from the second body to the first; none on overlap.
-    pub normal: Option<Vector3<f64>>,
-    /// Constraints of the first body, or of its part, that the answer rests on, with multipliers: `-n = Σ λ_i ∇g_i`; none on overlap.
-    pub active_a: ActiveConstraints,
-    /// Constraints of the second body, or of its part, that the answer rests on: `n = Σ λ_i ∇g_i`; none on overlap.
-    pub active_b: ActiveConstraints,
-    /// Which part of each solid the answer is about: positions in [`Solid::parts`], 0 for single bodies.
-    pub parts: [u16; 2],
-    /// Whether another pair of parts may be as near, their brackets meeting: normal, witnesses and gradients may then jump.
-    /// Never for single bodies, nor on overlap.
-    pub tied: bool,
-    /// Iterations of all methods together.
-    pub iterations: u32,
-}
-
-impl Default for Distance {
-    /// What is known of any two bodies: a place for an answer.
-    fn default() -> Self {
-        Self {
-            status: Status::BracketWide,
-            lower: 0.0,
-            upper: f64::INFINITY,
-            witness_a: Vector3::zeros(),
-            witness_b: Vector3::zeros(),
-            normal: None,
-            active_a: ActiveConstraints::default(),
-            active_b: ActiveConstraints::default(),
-            parts: [0, 0],
-            tied: false,
-            iterations: 0,
-        }
-    }
-}
-
-impl Distance {
-    /// The answer: the middle of the bracket.
-    pub fn value(&self) -> f64 {
-        0.5 * (self.lower + self.upper)
-    }
-
-    /// Derivatives with respect to the twists of the first and of the second body at the poses the distance was asked for
-    /// (envelope theorem: the witnesses count as fixed to their bodies). None unless the bodies are proven apart: at contact
-    /// the distance has no gradient, which is what [`super::signed_distance`] is for.
-    pub fn gradients(&self, pose_a: &Pose, pose_b: &Pose) -> Option<[Twist; 2]> {
-        let n = self.normal.filter(|_| self.lower > 0.0)?;
-        Some([
-            Twist::of_force(n, &self.witness_a, pose_a.translation()),
-            Twist::of_force(-n, &self.witness_b, pose_b.translation()),
-        ])
-    }
-}
-
-/// Euclidean distance between solid `a` at `pose_a` and solid `b` at `pose_b` (body to world), 0 when they touch or overlap;
-/// of solids with several parts, that of their closest parts.
-///
-/// The bracket is as narrow as `options` ask, or the status says that it is not.
-/// Far from contact minimises ½|x - y|²; near contact, where that loses its curvature, the point deepest in both bodies
-/// decides between overlap and a gap. `warm` is read and then replaced by the hint for the next query of this pair.
-///
-/// ```
-/// use nalgebra::Vector3;
-/// use sublevel::body::Body;
-/// use sublevel::measure::{Options, Pose, WarmStart, distance};
-///
-/// let ball = Body::ball("ball", Vector3::zeros(), 0.5)?;
-/// let crate_ = Body::cuboid("crate", Vector3::new(1.0, 1.0, 1.0))?;
-/// let apart = Pose::from_quaternion(Vector3::new(3.0, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0])?;
-/// let answer = distance(&crate_, &Pose::identity(), &ball, &apart, &Options::default(), &mut WarmStart::default());
-/// assert!((answer.value() - 1.5).abs() < 1e-8);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn distance(
-    a: &impl Solid,
-    pose_a: &Pose,
-    b: &impl Solid,
-    pose_b: &Pose,
-    options: &Options<'_>,
-    warm: &mut WarmStart,
-) -> Distance {
-    union::distance(a, pose_a, b, pose_b, &Goal::NARROW, options, warm)
-}
-
-/// Distance of two bodies, or as much of it as the goal needs.
-pub(super) fn between(
-    (a, pose_a): (&Body, &Pose),
-    (b, pose_b): (&Body, &Pose),
-    goal: &Goal,
-    options: &Options<'_>,
-    warm: &mut WarmStart,
-) -> Distance {
-    let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
-    let relation = Apart { pose_a, pose_b, goal, tolerance };
-    let mut lost = Lost::after(0);
-    let mut proven = None;
-    if let Hint::Smooth(trace) = &mut warm.hint {
-        match dispatch(Follow { a, b, relation, options, trace }) {
-            Ok(found) => proven = Some(found),
-            Err(left) => lost = left,
-        }
-    }
-    let still_overlapping = matches!(warm.hint, Hint::Overlap { .. }) && {
-        let pair = Pair::new(a, pose_a, b, pose_b);
-        matches!(&warm.hint, Hint::Overlap { point_a } if pair.common(&pair.a_to_query(point_a)))
-    };
-    // Where edges face each other no single constraint is to be followed.
-    let smooth = a.is_smooth() && b.is_smooth();
-    if proven.is_none() && smooth && !still_overlapping && !lost.touching() && !options.exhausted(lost.rounds) {
-        let limit = SEEK_ROUNDS.min(options.max_iterations() - lost.rounds);
-        match dispatch(Seek { a, b, relation, from: None, limit, options }) {
-            Ok((found, trace)) => {
-                *warm = Hint::Smooth(trace).into();
-                proven = Some(Proven { rounds: lost.rounds + found.rounds, ..found });
-            }
-            Err(left) => lost = Lost { rounds: lost.rounds + left.rounds, ..left },
-        }
-    }
-    match proven {
-        Some(proven) if proven.width() <= tolerance || goal.met(proven.lower, proven.upper) => {
-            proven.answer(a, pose_a, tolerance)
-        }
-        Some(proven) => sharpened((a, pose_a), (b, pose_b), goal, options, &proven),
-        None => {
-            let pair = Pair::new(a, pose_a, b, pose_b);
-            let mut search = Search::new(&pair, goal, options);
-            search.take_over(&lost);
-            if !search.decided() {
-                search.run(&warm.hint);
-            }
-            *warm = search.hint();
-            search.answer()
-        }
-    }
-}
-
-/// A proven answer that rounding keeps wide, gone on with in twice the precision.
-#[cold]
-fn sharpened(
-    (a, pose_a): (&Body, &Pose),
-    (b, pose_b): (&Body, &Pose),
-    goal: &Goal,
-    options: &Options<'_>,
-    proven: &Proven,
-) -> Distance {
-    let pair = Pair::new(a, pose_a, b, pose_b);
-    let mut search = Search::new(&pair, goal, options);
-    search.iterations = proven.rounds;
-    search.resume(proven);
-    search.sharpen();
-    search.answer()
-}
-
-/// The point of B nearest to A in the query frame and the constraints that are active there; on overlap a common point, and
-/// none.
-pub(super) fn nearest(
-    pair: &Pair<'_>,
-    options: &Options<'_>,
-    iterations: &mut u32,
-) -> (Vector3<f64>, Option<(Active, Active)>) {
-    let mut search = Search::new(pair, &Goal::NARROW, options);
-    search.iterations = *iterations;
-    search.run(&Hint::Cold);
-    *iterations = search.iterations;
-    (search.y, (search.upper > 0.0).then_some(search.active))
-}
-
 /// A solve in progress: the best bracket so far and where it was attained, in query units.
-struct Search<'a> {
+pub(super) struct Search<'a> {
     pair: &'a Pair<'a>,
     options: &'a Options<'a>,
     tolerance: f64,
@@ -236,7 +55,8 @@ const DEEPER: f64 = 1e-6;
 const STEEP: f64 = 1e3;
 
 impl<'a> Search<'a> {
-    fn new(pair: &'a Pair<'a>, goal: &'a Goal, options: &'a Options<'a>) -> Self {
+    /// A search that knows nothing yet, after that many iterations.
+    pub(super) fn new(pair: &'a Pair<'a>, goal: &'a Goal, options: &'a Options<'a>, iterations: u32) -> Self {
         let (x, y) = (pair.a.interior, pair.b.interior);
         let n = (x - y).try_normalize(0.0).unwrap_or_else(Vector3::x);
         Self {
@@ -252,7 +72,7 @@ impl<'a> Search<'a> {
             active: (Active::default(), Active::default()),
             trace: None,
             tried: [None; 2],
-            iterations: 0,
+            iterations,
         }
     }
 
@@ -266,7 +86,7 @@ impl<'a> Search<'a> {
     }
 
     /// Whether the bracket is narrow enough and says on which side of contact the bodies are.
-    fn decided(&self) -> bool {
+    pub(super) fn decided(&self) -> bool {
         self.done() && (self.lower > 0.0 || self.upper == 0.0)
     }
 
@@ -275,10 +95,13 @@ impl<'a> Search<'a> {
         self.done() || self.options.exhausted(self.iterations)
     }
 
-    fn run(&mut self, hint: &Hint) {
+    pub(super) fn run(&mut self, hint: &Hint) {
+        self.narrow_down(hint);
+        self.attain_any();
+    }
+
+    fn narrow_down(&mut self, hint: &Hint) {
         if self.options.exhausted(self.iterations) {
-            // Any pair of points is an answer.
-            self.attain(&self.pair.a.interior.clone_owned(), &self.pair.b.interior.clone_owned());
             return;
         }
         match hint {
@@ -289,10 +112,8 @@ impl<'a> Search<'a> {
                     self.newton(self.pair.a_to_query(x_a), self.pair.b_to_query(y_b), *normal_a, a, b);
                 }
             }
-            Hint::Overlap { point_a } => {
-                self.common(&self.pair.a_to_query(point_a));
-            }
             Hint::Cold
+            | Hint::Overlap { .. }
             | Hint::Level { .. }
             | Hint::LevelSmooth(_)
             | Hint::Saturated
@@ -360,8 +181,8 @@ impl<'a> Search<'a> {
         let center = pair.a.body.normalization().center;
         let from_center = |v: &Vector3<f64>| (pair.to_a(v) - center).into();
         let from = Some(Start { x: from_center(x), y: from_center(y), n: (*n).into() });
-        let limit = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
-        match dispatch(Seek { a: pair.a.body, b: pair.b.body, relation, from, limit, options }) {
+        let most = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
+        match dispatch(Seek { a: pair.a.body, b: pair.b.body, relation, from, most, options }) {
             Ok((proven, trace)) => {
                 self.iterations += proven.rounds;
                 self.resume(&proven);
@@ -370,13 +191,15 @@ impl<'a> Search<'a> {
                     self.sharpen();
                 }
             }
-            Err(lost) => self.take_over(&lost),
+            Err(lost) => {
+                self.iterations += lost.rounds;
+                self.take_over(&lost);
+            }
         }
     }
 
     /// Goes on from what continuation has left: near contact in twice the precision.
-    fn take_over(&mut self, lost: &Lost) {
-        self.iterations += lost.rounds;
+    pub(super) fn take_over(&mut self, lost: &Lost) {
         let pair = self.pair;
         let center = pair.a.body.normalization().center;
         let to_query = |v: V3<f64>| pair.a_to_query(&(center + Vector3::from(v)));
@@ -389,8 +212,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Takes the bracket of continuation and where it was attained.
-    fn resume(&mut self, proven: &Proven) {
+    /// Takes what is better in the bracket of continuation, and where that ended as a start.
+    pub(super) fn resume(&mut self, proven: &Proven) {
         let pair = self.pair;
         let (unit, center) = (pair.unit(), pair.a.body.normalization().center);
         let to_query = |v: V3<f64>| pair.a_to_query(&(center + Vector3::from(v)));
@@ -401,24 +224,37 @@ impl<'a> Search<'a> {
             active
         });
         let (x, y, n) = (to_query(proven.x), to_query(proven.y), Vector3::from(proven.n));
-        (self.lower, self.upper) = (proven.lower / unit, proven.upper / unit);
-        (self.x, self.y, self.n, self.active) = (x, y, n, (a, b));
+        let raised = self.raise(proven.lower / unit, &n);
+        if raised | self.take(proven.upper / unit, x, y) {
+            self.active = (a, b);
+        }
         self.tried[0] = Some(DistanceNewton { x, y, distance: n.dot(&(x - y)), n, a, b });
     }
 
+    /// The interior points as an answer where nothing better was attained: early ends leave a bracket, too.
+    pub(super) fn attain_any(&mut self) {
+        let (pair, (pose_a, pose_b)) = (self.pair, self.pair.poses());
+        if self.upper.is_infinite() {
+            // Proven in the bodies' own frames: however far away bodies are, this one is finite.
+            let (of_a, of_b) = (pair.a.body.interior_point(), pair.b.body.interior_point());
+            let (_, apart, error) = across((pose_a, of_a), (pose_b, of_b));
+            let upper = (apart + error) * (1.0 + f64::EPSILON) / pair.unit();
+            self.take(upper, pair.a.interior, pair.b.interior);
+        }
+    }
+
     /// Goes on in twice the precision where rounding keeps the bracket wide.
-    fn sharpen(&mut self) {
+    pub(super) fn sharpen(&mut self) {
         let pair = self.pair;
         let sharp = SharpPair::new(pair);
-        for start in self.tried.into_iter().flatten() {
+        // Once each: from the same start it would end the same.
+        while let Some(start) = self.tried.iter_mut().find_map(Option::take) {
             let left = self.options.max_iterations() - self.iterations.min(self.options.max_iterations());
             let steps = sharp.distance(&start, left, |found| {
                 if self.raise(found.lower, &found.n) {
                     self.active = found.active;
                 }
-                if found.upper < self.upper {
-                    (self.upper, self.x, self.y) = (found.upper, found.x, found.y);
-                }
+                self.take(found.upper, found.x, found.y);
                 self.decided() || self.options.stopped()
             });
             self.iterations += steps;
@@ -541,7 +377,7 @@ impl<'a> Search<'a> {
             if raised | self.attain(&at.x, &at.y) {
                 self.active = (at.a, at.b);
             }
-            self.done() || self.options.exhausted(0)
+            self.done() || self.options.stopped()
         });
         self.iterations += steps;
         self.tried[1] = Some(newton);
@@ -575,7 +411,11 @@ impl<'a> Search<'a> {
     /// Pulls trial points into their bodies and takes them if they are the closest so far.
     fn attain(&mut self, x: &Vector3<f64>, y: &Vector3<f64>) -> bool {
         let (Some(x), Some(y)) = (self.pair.a.pull_in(x), self.pair.b.pull_in(y)) else { return false };
-        let upper = distance_upper(self.pair, &x, &y);
+        self.take(distance_upper(self.pair, &x, &y), x, y)
+    }
+
+    /// Takes an upper bound and the points that attain it if it is the best so far.
+    fn take(&mut self, upper: f64, x: Vector3<f64>, y: Vector3<f64>) -> bool {
         let better = upper < self.upper;
         if better {
             (self.upper, self.x, self.y) = (upper, x, y);
@@ -584,7 +424,7 @@ impl<'a> Search<'a> {
     }
 
     /// Whether v is proven to lie in both bodies; if so the answer is 0.
-    fn common(&mut self, v: &Vector3<f64>) -> bool {
+    pub(super) fn common(&mut self, v: &Vector3<f64>) -> bool {
         let both = self.pair.common(v);
         if both {
             (self.lower, self.upper, self.x, self.y) = (0.0, 0.0, *v, *v);
@@ -592,7 +432,16 @@ impl<'a> Search<'a> {
         both
     }
 
-    fn hint(&self) -> WarmStart {
+    pub(super) fn iterations(&self) -> u32 {
+        self.iterations
+    }
+
+    /// The nearest point of B and the constraints that are active there; on overlap a common point, and none.
+    pub(super) fn nearest(&self) -> (Vector3<f64>, Option<(Active, Active)>) {
+        (self.y, (self.upper > 0.0).then_some(self.active))
+    }
+
+    pub(super) fn hint(&self) -> WarmStart {
         if self.upper == 0.0 {
             Hint::Overlap { point_a: self.pair.to_a(&self.x) }.into()
         } else if let Some(trace) = self.trace() {
@@ -612,7 +461,7 @@ impl<'a> Search<'a> {
         Some(Trace::new(self.pair.a.body, &x, self.pair.b.body, &y, &self.n, active))
     }
 
-    fn answer(&self) -> Distance {
+    pub(super) fn answer(&self) -> Distance {
         let unit = self.pair.unit();
         let witness_a = self.pair.to_world(&self.x);
         let (witness_b, normal) = if self.upper == 0.0 {
@@ -647,39 +496,6 @@ impl<'a> Search<'a> {
         };
         outward(&self.pair.b, &self.y) - outward(&self.pair.a, &self.x)
     }
-}
-
-impl Proven {
-    fn width(&self) -> f64 {
-        self.upper - self.lower
-    }
-
-    fn answer(&self, a: &Body, pose_a: &Pose, tolerance: f64) -> Distance {
-        let (witness_a, witness_b) = self.witnesses(a, pose_a);
-        Distance {
-            status: if self.width() <= tolerance { Status::Converged } else { Status::BracketWide },
-            lower: self.lower,
-            upper: self.upper,
-            witness_a,
-            witness_b,
-            normal: self.normal(pose_a),
-            active_a: ActiveConstraints::single(self.active[0], self.multipliers[0]),
-            active_b: ActiveConstraints::single(self.active[1], self.multipliers[1]),
-            parts: [0, 0],
-            tied: false,
-            iterations: self.rounds,
-        }
-    }
-}
-
-/// Splits the multipliers of a program's rows into those of A and of B, times `factor`.
-pub(super) fn split(pair: &Pair<'_>, rows: &[f64], factor: f64) -> (Multipliers, Multipliers) {
-    let (mut of_a, mut of_b) = ([0.0; MAX_CONSTRAINTS], [0.0; MAX_CONSTRAINTS]);
-    let (first, second) = rows.split_at(pair.a.len());
-    for (to, from) in of_a.iter_mut().zip(first).chain(of_b.iter_mut().zip(second)) {
-        *to = from * factor;
-    }
-    (of_a, of_b)
 }
 
 /// Of three points the one of the least value.

@@ -1,0 +1,236 @@
+//! Euclidean distance between two bodies.
+
+mod search;
+
+use super::Status;
+use super::active::ActiveConstraints;
+use super::bracket::Multipliers;
+use super::decide::Goal;
+use super::newton::Active;
+use super::options::Options;
+use super::pair::Pair;
+use super::pose::Pose;
+use super::relation::Apart;
+use super::smooth::{Follow, Lost, Proven, SEEK_ROUNDS, Seek};
+use super::twist::Twist;
+use super::union;
+use super::warm::{Hint, WarmStart};
+use crate::body::{Body, MAX_CONSTRAINTS, Solid};
+use crate::polynomial::dispatch;
+use nalgebra::Vector3;
+use search::Search;
+
+/// Distance of two bodies with its proof, lengths in metres, vectors in the world frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Distance {
+    /// How the solve ended.
+    pub status: Status,
+    /// Proven lower bound; 0 when the bodies are not proven apart.
+    pub lower: f64,
+    /// Proven upper bound, attained by the witnesses; 0 on overlap.
+    pub upper: f64,
+    /// A point of the first body.
+    pub witness_a: Vector3<f64>,
+    /// A point of the second body; on overlap the same common point.
+    pub witness_b: Vector3<f64>,
+    /// Unit normal from the second body to the first; none on overlap.
+    pub normal: Option<Vector3<f64>>,
+    /// Constraints of the first body, or of its part, that the answer rests on, with multipliers: `-n = Σ λ_i ∇g_i`; none on overlap.
+    pub active_a: ActiveConstraints,
+    /// Constraints of the second body, or of its part, that the answer rests on: `n = Σ λ_i ∇g_i`; none on overlap.
+    pub active_b: ActiveConstraints,
+    /// Which part of each solid the answer is about: positions in [`Solid::parts`], 0 for single bodies.
+    pub parts: [u16; 2],
+    /// Whether another pair of parts may be as near, their brackets meeting: normal, witnesses and gradients may then jump.
+    /// Never for single bodies, nor on overlap.
+    pub tied: bool,
+    /// Iterations of all methods together.
+    pub iterations: u32,
+}
+
+impl Default for Distance {
+    /// What is known of any two bodies: a place for an answer.
+    fn default() -> Self {
+        Self {
+            status: Status::BracketWide,
+            lower: 0.0,
+            upper: f64::INFINITY,
+            witness_a: Vector3::zeros(),
+            witness_b: Vector3::zeros(),
+            normal: None,
+            active_a: ActiveConstraints::default(),
+            active_b: ActiveConstraints::default(),
+            parts: [0, 0],
+            tied: false,
+            iterations: 0,
+        }
+    }
+}
+
+impl Distance {
+    /// The answer: the middle of the bracket.
+    pub fn value(&self) -> f64 {
+        0.5 * (self.lower + self.upper)
+    }
+
+    /// Derivatives with respect to the twists of the first and of the second body at the poses the distance was asked for
+    /// (envelope theorem: the witnesses count as fixed to their bodies). None unless the bodies are proven apart: at contact
+    /// the distance has no gradient, which is what [`super::signed_distance`] is for.
+    pub fn gradients(&self, pose_a: &Pose, pose_b: &Pose) -> Option<[Twist; 2]> {
+        let n = self.normal.filter(|_| self.lower > 0.0)?;
+        Some([
+            Twist::of_force(n, &self.witness_a, pose_a.translation()),
+            Twist::of_force(-n, &self.witness_b, pose_b.translation()),
+        ])
+    }
+}
+
+/// Euclidean distance between solid `a` at `pose_a` and solid `b` at `pose_b` (body to world), 0 when they touch or overlap;
+/// of solids with several parts, that of their closest parts.
+///
+/// The bracket is as narrow as `options` ask, or the status says that it is not.
+/// Newton's method finds the points with opposite normals along their difference: on from the last answer if `warm` has one,
+/// else from where samples of both surfaces face each other. Where that fails an interior-point method minimises ½|x - y|²;
+/// near contact, where that loses its curvature, the point deepest in both bodies decides between overlap and a gap.
+/// `warm` is read and then replaced by the hint for the next query of this pair.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use sublevel::body::Body;
+/// use sublevel::measure::{Options, Pose, WarmStart, distance};
+///
+/// let ball = Body::ball("ball", Vector3::zeros(), 0.5)?;
+/// let crate_ = Body::cuboid("crate", Vector3::new(1.0, 1.0, 1.0))?;
+/// let apart = Pose::from_quaternion(Vector3::new(3.0, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0])?;
+/// let answer = distance(&crate_, &Pose::identity(), &ball, &apart, &Options::default(), &mut WarmStart::default());
+/// assert!((answer.value() - 1.5).abs() < 1e-8);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn distance(
+    a: &impl Solid,
+    pose_a: &Pose,
+    b: &impl Solid,
+    pose_b: &Pose,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> Distance {
+    union::distance(a, pose_a, b, pose_b, &Goal::NARROW, options, warm)
+}
+
+/// Distance of two bodies, or as much of it as the goal needs.
+pub(super) fn between(
+    (a, pose_a): (&Body, &Pose),
+    (b, pose_b): (&Body, &Pose),
+    goal: &Goal,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> Distance {
+    let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
+    if let Hint::Overlap { point_a } = &warm.hint {
+        let pair = Pair::new(a, pose_a, b, pose_b);
+        let mut search = Search::new(&pair, goal, options, 0);
+        if search.common(&pair.a_to_query(point_a)) {
+            return search.answer();
+        }
+    }
+    let relation = Apart { pose_a, pose_b, goal, tolerance };
+    let mut lost = Lost::after(0);
+    let mut proven = None;
+    if let Hint::Smooth(trace) = &mut warm.hint {
+        match dispatch(Follow { a, b, relation, options, trace }) {
+            Ok(found) => proven = Some(found),
+            Err(left) => lost = left,
+        }
+    }
+    // Where edges face each other no single constraint is to be followed.
+    let smooth = a.is_smooth() && b.is_smooth();
+    if proven.is_none() && smooth && !lost.touching() && !options.exhausted(lost.rounds) {
+        let most = SEEK_ROUNDS.min(options.max_iterations() - lost.rounds);
+        match dispatch(Seek { a, b, relation, from: None, most, options }) {
+            Ok((found, trace)) => {
+                *warm = Hint::Smooth(trace).into();
+                proven = Some(Proven { rounds: lost.rounds + found.rounds, ..found });
+            }
+            Err(left) => lost = Lost { rounds: lost.rounds + left.rounds, ..left },
+        }
+    }
+    match proven {
+        Some(proven) if proven.width() <= tolerance || goal.met(proven.lower, proven.upper) => {
+            proven.answer(a, pose_a, tolerance)
+        }
+        Some(proven) => sharpened((a, pose_a), (b, pose_b), goal, options, &proven),
+        None => {
+            let pair = Pair::new(a, pose_a, b, pose_b);
+            let mut search = Search::new(&pair, goal, options, lost.rounds);
+            search.take_over(&lost);
+            if !search.decided() {
+                search.run(&warm.hint);
+            }
+            *warm = search.hint();
+            search.answer()
+        }
+    }
+}
+
+/// A proven answer that rounding keeps wide, gone on with in twice the precision.
+#[cold]
+fn sharpened(
+    (a, pose_a): (&Body, &Pose),
+    (b, pose_b): (&Body, &Pose),
+    goal: &Goal,
+    options: &Options<'_>,
+    proven: &Proven,
+) -> Distance {
+    let pair = Pair::new(a, pose_a, b, pose_b);
+    let mut search = Search::new(&pair, goal, options, proven.rounds);
+    search.resume(proven);
+    search.sharpen();
+    search.attain_any();
+    search.answer()
+}
+
+/// The point of B nearest to A in the query frame and the constraints that are active there; on overlap a common point, and
+/// none.
+pub(super) fn nearest(
+    pair: &Pair<'_>,
+    options: &Options<'_>,
+    iterations: &mut u32,
+) -> (Vector3<f64>, Option<(Active, Active)>) {
+    let mut search = Search::new(pair, &Goal::NARROW, options, *iterations);
+    search.run(&Hint::Cold);
+    *iterations = search.iterations();
+    search.nearest()
+}
+
+impl Proven {
+    fn width(&self) -> f64 {
+        self.upper - self.lower
+    }
+
+    fn answer(&self, a: &Body, pose_a: &Pose, tolerance: f64) -> Distance {
+        let (witness_a, witness_b) = self.witnesses(a, pose_a);
+        Distance {
+            status: if self.width() <= tolerance { Status::Converged } else { Status::BracketWide },
+            lower: self.lower,
+            upper: self.upper,
+            witness_a,
+            witness_b,
+            normal: self.normal(pose_a),
+            active_a: ActiveConstraints::single(self.active[0], self.multipliers[0]),
+            active_b: ActiveConstraints::single(self.active[1], self.multipliers[1]),
+            parts: [0, 0],
+            tied: false,
+            iterations: self.rounds,
+        }
+    }
+}
+
+/// Splits the multipliers of a program's rows into those of A and of B, times `factor`.
+pub(super) fn split(pair: &Pair<'_>, rows: &[f64], factor: f64) -> (Multipliers, Multipliers) {
+    let (mut of_a, mut of_b) = ([0.0; MAX_CONSTRAINTS], [0.0; MAX_CONSTRAINTS]);
+    let (first, second) = rows.split_at(pair.a.len());
+    for (to, from) in of_a.iter_mut().zip(first).chain(of_b.iter_mut().zip(second)) {
+        *to = from * factor;
+    }
+    (of_a, of_b)
+}
