@@ -1,6 +1,6 @@
-//! Newton's method on the optimality systems, for a given set of active constraints.
+//! Newton's method on the optimality system of the distance, for a given set of active constraints.
 //!
-//! Distance, regular through contact: the unknowns are x, y, the distance D, the normal n and multipliers λ of A, μ of B, with
+//! Regular through contact: the unknowns are x, y, the distance D, the normal n and multipliers λ of A, μ of B, with
 //! `u = Σ λ_i ∇g_i(x)` and `w = Σ μ_j ∇h_j(y)`:
 //!
 //! ```text
@@ -10,16 +10,10 @@
 //! The normal is an unknown of its own, although u and w say what it is: those of thin bodies turn so fast with the point that
 //! Newton's method goes astray by them from where it converges so (Albersmeyer and Diehl, The lifted Newton method and its
 //! application in optimization, SIAM J. Optimization 20, 2010).
-//!
-//! Level distance: the unknowns are x, s and the multipliers:
-//!
-//! ```text
-//! Σ ν_i ∇g_i + Σ μ_j ∇h_j = 0,   Σ ν_i = 1,   g_i(x) = s,   h_j(x) = 1
-//! ```
 
 use super::active::{ActiveConstraints, MAX_ACTIVE};
 use super::bracket::Multipliers;
-use super::linear::{Augmented, MAX_UNKNOWNS, solve};
+use super::linear::solve;
 use super::pair::{Pair, Posed};
 use super::smooth::LONGEST;
 use super::warm::ActiveSet;
@@ -86,7 +80,7 @@ impl Active {
         while active.len < MAX_ACTIVE {
             let rest = (0..body.len()).filter(|i| !active.index[..active.len].contains(i));
             match rest.max_by(|&i, &j| values[i].total_cmp(&values[j])) {
-                Some(i) if values[i] > highest - AT => _ = active.push(i),
+                Some(i) if values[i] > highest - AT * highest.abs().max(1.0) => _ = active.push(i),
                 _ => break,
             }
         }
@@ -156,6 +150,15 @@ impl Active {
         }
     }
 
+    /// Drops the constraint with the most negative multiplier, be it the last one; whether there was one.
+    pub(super) fn drop_pulling(&mut self) -> bool {
+        let last = self.len == 1 && self.multiplier[0] < 0.0;
+        if last {
+            self.len = 0;
+        }
+        last || self.drop_negative()
+    }
+
     /// Least-squares multipliers of `Σ λ_i ∇g_i = target` at v. False if the gradients are dependent.
     pub(super) fn fit(&mut self, body: &Posed<'_>, v: &Vector3<f64>, target: &Vector3<f64>) -> bool {
         let gradients: [Vector3<f64>; MAX_ACTIVE] =
@@ -193,7 +196,7 @@ pub(super) struct At {
 }
 
 impl At {
-    fn new(body: &Posed<'_>, active: &Active, v: &Vector3<f64>) -> Self {
+    pub(super) fn new(body: &Posed<'_>, active: &Active, v: &Vector3<f64>) -> Self {
         let mut at = Self::default();
         for (k, (i, multiplier)) in active.iter().enumerate() {
             let jet = body.jet(i, v);
@@ -206,17 +209,17 @@ impl At {
     }
 }
 
-/// How far below the highest the value of a constraint may be that counts as active.
+/// How far below the highest the value of a constraint may be that counts as active, relative to that or to 1.
 const AT: f64 = 0.1;
 
 /// Largest number of Newton steps and of changes of the active set.
-const MAX_STEPS: u32 = 16;
+pub(super) const MAX_STEPS: u32 = 16;
 
 /// Longest Newton step, relative to the bodies, after which a bracket may be narrow: what remains is about its square.
-const WORTH_A_BRACKET: f64 = 1e-3;
+pub(super) const WORTH_A_BRACKET: f64 = 1e-3;
 
 /// Whether Newton's steps still shrink: fast near a solution, and those that do not are not near one.
-struct Pace {
+pub(super) struct Pace {
     last: f64,
     /// How often a short step was hardly shorter than the one before.
     stuck: u32,
@@ -224,10 +227,10 @@ struct Pace {
 
 impl Pace {
     /// Of steps towards a system that none has been taken towards yet.
-    const FIRST: Self = Self { last: f64::INFINITY, stuck: 0 };
+    pub(super) const FIRST: Self = Self { last: f64::INFINITY, stuck: 0 };
 
     /// Whether no step is worth taking after one of this length, relative to the bodies.
-    fn ends_with(&mut self, length: f64) -> bool {
+    pub(super) fn ends_with(&mut self, length: f64) -> bool {
         self.stuck += u32::from(length < WORTH_A_BRACKET && length > 0.9 * self.last);
         self.last = length;
         self.stuck == 2 || length < 1e-14
@@ -355,126 +358,5 @@ impl DistanceNewton {
             self.b.multiplier[k] += d[4 + la + k] * damping;
         }
         Some(length.max(dn.norm()))
-    }
-}
-
-/// Newton iterates of the level-distance system.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct LevelNewton {
-    pub(super) x: Vector3<f64>,
-    pub(super) a: Active,
-    pub(super) b: Active,
-}
-
-impl LevelNewton {
-    /// Iterates until `accept` takes one, they stop converging or `stop` says so after that many steps; returns the steps taken.
-    pub(super) fn run(
-        &mut self,
-        pair: &Pair<'_>,
-        stop: impl Fn(u32) -> bool,
-        mut accept: impl FnMut(&Self) -> bool,
-    ) -> u32 {
-        if self.a.len == 0 {
-            return 0;
-        }
-        let mut s = self.start(pair);
-        let mut pace = Pace::FIRST;
-        for step in 1..=MAX_STEPS {
-            if stop(step - 1) {
-                return step - 1;
-            }
-            let Some(length) = self.step(pair, &mut s) else {
-                // Where both are flat the system is singular, but the point at hand with its multipliers may do.
-                accept(self);
-                return step;
-            };
-            if (length < WORTH_A_BRACKET || step % 4 == 0) && accept(self) {
-                return step;
-            }
-            if length < WORTH_A_BRACKET || step % 4 == 0 {
-                let inactive = self.b.len == 1 && self.b.multiplier[0] < 0.0;
-                if inactive {
-                    self.b.len = 0;
-                }
-                let changed = inactive
-                    | self.a.drop_negative()
-                    | self.b.drop_negative()
-                    | self.a.violated(&pair.a, &self.x, s).is_some_and(|i| self.a.push(i))
-                    | self.b.violated(&pair.b, &self.x, 1.0).is_some_and(|i| self.b.push(i));
-                if changed {
-                    pace = Pace::FIRST;
-                    continue;
-                }
-            }
-            if pace.ends_with(length) {
-                return step;
-            }
-        }
-        MAX_STEPS
-    }
-
-    /// First multipliers: equal weights of A, and those of B that fit; returns the first s.
-    fn start(&mut self, pair: &Pair<'_>) -> f64 {
-        self.a.multiplier = [1.0 / self.a.len as f64; MAX_ACTIVE];
-        let a = At::new(&pair.a, &self.a, &self.x);
-        if !self.b.fit(&pair.b, &self.x, &-a.sum) {
-            self.b.len = 0;
-        }
-        a.value[..self.a.len].iter().sum::<f64>() / self.a.len as f64
-    }
-
-    /// Newton's matrix, as that of the distance; column `4 + la + lb` is left to the residuals.
-    pub(super) fn matrix(a: &At, b: &At, la: usize, lb: usize) -> Augmented {
-        let hessian = a.hessian + b.hessian;
-        let mut m: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
-        for i in 0..3 {
-            for j in 0..3 {
-                m[i][j] = hessian[(i, j)];
-            }
-            for k in 0..la {
-                m[i][4 + k] = a.gradient[k][i];
-                m[4 + k][i] = a.gradient[k][i];
-            }
-            for k in 0..lb {
-                m[i][4 + la + k] = b.gradient[k][i];
-                m[4 + la + k][i] = b.gradient[k][i];
-            }
-        }
-        for k in 0..la {
-            m[3][4 + k] = 1.0;
-            m[4 + k][3] = -1.0;
-        }
-        m
-    }
-
-    fn step(&mut self, pair: &Pair<'_>, s: &mut f64) -> Option<f64> {
-        let a = At::new(&pair.a, &self.a, &self.x);
-        let b = At::new(&pair.b, &self.b, &self.x);
-        let size = 4 + self.a.len + self.b.len;
-        let mut m = Self::matrix(&a, &b, self.a.len, self.b.len);
-        for i in 0..3 {
-            m[i][size] = -(a.sum[i] + b.sum[i]);
-        }
-        m[3][size] = 1.0;
-        for k in 0..self.a.len {
-            m[3][size] -= self.a.multiplier[k];
-            m[4 + k][size] = *s - a.value[k];
-        }
-        for k in 0..self.b.len {
-            m[4 + self.a.len + k][size] = 1.0 - b.value[k];
-        }
-        let d = solve(&mut m, size)?;
-        let dx = Vector3::new(d[0], d[1], d[2]);
-        let length = pair.b.relative_length(&dx);
-        let damping = (LONGEST / length).min(1.0);
-        self.x += dx * damping;
-        *s += d[3] * damping;
-        for k in 0..self.a.len {
-            self.a.multiplier[k] += d[4 + k] * damping;
-        }
-        for k in 0..self.b.len {
-            self.b.multiplier[k] += d[4 + self.a.len + k] * damping;
-        }
-        Some(length)
     }
 }

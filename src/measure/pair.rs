@@ -67,7 +67,22 @@ impl Posed<'_> {
 
     /// How long a step is in normalized coordinates, relative to the body's size there.
     pub(super) fn relative_length(&self, step: &Vector3<f64>) -> f64 {
-        (self.placement.linear() * step).norm() / self.body.trust().radius
+        self.normalized(step).norm() / self.body.trust().radius
+    }
+
+    /// The matrix of the square of a step's length in normalized coordinates.
+    pub(super) fn metric(&self) -> Matrix3<f64> {
+        self.placement.linear().tr_mul(self.placement.linear())
+    }
+
+    /// A step in normalized coordinates.
+    pub(super) fn normalized(&self, step: &Vector3<f64>) -> Vector3<f64> {
+        self.placement.linear() * step
+    }
+
+    /// A gradient in normalized coordinates as one in the query frame.
+    pub(super) fn pulled_back(&self, gradient: &Vector3<f64>) -> Vector3<f64> {
+        self.placement.linear().tr_mul(gradient)
     }
 
     /// Upper bound ρ of the distance from v, or a point within its displacement, to any point of the body.

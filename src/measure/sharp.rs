@@ -5,8 +5,9 @@
 //! with residuals of twice the precision (iterative refinement), and the same inequalities are evaluated there. Rounding then
 //! plays no part: what is left is how near the iterates are to the solution.
 
+use super::level::LevelNewton;
 use super::linear::{Augmented, MAX_UNKNOWNS, solve};
-use super::newton::{Active, At, DistanceNewton, LevelNewton};
+use super::newton::{Active, At, DistanceNewton};
 use super::pair::{Pair, Posed};
 use super::pose::Pose;
 use super::twofold::{Two, Twos, UNIT, apply, dot, doubles, minus, plus, product, times, transposed, twos};

@@ -3,6 +3,7 @@
 //! points that the outlines keep. Nothing is proven by it; it shows Newton's method where to begin and which constraints are active.
 
 use super::pair::Pair;
+use super::vector::{V3, apply_symmetric};
 use crate::body::Body;
 use crate::polynomial::Scalar;
 use nalgebra::{Matrix3, Vector3};
@@ -88,12 +89,20 @@ pub(super) struct Approach {
 
 /// Points of the outlines of A farthest along -n and of B farthest along n, query frame.
 pub(super) fn corners(pair: &Pair<'_>, n: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    let toward = |body: &Body, n: Vector3<f64>| {
-        let point = body.outline().point(body.outline().place::<_, f64>(Scalar, n.into()));
-        body.normalization().center + Vector3::from(point)
-    };
-    let (a, b) = (pair.a.body, pair.b.body);
-    (pair.a_to_query(&toward(a, -n)), pair.b_to_query(&toward(b, pair.direction_to_b(n))))
+    (pair.a_to_query(&farthest(pair.a.body, &-n)), farthest_b(pair, n))
+}
+
+/// Point of B's outline farthest along n, query frame.
+fn farthest_b(pair: &Pair<'_>, n: &Vector3<f64>) -> Vector3<f64> {
+    pair.b_to_query(&farthest(pair.b.body, &pair.direction_to_b(n)))
+}
+
+/// Point of a body's outline farthest along n, both in the body's frame: of bodies with edges one on the surface.
+fn farthest(body: &Body, n: &Vector3<f64>) -> Vector3<f64> {
+    let n: V3<f64> = (*n).into();
+    let cell = body.outline().cell::<_, f64>(Scalar, n);
+    let turned = if body.is_smooth() { apply_symmetric::<Scalar, f64>(&cell.turn, n) } else { [0.0; 3] };
+    body.normalization().center + Vector3::from(cell.point) + Vector3::from(turned)
 }
 
 /// The approach of two bodies, from a direction from B to A on.
@@ -103,6 +112,18 @@ pub(super) fn approach(pair: &Pair<'_>, n: &Vector3<f64>) -> Approach {
         Corner { x, y, difference: x - y }
     };
     gjk(WORTH * pair.a.radius.min(pair.b.radius).powi(2), n, support)
+}
+
+/// About where in B the polynomial of A is lowest, as A's normalized coordinates show it, in which it rises about as fast every
+/// way: the point of B's outline nearest to A's interior point, and the unit vector from there to it in those coordinates.
+pub(super) fn lowest(pair: &Pair<'_>) -> Approach {
+    let support = |n: &Vector3<f64>| {
+        let point = farthest_b(pair, &-pair.a.pulled_back(n));
+        Corner { x: point, y: point, difference: pair.a.normalized(&(point - pair.a.interior)) }
+    };
+    let first = pair.a.normalized(&(pair.b.interior - pair.a.interior));
+    let first = first.try_normalize(0.0).unwrap_or_else(Vector3::x);
+    gjk(WORTH * pair.a.body.trust().radius.powi(2), &first, support)
 }
 
 /// What is nearest to 0 of a convex set that is known by its support points along -n, from a direction n on; a distance whose

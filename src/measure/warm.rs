@@ -1,6 +1,6 @@
 //! Warm starts: what one answer tells the next query of the same pair.
 
-use super::level_smooth::LevelTrace;
+use super::level::LevelTrace;
 use super::pair::Pair;
 use super::smooth::Trace;
 use nalgebra::Vector3;

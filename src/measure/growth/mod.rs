@@ -19,6 +19,7 @@
 //! the left by duality, the right because a gauge is subadditive.
 
 mod along;
+mod portal;
 mod reach;
 #[cfg(test)]
 mod tests;
@@ -40,6 +41,7 @@ use crate::optimize::minimise_within;
 use crate::polynomial::{dispatch, gamma};
 use along::Along;
 use nalgebra::Vector3;
+use portal::{Corner, crossing};
 use reach::{ReachNewton, ReachProgram};
 use std::ops::ControlFlow;
 
@@ -131,7 +133,8 @@ pub(super) fn between(
         }
     }
     if !options.exhausted(spent) {
-        let most = SEEK_ROUNDS.min(options.max_iterations() - spent);
+        let most = if a.is_smooth() && b.is_smooth() { SEEK_ROUNDS } else { EDGED_ROUNDS };
+        let most = most.min(options.max_iterations() - spent);
         match dispatch(Seek { a, b, relation: along, from: None, most, options }) {
             Ok((proven, trace)) => {
                 *warm = Hint::Smooth(trace).into();
@@ -179,6 +182,9 @@ pub(super) fn between(
     }
     search.answer(pose_a, pose_b)
 }
+
+/// Rounds of continuation from a cold start of bodies with edges: it gets there fast or not at all.
+const EDGED_ROUNDS: u32 = 4;
 
 /// The bodies with their centres on top of each other, and the vector Δ between the centres where they really are; query
 /// units, in the frame of the first body.
@@ -282,7 +288,10 @@ impl Search<'_> {
                 self.newton(pair.a_to_query(x_a), pair.b_to_query(y_b), &-normal_a, a, b);
             }
         }
-        if !self.done() {
+        if !self.ended() {
+            self.outlined();
+        }
+        if !self.ended() {
             self.interior_point(f64::INFINITY);
         }
         if !self.ended() && !pair.smooth() {
@@ -290,6 +299,23 @@ impl Search<'_> {
         }
         if !self.ended() {
             self.interior_point(1.0);
+        }
+    }
+
+    /// Newton's method from where the ray leaves the difference of the outlines.
+    fn outlined(&mut self) {
+        let pair = self.frame.pair;
+        let support = |n: &Vector3<f64>| {
+            let (x, y) = corners(pair, &-n);
+            Corner { x, y, w: self.frame.w(&x, &y) }
+        };
+        let found = crossing(&(self.frame.delta / self.frame.gap), support);
+        for (x, y) in [(found.x, found.y), (found.x, found.corner.y), (found.corner.x, found.y)] {
+            let (a, b) = (Active::near(&pair.a, &x, &found.n), Active::near(&pair.b, &y, &-found.n));
+            self.newton(x, y, &found.n, a, b);
+            if self.ended() || pair.smooth() {
+                return;
+            }
         }
     }
 

@@ -10,15 +10,13 @@
 //! Σ λ_i ∇g_i(x) = n,   Σ μ_j ∇h_j(y) = -n,   n·u = 1.
 //! ```
 
-use crate::measure::active::MAX_ACTIVE;
-use crate::measure::linear::{Curvature, eliminate};
-use crate::measure::newton::Active;
+use crate::measure::newton::{Active, MAX_STEPS, Pace, WORTH_A_BRACKET};
 use crate::measure::options::Options;
 use crate::measure::pair::{Pair, Posed};
 use crate::measure::programs::near_boundary;
+use crate::measure::quadratic::{Jets, Quadratic};
 use crate::optimize::{Program, Row, Rows};
-use crate::polynomial::Jet;
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, Vector3, Vector4};
 
 /// The program in coordinates along u and across it, the same across for x and y: variables (a, p, q, b) with
 /// `x = center_a + a u + p v + q w`, `y = center_b + b u + p v + q w`, minimising b - a.
@@ -87,48 +85,10 @@ impl Program<4> for ReachProgram<'_> {
     }
 }
 
-/// The active constraints of one body at one point.
-struct Local {
-    jets: [Jet; MAX_ACTIVE],
-    len: usize,
-}
+/// Longest Newton step, relative to the bodies, that the linearization may mean anything for.
+const LONG: f64 = 0.5;
 
-impl Local {
-    fn new(body: &Posed<'_>, active: &Active, v: &Vector3<f64>) -> Self {
-        let blank = Jet { value: 0.0, gradient: Vector3::zeros(), hessian: Matrix3::zeros() };
-        let mut jets = [blank; MAX_ACTIVE];
-        for (jet, (i, _)) in jets.iter_mut().zip(active.iter()) {
-            *jet = body.jet(i, v);
-        }
-        Self { jets, len: active.len }
-    }
-
-    fn iter<'s>(&'s self, active: &'s Active) -> impl Iterator<Item = (&'s Jet, f64)> {
-        self.jets[..self.len].iter().zip(active.multiplier)
-    }
-
-    fn hessian(&self, active: &Active) -> Matrix3<f64> {
-        self.iter(active).fold(Matrix3::zeros(), |sum, (jet, multiplier)| sum + jet.hessian * multiplier)
-    }
-
-    fn gradient(&self, active: &Active) -> Vector3<f64> {
-        self.iter(active).fold(Vector3::zeros(), |sum, (jet, multiplier)| sum + jet.gradient * multiplier)
-    }
-}
-
-/// Largest number of Newton steps.
-const MAX_STEPS: u32 = 16;
-
-/// Longest Newton step, in query units, after which a bracket may be narrow: what remains is about its square.
-const WORTH_A_BRACKET: f64 = 1e-3;
-
-/// Most rows of the reduced system: ρ and three multipliers of each body.
-const MOST: usize = 1 + 2 * MAX_ACTIVE;
-
-/// Newton iterates of the optimality system; each step evaluates each active constraint once.
-///
-/// x and ρ carry the curvature of both bodies, `M = Σ λ_i ∇²g_i + Σ μ_j ∇²h_j`, and y follows x: what is left after M is one
-/// equation for ρ and one for each multiplier.
+/// Newton iterates of the program in x and ρ, with `y = x + offset - ρ u`.
 pub(super) struct ReachNewton {
     pub(super) x: Vector3<f64>,
     pub(super) y: Vector3<f64>,
@@ -137,7 +97,6 @@ pub(super) struct ReachNewton {
     pub(super) a: Active,
     pub(super) b: Active,
     u: Vector3<f64>,
-    offset: Vector3<f64>,
 }
 
 impl ReachNewton {
@@ -161,7 +120,8 @@ impl ReachNewton {
         let n = n / along;
         let finite = x.iter().chain(&y).chain(&n).all(|value| value.is_finite());
         let fits = finite && a.fit(&pair.a, &x, &n) && b.fit(&pair.b, &y, &-n);
-        fits.then_some(Self { x, y, n, a, b, u, offset })
+        let y = x + offset - u * (x + offset - y).dot(&u);
+        fits.then_some(Self { x, y, n, a, b, u })
     }
 
     /// Iterates until `accept` takes one, they stop converging or the options say so after `before` iterations and these;
@@ -173,7 +133,7 @@ impl ReachNewton {
         before: u32,
         mut accept: impl FnMut(&Self) -> bool,
     ) -> u32 {
-        let mut last = f64::INFINITY;
+        let mut pace = Pace::FIRST;
         for step in 1..=MAX_STEPS {
             if options.exhausted(before + step - 1) {
                 return step - 1;
@@ -187,83 +147,55 @@ impl ReachNewton {
             if (length < WORTH_A_BRACKET || step % 4 == 0) && accept(self) {
                 return step;
             }
-            if length < 1e-9 || step % 4 == 0 {
-                let changed = self.a.drop_negative()
-                    | self.b.drop_negative()
-                    | self.a.violated(&pair.a, &self.x, 1.0).is_some_and(|i| self.a.push(i))
-                    | self.b.violated(&pair.b, &self.y, 1.0).is_some_and(|i| self.b.push(i));
-                if !changed && (length > 0.9 * last || length < 1e-14) {
-                    return step;
-                }
+            if pace.ends_with(length) {
+                return step;
             }
-            last = length;
         }
         MAX_STEPS
     }
 
-    /// One Newton step; its length, or none if the system is singular.
+    /// One Newton step; its length relative to the bodies, or none if it leads nowhere.
     fn step(&mut self, pair: &Pair<'_>) -> Option<f64> {
-        let (a, b) = (Local::new(&pair.a, &self.a, &self.x), Local::new(&pair.b, &self.b, &self.y));
-        let (of_a, of_b) = (a.hessian(&self.a), b.hessian(&self.b));
-        let curvature = Curvature::new(&(of_a + of_b))?;
-        // y moves by dx + e - u dρ, with the part of e along u already in ρ.
-        let e = self.x - self.y + self.offset;
-        let e = e - self.u * e.dot(&self.u);
-        let (k, q) = (of_b * self.u, of_b * e);
-        let (c, d) = (curvature.solve(&k), curvature.solve(&q));
-        let (dx, drho) = if self.a.len == 1 && self.b.len == 1 {
-            self.reduced::<3>(&a, &b, &curvature, [&e, &k, &q, &c, &d])?
-        } else {
-            self.reduced::<MOST>(&a, &b, &curvature, [&e, &k, &q, &c, &d])?
+        let (of_a, of_b) = (Jets::new(&pair.a, &self.x), Jets::new(&pair.b, &self.y));
+        let (bent_a, bent_b) = (of_a.hessian(&self.a), of_b.hessian(&self.b));
+        let u = self.u;
+        let program = Quadratic {
+            hessian: self.joint(&bent_a, &bent_b),
+            cost: -Vector4::w(),
+            a: of_a.rows(1.0, |jet| (jet.gradient.push(0.0), 1.0 - jet.value)),
+            b: of_b.rows(1.0, |jet| (jet.gradient.push(-jet.gradient.dot(&u)), 1.0 - jet.value)),
+            free_of_b: false,
         };
-        let dy = dx + e - self.u * drho;
-        let length = dx.norm().max(dy.norm());
-        // Bodies have size 1 here: a longer step leaves where the linearization means anything.
-        let damping = (0.5 / length).min(1.0);
-        self.x += dx * damping;
-        self.y += dy * damping;
+        // y moves by dx - u dρ, but how far B's constraints let dρ go is not known before.
+        let short = |dx: &Vector3<f64>| pair.a.relative_length(dx) <= LONG;
+        let found = program.step(self.a, self.b, short, || self.stiffness(pair, &of_a, &of_b))?;
+        let (dx, dy) = (found.v.xyz(), found.v.xyz() - u * found.v.w);
+        let length = pair.a.relative_length(&dx).max(pair.b.relative_length(&dy));
+        let share = (LONG / length).min(1.0);
+        self.x += dx * share;
+        self.y += dy * share;
+        (self.a, self.b) = (found.a, found.b);
         // The linearized gradient at the new point: both bodies' are the same.
-        self.n = a.gradient(&self.a) + of_a * dx * damping;
+        self.n = of_a.gradient(&self.a) + bent_a * dx * share;
         length.is_finite().then_some(length)
     }
 
-    /// Solves for the multipliers (which it replaces), dx and dρ. N is 1 + the number of active constraints, or more.
-    fn reduced<const N: usize>(
-        &mut self,
-        a: &Local,
-        b: &Local,
-        curvature: &Curvature,
-        [e, k, q, c, d]: [&Vector3<f64>; 5],
-    ) -> Option<(Vector3<f64>, f64)> {
-        let mut m = [[0.0; N]; N];
-        let mut r = [0.0; N];
-        // Rows beyond the active constraints say that an unused unknown is 0.
-        (0..N).for_each(|i| m[i][i] = 1.0);
-        let jets =
-            || a.jets[..a.len].iter().zip([false; MAX_ACTIVE]).chain(b.jets[..b.len].iter().zip([true; MAX_ACTIVE]));
-        let mut columns = [Vector3::zeros(); N];
-        for (i, (jet, _)) in jets().enumerate() {
-            columns[i + 1] = curvature.solve(&jet.gradient);
-        }
-        // n·u = 1, seen from B.
-        (m[0][0], r[0]) = (self.u.dot(k) - k.dot(c), 1.0 + self.u.dot(q) - k.dot(d));
-        for (i, (jet, of_b)) in jets().enumerate() {
-            let g = &jet.gradient;
-            let (slope, shift) = if of_b { (self.u.dot(g), e.dot(g)) } else { (0.0, 0.0) };
-            m[0][i + 1] = g.dot(c) - slope;
-            m[i + 1][0] = g.dot(c) - slope;
-            for j in 0..a.len + b.len {
-                m[i + 1][j + 1] = -g.dot(&columns[j + 1]);
-            }
-            r[i + 1] = 1.0 - jet.value - shift + g.dot(d);
-        }
-        eliminate(&mut m, &mut r)?;
-        let mut dx = c * r[0] - d;
-        for (column, multiplier) in columns[1..].iter().zip(&r[1..]) {
-            dx -= column * *multiplier;
-        }
-        self.a.multiplier[..a.len].copy_from_slice(&r[1..=a.len]);
-        self.b.multiplier[..b.len].copy_from_slice(&r[a.len + 1..=a.len + b.len]);
-        Some((dx, r[0]))
+    /// The quadratic form of dx and dρ that is one of A of dx, and one of B of `dx - u dρ`.
+    fn joint(&self, of_a: &Matrix3<f64>, of_b: &Matrix3<f64>) -> Matrix4<f64> {
+        let mut m: Matrix4<f64> = (of_a + of_b).fixed_resize(0.0);
+        let turned = of_b * self.u;
+        m.fixed_view_mut::<3, 1>(0, 3).copy_from(&-turned);
+        m.fixed_view_mut::<1, 3>(3, 0).copy_from(&-turned.transpose());
+        m[(3, 3)] = self.u.dot(&turned);
+        m
+    }
+
+    /// What the Hessian is about of constraints with such gradients over lengths like those of the bodies.
+    fn stiffness(&self, pair: &Pair<'_>, of_a: &Jets, of_b: &Jets) -> Matrix4<f64> {
+        let stiff = |body: &Posed<'_>, gradient: Vector3<f64>| {
+            let (slope, radius) = (body.functional(&gradient).0.norm(), body.body.trust().radius);
+            body.metric() * (slope / radius)
+        };
+        self.joint(&stiff(&pair.a, of_a.gradient(&self.a)), &stiff(&pair.b, of_b.gradient(&self.b)))
     }
 }

@@ -201,6 +201,7 @@ fn gradients_are_the_derivatives_of_the_value() {
 
 #[test]
 fn limits_end_in_true_brackets() {
+    let mut wide = 0;
     for seed in 0..60 {
         let mut random = Seeded(4000 + seed);
         let (a, b) = (smooth(&mut random, "a"), smooth(&mut random, "b"));
@@ -213,7 +214,9 @@ fn limits_end_in_true_brackets() {
             let options = Options::default().with_max_iterations(limit).unwrap();
             let level = query(&options, &mut WarmStart::default());
             let label = format!("seed {seed} limit {limit}: {level:?} against {fine:?}");
-            assert_eq!(level.status, Status::BracketWide, "{label}");
+            let narrow = level.upper - level.lower <= options.accuracy() * level.upper.abs().max(1.0);
+            assert_eq!(level.status == Status::Converged, narrow, "{label}");
+            wide += usize::from(!narrow);
             assert!(level.iterations <= limit, "{label}");
             assert!(level.lower <= fine.upper && fine.lower <= level.upper, "{label}");
             assert!(level.upper.is_finite() && level.lower.is_finite(), "{label}");
@@ -230,6 +233,7 @@ fn limits_end_in_true_brackets() {
             assert!(level.lower <= fine.upper && fine.lower <= level.upper, "{label}");
         }
     }
+    assert!(wide > 60, "{wide}");
 }
 
 #[test]

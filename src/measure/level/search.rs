@@ -1,145 +1,25 @@
-//! Level distance `d(A‖B) = min p_A(x)` over x in B, p the largest constraint.
+//! The search for a level distance where continuation alone has not proven it: every method in turn, from the cheapest, each of
+//! them improving one bracket.
 
-use super::Status;
-use super::bracket::{Multipliers, level_lower};
-use super::distance::{self, split};
-use super::level_smooth::{FollowLevel, LevelProven, LevelTrace, Saturated};
-use super::newton::{Active, LevelNewton};
-use super::options::Options;
-use super::pair::Pair;
-use super::pose::Pose;
-use super::programs::Level;
-use super::sharp::SharpPair;
-use super::twist::Twist;
-use super::union;
-use super::warm::{Hint, WarmStart};
-use crate::body::{Body, MAX_CONSTRAINTS, Solid};
+use super::LevelDistance;
+use super::newton::LevelNewton;
+use super::smooth::{LevelTrace, Settled};
+use crate::body::MAX_CONSTRAINTS;
+use crate::measure::Status;
+use crate::measure::bracket::{Multipliers, level_lower};
+use crate::measure::distance::{self, split};
+use crate::measure::newton::Active;
+use crate::measure::options::Options;
+use crate::measure::pair::Pair;
+use crate::measure::pose::Pose;
+use crate::measure::programs::Level;
+use crate::measure::sharp::SharpPair;
+use crate::measure::simplex::Approach;
+use crate::measure::twist::Twist;
+use crate::measure::warm::Hint;
 use crate::optimize::minimise;
-use crate::polynomial::dispatch;
 use nalgebra::{SVector, Vector3};
 use std::ops::ControlFlow;
-
-/// Level distance with its proof; unit-free but for the witness.
-#[derive(Clone, Copy, Debug)]
-pub struct LevelDistance {
-    /// How the solve ended.
-    pub status: Status,
-    /// Proven lower bound.
-    pub lower: f64,
-    /// Proven upper bound, attained at the witness.
-    pub upper: f64,
-    /// A point of the second body where the first one's polynomial is at most `upper`; world frame, metres.
-    pub witness: Vector3<f64>,
-    /// How fast d falls as the level of the second body rises from 1: the sum of the multipliers of its constraints.
-    pub multiplier: f64,
-    /// Whether the second body holds the minimiser of the first one's polynomial: d is its minimum, the multiplier and all
-    /// derivatives are 0, and d says no more about depth.
-    pub saturated: bool,
-    /// Derivative of d with respect to the pose of the first body, 1/m and 1/rad: a twist (v, ω) changes d by `-g·v - ((x - t) × g)·ω`,
-    /// g the gradient of the first body's polynomial at the witness x (of several active constraints, weighted by their
-    /// multipliers) and t the translation.
-    pub gradient_a: Twist,
-    /// Derivative of d with respect to the pose of the second body: the same force the other way, about its own translation.
-    pub gradient_b: Twist,
-    /// Whether another pair of parts may be as low, their brackets meeting: witness, multiplier and gradients may then jump.
-    /// Never for single bodies.
-    pub tied: bool,
-    /// Iterations of all methods together.
-    pub iterations: u32,
-}
-
-impl LevelDistance {
-    /// The answer inside the bracket: the upper bound, which the witness attains.
-    pub fn value(&self) -> f64 {
-        self.upper
-    }
-}
-
-/// Level distance of `a` over `b`: the smallest value that the stored polynomial of `a` (the largest of its constraints)
-/// takes on `b`. Above 1 the bodies are apart, at 1 they touch, below 1 they overlap; it is not symmetric.
-///
-/// The bracket is as narrow as `options` ask, relative to `max(1, |d|)`, or the status says that it is not. When the minimiser of `a`'s
-/// polynomial lies in `b`, the answer is its minimum ([`Body::min_value`]) and says no more about depth. Derivatives are by the
-/// envelope theorem: at the minimiser x the gradients of both bodies balance, `g_a + μ g_b = 0`. `warm` is read and
-/// then replaced by the hint for the next query of this pair in this order.
-///
-/// Of solids with several parts it is the least over the pairs of parts, the polynomial of a union being the least of those
-/// of its parts: one part of `a` and the part of `b` where it is lowest, to which witness, multiplier and `saturated` belong.
-///
-/// ```
-/// use nalgebra::Vector3;
-/// use sublevel::body::{Body, Compound};
-/// use sublevel::measure::{Options, Pose, WarmStart, level_distance};
-///
-/// let ball = Body::ball("ball", Vector3::zeros(), 1.0)?;
-/// let apart = Pose::from_quaternion(Vector3::new(3.0, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0])?;
-/// let d = level_distance(&ball, &Pose::identity(), &ball, &apart, &Options::default(), &mut WarmStart::default());
-/// assert!((d.value() - 4.0).abs() < 1e-8); // |x|² is 4 at (2, 0, 0)
-/// assert!((d.gradient_b.linear - Vector3::new(4.0, 0.0, 0.0)).norm() < 1e-6); // and its slope there 4
-///
-/// let pair = Compound::new("pair", vec![ball.clone(), Body::ball("far", Vector3::new(0.0, 5.0, 0.0), 1.0)?])?;
-/// let e = level_distance(&pair, &Pose::identity(), &ball, &apart, &Options::default(), &mut WarmStart::default());
-/// assert!((e.value() - d.value()).abs() < 1e-8 && !e.tied);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn level_distance(
-    a: &impl Solid,
-    pose_a: &Pose,
-    b: &impl Solid,
-    pose_b: &Pose,
-    options: &Options<'_>,
-    warm: &mut WarmStart,
-) -> LevelDistance {
-    union::level_distance(a, pose_a, b, pose_b, options, warm)
-}
-
-/// Level distance of one body over another.
-pub(super) fn between(
-    a: &Body,
-    pose_a: &Pose,
-    b: &Body,
-    pose_b: &Pose,
-    options: &Options<'_>,
-    warm: &mut WarmStart,
-) -> LevelDistance {
-    let mut spent = 0;
-    match &mut warm.hint {
-        Hint::LevelSmooth(trace) => match dispatch(FollowLevel { a, pose_a, b, pose_b, options, trace }) {
-            Ok(proven) => return proven.answer(a, pose_a, pose_b),
-            Err(rounds) => spent = rounds,
-        },
-        Hint::Saturated => {
-            if let Some(answer) = saturated(a, pose_a, b, pose_b, options) {
-                return answer;
-            }
-        }
-        _ => {}
-    }
-    let pair = Pair::new(a, pose_a, b, pose_b);
-    let mut search = Search::new(&pair, options);
-    search.iterations = spent;
-    search.run(&warm.hint);
-    *warm = search.hint().into();
-    search.answer(pose_a, pose_b)
-}
-
-/// The answer where the interior point of `a` is proven to lie in `b` and what is known of the minimum is enough.
-fn saturated(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, options: &Options<'_>) -> Option<LevelDistance> {
-    let (lower, upper) = (a.trust().least, a.min_value());
-    let narrow = upper - lower <= options.accuracy() * upper.abs().max(1.0);
-    (narrow && dispatch(Saturated { a, pose_a, b, pose_b })).then(|| LevelDistance {
-        status: Status::Converged,
-        lower,
-        upper,
-        witness: pose_a.transform_point(a.interior_point()),
-        multiplier: 0.0,
-        saturated: true,
-        gradient_a: Twist::ZERO,
-        gradient_b: Twist::ZERO,
-        tied: false,
-        iterations: 0,
-    })
-}
 
 /// Most changes of scale; each is by a thousand, and values reach about 1e12 at degree 8.
 const MAX_ROUNDS: u32 = 6;
@@ -151,7 +31,7 @@ const STEEP: f64 = 1e3;
 const REFINED: f64 = 1e-3;
 
 /// A solve in progress: the best bracket so far and where it was attained, in query units.
-struct Search<'a> {
+pub(super) struct Search<'a> {
     pair: &'a Pair<'a>,
     options: &'a Options<'a>,
     /// Of the bracket that is being worked for.
@@ -172,8 +52,9 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(pair: &'a Pair<'a>, options: &'a Options<'a>) -> Self {
-        Self {
+    /// A search that knows nothing but a point of B yet, after that many iterations.
+    pub(super) fn new(pair: &'a Pair<'a>, options: &'a Options<'a>, iterations: u32) -> Self {
+        let mut search = Self {
             pair,
             options,
             accuracy: options.accuracy(),
@@ -185,8 +66,10 @@ impl<'a> Search<'a> {
             proven: pair.b.interior,
             refined: false,
             ended: None,
-            iterations: 0,
-        }
+            iterations,
+        };
+        search.attain(&pair.b.interior);
+        search
     }
 
     fn done(&self) -> bool {
@@ -197,13 +80,36 @@ impl<'a> Search<'a> {
         self.upper.is_finite() && self.upper - self.lower <= accuracy * self.upper.abs().max(1.0)
     }
 
-    fn run(&mut self, hint: &Hint) {
+    /// Goes on in twice the precision from where continuation has ended.
+    pub(super) fn resume(&mut self, settled: &Settled) {
+        let [mut a, mut b] = settled.active.map(|i| {
+            let mut active = Active::default();
+            active.push(usize::from(i));
+            active
+        });
+        (a.multiplier[0], b.multiplier[0]) = (1.0, settled.multiplier);
+        self.ended = Some(LevelNewton { x: self.pair.b_to_query(&settled.point), a, b });
+        self.sharpen(self.accuracy);
+    }
+
+    /// From a hint, or from what the outlines show.
+    pub(super) fn run(&mut self, hint: &Hint, start: Option<&Approach>) {
+        if self.done() && self.refined {
+            return;
+        }
         if let Hint::Level { x_b, active_a, active_b } = hint {
             let active =
                 (Active::from_bits(*active_a, self.pair.a.len()), Active::from_bits(*active_b, self.pair.b.len()));
             if let (Some(a), Some(b)) = active {
                 self.newton(self.pair.b_to_query(x_b), a, b);
             }
+        }
+        if let Some(start) = start
+            && start.common.is_none()
+            && !self.done()
+            && !self.exhausted()
+        {
+            self.outlined(start);
         }
         if !self.done() && !self.exhausted() {
             self.interior_point();
@@ -225,6 +131,20 @@ impl<'a> Search<'a> {
                 self.descend(REFINED);
             }
             self.accuracy = self.options.accuracy();
+        }
+    }
+
+    /// Newton's method from where the outline of B is nearest to A's interior point, with the constraints that are active there.
+    fn outlined(&mut self, start: &Approach) {
+        let pair = self.pair;
+        let outward = pair.a.pulled_back(&start.n);
+        for x in [start.x, start.corners.1] {
+            let (a, b) = (Active::near(&pair.a, &x, &outward), Active::near(&pair.b, &x, &-outward));
+            self.attain(&x);
+            self.newton(x, a, b);
+            if self.done() || self.exhausted() {
+                return;
+            }
         }
     }
 
@@ -282,7 +202,6 @@ impl<'a> Search<'a> {
     /// constraints. Values of A fall by orders of magnitude on the way in: each round scales them anew.
     fn interior_point(&mut self) {
         let pair = self.pair;
-        self.attain(&pair.b.interior);
         self.attain(&pair.a.interior);
         if pair.b.contains(&pair.a.interior) {
             // Saturated: B does not hold the minimiser back.
@@ -391,7 +310,7 @@ impl<'a> Search<'a> {
         better
     }
 
-    fn hint(&self) -> Hint {
+    pub(super) fn hint(&self) -> Hint {
         let (x, y) = (self.pair.to_a(&self.x), self.pair.to_b(&self.x));
         let (a, b) = (self.pair.a.body, self.pair.b.body);
         match (self.active.0.single(), self.active.1.single()) {
@@ -408,7 +327,7 @@ impl<'a> Search<'a> {
         self.done() && (free || self.pair.b.contains(&self.pair.a.interior))
     }
 
-    fn answer(&self, pose_a: &Pose, pose_b: &Pose) -> LevelDistance {
+    pub(super) fn answer(&self, pose_a: &Pose, pose_b: &Pose) -> LevelDistance {
         let (pair, saturated) = (self.pair, self.saturated());
         let (of_a, of_b) = &self.multipliers;
         let gradient = of_a.iter().enumerate().take(pair.a.len()).filter(|(_, weight)| **weight > 0.0);
@@ -445,25 +364,3 @@ fn normalized(of_a: &Multipliers, of_b: &Multipliers) -> (Multipliers, Multiplie
     let total: f64 = of_a.iter().sum();
     (of_a.map(|multiplier| multiplier / total), of_b.map(|multiplier| multiplier / total))
 }
-
-impl LevelProven {
-    fn answer(&self, a: &Body, pose_a: &Pose, pose_b: &Pose) -> LevelDistance {
-        let witness = pose_a.transform_point(&(a.normalization().center + Vector3::from(self.x)));
-        let force = pose_a.transform_direction(&Vector3::from(self.gradient));
-        LevelDistance {
-            status: Status::Converged,
-            lower: self.lower,
-            upper: self.upper,
-            witness,
-            multiplier: self.multiplier,
-            saturated: false,
-            gradient_a: Twist::of_force(-force, &witness, pose_a.translation()),
-            gradient_b: Twist::of_force(force, &witness, pose_b.translation()),
-            tied: false,
-            iterations: self.rounds,
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests;
