@@ -3,6 +3,9 @@
 use crate::state::State;
 use std::fmt::Write;
 
+/// Iterations that no solve should need more than.
+const WANTED: u32 = 30;
+
 pub(crate) fn markdown(state: &State, threads: usize) -> String {
     let tally = &state.tally;
     let mut text = String::new();
@@ -27,16 +30,17 @@ pub(crate) fn markdown(state: &State, threads: usize) -> String {
         line(format_args!("| {} | {} | {} |", check.name(), grouped(*made), grouped(failed)));
     }
     line(format_args!(
-        "\n| iterations | solves | mean | median | 99.9 % | most | where |\n|---|---:|---:|---:|---:|---:|---|"
+        "\n| iterations | solves | mean | median | 99.9 % | above {WANTED} | most | where |\n|---|---:|---:|---:|---:|---:|---:|---|"
     ));
     for (name, iterations) in &tally.iterations {
         let worst = iterations.worst;
         line(format_args!(
-            "| {name} | {} | {:.2} | {} | {} | {} | block {} query {} |",
+            "| {name} | {} | {:.2} | {} | {} | {:.3} % | {} | block {} query {} |",
             grouped(iterations.solves()),
             iterations.mean(),
             iterations.quantile(0.5),
             iterations.quantile(0.999),
+            100.0 * iterations.above(WANTED),
             worst.iterations,
             worst.block,
             worst.query

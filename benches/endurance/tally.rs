@@ -38,6 +38,12 @@ impl Iterations {
         total as f64 / self.solves().max(1) as f64
     }
 
+    /// Share of the solves that took more iterations than that.
+    pub(crate) fn above(&self, iterations: u32) -> f64 {
+        let more = self.histogram.iter().filter(|(spent, _)| **spent > iterations).map(|(_, count)| count);
+        more.sum::<u64>() as f64 / self.solves().max(1) as f64
+    }
+
     /// Smallest count that this share of the solves does not exceed.
     pub(crate) fn quantile(&self, share: f64) -> u32 {
         let (mut seen, wanted) = (0, (share * self.solves() as f64).ceil() as u64);

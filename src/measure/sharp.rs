@@ -327,7 +327,7 @@ impl<'a> SharpPair<'a> {
             let (b, sum_b, values_b) = self.b.at(&of_b, &x);
             let (la, lb) = (of_a.set.len, of_b.set.len);
             let size = 4 + la + lb;
-            let mut m = LevelNewton::matrix(&a, &b, la, lb);
+            let mut m = level_matrix(&a, &b, la, lb);
             let balance = plus(&sum_a, &sum_b);
             for i in 0..3 {
                 m[i][size] = -balance[i].double();
@@ -417,6 +417,24 @@ fn newton_matrix(distance: f64, a: &At, b: &At, la: usize, lb: usize) -> Augment
     }
     for k in 0..la {
         m[6][7 + k] = a.sum.dot(&a.gradient[k]);
+    }
+    m
+}
+
+/// Newton's matrix of the level distance, unknowns x, s and the multipliers; column `4 + la + lb` is left to the residuals.
+fn level_matrix(a: &At, b: &At, la: usize, lb: usize) -> Augmented {
+    let hessian = a.hessian + b.hessian;
+    let mut m: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
+    for i in 0..3 {
+        (0..3).for_each(|j| m[i][j] = hessian[(i, j)]);
+        for (k, gradient) in a.gradient[..la].iter().chain(&b.gradient[..lb]).enumerate() {
+            m[i][4 + k] = gradient[i];
+            m[4 + k][i] = gradient[i];
+        }
+    }
+    for k in 0..la {
+        m[3][4 + k] = 1.0;
+        m[4 + k][3] = -1.0;
     }
     m
 }

@@ -1,5 +1,6 @@
 //! Euclidean distance between two bodies.
 
+mod deepest;
 mod search;
 
 use super::Status;

@@ -1,11 +1,12 @@
 //! The search for a distance where continuation alone has not proven it: every method in turn, from the cheapest, each of them
 //! improving one bracket.
 
+use super::deepest::Deepest;
 use super::{Distance, split};
 use crate::measure::Status;
 use crate::measure::bracket::{Multipliers, distance_lower, distance_upper};
 use crate::measure::decide::{Goal, across};
-use crate::measure::newton::{Active, DistanceNewton};
+use crate::measure::newton::{Active, DistanceNewton, MAX_STEPS, Pace, WORTH_A_BRACKET};
 use crate::measure::options::Options;
 use crate::measure::pair::{Pair, Posed};
 use crate::measure::programs::{Closest, Level, points};
@@ -159,14 +160,17 @@ impl<'a> Search<'a> {
         let Approach { x, y, n, corners, .. } = found;
         if pair.smooth() {
             self.seek(&x, &y, &n);
-            return;
-        }
-        for (x, y) in [(x, y), (x, corners.1), (corners.0, y)] {
-            let (a, b) = (Active::near(&pair.a, &x, &-n), Active::near(&pair.b, &y, &n));
-            self.newton(x, y, n, a, b);
-            if self.ended() || found.common.is_some() {
-                return;
+        } else {
+            for (x, y) in [(x, y), (x, corners.1), (corners.0, y)] {
+                let (a, b) = (Active::near(&pair.a, &x, &-n), Active::near(&pair.b, &y, &n));
+                self.newton(x, y, n, a, b);
+                if self.ended() || found.common.is_some() {
+                    break;
+                }
             }
+        }
+        if !self.ended() && self.lower == 0.0 {
+            self.deepest(&found.common.unwrap_or((x + y) * 0.5), &n);
         }
     }
 
@@ -317,17 +321,60 @@ impl<'a> Search<'a> {
         });
     }
 
-    /// The point deepest in both bodies: inside both, it proves overlap; else its multipliers show the normal.
+    /// The point deepest in both bodies, by Newton's method from a point and a normal.
+    fn deepest(&mut self, v: &Vector3<f64>, n: &Vector3<f64>) {
+        let pair = self.pair;
+        let (a, b) = (Active::near(&pair.a, v, &-n), Active::near(&pair.b, v, n));
+        let mut deepest = Deepest::new(*v, self.depth(v), a, b);
+        let mut pace = Pace::FIRST;
+        for _ in 0..MAX_STEPS {
+            if self.options.exhausted(self.iterations) {
+                return;
+            }
+            self.iterations += 1;
+            let Some(length) = deepest.step(pair) else { return };
+            if deepest.s < 1.0 && self.common(&deepest.x) {
+                return;
+            }
+            if pace.ends_with(length) || length < WORTH_A_BRACKET && deepest.s > 1.0 {
+                self.part(&deepest.x, &deepest.a.multipliers(), &deepest.b.multipliers());
+                return;
+            }
+        }
+    }
+
+    /// Newton's method for the distance from a point between both bodies, with multipliers of the constraints that are largest there.
+    fn part(&mut self, v: &Vector3<f64>, of_a: &Multipliers, of_b: &Multipliers) {
+        let pair = self.pair;
+        let (u, w) = (gradient(&pair.a, v, of_a), gradient(&pair.b, v, of_b));
+        if !(u.norm() > 0.0 && w.norm() > 0.0) {
+            return;
+        }
+        let n = (w / w.norm() - u / u.norm()).try_normalize(0.0).unwrap_or(self.n);
+        let (x, y) = (pair.a.enter(v, &n), pair.b.enter(v, &-n));
+        self.bound(v, v, of_a, of_b);
+        self.attain(&x, &y);
+        if !self.done() {
+            self.newton(x, y, n, Active::from_multipliers(of_a), Active::from_multipliers(of_b));
+        }
+    }
+
+    /// The largest constraint of both bodies.
+    fn depth(&self, v: &Vector3<f64>) -> f64 {
+        let pair = self.pair;
+        let values = (0..pair.a.len()).map(|i| pair.a.jet(i, v).value);
+        values.chain((0..pair.b.len()).map(|i| pair.b.jet(i, v).value)).fold(f64::MIN, f64::max)
+    }
+
+    /// The point deepest in both bodies, by the interior-point method: inside both, it proves overlap; else its multipliers show the
+    /// normal.
     fn contact(&mut self) {
         let pair = self.pair;
-        let depth = |v: &Vector3<f64>| {
-            let values = (0..pair.a.len()).map(|i| pair.a.jet(i, v).value);
-            values.chain((0..pair.b.len()).map(|i| pair.b.jet(i, v).value)).fold(f64::MIN, f64::max)
-        };
         // Far outside a small body its values would hide all else.
         let starts = [(self.x + self.y) * 0.5, self.x, self.y];
-        let start = if depth(&starts[0]) < STEEP { starts[0] } else { least_of(starts, depth) };
-        let first = depth(&start) + 0.5;
+        let middling = self.depth(&starts[0]) < STEEP;
+        let start = if middling { starts[0] } else { least_of(starts, |v| self.depth(v)) };
+        let first = self.depth(&start) + 0.5;
         let mut v = SVector::from([start.x, start.y, start.z, first]);
         let mut attempt = 1e-1;
         let program = Level { pair, both: true, scale: 1.0 };
@@ -340,16 +387,7 @@ impl<'a> Search<'a> {
             if iterate.gap < attempt {
                 attempt = iterate.gap * 1e-2;
                 let (of_a, of_b) = split(pair, iterate.multipliers, 1.0);
-                let (u, w) = (gradient(&pair.a, &x, &of_a), gradient(&pair.b, &x, &of_b));
-                if u.norm() > 0.0 && w.norm() > 0.0 {
-                    let n = (w / w.norm() - u / u.norm()).try_normalize(0.0).unwrap_or(self.n);
-                    let (x_a, y_b) = (pair.a.enter(&x, &n), pair.b.enter(&x, &-n));
-                    self.bound(&x, &x, &of_a, &of_b);
-                    self.attain(&x_a, &y_b);
-                    if !self.done() {
-                        self.newton(x_a, y_b, n, Active::from_multipliers(&of_a), Active::from_multipliers(&of_b));
-                    }
-                }
+                self.part(&x, &of_a, &of_b);
             }
             let ended = self.decided() || attempt < 1e-18 || self.options.exhausted(self.iterations);
             if ended { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

@@ -5,7 +5,6 @@
 //! ```
 
 use crate::measure::active::MAX_ACTIVE;
-use crate::measure::linear::{Augmented, MAX_UNKNOWNS};
 use crate::measure::newton::{Active, At, MAX_STEPS, Pace, WORTH_A_BRACKET};
 use crate::measure::pair::Pair;
 use crate::measure::quadratic::{Jets, Quadratic};
@@ -65,30 +64,6 @@ impl LevelNewton {
             self.b.len = 0;
         }
         a.value[..self.a.len].iter().sum::<f64>() / self.a.len as f64
-    }
-
-    /// Newton's matrix, as that of the distance; column `4 + la + lb` is left to the residuals.
-    pub(in crate::measure) fn matrix(a: &At, b: &At, la: usize, lb: usize) -> Augmented {
-        let hessian = a.hessian + b.hessian;
-        let mut m: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
-        for i in 0..3 {
-            for j in 0..3 {
-                m[i][j] = hessian[(i, j)];
-            }
-            for k in 0..la {
-                m[i][4 + k] = a.gradient[k][i];
-                m[4 + k][i] = a.gradient[k][i];
-            }
-            for k in 0..lb {
-                m[i][4 + la + k] = b.gradient[k][i];
-                m[4 + la + k][i] = b.gradient[k][i];
-            }
-        }
-        for k in 0..la {
-            m[3][4 + k] = 1.0;
-            m[4 + k][3] = -1.0;
-        }
-        m
     }
 
     /// One step; its length relative to B and to the distance from A's interior point, or none if it leads nowhere.
