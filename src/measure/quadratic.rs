@@ -22,9 +22,16 @@ const MAX_CHANGES: usize = 8;
 /// Violation of a constraint, relative to its scale, that counts as none.
 const VIOLATED: f64 = 1e-10;
 
-/// How much of a stiffness is added to the Hessian until a step is short enough for it to mean something where the step leads
-/// (Levenberg and Marquardt).
-const DAMPINGS: [f64; 6] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
+/// How much of a stiffness, what the Hessian is of such values over such lengths, is added to it until a step is short enough for it
+/// to mean something where the step leads (Levenberg and Marquardt).
+pub(super) const DAMPINGS: [f64; 6] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
+
+/// Longest step, relative to the bodies and to the distance from a centre that values rise from, that a linearization may mean
+/// anything for.
+pub(super) const LONGEST: f64 = 0.5;
+
+/// Distance from such a centre, relative to its body, that counts as none.
+pub(super) const CENTER: f64 = 0.02;
 
 /// All constraints of one body at one point.
 pub(super) struct Jets {
@@ -103,12 +110,12 @@ impl Quadratic {
         a: Active,
         b: Active,
         short: impl Fn(&Vector3<f64>) -> bool,
-        stiffness: impl FnOnce() -> Matrix4<f64>,
+        stiffness: &Matrix4<f64>,
     ) -> Option<Solution> {
         let fits = |found: &Option<Solution>| found.as_ref().is_some_and(|step| short(&step.v.xyz()));
         let mut found = self.solve(a, b);
         if !fits(&found) {
-            let (hessian, stiffness) = (self.hessian, stiffness());
+            let hessian = self.hessian;
             for damping in DAMPINGS {
                 self.hessian = hessian + stiffness * damping;
                 found = self.solve(a, b).or(found);

@@ -43,7 +43,6 @@ pub(super) trait Relation: Copy {
 }
 
 /// What a bracket is good for.
-#[derive(Clone, Copy)]
 pub(super) enum Verdict {
     /// Narrow enough.
     Proven {

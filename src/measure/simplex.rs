@@ -16,11 +16,11 @@ const MAX_STEPS: usize = 16;
 const WORTH: f64 = 1e-6;
 
 /// Points of the outlines of both bodies, and their difference.
-#[derive(Clone, Copy)]
-struct Corner {
-    x: Vector3<f64>,
-    y: Vector3<f64>,
-    difference: Vector3<f64>,
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Corner {
+    pub(super) x: Vector3<f64>,
+    pub(super) y: Vector3<f64>,
+    pub(super) difference: Vector3<f64>,
 }
 
 /// Corners and the weights of the point nearest to 0 that they span; one with a weight of zero is none.

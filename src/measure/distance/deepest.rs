@@ -8,11 +8,8 @@
 
 use crate::measure::newton::Active;
 use crate::measure::pair::{Pair, Posed};
-use crate::measure::quadratic::{Jets, Quadratic};
+use crate::measure::quadratic::{Jets, LONGEST, Quadratic};
 use nalgebra::{Matrix3, Vector3, Vector4};
-
-/// Longest step relative to either body.
-const LONG: f64 = 0.5;
 
 /// Newton iterates of the deepest point, query frame.
 #[derive(Clone, Copy, Debug)]
@@ -45,11 +42,11 @@ impl Deepest {
             free_of_b: true,
         };
         let length = |dx: &Vector3<f64>| pair.a.relative_length(dx).max(pair.b.relative_length(dx));
-        let stiffness = || (stiff(&pair.a, scale) + stiff(&pair.b, scale)).fixed_resize(0.0);
-        let found = program.step(self.a, self.b, |dx| length(dx) <= LONG, stiffness)?;
+        let stiffness = (stiff(&pair.a, scale) + stiff(&pair.b, scale)).fixed_resize(0.0);
+        let found = program.step(self.a, self.b, |dx| length(dx) <= LONGEST, &stiffness)?;
         let dx = found.v.xyz();
         let length = length(&dx);
-        let share = (LONG / length).min(1.0);
+        let share = (LONGEST / length).min(1.0);
         self.x += dx * share;
         self.s += (found.v.w - self.s) * share;
         (self.a, self.b) = (found.a, found.b);

@@ -31,7 +31,7 @@ use super::newton::Active;
 use super::options::Options;
 use super::pair::{Pair, Posed};
 use super::pose::{Pose, ROTATION_ERROR};
-use super::simplex::corners;
+use super::simplex::{Corner, corners};
 use super::smooth::{Follow, SEEK_ROUNDS, Seek};
 use super::twist::Twist;
 use super::union;
@@ -41,7 +41,7 @@ use crate::optimize::minimise_within;
 use crate::polynomial::{dispatch, gamma};
 use along::Along;
 use nalgebra::Vector3;
-use portal::{Corner, crossing};
+use portal::crossing;
 use reach::{ReachNewton, ReachProgram};
 use std::ops::ControlFlow;
 
@@ -307,7 +307,7 @@ impl Search<'_> {
         let pair = self.frame.pair;
         let support = |n: &Vector3<f64>| {
             let (x, y) = corners(pair, &-n);
-            Corner { x, y, w: self.frame.w(&x, &y) }
+            Corner { x, y, difference: self.frame.w(&x, &y) }
         };
         let found = crossing(&(self.frame.delta / self.frame.gap), support);
         for (x, y) in [(found.x, found.y), (found.x, found.corner.y), (found.corner.x, found.y)] {

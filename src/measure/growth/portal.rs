@@ -1,6 +1,7 @@
 //! About where a ray from inside leaves the difference of two outlines: the refinement of portals (Snethen, Complex collision made
 //! simple, Game Programming Gems 7, 2008). Nothing is proven by it; it shows Newton's method where to begin.
 
+use crate::measure::simplex::Corner;
 use nalgebra::Vector3;
 
 /// Most support points asked for to find a portal, and as many to refine it.
@@ -8,14 +9,6 @@ const MAX_STEPS: usize = 12;
 
 /// How much farther a support point must lie, relative to the plane of the portal.
 const WORTH: f64 = 1e-3;
-
-/// A point of the difference, and the points of both bodies that it is the difference of.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Corner {
-    pub(super) x: Vector3<f64>,
-    pub(super) y: Vector3<f64>,
-    pub(super) w: Vector3<f64>,
-}
 
 /// Where the ray passes through the last portal.
 #[derive(Clone, Copy, Debug)]
@@ -31,40 +24,40 @@ pub(super) struct Crossing {
 /// Where the ray from 0 along u leaves a convex set around 0 that is known by its points farthest along directions.
 pub(super) fn crossing(u: &Vector3<f64>, support: impl Fn(&Vector3<f64>) -> Corner) -> Crossing {
     let mut a = support(u);
-    let mut n = a.w.cross(u);
-    if !(n.norm_squared() > 1e-12 * a.w.norm_squared() * u.norm_squared()) {
+    let mut n = a.difference.cross(u);
+    if !(n.norm_squared() > 1e-12 * a.difference.norm_squared() * u.norm_squared()) {
         return Crossing { x: a.x, y: a.y, n: *u, corner: a };
     }
     let mut b = support(&n);
-    n = a.w.cross(&b.w);
+    n = a.difference.cross(&b.difference);
     if n.dot(u) < 0.0 {
         (a, b, n) = (b, a, -n);
     }
     // The cone of a, b and c is to hold u; a and b have it on the side where c lies.
     let mut c = support(&n);
     for _ in 0..MAX_STEPS {
-        if b.w.cross(&c.w).dot(u) < 0.0 {
+        if b.difference.cross(&c.difference).dot(u) < 0.0 {
             a = c;
-        } else if c.w.cross(&a.w).dot(u) < 0.0 {
+        } else if c.difference.cross(&a.difference).dot(u) < 0.0 {
             b = c;
         } else {
             break;
         }
-        c = support(&a.w.cross(&b.w));
+        c = support(&a.difference.cross(&b.difference));
     }
     let outward = |a: &Corner, b: &Corner, c: &Corner| {
-        let n = (b.w - a.w).cross(&(c.w - a.w));
+        let n = (b.difference - a.difference).cross(&(c.difference - a.difference));
         if n.dot(u) < 0.0 { -n } else { n }
     };
     n = outward(&a, &b, &c);
     let mut last = support(&n);
     for _ in 0..MAX_STEPS {
-        if !((last.w - a.w).dot(&n) > WORTH * a.w.dot(&n)) {
+        if !((last.difference - a.difference).dot(&n) > WORTH * a.difference.dot(&n)) {
             break;
         }
         // Of the three portals with the new corner the one that the ray passes through.
-        let side = last.w.cross(u);
-        let (of_a, of_b, of_c) = (side.dot(&a.w), side.dot(&b.w), side.dot(&c.w));
+        let side = last.difference.cross(u);
+        let (of_a, of_b, of_c) = (side.dot(&a.difference), side.dot(&b.difference), side.dot(&c.difference));
         if of_a <= 0.0 && of_b >= 0.0 {
             c = last;
         } else if of_b <= 0.0 && of_c >= 0.0 {
@@ -75,8 +68,12 @@ pub(super) fn crossing(u: &Vector3<f64>, support: impl Fn(&Vector3<f64>) -> Corn
         n = outward(&a, &b, &c);
         last = support(&n);
     }
-    let weights =
-        [b.w.cross(&c.w).dot(u), c.w.cross(&a.w).dot(u), a.w.cross(&b.w).dot(u)].map(|weight| weight.max(0.0));
+    let weights = [
+        b.difference.cross(&c.difference).dot(u),
+        c.difference.cross(&a.difference).dot(u),
+        a.difference.cross(&b.difference).dot(u),
+    ]
+    .map(|weight| weight.max(0.0));
     let total = weights[0] + weights[1] + weights[2];
     if !(total > 0.0) {
         return Crossing { x: last.x, y: last.y, n, corner: last };
@@ -87,7 +84,8 @@ pub(super) fn crossing(u: &Vector3<f64>, support: impl Fn(&Vector3<f64>) -> Corn
 
 #[cfg(test)]
 mod tests {
-    use super::{Corner, crossing};
+    use super::crossing;
+    use crate::measure::simplex::Corner;
     use crate::measure::tests::unit;
     use crate::polynomial::tests::Seeded;
     use nalgebra::Vector3;
@@ -96,7 +94,7 @@ mod tests {
     fn cuboid(half: Vector3<f64>, center: Vector3<f64>) -> impl Fn(&Vector3<f64>) -> Corner {
         move |n| {
             let x = center + Vector3::from_fn(|i, _| half[i] * n[i].signum());
-            Corner { x, y: Vector3::zeros(), w: x }
+            Corner { x, y: Vector3::zeros(), difference: x }
         }
     }
 
@@ -130,7 +128,7 @@ mod tests {
             let support = |n: &Vector3<f64>| {
                 let scaled = radii.component_mul(n);
                 let x = radii.component_mul(&scaled) / scaled.norm();
-                Corner { x, y: -x, w: x * 2.0 }
+                Corner { x, y: -x, difference: x * 2.0 }
             };
             let u = unit(&mut random);
             let found = crossing(&u, support);
@@ -144,7 +142,7 @@ mod tests {
     fn a_ray_through_the_first_corner_is_its_own_portal() {
         let found = crossing(&Vector3::x(), |n| {
             let x = n.normalize();
-            Corner { x, y: Vector3::zeros(), w: x }
+            Corner { x, y: Vector3::zeros(), difference: x }
         });
         assert!((found.x - Vector3::x()).norm() < 1e-12 && found.n == Vector3::x());
     }

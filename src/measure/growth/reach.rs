@@ -14,7 +14,7 @@ use crate::measure::newton::{Active, MAX_STEPS, Pace, WORTH_A_BRACKET};
 use crate::measure::options::Options;
 use crate::measure::pair::{Pair, Posed};
 use crate::measure::programs::near_boundary;
-use crate::measure::quadratic::{Jets, Quadratic};
+use crate::measure::quadratic::{Jets, LONGEST, Quadratic};
 use crate::optimize::{Program, Row, Rows};
 use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, Vector3, Vector4};
 
@@ -84,9 +84,6 @@ impl Program<4> for ReachProgram<'_> {
         }
     }
 }
-
-/// Longest Newton step, relative to the bodies, that the linearization may mean anything for.
-const LONG: f64 = 0.5;
 
 /// Newton iterates of the program in x and ρ, with `y = x + offset - ρ u`.
 pub(super) struct ReachNewton {
@@ -167,11 +164,11 @@ impl ReachNewton {
             free_of_b: false,
         };
         // y moves by dx - u dρ, but how far B's constraints let dρ go is not known before.
-        let short = |dx: &Vector3<f64>| pair.a.relative_length(dx) <= LONG;
-        let found = program.step(self.a, self.b, short, || self.stiffness(pair, &of_a, &of_b))?;
+        let short = |dx: &Vector3<f64>| pair.a.relative_length(dx) <= LONGEST;
+        let found = program.step(self.a, self.b, short, &self.stiffness(pair, &of_a, &of_b))?;
         let (dx, dy) = (found.v.xyz(), found.v.xyz() - u * found.v.w);
         let length = pair.a.relative_length(&dx).max(pair.b.relative_length(&dy));
-        let share = (LONG / length).min(1.0);
+        let share = (LONGEST / length).min(1.0);
         self.x += dx * share;
         self.y += dy * share;
         (self.a, self.b) = (found.a, found.b);

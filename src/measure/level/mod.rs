@@ -1,7 +1,10 @@
 //! Level distance `d(A‖B) = min p_A(x)` over x in B, p the largest constraint.
 
+mod bracket;
 mod newton;
+mod saturated;
 mod search;
+mod sides;
 mod smooth;
 #[cfg(test)]
 mod tests;
@@ -18,9 +21,10 @@ use crate::body::{Body, Solid};
 use crate::polynomial::dispatch;
 use nalgebra::Vector3;
 pub(in crate::measure) use newton::LevelNewton;
+use saturated::saturated;
 use search::Search;
 pub(in crate::measure) use smooth::LevelTrace;
-use smooth::{FollowLevel, LevelProven, SEEK_ROUNDS, Saturated, SeekLevel};
+use smooth::{FollowLevel, LevelProven, SEEK_ROUNDS, SeekLevel};
 
 /// Level distance with its proof; unit-free but for the witness.
 #[derive(Clone, Copy, Debug)]
@@ -107,11 +111,17 @@ pub(super) fn between(
 ) -> LevelDistance {
     let mut spent = 0;
     let mut settled = None;
-    if let Hint::LevelSmooth(trace) = &mut warm.hint {
-        match dispatch(FollowLevel { a, pose_a, b, pose_b, options, trace }) {
+    match &mut warm.hint {
+        Hint::LevelSmooth(trace) => match dispatch(FollowLevel { a, pose_a, b, pose_b, options, trace }) {
             Ok(proven) => return proven.answer(a, pose_a, pose_b),
             Err(lost) => (spent, settled) = (lost.rounds, lost.settled),
+        },
+        Hint::Saturated => {
+            if let Some(answer) = saturated(a, pose_a, b, pose_b, options) {
+                return answer;
+            }
         }
+        _ => {}
     }
     let pair = Pair::new(a, pose_a, b, pose_b);
     let followed = matches!(warm.hint, Hint::Level { .. }) || settled.is_some();
@@ -142,24 +152,6 @@ pub(super) fn between(
     search.run(&warm.hint, start.as_ref());
     *warm = search.hint().into();
     search.answer(pose_a, pose_b)
-}
-
-/// The answer where the interior point of `a` is proven to lie in `b` and what is known of the minimum is enough.
-fn saturated(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, options: &Options<'_>) -> Option<LevelDistance> {
-    let (lower, upper) = (a.trust().least, a.min_value());
-    let narrow = upper - lower <= options.accuracy() * upper.abs().max(1.0);
-    (narrow && dispatch(Saturated { a, pose_a, b, pose_b })).then(|| LevelDistance {
-        status: Status::Converged,
-        lower,
-        upper,
-        witness: pose_a.transform_point(a.interior_point()),
-        multiplier: 0.0,
-        saturated: true,
-        gradient_a: Twist::ZERO,
-        gradient_b: Twist::ZERO,
-        tied: false,
-        iterations: 0,
-    })
 }
 
 impl LevelProven {

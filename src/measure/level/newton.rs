@@ -7,14 +7,8 @@
 use crate::measure::active::MAX_ACTIVE;
 use crate::measure::newton::{Active, At, MAX_STEPS, Pace, WORTH_A_BRACKET};
 use crate::measure::pair::Pair;
-use crate::measure::quadratic::{Jets, Quadratic};
+use crate::measure::quadratic::{CENTER, Jets, LONGEST, Quadratic};
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
-
-/// Longest step, relative to B and to the distance from A's interior point.
-const LONG: f64 = 0.5;
-
-/// Distance from A's interior point, relative to A, that counts as none.
-const CENTER: f64 = 0.02;
 
 /// Newton iterates of the level-distance system.
 #[derive(Clone, Copy, Debug)]
@@ -78,11 +72,11 @@ impl LevelNewton {
             b: of_b.rows(1.0, |jet| (jet.gradient.push(0.0), 1.0 - jet.value)),
             free_of_b: true,
         };
-        let short = |dx: &Vector3<f64>| length(dx) <= LONG;
-        let found = program.step(self.a, self.b, short, || of_point(self.stiffness(pair, &of_a, far, *s)))?;
+        let short = |dx: &Vector3<f64>| length(dx) <= LONGEST;
+        let found = program.step(self.a, self.b, short, &of_point(self.stiffness(pair, &of_a, far, *s)))?;
         let dx = found.v.xyz();
         let length = length(&dx);
-        let share = (LONG / length).min(1.0);
+        let share = (LONGEST / length).min(1.0);
         self.x += dx * share;
         *s += (found.v.w - *s) * share;
         (self.a, self.b) = (found.a, found.b);

@@ -1,0 +1,246 @@
+//! Two bodies as Newton's method for the level distance sees them: in B's normalized coordinates, one constraint of each active. The
+//! formulas are those of [`super::smooth`].
+
+use crate::body::{Body, ConstraintTrust};
+use crate::measure::pose::Pose;
+use crate::measure::quadratic::{CENTER, DAMPINGS, LONGEST};
+use crate::measure::tangent::{Relative, TURNED};
+use crate::measure::vector::{
+    M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, rows, scaled, times_transposed,
+};
+use crate::polynomial::{Number, NumberJet, Polynomial, Simd, gamma};
+
+/// Most of the curvature along the gradient of p that is not that of the root of p.
+const MOST_BENT: f64 = 0.9;
+
+/// The map from B's normalized coordinates w to A's, with its errors.
+pub(super) struct Map {
+    /// `K` in `x = K w + o`.
+    pub(super) linear: M3<f64>,
+    /// `o`.
+    pub(super) origin: V3<f64>,
+    /// `M_A` in `z = M_A x`.
+    pub(super) to_a: M3<f64>,
+    /// `M_A K`.
+    pub(super) both: M3<f64>,
+    /// Bound of the error of x, for w and steps within B's ball, metres.
+    pub(super) displacement: f64,
+    /// Relative bound of the displacement that the rounding of z amounts to.
+    pub(super) rounding: f64,
+    /// Bound of the error of `K` in operator norm.
+    pub(super) turn: f64,
+    /// Bound of `|M_A K|` in operator norm.
+    pub(super) spread: f64,
+}
+
+impl Map {
+    #[inline(always)]
+    fn new<S: Simd>(simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> Self {
+        let inverse = rows(simd, &b.inverse().transpose());
+        let (to_a, origin) = (rows(simd, &a.normalization().linear), relative.origin);
+        let linear = times_transposed::<S, f64>(&relative.rotation, &inverse);
+        let both = product::<S>(&to_a, &linear);
+        let trust = b.trust();
+        let turn = (TURNED + gamma(16)) * trust.inverse_norm + trust.inverse_error;
+        let far = origin[0].abs() + origin[1].abs() + origin[2].abs();
+        let rounding = a.trust().rounding;
+        let frobenius = (square::<S>(both[0]) + square::<S>(both[1]) + square::<S>(both[2])).sqrt();
+        Self {
+            linear,
+            origin,
+            to_a,
+            both,
+            // Twice: w and the step.
+            displacement: (relative.displacement + 2.0 * turn * trust.radius + gamma(4) * far) * (1.0 + 1e-13)
+                + rounding * trust.inverse_norm * trust.radius,
+            rounding,
+            turn,
+            spread: frobenius * (1.0 + 1e-12) + a.trust().linear_norm * turn,
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn apply<S: Simd>(&self, _: S, w: V3<f64>) -> V3<f64> {
+        add::<S, f64>(apply::<S, f64>(&self.linear, w), self.origin)
+    }
+
+    #[inline(always)]
+    pub(super) fn to_a<S: Simd>(&self, _: S, x: V3<f64>) -> V3<f64> {
+        apply::<S, f64>(&self.to_a, x)
+    }
+
+    /// The matrix of `of_a |C d|² + of_b |d|²`: xx, xy, xz, yy, yz, zz.
+    #[inline(always)]
+    pub(super) fn metric(&self, of_a: f64, of_b: f64) -> [f64; 6] {
+        let [r, s, t] = self.both;
+        let entry = |i: usize, j: usize| of_a * (r[i] * r[j] + s[i] * s[j] + t[i] * t[j]);
+        [entry(0, 0) + of_b, entry(0, 1), entry(0, 2), entry(1, 1) + of_b, entry(1, 2), entry(2, 2) + of_b]
+    }
+}
+
+/// Both bodies with their active constraints.
+pub(super) struct Sides<'a> {
+    pub(super) a: &'a Body,
+    pub(super) b: &'a Body,
+    /// Active constraint of A and of B.
+    pub(super) active: [u8; 2],
+    pub(super) p: &'a Polynomial,
+    pub(super) g: &'a Polynomial,
+    pub(super) trust: &'a ConstraintTrust,
+    pub(super) map: Map,
+}
+
+/// Both constraints at one point.
+pub(super) struct Evaluated {
+    pub(super) x: V3<f64>,
+    pub(super) z: V3<f64>,
+    pub(super) jet_a: NumberJet<f64>,
+    pub(super) w: V3<f64>,
+    pub(super) jet_b: NumberJet<f64>,
+}
+
+/// A Newton step.
+pub(super) struct Step {
+    /// Change of w.
+    pub(super) delta: V3<f64>,
+    /// Multiplier before the step, in H.
+    pub(super) multiplier: f64,
+    /// Lower bound of the smallest eigenvalue of H, but for the errors of its entries.
+    pub(super) curvature: f64,
+}
+
+impl<'a> Sides<'a> {
+    /// The bodies with these active constraints.
+    #[inline(always)]
+    pub(super) fn new<S: Simd>(
+        simd: S,
+        (a, pose_a): (&'a Body, &Pose),
+        (b, pose_b): (&'a Body, &Pose),
+        active: [u8; 2],
+    ) -> Self {
+        let [of_a, of_b] = active.map(usize::from);
+        Self {
+            a,
+            b,
+            active,
+            p: &a.constraints()[of_a].polynomial,
+            g: &b.constraints()[of_b].polynomial,
+            trust: &b.trust().constraints[of_b],
+            map: Map::new(simd, a, b, &Relative::new(simd, a, pose_a, b, pose_b)),
+        }
+    }
+
+    /// How long a step from z is: relative to B, and to the distance from A's centre.
+    #[inline(always)]
+    pub(super) fn length<S: Simd>(&self, _: S, z: V3<f64>, delta: V3<f64>) -> f64 {
+        let of_b = self.b.trust().radius;
+        let in_a = square::<S>(apply::<S, f64>(&self.map.both, delta)) / self.far::<S>(z);
+        in_a.max(square::<S>(delta) / (of_b * of_b)).sqrt()
+    }
+
+    /// Square of the distance of z from A's centre, or of what counts as none.
+    #[inline(always)]
+    fn far<S: Simd>(&self, z: V3<f64>) -> f64 {
+        square::<S>(z).max((CENTER * self.a.trust().radius).powi(2))
+    }
+
+    /// Newton's step.
+    #[inline(always)]
+    pub(super) fn newton<S: Simd>(&self, simd: S, a: &NumberJet<f64>, b: &NumberJet<f64>) -> Step {
+        let (pulled, multiplier) = self.balance(simd, a, b);
+        let hessian = self.hessian(simd, a, b, multiplier);
+        let (cofactors, determinant) = cofactors(simd, hessian);
+        let u = apply_symmetric::<S, f64>(&cofactors, pulled);
+        let v = apply_symmetric::<S, f64>(&cofactors, b.gradient);
+        let excess = b.value - 1.0;
+        let next = (determinant * excess - dot::<S, f64>(u, b.gradient)) / dot::<S, f64>(b.gradient, v);
+        let delta = scaled::<S, f64>(add_scaled::<S, f64>(u, next, v), -1.0 / determinant);
+        // The determinant over the square of half the trace, as in the tangent plane's bracket.
+        let half_trace = 0.5 * (hessian[0] + hessian[3] + hessian[5]);
+        let curvature = determinant / (half_trace * half_trace) - 256.0 * f64::EPSILON * half_trace;
+        Step { delta, multiplier, curvature }
+    }
+
+    /// A step towards the solution from afar, where Newton's would be a long one: towards the least of `p^(2/d)`, d the degree of p,
+    /// which is about a square whatever d is, and damped (Levenberg and Marquardt) until it is short enough for the Hessians
+    /// to mean something where it leads.
+    #[inline(always)]
+    pub(super) fn damped<S: Simd>(&self, simd: S, at: &Evaluated, multiplier: Option<f64>) -> (V3<f64>, f64) {
+        let (a, b) = (&at.jet_a, &at.jet_b);
+        let (pulled, fitting) = self.balance(simd, a, b);
+        let multiplier = multiplier.unwrap_or(fitting);
+        let hessian = self.hessian(simd, a, b, multiplier);
+        let degree = self.p.degree() as f64;
+        let of_b = self.b.trust().radius;
+        let stiff_a = degree * (degree - 1.0) * a.value / self.far::<S>(at.z);
+        let stiff_b = square::<S>(pulled).sqrt() / of_b;
+        let (mut delta, mut next) = ([f64::NAN; 3], 0.0);
+        for damping in [0.0].into_iter().chain(DAMPINGS) {
+            let mut h = self.map.metric(damping * stiff_a, damping * stiff_b);
+            for (entry, of_hessian) in h.iter_mut().zip(hessian) {
+                *entry += of_hessian;
+            }
+            let (cofactors, determinant) = cofactors(simd, h);
+            let inverse = 1.0 / determinant;
+            let u = scaled::<S, f64>(apply_symmetric::<S, f64>(&cofactors, pulled), inverse);
+            let v = scaled::<S, f64>(apply_symmetric::<S, f64>(&cofactors, b.gradient), inverse);
+            // Of p^(2/d) the Hessian lacks this much of the square of the gradient; by the formula of Sherman and Morrison.
+            let (of_u, mixed) = (dot::<S, f64>(pulled, u), dot::<S, f64>(b.gradient, u));
+            let lacks = ((1.0 - 2.0 / degree) / a.value).min(MOST_BENT / of_u);
+            let more = 1.0 / (1.0 - lacks * of_u);
+            let v = add_scaled::<S, f64>(v, lacks * mixed * more, u);
+            let u = scaled::<S, f64>(u, more);
+            let excess = b.value - 1.0;
+            next = (excess - dot::<S, f64>(u, b.gradient)) / dot::<S, f64>(b.gradient, v);
+            delta = scaled::<S, f64>(add_scaled::<S, f64>(u, next, v), -1.0);
+            let length = self.length(simd, at.z, delta);
+            if length <= LONGEST {
+                return (delta, next);
+            }
+        }
+        (scaled::<S, f64>(delta, LONGEST / self.length(simd, at.z, delta)), next)
+    }
+
+    /// `G` and the multiplier that fits the gradients best.
+    #[inline(always)]
+    pub(super) fn balance<S: Simd>(&self, _: S, a: &NumberJet<f64>, b: &NumberJet<f64>) -> (V3<f64>, f64) {
+        let pulled = apply_transposed::<S, f64>(&self.map.both, a.gradient);
+        // Where p falls inward B's constraint holds nothing back.
+        let multiplier = (-dot::<S, f64>(pulled, b.gradient) / dot::<S, f64>(b.gradient, b.gradient)).max(0.0);
+        (pulled, multiplier)
+    }
+
+    /// `H`: xx, xy, xz, yy, yz, zz.
+    #[inline(always)]
+    pub(super) fn hessian<S: Simd>(&self, _: S, a: &NumberJet<f64>, b: &NumberJet<f64>, multiplier: f64) -> [f64; 6] {
+        let c = &self.map.both;
+        let [xx, xy, xz, yy, yz, zz] = a.hessian;
+        let bent = product::<S>(&[[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], c);
+        let mut hessian = b.hessian;
+        let mut k = 0;
+        for i in 0..3 {
+            for j in i..3 {
+                let pulled = fused::<S>(c[2][i], bent[2][j], fused::<S>(c[1][i], bent[1][j], c[0][i] * bent[0][j]));
+                hessian[k] = fused::<S>(multiplier, hessian[k], pulled);
+                k += 1;
+            }
+        }
+        hessian
+    }
+}
+
+#[inline(always)]
+pub(super) fn square<S: Simd>(v: V3<f64>) -> f64 {
+    dot::<S, f64>(v, v)
+}
+
+/// `M N`. No closures here: they would not be compiled for the widest arithmetic.
+#[inline(always)]
+fn product<S: Simd>(m: &M3<f64>, n: &M3<f64>) -> M3<f64> {
+    [apply_transposed::<S, f64>(n, m[0]), apply_transposed::<S, f64>(n, m[1]), apply_transposed::<S, f64>(n, m[2])]
+}
+
+#[inline(always)]
+fn fused<S: Simd>(a: f64, b: f64, c: f64) -> f64 {
+    <f64 as Number<S>>::mul_add(a, b, c)
+}
