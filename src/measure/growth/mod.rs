@@ -132,9 +132,8 @@ pub(super) fn between(
             Err(lost) => spent = lost.rounds,
         }
     }
-    if !options.exhausted(spent) {
-        let most = if a.is_smooth() && b.is_smooth() { SEEK_ROUNDS } else { EDGED_ROUNDS };
-        let most = most.min(options.max_iterations() - spent);
+    if a.is_smooth() && b.is_smooth() && !options.exhausted(spent) {
+        let most = SEEK_ROUNDS.min(options.max_iterations() - spent);
         match dispatch(Seek { a, b, relation: along, from: None, most, options }) {
             Ok((proven, trace)) => {
                 *warm = Hint::Smooth(trace).into();
@@ -182,9 +181,6 @@ pub(super) fn between(
     }
     search.answer(pose_a, pose_b)
 }
-
-/// Rounds of continuation from a cold start of bodies with edges: it gets there fast or not at all.
-const EDGED_ROUNDS: u32 = 4;
 
 /// The bodies with their centres on top of each other, and the vector Δ between the centres where they really are; query
 /// units, in the frame of the first body.
@@ -294,9 +290,6 @@ impl Search<'_> {
         if !self.ended() {
             self.interior_point(f64::INFINITY);
         }
-        if !self.ended() && !pair.smooth() {
-            self.cornered();
-        }
         if !self.ended() {
             self.interior_point(1.0);
         }
@@ -315,20 +308,6 @@ impl Search<'_> {
             self.newton(x, y, &found.n, a, b);
             if self.ended() || pair.smooth() {
                 return;
-            }
-        }
-    }
-
-    /// Newton's method from the corners of either body: where two sides are all but parallel, they show what touches first.
-    fn cornered(&mut self) {
-        let Some(n) = self.n else { return };
-        let pair = self.frame.pair;
-        let (x, y) = (self.x, self.y);
-        let (corner_a, corner_b) = corners(pair, &-n.normalize());
-        for (x, y) in [(x, corner_b), (corner_a, y)] {
-            let (a, b) = (Active::near(&pair.a, &x, &n), Active::near(&pair.b, &y, &-n));
-            if !self.ended() {
-                self.newton(x, y, &n, a, b);
             }
         }
     }
