@@ -22,6 +22,8 @@ pub use outline::{Cell, Outline};
 pub use placement::{Placement, Sample};
 pub use sphere::Sphere;
 pub use surface::Volume;
+#[cfg(feature = "fit")]
+pub(crate) use surface::{boundary_radius, sphere_rule};
 pub use trust::{ConstraintTrust, Trust};
 
 use crate::polynomial::{CertificateError, HessianGram, Polynomial};

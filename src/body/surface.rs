@@ -3,47 +3,56 @@
 use super::Constraint;
 use super::placement::Placement;
 use super::sphere::Sphere;
+use crate::polynomial::Polynomial;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
 
 /// Distance from the interior point `start` along `direction` to the boundary, all in the normalized frame: the smallest
 /// root of `g_i = 1` over the constraints. Infinite where no constraint bounds the ray.
-///
-/// Each `g_i` is convex along the ray and below 1 at its start, so Newton's method lands outside at once and then decreases
-/// monotonically to the root. Its first guess takes `g_i` for a pure power of the distance.
 pub(super) fn radius(constraints: &[Constraint], start: &Vector3<f64>, direction: &Vector3<f64>) -> f64 {
-    let mut smallest = f64::INFINITY;
-    for Constraint { polynomial, .. } in constraints {
-        let along = |r: f64| {
-            let jet = polynomial.evaluate(&(start + direction * r));
-            (jet.value - 1.0, jet.gradient.dot(direction))
-        };
-        let unit = smallest.min(1.0);
-        let (excess, _) = along(unit);
-        let depth = 1.0 - polynomial.evaluate(start).value;
-        let mut r = unit * (depth / (excess + depth)).max(1e-16).powf(1.0 / polynomial.degree() as f64);
-        let mut outside = false;
-        for _ in 0..200 {
-            let (excess, slope) = along(r);
-            if outside && excess <= 0.0 {
-                // Only rounding brings the descent from outside to the other side.
-                break;
-            }
-            outside = excess >= 0.0;
-            if excess < 0.0 && r >= smallest.min(1e9) {
-                // Another constraint is met first, or none bounds the ray.
-                r = f64::INFINITY;
-                break;
-            }
-            let next = if slope > 0.0 { (r - excess / slope).min(4.0 * r) } else { 4.0 * r };
-            if !next.is_finite() || (next - r).abs() <= 4e-16 * r || outside && next >= r {
-                break;
-            }
-            r = next;
+    constraints
+        .iter()
+        .fold(f64::INFINITY, |smallest, c| smallest.min(radius_within(&c.polynomial, start, direction, smallest)))
+}
+
+/// Distance from `start`, where the convex `polynomial` is below 1, along `direction` to where it is 1; infinite if that is
+/// nowhere.
+pub(crate) fn boundary_radius(polynomial: &Polynomial, start: &Vector3<f64>, direction: &Vector3<f64>) -> f64 {
+    radius_within(polynomial, start, direction, f64::INFINITY)
+}
+
+/// As [`boundary_radius`], infinite also if it is not below `smallest`.
+///
+/// The polynomial is convex along the ray and below 1 at its start, so Newton's method lands outside at once and then
+/// decreases monotonically to the root. Its first guess takes it for a pure power of the distance.
+fn radius_within(polynomial: &Polynomial, start: &Vector3<f64>, direction: &Vector3<f64>, smallest: f64) -> f64 {
+    let along = |r: f64| {
+        let jet = polynomial.evaluate(&(start + direction * r));
+        (jet.value - 1.0, jet.gradient.dot(direction))
+    };
+    let unit = smallest.min(1.0);
+    let (excess, _) = along(unit);
+    let depth = 1.0 - polynomial.evaluate(start).value;
+    let mut r = unit * (depth / (excess + depth)).max(1e-16).powf(1.0 / polynomial.degree() as f64);
+    let mut outside = false;
+    for _ in 0..200 {
+        let (excess, slope) = along(r);
+        if outside && excess <= 0.0 {
+            // Only rounding brings the descent from outside to the other side.
+            break;
         }
-        smallest = smallest.min(r);
+        outside = excess >= 0.0;
+        if excess < 0.0 && r >= smallest.min(1e9) {
+            // Another constraint is met first, or none bounds the ray.
+            return f64::INFINITY;
+        }
+        let next = if slope > 0.0 { (r - excess / slope).min(4.0 * r) } else { 4.0 * r };
+        if !next.is_finite() || (next - r).abs() <= 4e-16 * r || outside && next >= r {
+            break;
+        }
+        r = next;
     }
-    smallest
+    r
 }
 
 /// Points proven to lie in the body, close to its boundary, one per direction of the shared sphere.
@@ -110,20 +119,23 @@ pub struct Volume {
 pub(super) fn volume(constraints: &[Constraint], linear: &Matrix3<f64>, start: &Vector3<f64>) -> Volume {
     let scale = 1.0 / linear.determinant().abs();
     let rule = |rings: usize| {
-        let sectors = 2 * rings;
-        let mut sum = 0.0;
-        for (cosine, weight) in gauss_legendre(rings) {
-            let sine = (1.0 - cosine * cosine).sqrt();
-            for k in 0..sectors {
-                let angle = PI * (2 * k + 1) as f64 / sectors as f64;
-                let u = Vector3::new(sine * angle.cos(), sine * angle.sin(), cosine);
-                sum += weight * radius(constraints, start, &u).powi(3);
-            }
-        }
-        sum * 2.0 * PI / sectors as f64 / 3.0 * scale
+        sphere_rule(rings).map(|(u, weight)| weight * radius(constraints, start, &u).powi(3)).sum::<f64>() / 3.0 * scale
     };
     let (fine, coarse) = (rule(40), rule(20));
     Volume { volume_m3: fine, error_m3: (fine - coarse).abs() }
+}
+
+/// Nodes and weights of a rule for the unit sphere: `rings` by Gauss and Legendre, 2 `rings` sectors each. Weights add up to
+/// 4π.
+pub(crate) fn sphere_rule(rings: usize) -> impl Iterator<Item = (Vector3<f64>, f64)> {
+    let sectors = 2 * rings;
+    gauss_legendre(rings).into_iter().flat_map(move |(cosine, weight)| {
+        let sine = (1.0 - cosine * cosine).sqrt();
+        (0..sectors).map(move |k| {
+            let angle = PI * (2 * k + 1) as f64 / sectors as f64;
+            (Vector3::new(sine * angle.cos(), sine * angle.sin(), cosine), weight * 2.0 * PI / sectors as f64)
+        })
+    })
 }
 
 /// Nodes and weights of the Gauss-Legendre rule on [-1, 1] (Newton on the Legendre polynomial).

@@ -1,8 +1,10 @@
 //! Solves the program of a fit: damped Newton steps, adding the points that a step leaves outside.
 
-use super::program::{Dual, ProgramError, Step, lower_bound, newton_step};
-use super::start::near_optimum;
+use super::path::{NearOptimum, near_optimum, start};
+use super::program::{Dual, Problem, ProgramError};
+use super::quadratic::{Step, newton_step};
 use super::structure::Structure;
+use super::trace;
 use super::{FitError, Progress};
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::ops::ControlFlow;
@@ -13,8 +15,10 @@ const VIOLATION: f64 = 1e-6;
 const SLOPPY: f64 = 1e-4;
 /// Newton decrement at which to stop; the objective is then within about its square.
 const DECREMENT: f64 = 1e-3;
+/// Largest distance of f to its lower bound, relative to f (or 1, if that is more), of a fit.
+pub(super) const OPTIMALITY_GAP: f64 = 1e-5;
 /// Accuracy asked of the solver for the last steps, its default.
-const FINE: f64 = 1e-8;
+pub(super) const FINE: f64 = 1e-8;
 /// Accuracy asked of the solver while the steps are damped: they only have to lead downhill.
 const COARSE: f64 = 1e-3;
 /// Weight, as a part of all weights, below which a point of the start is left out of the program until it is violated.
@@ -32,6 +36,8 @@ const PREPARED: f64 = 1e-3;
 const SPREAD: usize = 10;
 /// Newton steps before giving up.
 const ROUNDS: usize = 60;
+/// Further Newton steps for an answer that looks final but whose gap is too large, before it is rejected.
+const IMPROVEMENTS: usize = 4;
 
 /// The optimum of a fit's program, feasible for all points up to [`VIOLATION`].
 #[derive(Clone, Debug)]
@@ -40,10 +46,10 @@ pub(super) struct Optimum {
     pub(super) coefficients: DVector<f64>,
     /// Gram matrix of its Hessian form.
     pub(super) hessian: DMatrix<f64>,
-    /// `-log det P` minus its lower bound from the dual.
-    pub(super) gap: Option<f64>,
-    /// `-log det P` in the whitened frame.
-    pub(super) objective: Option<f64>,
+    /// f minus its lower bound from the dual; at most [`OPTIMALITY_GAP`] in proportion.
+    pub(super) gap: f64,
+    /// f, in the whitened frame for log dets and in the unit frame for traces.
+    pub(super) objective: f64,
     /// The last quadratic program was solved to full accuracy.
     pub(super) full_accuracy: bool,
     /// Newton steps.
@@ -52,22 +58,26 @@ pub(super) struct Optimum {
     pub(super) iterations: u32,
 }
 
-/// Minimises `-log det P` over sos-convex p with `p <= 1` at `points` (whitened: the unit ball is their smallest
+/// Minimises the objective over sos-convex p with `p <= 1` at `points` (whitened: the unit ball is their smallest
 /// ellipsoid).
 pub(super) fn generate(
-    structure: &Structure,
+    problem: Problem,
     points: &[Vector3<f64>],
-    margin: f64,
     progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Optimum, FitError> {
+    let structure = problem.structure;
     let mut active = Active::start(structure, points);
-    let (mut dual, mut tolerance) = match prepared(structure, points, &mut active, margin, progress)? {
-        Some(start) => (active.keep(structure, start), FINE),
-        None => (active.uniform(structure), COARSE),
+    if !problem.spectral.is_self_concordant() {
+        return linear(problem, points, active, progress);
+    }
+    let (mut dual, mut tolerance) = match prepared(&problem, points, &mut active, progress)? {
+        Some(start) => (active.keep(&problem, start), FINE),
+        None => (active.uniform(&problem), COARSE),
     };
     let mut iterations = 0;
+    let mut rejected = 0;
     for round in 1..=ROUNDS {
-        let step = newton_step(structure, &active.values, margin, &dual.moments, tolerance)?;
+        let step = newton_step(&problem, &active.values, &dual, tolerance)?;
         iterations += step.iterations;
         let outside = violations(structure, points, &step.coefficients);
         let worst = outside.first().map_or(0.0, |&(excess, _)| excess);
@@ -78,39 +88,85 @@ pub(super) fn generate(
         }
         // Points that are in the program and still outside are the solver's accuracy, which the pull-in pays for.
         let fits = worst <= VIOLATION || worst <= SLOPPY && outside.iter().all(|&(_, index)| active.used[index]);
-        if step.decrement <= DECREMENT && fits && tolerance <= FINE {
-            let bound = lower_bound(structure, &step.target, margin)?;
-            return Ok(Optimum {
-                gap: step.primal.map(|primal| primal - bound),
-                objective: step.primal,
-                coefficients: step.coefficients,
-                hessian: step.hessian,
-                full_accuracy: step.full_accuracy,
-                rounds: round,
-                iterations,
-            });
+        if fits && tolerance <= FINE {
+            // The gap decides; a step that is done by its own measure and has none is taken a few more times.
+            let done = step.decrement <= DECREMENT;
+            let bound = problem.lower_bound(&step.target).unwrap_or(f64::NEG_INFINITY);
+            match verified(&step, bound, round, iterations) {
+                Ok(optimum) => return Ok(optimum),
+                Err(gap) if done && rejected == IMPROVEMENTS => return Err(FitError::NotOptimal { gap }),
+                Err(_) => rejected += usize::from(done),
+            }
         }
         // The next decrement is about the square of this one: more accuracy than that is wasted on it.
         tolerance = (1e-2 * step.decrement.powi(4)).clamp(FINE, COARSE);
-        dual = damped(structure, &dual, &step, margin)?;
+        dual = problem.damped(&dual, &step.target);
         active.add(structure, points, &outside, &mut dual);
     }
     Err(FitError::NoConvergence { rounds: ROUNDS })
 }
 
+/// As [`generate`], where every round is one linear program: only points are left to add.
+fn linear(
+    mut problem: Problem,
+    points: &[Vector3<f64>],
+    mut active: Active,
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+) -> Result<Optimum, FitError> {
+    let structure = problem.structure;
+    let first = start(structure, &active.values).ok_or(ProgramError::Singular)?;
+    // At the path's start the weights have the right sum, so the scale is a square.
+    problem = sized(problem, &first, -2).ok_or(ProgramError::Singular)?;
+    let mut iterations = 0;
+    for round in 1..=ROUNDS {
+        let (mut step, bound) = trace::solve(&problem, &active.values)?;
+        iterations += step.iterations;
+        let outside = violations(structure, points, &step.coefficients);
+        let worst = outside.first().map_or(0.0, |&(excess, _)| excess);
+        let report =
+            Progress { round, active_points: active.values.ncols(), worst_violation: worst, decrement: Some(0.0) };
+        if progress(report).is_break() {
+            return Err(FitError::Cancelled);
+        }
+        if worst <= VIOLATION || worst <= SLOPPY && outside.iter().all(|&(_, index)| active.used[index]) {
+            return verified(&step, bound, round, iterations).map_err(|gap| FitError::NotOptimal { gap });
+        }
+        active.add(structure, points, &outside, &mut step.target);
+    }
+    Err(FitError::NoConvergence { rounds: ROUNDS })
+}
+
+/// The optimum if the dual solution proves it one, whatever the solver says of it; else the gap that is left.
+fn verified(step: &Step, bound: f64, rounds: usize, iterations: u32) -> Result<Optimum, f64> {
+    let Some(objective) = step.primal else { return Err(f64::INFINITY) };
+    let gap = objective - bound;
+    if !(gap.abs() <= OPTIMALITY_GAP * objective.abs().max(1.0)) {
+        return Err(gap);
+    }
+    Ok(Optimum {
+        gap,
+        objective,
+        coefficients: step.coefficients.clone(),
+        hessian: step.hessian.clone(),
+        full_accuracy: step.full_accuracy,
+        rounds,
+        iterations,
+    })
+}
+
 /// A start near the optimum. It already brings in the points that would be violated most: a round here costs
 /// far less than one with the solver.
 fn prepared(
-    structure: &Structure,
+    problem: &Problem,
     points: &[Vector3<f64>],
     active: &mut Active,
-    margin: f64,
     progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Option<Dual>, FitError> {
+    let structure = problem.structure;
     for _ in 0..PREPARATIONS {
-        let Some(mut start) = near_optimum(structure, &active.values, margin, ROUGH_GAP) else { return Ok(None) };
-        let Some(gram) = structure.gram.spread(&start.moments).cholesky() else { return Ok(None) };
-        let outside = violations(structure, points, &structure.gram.collapse(&gram.inverse()));
+        let Some(near) = near_optimum(problem, &active.values, ROUGH_GAP) else { return Ok(None) };
+        let NearOptimum { dual: mut start, coefficients } = near;
+        let outside = violations(structure, points, &coefficients);
         let worst_violation = outside.first().map_or(0.0, |&(excess, _)| excess);
         let active_points = active.values.ncols();
         if progress(Progress { round: 0, active_points, worst_violation, decrement: None }).is_break() {
@@ -121,35 +177,13 @@ fn prepared(
         }
         active.add(structure, points, &outside, &mut start);
     }
-    Ok(near_optimum(structure, &active.values, margin, GAP))
+    Ok(near_optimum(problem, &active.values, GAP).map(|near| near.dual))
 }
 
-/// The point between `from` and the step's target that minimises the dual objective.
-fn damped(structure: &Structure, from: &Dual, step: &Step, margin: f64) -> Result<Dual, ProgramError> {
-    let at = structure.gram.spread(&from.moments);
-    let factor = at.cholesky().ok_or(ProgramError::Singular)?.l();
-    let change = structure.gram.spread(&(&step.target.moments - &from.moments));
-    let half = factor.solve_lower_triangular(&change).ok_or(ProgramError::Singular)?;
-    let relative = factor.solve_lower_triangular(&half.transpose()).ok_or(ProgramError::Singular)?;
-    let rates = relative.symmetric_eigenvalues();
-    let cost = |dual: &Dual| dual.weights.sum() - margin * structure.hessian.trace(&dual.form);
-    let slope = cost(&step.target) - cost(from);
-    // φ(t) = -Σ log(1 + t rate) + t slope is convex: bisect its derivative on [0, 1].
-    let derivative = |t: f64| slope - rates.iter().map(|r| r / (1.0 + t * r)).sum::<f64>();
-    let steepest = rates.min();
-    let (mut low, mut high) = (0.0, if steepest < 0.0 { (-0.99 / steepest).min(1.0) } else { 1.0 });
-    if derivative(high) > 0.0 {
-        for _ in 0..40 {
-            let middle = 0.5 * (low + high);
-            if derivative(middle) > 0.0 { high = middle } else { low = middle }
-        }
-    }
-    let blend = |a: &DVector<f64>, b: &DVector<f64>| a + (b - a) * high;
-    Ok(Dual {
-        weights: blend(&from.weights, &step.target.weights),
-        form: blend(&from.form, &step.target.form),
-        moments: blend(&from.moments, &step.target.moments),
-    })
+/// The problem with f scaled by a power of its size at `dual`.
+fn sized<'a>(problem: Problem<'a>, dual: &Dual, power: i32) -> Option<Problem<'a>> {
+    let size = problem.spectral.size(&problem.measured(dual))?;
+    Some(Problem { spectral: problem.spectral.scaled(size.powi(power)), ..problem })
 }
 
 /// Points with p above 1, the farthest first.
@@ -209,13 +243,14 @@ impl Active {
     }
 
     /// Leaves out the points with next to no weight, which are most of them.
-    fn keep(&mut self, structure: &Structure, start: Dual) -> Dual {
+    fn keep(&mut self, problem: &Problem, start: Dual) -> Dual {
         let least = NEGLIGIBLE * start.weights.sum();
         let kept: Vec<usize> = (0..self.chosen.len()).filter(|&i| start.weights[i] > least).collect();
         let weights = DVector::from_iterator(kept.len(), kept.iter().map(|&i| start.weights[i]));
         let values = self.values.select_columns(&kept);
-        let moments = &values * &weights - structure.pull_back(&start.form);
-        if super::program::log_det(&structure.gram.spread(&moments)).is_none() {
+        let moments = &values * &weights - problem.structure.pull_back(&start.form);
+        let kept_dual = Dual { weights, moments, form: start.form.clone() };
+        if problem.spectral.bound(&problem.measured(&kept_dual)).is_none() {
             return start;
         }
         for (position, index) in self.indices.iter().enumerate() {
@@ -226,11 +261,16 @@ impl Active {
         self.indices = kept.iter().map(|&i| self.indices[i]).collect();
         self.chosen = kept.iter().map(|&i| self.chosen[i]).collect();
         self.values = values;
-        Dual { weights, moments, form: start.form }
+        kept_dual
     }
 
-    /// Equal weights, scaled to the optimum along their ray: they add up to N.
-    fn uniform(&self, structure: &Structure) -> Dual {
+    /// Equal weights, scaled to the optimum along their ray: they add up to N. With it goes the functional of the path's
+    /// start if there is one, and none otherwise.
+    fn uniform(&self, problem: &Problem) -> Dual {
+        let structure = problem.structure;
+        if let Some(start) = start(structure, &self.values) {
+            return start;
+        }
         let count = self.values.ncols();
         let weights = DVector::repeat(count, structure.gram.size as f64 / count as f64);
         Dual { moments: &self.values * &weights, weights, form: DVector::zeros(structure.hessian.keys) }

@@ -1,28 +1,40 @@
 //! Points to a certified body: hull, whitening, semidefinite program, certificate, proof.
 //!
 //! The way of one fit: [`read`] the points; [`hull`] leaves those that matter; the smallest [`ellipsoid`] around them
-//! gives the normalized frame; `generate` minimises -log det P over sos-convex polynomials with a margin by Newton steps
-//! that `program` hands to clarabel; the constant coefficient pulls every input point inside; [`Body::new`] proves the
-//! stored numbers. Nothing the solver says is believed: a fit returns a body only with its proofs.
+//! gives the normalized frame; `generate` minimises an [`Objective`] over sos-convex polynomials with a margin by Newton
+//! steps that `quadratic` hands to clarabel; the constant coefficient pulls every input point inside; [`Body::new`] proves
+//! the stored numbers. Nothing the solver says is believed: a fit returns a body only with its proofs.
 
+mod basis;
 pub mod ellipsoid;
 mod generate;
 pub mod hull;
+mod model;
+mod objective;
+mod path;
 mod program;
+mod quadratic;
 pub mod read;
-mod start;
+mod refine;
+mod spectral;
 mod structure;
+mod trace;
+mod volume;
 
 pub use hull::HullError;
+pub use objective::{Objective, UnknownObjective};
 pub use program::ProgramError;
 pub use read::{ReadError, read_points};
 
 use crate::body::{Body, BodyError, Constraint, Normalization, NotContained, Placement, Provenance, check_name};
 use crate::polynomial::{HessianGram, Polynomial, PolynomialError};
+use basis::Affine;
 use ellipsoid::{Ellipsoid, minimum_ellipsoid};
 use generate::{Optimum, generate};
 use hull::Frame;
 use nalgebra::{Matrix3, Vector3};
+use program::Problem;
+use refine::refine;
 use std::ops::ControlFlow;
 use std::time::Instant;
 use structure::Structure;
@@ -38,9 +50,14 @@ const MARGIN_ATTEMPTS: [f64; 3] = [1.0, 10.0, 100.0];
 pub struct FitOptions {
     /// Degree of the polynomial: 2, 4, 6 or 8.
     pub degree: usize,
+    /// What is minimised. Those of the Hessian's Gram matrix are offered up to degree 6.
+    pub objective: Objective,
+    /// Whether to minimise the volume itself, starting from the optimum of the objective.
+    pub refine: bool,
     /// Smallest eigenvalue asked of the Gram matrix of the Hessian form in the whitened frame; in (0, 1e-2].
     ///
-    /// It pays for the rounding of the certificate. Volumes grow by about a part in 10⁴ at 1e-4.
+    /// It pays for the rounding of the certificate. Volumes grow by about a part in 10⁴ at 1e-4. The objectives of that very
+    /// matrix keep it definite by themselves.
     pub margin: f64,
     /// Name of the input, for the provenance of the body.
     pub input: String,
@@ -48,7 +65,7 @@ pub struct FitOptions {
 
 impl Default for FitOptions {
     fn default() -> Self {
-        Self { degree: 6, margin: DEFAULT_MARGIN, input: String::new() }
+        Self { degree: 6, objective: Objective::default(), refine: false, margin: DEFAULT_MARGIN, input: String::new() }
     }
 }
 
@@ -56,10 +73,13 @@ impl FitOptions {
     /// Checks the options and the name of a body to be fitted, before any work.
     ///
     /// # Errors
-    /// [`FitError::Degree`], [`FitError::Margin`] or [`FitError::Name`].
+    /// [`FitError::Degree`], [`FitError::Objective`], [`FitError::Margin`] or [`FitError::Name`].
     pub fn check(&self, name: &str) -> Result<(), FitError> {
         if ![2, 4, 6, 8].contains(&self.degree) {
             return Err(FitError::Degree(self.degree));
+        }
+        if self.degree > self.objective.max_degree() {
+            return Err(FitError::Objective { objective: self.objective, degree: self.degree });
         }
         if !(self.margin > 0.0 && self.margin <= 1e-2) {
             return Err(FitError::Margin(self.margin));
@@ -88,15 +108,15 @@ pub struct Progress {
 pub enum FitStatus {
     /// The last program was solved to full accuracy.
     Solved,
-    /// The solver stopped a little early; what it gave was proven all the same.
-    AlmostSolved,
+    /// The solver stopped a little early; its answer was verified to be as close to the optimum all the same.
+    Verified,
 }
 
 impl std::fmt::Display for FitStatus {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Solved => "solved",
-            Self::AlmostSolved => "almost_solved",
+            Self::Verified => "verified",
         })
     }
 }
@@ -112,20 +132,26 @@ pub struct FitReport {
     pub hull_vertices: usize,
     /// Volume of the body, m³.
     pub volume_m3: f64,
+    /// Estimate of the error of its quadrature, m³.
+    pub volume_error_m3: f64,
+    /// Volumes of the refinement before its first step and after each, m³, by the rule that it minimises; none without.
+    pub refinement_m3: Vec<f64>,
     /// Volume of the convex hull, m³.
     pub hull_volume_m3: f64,
     /// Wall time, seconds.
     pub seconds: f64,
     /// How the solver ended.
     pub status: FitStatus,
-    /// `-log det P` in the whitened frame minus its lower bound from the dual; none when P is not definite.
-    pub optimality_gap: Option<f64>,
+    /// [`FitReport::objective_value`] minus its lower bound from the dual; at most 1e-5 max(1, |value|).
+    pub optimality_gap: f64,
     /// Newton steps, each one quadratic program.
     pub rounds: usize,
     /// Interior-point iterations of all of them.
     pub iterations: u32,
-    /// `-log det P` in the whitened frame; none when P is not definite.
-    pub objective: Option<f64>,
+    /// What was minimised.
+    pub objective: Objective,
+    /// Its optimal value: log dets in the whitened frame, traces in the unit frame.
+    pub objective_value: f64,
     /// Margin the certificate was proven with.
     pub margin: f64,
 }
@@ -145,6 +171,15 @@ pub enum FitError {
     /// The degree is not one of 2, 4, 6, 8.
     #[error("degree: {0} is not one of 2, 4, 6, 8; bodies have even degree, 6 suits most objects")]
     Degree(usize),
+    /// The objective is not offered at this degree.
+    #[error("objective: {objective} is offered up to degree {}, not {degree}; take logdet-p or lower the degree",
+        objective.max_degree())]
+    Objective {
+        /// The objective.
+        objective: Objective,
+        /// The degree.
+        degree: usize,
+    },
     /// The margin is outside its range.
     #[error("margin: {0} is not in (0, 0.01]; leave it at {DEFAULT_MARGIN:e} unless a certificate fails")]
     Margin(f64),
@@ -177,6 +212,12 @@ pub enum FitError {
         /// Steps taken.
         rounds: usize,
     },
+    /// The solver's answer could neither be verified optimal nor improved.
+    #[error("the fit is only known to be within {gap:.1e} of the optimal objective; lower the degree")]
+    NotOptimal {
+        /// Objective minus its lower bound from the dual.
+        gap: f64,
+    },
     /// The solver's polynomial is none.
     #[error("the solver's polynomial is unusable: {0}; lower the degree")]
     Polynomial(#[from] PolynomialError),
@@ -188,8 +229,10 @@ pub enum FitError {
     NotContained(#[from] NotContained),
 }
 
-/// Fits a body of one polynomial around `points` (metres), with minimal `-log det P` in the whitened frame, which is
-/// minimal in every affine frame.
+/// Fits a body of one polynomial around `points` (metres) with the least [`FitOptions::objective`].
+///
+/// Log dets are least in every affine frame at once. Traces depend on the frame: they are measured in the unit frame, in
+/// which the points have their mean at the origin and largest norm 1.
 ///
 /// `progress` hears of every Newton step (tens of milliseconds at degree 4 to seconds at degree 8) and can stop the fit.
 ///
@@ -211,21 +254,30 @@ pub fn fit(
     let whitened: Vec<Vector3<f64>> =
         hull.vertices.iter().map(|&i| normalization.linear * (points[i] - normalization.center)).collect();
     let structure = Structure::new(options.degree);
+    let unit = unit_frame(points, &normalization).ok_or(ProgramError::Singular)?;
 
     let mut attempts = MARGIN_ATTEMPTS.iter().map(|factor| factor * options.margin);
-    let (body, optimum, margin) = loop {
+    let (body, optimum, margin, volumes) = loop {
         let margin = attempts.next().unwrap_or(options.margin);
-        let optimum = generate(&structure, &whitened, margin, progress)?;
+        let problem = Problem::new(&structure, options.objective, &unit, margin);
+        let mut optimum = generate(problem, &whitened, progress)?;
+        let mut volumes = Vec::new();
+        if options.refine {
+            let (coefficients, hessian) = (optimum.coefficients.clone(), optimum.hessian.clone());
+            let refined = refine(&structure, &whitened, margin, coefficients, hessian, progress)?;
+            (optimum.coefficients, optimum.hessian) = (refined.coefficients, refined.hessian);
+            volumes = refined.volumes;
+        }
         match certify(name, points, &normalization, &structure, &optimum) {
-            Ok(body) => break (body, optimum, margin),
+            Ok(body) => break (body, optimum, margin, volumes),
             Err(FitError::Unproven(BodyError::Certificate { .. })) if attempts.len() > 0 => {}
             Err(error) => return Err(error),
         }
     };
     let body = body.with_provenance(Provenance {
         input: options.input.clone(),
-        objective: "logdet-p".to_owned(),
-        refined: false,
+        objective: options.objective.name().to_owned(),
+        refined: volumes.len() > 1,
         hull_vertices: hull.vertices.len(),
         hull_volume_m3: hull.volume,
     });
@@ -234,10 +286,13 @@ pub fn fit(
         points: points.len(),
         hull_vertices: hull.vertices.len(),
         volume_m3: body.volume().volume_m3,
+        volume_error_m3: body.volume().error_m3,
+        refinement_m3: volumes.iter().map(|volume| volume / normalization.linear.determinant().abs()).collect(),
         hull_volume_m3: hull.volume,
         seconds: start.elapsed().as_secs_f64(),
-        status: if optimum.full_accuracy { FitStatus::Solved } else { FitStatus::AlmostSolved },
-        objective: optimum.objective,
+        status: if optimum.full_accuracy { FitStatus::Solved } else { FitStatus::Verified },
+        objective: options.objective,
+        objective_value: optimum.objective,
         optimality_gap: optimum.gap,
         rounds: optimum.rounds,
         iterations: optimum.iterations,
@@ -256,6 +311,15 @@ fn whitening(frame: &Frame, ellipsoid: &Ellipsoid) -> Option<Normalization> {
         turn.row_mut(2).neg_mut();
     }
     Some(Normalization { center, linear: Matrix3::from_diagonal(&decomposition.singular_values) * turn })
+}
+
+/// The map from the whitened frame to the unit frame.
+fn unit_frame(points: &[Vector3<f64>], whitened: &Normalization) -> Option<Affine> {
+    let count = points.len() as f64;
+    // About the center, which is near: far-off coordinates would round the mean away.
+    let offset = points.iter().map(|p| (p - whitened.center) / count).sum::<Vector3<f64>>();
+    let reach = points.iter().map(|p| (p - whitened.center - offset).norm()).fold(0.0, f64::max);
+    Some(Affine { linear: whitened.linear.try_inverse()? / reach, offset: -offset / reach })
 }
 
 fn check(points: &[Vector3<f64>]) -> Result<(), FitError> {

@@ -1,29 +1,34 @@
-//! The semidefinite program of one fit, as a sequence of quadratic ones that clarabel solves.
+//! The semidefinite program of one fit and its dual.
 //!
-//! The paper's program (its section III, convex case) in the whitened frame, with a margin ε:
-//!
-//! ```text
-//! minimise  -log det P   subject to  p = zᵀPz,  yᵀ∇²p y = wᵀHw,  H ⪰ εI,  p(xᵢ) <= 1
-//! ```
-//!
-//! Its dual has far fewer variables: weights w >= 0 of the points and a functional s on the Hessian form, and
+//! The programs of the paper (its section III, convex case) in the whitened frame, with a margin ε:
 //!
 //! ```text
-//! minimise  -log det M(m) + Σwᵢ - ε tr S(s)   subject to  m = Σ wᵢ v(xᵢ) - D*s,  S(s) ⪰ 0,  w >= 0
+//! minimise  f(P) or f(H)   subject to  p = zᵀPz,  yᵀ∇²p y = wᵀHw,  P ⪰ 0,  H ⪰ εI,  p(xᵢ) <= 1
 //! ```
 //!
-//! where M and S are (pseudo-)moment matrices, v the monomials of p and D the map from p to its Hessian form. At the
-//! optimum P = M⁻¹. `-log det` is self-concordant, so damped Newton steps converge from any positive definite M, and a
-//! Newton step is a quadratic program over one small semidefinite cone: no exponential cones and no 2N block for the
-//! determinant. The multipliers of each such program are a polynomial p and a Gram matrix H that satisfy **all**
-//! constraints of the paper's program for the points used, however far the Newton iteration still has to go.
+//! Their duals have far fewer variables: weights w >= 0 of the points and a functional s on the Hessian form. With
+//! φ the concave conjugate of f (`spectral`), for the Gram matrix P
+//!
+//! ```text
+//! maximise  φ(M(m)) - Σwᵢ + ε tr S(s)   subject to  m = Σ wᵢ v(xᵢ) - D*s,  S(s) ⪰ 0,  w >= 0
+//! ```
+//!
+//! where M and S are (pseudo-)moment matrices, v the monomials of p and D the map from p to its Hessian form; P is then
+//! implied definite. For the Gram matrix H the two change roles, and f alone keeps H definite, so there is no ε:
+//!
+//! ```text
+//! maximise  φ(S(s)) - Σwᵢ   subject to  m = Σ wᵢ v(xᵢ) - D*s,  M(m) ⪰ 0,  w >= 0
+//! ```
+//!
+//! The optimal Gram matrix is the gradient of φ at the optimum. Newton steps on φ need one quadratic program over one
+//! small semidefinite cone each (`quadratic`): no exponential cones, and no block of twice the size for determinant or
+//! inverse.
 
-use super::structure::Structure;
-use clarabel::algebra::CscMatrix;
-use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
+use super::basis::{Affine, change};
+use super::objective::{Function, Matrix, Objective};
+use super::spectral::Spectral;
+use super::structure::{Pattern, Structure};
 use nalgebra::{Cholesky, DMatrix, DVector};
-// Links the BLAS that clarabel's semidefinite cones call.
-use openblas_src as _;
 
 /// Why a program could not be solved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -47,142 +52,98 @@ pub(super) struct Dual {
     pub(super) moments: DVector<f64>,
 }
 
-/// What one quadratic program gives.
+impl Dual {
+    /// The point at part `t` of the way to `other`.
+    pub(super) fn towards(&self, other: &Self, t: f64) -> Self {
+        let blend = |a: &DVector<f64>, b: &DVector<f64>| a + (b - a) * t;
+        Self {
+            weights: blend(&self.weights, &other.weights),
+            form: blend(&self.form, &other.form),
+            moments: blend(&self.moments, &other.moments),
+        }
+    }
+}
+
+/// One fit's program but for its points.
 #[derive(Clone, Debug)]
-pub(super) struct Step {
-    /// The minimiser of the quadratic model.
-    pub(super) target: Dual,
-    /// Coefficients of p, feasible for the points of the program.
-    pub(super) coefficients: DVector<f64>,
-    /// Gram matrix of its Hessian form, `⪰ εI`.
-    pub(super) hessian: DMatrix<f64>,
-    /// Newton decrement: distance to the target in the local norm of -log det.
-    pub(super) decrement: f64,
-    /// `-log det` of the Gram matrix of p, if that is positive definite.
-    pub(super) primal: Option<f64>,
-    /// Solved to full accuracy (not only "almost").
-    pub(super) full_accuracy: bool,
-    /// Interior-point iterations.
-    pub(super) iterations: u32,
+pub(super) struct Problem<'a> {
+    pub(super) structure: &'a Structure,
+    /// Which Gram matrix the objective measures.
+    pub(super) matrix: Matrix,
+    /// What it measures of it.
+    pub(super) spectral: Spectral,
+    /// ε; 0 when H is measured.
+    pub(super) margin: f64,
 }
 
-/// The dual objective, as the lower bound of the primal: `log det M + N - Σw + ε tr S`.
-pub(super) fn lower_bound(structure: &Structure, dual: &Dual, margin: f64) -> Result<f64, ProgramError> {
-    let n = structure.gram.size as f64;
-    Ok(log_det(&structure.gram.spread(&dual.moments)).ok_or(ProgramError::Singular)? + n - dual.weights.sum()
-        + margin * structure.hessian.trace(&dual.form))
-}
-
-/// `log det` of a positive definite matrix.
-pub(super) fn log_det(matrix: &DMatrix<f64>) -> Option<f64> {
-    let factor = Cholesky::new(matrix.clone())?;
-    let value = 2.0 * factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
-    value.is_finite().then_some(value)
-}
-
-/// Minimises the quadratic model of the dual at moments `at`, over the points whose monomials are the columns of
-/// `values`, to the solver's tolerance `tolerance`.
-pub(super) fn newton_step(
-    structure: &Structure,
-    values: &DMatrix<f64>,
-    margin: f64,
-    at: &DVector<f64>,
-    tolerance: f64,
-) -> Result<Step, ProgramError> {
-    let (count, points, forms) = (structure.monomials.len(), values.ncols(), structure.hessian.keys);
-    let gram = Cholesky::new(structure.gram.spread(at)).ok_or(ProgramError::Singular)?.inverse();
-    let gradient = structure.gram.collapse(&gram);
-    let curvature = structure.gram.congruence(&gram);
-    // In the coordinates u = R m, curvature = RᵀR, the model is perfectly conditioned. The rows stay those of m, where D
-    // has one entry per column: that keeps the factorization sparse.
-    let lower = regularised_factor(&curvature).ok_or(ProgramError::Singular)?;
-    let whitened_gradient = lower.solve_lower_triangular(&gradient).ok_or(ProgramError::Singular)?;
-    let upper = lower.transpose();
-    let whitened_at = &upper * at;
-    let inverse = upper.solve_upper_triangular(&DMatrix::identity(count, count)).ok_or(ProgramError::Singular)?;
-
-    let h = structure.hessian.size;
-    let mut columns = Columns::new(count + points + h * (h + 1) / 2);
-    for i in 0..count {
-        columns.push((0..=i).map(|row| (row, inverse[(row, i)])));
+impl<'a> Problem<'a> {
+    /// The program of an objective; `unit` maps the whitened frame to the unit frame, in which traces are measured.
+    pub(super) fn new(structure: &'a Structure, objective: Objective, unit: &Affine, margin: f64) -> Self {
+        let matrix = objective.matrix();
+        let spectral = match objective.function() {
+            Function::LogDet => Spectral::log_det(),
+            Function::TraceInverse => Spectral::trace_inverse(change(structure, matrix, unit)),
+        };
+        let margin = match matrix {
+            Matrix::Polynomial => margin,
+            Matrix::Hessian => 0.0,
+        };
+        Self { structure, matrix, spectral, margin }
     }
-    for i in 0..points {
-        columns.push(values.column(i).iter().map(|v| -v).enumerate().chain([(count + i, -1.0)]));
-    }
-    let cone = count + points;
-    let mut entries = vec![Vec::new(); forms];
-    let mut row = cone;
-    for j in 0..h {
-        for i in 0..=j {
-            let scale = if i == j { 1.0 } else { std::f64::consts::SQRT_2 };
-            entries[structure.hessian.key(i, j)].push((row, -scale));
-            row += 1;
+
+    /// The pattern of the measured matrix.
+    pub(super) fn pattern(&self) -> &'a Pattern {
+        match self.matrix {
+            Matrix::Polynomial => &self.structure.gram,
+            Matrix::Hessian => &self.structure.hessian,
         }
     }
-    for (&(monomial, scale), entries) in structure.derivative.iter().zip(entries) {
-        columns.push([(monomial, scale)].into_iter().chain(entries));
-    }
 
-    let variables = count + points + forms;
-    let mut linear = vec![0.0; variables];
-    for i in 0..count {
-        linear[i] = -whitened_gradient[i] - whitened_at[i];
-    }
-    linear[count..cone].fill(1.0);
-    for i in 0..h {
-        linear[cone + structure.hessian.key(i, i)] -= margin;
-    }
-    let quadratic = CscMatrix::new(
-        variables,
-        variables,
-        (0..=variables).map(|i| i.min(count)).collect(),
-        (0..count).collect(),
-        vec![1.0; count],
-    );
-    let cones = [
-        SupportedConeT::ZeroConeT(count),
-        SupportedConeT::NonnegativeConeT(points),
-        SupportedConeT::PSDTriangleConeT(h),
-    ];
-    let matrix = columns.finish();
-    let rows = matrix.m;
-    let mut solver = DefaultSolver::new(&quadratic, &linear, &matrix, &vec![0.0; rows], &cones, settings(tolerance))
-        .map_err(|error| ProgramError::Solver(error.to_string()))?;
-    solver.solve();
-    let solution = &solver.solution;
-    let full_accuracy = match solution.status {
-        SolverStatus::Solved => true,
-        // Progress can end a little early; whoever uses the polynomial proves it first.
-        SolverStatus::AlmostSolved | SolverStatus::InsufficientProgress => false,
-        other => return Err(ProgramError::Solver(format!("{other:?}"))),
-    };
-
-    let weights = DVector::from_iterator(points, solution.x[count..cone].iter().map(|w| w.max(0.0)));
-    let form = DVector::from_column_slice(&solution.x[cone..]);
-    let moments = values * &weights - structure.pull_back(&form);
-    let coefficients = DVector::from_column_slice(&solution.z[..count]);
-    let mut hessian = DMatrix::zeros(h, h);
-    let mut row = cone;
-    for j in 0..h {
-        for i in 0..=j {
-            let value = if i == j { solution.z[row] + margin } else { solution.z[row] / std::f64::consts::SQRT_2 };
-            hessian[(i, j)] = value;
-            hessian[(j, i)] = value;
-            row += 1;
+    /// Which part of a dual point is the measured matrix' moments.
+    pub(super) fn variable<'b>(&self, dual: &'b Dual) -> &'b DVector<f64> {
+        match self.matrix {
+            Matrix::Polynomial => &dual.moments,
+            Matrix::Hessian => &dual.form,
         }
     }
-    let decrement = (&upper * (&moments - at)).norm();
-    // The Gram matrix the model predicts: its coefficients are those of p.
-    let predicted = &gram * 2.0 - &gram * structure.gram.spread(&moments) * &gram;
-    Ok(Step {
-        target: Dual { weights, form, moments },
-        coefficients,
-        hessian,
-        decrement,
-        primal: log_det(&predicted).map(|value| -value),
-        full_accuracy,
-        iterations: solution.iterations,
-    })
+
+    /// Moment matrix of the measured matrix.
+    pub(super) fn measured(&self, dual: &Dual) -> DMatrix<f64> {
+        self.pattern().spread(self.variable(dual))
+    }
+
+    /// The linear part of the dual objective, `Σw - ε tr S`.
+    pub(super) fn cost(&self, dual: &Dual) -> f64 {
+        let trace = if self.margin > 0.0 { self.margin * self.structure.hessian.trace(&dual.form) } else { 0.0 };
+        dual.weights.sum() - trace
+    }
+
+    /// The dual objective: a lower bound of f over all feasible polynomials.
+    pub(super) fn lower_bound(&self, dual: &Dual) -> Result<f64, ProgramError> {
+        let bound = self.spectral.bound(&self.measured(dual)).ok_or(ProgramError::Singular)?;
+        Ok((bound - self.cost(dual)) / self.spectral.scale())
+    }
+
+    /// The point between `from` and `to` with the largest dual objective.
+    pub(super) fn damped(&self, from: &Dual, to: &Dual) -> Dual {
+        let slope = self.cost(to) - self.cost(from);
+        let (start, end) = (self.measured(from), self.measured(to));
+        let change = &end - &start;
+        // -φ(t) + t slope is convex: bisect its derivative on [0, 1].
+        let falls = |t: f64| {
+            let gram = self.spectral.minimiser(&(&start + &change * t));
+            gram.is_some_and(|gram| slope - gram.dot(&change) <= 0.0)
+        };
+        let (mut low, mut high) = (0.0, 1.0);
+        if falls(1.0) {
+            return to.clone();
+        }
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            if falls(middle) { low = middle } else { high = middle }
+        }
+        from.towards(to, low)
+    }
 }
 
 /// Lower Cholesky factor of a matrix that is positive definite up to rounding: its diagonal grows until it is. A slightly
@@ -195,44 +156,4 @@ pub(super) fn regularised_factor(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> 
         }
         Some(Cholesky::new(matrix)?.unpack()).filter(|factor| factor.iter().all(|v| v.is_finite()))
     })
-}
-
-fn settings(tolerance: f64) -> DefaultSettings<f64> {
-    DefaultSettings {
-        verbose: false,
-        max_threads: 1,
-        tol_gap_abs: tolerance,
-        tol_gap_rel: tolerance,
-        tol_feas: tolerance,
-        direct_solve_method: "faer".to_string(),
-        // One dense cone: there is nothing to decompose.
-        chordal_decomposition_enable: false,
-        ..DefaultSettings::default()
-    }
-}
-
-/// A sparse matrix built column by column.
-struct Columns {
-    rows: usize,
-    starts: Vec<usize>,
-    indices: Vec<usize>,
-    values: Vec<f64>,
-}
-
-impl Columns {
-    fn new(rows: usize) -> Self {
-        Self { rows, starts: vec![0], indices: Vec::new(), values: Vec::new() }
-    }
-
-    fn push(&mut self, entries: impl IntoIterator<Item = (usize, f64)>) {
-        for (row, value) in entries {
-            self.indices.push(row);
-            self.values.push(value);
-        }
-        self.starts.push(self.indices.len());
-    }
-
-    fn finish(self) -> CscMatrix<f64> {
-        CscMatrix::new(self.rows, self.starts.len() - 1, self.starts, self.indices, self.values)
-    }
 }

@@ -70,6 +70,8 @@ impl Pattern {
 /// The index maps for one degree.
 #[derive(Clone, Debug)]
 pub(super) struct Structure {
+    /// Degree of p.
+    pub(super) degree: usize,
     /// Monomials of p, at most `degree`.
     pub(super) monomials: Vec<Exponents>,
     /// Gram matrix P of p on the monomials of half the degree; keys are `monomials`.
@@ -112,7 +114,7 @@ impl Structure {
             let rest: Exponents = std::array::from_fn(|i| a.exponents[i] + b.exponents[i]);
             (a.direction.min(b.direction), a.direction.max(b.direction), rest)
         });
-        Self { monomials: all, gram, hessian_basis, hessian, derivative }
+        Self { degree, monomials: all, gram, hessian_basis, hessian, derivative }
     }
 
     /// Values of all monomials of p at `z`.
@@ -128,6 +130,15 @@ impl Structure {
             self.monomials.len(),
             self.monomials.iter().map(|e| (0..3).map(|i| powers[i][usize::from(e[i])]).product::<f64>()),
         )
+    }
+
+    /// D: the coefficients of the Hessian form of p from those of p. Size: forms x monomials.
+    pub(super) fn derivative_matrix(&self) -> DMatrix<f64> {
+        let mut matrix = DMatrix::zeros(self.hessian.keys, self.monomials.len());
+        for (row, &(monomial, factor)) in self.derivative.iter().enumerate() {
+            matrix[(row, monomial)] = factor;
+        }
+        matrix
     }
 
     /// The functional on coefficients of p that a functional on its Hessian form induces.

@@ -40,7 +40,7 @@ fn degree_two_is_the_smallest_ellipsoid() {
     }
     let ellipsoid = minimum_ellipsoid(&points).unwrap();
     assert!((fit.report.volume_m3 / ellipsoid.volume() - 1.0).abs() < 1e-5);
-    assert!(fit.report.optimality_gap.unwrap().abs() < 1e-6);
+    assert!(fit.report.optimality_gap.abs() < 1e-6);
 }
 
 #[test]
@@ -49,8 +49,10 @@ fn fits_follow_affine_maps() {
     let turn = Rotation3::from_euler_angles(0.4, -1.1, 2.0).into_inner();
     let map = turn * Matrix3::new(2.0, 0.3, 0.0, 0.0, 0.5, -0.2, 0.1, 0.0, 4.0);
     let moved: Vec<_> = points.iter().map(|p| map * p + Vector3::new(3.0, -50.0, 7.0)).collect();
-    for degree in [4, 6] {
-        let (first, second) = (fitted(&points, degree), fitted(&moved, degree));
+    for (degree, objective) in [(4, Objective::LogDetP), (6, Objective::LogDetP), (4, Objective::LogDetH)] {
+        let options = FitOptions { degree, objective, ..FitOptions::default() };
+        let of = |points: &[Vector3<f64>]| fit("test", points, &options, &mut unwatched).unwrap();
+        let (first, second) = (of(&points), of(&moved));
         let ratio = second.report.volume_m3 / first.report.volume_m3 / map.determinant().abs();
         // the margin is imposed in a frame that a rotation is free in, hence not exact
         assert!((ratio - 1.0).abs() < 1e-4, "degree {degree}: {ratio}");
@@ -87,8 +89,10 @@ fn the_optimum_is_feasible_and_its_bound_holds() {
     let margin = 1e-4;
     for degree in [4, 6] {
         let structure = Structure::new(degree);
-        let optimum = generate(&structure, &whitened, margin, &mut unwatched).unwrap();
-        assert!(optimum.gap.unwrap().abs() < 1e-5);
+        let unit = Affine { linear: Matrix3::identity(), offset: Vector3::zeros() };
+        let problem = Problem::new(&structure, Objective::LogDetP, &unit, margin);
+        let optimum = generate(problem, &whitened, &mut unwatched).unwrap();
+        assert!(optimum.gap.abs() < 1e-5);
         assert!(optimum.hessian.symmetric_eigenvalues().min() > 0.99 * margin);
         for z in &whitened {
             assert!(structure.values(z).dot(&optimum.coefficients) < 1.0 + 1e-5);
@@ -106,7 +110,7 @@ fn the_optimum_is_feasible_and_its_bound_holds() {
             assert!((left - right).abs() < 1e-5 * left.abs().max(1.0), "{left} {right}");
         }
         // -log det P at the optimum, against a feasible polynomial Σ wⱼ |z|²ʲ with its diagonal Gram matrix
-        let objective = optimum.objective.unwrap();
+        let objective = optimum.objective;
         let mut simple = f64::INFINITY;
         for share in [0.2, 0.4, 0.6] {
             let parts = degree / 2 + 1;
@@ -120,9 +124,128 @@ fn the_optimum_is_feasible_and_its_bound_holds() {
                     weight * multinomial
                 }),
             ));
-            simple = simple.min(-program::log_det(&gram).unwrap());
+            simple = simple.min(-spectral::log_det(&gram).unwrap());
         }
         assert!(objective < simple, "{objective} against {simple}");
+    }
+}
+
+/// Every objective at every degree it has: optimal by its own gap, proven, and least among all bodies in its own measure.
+#[test]
+fn objectives_are_optimal_and_proven() {
+    let points = blob(150);
+    for objective in Objective::ALL {
+        for degree in [2, 4, 6].into_iter().filter(|&d| d <= if objective == Objective::TraceH { 4 } else { 6 }) {
+            let options = FitOptions { degree, objective, ..FitOptions::default() };
+            let Fit { body, report } = fit("test", &points, &options, &mut unwatched).unwrap();
+            assert!(report.optimality_gap.abs() <= 1e-5 * report.objective_value.abs().max(1.0), "{report:?}");
+            assert!(body.prove_contains(&points).is_ok());
+            assert!(report.volume_m3 > report.hull_volume_m3);
+            assert_eq!(body.provenance().unwrap().objective, objective.name());
+        }
+    }
+    let options = FitOptions { degree: 8, objective: Objective::TraceH, ..FitOptions::default() };
+    let error = fit("test", &points, &options, &mut unwatched).unwrap_err();
+    assert_eq!(error, FitError::Objective { objective: Objective::TraceH, degree: 8 });
+}
+
+/// At degree 2 with p a sum of squares, `tr H⁻¹` is half the sum of the squared semi-axes of the ellipsoid, and `log det H`
+/// its volume: closed forms for a cuboid's corners a, where the least sum of squares is (Σ aᵢ)².
+#[test]
+fn hessian_objectives_at_degree_two_have_closed_forms() {
+    let half = Vector3::new(1.0, 2.0, 0.5);
+    let corners: Vec<_> = cube(2.0).iter().map(|c| c.component_mul(&half)).collect();
+    let fitted = |objective| {
+        let options = FitOptions { degree: 2, objective, ..FitOptions::default() };
+        fit("test", &corners, &options, &mut unwatched).unwrap().report
+    };
+    let trace = fitted(Objective::TraceH);
+    // in the unit frame lengths are in units of the half diagonal
+    let expected = half.sum().powi(2) / half.norm_squared() / 2.0;
+    assert!((trace.objective_value / expected - 1.0).abs() < 1e-6, "{} {expected}", trace.objective_value);
+    let volume = 4.0 / 3.0 * std::f64::consts::PI * 27_f64.sqrt() * half.product();
+    assert!((fitted(Objective::LogDetH).volume_m3 / volume - 1.0).abs() < 1e-5);
+}
+
+#[test]
+fn spectral_derivatives_agree_with_differences() {
+    let structure = Structure::new(4);
+    let map = Affine { linear: Matrix3::new(1.2, 0.1, 0.0, -0.2, 0.7, 0.3, 0.0, 0.1, 0.9), offset: Vector3::x() * 0.3 };
+    let points = blob(90);
+    let mean = points.iter().map(|x| structure.values(x) / 90.0).sum::<DVector<f64>>();
+    let other = points.iter().take(40).map(|x| structure.values(x) / 40.0).sum::<DVector<f64>>();
+    let direction = &other - &mean;
+    for spectral in [
+        spectral::Spectral::log_det(),
+        spectral::Spectral::trace_inverse(basis::change(&structure, objective::Matrix::Polynomial, &map)),
+    ] {
+        let at = |t: f64| structure.gram.spread(&(&mean + &direction * t));
+        let slope = |t: f64| structure.gram.collapse(&spectral.minimiser(&at(t)).unwrap()).dot(&direction);
+        let step = 1e-5;
+        let difference = (spectral.bound(&at(step)).unwrap() - spectral.bound(&at(-step)).unwrap()) / (2.0 * step);
+        assert!((difference / slope(0.0) - 1.0).abs() < 1e-6, "{difference} {}", slope(0.0));
+        let curvature = spectral.curvature(&structure.gram, &at(0.0)).unwrap();
+        let second = -(slope(step) - slope(-step)) / (2.0 * step);
+        assert!((direction.dot(&(&curvature * &direction)) / second - 1.0).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn the_gradient_of_the_volume_agrees_with_differences() {
+    let structure = Structure::new(4);
+    // |z|⁴ moved and squeezed, plus lower terms
+    let mut coefficients = DVector::zeros(structure.monomials.len());
+    for (value, e) in coefficients.iter_mut().zip(&structure.monomials) {
+        *value = match e.iter().sum::<u8>() {
+            4 if e.iter().all(|n| n % 2 == 0) => {
+                if e.contains(&4) {
+                    1.0
+                } else {
+                    2.0
+                }
+            }
+            2 if e.contains(&2) => 0.3,
+            1 => 0.05,
+            _ => 0.0,
+        };
+    }
+    let center = Vector3::new(0.05, -0.02, 0.01);
+    let at = |c: &DVector<f64>| volume::volume(&volume::polynomial(&structure, c).unwrap(), &center);
+    let p = volume::polynomial(&structure, &coefficients).unwrap();
+    let expansion = volume::expansion(&structure, &p, &center);
+    assert!((expansion.volume / at(&coefficients) - 1.0).abs() < 1e-12);
+    for i in 0..coefficients.len() {
+        let mut step = DVector::zeros(coefficients.len());
+        step[i] = 1e-5;
+        let difference = (at(&(&coefficients + &step)) - at(&(&coefficients - &step))) / 2e-5;
+        assert!((difference - expansion.gradient[i]).abs() < 1e-7, "{i}: {difference} {}", expansion.gradient[i]);
+    }
+    // the ball |z|⁴ <= 1 has 4π/3, and scaled by 1 + ε in p the second derivative of (1 + ε)^(-3/4) times it
+    let ball =
+        coefficients.map_with_location(|i, _, c| if structure.monomials[i].iter().sum::<u8>() == 4 { c } else { 0.0 });
+    let p = volume::polynomial(&structure, &ball).unwrap();
+    let expansion = volume::expansion(&structure, &p, &Vector3::zeros());
+    let whole = 4.0 / 3.0 * std::f64::consts::PI;
+    assert!((expansion.volume / whole - 1.0).abs() < 1e-12);
+    assert!((ball.dot(&expansion.gradient) / (-0.75 * whole) - 1.0).abs() < 1e-12);
+    assert!((ball.dot(&(&expansion.curvature * &ball)) / (0.75 * 1.75 * whole) - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn refinement_is_monotone_contains_the_points_and_is_proven() {
+    let points = blob(150);
+    for degree in [4, 6] {
+        let start = fitted(&points, degree);
+        let options = FitOptions { degree, refine: true, ..FitOptions::default() };
+        let Fit { body, report } = fit("test", &points, &options, &mut unwatched).unwrap();
+        assert!(report.refinement_m3.len() > 1 && report.refinement_m3.windows(2).all(|v| v[1] < v[0]), "{report:?}");
+        assert!(report.volume_m3 < start.report.volume_m3 && report.volume_m3 > report.hull_volume_m3);
+        // two quadratures of the same set
+        let last = report.refinement_m3.last().unwrap();
+        assert!((report.volume_m3 / last - 1.0).abs() < 1e-4, "{} {last}", report.volume_m3);
+        assert!(body.prove_contains(&points).is_ok() && body.min_value().abs() < 1e-6, "{}", body.min_value());
+        let again = Body::from_json(&body.to_json()).unwrap();
+        assert!(again.provenance().unwrap().refined);
     }
 }
 
@@ -163,7 +286,7 @@ fn a_thin_sheet_is_fitted() {
 fn bad_input_is_refused_by_field() {
     let good = blob(50);
     let attempt = |points: &[Vector3<f64>], degree, margin| {
-        let options = FitOptions { degree, margin, input: String::new() };
+        let options = FitOptions { degree, margin, ..FitOptions::default() };
         fit("test", points, &options, &mut unwatched).expect_err("bad input must be refused")
     };
     for degree in [0, 1, 3, 7, 10, usize::MAX] {
