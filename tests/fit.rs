@@ -5,7 +5,7 @@
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use sublevel::body::Body;
-use sublevel::fit::{FitOptions, FitStatus, fit, read_points};
+use sublevel::fit::{FitOptions, RefinementEnd, fit, read_points};
 
 /// Mesh number, volume of the convex hull and vertices of it, volumes of the -log det P fits at degrees 2, 4, 6.
 const TABLE: [(u32, f64, usize, [f64; 3]); 5] = [
@@ -35,20 +35,18 @@ fn check(row: usize) {
         let fit = fit("mesh", &points, &options, &mut |_| ControlFlow::Continue(())).expect("the mesh is fitted");
         let report = &fit.report;
         println!(
-            "{number}: degree {degree}, volume {:.4} m³ ({:+.2} %), {:.2} s, {} rounds, {} iterations, gap {:.0e}, {}",
+            "{number}: degree {degree}, volume {:.4} m³ ({:+.2} %), {:.2} s, {} rounds, {} iterations, gap {:.0e}",
             report.volume_m3,
             100.0 * (report.volume_m3 / expected - 1.0),
             report.seconds,
             report.rounds,
             report.iterations,
             report.optimality_gap,
-            report.status,
         );
         assert!(report.volume_m3 <= 1.003 * expected, "{} m³ where {expected} are possible", report.volume_m3);
         assert!((report.hull_volume_m3 / hull_volume - 1.0).abs() < 5e-4, "{}", report.hull_volume_m3);
         assert!(report.hull_vertices.abs_diff(hull_vertices) <= 3, "{}", report.hull_vertices);
-        assert_eq!(report.status, FitStatus::Solved);
-        assert!(report.optimality_gap.abs() < 1e-5);
+        assert!(report.optimality_gap.abs() <= 1e-5 * report.objective_value.abs().max(1.0));
         // Reading a body back proves it sos-convex and bounded from its stored numbers alone.
         let again = Body::from_json(&fit.body.to_json()).expect("the stored body is proven");
         assert_eq!(again.id(), fit.body.id());
@@ -79,6 +77,7 @@ fn refined_volumes() {
             );
             assert!(report.volume_m3 <= expected, "{} m³ where {expected} are possible", report.volume_m3);
             assert!(report.refinement_m3.windows(2).all(|v| v[1] < v[0]), "{:?}", report.refinement_m3);
+            assert_eq!(report.refinement_end, Some(RefinementEnd::Converged));
             let again = Body::from_json(&fit.body.to_json()).expect("the stored body is proven");
             again.prove_contains(&points).expect("every point of the mesh is proven inside");
         }

@@ -1,7 +1,7 @@
 //! `sublevel fit`.
 
 use super::write_atomically;
-use crate::fit::{Fit, FitOptions, Objective, Progress, fit, read_points};
+use crate::fit::{Fit, FitOptions, Objective, Progress, RefinementEnd, fit, read_points};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use std::error::Error;
@@ -17,9 +17,15 @@ use std::time::Duration;
 /// polynomial; what is minimised in its place is the objective. A file is written only with all proofs, and only when the
 /// dual solution shows the objective to be optimal.
 ///
-/// Higher degrees are tighter and cost more: 2 is an ellipsoid, 6 suits most objects, 8 takes minutes to fit.
+/// Higher degrees are tighter and cost more: 2 is an ellipsoid, 6 suits most objects and takes about a second, 8 about ten.
 ///
-/// Example: sublevel fit mug.obj --scale 0.001 --out bodies
+/// Examples:
+///
+///   sublevel fit mug.obj --scale 0.001 --out bodies
+///
+///   sublevel fit chair.off --objective trace-p --degree 4 --out bodies
+///
+///   sublevel fit chair.off --refine --out bodies
 #[derive(Debug, clap::Args)]
 pub(super) struct FitArgs {
     /// Mesh or point files; the ending tells the format
@@ -41,7 +47,9 @@ pub(super) struct FitArgs {
     /// trace-h: trace of the inverse of H, in the frame of trace-p. Degrees 2 to 6.
     #[arg(long, value_name = "NAME", default_value_t, verbatim_doc_comment)]
     objective: Objective,
-    /// Minimise the volume itself afterwards, starting from the objective's optimum: 1 to 10 % smaller, a few times as long
+    /// Minimise the volume itself afterwards, starting from the objective's optimum: 1 to 10 % smaller, several times as long
+    ///
+    /// Never makes the volume larger. Why it ended is reported when that was before it converged.
     #[arg(long)]
     refine: bool,
     /// Metres per unit of the input: 0.001 for files in millimetres
@@ -59,13 +67,14 @@ struct Row {
     degree: usize,
     objective: &'static str,
     refined: bool,
+    /// Why the refinement ended; none without.
+    refinement: Option<String>,
     points: usize,
     hull_vertices: usize,
     volume_m3: f64,
     volume_error_m3: f64,
     hull_volume_m3: f64,
     seconds: f64,
-    status: String,
     objective_value: f64,
     optimality_gap: f64,
     proven: bool,
@@ -132,16 +141,19 @@ fn one(args: &FitArgs, input: &Path, stem: &str) -> Result<Row, Box<dyn Error>> 
     bar.set_message("reading");
     let points = read_points(input, args.scale)?;
     let mut tell = |progress: Progress| {
-        let Progress { round, active_points, worst_violation, decrement } = progress;
-        let left = decrement.map_or_else(|| "preparing".to_owned(), |d| format!("{d:.1e} from the optimum"));
+        let Progress { round, iterations, active_points, worst_violation, gap } = progress;
         bar.set_message(format!(
-            "step {round}, {left}, {active_points} points, worst outside by {worst_violation:.1e}"
+            "round {round}, step {iterations}, {gap:.0e} from the optimum of {active_points} points, others outside by \
+             {worst_violation:.0e}"
         ));
         ControlFlow::Continue(())
     };
     let Fit { body, report } = fit(stem, &points, &options(args, input), &mut tell)
         .map_err(|error| format!("{}: {error}", input.display()))?;
     bar.finish_and_clear();
+    if let Some(end) = report.refinement_end.filter(|&end| end != RefinementEnd::Converged) {
+        eprintln!("note: {}: the refinement ended early: {end}; the body is proven all the same", input.display());
+    }
     let file = args.out.join(format!("{stem}-d{}.json", args.degree));
     write_atomically(&file, &body.to_json())?;
     Ok(Row {
@@ -150,13 +162,13 @@ fn one(args: &FitArgs, input: &Path, stem: &str) -> Result<Row, Box<dyn Error>> 
         degree: report.degree,
         objective: report.objective.name(),
         refined: report.refinement_m3.len() > 1,
+        refinement: report.refinement_end.map(|end| end.to_string()),
         points: report.points,
         hull_vertices: report.hull_vertices,
         volume_m3: report.volume_m3,
         volume_error_m3: report.volume_error_m3,
         hull_volume_m3: report.hull_volume_m3,
         seconds: report.seconds,
-        status: report.status.to_string(),
         objective_value: report.objective_value,
         optimality_gap: report.optimality_gap,
         // A fit returns a body only when it is proven.

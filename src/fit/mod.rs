@@ -1,10 +1,11 @@
 //! Points to a certified body: hull, whitening, semidefinite program, certificate, proof.
 //!
 //! The way of one fit: [`read`] the points; [`hull`] leaves those that matter; the smallest [`ellipsoid`] around them
-//! gives the normalized frame; `generate` minimises an [`Objective`] over sos-convex polynomials with a margin by Newton
-//! steps that `quadratic` hands to clarabel; the constant coefficient pulls every input point inside; [`Body::new`] proves
-//! the stored numbers. Nothing the solver says is believed: a fit returns a body only with its proofs.
+//! gives the normalized frame; `generate` minimises an [`Objective`] over sos-convex polynomials with a margin by following
+//! the central path of the dual (`path`); `refine` goes on to the volume itself; the constant coefficient pulls every input point inside; [`Body::new`] proves
+//! the stored numbers. Nothing of that is believed: a fit returns a body only with its proofs.
 
+mod barrier;
 mod basis;
 pub mod ellipsoid;
 mod generate;
@@ -13,18 +14,19 @@ mod model;
 mod objective;
 mod path;
 mod program;
-mod quadratic;
+mod progress;
 pub mod read;
 mod refine;
 mod spectral;
 mod structure;
-mod trace;
 mod volume;
 
 pub use hull::HullError;
 pub use objective::{Objective, UnknownObjective};
 pub use program::ProgramError;
+pub use progress::Progress;
 pub use read::{ReadError, read_points};
+pub use refine::RefinementEnd;
 
 use crate::body::{Body, BodyError, Constraint, Normalization, NotContained, Placement, Provenance, check_name};
 use crate::polynomial::{HessianGram, Polynomial, PolynomialError};
@@ -34,6 +36,7 @@ use generate::{Optimum, generate};
 use hull::Frame;
 use nalgebra::{Matrix3, Vector3};
 use program::Problem;
+use progress::Watch;
 use refine::refine;
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -89,38 +92,6 @@ impl FitOptions {
     }
 }
 
-/// How far a fit has come, after each round.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Progress {
-    /// Newton steps done; 0 while a start is prepared.
-    pub round: usize,
-    /// Points the program takes into account.
-    pub active_points: usize,
-    /// Largest p - 1 over the hull's vertices, at least 0.
-    pub worst_violation: f64,
-    /// Distance to the optimum in the local norm; falls below 1e-3 at the end, quadratically once it is below 1.
-    /// None while a start is prepared.
-    pub decrement: Option<f64>,
-}
-
-/// How the solver ended; the proofs do not depend on it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FitStatus {
-    /// The last program was solved to full accuracy.
-    Solved,
-    /// The solver stopped a little early; its answer was verified to be as close to the optimum all the same.
-    Verified,
-}
-
-impl std::fmt::Display for FitStatus {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Solved => "solved",
-            Self::Verified => "verified",
-        })
-    }
-}
-
 /// What a fit took and reached.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitReport {
@@ -140,14 +111,14 @@ pub struct FitReport {
     pub hull_volume_m3: f64,
     /// Wall time, seconds.
     pub seconds: f64,
-    /// How the solver ended.
-    pub status: FitStatus,
+    /// Why the refinement ended; none without.
+    pub refinement_end: Option<RefinementEnd>,
     /// [`FitReport::objective_value`] minus its lower bound from the dual; at most 1e-5 max(1, |value|).
     pub optimality_gap: f64,
-    /// Newton steps, each one quadratic program.
+    /// Programs solved, one per set of points and one per step of a refinement.
     pub rounds: usize,
-    /// Interior-point iterations of all of them.
-    pub iterations: u32,
+    /// Newton steps of all of them.
+    pub iterations: usize,
     /// What was minimised.
     pub objective: Objective,
     /// Its optimal value: log dets in the whitened frame, traces in the unit frame.
@@ -203,23 +174,23 @@ pub enum FitError {
     /// The progress callback asked to stop.
     #[error("the fit was cancelled")]
     Cancelled,
-    /// The solver failed.
+    /// The program has no usable start, or rounding ate it.
     #[error(transparent)]
     Program(#[from] ProgramError),
-    /// The Newton iteration did not end.
-    #[error("the fit did not converge in {rounds} steps; lower the degree")]
+    /// Points were left outside again and again.
+    #[error("points were still left outside after {rounds} rounds of adding them; lower the degree")]
     NoConvergence {
-        /// Steps taken.
+        /// Rounds done.
         rounds: usize,
     },
-    /// The solver's answer could neither be verified optimal nor improved.
+    /// The answer could not be verified optimal.
     #[error("the fit is only known to be within {gap:.1e} of the optimal objective; lower the degree")]
     NotOptimal {
         /// Objective minus its lower bound from the dual.
         gap: f64,
     },
-    /// The solver's polynomial is none.
-    #[error("the solver's polynomial is unusable: {0}; lower the degree")]
+    /// The numbers make no polynomial.
+    #[error("the fitted polynomial is unusable: {0}; lower the degree")]
     Polynomial(#[from] PolynomialError),
     /// The body could not be proven.
     #[error("the fitted polynomial could not be proven, also with a hundred times the margin: {0}; lower the degree")]
@@ -234,7 +205,8 @@ pub enum FitError {
 /// Log dets are least in every affine frame at once. Traces depend on the frame: they are measured in the unit frame, in
 /// which the points have their mean at the origin and largest norm 1.
 ///
-/// `progress` hears of every Newton step (tens of milliseconds at degree 4 to seconds at degree 8) and can stop the fit.
+/// `progress` hears of every Newton step (below a millisecond at degree 4 to tens of milliseconds at degree 8), those of a
+/// refinement included, and can stop the fit.
 ///
 /// # Errors
 /// [`FitError`]: bad input by field, a cancelled fit, or what could not be solved or proven and by how much.
@@ -257,19 +229,20 @@ pub fn fit(
     let unit = unit_frame(points, &normalization).ok_or(ProgramError::Singular)?;
 
     let mut attempts = MARGIN_ATTEMPTS.iter().map(|factor| factor * options.margin);
-    let (body, optimum, margin, volumes) = loop {
+    let mut watch = Watch::new(progress);
+    let (body, optimum, margin, volumes, refinement_end) = loop {
         let margin = attempts.next().unwrap_or(options.margin);
         let problem = Problem::new(&structure, options.objective, &unit, margin);
-        let mut optimum = generate(problem, &whitened, progress)?;
-        let mut volumes = Vec::new();
+        let mut optimum = generate(problem, &whitened, &mut watch)?;
+        let (mut volumes, mut end) = (Vec::new(), None);
         if options.refine {
             let (coefficients, hessian) = (optimum.coefficients.clone(), optimum.hessian.clone());
-            let refined = refine(&structure, &whitened, margin, coefficients, hessian, progress)?;
+            let refined = refine(&structure, &whitened, margin, coefficients, hessian, &mut watch)?;
             (optimum.coefficients, optimum.hessian) = (refined.coefficients, refined.hessian);
-            volumes = refined.volumes;
+            (volumes, end) = (refined.volumes, Some(refined.end));
         }
         match certify(name, points, &normalization, &structure, &optimum) {
-            Ok(body) => break (body, optimum, margin, volumes),
+            Ok(body) => break (body, optimum, margin, volumes, end),
             Err(FitError::Unproven(BodyError::Certificate { .. })) if attempts.len() > 0 => {}
             Err(error) => return Err(error),
         }
@@ -290,12 +263,12 @@ pub fn fit(
         refinement_m3: volumes.iter().map(|volume| volume / normalization.linear.determinant().abs()).collect(),
         hull_volume_m3: hull.volume,
         seconds: start.elapsed().as_secs_f64(),
-        status: if optimum.full_accuracy { FitStatus::Solved } else { FitStatus::Verified },
+        refinement_end,
         objective: options.objective,
         objective_value: optimum.objective,
         optimality_gap: optimum.gap,
-        rounds: optimum.rounds,
-        iterations: optimum.iterations,
+        rounds: watch.progress().round,
+        iterations: watch.progress().iterations,
         margin,
     };
     Ok(Fit { body, report })

@@ -7,23 +7,24 @@
 //! ```
 //!
 //! costs one small dense factorization per Newton step (Nesterov and Nemirovskii, Interior-Point Polynomial Algorithms,
-//! 1994): milliseconds where a quadratic program of the same size takes a second. A centre is within (points + rows of
-//! S)/τ of the optimum, and a Newton step near it yields a polynomial that satisfies all constraints strictly.
-//!
-//! Fits only start from it, because their last digits come from the solver; refinement needs few digits and a definite
-//! Gram matrix, and takes the polynomial.
+//! 1994). A centre is within (points + rows of S)/τ of the optimum, and a Newton step near it yields a polynomial that
+//! satisfies all constraints strictly, with its Gram matrices: an upper bound to hold against the lower bound of the dual.
 
+use super::FitError;
+use super::barrier::Barrier;
 use super::model::Model;
 use super::objective::Matrix;
 use super::program::{Dual, Problem, regularised_factor};
-use super::spectral::{Spectral, symmetric};
-use super::structure::Structure;
+use super::progress::Watch;
+use super::spectral::Spectral;
+use super::structure::{Pattern, Structure};
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-/// Growth of τ from one centre to the next.
-const GROWTH: f64 = 6.0;
-/// Newton steps in all before settling for what there is.
-const STEPS: usize = 120;
+/// Newton decrement below which a point counts as a centre; 1 is where its polynomial stops being feasible.
+const CENTRED: f64 = 0.9;
+
+/// Weight of a trace at the start, relative to that of a log det.
+const TRACE_SHARE: f64 = 0.01;
 
 /// What the path minimises, besides `Σw - ε tr S`.
 #[derive(Clone, Copy)]
@@ -43,38 +44,33 @@ pub(super) struct Interior {
     pub(super) hessian: DMatrix<f64>,
 }
 
-/// Where a path ends.
-pub(super) struct NearOptimum {
-    /// The dual point.
+/// A dual point and the weight of the objective there.
+#[derive(Clone, Debug)]
+pub(super) struct Place {
     pub(super) dual: Dual,
-    /// Coefficients of the polynomial that goes with it.
-    pub(super) coefficients: DVector<f64>,
+    pub(super) tau: f64,
 }
 
-/// A point within about `gap` (of scaled f) of the optimum for the points whose monomials are the columns of `values` unless
-/// definiteness was lost to rounding before; `None` if it was from the beginning.
-pub(super) fn near_optimum(problem: &Problem, values: &DMatrix<f64>, gap: f64) -> Option<NearOptimum> {
-    let goal = Goal::Gram(problem.matrix, &problem.spectral);
-    let path = Path::new(problem.structure, values, problem.margin, goal);
-    let mut dual = path.start()?;
-    let mut tau = 1.0;
-    for _ in 0..STEPS {
-        let Some(newton) = path.step(&dual, tau) else { break };
-        dual = newton.next;
-        if newton.decrement < 1.0 {
-            if path.barrier_parameter() / tau <= gap {
-                break;
-            }
-            tau *= GROWTH;
-        }
-    }
-    let coefficients = path.of_moments(&dual, tau)?.0 / tau;
-    Some(NearOptimum { dual, coefficients })
+/// How to follow a path.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pace {
+    /// Distance to the optimum at which to stop, in units of the goal.
+    pub(super) gap: f64,
+    /// Growth of τ from one centre to the next.
+    pub(super) growth: f64,
+    /// Newton steps at most.
+    pub(super) steps: usize,
 }
 
-/// The start of every path: weights that add up to the rows of P, and a functional to match.
-pub(super) fn start(structure: &Structure, values: &DMatrix<f64>) -> Option<Dual> {
-    Path::new(structure, values, 0.0, Goal::Gram(Matrix::Polynomial, &Spectral::log_det())).start()
+/// A point near the path.
+#[derive(Clone, Debug)]
+pub(super) struct Centre {
+    /// Where it is.
+    pub(super) place: Place,
+    /// The polynomial that goes with it.
+    pub(super) interior: Interior,
+    /// The Gram matrix P of that polynomial; none if the goal is a model, where p needs none.
+    pub(super) gram: Option<DMatrix<f64>>,
 }
 
 /// The barrier problem.
@@ -87,23 +83,26 @@ pub(super) struct Path<'a> {
     derivative: DMatrix<f64>,
     /// `tr S` as a functional of s.
     trace: DVector<f64>,
-    /// `-log det` of the matrix that the goal does not measure.
-    barrier: Spectral,
 }
 
 /// A damped Newton step.
-pub(super) struct Newton {
+struct Newton {
     /// Where it leads.
-    pub(super) next: Dual,
+    next: Dual,
+    /// Where it would lead undamped.
+    whole: Dual,
     /// Newton decrement before it.
-    pub(super) decrement: f64,
+    decrement: f64,
     /// τ times the coefficients of p that the full step predicts.
     coefficients: DVector<f64>,
-    /// The full step in s.
-    form: DVector<f64>,
 }
 
 impl<'a> Path<'a> {
+    /// The path of a fit over the points whose monomials are the columns of `values`.
+    pub(super) fn of_fit(problem: &'a Problem, values: &'a DMatrix<f64>) -> Self {
+        Self::new(problem.structure, values, problem.margin, Goal::Gram(problem.matrix, &problem.spectral))
+    }
+
     pub(super) fn new(structure: &'a Structure, values: &'a DMatrix<f64>, margin: f64, goal: Goal<'a>) -> Self {
         let forms = structure.hessian.keys;
         let mut trace = DVector::zeros(forms);
@@ -111,32 +110,100 @@ impl<'a> Path<'a> {
             trace[structure.hessian.key(i, i)] += 1.0;
         }
         let derivative = structure.derivative_matrix();
-        Self { structure, values, margin, goal, derivative, trace, barrier: Spectral::log_det() }
+        Self { structure, values, margin, goal, derivative, trace }
+    }
+
+    fn pattern(&self, matrix: Matrix) -> &'a Pattern {
+        match matrix {
+            Matrix::Polynomial => &self.structure.gram,
+            Matrix::Hessian => &self.structure.hessian,
+        }
+    }
+
+    /// What the moments of `matrix` add to the barrier problem.
+    fn barrier(&self, matrix: Matrix, tau: f64) -> Barrier<'a> {
+        let measured = match self.goal {
+            Goal::Gram(measured, spectral) if measured == matrix => Some((spectral, tau)),
+            _ => None,
+        };
+        Barrier::new(self.pattern(matrix), measured)
     }
 
     /// At a centre, this over τ is the distance to the optimum.
     pub(super) fn barrier_parameter(&self) -> f64 {
         let cone = match self.goal {
-            Goal::Gram(Matrix::Hessian, _) => &self.structure.gram,
-            _ => &self.structure.hessian,
+            Goal::Model(_) => self.structure.hessian.size,
+            Goal::Gram(_, spectral) if !spectral.is_self_concordant() => {
+                self.structure.gram.size + self.structure.hessian.size
+            }
+            Goal::Gram(Matrix::Polynomial, _) => self.structure.hessian.size,
+            Goal::Gram(Matrix::Hessian, _) => self.structure.gram.size,
         };
-        (self.values.ncols() + cone.size) as f64
+        (self.values.ncols() + cone) as f64
+    }
+
+    /// The unit of gaps.
+    fn size(&self, at: &Dual) -> f64 {
+        match self.goal {
+            Goal::Gram(Matrix::Polynomial, spectral) => spectral.size(&self.structure.gram.spread(&at.moments)),
+            Goal::Gram(Matrix::Hessian, spectral) => spectral.size(&self.structure.hessian.spread(&at.form)),
+            Goal::Model(_) => Some(1.0),
+        }
+        .unwrap_or(1.0)
     }
 
     fn point(&self, weights: DVector<f64>, form: DVector<f64>) -> Dual {
         Dual { moments: self.values * &weights - self.structure.pull_back(&form), weights, form }
     }
 
-    /// Equal weights, and y isotropic and independent of z: S is positive definite, and small enough to leave M so.
-    pub(super) fn start(&self) -> Option<Dual> {
+    /// Equal weights that add up to the rows of P, and y isotropic and independent of z: S is positive definite, and small
+    /// enough to leave M so.
+    pub(super) fn start(&self) -> Option<Place> {
         let points = self.values.ncols();
-        let weights = DVector::repeat(points, self.structure.gram.size as f64 / points as f64);
+        let rows = self.structure.gram.size as f64;
+        let weights = DVector::repeat(points, rows / points as f64);
         let isotropic = isotropic_form(self.structure, &(self.values * DVector::repeat(points, 1.0 / points as f64)));
-        (0..40).find_map(|halvings| {
+        let dual = (0..40).find_map(|halvings| {
             let point = self.point(weights.clone(), &isotropic * 0.5_f64.powi(halvings));
-            self.barrier.bound(&self.structure.gram.spread(&point.moments))?;
+            Cholesky::new(self.structure.gram.spread(&point.moments))?;
             Some(self.point(weights.clone(), &isotropic * 0.5_f64.powi(halvings + 1)))
-        })
+        })?;
+        match self.goal {
+            Goal::Gram(_, spectral) if !spectral.is_self_concordant() => {
+                // The functional is a poor guess for traces, so the barriers rule at first; then this scale is best.
+                let size = self.size(&dual);
+                let scale = size * (1.0 + self.barrier_parameter() / (TRACE_SHARE * rows));
+                let dual = self.point(dual.weights * scale.powi(2), dual.form * scale.powi(2));
+                Some(Place { dual, tau: 1.0 / (size * scale) })
+            }
+            _ => Some(Place { dual, tau: 1.0 }),
+        }
+    }
+
+    /// The last centre before the steps ran out or rounding stood in the way; its τ tells how far that is.
+    ///
+    /// # Errors
+    /// [`FitError::Cancelled`].
+    pub(super) fn follow(&self, from: Place, pace: Pace, watch: &mut Watch) -> Result<Option<Centre>, FitError> {
+        let Place { mut dual, mut tau } = from;
+        let mut last = None;
+        let mut size = self.size(&dual);
+        for _ in 0..pace.steps {
+            watch.iteration(self.barrier_parameter() / (tau * size))?;
+            let Some(newton) = self.step(&dual, tau) else { break };
+            if newton.decrement < CENTRED {
+                let Some(centre) = self.centre(&dual, &newton, tau) else { break };
+                last = Some(centre);
+                size = self.size(&dual);
+                let end = self.barrier_parameter() / (pace.gap * size);
+                if tau >= end {
+                    break;
+                }
+                tau = (tau * pace.growth).min(end);
+            }
+            dual = newton.next;
+        }
+        Ok(last)
     }
 
     /// Objective of the barrier problem; none outside its domain.
@@ -144,55 +211,35 @@ impl<'a> Path<'a> {
         if point.weights.min() <= 0.0 {
             return None;
         }
-        let form = self.structure.hessian.spread(&point.form);
-        let moments = || self.structure.gram.spread(&point.moments);
-        let value = match self.goal {
-            Goal::Gram(Matrix::Polynomial, spectral) => {
-                -tau * spectral.bound(&moments())? - self.barrier.bound(&form)?
-            }
-            Goal::Gram(Matrix::Hessian, spectral) => -tau * spectral.bound(&form)? - self.barrier.bound(&moments())?,
-            Goal::Model(model) => tau * model.value(&point.moments) - self.barrier.bound(&form)?,
+        let of_moments = match self.goal {
+            Goal::Model(model) => tau * model.value(&point.moments),
+            Goal::Gram(..) => self.barrier(Matrix::Polynomial, tau).value(&point.moments)?,
         };
+        let of_form = self.barrier(Matrix::Hessian, tau).value(&point.form)?;
         let weights = point.weights.iter().map(|w| w.ln()).sum::<f64>();
         let cost = point.weights.sum() - self.margin * self.trace.dot(&point.form);
-        let value = value + tau * cost - weights;
+        let value = of_moments + of_form + tau * cost - weights;
         value.is_finite().then_some(value)
     }
 
     /// Minus the gradient, and the inverse of the Hessian, of the part that depends on m.
     fn of_moments(&self, at: &Dual, tau: f64) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let (spectral, scale) = match self.goal {
-            Goal::Model(model) => {
-                return Some((model.coefficients(&at.moments) * tau, model.flexibility() / tau));
-            }
-            Goal::Gram(Matrix::Polynomial, spectral) => (spectral, tau),
-            Goal::Gram(Matrix::Hessian, _) => (&self.barrier, 1.0),
-        };
-        let matrix = self.structure.gram.spread(&at.moments);
-        let gradient = self.structure.gram.collapse(&spectral.minimiser(&matrix)?);
-        let factor = regularised_factor(&spectral.curvature(&self.structure.gram, &matrix)?)?;
+        if let Goal::Model(model) = self.goal {
+            return Some((model.coefficients(&at.moments) * tau, model.flexibility() / tau));
+        }
+        let (gradient, curvature) = self.barrier(Matrix::Polynomial, tau).derivatives(&at.moments)?;
+        let factor = regularised_factor(&curvature)?;
         let root = factor.solve_lower_triangular(&DMatrix::identity(gradient.len(), gradient.len()))?;
-        Some((gradient * scale, root.tr_mul(&root) / scale))
-    }
-
-    /// Minus the gradient, and the lower Cholesky factor of the Hessian, of the part that depends on s alone.
-    fn of_form(&self, at: &Dual, tau: f64) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let (spectral, scale) = match self.goal {
-            Goal::Gram(Matrix::Hessian, spectral) => (spectral, tau),
-            _ => (&self.barrier, 1.0),
-        };
-        let matrix = self.structure.hessian.spread(&at.form);
-        let gradient = self.structure.hessian.collapse(&spectral.minimiser(&matrix)?);
-        let factor = regularised_factor(&spectral.curvature(&self.structure.hessian, &matrix)?)?;
-        Some((gradient * scale, factor * scale.sqrt()))
+        Some((gradient, root.tr_mul(&root)))
     }
 
     /// A damped Newton step; none when rounding stands in its way.
-    pub(super) fn step(&self, at: &Dual, tau: f64) -> Option<Newton> {
+    fn step(&self, at: &Dual, tau: f64) -> Option<Newton> {
         let Self { values, derivative, .. } = self;
         // 1. Gradients and Hessians of the three parts.
         let (coefficients, flexibility) = self.of_moments(at, tau)?;
-        let (gram, form_factor) = self.of_form(at, tau)?;
+        let (gram, curvature) = self.barrier(Matrix::Hessian, tau).derivatives(&at.form)?;
+        let form_factor = regularised_factor(&curvature)?;
         let of_weights = (values.tr_mul(&coefficients) * -1.0).add_scalar(tau) - at.weights.map(|w| 1.0 / w);
         let of_form = derivative * &coefficients - &self.trace * (self.margin * tau) - gram;
         // 2. All but the part of m is block diagonal; that has the rank of the moments (Woodbury).
@@ -209,28 +256,39 @@ impl<'a> Path<'a> {
             return None;
         }
         // 3. Shortened until everything stays positive and the objective falls.
+        let along = |length: f64| self.point(&at.weights + &step_weights * length, &at.form + &step_form * length);
         let here = self.objective(at, tau)?;
         let next = (0..40).find_map(|shortening| {
             let length = 0.7_f64.powi(shortening);
-            let next = self.point(&at.weights + &step_weights * length, &at.form + &step_form * length);
+            let next = along(length);
             let sufficient = here + 0.1 * length * slope + 1e-9 * here.abs();
             self.objective(&next, tau).is_some_and(|value| value <= sufficient).then_some(next)
         })?;
         // The multiplier is minus the Hessian of the part of m times the full step.
-        Some(Newton { next, decrement: (-slope).sqrt(), coefficients: coefficients + multiplier, form: step_form })
+        Some(Newton { next, whole: along(1.0), decrement: (-slope).sqrt(), coefficients: coefficients + multiplier })
     }
 
-    /// The polynomial that a Newton step from `at` predicts, when the goal is a model.
+    /// The polynomial that a Newton step from `at` predicts; none if rounding costs it what mathematics promises.
     ///
-    /// With decrement below 1 the step in w keeps `dw < w`, so that `1 - p(xᵢ) = (1 - dwᵢ/wᵢ)/(τwᵢ) > 0`, and
-    /// `H = εI + (S⁻¹ - S⁻¹ dS S⁻¹)/τ ≻ εI` matches p exactly: both are the Newton equations read again.
-    pub(super) fn interior(&self, at: &Dual, newton: &Newton, tau: f64) -> Option<Interior> {
-        let pattern = &self.structure.hessian;
-        let inverse = self.barrier.minimiser(&pattern.spread(&at.form))?;
-        let size = pattern.size;
-        let hessian = (&inverse - &inverse * pattern.spread(&newton.form) * &inverse) / tau
-            + DMatrix::identity(size, size) * self.margin;
-        Some(Interior { coefficients: &newton.coefficients / tau, hessian: symmetric(hessian) })
+    /// With decrement below 1 the step in w keeps `dw < w`, so that `1 - p(xᵢ) = (1 - dwᵢ/wᵢ)/(τwᵢ) > 0`, and both Gram
+    /// matrices, predicted from the gradients of their barriers, are definite and match p: these are the Newton equations
+    /// read again.
+    fn centre(&self, at: &Dual, newton: &Newton, tau: f64) -> Option<Centre> {
+        let coefficients = &newton.coefficients / tau;
+        let Structure { gram, hessian, .. } = self.structure;
+        let margin = DMatrix::identity(hessian.size, hessian.size) * self.margin;
+        let form = self.barrier(Matrix::Hessian, tau).predicted(&at.form, &newton.whole.form)? / tau + &margin;
+        let form = hessian.nearest(&form, &(&self.derivative * &coefficients));
+        Cholesky::new(&form - margin * 0.5)?;
+        let gram = match self.goal {
+            Goal::Model(_) => None,
+            Goal::Gram(..) => {
+                let predicted = self.barrier(Matrix::Polynomial, tau).predicted(&at.moments, &newton.whole.moments)?;
+                Some(gram.nearest(&(predicted / tau), &coefficients))
+            }
+        };
+        let place = Place { dual: newton.next.clone(), tau };
+        Some(Centre { place, interior: Interior { coefficients, hessian: form }, gram })
     }
 }
 

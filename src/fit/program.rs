@@ -20,9 +20,8 @@
 //! maximise  φ(S(s)) - Σwᵢ   subject to  m = Σ wᵢ v(xᵢ) - D*s,  M(m) ⪰ 0,  w >= 0
 //! ```
 //!
-//! The optimal Gram matrix is the gradient of φ at the optimum. Newton steps on φ need one quadratic program over one
-//! small semidefinite cone each (`quadratic`): no exponential cones, and no block of twice the size for determinant or
-//! inverse.
+//! The optimal Gram matrix is the gradient of φ at the optimum. The dual needs no exponential cones, and no block of twice
+//! the size for determinant or inverse (`path`).
 
 use super::basis::{Affine, change};
 use super::objective::{Function, Matrix, Objective};
@@ -33,9 +32,6 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 /// Why a program could not be solved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProgramError {
-    /// The solver refused or gave up.
-    #[error("the semidefinite solver stopped with {0}; lower the degree")]
-    Solver(String),
     /// A moment matrix lost its definiteness.
     #[error("the points do not span the polynomials of this degree numerically; lower the degree")]
     Singular,
@@ -50,18 +46,6 @@ pub(super) struct Dual {
     pub(super) form: DVector<f64>,
     /// Moments m.
     pub(super) moments: DVector<f64>,
-}
-
-impl Dual {
-    /// The point at part `t` of the way to `other`.
-    pub(super) fn towards(&self, other: &Self, t: f64) -> Self {
-        let blend = |a: &DVector<f64>, b: &DVector<f64>| a + (b - a) * t;
-        Self {
-            weights: blend(&self.weights, &other.weights),
-            form: blend(&self.form, &other.form),
-            moments: blend(&self.moments, &other.moments),
-        }
-    }
 }
 
 /// One fit's program but for its points.
@@ -121,28 +105,7 @@ impl<'a> Problem<'a> {
     /// The dual objective: a lower bound of f over all feasible polynomials.
     pub(super) fn lower_bound(&self, dual: &Dual) -> Result<f64, ProgramError> {
         let bound = self.spectral.bound(&self.measured(dual)).ok_or(ProgramError::Singular)?;
-        Ok((bound - self.cost(dual)) / self.spectral.scale())
-    }
-
-    /// The point between `from` and `to` with the largest dual objective.
-    pub(super) fn damped(&self, from: &Dual, to: &Dual) -> Dual {
-        let slope = self.cost(to) - self.cost(from);
-        let (start, end) = (self.measured(from), self.measured(to));
-        let change = &end - &start;
-        // -φ(t) + t slope is convex: bisect its derivative on [0, 1].
-        let falls = |t: f64| {
-            let gram = self.spectral.minimiser(&(&start + &change * t));
-            gram.is_some_and(|gram| slope - gram.dot(&change) <= 0.0)
-        };
-        let (mut low, mut high) = (0.0, 1.0);
-        if falls(1.0) {
-            return to.clone();
-        }
-        for _ in 0..40 {
-            let middle = 0.5 * (low + high);
-            if falls(middle) { low = middle } else { high = middle }
-        }
-        from.towards(to, low)
+        Ok(bound - self.cost(dual))
     }
 }
 

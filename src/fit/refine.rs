@@ -6,14 +6,13 @@
 //! is feasible, and the volume never grows.
 
 use super::model::Model;
-use super::path::{Goal, Interior, Path};
-use super::program::Dual;
+use super::path::{Goal, Interior, Pace, Path, Place};
+use super::progress::Watch;
 use super::structure::Structure;
 use super::volume::{expansion, polynomial, volume};
-use super::{FitError, ProgramError, Progress};
+use super::{FitError, ProgramError};
 use crate::polynomial::Polynomial;
 use nalgebra::{DMatrix, DVector, Vector3};
-use std::ops::ControlFlow;
 
 /// Steps at most.
 const STEPS: usize = 30;
@@ -23,12 +22,40 @@ const ENOUGH: f64 = 2e-5;
 const GAP: f64 = 1e-5;
 /// Growth of τ from one centre to the next.
 const GROWTH: f64 = 10.0;
+/// Where a path starts, as a part of its last τ: nearer, and the first centre is far; farther, and there are more of them.
+const COLD: f64 = 1e-5;
 /// Newton steps on one path at most.
-const NEWTON_STEPS: usize = 3000;
-/// The same on a path from the last optimum.
-const WARM_STEPS: usize = 300;
+const COLD_STEPS: usize = 3000;
+/// As [`COLD`], from the last optimum.
+const WARM: f64 = 1e-2;
+/// As [`COLD_STEPS`], from the last optimum: what works takes a few tens.
+const WARM_STEPS: usize = 80;
 /// Levenberg's term, relative to the mean curvature: directions that the rays see nothing of stay put.
 const DAMPING: f64 = 1e-7;
+
+/// Why a refinement ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RefinementEnd {
+    /// The last step hardly made the volume smaller.
+    Converged,
+    /// No polynomial on the way to a step's optimum had a smaller volume.
+    NoDescent,
+    /// The program of a step could not be solved; the steps before it count.
+    Unsolved,
+    /// The volume was still falling after the last step allowed.
+    StepLimit,
+}
+
+impl std::fmt::Display for RefinementEnd {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Converged => "converged",
+            Self::NoDescent => "no smaller volume was found on the way of the last step",
+            Self::Unsolved => "the program of the last step could not be solved",
+            Self::StepLimit => "the volume was still falling after the last step allowed",
+        })
+    }
+}
 
 /// What a refinement came to.
 #[derive(Clone, Debug)]
@@ -39,6 +66,8 @@ pub(super) struct Refined {
     pub(super) hessian: DMatrix<f64>,
     /// Volume in the frame of p before the first step and after each, by the rule that is minimised.
     pub(super) volumes: Vec<f64>,
+    /// Why there are no more steps.
+    pub(super) end: RefinementEnd,
 }
 
 /// Refines a polynomial that is feasible for `points` (up to a constant) with the Gram matrix `hessian ⪰ margin`.
@@ -48,7 +77,7 @@ pub(super) fn refine(
     margin: f64,
     coefficients: DVector<f64>,
     hessian: DMatrix<f64>,
-    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    watch: &mut Watch,
 ) -> Result<Refined, FitError> {
     let values = DMatrix::from_columns(&points.iter().map(|x| structure.values(x)).collect::<Vec<_>>());
     let mut current = Interior { coefficients, hessian };
@@ -58,43 +87,46 @@ pub(super) fn refine(
     let mut volumes = Vec::new();
     let mut last = None;
     let mut center = Vector3::zeros();
-    for step in 0..STEPS {
+    let mut end = RefinementEnd::StepLimit;
+    for _ in 0..STEPS {
         center = normalise(structure, &mut current, &center)?;
         let p = polynomial(structure, &current.coefficients)?;
         let model = expansion(structure, &p, &center);
+        let here = model.volume;
         if volumes.is_empty() {
-            volumes.push(model.volume);
-        }
-        let report = Progress { round: step + 1, active_points: points.len(), worst_violation: 0.0, decrement: None };
-        if progress(report).is_break() {
-            return Err(FitError::Cancelled);
+            volumes.push(here);
         }
         // A multiple of p - 1 describes the same set: p(center) is held, which fixes the multiple.
         let hold = structure.values(&center);
         let mean = model.curvature.trace() / hold.len() as f64;
-        let mut curvature = model.curvature + &hold * hold.transpose() * (model.volume * 10.0);
+        let mut curvature = model.curvature + &hold * hold.transpose() * (here * 10.0);
         for i in 0..curvature.nrows() {
             curvature[(i, i)] += DAMPING * mean;
         }
         let program =
             Model::new(current.coefficients.clone(), model.gradient, curvature).ok_or(ProgramError::Singular)?;
         let path = Path::new(structure, &values, margin, Goal::Model(&program));
-        // The last optimum is close to the next, but also to the boundary: from there the path is not always found.
-        let warm = last.take().and_then(|dual| minimise(&path, model.volume, Some(dual), WARM_STEPS));
-        let Some((target, dual)) = warm.or_else(|| minimise(&path, model.volume, None, NEWTON_STEPS)) else { break };
-        last = Some(dual);
-        let here = volumes.last().copied().unwrap_or(f64::INFINITY);
-        let Some((next, smaller)) = search(structure, &current, &target, &center, here) else { break };
+        watch.round(points.len(), 0.0);
+        let Some((target, place)) = minimise(&path, here, last.take(), watch)? else {
+            end = RefinementEnd::Unsolved;
+            break;
+        };
+        last = Some(place);
+        let Some((next, smaller)) = search(structure, &current, &target, &center, here) else {
+            end = RefinementEnd::NoDescent;
+            break;
+        };
         volumes.push(smaller);
         current = next;
         if smaller > here * (1.0 - ENOUGH) {
+            end = RefinementEnd::Converged;
             break;
         }
     }
     // The path ends a little inside the constraints: the constant takes that back, and then min p is 0.
     current.coefficients[0] += 1.0 - values.tr_mul(&current.coefficients).max();
     normalise(structure, &mut current, &center)?;
-    Ok(Refined { coefficients: current.coefficients, hessian: current.hessian, volumes })
+    Ok(Refined { coefficients: current.coefficients, hessian: current.hessian, volumes, end })
 }
 
 /// `p -> 1 + (p - 1)/(1 - min p)`: the same set with min p = 0. Returns the minimiser.
@@ -128,25 +160,25 @@ fn minimiser(p: &Polynomial, start: &Vector3<f64>) -> Option<Vector3<f64>> {
     Some(z)
 }
 
-/// The minimiser of the model, to [`GAP`], and the dual point to start the next from.
-fn minimise(path: &Path, volume: f64, warm: Option<Dual>, steps: usize) -> Option<(Interior, Dual)> {
-    let end = path.barrier_parameter() / (GAP * volume);
-    let mut tau = if warm.is_some() { 1e-3 * end } else { 1e-6 * end };
-    let mut dual = match warm {
-        Some(dual) => dual,
-        None => path.start()?,
-    };
-    for _ in 0..steps {
-        let newton = path.step(&dual, tau)?;
-        if newton.decrement < 0.9 {
-            if tau >= end {
-                return Some((path.interior(&dual, &newton, tau)?, newton.next));
-            }
-            tau = (tau * GROWTH).min(end);
+/// The minimiser of the model, to [`GAP`], and the place to start the next from.
+fn minimise(
+    path: &Path,
+    volume: f64,
+    warm: Option<Place>,
+    watch: &mut Watch,
+) -> Result<Option<(Interior, Place)>, FitError> {
+    let gap = GAP * volume;
+    let end = path.barrier_parameter() / gap;
+    // The last optimum is close to the next, but also to the boundary: from there the path is not always found.
+    let warm = warm.map(|place| (Place { tau: WARM * end, ..place }, WARM_STEPS));
+    let cold = path.start().map(|place| (Place { tau: COLD * end, ..place }, COLD_STEPS));
+    for (start, steps) in warm.into_iter().chain(cold) {
+        let centre = path.follow(start, Pace { gap, growth: GROWTH, steps }, watch)?;
+        if let Some(centre) = centre.filter(|centre| centre.place.tau >= end) {
+            return Ok(Some((centre.interior, centre.place)));
         }
-        dual = newton.next;
     }
-    None
+    Ok(None)
 }
 
 /// The polynomial on the way from `from` to `to` with about the smallest volume, if one is below `here`.

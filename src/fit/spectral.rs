@@ -25,27 +25,17 @@ pub(super) struct Spectral {
     function: Function,
     /// T; none where the frame makes no difference but a constant.
     change: Option<DMatrix<f64>>,
-    /// Factor on f, which brings it to the size of log dets.
-    scale: f64,
-}
-
-/// The prediction of first order of the minimiser P.
-pub(super) struct Predicted {
-    /// P.
-    pub(super) gram: DMatrix<f64>,
-    /// f(P), unscaled; none unless P is positive definite.
-    pub(super) value: Option<f64>,
 }
 
 impl Spectral {
     /// `-log det` in the whitened frame.
     pub(super) fn log_det() -> Self {
-        Self { function: Function::LogDet, change: None, scale: 1.0 }
+        Self { function: Function::LogDet, change: None }
     }
 
     /// `tr Q⁻¹` in the frame that `change` leads to.
     pub(super) fn trace_inverse(change: DMatrix<f64>) -> Self {
-        Self { function: Function::TraceInverse, change: Some(change), scale: 1.0 }
+        Self { function: Function::TraceInverse, change: Some(change) }
     }
 
     /// Whether Newton's method does on φ.
@@ -53,19 +43,7 @@ impl Spectral {
         self.function == Function::LogDet
     }
 
-    /// Factor on f in everything but the values reported.
-    pub(super) fn scale(&self) -> f64 {
-        self.scale
-    }
-
-    /// f times `factor`.
-    pub(super) fn scaled(mut self, factor: f64) -> Self {
-        self.scale *= factor;
-        self
-    }
-
-    /// `⟨X, Q⟩` at the minimiser Q over the number of rows N: 1 for log dets. Tolerances mean the same for every object
-    /// when a scale makes it 1 for traces, too.
+    /// `⟨X, Q⟩` at the minimiser Q over the number of rows N: the unit that gaps are measured in, 1 for log dets.
     pub(super) fn size(&self, matrix: &DMatrix<f64>) -> Option<f64> {
         match self.function {
             Function::LogDet => Some(1.0),
@@ -75,12 +53,11 @@ impl Spectral {
         }
     }
 
-    /// Eigenvalues of the scaled X and `E = √scale UᵀT`, so that `E M Eᵀ = Λ`; none unless all are positive.
+    /// Eigenvalues of X and `E = UᵀT`, so that `E M Eᵀ = Λ`; none unless all are positive.
     fn eigen(&self, matrix: &DMatrix<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let root = self.scale.sqrt();
         let moved = match &self.change {
-            Some(change) => (change * matrix * change.transpose()) * self.scale,
-            None => matrix * self.scale,
+            Some(change) => change * matrix * change.transpose(),
+            None => matrix.clone(),
         };
         if !moved.iter().all(|v| v.is_finite()) {
             return None;
@@ -90,28 +67,22 @@ impl Spectral {
         if least.is_nan() || least <= 0.0 {
             return None;
         }
-        let turn = eigen.eigenvectors.transpose() * root;
+        let turn = eigen.eigenvectors.transpose();
         let turn = self.change.as_ref().map_or_else(|| turn.clone(), |change| &turn * change);
         Some((eigen.eigenvalues, turn))
     }
 
-    /// For each key of a pattern the matrix X that its moment alone gives, so that X is linear in the moments.
-    pub(super) fn unit_matrices(&self, pattern: &Pattern) -> Vec<DMatrix<f64>> {
-        let mut unit = DVector::zeros(pattern.keys);
-        (0..pattern.keys)
-            .map(|key| {
-                unit[key] = 1.0;
-                let matrix = pattern.spread(&unit) * self.scale;
-                unit[key] = 0.0;
-                self.change.as_ref().map_or_else(|| matrix.clone(), |change| change * &matrix * change.transpose())
-            })
-            .collect()
-    }
-
-    /// The Gram matrix `scale TᵀQT` of the whitened frame.
-    pub(super) fn whitened(&self, gram: &DMatrix<f64>) -> DMatrix<f64> {
-        let gram = gram * self.scale;
-        symmetric(self.change.as_ref().map_or_else(|| gram.clone(), |change| change.tr_mul(&(&gram * change))))
+    /// f of a Gram matrix P of the whitened frame; none unless it is positive definite.
+    pub(super) fn measure(&self, gram: &DMatrix<f64>) -> Option<f64> {
+        match self.function {
+            Function::LogDet => log_det(gram).map(|value| -value),
+            Function::TraceInverse => {
+                // Q⁻¹ = TP⁻¹Tᵀ
+                let change = self.change.clone().unwrap_or_else(|| DMatrix::identity(gram.nrows(), gram.nrows()));
+                let half = Cholesky::new(gram.clone())?.l().solve_lower_triangular(&change.transpose())?;
+                Some(half.norm_squared())
+            }
+        }
     }
 
     /// φ at the moment matrix M of the whitened frame; none unless it is positive definite.
@@ -160,27 +131,20 @@ impl Spectral {
     }
 
     /// The minimiser at moment matrix `to`, to first order from `at`.
-    pub(super) fn predicted(&self, at: &DMatrix<f64>, to: &DMatrix<f64>) -> Option<Predicted> {
+    pub(super) fn predicted(&self, at: &DMatrix<f64>, to: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         match self.function {
             Function::LogDet => {
                 let gram = self.minimiser(at)?;
-                let gram = symmetric(&gram * 2.0 - &gram * to * &gram);
-                Some(Predicted { value: log_det(&gram).map(|value| -value), gram })
+                Some(&gram * 2.0 - &gram * to * &gram)
             }
             Function::TraceInverse => {
                 let (values, turn) = self.eigen(at)?;
                 let change = &turn * (to - at) * turn.transpose();
-                let mut inner = DMatrix::from_diagonal(&values.map(|v| 1.0 / v.sqrt()));
-                inner.zip_apply(
-                    &DMatrix::from_fn(values.len(), values.len(), |i, j| {
-                        divided(values[i], values[j]) * change[(i, j)]
-                    }),
-                    |q, step| *q -= step,
-                );
-                let gram = turn.tr_mul(&(&inner * &turn));
-                // U and √scale cancel in the trace but for the factor itself.
-                let value = Cholesky::new(symmetric(inner)).map(|c| c.inverse().trace() / self.scale);
-                Some(Predicted { gram: symmetric(gram), value })
+                let inner = DMatrix::from_fn(values.len(), values.len(), |i, j| {
+                    let here = if i == j { 1.0 / values[i].sqrt() } else { 0.0 };
+                    here - divided(values[i], values[j]) * change[(i, j)]
+                });
+                Some(turn.tr_mul(&(inner * &turn)))
             }
         }
     }

@@ -42,6 +42,12 @@ impl Pattern {
         values
     }
 
+    /// The nearest matrix to the symmetric `matrix` whose coefficients are `values`.
+    pub(super) fn nearest(&self, matrix: &DMatrix<f64>, values: &DVector<f64>) -> DMatrix<f64> {
+        let places = self.collapse(&DMatrix::repeat(self.size, self.size, 1.0));
+        matrix + self.spread(&(values - self.collapse(matrix)).component_div(&places))
+    }
+
     /// `tr spread(values)`.
     pub(super) fn trace(&self, values: &DVector<f64>) -> f64 {
         (0..self.size).map(|i| values[self.key(i, i)]).sum()
@@ -51,15 +57,17 @@ impl Pattern {
     pub(super) fn congruence(&self, g: &DMatrix<f64>) -> DMatrix<f64> {
         let n = self.size;
         let mut form = DMatrix::zeros(self.keys, self.keys);
-        // tr(G E_a G E_b) summed over the unit entries of both keys
+        // tr(G E_a G E_b) summed over the unit entries of both keys; a pair and its mirror image share a key
         for i in 0..n {
-            for j in 0..n {
+            for j in 0..=i {
+                let mirrored = if i == j { 1.0 } else { 2.0 };
                 let mut column = form.column_mut(self.key(i, j));
                 for k in 0..n {
-                    let g_ik = g[(i, k)];
-                    for l in 0..n {
-                        column[self.key(k, l)] += g_ik * g[(j, l)];
+                    let (g_ik, g_jk) = (mirrored * g[(k, i)], mirrored * g[(k, j)]);
+                    for l in 0..k {
+                        column[self.key(k, l)] += g_ik * g[(l, j)] + g_jk * g[(l, i)];
                     }
+                    column[self.key(k, k)] += g_ik * g[(k, j)];
                 }
             }
         }

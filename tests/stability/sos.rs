@@ -15,6 +15,8 @@
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 use nalgebra::{Matrix3, Vector3};
+// Links the BLAS that clarabel's semidefinite cones call.
+use openblas_src as _;
 use std::collections::BTreeMap;
 use sublevel::body::{Body, Constraint};
 use sublevel::measure::Pose;

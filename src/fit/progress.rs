@@ -1,0 +1,52 @@
+//! How far a fit has come, told from inside its loops.
+
+use super::FitError;
+use std::ops::ControlFlow;
+
+/// How far a fit has come, after each iteration of its solver.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Progress {
+    /// Programs begun: one per set of points or accuracy, and one per step of a refinement.
+    pub round: usize,
+    /// Interior-point iterations of all of them.
+    pub iterations: usize,
+    /// Points that the program takes into account.
+    pub active_points: usize,
+    /// Largest p - 1 over the hull's vertices at the end of the program before, at least 0.
+    pub worst_violation: f64,
+    /// About the distance to the optimum of the program, in units of log dets, or of the volume in refinements.
+    pub gap: f64,
+}
+
+/// Keeps the count, and hears from the caller whether to go on.
+pub(super) struct Watch<'a> {
+    progress: Progress,
+    tell: &'a mut dyn FnMut(Progress) -> ControlFlow<()>,
+}
+
+impl<'a> Watch<'a> {
+    pub(super) fn new(tell: &'a mut dyn FnMut(Progress) -> ControlFlow<()>) -> Self {
+        Self { progress: Progress::default(), tell }
+    }
+
+    /// A program begins; the one before left its points outside by `worst_violation`.
+    pub(super) fn round(&mut self, active_points: usize, worst_violation: f64) {
+        let round = self.progress.round + 1;
+        self.progress = Progress { round, active_points, worst_violation, ..self.progress };
+    }
+
+    /// An iteration begins, about `gap` from the optimum.
+    ///
+    /// # Errors
+    /// [`FitError::Cancelled`] when the caller asks to stop.
+    pub(super) fn iteration(&mut self, gap: f64) -> Result<(), FitError> {
+        self.progress.iterations += 1;
+        self.progress.gap = gap;
+        if (self.tell)(self.progress).is_break() { Err(FitError::Cancelled) } else { Ok(()) }
+    }
+
+    /// The counts so far.
+    pub(super) fn progress(&self) -> Progress {
+        self.progress
+    }
+}
