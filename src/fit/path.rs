@@ -23,6 +23,8 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 /// Newton decrement below which a point counts as a centre; 1 is where its polynomial stops being feasible.
 const CENTRED: f64 = 0.9;
 
+/// Growth of τ below which a path that rounding blocks is given up.
+const LEAST_GROWTH: f64 = 1.3;
 /// Weight of a trace at the start, relative to that of a log det.
 const TRACE_SHARE: f64 = 0.01;
 
@@ -186,22 +188,32 @@ impl<'a> Path<'a> {
     /// [`FitError::Cancelled`].
     pub(super) fn follow(&self, from: Place, pace: Pace, watch: &mut Watch) -> Result<Option<Centre>, FitError> {
         let Place { mut dual, mut tau } = from;
-        let mut last = None;
-        let mut size = self.size(&dual);
+        let (mut size, mut growth) = (self.size(&dual), pace.growth);
+        let mut last: Option<Centre> = None;
         for _ in 0..pace.steps {
             watch.iteration(self.barrier_parameter() / (tau * size))?;
-            let Some(newton) = self.step(&dual, tau) else { break };
-            if newton.decrement < CENTRED {
-                let Some(centre) = self.centre(&dual, &newton, tau) else { break };
-                last = Some(centre);
-                size = self.size(&dual);
-                let end = self.barrier_parameter() / (pace.gap * size);
-                if tau >= end {
-                    break;
+            let newton = self.step(&dual, tau);
+            let centred = newton.as_ref().is_some_and(|newton| newton.decrement < CENTRED);
+            let centre = newton.as_ref().filter(|_| centred).and_then(|newton| self.centre(&dual, newton, tau));
+            match (newton, centre) {
+                (Some(_), Some(centre)) => {
+                    size = self.size(&dual);
+                    dual.clone_from(&centre.place.dual);
+                    last = Some(centre);
+                    let end = self.barrier_parameter() / (pace.gap * size);
+                    if tau >= end {
+                        break;
+                    }
+                    tau = (tau * growth).min(end);
                 }
-                tau = (tau * pace.growth).min(end);
+                (Some(newton), None) if !centred => dual = newton.next,
+                // Rounding: from the last centre a shorter way may still be open.
+                _ => {
+                    growth = growth.sqrt();
+                    let Some(Centre { place, .. }) = last.as_ref().filter(|_| growth > LEAST_GROWTH) else { break };
+                    (dual, tau) = (place.dual.clone(), place.tau * growth);
+                }
             }
-            dual = newton.next;
         }
         Ok(last)
     }
