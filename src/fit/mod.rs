@@ -184,7 +184,10 @@ pub enum FitError {
         rounds: usize,
     },
     /// The answer could not be verified optimal.
-    #[error("the fit is only known to be within {gap:.1e} of the optimal objective; lower the degree")]
+    #[error(
+        "the fit is only known to be within {gap:.1e} of the optimal objective; lower the degree, or take the objective \
+         logdet-p, which no frame makes worse"
+    )]
     NotOptimal {
         /// Objective minus its lower bound from the dual.
         gap: f64,

@@ -25,8 +25,9 @@ const CENTRED: f64 = 0.9;
 
 /// Growth of τ below which a path that rounding blocks is given up.
 const LEAST_GROWTH: f64 = 1.3;
-/// Weight of a trace at the start, relative to that of a log det.
-const TRACE_SHARE: f64 = 0.01;
+/// Weight of a trace at the start, relative to that of a log det: 1e-2 leaves some starts too far from any centre, 1e-6 drowns
+/// the trace in rounding.
+const TRACE_SHARE: f64 = 1e-4;
 
 /// What the path minimises, besides `Σw - ε tr S`.
 #[derive(Clone, Copy)]

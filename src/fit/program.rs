@@ -33,7 +33,10 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProgramError {
     /// A moment matrix lost its definiteness.
-    #[error("the points do not span the polynomials of this degree numerically; lower the degree")]
+    #[error(
+        "the points do not span the polynomials of this degree numerically; lower the degree, or take the objective \
+         logdet-p, which no frame makes worse"
+    )]
     Singular,
 }
 
