@@ -43,7 +43,7 @@ pub(super) enum Goal<'a> {
 pub(super) struct Interior {
     /// Its coefficients.
     pub(super) coefficients: DVector<f64>,
-    /// Gram matrix of its Hessian form, `≻ εI`.
+    /// Gram matrix of its Hessian form: `≻ εI` but for rounding, of which it may lose half.
     pub(super) hessian: DMatrix<f64>,
 }
 

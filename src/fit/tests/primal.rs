@@ -74,7 +74,12 @@ impl Program {
         let mut solver =
             DefaultSolver::new(&nothing, &self.linear, &matrix, &self.right, &self.cones, settings).unwrap();
         solver.solve();
-        assert_eq!(solver.solution.status, SolverStatus::Solved);
+        // The gap between these answers and ours is asserted, whatever the solver thinks of its own.
+        let status = solver.solution.status;
+        assert!(
+            [SolverStatus::Solved, SolverStatus::AlmostSolved, SolverStatus::InsufficientProgress].contains(&status),
+            "{status:?}"
+        );
         solver.solution.obj_val
     }
 }
@@ -147,7 +152,10 @@ fn blocks(
 
 #[test]
 fn traces_agree_with_the_printed_programs() {
-    let corners: Vec<_> = blob(40).into_iter().map(|x| x.component_mul(&Vector3::new(0.5, 0.3, 0.2))).collect();
+    let cloud = |count| -> Vec<Vector3<f64>> {
+        blob(count).into_iter().map(|x| x.component_mul(&Vector3::new(0.8, 0.7, 0.6))).collect()
+    };
+    let (lopsided, corners) = (cloud(150), cloud(30));
     let mirrored: Vec<_> = (0..8_usize)
         .flat_map(|octant| {
             let sign = Vector3::from_fn(|axis, _| if (octant >> axis) & 1 == 0 { 1.0 } else { -1.0 });
@@ -156,7 +164,7 @@ fn traces_agree_with_the_printed_programs() {
         .collect();
     let margin = 1e-7;
     for (degree, symmetric) in [(2, false), (4, false), (4, true), (6, true)] {
-        let unit_points = if symmetric { &mirrored } else { &corners };
+        let unit_points = if symmetric { &mirrored } else { &lopsided };
         let ellipsoid = minimum_ellipsoid(unit_points).unwrap();
         let whitened: Vec<_> = unit_points.iter().map(|u| ellipsoid.linear * (u - ellipsoid.center)).collect();
         let unit = Affine { linear: ellipsoid.linear.try_inverse().unwrap(), offset: ellipsoid.center };
@@ -170,7 +178,7 @@ fn traces_agree_with_the_printed_programs() {
                 "{objective}, degree {degree}: {:.8}, as printed {printed:.8}, relative difference {difference:.1e}",
                 ours.objective
             );
-            assert!(difference.abs() < 2e-5);
+            assert!(difference.abs() < 1e-6);
         }
     }
 }
