@@ -1,7 +1,7 @@
 //! About where a ray from inside leaves the difference of two outlines: the refinement of portals (Snethen, Complex collision made
 //! simple, Game Programming Gems 7, 2008). Nothing is proven by it; it shows Newton's method where to begin.
 
-use crate::measure::simplex::Corner;
+use crate::optimize::Corner;
 use nalgebra::Vector3;
 
 /// Most support points asked for to find a portal, and as many to refine it.
@@ -85,8 +85,8 @@ pub(super) fn crossing(u: &Vector3<f64>, support: impl Fn(&Vector3<f64>) -> Corn
 #[cfg(test)]
 mod tests {
     use super::crossing;
-    use crate::measure::simplex::Corner;
     use crate::measure::tests::unit;
+    use crate::optimize::Corner;
     use crate::polynomial::tests::Seeded;
     use nalgebra::Vector3;
 

@@ -11,9 +11,9 @@ mod tests;
 
 use super::Status;
 use super::options::Options;
+use super::outlines::lowest;
 use super::pair::Pair;
 use super::pose::Pose;
-use super::simplex::lowest;
 use super::twist::Twist;
 use super::union;
 use super::warm::{Hint, WarmStart};

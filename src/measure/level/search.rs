@@ -14,10 +14,9 @@ use crate::measure::pair::Pair;
 use crate::measure::pose::Pose;
 use crate::measure::programs::Level;
 use crate::measure::sharp::SharpPair;
-use crate::measure::simplex::Approach;
 use crate::measure::twist::Twist;
 use crate::measure::warm::Hint;
-use crate::optimize::minimise;
+use crate::optimize::{Approach, minimise};
 use nalgebra::{SVector, Vector3};
 use std::ops::ControlFlow;
 
