@@ -12,7 +12,7 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
     ("optimize", &[]),
     ("body", &["polynomial", "optimize"]),
     ("measure", &["body", "polynomial", "optimize"]),
-    ("fit", &["body", "polynomial"]),
+    ("fit", &["body", "polynomial", "optimize"]),
     ("scene", &["measure", "body"]),
     // Of measure, the pose.
     ("store", &["body", "scene", "measure"]),

@@ -83,13 +83,15 @@ fn sorted(names: &str) -> Vec<&str> {
 fn fit_reports_and_writes_a_proven_body() {
     let fitted = fitted();
     let [row] = fitted.report.as_array().unwrap().as_slice() else { panic!("{}", fitted.report) };
-    let expected =
-        "input body degree objective refined points hull_vertices volume_m3 hull_volume_m3 seconds status proven";
+    let expected = "input body degree slabs objective refined refinement points hull_vertices volume_m3 volume_error_m3 hull_volume_m3 \
+         gap_m mean_gap_m seconds status objective_value optimality_gap proven";
     assert_eq!(keys(row), sorted(expected));
     assert_eq!(row["body"], text(&fitted.body()));
     assert_eq!((&row["degree"], &row["points"], &row["proven"]), (&4.into(), &8.into(), &true.into()));
     assert!((row["hull_volume_m3"].as_f64().unwrap() - 8.0).abs() < 1e-9);
     assert!((8.0..16.0).contains(&row["volume_m3"].as_f64().unwrap()));
+    let (gap, mean) = (row["gap_m"].as_f64().unwrap(), row["mean_gap_m"].as_f64().unwrap());
+    assert!(0.0 < mean && mean < gap && gap < 3.0_f64.sqrt() - 1.0, "{gap} {mean}");
 
     let file: Value = serde_json::from_str(&std::fs::read_to_string(fitted.body()).unwrap()).unwrap();
     assert_eq!((&file["format"], &file["kind"]), (&"sublevel/1".into(), &"body".into()));
@@ -112,15 +114,49 @@ fn fit_reports_and_writes_a_proven_body() {
 }
 
 #[test]
+fn a_gap_chooses_the_coarsest_body_and_a_ladder_has_them_all() {
+    let fitted = fitted();
+    let (mesh, out) = (fitted.path("cube.off"), fitted.path("rungs"));
+    let fit = |more: &[&str]| json(&[&["fit", "--json", text(&mesh), "--out", text(&out)], more].concat());
+    // The ball around a cube of side 2 reaches √3 - 1 beyond its faces; three slabs leave nothing but the cube.
+    for (gap, name, slabs) in [("800mm", "cube-ball.json", 0), ("1e-3", "cube-d2-s3.json", 3)] {
+        let report = fit(&["--max-gap", gap]);
+        let [row] = report.as_array().unwrap().as_slice() else { panic!("{report}") };
+        assert_eq!((row["body"].as_str().unwrap(), &row["slabs"]), (text(&out.join(name)), &slabs.into()));
+        json(&["verify", "--json", text(&out.join(name)), "--points", text(&mesh)]);
+    }
+    let report = fit(&["--ladder", "--degree", "4"]);
+    let names: Vec<_> = report.as_array().unwrap().iter().map(|row| row["body"].as_str().unwrap().to_owned()).collect();
+    assert_eq!(names, ["cube-ball.json", "cube-d2.json", "cube-d4.json"].map(|name| text(&out.join(name)).to_owned()));
+    let gap = |k: usize| report[k]["gap_m"].as_f64().unwrap();
+    assert!((gap(0) - (3.0_f64.sqrt() - 1.0)).abs() < 0.02 && gap(2) < gap(1), "{report}");
+
+    let told = refusal(&["fit", text(&mesh), "--out", text(&out), "--max-gap", "1nm"]);
+    assert!(told.contains("--max-gap") && told.contains("5mm"), "{told}");
+    let told = refusal(&["fit", text(&mesh), "--out", text(&out), "--max-gap", "1e-9", "--degree", "2"]);
+    assert!(told.contains("max gap") && told.contains("slab(s)"), "{told}");
+    let told = refusal(&["fit", text(&mesh), "--out", text(&out), "--slabs", "16"]);
+    assert!(told.contains("slabs: 16"), "{told}");
+
+    // A note that a point of the body refutes is not passed on.
+    let body = out.join("cube-d4.json");
+    let mut value: Value = serde_json::from_str(&std::fs::read_to_string(&body).unwrap()).unwrap();
+    value["gap_m"] = 1e-3.into();
+    std::fs::write(&body, value.to_string()).unwrap();
+    assert!(refusal(&["verify", text(&body), "--points", text(&mesh)]).contains("gap_m"));
+}
+
+#[test]
 fn verify_proves_and_refuses() {
     let fitted = fitted();
     let (body, mesh) = (fitted.body(), fitted.path("cube.off"));
     let plain = json(&["verify", "--json", text(&body)]);
-    assert_eq!(keys(&plain), sorted("sos_convex_proven contains_all_points_proven max_value degree"));
+    assert_eq!(keys(&plain), sorted("sos_convex_proven contains_all_points_proven max_value degree gap_m"));
     assert_eq!(plain["contains_all_points_proven"], Value::Null);
     let full = json(&["verify", "--json", text(&body), "--points", text(&mesh)]);
     assert_eq!((&full["sos_convex_proven"], &full["contains_all_points_proven"]), (&true.into(), &true.into()));
     assert!(full["max_value"].as_f64().unwrap() <= 1.0);
+    assert_eq!(full["gap_m"], fitted.report[0]["gap_m"]);
 
     let output = sublevel(&["verify", "--json", text(&body), "--points", text(&mesh), "--scale", "1.01"]);
     let outside: Value = serde_json::from_slice(&output.stdout).unwrap();

@@ -34,14 +34,14 @@ impl Program<3> for Support<'_> {
 ///
 /// For any λ >= 0 and any point x0, convexity gives `n·(x - x0) <= Σ λ_i (1 - g_i(x0)) + |n - Σ λ_i ∇g_i(x0)| |x - x0|`
 /// for every x of the body; the residual `slope` is tiny at the support point but multiplies a distance not yet bounded.
-struct TangentBound {
-    point: Vector3<f64>,
-    reach: f64,
-    slope: f64,
+pub(super) struct TangentBound {
+    pub(super) point: Vector3<f64>,
+    pub(super) reach: f64,
+    pub(super) slope: f64,
 }
 
 /// Support point of the body in the direction of the unit vector `n` of the body frame, with its tangent bound.
-fn support(
+pub(super) fn support(
     constraints: &[Constraint],
     placement: &Placement,
     inverse: &Matrix3<f64>,

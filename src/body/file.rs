@@ -162,6 +162,7 @@ impl Body {
             body = body.with_growth_center(center)?;
         }
         body.points = file.contained_points;
+        body.gap = file.gap_m;
         body.provenance = file.provenance;
         Ok(body)
     }
@@ -209,6 +210,11 @@ fn check_notes(file: &File) -> Result<(), BodyFileError> {
             "must be the number of points that were hashed",
         )?;
     }
+    if let Some(gap) = file.gap_m {
+        // Both the body and the hull lie in the circumscribed ball.
+        let possible = (0.0..=2.0 * file.circumscribed_ball.radius_m).contains(&gap);
+        check(possible, "gap_m", "must be between 0 and the diameter of the circumscribed ball, or null")?;
+    }
     if let Some(Provenance { input, objective, hull_volume_m3, .. }) = &file.provenance {
         for (field, text) in [("provenance.input", input), ("provenance.objective", objective)] {
             let printable = text.is_empty() || super::check_name(text).is_ok();
@@ -248,10 +254,6 @@ fn check_derived(file: &File, body: &Body) -> Result<(), BodyFileError> {
     vector("bounding_box.max_m", file.bounding_box.max_m, &body.bounding_box.max)?;
     scalar("volume_m3", file.volume_m3, body.volume.volume_m3, body.volume.volume_m3)?;
     scalar("volume_error_m3", file.volume_error_m3, body.volume.error_m3, body.volume.volume_m3)?;
-    if let Some(gap) = file.gap_m {
-        let recomputed = "unknown (null)".to_owned();
-        return Err(BodyFileError::Derived { field: "gap_m", stored: gap.to_string(), recomputed });
-    }
     Ok(())
 }
 
@@ -276,7 +278,7 @@ impl From<&Body> for File {
             bounding_box: FileBox { min_m: min.into(), max_m: max.into() },
             volume_m3: body.volume.volume_m3,
             volume_error_m3: body.volume.error_m3,
-            gap_m: None,
+            gap_m: body.gap,
             contained_points: body.points.clone(),
             provenance: body.provenance.clone(),
         }

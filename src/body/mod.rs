@@ -73,6 +73,15 @@ pub struct Aabb {
     pub max: Vector3<f64>,
 }
 
+/// How far a body reaches along a direction, body frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Support {
+    /// Point farthest along it, up to the accuracy of its computation.
+    pub point: Vector3<f64>,
+    /// Proven upper bound of the height of all points along it above the interior point, metres.
+    pub height_m: f64,
+}
+
 /// Which points a body was proven to contain.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -194,6 +203,7 @@ pub struct Body {
     outline: Outline,
     volume: Volume,
     points: Option<ContainedPoints>,
+    gap: Option<f64>,
     provenance: Option<Provenance>,
 }
 
@@ -270,6 +280,7 @@ impl Body {
             outline,
             volume,
             points: None,
+            gap: None,
             provenance: None,
         })
     }
@@ -287,7 +298,7 @@ impl Body {
         let normalization = Normalization { center: place(center), linear: linear * matrix.inverse().matrix() };
         let interior = place(&self.interior_point);
         let body = Self::of_proven(&self.name, normalization, self.constraints.clone(), Some(interior))?;
-        Ok(Self { provenance: self.provenance.clone(), ..body })
+        Ok(Self { gap: self.gap, provenance: self.provenance.clone(), ..body })
     }
 
     /// Name given by its maker; not part of the identity.
@@ -386,6 +397,12 @@ impl Body {
         self.points.as_ref()
     }
 
+    /// Upper bound of the distance of any point of the body from the convex hull of its object, metres, as its maker proved it; the
+    /// body alone does not tell.
+    pub fn gap_m(&self) -> Option<f64> {
+        self.gap
+    }
+
     /// Where the body comes from.
     pub fn provenance(&self) -> Option<&Provenance> {
         self.provenance.as_ref()
@@ -411,6 +428,16 @@ impl Body {
         let start = self.normalization.linear * (self.interior_point - self.normalization.center);
         let radius = surface::radius(&self.constraints, &start, direction);
         self.inverse * (direction * radius) + self.interior_point
+    }
+
+    /// How far the body reaches along the unit vector `n` of the body frame.
+    pub fn support(&self, n: &Vector3<f64>) -> Support {
+        let interior_z = self.normalization.linear * (self.interior_point - self.normalization.center);
+        let anchor = &self.interior_point;
+        let bound = extent::support(&self.constraints, &self.placement, &self.inverse, &interior_z, anchor, n);
+        let Ball { center, radius } = &self.circumscribed;
+        let farthest = (bound.point - center).norm() + radius;
+        Support { point: bound.point, height_m: (bound.reach + bound.slope * farthest) * (1.0 + 1e-14) }
     }
 
     /// Proves every point inside, rounding included; with convexity their whole convex hull is.
@@ -440,6 +467,13 @@ impl Body {
         self.prove_contains(points)?;
         self.points = Some(ContainedPoints::of(points));
         Ok(self)
+    }
+
+    /// The same body with the note of its [`Body::gap_m`]; a body's file with one that is negative or beyond the body's size is
+    /// refused.
+    pub fn with_gap(mut self, gap_m: f64) -> Self {
+        self.gap = Some(gap_m);
+        self
     }
 
     /// The same body growing from `center` (metres, body frame) in the growth distance. As it changes answers it changes the

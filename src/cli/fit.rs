@@ -1,7 +1,7 @@
 //! `sublevel fit`.
 
 use super::write_atomically;
-use crate::fit::{Fit, FitOptions, Objective, Progress, RefinementEnd, fit, read_points};
+use crate::fit::{FitOptions, Objective, Progress, RefinementEnd, Rung, coarsest_within, fit, ladder, read_points};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use std::error::Error;
@@ -35,7 +35,15 @@ pub(super) struct FitArgs {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Degree of the polynomial: 2, 4, 6 or 8
-    #[arg(long, value_name = "N", default_value_t = 6)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 6,
+        default_value_ifs = [
+            ("ladder", clap::builder::ArgPredicate::IsPresent, Some("8")),
+            ("max_gap", clap::builder::ArgPredicate::IsPresent, Some("8")),
+        ]
+    )]
     degree: usize,
     /// What the fit minimises: logdet-p, trace-p, logdet-h or trace-h
     ///
@@ -47,6 +55,21 @@ pub(super) struct FitArgs {
     /// trace-h: trace of the inverse of H, in the frame of trace-p. Degrees 2 to 6.
     #[arg(long, value_name = "NAME", default_value_t, verbatim_doc_comment)]
     objective: Objective,
+    /// Cut the body by this many slabs (pairs of parallel planes), each where it reaches farthest beyond the convex hull, 0 to 15
+    ///
+    /// Two or three slabs bring a body of degree 4 as close to most objects as one of degree 8. They give it edges, and queries
+    /// of bodies with edges take several times as long.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    slabs: usize,
+    /// Fit every rung up to --degree (8 if not given): smallest ball (<stem>-ball.json), ellipsoid (-d2), degree 4, 6, 8
+    #[arg(long)]
+    ladder: bool,
+    /// Fit no finer than needed: the body cheapest to query that reaches at most this far beyond the object's convex hull
+    ///
+    /// Such as 5mm, 2cm, or 0.005 (metres). Tried in this order: ball, ellipsoid, degree 4, 6, 8 (or up to --degree), then these
+    /// cut by slabs (<stem>-d4-s3.json has three).
+    #[arg(long, value_name = "LENGTH", value_parser = length, conflicts_with_all = ["ladder", "slabs"])]
+    max_gap: Option<f64>,
     /// Minimise the volume itself afterwards, starting from the objective's optimum: 1 to 10 % smaller, several times as long
     ///
     /// Never makes the volume larger. Why it ended is reported when that was before it converged.
@@ -65,19 +88,34 @@ struct Row {
     input: String,
     body: String,
     degree: usize,
-    objective: &'static str,
+    slabs: usize,
+    /// What was minimised: the objective, or the radius of a ball.
+    objective: String,
     refined: bool,
-    /// Why the refinement ended; none without.
-    refinement: Option<String>,
     points: usize,
     hull_vertices: usize,
     volume_m3: f64,
     volume_error_m3: f64,
     hull_volume_m3: f64,
+    /// Proven bound of the distance of any point of the body from the hull.
+    gap_m: f64,
+    /// Mean over directions of how much farther the body reaches than the hull.
+    mean_gap_m: f64,
     seconds: f64,
+    /// A fit that is not solved, or not proven, is an error.
+    status: &'static str,
+    proven: bool,
+    #[serde(flatten)]
+    solve: Option<Solve>,
+}
+
+/// What only fits of polynomials have.
+#[derive(Serialize)]
+struct Solve {
+    /// Why the refinement ended; none without.
+    refinement: Option<String>,
     objective_value: f64,
     optimality_gap: f64,
-    proven: bool,
 }
 
 /// Fits every input in turn; what was fitted before an error stays.
@@ -102,7 +140,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), Box<dyn Error>> {
     let mut failure = None;
     for (input, stem) in args.inputs.iter().zip(&stems) {
         match one(args, input, stem) {
-            Ok(row) => rows.push(row),
+            Ok(of_input) => rows.extend(of_input),
             // What was fitted before is on disk: it is reported before the error.
             Err(error) => {
                 failure = Some(error);
@@ -126,6 +164,7 @@ fn options(args: &FitArgs, input: &Path) -> FitOptions {
         degree: args.degree,
         objective: args.objective,
         refine: args.refine,
+        slabs: args.slabs,
         input: name,
         ..FitOptions::default()
     }
@@ -136,7 +175,18 @@ fn stem(input: &Path) -> Result<String, Box<dyn Error>> {
     Ok(stem.to_string_lossy().into_owned())
 }
 
-fn one(args: &FitArgs, input: &Path, stem: &str) -> Result<Row, Box<dyn Error>> {
+/// A length with its unit, or in metres.
+fn length(text: &str) -> Result<f64, String> {
+    let units = [("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("", 1.0)];
+    units
+        .into_iter()
+        .find_map(|(unit, metres)| Some(text.strip_suffix(unit)?.trim_end().parse::<f64>().ok()? * metres))
+        .filter(|length| *length > 0.0 && length.is_finite())
+        .ok_or_else(|| "not a positive length such as 5mm, 2cm or 0.005 (metres)".to_owned())
+}
+
+/// Fits what is asked for of one input, and writes it.
+fn one(args: &FitArgs, input: &Path, stem: &str) -> Result<Vec<Row>, Box<dyn Error>> {
     let bar = progress_bar(stem);
     bar.set_message("reading");
     let points = read_points(input, args.scale)?;
@@ -148,31 +198,56 @@ fn one(args: &FitArgs, input: &Path, stem: &str) -> Result<Row, Box<dyn Error>> 
         ));
         ControlFlow::Continue(())
     };
-    let Fit { body, report } = fit(stem, &points, &options(args, input), &mut tell)
-        .map_err(|error| format!("{}: {error}", input.display()))?;
-    bar.finish_and_clear();
-    if let Some(end) = report.refinement_end.filter(|&end| end != RefinementEnd::Converged) {
-        eprintln!("note: {}: the refinement ended early: {end}; the body is proven all the same", input.display());
+    let options = options(args, input);
+    let rungs = match args.max_gap {
+        Some(max_gap) => coarsest_within(stem, &points, max_gap, &options, &mut tell).map(|rung| vec![rung]),
+        None if args.ladder => ladder(stem, &points, &options, &mut tell),
+        None => fit(stem, &points, &options, &mut tell).map(|fit| vec![fit.into()]),
     }
-    let file = args.out.join(format!("{stem}-d{}.json", args.degree));
+    .map_err(|error| format!("{}: {error}", input.display()))?;
+    bar.finish_and_clear();
+    rungs.iter().map(|rung| write(args, input, stem, points.len(), rung)).collect()
+}
+
+/// Writes one body and describes it.
+fn write(args: &FitArgs, input: &Path, stem: &str, points: usize, rung: &Rung) -> Result<Row, Box<dyn Error>> {
+    let Rung { body, gap, seconds, report } = rung;
+    let slabs = body.constraints().len() - 1;
+    let kind = match (report, slabs) {
+        (None, _) => "ball".to_owned(),
+        (Some(report), 0) => format!("d{}", report.degree),
+        (Some(report), _) => format!("d{}-s{slabs}", report.degree),
+    };
+    let file = args.out.join(format!("{stem}-{kind}.json"));
     write_atomically(&file, &body.to_json())?;
+    let refinement = report.as_ref().and_then(|report| report.refinement_end);
+    if let Some(end) = refinement.filter(|&end| end != RefinementEnd::Converged) {
+        eprintln!("note: {}: the refinement ended early: {end}; the body is proven all the same", file.display());
+    }
+    let made = body.provenance().cloned().unwrap_or_default();
     Ok(Row {
         input: input.display().to_string(),
         body: file.display().to_string(),
-        degree: report.degree,
-        objective: report.objective.name(),
-        refined: report.refinement_m3.len() > 1,
-        refinement: report.refinement_end.map(|end| end.to_string()),
-        points: report.points,
-        hull_vertices: report.hull_vertices,
-        volume_m3: report.volume_m3,
-        volume_error_m3: report.volume_error_m3,
-        hull_volume_m3: report.hull_volume_m3,
-        seconds: report.seconds,
-        objective_value: report.objective_value,
-        optimality_gap: report.optimality_gap,
+        degree: report.as_ref().map_or(2, |report| report.degree),
+        slabs,
+        objective: made.objective,
+        refined: made.refined,
+        points,
+        hull_vertices: made.hull_vertices,
+        volume_m3: body.volume().volume_m3,
+        volume_error_m3: body.volume().error_m3,
+        hull_volume_m3: made.hull_volume_m3,
+        gap_m: gap.most_m,
+        mean_gap_m: gap.mean_m,
+        seconds: *seconds,
+        status: "solved",
         // A fit returns a body only when it is proven.
         proven: true,
+        solve: report.as_ref().map(|report| Solve {
+            refinement: report.refinement_end.map(|end| end.to_string()),
+            objective_value: report.objective_value,
+            optimality_gap: report.optimality_gap,
+        }),
     })
 }
 
@@ -191,23 +266,40 @@ fn table(out: &mut impl Write, rows: &[Row]) -> io::Result<()> {
     let width = rows.iter().map(|row| row.body.chars().count()).max().unwrap_or(0).max(4);
     writeln!(
         out,
-        "{:width$}  degree  points  hull vertices    volume m³      hull m³  volume:hull  seconds  proven",
+        "{:width$}  degree  slabs  points  hull vertices    volume m³  volume:hull      gap m  mean gap m  seconds  proven",
         "body"
     )?;
     for row in rows {
         writeln!(
             out,
-            "{:width$}  {:>6}  {:>6}  {:>13}  {:>11.4e}  {:>11.4e}  {:>11.3}  {:>7.2}  {:>6}",
+            "{:width$}  {:>6}  {:>5}  {:>6}  {:>13}  {:>11.4e}  {:>11.3}  {:>9.3e}  {:>10.3e}  {:>7.2}  {:>6}",
             row.body,
             row.degree,
+            row.slabs,
             row.points,
             row.hull_vertices,
             row.volume_m3,
-            row.hull_volume_m3,
             row.volume_m3 / row.hull_volume_m3,
+            row.gap_m,
+            row.mean_gap_m,
             row.seconds,
             if row.proven { "yes" } else { "no" }
         )?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::length;
+
+    #[test]
+    fn lengths_have_units_or_are_metres() {
+        for (text, metres) in [("5mm", 5e-3), ("2 cm", 2e-2), ("0.5m", 0.5), ("3e-3", 3e-3), ("1e3mm", 1.0)] {
+            assert!((length(text).unwrap() - metres).abs() < 1e-15, "{text}");
+        }
+        for text in ["", "mm", "5in", "-1mm", "0", "nan", "inf", "5 5mm"] {
+            assert!(length(text).is_err(), "{text}");
+        }
+    }
 }

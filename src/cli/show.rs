@@ -66,6 +66,7 @@ fn summary(body: &Body) -> serde_json::Value {
         "bounding_box": { "min_m": array(&bounds.min), "max_m": array(&bounds.max) },
         "volume_m3": body.volume().volume_m3,
         "volume_error_m3": body.volume().error_m3,
+        "gap_m": body.gap_m(),
         "contained_points": body.points(),
         "provenance": body.provenance(),
     })
@@ -102,6 +103,9 @@ fn describe(out: &mut impl Write, body: &Body) -> io::Result<()> {
             "  fitted around   {} points, sha256 {} ('verify --points' proves it)",
             points.count, points.sha256
         )?;
+    }
+    if let Some(gap) = body.gap_m() {
+        writeln!(out, "  gap             at most {} m beyond the convex hull of its object", length(gap))?;
     }
     if let Some(provenance) = body.provenance() {
         let refined = if provenance.refined { ", refined" } else { "" };

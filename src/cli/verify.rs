@@ -9,7 +9,8 @@ use std::path::PathBuf;
 /// Re-prove a body from its stored numbers alone
 ///
 /// Recomputes the id, checks every certificate (no program is solved), proves the body bounded and compares every derived
-/// value. With --points it also proves that every point of a mesh is inside. Exit code 0 only if every claim holds.
+/// value. With --points it also proves that every point of a mesh is inside, and bounds anew how far the body reaches beyond
+/// their convex hull. Exit code 0 only if every claim holds.
 ///
 /// Example: sublevel verify bodies/mug-d6.json --points mug.obj --scale 0.001
 #[derive(Debug, clap::Args)]
@@ -36,6 +37,8 @@ struct Report {
     /// Rigorous upper bound of the largest constraint over the points.
     max_value: Option<f64>,
     degree: Option<usize>,
+    /// Proven bound of the distance of any point of the body from the convex hull of the points, metres.
+    gap_m: Option<f64>,
 }
 
 /// Proves, prints, and tells whether every claim holds.
@@ -44,8 +47,13 @@ pub(super) fn run(args: &VerifyArgs) -> Outcome {
     let (report, trouble) = match Body::from_json(&text) {
         Ok(body) => contained(args, &body)?,
         Err(error) => {
-            let report =
-                Report { sos_convex_proven: false, contains_all_points_proven: None, max_value: None, degree: None };
+            let report = Report {
+                sos_convex_proven: false,
+                contains_all_points_proven: None,
+                max_value: None,
+                degree: None,
+                gap_m: None,
+            };
             (report, Some(format!("{}: {error}", args.file.display())))
         }
     };
@@ -57,6 +65,9 @@ pub(super) fn run(args: &VerifyArgs) -> Outcome {
         writeln!(out, "{}: proven sos-convex, bounded, and as its file says", args.file.display())?;
         if let (Some(true), Some(value)) = (report.contains_all_points_proven, report.max_value) {
             writeln!(out, "proven to contain every point: the largest value is at most {value}")?;
+        }
+        if let Some(gap) = report.gap_m {
+            writeln!(out, "proven to reach at most {gap:.3e} m beyond their convex hull")?;
         }
     }
     if let Some(trouble) = &trouble {
@@ -73,12 +84,26 @@ fn contained(args: &VerifyArgs, body: &Body) -> Result<(Report, Option<String>),
     if body.points().is_some_and(|recorded| *recorded != crate::body::ContainedPoints::of(&points)) {
         eprintln!("note: these are not the points that the body was fitted to");
     }
-    let (value, trouble) = match body.prove_contains(&points) {
+    let (value, mut trouble) = match body.prove_contains(&points) {
         Ok(value) => (value, None),
         Err(failure) => (failure.value, Some(format!("{}: {failure}", path.display()))),
     };
     report.contains_all_points_proven = Some(trouble.is_none());
     report.max_value = Some(value);
+    // Points outside have no hull inside the body.
+    if trouble.is_none()
+        && let Ok(hull) = crate::fit::hull::convex_hull(&points)
+    {
+        let vertices: Vec<_> = hull.vertices.iter().map(|&i| points[i]).collect();
+        let gap = crate::fit::gap(body, &vertices);
+        report.gap_m = Some(gap.most_m);
+        trouble = body.gap_m().filter(|&stored| stored < gap.found_m * (1.0 - 1e-6)).map(|stored| {
+            let (file, found) = (args.file.display(), gap.found_m);
+            format!(
+                "{file}: gap_m is {stored:e} but a point of the body is {found:e} m from the hull; fit the body again"
+            )
+        });
+    }
     Ok((report, trouble))
 }
 
@@ -88,5 +113,11 @@ fn contained(_: &VerifyArgs, body: &Body) -> Result<(Report, Option<String>), Bo
 }
 
 fn proven(body: &Body) -> Report {
-    Report { sos_convex_proven: true, contains_all_points_proven: None, max_value: None, degree: Some(body.degree()) }
+    Report {
+        sos_convex_proven: true,
+        contains_all_points_proven: None,
+        max_value: None,
+        degree: Some(body.degree()),
+        gap_m: None,
+    }
 }

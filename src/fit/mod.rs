@@ -1,52 +1,50 @@
 //! Points to a certified body: hull, whitening, semidefinite program, certificate, proof.
 //!
 //! The way of one fit: [`read`] the points; [`hull`] leaves those that matter; the smallest [`ellipsoid`] around them
-//! gives the normalized frame; `generate` minimises an [`Objective`] over sos-convex polynomials with a margin by following
-//! the central path of the dual (`path`); `refine` goes on to the volume itself; the constant coefficient pulls every input point inside; [`Body::new`] proves
-//! the stored numbers. Nothing of that is believed: a fit returns a body only with its proofs.
+//! gives the normalized frame (`object`); `generate` minimises an [`Objective`] over sos-convex polynomials with a margin by
+//! following the central path of the dual (`path`); `refine` goes on to the volume itself; the constant coefficient pulls every
+//! input point inside; [`Body::new`] proves the stored numbers; `slab` cuts off what is too much, and [`gap`](gap()) bounds what
+//! is left of it. Nothing of that is believed: a fit returns a body only with its proofs. A [`ladder`](ladder()) has several of them.
 
+mod ball;
 mod barrier;
 mod basis;
 pub mod ellipsoid;
+mod gap;
 mod generate;
 pub mod hull;
+mod ladder;
 mod model;
+mod object;
 mod objective;
 mod path;
 mod program;
 mod progress;
 pub mod read;
 mod refine;
+mod slab;
 mod spectral;
 mod structure;
 mod volume;
 
+pub use gap::{Gap, gap};
 pub use hull::HullError;
+pub use ladder::{MAX_SLABS, Rung, coarsest_within, ladder};
 pub use objective::{Objective, UnknownObjective};
 pub use program::ProgramError;
 pub use progress::Progress;
 pub use read::{ReadError, read_points};
 pub use refine::RefinementEnd;
+pub use slab::CutError;
 
-use crate::body::{Body, BodyError, Constraint, Normalization, NotContained, Placement, Provenance, check_name};
-use crate::polynomial::{HessianGram, Polynomial, PolynomialError};
-use basis::Affine;
-use ellipsoid::{Ellipsoid, minimum_ellipsoid};
-use generate::{Optimum, generate};
-use hull::Frame;
-use nalgebra::{Matrix3, Vector3};
-use program::Problem;
-use progress::Watch;
-use refine::refine;
+use crate::body::{Body, BodyError, NotContained, check_name};
+use crate::polynomial::PolynomialError;
+use nalgebra::Vector3;
+use object::Object;
 use std::ops::ControlFlow;
-use std::time::Instant;
-use structure::Structure;
 
 /// Default of [`FitOptions::margin`].
 pub const DEFAULT_MARGIN: f64 = 1e-5;
-
-/// Factors on the margin for further attempts, when the certificate of a fit could not be proven.
-const MARGIN_ATTEMPTS: [f64; 3] = [1.0, 10.0, 100.0];
 
 /// What to fit.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,6 +55,9 @@ pub struct FitOptions {
     pub objective: Objective,
     /// Whether to minimise the volume itself, starting from the optimum of the objective.
     pub refine: bool,
+    /// How many slabs to cut the body by, each across the direction in which it reaches farthest beyond the hull: 0 to
+    /// [`MAX_SLABS`].
+    pub slabs: usize,
     /// Smallest eigenvalue asked of the Gram matrix of the Hessian form in the whitened frame; in (0, 1e-2].
     ///
     /// It pays for the rounding of the certificate. Volumes grow by about a part in 10⁴ at 1e-4. The objectives of that very
@@ -68,7 +69,14 @@ pub struct FitOptions {
 
 impl Default for FitOptions {
     fn default() -> Self {
-        Self { degree: 6, objective: Objective::default(), refine: false, margin: DEFAULT_MARGIN, input: String::new() }
+        Self {
+            degree: 6,
+            objective: Objective::default(),
+            refine: false,
+            slabs: 0,
+            margin: DEFAULT_MARGIN,
+            input: String::new(),
+        }
     }
 }
 
@@ -76,13 +84,16 @@ impl FitOptions {
     /// Checks the options and the name of a body to be fitted, before any work.
     ///
     /// # Errors
-    /// [`FitError::Degree`], [`FitError::Objective`], [`FitError::Margin`] or [`FitError::Name`].
+    /// [`FitError::Degree`], [`FitError::Objective`], [`FitError::Slabs`], [`FitError::Margin`] or [`FitError::Name`].
     pub fn check(&self, name: &str) -> Result<(), FitError> {
         if ![2, 4, 6, 8].contains(&self.degree) {
             return Err(FitError::Degree(self.degree));
         }
         if self.degree > self.objective.max_degree() {
             return Err(FitError::Objective { objective: self.objective, degree: self.degree });
+        }
+        if self.slabs > MAX_SLABS {
+            return Err(FitError::Slabs(self.slabs));
         }
         if !(self.margin > 0.0 && self.margin <= 1e-2) {
             return Err(FitError::Margin(self.margin));
@@ -132,6 +143,8 @@ pub struct FitReport {
 pub struct Fit {
     /// The body: proven sos-convex, bounded, and to contain every input point.
     pub body: Body,
+    /// How far it reaches beyond the convex hull of the points.
+    pub gap: Gap,
     /// What it took.
     pub report: FitReport,
 }
@@ -150,6 +163,27 @@ pub enum FitError {
         objective: Objective,
         /// The degree.
         degree: usize,
+    },
+    /// Too many slabs.
+    #[error("slabs: {0} is more than {MAX_SLABS}; raise the degree instead")]
+    Slabs(usize),
+    /// The gap asked for is not a length.
+    #[error("max gap: {0} m is not positive; give the distance that the body may reach beyond the convex hull")]
+    MaxGap(f64),
+    /// No representation is as close as asked for.
+    #[error(
+        "max gap: the closest body, of degree {degree} with {slabs} slab(s), still reaches {reached_m:.3e} m beyond the convex hull, \
+         {asked_m:.3e} m are asked for; allow more, or split the object into several inputs"
+    )]
+    Gap {
+        /// Gap asked for, metres.
+        asked_m: f64,
+        /// Least gap reached, metres.
+        reached_m: f64,
+        /// Degree of that body.
+        degree: usize,
+        /// Slabs of that body.
+        slabs: usize,
     },
     /// The margin is outside its range.
     #[error("margin: {0} is not in (0, 0.01]; leave it at {DEFAULT_MARGIN:e} unless a certificate fails")]
@@ -201,9 +235,13 @@ pub enum FitError {
     /// A point could not be proven inside.
     #[error("the fitted polynomial could not be proven to contain the points: {0}; lower the degree")]
     NotContained(#[from] NotContained),
+    /// A slab could not be added.
+    #[error("the body could not be cut by a slab: {0}; ask for fewer slabs")]
+    Cut(#[from] CutError),
 }
 
-/// Fits a body of one polynomial around `points` (metres) with the least [`FitOptions::objective`].
+/// Fits a body of one polynomial around `points` (metres) with the least [`FitOptions::objective`], and cuts it by
+/// [`FitOptions::slabs`].
 ///
 /// Log dets are least in every affine frame at once. Traces depend on the frame: they are measured in the unit frame, in
 /// which the points have their mean at the origin and largest norm 1.
@@ -219,123 +257,9 @@ pub fn fit(
     options: &FitOptions,
     progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Fit, FitError> {
-    let start = Instant::now();
     options.check(name)?;
-    check(points)?;
-    let hull = hull::convex_hull(points)?;
-    let conditioned: Vec<Vector3<f64>> = hull.vertices.iter().map(|&i| hull.frame.apply(&points[i])).collect();
-    let ellipsoid = minimum_ellipsoid(&conditioned).ok_or(ProgramError::Singular)?;
-    let normalization = whitening(&hull.frame, &ellipsoid).ok_or(ProgramError::Singular)?;
-    let whitened: Vec<Vector3<f64>> =
-        hull.vertices.iter().map(|&i| normalization.linear * (points[i] - normalization.center)).collect();
-    let structure = Structure::new(options.degree);
-    let unit = unit_frame(points, &normalization).ok_or(ProgramError::Singular)?;
-
-    let mut attempts = MARGIN_ATTEMPTS.iter().map(|factor| factor * options.margin);
-    let mut watch = Watch::new(progress);
-    let (body, optimum, margin, volumes, refinement_end) = loop {
-        let margin = attempts.next().unwrap_or(options.margin);
-        let problem = Problem::new(&structure, options.objective, &unit, margin);
-        let mut optimum = generate(problem, &whitened, &mut watch)?;
-        let (mut volumes, mut end) = (Vec::new(), None);
-        if options.refine {
-            let (coefficients, hessian) = (optimum.coefficients.clone(), optimum.hessian.clone());
-            let refined = refine(&structure, &whitened, margin, coefficients, hessian, &mut watch)?;
-            (optimum.coefficients, optimum.hessian) = (refined.coefficients, refined.hessian);
-            (volumes, end) = (refined.volumes, Some(refined.end));
-        }
-        match certify(name, points, &normalization, &structure, &optimum) {
-            Ok(body) => break (body, optimum, margin, volumes, end),
-            Err(FitError::Unproven(BodyError::Certificate { .. })) if attempts.len() > 0 => {}
-            Err(error) => return Err(error),
-        }
-    };
-    let body = body.with_provenance(Provenance {
-        input: options.input.clone(),
-        objective: options.objective.name().to_owned(),
-        refined: volumes.len() > 1,
-        hull_vertices: hull.vertices.len(),
-        hull_volume_m3: hull.volume,
-    });
-    let report = FitReport {
-        degree: options.degree,
-        points: points.len(),
-        hull_vertices: hull.vertices.len(),
-        volume_m3: body.volume().volume_m3,
-        volume_error_m3: body.volume().error_m3,
-        refinement_m3: volumes.iter().map(|volume| volume / normalization.linear.determinant().abs()).collect(),
-        hull_volume_m3: hull.volume,
-        seconds: start.elapsed().as_secs_f64(),
-        refinement_end,
-        objective: options.objective,
-        objective_value: optimum.objective,
-        optimality_gap: optimum.gap,
-        rounds: watch.progress().round,
-        iterations: watch.progress().iterations,
-        margin,
-    };
-    Ok(Fit { body, report })
-}
-
-/// The map from the frame of the points to that of the ellipsoid around the conditioned points, with orthogonal rows: such a
-/// map amplifies no rounding, however long the ellipsoid is.
-fn whitening(frame: &Frame, ellipsoid: &Ellipsoid) -> Option<Normalization> {
-    let center = frame.center + frame.linear.try_inverse()? * ellipsoid.center;
-    let decomposition = (ellipsoid.linear * frame.linear).svd(false, true);
-    let mut turn = decomposition.v_t?;
-    if turn.determinant() < 0.0 {
-        turn.row_mut(2).neg_mut();
-    }
-    Some(Normalization { center, linear: Matrix3::from_diagonal(&decomposition.singular_values) * turn })
-}
-
-/// The map from the whitened frame to the unit frame.
-fn unit_frame(points: &[Vector3<f64>], whitened: &Normalization) -> Option<Affine> {
-    let count = points.len() as f64;
-    // About the center, which is near: far-off coordinates would round the mean away.
-    let offset = points.iter().map(|p| (p - whitened.center) / count).sum::<Vector3<f64>>();
-    let reach = points.iter().map(|p| (p - whitened.center - offset).norm()).fold(0.0, f64::max);
-    Some(Affine { linear: whitened.linear.try_inverse()? / reach, offset: -offset / reach })
-}
-
-fn check(points: &[Vector3<f64>]) -> Result<(), FitError> {
-    if points.len() < 4 {
-        return Err(FitError::TooFewPoints(points.len()));
-    }
-    if let Some(index) = points.iter().position(|p| !p.iter().all(|v| v.is_finite())) {
-        return Err(FitError::NotFinite(index));
-    }
-    let reach = points.iter().map(Vector3::amax).fold(0.0, f64::max);
-    // Coinciding points at the origin are told as such later.
-    if reach > 1e15 || reach > 0.0 && reach < 1e-15 { Err(FitError::OutOfRange(reach)) } else { Ok(()) }
-}
-
-/// Pulls all points inside by the constant coefficient, which leaves the Hessian as it is, and proves the body.
-fn certify(
-    name: &str,
-    points: &[Vector3<f64>],
-    normalization: &Normalization,
-    structure: &Structure,
-    optimum: &Optimum,
-) -> Result<Body, FitError> {
-    let terms = structure.monomials.iter().copied().zip(optimum.coefficients.iter().copied()).collect();
-    let polynomial = Polynomial::new(terms)?;
-    let gram = HessianGram::nearest(&polynomial, structure.hessian_basis.clone(), optimum.hessian.clone())
-        .map_err(|source| BodyError::Certificate { index: 0, source })?;
-    let mut constraint = Constraint { polynomial, gram };
-    let inverse = normalization.linear.try_inverse().ok_or(ProgramError::Singular)?;
-    let placement = Placement::new(normalization.linear, inverse, normalization.center, 0.0, 0.0);
-    // The bound of the rounding moves a little with the constant: a second pass settles it.
-    for _ in 0..3 {
-        let highest =
-            points.iter().map(|x| placement.sample(&constraint, x).value_upper(0.0)).fold(f64::NEG_INFINITY, f64::max);
-        let excess = highest - 1.0;
-        if (-1e-15..=0.0).contains(&excess) {
-            break;
-        }
-        constraint.polynomial = constraint.polynomial.with_constant_shifted(-(excess + 4.0 * f64::EPSILON));
-    }
-    Ok(Body::new(name, *normalization, vec![constraint])?.with_points(points)?)
+    let object = Object::new(name, points, &options.input)?;
+    object.cut(object.fit(options, progress)?, options.slabs, 0.0)
 }
 
 #[cfg(test)]

@@ -1,4 +1,11 @@
+use super::basis::Affine;
+use super::ellipsoid::minimum_ellipsoid;
+use super::generate::generate;
+use super::program::Problem;
+use super::progress::Watch;
+use super::structure::Structure;
 use super::*;
+use crate::polynomial::Polynomial;
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3};
 
 mod primal;
@@ -69,7 +76,7 @@ fn higher_degrees_are_smaller_and_never_below_the_hull() {
     let points = blob(250);
     let mut last = f64::INFINITY;
     for degree in [2, 4, 6] {
-        let Fit { body, report } = fitted(&points, degree);
+        let Fit { body, report, .. } = fitted(&points, degree);
         assert!(report.volume_m3 < last && report.volume_m3 > report.hull_volume_m3);
         assert!(body.prove_contains(&points).is_ok());
         assert_eq!((report.points, body.degree()), (points.len(), degree));
@@ -139,7 +146,7 @@ fn objectives_are_optimal_and_proven() {
     for objective in Objective::ALL {
         for degree in [2, 4, 6] {
             let options = FitOptions { degree, objective, ..FitOptions::default() };
-            let Fit { body, report } = fit("test", &points, &options, &mut unwatched).unwrap();
+            let Fit { body, report, .. } = fit("test", &points, &options, &mut unwatched).unwrap();
             assert!(report.optimality_gap.abs() <= 1e-5 * report.objective_value.abs().max(1.0), "{report:?}");
             assert!(body.prove_contains(&points).is_ok());
             assert!(report.volume_m3 > report.hull_volume_m3);
@@ -239,7 +246,7 @@ fn refinement_is_monotone_contains_the_points_and_is_proven() {
     for degree in [4, 6] {
         let start = fitted(&points, degree);
         let options = FitOptions { degree, refine: true, ..FitOptions::default() };
-        let Fit { body, report } = fit("test", &points, &options, &mut unwatched).unwrap();
+        let Fit { body, report, .. } = fit("test", &points, &options, &mut unwatched).unwrap();
         assert!(report.refinement_m3.len() > 1 && report.refinement_m3.windows(2).all(|v| v[1] < v[0]), "{report:?}");
         assert!(report.volume_m3 < start.report.volume_m3 && report.volume_m3 > report.hull_volume_m3);
         // two quadratures of the same set
