@@ -57,7 +57,6 @@ mod tests {
     use crate::measure::Pose;
     use crate::measure::pair::Pair;
     use crate::measure::tests::{at, random_pose, unit};
-    use crate::optimize::{Approach, Corner, gjk};
     use crate::polynomial::tests::Seeded;
     use nalgebra::Vector3;
 
