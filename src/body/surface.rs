@@ -15,13 +15,14 @@ pub(super) fn radius(constraints: &[Constraint], start: &Vector3<f64>, direction
         .fold(f64::INFINITY, |smallest, c| smallest.min(radius_within(&c.polynomial, start, direction, smallest)))
 }
 
-/// Distance from `start`, where the convex `polynomial` is below 1, along `direction` to where it is 1; infinite if that is
-/// nowhere.
+/// As [`radius`], of one convex polynomial.
+#[cfg(feature = "fit")]
 pub(crate) fn boundary_radius(polynomial: &Polynomial, start: &Vector3<f64>, direction: &Vector3<f64>) -> f64 {
     radius_within(polynomial, start, direction, f64::INFINITY)
 }
 
-/// As [`boundary_radius`], infinite also if it is not below `smallest`.
+/// Distance from `start`, where the convex `polynomial` is below 1, along `direction` to where it is 1; infinite if that is
+/// nowhere, or not below `smallest`.
 ///
 /// The polynomial is convex along the ray and below 1 at its start, so Newton's method lands outside at once and then
 /// decreases monotonically to the root. Its first guess takes it for a pure power of the distance.
