@@ -147,6 +147,40 @@ fn a_gap_chooses_the_coarsest_body_and_a_ladder_has_them_all() {
 }
 
 #[test]
+fn certify_proves_polynomials_from_elsewhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let (input, out) = (folder.path().join("quartic.json"), folder.path().join("body.json"));
+    let certify = |content: &str| {
+        std::fs::write(&input, content).unwrap();
+        sublevel(&["certify", "--json", text(&input), "--out", text(&out)])
+    };
+    let quartic = r#"{"constraints": [{"exponents": [[4,0,0], [0,4,0], [0,0,2], [1,1,0]], "coefficients": [1.0, 1.0, 4.0, 0.0]}]}"#;
+    let output = certify(quartic);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&report["degree"], &report["proven"]), (&4.into(), &true.into()));
+    // What it wrote is proven from its numbers alone, and certified again to the same set.
+    json(&["verify", "--json", text(&out)]);
+    let again = json(&["certify", "--json", text(&out), "--out", text(&folder.path().join("again.json"))]);
+    assert_eq!(again["id"], report["id"]);
+    for (bad, expected) in [
+        ("{", "not polynomials"),
+        (r#"{"constraints": []}"#, "constraints"),
+        (r#"{"constraints": [{"exponents": [[2,0,0]], "coefficients": []}]}"#, "constraints[0]: coefficients"),
+        (r#"{"constraints": [{"exponents": [[3,0,0]], "coefficients": [1.0]}]}"#, "degree 3"),
+        (r#"{"constraints": [{"exponents": [[2,0,0]], "coefficients": [1.0]}]}"#, "not proven bounded"),
+        (
+            r#"{"constraints": [{"exponents": [[4,0,0], [2,0,0], [0,2,0], [0,0,2]], "coefficients": [1.0, -2.0, 1.0, 1.0]}]}"#,
+            "not sos-convex",
+        ),
+    ] {
+        let output = certify(bad);
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(1) && error.contains(expected), "{bad}: {error}");
+    }
+}
+
+#[test]
 fn verify_proves_and_refuses() {
     let fitted = fitted();
     let (body, mesh) = (fitted.body(), fitted.path("cube.off"));

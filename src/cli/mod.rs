@@ -3,6 +3,8 @@
 //! Standard output holds results only; progress and logs go to standard error.
 
 #[cfg(feature = "fit")]
+mod certify;
+#[cfg(feature = "fit")]
 mod demo;
 #[cfg(feature = "fit")]
 mod fit;
@@ -31,7 +33,7 @@ type Outcome = Result<bool, Box<dyn Error>>;
     feature = "fit",
     doc = "A first tour: 'sublevel demo'. With meshes of your own: 'fit', then 'measure' without a server, or 'serve' and 'push'."
 )]
-#[cfg_attr(not(feature = "fit"), doc = "Built without the feature 'fit': 'fit' and 'demo' are left out.")]
+#[cfg_attr(not(feature = "fit"), doc = "Built without the feature 'fit': 'fit', 'certify' and 'demo' are left out.")]
 #[derive(Debug, Parser)]
 #[command(version, max_term_width = 100)]
 enum Command {
@@ -41,6 +43,8 @@ enum Command {
     Fit(fit::FitArgs),
     Show(show::ShowArgs),
     Verify(verify::VerifyArgs),
+    #[cfg(feature = "fit")]
+    Certify(certify::CertifyArgs),
     Measure(measure::MeasureArgs),
     Serve(serve::ServeArgs),
     Push(push::PushArgs),
@@ -57,6 +61,8 @@ pub fn main() -> ExitCode {
         Command::Fit(args) => fit::run(&args).map(done),
         Command::Show(args) => show::run(&args).map(done),
         Command::Verify(args) => verify::run(&args),
+        #[cfg(feature = "fit")]
+        Command::Certify(args) => certify::run(&args).map(done),
         Command::Measure(args) => measure::run(&args).map(done),
         Command::Serve(args) => serve::run(&args).map(done).map_err(Into::into),
         Command::Push(args) => push::run(&args).map(done),

@@ -9,6 +9,7 @@
 mod ball;
 mod barrier;
 mod basis;
+mod certificate;
 pub mod ellipsoid;
 mod gap;
 mod generate;
@@ -27,6 +28,7 @@ mod spectral;
 mod structure;
 mod volume;
 
+pub use certificate::{NoCertificate, certificate};
 pub use gap::{Gap, gap};
 pub use hull::HullError;
 pub use ladder::{MAX_SLABS, Rung, coarsest_within, ladder};

@@ -21,6 +21,16 @@ impl Pattern {
         Self { size: basis.len(), keys: index.len(), key: key.collect() }
     }
 
+    /// The pattern of some of the rows and columns, and which of the keys are its keys.
+    pub(super) fn restricted(&self, rows: &[usize]) -> (Self, Vec<usize>) {
+        let old: Vec<usize> = rows.iter().flat_map(|&i| rows.iter().map(move |&j| self.key(i, j))).collect();
+        let mut keys = old.clone();
+        keys.sort_unstable();
+        keys.dedup();
+        let key = old.iter().map(|key| keys.partition_point(|kept| kept < key)).collect();
+        (Self { size: rows.len(), keys: keys.len(), key }, keys)
+    }
+
     /// Key of the entry in row `i` and column `j`.
     pub(super) fn key(&self, i: usize, j: usize) -> usize {
         self.key[i * self.size + j]
