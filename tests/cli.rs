@@ -83,7 +83,7 @@ fn sorted(names: &str) -> Vec<&str> {
 fn fit_reports_and_writes_a_proven_body() {
     let fitted = fitted();
     let [row] = fitted.report.as_array().unwrap().as_slice() else { panic!("{}", fitted.report) };
-    let expected = "input body degree slabs objective refined refinement points hull_vertices volume_m3 volume_error_m3 hull_volume_m3 \
+    let expected = "input body degree slabs objective refined refinement points left_out left_out_m hull_vertices volume_m3 volume_error_m3 hull_volume_m3 \
          gap_m mean_gap_m seconds status objective_value optimality_gap proven";
     assert_eq!(keys(row), sorted(expected));
     assert_eq!(row["body"], text(&fitted.body()));
@@ -144,6 +144,46 @@ fn a_gap_chooses_the_coarsest_body_and_a_ladder_has_them_all() {
     value["gap_m"] = 1e-3.into();
     std::fs::write(&body, value.to_string()).unwrap();
     assert!(refusal(&["verify", text(&body), "--points", text(&mesh)]).contains("gap_m"));
+}
+
+#[test]
+fn outliers_are_trimmed_and_sheets_thickened() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scan, sheet, out) =
+        (folder.path().join("scan.xyz"), folder.path().join("sheet.xyz"), folder.path().join("out"));
+    let mut lines = String::new();
+    let mut plane = String::new();
+    for k in 0..400 {
+        let (u, v) = ((f64::from(k) * 0.618_034).fract(), (f64::from(k) * 0.754_878).fract());
+        let (height, angle) = (2.0 * u - 1.0, std::f64::consts::TAU * v);
+        let ring = (1.0 - height * height).sqrt();
+        lines += &format!("{} {} {height}\n", ring * angle.cos(), ring * angle.sin());
+        plane += &format!("{u} {v} 0\n");
+    }
+    std::fs::write(&scan, lines + "9 9 9\n").unwrap();
+    std::fs::write(&sheet, plane).unwrap();
+    let fit = |input: &Path, more: &[&str]| {
+        let common = ["fit", "--json", text(input), "--out", text(&out), "--degree", "4"];
+        let output = sublevel(&[&common[..], more].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        (report[0].clone(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let (row, told) = fit(&scan, &["--trim", "0.0025"]);
+    assert_eq!((&row["left_out"], &row["points"]), (&1.into(), &400.into()));
+    assert!(
+        (row["left_out_m"].as_f64().unwrap() - (243.0_f64.sqrt() - 1.0)).abs() < 0.1 && told.contains("1 of 401"),
+        "{row}"
+    );
+    assert!(row["volume_m3"].as_f64().unwrap() < 4.4, "{row}");
+
+    let told = refusal(&["fit", text(&sheet), "--out", text(&out)]);
+    assert!(told.contains("coplanar") && told.contains("--min-thickness"), "{told}");
+    let (row, _) = fit(&sheet, &["--min-thickness", "1cm"]);
+    assert!((row["hull_volume_m3"].as_f64().unwrap() / 0.01 - 1.0).abs() < 0.1, "{row}");
+    json(&["verify", "--json", text(&out.join("sheet-d4.json")), "--points", text(&sheet)]);
+    let told = refusal(&["fit", text(&scan), "--out", text(&out), "--trim", "0.9"]);
+    assert!(told.contains("trim: 0.9"), "{told}");
 }
 
 #[test]

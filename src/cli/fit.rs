@@ -1,9 +1,13 @@
 //! `sublevel fit`.
 
 use super::write_atomically;
-use crate::fit::{FitOptions, Objective, Progress, RefinementEnd, Rung, coarsest_within, fit, ladder, read_points};
+use crate::fit::{
+    FitError, FitOptions, Objective, Progress, RefinementEnd, Rung, Trimmed, coarsest_within, fit, ladder, read_points,
+    thicken, trim,
+};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
+use std::borrow::Cow;
 use std::error::Error;
 use std::io::{self, Write};
 use std::ops::ControlFlow;
@@ -75,6 +79,12 @@ pub(super) struct FitArgs {
     /// Never makes the volume larger. Why it ended is reported when that was before it converged.
     #[arg(long)]
     refine: bool,
+    /// Leave out this fraction of the points, the outermost, such as 0.01 of a scan with outliers; what was left out is told
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.0, allow_negative_numbers = true)]
+    trim: f64,
+    /// Give flat inputs a thickness: copies of the points to both sides, where they extend by less than this, such as 1mm
+    #[arg(long, value_name = "LENGTH", value_parser = length)]
+    min_thickness: Option<f64>,
     /// Metres per unit of the input: 0.001 for files in millimetres
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, allow_negative_numbers = true)]
     scale: f64,
@@ -93,6 +103,9 @@ struct Row {
     objective: String,
     refined: bool,
     points: usize,
+    /// Points that were trimmed, and the largest distance of one of them from the hull of the others.
+    left_out: usize,
+    left_out_m: f64,
     hull_vertices: usize,
     volume_m3: f64,
     volume_error_m3: f64,
@@ -199,18 +212,35 @@ fn one(args: &FitArgs, input: &Path, stem: &str) -> Result<Vec<Row>, Box<dyn Err
         ControlFlow::Continue(())
     };
     let options = options(args, input);
+    let named = |error: FitError| format!("{}: {error}", input.display());
+    let thick = args.min_thickness.map_or(Cow::Borrowed(&points[..]), |least| thicken(&points, least));
+    let trimmed = if args.trim == 0.0 { None } else { Some(trim(&thick, args.trim, &mut tell).map_err(named)?) };
+    let kept = trimmed.as_ref().map_or(&thick[..], |trimmed| &trimmed.kept);
     let rungs = match args.max_gap {
-        Some(max_gap) => coarsest_within(stem, &points, max_gap, &options, &mut tell).map(|rung| vec![rung]),
-        None if args.ladder => ladder(stem, &points, &options, &mut tell),
-        None => fit(stem, &points, &options, &mut tell).map(|fit| vec![fit.into()]),
+        Some(max_gap) => coarsest_within(stem, kept, max_gap, &options, &mut tell).map(|rung| vec![rung]),
+        None if args.ladder => ladder(stem, kept, &options, &mut tell),
+        None => fit(stem, kept, &options, &mut tell).map(|fit| vec![fit.into()]),
     }
-    .map_err(|error| format!("{}: {error}", input.display()))?;
+    .map_err(named)?;
     bar.finish_and_clear();
-    rungs.iter().map(|rung| write(args, input, stem, points.len(), rung)).collect()
+    let told = trimmed.as_ref().filter(|trimmed| !trimmed.left_out.is_empty());
+    if let Some(Trimmed { left_out, farthest_m, .. }) = told {
+        let (input, count, all) = (input.display(), left_out.len(), thick.len());
+        eprintln!(
+            "note: {input}: {count} of {all} points left out, up to {farthest_m:.3e} m outside the hull of the others"
+        );
+    }
+    rungs.iter().map(|rung| write(args, input, stem, trimmed.as_ref(), rung)).collect()
 }
 
 /// Writes one body and describes it.
-fn write(args: &FitArgs, input: &Path, stem: &str, points: usize, rung: &Rung) -> Result<Row, Box<dyn Error>> {
+fn write(
+    args: &FitArgs,
+    input: &Path,
+    stem: &str,
+    trimmed: Option<&Trimmed>,
+    rung: &Rung,
+) -> Result<Row, Box<dyn Error>> {
     let Rung { body, gap, seconds, report } = rung;
     let slabs = body.constraints().len() - 1;
     let kind = match (report, slabs) {
@@ -232,7 +262,9 @@ fn write(args: &FitArgs, input: &Path, stem: &str, points: usize, rung: &Rung) -
         slabs,
         objective: made.objective,
         refined: made.refined,
-        points,
+        points: body.points().map_or(0, |points| points.count),
+        left_out: trimmed.map_or(0, |trimmed| trimmed.left_out.len()),
+        left_out_m: trimmed.map_or(0.0, |trimmed| trimmed.farthest_m),
         hull_vertices: made.hull_vertices,
         volume_m3: body.volume().volume_m3,
         volume_error_m3: body.volume().error_m3,

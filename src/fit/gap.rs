@@ -204,29 +204,18 @@ impl<'a> Search<'a> {
 
     /// Bound of the distance of x from the hull.
     fn distance(&self, x: &Vector3<f64>) -> f64 {
-        let distance = (x - self.nearest(x)).norm() + ROUNDING * self.size;
+        let distance = (x - nearest(&self.points, x)).norm() + ROUNDING * self.size;
         // A plane that bounds nothing.
         if x.norm() < f64::INFINITY { distance } else { f64::INFINITY }
     }
 
     /// Takes a point of the body if it is the farthest so far, by the plane that parts it from the hull.
     fn find(&mut self, x: &Vector3<f64>) {
-        let Some(n) = (x - self.nearest(x)).try_normalize(0.0) else { return };
+        let Some(n) = (x - nearest(&self.points, x)).try_normalize(0.0) else { return };
         let distance = n.dot(x) - self.points.iter().map(|p| n.dot(p)).fold(f64::NEG_INFINITY, f64::max);
         if distance > self.found {
             (self.found, self.direction) = (distance, n);
         }
-    }
-
-    /// A point of the hull, about the one nearest to x.
-    fn nearest(&self, x: &Vector3<f64>) -> Vector3<f64> {
-        let support = |n: &Vector3<f64>| {
-            let farthest = self.points.iter().min_by(|p, q| n.dot(p).total_cmp(&n.dot(q)));
-            let point = farthest.copied().unwrap_or_default();
-            Corner { x: point, y: *x, difference: point - x }
-        };
-        let found = gjk(0.0, &-x, support);
-        if found.common.is_some() { *x } else { found.x }
     }
 
     fn mean(&self) -> f64 {
@@ -236,6 +225,17 @@ impl<'a> Search<'a> {
         };
         sphere_rule(RINGS).map(|(n, weight)| gap(&n) * weight).sum::<f64>() / (4.0 * PI)
     }
+}
+
+/// A point of the hull of points, about the one nearest to x.
+pub(super) fn nearest(points: &[Vector3<f64>], x: &Vector3<f64>) -> Vector3<f64> {
+    let support = |n: &Vector3<f64>| {
+        let farthest = points.iter().min_by(|p, q| n.dot(p).total_cmp(&n.dot(q)));
+        let point = farthest.copied().unwrap_or_default();
+        Corner { x: point, y: *x, difference: point - x }
+    };
+    let found = gjk(0.0, &-x, support);
+    if found.common.is_some() { *x } else { found.x }
 }
 
 /// The part of a polygon where a linear function is not negative; corners are by their weights on a triangle, the function by its

@@ -23,8 +23,7 @@ pub enum HullError {
     /// Coplanar, collinear or coincident points.
     #[error(
         "the points are flat: {shape}, {thickness_m:.3e} m thick and {extent_m:.3e} m long \
-         (at least {FLATNESS:.0e} of the length is needed); add thickness, for example copies of the points offset \
-         to both sides"
+         (at least {FLATNESS:.0e} of the length is needed); give them a thickness (--min-thickness, such as 1mm)"
     )]
     Flat {
         /// "coincident", "collinear" or "coplanar".
@@ -128,20 +127,7 @@ fn principal_frame(points: &[Vector3<f64>]) -> Result<Frame, HullError> {
     if points.is_empty() || !(size > 0.0) {
         return Err(HullError::Flat { shape: "coincident", thickness_m: 0.0, extent_m: size.max(0.0) });
     }
-    // Unit size first: squares of tiny or huge coordinates stay in range.
-    let middle = low * 0.5 + high * 0.5;
-    let count = points.len() as f64;
-    let mean = middle + points.iter().map(|p| (p - middle) / count).sum::<Vector3<f64>>();
-    let covariance: Matrix3<f64> = points.iter().map(|p| (p - mean) / size).map(|d| d * d.transpose() / count).sum();
-    let axes = SymmetricEigen::new(covariance).eigenvectors;
-    let extents = Vector3::from_fn(|i, _| {
-        let axis = axes.column(i);
-        let (low, high) = points
-            .iter()
-            .map(|p| axis.dot(&(p - mean)))
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), along| (low.min(along), high.max(along)));
-        high - low
-    });
+    let (mean, axes, extents) = principal_axes(points);
     let mut sorted = [extents.x, extents.y, extents.z];
     sorted.sort_by(f64::total_cmp);
     let needed = FLATNESS * sorted[2];
@@ -154,6 +140,32 @@ fn principal_frame(points: &[Vector3<f64>]) -> Result<Frame, HullError> {
     }
     let linear = Matrix3::from_diagonal(&extents.map(|e| 1.0 / e)) * axes.transpose();
     Ok(Frame { center: mean, linear })
+}
+
+/// The mean of finite points, their principal axes as columns, and how far they extend along each.
+pub(super) fn principal_axes(points: &[Vector3<f64>]) -> (Vector3<f64>, Matrix3<f64>, Vector3<f64>) {
+    let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    for point in points {
+        (low, high) = (low.inf(point), high.sup(point));
+    }
+    let size = (high - low).max();
+    let middle = low * 0.5 + high * 0.5;
+    let count = points.len() as f64;
+    let mean = middle + points.iter().map(|p| (p - middle) / count).sum::<Vector3<f64>>();
+    if !(size > 0.0) {
+        return (mean, Matrix3::identity(), Vector3::zeros());
+    }
+    // Unit size first: squares of tiny or huge coordinates stay in range.
+    let covariance: Matrix3<f64> = points.iter().map(|p| (p - mean) / size).map(|d| d * d.transpose() / count).sum();
+    let axes = SymmetricEigen::new(covariance).eigenvectors;
+    let extents = Vector3::from_fn(|i, _| {
+        let axis = axes.column(i);
+        let along = points.iter().map(|p| axis.dot(&(p - mean)));
+        let (low, high) =
+            along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), along| (low.min(along), high.max(along)));
+        high - low
+    });
+    (mean, axes, extents)
 }
 
 /// Vertices and facets of the hull, as indices into `points`.

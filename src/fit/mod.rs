@@ -26,6 +26,8 @@ mod refine;
 mod slab;
 mod spectral;
 mod structure;
+mod thicken;
+mod trim;
 mod volume;
 
 pub use certificate::{NoCertificate, certificate};
@@ -38,6 +40,8 @@ pub use progress::Progress;
 pub use read::{ReadError, read_points};
 pub use refine::RefinementEnd;
 pub use slab::CutError;
+pub use thicken::thicken;
+pub use trim::{Trimmed, trim};
 
 use crate::body::{Body, BodyError, NotContained, check_name};
 use crate::polynomial::PolynomialError;
@@ -190,6 +194,9 @@ pub enum FitError {
     /// The margin is outside its range.
     #[error("margin: {0} is not in (0, 0.01]; leave it at {DEFAULT_MARGIN:e} unless a certificate fails")]
     Margin(f64),
+    /// More than may be left out, or less than nothing.
+    #[error("trim: {0} is not between 0 and 0.5; give the fraction of the points to leave out, such as 0.01")]
+    Trim(f64),
     /// Fewer than four points.
     #[error("points: {0} given; a body needs at least 4 that do not lie in one plane")]
     TooFewPoints(usize),

@@ -11,7 +11,7 @@ use super::progress::{Progress, Watch};
 use super::refine::refine;
 use super::slab::cut;
 use super::structure::Structure;
-use super::{Fit, FitError, FitOptions, FitReport, Rung};
+use super::{DEFAULT_MARGIN, Fit, FitError, FitOptions, FitReport, Objective, Rung};
 use crate::body::{Body, BodyError, Constraint, Normalization, Placement, Provenance, Volume};
 use crate::polynomial::{HessianGram, Polynomial};
 use nalgebra::{Matrix3, Vector3};
@@ -66,6 +66,16 @@ impl<'a> Object<'a> {
         let body = Body::ball(self.name, ball.center, ball.radius * (1.0 + 1e-12))?.with_points(self.points)?;
         let (body, gap) = self.finish(body, BALL, false);
         Ok(Rung { body, gap, seconds: self.seconds + start.elapsed().as_secs_f64(), report: None })
+    }
+
+    /// Values at all points of the polynomial of that degree with the least log det: 1 at the outermost.
+    pub(super) fn levels(&self, degree: usize, watch: &mut Watch) -> Result<Vec<f64>, FitError> {
+        let structure = Structure::new(degree);
+        let problem = Problem::new(&structure, Objective::LogDetP, &self.unit, DEFAULT_MARGIN);
+        let optimum = generate(problem, &self.whitened, watch)?;
+        let Normalization { center, linear } = &self.normalization;
+        let value = |x: &Vector3<f64>| structure.values(&(linear * (x - center))).dot(&optimum.coefficients);
+        Ok(self.points.iter().map(value).collect())
     }
 
     /// The body of one polynomial with the least objective, refined as asked for.
