@@ -22,14 +22,16 @@ use std::time::Duration;
 /// dual solution shows the objective to be optimal.
 ///
 /// Higher degrees are tighter and cost more: 2 is an ellipsoid, 6 suits most objects and takes about a second, 8 about ten.
+/// How far a body reaches beyond the convex hull of its points is told as the gap: a proven bound of the distance of its
+/// farthest point, and the mean over all directions.
 ///
 /// Examples:
 ///
 ///   sublevel fit mug.obj --scale 0.001 --out bodies
 ///
-///   sublevel fit chair.off --objective trace-p --degree 4 --out bodies
+///   sublevel fit mug.obj --scale 0.001 --max-gap 5mm --out bodies
 ///
-///   sublevel fit chair.off --refine --out bodies
+///   sublevel fit chair.off --ladder --out bodies
 #[derive(Debug, clap::Args)]
 pub(super) struct FitArgs {
     /// Mesh or point files; the ending tells the format
@@ -51,11 +53,12 @@ pub(super) struct FitArgs {
     degree: usize,
     /// What the fit minimises: logdet-p, trace-p, logdet-h or trace-h
     ///
-    /// logdet-p: log det of the inverse Gram matrix P of p. Tightest nearly always; the body follows the object through
-    /// every affine map. Take it unless you compare objectives.
-    /// trace-p: trace of the inverse of P. Depends on the frame: points centred at their mean, largest norm 1. Looser.
-    /// logdet-h: log det of the inverse Gram matrix H of the Hessian form, which asks for curvature everywhere: rounder
-    /// bodies that bulge at flat sides. Degrees 2 to 6.
+    /// logdet-p: log det of the inverse Gram matrix P of p. Tightest nearly always, and
+    ///   the body follows the object through every affine map: take it.
+    /// trace-p: trace of the inverse of P. Looser, and depends on the frame: points
+    ///   centred at their mean, largest norm 1.
+    /// logdet-h: log det of the inverse Gram matrix H of the Hessian form, which asks
+    ///   for curvature everywhere: bodies that bulge at flat sides. Degrees 2 to 6.
     /// trace-h: trace of the inverse of H, in the frame of trace-p. Degrees 2 to 6.
     #[arg(long, value_name = "NAME", default_value_t, verbatim_doc_comment)]
     objective: Objective,

@@ -128,15 +128,7 @@ impl Active {
             }
             next = (0..points.len()).max_by(|&a, &b| distance[a].total_cmp(&distance[b])).unwrap_or(0);
         }
-        let inner = 2 * structure.gram.size;
-        let spread = chosen.len();
-        for i in 0..inner {
-            // four points from different quarters of the chosen ones, with weights that change from one mix to the next
-            let corner = |k: usize| chosen[(i + k * (spread / 4).max(1)) % spread];
-            let shares = [0.618_034, 0.754_878, 0.569_840, 0.819_173].map(|step| fraction(i, step).powi(3) + 0.01);
-            let total: f64 = shares.iter().sum();
-            chosen.push((0..4).map(|k| corner(k) * (shares[k] / total)).sum());
-        }
+        chosen.extend(inner(structure, &chosen));
         let values = columns(structure, &chosen);
         Self { used, chosen, values }
     }
@@ -159,6 +151,19 @@ impl Active {
 
 fn columns(structure: &Structure, points: &[Vector3<f64>]) -> DMatrix<f64> {
     DMatrix::from_columns(&points.iter().map(|point| structure.values(point)).collect::<Vec<_>>())
+}
+
+/// Mixes of points, twice as many as monomials of half the degree: they constrain nothing, but with weight on them moments are
+/// positive definite also where there are few points, or points on a quadric.
+pub(super) fn inner(structure: &Structure, points: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let mix = |i: usize| {
+        // four points from different quarters of them, with weights that change from one mix to the next
+        let corner = |k: usize| points[(i + k * (points.len() / 4).max(1)) % points.len()];
+        let shares = [0.618_034, 0.754_878, 0.569_840, 0.819_173].map(|step| fraction(i, step).powi(3) + 0.01);
+        let total: f64 = shares.iter().sum();
+        (0..4).map(|k| corner(k) * (shares[k] / total)).sum()
+    };
+    (0..2 * structure.gram.size).map(mix).collect()
 }
 
 /// Low-discrepancy sequence in the unit interval.

@@ -9,6 +9,9 @@ use std::ops::ControlFlow;
 /// Most slabs a body may be cut by.
 pub const MAX_SLABS: usize = MAX_CONSTRAINTS - 1;
 
+/// Terms of a slab's quadratic.
+const SLAB_TERMS: usize = 10;
+
 /// Degrees of the rungs above the ball.
 const DEGREES: [usize; 4] = [2, 4, 6, 8];
 
@@ -53,8 +56,8 @@ pub fn ladder(
 
 /// The representation of an object that is the cheapest to query of those whose gap is at most `max_gap_m`, metres.
 ///
-/// A ladder is climbed up to the degree of the options, then bodies are cut by slabs, from the lowest degree on: slabs make edges,
-/// which cost a query more than any degree does, and among bodies with edges the fewest terms are the cheapest.
+/// A ladder is climbed up to the degree of the options. If no rung is near enough they are cut by slabs, and the one that gets there
+/// with the fewest terms is taken: slabs make edges, which cost a query more than any degree does.
 ///
 /// # Errors
 /// As [`fit`](super::fit()), and [`FitError::Gap`] with the closest that was reached.
@@ -83,18 +86,25 @@ pub fn coarsest_within(
         fits.push(fit);
     }
     let mut closest = FitError::Gap { asked_m: max_gap_m, reached_m: f64::INFINITY, degree: 0, slabs: 0 };
+    let mut cheapest: Option<Fit> = None;
     for fit in fits {
-        let Fit { body, gap, report } = object.cut(fit, MAX_SLABS, max_gap_m)?;
-        if gap.most_m <= max_gap_m {
-            return Ok(Fit { body, gap, report }.into());
-        }
-        if let FitError::Gap { reached_m, degree, slabs, .. } = &mut closest
-            && gap.most_m < *reached_m
+        let room = cheapest.as_ref().map_or(usize::MAX, |known| terms(&known.body).saturating_sub(terms(&fit.body)));
+        let slabs = MAX_SLABS.min(room.saturating_sub(1) / SLAB_TERMS);
+        let fit = object.cut(fit, slabs, max_gap_m)?;
+        if fit.gap.most_m <= max_gap_m {
+            cheapest = Some(fit);
+        } else if let FitError::Gap { reached_m, degree, slabs, .. } = &mut closest
+            && fit.gap.most_m < *reached_m
         {
-            (*reached_m, *degree, *slabs) = (gap.most_m, body.degree(), body.constraints().len() - 1);
+            (*reached_m, *degree, *slabs) = (fit.gap.most_m, fit.body.degree(), fit.body.constraints().len() - 1);
         }
     }
-    Err(closest)
+    cheapest.map(Rung::from).ok_or(closest)
+}
+
+/// Terms of all constraints, which queries evaluate.
+fn terms(body: &Body) -> usize {
+    body.constraints().iter().map(|constraint| constraint.polynomial.terms().len()).sum()
 }
 
 /// The options of the rungs above the ball.
