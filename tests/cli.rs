@@ -261,13 +261,16 @@ fn measure_prints_one_line_a_pose() {
     let lines: Vec<Value> =
         std::str::from_utf8(&output.stdout).unwrap().lines().map(|l| serde_json::from_str(l).unwrap()).collect();
     assert_eq!(lines.len(), 3);
-    let expected = "status distance_m distance_lower_m distance_upper_m level_ab level_ab_lower level_ab_upper level_ba \
-                    level_ba_lower level_ba_upper witness_a witness_b normal iterations";
+    let expected = "status distance_m distance_lower_m distance_upper_m hulls_distance_upper_m level_ab level_ab_lower \
+                    level_ab_upper level_ba level_ba_lower level_ba_upper witness_a witness_b normal iterations";
     let expected = expected.split_whitespace().collect::<Vec<_>>().join(" ");
     assert_eq!(keys(&lines[0]), sorted(&expected));
     assert!(lines.iter().all(|line| line["status"] == "converged"));
     let d = lines[0]["distance_m"].as_f64().unwrap();
     assert!((d - (5.0 - 2.0 * reach)).abs() < 1e-8, "{d} against {}", 5.0 - 2.0 * reach);
+    // The cubes themselves are 3 m apart.
+    let bound = |key: &str| lines[0][key].as_f64().unwrap();
+    assert!(bound("distance_lower_m") <= 3.0 && bound("hulls_distance_upper_m") >= 3.0, "{}", lines[0]);
     // From B to A: B stands at +x.
     assert!(lines[0]["normal"][0].as_f64().unwrap() < -0.999);
     assert_eq!((&lines[2]["distance_m"], &lines[2]["normal"]), (&0.0.into(), &Value::Null));

@@ -11,8 +11,8 @@
 //! after division by the (positive) rest. In the cone, at `x = r Σ w_i d_i` with `w_i >= 0` and `Σ w_i = 1`, these say
 //! `1 / r >= max_k Σ w_i a_k·d_i`: the largest of some functions that are linear in w. Where one of them is the largest is a polygon,
 //! and the cell's part of the body lies in the hull of 0 and the points that the corners of these polygons stand for. The
-//! distance from the hull is convex and 0 at 0, so the largest of those points' distances is a bound. Across a smooth surface it is
-//! off by the square of the cell's size; along edges, where constraints meet, it is exact.
+//! distance from the hull is convex, so the largest at those points and at 0 is a bound. Across a smooth surface it is off by the
+//! square of the cell's size; along edges, where constraints meet, it is exact.
 
 use crate::body::{Body, Constraint, Sphere, boundary_radius, sphere_rule};
 use crate::optimize::{Corner, gjk};
@@ -101,6 +101,8 @@ struct Search<'a> {
     points: Vec<Vector3<f64>>,
     /// Bound of the distance of any point of the body from the interior point.
     size: f64,
+    /// Bound of the distance of the interior point from the hull, in which it need not lie.
+    center: f64,
     rays: Vec<Ray>,
     /// Rays between two others.
     middles: HashMap<(usize, usize), usize>,
@@ -110,10 +112,13 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     fn new(body: &'a Body, points: &[Vector3<f64>]) -> Self {
-        let points = points.iter().map(|x| x - body.interior_point()).collect();
+        let points: Vec<_> = points.iter().map(|x| x - body.interior_point()).collect();
         let ball = body.circumscribed();
         let size = (body.interior_point() - ball.center).norm() + ball.radius;
-        Self { body, points, size, rays: Vec::new(), middles: HashMap::new(), found: 0.0, direction: Vector3::x() }
+        let (rays, middles) = (Vec::new(), HashMap::new());
+        let mut search = Self { body, points, size, center: 0.0, rays, middles, found: 0.0, direction: Vector3::x() };
+        search.center = search.distance(&Vector3::zeros());
+        search
     }
 
     fn run(mut self) -> Gap {
@@ -193,7 +198,7 @@ impl<'a> Search<'a> {
     /// Bound of the distance of the body within a cone of rays.
     fn most(&self, rays: [usize; 3]) -> f64 {
         let rays = rays.map(|ray| &self.rays[ray]);
-        let mut most = rays.iter().map(|ray| ray.most).fold(0.0, f64::max);
+        let mut most = rays.iter().map(|ray| ray.most).fold(self.center, f64::max);
         // Of each plane the inverse of how far along each ray it is.
         let mut planes: Vec<[f64; 3]> = Vec::new();
         for a in rays.iter().flat_map(|ray| &ray.planes) {
@@ -275,7 +280,7 @@ fn clip(polygon: &mut Vec<[f64; 3]>, function: &[f64; 3]) {
 #[cfg(test)]
 mod tests {
     use super::gap;
-    use crate::body::Body;
+    use crate::body::{Body, Sphere};
     use crate::fit::slab::cut;
     use crate::polynomial::tests::Seeded;
     use nalgebra::Vector3;
@@ -300,6 +305,15 @@ mod tests {
     fn a_box_does_not_reach_beyond_its_corners() {
         let found = gap(&Body::cuboid("box", Vector3::repeat(1.0 + 1e-9)).unwrap(), &cube(1.0));
         assert!(1e-9 <= found.most_m && found.most_m < 1e-4, "{found:?}");
+    }
+
+    #[test]
+    fn the_interior_point_may_lie_outside_the_hull() {
+        // A ball about 0, and its points with x >= 1/2 only: the farthest is (-1, 0, 0).
+        let points: Vec<_> = Sphere::subdivided(3).vertices().iter().copied().filter(|u| u.x >= 0.5).collect();
+        let nearest = points.iter().map(|u| u.x).fold(f64::MAX, f64::min);
+        let found = gap(&Body::ball("ball", Vector3::zeros(), 1.0).unwrap(), &points);
+        assert!(1.0 + nearest <= found.most_m && found.most_m <= 1.03 * (1.0 + nearest), "{found:?}");
     }
 
     #[test]

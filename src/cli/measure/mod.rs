@@ -17,7 +17,8 @@ use std::path::PathBuf;
 /// for one relative pose or for each pose of a file. Successive poses of a trajectory are warm-started.
 ///
 /// A pose maps the frame of B into the frame of A; witnesses and normal are in A's frame, metres, the normal from B to A
-/// (none on overlap). Level distances are above 1 apart, 1 touching, below 1 overlapping, and use the polynomials as they
+/// (none on overlap). With --json the convex hulls of the objects have a bracket, too, where the bodies' gaps are known: their
+/// distance is at least distance_lower_m and at most hulls_distance_upper_m. Level distances are above 1 apart, 1 touching, below 1 overlapping, and use the polynomials as they
 /// are stored: 'show' tells their minimum.
 ///
 /// Example: sublevel measure a.json b.json --pose 0.5,0,0,0,0,0,1
@@ -53,6 +54,9 @@ struct Line {
     distance_m: f64,
     distance_lower_m: f64,
     distance_upper_m: f64,
+    /// Of the distance of the convex hulls of the objects, if both bodies tell how far they reach beyond them; of the lower bound
+    /// it is the same.
+    hulls_distance_upper_m: Option<f64>,
     level_ab: f64,
     level_ab_lower: Option<f64>,
     level_ab_upper: f64,
@@ -67,7 +71,7 @@ struct Line {
 }
 
 impl Line {
-    fn new(distance: &Distance, ab: &LevelDistance, ba: &LevelDistance) -> Self {
+    fn new(distance: &Distance, ab: &LevelDistance, ba: &LevelDistance, gaps: Option<f64>) -> Self {
         let converged = [distance.status, ab.status, ba.status].iter().all(|&status| status == Status::Converged);
         let finite = |value: f64| value.is_finite().then_some(value);
         Self {
@@ -75,6 +79,7 @@ impl Line {
             distance_m: distance.value(),
             distance_lower_m: distance.lower,
             distance_upper_m: distance.upper,
+            hulls_distance_upper_m: gaps.map(|gaps| (distance.upper + gaps).next_up()),
             level_ab: ab.value(),
             level_ab_lower: finite(ab.lower),
             level_ab_upper: ab.upper,
@@ -97,6 +102,11 @@ struct Query {
 }
 
 impl Query {
+    /// How far both bodies together reach beyond the convex hulls of their objects, metres.
+    fn gaps(&self) -> Option<f64> {
+        Some((self.a.gap_m()? + self.b.gap_m()?).next_up())
+    }
+
     fn distance(&self, pose: &Pose, warm: &mut WarmStart) -> Distance {
         distance(&self.a, &Pose::identity(), &self.b, pose, &self.options, warm)
     }
@@ -140,7 +150,7 @@ pub(super) fn run(args: &MeasureArgs) -> Result<(), Box<dyn Error>> {
         for pose in trajectory {
             let distance = query.distance(pose, &mut warm[0]);
             let (ab, ba) = (query.level_ab(pose, &mut warm[1]), query.level_ba(pose, &mut warm[2]));
-            let line = Line::new(&distance, &ab, &ba);
+            let line = Line::new(&distance, &ab, &ba, query.gaps());
             if args.json {
                 serde_json::to_writer(&mut out, &line)?;
                 writeln!(out)?;
