@@ -160,6 +160,8 @@ fn outliers_are_trimmed_and_sheets_thickened() {
         lines += &format!("{} {} {height}\n", ring * angle.cos(), ring * angle.sin());
         plane += &format!("{u} {v} 0\n");
     }
+    let half = folder.path().join("half.xyz");
+    std::fs::write(&half, lines.lines().take(200).map(|line| line.to_owned() + "\n").collect::<String>()).unwrap();
     std::fs::write(&scan, lines + "9 9 9\n").unwrap();
     std::fs::write(&sheet, plane).unwrap();
     let fit = |input: &Path, more: &[&str]| {
@@ -176,12 +178,16 @@ fn outliers_are_trimmed_and_sheets_thickened() {
         "{row}"
     );
     assert!(row["volume_m3"].as_f64().unwrap() < 4.4, "{row}");
+    let row_gap = row["gap_m"].as_f64().unwrap();
 
     let told = refusal(&["fit", text(&sheet), "--out", text(&out)]);
     assert!(told.contains("coplanar") && told.contains("--min-thickness"), "{told}");
     let (row, _) = fit(&sheet, &["--min-thickness", "1cm"]);
     assert!((row["hull_volume_m3"].as_f64().unwrap() / 0.01 - 1.0).abs() < 0.1, "{row}");
     json(&["verify", "--json", text(&out.join("sheet-d4.json")), "--points", text(&sheet)]);
+    // Against points that are not those it was fitted to, a body's gap is bounded anew, not refuted.
+    let verified = json(&["verify", "--json", text(&out.join("scan-d4.json")), "--points", text(&half)]);
+    assert!(verified["gap_m"].as_f64().unwrap() > row_gap, "{verified}");
     let told = refusal(&["fit", text(&scan), "--out", text(&out), "--trim", "0.9"]);
     assert!(told.contains("trim: 0.9"), "{told}");
 }
@@ -206,6 +212,7 @@ fn certify_proves_polynomials_from_elsewhere() {
     for (bad, expected) in [
         ("{", "not polynomials"),
         (r#"{"constraints": []}"#, "constraints"),
+        (r#"{"normalisation": {}, "constraints": []}"#, "normalisation"),
         (r#"{"constraints": [{"exponents": [[2,0,0]], "coefficients": []}]}"#, "constraints[0]: coefficients"),
         (r#"{"constraints": [{"exponents": [[3,0,0]], "coefficients": [1.0]}]}"#, "degree 3"),
         (r#"{"constraints": [{"exponents": [[2,0,0]], "coefficients": [1.0]}]}"#, "not proven bounded"),

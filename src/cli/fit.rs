@@ -23,7 +23,8 @@ use std::time::Duration;
 ///
 /// Higher degrees are tighter and cost more: 2 is an ellipsoid, 6 suits most objects and takes about a second, 8 about ten.
 /// How far a body reaches beyond the convex hull of its points is told as the gap: a proven bound of the distance of its
-/// farthest point, and the mean over all directions.
+/// farthest point, and a mean over directions, which overlooks narrow corners. It refers to the points that were fitted: those
+/// that --trim leaves, as --min-thickness thickens them.
 ///
 /// Examples:
 ///
@@ -41,16 +42,10 @@ pub(super) struct FitArgs {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Degree of the polynomial: 2, 4, 6 or 8
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 6,
-        default_value_ifs = [
-            ("ladder", clap::builder::ArgPredicate::IsPresent, Some("8")),
-            ("max_gap", clap::builder::ArgPredicate::IsPresent, Some("8")),
-        ]
-    )]
-    degree: usize,
+    ///
+    /// [default: 6; with --ladder and --max-gap the highest tried: 8, or as far as the objective goes]
+    #[arg(long, value_name = "N")]
+    degree: Option<usize>,
     /// What the fit minimises: logdet-p, trace-p, logdet-h or trace-h
     ///
     /// logdet-p: log det of the inverse Gram matrix P of p. Tightest nearly always, and
@@ -62,13 +57,13 @@ pub(super) struct FitArgs {
     /// trace-h: trace of the inverse of H, in the frame of trace-p. Degrees 2 to 6.
     #[arg(long, value_name = "NAME", default_value_t, verbatim_doc_comment)]
     objective: Objective,
-    /// Cut the body by this many slabs (pairs of parallel planes), each where it reaches farthest beyond the convex hull, 0 to 15
+    /// Cut the body by at most this many slabs (pairs of parallel planes), each where it reaches farthest beyond the convex hull
     ///
-    /// Two or three slabs bring a body of degree 4 as close to most objects as one of degree 8. They give it edges, and queries
-    /// of bodies with edges take several times as long.
+    /// 0 to 15; they end where nothing is left to cut off. With --ladder all rungs but the ball are cut (<stem>-d4-s3.json has
+    /// three slabs). Queries of bodies with such edges take several times as long.
     #[arg(long, value_name = "N", default_value_t = 0)]
     slabs: usize,
-    /// Fit every rung up to --degree (8 if not given): smallest ball (<stem>-ball.json), ellipsoid (-d2), degree 4, 6, 8
+    /// Fit every rung up to --degree: smallest ball (<stem>-ball.json), ellipsoid (-d2), degree 4, 6, 8
     #[arg(long)]
     ladder: bool,
     /// Fit no finer than needed: the body cheapest to query that reaches at most this far beyond the object's convex hull
@@ -141,8 +136,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), Box<dyn Error>> {
         if let Some(j) = stems[..i].iter().position(|earlier| earlier == stem) {
             let (first, second) = (args.inputs[j].display(), args.inputs[i].display());
             return Err(format!(
-                "{first} and {second} would both become {stem}-d{}.json; fit them into different folders",
-                args.degree
+                "{first} and {second} would both become {stem}-*.json; fit them into different folders"
             )
             .into());
         }
@@ -177,7 +171,11 @@ pub(super) fn run(args: &FitArgs) -> Result<(), Box<dyn Error>> {
 fn options(args: &FitArgs, input: &Path) -> FitOptions {
     let name = input.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     FitOptions {
-        degree: args.degree,
+        degree: args.degree.unwrap_or(if args.ladder || args.max_gap.is_some() {
+            args.objective.max_degree()
+        } else {
+            6
+        }),
         objective: args.objective,
         refine: args.refine,
         slabs: args.slabs,
@@ -218,6 +216,12 @@ fn one(args: &FitArgs, input: &Path, stem: &str) -> Result<Vec<Row>, Box<dyn Err
     let named = |error: FitError| format!("{}: {error}", input.display());
     let thick = args.min_thickness.map_or(Cow::Borrowed(&points[..]), |least| thicken(&points, least));
     let trimmed = if args.trim == 0.0 { None } else { Some(trim(&thick, args.trim, &mut tell).map_err(named)?) };
+    if let Some(Trimmed { left_out, farthest_m, .. }) = &trimmed {
+        let (input, count, all) = (input.display(), left_out.len(), thick.len());
+        bar.suspend(|| {
+            eprintln!("note: {input}: {count} of {all} points left out, up to {farthest_m:.3e} m outside the hull of the others");
+        });
+    }
     let kept = trimmed.as_ref().map_or(&thick[..], |trimmed| &trimmed.kept);
     let rungs = match args.max_gap {
         Some(max_gap) => coarsest_within(stem, kept, max_gap, &options, &mut tell).map(|rung| vec![rung]),
@@ -226,13 +230,6 @@ fn one(args: &FitArgs, input: &Path, stem: &str) -> Result<Vec<Row>, Box<dyn Err
     }
     .map_err(named)?;
     bar.finish_and_clear();
-    let told = trimmed.as_ref().filter(|trimmed| !trimmed.left_out.is_empty());
-    if let Some(Trimmed { left_out, farthest_m, .. }) = told {
-        let (input, count, all) = (input.display(), left_out.len(), thick.len());
-        eprintln!(
-            "note: {input}: {count} of {all} points left out, up to {farthest_m:.3e} m outside the hull of the others"
-        );
-    }
     rungs.iter().map(|rung| write(args, input, stem, trimmed.as_ref(), rung)).collect()
 }
 

@@ -16,7 +16,7 @@
 use super::program::regularised_factor;
 use super::structure::{Pattern, Structure};
 use crate::body::sphere_rule;
-use crate::polynomial::{CertificateError, HessianGram, HessianMonomial, Polynomial};
+use crate::polynomial::{CertificateError, Exponents, HessianGram, HessianMonomial, Polynomial};
 use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
 
 /// Newton steps before giving up; ten to thirty are used where there is a certificate.
@@ -34,6 +34,9 @@ const LEAST: f64 = 1e-14;
 /// Why a polynomial has no certificate.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoCertificate {
+    /// A term bends the polynomial downwards somewhere, and no square of the Hessian form makes up for it.
+    #[error("the polynomial is not convex: nothing in it outweighs its term with exponents {0:?} in all directions")]
+    NoSquare(Exponents),
     /// It is not sos-convex.
     #[error(
         "the polynomial is not sos-convex: every Gram matrix of its Hessian form has an eigenvalue of {bound:.1e} or less, relative \
@@ -65,7 +68,7 @@ pub fn certificate(polynomial: &Polynomial) -> Result<HessianGram, NoCertificate
     let structure = Structure::new(polynomial.degree());
     let form = form(&structure, polynomial);
     let largest = form.amax();
-    let rows = basis(&structure.hessian, &form).ok_or(NoCertificate::NotSosConvex { bound: 0.0 })?;
+    let rows = basis(&structure.hessian, &form).map_err(|key| NoCertificate::NoSquare(monomial(&structure, key)))?;
     let (pattern, keys) = structure.hessian.restricted(&rows);
     let form = DVector::from_iterator(keys.len(), keys.iter().map(|&key| form[key] / largest));
     let basis: Vec<_> = rows.iter().map(|&row| structure.hessian_basis[row]).collect();
@@ -86,21 +89,29 @@ fn form(structure: &Structure, polynomial: &Polynomial) -> DVector<f64> {
     DVector::from_iterator(structure.derivative.len(), of_form)
 }
 
-/// The elements of the basis that a Gram matrix may have entries for; none if they do not give all of the form.
-fn basis(pattern: &Pattern, form: &DVector<f64>) -> Option<Vec<usize>> {
+/// The monomial of p that a monomial of its Hessian form comes from.
+fn monomial(structure: &Structure, key: usize) -> Exponents {
+    structure.monomials[structure.derivative[key].0]
+}
+
+/// The elements of the basis that a Gram matrix may have entries for.
+///
+/// # Errors
+/// The monomial of the form that they do not give.
+fn basis(pattern: &Pattern, form: &DVector<f64>) -> Result<Vec<usize>, usize> {
     let mut rows: Vec<usize> = (0..pattern.size).collect();
     loop {
         let mut products = vec![0; pattern.keys];
         for (i, &row) in rows.iter().enumerate() {
             rows[..=i].iter().for_each(|&column| products[pattern.key(row, column)] += 1);
         }
-        if (0..pattern.keys).any(|key| form[key] != 0.0 && products[key] == 0) {
-            return None;
+        if let Some(key) = (0..pattern.keys).find(|&key| form[key] != 0.0 && products[key] == 0) {
+            return Err(key);
         }
         let before = rows.len();
         rows.retain(|&row| products[pattern.key(row, row)] > 1 || form[pattern.key(row, row)] != 0.0);
         if rows.len() == before {
-            return Some(rows);
+            return Ok(rows);
         }
     }
 }
@@ -127,7 +138,11 @@ fn centre(pattern: &Pattern, form: &DVector<f64>, start: &DVector<f64>) -> Resul
     let mut found = None;
     for step in 0..STEPS {
         let moments = pattern.spread(&s);
-        bound = bound.min(form.dot(&s) / moments.trace());
+        let trace = moments.trace();
+        let Some(gram) = Cholesky::new(moments).map(|factor| factor.inverse()) else { break };
+        let rounding =
+            4.0 * f64::EPSILON * pattern.keys as f64 * form.iter().zip(&s).map(|(f, s)| (f * s).abs()).sum::<f64>();
+        bound = bound.min((form.dot(&s) + rounding) / trace);
         if bound < 0.0 {
             return Err(NoCertificate::NotSosConvex { bound });
         }
@@ -136,7 +151,6 @@ fn centre(pattern: &Pattern, form: &DVector<f64>, start: &DVector<f64>) -> Resul
             s *= pattern.size as f64 / form.dot(&s).max(f64::MIN_POSITIVE);
             continue;
         }
-        let Some(gram) = Cholesky::new(moments).map(|factor| factor.inverse()) else { break };
         let slope = form - pattern.collapse(&gram);
         let Some(factor) = regularised_factor(&pattern.congruence(&gram)) else { break };
         let Some(half) = factor.solve_lower_triangular(&slope) else { break };
@@ -158,10 +172,10 @@ fn centre(pattern: &Pattern, form: &DVector<f64>, start: &DVector<f64>) -> Resul
 mod tests {
     use super::{NoCertificate, certificate};
     use crate::body::Body;
-    use crate::polynomial::{Exponents, Polynomial};
+    use crate::polynomial::Polynomial;
     use nalgebra::Vector3;
 
-    fn polynomial(terms: &[(Exponents, f64)]) -> Polynomial {
+    fn polynomial(terms: &[(crate::polynomial::Exponents, f64)]) -> Polynomial {
         Polynomial::new(terms.to_vec()).unwrap()
     }
 
@@ -201,6 +215,12 @@ mod tests {
                 other => panic!("{terms:?}: {other:?}"),
             }
         }
+    }
+
+    #[test]
+    fn a_term_without_squares_is_named() {
+        let twisted = polynomial(&[([2, 0, 0], 1.0), ([0, 2, 0], 1.0), ([0, 0, 2], 1.0), ([3, 1, 0], 1.0)]);
+        assert_eq!(certificate(&twisted), Err(NoCertificate::NoSquare([3, 1, 0])));
     }
 
     #[test]

@@ -25,7 +25,7 @@ use std::f64::consts::PI;
 const ACCURACY: f64 = 0.02;
 
 /// Distance, relative to the body, that is as good as none.
-const NONE: f64 = 1e-5;
+pub(super) const NONE: f64 = 1e-5;
 
 /// Most cells looked at; the bound holds after fewer, too.
 const MAX_CELLS: usize = 30_000;
@@ -54,7 +54,8 @@ pub struct Gap {
     pub mean_m: f64,
 }
 
-/// The gap between a body and the convex hull of points inside it, metres of the body frame.
+/// The gap between a body and the convex hull of points inside it, of which there is one at least, metres of the body frame.
+/// Gaps below a 1e-5th of the body are not resolved: their bound is about that.
 pub fn gap(body: &Body, points: &[Vector3<f64>]) -> Gap {
     Search::new(body, points).run()
 }
@@ -144,6 +145,8 @@ impl<'a> Search<'a> {
                 cells.push(Cell { rays, most: self.most(rays).min(most) });
             }
         }
+        // All lies in one ball.
+        let most = most.min(2.0 * self.body.circumscribed().radius);
         Gap { most_m: most, found_m: self.found, direction: self.direction, mean_m: self.mean() }
     }
 
@@ -174,6 +177,8 @@ impl<'a> Search<'a> {
                 let own = body.inverse() * u * boundary_radius(&constraint.polynomial, &start, &u);
                 self.plane(constraint, if own.norm() <= FAR * exit.norm() { &own } else { &exit })
             })
+            // Without one of them the others still hold the body.
+            .filter(|a| a.iter().all(|entry| entry.is_finite()))
             .collect();
         let reach = planes.iter().map(|a| a.dot(&d)).fold(0.0, f64::max);
         let most = self.distance(&(d / reach));
@@ -217,10 +222,16 @@ impl<'a> Search<'a> {
             for w in polygon.iter().filter(|w| w.iter().all(|share| *share < 1.0)) {
                 let along = rays[0].d * w[0] + rays[1].d * w[1] + rays[2].d * w[2];
                 let reach = plane[0] * w[0] + plane[1] * w[1] + plane[2] * w[2];
+                let rounded = plane[0].abs() * w[0] + plane[1].abs() * w[1] + plane[2].abs() * w[2];
+                let reach = reach - ROUNDING * rounded;
+                // Planes that leave the cell open somewhere bound nothing there.
+                if !(reach > 0.0) {
+                    return f64::INFINITY;
+                }
                 most = most.max(self.distance(&(along / reach)));
             }
         }
-        if most.is_nan() { f64::INFINITY } else { most }
+        most
     }
 
     /// Bound of the distance of x from the hull.

@@ -5,6 +5,7 @@ use super::{Fit, FitError, FitOptions, FitReport, Gap, Progress};
 use crate::body::{Body, MAX_CONSTRAINTS};
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
+use std::time::Instant;
 
 /// Most slabs a body may be cut by.
 pub const MAX_SLABS: usize = MAX_CONSTRAINTS - 1;
@@ -22,7 +23,7 @@ pub struct Rung {
     pub body: Body,
     /// How far it reaches beyond the convex hull of the points.
     pub gap: Gap,
-    /// Wall time, seconds.
+    /// Wall time, seconds, with all that was tried before.
     pub seconds: f64,
     /// What the fit took and reached; none for the ball.
     pub report: Option<FitReport>,
@@ -49,7 +50,7 @@ pub fn ladder(
     let object = Object::new(name, points, &options.input)?;
     let mut rungs = vec![object.ball()?];
     for options in climb(options) {
-        rungs.push(object.cut(object.fit(&options, progress)?, options.slabs, 0.0)?.into());
+        rungs.push(object.cut(object.fit(&options, progress)?, options.slabs, 0.0, progress)?.into());
     }
     Ok(rungs)
 }
@@ -57,7 +58,7 @@ pub fn ladder(
 /// The representation of an object that is the cheapest to query of those whose gap is at most `max_gap_m`, metres.
 ///
 /// A ladder is climbed up to the degree of the options. If no rung is near enough they are cut by slabs, and the one that gets there
-/// with the fewest terms is taken: slabs make edges, which cost a query more than any degree does.
+/// with the fewest terms is taken: slabs make edges, which cost a query more than a degree does.
 ///
 /// # Errors
 /// As [`fit`](super::fit()), and [`FitError::Gap`] with the closest that was reached.
@@ -72,34 +73,42 @@ pub fn coarsest_within(
     if !(max_gap_m > 0.0) {
         return Err(FitError::MaxGap(max_gap_m));
     }
+    let start = Instant::now();
     let object = Object::new(name, points, &options.input)?;
+    let timed = |rung: Rung| Rung { seconds: start.elapsed().as_secs_f64(), ..rung };
     let ball = object.ball()?;
     if ball.gap.most_m <= max_gap_m {
-        return Ok(ball);
+        return Ok(timed(ball));
     }
+    // What fails is told if nothing else does.
+    let mut closest = FitError::Gap { asked_m: max_gap_m, reached_m: f64::INFINITY, degree: 0, slabs: 0 };
     let mut fits = Vec::new();
     for options in climb(options) {
-        let fit = object.fit(&options, progress)?;
-        if fit.gap.most_m <= max_gap_m {
-            return Ok(fit.into());
+        match object.fit(&options, progress) {
+            Ok(fit) if fit.gap.most_m <= max_gap_m => return Ok(timed(fit.into())),
+            Ok(fit) => fits.push(fit),
+            Err(FitError::Cancelled) => return Err(FitError::Cancelled),
+            Err(error) => closest = error,
         }
-        fits.push(fit);
     }
-    let mut closest = FitError::Gap { asked_m: max_gap_m, reached_m: f64::INFINITY, degree: 0, slabs: 0 };
     let mut cheapest: Option<Fit> = None;
     for fit in fits {
         let room = cheapest.as_ref().map_or(usize::MAX, |known| terms(&known.body).saturating_sub(terms(&fit.body)));
         let slabs = MAX_SLABS.min(room.saturating_sub(1) / SLAB_TERMS);
-        let fit = object.cut(fit, slabs, max_gap_m)?;
-        if fit.gap.most_m <= max_gap_m {
-            cheapest = Some(fit);
-        } else if let FitError::Gap { reached_m, degree, slabs, .. } = &mut closest
-            && fit.gap.most_m < *reached_m
-        {
-            (*reached_m, *degree, *slabs) = (fit.gap.most_m, fit.body.degree(), fit.body.constraints().len() - 1);
+        match object.cut(fit, slabs, max_gap_m, progress) {
+            Ok(fit) if fit.gap.most_m <= max_gap_m => cheapest = Some(fit),
+            Ok(Fit { body, gap, .. }) => {
+                if let FitError::Gap { reached_m, degree, slabs, .. } = &mut closest
+                    && gap.most_m < *reached_m
+                {
+                    (*reached_m, *degree, *slabs) = (gap.most_m, body.degree(), body.constraints().len() - 1);
+                }
+            }
+            Err(FitError::Cancelled) => return Err(FitError::Cancelled),
+            Err(error) => closest = error,
         }
     }
-    cheapest.map(Rung::from).ok_or(closest)
+    cheapest.map(|fit| timed(fit.into())).ok_or(closest)
 }
 
 /// Terms of all constraints, which queries evaluate.

@@ -178,8 +178,8 @@ pub enum FitError {
     MaxGap(f64),
     /// No representation is as close as asked for.
     #[error(
-        "max gap: the closest body, of degree {degree} with {slabs} slab(s), still reaches {reached_m:.3e} m beyond the convex hull, \
-         {asked_m:.3e} m are asked for; allow more, or split the object into several inputs"
+        "max gap: the closest body, of degree {degree} with {slabs} slab(s), is only proven to reach at most {reached_m:.3e} m beyond the convex \
+         hull, {asked_m:.3e} m are asked for; allow more, or split the object into several inputs"
     )]
     Gap {
         /// Gap asked for, metres.
@@ -245,7 +245,7 @@ pub enum FitError {
     #[error("the fitted polynomial could not be proven to contain the points: {0}; lower the degree")]
     NotContained(#[from] NotContained),
     /// A slab could not be added.
-    #[error("the body could not be cut by a slab: {0}; ask for fewer slabs")]
+    #[error("the body could not be cut by a slab: {0}; ask for fewer slabs, or a larger gap")]
     Cut(#[from] CutError),
 }
 
@@ -268,7 +268,7 @@ pub fn fit(
 ) -> Result<Fit, FitError> {
     options.check(name)?;
     let object = Object::new(name, points, &options.input)?;
-    object.cut(object.fit(options, progress)?, options.slabs, 0.0)
+    object.cut(object.fit(options, progress)?, options.slabs, 0.0, progress)
 }
 
 #[cfg(test)]

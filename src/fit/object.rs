@@ -3,7 +3,7 @@
 use super::ball::smallest_ball;
 use super::basis::Affine;
 use super::ellipsoid::{Ellipsoid, minimum_ellipsoid};
-use super::gap::{Gap, gap};
+use super::gap::{Gap, NONE, gap};
 use super::generate::{Optimum, generate};
 use super::hull::{Frame, Hull, convex_hull};
 use super::program::{Problem, ProgramError};
@@ -141,13 +141,23 @@ impl<'a> Object<'a> {
 
     /// Cuts a body by at most so many slabs, one after the other where it reaches farthest beyond the hull, until it reaches no
     /// farther than `enough`, metres.
-    pub(super) fn cut(&self, fit: Fit, most: usize, enough: f64) -> Result<Fit, FitError> {
+    pub(super) fn cut(
+        &self,
+        fit: Fit,
+        most: usize,
+        enough: f64,
+        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<Fit, FitError> {
         let start = Instant::now();
+        let mut watch = Watch::new(progress);
         let Fit { mut body, mut gap, report } = fit;
         for _ in 0..most {
-            if gap.most_m <= enough {
+            // Below what is resolved there is nothing to cut off.
+            if gap.most_m <= enough.max(2.0 * NONE * body.circumscribed().radius) {
                 break;
             }
+            watch.round(self.vertices.len(), 0.0);
+            watch.iteration(gap.most_m)?;
             let slabbed = cut(&body, self.points, &gap.direction)?;
             gap = self::gap(&slabbed, &self.vertices);
             body = slabbed.with_gap(gap.most_m);

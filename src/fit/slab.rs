@@ -51,8 +51,7 @@ fn slab(body: &Body, points: &[Vector3<f64>], n: &Vector3<f64>) -> Result<Constr
     let (middle, half) = ((low + high) * 0.5, (high - low) * 0.5);
     // l(z) = slope·z + offset
     let (slope, offset) = (body.inverse().tr_mul(n) / half, -middle / half);
-    // Less by what rounding may add.
-    let (share, round) = (1.0 - BULGE - 1e-12, BULGE / square);
+    let (share, round) = (1.0 - BULGE, BULGE / square);
     let unit = |i: usize| Vector3::<u8>::ith(i, 1);
     let exponents = |v: Vector3<u8>| -> Exponents { v.into() };
     let hessian = (slope * slope.transpose() * share + Matrix3::identity() * round) * 2.0;
@@ -68,5 +67,12 @@ fn slab(body: &Body, points: &[Vector3<f64>], n: &Vector3<f64>) -> Result<Constr
     let basis = (0..3).map(|i| HessianMonomial { direction: i, exponents: [0, 0, 0] }).collect();
     let gram = HessianGram::nearest(&polynomial, basis, DMatrix::from_fn(3, 3, |i, j| hessian[(i, j)]))
         .map_err(|source| BodyError::Certificate { index: body.constraints().len(), source })?;
-    Ok(Constraint { polynomial, gram })
+    let mut slab = Constraint { polynomial, gram };
+    // Thin objects feel the rounding of coordinates: what it may add the constant takes back, which leaves the Hessian as it is.
+    let value = |slab: &Constraint, x| body.placement().sample(slab, x).value_upper(0.0);
+    let excess = points.iter().map(|x| value(&slab, x)).fold(f64::NEG_INFINITY, f64::max) - 1.0;
+    if excess > 0.0 {
+        slab.polynomial = slab.polynomial.with_constant_shifted(-(2.0 * excess + 4.0 * f64::EPSILON));
+    }
+    Ok(slab)
 }

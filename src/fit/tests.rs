@@ -314,7 +314,7 @@ fn bad_input_is_refused_by_field() {
     assert_eq!(attempt(&broken, 4, 1e-5), FitError::NotFinite(17));
     let flat: Vec<_> = good.iter().map(|p| Vector3::new(p.x, p.y, 0.2 * p.x + p.y)).collect();
     let error = attempt(&flat, 4, 1e-5).to_string();
-    assert!(error.contains("coplanar") && error.contains("add thickness"), "{error}");
+    assert!(error.contains("coplanar") && error.contains("thickness"), "{error}");
     let line: Vec<_> = (0..40).map(|i| Vector3::new(1.0, 0.1, 7.0) * f64::from(i)).collect();
     assert!(attempt(&line, 4, 1e-5).to_string().contains("collinear"));
     assert!(attempt(&[good[0]; 9], 4, 1e-5).to_string().contains("coincident"));
