@@ -18,9 +18,10 @@ use std::path::PathBuf;
 ///
 ///   {"constraints": [{"exponents": [[4,0,0], [0,4,0], [0,0,2]], "coefficients": [1.0, 1.0, 4.0]}]}
 ///
-/// with one entry of "exponents" per coefficient, x in metres. A "normalization" {"center": [..], "linear": [[..], [..], [..]]} makes
-/// them polynomials of linear (x - center) instead, as in body files, which may be given, too: their certificates are made anew, and
-/// what no polynomial tells (points, gap, provenance) is left out. The polynomials are stored as they are. One that is not sos-convex is refused with a bound of how far it is from it.
+/// with one entry of "exponents" per coefficient, x in metres. A "normalization" {"center": [..], "linear": [[..], [..],
+/// [..]]} makes them polynomials of linear (x - center) instead, as in body files. These may be given, too: their
+/// certificates are made anew, and what no polynomial tells (points, gap, provenance) is left out. The polynomials are stored
+/// as they are; one that is not sos-convex is refused with a bound of how far it is from it.
 ///
 /// Example: sublevel certify quartic.json --out quartic-body.json
 #[derive(Debug, clap::Args)]
@@ -38,7 +39,24 @@ pub(super) struct CertifyArgs {
     json: bool,
 }
 
-/// Polynomials, or what a body file has besides.
+/// What body files say besides the polynomials.
+const OF_BODY_FILES: [&str; 14] = [
+    "format",
+    "kind",
+    "id",
+    "degree",
+    "interior_point_m",
+    "min_value",
+    "in_radius_m",
+    "circumscribed_ball",
+    "bounding_box",
+    "volume_m3",
+    "volume_error_m3",
+    "gap_m",
+    "contained_points",
+    "provenance",
+];
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Input {
@@ -46,34 +64,6 @@ struct Input {
     normalization: Option<InputNormalization>,
     constraints: Vec<InputConstraint>,
     growth_center_m: Option<[f64; 3]>,
-    #[serde(rename = "format")]
-    _format: Option<IgnoredAny>,
-    #[serde(rename = "kind")]
-    _kind: Option<IgnoredAny>,
-    #[serde(rename = "id")]
-    _id: Option<IgnoredAny>,
-    #[serde(rename = "degree")]
-    _degree: Option<IgnoredAny>,
-    #[serde(rename = "interior_point_m")]
-    _interior_point_m: Option<IgnoredAny>,
-    #[serde(rename = "min_value")]
-    _min_value: Option<IgnoredAny>,
-    #[serde(rename = "in_radius_m")]
-    _in_radius_m: Option<IgnoredAny>,
-    #[serde(rename = "circumscribed_ball")]
-    _circumscribed_ball: Option<IgnoredAny>,
-    #[serde(rename = "bounding_box")]
-    _bounding_box: Option<IgnoredAny>,
-    #[serde(rename = "volume_m3")]
-    _volume_m3: Option<IgnoredAny>,
-    #[serde(rename = "volume_error_m3")]
-    _volume_error_m3: Option<IgnoredAny>,
-    #[serde(rename = "gap_m")]
-    _gap_m: Option<IgnoredAny>,
-    #[serde(rename = "contained_points")]
-    _contained_points: Option<IgnoredAny>,
-    #[serde(rename = "provenance")]
-    _provenance: Option<IgnoredAny>,
 }
 
 #[derive(Deserialize)]
@@ -88,14 +78,21 @@ struct InputNormalization {
 struct InputConstraint {
     exponents: Vec<Exponents>,
     coefficients: Vec<f64>,
+    /// Made anew.
     #[serde(rename = "certificate")]
     _certificate: Option<IgnoredAny>,
+}
+
+fn parse(text: &str) -> Result<Input, serde_json::Error> {
+    let mut object: serde_json::Map<String, serde_json::Value> = serde_json::from_str(text)?;
+    object.retain(|key, _| !OF_BODY_FILES.contains(&key.as_str()));
+    Input::deserialize(serde_json::Value::Object(object))
 }
 
 /// Certifies and writes.
 pub(super) fn run(args: &CertifyArgs) -> Result<(), Box<dyn Error>> {
     let place = args.file.display();
-    let input: Input = serde_json::from_str(&read(&args.file)?)
+    let input = parse(&read(&args.file)?)
         .map_err(|error| format!("{place}: not polynomials as JSON: {error}; see 'sublevel certify --help'"))?;
     let normalization = input.normalization.map_or(
         Normalization { center: Vector3::zeros(), linear: Matrix3::identity() },

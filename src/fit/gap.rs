@@ -270,15 +270,16 @@ pub(super) fn nearest(points: &[Vector3<f64>], x: &Vector3<f64>) -> Vector3<f64>
     if found.common.is_some() { *x } else { found.x }
 }
 
-/// The part of a polygon where a linear function is not negative; corners are by their weights on a triangle, the function by its
-/// values at the triangle's corners (Sutherland and Hodgman, Reentrant polygon clipping, Comm. ACM 17, 1974).
+/// The part of a polygon where a linear function is not negative, and corners that rounding may have made negative: too many only
+/// widen a bound. Corners are by their weights on a triangle, the function by its values at the triangle's corners (Sutherland and Hodgman, Reentrant polygon clipping, Comm. ACM 17, 1974).
 fn clip(polygon: &mut Vec<[f64; 3]>, function: &[f64; 3]) {
     let value = |w: &[f64; 3]| function[0] * w[0] + function[1] * w[1] + function[2] * w[2];
+    let rounding = 16.0 * f64::EPSILON * function.iter().map(|value| value.abs()).sum::<f64>();
     let corners = std::mem::take(polygon);
     for (i, p) in corners.iter().enumerate() {
         let q = &corners[(i + 1) % corners.len()];
         let (at_p, at_q) = (value(p), value(q));
-        if at_p >= 0.0 {
+        if at_p >= -rounding {
             polygon.push(*p);
         }
         if (at_p > 0.0 && at_q < 0.0) || (at_p < 0.0 && at_q > 0.0) {
