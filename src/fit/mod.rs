@@ -37,7 +37,7 @@ pub use ladder::{MAX_SLABS, Rung, coarsest_within, ladder};
 pub use objective::{Objective, UnknownObjective};
 pub use program::ProgramError;
 pub use progress::Progress;
-pub use read::{ReadError, read_points};
+pub use read::{Mesh, ReadError, read_mesh, read_points};
 pub use refine::RefinementEnd;
 pub use slab::CutError;
 pub use thicken::thicken;

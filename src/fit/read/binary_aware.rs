@@ -1,19 +1,20 @@
 //! The formats with a text and a binary variant: PLY and STL.
 
-use super::Defect;
+use super::{Defect, Mesh};
 use nalgebra::Vector3;
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
 use std::io::{BufReader, Cursor};
 
-type Points = Result<Vec<Vector3<f64>>, Defect>;
+/// A PLY element: its x, y and z if it is a vertex, its corners if it is a face.
+struct Element {
+    point: Vector3<f64>,
+    corners: Vec<usize>,
+}
 
-/// A PLY element: its x, y and z if it has them.
-struct Vertex(Vector3<f64>);
-
-impl PropertyAccess for Vertex {
+impl PropertyAccess for Element {
     fn new() -> Self {
-        Self(Vector3::repeat(f64::NAN))
+        Self { point: Vector3::repeat(f64::NAN), corners: Vec::new() }
     }
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
@@ -21,9 +22,10 @@ impl PropertyAccess for Vertex {
             "x" => 0,
             "y" => 1,
             "z" => 2,
+            "vertex_indices" | "vertex_index" => return self.set_corners(property),
             _ => return PropertyAccessResult::Ignored,
         };
-        self.0[axis] = match property {
+        self.point[axis] = match property {
             Property::Char(v) => f64::from(v),
             Property::UChar(v) => f64::from(v),
             Property::Short(v) => f64::from(v),
@@ -38,11 +40,32 @@ impl PropertyAccess for Vertex {
     }
 }
 
+impl Element {
+    fn set_corners(&mut self, property: Property) -> PropertyAccessResult {
+        // A negative index is as wrong as one past the end, and told as such.
+        fn indices<T: TryInto<usize>>(list: Vec<T>) -> Vec<usize> {
+            list.into_iter().map(|index| index.try_into().unwrap_or(usize::MAX)).collect()
+        }
+        self.corners = match property {
+            Property::ListChar(list) => indices(list),
+            Property::ListUChar(list) => indices(list),
+            Property::ListShort(list) => indices(list),
+            Property::ListUShort(list) => indices(list),
+            Property::ListInt(list) => indices(list),
+            Property::ListUInt(list) => indices(list),
+            _ => return PropertyAccessResult::UnsupportedType,
+        };
+        PropertyAccessResult::Set
+    }
+}
+
 /// Stanford PLY, text and binary of both byte orders.
-pub(super) fn ply(bytes: &[u8]) -> Points {
+pub(super) fn ply(bytes: &[u8]) -> Result<Mesh, Defect> {
     let mut reader = Reader::new(BufReader::new(bytes));
-    let parser = Parser::<Vertex>::new();
+    let parser = Parser::<Element>::new();
     let header = parser.read_header(&mut reader).map_err(|error| Defect::new("header", first_line(&error)))?;
+    let mut mesh = None;
+    let mut faces = Vec::new();
     for (name, element) in &header.elements {
         let place = format!("element {name:?}");
         // Every element takes at least a byte: a count beyond the file's size is a lie not worth looping for.
@@ -55,15 +78,24 @@ pub(super) fn ply(bytes: &[u8]) -> Points {
         let values = parser
             .read_payload_for_element(&mut reader, element, &header)
             .map_err(|error| Defect::new(place, first_line(&error)))?;
-        if name == "vertex" {
-            return Ok(values.into_iter().map(|vertex| vertex.0).collect());
+        match name.as_str() {
+            "vertex" => {
+                let points = values.into_iter().map(|vertex| vertex.point).collect();
+                mesh = Some(Mesh { points, ..Mesh::default() });
+            }
+            "face" => faces = values,
+            _ => {}
         }
     }
-    Err(Defect::new("header", "there is no element \"vertex\""))
+    let mut mesh = mesh.ok_or_else(|| Defect::new("header", "there is no element \"vertex\""))?;
+    for face in faces {
+        mesh.add_face(&face.corners);
+    }
+    Ok(mesh)
 }
 
-/// Stereolithography, text or binary; each triangle's corners, repeated corners once.
-pub(super) fn stl(bytes: &[u8]) -> Points {
+/// Stereolithography, text or binary; corners that several triangles have are one vertex.
+pub(super) fn stl(bytes: &[u8]) -> Result<Mesh, Defect> {
     const HEADER: usize = 84;
     const TRIANGLE: usize = 50;
     let mut bytes = bytes.to_vec();
@@ -88,7 +120,8 @@ pub(super) fn stl(bytes: &[u8]) -> Points {
     }
     let mesh =
         stl_io::read_stl(&mut Cursor::new(bytes)).map_err(|error| Defect::new("triangles", first_line(&error)))?;
-    Ok(mesh.vertices.iter().map(|v| Vector3::new(v[0], v[1], v[2]).map(f64::from)).collect())
+    let points = mesh.vertices.iter().map(|v| Vector3::new(v[0], v[1], v[2]).map(f64::from)).collect();
+    Ok(Mesh { points, triangles: mesh.faces.iter().map(|face| face.vertices).collect() })
 }
 
 /// Parsers add the offending text on further lines; an error of ours is one line.

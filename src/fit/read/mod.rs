@@ -1,4 +1,5 @@
-//! Points of a mesh or point cloud file. Only vertices are read: a convex body that holds them holds every triangle.
+//! Meshes and point clouds from files. One convex body that holds the vertices holds every triangle; what several bodies hold
+//! together, or one that is not convex, is told by the triangles.
 
 mod binary_aware;
 mod text;
@@ -85,11 +86,36 @@ impl Defect {
     }
 }
 
+/// Vertices and the triangles between them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// All vertices of the file, metres, also those of no triangle.
+    pub points: Vec<Vector3<f64>>,
+    /// Indices into the points. A face of more corners is the fan of triangles about its first corner; none for clouds.
+    pub triangles: Vec<[usize; 3]>,
+}
+
+impl Mesh {
+    /// Adds a face as the fan about its first corner; nothing for fewer than three corners.
+    fn add_face(&mut self, corners: &[usize]) {
+        let Some((&first, rest)) = corners.split_first() else { return };
+        self.triangles.extend(rest.windows(2).map(|edge| [first, edge[0], edge[1]]));
+    }
+}
+
 /// The vertices of the file at `path` in metres; `scale` is metres per unit of the file.
 ///
 /// # Errors
-/// [`ReadError`]; every variant names the file, the place, the reason and the remedy. Counts in headers are not trusted.
+/// As [`read_mesh`].
 pub fn read_points(path: &Path, scale: f64) -> Result<Vec<Vector3<f64>>, ReadError> {
+    read_mesh(path, scale).map(|mesh| mesh.points)
+}
+
+/// Vertices (metres) and triangles of the file at `path`; `scale` is metres per unit of the file.
+///
+/// # Errors
+/// [`ReadError`]; every variant names the file, the place, the reason and the remedy. Counts and indices are not trusted.
+pub fn read_mesh(path: &Path, scale: f64) -> Result<Mesh, ReadError> {
     if !(scale > 0.0 && scale.is_finite()) {
         return Err(ReadError::Scale(scale));
     }
@@ -101,27 +127,33 @@ pub fn read_points(path: &Path, scale: f64) -> Result<Vec<Vector3<f64>>, ReadErr
     parse(&bytes, &extension, path, scale)
 }
 
-fn parse(bytes: &[u8], extension: &str, path: &Path, scale: f64) -> Result<Vec<Vector3<f64>>, ReadError> {
-    let points = match extension {
+fn parse(bytes: &[u8], extension: &str, path: &Path, scale: f64) -> Result<Mesh, ReadError> {
+    let mesh = match extension {
         "off" => text::off(bytes),
         "obj" => text::obj(bytes),
         "xyz" => text::xyz(bytes),
         "ply" => binary_aware::ply(bytes),
         _ => binary_aware::stl(bytes),
     };
-    let mut points =
-        points.map_err(|Defect { place, reason }| ReadError::Malformed { path: path.to_owned(), place, reason })?;
-    for (vertex, point) in points.iter_mut().enumerate() {
+    let malformed = |Defect { place, reason }| ReadError::Malformed { path: path.to_owned(), place, reason };
+    let mut mesh = mesh.map_err(malformed)?;
+    for (vertex, point) in mesh.points.iter_mut().enumerate() {
         *point *= scale;
         if !point.iter().all(|v| v.is_finite()) {
             let coordinates = [point.x, point.y, point.z];
             return Err(ReadError::NotFinite { path: path.to_owned(), vertex, coordinates });
         }
     }
-    if points.len() < 4 {
-        return Err(ReadError::TooFew { path: path.to_owned(), count: points.len() });
+    let count = mesh.points.len();
+    if count < 4 {
+        return Err(ReadError::TooFew { path: path.to_owned(), count });
     }
-    Ok(points)
+    match mesh.triangles.iter().flatten().find(|&&corner| corner >= count) {
+        Some(corner) => {
+            Err(malformed(Defect::new("faces", format!("vertex {corner} (counted from 0) of {count} is asked for"))))
+        }
+        None => Ok(mesh),
+    }
 }
 
 #[cfg(test)]

@@ -2,12 +2,12 @@ use super::*;
 
 const CORNERS: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 0.5]];
 
-fn read(extension: &str, bytes: impl AsRef<[u8]>) -> Result<Vec<Vector3<f64>>, String> {
+fn read(extension: &str, bytes: impl AsRef<[u8]>) -> Result<Mesh, String> {
     parse(bytes.as_ref(), extension, Path::new("shape"), 1.0).map_err(|error| error.to_string())
 }
 
 fn assert_corners(extension: &str, bytes: impl AsRef<[u8]>) {
-    let points = read(extension, bytes).unwrap();
+    let Mesh { points, .. } = read(extension, bytes).unwrap();
     assert_eq!(points.len(), 4);
     for corner in CORNERS {
         assert!(points.contains(&Vector3::from(corner)), "{extension}: {corner:?} is missing from {points:?}");
@@ -84,7 +84,11 @@ fn ply_binary(big: bool) -> Vec<u8> {
         }
         bytes.push(7);
     }
-    bytes.extend([3, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0]);
+    bytes.push(3);
+    for corner in TRIANGLES[0] {
+        let corner = corner as i32;
+        bytes.extend(if big { corner.to_be_bytes() } else { corner.to_le_bytes() });
+    }
     bytes
 }
 
@@ -166,6 +170,53 @@ fn broken_stl() {
     let mut nan = stl_binary(b"");
     nan[96..100].copy_from_slice(&f32::NAN.to_le_bytes());
     assert_fails("stl", &nan, &["vertex 0", "NaN"]);
+}
+
+/// The corners of each triangle, by coordinates.
+fn triangles(extension: &str, bytes: impl AsRef<[u8]>) -> Vec<[[f64; 3]; 3]> {
+    let Mesh { points, triangles } = read(extension, bytes).unwrap();
+    triangles.iter().map(|corners| corners.map(|i| points[i].into())).collect()
+}
+
+#[test]
+fn faces_become_triangles() {
+    let vertices = "0 0 0\n1 0 0\n0 2 0\n0 0 0.5\n";
+    let lines = |prefix: &str| vertices.lines().map(|line| format!("{prefix}{line}\n")).collect::<String>();
+    let fan = TRIANGLES.map(|corners| corners.map(|i| CORNERS[i]));
+    let [a, b, c, d] = CORNERS;
+    let quad = vec![[a, b, c], [a, c, d]];
+    assert_eq!(triangles("off", format!("OFF\n4 2 0\n{vertices}3 0 1 2 255 0 0\n3 0 1 3\n")), fan);
+    assert_eq!(triangles("off", format!("OFF\n4 1 0\n{vertices}4 0 1 2 3\n")), quad);
+    assert_eq!(triangles("obj", format!("{}f 1/1/1 2//1 3\nf 1 2/7 4\nl 1 2\n", lines("v "))), fan);
+    assert_eq!(triangles("obj", format!("{}f -4 -3 -2 -1\n", lines("v "))), quad);
+    assert_eq!(triangles("stl", stl_text("solid thing")), fan);
+    assert_eq!(triangles("stl", stl_binary(b"")), fan);
+    assert_eq!(triangles("ply", ply_binary(false)), fan[..1]);
+    assert_eq!(triangles("ply", ply_binary(true)), fan[..1]);
+    let ply = format!("{}0 0 0 1\n1 0 0 1\n0 2 0 1\n0 0 0.5 1\n4 0 1 2 3\n", ply_header("ascii", 4));
+    assert_eq!(triangles("ply", ply), quad);
+    assert_eq!(triangles("xyz", vertices), Vec::<[[f64; 3]; 3]>::new());
+    // Fewer than three corners bound nothing.
+    assert!(triangles("off", format!("OFF\n4 2 0\n{vertices}2 0 1\n0\n")).is_empty());
+}
+
+#[test]
+fn faces_of_missing_vertices() {
+    let vertices = "0 0 0\n1 0 0\n0 2 0\n0 0 0.5\n";
+    let lines = |prefix: &str| vertices.lines().map(|line| format!("{prefix}{line}\n")).collect::<String>();
+    assert_fails("off", format!("OFF\n4 1 0\n{vertices}3 0 1 4\n"), &["faces", "vertex 4"]);
+    assert_fails("off", format!("OFF\n4 1 0\n{vertices}3 0 1\n"), &["line 7", "2 corners"]);
+    assert_fails("off", format!("OFF\n4 1 0\n{vertices}3 0 1 -1\n"), &["line 7", "\"-1\""]);
+    assert_fails("obj", format!("{}f 1 2 5\n", lines("v ")), &["faces", "vertex 4"]);
+    assert_fails("obj", format!("{}f 1 2 0\n", lines("v ")), &["line 5", "no vertex 0"]);
+    assert_fails("obj", format!("{}f -5 2 3\n", lines("v ")), &["line 5", "no vertex -5"]);
+    assert_fails("obj", format!("{}f a b c\n", lines("v ")), &["line 5", "\"a\""]);
+    let ply = |face: &str| format!("{}0 0 0 1\n1 0 0 1\n0 2 0 1\n0 0 0.5 1\n{face}\n", ply_header("ascii", 4));
+    assert_fails("ply", ply("3 0 1 4"), &["faces", "vertex 4"]);
+    assert_fails("ply", ply("3 0 1 -1"), &["faces"]);
+    let mut truncated = ply_binary(false);
+    truncated.truncate(truncated.len() - 2);
+    assert_fails("ply", truncated, &["element \"face\""]);
 }
 
 #[test]
