@@ -13,7 +13,7 @@
 //! A square that only one product of the basis gives and that f lacks rules that element of the basis out, as those of sparse forms:
 //! of `z^4` only `y z` is left.
 
-use super::program::regularised_factor;
+use super::factor::regularised_factor;
 use super::structure::{Pattern, Structure};
 use crate::body::sphere_rule;
 use crate::polynomial::{CertificateError, Exponents, HessianGram, HessianMonomial, Polynomial};

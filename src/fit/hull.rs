@@ -1,5 +1,6 @@
 //! Convex hull of the input points: only its vertices constrain a convex polynomial.
 
+use super::outermost::outermost;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use parry3d_f64::math::Vector as GlamVector;
 use parry3d_f64::transformation::try_convex_hull;
@@ -82,11 +83,13 @@ impl Frame {
 /// [`HullError::Flat`] for points without volume, with their measured thickness.
 pub fn convex_hull(points: &[Vector3<f64>]) -> Result<Hull, HullError> {
     let frame = principal_frame(points)?;
+    // + 0.0 makes the two zeros one key
+    let conditioned: Vec<Vector3<f64>> = points.iter().map(|point| frame.apply(point).add_scalar(0.0)).collect();
     let mut seen = HashMap::new();
     let mut unique = Vec::new();
-    for (index, point) in points.iter().enumerate() {
-        // + 0.0 makes the two zeros one key
-        let u = frame.apply(point).add_scalar(0.0);
+    // What is left out lies in the hull of the others.
+    for index in outermost(&conditioned) {
+        let u = conditioned[index];
         seen.entry([u.x.to_bits(), u.y.to_bits(), u.z.to_bits()]).or_insert_with(|| {
             unique.push((index, u));
             index
@@ -169,7 +172,7 @@ pub(super) fn principal_axes(points: &[Vector3<f64>]) -> (Vector3<f64>, Matrix3<
 }
 
 /// Vertices and facets of the hull, as indices into `points`.
-fn facets(points: &[Vector3<f64>]) -> Result<(Vec<usize>, Vec<[usize; 3]>), String> {
+pub(super) fn facets(points: &[Vector3<f64>]) -> Result<(Vec<usize>, Vec<[usize; 3]>), String> {
     let converted: Vec<GlamVector> = points.iter().map(|p| GlamVector::new(p.x, p.y, p.z)).collect();
     // The hull code asserts its topology, which rounding can break.
     let (vertices, triangles) = std::panic::catch_unwind(|| try_convex_hull(&converted))

@@ -1,6 +1,6 @@
 //! A convex quadratic function of the coefficients of p, and its dual as a function of the moments.
 
-use super::program::regularised_factor;
+use super::factor::regularised_factor;
 use nalgebra::{DMatrix, DVector};
 
 /// `F(c) = g·(c - c0) + ½ (c - c0)ᵀ B (c - c0)` with B ≻ 0.

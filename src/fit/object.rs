@@ -177,9 +177,13 @@ impl<'a> Object<'a> {
         let mut constraint = Constraint { polynomial, gram };
         let inverse = normalization.linear.try_inverse().ok_or(ProgramError::Singular)?;
         let placement = Placement::new(normalization.linear, inverse, normalization.center, 0.0, 0.0);
+        // A million points are looked at once: which are highest does not change with the constant.
+        let values: Vec<f64> = points.iter().map(|x| placement.jet(&constraint, x).value).collect();
+        let top = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let outermost: Vec<_> = points.iter().zip(&values).filter(|(_, v)| **v >= top - 1e-3).map(|(x, _)| x).collect();
         // The bound of the rounding moves a little with the constant: a second pass settles it.
         for _ in 0..3 {
-            let highest = points
+            let highest = outermost
                 .iter()
                 .map(|x| placement.sample(&constraint, x).value_upper(0.0))
                 .fold(f64::NEG_INFINITY, f64::max);

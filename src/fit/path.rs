@@ -12,9 +12,10 @@
 
 use super::FitError;
 use super::barrier::Barrier;
+use super::factor::{cholesky, regularised_factor, solve_lower};
 use super::model::Model;
 use super::objective::Matrix;
-use super::program::{Dual, Problem, regularised_factor};
+use super::program::{Dual, Problem};
 use super::progress::Watch;
 use super::spectral::Spectral;
 use super::structure::{Pattern, Structure};
@@ -242,8 +243,8 @@ impl<'a> Path<'a> {
         }
         let (gradient, curvature) = self.barrier(Matrix::Polynomial, tau).derivatives(&at.moments)?;
         let factor = regularised_factor(&curvature)?;
-        let root = factor.solve_lower_triangular(&DMatrix::identity(gradient.len(), gradient.len()))?;
-        Some((gradient, root.tr_mul(&root)))
+        let root = solve_lower(&factor, DMatrix::identity(gradient.len(), gradient.len()))?;
+        Some((gradient, root.transpose() * &root))
     }
 
     /// A damped Newton step; none when rounding stands in its way.
@@ -256,12 +257,15 @@ impl<'a> Path<'a> {
         let of_weights = (values.tr_mul(&coefficients) * -1.0).add_scalar(tau) - at.weights.map(|w| 1.0 / w);
         let of_form = derivative * &coefficients - &self.trace * (self.margin * tau) - gram;
         // 2. All but the part of m is block diagonal; that has the rank of the moments (Woodbury).
-        let half = form_factor.solve_lower_triangular(derivative)?;
+        let half = solve_lower(&form_factor, derivative.clone())?;
         let half_gradient = form_factor.solve_lower_triangular(&of_form)?;
         let scaled = DMatrix::from_fn(values.nrows(), values.ncols(), |i, j| values[(i, j)] * at.weights[j]);
         let squares = at.weights.component_mul(&at.weights);
         let plain = *values * squares.component_mul(&of_weights) - half.tr_mul(&half_gradient);
-        let multiplier = Cholesky::new(flexibility + &scaled * scaled.transpose() + half.tr_mul(&half))?.solve(&plain);
+        let system = flexibility + &scaled * scaled.transpose() + half.transpose() * &half;
+        let factor = cholesky(system)?;
+        let mut multiplier = factor.solve_lower_triangular(&plain)?;
+        factor.tr_solve_lower_triangular_mut(&mut multiplier);
         let step_weights = -squares.component_mul(&(&of_weights - values.tr_mul(&multiplier)));
         let step_form = -form_factor.tr_solve_lower_triangular(&(half_gradient + &half * &multiplier))?;
         let slope = of_weights.dot(&step_weights) + of_form.dot(&step_form);

@@ -27,7 +27,7 @@ use super::basis::{Affine, change};
 use super::objective::{Function, Matrix, Objective};
 use super::spectral::Spectral;
 use super::structure::{Pattern, Structure};
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 /// Why a program could not be solved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -110,16 +110,4 @@ impl<'a> Problem<'a> {
         let bound = self.spectral.bound(&self.measured(dual)).ok_or(ProgramError::Singular)?;
         Ok(bound - self.cost(dual))
     }
-}
-
-/// Lower Cholesky factor of a matrix that is positive definite up to rounding: its diagonal grows until it is. A slightly
-/// wrong curvature changes the path of the Newton steps, not where they end.
-pub(super) fn regularised_factor(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    [0.0, 1e-14, 1e-12, 1e-10, 1e-8].into_iter().find_map(|share| {
-        let mut matrix = matrix.clone();
-        for i in 0..matrix.nrows() {
-            matrix[(i, i)] *= 1.0 + share;
-        }
-        Some(Cholesky::new(matrix)?.unpack()).filter(|factor| factor.iter().all(|v| v.is_finite()))
-    })
 }

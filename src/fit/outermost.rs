@@ -1,0 +1,114 @@
+//! Most points of a large cloud are far from its convex hull's surface: they are left out before the hull is computed.
+//!
+//! The extreme points along some directions span a polytope inside the hull, and what lies inside that is no vertex (Akl and
+//! Toussaint, A fast convex hull algorithm, Inf. Process. Lett. 7, 1978). More directions, for the fewer points that are left,
+//! leave fewer still.
+
+use super::hull::facets;
+use nalgebra::Vector3;
+use std::f64::consts::PI;
+
+/// Fewer points than this are not worth the work.
+const MANY: usize = 4096;
+/// Directions of the first polytope and of the second.
+const DIRECTIONS: [usize; 2] = [64, 512];
+/// How deep inside the polytope a point must lie to be left out; the points have extents near 1, and rounding is far below.
+const DEPTH: f64 = 1e-9;
+
+/// Indices of the points that may be vertices of the convex hull, ascending; the others lie inside the hull of these. The points
+/// have extents near 1.
+pub(super) fn outermost(points: &[Vector3<f64>]) -> Vec<usize> {
+    let mut left: Vec<usize> = (0..points.len()).collect();
+    for count in DIRECTIONS {
+        if left.len() < MANY {
+            break;
+        }
+        let planes = planes(points, &left, count);
+        // Without planes nothing is known to be inside.
+        left.retain(|&i| planes.is_empty() || planes.iter().any(|(normal, offset)| normal.dot(&points[i]) > *offset));
+    }
+    left
+}
+
+/// The planes of the polytope of the extreme points along `count` directions, moved inwards: `normal·x <= offset` inside. None if the
+/// hull code fails.
+fn planes(points: &[Vector3<f64>], left: &[usize], count: usize) -> Vec<(Vector3<f64>, f64)> {
+    let directions: Vec<Vector3<f64>> = directions(count).collect();
+    let mut best = vec![(f64::NEG_INFINITY, 0); count];
+    for &i in left {
+        for (best, direction) in best.iter_mut().zip(&directions) {
+            let height = direction.dot(&points[i]);
+            if height > best.0 {
+                *best = (height, i);
+            }
+        }
+    }
+    let mut extreme: Vec<usize> = best.iter().map(|&(_, i)| i).collect();
+    extreme.sort_unstable();
+    extreme.dedup();
+    let corners: Vec<Vector3<f64>> = extreme.iter().map(|&i| points[i]).collect();
+    let Ok((_, triangles)) = facets(&corners) else { return Vec::new() };
+    let planes = triangles.iter().filter_map(|&[a, b, c]| {
+        let normal = (corners[b] - corners[a]).cross(&(corners[c] - corners[a]));
+        let normal = normal.try_normalize(1e-12)?;
+        Some((normal, normal.dot(&corners[a]) - DEPTH))
+    });
+    // A sliver has no plane to speak of, and without it the polytope would be larger than it is.
+    let planes: Vec<_> = planes.collect();
+    if planes.len() == triangles.len() { planes } else { Vec::new() }
+}
+
+/// Even directions on the sphere.
+fn directions(count: usize) -> impl Iterator<Item = Vector3<f64>> {
+    let golden = PI * (3.0 - 5_f64.sqrt());
+    (0..count).map(move |i| {
+        let z = 1.0 - (2 * i + 1) as f64 / count as f64;
+        let (sin, cos) = (golden * i as f64).sin_cos();
+        let across = (1.0 - z * z).sqrt();
+        Vector3::new(across * cos, across * sin, z)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::polynomial::tests::Seeded;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn nothing_that_is_extreme_is_left_out() {
+        for seed in 0..6 {
+            let mut random = Seeded(seed);
+            // A ball, a cube, a shell with noise.
+            let point = |random: &mut Seeded| {
+                let x = Vector3::from_fn(|_, _| random.signed());
+                match seed % 3 {
+                    0 => x.normalize() * random.signed().abs().cbrt(),
+                    1 => x * 0.5,
+                    _ => x.normalize() * (1.0 + 1e-3 * random.signed()),
+                }
+            };
+            let points: Vec<_> = (0..20_000).map(|_| point(&mut random)).collect();
+            let left: BTreeSet<usize> = outermost(&points).into_iter().collect();
+            assert!(left.len() < points.len() / 2, "seed {seed}: {} left", left.len());
+            for _ in 0..3000 {
+                let direction = Vector3::from_fn(|_, _| random.signed()).normalize();
+                let farthest =
+                    (0..points.len()).max_by(|&a, &b| direction.dot(&points[a]).total_cmp(&direction.dot(&points[b])));
+                assert!(left.contains(&farthest.unwrap()), "seed {seed}");
+            }
+        }
+    }
+
+    #[test]
+    fn corners_and_duplicates_stay() {
+        let corners: Vec<Vector3<f64>> =
+            (0..8).map(|i| Vector3::from_fn(|k, _| if i >> k & 1 == 1 { 0.5 } else { -0.5 })).collect();
+        let mut random = Seeded(1);
+        let mut points: Vec<_> = (0..10_000).map(|_| Vector3::from_fn(|_, _| 0.49 * random.signed())).collect();
+        points.extend(corners.iter().chain(&corners));
+        let left = outermost(&points);
+        assert!((10_000..10_008).all(|i| left.contains(&i) || left.contains(&(i + 8))), "{left:?}");
+        assert!(left.len() < 100, "{}", left.len());
+    }
+}
