@@ -12,7 +12,7 @@ struct Readme;
 pub mod body;
 pub mod chart;
 pub mod cli;
-#[cfg(feature = "fit")]
+#[cfg(feature = "chart")]
 pub mod demo;
 #[cfg(feature = "fit")]
 pub mod fit;

@@ -17,7 +17,7 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
     // Of measure, the pose.
     ("store", &["body", "scene", "measure"]),
     ("service", &["store", "scene", "measure", "body"]),
-    ("chart", &["fit", "measure", "body"]),
+    ("chart", &["fit", "measure", "body", "polynomial", "optimize"]),
     ("demo", ANY),
     ("cli", ANY),
 ];

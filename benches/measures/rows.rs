@@ -1,6 +1,5 @@
 //! The rows: one function each, listed in [`all`].
 
-use crate::machine;
 use crate::motion::{self, Kind, Trajectory};
 use crate::objects::{DEGREES, Pair, folder};
 use crate::peers::{Hulls, parry_pose};
@@ -160,7 +159,7 @@ fn distance_batches<'a>(scene: &'a Scene<'a>) -> Row<'a> {
             .expect("there are poses, and places for answers");
     };
     let judge = |answer: &Distance| Answer::new(answer.iterations, answer.status, answer.lower <= 0.0);
-    let nanoseconds = if machine::simd() == "AVX-512" { 120.0 } else { 200.0 };
+    let nanoseconds = if sublevel::chart::simd() == "AVX-512" { 120.0 } else { 200.0 };
     let nanoseconds = if scene.kind == Kind::Grazing { 2.0 * nanoseconds } else { nanoseconds };
     Row::batches(format!("distance batches, degree {DEGREE}"), scene.poses(DEGREE), BATCH, batch, judge)
         .at_most(Target::Nanoseconds(nanoseconds))

@@ -1,20 +1,10 @@
 //! Line charts with a logarithmic vertical axis.
 
 use super::Ink;
+use super::canvas::{ChartError, FINE, FONT, LEFT, color, px, svg, tidy};
 use plotters::coord::combinators::IntoLogRange;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-
-/// Why a chart could not be drawn.
-#[derive(Debug, thiserror::Error, PartialEq)]
-pub enum ChartError {
-    /// No series holds a finite point.
-    #[error("a chart needs at least one finite point; none of its series has any")]
-    Empty,
-    /// The drawing library gave up.
-    #[error("the chart can not be drawn: {0}")]
-    Drawing(String),
-}
 
 /// One curve.
 #[derive(Clone, Debug)]
@@ -55,11 +45,6 @@ pub struct LineChart {
 
 /// Width and height, pixels.
 const SIZE: (u32, u32) = (760, 440);
-/// The backend rounds to whole units: drawing this many to a pixel keeps curves smooth.
-const FINE: u32 = 10;
-/// Left end of the axes, pixels.
-const LEFT: i32 = 80;
-const FONT: &str = "sans-serif";
 /// Decades below the mark at which a curve is cut off: nothing can be told apart there.
 const DECADES_BELOW: i32 = 3;
 
@@ -70,12 +55,7 @@ impl LineChart {
     /// [`ChartError::Empty`] if there is nothing to draw.
     pub fn to_svg(&self) -> Result<String, ChartError> {
         let frame = self.frame().ok_or(ChartError::Empty)?;
-        let mut svg = String::new();
-        self.draw(&mut svg, &frame).map_err(|error| ChartError::Drawing(error.to_string()))?;
-        // Drawn fine, shown at its size: the view box keeps the fine units.
-        let (width, height) = SIZE;
-        let fine = format!("width=\"{}\" height=\"{}\"", width * FINE, height * FINE);
-        Ok(svg.replacen(&fine, &format!("width=\"{width}\" height=\"{height}\""), 1))
+        svg(SIZE, |root| self.draw(root, &frame))
     }
 
     /// Ranges that hold all finite points and the mark, the vertical one in whole decades.
@@ -93,12 +73,15 @@ impl LineChart {
         Some(Frame { x: (left - pad, right + pad), y: (10f64.powf(low), 10f64.powf(high.max(low + 1.0)) * 1.05) })
     }
 
-    fn draw(&self, svg: &mut String, frame: &Frame) -> Result<(), Box<dyn std::error::Error>> {
-        let root = SVGBackend::with_string(svg, (SIZE.0 * FINE, SIZE.1 * FINE)).into_drawing_area();
+    fn draw(
+        &self,
+        root: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+        frame: &Frame,
+    ) -> Result<(), Box<dyn std::error::Error>> {
         let grey = color(Ink::Grey);
         let text = |size: i32| (FONT, px(size)).into_font().color(&grey);
         root.draw(&Text::new(self.title.as_str(), (px(LEFT), px(10)), text(17)))?;
-        self.draw_legend(&root)?;
+        self.draw_legend(root)?;
 
         let (_, body) = root.split_vertically(px(58));
         let mut chart = ChartBuilder::on(&body)
@@ -139,7 +122,6 @@ impl LineChart {
                 chart.draw_series(LineSeries::new(points, style))?;
             }
         }
-        root.present()?;
         Ok(())
     }
 
@@ -169,30 +151,9 @@ impl LineChart {
     }
 }
 
-/// Pixels in the units of the drawing.
-fn px(pixels: i32) -> i32 {
-    pixels * FINE as i32
-}
-
 struct Frame {
     x: (f64, f64),
     y: (f64, f64),
-}
-
-fn color(ink: Ink) -> RGBColor {
-    let (red, green, blue) = ink.rgb();
-    RGBColor(red, green, blue)
-}
-
-/// A tick label without trailing zeros and without the noise of binary fractions.
-fn tidy(value: f64) -> String {
-    let text = if value != 0.0 && (value.abs() >= 1e4 || value.abs() < 1e-3) {
-        return format!("{value:.0e}");
-    } else {
-        format!("{value:.4}")
-    };
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".into() } else { text.into() }
 }
 
 #[cfg(test)]
@@ -223,14 +184,5 @@ mod tests {
         assert_eq!(chart(vec![(f64::NAN, 1.0)]).to_svg(), Err(ChartError::Empty));
         assert!(chart(vec![(0.0, 1.0)]).to_svg().is_ok());
         assert!(chart(vec![(0.0, -2.0), (1.0, 0.0), (2.0, f64::INFINITY), (3.0, 1e300)]).to_svg().is_ok());
-    }
-
-    #[test]
-    fn tick_labels_are_short() {
-        for (value, text) in
-            [(0.0, "0"), (-1e-17, "-1e-17"), (0.1, "0.1"), (100.0, "100"), (-1.5, "-1.5"), (1e6, "1e6")]
-        {
-            assert_eq!(tidy(value), text);
-        }
     }
 }

@@ -1,13 +1,34 @@
-//! Pictures as SVG: curves ([`LineChart`]) and silhouettes of posed bodies ([`Silhouettes`]).
+//! Pictures as SVG: silhouettes of posed bodies ([`Silhouettes`]), and with the feature `chart` curves, points on logarithmic axes,
+//! and reports with measurements.
 //!
 //! Backgrounds are transparent, and every colour has a contrast of at least 3 : 1 against white and against black, so a
 //! picture can be read on light and on dark pages. Two colours never carry a meaning alone: dashes or labels do too.
 
+#[cfg(feature = "chart")]
+mod canvas;
+#[cfg(feature = "chart")]
 mod curve;
+#[cfg(feature = "chart")]
+mod machine;
+#[cfg(feature = "chart")]
+mod scatter;
+mod shadow;
 mod silhouette;
+#[cfg(feature = "chart")]
+mod table1;
 
-pub use curve::{ChartError, LineChart, Mark, Series};
+#[cfg(feature = "chart")]
+pub use canvas::ChartError;
+#[cfg(feature = "chart")]
+pub use curve::{LineChart, Mark, Series};
+#[cfg(feature = "chart")]
+pub use machine::{Machine, simd};
+#[cfg(feature = "chart")]
+pub use scatter::{Group, Marker, Point, Scatter};
+pub use shadow::shadow;
 pub use silhouette::{Outline, Panel, Silhouettes, View, boundary_points, outline};
+#[cfg(feature = "chart")]
+pub use table1::{Table1, Table1Error, Table1Progress, table1};
 
 /// Colours of a chart, told apart by colour-blind readers too (after Okabe and Ito).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,6 +39,8 @@ pub enum Ink {
     Orange,
     /// Third object or curve.
     Green,
+    /// Fourth object or curve.
+    Purple,
     /// Text, axes, marks.
     Grey,
 }
@@ -29,6 +52,7 @@ impl Ink {
             Ink::Blue => (0x1f, 0x7f, 0xc4),
             Ink::Orange => (0xd5, 0x5e, 0x00),
             Ink::Green => (0x00, 0x93, 0x6b),
+            Ink::Purple => (0xb2, 0x62, 0x98),
             Ink::Grey => (0x7a, 0x7a, 0x7a),
         }
     }
@@ -56,7 +80,7 @@ mod tests {
 
     #[test]
     fn every_ink_reads_on_white_and_on_black() {
-        for ink in [Ink::Blue, Ink::Orange, Ink::Green, Ink::Grey] {
+        for ink in [Ink::Blue, Ink::Orange, Ink::Green, Ink::Purple, Ink::Grey] {
             let l = luminance(ink);
             assert!(1.05 / (l + 0.05) >= 3.0 && (l + 0.05) / 0.05 >= 3.0, "{ink:?}");
         }

@@ -1,6 +1,7 @@
 //! Silhouettes of convex bodies, and drawings of them in a grid of panels with one common scale.
 
 use super::Ink;
+use crate::optimize::{outline as convex_outline, turn};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -23,6 +24,24 @@ impl View {
             View::Side => [point.x, point.z],
             View::Front => [point.y, point.z],
             View::Top => [point.x, point.y],
+        }
+    }
+
+    /// How far away from the picture plane a point is, metres, up to sign.
+    pub(super) fn depth(self, point: &Vector3<f64>) -> f64 {
+        match self {
+            View::Side => point.y,
+            View::Front => point.x,
+            View::Top => point.z,
+        }
+    }
+
+    /// The point at these picture coordinates and depth.
+    pub(super) fn lift(self, [a, b]: [f64; 2], depth: f64) -> Vector3<f64> {
+        match self {
+            View::Side => Vector3::new(a, depth, b),
+            View::Front => Vector3::new(depth, a, b),
+            View::Top => Vector3::new(a, b, depth),
         }
     }
 
@@ -53,31 +72,7 @@ pub fn boundary_points(along: impl Fn(&Vector3<f64>) -> Vector3<f64>, count: usi
 /// The silhouette of the convex hull of `points`: its corners in picture coordinates, metres, counter-clockwise.
 pub fn outline(points: &[Vector3<f64>], view: View) -> Vec<[f64; 2]> {
     let mut flat: Vec<[f64; 2]> = points.iter().map(|point| view.project(point)).collect();
-    flat.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
-    flat.dedup();
-    // Andrew's monotone chain: the lower side from left to right, the upper side back.
-    let half = |points: &mut dyn Iterator<Item = [f64; 2]>| {
-        let mut chain: Vec<[f64; 2]> = Vec::new();
-        for point in points {
-            while let [.., a, b] = chain[..] {
-                if turn(a, b, point) > 0.0 {
-                    break;
-                }
-                chain.pop();
-            }
-            chain.push(point);
-        }
-        chain.pop(); // the first of the other side
-        chain
-    };
-    let mut hull = half(&mut flat.iter().copied());
-    hull.extend(half(&mut flat.iter().rev().copied()));
-    hull
-}
-
-/// Twice the signed area of the triangle a, b, c; positive if counter-clockwise.
-fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
-    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    convex_outline(&mut flat)
 }
 
 /// One drawn thing: the outline of a body, or the triangles of an object.

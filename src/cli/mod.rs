@@ -4,7 +4,9 @@
 
 #[cfg(feature = "fit")]
 mod certify;
-#[cfg(feature = "fit")]
+#[cfg(feature = "chart")]
+mod chart;
+#[cfg(feature = "chart")]
 mod demo;
 #[cfg(feature = "fit")]
 mod fit;
@@ -33,11 +35,14 @@ type Outcome = Result<bool, Box<dyn Error>>;
     feature = "fit",
     doc = "A first tour: 'sublevel demo'. With meshes of your own: 'fit', then 'measure' without a server, or 'serve' and 'push'."
 )]
-#[cfg_attr(not(feature = "fit"), doc = "Built without the feature 'fit': 'fit', 'certify' and 'demo' are left out.")]
+#[cfg_attr(
+    not(feature = "fit"),
+    doc = "Built without the feature 'fit': 'fit', 'certify', 'demo' and 'chart' are left out."
+)]
 #[derive(Debug, Parser)]
 #[command(version, max_term_width = 100)]
 enum Command {
-    #[cfg(feature = "fit")]
+    #[cfg(feature = "chart")]
     Demo(demo::DemoArgs),
     #[cfg(feature = "fit")]
     Fit(fit::FitArgs),
@@ -48,6 +53,8 @@ enum Command {
     Measure(measure::MeasureArgs),
     Serve(serve::ServeArgs),
     Push(push::PushArgs),
+    #[cfg(feature = "chart")]
+    Chart(chart::ChartArgs),
 }
 
 /// Runs the command line of this process. Exit code 0: done; 1: failed, with one line on standard error, or a checked claim
@@ -55,7 +62,7 @@ enum Command {
 pub fn main() -> ExitCode {
     let done = |()| true;
     let outcome: Outcome = match Command::parse() {
-        #[cfg(feature = "fit")]
+        #[cfg(feature = "chart")]
         Command::Demo(args) => demo::run(&args).map(done).map_err(Into::into),
         #[cfg(feature = "fit")]
         Command::Fit(args) => fit::run(&args).map(done),
@@ -66,6 +73,8 @@ pub fn main() -> ExitCode {
         Command::Measure(args) => measure::run(&args).map(done),
         Command::Serve(args) => serve::run(&args).map(done).map_err(Into::into),
         Command::Push(args) => push::run(&args).map(done),
+        #[cfg(feature = "chart")]
+        Command::Chart(args) => chart::run(&args).map(done),
     };
     match outcome {
         Ok(true) => ExitCode::SUCCESS,

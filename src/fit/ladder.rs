@@ -35,6 +35,16 @@ impl From<Fit> for Rung {
     }
 }
 
+/// The lowest rung: the smallest ball around the points, metres.
+///
+/// # Errors
+/// As [`fit`](super::fit()), of bad input.
+pub fn ball(name: &str, points: &[Vector3<f64>]) -> Result<Rung, FitError> {
+    let options = FitOptions::default();
+    options.check(name)?;
+    Object::new(name, points, &options.input)?.ball()
+}
+
 /// The rungs of an object: the smallest ball, the smallest ellipsoid, and bodies of degree 4, 6, 8 up to that of the options, each
 /// but the ball refined and cut by slabs as they say.
 ///

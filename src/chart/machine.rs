@@ -1,0 +1,71 @@
+//! What figures were measured on and with, for the head of a report.
+
+use serde::Serialize;
+use std::fs;
+use std::process::Command;
+
+/// The machine and the versions, as far as they can be told.
+#[derive(Clone, Debug, Serialize)]
+pub struct Machine {
+    /// Name of the processor.
+    pub cpu: String,
+    /// Cores that can be used at once.
+    pub cores: usize,
+    /// What [`simd`] says.
+    pub simd: &'static str,
+    /// The sources: what `git describe` says of them, while they are where this was built.
+    pub commit: String,
+    /// The compiler that is installed now.
+    pub rustc: String,
+}
+
+impl Machine {
+    /// This one.
+    pub fn this() -> Self {
+        Self {
+            cpu: cpu(),
+            cores: std::thread::available_parallelism().map_or(0, usize::from),
+            simd: simd(),
+            commit: said("git", &["describe", "--always", "--dirty", "--tags"]),
+            rustc: said("rustc", &["--version"]),
+        }
+    }
+}
+
+fn cpu() -> String {
+    let info = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let field = |key: &str| {
+        let line = info.lines().find(|line| line.split(':').next().is_some_and(|name| name.trim() == key))?;
+        Some(line.split_once(':')?.1.trim().to_owned())
+    };
+    match (field("model name"), field("cpu family"), field("model")) {
+        // Clouds hide the name; family and model still tell the generation.
+        (Some(name), Some(family), Some(model)) => format!("{name} (family {family}, model {model})"),
+        (Some(name), ..) => name,
+        _ => std::env::consts::ARCH.to_owned(),
+    }
+}
+
+/// The widest arithmetic of this processor: "AVX-512", "AVX2" or "baseline".
+pub fn simd() -> &'static str {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if is_x86_feature_detected!("avx512f") {
+            return "AVX-512";
+        }
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            return "AVX2";
+        }
+    }
+    "baseline"
+}
+
+/// First line a program prints, or "unknown".
+fn said(program: &str, arguments: &[&str]) -> String {
+    let output = Command::new(program).args(arguments).current_dir(env!("CARGO_MANIFEST_DIR")).output();
+    let line = output.ok().filter(|output| output.status.success()).and_then(|output| {
+        let text = String::from_utf8(output.stdout).ok()?;
+        text.lines().next().map(str::to_owned)
+    });
+    line.unwrap_or_else(|| "unknown".to_owned())
+}

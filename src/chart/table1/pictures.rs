@@ -1,0 +1,116 @@
+//! The paper's pictures, redrawn from our fits: degrees, level sets, and the two Gram matrices.
+
+use super::rows::{MESHES, Method};
+use super::{Subject, Table1};
+use crate::body::{Aabb, Body};
+use crate::chart::{Ink, Outline, Panel, Silhouettes, View, boundary_points, outline, shadow};
+use crate::fit::Objective;
+use nalgebra::Vector3;
+
+/// Boundary points that an outline is made of.
+const POINTS: usize = 6000;
+/// The levels of the paper's picture.
+const LEVELS: [f64; 3] = [2.0, 1.0, 0.75];
+
+impl Table1 {
+    /// The pictures by name: what could be built is drawn.
+    pub fn pictures(&self) -> Vec<(&'static str, String)> {
+        vec![
+            ("table1-degrees.svg", self.degrees()),
+            ("table1-gram.svg", self.grams()),
+            ("table1-levels.svg", self.levels()),
+        ]
+    }
+
+    /// A row of bodies of rising degree around each of two meshes.
+    fn degrees(&self) -> String {
+        let rows = ["human", "chair"].map(|name| {
+            let panel = |degree| {
+                let method = Method::Convex(Objective::LogDetP, degree, false);
+                self.panel(name, &format!("{name}, degree {degree}"), View::Front, &[(Ink::Orange, method)])
+            };
+            [2, 4, 6, 8].into_iter().filter_map(panel).collect()
+        });
+        let legend = vec![(Ink::Blue, "mesh".into()), (Ink::Orange, "sos-convex body, logdet-p".into())];
+        Silhouettes { title: "Bodies of rising degree".into(), legend, rows: rows.into() }.to_svg()
+    }
+
+    /// The body of least log det of P beside that of H, of the highest degree that there is.
+    fn grams(&self) -> String {
+        let built = |&degree: &usize| self.body("chair", Method::Convex(Objective::LogDetH, degree, false)).is_some();
+        let degree = [6, 4].into_iter().find(built).unwrap_or_default();
+        let panel = |(name, view): (&str, View)| {
+            let method = |objective| Method::Convex(objective, degree, false);
+            let both = [(Ink::Orange, method(Objective::LogDetH)), (Ink::Green, method(Objective::LogDetP))];
+            self.panel(name, &format!("{name}, {}", view.name()), view, &both)
+        };
+        let panels = [("chair", View::Front), ("chair", View::Top), ("octopus", View::Top)];
+        let rows = vec![panels.into_iter().filter_map(panel).collect()];
+        let legend =
+            vec![(Ink::Blue, "mesh".into()), (Ink::Orange, "logdet-h".into()), (Ink::Green, "logdet-p".into())];
+        let title = format!("Gram matrix of the Hessian form against that of p, degree {degree}");
+        Silhouettes { title, legend, rows }.to_svg()
+    }
+
+    /// One body grown and shrunk by its level sets.
+    fn levels(&self) -> String {
+        let panel = |(name, _): &(&str, &str)| {
+            let method = [6, 4].map(|degree| Method::Convex(Objective::LogDetP, degree, false));
+            let body = method.into_iter().find_map(|method| self.body(name, method))?;
+            let subject = self.subject(name)?;
+            let inks = [Ink::Green, Ink::Orange, Ink::Purple];
+            let bounds = grown(body);
+            let sets = LEVELS.iter().zip(inks).map(|(&level, ink)| Outline {
+                ink,
+                polygons: shadow(|x| body.value(x), level, &bounds, View::Front),
+                solid: false,
+            });
+            let outlines = std::iter::once(subject.picture(View::Front)).chain(sets).collect();
+            Some(Panel { caption: format!("{name}, degree {}", body.degree()), outlines })
+        };
+        let rows = vec![MESHES[..3].iter().filter_map(panel).collect()];
+        let legend = vec![
+            (Ink::Blue, "mesh".into()),
+            (Ink::Green, "p <= 2".into()),
+            (Ink::Orange, "p <= 1".into()),
+            (Ink::Purple, "p <= 0.75".into()),
+        ];
+        Silhouettes { title: "Growth and shrinkage by level sets".into(), legend, rows }.to_svg()
+    }
+
+    /// The bodies of these methods over the mesh, if they could be built.
+    fn panel(&self, name: &str, caption: &str, view: View, methods: &[(Ink, Method)]) -> Option<Panel> {
+        let mut outlines = vec![self.subject(name)?.picture(view)];
+        for &(ink, method) in methods {
+            let body = self.body(name, method)?;
+            let points = boundary_points(|direction| body.boundary_along(direction), POINTS);
+            outlines.push(Outline::body(ink, outline(&points, view)));
+        }
+        Some(Panel { caption: caption.into(), outlines })
+    }
+
+    fn subject(&self, name: &str) -> Option<&Subject> {
+        self.subjects.iter().find(|subject| subject.name == name)
+    }
+
+    fn body(&self, name: &str, method: Method) -> Option<&Body> {
+        let column = self.subjects.iter().position(|subject| subject.name == name)?;
+        let (_, cells) = self.rows.iter().find(|(row, _)| row.method == method)?;
+        cells.get(column)?.as_ref().ok()?.body.as_ref()
+    }
+}
+
+impl Subject {
+    fn picture(&self, view: View) -> Outline {
+        Outline::surface(Ink::Blue, &self.mesh.points, &self.mesh.triangles, view)
+    }
+}
+
+/// A box around the largest of the level sets: p is convex, so that {p <= 2} is no more than `(2 - min p)/(1 - min p)` times as large
+/// as the body, about the point of the least value.
+fn grown(body: &Body) -> Aabb {
+    let factor = (LEVELS[0] - body.min_value()) / (1.0 - body.min_value());
+    let (bounds, center) = (body.bounding_box(), body.interior_point());
+    let away = |corner: &Vector3<f64>| center + (corner - center) * factor;
+    Aabb { min: away(&bounds.min), max: away(&bounds.max) }
+}
