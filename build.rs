@@ -4,8 +4,13 @@ use std::{env, error::Error, fs, path::PathBuf};
 
 use protox::prost::Message;
 
-const FILES: [&str; 4] =
-    ["sublevel/v1/types.proto", "sublevel/v1/body.proto", "sublevel/v1/scene.proto", "sublevel/v1/query.proto"];
+const FILES: [&str; 5] = [
+    "sublevel/v1/types.proto",
+    "sublevel/v1/body.proto",
+    "sublevel/v1/scene.proto",
+    "sublevel/v1/query.proto",
+    "sublevel/v1/fit.proto",
+];
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");

@@ -16,6 +16,8 @@ pub mod cli;
 pub mod demo;
 #[cfg(feature = "fit")]
 pub mod fit;
+#[cfg(feature = "fit")]
+pub mod jobs;
 pub mod measure;
 pub mod optimize;
 pub mod polynomial;

@@ -16,14 +16,15 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
     ("scene", &["measure", "body"]),
     // Of measure, the pose.
     ("store", &["body", "scene", "measure"]),
-    ("service", &["store", "scene", "measure", "body"]),
+    ("jobs", &["fit", "store", "body"]),
+    ("service", &["jobs", "store", "scene", "measure", "body"]),
     ("chart", &["fit", "measure", "body", "polynomial", "optimize"]),
     ("demo", ANY),
     ("cli", ANY),
 ];
 
 const ANY: &[&str] =
-    &["polynomial", "optimize", "body", "measure", "fit", "scene", "store", "service", "chart", "demo"];
+    &["polynomial", "optimize", "body", "measure", "fit", "scene", "store", "jobs", "service", "chart", "demo"];
 
 /// Words that one room (or a few) may name, and no other: wire formats, bytes on disk.
 const PRIVATE_WORDS: &[(&str, &[&str])] = &[

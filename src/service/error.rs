@@ -80,6 +80,15 @@ pub(super) fn catalogue(error: &CatalogueError, field: &str) -> Status {
             details.set_resource_info("scene", name, "", message.clone());
             Status::with_error_details(Code::AlreadyExists, message, details)
         }
+        CatalogueError::NoJob(id) => not_found("fit", id, field, message),
+        CatalogueError::RequestUsed { request_id, .. } => {
+            let mut details = details("REQUEST_ID_USED");
+            details.set_resource_info("fit", request_id, "", message.clone());
+            Status::with_error_details(Code::AlreadyExists, message, details)
+        }
+        CatalogueError::QueueFull => {
+            Status::with_error_details(Code::ResourceExhausted, message, details("QUEUE_FULL"))
+        }
         CatalogueError::SceneName(error) => Invalid::new(field, error).into(),
         CatalogueError::Scene(error) => scene(error),
         CatalogueError::Store(error) => store(error),

@@ -50,3 +50,18 @@ pub const MUTE_PATIENCE_CROWDED: Duration = Duration::from_secs(1);
 
 /// Pause after a connection could not be accepted.
 pub const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
+
+/// Most points of one fit job, counting those of a mesh file.
+pub const MAX_FIT_POINTS: usize = 4 << 20;
+
+/// Longest mesh file of a fit job, in bytes.
+pub const MAX_MESH_BYTES: usize = 128 << 20;
+
+/// Uploads that are read at once, each with as much in memory; further ones wait unread.
+pub const MAX_UPLOADS: usize = 2;
+
+/// Most items of a page of fit jobs, whose descriptions are long.
+pub const MAX_FITS_PAGE: usize = 500;
+
+/// Pause between two messages about a fit job.
+pub const WATCH_PAUSE: Duration = Duration::from_millis(100);

@@ -13,14 +13,22 @@ use tonic::transport::server::Router;
 use tonic_health::ServingStatus;
 use tonic_health::server::HealthReporter;
 
+#[cfg(feature = "fit")]
+use crate::jobs::Jobs;
 use crate::store::{Catalogue, Store, StoreError};
 
 use super::bodies::Bodies;
+#[cfg(feature = "fit")]
+use super::fits::Fits;
 use super::gate::Gate;
+#[cfg(feature = "fit")]
+use super::gate::Gated;
 use super::incoming::Incoming;
 use super::limits::{DRAIN, KEEPALIVE, KEEPALIVE_TIMEOUT, MAX_MESSAGE_BYTES, MAX_STREAMS};
 use super::proto::FILE_DESCRIPTOR_SET;
 use super::proto::body_service_server::{self, BodyServiceServer};
+#[cfg(feature = "fit")]
+use super::proto::fit_service_server::{self, FitServiceServer};
 use super::proto::query_service_server::{self, QueryServiceServer};
 use super::proto::scene_service_server::{self, SceneServiceServer};
 use super::queries::Queries;
@@ -106,7 +114,14 @@ impl Server {
         let (health, health_service) = tonic_health::server::health_reporter();
         // It starts as SERVING.
         set_health(&health, ServingStatus::NotServing).await;
-        let router = router(Ready::new(catalogue)).add_service(health_service);
+        let ready = Ready::new(catalogue.clone());
+        let router = router(ready.clone()).add_service(health_service);
+        #[cfg(feature = "fit")]
+        let (router, jobs, worker) = {
+            let jobs = Jobs::default();
+            let worker = tokio::spawn(jobs.clone().work(catalogue));
+            (router.add_service(fits(ready, jobs.clone())), jobs, worker)
+        };
 
         let loading = load(self.store, loaded, health.clone());
         let (failed, failure) = oneshot::channel();
@@ -129,6 +144,12 @@ impl Server {
         loader.abort();
         set_health(&health, ServingStatus::NotServing).await;
         let _ = draining.send(());
+        #[cfg(feature = "fit")]
+        {
+            // The running fit goes back into the queue, and those who watch it are told.
+            jobs.stop();
+            let _ = tokio::time::timeout(DRAIN, worker).await;
+        }
         // Streams may stay open as long as their clients like; waiting for them ends here.
         if let Ok(result) = tokio::time::timeout(DRAIN, serving).await {
             result?;
@@ -214,6 +235,13 @@ fn router(ready: Ready) -> Router {
         .add_optional_service(reflection().build_v1alpha().ok())
 }
 
+/// Behind a gate of its own: uploads take long, and nothing else waits for them.
+#[cfg(feature = "fit")]
+fn fits(ready: Ready, jobs: Jobs) -> Gated<FitServiceServer<Fits>> {
+    let fits = FitServiceServer::new(Fits::new(ready, jobs));
+    Gate::new().before(fits.max_decoding_message_size(MAX_MESSAGE_BYTES).max_encoding_message_size(MAX_MESSAGE_BYTES))
+}
+
 /// Loads the catalogue on a thread that may block, then opens the doors.
 async fn load(
     store: Store,
@@ -233,6 +261,8 @@ async fn load(
 async fn set_health(health: &HealthReporter, status: ServingStatus) {
     let services =
         ["", body_service_server::SERVICE_NAME, scene_service_server::SERVICE_NAME, query_service_server::SERVICE_NAME];
+    #[cfg(feature = "fit")]
+    let services = services.into_iter().chain([fit_service_server::SERVICE_NAME]);
     for service in services {
         health.set_service_status(service, status).await;
     }

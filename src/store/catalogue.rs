@@ -1,4 +1,6 @@
-//! All bodies and scenes in memory, every change written through.
+//! All bodies, scenes and jobs in memory, every change written through.
+
+mod jobs;
 
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Bound;
@@ -11,6 +13,7 @@ use crate::body::{Body, BodyId};
 use crate::scene::{NameError, Object, Scene, SceneError, Update, check_name};
 
 use super::disk::Contents;
+use super::job::{Job, MAX_QUEUED_JOBS};
 use super::rows::{BODIES, META, OBJECTS, ObjectRow, REVISIONS, SCENES, SceneRow};
 use super::{Store, StoreError};
 
@@ -27,6 +30,7 @@ pub struct Catalogue {
 struct State {
     bodies: BTreeMap<BodyId, Arc<Body>>,
     scenes: BTreeMap<Arc<str>, Arc<Scene>>,
+    jobs: BTreeMap<u64, Arc<Job>>,
     /// No new scene starts at or below it.
     revision_floor: u64,
 }
@@ -59,6 +63,22 @@ pub enum CatalogueError {
     /// The update can not be applied to the scene.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// No fit job has this id.
+    #[error("no fit job {0}; list the jobs, or create it first")]
+    NoJob(String),
+    /// The request id names another job.
+    #[error(
+        "the request id \"{request_id}\" was used for fit job {job}, which has other points or options; choose another id"
+    )]
+    RequestUsed {
+        /// The request id.
+        request_id: String,
+        /// The job it made.
+        job: u64,
+    },
+    /// Too many jobs wait.
+    #[error("{MAX_QUEUED_JOBS} fit jobs wait already; try again when some are done, or cancel some")]
+    QueueFull,
     /// The disk failed.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -270,7 +290,7 @@ impl State {
     /// Everything in the store; bodies in `known` are not proven again.
     fn read(store: &Store, known: &BTreeMap<BodyId, Arc<Body>>) -> Result<Self, StoreError> {
         let damaged = |what: String| StoreError::damaged(store.dir(), what);
-        let Contents { bodies, scenes, objects, revision_floor } = store.read()?;
+        let Contents { bodies, scenes, objects, jobs, revision_floor } = store.read()?;
         tracing::info!(
             bodies = bodies.len(),
             scenes = scenes.len(),
@@ -290,7 +310,8 @@ impl State {
                 Object { name: name.as_str().into(), body: Arc::clone(body), pose, group: row.group.as_str().into() };
             placed.entry(scene).or_default().push(object);
         }
-        let mut state = Self { scenes: BTreeMap::new(), revision_floor, bodies: BTreeMap::new() };
+        let jobs = jobs.into_iter().map(|job| (job.id, Arc::new(job))).collect();
+        let mut state = Self { scenes: BTreeMap::new(), revision_floor, bodies: BTreeMap::new(), jobs };
         for (name, revision, row) in scenes {
             check_name(&name).map_err(|error| damaged(format!("scene {name:?} {error}")))?;
             let objects = placed.remove(&name).unwrap_or_default();

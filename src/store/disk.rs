@@ -5,11 +5,15 @@ use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use redb::{Database, DatabaseError, Durability, ReadableDatabase, ReadableTable, TableHandle, WriteTransaction};
+use nalgebra::Vector3;
+use redb::{
+    Database, DatabaseError, Durability, ReadOnlyTable, ReadTransaction, ReadableDatabase, ReadableTable,
+    TableDefinition, TableError, TableHandle, WriteTransaction,
+};
 use serde::de::DeserializeOwned;
 
-use super::StoreError;
-use super::rows::{BODIES, FORMAT, META, OBJECTS, ObjectRow, REVISIONS, SCENES, SceneRow};
+use super::rows::{BODIES, FORMAT, JOBS, META, OBJECTS, ObjectRow, POINTS, REVISIONS, SCENES, SceneRow};
+use super::{Job, StoreError};
 
 /// The catalogue's file, locked by this process. Hand it to [`super::Catalogue::load`].
 pub struct Store {
@@ -28,6 +32,8 @@ pub(super) struct Contents {
     pub(super) scenes: Vec<(String, u64, SceneRow)>,
     /// Scene, object, row; in the order of scene and object.
     pub(super) objects: Vec<(String, String, ObjectRow)>,
+    /// In the order of their ids.
+    pub(super) jobs: Vec<Job>,
     pub(super) revision_floor: u64,
 }
 
@@ -160,6 +166,7 @@ impl Store {
             bodies: Vec::new(),
             scenes: Vec::new(),
             objects: Vec::new(),
+            jobs: Vec::new(),
             revision_floor: read.open_table(META)?.get("revision_floor")?.map_or(0, |value| value.value()),
         };
         for entry in read.open_table(BODIES)?.iter()? {
@@ -184,7 +191,32 @@ impl Store {
             let row = parse(row.value(), || format!("object \"{name}\" of scene \"{scene}\""))?;
             contents.objects.push((scene.to_owned(), name.to_owned(), row));
         }
+        if let Some(jobs) = table(&read, JOBS)? {
+            for entry in jobs.iter()? {
+                let (id, row) = entry?;
+                let (id, job) = (id.value(), parse::<Job>(row.value(), || format!("fit job {}", id.value()))?);
+                if job.id != id {
+                    return Err(ReadError::Row(format!("fit job {id} says that it is {}", job.id)));
+                }
+                contents.jobs.push(job);
+            }
+        }
         Ok(contents)
+    }
+
+    /// The points of a job, metres, if it has not ended.
+    pub(super) fn points(&self, id: u64) -> Result<Option<Vec<Vector3<f64>>>, StoreError> {
+        let database = self.database.as_ref().ok_or_else(|| self.closed())?;
+        (|| {
+            let read = database.begin_read()?;
+            let Some(table) = table(&read, POINTS)? else { return Ok(None) };
+            Ok(table.get(id)?.map(|row| {
+                let number = |bytes: &[u8]| bytes.try_into().map_or(f64::NAN, f64::from_le_bytes);
+                let (points, _) = row.value().as_chunks::<24>();
+                points.iter().map(|bytes| Vector3::from_iterator(bytes.chunks(8).map(number))).collect()
+            }))
+        })()
+        .map_err(|error: redb::Error| StoreError::from_redb(&self.dir, error))
     }
 
     fn closed(&self) -> StoreError {
@@ -218,6 +250,18 @@ enum ReadError {
 impl<E: Into<redb::Error>> From<E> for ReadError {
     fn from(error: E) -> Self {
         Self::Redb(error.into())
+    }
+}
+
+/// A table that older files may lack.
+fn table<K: redb::Key + 'static, V: redb::Value + 'static>(
+    read: &ReadTransaction,
+    definition: TableDefinition<K, V>,
+) -> Result<Option<ReadOnlyTable<K, V>>, redb::Error> {
+    match read.open_table(definition) {
+        Ok(table) => Ok(Some(table)),
+        Err(TableError::TableDoesNotExist(_)) => Ok(None),
+        Err(error) => Err(error.into()),
     }
 }
 

@@ -1,4 +1,4 @@
-//! The durable catalogue of bodies and scenes, embedded in the server.
+//! The durable catalogue of bodies, scenes and fit jobs, embedded in the server.
 //!
 //! [`Store`] is the file: one redb database, `catalogue.redb`, in the data directory. [`Catalogue`] holds everything of it
 //! in memory for reading and writes every change through. Only this room knows bytes on disk.
@@ -26,11 +26,16 @@
 mod catalogue;
 mod disk;
 mod error;
+mod job;
 mod rows;
 
 pub use catalogue::{Catalogue, CatalogueError};
 pub use disk::Store;
 pub use error::StoreError;
+pub use job::{
+    FitOptimum, FitOrder, FitOutcome, FittedBody, Job, JobState, MAX_ENDED_JOBS, MAX_QUEUED_JOBS, MAX_REQUEST_ID_BYTES,
+    NewJob,
+};
 
 #[cfg(test)]
 mod tests;

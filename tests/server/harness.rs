@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use sublevel::body::Body;
 use sublevel::service::proto::body_service_client::BodyServiceClient;
+use sublevel::service::proto::fit_service_client::FitServiceClient;
 use sublevel::service::proto::query_service_client::QueryServiceClient;
 use sublevel::service::proto::scene_service_client::SceneServiceClient;
 use sublevel::service::proto::{
@@ -94,6 +95,7 @@ impl Running {
             bodies: BodyServiceClient::new(channel.clone()),
             scenes: SceneServiceClient::new(channel.clone()),
             queries: QueryServiceClient::new(channel.clone()),
+            fits: FitServiceClient::new(channel.clone()),
             channel,
         }
     }
@@ -150,6 +152,7 @@ pub(crate) struct Clients {
     pub(crate) bodies: BodyServiceClient<Channel>,
     pub(crate) scenes: SceneServiceClient<Channel>,
     pub(crate) queries: QueryServiceClient<Channel>,
+    pub(crate) fits: FitServiceClient<Channel>,
     pub(crate) channel: Channel,
 }
 

@@ -127,7 +127,7 @@ pub fn read_mesh(path: &Path, scale: f64) -> Result<Mesh, ReadError> {
     parse(&bytes, &extension, path, scale)
 }
 
-fn parse(bytes: &[u8], extension: &str, path: &Path, scale: f64) -> Result<Mesh, ReadError> {
+pub(crate) fn parse(bytes: &[u8], extension: &str, path: &Path, scale: f64) -> Result<Mesh, ReadError> {
     let mesh = match extension {
         "off" => text::off(bytes),
         "obj" => text::obj(bytes),

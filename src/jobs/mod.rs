@@ -1,0 +1,62 @@
+//! Fit jobs: queue, progress, cancel, restart.
+//!
+//! The catalogue holds the jobs; what is decided there is final, and the worker only follows. A job that is cancelled is
+//! CANCELLED on disk first and stopped then; the result of a fit counts only if its job is still running when it comes. So
+//! nothing depends on when the fit hears of it, and a kill at any time leaves a state that was acknowledged.
+//!
+//! `order` is what can be asked for; `worker` fits one job after the other; `board` is where it tells how far it is,
+//! and where everybody waits for news.
+
+mod board;
+mod order;
+mod worker;
+
+pub use board::{Board, Phase, Progress};
+pub use order::{MESH_FORMATS, OrderError, check, read_mesh};
+
+use std::sync::Arc;
+
+use tokio::sync::watch;
+
+use crate::store::{Catalogue, CatalogueError, Job, JobState, NewJob};
+
+/// The jobs of one server. Clones are the same jobs.
+#[derive(Clone, Debug, Default)]
+pub struct Jobs(Arc<watch::Sender<Board>>);
+
+impl Jobs {
+    /// Queues a job, see [`Catalogue::create_job`]. Blocks on the disk, as all changes do.
+    ///
+    /// # Errors
+    /// When the catalogue refuses it.
+    pub fn create(&self, catalogue: &Catalogue, job: NewJob) -> Result<(Arc<Job>, bool), CatalogueError> {
+        let created = catalogue.create_job(job)?;
+        self.tell(|_| {});
+        Ok(created)
+    }
+
+    /// Cancels a job that has not ended, and returns it as it is then. A running fit stops at its next iteration.
+    ///
+    /// # Errors
+    /// When there is no such job, or when the disk fails.
+    pub fn cancel(&self, catalogue: &Catalogue, id: u64) -> Result<Arc<Job>, CatalogueError> {
+        let job = catalogue
+            .change_job(id, Vec::new(), |job| (!job.state.is_final()).then_some((JobState::Cancelled, job.attempts)))?;
+        self.tell(|board| board.stop(id));
+        Ok(job)
+    }
+
+    /// Wakes up whenever a job may have changed.
+    pub fn news(&self) -> watch::Receiver<Board> {
+        self.0.subscribe()
+    }
+
+    /// Makes the worker put its job back into the queue and end.
+    pub fn stop(&self) {
+        self.tell(Board::stop_all);
+    }
+
+    fn tell(&self, change: impl FnOnce(&mut Board)) {
+        self.0.send_modify(change);
+    }
+}

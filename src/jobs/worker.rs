@@ -1,0 +1,185 @@
+//! One job after the other, on one thread: fits take a core for seconds, and queries need the others.
+
+use std::any::Any;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::sync::watch;
+use tokio::task::{JoinError, spawn_blocking};
+
+use super::order::carry_out;
+use super::{Board, Jobs};
+use crate::body::Body;
+use crate::store::{Catalogue, CatalogueError, FitOutcome, Job, JobState};
+
+/// Attempts at a job. One that was running whenever the server was killed may be what kills it.
+const MAX_ATTEMPTS: u32 = 2;
+
+/// Pause after the disk failed.
+const PAUSE: Duration = Duration::from_secs(1);
+
+type Fitted = Result<Result<(FitOutcome, Vec<Body>), String>, JoinError>;
+
+impl Jobs {
+    /// Fits job after job once the catalogue is loaded, until [`Jobs::stop`]; the jobs that a kill left running go first.
+    pub async fn work(self, mut catalogue: watch::Receiver<Option<Arc<Catalogue>>>) {
+        let mut news = self.news();
+        let catalogue = tokio::select! {
+            Ok(loaded) = catalogue.wait_for(Option::is_some) => loaded.clone(),
+            _ = news.wait_for(Board::is_stopping) => None,
+            else => None,
+        };
+        let Some(catalogue) = catalogue else { return };
+        self.insist(&catalogue, recover).await;
+        while !news.borrow_and_update().is_stopping() {
+            match self.insist(&catalogue, claim).await.flatten() {
+                Some(job) => self.attempt(&catalogue, &job).await,
+                None => drop(news.changed().await),
+            }
+        }
+    }
+
+    /// One attempt at a job that was claimed.
+    async fn attempt(&self, catalogue: &Arc<Catalogue>, job: &Arc<Job>) {
+        let id = job.id;
+        tracing::info!(id, name = job.order.name, points = job.points, attempt = job.attempts, "fit job begun");
+        self.tell(|board| board.begin(id));
+        let fit = {
+            let (jobs, catalogue, job) = (self.clone(), catalogue.clone(), job.clone());
+            spawn_blocking(move || jobs.fit(&catalogue, &job))
+        };
+        let mut news = self.news();
+        let fitted = tokio::select! {
+            biased;
+            _ = news.wait_for(Board::is_stopping) => None,
+            fitted = fit => Some(fitted),
+        };
+        match fitted {
+            // The fit hears of it, too; whether it ends before the server does is no matter.
+            None => self.once(catalogue, move |catalogue| put_back(catalogue, id)).await,
+            Some(fitted) => {
+                let (state, bodies) = ended(fitted);
+                let ended =
+                    self.insist(catalogue, move |catalogue| finish(catalogue, id, &state, bodies.clone())).await;
+                if let Some(job) = ended {
+                    tracing::info!(id, state = ?job.state, "fit job ended");
+                }
+            }
+        }
+        self.tell(Board::end);
+    }
+
+    /// On a thread of its own. An error is the reason why the job fails.
+    fn fit(&self, catalogue: &Catalogue, job: &Job) -> Result<(FitOutcome, Vec<Body>), String> {
+        // A job that was cancelled since it was claimed, when nobody could tell the board, has no points any more.
+        let points = catalogue.job_points(job.id).map_err(|error| format!("its points can not be read: {error}"))?;
+        carry_out(&job.order, &points, |phase, said| {
+            let mut goes_on = true;
+            self.tell(|board| goes_on = board.note(job.id, phase, said));
+            if goes_on { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        })
+        .map_err(|error| error.to_string())
+    }
+
+    /// A change of the catalogue, again and again until the disk takes it or the server stops.
+    async fn insist<T: Send + 'static>(
+        &self,
+        catalogue: &Arc<Catalogue>,
+        change: impl Fn(&Catalogue) -> Result<T, CatalogueError> + Send + Sync + 'static,
+    ) -> Option<T> {
+        let (mut news, change) = (self.news(), Arc::new(change));
+        loop {
+            let (catalogue, change) = (catalogue.clone(), change.clone());
+            match spawn_blocking(move || change(&catalogue)).await {
+                Ok(Ok(done)) => return Some(done),
+                Ok(Err(error)) => tracing::warn!(%error, "a fit job waits for the disk"),
+                Err(error) => tracing::error!(%error, "a change of a fit job was ended by a defect"),
+            }
+            let stopping = news.wait_for(Board::is_stopping);
+            if tokio::time::timeout(PAUSE, stopping).await.is_ok() {
+                return None;
+            }
+        }
+    }
+
+    /// A change of the catalogue that is given up when it fails.
+    async fn once(
+        &self,
+        catalogue: &Arc<Catalogue>,
+        change: impl FnOnce(&Catalogue) -> Result<(), CatalogueError> + Send + 'static,
+    ) {
+        let catalogue = catalogue.clone();
+        match spawn_blocking(move || change(&catalogue)).await {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => tracing::error!(%error, "a fit job could not be put back into the queue"),
+            Err(error) => tracing::error!(%error, "a change of a fit job was ended by a defect"),
+        }
+    }
+}
+
+/// Jobs that were running when the server was killed: back into the queue, or given up.
+fn recover(catalogue: &Catalogue) -> Result<(), CatalogueError> {
+    while let Some(job) = catalogue.first_job(&JobState::Running) {
+        let job = catalogue.change_job(job.id, Vec::new(), |job| {
+            let state = if job.attempts < MAX_ATTEMPTS {
+                JobState::Queued
+            } else {
+                JobState::Failed(format!(
+                    "the server was killed {} times while it fitted this; give it more memory, or send fewer points or a \
+                     lower degree",
+                    job.attempts
+                ))
+            };
+            Some((state, job.attempts))
+        })?;
+        tracing::warn!(id = job.id, attempts = job.attempts, state = ?job.state, "a fit job was running when the server was killed");
+    }
+    Ok(())
+}
+
+/// The oldest job that waits is running now.
+fn claim(catalogue: &Catalogue) -> Result<Option<Arc<Job>>, CatalogueError> {
+    let Some(job) = catalogue.first_job(&JobState::Queued) else { return Ok(None) };
+    let is_queued = |job: &Job| job.state == JobState::Queued;
+    let job = catalogue
+        .change_job(job.id, Vec::new(), |job| is_queued(job).then_some((JobState::Running, job.attempts + 1)))?;
+    // Cancelled meanwhile: who asks for news hears of it and comes back.
+    Ok(Some(job).filter(|job| job.state == JobState::Running))
+}
+
+/// Back into the queue, as if it had not been begun.
+fn put_back(catalogue: &Catalogue, id: u64) -> Result<(), CatalogueError> {
+    let is_running = |job: &Job| job.state == JobState::Running;
+    catalogue.change_job(id, Vec::new(), |job| {
+        is_running(job).then(|| (JobState::Queued, job.attempts.saturating_sub(1)))
+    })?;
+    Ok(())
+}
+
+/// The end of a job, unless it was cancelled meanwhile.
+fn finish(catalogue: &Catalogue, id: u64, state: &JobState, bodies: Vec<Body>) -> Result<Arc<Job>, CatalogueError> {
+    let is_running = |job: &Job| job.state == JobState::Running;
+    catalogue.change_job(id, bodies, |job| is_running(job).then(|| (state.clone(), job.attempts)))
+}
+
+/// The state that a fit leaves its job in, and the bodies to be stored.
+fn ended(fitted: Fitted) -> (JobState, Vec<Body>) {
+    match fitted {
+        Ok(Ok((outcome, bodies))) => (JobState::Succeeded(outcome), bodies),
+        Ok(Err(why)) => (JobState::Failed(why), Vec::new()),
+        Err(error) => {
+            let what =
+                error.try_into_panic().map_or_else(|error| error.to_string(), |panic| message(&*panic).to_owned());
+            tracing::error!(what, "a fit was ended by a defect");
+            let why = format!("the fit was ended by a defect of the program: {what}; please report it with the points");
+            (JobState::Failed(why), Vec::new())
+        }
+    }
+}
+
+/// What a panic said.
+fn message(panic: &(dyn Any + Send)) -> &str {
+    let text = panic.downcast_ref::<&str>().copied();
+    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message")
+}

@@ -1,0 +1,130 @@
+//! FitService.
+
+mod upload;
+mod wire;
+
+use std::sync::Arc;
+
+use tokio::sync::{Semaphore, mpsc};
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::{Request, Response, Status, Streaming};
+
+use super::limits::{MAX_FITS_PAGE, MAX_UPLOADS, WATCH_PAUSE};
+use super::proto::fit_service_server::FitService;
+use super::proto::{
+    CancelFitRequest, CancelFitResponse, CreateFitRequest, CreateFitResponse, GetFitRequest, GetFitResponse,
+    ListFitsRequest, ListFitsResponse, WatchFitRequest, WatchFitResponse,
+};
+use super::ready::Ready;
+use super::{error, wire as shared};
+use crate::jobs::{Board, Jobs};
+use crate::store::{Catalogue, CatalogueError, Job};
+
+#[derive(Debug)]
+pub(super) struct Fits {
+    ready: Ready,
+    jobs: Jobs,
+    /// Each holds its points in memory; further ones wait unread.
+    uploads: Semaphore,
+}
+
+impl Fits {
+    pub(super) fn new(ready: Ready, jobs: Jobs) -> Self {
+        Self { ready, jobs, uploads: Semaphore::new(MAX_UPLOADS) }
+    }
+}
+
+#[tonic::async_trait]
+impl FitService for Fits {
+    async fn create_fit(
+        &self,
+        request: Request<Streaming<CreateFitRequest>>,
+    ) -> Result<Response<CreateFitResponse>, Status> {
+        let _place = self.uploads.acquire().await;
+        let upload = upload::receive(request.into_inner()).await?;
+        let new = self.ready.prove(move || upload.into_job()).await??;
+        let jobs = self.jobs.clone();
+        let create = move |catalogue: &Catalogue| jobs.create(catalogue, new);
+        let (job, created) = self.ready.change("header.request_id", create).await?;
+        Ok(Response::new(CreateFitResponse { job: Some(self.message(&job)), created }))
+    }
+
+    async fn get_fit(&self, request: Request<GetFitRequest>) -> Result<Response<GetFitResponse>, Status> {
+        let job = find(&*self.ready.catalogue().await?, wire::id(&request.get_ref().id, "id")?)?;
+        Ok(Response::new(GetFitResponse { job: Some(self.message(&job)) }))
+    }
+
+    async fn list_fits(&self, request: Request<ListFitsRequest>) -> Result<Response<ListFitsResponse>, Status> {
+        let (size, after) = shared::page(request.get_ref().page_size, &request.get_ref().page_token);
+        let after = after.map(|token| wire::id(token, "page_token")).transpose()?;
+        let (jobs, more) = self.ready.catalogue().await?.jobs(after, size.min(MAX_FITS_PAGE));
+        let next_page_token = match jobs.last() {
+            Some(last) if more => last.id.to_string(),
+            _ => String::new(),
+        };
+        let jobs = jobs.iter().map(|job| self.message(job)).collect();
+        Ok(Response::new(ListFitsResponse { jobs, next_page_token }))
+    }
+
+    type WatchFitStream = ReceiverStream<Result<WatchFitResponse, Status>>;
+
+    async fn watch_fit(&self, request: Request<WatchFitRequest>) -> Result<Response<Self::WatchFitStream>, Status> {
+        let id = wire::id(&request.get_ref().id, "id")?;
+        let catalogue = self.ready.catalogue().await?;
+        find(&catalogue, id)?;
+        let (sender, stream) = mpsc::channel(1);
+        tokio::spawn(watch(catalogue, self.jobs.clone(), id, sender));
+        Ok(Response::new(ReceiverStream::new(stream)))
+    }
+
+    async fn cancel_fit(&self, request: Request<CancelFitRequest>) -> Result<Response<CancelFitResponse>, Status> {
+        let id = wire::id(&request.get_ref().id, "id")?;
+        let jobs = self.jobs.clone();
+        let job = self.ready.change("id", move |catalogue| jobs.cancel(catalogue, id)).await?;
+        Ok(Response::new(CancelFitResponse { job: Some(self.message(&job)) }))
+    }
+}
+
+impl Fits {
+    fn message(&self, job: &Job) -> super::proto::FitJob {
+        wire::job(job, self.jobs.news().borrow().progress(job.id))
+    }
+}
+
+fn find(catalogue: &Catalogue, id: u64) -> Result<Arc<Job>, Status> {
+    catalogue.job(id).ok_or_else(|| error::catalogue(&CatalogueError::NoJob(id.to_string()), "id"))
+}
+
+/// Sends the job as it stands whenever it has changed, until it has ended or nobody listens. A message is made when there is
+/// room for it, so who reads slowly gets the latest.
+async fn watch(catalogue: Arc<Catalogue>, jobs: Jobs, id: u64, sender: mpsc::Sender<Result<WatchFitResponse, Status>>) {
+    let (mut news, mut sent) = (jobs.news(), None);
+    while let Ok(room) = sender.reserve().await {
+        let (progress, stopping) = {
+            let board: &Board = &news.borrow_and_update();
+            (board.progress(id), board.is_stopping())
+        };
+        let job = match find(&catalogue, id) {
+            Ok(job) => job,
+            Err(status) => return room.send(Err(status)),
+        };
+        let message = wire::job(&job, progress);
+        if sent.as_ref() != Some(&message) {
+            sent = Some(message.clone());
+            room.send(Ok(WatchFitResponse { job: Some(message) }));
+        } else if stopping {
+            let why = "the server stops; watch the job again when it is back, it goes on then";
+            return room.send(Err(error::unavailable("STOPPING", why)));
+        }
+        if job.state.is_final() {
+            return;
+        }
+        if !stopping {
+            tokio::time::sleep(WATCH_PAUSE).await;
+            tokio::select! {
+                _ = news.changed() => {}
+                () = sender.closed() => return,
+            }
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! The jobs of the catalogue. Their points stay on disk until somebody fits them, and go when the job has ended.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+
+use crate::body::Body;
+use crate::store::job::{Job, JobState, MAX_ENDED_JOBS, MAX_QUEUED_JOBS, NewJob};
+use crate::store::rows::{BODIES, JOBS, POINTS};
+
+use super::{Catalogue, CatalogueError, json, page};
+
+impl Catalogue {
+    /// One job by id.
+    pub fn job(&self, id: u64) -> Option<Arc<Job>> {
+        self.read(|state| state.jobs.get(&id).cloned())
+    }
+
+    /// Up to `count` jobs, oldest first, from the first one after `after`; and whether more follow.
+    pub fn jobs(&self, after: Option<u64>, count: usize) -> (Vec<Arc<Job>>, bool) {
+        self.read(|state| page(&state.jobs, after.as_ref(), count))
+    }
+
+    /// The oldest job in this state.
+    pub fn first_job(&self, wanted: &JobState) -> Option<Arc<Job>> {
+        self.read(|state| state.jobs.values().find(|job| job.state == *wanted).cloned())
+    }
+
+    /// The points of a job that has not ended, metres.
+    ///
+    /// # Errors
+    /// When there are none, or when the disk fails.
+    pub fn job_points(&self, id: u64) -> Result<Vec<Vector3<f64>>, CatalogueError> {
+        let points = self.writer()?.points(id)?;
+        points.ok_or_else(|| CatalogueError::NoJob(id.to_string()))
+    }
+
+    /// Queues a job. The one that was there first when the request id is known; tells whether it is new. The oldest of too
+    /// many jobs that have ended is forgotten.
+    ///
+    /// # Errors
+    /// When the request id was used for another content, when too many jobs wait, or when the disk fails.
+    pub fn create_job(&self, new: NewJob) -> Result<(Arc<Job>, bool), CatalogueError> {
+        let mut store = self.writer()?;
+        let NewJob { request_id, digest, order, points, coordinates } = new;
+        let (known, queued, ended, id) = self.read(|state| {
+            let jobs = || state.jobs.values();
+            let known = jobs().find(|job| !request_id.is_empty() && job.request_id == request_id).cloned();
+            let queued = jobs().filter(|job| job.state == JobState::Queued).count();
+            let ended: Vec<u64> = jobs().filter(|job| job.state.is_final()).map(|job| job.id).collect();
+            // The latest job is never forgotten, so no id is given twice.
+            (known, queued, ended, state.jobs.last_key_value().map_or(1, |(last, _)| last + 1))
+        });
+        match known {
+            Some(known) if known.digest == digest => return Ok((known, false)),
+            Some(known) => return Err(CatalogueError::RequestUsed { request_id, job: known.id }),
+            None if queued >= MAX_QUEUED_JOBS => return Err(CatalogueError::QueueFull),
+            None => {}
+        }
+        let job = Arc::new(Job { id, request_id, digest, order, points, attempts: 0, state: JobState::Queued });
+        let forgotten = &ended[..ended.len().saturating_sub(MAX_ENDED_JOBS)];
+        self.commit(&mut store, |transaction| {
+            transaction.open_table(POINTS)?.insert(id, coordinates.as_slice())?;
+            let mut jobs = transaction.open_table(JOBS)?;
+            jobs.insert(id, json(&*job)?.as_slice())?;
+            for id in forgotten {
+                jobs.remove(id)?;
+            }
+            Ok(())
+        })?;
+        self.write(|state| {
+            forgotten.iter().for_each(|id| drop(state.jobs.remove(id)));
+            state.jobs.insert(id, job.clone())
+        });
+        tracing::debug!(id, name = job.order.name, points, "fit job queued");
+        Ok((job, true))
+    }
+
+    /// Moves a job on to the state and number of attempts that `change` says, storing its bodies along with that; `None`
+    /// leaves all as it is. Returns the job as it is then. A job that ends loses its points.
+    ///
+    /// # Errors
+    /// When there is no such job, or when the disk fails.
+    pub fn change_job(
+        &self,
+        id: u64,
+        bodies: Vec<Body>,
+        change: impl FnOnce(&Job) -> Option<(JobState, u32)>,
+    ) -> Result<Arc<Job>, CatalogueError> {
+        let mut store = self.writer()?;
+        let job = self.job(id).ok_or_else(|| CatalogueError::NoJob(id.to_string()))?;
+        let Some((state, attempts)) = change(&job) else { return Ok(job) };
+        let next = Arc::new(Job { state, attempts, ..(*job).clone() });
+        let fresh: Vec<Arc<Body>> =
+            bodies.into_iter().filter(|body| self.body(body.id()).is_none()).map(Arc::new).collect();
+        self.commit(&mut store, |transaction| {
+            let mut table = transaction.open_table(BODIES)?;
+            for body in &fresh {
+                table.insert(body.id().to_string().as_str(), body.to_json().as_bytes())?;
+            }
+            if next.state.is_final() {
+                transaction.open_table(POINTS)?.remove(id)?;
+            }
+            transaction.open_table(JOBS)?.insert(id, json(&*next)?.as_slice())?;
+            Ok(())
+        })?;
+        self.write(|state| {
+            state.bodies.extend(fresh.into_iter().map(|body| (*body.id(), body)));
+            state.jobs.insert(id, next.clone())
+        });
+        tracing::debug!(id, attempts, state = ?next.state, "fit job moved on");
+        Ok(next)
+    }
+}

@@ -1,0 +1,116 @@
+//! Fit jobs as their users meet them: uploads, progress, cancelling, restarts, refusals.
+
+mod jobs;
+mod refused;
+mod restarts;
+mod uploads;
+
+use std::time::{Duration, Instant};
+
+use nalgebra::Vector3;
+use sublevel::body::Body;
+use sublevel::service::proto::create_fit_request::Part;
+use sublevel::service::proto::{
+    CancelFitRequest, CreateFitRequest, CreateFitResponse, FitHeader, FitJob, FitOptions, FitState, GetBodyRequest,
+    GetFitRequest, PointChunk, WatchFitRequest, WatchFitResponse,
+};
+use tonic::{Status, Streaming};
+
+use crate::harness::{Clients, Numbers};
+
+/// Long enough for any job here on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// Points on a ball with a bite of noise, metres: all but a few are vertices of their hull.
+fn cloud(count: usize, seed: u64) -> Vec<Vector3<f64>> {
+    let mut numbers = Numbers(seed);
+    let mut number = || numbers.next();
+    (0..count).map(|_| Vector3::new(number(), number(), number()).normalize() * (1.0 + 0.01 * number())).collect()
+}
+
+fn header(name: &str, options: FitOptions) -> FitHeader {
+    FitHeader { name: name.into(), options: Some(options), ..FitHeader::default() }
+}
+
+/// Fits in well below a second.
+fn quick() -> FitOptions {
+    FitOptions { degree: 2, ..FitOptions::default() }
+}
+
+/// Fits for much longer than any test waits for it to begin.
+fn long() -> FitOptions {
+    FitOptions { degree: 8, refine: true, slabs: 15, ..FitOptions::default() }
+}
+
+fn message(part: Part) -> CreateFitRequest {
+    CreateFitRequest { part: Some(part) }
+}
+
+fn chunk(points: &[Vector3<f64>]) -> CreateFitRequest {
+    let coordinates = points.iter().flat_map(|point| [point.x, point.y, point.z]).collect();
+    message(Part::Points(PointChunk { coordinates }))
+}
+
+impl Clients {
+    async fn upload(&mut self, messages: Vec<CreateFitRequest>) -> Result<CreateFitResponse, Status> {
+        Ok(self.fits.create_fit(tokio_stream::iter(messages)).await?.into_inner())
+    }
+
+    /// Queues a job about these points.
+    async fn queue(&mut self, header: FitHeader, points: &[Vector3<f64>]) -> FitJob {
+        let mut messages = vec![message(Part::Header(header))];
+        messages.extend(points.chunks(50_000).map(chunk));
+        self.upload(messages).await.expect("queued").job.expect("a job")
+    }
+
+    async fn job(&mut self, id: &str) -> FitJob {
+        self.fits.get_fit(GetFitRequest { id: id.into() }).await.expect("there").into_inner().job.expect("a job")
+    }
+
+    async fn cancel(&mut self, id: &str) -> FitJob {
+        let request = CancelFitRequest { id: id.into() };
+        self.fits.cancel_fit(request).await.expect("cancelled").into_inner().job.expect("a job")
+    }
+
+    async fn watch(&mut self, id: &str) -> Streaming<WatchFitResponse> {
+        self.fits.watch_fit(WatchFitRequest { id: id.into() }).await.expect("a watch").into_inner()
+    }
+
+    /// Waits until the job is being solved: past its hull, in the middle of its first program.
+    async fn under_way(&mut self, id: &str) -> FitJob {
+        let mut watch = self.watch(id).await;
+        let start = Instant::now();
+        loop {
+            let job = next(&mut watch).await.expect("it goes on").expect("it has not ended");
+            if job.progress.is_some_and(|progress| progress.iterations > 0) {
+                assert_eq!(job.state(), FitState::Running);
+                return job;
+            }
+            assert!(start.elapsed() < PATIENCE, "{job:?}");
+        }
+    }
+
+    /// Waits for the end of a job.
+    async fn ended(&mut self, id: &str) -> FitJob {
+        let mut watch = self.watch(id).await;
+        let mut last = None;
+        while let Some(job) = next(&mut watch).await.expect("it goes on") {
+            last = Some(job);
+        }
+        last.expect("a state")
+    }
+
+    /// The stored body, re-proven from its file.
+    async fn body(&mut self, id: &str) -> Body {
+        let response = self.bodies.get_body(GetBodyRequest { id: id.into() }).await.expect("stored").into_inner();
+        let body = Body::from_json(std::str::from_utf8(&response.body_file_json).expect("text")).expect("proven");
+        assert_eq!(body.id().to_string(), id);
+        body
+    }
+}
+
+/// The next message of a watch; none at its end.
+async fn next(watch: &mut Streaming<WatchFitResponse>) -> Result<Option<FitJob>, Status> {
+    let message = tokio::time::timeout(PATIENCE, watch.message()).await.expect("in time")?;
+    Ok(message.map(|message| message.job.expect("a job")))
+}

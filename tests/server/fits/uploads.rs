@@ -1,0 +1,160 @@
+//! What is sent comes back as bodies that hold it.
+
+use nalgebra::Vector3;
+use sublevel::fit;
+use sublevel::service::proto::create_fit_request::Part;
+use sublevel::service::proto::{FitObjective, FitOptions, FitPhase, FitState, MeshFormat};
+
+use super::{chunk, cloud, header, message, next, quick};
+use crate::harness::{Numbers, Running};
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_million_points_become_a_body_and_progress_only_grows() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(dir.path());
+    let mut clients = server.connect().await;
+    // Filling a box and touching its sides, so that the hull is small.
+    let mut numbers = Numbers(7);
+    let sides = Vector3::new(0.5, 0.3, 0.2);
+    let points: Vec<_> = (0..1_000_000)
+        .map(|_| Vector3::from_fn(|_, _| (1.5 * numbers.next()).clamp(-1.0, 1.0)).component_mul(&sides))
+        .collect();
+    let options = FitOptions { degree: 4, trim: 0.0, ..FitOptions::default() };
+    let job = clients.queue(header("box", options), &points).await;
+    assert_eq!((job.point_count, job.name.as_str(), job.attempts), (1_000_000, "box", job.attempts.min(1)));
+
+    let mut watch = clients.watch(&job.id).await;
+    let (mut last, mut order) = (job.clone(), vec![job.state()]);
+    while let Some(job) = next(&mut watch).await.expect("it goes on") {
+        if let (Some(before), Some(now)) = (&last.progress, &job.progress) {
+            assert!(now.iterations >= before.iterations && now.rounds >= before.rounds, "{before:?} {now:?}");
+            assert!(now.phase >= before.phase, "{before:?} {now:?}");
+        }
+        order.push(job.state());
+        last = job;
+    }
+    assert!(order.is_sorted_by_key(|state| i32::from(*state)), "{order:?}");
+    assert_eq!(last.state(), FitState::Succeeded, "{}", last.failure);
+    let result = last.result.expect("a result");
+    let [fitted] = &result.bodies[..] else { panic!("{result:?}") };
+    let body = clients.body(&fitted.body_id).await;
+    assert_eq!((body.name(), body.degree(), body.points().map(|points| points.count)), ("box", 4, Some(1_000_000)));
+    body.prove_contains(&points).expect("every point is inside");
+    assert_eq!(body.gap_m(), Some(fitted.gap_m));
+    assert!(fitted.mean_gap_m < fitted.gap_m && fitted.duration_s > 0.0);
+    assert!(fitted.optimum.as_ref().is_some_and(|optimum| optimum.optimality_gap.abs() < 1e-4));
+}
+
+/// The service and the library give the very same bodies.
+#[tokio::test(flavor = "multi_thread")]
+async fn options_mean_what_they_mean_to_the_library() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(dir.path());
+    let mut clients = server.connect().await;
+    let points = cloud(300, 3);
+    let fitted = |options: &fit::FitOptions| {
+        fit::fit("it", &points, options, &mut |_| std::ops::ControlFlow::Continue(())).expect("a fit").body
+    };
+    let library = |degree| fit::FitOptions { degree, input: "it.xyz".into(), ..fit::FitOptions::default() };
+    let trace = fit::FitOptions { objective: fit::Objective::TraceP, ..library(4) };
+    let refined = fit::FitOptions { refine: true, slabs: 2, ..library(4) };
+    let cases = [
+        (FitOptions::default(), fitted(&library(6))),
+        (FitOptions { degree: 4, objective: FitObjective::TraceP.into(), ..FitOptions::default() }, fitted(&trace)),
+        (FitOptions { degree: 4, refine: true, slabs: 2, ..FitOptions::default() }, fitted(&refined)),
+        (FitOptions { max_gap_m: Some(10.0), ..FitOptions::default() }, {
+            let tell = &mut |_| std::ops::ControlFlow::Continue(());
+            fit::coarsest_within("it", &points, 10.0, &library(8), tell).expect("the ball").body
+        }),
+    ];
+    for (options, expected) in cases {
+        let mut header = header("it", options);
+        header.input = "it.xyz".into();
+        let id = clients.queue(header, &points).await.id;
+        let job = clients.ended(&id).await;
+        let result = job.result.unwrap_or_else(|| panic!("{}", job.failure));
+        assert_eq!(result.bodies[0].body_id, expected.id().to_string(), "{options:?}");
+        let stored = clients.body(&result.bodies[0].body_id).await;
+        assert_eq!(stored.provenance(), expected.provenance());
+    }
+    let options = FitOptions { degree: 4, ladder: true, trim: 0.01, scale: Some(1e-3), ..FitOptions::default() };
+    let id = clients.queue(header("it", options), &points).await.id;
+    let result = clients.ended(&id).await.result.expect("a ladder");
+    assert_eq!((result.bodies.len(), result.left_out_count), (3, 3));
+    assert!(result.bodies.is_sorted_by(|a, b| a.gap_m > b.gap_m) && result.bodies[0].gap_m < 1e-2);
+    assert!(result.bodies[0].optimum.is_none() && result.left_out_m < 1e-3, "{result:?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_mesh_comes_as_the_bytes_of_its_file() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(dir.path());
+    let mut clients = server.connect().await;
+    let mut file = "OFF\n8 0 0\n".to_owned();
+    for i in 0..8 {
+        file += &format!("{} {} {}\n", i & 1, i >> 1 & 1, i >> 2);
+    }
+    let mut header = header("cube", quick());
+    header.mesh_format = MeshFormat::Off.into();
+    let mut messages = vec![message(Part::Header(header))];
+    // Cut where it hurts, in the middle of numbers and lines.
+    messages.extend(file.as_bytes().chunks(7).map(|bytes| message(Part::Mesh(bytes.to_vec().into()))));
+    let job = clients.upload(messages).await.expect("queued").job.expect("a job");
+    assert_eq!(job.point_count, 8);
+    let result = clients.ended(&job.id).await.result.expect("a body");
+    let volume = clients.body(&result.bodies[0].body_id).await.volume().volume_m3;
+    // The smallest ellipsoid around a unit cube is its ball.
+    let ball = std::f64::consts::PI * 3.0_f64.sqrt() / 2.0;
+    assert!((volume / ball - 1.0).abs() < 1e-3, "{volume} {ball}");
+}
+
+/// Points that can not be fitted are a failed job with the reason, and the next job goes on.
+#[tokio::test(flavor = "multi_thread")]
+async fn what_can_not_be_fitted_fails_by_name() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(dir.path());
+    let mut clients = server.connect().await;
+    let flat: Vec<_> = cloud(50, 5).into_iter().map(|point| Vector3::new(point.x, point.y, 0.0)).collect();
+    let failed = clients.queue(header("sheet", quick()), &flat).await.id;
+    let close = FitOptions { max_gap_m: Some(1e-9), degree: 2, ..FitOptions::default() };
+    let far = clients.queue(header("ball", close), &cloud(50, 6)).await.id;
+    let thick = FitOptions { min_thickness_m: Some(1e-3), ..quick() };
+    let done = clients.queue(header("sheet", thick), &flat).await.id;
+    let job = clients.ended(&failed).await;
+    assert_eq!(job.state(), FitState::Failed);
+    assert!(job.failure.contains("plane") && job.result.is_none(), "{}", job.failure);
+    let job = clients.ended(&far).await;
+    assert!(job.failure.contains("max gap") && job.attempts == 1, "{}", job.failure);
+    assert_eq!(clients.ended(&done).await.state(), FitState::Succeeded);
+}
+
+/// A watch that is not read does not pile up what it missed.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_slow_watcher_gets_the_latest() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(dir.path());
+    let mut clients = server.connect().await;
+    let points = cloud(400, 9);
+    let id = clients.queue(header("long", super::long()), &points).await.id;
+    let begun = std::time::Instant::now();
+    let mut slow = clients.watch(&id).await;
+    clients.under_way(&id).await;
+    tokio::time::sleep(std::time::Duration::from_secs(2)).await;
+    // Who comes late hears at once how far it is.
+    let late = next(&mut clients.watch(&id).await).await.expect("it goes on").expect("a job");
+    let progress = late.progress.expect("it runs");
+    assert!(progress.phase() == FitPhase::Fitting && progress.iterations > 10, "{progress:?}");
+    clients.cancel(&id).await;
+    let (mut count, mut last) = (0, None);
+    while let Some(job) = next(&mut slow).await.expect("it goes on") {
+        (count, last) = (count + 1, Some(job.state()));
+    }
+    assert_eq!(last, Some(FitState::Cancelled));
+    let most = 10.0 * begun.elapsed().as_secs_f64() + 3.0;
+    assert!(
+        f64::from(count) <= most && progress.iterations > 100,
+        "{count} messages, {} iterations",
+        progress.iterations
+    );
+    drop(chunk(&points));
+}
