@@ -1,5 +1,7 @@
 //! `sublevel fit`.
 
+mod remote;
+
 use super::write_atomically;
 use crate::fit::{
     FitError, FitOptions, Objective, Progress, RefinementEnd, Rung, Trimmed, coarsest_within, fit, ladder, read_points,
@@ -86,6 +88,11 @@ pub(super) struct FitArgs {
     /// Metres per unit of the input: 0.001 for files in millimetres
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, allow_negative_numbers = true)]
     scale: f64,
+    /// Have this server fit, such as http://127.0.0.1:50051: it stores the bodies, and their files are written here, too
+    ///
+    /// Jobs wait for their turn there and survive its restart. Ctrl-C cancels the one that is under way.
+    #[arg(long, value_name = "URL")]
+    server: Option<String>,
     /// Print a JSON array of reports instead of a table
     #[arg(long)]
     json: bool,
@@ -149,7 +156,11 @@ pub(super) fn run(args: &FitArgs) -> Result<(), Box<dyn Error>> {
     let mut rows = Vec::new();
     let mut failure = None;
     for (input, stem) in args.inputs.iter().zip(&stems) {
-        match one(args, input, stem) {
+        let fitted = match &args.server {
+            Some(url) => remote::one(args, url, input, stem),
+            None => one(args, input, stem),
+        };
+        match fitted {
             Ok(of_input) => rows.extend(of_input),
             // What was fitted before is on disk: it is reported before the error.
             Err(error) => {

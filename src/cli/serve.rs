@@ -5,11 +5,11 @@ use std::path::PathBuf;
 
 use crate::service::{self, ServeError, ServeOptions};
 
-/// Run the gRPC server: bodies and scenes on disk, distances on request
+/// Run the gRPC server: bodies, scenes and fit jobs on disk, distances on request
 ///
 /// Prints 'listening on ADDR' as its first line on standard output; logs go to standard error, as much as RUST_LOG says
 /// (error, warn, info, debug; default info). Changes are on disk before they are acknowledged. SIGTERM or Ctrl-C stops it:
-/// calls in flight get a few seconds to end.
+/// calls in flight get a few seconds to end, and a fit under way goes on at the next start.
 ///
 /// Example: sublevel serve --data /var/lib/sublevel --listen 127.0.0.1:50051
 #[derive(Debug, clap::Args)]

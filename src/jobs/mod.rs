@@ -60,3 +60,6 @@ impl Jobs {
         self.0.send_modify(change);
     }
 }
+
+#[cfg(test)]
+mod tests;

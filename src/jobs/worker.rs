@@ -71,7 +71,7 @@ impl Jobs {
     }
 
     /// On a thread of its own. An error is the reason why the job fails.
-    fn fit(&self, catalogue: &Catalogue, job: &Job) -> Result<(FitOutcome, Vec<Body>), String> {
+    pub(super) fn fit(&self, catalogue: &Catalogue, job: &Job) -> Result<(FitOutcome, Vec<Body>), String> {
         // A job that was cancelled since it was claimed, when nobody could tell the board, has no points any more.
         let points = catalogue.job_points(job.id).map_err(|error| format!("its points can not be read: {error}"))?;
         carry_out(&job.order, &points, |phase, said| {
@@ -83,7 +83,7 @@ impl Jobs {
     }
 
     /// A change of the catalogue, again and again until the disk takes it or the server stops.
-    async fn insist<T: Send + 'static>(
+    pub(super) async fn insist<T: Send + 'static>(
         &self,
         catalogue: &Arc<Catalogue>,
         change: impl Fn(&Catalogue) -> Result<T, CatalogueError> + Send + Sync + 'static,
@@ -119,7 +119,7 @@ impl Jobs {
 }
 
 /// Jobs that were running when the server was killed: back into the queue, or given up.
-fn recover(catalogue: &Catalogue) -> Result<(), CatalogueError> {
+pub(super) fn recover(catalogue: &Catalogue) -> Result<(), CatalogueError> {
     while let Some(job) = catalogue.first_job(&JobState::Running) {
         let job = catalogue.change_job(job.id, Vec::new(), |job| {
             let state = if job.attempts < MAX_ATTEMPTS {
@@ -139,7 +139,7 @@ fn recover(catalogue: &Catalogue) -> Result<(), CatalogueError> {
 }
 
 /// The oldest job that waits is running now.
-fn claim(catalogue: &Catalogue) -> Result<Option<Arc<Job>>, CatalogueError> {
+pub(super) fn claim(catalogue: &Catalogue) -> Result<Option<Arc<Job>>, CatalogueError> {
     let Some(job) = catalogue.first_job(&JobState::Queued) else { return Ok(None) };
     let is_queued = |job: &Job| job.state == JobState::Queued;
     let job = catalogue
@@ -149,7 +149,7 @@ fn claim(catalogue: &Catalogue) -> Result<Option<Arc<Job>>, CatalogueError> {
 }
 
 /// Back into the queue, as if it had not been begun.
-fn put_back(catalogue: &Catalogue, id: u64) -> Result<(), CatalogueError> {
+pub(super) fn put_back(catalogue: &Catalogue, id: u64) -> Result<(), CatalogueError> {
     let is_running = |job: &Job| job.state == JobState::Running;
     catalogue.change_job(id, Vec::new(), |job| {
         is_running(job).then(|| (JobState::Queued, job.attempts.saturating_sub(1)))
@@ -158,13 +158,18 @@ fn put_back(catalogue: &Catalogue, id: u64) -> Result<(), CatalogueError> {
 }
 
 /// The end of a job, unless it was cancelled meanwhile.
-fn finish(catalogue: &Catalogue, id: u64, state: &JobState, bodies: Vec<Body>) -> Result<Arc<Job>, CatalogueError> {
+pub(super) fn finish(
+    catalogue: &Catalogue,
+    id: u64,
+    state: &JobState,
+    bodies: Vec<Body>,
+) -> Result<Arc<Job>, CatalogueError> {
     let is_running = |job: &Job| job.state == JobState::Running;
     catalogue.change_job(id, bodies, |job| is_running(job).then(|| (state.clone(), job.attempts)))
 }
 
 /// The state that a fit leaves its job in, and the bodies to be stored.
-fn ended(fitted: Fitted) -> (JobState, Vec<Body>) {
+pub(super) fn ended(fitted: Fitted) -> (JobState, Vec<Body>) {
     match fitted {
         Ok(Ok((outcome, bodies))) => (JobState::Succeeded(outcome), bodies),
         Ok(Err(why)) => (JobState::Failed(why), Vec::new()),

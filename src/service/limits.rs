@@ -52,7 +52,7 @@ pub const MUTE_PATIENCE_CROWDED: Duration = Duration::from_secs(1);
 pub const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
 /// Most points of one fit job, counting those of a mesh file.
-pub const MAX_FIT_POINTS: usize = 4 << 20;
+pub const MAX_FIT_POINTS: usize = 2 << 20;
 
 /// Longest mesh file of a fit job, in bytes.
 pub const MAX_MESH_BYTES: usize = 128 << 20;

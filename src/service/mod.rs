@@ -20,5 +20,7 @@ mod scenes;
 mod server;
 mod wire;
 
+#[cfg(feature = "fit")]
+pub use fits::{SubmitError, Submitted, submit};
 pub use push::{PushError, Pushed, push};
 pub use server::{ServeError, ServeOptions, Server, serve};

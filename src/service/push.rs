@@ -149,7 +149,7 @@ fn read(file: &Path) -> Result<String, PushError> {
     }
 }
 
-async fn connect(url: &str, patience: Duration) -> Result<Channel, PushError> {
+pub(super) async fn connect(url: &str, patience: Duration) -> Result<Channel, PushError> {
     let unusable = |why: String| PushError::Url { url: url.into(), why };
     let endpoint = Endpoint::from_shared(url.to_owned()).map_err(|error| unusable(error.to_string()))?;
     if endpoint.uri().scheme_str() != Some("http") {

@@ -1,5 +1,7 @@
 //! The catalogue on a disk that fails, fills up, or holds something else.
 
+mod jobs;
+
 use std::io::{self, ErrorKind};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};

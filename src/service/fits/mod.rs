@@ -1,7 +1,10 @@
 //! FitService.
 
+mod submit;
 mod upload;
 mod wire;
+
+pub use submit::{SubmitError, Submitted, submit};
 
 use std::sync::Arc;
 

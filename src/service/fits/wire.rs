@@ -61,6 +61,13 @@ pub(super) fn order(header: FitHeader) -> Result<(String, FitOrder, Option<&'sta
     Ok((header.request_id, order, name_of(&FORMATS, format)))
 }
 
+/// The header of an order for points that are sent in metres.
+pub(super) fn header(order: &FitOrder) -> FitHeader {
+    let FitOrder { name, input, .. } = order.clone();
+    let mesh_format = MeshFormat::Unspecified.into();
+    FitHeader { name, request_id: String::new(), input, mesh_format, options: Some(options(order)) }
+}
+
 pub(super) fn job(job: &Job, progress: Option<Progress>) -> FitJob {
     let Job { id, request_id, order, points, attempts, state, .. } = job;
     let (state, failure, result) = match state {

@@ -1,0 +1,122 @@
+//! The worker's decisions, one by one.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use tokio::task::spawn_blocking;
+
+use super::Jobs;
+use super::worker::{claim, ended, finish, put_back, recover};
+use crate::polynomial::tests::Seeded;
+use crate::store::{Catalogue, FitOrder, JobState, NewJob, Store};
+
+fn order(degree: usize) -> FitOrder {
+    FitOrder {
+        name: "it".into(),
+        input: String::new(),
+        degree: Some(degree),
+        objective: "logdet-p".into(),
+        refine: false,
+        slabs: 0,
+        ladder: false,
+        max_gap_m: None,
+        trim: 0.0,
+        min_thickness_m: None,
+        scale: 1.0,
+    }
+}
+
+/// A catalogue with one job that was claimed, and where it lies.
+fn claimed() -> (tempfile::TempDir, Catalogue, u64) {
+    let dir = tempfile::tempdir().expect("a directory");
+    let catalogue = Catalogue::load(Store::open(dir.path()).expect("a new catalogue")).expect("loads");
+    let mut random = Seeded(5);
+    let points: Vec<_> = (0..40).map(|_| Vector3::from_fn(|_, _| random.signed())).collect();
+    catalogue.create_job(NewJob::new(String::new(), order(4), &points)).expect("queued");
+    let job = claim(&catalogue).expect("the disk works").expect("a job");
+    assert_eq!((&job.state, job.attempts), (&JobState::Running, 1));
+    assert!(claim(&catalogue).expect("the disk works").is_none(), "one job is claimed once");
+    (dir, catalogue, job.id)
+}
+
+/// The stop comes when the board does not know the job yet, so nobody tells the fit; its points are gone all the same.
+#[test]
+fn a_job_that_is_cancelled_before_it_is_on_the_board_makes_nothing() {
+    let (_dir, catalogue, id) = claimed();
+    let (jobs, job) = (Jobs::default(), catalogue.job(id).expect("there"));
+    assert_eq!(jobs.cancel(&catalogue, id).expect("cancelled").state, JobState::Cancelled);
+    jobs.tell(|board| board.begin(id));
+    jobs.fit(&catalogue, &job).expect_err("nothing to fit");
+    let state = finish(&catalogue, id, &JobState::Failed("why".into()), Vec::new()).expect("as it is").state.clone();
+    assert_eq!(state, JobState::Cancelled);
+}
+
+/// The result comes after the cancel was acknowledged.
+#[test]
+fn a_result_that_comes_too_late_is_dropped_with_its_bodies() {
+    let (_dir, catalogue, id) = claimed();
+    let (jobs, job) = (Jobs::default(), catalogue.job(id).expect("there"));
+    jobs.tell(|board| board.begin(id));
+    let (state, bodies) = ended(Ok(jobs.fit(&catalogue, &job)));
+    assert!(matches!(&state, JobState::Succeeded(outcome) if outcome.bodies.len() == 1), "{state:?}");
+    jobs.cancel(&catalogue, id).expect("cancelled");
+    assert_eq!(finish(&catalogue, id, &state, bodies.clone()).expect("as it is").state, JobState::Cancelled);
+    assert_eq!(catalogue.counts(), (0, 0));
+    // The same without the cancel.
+    let (_dir, catalogue, id) = claimed();
+    assert_eq!(finish(&catalogue, id, &state, bodies).expect("stored").state, state);
+    assert_eq!(catalogue.counts(), (1, 0));
+}
+
+#[test]
+fn a_kill_counts_as_an_attempt_and_an_orderly_stop_does_not() {
+    let (_dir, catalogue, id) = claimed();
+    let now = || catalogue.job(id).map(|job| (job.state.clone(), job.attempts)).expect("there");
+    for _ in 0..5 {
+        put_back(&catalogue, id).expect("back");
+        assert_eq!(now(), (JobState::Queued, 0));
+        recover(&catalogue).expect("nothing to do");
+        assert_eq!(claim(&catalogue).expect("the disk works").expect("the job").attempts, 1);
+    }
+    recover(&catalogue).expect("begun anew");
+    assert_eq!(now(), (JobState::Queued, 1));
+    assert_eq!(claim(&catalogue).expect("the disk works").expect("the job").attempts, 2);
+    recover(&catalogue).expect("given up");
+    assert!(matches!(now(), (JobState::Failed(why), 2) if why.contains("killed 2 times")));
+    recover(&catalogue).expect("nothing to do");
+    assert!(claim(&catalogue).expect("the disk works").is_none());
+}
+
+#[tokio::test]
+async fn a_panic_is_a_failed_job_with_its_message() {
+    let points: Vec<u8> = Vec::new();
+    let defects = [
+        (spawn_blocking(|| panic!("so it {}", "ends")), "so it ends"),
+        (spawn_blocking(|| panic!("plainly")), "plainly"),
+        (spawn_blocking(move || panic!("{}", points[3])), "index out of bounds"),
+    ];
+    for (defect, word) in defects {
+        match ended(defect.await) {
+            (JobState::Failed(why), bodies) => assert!(why.contains(word) && bodies.is_empty(), "{why}"),
+            (state, _) => panic!("{state:?}"),
+        }
+    }
+}
+
+/// The disk fails while a job ends: the worker keeps at it until it works.
+#[tokio::test]
+async fn a_change_is_made_as_soon_as_the_disk_works() {
+    let (_dir, catalogue, _) = claimed();
+    let (jobs, catalogue) = (Jobs::default(), Arc::new(catalogue));
+    let tries = Arc::new(std::sync::atomic::AtomicUsize::new(0));
+    let failing = |until: usize| {
+        let tries = tries.clone();
+        move |_: &Catalogue| {
+            let before = tries.fetch_add(1, std::sync::atomic::Ordering::SeqCst);
+            if before < until { Err(crate::store::CatalogueError::QueueFull) } else { Ok(before) }
+        }
+    };
+    assert_eq!(jobs.insist(&catalogue, failing(1)).await, Some(1));
+    jobs.stop();
+    assert_eq!(jobs.insist(&catalogue, failing(usize::MAX)).await, None, "a stop ends the wait");
+}

@@ -1,0 +1,161 @@
+//! Jobs on disk: what is acknowledged is there, what has ended is forgotten in time, and no id is given twice.
+
+use nalgebra::Vector3;
+
+use super::{Disk, ball};
+use crate::store::rows::{JOBS, POINTS};
+use crate::store::{
+    Catalogue, CatalogueError, FitOrder, FitOutcome, Job, JobState, MAX_ENDED_JOBS, MAX_QUEUED_JOBS, NewJob, StoreError,
+};
+
+fn order(name: &str) -> FitOrder {
+    FitOrder {
+        name: name.into(),
+        input: String::new(),
+        degree: Some(4),
+        objective: "logdet-p".into(),
+        refine: false,
+        slabs: 0,
+        ladder: false,
+        max_gap_m: Some(0.1 + 0.2),
+        trim: 1.0 / 3.0,
+        min_thickness_m: None,
+        scale: 1e-3,
+    }
+}
+
+/// Coordinates that use all their bits, and the special ones.
+fn points() -> Vec<Vector3<f64>> {
+    vec![Vector3::new(0.1, -0.0, f64::MIN_POSITIVE / 3.0), Vector3::new(1.0 / 3.0, f64::MAX, -1e-300)]
+}
+
+fn job(request_id: &str) -> NewJob {
+    NewJob::new(request_id.into(), order("it"), &points())
+}
+
+fn done() -> JobState {
+    JobState::Succeeded(FitOutcome { bodies: Vec::new(), left_out: 2, left_out_m: 0.1 })
+}
+
+fn end(catalogue: &Catalogue, id: u64, state: &JobState) -> Result<std::sync::Arc<Job>, CatalogueError> {
+    catalogue.change_job(id, vec![ball(3.0)], |job| (!job.state.is_final()).then(|| (state.clone(), job.attempts)))
+}
+
+#[test]
+fn every_acknowledged_state_is_on_disk() {
+    let disk = Disk::default();
+    let catalogue = disk.load().expect("a new catalogue");
+    let (made, created) = catalogue.create_job(job("r")).expect("queued");
+    assert!(created && made.state == JobState::Queued && made.points == 2);
+    let saved = |wanted: &Job| {
+        let copy = Disk::default();
+        copy.bytes.lock().expect("sound").clone_from(&disk.bytes.lock().expect("sound"));
+        let again = copy.load().expect("loads");
+        assert_eq!(*again.job(wanted.id).expect("there"), *wanted);
+        again
+    };
+    let bits = |points: &[Vector3<f64>]| points.iter().flatten().map(|v| v.to_bits()).collect::<Vec<_>>();
+    let again = saved(&made);
+    assert_eq!(bits(&again.job_points(made.id).expect("kept")), bits(&points()));
+    let (known, created) = again.create_job(job("r")).expect("known");
+    assert!(!created && known == made);
+
+    let running = catalogue.change_job(made.id, Vec::new(), |_| Some((JobState::Running, 1))).expect("moved on");
+    assert_eq!((running.attempts, &running.state), (1, &JobState::Running));
+    saved(&running);
+    let ended = end(&catalogue, made.id, &done()).expect("ended");
+    let again = saved(&ended);
+    assert!(again.body(ball(3.0).id()).is_some(), "the body came with the state");
+    assert!(matches!(again.job_points(made.id), Err(CatalogueError::NoJob(_))), "the points went with it");
+    // What has ended is not changed any more when its caller looks at it.
+    assert_eq!(end(&catalogue, made.id, &JobState::Cancelled).expect("as it is"), ended);
+}
+
+#[test]
+fn a_full_disk_leaves_jobs_as_they_were() {
+    let disk = Disk::default();
+    let catalogue = disk.load().expect("a new catalogue");
+    let id = catalogue.create_job(job("")).expect("queued").0.id;
+    disk.set_full(true);
+    let failed = end(&catalogue, id, &done()).expect_err("full");
+    assert!(matches!(failed, CatalogueError::Store(StoreError::Full { .. })), "{failed}");
+    assert!(catalogue.create_job(job("")).is_err());
+    assert_eq!(catalogue.job(id).expect("there").state, JobState::Queued);
+    assert!(catalogue.body(ball(3.0).id()).is_none(), "half of a change");
+    disk.set_full(false);
+    assert_eq!(catalogue.job_points(id).expect("kept"), points());
+    assert_eq!(end(&catalogue, id, &done()).expect("room again").state, done());
+    assert!(catalogue.body(ball(3.0).id()).is_some());
+    assert_eq!(catalogue.jobs(None, 9).0.len(), 1);
+}
+
+#[test]
+fn a_request_id_is_for_one_content() {
+    let catalogue = Disk::default().load().expect("a new catalogue");
+    let first = catalogue.create_job(job("r")).expect("queued").0;
+    let other_points = NewJob::new("r".into(), order("it"), &points()[1..]);
+    let other_order = NewJob::new("r".into(), order("that"), &points());
+    for other in [other_points, other_order] {
+        match catalogue.create_job(other) {
+            Err(CatalogueError::RequestUsed { request_id, job }) => assert_eq!((&*request_id, job), ("r", first.id)),
+            unexpected => panic!("{unexpected:?}"),
+        }
+    }
+    assert!(catalogue.create_job(job("")).expect("queued").1 && catalogue.create_job(job("")).expect("queued").1);
+}
+
+#[test]
+fn the_queue_is_bounded_and_the_oldest_that_ended_are_forgotten() {
+    let catalogue = Disk::default().load().expect("a new catalogue");
+    for _ in 0..MAX_QUEUED_JOBS {
+        catalogue.create_job(job("")).expect("queued");
+    }
+    assert!(matches!(catalogue.create_job(job("")), Err(CatalogueError::QueueFull)));
+    let known = catalogue.create_job(NewJob::new("r".into(), order("it"), &points()));
+    assert!(matches!(known, Err(CatalogueError::QueueFull)));
+    // The first goes on waiting while others come and go.
+    let mut last = MAX_QUEUED_JOBS as u64;
+    end(&catalogue, 2, &JobState::Cancelled).expect("cancelled");
+    for _ in 0..MAX_ENDED_JOBS {
+        let id = catalogue.create_job(job("")).expect("queued").0.id;
+        assert_eq!(id, last + 1);
+        last = id;
+        end(&catalogue, id, &JobState::Failed("why".into())).expect("failed");
+    }
+    assert!(catalogue.job(2).is_some());
+    let one_more = catalogue.create_job(job("")).expect("queued").0.id;
+    assert!(catalogue.job(2).is_none(), "forgotten");
+    assert_eq!(catalogue.first_job(&JobState::Queued).expect("the first").id, 1);
+    assert_eq!(catalogue.jobs(Some(last - 1), 9).0.iter().map(|job| job.id).collect::<Vec<_>>(), [last, one_more]);
+}
+
+#[test]
+fn files_of_programs_that_knew_no_jobs_are_read() {
+    let disk = Disk::default();
+    drop(super::furnished(&disk));
+    disk.meddle(|transaction| {
+        transaction.delete_table(JOBS).expect("deleted");
+        transaction.delete_table(POINTS).expect("deleted");
+    });
+    let catalogue = disk.load().expect("loads");
+    assert_eq!((catalogue.counts(), catalogue.jobs(None, 9).0.len()), ((1, 1), 0));
+    assert!(matches!(catalogue.job_points(1), Err(CatalogueError::NoJob(_))));
+    let id = catalogue.create_job(job("")).expect("queued").0.id;
+    assert_eq!(catalogue.job_points(id).expect("kept"), points());
+}
+
+#[test]
+fn damaged_jobs_are_refused_by_name() {
+    for (key, word) in [(1, "fit job 1"), (7, "says that it is 1")] {
+        let disk = Disk::default();
+        disk.load().expect("a new catalogue").create_job(job("")).expect("queued");
+        disk.meddle(|transaction| {
+            let mut table = transaction.open_table(JOBS).expect("a table");
+            let row = table.remove(1).expect("read").expect("a row").value().to_vec();
+            let row = if key == 1 { &row[..row.len() / 2] } else { &row[..] };
+            table.insert(key, row).expect("written");
+        });
+        let error = disk.load().expect_err(word).to_string();
+        assert!(error.contains(word) && error.contains("damaged"), "{error}");
+    }
+}
