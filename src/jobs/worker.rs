@@ -32,6 +32,7 @@ impl Jobs {
         };
         let Some(catalogue) = catalogue else { return };
         self.insist(&catalogue, recover).await;
+        self.tell(|_| {});
         while !news.borrow_and_update().is_stopping() {
             match self.insist(&catalogue, claim).await.flatten() {
                 Some(job) => self.attempt(&catalogue, &job).await,
@@ -57,7 +58,9 @@ impl Jobs {
         };
         match fitted {
             // The fit hears of it, too; whether it ends before the server does is no matter.
-            None => self.once(catalogue, move |catalogue| put_back(catalogue, id)).await,
+            None => {
+                self.insist(catalogue, move |catalogue| put_back(catalogue, id)).await;
+            }
             Some(fitted) => {
                 let (state, bodies) = ended(fitted);
                 let ended =
@@ -100,20 +103,6 @@ impl Jobs {
             if tokio::time::timeout(PAUSE, stopping).await.is_ok() {
                 return None;
             }
-        }
-    }
-
-    /// A change of the catalogue that is given up when it fails.
-    async fn once(
-        &self,
-        catalogue: &Arc<Catalogue>,
-        change: impl FnOnce(&Catalogue) -> Result<(), CatalogueError> + Send + 'static,
-    ) {
-        let catalogue = catalogue.clone();
-        match spawn_blocking(move || change(&catalogue)).await {
-            Ok(Ok(())) => {}
-            Ok(Err(error)) => tracing::error!(%error, "a fit job could not be put back into the queue"),
-            Err(error) => tracing::error!(%error, "a change of a fit job was ended by a defect"),
         }
     }
 }

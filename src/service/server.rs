@@ -144,14 +144,17 @@ impl Server {
         loader.abort();
         set_health(&health, ServingStatus::NotServing).await;
         let _ = draining.send(());
-        #[cfg(feature = "fit")]
-        {
+        let drained = async {
             // The running fit goes back into the queue, and those who watch it are told.
-            jobs.stop();
-            let _ = tokio::time::timeout(DRAIN, worker).await;
-        }
+            #[cfg(feature = "fit")]
+            {
+                jobs.stop();
+                let _ = worker.await;
+            }
+            serving.await
+        };
         // Streams may stay open as long as their clients like; waiting for them ends here.
-        if let Ok(result) = tokio::time::timeout(DRAIN, serving).await {
+        if let Ok(result) = tokio::time::timeout(DRAIN, drained).await {
             result?;
         } else {
             tracing::warn!("some connections were still open after {DRAIN:?} and are cut");

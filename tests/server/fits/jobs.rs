@@ -1,11 +1,13 @@
 //! Queue, request ids, cancelling, pages.
 
-use sublevel::service::proto::{CancelFitRequest, FitState, GetFitRequest, ListBodiesRequest, ListFitsRequest};
+use sublevel::service::proto::create_fit_request::Part;
+use sublevel::service::proto::{
+    CancelFitRequest, FitState, GetFitRequest, ListBodiesRequest, ListFitsRequest, WatchFitRequest,
+};
 use tonic::Code;
 
 use super::{chunk, cloud, header, long, message, quick};
 use crate::harness::{Clients, Running, field, reason};
-use sublevel::service::proto::create_fit_request::Part;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn running_and_queued_jobs_are_cancelled_and_the_next_one_runs() {
@@ -117,7 +119,7 @@ async fn unknown_jobs_are_told_by_name() {
     for (id, code) in [("1", Code::NotFound), ("chair", Code::InvalidArgument), ("", Code::InvalidArgument)] {
         let got = clients.fits.get_fit(GetFitRequest { id: id.into() }).await.expect_err(id);
         let cancelled = clients.fits.cancel_fit(CancelFitRequest { id: id.into() }).await.expect_err(id);
-        let watched = clients.fits.watch_fit(sublevel::service::proto::WatchFitRequest { id: id.into() }).await;
+        let watched = clients.fits.watch_fit(WatchFitRequest { id: id.into() }).await;
         for status in [got, cancelled, watched.expect_err(id)] {
             assert_eq!((status.code(), field(&status).as_str()), (code, "id"), "{}", status.message());
         }

@@ -1,5 +1,6 @@
 //! Fit jobs as their users meet them: uploads, progress, cancelling, restarts, refusals.
 
+mod command;
 mod jobs;
 mod refused;
 mod restarts;

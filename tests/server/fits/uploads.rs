@@ -1,11 +1,13 @@
 //! What is sent comes back as bodies that hold it.
 
+use std::time::Instant;
+
 use nalgebra::Vector3;
 use sublevel::fit;
 use sublevel::service::proto::create_fit_request::Part;
 use sublevel::service::proto::{FitObjective, FitOptions, FitPhase, FitState, MeshFormat};
 
-use super::{chunk, cloud, header, message, next, quick};
+use super::{cloud, header, message, next, quick};
 use crate::harness::{Numbers, Running};
 
 #[tokio::test(flavor = "multi_thread")]
@@ -21,7 +23,7 @@ async fn a_million_points_become_a_body_and_progress_only_grows() {
         .collect();
     let options = FitOptions { degree: 4, trim: 0.0, ..FitOptions::default() };
     let job = clients.queue(header("box", options), &points).await;
-    assert_eq!((job.point_count, job.name.as_str(), job.attempts), (1_000_000, "box", job.attempts.min(1)));
+    assert_eq!((job.point_count, job.name.as_str()), (1_000_000, "box"));
 
     let mut watch = clients.watch(&job.id).await;
     let (mut last, mut order) = (job.clone(), vec![job.state()]);
@@ -42,7 +44,8 @@ async fn a_million_points_become_a_body_and_progress_only_grows() {
     body.prove_contains(&points).expect("every point is inside");
     assert_eq!(body.gap_m(), Some(fitted.gap_m));
     assert!(fitted.mean_gap_m < fitted.gap_m && fitted.duration_s > 0.0);
-    assert!(fitted.optimum.as_ref().is_some_and(|optimum| optimum.optimality_gap.abs() < 1e-4));
+    let optimum = fitted.optimum.as_ref().expect("it is no ball");
+    assert!(optimum.optimality_gap <= 1e-5 * optimum.objective_value.abs().max(1.0), "{optimum:?}");
 }
 
 /// The service and the library give the very same bodies.
@@ -81,7 +84,7 @@ async fn options_mean_what_they_mean_to_the_library() {
     let id = clients.queue(header("it", options), &points).await.id;
     let result = clients.ended(&id).await.result.expect("a ladder");
     assert_eq!((result.bodies.len(), result.left_out_count), (3, 3));
-    assert!(result.bodies.is_sorted_by(|a, b| a.gap_m > b.gap_m) && result.bodies[0].gap_m < 1e-2);
+    assert!(result.bodies.iter().all(|body| body.gap_m > 0.0 && body.gap_m < 1e-3), "{result:?}");
     assert!(result.bodies[0].optimum.is_none() && result.left_out_m < 1e-3, "{result:?}");
 }
 
@@ -122,39 +125,31 @@ async fn what_can_not_be_fitted_fails_by_name() {
     let done = clients.queue(header("sheet", thick), &flat).await.id;
     let job = clients.ended(&failed).await;
     assert_eq!(job.state(), FitState::Failed);
-    assert!(job.failure.contains("plane") && job.result.is_none(), "{}", job.failure);
+    assert!(job.failure.contains("coplanar") && job.result.is_none(), "{}", job.failure);
     let job = clients.ended(&far).await;
     assert!(job.failure.contains("max gap") && job.attempts == 1, "{}", job.failure);
     assert_eq!(clients.ended(&done).await.state(), FitState::Succeeded);
 }
 
-/// A watch that is not read does not pile up what it missed.
+/// A watch that is not read does not pile up what it missed, and who comes late hears at once how far it is.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_slow_watcher_gets_the_latest() {
     let dir = tempfile::tempdir().expect("a directory");
     let server = Running::start(dir.path());
     let mut clients = server.connect().await;
-    let points = cloud(400, 9);
-    let id = clients.queue(header("long", super::long()), &points).await.id;
-    let begun = std::time::Instant::now();
+    let many_steps = FitOptions { degree: 4, refine: true, slabs: 15, ..FitOptions::default() };
+    let begun = Instant::now();
+    let id = clients.queue(header("steps", many_steps), &cloud(400, 9)).await.id;
     let mut slow = clients.watch(&id).await;
     clients.under_way(&id).await;
-    tokio::time::sleep(std::time::Duration::from_secs(2)).await;
-    // Who comes late hears at once how far it is.
     let late = next(&mut clients.watch(&id).await).await.expect("it goes on").expect("a job");
-    let progress = late.progress.expect("it runs");
-    assert!(progress.phase() == FitPhase::Fitting && progress.iterations > 10, "{progress:?}");
-    clients.cancel(&id).await;
-    let (mut count, mut last) = (0, None);
+    assert!(late.progress.is_some_and(|progress| progress.phase() == FitPhase::Fitting && progress.iterations > 0));
+    let ended = clients.ended(&id).await;
+    assert_eq!(ended.state(), FitState::Succeeded, "{}", ended.failure);
+    let (mut count, mut last, elapsed) = (0, None, begun.elapsed().as_secs_f64());
     while let Some(job) = next(&mut slow).await.expect("it goes on") {
-        (count, last) = (count + 1, Some(job.state()));
+        (count, last) = (count + 1, Some(job));
     }
-    assert_eq!(last, Some(FitState::Cancelled));
-    let most = 10.0 * begun.elapsed().as_secs_f64() + 3.0;
-    assert!(
-        f64::from(count) <= most && progress.iterations > 100,
-        "{count} messages, {} iterations",
-        progress.iterations
-    );
-    drop(chunk(&points));
+    assert_eq!(last, Some(ended));
+    assert!(f64::from(count) <= 10.0 * elapsed + 3.0, "{count} messages in {elapsed} s");
 }
