@@ -66,7 +66,7 @@ impl Jobs {
                 let ended =
                     self.insist(catalogue, move |catalogue| finish(catalogue, id, &state, bodies.clone())).await;
                 if let Some(job) = ended {
-                    tracing::info!(id, state = ?job.state, "fit job ended");
+                    tracing::info!(id, state = %job.state, "fit job ended");
                 }
             }
         }
@@ -122,7 +122,7 @@ pub(super) fn recover(catalogue: &Catalogue) -> Result<(), CatalogueError> {
             };
             Some((state, job.attempts))
         })?;
-        tracing::warn!(id = job.id, attempts = job.attempts, state = ?job.state, "a fit job was running when the server was killed");
+        tracing::warn!(id = job.id, attempts = job.attempts, state = %job.state, "a fit job was running when the server was killed");
     }
     Ok(())
 }

@@ -1,5 +1,7 @@
 //! What a fit job is, as it is kept: JSON that any later version can read.
 
+use std::fmt;
+
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -144,5 +146,18 @@ impl JobState {
     /// Whether nothing changes it any more.
     pub fn is_final(&self) -> bool {
         !matches!(self, Self::Queued | Self::Running)
+    }
+}
+
+/// For logs: one line.
+impl fmt::Display for JobState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Queued => f.write_str("queued"),
+            Self::Running => f.write_str("running"),
+            Self::Succeeded(outcome) => write!(f, "succeeded with {} bodies", outcome.bodies.len()),
+            Self::Failed(why) => write!(f, "failed: {why}"),
+            Self::Cancelled => f.write_str("cancelled"),
+        }
     }
 }

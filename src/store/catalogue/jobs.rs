@@ -108,7 +108,7 @@ impl Catalogue {
             state.bodies.extend(fresh.into_iter().map(|body| (*body.id(), body)));
             state.jobs.insert(id, next.clone())
         });
-        tracing::debug!(id, attempts, state = ?next.state, "fit job moved on");
+        tracing::debug!(id, attempts, state = %next.state, "fit job moved on");
         Ok(next)
     }
 }
