@@ -3,7 +3,8 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use sublevel::body::Body;
 use sublevel::service::proto::{
-    self, DistanceResult, EvaluateRequest, LevelDistanceResult, Measure, UpdateSceneRequest, evaluate_result::Outcome,
+    self, Accuracy, DistanceResult, EvaluateRequest, LevelDistanceResult, Measure, UpdateSceneRequest,
+    evaluate_result::Outcome,
 };
 
 use crate::harness::{Clients, Numbers, Running, at, ball, moved, object, pair};
@@ -16,7 +17,7 @@ async fn answers(clients: &mut Clients, b: proto::Pose) -> (DistanceResult, Leve
         pairs: vec![pair("a", "b")],
         measures: measures.map(Into::into).to_vec(),
         pose_overrides: vec![moved("b", b)],
-        ..EvaluateRequest::default()
+        accuracy: Some(Accuracy { distance_relative: Some(1e-12), level_relative: Some(1e-12) }),
     };
     let results = clients.queries.evaluate(request).await.expect("answers").into_inner().results;
     let outcomes: Vec<_> = results.into_iter().map(|result| result.outcome.expect("an outcome")).collect();
