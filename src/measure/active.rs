@@ -5,6 +5,20 @@ pub(super) const MAX_ACTIVE: usize = 3;
 
 /// The active constraints of one body at a witness with their multipliers λ >= 0: the outward normal there is `Σ λ_i ∇g_i`, the
 /// gradients by metres, so the multipliers are in metres.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use sublevel::body::Body;
+/// use sublevel::measure::{Options, Pose, WarmStart, distance};
+///
+/// // |x|²/4 of a ball of radius 2 has a gradient of length 1 at its surface.
+/// let ball = Body::ball("ball", Vector3::zeros(), 2.0)?;
+/// let apart = Pose::from_quaternion(Vector3::new(5.0, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0])?;
+/// let answer = distance(&ball, &Pose::identity(), &ball, &apart, &Options::default(), &mut WarmStart::default());
+/// let active: Vec<(usize, f64)> = answer.active_a.iter().collect();
+/// assert!(active.len() == 1 && active[0].0 == 0 && (active[0].1 - 1.0).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ActiveConstraints {
     index: [u8; MAX_ACTIVE],

@@ -75,7 +75,8 @@ pub fn overlap(
     decide(&union::distance(a, pose_a, b, pose_b, &Goal::compare(0.0), options, warm), 0.0)
 }
 
-/// Whether the distance of two solids is below `threshold` metres.
+/// Whether the distance of two solids is below `threshold` metres: the search ends as soon as its bracket decides. `warm` as in
+/// [`super::distance`].
 ///
 /// # Errors
 /// A threshold that is negative or not finite.
@@ -108,7 +109,7 @@ pub fn nearer_than(
 }
 
 /// The distance of two solids, as accurate as [`super::distance`] gives it, unless it is proven to exceed `margin` metres:
-/// then it is not worked out.
+/// then it is not worked out. `warm` as in [`super::distance`].
 ///
 /// # Errors
 /// A margin that is negative or not finite.

@@ -1,14 +1,11 @@
-//! Measures between two posed bodies: Euclidean, signed, level and growth distance and penetration depth, each inside a
-//! proven bracket.
+#![doc = include_str!("textbook.md")]
 //!
-//! Every measure but the depth, which is the least of many convex programs, is one convex program. A warm start is
-//! corrected by Newton's method on the optimality system of its active constraints (`newton`); where that does not apply or
-//! does not converge, an interior-point method ([`crate::optimize`]) does, from a start that is always feasible. Neither is
-//! trusted: an answer is accepted when its bracket, which holds for any trial point (`bracket`), is narrow enough. This room
-//! knows neither clock nor allocator nor threads.
+//! # Inside
 //!
-//! Solids of several parts, compounds, are measured by pairs of parts (`union`). Where another pair may be as near, answers
-//! are marked as `tied`: their normals and gradients may jump.
+//! A warm start is corrected by Newton's method on the optimality system of its active constraints (`newton`, and `smooth` where one
+//! constraint of each body is active); where that does not apply or does not converge, an interior-point method
+//! ([`crate::optimize`]) does. Neither is trusted: an answer is accepted when its bracket (`bracket`) is narrow enough. Unions are
+//! in `union`. This room knows neither clock nor allocator nor threads.
 
 mod active;
 mod batch;

@@ -14,7 +14,19 @@ const NORMALISED: f64 = 2.0 * f64::EPSILON;
 /// the 3 u of computing it, hence 14 u of the matrix, and each entry costs 8 u more: below 30 u in operator norm.
 pub(super) const ROTATION_ERROR: f64 = 16.0 * f64::EPSILON;
 
-/// A rigid motion `x_world = R x_body + t`, lengths in metres.
+/// A rigid motion `x_world = R x_body + t`, lengths in metres; R is the rotation of the stored quaternion normalised exactly.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use sublevel::measure::Pose;
+///
+/// // A quarter turn about z, then one metre along x.
+/// let half = std::f64::consts::FRAC_1_SQRT_2;
+/// let pose = Pose::from_quaternion(Vector3::x(), [0.0, 0.0, half, half])?;
+/// assert!((pose.transform_point(&Vector3::x()) - Vector3::new(1.0, 1.0, 0.0)).norm() < 1e-15);
+/// assert!(Pose::from_quaternion(Vector3::x(), [0.0, 0.0, 0.0, 2.0]).is_err());
+/// # Ok::<(), sublevel::measure::PoseError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     rotation: UnitQuaternion<f64>,

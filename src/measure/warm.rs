@@ -8,10 +8,27 @@ use nalgebra::Vector3;
 /// Constraints of one body that hold with equality, as a bit set.
 pub(super) type ActiveSet = u16;
 
-/// A caller-owned hint from an earlier answer; [`WarmStart::default`] is a cold start.
+/// A caller-owned hint from an earlier answer, for the next query of the same pair and measure in the same order;
+/// [`WarmStart::default`] is a cold start.
 ///
 /// It may change the time a query takes, never its answer beyond the bracket: a hint of another pair, of a pose far away,
-/// or of nonsense is found out by the bracket and the solve starts cold.
+/// or of nonsense is found out by the bracket and the solve starts cold. Copying it forks a trajectory.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use sublevel::body::Body;
+/// use sublevel::measure::{Options, Pose, WarmStart, distance};
+///
+/// let egg = Body::ellipsoid("egg", Vector3::zeros(), Vector3::new(1.0, 1.0, 2.0))?;
+/// let mut warm = WarmStart::default();
+/// for step in 0..10 {
+///     let x = 5.0 - 0.1 * f64::from(step);
+///     let pose = Pose::from_quaternion(Vector3::new(x, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0])?;
+///     let answer = distance(&egg, &Pose::identity(), &egg, &pose, &Options::default(), &mut warm);
+///     assert!((answer.value() - (x - 2.0)).abs() < 1e-8);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WarmStart {
     pub(super) hint: Hint,

@@ -125,7 +125,7 @@ fn one(a: &Placed, b: &Placed, measure: Measure, accuracy: Accuracy) -> Option<O
         Measure::Distance => {
             let warm = &mut WarmStart::default();
             let found = measure::distance(&*a.body, &a.pose, &*b.body, &b.pose, &accuracy.distance, warm);
-            Some(Outcome::Distance(wire::distance(&found)))
+            Some(Outcome::Distance(wire::distance(&found, (&a.body, &a.pose), (&b.body, &b.pose))))
         }
         Measure::LevelDistanceAOnB => Some(Outcome::LevelDistanceAOnB(level(a, b))),
         Measure::LevelDistanceBOnA => Some(Outcome::LevelDistanceBOnA(level(b, a))),

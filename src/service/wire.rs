@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use crate::body::{Body, BodyId};
-use crate::measure::{Distance, LevelDistance, Options, Pose, PoseError, Status};
+use crate::measure::{Distance, LevelDistance, Options, Pose, PoseError, Status, Twist};
 use crate::scene::{Placement, Scene, Update, check_name};
 
 use super::error::Invalid;
@@ -176,7 +176,15 @@ pub(super) fn scene(scene: &Scene) -> proto::Scene {
     }
 }
 
-pub(super) fn distance(found: &Distance) -> proto::DistanceResult {
+/// A distance with what follows from it for the bodies as they stand.
+pub(super) fn distance(
+    found: &Distance,
+    (a, pose_a): (&Body, &Pose),
+    (b, pose_b): (&Body, &Pose),
+) -> proto::DistanceResult {
+    let [gradient_a, gradient_b] =
+        found.gradients(pose_a, pose_b).map_or([None; 2], |both| both.map(|twist| Some(gradient(&twist))));
+    let [part_a, part_b] = found.parts.map(u32::from);
     proto::DistanceResult {
         status: status(found.status, found.lower, found.upper).into(),
         value_m: found.value(),
@@ -186,6 +194,12 @@ pub(super) fn distance(found: &Distance) -> proto::DistanceResult {
         witness_b_m: Some(vector(&found.witness_b)),
         normal: found.normal.as_ref().map(vector),
         iterations: found.iterations,
+        hulls_upper_m: found.hulls_upper(a, b),
+        gradient_a,
+        gradient_b,
+        tied: found.tied,
+        part_a,
+        part_b,
     }
 }
 
@@ -197,6 +211,11 @@ pub(super) fn level_distance(found: &LevelDistance) -> proto::LevelDistanceResul
         upper: found.upper,
         witness_m: Some(vector(&found.witness)),
         iterations: found.iterations,
+        multiplier: found.multiplier,
+        saturated: found.saturated,
+        gradient_p: Some(gradient(&found.gradient_a)),
+        gradient_q: Some(gradient(&found.gradient_b)),
+        tied: found.tied,
     }
 }
 
@@ -220,6 +239,10 @@ fn vector(v: &Vector3<f64>) -> proto::Vector3 {
     proto::Vector3 { x: v.x, y: v.y, z: v.z }
 }
 
+fn gradient(twist: &Twist) -> proto::PoseGradient {
+    proto::PoseGradient { linear: Some(vector(&twist.linear)), angular: Some(vector(&twist.angular)) }
+}
+
 pub(super) fn count(count: usize) -> u32 {
     u32::try_from(count).unwrap_or(u32::MAX)
 }
@@ -227,7 +250,6 @@ pub(super) fn count(count: usize) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::Twist;
 
     #[test]
     fn a_bracket_without_an_end_has_not_converged() {

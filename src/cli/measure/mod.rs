@@ -71,7 +71,7 @@ struct Line {
 }
 
 impl Line {
-    fn new(distance: &Distance, ab: &LevelDistance, ba: &LevelDistance, gaps: Option<f64>) -> Self {
+    fn new(distance: &Distance, ab: &LevelDistance, ba: &LevelDistance, hulls_upper: Option<f64>) -> Self {
         let converged = [distance.status, ab.status, ba.status].iter().all(|&status| status == Status::Converged);
         let finite = |value: f64| value.is_finite().then_some(value);
         Self {
@@ -79,7 +79,7 @@ impl Line {
             distance_m: distance.value(),
             distance_lower_m: distance.lower,
             distance_upper_m: distance.upper,
-            hulls_distance_upper_m: gaps.map(|gaps| (distance.upper + gaps).next_up()),
+            hulls_distance_upper_m: hulls_upper,
             level_ab: ab.value(),
             level_ab_lower: finite(ab.lower),
             level_ab_upper: ab.upper,
@@ -102,11 +102,6 @@ struct Query {
 }
 
 impl Query {
-    /// How far both bodies together reach beyond the convex hulls of their objects, metres.
-    fn gaps(&self) -> Option<f64> {
-        Some((self.a.gap_m()? + self.b.gap_m()?).next_up())
-    }
-
     fn distance(&self, pose: &Pose, warm: &mut WarmStart) -> Distance {
         distance(&self.a, &Pose::identity(), &self.b, pose, &self.options, warm)
     }
@@ -150,7 +145,7 @@ pub(super) fn run(args: &MeasureArgs) -> Result<(), Box<dyn Error>> {
         for pose in trajectory {
             let distance = query.distance(pose, &mut warm[0]);
             let (ab, ba) = (query.level_ab(pose, &mut warm[1]), query.level_ba(pose, &mut warm[2]));
-            let line = Line::new(&distance, &ab, &ba, query.gaps());
+            let line = Line::new(&distance, &ab, &ba, distance.hulls_upper(&query.a, &query.b));
             if args.json {
                 serde_json::to_writer(&mut out, &line)?;
                 writeln!(out)?;

@@ -74,6 +74,28 @@ impl Distance {
         0.5 * (self.lower + self.upper)
     }
 
+    /// Upper bound of the distance of the convex hulls of the objects that the bodies `a` and `b` of this answer were fitted to,
+    /// metres: the bodies contain them, so that `lower` is a bound of their distance as well, and reach at most their gaps
+    /// ([`Body::gap_m`]) beyond. None where a gap is not known. Of solids with several parts, each the hull of its own piece.
+    ///
+    /// ```
+    /// use nalgebra::Vector3;
+    /// use sublevel::body::Body;
+    /// use sublevel::measure::{Options, Pose, WarmStart, distance};
+    ///
+    /// let ball = Body::ball("ball", Vector3::zeros(), 1.0)?.with_gap(0.25);
+    /// let apart = Pose::from_quaternion(Vector3::new(3.0, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0])?;
+    /// let origin = Pose::identity();
+    /// let answer = distance(&ball, &origin, &ball, &apart, &Options::default(), &mut WarmStart::default());
+    /// assert!((answer.hulls_upper(&ball, &ball).expect("both gaps are known") - 1.5).abs() < 1e-8);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn hulls_upper(&self, a: &impl Solid, b: &impl Solid) -> Option<f64> {
+        let gap = |solid: &[Body], part: u16| solid.get(usize::from(part))?.gap_m();
+        let gaps = (gap(a.parts(), self.parts[0])? + gap(b.parts(), self.parts[1])?).next_up();
+        Some((self.upper + gaps).next_up())
+    }
+
     /// Derivatives with respect to the twists of the first and of the second body at the poses the distance was asked for
     /// (envelope theorem: the witnesses count as fixed to their bodies). None unless the bodies are proven apart: at contact
     /// the distance has no gradient, which is what [`super::signed_distance`] is for.

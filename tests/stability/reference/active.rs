@@ -11,17 +11,18 @@ pub(crate) struct Trial {
     pub(crate) multiplier: Vec<f64>,
 }
 
-/// Values this close to the level may stand for equality.
-const NEAR: f64 = 0.05;
+/// How close to the level values may stand for equality: at first, and where that leads nowhere. The witness on a needle's face may be
+/// far from the edge that it belongs to, as measured by the thickness, where the edge counts for little.
+pub(crate) const CLOSE: [f64; 2] = [0.05, f64::INFINITY];
 
 /// Most constraints looked at.
 const MOST: usize = 5;
 
-/// Constraints of the body whose value at v is near `level` or above it, largest first, with their gradients.
-pub(crate) fn near(body: &Solid<'_>, v: &Vector, level: f64) -> Vec<(usize, Vector3<f64>)> {
+/// Constraints of the body whose value at v is that close to `level` or above it, largest first, with their gradients.
+pub(crate) fn near(body: &Solid<'_>, v: &Vector, level: f64, close: f64) -> Vec<(usize, Vector3<f64>)> {
     let mut all: Vec<_> = (0..body.len()).map(|i| (i, double(&body.value(i, v)))).collect();
     all.sort_by(|p, q| q.1.total_cmp(&p.1));
-    let least = (level - NEAR * level.abs().max(1.0)).min(all[0].1);
+    let least = (level - close * level.abs().max(1.0)).min(all[0].1);
     all.truncate(MOST);
     all.retain(|(_, value)| *value >= least);
     all.into_iter().map(|(i, _)| (i, doubles(&body.jet(i, v).gradient))).collect()
@@ -43,9 +44,9 @@ pub(crate) fn fit(columns: &[DVector<f64>], target: &DVector<f64>) -> (Vec<f64>,
 }
 
 /// Trial sets for `Σ λ ∇g = target`, the best fit first and small sets before large ones.
-pub(crate) fn for_direction(body: &Solid<'_>, v: &Vector, target: &Vector3<f64>) -> Vec<Trial> {
+pub(crate) fn for_direction(body: &Solid<'_>, v: &Vector, target: &Vector3<f64>, close: f64) -> Vec<Trial> {
     let target = DVector::from_column_slice(target.as_slice());
-    let mut trials: Vec<_> = subsets(&near(body, v, 1.0))
+    let mut trials: Vec<_> = subsets(&near(body, v, 1.0, close))
         .into_iter()
         .map(|set| {
             let columns: Vec<_> = set.iter().map(|(_, g)| DVector::from_column_slice(g.as_slice())).collect();

@@ -1,7 +1,8 @@
 //! The distance of two bodies with 200 bits.
 
-use super::active::{Trial, for_direction};
+use super::active::{CLOSE, Trial, for_direction};
 use super::big::{Big, Vector, add, big, cross, dot, double, doubles, norm, scaled, solve, sub, vector};
+use super::dual::Dual;
 use super::solid::{Jet, Solid};
 use nalgebra::Vector3;
 use sublevel::body::Body;
@@ -19,6 +20,8 @@ pub(crate) struct Truth {
     pub(crate) normal: Vector,
     /// Derivative with respect to the twists `(v_a, ω_a, v_b, ω_b)` of the bodies, each about its own translation.
     pub(crate) gradient: [f64; 12],
+    /// What proves `lower`, with `normal`; none if nothing but 0 was proven.
+    pub(crate) dual: Option<Dual>,
 }
 
 impl Truth {
@@ -53,6 +56,8 @@ struct Best {
     x: Vector,
     y: Vector,
     n: Vector,
+    unit: f64,
+    dual: Option<Dual>,
 }
 
 /// Bracket at which an iterate is taken, in units of the larger body.
@@ -66,8 +71,8 @@ pub(crate) fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer:
     let (one, two) = (Solid::new(a, pose_a, origin, unit), Solid::new(b, pose_b, origin, unit));
     let local = |w: &Vector3<f64>| scaled(&sub(&vector(w), &vector(origin)), &(big(1.0) / big(unit)));
     let (x, y) = (local(&answer.witness_a), local(&answer.witness_b));
-    let mut best =
-        Best { lower: big(0.0), upper: norm(&sub(&one.interior, &two.interior)), x, y, n: vector(&Vector3::x()) };
+    let upper = norm(&sub(&one.interior, &two.interior));
+    let mut best = Best { lower: big(0.0), upper, x, y, n: vector(&Vector3::x()), unit, dual: None };
     let (x, y) = (best.x.clone(), best.y.clone());
     raise(&one, &two, &x, &y, &mut best);
     let small = a.circumscribed().radius.min(b.circumscribed().radius) / unit;
@@ -80,9 +85,15 @@ pub(crate) fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer:
         let (g, h) = (steepest(&one, &x), steepest(&two, &y));
         (h.normalize() - g.normalize()).try_normalize(1e-300).unwrap_or_else(Vector3::x)
     });
+    let scale = big(unit);
     let done = |best: &Best| &best.upper - &best.lower <= big(TARGET);
-    if !done(&best) {
-        let (of_a, of_b) = (for_direction(&one, &x, &-normal), for_direction(&two, &y, &normal));
+    // As much as is asked: the bracket of the answer holds all that the distance may be.
+    let decided = |best: &Best| big(answer.lower) <= &best.lower * &scale && &best.upper * &scale <= big(answer.upper);
+    for (pass, close) in CLOSE.into_iter().enumerate() {
+        if done(&best) || pass > 0 && decided(&best) {
+            break;
+        }
+        let (of_a, of_b) = (for_direction(&one, &x, &-normal, close), for_direction(&two, &y, &normal, close));
         'search: for rank in 0..of_a.len() + of_b.len() {
             for (i, j) in (0..=rank).map(|i| (i, rank - i)) {
                 if let (Some(p), Some(q)) = (of_a.get(i), of_b.get(j)) {
@@ -94,7 +105,6 @@ pub(crate) fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer:
             }
         }
     }
-    let scale = big(unit);
     let (x, y) = (scaled(&best.x, &scale), scaled(&best.y, &scale));
     Truth {
         lower: best.lower * &scale,
@@ -103,6 +113,7 @@ pub(crate) fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer:
         x,
         y,
         normal: best.n,
+        dual: best.dual,
     }
 }
 
@@ -266,6 +277,7 @@ fn bracket(
     if lower > best.lower {
         best.lower = lower;
         best.n = n.clone();
+        best.dual = Some(Dual::new((x, y), (p, l), (q, m), best.unit, true));
     } else if best.upper <= big(1e-30) {
         best.n = n.clone();
     }

@@ -1,7 +1,8 @@
 //! The growth distance of two bodies with 200 bits: the smallest s at which the bodies, grown by s about their centres, touch.
 
-use super::active::{Trial, for_direction};
+use super::active::{CLOSE, Trial, for_direction};
 use super::big::{Big, Vector, add, big, cross, dot, double, norm, scaled, solve, sub, vector};
+use super::dual::Dual;
 use super::solid::{Jet, Solid};
 use nalgebra::Vector3;
 use sublevel::body::Body;
@@ -14,6 +15,10 @@ pub(crate) struct Truth {
     pub(crate) upper: Big,
     /// Derivative with respect to the twists `(v_a, ω_a, v_b, ω_b)` of the bodies, each about its own translation.
     pub(crate) gradient: [f64; 12],
+    /// The point of contact, metres, relative to the translation of the first body.
+    pub(crate) contact: Vector,
+    /// What proves `lower`, up to a common factor of all multipliers.
+    pub(crate) dual: Dual,
 }
 
 impl Truth {
@@ -52,6 +57,8 @@ struct Best {
     /// `Σ λ ∇g` with `r·Δ = 1`, and the point of contact.
     r: Vector,
     x: Vector,
+    unit: f64,
+    dual: Option<Dual>,
 }
 
 impl Best {
@@ -84,14 +91,17 @@ pub(crate) fn growth_distance(a: Centred<'_>, b: Centred<'_>, start: &Start) -> 
     let along = double(&dot(&vector(&against), &problem.delta));
     let target = against / along;
     let zero: Vector = std::array::from_fn(|_| big(0.0));
-    let mut best = Best { lower: None, upper: None, r: zero.clone(), x: zero };
-    let (of_a, of_b) = (for_direction(&problem.one, &u, &target), for_direction(&problem.two, &w, &-target));
-    'search: for rank in 0..of_a.len() + of_b.len() {
-        for (i, j) in (0..=rank).map(|i| (i, rank - i)) {
-            if let (Some(p), Some(q)) = (of_a.get(i), of_b.get(j)) {
-                problem.newton(p, q, (&u, &w, &s), &mut best);
-                if best.width().is_some_and(|width| width <= big(TARGET)) {
-                    break 'search;
+    let mut best = Best { lower: None, upper: None, r: zero.clone(), x: zero, unit, dual: None };
+    'search: for close in CLOSE {
+        let (of_a, of_b) =
+            (for_direction(&problem.one, &u, &target, close), for_direction(&problem.two, &w, &-target, close));
+        for rank in 0..of_a.len() + of_b.len() {
+            for (i, j) in (0..=rank).map(|i| (i, rank - i)) {
+                if let (Some(p), Some(q)) = (of_a.get(i), of_b.get(j)) {
+                    problem.newton(p, q, (&u, &w, &s), &mut best);
+                    if best.width().is_some_and(|width| width <= big(TARGET)) {
+                        break 'search;
+                    }
                 }
             }
         }
@@ -104,7 +114,8 @@ pub(crate) fn growth_distance(a: Centred<'_>, b: Centred<'_>, start: &Start) -> 
     let arm = sub(&x, &sub(&vector(b.1.translation()), &vector(origin)));
     let minus = |v: Vector| -> Vector { v.map(|c| -c) };
     let parts = [minus(r.clone()), minus(cross(&x, &r)), r.clone(), cross(&arm, &r)];
-    Some(Truth { lower, upper, gradient: std::array::from_fn(|i| double(&parts[i / 3][i % 3])) })
+    let gradient = std::array::from_fn(|i| double(&parts[i / 3][i % 3]));
+    Some(Truth { lower, upper, gradient, contact: x, dual: best.dual? })
 }
 
 impl Problem<'_> {
@@ -200,6 +211,7 @@ impl Problem<'_> {
             let lower = dot(&r, &self.delta) / supports;
             if best.lower.as_ref().is_none_or(|old| lower > *old) {
                 (best.lower, best.r) = (Some(lower), r);
+                best.dual = Some(Dual::new((u, w), (p, l), (q, m), best.unit, false));
             }
         }
         let x = add(&self.c1, &scaled(&sub(u, &self.c1), s));

@@ -1,7 +1,8 @@
 //! The level distance of two bodies with 200 bits.
 
-use super::active::{Trial, fit, near, subsets};
+use super::active::{CLOSE, Trial, fit, near, subsets};
 use super::big::{Big, Vector, add, big, cross, double, norm, scaled, solve, sub, vector};
+use super::dual::Dual;
 use super::solid::Solid;
 use nalgebra::{DVector, Vector3};
 use sublevel::body::Body;
@@ -16,6 +17,8 @@ pub(crate) struct Truth {
     pub(crate) x: Vector,
     /// Derivative with respect to the twists `(v_a, ω_a, v_b, ω_b)` of the bodies, each about its own translation.
     pub(crate) gradient: [f64; 12],
+    /// What proves `lower`.
+    pub(crate) dual: Dual,
 }
 
 impl Truth {
@@ -41,6 +44,8 @@ struct Best {
     x: Vector,
     /// Gradients of A and of B at the minimiser, with their multipliers.
     pull: (Vector, Vector),
+    unit: f64,
+    dual: Option<Dual>,
 }
 
 impl Best {
@@ -53,6 +58,9 @@ impl Best {
 /// Bracket at which an iterate is taken, relative to `max(1, |d|)`.
 const TARGET: f64 = 1e-40;
 
+/// Bracket at which the search ends where the target is out of reach.
+const SHARP: f64 = 1e-13;
+
 /// Solves for `d(A‖B)` from the witness of an answer; proven by its own bracket, as [`super::distance()`].
 pub(crate) fn level_distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer: &LevelDistance) -> Truth {
     let unit = b.circumscribed().radius.log2().round().exp2();
@@ -60,15 +68,20 @@ pub(crate) fn level_distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, a
     let (one, two) = (Solid::new(a, pose_a, origin, unit), Solid::new(b, pose_b, origin, unit));
     let start = scaled(&sub(&vector(&answer.witness), &vector(origin)), &(big(1.0) / big(unit)));
     let none: Vector = std::array::from_fn(|_| big(0.0));
-    let mut best = Best { lower: None, upper: None, x: start.clone(), pull: (none.clone(), none) };
-    let trials = trials(&one, &two, &start);
+    let mut best = Best { lower: None, upper: None, x: start.clone(), pull: (none.clone(), none), unit, dual: None };
     // Between flush faces the system is singular: there a ridge keeps the steps across short.
-    'search: for (ridge, target) in [(0.0, TARGET), (1e-6, 1e-13)] {
-        for (p, q) in &trials {
-            if best.width().is_some_and(|width| width <= big(target)) {
-                break 'search;
+    'search: for close in CLOSE {
+        let trials = trials(&one, &two, &start, close);
+        for (ridge, target) in [(0.0, TARGET), (1e-6, SHARP)] {
+            for (p, q) in &trials {
+                if best.width().is_some_and(|width| width <= big(target)) {
+                    break 'search;
+                }
+                newton(&one, &two, p, q, (&start, ridge), &mut best);
             }
-            newton(&one, &two, p, q, (&start, ridge), &mut best);
+        }
+        if best.width().is_some_and(|width| width <= big(SHARP)) {
+            break;
         }
     }
     let x = scaled(&best.x, &big(unit));
@@ -81,15 +94,16 @@ pub(crate) fn level_distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, a
         upper: best.upper.expect("the interior point proves an upper bound"),
         gradient: std::array::from_fn(|i| -double(&parts[i / 3][i % 3]) / unit),
         x,
+        dual: best.dual.expect("a trial set proves a lower bound"),
     }
 }
 
 /// Pairs of trial sets, the best fit of `Σ ν ∇g + Σ μ ∇h = 0`, `Σ ν = 1` first; B's may be empty.
-fn trials(one: &Solid<'_>, two: &Solid<'_>, v: &Vector) -> Vec<(Trial, Trial)> {
+fn trials(one: &Solid<'_>, two: &Solid<'_>, v: &Vector, close: f64) -> Vec<(Trial, Trial)> {
     let level = double(&one.largest(v));
-    let of_a = subsets(&near(one, v, level));
+    let of_a = subsets(&near(one, v, level, close));
     let mut of_b = vec![vec![]];
-    of_b.extend(subsets(&near(two, v, 1.0)));
+    of_b.extend(subsets(&near(two, v, 1.0, close)));
     let mut pairs = Vec::new();
     for set_a in &of_a {
         let scale = set_a.iter().map(|(_, g)| g.norm()).fold(1e-300, f64::max);
@@ -115,13 +129,17 @@ fn trials(one: &Solid<'_>, two: &Solid<'_>, v: &Vector) -> Vec<(Trial, Trial)> {
 fn newton(one: &Solid<'_>, two: &Solid<'_>, p: &Trial, q: &Trial, (start, ridge): (&Vector, f64), best: &mut Best) {
     let mut x = start.clone();
     let mut nu: Vec<Big> = p.multiplier.iter().map(|&m| big(m)).collect();
-    let mut mu: Vec<Big> = q.multiplier.iter().map(|&m| big(m)).collect();
     let mut s = one.largest(&x);
+    // Far away the values of A are many powers of ten: brought to about 1, or the pivots of the system say nothing of its rank.
+    let scale = big(double(&s).abs().max(1.0).log2().round().exp2());
+    let factor = big(1.0) / &scale;
+    s *= &factor;
+    let mut mu: Vec<Big> = q.multiplier.iter().map(|&m| big(m) * &factor).collect();
     let (la, lb) = (nu.len(), mu.len());
     let size = 4 + la + lb;
     let mut stalled = 0;
     for step in 1..200 {
-        let of_a: Vec<_> = p.index.iter().map(|&i| one.jet(i, &x)).collect();
+        let of_a: Vec<_> = p.index.iter().map(|&i| one.jet(i, &x).times(&factor)).collect();
         let of_b: Vec<_> = q.index.iter().map(|&i| two.jet(i, &x)).collect();
         let mut k = vec![vec![big(0.0); size]; size];
         let mut r = vec![big(0.0); size];
@@ -158,7 +176,8 @@ fn newton(one: &Solid<'_>, two: &Solid<'_>, p: &Trial, q: &Trial, (start, ridge)
         }
         if length < 1e-12 || step % 8 == 0 {
             let before = best.width();
-            bracket(one, two, (p, &nu), (q, &mu), &x, best);
+            let unscaled: Vec<Big> = mu.iter().map(|m| m * &scale).collect();
+            bracket(one, two, (p, &nu), (q, &unscaled), &x, best);
             let width = best.width();
             let better = before.is_none() || width < before;
             stalled = if better || length >= 1e-12 { 0 } else { stalled + 1 };
@@ -197,6 +216,7 @@ fn bracket(
         if best.lower.as_ref().is_none_or(|old| lower > *old) {
             best.lower = Some(lower);
             best.pull = (pull_a, pull_b);
+            best.dual = Some(Dual::new((x, x), (p, nu), (q, mu), best.unit, false));
         }
     }
     if let Some(x) = two.pull_in(x) {

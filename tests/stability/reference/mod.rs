@@ -8,6 +8,7 @@
 mod active;
 pub(crate) mod big;
 pub(crate) mod distance;
+pub(crate) mod dual;
 pub(crate) mod growth;
 pub(crate) mod level;
 pub(crate) mod signed;

@@ -3,9 +3,10 @@
 //! In overlap the shortest way out is the least of many: what an answer's normal leads to is a stationary one, and the
 //! optimality system of the distance with a negative D says which. Whether another way is shorter is not decided here.
 
-use super::active::for_direction;
-use super::big::{Big, big, double, scaled, sub, vector};
+use super::active::{CLOSE, for_direction};
+use super::big::{Big, Vector, big, double, scaled, sub, vector};
 use super::distance::{Iterate, twists};
+use super::dual::Dual;
 use super::solid::Solid;
 use nalgebra::Vector3;
 use sublevel::body::Body;
@@ -18,6 +19,9 @@ pub(crate) struct Truth {
     pub(crate) value: f64,
     /// Derivative with respect to the twists `(v_a, ω_a, v_b, ω_b)` of the bodies, each about its own translation.
     pub(crate) gradient: [f64; 12],
+    /// Unit normal from the second body to the first, and what proves that a plane across it parts the bodies by the value.
+    pub(crate) normal: Vector,
+    pub(crate) dual: Dual,
 }
 
 /// Step at which an iterate is taken, in units of the larger body.
@@ -38,20 +42,24 @@ pub(crate) fn signed_distance(
     let (one, two) = (Solid::new(a, pose_a, origin, unit), Solid::new(b, pose_b, origin, unit));
     let local = |w: &Vector3<f64>| scaled(&sub(&vector(w), &vector(origin)), &(big(1.0) / big(unit)));
     let (x, y, normal) = (local(&answer.witness_a), local(&answer.witness_b), answer.normal?);
-    let (of_a, of_b) = (for_direction(&one, &x, &-normal), for_direction(&two, &y, &normal));
-    for rank in 0..of_a.len() + of_b.len() {
-        for (i, j) in (0..=rank).map(|i| (i, rank - i)) {
-            let (Some(p), Some(q)) = (of_a.get(i), of_b.get(j)) else { continue };
-            let mut iterate = Iterate::new(p, q, &x, &y, &vector(&normal));
-            let settled = (0..100).map(|_| iterate.step(&one, &two, small / unit)).find(|length| !(*length > TARGET));
-            let signs = iterate.l.iter().chain(&iterate.m).all(|multiplier| *multiplier >= Big::ZERO);
-            let inside = |body: &Solid<'_>, v| body.largest(v) <= big(1.0) + big(TARGET);
-            let solved = settled.is_some_and(|length| length <= TARGET) && signs;
-            if solved && inside(&one, &iterate.x) && inside(&two, &iterate.y) {
-                let metres = big(unit);
-                let (x, y) = (scaled(&iterate.x, &metres), scaled(&iterate.y, &metres));
-                let gradient = twists(&x, &y, &iterate.n, pose_a, pose_b);
-                return Some(Truth { value: double(&iterate.d) * unit, gradient });
+    for close in CLOSE {
+        let (of_a, of_b) = (for_direction(&one, &x, &-normal, close), for_direction(&two, &y, &normal, close));
+        for rank in 0..of_a.len() + of_b.len() {
+            for (i, j) in (0..=rank).map(|i| (i, rank - i)) {
+                let (Some(p), Some(q)) = (of_a.get(i), of_b.get(j)) else { continue };
+                let mut iterate = Iterate::new(p, q, &x, &y, &vector(&normal));
+                let settled =
+                    (0..100).map(|_| iterate.step(&one, &two, small / unit)).find(|length| !(*length > TARGET));
+                let signs = iterate.l.iter().chain(&iterate.m).all(|multiplier| *multiplier >= Big::ZERO);
+                let inside = |body: &Solid<'_>, v| body.largest(v) <= big(1.0) + big(TARGET);
+                let solved = settled.is_some_and(|length| length <= TARGET) && signs;
+                if solved && inside(&one, &iterate.x) && inside(&two, &iterate.y) {
+                    let metres = big(unit);
+                    let (x, y) = (scaled(&iterate.x, &metres), scaled(&iterate.y, &metres));
+                    let gradient = twists(&x, &y, &iterate.n, pose_a, pose_b);
+                    let dual = Dual::new((&iterate.x, &iterate.y), (p, &iterate.l), (q, &iterate.m), unit, true);
+                    return Some(Truth { value: double(&iterate.d) * unit, gradient, normal: iterate.n, dual });
+                }
             }
         }
     }

@@ -12,6 +12,17 @@ pub(crate) struct Jet {
     pub(crate) hessian: [Vector; 3],
 }
 
+impl Jet {
+    /// That of the constraint times a factor.
+    pub(crate) fn times(self, factor: &Big) -> Self {
+        Self {
+            value: self.value * factor,
+            gradient: scaled(&self.gradient, factor),
+            hessian: self.hessian.map(|row| scaled(&row, factor)),
+        }
+    }
+}
+
 /// A body in the frame of work: world directions, origin at the first body's translation, lengths in `unit` metres.
 pub(crate) struct Solid<'a> {
     body: &'a Body,

@@ -1,0 +1,124 @@
+//! What answers tell besides their bracket, held against closed forms of balls.
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use sublevel::body::Body;
+use sublevel::service::proto::{
+    self, Accuracy, DistanceResult, EvaluateRequest, LevelDistanceResult, Measure, UpdateSceneRequest,
+    evaluate_result::Outcome,
+};
+
+use crate::harness::{Clients, Numbers, Running, at, ball, moved, object, pair};
+
+/// All three measures of the objects `a` and `b` of the scene `room`, `b` elsewhere for this call.
+async fn answers(clients: &mut Clients, b: proto::Pose) -> (DistanceResult, LevelDistanceResult, LevelDistanceResult) {
+    let measures = [Measure::Distance, Measure::LevelDistanceAOnB, Measure::LevelDistanceBOnA];
+    let request = EvaluateRequest {
+        scene: "room".into(),
+        pairs: vec![pair("a", "b")],
+        measures: measures.map(Into::into).to_vec(),
+        pose_overrides: vec![moved("b", b)],
+        accuracy: Some(Accuracy { distance_relative: Some(1e-12), level_relative: Some(1e-12) }),
+    };
+    let results = clients.queries.evaluate(request).await.expect("answers").into_inner().results;
+    let outcomes: Vec<_> = results.into_iter().map(|result| result.outcome.expect("an outcome")).collect();
+    match <[Outcome; 3]>::try_from(outcomes).expect("three results") {
+        [Outcome::Distance(d), Outcome::LevelDistanceAOnB(ab), Outcome::LevelDistanceBOnA(ba)] => (d, ab, ba),
+        other => panic!("measures in another order: {other:?}"),
+    }
+}
+
+/// A scene `room` of two bodies: `a` at this pose, `b` at the origin.
+async fn room(clients: &mut Clients, (a, pose): (&Body, proto::Pose), b: &Body) {
+    let (a, b) = (clients.put(a).await, clients.put(b).await);
+    clients.make_scene("room").await;
+    let upsert_objects = vec![object("a", &a, pose), object("b", &b, at(0.0))];
+    clients.update(UpdateSceneRequest { name: "room".into(), upsert_objects, ..Default::default() }).await;
+}
+
+fn vector(v: Option<proto::Vector3>) -> Vector3<f64> {
+    let v = v.expect("a vector");
+    Vector3::new(v.x, v.y, v.z)
+}
+
+/// How far a gradient is from the force at a point, about the translation of a pose, relative to the force.
+fn off(gradient: Option<proto::PoseGradient>, force: &Vector3<f64>, arm: &Vector3<f64>) -> f64 {
+    let gradient = gradient.expect("a gradient");
+    let linear = (vector(gradient.linear) - force).norm();
+    let angular = (vector(gradient.angular) - arm.cross(force)).norm();
+    (linear + angular) / force.norm()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn gradients_are_those_of_balls_off_their_origins() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(dir.path());
+    let mut clients = server.connect().await;
+    let (center_a, center_b) = (Vector3::new(0.3, -0.4, 0.2), Vector3::new(0.0, 0.5, -0.1));
+    let (radius_a, radius_b) = (0.7, 0.4);
+    let body = |center, radius| Body::ball("ball", center, radius).expect("a ball");
+    let mut numbers = Numbers(17);
+    let pose_a = numbers.pose();
+    room(&mut clients, (&body(center_a, radius_a), pose_a), &body(center_b, radius_b)).await;
+
+    let mut apart = 0;
+    for step in 0..60 {
+        let pose_b = numbers.pose();
+        let arm = |pose: &proto::Pose, center: &Vector3<f64>| {
+            let q = pose.rotation.expect("a rotation");
+            UnitQuaternion::from_quaternion(Quaternion::new(q.w, q.x, q.y, q.z)) * center
+        };
+        let (arm_a, arm_b) = (arm(&pose_a, &center_a), arm(&pose_b, &center_b));
+        let between = vector(pose_a.translation_m) + arm_a - vector(pose_b.translation_m) - arm_b;
+        let (length, n) = (between.norm(), between.normalize());
+        let (distance, ab, ba) = answers(&mut clients, pose_b).await;
+        let label = format!("seed 17 step {step}: {distance:?} {ab:?} {ba:?}");
+        assert!(!distance.tied && !ab.tied && !ba.tied, "{label}");
+        assert_eq!((distance.part_a, distance.part_b, distance.hulls_upper_m), (0, 0, None), "{label}");
+        if length < radius_a + radius_b {
+            assert!(distance.gradient_a.is_none() && distance.gradient_b.is_none(), "{label}");
+            continue;
+        }
+        apart += 1;
+        assert!(off(distance.gradient_a, &n, &arm_a) < 1e-6 && off(distance.gradient_b, &-n, &arm_b) < 1e-6, "{label}");
+        // d(P‖Q) = ((length - r_Q) / r_P)², and the radius of Q grows with the root of its level.
+        for (level, p, q, of_p, of_q, n) in
+            [(ab, radius_a, radius_b, arm_a, arm_b, n), (ba, radius_b, radius_a, arm_b, arm_a, -n)]
+        {
+            let force = n * (2.0 * (length - q) / (p * p));
+            assert!(off(level.gradient_p, &force, &of_p) < 1e-6, "{label}");
+            assert!(off(level.gradient_q, &-force, &of_q) < 1e-6, "{label}");
+            let multiplier = (length - q) * q / (p * p);
+            assert!((level.multiplier - multiplier).abs() <= 1e-6 * multiplier && !level.saturated, "{label}");
+        }
+    }
+    assert!(apart > 30, "{apart} of 60 are apart");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn gaps_widen_the_bracket_for_the_objects() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(dir.path());
+    let mut clients = server.connect().await;
+    // Balls of radius 1 and 2 that reach a quarter and a half beyond their objects.
+    room(&mut clients, (&ball(1.0).with_gap(0.25), at(0.0)), &ball(2.0).with_gap(0.5)).await;
+    for x in [5.0, 3.0 + 1e-9, 1.0] {
+        let (distance, ..) = answers(&mut clients, at(x)).await;
+        let hulls = distance.hulls_upper_m.expect("both gaps are known");
+        assert!(hulls >= distance.upper_m + 0.75 && hulls <= (distance.upper_m + 0.75) * (1.0 + 1e-15), "{distance:?}");
+        assert!((distance.upper_m - (x - 3.0).max(0.0)).abs() < 1e-8, "{distance:?}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn saturated_levels_say_so() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(dir.path());
+    let mut clients = server.connect().await;
+    room(&mut clients, (&ball(1.0), at(0.0)), &ball(2.0)).await;
+    // The centre of A lies in B, that of B outside A.
+    let (distance, ab, ba) = answers(&mut clients, at(1.5)).await;
+    assert!(distance.gradient_a.is_none() && distance.upper_m == 0.0, "{distance:?}");
+    let still = proto::Vector3 { x: 0.0, y: 0.0, z: 0.0 };
+    assert!(ab.saturated && ab.multiplier == 0.0 && ab.gradient_p.expect("one").linear == Some(still), "{ab:?}");
+    assert!(!ba.saturated && (ba.value - 0.0625).abs() < 1e-8 && ba.multiplier > 0.0, "{ba:?}");
+}
