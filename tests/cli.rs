@@ -346,3 +346,102 @@ fn bad_input_is_refused_in_one_line() {
     let accuracy = refusal(&["measure", text(&body), text(&body), "--accuracy", "0"]);
     assert!(accuracy.contains("--accuracy"), "{accuracy}");
 }
+
+/// Three quarters of a ring as OFF text, with its triangles.
+fn ring() -> String {
+    let (along, around) = (40, 12);
+    let mut text = format!("OFF\n{} {} 0\n", along * around, 2 * (along - 1) * around);
+    for i in 0..along {
+        for j in 0..around {
+            let (a, b) =
+                (4.7 * f64::from(i) / f64::from(along), std::f64::consts::TAU * f64::from(j) / f64::from(around));
+            let r = 1.0 + 0.3 * b.cos();
+            text += &format!("{} {} {}\n", r * a.cos(), r * a.sin(), 0.3 * b.sin());
+        }
+    }
+    for i in 0..along - 1 {
+        for j in 0..around {
+            let at = |i: i32, j: i32| i * around + j % around;
+            text += &format!("3 {} {} {}\n", at(i, j), at(i + 1, j), at(i, j + 1));
+            text += &format!("3 {} {} {}\n", at(i, j + 1), at(i + 1, j), at(i + 1, j + 1));
+        }
+    }
+    text
+}
+
+#[test]
+fn sets_that_need_not_be_convex_are_told_from_bodies_everywhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = folder.path().join("ring.off");
+    std::fs::write(&mesh, ring()).unwrap();
+    let mesh = text(&mesh);
+    let out = text(folder.path());
+    let fit =
+        |more: &[&str]| json(&[&["fit", mesh, "--out", out, "--degree", "4", "--json"], more].concat())[0].clone();
+    let convex = fit(&[]);
+    let relaxed = fit(&["--relax-convexity", "10"]);
+    let free = fit(&["--relax-convexity", "inf"]);
+    let moment = fit(&["--objective", "inverse-moment"]);
+    let volume = |row: &Value| row["volume_m3"].as_f64().unwrap();
+    assert!(volume(&free) < volume(&relaxed) && volume(&relaxed) < volume(&convex));
+    for (row, name, c) in [
+        (&relaxed, "ring-d4-c10.json", Some(10.0)),
+        (&free, "ring-d4-cinf.json", None),
+        (&moment, "ring-d4-im.json", None),
+    ] {
+        assert_eq!(
+            keys(row),
+            sorted(
+                "input body kind degree objective relax_convexity points left_out left_out_m hull_vertices volume_m3 volume_error_m3 \
+             hull_volume_m3 points_only coverage objective_value optimality_gap seconds status proven"
+            )
+        );
+        assert!(row["body"].as_str().unwrap().ends_with(name), "{row}");
+        assert_eq!((row["points_only"].as_bool(), row["kind"].as_str()), (Some(true), Some("sos-body")));
+        assert_eq!((row["relax_convexity"].as_f64(), row["coverage"]["triangles"].as_u64()), (c, Some(936)));
+    }
+    assert_eq!(moment["objective"], "inverse-moment");
+
+    let file = folder.path().join("ring-d4-c10.json");
+    let file = text(&file);
+    let shown = json(&["show", file, "--json"]);
+    assert_eq!((&shown["kind"], &shown["points_only"]), (&"sos-body".into(), &true.into()));
+    assert_eq!(shown["coverage"], relaxed["coverage"]);
+    let verified = json(&["verify", file, "--points", mesh, "--json"]);
+    assert_eq!((&verified["sos_proven"], &verified["contains_all_points_proven"]), (&true.into(), &true.into()));
+    assert_eq!(verified["coverage"], relaxed["coverage"]);
+    // A file that claims more than it holds, and one that claims more convexity.
+    let changed = |change: &dyn Fn(&mut Value)| {
+        let mut value: Value = serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap();
+        change(&mut value);
+        let path = folder.path().join("changed.json");
+        std::fs::write(&path, value.to_string()).unwrap();
+        path
+    };
+    let boast = changed(&|file| {
+        let coverage = &mut file["coverage"];
+        assert!(coverage["uncovered"] != 0, "the ring's ends stick out");
+        coverage["uncovered"] = 0.into();
+        coverage["uncovered_area_m2"] = 0.0.into();
+        coverage["largest"] = Value::Null;
+    });
+    assert!(refusal(&["verify", text(&boast), "--points", mesh]).contains("uncovered triangles"));
+    let straighter = changed(&|file| file["relaxation"]["c"] = 1.0.into());
+    assert!(refusal(&["verify", text(&straighter)]).contains("relaxation"));
+
+    // Where convexity is needed it is refused for what it is.
+    let body = folder.path().join("ring-d4.json");
+    assert!(refusal(&["measure", text(&body), file]).contains("need not be convex"));
+    assert!(refusal(&["push", file, "--server", "http://127.0.0.1:9"]).contains("need not be convex"));
+    assert!(refusal(&["show", file, "--svg", text(&folder.path().join("x.svg"))]).contains("sos-body"));
+    for more in [&["--refine"][..], &["--slabs", "2"], &["--ladder"], &["--max-gap", "1cm"]] {
+        let refused = refusal(&[&["fit", mesh, "--out", out, "--relax-convexity", "1"], more].concat());
+        assert!(refused.contains("convex bodies"), "{refused}");
+    }
+    assert!(refusal(&["fit", mesh, "--out", out, "--relax-convexity", "-1"]).contains("relax convexity"));
+    assert!(
+        refusal(&["fit", mesh, "--out", out, "--relax-convexity", "1", "--objective", "trace-h"]).contains("logdet-p")
+    );
+    let both = ["fit", mesh, "--out", out, "--relax-convexity", "1", "--objective", "inverse-moment"];
+    assert!(refusal(&both).contains("leave one of the two out"));
+}

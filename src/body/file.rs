@@ -1,13 +1,13 @@
 //! The body file: JSON that any program can read, re-proven whenever it is read.
 
-use super::{Aabb, Ball, Body, BodyError, Constraint, ContainedPoints, Normalization, Provenance};
-use crate::polynomial::{HessianGram, HessianMonomial, Polynomial};
+use super::{Aabb, Ball, Body, BodyError, Constraint, ContainedPoints, Normalization, Provenance, SosBodyError, sos};
+use crate::polynomial::{Exponents, HessianGram, HessianMonomial, Polynomial};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use serde_json::ser::{CompactFormatter, Formatter};
 use std::io;
 
-const FORMAT: &str = "sublevel/1";
+pub(super) const FORMAT: &str = "sublevel/1";
 const KIND: &str = "body";
 
 /// Relative difference at which a stored derived value is called wrong: far above what another machine's rounding does to
@@ -53,6 +53,15 @@ pub enum BodyFileError {
     /// The proof fails.
     #[error(transparent)]
     Body(#[from] BodyError),
+    /// The set of an sos-body where a convex body is needed.
+    #[error(
+        "kind is \"sos-body\": its set need not be convex, so that what bounds distances of convex bodies proves nothing of it; \
+         fit a convex body to the same object ('sublevel fit' without --relax-convexity and inverse-moment)"
+    )]
+    NotConvex,
+    /// The proof of an sos-body fails.
+    #[error(transparent)]
+    SosBody(#[from] SosBodyError),
 }
 
 #[derive(Serialize, Deserialize)]
@@ -81,9 +90,9 @@ struct File {
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct FileNormalization {
-    center: [f64; 3],
-    linear: [[f64; 3]; 3],
+pub(super) struct FileNormalization {
+    pub(super) center: [f64; 3],
+    pub(super) linear: [[f64; 3]; 3],
 }
 
 #[derive(Serialize, Deserialize)]
@@ -97,34 +106,29 @@ struct FileConstraint {
 /// `gram` belongs to the basis `y_i z^(a, b, c)`, each element stored as `[i, a, b, c]`.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct FileCertificate {
+pub(super) struct FileCertificate {
     basis: Vec<[u8; 4]>,
     gram: Vec<Vec<f64>>,
 }
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct FileBall {
-    center_m: [f64; 3],
-    radius_m: f64,
+pub(super) struct FileBall {
+    pub(super) center_m: [f64; 3],
+    pub(super) radius_m: f64,
 }
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct FileBox {
-    min_m: [f64; 3],
-    max_m: [f64; 3],
+pub(super) struct FileBox {
+    pub(super) min_m: [f64; 3],
+    pub(super) max_m: [f64; 3],
 }
 
 impl Body {
     /// The body file of this body; reading it back gives the same numbers exactly.
     pub fn to_json(&self) -> String {
-        let mut text = Vec::new();
-        let mut serializer = serde_json::Serializer::with_formatter(&mut text, LinePerKey::default());
-        // Writing plain data to memory does not fail, and JSON is UTF-8.
-        let _ = File::from(self).serialize(&mut serializer);
-        text.push(b'\n');
-        String::from_utf8_lossy(&text).into_owned()
+        write(&File::from(self))
     }
 
     /// Reads a body file and re-proves it: the id is recomputed, the certificates are checked, every derived value is
@@ -133,22 +137,18 @@ impl Body {
     /// # Errors
     /// The field that is wrong, the reason and the remedy.
     pub fn from_json(text: &str) -> Result<Self, BodyFileError> {
-        let file: File = serde_json::from_str(text).map_err(|error| BodyFileError::Json(error.to_string()))?;
-        for (field, found, expected) in [("format", &file.format, FORMAT), ("kind", &file.kind, KIND)] {
-            if found != expected {
-                return Err(BodyFileError::Format { field, found: found.clone(), expected });
-            }
+        if kind(text).is_ok_and(|kind| kind == sos::KIND) {
+            return Err(BodyFileError::NotConvex);
         }
+        let file: File = read(text)?;
+        check_format(&file.format, &file.kind, KIND)?;
         let constraints = file
             .constraints
             .iter()
             .enumerate()
             .map(|(i, constraint)| read_constraint(i, constraint))
             .collect::<Result<Vec<_>, _>>()?;
-        let normalization = Normalization {
-            center: file.normalization.center.into(),
-            linear: Matrix3::from_fn(|i, j| file.normalization.linear[i][j]),
-        };
+        let normalization = Normalization::from(&file.normalization);
         let interior = Vector3::from(file.interior_point_m);
         let growth_center = file.growth_center_m.map(Vector3::from);
         let recomputed = super::BodyId::of(&normalization, &constraints, growth_center.as_ref()).to_string();
@@ -168,9 +168,47 @@ impl Body {
     }
 }
 
-fn read_constraint(i: usize, constraint: &FileConstraint) -> Result<Constraint, BodyFileError> {
-    let field = |key: &str, reason: String| BodyFileError::Field { field: format!("constraints[{i}].{key}"), reason };
-    let FileConstraint { exponents, coefficients, certificate } = constraint;
+/// The data of a file of some kind.
+pub(super) fn read<'a, T: Deserialize<'a>>(text: &'a str) -> Result<T, BodyFileError> {
+    serde_json::from_str(text).map_err(|error| BodyFileError::Json(error.to_string()))
+}
+
+/// What kind a file says it is of.
+pub(super) fn kind(text: &str) -> Result<String, BodyFileError> {
+    #[derive(Deserialize)]
+    struct Header {
+        kind: String,
+    }
+    Ok(read::<Header>(text)?.kind)
+}
+
+/// Refuses another format, or another kind than the expected.
+pub(super) fn check_format(format: &str, kind: &str, expected: &'static str) -> Result<(), BodyFileError> {
+    for (field, found, expected) in [("format", format, FORMAT), ("kind", kind, expected)] {
+        if found != expected {
+            return Err(BodyFileError::Format { field, found: found.into(), expected });
+        }
+    }
+    Ok(())
+}
+
+/// JSON text of a file.
+pub(super) fn write(file: &impl Serialize) -> String {
+    let mut text = Vec::new();
+    let mut serializer = serde_json::Serializer::with_formatter(&mut text, LinePerKey::default());
+    // Writing plain data to memory does not fail, and JSON is UTF-8.
+    let _ = file.serialize(&mut serializer);
+    text.push(b'\n');
+    String::from_utf8_lossy(&text).into_owned()
+}
+
+/// A polynomial as a file has it: `place` names it in errors.
+pub(super) fn read_polynomial(
+    place: &str,
+    exponents: &[Exponents],
+    coefficients: &[f64],
+) -> Result<Polynomial, BodyFileError> {
+    let field = |key: &str, reason: String| BodyFileError::Field { field: format!("{place}.{key}"), reason };
     if exponents.len() != coefficients.len() {
         let reason =
             format!("has {} entries for {} exponents; one is needed per exponent", coefficients.len(), exponents.len());
@@ -181,64 +219,103 @@ fn read_constraint(i: usize, constraint: &FileConstraint) -> Result<Constraint, 
     if polynomial.terms() != terms {
         return Err(field("exponents", "must be in lexicographic order with non-zero coefficients".into()));
     }
-    let n = certificate.basis.len();
-    if certificate.gram.len() != n || certificate.gram.iter().any(|row| row.len() != n) {
-        return Err(field("certificate.gram", format!("must be {n}x{n} like its basis")));
+    Ok(polynomial)
+}
+
+/// The matrix of a certificate with a basis of `n` elements.
+pub(super) fn read_gram(place: &str, n: usize, rows: &[Vec<f64>]) -> Result<DMatrix<f64>, BodyFileError> {
+    if rows.len() != n || rows.iter().any(|row| row.len() != n) {
+        let reason = format!("must be {n}x{n} like its basis");
+        return Err(BodyFileError::Field { field: format!("{place}.certificate.gram"), reason });
     }
-    let basis = certificate
-        .basis
-        .iter()
-        .map(|&[direction, a, b, c]| HessianMonomial { direction, exponents: [a, b, c] })
-        .collect();
-    let matrix = DMatrix::from_fn(n, n, |row, column| certificate.gram[row][column]);
-    let gram = HessianGram::new(basis, matrix).map_err(|error| field("certificate", error.to_string()))?;
-    Ok(Constraint { polynomial, gram })
+    Ok(DMatrix::from_fn(n, n, |row, column| rows[row][column]))
+}
+
+/// The Gram matrix of a Hessian form.
+pub(super) fn read_hessian(place: &str, certificate: &FileCertificate) -> Result<HessianGram, BodyFileError> {
+    let basis = certificate.basis.iter();
+    let basis: Vec<_> =
+        basis.map(|&[direction, a, b, c]| HessianMonomial { direction, exponents: [a, b, c] }).collect();
+    let matrix = read_gram(place, basis.len(), &certificate.gram)?;
+    HessianGram::new(basis, matrix)
+        .map_err(|error| BodyFileError::Field { field: format!("{place}.certificate"), reason: error.to_string() })
+}
+
+/// Rows of a matrix.
+pub(super) fn rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
+}
+
+fn read_constraint(i: usize, constraint: &FileConstraint) -> Result<Constraint, BodyFileError> {
+    let place = format!("constraints[{i}]");
+    let polynomial = read_polynomial(&place, &constraint.exponents, &constraint.coefficients)?;
+    Ok(Constraint { polynomial, gram: read_hessian(&place, &constraint.certificate)? })
+}
+
+fn field(name: &str, reason: &str) -> BodyFileError {
+    BodyFileError::Field { field: name.into(), reason: reason.into() }
 }
 
 /// Checks what no proof covers, as far as it can be: notes about the input must at least be possible and printable.
 fn check_notes(file: &File) -> Result<(), BodyFileError> {
-    let check = |good: bool, field: &str, reason: &str| {
-        let error = || BodyFileError::Field { field: field.into(), reason: reason.into() };
-        if good { Ok(()) } else { Err(error()) }
-    };
-    if let Some(ContainedPoints { count, sha256 }) = &file.contained_points {
-        let digits = sha256.len() == 64 && sha256.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'));
-        check(digits, "contained_points.sha256", "must be 64 lowercase hexadecimal digits")?;
-        check(
-            (1..=1 << 40).contains(count),
-            "contained_points.count",
-            "must be the number of points that were hashed",
-        )?;
+    if let Some(points) = &file.contained_points {
+        points.check()?;
     }
-    if let Some(gap) = file.gap_m {
-        // Both the body and the hull lie in the circumscribed ball.
-        let possible = (0.0..=2.0 * file.circumscribed_ball.radius_m).contains(&gap);
-        check(possible, "gap_m", "must be between 0 and the diameter of the circumscribed ball, or null")?;
+    // Both the body and the hull lie in the circumscribed ball.
+    if file.gap_m.is_some_and(|gap| !(0.0..=2.0 * file.circumscribed_ball.radius_m).contains(&gap)) {
+        return Err(field("gap_m", "must be between 0 and the diameter of the circumscribed ball, or null"));
     }
-    if let Some(Provenance { input, objective, hull_volume_m3, .. }) = &file.provenance {
-        for (field, text) in [("provenance.input", input), ("provenance.objective", objective)] {
-            let printable = text.is_empty() || super::check_name(text).is_ok();
-            check(printable, field, "must have at most 200 characters and no control characters")?;
-        }
+    if let Some(provenance) = &file.provenance {
+        provenance.check()?;
         // A hull inside the body is no larger than the body, up to the quadrature.
-        let possible = *hull_volume_m3 >= 0.0 && *hull_volume_m3 <= 1.01 * file.volume_m3;
-        check(possible, "provenance.hull_volume_m3", "must be between 0 and the volume of the body")?;
+        if provenance.hull_volume_m3 > 1.01 * file.volume_m3 {
+            return Err(field("provenance.hull_volume_m3", "must be between 0 and the volume of the body"));
+        }
     }
     Ok(())
+}
+
+impl ContainedPoints {
+    pub(super) fn check(&self) -> Result<(), BodyFileError> {
+        let Self { count, sha256 } = self;
+        if sha256.len() != 64 || !sha256.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f')) {
+            return Err(field("contained_points.sha256", "must be 64 lowercase hexadecimal digits"));
+        }
+        if !(1..=1 << 40).contains(count) {
+            return Err(field("contained_points.count", "must be the number of points that were hashed"));
+        }
+        Ok(())
+    }
+}
+
+impl Provenance {
+    pub(super) fn check(&self) -> Result<(), BodyFileError> {
+        for (name, text) in [("provenance.input", &self.input), ("provenance.objective", &self.objective)] {
+            if !(text.is_empty() || super::check_name(text).is_ok()) {
+                return Err(field(name, "must have at most 200 characters and no control characters"));
+            }
+        }
+        if !(self.hull_volume_m3 >= 0.0) {
+            return Err(field("provenance.hull_volume_m3", "must be between 0 and the volume of the body"));
+        }
+        Ok(())
+    }
+}
+
+/// Holds a stored value that follows from others against the recomputed one, at the accuracy of `scale`.
+pub(super) fn check_scalar(field: &'static str, stored: f64, recomputed: f64, scale: f64) -> Result<(), BodyFileError> {
+    // Not `>`: a NaN is wrong too.
+    if (stored - recomputed).abs() <= TOLERANCE * scale {
+        return Ok(());
+    }
+    Err(BodyFileError::Derived { field, stored: format!("{stored:e}"), recomputed: format!("{recomputed:e}") })
 }
 
 /// Compares every derived value with the one recomputed from the polynomials.
 fn check_derived(file: &File, body: &Body) -> Result<(), BodyFileError> {
     let size = body.circumscribed.radius;
     let place = size + body.circumscribed.center.amax();
-    let scalar = |field, stored: f64, recomputed: f64, scale: f64| {
-        // Not `>`: a NaN is wrong too.
-        if (stored - recomputed).abs() <= TOLERANCE * scale {
-            Ok(())
-        } else {
-            Err(BodyFileError::Derived { field, stored: format!("{stored:e}"), recomputed: format!("{recomputed:e}") })
-        }
-    };
+    let scalar = check_scalar;
     let vector = |field, stored: [f64; 3], recomputed: &Vector3<f64>| {
         (0..3).try_for_each(|i| scalar(field, stored[i], recomputed[i], place))
     };
@@ -259,23 +336,20 @@ fn check_derived(file: &File, body: &Body) -> Result<(), BodyFileError> {
 
 impl From<&Body> for File {
     fn from(body: &Body) -> Self {
-        let Ball { center, radius } = body.circumscribed;
-        let Aabb { min, max } = body.bounding_box;
-        let Normalization { center: origin, linear } = body.normalization;
         Self {
             format: FORMAT.into(),
             kind: KIND.into(),
             id: body.id.to_string(),
             name: body.name.clone(),
             degree: body.degree(),
-            normalization: FileNormalization { center: origin.into(), linear: linear.transpose().into() },
+            normalization: (&body.normalization).into(),
             constraints: body.constraints.iter().map(FileConstraint::from).collect(),
             interior_point_m: body.interior_point.into(),
             min_value: body.min_value,
             in_radius_m: body.in_radius,
             growth_center_m: body.growth.map(|ball| ball.center.into()),
-            circumscribed_ball: FileBall { center_m: center.into(), radius_m: radius },
-            bounding_box: FileBox { min_m: min.into(), max_m: max.into() },
+            circumscribed_ball: (&body.circumscribed).into(),
+            bounding_box: (&body.bounding_box).into(),
             volume_m3: body.volume.volume_m3,
             volume_error_m3: body.volume.error_m3,
             gap_m: body.gap,
@@ -286,13 +360,40 @@ impl From<&Body> for File {
 }
 
 impl From<&Constraint> for FileConstraint {
-    fn from(constraint: &Constraint) -> Self {
-        let Constraint { polynomial, gram } = constraint;
+    fn from(Constraint { polynomial, gram }: &Constraint) -> Self {
         let (exponents, coefficients) = polynomial.terms().iter().copied().unzip();
-        let basis =
-            gram.basis().iter().map(|b| [b.direction, b.exponents[0], b.exponents[1], b.exponents[2]]).collect();
-        let gram = gram.matrix().row_iter().map(|row| row.iter().copied().collect()).collect();
-        Self { exponents, coefficients, certificate: FileCertificate { basis, gram } }
+        Self { exponents, coefficients, certificate: gram.into() }
+    }
+}
+
+impl From<&HessianGram> for FileCertificate {
+    fn from(gram: &HessianGram) -> Self {
+        let basis = gram.basis().iter().map(|b| [b.direction, b.exponents[0], b.exponents[1], b.exponents[2]]);
+        Self { basis: basis.collect(), gram: rows(gram.matrix()) }
+    }
+}
+
+impl From<&Normalization> for FileNormalization {
+    fn from(Normalization { center, linear }: &Normalization) -> Self {
+        Self { center: (*center).into(), linear: linear.transpose().into() }
+    }
+}
+
+impl From<&FileNormalization> for Normalization {
+    fn from(FileNormalization { center, linear }: &FileNormalization) -> Self {
+        Self { center: (*center).into(), linear: Matrix3::from_fn(|i, j| linear[i][j]) }
+    }
+}
+
+impl From<&Ball> for FileBall {
+    fn from(Ball { center, radius }: &Ball) -> Self {
+        Self { center_m: (*center).into(), radius_m: *radius }
+    }
+}
+
+impl From<&Aabb> for FileBox {
+    fn from(Aabb { min, max }: &Aabb) -> Self {
+        Self { min_m: (*min).into(), max_m: (*max).into() }
     }
 }
 

@@ -1,14 +1,15 @@
 //! Identity of a body: a hash of what it is, not of what it is called.
 
 use super::{Constraint, Normalization};
+use crate::polynomial::Polynomial;
 use nalgebra::Vector3;
 use sha2::{Digest, Sha256};
 use std::fmt;
 use std::str::FromStr;
 
 /// SHA-256 of a body's content: center, linear (rows), then per constraint the number of its terms and each term's three
-/// exponents and coefficient in lexicographic order of the exponents, then, if one was set, -1 and the growth centre;
-/// everything as little-endian f64.
+/// exponents and coefficient in lexicographic order of the exponents, then, if one was set, -1 and the growth centre, or -2 for
+/// an sos-body; everything as little-endian f64.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct BodyId([u8; 32]);
 
@@ -18,23 +19,33 @@ impl BodyId {
         constraints: &[Constraint],
         growth_center: Option<&Vector3<f64>>,
     ) -> Self {
+        // No number of terms is negative.
+        let growth = growth_center.into_iter().flat_map(|center| [-1.0].into_iter().chain(center.iter().copied()));
+        Self::hash(normalization, constraints.iter().map(|constraint| &constraint.polynomial), growth)
+    }
+
+    pub(super) fn of_sos(normalization: &Normalization, polynomial: &Polynomial) -> Self {
+        Self::hash(normalization, [polynomial].into_iter(), [-2.0].into_iter())
+    }
+
+    fn hash<'a>(
+        normalization: &Normalization,
+        polynomials: impl Iterator<Item = &'a Polynomial>,
+        rest: impl Iterator<Item = f64>,
+    ) -> Self {
         let mut hash = Sha256::new();
         let mut feed = |value: f64| hash.update(value.to_le_bytes());
         normalization.center.iter().for_each(|&value| feed(value));
         normalization.linear.transpose().iter().for_each(|&value| feed(value));
-        for constraint in constraints {
-            let terms = constraint.polynomial.terms();
+        for polynomial in polynomials {
+            let terms = polynomial.terms();
             feed(terms.len() as f64);
             for (exponents, coefficient) in terms {
                 exponents.iter().for_each(|&e| feed(f64::from(e)));
                 feed(*coefficient);
             }
         }
-        if let Some(center) = growth_center {
-            // No number of terms is negative.
-            feed(-1.0);
-            center.iter().for_each(|&value| feed(value));
-        }
+        rest.for_each(feed);
         Self(hash.finalize().into())
     }
 }

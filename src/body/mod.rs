@@ -1,8 +1,8 @@
 //! Certified convex bodies: `{x : g_1(x) <= 1, ..., g_m(x) <= 1}` with sos-convex `g_i`, proven bounded and non-empty.
 //!
 //! A [`Body`] exists only with its proofs: making one, from numbers or from a file, checks every certificate and proves or
-//! recomputes everything derived from the polynomials. Lengths are metres in the body frame unless a name says otherwise;
-//! `z` is the unit-free normalized frame, `z = L (x - c)`.
+//! recomputes everything derived from the polynomials. What need not be convex is an [`SosBody`], which no measure takes.
+//! Lengths are metres in the body frame unless a name says otherwise; `z` is the unit-free normalized frame, `z = L (x - c)`.
 
 mod compound;
 mod extent;
@@ -11,6 +11,7 @@ mod id;
 mod outline;
 mod placement;
 mod shapes;
+mod sos;
 mod sphere;
 mod surface;
 mod trust;
@@ -20,6 +21,7 @@ pub use file::BodyFileError;
 pub use id::{BodyId, ParseIdError};
 pub use outline::{Cell, Outline};
 pub use placement::{Placement, Sample};
+pub use sos::{Coverage, Relaxation, SosBody, SosBodyError, TriangleError, Uncovered};
 pub use sphere::Sphere;
 pub use surface::Volume;
 #[cfg(feature = "fit")]
@@ -445,18 +447,7 @@ impl Body {
     /// # Errors
     /// The point that fails most.
     pub fn prove_contains(&self, points: &[Vector3<f64>]) -> Result<f64, NotContained> {
-        let mut worst = NotContained { index: 0, value: f64::MIN };
-        for (index, point) in points.iter().enumerate() {
-            let value = self.value_upper(point);
-            // A NaN is never inside.
-            if !(value <= worst.value) {
-                worst = NotContained { index, value };
-                if value.is_nan() {
-                    break;
-                }
-            }
-        }
-        if worst.value <= 1.0 { Ok(worst.value) } else { Err(worst) }
+        prove_contains(points, |point| self.value_upper(point))
     }
 
     /// The same body with the record of the points it is proven to contain.
@@ -498,6 +489,22 @@ impl Body {
         self.provenance = Some(provenance);
         self
     }
+}
+
+/// The largest of the bounds of the values at the points, if it is at most 1.
+fn prove_contains(points: &[Vector3<f64>], value_upper: impl Fn(&Vector3<f64>) -> f64) -> Result<f64, NotContained> {
+    let mut worst = NotContained { index: 0, value: f64::MIN };
+    for (index, point) in points.iter().enumerate() {
+        let value = value_upper(point);
+        // A NaN is never inside.
+        if !(value <= worst.value) {
+            worst = NotContained { index, value };
+            if value.is_nan() {
+                break;
+            }
+        }
+    }
+    if worst.value <= 1.0 { Ok(worst.value) } else { Err(worst) }
 }
 
 /// Whether a text can name a body, or what it was made from.

@@ -152,8 +152,13 @@ impl Placement {
     /// Constraint at the point v, with error bounds.
     #[inline]
     pub fn sample<'a>(&'a self, constraint: &'a Constraint, v: &Vector3<f64>) -> Sample<'a> {
+        self.sample_of(&constraint.polynomial, v)
+    }
+
+    /// Polynomial of the normalized frame at the point v, with error bounds.
+    #[inline]
+    pub fn sample_of<'a>(&'a self, polynomial: &'a Polynomial, v: &Vector3<f64>) -> Sample<'a> {
         let z = self.linear * (v - self.origin);
-        let polynomial = &constraint.polynomial;
         Sample { placement: self, polynomial, z, displacement: self.displacement(v), jet: polynomial.evaluate(&z) }
     }
 

@@ -1,14 +1,16 @@
 //! `sublevel fit`.
 
 mod remote;
+mod sos;
 
 use super::write_atomically;
 use crate::fit::{
-    FitError, FitOptions, Objective, Progress, RefinementEnd, Rung, Trimmed, coarsest_within, fit, ladder, read_points,
-    thicken, trim,
+    Coordinates, FitError, FitOptions, Mesh, Progress, RefinementEnd, Rung, Trimmed, coarsest_within, fit, ladder,
+    read_mesh, thicken, trim,
 };
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
+use sos::{Choice, method};
 use std::borrow::Cow;
 use std::error::Error;
 use std::io::{self, Write};
@@ -27,6 +29,9 @@ use std::time::Duration;
 /// How far a body reaches beyond the convex hull of its points is told as the gap: a proven bound of the distance of its
 /// farthest point, and a mean over directions, which overlooks narrow corners. It refers to the points that were fitted: those
 /// that --trim leaves, as --min-thickness thickens them.
+///
+/// With --relax-convexity, and with the objective inverse-moment, the set need not be convex: tighter, but no distances are measured
+/// from it. It is proven to hold the points; which triangles of the mesh it does not hold is told.
 ///
 /// Examples:
 ///
@@ -48,7 +53,7 @@ pub(super) struct FitArgs {
     /// [default: 6; with --ladder and --max-gap the highest tried: 8, or as far as the objective goes]
     #[arg(long, value_name = "N")]
     degree: Option<usize>,
-    /// What the fit minimises: logdet-p, trace-p, logdet-h or trace-h
+    /// What the fit minimises: logdet-p, trace-p, logdet-h, trace-h or inverse-moment
     ///
     /// logdet-p: log det of the inverse Gram matrix P of p. Tightest nearly always, and
     ///   the body follows the object through every affine map: take it.
@@ -57,8 +62,18 @@ pub(super) struct FitArgs {
     /// logdet-h: log det of the inverse Gram matrix H of the Hessian form, which asks
     ///   for curvature everywhere: bodies that bulge at flat sides. Degrees 2 to 6.
     /// trace-h: trace of the inverse of H, in the frame of trace-p. Degrees 2 to 6.
+    /// inverse-moment: nothing; the inverse moment matrix of the points makes a set that
+    ///   need not be convex (<stem>-d6-im.json), below the least level that holds them.
     #[arg(long, value_name = "NAME", default_value_t, verbatim_doc_comment)]
-    objective: Objective,
+    objective: Choice,
+    /// Let the set bend inwards: ask only that p + C |u|^degree be sos-convex, u being points with mean 0 and largest norm 1
+    ///
+    /// 0 is a convex body; 10 and 100 follow the object more and more (<stem>-d6-c10.json); inf asks for no convexity at all.
+    #[arg(long, value_name = "C", default_value_t = 0.0, allow_negative_numbers = true)]
+    relax_convexity: f64,
+    /// Measure traces and C in the coordinates of the points, metres, in place of those with mean 0 and largest norm 1
+    #[arg(long)]
+    raw_frame: bool,
     /// Cut the body by at most this many slabs (pairs of parallel planes), each where it reaches farthest beyond the convex hull
     ///
     /// 0 to 15; they end where nothing is left to cut off. With --ladder all rungs but the ball are cut (<stem>-d4-s3.json has
@@ -148,19 +163,41 @@ pub(super) fn run(args: &FitArgs) -> Result<(), Box<dyn Error>> {
             .into());
         }
     }
+    let relaxed = method(args)?;
     for (input, stem) in args.inputs.iter().zip(&stems) {
-        options(args, input).check(stem).map_err(|error| format!("{}: {error}", input.display()))?;
+        match relaxed {
+            Some(method) => sos::options(args, method, input).check(stem),
+            None => options(args, input).check(stem),
+        }
+        .map_err(|error| format!("{}: {error}", input.display()))?;
     }
     std::fs::create_dir_all(&args.out)
         .map_err(|error| format!("can not make {}: {error}; choose another --out", args.out.display()))?;
+    match relaxed {
+        Some(method) => each(args, &stems, |input, stem| Ok(vec![sos::one(args, method, input, stem)?]), sos::table),
+        None => each(
+            args,
+            &stems,
+            |input, stem| match &args.server {
+                Some(url) => remote::one(args, url, input, stem),
+                None => one(args, input, stem),
+            },
+            table,
+        ),
+    }
+}
+
+/// Fits the inputs and prints the rows of those before an error.
+fn each<R: Serialize>(
+    args: &FitArgs,
+    stems: &[String],
+    one: impl Fn(&Path, &str) -> Result<Vec<R>, Box<dyn Error>>,
+    table: fn(&mut dyn Write, &[R]) -> io::Result<()>,
+) -> Result<(), Box<dyn Error>> {
     let mut rows = Vec::new();
     let mut failure = None;
-    for (input, stem) in args.inputs.iter().zip(&stems) {
-        let fitted = match &args.server {
-            Some(url) => remote::one(args, url, input, stem),
-            None => one(args, input, stem),
-        };
-        match fitted {
+    for (input, stem) in args.inputs.iter().zip(stems) {
+        match one(input, stem) {
             Ok(of_input) => rows.extend(of_input),
             // What was fitted before is on disk: it is reported before the error.
             Err(error) => {
@@ -180,19 +217,24 @@ pub(super) fn run(args: &FitArgs) -> Result<(), Box<dyn Error>> {
 }
 
 fn options(args: &FitArgs, input: &Path) -> FitOptions {
-    let name = input.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let Choice::Minimise(objective) = args.objective else { return FitOptions::default() };
     FitOptions {
-        degree: args.degree.unwrap_or(if args.ladder || args.max_gap.is_some() {
-            args.objective.max_degree()
-        } else {
-            6
-        }),
-        objective: args.objective,
+        degree: args.degree.unwrap_or(if args.ladder || args.max_gap.is_some() { objective.max_degree() } else { 6 }),
+        objective,
+        coordinates: coordinates(args),
         refine: args.refine,
         slabs: args.slabs,
-        input: name,
+        input: file_name(input),
         ..FitOptions::default()
     }
+}
+
+fn coordinates(args: &FitArgs) -> Coordinates {
+    if args.raw_frame { Coordinates::Raw } else { Coordinates::Unit }
+}
+
+fn file_name(input: &Path) -> String {
+    input.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
 fn stem(input: &Path) -> Result<String, Box<dyn Error>> {
@@ -210,36 +252,66 @@ fn length(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "not a positive length such as 5mm, 2cm or 0.005 (metres)".to_owned())
 }
 
-/// Fits what is asked for of one input, and writes it.
-fn one(args: &FitArgs, input: &Path, stem: &str) -> Result<Vec<Row>, Box<dyn Error>> {
-    let bar = progress_bar(stem);
-    bar.set_message("reading");
-    let points = read_points(input, args.scale)?;
-    let mut tell = |progress: Progress| {
+/// The points of an input that are to be fitted.
+struct Prepared {
+    /// With its triangles only if the points are those of the file.
+    mesh: Mesh,
+    trimmed: Option<Trimmed>,
+}
+
+impl Prepared {
+    /// Reads, thickens and trims as asked for.
+    fn new(
+        args: &FitArgs,
+        input: &Path,
+        bar: &ProgressBar,
+        tell: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<Self, Box<dyn Error>> {
+        bar.set_message("reading");
+        let mut mesh = read_mesh(input, args.scale)?;
+        if let Some(least) = args.min_thickness
+            && let Cow::Owned(points) = thicken(&mesh.points, least)
+        {
+            mesh = Mesh { points, triangles: Vec::new() };
+        }
+        if args.trim == 0.0 {
+            return Ok(Self { mesh, trimmed: None });
+        }
+        let trimmed = trim(&mesh.points, args.trim, tell).map_err(|error| format!("{}: {error}", input.display()))?;
+        let (place, count, all) = (input.display(), trimmed.left_out.len(), mesh.points.len());
+        let farthest_m = trimmed.farthest_m;
+        bar.suspend(|| {
+            eprintln!("note: {place}: {count} of {all} points left out, up to {farthest_m:.3e} m outside the hull of the others");
+        });
+        let mesh = Mesh { points: trimmed.kept.clone(), triangles: Vec::new() };
+        Ok(Self { mesh, trimmed: Some(trimmed) })
+    }
+}
+
+/// What a bar says of a fit's progress.
+fn telling(bar: &ProgressBar) -> impl FnMut(Progress) -> ControlFlow<()> + '_ {
+    |progress: Progress| {
         let Progress { round, iterations, active_points, worst_violation, gap } = progress;
         bar.set_message(format!(
             "round {round}, step {iterations}, {gap:.0e} from the optimum of {active_points} points, others outside by \
              {worst_violation:.0e}"
         ));
         ControlFlow::Continue(())
-    };
+    }
+}
+
+/// Fits what is asked for of one input, and writes it.
+fn one(args: &FitArgs, input: &Path, stem: &str) -> Result<Vec<Row>, Box<dyn Error>> {
+    let bar = progress_bar(stem);
+    let mut tell = telling(&bar);
+    let Prepared { mesh, trimmed } = Prepared::new(args, input, &bar, &mut tell)?;
     let options = options(args, input);
-    let named = |error: FitError| format!("{}: {error}", input.display());
-    let thick = args.min_thickness.map_or(Cow::Borrowed(&points[..]), |least| thicken(&points, least));
-    let trimmed = if args.trim == 0.0 { None } else { Some(trim(&thick, args.trim, &mut tell).map_err(named)?) };
-    if let Some(Trimmed { left_out, farthest_m, .. }) = &trimmed {
-        let (input, count, all) = (input.display(), left_out.len(), thick.len());
-        bar.suspend(|| {
-            eprintln!("note: {input}: {count} of {all} points left out, up to {farthest_m:.3e} m outside the hull of the others");
-        });
-    }
-    let kept = trimmed.as_ref().map_or(&thick[..], |trimmed| &trimmed.kept);
     let rungs = match args.max_gap {
-        Some(max_gap) => coarsest_within(stem, kept, max_gap, &options, &mut tell).map(|rung| vec![rung]),
-        None if args.ladder => ladder(stem, kept, &options, &mut tell),
-        None => fit(stem, kept, &options, &mut tell).map(|fit| vec![fit.into()]),
+        Some(max_gap) => coarsest_within(stem, &mesh.points, max_gap, &options, &mut tell).map(|rung| vec![rung]),
+        None if args.ladder => ladder(stem, &mesh.points, &options, &mut tell),
+        None => fit(stem, &mesh.points, &options, &mut tell).map(|fit| vec![fit.into()]),
     }
-    .map_err(named)?;
+    .map_err(|error: FitError| format!("{}: {error}", input.display()))?;
     bar.finish_and_clear();
     rungs.iter().map(|rung| write(args, input, stem, trimmed.as_ref(), rung)).collect()
 }
@@ -305,7 +377,7 @@ fn progress_bar(stem: &str) -> ProgressBar {
     bar
 }
 
-fn table(out: &mut impl Write, rows: &[Row]) -> io::Result<()> {
+fn table(out: &mut dyn Write, rows: &[Row]) -> io::Result<()> {
     let width = rows.iter().map(|row| row.body.chars().count()).max().unwrap_or(0).max(4);
     writeln!(
         out,

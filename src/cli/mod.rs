@@ -14,6 +14,7 @@ mod measure;
 mod push;
 mod serve;
 mod show;
+mod sos_body;
 mod verify;
 
 use crate::body::Body;

@@ -1,7 +1,7 @@
 //! `sublevel show`.
 
-use super::{read_body, write_atomically};
-use crate::body::{Body, Sphere};
+use super::{read, read_body, sos_body, write_atomically};
+use crate::body::{Body, SosBody, Sphere};
 use crate::chart::{Ink, Outline, Panel, Silhouettes, View, boundary_points, outline};
 use serde_json::json;
 use std::error::Error;
@@ -14,7 +14,8 @@ const SILHOUETTE_POINTS: usize = 6000;
 
 /// Describe a body, export its surface, draw its silhouettes
 ///
-/// The file is re-proven first, as by 'verify'. Lengths are metres in the body frame.
+/// The file is re-proven first, as by 'verify'. Lengths are metres in the body frame. Of an sos-body, which need not be convex, only
+/// the description is printed.
 ///
 /// Example: sublevel show bodies/mug-d6.json --mesh mug.obj --svg mug.svg
 #[derive(Debug, clap::Args)]
@@ -34,6 +35,12 @@ pub(super) struct ShowArgs {
 
 /// Describes and exports.
 pub(super) fn run(args: &ShowArgs) -> Result<(), Box<dyn Error>> {
+    if SosBody::is_file(&read(&args.file)?) {
+        if args.mesh.is_some() || args.svg.is_some() {
+            return Err(format!("{}: an sos-body is not drawn; leave out --mesh and --svg", args.file.display()).into());
+        }
+        return sos_body::show(&args.file, args.json);
+    }
     let body = read_body(&args.file)?;
     if let Some(path) = &args.mesh {
         write_atomically(path, &mesh(&body))?;

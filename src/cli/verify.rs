@@ -1,7 +1,7 @@
 //! `sublevel verify`.
 
-use super::{Outcome, one_line, read};
-use crate::body::Body;
+use super::{Outcome, one_line, read, sos_body};
+use crate::body::{Body, SosBody};
 use serde::Serialize;
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -12,22 +12,25 @@ use std::path::PathBuf;
 /// value but gap_m, which needs the object. With --points it also proves that every point of a mesh is inside, and bounds anew how far the body reaches beyond
 /// their convex hull. Exit code 0 only if every claim holds.
 ///
+/// An sos-body, which need not be convex, is proven to be of a sum of squares and as near to convex as it says; with --points, to hold
+/// the points, and no fewer triangles between them than it says.
+///
 /// Example: sublevel verify bodies/mug-d6.json --points mug.obj --scale 0.001
 #[derive(Debug, clap::Args)]
 pub(super) struct VerifyArgs {
     /// Body file
-    file: PathBuf,
+    pub(super) file: PathBuf,
     /// Mesh or points that the body must contain
     #[cfg(feature = "fit")]
     #[arg(long, value_name = "MESH")]
-    points: Option<PathBuf>,
+    pub(super) points: Option<PathBuf>,
     /// Metres per unit of the points
     #[cfg(feature = "fit")]
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, requires = "points", allow_negative_numbers = true)]
-    scale: f64,
+    pub(super) scale: f64,
     /// Print one JSON object instead of sentences
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 #[derive(Serialize)]
@@ -44,6 +47,9 @@ struct Report {
 /// Proves, prints, and tells whether every claim holds.
 pub(super) fn run(args: &VerifyArgs) -> Outcome {
     let text = read(&args.file)?;
+    if SosBody::is_file(&text) {
+        return sos_body::verify(args, &text);
+    }
     let (report, trouble) = match Body::from_json(&text) {
         Ok(body) => contained(args, &body)?,
         Err(error) => {

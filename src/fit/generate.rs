@@ -34,19 +34,21 @@ const ROUNDS: usize = 60;
 pub(super) struct Optimum {
     /// Coefficients of p on `Structure::monomials`.
     pub(super) coefficients: DVector<f64>,
-    /// Gram matrix of its Hessian form.
+    /// Gram matrix of its Hessian form, and of what relaxes convexity.
     pub(super) hessian: DMatrix<f64>,
+    /// Gram matrix of p.
+    pub(super) gram: Option<DMatrix<f64>>,
     /// f minus its lower bound from the dual; at most [`OPTIMALITY_GAP`] in proportion.
     pub(super) gap: f64,
     /// f, in the whitened frame for log dets and in the unit frame for traces.
     pub(super) objective: f64,
 }
 
-/// Minimises the objective over sos-convex p with `p <= 1` at `points` (whitened: the unit ball is their smallest
+/// Minimises the objective over p, sos-convex as far as the problem asks for it, with `p <= 1` at `points` (whitened: the unit ball is their smallest
 /// ellipsoid).
 pub(super) fn generate(problem: Problem, points: &[Vector3<f64>], watch: &mut Watch) -> Result<Optimum, FitError> {
     let structure = problem.structure;
-    let mut active = Active::start(structure, points);
+    let mut active = Active::start(&problem, points);
     let mut worst = 0.0;
     for round in 1..=ROUNDS {
         // Points come in while the optimum is still rough.
@@ -87,7 +89,7 @@ fn verified(problem: &Problem, centre: Centre) -> Result<Optimum, FitError> {
         return Err(FitError::NotOptimal { gap });
     }
     let Interior { coefficients, hessian } = centre.interior;
-    Ok(Optimum { gap, objective, coefficients, hessian })
+    Ok(Optimum { gap, objective, coefficients, hessian, gram: centre.gram })
 }
 
 /// Points with p above 1, the farthest first.
@@ -112,9 +114,10 @@ struct Active {
 }
 
 impl Active {
-    /// A well-spread subset, and as many points inside the hull: those constrain nothing, but with weight on them the
+    /// A well-spread subset, and for convex p as many points inside the hull: those constrain nothing, but with weight on them the
     /// moments are positive definite also when the points lie on a quadric, as the corners of a box do.
-    fn start(structure: &Structure, points: &[Vector3<f64>]) -> Self {
+    fn start(problem: &Problem, points: &[Vector3<f64>]) -> Self {
+        let structure = problem.structure;
         let wanted = (SPREAD * structure.gram.size).min(points.len());
         let mut used = vec![false; points.len()];
         let mut distance = vec![f64::INFINITY; points.len()];
@@ -128,7 +131,9 @@ impl Active {
             }
             next = (0..points.len()).max_by(|&a, &b| distance[a].total_cmp(&distance[b])).unwrap_or(0);
         }
-        chosen.extend(inner(structure, &chosen));
+        if problem.is_convex() {
+            chosen.extend(inner(structure, &chosen));
+        }
         let values = columns(structure, &chosen);
         Self { used, chosen, values }
     }

@@ -5,11 +5,13 @@
 //! following the central path of the dual (`path`); `refine` goes on to the volume itself; the constant coefficient pulls every
 //! input point inside; [`Body::new`] proves the stored numbers; `slab` cuts off what is too much, and [`gap`](gap()) bounds what
 //! is left of it. Nothing of that is believed: a fit returns a body only with its proofs. A [`ladder`](ladder()) has several of them.
+//! [`fit_sos`] goes the same way to sets that need not be convex.
 
 mod ball;
 mod barrier;
 mod basis;
 mod certificate;
+mod coordinates;
 mod cuboid;
 pub mod ellipsoid;
 mod factor;
@@ -18,6 +20,7 @@ mod generate;
 pub mod hull;
 mod ladder;
 mod model;
+mod moment;
 mod object;
 mod objective;
 mod outermost;
@@ -27,6 +30,7 @@ mod progress;
 pub mod read;
 mod refine;
 mod slab;
+mod sos;
 mod spectral;
 mod structure;
 mod thicken;
@@ -34,6 +38,7 @@ mod trim;
 mod volume;
 
 pub use certificate::{NoCertificate, certificate};
+pub use coordinates::Coordinates;
 pub use cuboid::{OrientedBox, smallest_box};
 pub use gap::{Gap, gap};
 pub use hull::HullError;
@@ -44,10 +49,11 @@ pub use progress::Progress;
 pub use read::{Mesh, ReadError, read_mesh, read_points};
 pub use refine::RefinementEnd;
 pub use slab::CutError;
+pub use sos::{ProgramReport, SosFit, SosMethod, SosOptions, SosReport, fit_sos};
 pub use thicken::thicken;
 pub use trim::{Trimmed, trim};
 
-use crate::body::{Body, BodyError, NotContained, check_name};
+use crate::body::{Body, BodyError, NotContained, SosBodyError, TriangleError, check_name};
 use crate::polynomial::PolynomialError;
 use nalgebra::Vector3;
 use object::Object;
@@ -56,6 +62,9 @@ use std::ops::ControlFlow;
 /// Default of [`FitOptions::margin`].
 pub const DEFAULT_MARGIN: f64 = 1e-5;
 
+/// Factors on the margin for further attempts, when the certificate of a fit could not be proven.
+const MARGIN_ATTEMPTS: [f64; 3] = [1.0, 10.0, 100.0];
+
 /// What to fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitOptions {
@@ -63,6 +72,8 @@ pub struct FitOptions {
     pub degree: usize,
     /// What is minimised. Those of the Hessian's Gram matrix are offered up to degree 6.
     pub objective: Objective,
+    /// Coordinates that traces are measured in.
+    pub coordinates: Coordinates,
     /// Whether to minimise the volume itself, starting from the optimum of the objective.
     pub refine: bool,
     /// How many slabs to cut the body by, each across the direction in which it reaches farthest beyond the hull: 0 to
@@ -82,6 +93,7 @@ impl Default for FitOptions {
         Self {
             degree: 6,
             objective: Objective::default(),
+            coordinates: Coordinates::default(),
             refine: false,
             slabs: 0,
             margin: DEFAULT_MARGIN,
@@ -142,7 +154,7 @@ pub struct FitReport {
     pub iterations: usize,
     /// What was minimised.
     pub objective: Objective,
-    /// Its optimal value: log dets in the whitened frame, traces in the unit frame.
+    /// Its optimal value: log dets in the whitened frame, traces in the chosen coordinates.
     pub objective_value: f64,
     /// Margin the certificate was proven with.
     pub margin: f64,
@@ -174,6 +186,16 @@ pub enum FitError {
         /// The degree.
         degree: usize,
     },
+    /// Convexity relaxed by nothing, or less.
+    #[error(
+        "relax convexity: {0} is not positive; give c > 0, or inf for no bound of convexity, or fit a convex body, which is c = 0"
+    )]
+    Relaxation(f64),
+    /// The objective measures what is relaxed.
+    #[error(
+        "objective: {0} measures the Hessian form, which relaxed convexity leaves indefinite; take logdet-p or trace-p"
+    )]
+    RelaxedObjective(Objective),
     /// Too many slabs.
     #[error("slabs: {0} is more than {MAX_SLABS}; raise the degree instead")]
     Slabs(usize),
@@ -218,6 +240,23 @@ pub enum FitError {
     /// The points have no usable convex hull.
     #[error("points: {0}")]
     Hull(#[from] HullError),
+    /// The points lie on a surface.
+    #[error(
+        "points: they span only {rank} of the {monomials} monomials of degree {} (they are too few, or all near a surface of that \
+         degree), so nothing bounds a polynomial of degree {degree}; lower the degree, add points, or bound convexity (c finite or 0)",
+        degree / 2
+    )]
+    Span {
+        /// Degree of the polynomial.
+        degree: usize,
+        /// Rank of the moment matrix but for rounding.
+        rank: usize,
+        /// Monomials of half the degree.
+        monomials: usize,
+    },
+    /// A triangle names a point that is not there.
+    #[error("triangles: {0}")]
+    Triangles(#[from] TriangleError),
     /// The progress callback asked to stop.
     #[error("the fit was cancelled")]
     Cancelled,
@@ -245,6 +284,9 @@ pub enum FitError {
     /// The body could not be proven.
     #[error("the fitted polynomial could not be proven, also with a hundred times the margin: {0}; lower the degree")]
     Unproven(#[from] BodyError),
+    /// The set that need not be convex could not be proven.
+    #[error("the fitted polynomial could not be proven: {0}; lower the degree")]
+    UnprovenSos(#[from] SosBodyError),
     /// A point could not be proven inside.
     #[error("the fitted polynomial could not be proven to contain the points: {0}; lower the degree")]
     NotContained(#[from] NotContained),
@@ -256,8 +298,8 @@ pub enum FitError {
 /// Fits a body of one polynomial around `points` (metres) with the least [`FitOptions::objective`], and cuts it by
 /// [`FitOptions::slabs`].
 ///
-/// Log dets are least in every affine frame at once. Traces depend on the frame: they are measured in the unit frame, in
-/// which the points have their mean at the origin and largest norm 1.
+/// Log dets are least in every affine frame at once. Traces depend on the frame: they are measured in
+/// [`FitOptions::coordinates`].
 ///
 /// `progress` hears of every Newton step (below a millisecond at degree 4 to tens of milliseconds at degree 8), those of a
 /// refinement included, and can stop the fit.

@@ -2,6 +2,7 @@
 
 use super::ball::smallest_ball;
 use super::basis::Affine;
+use super::coordinates::Coordinates;
 use super::ellipsoid::{Ellipsoid, minimum_ellipsoid};
 use super::gap::{Gap, NONE, gap};
 use super::generate::{Optimum, generate};
@@ -11,15 +12,12 @@ use super::progress::{Progress, Watch};
 use super::refine::refine;
 use super::slab::cut;
 use super::structure::Structure;
-use super::{DEFAULT_MARGIN, Fit, FitError, FitOptions, FitReport, Objective, Rung};
+use super::{DEFAULT_MARGIN, Fit, FitError, FitOptions, FitReport, MARGIN_ATTEMPTS, Objective, Rung};
 use crate::body::{Body, BodyError, Constraint, Normalization, Placement, Provenance, Volume};
 use crate::polynomial::{HessianGram, Polynomial};
 use nalgebra::{Matrix3, Vector3};
 use std::ops::ControlFlow;
 use std::time::Instant;
-
-/// Factors on the margin for further attempts, when the certificate of a fit could not be proven.
-const MARGIN_ATTEMPTS: [f64; 3] = [1.0, 10.0, 100.0];
 
 /// What the smallest ball is said to minimise.
 const BALL: &str = "radius";
@@ -37,8 +35,6 @@ pub(super) struct Object<'a> {
     normalization: Normalization,
     /// The vertices there.
     whitened: Vec<Vector3<f64>>,
-    /// From there to the unit frame.
-    unit: Affine,
     /// What all this took.
     seconds: f64,
 }
@@ -53,9 +49,38 @@ impl<'a> Object<'a> {
         let ellipsoid = minimum_ellipsoid(&conditioned).ok_or(ProgramError::Singular)?;
         let normalization = whitening(&hull.frame, &ellipsoid).ok_or(ProgramError::Singular)?;
         let whitened = vertices.iter().map(|x| normalization.linear * (x - normalization.center)).collect();
-        let unit = unit_frame(points, &normalization).ok_or(ProgramError::Singular)?;
         let seconds = start.elapsed().as_secs_f64();
-        Ok(Self { name, points, input, hull, vertices, normalization, whitened, unit, seconds })
+        Ok(Self { name, points, input, hull, vertices, normalization, whitened, seconds })
+    }
+
+    /// Its name.
+    pub(super) fn name(&self) -> &str {
+        self.name
+    }
+
+    /// All points, metres.
+    pub(super) fn points(&self) -> &[Vector3<f64>] {
+        self.points
+    }
+
+    /// Their convex hull.
+    pub(super) fn hull(&self) -> &Hull {
+        &self.hull
+    }
+
+    /// The map to the frame in which the smallest ellipsoid is the unit ball.
+    pub(super) fn normalization(&self) -> Normalization {
+        self.normalization
+    }
+
+    /// A point there.
+    pub(super) fn whiten(&self, x: &Vector3<f64>) -> Vector3<f64> {
+        self.normalization.linear * (x - self.normalization.center)
+    }
+
+    /// The map from there to other coordinates.
+    pub(super) fn coordinates(&self, coordinates: Coordinates) -> Result<Affine, ProgramError> {
+        coordinates.map(self.points, &self.normalization).ok_or(ProgramError::Singular)
     }
 
     /// The smallest ball around the points.
@@ -71,10 +96,10 @@ impl<'a> Object<'a> {
     /// Values at all points of the polynomial of that degree with the least log det: 1 at the outermost.
     pub(super) fn levels(&self, degree: usize, watch: &mut Watch) -> Result<Vec<f64>, FitError> {
         let structure = Structure::new(degree);
-        let problem = Problem::new(&structure, Objective::LogDetP, &self.unit, DEFAULT_MARGIN);
+        let coordinates = self.coordinates(Coordinates::Unit)?;
+        let problem = Problem::new(&structure, Objective::LogDetP, &coordinates, DEFAULT_MARGIN);
         let optimum = generate(problem, &self.whitened, watch)?;
-        let Normalization { center, linear } = &self.normalization;
-        let value = |x: &Vector3<f64>| structure.values(&(linear * (x - center))).dot(&optimum.coefficients);
+        let value = |x: &Vector3<f64>| structure.values(&self.whiten(x)).dot(&optimum.coefficients);
         Ok(self.points.iter().map(value).collect())
     }
 
@@ -86,11 +111,12 @@ impl<'a> Object<'a> {
     ) -> Result<Fit, FitError> {
         let start = Instant::now();
         let structure = Structure::new(options.degree);
+        let coordinates = self.coordinates(options.coordinates)?;
         let mut attempts = MARGIN_ATTEMPTS.iter().map(|factor| factor * options.margin);
         let mut watch = Watch::new(progress);
         let (body, optimum, margin, volumes, refinement_end) = loop {
             let margin = attempts.next().unwrap_or(options.margin);
-            let problem = Problem::new(&structure, options.objective, &self.unit, margin);
+            let problem = Problem::new(&structure, options.objective, &coordinates, margin);
             let mut optimum = generate(problem, &self.whitened, &mut watch)?;
             let (mut volumes, mut end) = (Vec::new(), None);
             if options.refine {
@@ -174,26 +200,10 @@ impl<'a> Object<'a> {
         let polynomial = Polynomial::new(terms)?;
         let gram = HessianGram::nearest(&polynomial, structure.hessian_basis.clone(), optimum.hessian.clone())
             .map_err(|source| BodyError::Certificate { index: 0, source })?;
-        let mut constraint = Constraint { polynomial, gram };
         let inverse = normalization.linear.try_inverse().ok_or(ProgramError::Singular)?;
         let placement = Placement::new(normalization.linear, inverse, normalization.center, 0.0, 0.0);
-        // A million points are looked at once: which are highest does not change with the constant.
-        let values: Vec<f64> = points.iter().map(|x| placement.jet(&constraint, x).value).collect();
-        let top = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let outermost: Vec<_> = points.iter().zip(&values).filter(|(_, v)| **v >= top - 1e-3).map(|(x, _)| x).collect();
-        // The bound of the rounding moves a little with the constant: a second pass settles it.
-        for _ in 0..3 {
-            let highest = outermost
-                .iter()
-                .map(|x| placement.sample(&constraint, x).value_upper(0.0))
-                .fold(f64::NEG_INFINITY, f64::max);
-            let excess = highest - 1.0;
-            if (-1e-15..=0.0).contains(&excess) {
-                break;
-            }
-            constraint.polynomial = constraint.polynomial.with_constant_shifted(-(excess + 4.0 * f64::EPSILON));
-        }
-        Ok(Body::new(name, *normalization, vec![constraint])?.with_points(points)?)
+        let polynomial = pulled_inside(polynomial, points, &placement, 0.0);
+        Ok(Body::new(name, *normalization, vec![Constraint { polynomial, gram }])?.with_points(points)?)
     }
 }
 
@@ -209,13 +219,30 @@ fn whitening(frame: &Frame, ellipsoid: &Ellipsoid) -> Option<Normalization> {
     Some(Normalization { center, linear: Matrix3::from_diagonal(&decomposition.singular_values) * turn })
 }
 
-/// The map from the whitened frame to the unit frame.
-fn unit_frame(points: &[Vector3<f64>], whitened: &Normalization) -> Option<Affine> {
-    let count = points.len() as f64;
-    // About the center, which is near: far-off coordinates would round the mean away.
-    let offset = points.iter().map(|p| (p - whitened.center) / count).sum::<Vector3<f64>>();
-    let reach = points.iter().map(|p| (p - whitened.center - offset).norm()).fold(0.0, f64::max);
-    Some(Affine { linear: whitened.linear.try_inverse()? / reach, offset: -offset / reach })
+/// The polynomial with the constant coefficient that brings the highest of its values at the points to `1 - room`, rounding included.
+pub(super) fn pulled_inside(
+    mut polynomial: Polynomial,
+    points: &[Vector3<f64>],
+    placement: &Placement,
+    room: f64,
+) -> Polynomial {
+    // A million points are looked at once: which are highest does not change with the constant.
+    let values: Vec<f64> = points.iter().map(|x| placement.sample_of(&polynomial, x).value()).collect();
+    let top = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let outermost: Vec<_> = points.iter().zip(&values).filter(|(_, v)| **v >= top - 1e-3).map(|(x, _)| x).collect();
+    // The bound of the rounding moves a little with the constant: a second pass settles it.
+    for _ in 0..3 {
+        let highest = outermost
+            .iter()
+            .map(|x| placement.sample_of(&polynomial, x).value_upper(0.0))
+            .fold(f64::NEG_INFINITY, f64::max);
+        let excess = highest - (1.0 - room);
+        if (-1e-15..=0.0).contains(&excess) {
+            break;
+        }
+        polynomial = polynomial.with_constant_shifted(-(excess + 4.0 * f64::EPSILON));
+    }
+    polynomial
 }
 
 fn check(points: &[Vector3<f64>]) -> Result<(), FitError> {

@@ -3,7 +3,7 @@
 //! The dual of `program` has few variables, and its barrier problem, here for the Gram matrix P,
 //!
 //! ```text
-//! minimise  τ (-φ(M(m)) + Σwᵢ - ε tr S(s)) - Σ log wᵢ - log det S(s),   m = Σ wᵢ v(xᵢ) - D*s
+//! minimise  τ (-φ(M(m)) + Σwᵢ - ε tr S(s) + h·s) - Σ log wᵢ - log det S(s),   m = Σ wᵢ v(xᵢ) - D*s
 //! ```
 //!
 //! costs one small dense factorization per Newton step (Nesterov and Nemirovskii, Interior-Point Polynomial Algorithms,
@@ -19,6 +19,7 @@ use super::program::{Dual, Problem};
 use super::progress::Watch;
 use super::spectral::Spectral;
 use super::structure::{Pattern, Structure};
+use crate::polynomial::degree_of;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// Newton decrement below which a point counts as a centre; 1 is where its polynomial stops being feasible.
@@ -30,7 +31,7 @@ const LEAST_GROWTH: f64 = 1.3;
 /// the trace in rounding.
 const TRACE_SHARE: f64 = 1e-4;
 
-/// What the path minimises, besides `Σw - ε tr S`.
+/// What the path minimises, besides `Σw - ε tr S + h·s`.
 #[derive(Clone, Copy)]
 pub(super) enum Goal<'a> {
     /// `-φ` of the moment matrix of one Gram matrix.
@@ -85,8 +86,10 @@ pub(super) struct Path<'a> {
     goal: Goal<'a>,
     /// D: Hessian forms x monomials.
     derivative: DMatrix<f64>,
-    /// `tr S` as a functional of s.
-    trace: DVector<f64>,
+    /// h: what the Hessian form of p may lack.
+    allowance: DVector<f64>,
+    /// `h·s - ε tr S` as a functional of s.
+    cost: DVector<f64>,
 }
 
 /// A damped Newton step.
@@ -104,17 +107,23 @@ struct Newton {
 impl<'a> Path<'a> {
     /// The path of a fit over the points whose monomials are the columns of `values`.
     pub(super) fn of_fit(problem: &'a Problem, values: &'a DMatrix<f64>) -> Self {
-        Self::new(problem.structure, values, problem.margin, Goal::Gram(problem.matrix, &problem.spectral))
+        let mut path =
+            Self::new(problem.structure, values, problem.margin, Goal::Gram(problem.matrix, &problem.spectral));
+        if let Some(allowance) = &problem.allowance {
+            path.allowance += allowance;
+            path.cost += allowance;
+        }
+        path
     }
 
     pub(super) fn new(structure: &'a Structure, values: &'a DMatrix<f64>, margin: f64, goal: Goal<'a>) -> Self {
         let forms = structure.hessian.keys;
-        let mut trace = DVector::zeros(forms);
+        let mut cost = DVector::zeros(forms);
         for i in 0..structure.hessian.size {
-            trace[structure.hessian.key(i, i)] += 1.0;
+            cost[structure.hessian.key(i, i)] -= margin;
         }
         let derivative = structure.derivative_matrix();
-        Self { structure, values, margin, goal, derivative, trace }
+        Self { structure, values, margin, goal, derivative, allowance: DVector::zeros(forms), cost }
     }
 
     fn pattern(&self, matrix: Matrix) -> &'a Pattern {
@@ -161,27 +170,36 @@ impl<'a> Path<'a> {
     }
 
     /// Equal weights that add up to the rows of P, and y isotropic and independent of z: S is positive definite, and small
-    /// enough to leave M so.
+    /// enough to leave M so. Where relaxed convexity has no points inside to go by, as of a sphere, z closer to the centre helps.
     pub(super) fn start(&self) -> Option<Place> {
         let points = self.values.ncols();
         let rows = self.structure.gram.size as f64;
         let weights = DVector::repeat(points, rows / points as f64);
-        let isotropic = isotropic_form(self.structure, &(self.values * DVector::repeat(points, 1.0 / points as f64)));
-        let dual = (0..40).find_map(|halvings| {
-            let point = self.point(weights.clone(), &isotropic * 0.5_f64.powi(halvings));
-            Cholesky::new(self.structure.gram.spread(&point.moments))?;
-            Some(self.point(weights.clone(), &isotropic * 0.5_f64.powi(halvings + 1)))
+        let mean = self.values * DVector::repeat(points, 1.0 / points as f64);
+        let dual = [1.0, 0.5, 0.25].into_iter().find_map(|shrink: f64| {
+            let order = self.structure.monomials.iter().map(|&e| shrink.powi(degree_of(e) as i32));
+            let isotropic =
+                isotropic_form(self.structure, &mean.component_mul(&DVector::from_iterator(mean.len(), order)));
+            (0..40).find_map(|halvings| {
+                let point = self.point(weights.clone(), &isotropic * 0.5_f64.powi(halvings));
+                Cholesky::new(self.structure.gram.spread(&point.moments))?;
+                Some(self.point(weights.clone(), &isotropic * 0.5_f64.powi(halvings + 1)))
+            })
         })?;
-        match self.goal {
+        let Place { dual, tau } = match self.goal {
             Goal::Gram(_, spectral) if !spectral.is_self_concordant() => {
                 // The functional is a poor guess for traces, so the barriers rule at first; then this scale is best.
                 let size = self.size(&dual);
                 let scale = size * (1.0 + self.barrier_parameter() / (TRACE_SHARE * rows));
                 let dual = self.point(dual.weights * scale.powi(2), dual.form * scale.powi(2));
-                Some(Place { dual, tau: 1.0 / (size * scale) })
+                Place { dual, tau: 1.0 / (size * scale) }
             }
-            _ => Some(Place { dual, tau: 1.0 }),
-        }
+            _ => Place { dual, tau: 1.0 },
+        };
+        // At a centre the rows of S are what relaxed convexity costs: a start that costs more is far from any.
+        let least = self.structure.hessian.size as f64 / (tau * self.cost.dot(&dual.form));
+        let share = if least > 0.0 { least.min(1.0) } else { 1.0 };
+        Some(Place { dual: self.point(dual.weights, dual.form * share), tau })
     }
 
     /// The last centre before the steps ran out or rounding stood in the way; its τ tells how far that is.
@@ -231,7 +249,7 @@ impl<'a> Path<'a> {
         };
         let of_form = self.barrier(Matrix::Hessian, tau).value(&point.form)?;
         let weights = point.weights.iter().map(|w| w.ln()).sum::<f64>();
-        let cost = point.weights.sum() - self.margin * self.trace.dot(&point.form);
+        let cost = point.weights.sum() + self.cost.dot(&point.form);
         let value = of_moments + of_form + tau * cost - weights;
         value.is_finite().then_some(value)
     }
@@ -255,7 +273,7 @@ impl<'a> Path<'a> {
         let (gram, curvature) = self.barrier(Matrix::Hessian, tau).derivatives(&at.form)?;
         let form_factor = regularised_factor(&curvature)?;
         let of_weights = (values.tr_mul(&coefficients) * -1.0).add_scalar(tau) - at.weights.map(|w| 1.0 / w);
-        let of_form = derivative * &coefficients - &self.trace * (self.margin * tau) - gram;
+        let of_form = derivative * &coefficients + &self.cost * tau - gram;
         // 2. All but the part of m is block diagonal; that has the rank of the moments (Woodbury).
         let half = solve_lower(&form_factor, derivative.clone())?;
         let half_gradient = form_factor.solve_lower_triangular(&of_form)?;
@@ -295,7 +313,7 @@ impl<'a> Path<'a> {
         let Structure { gram, hessian, .. } = self.structure;
         let margin = DMatrix::identity(hessian.size, hessian.size) * self.margin;
         let form = self.barrier(Matrix::Hessian, tau).predicted(&at.form, &newton.whole.form)? / tau + &margin;
-        let form = hessian.nearest(&form, &(&self.derivative * &coefficients));
+        let form = hessian.nearest(&form, &(&self.derivative * &coefficients + &self.allowance));
         Cholesky::new(&form - margin * 0.5)?;
         let gram = match self.goal {
             Goal::Model(_) => None,

@@ -20,6 +20,9 @@
 //! maximise  φ(S(s)) - Σwᵢ   subject to  m = Σ wᵢ v(xᵢ) - D*s,  M(m) ⪰ 0,  w >= 0
 //! ```
 //!
+//! With convexity relaxed, `p + r` is sos-convex in place of p, for `r = c |u|^2d` in given coordinates u: with h the coefficients of the
+//! Hessian form of r, the constraint `yᵀ∇²(p + r) y = wᵀHw` takes `h·s` off the dual objective, and nothing else changes.
+//!
 //! The optimal Gram matrix is the gradient of φ at the optimum. The dual needs no exponential cones, and no block of twice
 //! the size for determinant or inverse (`path`).
 
@@ -27,6 +30,7 @@ use super::basis::{Affine, change};
 use super::objective::{Function, Matrix, Objective};
 use super::spectral::Spectral;
 use super::structure::{Pattern, Structure};
+use crate::polynomial::NormPower;
 use nalgebra::{DMatrix, DVector};
 
 /// Why a program could not be solved.
@@ -61,6 +65,8 @@ pub(super) struct Problem<'a> {
     pub(super) spectral: Spectral,
     /// ε; 0 when H is measured.
     pub(super) margin: f64,
+    /// h: coefficients of the Hessian form of what relaxes convexity; none if nothing does.
+    pub(super) allowance: Option<DVector<f64>>,
 }
 
 impl<'a> Problem<'a> {
@@ -75,7 +81,24 @@ impl<'a> Problem<'a> {
             Matrix::Polynomial => margin,
             Matrix::Hessian => 0.0,
         };
-        Self { structure, matrix, spectral, margin }
+        Self { structure, matrix, spectral, margin, allowance: None }
+    }
+
+    /// The same program with convexity asked of `p + power` only.
+    pub(super) fn relaxed(mut self, power: Option<&NormPower>) -> Self {
+        self.allowance = power.map(|power| {
+            let mut coefficients = DVector::zeros(self.structure.monomials.len());
+            for (value, monomial) in coefficients.iter_mut().zip(&self.structure.monomials) {
+                *value = power.terms().iter().find(|term| term.0 == *monomial).map_or(0.0, |term| term.1);
+            }
+            self.structure.derivative_matrix() * coefficients
+        });
+        self
+    }
+
+    /// Whether every mixture of points satisfies what the points do, as p is convex.
+    pub(super) fn is_convex(&self) -> bool {
+        self.allowance.is_none() && self.structure.hessian.size > 0
     }
 
     /// The pattern of the measured matrix.
@@ -99,10 +122,11 @@ impl<'a> Problem<'a> {
         self.pattern().spread(self.variable(dual))
     }
 
-    /// The linear part of the dual objective, `Σw - ε tr S`.
+    /// The linear part of the dual objective, `Σw - ε tr S + h·s`.
     pub(super) fn cost(&self, dual: &Dual) -> f64 {
         let trace = if self.margin > 0.0 { self.margin * self.structure.hessian.trace(&dual.form) } else { 0.0 };
-        dual.weights.sum() - trace
+        let allowed = self.allowance.as_ref().map_or(0.0, |allowance| allowance.dot(&dual.form));
+        dual.weights.sum() - trace + allowed
     }
 
     /// The dual objective: a lower bound of f over all feasible polynomials.

@@ -135,6 +135,12 @@ impl Structure {
         Self { degree, monomials: all, gram, hessian_basis, hessian, derivative }
     }
 
+    /// The maps for even `degree` where nothing is asked of the Hessian: its form has no basis and no keys.
+    pub(super) fn without_convexity(degree: usize) -> Self {
+        let hessian = Pattern { size: 0, keys: 0, key: Vec::new() };
+        Self { hessian_basis: Vec::new(), hessian, derivative: Vec::new(), ..Self::new(degree) }
+    }
+
     /// Values of all monomials of p at `z`.
     pub(super) fn values(&self, z: &Vector3<f64>) -> DVector<f64> {
         let powers: [[f64; 9]; 3] = std::array::from_fn(|i| {

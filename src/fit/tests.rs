@@ -9,6 +9,7 @@ use crate::polynomial::Polynomial;
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3};
 
 mod primal;
+mod sos;
 
 fn unwatched(_: Progress) -> ControlFlow<()> {
     ControlFlow::Continue(())

@@ -5,7 +5,7 @@
 //! centre of each, the polynomial has its cancellation done, and what Taylor's formula adds for the small cube is little.
 
 use super::Polynomial;
-use super::monomial::Exponents;
+use super::dense::{Dense, dense, shifted};
 use super::rounding::gamma;
 use nalgebra::Vector3;
 
@@ -26,9 +26,6 @@ pub struct ThirdCeiling {
     /// Length of a step from a point near the level along which the bound holds.
     pub leeway: f64,
 }
-
-/// Coefficients of degree at most 8 by their exponents.
-type Dense = [[[f64; 9]; 9]; 9];
 
 /// Bound over the points with `|z_i| <= radius` where the convex `p` is within [`NEAR_LEVEL`] of 1, and along steps of the leeway
 /// from there: the largest Frobenius norm of the third derivative. `absolute` is the same bound by absolute coefficients
@@ -74,44 +71,6 @@ pub(super) fn third_ceiling(p: &Polynomial, radius: f64, absolute: f64) -> Third
     }
     // Each coefficient passed through fewer than 3 * 8 * 2 roundings, on a sum bounded by the one of absolute values.
     ThirdCeiling { ceiling: (largest * (1.0 + 1e-12) + gamma(100) * absolute) * (1.0 + 1e-12), leeway }
-}
-
-fn dense(terms: &[(Exponents, f64)]) -> Dense {
-    let mut dense: Dense = [[[0.0; 9]; 9]; 9];
-    for &([i, j, k], coefficient) in terms {
-        dense[usize::from(i)][usize::from(j)][usize::from(k)] = coefficient;
-    }
-    dense
-}
-
-/// Coefficients of `p(z + by e_axis)`: synthetic division, line by line.
-fn shifted(dense: &Dense, degree: usize, by: f64, axis: usize) -> Dense {
-    let mut result = *dense;
-    for i in 0..=degree {
-        for j in 0..=degree - i {
-            let longest = degree - i - j;
-            let mut line = [0.0; 9];
-            let place = |k: usize| match axis {
-                0 => [k, i, j],
-                1 => [i, k, j],
-                _ => [i, j, k],
-            };
-            for k in 0..=longest {
-                let [a, b, c] = place(k);
-                line[k] = result[a][b][c];
-            }
-            for start in 0..longest {
-                for k in (start..longest).rev() {
-                    line[k] += by * line[k + 1];
-                }
-            }
-            for k in 0..=longest {
-                let [a, b, c] = place(k);
-                result[a][b][c] = line[k];
-            }
-        }
-    }
-    result
 }
 
 /// Bound of the Frobenius norm of the third derivative at all points within `distance`, by Taylor's formula: the k-th derivative

@@ -7,9 +7,9 @@
 use super::Polynomial;
 use super::definite::is_positive_definite_above;
 use super::monomial::{Exponents, monomials};
-use super::rounding::gamma;
+use super::norm_power::NormPower;
+use super::residual::{Residuals, check_matrix};
 use nalgebra::DMatrix;
-use std::collections::BTreeMap;
 
 /// Basis element `y_direction · z^exponents` of a Hessian form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -35,14 +35,25 @@ pub struct Margin {
     pub residual: f64,
 }
 
+impl Margin {
+    /// Proves all eigenvalues of a Gram matrix above its residual.
+    pub(super) fn of(matrix: &DMatrix<f64>, residual: f64) -> Result<Self, CertificateError> {
+        if is_positive_definite_above(matrix, residual) {
+            return Ok(Self { residual });
+        }
+        let smallest_eigenvalue = matrix.symmetric_eigenvalues().min();
+        Err(CertificateError::NotDefinite { residual, smallest_eigenvalue })
+    }
+}
+
 /// Why a certificate proves nothing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CertificateError {
     /// The basis or matrix is malformed.
     #[error("the certificate is malformed: {0}")]
     Malformed(String),
-    /// The Hessian form has a monomial no product of two basis elements gives.
-    #[error("the certificate's basis can not express the Hessian term {0}; use a larger basis")]
+    /// The form has a monomial no product of two basis elements gives.
+    #[error("the certificate's basis can not express the {0}; use a larger basis")]
     BasisTooSmall(String),
     /// The smallest eigenvalue does not exceed the residual.
     #[error(
@@ -67,47 +78,22 @@ fn product(a: &HessianMonomial, b: &HessianMonomial) -> FormMonomial {
 }
 
 /// `yᵀ ∇²p(z) y` as integer multiples of coefficients of p: each monomial comes from one term.
-fn hessian_form(polynomial: &Polynomial) -> BTreeMap<FormMonomial, (f64, f64)> {
-    let mut form = BTreeMap::new();
-    for &(exponents, coefficient) in polynomial.terms() {
-        for i in 0..3_usize {
-            for j in i..3 {
-                let factor = if i == j {
-                    f64::from(exponents[i]) * (f64::from(exponents[i]) - 1.0)
-                } else {
-                    2.0 * f64::from(exponents[i]) * f64::from(exponents[j])
-                };
-                if factor > 0.0 {
-                    let mut rest = exponents;
-                    rest[i] -= 1;
-                    rest[j] -= 1;
-                    form.insert((i as u8, j as u8, rest), (coefficient, factor));
-                }
-            }
+fn hessian_form(exponents: Exponents) -> impl Iterator<Item = (FormMonomial, f64)> {
+    let pairs = (0..3_usize).flat_map(|i| (i..3).map(move |j| (i, j)));
+    pairs.filter_map(move |(i, j)| {
+        let factor = if i == j {
+            f64::from(exponents[i]) * (f64::from(exponents[i]) - 1.0)
+        } else {
+            2.0 * f64::from(exponents[i]) * f64::from(exponents[j])
+        };
+        if factor <= 0.0 {
+            return None;
         }
-    }
-    form
-}
-
-/// Sum of floating-point numbers and a bound of its error.
-#[derive(Default)]
-struct BoundedSum {
-    sum: f64,
-    magnitude: f64,
-    terms: usize,
-}
-
-impl BoundedSum {
-    fn add(&mut self, value: f64) {
-        self.sum += value;
-        self.magnitude += value.abs();
-        self.terms += 1;
-    }
-
-    /// Upper bound of the magnitude of the exact sum; each addend may itself carry one rounding.
-    fn magnitude_bound(&self) -> f64 {
-        (self.sum.abs() + gamma(self.terms + 1) * self.magnitude * (1.0 + gamma(self.terms))).next_up()
-    }
+        let mut rest = exponents;
+        rest[i] -= 1;
+        rest[j] -= 1;
+        Some(((i as u8, j as u8, rest), factor))
+    })
 }
 
 impl HessianGram {
@@ -130,20 +116,7 @@ impl HessianGram {
         if sorted.windows(2).any(|pair| pair[0] == pair[1]) {
             return malformed("a basis element occurs twice".into());
         }
-        if matrix.shape() != (n, n) {
-            return malformed(format!(
-                "its matrix is {}x{} but its basis has {n} elements",
-                matrix.nrows(),
-                matrix.ncols()
-            ));
-        }
-        for i in 0..n {
-            for j in 0..=i {
-                if !matrix[(i, j)].is_finite() || matrix[(i, j)] != matrix[(j, i)] {
-                    return malformed(format!("matrix entries ({i}, {j}) and ({j}, {i}) are not finite and equal"));
-                }
-            }
-        }
+        check_matrix(&matrix, n)?;
         Ok(Self { basis, matrix })
     }
 
@@ -155,27 +128,32 @@ impl HessianGram {
             .collect()
     }
 
-    /// The matrix closest to `matrix` (Frobenius norm) whose form matches the polynomial, up to rounding: the residual of
-    /// every monomial is spread evenly over the positions that produce it.
+    /// The matrix closest to `matrix` (Frobenius norm) whose form matches the polynomial, up to rounding.
+    ///
+    /// # Errors
+    /// As of [`HessianGram::new`].
     pub fn nearest(
         polynomial: &Polynomial,
         basis: Vec<HessianMonomial>,
         matrix: DMatrix<f64>,
     ) -> Result<Self, CertificateError> {
         let mut gram = Self::new(basis, matrix)?;
-        let n = gram.basis.len();
-        let correction: BTreeMap<_, _> = gram
-            .residuals(polynomial)
-            .into_iter()
-            .map(|(key, (sum, count))| (key, sum.sum / count.max(1) as f64))
-            .collect();
-        for i in 0..n {
-            for j in 0..n {
-                if let Some(step) = correction.get(&product(&gram.basis[i], &gram.basis[j])) {
-                    gram.matrix[(i, j)] += step;
-                }
-            }
-        }
+        gram.residuals(polynomial, None).close(&mut gram.matrix, |i, j| product(&gram.basis[i], &gram.basis[j]));
+        Ok(gram)
+    }
+
+    /// As [`HessianGram::nearest`], of the sum of the polynomial and `power`.
+    ///
+    /// # Errors
+    /// As of [`HessianGram::new`].
+    pub fn nearest_with(
+        polynomial: &Polynomial,
+        power: &NormPower,
+        basis: Vec<HessianMonomial>,
+        matrix: DMatrix<f64>,
+    ) -> Result<Self, CertificateError> {
+        let mut gram = Self::new(basis, matrix)?;
+        gram.residuals(polynomial, Some(power)).close(&mut gram.matrix, |i, j| product(&gram.basis[i], &gram.basis[j]));
         Ok(gram)
     }
 
@@ -189,20 +167,17 @@ impl HessianGram {
         &self.matrix
     }
 
-    /// Per monomial β of the form: coefficient of the polynomial's form minus that of `wᵀ H w`, and the number n_β of
-    /// ordered matrix positions that produce β.
-    fn residuals(&self, polynomial: &Polynomial) -> BTreeMap<FormMonomial, (BoundedSum, usize)> {
-        let mut residuals: BTreeMap<FormMonomial, (BoundedSum, usize)> = BTreeMap::new();
-        for (key, (coefficient, factor)) in hessian_form(polynomial) {
-            residuals.entry(key).or_default().0.add(coefficient * factor);
+    /// What the form of the polynomial, and of `power`, has beyond `wᵀ H w`.
+    fn residuals(&self, polynomial: &Polynomial, power: Option<&NormPower>) -> Residuals<FormMonomial> {
+        let mut residuals = Residuals::default();
+        for &(exponents, coefficient) in polynomial.terms() {
+            hessian_form(exponents).for_each(|(key, factor)| residuals.add(key, coefficient * factor, 0.0));
         }
-        for (i, a) in self.basis.iter().enumerate() {
-            for (j, b) in self.basis.iter().enumerate() {
-                let (sum, count) = residuals.entry(product(a, b)).or_default();
-                sum.add(-self.matrix[(i, j)]);
-                *count += 1;
-            }
+        for &(exponents, coefficient, error) in power.iter().flat_map(|power| power.terms()) {
+            hessian_form(exponents)
+                .for_each(|(key, factor)| residuals.add(key, coefficient * factor, (error * factor).next_up()));
         }
+        residuals.subtract(&self.matrix, |i, j| product(&self.basis[i], &self.basis[j]));
         residuals
     }
 
@@ -212,13 +187,15 @@ impl HessianGram {
     /// # Errors
     /// What is missing for a proof, and by how much.
     pub fn prove(&self, polynomial: &Polynomial) -> Result<Margin, CertificateError> {
-        let residual = self.residual(polynomial)?;
-        if is_positive_definite_above(&self.matrix, residual) {
-            Ok(Margin { residual })
-        } else {
-            let smallest_eigenvalue = self.matrix.symmetric_eigenvalues().min();
-            Err(CertificateError::NotDefinite { residual, smallest_eigenvalue })
-        }
+        Margin::of(&self.matrix, self.residual(polynomial, None)?)
+    }
+
+    /// Proves the sum of the polynomial and `power` sos-convex: the polynomial itself is, but for what `power` bends.
+    ///
+    /// # Errors
+    /// What is missing for a proof, and by how much.
+    pub fn prove_with(&self, polynomial: &Polynomial, power: &NormPower) -> Result<Margin, CertificateError> {
+        Margin::of(&self.matrix, self.residual(polynomial, Some(power))?)
     }
 
     /// A proven c >= 0 with `yᵀ ∇²p(z) y >= c |y|²` for all y and z; 0 when there is none or none is found.
@@ -228,7 +205,7 @@ impl HessianGram {
     pub fn curvature_floor(&self, polynomial: &Polynomial) -> f64 {
         let plain: Vec<usize> = (0..self.basis.len()).filter(|&i| self.basis[i].exponents == [0, 0, 0]).collect();
         let rest: Vec<usize> = (0..self.basis.len()).filter(|i| !plain.contains(i)).collect();
-        let (Ok(residual), 3) = (self.residual(polynomial), plain.len()) else { return 0.0 };
+        let (Ok(residual), 3) = (self.residual(polynomial, None), plain.len()) else { return 0.0 };
         let block = |rows: &[usize], columns: &[usize]| {
             DMatrix::from_fn(rows.len(), columns.len(), |i, j| self.matrix[(rows[i], columns[j])])
         };
@@ -254,18 +231,9 @@ impl HessianGram {
     }
 
     /// Bound δ of the correction that makes the matrix match the polynomial exactly.
-    fn residual(&self, polynomial: &Polynomial) -> Result<f64, CertificateError> {
-        // Above zero: squares of tiny residuals may underflow.
-        let mut squares = f64::MIN_POSITIVE;
-        for ((i, j, exponents), (sum, count)) in self.residuals(polynomial) {
-            let residual = sum.magnitude_bound();
-            if count == 0 {
-                let [a, b, c] = exponents;
-                return Err(CertificateError::BasisTooSmall(format!("y{i} y{j} z^({a}, {b}, {c})")));
-            }
-            squares += residual * residual / count as f64;
-        }
-        // Fewer than 2^12 roundings in the sum and root.
-        Ok((squares.sqrt() * (1.0 + 1e-12)).next_up())
+    fn residual(&self, polynomial: &Polynomial, power: Option<&NormPower>) -> Result<f64, CertificateError> {
+        self.residuals(polynomial, power).norm().map_err(|(i, j, [a, b, c])| {
+            CertificateError::BasisTooSmall(format!("Hessian term y{i} y{j} z^({a}, {b}, {c})"))
+        })
     }
 }

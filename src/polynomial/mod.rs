@@ -4,20 +4,31 @@
 //! or bodies.
 
 mod ceiling;
+mod chord;
 mod definite;
+mod dense;
 mod gram;
 mod hessian_form;
 mod monomial;
 mod nested;
+mod norm_power;
+mod patch;
+mod range;
+mod residual;
 mod rounding;
 mod simd;
+mod sos_gram;
 
 pub use ceiling::{NEAR_LEVEL, ThirdCeiling};
+pub use chord::Chords;
 pub use gram::{CertificateError, HessianGram, HessianMonomial, Margin};
 pub use hessian_form::{Jet, NumberJet};
 pub use monomial::{Exponents, degree_of, monomials};
+pub use norm_power::NormPower;
+pub use patch::Peak;
 pub use rounding::{Growth, gamma};
 pub use simd::{Arch, Lanes, MAX_LANES, Number, Scalar, Simd, WithSimd, dispatch};
+pub use sos_gram::SosGram;
 
 use hessian_form::HessianForm;
 use nalgebra::Vector3;
@@ -138,6 +149,18 @@ impl Polynomial {
     /// values are within [`NEAR_LEVEL`] of 1.
     pub fn third_ceiling(&self, radius: f64) -> ThirdCeiling {
         ceiling::third_ceiling(self, radius, self.absolute.third_ceiling(2.0 * radius))
+    }
+
+    /// The value at `center`, up to rounding, and a proven lower bound of the values where `|z_i - center_i| <= half_i`.
+    pub fn floor_within(&self, center: &Vector3<f64>, half: &Vector3<f64>) -> (f64, f64) {
+        range::floor_within(self, center, half)
+    }
+
+    /// How high the polynomial reaches on the triangle with these corners, and within `distance` (each coordinate) of it.
+    ///
+    /// The proven bound is as tight as it takes to be on one side of `level`, or within a thousandth of the highest value found.
+    pub fn peak(&self, corners: &[Vector3<f64>; 3], distance: f64, level: f64) -> Peak {
+        patch::peak(self, corners, distance, level)
     }
 
     /// Bounds at all points with `|z_i| <= coordinate`, `|z| <= length`: tighter by a power of √3 for knowing both.

@@ -80,6 +80,12 @@ impl AbsolutePolynomial {
         (q, dq, 2.0 * half_ddq)
     }
 
+    /// Bound of the values of p with absolute coefficients, and of the sum of its slopes, where `|z_i| <= r`.
+    pub(super) fn magnitude(&self, r: f64) -> (f64, f64) {
+        let (q, dq, _) = self.jet(r);
+        (q * (1.0 + 1e-13) + self.underflow(r), dq * (1.0 + 1e-13) + self.underflow(r))
+    }
+
     fn underflow(&self, r: f64) -> f64 {
         // Without a call to a general power.
         let square = r.max(1.0) * r.max(1.0);

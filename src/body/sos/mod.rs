@@ -1,0 +1,255 @@
+//! Sets that need not be convex: `{x : p(x) <= 1}` with p a sum of squares.
+//!
+//! An [`SosBody`] is a type of its own, so that it can not be passed where convexity is assumed. It is proven bounded, and to
+//! contain the points it was fitted around; what lies between them has to be proven triangle by triangle ([`Coverage`]).
+//! Relaxed sets also prove how far they are from convex: `p + c |u|^2d` is sos-convex ([`Relaxation`]).
+
+mod coverage;
+mod extent;
+mod file;
+mod volume;
+
+pub(super) use file::KIND;
+
+pub use coverage::{Coverage, TriangleError, Uncovered};
+
+use super::{
+    Aabb, Ball, BodyError, BodyId, ContainedPoints, Normalization, NotContained, Placement, Provenance, Volume,
+};
+use super::{check_name, invert};
+use crate::polynomial::{CertificateError, HessianGram, NormPower, Polynomial, SosGram};
+use nalgebra::{Matrix3, Vector3};
+
+/// How far a polynomial is from sos-convex: `p(z) + c |linear z + offset|^degree` is, degree being that of p (Ahmadi, Hall,
+/// Makadia and Sindhwani, RSS 2017, section III).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Relaxation {
+    /// c > 0: unit-free, as the coordinates that it belongs to.
+    pub c: f64,
+    /// Linear part of the map from the normalized frame to these coordinates.
+    pub linear: Matrix3<f64>,
+    /// Its constant part.
+    pub offset: Vector3<f64>,
+    /// Gram matrix of the Hessian form of the sum.
+    pub gram: HessianGram,
+}
+
+impl Relaxation {
+    /// What is added to a polynomial of this degree.
+    pub(crate) fn power(&self, degree: usize) -> NormPower {
+        NormPower::new(self.c, &self.linear, &self.offset, degree)
+    }
+}
+
+/// Why numbers do not make an sos-body.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SosBodyError {
+    /// Its name or its normalization.
+    #[error(transparent)]
+    Body(#[from] BodyError),
+    /// The polynomial is not proven a sum of squares.
+    #[error("polynomial: {0}")]
+    NotSos(CertificateError),
+    /// c or its coordinates are not finite, or c is not positive.
+    #[error(
+        "relaxation: c is {0:e}; c must be positive, c and its coordinates finite (leave it out for no bound of convexity)"
+    )]
+    Relaxation(f64),
+    /// The relaxed polynomial is not proven sos-convex.
+    #[error("relaxation: {0}")]
+    NotRelaxed(CertificateError),
+    /// Nothing bounds the set along an axis.
+    #[error(
+        "the set is not proven bounded along axis {axis} of its normalized frame: no multiple of a power of z{axis} is proven below p; \
+         use a Gram matrix farther from singular"
+    )]
+    Unbounded {
+        /// Which axis, from 0.
+        axis: usize,
+    },
+    /// No point is proven inside.
+    #[error("the set has no proven interior: the polynomial was nowhere found below 1; scale it to reach lower")]
+    Empty,
+}
+
+/// A closed bounded set `{x : p(x) <= 1}` with non-empty interior, p a sum of squares, certified; immutable. It need not be
+/// convex, star-shaped or connected. Lengths are metres in the body frame.
+#[derive(Clone, Debug)]
+pub struct SosBody {
+    name: String,
+    id: BodyId,
+    normalization: Normalization,
+    placement: Placement,
+    polynomial: Polynomial,
+    gram: SosGram,
+    relaxation: Option<Relaxation>,
+    interior_point: Vector3<f64>,
+    bounding_box: Aabb,
+    circumscribed: Ball,
+    volume: Volume,
+    points: Option<ContainedPoints>,
+    coverage: Option<Coverage>,
+    provenance: Option<Provenance>,
+}
+
+impl SosBody {
+    /// Makes an sos-body of its defining numbers: proves the polynomial a sum of squares, the relaxation if there is one, the set
+    /// bounded and not empty, and computes everything derived. No semidefinite program is solved.
+    ///
+    /// # Errors
+    /// What could not be proven, and by how much it failed.
+    pub fn new(
+        name: &str,
+        normalization: Normalization,
+        polynomial: Polynomial,
+        gram: SosGram,
+        relaxation: Option<Relaxation>,
+    ) -> Result<Self, SosBodyError> {
+        check_name(name)?;
+        let inverse = invert(&normalization)?;
+        gram.prove(&polynomial).map_err(SosBodyError::NotSos)?;
+        if let Some(relaxation) = &relaxation {
+            let Relaxation { c, linear, offset, gram } = relaxation;
+            if !(*c > 0.0 && c.is_finite() && linear.iter().chain(offset).all(|value| value.is_finite())) {
+                return Err(SosBodyError::Relaxation(*c));
+            }
+            gram.prove_with(&polynomial, &relaxation.power(polynomial.degree())).map_err(SosBodyError::NotRelaxed)?;
+        }
+        let placement = Placement::new(normalization.linear, inverse, normalization.center, 0.0, 0.0);
+        let extent = extent::Extent::prove(&polynomial, &gram, &placement, &inverse)?;
+        let (volume, deepest) = volume::measure(&polynomial, &normalization, &inverse, &extent.circumscribed);
+        let interior_point = deepest.ok_or(SosBodyError::Empty)?;
+        if !(placement.sample_of(&polynomial, &interior_point).value_upper(0.0) < 1.0) {
+            return Err(SosBodyError::Empty);
+        }
+        Ok(Self {
+            name: name.to_owned(),
+            id: BodyId::of_sos(&normalization, &polynomial),
+            normalization,
+            placement,
+            polynomial,
+            gram,
+            relaxation,
+            interior_point,
+            bounding_box: extent.bounding_box,
+            circumscribed: extent.circumscribed,
+            volume,
+            points: None,
+            coverage: None,
+            provenance: None,
+        })
+    }
+
+    /// Name given by its maker; not part of the identity.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Hash of normalization and polynomial.
+    pub fn id(&self) -> &BodyId {
+        &self.id
+    }
+
+    /// Degree of the polynomial: 2, 4, 6 or 8.
+    pub fn degree(&self) -> usize {
+        self.polynomial.degree()
+    }
+
+    /// Map to the normalized frame.
+    pub fn normalization(&self) -> &Normalization {
+        &self.normalization
+    }
+
+    /// The polynomial p, in the normalized frame.
+    pub fn polynomial(&self) -> &Polynomial {
+        &self.polynomial
+    }
+
+    /// Gram matrix that proves p a sum of squares.
+    pub fn gram(&self) -> &SosGram {
+        &self.gram
+    }
+
+    /// How far p is from sos-convex; none if nothing is claimed.
+    pub fn relaxation(&self) -> Option<&Relaxation> {
+        self.relaxation.as_ref()
+    }
+
+    /// A point proven inside, in the middle of the longest chord of the rays that measure the volume.
+    pub fn interior_point(&self) -> &Vector3<f64> {
+        &self.interior_point
+    }
+
+    /// A box proven to contain the set.
+    pub fn bounding_box(&self) -> &Aabb {
+        &self.bounding_box
+    }
+
+    /// A ball proven to contain the set.
+    pub fn circumscribed(&self) -> &Ball {
+        &self.circumscribed
+    }
+
+    /// Volume by quadrature.
+    pub fn volume(&self) -> Volume {
+        self.volume
+    }
+
+    /// Which points the set was proven to contain.
+    pub fn points(&self) -> Option<&ContainedPoints> {
+        self.points.as_ref()
+    }
+
+    /// Which of the triangles between them it was proven to contain.
+    pub fn covered(&self) -> Option<&Coverage> {
+        self.coverage.as_ref()
+    }
+
+    /// Where the set comes from.
+    pub fn provenance(&self) -> Option<&Provenance> {
+        self.provenance.as_ref()
+    }
+
+    /// p at a point of the body frame, up to rounding: at most 1 inside.
+    pub fn value(&self, x: &Vector3<f64>) -> f64 {
+        self.placement.sample_of(&self.polynomial, x).value()
+    }
+
+    /// Rigorous upper bound of p at a point of the body frame.
+    pub fn value_upper(&self, x: &Vector3<f64>) -> f64 {
+        self.placement.sample_of(&self.polynomial, x).value_upper(0.0)
+    }
+
+    /// Proves every point inside, rounding included, and nothing of what is between them.
+    ///
+    /// # Errors
+    /// The point that fails most.
+    pub fn prove_contains(&self, points: &[Vector3<f64>]) -> Result<f64, NotContained> {
+        super::prove_contains(points, |point| self.value_upper(point))
+    }
+
+    /// The same set with the record of the points it is proven to contain.
+    ///
+    /// # Errors
+    /// The point that fails most.
+    pub fn with_points(mut self, points: &[Vector3<f64>]) -> Result<Self, NotContained> {
+        self.prove_contains(points)?;
+        self.points = Some(ContainedPoints::of(points));
+        Ok(self)
+    }
+
+    /// The same set with the note of how many triangles it is proven to contain.
+    pub fn with_coverage(mut self, coverage: Coverage) -> Self {
+        self.coverage = Some(coverage);
+        self
+    }
+
+    /// The same set with its origin noted; texts should pass [`check_name`], or its file is refused.
+    pub fn with_provenance(mut self, provenance: Provenance) -> Self {
+        self.provenance = Some(provenance);
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests;
