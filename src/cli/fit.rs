@@ -2,8 +2,8 @@
 
 use super::write_atomically;
 use crate::fit::{
-    FitError, FitOptions, Objective, Progress, RefinementEnd, Rung, Trimmed, coarsest_within, fit, ladder, read_points,
-    thicken, trim,
+    Cone, FitError, FitOptions, Objective, Progress, RefinementEnd, Rung, Trimmed, coarsest_within, fit, ladder,
+    read_points, thicken, trim,
 };
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
@@ -57,6 +57,15 @@ pub(super) struct FitArgs {
     /// trace-h: trace of the inverse of H, in the frame of trace-p. Degrees 2 to 6.
     #[arg(long, value_name = "NAME", default_value_t, verbatim_doc_comment)]
     objective: Objective,
+    /// Fast fits for streams of point clouds: sdsos or dsos; sos is the tightest
+    ///
+    /// sos: all sos-convex polynomials, by semidefinite programs, for the objective.
+    /// sdsos: those whose Hessian form is a sum of squares of two terms each, by
+    ///   second-order cones. Minimises the volume itself.
+    /// dsos: those whose form is even diagonally dominant, by linear constraints.
+    ///   Looser, and no faster. Both depend on the axes of the smallest ellipsoid.
+    #[arg(long, value_name = "NAME", default_value_t, verbatim_doc_comment)]
+    cone: Cone,
     /// Cut the body by at most this many slabs (pairs of parallel planes), each where it reaches farthest beyond the convex hull
     ///
     /// 0 to 15; they end where nothing is left to cut off. With --ladder all rungs but the ball are cut (<stem>-d4-s3.json has
@@ -126,7 +135,7 @@ struct Solve {
     /// Why the refinement ended; none without.
     refinement: Option<String>,
     objective_value: f64,
-    optimality_gap: f64,
+    optimality_gap: Option<f64>,
 }
 
 /// Fits every input in turn; what was fitted before an error stays.
@@ -177,6 +186,7 @@ fn options(args: &FitArgs, input: &Path) -> FitOptions {
             6
         }),
         objective: args.objective,
+        cone: args.cone,
         refine: args.refine,
         slabs: args.slabs,
         input: name,

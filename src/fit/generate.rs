@@ -36,9 +36,9 @@ pub(super) struct Optimum {
     pub(super) coefficients: DVector<f64>,
     /// Gram matrix of its Hessian form.
     pub(super) hessian: DMatrix<f64>,
-    /// f minus its lower bound from the dual; at most [`OPTIMALITY_GAP`] in proportion.
-    pub(super) gap: f64,
-    /// f, in the whitened frame for log dets and in the unit frame for traces.
+    /// f minus its lower bound from the dual, if there is one; at most [`OPTIMALITY_GAP`] in proportion.
+    pub(super) gap: Option<f64>,
+    /// f, in the whitened frame for log dets and volumes and in the unit frame for traces.
     pub(super) objective: f64,
 }
 
@@ -87,7 +87,7 @@ fn verified(problem: &Problem, centre: Centre) -> Result<Optimum, FitError> {
         return Err(FitError::NotOptimal { gap });
     }
     let Interior { coefficients, hessian } = centre.interior;
-    Ok(Optimum { gap, objective, coefficients, hessian })
+    Ok(Optimum { gap: Some(gap), objective, coefficients, hessian })
 }
 
 /// Points with p above 1, the farthest first.
