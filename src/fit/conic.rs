@@ -34,7 +34,7 @@ const FEASIBLE: f64 = 1e-9;
 const ROUGH: f64 = 1e-6;
 
 /// Size of the functional to start from, beside the slope of the model.
-const FUNCTIONAL: f64 = 0.1;
+const FUNCTIONAL: f64 = 0.5;
 /// Least slack of a point to start from.
 const LEAST_SLACK: f64 = 0.1;
 

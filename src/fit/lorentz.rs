@@ -38,7 +38,9 @@ pub(super) fn longest(x: &Vector3<f64>, d: &Vector3<f64>) -> f64 {
     if discriminant < -1e-12 * b * b || (a >= 0.0 && b >= 0.0) {
         return f64::INFINITY;
     }
-    c / (discriminant.max(0.0).sqrt() - b)
+    let root = discriminant.max(0.0).sqrt();
+    // Of the two forms of that root the one without cancellation.
+    if b > 0.0 { (b + root) / -a } else { c / (root - b) }
 }
 
 /// The symmetric W with `W z = W⁻¹x` for x and z inside.
