@@ -16,10 +16,10 @@
 
 use super::FitError;
 use super::dominance::{Bordered, Dominance};
+use super::factor::regularised_factor;
 use super::lorentz::{Scaling, longest, product, quotient};
 use super::model::Model;
 use super::path::Interior;
-use super::factor::regularised_factor;
 use super::progress::Watch;
 use nalgebra::{DMatrix, DVector, Vector3};
 

@@ -7,8 +7,8 @@
 //! border as wide as there are squares: 30 of 210 at degree 6.
 
 use super::cone::Cone;
-use super::path::isotropic_form;
 use super::factor::{regularised_factor, solve_lower};
+use super::path::isotropic_form;
 use super::structure::Structure;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
