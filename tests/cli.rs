@@ -114,6 +114,22 @@ fn fit_reports_and_writes_a_proven_body() {
 }
 
 #[test]
+fn fits_over_smaller_cones_say_what_they_minimised() {
+    let fitted = fitted();
+    let (mesh, out) = (fitted.path("cube.off"), fitted.path("cones"));
+    let fit = |cone: &'static str| ["fit", text(&mesh), "--out", text(&out), "--degree", "4", "--cone", cone, "--json"];
+    for cone in ["sdsos", "dsos"] {
+        let report = json(&fit(cone));
+        assert_eq!(report[0]["objective"], format!("volume, {cone}"));
+        assert_eq!((&report[0]["optimality_gap"], &report[0]["proven"]), (&Value::Null, &true.into()));
+        assert!((8.0..16.0).contains(&report[0]["volume_m3"].as_f64().unwrap()), "{report}");
+    }
+    assert!(refusal(&fit("socp")).contains("sdsos"));
+    assert!(refusal(&[&fit("dsos")[..], &["--refine"]].concat()).contains("volume itself"));
+    assert!(refusal(&[&fit("dsos")[..], &["--objective", "trace-p"]].concat()).contains("volume itself"));
+}
+
+#[test]
 fn a_gap_chooses_the_coarsest_body_and_a_ladder_has_them_all() {
     let fitted = fitted();
     let (mesh, out) = (fitted.path("cube.off"), fitted.path("rungs"));

@@ -5,8 +5,8 @@ mod sos;
 
 use super::write_atomically;
 use crate::fit::{
-    Coordinates, FitError, FitOptions, Mesh, Progress, RefinementEnd, Rung, Trimmed, coarsest_within, fit, ladder,
-    read_mesh, thicken, trim,
+    Cone, Coordinates, FitError, FitOptions, Mesh, Progress, RefinementEnd, Rung, Trimmed, coarsest_within, fit,
+    ladder, read_mesh, thicken, trim,
 };
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
@@ -74,6 +74,15 @@ pub(super) struct FitArgs {
     /// Measure traces and C in the coordinates of the points, metres, in place of those with mean 0 and largest norm 1
     #[arg(long)]
     raw_frame: bool,
+    /// Fast fits for streams of point clouds: sdsos or dsos; sos is the tightest
+    ///
+    /// sos: all sos-convex polynomials, by semidefinite programs, for the objective.
+    /// sdsos: those whose Hessian form is a sum of squares of two terms each, by
+    ///   second-order cones. Minimises the volume itself.
+    /// dsos: those whose form is even diagonally dominant, by linear constraints.
+    ///   Looser, and no faster. Both depend on the axes of the smallest ellipsoid.
+    #[arg(long, value_name = "NAME", default_value_t, verbatim_doc_comment)]
+    cone: Cone,
     /// Cut the body by at most this many slabs (pairs of parallel planes), each where it reaches farthest beyond the convex hull
     ///
     /// 0 to 15; they end where nothing is left to cut off. With --ladder all rungs but the ball are cut (<stem>-d4-s3.json has
@@ -148,7 +157,7 @@ struct Solve {
     /// Why the refinement ended; none without.
     refinement: Option<String>,
     objective_value: f64,
-    optimality_gap: f64,
+    optimality_gap: Option<f64>,
 }
 
 /// Fits every input in turn; what was fitted before an error stays.
@@ -222,6 +231,7 @@ fn options(args: &FitArgs, input: &Path) -> FitOptions {
         degree: args.degree.unwrap_or(if args.ladder || args.max_gap.is_some() { objective.max_degree() } else { 6 }),
         objective,
         coordinates: coordinates(args),
+        cone: args.cone,
         refine: args.refine,
         slabs: args.slabs,
         input: file_name(input),

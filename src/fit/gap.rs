@@ -14,6 +14,7 @@
 //! distance from the hull is convex, so the largest at those points and at 0 is a bound. Across a smooth surface it is off by the
 //! square of the cell's size; along edges, where constraints meet, it is exact.
 
+use super::support::{farthest, height};
 use crate::body::{Body, Constraint, Sphere, boundary_radius, sphere_rule};
 use crate::optimize::{Corner, gjk};
 use nalgebra::Vector3;
@@ -244,17 +245,14 @@ impl<'a> Search<'a> {
     /// Takes a point of the body if it is the farthest so far, by the plane that parts it from the hull.
     fn find(&mut self, x: &Vector3<f64>) {
         let Some(n) = (x - nearest(&self.points, x)).try_normalize(0.0) else { return };
-        let distance = n.dot(x) - self.points.iter().map(|p| n.dot(p)).fold(f64::NEG_INFINITY, f64::max);
+        let distance = n.dot(x) - height(&self.points, &n);
         if distance > self.found {
             (self.found, self.direction) = (distance, n);
         }
     }
 
     fn mean(&self) -> f64 {
-        let gap = |n: &Vector3<f64>| {
-            let hull = self.points.iter().map(|p| n.dot(p)).fold(f64::NEG_INFINITY, f64::max);
-            self.body.support(n).height_m - hull
-        };
+        let gap = |n: &Vector3<f64>| self.body.support(n).height_m - height(&self.points, n);
         sphere_rule(RINGS).map(|(n, weight)| gap(&n) * weight).sum::<f64>() / (4.0 * PI)
     }
 }
@@ -262,8 +260,7 @@ impl<'a> Search<'a> {
 /// A point of the hull of points, about the one nearest to x.
 pub(super) fn nearest(points: &[Vector3<f64>], x: &Vector3<f64>) -> Vector3<f64> {
     let support = |n: &Vector3<f64>| {
-        let farthest = points.iter().min_by(|p, q| n.dot(p).total_cmp(&n.dot(q)));
-        let point = farthest.copied().unwrap_or_default();
+        let point = farthest(points, &-n).copied().unwrap_or_default();
         Corner { x: point, y: *x, difference: point - x }
     };
     let found = gjk(0.0, &-x, support);

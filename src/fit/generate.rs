@@ -36,11 +36,11 @@ pub(super) struct Optimum {
     pub(super) coefficients: DVector<f64>,
     /// Gram matrix of its Hessian form, and of what relaxes convexity.
     pub(super) hessian: DMatrix<f64>,
-    /// Gram matrix of p.
+    /// Gram matrix of p, where it is measured.
     pub(super) gram: Option<DMatrix<f64>>,
-    /// f minus its lower bound from the dual; at most [`OPTIMALITY_GAP`] in proportion.
-    pub(super) gap: f64,
-    /// f, in the whitened frame for log dets and in the unit frame for traces.
+    /// f minus its lower bound from the dual, if there is one; at most [`OPTIMALITY_GAP`] in proportion.
+    pub(super) gap: Option<f64>,
+    /// f, in the whitened frame for log dets and volumes and in the unit frame for traces.
     pub(super) objective: f64,
 }
 
@@ -89,7 +89,7 @@ fn verified(problem: &Problem, centre: Centre) -> Result<Optimum, FitError> {
         return Err(FitError::NotOptimal { gap });
     }
     let Interior { coefficients, hessian } = centre.interior;
-    Ok(Optimum { gap, objective, coefficients, hessian, gram: centre.gram })
+    Ok(Optimum { gap: Some(gap), objective, coefficients, hessian, gram: centre.gram })
 }
 
 /// Points with p above 1, the farthest first.

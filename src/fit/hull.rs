@@ -1,6 +1,7 @@
 //! Convex hull of the input points: only its vertices constrain a convex polynomial.
 
 use super::outermost::outermost;
+use super::support::height;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use parry3d_f64::math::Vector as GlamVector;
 use parry3d_f64::transformation::try_convex_hull;
@@ -202,10 +203,7 @@ fn excess(points: &[Vector3<f64>], facets: &[[usize; 3]]) -> f64 {
         let length = normal.norm();
         // slivers have no direction to speak of
         if length > 1e-9 {
-            let offset = normal.dot(&points[a]);
-            for point in points {
-                worst = worst.max((normal.dot(point) - offset) / length);
-            }
+            worst = worst.max((height(points, &normal) - normal.dot(&points[a])) / length);
         }
     }
     worst

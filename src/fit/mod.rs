@@ -11,14 +11,19 @@ mod ball;
 mod barrier;
 mod basis;
 mod certificate;
+mod cone;
+mod conic;
 mod coordinates;
 mod cuboid;
+mod descent;
+mod dominance;
 pub mod ellipsoid;
 mod factor;
 mod gap;
 mod generate;
 pub mod hull;
 mod ladder;
+mod lorentz;
 mod model;
 mod moment;
 mod object;
@@ -33,11 +38,13 @@ mod slab;
 mod sos;
 mod spectral;
 mod structure;
+mod support;
 mod thicken;
 mod trim;
 mod volume;
 
 pub use certificate::{NoCertificate, certificate};
+pub use cone::{Cone, UnknownCone};
 pub use coordinates::Coordinates;
 pub use cuboid::{OrientedBox, smallest_box};
 pub use gap::{Gap, gap};
@@ -74,6 +81,9 @@ pub struct FitOptions {
     pub objective: Objective,
     /// Coordinates that traces are measured in.
     pub coordinates: Coordinates,
+    /// Where the Gram matrix of the Hessian form is taken from. Over the smaller cones the volume itself is minimised, in a
+    /// fraction of the time: the objective then stays at its default, and there is nothing to refine.
+    pub cone: Cone,
     /// Whether to minimise the volume itself, starting from the optimum of the objective.
     pub refine: bool,
     /// How many slabs to cut the body by, each across the direction in which it reaches farthest beyond the hull: 0 to
@@ -94,6 +104,7 @@ impl Default for FitOptions {
             degree: 6,
             objective: Objective::default(),
             coordinates: Coordinates::default(),
+            cone: Cone::default(),
             refine: false,
             slabs: 0,
             margin: DEFAULT_MARGIN,
@@ -106,13 +117,16 @@ impl FitOptions {
     /// Checks the options and the name of a body to be fitted, before any work.
     ///
     /// # Errors
-    /// [`FitError::Degree`], [`FitError::Objective`], [`FitError::Slabs`], [`FitError::Margin`] or [`FitError::Name`].
+    /// [`FitError::Degree`], [`FitError::Objective`], [`FitError::Cone`], [`FitError::Slabs`], [`FitError::Margin`] or [`FitError::Name`].
     pub fn check(&self, name: &str) -> Result<(), FitError> {
         if ![2, 4, 6, 8].contains(&self.degree) {
             return Err(FitError::Degree(self.degree));
         }
         if self.degree > self.objective.max_degree() {
             return Err(FitError::Objective { objective: self.objective, degree: self.degree });
+        }
+        if self.cone != Cone::Sos && (self.objective != Objective::default() || self.refine) {
+            return Err(FitError::Cone(self.cone));
         }
         if self.slabs > MAX_SLABS {
             return Err(FitError::Slabs(self.slabs));
@@ -138,23 +152,29 @@ pub struct FitReport {
     pub volume_m3: f64,
     /// Estimate of the error of its quadrature, m³.
     pub volume_error_m3: f64,
-    /// Volumes of the refinement before its first step and after each, m³, by the rule that it minimises; none without.
+    /// Volumes of the refinement before its first step and after each, m³, by the rule that it minimises; over the smaller cones
+    /// after each step from the smallest ellipsoid; none without either.
     pub refinement_m3: Vec<f64>,
     /// Volume of the convex hull, m³.
     pub hull_volume_m3: f64,
     /// Wall time, seconds.
     pub seconds: f64,
-    /// Why the refinement ended; none without.
+    /// Why the refinement ended, or the descent over one of the smaller cones; none without either.
     pub refinement_end: Option<RefinementEnd>,
-    /// [`FitReport::objective_value`] minus its lower bound from the dual; at most 1e-5 max(1, |value|).
-    pub optimality_gap: f64,
+    /// [`FitReport::objective_value`] minus its lower bound from the dual; at most 1e-5 max(1, |value|). None for volumes: they are
+    /// not convex in the polynomial, and no lower bound of theirs is known.
+    pub optimality_gap: Option<f64>,
     /// Programs solved, one per set of points and one per step of a refinement.
     pub rounds: usize,
     /// Newton steps of all of them.
     pub iterations: usize,
-    /// What was minimised.
+    /// What was minimised, but over the smaller cones.
     pub objective: Objective,
     /// Its optimal value: log dets in the whitened frame, traces in the chosen coordinates.
+    /// Over which polynomials; the volume itself if these are not all the sos-convex ones.
+    pub cone: Cone,
+    /// What was reached: log dets in the whitened frame, traces in the unit frame, volumes over the smaller cones in the whitened
+    /// frame.
     pub objective_value: f64,
     /// Margin the certificate was proven with.
     pub margin: f64,
@@ -196,6 +216,12 @@ pub enum FitError {
         "objective: {0} measures the Hessian form, which relaxed convexity leaves indefinite; take logdet-p or trace-p"
     )]
     RelaxedObjective(Objective),
+    /// An objective or a refinement is asked for over one of the smaller cones.
+    #[error(
+        "cone: over {0} the volume itself is minimised, which leaves nothing to choose or refine; leave objective and \
+         refinement at their defaults, or take the cone sos"
+    )]
+    Cone(Cone),
     /// Too many slabs.
     #[error("slabs: {0} is more than {MAX_SLABS}; raise the degree instead")]
     Slabs(usize),

@@ -40,6 +40,11 @@ impl Model {
         &self.origin - change
     }
 
+    /// ∇F at coefficients c.
+    pub(super) fn gradient(&self, coefficients: &DVector<f64>) -> DVector<f64> {
+        &self.slope + &self.curvature * (coefficients - &self.origin)
+    }
+
     /// B: the inverse of the conjugate's Hessian.
     pub(super) fn flexibility(&self) -> &DMatrix<f64> {
         &self.curvature

@@ -3,16 +3,17 @@
 use super::ball::smallest_ball;
 use super::basis::Affine;
 use super::coordinates::Coordinates;
+use super::descent::descend;
 use super::ellipsoid::{Ellipsoid, minimum_ellipsoid};
 use super::gap::{Gap, NONE, gap};
 use super::generate::{Optimum, generate};
 use super::hull::{Frame, Hull, convex_hull};
 use super::program::{Problem, ProgramError};
 use super::progress::{Progress, Watch};
-use super::refine::refine;
+use super::refine::{Refined, RefinementEnd, refine};
 use super::slab::cut;
 use super::structure::Structure;
-use super::{DEFAULT_MARGIN, Fit, FitError, FitOptions, FitReport, MARGIN_ATTEMPTS, Objective, Rung};
+use super::{Cone, DEFAULT_MARGIN, Fit, FitError, FitOptions, FitReport, MARGIN_ATTEMPTS, Objective, Rung};
 use crate::body::{Body, BodyError, Constraint, Normalization, Placement, Provenance, Volume};
 use crate::polynomial::{HessianGram, Polynomial};
 use nalgebra::{Matrix3, Vector3};
@@ -116,22 +117,25 @@ impl<'a> Object<'a> {
         let mut watch = Watch::new(progress);
         let (body, optimum, margin, volumes, refinement_end) = loop {
             let margin = attempts.next().unwrap_or(options.margin);
-            let problem = Problem::new(&structure, options.objective, &coordinates, margin);
-            let mut optimum = generate(problem, &self.whitened, &mut watch)?;
-            let (mut volumes, mut end) = (Vec::new(), None);
-            if options.refine {
-                let (coefficients, hessian) = (optimum.coefficients.clone(), optimum.hessian.clone());
-                let refined = refine(&structure, &self.whitened, margin, coefficients, hessian, &mut watch)?;
-                (optimum.coefficients, optimum.hessian) = (refined.coefficients, refined.hessian);
-                (volumes, end) = (refined.volumes, Some(refined.end));
-            }
+            let (optimum, volumes, end) = if options.cone == Cone::Sos {
+                self.least_objective(&structure, options, margin, &mut watch)?
+            } else {
+                let found = descend(&structure, options.cone, &self.whitened, margin, &mut watch)?;
+                let objective = found.volumes.last().copied().unwrap_or(f64::NAN);
+                let Refined { coefficients, hessian, volumes, end } = found;
+                (Optimum { coefficients, hessian, gram: None, gap: None, objective }, volumes, Some(end))
+            };
             match self.certify(&structure, &optimum) {
                 Ok(body) => break (body, optimum, margin, volumes, end),
                 Err(FitError::Unproven(BodyError::Certificate { .. })) if attempts.len() > 0 => {}
                 Err(error) => return Err(error),
             }
         };
-        let (body, gap) = self.finish(body, options.objective.name(), volumes.len() > 1);
+        let made = match options.cone {
+            Cone::Sos => options.objective.name().to_owned(),
+            cone => format!("volume, {cone}"),
+        };
+        let (body, gap) = self.finish(body, &made, options.refine && volumes.len() > 1);
         let report = FitReport {
             degree: options.degree,
             points: self.points.len(),
@@ -143,6 +147,7 @@ impl<'a> Object<'a> {
             seconds: self.seconds + start.elapsed().as_secs_f64(),
             refinement_end,
             objective: options.objective,
+            cone: options.cone,
             objective_value: optimum.objective,
             optimality_gap: optimum.gap,
             rounds: watch.progress().round,
@@ -150,6 +155,26 @@ impl<'a> Object<'a> {
             margin,
         };
         Ok(Fit { body, gap, report })
+    }
+
+    /// The optimum of the objective over all sos-convex polynomials, refined if asked for, with the volumes of that and its end.
+    fn least_objective(
+        &self,
+        structure: &Structure,
+        options: &FitOptions,
+        margin: f64,
+        watch: &mut Watch,
+    ) -> Result<(Optimum, Vec<f64>, Option<RefinementEnd>), FitError> {
+        let coordinates = self.coordinates(options.coordinates)?;
+        let problem = Problem::new(structure, options.objective, &coordinates, margin);
+        let optimum = generate(problem, &self.whitened, watch)?;
+        if !options.refine {
+            return Ok((optimum, Vec::new(), None));
+        }
+        let Optimum { coefficients, hessian, gap, objective, .. } = optimum;
+        let Refined { coefficients, hessian, volumes, end } =
+            refine(structure, &self.whitened, margin, coefficients, hessian, watch)?;
+        Ok((Optimum { coefficients, hessian, gram: None, gap, objective }, volumes, Some(end)))
     }
 
     /// Notes where the body is from and how far it reaches beyond the hull.

@@ -10,7 +10,7 @@ use super::model::Model;
 use super::path::{Goal, Interior, Pace, Path, Place};
 use super::progress::Watch;
 use super::structure::Structure;
-use super::volume::{expansion, polynomial, volume};
+use super::volume::{Expansion, expansion, polynomial, volume};
 use super::{FitError, ProgramError};
 use crate::polynomial::Polynomial;
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -98,15 +98,7 @@ pub(super) fn refine(
         if volumes.is_empty() {
             volumes.push(here);
         }
-        // A multiple of p - 1 describes the same set: p(center) is held, which fixes the multiple.
-        let hold = structure.values(&center);
-        let mean = model.curvature.trace() / hold.len() as f64;
-        let mut curvature = model.curvature + &hold * hold.transpose() * (here * 10.0);
-        for i in 0..curvature.nrows() {
-            curvature[(i, i)] += DAMPING * mean;
-        }
-        let program =
-            Model::new(current.coefficients.clone(), model.gradient, curvature).ok_or(ProgramError::Singular)?;
+        let program = step_model(structure, &current.coefficients, model, &center).ok_or(ProgramError::Singular)?;
         let path = Path::new(structure, &values, margin, Goal::Model(&program));
         watch.round(points.len(), 0.0);
         let Some((target, place)) = minimise(&path, here, last.take(), watch)? else {
@@ -131,8 +123,30 @@ pub(super) fn refine(
     Ok(Refined { coefficients: current.coefficients, hessian: current.hessian, volumes, end })
 }
 
+/// The model that a step around these coefficients minimises; none where the volume has no usable curvature.
+pub(super) fn step_model(
+    structure: &Structure,
+    coefficients: &DVector<f64>,
+    expansion: Expansion,
+    center: &Vector3<f64>,
+) -> Option<Model> {
+    let Expansion { volume, gradient, mut curvature } = expansion;
+    // A multiple of p - 1 describes the same set: p(center) is held, which fixes the multiple.
+    let hold = structure.values(center);
+    let mean = curvature.trace() / hold.len() as f64;
+    curvature.ger(volume * 10.0, &hold, &hold, 1.0);
+    for i in 0..curvature.nrows() {
+        curvature[(i, i)] += DAMPING * mean;
+    }
+    Model::new(coefficients.clone(), gradient, curvature)
+}
+
 /// `p -> 1 + (p - 1)/(1 - min p)`: the same set with min p = 0. Returns the minimiser.
-fn normalise(structure: &Structure, interior: &mut Interior, near: &Vector3<f64>) -> Result<Vector3<f64>, FitError> {
+pub(super) fn normalise(
+    structure: &Structure,
+    interior: &mut Interior,
+    near: &Vector3<f64>,
+) -> Result<Vector3<f64>, FitError> {
     let p = polynomial(structure, &interior.coefficients)?;
     let center = minimiser(&p, near).ok_or(ProgramError::Singular)?;
     let least = p.evaluate(&center).value;

@@ -1,0 +1,167 @@
+//! Fits over the smaller cones: down in the volume itself, from the smallest ellipsoid.
+//!
+//! No log det stands in for the volume here, since that would take a semidefinite cone. Each step minimises a convex quadratic
+//! model of the volume (`volume`) over the cone and around some of the points, and goes that way as far as the volume falls when
+//! the constant coefficient takes in all points. So the volume never grows, and what had to be taken in is known to the next step.
+
+use super::cone::Cone;
+use super::conic::Conic;
+use super::dominance::Dominance;
+use super::path::Interior;
+use super::progress::Watch;
+use super::refine::{Refined, RefinementEnd, normalise, step_model};
+use super::structure::Structure;
+use super::volume::{expansion, polynomial, volume};
+use super::{FitError, ProgramError};
+use nalgebra::{DMatrix, DVector, Vector3};
+
+/// Steps at most; 5 to 10 are usual.
+const STEPS: usize = 30;
+/// Relative decrease of the volume below which to stop.
+const ENOUGH: f64 = 2e-3;
+/// Accuracy of a step's program, relative to the volume.
+const GAP: f64 = 1e-4;
+/// Points that the first program knows, in multiples of the rows of P, and at most as many more in each of the next.
+const SPREAD: usize = 4;
+/// Excess of p - 1 from which a point is made known to the next program.
+const OUTSIDE: f64 = 1e-4;
+/// Lengths tried of one step.
+const LENGTHS: usize = 8;
+
+/// The polynomial of about the least volume over the cone with `p <= 1` at `points` (whitened: the unit ball is their smallest
+/// ellipsoid) whose Gram matrix is in the cone also without `margin` on its diagonal.
+pub(super) fn descend(
+    structure: &Structure,
+    cone: Cone,
+    points: &[Vector3<f64>],
+    margin: f64,
+    watch: &mut Watch,
+) -> Result<Refined, FitError> {
+    let dominance = Dominance::new(structure, cone);
+    let values = DMatrix::from_columns(&points.iter().map(|x| structure.values(x)).collect::<Vec<_>>());
+    let mut known = Known::start(points, SPREAD * structure.gram.size);
+    let rows = structure.hessian.size;
+    let mut current = Interior { coefficients: ball(structure), hessian: DMatrix::zeros(rows, rows) };
+    let mut volumes: Vec<f64> = Vec::new();
+    let mut center = Vector3::zeros();
+    let mut end = RefinementEnd::StepLimit;
+    for _ in 0..STEPS {
+        center = normalise(structure, &mut current, &center)?;
+        let p = polynomial(structure, &current.coefficients)?;
+        let expansion = expansion(structure, &p, &center);
+        let here = expansion.volume;
+        let model = step_model(structure, &current.coefficients, expansion, &center).ok_or(ProgramError::Singular)?;
+        let columns = values.select_columns(&known.indices);
+        let program = Conic { dominance: &dominance, values: &columns, margin, model: &model };
+        watch.round(columns.ncols(), known.worst);
+        let target = program.minimise(&current.coefficients, GAP * here, watch)?;
+        let Some(target) = target else {
+            end = RefinementEnd::Unsolved;
+            break;
+        };
+        known.learn(points, &values, &target.coefficients);
+        // The ball has no Gram matrix of its own: the first step is taken whole, wherever it leads.
+        let (lengths, bar) = if volumes.is_empty() { (1, f64::INFINITY) } else { (LENGTHS, here) };
+        let Some((found, there)) = search(structure, &values, &current, &target, &center, lengths, bar) else {
+            end = RefinementEnd::NoDescent;
+            break;
+        };
+        current = found;
+        volumes.push(there);
+        if there > (1.0 - ENOUGH) * bar {
+            end = RefinementEnd::Converged;
+            break;
+        }
+    }
+    if volumes.is_empty() {
+        return Err(ProgramError::Singular.into());
+    }
+    Ok(Refined { coefficients: current.coefficients, hessian: current.hessian, volumes, end })
+}
+
+/// The polynomial on the way from `from` to `to` with about the smallest volume around all points, if one is below `bar`.
+fn search(
+    structure: &Structure,
+    values: &DMatrix<f64>,
+    from: &Interior,
+    to: &Interior,
+    center: &Vector3<f64>,
+    lengths: usize,
+    bar: f64,
+) -> Option<(Interior, f64)> {
+    let at = |t: f64| {
+        let mut coefficients = &from.coefficients + (&to.coefficients - &from.coefficients) * t;
+        coefficients[0] += 1.0 - values.tr_mul(&coefficients).max();
+        coefficients
+    };
+    let mut best = (None, bar);
+    let mut length = 1.0;
+    for _ in 0..lengths {
+        let coefficients = at(length);
+        let value = polynomial(structure, &coefficients).map_or(f64::INFINITY, |p| volume(&p, center));
+        if value < best.1 {
+            let hessian = &from.hessian + (&to.hessian - &from.hessian) * length;
+            best = (Some(Interior { coefficients, hessian }), value);
+        } else if best.0.is_some() {
+            break;
+        }
+        length *= 0.6;
+    }
+    Some((best.0?, best.1))
+}
+
+/// The unit ball as the set of a polynomial of full degree: the mean of `|z|²ʲ`, j from 1 to half the degree.
+fn ball(structure: &Structure) -> DVector<f64> {
+    let factorial = |n: u8| (1..=n).map(f64::from).product::<f64>();
+    let half = (structure.degree / 2) as f64;
+    let of_monomial = structure.monomials.iter().map(|e| {
+        let total: u8 = e.iter().sum();
+        if total == 0 || e.iter().any(|n| n % 2 == 1) {
+            return 0.0;
+        }
+        factorial(total / 2) / e.iter().map(|n| factorial(n / 2)).product::<f64>() / half
+    });
+    DVector::from_iterator(structure.monomials.len(), of_monomial)
+}
+
+/// Which of the points the programs know.
+struct Known {
+    indices: Vec<usize>,
+    /// Most points to learn at a time.
+    most: usize,
+    /// Largest p - 1 of the last optimum over all points, at least 0.
+    worst: f64,
+}
+
+impl Known {
+    /// So many of the points, each the farthest from those before it.
+    fn start(points: &[Vector3<f64>], most: usize) -> Self {
+        let mut distances = vec![f64::INFINITY; points.len()];
+        let mut indices = Vec::new();
+        let mut next =
+            points.iter().map(Vector3::norm).enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(i, _)| i);
+        while indices.len() < most.min(points.len()) {
+            indices.push(next);
+            for (distance, point) in distances.iter_mut().zip(points) {
+                *distance = distance.min((point - points[next]).norm());
+            }
+            next = distances.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).map_or(0, |(i, _)| i);
+        }
+        Self { indices, most, worst: 0.0 }
+    }
+
+    /// Adds those that were left outside the farthest, but not many from one spot.
+    fn learn(&mut self, points: &[Vector3<f64>], values: &DMatrix<f64>, coefficients: &DVector<f64>) {
+        let excess = values.tr_mul(coefficients).add_scalar(-1.0);
+        let mut outside: Vec<usize> = (0..points.len()).filter(|&i| excess[i] > OUTSIDE).collect();
+        outside.sort_by(|&i, &j| excess[j].total_cmp(&excess[i]));
+        self.worst = excess.max().max(0.0);
+        let before = self.indices.len();
+        for i in outside {
+            let added = &self.indices[before..];
+            if added.len() < self.most && added.iter().all(|&j| (points[i] - points[j]).norm() > 0.05) {
+                self.indices.push(i);
+            }
+        }
+    }
+}
