@@ -12,6 +12,7 @@ mod basis;
 mod certificate;
 mod cuboid;
 pub mod ellipsoid;
+mod enclose;
 mod factor;
 mod gap;
 mod generate;
@@ -35,6 +36,10 @@ mod volume;
 
 pub use certificate::{NoCertificate, certificate};
 pub use cuboid::{OrientedBox, smallest_box};
+pub use enclose::{
+    EncloseError, EncloseOptions, Enclosure, Group, MAX_MULTIPLIER_DEGREE, MAX_SETS, NoContainment, Region,
+    containment, enclose, enclose_bodies, group,
+};
 pub use gap::{Gap, gap};
 pub use hull::HullError;
 pub use ladder::{MAX_SLABS, Rung, ball, coarsest_within, ladder};

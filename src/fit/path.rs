@@ -310,7 +310,7 @@ impl<'a> Path<'a> {
 }
 
 /// The functional `y_i y_j z^e -> [i = j] mean(z^e)`.
-fn isotropic_form(structure: &Structure, mean: &DVector<f64>) -> DVector<f64> {
+pub(super) fn isotropic_form(structure: &Structure, mean: &DVector<f64>) -> DVector<f64> {
     let size = structure.hessian.size / 3;
     let basis = &structure.hessian_basis;
     let position = |exponents: [u8; 3]| structure.monomials.iter().position(|&m| m == exponents);

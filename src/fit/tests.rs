@@ -8,9 +8,9 @@ use super::*;
 use crate::polynomial::Polynomial;
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3};
 
-mod primal;
+pub(super) mod primal;
 
-fn unwatched(_: Progress) -> ControlFlow<()> {
+pub(super) fn unwatched(_: Progress) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
