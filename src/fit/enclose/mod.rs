@@ -3,11 +3,13 @@
 //! [`enclose`] solves the program of section V of Ahmadi, Hall, Makadia and Sindhwani (RSS 2017), sos-convex p with multipliers for
 //! every set, by the central path of its dual (`path`): the strictly feasible polynomial at its end comes with all Gram
 //! matrices, which become the [`Containment`] of each set. [`containment`] looks for such a proof when body and set are given
-//! both, and [`group`](group()) puts many bodies into few. Every set has a frame of its own for its proof (`region`), with the frames' rounding paid for (`body::Containment`).
+//! both, and [`group`](group()) puts many bodies into few. Every set has a frame of its own for its proof (`region`), with the
+//! frames' rounding paid for ([`Containment`]).
 
 mod cone;
 mod group;
 mod path;
+mod program;
 mod prove;
 mod region;
 
@@ -16,18 +18,14 @@ pub use prove::{NoContainment, containment};
 pub use region::Region;
 
 use super::object::Object;
-use super::path::isotropic_form;
-use super::program::ProgramError;
 use super::progress::{Progress, Watch};
 use super::structure::Structure;
 use super::{DEFAULT_MARGIN, FitError, Gap};
 use crate::body::{BasicSet, Body, BodyError, BodyId, Constraint, ContainedSet, Containment};
 use crate::polynomial::{ContainmentProof, HessianGram, NotContaining, Polynomial, Substituted};
-use cone::Cone;
-use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
-use path::{Block, Path};
-use region::{Prepared, affine};
-use std::borrow::Cow;
+use nalgebra::{DMatrix, Vector3};
+use program::{prepare, program};
+use region::Prepared;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -176,7 +174,7 @@ pub fn enclose(
     let mut attempts = MARGIN_ATTEMPTS.iter().map(|factor| factor * DEFAULT_MARGIN);
     loop {
         let margin = attempts.next().unwrap_or(DEFAULT_MARGIN);
-        let program = program(&structure, &object, &prepared, margin)?;
+        let program = program(&structure, &object, &prepared, margin).map_err(FitError::from)?;
         watch.round(regions.len(), 0.0);
         let unsolved = EncloseError::Unsolved { multiplier_degree: options.multiplier_degree };
         let centre = program.follow(GAP, &mut watch)?.ok_or_else(|| unsolved.clone())?;
@@ -230,60 +228,6 @@ pub fn enclose_bodies(
             .map_err(|source| EncloseError::Unproven { index, source })?;
     }
     Ok(enclosure)
-}
-
-fn prepare(regions: &[Region], options: &EncloseOptions) -> Result<Vec<Prepared>, EncloseError> {
-    let prepare = |(index, region): (usize, &Region)| {
-        if region.set.polynomials.is_empty() {
-            return Err(EncloseError::NoPolynomial(index));
-        }
-        let prepared = Prepared::new(region, options.degree, options.multiplier_degree)
-            .map_err(|source| EncloseError::Points { index, source })?;
-        let definite = prepared.cones.iter().all(|cone| cone.log_det(&prepared.mean).is_some());
-        definite.then_some(prepared).ok_or(EncloseError::Start(index))
-    };
-    regions.iter().enumerate().map(prepare).collect()
-}
-
-/// The program in the normalized frame of the object; the last block is the Hessian form's.
-fn program<'a>(
-    structure: &'a Structure,
-    object: &Object,
-    prepared: &'a [Prepared],
-    margin: f64,
-) -> Result<Path<'a>, FitError> {
-    let rows = structure.gram.size as f64;
-    let normalization = object.normalization();
-    let mut blocks = Vec::with_capacity(prepared.len() + 1);
-    let mut mean = DVector::zeros(structure.monomials.len());
-    for set in prepared {
-        let change = super::basis::of_monomials(structure.degree, &affine(&set.frame, &normalization));
-        let map = change.resize_horizontally(set.mean.len(), 0.0);
-        let mut cost = DVector::zeros(set.mean.len());
-        cost[0] = 1.0;
-        // Equal masses that add up to the rows of P.
-        let start = &set.mean * (rows / prepared.len() as f64);
-        mean += &map * &set.mean / prepared.len() as f64;
-        blocks.push(Block { cones: Cow::Borrowed(&set.cones), cost, map, start });
-    }
-    let form = &structure.hessian;
-    let mut trace = DVector::zeros(form.keys);
-    for i in 0..form.size {
-        trace[form.key(i, i)] += 1.0;
-    }
-    // y isotropic and independent of z, and small enough to leave M definite.
-    let isotropic = isotropic_form(structure, &mean);
-    let start = (0..40)
-        .map(|halvings| &isotropic * 0.5_f64.powi(halvings))
-        .find(|form| Cholesky::new(structure.gram.spread(&(&mean * rows - structure.pull_back(form)))).is_some())
-        .ok_or(ProgramError::Singular)?;
-    blocks.push(Block {
-        cones: Cow::Owned(vec![Cone::of(form.clone())]),
-        cost: -trace * margin,
-        map: -structure.derivative_matrix().transpose(),
-        start: start * 0.5,
-    });
-    Ok(Path { structure, blocks })
 }
 
 fn body(

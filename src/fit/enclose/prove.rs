@@ -11,6 +11,7 @@
 //! is no proof with these multipliers.
 
 use super::cone::Cone;
+use super::program::prepare;
 use super::region::{Prepared, Region};
 use super::{EncloseError, EncloseOptions};
 use crate::body::{BasicSet, Body, Containment};
@@ -72,7 +73,7 @@ pub fn containment(body: &Body, region: &Region, multiplier_degree: usize) -> Re
         return Err(NoContainment::Outside { point: (*x).into(), value });
     }
     let options = EncloseOptions { degree: body.degree(), multiplier_degree };
-    let prepared = super::prepare(std::slice::from_ref(region), &options)?.remove(0);
+    let prepared = prepare(std::slice::from_ref(region), &options)?.remove(0);
     let map = prepared.frame.to(outer.normalization);
     let set_map = prepared.frame.to(region.set.normalization);
     let set = Substituted { polynomials: &region.set.polynomials, map: &set_map };
