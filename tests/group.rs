@@ -40,7 +40,7 @@ fn grouped(problem: usize, degree: usize, max_growth: f64) -> Option<(usize, usi
     let bodies: Vec<Body> =
         scene["obstacles"].as_array().expect("scenes have obstacles").iter().map(obstacle).collect();
     let start = Instant::now();
-    let options = EncloseOptions { degree, ..EncloseOptions::default() };
+    let options = EncloseOptions::new(degree);
     let groups =
         group(&bodies, max_growth, &options, &mut |_| ControlFlow::Continue(())).expect("the scene is grouped");
     let seconds = start.elapsed().as_secs_f64();

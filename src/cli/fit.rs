@@ -99,8 +99,10 @@ pub(super) struct FitArgs {
     #[arg(long, value_name = "FRACTION", requires = "group", allow_negative_numbers = true)]
     pub(super) max_growth: Option<f64>,
     /// Degree that the multipliers have at least: 0, 2 or 4; higher ones may make the body smaller and cost more
-    #[arg(long, value_name = "N", requires = "group", default_value_t = 2)]
-    pub(super) multiplier_degree: usize,
+    ///
+    /// [default: --degree less 2, at most 4]
+    #[arg(long, value_name = "N", requires = "group")]
+    pub(super) multiplier_degree: Option<usize>,
     /// Print a JSON array of reports instead of a table
     #[arg(long)]
     pub(super) json: bool,

@@ -32,7 +32,8 @@ struct Row {
 /// Reads the bodies, puts them into one or several, and writes those.
 pub(super) fn run(args: &FitArgs, name: &str) -> Result<(), Box<dyn Error>> {
     let start = Instant::now();
-    let options = EncloseOptions { degree: args.degree.unwrap_or(DEGREE), multiplier_degree: args.multiplier_degree };
+    let mut options = EncloseOptions::new(args.degree.unwrap_or(DEGREE));
+    options.multiplier_degree = args.multiplier_degree.unwrap_or(options.multiplier_degree);
     options.check()?;
     crate::body::check_name(name)?;
     let bodies = args.inputs.iter().map(|path| read_body(path)).collect::<Result<Vec<_>, _>>()?;

@@ -30,7 +30,7 @@ pub(super) struct VerifyArgs {
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, requires = "points", allow_negative_numbers = true)]
     scale: f64,
     /// Bodies that the body must contain whole, by the proofs that its file keeps for them
-    #[cfg_attr(feature = "fit", doc = "or, if it has none, by new ones with multipliers of degree 2")]
+    #[cfg_attr(feature = "fit", doc = "or, if it has none, by new ones")]
     #[arg(long, value_name = "FILE", num_args = 1..)]
     contains: Vec<PathBuf>,
     /// Print one JSON object instead of sentences
@@ -155,7 +155,7 @@ fn inside(path: &Path, body: &Body) -> Result<Option<String>, Box<dyn std::error
 
 #[cfg(feature = "fit")]
 fn new_proof(body: &Body, inner: &Body) -> Option<String> {
-    let degree = crate::fit::EncloseOptions::default().multiplier_degree;
+    let degree = crate::fit::EncloseOptions::new(body.degree()).multiplier_degree;
     crate::fit::containment(body, &inner.into(), degree).err().map(|error| error.to_string())
 }
 

@@ -24,7 +24,7 @@ fn three_ellipsoids(size: f64, center: Vector3<f64>) -> Vec<Body> {
 }
 
 fn around(bodies: &[Body], degree: usize) -> Enclosure {
-    let options = EncloseOptions { degree, ..EncloseOptions::default() };
+    let options = EncloseOptions::new(degree);
     let enclosure = enclose_bodies("all", &bodies.iter().collect::<Vec<_>>(), &options, &mut unwatched).unwrap();
     for body in bodies {
         // A hundred times as many points as the solver saw.
@@ -144,7 +144,7 @@ fn sets_that_are_not_convex_are_convexified() {
         let hull = crate::fit::hull::convex_hull(&region.inside).unwrap().volume;
         let mut last = f64::INFINITY;
         for degree in [2, 4, 6] {
-            let options = EncloseOptions { degree, ..EncloseOptions::default() };
+            let options = EncloseOptions::new(degree);
             let all = enclose(name, std::slice::from_ref(&region), &options, &mut unwatched).unwrap();
             let volume = all.body.volume().volume_m3;
             println!(
@@ -211,7 +211,7 @@ fn files_keep_the_proofs() {
         set.containment.prove(&BasicSet::from(&again), &BasicSet::from(body)).unwrap();
     }
     for (what, with, field) in [
-        ("\"origin_m\":[", "\"origin_m\":[7,", "invalid length"),
+        ("\"origin_m\":[", "\"origin_m\":[7,", "not a body file"),
         ("\"rest\":[[", "\"rest\":[[1,", "contained_sets[0].proofs"),
     ] {
         let error = Body::from_json(&text.replacen(what, with, 1)).unwrap_err().to_string();
@@ -267,7 +267,7 @@ fn neighbours_are_grouped_and_others_left_alone() {
         // Those in an L, and those in a row, of which the next best are metres away.
         (1.5, vec![vec![0, 2, 5], vec![1, 4], vec![3]]),
     ] {
-        let groups = group(&bodies, growth, &EncloseOptions::default(), &mut unwatched).unwrap();
+        let groups = group(&bodies, growth, &EncloseOptions::new(4), &mut unwatched).unwrap();
         println!("growth {growth}: {:?}, {:+.3}", members(&groups), volumes(&groups) / total - 1.0);
         assert_eq!(members(&groups), expected, "growth {growth}");
         assert!(volumes(&groups) <= (1.0 + growth) * total);
@@ -275,7 +275,7 @@ fn neighbours_are_grouped_and_others_left_alone() {
             assert_eq!(enclosure.as_ref().map_or(1, |all| all.body.sets().len()), members.len());
         }
     }
-    assert_eq!(group(&bodies, 0.0, &EncloseOptions::default(), &mut unwatched).unwrap_err(), EncloseError::Growth(0.0));
+    assert_eq!(group(&bodies, 0.0, &EncloseOptions::new(4), &mut unwatched).unwrap_err(), EncloseError::Growth(0.0));
 }
 
 #[test]
@@ -308,6 +308,6 @@ fn bad_input_is_told_before_any_work() {
             .for_each(|x| *x = *bodies[1].interior_point() + (*x - bodies[1].interior_point()) * 3.0);
     };
     assert_eq!(broken(&around), EncloseError::Start(1));
-    let cancelled = enclose("a", &regions, &EncloseOptions::default(), &mut |_| ControlFlow::Break(()));
+    let cancelled = enclose("a", &regions, &EncloseOptions::new(4), &mut |_| ControlFlow::Break(()));
     assert_eq!(cancelled.unwrap_err(), FitError::Cancelled.into());
 }
