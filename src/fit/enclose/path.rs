@@ -20,7 +20,7 @@
 
 use super::cone::Cone;
 use crate::fit::FitError;
-use crate::fit::program::regularised_factor;
+use crate::fit::factor::{regularised_factor, solve_lower};
 use crate::fit::progress::Watch;
 use crate::fit::structure::Structure;
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -147,7 +147,7 @@ impl Path<'_> {
         let inverse = Cholesky::new(pattern.spread(&self.moments(at)))?.inverse();
         let coefficients = pattern.collapse(&inverse) * tau;
         let factor = regularised_factor(&(pattern.congruence(&inverse) * tau))?;
-        let root = factor.solve_lower_triangular(&DMatrix::identity(pattern.keys, pattern.keys))?;
+        let root = solve_lower(&factor, DMatrix::identity(pattern.keys, pattern.keys))?;
         let mut middle = root.tr_mul(&root);
         // 2. The blocks, each with the half step that its own factor gives.
         let mut plain = DVector::zeros(pattern.keys);
@@ -161,7 +161,7 @@ impl Path<'_> {
                 curvature += bend;
             }
             let factor = regularised_factor(&curvature)?;
-            let half = factor.solve_lower_triangular(&block.map.transpose())?;
+            let half = solve_lower(&factor, block.map.transpose())?;
             let half_gradient = factor.solve_lower_triangular(&gradient)?;
             middle += half.tr_mul(&half);
             plain += half.tr_mul(&half_gradient);

@@ -15,7 +15,7 @@ use super::program::prepare;
 use super::region::{Prepared, Region};
 use super::{EncloseError, EncloseOptions};
 use crate::body::{BasicSet, Body, Containment};
-use crate::fit::program::regularised_factor;
+use crate::fit::factor::regularised_factor;
 use crate::polynomial::{ContainmentProof, NotContaining, Substituted};
 use nalgebra::{DMatrix, DVector};
 
