@@ -461,3 +461,57 @@ fn sets_that_need_not_be_convex_are_told_from_bodies_everywhere() {
     let both = ["fit", mesh, "--out", out, "--relax-convexity", "1", "--objective", "inverse-moment"];
     assert!(refusal(&both).contains("leave one of the two out"));
 }
+
+#[test]
+fn bodies_are_grouped_into_one_that_is_proven_to_hold_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    // Balls of radius 1/2 about (0, 0, 0), (1.2, 0, 0) and (9, 0, 0).
+    let balls: Vec<PathBuf> = [("near", 0.0), ("next", 1.2), ("far", 9.0)]
+        .into_iter()
+        .map(|(name, x)| {
+            let (input, body) = (path(&format!("{name}-polynomial.json")), path(&format!("{name}.json")));
+            let constraint = r#"{"exponents": [[2,0,0], [0,2,0], [0,0,2]], "coefficients": [4.0, 4.0, 4.0]}"#;
+            let linear = "[[1,0,0],[0,1,0],[0,0,1]]";
+            let content = format!(
+                r#"{{"normalization": {{"center": [{x}, 0, 0], "linear": {linear}}}, "constraints": [{constraint}]}}"#
+            );
+            std::fs::write(&input, content).unwrap();
+            json(&["certify", text(&input), "--out", text(&body), "--name", name, "--json"]);
+            body
+        })
+        .collect();
+    let [near, next, far] = [0, 1, 2].map(|i| text(&balls[i]));
+    let out = path("grouped");
+    let fit = |inputs: &[&str], options: &[&str]| {
+        json(&[&["fit"], inputs, &["--json", "--out", text(&out), "--group"], options].concat())
+    };
+
+    let report = fit(&[near, next], &["pair"]);
+    assert_eq!(report[0]["degree"], 4);
+    assert_eq!(report[0]["members"], serde_json::json!(["near", "next"]));
+    let pair = out.join("pair-d4.json");
+    let verdict = json(&["verify", text(&pair), "--json", "--contains", near, next]);
+    assert_eq!(verdict["contains_sets_proven"], serde_json::json!([true, true]));
+    // The far one is not inside, and a proof that was changed proves nothing.
+    assert!(refusal(&["verify", text(&pair), "--contains", far]).contains("does not contain the set"));
+    let content = std::fs::read_to_string(&pair).unwrap();
+    let changed = path("changed.json");
+    std::fs::write(&changed, content.replacen("\"multipliers\":[[[", "\"multipliers\":[[[9", 1)).unwrap();
+    assert!(refusal(&["verify", text(&changed), "--contains", near]).contains("not proven"));
+
+    let report = fit(&[near, next, far], &["some", "--degree", "6", "--max-growth", "0.9"]);
+    assert_eq!(report.as_array().unwrap().len(), 2);
+    assert_eq!(report[1]["members"], serde_json::json!(["far"]));
+    assert!(out.join("some-1-d6.json").exists() && out.join("some-2-d2.json").exists());
+
+    for (arguments, reason) in [
+        (&["pair", "--multiplier-degree", "3"][..], "one of 0, 2, 4"),
+        (&["pair", "--degree", "5"], "2, 4, 6, 8"),
+        (&["pair", "--max-growth", "0"], "not positive"),
+        (&["pair", "--ladder"], "cannot be used"),
+    ] {
+        let error = refusal(&[&["fit", near, next, "--out", text(&out), "--group"], arguments].concat());
+        assert!(error.contains(reason), "{error}");
+    }
+}

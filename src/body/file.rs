@@ -1,5 +1,6 @@
 //! The body file: JSON that any program can read, re-proven whenever it is read.
 
+use super::contained_file::FileContainedSet;
 use super::{Aabb, Ball, Body, BodyError, Constraint, ContainedPoints, Normalization, Provenance, SosBodyError, sos};
 use crate::polynomial::{Exponents, HessianGram, HessianMonomial, Polynomial};
 use nalgebra::{DMatrix, Matrix3, Vector3};
@@ -85,6 +86,8 @@ struct File {
     volume_error_m3: f64,
     gap_m: Option<f64>,
     contained_points: Option<ContainedPoints>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    contained_sets: Vec<FileContainedSet>,
     provenance: Option<Provenance>,
 }
 
@@ -156,12 +159,14 @@ impl Body {
             return Err(BodyFileError::Derived { field: "id", stored: file.id, recomputed });
         }
         check_notes(&file)?;
+        let sets = file.contained_sets.iter().enumerate().map(|(i, set)| set.read(i)).collect::<Result<_, _>>()?;
         let mut body = Self::with_interior(&file.name, normalization, constraints, Some(interior))?;
         check_derived(&file, &body)?;
         if let Some(center) = growth_center {
             body = body.with_growth_center(center)?;
         }
         body.points = file.contained_points;
+        body.sets = sets;
         body.gap = file.gap_m;
         body.provenance = file.provenance;
         Ok(body)
@@ -354,6 +359,7 @@ impl From<&Body> for File {
             volume_error_m3: body.volume.error_m3,
             gap_m: body.gap,
             contained_points: body.points.clone(),
+            contained_sets: body.sets.iter().map(FileContainedSet::from).collect(),
             provenance: body.provenance.clone(),
         }
     }

@@ -5,6 +5,8 @@
 //! Lengths are metres in the body frame unless a name says otherwise; `z` is the unit-free normalized frame, `z = L (x - c)`.
 
 mod compound;
+mod contained_file;
+mod containment;
 mod extent;
 mod file;
 mod id;
@@ -17,6 +19,7 @@ mod surface;
 mod trust;
 
 pub use compound::{Compound, CompoundError, MAX_PARTS, Solid};
+pub use containment::{BasicSet, ContainedSet, Containment, ProofFrame};
 pub use file::BodyFileError;
 pub use id::{BodyId, ParseIdError};
 pub use outline::{Cell, Outline};
@@ -28,7 +31,7 @@ pub use surface::Volume;
 pub(crate) use surface::{boundary_radius, sphere_rule};
 pub use trust::{ConstraintTrust, Trust};
 
-use crate::polynomial::{CertificateError, HessianGram, Polynomial};
+use crate::polynomial::{CertificateError, HessianGram, NotContaining, Polynomial};
 use extent::Extent;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -205,6 +208,7 @@ pub struct Body {
     outline: Outline,
     volume: Volume,
     points: Option<ContainedPoints>,
+    sets: Vec<ContainedSet>,
     gap: Option<f64>,
     provenance: Option<Provenance>,
 }
@@ -282,13 +286,14 @@ impl Body {
             outline,
             volume,
             points: None,
+            sets: Vec::new(),
             gap: None,
             provenance: None,
         })
     }
 
     /// The same set moved within its frame by `x -> rotation x + translation` (metres): another normalization for the same
-    /// constraints with the same certificates. Bounds are proven anew; the record of contained points does not move along.
+    /// constraints with the same certificates. Bounds are proven anew; the records of contained points and sets do not move along.
     ///
     /// # Errors
     /// Numbers that are not finite, or a place so far away that the body drowns in rounding.
@@ -306,6 +311,15 @@ impl Body {
     /// Name given by its maker; not part of the identity.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// The same body of another name.
+    ///
+    /// # Errors
+    /// [`BodyError::Name`].
+    pub fn renamed(&self, name: &str) -> Result<Self, BodyError> {
+        check_name(name)?;
+        Ok(Self { name: name.to_owned(), ..self.clone() })
     }
 
     /// Hash of the content.
@@ -399,6 +413,11 @@ impl Body {
         self.points.as_ref()
     }
 
+    /// Sets that it was fitted around, with proofs that hold whenever the set is at hand.
+    pub fn sets(&self) -> &[ContainedSet] {
+        &self.sets
+    }
+
     /// Upper bound of the distance of any point of the body from the convex hull of its object, metres, as its maker proved it; the
     /// body alone does not tell.
     pub fn gap_m(&self) -> Option<f64> {
@@ -457,6 +476,16 @@ impl Body {
     pub fn with_points(mut self, points: &[Vector3<f64>]) -> Result<Self, NotContained> {
         self.prove_contains(points)?;
         self.points = Some(ContainedPoints::of(points));
+        Ok(self)
+    }
+
+    /// The same body with the record of a set it contains, which is proven here and now.
+    ///
+    /// # Errors
+    /// What the proof lacks.
+    pub fn with_set(mut self, set: &BasicSet, record: ContainedSet) -> Result<Self, NotContaining> {
+        record.containment.prove(&BasicSet::from(&self), set)?;
+        self.sets.push(record);
         Ok(self)
     }
 

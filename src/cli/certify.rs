@@ -40,7 +40,7 @@ pub(super) struct CertifyArgs {
 }
 
 /// What body files say besides the polynomials.
-const OF_BODY_FILES: [&str; 14] = [
+const OF_BODY_FILES: [&str; 15] = [
     "format",
     "kind",
     "id",
@@ -54,6 +54,7 @@ const OF_BODY_FILES: [&str; 14] = [
     "volume_error_m3",
     "gap_m",
     "contained_points",
+    "contained_sets",
     "provenance",
 ];
 

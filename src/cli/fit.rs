@@ -40,19 +40,21 @@ use std::time::Duration;
 ///   sublevel fit mug.obj --scale 0.001 --max-gap 5mm --out bodies
 ///
 ///   sublevel fit chair.off --ladder --out bodies
+///
+///   sublevel fit shelf-*.json --group shelf --degree 4 --out bodies
 #[derive(Debug, clap::Args)]
 pub(super) struct FitArgs {
-    /// Mesh or point files; the ending tells the format
+    /// Mesh or point files; the ending tells the format. With --group, body files
     #[arg(required = true, value_name = "INPUT")]
-    inputs: Vec<PathBuf>,
+    pub(super) inputs: Vec<PathBuf>,
     /// Folder for the body files; made with its parents when it is not there
     #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    pub(super) out: PathBuf,
     /// Degree of the polynomial: 2, 4, 6 or 8
     ///
-    /// [default: 6; with --ladder and --max-gap the highest tried: 8, or as far as the objective goes]
+    /// [default: 6; with --ladder and --max-gap the highest tried: 8, or as far as the objective goes; with --group 4]
     #[arg(long, value_name = "N")]
-    degree: Option<usize>,
+    pub(super) degree: Option<usize>,
     /// What the fit minimises: logdet-p, trace-p, logdet-h, trace-h or inverse-moment
     ///
     /// logdet-p: log det of the inverse Gram matrix P of p. Tightest nearly always, and
@@ -117,9 +119,24 @@ pub(super) struct FitArgs {
     /// Jobs wait for their turn there and survive its restart. Ctrl-C cancels the one that is under way.
     #[arg(long, value_name = "URL")]
     server: Option<String>,
+    /// Put the bodies of all inputs, body files in one common frame, into one body: <NAME>-d<degree>.json
+    ///
+    /// It is proven to contain every body whole, by polynomial multipliers that its file keeps: 'verify --contains' checks them.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["ladder", "max_gap", "refine", "slabs", "trim", "min_thickness", "scale", "objective", "relax_convexity", "raw_frame", "cone", "server"])]
+    pub(super) group: Option<String>,
+    /// Put them into few bodies, <NAME>-1-d<degree>.json and so on, of at most 1 + FRACTION times the inputs' total volume
+    ///
+    /// What adds the least volume is merged first. Bodies that stay alone are written, too, as they are.
+    #[arg(long, value_name = "FRACTION", requires = "group", allow_negative_numbers = true)]
+    pub(super) max_growth: Option<f64>,
+    /// Degree that the multipliers have at least: 0, 2 or 4; higher ones may make the body smaller and cost more
+    ///
+    /// [default: --degree less 2, at most 4]
+    #[arg(long, value_name = "N", requires = "group")]
+    pub(super) multiplier_degree: Option<usize>,
     /// Print a JSON array of reports instead of a table
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 #[derive(Serialize)]
@@ -162,6 +179,9 @@ struct Solve {
 
 /// Fits every input in turn; what was fitted before an error stays.
 pub(super) fn run(args: &FitArgs) -> Result<(), Box<dyn Error>> {
+    if let Some(name) = &args.group {
+        return super::group::run(args, name);
+    }
     let stems = args.inputs.iter().map(|input| stem(input)).collect::<Result<Vec<_>, _>>()?;
     for (i, stem) in stems.iter().enumerate() {
         if let Some(j) = stems[..i].iter().position(|earlier| earlier == stem) {
@@ -180,8 +200,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), Box<dyn Error>> {
         }
         .map_err(|error| format!("{}: {error}", input.display()))?;
     }
-    std::fs::create_dir_all(&args.out)
-        .map_err(|error| format!("can not make {}: {error}; choose another --out", args.out.display()))?;
+    make_folder(&args.out)?;
     match relaxed {
         Some(method) => each(args, &stems, |input, stem| Ok(vec![sos::one(args, method, input, stem)?]), sos::table),
         None => each(
@@ -223,6 +242,12 @@ fn each<R: Serialize>(
         table(&mut out, &rows)?;
     }
     failure.map_or(Ok(()), Err)
+}
+
+/// Makes the output folder.
+pub(super) fn make_folder(path: &Path) -> Result<(), Box<dyn Error>> {
+    std::fs::create_dir_all(path)
+        .map_err(|error| format!("can not make {}: {error}; choose another --out", path.display()).into())
 }
 
 fn options(args: &FitArgs, input: &Path) -> FitOptions {
@@ -377,7 +402,7 @@ fn write(
 }
 
 /// A spinner on a terminal, nothing elsewhere.
-fn progress_bar(stem: &str) -> ProgressBar {
+pub(super) fn progress_bar(stem: &str) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
     if let Ok(style) = ProgressStyle::with_template("{spinner} {prefix}: {msg} [{elapsed}]") {
         bar.set_style(style);

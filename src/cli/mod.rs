@@ -10,6 +10,8 @@ mod chart;
 mod demo;
 #[cfg(feature = "fit")]
 mod fit;
+#[cfg(feature = "fit")]
+mod group;
 mod measure;
 mod push;
 mod serve;

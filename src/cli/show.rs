@@ -75,6 +75,7 @@ fn summary(body: &Body) -> serde_json::Value {
         "volume_error_m3": body.volume().error_m3,
         "gap_m": body.gap_m(),
         "contained_points": body.points(),
+        "contained_sets": body.sets().iter().map(|set| json!({ "id": set.id.to_string(), "name": set.name })).collect::<Vec<_>>(),
         "provenance": body.provenance(),
     })
 }
@@ -110,6 +111,9 @@ fn describe(out: &mut impl Write, body: &Body) -> io::Result<()> {
             "  fitted around   {} points, sha256 {} ('verify --points' proves it)",
             points.count, points.sha256
         )?;
+    }
+    for set in body.sets() {
+        writeln!(out, "  contains        {}, id {} ('verify --contains' proves it)", set.name, set.id)?;
     }
     if let Some(gap) = body.gap_m() {
         writeln!(out, "  gap             at most {} m beyond the convex hull of its object", length(gap))?;

@@ -1,21 +1,25 @@
 //! `sublevel verify`.
 
-use super::{Outcome, one_line, read, sos_body};
-use crate::body::{Body, SosBody};
+use super::{Outcome, one_line, read, read_body, sos_body};
+use crate::body::{BasicSet, Body, SosBody};
 use serde::Serialize;
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Re-prove a body from its stored numbers alone
 ///
 /// Recomputes the id, checks every certificate (no program is solved), proves the body bounded and compares every derived
 /// value but gap_m, which needs the object. With --points it also proves that every point of a mesh is inside, and bounds anew how far the body reaches beyond
-/// their convex hull. Exit code 0 only if every claim holds.
+/// their convex hull. With --contains it proves that whole bodies are inside. Exit code 0 only if every claim holds.
 ///
 /// An sos-body, which need not be convex, is proven to be of a sum of squares and as near to convex as it says; with --points, to hold
 /// the points, and no fewer triangles between them than it says.
 ///
-/// Example: sublevel verify bodies/mug-d6.json --points mug.obj --scale 0.001
+/// Examples:
+///
+///   sublevel verify bodies/mug-d6.json --points mug.obj --scale 0.001
+///
+///   sublevel verify bodies/shelf-d4.json --contains board-1.json board-2.json
 #[derive(Debug, clap::Args)]
 pub(super) struct VerifyArgs {
     /// Body file
@@ -28,6 +32,10 @@ pub(super) struct VerifyArgs {
     #[cfg(feature = "fit")]
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, requires = "points", allow_negative_numbers = true)]
     pub(super) scale: f64,
+    /// Bodies that the body must contain whole, by the proofs that its file keeps for them
+    #[cfg_attr(feature = "fit", doc = "or, if it has none, by new ones")]
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    contains: Vec<PathBuf>,
     /// Print one JSON object instead of sentences
     #[arg(long)]
     pub(super) json: bool,
@@ -39,6 +47,8 @@ struct Report {
     contains_all_points_proven: Option<bool>,
     /// Rigorous upper bound of the largest constraint over the points.
     max_value: Option<f64>,
+    /// Whether each body of --contains is proven inside, in their order.
+    contains_sets_proven: Option<Vec<bool>>,
     degree: Option<usize>,
     /// Proven bound of the distance of any point of the body from the convex hull of the points, metres.
     gap_m: Option<f64>,
@@ -51,12 +61,21 @@ pub(super) fn run(args: &VerifyArgs) -> Outcome {
         return sos_body::verify(args, &text);
     }
     let (report, trouble) = match Body::from_json(&text) {
-        Ok(body) => contained(args, &body)?,
+        Ok(body) => {
+            let (mut report, mut trouble) = contained(args, &body)?;
+            if !args.contains.is_empty() {
+                let failures = args.contains.iter().map(|path| inside(path, &body)).collect::<Result<Vec<_>, _>>()?;
+                report.contains_sets_proven = Some(failures.iter().map(Option::is_none).collect());
+                trouble = trouble.or_else(|| failures.into_iter().flatten().next());
+            }
+            (report, trouble)
+        }
         Err(error) => {
             let report = Report {
                 sos_convex_proven: false,
                 contains_all_points_proven: None,
                 max_value: None,
+                contains_sets_proven: None,
                 degree: None,
                 gap_m: None,
             };
@@ -74,6 +93,10 @@ pub(super) fn run(args: &VerifyArgs) -> Outcome {
         }
         if let Some(gap) = report.gap_m {
             writeln!(out, "proven to reach at most {gap:.3e} m beyond their convex hull")?;
+        }
+        for (path, proven) in args.contains.iter().zip(report.contains_sets_proven.iter().flatten()) {
+            let verdict = if *proven { "proven to contain" } else { "not proven to contain" };
+            writeln!(out, "{verdict} all of {}", path.display())?;
         }
     }
     if let Some(trouble) = &trouble {
@@ -121,11 +144,38 @@ fn contained(_: &VerifyArgs, body: &Body) -> Result<(Report, Option<String>), Bo
     Ok((proven(body), None))
 }
 
+/// Proves a body inside by the stored proof or a new one; else tells why not.
+fn inside(path: &Path, body: &Body) -> Result<Option<String>, Box<dyn std::error::Error>> {
+    let inner = read_body(path)?;
+    if inner.id() == body.id() {
+        return Ok(None);
+    }
+    let failure = match body.sets().iter().find(|set| set.id == *inner.id()) {
+        Some(set) => {
+            set.containment.prove(&BasicSet::from(body), &BasicSet::from(&inner)).err().map(|error| error.to_string())
+        }
+        None => new_proof(body, &inner),
+    };
+    Ok(failure.map(|failure| format!("{}: {failure}", path.display())))
+}
+
+#[cfg(feature = "fit")]
+fn new_proof(body: &Body, inner: &Body) -> Option<String> {
+    let degree = crate::fit::EncloseOptions::new(body.degree()).multiplier_degree;
+    crate::fit::containment(body, &inner.into(), degree).err().map(|error| error.to_string())
+}
+
+#[cfg(not(feature = "fit"))]
+fn new_proof(_: &Body, _: &Body) -> Option<String> {
+    Some("the body's file has no proof that it contains this body, and making one needs the feature 'fit'".into())
+}
+
 fn proven(body: &Body) -> Report {
     Report {
         sos_convex_proven: true,
         contains_all_points_proven: None,
         max_value: None,
+        contains_sets_proven: None,
         degree: Some(body.degree()),
         gap_m: None,
     }

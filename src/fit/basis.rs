@@ -33,7 +33,7 @@ pub(super) fn change(structure: &Structure, matrix: Matrix, map: &Affine) -> DMa
 }
 
 /// Coefficients of the monomials of u, one row each, as polynomials of z.
-fn of_monomials(degree: usize, map: &Affine) -> DMatrix<f64> {
+pub(super) fn of_monomials(degree: usize, map: &Affine) -> DMatrix<f64> {
     let order = monomials(degree);
     let position = |e: Exponents| order.iter().position(|&m| m == e);
     let mut change = DMatrix::zeros(order.len(), order.len());

@@ -18,6 +18,7 @@ mod cuboid;
 mod descent;
 mod dominance;
 pub mod ellipsoid;
+mod enclose;
 mod factor;
 mod gap;
 mod generate;
@@ -47,6 +48,10 @@ pub use certificate::{NoCertificate, certificate};
 pub use cone::{Cone, UnknownCone};
 pub use coordinates::Coordinates;
 pub use cuboid::{OrientedBox, smallest_box};
+pub use enclose::{
+    EncloseError, EncloseOptions, Enclosure, Group, MAX_MULTIPLIER_DEGREE, MAX_SETS, NoContainment, Region,
+    containment, enclose, enclose_bodies, group,
+};
 pub use gap::{Gap, gap};
 pub use hull::HullError;
 pub use ladder::{MAX_SLABS, Rung, ball, coarsest_within, ladder};

@@ -84,6 +84,16 @@ impl<'a> Object<'a> {
         coordinates.map(self.points, &self.normalization).ok_or(ProgramError::Singular)
     }
 
+    /// Its name.
+    pub(super) fn name(&self) -> &str {
+        self.name
+    }
+
+    /// The map to the frame in which the smallest ellipsoid is the unit ball.
+    pub(super) fn normalization(&self) -> Normalization {
+        self.normalization
+    }
+
     /// The smallest ball around the points.
     pub(super) fn ball(&self) -> Result<Rung, FitError> {
         let start = Instant::now();
@@ -178,7 +188,7 @@ impl<'a> Object<'a> {
     }
 
     /// Notes where the body is from and how far it reaches beyond the hull.
-    fn finish(&self, body: Body, objective: &str, refined: bool) -> (Body, Gap) {
+    pub(super) fn finish(&self, body: Body, objective: &str, refined: bool) -> (Body, Gap) {
         let gap = gap(&body, &self.vertices);
         let provenance = Provenance {
             input: self.input.to_owned(),

@@ -201,8 +201,13 @@ fn relaxed(
         match certify(object, &structure, &coefficients, gram, relaxation) {
             Ok(body) => {
                 let (rounds, iterations) = (watch.progress().round, watch.progress().iterations);
-                let report =
-                    ProgramReport { objective_value: objective, optimality_gap: gap.unwrap_or(f64::INFINITY), rounds, iterations, margin };
+                let report = ProgramReport {
+                    objective_value: objective,
+                    optimality_gap: gap.unwrap_or(f64::INFINITY),
+                    rounds,
+                    iterations,
+                    margin,
+                };
                 return Ok((body, report));
             }
             Err(FitError::UnprovenSos(SosBodyError::NotRelaxed(_))) if margins.len() > 0 => {}

@@ -21,6 +21,12 @@ impl Pattern {
         Self { size: basis.len(), keys: index.len(), key: key.collect() }
     }
 
+    /// Gram matrices of polynomials on all monomials up to half their degree; keys are the monomials in their order.
+    pub(super) fn of_monomials(half_degree: usize) -> Self {
+        let index: HashMap<Exponents, usize> = monomials(2 * half_degree).into_iter().zip(0..).collect();
+        Self::new(&monomials(half_degree), &index, |a, b| std::array::from_fn(|i| a[i] + b[i]))
+    }
+
     /// The pattern of some of the rows and columns, and which of the keys are its keys.
     pub(super) fn restricted(&self, rows: &[usize]) -> (Self, Vec<usize>) {
         let old: Vec<usize> = rows.iter().flat_map(|&i| rows.iter().map(move |&j| self.key(i, j))).collect();
@@ -107,7 +113,7 @@ impl Structure {
     pub(super) fn new(degree: usize) -> Self {
         let all = monomials(degree);
         let index: HashMap<Exponents, usize> = all.iter().copied().zip(0..).collect();
-        let gram = Pattern::new(&monomials(degree / 2), &index, |a, b| std::array::from_fn(|i| a[i] + b[i]));
+        let gram = Pattern::of_monomials(degree / 2);
 
         let mut form_index = HashMap::new();
         let mut derivative = Vec::new();

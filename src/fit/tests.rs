@@ -9,10 +9,10 @@ use crate::polynomial::Polynomial;
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3};
 
 mod cones;
-mod primal;
+pub(super) mod primal;
 mod sos;
 
-fn unwatched(_: Progress) -> ControlFlow<()> {
+pub(super) fn unwatched(_: Progress) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 

@@ -1,14 +1,17 @@
-//! Polynomials of even degree 2 to 8 in three variables: evaluation, rounding bounds and proofs of sos-convexity.
+//! Polynomials of even degree 2 to 8 in three variables: evaluation, rounding bounds, proofs of sos-convexity and of
+//! containment.
 //!
 //! Pure mathematics in the normalized frame of a body (unit-free coordinates `z`); nothing here knows of metres, poses
 //! or bodies.
 
 mod ceiling;
 mod chord;
+mod containment;
 mod definite;
 mod dense;
 mod gram;
 mod hessian_form;
+mod interval;
 mod monomial;
 mod nested;
 mod norm_power;
@@ -18,17 +21,20 @@ mod residual;
 mod rounding;
 mod simd;
 mod sos_gram;
+mod substitution;
 
 pub use ceiling::{NEAR_LEVEL, ThirdCeiling};
 pub use chord::Chords;
+pub use containment::{ContainmentProof, NotContaining, Substituted};
 pub use gram::{CertificateError, HessianGram, HessianMonomial, Margin};
 pub use hessian_form::{Jet, NumberJet};
-pub use monomial::{Exponents, degree_of, monomials};
+pub use monomial::{Exponents, degree_of, monomials, position};
 pub use norm_power::NormPower;
 pub use patch::Peak;
 pub use rounding::{Growth, gamma};
 pub use simd::{Arch, Lanes, MAX_LANES, Number, Scalar, Simd, WithSimd, dispatch};
 pub use sos_gram::SosGram;
+pub use substitution::Substitution;
 
 use hessian_form::HessianForm;
 use nalgebra::Vector3;

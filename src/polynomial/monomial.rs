@@ -29,6 +29,12 @@ pub fn monomials(max_degree: usize) -> Vec<Exponents> {
     list
 }
 
+/// Where a monomial stands in the order of [`monomials`], whatever their highest degree.
+pub fn position(exponents: Exponents) -> usize {
+    let [total, tail] = [degree_of(exponents), usize::from(exponents[1]) + usize::from(exponents[2])];
+    total * (total + 1) * (total + 2) / 6 + tail * (tail + 1) / 2 + usize::from(exponents[2])
+}
+
 /// Values of all monomials of degree at most `degree` <= 6 at `z`, in the order of [`monomials`]; `K` is their number and
 /// the first of `values` is 1 already.
 ///
@@ -80,6 +86,11 @@ mod tests {
             let direct: f64 = (0..3).map(|i| z[i].powi(i32::from(exponents[i]))).product();
             assert!((value - direct).abs() <= 1e-14 * direct.abs(), "{exponents:?}: {value} against {direct}");
         }
+    }
+
+    #[test]
+    fn positions_are_those_of_the_list() {
+        assert!(monomials(12).into_iter().enumerate().all(|(place, e)| position(e) == place));
     }
 
     #[test]

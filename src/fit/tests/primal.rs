@@ -1,4 +1,4 @@
-//! The paper's programs for traces as they are printed, in the primal and given straight to clarabel: nothing of the dual, of
+//! The paper's programs as they are printed, here for traces, in the primal and given straight to clarabel: nothing of the dual, of
 //! paths or of frames is shared with what they are to check.
 
 use super::*;
@@ -13,7 +13,7 @@ use std::f64::consts::SQRT_2;
 
 /// `A x + s = b`, s in a product of cones, row by row.
 #[derive(Default)]
-struct Program {
+pub(in crate::fit) struct Program {
     /// Row, column, value.
     entries: Vec<(usize, usize, f64)>,
     right: Vec<f64>,
@@ -22,25 +22,25 @@ struct Program {
 }
 
 impl Program {
-    fn variable(&mut self, cost: f64) -> usize {
+    pub(in crate::fit) fn variable(&mut self, cost: f64) -> usize {
         self.linear.push(cost);
         self.linear.len() - 1
     }
 
     /// Variables of a symmetric matrix, upper triangle by columns.
-    fn matrix(&mut self, size: usize, trace_cost: f64) -> Vec<usize> {
+    pub(in crate::fit) fn matrix(&mut self, size: usize, trace_cost: f64) -> Vec<usize> {
         let entries = (0..size).flat_map(|j| (0..=j).map(move |i| i == j));
         entries.map(|diagonal| self.variable(if diagonal { trace_cost } else { 0.0 })).collect()
     }
 
-    fn row(&mut self, entries: impl IntoIterator<Item = (usize, f64)>, right: f64) {
+    pub(in crate::fit) fn row(&mut self, entries: impl IntoIterator<Item = (usize, f64)>, right: f64) {
         let row = self.right.len();
         self.entries.extend(entries.into_iter().map(|(column, value)| (row, column, value)));
         self.right.push(right);
     }
 
     /// `[[V, I], [I, Q]] ⪰ 0`, or `Q ⪰ floor I` without V.
-    fn semidefinite(&mut self, v: Option<&[usize]>, q: &[usize], size: usize, floor: f64) {
+    pub(in crate::fit) fn semidefinite(&mut self, v: Option<&[usize]>, q: &[usize], size: usize, floor: f64) {
         let first = if v.is_some() { size } else { 0 };
         for j in 0..first + size {
             for i in 0..=j {
@@ -56,7 +56,38 @@ impl Program {
         self.cones.push(SupportedConeT::PSDTriangleConeT(first + size));
     }
 
-    fn minimum(mut self) -> f64 {
+    /// All rows so far are equations.
+    pub(in crate::fit) fn equations(&mut self) {
+        self.cones.push(SupportedConeT::ZeroConeT(self.right.len()));
+    }
+
+    /// `log det Q >= Σ t` for new t, which are to be maximised: `[[Q, Z], [Zᵀ, diag Z]] ⪰ 0` with Z lower triangular and
+    /// `exp(t_i) <= Z_ii`.
+    pub(in crate::fit) fn log_det(&mut self, q: &[usize], size: usize) {
+        let at = |i: usize, j: usize| j * (j + 1) / 2 + i;
+        let z = self.matrix(size, 0.0);
+        for j in 0..2 * size {
+            for i in 0..=j {
+                let scale = if i == j { 1.0 } else { SQRT_2 };
+                match (i < size, j < size) {
+                    (true, true) => self.row([(q[at(i, j)], -scale)], 0.0),
+                    (true, false) if i >= j - size => self.row([(z[at(j - size, i)], -scale)], 0.0),
+                    (false, false) if i == j => self.row([(z[at(i - size, i - size)], -1.0)], 0.0),
+                    _ => self.row([], 0.0),
+                }
+            }
+        }
+        self.cones.push(SupportedConeT::PSDTriangleConeT(2 * size));
+        for i in 0..size {
+            let t = self.variable(-1.0);
+            self.row([(t, -1.0)], 0.0);
+            self.row([], 1.0);
+            self.row([(z[at(i, i)], -1.0)], 0.0);
+            self.cones.push(SupportedConeT::ExponentialConeT());
+        }
+    }
+
+    pub(in crate::fit) fn minimum(mut self) -> f64 {
         self.entries.sort_by_key(|&(row, column, _)| (column, row));
         let columns = self.linear.len();
         let starts = (0..=columns).map(|c| self.entries.partition_point(|entry| entry.1 < c)).collect();
@@ -129,7 +160,7 @@ fn least_trace(
             program.row(key, factor * relaxation[monomial]);
         }
     }
-    program.cones.push(SupportedConeT::ZeroConeT(program.right.len()));
+    program.equations();
     for point in points {
         let values = structure.values(point);
         program.row(coefficients.iter().zip(&values).filter_map(|(c, v)| Some(((*c)?, *v))), 1.0);
