@@ -117,7 +117,7 @@ pub(super) struct FitArgs {
     /// Have this server fit, such as http://127.0.0.1:50051: it stores the bodies, and their files are written here, too
     ///
     /// Jobs wait for their turn there and survive its restart. Ctrl-C cancels the one that is under way.
-    #[arg(long, value_name = "URL")]
+    #[arg(long, value_name = "URL", conflicts_with_all = ["relax_convexity", "raw_frame", "cone"])]
     server: Option<String>,
     /// Put the bodies of all inputs, body files in one common frame, into one body: <NAME>-d<degree>.json
     ///
@@ -193,6 +193,9 @@ pub(super) fn run(args: &FitArgs) -> Result<(), Box<dyn Error>> {
         }
     }
     let relaxed = method(args)?;
+    if relaxed.is_some() && args.server.is_some() {
+        return Err("servers keep convex bodies only; leave --server out, or choose another --objective".into());
+    }
     for (input, stem) in args.inputs.iter().zip(&stems) {
         match relaxed {
             Some(method) => sos::options(args, method, input).check(stem),

@@ -84,16 +84,6 @@ impl<'a> Object<'a> {
         coordinates.map(self.points, &self.normalization).ok_or(ProgramError::Singular)
     }
 
-    /// Its name.
-    pub(super) fn name(&self) -> &str {
-        self.name
-    }
-
-    /// The map to the frame in which the smallest ellipsoid is the unit ball.
-    pub(super) fn normalization(&self) -> Normalization {
-        self.normalization
-    }
-
     /// The smallest ball around the points.
     pub(super) fn ball(&self) -> Result<Rung, FitError> {
         let start = Instant::now();
@@ -122,7 +112,6 @@ impl<'a> Object<'a> {
     ) -> Result<Fit, FitError> {
         let start = Instant::now();
         let structure = Structure::new(options.degree);
-        let coordinates = self.coordinates(options.coordinates)?;
         let mut attempts = MARGIN_ATTEMPTS.iter().map(|factor| factor * options.margin);
         let mut watch = Watch::new(progress);
         let (body, optimum, margin, volumes, refinement_end) = loop {

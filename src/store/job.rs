@@ -124,8 +124,8 @@ pub struct FittedBody {
 pub struct FitOptimum {
     /// Optimal value of the objective.
     pub objective_value: f64,
-    /// It minus its lower bound from the dual.
-    pub optimality_gap: f64,
+    /// It minus its lower bound from the dual, if there is one.
+    pub optimality_gap: Option<f64>,
     /// Why the refinement ended, if there was one.
     pub refinement_end: Option<String>,
 }
