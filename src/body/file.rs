@@ -1,13 +1,13 @@
 //! The body file: JSON that any program can read, re-proven whenever it is read.
 
-use super::{Aabb, Ball, Body, BodyError, Constraint, ContainedPoints, Normalization, Provenance};
+use super::{Aabb, Ball, Body, BodyError, CompoundError, Constraint, ContainedPoints, Normalization, Provenance};
 use crate::polynomial::{HessianGram, HessianMonomial, Polynomial};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use serde_json::ser::{CompactFormatter, Formatter};
 use std::io;
 
-const FORMAT: &str = "sublevel/1";
+pub(super) const FORMAT: &str = "sublevel/1";
 const KIND: &str = "body";
 
 /// Relative difference at which a stored derived value is called wrong: far above what another machine's rounding does to
@@ -53,11 +53,23 @@ pub enum BodyFileError {
     /// The proof fails.
     #[error(transparent)]
     Body(#[from] BodyError),
+    /// A part of a compound is wrong.
+    #[error("parts[{index}]: {source}")]
+    Part {
+        /// Which part.
+        index: usize,
+        /// What is wrong with it.
+        source: Box<BodyFileError>,
+    },
+    /// The parts do not make a compound.
+    #[error(transparent)]
+    Compound(#[from] CompoundError),
 }
 
+/// The body file of one body, which a compound's file has for each of its parts.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct File {
+pub(super) struct File {
     format: String,
     kind: String,
     id: String,
@@ -119,12 +131,7 @@ struct FileBox {
 impl Body {
     /// The body file of this body; reading it back gives the same numbers exactly.
     pub fn to_json(&self) -> String {
-        let mut text = Vec::new();
-        let mut serializer = serde_json::Serializer::with_formatter(&mut text, LinePerKey::default());
-        // Writing plain data to memory does not fail, and JSON is UTF-8.
-        let _ = File::from(self).serialize(&mut serializer);
-        text.push(b'\n');
-        String::from_utf8_lossy(&text).into_owned()
+        write(&File::from(self), 1)
     }
 
     /// Reads a body file and re-proves it: the id is recomputed, the certificates are checked, every derived value is
@@ -133,12 +140,11 @@ impl Body {
     /// # Errors
     /// The field that is wrong, the reason and the remedy.
     pub fn from_json(text: &str) -> Result<Self, BodyFileError> {
-        let file: File = serde_json::from_str(text).map_err(|error| BodyFileError::Json(error.to_string()))?;
-        for (field, found, expected) in [("format", &file.format, FORMAT), ("kind", &file.kind, KIND)] {
-            if found != expected {
-                return Err(BodyFileError::Format { field, found: found.clone(), expected });
-            }
-        }
+        Self::from_file(read(text)?)
+    }
+
+    pub(super) fn from_file(file: File) -> Result<Self, BodyFileError> {
+        check_format(&file.format, &file.kind, KIND)?;
         let constraints = file
             .constraints
             .iter()
@@ -168,6 +174,31 @@ impl Body {
     }
 }
 
+/// The data of a file of some kind.
+pub(super) fn read<'a, T: Deserialize<'a>>(text: &'a str) -> Result<T, BodyFileError> {
+    serde_json::from_str(text).map_err(|error| BodyFileError::Json(error.to_string()))
+}
+
+/// Refuses another format, or another kind than the expected.
+pub(super) fn check_format(format: &str, kind: &str, expected: &'static str) -> Result<(), BodyFileError> {
+    for (field, found, expected) in [("format", format, FORMAT), ("kind", kind, expected)] {
+        if found != expected {
+            return Err(BodyFileError::Format { field, found: found.into(), expected });
+        }
+    }
+    Ok(())
+}
+
+/// JSON text of a file, a line per key of its objects down to so many levels.
+pub(super) fn write(file: &impl Serialize, levels: usize) -> String {
+    let mut text = Vec::new();
+    let mut serializer = serde_json::Serializer::with_formatter(&mut text, LinePerKey { levels, depth: 0 });
+    // Writing plain data to memory does not fail, and JSON is UTF-8.
+    let _ = file.serialize(&mut serializer);
+    text.push(b'\n');
+    String::from_utf8_lossy(&text).into_owned()
+}
+
 fn read_constraint(i: usize, constraint: &FileConstraint) -> Result<Constraint, BodyFileError> {
     let field = |key: &str, reason: String| BodyFileError::Field { field: format!("constraints[{i}].{key}"), reason };
     let FileConstraint { exponents, coefficients, certificate } = constraint;
@@ -195,36 +226,54 @@ fn read_constraint(i: usize, constraint: &FileConstraint) -> Result<Constraint, 
     Ok(Constraint { polynomial, gram })
 }
 
+fn field(name: impl Into<String>, reason: &str) -> BodyFileError {
+    BodyFileError::Field { field: name.into(), reason: reason.into() }
+}
+
 /// Checks what no proof covers, as far as it can be: notes about the input must at least be possible and printable.
 fn check_notes(file: &File) -> Result<(), BodyFileError> {
-    let check = |good: bool, field: &str, reason: &str| {
-        let error = || BodyFileError::Field { field: field.into(), reason: reason.into() };
-        if good { Ok(()) } else { Err(error()) }
-    };
-    if let Some(ContainedPoints { count, sha256 }) = &file.contained_points {
-        let digits = sha256.len() == 64 && sha256.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'));
-        check(digits, "contained_points.sha256", "must be 64 lowercase hexadecimal digits")?;
-        check(
-            (1..=1 << 40).contains(count),
-            "contained_points.count",
-            "must be the number of points that were hashed",
-        )?;
+    if let Some(points) = &file.contained_points {
+        points.check("contained_points")?;
     }
-    if let Some(gap) = file.gap_m {
-        // Both the body and the hull lie in the circumscribed ball.
-        let possible = (0.0..=2.0 * file.circumscribed_ball.radius_m).contains(&gap);
-        check(possible, "gap_m", "must be between 0 and the diameter of the circumscribed ball, or null")?;
+    // Both the body and the hull lie in the circumscribed ball.
+    if file.gap_m.is_some_and(|gap| !(0.0..=2.0 * file.circumscribed_ball.radius_m).contains(&gap)) {
+        return Err(field("gap_m", "must be between 0 and the diameter of the circumscribed ball, or null"));
     }
-    if let Some(Provenance { input, objective, hull_volume_m3, .. }) = &file.provenance {
-        for (field, text) in [("provenance.input", input), ("provenance.objective", objective)] {
-            let printable = text.is_empty() || super::check_name(text).is_ok();
-            check(printable, field, "must have at most 200 characters and no control characters")?;
-        }
+    if let Some(provenance) = &file.provenance {
+        provenance.check()?;
         // A hull inside the body is no larger than the body, up to the quadrature.
-        let possible = *hull_volume_m3 >= 0.0 && *hull_volume_m3 <= 1.01 * file.volume_m3;
-        check(possible, "provenance.hull_volume_m3", "must be between 0 and the volume of the body")?;
+        if provenance.hull_volume_m3 > 1.01 * file.volume_m3 {
+            return Err(field("provenance.hull_volume_m3", "must be between 0 and the volume of the body"));
+        }
     }
     Ok(())
+}
+
+impl ContainedPoints {
+    pub(super) fn check(&self, name: &str) -> Result<(), BodyFileError> {
+        let Self { count, sha256 } = self;
+        if sha256.len() != 64 || !sha256.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f')) {
+            return Err(field(format!("{name}.sha256"), "must be 64 lowercase hexadecimal digits"));
+        }
+        if !(1..=1 << 40).contains(count) {
+            return Err(field(format!("{name}.count"), "must be the number of points that were hashed"));
+        }
+        Ok(())
+    }
+}
+
+impl Provenance {
+    pub(super) fn check(&self) -> Result<(), BodyFileError> {
+        for (name, text) in [("provenance.input", &self.input), ("provenance.objective", &self.objective)] {
+            if !(text.is_empty() || super::check_name(text).is_ok()) {
+                return Err(field(name, "must have at most 200 characters and no control characters"));
+            }
+        }
+        if !(self.hull_volume_m3 >= 0.0) {
+            return Err(field("provenance.hull_volume_m3", "must be a volume, m³"));
+        }
+        Ok(())
+    }
 }
 
 /// Compares every derived value with the one recomputed from the polynomials.
@@ -296,10 +345,18 @@ impl From<&Constraint> for FileConstraint {
     }
 }
 
-/// Compact JSON but for a line break before each key of the outermost object, so that a file can be looked at.
-#[derive(Default)]
+/// Compact JSON but for a line break before each key of the outer objects, so that a file can be looked at.
 struct LinePerKey {
+    /// How many levels of objects are broken into lines.
+    levels: usize,
     depth: usize,
+}
+
+impl LinePerKey {
+    fn indent<W: ?Sized + io::Write>(&self, writer: &mut W) -> io::Result<()> {
+        writer.write_all(b"\n")?;
+        (0..self.depth).try_for_each(|_| writer.write_all(b"  "))
+    }
 }
 
 impl Formatter for LinePerKey {
@@ -310,21 +367,18 @@ impl Formatter for LinePerKey {
 
     fn end_object<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
         self.depth -= 1;
-        if self.depth == 0 {
-            writer.write_all(b"\n")?;
+        if self.depth < self.levels {
+            self.indent(writer)?;
         }
         CompactFormatter.end_object(writer)
     }
 
     fn begin_object_key<W: ?Sized + io::Write>(&mut self, writer: &mut W, first: bool) -> io::Result<()> {
         CompactFormatter.begin_object_key(writer, first)?;
-        if self.depth == 1 {
-            writer.write_all(b"\n  ")?;
-        }
-        Ok(())
+        if self.depth <= self.levels { self.indent(writer) } else { Ok(()) }
     }
 
     fn begin_object_value<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
-        writer.write_all(if self.depth == 1 { b": " } else { b":" })
+        writer.write_all(if self.depth <= self.levels { b": " } else { b":" })
     }
 }

@@ -16,7 +16,7 @@ mod serve;
 mod show;
 mod verify;
 
-use crate::body::Body;
+use crate::body::Shape;
 use clap::Parser;
 use std::error::Error;
 use std::io;
@@ -122,9 +122,9 @@ fn read(path: &Path) -> Result<String, Box<dyn Error>> {
     std::fs::read_to_string(path).map_err(|error| format!("{}: {error}; check the path", path.display()).into())
 }
 
-/// Reads and re-proves a body file, naming it in the error.
-fn read_body(path: &Path) -> Result<Body, Box<dyn Error>> {
-    Body::from_json(&read(path)?).map_err(|error| format!("{}: {error}", path.display()).into())
+/// Reads and re-proves the file of a body or a compound, naming it in the error.
+fn read_shape(path: &Path) -> Result<Shape, Box<dyn Error>> {
+    Shape::from_json(&read(path)?).map_err(|error| format!("{}: {error}", path.display()).into())
 }
 
 /// Writes a file whole or not at all: under a temporary name beside it, then renamed.

@@ -39,6 +39,8 @@ pub(super) struct Object<'a> {
     whitened: Vec<Vector3<f64>>,
     /// From there to the unit frame.
     unit: Affine,
+    /// The points are known up to this distance, metres: bodies hold the balls around them.
+    clearance: f64,
     /// What all this took.
     seconds: f64,
 }
@@ -55,7 +57,12 @@ impl<'a> Object<'a> {
         let whitened = vertices.iter().map(|x| normalization.linear * (x - normalization.center)).collect();
         let unit = unit_frame(points, &normalization).ok_or(ProgramError::Singular)?;
         let seconds = start.elapsed().as_secs_f64();
-        Ok(Self { name, points, input, hull, vertices, normalization, whitened, unit, seconds })
+        Ok(Self { name, points, input, hull, vertices, normalization, whitened, unit, clearance: 0.0, seconds })
+    }
+
+    /// The same object of points that are only known up to a distance, metres.
+    pub(super) fn around(self, clearance: f64) -> Self {
+        Self { clearance, ..self }
     }
 
     /// The smallest ball around the points.
@@ -63,7 +70,8 @@ impl<'a> Object<'a> {
         let start = Instant::now();
         let ball = smallest_ball(&self.vertices);
         // Rounding of the coordinates, as seen from the centre.
-        let body = Body::ball(self.name, ball.center, ball.radius * (1.0 + 1e-12))?.with_points(self.points)?;
+        let body = Body::ball(self.name, ball.center, ball.radius * (1.0 + 1e-12) + 2.0 * self.clearance)?
+            .with_points(self.points)?;
         let (body, gap) = self.finish(body, BALL, false);
         Ok(Rung { body, gap, seconds: self.seconds + start.elapsed().as_secs_f64(), report: None })
     }
@@ -128,7 +136,7 @@ impl<'a> Object<'a> {
 
     /// Notes where the body is from and how far it reaches beyond the hull.
     fn finish(&self, body: Body, objective: &str, refined: bool) -> (Body, Gap) {
-        let gap = gap(&body, &self.vertices);
+        let gap = self.gap(&body);
         let provenance = Provenance {
             input: self.input.to_owned(),
             objective: objective.to_owned(),
@@ -137,6 +145,12 @@ impl<'a> Object<'a> {
             hull_volume_m3: self.hull.volume,
         };
         (body.with_provenance(provenance).with_gap(gap.most_m), gap)
+    }
+
+    /// How far a body reaches beyond the hull, wherever within the clearance the points are.
+    fn gap(&self, body: &Body) -> Gap {
+        let gap = gap(body, &self.vertices);
+        Gap { most_m: gap.most_m + self.clearance, ..gap }
     }
 
     /// Cuts a body by at most so many slabs, one after the other where it reaches farthest beyond the hull, until it reaches no
@@ -158,8 +172,8 @@ impl<'a> Object<'a> {
             }
             watch.round(self.vertices.len(), 0.0);
             watch.iteration(gap.most_m)?;
-            let slabbed = cut(&body, self.points, &gap.direction)?;
-            gap = self::gap(&slabbed, &self.vertices);
+            let slabbed = cut(&body, self.points, self.clearance, &gap.direction)?;
+            gap = self.gap(&slabbed);
             body = slabbed.with_gap(gap.most_m);
         }
         let seconds = report.seconds + start.elapsed().as_secs_f64();
@@ -167,9 +181,9 @@ impl<'a> Object<'a> {
         Ok(Fit { body, gap, report: FitReport { volume_m3, volume_error_m3, seconds, ..report } })
     }
 
-    /// Pulls all points inside by the constant coefficient, which leaves the Hessian as it is, and proves the body.
+    /// Pulls all points, with what is around them, inside by the constant coefficient, which leaves the Hessian as it is, and proves the body.
     fn certify(&self, structure: &Structure, optimum: &Optimum) -> Result<Body, FitError> {
-        let Self { name, points, normalization, .. } = self;
+        let Self { name, points, normalization, clearance, .. } = self;
         let terms = structure.monomials.iter().copied().zip(optimum.coefficients.iter().copied()).collect();
         let polynomial = Polynomial::new(terms)?;
         let gram = HessianGram::nearest(&polynomial, structure.hessian_basis.clone(), optimum.hessian.clone())
@@ -185,7 +199,7 @@ impl<'a> Object<'a> {
         for _ in 0..3 {
             let highest = outermost
                 .iter()
-                .map(|x| placement.sample(&constraint, x).value_upper(0.0))
+                .map(|x| placement.sample(&constraint, x).value_upper(*clearance))
                 .fold(f64::NEG_INFINITY, f64::max);
             let excess = highest - 1.0;
             if (-1e-15..=0.0).contains(&excess) {
