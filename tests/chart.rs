@@ -43,7 +43,7 @@ fn the_quick_table_holds_the_known_volumes() {
         }
     }
     let report = read("table1.md");
-    for name in ["table1.svg", "table1-degrees.svg", "table1-gram.svg", "table1-levels.svg"] {
+    for name in ["table1.svg", "table1-degrees.svg", "table1-gram.svg", "table1-convexity.svg", "table1-levels.svg"] {
         assert!(report.contains(name), "{name} is not in the report");
         let picture = read(name);
         assert!(picture.starts_with("<svg") && !picture.contains("NaN"), "{name}");

@@ -5,11 +5,12 @@ mod report;
 mod rows;
 
 use super::{ChartError, Machine};
-use crate::body::Body;
+use crate::body::{Aabb, Body, SosBody, Volume};
 use crate::fit::{
-    FitError, FitOptions, Mesh, OrientedBox, ReadError, ball, fit, hull, hull::HullError, read_mesh, smallest_box,
+    Coordinates, FitError, FitOptions, Mesh, OrientedBox, ReadError, SosMethod, SosOptions, ball, fit, fit_sos, hull,
+    hull::HullError, read_mesh, smallest_box,
 };
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 use rows::{MESHES, Method, Row, rows};
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -49,8 +50,38 @@ struct Made {
     /// Estimate of the error of the volume; 0 where it is a formula.
     error_m3: f64,
     seconds: f64,
-    /// The body, where it is one of ours.
-    body: Option<Body>,
+    /// The set, where it is one of ours.
+    set: Option<Set>,
+}
+
+/// One of our sets.
+#[derive(Clone, Debug)]
+enum Set {
+    Body(Box<Body>),
+    Sos(Box<SosBody>),
+}
+
+impl Set {
+    fn value(&self, x: &Vector3<f64>) -> f64 {
+        match self {
+            Self::Body(body) => body.value(x),
+            Self::Sos(body) => body.value(x),
+        }
+    }
+
+    fn bounding_box(&self) -> &Aabb {
+        match self {
+            Self::Body(body) => body.bounding_box(),
+            Self::Sos(body) => body.bounding_box(),
+        }
+    }
+
+    fn volume(&self) -> Volume {
+        match self {
+            Self::Body(body) => body.volume(),
+            Self::Sos(body) => body.volume(),
+        }
+    }
 }
 
 /// One of the meshes.
@@ -124,7 +155,7 @@ impl Subject {
 
     fn make(&self, method: Method, progress: &mut dyn FnMut() -> ControlFlow<()>) -> Result<Made, FitError> {
         let start = Instant::now();
-        let exact = |volume_m3| Made { volume_m3, error_m3: 0.0, seconds: start.elapsed().as_secs_f64(), body: None };
+        let exact = |volume_m3| Made { volume_m3, error_m3: 0.0, seconds: start.elapsed().as_secs_f64(), set: None };
         let points = &self.mesh.points;
         Ok(match method {
             Method::Hull => exact(hull::convex_hull(points)?.volume),
@@ -135,20 +166,34 @@ impl Subject {
             }
             Method::Ball => {
                 let rung = ball(self.name, points)?;
-                Made::of(rung.body, rung.seconds)
+                Made::of(Set::Body(Box::new(rung.body)), rung.seconds)
             }
             Method::Convex(objective, degree, refine) => {
                 let options = FitOptions { degree, objective, refine, ..FitOptions::default() };
                 let fit = fit(self.name, points, &options, &mut |_| progress())?;
-                Made::of(fit.body, fit.report.seconds)
+                Made::of(Set::Body(Box::new(fit.body)), fit.report.seconds)
             }
+            Method::InverseMoment(degree) => self.sos(degree, SosMethod::InverseMoment, progress)?,
+            Method::Relaxed(c, objective, degree) => self.sos(degree, SosMethod::Relaxed { c, objective }, progress)?,
         })
+    }
+
+    /// A set that need not be convex; c is measured in the meshes' own frame.
+    fn sos(
+        &self,
+        degree: usize,
+        method: SosMethod,
+        progress: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<Made, FitError> {
+        let options = SosOptions { degree, method, coordinates: Coordinates::Raw, input: String::new() };
+        let fit = fit_sos(self.name, &self.mesh.points, &[], &options, &mut |_| progress())?;
+        Ok(Made::of(Set::Sos(Box::new(fit.body)), fit.report.seconds))
     }
 }
 
 impl Made {
-    fn of(body: Body, seconds: f64) -> Self {
-        let volume = body.volume();
-        Self { volume_m3: volume.volume_m3, error_m3: volume.error_m3, seconds, body: Some(body) }
+    fn of(set: Set, seconds: f64) -> Self {
+        let Volume { volume_m3, error_m3 } = set.volume();
+        Self { volume_m3, error_m3, seconds, set: Some(set) }
     }
 }

@@ -1,7 +1,7 @@
 //! The paper's pictures, redrawn from our fits: degrees, level sets, and the two Gram matrices.
 
 use super::rows::{MESHES, Method};
-use super::{Subject, Table1};
+use super::{Set, Subject, Table1};
 use crate::body::{Aabb, Body};
 use crate::chart::{Ink, Outline, Panel, Silhouettes, View, boundary_points, outline, shadow};
 use crate::fit::Objective;
@@ -18,6 +18,7 @@ impl Table1 {
         vec![
             ("table1-degrees.svg", self.degrees()),
             ("table1-gram.svg", self.grams()),
+            ("table1-convexity.svg", self.convexity()),
             ("table1-levels.svg", self.levels()),
         ]
     }
@@ -52,6 +53,23 @@ impl Table1 {
         Silhouettes { title, legend, rows }.to_svg()
     }
 
+    /// Sets of one degree that need be convex less and less.
+    fn convexity(&self) -> String {
+        let relaxed = |c, degree| Method::Relaxed(c, Objective::LogDetP, degree);
+        let built = |&degree: &usize| self.set("chair", relaxed(100.0, degree)).is_some();
+        let degree = [6, 4].into_iter().find(built).unwrap_or_default();
+        let rows = [("human", View::Front), ("chair", View::Side), ("octopus", View::Top)].map(|(name, view)| {
+            let convex = Method::Convex(Objective::LogDetP, degree, false);
+            let columns = [("c = 0", convex), ("c = 10", relaxed(10.0, degree)), ("c = 100", relaxed(100.0, degree))];
+            let panel = |(c, method): (&str, Method)| {
+                self.panel(name, &format!("{name}, {c}, {}", view.name()), view, &[(Ink::Orange, method)])
+            };
+            columns.into_iter().filter_map(panel).collect()
+        });
+        let legend = vec![(Ink::Blue, "mesh".into()), (Ink::Orange, "p <= 1".into())];
+        Silhouettes { title: format!("Less and less convex, degree {degree}"), legend, rows: rows.into() }.to_svg()
+    }
+
     /// One body grown and shrunk by its level sets.
     fn levels(&self) -> String {
         let panel = |(name, _): &(&str, &str)| {
@@ -82,9 +100,16 @@ impl Table1 {
     fn panel(&self, name: &str, caption: &str, view: View, methods: &[(Ink, Method)]) -> Option<Panel> {
         let mut outlines = vec![self.subject(name)?.picture(view)];
         for &(ink, method) in methods {
-            let body = self.body(name, method)?;
-            let points = boundary_points(|direction| body.boundary_along(direction), POINTS);
-            outlines.push(Outline::body(ink, outline(&points, view)));
+            outlines.push(match self.set(name, method)? {
+                Set::Body(body) => {
+                    let points = boundary_points(|direction| body.boundary_along(direction), POINTS);
+                    Outline::body(ink, outline(&points, view))
+                }
+                set @ Set::Sos(_) => {
+                    let polygons = shadow(|x| set.value(x), 1.0, set.bounding_box(), view);
+                    Outline { ink, polygons, solid: false }
+                }
+            });
         }
         Some(Panel { caption: caption.into(), outlines })
     }
@@ -94,9 +119,16 @@ impl Table1 {
     }
 
     fn body(&self, name: &str, method: Method) -> Option<&Body> {
+        match self.set(name, method)? {
+            Set::Body(body) => Some(body),
+            Set::Sos(_) => None,
+        }
+    }
+
+    fn set(&self, name: &str, method: Method) -> Option<&Set> {
         let column = self.subjects.iter().position(|subject| subject.name == name)?;
         let (_, cells) = self.rows.iter().find(|(row, _)| row.method == method)?;
-        cells.get(column)?.as_ref().ok()?.body.as_ref()
+        cells.get(column)?.as_ref().ok()?.set.as_ref()
     }
 }
 

@@ -19,6 +19,10 @@ pub(super) enum Method {
     OrientedBox,
     /// The sos-convex body of a degree with the least objective, refined or not.
     Convex(Objective, usize, bool),
+    /// The inverse-moment set of a degree.
+    InverseMoment(usize),
+    /// The set of a degree with the least objective whose convexity is relaxed by c.
+    Relaxed(f64, Objective, usize),
 }
 
 /// A row.
@@ -41,13 +45,15 @@ impl Method {
             Self::Convex(objective, degree, refined) => {
                 format!("sos-convex {degree}, {objective}{}", if refined { ", refined" } else { "" })
             }
+            Self::InverseMoment(degree) => format!("inverse moment {degree}"),
+            Self::Relaxed(c, objective, degree) => format!("sos {degree}, c = {c}, {objective}"),
         }
     }
 
     /// Degree of its polynomial, where it is one.
     pub(super) fn degree(self) -> Option<usize> {
         match self {
-            Self::Convex(_, degree, _) => Some(degree),
+            Self::Convex(_, degree, _) | Self::InverseMoment(degree) | Self::Relaxed(_, _, degree) => Some(degree),
             _ => None,
         }
     }
@@ -79,5 +85,16 @@ pub(super) fn rows() -> Vec<Row> {
         ours(refined(6)),
         ours(convex(LogDetP, 8)),
         ours(refined(8)),
+        print(Method::InverseMoment(2), [4.02, 1.42, 2.14, 1.36, 1.74]),
+        print(Method::InverseMoment(4), [1.53, 0.95, 0.90, 1.25, 0.75]),
+        print(Method::InverseMoment(6), [0.48, 0.54, 0.58, 1.10, 0.57]),
+        print(Method::Relaxed(10.0, LogDetP, 4), [0.38, 0.72, 0.42, 1.05, 0.63]),
+        print(Method::Relaxed(10.0, TraceP, 4), [0.51, 0.78, 0.48, 1.11, 0.71]),
+        print(Method::Relaxed(10.0, LogDetP, 6), [0.35, 0.49, 0.34, 0.92, 0.41]),
+        print(Method::Relaxed(10.0, TraceP, 6), [0.37, 0.56, 0.39, 0.99, 0.54]),
+        print(Method::Relaxed(100.0, LogDetP, 4), [0.36, 0.64, 0.39, 1.05, 0.46]),
+        print(Method::Relaxed(100.0, TraceP, 4), [0.42, 0.74, 0.46, 1.10, 0.54]),
+        print(Method::Relaxed(100.0, LogDetP, 6), [0.21, 0.21, 0.26, 0.82, 0.28]),
+        print(Method::Relaxed(100.0, TraceP, 6), [0.22, 0.30, 0.29, 0.85, 0.37]),
     ]
 }
