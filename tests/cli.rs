@@ -327,7 +327,10 @@ fn verify_proves_and_refuses() {
     let fitted = fitted();
     let (body, mesh) = (fitted.body(), fitted.path("cube.off"));
     let plain = json(&["verify", "--json", text(&body)]);
-    assert_eq!(keys(&plain), sorted("sos_convex_proven contains_all_points_proven max_value degree gap_m"));
+    assert_eq!(
+        keys(&plain),
+        sorted("sos_convex_proven contains_all_points_proven max_value contains_sets_proven degree gap_m")
+    );
     assert_eq!(plain["contains_all_points_proven"], Value::Null);
     let full = json(&["verify", "--json", text(&body), "--points", text(&mesh)]);
     assert_eq!((&full["sos_convex_proven"], &full["contains_all_points_proven"]), (&true.into(), &true.into()));

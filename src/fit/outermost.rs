@@ -90,7 +90,8 @@ mod tests {
             };
             let points: Vec<_> = (0..20_000).map(|_| point(&mut random)).collect();
             let left: BTreeSet<usize> = outermost(&points).into_iter().collect();
-            assert!(left.len() < points.len() / 2, "seed {seed}: {} left", left.len());
+            // Of the shell hardly any point is deep inside.
+            assert!(seed % 3 == 2 || left.len() < points.len() / 2, "seed {seed}: {} left", left.len());
             for _ in 0..3000 {
                 let direction = Vector3::from_fn(|_, _| random.signed()).normalize();
                 let farthest =

@@ -120,7 +120,8 @@ mod tests {
                 let half = (interval - Interval::of(interval.middle())).magnitude();
                 middle += exact(interval.middle()) * at(&v, e);
                 radius += exact(half) * at(&v, e);
-                assert!(half < 1e-12 * (1.0 + interval.magnitude()), "seed {seed}: {interval:?}");
+                // Hundreds of terms, some of which cancel.
+                assert!(half < 1e-10 * (1.0 + interval.magnitude()), "seed {seed}: {interval:?}");
             }
             let error = if value > middle { value - middle } else { middle - value };
             assert!(error <= radius, "seed {seed}");

@@ -7,8 +7,10 @@ use nalgebra::{Matrix3, Vector3};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// Boxes looked at for one bound.
+/// Boxes looked at for the bound along one direction, where the highest point is one, and for that of the distance, which all points of
+/// a circle may share.
 const BOXES: usize = 3000;
+const BOXES_ALL_AROUND: usize = 12_000;
 
 /// How close a bound is to what is attained, relative to the size of the first box, before it is good enough.
 const CLOSE: f64 = 1e-3;
@@ -37,7 +39,7 @@ impl Extent {
         };
         let reach = |n: &Vector3<f64>| {
             let (m, error) = functional(n);
-            highest(polynomial, &first, |z, half| m.dot(z) + m.abs().dot(half) + error, CLOSE * size)
+            highest(polynomial, &first, |z, half| m.dot(z) + m.abs().dot(half) + error, CLOSE * size, BOXES)
         };
         let origin = placement.origin();
         let bounding_box = Aabb {
@@ -50,7 +52,9 @@ impl Extent {
         let error = Vector3::from_fn(|i, _| functional(&unit(i)).1).norm();
         let distance =
             |z: &Vector3<f64>, half: &Vector3<f64>| (inverse * z + offset).norm() + (spread * half).norm() + error;
-        let radius = highest(polynomial, &first, distance, CLOSE * size).min(half_diagonal) * (1.0 + 1e-14) + rounding;
+        let radius = highest(polynomial, &first, distance, CLOSE * size, BOXES_ALL_AROUND).min(half_diagonal)
+            * (1.0 + 1e-14)
+            + rounding;
         Ok(Self { bounding_box, circumscribed: Ball { center, radius } })
     }
 }
@@ -112,11 +116,12 @@ fn highest(
     first: &Vector3<f64>,
     height: impl Fn(&Vector3<f64>, &Vector3<f64>) -> f64,
     close: f64,
+    boxes: usize,
 ) -> f64 {
     let cell = |center: Vector3<f64>, half: Vector3<f64>| Cell { center, half, height: height(&center, &half) };
     let mut heap = BinaryHeap::from([cell(Vector3::zeros(), *first)]);
     let mut attained = f64::NEG_INFINITY;
-    for _ in 0..BOXES {
+    for _ in 0..boxes {
         let Some(top) = heap.peek() else { break };
         if top.height - attained <= close {
             break;

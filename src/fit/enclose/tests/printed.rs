@@ -46,8 +46,13 @@ fn printed(structure: &Structure, sets: &[Polynomial], margin: f64) -> f64 {
     let (squares, multiplier) = (Pattern::of_monomials(degree / 2), Pattern::of_monomials(1));
     let mut definite = vec![];
     for g in sets {
-        let mut slack: Vec<_> = g.terms().iter().map(|&(e, c)| (e, -c)).collect();
-        slack.push(([0; 3], 1.0));
+        let mut slack = vec![([0; 3], 1.0)];
+        for &(e, c) in g.terms() {
+            match slack.iter_mut().find(|term| term.0 == e) {
+                Some(term) => term.1 -= c,
+                None => slack.push((e, -c)),
+            }
+        }
         let mut equations = vec![vec![]; monomials(degree).len()];
         definite.push((add(&mut program, &mut equations, &squares, &[([0; 3], 1.0)]), squares.size));
         definite.push((add(&mut program, &mut equations, &multiplier, &slack), multiplier.size));
