@@ -87,7 +87,7 @@ pub(super) struct FitArgs {
     /// sdsos: those whose Hessian form is a sum of squares of two terms each, by
     ///   second-order cones. Minimises the volume itself.
     /// dsos: those whose form is even diagonally dominant, by linear constraints.
-    ///   Looser, and no faster. Both depend on the axes of the smallest ellipsoid.
+    ///   Looser, and hardly faster. Both depend on the axes of the smallest ellipsoid.
     #[arg(long, value_name = "NAME", default_value_t, verbatim_doc_comment)]
     cone: Cone,
     /// Cut the body by at most this many slabs (pairs of parallel planes), each where it reaches farthest beyond the convex hull

@@ -22,7 +22,7 @@ pub enum Cone {
 
 /// A name that is no cone.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("cone: {0:?} is not one of sos, sdsos, dsos; sos is the tightest, sdsos nearly as tight and the fastest")]
+#[error("cone: {0:?} is not one of sos, sdsos, dsos; sos is the tightest, sdsos is for streams of point clouds")]
 pub struct UnknownCone(pub String);
 
 impl Cone {
