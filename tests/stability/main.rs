@@ -4,6 +4,7 @@
 //! draws in their billions are the endurance bench.
 
 mod bodies;
+mod exact;
 mod judge;
 mod random;
 #[allow(dead_code)]
@@ -16,6 +17,7 @@ mod gradients;
 mod limits;
 mod motion;
 mod placement;
+mod recheck;
 mod scale;
 #[cfg(feature = "fit")]
 mod sos;
