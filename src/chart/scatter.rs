@@ -176,10 +176,13 @@ fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     ends.map(|(low, high)| (low / ROOM, high * ROOM))
 }
 
-/// Where the axis is labelled: whole decades, with 2 and 5 of them where there are few.
+/// Where the axis is labelled: whole decades, and the fewer there are, the more of their multiples.
 fn ticks((low, high): (f64, f64)) -> Vec<f64> {
-    let few = (high / low).log10() < 3.0;
-    let steps: &[f64] = if few { &[1.0, 2.0, 5.0] } else { &[1.0] };
+    let steps: &[f64] = match (high / low).log10() {
+        wide if wide > 3.0 => &[1.0],
+        some if some > 1.2 => &[1.0, 2.0, 5.0],
+        _ => &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0],
+    };
     let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;
     let all = decades.flat_map(|decade| steps.iter().map(move |step| step * 10_f64.powi(decade)));
     all.filter(|tick| (low..=high).contains(tick)).collect()
@@ -217,7 +220,8 @@ mod tests {
 
     #[test]
     fn ticks_are_round() {
-        assert_eq!(ticks((0.4, 3.0)), [0.5, 1.0, 2.0]);
+        assert_eq!(ticks((0.4, 3.0)), [0.4, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0]);
+        assert_eq!(ticks((0.4, 30.0)), [0.5, 1.0, 2.0, 5.0, 10.0, 20.0]);
         assert_eq!(ticks((0.5e-3, 20.0)), [1e-3, 1e-2, 1e-1, 1.0, 10.0]);
     }
 }

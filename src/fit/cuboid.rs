@@ -12,7 +12,7 @@ use std::f64::consts::{PI, TAU};
 /// Directions that are tried first, over half of the sphere.
 const LATTICE: usize = 600;
 /// How many of them are searched from.
-const STARTS: usize = 24;
+const STARTS: usize = 8;
 /// Directions of a compass, and the step at which a search ends, radians.
 const COMPASS: usize = 8;
 const LEAST_STEP: f64 = 1e-7;

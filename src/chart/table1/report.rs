@@ -108,7 +108,7 @@ impl Table1 {
             let mean =
                 |f: &dyn Fn(&Made) -> f64| (made.iter().map(|(m, _)| f(m).ln()).sum::<f64>() / made.len() as f64).exp();
             let hull = (made.iter().map(|(_, s)| s.hull_volume_m3.ln()).sum::<f64>() / made.len() as f64).exp();
-            let name = row.method.degree().map_or(row.method.name(), |degree| degree.to_string());
+            let name = row.method.degree().map_or(String::new(), |degree| degree.to_string());
             let point = Point { x: mean(&|m| m.seconds), y: mean(&|m| m.volume_m3) / hull, label: name };
             match groups.iter_mut().find(|group| group.label == label) {
                 Some(group) => group.points.push(point),
