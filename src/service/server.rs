@@ -144,17 +144,15 @@ impl Server {
         loader.abort();
         set_health(&health, ServingStatus::NotServing).await;
         let _ = draining.send(());
-        let drained = async {
-            // The running fit goes back into the queue, and those who watch it are told.
-            #[cfg(feature = "fit")]
-            {
-                jobs.stop();
-                let _ = worker.await;
-            }
+        // The running fit goes back into the queue, and those who watch it are told.
+        #[cfg(feature = "fit")]
+        let serving = async {
+            jobs.stop();
+            let _ = worker.await;
             serving.await
         };
         // Streams may stay open as long as their clients like; waiting for them ends here.
-        if let Ok(result) = tokio::time::timeout(DRAIN, drained).await {
+        if let Ok(result) = tokio::time::timeout(DRAIN, serving).await {
             result?;
         } else {
             tracing::warn!("some connections were still open after {DRAIN:?} and are cut");

@@ -37,15 +37,20 @@ impl Extent {
             let (m, error) = placement.functional(n);
             (m, error.dot(&first) + rounding)
         };
-        let reach = |n: &Vector3<f64>| {
-            let (m, error) = functional(n);
-            highest(polynomial, &first, |z, half| m.dot(z) + m.abs().dot(half) + error, CLOSE * size, BOXES)
-        };
         let origin = placement.origin();
-        let bounding_box = Aabb {
-            min: Vector3::from_fn(|i, _| (origin[i] - reach(&-unit(i))).next_down()),
-            max: Vector3::from_fn(|i, _| (origin[i] + reach(&unit(i))).next_up()),
+        let bounds = |close: f64| {
+            let reach = |n: &Vector3<f64>| {
+                let (m, error) = functional(n);
+                highest(polynomial, &first, |z, half| m.dot(z) + m.abs().dot(half) + error, close, BOXES)
+            };
+            Aabb {
+                min: Vector3::from_fn(|i, _| (origin[i] - reach(&-unit(i))).next_down()),
+                max: Vector3::from_fn(|i, _| (origin[i] + reach(&unit(i))).next_up()),
+            }
         };
+        // The first box can be hundreds of times too large.
+        let rough = bounds(CLOSE * size);
+        let bounding_box = bounds(CLOSE * (rough.max - rough.min).norm());
         let center = (bounding_box.min + bounding_box.max) * 0.5;
         let half_diagonal = (bounding_box.max - bounding_box.min).norm() * 0.5;
         let (offset, spread) = (origin - center, inverse.abs());
