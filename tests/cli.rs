@@ -83,7 +83,7 @@ fn sorted(names: &str) -> Vec<&str> {
 fn fit_reports_and_writes_a_proven_body() {
     let fitted = fitted();
     let [row] = fitted.report.as_array().unwrap().as_slice() else { panic!("{}", fitted.report) };
-    let expected = "input body degree slabs objective refined refinement points left_out left_out_m hull_vertices volume_m3 volume_error_m3 hull_volume_m3 \
+    let expected = "input body degree slabs parts covers objective refined refinement points left_out left_out_m hull_vertices volume_m3 volume_error_m3 hull_volume_m3 \
          gap_m mean_gap_m seconds status objective_value optimality_gap proven";
     assert_eq!(keys(row), sorted(expected));
     assert_eq!(row["body"], text(&fitted.body()));
@@ -160,6 +160,85 @@ fn a_gap_chooses_the_coarsest_body_and_a_ladder_has_them_all() {
     value["gap_m"] = 1e-3.into();
     std::fs::write(&body, value.to_string()).unwrap();
     assert!(refusal(&["verify", text(&body), "--points", text(&mesh)]).contains("gap_m"));
+}
+
+/// A closed mesh like the letter L as OFF text, its arms 1 m long, 0.2 m thick, 0.3 m deep.
+fn letter() -> String {
+    let outline = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.2], [0.2, 0.2], [0.2, 1.0], [0.0, 1.0]];
+    let mut text = "OFF\n12 10 0\n".to_owned();
+    for z in [0.0, 0.3] {
+        text.extend(outline.iter().map(|[x, y]| format!("{x} {y} {z}\n")));
+    }
+    text += "4 3 2 1 0\n4 5 4 3 0\n4 6 7 8 9\n4 6 9 10 11\n";
+    text.extend((0..6).map(|i| (i, (i + 1) % 6)).map(|(i, next)| format!("4 {i} {next} {} {}\n", next + 6, i + 6)));
+    text
+}
+
+#[test]
+fn compounds_are_fitted_verified_shown_and_measured() {
+    let fitted = fitted();
+    let (mesh, out) = (fitted.path("letter.off"), fitted.path("compounds"));
+    std::fs::write(&mesh, letter()).unwrap();
+    let fit = |more: &[&str]| json(&[&["fit", "--json", text(&mesh), "--out", text(&out)], more].concat());
+    let report = fit(&["--degree", "4", "--parts", "2"]);
+    let [row] = report.as_array().unwrap().as_slice() else { panic!("{report}") };
+    let compound = out.join("letter-d4-p2.json");
+    assert_eq!((&row["parts"], &row["covers"], &row["proven"]), (&2.into(), &"interior".into(), &true.into()));
+    assert_eq!((row["body"].as_str().unwrap(), &row["mean_gap_m"]), (text(&compound), &Value::Null));
+    let single = fit(&["--degree", "4"]);
+    for key in ["gap_m", "volume_m3"] {
+        assert!(row[key].as_f64().unwrap() < 0.8 * single[0][key].as_f64().unwrap(), "{key}: {row} {single}");
+    }
+    // A gap that no single smooth body keeps.
+    let gap = format!("{}", 0.5 * single[0]["gap_m"].as_f64().unwrap());
+    let chosen = fit(&["--degree", "4", "--max-gap", &gap]);
+    assert!(chosen[0]["parts"].as_u64().unwrap() > 1 && chosen[0]["slabs"] == 0, "{chosen}");
+
+    let verified = json(&["verify", "--json", text(&compound), "--points", text(&mesh)]);
+    assert_eq!((&verified["covers"], &verified["gap_m"]), (&"interior".into(), &row["gap_m"]));
+    assert!(verified["max_value"].as_f64().unwrap() <= 1.0);
+    assert_eq!(json(&["verify", "--json", text(&compound)])["contains_all_points_proven"], Value::Null);
+    let larger = sublevel(&["verify", text(&compound), "--points", text(&mesh), "--scale", "1.01"]);
+    let told = String::from_utf8_lossy(&larger.stderr).into_owned();
+    assert!(larger.status.code() == Some(1) && told.contains("does not hold its piece"), "{told}");
+    // A note that is not true of the mesh is refused.
+    let stored = std::fs::read_to_string(&compound).unwrap();
+    let changed = fitted.path("changed-compound.json");
+    std::fs::write(&changed, stored.replace("\"interior\"", "\"surface_only\"")).unwrap();
+    assert!(refusal(&["verify", text(&changed), "--points", text(&mesh)]).contains("covering.proven"));
+
+    let (surface, picture) = (fitted.path("letter.obj"), fitted.path("letter.svg"));
+    let shown = json(&["show", text(&compound), "--json", "--mesh", text(&surface), "--svg", text(&picture)]);
+    assert_eq!((&shown["kind"], shown["parts"].as_array().unwrap().len()), (&"compound".into(), 2));
+    assert_eq!((&shown["volume_m3"], &shown["gap_m"]), (&row["volume_m3"], &row["gap_m"]));
+    assert!(std::fs::read_to_string(&surface).unwrap().lines().filter(|line| line.starts_with('v')).count() > 5000);
+    assert!(sublevel(&["show", text(&compound)]).status.success());
+
+    // A ball in the angle of the letter: clear of the compound, within the single body.
+    let ball = fitted.path("ball.xyz");
+    let points = (0..200).map(|k| {
+        let (z, angle) = (f64::from(k) / 99.5 - 1.0, f64::from(k) * 2.4);
+        let ring = (1.0 - z * z).max(0.0).sqrt();
+        format!("{} {} {}\n", 0.05 * ring * angle.cos(), 0.05 * ring * angle.sin(), 0.05 * z)
+    });
+    std::fs::write(&ball, points.collect::<String>()).unwrap();
+    json(&["fit", "--json", text(&ball), "--out", text(&out), "--degree", "2"]);
+    let ball = out.join("ball-d2.json");
+    let measure =
+        |body: &Path| json(&["measure", text(body), text(&ball), "--json", "--pose", "0.55,0.55,0.15,0,0,0,1"]);
+    let apart = measure(&compound);
+    assert!(apart["distance_m"].as_f64().unwrap() > 0.02 && apart["status"] == "converged", "{apart}");
+    assert_eq!(measure(&out.join("letter-d4.json"))["distance_m"], 0.0);
+
+    assert!(refusal(&["push", text(&compound)]).contains("compound"));
+    let told = refusal(&["fit", text(&ball.with_file_name("nothing.xyz")), "--out", text(&out), "--parts", "2"]);
+    assert!(told.contains("check the path"), "{told}");
+    let told = refusal(&["fit", text(&fitted.path("ball.xyz")), "--out", text(&out), "--parts", "2"]);
+    assert!(told.contains("no triangles"), "{told}");
+    let told = refusal(&["fit", text(&mesh), "--out", text(&out), "--parts", "0"]);
+    assert!(told.contains("parts: 0"), "{told}");
+    let told = refusal(&["fit", text(&mesh), "--out", text(&out), "--parts", "2", "--max-gap", "1cm"]);
+    assert!(told.contains("--max-gap"), "{told}");
 }
 
 #[test]
@@ -429,7 +508,7 @@ fn sets_that_need_not_be_convex_are_told_from_bodies_everywhere() {
     let verified = json(&["verify", file, "--points", mesh, "--json"]);
     assert_eq!((&verified["sos_proven"], &verified["contains_all_points_proven"]), (&true.into(), &true.into()));
     assert_eq!(verified["coverage"], relaxed["coverage"]);
-    // A file that claims more convexity.
+    // A file that claims more than it holds, and one that claims more convexity.
     let changed = |change: &dyn Fn(&mut Value)| {
         let mut value: Value = serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap();
         change(&mut value);

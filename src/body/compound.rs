@@ -1,6 +1,6 @@
 //! Several bodies as one: their union, rigidly attached to one frame; and what bodies and compounds have in common.
 
-use super::{Aabb, Ball, Body, BodyError, check_name};
+use super::{Aabb, Ball, Body, BodyError, BodyId, Covering, Provenance, check_name};
 use nalgebra::Vector3;
 
 /// Most parts a compound may have.
@@ -23,6 +23,7 @@ mod sealed {
     pub trait Sealed {}
     impl Sealed for super::Body {}
     impl Sealed for super::Compound {}
+    impl Sealed for crate::body::Shape {}
 }
 
 impl Solid for Body {
@@ -56,9 +57,12 @@ impl Solid for Body {
 #[derive(Clone, Debug)]
 pub struct Compound {
     name: String,
+    id: BodyId,
     parts: Vec<Body>,
     circumscribed: Ball,
     bounding_box: Aabb,
+    pub(super) covering: Option<Covering>,
+    pub(super) provenance: Option<Provenance>,
 }
 
 /// Why bodies do not make a compound.
@@ -94,7 +98,21 @@ impl Compound {
             ((ball.center - center).norm() + ball.radius + positions) * (1.0 + 8.0 * f64::EPSILON)
         };
         let radius = parts.iter().map(|part| around(part.circumscribed())).fold(0.0, f64::max);
-        Ok(Self { name: name.to_owned(), parts, circumscribed: Ball { center, radius }, bounding_box })
+        Ok(Self {
+            name: name.to_owned(),
+            id: BodyId::of_parts(parts.iter().map(Body::id)),
+            parts,
+            circumscribed: Ball { center, radius },
+            bounding_box,
+            covering: None,
+            provenance: None,
+        })
+    }
+
+    /// The same compound with its origin noted: the objective of its parts, and the hull of the whole object.
+    pub fn with_provenance(mut self, provenance: Provenance) -> Self {
+        self.provenance = Some(provenance);
+        self
     }
 
     /// Name given by its maker.
@@ -102,9 +120,36 @@ impl Compound {
         &self.name
     }
 
+    /// Hash of the ids of the parts, in their order.
+    pub fn id(&self) -> &BodyId {
+        &self.id
+    }
+
     /// The parts.
     pub fn parts(&self) -> &[Body] {
         &self.parts
+    }
+
+    /// Highest degree of the parts.
+    pub fn degree(&self) -> usize {
+        self.parts.iter().map(Body::degree).max().unwrap_or(0)
+    }
+
+    /// Upper bound of the distance of any point of the compound from the union of the convex hulls of the pieces that its parts were
+    /// fitted to, metres: the largest [`Body::gap_m`] of the parts, if all have one. The hull of the whole object holds that union,
+    /// so the bound is good for it, too.
+    pub fn gap_m(&self) -> Option<f64> {
+        self.parts.iter().map(Body::gap_m).try_fold(0.0, |most: f64, gap| Some(most.max(gap?)))
+    }
+
+    /// Which mesh the compound was proven to cover.
+    pub fn covering(&self) -> Option<&Covering> {
+        self.covering.as_ref()
+    }
+
+    /// Where the compound comes from.
+    pub fn provenance(&self) -> Option<&Provenance> {
+        self.provenance.as_ref()
     }
 
     /// A ball proven to contain all parts, metres.

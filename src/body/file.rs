@@ -1,7 +1,10 @@
 //! The body file: JSON that any program can read, re-proven whenever it is read.
 
 use super::contained_file::FileContainedSet;
-use super::{Aabb, Ball, Body, BodyError, Constraint, ContainedPoints, Normalization, Provenance, SosBodyError, sos};
+use super::{
+    Aabb, Ball, Body, BodyError, CompoundError, Constraint, ContainedPoints, Normalization, Provenance, SosBodyError,
+    sos,
+};
 use crate::polynomial::{Exponents, HessianGram, HessianMonomial, Polynomial};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -63,11 +66,23 @@ pub enum BodyFileError {
     /// The proof of an sos-body fails.
     #[error(transparent)]
     SosBody(#[from] SosBodyError),
+    /// A part of a compound is wrong.
+    #[error("parts[{index}]: {source}")]
+    Part {
+        /// Which part.
+        index: usize,
+        /// What is wrong with it.
+        source: Box<BodyFileError>,
+    },
+    /// The parts do not make a compound.
+    #[error(transparent)]
+    Compound(#[from] CompoundError),
 }
 
+/// The body file of one body, which a compound's file has for each of its parts.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct File {
+pub(super) struct File {
     format: String,
     kind: String,
     id: String,
@@ -131,7 +146,7 @@ pub(super) struct FileBox {
 impl Body {
     /// The body file of this body; reading it back gives the same numbers exactly.
     pub fn to_json(&self) -> String {
-        write(&File::from(self))
+        write(&File::from(self), 1)
     }
 
     /// Reads a body file and re-proves it: the id is recomputed, the certificates are checked, every derived value is
@@ -143,7 +158,10 @@ impl Body {
         if kind(text).is_ok_and(|kind| kind == sos::KIND) {
             return Err(BodyFileError::NotConvex);
         }
-        let file: File = read(text)?;
+        Self::from_file(read(text)?)
+    }
+
+    pub(super) fn from_file(file: File) -> Result<Self, BodyFileError> {
         check_format(&file.format, &file.kind, KIND)?;
         let constraints = file
             .constraints
@@ -197,10 +215,10 @@ pub(super) fn check_format(format: &str, kind: &str, expected: &'static str) -> 
     Ok(())
 }
 
-/// JSON text of a file.
-pub(super) fn write(file: &impl Serialize) -> String {
+/// JSON text of a file, a line per key of its objects down to so many levels.
+pub(super) fn write(file: &impl Serialize, levels: usize) -> String {
     let mut text = Vec::new();
-    let mut serializer = serde_json::Serializer::with_formatter(&mut text, LinePerKey::default());
+    let mut serializer = serde_json::Serializer::with_formatter(&mut text, LinePerKey { levels, depth: 0 });
     // Writing plain data to memory does not fail, and JSON is UTF-8.
     let _ = file.serialize(&mut serializer);
     text.push(b'\n');
@@ -257,14 +275,14 @@ fn read_constraint(i: usize, constraint: &FileConstraint) -> Result<Constraint, 
     Ok(Constraint { polynomial, gram: read_hessian(&place, &constraint.certificate)? })
 }
 
-fn field(name: &str, reason: &str) -> BodyFileError {
+fn field(name: impl Into<String>, reason: &str) -> BodyFileError {
     BodyFileError::Field { field: name.into(), reason: reason.into() }
 }
 
 /// Checks what no proof covers, as far as it can be: notes about the input must at least be possible and printable.
 fn check_notes(file: &File) -> Result<(), BodyFileError> {
     if let Some(points) = &file.contained_points {
-        points.check()?;
+        points.check("contained_points")?;
     }
     // Both the body and the hull lie in the circumscribed ball.
     if file.gap_m.is_some_and(|gap| !(0.0..=2.0 * file.circumscribed_ball.radius_m).contains(&gap)) {
@@ -281,13 +299,13 @@ fn check_notes(file: &File) -> Result<(), BodyFileError> {
 }
 
 impl ContainedPoints {
-    pub(super) fn check(&self) -> Result<(), BodyFileError> {
+    pub(super) fn check(&self, name: &str) -> Result<(), BodyFileError> {
         let Self { count, sha256 } = self;
         if sha256.len() != 64 || !sha256.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f')) {
-            return Err(field("contained_points.sha256", "must be 64 lowercase hexadecimal digits"));
+            return Err(field(format!("{name}.sha256"), "must be 64 lowercase hexadecimal digits"));
         }
         if !(1..=1 << 40).contains(count) {
-            return Err(field("contained_points.count", "must be the number of points that were hashed"));
+            return Err(field(format!("{name}.count"), "must be the number of points that were hashed"));
         }
         Ok(())
     }
@@ -301,7 +319,7 @@ impl Provenance {
             }
         }
         if !(self.hull_volume_m3 >= 0.0) {
-            return Err(field("provenance.hull_volume_m3", "must be between 0 and the volume of the body"));
+            return Err(field("provenance.hull_volume_m3", "must be a volume, m³"));
         }
         Ok(())
     }
@@ -403,10 +421,18 @@ impl From<&Aabb> for FileBox {
     }
 }
 
-/// Compact JSON but for a line break before each key of the outermost object, so that a file can be looked at.
-#[derive(Default)]
+/// Compact JSON but for a line break before each key of the outer objects, so that a file can be looked at.
 struct LinePerKey {
+    /// How many levels of objects are broken into lines.
+    levels: usize,
     depth: usize,
+}
+
+impl LinePerKey {
+    fn indent<W: ?Sized + io::Write>(&self, writer: &mut W) -> io::Result<()> {
+        writer.write_all(b"\n")?;
+        (0..self.depth).try_for_each(|_| writer.write_all(b"  "))
+    }
 }
 
 impl Formatter for LinePerKey {
@@ -417,21 +443,18 @@ impl Formatter for LinePerKey {
 
     fn end_object<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
         self.depth -= 1;
-        if self.depth == 0 {
-            writer.write_all(b"\n")?;
+        if self.depth < self.levels {
+            self.indent(writer)?;
         }
         CompactFormatter.end_object(writer)
     }
 
     fn begin_object_key<W: ?Sized + io::Write>(&mut self, writer: &mut W, first: bool) -> io::Result<()> {
         CompactFormatter.begin_object_key(writer, first)?;
-        if self.depth == 1 {
-            writer.write_all(b"\n  ")?;
-        }
-        Ok(())
+        if self.depth <= self.levels { self.indent(writer) } else { Ok(()) }
     }
 
     fn begin_object_value<W: ?Sized + io::Write>(&mut self, writer: &mut W) -> io::Result<()> {
-        writer.write_all(if self.depth == 1 { b": " } else { b":" })
+        writer.write_all(if self.depth <= self.levels { b": " } else { b":" })
     }
 }

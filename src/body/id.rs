@@ -9,7 +9,8 @@ use std::str::FromStr;
 
 /// SHA-256 of a body's content: center, linear (rows), then per constraint the number of its terms and each term's three
 /// exponents and coefficient in lexicographic order of the exponents, then, if one was set, -1 and the growth centre, or -2 for
-/// an sos-body; everything as little-endian f64.
+/// an sos-body; everything as little-endian f64. That of a compound is the SHA-256 of the ids of its parts, 32 bytes each, in their
+/// order.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct BodyId([u8; 32]);
 
@@ -46,6 +47,12 @@ impl BodyId {
             }
         }
         rest.for_each(feed);
+        Self(hash.finalize().into())
+    }
+
+    pub(super) fn of_parts<'a>(parts: impl Iterator<Item = &'a Self>) -> Self {
+        let mut hash = Sha256::new();
+        parts.for_each(|part| hash.update(part.0));
         Self(hash.finalize().into())
     }
 }

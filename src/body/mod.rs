@@ -5,25 +5,33 @@
 //! Lengths are metres in the body frame unless a name says otherwise; `z` is the unit-free normalized frame, `z = L (x - c)`.
 
 mod compound;
+mod compound_file;
 mod contained_file;
 mod containment;
+mod covering;
 mod extent;
 mod file;
 mod id;
 mod outline;
+mod piece;
 mod placement;
+mod shape;
 mod shapes;
 mod sos;
 mod sphere;
 mod surface;
 mod trust;
+mod union;
 
 pub use compound::{Compound, CompoundError, MAX_PARTS, Solid};
 pub use containment::{BasicSet, ContainedSet, Containment, ProofFrame};
+pub use covering::{Covered, Covering, Cut, NotCovered};
 pub use file::BodyFileError;
 pub use id::{BodyId, ParseIdError};
 pub use outline::{Cell, Outline};
+pub use piece::{MeshError, Piece, Spot};
 pub use placement::{Placement, Sample};
+pub use shape::Shape;
 pub use sos::{Coverage, Relaxation, SosBody, SosBodyError, TriangleError, Uncovered};
 pub use sphere::Sphere;
 pub use surface::Volume;
@@ -441,7 +449,12 @@ impl Body {
 
     /// Rigorous upper bound of the largest constraint at a point of the body frame.
     pub fn value_upper(&self, x: &Vector3<f64>) -> f64 {
-        largest(self.constraints.iter().map(|c| self.placement.sample(c, x).value_upper(0.0)))
+        self.value_upper_within(x, 0.0)
+    }
+
+    /// Rigorous upper bound of the largest constraint over the ball of a radius (metres) about a point of the body frame.
+    pub fn value_upper_within(&self, x: &Vector3<f64>, radius: f64) -> f64 {
+        largest(self.constraints.iter().map(|c| self.placement.sample(c, x).value_upper(radius)))
     }
 
     /// Boundary point of the body frame met by the ray from the interior point along `direction` of the normalized frame.
@@ -550,6 +563,21 @@ pub fn check_name(name: &str) -> Result<(), BodyError> {
 /// Largest of the values; NaN if any is NaN, which `f64::max` would pass over.
 pub(crate) fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(f64::NEG_INFINITY, |most, value| if value.is_nan() || value > most { value } else { most })
+}
+
+/// The largest of values that must be at most 1; of none, the least number.
+fn all_inside(values: impl Iterator<Item = f64>) -> Result<f64, NotContained> {
+    let mut worst = NotContained { index: 0, value: f64::MIN };
+    for (index, value) in values.enumerate() {
+        // A NaN is never inside.
+        if !(value <= worst.value) {
+            worst = NotContained { index, value };
+            if value.is_nan() {
+                break;
+            }
+        }
+    }
+    if worst.value <= 1.0 { Ok(worst.value) } else { Err(worst) }
 }
 
 fn invert(normalization: &Normalization) -> Result<Matrix3<f64>, BodyError> {

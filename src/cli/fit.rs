@@ -4,9 +4,10 @@ mod remote;
 mod sos;
 
 use super::write_atomically;
+use crate::body::Provenance;
 use crate::fit::{
-    Cone, Coordinates, FitError, FitOptions, Mesh, Progress, RefinementEnd, Rung, Trimmed, coarsest_within, fit,
-    ladder, read_mesh, thicken, trim,
+    CompoundFit, Cone, Coordinates, FitError, FitOptions, Mesh, Progress, RefinementEnd, Representation, Rung, Trimmed,
+    cheapest_within, coarsest_within, fit, fit_parts, ladder, read_mesh, thicken, trim,
 };
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
@@ -32,6 +33,10 @@ use std::time::Duration;
 ///
 /// With --relax-convexity, and with the objective inverse-moment, the set need not be convex: tighter, but no distances are measured
 /// from it. It is proven to hold the points; which triangles of the mesh it does not hold is told.
+///
+/// Meshes that are not convex can become compounds of several bodies: by --parts, or by --max-gap where that is cheaper to query. The
+/// mesh is cut by planes; each part holds its piece, and the gap is measured to the convex hulls of the pieces. All triangles are
+/// proven to be covered, and the interior of closed meshes ("surface_only" is said of others).
 ///
 /// Examples:
 ///
@@ -96,10 +101,18 @@ pub(super) struct FitArgs {
     ladder: bool,
     /// Fit no finer than needed: the body cheapest to query that reaches at most this far beyond the object's convex hull
     ///
-    /// Such as 5mm, 2cm, or 0.005 (metres). Tried in this order: ball, ellipsoid, degree 4, 6, 8 (or up to --degree), then these
-    /// cut by slabs (<stem>-d4-s3.json has three).
+    /// Such as 5mm, 2cm, or 0.005 (metres). Tried in this order, which is that of the time of queries: ball, ellipsoid, degree 4, 6;
+    /// compounds of two parts of degree 2 or 4; degree 8; compounds of up to 19 parts, each of the lowest degree that is near enough, 6
+    /// at most (<stem>-d4-p3.json has three parts, of degree 4 at most); single bodies cut by slabs (<stem>-d4-s3.json has three).
+    /// No degree above --degree. Compounds are made of meshes only, untrimmed and not thickened.
     #[arg(long, value_name = "LENGTH", value_parser = length, conflicts_with_all = ["ladder", "slabs"])]
     max_gap: Option<f64>,
+    /// Fit a compound of at most this many convex parts, each of --degree: <stem>-d6-p4.json has four
+    ///
+    /// Fewer where no cut reduces the volume of the parts' convex hulls. Queries take about as many times as long as there are parts
+    /// near the other body.
+    #[arg(long, value_name = "N", conflicts_with_all = ["ladder", "max_gap", "trim", "min_thickness", "server"])]
+    parts: Option<usize>,
     /// Minimise the volume itself afterwards, starting from the objective's optimum: 1 to 10 % smaller, several times as long
     ///
     /// Never makes the volume larger. Why it ended is reported when that was before it converged.
@@ -122,7 +135,7 @@ pub(super) struct FitArgs {
     /// Put the bodies of all inputs, body files in one common frame, into one body: <NAME>-d<degree>.json
     ///
     /// It is proven to contain every body whole, by polynomial multipliers that its file keeps: 'verify --contains' checks them.
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["ladder", "max_gap", "refine", "slabs", "trim", "min_thickness", "scale", "objective", "relax_convexity", "raw_frame", "cone", "server"])]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["ladder", "max_gap", "refine", "slabs", "trim", "min_thickness", "scale", "objective", "relax_convexity", "raw_frame", "cone", "server", "parts"])]
     pub(super) group: Option<String>,
     /// Put them into few bodies, <NAME>-1-d<degree>.json and so on, of at most 1 + FRACTION times the inputs' total volume
     ///
@@ -145,6 +158,10 @@ struct Row {
     body: String,
     degree: usize,
     slabs: usize,
+    /// 1 for a body that is no compound.
+    parts: usize,
+    /// What a compound is proven to cover of the mesh: "interior" or "surface_only".
+    covers: Option<&'static str>,
     /// What was minimised: the objective, or the radius of a ball.
     objective: String,
     refined: bool,
@@ -153,13 +170,14 @@ struct Row {
     left_out: usize,
     left_out_m: f64,
     hull_vertices: usize,
+    /// Of a compound the union of its parts, which may overlap.
     volume_m3: f64,
     volume_error_m3: f64,
     hull_volume_m3: f64,
-    /// Proven bound of the distance of any point of the body from the hull.
+    /// Proven bound of the distance of any point of the body from the hull, of a compound from the hulls of its pieces.
     gap_m: f64,
-    /// Mean over directions of how much farther the body reaches than the hull.
-    mean_gap_m: f64,
+    /// Mean over directions of how much farther the body reaches than the hull; none for compounds.
+    mean_gap_m: Option<f64>,
     seconds: f64,
     /// A fit that is not solved, or not proven, is an error.
     status: &'static str,
@@ -344,14 +362,67 @@ fn one(args: &FitArgs, input: &Path, stem: &str) -> Result<Vec<Row>, Box<dyn Err
     let mut tell = telling(&bar);
     let Prepared { mesh, trimmed } = Prepared::new(args, input, &bar, &mut tell)?;
     let options = options(args, input);
-    let rungs = match args.max_gap {
-        Some(max_gap) => coarsest_within(stem, &mesh.points, max_gap, &options, &mut tell).map(|rung| vec![rung]),
-        None if args.ladder => ladder(stem, &mesh.points, &options, &mut tell),
-        None => fit(stem, &mesh.points, &options, &mut tell).map(|fit| vec![fit.into()]),
+    // What was thickened or trimmed has lost its triangles.
+    let fitted: Vec<Representation> = match (args.max_gap, args.parts) {
+        (Some(max_gap), _) if !mesh.triangles.is_empty() => {
+            cheapest_within(stem, &mesh, max_gap, &options, &mut tell).map(|one| vec![one])
+        }
+        (Some(max_gap), _) => {
+            coarsest_within(stem, &mesh.points, max_gap, &options, &mut tell).map(|one| vec![one.into()])
+        }
+        (None, Some(parts)) => fit_parts(stem, &mesh, parts, &options, &mut tell).map(|one| vec![one.into()]),
+        (None, None) if args.ladder => {
+            ladder(stem, &mesh.points, &options, &mut tell).map(|rungs| rungs.into_iter().map(Into::into).collect())
+        }
+        (None, None) => fit(stem, &mesh.points, &options, &mut tell).map(|fit| vec![Rung::from(fit).into()]),
     }
     .map_err(|error: FitError| format!("{}: {error}", input.display()))?;
     bar.finish_and_clear();
-    rungs.iter().map(|rung| write(args, input, stem, trimmed.as_ref(), rung)).collect()
+    let written = fitted.iter().map(|one| match one {
+        Representation::Body(rung) => write(args, input, stem, trimmed.as_ref(), rung),
+        Representation::Compound(fit) => write_compound(args, input, stem, mesh.points.len(), fit),
+    });
+    written.collect()
+}
+
+/// Writes a compound and describes it.
+fn write_compound(
+    args: &FitArgs,
+    input: &Path,
+    stem: &str,
+    points: usize,
+    fit: &CompoundFit,
+) -> Result<Row, Box<dyn Error>> {
+    let CompoundFit { compound, seconds } = fit;
+    let parts = compound.parts();
+    let file = args.out.join(format!("{stem}-d{}-p{}.json", compound.degree(), parts.len()));
+    write_atomically(&file, &compound.to_json())?;
+    let Provenance { objective, refined, hull_vertices, hull_volume_m3, .. } =
+        compound.provenance().cloned().unwrap_or_default();
+    let volume = compound.volume();
+    Ok(Row {
+        input: input.display().to_string(),
+        body: file.display().to_string(),
+        degree: compound.degree(),
+        slabs: parts.iter().map(|part| part.constraints().len() - 1).max().unwrap_or(0),
+        parts: parts.len(),
+        covers: compound.covering().map(|covering| covering.proven.name()),
+        objective,
+        refined,
+        points,
+        left_out: 0,
+        left_out_m: 0.0,
+        hull_vertices,
+        volume_m3: volume.volume_m3,
+        volume_error_m3: volume.error_m3,
+        hull_volume_m3,
+        gap_m: compound.gap_m().unwrap_or(f64::INFINITY),
+        mean_gap_m: None,
+        seconds: *seconds,
+        status: "solved",
+        proven: true,
+        solve: None,
+    })
 }
 
 /// Writes one body and describes it.
@@ -381,6 +452,8 @@ fn write(
         body: file.display().to_string(),
         degree: report.as_ref().map_or(2, |report| report.degree),
         slabs,
+        parts: 1,
+        covers: None,
         objective: made.objective,
         refined: made.refined,
         points: body.points().map_or(0, |points| points.count),
@@ -391,7 +464,7 @@ fn write(
         volume_error_m3: body.volume().error_m3,
         hull_volume_m3: made.hull_volume_m3,
         gap_m: gap.most_m,
-        mean_gap_m: gap.mean_m,
+        mean_gap_m: Some(gap.mean_m),
         seconds: *seconds,
         status: "solved",
         // A fit returns a body only when it is proven.
@@ -419,22 +492,23 @@ fn table(out: &mut dyn Write, rows: &[Row]) -> io::Result<()> {
     let width = rows.iter().map(|row| row.body.chars().count()).max().unwrap_or(0).max(4);
     writeln!(
         out,
-        "{:width$}  degree  slabs  points  hull vertices    volume m³  volume:hull      gap m  mean gap m  seconds  proven",
+        "{:width$}  degree  slabs  parts  points  hull vertices    volume m³  volume:hull      gap m  mean gap m  seconds  proven",
         "body"
     )?;
     for row in rows {
         writeln!(
             out,
-            "{:width$}  {:>6}  {:>5}  {:>6}  {:>13}  {:>11.4e}  {:>11.3}  {:>9.3e}  {:>10.3e}  {:>7.2}  {:>6}",
+            "{:width$}  {:>6}  {:>5}  {:>5}  {:>6}  {:>13}  {:>11.4e}  {:>11.3}  {:>9.3e}  {:>10}  {:>7.2}  {:>6}",
             row.body,
             row.degree,
             row.slabs,
+            row.parts,
             row.points,
             row.hull_vertices,
             row.volume_m3,
             row.volume_m3 / row.hull_volume_m3,
             row.gap_m,
-            row.mean_gap_m,
+            row.mean_gap_m.map_or("-".to_owned(), |mean| format!("{mean:.3e}")),
             row.seconds,
             if row.proven { "yes" } else { "no" }
         )?;

@@ -19,7 +19,7 @@ mod show;
 mod sos_body;
 mod verify;
 
-use crate::body::Body;
+use crate::body::{Body, Shape};
 use clap::Parser;
 use std::error::Error;
 use std::io;
@@ -128,6 +128,11 @@ fn read(path: &Path) -> Result<String, Box<dyn Error>> {
 /// Reads and re-proves a body file, naming it in the error.
 fn read_body(path: &Path) -> Result<Body, Box<dyn Error>> {
     Body::from_json(&read(path)?).map_err(|error| format!("{}: {error}", path.display()).into())
+}
+
+/// Reads and re-proves the file of a body or a compound, naming it in the error.
+fn read_shape(path: &Path) -> Result<Shape, Box<dyn Error>> {
+    Shape::from_json(&read(path)?).map_err(|error| format!("{}: {error}", path.display()).into())
 }
 
 /// Writes a file whole or not at all: under a temporary name beside it, then renamed.

@@ -1,7 +1,7 @@
 //! `sublevel show`.
 
-use super::{read, read_body, sos_body, write_atomically};
-use crate::body::{Body, SosBody, Sphere};
+use super::{read, read_shape, sos_body, write_atomically};
+use crate::body::{Body, Compound, Shape, Solid, SosBody, Sphere};
 use crate::chart::{Ink, Outline, Panel, Silhouettes, View, boundary_points, outline};
 use serde_json::json;
 use std::error::Error;
@@ -12,7 +12,7 @@ use std::path::PathBuf;
 /// Boundary points that a silhouette is made of.
 const SILHOUETTE_POINTS: usize = 6000;
 
-/// Describe a body, export its surface, draw its silhouettes
+/// Describe a body or a compound, export its surface, draw its silhouettes
 ///
 /// The file is re-proven first, as by 'verify'. Lengths are metres in the body frame. Of an sos-body, which need not be convex, only
 /// the description is printed.
@@ -20,12 +20,12 @@ const SILHOUETTE_POINTS: usize = 6000;
 /// Example: sublevel show bodies/mug-d6.json --mesh mug.obj --svg mug.svg
 #[derive(Debug, clap::Args)]
 pub(super) struct ShowArgs {
-    /// Body file
+    /// File of a body or a compound
     file: PathBuf,
     /// Print one JSON object instead of lines
     #[arg(long)]
     json: bool,
-    /// Write the surface as a triangle mesh, inscribed in the body up to rounding
+    /// Write the surface as a triangle mesh, inscribed in the body up to rounding; of a compound that of each part
     #[arg(long, value_name = "OUT.obj")]
     mesh: Option<PathBuf>,
     /// Write the silhouettes seen along the three axes
@@ -41,18 +41,19 @@ pub(super) fn run(args: &ShowArgs) -> Result<(), Box<dyn Error>> {
         }
         return sos_body::show(&args.file, args.json);
     }
-    let body = read_body(&args.file)?;
+    let shape = read_shape(&args.file)?;
     if let Some(path) = &args.mesh {
-        write_atomically(path, &mesh(&body))?;
+        write_atomically(path, &mesh(shape.parts()))?;
     }
     if let Some(path) = &args.svg {
-        write_atomically(path, &silhouettes(&body))?;
+        write_atomically(path, &silhouettes(&shape))?;
     }
     let mut out = io::stdout().lock();
-    if args.json {
-        writeln!(out, "{:#}", summary(&body))?;
-    } else {
-        describe(&mut out, &body)?;
+    match &shape {
+        Shape::Body(body) if args.json => writeln!(out, "{:#}", summary(body))?,
+        Shape::Body(body) => describe(&mut out, body)?,
+        Shape::Compound(compound) if args.json => writeln!(out, "{:#}", summary_of_compound(compound))?,
+        Shape::Compound(compound) => describe_compound(&mut out, compound)?,
     }
     Ok(())
 }
@@ -129,30 +130,102 @@ fn describe(out: &mut impl Write, body: &Body) -> io::Result<()> {
     writeln!(out, "  proven          sos-convex, bounded, interior not empty")
 }
 
-/// The surface as OBJ text: the boundary along the vertices of a subdivided icosahedron.
-fn mesh(body: &Body) -> String {
-    let sphere = Sphere::subdivided(4);
-    let mirrored = body.normalization().linear.determinant() < 0.0;
-    let mut text = format!("# {} ({})\n", body.name(), body.id());
-    // Writing to a string can not fail.
-    for direction in sphere.vertices() {
-        let x = body.boundary_along(direction);
-        let _ = writeln!(text, "v {} {} {}", x.x, x.y, x.z);
+fn summary_of_compound(compound: &Compound) -> serde_json::Value {
+    let (volume, bounds) = (compound.volume(), compound.bounding_box());
+    json!({
+        "id": compound.id().to_string(),
+        "name": compound.name(),
+        "kind": "compound",
+        "degree": compound.degree(),
+        "bounding_box": { "min_m": bounds.min.as_slice(), "max_m": bounds.max.as_slice() },
+        "volume_m3": volume.volume_m3,
+        "volume_error_m3": volume.error_m3,
+        "gap_m": compound.gap_m(),
+        "covering": compound.covering(),
+        "provenance": compound.provenance(),
+        "parts": compound.parts().iter().map(summary).collect::<Vec<_>>(),
+    })
+}
+
+fn describe_compound(out: &mut impl Write, compound: &Compound) -> io::Result<()> {
+    let volume = compound.volume();
+    let length = |x: f64| format!("{x:.5}");
+    let list = |v: &nalgebra::Vector3<f64>| format!("({}, {}, {})", length(v.x), length(v.y), length(v.z));
+    let bounds = compound.bounding_box();
+    writeln!(out, "{}", compound.name())?;
+    writeln!(out, "  id              {}", compound.id())?;
+    writeln!(out, "  compound        of {} parts", compound.parts().len())?;
+    for (index, part) in compound.parts().iter().enumerate() {
+        let gap = part.gap_m().map_or(String::new(), |gap| format!(", gap {gap:.3e} m"));
+        let (degree, constraints) = (part.degree(), part.constraints().len());
+        let volume = part.volume().volume_m3;
+        writeln!(out, "    {index:<14}degree {degree}, {constraints} constraint(s), {volume:.6e} m³{gap}")?;
     }
-    for &[a, b, c] in sphere.triangles() {
-        let (b, c) = if mirrored { (c, b) } else { (b, c) };
-        let _ = writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1);
+    let (union, error) = (volume.volume_m3, volume.error_m3);
+    writeln!(out, "  volume          {union:.6e} m³ of the union (quadrature error about {error:.0e})")?;
+    writeln!(out, "  bounding box    {} to {} m", list(&bounds.min), list(&bounds.max))?;
+    if let Some(covering) = compound.covering() {
+        writeln!(
+            out,
+            "  covers          {} of {} triangles, sha256 {} ('verify --points' proves it)",
+            covering.proven.name(),
+            covering.corners.count / 3,
+            covering.corners.sha256
+        )?;
+    }
+    if let Some(gap) = compound.gap_m() {
+        writeln!(
+            out,
+            "  gap             at most {} m beyond the convex hulls of the pieces of its object",
+            length(gap)
+        )?;
+    }
+    if let Some(made) = compound.provenance() {
+        let refined = if made.refined { ", refined" } else { "" };
+        let (input, objective, vertices) = (&made.input, &made.objective, made.hull_vertices);
+        writeln!(
+            out,
+            "  fitted          to {input}, objective {objective}{refined}; hull of {vertices} vertices, {:.6e} m³",
+            made.hull_volume_m3
+        )?;
+    }
+    writeln!(out, "  proven          every part sos-convex, bounded, interior not empty")
+}
+
+/// The surfaces as OBJ text: the boundaries along the vertices of a subdivided icosahedron.
+fn mesh(parts: &[Body]) -> String {
+    let sphere = Sphere::subdivided(4);
+    let mut text = String::new();
+    for (index, body) in parts.iter().enumerate() {
+        let mirrored = body.normalization().linear.determinant() < 0.0;
+        let first = 1 + index * sphere.vertices().len();
+        // Writing to a string can not fail.
+        let _ = writeln!(text, "# {} ({})", body.name(), body.id());
+        for direction in sphere.vertices() {
+            let x = body.boundary_along(direction);
+            let _ = writeln!(text, "v {} {} {}", x.x, x.y, x.z);
+        }
+        for &[a, b, c] in sphere.triangles() {
+            let (b, c) = if mirrored { (c, b) } else { (b, c) };
+            let _ = writeln!(text, "f {} {} {}", a + first, b + first, c + first);
+        }
     }
     text
 }
 
-fn silhouettes(body: &Body) -> String {
-    let points = boundary_points(|direction| body.boundary_along(direction), SILHOUETTE_POINTS);
+fn silhouettes(shape: &Shape) -> String {
+    let points = |body: &Body| boundary_points(|direction| body.boundary_along(direction), SILHOUETTE_POINTS);
+    let points: Vec<_> = shape.parts().iter().map(points).collect();
     let panel = |view: View| Panel {
         caption: view.name().into(),
-        outlines: vec![Outline::body(Ink::Blue, outline(&points, view))],
+        outlines: points.iter().map(|points| Outline::body(Ink::Blue, outline(points, view))).collect(),
     };
     let rows = vec![[View::Side, View::Front, View::Top].map(panel).into()];
-    let legend = vec![(Ink::Blue, format!("degree {}", body.degree()))];
-    Silhouettes { title: body.name().into(), legend, rows }.to_svg()
+    let (name, what) = match shape {
+        Shape::Body(body) => (body.name(), format!("degree {}", body.degree())),
+        Shape::Compound(compound) => {
+            (compound.name(), format!("{} parts, degree {}", compound.parts().len(), compound.degree()))
+        }
+    };
+    Silhouettes { title: name.into(), legend: vec![(Ink::Blue, what)], rows }.to_svg()
 }

@@ -1,16 +1,24 @@
 //! `sublevel verify`.
 
 use super::{Outcome, one_line, read, read_body, sos_body};
-use crate::body::{BasicSet, Body, SosBody};
+use crate::body::{BasicSet, Body, Compound, Shape, SosBody};
+#[cfg(feature = "fit")]
+use crate::body::{Covering, NotCovered, Piece};
+#[cfg(feature = "fit")]
+use crate::fit::Mesh;
+#[cfg(feature = "fit")]
+use nalgebra::Vector3;
 use serde::Serialize;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// Re-prove a body from its stored numbers alone
+/// Re-prove a body or a compound from its stored numbers alone
 ///
 /// Recomputes the id, checks every certificate (no program is solved), proves the body bounded and compares every derived
 /// value but gap_m, which needs the object. With --points it also proves that every point of a mesh is inside, and bounds anew how far the body reaches beyond
-/// their convex hull. With --contains it proves that whole bodies are inside. Exit code 0 only if every claim holds.
+/// their convex hull. With --contains it proves that whole bodies are inside. Of a compound every part is re-proven, and with
+/// --points that it covers all triangles of the mesh, and what they enclose if they are closed: the mesh is cut again as the file
+/// says, and each part must hold its piece. Exit code 0 only if every claim holds.
 ///
 /// An sos-body, which need not be convex, is proven to be of a sum of squares and as near to convex as it says; with --points, to hold
 /// the points, and no fewer triangles between them than it says.
@@ -22,9 +30,9 @@ use std::path::{Path, PathBuf};
 ///   sublevel verify bodies/shelf-d4.json --contains board-1.json board-2.json
 #[derive(Debug, clap::Args)]
 pub(super) struct VerifyArgs {
-    /// Body file
+    /// File of a body, a compound or an sos-body
     pub(super) file: PathBuf,
-    /// Mesh or points that the body must contain
+    /// Mesh or points that the body must contain, mesh that the compound must cover
     #[cfg(feature = "fit")]
     #[arg(long, value_name = "MESH")]
     pub(super) points: Option<PathBuf>,
@@ -50,8 +58,12 @@ struct Report {
     /// Whether each body of --contains is proven inside, in their order.
     contains_sets_proven: Option<Vec<bool>>,
     degree: Option<usize>,
-    /// Proven bound of the distance of any point of the body from the convex hull of the points, metres.
+    /// Proven bound of the distance of any point of the body from the convex hull of the points, metres; of a compound from those of
+    /// the pieces of the mesh.
     gap_m: Option<f64>,
+    /// What is proven to be covered of the mesh: "interior" or "surface_only"; of compounds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    covers: Option<&'static str>,
 }
 
 /// Proves, prints, and tells whether every claim holds.
@@ -60,8 +72,8 @@ pub(super) fn run(args: &VerifyArgs) -> Outcome {
     if SosBody::is_file(&text) {
         return sos_body::verify(args, &text);
     }
-    let (report, trouble) = match Body::from_json(&text) {
-        Ok(body) => {
+    let (report, trouble) = match Shape::from_json(&text) {
+        Ok(Shape::Body(body)) => {
             let (mut report, mut trouble) = contained(args, &body)?;
             if !args.contains.is_empty() {
                 let failures = args.contains.iter().map(|path| inside(path, &body)).collect::<Result<Vec<_>, _>>()?;
@@ -70,6 +82,12 @@ pub(super) fn run(args: &VerifyArgs) -> Outcome {
             }
             (report, trouble)
         }
+        Ok(Shape::Compound(_)) if !args.contains.is_empty() => {
+            return Err(
+                "--contains: only a single body is proven to contain others, not a compound; leave it out".into()
+            );
+        }
+        Ok(Shape::Compound(compound)) => covered(args, &compound)?,
         Err(error) => {
             let report = Report {
                 sos_convex_proven: false,
@@ -78,6 +96,7 @@ pub(super) fn run(args: &VerifyArgs) -> Outcome {
                 contains_sets_proven: None,
                 degree: None,
                 gap_m: None,
+                covers: None,
             };
             (report, Some(format!("{}: {error}", args.file.display())))
         }
@@ -89,10 +108,16 @@ pub(super) fn run(args: &VerifyArgs) -> Outcome {
     } else if report.sos_convex_proven {
         writeln!(out, "{}: proven sos-convex, bounded, and as its file says", args.file.display())?;
         if let (Some(true), Some(value)) = (report.contains_all_points_proven, report.max_value) {
-            writeln!(out, "proven to contain every point: the largest value is at most {value}")?;
+            let what = match report.covers {
+                None => "to contain every point",
+                Some("interior") => "to cover every triangle and the interior",
+                Some(_) => "to cover every triangle (the mesh is not closed)",
+            };
+            writeln!(out, "proven {what}: the largest value is at most {value}")?;
         }
         if let Some(gap) = report.gap_m {
-            writeln!(out, "proven to reach at most {gap:.3e} m beyond their convex hull")?;
+            let hull = if report.covers.is_some() { "the convex hulls of its pieces" } else { "their convex hull" };
+            writeln!(out, "proven to reach at most {gap:.3e} m beyond {hull}")?;
         }
         for (path, proven) in args.contains.iter().zip(report.contains_sets_proven.iter().flatten()) {
             let verdict = if *proven { "proven to contain" } else { "not proven to contain" };
@@ -107,7 +132,7 @@ pub(super) fn run(args: &VerifyArgs) -> Outcome {
 
 #[cfg(feature = "fit")]
 fn contained(args: &VerifyArgs, body: &Body) -> Result<(Report, Option<String>), Box<dyn std::error::Error>> {
-    let mut report = proven(body);
+    let mut report = proven(body.degree());
     let Some(path) = &args.points else { return Ok((report, None)) };
     let points = crate::fit::read_points(path, args.scale)?;
     let fitted_to = body.points().is_some_and(|recorded| *recorded == crate::body::ContainedPoints::of(&points));
@@ -122,26 +147,83 @@ fn contained(args: &VerifyArgs, body: &Body) -> Result<(Report, Option<String>),
     report.max_value = Some(value);
     // Points outside have no hull inside the body.
     if trouble.is_none() {
-        match crate::fit::hull::convex_hull(&points) {
-            Ok(hull) => {
-                let vertices: Vec<_> = hull.vertices.iter().map(|&i| points[i]).collect();
-                let gap = crate::fit::gap(body, &vertices).most_m;
-                report.gap_m = Some(gap);
-                // Of other points the file says nothing.
-                trouble = body.gap_m().filter(|&stored| fitted_to && stored < gap * (1.0 - 1e-6)).map(|stored| {
-                    let file = args.file.display();
-                    format!("{file}: gap_m is {stored:e} but only {gap:e} m can be proven; fit the body again")
-                });
-            }
-            Err(error) => eprintln!("note: no gap is bounded: {error}"),
-        }
+        (report.gap_m, trouble) = gap(args, body, &points, 0.0, fitted_to);
     }
+    Ok((report, trouble))
+}
+
+/// How far a body reaches beyond the hull of points inside, which are known up to a clearance, and what is wrong with its own note of that, if it is about these points.
+#[cfg(feature = "fit")]
+fn gap(
+    args: &VerifyArgs,
+    body: &Body,
+    points: &[Vector3<f64>],
+    clearance: f64,
+    fitted_to: bool,
+) -> (Option<f64>, Option<String>) {
+    let hull = match crate::fit::hull::convex_hull(points) {
+        Ok(hull) => hull,
+        Err(error) => {
+            eprintln!("note: no gap is bounded: {error}");
+            return (None, None);
+        }
+    };
+    let vertices: Vec<_> = hull.vertices.iter().map(|&i| points[i]).collect();
+    let gap = crate::fit::gap(body, &vertices).most_m + clearance;
+    // Of other points the file says nothing.
+    let trouble = body.gap_m().filter(|&stored| fitted_to && stored < gap * (1.0 - 1e-6)).map(|stored| {
+        let file = args.file.display();
+        format!("{file}: gap_m is {stored:e} but only {gap:e} m can be proven; fit the body again")
+    });
+    (Some(gap), trouble)
+}
+
+/// As [`contained`], of a compound and a mesh.
+#[cfg(feature = "fit")]
+fn covered(args: &VerifyArgs, compound: &Compound) -> Result<(Report, Option<String>), Box<dyn std::error::Error>> {
+    let mut report = proven(compound.degree());
+    let Some(path) = &args.points else { return Ok((report, None)) };
+    let Mesh { points, triangles } = crate::fit::read_mesh(path, args.scale)?;
+    let covering = compound.covering();
+    let cuts = covering.map_or(&[][..], |covering| &covering.cuts);
+    let proof = compound.prove_covers(&points, &triangles, cuts);
+    report.contains_all_points_proven = Some(proof.is_ok());
+    let (proven, value) = match proof {
+        Ok(proof) => proof,
+        Err(failure) => {
+            if let NotCovered::Part { source, .. } = failure {
+                report.max_value = Some(source.value);
+            }
+            return Ok((report, Some(format!("{}: {failure}", path.display()))));
+        }
+    };
+    (report.max_value, report.covers) = (Some(value), Some(proven.name()));
+    let fitted_to = covering.is_some_and(|covering| covering.corners == Covering::corners(&points, &triangles));
+    let mut trouble = None;
+    if fitted_to {
+        let stored = covering.map(|covering| covering.proven).filter(|&stored| stored != proven);
+        trouble = stored.map(|stored| {
+            let (stored, proven) = (stored.name(), proven.name());
+            format!("{}: covering.proven is {stored}, but {proven} is", args.file.display())
+        });
+    } else if covering.is_some() {
+        eprintln!("note: this is not the mesh that the compound was fitted to");
+    }
+    let mut most = Some(0.0);
+    let pieces = Covering::pieces(Piece::of_mesh(&points, &triangles)?, cuts);
+    for (part, piece) in compound.parts().iter().zip(pieces) {
+        let points: Vec<_> = piece.spots().iter().map(|spot| spot.x).collect();
+        let (gap, wrong) = gap(args, part, &points, piece.uncertainty(), fitted_to);
+        most = most.zip(gap).map(|(most, gap): (f64, f64)| most.max(gap));
+        trouble = trouble.or(wrong);
+    }
+    report.gap_m = most;
     Ok((report, trouble))
 }
 
 #[cfg(not(feature = "fit"))]
 fn contained(_: &VerifyArgs, body: &Body) -> Result<(Report, Option<String>), Box<dyn std::error::Error>> {
-    Ok((proven(body), None))
+    Ok((proven(body.degree()), None))
 }
 
 /// Proves a body inside by the stored proof or a new one; else tells why not.
@@ -170,13 +252,19 @@ fn new_proof(_: &Body, _: &Body) -> Option<String> {
     Some("the body's file has no proof that it contains this body, and making one needs the feature 'fit'".into())
 }
 
-fn proven(body: &Body) -> Report {
+#[cfg(not(feature = "fit"))]
+fn covered(_: &VerifyArgs, compound: &Compound) -> Result<(Report, Option<String>), Box<dyn std::error::Error>> {
+    Ok((proven(compound.degree()), None))
+}
+
+fn proven(degree: usize) -> Report {
     Report {
         sos_convex_proven: true,
         contains_all_points_proven: None,
         max_value: None,
         contains_sets_proven: None,
-        degree: Some(body.degree()),
+        degree: Some(degree),
         gap_m: None,
+        covers: None,
     }
 }

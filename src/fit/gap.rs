@@ -336,7 +336,7 @@ mod tests {
         for slabs in 0..8 {
             // Some cuts are across edges of the octahedron, which stand out as well.
             assert!(found.found_m <= found.most_m && found.most_m <= 1.03 * found.found_m, "{slabs}: {found:?}");
-            body = cut(&body, &points, &found.direction).unwrap();
+            body = cut(&body, &points, 0.0, &found.direction).unwrap();
             found = gap(&body, &points);
             if found.most_m < 1e-4 {
                 break;

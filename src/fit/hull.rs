@@ -117,6 +117,14 @@ pub fn convex_hull(points: &[Vector3<f64>]) -> Result<Hull, HullError> {
     Err(HullError::Failed(failure))
 }
 
+/// About the volume of the convex hull, in half the time and less: nothing is checked. None for points without volume.
+pub(super) fn rough_volume(points: &[Vector3<f64>]) -> Option<f64> {
+    let frame = principal_frame(points).ok()?;
+    let moved: Vec<_> = points.iter().map(|x| frame.apply(x)).collect();
+    let (_, facets) = facets(&moved).ok()?;
+    Some(volume(&moved, &facets) / frame.linear.determinant().abs())
+}
+
 /// The frame in which the points have principal extents 1.
 fn principal_frame(points: &[Vector3<f64>]) -> Result<Frame, HullError> {
     let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));

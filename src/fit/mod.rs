@@ -30,6 +30,7 @@ mod moment;
 mod object;
 mod objective;
 mod outermost;
+mod parts;
 mod path;
 mod program;
 mod progress;
@@ -38,6 +39,7 @@ mod refine;
 mod slab;
 mod sos;
 mod spectral;
+mod split;
 mod structure;
 mod support;
 mod thicken;
@@ -54,8 +56,9 @@ pub use enclose::{
 };
 pub use gap::{Gap, gap};
 pub use hull::HullError;
-pub use ladder::{MAX_SLABS, Rung, ball, coarsest_within, ladder};
+pub use ladder::{MAX_SLABS, Representation, Rung, ball, cheapest_within, coarsest_within, ladder};
 pub use objective::{Objective, UnknownObjective};
+pub use parts::{CompoundFit, MAX_PIECES, fit_parts};
 pub use program::ProgramError;
 pub use progress::Progress;
 pub use read::{Mesh, ReadError, read_mesh, read_points};
@@ -65,7 +68,9 @@ pub use sos::{ProgramReport, SosFit, SosMethod, SosOptions, SosReport, fit_sos};
 pub use thicken::thicken;
 pub use trim::{Trimmed, trim};
 
-use crate::body::{Body, BodyError, NotContained, SosBodyError, TriangleError, check_name};
+use crate::body::{
+    Body, BodyError, CompoundError, MeshError, NotContained, NotCovered, SosBodyError, TriangleError, check_name,
+};
 use crate::polynomial::PolynomialError;
 use nalgebra::Vector3;
 use object::Object;
@@ -321,6 +326,18 @@ pub enum FitError {
     /// A point could not be proven inside.
     #[error("the fitted polynomial could not be proven to contain the points: {0}; lower the degree")]
     NotContained(#[from] NotContained),
+    /// More parts than can be asked for, or none.
+    #[error("parts: {0} is not between 1 and {MAX_PIECES}; a few to a dozen suit most objects")]
+    Parts(usize),
+    /// The mesh is none.
+    #[error("mesh: {0}")]
+    Mesh(#[from] MeshError),
+    /// The parts make no compound.
+    #[error(transparent)]
+    Compound(#[from] CompoundError),
+    /// The parts could not be proven to cover the mesh.
+    #[error("the compound could not be proven to cover the mesh: {0}; ask for fewer parts or a lower degree")]
+    NotCovered(#[from] NotCovered),
     /// A slab could not be added.
     #[error("the body could not be cut by a slab: {0}; ask for fewer slabs, or a larger gap")]
     Cut(#[from] CutError),

@@ -36,6 +36,8 @@ pub(super) struct Object<'a> {
     normalization: Normalization,
     /// The vertices there.
     whitened: Vec<Vector3<f64>>,
+    /// The points are known up to this distance, metres: bodies hold the balls around them.
+    clearance: f64,
     /// What all this took.
     seconds: f64,
 }
@@ -51,7 +53,12 @@ impl<'a> Object<'a> {
         let normalization = whitening(&hull.frame, &ellipsoid).ok_or(ProgramError::Singular)?;
         let whitened = vertices.iter().map(|x| normalization.linear * (x - normalization.center)).collect();
         let seconds = start.elapsed().as_secs_f64();
-        Ok(Self { name, points, input, hull, vertices, normalization, whitened, seconds })
+        Ok(Self { name, points, input, hull, vertices, normalization, whitened, clearance: 0.0, seconds })
+    }
+
+    /// The same object of points that are only known up to a distance, metres.
+    pub(super) fn around(self, clearance: f64) -> Self {
+        Self { clearance, ..self }
     }
 
     /// Its name.
@@ -89,7 +96,8 @@ impl<'a> Object<'a> {
         let start = Instant::now();
         let ball = smallest_ball(&self.vertices);
         // Rounding of the coordinates, as seen from the centre.
-        let body = Body::ball(self.name, ball.center, ball.radius * (1.0 + 1e-12))?.with_points(self.points)?;
+        let body = Body::ball(self.name, ball.center, ball.radius * (1.0 + 1e-12) + 2.0 * self.clearance)?
+            .with_points(self.points)?;
         let (body, gap) = self.finish(body, BALL, false);
         Ok(Rung { body, gap, seconds: self.seconds + start.elapsed().as_secs_f64(), report: None })
     }
@@ -178,7 +186,7 @@ impl<'a> Object<'a> {
 
     /// Notes where the body is from and how far it reaches beyond the hull.
     pub(super) fn finish(&self, body: Body, objective: &str, refined: bool) -> (Body, Gap) {
-        let gap = gap(&body, &self.vertices);
+        let gap = self.gap(&body);
         let provenance = Provenance {
             input: self.input.to_owned(),
             objective: objective.to_owned(),
@@ -187,6 +195,12 @@ impl<'a> Object<'a> {
             hull_volume_m3: self.hull.volume,
         };
         (body.with_provenance(provenance).with_gap(gap.most_m), gap)
+    }
+
+    /// How far a body reaches beyond the hull, wherever within the clearance the points are.
+    fn gap(&self, body: &Body) -> Gap {
+        let gap = gap(body, &self.vertices);
+        Gap { most_m: gap.most_m + self.clearance, ..gap }
     }
 
     /// Cuts a body by at most so many slabs, one after the other where it reaches farthest beyond the hull, until it reaches no
@@ -208,8 +222,8 @@ impl<'a> Object<'a> {
             }
             watch.round(self.vertices.len(), 0.0);
             watch.iteration(gap.most_m)?;
-            let slabbed = cut(&body, self.points, &gap.direction)?;
-            gap = self::gap(&slabbed, &self.vertices);
+            let slabbed = cut(&body, self.points, self.clearance, &gap.direction)?;
+            gap = self.gap(&slabbed);
             body = slabbed.with_gap(gap.most_m);
         }
         let seconds = report.seconds + start.elapsed().as_secs_f64();
@@ -217,16 +231,16 @@ impl<'a> Object<'a> {
         Ok(Fit { body, gap, report: FitReport { volume_m3, volume_error_m3, seconds, ..report } })
     }
 
-    /// Pulls all points inside by the constant coefficient, which leaves the Hessian as it is, and proves the body.
+    /// Pulls all points, with what is around them, inside by the constant coefficient, which leaves the Hessian as it is, and proves the body.
     fn certify(&self, structure: &Structure, optimum: &Optimum) -> Result<Body, FitError> {
-        let Self { name, points, normalization, .. } = self;
+        let Self { name, points, normalization, clearance, .. } = self;
         let terms = structure.monomials.iter().copied().zip(optimum.coefficients.iter().copied()).collect();
         let polynomial = Polynomial::new(terms)?;
         let gram = HessianGram::nearest(&polynomial, structure.hessian_basis.clone(), optimum.hessian.clone())
             .map_err(|source| BodyError::Certificate { index: 0, source })?;
         let inverse = normalization.linear.try_inverse().ok_or(ProgramError::Singular)?;
         let placement = Placement::new(normalization.linear, inverse, normalization.center, 0.0, 0.0);
-        let polynomial = pulled_inside(polynomial, points, &placement, 0.0);
+        let polynomial = pulled_inside(polynomial, points, &placement, *clearance, 0.0);
         Ok(Body::new(name, *normalization, vec![Constraint { polynomial, gram }])?.with_points(points)?)
     }
 }
@@ -248,6 +262,7 @@ pub(super) fn pulled_inside(
     mut polynomial: Polynomial,
     points: &[Vector3<f64>],
     placement: &Placement,
+    clearance: f64,
     room: f64,
 ) -> Polynomial {
     // A million points are looked at once: which are highest does not change with the constant.
@@ -258,7 +273,7 @@ pub(super) fn pulled_inside(
     for _ in 0..3 {
         let highest = outermost
             .iter()
-            .map(|x| placement.sample_of(&polynomial, x).value_upper(0.0))
+            .map(|x| placement.sample_of(&polynomial, x).value_upper(clearance))
             .fold(f64::NEG_INFINITY, f64::max);
         let excess = highest - (1.0 - room);
         if (-1e-15..=0.0).contains(&excess) {

@@ -30,10 +30,10 @@ pub enum CutError {
     Points(#[from] NotContained),
 }
 
-/// The body cut by the slab across the unit vector n that holds the points; what is noted of the body stays but for the gap.
-pub(super) fn cut(body: &Body, points: &[Vector3<f64>], n: &Vector3<f64>) -> Result<Body, CutError> {
+/// The body cut by the slab across the unit vector n that holds the balls of radius `clearance` about the points; what is noted of the body stays but for the gap.
+pub(super) fn cut(body: &Body, points: &[Vector3<f64>], clearance: f64, n: &Vector3<f64>) -> Result<Body, CutError> {
     let mut constraints = body.constraints().to_vec();
-    constraints.push(slab(body, points, n)?);
+    constraints.push(slab(body, points, clearance, n)?);
     let cut = Body::new(body.name(), *body.normalization(), constraints)?.with_points(points)?;
     Ok(match body.provenance() {
         Some(provenance) => cut.with_provenance(provenance.clone()),
@@ -42,7 +42,7 @@ pub(super) fn cut(body: &Body, points: &[Vector3<f64>], n: &Vector3<f64>) -> Res
 }
 
 /// The slab in the body's normalized coordinates.
-fn slab(body: &Body, points: &[Vector3<f64>], n: &Vector3<f64>) -> Result<Constraint, CutError> {
+fn slab(body: &Body, points: &[Vector3<f64>], clearance: f64, n: &Vector3<f64>) -> Result<Constraint, CutError> {
     let normalization = body.normalization();
     let seen = |x: &Vector3<f64>| x - normalization.center;
     let heights = points.iter().map(|x| n.dot(&seen(x)));
@@ -69,7 +69,7 @@ fn slab(body: &Body, points: &[Vector3<f64>], n: &Vector3<f64>) -> Result<Constr
         .map_err(|source| BodyError::Certificate { index: body.constraints().len(), source })?;
     let mut slab = Constraint { polynomial, gram };
     // Thin objects feel the rounding of coordinates: what it may add the constant takes back, which leaves the Hessian as it is.
-    let value = |slab: &Constraint, x| body.placement().sample(slab, x).value_upper(0.0);
+    let value = |slab: &Constraint, x| body.placement().sample(slab, x).value_upper(clearance);
     let excess = points.iter().map(|x| value(&slab, x)).fold(f64::NEG_INFINITY, f64::max) - 1.0;
     if excess > 0.0 {
         slab.polynomial = slab.polynomial.with_constant_shifted(-(2.0 * excess + 4.0 * f64::EPSILON));

@@ -228,7 +228,7 @@ fn certify(
     let inverse = normalization.linear.try_inverse().ok_or(ProgramError::Singular)?;
     let placement = Placement::new(normalization.linear, inverse, normalization.center, 0.0, 0.0);
     let terms = structure.monomials.iter().copied().zip(coefficients.iter().copied()).collect();
-    let polynomial = pulled_inside(Polynomial::new(terms)?, object.points(), &placement, ROOM);
+    let polynomial = pulled_inside(Polynomial::new(terms)?, object.points(), &placement, 0.0, ROOM);
     let gram = SosGram::nearest(&polynomial, monomials(structure.degree / 2), gram).map_err(SosBodyError::NotSos)?;
     let relaxation = relaxation(&polynomial)?;
     let body = SosBody::new(object.name(), normalization, polynomial, gram, relaxation)?;

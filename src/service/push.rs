@@ -6,7 +6,7 @@ use std::time::Duration;
 use tonic::transport::{Channel, Endpoint};
 use tonic::{Code, Status};
 
-use crate::body::Body;
+use crate::body::Shape;
 
 use super::limits::MAX_MESSAGE_BYTES;
 use super::proto::body_service_client::BodyServiceClient;
@@ -63,6 +63,15 @@ pub enum PushError {
         file: PathBuf,
         /// The reason, with its remedy.
         why: String,
+    },
+    /// The file holds a compound.
+    #[error(
+        "{} holds a compound, and servers store single bodies only; fit the object without --parts",
+        .file.display()
+    )]
+    Compound {
+        /// The file.
+        file: PathBuf,
     },
     /// The file does not fit into a message.
     #[error(
@@ -143,8 +152,9 @@ fn read(file: &Path) -> Result<String, PushError> {
         return Err(PushError::Large { file: file.into(), bytes });
     }
     let text = std::fs::read_to_string(file).map_err(unreadable)?;
-    match Body::from_json(&text) {
-        Ok(_) => Ok(text),
+    match Shape::from_json(&text) {
+        Ok(Shape::Body(_)) => Ok(text),
+        Ok(Shape::Compound(_)) => Err(PushError::Compound { file: file.into() }),
         Err(error) => Err(PushError::File { file: file.into(), why: error.to_string() }),
     }
 }
@@ -176,6 +186,7 @@ fn root_cause(error: &dyn std::error::Error) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::body::Body;
 
     #[tokio::test]
     async fn a_server_that_never_answers_is_given_up() {

@@ -68,7 +68,7 @@ impl SosBody {
 
     /// The file of this set; reading it back gives the same numbers exactly.
     pub fn to_json(&self) -> String {
-        write(&File::from(self))
+        write(&File::from(self), 1)
     }
 
     /// Reads a file and re-proves it: the id is recomputed, the certificates are checked, every derived value is recomputed and
@@ -118,7 +118,7 @@ impl FileRelaxation {
 /// Checks what no proof covers: notes must at least be possible.
 fn check_notes(file: &File) -> Result<(), BodyFileError> {
     if let Some(points) = &file.contained_points {
-        points.check()?;
+        points.check("contained_points")?;
     }
     if let Some(Coverage { triangles, uncovered, area_m2, uncovered_area_m2, largest }) = &file.coverage {
         let areas = *area_m2 >= 0.0 && (0.0..=*area_m2 * (1.0 + 1e-12)).contains(uncovered_area_m2);

@@ -91,6 +91,8 @@ fn row(
         body: file.display().to_string(),
         degree: body.degree(),
         slabs,
+        parts: 1,
+        covers: None,
         objective: made.objective,
         refined: made.refined,
         points: body.points().map_or(0, |points| points.count),
@@ -101,7 +103,7 @@ fn row(
         volume_error_m3: body.volume().error_m3,
         hull_volume_m3: made.hull_volume_m3,
         gap_m: fitted.gap_m,
-        mean_gap_m: fitted.mean_gap_m,
+        mean_gap_m: Some(fitted.mean_gap_m),
         seconds: fitted.duration_s,
         status: "solved",
         // Re-proven when its file was read.

@@ -57,8 +57,8 @@ pub(super) fn method(args: &FitArgs) -> Result<Option<SosMethod>, String> {
             return Err("--relax-convexity: inverse-moment asks for no convexity; leave one of the two out".into());
         }
     };
-    if args.refine || args.ladder || args.slabs > 0 || args.max_gap.is_some() {
-        let wanted = "--refine, --ladder, --slabs and --max-gap need convex bodies; leave them out";
+    if args.refine || args.ladder || args.slabs > 0 || args.max_gap.is_some() || args.parts.is_some() {
+        let wanted = "--refine, --ladder, --slabs, --parts and --max-gap need convex bodies; leave them out";
         return Err(format!("{wanted}, or --relax-convexity and inverse-moment"));
     }
     Ok(Some(method))

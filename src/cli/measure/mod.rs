@@ -3,30 +3,30 @@
 mod poses;
 mod timing;
 
-use super::{read, read_body};
-use crate::body::Body;
+use super::{read, read_shape};
+use crate::body::Shape;
 use crate::measure::{Distance, LevelDistance, Options, Pose, Status, WarmStart, distance, level_distance};
 use serde::Serialize;
 use std::error::Error;
 use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
 
-/// Measure distances between two bodies, without a server
+/// Measure distances between two bodies or compounds, without a server
 ///
 /// Prints the Euclidean distance and both level distances d(A‖B) = min p_A on B and d(B‖A), each with its proven bracket,
 /// for one relative pose or for each pose of a file. Successive poses of a trajectory are warm-started.
 ///
 /// A pose maps the frame of B into the frame of A; witnesses and normal are in A's frame, metres, the normal from B to A
 /// (none on overlap). With --json the convex hulls of the objects have a bracket, too, where the bodies' gaps are known: their
-/// distance is at least distance_lower_m and at most hulls_distance_upper_m. Level distances are above 1 apart, 1 touching, below 1 overlapping, and use the polynomials as they
+/// distance is at least distance_lower_m and at most hulls_distance_upper_m (of a compound it is the hulls of its pieces). Level distances are above 1 apart, 1 touching, below 1 overlapping, and use the polynomials as they
 /// are stored: 'show' tells their minimum.
 ///
 /// Example: sublevel measure a.json b.json --pose 0.5,0,0,0,0,0,1
 #[derive(Debug, clap::Args)]
 pub(super) struct MeasureArgs {
-    /// Body file of A
+    /// File of A, a body or a compound
     a: PathBuf,
-    /// Body file of B
+    /// File of B
     b: PathBuf,
     /// Pose of B in A's frame: translation (m) and quaternion [default: identity]
     #[arg(long, value_name = "X,Y,Z,QX,QY,QZ,QW", allow_hyphen_values = true, conflicts_with = "poses")]
@@ -94,10 +94,10 @@ impl Line {
     }
 }
 
-/// Two bodies and the accuracy asked for.
+/// Two bodies or compounds and the accuracy asked for.
 struct Query {
-    a: Body,
-    b: Body,
+    a: Shape,
+    b: Shape,
     options: Options<'static>,
 }
 
@@ -125,7 +125,7 @@ pub(super) fn run(args: &MeasureArgs) -> Result<(), Box<dyn Error>> {
         }
         (None, None) => vec![vec![Pose::identity()]],
     };
-    let query = Query { a: read_body(&args.a)?, b: read_body(&args.b)?, options };
+    let query = Query { a: read_shape(&args.a)?, b: read_shape(&args.b)?, options };
     let mut out = BufWriter::new(io::stdout().lock());
     if args.time {
         serde_json::to_writer(&mut out, &timing::time(&query, &trajectories))?;

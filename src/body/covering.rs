@@ -1,0 +1,258 @@
+//! What a compound covers of a mesh, and the planes by which that is proven.
+
+use super::piece::{MeshError, Piece};
+use super::{Body, Compound, ContainedPoints, NotContained};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// A plane that divides one part of an object into two.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cut {
+    /// Which part it divides, of those that the cuts before have made: what is below the plane keeps this number, what is not gets
+    /// the next free one.
+    pub part: usize,
+    /// Normal of the plane, pointing up, of length about 1.
+    pub normal: [f64; 3],
+    /// `normal·x` on the plane, metres.
+    pub height_m: f64,
+}
+
+/// How much of a mesh is covered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Covered {
+    /// Every triangle, but not what an open mesh may be thought to enclose.
+    SurfaceOnly,
+    /// Every triangle, and every point about which the closed mesh has a winding number other than 0.
+    Interior,
+}
+
+impl Covered {
+    /// As files and reports call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Covered::SurfaceOnly => "surface_only",
+            Covered::Interior => "interior",
+        }
+    }
+}
+
+/// Which mesh a compound was proven to cover, and how.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Covering {
+    /// How much of it.
+    pub proven: Covered,
+    /// The corners of its triangles, one triangle after the other.
+    pub corners: ContainedPoints,
+    /// The planes that leave one piece of the mesh to each part.
+    pub cuts: Vec<Cut>,
+}
+
+/// Why a compound is not proven to cover a mesh.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum NotCovered {
+    /// The mesh is none.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// Cuts and parts do not match.
+    #[error("{cuts} cuts leave {} pieces of a mesh for {parts} parts; only compounds with the cuts of their fit can be proven", cuts + 1)]
+    Cuts {
+        /// How many cuts there are.
+        cuts: usize,
+        /// How many parts.
+        parts: usize,
+    },
+    /// A part does not hold its piece.
+    #[error("part {part} does not hold its piece of the mesh: {source}")]
+    Part {
+        /// Which part, from 0.
+        part: usize,
+        /// The point of the piece that fails most.
+        source: NotContained,
+    },
+}
+
+impl Covering {
+    /// The pieces of a mesh that cuts leave, one for each part (see [`Piece`] for what they say of the mesh).
+    pub fn pieces(mesh: Piece, cuts: &[Cut]) -> Vec<Piece> {
+        let mut pieces = vec![mesh];
+        for &Cut { part, normal, height_m } in cuts {
+            let [below, above] = pieces[part].cut(&normal.into(), height_m);
+            pieces[part] = below;
+            pieces.push(above);
+        }
+        pieces
+    }
+
+    /// The record of a mesh: the corners of its triangles, all of which must exist.
+    pub fn corners(points: &[Vector3<f64>], triangles: &[[usize; 3]]) -> ContainedPoints {
+        let corners: Vec<_> = triangles.iter().flatten().map(|&corner| points[corner]).collect();
+        ContainedPoints::of(&corners)
+    }
+
+    /// The first of the cuts that names no part or is no plane.
+    pub(super) fn bad_cut(cuts: &[Cut]) -> Option<usize> {
+        let good = |(index, cut): (usize, &Cut)| {
+            let numbers = cut.normal.iter().chain([&cut.height_m]).all(|number| number.is_finite());
+            cut.part <= index && numbers && (Vector3::from(cut.normal).norm() - 1.0).abs() < 1e-6
+        };
+        cuts.iter().enumerate().position(|entry| !good(entry))
+    }
+}
+
+impl Body {
+    /// Proves a piece of a mesh inside, rounding included.
+    ///
+    /// # Errors
+    /// The spot that fails most.
+    pub fn prove_holds(&self, piece: &Piece) -> Result<f64, NotContained> {
+        let value = |spot: &super::Spot| self.value_upper_within(&spot.x, spot.radius);
+        super::all_inside(piece.spots().iter().map(value))
+    }
+}
+
+impl Compound {
+    /// Proves that this compound covers a mesh: every triangle, and what it encloses if it is closed. Each part must hold its piece
+    /// of those that the cuts leave. Returns how much is covered, and a rigorous upper bound of the constraints over the pieces.
+    ///
+    /// # Errors
+    /// [`NotCovered`]: the part that fails, and where.
+    pub fn prove_covers(
+        &self,
+        points: &[Vector3<f64>],
+        triangles: &[[usize; 3]],
+        cuts: &[Cut],
+    ) -> Result<(Covered, f64), NotCovered> {
+        let parts = self.parts().len();
+        if cuts.len() + 1 != parts || Covering::bad_cut(cuts).is_some() {
+            return Err(NotCovered::Cuts { cuts: cuts.len(), parts });
+        }
+        let mesh = Piece::of_mesh(points, triangles)?;
+        let covered = if mesh.is_closed() { Covered::Interior } else { Covered::SurfaceOnly };
+        let mut most = f64::NEG_INFINITY;
+        for (part, (body, piece)) in self.parts().iter().zip(Covering::pieces(mesh, cuts)).enumerate() {
+            most = most.max(body.prove_holds(&piece).map_err(|source| NotCovered::Part { part, source })?);
+        }
+        Ok((covered, most))
+    }
+
+    /// The same compound with the record of the mesh that it is proven to cover.
+    ///
+    /// # Errors
+    /// As [`Compound::prove_covers`].
+    pub fn with_covering(
+        mut self,
+        points: &[Vector3<f64>],
+        triangles: &[[usize; 3]],
+        cuts: Vec<Cut>,
+    ) -> Result<Self, NotCovered> {
+        let (proven, _) = self.prove_covers(points, triangles, &cuts)?;
+        self.covering = Some(Covering { proven, corners: Covering::corners(points, triangles), cuts });
+        Ok(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Covered, Covering, Cut, NotCovered};
+    use crate::body::{Aabb, Body, Compound, MeshError, Shape};
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    const CUT: Cut = Cut { part: 0, normal: [1.0, 0.0, 0.0], height_m: 0.25 };
+
+    /// An axis-aligned cuboid as a mesh.
+    fn mesh(bounds: &Aabb) -> (Vec<Vector3<f64>>, Vec<[usize; 3]>) {
+        let corner = |i: u8, axis: usize| if i >> axis & 1 == 1 { bounds.max[axis] } else { bounds.min[axis] };
+        let points = (0..8).map(|i| Vector3::from_fn(|axis, _| corner(i, axis))).collect();
+        let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        (points, faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
+    }
+
+    fn unit() -> (Vec<Vector3<f64>>, Vec<[usize; 3]>) {
+        mesh(&Aabb { min: Vector3::repeat(-1.0), max: Vector3::repeat(1.0) })
+    }
+
+    /// The box from `low` to `high` along x, and a bit more than 1 to both sides along the others.
+    fn slice(low: f64, high: f64) -> Body {
+        let half = Vector3::new((high - low) / 2.0, 1.0 + 1e-12, 1.0 + 1e-12);
+        let body = Body::cuboid("slice", half).unwrap();
+        body.moved(&UnitQuaternion::identity(), &(Vector3::x() * ((low + high) / 2.0))).unwrap()
+    }
+
+    #[test]
+    fn parts_that_hold_their_pieces_cover_the_mesh() {
+        let (points, triangles) = unit();
+        let compound = Compound::new("two", vec![slice(-1.0 - 1e-12, 0.25 + 1e-12), slice(0.25 - 1e-12, 1.1)]).unwrap();
+        let (covered, most) = compound.prove_covers(&points, &triangles, &[CUT]).unwrap();
+        assert!(covered == Covered::Interior && most <= 1.0 && most > 0.999, "{most}");
+        let (covered, _) = compound.prove_covers(&points, &triangles[1..], &[CUT]).unwrap();
+        assert_eq!(covered, Covered::SurfaceOnly);
+        let noted = compound.clone().with_covering(&points, &triangles, vec![CUT]).unwrap();
+        let covering = noted.covering().unwrap();
+        assert_eq!((covering.proven, covering.corners.count), (Covered::Interior, 36));
+        assert_eq!(covering.corners, Covering::corners(&points, &triangles));
+
+        // Bodies that only meet in the plane of the cut leave the rounding of cut points uncovered, and say so.
+        for (left, right) in [(0.25, 0.25), (0.249, 0.26), (0.26, 0.251)] {
+            let parts = vec![slice(-1.1, left), slice(right, 1.1)];
+            let failure = Compound::new("two", parts).unwrap().prove_covers(&points, &triangles, &[CUT]).unwrap_err();
+            assert!(matches!(failure, NotCovered::Part { source, .. } if source.value > 1.0), "{failure}");
+        }
+        // Order counts: parts belong to pieces.
+        let swapped = Compound::new("two", compound.parts().iter().rev().cloned().collect()).unwrap();
+        assert!(matches!(swapped.prove_covers(&points, &triangles, &[CUT]), Err(NotCovered::Part { part: 0, .. })));
+    }
+
+    #[test]
+    fn what_can_not_be_proven_is_refused() {
+        let (points, triangles) = unit();
+        let compound = Compound::new("two", vec![slice(-1.1, 1.1), slice(-1.1, 1.1)]).unwrap();
+        let prove = |cuts: &[Cut]| compound.prove_covers(&points, &triangles, cuts);
+        assert!(prove(&[CUT]).is_ok());
+        for cuts in [
+            &[][..],
+            &[CUT, CUT],
+            &[Cut { part: 1, ..CUT }],
+            &[Cut { height_m: f64::NAN, ..CUT }],
+            &[Cut { normal: [0.0; 3], ..CUT }],
+        ] {
+            assert!(matches!(prove(cuts), Err(NotCovered::Cuts { .. })), "{cuts:?}");
+        }
+        assert_eq!(
+            compound.prove_covers(&points, &[[0, 1, 8]], &[CUT]),
+            Err(NotCovered::Mesh(MeshError::Corner { triangle: 0, point: 8, points: 8 }))
+        );
+        assert!(compound.prove_covers(&points, &[], &[CUT]).is_err());
+    }
+
+    #[test]
+    fn files_keep_compounds_and_refuse_changed_ones() {
+        let (points, triangles) = unit();
+        let parts = vec![slice(-1.1, 0.3).with_gap(0.2), slice(0.2, 1.1).with_gap(0.1)];
+        let compound = Compound::new("two", parts).unwrap().with_covering(&points, &triangles, vec![CUT]).unwrap();
+        let text = compound.to_json();
+        let again = Compound::from_json(&text).unwrap();
+        assert_eq!(again.to_json(), text);
+        assert_eq!((again.id(), again.gap_m(), again.covering()), (compound.id(), Some(0.2), compound.covering()));
+        assert!(again.prove_covers(&points, &triangles, &again.covering().unwrap().cuts).is_ok());
+        for (from, to, field) in [
+            ("\"gap_m\": 0.2,", "\"gap_m\": 0.1,", "gap_m"),
+            ("\"part\":0", "\"part\":1", "covering.cuts[0]"),
+            ("\"name\": \"two\"", "\"name\": \"\"", "name"),
+            ("\"kind\": \"compound\"", "\"kind\": \"body\"", "not a body file"),
+            ("\"degree\": 2", "\"degree\": 4", "parts[0]: degree"),
+        ] {
+            let changed = text.replacen(from, to, 1);
+            assert_ne!(changed, text, "{from}");
+            let told = Shape::from_json(&changed).unwrap_err().to_string();
+            assert!(told.contains(field), "{from}: {told}");
+        }
+        let id = compound.id().to_string();
+        let other = compound.parts()[0].id().to_string();
+        let told = Compound::from_json(&text.replacen(&id, &other, 1)).unwrap_err().to_string();
+        assert!(told.starts_with("id "), "{told}");
+        assert!(Body::from_json(&text).is_err());
+    }
+}

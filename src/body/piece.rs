@@ -1,0 +1,211 @@
+//! Pieces of a mesh: what planes leave of it, closed again where they cut.
+//!
+//! A piece is a chain of triangles. A plane divides it into one piece below and one above: triangles with corners on both sides are
+//! split at points of their edges, and where a closed piece was cut open both sides get a cap, with opposite orientation. Two
+//! things follow, whatever the plane and however coarsely its side of a corner was told:
+//!
+//! - **The surface** lies in the hulls of the pieces: a triangle is the union of those it is split into, and each piece has its own
+//!   among its triangles.
+//! - **The interior** of a closed mesh, where its winding number is not 0, does so too. As chains, the mesh is the sum of its pieces:
+//!   caps cancel. Each is a cycle, as caps are cones over the loops that the cuts leave of its boundary. So the winding numbers
+//!   about a point add up, and where the mesh's is not 0 that of some piece is not either. But about a point outside its hull a cycle
+//!   has winding number 0. (On the triangles themselves it is not defined; hulls are closed, and these points limits of others.)
+//!
+//! Neither needs the points to lie on the plane, only on the edges they split. In floating point they do not even do that. What a
+//! [`Spot`] stands for is the exact point `p + t (q - p)` of the edge between the exact points p and q, t the rounded number that
+//! was used; its coordinates are known to be within a radius of it, which grows by a few roundings with each cut. So the claims
+//! hold for convex sets that contain not the spots alone but balls of their radii.
+
+use nalgebra::Vector3;
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+
+/// A point known up to rounding, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spot {
+    /// Its rounded coordinates.
+    pub x: Vector3<f64>,
+    /// Bound of the distance of the exact point from there; 0 for a corner of the mesh.
+    pub radius: f64,
+}
+
+impl Spot {
+    /// The point `p + t (q - p)` for t in [0, 1].
+    fn between(p: &Self, q: &Self, t: f64) -> Self {
+        // Of the difference, the product and the sum, each at most half an ε of |p| + |q|, and again as much for this bound; numbers
+        // too small to be rounded in proportion are off by less than the least normal one.
+        let rounding = 2.0 * f64::EPSILON * (p.x.norm() + q.x.norm()) + f64::MIN_POSITIVE;
+        Self { x: p.x + (q.x - p.x) * t, radius: (p.radius.max(q.radius) + rounding) * (1.0 + 2.0 * f64::EPSILON) }
+    }
+}
+
+/// Why triangles are no mesh.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum MeshError {
+    /// No triangles.
+    #[error("the mesh has no triangles; a compound is made of those, a single body of points")]
+    NoTriangles,
+    /// A corner that does not exist.
+    #[error("triangle {triangle} (counted from 0) names point {point} of {points}; repair the mesh")]
+    Corner {
+        /// The triangle.
+        triangle: usize,
+        /// The point it names.
+        point: usize,
+        /// How many points there are.
+        points: usize,
+    },
+    /// A coordinate is not finite.
+    #[error("point {0} (counted from 0) has a NaN or infinite coordinate; remove it or repair the mesh")]
+    NotFinite(usize),
+}
+
+/// A chain of triangles; each spot is a corner of some.
+#[derive(Clone, Debug, Default)]
+pub struct Piece {
+    spots: Vec<Spot>,
+    triangles: Vec<[usize; 3]>,
+    closed: bool,
+}
+
+impl Piece {
+    /// The whole mesh, points with equal coordinates taken for one.
+    ///
+    /// # Errors
+    /// [`MeshError`] for triangles that are none.
+    pub fn of_mesh(points: &[Vector3<f64>], triangles: &[[usize; 3]]) -> Result<Self, MeshError> {
+        if triangles.is_empty() {
+            return Err(MeshError::NoTriangles);
+        }
+        if let Some(index) = points.iter().position(|x| !x.iter().all(|value| value.is_finite())) {
+            return Err(MeshError::NotFinite(index));
+        }
+        let mut known = HashMap::new();
+        let mut piece = Self::default();
+        for (triangle, corners) in triangles.iter().enumerate() {
+            if let Some(&point) = corners.iter().find(|&&corner| corner >= points.len()) {
+                return Err(MeshError::Corner { triangle, point, points: points.len() });
+            }
+            piece.triangles.push(corners.map(|corner| {
+                // + 0.0 makes the two zeros one key.
+                let x = points[corner].add_scalar(0.0);
+                *known.entry([x.x.to_bits(), x.y.to_bits(), x.z.to_bits()]).or_insert_with(|| {
+                    piece.spots.push(Spot { x, radius: 0.0 });
+                    piece.spots.len() - 1
+                })
+            }));
+        }
+        piece.closed = piece.boundary_is_empty();
+        Ok(piece)
+    }
+
+    /// Corners of the triangles.
+    pub fn spots(&self) -> &[Spot] {
+        &self.spots
+    }
+
+    /// Triangles as indices of spots.
+    pub fn triangles(&self) -> &[[usize; 3]] {
+        &self.triangles
+    }
+
+    /// Whether the chain is a cycle: every edge is passed as often one way as the other.
+    pub fn is_closed(&self) -> bool {
+        self.closed
+    }
+
+    /// Largest radius of a spot, metres.
+    pub fn uncertainty(&self) -> f64 {
+        self.spots.iter().map(|spot| spot.radius).fold(0.0, f64::max)
+    }
+
+    /// The pieces where `normal·x < height` and where not. Either may be empty.
+    pub fn cut(&self, normal: &Vector3<f64>, height: f64) -> [Self; 2] {
+        let mut spots = self.spots.clone();
+        let heights: Vec<f64> = spots.iter().map(|spot| normal.dot(&spot.x) - height).collect();
+        let mut middles = HashMap::new();
+        let mut middle = |a: usize, b: usize| {
+            let (a, b) = (a.min(b), a.max(b));
+            *middles.entry((a, b)).or_insert_with(|| {
+                // One height is negative, the other is not.
+                let t = heights[a] / (heights[a] - heights[b]);
+                spots.push(Spot::between(&spots[a], &spots[b], t));
+                spots.len() - 1
+            })
+        };
+        let mut sides = [Vec::new(), Vec::new()];
+        // Edges between cut points, as the boundary of what is below passes them.
+        let mut chords = Vec::new();
+        for triangle in &self.triangles {
+            let above = triangle.map(|corner| usize::from(heights[corner] >= 0.0));
+            let Some(lone) = (0..3).find(|&i| above[i] != above[(i + 1) % 3] && above[i] != above[(i + 2) % 3]) else {
+                sides[above[0]].push(*triangle);
+                continue;
+            };
+            let [a, b, c] = [0, 1, 2].map(|i| triangle[(lone + i) % 3]);
+            let (p, q) = (middle(a, b), middle(a, c));
+            sides[above[lone]].push([a, p, q]);
+            sides[1 - above[lone]].extend([[p, b, c], [p, c, q]]);
+            chords.push(if above[lone] == 0 { (p, q) } else { (q, p) });
+        }
+        if self.closed {
+            let apex = apexes(&chords);
+            for &(p, q) in &chords {
+                let apex = apex[&p];
+                if apex != p && apex != q {
+                    sides[0].push([apex, q, p]);
+                    sides[1].push([apex, p, q]);
+                }
+            }
+        }
+        sides.map(|triangles| Self::compact(&spots, triangles, self.closed))
+    }
+
+    /// The piece of some triangles, with the spots that they need.
+    fn compact(spots: &[Spot], mut triangles: Vec<[usize; 3]>, closed: bool) -> Self {
+        let mut places = vec![usize::MAX; spots.len()];
+        let mut kept = Vec::new();
+        for corner in triangles.iter_mut().flatten() {
+            if places[*corner] == usize::MAX {
+                places[*corner] = kept.len();
+                kept.push(spots[*corner]);
+            }
+            *corner = places[*corner];
+        }
+        Self { spots: kept, triangles, closed }
+    }
+
+    fn boundary_is_empty(&self) -> bool {
+        let mut passes: HashMap<(usize, usize), i64> = HashMap::new();
+        for &[a, b, c] in &self.triangles {
+            for (p, q) in [(a, b), (b, c), (c, a)] {
+                *passes.entry((p.min(q), p.max(q))).or_default() += (q as i64 - p as i64).signum();
+            }
+        }
+        passes.values().all(|&net| net == 0)
+    }
+}
+
+/// For each end of a chord one end of the chords it hangs together with: each loop gets a cap of its own, or caps would reach from
+/// one limb of an object to the next.
+fn apexes(chords: &[(usize, usize)]) -> HashMap<usize, usize> {
+    let mut neighbours: HashMap<usize, Vec<usize>> = HashMap::new();
+    for &(p, q) in chords {
+        neighbours.entry(p).or_default().push(q);
+        neighbours.entry(q).or_default().push(p);
+    }
+    let mut apexes = HashMap::new();
+    for &(apex, _) in chords {
+        let mut open = vec![apex];
+        while let Some(end) = open.pop() {
+            if let Entry::Vacant(place) = apexes.entry(end) {
+                place.insert(apex);
+                open.extend(&neighbours[&end]);
+            }
+        }
+    }
+    apexes
+}
+
+#[cfg(test)]
+mod tests;

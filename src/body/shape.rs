@@ -1,0 +1,59 @@
+//! Whatever a file holds: a body or a compound.
+
+use super::file::{BodyFileError, kind};
+use super::{Aabb, Ball, Body, Compound, Solid, compound_file};
+
+/// A body or a compound, which measures take alike.
+#[derive(Clone, Debug)]
+pub enum Shape {
+    /// One convex body.
+    Body(Box<Body>),
+    /// The union of several.
+    Compound(Box<Compound>),
+}
+
+impl Shape {
+    /// Reads and re-proves a file, of a body or of a compound as its `kind` says.
+    ///
+    /// # Errors
+    /// As [`Body::from_json`] and [`Compound::from_json`].
+    pub fn from_json(text: &str) -> Result<Self, BodyFileError> {
+        if kind(text)? == compound_file::KIND {
+            Compound::from_json(text).map(|compound| Shape::Compound(Box::new(compound)))
+        } else {
+            Body::from_json(text).map(|body| Shape::Body(Box::new(body)))
+        }
+    }
+
+    /// How far it reaches beyond the convex hull of its object, or those of the pieces of its object, metres.
+    pub fn gap_m(&self) -> Option<f64> {
+        match self {
+            Shape::Body(body) => body.gap_m(),
+            Shape::Compound(compound) => compound.gap_m(),
+        }
+    }
+}
+
+impl Solid for Shape {
+    #[inline]
+    fn parts(&self) -> &[Body] {
+        match self {
+            Shape::Body(body) => std::slice::from_ref(body),
+            Shape::Compound(compound) => compound.parts(),
+        }
+    }
+
+    fn circumscribed(&self) -> &Ball {
+        match self {
+            Shape::Body(body) => body.circumscribed(),
+            Shape::Compound(compound) => compound.circumscribed(),
+        }
+    }
+
+    fn bounding_box(&self) -> &Aabb {
+        match self {
+            Shape::Body(body) => body.bounding_box(),
+            Shape::Compound(compound) => compound.bounding_box(),
+        }
+    }
+}
