@@ -33,7 +33,7 @@ pub use piece::{MeshError, Piece, Spot};
 pub use placement::{Placement, Sample};
 pub use shape::Shape;
 pub use sos::{Coverage, Relaxation, SosBody, SosBodyError, TriangleError, Uncovered};
-pub use sphere::Sphere;
+pub use sphere::{Sphere, fibonacci_lattice};
 pub use surface::Volume;
 #[cfg(feature = "fit")]
 pub(crate) use surface::{boundary_radius, sphere_rule};

@@ -1,8 +1,21 @@
-//! Directions spread evenly over the unit sphere: a twice or more subdivided icosahedron.
+//! Directions spread evenly over the unit sphere: a twice or more subdivided icosahedron, or a lattice of any count.
 
 use nalgebra::Vector3;
 use std::collections::HashMap;
+use std::f64::consts::PI;
 use std::sync::OnceLock;
+
+/// `count` unit vectors in equal steps of height from the north pole down, each turned from the last by the golden angle. The first
+/// half are spread evenly over the northern hemisphere.
+pub fn fibonacci_lattice(count: usize) -> impl Iterator<Item = Vector3<f64>> {
+    let golden_angle = PI * (3.0 - 5.0_f64.sqrt());
+    (0..count).map(move |i| {
+        let z = 1.0 - (2 * i + 1) as f64 / count as f64;
+        let (sin, cos) = (golden_angle * i as f64).sin_cos();
+        let across = (1.0 - z * z).sqrt();
+        Vector3::new(across * cos, across * sin, z)
+    })
+}
 
 /// A triangulated unit sphere.
 #[derive(Clone, Debug)]

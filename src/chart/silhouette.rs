@@ -1,9 +1,9 @@
 //! Silhouettes of convex bodies, and drawings of them in a grid of panels with one common scale.
 
 use super::Ink;
+use crate::body::fibonacci_lattice;
 use crate::optimize::{outline as convex_outline, turn};
 use nalgebra::Vector3;
-use std::f64::consts::TAU;
 use std::fmt::Write;
 
 /// Where the onlooker stands; the picture's axes are in metres, the second one upwards.
@@ -59,14 +59,7 @@ impl View {
 ///
 /// `along` gives the boundary point met by the ray in a unit direction, such as `Body::boundary_along`.
 pub fn boundary_points(along: impl Fn(&Vector3<f64>) -> Vector3<f64>, count: usize) -> Vec<Vector3<f64>> {
-    let golden = TAU * (3.0 - 5f64.sqrt()) / 2.0;
-    let direction = |i: usize| {
-        let z = 1.0 - (2 * i + 1) as f64 / count as f64;
-        let (sin, cos) = (golden * i as f64).sin_cos();
-        let across = (1.0 - z * z).sqrt();
-        Vector3::new(across * cos, across * sin, z)
-    };
-    (0..count).map(|i| along(&direction(i))).collect()
+    fibonacci_lattice(count).map(|direction| along(&direction)).collect()
 }
 
 /// The silhouette of the convex hull of `points`: its corners in picture coordinates, metres, counter-clockwise.

@@ -5,9 +5,10 @@
 //! curve, Commun. ACM 18, 1975). What is left is a search over the axis, which has many local minima: from the best of a
 //! lattice of directions, by compass steps, and at each of them also about the other two axes of the box found.
 
+use crate::body::fibonacci_lattice;
 use crate::optimize::outline;
 use nalgebra::{Matrix3, Vector3};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 /// Directions that are tried first, over half of the sphere.
 const LATTICE: usize = 600;
@@ -52,7 +53,7 @@ impl OrientedBox {
 /// meshes; a proof that there is none smaller it has not.
 pub fn smallest_box(points: &[Vector3<f64>]) -> OrientedBox {
     let mut starts: Vec<(f64, Vector3<f64>)> =
-        lattice().map(|axis| (best_along(&axis, points).volume(), axis)).collect();
+        fibonacci_lattice(2 * LATTICE).take(LATTICE).map(|axis| (best_along(&axis, points).volume(), axis)).collect();
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
     let found = starts.iter().take(STARTS).map(|(_, axis)| descend(axis, points));
     found.min_by(|a, b| a.volume().total_cmp(&b.volume())).unwrap_or(OrientedBox::along(Matrix3::identity(), points))
@@ -111,17 +112,6 @@ fn across(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let other = if axis.x.abs() < 0.5 { Vector3::x() } else { Vector3::y() };
     let right = other.cross(axis).normalize();
     (right, axis.cross(&right))
-}
-
-/// Even directions over half of the sphere: opposite ones make the same boxes.
-fn lattice() -> impl Iterator<Item = Vector3<f64>> {
-    let golden = PI * (3.0 - 5_f64.sqrt());
-    (0..LATTICE).map(move |i| {
-        let z = (i as f64 + 0.5) / LATTICE as f64;
-        let (sin, cos) = (golden * i as f64).sin_cos();
-        let across = (1.0 - z * z).sqrt();
-        Vector3::new(across * cos, across * sin, z)
-    })
 }
 
 #[cfg(test)]

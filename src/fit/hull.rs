@@ -117,10 +117,11 @@ pub fn convex_hull(points: &[Vector3<f64>]) -> Result<Hull, HullError> {
     Err(HullError::Failed(failure))
 }
 
-/// About the volume of the convex hull, in half the time and less: nothing is checked. None for points without volume.
+/// About the volume of the convex hull, in half the time and less: nothing is checked, and points are moved a little, as those of
+/// flat facets can confuse the hull code. None for points without volume.
 pub(super) fn rough_volume(points: &[Vector3<f64>]) -> Option<f64> {
     let frame = principal_frame(points).ok()?;
-    let moved: Vec<_> = points.iter().map(|x| frame.apply(x)).collect();
+    let moved: Vec<_> = points.iter().enumerate().map(|(index, x)| frame.apply(x) + jitter(index) * 1e-7).collect();
     let (_, facets) = facets(&moved).ok()?;
     Some(volume(&moved, &facets) / frame.linear.determinant().abs())
 }

@@ -5,8 +5,8 @@
 //! leave fewer still.
 
 use super::hull::facets;
+use crate::body::fibonacci_lattice;
 use nalgebra::Vector3;
-use std::f64::consts::PI;
 
 /// Fewer points than this are not worth the work.
 const MANY: usize = 4096;
@@ -33,7 +33,7 @@ pub(super) fn outermost(points: &[Vector3<f64>]) -> Vec<usize> {
 /// The planes of the polytope of the extreme points along `count` directions, moved inwards: `normal·x <= offset` inside. None if the
 /// hull code fails.
 fn planes(points: &[Vector3<f64>], left: &[usize], count: usize) -> Vec<(Vector3<f64>, f64)> {
-    let directions: Vec<Vector3<f64>> = directions(count).collect();
+    let directions: Vec<Vector3<f64>> = fibonacci_lattice(count).collect();
     let mut best = vec![(f64::NEG_INFINITY, 0); count];
     for &i in left {
         for (best, direction) in best.iter_mut().zip(&directions) {
@@ -56,17 +56,6 @@ fn planes(points: &[Vector3<f64>], left: &[usize], count: usize) -> Vec<(Vector3
     // A sliver has no plane to speak of, and without it the polytope would be larger than it is.
     let planes: Vec<_> = planes.collect();
     if planes.len() == triangles.len() { planes } else { Vec::new() }
-}
-
-/// Even directions on the sphere.
-fn directions(count: usize) -> impl Iterator<Item = Vector3<f64>> {
-    let golden = PI * (3.0 - 5_f64.sqrt());
-    (0..count).map(move |i| {
-        let z = 1.0 - (2 * i + 1) as f64 / count as f64;
-        let (sin, cos) = (golden * i as f64).sin_cos();
-        let across = (1.0 - z * z).sqrt();
-        Vector3::new(across * cos, across * sin, z)
-    })
 }
 
 #[cfg(test)]

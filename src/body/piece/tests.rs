@@ -101,11 +101,11 @@ fn points_of_edges_are_within_their_radius() {
     }
 }
 
-/// What the spots of a piece stand for, by their rounded coordinates.
-type Truth = HashMap<[u64; 3], Exact>;
+/// What the spots of a piece stand for, by all that is known of them: at 10^6 m two can have the same coordinates.
+type Truth = HashMap<[u64; 4], Exact>;
 
-fn key(spot: &Spot) -> [u64; 3] {
-    [spot.x.x.to_bits(), spot.x.y.to_bits(), spot.x.z.to_bits()]
+fn key(spot: &Spot) -> [u64; 4] {
+    [spot.x.x, spot.x.y, spot.x.z, spot.radius].map(f64::to_bits)
 }
 
 /// Adds the exact points where a plane splits edges of a piece.

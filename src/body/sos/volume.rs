@@ -1,6 +1,6 @@
 //! Volume by quadrature over rays that may enter and leave the set several times.
 
-use crate::body::{Ball, Normalization, Volume};
+use crate::body::{Ball, Normalization, Volume, fibonacci_lattice};
 use crate::polynomial::{Chords, Polynomial};
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
@@ -24,7 +24,7 @@ pub(super) fn measure(
     let mut longest = (0.0, None);
     let mut rule = |rays: usize| {
         let mut sum = 0.0;
-        for u in lattice(rays) {
+        for u in fibonacci_lattice(rays) {
             let metres = (inverse * u).norm();
             // A chord may come in pieces; the last one is kept open until the next does not adjoin it.
             let mut open = (0.0, 0.0);
@@ -49,14 +49,4 @@ pub(super) fn measure(
     };
     let (fine, coarse) = (rule(RAYS), rule(RAYS / 2));
     (Volume { volume_m3: fine, error_m3: (fine - coarse).abs() }, longest.1)
-}
-
-/// Unit vectors with equal steps of height, each turned from the last by the golden section of a turn.
-fn lattice(count: usize) -> impl Iterator<Item = Vector3<f64>> {
-    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-    (0..count).map(move |i| {
-        let height = 1.0 - (2 * i + 1) as f64 / count as f64;
-        let (radius, angle) = ((1.0 - height * height).sqrt(), 2.0 * PI * (i as f64 * golden).fract());
-        Vector3::new(radius * angle.cos(), radius * angle.sin(), height)
-    })
 }
