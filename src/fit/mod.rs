@@ -19,6 +19,7 @@ mod descent;
 mod dominance;
 pub mod ellipsoid;
 mod enclose;
+mod facing;
 mod factor;
 mod gap;
 mod generate;
