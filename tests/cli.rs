@@ -192,7 +192,8 @@ fn compounds_are_fitted_verified_shown_and_measured() {
     }
     // A gap that no single smooth body of that degree keeps.
     let gap = format!("{}", 1.0001 * row["gap_m"].as_f64().unwrap());
-    let chosen = fit(&["--degree", "4", "--max-gap", &gap]);
+    let elsewhere = fitted.path("chosen");
+    let chosen = json(&["fit", "--json", text(&mesh), "--out", text(&elsewhere), "--degree", "4", "--max-gap", &gap]);
     assert!(chosen[0]["parts"].as_u64().unwrap() > 1 && chosen[0]["slabs"] == 0, "{chosen}");
 
     let verified = json(&["verify", "--json", text(&compound), "--points", text(&mesh)]);
