@@ -78,14 +78,18 @@ impl Upload {
     /// Reads the mesh, if it is one. Takes a while for large ones.
     pub(super) fn into_job(self) -> Result<NewJob, Invalid> {
         let Self { request_id, order, content } = self;
-        let (field, points, mut triangles) = match content {
+        let (field, points, triangles) = match content {
             Content::Points(points, triangles) => ("points", points, triangles),
             Content::Mesh(format, file) => {
                 let mesh = jobs::read_mesh(&file, format, &order.input, order.scale);
                 let mesh = mesh.map_err(|error| Invalid::new("mesh", error))?;
-                // No index is too large: they were held against the points, and those against the length of the file.
+                let triangles = if order.uses_triangles() { mesh.triangles } else { Vec::new() };
+                if triangles.len() > MAX_FIT_TRIANGLES {
+                    return Err(Invalid::new("mesh", too_many()));
+                }
+                // Too large for any number of points that is accepted.
                 let corner = |corner| u32::try_from(corner).unwrap_or(u32::MAX);
-                ("mesh", mesh.points, mesh.triangles.into_iter().map(|corners| corners.map(corner)).collect())
+                ("mesh", mesh.points, triangles.into_iter().map(|corners| corners.map(corner)).collect())
             }
             Content::Group => return Ok(NewJob::new(request_id, order, &[], &[])),
         };
@@ -93,21 +97,12 @@ impl Upload {
             let why = format!("has {} points; a fit takes 4 to {MAX_FIT_POINTS}", points.len());
             return Err(Invalid::new(field, why));
         }
-        if !order.uses_triangles() {
-            triangles = Vec::new();
-        }
-        if triangles.len() > MAX_FIT_TRIANGLES {
-            return Err(Invalid::new("mesh", too_many()));
-        }
-        let missing = |corner: u32| usize::try_from(corner).map_or(true, |corner| corner >= points.len());
-        if let Some((index, corners)) =
-            triangles.iter().enumerate().find(|(_, corners)| corners.iter().any(|&corner| missing(corner)))
-        {
-            let why = format!(
-                "triangle {index} (counted from 0) has the corners {corners:?}, but there are {} points; count them from 0",
-                points.len()
-            );
-            return Err(Invalid::new("triangles.corners", why));
+        let is_there = |corner: &u32| usize::try_from(*corner).is_ok_and(|corner| corner < points.len());
+        if let Some(index) = triangles.iter().position(|corners| !corners.iter().all(is_there)) {
+            let (corners, count): (&[u32; 3], _) = (&triangles[index], points.len());
+            let why =
+                format!("triangle {index} (counted from 0) has the corners {corners:?}, but there are {count} points");
+            return Err(Invalid::new("triangles.corners", why + "; count points from 0, and send all of them"));
         }
         if order.parts.is_some() && triangles.is_empty() {
             let why = "parts are cut from a mesh, and no triangles are sent; send them, or leave out parts";
@@ -119,7 +114,7 @@ impl Upload {
 
 fn add_bytes(file: &mut Vec<u8>, bytes: &[u8]) -> Result<(), Invalid> {
     if file.len() + bytes.len() > MAX_MESH_BYTES {
-        let why = format!("has more than {MAX_MESH_BYTES} bytes; send the vertices of its hull as points");
+        let why = format!("has more than {MAX_MESH_BYTES} bytes; make the mesh coarser, or send its points");
         return Err(Invalid::new("mesh", why));
     }
     file.extend_from_slice(bytes);
@@ -133,7 +128,9 @@ fn add_points(points: &mut Vec<Vector3<f64>>, coordinates: &[f64], scale: f64) -
         return refused(format!("has {} numbers; send x, y and z of every point in one message", coordinates.len()));
     }
     if points.len() + chunk.len() > MAX_FIT_POINTS {
-        return refused(format!("has more than {MAX_FIT_POINTS} points; send fewer, those of the convex hull suffice"));
+        return refused(format!(
+            "has more than {MAX_FIT_POINTS} points; send fewer: those of the convex hull suffice for bodies"
+        ));
     }
     for &point in chunk {
         let point = Vector3::from(point) * scale;
