@@ -122,8 +122,7 @@ fn check_parts(order: &FitOrder) -> Result<(), OrderError> {
 
 fn check_group(order: &FitOrder, group: &FitGroup) -> Result<(), OrderError> {
     let FitOrder { name, input, degree, .. } = order.clone();
-    let alone = FitOrder { name, input, degree, group: Some(group.clone()), ..FitOrder::default() };
-    if *order != alone {
+    if (FitOrder { group: None, ..order.clone() }) != (FitOrder { name, input, degree, ..FitOrder::default() }) {
         let why = "is about stored bodies, which options of points do not change; leave out all but the degree";
         return Err(OrderError::new("group", why));
     }

@@ -77,8 +77,10 @@ async fn the_command_writes_the_same_files_with_and_without_a_server() {
     ] {
         assert_eq!(both(dir.path(), &server.url(), &[&[mesh.as_str()], options].concat()), [name]);
     }
-    // Where degree 2 alone is not near enough.
-    let [compound] = &both(dir.path(), &server.url(), &[&mesh, "--degree", "2", "--max-gap", "5cm"])[..] else {
+    // A gap for which three parts are the cheapest.
+    let three = rows(&[&mesh, "--degree", "2", "--parts", "3", "--out", &path("three")]);
+    let gap = format!("{}", 1.0001 * three[0]["gap_m"].as_f64().expect("a gap"));
+    let [compound] = &both(dir.path(), &server.url(), &[&mesh, "--degree", "2", "--max-gap", &gap])[..] else {
         panic!("one file")
     };
     assert!(compound.starts_with("arc-d2-p"), "{compound}");

@@ -66,10 +66,10 @@ async fn cones_and_the_raw_frame_make_bodies() {
         (raw, body(fit::FitOptions { objective, coordinates, ..plain() })),
     ] {
         let job = ended(&mut clients, options.clone(), &mesh).await;
-        assert_eq!(
-            job.options,
-            Some(FitOptions { objective: job.options.as_ref().unwrap().objective, scale: Some(1.0), ..options })
-        );
+        // What was left open is told.
+        let (objective, cone) = (options.objective().max(FitObjective::LogdetP), options.cone().max(FitCone::Sos));
+        let told = FitOptions { objective: objective.into(), cone: cone.into(), scale: Some(1.0), ..options };
+        assert_eq!(job.options.as_ref(), Some(&told));
         let found = made(job);
         clients.body(&found.1).await;
         assert_eq!(found, expected);
