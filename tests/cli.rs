@@ -531,11 +531,18 @@ fn sets_that_need_not_be_convex_are_told_from_bodies_everywhere() {
     assert!(refusal(&["measure", text(&body), file]).contains("need not be convex"));
     assert!(refusal(&["push", file, "--server", "http://127.0.0.1:9"]).contains("need not be convex"));
     assert!(refusal(&["show", file, "--svg", text(&folder.path().join("x.svg"))]).contains("sos-body"));
-    for more in [&["--refine"][..], &["--slabs", "2"], &["--ladder"], &["--max-gap", "1cm"]] {
+    for more in [
+        &["--refine"][..],
+        &["--slabs", "2"],
+        &["--ladder"],
+        &["--max-gap", "1cm"],
+        &["--parts", "2"],
+        &["--cone", "dsos"],
+    ] {
         let refused = refusal(&[&["fit", mesh, "--out", out, "--relax-convexity", "1"], more].concat());
         assert!(refused.contains("convex bodies"), "{refused}");
     }
-    assert!(refusal(&["fit", mesh, "--out", out, "--relax-convexity", "-1"]).contains("relax convexity"));
+    assert!(refusal(&["fit", mesh, "--out", out, "--relax-convexity", "-1"]).contains("--relax-convexity: -1"));
     assert!(
         refusal(&["fit", mesh, "--out", out, "--relax-convexity", "1", "--objective", "trace-h"]).contains("logdet-p")
     );
