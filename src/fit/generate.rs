@@ -135,29 +135,21 @@ struct Active {
 }
 
 impl Active {
-    /// The likeliest points and a well-spread subset, and for convex p as many points inside the hull: those constrain nothing, but
-    /// with weight on them the moments are positive definite also when the points lie on a quadric, as the corners of a box do.
+    /// A well-spread subset, the likeliest points, and for convex p some inside the hull: those constrain nothing, but with weight on
+    /// them the moments are positive definite also when the points lie on a quadric, as the corners of a box do.
     fn start(problem: &Problem, points: &[Vector3<f64>], likely: &[usize]) -> Self {
         let structure = problem.structure;
-        let wanted = (SPREAD * structure.gram.size).min(points.len());
-        let mut used = vec![false; points.len()];
-        let mut distance = vec![f64::INFINITY; points.len()];
-        let mut chosen = Vec::new();
-        let outermost = (0..points.len()).max_by(|&a, &b| points[a].norm().total_cmp(&points[b].norm())).unwrap_or(0);
-        let likely = apart(points, likely.iter().copied(), LIKELY * structure.gram.size);
-        let mut first = likely.into_iter().chain([outermost]);
-        while chosen.len() < wanted {
-            let spread = || (0..points.len()).max_by(|&a, &b| distance[a].total_cmp(&distance[b])).unwrap_or(0);
-            let next = first.next().unwrap_or_else(spread);
-            used[next] = true;
-            chosen.push(points[next]);
-            for (d, point) in distance.iter_mut().zip(points) {
-                *d = d.min((point - points[next]).norm());
-            }
-        }
+        let first = spread(points, SPREAD * structure.gram.size);
+        let mut chosen: Vec<Vector3<f64>> = first.iter().map(|&index| points[index]).collect();
         if problem.is_convex() {
             chosen.extend(inner(structure, &chosen));
         }
+        let mut used = vec![false; points.len()];
+        first.iter().for_each(|&index| used[index] = true);
+        let unused = likely.iter().copied().filter(|&index| !used[index]);
+        let likely = apart(points, unused, LIKELY * structure.gram.size);
+        likely.iter().for_each(|&index| used[index] = true);
+        chosen.extend(likely.into_iter().map(|index| points[index]));
         let values = columns(structure, &chosen);
         Self { used, chosen, values }
     }
@@ -176,12 +168,28 @@ fn columns(structure: &Structure, points: &[Vector3<f64>]) -> DMatrix<f64> {
     DMatrix::from_columns(&points.iter().map(|point| structure.values(point)).collect::<Vec<_>>())
 }
 
-/// Mixes of points, twice as many as monomials of half the degree: they constrain nothing, but with weight on them moments are
-/// positive definite also where there are few points, or points on a quadric.
-pub(super) fn inner(structure: &Structure, points: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+/// At most so many points, each the farthest from those before; the first is the farthest from 0.
+pub(super) fn spread(points: &[Vector3<f64>], most: usize) -> Vec<usize> {
+    let mut distance = vec![f64::INFINITY; points.len()];
+    let mut next = (0..points.len()).max_by(|&a, &b| points[a].norm().total_cmp(&points[b].norm())).unwrap_or(0);
+    let choose = |_| {
+        let chosen = next;
+        for (d, point) in distance.iter_mut().zip(points) {
+            *d = d.min((point - points[chosen]).norm());
+        }
+        next = (0..points.len()).max_by(|&a, &b| distance[a].total_cmp(&distance[b])).unwrap_or(0);
+        chosen
+    };
+    (0..most.min(points.len())).map(choose).collect()
+}
+
+/// Mixes of [`spread`] points, twice as many as monomials of half the degree: they constrain nothing, but with weight on them moments
+/// are positive definite also where there are few points, or points on a quadric.
+pub(super) fn inner(structure: &Structure, spread: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let mix = |i: usize| {
-        // Four points of all, whatever their order is, with weights that change from one mix to the next.
-        let corner = |k: usize| points[(fraction(i, CORNERS[k]) * points.len() as f64) as usize];
+        // Four points, the first ones more often, with weights that change from one mix to the next: where a few points are far from
+        // a crowd, mixes of the crowd alone would all but be one point.
+        let corner = |k: usize| spread[(fraction(i, CORNERS[k]).powi(4) * spread.len() as f64) as usize];
         let shares = SHARES.map(|step| fraction(i, step).powi(3) + 0.01);
         let total: f64 = shares.iter().sum();
         (0..4).map(|k| corner(k) * (shares[k] / total)).sum()

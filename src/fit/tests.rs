@@ -263,7 +263,7 @@ fn refinement_is_monotone_contains_the_points_and_is_proven() {
 
 #[test]
 fn refits_of_a_stream_take_fewer_steps_and_end_where_fits_do() {
-    let shape = blob(3000);
+    let shape = blob(300);
     let (mut anew, mut on) = (0, 0);
     let mut last: Option<Fit> = None;
     for frame in 0..8 {
@@ -282,7 +282,7 @@ fn refits_of_a_stream_take_fewer_steps_and_end_where_fits_do() {
         last = Some(refit);
     }
     println!("{anew} steps anew, {on} from the body before");
-    assert!(on < anew, "{on} {anew}");
+    assert!(on < anew * 3 / 4, "{on} {anew}");
     // A body that has nothing to do with the points does no harm.
     let elsewhere = fitted(&cube(1.0), 2);
     let options = FitOptions { degree: 4, ..FitOptions::default() };
