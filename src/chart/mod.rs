@@ -9,6 +9,8 @@ mod canvas;
 #[cfg(feature = "chart")]
 mod curve;
 #[cfg(feature = "chart")]
+pub mod duel;
+#[cfg(feature = "chart")]
 mod machine;
 #[cfg(feature = "chart")]
 mod scatter;
