@@ -11,6 +11,8 @@ mod curve;
 #[cfg(feature = "chart")]
 pub mod duel;
 #[cfg(feature = "chart")]
+mod labels;
+#[cfg(feature = "chart")]
 mod machine;
 #[cfg(feature = "chart")]
 mod scatter;
@@ -26,7 +28,7 @@ pub use curve::{LineChart, Mark, Series};
 #[cfg(feature = "chart")]
 pub use machine::{Machine, simd};
 #[cfg(feature = "chart")]
-pub use scatter::{Group, Marker, Point, Scatter};
+pub use scatter::{Group, Marker, Point, Scatter, Stairs};
 pub use shadow::shadow;
 pub use silhouette::{Outline, Panel, Silhouettes, View, boundary_points, outline};
 #[cfg(feature = "chart")]

@@ -52,6 +52,13 @@ impl Tally {
     }
 }
 
+/// Walks of a trajectory in a [`Row::turn`]: those of coal's program.
+const WALKS: usize = 9;
+
+fn median_of(count: usize, time: impl Fn() -> f64) -> f64 {
+    median(&(0..count).map(|_| time()).collect::<Vec<_>>())
+}
+
 /// A query over all poses with its times so far.
 pub struct Row<'a> {
     /// Name in tables.
@@ -60,7 +67,7 @@ pub struct Row<'a> {
     pub tally: Tally,
     /// Nanoseconds of each trajectory in each pass so far.
     passes: Vec<Vec<f64>>,
-    time: Box<dyn Fn() -> Vec<f64> + 'a>,
+    time: Box<dyn Fn(usize) -> Vec<f64> + 'a>,
 }
 
 impl<'a> Row<'a> {
@@ -75,7 +82,7 @@ impl<'a> Row<'a> {
         for trajectory in trajectories {
             walk(trajectory, &query, |answer| tally.add(&answer));
         }
-        let time = Box::new(move || {
+        let time = Box::new(move |walks| {
             let timed = |trajectory: &Vec<P>| {
                 let start = Instant::now();
                 walk(trajectory, &query, |answer| {
@@ -83,7 +90,7 @@ impl<'a> Row<'a> {
                 });
                 start.elapsed().as_nanos() as f64
             };
-            trajectories.iter().map(timed).collect()
+            trajectories.iter().map(|trajectory| median_of(walks, || timed(trajectory))).collect()
         });
         Self { label: label.into(), tally, passes: Vec::new(), time }
     }
@@ -109,7 +116,7 @@ impl<'a> Row<'a> {
             batch(poses, answers);
             answers.iter().for_each(|answer| tally.add(&judge(answer)));
         }
-        let time = Box::new(move || {
+        let time = Box::new(move |walks| {
             let timed = |trajectory: &Vec<P>| {
                 let mut places = places.borrow_mut();
                 let start = Instant::now();
@@ -120,14 +127,20 @@ impl<'a> Row<'a> {
                 }
                 start.elapsed().as_nanos() as f64
             };
-            trajectories.iter().map(timed).collect()
+            trajectories.iter().map(|trajectory| median_of(walks, || timed(trajectory))).collect()
         });
         Self { label: label.into(), tally, passes: Vec::new(), time }
     }
 
     /// Times one pass over all poses.
     pub fn pass(&mut self) {
-        self.passes.push((self.time)());
+        self.passes.push((self.time)(1));
+    }
+
+    /// Times one pass in which each trajectory is walked [`WALKS`] times on end and the median walk counts: as coal's program does it, whose
+    /// caches and branches are warm by then.
+    pub fn turn(&mut self) {
+        self.passes.push((self.time)(WALKS));
     }
 
     /// Nanoseconds per query: the median pass of each trajectory, summed.
