@@ -1,17 +1,18 @@
 //! `sublevel fit --group`.
 
-use super::fit::{FitArgs, make_folder, progress_bar};
+use super::fit::{FitArgs, carry_out_on, checked, make_folder, order_of_group, progress_bar};
 use super::{read_body, write_atomically};
 use crate::body::Body;
-use crate::fit::{EncloseOptions, Enclosure, Group, Progress, enclose_bodies, group};
+use crate::fit::Progress;
+use crate::jobs::{Made, Shapes, fit_group};
+use crate::service;
+use crate::store::{FitOrder, FittedBody};
+use indicatif::ProgressBar;
 use serde::Serialize;
 use std::error::Error;
 use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::time::Instant;
-
-/// Degree unless told otherwise.
-const DEGREE: usize = 4;
 
 #[derive(Serialize)]
 struct Row {
@@ -32,33 +33,18 @@ struct Row {
 /// Reads the bodies, puts them into one or several, and writes those.
 pub(super) fn run(args: &FitArgs, name: &str) -> Result<(), Box<dyn Error>> {
     let start = Instant::now();
-    let mut options = EncloseOptions::new(args.degree.unwrap_or(DEGREE));
-    options.multiplier_degree = args.multiplier_degree.unwrap_or(options.multiplier_degree);
-    options.check()?;
-    crate::body::check_name(name)?;
     let bodies = args.inputs.iter().map(|path| read_body(path)).collect::<Result<Vec<_>, _>>()?;
+    let order = checked(order_of_group(args, name, &bodies))?;
     make_folder(&args.out)?;
     let bar = progress_bar(name);
-    let mut tell = |progress: Progress| {
-        bar.set_message(format!("step {}, {:.0e} from the optimum", progress.iterations, progress.gap));
-        ControlFlow::Continue(())
-    };
-    let groups = match args.max_growth {
-        Some(max_growth) => group(&bodies, max_growth, &options, &mut tell)?,
-        None => {
-            let enclosure = enclose_bodies(name, &bodies.iter().collect::<Vec<_>>(), &options, &mut tell)?;
-            vec![Group { members: (0..bodies.len()).collect(), enclosure: Some(enclosure) }]
-        }
+    let Made { outcome, shapes } = match &args.server {
+        Some(url) => carry_out_there(args, url, &order, &bar)?,
+        None => fit_group(&order, &bodies, |_, said| tell(&bar, said))?,
     };
     bar.finish_and_clear();
-    let several = args.max_growth.is_some();
-    let rows = groups
-        .iter()
-        .enumerate()
-        .map(|(i, group)| {
-            write(args, &if several { format!("{name}-{}", i + 1) } else { name.to_owned() }, &bodies, group)
-        })
-        .collect::<Result<Vec<_>, _>>()?;
+    let Shapes::Bodies(made) = shapes else { return Err("groups become bodies; are the versions the same?".into()) };
+    let rows = made.iter().zip(&outcome.bodies).map(|(body, took)| write(args, body, took, &bodies));
+    let rows = rows.collect::<Result<Vec<_>, _>>()?;
     let mut out = io::stdout().lock();
     if args.json {
         serde_json::to_writer_pretty(&mut out, &rows)?;
@@ -79,22 +65,32 @@ pub(super) fn run(args: &FitArgs, name: &str) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+fn tell(bar: &ProgressBar, progress: Progress) -> ControlFlow<()> {
+    bar.set_message(format!("step {}, {:.0e} from the optimum", progress.iterations, progress.gap));
+    ControlFlow::Continue(())
+}
+
+/// The server must have the bodies first.
+fn carry_out_there(args: &FitArgs, url: &str, order: &FitOrder, bar: &ProgressBar) -> Result<Made, Box<dyn Error>> {
+    bar.set_message("sending");
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    runtime.block_on(service::push(url, &args.inputs))?;
+    carry_out_on(url, order, &[], &[], bar)
+}
+
 /// Writes one body and describes it.
-fn write(args: &FitArgs, name: &str, bodies: &[Body], group: &Group) -> Result<Row, Box<dyn Error>> {
-    let body = group.enclosure.as_ref().map_or(&bodies[group.members[0]], |enclosure| &enclosure.body);
-    let body = body.renamed(name)?;
-    let file = args.out.join(format!("{name}-d{}.json", body.degree()));
+fn write(args: &FitArgs, body: &Body, took: &FittedBody, bodies: &[Body]) -> Result<Row, Box<dyn Error>> {
+    let file = args.out.join(format!("{}-d{}.json", body.name(), body.degree()));
     write_atomically(&file, &body.to_json())?;
-    let members = group.members.iter().map(|&i| &bodies[i]);
-    let of_fit = |value: fn(&Enclosure) -> f64| group.enclosure.as_ref().map(value);
+    let members = took.members.iter().filter_map(|&member| bodies.get(member));
     Ok(Row {
         body: file.display().to_string(),
         members: members.clone().map(|body| body.name().to_owned()).collect(),
         degree: body.degree(),
         volume_m3: body.volume().volume_m3,
         members_volume_m3: members.map(|body| body.volume().volume_m3).sum(),
-        gap_m: of_fit(|enclosure| enclosure.gap.most_m),
-        optimality_gap: of_fit(|enclosure| enclosure.optimality_gap),
+        gap_m: took.gap_m,
+        optimality_gap: took.optimum.as_ref().and_then(|optimum| optimum.optimality_gap),
         proven: true,
     })
 }

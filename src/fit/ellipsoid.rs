@@ -6,6 +6,8 @@ use nalgebra::{Matrix3, Matrix4, SymmetricEigen, Vector3, Vector4};
 const TOLERANCE: f64 = 1e-7;
 /// Steps before giving up; tens to a few thousand are used in practice.
 const STEPS: usize = 200_000;
+/// Points that may all have a weight at first.
+const FEW: usize = 1000;
 /// Rank-one updates between two factorizations from scratch, which bounds the drift of the inverse.
 const REFRESH: usize = 100;
 
@@ -32,9 +34,8 @@ impl Ellipsoid {
 /// Khachiyan's coordinate ascent on the dual with the away steps of Todd and Yıldırım (Discrete Applied Mathematics
 /// 155, 2007), which make it converge linearly. `None` when the points are flat to rounding: condition them first.
 pub fn minimum_ellipsoid(points: &[Vector3<f64>]) -> Option<Ellipsoid> {
-    let count = points.len() as f64;
     let lifted: Vec<Vector4<f64>> = points.iter().map(|p| p.push(1.0)).collect();
-    let mut weights = vec![1.0 / count; points.len()];
+    let mut weights = first_weights(points)?;
     let (mut inverse, mut heights) = heights(&lifted, &weights)?;
     for step in 1..=STEPS {
         let (mut far, mut near) = (0, None::<usize>);
@@ -94,6 +95,32 @@ pub fn minimum_ellipsoid(points: &[Vector3<f64>]) -> Option<Ellipsoid> {
     (reach > 0.0 && reach.is_finite()).then(|| Ellipsoid { center, linear: linear / reach, weights })
 }
 
+/// Equal weights: on all of few points, which keeps their symmetry, and with it the axes of the ellipsoid of a cube; on six that span
+/// the space of many, nearly all of which would have to lose their weight again. Those are the farthest both ways along three
+/// directions, each across the spans found before (Kumar and Yıldırım, J. Optim. Theory Appl. 126, 2005).
+fn first_weights(points: &[Vector3<f64>]) -> Option<Vec<f64>> {
+    if points.len() <= FEW {
+        return Some(vec![1.0 / points.len() as f64; points.len()]);
+    }
+    let mut weights = vec![0.0; points.len()];
+    let mut spans: Vec<Vector3<f64>> = Vec::new();
+    for axis in 0..3 {
+        let mut across = match *spans.as_slice() {
+            [first, second] => first.cross(&second),
+            [first] => Vector3::ith(first.iamin(), 1.0).cross(&first),
+            _ => Vector3::ith(axis, 1.0),
+        };
+        across = across.try_normalize(0.0)?;
+        let heights = || points.iter().map(|p| across.dot(p)).enumerate();
+        let (low, _) = heights().min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let (high, _) = heights().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        weights[low] += 1.0 / 6.0;
+        weights[high] += 1.0 / 6.0;
+        spans.push(points[high] - points[low]);
+    }
+    Some(weights)
+}
+
 /// Inverse of `Σ w q qᵀ` and the heights `qᵀ (Σ w q qᵀ)⁻¹ q`, which are at most 4 at the optimum.
 fn heights(lifted: &[Vector4<f64>], weights: &[f64]) -> Option<(Matrix4<f64>, Vec<f64>)> {
     let scatter: Matrix4<f64> = lifted.iter().zip(weights).map(|(q, w)| q * q.transpose() * *w).sum();
@@ -105,6 +132,7 @@ fn heights(lifted: &[Vector4<f64>], weights: &[f64]) -> Option<(Matrix4<f64>, Ve
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::body::fibonacci_lattice;
 
     #[test]
     fn of_a_cuboid() {
@@ -140,21 +168,19 @@ mod tests {
     #[test]
     fn of_points_on_a_known_ellipsoid() {
         let axes = Vector3::new(3.0, 1.0, 0.2);
-        let points: Vec<_> = (0..400)
-            .map(|i| {
-                let (z, turn) = (1.0 - (2 * i + 1) as f64 / 400.0, i as f64 * 2.399963);
-                let r = (1.0 - z * z).sqrt();
-                Vector3::new(r * turn.cos(), r * turn.sin(), z).component_mul(&axes)
-            })
-            .collect();
-        let ellipsoid = minimum_ellipsoid(&points).unwrap();
-        assert!((ellipsoid.linear - Matrix3::from_diagonal(&axes.map(|a| 1.0 / a))).norm() < 1e-4);
-        assert!(points.iter().all(|p| (ellipsoid.linear * (p - ellipsoid.center)).norm() <= 1.0 + 1e-15));
+        for count in [400, 20_000] {
+            let points: Vec<_> = fibonacci_lattice(count).map(|u| u.component_mul(&axes)).collect();
+            let ellipsoid = minimum_ellipsoid(&points).unwrap();
+            assert!((ellipsoid.linear - Matrix3::from_diagonal(&axes.map(|a| 1.0 / a))).norm() < 1e-4, "{count}");
+            assert!(points.iter().all(|p| (ellipsoid.linear * (p - ellipsoid.center)).norm() <= 1.0 + 1e-15));
+        }
     }
 
     #[test]
     fn flat_points_have_none() {
-        let points: Vec<_> = (0..20).map(|i| Vector3::new((i as f64).sin(), (i as f64).cos(), 0.0)).collect();
-        assert!(minimum_ellipsoid(&points).is_none());
+        for count in [20, 2000] {
+            let points: Vec<_> = (0..count).map(|i| Vector3::new((i as f64).sin(), (i as f64).cos(), 0.0)).collect();
+            assert!(minimum_ellipsoid(&points).is_none(), "{count}");
+        }
     }
 }

@@ -20,8 +20,12 @@ const ROUGH_GAP: f64 = 1e-3;
 const PREPARATIONS: usize = 3;
 /// See [`PREPARATIONS`].
 const PREPARED: f64 = 1e-3;
-/// Points in the start, in multiples of N.
+/// Points in the start, in multiples of N, and the most that are taken for likely.
 const SPREAD: usize = 10;
+/// See [`SPREAD`].
+const LIKELY: usize = 5;
+/// Points added together have at least this distance; the frame is whitened.
+const SPACING: f64 = 0.05;
 /// Growth of τ from one centre to the next.
 const GROWTH: f64 = 10.0;
 /// Newton steps on one path before settling for what there is.
@@ -45,10 +49,16 @@ pub(super) struct Optimum {
 }
 
 /// Minimises the objective over p, sos-convex as far as the problem asks for it, with `p <= 1` at `points` (whitened: the unit ball is their smallest
-/// ellipsoid).
-pub(super) fn generate(problem: Problem, points: &[Vector3<f64>], watch: &mut Watch) -> Result<Optimum, FitError> {
+/// ellipsoid). The program begins with the points that are `likely` to bound p, the likeliest first, among others; they change the
+/// answer only within its gap.
+pub(super) fn generate(
+    problem: Problem,
+    points: &[Vector3<f64>],
+    likely: &[usize],
+    watch: &mut Watch,
+) -> Result<Optimum, FitError> {
     let structure = problem.structure;
-    let mut active = Active::start(&problem, points);
+    let mut active = Active::start(&problem, points, likely);
     let mut worst = 0.0;
     for round in 1..=ROUNDS {
         // Points come in while the optimum is still rough.
@@ -104,6 +114,17 @@ fn violations(structure: &Structure, points: &[Vector3<f64>], coefficients: &DVe
     outside
 }
 
+/// The first of some points that are not close to one before, at most so many.
+fn apart(points: &[Vector3<f64>], candidates: impl Iterator<Item = usize>, most: usize) -> Vec<usize> {
+    let mut taken: Vec<usize> = Vec::new();
+    for index in candidates {
+        if taken.len() < most && taken.iter().all(|&other| (points[other] - points[index]).norm() > SPACING) {
+            taken.push(index);
+        }
+    }
+    taken
+}
+
 /// The points a program knows.
 struct Active {
     /// Which of the points are in.
@@ -114,22 +135,25 @@ struct Active {
 }
 
 impl Active {
-    /// A well-spread subset, and for convex p as many points inside the hull: those constrain nothing, but with weight on them the
-    /// moments are positive definite also when the points lie on a quadric, as the corners of a box do.
-    fn start(problem: &Problem, points: &[Vector3<f64>]) -> Self {
+    /// The likeliest points and a well-spread subset, and for convex p as many points inside the hull: those constrain nothing, but
+    /// with weight on them the moments are positive definite also when the points lie on a quadric, as the corners of a box do.
+    fn start(problem: &Problem, points: &[Vector3<f64>], likely: &[usize]) -> Self {
         let structure = problem.structure;
         let wanted = (SPREAD * structure.gram.size).min(points.len());
         let mut used = vec![false; points.len()];
         let mut distance = vec![f64::INFINITY; points.len()];
         let mut chosen = Vec::new();
-        let mut next = (0..points.len()).max_by(|&a, &b| points[a].norm().total_cmp(&points[b].norm())).unwrap_or(0);
+        let outermost = (0..points.len()).max_by(|&a, &b| points[a].norm().total_cmp(&points[b].norm())).unwrap_or(0);
+        let likely = apart(points, likely.iter().copied(), LIKELY * structure.gram.size);
+        let mut first = likely.into_iter().chain([outermost]);
         while chosen.len() < wanted {
+            let spread = || (0..points.len()).max_by(|&a, &b| distance[a].total_cmp(&distance[b])).unwrap_or(0);
+            let next = first.next().unwrap_or_else(spread);
             used[next] = true;
             chosen.push(points[next]);
             for (d, point) in distance.iter_mut().zip(points) {
                 *d = d.min((point - points[next]).norm());
             }
-            next = (0..points.len()).max_by(|&a, &b| distance[a].total_cmp(&distance[b])).unwrap_or(0);
         }
         if problem.is_convex() {
             chosen.extend(inner(structure, &chosen));
@@ -140,16 +164,10 @@ impl Active {
 
     /// Adds the worst of the points outside, but not many from one spot.
     fn add(&mut self, structure: &Structure, points: &[Vector3<f64>], outside: &[(f64, usize)]) {
-        let limit = 2 * structure.gram.size;
-        let mut added: Vec<Vector3<f64>> = Vec::new();
-        for &(_, index) in outside {
-            let point = points[index];
-            if added.len() < limit && !self.used[index] && added.iter().all(|other| (other - point).norm() > 0.05) {
-                self.used[index] = true;
-                added.push(point);
-            }
-        }
-        self.chosen.extend(added);
+        let candidates = outside.iter().map(|&(_, index)| index).filter(|&index| !self.used[index]);
+        let added = apart(points, candidates, 2 * structure.gram.size);
+        added.iter().for_each(|&index| self.used[index] = true);
+        self.chosen.extend(added.into_iter().map(|index| points[index]));
         self.values = columns(structure, &self.chosen);
     }
 }
@@ -162,14 +180,19 @@ fn columns(structure: &Structure, points: &[Vector3<f64>]) -> DMatrix<f64> {
 /// positive definite also where there are few points, or points on a quadric.
 pub(super) fn inner(structure: &Structure, points: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let mix = |i: usize| {
-        // four points from different quarters of them, with weights that change from one mix to the next
-        let corner = |k: usize| points[(i + k * (points.len() / 4).max(1)) % points.len()];
-        let shares = [0.618_034, 0.754_878, 0.569_840, 0.819_173].map(|step| fraction(i, step).powi(3) + 0.01);
+        // Four points of all, whatever their order is, with weights that change from one mix to the next.
+        let corner = |k: usize| points[(fraction(i, CORNERS[k]) * points.len() as f64) as usize];
+        let shares = SHARES.map(|step| fraction(i, step).powi(3) + 0.01);
         let total: f64 = shares.iter().sum();
         (0..4).map(|k| corner(k) * (shares[k] / total)).sum()
     };
     (0..2 * structure.gram.size).map(mix).collect()
 }
+
+/// Steps of low-discrepancy sequences.
+const CORNERS: [f64; 4] = [0.856_675, 0.733_892, 0.628_707, 0.538_597];
+/// See [`CORNERS`].
+const SHARES: [f64; 4] = [0.618_034, 0.754_878, 0.569_840, 0.819_173];
 
 /// Low-discrepancy sequence in the unit interval.
 fn fraction(index: usize, step: f64) -> f64 {

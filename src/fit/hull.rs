@@ -1,7 +1,7 @@
 //! Convex hull of the input points: only its vertices constrain a convex polynomial.
 
+use super::facing::Facing;
 use super::outermost::outermost;
-use super::support::height;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use parry3d_f64::math::Vector as GlamVector;
 use parry3d_f64::transformation::try_convex_hull;
@@ -204,18 +204,18 @@ fn volume(points: &[Vector3<f64>], facets: &[[usize; 3]]) -> f64 {
     facets.iter().map(|&[a, b, c]| points[a].dot(&points[b].cross(&points[c]))).sum::<f64>() / 6.0
 }
 
-/// How far the farthest point lies outside a facet's plane; the points have extents near 1.
+/// How far the farthest point lies outside the plane of a facet that it faces; the points have extents near 1. Infinite if the facets
+/// enclose nothing.
 fn excess(points: &[Vector3<f64>], facets: &[[usize; 3]]) -> f64 {
-    let mut worst = 0.0_f64;
-    for &[a, b, c] in facets {
-        let normal = (points[b] - points[a]).cross(&(points[c] - points[a]));
-        let length = normal.norm();
-        // slivers have no direction to speak of
-        if length > 1e-9 {
-            worst = worst.max((height(points, &normal) - normal.dot(&points[a])) / length);
-        }
-    }
-    worst
+    // Slivers have no direction to speak of.
+    let planes = facets.iter().filter_map(|&[a, b, c]| {
+        let normal = (points[b] - points[a]).cross(&(points[c] - points[a])).try_normalize(1e-9)?;
+        Some((normal, normal.dot(&points[a])))
+    });
+    let corners = facets.iter().flatten().map(|&corner| points[corner]);
+    let center = corners.sum::<Vector3<f64>>() / (3 * facets.len()).max(1) as f64;
+    let Some(facing) = Facing::new(center, planes) else { return f64::INFINITY };
+    points.iter().map(|x| facing.beyond(x)).fold(0.0, f64::max)
 }
 
 /// A fixed pseudo-random vector in the unit cube for each index.

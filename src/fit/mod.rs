@@ -19,6 +19,7 @@ mod descent;
 mod dominance;
 pub mod ellipsoid;
 mod enclose;
+mod facing;
 mod factor;
 mod gap;
 mod generate;
@@ -363,6 +364,24 @@ pub fn fit(
 ) -> Result<Fit, FitError> {
     options.check(name)?;
     let object = Object::new(name, points, &options.input)?;
+    object.cut(object.fit(options, progress)?, options.slabs, 0.0, progress)
+}
+
+/// As [`fit()`], of points that have changed a little since `previous` was fitted, as those of the next scan of a stream: the program
+/// begins with the points near the surface of that body, which saves it rounds of looking for those that bound the new one. The
+/// answer is that of a fit from scratch within the optimality gap, whatever the body is.
+///
+/// # Errors
+/// As [`fit()`].
+pub fn refit(
+    previous: &Body,
+    points: &[Vector3<f64>],
+    options: &FitOptions,
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+) -> Result<Fit, FitError> {
+    options.check(previous.name())?;
+    let object = Object::new(previous.name(), points, &options.input)?;
+    object.begin_with(previous);
     object.cut(object.fit(options, progress)?, options.slabs, 0.0, progress)
 }
 

@@ -17,11 +17,15 @@ use super::{Cone, DEFAULT_MARGIN, Fit, FitError, FitOptions, FitReport, MARGIN_A
 use crate::body::{Body, BodyError, Constraint, Normalization, Placement, Provenance, Volume};
 use crate::polynomial::{HessianGram, Polynomial};
 use nalgebra::{Matrix3, Vector3};
+use std::cell::RefCell;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
 /// What the smallest ball is said to minimise.
 const BALL: &str = "radius";
+
+/// Vertices where a body's constraint is above this are likely to bound the next body.
+const NEAR: f64 = 0.9;
 
 /// Points with what every fit around them needs.
 pub(super) struct Object<'a> {
@@ -36,6 +40,8 @@ pub(super) struct Object<'a> {
     normalization: Normalization,
     /// The vertices there.
     whitened: Vec<Vector3<f64>>,
+    /// Indices of vertices that are likely to bound the next fit, the likeliest first.
+    likely: RefCell<Vec<usize>>,
     /// The points are known up to this distance, metres: bodies hold the balls around them.
     clearance: f64,
     /// What all this took.
@@ -53,12 +59,31 @@ impl<'a> Object<'a> {
         let normalization = whitening(&hull.frame, &ellipsoid).ok_or(ProgramError::Singular)?;
         let whitened = vertices.iter().map(|x| normalization.linear * (x - normalization.center)).collect();
         let seconds = start.elapsed().as_secs_f64();
-        Ok(Self { name, points, input, hull, vertices, normalization, whitened, clearance: 0.0, seconds })
+        Ok(Self {
+            name,
+            points,
+            input,
+            hull,
+            vertices,
+            normalization,
+            whitened,
+            likely: RefCell::default(),
+            clearance: 0.0,
+            seconds,
+        })
     }
 
     /// The same object of points that are only known up to a distance, metres.
     pub(super) fn around(self, clearance: f64) -> Self {
         Self { clearance, ..self }
+    }
+
+    /// Lets the next fit begin with the vertices near the surface of a body, or outside of it.
+    pub(super) fn begin_with(&self, body: &Body) {
+        let values = self.vertices.iter().map(|x| body.value(x)).enumerate();
+        let mut near: Vec<(usize, f64)> = values.filter(|(_, value)| *value > NEAR).collect();
+        near.sort_by(|a, b| b.1.total_cmp(&a.1));
+        self.likely.replace(near.into_iter().map(|(index, _)| index).collect());
     }
 
     /// Its name.
@@ -107,12 +132,12 @@ impl<'a> Object<'a> {
         let structure = Structure::new(degree);
         let coordinates = self.coordinates(Coordinates::Unit)?;
         let problem = Problem::new(&structure, Objective::LogDetP, &coordinates, DEFAULT_MARGIN);
-        let optimum = generate(problem, &self.whitened, watch)?;
+        let optimum = generate(problem, &self.whitened, &[], watch)?;
         let value = |x: &Vector3<f64>| structure.values(&self.whiten(x)).dot(&optimum.coefficients);
         Ok(self.points.iter().map(value).collect())
     }
 
-    /// The body of one polynomial with the least objective, refined as asked for.
+    /// The body of one polynomial with the least objective, refined as asked for. The next fit begins with what bounds this one.
     pub(super) fn fit(
         &self,
         options: &FitOptions,
@@ -142,6 +167,7 @@ impl<'a> Object<'a> {
             Cone::Sos => options.objective.name().to_owned(),
             cone => format!("volume, {cone}"),
         };
+        self.begin_with(&body);
         let (body, gap) = self.finish(body, &made, options.refine && volumes.len() > 1);
         let report = FitReport {
             degree: options.degree,
@@ -174,7 +200,7 @@ impl<'a> Object<'a> {
     ) -> Result<(Optimum, Vec<f64>, Option<RefinementEnd>), FitError> {
         let coordinates = self.coordinates(options.coordinates)?;
         let problem = Problem::new(structure, options.objective, &coordinates, margin);
-        let optimum = generate(problem, &self.whitened, watch)?;
+        let optimum = generate(problem, &self.whitened, &self.likely.borrow(), watch)?;
         if !options.refine {
             return Ok((optimum, Vec::new(), None));
         }

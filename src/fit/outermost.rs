@@ -4,58 +4,87 @@
 //! Toussaint, A fast convex hull algorithm, Inf. Process. Lett. 7, 1978). More directions, for the fewer points that are left,
 //! leave fewer still.
 
+use super::facing::{Facing, cell_count, cell_of};
 use super::hull::facets;
 use crate::body::fibonacci_lattice;
 use nalgebra::Vector3;
 
 /// Fewer points than this are not worth the work.
 const MANY: usize = 4096;
-/// Directions of the first polytope and of the second.
-const DIRECTIONS: [usize; 2] = [64, 512];
+
+/// How corners of the polytopes are chosen, one after the other.
+const CHOICES: [Choice; 3] = [Choice::Extreme(64), Choice::Extreme(512), Choice::Farthest(24)];
+
 /// How deep inside the polytope a point must lie to be left out; the points have extents near 1, and rounding is far below.
 const DEPTH: f64 = 1e-9;
+
+/// Which points span a polytope.
+enum Choice {
+    /// The extreme ones along as many directions: finds the corners of an object.
+    Extreme(usize),
+    /// The farthest from the middle in each cell of directions, by cells along the edge of a cube: follows smooth surfaces, which
+    /// takes many.
+    Farthest(usize),
+}
 
 /// Indices of the points that may be vertices of the convex hull, ascending; the others lie inside the hull of these. The points
 /// have extents near 1.
 pub(super) fn outermost(points: &[Vector3<f64>]) -> Vec<usize> {
     let mut left: Vec<usize> = (0..points.len()).collect();
-    for count in DIRECTIONS {
+    for choice in CHOICES {
         if left.len() < MANY {
             break;
         }
-        let planes = planes(points, &left, count);
-        // Without planes nothing is known to be inside.
-        left.retain(|&i| planes.is_empty() || planes.iter().any(|(normal, offset)| normal.dot(&points[i]) > *offset));
+        // Without a polytope nothing is known to be inside.
+        if let Some(polytope) = polytope(points, &choice.among(points, &left)) {
+            left.retain(|&i| polytope.beyond(&points[i]) > -DEPTH);
+        }
     }
     left
 }
 
-/// The planes of the polytope of the extreme points along `count` directions, moved inwards: `normal·x <= offset` inside. None if the
-/// hull code fails.
-fn planes(points: &[Vector3<f64>], left: &[usize], count: usize) -> Vec<(Vector3<f64>, f64)> {
-    let directions: Vec<Vector3<f64>> = fibonacci_lattice(count).collect();
-    let mut best = vec![(f64::NEG_INFINITY, 0); count];
-    for &i in left {
-        for (best, direction) in best.iter_mut().zip(&directions) {
-            let height = direction.dot(&points[i]);
+impl Choice {
+    fn among(&self, points: &[Vector3<f64>], left: &[usize]) -> Vec<usize> {
+        let places = match *self {
+            Self::Extreme(count) => count,
+            Self::Farthest(grid) => cell_count(grid),
+        };
+        let mut best = vec![(f64::NEG_INFINITY, 0); places];
+        let mut compete = |place: usize, height: f64, i: usize| {
+            let best: &mut (f64, usize) = &mut best[place];
             if height > best.0 {
                 *best = (height, i);
             }
+        };
+        match *self {
+            Self::Extreme(count) => {
+                let directions: Vec<Vector3<f64>> = fibonacci_lattice(count).collect();
+                for &i in left {
+                    directions.iter().enumerate().for_each(|(k, direction)| compete(k, direction.dot(&points[i]), i));
+                }
+            }
+            Self::Farthest(grid) => {
+                left.iter().for_each(|&i| compete(cell_of(&points[i], grid), points[i].norm_squared(), i));
+            }
         }
+        let mut chosen: Vec<usize> = best.iter().filter(|best| best.0.is_finite()).map(|&(_, i)| i).collect();
+        chosen.sort_unstable();
+        chosen.dedup();
+        chosen
     }
-    let mut extreme: Vec<usize> = best.iter().map(|&(_, i)| i).collect();
-    extreme.sort_unstable();
-    extreme.dedup();
-    let corners: Vec<Vector3<f64>> = extreme.iter().map(|&i| points[i]).collect();
-    let Ok((_, triangles)) = facets(&corners) else { return Vec::new() };
-    let planes = triangles.iter().filter_map(|&[a, b, c]| {
-        let normal = (corners[b] - corners[a]).cross(&(corners[c] - corners[a]));
-        let normal = normal.try_normalize(1e-12)?;
-        Some((normal, normal.dot(&corners[a]) - DEPTH))
+}
+
+/// The convex hull of few points; none if the hull code fails.
+fn polytope(points: &[Vector3<f64>], chosen: &[usize]) -> Option<Facing> {
+    let corners: Vec<Vector3<f64>> = chosen.iter().map(|&i| points[i]).collect();
+    let (_, triangles) = facets(&corners).ok()?;
+    let planes = triangles.iter().map(|&[a, b, c]| {
+        let normal = (corners[b] - corners[a]).cross(&(corners[c] - corners[a])).try_normalize(1e-12)?;
+        Some((normal, normal.dot(&corners[a])))
     });
     // A sliver has no plane to speak of, and without it the polytope would be larger than it is.
-    let planes: Vec<_> = planes.collect();
-    if planes.len() == triangles.len() { planes } else { Vec::new() }
+    let planes: Option<Vec<_>> = planes.collect();
+    Facing::new(corners.iter().sum::<Vector3<f64>>() / corners.len() as f64, planes?.into_iter())
 }
 
 #[cfg(test)]

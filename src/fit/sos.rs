@@ -190,7 +190,7 @@ fn relaxed(
     loop {
         let margin = margins.next().unwrap_or(DEFAULT_MARGIN);
         let problem = Problem::new(&structure, objective, &map, margin).relaxed(power.as_ref());
-        let Optimum { coefficients, hessian, gram, gap, objective } = generate(problem, whitened, watch)?;
+        let Optimum { coefficients, hessian, gram, gap, objective } = generate(problem, whitened, &[], watch)?;
         let relaxation = |polynomial: &Polynomial| {
             let Some(power) = &power else { return Ok(None) };
             let gram = HessianGram::nearest_with(polynomial, power, structure.hessian_basis.clone(), hessian.clone())

@@ -8,7 +8,6 @@
 use super::hull::{principal_axes, rough_volume};
 use crate::body::{Cut, Piece, Sphere};
 use nalgebra::Vector3;
-use std::cell::OnceCell;
 
 /// Heights tried per direction.
 const HEIGHTS: usize = 15;
@@ -31,8 +30,18 @@ pub(super) struct Partition {
     pub(super) cuts: Vec<Cut>,
     /// The pieces they leave, numbered as they say.
     pub(super) pieces: Vec<Piece>,
-    /// The best cut of each piece, once it was looked for; none if nothing is gained by any.
-    plans: Vec<OnceCell<Option<Plan>>>,
+    /// What is known of the best cut of each piece.
+    plans: Vec<Best>,
+}
+
+/// The best cut of a piece.
+enum Best {
+    /// It was not looked for yet.
+    Unknown,
+    /// Nothing is gained by any.
+    Nothing,
+    /// The one that gains most.
+    Cut(Plan),
 }
 
 /// A cut of a piece.
@@ -47,23 +56,29 @@ struct Plan {
 impl Partition {
     /// The mesh in one piece.
     pub(super) fn new(mesh: Piece) -> Self {
-        Self { cuts: Vec::new(), pieces: vec![mesh], plans: vec![OnceCell::new()] }
+        Self { cuts: Vec::new(), pieces: vec![mesh], plans: vec![Best::Unknown] }
     }
 
     /// Makes the cut that gains most; tells whether there was one.
     pub(super) fn divide(&mut self) -> bool {
-        let gain = |part: usize| {
-            let plan = self.plans[part].get_or_init(|| plan(&self.pieces[part]));
-            plan.as_ref().map_or(0.0, |plan| plan.gain)
-        };
-        let Some(part) = (0..self.pieces.len()).max_by(|&a, &b| gain(a).total_cmp(&gain(b))) else { return false };
-        let Some(Plan { normal, height, sides: [below, above], .. }) = self.plans[part].take().flatten() else {
+        for (piece, best) in self.pieces.iter().zip(&mut self.plans) {
+            if let Best::Unknown = best {
+                *best = plan(piece).map_or(Best::Nothing, Best::Cut);
+            }
+        }
+        let gain = |best: &Best| if let Best::Cut(plan) = best { plan.gain } else { 0.0 };
+        let part = (0..self.plans.len()).max_by(|&a, &b| gain(&self.plans[a]).total_cmp(&gain(&self.plans[b])));
+        let Some(part) = part else { return false };
+        let Best::Cut(Plan { normal, height, sides: [below, above], .. }) =
+            std::mem::replace(&mut self.plans[part], Best::Unknown)
+        else {
+            self.plans[part] = Best::Nothing;
             return false;
         };
         self.cuts.push(Cut { part, normal: normal.into(), height_m: height });
         self.pieces[part] = below;
         self.pieces.push(above);
-        self.plans.push(OnceCell::new());
+        self.plans.push(Best::Unknown);
         true
     }
 }

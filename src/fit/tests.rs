@@ -102,7 +102,7 @@ fn the_optimum_is_feasible_and_its_bound_holds() {
         let structure = Structure::new(degree);
         let unit = Affine { linear: Matrix3::identity(), offset: Vector3::zeros() };
         let problem = Problem::new(&structure, Objective::LogDetP, &unit, margin);
-        let optimum = generate(problem, &whitened, &mut Watch::new(&mut unwatched)).unwrap();
+        let optimum = generate(problem, &whitened, &[], &mut Watch::new(&mut unwatched)).unwrap();
         assert!(optimum.gap.unwrap().abs() < 1e-5);
         assert!(optimum.hessian.symmetric_eigenvalues().min() > 0.5 * margin);
         for z in &whitened {
@@ -259,6 +259,35 @@ fn refinement_is_monotone_contains_the_points_and_is_proven() {
         let again = Body::from_json(&body.to_json()).unwrap();
         assert!(again.provenance().unwrap().refined);
     }
+}
+
+#[test]
+fn refits_of_a_stream_take_fewer_steps_and_end_where_fits_do() {
+    let shape = blob(3000);
+    let (mut anew, mut on) = (0, 0);
+    let mut last: Option<Fit> = None;
+    for frame in 0..8 {
+        // It bends and swells a little from frame to frame.
+        let t = 0.02 * f64::from(frame);
+        let points: Vec<_> = shape.iter().map(|x| x * (1.0 + 0.5 * t) + Vector3::x() * (t * x.y * x.y)).collect();
+        let fit = fitted(&points, 4);
+        let options = FitOptions { degree: 4, ..FitOptions::default() };
+        let previous = last.as_ref().unwrap_or(&fit);
+        let refit = refit(&previous.body, &points, &options, &mut unwatched).unwrap();
+        refit.body.prove_contains(&points).unwrap();
+        let ratio = refit.report.volume_m3 / fit.report.volume_m3;
+        assert!((ratio - 1.0).abs() < 1e-4, "frame {frame}: {ratio}");
+        anew += fit.report.iterations;
+        on += refit.report.iterations;
+        last = Some(refit);
+    }
+    println!("{anew} steps anew, {on} from the body before");
+    assert!(on < anew, "{on} {anew}");
+    // A body that has nothing to do with the points does no harm.
+    let elsewhere = fitted(&cube(1.0), 2);
+    let options = FitOptions { degree: 4, ..FitOptions::default() };
+    let far: Vec<_> = shape.iter().map(|x| x + Vector3::repeat(100.0)).collect();
+    refit(&elsewhere.body, &far, &options, &mut unwatched).unwrap().body.prove_contains(&far).unwrap();
 }
 
 #[test]

@@ -4,14 +4,16 @@
 //! CANCELLED on disk first and stopped then; the result of a fit counts only if its job is still running when it comes. So
 //! nothing depends on when the fit hears of it, and a kill at any time leaves a state that was acknowledged.
 //!
-//! `order` is what can be asked for; `worker` fits one job after the other; `board` is where it tells how far it is,
-//! and where everybody waits for news.
+//! `order` is what can be asked for, `carry_out` does it, for whoever asks; `worker` does one job after the other; `board` is where it
+//! tells how far it is, and where everybody waits for news.
 
 mod board;
+mod carry_out;
 mod order;
 mod worker;
 
 pub use board::{Board, Phase, Progress};
+pub use carry_out::{Failure, Made, Shapes, body_name, fit_group, fit_mesh};
 pub use order::{MESH_FORMATS, OrderError, check, read_mesh};
 
 use std::sync::Arc;
@@ -40,8 +42,9 @@ impl Jobs {
     /// # Errors
     /// When there is no such job, or when the disk fails.
     pub fn cancel(&self, catalogue: &Catalogue, id: u64) -> Result<Arc<Job>, CatalogueError> {
-        let job = catalogue
-            .change_job(id, Vec::new(), |job| (!job.state.is_final()).then_some((JobState::Cancelled, job.attempts)))?;
+        let job = catalogue.change_job(id, Vec::new(), None, |job| {
+            (!job.state.is_final()).then_some((JobState::Cancelled, job.attempts))
+        })?;
         self.tell(|board| board.stop(id));
         Ok(job)
     }

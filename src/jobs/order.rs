@@ -1,19 +1,20 @@
-//! What a job is asked for, checked and carried out.
+//! What a job is asked for, checked before any work.
 
-use std::ops::ControlFlow;
 use std::path::Path;
 
-use nalgebra::Vector3;
-
-use super::Phase;
-use crate::body::{Body, check_name};
+use super::carry_out::body_name;
+use crate::body::check_name;
 use crate::fit::{
-    self, FitError, FitOptions, Objective, Progress, ReadError, Rung, Trimmed, coarsest_within, ladder, thicken, trim,
+    self, Cone, Coordinates, EncloseError, EncloseOptions, FitError, FitOptions, MAX_PIECES, MAX_SETS, Mesh, Objective,
+    ReadError, SosMethod, SosOptions,
 };
-use crate::store::{FitOptimum, FitOrder, FitOutcome, FittedBody, MAX_REQUEST_ID_BYTES};
+use crate::store::{FitGroup, FitOrder, MAX_REQUEST_ID_BYTES};
 
 /// Endings of the mesh formats that can be read.
 pub use crate::fit::read::FORMATS as MESH_FORMATS;
+
+/// Degree of bodies around groups unless told otherwise: multipliers make higher ones slow.
+const GROUP_DEGREE: usize = 4;
 
 /// A field of an order that can not be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -26,12 +27,21 @@ pub struct OrderError {
 }
 
 impl OrderError {
-    fn new(field: &'static str, why: impl ToString) -> Self {
+    pub(super) fn new(field: &'static str, why: impl ToString) -> Self {
         let why = why.to_string();
         // Fits name their options themselves.
-        let why = why.strip_prefix(field).and_then(|why| why.strip_prefix(": ")).unwrap_or(&why).to_owned();
+        let words = field.trim_start_matches("group.").replace('_', " ");
+        let why = why.strip_prefix(&words).and_then(|why| why.strip_prefix(": ")).unwrap_or(&why).to_owned();
         Self { field, why }
     }
+}
+
+/// How points become what is asked for.
+pub(super) enum Way {
+    /// Bodies, or a compound of some.
+    Convex(FitOptions),
+    /// A set that need not be convex.
+    Relaxed(SosOptions),
 }
 
 /// Checks an order before any work, and the request's id.
@@ -57,15 +67,32 @@ pub fn check(request_id: &str, order: &FitOrder) -> Result<(), OrderError> {
         }
     }
     if !(0.0..=0.5).contains(&order.trim) {
-        return Err(OrderError::new("trim", format!("is {}; send a fraction of 0 to 0.5, such as 0.01", order.trim)));
+        return Err(OrderError::new("trim", FitError::Trim(order.trim)));
     }
-    if order.max_gap_m.is_some() && (order.ladder || order.slabs > 0) {
-        return Err(OrderError::new("max_gap_m", "chooses degree and slabs itself; leave out ladder and slabs"));
+    if let Some(group) = &order.group {
+        return check_group(order, group);
     }
-    options(order)?.check(&order.name).map_err(|error| {
+    let checked = match way(order)? {
+        Way::Convex(options) => {
+            check_parts(order)?;
+            options.check(&order.name)
+        }
+        Way::Relaxed(options) => {
+            if order.refine || order.ladder || order.slabs > 0 || order.max_gap_m.is_some() || order.parts.is_some() {
+                return Err(unfit(order, "refinement, ladder, slabs, parts and max gap need convex bodies"));
+            }
+            if order.cone != Cone::default().name() {
+                return Err(unfit(order, "the cones sdsos and dsos make convex bodies"));
+            }
+            options.check(&order.name)
+        }
+    };
+    checked.map_err(|error| {
         let field = match error {
             FitError::Degree(_) => "degree",
-            FitError::Objective { .. } => "objective",
+            FitError::Objective { .. } | FitError::RelaxedObjective(_) => "objective",
+            FitError::Relaxation(_) => "relax_convexity",
+            FitError::Cone(_) => "cone",
             FitError::Slabs(_) => "slabs",
             _ => "name",
         };
@@ -73,60 +100,93 @@ pub fn check(request_id: &str, order: &FitOrder) -> Result<(), OrderError> {
     })
 }
 
-/// The vertices of a mesh file in one of [`MESH_FORMATS`], metres; `input` names it in errors, `scale` is metres per unit.
+/// What does not go with a set that need not be convex.
+fn unfit(order: &FitOrder, why: &str) -> OrderError {
+    let field = if order.relax_convexity == 0.0 { "objective" } else { "relax_convexity" };
+    OrderError::new(field, format!("{why}; leave them out, or relaxed convexity and inverse-moment"))
+}
+
+fn check_parts(order: &FitOrder) -> Result<(), OrderError> {
+    if order.max_gap_m.is_some() && (order.ladder || order.slabs > 0 || order.parts.is_some()) {
+        let why = "chooses degree, slabs and parts itself; leave out ladder, slabs and parts";
+        return Err(OrderError::new("max_gap_m", why));
+    }
+    match order.parts {
+        Some(parts) if !(1..=MAX_PIECES).contains(&parts) => Err(OrderError::new("parts", FitError::Parts(parts))),
+        Some(_) if order.ladder || order.trim > 0.0 || order.min_thickness_m.is_some() => {
+            Err(OrderError::new("parts", "cut the mesh as it is; leave out ladder, trimming and thickness, or parts"))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn check_group(order: &FitOrder, group: &FitGroup) -> Result<(), OrderError> {
+    let FitOrder { name, input, degree, .. } = order.clone();
+    if (FitOrder { group: None, ..order.clone() }) != (FitOrder { name, input, degree, ..FitOrder::default() }) {
+        let why = "is about stored bodies, which options of points do not change; leave out all but the degree";
+        return Err(OrderError::new("group", why));
+    }
+    let count = group.body_ids.len();
+    if count == 0 || (group.max_growth.is_none() && count > MAX_SETS) {
+        let why = format!("has {count} bodies; name 1 to {MAX_SETS}, or more with a max growth, which makes several");
+        return Err(OrderError::new("group.body_ids", why));
+    }
+    if let Some(growth) = group.max_growth.filter(|growth| !(*growth > 0.0 && growth.is_finite())) {
+        return Err(OrderError::new("group.max_growth", EncloseError::Growth(growth)));
+    }
+    check_name(&body_name(order, count - 1)).map_err(|error| OrderError::new("name", error))?;
+    enclosing(order, group).check().map_err(|error| {
+        let field =
+            if matches!(error, EncloseError::MultiplierDegree(_)) { "group.multiplier_degree" } else { "degree" };
+        OrderError::new(field, error)
+    })
+}
+
+/// Points, metres, and triangles of a mesh file in one of [`MESH_FORMATS`]; `input` names it in errors, `scale` is metres per unit.
 ///
 /// # Errors
 /// What is wrong with the file, and where.
-pub fn read_mesh(bytes: &[u8], format: &str, input: &str, scale: f64) -> Result<Vec<Vector3<f64>>, ReadError> {
+pub fn read_mesh(bytes: &[u8], format: &str, input: &str, scale: f64) -> Result<Mesh, ReadError> {
     let name = if input.is_empty() { "the mesh" } else { input };
-    Ok(fit::read::parse(bytes, format, Path::new(name), scale)?.points)
+    fit::read::parse(bytes, format, Path::new(name), scale)
 }
 
-/// Carries out an order. `progress` can stop it.
-///
-/// # Errors
-/// As [`fit()`](fit::fit()).
-pub(super) fn carry_out(
-    order: &FitOrder,
-    points: &[Vector3<f64>],
-    mut progress: impl FnMut(Phase, Progress) -> ControlFlow<()>,
-) -> Result<(FitOutcome, Vec<Body>), FitError> {
-    let options = options(order).map_err(|_| FitError::Degree(0))?;
-    let thick = order.min_thickness_m.map_or(points.into(), |least_m| thicken(points, least_m));
-    let trimmed = if order.trim > 0.0 {
-        trim(&thick, order.trim, &mut |said| progress(Phase::Trimming, said))?
-    } else {
-        Trimmed { kept: thick.into_owned(), left_out: Vec::new(), farthest_m: 0.0 }
+/// How to carry out an order about points.
+pub(super) fn way(order: &FitOrder) -> Result<Way, OrderError> {
+    let is_moment = order.objective == SosMethod::InverseMoment.name();
+    if is_moment && order.relax_convexity != 0.0 {
+        let why = "inverse-moment asks for no convexity; leave one of the two out";
+        return Err(OrderError::new("relax_convexity", why));
+    }
+    let objective: Objective = match order.objective.parse() {
+        Ok(objective) => objective,
+        Err(_) if is_moment => Objective::default(),
+        Err(error) => return Err(OrderError::new("objective", error)),
     };
-    let (name, points, mut tell) = (&order.name, &trimmed.kept, |said| progress(Phase::Fitting, said));
-    let rungs = match order.max_gap_m {
-        Some(max_gap_m) => vec![coarsest_within(name, points, max_gap_m, &options, &mut tell)?],
-        None if order.ladder => ladder(name, points, &options, &mut tell)?,
-        None => vec![fit::fit(name, points, &options, &mut tell)?.into()],
-    };
-    let bodies = rungs.iter().map(fitted).collect();
-    let outcome = FitOutcome { bodies, left_out: trimmed.left_out.len(), left_out_m: trimmed.farthest_m };
-    Ok((outcome, rungs.into_iter().map(|rung| rung.body).collect()))
-}
-
-fn fitted(Rung { body, gap, seconds, report }: &Rung) -> FittedBody {
-    let optimum = report.as_ref().map(|report| FitOptimum {
-        objective_value: report.objective_value,
-        optimality_gap: report.optimality_gap,
-        refinement_end: report.refinement_end.map(|end| end.to_string()),
-    });
-    FittedBody { id: body.id().to_string(), gap_m: gap.most_m, mean_gap_m: gap.mean_m, seconds: *seconds, optimum }
-}
-
-fn options(order: &FitOrder) -> Result<FitOptions, OrderError> {
-    let objective: Objective = order.objective.parse().map_err(|error| OrderError::new("objective", error))?;
+    let cone: Cone = order.cone.parse().map_err(|error| OrderError::new("cone", error))?;
+    let coordinates = if order.raw_frame { Coordinates::Raw } else { Coordinates::Unit };
+    let input = order.input.clone();
+    if order.is_relaxed() {
+        let degree = order.degree.unwrap_or(FitOptions::default().degree);
+        let c = order.relax_convexity;
+        let method = if is_moment { SosMethod::InverseMoment } else { SosMethod::Relaxed { c, objective } };
+        return Ok(Way::Relaxed(SosOptions { degree, method, coordinates, input }));
+    }
     let climbs = order.ladder || order.max_gap_m.is_some();
-    Ok(FitOptions {
+    Ok(Way::Convex(FitOptions {
         degree: order.degree.unwrap_or(if climbs { objective.max_degree() } else { FitOptions::default().degree }),
         objective,
+        coordinates,
+        cone,
         refine: order.refine,
         slabs: order.slabs,
-        input: order.input.clone(),
+        input,
         ..FitOptions::default()
-    })
+    }))
+}
+
+/// How to carry out an order about a group.
+pub(super) fn enclosing(order: &FitOrder, group: &FitGroup) -> EncloseOptions {
+    let options = EncloseOptions::new(order.degree.unwrap_or(GROUP_DEGREE));
+    EncloseOptions { multiplier_degree: group.multiplier_degree.unwrap_or(options.multiplier_degree), ..options }
 }

@@ -5,25 +5,15 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use tokio::task::spawn_blocking;
 
-use super::Jobs;
 use super::worker::{claim, ended, finish, put_back, recover};
+use super::{Jobs, Made, Shapes};
+use crate::body::Compound;
+use crate::fit::{FitOptions, fit};
 use crate::polynomial::tests::Seeded;
-use crate::store::{Catalogue, FitOrder, JobState, NewJob, Store};
+use crate::store::{Catalogue, FitOrder, FitOutcome, JobState, NewJob, Store};
 
 fn order(degree: usize) -> FitOrder {
-    FitOrder {
-        name: "it".into(),
-        input: String::new(),
-        degree: Some(degree),
-        objective: "logdet-p".into(),
-        refine: false,
-        slabs: 0,
-        ladder: false,
-        max_gap_m: None,
-        trim: 0.0,
-        min_thickness_m: None,
-        scale: 1.0,
-    }
+    FitOrder { name: "it".into(), degree: Some(degree), ..FitOrder::default() }
 }
 
 /// A catalogue with one job that was claimed, and where it lies.
@@ -32,7 +22,7 @@ fn claimed() -> (tempfile::TempDir, Catalogue, u64) {
     let catalogue = Catalogue::load(Store::open(dir.path()).expect("a new catalogue")).expect("loads");
     let mut random = Seeded(5);
     let points: Vec<_> = (0..40).map(|_| Vector3::from_fn(|_, _| random.signed())).collect();
-    catalogue.create_job(NewJob::new(String::new(), order(4), &points)).expect("queued");
+    catalogue.create_job(NewJob::new(String::new(), order(4), &points, &[])).expect("queued");
     let job = claim(&catalogue).expect("the disk works").expect("a job");
     assert_eq!((&job.state, job.attempts), (&JobState::Running, 1));
     assert!(claim(&catalogue).expect("the disk works").is_none(), "one job is claimed once");
@@ -47,7 +37,8 @@ fn a_job_that_is_cancelled_before_it_is_on_the_board_makes_nothing() {
     assert_eq!(jobs.cancel(&catalogue, id).expect("cancelled").state, JobState::Cancelled);
     jobs.tell(|board| board.begin(id));
     jobs.fit(&catalogue, &job).expect_err("nothing to fit");
-    let state = finish(&catalogue, id, &JobState::Failed("why".into()), Vec::new()).expect("as it is").state.clone();
+    let state =
+        finish(&catalogue, id, &(JobState::Failed("why".into()), Vec::new(), None)).expect("as it is").state.clone();
     assert_eq!(state, JobState::Cancelled);
 }
 
@@ -57,14 +48,14 @@ fn a_result_that_comes_too_late_is_dropped_with_its_bodies() {
     let (_dir, catalogue, id) = claimed();
     let (jobs, job) = (Jobs::default(), catalogue.job(id).expect("there"));
     jobs.tell(|board| board.begin(id));
-    let (state, bodies) = ended(Ok(jobs.fit(&catalogue, &job)));
-    assert!(matches!(&state, JobState::Succeeded(outcome) if outcome.bodies.len() == 1), "{state:?}");
+    let made = ended(Ok(jobs.fit(&catalogue, &job)));
+    assert!(matches!(&made.0, JobState::Succeeded(outcome) if outcome.bodies.len() == 1), "{:?}", made.0);
     jobs.cancel(&catalogue, id).expect("cancelled");
-    assert_eq!(finish(&catalogue, id, &state, bodies.clone()).expect("as it is").state, JobState::Cancelled);
+    assert_eq!(finish(&catalogue, id, &made).expect("as it is").state, JobState::Cancelled);
     assert_eq!(catalogue.counts(), (0, 0));
     // The same without the cancel.
     let (_dir, catalogue, id) = claimed();
-    assert_eq!(finish(&catalogue, id, &state, bodies).expect("stored").state, state);
+    assert_eq!(finish(&catalogue, id, &made).expect("stored").state, made.0);
     assert_eq!(catalogue.counts(), (1, 0));
 }
 
@@ -87,6 +78,24 @@ fn a_kill_counts_as_an_attempt_and_an_orderly_stop_does_not() {
     assert!(claim(&catalogue).expect("the disk works").is_none());
 }
 
+/// A compound is kept with its job, and fails it where no message could hand it out.
+#[test]
+fn a_file_is_kept_if_it_fits_in_a_message() {
+    let mut random = Seeded(7);
+    let points: Vec<_> = (0..60).map(|_| Vector3::from_fn(|_, _| random.signed())).collect();
+    let unwatched = &mut |_| std::ops::ControlFlow::Continue(());
+    let body = fit("it", &points, &FitOptions::default(), unwatched).expect("a fit").body;
+    for (parts, fits) in [(2, true), (256, false)] {
+        let compound = Compound::new("it", vec![body.clone(); parts]).expect("a compound");
+        let outcome = FitOutcome { bodies: Vec::new(), left_out: 0, left_out_m: 0.0 };
+        let file = compound.to_json();
+        let made = Made { outcome, shapes: Shapes::Compound(Box::new(compound)) };
+        let (state, bodies, kept) = ended(Ok(Ok(made)));
+        assert_eq!(matches!(state, JobState::Succeeded(_)), fits, "{} bytes: {state:?}", file.len());
+        assert!(bodies.is_empty() && (!fits || kept == Some(file)));
+    }
+}
+
 #[tokio::test]
 async fn a_panic_is_a_failed_job_with_its_message() {
     let points: Vec<u8> = Vec::new();
@@ -97,8 +106,8 @@ async fn a_panic_is_a_failed_job_with_its_message() {
     ];
     for (defect, word) in defects {
         match ended(defect.await) {
-            (JobState::Failed(why), bodies) => assert!(why.contains(word) && bodies.is_empty(), "{why}"),
-            (state, _) => panic!("{state:?}"),
+            (JobState::Failed(why), bodies, None) => assert!(why.contains(word) && bodies.is_empty(), "{why}"),
+            (state, ..) => panic!("{state:?}"),
         }
     }
 }

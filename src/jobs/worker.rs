@@ -8,10 +8,10 @@ use std::time::Duration;
 use tokio::sync::watch;
 use tokio::task::{JoinError, spawn_blocking};
 
-use super::order::carry_out;
-use super::{Board, Jobs};
+use super::{Board, Jobs, Made, Phase, fit_group, fit_mesh};
 use crate::body::Body;
-use crate::store::{Catalogue, CatalogueError, FitOutcome, Job, JobState};
+use crate::fit::{self, Mesh};
+use crate::store::{Catalogue, CatalogueError, FitGroup, Job, JobState, MAX_FILE_BYTES};
 
 /// Attempts at a job. One that was running whenever the server was killed may be what kills it.
 const MAX_ATTEMPTS: u32 = 2;
@@ -19,7 +19,10 @@ const MAX_ATTEMPTS: u32 = 2;
 /// Pause after the disk failed.
 const PAUSE: Duration = Duration::from_secs(1);
 
-type Fitted = Result<Result<(FitOutcome, Vec<Body>), String>, JoinError>;
+type Fitted = Result<Result<Made, String>, JoinError>;
+
+/// The state that a fit leaves its job in, the bodies to be stored, and the file to be kept with it.
+pub(super) type Ended = (JobState, Vec<Body>, Option<String>);
 
 impl Jobs {
     /// Fits job after job once the catalogue is loaded, until [`Jobs::stop`]; the jobs that a kill left running go first.
@@ -62,10 +65,8 @@ impl Jobs {
                 self.insist(catalogue, move |catalogue| put_back(catalogue, id)).await;
             }
             Some(fitted) => {
-                let (state, bodies) = ended(fitted);
-                let ended =
-                    self.insist(catalogue, move |catalogue| finish(catalogue, id, &state, bodies.clone())).await;
-                if let Some(job) = ended {
+                let ended = ended(fitted);
+                if let Some(job) = self.insist(catalogue, move |catalogue| finish(catalogue, id, &ended)).await {
                     tracing::info!(id, state = %job.state, "fit job ended");
                 }
             }
@@ -74,15 +75,28 @@ impl Jobs {
     }
 
     /// On a thread of its own. An error is the reason why the job fails.
-    pub(super) fn fit(&self, catalogue: &Catalogue, job: &Job) -> Result<(FitOutcome, Vec<Body>), String> {
+    pub(super) fn fit(&self, catalogue: &Catalogue, job: &Job) -> Result<Made, String> {
         // A job that was cancelled since it was claimed, when nobody could tell the board, has no points any more.
-        let points = catalogue.job_points(job.id).map_err(|error| format!("its points can not be read: {error}"))?;
-        carry_out(&job.order, &points, |phase, said| {
+        let mesh = catalogue.job_mesh(job.id).map_err(|error| format!("its points can not be read: {error}"))?;
+        let progress = |phase: Phase, said: fit::Progress| {
             let mut goes_on = true;
             self.tell(|board| goes_on = board.note(job.id, phase, said));
             if goes_on { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
-        })
-        .map_err(|error| error.to_string())
+        };
+        let made = match &job.order.group {
+            Some(FitGroup { body_ids, .. }) => {
+                let body = |id: &String| {
+                    let found = id.parse().ok().and_then(|id| catalogue.body(&id));
+                    found
+                        .map(|body| (*body).clone())
+                        .ok_or_else(|| format!("body {id} was deleted meanwhile; create it again"))
+                };
+                let bodies = body_ids.iter().map(body).collect::<Result<Vec<_>, _>>()?;
+                fit_group(&job.order, &bodies, progress)
+            }
+            None => fit_mesh(&job.order, Mesh { points: mesh.0, triangles: mesh.1 }, progress),
+        };
+        made.map_err(|error| error.to_string())
     }
 
     /// A change of the catalogue, again and again until the disk takes it or the server stops.
@@ -110,7 +124,7 @@ impl Jobs {
 /// Jobs that were running when the server was killed: back into the queue, or given up.
 pub(super) fn recover(catalogue: &Catalogue) -> Result<(), CatalogueError> {
     while let Some(job) = catalogue.first_job(&JobState::Running) {
-        let job = catalogue.change_job(job.id, Vec::new(), |job| {
+        let job = catalogue.change_job(job.id, Vec::new(), None, |job| {
             let state = if job.attempts < MAX_ATTEMPTS {
                 JobState::Queued
             } else {
@@ -132,7 +146,7 @@ pub(super) fn claim(catalogue: &Catalogue) -> Result<Option<Arc<Job>>, Catalogue
     let Some(job) = catalogue.first_job(&JobState::Queued) else { return Ok(None) };
     let is_queued = |job: &Job| job.state == JobState::Queued;
     let job = catalogue
-        .change_job(job.id, Vec::new(), |job| is_queued(job).then_some((JobState::Running, job.attempts + 1)))?;
+        .change_job(job.id, Vec::new(), None, |job| is_queued(job).then_some((JobState::Running, job.attempts + 1)))?;
     // Cancelled meanwhile: who asks for news hears of it and comes back.
     Ok(Some(job).filter(|job| job.state == JobState::Running))
 }
@@ -140,34 +154,42 @@ pub(super) fn claim(catalogue: &Catalogue) -> Result<Option<Arc<Job>>, Catalogue
 /// Back into the queue, as if it had not been begun.
 pub(super) fn put_back(catalogue: &Catalogue, id: u64) -> Result<(), CatalogueError> {
     let is_running = |job: &Job| job.state == JobState::Running;
-    catalogue.change_job(id, Vec::new(), |job| {
+    catalogue.change_job(id, Vec::new(), None, |job| {
         is_running(job).then(|| (JobState::Queued, job.attempts.saturating_sub(1)))
     })?;
     Ok(())
 }
 
 /// The end of a job, unless it was cancelled meanwhile.
-pub(super) fn finish(
-    catalogue: &Catalogue,
-    id: u64,
-    state: &JobState,
-    bodies: Vec<Body>,
-) -> Result<Arc<Job>, CatalogueError> {
+pub(super) fn finish(catalogue: &Catalogue, id: u64, ended: &Ended) -> Result<Arc<Job>, CatalogueError> {
+    let (state, bodies, file) = ended;
     let is_running = |job: &Job| job.state == JobState::Running;
-    catalogue.change_job(id, bodies, |job| is_running(job).then(|| (state.clone(), job.attempts)))
+    catalogue
+        .change_job(id, bodies.clone(), file.as_deref(), |job| is_running(job).then(|| (state.clone(), job.attempts)))
 }
 
-/// The state that a fit leaves its job in, and the bodies to be stored.
-pub(super) fn ended(fitted: Fitted) -> (JobState, Vec<Body>) {
+/// What a fit leaves.
+pub(super) fn ended(fitted: Fitted) -> Ended {
+    let failed = |why| (JobState::Failed(why), Vec::new(), None);
     match fitted {
-        Ok(Ok((outcome, bodies))) => (JobState::Succeeded(outcome), bodies),
-        Ok(Err(why)) => (JobState::Failed(why), Vec::new()),
+        Ok(Ok(Made { outcome, shapes })) => {
+            let (bodies, file) = shapes.into_stored();
+            let longest = bodies.iter().map(|body| body.to_json().len()).chain(file.as_ref().map(String::len)).max();
+            match longest {
+                // Nobody could fetch it.
+                Some(bytes) if bytes > MAX_FILE_BYTES => failed(format!(
+                    "its file has {bytes} bytes, and a message hands out {MAX_FILE_BYTES} at most; ask for a lower degree, fewer \
+                     parts or a smaller group, or fit it without a server"
+                )),
+                _ => (JobState::Succeeded(outcome), bodies, file),
+            }
+        }
+        Ok(Err(why)) => failed(why),
         Err(error) => {
             let what =
                 error.try_into_panic().map_or_else(|error| error.to_string(), |panic| message(&*panic).to_owned());
             tracing::error!(what, "a fit was ended by a defect");
-            let why = format!("the fit was ended by a defect of the program: {what}; please report it with the points");
-            (JobState::Failed(why), Vec::new())
+            failed(format!("the fit was ended by a defect of the program: {what}; please report it with the points"))
         }
     }
 }

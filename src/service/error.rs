@@ -80,6 +80,9 @@ pub(super) fn catalogue(error: &CatalogueError, field: &str) -> Status {
             details.set_resource_info("scene", name, "", message.clone());
             Status::with_error_details(Code::AlreadyExists, message, details)
         }
+        CatalogueError::NoMember { index, id } => {
+            not_found("body", id, &format!("header.options.group.body_ids[{index}]"), message)
+        }
         CatalogueError::NoJob(id) => not_found("fit", id, field, message),
         CatalogueError::RequestUsed { request_id, .. } => {
             let mut details = details("REQUEST_ID_USED");

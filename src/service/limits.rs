@@ -54,6 +54,12 @@ pub const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 /// Most points of one fit job, counting those of a mesh file.
 pub const MAX_FIT_POINTS: usize = 2 << 20;
 
+/// Most triangles of one fit job, counting those of a mesh file: a closed mesh has twice as many as points.
+pub const MAX_FIT_TRIANGLES: usize = 4 << 20;
+
+/// Most bodies of one group: the hulls of all pairs are looked at before the first program.
+pub const MAX_GROUP_BODIES: usize = 256;
+
 /// Longest mesh file of a fit job, in bytes.
 pub const MAX_MESH_BYTES: usize = 128 << 20;
 

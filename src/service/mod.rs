@@ -21,6 +21,6 @@ mod server;
 mod wire;
 
 #[cfg(feature = "fit")]
-pub use fits::{SubmitError, Submitted, submit};
+pub use fits::{SubmitError, submit};
 pub use push::{PushError, Pushed, push};
 pub use server::{ServeError, ServeOptions, Server, serve};

@@ -76,6 +76,14 @@ pub enum CatalogueError {
         /// The job it made.
         job: u64,
     },
+    /// A group names a body that is not there.
+    #[error("no body {id}; list the bodies, or create it first")]
+    NoMember {
+        /// Its place in the group.
+        index: usize,
+        /// As given.
+        id: String,
+    },
     /// Too many jobs wait.
     #[error("{MAX_QUEUED_JOBS} fit jobs wait already; try again when some are done, or cancel some")]
     QueueFull,

@@ -12,7 +12,9 @@ use redb::{
 };
 use serde::de::DeserializeOwned;
 
-use super::rows::{BODIES, FORMAT, JOBS, META, OBJECTS, ObjectRow, POINTS, REVISIONS, SCENES, SceneRow};
+use super::rows::{
+    BODIES, FILES, FORMAT, JOBS, META, OBJECTS, ObjectRow, POINTS, REVISIONS, SCENES, SceneRow, TRIANGLES,
+};
 use super::{Job, StoreError};
 
 /// The catalogue's file, locked by this process. Hand it to [`super::Catalogue::load`].
@@ -24,6 +26,9 @@ pub struct Store {
 }
 
 type Opener = Box<dyn Fn() -> Result<Database, DatabaseError> + Send>;
+
+/// The points of a job, metres, and the triangles between them.
+pub type JobMesh = (Vec<Vector3<f64>>, Vec<[usize; 3]>);
 
 /// Everything in the file, as stored.
 pub(super) struct Contents {
@@ -204,17 +209,31 @@ impl Store {
         Ok(contents)
     }
 
-    /// The points of a job, metres, if it has not ended.
-    pub(super) fn points(&self, id: u64) -> Result<Option<Vec<Vector3<f64>>>, StoreError> {
+    /// Points, metres, and triangles of a job, if it has not ended.
+    pub(super) fn mesh(&self, id: u64) -> Result<Option<JobMesh>, StoreError> {
+        let Some(coordinates) = self.job_bytes(POINTS, id)? else { return Ok(None) };
+        let corners = self.job_bytes(TRIANGLES, id)?.unwrap_or_default();
+        let points = coordinates.as_chunks::<8>().0.as_chunks::<3>().0;
+        let points = points.iter().map(|point| point.map(f64::from_le_bytes).into()).collect();
+        let triangles = corners.as_chunks::<4>().0.as_chunks::<3>().0;
+        let index = |corner| usize::try_from(u32::from_le_bytes(corner)).unwrap_or(usize::MAX);
+        Ok(Some((points, triangles.iter().map(|corners| corners.map(index)).collect())))
+    }
+
+    /// The file that a job made, if it made one.
+    pub(super) fn file(&self, id: u64) -> Result<Option<Vec<u8>>, StoreError> {
+        self.job_bytes(FILES, id)
+    }
+
+    fn job_bytes(
+        &self,
+        definition: TableDefinition<u64, &'static [u8]>,
+        id: u64,
+    ) -> Result<Option<Vec<u8>>, StoreError> {
         let database = self.database.as_ref().ok_or_else(|| self.closed())?;
         (|| {
-            let read = database.begin_read()?;
-            let Some(table) = table(&read, POINTS)? else { return Ok(None) };
-            Ok(table.get(id)?.map(|row| {
-                let number = |bytes: &[u8]| bytes.try_into().map_or(f64::NAN, f64::from_le_bytes);
-                let (points, _) = row.value().as_chunks::<24>();
-                points.iter().map(|bytes| Vector3::from_iterator(bytes.chunks(8).map(number))).collect()
-            }))
+            let Some(table) = table(&database.begin_read()?, definition)? else { return Ok(None) };
+            Ok(table.get(id)?.map(|row| row.value().to_vec()))
         })()
         .map_err(|error: redb::Error| StoreError::from_redb(&self.dir, error))
     }

@@ -15,7 +15,13 @@ pub const MAX_ENDED_JOBS: usize = 1000;
 /// Longest request id.
 pub const MAX_REQUEST_ID_BYTES: usize = 128;
 
+/// Longest file that a job may make: what one message can hand out, with all that is said of the job.
+pub const MAX_FILE_BYTES: usize = (4 << 20) - (64 << 10);
+
 /// What a job is asked for. `jobs` checks it before it is stored.
+///
+/// Options that came later are left out where nobody chose them, so that orders of earlier versions are read, and an order means the
+/// same content under the request id that was given then.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FitOrder {
@@ -25,8 +31,17 @@ pub struct FitOrder {
     pub input: String,
     /// Degree of the polynomial, or the highest tried; the default when there is none.
     pub degree: Option<usize>,
-    /// Name of what is minimised.
+    /// Name of what is minimised, or `inverse-moment`.
     pub objective: String,
+    /// Name of the cone that the Gram matrix of the Hessian form is taken from.
+    #[serde(default = "sos", skip_serializing_if = "is_sos")]
+    pub cone: String,
+    /// Whether traces and what relaxes convexity are measured in the coordinates of the points.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub raw_frame: bool,
+    /// How far convexity is relaxed; 0 makes bodies.
+    #[serde(default, skip_serializing_if = "is_default", with = "number_as_text")]
+    pub relax_convexity: f64,
     /// Whether to minimise the volume itself afterwards.
     pub refine: bool,
     /// Most slabs to cut the body by.
@@ -35,12 +50,30 @@ pub struct FitOrder {
     pub ladder: bool,
     /// How far the body may reach beyond the hull, metres, if that is what matters.
     pub max_gap_m: Option<f64>,
+    /// Most parts of the compound, if one is wanted.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub parts: Option<usize>,
     /// Fraction of the points to leave out.
     pub trim: f64,
     /// Thickness of points that have less, metres.
     pub min_thickness_m: Option<f64>,
     /// Metres per unit of the coordinates that were sent.
     pub scale: f64,
+    /// Stored bodies to be put into fewer, in place of points.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub group: Option<FitGroup>,
+}
+
+/// Bodies to be put into one or few.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FitGroup {
+    /// Their ids.
+    pub body_ids: Vec<String>,
+    /// How much volume several bodies around them may add, as a fraction of theirs; one body if not told.
+    pub max_growth: Option<f64>,
+    /// Least degree of the multipliers; the default if not told.
+    pub multiplier_degree: Option<usize>,
 }
 
 /// A job that is not stored yet.
@@ -52,6 +85,8 @@ pub struct NewJob {
     pub(super) points: usize,
     /// Coordinates of the points, metres, as little-endian f64.
     pub(super) coordinates: Vec<u8>,
+    /// Corners of the triangles between them as little-endian u32.
+    pub(super) corners: Vec<u8>,
 }
 
 /// A job and how far it came.
@@ -62,7 +97,7 @@ pub struct Job {
     pub id: u64,
     /// What the client calls its request; empty when it does not say.
     pub request_id: String,
-    /// SHA-256 of the order and the points.
+    /// SHA-256 of the order, the points and the triangles.
     pub digest: String,
     /// What it is asked for.
     pub order: FitOrder,
@@ -82,7 +117,7 @@ pub enum JobState {
     Queued,
     /// It is being fitted.
     Running,
-    /// Its bodies are stored.
+    /// What it made is stored.
     Succeeded(FitOutcome),
     /// It can not be done, for this reason.
     Failed(String),
@@ -94,7 +129,7 @@ pub enum JobState {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FitOutcome {
-    /// The bodies, coarsest first.
+    /// The bodies, coarsest first; or the one compound or sos-body.
     pub bodies: Vec<FittedBody>,
     /// Points that were left out.
     pub left_out: usize,
@@ -102,20 +137,39 @@ pub struct FitOutcome {
     pub left_out_m: f64,
 }
 
-/// A body that a job made, and what it took.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// What a job made, and what that took.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FittedBody {
+    /// What it is.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub kind: FittedKind,
     /// Its id.
     pub id: String,
-    /// Proven bound of how far it reaches beyond the hull, metres.
-    pub gap_m: f64,
-    /// Mean of that over directions, metres.
-    pub mean_gap_m: f64,
+    /// Proven bound of how far it reaches beyond the hull, metres, where there is one.
+    pub gap_m: Option<f64>,
+    /// Mean of that over directions, metres; only of bodies.
+    pub mean_gap_m: Option<f64>,
     /// Time of the fit.
     pub seconds: f64,
-    /// Only of polynomials.
+    /// Only of polynomials that a program made.
     pub optimum: Option<FitOptimum>,
+    /// Which bodies of the group are inside, by their positions in it.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub members: Vec<usize>,
+}
+
+/// What a job can make.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FittedKind {
+    /// A body, which the catalogue keeps with all others.
+    #[default]
+    Body,
+    /// A union of bodies, whose file is kept with the job.
+    Compound,
+    /// A set that need not be convex, whose file is kept with the job.
+    SosBody,
 }
 
 /// The end of the program that made a polynomial.
@@ -130,15 +184,79 @@ pub struct FitOptimum {
     pub refinement_end: Option<String>,
 }
 
+impl Default for FitOrder {
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            input: String::new(),
+            degree: None,
+            objective: "logdet-p".into(),
+            cone: sos(),
+            raw_frame: false,
+            relax_convexity: 0.0,
+            refine: false,
+            slabs: 0,
+            ladder: false,
+            max_gap_m: None,
+            parts: None,
+            trim: 0.0,
+            min_thickness_m: None,
+            scale: 1.0,
+            group: None,
+        }
+    }
+}
+
+impl FitOrder {
+    /// Whether it makes a set that need not be convex.
+    pub fn is_relaxed(&self) -> bool {
+        self.relax_convexity != 0.0 || self.objective == "inverse-moment"
+    }
+
+    /// Whether triangles matter: only the points of one convex body do, and what is trimmed has lost them.
+    pub fn uses_triangles(&self) -> bool {
+        self.trim == 0.0 && (self.parts.is_some() || self.max_gap_m.is_some() || self.is_relaxed())
+    }
+}
+
 impl NewJob {
-    /// A job about points, metres, that are finite.
-    pub fn new(request_id: String, order: FitOrder, points: &[Vector3<f64>]) -> Self {
+    /// A job about points, metres, that are finite, and the triangles between them; of a group about neither.
+    pub fn new(request_id: String, order: FitOrder, points: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Self {
         let coordinates: Vec<u8> = points.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
+        let corners: Vec<u8> = triangles.iter().flatten().flat_map(|corner| corner.to_le_bytes()).collect();
         // What the hash reads has one form only: fields in their order, shortest numbers.
-        let asked = serde_json::to_string(&order).unwrap_or_default();
-        let hash = Sha256::new().chain_update(asked).chain_update(&coordinates).finalize();
+        let mut asked = serde_json::to_string(&order).unwrap_or_default();
+        if !triangles.is_empty() {
+            asked += &format!("{} triangles", triangles.len());
+        }
+        let hash = Sha256::new().chain_update(asked).chain_update(&coordinates).chain_update(&corners).finalize();
         let digest = hash.iter().map(|byte| format!("{byte:02x}")).collect();
-        Self { request_id, digest, order, points: points.len(), coordinates }
+        Self { request_id, digest, order, points: points.len(), coordinates, corners }
+    }
+}
+
+fn sos() -> String {
+    "sos".into()
+}
+
+fn is_sos(cone: &str) -> bool {
+    cone == "sos"
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+/// JSON has no infinity; the shortest decimal text has.
+mod number_as_text {
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    pub(super) fn serialize<S: Serializer>(number: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(number)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+        String::deserialize(deserializer)?.parse().map_err(D::Error::custom)
     }
 }
 

@@ -30,11 +30,11 @@ mod job;
 mod rows;
 
 pub use catalogue::{Catalogue, CatalogueError};
-pub use disk::Store;
+pub use disk::{JobMesh, Store};
 pub use error::StoreError;
 pub use job::{
-    FitOptimum, FitOrder, FitOutcome, FittedBody, Job, JobState, MAX_ENDED_JOBS, MAX_QUEUED_JOBS, MAX_REQUEST_ID_BYTES,
-    NewJob,
+    FitGroup, FitOptimum, FitOrder, FitOutcome, FittedBody, FittedKind, Job, JobState, MAX_ENDED_JOBS, MAX_FILE_BYTES,
+    MAX_QUEUED_JOBS, MAX_REQUEST_ID_BYTES, NewJob,
 };
 
 #[cfg(test)]

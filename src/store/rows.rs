@@ -20,10 +20,14 @@ pub(super) const SCENES: TableDefinition<&str, &[u8]> = TableDefinition::new("sc
 pub(super) const REVISIONS: TableDefinition<&str, u64> = TableDefinition::new("revisions");
 /// Scene and object name to [`ObjectRow`]: a new pose rewrites one row, whatever the size of the scene.
 pub(super) const OBJECTS: TableDefinition<(&str, &str), &[u8]> = TableDefinition::new("objects");
-/// Job id to [`Job`](super::Job). This table and the next are missing from files of programs that knew no jobs.
+/// Job id to [`Job`](super::Job). This table and the next three are missing from files of programs that did not know them.
 pub(super) const JOBS: TableDefinition<u64, &[u8]> = TableDefinition::new("jobs");
 /// Job id to the coordinates of its points, metres, as little-endian f64; of jobs that have not ended.
 pub(super) const POINTS: TableDefinition<u64, &[u8]> = TableDefinition::new("points");
+/// Job id to the corners of the triangles between its points, as little-endian u32; of jobs that have not ended.
+pub(super) const TRIANGLES: TableDefinition<u64, &[u8]> = TableDefinition::new("triangles");
+/// Job id to the file of the compound or sos-body that it made.
+pub(super) const FILES: TableDefinition<u64, &[u8]> = TableDefinition::new("files");
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -12,7 +12,7 @@ use std::collections::BinaryHeap;
 const BOXES: usize = 3000;
 const BOXES_ALL_AROUND: usize = 12_000;
 
-/// How close a bound is to what is attained, relative to the size of the first box, before it is good enough.
+/// How close a bound is to what is attained, relative to the size of the box known before, when it is good enough.
 const CLOSE: f64 = 1e-3;
 
 /// Proven extent of a set in its own frame, metres.
@@ -57,7 +57,7 @@ impl Extent {
         let error = Vector3::from_fn(|i, _| functional(&unit(i)).1).norm();
         let distance =
             |z: &Vector3<f64>, half: &Vector3<f64>| (inverse * z + offset).norm() + (spread * half).norm() + error;
-        let radius = highest(polynomial, &first, distance, CLOSE * size, BOXES_ALL_AROUND).min(half_diagonal)
+        let radius = highest(polynomial, &first, distance, CLOSE * half_diagonal, BOXES_ALL_AROUND).min(half_diagonal)
             * (1.0 + 1e-14)
             + rounding;
         Ok(Self { bounding_box, circumscribed: Ball { center, radius } })

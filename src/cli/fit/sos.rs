@@ -1,73 +1,10 @@
-//! `sublevel fit` of sets that need not be convex.
+//! What `sublevel fit` says of sets that need not be convex.
 
-use super::{FitArgs, Prepared, coordinates, file_name, progress_bar, telling};
 use crate::body::{Coverage, SosBody};
-use crate::cli::write_atomically;
-use crate::fit::{Objective, SosFit, SosMethod, SosOptions, SosReport, Trimmed, UnknownObjective, fit_sos};
+use crate::store::FitOutcome;
 use serde::Serialize;
-use std::error::Error;
-use std::fmt;
 use std::io::{self, Write};
 use std::path::Path;
-use std::str::FromStr;
-
-/// What `--objective` names.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Choice {
-    /// An objective of a program.
-    Minimise(Objective),
-    /// The inverse moment, which minimises nothing.
-    InverseMoment,
-}
-
-impl Default for Choice {
-    fn default() -> Self {
-        Self::Minimise(Objective::default())
-    }
-}
-
-impl fmt::Display for Choice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Minimise(objective) => objective.fmt(f),
-            Self::InverseMoment => f.write_str(SosMethod::InverseMoment.name()),
-        }
-    }
-}
-
-impl FromStr for Choice {
-    type Err = UnknownObjective;
-
-    fn from_str(name: &str) -> Result<Self, UnknownObjective> {
-        if name == SosMethod::InverseMoment.name() {
-            return Ok(Self::InverseMoment);
-        }
-        name.parse().map(Self::Minimise)
-    }
-}
-
-/// How to make a set that need not be convex, if one is asked for.
-pub(super) fn method(args: &FitArgs) -> Result<Option<SosMethod>, String> {
-    let c = args.relax_convexity;
-    let method = match args.objective {
-        Choice::Minimise(_) if c == 0.0 => return Ok(None),
-        Choice::Minimise(objective) => SosMethod::Relaxed { c, objective },
-        Choice::InverseMoment if c == 0.0 => SosMethod::InverseMoment,
-        Choice::InverseMoment => {
-            return Err("--relax-convexity: inverse-moment asks for no convexity; leave one of the two out".into());
-        }
-    };
-    if args.refine || args.ladder || args.slabs > 0 || args.max_gap.is_some() || args.parts.is_some() {
-        let wanted = "--refine, --ladder, --slabs, --parts and --max-gap need convex bodies; leave them out";
-        return Err(format!("{wanted}, or --relax-convexity and inverse-moment"));
-    }
-    Ok(Some(method))
-}
-
-pub(super) fn options(args: &FitArgs, method: SosMethod, input: &Path) -> SosOptions {
-    let degree = args.degree.unwrap_or(6);
-    SosOptions { degree, method, coordinates: coordinates(args), input: file_name(input) }
-}
 
 #[derive(Serialize)]
 pub(super) struct Row {
@@ -79,7 +16,7 @@ pub(super) struct Row {
     objective: String,
     /// c; none where nothing bounds convexity.
     relax_convexity: Option<f64>,
-    points: usize,
+    pub(super) points: usize,
     /// Points that were trimmed, and the largest distance of one of them from the hull of the others.
     left_out: usize,
     left_out_m: f64,
@@ -98,51 +35,36 @@ pub(super) struct Row {
     proven: bool,
 }
 
-/// Fits one input, writes and describes it.
-pub(super) fn one(args: &FitArgs, method: SosMethod, input: &Path, stem: &str) -> Result<Row, Box<dyn Error>> {
-    let bar = progress_bar(stem);
-    let mut tell = telling(&bar);
-    let Prepared { mesh, trimmed } = Prepared::new(args, input, &bar, &mut tell)?;
-    let options = options(args, method, input);
-    let SosFit { body, report } = fit_sos(stem, &mesh.points, &mesh.triangles, &options, &mut tell)
-        .map_err(|error| format!("{}: {error}", input.display()))?;
-    bar.finish_and_clear();
-    let kind = match method {
-        SosMethod::Relaxed { c, .. } => format!("c{c}"),
-        SosMethod::InverseMoment => "im".into(),
-    };
-    let file = args.out.join(format!("{stem}-d{}-{kind}.json", body.degree()));
-    write_atomically(&file, &body.to_json())?;
-    Ok(row(input, &file, &body, &report, trimmed.as_ref()))
-}
-
-fn row(input: &Path, file: &Path, body: &SosBody, report: &SosReport, trimmed: Option<&Trimmed>) -> Row {
+pub(super) fn row(input: &Path, file: &Path, outcome: &FitOutcome, body: &SosBody) -> Row {
+    let made = body.provenance().cloned().unwrap_or_default();
+    let took = outcome.bodies.first();
+    let optimum = took.and_then(|took| took.optimum.as_ref());
     Row {
         input: input.display().to_string(),
         body: file.display().to_string(),
         kind: "sos-body",
         degree: body.degree(),
-        objective: body.provenance().map(|made| made.objective.clone()).unwrap_or_default(),
+        objective: made.objective,
         relax_convexity: body.relaxation().map(|relaxation| relaxation.c),
-        points: report.points,
-        left_out: trimmed.map_or(0, |trimmed| trimmed.left_out.len()),
-        left_out_m: trimmed.map_or(0.0, |trimmed| trimmed.farthest_m),
-        hull_vertices: report.hull_vertices,
+        points: body.points().map_or(0, |points| points.count),
+        left_out: outcome.left_out,
+        left_out_m: outcome.left_out_m,
+        hull_vertices: made.hull_vertices,
         volume_m3: body.volume().volume_m3,
         volume_error_m3: body.volume().error_m3,
-        hull_volume_m3: report.hull_volume_m3,
+        hull_volume_m3: made.hull_volume_m3,
         points_only: true,
         coverage: body.covered().copied(),
-        objective_value: report.program.map(|program| program.objective_value),
-        optimality_gap: report.program.map(|program| program.optimality_gap),
-        seconds: report.seconds,
+        objective_value: optimum.map(|optimum| optimum.objective_value),
+        optimality_gap: optimum.and_then(|optimum| optimum.optimality_gap),
+        seconds: took.map_or(0.0, |took| took.seconds),
         // A fit returns a set only when it is solved and proven.
         status: "solved",
         proven: true,
     }
 }
 
-pub(super) fn table(out: &mut dyn Write, rows: &[Row]) -> io::Result<()> {
+pub(super) fn table(out: &mut dyn Write, rows: &[&Row]) -> io::Result<()> {
     let width = rows.iter().map(|row| row.body.chars().count()).max().unwrap_or(0).max(4);
     writeln!(
         out,

@@ -117,7 +117,7 @@ fn without_convexity_it_is_the_optimal_design() {
         let structure = Structure::without_convexity(degree);
         let identity = Affine { linear: Matrix3::identity(), offset: Vector3::zeros() };
         let problem = Problem::new(&structure, Objective::LogDetP, &identity, 1e-5);
-        let optimum = generate(problem, &whitened, &mut Watch::new(&mut unwatched)).unwrap();
+        let optimum = generate(problem, &whitened, &[], &mut Watch::new(&mut unwatched)).unwrap();
         // Titterington's iteration w <- w m(x)ᵀ M⁻¹ m(x) / N for the dual, which only ever improves.
         let n = structure.gram.size as f64;
         let mut weights = DVector::repeat(points.len(), 1.0 / points.len() as f64);

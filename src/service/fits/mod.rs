@@ -1,27 +1,32 @@
 //! FitService.
 
+mod order;
 mod submit;
 mod upload;
 mod wire;
 
-pub use submit::{SubmitError, Submitted, submit};
+pub use submit::{SubmitError, submit};
 
 use std::sync::Arc;
 
+use prost::Message;
 use tokio::sync::{Semaphore, mpsc};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::limits::{MAX_FITS_PAGE, MAX_UPLOADS, WATCH_PAUSE};
+use super::limits::{MAX_FITS_PAGE, MAX_MESSAGE_BYTES, MAX_UPLOADS, WATCH_PAUSE};
 use super::proto::fit_service_server::FitService;
 use super::proto::{
-    CancelFitRequest, CancelFitResponse, CreateFitRequest, CreateFitResponse, GetFitRequest, GetFitResponse,
+    CancelFitRequest, CancelFitResponse, CreateFitRequest, CreateFitResponse, FitJob, GetFitRequest, GetFitResponse,
     ListFitsRequest, ListFitsResponse, WatchFitRequest, WatchFitResponse,
 };
 use super::ready::Ready;
 use super::{error, wire as shared};
 use crate::jobs::{Board, Jobs};
-use crate::store::{Catalogue, CatalogueError, Job};
+use crate::store::{Catalogue, CatalogueError, Job, MAX_FILE_BYTES};
+
+// A job's message with its file, and with all that it says besides.
+const _: () = assert!(MAX_FILE_BYTES + (32 << 10) < MAX_MESSAGE_BYTES);
 
 #[derive(Debug)]
 pub(super) struct Fits {
@@ -49,23 +54,24 @@ impl FitService for Fits {
         let jobs = self.jobs.clone();
         let create = move |catalogue: &Catalogue| jobs.create(catalogue, new);
         let (job, created) = self.ready.change("header.request_id", create).await?;
-        Ok(Response::new(CreateFitResponse { job: Some(self.message(&job)), created }))
+        Ok(Response::new(CreateFitResponse { job: Some(self.message(&job).await?), created }))
     }
 
     async fn get_fit(&self, request: Request<GetFitRequest>) -> Result<Response<GetFitResponse>, Status> {
         let job = find(&*self.ready.catalogue().await?, wire::id(&request.get_ref().id, "id")?)?;
-        Ok(Response::new(GetFitResponse { job: Some(self.message(&job)) }))
+        Ok(Response::new(GetFitResponse { job: Some(self.message(&job).await?) }))
     }
 
     async fn list_fits(&self, request: Request<ListFitsRequest>) -> Result<Response<ListFitsResponse>, Status> {
         let (size, after) = shared::page(request.get_ref().page_size, &request.get_ref().page_token);
         let after = after.map(|token| wire::id(token, "page_token")).transpose()?;
-        let (jobs, more) = self.ready.catalogue().await?.jobs(after, size.min(MAX_FITS_PAGE));
+        let (found, more) = self.ready.catalogue().await?.jobs(after, size.min(MAX_FITS_PAGE));
+        let progress = self.jobs.news();
+        let jobs = fitting(found.iter().map(|job| wire::job(job, progress.borrow().progress(job.id))));
         let next_page_token = match jobs.last() {
-            Some(last) if more => last.id.to_string(),
+            Some(last) if more || jobs.len() < found.len() => last.id.clone(),
             _ => String::new(),
         };
-        let jobs = jobs.iter().map(|job| self.message(job)).collect();
         Ok(Response::new(ListFitsResponse { jobs, next_page_token }))
     }
 
@@ -76,7 +82,7 @@ impl FitService for Fits {
         let catalogue = self.ready.catalogue().await?;
         find(&catalogue, id)?;
         let (sender, stream) = mpsc::channel(1);
-        tokio::spawn(watch(catalogue, self.jobs.clone(), id, sender));
+        tokio::spawn(watch(self.ready.clone(), self.jobs.clone(), id, sender));
         Ok(Response::new(ReceiverStream::new(stream)))
     }
 
@@ -84,14 +90,39 @@ impl FitService for Fits {
         let id = wire::id(&request.get_ref().id, "id")?;
         let jobs = self.jobs.clone();
         let job = self.ready.change("id", move |catalogue| jobs.cancel(catalogue, id)).await?;
-        Ok(Response::new(CancelFitResponse { job: Some(self.message(&job)) }))
+        Ok(Response::new(CancelFitResponse { job: Some(self.message(&job).await?) }))
     }
 }
 
 impl Fits {
-    fn message(&self, job: &Job) -> super::proto::FitJob {
-        wire::job(job, self.jobs.news().borrow().progress(job.id))
+    async fn message(&self, job: &Job) -> Result<FitJob, Status> {
+        let message = wire::job(job, self.jobs.news().borrow().progress(job.id));
+        complete(&self.ready, job, message).await
     }
+}
+
+/// A job's message with the file that the job made, if it made one.
+async fn complete(ready: &Ready, job: &Job, message: FitJob) -> Result<FitJob, Status> {
+    if !wire::has_file(job) {
+        return Ok(message);
+    }
+    let (catalogue, id) = (ready.catalogue().await?, job.id);
+    let file = ready.solve(move || catalogue.job_file(id)).await?.map_err(|error| error::catalogue(&error, "id"))?;
+    Ok(wire::with_file(message, file.unwrap_or_default()))
+}
+
+/// As many of the jobs, at least one, as fit in a message.
+fn fitting(jobs: impl Iterator<Item = FitJob>) -> Vec<FitJob> {
+    let (mut bytes, mut fitting) = (0, Vec::new());
+    for job in jobs {
+        // With its tag and length; the token comes on top.
+        bytes += job.encoded_len() + 16;
+        if bytes > MAX_MESSAGE_BYTES - 64 && !fitting.is_empty() {
+            break;
+        }
+        fitting.push(job);
+    }
+    fitting
 }
 
 fn find(catalogue: &Catalogue, id: u64) -> Result<Arc<Job>, Status> {
@@ -100,21 +131,22 @@ fn find(catalogue: &Catalogue, id: u64) -> Result<Arc<Job>, Status> {
 
 /// Sends the job as it stands whenever it has changed, until it has ended or nobody listens. A message is made when there is
 /// room for it, so who reads slowly gets the latest.
-async fn watch(catalogue: Arc<Catalogue>, jobs: Jobs, id: u64, sender: mpsc::Sender<Result<WatchFitResponse, Status>>) {
+async fn watch(ready: Ready, jobs: Jobs, id: u64, sender: mpsc::Sender<Result<WatchFitResponse, Status>>) {
     let (mut news, mut sent) = (jobs.news(), None);
     while let Ok(room) = sender.reserve().await {
         let (progress, stopping) = {
             let board: &Board = &news.borrow_and_update();
             (board.progress(id), board.is_stopping())
         };
-        let job = match find(&catalogue, id) {
+        let job = match ready.catalogue().await.and_then(|catalogue| find(&catalogue, id)) {
             Ok(job) => job,
             Err(status) => return room.send(Err(status)),
         };
         let message = wire::job(&job, progress);
         if sent.as_ref() != Some(&message) {
             sent = Some(message.clone());
-            room.send(Ok(WatchFitResponse { job: Some(message) }));
+            let message = complete(&ready, &job, message).await;
+            room.send(message.map(|job| WatchFitResponse { job: Some(job) }));
         } else if stopping {
             let why = "the server stops; watch the job again when it is back, it goes on then";
             return room.send(Err(error::unavailable("STOPPING", why)));
@@ -128,6 +160,22 @@ async fn watch(catalogue: Arc<Catalogue>, jobs: Jobs, id: u64, sender: mpsc::Sen
                 _ = news.changed() => {}
                 () = sender.closed() => return,
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_ends_where_a_message_would() {
+        let jobs = |bytes: usize| (0..5).map(move |_| FitJob { failure: "x".repeat(bytes), ..FitJob::default() });
+        for (bytes, count) in [(10, 5), (1 << 20, 3), (5 << 20, 1)] {
+            let page = fitting(jobs(bytes));
+            assert_eq!(page.len(), count);
+            let page = ListFitsResponse { jobs: page, next_page_token: u64::MAX.to_string() };
+            assert!(count == 1 || page.encoded_len() <= MAX_MESSAGE_BYTES);
         }
     }
 }

@@ -11,24 +11,17 @@ use super::super::proto::body_service_client::BodyServiceClient;
 use super::super::proto::create_fit_request::Part;
 use super::super::proto::fit_service_client::FitServiceClient;
 use super::super::proto::{
-    CancelFitRequest, CreateFitRequest, FitJob, FitState, FittedBody, GetBodyRequest, PointChunk, WatchFitRequest,
+    CancelFitRequest, CreateFitRequest, FitJob, FitResult, FitState, GetBodyRequest, PointChunk, TriangleChunk,
+    WatchFitRequest,
 };
 use super::super::push::{PushError, connect};
-use super::wire;
-use crate::body::Body;
-use crate::store::FitOrder;
+use super::{order, wire};
+use crate::body::{Body, BodyFileError, Compound, SosBody};
+use crate::jobs::{Made, Shapes, body_name};
+use crate::store::{FitOrder, FittedKind};
 
-/// Points of one message: some 1.5 MB.
+/// Points, or triangles, of one message: some 1.5 MB.
 const CHUNK: usize = 1 << 16;
-
-/// What a server made.
-#[derive(Debug)]
-pub struct Submitted {
-    /// The job in its final state.
-    pub job: FitJob,
-    /// Its bodies and what they took, re-proven here from the server's files.
-    pub bodies: Vec<(FittedBody, Body)>,
-}
 
 /// Why a server made no bodies.
 #[derive(Debug, thiserror::Error)]
@@ -57,19 +50,26 @@ pub enum SubmitError {
         /// What went wrong.
         status: Box<Status>,
     },
-    /// The points can not be fitted.
+    /// What was sent can not be fitted.
     #[error("{0}")]
     Failed(String),
     /// The job was cancelled, here or by another client.
     #[error("the fit was cancelled")]
     Cancelled,
-    /// The server sent something that is no body.
-    #[error("the server sent a body that can not be proven: {0}; are the versions the same?")]
+    /// The server sent something that is not what the job makes.
+    #[error("the server sent what can not be proven: {0}; are the versions the same?")]
     Unproven(String),
 }
 
-/// Has a server fit points (metres), and fetches the bodies. `tell` hears of the job whenever it has changed; when `cancel`
-/// resolves, the job is cancelled.
+impl From<BodyFileError> for SubmitError {
+    fn from(error: BodyFileError) -> Self {
+        Self::Unproven(error.to_string())
+    }
+}
+
+/// Has a server carry out an order about points (metres) and the triangles between them, or about a group of bodies that it has;
+/// fetches what it made and proves it anew. `tell` hears of the job whenever it has changed; when `cancel` resolves, the job is
+/// cancelled.
 ///
 /// # Errors
 /// [`SubmitError`].
@@ -77,14 +77,17 @@ pub async fn submit(
     url: &str,
     order: &FitOrder,
     points: &[Vector3<f64>],
+    triangles: &[[usize; 3]],
     mut tell: impl FnMut(&FitJob),
     cancel: impl Future<Output = ()>,
-) -> Result<Submitted, SubmitError> {
+) -> Result<Made, SubmitError> {
     let channel = connect(url, CALL_LIMIT).await?;
-    let mut client = FitServiceClient::new(channel.clone()).max_encoding_message_size(MAX_MESSAGE_BYTES);
+    let mut client = FitServiceClient::new(channel.clone())
+        .max_decoding_message_size(MAX_MESSAGE_BYTES)
+        .max_encoding_message_size(MAX_MESSAGE_BYTES);
     tokio::pin!(cancel);
     let created = tokio::select! {
-        created = client.create_fit(tokio_stream::iter(messages(order, points))) => created,
+        created = client.create_fit(tokio_stream::iter(messages(order, points, triangles))) => created,
         // What is not sent to its end makes no job.
         () = &mut cancel => return Err(SubmitError::Cancelled),
     };
@@ -116,33 +119,60 @@ pub async fn submit(
         FitState::Cancelled => return Err(SubmitError::Cancelled),
         _ => return Err(SubmitError::Failed(job.failure)),
     }
-    let mut bodies = Vec::new();
-    for fitted in job.result.clone().unwrap_or_default().bodies {
-        let body = fetch(channel.clone(), &fitted.body_id).await?;
-        bodies.push((fitted, body));
-    }
-    Ok(Submitted { job, bodies })
+    fetch(channel, order, job.result.unwrap_or_default()).await
 }
 
-/// The header and the points in pieces, each made when it is sent.
-fn messages(order: &FitOrder, points: &[Vector3<f64>]) -> impl Iterator<Item = CreateFitRequest> + use<> {
-    let header = CreateFitRequest { part: Some(Part::Header(wire::header(order))) };
-    let points = points.to_vec();
-    let chunks = (0..points.len()).step_by(CHUNK).map(move |from| {
-        let chunk = &points[from..points.len().min(from + CHUNK)];
+/// The header, and the points and triangles in pieces, each made when it is sent.
+fn messages(
+    order: &FitOrder,
+    points: &[Vector3<f64>],
+    triangles: &[[usize; 3]],
+) -> impl Iterator<Item = CreateFitRequest> + use<> {
+    let coordinates = |chunk: &[Vector3<f64>]| {
         let coordinates = chunk.iter().flat_map(|point| [point.x, point.y, point.z]).collect();
-        CreateFitRequest { part: Some(Part::Points(PointChunk { coordinates })) }
-    });
-    std::iter::once(header).chain(chunks)
+        Part::Points(PointChunk { coordinates })
+    };
+    let corners = |chunk: &[[usize; 3]]| {
+        // One that is too large names no point, and the server says so.
+        let corner = |&corner| u32::try_from(corner).unwrap_or(u32::MAX);
+        Part::Triangles(TriangleChunk { corners: chunk.iter().flatten().map(corner).collect() })
+    };
+    let triangles = if order.uses_triangles() { triangles } else { &[] };
+    std::iter::once(Part::Header(order::header(order)))
+        .chain(chunks(points.to_vec(), coordinates))
+        .chain(chunks(triangles.to_vec(), corners))
+        .map(|part| CreateFitRequest { part: Some(part) })
 }
 
-async fn fetch(channel: Channel, id: &str) -> Result<Body, SubmitError> {
-    let mut client = BodyServiceClient::new(channel).max_decoding_message_size(MAX_MESSAGE_BYTES);
-    let file = client
-        .get_body(GetBodyRequest { id: id.to_owned() })
-        .await
-        .map_err(|status| SubmitError::Gone(Box::new(status)))?;
-    let file = file.into_inner().body_file_json;
-    let text = std::str::from_utf8(&file).map_err(|error| SubmitError::Unproven(error.to_string()))?;
-    Body::from_json(text).map_err(|error| SubmitError::Unproven(error.to_string()))
+fn chunks<T>(all: Vec<T>, part: impl Fn(&[T]) -> Part) -> impl Iterator<Item = Part> {
+    (0..all.len()).step_by(CHUNK).map(move |from| part(&all[from..all.len().min(from + CHUNK)]))
+}
+
+/// What a job made, re-proven here from the server's files.
+async fn fetch(channel: Channel, order: &FitOrder, result: FitResult) -> Result<Made, SubmitError> {
+    let unknown = || SubmitError::Unproven("something of a kind that this program does not know".to_owned());
+    let outcome = wire::outcome(&result).ok_or_else(unknown)?;
+    let file = || text(&result.bodies[0].file_json);
+    let shapes = match outcome.bodies.first().map(|made| made.kind) {
+        Some(FittedKind::Compound) => Shapes::Compound(Box::new(Compound::from_json(file()?)?)),
+        Some(FittedKind::SosBody) => Shapes::SosBody(Box::new(SosBody::from_json(file()?)?)),
+        _ => {
+            let mut client = BodyServiceClient::new(channel).max_decoding_message_size(MAX_MESSAGE_BYTES);
+            let mut bodies = Vec::new();
+            for (index, made) in outcome.bodies.iter().enumerate() {
+                let found = client.get_body(GetBodyRequest { id: made.id.clone() }).await;
+                let found = found.map_err(|status| SubmitError::Gone(Box::new(status)))?.into_inner();
+                let body = Body::from_json(text(&found.body_file_json)?)?;
+                // The server may have had it under another name.
+                let named = body.renamed(&body_name(order, index));
+                bodies.push(named.map_err(|error| SubmitError::Unproven(error.to_string()))?);
+            }
+            Shapes::Bodies(bodies)
+        }
+    };
+    Ok(Made { outcome, shapes })
+}
+
+fn text(file: &[u8]) -> Result<&str, SubmitError> {
+    std::str::from_utf8(file).map_err(|error| SubmitError::Unproven(error.to_string()))
 }

@@ -1,73 +1,24 @@
 //! Between the messages of FitService and jobs.
 
 use super::super::error::Invalid;
-use super::super::proto::{
-    self, FitHeader, FitJob, FitObjective, FitOptions, FitPhase, FitProgress, FitResult, FitState, MeshFormat,
-};
-use crate::jobs::{Phase, Progress, check};
-use crate::store::{FitOptimum, FitOrder, FitOutcome, FittedBody, Job, JobState};
+use super::super::proto::{self, FitJob, FitPhase, FitProgress, FitResult, FitState};
+use super::super::wire::count;
+use super::order::options;
+use crate::jobs::{Phase, Progress};
+use crate::store::{FitOptimum, FitOutcome, FittedBody, FittedKind, Job, JobState};
 
-/// Objectives and their names in orders.
-const OBJECTIVES: [(FitObjective, &str); 4] = [
-    (FitObjective::LogdetP, "logdet-p"),
-    (FitObjective::TraceP, "trace-p"),
-    (FitObjective::LogdetH, "logdet-h"),
-    (FitObjective::TraceH, "trace-h"),
-];
-
-/// Formats and the endings of their files.
-const FORMATS: [(MeshFormat, &str); 5] = [
-    (MeshFormat::Off, "off"),
-    (MeshFormat::Obj, "obj"),
-    (MeshFormat::Ply, "ply"),
-    (MeshFormat::Stl, "stl"),
-    (MeshFormat::Xyz, "xyz"),
+/// What a job can make.
+const KINDS: [(FittedKind, proto::FittedKind); 3] = [
+    (FittedKind::Body, proto::FittedKind::Body),
+    (FittedKind::Compound, proto::FittedKind::Compound),
+    (FittedKind::SosBody, proto::FittedKind::SosBody),
 ];
 
 pub(super) fn id(id: &str, field: &str) -> Result<u64, Invalid> {
     id.parse().map_err(|_| Invalid::new(field, "is no id of a fit job; give the one CreateFit returned"))
 }
 
-/// The request's id, the checked order, and the format of the mesh file that follows, if one does.
-pub(super) fn order(header: FitHeader) -> Result<(String, FitOrder, Option<&'static str>), Invalid> {
-    let format = header.mesh_format();
-    if i32::from(format) != header.mesh_format {
-        return Err(Invalid::new("header.mesh_format", "is no format this server knows"));
-    }
-    let options = header.options.unwrap_or_default();
-    let objective = match options.objective() {
-        known if i32::from(known) != options.objective => None,
-        FitObjective::Unspecified => Some("logdet-p"),
-        known => name_of(&OBJECTIVES, known),
-    };
-    let refused = |why| Invalid::new("header.options.objective", why);
-    let order = FitOrder {
-        name: header.name,
-        input: header.input,
-        degree: Some(number(options.degree)).filter(|&degree| degree != 0),
-        objective: objective.ok_or_else(|| refused("is no objective this server knows"))?.to_owned(),
-        refine: options.refine,
-        slabs: number(options.slabs),
-        ladder: options.ladder,
-        max_gap_m: options.max_gap_m,
-        trim: options.trim,
-        min_thickness_m: options.min_thickness_m,
-        scale: options.scale.unwrap_or(1.0),
-    };
-    check(&header.request_id, &order).map_err(|error| {
-        let inside = if ["name", "input", "request_id"].contains(&error.field) { "" } else { "options." };
-        Invalid::new(format!("header.{inside}{}", error.field), error.why)
-    })?;
-    Ok((header.request_id, order, name_of(&FORMATS, format)))
-}
-
-/// The header of an order for points that are sent in metres.
-pub(super) fn header(order: &FitOrder) -> FitHeader {
-    let FitOrder { name, input, .. } = order.clone();
-    let mesh_format = MeshFormat::Unspecified.into();
-    FitHeader { name, request_id: String::new(), input, mesh_format, options: Some(options(order)) }
-}
-
+/// A job without the file that it made.
 pub(super) fn job(job: &Job, progress: Option<Progress>) -> FitJob {
     let Job { id, request_id, order, points, attempts, state, .. } = job;
     let (state, failure, result) = match state {
@@ -93,19 +44,20 @@ pub(super) fn job(job: &Job, progress: Option<Progress>) -> FitJob {
     }
 }
 
-fn options(order: &FitOrder) -> FitOptions {
-    let objective = OBJECTIVES.iter().find(|(_, name)| *name == order.objective);
-    FitOptions {
-        degree: super::super::wire::count(order.degree.unwrap_or(0)),
-        objective: objective.map_or(FitObjective::Unspecified, |(objective, _)| *objective).into(),
-        refine: order.refine,
-        slabs: super::super::wire::count(order.slabs),
-        ladder: order.ladder,
-        max_gap_m: order.max_gap_m,
-        trim: order.trim,
-        min_thickness_m: order.min_thickness_m,
-        scale: Some(order.scale),
+/// Whether a job has made a file that [`job`] leaves out.
+pub(super) fn has_file(job: &Job) -> bool {
+    match &job.state {
+        JobState::Succeeded(outcome) => outcome.bodies.iter().any(|made| made.kind != FittedKind::Body),
+        _ => false,
     }
+}
+
+/// Adds the file to the message of a job that made one.
+pub(super) fn with_file(mut job: FitJob, file: Vec<u8>) -> FitJob {
+    if let Some(made) = job.result.as_mut().and_then(|result| result.bodies.first_mut()) {
+        made.file_json = file.into();
+    }
+    job
 }
 
 fn progress_message(progress: Progress) -> FitProgress {
@@ -124,29 +76,50 @@ fn progress_message(progress: Progress) -> FitProgress {
 }
 
 fn result(outcome: &FitOutcome) -> FitResult {
-    let bodies =
-        outcome.bodies.iter().map(|FittedBody { id, gap_m, mean_gap_m, seconds, optimum }| proto::FittedBody {
-            body_id: id.clone(),
-            gap_m: *gap_m,
-            mean_gap_m: *mean_gap_m,
-            duration_s: *seconds,
-            optimum: optimum.as_ref().map(optimum_message),
-        });
-    FitResult { bodies: bodies.collect(), left_out_count: outcome.left_out as u64, left_out_m: outcome.left_out_m }
-}
-
-fn optimum_message(optimum: &FitOptimum) -> proto::FitOptimum {
-    proto::FitOptimum {
-        objective_value: optimum.objective_value,
-        optimality_gap: optimum.optimality_gap,
-        refinement_end: optimum.refinement_end.clone().unwrap_or_default(),
+    FitResult {
+        bodies: outcome.bodies.iter().map(fitted).collect(),
+        left_out_count: outcome.left_out as u64,
+        left_out_m: outcome.left_out_m,
     }
 }
 
-fn name_of<T: PartialEq>(names: &[(T, &'static str)], wanted: T) -> Option<&'static str> {
-    names.iter().find(|(known, _)| *known == wanted).map(|(_, name)| *name)
+fn fitted(made: &FittedBody) -> proto::FittedBody {
+    let kind = KINDS.iter().find(|(kind, _)| *kind == made.kind);
+    proto::FittedBody {
+        body_id: made.id.clone(),
+        gap_m: made.gap_m,
+        mean_gap_m: made.mean_gap_m,
+        duration_s: made.seconds,
+        optimum: made.optimum.as_ref().map(|optimum| proto::FitOptimum {
+            objective_value: optimum.objective_value,
+            optimality_gap: optimum.optimality_gap,
+            refinement_end: optimum.refinement_end.clone().unwrap_or_default(),
+        }),
+        kind: kind.map_or(proto::FittedKind::Unspecified, |(_, kind)| *kind).into(),
+        file_json: Default::default(),
+        members: made.members.iter().map(|&member| count(member)).collect(),
+    }
 }
 
-fn number(count: u32) -> usize {
-    usize::try_from(count).unwrap_or(usize::MAX)
+/// What a message says that a job made; none of a kind that this program does not know.
+pub(super) fn outcome(result: &FitResult) -> Option<FitOutcome> {
+    let body = |made: &proto::FittedBody| {
+        let (kind, _) = KINDS.iter().find(|(_, kind)| *kind == made.kind())?;
+        Some(FittedBody {
+            kind: *kind,
+            id: made.body_id.clone(),
+            gap_m: made.gap_m,
+            mean_gap_m: made.mean_gap_m,
+            seconds: made.duration_s,
+            optimum: made.optimum.as_ref().map(|optimum| FitOptimum {
+                objective_value: optimum.objective_value,
+                optimality_gap: optimum.optimality_gap,
+                refinement_end: Some(optimum.refinement_end.clone()).filter(|end| !end.is_empty()),
+            }),
+            members: made.members.iter().map(|&member| usize::try_from(member).unwrap_or(usize::MAX)).collect(),
+        })
+    };
+    let bodies = result.bodies.iter().map(body).collect::<Option<_>>()?;
+    let left_out = usize::try_from(result.left_out_count).unwrap_or(usize::MAX);
+    Some(FitOutcome { bodies, left_out, left_out_m: result.left_out_m })
 }

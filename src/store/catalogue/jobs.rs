@@ -1,14 +1,14 @@
-//! The jobs of the catalogue. Their points stay on disk until somebody fits them, and go when the job has ended.
+//! The jobs of the catalogue. Their points stay on disk until somebody fits them, and go when the job has ended; a file that it made
+//! stays there until the job is forgotten.
 
 use std::sync::Arc;
 
-use nalgebra::Vector3;
-
 use crate::body::Body;
-use crate::store::job::{Job, JobState, MAX_ENDED_JOBS, MAX_QUEUED_JOBS, NewJob};
-use crate::store::rows::{BODIES, JOBS, POINTS};
+use crate::store::JobMesh;
+use crate::store::job::{FitOrder, Job, JobState, MAX_ENDED_JOBS, MAX_QUEUED_JOBS, NewJob};
+use crate::store::rows::{BODIES, FILES, JOBS, POINTS, TRIANGLES};
 
-use super::{Catalogue, CatalogueError, json, page};
+use super::{Catalogue, CatalogueError, State, json, page};
 
 impl Catalogue {
     /// One job by id.
@@ -26,45 +26,59 @@ impl Catalogue {
         self.read(|state| state.jobs.values().find(|job| job.state == *wanted).cloned())
     }
 
-    /// The points of a job that has not ended, metres.
+    /// The points of a job that has not ended, metres, and the triangles between them; none of either for groups.
     ///
     /// # Errors
-    /// When there are none, or when the disk fails.
-    pub fn job_points(&self, id: u64) -> Result<Vec<Vector3<f64>>, CatalogueError> {
-        let points = self.writer()?.points(id)?;
-        points.ok_or_else(|| CatalogueError::NoJob(id.to_string()))
+    /// When it has ended, or when the disk fails.
+    pub fn job_mesh(&self, id: u64) -> Result<JobMesh, CatalogueError> {
+        let mesh = self.writer()?.mesh(id)?;
+        mesh.ok_or_else(|| CatalogueError::NoJob(id.to_string()))
+    }
+
+    /// The file of the compound or sos-body that a job made, if it made one.
+    ///
+    /// # Errors
+    /// When the disk fails.
+    pub fn job_file(&self, id: u64) -> Result<Option<Vec<u8>>, CatalogueError> {
+        Ok(self.writer()?.file(id)?)
     }
 
     /// Queues a job. The one that was there first when the request id is known; tells whether it is new. The oldest of too
     /// many jobs that have ended is forgotten.
     ///
     /// # Errors
-    /// When the request id was used for another content, when too many jobs wait, or when the disk fails.
+    /// When the request id was used for another content, when it is about a body that is not there, when too many jobs wait, or when
+    /// the disk fails.
     pub fn create_job(&self, new: NewJob) -> Result<(Arc<Job>, bool), CatalogueError> {
         let mut store = self.writer()?;
-        let NewJob { request_id, digest, order, points, coordinates } = new;
-        let (known, queued, ended, id) = self.read(|state| {
+        let NewJob { request_id, digest, order, points, coordinates, corners } = new;
+        let (known, missing, queued, ended, id) = self.read(|state| {
             let jobs = || state.jobs.values();
             let known = jobs().find(|job| !request_id.is_empty() && job.request_id == request_id).cloned();
             let queued = jobs().filter(|job| job.state == JobState::Queued).count();
             let ended: Vec<u64> = jobs().filter(|job| job.state.is_final()).map(|job| job.id).collect();
             // The latest job is never forgotten, so no id is given twice.
-            (known, queued, ended, state.jobs.last_key_value().map_or(1, |(last, _)| last + 1))
+            (known, state.missing(&order), queued, ended, state.jobs.last_key_value().map_or(1, |(last, _)| last + 1))
         });
-        match known {
-            Some(known) if known.digest == digest => return Ok((known, false)),
-            Some(known) => return Err(CatalogueError::RequestUsed { request_id, job: known.id }),
-            None if queued >= MAX_QUEUED_JOBS => return Err(CatalogueError::QueueFull),
-            None => {}
+        match (known, missing) {
+            (Some(known), _) if known.digest == digest => return Ok((known, false)),
+            (Some(known), _) => return Err(CatalogueError::RequestUsed { request_id, job: known.id }),
+            (None, Some(missing)) => return Err(missing),
+            (None, None) if queued >= MAX_QUEUED_JOBS => return Err(CatalogueError::QueueFull),
+            (None, None) => {}
         }
         let job = Arc::new(Job { id, request_id, digest, order, points, attempts: 0, state: JobState::Queued });
         let forgotten = &ended[..ended.len().saturating_sub(MAX_ENDED_JOBS)];
         self.commit(&mut store, |transaction| {
             transaction.open_table(POINTS)?.insert(id, coordinates.as_slice())?;
-            let mut jobs = transaction.open_table(JOBS)?;
+            if !corners.is_empty() {
+                transaction.open_table(TRIANGLES)?.insert(id, corners.as_slice())?;
+            }
+            let (mut jobs, mut files) = (transaction.open_table(JOBS)?, transaction.open_table(FILES)?);
             jobs.insert(id, json(&*job)?.as_slice())?;
             for id in forgotten {
                 jobs.remove(id)?;
+                files.remove(id)?;
             }
             Ok(())
         })?;
@@ -76,8 +90,8 @@ impl Catalogue {
         Ok((job, true))
     }
 
-    /// Moves a job on to the state and number of attempts that `change` says, storing its bodies along with that; `None`
-    /// leaves all as it is. Returns the job as it is then. A job that ends loses its points.
+    /// Moves a job on to the state and number of attempts that `change` says, storing its bodies, or the file of what is no body, along
+    /// with that; `None` leaves all as it is. Returns the job as it is then. A job that ends loses its points.
     ///
     /// # Errors
     /// When there is no such job, or when the disk fails.
@@ -85,6 +99,7 @@ impl Catalogue {
         &self,
         id: u64,
         bodies: Vec<Body>,
+        file: Option<&str>,
         change: impl FnOnce(&Job) -> Option<(JobState, u32)>,
     ) -> Result<Arc<Job>, CatalogueError> {
         let mut store = self.writer()?;
@@ -100,6 +115,10 @@ impl Catalogue {
             }
             if next.state.is_final() {
                 transaction.open_table(POINTS)?.remove(id)?;
+                transaction.open_table(TRIANGLES)?.remove(id)?;
+            }
+            if let Some(file) = file {
+                transaction.open_table(FILES)?.insert(id, file.as_bytes())?;
             }
             transaction.open_table(JOBS)?.insert(id, json(&*next)?.as_slice())?;
             Ok(())
@@ -110,5 +129,14 @@ impl Catalogue {
         });
         tracing::debug!(id, attempts, state = %next.state, "fit job moved on");
         Ok(next)
+    }
+}
+
+impl State {
+    /// The first body of an order's group that is not there.
+    fn missing(&self, order: &FitOrder) -> Option<CatalogueError> {
+        let mut ids = order.group.iter().flat_map(|group| &group.body_ids).enumerate();
+        let is_there = |id: &str| id.parse().is_ok_and(|id| self.bodies.contains_key(&id));
+        ids.find(|(_, id)| !is_there(id)).map(|(index, id)| CatalogueError::NoMember { index, id: id.clone() })
     }
 }

@@ -3,26 +3,18 @@
 use nalgebra::Vector3;
 
 use super::{Disk, ball};
-use crate::store::rows::{JOBS, POINTS};
+use crate::store::rows::{FILES, JOBS, POINTS, TRIANGLES};
 use crate::store::{
-    Catalogue, CatalogueError, FitOrder, FitOutcome, Job, JobState, MAX_ENDED_JOBS, MAX_QUEUED_JOBS, NewJob, StoreError,
+    Catalogue, CatalogueError, FitGroup, FitOrder, FitOutcome, FittedKind, Job, JobState, MAX_ENDED_JOBS,
+    MAX_QUEUED_JOBS, NewJob, StoreError,
 };
 
 fn order(name: &str) -> FitOrder {
-    FitOrder {
-        name: name.into(),
-        input: String::new(),
-        degree: Some(4),
-        objective: "logdet-p".into(),
-        refine: false,
-        slabs: 0,
-        ladder: false,
-        max_gap_m: Some(0.1 + 0.2),
-        trim: 1.0 / 3.0,
-        min_thickness_m: None,
-        scale: 1e-3,
-    }
+    let (degree, max_gap_m) = (Some(4), Some(0.1 + 0.2));
+    FitOrder { name: name.into(), degree, max_gap_m, trim: 1.0 / 3.0, scale: 1e-3, ..FitOrder::default() }
 }
+
+const CORNERS: [[u32; 3]; 1] = [[0, 1, 1]];
 
 /// Coordinates that use all their bits, and the special ones.
 fn points() -> Vec<Vector3<f64>> {
@@ -30,7 +22,7 @@ fn points() -> Vec<Vector3<f64>> {
 }
 
 fn job(request_id: &str) -> NewJob {
-    NewJob::new(request_id.into(), order("it"), &points())
+    NewJob::new(request_id.into(), order("it"), &points(), &CORNERS)
 }
 
 fn done() -> JobState {
@@ -38,7 +30,8 @@ fn done() -> JobState {
 }
 
 fn end(catalogue: &Catalogue, id: u64, state: &JobState) -> Result<std::sync::Arc<Job>, CatalogueError> {
-    catalogue.change_job(id, vec![ball(3.0)], |job| (!job.state.is_final()).then(|| (state.clone(), job.attempts)))
+    catalogue
+        .change_job(id, vec![ball(3.0)], None, |job| (!job.state.is_final()).then(|| (state.clone(), job.attempts)))
 }
 
 #[test]
@@ -56,19 +49,98 @@ fn every_acknowledged_state_is_on_disk() {
     };
     let bits = |points: &[Vector3<f64>]| points.iter().flatten().map(|v| v.to_bits()).collect::<Vec<_>>();
     let again = saved(&made);
-    assert_eq!(bits(&again.job_points(made.id).expect("kept")), bits(&points()));
+    let (kept, corners) = again.job_mesh(made.id).expect("kept");
+    assert_eq!((bits(&kept), corners), (bits(&points()), vec![[0, 1, 1]]));
     let (known, created) = again.create_job(job("r")).expect("known");
     assert!(!created && known == made);
 
-    let running = catalogue.change_job(made.id, Vec::new(), |_| Some((JobState::Running, 1))).expect("moved on");
+    let running = catalogue.change_job(made.id, Vec::new(), None, |_| Some((JobState::Running, 1))).expect("moved on");
     assert_eq!((running.attempts, &running.state), (1, &JobState::Running));
     saved(&running);
     let ended = end(&catalogue, made.id, &done()).expect("ended");
     let again = saved(&ended);
     assert!(again.body(ball(3.0).id()).is_some(), "the body came with the state");
-    assert!(matches!(again.job_points(made.id), Err(CatalogueError::NoJob(_))), "the points went with it");
+    assert!(matches!(again.job_mesh(made.id), Err(CatalogueError::NoJob(_))), "the points went with it");
     // What has ended is not changed any more when its caller looks at it.
     assert_eq!(end(&catalogue, made.id, &JobState::Cancelled).expect("as it is"), ended);
+}
+
+/// An order and a job as they were written when there were fewer options.
+#[test]
+fn jobs_of_earlier_versions_are_read_and_keep_their_request_ids() {
+    let order_then = r#"{"name":"it","input":"","degree":4,"objective":"logdet-p","refine":false,"slabs":0,"ladder":false,"max_gap_m":0.30000000000000004,"trim":0.3333333333333333,"min_thickness_m":null,"scale":0.001}"#;
+    // What request ids are compared by.
+    assert_eq!(serde_json::to_string(&order("it")).expect("JSON"), order_then);
+    let new = NewJob::new("r".into(), order("it"), &points(), &[]);
+    let body = r#"{"id":"5f","gap_m":0.25,"mean_gap_m":0.125,"seconds":1.5,"optimum":null}"#;
+    let state = format!(r#"{{"succeeded":{{"bodies":[{body}],"left_out":0,"left_out_m":0.0}}}}"#);
+    let row = format!(
+        r#"{{"id":1,"request_id":"r","digest":"{}","order":{order_then},"points":2,"attempts":1,"state":{state}}}"#,
+        new.digest
+    );
+    let disk = Disk::default();
+    drop(disk.load().expect("a new catalogue"));
+    disk.meddle(|transaction| {
+        transaction.open_table(JOBS).expect("a table").insert(1, row.as_bytes()).expect("written");
+    });
+    let catalogue = disk.load().expect("loads");
+    let (known, created) = catalogue.create_job(new).expect("known");
+    assert!(!created && known.order == order("it"), "{known:?}");
+    let JobState::Succeeded(outcome) = &known.state else { panic!("{known:?}") };
+    assert_eq!((outcome.bodies[0].kind, outcome.bodies[0].gap_m), (FittedKind::Body, Some(0.25)));
+    assert_eq!(serde_json::to_string(&*known).expect("JSON"), row, "nor is it written otherwise now");
+}
+
+#[test]
+fn every_option_is_read_back() {
+    let group = FitGroup { body_ids: vec!["5f".into()], max_growth: Some(0.2), multiplier_degree: Some(0) };
+    for relax_convexity in [0.0, 0.1 + 0.2, f64::INFINITY] {
+        let order = FitOrder {
+            cone: "dsos".into(),
+            raw_frame: true,
+            relax_convexity,
+            parts: Some(3),
+            group: Some(group.clone()),
+            ..order("it")
+        };
+        let text = serde_json::to_string(&order).expect("JSON");
+        assert_eq!(serde_json::from_str::<FitOrder>(&text).expect("an order"), order);
+    }
+}
+
+#[test]
+fn a_file_stays_until_its_job_is_forgotten() {
+    let disk = Disk::default();
+    let catalogue = disk.load().expect("a new catalogue");
+    let id = catalogue.create_job(job("")).expect("queued").0.id;
+    assert_eq!(catalogue.job_file(id).expect("read"), None);
+    catalogue.change_job(id, Vec::new(), Some("{}"), |_| Some((done(), 1))).expect("ended");
+    assert_eq!(catalogue.job_file(id).expect("read").as_deref(), Some(&b"{}"[..]));
+    drop(catalogue);
+    let catalogue = disk.load().expect("loads");
+    assert_eq!(catalogue.job_file(id).expect("read").as_deref(), Some(&b"{}"[..]));
+    for _ in 0..=MAX_ENDED_JOBS {
+        let next = catalogue.create_job(job("")).expect("queued").0.id;
+        end(&catalogue, next, &JobState::Cancelled).expect("cancelled");
+    }
+    assert!(catalogue.job(id).is_none() && catalogue.job_file(id).expect("read").is_none());
+}
+
+#[test]
+fn a_group_is_of_bodies_that_are_stored() {
+    let catalogue = Disk::default().load().expect("a new catalogue");
+    let there = catalogue.create_body(ball(1.0)).expect("stored").0.id().to_string();
+    let grouping = |body_ids: Vec<String>| {
+        let group = FitGroup { body_ids, max_growth: None, multiplier_degree: None };
+        NewJob::new(String::new(), FitOrder { group: Some(group), ..FitOrder::default() }, &[], &[])
+    };
+    let missing = ball(2.0).id().to_string();
+    match catalogue.create_job(grouping(vec![there.clone(), missing.clone()])) {
+        Err(CatalogueError::NoMember { index, id }) => assert_eq!((index, id), (1, missing)),
+        unexpected => panic!("{unexpected:?}"),
+    }
+    let job = catalogue.create_job(grouping(vec![there])).expect("queued").0;
+    assert_eq!(catalogue.job_mesh(job.id).expect("kept"), (Vec::new(), Vec::new()));
 }
 
 #[test]
@@ -83,7 +155,7 @@ fn a_full_disk_leaves_jobs_as_they_were() {
     assert_eq!(catalogue.job(id).expect("there").state, JobState::Queued);
     assert!(catalogue.body(ball(3.0).id()).is_none(), "half of a change");
     disk.set_full(false);
-    assert_eq!(catalogue.job_points(id).expect("kept"), points());
+    assert_eq!(catalogue.job_mesh(id).expect("kept").0, points());
     assert_eq!(end(&catalogue, id, &done()).expect("room again").state, done());
     assert!(catalogue.body(ball(3.0).id()).is_some());
     assert_eq!(catalogue.jobs(None, 9).0.len(), 1);
@@ -93,9 +165,10 @@ fn a_full_disk_leaves_jobs_as_they_were() {
 fn a_request_id_is_for_one_content() {
     let catalogue = Disk::default().load().expect("a new catalogue");
     let first = catalogue.create_job(job("r")).expect("queued").0;
-    let other_points = NewJob::new("r".into(), order("it"), &points()[1..]);
-    let other_order = NewJob::new("r".into(), order("that"), &points());
-    for other in [other_points, other_order] {
+    let other_points = NewJob::new("r".into(), order("it"), &points()[1..], &CORNERS);
+    let other_triangles = NewJob::new("r".into(), order("it"), &points(), &[[0, 1, 0]]);
+    let other_order = NewJob::new("r".into(), order("that"), &points(), &CORNERS);
+    for other in [other_points, other_triangles, other_order] {
         match catalogue.create_job(other) {
             Err(CatalogueError::RequestUsed { request_id, job }) => assert_eq!((&*request_id, job), ("r", first.id)),
             unexpected => panic!("{unexpected:?}"),
@@ -111,7 +184,7 @@ fn the_queue_is_bounded_and_the_oldest_that_ended_are_forgotten() {
         catalogue.create_job(job("")).expect("queued");
     }
     assert!(matches!(catalogue.create_job(job("")), Err(CatalogueError::QueueFull)));
-    let known = catalogue.create_job(NewJob::new("r".into(), order("it"), &points()));
+    let known = catalogue.create_job(NewJob::new("r".into(), order("it"), &points(), &CORNERS));
     assert!(matches!(known, Err(CatalogueError::QueueFull)));
     // The first goes on waiting while others come and go.
     let mut last = MAX_QUEUED_JOBS as u64;
@@ -135,13 +208,15 @@ fn files_of_programs_that_knew_no_jobs_are_read() {
     drop(super::furnished(&disk));
     disk.meddle(|transaction| {
         transaction.delete_table(JOBS).expect("deleted");
-        transaction.delete_table(POINTS).expect("deleted");
+        for table in [POINTS, TRIANGLES, FILES] {
+            transaction.delete_table(table).expect("deleted");
+        }
     });
     let catalogue = disk.load().expect("loads");
     assert_eq!((catalogue.counts(), catalogue.jobs(None, 9).0.len()), ((1, 1), 0));
-    assert!(matches!(catalogue.job_points(1), Err(CatalogueError::NoJob(_))));
+    assert!(matches!(catalogue.job_mesh(1), Err(CatalogueError::NoJob(_))));
     let id = catalogue.create_job(job("")).expect("queued").0.id;
-    assert_eq!(catalogue.job_points(id).expect("kept"), points());
+    assert_eq!(catalogue.job_mesh(id).expect("kept").0, points());
 }
 
 #[test]

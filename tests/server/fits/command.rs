@@ -5,9 +5,11 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use serde_json::Value;
+use sublevel::body::Body;
 use sublevel::service::proto::{FitState, ListFitsRequest};
 
-use super::cloud;
+use super::{arc, cloud, off};
 use crate::harness::{Running, run};
 
 fn write_points(file: &Path, count: usize) {
@@ -18,40 +20,81 @@ fn write_points(file: &Path, count: usize) {
     std::fs::write(file, text).expect("written");
 }
 
+/// Runs `sublevel fit` and returns its rows without what differs from run to run: times, and the folder.
+fn rows(args: &[&str]) -> Vec<Value> {
+    let done = run(&[&["fit"][..], args, &["--json"]].concat());
+    assert!(done.status.success(), "{args:?}: {}", String::from_utf8_lossy(&done.stderr));
+    let mut rows: Vec<Value> = serde_json::from_slice(&done.stdout).expect("JSON");
+    for row in &mut rows {
+        let row = row.as_object_mut().expect("a row");
+        row.remove("seconds");
+        let body = row.remove("body").expect("a file");
+        let name = Path::new(body.as_str().expect("text")).file_name().expect("a name").to_owned();
+        row.insert("name".into(), name.to_str().expect("text").into());
+    }
+    rows
+}
+
+/// Runs `sublevel fit` without and with a server; the files that both wrote, which are the same.
+fn both(dir: &Path, url: &str, args: &[&str]) -> Vec<String> {
+    let [here, there] = ["here", "there"].map(|out| dir.join(out).to_str().expect("text").to_owned());
+    let expected = rows(&[args, &["--out", &here]].concat());
+    assert_eq!(rows(&[args, &["--out", &there, "--server", url]].concat()), expected, "{args:?}");
+    let names = expected.iter().map(|row| row["name"].as_str().expect("text").to_owned());
+    names
+        .inspect(|name| {
+            let [one, other] = [&here, &there].map(|out| std::fs::read(Path::new(out).join(name)).expect("a file"));
+            assert!(one == other, "{args:?}: {name} differs");
+        })
+        .collect()
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn the_command_writes_the_same_files_with_and_without_a_server() {
     let dir = tempfile::tempdir().expect("a directory");
     let server = Running::start(&dir.path().join("data"));
     let mut clients = server.connect().await;
-    let file = dir.path().join("cloud.xyz");
-    write_points(&file, 200);
-    let (file, url) = (file.to_str().expect("text"), server.url());
-    let out = |name: &str| dir.path().join(name).to_str().expect("text").to_owned();
-    let options = ["--degree", "4", "--ladder", "--trim", "0.02", "--scale", "0.001", "--json"];
-    let rows = |out: &str, server: &[&str]| {
-        let done = run(&[&["fit", file, "--out", out][..], &options, server].concat());
-        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-        let mut rows: serde_json::Value = serde_json::from_slice(&done.stdout).expect("JSON");
-        for row in rows.as_array_mut().expect("rows") {
-            let row = row.as_object_mut().expect("a row");
-            assert!(row.remove("seconds").expect("a time").as_f64() > Some(0.0));
-            let body = row.remove("body").expect("a file");
-            let name = Path::new(body.as_str().expect("text")).file_name().expect("a name").to_owned();
-            row.insert("name".into(), name.to_str().expect("text").into());
-        }
-        rows
-    };
-    let (here, there) = (out("here"), out("there"));
-    let expected = rows(&here, &[]);
-    assert_eq!(rows(&there, &["--server", &url]), expected);
-    assert_eq!(expected.as_array().map(Vec::len), Some(3));
-    for row in expected.as_array().expect("rows") {
-        let name = row["name"].as_str().expect("text");
-        let [one, other] = [&here, &there].map(|out| std::fs::read(Path::new(out).join(name)).expect("a file"));
-        assert!(one == other, "{name} differs");
-        let id: serde_json::Value = serde_json::from_slice(&one).expect("JSON");
-        clients.body(id["id"].as_str().expect("text")).await;
+    let path = |name: &str| dir.path().join(name).to_str().expect("text").to_owned();
+    let (cloud, mesh) = (path("cloud.xyz"), path("arc.off"));
+    write_points(Path::new(&cloud), 200);
+    std::fs::write(&mesh, off(&arc())).expect("written");
+    let stored =
+        both(dir.path(), &server.url(), &[&cloud, "--degree", "4", "--ladder", "--trim", "0.02", "--scale", "0.001"]);
+    assert_eq!(stored, ["cloud-ball.json", "cloud-d2.json", "cloud-d4.json"]);
+    for name in stored {
+        let file = std::fs::read(dir.path().join("here").join(name)).expect("a file");
+        let file: Value = serde_json::from_slice(&file).expect("JSON");
+        clients.body(file["id"].as_str().expect("text")).await;
     }
+    for (options, name) in [
+        (&["--degree", "4", "--cone", "sdsos"][..], "arc-d4.json"),
+        (&["--degree", "4", "--objective", "trace-p", "--raw-frame", "--scale", "0.01"], "arc-d4.json"),
+        (&["--degree", "2", "--parts", "3", "--scale", "0.01"], "arc-d2-p3.json"),
+        (&["--degree", "2", "--parts", "2", "--slabs", "1", "--refine"], "arc-d2-p2.json"),
+        (&["--degree", "4", "--relax-convexity", "10"], "arc-d4-c10.json"),
+        (&["--degree", "4", "--relax-convexity", "inf", "--raw-frame"], "arc-d4-cinf.json"),
+        (&["--degree", "4", "--objective", "inverse-moment", "--trim", "0.02"], "arc-d4-im.json"),
+    ] {
+        assert_eq!(both(dir.path(), &server.url(), &[&[mesh.as_str()], options].concat()), [name]);
+    }
+    // A gap for which three parts are the cheapest.
+    let three = rows(&[&mesh, "--degree", "2", "--parts", "3", "--out", &path("three")]);
+    let gap = format!("{}", 1.0001 * three[0]["gap_m"].as_f64().expect("a gap"));
+    let [compound] = &both(dir.path(), &server.url(), &[&mesh, "--degree", "2", "--max-gap", &gap])[..] else {
+        panic!("one file")
+    };
+    assert!(compound.starts_with("arc-d2-p"), "{compound}");
+
+    let bodies = [("near", 0.0), ("next", 1.2), ("far", 9.0)].map(|(name, x)| {
+        let ball = Body::ball(name, nalgebra::Vector3::new(x, 0.0, 0.0), 0.5).expect("a ball");
+        let file = path(&format!("{name}.json"));
+        std::fs::write(&file, ball.to_json()).expect("written");
+        file
+    });
+    let [near, next, far] = bodies.each_ref().map(String::as_str);
+    assert_eq!(both(dir.path(), &server.url(), &[near, next, "--group", "pair"]), ["pair-d4.json"]);
+    let few = [near, next, far, "--group", "few", "--max-growth", "0.9", "--multiplier-degree", "2"];
+    assert_eq!(both(dir.path(), &server.url(), &few), ["few-1-d4.json", "few-2-d2.json"]);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -64,6 +107,9 @@ async fn the_command_says_what_went_wrong_and_ctrl_c_cancels() {
     write_points(&file, 400);
     let (out, url) = (dir.path().join("out"), server.url());
     let (flat, file, out) = (flat.to_str().expect("text"), file.to_str().expect("text"), out.to_str().expect("text"));
+    let told = run(&["fit", file, "--out", out, "--server", &url, "--parts", "2"]);
+    let stderr = String::from_utf8_lossy(&told.stderr);
+    assert!(!told.status.success() && stderr.contains("no triangles"), "{stderr}");
     for (url, word) in [(url.as_str(), "coplanar"), ("http://127.0.0.1:1", "sublevel serve"), ("no url", "--server")] {
         let refused = run(&["fit", flat, "--out", out, "--server", url]);
         let stderr = String::from_utf8_lossy(&refused.stderr);

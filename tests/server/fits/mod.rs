@@ -1,7 +1,9 @@
 //! Fit jobs as their users meet them: uploads, progress, cancelling, restarts, refusals.
 
 mod command;
+mod groups;
 mod jobs;
+mod options;
 mod refused;
 mod restarts;
 mod uploads;
@@ -10,10 +12,11 @@ use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
 use sublevel::body::Body;
+use sublevel::fit::Mesh;
 use sublevel::service::proto::create_fit_request::Part;
 use sublevel::service::proto::{
     CancelFitRequest, CreateFitRequest, CreateFitResponse, FitHeader, FitJob, FitOptions, FitState, GetBodyRequest,
-    GetFitRequest, PointChunk, WatchFitRequest, WatchFitResponse,
+    GetFitRequest, PointChunk, TriangleChunk, WatchFitRequest, WatchFitResponse,
 };
 use tonic::{Status, Streaming};
 
@@ -27,6 +30,35 @@ fn cloud(count: usize, seed: u64) -> Vec<Vector3<f64>> {
     let mut numbers = Numbers(seed);
     let mut number = || numbers.next();
     (0..count).map(|_| Vector3::new(number(), number(), number()).normalize() * (1.0 + 0.01 * number())).collect()
+}
+
+/// A quarter of a ring, open at both ends and turned so that no axis fits it, metres.
+fn arc() -> Mesh {
+    let turn = nalgebra::Rotation3::from_euler_angles(0.4, -0.3, 0.9);
+    let (along, around) = (16, 8);
+    let point = |k: u32| {
+        let (i, j) = (f64::from(k / around), f64::from(k % around));
+        let (a, b) = (1.6 * i / f64::from(along), std::f64::consts::TAU * j / f64::from(around));
+        let r = 1.0 + 0.2 * b.cos();
+        turn * Vector3::new(r * a.cos(), r * a.sin(), 0.2 * b.sin())
+    };
+    let at = |i: u32, j: u32| (i * around + j % around) as usize;
+    let cells = (0..along - 1).flat_map(|i| (0..around).map(move |j| (i, j)));
+    let halves = |(i, j)| [[at(i, j), at(i + 1, j), at(i, j + 1)], [at(i, j + 1), at(i + 1, j), at(i + 1, j + 1)]];
+    Mesh { points: (0..along * around).map(point).collect(), triangles: cells.flat_map(halves).collect() }
+}
+
+/// The text of a mesh file that is read back exactly.
+fn off(mesh: &Mesh) -> String {
+    let mut text = format!("OFF\n{} {} 0\n", mesh.points.len(), mesh.triangles.len());
+    mesh.points.iter().for_each(|point| text += &format!("{} {} {}\n", point.x, point.y, point.z));
+    mesh.triangles.iter().for_each(|[a, b, c]| text += &format!("3 {a} {b} {c}\n"));
+    text
+}
+
+fn triangles(triangles: &[[usize; 3]]) -> CreateFitRequest {
+    let corners = triangles.iter().flatten().map(|&corner| corner as u32).collect();
+    message(Part::Triangles(TriangleChunk { corners }))
 }
 
 fn header(name: &str, options: FitOptions) -> FitHeader {
@@ -61,6 +93,13 @@ impl Clients {
     async fn queue(&mut self, header: FitHeader, points: &[Vector3<f64>]) -> FitJob {
         let mut messages = vec![message(Part::Header(header))];
         messages.extend(points.chunks(50_000).map(chunk));
+        self.upload(messages).await.expect("queued").job.expect("a job")
+    }
+
+    /// Queues a job about this mesh.
+    async fn queue_mesh(&mut self, header: FitHeader, mesh: &Mesh) -> FitJob {
+        let (some, others) = mesh.triangles.split_at(mesh.triangles.len() / 3);
+        let messages = vec![message(Part::Header(header)), triangles(some), chunk(&mesh.points), triangles(others)];
         self.upload(messages).await.expect("queued").job.expect("a job")
     }
 

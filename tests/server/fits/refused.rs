@@ -2,7 +2,8 @@
 
 use sublevel::service::proto::create_fit_request::Part;
 use sublevel::service::proto::{
-    CreateFitRequest, FitHeader, FitObjective, FitOptions, ListFitsRequest, MeshFormat, PointChunk,
+    CreateFitRequest, FitCone, FitHeader, FitObjective, FitOptions, ListFitsRequest, MeshFormat, PointChunk,
+    TriangleChunk,
 };
 use tonic::Code;
 
@@ -15,6 +16,10 @@ fn first(header: FitHeader) -> CreateFitRequest {
 
 fn numbers(coordinates: Vec<f64>) -> CreateFitRequest {
     message(Part::Points(PointChunk { coordinates }))
+}
+
+fn corners(corners: Vec<u32>) -> CreateFitRequest {
+    message(Part::Triangles(TriangleChunk { corners }))
 }
 
 fn bytes(text: &str) -> CreateFitRequest {
@@ -36,6 +41,8 @@ async fn bad_uploads_are_told_by_field() {
         change(&mut header);
         first(header)
     };
+    let inverse_moment = || FitOptions { objective: FitObjective::InverseMoment.into(), ..quick() };
+    let parts = || FitOptions { parts: 2, ..quick() };
     let scaled = FitOptions { scale: Some(1e300), ..quick() };
     let cases = [
         (vec![], "header"),
@@ -69,6 +76,51 @@ async fn bad_uploads_are_told_by_field() {
             "header.options.min_thickness_m",
         ),
         (vec![asked(FitOptions { scale: Some(-1.0), ..quick() }), points()], "header.options.scale"),
+        (vec![asked(FitOptions { cone: 99, ..quick() }), points()], "header.options.cone"),
+        (
+            vec![asked(FitOptions { cone: FitCone::Dsos.into(), refine: true, ..quick() }), points()],
+            "header.options.cone",
+        ),
+        (vec![asked(FitOptions { parts: 65, ..quick() }), points()], "header.options.parts"),
+        (vec![asked(FitOptions { trim: 0.01, ..parts() }), points()], "header.options.parts"),
+        (vec![asked(FitOptions { ladder: true, ..parts() }), points()], "header.options.parts"),
+        (vec![asked(FitOptions { min_thickness_m: Some(0.1), ..parts() }), points()], "header.options.parts"),
+        (vec![asked(FitOptions { max_gap_m: Some(0.1), ..parts() }), points()], "header.options.max_gap_m"),
+        (vec![asked(FitOptions { relax_convexity: -1.0, ..quick() }), points()], "header.options.relax_convexity"),
+        (vec![asked(FitOptions { relax_convexity: f64::NAN, ..quick() }), points()], "header.options.relax_convexity"),
+        (
+            vec![asked(FitOptions { relax_convexity: 1.0, ladder: true, ..quick() }), points()],
+            "header.options.relax_convexity",
+        ),
+        (vec![asked(FitOptions { relax_convexity: 1.0, ..parts() }), points()], "header.options.relax_convexity"),
+        (
+            vec![asked(FitOptions { relax_convexity: 1.0, ..inverse_moment() }), points()],
+            "header.options.relax_convexity",
+        ),
+        (
+            vec![
+                asked(FitOptions { relax_convexity: 1.0, objective: FitObjective::LogdetH.into(), ..quick() }),
+                points(),
+            ],
+            "header.options.objective",
+        ),
+        (vec![asked(FitOptions { slabs: 1, ..inverse_moment() }), points()], "header.options.objective"),
+        (
+            vec![asked(FitOptions { cone: FitCone::Sdsos.into(), ..inverse_moment() }), points()],
+            "header.options.objective",
+        ),
+        (vec![asked(parts()), points()], "triangles"),
+        (vec![asked(parts()), points(), corners(vec![0, 1])], "triangles.corners"),
+        (vec![asked(parts()), corners(vec![0, 1, 2, 2, 1, 20]), points()], "triangles.corners"),
+        (vec![asked(parts()), corners(vec![0, 1, u32::MAX]), points()], "triangles.corners"),
+        (vec![mesh(), corners(vec![0, 1, 2])], "triangles"),
+        (
+            vec![
+                first(FitHeader { mesh_format: MeshFormat::Xyz.into(), ..header("it", parts()) }),
+                bytes("0 0 0\n1 0 0\n0 1 0\n0 0 1\n"),
+            ],
+            "mesh",
+        ),
         (vec![good()], "points"),
         (vec![good(), chunk(&cloud(3, 37))], "points"),
         (vec![good(), numbers(vec![1.0, 2.0])], "points.coordinates"),
@@ -105,6 +157,12 @@ async fn too_much_is_refused_while_it_comes() {
     let status = clients.upload(messages).await.expect_err("too many");
     assert_eq!((status.code(), field(&status).as_str()), (Code::InvalidArgument, "points.coordinates"), "{status:?}");
     assert!(status.message().contains("2097152"), "{}", status.message());
+
+    let mut messages = vec![first(header("meshed", FitOptions { parts: 2, ..quick() }))];
+    messages.extend(std::iter::repeat_n(corners(vec![1; 3 * 400_000]), 11));
+    let status = clients.upload(messages).await.expect_err("too many");
+    assert_eq!((status.code(), field(&status).as_str()), (Code::InvalidArgument, "triangles.corners"), "{status:?}");
+    assert!(status.message().contains("4194304"), "{}", status.message());
 
     let mesh = FitHeader { mesh_format: MeshFormat::Stl.into(), ..header("large", quick()) };
     let piece = message(Part::Mesh(vec![0; 4_000_000].into()));
