@@ -238,7 +238,7 @@ fn draw_stairs(
     let path: Vec<(i32, i32)> = points.iter().zip(ends).flat_map(|(&(x, y), end)| [(x, y), (end, y)]).collect();
     let style = ink.mix(0.55).stroke_width(3 * FINE / 2);
     if dashed {
-        root.draw(&DashedPathElement::new(path.into_iter(), 6 * FINE, 4 * FINE, style))?;
+        root.draw(&DashedPathElement::new(path, 6 * FINE, 4 * FINE, style))?;
     } else {
         root.draw(&PathElement::new(path, style))?;
     }

@@ -42,7 +42,7 @@ pub fn detail(
     let effort = if quick {
         Effort { quick, trajectories: 2, poses: 100, passes: 3, questions: 100 }
     } else {
-        Effort { quick, trajectories: 8, poses: 250, passes: 9, questions: 2000 }
+        Effort { quick, trajectories: 4, poses: 400, passes: 5, questions: 2000 }
     };
     let mut told = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };
     let pairs = pairs(data, quick)?;

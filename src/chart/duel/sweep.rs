@@ -54,6 +54,8 @@ impl Tally {
 
 /// Walks of a trajectory in a [`Row::turn`]: those of coal's program.
 const WALKS: usize = 9;
+/// Queries that take longer than this are walked once, nanoseconds.
+const SLOW_NS: f64 = 5000.0;
 
 fn median_of(count: usize, time: impl Fn() -> f64) -> f64 {
     median(&(0..count).map(|_| time()).collect::<Vec<_>>())
@@ -137,10 +139,12 @@ impl<'a> Row<'a> {
         self.passes.push((self.time)(1));
     }
 
-    /// Times one pass in which each trajectory is walked [`WALKS`] times on end and the median walk counts: as coal's program does it, whose
-    /// caches and branches are warm by then.
+    /// Times one pass in which each trajectory is walked nine times on end and the median walk counts: as coal's program does it, whose caches and
+    /// branches are warm by then. Slow queries are walked once.
     pub fn turn(&mut self) {
-        self.passes.push((self.time)(WALKS));
+        // What takes long forgets the walk before by its end anyway.
+        let walks = if self.nanoseconds() > SLOW_NS { 1 } else { WALKS };
+        self.passes.push((self.time)(walks));
     }
 
     /// Nanoseconds per query: the median pass of each trajectory, summed.

@@ -22,7 +22,8 @@ struct Effort {
     trajectories: usize,
     poses: usize,
     passes: usize,
-    /// Of what takes ten thousand times as long as the rest.
+    /// Poses, about, and passes of what takes ten thousand times as long as the rest.
+    slow_poses: usize,
     slow_passes: usize,
 }
 
@@ -49,9 +50,9 @@ pub fn speed(
     progress: &mut dyn FnMut(&str) -> ControlFlow<()>,
 ) -> Result<Speed, DuelError> {
     let effort = if quick {
-        Effort { quick, trajectories: 2, poses: 100, passes: 3, slow_passes: 1 }
+        Effort { quick, trajectories: 2, poses: 100, passes: 3, slow_poses: 2, slow_passes: 1 }
     } else {
-        Effort { quick, trajectories: 8, poses: 250, passes: 9, slow_passes: 3 }
+        Effort { quick, trajectories: 4, poses: 400, passes: 5, slow_poses: 8, slow_passes: 2 }
     };
     let coal = Coal::from_environment()?;
     let mut told = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };

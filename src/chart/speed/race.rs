@@ -76,8 +76,6 @@ pub(super) struct Race {
 const AGREEMENT: f64 = 1e-7;
 /// Most poses of a batch.
 const BATCH: usize = 1024;
-/// Parry's meshes take ten thousand times as long as the rest: so many poses, about, have to do.
-const SLOW_POSES: usize = 16;
 
 /// One of ours with its two shapes.
 struct Ours {
@@ -135,7 +133,7 @@ pub(super) fn race(
     }
     lines.push(Line::of(Who::ParryMesh, [error(&truth[1])[0], ModelError::NONE]));
 
-    let every = (parry_poses.iter().map(Vec::len).sum::<usize>() / SLOW_POSES).max(1);
+    let every = (parry_poses.iter().map(Vec::len).sum::<usize>() / effort.slow_poses).max(1);
     let few: Vec<Vec<ParryPose>> = parry_poses.iter().map(|t| t.iter().step_by(every).copied().collect()).collect();
     let mut rows = Rows { rows: Vec::new() };
     ours.iter().for_each(|one| rows.ours(one, &poses));

@@ -20,8 +20,8 @@ the hulls do not, less minus its depth. `mesh` is the same against the distance 
 - Compounds and covers of balls contain the mesh, not its hull: they stand in the charts against meshes only.
 - Smooth motions of steps of 0.5 % of the larger diameter and one degree about each other; bodies of degree 2 and up stay apart, the closest of \
 them mostly by 2.5 to 37 % of the larger diameter. Seeds 1, 2, ... of SplitMix64, those that come too close left out. Everybody walks the same \
-poses; rows take turns; in a turn each motion is walked nine times on end, as coal's program does it, and the median counts, then the median of the \
-turns; one thread. Parry's meshes are walked once per turn, at about 16 of the poses.
+poses; rows take turns; in a turn each motion is walked nine times on end (once if a query takes more than 5 µs), as coal's program does it, and the median counts, then the median of the \
+turns; one thread. Parry's meshes are asked at a few of the poses only.
 - warm: with the hint from the pose before (ours, coal's cached guess, parry's initial direction). batch: all poses of a motion in one call, each \
 solved cold. Peers have no batch and stand with the faster of their two times there.
 - Hulls of n vertices are intersections of half-spaces that touch the hull, chosen one by one to cut off what stands out farthest: they contain \

@@ -56,7 +56,7 @@ pub fn warm(
     let effort = if quick {
         Effort { trajectories: 2, poses: 100, passes: 3, positions: 61 }
     } else {
-        Effort { trajectories: 8, poses: 400, passes: 9, positions: 201 }
+        Effort { trajectories: 4, poses: 400, passes: 5, positions: 201 }
     };
     let (degrees, sizes) = if quick { (&QUICK_DEGREES[..], &QUICK_STEPS[..]) } else { (&DEGREES[..], &STEPS[..]) };
     let coal = Coal::from_environment()?;
