@@ -2,8 +2,8 @@
 
 #![cfg(feature = "chart")]
 
-use std::path::PathBuf;
-use std::process::Command;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
 
 /// Rows with volumes known independently for human, chair, hand, vase and octopus, and how far above them an answer may be: exact
 /// geometry either way, fits only above.
@@ -61,4 +61,157 @@ fn missing_meshes_are_told() {
     let error = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{error}");
     assert!(error.contains("10.off") && error.contains("Princeton"), "{error}");
+}
+
+/// `sublevel chart FIGURE --quick` with fits kept for the next run.
+fn quick(figure: &str, data: &Path, out: &Path) -> Output {
+    let fits = Path::new(env!("CARGO_TARGET_TMPDIR")).join("chart-fits");
+    Command::new(env!("CARGO_BIN_EXE_sublevel"))
+        .args(["chart", figure, "--quick", "--data"])
+        .arg(data)
+        .arg("--fits")
+        .arg(fits)
+        .arg("--out")
+        .arg(out)
+        .env_remove("SUBLEVEL_COAL")
+        .output()
+        .expect("the program starts")
+}
+
+/// The files of a quick figure: report and table as text; every picture that the report shows is looked at.
+fn made(figure: &str) -> Option<(String, String)> {
+    let Some(data) = std::env::var_os("SUBLEVEL_DATA").map(PathBuf::from) else {
+        eprintln!("skipped: SUBLEVEL_DATA does not name the folder with the meshes");
+        return None;
+    };
+    let out = tempfile::tempdir().expect("a folder can be made");
+    let output = quick(figure, &data, out.path());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let read = |name: &str| std::fs::read_to_string(out.path().join(name)).expect("the file is written");
+    let report = read(&format!("{figure}.md"));
+    let shown: Vec<&str> = report.split("](").skip(1).filter_map(|rest| rest.split(')').next()).collect();
+    assert!(shown.len() >= 3, "{shown:?}");
+    for name in shown {
+        let picture = read(name);
+        assert!(picture.starts_with("<svg") && !picture.contains("NaN"), "{name}");
+    }
+    assert!(report.contains(&format!("`sublevel chart {figure} --data DIR --quick`")), "the command is printed");
+    Some((report, read(&format!("{figure}.csv"))))
+}
+
+/// Lines of a table whose first cells are these, as the numbers of a column; NaN where there is none.
+fn column(csv: &str, first: &str, name: &str) -> Vec<f64> {
+    let heads: Vec<&str> = csv.lines().next().expect("a head").split(',').collect();
+    let from_the_end = heads.len() - heads.iter().position(|head| *head == name).expect("a column of that name");
+    // Names in front may hold commas.
+    let cell = |line: &str| line.rsplit(',').nth(from_the_end - 1)?.parse().ok();
+    csv.lines().filter(|line| line.starts_with(first)).map(|line| cell(line).unwrap_or(f64::NAN)).collect()
+}
+
+#[test]
+fn the_quick_chart_of_speed_holds_what_is_known() {
+    let Some((report, csv)) = made("speed") else { return };
+    for pair in ["chair-human", "mug-table"] {
+        let of = |name: &str, head: &str| {
+            let found = column(&csv, &format!("{pair},\"{name}\","), head);
+            assert_eq!(found.len(), 1, "{pair}, {name}");
+            found[0]
+        };
+        // Closer and closer.
+        let names = ["ball", "ellipsoid", "degree 4", "degree 6", "degree 6, refined"];
+        let errors = names.map(|name| of(name, "hull_error_mean"));
+        assert!(errors.windows(2).all(|pair| pair[1] < pair[0]), "{pair}: {errors:?}");
+        assert!(of("hull, 64 vertices, parry", "hull_error_mean") < of("hull, 32 vertices, parry", "hull_error_mean"));
+        // All contain the hull, so that none is farther than it; the exact hull contains the mesh.
+        for name in names.into_iter().chain([
+            "axis-aligned box",
+            "oriented box",
+            "degree 4, 4 slabs",
+            "hull, 32 vertices, parry",
+        ]) {
+            assert!(of(name, "hull_error_min") > -1e-7, "{pair}, {name}");
+        }
+        for name in ["hull, parry", "compound of 4, degree 4", "cover of 32 balls"] {
+            assert!(of(name, "mesh_error_min") > -1e-7, "{pair}, {name}");
+        }
+        assert!(of("oriented box", "hull_error_mean") == of("oriented box, parry", "hull_error_mean"));
+    }
+    for name in ["failed", "wrong"] {
+        assert!(column(&csv, "", name).iter().skip(1).all(|count| *count == 0.0), "{name}: {csv}");
+    }
+    let judged = ["hold everywhere", "Where the figures are missed"];
+    assert!(judged.iter().any(|words| report.contains(words)), "no verdict");
+}
+
+#[test]
+fn the_quick_chart_of_warm_starts_counts_iterations() {
+    let Some((report, csv)) = made("warm") else { return };
+    let steps = csv.split("\n\n").next().expect("the first table");
+    for degree in [4, 6] {
+        let of = |step: &str, head: &str| column(steps, &format!("chair-human,\"degree {degree}\",{step},"), head)[0];
+        assert!(of("0.0001", "warm_iterations") < of("0.3", "warm_iterations"), "hints are worth less from afar");
+        assert!(of("0.01", "warm_iterations") < of("0.01", "cold_iterations"), "hints are worth something");
+        assert!(of("teleport", "warm_most") <= 40.0);
+    }
+    for name in ["failed", "contradictions"] {
+        assert!(column(steps, "chair-human", name).iter().all(|count| *count == 0.0), "{name}: {csv}");
+    }
+    let passage = csv.split("\n\n").nth(1).expect("the second table");
+    assert!(!passage.contains("true"), "no position has a wrong answer");
+    let levels = column(passage, "", "chair_human");
+    let (least, most) = levels.iter().skip(1).fold((f64::INFINITY, 0.0_f64), |(l, m), v| (l.min(*v), m.max(*v)));
+    assert!(least < 1.0 && most > 100.0, "through contact: {least} {most}");
+    assert!(report.contains("150 ms") && report.contains("10 ms"), "the paper's times");
+}
+
+#[test]
+fn the_quick_chart_of_detail_settles_more_on_every_rung() {
+    let Some((_, csv)) = made("detail") else { return };
+    for pair in ["chair-human", "mug-table"] {
+        let rungs = ["ball", "ellipsoid", "degree 4", "degree 6"];
+        let of = |rung: &str, head: &str| column(&csv, &format!("{pair},{rung},"), head);
+        let errors = rungs.map(|rung| of(rung, "error_mean")[0]);
+        assert!(errors.windows(2).all(|pair| pair[1] < pair[0]) && errors[3] > 0.0, "{errors:?}");
+        let settled = |rung: &str| of(rung, "yes").iter().sum::<f64>() + of(rung, "no").iter().sum::<f64>();
+        assert!(settled("degree 6") > settled("ball"));
+        for rung in rungs {
+            assert_eq!(of(rung, "gap").len(), 10, "a line for each threshold");
+            assert!(of(rung, "gap")[0] > of(rung, "error_max")[0], "{pair}, {rung}: the gap bounds the error");
+            for name in ["failed", "wrong", "contradicted"] {
+                assert!(of(rung, name).iter().all(|count| *count == 0.0), "{pair}, {rung}, {name}");
+            }
+            let last = [of(rung, "yes"), of(rung, "no")].map(|parts| parts[9]);
+            assert!(last[0] + last[1] > 0.8, "{pair}, {rung}: far questions are easy, {last:?}");
+        }
+    }
+}
+
+#[test]
+fn charts_refuse_what_they_can_not_use_with_a_remedy() {
+    let out = tempfile::tempdir().expect("a folder can be made");
+    let file = out.path().join("file");
+    std::fs::write(&file, "").expect("a file can be written");
+    let folder = out.path();
+    for figure in ["speed", "warm", "detail"] {
+        let told = |output: Output, code: i32, words: &[&str]| {
+            let error = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert_eq!(output.status.code(), Some(code), "{figure}: {error}");
+            assert!(words.iter().all(|word| error.contains(word)), "{figure}: {error}");
+        };
+        told(quick(figure, folder, folder), 1, &["psb/101.off", "--data"]);
+        told(quick(figure, folder, &file), 1, &["--out"]);
+        let chart = |arguments: &[&str], coal: Option<&Path>| {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_sublevel"));
+            command.args(["chart", figure]).args(arguments).current_dir(folder).env_remove("SUBLEVEL_COAL");
+            coal.into_iter().for_each(|coal| {
+                command.env("SUBLEVEL_COAL", coal);
+            });
+            command.output().expect("the program starts")
+        };
+        told(chart(&[], None), 2, &["--data"]);
+        told(chart(&["--data", ".", "--fits", "file"], None), 1, &["file", "another folder"]);
+        if figure != "detail" {
+            told(chart(&["--data", "."], Some(Path::new("absent"))), 1, &["SUBLEVEL_COAL", "absent"]);
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use std::fs;
-use sublevel::chart;
+use sublevel::chart::{self, duel::parry_version};
 
 /// The machine and the versions, as far as they can be told.
 #[derive(Debug, Serialize)]
@@ -17,7 +17,7 @@ pub(crate) struct Machine {
 
 impl Machine {
     pub(crate) fn new(coal: Option<String>) -> Self {
-        Self { this: chart::Machine::this(), parry: locked_version("parry3d-f64"), coal, load: [load(), None] }
+        Self { this: chart::Machine::this(), parry: parry_version(), coal, load: [load(), None] }
     }
 
     /// Notes the load once all is measured.
@@ -46,12 +46,4 @@ impl Machine {
 
 fn load() -> Option<f64> {
     fs::read_to_string("/proc/loadavg").ok()?.split_whitespace().next()?.parse().ok()
-}
-
-/// Version of a dependency in the lock file.
-fn locked_version(name: &str) -> String {
-    let mut lines = include_str!("../../Cargo.lock").lines();
-    let wanted = format!("name = \"{name}\"");
-    let version = lines.find(|line| *line == wanted).and_then(|_| lines.next());
-    version.and_then(|line| line.split('"').nth(1)).unwrap_or("unknown").to_owned()
 }

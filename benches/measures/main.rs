@@ -14,11 +14,11 @@ mod sweep;
 use clap::Parser;
 use motion::Kind;
 use objects::{Object, Pair};
-use peers::Coal;
 use report::{Report, Table};
 use std::error::Error;
 use std::fs;
 use std::path::PathBuf;
+use sublevel::chart::duel::{Coal, CoalRun};
 
 /// Time the measures and compare them with GJK on the hulls
 ///
@@ -65,6 +65,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 
     let coal = Coal::from_environment()?;
+    if coal.is_none() {
+        eprintln!(
+            "note: without coal; build it with '../shared/peers/build.sh DIR' and set SUBLEVEL_COAL=DIR/coal_gjk"
+        );
+    }
     let mut report = Report::new(coal.as_ref());
     report.print_head();
     for ((a, b), name) in objects::PAIRS.into_iter().zip(names) {
@@ -103,15 +108,15 @@ fn compare(
 ) -> Result<Table, Box<dyn Error>> {
     let scene = rows::Scene::new(pair, kind, effort.trajectories, effort.poses)?;
     let mut rows = rows::all(&scene);
-    let mut coal = coal.map(|coal| coal.start(&scene)).transpose()?;
+    let mut coal = coal.map(|coal| peers::start(coal, &scene)).transpose()?;
     for _ in 0..effort.passes {
         if let Some(coal) = &mut coal {
             coal.pass()?;
         }
-        rows.iter_mut().for_each(sweep::Row::pass);
+        rows.iter_mut().for_each(|row| row.timed.pass());
     }
     if let Some(coal) = &coal {
-        coal.check(&scene)?;
+        peers::check(coal, &scene)?;
     }
-    Ok(Table::new(&scene, &rows, coal.as_ref().map(peers::CoalRun::times), separated))
+    Ok(Table::new(&scene, &rows, coal.as_ref().map(CoalRun::times), separated))
 }

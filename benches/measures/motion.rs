@@ -1,15 +1,10 @@
-//! Smooth motions of one body about another in steps of one centimetre and one degree; poses in overlap; screw motions; rays.
+//! What is asked besides distances along motions: poses in overlap, screw motions, rays; and what motions are like.
 
-use nalgebra::{UnitQuaternion, Vector3};
-use std::f64::consts::TAU;
-use std::fmt::Write;
+use nalgebra::Vector3;
 use sublevel::body::Body;
-use sublevel::measure::{
-    Motion, MotionError, Options, Pose, PoseError, Ray, RayError, WarmStart, distance, signed_distance,
-};
-
-/// Poses of `b` in the frame of `a`.
-pub(crate) type Trajectory = Vec<Pose>;
+use sublevel::chart::duel::Random;
+pub(crate) use sublevel::chart::duel::motion::{Trajectory, grazing, separated, through_contact, to_text};
+use sublevel::measure::{Motion, MotionError, Options, Pose, PoseError, Ray, RayError, WarmStart, signed_distance};
 
 /// How close the bodies come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, clap::ValueEnum)]
@@ -33,220 +28,13 @@ impl Kind {
     }
 }
 
-/// Translation from pose to pose, metres.
-const STEP: f64 = 0.01;
-/// Rotation from pose to pose, radians.
-const TURN: f64 = TAU / 360.0;
-/// How much the directions of translation and rotation change in a step, radians.
-const WANDER: f64 = 0.05;
-
-/// The gap that separated motions keep about, and how far from it they are steered back with full strength, metres.
-const MIDDLE: f64 = 0.4;
-const HALF_RANGE: f64 = 0.35;
-/// Below this gap of any pair a separated motion is thrown away, metres.
-const CLEAR: f64 = 0.01;
-
-/// Ranges of the gap of grazing motions and of those through contact, metres, and the poses in which they go through them.
-const GRAZE: (f64, f64) = (1e-6, 0.01);
-const CONTACT: (f64, f64) = (-0.05, 0.01);
-const PERIOD: f64 = 90.0;
-
-/// SplitMix64 (Steele, Lea, Flood 2014): the same motions everywhere.
-struct Random(u64);
-
-impl Random {
-    /// Uniform in [-1, 1).
-    fn signed(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-
-    /// Uniform on the sphere.
-    fn direction(&mut self) -> Vector3<f64> {
-        loop {
-            let v = Vector3::from_fn(|_, _| self.signed());
-            if (0.1..1.0).contains(&v.norm()) {
-                return v.normalize();
-            }
-        }
-    }
-}
-
-/// A body on its way: where its middle is, how it is turned, where it goes and about which axis it turns.
-struct Walk {
-    middle: Vector3<f64>,
-    position: Vector3<f64>,
-    rotation: UnitQuaternion<f64>,
-    heading: Vector3<f64>,
-    axis: Vector3<f64>,
-    random: Random,
-}
-
-impl Walk {
-    /// Starts clear of `a` in a random direction.
-    fn new(a: &Body, b: &Body, seed: u64) -> Self {
-        let mut random = Random(seed);
-        let (ball_a, ball_b) = (a.circumscribed(), b.circumscribed());
-        let position = ball_a.center + random.direction() * (ball_a.radius + ball_b.radius + MIDDLE);
-        let rotation = UnitQuaternion::new(random.direction() * (TAU * random.signed()));
-        let (heading, axis) = (random.direction(), random.direction());
-        Self { middle: ball_b.center, position, rotation, heading, axis, random }
-    }
-
-    fn pose(&self) -> Result<Pose, PoseError> {
-        Pose::from_quaternion(self.position - self.rotation * self.middle, self.rotation.coords.into())
-    }
-
-    /// One step; `steer` changes the heading first.
-    fn step(&mut self, steer: impl FnOnce(Vector3<f64>) -> Vector3<f64>) {
-        let wander = self.random.direction() * WANDER;
-        self.heading = steer(self.heading + wander).normalize();
-        self.axis = (self.axis + self.random.direction() * WANDER).normalize();
-        self.position += self.heading * STEP;
-        self.rotation = UnitQuaternion::new(self.axis * TURN) * self.rotation;
-    }
-}
-
-/// Motions on which every one of these pairs stays apart.
-pub(crate) fn separated(
-    pairs: &[(&Body, &Body)],
-    trajectories: usize,
-    poses: usize,
-) -> Result<Vec<Trajectory>, PoseError> {
-    let mut found = Vec::new();
-    let mut seed = 0;
-    while found.len() < trajectories {
-        seed += 1;
-        found.extend(try_separated(pairs, poses, seed)?);
-    }
-    Ok(found)
-}
-
-/// None where the bodies came too close.
-fn try_separated(pairs: &[(&Body, &Body)], poses: usize, seed: u64) -> Result<Option<Trajectory>, PoseError> {
-    let Some((a, b)) = pairs.first() else { return Ok(None) };
-    let mut walk = Walk::new(a, b, seed);
-    let mut trajectory = Vec::new();
-    while trajectory.len() < poses {
-        let pose = walk.pose()?;
-        let answers = pairs.iter().map(|(a, b)| gap(a, b, &pose, &mut WarmStart::default()));
-        let Some((gap, normal)) = answers.min_by(|x, y| x.0.total_cmp(&y.0)) else { return Ok(None) };
-        let Some(normal) = normal.filter(|_| gap >= CLEAR) else { return Ok(None) };
-        // Within reach only: the way there is no part of the motion.
-        if gap <= MIDDLE + HALF_RANGE || !trajectory.is_empty() {
-            trajectory.push(pose);
-        }
-        // The normal points from b to a: along it b comes closer.
-        let pull = ((gap - MIDDLE) / HALF_RANGE).powi(3).clamp(-2.0, 2.0);
-        walk.step(|heading| heading + normal * (0.2 * pull));
-    }
-    Ok(Some(trajectory))
-}
-
-/// Motions of one body along the other with the gap going up and down through [`GRAZE`].
-pub(crate) fn grazing(a: &Body, b: &Body, trajectories: usize, poses: usize) -> Result<Vec<Trajectory>, PoseError> {
-    along(a, b, trajectories, poses, GRAZE, settle)
-}
-
-/// Motions of one body along the other with the gap going up and down through [`CONTACT`].
-pub(crate) fn through_contact(
-    a: &Body,
-    b: &Body,
-    trajectories: usize,
-    poses: usize,
-) -> Result<Vec<Trajectory>, PoseError> {
-    along(a, b, trajectories, poses, CONTACT, settle_signed)
-}
-
-/// Moves a body until its gap to another is as wanted, from the normal of the pose before and with its hint; tells the new
-/// normal.
-type Settle = fn(&mut Walk, &Body, &Body, f64, Vector3<f64>, &mut WarmStart) -> Result<Vector3<f64>, PoseError>;
-
-/// Motions of one body along the other with the gap going up and down through a range.
-///
-/// The step along the surface is a centimetre; turning adds what brings the gap back.
-fn along(
-    a: &Body,
-    b: &Body,
-    trajectories: usize,
-    poses: usize,
-    (least, most): (f64, f64),
-    settle: Settle,
-) -> Result<Vec<Trajectory>, PoseError> {
-    (1..=trajectories as u64)
-        .map(|seed| {
-            let mut walk = Walk::new(a, b, seed);
-            let mut warm = WarmStart::default();
-            let mut normal = Vector3::x();
-            let mut trajectory = Vec::new();
-            for pose in 0..poses {
-                let phase = TAU * pose as f64 / PERIOD;
-                let wanted = least + (most - least) * 0.5 * (1.0 - phase.cos());
-                normal = settle(&mut walk, a, b, wanted, normal, &mut warm)?;
-                trajectory.push(walk.pose()?);
-                walk.step(|heading| heading - normal * normal.dot(&heading));
-            }
-            Ok(trajectory)
-        })
-        .collect()
-}
-
-/// Moves the body along the normal until the gap is as wanted. One move is exact: the distance is convex in the translation
-/// and falls along the normal with slope 1.
-fn settle(
-    walk: &mut Walk,
-    a: &Body,
-    b: &Body,
-    wanted: f64,
-    mut normal: Vector3<f64>,
-    warm: &mut WarmStart,
-) -> Result<Vector3<f64>, PoseError> {
-    // Overlapping bodies are drawn apart by steps first, which is soon done.
-    for _ in 0..1000 {
-        let (gap, found) = gap(a, b, &walk.pose()?, warm);
-        let Some(found) = found.filter(|_| gap > 0.0) else {
-            walk.position -= normal * STEP;
-            continue;
-        };
-        normal = found;
-        walk.position += normal * (gap - wanted);
-        if (gap - wanted).abs() <= 0.1 * GRAZE.0 {
-            break;
-        }
-    }
-    Ok(normal)
-}
-
-/// The same by the signed distance. In overlap a move to another face may be shorter by then: a few moves come close.
-fn settle_signed(
-    walk: &mut Walk,
-    a: &Body,
-    b: &Body,
-    wanted: f64,
-    mut normal: Vector3<f64>,
-    warm: &mut WarmStart,
-) -> Result<Vector3<f64>, PoseError> {
-    for _ in 0..10 {
-        let answer = signed_distance(a, &Pose::identity(), b, &walk.pose()?, &Options::default(), warm);
-        normal = answer.normal.unwrap_or(normal);
-        walk.position += normal * (answer.value() - wanted);
-        if (answer.value() - wanted).abs() <= 0.01 * (CONTACT.1 - CONTACT.0) {
-            break;
-        }
-    }
-    Ok(normal)
-}
-
 /// Poses that have nothing to do with each other in all of which the bodies overlap, from all but apart to all but
 /// concentric.
 pub(crate) fn overlapping(a: &Body, b: &Body, trajectories: usize, poses: usize) -> Result<Vec<Trajectory>, PoseError> {
     let mut random = Random(0);
     let reach = a.circumscribed().radius + b.circumscribed().radius;
     let mut draw = || {
-        let rotation = UnitQuaternion::new(random.direction() * (TAU * random.signed()));
+        let rotation = random.rotation();
         let place = a.interior_point() + random.direction() * (reach * random.signed());
         Pose::from_quaternion(place - rotation * b.interior_point(), rotation.coords.into())
     };
@@ -291,12 +79,6 @@ pub(crate) fn rays(a: &Body, b: &Body, poses: &[Trajectory]) -> Result<Vec<Vec<R
     poses.iter().map(|trajectory| trajectory.iter().map(&mut ray).collect()).collect()
 }
 
-/// Distance proven, and the normal from `b` to `a`.
-fn gap(a: &Body, b: &Body, pose: &Pose, warm: &mut WarmStart) -> (f64, Option<Vector3<f64>>) {
-    let answer = distance(a, &Pose::identity(), b, pose, &Options::default(), warm);
-    (answer.lower, answer.normal)
-}
-
 /// What a motion is like, in metres.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub(crate) struct Character {
@@ -330,23 +112,4 @@ fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut sorted: Vec<f64> = values.collect();
     sorted.sort_by(f64::total_cmp);
     sorted
-}
-
-/// The poses as text: `r00 r01 r02 r10 .. r22 tx ty tz` on a line each, an empty line after each trajectory.
-pub(crate) fn to_text(trajectories: &[Trajectory]) -> String {
-    let mut text = String::new();
-    for trajectory in trajectories {
-        for pose in trajectory {
-            let rotation = pose.rotation().to_rotation_matrix();
-            // Stored by columns; the text goes by rows. Writing to a string can not fail.
-            let rows = rotation.matrix().transpose();
-            for number in rows.iter() {
-                let _ = write!(text, "{number:e} ");
-            }
-            let t = pose.translation();
-            let _ = writeln!(text, "{:e} {:e} {:e}", t.x, t.y, t.z);
-        }
-        text.push('\n');
-    }
-    text
 }

@@ -3,10 +3,10 @@
 use nalgebra::Vector3;
 use std::error::Error;
 use std::fs;
-use std::ops::ControlFlow;
 use std::path::PathBuf;
-use sublevel::body::{Body, ContainedPoints};
-use sublevel::fit::{FitOptions, fit, hull::convex_hull, read_points};
+use sublevel::body::Body;
+use sublevel::chart::duel::Shelf;
+use sublevel::fit::{FitOptions, Mesh, hull::convex_hull, read_mesh};
 
 /// The pairs of the figures.
 pub(crate) const PAIRS: [(&str, &str); 3] = [("chair", "human"), ("hand", "vase"), ("octopus", "chair")];
@@ -19,7 +19,6 @@ pub(crate) const DEGREES: [usize; 4] = [2, 4, 6, 8];
 
 /// An object as a hull and as bodies.
 pub(crate) struct Object {
-    pub(crate) name: String,
     /// Vertices of the convex hull, metres.
     pub(crate) hull: Vec<Vector3<f64>>,
     /// One body for each of [`DEGREES`].
@@ -46,10 +45,11 @@ impl Object {
         let (_, number) = MESHES.into_iter().find(|(known, _)| *known == name).ok_or("no such mesh")?;
         let data = std::env::var_os("SUBLEVEL_DATA").ok_or("SUBLEVEL_DATA does not name the folder with the meshes")?;
         let path = PathBuf::from(data).join(format!("psb/{number}.off"));
-        let points = read_points(&path, 1.0).map_err(|error| format!("{}: {error}", path.display()))?;
-        let hull = convex_hull(&points)?.vertices.into_iter().map(|i| points[i]).collect();
-        let bodies = DEGREES.into_iter().map(|degree| kept(name, degree, &points)).collect::<Result<_, _>>()?;
-        Ok(Self { name: name.to_owned(), hull, bodies })
+        let mesh = read_mesh(&path, 1.0)?;
+        let hull = convex_hull(&mesh.points)?.vertices.into_iter().map(|i| mesh.points[i]).collect();
+        let shelf = Shelf::new(&folder()?)?;
+        let bodies = DEGREES.into_iter().map(|degree| kept(&shelf, name, degree, &mesh)).collect::<Result<_, _>>()?;
+        Ok(Self { hull, bodies })
     }
 
     fn body(&self, degree: usize) -> &Body {
@@ -66,19 +66,8 @@ pub(crate) fn folder() -> Result<PathBuf, Box<dyn Error>> {
     Ok(folder)
 }
 
-/// The body of an earlier run, if it holds these points, or a new fit.
-fn kept(name: &str, degree: usize, points: &[Vector3<f64>]) -> Result<Body, Box<dyn Error>> {
-    let path = folder()?.join(format!("{name}-d{degree}.json"));
-    let earlier = fs::read_to_string(&path).ok().and_then(|text| Body::from_json(&text).ok());
-    if let Some(body) = earlier
-        && body.degree() == degree
-        && body.points() == Some(&ContainedPoints::of(points))
-    {
-        return Ok(body);
-    }
-    eprintln!("fitting {name} at degree {degree} ...");
+/// The body of an earlier run, or a new fit.
+fn kept(shelf: &Shelf, name: &str, degree: usize, mesh: &Mesh) -> Result<Body, Box<dyn Error>> {
     let options = FitOptions { degree, ..FitOptions::default() };
-    let body = fit(name, points, &options, &mut |_| ControlFlow::Continue(()))?.body;
-    fs::write(&path, body.to_json()).map_err(|error| format!("{}: {error}", path.display()))?;
-    Ok(body)
+    Ok(shelf.body(name, mesh, &options)?)
 }

@@ -2,10 +2,10 @@
 
 use crate::machine::Machine;
 use crate::motion::{Character, Kind};
-use crate::peers::Coal;
 use crate::rows::{COAL_COLD, COAL_WARM, DEGREE, Scene};
 use crate::sweep::{Row, Target};
 use serde::Serialize;
+use sublevel::chart::duel::Coal;
 
 /// All results of a run.
 #[derive(Serialize)]
@@ -88,14 +88,15 @@ impl Table {
     /// Gathers the rows; `coal` is cold and warm, in nanoseconds, `separated` the table of the same pair on those motions.
     pub(crate) fn new(scene: &Scene<'_>, rows: &[Row<'_>], coal: Option<(f64, f64)>, separated: Option<&Self>) -> Self {
         let queries = scene.poses(DEGREE).iter().map(Vec::len).sum();
-        let mut times: Vec<(&str, f64)> = rows.iter().map(|row| (row.label.as_str(), row.nanoseconds())).collect();
+        let mut times: Vec<(&str, f64)> =
+            rows.iter().map(|row| (row.timed.label.as_str(), row.timed.nanoseconds())).collect();
         if let Some((cold, warm)) = coal {
             times.extend([(COAL_COLD, cold), (COAL_WARM, warm)]);
         }
         let time = |label: &str| times.iter().find(|(known, _)| *known == label).map(|(_, time)| *time);
         let line = |label: &str, row: Option<&Row<'_>>| {
             let nanoseconds = time(label).unwrap_or(f64::NAN);
-            let counts = row.and_then(|row| row.tally.iterations());
+            let counts = row.and_then(|row| row.timed.tally.iterations());
             let verdict = |target: &Target| {
                 let (target, at_most, reached) = match *target {
                     Target::PartOf(of, part) => (format!("of {of}"), part, time(of).map(|time| nanoseconds / time)),
@@ -123,12 +124,12 @@ impl Table {
                 of_coal_cold: time(COAL_COLD).map(|time| nanoseconds / time),
                 mean_iterations: counts.map(|(mean, ..)| mean),
                 most_iterations: counts.map(|(.., most)| most),
-                failed: row.map(|row| row.tally.failed),
-                overlaps: row.map(|row| row.tally.overlaps),
+                failed: row.map(|row| row.timed.tally.failed),
+                overlaps: row.map(|row| row.timed.tally.overlaps),
                 targets: row.map_or(&[][..], |row| &row.targets).iter().map(verdict).collect(),
             }
         };
-        let mut lines: Vec<Line> = rows.iter().map(|row| line(&row.label, Some(row))).collect();
+        let mut lines: Vec<Line> = rows.iter().map(|row| line(&row.timed.label, Some(row))).collect();
         if coal.is_some() {
             lines.extend([COAL_COLD, COAL_WARM].map(|label| line(label, None)));
         }

@@ -2,10 +2,10 @@
 
 use crate::motion::{self, Kind, Trajectory};
 use crate::objects::{DEGREES, Pair, folder};
-use crate::peers::{Hulls, parry_pose};
 use crate::sweep::{Answer, Row, Target};
 use std::error::Error;
 use std::fs;
+use sublevel::chart::duel::{Hulls, parry_pose};
 use sublevel::measure::{
     Distance, ImpactOptions, ImpactStatus, Motion, Options, Pose, Ray, RayCast, Status, WarmStart, cast_ray, distance,
     distance_batch, growth_distance, level_distance, penetration, signed_distance, time_of_impact,
@@ -45,7 +45,7 @@ impl<'a> Scene<'a> {
         let all: Vec<(usize, Vec<Trajectory>)> = match kind {
             Kind::Separated => {
                 let bodies: Vec<_> = DEGREES.iter().map(|&degree| pair.bodies(degree)).collect();
-                let shared = motion::separated(&bodies, trajectories, poses)?;
+                let shared = motion::separated(&bodies, 1.0, trajectories, poses)?;
                 DEGREES.iter().map(|&degree| (degree, shared.clone())).collect()
             }
             // Bodies that differ in size can not all graze in one pose: each degree walks the same way along its own.
@@ -61,7 +61,7 @@ impl<'a> Scene<'a> {
         let mut scene = Self {
             pair,
             kind,
-            hulls: Hulls::new(pair)?,
+            hulls: Hulls::new(&pair.a.hull, &pair.b.hull)?,
             poses: all,
             parry_poses: Vec::new(),
             rays: Vec::new(),
@@ -245,10 +245,10 @@ fn impact<'a>(scene: &'a Scene<'a>) -> Row<'a> {
 }
 
 fn parry_cold<'a>(scene: &'a Scene<'a>) -> Row<'a> {
-    Row::cold(PARRY_COLD, &scene.parry_poses, move |pose| scene.hulls.parry_cold(pose))
+    Row::cold(PARRY_COLD, &scene.parry_poses, move |pose| scene.hulls.cold(pose))
 }
 
 /// Parry's warm form: the direction between the closest points before.
 fn parry_warm<'a>(scene: &'a Scene<'a>) -> Row<'a> {
-    Row::warm("parry GJK warm", &scene.parry_poses, move |pose, direction| scene.hulls.parry_warm(pose, direction))
+    Row::warm("parry GJK warm", &scene.parry_poses, move |pose, direction| scene.hulls.warm(pose, direction))
 }

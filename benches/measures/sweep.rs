@@ -1,51 +1,7 @@
-//! A row: one query over all poses, timed pass by pass.
+//! A row: one query over all poses, timed pass by pass, and what its time is held against.
 
-use std::cell::RefCell;
-use std::hint::black_box;
-use std::time::Instant;
-use sublevel::measure::Status;
-
-/// What a row needs to know of an answer.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Answer {
-    /// None where the solver does not tell.
-    pub(crate) iterations: Option<u32>,
-    pub(crate) failed: bool,
-    /// Whether the bodies were found to overlap or touch.
-    pub(crate) overlap: bool,
-}
-
-impl Answer {
-    pub(crate) fn new(iterations: u32, status: Status, overlap: bool) -> Self {
-        Self { iterations: Some(iterations), failed: status != Status::Converged, overlap }
-    }
-}
-
-/// What came of all queries of a row.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Tally {
-    pub(crate) queries: usize,
-    pub(crate) failed: usize,
-    pub(crate) overlaps: usize,
-    /// Of each query that tells.
-    iterations: Vec<u32>,
-}
-
-impl Tally {
-    fn add(&mut self, answer: &Answer) {
-        self.queries += 1;
-        self.failed += usize::from(answer.failed);
-        self.overlaps += usize::from(answer.overlap);
-        self.iterations.extend(answer.iterations);
-    }
-
-    /// Mean, median and worst number of iterations, if they are told.
-    pub(crate) fn iterations(&self) -> Option<(f64, f64, u32)> {
-        let counts: Vec<f64> = self.iterations.iter().copied().map(f64::from).collect();
-        let most = self.iterations.iter().max().filter(|most| **most > 0)?;
-        Some((counts.iter().sum::<f64>() / counts.len() as f64, median(&counts), *most))
-    }
-}
+use sublevel::chart::duel::sweep;
+pub(crate) use sublevel::chart::duel::sweep::Answer;
 
 /// A bound that a row is to stay below.
 #[derive(Clone, Copy, Debug)]
@@ -66,12 +22,14 @@ pub(crate) enum Target {
 
 /// One line of a table.
 pub(crate) struct Row<'a> {
-    pub(crate) label: String,
+    pub(crate) timed: sweep::Row<'a>,
     pub(crate) targets: Vec<Target>,
-    pub(crate) tally: Tally,
-    /// Nanoseconds of each trajectory in each pass so far.
-    passes: Vec<Vec<f64>>,
-    time: Box<dyn Fn() -> Vec<f64> + 'a>,
+}
+
+impl<'a> From<sweep::Row<'a>> for Row<'a> {
+    fn from(timed: sweep::Row<'a>) -> Self {
+        Self { timed, targets: Vec::new() }
+    }
 }
 
 impl<'a> Row<'a> {
@@ -81,22 +39,7 @@ impl<'a> Row<'a> {
         trajectories: &'a [Vec<P>],
         query: impl Fn(&P, &mut T) -> Answer + 'a,
     ) -> Self {
-        let mut tally = Tally::default();
-        // Counted before and not while timing.
-        for trajectory in trajectories {
-            walk(trajectory, &query, |answer| tally.add(&answer));
-        }
-        let time = Box::new(move || {
-            let timed = |trajectory: &Vec<P>| {
-                let start = Instant::now();
-                walk(trajectory, &query, |answer| {
-                    black_box(answer);
-                });
-                start.elapsed().as_nanos() as f64
-            };
-            trajectories.iter().map(timed).collect()
-        });
-        Self { label: label.into(), targets: Vec::new(), tally, passes: Vec::new(), time }
+        sweep::Row::warm(label, trajectories, query).into()
     }
 
     /// A row of `query`, which knows nothing of the pose before.
@@ -105,7 +48,7 @@ impl<'a> Row<'a> {
         trajectories: &'a [Vec<P>],
         query: impl Fn(&P) -> Answer + 'a,
     ) -> Self {
-        Self::warm(label, trajectories, move |pose, (): &mut ()| query(pose))
+        sweep::Row::cold(label, trajectories, query).into()
     }
 
     /// A row of batches of up to `most` consecutive poses; `batch` writes its answers where it is told to.
@@ -116,28 +59,7 @@ impl<'a> Row<'a> {
         batch: impl Fn(&[P], &mut [T]) + 'a,
         judge: impl Fn(&T) -> Answer,
     ) -> Self {
-        let longest = trajectories.iter().map(Vec::len).max().unwrap_or(0);
-        let places = RefCell::new(vec![T::default(); longest.min(most)]);
-        let mut tally = Tally::default();
-        for poses in trajectories.iter().flat_map(|trajectory| trajectory.chunks(most)) {
-            let answers = &mut places.borrow_mut()[..poses.len()];
-            batch(poses, answers);
-            answers.iter().for_each(|answer| tally.add(&judge(answer)));
-        }
-        let time = Box::new(move || {
-            let timed = |trajectory: &Vec<P>| {
-                let mut places = places.borrow_mut();
-                let start = Instant::now();
-                for poses in trajectory.chunks(most) {
-                    let answers = &mut places[..poses.len()];
-                    batch(black_box(poses), answers);
-                    black_box(answers);
-                }
-                start.elapsed().as_nanos() as f64
-            };
-            trajectories.iter().map(timed).collect()
-        });
-        Self { label: label.into(), targets: Vec::new(), tally, passes: Vec::new(), time }
+        sweep::Row::batches(label, trajectories, most, batch, judge).into()
     }
 
     /// The same row with a target.
@@ -145,34 +67,4 @@ impl<'a> Row<'a> {
         self.targets.push(target);
         self
     }
-
-    /// Times one pass over all poses.
-    pub(crate) fn pass(&mut self) {
-        self.passes.push((self.time)());
-    }
-
-    /// Nanoseconds per query: the median pass of each trajectory, summed.
-    ///
-    /// Whole passes are long enough that other processes interrupt every one on a busy machine; trajectories are not.
-    pub(crate) fn nanoseconds(&self) -> f64 {
-        let trajectories = self.passes.first().map_or(0, Vec::len);
-        let of = |trajectory: usize| median(&self.passes.iter().map(|pass| pass[trajectory]).collect::<Vec<_>>());
-        (0..trajectories).map(of).sum::<f64>() / self.tally.queries as f64
-    }
-}
-
-/// All poses of a trajectory, one after the other.
-#[inline(always)]
-fn walk<P, T: Default>(trajectory: &[P], query: &impl Fn(&P, &mut T) -> Answer, mut record: impl FnMut(Answer)) {
-    let mut kept = T::default();
-    for pose in trajectory {
-        record(query(black_box(pose), &mut kept));
-    }
-}
-
-/// The middle value; NaN of none.
-pub(crate) fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
 }

@@ -32,6 +32,14 @@ impl Machine {
     }
 }
 
+impl Machine {
+    /// The first line of a report: the command that makes it, and where this was.
+    pub(super) fn head(&self, command: &str) -> String {
+        let Self { cpu, cores, simd, commit, rustc } = self;
+        format!("Made by `{command}` on {cpu}, {cores} cores, {simd}, of which one is used; commit {commit}; {rustc}.")
+    }
+}
+
 fn cpu() -> String {
     let info = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let field = |key: &str| {

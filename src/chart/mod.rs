@@ -9,26 +9,42 @@ mod canvas;
 #[cfg(feature = "chart")]
 mod curve;
 #[cfg(feature = "chart")]
+mod detail;
+#[cfg(feature = "chart")]
+pub mod duel;
+#[cfg(feature = "chart")]
+mod labels;
+#[cfg(feature = "chart")]
 mod machine;
 #[cfg(feature = "chart")]
 mod scatter;
 mod shadow;
 mod silhouette;
 #[cfg(feature = "chart")]
+mod speed;
+#[cfg(feature = "chart")]
 mod table1;
+#[cfg(feature = "chart")]
+mod warm;
 
 #[cfg(feature = "chart")]
 pub use canvas::ChartError;
 #[cfg(feature = "chart")]
 pub use curve::{LineChart, Mark, Series};
 #[cfg(feature = "chart")]
+pub use detail::{Detail, detail};
+#[cfg(feature = "chart")]
 pub use machine::{Machine, simd};
 #[cfg(feature = "chart")]
-pub use scatter::{Group, Marker, Point, Scatter};
+pub use scatter::{Group, Marker, Point, Scatter, Stairs};
 pub use shadow::shadow;
 pub use silhouette::{Outline, Panel, Silhouettes, View, boundary_points, outline};
 #[cfg(feature = "chart")]
+pub use speed::{Speed, speed};
+#[cfg(feature = "chart")]
 pub use table1::{Table1, Table1Error, Table1Progress, table1};
+#[cfg(feature = "chart")]
+pub use warm::{Warm, warm};
 
 /// Colours of a chart, told apart by colour-blind readers too (after Okabe and Ito).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

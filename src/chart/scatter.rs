@@ -1,20 +1,22 @@
-//! Points on two logarithmic axes, each with a word beside it.
+//! Points on two logarithmic axes, each with a word beside it; fronts as stairs below them.
 
 use super::Ink;
 use super::canvas::{ChartError, FINE, FONT, LEFT, color, px, svg, tidy};
+use super::labels::{Area, place};
 use plotters::coord::Shift;
 use plotters::coord::combinators::{BindKeyPoints, IntoLogRange};
+use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 /// One measured thing.
 #[derive(Clone, Debug)]
 pub struct Point {
-    /// Horizontal coordinate, positive.
+    /// Horizontal coordinate, positive; 0 puts it on the [`Scatter::edge`].
     pub x: f64,
     /// Vertical coordinate, positive.
     pub y: f64,
-    /// Written to the right of it.
+    /// Written beside it.
     pub label: String,
 }
 
@@ -31,7 +33,7 @@ pub enum Marker {
     Cross,
 }
 
-/// Points of one kind, joined in their order by a thin line.
+/// Points of one kind.
 #[derive(Clone, Debug)]
 pub struct Group {
     /// Name in the legend.
@@ -42,6 +44,21 @@ pub struct Group {
     pub marker: Marker,
     /// The points.
     pub points: Vec<Point>,
+    /// Whether a thin line joins them in their order.
+    pub joined: bool,
+}
+
+/// A front: a value holds from its point on to the right, until the next one.
+#[derive(Clone, Debug)]
+pub struct Stairs {
+    /// Name in the legend.
+    pub label: String,
+    /// Colour.
+    pub ink: Ink,
+    /// Dashed instead of solid.
+    pub dashed: bool,
+    /// Its points from left to right; an `x` of 0 is on the edge.
+    pub points: Vec<(f64, f64)>,
 }
 
 /// A chart of points.
@@ -55,11 +72,17 @@ pub struct Scatter {
     pub y_label: String,
     /// What is drawn.
     pub groups: Vec<Group>,
+    /// Below the points.
+    pub stairs: Vec<Stairs>,
+    /// What it means that `x` is 0: the tick label of a strip at the left edge.
+    pub edge: Option<String>,
+    /// A place on the horizontal axis that has a word for a number.
+    pub named: Option<(f64, String)>,
 }
 
 /// Width, pixels; and height without the legend.
 const WIDTH: u32 = 760;
-const HEIGHT: u32 = 460;
+const HEIGHT: u32 = 500;
 /// Entries of the legend in a row, and the height of a row, pixels.
 const COLUMNS: usize = 3;
 const ROW: i32 = 20;
@@ -67,6 +90,9 @@ const ROW: i32 = 20;
 const RADIUS: i32 = 5;
 /// Room beyond the outermost points, as a factor.
 const ROOM: f64 = 1.25;
+/// How far the edge, and the line beside it, lie left of the leftmost point, as factors.
+const EDGE: f64 = 2.6;
+const BESIDE: f64 = 1.7;
 
 impl Scatter {
     /// The chart as an SVG document.
@@ -74,22 +100,37 @@ impl Scatter {
     /// # Errors
     /// [`ChartError::Empty`] if no point has positive finite coordinates.
     pub fn to_svg(&self) -> Result<String, ChartError> {
-        let (x, y) = (range(self.points().map(|p| p.x)), range(self.points().map(|p| p.y)));
-        let (Some(x), Some(y)) = (x, y) else { return Err(ChartError::Empty) };
-        let rows = self.groups.len().div_ceil(COLUMNS) as u32;
+        let places = || self.groups.iter().flat_map(|group| &group.points).map(|p| (p.x, p.y));
+        let drawable = || places().filter(|place| self.drawable(*place));
+        // All on the edge leave no scale to choose; any will do.
+        let x = range(drawable().map(|p| p.0).filter(|x| *x > 0.0)).or(self.edge.as_ref().map(|_| (1e-3, 1.0)));
+        let (Some(x), Some(y)) = (x, range(drawable().map(|p| p.1))) else { return Err(ChartError::Empty) };
+        let rows = (self.groups.len() + self.stairs.len()).div_ceil(COLUMNS) as u32;
         svg((WIDTH, HEIGHT + rows * ROW as u32), |root| self.draw(root, x, y))
     }
 
-    fn points(&self) -> impl Iterator<Item = &Point> {
-        self.groups.iter().flat_map(|group| &group.points).filter(|p| drawable(p))
+    fn drawable(&self, (x, y): (f64, f64)) -> bool {
+        let across = x > 0.0 || (x == 0.0 && self.edge.is_some());
+        across && y > 0.0 && [x, y].iter().all(|v| v.is_finite())
     }
 
     fn draw(
         &self,
         root: &DrawingArea<SVGBackend<'_>, Shift>,
-        x: (f64, f64),
+        data: (f64, f64),
         y: (f64, f64),
     ) -> Result<(), Box<dyn std::error::Error>> {
+        let edge = data.0 / EDGE;
+        let mut x_ticks = ticks(data);
+        let named = self.edge.iter().map(|word| (edge, word)).chain(self.named.iter().map(|(x, word)| (*x, word)));
+        let named: Vec<(f64, &String)> = named.collect();
+        x_ticks.extend(self.named.iter().map(|(x, _)| *x));
+        let x = if self.edge.is_some() {
+            x_ticks.push(edge);
+            (edge / ROOM.powi(2), data.1)
+        } else {
+            data
+        };
         let grey = color(Ink::Grey);
         let text = |size: i32| (FONT, px(size)).into_font().color(&grey);
         root.draw(&Text::new(self.title.as_str(), (px(LEFT), px(10)), text(17)))?;
@@ -102,7 +143,7 @@ impl Scatter {
             .x_label_area_size(px(46))
             .y_label_area_size(px(66))
             .build_cartesian_2d(
-                (x.0..x.1).log_scale().with_key_points(ticks(x)),
+                (x.0..x.1).log_scale().with_key_points(x_ticks),
                 (y.0..y.1).log_scale().with_key_points(ticks(y)),
             )?;
         chart
@@ -113,24 +154,53 @@ impl Scatter {
             .set_all_tick_mark_size(px(5))
             .x_labels(99)
             .y_labels(99)
-            .x_label_formatter(&|x| tidy(*x))
+            .x_label_formatter(&|x| {
+                named.iter().find(|(place, _)| place == x).map_or_else(|| tidy(*x), |(_, word)| (*word).clone())
+            })
             .y_label_formatter(&|y| tidy(*y))
             .x_desc(self.x_label.as_str())
             .y_desc(self.y_label.as_str())
             .label_style(text(13))
             .axis_desc_style(text(14))
             .draw()?;
+        let at = |(x, y): (f64, f64)| chart.backend_coord(&(if x > 0.0 { x } else { edge }, y));
+        if self.edge.is_some() {
+            let [top, bottom] = [y.1, y.0].map(|y| chart.backend_coord(&(data.0 / BESIDE, y)));
+            root.draw(&PathElement::new([top, bottom], grey.stroke_width(FINE)))?;
+        }
+        for Stairs { ink, dashed, points, .. } in &self.stairs {
+            draw_stairs(root, color(*ink), *dashed, points.iter().map(|p| at(*p)).collect(), at((x.1, y.0)).0)?;
+        }
+        let mut labels = Vec::new();
+        let mut markers = Vec::new();
         for group in &self.groups {
             let ink = color(group.ink);
-            let places: Vec<(i32, i32)> =
-                group.points.iter().filter(|p| drawable(p)).map(|p| chart.backend_coord(&(p.x, p.y))).collect();
-            root.draw(&PathElement::new(places.clone(), ink.mix(0.4).stroke_width(FINE)))?;
-            let labels = group.points.iter().filter(|p| drawable(p)).map(|p| p.label.as_str());
-            for (&place, label) in places.iter().zip(labels) {
-                draw_marker(root, group.marker, ink, place)?;
-                let style = (FONT, px(12)).into_font().color(&ink).pos(Pos::new(HPos::Left, VPos::Bottom));
-                root.draw(&Text::new(label, (place.0 + px(RADIUS), place.1 - px(RADIUS) / 2), style))?;
+            let points: Vec<&Point> = group.points.iter().filter(|p| self.drawable((p.x, p.y))).collect();
+            let places: Vec<(i32, i32)> = points.iter().map(|p| at((p.x, p.y))).collect();
+            let joined: Vec<_> =
+                places.iter().zip(&points).filter(|(_, p)| p.x > 0.0).map(|(place, _)| *place).collect();
+            if group.joined {
+                root.draw(&PathElement::new(joined, ink.mix(0.4).stroke_width(FINE)))?;
             }
+            for (&place, point) in places.iter().zip(points) {
+                draw_marker(root, group.marker, ink, place)?;
+                let place = (f64::from(place.0) / f64::from(FINE), f64::from(place.1) / f64::from(FINE));
+                markers.push(Area::around(place, f64::from(RADIUS)));
+                if !point.label.is_empty() {
+                    labels.push((place, point.label.as_str(), ink));
+                }
+            }
+        }
+        let pixels = |v: i32| f64::from(v) / f64::from(FINE);
+        let ((left, top), (right, bottom)) = (chart.backend_coord(&(x.0, y.1)), chart.backend_coord(&(x.1, y.0)));
+        let frame = Area { left: pixels(left), top: pixels(top), right: pixels(right), bottom: pixels(bottom) };
+        let texts: Vec<((f64, f64), &str)> = labels.iter().map(|(place, text, _)| (*place, *text)).collect();
+        for ((left, top), (_, text, ink)) in
+            place(&texts, &markers, &frame, f64::from(RADIUS) + 1.0).into_iter().zip(&labels)
+        {
+            let style = (FONT, px(12)).into_font().color(ink).pos(Pos::new(HPos::Left, VPos::Top));
+            let fine = |v: f64| (v * f64::from(FINE)).round() as i32;
+            root.draw(&Text::new(*text, (fine(left), fine(top)), style))?;
         }
         Ok(())
     }
@@ -145,8 +215,34 @@ impl Scatter {
             let style = (FONT, px(13)).into_font().color(&color(Ink::Grey)).pos(Pos::new(HPos::Left, VPos::Center));
             root.draw(&Text::new(group.label.as_str(), (px(left + 18), px(middle)), style))?;
         }
-        Ok(42 + self.groups.len().div_ceil(COLUMNS) as i32 * ROW)
+        for (i, stairs) in (self.groups.len()..).zip(&self.stairs) {
+            let (left, middle) = (LEFT + (i % COLUMNS) as i32 * wide, 45 + (i / COLUMNS) as i32 * ROW);
+            let from = (px(left - 4), px(middle));
+            draw_stairs(root, color(stairs.ink), stairs.dashed, vec![from], px(left + 14))?;
+            let style = (FONT, px(13)).into_font().color(&color(Ink::Grey)).pos(Pos::new(HPos::Left, VPos::Center));
+            root.draw(&Text::new(stairs.label.as_str(), (px(left + 18), px(middle)), style))?;
+        }
+        Ok(42 + (self.groups.len() + self.stairs.len()).div_ceil(COLUMNS) as i32 * ROW)
     }
+}
+
+/// Each point's height holds until the next point, that of the last one until `end`.
+fn draw_stairs(
+    root: &DrawingArea<SVGBackend<'_>, Shift>,
+    ink: RGBColor,
+    dashed: bool,
+    points: Vec<(i32, i32)>,
+    end: i32,
+) -> Result<(), Box<dyn std::error::Error>> {
+    let ends = points.iter().skip(1).map(|p| p.0).chain([end]);
+    let path: Vec<(i32, i32)> = points.iter().zip(ends).flat_map(|(&(x, y), end)| [(x, y), (end, y)]).collect();
+    let style = ink.mix(0.55).stroke_width(3 * FINE / 2);
+    if dashed {
+        root.draw(&DashedPathElement::new(path, 6 * FINE, 4 * FINE, style))?;
+    } else {
+        root.draw(&PathElement::new(path, style))?;
+    }
+    Ok(())
 }
 
 fn draw_marker(
@@ -163,10 +259,6 @@ fn draw_marker(
         Marker::Cross => root.draw(&plotters::element::Cross::new((x, y), r, line))?,
     }
     Ok(())
-}
-
-fn drawable(point: &Point) -> bool {
-    [point.x, point.y].iter().all(|v| *v > 0.0 && v.is_finite())
 }
 
 /// The range of positive values, with some room.
@@ -194,12 +286,15 @@ mod tests {
 
     fn scatter(points: Vec<(f64, f64)>) -> Scatter {
         let points = points.into_iter().map(|(x, y)| Point { x, y, label: "label".into() }).collect();
-        let group = Group { label: "first".into(), ink: Ink::Purple, marker: Marker::Ring, points };
+        let group = Group { label: "first".into(), ink: Ink::Purple, marker: Marker::Ring, points, joined: true };
         Scatter {
             title: "Title".into(),
             x_label: "time (s)".into(),
             y_label: "volume (m³)".into(),
             groups: vec![group],
+            stairs: vec![],
+            edge: None,
+            named: None,
         }
     }
 
@@ -216,6 +311,21 @@ mod tests {
     fn odd_points_are_left_out_or_refused() {
         assert_eq!(scatter(vec![(f64::NAN, 1.0), (0.0, 1.0), (1.0, -1.0)]).to_svg(), Err(ChartError::Empty));
         assert!(scatter(vec![(1.0, 1.0), (0.0, f64::INFINITY)]).to_svg().is_ok());
+    }
+
+    #[test]
+    fn what_is_exact_stands_on_the_edge() {
+        let mut chart = scatter(vec![(0.0, 2.0), (0.1, 1.0)]);
+        chart.edge = Some("exact".into());
+        chart.stairs =
+            vec![Stairs { label: "front".into(), ink: Ink::Grey, dashed: true, points: vec![(0.0, 2.0), (0.1, 1.0)] }];
+        let svg = chart.to_svg().unwrap();
+        for text in ["exact", "front"] {
+            assert!(svg.contains(text), "{text} is missing");
+        }
+        assert!(!svg.contains("NaN"));
+        chart.groups[0].points.truncate(1);
+        assert!(chart.to_svg().is_ok(), "nothing but exact ones");
     }
 
     #[test]

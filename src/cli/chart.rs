@@ -1,13 +1,14 @@
 //! `sublevel chart`.
 
 use super::write_atomically;
-use crate::chart::{Table1Progress, table1};
+use crate::chart::duel::Shelf;
+use crate::chart::{Table1Progress, detail, speed, table1, warm};
 use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::error::Error;
 use std::io::{self, Write};
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Measure on this machine, and draw: reports as Markdown with SVG pictures, and their raw numbers as CSV
 ///
@@ -20,6 +21,9 @@ pub(super) struct ChartArgs {
 
 #[derive(Debug, Subcommand)]
 enum Figure {
+    Speed(SpeedArgs),
+    Warm(WarmArgs),
+    Detail(DetailArgs),
     Table1(Table1Args),
 }
 
@@ -41,35 +45,136 @@ struct Table1Args {
     quick: bool,
 }
 
+/// Time of a distance query against model error: our representations beside hulls, simplified hulls and meshes of parry and coal
+///
+/// Pairs of the five meshes of the Princeton benchmark and of household objects. Writes speed.md, speed.csv and the pictures speed*.svg. Fits
+/// are made once, which takes about ten minutes on one core, and kept; measuring takes about ten more. Coal takes part when SUBLEVEL_COAL
+/// names the program that times it.
+#[derive(Debug, Args)]
+struct SpeedArgs {
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Time and iterations of queries with a hint against how far the pose before is away; and the paper's experiment
+///
+/// Steps from a 10 000th of half the larger diameter to poses that have nothing to do with each other; then the chair swept past the human, level
+/// distances and their times beside the paper's. Writes warm.md, warm.csv and the pictures warm*.svg.
+#[derive(Debug, Args)]
+struct WarmArgs {
+    #[command(flatten)]
+    common: Common,
+}
+
+/// What each rung of the ladder buys: model error, gap, iterations, time, and how many questions it settles
+///
+/// The rungs are ball, ellipsoid and degree 4, 6, 8; the question is "nearer than m?" of random pairs, m from touching to ten object sizes. Writes
+/// detail.md, detail.csv and the pictures detail*.svg.
+#[derive(Debug, Args)]
+struct DetailArgs {
+    #[command(flatten)]
+    common: Common,
+}
+
+/// What all figures with bodies around meshes take.
+#[derive(Debug, Args)]
+struct Common {
+    /// Folder with psb/101.off, meshes/mbm_mug.off and so on
+    #[arg(long, value_name = "DIR")]
+    data: PathBuf,
+    /// Folder for the report; made with its parents when it is not there
+    #[arg(long, value_name = "DIR", default_value = "sublevel-chart")]
+    out: PathBuf,
+    /// Folder where fits are kept between runs; delete it after changes to the fit
+    #[arg(long, value_name = "DIR", default_value = "target/bench-bodies")]
+    fits: PathBuf,
+    /// Fewer objects, representations and poses: a look, not a result
+    #[arg(long)]
+    quick: bool,
+}
+
 /// Measures and writes what is asked for.
 pub(super) fn run(args: &ChartArgs) -> Result<(), Box<dyn Error>> {
     match &args.figure {
+        Figure::Speed(args) => run_speed(&args.common),
+        Figure::Warm(args) => run_warm(&args.common),
+        Figure::Detail(args) => run_detail(&args.common),
         Figure::Table1(args) => run_table1(args),
     }
 }
 
-fn run_table1(args: &Table1Args) -> Result<(), Box<dyn Error>> {
-    std::fs::create_dir_all(&args.out)
-        .map_err(|error| format!("can not make {}: {error}; choose another --out", args.out.display()))?;
+fn run_speed(args: &Common) -> Result<(), Box<dyn Error>> {
+    make_folder(&args.out)?;
+    let shelf = Shelf::new(&args.fits)?;
+    let bar = bar()?;
+    let found = speed(&args.data, &shelf, args.quick, &mut |at| tell(&bar, at))?;
+    bar.finish_and_clear();
+    write_report(&args.out, "speed", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+}
+
+fn run_warm(args: &Common) -> Result<(), Box<dyn Error>> {
+    make_folder(&args.out)?;
+    let shelf = Shelf::new(&args.fits)?;
+    let bar = bar()?;
+    let found = warm(&args.data, &shelf, args.quick, &mut |at| tell(&bar, at))?;
+    bar.finish_and_clear();
+    write_report(&args.out, "warm", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+}
+
+fn run_detail(args: &Common) -> Result<(), Box<dyn Error>> {
+    make_folder(&args.out)?;
+    let shelf = Shelf::new(&args.fits)?;
+    let bar = bar()?;
+    let found = detail(&args.data, &shelf, args.quick, &mut |at| tell(&bar, at))?;
+    bar.finish_and_clear();
+    write_report(&args.out, "detail", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+}
+
+fn make_folder(out: &Path) -> Result<(), Box<dyn Error>> {
+    let made = std::fs::create_dir_all(out);
+    Ok(made.map_err(|error| format!("can not make {}: {error}; choose another --out", out.display()))?)
+}
+
+fn bar() -> Result<ProgressBar, Box<dyn Error>> {
     let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
     bar.set_style(ProgressStyle::with_template("{spinner} [{elapsed_precise}] {wide_msg}")?);
+    Ok(bar)
+}
+
+fn tell(bar: &ProgressBar, at: &str) -> ControlFlow<()> {
+    bar.set_message(at.to_owned());
+    bar.tick();
+    ControlFlow::Continue(())
+}
+
+/// Writes NAME.md, NAME.csv and the pictures, and prints where the report is.
+fn write_report(
+    out: &Path,
+    name: &str,
+    markdown: impl FnOnce(&[&str]) -> String,
+    csv: &str,
+    pictures: &[(String, String)],
+) -> Result<(), Box<dyn Error>> {
+    let names: Vec<&str> = pictures.iter().map(|(name, _)| name.as_str()).collect();
+    let report = out.join(format!("{name}.md"));
+    write_atomically(&report, &markdown(&names))?;
+    write_atomically(&out.join(format!("{name}.csv")), csv)?;
+    for (name, svg) in pictures {
+        write_atomically(&out.join(name), svg)?;
+    }
+    writeln!(io::stdout().lock(), "{}", report.display())?;
+    Ok(())
+}
+
+fn run_table1(args: &Table1Args) -> Result<(), Box<dyn Error>> {
+    make_folder(&args.out)?;
+    let bar = bar()?;
     let table = table1(&args.meshes, args.quick, &mut |progress| {
         let Table1Progress { done, cells, at } = progress;
-        bar.set_message(format!("{} of {cells}: {at}", done + 1));
-        bar.tick();
-        ControlFlow::Continue(())
+        tell(&bar, &format!("{} of {cells}: {at}", done + 1))
     })?;
     bar.finish_and_clear();
-    let mut pictures = vec![("table1.svg", table.volume_against_time()?)];
-    pictures.extend(table.pictures());
-    let names: Vec<&str> = pictures.iter().map(|(name, _)| *name).collect();
-    let report = table.markdown(&names);
-    for (name, content) in [("table1.md", &report), ("table1.csv", &table.csv())] {
-        write_atomically(&args.out.join(name), content)?;
-    }
-    for (name, svg) in &pictures {
-        write_atomically(&args.out.join(name), svg)?;
-    }
-    writeln!(io::stdout().lock(), "{}", args.out.join("table1.md").display())?;
-    Ok(())
+    let mut pictures = vec![("table1.svg".to_owned(), table.volume_against_time()?)];
+    pictures.extend(table.pictures().into_iter().map(|(name, svg)| (name.to_owned(), svg)));
+    write_report(&args.out, "table1", |names| table.markdown(names), &table.csv(), &pictures)
 }

@@ -10,11 +10,11 @@ const STEPS: usize = 200_000;
 
 /// A ball, units of the points.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct EnclosingBall {
+pub struct EnclosingBall {
     /// Centre.
-    pub(super) center: Vector3<f64>,
+    pub center: Vector3<f64>,
     /// Distance of the farthest point from it.
-    pub(super) radius: f64,
+    pub radius: f64,
 }
 
 /// The smallest ball around `points`, its radius to a relative 1e-9; of no points, the point 0.
@@ -22,7 +22,7 @@ pub(super) struct EnclosingBall {
 /// The dual gives weights to the points: the centre is their mean, and the variance `γ = Σ w |x - c|²` is at most the square of the
 /// smallest radius. Coordinate ascent towards the farthest point, and away from the nearest one with a weight, converges
 /// linearly (Yıldırım, Two algorithms for the minimum enclosing ball problem, SIAM J. Optimization 19, 2008).
-pub(super) fn smallest_ball(points: &[Vector3<f64>]) -> EnclosingBall {
+pub fn smallest_ball(points: &[Vector3<f64>]) -> EnclosingBall {
     let Some(first) = points.first() else { return EnclosingBall { center: Vector3::zeros(), radius: 0.0 } };
     let farthest = |from: &Vector3<f64>| {
         (0..points.len())

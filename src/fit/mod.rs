@@ -47,6 +47,7 @@ mod thicken;
 mod trim;
 mod volume;
 
+pub use ball::{EnclosingBall, smallest_ball};
 pub use certificate::{NoCertificate, certificate};
 pub use cone::{Cone, UnknownCone};
 pub use coordinates::Coordinates;

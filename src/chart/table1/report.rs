@@ -32,12 +32,7 @@ impl Table1 {
     pub fn markdown(&self, pictures: &[&str]) -> String {
         let mut text = String::from("# Table I, computed anew\n\n");
         // Writing to a string can not fail.
-        let machine = &self.machine;
-        let _ = writeln!(
-            text,
-            "Made by `sublevel chart table1` on {}, {} cores, {}, of which one is used; commit {}; {}.\n",
-            machine.cpu, machine.cores, machine.simd, machine.commit, machine.rustc
-        );
+        let _ = writeln!(text, "{}\n", self.machine.head("sublevel chart table1"));
         let heads: Vec<String> = MESHES.iter().map(|(name, number)| format!("{name} ({number})")).collect();
         let _ = writeln!(text, "| set | {} | median s |\n|---{}|---|", heads.join(" | "), "|---".repeat(heads.len()));
         for (row, cells) in &self.rows {
@@ -114,7 +109,7 @@ impl Table1 {
             let point = Point { x: mean(&|m| m.seconds), y: mean(&|m| m.volume_m3) / hull, label: name };
             match groups.iter_mut().find(|group| group.label == label) {
                 Some(group) => group.points.push(point),
-                None => groups.push(Group { label: label.into(), ink, marker, points: vec![point] }),
+                None => groups.push(Group { label: label.into(), ink, marker, points: vec![point], joined: true }),
             }
         }
         for group in &mut groups {
@@ -125,6 +120,9 @@ impl Table1 {
             x_label: "construction time (s)".into(),
             y_label: "volume over that of the convex hull".into(),
             groups,
+            stairs: Vec::new(),
+            edge: None,
+            named: None,
         }
         .to_svg()
     }

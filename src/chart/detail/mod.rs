@@ -1,0 +1,51 @@
+//! Detail: what each rung of the ladder buys in accuracy, what it costs, and how many questions it settles.
+
+mod questions;
+mod report;
+mod rungs;
+
+use super::Machine;
+use super::duel::{DuelError, Shelf, pairs};
+use rungs::{Ladder, ladder};
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// How much is run.
+struct Effort {
+    quick: bool,
+    trajectories: usize,
+    poses: usize,
+    passes: usize,
+    /// Random pairs of poses per threshold.
+    questions: usize,
+}
+
+/// The ladders of all pairs, measured.
+pub struct Detail {
+    machine: Machine,
+    quick: bool,
+    questions: usize,
+    ladders: Vec<Ladder>,
+}
+
+/// Measures the rungs of pairs of the meshes in `data`, of two pairs up to degree 6 if `quick`. Fits are kept on the `shelf`.
+/// `progress` hears what is going on and can stop it.
+///
+/// # Errors
+/// [`DuelError`].
+pub fn detail(
+    data: &Path,
+    shelf: &Shelf,
+    quick: bool,
+    progress: &mut dyn FnMut(&str) -> ControlFlow<()>,
+) -> Result<Detail, DuelError> {
+    let effort = if quick {
+        Effort { quick, trajectories: 2, poses: 100, passes: 3, questions: 100 }
+    } else {
+        Effort { quick, trajectories: 4, poses: 400, passes: 5, questions: 2000 }
+    };
+    let mut told = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };
+    let pairs = pairs(data, quick)?;
+    let ladders = pairs.iter().map(|[a, b]| ladder([a, b], &effort, shelf, &mut told)).collect::<Result<_, _>>()?;
+    Ok(Detail { machine: Machine::this(), quick, questions: effort.questions, ladders })
+}

@@ -1,0 +1,58 @@
+//! Why a figure can not be made.
+
+use super::{CoalError, NoHull, ShelfError};
+use crate::chart::ChartError;
+use crate::fit::{ReadError, hull::HullError};
+use crate::measure::PoseError;
+
+/// Why there is no figure.
+#[derive(Debug, thiserror::Error)]
+pub enum DuelError {
+    /// A mesh can not be read.
+    #[error("{0}; name the folder that has psb/101.off and meshes/mbm_mug.off with --data")]
+    Mesh(#[from] ReadError),
+    /// A mesh has no hull.
+    #[error("{mesh}: {source}")]
+    Hull {
+        /// The mesh.
+        mesh: &'static str,
+        /// What is wrong with it.
+        source: HullError,
+    },
+    /// A representation can not be made.
+    #[error("{mesh}, {method}: {what}")]
+    Representation {
+        /// The mesh.
+        mesh: &'static str,
+        /// The representation.
+        method: String,
+        /// Why not.
+        what: String,
+    },
+    /// Fits can not be made or kept.
+    #[error(transparent)]
+    Shelf(#[from] ShelfError),
+    /// Parry makes no mesh of it.
+    #[error("{mesh}: parry makes no mesh of it: {what}")]
+    ParryMesh {
+        /// The mesh.
+        mesh: &'static str,
+        /// What it said.
+        what: String,
+    },
+    /// Parry makes no hull.
+    #[error(transparent)]
+    NoHull(#[from] NoHull),
+    /// Coal can not be timed.
+    #[error(transparent)]
+    Coal(#[from] CoalError),
+    /// A pose is none.
+    #[error(transparent)]
+    Pose(#[from] PoseError),
+    /// Stopped by the caller.
+    #[error("the chart was cancelled")]
+    Cancelled,
+    /// A picture failed.
+    #[error(transparent)]
+    Chart(#[from] ChartError),
+}

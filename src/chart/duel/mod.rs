@@ -1,0 +1,20 @@
+//! Duels: representations of the same objects walk the same poses and are timed in turns, ours and those of other libraries.
+//!
+//! Figures and `cargo bench --bench measures` share this: motions ([`motion`]), timed rows ([`sweep`]), the peers ([`Hulls`] of
+//! parry in this process, [`Coal`] in one of its own), and fits that are kept between runs ([`Shelf`]).
+
+mod coal;
+mod error;
+pub mod motion;
+mod parry;
+mod random;
+mod shelf;
+mod subject;
+pub mod sweep;
+
+pub use coal::{Coal, CoalError, CoalRun};
+pub use error::DuelError;
+pub use parry::{Hulls, NoHull, parry_pose, parry_version};
+pub use random::Random;
+pub use shelf::{Shelf, ShelfError};
+pub use subject::{Subject, pairs};

@@ -1,0 +1,34 @@
+//! Numbers that look random and are the same everywhere.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use std::f64::consts::TAU;
+
+/// SplitMix64 (Steele, Lea, Flood 2014): the same motions everywhere.
+#[derive(Clone, Debug)]
+pub struct Random(pub u64);
+
+impl Random {
+    /// Uniform in [-1, 1).
+    pub fn signed(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    /// Uniform on the sphere.
+    pub fn direction(&mut self) -> Vector3<f64> {
+        loop {
+            let v = Vector3::from_fn(|_, _| self.signed());
+            if (0.1..1.0).contains(&v.norm()) {
+                return v.normalize();
+            }
+        }
+    }
+
+    /// A rotation about a random axis.
+    pub fn rotation(&mut self) -> UnitQuaternion<f64> {
+        UnitQuaternion::new(self.direction() * (TAU * self.signed()))
+    }
+}

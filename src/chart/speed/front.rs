@@ -1,0 +1,96 @@
+//! Who is fastest at an accuracy: Pareto fronts, and how many times as fast as their peers ours are.
+
+/// A representation by what it costs and how wrong it is.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Entry {
+    /// Name for people.
+    pub(super) name: String,
+    /// Whether it is ours.
+    pub(super) ours: bool,
+    /// Mean model error, as a part of the larger diameter; 0 for exact ones.
+    pub(super) error: f64,
+    /// Time of a query, nanoseconds.
+    pub(super) nanoseconds: f64,
+}
+
+/// Those that nothing as accurate is faster than, from the most accurate on.
+pub(super) fn front<'a>(entries: impl Iterator<Item = &'a Entry>) -> Vec<&'a Entry> {
+    let mut all: Vec<&Entry> = entries.filter(|e| e.error.is_finite() && e.nanoseconds.is_finite()).collect();
+    all.sort_by(|a, b| a.error.total_cmp(&b.error).then(a.nanoseconds.total_cmp(&b.nanoseconds)));
+    let mut fastest = f64::INFINITY;
+    all.retain(|entry| {
+        let kept = entry.nanoseconds < fastest;
+        fastest = fastest.min(entry.nanoseconds);
+        kept
+    });
+    all
+}
+
+/// The best that can be said for ours at an accuracy.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Standing {
+    /// Which of ours.
+    pub(super) ours: String,
+    /// Its mean model error.
+    pub(super) error: f64,
+    /// The fastest peer that is at least as accurate as it.
+    pub(super) peer: String,
+    /// How many times as fast as that.
+    pub(super) times: f64,
+    /// How many times as fast ours at the error allowed are as peers at the error allowed.
+    pub(super) allowed: f64,
+}
+
+/// Of ours whose error is at most `error`: the one that is the most times as fast as the fastest peer of equal or better accuracy.
+pub(super) fn standing(entries: &[Entry], error: f64) -> Option<Standing> {
+    let fastest = |ours: bool, error: f64| {
+        let able = entries.iter().filter(move |e| e.ours == ours && e.error <= error && e.nanoseconds.is_finite());
+        able.min_by(|a, b| a.nanoseconds.total_cmp(&b.nanoseconds))
+    };
+    let allowed = fastest(false, error)?.nanoseconds / fastest(true, error)?.nanoseconds;
+    let able = entries.iter().filter(|e| e.ours && e.error <= error && e.nanoseconds.is_finite());
+    let against = able.filter_map(|ours| {
+        let peer = fastest(false, ours.error)?;
+        let times = peer.nanoseconds / ours.nanoseconds;
+        let (peer, error) = (peer.name.clone(), ours.error);
+        Some(Standing { ours: ours.name.clone(), error, peer, times, allowed })
+    });
+    against.max_by(|a, b| a.times.total_cmp(&b.times))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entry(name: &str, ours: bool, error: f64, nanoseconds: f64) -> Entry {
+        Entry { name: name.into(), ours, error, nanoseconds }
+    }
+
+    #[test]
+    fn the_front_falls() {
+        let all = [
+            entry("hull", false, 0.0, 600.0),
+            entry("six", true, 0.02, 250.0),
+            entry("slow", true, 0.03, 300.0),
+            entry("ball", true, 0.2, 100.0),
+            entry("broken", true, f64::NAN, 1.0),
+        ];
+        let names: Vec<&str> = front(all.iter()).iter().map(|e| e.name.as_str()).collect();
+        assert_eq!(names, ["hull", "six", "ball"]);
+    }
+
+    #[test]
+    fn ours_are_held_against_peers_at_least_as_accurate() {
+        let all = [
+            entry("hull", false, 0.0, 600.0),
+            entry("rough hull", false, 0.03, 400.0),
+            entry("six", true, 0.02, 250.0),
+            entry("four", true, 0.04, 200.0),
+        ];
+        let found = standing(&all, 0.05).unwrap();
+        assert_eq!((found.ours.as_str(), found.peer.as_str()), ("six", "hull"));
+        assert!((found.times - 2.4).abs() < 1e-12 && (found.allowed - 2.0).abs() < 1e-12);
+        assert_eq!(standing(&all, 0.03).unwrap().allowed, 1.6);
+        assert_eq!(standing(&all, 0.01), None, "none of ours is that accurate");
+    }
+}

@@ -1,0 +1,65 @@
+//! Speed against accuracy: every representation of pairs of objects by how wrong it is and how long a query takes.
+
+mod cover;
+mod front;
+mod meshes;
+mod ours;
+mod outer;
+mod peers;
+mod pictures;
+mod race;
+mod report;
+
+use super::Machine;
+use super::duel::{Coal, DuelError, Shelf, pairs};
+use race::{Race, race};
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// How much is run.
+struct Effort {
+    quick: bool,
+    trajectories: usize,
+    poses: usize,
+    passes: usize,
+    /// Poses, about, and passes of what takes ten thousand times as long as the rest.
+    slow_poses: usize,
+    slow_passes: usize,
+}
+
+/// All pairs, measured.
+pub struct Speed {
+    machine: Machine,
+    /// Version of coal, if it ran.
+    coal: Option<String>,
+    quick: bool,
+    passes: usize,
+    races: Vec<Race>,
+}
+
+/// Measures all pairs of the meshes in `data`, or two of them with fewer representations and poses if `quick`. Fits are kept on the
+/// `shelf`; coal takes part where `SUBLEVEL_COAL` names the program that times it. `progress` hears what is going on and can
+/// stop it.
+///
+/// # Errors
+/// [`DuelError`].
+pub fn speed(
+    data: &Path,
+    shelf: &Shelf,
+    quick: bool,
+    progress: &mut dyn FnMut(&str) -> ControlFlow<()>,
+) -> Result<Speed, DuelError> {
+    let effort = if quick {
+        Effort { quick, trajectories: 2, poses: 100, passes: 3, slow_poses: 2, slow_passes: 1 }
+    } else {
+        Effort { quick, trajectories: 4, poses: 400, passes: 5, slow_poses: 8, slow_passes: 2 }
+    };
+    let coal = Coal::from_environment()?;
+    let mut told = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };
+    // A mesh that is missing is told before any work.
+    let pairs = pairs(data, quick)?;
+    let races = pairs.iter().map(|[a, b]| race([a, b], &effort, shelf, coal.as_ref(), &mut told));
+    let races = races.collect::<Result<Vec<_>, _>>()?;
+    let coal = coal.as_ref().map(Coal::version);
+    Ok(Speed { machine: Machine::this(), coal, quick, passes: effort.passes, races })
+}
