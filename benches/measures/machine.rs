@@ -37,9 +37,9 @@ impl Machine {
     }
 
     pub(crate) fn print(&self) {
-        let chart::Machine { cpu, cores, simd, commit, rustc } = &self.this;
+        let chart::Machine { cpu, cores, simd, commit, rustc, date } = &self.this;
         println!("machine  {cpu}, {cores} cores, {simd}");
-        println!("commit   {commit}, {rustc}");
+        println!("commit   {commit}, {rustc}, on {date}");
         println!("peers    coal {}, parry3d-f64 {}", self.coal.as_deref().unwrap_or("absent"), self.parry);
     }
 }

@@ -3,6 +3,7 @@
 use serde::Serialize;
 use std::fs;
 use std::process::Command;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 /// The machine and the versions, as far as they can be told.
 #[derive(Clone, Debug, Serialize)]
@@ -17,6 +18,8 @@ pub struct Machine {
     pub commit: String,
     /// The compiler that is installed now.
     pub rustc: String,
+    /// Today in UTC, as year-month-day.
+    pub date: String,
 }
 
 impl Machine {
@@ -28,15 +31,16 @@ impl Machine {
             simd: simd(),
             commit: said("git", &["describe", "--always", "--dirty", "--tags"]),
             rustc: said("rustc", &["--version"]),
+            date: date(SystemTime::now()),
         }
     }
-}
 
-impl Machine {
     /// The first line of a report: the command that makes it, and where this was.
     pub(super) fn head(&self, command: &str) -> String {
-        let Self { cpu, cores, simd, commit, rustc } = self;
-        format!("Made by `{command}` on {cpu}, {cores} cores, {simd}, of which one is used; commit {commit}; {rustc}.")
+        let Self { cpu, cores, simd, commit, rustc, date } = self;
+        format!(
+            "Made by `{command}` on {date} on {cpu}, {cores} cores, {simd}, of which one is used; commit {commit}; {rustc}."
+        )
     }
 }
 
@@ -76,4 +80,46 @@ fn said(program: &str, arguments: &[&str]) -> String {
         text.lines().next().map(str::to_owned)
     });
     line.unwrap_or_else(|| "unknown".to_owned())
+}
+
+/// Year, month and day of a time in UTC, by the Gregorian calendar.
+fn date(time: SystemTime) -> String {
+    let seconds = time.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    let mut day = seconds / 86_400;
+    let mut year = 1970;
+    let leap = |year: u64| year.is_multiple_of(4) && !year.is_multiple_of(100) || year.is_multiple_of(400);
+    while day >= 365 + u64::from(leap(year)) {
+        day -= 365 + u64::from(leap(year));
+        year += 1;
+    }
+    let february = 28 + u64::from(leap(year));
+    let mut month = 1;
+    for days in [31, february, 31, 30, 31, 30, 31, 31, 30, 31, 30] {
+        if day < days {
+            break;
+        }
+        day -= days;
+        month += 1;
+    }
+    format!("{year}-{month:02}-{:02}", day + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::date;
+    use std::time::{Duration, UNIX_EPOCH};
+
+    #[test]
+    fn days_are_those_of_the_calendar() {
+        for (seconds, day) in [
+            (0, "1970-01-01"),
+            (951_782_399, "2000-02-28"),
+            (951_782_400, "2000-02-29"),
+            (1_735_689_599, "2024-12-31"),
+            (1_735_689_600, "2025-01-01"),
+            (4_107_542_400, "2100-03-01"),
+        ] {
+            assert_eq!(date(UNIX_EPOCH + Duration::from_secs(seconds)), day);
+        }
+    }
 }
