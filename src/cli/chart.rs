@@ -48,7 +48,7 @@ struct Table1Args {
 /// Time of a distance query against model error: our representations beside hulls, simplified hulls and meshes of parry and coal
 ///
 /// Pairs of the five meshes of the Princeton benchmark and of household objects. Writes speed.md, speed.csv and the pictures speed*.svg. Fits
-/// are made once, which takes about ten minutes on one core, and kept; measuring takes about ten more. Coal takes part when SUBLEVEL_COAL
+/// are made once and kept, which takes a few minutes on one core; measuring takes about a quarter of an hour. Coal takes part when SUBLEVEL_COAL
 /// names the program that times it.
 #[derive(Debug, Args)]
 struct SpeedArgs {

@@ -167,11 +167,11 @@ impl Speed {
 fn chart(race: &Race, truth: Truth, timing: Timing) -> Result<String, ChartError> {
     let lines = race.lines.iter().filter_map(|line| Some((line.who, line.error(truth)?, line.nanoseconds(timing))));
     let how = match timing {
-        Timing::Warm => "with a hint from the pose before",
-        Timing::Cold => "without a hint",
-        Timing::Batch => "ours in batches",
+        Timing::Warm => " with a hint from the pose before",
+        Timing::Cold => " without a hint",
+        Timing::Batch => ", ours in batches",
     };
-    draw(lines.collect(), format!("{}: distance queries {how}", race.name), truth)
+    draw(lines.collect(), format!("{}: distance queries{how}", race.name), truth)
 }
 
 fn draw(lines: Vec<(Who, f64, f64)>, title: String, truth: Truth) -> Result<String, ChartError> {
