@@ -127,7 +127,7 @@ impl<'a> Object<'a> {
         Ok(Rung { body, gap, seconds: self.seconds + start.elapsed().as_secs_f64(), report: None })
     }
 
-    /// Values at all points of the polynomial of that degree with the least log det: 1 at the outermost.
+    /// How far out every point lies: the values of the polynomial of that degree with the least log det, 1 at the outermost.
     pub(super) fn levels(&self, degree: usize, watch: &mut Watch) -> Result<Vec<f64>, FitError> {
         let structure = Structure::new(degree);
         let coordinates = self.coordinates(Coordinates::Unit)?;

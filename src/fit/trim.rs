@@ -4,8 +4,9 @@ use super::FitError;
 use super::gap::nearest;
 use super::hull::convex_hull;
 use super::object::Object;
+use super::program::ProgramError;
 use super::progress::{Progress, Watch};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use std::ops::ControlFlow;
 
 /// Degree of the bodies by which points stand out.
@@ -13,6 +14,9 @@ const DEGREE: usize = 4;
 
 /// How often points are left out, about as many each time: those that an outlier hid stand out once it is gone.
 const ROUNDS: usize = 5;
+
+/// Points with a larger value of the polynomial touch the body.
+const TOUCHES: f64 = 1.0 - 1e-3;
 
 /// Most of the points that may be left out.
 const MOST: f64 = 0.5;
@@ -29,7 +33,8 @@ pub struct Trimmed {
 }
 
 /// Leaves out that fraction of the points, rounded down: again and again the outermost as the smallest body of degree 4 around those
-/// that are left sees them, the ones with the largest values of its polynomial. It follows the points through affine maps.
+/// that are left sees them, the ones with the largest values of its polynomial. Of those that touch it, the ones that stand apart from
+/// all others go first. It follows the points through affine maps.
 ///
 /// # Errors
 /// [`FitError::Trim`] for a fraction outside [0, 0.5], and as [`fit`](super::fit()).
@@ -51,9 +56,14 @@ pub fn trim(
         }
         let (indices, kept): (Vec<_>, Vec<_>) =
             points.iter().enumerate().filter(|(i, _)| stays[*i]).map(|(i, x)| (i, *x)).unzip();
-        let levels = Object::new("trim", &kept, "")?.levels(DEGREE, &mut watch)?;
+        let object = Object::new("trim", &kept, "")?;
+        let levels = object.levels(DEGREE, &mut watch)?;
+        let leverages = leverages(&kept.iter().map(|x| object.whiten(x)).collect::<Vec<_>>())?;
+        // Few points touch on all sides of a cluster as on all sides of a body: their levels are the same but for rounding.
+        let outward = |i: usize| if levels[i] > TOUCHES { (true, leverages[i]) } else { (false, levels[i]) };
+        let compare = |a: (bool, f64), b: (bool, f64)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1));
         let mut order: Vec<usize> = (0..kept.len()).collect();
-        order.select_nth_unstable_by(share - 1, |&i, &j| levels[j].total_cmp(&levels[i]));
+        order.select_nth_unstable_by(share - 1, |&i, &j| compare(outward(j), outward(i)));
         order[..share].iter().for_each(|&k| stays[indices[k]] = false);
         left -= share;
     }
@@ -68,6 +78,15 @@ pub fn trim(
         farthest_m = left_out.iter().map(|x| (x - from - nearest(&hull, &(x - from))).norm()).fold(0.0, f64::max);
     }
     Ok(Trimmed { kept, left_out, farthest_m })
+}
+
+/// Squared distance of every point from the mean of all, in the metric of their covariance (Mahalanobis): what stands apart from a
+/// crowd has much, the crowd little, wherever it lies.
+fn leverages(points: &[Vector3<f64>]) -> Result<Vec<f64>, ProgramError> {
+    let mean = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
+    let scatter: Matrix3<f64> = points.iter().map(|x| (x - mean) * (x - mean).transpose()).sum();
+    let factor = scatter.cholesky().ok_or(ProgramError::Singular)?;
+    Ok(points.iter().map(|x| (x - mean).dot(&factor.solve(&(x - mean)))).collect())
 }
 
 #[cfg(test)]
@@ -108,6 +127,21 @@ mod tests {
         assert_eq!((found.left_out.len(), found.kept.len()), (60, points.len() - 60));
         assert!(found.kept.iter().all(|x| x.norm() < 0.7), "a stray stays");
         assert!(found.farthest_m > 0.5 && found.farthest_m < 1.7, "{}", found.farthest_m);
+    }
+
+    #[test]
+    fn as_few_strays_as_corners_of_a_simplex_go_before_the_crowd() {
+        for seed in 0..40 {
+            let mut random = Seeded(seed);
+            let mut points: Vec<_> = (0..30).map(|_| Vector3::from_fn(|_, _| random.signed())).collect();
+            let strays = 1 + (seed % 5) as usize;
+            for _ in 0..strays {
+                let u = Vector3::from_fn(|_, _| random.signed()).normalize();
+                points.push(u * 10_f64.powf(1.0 + 4.0 * random.signed().abs()));
+            }
+            let found = trim(&points, (strays as f64 + 0.5) / points.len() as f64, &mut unwatched).unwrap();
+            assert_eq!(found.left_out, points[30..], "seed {seed}");
+        }
     }
 
     #[test]
