@@ -6,6 +6,7 @@ use super::path::{Centre, Interior, Pace, Path};
 use super::program::{Problem, ProgramError};
 use super::progress::Watch;
 use super::structure::Structure;
+use crate::body::fibonacci_lattice;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 /// A point may be outside by this much in p before the pull-in takes it in.
@@ -57,25 +58,12 @@ pub(super) fn generate(
     likely: &[usize],
     watch: &mut Watch,
 ) -> Result<Optimum, FitError> {
-    match generate_from(&problem, Active::start(&problem, points, likely, Mixes::OfAll), points, watch) {
-        Err(FitError::Program(ProgramError::Singular)) if problem.is_convex() => {
-            generate_from(&problem, Active::start(&problem, points, likely, Mixes::OfTheFarthest), points, watch)
-        }
-        found => found,
-    }
-}
-
-fn generate_from(
-    problem: &Problem,
-    mut active: Active,
-    points: &[Vector3<f64>],
-    watch: &mut Watch,
-) -> Result<Optimum, FitError> {
     let structure = problem.structure;
+    let mut active = Active::start(&problem, points, likely);
     let mut worst = 0.0;
     for round in 1..=ROUNDS {
         // Points come in while the optimum is still rough.
-        let path = Path::of_fit(problem, &active.values);
+        let path = Path::of_fit(&problem, &active.values);
         let first = path.start().ok_or(ProgramError::Singular)?;
         watch.round(active.values.ncols(), worst);
         let rough = path.follow(first, pace(ROUGH_GAP), watch)?.ok_or(ProgramError::Singular)?;
@@ -89,7 +77,7 @@ fn generate_from(
         let outside = violations(structure, points, &last.interior.coefficients);
         worst = outside.first().map_or(0.0, |&(excess, _)| excess);
         if worst <= VIOLATION {
-            return verified(problem, last);
+            return verified(&problem, last);
         }
         active.add(structure, points, &outside);
     }
@@ -150,12 +138,12 @@ struct Active {
 impl Active {
     /// A well-spread subset, the likeliest points, and for convex p some inside the hull: those constrain nothing, but with weight on
     /// them the moments are positive definite also when the points lie on a quadric, as the corners of a box do.
-    fn start(problem: &Problem, points: &[Vector3<f64>], likely: &[usize], mixes: Mixes) -> Self {
+    fn start(problem: &Problem, points: &[Vector3<f64>], likely: &[usize]) -> Self {
         let structure = problem.structure;
         let first = spread(points, SPREAD * structure.gram.size);
         let mut chosen: Vec<Vector3<f64>> = first.iter().map(|&index| points[index]).collect();
         if problem.is_convex() {
-            chosen.extend(inner(structure, &chosen, mixes));
+            chosen.extend(inner(structure));
         }
         let mut used = vec![false; points.len()];
         first.iter().for_each(|&index| used[index] = true);
@@ -196,45 +184,14 @@ pub(super) fn spread(points: &[Vector3<f64>], most: usize) -> Vec<usize> {
     (0..most.min(points.len())).map(choose).collect()
 }
 
-/// What inner points are mixed of.
-#[derive(Clone, Copy)]
-pub(super) enum Mixes {
-    /// All points alike.
-    OfAll,
-    /// Mostly the first, which are the farthest apart: where a few points are far from a crowd, mixes of the crowd alone are all but
-    /// one point.
-    OfTheFarthest,
+/// Points of a ball that is in the hull, twice as many as monomials of half the degree: they constrain nothing, but with weight on them
+/// moments are positive definite also where there are few points, or points on a quadric. The unit ball is the smallest ellipsoid
+/// around the hull, so the ball of a third of its radius is inside (John's theorem).
+pub(super) fn inner(structure: &Structure) -> impl Iterator<Item = Vector3<f64>> {
+    let count = 2 * structure.gram.size;
+    fibonacci_lattice(count).enumerate().map(|(i, u)| u * (INNER * (i as f64 * RADII).fract().cbrt()))
 }
 
-impl Mixes {
-    /// Power of a number between 0 and 1 that tells which of the points is taken.
-    fn bias(self) -> i32 {
-        match self {
-            Self::OfAll => 1,
-            Self::OfTheFarthest => 4,
-        }
-    }
-}
-
-/// Mixes of [`spread`] points, twice as many as monomials of half the degree: they constrain nothing, but with weight on them moments
-/// are positive definite also where there are few points, or points on a quadric.
-pub(super) fn inner(structure: &Structure, spread: &[Vector3<f64>], mixes: Mixes) -> Vec<Vector3<f64>> {
-    let mix = |i: usize| {
-        // Four points with weights that change from one mix to the next.
-        let corner = |k: usize| spread[(fraction(i, CORNERS[k]).powi(mixes.bias()) * spread.len() as f64) as usize];
-        let shares = SHARES.map(|step| fraction(i, step).powi(3) + 0.01);
-        let total: f64 = shares.iter().sum();
-        (0..4).map(|k| corner(k) * (shares[k] / total)).sum()
-    };
-    (0..2 * structure.gram.size).map(mix).collect()
-}
-
-/// Steps of low-discrepancy sequences.
-const CORNERS: [f64; 4] = [0.856_675, 0.733_892, 0.628_707, 0.538_597];
-/// See [`CORNERS`].
-const SHARES: [f64; 4] = [0.618_034, 0.754_878, 0.569_840, 0.819_173];
-
-/// Low-discrepancy sequence in the unit interval.
-fn fraction(index: usize, step: f64) -> f64 {
-    (index as f64 * step).fract()
-}
+/// Radius of the ball, and the step of a low-discrepancy sequence of its radii.
+const INNER: f64 = 0.33;
+const RADII: f64 = 0.754_878;

@@ -5,7 +5,7 @@
 //! program's dual, and goes that way as far as the volume falls. The feasible set is convex, so every polynomial on the way
 //! is feasible, and the volume never grows.
 
-use super::generate::{Mixes, inner, spread};
+use super::generate::inner;
 use super::model::Model;
 use super::path::{Goal, Interior, Pace, Path, Place};
 use super::progress::Watch;
@@ -80,8 +80,7 @@ pub(super) fn refine(
     hessian: DMatrix<f64>,
     watch: &mut Watch,
 ) -> Result<Refined, FitError> {
-    let corners: Vec<_> = spread(points, 2 * structure.gram.size).into_iter().map(|index| points[index]).collect();
-    let known = points.iter().copied().chain(inner(structure, &corners, Mixes::OfAll));
+    let known = points.iter().copied().chain(inner(structure));
     let values = DMatrix::from_columns(&known.map(|x| structure.values(&x)).collect::<Vec<_>>());
     let mut current = Interior { coefficients, hessian };
     // What the solver left outside is taken in by the constant.
