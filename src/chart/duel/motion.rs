@@ -156,7 +156,7 @@ pub fn stepping<S: Solid>(
     (1..=trajectories as u64).map(one).collect()
 }
 
-/// Motions of one body along the other with the gap going up and down through [`GRAZE`].
+/// Motions of one body along the other with the gap going up and down between a micrometre and a centimetre.
 ///
 /// # Errors
 /// None that could be met: a pose that is no pose.
@@ -164,7 +164,7 @@ pub fn grazing(a: &Body, b: &Body, trajectories: usize, poses: usize) -> Result<
     along(a, b, trajectories, poses, GRAZE, settle)
 }
 
-/// Motions of one body along the other with the gap going up and down through [`CONTACT`].
+/// Motions of one body along the other with the gap going up and down from a centimetre apart to five deep.
 ///
 /// # Errors
 /// None that could be met: a pose that is no pose.

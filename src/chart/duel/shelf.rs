@@ -139,8 +139,7 @@ mod tests {
             move || Ok(Shape::Body(Box::new(Body::ball("ball", Vector3::zeros(), radius).expect("a radius"))))
         };
         let radius = |shape: &Shape| match shape {
-            // A metre from the centre the constraint is 1 / r².
-            Shape::Body(body) => body.value(&Vector3::x()).powf(-0.5).round(),
+            Shape::Body(body) => body.circumscribed().radius.round(),
             Shape::Compound(_) => f64::NAN,
         };
         let take = |x: f64, options: &str, r: f64| radius(&shelf.take("ball", &mesh(x), options, ball(r)).unwrap());
