@@ -526,6 +526,16 @@ fn sets_that_need_not_be_convex_are_told_from_bodies_everywhere() {
     let straighter = changed(&|file| file["relaxation"]["c"] = 1.0.into());
     assert!(refusal(&["verify", text(&straighter)]).contains("relaxation"));
 
+    // The smallest body around it is convex, and proven to contain all of it.
+    let convexified = json(&["fit", file, "--group", "hull", "--out", out, "--json"])[0].clone();
+    assert_eq!(convexified["members"], serde_json::json!(["ring"]));
+    assert!(volume(&convexified) > volume(&relaxed));
+    let hull = folder.path().join("hull-d4.json");
+    let verdict = json(&["verify", text(&hull), "--contains", file, "--json"]);
+    assert_eq!(verdict["contains_sets_proven"], serde_json::json!([true]));
+    let there = ["fit", file, "--group", "hull", "--out", out, "--server", "http://127.0.0.1:9"];
+    assert!(refusal(&there).contains("leave out --server"));
+
     // Where convexity is needed it is refused for what it is.
     let body = folder.path().join("ring-d4.json");
     assert!(refusal(&["measure", text(&body), file]).contains("need not be convex"));

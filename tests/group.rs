@@ -6,7 +6,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde_json::Value;
 use std::ops::ControlFlow;
 use std::time::Instant;
-use sublevel::body::{BasicSet, Body};
+use sublevel::body::{BasicSet, Body, Obstacle};
 use sublevel::fit::{EncloseOptions, group};
 
 fn number(value: &Value, index: usize) -> f64 {
@@ -41,8 +41,9 @@ fn grouped(problem: usize, degree: usize, max_growth: f64) -> Option<(usize, usi
         scene["obstacles"].as_array().expect("scenes have obstacles").iter().map(obstacle).collect();
     let start = Instant::now();
     let options = EncloseOptions::new(degree);
+    let obstacles: Vec<Obstacle> = bodies.iter().cloned().map(Into::into).collect();
     let groups =
-        group(&bodies, max_growth, &options, &mut |_| ControlFlow::Continue(())).expect("the scene is grouped");
+        group(&obstacles, max_growth, &options, &mut |_| ControlFlow::Continue(())).expect("the scene is grouped");
     let seconds = start.elapsed().as_secs_f64();
     let mut members: Vec<usize> = groups.iter().flat_map(|group| group.members.iter().copied()).collect();
     members.sort_unstable();
@@ -51,8 +52,8 @@ fn grouped(problem: usize, degree: usize, max_growth: f64) -> Option<(usize, usi
     for group in &groups {
         let volume: f64 = group.members.iter().map(|&i| bodies[i].volume().volume_m3).sum();
         before += volume;
-        after += group.enclosure.as_ref().map_or(volume, |enclosure| enclosure.body.volume().volume_m3);
-        let Some(enclosure) = &group.enclosure else { continue };
+        after += group.cover.body().volume().volume_m3;
+        let Some(enclosure) = group.cover.enclosure() else { continue };
         // From the stored numbers alone.
         let again = Body::from_json(&enclosure.body.to_json()).expect("the stored body is proven");
         for (set, &i) in again.sets().iter().zip(&group.members) {

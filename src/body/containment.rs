@@ -7,7 +7,7 @@
 //! real x, however large, small or far from the origin the set is. A frame in which the set fills the unit ball keeps that
 //! price low.
 
-use super::{Body, BodyId, Normalization};
+use super::{Body, BodyId, Normalization, SosBody};
 use crate::polynomial::{ContainmentProof, NotContaining, Polynomial, Substituted, Substitution};
 use nalgebra::{Matrix3, Vector3};
 
@@ -24,6 +24,12 @@ impl<'a> From<&'a Body> for BasicSet<'a> {
     fn from(body: &'a Body) -> Self {
         let polynomials = body.constraints().iter().map(|constraint| &constraint.polynomial).collect();
         Self { normalization: body.normalization(), polynomials }
+    }
+}
+
+impl<'a> From<&'a SosBody> for BasicSet<'a> {
+    fn from(body: &'a SosBody) -> Self {
+        Self { normalization: body.normalization(), polynomials: vec![body.polynomial()] }
     }
 }
 

@@ -136,12 +136,14 @@ pub(super) struct FitArgs {
     pub(super) server: Option<String>,
     /// Put the bodies of all inputs, body files in one common frame, into one body: <NAME>-d<degree>.json
     ///
+    /// Inputs may be sos-bodies, which need not be convex: the smallest body around one is its convexification.
     /// It is proven to contain every body whole, by polynomial multipliers that its file keeps: 'verify --contains' checks them.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["ladder", "max_gap", "refine", "slabs", "trim", "min_thickness", "scale", "objective", "relax_convexity", "raw_frame", "cone", "parts"])]
     pub(super) group: Option<String>,
     /// Put them into few bodies, <NAME>-1-d<degree>.json and so on, of at most 1 + FRACTION times the inputs' total volume
     ///
-    /// What adds the least volume is merged first. Bodies that stay alone are written, too, as they are.
+    /// What adds the least volume is merged first. Bodies that stay alone are written, too, as they are, and sos-bodies in
+    /// the body around them, whose volume counts for theirs.
     #[arg(long, value_name = "FRACTION", requires = "group", allow_negative_numbers = true)]
     pub(super) max_growth: Option<f64>,
     /// Degree that the multipliers have at least: 0, 2 or 4; higher ones may make the body smaller and cost more

@@ -1,8 +1,8 @@
 //! `sublevel fit --group`.
 
 use super::fit::{FitArgs, carry_out_on, checked, make_folder, order_of_group, progress_bar};
-use super::{read_body, write_atomically};
-use crate::body::Body;
+use super::{read_obstacle, write_atomically};
+use crate::body::{Body, Obstacle};
 use crate::fit::Progress;
 use crate::jobs::{Made, Shapes, fit_group};
 use crate::service;
@@ -33,17 +33,17 @@ struct Row {
 /// Reads the bodies, puts them into one or several, and writes those.
 pub(super) fn run(args: &FitArgs, name: &str) -> Result<(), Box<dyn Error>> {
     let start = Instant::now();
-    let bodies = args.inputs.iter().map(|path| read_body(path)).collect::<Result<Vec<_>, _>>()?;
-    let order = checked(order_of_group(args, name, &bodies))?;
+    let obstacles = args.inputs.iter().map(|path| read_obstacle(path)).collect::<Result<Vec<_>, _>>()?;
+    let order = checked(order_of_group(args, name, &obstacles))?;
     make_folder(&args.out)?;
     let bar = progress_bar(name);
     let Made { outcome, shapes } = match &args.server {
-        Some(url) => carry_out_there(args, url, &order, &bar)?,
-        None => fit_group(&order, &bodies, |_, said| tell(&bar, said))?,
+        Some(url) => carry_out_there(args, url, &order, &obstacles, &bar)?,
+        None => fit_group(&order, &obstacles, |_, said| tell(&bar, said))?,
     };
     bar.finish_and_clear();
     let Shapes::Bodies(made) = shapes else { return Err("groups become bodies; are the versions the same?".into()) };
-    let rows = made.iter().zip(&outcome.bodies).map(|(body, took)| write(args, body, took, &bodies));
+    let rows = made.iter().zip(&outcome.bodies).map(|(body, took)| write(args, body, took, &obstacles));
     let rows = rows.collect::<Result<Vec<_>, _>>()?;
     let mut out = io::stdout().lock();
     if args.json {
@@ -56,7 +56,7 @@ pub(super) fn run(args: &FitArgs, name: &str) -> Result<(), Box<dyn Error>> {
         writeln!(
             out,
             "{} bodies of {before:.4e} m³ in {} of {after:.4e} m³, {:+.1} %, in {:.1} s",
-            bodies.len(),
+            obstacles.len(),
             rows.len(),
             100.0 * (after / before - 1.0),
             start.elapsed().as_secs_f64()
@@ -70,8 +70,18 @@ fn tell(bar: &ProgressBar, progress: Progress) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// The server must have the bodies first.
-fn carry_out_there(args: &FitArgs, url: &str, order: &FitOrder, bar: &ProgressBar) -> Result<Made, Box<dyn Error>> {
+/// The server must have the bodies first, and it stores no others.
+fn carry_out_there(
+    args: &FitArgs,
+    url: &str,
+    order: &FitOrder,
+    obstacles: &[Obstacle],
+    bar: &ProgressBar,
+) -> Result<Made, Box<dyn Error>> {
+    if let Some(at) = obstacles.iter().position(|obstacle| matches!(obstacle, Obstacle::SosBody(_))) {
+        let file = args.inputs[at].display();
+        return Err(format!("{file} is an sos-body, which servers do not store; leave out --server").into());
+    }
     bar.set_message("sending");
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     runtime.block_on(service::push(url, &args.inputs))?;
@@ -79,16 +89,16 @@ fn carry_out_there(args: &FitArgs, url: &str, order: &FitOrder, bar: &ProgressBa
 }
 
 /// Writes one body and describes it.
-fn write(args: &FitArgs, body: &Body, took: &FittedBody, bodies: &[Body]) -> Result<Row, Box<dyn Error>> {
+fn write(args: &FitArgs, body: &Body, took: &FittedBody, obstacles: &[Obstacle]) -> Result<Row, Box<dyn Error>> {
     let file = args.out.join(format!("{}-d{}.json", body.name(), body.degree()));
     write_atomically(&file, &body.to_json())?;
-    let members = took.members.iter().filter_map(|&member| bodies.get(member));
+    let members = took.members.iter().filter_map(|&member| obstacles.get(member));
     Ok(Row {
         body: file.display().to_string(),
-        members: members.clone().map(|body| body.name().to_owned()).collect(),
+        members: members.clone().map(|member| member.name().to_owned()).collect(),
         degree: body.degree(),
         volume_m3: body.volume().volume_m3,
-        members_volume_m3: members.map(|body| body.volume().volume_m3).sum(),
+        members_volume_m3: members.map(|member| member.volume().volume_m3).sum(),
         gap_m: took.gap_m,
         optimality_gap: took.optimum.as_ref().and_then(|optimum| optimum.optimality_gap),
         proven: true,

@@ -19,7 +19,7 @@ mod show;
 mod sos_body;
 mod verify;
 
-use crate::body::{Body, Shape};
+use crate::body::{Obstacle, Shape};
 use clap::Parser;
 use std::error::Error;
 use std::io;
@@ -125,9 +125,9 @@ fn read(path: &Path) -> Result<String, Box<dyn Error>> {
     std::fs::read_to_string(path).map_err(|error| format!("{}: {error}; check the path", path.display()).into())
 }
 
-/// Reads and re-proves a body file, naming it in the error.
-fn read_body(path: &Path) -> Result<Body, Box<dyn Error>> {
-    Body::from_json(&read(path)?).map_err(|error| format!("{}: {error}", path.display()).into())
+/// Reads and re-proves the file of a body or an sos-body, naming it in the error.
+fn read_obstacle(path: &Path) -> Result<Obstacle, Box<dyn Error>> {
+    Obstacle::from_json(&read(path)?).map_err(|error| format!("{}: {error}", path.display()).into())
 }
 
 /// Reads and re-proves the file of a body or a compound, naming it in the error.

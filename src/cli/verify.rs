@@ -1,7 +1,7 @@
 //! `sublevel verify`.
 
-use super::{Outcome, one_line, read, read_body, sos_body};
-use crate::body::{BasicSet, Body, Compound, Shape, SosBody};
+use super::{Outcome, one_line, read, read_obstacle, sos_body};
+use crate::body::{BasicSet, Body, Compound, Obstacle, Shape, SosBody};
 #[cfg(feature = "fit")]
 use crate::body::{Covering, NotCovered, Piece};
 #[cfg(feature = "fit")]
@@ -40,7 +40,7 @@ pub(super) struct VerifyArgs {
     #[cfg(feature = "fit")]
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, requires = "points", allow_negative_numbers = true)]
     pub(super) scale: f64,
-    /// Bodies that the body must contain whole, by the proofs that its file keeps for them
+    /// Bodies and sos-bodies that the body must contain whole, by the proofs that its file keeps for them
     #[cfg_attr(feature = "fit", doc = "or, if it has none, by new ones")]
     #[arg(long, value_name = "FILE", num_args = 1..)]
     contains: Vec<PathBuf>,
@@ -228,7 +228,7 @@ fn contained(_: &VerifyArgs, body: &Body) -> Result<(Report, Option<String>), Bo
 
 /// Proves a body inside by the stored proof or a new one; else tells why not.
 fn inside(path: &Path, body: &Body) -> Result<Option<String>, Box<dyn std::error::Error>> {
-    let inner = read_body(path)?;
+    let inner = read_obstacle(path)?;
     if inner.id() == body.id() {
         return Ok(None);
     }
@@ -242,13 +242,13 @@ fn inside(path: &Path, body: &Body) -> Result<Option<String>, Box<dyn std::error
 }
 
 #[cfg(feature = "fit")]
-fn new_proof(body: &Body, inner: &Body) -> Option<String> {
+fn new_proof(body: &Body, inner: &Obstacle) -> Option<String> {
     let degree = crate::fit::EncloseOptions::new(body.degree()).multiplier_degree;
     crate::fit::containment(body, &inner.into(), degree).err().map(|error| error.to_string())
 }
 
 #[cfg(not(feature = "fit"))]
-fn new_proof(_: &Body, _: &Body) -> Option<String> {
+fn new_proof(_: &Body, _: &Obstacle) -> Option<String> {
     Some("the body's file has no proof that it contains this body, and making one needs the feature 'fit'".into())
 }
 

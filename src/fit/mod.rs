@@ -53,8 +53,8 @@ pub use cone::{Cone, UnknownCone};
 pub use coordinates::Coordinates;
 pub use cuboid::{OrientedBox, smallest_box};
 pub use enclose::{
-    EncloseError, EncloseOptions, Enclosure, Group, MAX_MULTIPLIER_DEGREE, MAX_SETS, NoContainment, Region,
-    containment, enclose, enclose_bodies, group,
+    Cover, EncloseError, EncloseOptions, Enclosure, Group, MAX_MULTIPLIER_DEGREE, MAX_SETS, NoContainment, Region,
+    containment, enclose, enclose_obstacles, group,
 };
 pub use gap::{Gap, gap};
 pub use hull::HullError;

@@ -5,10 +5,10 @@ use std::ops::ControlFlow;
 
 use super::Phase;
 use super::order::{OrderError, Way, enclosing, way};
-use crate::body::{Body, Compound, SosBody};
+use crate::body::{Body, Compound, Obstacle, SosBody};
 use crate::fit::{
-    CompoundFit, EncloseError, FitError, FitOptions, Group, Mesh, Progress, Representation, Rung, SosFit,
-    cheapest_within, coarsest_within, enclose_bodies, fit, fit_parts, fit_sos, group, ladder, thicken, trim,
+    CompoundFit, Cover, EncloseError, FitError, FitOptions, Group, Mesh, Progress, Representation, Rung, SosFit,
+    cheapest_within, coarsest_within, enclose_obstacles, fit, fit_parts, fit_sos, group, ladder, thicken, trim,
 };
 use crate::store::{FitGroup, FitOptimum, FitOrder, FitOutcome, FittedBody, FittedKind};
 
@@ -160,36 +160,36 @@ fn fit_convex(
     })
 }
 
-/// Carries out an order about a group, which is of these bodies. `progress` can stop it.
+/// Carries out an order about a group, which is of these obstacles. `progress` can stop it.
 ///
 /// # Errors
 /// What is wrong with the order, and what could not be solved or proven.
 pub fn fit_group(
     order: &FitOrder,
-    bodies: &[Body],
+    obstacles: &[Obstacle],
     mut progress: impl FnMut(Phase, Progress) -> ControlFlow<()>,
 ) -> Result<Made, Failure> {
     let asked = order.group.as_ref().ok_or_else(|| OrderError::new("group", "is missing; name the bodies"))?;
     let options = enclosing(order, asked);
     let mut tell = |said| progress(Phase::Fitting, said);
     let groups = match asked.max_growth {
-        Some(max_growth) => group(bodies, max_growth, &options, &mut tell)?,
+        Some(max_growth) => group(obstacles, max_growth, &options, &mut tell)?,
         None => {
-            let all: Vec<&Body> = bodies.iter().collect();
-            let enclosure = enclose_bodies(&order.name, &all, &options, &mut tell)?;
-            vec![Group { members: (0..bodies.len()).collect(), enclosure: Some(enclosure) }]
+            let all: Vec<&Obstacle> = obstacles.iter().collect();
+            let enclosure = enclose_obstacles(&order.name, &all, &options, &mut tell)?;
+            let cover = Cover::Around(Box::new(enclosure));
+            vec![Group { members: (0..obstacles.len()).collect(), cover }]
         }
     };
     let (mut took, mut made) = (Vec::new(), Vec::new());
-    for (index, Group { members, enclosure }) in groups.into_iter().enumerate() {
-        // A body that is alone stays as it is.
-        let body = enclosure.as_ref().map_or(&bodies[members[0]], |enclosure| &enclosure.body);
+    for (index, Group { members, cover }) in groups.into_iter().enumerate() {
+        let (body, enclosure) = (cover.body(), cover.enclosure());
         took.push(FittedBody {
             id: body.id().to_string(),
-            gap_m: enclosure.as_ref().map(|enclosure| enclosure.gap.most_m),
-            mean_gap_m: enclosure.as_ref().map(|enclosure| enclosure.gap.mean_m),
-            seconds: enclosure.as_ref().map_or(0.0, |enclosure| enclosure.seconds),
-            optimum: enclosure.as_ref().map(|enclosure| FitOptimum {
+            gap_m: enclosure.map(|enclosure| enclosure.gap.most_m),
+            mean_gap_m: enclosure.map(|enclosure| enclosure.gap.mean_m),
+            seconds: enclosure.map_or(0.0, |enclosure| enclosure.seconds),
+            optimum: enclosure.map(|enclosure| FitOptimum {
                 objective_value: enclosure.objective_value,
                 optimality_gap: Some(enclosure.optimality_gap),
                 refinement_end: None,

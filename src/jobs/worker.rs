@@ -10,6 +10,7 @@ use tokio::task::{JoinError, spawn_blocking};
 
 use super::{Board, Jobs, Made, Phase, fit_group, fit_mesh};
 use crate::body::Body;
+use crate::body::Obstacle;
 use crate::fit::{self, Mesh};
 use crate::store::{Catalogue, CatalogueError, FitGroup, Job, JobState, MAX_FILE_BYTES};
 
@@ -88,7 +89,7 @@ impl Jobs {
                 let body = |id: &String| {
                     let found = id.parse().ok().and_then(|id| catalogue.body(&id));
                     found
-                        .map(|body| (*body).clone())
+                        .map(|body| Obstacle::from((*body).clone()))
                         .ok_or_else(|| format!("body {id} was deleted meanwhile; create it again"))
                 };
                 let bodies = body_ids.iter().map(body).collect::<Result<Vec<_>, _>>()?;

@@ -15,9 +15,10 @@ pub use coverage::{Coverage, TriangleError, Uncovered};
 
 use super::{
     Aabb, Ball, BodyError, BodyId, ContainedPoints, Normalization, NotContained, Placement, Provenance, Volume,
+    fibonacci_lattice,
 };
 use super::{check_name, invert};
-use crate::polynomial::{CertificateError, HessianGram, NormPower, Polynomial, SosGram};
+use crate::polynomial::{CertificateError, Chords, HessianGram, NormPower, Polynomial, SosGram};
 use nalgebra::{Matrix3, Vector3};
 
 /// How far a polynomial is from sos-convex: `p(z) + c |linear z + offset|^degree` is, degree being that of p (Ahmadi, Hall,
@@ -208,6 +209,22 @@ impl SosBody {
     /// Where the set comes from.
     pub fn provenance(&self) -> Option<&Provenance> {
         self.provenance.as_ref()
+    }
+
+    /// Where so many rays from the centre of the circumscribed ball run through the set: both ends of each piece, metres. Thin parts
+    /// may lie between them.
+    pub fn chords(&self, rays: usize) -> Vec<(Vector3<f64>, Vector3<f64>)> {
+        let Normalization { center, linear } = &self.normalization;
+        let ball = self.circumscribed;
+        let chords = Chords::new(&self.polynomial, &(linear * (ball.center - center)));
+        let mut found = Vec::new();
+        for u in fibonacci_lattice(rays) {
+            let towards = linear * u;
+            chords.along(&towards, ball.radius, &mut |from, to| {
+                found.push((ball.center + u * from, ball.center + u * to))
+            });
+        }
+        found
     }
 
     /// p at a point of the body frame, up to rounding: at most 1 inside.

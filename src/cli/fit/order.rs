@@ -1,7 +1,7 @@
 //! What the arguments ask for, as an order: carried out here or by a server, it makes the same.
 
 use super::FitArgs;
-use crate::body::Body;
+use crate::body::Obstacle;
 use crate::fit::{Objective, SosMethod, UnknownObjective};
 use crate::jobs::check;
 use crate::store::{FitGroup, FitOrder};
@@ -66,9 +66,9 @@ pub(super) fn order(args: &FitArgs, input: &Path, stem: &str) -> FitOrder {
 }
 
 /// The order of `--group`.
-pub(in crate::cli) fn order_of_group(args: &FitArgs, name: &str, bodies: &[Body]) -> FitOrder {
+pub(in crate::cli) fn order_of_group(args: &FitArgs, name: &str, obstacles: &[Obstacle]) -> FitOrder {
     let group = FitGroup {
-        body_ids: bodies.iter().map(|body| body.id().to_string()).collect(),
+        body_ids: obstacles.iter().map(|obstacle| obstacle.id().to_string()).collect(),
         max_growth: args.max_growth,
         multiplier_degree: args.multiplier_degree,
     };

@@ -4,27 +4,52 @@
 //! lower bound of the volume of every convex body around two groups, so a pair's program is solved only once its bound is the least
 //! of all, and never for pairs that are too far apart.
 
-use super::{EncloseError, EncloseOptions, Enclosure, MAX_SETS, enclose_bodies};
-use crate::body::Body;
+use super::{EncloseError, EncloseOptions, Enclosure, MAX_SETS, Region, enclose_obstacles};
+use crate::body::{Body, Obstacle};
 use crate::fit::hull::convex_hull;
 use crate::fit::{FitError, Progress};
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 
-/// Some of the bodies, in one body.
+/// Some of the obstacles, in one body.
 #[derive(Clone, Debug)]
 pub struct Group {
-    /// Which of the bodies, in ascending order.
+    /// Which of the obstacles, in ascending order.
     pub members: Vec<usize>,
-    /// The body around them; none around a single one, which stays as it is.
-    pub enclosure: Option<Enclosure>,
+    /// The body around them.
+    pub cover: Cover,
+}
+
+/// The body around a group.
+#[derive(Clone, Debug)]
+pub enum Cover {
+    /// The single member itself, a body that stays as it is.
+    Itself(Box<Body>),
+    /// One that was made around the members.
+    Around(Box<Enclosure>),
+}
+
+impl Cover {
+    /// The body.
+    pub fn body(&self) -> &Body {
+        match self {
+            Self::Itself(body) => body,
+            Self::Around(enclosure) => &enclosure.body,
+        }
+    }
+
+    /// How the body was made, if it was.
+    pub fn enclosure(&self) -> Option<&Enclosure> {
+        match self {
+            Self::Itself(_) => None,
+            Self::Around(enclosure) => Some(enclosure),
+        }
+    }
 }
 
 /// A group that may still be merged.
 struct Candidate {
     group: Group,
-    /// Volume of its body, m³.
-    volume: f64,
     /// Vertices of the hull of points inside its members.
     points: Vec<Vector3<f64>>,
 }
@@ -38,15 +63,23 @@ struct Pair {
     merged: Option<Candidate>,
 }
 
-/// Puts bodies into few groups, the volumes of whose bodies add up to at most `1 + max_growth` times those of all bodies.
+impl Candidate {
+    /// Volume of its body, m³.
+    fn volume(&self) -> f64 {
+        self.group.cover.body().volume().volume_m3
+    }
+}
+
+/// Puts obstacles into few groups, the volumes of whose bodies add up to at most `1 + max_growth` times those of all obstacles, an
+/// obstacle that is not convex having that of the smallest body around it.
 ///
-/// Bodies that overlap count twice.
+/// Obstacles that overlap count twice.
 ///
 /// # Errors
 /// [`EncloseError::Growth`] for a growth that is not positive and finite, and as [`super::enclose`] for options and cancellation; a
 /// pair around which no body is found or proven is not merged.
 pub fn group(
-    bodies: &[Body],
+    obstacles: &[Obstacle],
     max_growth: f64,
     options: &EncloseOptions,
     progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
@@ -56,9 +89,10 @@ pub fn group(
         return Err(EncloseError::Growth(max_growth));
     }
     // Groups that were merged leave an empty place.
-    let mut candidates = (0..bodies.len()).map(|i| single(bodies, i).map(Some)).collect::<Result<Vec<_>, _>>()?;
-    let mut left = max_growth * bodies.iter().map(|body| body.volume().volume_m3).sum::<f64>();
-    let mut pairs: Vec<Pair> = (1..bodies.len())
+    let single = |i| single(obstacles, i, options, progress).map(Some);
+    let mut candidates = (0..obstacles.len()).map(single).collect::<Result<Vec<_>, _>>()?;
+    let mut left = max_growth * candidates.iter().flatten().map(Candidate::volume).sum::<f64>();
+    let mut pairs: Vec<Pair> = (1..obstacles.len())
         .flat_map(|j| (0..j).map(move |i| [i, j]))
         .filter_map(|places| pair(&candidates, places))
         .collect();
@@ -70,8 +104,8 @@ pub fn group(
         }
         let (Some(a), Some(b)) = (&candidates[i], &candidates[j]) else { continue };
         let Some(merged) = merged else {
-            if let Some(merged) = merge(bodies, a, b, options, progress)? {
-                let added = merged.volume - a.volume - b.volume;
+            if let Some(merged) = merge(obstacles, a, b, options, progress)? {
+                let added = merged.volume() - a.volume() - b.volume();
                 pairs.push(Pair { places: [i, j], added, merged: Some(merged) });
             }
             continue;
@@ -87,11 +121,22 @@ pub fn group(
     Ok(groups)
 }
 
-fn single(bodies: &[Body], index: usize) -> Result<Candidate, EncloseError> {
-    let body = &bodies[index];
-    let points = hull_of(body.boundary()).map_err(|source| EncloseError::Points { index, source })?.0;
-    let group = Group { members: vec![index], enclosure: None };
-    Ok(Candidate { group, volume: body.volume().volume_m3, points })
+fn single(
+    obstacles: &[Obstacle],
+    index: usize,
+    options: &EncloseOptions,
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+) -> Result<Candidate, EncloseError> {
+    let cover = match &obstacles[index] {
+        Obstacle::Body(body) => Cover::Itself(body.clone()),
+        obstacle @ Obstacle::SosBody(_) => {
+            let made = enclose_obstacles(obstacle.name(), &[obstacle], options, progress);
+            Cover::Around(Box::new(made.map_err(|error| error.of_set(index))?))
+        }
+    };
+    let inside = Region::from(&obstacles[index]).inside;
+    let points = hull_of(&inside).map_err(|source| EncloseError::Points { index, source })?.0;
+    Ok(Candidate { group: Group { members: vec![index], cover }, points })
 }
 
 /// The vertices of a hull and its volume, m³.
@@ -107,13 +152,13 @@ fn pair(candidates: &[Option<Candidate>], places: [usize; 2]) -> Option<Pair> {
         return None;
     }
     let points: Vec<_> = a.points.iter().chain(&b.points).copied().collect();
-    let added = hull_of(&points).ok()?.1 - a.volume - b.volume;
+    let added = hull_of(&points).ok()?.1 - a.volume() - b.volume();
     Some(Pair { places, added, merged: None })
 }
 
 /// Both groups in one, if there is a body around them.
 fn merge(
-    bodies: &[Body],
+    obstacles: &[Obstacle],
     a: &Candidate,
     b: &Candidate,
     options: &EncloseOptions,
@@ -121,13 +166,13 @@ fn merge(
 ) -> Result<Option<Candidate>, EncloseError> {
     let mut members: Vec<usize> = a.group.members.iter().chain(&b.group.members).copied().collect();
     members.sort_unstable();
-    let around: Vec<&Body> = members.iter().map(|&i| &bodies[i]).collect();
-    let enclosure = match enclose_bodies(around[0].name(), &around, options, progress) {
+    let around: Vec<&Obstacle> = members.iter().map(|&i| &obstacles[i]).collect();
+    let enclosure = match enclose_obstacles(around[0].name(), &around, options, progress) {
         Ok(enclosure) => enclosure,
         Err(EncloseError::Fit(FitError::Cancelled)) => return Err(FitError::Cancelled.into()),
         Err(_) => return Ok(None),
     };
     let points: Vec<_> = a.points.iter().chain(&b.points).copied().collect();
-    let (points, volume) = (hull_of(&points)?.0, enclosure.body.volume().volume_m3);
-    Ok(Some(Candidate { group: Group { members, enclosure: Some(enclosure) }, volume, points }))
+    let cover = Cover::Around(Box::new(enclosure));
+    Ok(Some(Candidate { group: Group { members, cover }, points: hull_of(&points)?.0 }))
 }

@@ -13,7 +13,7 @@ mod program;
 mod prove;
 mod region;
 
-pub use group::{Group, group};
+pub use group::{Cover, Group, group};
 pub use prove::{NoContainment, containment};
 pub use region::Region;
 
@@ -21,7 +21,7 @@ use super::object::Object;
 use super::progress::{Progress, Watch};
 use super::structure::Structure;
 use super::{DEFAULT_MARGIN, FitError, Gap};
-use crate::body::{BasicSet, Body, BodyError, BodyId, Constraint, ContainedSet, Containment};
+use crate::body::{BasicSet, Body, BodyError, BodyId, Constraint, ContainedSet, Containment, Obstacle};
 use crate::polynomial::{ContainmentProof, HessianGram, NotContaining, Polynomial, Substituted};
 use nalgebra::{DMatrix, Vector3};
 use program::{prepare, program};
@@ -127,6 +127,19 @@ pub enum EncloseError {
     },
 }
 
+impl EncloseError {
+    /// The error of a single set, told of the set that it is among others.
+    fn of_set(self, index: usize) -> Self {
+        match self {
+            Self::NoPolynomial(_) => Self::NoPolynomial(index),
+            Self::Points { source, .. } => Self::Points { index, source },
+            Self::Start(_) => Self::Start(index),
+            Self::Unproven { source, .. } => Self::Unproven { index, source },
+            error => error,
+        }
+    }
+}
+
 impl EncloseOptions {
     /// Multipliers that fill up to the degree of the polynomial where constraints are quadratic, as in the paper; of degree 4 at
     /// most.
@@ -208,19 +221,19 @@ pub fn enclose(
     }
 }
 
-/// The smallest body around bodies, whose file keeps the proofs.
+/// The smallest body around obstacles, whose file keeps the proofs. Around one that is not convex it is its convexification.
 ///
 /// # Errors
 /// As [`enclose`].
-pub fn enclose_bodies(
+pub fn enclose_obstacles(
     name: &str,
-    bodies: &[&Body],
+    obstacles: &[&Obstacle],
     options: &EncloseOptions,
     progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Enclosure, EncloseError> {
-    let regions: Vec<Region> = bodies.iter().map(|&body| body.into()).collect();
+    let regions: Vec<Region> = obstacles.iter().map(|&obstacle| obstacle.into()).collect();
     let mut enclosure = enclose(name, &regions, options, progress)?;
-    for (index, (inner, containment)) in bodies.iter().zip(&enclosure.containments).enumerate() {
+    for (index, (inner, containment)) in obstacles.iter().zip(&enclosure.containments).enumerate() {
         let id: BodyId = *inner.id();
         let record = ContainedSet { id, name: inner.name().to_owned(), containment: containment.clone() };
         enclosure.body = enclosure

@@ -1,7 +1,7 @@
 //! A set made ready to be contained: its frame, its constraints there, and a functional to start from.
 
 use super::cone::Cone;
-use crate::body::{BasicSet, Body, Normalization, ProofFrame};
+use crate::body::{BasicSet, Body, Normalization, Obstacle, ProofFrame, SosBody};
 use crate::fit::FitError;
 use crate::fit::basis::{Affine, of_monomials};
 use crate::fit::object::Object;
@@ -12,6 +12,11 @@ use nalgebra::{DVector, Matrix3, Vector3};
 /// How far the points in the interior of a body are from its centre, relative to its boundary: as many as a polynomial of degree 8
 /// can tell apart.
 const SHELLS: [f64; 4] = [0.4, 0.7, 0.9, 1.0];
+
+/// Rays whose chords give the points of a set that need not be convex, and where on them, from end to end.
+const RAYS: usize = 1000;
+/// See [`RAYS`].
+const ALONG: [f64; 4] = [1e-3, 0.3, 0.7, 0.999];
 
 /// A basic set to be contained, and points of it.
 #[derive(Clone, Debug)]
@@ -28,6 +33,22 @@ impl<'a> From<&'a Body> for Region<'a> {
         let center = body.interior_point();
         let shell = |share: f64| body.boundary().iter().map(move |x| center + (x - center) * share);
         Self { set: body.into(), inside: SHELLS.into_iter().flat_map(shell).collect() }
+    }
+}
+
+impl<'a> From<&'a SosBody> for Region<'a> {
+    fn from(body: &'a SosBody) -> Self {
+        let inside = |(from, to): (Vector3<f64>, Vector3<f64>)| ALONG.map(|share| from + (to - from) * share);
+        Self { set: body.into(), inside: body.chords(RAYS).into_iter().flat_map(inside).collect() }
+    }
+}
+
+impl<'a> From<&'a Obstacle> for Region<'a> {
+    fn from(obstacle: &'a Obstacle) -> Self {
+        match obstacle {
+            Obstacle::Body(body) => (&**body).into(),
+            Obstacle::SosBody(body) => (&**body).into(),
+        }
     }
 }
 

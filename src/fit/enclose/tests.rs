@@ -1,7 +1,7 @@
 use super::*;
-use crate::body::Normalization;
-use crate::fit::certificate;
+use crate::body::{Normalization, SosBody};
 use crate::fit::tests::unwatched;
+use crate::fit::{Coordinates, Objective, SosMethod, SosOptions, certificate, fit_sos};
 use crate::polynomial::tests::Seeded;
 use nalgebra::{Rotation3, UnitQuaternion};
 
@@ -23,9 +23,14 @@ fn three_ellipsoids(size: f64, center: Vector3<f64>) -> Vec<Body> {
         .collect()
 }
 
+fn obstacles(bodies: &[Body]) -> Vec<Obstacle> {
+    bodies.iter().cloned().map(Into::into).collect()
+}
+
 fn around(bodies: &[Body], degree: usize) -> Enclosure {
     let options = EncloseOptions::new(degree);
-    let enclosure = enclose_bodies("all", &bodies.iter().collect::<Vec<_>>(), &options, &mut unwatched).unwrap();
+    let enclosure =
+        enclose_obstacles("all", &obstacles(bodies).iter().collect::<Vec<_>>(), &options, &mut unwatched).unwrap();
     for body in bodies {
         // A hundred times as many points as the solver saw.
         for i in 0..60_000 {
@@ -254,12 +259,7 @@ fn neighbours_are_grouped_and_others_left_alone() {
         body.moved(&UnitQuaternion::from_matrix(Rotation3::identity().matrix()), &Vector3::new(x, y, 0.0)).unwrap()
     };
     let bodies = [cube(0.0, 0.0), cube(3.0, 0.0), cube(0.21, 0.0), cube(0.0, 5.0), cube(3.0, 0.21), cube(0.21, 0.21)];
-    let volumes = |groups: &[Group]| {
-        let of = |group: &Group| {
-            group.enclosure.as_ref().map_or(&bodies[group.members[0]], |all| &all.body).volume().volume_m3
-        };
-        groups.iter().map(of).sum::<f64>()
-    };
+    let volumes = |groups: &[Group]| groups.iter().map(|group| group.cover.body().volume().volume_m3).sum::<f64>();
     let members = |groups: &[Group]| groups.iter().map(|group| group.members.clone()).collect::<Vec<_>>();
     let total: f64 = bodies.iter().map(|body| body.volume().volume_m3).sum();
     for (growth, expected) in [
@@ -267,15 +267,66 @@ fn neighbours_are_grouped_and_others_left_alone() {
         // Those in an L, and those in a row, of which the next best are metres away.
         (1.5, vec![vec![0, 2, 5], vec![1, 4], vec![3]]),
     ] {
-        let groups = group(&bodies, growth, &EncloseOptions::new(4), &mut unwatched).unwrap();
+        let groups = group(&obstacles(&bodies), growth, &EncloseOptions::new(4), &mut unwatched).unwrap();
         println!("growth {growth}: {:?}, {:+.3}", members(&groups), volumes(&groups) / total - 1.0);
         assert_eq!(members(&groups), expected, "growth {growth}");
         assert!(volumes(&groups) <= (1.0 + growth) * total);
-        for Group { members, enclosure } in &groups {
-            assert_eq!(enclosure.as_ref().map_or(1, |all| all.body.sets().len()), members.len());
+        for Group { members, cover } in &groups {
+            assert_eq!(cover.enclosure().map_or(1, |all| all.body.sets().len()), members.len());
         }
     }
-    assert_eq!(group(&bodies, 0.0, &EncloseOptions::new(4), &mut unwatched).unwrap_err(), EncloseError::Growth(0.0));
+    let none = group(&obstacles(&bodies), 0.0, &EncloseOptions::new(4), &mut unwatched);
+    assert_eq!(none.unwrap_err(), EncloseError::Growth(0.0));
+}
+
+/// A set around points on an L, in the plane x = `across`, that follows its bend.
+fn bent(across: f64) -> SosBody {
+    let mut random = Seeded(5);
+    let mut points = Vec::new();
+    for _ in 0..400 {
+        let [a, b, c] = [(); 3].map(|()| 0.1 * random.signed());
+        let along = random.signed().abs();
+        points.extend([Vector3::new(across + a, b, along), Vector3::new(across + a, along, c)]);
+    }
+    let method = SosMethod::Relaxed { c: 100.0, objective: Objective::LogDetP };
+    let options = SosOptions { degree: 4, method, coordinates: Coordinates::Unit, input: String::new() };
+    fit_sos("bent", &points, &[], &options, &mut unwatched).unwrap().body
+}
+
+#[test]
+fn sos_bodies_are_convexified_alone_and_among_bodies() {
+    let set = bent(0.0);
+    let chords = set.chords(5000);
+    assert!(chords.iter().all(|(from, to)| set.value(&((from + to) * 0.5)) <= 1.0));
+    let ends: Vec<_> = chords.iter().flat_map(|(from, to)| [*from, *to]).collect();
+    let bridges = (0..ends.len()).map(|i| (ends[i] + ends[(7919 * i) % ends.len()]) * 0.5);
+    assert!(bridges.filter(|x| set.value(x) > 1.0).count() > 100, "the set is meant not to be convex");
+    let obstacle = Obstacle::from(set.clone());
+    let all = enclose_obstacles("hull", &[&obstacle], &EncloseOptions::new(4), &mut unwatched).unwrap();
+    let hull = crate::fit::hull::convex_hull(&ends).unwrap().volume;
+    let volume = all.body.volume().volume_m3;
+    println!("volume {:.3} hulls, {:.3} sets, {:.2} s", volume / hull, volume / set.volume().volume_m3, all.seconds);
+    assert!(volume > hull && volume < 1.8 * hull);
+    for (from, to) in set.chords(20_000) {
+        assert!(
+            all.body.value(&(from + (to - from) * 1e-6)) <= 1.0 && all.body.value(&(to + (from - to) * 1e-6)) <= 1.0
+        );
+    }
+    // From the stored numbers alone.
+    let again = Body::from_json(&all.body.to_json()).unwrap();
+    let file = Obstacle::from_json(&set.to_json()).unwrap();
+    let record = &again.sets()[0];
+    assert_eq!((&record.id, &*record.name), (file.id(), "bent"));
+    record.containment.prove(&BasicSet::from(&again), &BasicSet::from(&file)).unwrap();
+    assert!(record.containment.prove(&BasicSet::from(&again), &BasicSet::from(&bent(0.01))).is_err());
+
+    // A ball in the bend costs nothing, one far off stays alone.
+    let ball = |y: f64| Obstacle::from(Body::ball("ball", Vector3::new(0.0, y, 0.3), 0.1).unwrap());
+    let groups = group(&[obstacle, ball(0.3), ball(9.0)], 0.05, &EncloseOptions::new(4), &mut unwatched).unwrap();
+    assert_eq!(groups.iter().map(|group| &group.members[..]).collect::<Vec<_>>(), [&[0, 1][..], &[2]]);
+    let groups = group(&[bent(0.0).into(), bent(9.0).into()], 0.05, &EncloseOptions::new(4), &mut unwatched).unwrap();
+    assert_eq!(groups.len(), 2);
+    assert!(groups.iter().all(|group| group.cover.enclosure().is_some()), "what is not convex never stays as it is");
 }
 
 #[test]

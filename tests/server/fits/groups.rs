@@ -3,8 +3,8 @@
 use std::ops::ControlFlow;
 
 use nalgebra::Vector3;
-use sublevel::body::{BasicSet, Body};
-use sublevel::fit::{EncloseOptions, enclose_bodies};
+use sublevel::body::{BasicSet, Body, Obstacle};
+use sublevel::fit::{EncloseOptions, enclose_obstacles};
 use sublevel::service::proto::create_fit_request::Part;
 use sublevel::service::proto::{DeleteBodyRequest, FitGroup, FitHeader, FitOptions, FitState};
 use tonic::Code;
@@ -44,7 +44,8 @@ async fn stored_bodies_are_put_into_one_or_few() {
     let made = job.result.expect("a result").bodies.remove(0);
     let options = EncloseOptions::new(4);
     let unwatched = &mut |_| ControlFlow::Continue(());
-    let expected = enclose_bodies("pair", &[&balls[0], &balls[1]], &options, unwatched).expect("a body").body;
+    let [near, next] = [0, 1].map(|i: usize| Obstacle::from(balls[i].clone()));
+    let expected = enclose_obstacles("pair", &[&near, &next], &options, unwatched).expect("a body").body;
     let found = clients.body(&made.body_id).await;
     assert_eq!(found.to_json(), expected.to_json());
     assert_eq!((made.members, made.gap_m), (vec![0, 1], expected.gap_m()));
