@@ -23,6 +23,8 @@ mod silhouette;
 #[cfg(feature = "chart")]
 mod speed;
 #[cfg(feature = "chart")]
+pub mod stability;
+#[cfg(feature = "chart")]
 mod table1;
 #[cfg(feature = "chart")]
 mod warm;

@@ -2,6 +2,7 @@
 
 use super::write_atomically;
 use crate::chart::duel::Shelf;
+use crate::chart::stability::{Share, serve, stability};
 use crate::chart::{Table1Progress, detail, speed, table1, warm};
 use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -24,6 +25,7 @@ enum Figure {
     Speed(SpeedArgs),
     Warm(WarmArgs),
     Detail(DetailArgs),
+    Stability(StabilityArgs),
     Table1(Table1Args),
 }
 
@@ -76,6 +78,38 @@ struct DetailArgs {
     common: Common,
 }
 
+/// Families of queries that broke collision libraries, put to our solver and to others: who passes
+///
+/// Touching, deep, far, tiny, needle-like, nearly parallel, badly hinted and so on: each case is drawn from its seed alone, put in a process of its
+/// own with a time limit, and judged by points and planes. Writes stability.md and stability.csv. Takes a few minutes. Coal takes part when
+/// SUBLEVEL_COAL names the program that times it.
+///
+/// Examples:
+///
+///   sublevel chart stability --out docs
+///
+///   sublevel chart stability --replay 13/cold/5
+///
+///   sublevel chart stability --quick --guard docs/stability.csv
+#[derive(Debug, Args)]
+struct StabilityArgs {
+    /// Folder for the report; made with its parents when it is not there
+    #[arg(long, value_name = "DIR", default_value = "sublevel-chart")]
+    out: PathBuf,
+    /// A tenth of the cases: under a minute
+    #[arg(long)]
+    quick: bool,
+    /// Fail, with the row named, where ours fails more often than in this stability.csv of an earlier run
+    #[arg(long, value_name = "FILE")]
+    guard: Option<PathBuf>,
+    /// Put one case here and now, and print what came of it: the number of its family, the method and the seed, FROM-TO for several
+    #[arg(long, value_name = "FAMILY/METHOD/SEED", conflicts_with_all = ["out", "quick", "guard"])]
+    replay: Option<Share>,
+    /// With --replay, print one JSON object per case
+    #[arg(long, requires = "replay")]
+    json: bool,
+}
+
 /// What all figures with bodies around meshes take.
 #[derive(Debug, Args)]
 struct Common {
@@ -99,6 +133,7 @@ pub(super) fn run(args: &ChartArgs) -> Result<(), Box<dyn Error>> {
         Figure::Speed(args) => run_speed(&args.common),
         Figure::Warm(args) => run_warm(&args.common),
         Figure::Detail(args) => run_detail(&args.common),
+        Figure::Stability(args) => run_stability(args),
         Figure::Table1(args) => run_table1(args),
     }
 }
@@ -128,6 +163,30 @@ fn run_detail(args: &Common) -> Result<(), Box<dyn Error>> {
     let found = detail(&args.data, &shelf, args.quick, &mut |at| tell(&bar, at))?;
     bar.finish_and_clear();
     write_report(&args.out, "detail", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+}
+
+fn run_stability(args: &StabilityArgs) -> Result<(), Box<dyn Error>> {
+    if let Some(share) = &args.replay {
+        return Ok(serve(share, args.json, &mut io::stdout().lock())?);
+    }
+    // Read first: what it is for is known before the work.
+    let guard = args.guard.as_ref().map(|path| super::read(path)).transpose()?;
+    make_folder(&args.out)?;
+    let bar = bar()?;
+    let found = stability(&std::env::current_exe()?, args.quick, &mut |at| tell(&bar, at))?;
+    bar.finish_and_clear();
+    write_report(&args.out, "stability", |names| found.markdown(names), &found.csv(), &[])?;
+    let lost = guard.map_or(Ok(Vec::new()), |earlier| found.lost_against(&earlier))?;
+    if lost.is_empty() {
+        return Ok(());
+    }
+    let rows = lost.iter().map(|row| {
+        format!(
+            "family {}, {}: {} failures where there were {}; {}",
+            row.family, row.method, row.now, row.before, row.replay
+        )
+    });
+    Err(rows.collect::<Vec<_>>().join("\n").into())
 }
 
 fn make_folder(out: &Path) -> Result<(), Box<dyn Error>> {

@@ -46,6 +46,14 @@ pub enum DuelError {
     /// Coal can not be timed.
     #[error(transparent)]
     Coal(#[from] CoalError),
+    /// A child can not be started or heard.
+    #[error("{}: {source}", program.display())]
+    Child {
+        /// The program.
+        program: std::path::PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
     /// A pose is none.
     #[error(transparent)]
     Pose(#[from] PoseError),

@@ -14,7 +14,7 @@ pub mod sweep;
 
 pub use coal::{Coal, CoalError, CoalRun};
 pub use error::DuelError;
-pub use parry::{Hulls, NoHull, parry_pose, parry_version};
+pub use parry::{Hulls, NoHull, parry_impact, parry_pose, parry_version};
 pub use random::Random;
 pub use shelf::{Shelf, ShelfError};
 pub use subject::{Subject, pairs};

@@ -5,10 +5,12 @@ use crate::measure::Pose;
 use nalgebra::Vector3;
 use parry3d_f64::math::{Pose as ParryPose, Rotation, Vector};
 use parry3d_f64::query::details::{
-    closest_points_support_map_support_map_with_params, distance_support_map_support_map,
+    closest_points_support_map_support_map_with_params, contact_support_map_support_map,
+    distance_support_map_support_map,
 };
 use parry3d_f64::query::gjk::{GJKResult, VoronoiSimplex};
-use parry3d_f64::shape::ConvexPolyhedron;
+use parry3d_f64::query::{NonlinearRigidMotion, cast_shapes_nonlinear};
+use parry3d_f64::shape::{Ball, ConvexPolyhedron, Cuboid};
 
 /// Two convex hulls as parry's shapes.
 #[derive(Clone, Debug)]
@@ -35,6 +37,24 @@ pub fn parry_version() -> String {
     version.and_then(|line| line.split('"').nth(1)).unwrap_or("unknown").to_owned()
 }
 
+/// When a box of these half-extents, spinning at `spin` (rad/s, world) about its centre from `start`, strikes a ball that stands
+/// `still`, within `duration` seconds; none if it is not found to.
+pub fn parry_impact(
+    half: &Vector3<f64>,
+    start: &Pose,
+    spin: &Vector3<f64>,
+    radius: f64,
+    still: &Pose,
+    duration: f64,
+) -> Option<f64> {
+    let vector = |v: &Vector3<f64>| Vector::new(v.x, v.y, v.z);
+    let motion = NonlinearRigidMotion::new(parry_pose(start), Vector::ZERO, Vector::ZERO, vector(spin));
+    let stands = NonlinearRigidMotion::constant_position(parry_pose(still));
+    let (blade, ball) = (Cuboid::new(vector(half)), Ball::new(radius));
+    let found = cast_shapes_nonlinear(&motion, &blade, &stands, &ball, 0.0, duration, true);
+    found.ok()?.map(|hit| hit.time_of_impact)
+}
+
 impl Hulls {
     /// The hulls of these points, metres.
     ///
@@ -51,6 +71,11 @@ impl Hulls {
     /// Distance, metres.
     pub fn distance(&self, pose: &ParryPose) -> f64 {
         distance_support_map_support_map(pose, &self.a, &self.b)
+    }
+
+    /// Signed distance, metres: minus the depth in overlap, by GJK and EPA. None if they find none.
+    pub fn signed_distance(&self, pose: &ParryPose) -> Option<f64> {
+        contact_support_map_support_map(pose, &self.a, &self.b, f64::MAX).map(|contact| contact.dist)
     }
 
     /// One query; the hulls are known to be apart: 0 is a failure.

@@ -17,6 +17,21 @@ impl Random {
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
 
+    /// Uniform in [0, 1).
+    pub fn positive(&mut self) -> f64 {
+        0.5 * (self.signed() + 1.0)
+    }
+
+    /// Below `count`, which is positive.
+    pub fn index(&mut self, count: usize) -> usize {
+        (self.positive() * count as f64) as usize
+    }
+
+    /// Between `low` and `high`, uniform in the logarithm.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low * (high / low).powf(self.positive())
+    }
+
     /// Uniform on the sphere.
     pub fn direction(&mut self) -> Vector3<f64> {
         loop {

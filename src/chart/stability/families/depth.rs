@@ -1,0 +1,127 @@
+//! Overlap: 16, 27.
+
+use super::super::case::{Case, CaseError, Verdict};
+use super::super::method::{Method, pose, sampled};
+use super::super::zoo::{b, c, cylinder, e, q, zoo};
+use super::{any, random, somewhere};
+use crate::chart::duel::{Hulls, parry_pose};
+use crate::measure::{
+    Options, Pose, SignedDistance, Status, WarmStart, growth_distance, level_distance, signed_distance,
+};
+
+/// Offsets of a slide, from touching to concentric.
+const STEPS: u32 = 12;
+
+/// Deviation that others may have from what a signed distance does, relative to the smaller body.
+const PEER_ERROR: f64 = 1e-6;
+
+/// A slide from touching to concentric. About their centres the bodies are their own mirror images: the signed distance falls all the
+/// way, by no more than the motion.
+pub(super) fn slide(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
+    if matches!(method, Method::Batch | Method::Coal) {
+        return Ok(None);
+    }
+    let mut random = random(16, seed);
+    let bodies = [
+        e(1.0, 0.7, 0.4)?,
+        e(0.5, 0.5, 0.5)?,
+        q(4, 0.8, 0.5, 1.1)?,
+        q(8, 1.0, 0.6, 0.3)?,
+        c(6, 0.8, 0.3)?,
+        b(0.6, 0.9, 0.3)?,
+        cylinder(0.5, 0.8)?,
+    ];
+    let (a, b) = (&bodies[random.index(7)], &bodies[random.index(7)]);
+    let (pose_a, turn, direction) = (somewhere(&mut random, 0.3)?, random.rotation(), random.direction());
+    let place = |offset: f64| pose(pose_a.translation() + direction * offset, &turn);
+    let small = a.circumscribed().radius.min(b.circumscribed().radius);
+    // The offset at which they touch.
+    let (mut inside, mut outside) = (0.0, 2.0 * (a.circumscribed().radius + b.circumscribed().radius));
+    for _ in 0..60 {
+        let middle = 0.5 * (inside + outside);
+        let case = Case::new(a, pose_a, b, place(middle)?, String::new());
+        *(if case.ours(Method::Cold)?.upper > 0.0 { &mut outside } else { &mut inside }) = middle;
+    }
+    let hulls = match method {
+        Method::Parry => {
+            let made = Hulls::new(&sampled(a), &sampled(b));
+            Some(made.map_err(|error| CaseError::Other(error.to_string()))?)
+        }
+        _ => None,
+    };
+    let mut warm = WarmStart::default();
+    let mut last: Option<(f64, f64, bool)> = None;
+    for k in 0..=STEPS {
+        let offset = inside * (1.05 - 1.05 * f64::from(k) / f64::from(STEPS));
+        let pose_b = place(offset)?;
+        let (value, tied, slack) = if let Some(hulls) = &hulls {
+            let relative = parry_pose(&pose_a).inverse() * parry_pose(&pose_b);
+            let Some(value) = hulls.signed_distance(&relative) else { return Ok(Some(Verdict::NoAnswer)) };
+            (value, false, PEER_ERROR * small)
+        } else {
+            if method == Method::Cold {
+                warm = WarmStart::default();
+            }
+            let answer = signed_distance(a, &pose_a, b, &pose_b, &Options::default(), &mut warm);
+            let SignedDistance { status, lower, upper, tied, .. } = answer;
+            if status != Status::Converged {
+                return Ok(Some(Verdict::WrongStatus(format!("still wide, [{lower:e}, {upper:e}] m"))));
+            }
+            (answer.value(), tied, 2e-9 * small)
+        };
+        if let Some((before, earlier, was_tied)) = last.replace((offset, value, tied))
+            && !tied
+            && !was_tied
+        {
+            let off = (value - earlier).max(earlier - (before - offset) - value) - slack;
+            if !(off <= 0.0) {
+                return Ok(Some(Verdict::Off(off / small)));
+            }
+        }
+    }
+    Ok(Some(Verdict::Pass))
+}
+
+/// The seed of the level distance inside the other body: flagged, while the growth distance goes on in proportion to the offset.
+pub(super) fn saturation(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
+    if !matches!(method, Method::Cold | Method::Warm) {
+        return Ok(None);
+    }
+    let mut random = random(27, seed);
+    let (a, b) = (any(&mut random, zoo()?), any(&mut random, zoo()?));
+    let (pose_a, turn, direction) = (somewhere(&mut random, 0.3)?, random.rotation(), random.direction());
+    let meet = pose_a.transform_point(&a.growth_ball().center) - turn * b.growth_ball().center;
+    let sum = a.circumscribed().radius + b.circumscribed().radius;
+    let options = Options::default();
+    let (mut growth_warm, mut level_warm) = (WarmStart::default(), WarmStart::default());
+    // Bounds of the growth distance per metre of the centres' distance.
+    let (mut low, mut high) = (0.0_f64, f64::INFINITY);
+    for share in [1.2, 0.5, 0.2, 0.1, 1e-2, 1e-4, 1e-6] {
+        if method == Method::Cold {
+            (growth_warm, level_warm) = (WarmStart::default(), WarmStart::default());
+        }
+        let pose_b: Pose = pose(meet + direction * (sum * share), &turn)?;
+        let apart = pose_b.transform_point(&b.growth_ball().center) - pose_a.transform_point(&a.growth_ball().center);
+        let known = 1e-14 * (sum + meet.norm());
+        let growth = growth_distance(a, &pose_a, b, &pose_b, &options, &mut growth_warm);
+        if growth.status != Status::Converged {
+            return Ok(Some(Verdict::WrongStatus("the growth distance is still wide".into())));
+        }
+        low = low.max(growth.lower / (apart.norm() + known));
+        high = high.min(growth.upper / (apart.norm() - known));
+        if !(low <= high * (1.0 + 1e-12)) {
+            return Ok(Some(Verdict::Off(low / high - 1.0)));
+        }
+        let level = level_distance(a, &pose_a, b, &pose_b, &options, &mut level_warm);
+        let seed_place = pose_a.transform_point(a.interior_point()) - pose_b.translation();
+        let value = b.value(&pose_b.rotation().inverse_transform_vector(&seed_place));
+        // Near the boundary either is right.
+        if (value - 1.0).abs() > 1e-6 && level.saturated != (value < 1.0) {
+            return Ok(Some(Verdict::WrongStatus(format!("saturated: {}, the seed is at {value}", level.saturated))));
+        }
+        if level.status != Status::Converged {
+            return Ok(Some(Verdict::WrongStatus("the level distance is still wide".into())));
+        }
+    }
+    Ok(Some(Verdict::Pass))
+}

@@ -1,0 +1,267 @@
+//! Who answers: our solver in its three forms, and others.
+
+use super::arbiter::{Proposal, Truth, judge};
+use super::case::{Case, CaseError, Verdict};
+use crate::body::{Body, fibonacci_lattice};
+use crate::chart::duel::{Coal, Hulls, motion::Trajectory, parry_pose};
+use crate::fit::gap;
+use crate::measure::{Distance, MAX_ITERATIONS, Options, Pose, Status, WarmStart, distance, distance_batch};
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// Points of a body's surface whose convex hull stands for it where polytopes are asked for.
+const SAMPLES: usize = 1000;
+
+/// Error that others may have, relative to the smaller body.
+const PEER_ERROR: f64 = 1e-6;
+
+/// Width of the bracket from which proposals come, relative to the smaller body.
+const TIGHT: f64 = 1e-12;
+
+/// A column of the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Ours without a hint.
+    Cold,
+    /// Ours with the hint of a pose nearby.
+    Warm,
+    /// Ours, as one of nine poses of a batch.
+    Batch,
+    /// GJK of parry on sampled hulls.
+    Parry,
+    /// GJK of coal on sampled hulls.
+    Coal,
+}
+
+impl Method {
+    /// All columns.
+    pub const ALL: [Self; 5] = [Self::Cold, Self::Warm, Self::Batch, Self::Parry, Self::Coal];
+
+    /// Its name in commands and tables of numbers.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cold => "cold",
+            Self::Warm => "warm",
+            Self::Batch => "batch",
+            Self::Parry => "parry",
+            Self::Coal => "coal",
+        }
+    }
+
+    /// The heading of its column.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Cold => "ours, cold",
+            Self::Warm => "ours, warm",
+            Self::Batch => "ours, batch",
+            Self::Parry => "GJK on hulls, parry",
+            Self::Coal => "GJK on hulls, coal",
+        }
+    }
+
+    /// The one of that name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|method| method.name() == name)
+    }
+
+    /// Whether it is ours.
+    pub fn is_ours(self) -> bool {
+        matches!(self, Self::Cold | Self::Warm | Self::Batch)
+    }
+}
+
+/// Where an answer has its nearest points, and how much longer it may be than that of the bodies, metres.
+pub(super) struct Proposed {
+    pub(super) proposal: Proposal,
+    pub(super) slack: f64,
+}
+
+/// An answer of somebody else.
+pub(super) struct Reply {
+    /// The distance, metres; none if it says that it found none.
+    pub(super) value: Option<f64>,
+    pub(super) proposal: Proposal,
+    /// How much longer than that of the bodies the distance may be, metres: that of shapes inside.
+    pub(super) slack: f64,
+}
+
+impl Case {
+    /// Puts the case to a method, and judges what it says. None where the method can not be asked.
+    pub(super) fn put(&self, method: Method) -> Result<Option<Verdict>, CaseError> {
+        if method.is_ours() {
+            return Ok(Some(self.verdict(&self.ours(method)?)?));
+        }
+        // Others have other limits.
+        if self.limit.is_some() {
+            return Ok(None);
+        }
+        let Some(reply) = self.ask(method)? else { return Ok(None) };
+        let truth = self.truth(&[reply.proposal])?;
+        Ok(Some(reply.verdict(&truth, self)))
+    }
+
+    /// Our answer.
+    pub(super) fn ours(&self, method: Method) -> Result<Distance, CaseError> {
+        let options = self.options()?;
+        let Self { a, pose_a, b, pose_b, .. } = self;
+        let near = self.pose_nearby()?;
+        Ok(match method {
+            Method::Batch => {
+                let mut poses = [near; 9];
+                poses[4] = *pose_b;
+                let mut answers = [Distance::default(); 9];
+                let solved = distance_batch(a, pose_a, b, &poses, &options, &mut answers);
+                solved.map_err(|error| CaseError::Other(error.to_string()))?;
+                answers[4]
+            }
+            Method::Warm => {
+                let mut warm = WarmStart::default();
+                distance(a, pose_a, b, &near, &options, &mut warm);
+                distance(a, pose_a, b, pose_b, &options, &mut warm)
+            }
+            _ => distance(a, pose_a, b, pose_b, &options, &mut WarmStart::default()),
+        })
+    }
+
+    /// Nearest points and normal as a method finds them. None where it can not be asked.
+    pub(super) fn proposed(&self, method: Method) -> Result<Option<Proposed>, CaseError> {
+        if method.is_ours() {
+            return Ok(Some(Proposed { proposal: proposal(&self.ours(method)?), slack: 0.0 }));
+        }
+        Ok(self.ask(method)?.map(|Reply { proposal, slack, .. }| Proposed { proposal, slack }))
+    }
+
+    /// The distance as a method finds it, metres, if it finds one; and the accuracy it may be held to, relative to the smaller body.
+    /// None where it can not be asked.
+    pub(super) fn value(&self, method: Method) -> Result<Option<(Option<f64>, f64)>, CaseError> {
+        if method.is_ours() {
+            return Ok(Some((Some(self.ours(method)?.value()), self.accuracy)));
+        }
+        Ok(self.ask(method)?.map(|reply| (reply.value, PEER_ERROR)))
+    }
+
+    fn options(&self) -> Result<Options<'static>, CaseError> {
+        Ok(Options::default()
+            .with_accuracy(self.accuracy)?
+            .with_max_iterations(self.limit.unwrap_or(MAX_ITERATIONS))?)
+    }
+
+    /// A hundredth of the second body's size and half a degree before.
+    fn pose_nearby(&self) -> Result<Pose, CaseError> {
+        let step = Vector3::new(0.006, -0.005, 0.006) * self.b.circumscribed().radius;
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.005, 0.005, -0.005));
+        pose(self.pose_b.translation() + step, &(turn * self.pose_b.rotation()))
+    }
+
+    /// The truth, as these proposals and those of a tight answer of ours show it.
+    pub(super) fn truth(&self, proposals: &[Proposal]) -> Result<Truth, CaseError> {
+        let tight = Options::default().with_accuracy(TIGHT)?;
+        let Self { a, pose_a, b, pose_b, .. } = self;
+        let answer = distance(a, pose_a, b, pose_b, &tight, &mut WarmStart::default());
+        let mut all = proposals.to_vec();
+        all.push(proposal(&answer));
+        Ok(judge(self, &all))
+    }
+
+    /// Judges an answer of ours: its bracket, its status, its error.
+    pub(super) fn verdict(&self, answer: &Distance) -> Result<Verdict, CaseError> {
+        let Distance { lower, upper, status, iterations, .. } = *answer;
+        let small = self.small();
+        if !(lower >= 0.0 && lower <= upper && upper.is_finite()) {
+            return Ok(Verdict::WrongStatus(format!("the bracket is [{lower:e}, {upper:e}]")));
+        }
+        let width = upper - lower;
+        let is_narrow = width <= self.accuracy * small * (1.0 + 1e-12);
+        if status == Status::Converged && !is_narrow {
+            return Ok(Verdict::WrongStatus(format!("converged with a bracket of {width:e} m")));
+        }
+        if status == Status::BracketWide && self.limit.is_none() && width > self.floor {
+            return Ok(Verdict::WrongStatus(format!("the bracket is still wide, {width:e} m")));
+        }
+        if self.limit.is_some_and(|limit| iterations > limit) {
+            return Ok(Verdict::WrongStatus(format!("{iterations} iterations")));
+        }
+        let truth = self.truth(&[proposal(answer)])?;
+        let outside = (truth.lower - truth.floor - upper).max(lower - truth.upper - truth.floor);
+        if outside > 0.0 {
+            return Ok(Verdict::Off(outside / small));
+        }
+        let error = truth.error(answer.value());
+        Ok(if self.bound.is_some_and(|bound| error > bound) { Verdict::Off(error / small) } else { Verdict::Pass })
+    }
+
+    /// The answer of somebody else; none if it can not be asked.
+    pub(super) fn ask(&self, method: Method) -> Result<Option<Reply>, CaseError> {
+        let (a, b) = (sampled(&self.a), sampled(&self.b));
+        let slack = || gap(&self.a, &a).most_m + gap(&self.b, &b).most_m;
+        match method {
+            Method::Parry => {
+                let hulls = Hulls::new(&a, &b).map_err(|error| CaseError::Other(error.to_string()))?;
+                let relative = parry_pose(&self.pose_a).inverse() * parry_pose(&self.pose_b);
+                let value = Some(hulls.distance(&relative));
+                Ok(Some(Reply { value, proposal: Proposal::default(), slack: slack() }))
+            }
+            Method::Coal => {
+                let other = |error: &dyn std::error::Error| CaseError::Other(error.to_string());
+                let Some(coal) = Coal::from_environment().map_err(|error| other(&error))? else { return Ok(None) };
+                let folder = tempfile_folder().map_err(|error| other(&error))?;
+                let walked = coal_distance(&coal, &folder, [&a, &b], self.relative()?);
+                // What stays is in the folder for temporary files.
+                let _ = std::fs::remove_dir_all(&folder);
+                let value = walked.map_err(|error| other(&error))?;
+                Ok(Some(Reply { value, proposal: Proposal::default(), slack: slack() }))
+            }
+            Method::Cold | Method::Warm | Method::Batch => Ok(None),
+        }
+    }
+
+    /// The second body's pose in the frame of the first.
+    fn relative(&self) -> Result<Pose, CaseError> {
+        let back = self.pose_a.rotation().inverse();
+        pose(back * (self.pose_b.translation() - self.pose_a.translation()), &(back * self.pose_b.rotation()))
+    }
+}
+
+impl Reply {
+    /// Judges it.
+    pub(super) fn verdict(&self, truth: &Truth, case: &Case) -> Verdict {
+        let Some(value) = self.value else { return Verdict::NoAnswer };
+        // Not `>`: a NaN is off.
+        let error = (truth.lower - value).max(value - truth.upper - self.slack) - truth.floor;
+        let allowed = (PEER_ERROR * case.small()).max(case.bound.unwrap_or(0.0));
+        if error <= allowed { Verdict::Pass } else { Verdict::Off(error / case.small()) }
+    }
+}
+
+fn coal_distance(
+    coal: &Coal,
+    folder: &std::path::Path,
+    points: [&[Vector3<f64>]; 2],
+    relative: Pose,
+) -> Result<Option<f64>, crate::chart::duel::CoalError> {
+    let trajectory: Trajectory = vec![relative];
+    let mut run = coal.start(folder, "case", points, &[trajectory])?;
+    run.pass()?;
+    Ok(run.distances()?.first().and_then(|distances| distances.first()).copied())
+}
+
+/// A folder of this process alone.
+fn tempfile_folder() -> std::io::Result<std::path::PathBuf> {
+    let folder = std::env::temp_dir().join(format!("sublevel-stability-{}", std::process::id()));
+    std::fs::create_dir_all(&folder)?;
+    Ok(folder)
+}
+
+/// Points of a body's surface, in its frame.
+pub(super) fn sampled(body: &Body) -> Vec<Vector3<f64>> {
+    fibonacci_lattice(SAMPLES).map(|u| body.boundary_along(&u)).collect()
+}
+
+/// What an answer of ours proposes.
+pub(super) fn proposal(answer: &Distance) -> Proposal {
+    Proposal { points: Some([answer.witness_a, answer.witness_b]), normal: answer.normal }
+}
+
+/// A pose of a rotation that is one.
+pub(super) fn pose(translation: Vector3<f64>, rotation: &UnitQuaternion<f64>) -> Result<Pose, CaseError> {
+    Ok(Pose::from_quaternion(translation, rotation.coords.into())?)
+}

@@ -1,0 +1,96 @@
+//! The stability table: families of queries that broke collision libraries, put to our solver and to others.
+//!
+//! Each case is drawn from its seed alone and judged by bounds that do not depend on the solver ([`arbiter`]), in a process of its own
+//! ([`runner`]).
+
+mod arbiter;
+mod case;
+mod families;
+mod method;
+mod report;
+mod runner;
+mod zoo;
+
+use super::Machine;
+use super::duel::{Coal, DuelError};
+pub use case::Verdict;
+use families::FAMILIES;
+pub use method::Method;
+pub use report::{GuardError, Lost};
+use runner::Cell;
+pub use runner::{NoShare, Share, serve};
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::channel;
+use std::thread;
+
+/// One row: the cells of the methods that can be asked.
+struct Row {
+    number: u8,
+    name: &'static str,
+    cells: Vec<Cell>,
+}
+
+/// Who passes what.
+pub struct Stability {
+    machine: Machine,
+    /// Version of coal, if it took part.
+    coal: Option<String>,
+    quick: bool,
+    rows: Vec<Row>,
+}
+
+/// Puts all families to all methods, a tenth of the cases if `quick`. `program` is what to start for the children: this one, with the
+/// command `chart stability`. Coal takes part where `SUBLEVEL_COAL` names the program that times it. `progress` hears what is going on
+/// and can stop it.
+///
+/// # Errors
+/// [`DuelError`].
+pub fn stability(
+    program: &Path,
+    quick: bool,
+    progress: &mut dyn FnMut(&str) -> ControlFlow<()>,
+) -> Result<Stability, DuelError> {
+    let coal = Coal::from_environment()?;
+    let tasks: Vec<_> = (0..FAMILIES.len()).flat_map(|row| Method::ALL.map(|method| (row, method))).collect();
+    let next = AtomicUsize::new(0);
+    let workers = thread::available_parallelism().map_or(1, usize::from);
+    let mut rows: Vec<Row> =
+        FAMILIES.iter().map(|family| Row { number: family.number, name: family.name, cells: Vec::new() }).collect();
+    let (send, done) = channel();
+    thread::scope(|scope| {
+        for _ in 0..workers {
+            let (send, tasks, next) = (send.clone(), &tasks, &next);
+            scope.spawn(move || {
+                while let Some(&(row, method)) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let family = &FAMILIES[row];
+                    let found = runner::run(program, family, method, family.cases[usize::from(!quick)]);
+                    if send.send((row, method, found)).is_err() {
+                        break;
+                    }
+                }
+            });
+        }
+        drop(send);
+        for (count, (row, method, found)) in done.iter().enumerate() {
+            let found = found.map_err(|source| DuelError::Child { program: program.to_owned(), source })?;
+            rows[row].cells.extend(found);
+            let at = format!("{} of {}: {}, {}", count + 1, tasks.len(), FAMILIES[row].name, method.title());
+            if progress(&at).is_break() {
+                // No more tasks for anyone.
+                next.store(tasks.len(), Ordering::Relaxed);
+                return Err(DuelError::Cancelled);
+            }
+        }
+        Ok(())
+    })?;
+    for row in &mut rows {
+        row.cells.sort_by_key(|cell| Method::ALL.iter().position(|method| *method == cell.method));
+    }
+    let coal = coal.as_ref().map(Coal::version);
+    Ok(Stability { machine: Machine::this(), coal, quick, rows })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,202 @@
+//! The table as Markdown and CSV, and what was lost against an earlier one.
+
+use super::case::Verdict;
+use super::method::Method;
+use super::runner::{Cell, PATIENCE};
+use super::{Row, Stability};
+use crate::chart::duel::parry_version;
+use std::fmt::Write;
+
+/// Heading of the CSV.
+const HEAD: &str = "family,name,method,cases,failed,off,worst,wrong_status,no_answer,hang,crash,first_seed,first";
+
+/// The table to guard against can not be read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("line {line} is not one of a stability table ({HEAD}); give the stability.csv of an earlier run")]
+pub struct GuardError {
+    line: usize,
+}
+
+/// A cell of ours that fails more often than it did.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Lost {
+    /// Number and name of the family.
+    pub family: String,
+    /// The column.
+    pub method: &'static str,
+    /// Failures before.
+    pub before: u64,
+    /// Failures now.
+    pub now: u64,
+    /// Command that replays the first.
+    pub replay: String,
+}
+
+impl Cell {
+    fn count(&self, of: fn(&Verdict) -> bool) -> usize {
+        self.failures.iter().filter(|(_, verdict)| of(verdict)).count()
+    }
+
+    /// The largest error.
+    fn worst(&self) -> Option<f64> {
+        let errors = self.failures.iter().filter_map(|(_, verdict)| match verdict {
+            Verdict::Off(error) => Some(*error),
+            _ => None,
+        });
+        errors.reduce(|a, b| if a.total_cmp(&b).is_lt() { b } else { a })
+    }
+
+    fn text(&self) -> String {
+        let Self { cases, failures, .. } = self;
+        if failures.is_empty() {
+            return format!("pass ({cases})");
+        }
+        let mut parts = Vec::new();
+        if let Some(worst) = self.worst() {
+            parts.push(format!("off by up to {worst:.0e}"));
+        }
+        let kinds: [(fn(&Verdict) -> bool, &str); 4] = [
+            (|verdict| matches!(verdict, Verdict::WrongStatus(_)), "wrong status"),
+            (|verdict| *verdict == Verdict::NoAnswer, "no answer"),
+            (|verdict| *verdict == Verdict::Hang, "hang"),
+            (|verdict| *verdict == Verdict::Crash, "crash"),
+        ];
+        for (of, name) in kinds {
+            let count = self.count(of);
+            if count > 0 {
+                parts.push(format!("{count} {name}"));
+            }
+        }
+        format!("**{} of {cases}**: {}", failures.len(), parts.join(", "))
+    }
+}
+
+impl Row {
+    fn cell(&self, method: Method) -> Option<&Cell> {
+        self.cells.iter().find(|cell| cell.method == method)
+    }
+}
+
+impl Stability {
+    /// The report.
+    pub fn markdown(&self, _: &[&str]) -> String {
+        let mut text = String::from("# Stability where methods fail\n\n");
+        // Writing to a string can not fail.
+        let flags = if self.quick { " --quick" } else { "" };
+        let _ = writeln!(text, "{}\n", self.machine.head(&format!("sublevel chart stability{flags}")));
+        let coal =
+            self.coal.as_ref().map_or("coal did not take part (SUBLEVEL_COAL is not set)".to_owned(), |version| {
+                format!("coal {version} at its default tolerance of 1e-6 m")
+            });
+        let _ = writeln!(
+            text,
+            "Peers: parry3d-f64 {}; {coal}. In place of a body, GJK gets the convex hull of 1 000 points of its surface, and may be longer by \
+             as much as that hull is smaller, and wrong by 1e-6 of the smaller body. Ours must hold the truth in its bracket, be as narrow as asked for \
+             and say so; where a family asks for more, it must do that. Each case is drawn from its seed alone and put in a process of its own with {} s of \
+             time; the truth is the tightest of all pairs of points inside and of all separating planes that anyone proposes. \
+             Times impact: parry's nonlinear shape cast of a box and a ball. Depths: parry's EPA on the hulls.\n",
+            parry_version(),
+            PATIENCE.as_secs()
+        );
+        text.push_str("| | family |");
+        for method in Method::ALL {
+            let _ = write!(text, " {} |", method.title());
+        }
+        text.push_str("\n|---|---|");
+        text.push_str(&"---|".repeat(Method::ALL.len()));
+        text.push('\n');
+        for row in &self.rows {
+            let _ = write!(text, "| {} | {} |", row.number, row.name);
+            for method in Method::ALL {
+                let _ = write!(text, " {} |", row.cell(method).map_or("-".into(), Cell::text));
+            }
+            text.push('\n');
+        }
+        text.push_str(
+            "\nErrors are relative to the smaller body, of normals in radians, of gradients relative to their norm, of times to the whole turn. \
+             `-`: the method can not be asked. Families 17, 23 and 24 are about scenes, which are not measured here.\n\n\
+             ## Failures\n\nThe first of each cell, by the command that replays it.\n\n",
+        );
+        for row in &self.rows {
+            for cell in &row.cells {
+                if let Some((seed, verdict)) = cell.failures.first() {
+                    let _ = writeln!(text, "- `{}`: {}", replay(row, cell.method, *seed), verdict);
+                }
+            }
+        }
+        text
+    }
+
+    /// One line per cell.
+    pub fn csv(&self) -> String {
+        let mut text = format!("{HEAD}\n");
+        for row in &self.rows {
+            for cell in &row.cells {
+                let Cell { method, cases, failures } = cell;
+                let worst = cell.worst().map_or(String::new(), |worst| format!("{worst:e}"));
+                let (seed, first) = failures
+                    .first()
+                    .map_or((String::new(), String::new()), |(seed, verdict)| (seed.to_string(), verdict.to_string()));
+                let _ = writeln!(
+                    text,
+                    "{},\"{}\",{},{cases},{},{},{worst},{},{},{},{},{seed},\"{}\"",
+                    row.number,
+                    row.name,
+                    method.name(),
+                    failures.len(),
+                    cell.count(|verdict| matches!(verdict, Verdict::Off(_))),
+                    cell.count(|verdict| matches!(verdict, Verdict::WrongStatus(_))),
+                    cell.count(|verdict| *verdict == Verdict::NoAnswer),
+                    cell.count(|verdict| *verdict == Verdict::Hang),
+                    cell.count(|verdict| *verdict == Verdict::Crash),
+                    first.replace('"', "'")
+                );
+            }
+        }
+        text
+    }
+
+    /// The cells of ours that fail more often than in the CSV of an earlier run, in which cells that it does not have count as passed.
+    ///
+    /// # Errors
+    /// [`GuardError`].
+    pub fn lost_against(&self, earlier: &str) -> Result<Vec<Lost>, GuardError> {
+        let mut known = Vec::new();
+        for (at, line) in earlier.lines().enumerate() {
+            if at == 0 {
+                if line != HEAD {
+                    return Err(GuardError { line: 1 });
+                }
+                continue;
+            }
+            // Names hold commas.
+            let parse = || {
+                let (number, rest) = line.split_once(",\"")?;
+                let (_, rest) = rest.split_once("\",")?;
+                let mut fields = rest.split(',');
+                let (method, _, failed) = (fields.next()?, fields.next()?, fields.next()?);
+                Some((number.parse::<u8>().ok()?, Method::named(method)?, failed.parse::<u64>().ok()?))
+            };
+            known.push(parse().ok_or(GuardError { line: at + 1 })?);
+        }
+        let mut lost = Vec::new();
+        for row in &self.rows {
+            for cell in row.cells.iter().filter(|cell| cell.method.is_ours()) {
+                let found = known.iter().find(|(number, method, _)| *number == row.number && *method == cell.method);
+                let (before, now) = (found.map_or(0, |(_, _, failed)| *failed), cell.failures.len() as u64);
+                if let Some((seed, _)) = cell.failures.first()
+                    && now > before
+                {
+                    let replay = replay(row, cell.method, *seed);
+                    let family = format!("{} ({})", row.number, row.name);
+                    lost.push(Lost { family, method: cell.method.title(), before, now, replay });
+                }
+            }
+        }
+        Ok(lost)
+    }
+}
+
+fn replay(row: &Row, method: Method, seed: u64) -> String {
+    format!("sublevel chart stability --replay {}/{}/{seed}", row.number, method.name())
+}

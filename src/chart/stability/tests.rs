@@ -1,0 +1,109 @@
+use super::case::{Case, Verdict};
+use super::families::{FAMILIES, Put};
+use super::runner::Cell;
+use super::zoo::{e, zoo};
+use super::*;
+use crate::measure::{Distance, Pose, Status};
+use nalgebra::Vector3;
+
+fn at(x: f64) -> Pose {
+    Pose::from_quaternion(Vector3::new(x, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0]).unwrap()
+}
+
+/// Balls of radius 1 and 1/2 whose surfaces are a metre apart.
+fn balls() -> Case {
+    let (a, b) = (e(1.0, 1.0, 1.0).unwrap(), e(0.5, 0.5, 0.5).unwrap());
+    Case::new(&a, Pose::identity(), &b, at(2.5), "balls".into())
+}
+
+#[test]
+fn the_arbiter_needs_no_good_proposals_of_the_one_that_is_judged() {
+    let case = balls();
+    let truth = case.truth(&[]).unwrap();
+    assert!(truth.lower <= 1.0 + truth.floor && truth.upper >= 1.0 - truth.floor && truth.upper - truth.lower < 1e-11);
+    // Directions all around refute what is far too short, without anyone's help.
+    let alone = arbiter::judge(&case, &[]);
+    assert!(alone.lower > 0.95 && alone.lower <= 1.0 && alone.upper.is_infinite());
+}
+
+#[test]
+fn answers_that_are_wrong_are_found_out() {
+    let case = balls();
+    let good = case.ours(Method::Cold).unwrap();
+    assert_eq!(case.verdict(&good).unwrap(), Verdict::Pass);
+    let off = |change: &dyn Fn(&mut Distance)| {
+        let mut answer = good;
+        change(&mut answer);
+        case.verdict(&answer).unwrap()
+    };
+    assert!(matches!(off(&|d| (d.lower, d.upper) = (0.9, 0.9 + 1e-10)), Verdict::Off(error) if error > 0.1));
+    assert!(matches!(off(&|d| (d.lower, d.upper) = (1.1, 1.1 + 1e-10)), Verdict::Off(error) if error > 0.1));
+    assert!(matches!(off(&|d| d.lower = 0.5), Verdict::WrongStatus(_)), "converged, and wide");
+    assert!(matches!(off(&|d| (d.lower, d.status) = (0.5, Status::BracketWide)), Verdict::WrongStatus(_)), "wide");
+    assert!(matches!(off(&|d| d.upper = f64::NAN), Verdict::WrongStatus(_)));
+    assert!(matches!(off(&|d| (d.lower, d.upper) = (0.0, 0.0)), Verdict::Off(_)));
+}
+
+#[test]
+fn sampled_hulls_may_be_longer_but_not_shorter() {
+    let case = balls();
+    assert_eq!(case.put(Method::Parry).unwrap(), Some(Verdict::Pass));
+    let truth = case.truth(&[]).unwrap();
+    let reply = |value, slack| method::Reply { value, proposal: arbiter::Proposal::default(), slack };
+    assert_eq!(reply(Some(1.05), 0.1).verdict(&truth, &case), Verdict::Pass);
+    assert!(matches!(reply(Some(1.05), 0.01).verdict(&truth, &case), Verdict::Off(_)));
+    assert!(matches!(reply(Some(0.99), 0.1).verdict(&truth, &case), Verdict::Off(_)));
+    assert!(matches!(reply(Some(f64::NAN), 0.1).verdict(&truth, &case), Verdict::Off(_)));
+    assert_eq!(reply(None, 0.1).verdict(&truth, &case), Verdict::NoAnswer);
+}
+
+#[test]
+fn cases_are_drawn_from_their_seeds_alone() {
+    assert!(zoo().unwrap().len() >= 14);
+    for family in &FAMILIES {
+        let Put::Distance(case) = family.put else { continue };
+        for seed in 0..6 {
+            let [one, two] = [(); 2].map(|()| case(seed).unwrap_or_else(|error| panic!("{}: {error}", family.name)));
+            assert_eq!((one.pose_a, one.pose_b, one.what), (two.pose_a, two.pose_b, two.what));
+            assert_eq!((one.a.id(), one.b.id()), (two.a.id(), two.b.id()));
+        }
+    }
+}
+
+fn table(failures: Vec<(u64, Verdict)>) -> Stability {
+    let cells = vec![
+        Cell { method: Method::Cold, cases: 40, failures },
+        Cell { method: Method::Parry, cases: 40, failures: vec![(7, Verdict::Hang)] },
+    ];
+    let rows = vec![Row { number: 3, name: "faces, all but parallel", cells }];
+    Stability { machine: Machine::this(), coal: None, quick: true, rows }
+}
+
+#[test]
+fn what_is_lost_is_named_and_peers_are_not_guarded() {
+    let good = table(Vec::new());
+    let bad = table(vec![(5, Verdict::Off(1e-3)), (6, Verdict::WrongStatus("wide".into()))]);
+    assert_eq!(good.lost_against(&good.csv()), Ok(Vec::new()));
+    assert_eq!(bad.lost_against(&bad.csv()), Ok(Vec::new()));
+    assert_eq!(good.lost_against(&bad.csv()), Ok(Vec::new()));
+    let lost = bad.lost_against(&good.csv()).unwrap();
+    assert_eq!((lost.len(), lost[0].before, lost[0].now), (1, 0, 2));
+    assert!(lost[0].family.contains("faces") && lost[0].replay.ends_with("3/cold/5"));
+    assert!(good.lost_against("something").is_err());
+    assert!(good.lost_against(&format!("{}\n3,nothing", good.csv().lines().next().unwrap())).is_err());
+    let text = bad.markdown(&[]);
+    assert!(text.contains(
+        "| 3 | faces, all but parallel | **2 of 40**: off by up to 1e-3, 1 wrong status | - | - | **1 of 40**: 1 hang |"
+    ));
+    assert!(text.contains("--replay 3/parry/7"));
+}
+
+#[test]
+fn shares_are_read_as_they_are_printed() {
+    let share = |text: &str| text.parse::<Share>();
+    assert_eq!(share("13/cold/5"), Ok(Share { family: 13, method: Method::Cold, from: 5, to: 6 }));
+    assert_eq!(share("1/parry/2-9"), Ok(Share { family: 1, method: Method::Parry, from: 2, to: 9 }));
+    for bad in ["", "13", "17/cold/1", "13/someone/1", "13/cold/x", "13/cold/1/2"] {
+        assert!(share(bad).is_err(), "{bad}");
+    }
+}
