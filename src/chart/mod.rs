@@ -5,7 +5,11 @@
 //! picture can be read on light and on dark pages. Two colours never carry a meaning alone: dashes or labels do too.
 
 #[cfg(feature = "chart")]
+mod accuracy;
+#[cfg(feature = "chart")]
 mod canvas;
+#[cfg(feature = "chart")]
+mod cost;
 #[cfg(feature = "chart")]
 mod curve;
 #[cfg(feature = "chart")]
@@ -28,7 +32,11 @@ mod table1;
 mod warm;
 
 #[cfg(feature = "chart")]
+pub use accuracy::{Accuracy, ClarabelError, accuracy};
+#[cfg(feature = "chart")]
 pub use canvas::ChartError;
+#[cfg(feature = "chart")]
+pub use cost::{Cost, Messages, cost};
 #[cfg(feature = "chart")]
 pub use curve::{LineChart, Mark, Series};
 #[cfg(feature = "chart")]
