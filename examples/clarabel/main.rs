@@ -28,6 +28,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         runs.sort_by(|a, b| a.nanoseconds.total_cmp(&b.nanoseconds));
         runs[runs.len() / 2]
     };
+    // The first solve of a process finds everything cold.
+    if let (Some(program), Some(&tolerance)) = (asked.programs.first(), asked.tolerances.first()) {
+        solve(program, tolerance);
+    }
     let of_all = |tolerance: &f64| asked.programs.iter().map(|p| one(p, *tolerance)).collect::<Vec<_>>();
     let answers: Vec<Vec<Solved>> = asked.tolerances.iter().map(of_all).collect();
     fs::write(write, serde_json::to_string(&answers)?)?;

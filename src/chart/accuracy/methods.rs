@@ -18,7 +18,7 @@ pub(super) enum Method {
     /// Ours without and with the hint of the pose before.
     Cold,
     Warm,
-    /// Newton's method from where the line of centres leaves the bodies, from our witnesses after an iteration, and from those of the pose before.
+    /// Newton's method from where the line of centres leaves the bodies, from our witnesses of a coarse answer, and from those of the pose before.
     NewtonPlain,
     NewtonOurs,
     NewtonBefore,
@@ -60,6 +60,8 @@ const STEPS: [u32; 13] = [1, 2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 50, 100];
 /// Of the squared distance.
 const SLSQP: [f64; 8] = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14, 1e-16];
 const CLARABEL: [f64; 7] = [1e-3, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10, 1e-12];
+/// The coarsest tolerance: what our own answer to it is worth as a start.
+const EARLY: f64 = 1.0;
 /// Queries of a row are timed in chunks, which are short enough that other processes spoil few.
 const CHUNK: usize = 20;
 
@@ -97,7 +99,7 @@ pub(super) fn measure(
             timed.push(Timed::new((method, format!("{accuracy:e}")), &chunks, *size_m, ask));
         }
     }
-    let early = Options::default().with_max_iterations(1)?;
+    let early = Options::default().with_accuracy(EARLY)?;
     for method in [Method::NewtonPlain, Method::NewtonOurs, Method::NewtonBefore] {
         for steps in STEPS {
             let ask = move |query: &Query| {

@@ -40,6 +40,9 @@ const GOALS: [f64; 3] = [1e-3, 1e-6, 1e-9];
 /// A setting is no longer better than another if its error is above this part of the other's.
 const BETTER: f64 = 0.5;
 
+/// Larger errors are not drawn: nothing is known there.
+const DRAWN: f64 = 10.0;
+
 const NOTES: &str = "\
 - Errors and widths are parts of the circumradius of the smaller body, medians over the poses unless a column says otherwise. The truth is the middle of the \
 narrowest bracket of ours; no error is told below half of its width, which each case states. Times are means per query, one thread.
@@ -48,7 +51,7 @@ two superellipsoids of degree 8 are turned against each other by 1e-4 to 1e-2 ra
 before: a hundredth of half the diameter and a degree, or a centimetre along the faces.
 - Ours: tolerances from 1e-3 to 1e-12; the bracket is proven, rounding included. Nobody else's answer has a proof.
 - Newton: full steps on the eight optimality equations, 1 to 100 of them, without any test of the end; started where the line between interior points leaves the \
-bodies (plain), at our witnesses after one iteration (their time counts), or at the witnesses of the pose before.
+bodies (plain), at our witnesses of an answer to a tolerance of 1 (its time counts), or at the witnesses of the pose before.
 - SLSQP: sequential quadratic programming of NLopt, exact gradients, plain start, unit lengths; `ftol_rel` from 1e-2 to 1e-16; iterations are evaluations.
 - Level 0: the hierarchy's semidefinite program in moments, one matrix per body, stated anew and solved for every query; gap and feasibility tolerances from 1e-3 to \
 1e-12, faer, no chordal decomposition, one thread; the time is that of set-up and solve. It is exact here, the constraints being sos-convex.
@@ -261,7 +264,7 @@ impl Measured {
             let mut points: Vec<Point> = curve
                 .of(&self.cells)
                 .filter_map(|cell| Some(Point { x: x(cell)?, y: curve.value(cell), label: String::new() }))
-                .filter(|point| point.x > 0.0 && point.y.is_finite())
+                .filter(|point| point.x > 0.0 && point.y <= DRAWN)
                 .collect();
             // The ends of a curve that counts something are told by what it counts.
             if matches!(curve.method, Method::Parry | Method::Coal) {

@@ -5,10 +5,13 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-/// How much copies of a thing take together to be told from noise, bytes.
-const COPIES: f64 = 32e6;
-/// At most so many of them.
-const MOST_COPIES: usize = 20_000;
+/// How much a round of copies takes about, bytes, if a copy takes so much.
+const ROUND: f64 = 4e6;
+const GUESS: f64 = 100e3;
+/// Rounds at most; and so many on end must agree, to this part.
+const ROUNDS: usize = 80;
+const AGREEING: usize = 3;
+const AGREEMENT: f64 = 0.05;
 /// How often a process is looked at.
 const LOOK: Duration = Duration::from_millis(1);
 
@@ -19,16 +22,27 @@ fn status(process: &str, field: &str) -> Option<f64> {
     Some(1024.0 * line.trim().trim_end_matches(" kB").parse::<f64>().ok()?)
 }
 
-/// Bytes of a copy: the slope of resident memory over so many of them. `guess` is about what one takes.
-pub(super) fn bytes_of<T: Clone>(thing: &T, guess: f64) -> Option<f64> {
-    let count = ((COPIES / guess) as usize).clamp(100, MOST_COPIES);
-    let mut kept = Vec::with_capacity(3 * count);
-    // What the allocator had at hand is used up first.
-    kept.extend(std::iter::repeat_n(thing, count).cloned());
-    let before = status("self", "VmRSS")?;
-    kept.extend(std::iter::repeat_n(thing, 2 * count).cloned());
-    let after = status("self", "VmRSS")?;
-    Some((after - before) / (2 * count) as f64)
+/// Bytes of a copy of a thing, by resident memory: of a thing with so many `parts`, which guess how many copies are needed. None where that can not
+/// be told.
+///
+/// Freed memory that the allocator has at hand takes the first copies; once it is used up, rounds of as many copies take as much each.
+pub(super) fn bytes_of<T: Clone>(thing: &T, parts: usize) -> Option<f64> {
+    let count = (ROUND / (GUESS * parts as f64)).ceil().max(8.0) as usize;
+    let mut kept = Vec::with_capacity(ROUNDS);
+    let mut grown: Vec<f64> = Vec::new();
+    let mut before = status("self", "VmRSS")?;
+    for _ in 0..ROUNDS {
+        kept.push(vec![thing.clone(); count]);
+        let now = status("self", "VmRSS")?;
+        grown.push(now - before);
+        before = now;
+        let last = &grown[grown.len().saturating_sub(AGREEING)..];
+        let (least, most) = last.iter().fold((f64::INFINITY, 0.0_f64), |(l, m), v| (l.min(*v), m.max(*v)));
+        if last.len() == AGREEING && least > 0.0 && most - least <= AGREEMENT * most {
+            return Some(last.iter().sum::<f64>() / (AGREEING * count) as f64);
+        }
+    }
+    None
 }
 
 /// The most memory that a process held, bytes, if it ends well.
@@ -54,9 +68,12 @@ mod tests {
 
     #[test]
     fn copies_are_weighed() {
-        let thing = vec![1.0_f64; 4096];
-        let bytes = bytes_of(&thing, 32e3).unwrap();
-        assert!((30e3..36e3).contains(&bytes), "{bytes}");
+        let thing = vec![1.0_f64; 12_500];
+        // A heap with holes.
+        let holes: Vec<Vec<f64>> = (0..200).map(|_| thing.clone()).collect();
+        drop(holes);
+        let bytes = bytes_of(&thing, 1).unwrap();
+        assert!((95e3..110e3).contains(&bytes), "{bytes}");
     }
 
     #[test]

@@ -57,7 +57,7 @@ pub fn cost(
             parts: &[1, 2, 4],
             batches: &[1, 8, 64, 512],
             messages: &[1, 16, 256],
-            points: &[100, 1000, 10_000],
+            points: &[100, 1000, 3000],
             trajectories: 2,
             poses: 100,
             passes: 3,

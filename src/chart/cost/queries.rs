@@ -182,7 +182,7 @@ fn against(pair: [&Subject; 2], shapes: &[(usize, Shape, Shape)], effort: &Effor
             Shape::Body(body) => body.to_json(),
             Shape::Compound(compound) => compound.to_json(),
         };
-        memory.points.extend(bytes_of(a, text.len() as f64).map(|bytes| (size, bytes)));
+        memory.points.extend(bytes_of(a, a.parts().len()).map(|bytes| (size, bytes)));
         file.points.push((size, text.len() as f64));
     }
     Ok(vec![cold, warm, memory, file])
