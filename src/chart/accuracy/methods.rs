@@ -57,8 +57,8 @@ pub(super) const OFF: f64 = 1e-3;
 
 const TOLERANCES: [f64; 10] = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12];
 const STEPS: [u32; 13] = [1, 2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 50, 100];
-/// Of the squared distance.
-const SLSQP: [f64; 8] = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14, 1e-16];
+/// Evaluations at most.
+const SLSQP: [u32; 12] = [2, 3, 5, 8, 12, 20, 30, 50, 80, 120, 200, 1000];
 const CLARABEL: [f64; 7] = [1e-3, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10, 1e-12];
 /// The coarsest tolerance: what our own answer to it is worth as a start.
 const EARLY: f64 = 1.0;
@@ -118,13 +118,13 @@ pub(super) fn measure(
             timed.push(Timed::new((method, steps.to_string()), &chunks, *size_m, ask));
         }
     }
-    for tolerance in SLSQP {
+    for most in SLSQP {
         let ask = move |query: &Query| {
             let bodies = [Posed::new(a, &Pose::identity()), Posed::new(b, &query.pose)];
-            let (value, evaluations) = slsqp(&bodies, between(&bodies), *size_m, tolerance);
+            let (value, evaluations) = slsqp(&bodies, between(&bodies), *size_m, most);
             Said { value, width: None, iterations: Some(evaluations), kept: None }
         };
-        timed.push(Timed::new((Method::Slsqp, format!("{tolerance:e}")), &chunks, *size_m, ask));
+        timed.push(Timed::new((Method::Slsqp, most.to_string()), &chunks, *size_m, ask));
     }
     for (points, hulls, _) in &sampled {
         let ask = move |query: &Query| {

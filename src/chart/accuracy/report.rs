@@ -51,8 +51,8 @@ two superellipsoids of degree 8 are turned against each other by 1e-4 to 1e-2 ra
 before: a hundredth of half the diameter and a degree, or a centimetre along the faces.
 - Ours: tolerances from 1e-3 to 1e-12; the bracket is proven, rounding included. Nobody else's answer has a proof.
 - Newton: full steps on the eight optimality equations, 1 to 100 of them, without any test of the end; started where the line between interior points leaves the \
-bodies (plain), at our witnesses of an answer to a tolerance of 1 (its time counts), or at the witnesses of the pose before.
-- SLSQP: sequential quadratic programming of NLopt, exact gradients, plain start, unit lengths; `ftol_rel` from 1e-2 to 1e-16; iterations are evaluations.
+bodies (plain), at our witnesses of an answer to a tolerance of 1 (its time counts, its iterations do not), or at the witnesses of the pose before.
+- SLSQP: sequential quadratic programming of NLopt, exact gradients, plain start, unit lengths; 2 to 1000 evaluations at most, which count as iterations; `ftol_rel` 1e-16.
 - Level 0: the hierarchy's semidefinite program in moments, one matrix per body, stated anew and solved for every query; gap and feasibility tolerances from 1e-3 to \
 1e-12, faer, no chordal decomposition, one thread; the time is that of set-up and solve. It is exact here, the constraints being sos-convex.
 - Hulls: of 100 points and more of the boundary, spread evenly in the normalized frame; GJK at its own tolerance, cold. A hull of boundary points lies inside, so that \

@@ -156,8 +156,12 @@ impl Growth {
             let points = line.points.iter().enumerate().map(point).collect();
             Group { label: line.name.clone(), ink, marker, points, joined: true }
         });
+        let title = match unit {
+            Unit::Nanoseconds => self.title.to_owned(),
+            Unit::Bytes => format!("{}: memory", self.title),
+        };
         Scatter {
-            title: self.title.into(),
+            title,
             x_label: self.size.into(),
             y_label: y_label.into(),
             groups: groups.collect(),
