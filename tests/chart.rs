@@ -187,12 +187,63 @@ fn the_quick_chart_of_detail_settles_more_on_every_rung() {
 }
 
 #[test]
+fn the_quick_chart_of_accuracy_ends_at_the_floor() {
+    let Some((report, csv)) = made("accuracy") else { return };
+    for case in ["chair-human-d4", "flat-faces-d8"] {
+        let of = |method: &str, head: &str| column(&csv, &format!("{case},{method},"), head);
+        for method in ["cold", "warm"] {
+            let (tolerances, widths) = (of(method, "setting"), of(method, "width_max"));
+            assert_eq!(tolerances.len(), 10, "{case}, {method}");
+            for ((tolerance, width), short) in tolerances.iter().zip(&widths).zip(of(method, "short")) {
+                assert!(width <= tolerance || short > 0.0, "{case}, {method}: {width} at {tolerance}");
+                assert!(*tolerance < 1e-9 || short == 0.0, "{case}, {method}: {short} short at {tolerance}");
+            }
+            assert!(of(method, "error_max").iter().zip(&widths).all(|(error, width)| error <= width));
+            assert!(of(method, "off").iter().all(|off| *off == 0.0), "{case}, {method}");
+        }
+        // Other methods come to the same distances.
+        let best = |method: &str| of(method, "error_median").into_iter().fold(f64::INFINITY, f64::min);
+        assert!(best("newton-before") < 1e-6, "{case}: {}", best("newton-before"));
+        assert!(best("slsqp") < 1e-5, "{case}: {}", best("slsqp"));
+        assert!(best("hulls-parry") < 1e-2 && best("hulls-parry") > 1e-9, "{case}: {}", best("hulls-parry"));
+        if report.contains("clarabel 0") {
+            assert!(best("level0-clarabel") < 1e-5, "{case}: {}", best("level0-clarabel"));
+        }
+    }
+}
+
+#[test]
+fn the_quick_chart_of_cost_tells_exponents() {
+    let Some((report, csv)) = made("cost") else { return };
+    let of = |curve: &str, head: &str| column(&csv, curve, head);
+    for (curve, points) in [
+        ("degree,\"cold\",ns", 3),
+        ("constraints,\"warm\",ns", 4),
+        ("parts,\"warm\",ns", 2),
+        ("batch,\"a batch\",ns", 4),
+        ("message,\"a message\",ns", 3),
+        ("fit-degree,\"fit\",ns", 3),
+        ("fit-points,\"on chair\",ns", 3),
+        ("fit-points,\"all on their hull\",ns", 3),
+    ] {
+        let costs = of(curve, "cost");
+        assert!(costs.len() >= points && costs.iter().all(|cost| *cost > 0.0), "{curve}: {costs:?}");
+        assert!(of(curve, "exponent").iter().all(|exponent| exponent.is_finite()), "{curve}");
+    }
+    // Memory is told by Linux; files and places are told everywhere.
+    assert_eq!(of("batch,\"poses and answers\",bytes", "exponent")[0], 1.0);
+    let files = of("degree,\"as a file\",bytes", "cost");
+    assert!(files.windows(2).all(|pair| pair[0] < pair[1]), "{files:?}");
+    assert!(report.contains("| exponent |"));
+}
+
+#[test]
 fn charts_refuse_what_they_can_not_use_with_a_remedy() {
     let out = tempfile::tempdir().expect("a folder can be made");
     let file = out.path().join("file");
     std::fs::write(&file, "").expect("a file can be written");
     let folder = out.path();
-    for figure in ["speed", "warm", "detail"] {
+    for figure in ["speed", "warm", "detail", "accuracy", "cost"] {
         let told = |output: Output, code: i32, words: &[&str]| {
             let error = String::from_utf8_lossy(&output.stderr).into_owned();
             assert_eq!(output.status.code(), Some(code), "{figure}: {error}");
@@ -210,7 +261,7 @@ fn charts_refuse_what_they_can_not_use_with_a_remedy() {
         };
         told(chart(&[], None), 2, &["--data"]);
         told(chart(&["--data", ".", "--fits", "file"], None), 1, &["file", "another folder"]);
-        if figure != "detail" {
+        if !["detail", "cost"].contains(&figure) {
             told(chart(&["--data", "."], Some(Path::new("absent"))), 1, &["SUBLEVEL_COAL", "absent"]);
         }
     }

@@ -72,6 +72,14 @@ pub fn simd() -> &'static str {
     "baseline"
 }
 
+/// The version of a package that is built in.
+pub(super) fn locked(package: &str) -> String {
+    let mut lines = include_str!("../../Cargo.lock").lines();
+    let name = format!("name = \"{package}\"");
+    let version = lines.find(|line| *line == name).and_then(|_| lines.next());
+    version.and_then(|line| line.split('"').nth(1)).unwrap_or("unknown").to_owned()
+}
+
 /// First line a program prints, or "unknown".
 fn said(program: &str, arguments: &[&str]) -> String {
     let output = Command::new(program).args(arguments).current_dir(env!("CARGO_MANIFEST_DIR")).output();

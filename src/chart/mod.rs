@@ -5,7 +5,11 @@
 //! picture can be read on light and on dark pages. Two colours never carry a meaning alone: dashes or labels do too.
 
 #[cfg(feature = "chart")]
+mod accuracy;
+#[cfg(feature = "chart")]
 mod canvas;
+#[cfg(feature = "chart")]
+mod cost;
 #[cfg(feature = "chart")]
 mod curve;
 #[cfg(feature = "chart")]
@@ -16,6 +20,8 @@ pub mod duel;
 mod labels;
 #[cfg(feature = "chart")]
 mod machine;
+#[cfg(feature = "chart")]
+mod rivals;
 #[cfg(feature = "chart")]
 mod scatter;
 mod shadow;
@@ -30,13 +36,19 @@ mod table1;
 mod warm;
 
 #[cfg(feature = "chart")]
+pub use accuracy::{Accuracy, accuracy};
+#[cfg(feature = "chart")]
 pub use canvas::ChartError;
+#[cfg(feature = "chart")]
+pub use cost::{Cost, Messages, cost};
 #[cfg(feature = "chart")]
 pub use curve::{LineChart, Mark, Series};
 #[cfg(feature = "chart")]
 pub use detail::{Detail, detail};
 #[cfg(feature = "chart")]
 pub use machine::{Machine, simd};
+#[cfg(feature = "chart")]
+pub use rivals::ClarabelError;
 #[cfg(feature = "chart")]
 pub use scatter::{Group, Marker, Point, Scatter, Stairs};
 pub use shadow::shadow;

@@ -1,9 +1,10 @@
 //! `sublevel chart`.
 
+use super::messages::messages;
 use super::write_atomically;
 use crate::chart::duel::Shelf;
 use crate::chart::stability::{Share, serve, stability};
-use crate::chart::{Table1Progress, detail, speed, table1, warm};
+use crate::chart::{Messages, Table1Progress, accuracy, cost, detail, speed, table1, warm};
 use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::error::Error;
@@ -26,6 +27,8 @@ enum Figure {
     Warm(WarmArgs),
     Detail(DetailArgs),
     Stability(StabilityArgs),
+    Accuracy(AccuracyArgs),
+    Cost(CostArgs),
     Table1(Table1Args),
 }
 
@@ -110,6 +113,27 @@ struct StabilityArgs {
     json: bool,
 }
 
+/// How near our solver and the obvious alternatives come to the distance, in how much time, and where they stop coming nearer
+///
+/// Ours cold and warm at tolerances from 1e-3 to 1e-12; plain Newton, SLSQP, level 0 of the hierarchy by clarabel, and GJK on hulls of boundary points. Clarabel
+/// takes part when `cargo build --release --example clarabel` has made its program, or SUBLEVEL_CLARABEL names it; coal when SUBLEVEL_COAL names the program
+/// that times it. Writes accuracy.md, accuracy.csv and the pictures accuracy*.svg.
+#[derive(Debug, Args)]
+struct AccuracyArgs {
+    #[command(flatten)]
+    common: Common,
+}
+
+/// How time and memory grow: queries with degree, constraints, parts and poses of a batch, messages with their pairs, fits with degree and points
+///
+/// Chair and human of the Princeton benchmark; a server on loopback in this process; fits of up to a million random points. Exponents stand beside the curves.
+/// Writes cost.md, cost.csv and the pictures cost*.svg.
+#[derive(Debug, Args)]
+struct CostArgs {
+    #[command(flatten)]
+    common: Common,
+}
+
 /// What all figures with bodies around meshes take.
 #[derive(Debug, Args)]
 struct Common {
@@ -134,6 +158,8 @@ pub(super) fn run(args: &ChartArgs) -> Result<(), Box<dyn Error>> {
         Figure::Warm(args) => run_warm(&args.common),
         Figure::Detail(args) => run_detail(&args.common),
         Figure::Stability(args) => run_stability(args),
+        Figure::Accuracy(args) => run_accuracy(&args.common),
+        Figure::Cost(args) => run_cost(&args.common),
         Figure::Table1(args) => run_table1(args),
     }
 }
@@ -187,6 +213,27 @@ fn run_stability(args: &StabilityArgs) -> Result<(), Box<dyn Error>> {
         )
     });
     Err(rows.collect::<Vec<_>>().join("\n").into())
+}
+
+fn run_accuracy(args: &Common) -> Result<(), Box<dyn Error>> {
+    make_folder(&args.out)?;
+    let shelf = Shelf::new(&args.fits)?;
+    let bar = bar()?;
+    let found = accuracy(&args.data, &shelf, args.quick, &mut |at| tell(&bar, at))?;
+    bar.finish_and_clear();
+    write_report(&args.out, "accuracy", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+}
+
+fn run_cost(args: &Common) -> Result<(), Box<dyn Error>> {
+    make_folder(&args.out)?;
+    let shelf = Shelf::new(&args.fits)?;
+    let bar = bar()?;
+    let mut sent = |sizes: &[usize]| messages(sizes).map_err(|error| error.to_string());
+    let program = std::env::current_exe().ok();
+    let parts: (Messages<'_>, _) = (&mut sent, program.as_deref());
+    let found = cost(&args.data, &shelf, args.quick, parts, &mut |at| tell(&bar, at))?;
+    bar.finish_and_clear();
+    write_report(&args.out, "cost", |names| found.markdown(names), &found.csv(), &found.pictures()?)
 }
 
 fn make_folder(out: &Path) -> Result<(), Box<dyn Error>> {

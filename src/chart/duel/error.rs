@@ -1,9 +1,9 @@
 //! Why a figure can not be made.
 
 use super::{CoalError, NoHull, ShelfError};
-use crate::chart::ChartError;
+use crate::chart::{ChartError, ClarabelError};
 use crate::fit::{ReadError, hull::HullError};
-use crate::measure::PoseError;
+use crate::measure::{OptionsError, PoseError};
 
 /// Why there is no figure.
 #[derive(Debug, thiserror::Error)]
@@ -54,6 +54,15 @@ pub enum DuelError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// Clarabel can not be timed.
+    #[error(transparent)]
+    Clarabel(#[from] ClarabelError),
+    /// Messages to a server can not be timed.
+    #[error("timing messages to a server on loopback: {0}")]
+    Messages(String),
+    /// An accuracy is none.
+    #[error(transparent)]
+    Options(#[from] OptionsError),
     /// A pose is none.
     #[error(transparent)]
     Pose(#[from] PoseError),

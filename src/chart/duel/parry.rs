@@ -1,6 +1,7 @@
 //! GJK of parry on convex hulls, in this process.
 
 use super::sweep::Answer;
+use crate::chart::machine::locked;
 use crate::measure::Pose;
 use nalgebra::Vector3;
 use parry3d_f64::math::{Pose as ParryPose, Rotation, Vector};
@@ -32,9 +33,7 @@ pub fn parry_pose(pose: &Pose) -> ParryPose {
 
 /// The version that is built in.
 pub fn parry_version() -> String {
-    let mut lines = include_str!("../../../Cargo.lock").lines();
-    let version = lines.find(|line| *line == "name = \"parry3d-f64\"").and_then(|_| lines.next());
-    version.and_then(|line| line.split('"').nth(1)).unwrap_or("unknown").to_owned()
+    locked("parry3d-f64")
 }
 
 /// When a box of these half-extents, spinning at `spin` (rad/s, world) about its centre from `start`, strikes a ball that stands

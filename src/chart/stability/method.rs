@@ -4,15 +4,25 @@ use super::arbiter::{Proposal, Truth, judge};
 use super::case::{Case, CaseError, Verdict};
 use crate::body::{Body, fibonacci_lattice};
 use crate::chart::duel::{Coal, Hulls, motion::Trajectory, parry_pose};
-use crate::fit::gap;
+use crate::chart::rivals::{Clarabel, ConicProgram, Posed, between, newton, slsqp};
 use crate::measure::{Distance, MAX_ITERATIONS, Options, Pose, Status, WarmStart, distance, distance_batch};
+use crate::optimize::{Corner, gjk};
 use nalgebra::{UnitQuaternion, Vector3};
+use std::path::Path;
 
 /// Points of a body's surface whose convex hull stands for it where polytopes are asked for.
 const SAMPLES: usize = 1000;
 
 /// Error that others may have, relative to the smaller body.
 const PEER_ERROR: f64 = 1e-6;
+
+/// Steps of plain Newton, and evaluations of SLSQP: both are done long before, or not at all.
+const NEWTON_STEPS: u32 = 100;
+/// See [`NEWTON_STEPS`].
+const SLSQP_EVALUATIONS: u32 = 1000;
+
+/// Tolerance of clarabel: its default.
+const CLARABEL: f64 = 1e-8;
 
 /// Width of the bracket from which proposals come, relative to the smaller body.
 const TIGHT: f64 = 1e-12;
@@ -26,6 +36,12 @@ pub enum Method {
     Warm,
     /// Ours, as one of nine poses of a batch.
     Batch,
+    /// Undamped Newton on the optimality system.
+    Newton,
+    /// A general nonlinear program, by SLSQP.
+    Slsqp,
+    /// Level 0 of the hierarchy, a semidefinite program, by clarabel.
+    Clarabel,
     /// GJK of parry on sampled hulls.
     Parry,
     /// GJK of coal on sampled hulls.
@@ -34,7 +50,8 @@ pub enum Method {
 
 impl Method {
     /// All columns.
-    pub const ALL: [Self; 5] = [Self::Cold, Self::Warm, Self::Batch, Self::Parry, Self::Coal];
+    pub const ALL: [Self; 8] =
+        [Self::Cold, Self::Warm, Self::Batch, Self::Newton, Self::Slsqp, Self::Clarabel, Self::Parry, Self::Coal];
 
     /// Its name in commands and tables of numbers.
     pub fn name(self) -> &'static str {
@@ -42,6 +59,9 @@ impl Method {
             Self::Cold => "cold",
             Self::Warm => "warm",
             Self::Batch => "batch",
+            Self::Newton => "newton",
+            Self::Slsqp => "slsqp",
+            Self::Clarabel => "clarabel",
             Self::Parry => "parry",
             Self::Coal => "coal",
         }
@@ -53,6 +73,9 @@ impl Method {
             Self::Cold => "ours, cold",
             Self::Warm => "ours, warm",
             Self::Batch => "ours, batch",
+            Self::Newton => "plain Newton",
+            Self::Slsqp => "SLSQP",
+            Self::Clarabel => "semidefinite, clarabel",
             Self::Parry => "GJK on hulls, parry",
             Self::Coal => "GJK on hulls, coal",
         }
@@ -69,19 +92,13 @@ impl Method {
     }
 }
 
-/// Where an answer has its nearest points, and how much longer it may be than that of the bodies, metres.
-pub(super) struct Proposed {
-    pub(super) proposal: Proposal,
-    pub(super) slack: f64,
-}
-
 /// An answer of somebody else.
 pub(super) struct Reply {
     /// The distance, metres; none if it says that it found none.
     pub(super) value: Option<f64>,
     pub(super) proposal: Proposal,
-    /// How much longer than that of the bodies the distance may be, metres: that of shapes inside.
-    pub(super) slack: f64,
+    /// The truth where the question was another one: about hulls.
+    pub(super) own: Option<Truth>,
 }
 
 impl Case {
@@ -95,7 +112,7 @@ impl Case {
             return Ok(None);
         }
         let Some(reply) = self.ask(method)? else { return Ok(None) };
-        let truth = self.truth(&[reply.proposal])?;
+        let truth = reply.own.map_or_else(|| self.truth(&[reply.proposal]), Ok)?;
         Ok(Some(reply.verdict(&truth, self)))
     }
 
@@ -122,12 +139,13 @@ impl Case {
         })
     }
 
-    /// Nearest points and normal as a method finds them. None where it can not be asked.
-    pub(super) fn proposed(&self, method: Method) -> Result<Option<Proposed>, CaseError> {
-        if method.is_ours() {
-            return Ok(Some(Proposed { proposal: proposal(&self.ours(method)?), slack: 0.0 }));
+    /// Nearest points and normal as a method finds them. None where it can not be asked: of hulls they are others.
+    pub(super) fn proposed(&self, method: Method) -> Result<Option<Proposal>, CaseError> {
+        match method {
+            Method::Cold | Method::Warm | Method::Batch => Ok(Some(proposal(&self.ours(method)?))),
+            Method::Newton => Ok(self.ask(method)?.map(|reply| reply.proposal)),
+            Method::Slsqp | Method::Clarabel | Method::Parry | Method::Coal => Ok(None),
         }
-        Ok(self.ask(method)?.map(|Reply { proposal, slack, .. }| Proposed { proposal, slack }))
     }
 
     /// The distance as a method finds it, metres, if it finds one; and the accuracy it may be held to, relative to the smaller body.
@@ -191,27 +209,50 @@ impl Case {
 
     /// The answer of somebody else; none if it can not be asked.
     pub(super) fn ask(&self, method: Method) -> Result<Option<Reply>, CaseError> {
-        let (a, b) = (sampled(&self.a), sampled(&self.b));
-        let slack = || gap(&self.a, &a).most_m + gap(&self.b, &b).most_m;
-        match method {
+        let plain = |value| Reply { value, proposal: Proposal::default(), own: None };
+        Ok(match method {
+            Method::Cold | Method::Warm | Method::Batch => None,
+            // Theirs are problems of one constraint each.
+            Method::Newton | Method::Slsqp if !(self.a.is_smooth() && self.b.is_smooth()) => None,
+            Method::Newton => {
+                let bodies = self.posed();
+                let found = newton(&bodies, between(&bodies), NEWTON_STEPS);
+                let has_converged = found.step_m <= PEER_ERROR * self.small();
+                let proposal = Proposal { points: has_converged.then_some(found.points), normal: None };
+                Some(Reply { value: has_converged.then(|| found.apart()), proposal, own: None })
+            }
+            Method::Slsqp => {
+                let bodies = self.posed();
+                let (value, _) = slsqp(&bodies, between(&bodies), self.small(), SLSQP_EVALUATIONS);
+                Some(plain(Some(value)))
+            }
+            Method::Clarabel => {
+                let Some(solver) = Clarabel::find().map_err(|error| other(&error))? else { return Ok(None) };
+                let posed = [(&self.a, &self.pose_a), (&self.b, &self.pose_b)];
+                let unit = self.small();
+                let program = ConicProgram::distance(posed, unit);
+                let found = in_folder(|folder| solver.solve((folder, "case"), vec![program], &[CLARABEL], 1))?;
+                let found = found.first().and_then(|of| of.first()).filter(|found| found.solved);
+                Some(plain(found.and_then(|found| found.value).map(|value| value * unit)))
+            }
             Method::Parry => {
-                let hulls = Hulls::new(&a, &b).map_err(|error| CaseError::Other(error.to_string()))?;
+                let (a, b) = (sampled(&self.a), sampled(&self.b));
+                let hulls = Hulls::new(&a, &b).map_err(|error| other(&error))?;
                 let relative = parry_pose(&self.pose_a).inverse() * parry_pose(&self.pose_b);
-                let value = Some(hulls.distance(&relative));
-                Ok(Some(Reply { value, proposal: Proposal::default(), slack: slack() }))
+                let own = Some(polytopes(&a, &b, &self.relative()?));
+                Some(Reply { value: Some(hulls.distance(&relative)), own, ..plain(None) })
             }
             Method::Coal => {
-                let other = |error: &dyn std::error::Error| CaseError::Other(error.to_string());
                 let Some(coal) = Coal::from_environment().map_err(|error| other(&error))? else { return Ok(None) };
-                let folder = tempfile_folder().map_err(|error| other(&error))?;
-                let walked = coal_distance(&coal, &folder, [&a, &b], self.relative()?);
-                // What stays is in the folder for temporary files.
-                let _ = std::fs::remove_dir_all(&folder);
-                let value = walked.map_err(|error| other(&error))?;
-                Ok(Some(Reply { value, proposal: Proposal::default(), slack: slack() }))
+                let (a, b, relative) = (sampled(&self.a), sampled(&self.b), self.relative()?);
+                let value = in_folder(|folder| coal_distance(&coal, folder, [&a, &b], relative))?;
+                Some(Reply { value, own: Some(polytopes(&a, &b, &relative)), ..plain(None) })
             }
-            Method::Cold | Method::Warm | Method::Batch => Ok(None),
-        }
+        })
+    }
+
+    fn posed(&self) -> [Posed<'_>; 2] {
+        [Posed::new(&self.a, &self.pose_a), Posed::new(&self.b, &self.pose_b)]
     }
 
     /// The second body's pose in the frame of the first.
@@ -226,7 +267,7 @@ impl Reply {
     pub(super) fn verdict(&self, truth: &Truth, case: &Case) -> Verdict {
         let Some(value) = self.value else { return Verdict::NoAnswer };
         // Not `>`: a NaN is off.
-        let error = (truth.lower - value).max(value - truth.upper - self.slack) - truth.floor;
+        let error = (truth.lower - value).max(value - truth.upper) - truth.floor;
         let allowed = (PEER_ERROR * case.small()).max(case.bound.unwrap_or(0.0));
         if error <= allowed { Verdict::Pass } else { Verdict::Off(error / case.small()) }
     }
@@ -234,7 +275,7 @@ impl Reply {
 
 fn coal_distance(
     coal: &Coal,
-    folder: &std::path::Path,
+    folder: &Path,
     points: [&[Vector3<f64>]; 2],
     relative: Pose,
 ) -> Result<Option<f64>, crate::chart::duel::CoalError> {
@@ -244,11 +285,40 @@ fn coal_distance(
     Ok(run.distances()?.first().and_then(|distances| distances.first()).copied())
 }
 
-/// A folder of this process alone.
-fn tempfile_folder() -> std::io::Result<std::path::PathBuf> {
+/// Does something with a folder of this process alone, which is removed afterwards.
+fn in_folder<T, E: std::error::Error>(work: impl FnOnce(&Path) -> Result<T, E>) -> Result<T, CaseError> {
     let folder = std::env::temp_dir().join(format!("sublevel-stability-{}", std::process::id()));
-    std::fs::create_dir_all(&folder)?;
-    Ok(folder)
+    std::fs::create_dir_all(&folder).map_err(|error| other(&error))?;
+    let done = work(&folder);
+    // What stays is in the folder for temporary files.
+    let _ = std::fs::remove_dir_all(&folder);
+    done.map_err(|error| other(&error))
+}
+
+fn other(error: &dyn std::error::Error) -> CaseError {
+    CaseError::Other(error.to_string())
+}
+
+/// The distance of the hulls of points, the second ones posed in the frame of the first: between points of theirs, and along the line
+/// between these.
+fn polytopes(a: &[Vector3<f64>], b: &[Vector3<f64>], relative: &Pose) -> Truth {
+    let b: Vec<_> = b.iter().map(|y| relative.transform_point(y)).collect();
+    let farthest = |points: &[Vector3<f64>], n: &Vector3<f64>| {
+        points.iter().copied().max_by(|x, y| n.dot(x).total_cmp(&n.dot(y))).unwrap_or_default()
+    };
+    let support = |n: &Vector3<f64>| {
+        let (x, y) = (farthest(a, &-n), farthest(&b, n));
+        Corner { x, y, difference: x - y }
+    };
+    let found = gjk(0.0, &(a[0] - b[0]), support);
+    let size = a.iter().chain(&b).map(Vector3::norm).fold(0.0, f64::max);
+    let floor = 16.0 * f64::EPSILON * size;
+    if found.common.is_some() {
+        return Truth { lower: 0.0, upper: 0.0, floor };
+    }
+    let n = found.n;
+    let lower = n.dot(&(farthest(a, &-n) - farthest(&b, &n)));
+    Truth { lower: lower.max(0.0), upper: (found.x - found.y).norm(), floor }
 }
 
 /// Points of a body's surface, in its frame.

@@ -13,6 +13,7 @@ mod zoo;
 
 use super::Machine;
 use super::duel::{Coal, DuelError};
+use super::rivals::Clarabel;
 pub use case::Verdict;
 use families::FAMILIES;
 pub use method::Method;
@@ -37,12 +38,14 @@ pub struct Stability {
     machine: Machine,
     /// Version of coal, if it took part.
     coal: Option<String>,
+    /// Version of clarabel, if it took part.
+    solver: Option<String>,
     quick: bool,
     rows: Vec<Row>,
 }
 
 /// Puts all families to all methods, a tenth of the cases if `quick`. `program` is what to start for the children: this one, with the
-/// command `chart stability`. Coal takes part where `SUBLEVEL_COAL` names the program that times it. `progress` hears what is going on
+/// command `chart stability`. Coal takes part where `SUBLEVEL_COAL` names the program that times it, clarabel where its example is built. `progress` hears what is going on
 /// and can stop it.
 ///
 /// # Errors
@@ -52,7 +55,7 @@ pub fn stability(
     quick: bool,
     progress: &mut dyn FnMut(&str) -> ControlFlow<()>,
 ) -> Result<Stability, DuelError> {
-    let coal = Coal::from_environment()?;
+    let (coal, solver) = (Coal::from_environment()?, Clarabel::find()?);
     let tasks: Vec<_> = (0..FAMILIES.len()).flat_map(|row| Method::ALL.map(|method| (row, method))).collect();
     let next = AtomicUsize::new(0);
     let workers = thread::available_parallelism().map_or(1, usize::from);
@@ -89,7 +92,8 @@ pub fn stability(
         row.cells.sort_by_key(|cell| Method::ALL.iter().position(|method| *method == cell.method));
     }
     let coal = coal.as_ref().map(Coal::version);
-    Ok(Stability { machine: Machine::this(), coal, quick, rows })
+    let solver = solver.is_some().then(Clarabel::version);
+    Ok(Stability { machine: Machine::this(), coal, solver, quick, rows })
 }
 
 #[cfg(test)]

@@ -88,10 +88,17 @@ impl Stability {
             self.coal.as_ref().map_or("coal did not take part (SUBLEVEL_COAL is not set)".to_owned(), |version| {
                 format!("coal {version} at its default tolerance of 1e-6 m")
             });
+        let solver = self
+            .solver
+            .as_ref()
+            .map_or("clarabel did not take part (its example is not built)".to_owned(), |version| {
+                format!("clarabel {version}")
+            });
         let _ = writeln!(
             text,
-            "Peers: parry3d-f64 {}; {coal}. In place of a body, GJK gets the convex hull of 1 000 points of its surface, and may be longer by \
-             as much as that hull is smaller, and wrong by 1e-6 of the smaller body. Ours must hold the truth in its bracket, be as narrow as asked for \
+            "Peers: parry3d-f64 {}; {coal}; {solver}. In place of a body, GJK gets the convex hull of 1 000 points of its surface, and is held to the distance \
+             of these hulls; others may be wrong by 1e-6 of the smaller body. Newton does 100 undamped steps from where the line of centres leaves the bodies, SLSQP \
+             1 000 evaluations from there, bodies of one constraint both; clarabel has its default tolerance of 1e-8. Ours must hold the truth in its bracket, be as narrow as asked for \
              and say so; where a family asks for more, it must do that. Each case is drawn from its seed alone and put in a process of its own with {} s of \
              time; the truth is the tightest of all pairs of points inside and of all separating planes that anyone proposes. \
              Times impact: parry's nonlinear shape cast of a box and a ball. Depths: parry's EPA on the hulls.\n",

@@ -127,8 +127,6 @@ pub(super) fn run(program: &Path, family: &Family, method: Method, count: u64) -
                     cell.failures.push((line.seed, verdict));
                 }
             }
-            // Where one can not be asked, none can.
-            asked
         })?;
         let verdict = match end {
             End::Done => break,
@@ -143,8 +141,8 @@ pub(super) fn run(program: &Path, family: &Family, method: Method, count: u64) -
     Ok(asked.then_some(cell))
 }
 
-/// Starts a child and hears its lines while `hear` wants more.
-fn child(program: &Path, share: &str, mut hear: impl FnMut(Line) -> bool) -> std::io::Result<End> {
+/// Starts a child and hears its lines.
+fn child(program: &Path, share: &str, mut hear: impl FnMut(Line)) -> std::io::Result<End> {
     let mut child = Command::new(program)
         .args(["chart", "stability", "--replay", share, "--json"])
         .stdin(Stdio::null())
@@ -163,8 +161,7 @@ fn child(program: &Path, share: &str, mut hear: impl FnMut(Line) -> bool) -> std
     let end = loop {
         match lines.recv_timeout(PATIENCE) {
             Ok(line) => match serde_json::from_str(&line).map(&mut hear) {
-                Ok(true) => {}
-                Ok(false) => break End::Done,
+                Ok(()) => {}
                 Err(_) => break End::Crashed,
             },
             Err(RecvTimeoutError::Timeout) => break End::Hung,

@@ -1,7 +1,7 @@
 use super::case::{Case, Verdict};
 use super::families::{FAMILIES, Put};
 use super::runner::Cell;
-use super::zoo::{e, zoo};
+use super::zoo::{self, e, zoo};
 use super::*;
 use crate::measure::{Distance, Pose, Status};
 use nalgebra::Vector3;
@@ -45,16 +45,25 @@ fn answers_that_are_wrong_are_found_out() {
 }
 
 #[test]
-fn sampled_hulls_may_be_longer_but_not_shorter() {
+fn others_are_held_to_their_own_problem() {
     let case = balls();
-    assert_eq!(case.put(Method::Parry).unwrap(), Some(Verdict::Pass));
+    // Hulls inside of balls are farther apart, which is not held against GJK.
+    for method in [Method::Newton, Method::Slsqp, Method::Parry] {
+        assert_eq!(case.put(method).unwrap(), Some(Verdict::Pass), "{method:?}");
+    }
+    let found = case.ask(Method::Parry).unwrap().unwrap();
+    let own = found.own.unwrap();
+    assert!(own.lower > 1.0001 && own.upper < 1.02 && own.upper - own.lower < 1e-9, "{own:?}");
     let truth = case.truth(&[]).unwrap();
-    let reply = |value, slack| method::Reply { value, proposal: arbiter::Proposal::default(), slack };
-    assert_eq!(reply(Some(1.05), 0.1).verdict(&truth, &case), Verdict::Pass);
-    assert!(matches!(reply(Some(1.05), 0.01).verdict(&truth, &case), Verdict::Off(_)));
-    assert!(matches!(reply(Some(0.99), 0.1).verdict(&truth, &case), Verdict::Off(_)));
-    assert!(matches!(reply(Some(f64::NAN), 0.1).verdict(&truth, &case), Verdict::Off(_)));
-    assert_eq!(reply(None, 0.1).verdict(&truth, &case), Verdict::NoAnswer);
+    let reply = |value| method::Reply { value, proposal: arbiter::Proposal::default(), own: None };
+    assert_eq!(reply(Some(1.0 + 1e-7)).verdict(&truth, &case), Verdict::Pass);
+    for wrong in [1.01, 0.99, f64::NAN] {
+        assert!(matches!(reply(Some(wrong)).verdict(&truth, &case), Verdict::Off(_)), "{wrong}");
+    }
+    assert_eq!(reply(None).verdict(&truth, &case), Verdict::NoAnswer);
+    // A box has several constraints.
+    let edged = Case::new(&zoo::b(1.0, 1.0, 1.0).unwrap(), Pose::identity(), &case.b, at(2.5), "edged".into());
+    assert_eq!(edged.put(Method::Newton).unwrap(), None);
 }
 
 #[test]
@@ -76,7 +85,7 @@ fn table(failures: Vec<(u64, Verdict)>) -> Stability {
         Cell { method: Method::Parry, cases: 40, failures: vec![(7, Verdict::Hang)] },
     ];
     let rows = vec![Row { number: 3, name: "faces, all but parallel", cells }];
-    Stability { machine: Machine::this(), coal: None, quick: true, rows }
+    Stability { machine: Machine::this(), coal: None, solver: None, quick: true, rows }
 }
 
 #[test]
@@ -93,7 +102,7 @@ fn what_is_lost_is_named_and_peers_are_not_guarded() {
     assert!(good.lost_against(&format!("{}\n3,nothing", good.csv().lines().next().unwrap())).is_err());
     let text = bad.markdown(&[]);
     assert!(text.contains(
-        "| 3 | faces, all but parallel | **2 of 40**: off by up to 1e-3, 1 wrong status | - | - | **1 of 40**: 1 hang |"
+        "| 3 | faces, all but parallel | **2 of 40**: off by up to 1e-3, 1 wrong status | - | - | - | - | - | **1 of 40**: 1 hang |"
     ));
     assert!(text.contains("--replay 3/parry/7"));
 }

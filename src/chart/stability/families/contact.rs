@@ -1,7 +1,7 @@
 //! Touching, flat and nearly touching bodies: 1, 3, 8, 13, 14, 15.
 
 use super::super::case::{Case, CaseError, Verdict};
-use super::super::method::{Method, Proposed, pose};
+use super::super::method::{Method, pose};
 use super::super::zoo::{c, e, p, q};
 use super::{at, moved_to, random, somewhere};
 use crate::body::Body;
@@ -58,13 +58,10 @@ pub(super) fn normal(seed: u64, method: Method) -> Result<Option<Verdict>, CaseE
     let gap = [1e-3, 1e-6, 1e-9, 1e-12][(seed % 4) as usize];
     let apart = Case::new(a, somewhere(&mut random, 0.3)?, b, somewhere(&mut random, 4.0)?, format!("gap {gap:e} m"));
     let case = Case { accuracy: 1e-13, floor: 1e-12, ..moved_to(apart, gap)? };
-    let Some(Proposed { proposal, slack }) = case.proposed(method)? else { return Ok(None) };
-    // Polytopes have normals of their own.
-    if slack > 0.0 {
-        return Ok(None);
-    }
+    let Some(proposal) = case.proposed(method)? else { return Ok(None) };
     let truth = case.truth(&[proposal])?;
-    let Some(n) = proposal.normal else {
+    let between = || proposal.points.and_then(|[x, y]| (x - y).try_normalize(0.0));
+    let Some(n) = proposal.normal.or_else(between) else {
         // Nothing has to be said of a gap that may be none.
         return Ok(Some(if truth.lower <= 2.0 * truth.floor { Verdict::Pass } else { Verdict::NoAnswer }));
     };

@@ -18,7 +18,7 @@ const PEER_ERROR: f64 = 1e-6;
 /// A slide from touching to concentric. About their centres the bodies are their own mirror images: the signed distance falls all the
 /// way, by no more than the motion.
 pub(super) fn slide(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
-    if matches!(method, Method::Batch | Method::Coal) {
+    if !matches!(method, Method::Cold | Method::Warm | Method::Parry) {
         return Ok(None);
     }
     let mut random = random(16, seed);

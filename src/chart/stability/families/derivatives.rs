@@ -1,7 +1,7 @@
 //! Gradients and where they jump: 20, 21.
 
 use super::super::case::{Case, CaseError, Verdict};
-use super::super::method::{Method, Proposed, pose};
+use super::super::method::{Method, pose};
 use super::super::zoo::{b, e, q, zoo};
 use super::{any, moved_to, random, somewhere};
 use crate::body::Compound;
@@ -21,11 +21,7 @@ pub(super) fn gradient(seed: u64, method: Method) -> Result<Option<Verdict>, Cas
     let far = 2.5 * (sizes[0] + sizes[1]) + gap;
     let apart = Case::new(a, somewhere(&mut random, 0.3)?, b, somewhere(&mut random, far)?, format!("gap {gap:.3} m"));
     let case = moved_to(apart, gap)?;
-    let Some(Proposed { proposal, slack }) = case.proposed(method)? else { return Ok(None) };
-    // Of polytopes the gradient is another one.
-    if slack > 0.0 {
-        return Ok(None);
-    }
+    let Some(proposal) = case.proposed(method)? else { return Ok(None) };
     let Some([x, y]) = proposal.points else { return Ok(Some(Verdict::NoAnswer)) };
     let Some(n) = proposal.normal.or_else(|| (x - y).try_normalize(0.0)) else { return Ok(Some(Verdict::NoAnswer)) };
     // A point at r from the translation moves by v + ω × r.

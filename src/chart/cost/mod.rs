@@ -1,0 +1,112 @@
+//! Cost: how time and memory grow with degree, constraints, parts, poses of a batch, pairs of a message, and points of a fit.
+
+mod fits;
+mod growth;
+mod memory;
+mod queries;
+mod report;
+
+use super::Machine;
+use super::duel::{DuelError, Shelf, Subject};
+use fits::Fitting;
+use growth::{Growth, Line, Unit};
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// How much is run.
+struct Effort {
+    degrees: &'static [usize],
+    slabs: &'static [usize],
+    parts: &'static [usize],
+    /// Poses of a batch, pairs of a message, points of a fit.
+    batches: &'static [usize],
+    messages: &'static [usize],
+    points: &'static [usize],
+    trajectories: usize,
+    poses: usize,
+    passes: usize,
+}
+
+/// Nanoseconds of a message with so many pairs, sent to a server and answered, for each number of pairs. Who serves lives in another room.
+pub type Messages<'a> = &'a mut dyn FnMut(&[usize]) -> Result<Vec<f64>, String>;
+
+/// What grows how fast.
+pub struct Cost {
+    machine: Machine,
+    quick: bool,
+    passes: usize,
+    growths: Vec<Growth>,
+}
+
+/// Measures chair and human of the meshes in `data`. Fits are kept on the `shelf`; `messages` sends messages to a server, and `program` is `sublevel`, whose
+/// memory is looked at as it fits. `progress` hears what is going on and can stop it.
+///
+/// # Errors
+/// [`DuelError`].
+pub fn cost(
+    data: &Path,
+    shelf: &Shelf,
+    quick: bool,
+    (messages, program): (Messages<'_>, Option<&Path>),
+    progress: &mut dyn FnMut(&str) -> ControlFlow<()>,
+) -> Result<Cost, DuelError> {
+    let effort = if quick {
+        Effort {
+            degrees: &[2, 4, 6],
+            slabs: &[0, 1, 3, 7],
+            parts: &[1, 2, 4],
+            batches: &[1, 8, 64, 512],
+            messages: &[1, 16, 256],
+            points: &[100, 1000, 3000],
+            trajectories: 2,
+            poses: 100,
+            passes: 3,
+        }
+    } else {
+        Effort {
+            degrees: &[2, 4, 6, 8],
+            slabs: &[0, 1, 3, 5, 7, 11, 15],
+            parts: &[1, 2, 4, 8, 12, 16],
+            batches: &[1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096],
+            messages: &[1, 4, 16, 64, 256, 1024, 2048, 4096],
+            points: &[100, 300, 1000, 3000, 10_000, 30_000, 100_000, 300_000, 1_000_000],
+            trajectories: 4,
+            poses: 400,
+            passes: 5,
+        }
+    };
+    let mut told = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };
+    let [chair, human] = [Subject::read("chair", data)?, Subject::read("human", data)?];
+    let pair = [&chair, &human];
+    let mut growths = vec![
+        queries::degrees(pair, &effort, shelf, &mut told)?,
+        queries::constraints(pair, &effort, shelf, &mut told)?,
+        queries::parts(pair, &effort, shelf, &mut told)?,
+        queries::batches(pair, &effort, shelf, &mut told)?,
+    ];
+    told("messages")?;
+    growths.push(sent(effort.messages, messages)?);
+    let fitting = Fitting { program, folder: shelf.folder() };
+    growths.push(fits::degrees(&chair, &effort, &fitting, &mut told)?);
+    growths.push(fits::points(&chair, &effort, &fitting, &mut told)?);
+    Ok(Cost { machine: Machine::this(), quick, passes: effort.passes, growths })
+}
+
+fn sent(sizes: &[usize], messages: Messages<'_>) -> Result<Growth, DuelError> {
+    let times = messages(sizes).map_err(DuelError::Messages)?;
+    let mut whole = Line::new("a message", Unit::Nanoseconds);
+    let mut each = Line::new("a pair of it", Unit::Nanoseconds);
+    for (&size, time) in sizes.iter().zip(times) {
+        whole.points.push((size as f64, time));
+        each.points.push((size as f64, time / size as f64));
+    }
+    Ok(Growth {
+        key: "message",
+        title: "A message to the server against its pairs",
+        size: "pairs of a message",
+        what: "Evaluate over gRPC on loopback, client and server in one process: distances of pairs of bodies of degree 4, 64 of each of two kinds in a scene of \
+               20 m, all pairs of a message different."
+            .into(),
+        lines: vec![whole, each],
+    })
+}

@@ -1,0 +1,39 @@
+//! The obvious ways to a distance, at their best settings: plain Newton, a general nonlinear program, level 0 of the hierarchy.
+
+mod level0;
+mod newton;
+mod posed;
+mod slsqp;
+mod solver;
+
+pub(in crate::chart) use level0::ConicProgram;
+pub(in crate::chart) use newton::newton;
+pub(in crate::chart) use posed::{Posed, between};
+pub(in crate::chart) use slsqp::slsqp;
+pub(in crate::chart) use solver::Clarabel;
+pub use solver::ClarabelError;
+
+#[cfg(test)]
+pub(in crate::chart) mod tests {
+    use crate::body::Body;
+    use crate::measure::Pose;
+    use nalgebra::Vector3;
+
+    type Known = (Body, Body, Pose, f64);
+
+    pub(in crate::chart) fn at(x: f64, y: f64, z: f64) -> Pose {
+        Pose::from_quaternion(Vector3::new(x, y, z), [0.0, 0.0, 0.0, 1.0]).unwrap()
+    }
+
+    /// Balls of radius 1 and 0.5, centres 3 apart.
+    pub(in crate::chart) fn balls_apart() -> Known {
+        let ball = |radius| Body::ball("ball", Vector3::zeros(), radius).unwrap();
+        (ball(1.0), ball(0.5), at(2.0, 2.0, 1.0), 1.5)
+    }
+
+    /// Ellipsoids that face each other along a common axis.
+    pub(in crate::chart) fn axes_apart() -> Known {
+        let egg = |x, y, z| Body::ellipsoid("egg", Vector3::zeros(), Vector3::new(x, y, z)).unwrap();
+        (egg(1.0, 0.6, 0.8), egg(0.5, 0.7, 0.9), at(2.25, 0.0, 0.0), 0.75)
+    }
+}

@@ -1,0 +1,109 @@
+//! Level 0 solved by clarabel, in a process of its own: clarabel's semidefinite cones need a BLAS, and this program needs none.
+
+use super::level0::ConicProgram;
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The program that solves: `program IN OUT`, the example `clarabel` of this package.
+#[derive(Clone, Debug)]
+pub(in crate::chart) struct Clarabel {
+    program: PathBuf,
+}
+
+/// Why it has no say.
+#[derive(Debug, thiserror::Error)]
+pub enum ClarabelError {
+    /// The variable names no program.
+    #[error("SUBLEVEL_CLARABEL: {} is no file; name the program that `cargo build --release --example clarabel` makes, or unset the variable", .0.display())]
+    NoProgram(PathBuf),
+    /// A file could not be read or written, or the program not be started.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// File or program.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The program failed, or wrote what it should not.
+    #[error("{}: {reason}", program.display())]
+    Program {
+        /// The program.
+        program: PathBuf,
+        /// What it said, or what is wrong with that.
+        reason: String,
+    },
+}
+
+/// What it is asked.
+#[derive(Serialize)]
+struct Asked<'a> {
+    programs: Vec<ConicProgram>,
+    tolerances: &'a [f64],
+    repeats: usize,
+}
+
+/// What it says of a program.
+#[derive(Clone, Copy, Debug, Deserialize)]
+pub(in crate::chart) struct Solved {
+    pub(in crate::chart) nanoseconds: f64,
+    /// In the unit of the program; none if there is no number.
+    pub(in crate::chart) value: Option<f64>,
+    pub(in crate::chart) iterations: u32,
+    pub(in crate::chart) solved: bool,
+}
+
+impl Clarabel {
+    /// As `SUBLEVEL_CLARABEL` says; else the example beside this program, where cargo puts it; none if it is not there.
+    ///
+    /// # Errors
+    /// [`ClarabelError::NoProgram`].
+    pub(in crate::chart) fn find() -> Result<Option<Self>, ClarabelError> {
+        if let Some(program) = std::env::var_os("SUBLEVEL_CLARABEL").map(PathBuf::from) {
+            return if program.is_file() { Ok(Some(Self { program })) } else { Err(ClarabelError::NoProgram(program)) };
+        }
+        let here = std::env::current_exe().ok();
+        let beside = here.as_deref().and_then(Path::parent).map(|folder| folder.join("examples/clarabel"));
+        Ok(beside.filter(|program| program.is_file()).map(|program| Self { program }))
+    }
+
+    /// The version that the example is built with.
+    pub(in crate::chart) fn version() -> String {
+        crate::chart::machine::locked("clarabel")
+    }
+
+    /// For each tolerance, for each program; files for that lie in `folder` under `name`.
+    ///
+    /// # Errors
+    /// [`ClarabelError`].
+    pub(in crate::chart) fn solve(
+        &self,
+        (folder, name): (&Path, &str),
+        programs: Vec<ConicProgram>,
+        tolerances: &[f64],
+        repeats: usize,
+    ) -> Result<Vec<Vec<Solved>>, ClarabelError> {
+        let count = programs.len();
+        let asked = Asked { programs, tolerances, repeats };
+        let failed = |reason: String| ClarabelError::Program { program: self.program.clone(), reason };
+        let io = |path: &Path| {
+            let path = path.to_owned();
+            |source| ClarabelError::Io { path, source }
+        };
+        let read = folder.join(format!("{name}.programs"));
+        let write = read.with_extension("solved");
+        let text = serde_json::to_string(&asked).map_err(|error| failed(error.to_string()))?;
+        fs::write(&read, text).map_err(io(&read))?;
+        let output = Command::new(&self.program).args([&read, &write]).env("OPENBLAS_NUM_THREADS", "1").output();
+        let output = output.map_err(io(&self.program))?;
+        if !output.status.success() {
+            return Err(failed(format!("failed: {}", String::from_utf8_lossy(&output.stderr).trim())));
+        }
+        let text = fs::read_to_string(&write).map_err(io(&write))?;
+        let answers: Vec<Vec<Solved>> =
+            serde_json::from_str(&text).map_err(|error| failed(format!("wrote no answers: {error}")))?;
+        let complete = answers.len() == tolerances.len() && answers.iter().all(|of| of.len() == count);
+        if complete { Ok(answers) } else { Err(failed("did not answer every program".into())) }
+    }
+}
