@@ -44,8 +44,8 @@ pub(super) fn slide(seed: u64, method: Method) -> Result<Option<Verdict>, CaseEr
     }
     let hulls = match method {
         Method::Parry => {
-            let made = Hulls::new(&sampled(a), &sampled(b));
-            Some(made.map_err(|error| CaseError::Other(error.to_string()))?)
+            let Ok(made) = Hulls::new(&sampled(a), &sampled(b)) else { return Ok(Some(Verdict::NoAnswer)) };
+            Some(made)
         }
         _ => None,
     };
