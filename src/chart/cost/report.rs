@@ -104,8 +104,13 @@ impl Cost {
     }
 }
 
+/// Without a sign before nothing.
+fn two_places(value: f64) -> String {
+    format!("{:.2}", (100.0 * value).round() / 100.0 + 0.0)
+}
+
 fn power(line: &Line) -> String {
-    line.exponent().map_or("-".into(), |exponent| format!("{exponent:.2}"))
+    line.exponent().map_or("-".into(), two_places)
 }
 
 impl Unit {
@@ -147,7 +152,7 @@ impl Growth {
         };
         let groups = self.of(unit).zip(LOOKS).map(|(line, (ink, marker))| {
             let last = line.points.len() - 1;
-            let word = line.exponent().map_or(String::new(), |exponent| format!("~ n^{exponent:.2}"));
+            let word = line.exponent().map_or(String::new(), |exponent| format!("~ n^{}", two_places(exponent)));
             let point = |(i, (x, y)): (usize, &(f64, f64))| Point {
                 x: *x,
                 y: scale * y,
@@ -209,6 +214,7 @@ mod tests {
         let times = [5.4, 999.0, 1234.0, 56_789.0, 1.5e6, 2.5e9].map(|ns| Unit::Nanoseconds.told(ns));
         assert_eq!(times, ["5 ns", "999 ns", "1.23 µs", "56.8 µs", "1.50 ms", "2.50 s"]);
         assert_eq!(Unit::Bytes.told(34_560.0), "34.6 kB");
+        assert_eq!([-0.001, -1.256].map(two_places), ["0.00", "-1.26"]);
     }
 
     #[test]
