@@ -3,7 +3,7 @@
 use super::messages::messages;
 use super::write_atomically;
 use crate::chart::duel::Shelf;
-use crate::chart::stability::{Share, serve, stability};
+use crate::chart::stability::{Lost, Share, Stability, serve, stability};
 use crate::chart::{Messages, Table1Progress, accuracy, cost, detail, speed, table1, warm};
 use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -14,7 +14,11 @@ use std::path::{Path, PathBuf};
 
 /// Measure on this machine, and draw: reports as Markdown with SVG pictures, and their raw numbers as CSV
 ///
-/// Example: sublevel chart table1 --meshes psb --out docs
+/// Examples:
+///
+///   sublevel chart all --data DIR --quick
+///
+///   sublevel chart table1 --meshes psb --out docs
 #[derive(Debug, Args)]
 pub(super) struct ChartArgs {
     #[command(subcommand)]
@@ -23,6 +27,7 @@ pub(super) struct ChartArgs {
 
 #[derive(Debug, Subcommand)]
 enum Figure {
+    All(AllArgs),
     Speed(SpeedArgs),
     Warm(WarmArgs),
     Detail(DetailArgs),
@@ -30,6 +35,16 @@ enum Figure {
     Accuracy(AccuracyArgs),
     Cost(CostArgs),
     Table1(Table1Args),
+}
+
+/// All figures, one after the other, and charts.md, which shows the main ones and leads to the others
+///
+/// Keep the machine quiet: times are measured. Takes about three quarters of an hour on one core, and under five minutes with --quick, once the
+/// fits are kept. Clarabel and coal take part as the figures' own help says.
+#[derive(Debug, Args)]
+struct AllArgs {
+    #[command(flatten)]
+    common: Common,
 }
 
 /// Volumes and construction times of all bounding sets around five meshes, beside the paper's Table I
@@ -151,44 +166,100 @@ struct Common {
     quick: bool,
 }
 
+/// The pictures that a figure wrote, the most telling first.
+type Drawn = Result<Vec<String>, Box<dyn Error>>;
+
 /// Measures and writes what is asked for.
 pub(super) fn run(args: &ChartArgs) -> Result<(), Box<dyn Error>> {
-    match &args.figure {
+    let drawn = match &args.figure {
+        Figure::All(args) => return run_all(&args.common),
+        Figure::Stability(args) => return run_stability(args),
         Figure::Speed(args) => run_speed(&args.common),
         Figure::Warm(args) => run_warm(&args.common),
         Figure::Detail(args) => run_detail(&args.common),
-        Figure::Stability(args) => run_stability(args),
         Figure::Accuracy(args) => run_accuracy(&args.common),
         Figure::Cost(args) => run_cost(&args.common),
-        Figure::Table1(args) => run_table1(args),
+        Figure::Table1(args) => run_table1(&args.meshes, &args.out, args.quick),
+    };
+    drawn.map(drop)
+}
+
+fn run_all(args: &Common) -> Result<(), Box<dyn Error>> {
+    let figures: [(&str, &str, fn(&Common) -> Drawn); 6] = [
+        ("speed", "Speed against accuracy", run_speed),
+        ("accuracy", "Solver accuracy against time", run_accuracy),
+        ("cost", "Cost growth", run_cost),
+        ("warm", "Warm starts", run_warm),
+        ("detail", "Detail", run_detail),
+        ("table1", "Table I of the paper", |args| run_table1(&args.data.join("psb"), &args.out, args.quick)),
+    ];
+    let flags = if args.quick { " --quick" } else { "" };
+    let mut text = format!(
+        "# Charts\n\nMade by `sublevel chart all --data DIR{flags}`. Each report names its machine, commit and versions, and the command that makes it \
+         again alone.\n\n## Stability\n\n"
+    );
+    let found = measure_stability(&args.out, args.quick)?;
+    text += &format!("{}\n[How this was judged, and each failure](stability.md)\n", found.table());
+    for (name, title, run) in figures {
+        let drawn = run(args)?;
+        text += &format!("\n## {title}\n\n");
+        if let Some(picture) = drawn.first() {
+            text += &format!("![{title}]({picture})\n\n");
+        }
+        text += &format!("[The report]({name}.md), [the numbers]({name}.csv)\n");
     }
+    let index = args.out.join("charts.md");
+    write_atomically(&index, &text)?;
+    writeln!(io::stdout().lock(), "{}", index.display())?;
+    Ok(())
 }
 
-fn run_speed(args: &Common) -> Result<(), Box<dyn Error>> {
+fn run_speed(args: &Common) -> Drawn {
+    with_shelf(args, |shelf, bar| {
+        let found = speed(&args.data, shelf, args.quick, &mut |at| tell(bar, at))?;
+        write_report(&args.out, "speed", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+    })
+}
+
+fn run_warm(args: &Common) -> Drawn {
+    with_shelf(args, |shelf, bar| {
+        let found = warm(&args.data, shelf, args.quick, &mut |at| tell(bar, at))?;
+        write_report(&args.out, "warm", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+    })
+}
+
+fn run_detail(args: &Common) -> Drawn {
+    with_shelf(args, |shelf, bar| {
+        let found = detail(&args.data, shelf, args.quick, &mut |at| tell(bar, at))?;
+        write_report(&args.out, "detail", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+    })
+}
+
+fn run_accuracy(args: &Common) -> Drawn {
+    with_shelf(args, |shelf, bar| {
+        let found = accuracy(&args.data, shelf, args.quick, &mut |at| tell(bar, at))?;
+        write_report(&args.out, "accuracy", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+    })
+}
+
+fn run_cost(args: &Common) -> Drawn {
+    with_shelf(args, |shelf, bar| {
+        let mut sent = |sizes: &[usize]| messages(sizes).map_err(|error| error.to_string());
+        let program = std::env::current_exe().ok();
+        let parts: (Messages<'_>, _) = (&mut sent, program.as_deref());
+        let found = cost(&args.data, shelf, args.quick, parts, &mut |at| tell(bar, at))?;
+        write_report(&args.out, "cost", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+    })
+}
+
+/// Makes the folders, and does the work under a spinner.
+fn with_shelf(args: &Common, work: impl FnOnce(&Shelf, &ProgressBar) -> Drawn) -> Drawn {
     make_folder(&args.out)?;
     let shelf = Shelf::new(&args.fits)?;
     let bar = bar()?;
-    let found = speed(&args.data, &shelf, args.quick, &mut |at| tell(&bar, at))?;
+    let drawn = work(&shelf, &bar);
     bar.finish_and_clear();
-    write_report(&args.out, "speed", |names| found.markdown(names), &found.csv(), &found.pictures()?)
-}
-
-fn run_warm(args: &Common) -> Result<(), Box<dyn Error>> {
-    make_folder(&args.out)?;
-    let shelf = Shelf::new(&args.fits)?;
-    let bar = bar()?;
-    let found = warm(&args.data, &shelf, args.quick, &mut |at| tell(&bar, at))?;
-    bar.finish_and_clear();
-    write_report(&args.out, "warm", |names| found.markdown(names), &found.csv(), &found.pictures()?)
-}
-
-fn run_detail(args: &Common) -> Result<(), Box<dyn Error>> {
-    make_folder(&args.out)?;
-    let shelf = Shelf::new(&args.fits)?;
-    let bar = bar()?;
-    let found = detail(&args.data, &shelf, args.quick, &mut |at| tell(&bar, at))?;
-    bar.finish_and_clear();
-    write_report(&args.out, "detail", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+    drawn
 }
 
 fn run_stability(args: &StabilityArgs) -> Result<(), Box<dyn Error>> {
@@ -197,43 +268,24 @@ fn run_stability(args: &StabilityArgs) -> Result<(), Box<dyn Error>> {
     }
     // Read first: what it is for is known before the work.
     let guard = args.guard.as_ref().map(|path| super::read(path)).transpose()?;
-    make_folder(&args.out)?;
-    let bar = bar()?;
-    let found = stability(&std::env::current_exe()?, args.quick, &mut |at| tell(&bar, at))?;
-    bar.finish_and_clear();
-    write_report(&args.out, "stability", |names| found.markdown(names), &found.csv(), &[])?;
+    let found = measure_stability(&args.out, args.quick)?;
     let lost = guard.map_or(Ok(Vec::new()), |earlier| found.lost_against(&earlier))?;
     if lost.is_empty() {
         return Ok(());
     }
-    let rows = lost.iter().map(|row| {
-        format!(
-            "family {}, {}: {} failures where there were {}; {}",
-            row.family, row.method, row.now, row.before, row.replay
-        )
+    let rows = lost.iter().map(|Lost { family, method, before, now, replay }| {
+        format!("family {family}, {method}: {now} failures where there were {before}; {replay}")
     });
     Err(rows.collect::<Vec<_>>().join("\n").into())
 }
 
-fn run_accuracy(args: &Common) -> Result<(), Box<dyn Error>> {
-    make_folder(&args.out)?;
-    let shelf = Shelf::new(&args.fits)?;
+fn measure_stability(out: &Path, quick: bool) -> Result<Stability, Box<dyn Error>> {
+    make_folder(out)?;
     let bar = bar()?;
-    let found = accuracy(&args.data, &shelf, args.quick, &mut |at| tell(&bar, at))?;
+    let found = stability(&std::env::current_exe()?, quick, &mut |at| tell(&bar, at))?;
     bar.finish_and_clear();
-    write_report(&args.out, "accuracy", |names| found.markdown(names), &found.csv(), &found.pictures()?)
-}
-
-fn run_cost(args: &Common) -> Result<(), Box<dyn Error>> {
-    make_folder(&args.out)?;
-    let shelf = Shelf::new(&args.fits)?;
-    let bar = bar()?;
-    let mut sent = |sizes: &[usize]| messages(sizes).map_err(|error| error.to_string());
-    let program = std::env::current_exe().ok();
-    let parts: (Messages<'_>, _) = (&mut sent, program.as_deref());
-    let found = cost(&args.data, &shelf, args.quick, parts, &mut |at| tell(&bar, at))?;
-    bar.finish_and_clear();
-    write_report(&args.out, "cost", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+    write_report(out, "stability", |_| found.markdown(), &found.csv(), &[])?;
+    Ok(found)
 }
 
 fn make_folder(out: &Path) -> Result<(), Box<dyn Error>> {
@@ -253,14 +305,14 @@ fn tell(bar: &ProgressBar, at: &str) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// Writes NAME.md, NAME.csv and the pictures, and prints where the report is.
+/// Writes NAME.md, NAME.csv and the pictures, and prints where the report is; tells the pictures' names.
 fn write_report(
     out: &Path,
     name: &str,
     markdown: impl FnOnce(&[&str]) -> String,
     csv: &str,
     pictures: &[(String, String)],
-) -> Result<(), Box<dyn Error>> {
+) -> Drawn {
     let names: Vec<&str> = pictures.iter().map(|(name, _)| name.as_str()).collect();
     let report = out.join(format!("{name}.md"));
     write_atomically(&report, &markdown(&names))?;
@@ -269,18 +321,18 @@ fn write_report(
         write_atomically(&out.join(name), svg)?;
     }
     writeln!(io::stdout().lock(), "{}", report.display())?;
-    Ok(())
+    Ok(names.into_iter().map(str::to_owned).collect())
 }
 
-fn run_table1(args: &Table1Args) -> Result<(), Box<dyn Error>> {
-    make_folder(&args.out)?;
+fn run_table1(meshes: &Path, out: &Path, quick: bool) -> Drawn {
+    make_folder(out)?;
     let bar = bar()?;
-    let table = table1(&args.meshes, args.quick, &mut |progress| {
+    let table = table1(meshes, quick, &mut |progress| {
         let Table1Progress { done, cells, at } = progress;
         tell(&bar, &format!("{} of {cells}: {at}", done + 1))
     })?;
     bar.finish_and_clear();
     let mut pictures = vec![("table1.svg".to_owned(), table.volume_against_time()?)];
     pictures.extend(table.pictures().into_iter().map(|(name, svg)| (name.to_owned(), svg)));
-    write_report(&args.out, "table1", |names| table.markdown(names), &table.csv(), &pictures)
+    write_report(out, "table1", |names| table.markdown(names), &table.csv(), &pictures)
 }

@@ -79,7 +79,7 @@ impl Row {
 
 impl Stability {
     /// The report.
-    pub fn markdown(&self, _: &[&str]) -> String {
+    pub fn markdown(&self) -> String {
         let mut text = String::from("# Stability where methods fail\n\n");
         // Writing to a string can not fail.
         let flags = if self.quick { " --quick" } else { "" };
@@ -105,7 +105,25 @@ impl Stability {
             parry_version(),
             PATIENCE.as_secs()
         );
-        text.push_str("| | family |");
+        text.push_str(&self.table());
+        text.push_str(
+            "\nErrors are relative to the smaller body, of normals in radians, of gradients relative to their norm, of times to the whole turn. \
+             `-`: the method can not be asked. Families 17, 23 and 24 are about scenes, which are not measured here.\n\n\
+             ## Failures\n\nThe first of each cell, by the command that replays it.\n\n",
+        );
+        for row in &self.rows {
+            for cell in &row.cells {
+                if let Some((seed, verdict)) = cell.failures.first() {
+                    let _ = writeln!(text, "- `{}`: {}", replay(row, cell.method, *seed), verdict);
+                }
+            }
+        }
+        text
+    }
+
+    /// A row per family, a column per method.
+    pub fn table(&self) -> String {
+        let mut text = String::from("| | family |");
         for method in Method::ALL {
             let _ = write!(text, " {} |", method.title());
         }
@@ -118,18 +136,6 @@ impl Stability {
                 let _ = write!(text, " {} |", row.cell(method).map_or("-".into(), Cell::text));
             }
             text.push('\n');
-        }
-        text.push_str(
-            "\nErrors are relative to the smaller body, of normals in radians, of gradients relative to their norm, of times to the whole turn. \
-             `-`: the method can not be asked. Families 17, 23 and 24 are about scenes, which are not measured here.\n\n\
-             ## Failures\n\nThe first of each cell, by the command that replays it.\n\n",
-        );
-        for row in &self.rows {
-            for cell in &row.cells {
-                if let Some((seed, verdict)) = cell.failures.first() {
-                    let _ = writeln!(text, "- `{}`: {}", replay(row, cell.method, *seed), verdict);
-                }
-            }
         }
         text
     }

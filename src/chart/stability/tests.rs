@@ -100,7 +100,7 @@ fn what_is_lost_is_named_and_peers_are_not_guarded() {
     assert!(lost[0].family.contains("faces") && lost[0].replay.ends_with("3/cold/5"));
     assert!(good.lost_against("something").is_err());
     assert!(good.lost_against(&format!("{}\n3,nothing", good.csv().lines().next().unwrap())).is_err());
-    let text = bad.markdown(&[]);
+    let text = bad.markdown();
     assert!(text.contains(
         "| 3 | faces, all but parallel | **2 of 40**: off by up to 1e-3, 1 wrong status | - | - | - | - | - | **1 of 40**: 1 hang |"
     ));

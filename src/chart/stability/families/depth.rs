@@ -65,7 +65,8 @@ pub(super) fn slide(seed: u64, method: Method) -> Result<Option<Verdict>, CaseEr
             let answer = signed_distance(a, &pose_a, b, &pose_b, &Options::default(), &mut warm);
             let SignedDistance { status, lower, upper, tied, .. } = answer;
             if status != Status::Converged {
-                return Ok(Some(Verdict::WrongStatus(format!("still wide, [{lower:e}, {upper:e}] m"))));
+                let pair = format!("{}-{} at {:.4} of the slide", a.name(), b.name(), offset / inside);
+                return Ok(Some(Verdict::WrongStatus(format!("{pair}: still wide, [{lower:e}, {upper:e}] m"))));
             }
             (answer.value(), tied, 2e-9 * small)
         };
