@@ -366,15 +366,17 @@ impl<const N: usize> Sweep<'_, N> {
     }
 
     /// Whether a direction far from the best is about as good, or one near it may be better.
-    fn tied(&self, best: &Best<'_>) -> bool {
+    fn tied(&mut self, best: &Best<'_>) -> bool {
         let Some(n) = best.n.filter(|_| best.depth > 0.0) else { return false };
         if !best.settled {
             return true;
         }
         let close = best.depth + 2.0 * best.tolerance();
         let elsewhere = |n_other: &Vector3<f64>| n_other.dot(&n) < ELSEWHERE;
+        // Symmetric bodies have the mirror image of the best, which may lie between all directions known.
+        let opposite = self.direction(-n, None, best);
         let others = self.covering.directions().iter().filter(|direction| elsewhere(&direction.n));
-        let Some(least) = others.min_by(|p, q| p.depth().total_cmp(&q.depth())) else { return false };
+        let Some(least) = others.chain(&opposite).min_by(|p, q| p.depth().total_cmp(&q.depth())) else { return false };
         if least.depth() <= close {
             return true;
         }
