@@ -68,7 +68,8 @@ pub fn stability(
             scope.spawn(move || {
                 while let Some(&(row, method)) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let family = &FAMILIES[row];
-                    let found = runner::run(program, family, method, family.cases[usize::from(!quick)]);
+                    let cases = family.cases[usize::from(!quick)].min(method.most_cases()[usize::from(!quick)]);
+                    let found = runner::run(program, family, method, cases);
                     if send.send((row, method, found)).is_err() {
                         break;
                     }

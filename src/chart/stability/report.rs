@@ -97,7 +97,7 @@ impl Stability {
         let _ = writeln!(
             text,
             "Peers: parry3d-f64 {}; {coal}; {solver}. In place of a body, GJK gets the convex hull of 1 000 points of its surface, and is held to the distance \
-             of these hulls; others may be wrong by 1e-6 of the smaller body. Newton does 100 undamped steps from where the line of centres leaves the bodies, SLSQP \
+             of these hulls; others may be wrong by 1e-5 of the smaller body. Newton does 100 undamped steps from where the line of centres leaves the bodies, SLSQP \
              1 000 evaluations from there, bodies of one constraint both; clarabel has its default tolerance of 1e-8. Ours must hold the truth in its bracket, be as narrow as asked for \
              and say so; where a family asks for more, it must do that. Each case is drawn from its seed alone and put in a process of its own with {} s of \
              time; the truth is the tightest of all pairs of points inside and of all separating planes that anyone proposes. \

@@ -13,7 +13,7 @@ use crate::measure::{
 const STEPS: u32 = 12;
 
 /// Deviation that others may have from what a signed distance does, relative to the smaller body.
-const PEER_ERROR: f64 = 1e-6;
+const PEER_ERROR: f64 = 1e-5;
 
 /// A slide from touching to concentric. About their centres the bodies are their own mirror images: the signed distance falls all the
 /// way, by no more than the motion.
