@@ -103,6 +103,7 @@ pub fn accuracy(
 mod tests {
     use super::cases::Case;
     use super::methods::{Method, measure};
+    use super::posed::Posed;
     use super::*;
     use crate::body::Body;
     use crate::measure::Pose;
@@ -124,6 +125,12 @@ mod tests {
     pub(super) fn axes_apart() -> Known {
         let egg = |x, y, z| Body::ellipsoid("egg", Vector3::zeros(), Vector3::new(x, y, z)).unwrap();
         (egg(1.0, 0.6, 0.8), egg(0.5, 0.7, 0.9), at(2.25, 0.0, 0.0), 0.75)
+    }
+
+    /// A start that is not the solution, unlike the line between these centres.
+    pub(super) fn aside([a, b]: &[Posed<'_>; 2]) -> [Vector3<f64>; 2] {
+        let beside = Vector3::new(0.0, 0.3, -0.2);
+        [a.facing(&(b.inside() + beside)), b.facing(&(a.inside() - 2.0 * beside))]
     }
 
     #[test]
