@@ -138,7 +138,7 @@ mod tests {
     fn several_constraints_and_higher_degrees_are_stated_too() {
         let a = Body::cylinder("post", 0.2, 1.0).unwrap();
         let b = Body::superellipsoid("block", Vector3::new(0.1, 0.0, 0.0), Vector3::new(0.5, 0.4, 0.3), 4).unwrap();
-        let pose = Pose::from_quaternion(Vector3::new(1.5, 0.4, 0.6), [0.1, 0.2, 0.3, 0.9]).unwrap();
+        let pose = Pose::from_quaternion(Vector3::new(1.5, 0.4, 0.6), [0.0, 0.48, 0.36, 0.8]).unwrap();
         let known = distance(&a, &Pose::identity(), &b, &pose, &Options::default(), &mut WarmStart::default());
         let found = solved(&a, &b, &pose);
         assert!((found - known.value()).abs() < 1e-6, "{found} for {}", known.value());

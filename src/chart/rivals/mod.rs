@@ -15,6 +15,7 @@ pub use solver::ClarabelError;
 
 #[cfg(test)]
 pub(in crate::chart) mod tests {
+    use super::Posed;
     use crate::body::Body;
     use crate::measure::Pose;
     use nalgebra::Vector3;
@@ -35,5 +36,11 @@ pub(in crate::chart) mod tests {
     pub(in crate::chart) fn axes_apart() -> Known {
         let egg = |x, y, z| Body::ellipsoid("egg", Vector3::zeros(), Vector3::new(x, y, z)).unwrap();
         (egg(1.0, 0.6, 0.8), egg(0.5, 0.7, 0.9), at(2.25, 0.0, 0.0), 0.75)
+    }
+
+    /// A start that is not the solution, unlike the line between these centres.
+    pub(in crate::chart) fn aside([a, b]: &[Posed<'_>; 2]) -> [Vector3<f64>; 2] {
+        let beside = Vector3::new(0.0, 0.3, -0.2);
+        [a.facing(&(b.inside() + beside)), b.facing(&(a.inside() - 2.0 * beside))]
     }
 }

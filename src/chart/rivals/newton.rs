@@ -66,15 +66,15 @@ pub(in crate::chart) fn newton(bodies: &[Posed<'_>; 2], [mut x, mut y]: [Vector3
 
 #[cfg(test)]
 mod tests {
-    use super::super::posed::{Posed, between};
-    use super::super::tests::{axes_apart, balls_apart};
+    use super::super::posed::Posed;
+    use super::super::tests::{aside, axes_apart, balls_apart};
     use super::newton;
 
     #[test]
     fn a_few_steps_find_the_distance_of_balls_and_ellipsoids() {
         for (a, b, pose, distance) in [balls_apart(), axes_apart()] {
             let bodies = [Posed::new(&a, &crate::measure::Pose::identity()), Posed::new(&b, &pose)];
-            let found = newton(&bodies, between(&bodies), 12).apart();
+            let found = newton(&bodies, aside(&bodies), 12).apart();
             assert!((found - distance).abs() < 1e-12, "{found} for {distance}");
         }
     }

@@ -51,18 +51,18 @@ pub(in crate::chart) fn slsqp(bodies: &[Posed<'_>; 2], start: [Vector3<f64>; 2],
 
 #[cfg(test)]
 mod tests {
-    use super::super::posed::{Posed, between};
-    use super::super::tests::{axes_apart, balls_apart};
+    use super::super::posed::Posed;
+    use super::super::tests::{aside, axes_apart, balls_apart};
     use super::slsqp;
 
     #[test]
     fn it_finds_the_distance_of_balls_and_ellipsoids() {
         for (a, b, pose, distance) in [balls_apart(), axes_apart()] {
             let bodies = [Posed::new(&a, &crate::measure::Pose::identity()), Posed::new(&b, &pose)];
-            let (found, evaluations) = slsqp(&bodies, between(&bodies), 1.0, 1000);
+            let (found, evaluations) = slsqp(&bodies, aside(&bodies), 1.0, 1000);
             assert!((found - distance).abs() < 1e-7, "{found} for {distance}");
             assert!((2..200).contains(&evaluations), "{evaluations}");
-            let (_, evaluations) = slsqp(&bodies, between(&bodies), 1.0, 1);
+            let (_, evaluations) = slsqp(&bodies, aside(&bodies), 1.0, 1);
             assert_eq!(evaluations, 1);
         }
     }
