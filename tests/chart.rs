@@ -237,6 +237,58 @@ fn the_quick_chart_of_cost_tells_exponents() {
     assert!(report.contains("| exponent |"));
 }
 
+/// `sublevel chart stability` with these arguments, of our methods.
+fn stability(arguments: &[&str], out: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sublevel"))
+        .args(["chart", "stability", "--quick", "--methods", "cold,warm,batch", "--out"])
+        .arg(out)
+        .args(arguments)
+        .output()
+        .expect("the program starts")
+}
+
+/// The committed table is the guard: no family may fail more often than there.
+#[test]
+fn no_family_of_the_stability_table_is_lost() {
+    let out = tempfile::tempdir().expect("a folder can be made");
+    let committed = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/stability.csv");
+    let output = stability(&["--guard", committed], out.path());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let csv = std::fs::read_to_string(out.path().join("stability.csv")).expect("the table is written");
+    let families: std::collections::BTreeSet<&str> =
+        csv.lines().skip(1).filter_map(|line| line.split(',').next()).collect();
+    assert_eq!(families.len(), 24, "{csv}");
+    let cases: f64 = column(&csv, "", "cases").into_iter().filter(|cases| cases.is_finite()).sum();
+    assert!(cases > 2000.0, "{cases} cases");
+    let report = std::fs::read_to_string(out.path().join("stability.md")).expect("the report is written");
+    assert!(report.contains("| 13 | parallel flats") && report.contains("pass (40)"), "{report}");
+}
+
+#[test]
+fn stability_refuses_what_it_can_not_use_with_a_remedy() {
+    let out = tempfile::tempdir().expect("a folder can be made");
+    let other = out.path().join("other.csv");
+    std::fs::write(&other, "a,b\n1,2\n").expect("a file can be written");
+    let run = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_sublevel"));
+        let output = command.args(["chart", "stability"]).args(arguments).current_dir(out.path()).output();
+        let output = output.expect("the program starts");
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    for (arguments, code, word) in [
+        (&["--methods", "someone"][..], 2, "none of cold, warm"),
+        (&["--replay", "17/cold/1"], 2, "FAMILY/METHOD/SEED"),
+        (&["--replay", "13/cold/1", "--quick"], 2, "cannot be used"),
+        (&["--guard", "absent.csv"], 1, "absent.csv"),
+        (&["--quick", "--methods", "coal", "--guard", "other.csv"], 1, "line 1"),
+    ] {
+        let (found, error) = run(arguments);
+        assert!(found == Some(code) && error.contains(word), "{arguments:?}: {found:?} {error}");
+    }
+    let (code, error) = run(&["--replay", "13/cold/1"]);
+    assert_eq!(code, Some(0), "{error}");
+}
+
 #[test]
 fn charts_refuse_what_they_can_not_use_with_a_remedy() {
     let out = tempfile::tempdir().expect("a folder can be made");

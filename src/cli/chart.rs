@@ -3,7 +3,7 @@
 use super::messages::messages;
 use super::write_atomically;
 use crate::chart::duel::Shelf;
-use crate::chart::stability::{Lost, Share, Stability, serve, stability};
+use crate::chart::stability::{Earlier, Lost, Method, Share, Stability, serve, stability};
 use crate::chart::{Messages, Table1Progress, accuracy, cost, detail, speed, table1, warm};
 use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -108,7 +108,7 @@ struct DetailArgs {
 ///
 ///   sublevel chart stability --replay 13/cold/5
 ///
-///   sublevel chart stability --quick --guard docs/stability.csv
+///   sublevel chart stability --quick --methods cold,warm,batch --guard docs/stability.csv
 #[derive(Debug, Args)]
 struct StabilityArgs {
     /// Folder for the report; made with its parents when it is not there
@@ -117,11 +117,14 @@ struct StabilityArgs {
     /// A tenth of the cases: under a minute
     #[arg(long)]
     quick: bool,
+    /// Only these columns: cold, warm, batch, newton, slsqp, clarabel, parry, coal
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    methods: Vec<Method>,
     /// Fail, with the row named, where ours fails more often than in this stability.csv of an earlier run
     #[arg(long, value_name = "FILE")]
     guard: Option<PathBuf>,
     /// Put one case here and now, and print what came of it: the number of its family, the method and the seed, FROM-TO for several
-    #[arg(long, value_name = "FAMILY/METHOD/SEED", conflicts_with_all = ["out", "quick", "guard"])]
+    #[arg(long, value_name = "FAMILY/METHOD/SEED", conflicts_with_all = ["out", "quick", "guard", "methods"])]
     replay: Option<Share>,
     /// With --replay, print one JSON object per case
     #[arg(long, requires = "replay")]
@@ -169,6 +172,9 @@ struct Common {
 /// The pictures that a figure wrote, the most telling first.
 type Drawn = Result<Vec<String>, Box<dyn Error>>;
 
+/// Measures and writes a figure.
+type Run = fn(&Common) -> Drawn;
+
 /// Measures and writes what is asked for.
 pub(super) fn run(args: &ChartArgs) -> Result<(), Box<dyn Error>> {
     let drawn = match &args.figure {
@@ -185,7 +191,7 @@ pub(super) fn run(args: &ChartArgs) -> Result<(), Box<dyn Error>> {
 }
 
 fn run_all(args: &Common) -> Result<(), Box<dyn Error>> {
-    let figures: [(&str, &str, fn(&Common) -> Drawn); 6] = [
+    let figures: [(&str, &str, Run); 6] = [
         ("speed", "Speed against accuracy", run_speed),
         ("accuracy", "Solver accuracy against time", run_accuracy),
         ("cost", "Cost growth", run_cost),
@@ -198,7 +204,7 @@ fn run_all(args: &Common) -> Result<(), Box<dyn Error>> {
         "# Charts\n\nMade by `sublevel chart all --data DIR{flags}`. Each report names its machine, commit and versions, and the command that makes it \
          again alone.\n\n## Stability\n\n"
     );
-    let found = measure_stability(&args.out, args.quick)?;
+    let found = measure_stability(&args.out, &Method::ALL, args.quick)?;
     text += &format!("{}\n[How this was judged, and each failure](stability.md)\n", found.table());
     for (name, title, run) in figures {
         let drawn = run(args)?;
@@ -267,9 +273,10 @@ fn run_stability(args: &StabilityArgs) -> Result<(), Box<dyn Error>> {
         return Ok(serve(share, args.json, &mut io::stdout().lock())?);
     }
     // Read first: what it is for is known before the work.
-    let guard = args.guard.as_ref().map(|path| super::read(path)).transpose()?;
-    let found = measure_stability(&args.out, args.quick)?;
-    let lost = guard.map_or(Ok(Vec::new()), |earlier| found.lost_against(&earlier))?;
+    let guard = args.guard.as_ref().map(|path| guard(path)).transpose()?;
+    let methods = if args.methods.is_empty() { &Method::ALL[..] } else { &args.methods };
+    let found = measure_stability(&args.out, methods, args.quick)?;
+    let lost = guard.map_or(Vec::new(), |earlier| found.lost_against(&earlier));
     if lost.is_empty() {
         return Ok(());
     }
@@ -279,10 +286,14 @@ fn run_stability(args: &StabilityArgs) -> Result<(), Box<dyn Error>> {
     Err(rows.collect::<Vec<_>>().join("\n").into())
 }
 
-fn measure_stability(out: &Path, quick: bool) -> Result<Stability, Box<dyn Error>> {
+fn guard(path: &Path) -> Result<Earlier, Box<dyn Error>> {
+    super::read(path)?.parse().map_err(|error| format!("{}: {error}", path.display()).into())
+}
+
+fn measure_stability(out: &Path, methods: &[Method], quick: bool) -> Result<Stability, Box<dyn Error>> {
     make_folder(out)?;
     let bar = bar()?;
-    let found = stability(&std::env::current_exe()?, quick, &mut |at| tell(&bar, at))?;
+    let found = stability(&std::env::current_exe()?, methods, quick, &mut |at| tell(&bar, at))?;
     bar.finish_and_clear();
     write_report(out, "stability", |_| found.markdown(), &found.csv(), &[])?;
     Ok(found)

@@ -221,7 +221,7 @@ impl SosBody {
         for u in fibonacci_lattice(rays) {
             let towards = linear * u;
             chords.along(&towards, ball.radius, &mut |from, to| {
-                found.push((ball.center + u * from, ball.center + u * to))
+                found.push((ball.center + u * from, ball.center + u * to));
             });
         }
         found

@@ -84,6 +84,20 @@ pub enum Verdict {
     Crash,
 }
 
+impl Verdict {
+    /// What it is in a word or two.
+    pub(super) fn kind(&self) -> &'static str {
+        match self {
+            Self::Pass => "pass",
+            Self::Off(_) => "off",
+            Self::WrongStatus(_) => "wrong status",
+            Self::NoAnswer => "no answer",
+            Self::Hang => "hang",
+            Self::Crash => "crash",
+        }
+    }
+}
+
 impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

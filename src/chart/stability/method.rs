@@ -9,6 +9,7 @@ use crate::measure::{Distance, MAX_ITERATIONS, Options, Pose, Status, WarmStart,
 use crate::optimize::{Corner, gjk};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::path::Path;
+use std::str::FromStr;
 
 /// Points of a body's surface whose convex hull stands for it where polytopes are asked for.
 const SAMPLES: usize = 1000;
@@ -50,6 +51,19 @@ pub enum Method {
     Coal,
 }
 
+/// No method of that name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0} is none of cold, warm, batch, newton, slsqp, clarabel, parry, coal")]
+pub struct UnknownMethod(String);
+
+impl FromStr for Method {
+    type Err = UnknownMethod;
+
+    fn from_str(name: &str) -> Result<Self, UnknownMethod> {
+        Self::named(name).ok_or_else(|| UnknownMethod(name.to_owned()))
+    }
+}
+
 impl Method {
     /// All columns.
     pub const ALL: [Self; 8] =
@@ -84,7 +98,7 @@ impl Method {
     }
 
     /// The one of that name.
-    pub fn named(name: &str) -> Option<Self> {
+    pub(super) fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|method| method.name() == name)
     }
 

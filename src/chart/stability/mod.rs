@@ -16,8 +16,8 @@ use super::duel::{Coal, DuelError};
 use super::rivals::Clarabel;
 pub use case::Verdict;
 use families::FAMILIES;
-pub use method::Method;
-pub use report::{GuardError, Lost};
+pub use method::{Method, UnknownMethod};
+pub use report::{Earlier, GuardError, Lost};
 use runner::Cell;
 pub use runner::{NoShare, Share, serve};
 use std::ops::ControlFlow;
@@ -44,7 +44,7 @@ pub struct Stability {
     rows: Vec<Row>,
 }
 
-/// Puts all families to all methods, a tenth of the cases if `quick`. `program` is what to start for the children: this one, with the
+/// Puts all families to these methods, a tenth of the cases if `quick`. `program` is what to start for the children: this one, with the
 /// command `chart stability`. Coal takes part where `SUBLEVEL_COAL` names the program that times it, clarabel where its example is built. `progress` hears what is going on
 /// and can stop it.
 ///
@@ -52,11 +52,12 @@ pub struct Stability {
 /// [`DuelError`].
 pub fn stability(
     program: &Path,
+    methods: &[Method],
     quick: bool,
     progress: &mut dyn FnMut(&str) -> ControlFlow<()>,
 ) -> Result<Stability, DuelError> {
     let (coal, solver) = (Coal::from_environment()?, Clarabel::find()?);
-    let tasks: Vec<_> = (0..FAMILIES.len()).flat_map(|row| Method::ALL.map(|method| (row, method))).collect();
+    let tasks: Vec<_> = (0..FAMILIES.len()).flat_map(|row| methods.iter().map(move |method| (row, *method))).collect();
     let next = AtomicUsize::new(0);
     let workers = thread::available_parallelism().map_or(1, usize::from);
     let mut rows: Vec<Row> =

@@ -119,7 +119,7 @@ pub(super) fn smooth(seed: u64) -> Result<Case, CaseError> {
         1 => (c(4, 0.1, 0.2)?, e(0.2, 0.1, 0.15)?),
         _ => (q(4, 0.2, 0.1, 0.15)?, q(4, 0.1, 0.2, 0.2)?),
     };
-    let gap = if seed / 3 % 2 == 0 { 2e-3 } else { -2e-3 };
+    let gap = if (seed / 3).is_multiple_of(2) { 2e-3 } else { -2e-3 };
     let apart = Case::new(&a, somewhere(&mut random, 0.1)?, &b, somewhere(&mut random, 1.0)?, format!("gap {gap:e} m"));
     Ok(Case { bound: Some(1e-10), ..moved_to(apart, gap)? })
 }

@@ -68,10 +68,10 @@ pub(super) fn ties(seed: u64, method: Method) -> Result<Option<Verdict>, CaseErr
     }
     let mut random = random(21, seed);
     let options = Options::default();
-    let turn = if seed % 2 == 0 { UnitQuaternion::identity() } else { random.rotation() };
+    let turn = if seed.is_multiple_of(2) { UnitQuaternion::identity() } else { random.rotation() };
     let still = pose(Vector3::zeros(), &turn)?;
     let mut warm = WarmStart::default();
-    if seed / 2 % 2 == 0 {
+    if (seed / 2).is_multiple_of(2) {
         let inner = [e(0.2, 0.2, 0.2)?, q(4, 0.3, 0.2, 0.25)?, b(0.3, 0.2, 0.25)?, q(8, 0.2, 0.3, 0.2)?];
         let hosts =
             [b(1.0, 1.0, 1.0)?, b(1.0, 0.5, 2.0)?, q(8, 1.0, 1.0, 1.0)?, e(1.0, 1.0, 1.5)?, q(4, 1.0, 0.5, 1.0)?];

@@ -22,7 +22,7 @@ pub(super) fn blade(seed: u64, method: Method) -> Result<Option<Verdict>, CaseEr
     }
     let mut random = random(22, seed);
     let (thin, radius) = (random.between(1e-3, 0.05), random.between(1e-3, 0.1));
-    let half = Vector3::new(2.0, thin, if seed % 2 == 0 { 0.1 } else { 1.0 });
+    let half = Vector3::new(2.0, thin, if seed.is_multiple_of(2) { 0.1 } else { 1.0 });
     let (place, rate) = (1.0 + 0.8 * random.positive(), random.between(1e-2, 1e3));
     let strike = ((thin + radius) / place).asin();
     let turn = strike + [1e-7, 1e-3, 0.3, 2.8][(seed / 2 % 4) as usize];

@@ -86,11 +86,10 @@ pub(super) fn swapped(seed: u64, method: Method) -> Result<Option<Verdict>, Case
         Case::new(b, pose_b, a, pose_a, "swapped".into()),
         Case::new(a, carried(&pose_a)?, b, carried(&pose_b)?, "carried along".into()),
     ];
-    let value = |case: &Case| Ok::<_, CaseError>(case.value(method)?.map(|(value, accuracy)| (value, accuracy)));
-    let Some((Some(one), accuracy)) = value(&first)? else { return Ok(None) };
+    let Some((Some(one), accuracy)) = first.value(method)? else { return Ok(None) };
     let floor = 1e-14 * (sum + shift.norm() + pose_b.translation().norm());
     for case in &other {
-        let Some((Some(found), _)) = value(case)? else { return Ok(Some(Verdict::NoAnswer)) };
+        let Some((Some(found), _)) = case.value(method)? else { return Ok(Some(Verdict::NoAnswer)) };
         let off = (found - one).abs() - floor;
         if !(off <= 2.0 * accuracy * first.small()) {
             return Ok(Some(Verdict::Off(off / first.small())));

@@ -21,7 +21,7 @@ pub(super) fn ratio(seed: u64) -> Result<Case, CaseError> {
         _ => c(4, s, 0.5 * s),
     };
     let (a, b) = (any(&mut random, 1.0)?, any(&mut random, 1.0 / ratio)?);
-    let (a, b) = if seed % 2 == 0 { (a, b) } else { (b, a) };
+    let (a, b) = if seed.is_multiple_of(2) { (a, b) } else { (b, a) };
     let sum = a.circumscribed().radius + b.circumscribed().radius;
     let (pose_a, far) = (somewhere(&mut random, 0.5)?, somewhere(&mut random, 2.5 * sum)?);
     let gap = [1.0, 1e-3, 1e-6, -0.1, 0.0][(seed / 6 % 5) as usize];
