@@ -98,8 +98,8 @@ struct DetailArgs {
 
 /// Families of queries that broke collision libraries, put to our solver and to others: who passes
 ///
-/// Touching, deep, far, tiny, needle-like, nearly parallel, badly hinted and so on: each case is drawn from its seed alone, put in a process of its
-/// own with a time limit, and judged by points and planes. Writes stability.md and stability.csv. Takes a few minutes. Coal takes part when
+/// Touching, deep, far, tiny, needle-like, nearly parallel, badly hinted and so on: each case is drawn from its seed alone, put in a child process
+/// with a time limit, and judged by points and planes. Writes stability.md and stability.csv. Takes a few minutes. Coal takes part when
 /// SUBLEVEL_COAL names the program that times it.
 ///
 /// Examples:
@@ -280,9 +280,7 @@ fn run_stability(args: &StabilityArgs) -> Result<(), Box<dyn Error>> {
     if lost.is_empty() {
         return Ok(());
     }
-    let rows = lost.iter().map(|Lost { family, method, before, now, replay }| {
-        format!("family {family}, {method}: {now} failures where there were {before}; {replay}")
-    });
+    let rows = lost.iter().map(|Lost { family, method, what }| format!("family {family}, {method}: {what}"));
     Err(rows.collect::<Vec<_>>().join("\n").into())
 }
 

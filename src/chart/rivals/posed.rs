@@ -34,10 +34,10 @@ impl<'a> Posed<'a> {
         self.rotation * self.body.interior_point() + self.translation
     }
 
-    /// Where the ray from the interior point towards another point leaves the body.
+    /// Where the ray from the interior point towards another point leaves the body; any ray if that is the same point.
     pub(in crate::chart) fn facing(&self, target: &Vector3<f64>) -> Vector3<f64> {
         let towards = self.body.normalization().linear * self.rotation.tr_mul(&(target - self.inside()));
-        self.rotation * self.body.boundary_along(&towards.normalize()) + self.translation
+        self.rotation * self.body.boundary_along(&towards.try_normalize(0.0).unwrap_or(Vector3::x())) + self.translation
     }
 }
 

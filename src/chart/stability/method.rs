@@ -102,9 +102,14 @@ impl Method {
         Self::ALL.into_iter().find(|method| method.name() == name)
     }
 
-    /// Most cases of a family that a quick run and a full one put to it: semidefinite programs take up to a second each.
+    /// Most cases of a family that a quick run and a full one put to it: those of others take long, semidefinite programs up to a second
+    /// each.
     pub(super) fn most_cases(self) -> [u64; 2] {
-        if self == Self::Clarabel { [5, 24] } else { [u64::MAX; 2] }
+        match self {
+            Self::Cold | Self::Warm | Self::Batch => [u64::MAX; 2],
+            Self::Clarabel => [5, 24],
+            Self::Newton | Self::Slsqp | Self::Parry | Self::Coal => [20, 100],
+        }
     }
 
     /// Whether it is ours.
@@ -220,6 +225,14 @@ impl Case {
             return Ok(Verdict::WrongStatus(format!("{iterations} iterations")));
         }
         let truth = self.truth(&[proposal(answer)])?;
+        // Points that were proposed may all be wrong: they decide only where directions confirm them.
+        if truth.upper - truth.lower > (self.accuracy * small).max(self.floor) + 2.0 * truth.floor {
+            return Ok(Verdict::WrongStatus(format!("not confirmed: [{:e}, {:e}] m", truth.lower, truth.upper)));
+        }
+        let apart = (answer.witness_a - answer.witness_b).norm();
+        if !(apart <= upper + truth.floor && apart >= lower - truth.floor) {
+            return Ok(Verdict::WrongStatus(format!("the witnesses are {apart:e} m apart")));
+        }
         let outside = (truth.lower - truth.floor - upper).max(lower - truth.upper - truth.floor);
         if outside > 0.0 {
             return Ok(Verdict::Off(outside / small));
@@ -261,14 +274,14 @@ impl Case {
                 // Of some needles it makes no hull.
                 let Ok(hulls) = Hulls::new(&a, &b) else { return Ok(Some(plain(None))) };
                 let relative = parry_pose(&self.pose_a).inverse() * parry_pose(&self.pose_b);
-                let own = Some(polytopes(&a, &b, &self.relative()?));
+                let own = Some(polytopes(&a, &b, &self.relative()?, self.small())?);
                 Some(Reply { value: Some(hulls.distance(&relative)), own, ..plain(None) })
             }
             Method::Coal => {
                 let Some(coal) = Coal::from_environment().map_err(|error| other(&error))? else { return Ok(None) };
                 let (a, b, relative) = (sampled(&self.a), sampled(&self.b), self.relative()?);
                 let value = in_folder(|folder| coal_distance(&coal, folder, [&a, &b], relative))?;
-                Some(Reply { value, own: Some(polytopes(&a, &b, &relative)), ..plain(None) })
+                Some(Reply { value, own: Some(polytopes(&a, &b, &relative, self.small())?), ..plain(None) })
             }
         })
     }
@@ -323,7 +336,7 @@ fn other(error: &dyn std::error::Error) -> CaseError {
 
 /// The distance of the hulls of points, the second ones posed in the frame of the first: between points of theirs, and along the line
 /// between these.
-fn polytopes(a: &[Vector3<f64>], b: &[Vector3<f64>], relative: &Pose) -> Truth {
+fn polytopes(a: &[Vector3<f64>], b: &[Vector3<f64>], relative: &Pose, small: f64) -> Result<Truth, CaseError> {
     let b: Vec<_> = b.iter().map(|y| relative.transform_point(y)).collect();
     let farthest = |points: &[Vector3<f64>], n: &Vector3<f64>| {
         points.iter().copied().max_by(|x, y| n.dot(x).total_cmp(&n.dot(y))).unwrap_or_default()
@@ -336,11 +349,15 @@ fn polytopes(a: &[Vector3<f64>], b: &[Vector3<f64>], relative: &Pose) -> Truth {
     let size = a.iter().chain(&b).map(Vector3::norm).fold(0.0, f64::max);
     let floor = 16.0 * f64::EPSILON * size;
     if found.common.is_some() {
-        return Truth { lower: 0.0, upper: 0.0, floor };
+        return Ok(Truth { lower: 0.0, upper: 0.0, floor });
     }
     let n = found.n;
     let lower = n.dot(&(farthest(a, &-n) - farthest(&b, &n)));
-    Truth { lower: lower.max(0.0), upper: (found.x - found.y).norm(), floor }
+    let (lower, upper) = (lower.max(0.0), (found.x - found.y).norm());
+    if upper - lower > PEER_ERROR * (small + upper) {
+        return Err(CaseError::Other(format!("the hulls' own distance is not known: [{lower:e}, {upper:e}] m")));
+    }
+    Ok(Truth { lower, upper, floor })
 }
 
 /// Points of a body's surface, in its frame.

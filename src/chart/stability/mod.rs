@@ -1,7 +1,7 @@
 //! The stability table: families of queries that broke collision libraries, put to our solver and to others.
 //!
-//! Each case is drawn from its seed alone and judged by bounds that do not depend on the solver ([`arbiter`]), in a process of its own
-//! ([`runner`]).
+//! Each case is drawn from its seed alone and judged by bounds that do not depend on the solver ([`arbiter`]), in a child process that is
+//! stopped where it hangs ([`runner`]).
 
 mod arbiter;
 mod case;
@@ -41,6 +41,8 @@ pub struct Stability {
     /// Version of clarabel, if it took part.
     solver: Option<String>,
     quick: bool,
+    /// The columns that were asked for.
+    methods: Vec<Method>,
     rows: Vec<Row>,
 }
 
@@ -79,7 +81,10 @@ pub fn stability(
         }
         drop(send);
         for (count, (row, method, found)) in done.iter().enumerate() {
-            let found = found.map_err(|source| DuelError::Child { program: program.to_owned(), source })?;
+            let found = found.map_err(|source| {
+                next.store(tasks.len(), Ordering::Relaxed);
+                DuelError::Child { program: program.to_owned(), source }
+            })?;
             rows[row].cells.extend(found);
             let at = format!("{} of {}: {}, {}", count + 1, tasks.len(), FAMILIES[row].name, method.title());
             if progress(&at).is_break() {
@@ -95,7 +100,7 @@ pub fn stability(
     }
     let coal = coal.as_ref().map(Coal::version);
     let solver = solver.is_some().then(Clarabel::version);
-    Ok(Stability { machine: Machine::this(), coal, solver, quick, rows })
+    Ok(Stability { machine: Machine::this(), coal, solver, quick, methods: methods.to_vec(), rows })
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use super::families::{FAMILIES, Family};
 use super::method::Method;
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead, BufReader, Write};
+use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -23,6 +24,8 @@ pub(super) struct Cell {
     pub(super) method: Method,
     /// Cases that were put.
     pub(super) cases: u64,
+    /// Cases that were not put any more after hangs and crashes.
+    pub(super) left_out: u64,
     /// The failures, by their seeds.
     pub(super) failures: Vec<(u64, Verdict)>,
 }
@@ -63,11 +66,13 @@ impl std::str::FromStr for Share {
             let (family, method, seeds) = (parts.next()?.parse().ok()?, parts.next()?, parts.next()?);
             let known = FAMILIES.iter().any(|row| row.number == family) && parts.next().is_none();
             let method = Method::named(method).filter(|_| known)?;
+            // Seeds of different families are a million apart.
+            let within = |share: &Self| share.from < share.to && share.to <= 1_000_000;
             let (from, to) = match seeds.split_once('-') {
                 Some((from, to)) => (from.parse().ok()?, to.parse().ok()?),
                 None => (seeds.parse().ok()?, seeds.parse::<u64>().ok()?.checked_add(1)?),
             };
-            Some(Self { family, method, from, to })
+            Some(Self { family, method, from, to }).filter(within)
         };
         let names = || Method::ALL.map(Method::name).join(", ");
         parse().ok_or_else(|| NoShare(text.to_owned(), names()))
@@ -114,7 +119,7 @@ enum End {
 
 /// Puts so many cases of a family to a method; none if it can not be asked.
 pub(super) fn run(program: &Path, family: &Family, method: Method, count: u64) -> std::io::Result<Option<Cell>> {
-    let mut cell = Cell { method, cases: 0, failures: Vec::new() };
+    let mut cell = Cell { method, cases: 0, left_out: 0, failures: Vec::new() };
     let (mut next, mut lost, mut asked) = (0, 0, false);
     while next < count && lost < MOST_LOST {
         let share = format!("{}/{}/{next}-{count}", family.number, method.name());
@@ -129,15 +134,16 @@ pub(super) fn run(program: &Path, family: &Family, method: Method, count: u64) -
             }
         })?;
         let verdict = match end {
-            End::Done => break,
+            End::Done if next >= count => break,
             End::Hung => Verdict::Hang,
-            End::Crashed => Verdict::Crash,
+            End::Done | End::Crashed => Verdict::Crash,
         };
         asked = true;
         cell.cases += 1;
         cell.failures.push((next, verdict));
         (next, lost) = (next + 1, lost + 1);
     }
+    cell.left_out = count.saturating_sub(next);
     Ok(asked.then_some(cell))
 }
 
@@ -148,6 +154,7 @@ fn child(program: &Path, share: &str, mut hear: impl FnMut(Line)) -> std::io::Re
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
+        .process_group(0)
         .spawn()?;
     let Some(output) = child.stdout.take() else { return Ok(End::Crashed) };
     let (send, lines) = channel();
@@ -170,7 +177,9 @@ fn child(program: &Path, share: &str, mut hear: impl FnMut(Line)) -> std::io::Re
             }
         }
     };
-    // It may have ended by itself.
+    // With whatever it waits for; they may have ended by themselves.
+    let group = format!("-{}", child.id());
+    let _ = Command::new("kill").args(["-KILL", "--", &group]).stderr(Stdio::null()).status();
     let _ = child.kill();
     child.wait()?;
     let _ = reader.join();

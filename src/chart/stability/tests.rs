@@ -27,6 +27,30 @@ fn the_arbiter_needs_no_good_proposals_of_the_one_that_is_judged() {
 }
 
 #[test]
+fn points_that_nothing_confirms_do_not_decide() {
+    let case = balls();
+    // Far sides of both balls: inside, consistent, and wrong.
+    let points = [Vector3::new(-1.0, 0.0, 0.0), Vector3::new(3.0, 0.0, 0.0)];
+    let proposal = arbiter::Proposal { points: Some(points), normal: Some(-Vector3::x()) };
+    let truth = arbiter::judge(&case, &[proposal]);
+    assert!(truth.upper > 3.9 && truth.lower <= 1.0 + truth.floor, "{truth:?}");
+}
+
+#[test]
+fn the_first_seeds_meet_all_settings() {
+    let case = |family: u8, seed| match FAMILIES.iter().find(|row| row.number == family).unwrap().put {
+        Put::Distance(case) => case(seed).unwrap(),
+        Put::Own(_) => unreachable!(),
+    };
+    let accuracies: std::collections::BTreeSet<String> =
+        (0..40).map(|seed| format!("{:e}", case(13, seed).accuracy)).collect();
+    assert_eq!(accuracies.len(), 9, "{accuracies:?}");
+    let shifts: std::collections::BTreeSet<String> =
+        (0..60).map(|seed| case(6, seed).pose_b.translation().sum().to_string()).collect();
+    assert!(shifts.len() >= 12, "{shifts:?}");
+}
+
+#[test]
 fn answers_that_are_wrong_are_found_out() {
     let case = balls();
     let good = case.ours(Method::Cold).unwrap();
@@ -81,11 +105,11 @@ fn cases_are_drawn_from_their_seeds_alone() {
 
 fn table(failures: Vec<(u64, Verdict)>) -> Stability {
     let cells = vec![
-        Cell { method: Method::Cold, cases: 40, failures },
-        Cell { method: Method::Parry, cases: 40, failures: vec![(7, Verdict::Hang)] },
+        Cell { method: Method::Cold, cases: 40, left_out: 0, failures },
+        Cell { method: Method::Parry, cases: 40, left_out: 9, failures: vec![(7, Verdict::Hang)] },
     ];
     let rows = vec![Row { number: 3, name: "faces, all but parallel", cells }];
-    Stability { machine: Machine::this(), coal: None, solver: None, quick: true, rows }
+    Stability { machine: Machine::this(), coal: None, solver: None, quick: true, methods: Method::ALL.to_vec(), rows }
 }
 
 #[test]
@@ -97,13 +121,20 @@ fn what_is_lost_is_named_and_peers_are_not_guarded() {
     assert_eq!(bad.lost_against(&earlier(&bad)), Vec::new());
     assert_eq!(good.lost_against(&earlier(&bad)), Vec::new());
     let lost = bad.lost_against(&earlier(&good));
-    assert_eq!((lost.len(), lost[0].before, lost[0].now), (1, 0, 2));
-    assert!(lost[0].family.contains("faces") && lost[0].replay.ends_with("3/cold/5"));
+    assert_eq!(lost.len(), 1);
+    assert!(lost[0].family.contains("faces") && lost[0].what.ends_with("3/cold/5"), "{lost:?}");
+    // As many failures, but another.
+    let other = table(vec![(6, Verdict::NoAnswer), (8, Verdict::NoAnswer)]);
+    let lost = other.lost_against(&earlier(&bad));
+    assert!(lost.len() == 1 && lost[0].what.ends_with("3/cold/8"), "{lost:?}");
+    let mut fewer = table(Vec::new());
+    fewer.rows[0].cells.remove(0);
+    assert_eq!(fewer.lost_against(&earlier(&good))[0].what, "is not put any more");
     assert_eq!("something".parse::<Earlier>().unwrap_err().to_string().split(' ').nth(1), Some("1"));
     assert!(format!("{}\n3,nothing", good.csv().lines().next().unwrap()).parse::<Earlier>().is_err());
     let text = bad.markdown();
     assert!(text.contains(
-        "| 3 | faces, all but parallel | **2 of 40**: off by up to 1e-3, 1 wrong status | - | - | - | - | - | **1 of 40**: 1 hang |"
+        "| 3 | faces, all but parallel | **2 of 40**: off by up to 1e-3, 1 wrong status | - | - | - | - | - | **1 of 40**: 1 hang; 9 not put any more |"
     ));
     assert!(text.contains("--replay 3/parry/7"));
 }
@@ -113,7 +144,7 @@ fn shares_are_read_as_they_are_printed() {
     let share = |text: &str| text.parse::<Share>();
     assert_eq!(share("13/cold/5"), Ok(Share { family: 13, method: Method::Cold, from: 5, to: 6 }));
     assert_eq!(share("1/parry/2-9"), Ok(Share { family: 1, method: Method::Parry, from: 2, to: 9 }));
-    for bad in ["", "13", "17/cold/1", "13/someone/1", "13/cold/x", "13/cold/1/2"] {
+    for bad in ["", "13", "17/cold/1", "13/someone/1", "13/cold/x", "13/cold/1/2", "13/cold/5-3", "13/cold/1000000"] {
         assert!(share(bad).is_err(), "{bad}");
     }
 }

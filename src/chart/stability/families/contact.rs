@@ -3,7 +3,7 @@
 use super::super::case::{Case, CaseError, Verdict};
 use super::super::method::{Method, pose};
 use super::super::zoo::{c, e, p, q};
-use super::{at, moved_to, random, somewhere};
+use super::{at, moved_to, random, somewhere, strewn};
 use crate::body::Body;
 use crate::measure::Pose;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -39,6 +39,7 @@ pub(super) fn kissing(seed: u64) -> Result<Case, CaseError> {
 
 /// Faces of degree 8, gap 1e-3 to 1e-12, tilt 1e-9 to 1e-3 rad.
 pub(super) fn parallel_faces(seed: u64) -> Result<Case, CaseError> {
+    let seed = strewn(seed, 80);
     let (a, b) = (q(8, 1.0, 1.0, 0.5)?, q(8, 0.75, 1.25, 0.5)?);
     let gap = 10_f64.powi(-3 - (seed % 10) as i32);
     let tilt = match seed / 10 % 8 {
@@ -73,6 +74,7 @@ pub(super) fn normal(seed: u64, method: Method) -> Result<Option<Verdict>, CaseE
 
 /// Flats of degree 8 a tenth apart: the error falls to the stated floor, beyond it the status tells.
 pub(super) fn tight(seed: u64) -> Result<Case, CaseError> {
+    let seed = strewn(seed, 189);
     let (a, b) = match seed % 3 {
         0 => (q(8, 1.0, 1.0, 0.5)?, q(8, 0.75, 1.25, 0.5)?),
         1 => (q(8, 1.0, 1.0, 0.5)?, p(8, 0.5)?),
@@ -92,6 +94,7 @@ pub(super) fn tight(seed: u64) -> Result<Case, CaseError> {
 
 /// Where Newton's method converges linearly: a tip of degree 8 against a flat of degree 8.
 pub(super) fn tips(seed: u64) -> Result<Case, CaseError> {
+    let seed = strewn(seed, 192);
     let mut random = random(14, seed);
     let tip = match seed % 4 {
         0 => q(8, 0.1, 0.1, 1.0)?,

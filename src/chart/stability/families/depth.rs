@@ -15,6 +15,16 @@ const STEPS: u32 = 12;
 /// Deviation that others may have from what a signed distance does, relative to the smaller body.
 const PEER_ERROR: f64 = 1e-5;
 
+/// What is said of one place of a slide, metres.
+#[derive(Clone, Copy)]
+struct Step {
+    offset: f64,
+    value: f64,
+    lower: f64,
+    upper: f64,
+    tied: bool,
+}
+
 /// A slide from touching to concentric. About their centres the bodies are their own mirror images: the signed distance falls all the
 /// way, by no more than the motion.
 pub(super) fn slide(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
@@ -50,14 +60,14 @@ pub(super) fn slide(seed: u64, method: Method) -> Result<Option<Verdict>, CaseEr
         _ => None,
     };
     let mut warm = WarmStart::default();
-    let mut last: Option<(f64, f64, bool)> = None;
+    let mut last: Option<Step> = None;
     for k in 0..=STEPS {
         let offset = inside * (1.05 - 1.05 * f64::from(k) / f64::from(STEPS));
         let pose_b = place(offset)?;
-        let (value, tied, slack) = if let Some(hulls) = &hulls {
+        let (step, slack) = if let Some(hulls) = &hulls {
             let relative = parry_pose(&pose_a).inverse() * parry_pose(&pose_b);
             let Some(value) = hulls.signed_distance(&relative) else { return Ok(Some(Verdict::NoAnswer)) };
-            (value, false, PEER_ERROR * small)
+            (Step { offset, value, lower: value, upper: value, tied: false }, PEER_ERROR * small)
         } else {
             if method == Method::Cold {
                 warm = WarmStart::default();
@@ -69,15 +79,17 @@ pub(super) fn slide(seed: u64, method: Method) -> Result<Option<Verdict>, CaseEr
                 let pair = format!("{}-{} at {:.4} of the slide", a.name(), b.name(), offset / inside);
                 return Ok(Some(Verdict::WrongStatus(format!("{pair}: still wide, [{lower:e}, {upper:e}] m"))));
             }
-            (answer.value(), tied, 2e-9 * small)
+            (Step { offset, value: answer.value(), lower, upper, tied }, 2e-9 * small)
         };
-        if let Some((before, earlier, was_tied)) = last.replace((offset, value, tied))
-            && !tied
-            && !was_tied
-        {
-            let off = (value - earlier).max(earlier - (before - offset) - value) - slack;
-            if !(off <= 0.0) {
-                return Ok(Some(Verdict::Off(off / small)));
+        if let Some(before) = last.replace(step) {
+            let moved = before.offset - offset;
+            // Of ties only the brackets are known to go on.
+            let mut off = (step.lower - before.upper).max(before.lower - moved - step.upper);
+            if !step.tied && !before.tied {
+                off = off.max(step.value - before.value).max(before.value - moved - step.value);
+            }
+            if !(off <= slack) {
+                return Ok(Some(Verdict::Off((off - slack) / small)));
             }
         }
     }

@@ -68,10 +68,14 @@ const fn row(number: u8, name: &'static str, cases: [u64; 2], put: Put) -> Famil
 impl Family {
     /// Puts one case to a method.
     pub(super) fn put(&self, seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
-        match self.put {
-            Put::Distance(case) => case(seed)?.put(method),
-            Put::Own(put) => put(seed, method),
-        }
+        let verdict = match self.put {
+            Put::Distance(case) => case(seed)?.put(method)?,
+            Put::Own(put) => put(seed, method)?,
+        };
+        Ok(verdict.map(|verdict| match verdict {
+            Verdict::Off(error) if !error.is_finite() => Verdict::WrongStatus("an answer is no number".into()),
+            verdict => verdict,
+        }))
     }
 }
 
@@ -84,6 +88,12 @@ impl Family {
             Err(error) => error.to_string(),
         }
     }
+}
+
+/// The case of a seed, of so many that go through all settings: those of the first seeds are strewn over all of them.
+fn strewn(seed: u64, cases: u64) -> u64 {
+    // Prime, and no factor of the numbers of cases.
+    seed % cases * 61 % cases
 }
 
 /// A draw for a case of a family.
