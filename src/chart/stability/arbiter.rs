@@ -7,7 +7,8 @@
 use super::case::Case;
 use crate::body::{Body, fibonacci_lattice};
 use crate::measure::Pose;
-use nalgebra::Vector3;
+use crate::polynomial::Jet;
+use nalgebra::{Matrix3xX, Vector3};
 
 /// Directions that are tried whatever is proposed.
 const LATTICE: usize = 200;
@@ -22,10 +23,12 @@ pub(super) struct Truth {
 }
 
 /// Points of both bodies in the world, metres, and a direction from the second to the first.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Proposal {
     pub(super) points: Option<[Vector3<f64>; 2]>,
     pub(super) normal: Option<Vector3<f64>>,
+    /// Constraints whose tangent planes at the points are to bound the bodies.
+    pub(super) active: [Vec<usize>; 2],
 }
 
 impl Truth {
@@ -47,17 +50,21 @@ pub(super) fn judge(case: &Case, proposals: &[Proposal]) -> Truth {
         return Truth { lower: exact, upper: exact, floor };
     }
     let mut truth = Truth { lower: 0.0, upper: f64::INFINITY, floor };
-    let gap = |n: &Vector3<f64>| case.height(n);
-    for [x, y] in proposals.iter().filter_map(|proposal| proposal.points) {
-        let (x, y) = (drawn_in(a, pose_a, &x), drawn_in(b, pose_b, &y));
-        truth.upper = truth.upper.min((pose_a.transform_point(&x) - pose_b.transform_point(&y)).norm());
-        if let Some(n) = (pose_a.transform_point(&x) - pose_b.transform_point(&y)).try_normalize(0.0) {
-            truth.lower = truth.lower.max(gap(&n));
+    for proposal in proposals {
+        let drawn = proposal.points.map(|[x, y]| [drawn_in(a, pose_a, &x), drawn_in(b, pose_b, &y)]);
+        let apart = drawn.map(|[x, y]| pose_a.transform_point(&x) - pose_b.transform_point(&y));
+        truth.upper = truth.upper.min(apart.map_or(f64::INFINITY, |apart| apart.norm()));
+        for n in proposal.normal.into_iter().chain(apart).filter_map(|n| n.try_normalize(0.0)) {
+            truth.lower = truth.lower.max(case.height(&n));
+            if let Some([x, y]) = drawn {
+                let [of_a, of_b] = &proposal.active;
+                let reaches = tangent_reach(a, pose_a, &-n, &x, of_a) + tangent_reach(b, pose_b, &n, &y, of_b);
+                truth.lower = truth.lower.max(n.dot(&(pose_a.translation() - pose_b.translation())) - reaches);
+            }
         }
     }
-    let normals = proposals.iter().filter_map(|proposal| proposal.normal?.try_normalize(0.0));
-    for n in normals.chain(fibonacci_lattice(LATTICE)) {
-        truth.lower = truth.lower.max(gap(&n));
+    for n in fibonacci_lattice(LATTICE) {
+        truth.lower = truth.lower.max(case.height(&n));
     }
     truth
 }
@@ -74,6 +81,66 @@ impl Case {
 fn reach(body: &Body, pose: &Pose, n: &Vector3<f64>) -> f64 {
     let n = pose.rotation().inverse_transform_vector(n);
     body.support(&n).height_m + n.dot(body.interior_point())
+}
+
+/// As [`reach`], from tangent planes at a point of the body's frame: with any `m_i >= 0`, `r = n - Σ m_i ∇g_i` and convex g_i,
+///
+/// ```text
+/// n·y <= Σ m_i (∇g_i·x + 1 - g_i(x)) + r·c + Σ |(L⁻ᵀ r)_k| E_k
+/// ```
+///
+/// for all y of the body, whose normalized coordinates `L (y - c)` are at most E_k.
+fn tangent_reach(body: &Body, pose: &Pose, n: &Vector3<f64>, x: &Vector3<f64>, active: &[usize]) -> f64 {
+    let n = pose.rotation().inverse_transform_vector(n);
+    if let [constraint] = body.constraints() {
+        // Of a strongly curved body the plane at the very point farthest along n.
+        let (mut x, mut least) = (*x, f64::INFINITY);
+        for _ in 0..POLISH {
+            let jet = body.placement().jet(constraint, &x);
+            least = least.min(plane_reach(body, &n, &x, &[(jet.value, jet.gradient)]));
+            let Some(step) = newton_step(&jet, &n) else { break };
+            x += step;
+        }
+        return least;
+    }
+    let samples: Vec<_> = active
+        .iter()
+        .filter_map(|&i| body.constraints().get(i))
+        .map(|constraint| body.placement().sample(constraint, x))
+        .map(|sample| (sample.value(), sample.gradient()))
+        .collect();
+    plane_reach(body, &n, x, &samples)
+}
+
+/// Steps of Newton's method towards the point farthest along a direction.
+const POLISH: usize = 8;
+
+/// Newton's step for `m ∇p(x) = n`, `p(x) = 1`.
+fn newton_step(jet: &Jet, n: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let g = jet.gradient;
+    let m = n.dot(&g) / g.norm_squared();
+    let inverse = (jet.hessian * m).try_inverse()?;
+    let (of_n, of_g) = (inverse * (n - g * m), inverse * g);
+    let rise = (g.dot(&of_n) - (1.0 - jet.value)) / g.dot(&of_g);
+    let step = of_n - of_g * rise;
+    step.iter().all(|value| value.is_finite()).then_some(step)
+}
+
+/// The bound of [`tangent_reach`] from values and gradients of constraints at a point.
+fn plane_reach(body: &Body, n: &Vector3<f64>, x: &Vector3<f64>, samples: &[(f64, Vector3<f64>)]) -> f64 {
+    if samples.is_empty() {
+        return f64::INFINITY;
+    }
+    let gradients = Matrix3xX::from_columns(&samples.iter().map(|(_, gradient)| *gradient).collect::<Vec<_>>());
+    // The best in the sense of least squares, made valid.
+    let Ok(multipliers) = gradients.clone().svd(true, true).solve(n, 1e-12) else { return f64::INFINITY };
+    let multipliers = multipliers.map(|m| m.max(0.0));
+    let rest = n - &gradients * &multipliers;
+    let planes = samples.iter().zip(multipliers.iter()).map(|((value, g), m)| m * (g.dot(x) + 1.0 - value));
+    let along = body.inverse().tr_mul(&rest).abs();
+    let reach = planes.sum::<f64>() + rest.dot(&body.normalization().center) + along.dot(body.z_extent());
+    // A NaN bounds nothing.
+    if reach.is_nan() { f64::INFINITY } else { reach }
 }
 
 /// The point in the body's frame; one outside moved to the boundary, straight towards the interior point.

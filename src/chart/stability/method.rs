@@ -138,7 +138,7 @@ impl Case {
             return Ok(None);
         }
         let Some(reply) = self.ask(method)? else { return Ok(None) };
-        let truth = reply.own.map_or_else(|| self.truth(&[reply.proposal]), Ok)?;
+        let truth = reply.own.map_or_else(|| self.truth(std::slice::from_ref(&reply.proposal)), Ok)?;
         Ok(Some(reply.verdict(&truth, self)))
     }
 
@@ -252,7 +252,8 @@ impl Case {
                 let bodies = self.posed();
                 let found = newton(&bodies, between(&bodies), NEWTON_STEPS);
                 let has_converged = found.step_m <= NEWTON_STEP * self.small();
-                let proposal = Proposal { points: has_converged.then_some(found.points), normal: None };
+                let points = has_converged.then_some(found.points);
+                let proposal = Proposal { points, normal: None, active: [vec![0], vec![0]] };
                 Some(Reply { value: has_converged.then(|| found.apart()), proposal, own: None })
             }
             Method::Slsqp => {
@@ -367,7 +368,8 @@ pub(super) fn sampled(body: &Body) -> Vec<Vector3<f64>> {
 
 /// What an answer of ours proposes.
 pub(super) fn proposal(answer: &Distance) -> Proposal {
-    Proposal { points: Some([answer.witness_a, answer.witness_b]), normal: answer.normal }
+    let active = [&answer.active_a, &answer.active_b].map(|active| active.iter().map(|(index, _)| index).collect());
+    Proposal { points: Some([answer.witness_a, answer.witness_b]), normal: answer.normal, active }
 }
 
 /// A pose of a rotation that is one.

@@ -31,7 +31,7 @@ fn points_that_nothing_confirms_do_not_decide() {
     let case = balls();
     // Far sides of both balls: inside, consistent, and wrong.
     let points = [Vector3::new(-1.0, 0.0, 0.0), Vector3::new(3.0, 0.0, 0.0)];
-    let proposal = arbiter::Proposal { points: Some(points), normal: Some(-Vector3::x()) };
+    let proposal = arbiter::Proposal { points: Some(points), normal: Some(-Vector3::x()), active: [vec![0], vec![0]] };
     let truth = arbiter::judge(&case, &[proposal]);
     assert!(truth.upper > 3.9 && truth.lower <= 1.0 + truth.floor, "{truth:?}");
 }

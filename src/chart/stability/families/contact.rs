@@ -60,7 +60,7 @@ pub(super) fn normal(seed: u64, method: Method) -> Result<Option<Verdict>, CaseE
     let apart = Case::new(a, somewhere(&mut random, 0.3)?, b, somewhere(&mut random, 4.0)?, format!("gap {gap:e} m"));
     let case = Case { accuracy: 1e-13, floor: 1e-12, ..moved_to(apart, gap)? };
     let Some(proposal) = case.proposed(method)? else { return Ok(None) };
-    let truth = case.truth(&[proposal])?;
+    let truth = case.truth(std::slice::from_ref(&proposal))?;
     let between = || proposal.points.and_then(|[x, y]| (x - y).try_normalize(0.0));
     let Some(n) = proposal.normal.or_else(between) else {
         // Nothing has to be said of a gap that may be none.
