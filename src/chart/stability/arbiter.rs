@@ -55,12 +55,7 @@ pub(super) fn judge(case: &Case, proposals: &[Proposal]) -> Truth {
         let apart = drawn.map(|[x, y]| pose_a.transform_point(&x) - pose_b.transform_point(&y));
         truth.upper = truth.upper.min(apart.map_or(f64::INFINITY, |apart| apart.norm()));
         for n in proposal.normal.into_iter().chain(apart).filter_map(|n| n.try_normalize(0.0)) {
-            truth.lower = truth.lower.max(case.height(&n));
-            if let Some([x, y]) = drawn {
-                let [of_a, of_b] = &proposal.active;
-                let reaches = tangent_reach(a, pose_a, &-n, &x, of_a) + tangent_reach(b, pose_b, &n, &y, of_b);
-                truth.lower = truth.lower.max(n.dot(&(pose_a.translation() - pose_b.translation())) - reaches);
-            }
+            truth.lower = truth.lower.max(case.height_at(&n, proposal));
         }
     }
     for n in fibonacci_lattice(LATTICE) {
@@ -74,6 +69,16 @@ impl Case {
     pub(super) fn height(&self, n: &Vector3<f64>) -> f64 {
         let Self { a, pose_a, b, pose_b, .. } = self;
         n.dot(&(pose_a.translation() - pose_b.translation())) - reach(a, pose_a, &-n) - reach(b, pose_b, n)
+    }
+
+    /// The same, where tangent planes at or near proposed points may show it better.
+    pub(super) fn height_at(&self, n: &Vector3<f64>, proposal: &Proposal) -> f64 {
+        let Self { a, pose_a, b, pose_b, .. } = self;
+        let Some([x, y]) = proposal.points else { return self.height(n) };
+        let (x, y) = (drawn_in(a, pose_a, &x), drawn_in(b, pose_b, &y));
+        let [of_a, of_b] = &proposal.active;
+        let reaches = tangent_reach(a, pose_a, &-n, &x, of_a) + tangent_reach(b, pose_b, n, &y, of_b);
+        self.height(n).max(n.dot(&(pose_a.translation() - pose_b.translation())) - reaches)
     }
 }
 
@@ -97,6 +102,10 @@ fn tangent_reach(body: &Body, pose: &Pose, n: &Vector3<f64>, x: &Vector3<f64>, a
         let (mut x, mut least) = (*x, f64::INFINITY);
         for _ in 0..POLISH {
             let jet = body.placement().jet(constraint, &x);
+            // Far from the surface the sums of the bound would cancel.
+            if !(0.5..2.0).contains(&jet.value) {
+                break;
+            }
             least = least.min(plane_reach(body, &n, &x, &[(jet.value, jet.gradient)]));
             let Some(step) = newton_step(&jet, &n) else { break };
             x += step;
@@ -139,8 +148,8 @@ fn plane_reach(body: &Body, n: &Vector3<f64>, x: &Vector3<f64>, samples: &[(f64,
     let planes = samples.iter().zip(multipliers.iter()).map(|((value, g), m)| m * (g.dot(x) + 1.0 - value));
     let along = body.inverse().tr_mul(&rest).abs();
     let reach = planes.sum::<f64>() + rest.dot(&body.normalization().center) + along.dot(body.z_extent());
-    // A NaN bounds nothing.
-    if reach.is_nan() { f64::INFINITY } else { reach }
+    // What is no number bounds nothing.
+    if reach.is_finite() { reach } else { f64::INFINITY }
 }
 
 /// The point in the body's frame; one outside moved to the boundary, straight towards the interior point.

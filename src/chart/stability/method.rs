@@ -275,14 +275,14 @@ impl Case {
                 // Of some needles it makes no hull.
                 let Ok(hulls) = Hulls::new(&a, &b) else { return Ok(Some(plain(None))) };
                 let relative = parry_pose(&self.pose_a).inverse() * parry_pose(&self.pose_b);
-                let own = Some(polytopes(&a, &b, &self.relative()?, self.small())?);
+                let own = Some(polytopes(&a, &b, &self.relative()?, self.small()));
                 Some(Reply { value: Some(hulls.distance(&relative)), own, ..plain(None) })
             }
             Method::Coal => {
                 let Some(coal) = Coal::from_environment().map_err(|error| other(&error))? else { return Ok(None) };
                 let (a, b, relative) = (sampled(&self.a), sampled(&self.b), self.relative()?);
                 let value = in_folder(|folder| coal_distance(&coal, folder, [&a, &b], relative))?;
-                Some(Reply { value, own: Some(polytopes(&a, &b, &relative, self.small())?), ..plain(None) })
+                Some(Reply { value, own: Some(polytopes(&a, &b, &relative, self.small())), ..plain(None) })
             }
         })
     }
@@ -335,9 +335,12 @@ fn other(error: &dyn std::error::Error) -> CaseError {
     CaseError::Other(error.to_string())
 }
 
+/// Most times that the search for the distance of hulls goes on from the direction it found.
+const RESTARTS: usize = 50;
+
 /// The distance of the hulls of points, the second ones posed in the frame of the first: between points of theirs, and along the line
-/// between these.
-fn polytopes(a: &[Vector3<f64>], b: &[Vector3<f64>], relative: &Pose, small: f64) -> Result<Truth, CaseError> {
+/// between these; bounds that do not meet are all that is known.
+fn polytopes(a: &[Vector3<f64>], b: &[Vector3<f64>], relative: &Pose, small: f64) -> Truth {
     let b: Vec<_> = b.iter().map(|y| relative.transform_point(y)).collect();
     let farthest = |points: &[Vector3<f64>], n: &Vector3<f64>| {
         points.iter().copied().max_by(|x, y| n.dot(x).total_cmp(&n.dot(y))).unwrap_or_default()
@@ -346,19 +349,22 @@ fn polytopes(a: &[Vector3<f64>], b: &[Vector3<f64>], relative: &Pose, small: f64
         let (x, y) = (farthest(a, &-n), farthest(&b, n));
         Corner { x, y, difference: x - y }
     };
-    let found = gjk(0.0, &(a[0] - b[0]), support);
     let size = a.iter().chain(&b).map(Vector3::norm).fold(0.0, f64::max);
-    let floor = 16.0 * f64::EPSILON * size;
-    if found.common.is_some() {
-        return Ok(Truth { lower: 0.0, upper: 0.0, floor });
+    let mut truth = Truth { lower: 0.0, upper: f64::INFINITY, floor: 16.0 * f64::EPSILON * size };
+    let mut n = a[0] - b[0];
+    for _ in 0..RESTARTS {
+        let found = gjk(0.0, &n, support);
+        if found.common.is_some() {
+            return Truth { upper: 0.0, ..truth };
+        }
+        n = found.n;
+        truth.lower = truth.lower.max(n.dot(&(farthest(a, &-n) - farthest(&b, &n))));
+        truth.upper = truth.upper.min((found.x - found.y).norm());
+        if truth.upper - truth.lower <= 0.1 * PEER_ERROR * small {
+            break;
+        }
     }
-    let n = found.n;
-    let lower = n.dot(&(farthest(a, &-n) - farthest(&b, &n)));
-    let (lower, upper) = (lower.max(0.0), (found.x - found.y).norm());
-    if upper - lower > PEER_ERROR * (small + upper) {
-        return Err(CaseError::Other(format!("the hulls' own distance is not known: [{lower:e}, {upper:e}] m")));
-    }
-    Ok(Truth { lower, upper, floor })
+    truth
 }
 
 /// Points of a body's surface, in its frame.

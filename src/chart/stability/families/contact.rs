@@ -66,7 +66,7 @@ pub(super) fn normal(seed: u64, method: Method) -> Result<Option<Verdict>, CaseE
         // Nothing has to be said of a gap that may be none.
         return Ok(Some(if truth.lower <= 2.0 * truth.floor { Verdict::Pass } else { Verdict::NoAnswer }));
     };
-    let lost = truth.upper - case.height(&n) - truth.floor;
+    let lost = truth.upper - case.height_at(&n, &proposal) - truth.floor;
     // Turned by an angle, the height falls by half its square times the bodies' curvature radii, or less.
     let allowed = 8.0 * NORMAL * NORMAL * case.large();
     Ok(Some(if lost <= allowed { Verdict::Pass } else { Verdict::Off((lost / case.large() / 8.0).sqrt()) }))

@@ -129,8 +129,9 @@ pub(super) fn saturation(seed: u64, method: Method) -> Result<Option<Verdict>, C
         let level = level_distance(a, &pose_a, b, &pose_b, &options, &mut level_warm);
         let seed_place = pose_a.transform_point(a.interior_point()) - pose_b.translation();
         let value = b.value(&pose_b.rotation().inverse_transform_vector(&seed_place));
-        // Near the boundary either is right.
-        if (value - 1.0).abs() > 1e-6 && level.saturated != (value < 1.0) {
+        // Near the boundary, and where the value is all but the least, either is right.
+        let is_free = value > 1.0 + 1e-6 && level.lower > a.min_value() + 1e-6;
+        if (level.saturated && is_free) || (!level.saturated && value < 1.0 - 1e-6) {
             return Ok(Some(Verdict::WrongStatus(format!("saturated: {}, the seed is at {value}", level.saturated))));
         }
         if level.status != Status::Converged {
