@@ -60,12 +60,21 @@ fn answers_that_are_wrong_are_found_out() {
         change(&mut answer);
         case.verdict(&answer).unwrap()
     };
-    assert!(matches!(off(&|d| (d.lower, d.upper) = (0.9, 0.9 + 1e-10)), Verdict::Off(error) if error > 0.1));
-    assert!(matches!(off(&|d| (d.lower, d.upper) = (1.1, 1.1 + 1e-10)), Verdict::Off(error) if error > 0.1));
+    // Brackets that miss the truth, with witnesses that go with them.
+    for length in [0.9, 1.1] {
+        let moved = |d: &mut Distance| {
+            (d.lower, d.upper) = (length, length + 1e-10);
+            d.witness_b = d.witness_a + Vector3::x() * (length + 5e-11);
+        };
+        assert!(matches!(off(&moved), Verdict::Off(error) if error > 0.1), "{length}");
+    }
+    let apart = |d: &mut Distance| d.witness_b += Vector3::x() * 1e-6;
+    assert!(matches!(off(&apart), Verdict::WrongStatus(what) if what.contains("witnesses")));
     assert!(matches!(off(&|d| d.lower = 0.5), Verdict::WrongStatus(_)), "converged, and wide");
     assert!(matches!(off(&|d| (d.lower, d.status) = (0.5, Status::BracketWide)), Verdict::WrongStatus(_)), "wide");
     assert!(matches!(off(&|d| d.upper = f64::NAN), Verdict::WrongStatus(_)));
-    assert!(matches!(off(&|d| (d.lower, d.upper) = (0.0, 0.0)), Verdict::Off(_)));
+    let touching = |d: &mut Distance| (d.lower, d.upper, d.witness_b) = (0.0, 0.0, d.witness_a);
+    assert!(matches!(off(&touching), Verdict::Off(_)));
 }
 
 #[test]
