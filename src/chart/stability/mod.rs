@@ -1,7 +1,7 @@
 //! The stability table: families of queries that broke collision libraries, put to our solver and to others.
 //!
-//! Each case is drawn from its seed alone and judged by bounds that do not depend on the solver ([`arbiter`]), in a child process that is
-//! stopped where it hangs ([`runner`]).
+//! Each case is drawn from its seed alone and judged by bounds that do not depend on the solver (`arbiter`), in a child process that is
+//! stopped where it hangs (`runner`).
 
 mod arbiter;
 mod case;
