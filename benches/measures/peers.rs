@@ -3,7 +3,7 @@
 use crate::objects::folder;
 use crate::rows::{DEGREE, Scene};
 use std::error::Error;
-use sublevel::chart::duel::{Coal, CoalError, CoalRun, parry_pose};
+use sublevel::chart::duel::{Coal, CoalRun, PeerError, parry_pose};
 use sublevel::measure::{Options, Pose, WarmStart, distance};
 
 /// Answers that contradict each other by more, metres, are told: ten times the tolerance coal has by default.
@@ -17,7 +17,7 @@ pub(crate) fn start<'a>(coal: &'a Coal, scene: &Scene<'_>) -> Result<CoalRun<'a>
 }
 
 /// Tells where coal, parry and our bodies, which contain the hulls, contradict each other.
-pub(crate) fn check(run: &CoalRun<'_>, scene: &Scene<'_>) -> Result<(), CoalError> {
+pub(crate) fn check(run: &CoalRun<'_>, scene: &Scene<'_>) -> Result<(), PeerError> {
     let (a, b) = scene.pair.bodies(DEGREE);
     let ours = [scene.pair.a.hull.len(), scene.pair.b.hull.len()];
     if let Some(other) = run.vertices().filter(|other| *other != ours) {

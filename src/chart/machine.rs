@@ -35,12 +35,15 @@ impl Machine {
         }
     }
 
-    /// The first line of a report: the command that makes it, and where this was.
+    /// The first line of a report of a figure that one core makes: the command, and where this was.
     pub(super) fn head(&self, command: &str) -> String {
+        self.head_with(command, "of which one is used")
+    }
+
+    /// The same where cores are used otherwise.
+    pub(super) fn head_with(&self, command: &str, used: &str) -> String {
         let Self { cpu, cores, simd, commit, rustc, date } = self;
-        format!(
-            "Made by `{command}` on {date} on {cpu}, {cores} cores, {simd}, of which one is used; commit {commit}; {rustc}."
-        )
+        format!("Made by `{command}` on {date} on {cpu}, {cores} cores, {simd}, {used}; commit {commit}; {rustc}.")
     }
 }
 

@@ -48,8 +48,6 @@ pub use detail::{Detail, detail};
 #[cfg(feature = "chart")]
 pub use machine::{Machine, simd};
 #[cfg(feature = "chart")]
-pub use rivals::ClarabelError;
-#[cfg(feature = "chart")]
 pub use scatter::{Group, Marker, Point, Scatter, Stairs};
 pub use shadow::shadow;
 pub use silhouette::{Outline, Panel, Silhouettes, View, boundary_points, outline};

@@ -5,10 +5,9 @@ use super::growth::{Growth, Line, Unit};
 use super::memory::peak;
 use crate::body::Body;
 use crate::chart::duel::sweep::median;
-use crate::chart::duel::{DuelError, Random, ShelfError, Subject};
+use crate::chart::duel::{DuelError, Random, ShelfError, Subject, points_text};
 use crate::fit::{FitOptions, Mesh, fit};
 use nalgebra::Vector3;
-use std::fmt::Write;
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -121,13 +120,8 @@ impl Fitting<'_> {
 
     /// The most memory of `sublevel fit`, bytes; none where it can not be told.
     fn peak(&self, program: &Path, points: &[Vector3<f64>], degree: usize) -> Option<f64> {
-        let mut text = String::new();
-        for v in points {
-            // Writing to a string can not fail.
-            let _ = writeln!(text, "{:e} {:e} {:e}", v.x, v.y, v.z);
-        }
         let [input, out] = ["cost-points.xyz", "cost-fits"].map(|name| self.folder.join(name));
-        fs::write(&input, text).ok()?;
+        fs::write(&input, points_text(points)).ok()?;
         let degree = degree.to_string();
         let found = peak(program, &["fit", input.to_str()?, "--degree", &degree, "--out", out.to_str()?]);
         // What is left there harms nobody.
@@ -139,12 +133,8 @@ impl Fitting<'_> {
 
 /// A point of a random triangle, of any size.
 fn on_surface(mesh: &Mesh, random: &mut Random) -> Vector3<f64> {
-    let mut uniform = || 0.5 * (1.0 + random.signed());
-    let index = (uniform() * mesh.triangles.len() as f64) as usize;
-    let Some(corners) = mesh.triangles.get(index.min(mesh.triangles.len().saturating_sub(1))) else {
-        return Vector3::zeros();
-    };
-    let (mut s, mut t) = (uniform(), uniform());
+    let Some(corners) = mesh.triangles.get(random.index(mesh.triangles.len())) else { return Vector3::zeros() };
+    let (mut s, mut t) = (random.positive(), random.positive());
     if s + t > 1.0 {
         (s, t) = (1.0 - s, 1.0 - t);
     }

@@ -1,6 +1,7 @@
 //! GJK of coal on convex hulls, by a program that times it in a process of its own.
 
 use super::motion::{self, Trajectory};
+use super::peer::{PeerError, named, printed};
 use super::sweep::median;
 use nalgebra::Vector3;
 use serde::Deserialize;
@@ -16,30 +17,6 @@ pub struct Coal {
     program: PathBuf,
 }
 
-/// Why coal has no say.
-#[derive(Debug, thiserror::Error)]
-pub enum CoalError {
-    /// The variable names no program.
-    #[error("SUBLEVEL_COAL: {} is no file; name the program that times coal, or unset the variable", .0.display())]
-    NoProgram(PathBuf),
-    /// A file could not be read or written, or the program not be started.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// File or program.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The program failed, or printed what it should not.
-    #[error("{}: {reason}", program.display())]
-    Program {
-        /// The program.
-        program: PathBuf,
-        /// What it said, or what is wrong with that.
-        reason: String,
-    },
-}
-
 /// What it prints.
 #[derive(Clone, Debug, Deserialize)]
 struct CoalTimes {
@@ -53,10 +30,9 @@ impl Coal {
     /// As `SUBLEVEL_COAL` says; none if it says nothing.
     ///
     /// # Errors
-    /// [`CoalError::NoProgram`].
-    pub fn from_environment() -> Result<Option<Self>, CoalError> {
-        let Some(program) = std::env::var_os("SUBLEVEL_COAL").map(PathBuf::from) else { return Ok(None) };
-        if program.is_file() { Ok(Some(Self { program })) } else { Err(CoalError::NoProgram(program)) }
+    /// [`PeerError::NoProgram`].
+    pub fn from_environment() -> Result<Option<Self>, PeerError> {
+        Ok(named("SUBLEVEL_COAL", "the program that times coal")?.map(|program| Self { program }))
     }
 
     /// The version of the wheel it was built against, which lies beside it.
@@ -75,17 +51,17 @@ impl Coal {
     /// poses for each trajectory.
     ///
     /// # Errors
-    /// [`CoalError::Io`].
+    /// [`PeerError::Io`].
     pub fn start(
         &self,
         folder: &Path,
         name: &str,
         [a, b]: [&[Vector3<f64>]; 2],
         trajectories: &[Trajectory],
-    ) -> Result<CoalRun<'_>, CoalError> {
+    ) -> Result<CoalRun<'_>, PeerError> {
         let write = |ending: String, text: String| {
             let path = folder.join(format!("{name}-{ending}"));
-            fs::write(&path, text).map_err(|source| CoalError::Io { path: path.clone(), source })?;
+            fs::write(&path, text).map_err(PeerError::io(&path))?;
             Ok(path)
         };
         let poses = trajectories
@@ -102,7 +78,8 @@ impl Coal {
     }
 }
 
-fn points_text(points: &[Vector3<f64>]) -> String {
+/// One point per line, as coal's program and `sublevel fit` read them.
+pub(in crate::chart) fn points_text(points: &[Vector3<f64>]) -> String {
     let mut text = String::new();
     for v in points {
         // Writing to a string can not fail.
@@ -134,17 +111,13 @@ impl CoalRun<'_> {
     /// the other.
     ///
     /// # Errors
-    /// [`CoalError`].
-    pub fn pass(&mut self) -> Result<(), CoalError> {
-        let failed = |reason: String| CoalError::Program { program: self.program.to_owned(), reason };
+    /// [`PeerError`].
+    pub fn pass(&mut self) -> Result<(), PeerError> {
         let run = self.poses.iter().map(|poses| {
-            let output =
-                Command::new(self.program).args([&self.a, &self.b, poses, &poses.with_extension("coal")]).output();
-            let output = output.map_err(|source| CoalError::Io { path: self.program.to_owned(), source })?;
-            if !output.status.success() {
-                return Err(failed(format!("failed: {}", String::from_utf8_lossy(&output.stderr).trim())));
-            }
-            serde_json::from_slice(&output.stdout).map_err(|error| failed(format!("prints no times: {error}")))
+            let mut command = Command::new(self.program);
+            let said = printed(self.program, command.args([&self.a, &self.b, poses, &poses.with_extension("coal")]))?;
+            serde_json::from_slice(&said)
+                .map_err(|error| PeerError::program(self.program, format!("prints no times: {error}")))
         });
         self.runs.push(run.collect::<Result<_, _>>()?);
         Ok(())
@@ -170,13 +143,13 @@ impl CoalRun<'_> {
     /// The distances of the last pass, metres, trajectory by trajectory.
     ///
     /// # Errors
-    /// [`CoalError`]: no pass yet, or files that changed since.
-    pub fn distances(&self) -> Result<Vec<Vec<f64>>, CoalError> {
+    /// [`PeerError`]: no pass yet, or files that changed since.
+    pub fn distances(&self) -> Result<Vec<Vec<f64>>, PeerError> {
         let queries = self.runs.last().map_or(Vec::new(), |run| run.iter().map(|times| times.queries).collect());
-        let failed = |reason: String| CoalError::Program { program: self.program.to_owned(), reason };
+        let failed = |reason: String| PeerError::program(self.program, reason);
         let read = |(poses, queries): (&PathBuf, usize)| {
             let path = poses.with_extension("coal");
-            let text = fs::read_to_string(&path).map_err(|source| CoalError::Io { path, source })?;
+            let text = fs::read_to_string(&path).map_err(PeerError::io(&path))?;
             let distances: Result<Vec<f64>, _> = text.lines().map(str::parse).collect();
             let distances = distances.map_err(|error| failed(format!("wrote no distances: {error}")))?;
             if distances.len() == queries {

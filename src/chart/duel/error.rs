@@ -1,7 +1,7 @@
 //! Why a figure can not be made.
 
-use super::{CoalError, NoHull, ShelfError};
-use crate::chart::{ChartError, ClarabelError};
+use super::{NoHull, PeerError, ShelfError};
+use crate::chart::ChartError;
 use crate::fit::{ReadError, hull::HullError};
 use crate::measure::{OptionsError, PoseError};
 
@@ -43,9 +43,9 @@ pub enum DuelError {
     /// Parry makes no hull.
     #[error(transparent)]
     NoHull(#[from] NoHull),
-    /// Coal can not be timed.
+    /// Coal or clarabel can not be timed.
     #[error(transparent)]
-    Coal(#[from] CoalError),
+    Peer(#[from] PeerError),
     /// A child can not be started or heard.
     #[error("{}: {source}", program.display())]
     Child {
@@ -54,9 +54,6 @@ pub enum DuelError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// Clarabel can not be timed.
-    #[error(transparent)]
-    Clarabel(#[from] ClarabelError),
     /// Messages to a server can not be timed.
     #[error("timing messages to a server on loopback: {0}")]
     Messages(String),

@@ -7,14 +7,17 @@ mod coal;
 mod error;
 pub mod motion;
 mod parry;
+pub(in crate::chart) mod peer;
 mod random;
 mod shelf;
 mod subject;
 pub mod sweep;
 
-pub use coal::{Coal, CoalError, CoalRun};
+pub(in crate::chart) use coal::points_text;
+pub use coal::{Coal, CoalRun};
 pub use error::DuelError;
 pub use parry::{Hulls, NoHull, parry_impact, parry_pose, parry_version};
+pub use peer::PeerError;
 pub use random::Random;
 pub use shelf::{Shelf, ShelfError};
 pub use subject::{Subject, pairs};

@@ -11,7 +11,6 @@ pub(in crate::chart) use newton::newton;
 pub(in crate::chart) use posed::{Posed, between};
 pub(in crate::chart) use slsqp::slsqp;
 pub(in crate::chart) use solver::Clarabel;
-pub use solver::ClarabelError;
 
 #[cfg(test)]
 pub(in crate::chart) mod tests {

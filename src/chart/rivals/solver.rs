@@ -1,6 +1,7 @@
 //! Level 0 solved by clarabel, in a process of its own: clarabel's semidefinite cones need a BLAS, and this program needs none.
 
 use super::level0::ConicProgram;
+use crate::chart::duel::peer::{PeerError, named, printed};
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,30 +11,6 @@ use std::process::Command;
 #[derive(Clone, Debug)]
 pub(in crate::chart) struct Clarabel {
     program: PathBuf,
-}
-
-/// Why it has no say.
-#[derive(Debug, thiserror::Error)]
-pub enum ClarabelError {
-    /// The variable names no program.
-    #[error("SUBLEVEL_CLARABEL: {} is no file; name the program that `cargo build --release --example clarabel` makes, or unset the variable", .0.display())]
-    NoProgram(PathBuf),
-    /// A file could not be read or written, or the program not be started.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// File or program.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The program failed, or wrote what it should not.
-    #[error("{}: {reason}", program.display())]
-    Program {
-        /// The program.
-        program: PathBuf,
-        /// What it said, or what is wrong with that.
-        reason: String,
-    },
 }
 
 /// What it is asked.
@@ -58,10 +35,11 @@ impl Clarabel {
     /// As `SUBLEVEL_CLARABEL` says; else the example beside this program, where cargo puts it; none if it is not there.
     ///
     /// # Errors
-    /// [`ClarabelError::NoProgram`].
-    pub(in crate::chart) fn find() -> Result<Option<Self>, ClarabelError> {
-        if let Some(program) = std::env::var_os("SUBLEVEL_CLARABEL").map(PathBuf::from) {
-            return if program.is_file() { Ok(Some(Self { program })) } else { Err(ClarabelError::NoProgram(program)) };
+    /// [`PeerError::NoProgram`].
+    pub(in crate::chart) fn find() -> Result<Option<Self>, PeerError> {
+        let what = "the program that `cargo build --release --example clarabel` makes";
+        if let Some(program) = named("SUBLEVEL_CLARABEL", what)? {
+            return Ok(Some(Self { program }));
         }
         let here = std::env::current_exe().ok();
         let beside = here.as_deref().and_then(Path::parent).map(|folder| folder.join("examples/clarabel"));
@@ -76,31 +54,24 @@ impl Clarabel {
     /// For each tolerance, for each program; files for that lie in `folder` under `name`.
     ///
     /// # Errors
-    /// [`ClarabelError`].
+    /// [`PeerError`].
     pub(in crate::chart) fn solve(
         &self,
         (folder, name): (&Path, &str),
         programs: Vec<ConicProgram>,
         tolerances: &[f64],
         repeats: usize,
-    ) -> Result<Vec<Vec<Solved>>, ClarabelError> {
+    ) -> Result<Vec<Vec<Solved>>, PeerError> {
         let count = programs.len();
         let asked = Asked { programs, tolerances, repeats };
-        let failed = |reason: String| ClarabelError::Program { program: self.program.clone(), reason };
-        let io = |path: &Path| {
-            let path = path.to_owned();
-            |source| ClarabelError::Io { path, source }
-        };
+        let failed = |reason: String| PeerError::program(&self.program, reason);
         let read = folder.join(format!("{name}.programs"));
         let write = read.with_extension("solved");
         let text = serde_json::to_string(&asked).map_err(|error| failed(error.to_string()))?;
-        fs::write(&read, text).map_err(io(&read))?;
-        let output = Command::new(&self.program).args([&read, &write]).env("OPENBLAS_NUM_THREADS", "1").output();
-        let output = output.map_err(io(&self.program))?;
-        if !output.status.success() {
-            return Err(failed(format!("failed: {}", String::from_utf8_lossy(&output.stderr).trim())));
-        }
-        let text = fs::read_to_string(&write).map_err(io(&write))?;
+        fs::write(&read, text).map_err(PeerError::io(&read))?;
+        let mut command = Command::new(&self.program);
+        printed(&self.program, command.args([&read, &write]).env("OPENBLAS_NUM_THREADS", "1"))?;
+        let text = fs::read_to_string(&write).map_err(PeerError::io(&write))?;
         let answers: Vec<Vec<Solved>> =
             serde_json::from_str(&text).map_err(|error| failed(format!("wrote no answers: {error}")))?;
         let complete = answers.len() == tolerances.len() && answers.iter().all(|of| of.len() == count);

@@ -3,7 +3,7 @@
 use super::arbiter::{Proposal, Truth, judge};
 use super::case::{Case, CaseError, Verdict};
 use crate::body::{Body, fibonacci_lattice};
-use crate::chart::duel::{Coal, Hulls, motion::Trajectory, parry_pose};
+use crate::chart::duel::{Coal, Hulls, PeerError, motion::Trajectory, parry_pose};
 use crate::chart::rivals::{Clarabel, ConicProgram, Posed, between, newton, slsqp};
 use crate::measure::{Distance, MAX_ITERATIONS, Options, Pose, Status, WarmStart, distance, distance_batch};
 use crate::optimize::{Corner, gjk};
@@ -60,7 +60,8 @@ impl FromStr for Method {
     type Err = UnknownMethod;
 
     fn from_str(name: &str) -> Result<Self, UnknownMethod> {
-        Self::named(name).ok_or_else(|| UnknownMethod(name.to_owned()))
+        let named = Self::ALL.into_iter().find(|method| method.name() == name);
+        named.ok_or_else(|| UnknownMethod(name.to_owned()))
     }
 }
 
@@ -95,11 +96,6 @@ impl Method {
             Self::Parry => "GJK on hulls, parry",
             Self::Coal => "GJK on hulls, coal",
         }
-    }
-
-    /// The one of that name.
-    pub(super) fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|method| method.name() == name)
     }
 
     /// Most cases of a family that a quick run and a full one put to it: those of others take long, semidefinite programs up to a second
@@ -314,7 +310,7 @@ fn coal_distance(
     folder: &Path,
     points: [&[Vector3<f64>]; 2],
     relative: Pose,
-) -> Result<Option<f64>, crate::chart::duel::CoalError> {
+) -> Result<Option<f64>, PeerError> {
     let trajectory: Trajectory = vec![relative];
     let mut run = coal.start(folder, "case", points, &[trajectory])?;
     run.pass()?;

@@ -112,7 +112,11 @@ impl Stability {
         let mut text = String::from("# Stability where methods fail\n\n");
         // Writing to a string can not fail.
         let flags = if self.quick { " --quick" } else { "" };
-        let _ = writeln!(text, "{}\n", self.machine.head(&format!("sublevel chart stability{flags}")));
+        let _ = writeln!(
+            text,
+            "{}\n",
+            self.machine.head_with(&format!("sublevel chart stability{flags}"), "all of which are used")
+        );
         let coal =
             self.coal.as_ref().map_or("coal did not take part (SUBLEVEL_COAL is not set)".to_owned(), |version| {
                 format!("coal {version} at its default tolerance of 1e-6 m")

@@ -65,7 +65,7 @@ impl std::str::FromStr for Share {
             let mut parts = text.split('/');
             let (family, method, seeds) = (parts.next()?.parse().ok()?, parts.next()?, parts.next()?);
             let known = FAMILIES.iter().any(|row| row.number == family) && parts.next().is_none();
-            let method = Method::named(method).filter(|_| known)?;
+            let method = method.parse().ok().filter(|_| known)?;
             // Seeds of different families are a million apart.
             let within = |share: &Self| share.from < share.to && share.to <= 1_000_000;
             let (from, to) = match seeds.split_once('-') {
@@ -177,11 +177,13 @@ fn child(program: &Path, share: &str, mut hear: impl FnMut(Line)) -> std::io::Re
             }
         }
     };
-    // With whatever it waits for; they may have ended by themselves.
-    let group = format!("-{}", child.id());
-    let _ = Command::new("kill").args(["-KILL", "--", &group]).stderr(Stdio::null()).status();
-    let _ = child.kill();
-    child.wait()?;
+    if child.try_wait()?.is_none() {
+        // With whatever it waits for.
+        let group = format!("-{}", child.id());
+        let _ = Command::new("kill").args(["-KILL", "--", &group]).stderr(Stdio::null()).status();
+        let _ = child.kill();
+        child.wait()?;
+    }
     let _ = reader.join();
     Ok(end)
 }
