@@ -48,6 +48,12 @@ impl Entry {
         }
     }
 
+    /// Takes note that the set lies between two parameters that are off by at most two roundings.
+    pub(super) fn clip(&mut self, from: f64, to: f64) {
+        self.from = self.from.max(from - 2.0 * f64::EPSILON * from.abs());
+        self.to = self.to.min(to + 2.0 * f64::EPSILON * to.abs());
+    }
+
     /// Takes note that s is in the set.
     pub(super) fn touch(&mut self, s: f64) {
         self.inside = self.inside.min(s);

@@ -10,7 +10,7 @@ use super::entry::Entry;
 use super::options::Options;
 use super::pose::{Pose, ROTATION_ERROR};
 use crate::body::{Body, MAX_CONSTRAINTS, Solid};
-use crate::polynomial::gamma;
+use crate::polynomial::{Polynomial, gamma};
 use nalgebra::{Matrix3, Vector3};
 
 /// A ray of finite or infinite length in the world frame; checked when made.
@@ -200,15 +200,14 @@ fn earlier(one: &RayCast, other: &RayCast, tolerance: f64) -> RayCast {
     }
 }
 
-/// Radius in normalized coordinates at which most surfaces lie; any value gives the same answers.
-const TYPICAL_RADIUS: f64 = 0.9;
-
-/// Most evaluations along one ray; 3 to 6 are usual, and halving the bracket alone would need about 50.
+/// Most evaluations along one ray; 1 or 2 are usual, and halving the bracket alone would need about 50.
 const MAX_STEPS: u32 = 96;
 
 fn cast_at(body: &Body, pose: &Pose, ray: &Ray, tolerance: f64, options: &Options<'_>) -> RayCast {
     let Some((along, mut entry)) = Along::new(body, pose, ray) else { return RayCast::Miss };
-    let mut s = along.first(&entry);
+    // A little beyond a root being inside is provable, and the tangent is as good.
+    let beyond = 0.25 * tolerance;
+    let mut s = along.first(&entry, beyond);
     let mut normal = Vector3::zeros();
     // The last two steps, and how many looks in a row have changed nothing.
     let (mut steps, mut idle) = ([f64::INFINITY; 2], 0);
@@ -228,9 +227,8 @@ fn cast_at(body: &Body, pose: &Pose, ray: &Ray, tolerance: f64, options: &Option
         if entry.inside.is_finite() && entry.width() <= tolerance || idle > 2 {
             break;
         }
-        // A little beyond the root, where being inside is provable and the tangent is as good. Steps that do not shrink
-        // (Brent's rule) or help make way for a halving.
-        let guess = look.guess + 0.25 * tolerance;
+        // Steps that do not shrink (Brent's rule) or help make way for a halving.
+        let guess = look.guess + beyond;
         let next = if (guess - s).abs() > 0.5 * steps[0] || idle > 0 { f64::NAN } else { guess };
         let next = entry.safeguard(next);
         steps = [steps[1], (next - s).abs()];
@@ -306,15 +304,16 @@ impl<'a> Along<'a> {
         let rows = body.placement().row_norms();
         let start_error = rows * (moved + gamma(8) * (from_center.norm() + 2.0 * reach)) * (1.0 + 1e-14);
         let velocity_error = rows * relative;
-        // Tangent planes: the slabs of the normalized coordinates.
+        // The slabs of the normalized coordinates, wider by what the line may be off in the ball.
+        let far = entry.from.abs().max(entry.to.abs());
         let extent = body.z_extent() + start_error;
-        for i in 0..3 {
-            let (value, slope, error) = (start[i], velocity[i], velocity_error[i]);
-            entry.cut(0.0, value - extent[i], slope - error, slope + error);
-            entry.cut(0.0, -value - extent[i], -slope - error, -slope + error);
-            if entry.missed() {
-                return None;
-            }
+        let slab = (extent + velocity_error * far) * (1.0 + 1e-14);
+        for i in (0..3).filter(|&i| velocity[i] != 0.0) {
+            let [one, other] = [-slab[i], slab[i]].map(|side| (side - start[i]) / velocity[i]);
+            entry.clip(one.min(other), one.max(other));
+        }
+        if entry.missed() {
+            return None;
         }
         let mut errors = [(0.0, 0.0); MAX_CONSTRAINTS];
         let corner = extent * (1.0 + 1e-6);
@@ -328,16 +327,16 @@ impl<'a> Along<'a> {
         Some((Self { body, base, start, velocity, start_error, velocity_error, errors }, entry))
     }
 
-    /// Where to look first: the start of a ray that may start inside, else the entry of a ball in the normalized
-    /// coordinates, in which bodies have a radius of about 1.
-    fn first(&self, entry: &Entry) -> f64 {
+    /// Where to look first: the start of a ray that may start inside, else where the last constraint is entered, as values along the
+    /// ray have it.
+    fn first(&self, entry: &Entry, beyond: f64) -> f64 {
         if entry.from <= -self.base {
             return entry.from;
         }
-        let (a, b) = (self.velocity.norm_squared(), self.start.dot(&self.velocity));
-        let c = self.start.norm_squared() - TYPICAL_RADIUS * TYPICAL_RADIUS;
-        let guess = (-b - (b * b - a * c).max(0.0).sqrt()) / a;
-        if guess > entry.from && guess < entry.to { guess } else { entry.from }
+        let (middle, half) = (0.5 * (entry.from + entry.to), 0.5 * (entry.to - entry.from));
+        let (z, step) = (self.start + self.velocity * middle, self.velocity * half);
+        let entered = |polynomial: &Polynomial| middle + half * polynomial.first_below_along(&z, &step, 1.0);
+        self.body.constraints().iter().map(|c| entered(&c.polynomial)).fold(entry.from, f64::max) + beyond
     }
 
     /// All constraints at τ = s: cuts the interval with their tangents.

@@ -12,6 +12,7 @@ mod dense;
 mod gram;
 mod hessian_form;
 mod interval;
+mod line;
 mod monomial;
 mod nested;
 mod norm_power;
@@ -125,6 +126,13 @@ impl Polynomial {
     #[inline(always)]
     pub fn jet<S: Simd, N: Number<S>>(&self, simd: S, z: [N; 3]) -> NumberJet<N> {
         N::jet(simd, self, z)
+    }
+
+    /// About the first t in [-1, 1] at which the polynomial, if convex along the line, falls to `level` at `middle + t half`; a t where it is
+    /// low if it hardly does. A guess: nothing is proven of it.
+    #[inline]
+    pub fn first_below_along(&self, middle: &Vector3<f64>, half: &Vector3<f64>, level: f64) -> f64 {
+        line::first_below((&self.nested, self.degree()), middle, half, level)
     }
 
     /// Bound of `|computed value - p(z')|` over all `z'` with `|z'_i - z_i| <= dz_i`, `gradient` being the computed one.
