@@ -80,8 +80,8 @@ impl Outline {
 
     /// The point of the cell kept there.
     #[inline(always)]
-    pub fn point(&self, place: f64) -> [f64; 3] {
-        let [x, y, z, ..] = self.cells[(place as usize).min(self.cells.len() - 1)];
+    pub fn point<S: Simd, N: Number<S>>(&self, simd: S, place: N) -> [N; 3] {
+        let [x, y, z, ..] = N::gather(simd, &self.cells, place);
         [x, y, z]
     }
 

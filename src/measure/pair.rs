@@ -203,7 +203,7 @@ pub(super) struct Pair<'a> {
     /// Origin of the query frame in the frame of the first body, metres.
     origin: Vector3<f64>,
     /// Rotation and translation of the second body's frame in the first's, metres.
-    rotation: Matrix3<f64>,
+    pub(super) rotation: Matrix3<f64>,
     translation: Vector3<f64>,
     pose_a: Pose,
     pose_b: Pose,

@@ -199,6 +199,52 @@ impl<'a, N: Copy> Side<'a, N> {
     {
         [apply(&self.linear, basis[0]), apply(&self.linear, basis[1]), apply(&self.linear, basis[2])]
     }
+
+    /// From a point with this plane to a point of the body nearby, against the gradient, in the basis of the plane, as far as the
+    /// active constraint goes; and whether that is proven.
+    #[inline(always)]
+    pub(super) fn inward<S: Simd>(&self, simd: S, at: &Extrapolated<N>) -> (V3<N>, N::Mask)
+    where
+        N: Number<S>,
+    {
+        let gradient = at.plane.gradient;
+        let length = dot(gradient, gradient).sqrt();
+        let inverse = N::splat(simd, 1.0) / length;
+        let error = at.value_error + N::splat(simd, self.trust().value_error);
+        let excess = at.plane.value - N::splat(simd, 1.0) + error;
+        let near = Near::new(self);
+        let gradient_error = at.gradient_error + N::splat(simd, near.gradient_error);
+        let (distance, fine) = near.move_inside(simd, excess, length, inverse, gradient_error);
+        (scaled(gradient, inverse * distance), fine)
+    }
+
+    /// Bound of how much farther along the unit vector n the body reaches than the point with this plane; not a number if the
+    /// plane faces another way. All in the basis of the plane.
+    #[inline(always)]
+    pub(super) fn lack<S: Simd>(&self, simd: S, at: &Extrapolated<N>, n: V3<N>) -> N
+    where
+        N: Number<S>,
+    {
+        let splat = |value: f64| N::splat(simd, value);
+        let gradient = at.plane.gradient;
+        let along = dot(n, gradient);
+        let multiplier = splat(1.0) / along;
+        let residual = add_scaled(n, -multiplier, gradient);
+        let near = Near::new(self);
+        let length = dot(gradient, gradient).sqrt();
+        let turned = splat(near.turn).mul_add(length, at.gradient_error + splat(near.gradient_error));
+        let off = dot(residual, residual).sqrt() + turned.mul_add(multiplier, splat(SLACK));
+        let bound = Bound {
+            curvature: at.curvature,
+            radius: at.radius,
+            inverse_square: splat(near.inverse_square),
+            floor: splat(near.floor),
+            span: splat(near.span),
+        };
+        let error = at.value_error + splat(self.trust().value_error);
+        let slack = multiplier * (splat(1.0) - at.plane.value + error);
+        (slack + bound.loss(simd, off, multiplier)).select(splat(f64::MIN_POSITIVE).le(along), splat(f64::NAN))
+    }
 }
 
 impl Side<'_, f64> {
@@ -224,43 +270,6 @@ impl Side<'_, f64> {
     pub(super) fn relative_square<S: Simd>(&self, _: S, local: &M3<f64>, step: V3<f64>) -> f64 {
         let delta = apply_transposed::<S, f64>(local, step);
         dot::<S, f64>(delta, delta) / self.body.trust().radius.powi(2)
-    }
-
-    /// From a point with this plane to a point of the body nearby, against the gradient, in the basis of the plane; as far as
-    /// the active constraint goes. None if it is not proven to be one.
-    #[inline(always)]
-    pub(super) fn inward<S: Simd>(&self, simd: S, at: &Extrapolated<f64>) -> Option<V3<f64>> {
-        let gradient = at.plane.gradient;
-        let length = dot::<S, f64>(gradient, gradient).sqrt();
-        let inverse = 1.0 / length;
-        let excess = at.plane.value - 1.0 + (at.value_error + self.trust().value_error);
-        let near = Near::new(self);
-        let gradient_error = at.gradient_error + near.gradient_error;
-        let (distance, fine) = near.move_inside::<S, f64>(simd, excess, length, inverse, gradient_error);
-        fine.then(|| scaled::<S, f64>(gradient, inverse * distance))
-    }
-
-    /// Bound of how much farther along the unit vector n the body reaches than the point with this plane; infinite or not a
-    /// number if the plane faces another way. All in the basis of the plane.
-    #[inline(always)]
-    pub(super) fn lack<S: Simd>(&self, simd: S, at: &Extrapolated<f64>, n: V3<f64>) -> f64 {
-        let gradient = at.plane.gradient;
-        let along = dot::<S, f64>(n, gradient);
-        let multiplier = 1.0 / along;
-        let residual = add_scaled::<S, f64>(n, -multiplier, gradient);
-        let near = Near::new(self);
-        let length = dot::<S, f64>(gradient, gradient).sqrt();
-        let turned = near.turn * length + at.gradient_error + near.gradient_error;
-        let off = dot::<S, f64>(residual, residual).sqrt() + turned * multiplier + SLACK;
-        let bound = Bound {
-            curvature: at.curvature,
-            radius: at.radius,
-            inverse_square: near.inverse_square,
-            floor: near.floor,
-            span: near.span,
-        };
-        let slack = multiplier * (1.0 - at.plane.value + at.value_error + self.trust().value_error);
-        if along > 0.0 { slack + bound.loss(simd, off, multiplier) } else { f64::INFINITY }
     }
 
     /// Whether all constraints but the active one are proven to hold at (a point within the displacement of) v.

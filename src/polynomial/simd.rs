@@ -42,6 +42,8 @@ pub trait Number<S: Simd>:
     fn le(self, other: Self) -> Self::Mask;
     /// Both masks.
     fn and(simd: S, a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// Whether the mask holds in every lane.
+    fn all(simd: S, mask: Self::Mask) -> bool;
     /// `self` where the mask holds, else `other`.
     fn select(self, mask: Self::Mask, other: Self) -> Self;
     /// Value, gradient and Hessian of the polynomial at points z, by the scheme that suits as many of them.
@@ -85,6 +87,10 @@ impl<S: Simd> Number<S> for f64 {
     #[inline(always)]
     fn and(_: S, a: bool, b: bool) -> bool {
         a & b
+    }
+    #[inline(always)]
+    fn all(_: S, mask: bool) -> bool {
+        mask
     }
     #[inline(always)]
     fn select(self, mask: bool, other: Self) -> Self {
@@ -186,6 +192,10 @@ impl<S: Simd> Number<S> for Lanes<S> {
     #[inline(always)]
     fn and(simd: S, a: S::m64s, b: S::m64s) -> S::m64s {
         simd.and_m64s(a, b)
+    }
+    #[inline(always)]
+    fn all(simd: S, mask: S::m64s) -> bool {
+        Self::bits(simd, mask) == (1 << Self::COUNT) - 1
     }
     #[inline(always)]
     fn select(self, mask: S::m64s, other: Self) -> Self {

@@ -73,9 +73,9 @@ impl<const N: usize> Covering<N> {
         &self.directions[..self.len]
     }
 
-    /// Whether one more triangle can be split.
-    pub(super) fn has_room(&self) -> bool {
-        self.len < N && self.open + 2 <= 2 * N
+    /// Whether so many more triangles can be split.
+    pub(super) fn has_room(&self, splits: usize) -> bool {
+        self.len + splits <= N && self.open + splits <= 2 * N
     }
 
     /// The corners of a triangle in an order that has the edge to be split first, and the direction to split it at: where
@@ -248,11 +248,11 @@ fn lower_bound(n: [Vector3<f64>; 3], w: [Vector3<f64>; 3], enough: f64) -> Resul
         let (alpha, beta) = if alpha >= 0.0 && beta >= 0.0 && alpha + beta > 0.0 { (alpha, beta) } else { (1.0, 1.0) };
         let value = (alpha * g[(i, i)] + beta * g[(i, j)]).min(alpha * g[(j, i)] + beta * g[(j, j)]);
         lowest = lowest.min(value / (n[i] * alpha + n[j] * beta).norm());
+        // Not `<`: a NaN bounds nothing.
+        if !(lowest >= enough) {
+            return Err(lowest);
+        }
         *edge = (alpha, beta);
-    }
-    // Not `<`: a NaN bounds nothing.
-    if !(lowest >= enough) {
-        return Err(lowest);
     }
     // Where all three are equal, or a point of the triangle near there: the first that will do.
     let meets = |a: Vector3<f64>| (g * a).min() / (n[0] * a[0] + n[1] * a[1] + n[2] * a[2]).norm();

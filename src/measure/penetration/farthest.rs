@@ -15,73 +15,131 @@ use crate::measure::tangent::Side;
 use crate::measure::vector::{
     V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, rows, scaled,
 };
-use crate::polynomial::{NumberJet, Simd, WithSimd};
+use crate::polynomial::{Lanes, MAX_LANES, Number, NumberJet, Simd, WithSimd};
 use nalgebra::Vector3;
 
-/// The point of a body farthest along n within the tolerance, as work for the widest arithmetic.
-pub(super) struct Farthest<'a> {
-    pub(super) body: &'a Body,
-    /// Unit vector, body frame.
+/// A point of a body that is farthest along a unit vector.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sought {
+    /// The unit vector, body frame.
     pub(super) n: Vector3<f64>,
-    /// What it may lack, metres.
+    /// What the point may lack, metres.
     pub(super) tolerance: f64,
 }
 
+/// Points within whose displacement (the rounding of their normalized coordinates) points of the body are proven to lie, each with the
+/// active constraint; from the centre of the normalization on, body frame, metres. None where Newton's method does not arrive.
+pub(super) type Found = [Option<(Vector3<f64>, usize)>; MAX_LANES];
+
+/// At most [`MAX_LANES`] points of a body, as work for the widest arithmetic: a lane each where the body has one constraint. None depends
+/// on the others.
+pub(super) struct Farthest<'a> {
+    pub(super) body: &'a Body,
+    pub(super) sought: &'a [Sought],
+}
+
 /// Most evaluations.
-const MAX_ROUNDS: u32 = 4;
+const MAX_ROUNDS: u32 = 6;
 
 impl WithSimd for Farthest<'_> {
-    type Output = Option<(Vector3<f64>, usize)>;
+    type Output = Found;
 
-    /// A point within whose displacement (the rounding of its normalized coordinates) a point of the body is proven to lie,
-    /// from the centre of the normalization on, body frame, metres, and the active constraint; none where Newton's method does
-    /// not arrive.
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Option<(Vector3<f64>, usize)> {
-        let Self { body, n, tolerance } = self;
-        let n: V3<f64> = n.into();
-        let cell = body.outline().cell(simd, n);
-        let active = body.outline().active(cell.place);
-        let side = Side::at_home(simd, body, active);
-        let inverse = rows(simd, body.inverse());
-        let e = apply_transposed::<S, f64>(&inverse, n);
-        let mut x = add::<S, f64>(cell.point, apply_symmetric::<S, f64>(&cell.turn, n));
-        let axes = side.localize(simd, &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
-        for _ in 0..MAX_ROUNDS {
-            let (jet, inside) = side.jet(simd, x);
-            if !inside {
-                return None;
+    fn with_simd<S: Simd>(self, simd: S) -> Found {
+        let Self { body, sought } = self;
+        let mut found = [None; MAX_LANES];
+        if body.is_smooth() {
+            for (sought, found) in sought.chunks(Lanes::<S>::COUNT).zip(found.chunks_mut(Lanes::<S>::COUNT)) {
+                in_lanes(simd, body, sought, found);
             }
-            let dx = apply::<S, f64>(&inverse, step(simd, &jet, e)?);
-            let next = side.extrapolate(simd, &jet, &axes, dx);
-            if let Some(inward) = side.inward(simd, &next)
-                && side.lack(simd, &next, n) - dot::<S, f64>(n, inward) <= tolerance
-            {
-                let x = add::<S, f64>(add::<S, f64>(x, dx), inward);
-                return side.others_hold(simd, x).then(|| (x.into(), active));
+        } else {
+            for (sought, found) in sought.iter().zip(&mut found) {
+                let active = body.outline().active(body.outline().place::<S, f64>(simd, sought.n.into()));
+                let (x, proven) = farthest::<S, f64>(simd, body, active, sought.n.into(), sought.tolerance);
+                let holds = proven > 0.0 && Side::at_home(simd, body, active).others_hold(simd, x);
+                *found = holds.then(|| (x.into(), active));
             }
-            x = add::<S, f64>(x, dx);
         }
-        None
+        found
     }
 }
 
-/// Newton's step from a point near the surface; none if its normal has nothing to do with e.
+/// As many points as there are lanes, of a body of one constraint.
 #[inline(always)]
-fn step<S: Simd>(simd: S, jet: &NumberJet<f64>, e: V3<f64>) -> Option<V3<f64>> {
+fn in_lanes<S: Simd>(simd: S, body: &Body, sought: &[Sought], found: &mut [Option<(Vector3<f64>, usize)>]) {
+    let mut columns = [[0.0; MAX_LANES]; 4];
+    for lane in 0..Lanes::<S>::COUNT {
+        // Lanes to spare seek the last point once more.
+        let Sought { n, tolerance } = &sought[lane.min(sought.len() - 1)];
+        for (column, entry) in columns.iter_mut().zip([n.x, n.y, n.z, *tolerance]) {
+            column[lane] = entry;
+        }
+    }
+    let mut loaded = [Lanes::<S>::splat(simd, 0.0); 4];
+    for (loaded, column) in loaded.iter_mut().zip(&columns) {
+        *loaded = Lanes::load(simd, column);
+    }
+    let [x, y, z, tolerance] = loaded;
+    let (x, proven) = farthest(simd, body, 0, [x, y, z], tolerance);
+    for (number, column) in [x[0], x[1], x[2], proven].into_iter().zip(&mut columns) {
+        number.store(column);
+    }
+    for (lane, found) in found.iter_mut().enumerate().take(sought.len()) {
+        let [x, y, z, proven] = [columns[0][lane], columns[1][lane], columns[2][lane], columns[3][lane]];
+        *found = (proven > 0.0).then(|| (Vector3::new(x, y, z), 0));
+    }
+}
+
+/// The point farthest along unit vectors n as far as one constraint goes, and 1 where that is proven, 0 where it is not.
+#[inline(always)]
+fn farthest<S: Simd, N: Number<S>>(simd: S, body: &Body, active: usize, n: V3<N>, tolerance: N) -> (V3<N>, N) {
+    let (zero, one) = (N::splat(simd, 0.0), N::splat(simd, 1.0));
+    let side = Side::at_home(simd, body, active);
+    let inverse = rows(simd, body.inverse());
+    let e = apply_transposed(&inverse, n);
+    let cell = body.outline().cell(simd, n);
+    let mut x = add(cell.point, apply_symmetric(&cell.turn, n));
+    let axes = side.localize(simd, &[[one, zero, zero], [zero, one, zero], [zero, zero, one]]);
+    let (mut best, mut proven, mut open) = (x, zero, one);
+    for _ in 0..MAX_ROUNDS {
+        let (jet, inside) = side.jet(simd, x);
+        let (dz, useful) = step(simd, &jet, e);
+        let dx = apply(&inverse, dz);
+        let next = side.extrapolate(simd, &jet, &axes, dx);
+        let (inward, near) = side.inward(simd, &next);
+        let enough = (side.lack(simd, &next, n) - dot(n, inward)).le(tolerance);
+        let useful = N::and(simd, inside, useful);
+        let found = N::and(simd, N::and(simd, useful, one.le(open)), N::and(simd, near, enough));
+        x = add(x, dx);
+        for i in 0..3 {
+            best[i] = (x[i] + inward[i]).select(found, best[i]);
+        }
+        proven = one.select(found, proven);
+        open = zero.select(found, open.select(useful, zero));
+        if N::all(simd, open.le(zero)) {
+            break;
+        }
+    }
+    (best, proven)
+}
+
+/// Newton's step from a point near the surface, and whether its normal has to do with e.
+#[inline(always)]
+fn step<S: Simd, N: Number<S>>(simd: S, jet: &NumberJet<N>, e: V3<N>) -> (V3<N>, N::Mask) {
+    let (one, positive) = (N::splat(simd, 1.0), N::splat(simd, f64::MIN_POSITIVE));
     let g = jet.gradient;
-    let (square, along) = (dot::<S, f64>(g, g), dot::<S, f64>(g, e));
+    let (square, along) = (dot(g, g), dot(g, e));
     let (cofactors, determinant) = cofactors(simd, jet.hessian);
-    let (of_e, of_g) = (apply_symmetric::<S, f64>(&cofactors, e), apply_symmetric::<S, f64>(&cofactors, g));
+    let (of_e, of_g) = (apply_symmetric(&cofactors, e), apply_symmetric(&cofactors, g));
     let multiplier = along / square;
-    let missing = determinant * (1.0 - jet.value);
-    let next = (dot::<S, f64>(g, of_e) - multiplier * missing) / dot::<S, f64>(g, of_g);
-    let dz = scaled::<S, f64>(add_scaled::<S, f64>(of_e, -next, of_g), 1.0 / (multiplier * determinant));
-    let bend = 0.5 * dot::<S, f64>(dz, apply_symmetric::<S, f64>(&jet.hessian, dz));
+    let missing = determinant * (one - jet.value);
+    let next = (dot(g, of_e) - multiplier * missing) / dot(g, of_g);
+    let dz = scaled(add_scaled(of_e, -next, of_g), one / (multiplier * determinant));
+    let bend = N::splat(simd, 0.5) * dot(dz, apply_symmetric(&jet.hessian, dz));
     // The surface bends away from the tangent plane by as much.
-    let dz = add_scaled::<S, f64>(dz, -bend / square, g);
-    let finite = along > 0.0 && next > 0.0 && dot::<S, f64>(dz, dz) < LONGEST * LONGEST;
-    finite.then_some(dz)
+    let dz = add_scaled(dz, -bend / square, g);
+    let short = dot(dz, dz).le(N::splat(simd, LONGEST * LONGEST));
+    (dz, N::and(simd, short, N::and(simd, positive.le(along), positive.le(next))))
 }
 
 /// Longest step, in normalized coordinates, that the linearization may mean anything for.

@@ -23,10 +23,10 @@ use super::pose::Pose;
 use super::union;
 use super::warm::WarmStart;
 use crate::body::{Body, Solid};
-use crate::polynomial::dispatch;
+use crate::polynomial::{MAX_LANES, dispatch};
 pub(super) use best::{Best, tolerance};
 use covering::{Cell, Covering, Direction};
-use farthest::Farthest;
+use farthest::{Farthest, Sought};
 use nalgebra::Vector3;
 use scout::Scout;
 use support::{SupportPoint, support};
@@ -170,8 +170,11 @@ pub(super) fn prove(best: &mut Best<'_>) -> Proof {
     }
 }
 
-/// Triangles split in one iteration.
-const SPLITS: u32 = 64;
+/// Triangles that are split together, as their support points are found together; the same on every machine.
+const GROUP: usize = MAX_LANES;
+
+/// Groups split in one iteration.
+const GROUPS: u32 = 8;
 
 /// Sweeps the sphere of directions until the bracket is narrow; also tells whether the table was full first.
 #[inline(never)]
@@ -196,6 +199,15 @@ fn sweep<const N: usize>(best: &mut Best<'_>) -> (Proof, bool) {
         directions: sweep.covering.directions().len() as u32,
     };
     (proof, full)
+}
+
+/// A direction whose support points are wanted.
+#[derive(Clone, Copy)]
+struct Wanted {
+    /// Unit vector, query frame.
+    n: Vector3<f64>,
+    /// The directions it lies between, in their order; none if it lies anywhere.
+    between: Option<[u16; 2]>,
 }
 
 struct Sweep<'a, const N: usize> {
@@ -224,10 +236,11 @@ impl<const N: usize> Sweep<'_, N> {
         let origin = Vector3::zeros();
         self.size = self.pair.a.reach(&origin) + self.pair.b.reach(&origin);
         // The octahedron: a box's own axes are among its corners.
-        for k in 0..6 {
-            let mut n = Vector3::zeros();
-            n[k % 3] = if k < 3 { 1.0 } else { -1.0 };
-            let direction = self.direction(n, None, best)?;
+        let mut axes = [Wanted { n: origin, between: None }; 6];
+        for (k, axis) in axes.iter_mut().enumerate() {
+            axis.n[k % 3] = if k < 3 { 1.0 } else { -1.0 };
+        }
+        for direction in self.directions(&axes, best)?.into_iter().flatten() {
             self.covering.add(direction);
         }
         self.improve(0, best);
@@ -237,16 +250,14 @@ impl<const N: usize> Sweep<'_, N> {
         }
         loop {
             let before = self.covering.directions().len();
-            for _ in 0..SPLITS {
+            for _ in 0..GROUPS {
                 if best.depth <= 0.0 || self.covering.is_closed() {
                     return Some(());
                 }
-                if !self.covering.has_room() {
+                if !self.covering.has_room(GROUP) {
                     return None;
                 }
-                let cell = self.covering.pop()?;
-                if !self.split(cell, best) {
-                    self.covering.push(cell);
+                if !self.split(best) {
                     return Some(());
                 }
             }
@@ -279,19 +290,45 @@ impl<const N: usize> Sweep<'_, N> {
         best.depth - tolerance(self.pair, self.options, best.depth)
     }
 
-    /// Support points along n and against it, n being between two directions or anywhere.
-    fn direction(&mut self, n: Vector3<f64>, between: Option<[u16; 2]>, best: &Best<'_>) -> Option<Direction> {
+    /// Support points along each n and against it; none if one of them can not be found.
+    fn directions(&mut self, wanted: &[Wanted], best: &Best<'_>) -> Option<[Option<Direction>; GROUP]> {
         let pair = self.pair;
-        let ends = between.map(|ends| ends.map(|i| self.covering.directions()[usize::from(i)]));
-        // Far above the best depth a rough bound will do.
+        let mut sought = [[Sought::default(); GROUP]; 2];
+        for (k, want) in wanted.iter().enumerate() {
+            let tolerance = self.tolerated(want, best) * pair.unit();
+            sought[0][k] = Sought { n: -want.n, tolerance };
+            sought[1][k] = Sought { n: pair.direction_to_b(&want.n), tolerance };
+        }
+        let of_a = dispatch(Farthest { body: pair.a.body, sought: &sought[0][..wanted.len()] });
+        let of_b = dispatch(Farthest { body: pair.b.body, sought: &sought[1][..wanted.len()] });
+        let mut found = [None; GROUP];
+        for (k, want) in wanted.iter().enumerate() {
+            found[k] = Some(self.direction(want, best, [of_a[k], of_b[k]])?);
+        }
+        Some(found)
+    }
+
+    /// What support points along n may lack, query units: far above the best depth a rough bound will do.
+    fn tolerated(&self, Wanted { n, between }: &Wanted, best: &Best<'_>) -> f64 {
         let known = if best.depth.is_finite() { best.depth.abs() } else { self.size };
-        let surplus = ends.map_or(0.0, |ends| ends.iter().map(|end| n.dot(&end.w())).fold(0.0, f64::max) - known);
-        let tolerance = (0.1 * tolerance(pair, self.options, known)).max(0.02 * surplus);
+        let depth = |end: u16| n.dot(&self.covering.directions()[usize::from(end)].w());
+        let surplus = between.map_or(0.0, |ends| ends.into_iter().map(depth).fold(0.0, f64::max) - known);
+        (0.1 * tolerance(self.pair, self.options, known)).max(0.02 * surplus)
+    }
+
+    /// The direction with its support points, which are sought in another way where they were not found.
+    fn direction(
+        &mut self,
+        want: &Wanted,
+        best: &Best<'_>,
+        [of_a, of_b]: [Option<(Vector3<f64>, usize)>; 2],
+    ) -> Option<Direction> {
+        let Wanted { n, between } = *want;
+        let (pair, tolerance) = (self.pair, self.tolerated(want, best));
+        let ends = between.map(|ends| ends.map(|i| self.covering.directions()[usize::from(i)]));
         let (a, b) = (&pair.a, &pair.b);
         let to_a = |x: &Vector3<f64>| pair.a_to_query(&(x + a.body.normalization().center));
         let to_b = |y: &Vector3<f64>| pair.b_to_query(&(y + b.body.normalization().center));
-        let of_a = dispatch(Farthest { body: a.body, n: -n, tolerance: tolerance * pair.unit() });
-        let of_b = dispatch(Farthest { body: b.body, n: pair.direction_to_b(&n), tolerance: tolerance * pair.unit() });
         let a = match of_a {
             Some((x, active)) => SupportPoint { x: to_a(&x), active: 1 << active },
             None => {
@@ -349,20 +386,37 @@ impl<const N: usize> Sweep<'_, N> {
         });
     }
 
-    fn split(&mut self, cell: Cell, best: &Best<'_>) -> bool {
-        let ([i, j, k], n) = self.covering.widest_edge(cell.corners);
-        let Some(middle) = self.middle(i, j, n, best) else { return false };
-        self.open([i, middle, k], best);
-        self.open([middle, j, k], best);
-        true
-    }
-
-    fn middle(&mut self, i: u16, j: u16, n: Vector3<f64>, best: &Best<'_>) -> Option<u16> {
-        if let Some(index) = self.covering.middle(i, j) {
-            return Some(index);
+    /// Splits the lowest triangles; if that can not be done all stays as it is.
+    fn split(&mut self, best: &Best<'_>) -> bool {
+        let (mut cells, mut count) = ([None; GROUP], 0);
+        let (mut wanted, mut missing) = ([Wanted { n: Vector3::zeros(), between: None }; GROUP], 0);
+        while count < GROUP
+            && let Some(cell) = self.covering.pop()
+        {
+            let ([i, j, k], n) = self.covering.widest_edge(cell.corners);
+            cells[count] = Some((cell, [i, j, k]));
+            count += 1;
+            let ends = [i.min(j), i.max(j)];
+            let known = self.covering.middle(i, j).is_some();
+            if !known && wanted[..missing].iter().all(|other| other.between != Some(ends)) {
+                wanted[missing] = Wanted { n, between: Some(ends) };
+                missing += 1;
+            }
         }
-        let direction = self.direction(n, Some([i, j]), best)?;
-        Some(self.covering.add_middle(direction))
+        let found = if missing > 0 { self.directions(&wanted[..missing], best) } else { Some([None; GROUP]) };
+        let Some(found) = found else {
+            cells.into_iter().flatten().for_each(|(cell, _)| self.covering.push(cell));
+            return false;
+        };
+        for direction in found.into_iter().flatten() {
+            self.covering.add_middle(direction);
+        }
+        for (_, [i, j, k]) in cells.into_iter().flatten() {
+            let Some(middle) = self.covering.middle(i, j) else { return false };
+            self.open([i, middle, k], best);
+            self.open([middle, j, k], best);
+        }
+        true
     }
 
     /// Whether a direction far from the best is about as good, or one near it may be better.
@@ -374,7 +428,7 @@ impl<const N: usize> Sweep<'_, N> {
         let close = best.depth + 2.0 * best.tolerance();
         let elsewhere = |n_other: &Vector3<f64>| n_other.dot(&n) < ELSEWHERE;
         // Symmetric bodies have the mirror image of the best, which may lie between all directions known.
-        let opposite = self.direction(-n, None, best);
+        let opposite = self.directions(&[Wanted { n: -n, between: None }], best).and_then(|[opposite, ..]| opposite);
         let others = self.covering.directions().iter().filter(|direction| elsewhere(&direction.n));
         let Some(least) = others.chain(&opposite).min_by(|p, q| p.depth().total_cmp(&q.depth())) else { return false };
         if least.depth() <= close {

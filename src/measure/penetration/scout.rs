@@ -2,8 +2,8 @@
 //! nothing: it only spares the proof from being about a way that is not the shortest.
 
 use crate::measure::pair::Pair;
-use crate::measure::vector::dot;
-use crate::polynomial::{Simd, WithSimd};
+use crate::measure::vector::{V3, apply_transposed, dot, rows};
+use crate::polynomial::{Lanes, MAX_LANES, Number, Simd, WithSimd};
 use nalgebra::Vector3;
 
 /// The look, as work for the widest arithmetic.
@@ -14,34 +14,60 @@ pub(super) struct Scout<'a> {
 /// Directions along each edge of the faces of a cube.
 const STEPS: usize = 5;
 
+/// All directions, in whole vectors.
+const COUNT: usize = (6 * STEPS * STEPS).next_multiple_of(MAX_LANES);
+
+/// The x, y and z of all directions, of any length; the last again where vectors are to be filled.
+static DIRECTIONS: [[f64; COUNT]; 3] = {
+    let mut columns = [[0.0; COUNT]; 3];
+    let mut k = 0;
+    while k < COUNT {
+        let index = if k < 6 * STEPS * STEPS { k } else { 6 * STEPS * STEPS - 1 };
+        let (face, i, j) = (index / (STEPS * STEPS), index / STEPS % STEPS, index % STEPS);
+        columns[face / 2][k] = if face % 2 == 0 { 1.0 } else { -1.0 };
+        columns[(face / 2 + 1) % 3][k] = (2 * i + 1) as f64 / STEPS as f64 - 1.0;
+        columns[(face / 2 + 2) % 3][k] = (2 * j + 1) as f64 / STEPS as f64 - 1.0;
+        k += 1;
+    }
+    columns
+};
+
 impl WithSimd for Scout<'_> {
     type Output = (Vector3<f64>, f64);
 
     /// The best of the directions, a unit vector from B to A, and about how deep A is in B along it; query frame.
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> (Vector3<f64>, f64) {
-        let (pair, a, b) = (self.pair, self.pair.a.body, self.pair.b.body);
-        let (outline_a, outline_b) = (a.outline(), b.outline());
-        let offset = pair.a_to_query(&a.normalization().center) - pair.b_to_query(&b.normalization().center);
-        let mut best = (f64::INFINITY, Vector3::x());
-        for face in 0..6 {
-            for i in 0..STEPS {
-                for j in 0..STEPS {
-                    let across = |k: usize| (2 * k + 1) as f64 / STEPS as f64 - 1.0;
-                    let mut n = Vector3::zeros();
-                    n[face / 2] = if face % 2 == 0 { 1.0 } else { -1.0 };
-                    (n[(face / 2 + 1) % 3], n[(face / 2 + 2) % 3]) = (across(i), across(j));
-                    let own = pair.direction_to_b(&n);
-                    let x = outline_a.point(outline_a.place(simd, [-n.x, -n.y, -n.z]));
-                    let y = outline_b.point(outline_b.place(simd, own.into()));
-                    let along = dot::<S, f64>(own.into(), y) - dot::<S, f64>(n.into(), x);
-                    let depth = (along / pair.unit() - n.dot(&offset)) / n.norm();
-                    if depth < best.0 {
-                        best = (depth, n);
-                    }
-                }
+        let pair = self.pair;
+        let splat = |value: f64| Lanes::<S>::splat(simd, value);
+        let (outline_a, outline_b) = (pair.a.body.outline(), pair.b.body.outline());
+        let offset =
+            pair.a_to_query(&pair.a.body.normalization().center) - pair.b_to_query(&pair.b.body.normalization().center);
+        let offset = [splat(offset.x), splat(offset.y), splat(offset.z)];
+        let (rotation, unit) = (rows(simd, &pair.rotation), splat(1.0 / pair.unit()));
+        let (mut least, mut best): (Lanes<S>, V3<Lanes<S>>) = (splat(f64::INFINITY), [splat(0.0); 3]);
+        for from in (0..COUNT).step_by(Lanes::<S>::COUNT) {
+            let mut n = best;
+            for (n, column) in n.iter_mut().zip(&DIRECTIONS) {
+                *n = Lanes::load(simd, &column[from..]);
+            }
+            let own = apply_transposed(&rotation, n);
+            let x = outline_a.point(simd, outline_a.place(simd, [-n[0], -n[1], -n[2]]));
+            let y = outline_b.point(simd, outline_b.place(simd, own));
+            let along = (dot(own, y) - dot(n, x)) * unit;
+            let depth = (along - dot(n, offset)) / dot(n, n).sqrt();
+            let better = depth.le(least);
+            least = depth.select(better, least);
+            for (best, n) in best.iter_mut().zip(n) {
+                *best = n.select(better, *best);
             }
         }
-        (best.1.normalize(), best.0)
+        let mut columns = [[f64::INFINITY; MAX_LANES]; 4];
+        for (number, column) in best.into_iter().chain([least]).zip(&mut columns) {
+            number.store(column);
+        }
+        let [x, y, z, depths] = columns;
+        let lane = (0..Lanes::<S>::COUNT).min_by(|&i, &j| depths[i].total_cmp(&depths[j])).unwrap_or_default();
+        (Vector3::new(x[lane], y[lane], z[lane]).normalize(), depths[lane])
     }
 }
