@@ -155,7 +155,7 @@ pub(super) fn measure(
                 })
                 .collect();
             let mut cell = Cell::judged((Method::LevelZero, format!("{tolerance:e}")), few, &said, *size_m);
-            cell.nanoseconds = median(&answers.iter().map(|found| found.nanoseconds).collect::<Vec<_>>());
+            cell.nanoseconds = answers.iter().map(|found| found.nanoseconds).sum::<f64>() / answers.len() as f64;
             cells.push(cell);
         }
     }

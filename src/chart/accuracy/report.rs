@@ -45,7 +45,7 @@ const DRAWN: f64 = 10.0;
 
 const NOTES: &str = "\
 - Errors and widths are parts of the circumradius of the smaller body, medians over the poses unless a column says otherwise. The truth is the middle of the \
-narrowest bracket of ours; no error is told below half of its width, which each case states. Times are means per query, one thread; of clarabel, asked about fewer poses, medians.
+narrowest bracket of ours; no error is told below half of its width, which each case states. Times are means per query, one thread; clarabel is asked about fewer poses.
 - The poses of fitted bodies are random, gaps between 0.5 and 37 % of the larger diameter (seeds 1, 2, ... of SplitMix64, one for each pose); the flat faces of \
 two superellipsoids of degree 8 are turned against each other by 1e-4 to 1e-2 rad, 1 to 30 cm apart. `warm` and `pose before` know the answer a step \
 before: a hundredth of half the diameter and a degree, or a centimetre along the faces.
