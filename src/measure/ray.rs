@@ -1,7 +1,8 @@
 //! Ray cast: where a ray enters a body.
 //!
 //! Along a ray every constraint is a convex polynomial of one variable. Its values and slopes bound the entry from both
-//! sides ([`Entry`]); its curvature says where to look next. All in the normalized coordinates of the body, into which the
+//! sides ([`Entry`]); its curvature says where to look next, and an interpolation of its values, which proves nothing, where to
+//! look first. All in the normalized coordinates of the body, into which the
 //! ray is taken once: `z(τ) = z_0 + τ ż`, τ measured from the point closest to the centre of the circumscribed ball, so that
 //! a far origin costs one rounding of its own size and no more.
 
@@ -200,7 +201,7 @@ fn earlier(one: &RayCast, other: &RayCast, tolerance: f64) -> RayCast {
     }
 }
 
-/// Most evaluations along one ray; 1 or 2 are usual, and halving the bracket alone would need about 50.
+/// Most evaluations along one ray; from outside 1 or 2 are usual, and halving the bracket alone would need about 50.
 const MAX_STEPS: u32 = 96;
 
 fn cast_at(body: &Body, pose: &Pose, ray: &Ray, tolerance: f64, options: &Options<'_>) -> RayCast {
@@ -308,7 +309,10 @@ impl<'a> Along<'a> {
         let far = entry.from.abs().max(entry.to.abs());
         let extent = body.z_extent() + start_error;
         let slab = (extent + velocity_error * far) * (1.0 + 1e-14);
-        for i in (0..3).filter(|&i| velocity[i] != 0.0) {
+        for i in 0..3 {
+            if velocity[i] == 0.0 && start[i].abs() <= slab[i] {
+                continue;
+            }
             let [one, other] = [-slab[i], slab[i]].map(|side| (side - start[i]) / velocity[i]);
             entry.clip(one.min(other), one.max(other));
         }
@@ -336,7 +340,9 @@ impl<'a> Along<'a> {
         let (middle, half) = (0.5 * (entry.from + entry.to), 0.5 * (entry.to - entry.from));
         let (z, step) = (self.start + self.velocity * middle, self.velocity * half);
         let entered = |polynomial: &Polynomial| middle + half * polynomial.first_below_along(&z, &step, 1.0);
-        self.body.constraints().iter().map(|c| entered(&c.polynomial)).fold(entry.from, f64::max) + beyond
+        let last = self.body.constraints().iter().map(|c| entered(&c.polynomial)).fold(entry.from, f64::max);
+        // Beyond the interval nothing is proven.
+        (last + beyond).min(entry.to)
     }
 
     /// All constraints at τ = s: cuts the interval with their tangents.
@@ -418,6 +424,25 @@ mod tests {
             to = to.min(one.max(other));
         }
         (from <= to).then_some(from)
+    }
+
+    #[test]
+    fn rays_that_end_before_the_surface_do_not_hit() {
+        let ball = Body::ball("ball", Vector3::zeros(), 1.0).unwrap();
+        for seed in 0..2000 {
+            let mut random = Seeded(seed);
+            let pose = random_pose(&mut random, 1.0);
+            let d = if seed % 2 == 0 { Vector3::repeat(1.0).normalize() } else { unit(&mut random) };
+            let aside = d.cross(&unit(&mut random)) * if seed % 3 == 0 { 0.0 } else { 1.1 * random.signed().abs() };
+            let Some(truth) = ball_entry(1.0, &(aside - d * 3.0), &d) else { continue };
+            let short = 10_f64.powi(-2 - (seed % 9) as i32);
+            let origin = pose.transform_point(&(aside - d * 3.0));
+            let ray = Ray::new(origin, pose.transform_direction(&d), truth - short).unwrap();
+            let accuracy = [1.0, 1e-3, 1e-6, 1e-9][(seed / 9 % 4) as usize];
+            let options = Options::default().with_accuracy(accuracy).unwrap();
+            let found = cast_ray(&ball, &pose, &ray, &options);
+            assert!(found.hit().is_none(), "seed {seed}, {short} short, accuracy {accuracy}: {found:?}");
+        }
     }
 
     #[test]

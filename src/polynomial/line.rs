@@ -56,7 +56,6 @@ impl Scheme {
 /// `f(t) = p(middle + t half)`, -1 <= t <= 1, from its values, as a task.
 struct Line<'a> {
     nested: &'a Nested,
-    degree: usize,
     middle: &'a Vector3<f64>,
     half: &'a Vector3<f64>,
     level: f64,
@@ -64,13 +63,8 @@ struct Line<'a> {
 
 /// About the first t in [-1, 1] at which f, if convex, falls to `level`; where f is lowest, of equidistant t, if at none of these it lies
 /// below. A guess: nothing is proven of it.
-pub(super) fn first_below(
-    (nested, degree): (&Nested, usize),
-    middle: &Vector3<f64>,
-    half: &Vector3<f64>,
-    level: f64,
-) -> f64 {
-    dispatch(Line { nested, degree, middle, half, level })
+pub(super) fn first_below(nested: &Nested, middle: &Vector3<f64>, half: &Vector3<f64>, level: f64) -> f64 {
+    dispatch(Line { nested, middle, half, level })
 }
 
 impl WithSimd for Line<'_> {
@@ -78,11 +72,12 @@ impl WithSimd for Line<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> f64 {
-        let scheme = &SCHEMES[self.degree / 2 - 1];
+        let scheme = &SCHEMES[self.nested.degree() / 2 - 1];
         let (values, coefficients) = self.interpolate(simd, scheme);
-        let (nodes, values) = (&scheme.nodes[..=self.degree], &values[..=self.degree]);
+        let (nodes, values) = (&scheme.nodes[..=self.nested.degree()], &values[..=self.nested.degree()]);
         let Some(k) = values.iter().position(|&value| value <= self.level) else {
-            let lowest = (0..=self.degree).min_by(|&i, &j| values[i].total_cmp(&values[j])).unwrap_or_default();
+            let lowest =
+                (0..=self.nested.degree()).min_by(|&i, &j| values[i].total_cmp(&values[j])).unwrap_or_default();
             return nodes[lowest];
         };
         if k == 0 {
@@ -93,7 +88,7 @@ impl WithSimd for Line<'_> {
         let mut t = nodes[k - 1] + share * (nodes[k] - nodes[k - 1]);
         for _ in 0..STEPS {
             let (mut value, mut slope) = (0.0, 0.0);
-            for &c in coefficients[..=self.degree].iter().rev() {
+            for &c in coefficients[..=self.nested.degree()].iter().rev() {
                 slope = Number::<S>::mul_add(slope, t, value);
                 value = Number::<S>::mul_add(value, t, c);
             }
@@ -118,7 +113,7 @@ impl Line<'_> {
     fn interpolate<S: Simd>(&self, simd: S, scheme: &Scheme) -> ([f64; MOST], [f64; MOST]) {
         let splat = |v: f64| Lanes::<S>::splat(simd, v);
         let (mut values, mut coefficients) = ([0.0; MOST], [0.0; MOST]);
-        for from in (0..=self.degree).step_by(Lanes::<S>::COUNT) {
+        for from in (0..=self.nested.degree()).step_by(Lanes::<S>::COUNT) {
             let t = Lanes::<S>::load(simd, &scheme.nodes[from..]);
             let mut z = [t; 3];
             for i in 0..3 {
@@ -127,9 +122,9 @@ impl Line<'_> {
             // The compiler leaves out what only derivatives need.
             self.nested.jet(simd, z).value.store(&mut values[from..]);
         }
-        for from in (0..=self.degree).step_by(Lanes::<S>::COUNT) {
+        for from in (0..=self.nested.degree()).step_by(Lanes::<S>::COUNT) {
             let mut sum = splat(0.0);
-            for (value, row) in values[..=self.degree].iter().zip(&scheme.basis) {
+            for (value, row) in values[..=self.nested.degree()].iter().zip(&scheme.basis) {
                 sum = splat(*value).mul_add(Lanes::load(simd, &row[from..]), sum);
             }
             sum.store(&mut coefficients[from..]);
@@ -152,7 +147,7 @@ mod tests {
             let degree = [2, 4, 6, 8][(seed % 4) as usize];
             let p = Polynomial::new(monomials(degree).into_iter().map(|e| (e, random.signed())).collect()).unwrap();
             let [middle, half] = [0.5, 1.5].map(|size| Vector3::from_fn(|_, _| size * random.signed()));
-            let line = Line { nested: &p.nested, degree, middle: &middle, half: &half, level: 1.0 };
+            let line = Line { nested: &p.nested, middle: &middle, half: &half, level: 1.0 };
             let (values, coefficients) = line.interpolate(Scalar, &SCHEMES[degree / 2 - 1]);
             let largest = values.iter().fold(1.0, |most: f64, value| most.max(value.abs()));
             for i in 0..=50 {

@@ -132,7 +132,7 @@ impl Polynomial {
     /// low if it hardly does. A guess: nothing is proven of it.
     #[inline]
     pub fn first_below_along(&self, middle: &Vector3<f64>, half: &Vector3<f64>, level: f64) -> f64 {
-        line::first_below((&self.nested, self.degree()), middle, half, level)
+        line::first_below(&self.nested, middle, half, level)
     }
 
     /// Bound of `|computed value - p(z')|` over all `z'` with `|z'_i - z_i| <= dz_i`, `gradient` being the computed one.

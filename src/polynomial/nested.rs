@@ -40,6 +40,10 @@ impl Nested {
         Self { degree, coefficients }
     }
 
+    pub(super) fn degree(&self) -> usize {
+        self.degree
+    }
+
     /// Value, gradient and Hessian, to be inlined into work for [`super::dispatch`].
     #[inline(always)]
     pub(super) fn jet<S: Simd, N: Number<S>>(&self, simd: S, z: [N; 3]) -> NumberJet<N> {

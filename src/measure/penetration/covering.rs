@@ -45,7 +45,7 @@ impl Direction {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cell {
     pub(super) corners: [u16; 3],
-    /// About the bound that was found.
+    /// At most about this is the bound.
     pub(super) guess: f64,
 }
 
@@ -73,8 +73,9 @@ impl<const N: usize> Covering<N> {
         &self.directions[..self.len]
     }
 
-    /// Whether so many more triangles can be split.
+    /// Whether so many of the open triangles, or all if there are fewer, can be split.
     pub(super) fn has_room(&self, splits: usize) -> bool {
+        let splits = splits.min(self.open);
         self.len + splits <= N && self.open + splits <= 2 * N
     }
 
@@ -233,8 +234,8 @@ impl<const N: usize> Covering<N> {
     }
 }
 
-/// `min over unit n in the cone of the n_i of max_i n·w_i`, from below, if that is found to be at least `enough`; else about
-/// what it is.
+/// `min over unit n in the cone of the n_i of max_i n·w_i`, from below, if that is found to be at least `enough`; else what it is
+/// at most, or about that.
 fn lower_bound(n: [Vector3<f64>; 3], w: [Vector3<f64>; 3], enough: f64) -> Result<f64, f64> {
     // A negative r proves nothing.
     let enough = enough.max(f64::MIN_POSITIVE);

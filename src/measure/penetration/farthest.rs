@@ -10,7 +10,7 @@
 //! leaves an error of the order of its square, and what that costs along e is of the square again. Taylor's formula proves how
 //! far the end of the last step is from the best, and a point of the body beside it.
 
-use crate::body::Body;
+use crate::body::{Body, Cell};
 use crate::measure::tangent::Side;
 use crate::measure::vector::{
     V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, rows, scaled,
@@ -54,8 +54,10 @@ impl WithSimd for Farthest<'_> {
             }
         } else {
             for (sought, found) in sought.iter().zip(&mut found) {
-                let active = body.outline().active(body.outline().place::<S, f64>(simd, sought.n.into()));
-                let (x, proven) = farthest::<S, f64>(simd, body, active, sought.n.into(), sought.tolerance);
+                let n: V3<f64> = sought.n.into();
+                let cell = body.outline().cell(simd, n);
+                let active = body.outline().active(cell.place);
+                let (x, proven) = farthest(simd, (body, active), &cell, n, sought.tolerance);
                 let holds = proven > 0.0 && Side::at_home(simd, body, active).others_hold(simd, x);
                 *found = holds.then(|| (x.into(), active));
             }
@@ -80,7 +82,8 @@ fn in_lanes<S: Simd>(simd: S, body: &Body, sought: &[Sought], found: &mut [Optio
         *loaded = Lanes::load(simd, column);
     }
     let [x, y, z, tolerance] = loaded;
-    let (x, proven) = farthest(simd, body, 0, [x, y, z], tolerance);
+    let n = [x, y, z];
+    let (x, proven) = farthest(simd, (body, 0), &body.outline().cell(simd, n), n, tolerance);
     for (number, column) in [x[0], x[1], x[2], proven].into_iter().zip(&mut columns) {
         number.store(column);
     }
@@ -90,14 +93,20 @@ fn in_lanes<S: Simd>(simd: S, body: &Body, sought: &[Sought], found: &mut [Optio
     }
 }
 
-/// The point farthest along unit vectors n as far as one constraint goes, and 1 where that is proven, 0 where it is not.
+/// The point farthest along unit vectors n, in these cells of the outline, as far as one constraint goes; and 1 where that is proven, 0
+/// where it is not.
 #[inline(always)]
-fn farthest<S: Simd, N: Number<S>>(simd: S, body: &Body, active: usize, n: V3<N>, tolerance: N) -> (V3<N>, N) {
+fn farthest<S: Simd, N: Number<S>>(
+    simd: S,
+    (body, active): (&Body, usize),
+    cell: &Cell<N>,
+    n: V3<N>,
+    tolerance: N,
+) -> (V3<N>, N) {
     let (zero, one) = (N::splat(simd, 0.0), N::splat(simd, 1.0));
     let side = Side::at_home(simd, body, active);
     let inverse = rows(simd, body.inverse());
     let e = apply_transposed(&inverse, n);
-    let cell = body.outline().cell(simd, n);
     let mut x = add(cell.point, apply_symmetric(&cell.turn, n));
     let axes = side.localize(simd, &[[one, zero, zero], [zero, one, zero], [zero, zero, one]]);
     let (mut best, mut proven, mut open) = (x, zero, one);
@@ -144,3 +153,45 @@ fn step<S: Simd, N: Number<S>>(simd: S, jet: &NumberJet<N>, e: V3<N>) -> (V3<N>,
 
 /// Longest step, in normalized coordinates, that the linearization may mean anything for.
 const LONGEST: f64 = 0.5;
+
+#[cfg(test)]
+mod tests {
+    use super::{Farthest, Sought};
+    use crate::body::Body;
+    use crate::measure::tests::unit;
+    use crate::polynomial::dispatch;
+    use crate::polynomial::tests::Seeded;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn points_are_as_far_as_they_can_be_whoever_their_neighbours_are() {
+        let half = Vector3::new(0.9, 0.4, 0.6);
+        let mut missing = 0;
+        for seed in 0..200 {
+            let mut random = Seeded(seed);
+            let degree = [2_u8, 4, 6, 8][seed as usize % 4];
+            let body = if degree == 2 {
+                Body::ellipsoid("egg", Vector3::zeros(), half)
+            } else {
+                Body::superellipsoid("q", Vector3::zeros(), half, degree)
+            };
+            let body = body.unwrap();
+            let tolerance = 10_f64.powi(-3 - (seed % 6) as i32);
+            let sought: Vec<Sought> = (0..8).map(|_| Sought { n: unit(&mut random), tolerance }).collect();
+            let found = dispatch(Farthest { body: &body, sought: &sought });
+            for (k, (one, Sought { n, .. })) in found.iter().zip(&sought).enumerate() {
+                assert_eq!(dispatch(Farthest { body: &body, sought: &sought[k..=k] })[0], *one, "seed {seed}, {k}");
+                // Hölder's inequality: with 1/p + 1/q = 1 the largest n·x is the q-norm of n scaled by the half-axes.
+                let q = f64::from(degree) / f64::from(degree - 1);
+                let most = n.component_mul(&half).map(|v| v.abs().powf(q)).sum().powf(1.0 / q);
+                let Some((x, _)) = one else {
+                    missing += 1;
+                    continue;
+                };
+                assert!(body.value(x) <= 1.0 + 1e-12, "seed {seed}, {k}");
+                assert!((most - tolerance..=most + 1e-12).contains(&n.dot(x)), "seed {seed}, {k}");
+            }
+        }
+        assert!(missing < 400, "{missing} of 1 600");
+    }
+}

@@ -294,8 +294,10 @@ impl<const N: usize> Sweep<'_, N> {
     fn directions(&mut self, wanted: &[Wanted], best: &Best<'_>) -> Option<[Option<Direction>; GROUP]> {
         let pair = self.pair;
         let mut sought = [[Sought::default(); GROUP]; 2];
+        let mut tolerated = [0.0; GROUP];
         for (k, want) in wanted.iter().enumerate() {
-            let tolerance = self.tolerated(want, best) * pair.unit();
+            tolerated[k] = self.tolerated(want, best);
+            let tolerance = tolerated[k] * pair.unit();
             sought[0][k] = Sought { n: -want.n, tolerance };
             sought[1][k] = Sought { n: pair.direction_to_b(&want.n), tolerance };
         }
@@ -303,7 +305,7 @@ impl<const N: usize> Sweep<'_, N> {
         let of_b = dispatch(Farthest { body: pair.b.body, sought: &sought[1][..wanted.len()] });
         let mut found = [None; GROUP];
         for (k, want) in wanted.iter().enumerate() {
-            found[k] = Some(self.direction(want, best, [of_a[k], of_b[k]])?);
+            found[k] = Some(self.direction(want, tolerated[k], [of_a[k], of_b[k]])?);
         }
         Some(found)
     }
@@ -319,12 +321,11 @@ impl<const N: usize> Sweep<'_, N> {
     /// The direction with its support points, which are sought in another way where they were not found.
     fn direction(
         &mut self,
-        want: &Wanted,
-        best: &Best<'_>,
+        &Wanted { n, between }: &Wanted,
+        tolerance: f64,
         [of_a, of_b]: [Option<(Vector3<f64>, usize)>; 2],
     ) -> Option<Direction> {
-        let Wanted { n, between } = *want;
-        let (pair, tolerance) = (self.pair, self.tolerated(want, best));
+        let pair = self.pair;
         let ends = between.map(|ends| ends.map(|i| self.covering.directions()[usize::from(i)]));
         let (a, b) = (&pair.a, &pair.b);
         let to_a = |x: &Vector3<f64>| pair.a_to_query(&(x + a.body.normalization().center));
@@ -344,8 +345,7 @@ impl<const N: usize> Sweep<'_, N> {
             }
         };
         self.error = self.error.max(pair.a.displacement(&a.x) + pair.b.displacement(&b.x));
-        let parents = between.map_or([0, 0], |[i, j]| [i.min(j), i.max(j)]);
-        Some(Direction { n, a, b, parents })
+        Some(Direction { n, a, b, parents: between.unwrap_or_default() })
     }
 
     /// Tries the best of the directions from `first` on, if it promises to be better than the best known.
@@ -386,33 +386,37 @@ impl<const N: usize> Sweep<'_, N> {
         });
     }
 
-    /// Splits the lowest triangles; if that can not be done all stays as it is.
+    /// Splits the lowest triangles; false if that can not be done, all staying as it is.
     fn split(&mut self, best: &Best<'_>) -> bool {
+        // Each with the middle of its widest edge if that is known, else where it is wanted.
         let (mut cells, mut count) = ([None; GROUP], 0);
         let (mut wanted, mut missing) = ([Wanted { n: Vector3::zeros(), between: None }; GROUP], 0);
         while count < GROUP
             && let Some(cell) = self.covering.pop()
         {
             let ([i, j, k], n) = self.covering.widest_edge(cell.corners);
-            cells[count] = Some((cell, [i, j, k]));
+            let between = Some([i.min(j), i.max(j)]);
+            let shared = wanted[..missing].iter().position(|other| other.between == between);
+            let middle = match (self.covering.middle(i, j), shared) {
+                (Some(known), _) => Ok(known),
+                (None, Some(shared)) => Err(shared),
+                (None, None) => {
+                    wanted[missing] = Wanted { n, between };
+                    missing += 1;
+                    Err(missing - 1)
+                }
+            };
+            cells[count] = Some((cell, [i, j, k], middle));
             count += 1;
-            let ends = [i.min(j), i.max(j)];
-            let known = self.covering.middle(i, j).is_some();
-            if !known && wanted[..missing].iter().all(|other| other.between != Some(ends)) {
-                wanted[missing] = Wanted { n, between: Some(ends) };
-                missing += 1;
-            }
         }
         let found = if missing > 0 { self.directions(&wanted[..missing], best) } else { Some([None; GROUP]) };
         let Some(found) = found else {
-            cells.into_iter().flatten().for_each(|(cell, _)| self.covering.push(cell));
+            cells.into_iter().flatten().for_each(|(cell, ..)| self.covering.push(cell));
             return false;
         };
-        for direction in found.into_iter().flatten() {
-            self.covering.add_middle(direction);
-        }
-        for (_, [i, j, k]) in cells.into_iter().flatten() {
-            let Some(middle) = self.covering.middle(i, j) else { return false };
+        let added = found.map(|direction| direction.map_or(0, |direction| self.covering.add_middle(direction)));
+        for (_, [i, j, k], middle) in cells.into_iter().flatten() {
+            let middle = middle.unwrap_or_else(|wanted| added[wanted]);
             self.open([i, middle, k], best);
             self.open([middle, j, k], best);
         }

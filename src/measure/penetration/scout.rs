@@ -2,7 +2,7 @@
 //! nothing: it only spares the proof from being about a way that is not the shortest.
 
 use crate::measure::pair::Pair;
-use crate::measure::vector::{V3, apply_transposed, dot, rows};
+use crate::measure::vector::{apply_transposed, dot, rows};
 use crate::polynomial::{Lanes, MAX_LANES, Number, Simd, WithSimd};
 use nalgebra::Vector3;
 
@@ -45,9 +45,9 @@ impl WithSimd for Scout<'_> {
             pair.a_to_query(&pair.a.body.normalization().center) - pair.b_to_query(&pair.b.body.normalization().center);
         let offset = [splat(offset.x), splat(offset.y), splat(offset.z)];
         let (rotation, unit) = (rows(simd, &pair.rotation), splat(1.0 / pair.unit()));
-        let (mut least, mut best): (Lanes<S>, V3<Lanes<S>>) = (splat(f64::INFINITY), [splat(0.0); 3]);
+        let (mut least, mut best) = (splat(f64::INFINITY), splat(0.0));
         for from in (0..COUNT).step_by(Lanes::<S>::COUNT) {
-            let mut n = best;
+            let mut n = [least; 3];
             for (n, column) in n.iter_mut().zip(&DIRECTIONS) {
                 *n = Lanes::load(simd, &column[from..]);
             }
@@ -56,18 +56,16 @@ impl WithSimd for Scout<'_> {
             let y = outline_b.point(simd, outline_b.place(simd, own));
             let along = (dot(own, y) - dot(n, x)) * unit;
             let depth = (along - dot(n, offset)) / dot(n, n).sqrt();
-            let better = depth.le(least);
-            least = depth.select(better, least);
-            for (best, n) in best.iter_mut().zip(n) {
-                *best = n.select(better, *best);
-            }
+            let worse = least.le(depth);
+            least = least.select(worse, depth);
+            best = best.select(worse, splat(from as f64));
         }
-        let mut columns = [[f64::INFINITY; MAX_LANES]; 4];
-        for (number, column) in best.into_iter().chain([least]).zip(&mut columns) {
-            number.store(column);
-        }
-        let [x, y, z, depths] = columns;
-        let lane = (0..Lanes::<S>::COUNT).min_by(|&i, &j| depths[i].total_cmp(&depths[j])).unwrap_or_default();
-        (Vector3::new(x[lane], y[lane], z[lane]).normalize(), depths[lane])
+        let mut columns = [[f64::INFINITY; MAX_LANES]; 2];
+        least.store(&mut columns[0]);
+        best.store(&mut columns[1]);
+        // Of directions as good the first, whatever the number of lanes.
+        let lanes = (0..Lanes::<S>::COUNT).map(|lane| (columns[0][lane], columns[1][lane] as usize + lane));
+        let (depth, k) = lanes.min_by(|p, q| p.0.total_cmp(&q.0).then(p.1.cmp(&q.1))).unwrap_or_default();
+        (Vector3::from_fn(|i, _| DIRECTIONS[i][k]).normalize(), depth)
     }
 }
