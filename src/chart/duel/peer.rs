@@ -24,6 +24,14 @@ pub enum PeerError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// A signal or a panic ended the program.
+    #[error("{} crashed: {reason}", program.display())]
+    Crashed {
+        /// The program.
+        program: PathBuf,
+        /// How it ended, and what it said.
+        reason: String,
+    },
     /// The program failed, or said what it should not.
     #[error("{}: {reason}", program.display())]
     Program {
@@ -54,14 +62,40 @@ pub(in crate::chart) fn named(variable: &'static str, what: &'static str) -> Res
     if path.is_file() { Ok(Some(path)) } else { Err(PeerError::NoProgram { variable, path, what }) }
 }
 
+/// What a Rust program exits with after a panic.
+const PANICKED: i32 = 101;
+
 /// What a program prints, if it ends well.
 ///
 /// # Errors
-/// [`PeerError::Io`] or [`PeerError::Program`].
+/// [`PeerError::Io`], [`PeerError::Crashed`] or [`PeerError::Program`].
 pub(in crate::chart) fn printed(program: &Path, command: &mut Command) -> Result<Vec<u8>, PeerError> {
     let output = command.output().map_err(PeerError::io(program))?;
-    if output.status.success() {
-        return Ok(output.stdout);
+    let said = String::from_utf8_lossy(&output.stderr);
+    match output.status.code() {
+        Some(0) => Ok(output.stdout),
+        // Ended by a signal, it has no code.
+        None | Some(PANICKED) => Err(PeerError::Crashed {
+            program: program.to_owned(),
+            reason: format!("{}; {}", output.status, said.trim()),
+        }),
+        Some(_) => Err(PeerError::program(program, format!("failed: {}", said.trim()))),
     }
-    Err(PeerError::program(program, format!("failed: {}", String::from_utf8_lossy(&output.stderr).trim())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn crashes_are_told_from_refusals() {
+        let shell = Path::new("/bin/sh");
+        let run = |script: &str| printed(shell, Command::new(shell).args(["-c", script]));
+        assert_eq!(run("echo fine").unwrap(), b"fine\n");
+        for crash in ["kill -ABRT $$", "echo index out of bounds >&2; exit 101"] {
+            assert!(matches!(run(crash), Err(PeerError::Crashed { .. })), "{crash}");
+        }
+        let refused = run("echo no such file >&2; exit 1").unwrap_err();
+        assert!(matches!(&refused, PeerError::Program { reason, .. } if reason.contains("no such file")), "{refused}");
+    }
 }
