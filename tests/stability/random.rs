@@ -5,7 +5,12 @@ use sublevel::measure::Pose;
 
 /// Number of random queries: `few`, or 1e5 where `SUBLEVEL_LONG` is set.
 pub(crate) fn draws(few: u64) -> u64 {
-    if std::env::var_os("SUBLEVEL_LONG").is_some() { 100_000 } else { few }
+    few_or(few, 100_000)
+}
+
+/// Number of draws of a family that takes long: `few`, or `many` where `SUBLEVEL_LONG` is set.
+pub(crate) fn few_or(few: u64, many: u64) -> u64 {
+    if std::env::var_os("SUBLEVEL_LONG").is_some() { many } else { few }
 }
 
 /// SplitMix64.

@@ -16,7 +16,7 @@ pub mod sweep;
 pub(in crate::chart) use coal::points_text;
 pub use coal::{Coal, CoalRun};
 pub use error::DuelError;
-pub use parry::{Hulls, NoHull, parry_impact, parry_pose, parry_version};
+pub use parry::{Flight, Hulls, NoHull, parry_impact, parry_pose, parry_version};
 pub use peer::PeerError;
 pub use random::Random;
 pub use shelf::{Shelf, ShelfError};

@@ -36,21 +36,28 @@ pub fn parry_version() -> String {
     locked("parry3d-f64")
 }
 
-/// When a box of these half-extents, spinning at `spin` (rad/s, world) about its centre from `start`, strikes a ball that stands
-/// `still`, within `duration` seconds; none if it is not found to.
-pub fn parry_impact(
-    half: &Vector3<f64>,
-    start: &Pose,
-    spin: &Vector3<f64>,
-    radius: f64,
-    still: &Pose,
-    duration: f64,
-) -> Option<f64> {
-    let vector = |v: &Vector3<f64>| Vector::new(v.x, v.y, v.z);
-    let motion = NonlinearRigidMotion::new(parry_pose(start), Vector::ZERO, Vector::ZERO, vector(spin));
-    let stands = NonlinearRigidMotion::constant_position(parry_pose(still));
-    let (blade, ball) = (Cuboid::new(vector(half)), Ball::new(radius));
-    let found = cast_shapes_nonlinear(&motion, &blade, &stands, &ball, 0.0, duration, true);
+/// A rigid motion of a body about the origin of its frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Flight {
+    /// Pose at time 0.
+    pub start: Pose,
+    /// Velocity of the origin, m/s, world.
+    pub velocity: Vector3<f64>,
+    /// Angular velocity, rad/s, world.
+    pub spin: Vector3<f64>,
+}
+
+impl Flight {
+    fn motion(&self) -> NonlinearRigidMotion {
+        let vector = |v: &Vector3<f64>| Vector::new(v.x, v.y, v.z);
+        NonlinearRigidMotion::new(parry_pose(&self.start), Vector::ZERO, vector(&self.velocity), vector(&self.spin))
+    }
+}
+
+/// When a box of these half-extents and a ball, metres, meet within `duration` seconds; none if they are not found to.
+pub fn parry_impact((half, a): (&Vector3<f64>, &Flight), (radius, b): (f64, &Flight), duration: f64) -> Option<f64> {
+    let (cuboid, ball) = (Cuboid::new(Vector::new(half.x, half.y, half.z)), Ball::new(radius));
+    let found = cast_shapes_nonlinear(&a.motion(), &cuboid, &b.motion(), &ball, 0.0, duration, true);
     found.ok()?.map(|hit| hit.time_of_impact)
 }
 

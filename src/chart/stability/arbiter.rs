@@ -8,7 +8,7 @@ use super::case::Case;
 use crate::body::{Body, fibonacci_lattice};
 use crate::measure::Pose;
 use crate::polynomial::Jet;
-use nalgebra::{Matrix3xX, Vector3};
+use nalgebra::{Matrix3, Matrix3xX, Vector3};
 
 /// Directions that are tried whatever is proposed.
 const LATTICE: usize = 200;
@@ -40,6 +40,15 @@ impl Truth {
 
 /// The best bounds for a case; a known value is taken for granted.
 pub(super) fn judge(case: &Case, proposals: &[Proposal]) -> Truth {
+    judge_along(case, proposals, fibonacci_lattice(LATTICE))
+}
+
+/// As [`judge`], with these directions, unit vectors, in place of some all around.
+pub(super) fn judge_along(
+    case: &Case,
+    proposals: &[Proposal],
+    directions: impl IntoIterator<Item = Vector3<f64>>,
+) -> Truth {
     let Case { a, pose_a, b, pose_b, .. } = case;
     let sizes = a.circumscribed().radius + b.circumscribed().radius;
     let apart = pose_a.translation() - pose_b.translation();
@@ -58,7 +67,7 @@ pub(super) fn judge(case: &Case, proposals: &[Proposal]) -> Truth {
             truth.lower = truth.lower.max(case.height_at(&n, proposal));
         }
     }
-    for n in fibonacci_lattice(LATTICE) {
+    for n in directions {
         truth.lower = truth.lower.max(case.height(&n));
     }
     truth
@@ -77,8 +86,10 @@ impl Case {
         let Some([x, y]) = proposal.points else { return self.height(n) };
         let (x, y) = (drawn_in(a, pose_a, &x), drawn_in(b, pose_b, &y));
         let [of_a, of_b] = &proposal.active;
-        let reaches = tangent_reach(a, pose_a, &-n, &x, of_a) + tangent_reach(b, pose_b, n, &y, of_b);
-        self.height(n).max(n.dot(&(pose_a.translation() - pose_b.translation())) - reaches)
+        // Of each body the better bound.
+        let of_a = tangent_reach(a, pose_a, &-n, &x, of_a).min(reach(a, pose_a, &-n));
+        let of_b = tangent_reach(b, pose_b, n, &y, of_b).min(reach(b, pose_b, n));
+        n.dot(&(pose_a.translation() - pose_b.translation())) - of_a - of_b
     }
 }
 
@@ -121,6 +132,9 @@ fn tangent_reach(body: &Body, pose: &Pose, n: &Vector3<f64>, x: &Vector3<f64>, a
     plane_reach(body, &n, x, &samples)
 }
 
+/// Share of a surface's mean curvature that is added to its curvatures: of higher degree it has none across a plane of symmetry.
+const RIDGE: f64 = 1e-9;
+
 /// Steps of Newton's method towards the point farthest along a direction.
 const POLISH: usize = 8;
 
@@ -128,7 +142,8 @@ const POLISH: usize = 8;
 fn newton_step(jet: &Jet, n: &Vector3<f64>) -> Option<Vector3<f64>> {
     let g = jet.gradient;
     let m = n.dot(&g) / g.norm_squared();
-    let inverse = (jet.hessian * m).try_inverse()?;
+    let curvature = jet.hessian * m;
+    let inverse = (curvature + Matrix3::from_diagonal_element(RIDGE * curvature.trace())).try_inverse()?;
     let (of_n, of_g) = (inverse * (n - g * m), inverse * g);
     let rise = (g.dot(&of_n) - (1.0 - jet.value)) / g.dot(&of_g);
     let step = of_n - of_g * rise;

@@ -2,6 +2,7 @@
 
 use super::zoo::ZooError;
 use crate::body::Body;
+use crate::chart::duel::PeerError;
 use crate::measure::{OptionsError, Pose, PoseError};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -80,7 +81,7 @@ pub enum Verdict {
     NoAnswer,
     /// It took longer than the limit, and was stopped.
     Hang,
-    /// It ended the process.
+    /// It ended its process by a signal or a panic.
     Crash,
 }
 
@@ -106,7 +107,7 @@ impl fmt::Display for Verdict {
             Self::WrongStatus(what) => write!(f, "wrong status: {what}"),
             Self::NoAnswer => f.write_str("no answer"),
             Self::Hang => f.write_str("hangs"),
-            Self::Crash => f.write_str("ends the process"),
+            Self::Crash => f.write_str("crashes"),
         }
     }
 }
@@ -123,7 +124,26 @@ pub(super) enum CaseError {
     /// Options of a query.
     #[error(transparent)]
     Options(#[from] OptionsError),
+    /// A peer's program crashed, which is a verdict on it.
+    #[error("{0}")]
+    Crashed(String),
     /// What else there is.
     #[error("{0}")]
     Other(String),
+}
+
+impl CaseError {
+    /// An error that says enough by its words.
+    pub(super) fn other(error: impl std::error::Error) -> Self {
+        Self::Other(error.to_string())
+    }
+}
+
+impl From<PeerError> for CaseError {
+    fn from(error: PeerError) -> Self {
+        match error {
+            PeerError::Crashed { .. } => Self::Crashed(error.to_string()),
+            PeerError::NoProgram { .. } | PeerError::Io { .. } | PeerError::Program { .. } => Self::other(error),
+        }
+    }
 }

@@ -5,7 +5,10 @@ use super::case::{Case, CaseError, Verdict};
 use crate::body::{Body, fibonacci_lattice};
 use crate::chart::duel::{Coal, Hulls, PeerError, motion::Trajectory, parry_pose};
 use crate::chart::rivals::{Clarabel, ConicProgram, Posed, between, newton, slsqp};
-use crate::measure::{Distance, MAX_ITERATIONS, Options, Pose, Status, WarmStart, distance, distance_batch};
+use crate::measure::{
+    Distance, MAX_ITERATIONS, Options, Pose, SignedDistance, Status, WarmStart, distance, distance_batch,
+    signed_distance,
+};
 use crate::optimize::{Corner, gjk};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::path::Path;
@@ -26,6 +29,9 @@ const SLSQP_EVALUATIONS: u32 = 1000;
 
 /// Tolerance of clarabel: its default.
 const CLARABEL: f64 = 1e-8;
+
+/// Rounding of a polynomial's value on the surface.
+const LEVEL: f64 = 1e-12;
 
 /// Width of the bracket from which proposals come, relative to the smaller body.
 const TIGHT: f64 = 1e-12;
@@ -114,6 +120,16 @@ impl Method {
     }
 }
 
+/// What a method says of a case, and what that is worth.
+#[derive(Clone, Debug)]
+pub(super) struct Said {
+    pub(super) verdict: Verdict,
+    /// The distance, metres, where it found one.
+    pub(super) value: Option<f64>,
+    /// All of the answer, if it is one of ours.
+    pub(super) answer: Option<Distance>,
+}
+
 /// An answer of somebody else.
 pub(super) struct Reply {
     /// The distance, metres; none if it says that it found none.
@@ -126,8 +142,18 @@ pub(super) struct Reply {
 impl Case {
     /// Puts the case to a method, and judges what it says. None where the method can not be asked.
     pub(super) fn put(&self, method: Method) -> Result<Option<Verdict>, CaseError> {
+        Ok(self.hear(method)?.map(|said| said.verdict))
+    }
+
+    /// As [`Case::put`], with what was said.
+    pub(super) fn hear(&self, method: Method) -> Result<Option<Said>, CaseError> {
         if method.is_ours() {
-            return Ok(Some(self.verdict(&self.ours(method)?)?));
+            let answer = self.ours(method)?;
+            return Ok(Some(Said {
+                verdict: self.verdict(&answer)?,
+                value: Some(answer.value()),
+                answer: Some(answer),
+            }));
         }
         // Others have other limits.
         if self.limit.is_some() {
@@ -135,7 +161,12 @@ impl Case {
         }
         let Some(reply) = self.ask(method)? else { return Ok(None) };
         let truth = reply.own.map_or_else(|| self.truth(std::slice::from_ref(&reply.proposal)), Ok)?;
-        Ok(Some(reply.verdict(&truth, self)))
+        Ok(Some(Said { verdict: reply.verdict(&truth, self), value: reply.value, answer: None }))
+    }
+
+    /// How much answers of a method may differ from the truth, metres.
+    pub(super) fn slack(&self, method: Method) -> f64 {
+        self.small() * if method.is_ours() { self.accuracy } else { PEER_ERROR }
     }
 
     /// Our answer.
@@ -149,7 +180,7 @@ impl Case {
                 poses[4] = *pose_b;
                 let mut answers = [Distance::default(); 9];
                 let solved = distance_batch(a, pose_a, b, &poses, &options, &mut answers);
-                solved.map_err(|error| CaseError::Other(error.to_string()))?;
+                solved.map_err(CaseError::other)?;
                 answers[4]
             }
             Method::Warm => {
@@ -161,6 +192,26 @@ impl Case {
         })
     }
 
+    /// What another measure of ours says, by the pose of the second body: without a hint, or warm with that of the pose nearby.
+    pub(super) fn measured<T>(
+        &self,
+        method: Method,
+        measure: impl Fn(&Pose, &mut WarmStart) -> T,
+    ) -> Result<T, CaseError> {
+        let mut warm = WarmStart::default();
+        if method == Method::Warm {
+            measure(&self.pose_nearby()?, &mut warm);
+        }
+        Ok(measure(&self.pose_b, &mut warm))
+    }
+
+    /// Our signed distance.
+    pub(super) fn signed(&self, method: Method) -> Result<SignedDistance, CaseError> {
+        let Self { a, pose_a, b, .. } = self;
+        let options = self.options()?;
+        self.measured(method, |pose_b, warm| signed_distance(a, pose_a, b, pose_b, &options, warm))
+    }
+
     /// Nearest points and normal as a method finds them. None where it can not be asked: of hulls they are others.
     pub(super) fn proposed(&self, method: Method) -> Result<Option<Proposal>, CaseError> {
         match method {
@@ -168,15 +219,6 @@ impl Case {
             Method::Newton => Ok(self.ask(method)?.map(|reply| reply.proposal)),
             Method::Slsqp | Method::Clarabel | Method::Parry | Method::Coal => Ok(None),
         }
-    }
-
-    /// The distance as a method finds it, metres, if it finds one; and the accuracy it may be held to, relative to the smaller body.
-    /// None where it can not be asked.
-    pub(super) fn value(&self, method: Method) -> Result<Option<(Option<f64>, f64)>, CaseError> {
-        if method.is_ours() {
-            return Ok(Some((Some(self.ours(method)?.value()), self.accuracy)));
-        }
-        Ok(self.ask(method)?.map(|reply| (reply.value, PEER_ERROR)))
     }
 
     fn options(&self) -> Result<Options<'static>, CaseError> {
@@ -204,37 +246,62 @@ impl Case {
 
     /// Judges an answer of ours: its bracket, its status, its error.
     pub(super) fn verdict(&self, answer: &Distance) -> Result<Verdict, CaseError> {
+        Ok(self.verdict_by(answer, &self.truth(&[proposal(answer)])?))
+    }
+
+    /// As [`Case::verdict`], by a truth that is known.
+    pub(super) fn verdict_by(&self, answer: &Distance, truth: &Truth) -> Verdict {
         let Distance { lower, upper, status, iterations, .. } = *answer;
         let small = self.small();
         if !(lower >= 0.0 && lower <= upper && upper.is_finite()) {
-            return Ok(Verdict::WrongStatus(format!("the bracket is [{lower:e}, {upper:e}]")));
+            return Verdict::WrongStatus(format!("the bracket is [{lower:e}, {upper:e}]"));
         }
         let width = upper - lower;
         let is_narrow = width <= self.accuracy * small * (1.0 + 1e-12);
         if status == Status::Converged && !is_narrow {
-            return Ok(Verdict::WrongStatus(format!("converged with a bracket of {width:e} m")));
+            return Verdict::WrongStatus(format!("converged with a bracket of {width:e} m"));
         }
         if status == Status::BracketWide && self.limit.is_none() && width > self.floor {
-            return Ok(Verdict::WrongStatus(format!("the bracket is still wide, {width:e} m")));
+            return Verdict::WrongStatus(format!("the bracket is still wide, {width:e} m"));
         }
-        if self.limit.is_some_and(|limit| iterations > limit) {
-            return Ok(Verdict::WrongStatus(format!("{iterations} iterations")));
+        if iterations > self.limit.unwrap_or(MAX_ITERATIONS) {
+            return Verdict::WrongStatus(format!("{iterations} iterations"));
         }
-        let truth = self.truth(&[proposal(answer)])?;
         // Points that were proposed may all be wrong: they decide only where directions confirm them.
-        if truth.upper - truth.lower > (self.accuracy * small).max(self.floor) + 2.0 * truth.floor {
-            return Ok(Verdict::WrongStatus(format!("not confirmed: [{:e}, {:e}] m", truth.lower, truth.upper)));
+        if !self.is_known_by(truth) {
+            return Verdict::WrongStatus(format!("not confirmed: [{:e}, {:e}] m", truth.lower, truth.upper));
         }
         let apart = (answer.witness_a - answer.witness_b).norm();
         if !(apart <= upper + truth.floor && apart >= lower - truth.floor) {
-            return Ok(Verdict::WrongStatus(format!("the witnesses are {apart:e} m apart")));
+            return Verdict::WrongStatus(format!("the witnesses are {apart:e} m apart"));
         }
         let outside = (truth.lower - truth.floor - upper).max(lower - truth.upper - truth.floor);
         if outside > 0.0 {
-            return Ok(Verdict::Off(outside / small));
+            return Verdict::Off(outside / small);
+        }
+        let beyond = self.beyond(answer, truth.floor);
+        if !(beyond <= 0.0) {
+            return Verdict::WrongStatus(format!("a witness is outside of its body, by {beyond:e} of its level"));
         }
         let error = truth.error(answer.value());
-        Ok(if self.bound.is_some_and(|bound| error > bound) { Verdict::Off(error / small) } else { Verdict::Pass })
+        if self.bound.is_some_and(|bound| error > bound) { Verdict::Off(error / small) } else { Verdict::Pass }
+    }
+
+    /// Whether bounds meet as nearly as an answer to this case has to.
+    pub(super) fn is_known_by(&self, truth: &Truth) -> bool {
+        truth.upper - truth.lower <= (self.accuracy * self.small()).max(self.floor) + 2.0 * truth.floor
+    }
+
+    /// How far the witnesses are outside of their bodies, as levels of the polynomials, beyond what coordinates that are rounded by
+    /// `floor` metres explain.
+    fn beyond(&self, answer: &Distance, floor: f64) -> f64 {
+        let of = |body: &Body, pose: &Pose, x: &Vector3<f64>| {
+            let x = pose.rotation().inverse_transform_vector(&(x - pose.translation()));
+            let samples = body.constraints().iter().map(|constraint| body.placement().sample(constraint, &x));
+            let levels = samples.map(|sample| sample.value() - 1.0 - sample.gradient().norm() * floor - LEVEL);
+            levels.fold(f64::NEG_INFINITY, f64::max)
+        };
+        of(&self.a, &self.pose_a, &answer.witness_a).max(of(&self.b, &self.pose_b, &answer.witness_b))
     }
 
     /// The answer of somebody else; none if it can not be asked.
@@ -258,7 +325,7 @@ impl Case {
                 Some(plain(Some(value)))
             }
             Method::Clarabel => {
-                let Some(solver) = Clarabel::find().map_err(|error| other(&error))? else { return Ok(None) };
+                let Some(solver) = Clarabel::find()? else { return Ok(None) };
                 let posed = [(&self.a, &self.pose_a), (&self.b, &self.pose_b)];
                 let unit = self.small();
                 let program = ConicProgram::distance(posed, unit);
@@ -275,7 +342,7 @@ impl Case {
                 Some(Reply { value: Some(hulls.distance(&relative)), own, ..plain(None) })
             }
             Method::Coal => {
-                let Some(coal) = Coal::from_environment().map_err(|error| other(&error))? else { return Ok(None) };
+                let Some(coal) = Coal::from_environment()? else { return Ok(None) };
                 let (a, b, relative) = (sampled(&self.a), sampled(&self.b), self.relative()?);
                 let value = in_folder(|folder| coal_distance(&coal, folder, [&a, &b], relative))?;
                 Some(Reply { value, own: Some(polytopes(&a, &b, &relative, self.small())), ..plain(None) })
@@ -318,17 +385,13 @@ fn coal_distance(
 }
 
 /// Does something with a folder of this process alone, which is removed afterwards.
-fn in_folder<T, E: std::error::Error>(work: impl FnOnce(&Path) -> Result<T, E>) -> Result<T, CaseError> {
+fn in_folder<T>(work: impl FnOnce(&Path) -> Result<T, PeerError>) -> Result<T, CaseError> {
     let folder = std::env::temp_dir().join(format!("sublevel-stability-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).map_err(|error| other(&error))?;
+    std::fs::create_dir_all(&folder).map_err(PeerError::io(&folder))?;
     let done = work(&folder);
     // What stays is in the folder for temporary files.
     let _ = std::fs::remove_dir_all(&folder);
-    done.map_err(|error| other(&error))
-}
-
-fn other(error: &dyn std::error::Error) -> CaseError {
-    CaseError::Other(error.to_string())
+    Ok(done?)
 }
 
 /// Most times that the search for the distance of hulls goes on from the direction it found.

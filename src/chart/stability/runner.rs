@@ -1,6 +1,6 @@
 //! Cases in processes of their own: what hangs is stopped, what crashes takes nothing with it.
 
-use super::case::Verdict;
+use super::case::{CaseError, Verdict};
 use super::families::{FAMILIES, Family};
 use super::method::Method;
 use serde::{Deserialize, Serialize};
@@ -88,6 +88,7 @@ pub fn serve(share: &Share, as_json: bool, out: &mut impl Write) -> std::io::Res
         for seed in share.from..share.to {
             let verdict = match family.put(seed, share.method) {
                 Ok(verdict) => verdict,
+                Err(CaseError::Crashed(_)) => Some(Verdict::Crash),
                 Err(error) => Some(Verdict::WrongStatus(format!("the case can not be put: {error}"))),
             };
             if as_json {

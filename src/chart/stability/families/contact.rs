@@ -1,40 +1,82 @@
 //! Touching, flat and nearly touching bodies: 1, 3, 8, 13, 14, 15.
 
 use super::super::case::{Case, CaseError, Verdict};
-use super::super::method::{Method, pose};
+use super::super::method::{Method, Said, pose};
 use super::super::zoo::{c, e, p, q};
+use super::derivatives::both_sides;
 use super::{at, moved_to, random, somewhere, strewn};
 use crate::body::Body;
-use crate::measure::Pose;
+use crate::measure::{DEFAULT_ACCURACY, Pose, Status};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Normals may be off by about this.
 const NORMAL: f64 = 1e-6;
 
-/// Coaxial, gaps of both signs from none to an ulp of the offset to a centimetre.
-pub(super) fn kissing(seed: u64) -> Result<Case, CaseError> {
+/// Neighbouring gaps of a case of kissing contact; the last one is the first of the next case.
+const RUN: usize = 4;
+
+/// Runs that go through all 31 gaps.
+const RUNS: u64 = 10;
+
+/// Coaxial, along one of the axes, at gaps that follow each other from a centimetre of overlap to a centimetre apart, over an ulp of the
+/// offset and none.
+pub(super) fn kissing(seed: u64) -> Result<Vec<Case>, CaseError> {
     let mut random = random(1, seed);
-    let (a, b) = match random.index(4) {
-        0 => (e(0.5, 0.5, 0.5)?, e(1.0, 0.25, 2.0)?),
-        1 => (e(1.0, 0.25, 2.0)?, e(0.5, 0.5, 0.5)?),
-        2 => (q(8, 1.0, 0.5, 0.25)?, q(8, 0.5, 2.0, 1.0)?),
-        _ => (q(8, 0.25, 1.0, 1.0)?, q(8, 0.25, 0.5, 0.125)?),
+    let all = 12 * RUNS;
+    let index = strewn(seed, all);
+    let (axis, first) = ((index / 4 % 3) as usize, (index / 12) as usize * (RUN - 1));
+    let ball = [0.5; 3];
+    // Beyond the first round of all settings with other sizes.
+    let mut size = |usual: f64| if seed < all { usual } else { usual * random.between(0.5, 2.0) };
+    let mut sizes = |usual: [f64; 3]| usual.map(&mut size);
+    let (degree, halves_a, halves_b) = match index % 4 {
+        0 => (2, ball, sizes([1.0, 0.25, 2.0])),
+        1 => (2, sizes([1.0, 0.25, 2.0]), ball),
+        2 => (8, sizes([1.0, 0.5, 0.25]), sizes([0.5, 2.0, 1.0])),
+        _ => (8, sizes([0.25, 1.0, 1.0]), sizes([0.25, 0.5, 0.125])),
     };
-    let axis = random.index(3);
-    let half = |body: &Body| 1.0 / body.normalization().linear[(axis, axis)];
-    let offset = half(&a) + half(&b);
-    let sign = if random.index(2) == 0 { 1.0 } else { -1.0 };
-    let gap = sign
-        * match random.index(16) {
-            0 => 0.0,
-            1 => offset.next_up() - offset,
-            k => 10_f64.powi(-(k as i32)),
-        };
-    let place = at(Vector3::ith(axis, offset + gap))?;
-    // The offset is rounded; what it is past the half-axes is exact.
-    let exact = (place.translation()[axis] - offset).max(0.0);
-    let case = Case::new(&a, Pose::identity(), &b, place, format!("along axis {axis}, gap {gap:e} m"));
-    Ok(Case { accuracy: 1e-13, exact: Some(exact), bound: Some(1e-12), floor: 1e-12, ..case })
+    let make = |[x, y, z]: [f64; 3]| if degree == 2 { e(x, y, z) } else { q(degree, x, y, z) };
+    let (a, b) = (make(halves_a)?, make(halves_b)?);
+    let offset = halves_a[axis] + halves_b[axis];
+    let ulp = offset.next_up() - offset;
+    let mut gaps: Vec<f64> = (2..=15).map(|k| 10_f64.powi(-k)).chain([ulp]).flat_map(|gap| [-gap, gap]).collect();
+    gaps.push(0.0);
+    gaps.sort_by(f64::total_cmp);
+    let case = |gap: &f64| {
+        let place = at(Vector3::ith(axis, offset + gap))?;
+        // The offset is rounded; what it is past the half-axes is exact.
+        let exact = (place.translation()[axis] - offset).max(0.0);
+        let case = Case::new(&a, Pose::identity(), &b, place, format!("along axis {axis}, gap {gap:e} m"));
+        Ok(Case { accuracy: 1e-13, exact: Some(exact), bound: Some(1e-12), floor: 1e-12, ..case })
+    };
+    gaps[first..first + RUN].iter().map(case).collect()
+}
+
+/// From gap to gap no value falls, and no normal leaves the axis.
+pub(super) fn rising(heard: &[(Case, Said)], method: Method) -> Result<Verdict, CaseError> {
+    let mut last = f64::NEG_INFINITY;
+    for (case, said) in heard {
+        let Some(value) = said.value else { return Ok(Verdict::NoAnswer) };
+        let offset = case.pose_b.translation();
+        let slack = if method.is_ours() { 4.0 * f64::EPSILON * offset.norm() } else { 2.0 * case.slack(method) };
+        if !(value >= last - slack) {
+            return Ok(Verdict::Off((last - value) / case.small()));
+        }
+        last = value;
+        let Some(answer) = &said.answer else { continue };
+        match answer.normal {
+            // From the second body to the first.
+            Some(n) => {
+                let angle = (n + offset.normalize()).norm();
+                if !(angle <= NORMAL) {
+                    return Ok(Verdict::Off(angle));
+                }
+            }
+            None if answer.lower > 0.0 => return Ok(Verdict::NoAnswer),
+            None => {}
+        }
+    }
+    Ok(Verdict::Pass)
 }
 
 /// Faces of degree 8, gap 1e-3 to 1e-12, tilt 1e-9 to 1e-3 rad.
@@ -51,25 +93,34 @@ pub(super) fn parallel_faces(seed: u64) -> Result<Case, CaseError> {
     Ok(Case::new(&a, Pose::identity(), &b, place, format!("gap {gap:e} m, tilt {tilt:e} rad")))
 }
 
-/// Touching pairs: the height along the normal is the distance up to what a deviation of [`NORMAL`] costs.
+/// Touching pairs: the height along the normal is the distance up to what a deviation of [`NORMAL`] costs; and without a gap, on both
+/// sides of contact, the signed distance has the slopes that it says.
 pub(super) fn normal(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
     let mut random = random(8, seed);
     let zoo = [e(1.0, 0.6, 0.8)?, q(4, 0.5, 0.7, 0.9)?, c(4, 0.6, 0.4)?, p(6, 0.7)?, q(6, 0.3, 1.0, 0.6)?];
     let (a, b) = (&zoo[random.index(zoo.len())], &zoo[random.index(zoo.len())]);
-    let gap = [1e-3, 1e-6, 1e-9, 1e-12][(seed % 4) as usize];
+    let gap = [1e-3, 1e-6, 1e-9, 1e-12, 0.0][(seed % 5) as usize];
     let apart = Case::new(a, somewhere(&mut random, 0.3)?, b, somewhere(&mut random, 4.0)?, format!("gap {gap:e} m"));
-    let case = Case { accuracy: 1e-13, floor: 1e-12, ..moved_to(apart, gap)? };
+    let case = moved_to(Case { accuracy: 1e-13, floor: 1e-12, ..apart }, gap)?;
     let Some(proposal) = case.proposed(method)? else { return Ok(None) };
     let truth = case.truth(std::slice::from_ref(&proposal))?;
     let between = || proposal.points.and_then(|[x, y]| (x - y).try_normalize(0.0));
-    let Some(n) = proposal.normal.or_else(between) else {
+    if let Some(n) = proposal.normal.or_else(between) {
+        let lost = truth.upper - case.height_at(&n, &proposal) - truth.floor;
+        // Turned by an angle, the height falls by half its square times the bodies' curvature radii, or less.
+        let allowed = 8.0 * NORMAL * NORMAL * case.large();
+        if !(lost <= allowed) {
+            return Ok(Some(Verdict::Off((lost / case.large() / 8.0).sqrt())));
+        }
+    } else if truth.lower > 2.0 * truth.floor {
         // Nothing has to be said of a gap that may be none.
-        return Ok(Some(if truth.lower <= 2.0 * truth.floor { Verdict::Pass } else { Verdict::NoAnswer }));
-    };
-    let lost = truth.upper - case.height_at(&n, &proposal) - truth.floor;
-    // Turned by an angle, the height falls by half its square times the bodies' curvature radii, or less.
-    let allowed = 8.0 * NORMAL * NORMAL * case.large();
-    Ok(Some(if lost <= allowed { Verdict::Pass } else { Verdict::Off((lost / case.large() / 8.0).sqrt()) }))
+        return Ok(Some(Verdict::NoAnswer));
+    }
+    // Batches, and others, answer with distances alone, which have no slopes in overlap.
+    if gap > 0.0 || !matches!(method, Method::Cold | Method::Warm) {
+        return Ok(Some(Verdict::Pass));
+    }
+    both_sides(&Case { accuracy: DEFAULT_ACCURACY, ..case }, method).map(Some)
 }
 
 /// Flats of degree 8 a tenth apart: the error falls to the stated floor, beyond it the status tells.
@@ -114,15 +165,51 @@ pub(super) fn tips(seed: u64) -> Result<Case, CaseError> {
     Ok(Case::new(&flat, Pose::identity(), &tip, place, format!("gap {gap:e} m, {aside:e} m aside")))
 }
 
-/// 20 cm, 2 mm apart or into each other: error of at most 1e-10 m.
-pub(super) fn smooth(seed: u64) -> Result<Case, CaseError> {
+/// 20 cm, 2 mm apart or into each other, anywhere or along an axis: error of at most 1e-10 m.
+pub(super) fn smooth(seed: u64) -> Result<Vec<Case>, CaseError> {
     let mut random = random(15, seed);
-    let (a, b) = match seed % 3 {
-        0 => (e(0.2, 0.15, 0.1)?, e(0.1, 0.2, 0.12)?),
-        1 => (c(4, 0.1, 0.2)?, e(0.2, 0.1, 0.15)?),
-        _ => (q(4, 0.2, 0.1, 0.15)?, q(4, 0.1, 0.2, 0.2)?),
+    let (a, b, halves) = match seed % 4 {
+        0 => (e(0.2, 0.15, 0.1)?, e(0.1, 0.2, 0.12)?, 0.2 + 0.1),
+        1 => (c(4, 0.1, 0.2)?, e(0.2, 0.1, 0.15)?, 0.1 + 0.2),
+        2 => (q(4, 0.2, 0.1, 0.15)?, q(4, 0.1, 0.2, 0.2)?, 0.2 + 0.1),
+        _ => (e(0.2, 0.2, 0.2)?, e(0.1, 0.2, 0.12)?, 0.2 + 0.1),
     };
-    let gap = if (seed / 3).is_multiple_of(2) { 2e-3 } else { -2e-3 };
-    let apart = Case::new(&a, somewhere(&mut random, 0.1)?, &b, somewhere(&mut random, 1.0)?, format!("gap {gap:e} m"));
-    Ok(Case { bound: Some(1e-10), ..moved_to(apart, gap)? })
+    let gap = if (seed / 4).is_multiple_of(2) { GRAZE } else { -GRAZE };
+    let (pose_a, far) = (somewhere(&mut random, 0.1)?, somewhere(&mut random, 1.0)?);
+    if (seed / 8).is_multiple_of(4) {
+        let place = pose(pose_a.transform_point(&(Vector3::x() * (halves + gap))), pose_a.rotation())?;
+        let case = Case::new(&a, pose_a, &b, place, format!("along an axis, gap {gap:e} m"));
+        // Coordinates are rounded, far less than the error that is allowed.
+        return Ok(vec![Case {
+            accuracy: SMOOTH / case.small(),
+            exact: Some(gap.max(0.0)),
+            bound: Some(SMOOTH),
+            ..case
+        }]);
+    }
+    let apart = Case::new(&a, pose_a, &b, far, format!("gap {gap:e} m"));
+    // That is where they stand.
+    let placed = moved_to(Case { accuracy: 1e-13, ..apart }, gap)?;
+    Ok(vec![Case { accuracy: SMOOTH / placed.small(), bound: Some(SMOOTH), ..placed }])
+}
+
+/// Error of smooth shapes that is allowed, and their accuracy that is asked for, metres.
+const SMOOTH: f64 = 1e-10;
+
+/// Gap and depth of smooth shapes, metres.
+const GRAZE: f64 = 2e-3;
+
+/// The same of the depth: signed distances say it on both sides.
+pub(super) fn deep(heard: &[(Case, Said)], method: Method) -> Result<Verdict, CaseError> {
+    let [(case, said)] = heard else { return Ok(Verdict::Pass) };
+    if !matches!(method, Method::Cold | Method::Warm) {
+        return Ok(Verdict::Pass);
+    }
+    let truth = if said.value > Some(0.5 * GRAZE) { GRAZE } else { -GRAZE };
+    let answer = case.signed(method)?;
+    let error = (answer.value() - truth).abs();
+    if answer.tied || answer.status != Status::Converged {
+        return Ok(Verdict::WrongStatus(format!("{:?}, tied: {}", answer.status, answer.tied)));
+    }
+    Ok(if error <= SMOOTH { Verdict::Pass } else { Verdict::Off(error / case.small()) })
 }

@@ -8,9 +8,16 @@ use crate::chart::duel::{Hulls, parry_pose};
 use crate::measure::{
     Options, Pose, SignedDistance, Status, WarmStart, growth_distance, level_distance, signed_distance,
 };
+use nalgebra::Vector3;
 
 /// Offsets of a slide, from touching to concentric.
 const STEPS: u32 = 12;
+
+/// How near to both ends there are more of them, relative to the whole slide.
+const ENDS: [f64; 5] = [1e-3, 1e-6, 1e-9, 1e-12, 1e-15];
+
+/// Offset from the common centre, relative to the whole slide, up to which the mirrored way out is as short, and told.
+const MIRRORED: f64 = 1e-6;
 
 /// Deviation that others may have from what a signed distance does, relative to the smaller body.
 const PEER_ERROR: f64 = 1e-5;
@@ -26,7 +33,7 @@ struct Step {
 }
 
 /// A slide from touching to concentric. About their centres the bodies are their own mirror images: the signed distance falls all the
-/// way, by no more than the motion.
+/// way, by no more than the motion; ours tells how well it is known, that the way out is tied where it is, and has a way out everywhere.
 pub(super) fn slide(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
     if !matches!(method, Method::Cold | Method::Warm | Method::Parry) {
         return Ok(None);
@@ -59,10 +66,14 @@ pub(super) fn slide(seed: u64, method: Method) -> Result<Option<Verdict>, CaseEr
         }
         _ => None,
     };
+    let options = Options::default();
     let mut warm = WarmStart::default();
     let mut last: Option<Step> = None;
-    for k in 0..=STEPS {
-        let offset = inside * (1.05 - 1.05 * f64::from(k) / f64::from(STEPS));
+    let mut shares: Vec<f64> = (0..=STEPS).map(|k| 1.05 - 1.05 * f64::from(k) / f64::from(STEPS)).collect();
+    shares.extend(ENDS.iter().flat_map(|near| [1.0 - near, *near]));
+    shares.sort_by(|p, q| q.total_cmp(p));
+    for share in shares {
+        let offset = inside * share;
         let pose_b = place(offset)?;
         let (step, slack) = if let Some(hulls) = &hulls {
             let relative = parry_pose(&pose_a).inverse() * parry_pose(&pose_b);
@@ -72,12 +83,26 @@ pub(super) fn slide(seed: u64, method: Method) -> Result<Option<Verdict>, CaseEr
             if method == Method::Cold {
                 warm = WarmStart::default();
             }
-            let answer = signed_distance(a, &pose_a, b, &pose_b, &Options::default(), &mut warm);
-            let SignedDistance { status, lower, upper, tied, .. } = answer;
+            let answer = signed_distance(a, &pose_a, b, &pose_b, &options, &mut warm);
+            let SignedDistance { status, lower, upper, tied, normal, .. } = answer;
+            let what = |what: &str| {
+                let pair = format!("{}-{} at {share:e} of the slide", a.name(), b.name());
+                Ok(Some(Verdict::WrongStatus(format!("{pair}: {what}, [{lower:e}, {upper:e}] m"))))
+            };
+            let depth = if upper < 0.0 { -lower } else { 0.0 };
+            let allowed = (options.accuracy() * small).max(options.depth_accuracy() * depth) * (1.0 + 1e-12);
+            if !(lower <= upper) || (status == Status::Converged) != (upper - lower <= allowed) {
+                return what("the status is not what the bracket says");
+            }
+            if normal.is_none() {
+                return what("no way out");
+            }
+            if share < MIRRORED && !tied {
+                return what("the mirrored way out is not told");
+            }
             // Concentric balls have no way out that is better than others: wide is right there, and told as a tie.
             if status != Status::Converged && !(tied && upper - lower <= 1e-2 * lower.abs()) {
-                let pair = format!("{}-{} at {:.4} of the slide", a.name(), b.name(), offset / inside);
-                return Ok(Some(Verdict::WrongStatus(format!("{pair}: still wide, [{lower:e}, {upper:e}] m"))));
+                return what("still wide");
             }
             (Step { offset, value: answer.value(), lower, upper, tied }, 2e-9 * small)
         };
@@ -136,6 +161,9 @@ pub(super) fn saturation(seed: u64, method: Method) -> Result<Option<Verdict>, C
         }
         if level.status != Status::Converged {
             return Ok(Some(Verdict::WrongStatus("the level distance is still wide".into())));
+        }
+        if level.saturated && (level.multiplier != 0.0 || level.gradient_b.linear != Vector3::zeros()) {
+            return Ok(Some(Verdict::WrongStatus("saturated, and yet with a gradient".into())));
         }
     }
     Ok(Some(Verdict::Pass))
