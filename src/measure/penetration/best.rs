@@ -19,24 +19,39 @@ fn common(points: [SupportPoint; 4]) -> SupportPoint {
     SupportPoint { x: sum * 0.25, active }
 }
 
-/// Whether points of a difference of bodies, all at least that high along n, have between them a point on the axis along n, or
+/// Weights by which points of a difference of bodies, all at least that high along n, have a point on the axis along n between them, or
 /// one no farther from it than `near`: then no direction close to n shows a smaller depth, but for what they lack.
-fn surrounds(n: &Vector3<f64>, across: &Vector3<f64>, w: &[Vector3<f64>; 4], height: f64, near: f64) -> bool {
+fn surrounding(
+    n: &Vector3<f64>,
+    across: &Vector3<f64>,
+    w: &[Vector3<f64>; 4],
+    height: f64,
+    near: f64,
+) -> Option<[f64; 4]> {
     let other = n.cross(across);
     let p = w.map(|w| Vector2::new(w.dot(across), w.dot(&other)));
-    let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
     let passes = |(i, j): (usize, usize)| {
         let along: Vector2<f64> = p[j] - p[i];
         let share = (-p[i].dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        (p[i] + along * share).norm() <= near
+        let mut weights = [0.0; 4];
+        (weights[i], weights[j]) = (1.0 - share, share);
+        ((p[i] + along * share).norm() <= near).then_some(weights)
     };
     // Strictly: points all in line with the axis have nothing but their segments.
     let holds = |[i, j, k]: [usize; 3]| {
-        let turns = [p[i].perp(&p[j]), p[j].perp(&p[k]), p[k].perp(&p[i])];
-        turns.iter().all(|turn| *turn > 0.0) || turns.iter().all(|turn| *turn < 0.0)
+        let turns = [p[j].perp(&p[k]), p[k].perp(&p[i]), p[i].perp(&p[j])];
+        let sum: f64 = turns.iter().sum();
+        let mut weights = [0.0; 4];
+        [weights[i], weights[j], weights[k]] = turns.map(|turn| turn / sum);
+        let same = turns.iter().all(|turn| *turn > 0.0) || turns.iter().all(|turn| *turn < 0.0);
+        same.then_some(weights)
     };
-    let between = pairs.into_iter().any(passes) || [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]].into_iter().any(holds);
-    between && w.iter().all(|w| w.dot(n) >= height)
+    if !w.iter().all(|w| w.dot(n) >= height) {
+        return None;
+    }
+    let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+    let triangles = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]];
+    pairs.into_iter().find_map(passes).or_else(|| triangles.into_iter().find_map(holds))
 }
 
 /// First and last step of the search around a direction, as the tangent of the angle.
@@ -199,7 +214,16 @@ impl<'a> Best<'a> {
             }
             self.polish(&common(around.map(|found| found.2)), &common(around.map(|found| found.3)), &n);
             let w = around.map(|(_, _, a, b)| b.x - a.x);
-            self.settled |= self.n == Some(n) && surrounds(&n, &needle, &w, self.depth - 10.0 * enough, enough);
+            if !self.settled
+                && self.n == Some(n)
+                && let Some(weights) = surrounding(&n, &needle, &w, self.depth - 10.0 * enough, enough)
+            {
+                // Of flat faces and edges any point is farthest: these two are along n from each other.
+                let mean = |points: [&Vector3<f64>; 4]| points.iter().zip(weights).map(|(x, weight)| *x * weight).sum();
+                self.x = mean(around.each_ref().map(|found| &found.2.x));
+                self.y = mean(around.each_ref().map(|found| &found.3.x));
+                self.settled = true;
+            }
             if self.settled {
                 return;
             }
@@ -285,7 +309,7 @@ impl<'a> Best<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::surrounds;
+    use super::surrounding;
     use nalgebra::Vector3;
 
     #[test]
@@ -293,7 +317,10 @@ mod tests {
         let (n, x) = (Vector3::z(), Vector3::x());
         let at = |points: [(f64, f64); 4]| {
             let w = points.map(|(x, y)| Vector3::new(x, y, 1.0));
-            surrounds(&n, &x, &w, 1.0, 1e-9)
+            let Some(weights) = surrounding(&n, &x, &w, 1.0, 1e-9) else { return false };
+            let mean: Vector3<f64> = w.iter().zip(weights).map(|(w, weight)| w * weight).sum();
+            assert!((mean - n).norm() <= 1e-9 && weights.iter().all(|weight| *weight >= 0.0), "{weights:?}");
+            true
         };
         assert!(at([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]));
         assert!(at([(1.0, 1.0), (-2.0, -2.0), (1.0, 1.0), (-2.0, -2.0)]), "an edge across the axis");
@@ -304,6 +331,6 @@ mod tests {
         assert!(!at([(1.0, 1.0), (2.0, -1.0), (3.0, 1.0), (1.0, -1.0)]), "all on one side");
         // Too low.
         let low = [Vector3::new(1.0, 0.0, 0.5), Vector3::new(-1.0, 0.0, 1.0), Vector3::z(), Vector3::z()];
-        assert!(!surrounds(&n, &x, &low, 1.0, 1e-9));
+        assert!(surrounding(&n, &x, &low, 1.0, 1e-9).is_none());
     }
 }
