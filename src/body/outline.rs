@@ -287,7 +287,7 @@ mod tests {
     use super::Cell;
     use crate::body::Body;
     use crate::polynomial::tests::Seeded;
-    use crate::polynomial::{Lanes, Scalar, Simd, WithSimd, dispatch};
+    use crate::polynomial::{Lanes, Scalar, Simd, WithSimd, dispatch_lanes};
     use nalgebra::{Matrix3, Vector3};
 
     /// `point + turn n`.
@@ -360,7 +360,7 @@ mod tests {
         for _ in 0..200 {
             let mut directions = [[0.0; 16]; 3];
             directions.iter_mut().flatten().for_each(|entry| *entry = random.signed());
-            let found = dispatch(Look { body: &body, directions });
+            let found = dispatch_lanes(Look { body: &body, directions });
             for lane in 0..16 {
                 let cell = body.outline().cell::<_, f64>(Scalar, directions.map(|row| row[lane]));
                 assert_eq!([cell.point[1], cell.turn[5]], [found[0][lane], found[1][lane]]);

@@ -16,7 +16,7 @@ use super::tangent::{ALIGNED, Bend, Plane, Relative, Side, Step, bracket, moved,
 use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, subtract};
 use super::warm::WarmStart;
 use crate::body::{Body, Solid};
-use crate::polynomial::{Lanes, MAX_LANES, Number, NumberJet, Simd, WithSimd, dispatch};
+use crate::polynomial::{Lanes, MAX_LANES, Number, NumberJet, Simd, WithSimd, dispatch_lanes};
 use nalgebra::Vector3;
 
 /// Why a batch is refused.
@@ -97,7 +97,7 @@ fn in_lanes(
     answers: &mut [Distance],
 ) {
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
-    dispatch(Batch { a, pose_a, b, poses_b, options, tolerance, answers });
+    dispatch_lanes(Batch { a, pose_a, b, poses_b, options, tolerance, answers });
 }
 
 /// Rounds that a group of poses goes through together.
@@ -221,7 +221,7 @@ impl<N: Copy> Iterate<N> {
         let (bend_a, bend_b) = (Bend::new(simd, jet_a, &local.0), Bend::new(simd, jet_b, &local.1));
         let difference = apply(&frame, subtract(self.x, self.y));
         let zero = N::splat(simd, 0.0);
-        let step = newton(simd, (&a, &bend_a), (&b, &bend_b), difference, zero);
+        let (step, _) = newton(simd, (&a, &bend_a), (&b, &bend_b), difference, zero);
         let square = step.square(simd, limits);
         Linearized { frame, local, difference, step, square }
     }

@@ -13,6 +13,7 @@ mod bracket;
 mod curvature;
 mod decide;
 mod distance;
+mod drift;
 mod entry;
 mod growth;
 mod half_space;

@@ -4,7 +4,7 @@
 use super::decide::Goal;
 use super::pose::Pose;
 use super::start::{Start, facing, meeting};
-use super::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, Step, newton};
+use super::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, Response, Step, newton};
 use super::vector::{M3, V3, add, add_scaled, dot, subtract};
 use crate::body::Body;
 use crate::polynomial::Simd;
@@ -24,7 +24,7 @@ pub(super) trait Relation: Copy {
     }
 
     /// Newton's step from points with `difference = x - y` in the frame, whose third vector is the normal from B to A: towards
-    /// points with their difference along the normal. `smallest`: see [`newton`].
+    /// points with their difference along the normal; and how the solution answers motions. `smallest`: see [`newton`].
     #[inline(always)]
     fn newton<S: Simd>(
         &self,
@@ -34,8 +34,14 @@ pub(super) trait Relation: Copy {
         _frame: &M3<f64>,
         difference: V3<f64>,
         smallest: f64,
-    ) -> Step<f64> {
+    ) -> (Step<f64>, Response<f64>) {
         newton(simd, a, b, difference, smallest)
+    }
+
+    /// How far points with `difference = x - y` in the frame are from what the relation asks for, along the tangents.
+    #[inline(always)]
+    fn aside<S: Simd>(&self, _: S, _frame: &M3<f64>, difference: V3<f64>) -> [f64; 2] {
+        [difference[0], difference[1]]
     }
 
     /// What the bracket of the distance at points with `difference = x - y` in the frame says of the measure.

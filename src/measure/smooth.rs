@@ -1,73 +1,91 @@
 //! Measures by continuation: from the last answer of a pair along its motion, where one constraint of each body is active.
 //!
-//! What a hint keeps of the last answer is where it was attained and both constraints' value, gradient and Hessian there, each
-//! in its own body's coordinates, where they stay true however the bodies move. So the first Newton step at new poses needs
-//! no evaluation: it is the sensitivity of the last answer to the motion. Along a smooth trajectory what that step misses is
-//! nearly the same each time, and is added on. One evaluation then mostly proves the answer or leaves one more step to it.
+//! What a hint keeps of the last answer is where it was attained, with the normal there, each body's part in its own frame,
+//! where it stays true however the bodies move, and how the solution answers motions to first order. So the first step at new
+//! poses needs no evaluation. Along a smooth trajectory what that step misses is nearly the same each time, and is added on.
+//! One evaluation then mostly proves the answer or leaves one more step to it.
 
+use super::drift::Drift;
 use super::options::Options;
 use super::pose::Pose;
 use super::relation::{Relation, Verdict};
 use super::start::{Start, middle};
-use super::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, Side, Step, bracket, moved};
-use super::vector::{M3, V3, add, apply, apply_transposed, basis, dot, subtract};
+use super::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, Response, Side, Step, bracket, moved, newton};
+use super::vector::{M3, V3, add, apply, apply_transposed, basis, dot, rows, subtract};
 use crate::body::Body;
-use crate::polynomial::{NumberJet, Scalar, Simd, WithSimd};
+use crate::polynomial::{Scalar, Simd, WithSimd};
 use nalgebra::Vector3;
 
-/// What is kept of an answer for the next query of the pair.
+/// What is kept of an answer for the next query of the pair. Points from the centres of the bodies' normalizations on, metres.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Trace {
     /// Active constraint of A and of B.
     active: [u8; 2],
-    /// Point of A, in A's frame from its normalization's centre on, metres.
-    x: V3<f64>,
-    /// Point of B, in B's frame from its normalization's centre on, metres.
-    y: V3<f64>,
-    /// Basis in A's frame whose third vector is the normal.
-    frame: M3<f64>,
-    /// Constraint of A at x, in the basis.
-    a: (Plane<f64>, Bend<f64>),
-    /// Constraint of B at y, in B's normalized coordinates.
-    jet_b: NumberJet<f64>,
-    /// What the last prediction missed at x, in A's frame.
-    drift_x: V3<f64>,
-    /// What the last prediction missed at y, in B's frame.
-    drift_y: V3<f64>,
+    /// Point of A and normal from B to A, in A's frame.
+    of_a: Spot,
+    /// Point of B and the same normal, in B's frame.
+    of_b: Spot,
+    /// Vectors across the normal in A's frame, along which the response is.
+    tangents: [V3<f64>; 2],
+    response: Response<f64>,
+    /// Of the points, each in its body's frame, and of the normal in A's.
+    drift: Drift<3>,
+}
+
+/// A point of a surface with its normal.
+#[derive(Clone, Copy, Debug, Default)]
+struct Spot {
+    point: V3<f64>,
+    normal: V3<f64>,
 }
 
 impl Trace {
     /// A trace of nothing yet.
     #[inline(always)]
     fn blank(active: [u8; 2]) -> Self {
-        let none = [0.0; 3];
-        let plane = Plane { value: 0.0, gradient: none };
-        let bend = Bend { curvature: none, tilt: [0.0; 2] };
-        let jet_b = NumberJet { value: 0.0, gradient: none, hessian: [0.0; 6] };
-        Self { active, x: none, y: none, frame: [none; 3], a: (plane, bend), jet_b, drift_x: none, drift_y: none }
+        let (nowhere, response) = (Spot::default(), Response::default());
+        Self { active, of_a: nowhere, of_b: nowhere, tangents: [[0.0; 3]; 2], response, drift: Drift::default() }
     }
 
-    /// The trace of witnesses x of A and y of B, each in its own frame, with the normal in A's frame.
-    pub(super) fn new(
-        a: &Body,
-        x: &Vector3<f64>,
-        b: &Body,
-        y: &Vector3<f64>,
-        n: &Vector3<f64>,
+    /// Takes down witnesses x of A and y of B, in the query frame of `relative`, with the normal.
+    #[inline(always)]
+    fn take_down<S: Simd>(
+        &mut self,
+        _: S,
+        relative: &Relative<f64>,
+        [x, y, n]: [V3<f64>; 3],
+        frame: &M3<f64>,
+        response: Response<f64>,
+    ) {
+        let from_b = subtract::<S, f64>(y, relative.origin);
+        self.of_a = Spot { point: x, normal: n };
+        self.of_b.point = apply_transposed::<S, f64>(&relative.rotation, from_b);
+        self.of_b.normal = apply_transposed::<S, f64>(&relative.rotation, n);
+        self.tangents = [frame[0], frame[1]];
+        self.response = response;
+    }
+
+    /// The trace of a distance's witnesses x of A and y of B, both in A's frame, with the normal.
+    pub(super) fn of_distance(
+        (a, pose_a): (&Body, &Pose),
+        (b, pose_b): (&Body, &Pose),
+        [x, y, n]: [V3<f64>; 3],
         active: [u8; 2],
     ) -> Self {
         let simd = Scalar;
-        let local = |body: &Body, v: &Vector3<f64>, active: u8| {
-            let from_center = v - body.normalization().center;
-            let z = body.normalization().linear * from_center;
-            let jet = body.constraints()[usize::from(active)].polynomial.evaluate(&z);
-            (from_center.into(), NumberJet::from(jet))
+        let relative = Relative::new(simd, a, pose_a, b, pose_b);
+        let frame = basis(simd, n);
+        let linearized = |side: &Side<'_, f64>, v: V3<f64>| {
+            let ((jet, _), local) = (side.jet(simd, v), side.localize(simd, &frame));
+            (Plane::new(simd, &jet, &local), Bend::new(simd, &jet, &local))
         };
-        let ((x, jet_a), (y, jet_b)) = (local(a, x, active[0]), local(b, y, active[1]));
-        let frame = basis(simd, (*n).into());
-        let localized = Side::at_home(simd, a, usize::from(active[0])).localize(simd, &frame);
-        let a = (Plane::new(simd, &jet_a, &localized), Bend::new(simd, &jet_a, &localized));
-        Self { active, x, y, frame, a, jet_b, drift_x: [0.0; 3], drift_y: [0.0; 3] }
+        let of_a = linearized(&Side::at_home(simd, a, active[0].into()), x);
+        let of_b = linearized(&Side::away(b, active[1].into(), &relative), y);
+        let difference = apply::<Scalar, f64>(&frame, subtract::<Scalar, f64>(x, y));
+        let (_, response) = newton(simd, (&of_a.0, &of_a.1), (&of_b.0, &of_b.1), difference, 0.0);
+        let mut trace = Self::blank(active);
+        trace.take_down(simd, &relative, [x, y, n], &frame, response);
+        trace
     }
 }
 
@@ -88,18 +106,14 @@ pub(super) struct Proven {
 }
 
 impl Proven {
-    /// The points in the world frame.
-    #[inline]
-    pub(super) fn witnesses(&self, a: &Body, pose_a: &Pose) -> (Vector3<f64>, Vector3<f64>) {
-        let center = a.normalization().center;
-        let to_world = |v: V3<f64>| pose_a.transform_point(&(center + Vector3::from(v)));
-        (to_world(self.x), to_world(self.y))
-    }
-
-    /// The normal in the world frame.
-    #[inline]
-    pub(super) fn normal(&self, pose_a: &Pose) -> Option<Vector3<f64>> {
-        Some(pose_a.transform_direction(&Vector3::from(self.n)))
+    /// The points x and y and the normal in the world frame.
+    #[inline(always)]
+    pub(super) fn world<S: Simd>(&self, simd: S, a: &Body, pose_a: &Pose) -> [Vector3<f64>; 3] {
+        let rotation = rows(simd, pose_a.rotation().to_rotation_matrix().matrix());
+        let (center, translation) = (a.normalization().center.into(), (*pose_a.translation()).into());
+        let turned = |v: V3<f64>| apply::<S, f64>(&rotation, v);
+        let moved = |v: V3<f64>| add::<S, f64>(turned(add::<S, f64>(v, center)), translation).into();
+        [moved(self.x), moved(self.y), turned(self.n).into()]
     }
 }
 
@@ -191,26 +205,29 @@ impl<R: Relation> WithSimd for Follow<'_, R> {
         let sides = (Side::at_home(simd, a, active[0]), Side::away(b, active[1], &relative));
         let correct = Correct { sides, relation, patience: most, most, options, limits: limits(a, b) };
 
-        // Prediction from the old jets at the new poses.
-        let y = add::<S, f64>(apply::<S, f64>(&relative.rotation, trace.y), relative.origin);
-        let mut at = Iterate { x: trace.x, y, frame: trace.frame };
-        let local_b = correct.sides.1.localize(simd, &at.frame);
-        let jet_b = (Plane::new(simd, &trace.jet_b, &local_b), Bend::new(simd, &trace.jet_b, &local_b));
-        let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
-        let (of_a, of_b) = ((&trace.a.0, &trace.a.1), (&jet_b.0, &jet_b.1));
-        let step = relation.newton(simd, of_a, of_b, &at.frame, difference, correct.flattest());
+        let Trace { of_a, of_b, tangents, response, .. } = trace;
+        let y = add::<S, f64>(apply::<S, f64>(&relative.rotation, of_b.point), relative.origin);
+        let turned = subtract::<S, f64>(apply::<S, f64>(&relative.rotation, of_b.normal), of_a.normal);
+        let frame = [tangents[0], tangents[1], of_a.normal];
+        let difference = apply::<S, f64>(&frame, subtract::<S, f64>(of_a.point, y));
+        let turned = [dot::<S, f64>(tangents[0], turned), dot::<S, f64>(tangents[1], turned)];
+        let step = response.step(simd, relation.aside(simd, &frame, difference), turned);
         if !step.within(simd, correct.limits) {
             return Err(Lost::after(0));
         }
-        at.advance(simd, &step);
-        let predicted = (at.x, at.y);
-        at.x = add::<S, f64>(at.x, trace.drift_x);
-        at.y = add::<S, f64>(at.y, apply::<S, f64>(&relative.rotation, trace.drift_y));
-
+        let x = moved::<S, f64>(of_a.point, step.dx, &frame);
+        let y = moved::<S, f64>(y, step.dy, &frame);
+        let n = moved::<S, f64>(of_a.normal, [step.dn[0], step.dn[1], 0.0], &frame);
+        let [of_x, of_y, of_n] = trace.drift.expected();
+        let at = Iterate {
+            x: add::<S, f64>(x, of_x),
+            y: add::<S, f64>(y, apply::<S, f64>(&relative.rotation, of_y)),
+            frame: basis(simd, add::<S, f64>(n, of_n)),
+        };
         let proven = correct.run(simd, &relative, at, trace)?;
-        trace.drift_x = subtract::<S, f64>(proven.x, predicted.0);
-        let drift_y = subtract::<S, f64>(proven.y, predicted.1);
-        trace.drift_y = apply_transposed::<S, f64>(&relative.rotation, drift_y);
+        let missed_y = apply_transposed::<S, f64>(&relative.rotation, subtract::<S, f64>(proven.y, y));
+        let missed = [subtract::<S, f64>(proven.x, x), missed_y, subtract::<S, f64>(proven.n, n)];
+        trace.drift.update(simd, missed);
         Ok(proven)
     }
 }
@@ -322,7 +339,7 @@ impl<R: Relation> Correct<'_, R> {
             let (bend_a, bend_b) = (Bend::new(simd, &jet_a, &local_a), Bend::new(simd, &jet_b, &local_b));
             let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
             let (of_a, of_b) = ((&a, &bend_a), (&b, &bend_b));
-            let mut step = self.relation.newton(simd, of_a, of_b, &at.frame, difference, self.flattest());
+            let (mut step, response) = self.relation.newton(simd, of_a, of_b, &at.frame, difference, self.flattest());
             if !step.within(simd, worth_a_bracket(self.limits)) {
                 let length = self.relative_length(simd, &step, (&local_a, &local_b));
                 let late = rounds.saturating_sub(self.patience);
@@ -352,13 +369,8 @@ impl<R: Relation> Correct<'_, R> {
                     if !(side_a.others_hold(simd, x) && side_b.others_hold(simd, y)) {
                         return Err(Lost::after(rounds));
                     }
-                    trace.x = at.x;
-                    let from_b = subtract::<S, f64>(at.y, relative.origin);
-                    trace.y = apply_transposed::<S, f64>(&relative.rotation, from_b);
-                    trace.frame = at.frame;
-                    trace.a = (a, bend_a);
-                    trace.jet_b = jet_b;
                     let n = apply_transposed::<S, f64>(&at.frame, found.normal);
+                    trace.take_down(simd, relative, [x, y, n], &at.frame, response);
                     let (active, multipliers) = (trace.active, found.multipliers);
                     return Ok(Proven { lower, upper, x, y, n, active, multipliers, rounds });
                 }

@@ -422,19 +422,20 @@ pub(super) fn newton<S: Simd, N: Number<S>>(
     (b, bend_b): (&Plane<N>, &Bend<N>),
     difference: V3<N>,
     smallest: N,
-) -> Step<N> {
+) -> (Step<N>, Response<N>) {
     let (straight_a, straight_b) = straighten(simd, (a, bend_a), (b, bend_b));
     let distance = difference[2] + straight_a.shift - straight_b.shift;
-    let turn = turn(simd, &straight_a, &straight_b, distance, [difference[0], difference[1]], smallest);
+    let (turn, response) = turn(simd, &straight_a, &straight_b, distance, [difference[0], difference[1]], smallest);
     let (alpha, beta) = (turn.alpha, turn.beta);
     // The tangential parts of the gradients, of second order, are at hand now.
     let along_a = (a.gradient[0] * alpha[0] + a.gradient[1] * alpha[1]) * straight_a.multiplier;
     let along_b = (b.gradient[0] * beta[0] + b.gradient[1] * beta[1]) * straight_b.multiplier;
-    Step {
+    let step = Step {
         dx: [alpha[0], alpha[1], straight_a.shift + along_a],
         dy: [beta[0], beta[1], straight_b.shift - along_b],
         dn: turn.theta,
-    }
+    };
+    (step, response)
 }
 
 /// Newton's step towards points with `x - y` along a ray, a vector in the basis, and opposite normals: the system above with
@@ -448,13 +449,13 @@ pub(super) fn newton_along<S: Simd>(
     difference: V3<f64>,
     ray: V3<f64>,
     smallest: f64,
-) -> Step<f64> {
+) -> (Step<f64>, Response<f64>) {
     let (straight_a, straight_b) = straighten(simd, (a, bend_a), (b, bend_b));
     let inverse = 1.0 / ray[2];
     let slope = [ray[0] * inverse, ray[1] * inverse];
     let height = difference[2] + straight_a.shift - straight_b.shift;
     let off = [difference[0] - height * slope[0], difference[1] - height * slope[1]];
-    let Turn { mut alpha, beta, theta } = turn(simd, &straight_a, &straight_b, 0.0, off, smallest);
+    let (Turn { mut alpha, beta, theta }, response) = turn(simd, &straight_a, &straight_b, 0.0, off, smallest);
     // What the surfaces fall below their tangent planes, of second order, changes where on the ray they meet.
     let fallen = |plane: &Plane<f64>, straight: &Straight<f64>, along: [f64; 2]| {
         let bent = apply2::<S, f64>(&straight.curvature, along);
@@ -465,11 +466,12 @@ pub(super) fn newton_along<S: Simd>(
     let fallen_b = fallen(b, &straight_b, beta);
     alpha[0] += (fallen_a + fallen_b) * slope[0];
     alpha[1] += (fallen_a + fallen_b) * slope[1];
-    Step {
+    let step = Step {
         dx: [alpha[0], alpha[1], straight_a.shift + fallen_a],
         dy: [beta[0], beta[1], straight_b.shift - fallen_b],
         dn: theta,
-    }
+    };
+    (step, response)
 }
 
 /// Both constraints straightened, B's seen from A: with `n` in place of its inward normal.
@@ -509,7 +511,7 @@ fn turn<S: Simd, N: Number<S>>(
     distance: N,
     tau: [N; 2],
     smallest: N,
-) -> Turn<N> {
+) -> (Turn<N>, Response<N>) {
     let one = N::splat(simd, 1.0);
     let (w_a, w_b, right_a, right_b) = (a.curvature, b.curvature, a.right, b.right);
     // I + D W_A, its determinant, and that times W_A K: the two commute.
@@ -535,7 +537,42 @@ fn turn<S: Simd, N: Number<S>>(
     let rest = [beta[0] - lever[0], beta[1] - lever[1]];
     let alpha = [(m[2] * rest[0] - m[1] * rest[1]) * of_m, (m[0] * rest[1] - m[1] * rest[0]) * of_m];
     let bent = apply2(&w_a, alpha);
-    Turn { alpha, beta, theta: [right_a[0] - bent[0], right_a[1] - bent[1]] }
+    let turn = Turn { alpha, beta, theta: [right_a[0] - bent[0], right_a[1] - bent[1]] };
+    let give = scaled([sum[2], -sum[1], sum[0]], of_sum);
+    let response = Response {
+        curvature_a: w_a,
+        give: scaled(give, determinant),
+        pull: [apply2(&both, [give[0], give[1]]), apply2(&both, [give[1], give[2]])],
+        hold: scaled([m[2], -m[1], m[0]], of_m),
+    };
+    (turn, response)
+}
+
+/// How a solution answers a small motion of B, to first order, in the basis it was found in: the system at the head of this
+/// file with all but τ and r_B at 0.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Response<N> {
+    /// `W_A`.
+    curvature_a: Symmetric2<N>,
+    /// `G = (W_B + W_A K)⁻¹`.
+    give: Symmetric2<N>,
+    /// `G W_A K`, by rows.
+    pull: [[N; 2]; 2],
+    /// `K`.
+    hold: Symmetric2<N>,
+}
+
+impl Response<f64> {
+    /// The step by how far x - y is from along the normal and how far B's outward normal has turned, both along the tangents.
+    #[inline(always)]
+    pub(super) fn step<S: Simd>(&self, _: S, tau: [f64; 2], turned: [f64; 2]) -> Step<f64> {
+        let pulled = apply2::<S, f64>(&self.give, turned);
+        let along = |row: [f64; 2], less: f64| row[0] * tau[0] + row[1] * tau[1] - less;
+        let beta = [along(self.pull[0], pulled[0]), along(self.pull[1], pulled[1])];
+        let alpha = apply2::<S, f64>(&self.hold, [beta[0] - tau[0], beta[1] - tau[1]]);
+        let theta = apply2::<S, f64>(&self.curvature_a, alpha);
+        Step { dx: [alpha[0], alpha[1], 0.0], dy: [beta[0], beta[1], 0.0], dn: [-theta[0], -theta[1]] }
+    }
 }
 
 /// What the linearization needs of a constraint that is straightened.

@@ -33,7 +33,7 @@ pub use monomial::{Exponents, degree_of, monomials, position};
 pub use norm_power::NormPower;
 pub use patch::Peak;
 pub use rounding::{Growth, gamma};
-pub use simd::{Arch, Lanes, MAX_LANES, Number, Scalar, Simd, WithSimd, dispatch};
+pub use simd::{Arch, Lanes, MAX_LANES, Number, Scalar, Simd, WithSimd, dispatch, dispatch_lanes};
 pub use sos_gram::SosGram;
 pub use substitution::Substitution;
 

@@ -1,8 +1,8 @@
-//! The widest arithmetic of the processor at hand, chosen when the program runs, and numbers that are one lane or several.
+//! The arithmetic of the processor at hand, chosen when the program runs, and numbers that are one lane or several.
 //!
-//! Work for [`dispatch`] is compiled three times by `pulp`: for any processor, for AVX2 with fused multiply-add, and for
-//! AVX-512. Everything it calls has to be inlined into it to profit. Results differ between the versions only within the
-//! rounding bounds, which count the roundings of the plain one.
+//! Work for [`dispatch`] and [`dispatch_lanes`] is compiled up to three times by `pulp`: for any processor, for AVX2 with fused
+//! multiply-add, and for AVX-512. Everything it calls has to be inlined into it to profit. Results differ between the versions
+//! only within the rounding bounds, which count the roundings of the plain one.
 
 use super::Polynomial;
 use super::hessian_form::NumberJet;
@@ -12,11 +12,23 @@ use std::sync::LazyLock;
 
 pub use pulp::{Arch, Scalar, Simd, WithSimd};
 
-/// Does the work with the widest arithmetic of this processor.
+/// Does work whose numbers fill whole vectors with the widest arithmetic of this processor.
 #[inline]
-pub fn dispatch<T: WithSimd>(work: T) -> T::Output {
+pub fn dispatch_lanes<T: WithSimd>(work: T) -> T::Output {
     static WIDEST: LazyLock<Arch> = LazyLock::new(Arch::new);
     WIDEST.dispatch(work)
+}
+
+/// Does work on single numbers, or a few at a time, with AVX2 where the processor has it: among scalar instructions those of
+/// AVX-512 cost more than they save, for while one of them is under way a port less takes all others.
+#[inline]
+pub fn dispatch<T: WithSimd>(work: T) -> T::Output {
+    static SUITED: LazyLock<Arch> = LazyLock::new(|| match Arch::new() {
+        #[cfg(target_arch = "x86_64")]
+        widest @ Arch::V4(_) => pulp::x86::V3::try_new().map_or(widest, Arch::V3),
+        widest => widest,
+    });
+    SUITED.dispatch(work)
 }
 
 /// Real numbers that are computed with: one double, or several side by side that know nothing of each other.

@@ -17,7 +17,7 @@ use super::twist::Twist;
 use super::union;
 use super::warm::{Hint, WarmStart};
 use crate::body::{Body, MAX_CONSTRAINTS, Solid};
-use crate::polynomial::dispatch;
+use crate::polynomial::{Simd, WithSimd, dispatch};
 use nalgebra::Vector3;
 use search::Search;
 
@@ -158,40 +158,105 @@ pub(super) fn between(
     }
     let relation = Apart { pose_a, pose_b, goal, tolerance };
     let mut lost = Lost::after(0);
-    let mut proven = None;
     if let Hint::Smooth(trace) = &mut warm.hint {
-        match dispatch(Follow { a, b, relation, options, trace }) {
-            Ok(found) => proven = Some(found),
-            Err(left) => lost = left,
+        match dispatch(Warm(Follow { a, b, relation, options, trace })) {
+            Ok(answer) => return answer,
+            Err(Left::Wide(proven)) => return sharpened((a, pose_a), (b, pose_b), goal, options, &proven),
+            Err(Left::Lost(left)) => lost = left,
         }
     }
     // Where edges face each other no single constraint is to be followed.
     let smooth = a.is_smooth() && b.is_smooth();
-    if proven.is_none() && smooth && !lost.touching() && !options.exhausted(lost.rounds) {
+    if smooth && !lost.touching() && !options.exhausted(lost.rounds) {
         let most = SEEK_ROUNDS.min(options.max_iterations() - lost.rounds);
-        match dispatch(Seek { a, b, relation, from: None, most, options }) {
-            Ok((found, trace)) => {
-                *warm = Hint::Smooth(trace).into();
-                proven = Some(Proven { rounds: lost.rounds + found.rounds, ..found });
+        match dispatch(Cold { seek: Seek { a, b, relation, from: None, most, options }, warm }) {
+            Ok(answer) => return Distance { iterations: lost.rounds + answer.iterations, ..answer },
+            Err(Left::Wide(proven)) => {
+                let proven = Proven { rounds: lost.rounds + proven.rounds, ..proven };
+                return sharpened((a, pose_a), (b, pose_b), goal, options, &proven);
             }
-            Err(left) => lost = Lost { rounds: lost.rounds + left.rounds, ..left },
+            Err(Left::Lost(left)) => lost = Lost { rounds: lost.rounds + left.rounds, ..left },
         }
     }
-    match proven {
-        Some(proven) if proven.width() <= tolerance || goal.met(proven.lower, proven.upper) => {
-            proven.answer(a, pose_a, tolerance)
+    let pair = Pair::new(a, pose_a, b, pose_b);
+    let mut search = Search::new(&pair, goal, options, lost.rounds);
+    search.take_over(&lost);
+    if !search.decided() {
+        search.run(&warm.hint);
+    }
+    *warm = search.hint();
+    search.answer()
+}
+
+/// What continuation leaves to do.
+enum Left {
+    /// The bracket is as narrow as doubles prove it.
+    Wide(Proven),
+    /// Nothing is proven.
+    Lost(Lost),
+}
+
+/// Continuation with its answer, as work for the widest arithmetic.
+struct Warm<'a>(Follow<'a, Apart<'a>>);
+
+impl WithSimd for Warm<'_> {
+    type Output = Result<Distance, Left>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Result<Distance, Left> {
+        let (a, relation) = (self.0.a, self.0.relation);
+        match self.0.with_simd(simd) {
+            Ok(proven) => relation.answer(simd, a, proven),
+            Err(lost) => Err(Left::Lost(lost)),
         }
-        Some(proven) => sharpened((a, pose_a), (b, pose_b), goal, options, &proven),
-        None => {
-            let pair = Pair::new(a, pose_a, b, pose_b);
-            let mut search = Search::new(&pair, goal, options, lost.rounds);
-            search.take_over(&lost);
-            if !search.decided() {
-                search.run(&warm.hint);
+    }
+}
+
+/// A start from nothing but the poses with its answer, as work for the widest arithmetic.
+struct Cold<'a> {
+    seek: Seek<'a, Apart<'a>>,
+    /// Replaced if the answer is proven.
+    warm: &'a mut WarmStart,
+}
+
+impl WithSimd for Cold<'_> {
+    type Output = Result<Distance, Left>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Result<Distance, Left> {
+        let (a, relation) = (self.seek.a, self.seek.relation);
+        match self.seek.with_simd(simd) {
+            Ok((proven, trace)) => {
+                *self.warm = Hint::Smooth(trace).into();
+                relation.answer(simd, a, proven)
             }
-            *warm = search.hint();
-            search.answer()
+            Err(lost) => Err(Left::Lost(lost)),
         }
+    }
+}
+
+impl Apart<'_> {
+    /// The answer that a proof gives, unless rounding keeps it wide.
+    #[inline(always)]
+    fn answer<S: Simd>(&self, simd: S, a: &Body, proven: Proven) -> Result<Distance, Left> {
+        let narrow = proven.upper - proven.lower <= self.tolerance;
+        if !narrow && !self.goal.met(proven.lower, proven.upper) {
+            return Err(Left::Wide(proven));
+        }
+        let [witness_a, witness_b, normal] = proven.world(simd, a, self.pose_a);
+        Ok(Distance {
+            status: if narrow { Status::Converged } else { Status::BracketWide },
+            lower: proven.lower,
+            upper: proven.upper,
+            witness_a,
+            witness_b,
+            normal: Some(normal),
+            active_a: ActiveConstraints::single(proven.active[0], proven.multipliers[0]),
+            active_b: ActiveConstraints::single(proven.active[1], proven.multipliers[1]),
+            parts: [0, 0],
+            tied: false,
+            iterations: proven.rounds,
+        })
     }
 }
 
@@ -223,29 +288,6 @@ pub(super) fn nearest(
     search.run(&Hint::Cold);
     *iterations = search.iterations();
     search.nearest()
-}
-
-impl Proven {
-    fn width(&self) -> f64 {
-        self.upper - self.lower
-    }
-
-    fn answer(&self, a: &Body, pose_a: &Pose, tolerance: f64) -> Distance {
-        let (witness_a, witness_b) = self.witnesses(a, pose_a);
-        Distance {
-            status: if self.width() <= tolerance { Status::Converged } else { Status::BracketWide },
-            lower: self.lower,
-            upper: self.upper,
-            witness_a,
-            witness_b,
-            normal: self.normal(pose_a),
-            active_a: ActiveConstraints::single(self.active[0], self.multipliers[0]),
-            active_b: ActiveConstraints::single(self.active[1], self.multipliers[1]),
-            parts: [0, 0],
-            tied: false,
-            iterations: self.rounds,
-        }
-    }
 }
 
 /// Splits the multipliers of a program's rows into those of A and of B, times `factor`.

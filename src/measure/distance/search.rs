@@ -174,6 +174,11 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// A point in A's frame from its normalization's centre on, metres.
+    fn from_center(&self, v: &Vector3<f64>) -> [f64; 3] {
+        (self.pair.to_a(v) - self.pair.a.body.normalization().center).into()
+    }
+
     /// Continuation of smooth bodies from two points and a normal.
     fn seek(&mut self, x: &Vector3<f64>, y: &Vector3<f64>, n: &Vector3<f64>) {
         let (pair, options) = (self.pair, self.options);
@@ -182,9 +187,7 @@ impl<'a> Search<'a> {
         }
         let (pose_a, pose_b) = pair.poses();
         let relation = Apart { pose_a, pose_b, goal: self.goals.0, tolerance: self.tolerance * pair.unit() };
-        let center = pair.a.body.normalization().center;
-        let from_center = |v: &Vector3<f64>| (pair.to_a(v) - center).into();
-        let from = Some(Start { x: from_center(x), y: from_center(y), n: (*n).into() });
+        let from = Some(Start { x: self.from_center(x), y: self.from_center(y), n: (*n).into() });
         let most = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
         match dispatch(Seek { a: pair.a.body, b: pair.b.body, relation, from, most, options }) {
             Ok((proven, trace)) => {
@@ -495,8 +498,9 @@ impl<'a> Search<'a> {
             return self.trace;
         }
         let active = [self.active.0.single()?, self.active.1.single()?];
-        let (x, y) = (self.pair.to_a(&self.x), self.pair.to_b(&self.y));
-        Some(Trace::new(self.pair.a.body, &x, self.pair.b.body, &y, &self.n, active))
+        let (pair, (pose_a, pose_b)) = (self.pair, self.pair.poses());
+        let places = [self.from_center(&self.x), self.from_center(&self.y), self.n.into()];
+        Some(Trace::of_distance((pair.a.body, pose_a), (pair.b.body, pose_b), places, active))
     }
 
     pub(super) fn answer(&self) -> Distance {

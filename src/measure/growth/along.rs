@@ -8,7 +8,7 @@ use crate::measure::pose::Pose;
 use crate::measure::relation::{Relation, Verdict};
 use crate::measure::smooth::Proven;
 use crate::measure::start::{Start, facing_along, meeting};
-use crate::measure::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, SLACK, Step, TURNED, newton_along};
+use crate::measure::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, Response, SLACK, Step, TURNED, newton_along};
 use crate::measure::twist::Twist;
 use crate::measure::vector::{M3, V3, add, apply, dot, normalized, rows, scaled, subtract};
 use crate::polynomial::{Scalar, Simd, gamma};
@@ -115,8 +115,15 @@ impl Relation for Along {
         frame: &M3<f64>,
         difference: V3<f64>,
         smallest: f64,
-    ) -> Step<f64> {
+    ) -> (Step<f64>, Response<f64>) {
         newton_along(simd, a, b, difference, apply::<S, f64>(frame, self.delta), smallest)
+    }
+
+    #[inline(always)]
+    fn aside<S: Simd>(&self, _: S, frame: &M3<f64>, difference: V3<f64>) -> [f64; 2] {
+        let ray = apply::<S, f64>(frame, self.delta);
+        let times = difference[2] / ray[2];
+        [difference[0] - times * ray[0], difference[1] - times * ray[1]]
     }
 
     /// With `H = H_A(n) + H_B(-n)`, which the bracket of the distance bounds, and a point w of the difference of the bodies,

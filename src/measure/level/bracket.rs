@@ -40,6 +40,8 @@ pub(super) struct Bracket {
     pub(super) inward: V3<f64>,
     /// Gradient of A's constraint in A's frame, per metre.
     pub(super) gradient: V3<f64>,
+    /// Gradient of B's constraint, by w.
+    pub(super) gradient_b: V3<f64>,
     pub(super) multiplier: f64,
     /// Whether the gradients oppose each other well enough for gradients of the answer.
     pub(super) aligned: bool,
@@ -199,6 +201,7 @@ impl Sides<'_> {
             upper,
             inward: scaled::<S, f64>(b, -distance * inverse),
             gradient,
+            gradient_b: b,
             multiplier,
             aligned,
         }

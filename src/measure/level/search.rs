@@ -311,10 +311,11 @@ impl<'a> Search<'a> {
 
     pub(super) fn hint(&self) -> Hint {
         let (x, y) = (self.pair.to_a(&self.x), self.pair.to_b(&self.x));
-        let (a, b) = (self.pair.a.body, self.pair.b.body);
+        let (pose_a, pose_b) = self.pair.poses();
+        let (a, b) = ((self.pair.a.body, pose_a, &x), (self.pair.b.body, pose_b, &y));
         match (self.active.0.single(), self.active.1.single()) {
             _ if self.saturated() => Hint::Saturated,
-            (Some(of_a), Some(of_b)) => Hint::LevelSmooth(LevelTrace::new(a, &x, b, &y, [of_a, of_b])),
+            (Some(of_a), Some(of_b)) => Hint::LevelSmooth(LevelTrace::new(a, b, [of_a, of_b])),
             _ => Hint::Level { x_b: y, active_a: self.active.0.bits(), active_b: self.active.1.bits() },
         }
     }

@@ -107,6 +107,27 @@ pub(super) struct Step {
     pub(super) multiplier: f64,
     /// Lower bound of the smallest eigenvalue of H, but for the errors of its entries.
     pub(super) curvature: f64,
+    /// The cofactors of H and its determinant.
+    cofactors: [f64; 6],
+    determinant: f64,
+}
+
+impl Step {
+    /// How the answer moves against a force: `H⁻¹ - H⁻¹b bᵀH⁻¹ / (b·H⁻¹b)`, xx, xy, xz, yy, yz, zz.
+    #[inline(always)]
+    pub(super) fn response<S: Simd>(&self, _: S, b: V3<f64>) -> [f64; 6] {
+        let v = apply_symmetric::<S, f64>(&self.cofactors, b);
+        let (held, inverse) = (1.0 / dot::<S, f64>(b, v), 1.0 / self.determinant);
+        let mut response = self.cofactors;
+        let mut k = 0;
+        for i in 0..3 {
+            for j in i..3 {
+                response[k] = (response[k] - held * v[i] * v[j]) * inverse;
+                k += 1;
+            }
+        }
+        response
+    }
 }
 
 impl<'a> Sides<'a> {
@@ -158,7 +179,7 @@ impl<'a> Sides<'a> {
         // The determinant over the square of half the trace, as in the tangent plane's bracket.
         let half_trace = 0.5 * (hessian[0] + hessian[3] + hessian[5]);
         let curvature = determinant / (half_trace * half_trace) - 256.0 * f64::EPSILON * half_trace;
-        Step { delta, multiplier, curvature }
+        Step { delta, multiplier, curvature, cofactors, determinant }
     }
 
     /// A step towards the solution from afar, where Newton's would be a long one: towards the least of `p^(2/d)`, d the degree of p,

@@ -17,9 +17,10 @@
 //!
 //! H is regular wherever one of the bodies is curved, H⁻¹ by its cofactors.
 //!
-//! **Prediction.** The last answer's jets of p and g stay true however the bodies move, but then belong to two different points,
-//! z and w: with `s = C w + M_A o - z` the quadratic model of p has at w's image the gradient `∇p + ∇²p s`. So the first step
-//! needs no evaluation. What it misses is nearly the same each time along a smooth trajectory, and is added on.
+//! **Prediction.** The last answer w obeyed `G + μ b = 0` where A was then; where A is now G is another, by the quadratic model of
+//! p about the point of the last jet: `∇p + ∇²p s`, s the way from there to w's image. To first order the answer moves by
+//! `-P G`, `P = H⁻¹ - H⁻¹b bᵀH⁻¹ / (b·H⁻¹b)`, for `P b = 0`. So the first step needs no evaluation. What it misses is nearly the same
+//! each time along a smooth trajectory, and is added on.
 //!
 //! **Bracket**, at the point w' = w + δ where the step leads, values and gradients there by Taylor's formula from the one
 //! evaluation; with its remainders and all rounding errors, `η` for the error of x, metres:
@@ -37,12 +38,13 @@
 //! hold: bounds for p are made at each point ([`crate::polynomial::Growth`]).
 
 use super::bracket::{Metric, ROOM};
-use super::sides::{Evaluated, Sides, square};
+use super::sides::{Evaluated, Sides, Step, square};
 use crate::body::Body;
+use crate::measure::drift::Drift;
 use crate::measure::options::Options;
 use crate::measure::pose::Pose;
 use crate::measure::quadratic::LONGEST;
-use crate::measure::vector::{V3, add, apply_symmetric, subtract};
+use crate::measure::vector::{V3, add, apply_symmetric, apply_transposed, scaled, subtract};
 use crate::polynomial::{NumberJet, Scalar, Simd, WithSimd};
 use nalgebra::Vector3;
 
@@ -51,25 +53,46 @@ use nalgebra::Vector3;
 pub(in crate::measure) struct LevelTrace {
     /// Active constraint of A and of B.
     active: [u8; 2],
-    /// Where in A's normalized coordinates A's jet is of.
+    /// Where in A's normalized coordinates A's gradient and Hessian are of.
     z: V3<f64>,
-    jet_a: NumberJet<f64>,
-    /// Where in B's normalized coordinates B's jet is of.
+    gradient: V3<f64>,
+    hessian: [f64; 6],
+    /// The answer, in B's normalized coordinates.
     w: V3<f64>,
-    jet_b: NumberJet<f64>,
-    /// What the last prediction missed, in B's normalized coordinates.
-    drift: V3<f64>,
+    /// `P`: xx, xy, xz, yy, yz, zz.
+    response: [f64; 6],
+    /// Of w.
+    drift: Drift<1>,
 }
 
 impl LevelTrace {
     /// The trace of a minimiser, x in A's frame and y in B's.
-    pub(super) fn new(a: &Body, x: &Vector3<f64>, b: &Body, y: &Vector3<f64>, active: [u8; 2]) -> Self {
-        let local = |body: &Body, v: &Vector3<f64>, active: u8| {
-            let z: V3<f64> = (body.normalization().linear * (v - body.normalization().center)).into();
-            (z, body.constraints()[usize::from(active)].polynomial.jet(Scalar, z))
+    pub(super) fn new(
+        (a, pose_a, x): (&Body, &Pose, &Vector3<f64>),
+        (b, pose_b, y): (&Body, &Pose, &Vector3<f64>),
+        active: [u8; 2],
+    ) -> Self {
+        let normalized = |body: &Body, v: &Vector3<f64>| -> V3<f64> {
+            (body.normalization().linear * (v - body.normalization().center)).into()
         };
-        let ((z, jet_a), (w, jet_b)) = (local(a, x, active[0]), local(b, y, active[1]));
-        Self { active, z, jet_a, w, jet_b, drift: [0.0; 3] }
+        let (z, w) = (normalized(a, x), normalized(b, y));
+        let sides = Sides::new(Scalar, (a, pose_a), (b, pose_b), active);
+        let (jet_a, jet_b) = (sides.p.jet(Scalar, z), sides.g.jet(Scalar, w));
+        let step = sides.newton(Scalar, &jet_a, &jet_b);
+        Self::at(Scalar, active, (z, &jet_a), (w, jet_b.gradient), &step)
+    }
+
+    /// The trace of the answer w with the gradient of B's constraint there, where a step led from z.
+    #[inline(always)]
+    fn at<S: Simd>(
+        simd: S,
+        active: [u8; 2],
+        (z, jet_a): (V3<f64>, &NumberJet<f64>),
+        (w, gradient_b): (V3<f64>, V3<f64>),
+        step: &Step,
+    ) -> Self {
+        let (gradient, hessian) = (jet_a.gradient, jet_a.hessian);
+        Self { active, z, gradient, hessian, w, response: step.response(simd, gradient_b), drift: Drift::default() }
     }
 }
 
@@ -149,15 +172,20 @@ impl WithSimd for FollowLevel<'_> {
         }
         let sides = Sides::new(simd, (a, self.pose_a), (b, self.pose_b), trace.active);
         let image = sides.map.to_a(simd, sides.map.apply(simd, trace.w));
-        let moved = shifted(simd, &trace.jet_a, subtract::<S, f64>(image, trace.z));
-        let step = sides.newton(simd, &moved, &trace.jet_b);
-        if !(sides.length(simd, trace.z, step.delta) <= LONGEST) {
+        let way = subtract::<S, f64>(image, trace.z);
+        let gradient = add::<S, f64>(trace.gradient, apply_symmetric::<S, f64>(&trace.hessian, way));
+        let pulled = apply_transposed::<S, f64>(&sides.map.both, gradient);
+        let delta = scaled::<S, f64>(apply_symmetric::<S, f64>(&trace.response, pulled), -1.0);
+        if !(sides.length(simd, trace.z, delta) <= LONGEST) {
             return Err(LevelLost::after(0));
         }
-        let predicted = add::<S, f64>(trace.w, step.delta);
+        let predicted = add::<S, f64>(trace.w, delta);
+        let [missed] = trace.drift.expected();
         let most = MAX_ROUNDS.min(options.max_iterations());
-        let (proven, found) = sides.correct(simd, add::<S, f64>(predicted, trace.drift), most, options)?;
-        *trace = LevelTrace { drift: subtract::<S, f64>(found.end, predicted), ..found.trace };
+        let (proven, found) = sides.correct(simd, add::<S, f64>(predicted, missed), most, options)?;
+        let mut drift = trace.drift;
+        drift.update(simd, [subtract::<S, f64>(found.w, predicted)]);
+        *trace = LevelTrace { drift, ..found };
         Ok(proven)
     }
 }
@@ -185,16 +213,8 @@ impl WithSimd for SeekLevel<'_> {
         let Self { a, b, most, options, .. } = self;
         let sides = Sides::new(simd, (a, self.pose_a), (b, self.pose_b), [0, 0]);
         let w = b.normalization().linear * (self.from - b.normalization().center);
-        let (proven, found) = sides.correct(simd, w.into(), most, options)?;
-        Ok((proven, found.trace))
+        sides.correct(simd, w.into(), most, options)
     }
-}
-
-/// Where Newton's method was when it proved its answer.
-struct Found {
-    trace: LevelTrace,
-    /// Where its last step led.
-    end: V3<f64>,
 }
 
 impl Sides<'_> {
@@ -206,7 +226,7 @@ impl Sides<'_> {
         mut w: V3<f64>,
         most: u32,
         options: &Options<'_>,
-    ) -> Result<(LevelProven, Found), LevelLost> {
+    ) -> Result<(LevelProven, LevelTrace), LevelLost> {
         let mut multiplier = None;
         for rounds in 1..=most {
             if options.stopped() {
@@ -238,7 +258,8 @@ impl Sides<'_> {
                 if !self.others_hold(simd, attained, found.upper) {
                     return Err(LevelLost::after(rounds));
                 }
-                let trace = LevelTrace { active: self.active, z, jet_a: at.jet_a, w, jet_b: at.jet_b, drift: [0.0; 3] };
+                let of_b = (end, found.gradient_b);
+                let trace = LevelTrace::at(simd, self.active, (z, &at.jet_a), of_b, &step);
                 let proven = LevelProven {
                     lower: found.lower,
                     upper: found.upper,
@@ -247,7 +268,7 @@ impl Sides<'_> {
                     multiplier: found.multiplier,
                     rounds,
                 };
-                return Ok((proven, Found { trace, end }));
+                return Ok((proven, trace));
             }
             if length <= SETTLED {
                 let body = self.b;
@@ -259,12 +280,4 @@ impl Sides<'_> {
         }
         Err(LevelLost::after(most))
     }
-}
-
-/// The quadratic model of a jet, about a point `by` away.
-#[inline(always)]
-fn shifted<S: Simd>(_: S, jet: &NumberJet<f64>, by: V3<f64>) -> NumberJet<f64> {
-    let bent = apply_symmetric::<S, f64>(&jet.hessian, by);
-    // The value is not needed for the step.
-    NumberJet { value: f64::NAN, gradient: add::<S, f64>(jet.gradient, bent), hessian: jet.hessian }
 }

@@ -21,7 +21,7 @@ use super::twist::Twist;
 use super::union;
 use super::warm::{Hint, WarmStart};
 use crate::body::{Body, Solid};
-use crate::polynomial::dispatch;
+use crate::polynomial::{Scalar, dispatch};
 use nalgebra::Vector3;
 
 /// Signed distance with its proof, lengths in metres, vectors in the world frame.
@@ -119,7 +119,8 @@ pub(super) fn between(
         // Apart, or nearly, the normal proves all there is.
         match dispatch(Follow { a, b, relation, options, trace }) {
             Ok(proven) if proven.upper - proven.lower <= tolerance => {
-                return Answer::of(&proven).report(proven.witnesses(a, pose_a), proven.normal(pose_a), pose_a, pose_b);
+                let [x, y, normal] = proven.world(Scalar, a, pose_a);
+                return Answer::of(&proven).report((x, y), Some(normal), pose_a, pose_b);
             }
             Ok(proven) => spent = proven.rounds,
             Err(lost) => spent = lost.rounds,
