@@ -141,13 +141,18 @@ impl Active {
         let worst = (0..self.len).min_by(|&i, &j| self.multiplier[i].total_cmp(&self.multiplier[j]));
         match worst {
             Some(k) if self.multiplier[k] < 0.0 && self.len > 1 => {
-                self.len -= 1;
-                self.index.swap(k, self.len);
-                self.multiplier.swap(k, self.len);
+                self.remove(k);
                 true
             }
             _ => false,
         }
+    }
+
+    /// Drops the k-th constraint of the set.
+    pub(super) fn remove(&mut self, k: usize) {
+        self.len -= 1;
+        self.index.swap(k, self.len);
+        self.multiplier.swap(k, self.len);
     }
 
     /// Drops the constraint with the most negative multiplier, be it the last one; whether there was one.

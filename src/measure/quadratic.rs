@@ -16,6 +16,9 @@ use crate::body::MAX_CONSTRAINTS;
 use crate::polynomial::Jet;
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
+/// Variables of a program.
+const VARIABLES: usize = 4;
+
 /// Most changes of the guess.
 const MAX_CHANGES: usize = 8;
 
@@ -29,6 +32,12 @@ pub(super) const DAMPINGS: [f64; 6] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
 /// Longest step, relative to the bodies and to the distance from a centre that values rise from, that a linearization may mean
 /// anything for.
 pub(super) const LONGEST: f64 = 0.5;
+
+/// Length of a step, in the same measure, that is well within that.
+const SHORT: f64 = 0.5 * LONGEST;
+
+/// Least damping, relative to the first: rounding tilts faces by about as much.
+const LEAST: f64 = 1e-9;
 
 /// Distance from such a centre, relative to its body, that counts as none.
 pub(super) const CENTER: f64 = 0.02;
@@ -104,24 +113,34 @@ pub(super) struct Solution {
 }
 
 impl Quadratic {
-    /// The solution from a guess of what is active on; of damped programs the first whose step is short enough, if there is one.
+    /// The solution from a guess of what is active on; of damped programs the least damped whose step is short enough, if there
+    /// is one.
     pub(super) fn step(
         mut self,
         a: Active,
         b: Active,
-        short: impl Fn(&Vector3<f64>) -> bool,
+        length: impl Fn(&Vector3<f64>) -> f64,
         stiffness: &Matrix4<f64>,
     ) -> Option<Solution> {
-        let fits = |found: &Option<Solution>| found.as_ref().is_some_and(|step| short(&step.v.xyz()));
+        let length = |found: &Option<Solution>| found.as_ref().map_or(f64::INFINITY, |step| length(&step.v.xyz()));
         let mut found = self.solve(a, b);
-        if !fits(&found) {
-            let hessian = self.hessian;
-            for damping in DAMPINGS {
-                self.hessian = hessian + stiffness * damping;
-                found = self.solve(a, b).or(found);
-                if fits(&found) {
-                    break;
+        if length(&found) <= LONGEST {
+            return found;
+        }
+        let hessian = self.hessian;
+        for (i, damping) in DAMPINGS.into_iter().enumerate() {
+            self.hessian = hessian + stiffness * damping;
+            found = self.solve(a, b).or(found);
+            let least = length(&found);
+            if least <= LONGEST {
+                if i == 0 && least < SHORT {
+                    // Along what does not bend a step is as long as the damping is little: of faces tilted by next to nothing
+                    // only such a step shows the edges.
+                    self.hessian = hessian + stiffness * (damping * (least / SHORT).max(LEAST));
+                    let longer = self.solve(a, b);
+                    return if length(&longer) <= LONGEST { longer } else { found };
                 }
+                break;
             }
         }
         found
@@ -129,18 +148,66 @@ impl Quadratic {
 
     /// The solution; none if the equations of a guess have none.
     fn solve(&self, mut a: Active, mut b: Active) -> Option<Solution> {
+        // More than as many as there are variables are dependent; the lowest of a guess come last.
+        while a.len + b.len > VARIABLES {
+            if a.len > b.len { a.len -= 1 } else { b.len -= 1 }
+        }
         for changes in 0..=MAX_CHANGES {
             let v = self.equations(&mut a, &mut b)?;
             let changed = changes < MAX_CHANGES
                 && (a.drop_negative()
                     || (if self.free_of_b { b.drop_pulling() } else { b.drop_negative() })
-                    || self.a.violated(&a, &v).is_some_and(|i| a.push(i))
-                    || self.b.violated(&b, &v).is_some_and(|i| b.push(i)));
+                    || self.take_violated(&mut a, &mut b, &v));
             if !changed {
                 return Some(Solution { v, a, b });
             }
         }
         None
+    }
+
+    /// Takes the constraint of A that v violates most, or else that of B; whether there is one and room for it.
+    fn take_violated(&self, a: &mut Active, b: &mut Active, v: &Vector4<f64>) -> bool {
+        if let Some(i) = self.a.violated(a, v)
+            && let Some((mut of_a, of_b)) = self.with_room(*a, *b, &self.a.rows[i].0)
+            && of_a.push(i)
+        {
+            (*a, *b) = (of_a, of_b);
+            return true;
+        }
+        if let Some(i) = self.b.violated(b, v)
+            && let Some((of_a, mut of_b)) = self.with_room(*a, *b, &self.b.rows[i].0)
+            && of_b.push(i)
+        {
+            (*a, *b) = (of_a, of_b);
+            return true;
+        }
+        false
+    }
+
+    /// The active constraints without one, where they determine the point: that whose multiplier is the first to vanish as the one of
+    /// the new gradient rises (the dual simplex method).
+    fn with_room(&self, mut a: Active, mut b: Active, new: &Vector4<f64>) -> Option<(Active, Active)> {
+        if a.len + b.len < VARIABLES {
+            return Some((a, b));
+        }
+        // The new gradient as a sum of the active ones.
+        let mut m = [[0.0; VARIABLES + 1]; VARIABLES];
+        let rows = a.iter().map(|(i, _)| &self.a.rows[i]).chain(b.iter().map(|(i, _)| &self.b.rows[i]));
+        for (k, (gradient, _)) in rows.enumerate() {
+            (0..VARIABLES).for_each(|i| m[i][k] = gradient[i]);
+        }
+        (0..VARIABLES).for_each(|i| m[i][VARIABLES] = new[i]);
+        let shares = solve(&mut m, VARIABLES)?;
+        let multipliers = a.multiplier[..a.len].iter().chain(&b.multiplier[..b.len]);
+        let vanishing = multipliers.zip(shares).enumerate().filter(|(_, (_, share))| *share > 0.0);
+        let ratios = vanishing.map(|(k, (multiplier, share))| (k, multiplier / share));
+        let (first, _) = ratios.min_by(|p, q| p.1.total_cmp(&q.1))?;
+        if first < a.len {
+            a.remove(first)
+        } else {
+            b.remove(first - a.len)
+        }
+        Some((a, b))
     }
 
     /// Solves the equations of optimality with the active constraints, which get their multipliers.

@@ -390,3 +390,30 @@ fn poses_are_normalised_or_refused() {
         assert!(matches!(Pose::from_matrix(&bad, none), Err(PoseError::NotRotation(d)) if d > 1e-6));
     }
 }
+
+#[test]
+fn distances_of_sides_tilted_by_next_to_nothing() {
+    let cuboid = |x, y, z| Body::cuboid("box", Vector3::new(x, y, z)).unwrap();
+    let needle = Body::cylinder("needle", 0.01, 1.0).unwrap();
+    let pairs = [
+        (cuboid(0.6, 0.9, 0.3), cuboid(0.6, 0.9, 0.3)),
+        (cuboid(1.0, 1.0, 1e-3), cuboid(0.6, 0.9, 0.3)),
+        (cuboid(0.02, 0.03, 0.01), cuboid(1.0, 1.0, 1e-3)),
+        (cuboid(0.6, 0.9, 0.3), needle),
+    ];
+    let mut longest = 0;
+    for seed in 0..400 {
+        let mut random = Seeded(seed);
+        let (a, b) = &pairs[(seed % 4) as usize];
+        let tilt = unit(&mut random) * 10_f64.powf(-7.5 + random.signed());
+        let turn = nalgebra::UnitQuaternion::from_scaled_axis(tilt);
+        let mut place = Vector3::zeros();
+        place[(seed / 4 % 3) as usize] = 3.0 + 0.9 * random.signed();
+        let pose = Pose::from_quaternion(place, turn.coords.into()).unwrap();
+        let answer = cold(a, &Pose::identity(), b, &pose);
+        let label = format!("seed {seed}, tilt {:e}: {answer:?}", tilt.norm());
+        assert_eq!(answer.status, Status::Converged, "{label}");
+        longest = longest.max(answer.iterations);
+    }
+    assert!(longest <= 30, "{longest}");
+}

@@ -43,7 +43,7 @@ impl Deepest {
         };
         let length = |dx: &Vector3<f64>| pair.a.relative_length(dx).max(pair.b.relative_length(dx));
         let stiffness = (stiff(&pair.a, scale) + stiff(&pair.b, scale)).fixed_resize(0.0);
-        let found = program.step(self.a, self.b, |dx| length(dx) <= LONGEST, &stiffness)?;
+        let found = program.step(self.a, self.b, length, &stiffness)?;
         let dx = found.v.xyz();
         let length = length(&dx);
         let share = (LONGEST / length).min(1.0);

@@ -6,6 +6,7 @@ use super::{Distance, split};
 use crate::measure::Status;
 use crate::measure::bracket::{Multipliers, distance_lower, distance_upper};
 use crate::measure::decide::{Goal, across};
+use crate::measure::growth::ReachNewton;
 use crate::measure::newton::{Active, DistanceNewton, MAX_STEPS, Pace, WORTH_A_BRACKET};
 use crate::measure::options::Options;
 use crate::measure::outlines::approach;
@@ -161,9 +162,13 @@ impl<'a> Search<'a> {
         if pair.smooth() {
             self.seek(&x, &y, &n);
         } else {
-            for (x, y) in [(x, y), (x, corners.1), (corners.0, y)] {
+            for (k, (x, y)) in [(x, y), (x, corners.1), (corners.0, y)].into_iter().enumerate() {
                 let (a, b) = (Active::near(&pair.a, &x, &-n), Active::near(&pair.b, &y, &n));
                 self.newton(x, y, n, a, b);
+                // The later attempts are from corners, which it finds by itself.
+                if k == 0 && !self.ended() {
+                    self.along(x, y, n, a, b);
+                }
                 if self.ended() || found.common.is_some() {
                     break;
                 }
@@ -171,6 +176,27 @@ impl<'a> Search<'a> {
         }
         if !self.ended() && self.lower == 0.0 {
             self.deepest(&found.common.unwrap_or((x + y) * 0.5), &n);
+        }
+    }
+
+    /// Newton's method for how far apart the bodies are along a normal that is about the right one. Its steps are those of quadratic
+    /// programs, which go all the way to the edges of sides that are tilted by next to nothing.
+    fn along(&mut self, x: Vector3<f64>, y: Vector3<f64>, n: Vector3<f64>, a: Active, b: Active) {
+        let pair = self.pair;
+        let Some(mut newton) = ReachNewton::new(pair, -n, Vector3::zeros(), x, y, &-n, a, b) else { return };
+        let steps = newton.run(pair, self.options, self.iterations, |at| {
+            let scale = 1.0 / at.n.norm();
+            let [of_a, of_b] = [at.a, at.b].map(|active| active.multipliers().map(|multiplier| multiplier * scale));
+            let n = -at.n * scale;
+            let raised = self.raise(distance_lower(pair, &at.x, &at.y, &n, &of_a, &of_b), &n);
+            if raised | self.attain(&at.x, &at.y) {
+                self.active = (at.a, at.b);
+            }
+            self.done()
+        });
+        self.iterations += steps;
+        if !self.ended() {
+            self.newton(newton.x, newton.y, -newton.n.normalize(), newton.a, newton.b);
         }
     }
 

@@ -42,7 +42,8 @@ use crate::polynomial::{dispatch, gamma};
 use along::Along;
 use nalgebra::Vector3;
 use portal::crossing;
-use reach::{ReachNewton, ReachProgram};
+pub(in crate::measure) use reach::ReachNewton;
+use reach::ReachProgram;
 use std::ops::ControlFlow;
 
 /// Growth distance with its proof; unit-free, vectors in the world frame.

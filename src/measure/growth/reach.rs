@@ -86,20 +86,20 @@ impl Program<4> for ReachProgram<'_> {
 }
 
 /// Newton iterates of the program in x and ρ, with `y = x + offset - ρ u`.
-pub(super) struct ReachNewton {
-    pub(super) x: Vector3<f64>,
-    pub(super) y: Vector3<f64>,
+pub(in crate::measure) struct ReachNewton {
+    pub(in crate::measure) x: Vector3<f64>,
+    pub(in crate::measure) y: Vector3<f64>,
     /// Normal from A to B with `n·u = 1` at the solution.
-    pub(super) n: Vector3<f64>,
-    pub(super) a: Active,
-    pub(super) b: Active,
+    pub(in crate::measure) n: Vector3<f64>,
+    pub(in crate::measure) a: Active,
+    pub(in crate::measure) b: Active,
     u: Vector3<f64>,
 }
 
 impl ReachNewton {
     /// A start from points near the surfaces and a normal from A to B; none if they are of no use for u.
     #[allow(clippy::too_many_arguments)]
-    pub(super) fn new(
+    pub(in crate::measure) fn new(
         pair: &Pair<'_>,
         u: Vector3<f64>,
         offset: Vector3<f64>,
@@ -123,7 +123,7 @@ impl ReachNewton {
 
     /// Iterates until `accept` takes one, they stop converging or the options say so after `before` iterations and these;
     /// returns the steps taken.
-    pub(super) fn run(
+    pub(in crate::measure) fn run(
         &mut self,
         pair: &Pair<'_>,
         options: &Options<'_>,
@@ -164,8 +164,8 @@ impl ReachNewton {
             free_of_b: false,
         };
         // y moves by dx - u dρ, but how far B's constraints let dρ go is not known before.
-        let short = |dx: &Vector3<f64>| pair.a.relative_length(dx) <= LONGEST;
-        let found = program.step(self.a, self.b, short, &self.stiffness(pair, &of_a, &of_b))?;
+        let length = |dx: &Vector3<f64>| pair.a.relative_length(dx);
+        let found = program.step(self.a, self.b, length, &self.stiffness(pair, &of_a, &of_b))?;
         let (dx, dy) = (found.v.xyz(), found.v.xyz() - u * found.v.w);
         let length = pair.a.relative_length(&dx).max(pair.b.relative_length(&dy));
         let share = (LONGEST / length).min(1.0);

@@ -264,3 +264,40 @@ fn limits_are_kept_and_admitted() {
         assert!(answer.upper - answer.lower <= 1e-9 * answer.upper.max(1.0), "{answer:?}");
     }
 }
+
+#[test]
+fn sides_tilted_by_next_to_nothing_show_their_edges() {
+    let cuboid = |x, y, z| Body::cuboid("box", Vector3::new(x, y, z)).unwrap();
+    let plate = || cuboid(1.0, 1.0, 1e-3);
+    let flat = |degree| Body::superellipsoid("flat", Vector3::zeros(), Vector3::new(1.0, 1.0, 0.02), degree).unwrap();
+    let can = || Body::cylinder("can", 0.5, 0.8).unwrap();
+    let pairs = [
+        (flat(4), plate()),
+        (flat(6), plate()),
+        (flat(8), plate()),
+        (plate(), can()),
+        (cuboid(0.6, 0.9, 0.3), plate()),
+        (flat(6), can()),
+        (Body::cylinder("needle", 0.01, 1.0).unwrap(), cuboid(0.6, 0.9, 0.3)),
+    ];
+    let mut longest = 0;
+    for seed in 0..600 {
+        let mut random = Seeded(seed);
+        let (a, b) = &pairs[(seed % 7) as usize];
+        let tilt = unit(&mut random) * 10_f64.powf(-9.5 + 1.5 * random.signed());
+        let quarter = nalgebra::UnitQuaternion::from_scaled_axis(Vector3::z() * [0.0, 0.5][(seed / 7 % 2) as usize]);
+        let turn = nalgebra::UnitQuaternion::from_scaled_axis(tilt) * quarter;
+        let mut place = Vector3::zeros();
+        place[(seed / 14 % 3) as usize] = 3.0 + 2.0 * random.signed();
+        let pose = Pose::from_quaternion(place, turn.coords.into()).unwrap();
+        let answer = cold(a, &Pose::identity(), b, &pose);
+        let label = format!("seed {seed}, tilt {:e}: {answer:?}", tilt.norm());
+        assert_eq!(answer.status, Status::Converged, "{label}");
+        let swapped = cold(b, &pose, a, &Pose::identity());
+        assert_eq!(swapped.status, Status::Converged, "{label} swapped {swapped:?}");
+        assert!(swapped.lower <= answer.upper && answer.lower <= swapped.upper, "{label} swapped {swapped:?}");
+        longest = longest.max(answer.iterations).max(swapped.iterations);
+    }
+    // Flat bodies take the longest: Newton's method nears their flat spots at a linear rate only.
+    assert!(longest <= 150, "{longest}");
+}

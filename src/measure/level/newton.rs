@@ -72,8 +72,7 @@ impl LevelNewton {
             b: of_b.rows(1.0, |jet| (jet.gradient.push(0.0), 1.0 - jet.value)),
             free_of_b: true,
         };
-        let short = |dx: &Vector3<f64>| length(dx) <= LONGEST;
-        let found = program.step(self.a, self.b, short, &of_point(self.stiffness(pair, &of_a, far, *s)))?;
+        let found = program.step(self.a, self.b, length, &of_point(self.stiffness(pair, &of_a, far, *s)))?;
         let dx = found.v.xyz();
         let length = length(&dx);
         let share = (LONGEST / length).min(1.0);

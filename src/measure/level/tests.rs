@@ -256,3 +256,26 @@ fn hints_of_other_pairs_change_nothing() {
         }
     }
 }
+
+#[test]
+fn sides_tilted_by_next_to_nothing_show_their_edges() {
+    let cuboid = |x, y, z| Body::cuboid("box", Vector3::new(x, y, z)).unwrap();
+    let needle = || Body::cylinder("needle", 0.01, 1.0).unwrap();
+    let pairs = [(cuboid(1.0, 1.0, 1e-3), needle()), (cuboid(1.0, 1.0, 1e-3), cuboid(0.6, 0.9, 0.3))];
+    let mut longest = 0;
+    for seed in 0..240 {
+        let mut random = Seeded(seed);
+        let (a, b) = &pairs[(seed % 2) as usize];
+        let tilt = signed(&mut random) * 10_f64.powf(-8.5 + random.signed());
+        let mut place = Vector3::zeros();
+        place[(seed / 2 % 3) as usize] = 3.0 + random.signed();
+        let pose = turned(place, tilt);
+        for (a, pose_a, b, pose_b) in [(a, Pose::identity(), b, pose), (b, pose, a, Pose::identity())] {
+            let level = cold(a, &pose_a, b, &pose_b, 1e-9);
+            let label = format!("seed {seed}, tilt {:e}, {} over {}: {level:?}", tilt.norm(), a.name(), b.name());
+            assert_eq!(level.status, Status::Converged, "{label}");
+            longest = longest.max(level.iterations);
+        }
+    }
+    assert!(longest <= 30, "{longest}");
+}
