@@ -203,9 +203,9 @@ impl Quadratic {
         let ratios = vanishing.map(|(k, (multiplier, share))| (k, multiplier / share));
         let (first, _) = ratios.min_by(|p, q| p.1.total_cmp(&q.1))?;
         if first < a.len {
-            a.remove(first)
+            a.remove(first);
         } else {
-            b.remove(first - a.len)
+            b.remove(first - a.len);
         }
         Some((a, b))
     }

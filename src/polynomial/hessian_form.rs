@@ -149,6 +149,12 @@ fn jet<S: Simd, const DEGREE: usize, const K: usize>(simd: S, table: &[Row], z: 
 /// Sums over the rows k of `table[k][i] powers[k]`, for each of the ten entries i, which lie side by side in vectors.
 #[inline(always)]
 fn contract<S: Simd, const K: usize>(simd: S, table: &[Row; K], powers: &[f64; K]) -> [f64; ENTRIES.len()] {
+    let mut sums = [0.0; ENTRIES.len()];
+    if K == 1 {
+        // Constant: the only monomial is 1.
+        sums.copy_from_slice(&table[0].0[..ENTRIES.len()]);
+        return sums;
+    }
     // Four sums in turn: a single one would wait for each addition before the next.
     let mut partial = [[simd.splat_f64s(0.0); ENTRIES.len()]; 4];
     let vectors = ENTRIES.len().div_ceil(S::F64_LANES);
@@ -165,7 +171,6 @@ fn contract<S: Simd, const K: usize>(simd: S, table: &[Row; K], powers: &[f64; K
         let [a, b, c, d] = [partial[0][i], partial[1][i], partial[2][i], partial[3][i]];
         *target = simd.add_f64s(simd.add_f64s(a, b), simd.add_f64s(c, d));
     }
-    let mut sums = [0.0; ENTRIES.len()];
     sums.copy_from_slice(&stored.0[..ENTRIES.len()]);
     sums
 }

@@ -237,6 +237,8 @@ impl WithSimd for Cold<'_> {
 
 impl Apart<'_> {
     /// The answer that a proof gives, unless rounding keeps it wide.
+    // What is left is about as large as the answer, and there is no allocation in a solve.
+    #[allow(clippy::result_large_err)]
     #[inline(always)]
     fn answer<S: Simd>(&self, simd: S, a: &Body, proven: Proven) -> Result<Distance, Left> {
         let narrow = proven.upper - proven.lower <= self.tolerance;

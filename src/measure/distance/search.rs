@@ -201,7 +201,7 @@ impl<'a> Search<'a> {
     }
 
     /// A point in A's frame from its normalization's centre on, metres.
-    fn from_center(&self, v: &Vector3<f64>) -> [f64; 3] {
+    fn centered(&self, v: &Vector3<f64>) -> [f64; 3] {
         (self.pair.to_a(v) - self.pair.a.body.normalization().center).into()
     }
 
@@ -213,7 +213,7 @@ impl<'a> Search<'a> {
         }
         let (pose_a, pose_b) = pair.poses();
         let relation = Apart { pose_a, pose_b, goal: self.goals.0, tolerance: self.tolerance * pair.unit() };
-        let from = Some(Start { x: self.from_center(x), y: self.from_center(y), n: (*n).into() });
+        let from = Some(Start { x: self.centered(x), y: self.centered(y), n: (*n).into() });
         let most = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
         match dispatch(Seek { a: pair.a.body, b: pair.b.body, relation, from, most, options }) {
             Ok((proven, trace)) => {
@@ -525,7 +525,7 @@ impl<'a> Search<'a> {
         }
         let active = [self.active.0.single()?, self.active.1.single()?];
         let (pair, (pose_a, pose_b)) = (self.pair, self.pair.poses());
-        let places = [self.from_center(&self.x), self.from_center(&self.y), self.n.into()];
+        let places = [self.centered(&self.x), self.centered(&self.y), self.n.into()];
         Some(Trace::of_distance((pair.a.body, pose_a), (pair.b.body, pose_b), places, active))
     }
 
