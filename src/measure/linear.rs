@@ -15,7 +15,7 @@ pub(super) fn solve<const N: usize, const W: usize>(system: &mut [[f64; W]; N], 
     dispatch(Elimination { system, n })
 }
 
-/// An elimination as work for the widest arithmetic: rows as a whole, for loops of one length make vectors.
+/// An elimination as vectorized work: rows as a whole, for loops of one length make vectors.
 struct Elimination<'a, const N: usize, const W: usize> {
     system: &'a mut [[f64; W]; N],
     n: usize,

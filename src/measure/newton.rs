@@ -113,6 +113,12 @@ impl Active {
         reported
     }
 
+    /// With multipliers so many times as large.
+    pub(super) fn scaled(mut self, factor: f64) -> Self {
+        self.multiplier.iter_mut().for_each(|multiplier| *multiplier *= factor);
+        self
+    }
+
     /// Multipliers of all constraints, negative ones cut off.
     pub(super) fn multipliers(&self) -> Multipliers {
         let mut all = [0.0; crate::body::MAX_CONSTRAINTS];

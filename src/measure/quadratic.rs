@@ -6,7 +6,8 @@
 //! ```
 //!
 //! From a guess of what is active the equations of its optimality are solved; what then pulls the wrong way is dropped, what is
-//! violated is added, until neither is left (a primal-dual active-set method; Nocedal and Wright, Numerical optimization, 2006,
+//! violated is added, where four are active already in place of the one that the dual simplex method gives up, until none is
+//! left (a primal-dual active-set method; Nocedal and Wright, Numerical optimization, 2006,
 //! chapter 16 and 18).
 
 use super::linear::{Augmented, MAX_UNKNOWNS, solve};
@@ -113,8 +114,8 @@ pub(super) struct Solution {
 }
 
 impl Quadratic {
-    /// The solution from a guess of what is active on; of damped programs the least damped whose step is short enough, if there
-    /// is one.
+    /// The solution from a guess of what is active on; of damped programs the first whose step is short enough, if there is
+    /// one, damped less where that leaves the step far from long.
     pub(super) fn step(
         mut self,
         a: Active,

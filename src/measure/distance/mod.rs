@@ -196,7 +196,7 @@ enum Left {
     Lost(Lost),
 }
 
-/// Continuation with its answer, as work for the widest arithmetic.
+/// Continuation with its answer, as vectorized work.
 struct Warm<'a>(Follow<'a, Apart<'a>>);
 
 impl WithSimd for Warm<'_> {
@@ -212,7 +212,7 @@ impl WithSimd for Warm<'_> {
     }
 }
 
-/// A start from nothing but the poses with its answer, as work for the widest arithmetic.
+/// A start from nothing but the poses with its answer, as vectorized work.
 struct Cold<'a> {
     seek: Seek<'a, Apart<'a>>,
     /// Replaced if the answer is proven.

@@ -186,11 +186,14 @@ impl<'a> Search<'a> {
         let Some(mut newton) = ReachNewton::new(pair, -n, Vector3::zeros(), x, y, &-n, a, b) else { return };
         let steps = newton.run(pair, self.options, self.iterations, |at| {
             let scale = 1.0 / at.n.norm();
-            let [of_a, of_b] = [at.a, at.b].map(|active| active.multipliers().map(|multiplier| multiplier * scale));
-            let n = -at.n * scale;
-            let raised = self.raise(distance_lower(pair, &at.x, &at.y, &n, &of_a, &of_b), &n);
+            let (n, a, b) = (-at.n * scale, at.a.scaled(scale), at.b.scaled(scale));
+            let raised = self.raise(distance_lower(pair, &at.x, &at.y, &n, &a.multipliers(), &b.multipliers()), &n);
+            if raised {
+                let distance = n.dot(&(at.x - at.y));
+                self.tried[0] = Some(DistanceNewton { x: at.x, y: at.y, distance, n, a, b });
+            }
             if raised | self.attain(&at.x, &at.y) {
-                self.active = (at.a, at.b);
+                self.active = (a, b);
             }
             self.done()
         });

@@ -1,4 +1,5 @@
-//! How far a difference of two bodies reaches along a ray: the program behind the growth distance.
+//! How far a difference of two bodies reaches along a ray: the program behind the growth distance, and with u a
+//! normal and no offset one that finds what a distance rests on.
 //!
 //! ```text
 //! max ρ   subject to   x - y + offset = ρ u,   g_i(x) <= 1,   h_j(y) <= 1

@@ -255,7 +255,7 @@ pub(super) fn square<S: Simd>(v: V3<f64>) -> f64 {
     dot::<S, f64>(v, v)
 }
 
-/// `M N`. No closures here: they would not be compiled for the widest arithmetic.
+/// `M N`. No closures here: they would not be compiled for vectors.
 #[inline(always)]
 fn product<S: Simd>(m: &M3<f64>, n: &M3<f64>) -> M3<f64> {
     [apply_transposed::<S, f64>(n, m[0]), apply_transposed::<S, f64>(n, m[1]), apply_transposed::<S, f64>(n, m[2])]

@@ -19,8 +19,8 @@
 //!
 //! **Prediction.** The last answer w obeyed `G + μ b = 0` where A was then; where A is now G is another, by the quadratic model of
 //! p about the point of the last jet: `∇p + ∇²p s`, s the way from there to w's image. To first order the answer moves by
-//! `-P G`, `P = H⁻¹ - H⁻¹b bᵀH⁻¹ / (b·H⁻¹b)`, for `P b = 0`. So the first step needs no evaluation. What it misses is nearly the same
-//! each time along a smooth trajectory, and is added on.
+//! `-P G`, `P = H⁻¹ - H⁻¹b bᵀH⁻¹ / (b·H⁻¹b)`, for `P b = 0`. So the first step needs no evaluation. What it misses changes slowly
+//! along a smooth trajectory; it is foreseen and added on.
 //!
 //! **Bracket**, at the point w' = w + δ where the step leads, values and gradients there by Taylor's formula from the one
 //! evaluation; with its remainders and all rounding errors, `η` for the error of x, metres:
@@ -148,7 +148,7 @@ const SHORT: f64 = 1e-3;
 /// Longest step after which none is left but rounding.
 const SETTLED: f64 = 1e-9;
 
-/// Continuation as work for the widest arithmetic.
+/// Continuation as vectorized work.
 pub(super) struct FollowLevel<'a> {
     pub(super) a: &'a Body,
     pub(super) pose_a: &'a Pose,
@@ -190,7 +190,7 @@ impl WithSimd for FollowLevel<'_> {
     }
 }
 
-/// A start from a point of B, as work for the widest arithmetic; for smooth bodies.
+/// A start from a point of B, as vectorized work; for smooth bodies.
 pub(super) struct SeekLevel<'a> {
     pub(super) a: &'a Body,
     pub(super) pose_a: &'a Pose,

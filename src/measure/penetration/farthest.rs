@@ -31,7 +31,7 @@ pub(super) struct Sought {
 /// active constraint; from the centre of the normalization on, body frame, metres. None where Newton's method does not arrive.
 pub(super) type Found = [Option<(Vector3<f64>, usize)>; MAX_LANES];
 
-/// At most [`MAX_LANES`] points of a body, as work for the widest arithmetic: a lane each where the body has one constraint. None depends
+/// At most [`MAX_LANES`] points of a body, as vectorized work: a lane each where the body has one constraint. None depends
 /// on the others.
 pub(super) struct Farthest<'a> {
     pub(super) body: &'a Body,

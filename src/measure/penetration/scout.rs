@@ -6,7 +6,7 @@ use crate::measure::vector::{apply_transposed, dot, rows};
 use crate::polynomial::{Lanes, MAX_LANES, Number, Simd, WithSimd};
 use nalgebra::Vector3;
 
-/// The look, as work for the widest arithmetic.
+/// The look, as vectorized work.
 pub(super) struct Scout<'a> {
     pub(super) pair: &'a Pair<'a>,
 }
