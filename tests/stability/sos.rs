@@ -227,26 +227,29 @@ impl Program {
         let count = self.objective.len();
         let (i, j, v) = triplets;
         let matrix = CscMatrix::new_from_triplets(row, count, i, j, v);
-        let settings = DefaultSettings {
-            verbose: false,
-            max_threads: 1,
-            tol_gap_abs: 1e-13,
-            tol_gap_rel: 1e-13,
-            tol_feas: 1e-13,
-            direct_solve_method: "faer".to_string(),
-            chordal_decomposition_enable: false,
-            ..DefaultSettings::default()
-        };
-        let none = CscMatrix::zeros((count, count));
-        let mut solver = DefaultSolver::new(&none, &self.objective, &matrix, &b, &cones, settings).ok()?;
-        solver.solve();
-        // Thin bodies leave no progress at the last digits: then the residuals decide.
-        let info = &solver.info;
-        let small = info.gap_abs.min(info.gap_rel).max(info.res_primal).max(info.res_dual) < 1e-6;
-        let stalled = [SolverStatus::AlmostSolved, SolverStatus::InsufficientProgress];
-        let solved =
-            solver.solution.status == SolverStatus::Solved || stalled.contains(&solver.solution.status) && small;
-        solved.then_some(solver.solution.obj_val)
+        // Where one factorization loses too many digits to go on, the other one mostly does not.
+        ["faer", "qdldl"].into_iter().find_map(|method| {
+            let settings = DefaultSettings {
+                verbose: false,
+                max_threads: 1,
+                tol_gap_abs: 1e-13,
+                tol_gap_rel: 1e-13,
+                tol_feas: 1e-13,
+                direct_solve_method: method.to_string(),
+                chordal_decomposition_enable: false,
+                ..DefaultSettings::default()
+            };
+            let none = CscMatrix::zeros((count, count));
+            let mut solver = DefaultSolver::new(&none, &self.objective, &matrix, &b, &cones, settings).ok()?;
+            solver.solve();
+            // Thin bodies leave no progress at the last digits: then the residuals decide.
+            let info = &solver.info;
+            let small = info.gap_abs.min(info.gap_rel).max(info.res_primal).max(info.res_dual) < 1e-6;
+            let stalled = [SolverStatus::AlmostSolved, SolverStatus::InsufficientProgress];
+            let solved =
+                solver.solution.status == SolverStatus::Solved || stalled.contains(&solver.solution.status) && small;
+            solved.then_some(solver.solution.obj_val)
+        })
     }
 }
 
