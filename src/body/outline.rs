@@ -147,7 +147,7 @@ fn place<S: Simd, N: Number<S>>(simd: S, [x, y, z]: [N; 3]) -> N {
 #[inline(always)]
 fn cell<S: Simd, N: Number<S>>(simd: S, across: N, scale: N) -> N {
     // Adding so much leaves no room for fractions; which side ties go to is of no matter.
-    let whole = N::splat(simd, 1.5 / f64::EPSILON);
+    let whole = N::splat(simd, 1.5 / N::EPSILON);
     let rounded = (across.mul_add(scale, N::splat(simd, 0.5 * CELLS as f64 - 0.5)) + whole) - whole;
     rounded.max(N::splat(simd, 0.0)).min(N::splat(simd, CELLS as f64 - 1.0))
 }
@@ -287,7 +287,7 @@ mod tests {
     use super::Cell;
     use crate::body::Body;
     use crate::polynomial::tests::Seeded;
-    use crate::polynomial::{Lanes, Scalar, Simd, WithSimd, dispatch_lanes};
+    use crate::polynomial::{Lanes, Scalar, Simd, Vector, WithSimd, dispatch_lanes};
     use nalgebra::{Matrix3, Vector3};
 
     /// `point + turn n`.

@@ -1,9 +1,10 @@
 //! Distances of one pair at many poses at once, a pose in each lane of the vectors.
 //!
-//! All poses are solved cold: the start of [`super::start`], then rounds of evaluation and step until the bracket is narrow. A
-//! group of poses goes through a few rounds together; the poses that need more wait until there is a group of them, so that the
-//! slowest does not hold up the others. A lane computes from its own pose only and selects where a single query would branch,
-//! so that no answer depends on the other poses of the batch.
+//! All poses are solved cold: the start of [`super::start`], then rounds of evaluation and step until the bracket is narrow. The
+//! first rounds, which are far off in any precision, are of single precision, for twice as many poses at a time. Those that
+//! bracket are of double; the poses that need more than one wait until there is a group of them, so that the slowest does not
+//! hold up the others. A lane computes from its own pose only and selects where a single query would branch, so that no answer
+//! depends on the other poses of the batch.
 
 use super::Status;
 use super::active::ActiveConstraints;
@@ -16,8 +17,11 @@ use super::tangent::{ALIGNED, Bend, Plane, Relative, Side, Step, bracket, moved,
 use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, subtract};
 use super::warm::WarmStart;
 use crate::body::{Body, Solid};
-use crate::polynomial::{Lanes, MAX_LANES, Number, NumberJet, Simd, WithSimd, dispatch_lanes};
+use crate::polynomial::{
+    Aligned, Lanes, MAX_LANES, MAX_SINGLES, Number, NumberJet, Simd, Singles, Twice, Vector, WithSimd, dispatch_lanes,
+};
 use nalgebra::Vector3;
+use std::ops::Range;
 
 /// Why a batch is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -75,7 +79,9 @@ pub fn distance_batch(
     if poses_b.is_empty() {
         return Err(BatchError::Empty);
     }
-    answers.fill(Distance::default());
+    for answer in answers.iter_mut() {
+        answer.upper = f64::INFINITY;
+    }
     if let ([a], [b]) = (a.parts(), b.parts())
         && a.is_smooth()
         && b.is_smooth()
@@ -100,8 +106,15 @@ fn in_lanes(
     dispatch_lanes(Batch { a, pose_a, b, poses_b, options, tolerance, answers });
 }
 
-/// Rounds that a group of poses goes through together.
-const ROUNDS: u32 = 3;
+/// Rounds in single precision that every pose goes through.
+const COARSE: u32 = 2;
+
+/// Most of them.
+const MOST_COARSE: u32 = 8;
+
+/// Square of the last step relative to the longest one, below which the next one, of double precision, is likely to end with a
+/// narrow bracket.
+const NEAR: f64 = 1e-4;
 
 /// Most rounds of a pose before it is solved alone.
 const MOST_ROUNDS: u32 = 16;
@@ -122,66 +135,91 @@ impl WithSimd for Batch<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        let lanes = Lanes::<S>::COUNT;
-        let mut waiting = Waiting::default();
+        let (lanes, singles) = (Lanes::<S>::COUNT, Coarse::<S>::COUNT);
+        let (mut far, mut near) = (Waiting::none(), Waiting::none());
         let mut next = 0;
-        while (next < self.poses_b.len() || waiting.len > 0) && !self.options.stopped() {
+        while !self.options.stopped() {
             let left = self.poses_b.len() - next;
-            let fresh = waiting.len < lanes && left > 0;
-            let mut group = Group { count: lanes.min(if fresh { left } else { waiting.len }), ..Group::default() };
-            if fresh {
-                // Lanes to spare solve the last pose once more.
-                for lane in 0..lanes {
-                    group.pose[lane] = next + lane.min(group.count - 1);
-                }
+            if near.len >= lanes || near.len > 0 && far.len + left == 0 {
+                let group = near.take(lanes);
+                self.prove(simd, group, &mut near);
+            } else if far.len >= singles || far.len > 0 && left == 0 {
+                let group = far.take(singles);
+                self.approach(simd, group, false, &mut far, &mut near);
+            } else if left > 0 {
+                let group = Group::fresh(next..next + left.min(singles));
                 next += group.count;
+                self.approach(simd, group, true, &mut far, &mut near);
             } else {
-                waiting.fill(&mut group, lanes);
+                return;
             }
-            self.solve(simd, &mut group, fresh, &mut waiting);
         }
     }
 }
 
+/// The numbers of the first rounds: where several poses are under way at once, none waits for the operands of another.
+type Coarse<S> = Twice<Singles<S>>;
+
 /// Poses of the batch in lanes.
-#[derive(Default)]
-struct Group {
+struct Group<const LANES: usize> {
     /// Lanes in use.
     count: usize,
     /// Index of the pose.
-    pose: [usize; MAX_LANES],
+    pose: [usize; LANES],
     /// Rounds that are behind it.
-    rounds: [u32; MAX_LANES],
-    /// Coordinates of x, y and n where rounds are behind it.
-    at: [[f64; MAX_LANES]; 9],
+    rounds: [u32; LANES],
+    /// Coordinates of x, y and n.
+    at: Aligned<[[f64; LANES]; 9]>,
 }
 
-/// Poses that need more rounds.
-#[derive(Default)]
+impl<const LANES: usize> Group<LANES> {
+    /// Poses that nothing is known of yet; lanes to spare solve the last one once more.
+    #[inline(always)]
+    fn fresh(poses: Range<usize>) -> Self {
+        let pose = std::array::from_fn(|lane| (poses.start + lane).min(poses.end - 1));
+        Self { count: poses.len(), pose, rounds: [0; LANES], at: Aligned([[0.0; LANES]; 9]) }
+    }
+}
+
+/// Most poses that wait for one kind of round: not quite enough for a group and those of another one.
+const MOST_WAITING: usize = 2 * MAX_SINGLES;
+
+/// Poses that wait for a round.
 struct Waiting {
     len: usize,
-    entries: [(usize, u32, [f64; 9]); 2 * MAX_LANES],
+    pose: [usize; MOST_WAITING],
+    rounds: [u32; MOST_WAITING],
+    at: [[f64; MOST_WAITING]; 9],
 }
 
 impl Waiting {
+    fn none() -> Self {
+        Self { len: 0, pose: [0; MOST_WAITING], rounds: [0; MOST_WAITING], at: [[0.0; MOST_WAITING]; 9] }
+    }
+
+    /// Lets a lane of a group wait.
     #[inline(always)]
-    fn push(&mut self, entry: (usize, u32, [f64; 9])) {
-        self.entries[self.len] = entry;
+    fn push<const LANES: usize>(&mut self, group: &Group<LANES>, lane: usize) {
+        self.pose[self.len] = group.pose[lane];
+        self.rounds[self.len] = group.rounds[lane];
+        for (waiting, column) in self.at.iter_mut().zip(&group.at.0) {
+            waiting[self.len] = column[lane];
+        }
         self.len += 1;
     }
 
-    /// Moves the last entries to the group; lanes to spare get the first of them once more.
+    /// At most so many of the last entries as a group; lanes to spare solve poses that no longer wait.
     #[inline(always)]
-    fn fill(&mut self, group: &mut Group, lanes: usize) {
+    fn take<const LANES: usize>(&mut self, lanes: usize) -> Group<LANES> {
+        let mut group = Group::fresh(0..lanes.min(self.len));
         self.len -= group.count;
-        for lane in 0..lanes {
-            let (pose, rounds, at) = self.entries[self.len + if lane < group.count { lane } else { 0 }];
-            group.pose[lane] = pose;
-            group.rounds[lane] = rounds;
-            for (column, entry) in group.at.iter_mut().zip(at) {
-                column[lane] = entry;
-            }
+        let taken = self.len..self.len + lanes;
+        group.pose[..lanes].copy_from_slice(&self.pose[taken.clone()]);
+        group.rounds[..lanes].copy_from_slice(&self.rounds[taken.clone()]);
+        for (column, waiting) in group.at.0.iter_mut().zip(&self.at) {
+            column[..lanes].copy_from_slice(&waiting[taken.clone()]);
         }
+        group
     }
 }
 
@@ -226,6 +264,31 @@ impl<N: Copy> Iterate<N> {
         Linearized { frame, local, difference, step, square }
     }
 
+    /// What a group was left with.
+    #[inline(always)]
+    fn load<S: Simd, const LANES: usize>(simd: S, group: &Group<LANES>) -> Self
+    where
+        N: Vector<S>,
+    {
+        let column = |i: usize| N::load(simd, &group.at.0[i]);
+        Self {
+            x: [column(0), column(1), column(2)],
+            y: [column(3), column(4), column(5)],
+            n: [column(6), column(7), column(8)],
+        }
+    }
+
+    /// Leaves it to the group.
+    #[inline(always)]
+    fn store<S: Simd, const LANES: usize>(&self, group: &mut Group<LANES>)
+    where
+        N: Vector<S>,
+    {
+        for (coordinate, column) in [self.x, self.y, self.n].as_flattened().iter().zip(&mut group.at.0) {
+            coordinate.store(column);
+        }
+    }
+
     /// Takes a step, within its limits.
     #[inline(always)]
     fn advance<S: Simd>(&mut self, simd: S, Linearized { frame, step, square, .. }: &Linearized<N>)
@@ -240,114 +303,126 @@ impl<N: Copy> Iterate<N> {
 }
 
 impl Batch<'_> {
-    /// A few rounds of a group: writes the answers that get proven and lets the others wait.
+    /// Rounds in single precision, after which the poses wait for what is next; fresh ones are started first, and left out where
+    /// they seem to overlap.
     #[inline(always)]
-    fn solve<S: Simd>(&mut self, simd: S, group: &mut Group, fresh: bool, waiting: &mut Waiting) {
-        let splat = |value: f64| Lanes::<S>::splat(simd, value);
-        let relative = self.relative(simd, &group.pose);
-        let side_a = Side::at_home(simd, self.a, 0);
-        let side_b = Side::away(self.b, 0, &relative);
+    fn approach<S: Simd>(
+        &self,
+        simd: S,
+        mut group: Group<MAX_SINGLES>,
+        fresh: bool,
+        far: &mut Waiting,
+        near: &mut Waiting,
+    ) {
+        let relative: Relative<Coarse<S>> = self.relative(simd, &group.pose);
+        let (side_a, side_b) = (Side::at_home(simd, self.a, 0), Side::away(self.b, 0, &relative));
         let limits = limits(self.a, self.b);
-        let worth = worth_a_bracket(limits);
-        let mut at = if fresh {
+        let mut at: Iterate<Coarse<S>> = Iterate::load(simd, &group);
+        let mut overlapping = 0;
+        if fresh {
             let n = facing(simd, self.a, self.b, &relative);
             let (Start { x, y, n }, _) = meeting(simd, self.a, self.b, &relative, n, None);
-            Iterate { x, y, n }
-        } else {
-            let column = |i: usize| Lanes::load(simd, &group.at[i]);
-            Iterate {
-                x: [column(0), column(1), column(2)],
-                y: [column(3), column(4), column(5)],
-                n: [column(6), column(7), column(8)],
+            at = Iterate { x, y, n };
+            overlapping = self.overlapping(simd, &at, (&side_a, &side_b));
+        }
+        let rounds = if fresh { COARSE } else { 1 };
+        let mut close = 0;
+        for _ in 0..rounds {
+            let ((jet_a, _), (jet_b, _)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
+            let here = at.linearize(simd, (&side_a, &jet_a), (&side_b, &jet_b), limits);
+            at.advance(simd, &here);
+            close = Coarse::<S>::bits(simd, here.square.le(Number::splat(simd, NEAR)));
+        }
+        at.store(&mut group);
+        for lane in 0..group.count {
+            group.rounds[lane] += rounds;
+            if overlapping >> lane & 1 == 0 {
+                let done = close >> lane & 1 == 1 || group.rounds[lane] >= MOST_COARSE;
+                if done { near.push(&group, lane) } else { far.push(&group, lane) }
             }
-        };
+        }
+    }
+
+    /// One round of a group that proves: writes the answers and lets the other poses wait.
+    #[inline(always)]
+    fn prove<S: Simd>(&mut self, simd: S, mut group: Group<MAX_LANES>, waiting: &mut Waiting) {
+        let splat = |value: f64| Lanes::<S>::splat(simd, value);
+        let relative: Relative<Lanes<S>> = self.relative(simd, &group.pose);
+        let (side_a, side_b) = (Side::at_home(simd, self.a, 0), Side::away(self.b, 0, &relative));
+        let limits = limits(self.a, self.b);
+        let worth = worth_a_bracket(limits);
+        let mut at = Iterate::load(simd, &group);
         let mut open = (1_u32 << group.count) - 1;
-        if fresh {
-            open &= !self.overlapping(simd, &at, (&side_a, &side_b));
+        let ((jet_a, inside_a), (jet_b, inside_b)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
+        let here = at.linearize(simd, (&side_a, &jet_a), (&side_b, &jet_b), limits);
+        let inside = Lanes::and(simd, inside_a, inside_b);
+        let short = Lanes::and(simd, inside, here.step.square(simd, worth).le(splat(1.0)));
+        if Lanes::bits(simd, short) & open != 0 {
+            let next_a = side_a.extrapolate(simd, &jet_a, &here.local.0, here.step.dx);
+            let next_b = side_b.extrapolate(simd, &jet_b, &here.local.1, here.step.dy);
+            let next = subtract(add(here.difference, here.step.dx), here.step.dy);
+            let found = bracket(simd, (&side_a, &next_a), (&side_b, &next_b), next);
+            let enough = splat(self.tolerance).max(found.rounding * splat(4.0));
+            let width = found.upper - found.lower;
+            let apart = Lanes::and(simd, short, splat(f64::MIN_POSITIVE).le(found.lower));
+            let settled = Lanes::and(simd, apart, Lanes::and(simd, found.off.le(splat(ALIGNED)), width.le(enough)));
+            let settled = Lanes::bits(simd, settled) & open;
+            // What rounding keeps wider than asked for, twice the precision narrows: one by one.
+            let proven = settled & Lanes::bits(simd, width.le(splat(self.tolerance)));
+            open &= !settled;
+            if proven != 0 {
+                let x = moved(at.x, add(here.step.dx, found.to_a), &here.frame);
+                let y = moved(at.y, add(here.step.dy, found.to_b), &here.frame);
+                let n = apply_transposed(&here.frame, found.normal);
+                self.write(simd, &group, proven, [found.lower, found.upper], found.multipliers, [x, y, n]);
+            }
             if open == 0 {
                 return;
             }
         }
-        let rounds = if fresh { ROUNDS } else { 1 };
-        for round in 1..=rounds {
-            let ((jet_a, inside_a), (jet_b, inside_b)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
-            let here = at.linearize(simd, (&side_a, &jet_a), (&side_b, &jet_b), limits);
-            let inside = Lanes::and(simd, inside_a, inside_b);
-            let short = Lanes::and(simd, inside, here.step.square(simd, worth).le(splat(1.0)));
-            // Before the last round hardly ever all lanes of a group are so far.
-            if round == rounds && Lanes::bits(simd, short) & open != 0 {
-                let next_a = side_a.extrapolate(simd, &jet_a, &here.local.0, here.step.dx);
-                let next_b = side_b.extrapolate(simd, &jet_b, &here.local.1, here.step.dy);
-                let next = subtract(add(here.difference, here.step.dx), here.step.dy);
-                let found = bracket(simd, (&side_a, &next_a), (&side_b, &next_b), next);
-                let enough = splat(self.tolerance).max(found.rounding * splat(4.0));
-                let width = found.upper - found.lower;
-                let apart = Lanes::and(simd, short, splat(f64::MIN_POSITIVE).le(found.lower));
-                let settled = Lanes::and(simd, apart, Lanes::and(simd, found.off.le(splat(ALIGNED)), width.le(enough)));
-                let settled = Lanes::bits(simd, settled) & open;
-                // What rounding keeps wider than asked for, twice the precision narrows: one by one.
-                let proven = settled & Lanes::bits(simd, width.le(splat(self.tolerance)));
-                open &= !settled;
-                if proven != 0 {
-                    let x = moved(at.x, add(here.step.dx, found.to_a), &here.frame);
-                    let y = moved(at.y, add(here.step.dy, found.to_b), &here.frame);
-                    let n = apply_transposed(&here.frame, found.normal);
-                    self.write(simd, group, proven, round, [found.lower, found.upper], found.multipliers, [x, y, n]);
-                }
-                if open == 0 {
-                    return;
-                }
-            }
-            at.advance(simd, &here);
-        }
-        for (i, coordinate) in [at.x, at.y, at.n].as_flattened().iter().enumerate() {
-            coordinate.store(&mut group.at[i]);
-        }
+        at.advance(simd, &here);
+        at.store(&mut group);
         for lane in 0..group.count {
-            let spent = group.rounds[lane] + rounds;
-            if open >> lane & 1 == 1 && spent < MOST_ROUNDS {
-                let mut entry = [0.0; 9];
-                for (entry, column) in entry.iter_mut().zip(&group.at) {
-                    *entry = column[lane];
-                }
-                waiting.push((group.pose[lane], spent, entry));
+            group.rounds[lane] += 1;
+            if open >> lane & 1 == 1 && group.rounds[lane] < MOST_ROUNDS {
+                waiting.push(&group, lane);
             }
         }
     }
 
     /// The lanes in which the middle between the points seems to lie in both bodies: single queries prove that fast.
     #[inline(always)]
-    fn overlapping<S: Simd>(
+    fn overlapping<S: Simd, N: Vector<S>>(
         &self,
         simd: S,
-        at: &Iterate<Lanes<S>>,
-        (side_a, side_b): (&Side<'_, Lanes<S>>, &Side<'_, Lanes<S>>),
+        at: &Iterate<N>,
+        (side_a, side_b): (&Side<'_, N>, &Side<'_, N>),
     ) -> u32 {
-        let one = Lanes::<S>::splat(simd, 1.0);
-        let across = Lanes::bits(simd, dot(at.n, subtract(at.x, at.y)).le(Lanes::splat(simd, 0.0)));
+        let one = N::splat(simd, 1.0);
+        let across = N::bits(simd, dot(at.n, subtract(at.x, at.y)).le(N::splat(simd, 0.0)));
         if across == 0 {
             return 0;
         }
         let middle = middle(simd, self.a, self.b, at.x, at.y);
         let ((in_a, _), (in_b, _)) = (side_a.jet(simd, middle), side_b.jet(simd, middle));
-        across & Lanes::bits(simd, in_a.value.max(in_b.value).le(one))
+        across & N::bits(simd, in_a.value.max(in_b.value).le(one))
     }
 
     /// B at the poses as seen from A.
     #[inline(always)]
-    fn relative<S: Simd>(&self, simd: S, poses: &[usize; MAX_LANES]) -> Relative<Lanes<S>> {
-        let mut columns = [[0.0; MAX_LANES]; 7];
-        for lane in 0..Lanes::<S>::COUNT {
+    fn relative<S: Simd, N: Vector<S>, const LANES: usize>(&self, simd: S, poses: &[usize; LANES]) -> Relative<N> {
+        let mut columns = Aligned([[0.0; LANES]; 7]);
+        for lane in 0..N::COUNT {
             let pose = &self.poses_b[poses[lane]];
             let q = &pose.rotation().coords;
             // Differences of translations are exact to one rounding, however far from the world origin.
             let t = pose.translation() - self.pose_a.translation();
-            for (column, entry) in columns.iter_mut().zip([q.x, q.y, q.z, q.w, t.x, t.y, t.z]) {
+            for (column, entry) in columns.0.iter_mut().zip([q.x, q.y, q.z, q.w, t.x, t.y, t.z]) {
                 column[lane] = entry;
             }
         }
-        let splat = |value: f64| Lanes::<S>::splat(simd, value);
-        let column = |i: usize| Lanes::load(simd, &columns[i]);
+        let splat = |value: f64| N::splat(simd, value);
+        let column = |i: usize| N::load(simd, &columns.0[i]);
         let own = &self.pose_a.rotation().coords;
         let (u, v) = ([splat(-own.x), splat(-own.y), splat(-own.z)], [column(0), column(1), column(2)]);
         let (u_w, v_w) = (splat(own.w), column(3));
@@ -372,13 +447,11 @@ impl Batch<'_> {
 
     /// Writes the answers of the lanes that are set in `proven`.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
     fn write<S: Simd>(
         &mut self,
         simd: S,
-        group: &Group,
+        group: &Group<MAX_LANES>,
         proven: u32,
-        round: u32,
         [lower, upper]: [Lanes<S>; 2],
         [of_a, of_b]: [Lanes<S>; 2],
         [x, y, n]: [V3<Lanes<S>>; 3],
@@ -388,16 +461,16 @@ impl Batch<'_> {
         let splat = |value: f64| Lanes::<S>::splat(simd, value);
         let place = [splat(place.x), splat(place.y), splat(place.z)];
         let (x, y, n) = (add(place, apply(&frame, x)), add(place, apply(&frame, y)), apply(&frame, n));
-        let mut columns = [[0.0; MAX_LANES]; 13];
+        let mut columns = Aligned([[0.0; MAX_LANES]; 13]);
         let numbers = [lower, upper, of_a, of_b, x[0], x[1], x[2], y[0], y[1], y[2], n[0], n[1], n[2]];
-        for (number, column) in numbers.into_iter().zip(&mut columns) {
+        for (number, column) in numbers.into_iter().zip(&mut columns.0) {
             number.store(column);
         }
         for lane in 0..group.count {
             if proven >> lane & 1 == 0 {
                 continue;
             }
-            let entry = |i: usize| columns[i][lane];
+            let entry = |i: usize| columns.0[i][lane];
             let vector = |i: usize| Vector3::new(entry(i), entry(i + 1), entry(i + 2));
             self.answers[group.pose[lane]] = Distance {
                 parts: [0, 0],
@@ -410,7 +483,7 @@ impl Batch<'_> {
                 normal: Some(vector(10)),
                 active_a: ActiveConstraints::single(0, entry(2)),
                 active_b: ActiveConstraints::single(0, entry(3)),
-                iterations: group.rounds[lane] + round,
+                iterations: group.rounds[lane] + 1,
             };
         }
     }

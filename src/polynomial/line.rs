@@ -1,7 +1,9 @@
 //! A polynomial along a line: as many values as fix it, side by side, and what they interpolate.
 
+use super::lanes::{Lanes, Vector};
 use super::nested::Nested;
-use super::simd::{Lanes, Number, Simd, WithSimd, dispatch};
+use super::number::Number;
+use super::simd::{Simd, WithSimd, dispatch};
 use nalgebra::Vector3;
 
 /// Most values that are computed: those of degree 8, rounded up to whole vectors.

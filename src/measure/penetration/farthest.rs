@@ -15,7 +15,7 @@ use crate::measure::tangent::Side;
 use crate::measure::vector::{
     V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, rows, scaled,
 };
-use crate::polynomial::{Lanes, MAX_LANES, Number, NumberJet, Simd, WithSimd};
+use crate::polynomial::{Lanes, MAX_LANES, Number, NumberJet, Simd, Vector, WithSimd};
 use nalgebra::Vector3;
 
 /// A point of a body that is farthest along a unit vector.

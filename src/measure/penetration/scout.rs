@@ -3,7 +3,7 @@
 
 use crate::measure::pair::Pair;
 use crate::measure::vector::{apply_transposed, dot, rows};
-use crate::polynomial::{Lanes, MAX_LANES, Number, Simd, WithSimd};
+use crate::polynomial::{Lanes, MAX_LANES, Number, Simd, Vector, WithSimd};
 use nalgebra::Vector3;
 
 /// The look, as vectorized work.

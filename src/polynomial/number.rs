@@ -1,0 +1,99 @@
+//! What is computed with: one double, or several numbers side by side.
+
+use super::Polynomial;
+use super::hessian_form::NumberJet;
+use super::simd::Simd;
+use std::fmt::Debug;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// Real numbers that are computed with: one double, or several doubles or singles side by side that know nothing of each other.
+pub trait Number<S: Simd>:
+    Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+{
+    /// Outcome of a comparison, lane by lane.
+    type Mask: Copy;
+
+    /// The distance from 1 to the next larger number.
+    const EPSILON: f64;
+
+    /// The same value in every lane, rounded to the precision at hand.
+    fn splat(simd: S, value: f64) -> Self;
+    /// `self b + c`, with one rounding where that is fast and two where not.
+    fn mul_add(self, b: Self, c: Self) -> Self;
+    /// Square root.
+    fn sqrt(self) -> Self;
+    /// Absolute value.
+    fn abs(self) -> Self;
+    /// The smaller of two.
+    fn min(self, other: Self) -> Self;
+    /// The larger of two.
+    fn max(self, other: Self) -> Self;
+    /// `self <= other`; false where one is NaN.
+    fn le(self, other: Self) -> Self::Mask;
+    /// Both masks.
+    fn and(simd: S, a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// Whether the mask holds in every lane.
+    fn all(simd: S, mask: Self::Mask) -> bool;
+    /// `self` where the mask holds, else `other`.
+    fn select(self, mask: Self::Mask, other: Self) -> Self;
+    /// Value, gradient and Hessian of the polynomial at points z, by the scheme that suits as many of them.
+    fn jet(simd: S, polynomial: &Polynomial, z: [Self; 3]) -> NumberJet<Self>;
+    /// The rows of a table at whole-numbered places; the last one beyond its end, the first one for what is not a number.
+    fn gather<const K: usize>(simd: S, table: &[[f64; K]], place: Self) -> [Self; K];
+}
+
+impl<S: Simd> Number<S> for f64 {
+    type Mask = bool;
+
+    const EPSILON: f64 = f64::EPSILON;
+
+    #[inline(always)]
+    fn splat(_: S, value: f64) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        // Without the instruction it would be a call.
+        if S::F64_LANES > 1 { f64::mul_add(self, b, c) } else { self * b + c }
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        f64::abs(self)
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        if self < other { self } else { other }
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> bool {
+        self <= other
+    }
+    #[inline(always)]
+    fn and(_: S, a: bool, b: bool) -> bool {
+        a & b
+    }
+    #[inline(always)]
+    fn all(_: S, mask: bool) -> bool {
+        mask
+    }
+    #[inline(always)]
+    fn select(self, mask: bool, other: Self) -> Self {
+        if mask { self } else { other }
+    }
+    #[inline(always)]
+    fn jet(simd: S, polynomial: &Polynomial, z: [Self; 3]) -> NumberJet<Self> {
+        polynomial.form.jet(simd, z)
+    }
+    #[inline(always)]
+    fn gather<const K: usize>(_: S, table: &[[f64; K]], place: Self) -> [Self; K] {
+        table[(place as usize).min(table.len() - 1)]
+    }
+}
