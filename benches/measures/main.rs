@@ -55,9 +55,9 @@ struct Effort {
 fn main() -> Result<(), Box<dyn Error>> {
     let args = Args::parse();
     let effort = if args.quick {
-        Effort { trajectories: 2, poses: 200, passes: 5 }
+        Effort { trajectories: 1, poses: 1024, passes: 3 }
     } else {
-        Effort { trajectories: 8, poses: 400, passes: 15 }
+        Effort { trajectories: 4, poses: 1024, passes: 15 }
     };
     let names: Vec<String> = objects::PAIRS.iter().map(|(a, b)| format!("{a}-{b}")).collect();
     if let Some(unknown) = args.pair.iter().find(|&name| !names.contains(name)) {
@@ -113,7 +113,7 @@ fn compare(
         if let Some(coal) = &mut coal {
             coal.pass()?;
         }
-        rows.iter_mut().for_each(|row| row.timed.pass());
+        rows.iter_mut().for_each(|row| row.timed.turn());
     }
     if let Some(coal) = &coal {
         peers::check(coal, &scene)?;

@@ -143,13 +143,15 @@ impl WithSimd for Batch<'_> {
             if near.len >= lanes || near.len > 0 && far.len + left == 0 {
                 let group = near.take(lanes);
                 self.prove(simd, group, &mut near);
-            } else if far.len >= singles || far.len > 0 && left == 0 {
-                let group = far.take(singles);
-                self.approach(simd, group, false, &mut far, &mut near);
-            } else if left > 0 {
-                let group = Group::fresh(next..next + left.min(singles));
-                next += group.count;
-                self.approach(simd, group, true, &mut far, &mut near);
+            } else if far.len + left > 0 {
+                let fresh = far.len < singles && left > 0;
+                let group = if fresh { Group::fresh(next..next + left.min(singles)) } else { far.take(singles) };
+                next += if fresh { group.count } else { 0 };
+                if group.count > Singles::<S>::COUNT {
+                    self.approach::<S, Coarse<S>>(simd, group, fresh, &mut far, &mut near);
+                } else {
+                    self.approach::<S, Singles<S>>(simd, group, fresh, &mut far, &mut near);
+                }
             } else {
                 return;
             }
@@ -157,7 +159,7 @@ impl WithSimd for Batch<'_> {
     }
 }
 
-/// The numbers of the first rounds: where several poses are under way at once, none waits for the operands of another.
+/// The numbers of the first rounds, unless there are few poses: while one vector waits for its operands the other is computed with.
 type Coarse<S> = Twice<Singles<S>>;
 
 /// Poses of the batch in lanes.
@@ -306,7 +308,7 @@ impl Batch<'_> {
     /// Rounds in single precision, after which the poses wait for what is next; fresh ones are started first, and left out where
     /// they seem to overlap.
     #[inline(always)]
-    fn approach<S: Simd>(
+    fn approach<S: Simd, N: Vector<S>>(
         &self,
         simd: S,
         mut group: Group<MAX_SINGLES>,
@@ -314,10 +316,10 @@ impl Batch<'_> {
         far: &mut Waiting,
         near: &mut Waiting,
     ) {
-        let relative: Relative<Coarse<S>> = self.relative(simd, &group.pose);
+        let relative: Relative<N> = self.relative(simd, &group.pose);
         let (side_a, side_b) = (Side::at_home(simd, self.a, 0), Side::away(self.b, 0, &relative));
         let limits = limits(self.a, self.b);
-        let mut at: Iterate<Coarse<S>> = Iterate::load(simd, &group);
+        let mut at: Iterate<N> = Iterate::load(simd, &group);
         let mut overlapping = 0;
         if fresh {
             let n = facing(simd, self.a, self.b, &relative);
@@ -331,7 +333,7 @@ impl Batch<'_> {
             let ((jet_a, _), (jet_b, _)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
             let here = at.linearize(simd, (&side_a, &jet_a), (&side_b, &jet_b), limits);
             at.advance(simd, &here);
-            close = Coarse::<S>::bits(simd, here.square.le(Number::splat(simd, NEAR)));
+            close = N::bits(simd, here.square.le(Number::splat(simd, NEAR)));
         }
         at.store(&mut group);
         for lane in 0..group.count {
