@@ -157,6 +157,8 @@ impl Round<'_> {
         self.tally.solves += 1;
         let worst = Worst { iterations: answer.iterations(), block: site.block, query: site.query };
         self.iterations[start as usize].count(worst);
+        let told = || format!("{}, {}: {}", MEASURES[site.measure].name, STARTS[start as usize].1, site.tell(answer));
+        self.tally.slow(worst, told);
         site.cheap(self.tally, answer);
     }
 }

@@ -59,7 +59,7 @@ struct Arguments {
     /// Folder of further body files.
     #[arg(long)]
     bodies: Option<PathBuf>,
-    /// Replay only this block and tell its failures.
+    /// Replay only this block and tell its failures and its slow solves.
     #[arg(long)]
     block: Option<u64>,
     /// What cargo says to every bench.
@@ -77,6 +77,9 @@ fn main() {
         let tally = block::run(&bodies, arguments.seed, number, true);
         for failure in &tally.kept {
             println!("query {}: {}: {}", failure.query, failure.check.name(), failure.detail);
+        }
+        for (iterations, query, detail) in &tally.slow {
+            println!("query {query}: {iterations} iterations: {detail}");
         }
         println!("{} solves, {} failures", tally.solves, tally.failed());
         return;

@@ -1,10 +1,8 @@
 //! The log of a run as Markdown.
 
 use crate::state::State;
+use crate::tally::WANTED;
 use std::fmt::Write;
-
-/// Iterations that no solve should need more than.
-const WANTED: u32 = 30;
 
 pub(crate) fn markdown(state: &State, threads: usize) -> String {
     let tally = &state.tally;

@@ -7,6 +7,9 @@ use std::collections::BTreeMap;
 const KEPT: usize = 500;
 const KEPT_OF_A_BLOCK: usize = 10;
 
+/// Iterations that none should exceed.
+pub(crate) const WANTED: u32 = 30;
+
 /// The hardest query of a kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(crate) struct Worst {
@@ -111,6 +114,9 @@ pub(crate) struct Tally {
     pub(crate) failures: BTreeMap<Check, u64>,
     /// The first failures.
     pub(crate) kept: Vec<Failure>,
+    /// Of a block that is replayed, the solves that took most iterations, with their number.
+    #[serde(skip)]
+    pub(crate) slow: Vec<(u32, u64, String)>,
     /// Largest deviation from the semidefinite program, relative to the size.
     pub(crate) deviation: f64,
 }
@@ -143,6 +149,13 @@ impl Tally {
             if self.kept.len() < KEPT_OF_A_BLOCK {
                 self.kept.push(Failure { block, query, check, detail: detail() });
             }
+        }
+    }
+
+    /// Takes down a solve if it is one of the slow ones.
+    pub(crate) fn slow(&mut self, solve: Worst, detail: impl FnOnce() -> String) {
+        if solve.iterations > WANTED {
+            self.slow.push((solve.iterations, solve.query, detail()));
         }
     }
 

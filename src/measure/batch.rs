@@ -1,8 +1,8 @@
 //! Distances of one pair at many poses at once, a pose in each lane of the vectors.
 //!
 //! All poses are solved cold: the start of [`super::start`], then rounds of evaluation and step until the bracket is narrow. The
-//! first rounds, which are far off in any precision, are of single precision, for twice as many poses at a time. Those that
-//! bracket are of double; the poses that need more than one wait until there is a group of them, so that the slowest does not
+//! first rounds, which are far off in any precision, are of single precision, for more poses at a time. Those that bracket are
+//! of double; the poses that need more than one wait until there is a group of them, so that the slowest does not
 //! hold up the others. A lane computes from its own pose only and selects where a single query would branch, so that no answer
 //! depends on the other poses of the batch.
 
@@ -112,7 +112,7 @@ const COARSE: u32 = 2;
 /// Most of them.
 const MOST_COARSE: u32 = 8;
 
-/// Square of the last step relative to the longest one, below which the next one, of double precision, is likely to end with a
+/// Square of the last step relative to the longest one allowed, below which the next one, of double precision, is likely to end with a
 /// narrow bracket.
 const NEAR: f64 = 1e-4;
 
@@ -162,6 +162,9 @@ impl WithSimd for Batch<'_> {
 /// The numbers of the first rounds, unless there are few poses: while one vector waits for its operands the other is computed with.
 type Coarse<S> = Twice<Singles<S>>;
 
+/// Most lanes of them.
+const MAX_COARSE: usize = 2 * MAX_SINGLES;
+
 /// Poses of the batch in lanes.
 struct Group<const LANES: usize> {
     /// Lanes in use.
@@ -183,8 +186,8 @@ impl<const LANES: usize> Group<LANES> {
     }
 }
 
-/// Most poses that wait for one kind of round: not quite enough for a group and those of another one.
-const MOST_WAITING: usize = 2 * MAX_SINGLES;
+/// Most poses that wait for one kind of round: one too few for a group, and those of a whole one.
+const MOST_WAITING: usize = 2 * MAX_COARSE;
 
 /// Poses that wait for a round.
 struct Waiting {
@@ -210,12 +213,13 @@ impl Waiting {
         self.len += 1;
     }
 
-    /// At most so many of the last entries as a group; lanes to spare solve poses that no longer wait.
+    /// At most so many of the last entries as a group; lanes to spare hold some that no longer wait.
     #[inline(always)]
     fn take<const LANES: usize>(&mut self, lanes: usize) -> Group<LANES> {
-        let mut group = Group::fresh(0..lanes.min(self.len));
-        self.len -= group.count;
+        let count = lanes.min(self.len);
+        self.len -= count;
         let taken = self.len..self.len + lanes;
+        let mut group = Group { count, pose: [0; LANES], rounds: [0; LANES], at: Aligned([[0.0; LANES]; 9]) };
         group.pose[..lanes].copy_from_slice(&self.pose[taken.clone()]);
         group.rounds[..lanes].copy_from_slice(&self.rounds[taken.clone()]);
         for (column, waiting) in group.at.0.iter_mut().zip(&self.at) {
@@ -311,7 +315,7 @@ impl Batch<'_> {
     fn approach<S: Simd, N: Vector<S>>(
         &self,
         simd: S,
-        mut group: Group<MAX_SINGLES>,
+        mut group: Group<MAX_COARSE>,
         fresh: bool,
         far: &mut Waiting,
         near: &mut Waiting,
@@ -319,26 +323,29 @@ impl Batch<'_> {
         let relative: Relative<N> = self.relative(simd, &group.pose);
         let (side_a, side_b) = (Side::at_home(simd, self.a, 0), Side::away(self.b, 0, &relative));
         let limits = limits(self.a, self.b);
-        let mut at: Iterate<N> = Iterate::load(simd, &group);
-        let mut overlapping = 0;
-        if fresh {
+        let (mut at, overlapping) = if fresh {
             let n = facing(simd, self.a, self.b, &relative);
             let (Start { x, y, n }, _) = meeting(simd, self.a, self.b, &relative, n, None);
-            at = Iterate { x, y, n };
-            overlapping = self.overlapping(simd, &at, (&side_a, &side_b));
-        }
+            let at = Iterate { x, y, n };
+            (at, self.overlapping(simd, &at, (&side_a, &side_b)))
+        } else {
+            (Iterate::load(simd, &group), 0)
+        };
         let rounds = if fresh { COARSE } else { 1 };
-        let mut close = 0;
+        let mut square = N::splat(simd, f64::NAN);
         for _ in 0..rounds {
             let ((jet_a, _), (jet_b, _)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
             let here = at.linearize(simd, (&side_a, &jet_a), (&side_b, &jet_b), limits);
             at.advance(simd, &here);
-            close = N::bits(simd, here.square.le(Number::splat(simd, NEAR)));
+            square = here.square;
         }
         at.store(&mut group);
+        // Where single precision has no number for something the pose is left out, too.
+        let within = |most: f64| N::bits(simd, square.le(N::splat(simd, most)));
+        let (close, open) = (within(NEAR), within(f32::MAX.into()) & !overlapping);
         for lane in 0..group.count {
             group.rounds[lane] += rounds;
-            if overlapping >> lane & 1 == 0 {
+            if open >> lane & 1 == 1 {
                 let done = close >> lane & 1 == 1 || group.rounds[lane] >= MOST_COARSE;
                 if done { near.push(&group, lane) } else { far.push(&group, lane) }
             }
@@ -493,7 +500,7 @@ impl Batch<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::{BatchError, distance_batch};
+    use super::{BatchError, distance_batch, in_lanes};
     use crate::body::{Body, Compound};
     use crate::measure::{Distance, Options, Pose, Status, WarmStart, distance};
     use crate::polynomial::tests::Seeded;
@@ -666,6 +673,93 @@ mod tests {
             for (answer, pose_b) in answers.iter().zip(&poses) {
                 let truth = distance(&a, &Pose::identity(), &b, pose_b, &Options::default(), &mut WarmStart::default());
                 assert!(answer.lower <= truth.upper && truth.lower <= answer.upper, "{answer:?} {truth:?}");
+            }
+        }
+    }
+
+    /// Which poses are answered in lanes.
+    fn answered(a: &Body, b: &Body, poses: &[Pose]) -> usize {
+        let unknown = Distance { upper: f64::INFINITY, ..Distance::default() };
+        let mut answers = vec![unknown; poses.len()];
+        in_lanes((a, &Pose::identity()), (b, poses), &Options::default(), &mut answers);
+        answers.iter().filter(|answer| answer.upper.is_finite()).count()
+    }
+
+    #[test]
+    fn lanes_answer_alike_in_any_unit() {
+        // From nanometres to gigametres; powers of two change no digit.
+        let answered_in = |unit: f64, degrees: [u8; 2], far: f64| {
+            let mut random = Seeded(5);
+            let [a, b] = degrees.map(|degree| {
+                let half = Vector3::from_fn(|_, _| unit * 2_f64.powf(random.signed()));
+                if degree == 2 {
+                    Body::ellipsoid("egg", Vector3::zeros(), half).unwrap()
+                } else {
+                    Body::superellipsoid("q", Vector3::zeros(), half, degree).unwrap()
+                }
+            });
+            let poses: Vec<Pose> = (0..200)
+                .map(|_| {
+                    let q = Vector4::from_fn(|_, _| random.signed()).normalize();
+                    let t = Vector3::from_fn(|_, _| random.signed()).normalize() * (far * unit);
+                    Pose::from_quaternion(t, q.into()).unwrap()
+                })
+                .collect();
+            answered(&a, &b, &poses)
+        };
+        for degrees in [[2, 2], [4, 6], [8, 2]] {
+            for far in [6.0, 60.0, 600.0] {
+                let count = answered_in(1.0, degrees, far);
+                assert!(count >= 180, "degrees {degrees:?}, far {far}: {count} of 200");
+                for exponent in [-30, -20, -10, 10, 20, 30] {
+                    let unit = 2_f64.powi(exponent);
+                    assert_eq!(answered_in(unit, degrees, far), count, "unit {unit:e}, degrees {degrees:?}, far {far}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn concentric_bodies_do_not_linger() {
+        let (a, b) = (body(&mut Seeded(1), 2), body(&mut Seeded(1), 2));
+        let mut answers = [Distance::default(); 3];
+        distance_batch(&a, &Pose::identity(), &b, &[Pose::identity(); 3], &Options::default(), &mut answers).unwrap();
+        for answer in &answers {
+            assert_eq!((answer.status, answer.lower), (Status::Converged, 0.0), "{answer:?}");
+        }
+        assert_eq!(answered(&a, &b, &[Pose::identity(); 3]), 0);
+    }
+
+    #[test]
+    fn what_the_places_held_before_is_gone() {
+        let mut random = Seeded(4);
+        let (a, b) = (body(&mut random, 4), body(&mut random, 6));
+        let poses: Vec<Pose> = (0..90).map(|_| pose(&mut random, 5.0)).collect();
+        let stop = AtomicBool::new(true);
+        let here = Pose::identity();
+        let truth = |pose| distance(&a, &here, &b, pose, &Options::default(), &mut WarmStart::default());
+        for options in [Options::default(), Options::default().with_stop(&stop)] {
+            let stale = Distance { status: Status::Converged, lower: 40.0, upper: 40.0, ..Distance::default() };
+            let mut answers = vec![stale; poses.len()];
+            distance_batch(&a, &here, &b, &poses, &options, &mut answers).unwrap();
+            for (answer, truth) in answers.iter().zip(poses.iter().map(truth)) {
+                assert!(answer.lower <= truth.upper && truth.lower <= answer.upper, "{answer:?} {truth:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn iterations_keep_their_limit() {
+        let mut random = Seeded(9);
+        let (a, b) = (body(&mut random, 8), body(&mut random, 8));
+        // Many at touch, where Newton's method in lanes comes to nothing.
+        let poses: Vec<Pose> = (0..600).map(|i| pose(&mut random, if i % 2 == 0 { 1.5 } else { 4.0 })).collect();
+        for most in [15, 16, 17, 40] {
+            let options = Options::default().with_max_iterations(most).unwrap();
+            let mut answers = vec![Distance::default(); poses.len()];
+            distance_batch(&a, &Pose::identity(), &b, &poses, &options, &mut answers).unwrap();
+            for answer in &answers {
+                assert!(answer.iterations <= most, "at most {most}: {answer:?}");
             }
         }
     }

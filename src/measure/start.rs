@@ -25,9 +25,6 @@ const TURNS: usize = 2;
 /// Least distance that n is turned for, relative to the widths of the ellipsoids.
 const LEAST: f64 = 1e-3;
 
-/// A length that is lost in any other, but has a square.
-const TINY: f64 = 1e-150;
-
 /// Largest turn, as the largest component of the tangent.
 const MOST: f64 = 0.3;
 
@@ -38,8 +35,9 @@ pub(super) fn facing<S: Simd, N: Number<S>>(simd: S, a: &Body, b: &Body, relativ
     let shape_a = rows(simd, a.outline().shape());
     let shape_b = rows(simd, b.outline().shape());
     let shape_b = times_transposed(&times_transposed(&relative.rotation, &shape_b), &relative.rotation);
+    let size = a.trust().reach + b.trust().reach;
     // Where both centres coincide any direction will do.
-    let first = N::splat(simd, TINY) - relative.origin[0];
+    let first = N::splat(simd, N::TINY) - relative.origin[0];
     let mut n = normalized(simd, [first, -relative.origin[1], -relative.origin[2]]);
     for _ in 0..TURNS {
         let (u, v) = (apply(&shape_a, n), apply(&shape_b, n));
@@ -63,7 +61,7 @@ pub(super) fn facing<S: Simd, N: Number<S>>(simd: S, a: &Body, b: &Body, relativ
         for i in 0..3 {
             residual[i] = w[i] - distance * n[i];
         }
-        n = turned(simd, n, matrix, residual);
+        n = turned(simd, n, matrix, residual, size);
     }
     n
 }
@@ -130,7 +128,8 @@ pub(super) fn meeting<S: Simd, N: Number<S>>(
     n: V3<N>,
     ray: Option<V3<N>>,
 ) -> (Start<N>, [N; 2]) {
-    let least = N::splat(simd, LEAST * (a.trust().reach + b.trust().reach));
+    let size = a.trust().reach + b.trust().reach;
+    let least = N::splat(simd, LEAST * size);
     let own = apply_transposed(&relative.rotation, n);
     let (cell_a, cell_b) = (a.outline().cell(simd, scaled(n, -N::splat(simd, 1.0))), b.outline().cell(simd, own));
     // Points for n, and how they turn with it.
@@ -148,7 +147,7 @@ pub(super) fn meeting<S: Simd, N: Number<S>>(
         let bent = turn_a[i] + turn_b[i];
         matrix[i] = if matches!(i, 0 | 3 | 5) { stiff + bent } else { bent };
     }
-    let n = turned(simd, n, matrix, add_scaled(w, -distance, along));
+    let n = turned(simd, n, matrix, add_scaled(w, -distance, along), size);
     // Of the same cells: where a side is flat a small turn leads far, to another cell for which it was not meant.
     let x = subtract(of_a, apply_symmetric(&turn_a, n));
     let y = add(of_b, apply_symmetric(&turn_b, n));
@@ -164,19 +163,29 @@ fn turned_symmetric<S: Simd, N: Number<S>>(rotation: &M3<N>, m: &[N; 6]) -> [N; 
 }
 
 /// The direction of `n + M⁻¹ r`, by cofactors of the symmetric matrix M with the entries xx, xy, xz, yy, yz, zz; the turn is
-/// limited.
+/// limited. M and r are lengths of about `size`, metres.
 #[inline(always)]
-fn turned<S: Simd, N: Number<S>>(simd: S, n: V3<N>, matrix: [N; 6], r: V3<N>) -> V3<N> {
+fn turned<S: Simd, N: Number<S>>(simd: S, n: V3<N>, matrix: [N; 6], r: V3<N>, size: f64) -> V3<N> {
     let (cofactors, determinant) = cofactors(simd, matrix);
-    let turn = apply_symmetric(&cofactors, r);
+    // Single precision has no sixth powers of the smallest and largest sizes, of which the norm would be the root.
+    let unit = N::splat(simd, inverse_cube(size));
+    let turn = scaled(apply_symmetric(&cofactors, r), unit);
     let longest = turn[0].abs().max(turn[1].abs()).max(turn[2].abs());
-    let weight = determinant.max(longest * N::splat(simd, 1.0 / MOST));
+    let weight = (determinant * unit).max(longest * N::splat(simd, 1.0 / MOST));
     normalized(simd, add_scaled(turn, weight, n))
+}
+
+/// About `1 / length³`, as a power of two: multiplied by it nothing is rounded.
+#[inline(always)]
+fn inverse_cube(length: f64) -> f64 {
+    const BIAS: i64 = 1023;
+    let exponent = ((length.to_bits() >> 52) as i64 - BIAS).clamp(-300, 300);
+    f64::from_bits(((BIAS - 3 * exponent) as u64) << 52)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::facing;
+    use super::{facing, inverse_cube};
     use crate::body::Body;
     use crate::measure::Pose;
     use crate::measure::tangent::Relative;
@@ -226,5 +235,16 @@ mod tests {
             worst = worst.max((x - y).normalize().cross(&n).norm());
         }
         assert!(worst < 0.1, "{worst}");
+    }
+
+    #[test]
+    fn inverse_cubes_are_powers_of_two_of_about_the_size() {
+        for exponent in -120..=120 {
+            let length = 1.7 * 2_f64.powi(exponent);
+            assert_eq!(inverse_cube(length), 2_f64.powi(-3 * exponent));
+        }
+        for length in [f64::MIN_POSITIVE, 1e-200, 1e200, f64::MAX] {
+            assert!(inverse_cube(length).is_normal());
+        }
     }
 }

@@ -23,10 +23,10 @@ pub trait Vector<S: Simd>: Number<S> {
 pub const MAX_LANES: usize = 8;
 
 /// Most lanes of singles of any processor served.
-pub const MAX_SINGLES: usize = 4 * MAX_LANES;
+pub const MAX_SINGLES: usize = 2 * MAX_LANES;
 
-/// Values that vectors are loaded from or stored to, none of them across two lines of the cache. With one among its variables a
-/// function also keeps vectors so that registers have no room for.
+/// Values that vectors are loaded from or stored to, none of them across two lines of the cache. A function with one among its
+/// variables aligns its stack, so that vectors that registers have no room for do not straddle lines either.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
 pub struct Aligned<T>(pub T);
@@ -69,7 +69,7 @@ macro_rules! functions {
 }
 
 macro_rules! numbers {
-    ($lanes:ident of $real:ident as $mask:ident, at most $most:ident: $splat:ident $neg:ident $fused:ident $le:ident $and:ident $select:ident,
+    ($lanes:ident of $real:ident as $mask:ident, at most $most:ident, from $tiny:literal on: $splat:ident $neg:ident $fused:ident $le:ident $and:ident $select:ident,
      $($functions:tt)*) => {
         impl<S: Simd> Neg for $lanes<S> {
             type Output = Self;
@@ -83,6 +83,7 @@ macro_rules! numbers {
             type Mask = S::$mask;
 
             const EPSILON: f64 = $real::EPSILON as f64;
+            const TINY: f64 = $tiny;
 
             #[inline(always)]
             fn splat(simd: S, value: f64) -> Self {
@@ -133,10 +134,10 @@ macro_rules! numbers {
         }
     };
 }
-numbers!(Lanes of f64 as m64s, at most MAX_LANES:
+numbers!(Lanes of f64 as m64s, at most MAX_LANES, from 1e-150 on:
     splat_f64s neg_f64s mul_add_e_f64s less_than_or_equal_f64s and_m64s select_f64s,
     sqrt sqrt_f64s, abs abs_f64s, min min_f64s other, max max_f64s other);
-numbers!(Singles of f32 as m32s, at most MAX_SINGLES:
+numbers!(Singles of f32 as m32s, at most MAX_SINGLES, from 1e-18 on:
     splat_f32s neg_f32s mul_add_e_f32s less_than_or_equal_f32s and_m32s select_f32s,
     sqrt sqrt_f32s, abs abs_f32s, min min_f32s other, max max_f32s other);
 

@@ -16,6 +16,9 @@ pub trait Number<S: Simd>:
     /// The distance from 1 to the next larger number.
     const EPSILON: f64;
 
+    /// A number that is lost in any other, but has a square.
+    const TINY: f64;
+
     /// The same value in every lane, rounded to the precision at hand.
     fn splat(simd: S, value: f64) -> Self;
     /// `self b + c`, with one rounding where that is fast and two where not.
@@ -46,6 +49,7 @@ impl<S: Simd> Number<S> for f64 {
     type Mask = bool;
 
     const EPSILON: f64 = f64::EPSILON;
+    const TINY: f64 = 1e-150;
 
     #[inline(always)]
     fn splat(_: S, value: f64) -> Self {

@@ -35,6 +35,7 @@ impl<N: Neg<Output = N> + Copy> Neg for Twice<N> {
 impl<S: Simd, N: Vector<S>> Number<S> for Twice<N> {
     type Mask = [N::Mask; 2];
     const EPSILON: f64 = N::EPSILON;
+    const TINY: f64 = N::TINY;
 
     #[inline(always)]
     fn splat(simd: S, value: f64) -> Self {
