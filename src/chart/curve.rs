@@ -24,7 +24,7 @@ pub struct Series {
 pub struct Mark {
     /// Height of the line.
     pub value: f64,
-    /// Text at its right end, above the line.
+    /// Text at one of its ends.
     pub label: String,
 }
 
@@ -47,6 +47,8 @@ pub struct LineChart {
 const SIZE: (u32, u32) = (760, 440);
 /// Decades below the mark at which a curve is cut off: nothing can be told apart there.
 const DECADES_BELOW: i32 = 3;
+/// Width of a letter, pixels: a guess, as the reader's font is not known here.
+const LETTER: i32 = 8;
 
 impl LineChart {
     /// The chart as an SVG document.
@@ -108,9 +110,10 @@ impl LineChart {
 
         let mark = self.mark.value;
         chart.draw_series(LineSeries::new([(frame.x.0, mark), (frame.x.1, mark)], grey.stroke_width(2 * FINE)))?;
-        let anchored = text(13).pos(Pos::new(HPos::Right, VPos::Bottom));
-        let (right, height) = chart.backend_coord(&(frame.x.1, mark));
-        root.draw(&Text::new(self.mark.label.as_str(), (right - px(4), height - px(4)), anchored))?;
+        let to_pixels = |(x, y): (f64, f64)| chart.backend_coord(&(x, y.max(frame.y.0)));
+        let ends = [frame.x.1, frame.x.0].map(|x| to_pixels((x, mark)));
+        let (corner, pos) = self.place_of_mark(ends, to_pixels);
+        root.draw(&Text::new(self.mark.label.as_str(), corner, text(13).pos(pos)))?;
 
         for series in &self.series {
             let points = series.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite());
@@ -123,6 +126,34 @@ impl LineChart {
             }
         }
         Ok(())
+    }
+
+    /// Corner and anchor of the mark's text: at one of the line's ends, right and left, above or below it, where no curve runs
+    /// through the text if there is such a place.
+    fn place_of_mark(&self, ends: [(i32, i32); 2], to_pixels: impl Fn((f64, f64)) -> (i32, i32)) -> ((i32, i32), Pos) {
+        let (width, height) = (px(LETTER * self.mark.label.chars().count() as i32), px(15));
+        let mut curves = Vec::new();
+        for series in &self.series {
+            let points: Vec<_> = series.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
+            let pixels: Vec<_> = points.into_iter().map(|point| to_pixels(*point)).collect();
+            curves.extend(pixels.windows(2).flat_map(|pair| between(pair[0], pair[1])));
+        }
+        let places = [(0, VPos::Bottom), (0, VPos::Top), (1, VPos::Bottom), (1, VPos::Top)].map(|(end, vertical)| {
+            let (inwards, horizontal) = if end == 0 { (-1, HPos::Right) } else { (1, HPos::Left) };
+            let up = if matches!(vertical, VPos::Bottom) { -1 } else { 1 };
+            let corner = (ends[end].0 + inwards * px(4), ends[end].1 + up * px(4));
+            let far = (corner.0 + inwards * width, corner.1 + up * height);
+            (corner, far, Pos::new(horizontal, vertical))
+        });
+        let within = |value: i32, a: i32, b: i32| (a.min(b)..=a.max(b)).contains(&value);
+        let clear = |corner: (i32, i32), far: (i32, i32)| {
+            !curves.iter().any(|(x, y)| within(*x, corner.0, far.0) && within(*y, corner.1, far.1))
+        };
+        let [(first, _, above), ..] = places;
+        places
+            .into_iter()
+            .find(|(corner, far, _)| clear(*corner, *far))
+            .map_or((first, above), |(corner, _, pos)| (corner, pos))
     }
 
     /// Names of the curves in a row between heading and axes, where no curve can run behind them.
@@ -144,11 +175,16 @@ impl LineChart {
             }
             let text = (FONT, px(14)).into_font().color(&color(Ink::Grey)).pos(Pos::new(HPos::Left, VPos::Center));
             root.draw(&Text::new(series.label.as_str(), (px(left + 42), px(45)), text))?;
-            // The width of a letter is a guess: the reader's font is not known here.
-            left += 70 + 8 * series.label.chars().count() as i32;
+            left += 70 + LETTER * series.label.chars().count() as i32;
         }
         Ok(())
     }
+}
+
+/// Pixels on the way from one point to another, no farther than a pixel apart or so.
+fn between(a: (i32, i32), b: (i32, i32)) -> impl Iterator<Item = (i32, i32)> {
+    let steps = (b.0 - a.0).abs().max((b.1 - a.1).abs()).max(1);
+    (0..=steps).map(move |i| (a.0 + (b.0 - a.0) * i / steps, a.1 + (b.1 - a.1) * i / steps))
 }
 
 struct Frame {
@@ -184,5 +220,27 @@ mod tests {
         assert_eq!(chart(vec![(f64::NAN, 1.0)]).to_svg(), Err(ChartError::Empty));
         assert!(chart(vec![(0.0, 1.0)]).to_svg().is_ok());
         assert!(chart(vec![(0.0, -2.0), (1.0, 0.0), (2.0, f64::INFINITY), (3.0, 1e300)]).to_svg().is_ok());
+    }
+
+    #[test]
+    fn the_name_of_the_mark_gets_out_of_the_way() {
+        let chart = |heights: [f64; 2]| {
+            let points = |height: f64| vec![(0.0, height), (1.0, height)];
+            let series = |height| Series { label: "s".into(), ink: Ink::Blue, dashed: false, points: points(height) };
+            LineChart {
+                title: "t".into(),
+                x_label: "x".into(),
+                y_label: "y".into(),
+                series: heights.map(series).into(),
+                mark: Mark { value: 1.0, label: "a name".into() },
+            }
+        };
+        let ends = [(px(500), px(100)), (0, px(100))];
+        // Ten pixels for a unit of height.
+        let to_pixels = |(x, y): (f64, f64)| (px((500.0 * x) as i32), px(110 - (10.0 * y) as i32));
+        let below = |heights: [f64; 2]| chart(heights).place_of_mark(ends, to_pixels).0.1 > px(100);
+        assert!(!below([9.0, 8.0]), "above the line where that is free");
+        assert!(below([2.0, 8.0]), "below it where a curve is right above");
+        assert!(!below([2.0, 0.0]), "above where both are taken");
     }
 }
