@@ -11,7 +11,7 @@ use super::pose::Pose;
 use super::relation::{Relation, Verdict};
 use super::start::{Start, middle};
 use super::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, Response, Side, Step, bracket, moved, newton};
-use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, subtract};
+use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, scaled, subtract};
 use crate::body::Body;
 use crate::polynomial::{Scalar, Simd, WithSimd};
 use nalgebra::Vector3;
@@ -346,10 +346,10 @@ impl<R: Relation> Correct<'_, R> {
             if !step.within(simd, worth_a_bracket(self.limits)) {
                 let length = self.relative_length(simd, &step, (&local_a, &local_b));
                 let late = rounds.saturating_sub(self.patience);
-                if rounds >= self.patience && !(length * f64::from(1_u32 << late) <= NEARLY) {
+                let back = pace.stretch(simd, &mut step, &at.frame, slope(&a, &b));
+                if !back && rounds >= self.patience && !(length * f64::from(1_u32 << late) <= NEARLY) {
                     return Err(Lost::after(rounds));
                 }
-                pace.stretch(simd, &mut step, &at.frame);
                 self.shorten(simd, &mut step, (&local_a, &local_b));
                 at.advance(simd, &step);
                 continue;
@@ -378,7 +378,7 @@ impl<R: Relation> Correct<'_, R> {
                     return Ok(Proven { lower, upper, x, y, n, active, multipliers, rounds });
                 }
                 Verdict::Wide => {
-                    pace.stretch(simd, &mut step, &at.frame);
+                    pace.stretch(simd, &mut step, &at.frame, slope(&a, &b));
                     self.shorten(simd, &mut step, (&local_a, &local_b));
                     at.advance(simd, &step);
                 }
@@ -389,7 +389,7 @@ impl<R: Relation> Correct<'_, R> {
                         let grazing = (!deep).then(|| at.grazing(simd, &step, &found, trace.active, rounds));
                         return Err(Lost { rounds, middle, grazing });
                     }
-                    pace = Pace::default();
+                    pace.stretch(simd, &mut step, &at.frame, slope(&a, &b));
                     self.shorten(simd, &mut step, (&local_a, &local_b));
                     at.advance(simd, &step);
                 }
@@ -415,6 +415,13 @@ impl<R: Relation> Correct<'_, R> {
     }
 }
 
+/// By how much the normals of both bodies differ, along the tangents.
+#[inline(always)]
+fn slope(a: &Plane<f64>, b: &Plane<f64>) -> [f64; 2] {
+    let along = |i: usize| a.gradient[i] / a.gradient[2] - b.gradient[i] / b.gradient[2];
+    [along(0), along(1)]
+}
+
 /// What a bracket is good for that no step makes narrower.
 #[inline(always)]
 fn last_resort(found: &Bracket<f64>) -> Verdict {
@@ -425,29 +432,55 @@ fn last_resort(found: &Bracket<f64>) -> Verdict {
     }
 }
 
-/// How Newton's steps shrink. Where both surfaces are flat to order j they do so by `(j - 2) / (j - 1)` each and in one direction;
-/// two of them then show where all of them lead (Aitken's extrapolation).
+/// How Newton's steps shrink. Where both surfaces are flat to order j they do so by `r = (j - 2) / (j - 1)` each and in one
+/// direction; two of them then show where all of them lead (Aitken's extrapolation), X away.
+///
+/// There the surfaces are flat, and if one is tilted against the other by next to nothing the answer is where their slopes, that
+/// grow like `X^m` with `m = j - 1 = 1 / (1 - r)` on the way back, make up for it. Newton's step would lead far beyond.
 #[derive(Clone, Copy, Default)]
 struct Pace {
     /// Sum of the last moves of x and y.
     last: V3<f64>,
     /// How much shorter than the one before.
     ratio: f64,
+    /// What the last extrapolation has led over.
+    leap: Option<Leap>,
+}
+
+/// A way to where a series of steps leads.
+#[derive(Clone, Copy)]
+struct Leap {
+    /// Moves of x and of y.
+    moves: [V3<f64>; 2],
+    /// How much the normals of the bodies differ along the way, where it began.
+    slope: f64,
+    /// Power by which that vanishes towards its end.
+    power: f64,
 }
 
 impl Pace {
     /// Ratios of steps that shrink slowly.
     const SLOW: std::ops::Range<f64> = 0.4..0.92;
 
-    /// Lengthens a step if it is one of a series.
+    /// Lengthens a step if it is one of a series, or turns back, which it tells, after one that was lengthened too much; `slope` is
+    /// the difference of the bodies' normals along the tangents.
     #[inline(always)]
-    fn stretch<S: Simd>(&mut self, _: S, step: &mut Step<f64>, frame: &M3<f64>) {
+    fn stretch<S: Simd>(&mut self, simd: S, step: &mut Step<f64>, frame: &M3<f64>, slope: [f64; 2]) -> bool {
+        let slope = apply_transposed::<S, f64>(frame, [slope[0], slope[1], 0.0]);
+        if let Some(leap) = self.leap.take()
+            && let Some(share) = leap.back(simd, slope)
+        {
+            let back = |way: V3<f64>| scaled::<S, f64>(apply::<S, f64>(frame, way), -share);
+            (step.dx, step.dy) = (back(leap.moves[0]), back(leap.moves[1]));
+            *self = Self::default();
+            return true;
+        }
         let both = apply_transposed::<S, f64>(frame, add::<S, f64>(step.dx, step.dy));
         let (along, square) = (dot::<S, f64>(both, self.last), dot::<S, f64>(self.last, self.last));
         let ratio = along / square;
         let straight = along * along > 0.99 * square * dot::<S, f64>(both, both);
         let series = straight && Self::SLOW.contains(&ratio) && (ratio - self.ratio).abs() < 0.05;
-        *self = Self { last: both, ratio };
+        *self = Self { last: both, ratio, leap: None };
         if series {
             // The rest of the series, the same for x and y: they stay where they are seen from each other.
             let rest = 0.5 * ratio / (1.0 - ratio);
@@ -456,8 +489,21 @@ impl Pace {
                 step.dx[i] += rest * both;
                 step.dy[i] += rest * both;
             }
-            *self = Self::default();
+            let moves = [step.dx, step.dy].map(|way| apply_transposed::<S, f64>(frame, way));
+            let slope = dot::<S, f64>(slope, add::<S, f64>(moves[0], moves[1]));
+            *self = Self { leap: Some(Leap { moves, slope, power: 1.0 / (1.0 - ratio) }), ..Self::default() };
         }
+        false
+    }
+}
+
+impl Leap {
+    /// Which share of the way to go back, where the slope at its end shows that the answer was passed.
+    #[inline(always)]
+    fn back<S: Simd>(&self, _: S, slope: V3<f64>) -> Option<f64> {
+        let slope = dot::<S, f64>(slope, add::<S, f64>(self.moves[0], self.moves[1]));
+        let passed = slope * self.slope < 0.0;
+        passed.then(|| (slope / (slope - self.slope)).powf(1.0 / self.power))
     }
 }
 

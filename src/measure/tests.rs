@@ -417,3 +417,25 @@ fn distances_of_sides_tilted_by_next_to_nothing() {
     }
     assert!(longest <= 30, "{longest}");
 }
+
+#[test]
+fn flats_of_different_orders_take_few_iterations() {
+    let needle = Body::superellipsoid("needle", Vector3::zeros(), Vector3::new(0.05, 0.05, 1.0), 8).unwrap();
+    let block = Body::superellipsoid("block", Vector3::zeros(), Vector3::new(0.5, 0.4, 0.3), 6).unwrap();
+    let plate = Body::superellipsoid("plate", Vector3::zeros(), Vector3::new(1.0, 1.0, 0.02), 8).unwrap();
+    for seed in 0..200 {
+        let mut random = Seeded(seed);
+        // Shallow tilts decide where on its side a body is nearest; 1 m apart.
+        let tilt = 10_f64.powf(-7.0 + 5.0 * random.signed());
+        let turn = nalgebra::UnitQuaternion::from_scaled_axis(unit(&mut random) * tilt);
+        let pairs = [(&needle, &block, 1.3), (&block, &plate, 0.32), (&plate, &needle, 1.02), (&plate, &plate, 0.04)];
+        for (a, b, halves) in pairs {
+            let pose = Pose::from_quaternion(Vector3::new(0.0, 0.0, 1.0 + halves), turn.coords.into()).unwrap();
+            let answer = cold(a, &Pose::identity(), b, &pose);
+            let context = format!("seed {seed}, {} over {}, tilt {tilt:e}: {answer:?}", b.name(), a.name());
+            assert_eq!(answer.status, Status::Converged, "{context}");
+            assert!((answer.value() - 1.0).abs() < 0.05, "{context}");
+            assert!(answer.iterations <= 30, "{context}");
+        }
+    }
+}
