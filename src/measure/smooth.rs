@@ -343,57 +343,53 @@ impl<R: Relation> Correct<'_, R> {
             let (of_a, of_b) = ((&a, &bend_a), (&b, &bend_b));
             let (mut step, response) =
                 self.relation.newton(simd, of_a, of_b, &at.frame, difference, flattest(self.limits));
-            if !step.within(simd, worth_a_bracket(self.limits)) {
-                let length = self.relative_length(simd, &step, (&local_a, &local_b));
-                let late = rounds.saturating_sub(self.patience);
-                let back = pace.stretch(simd, &mut step, &at.frame, slope(&a, &b));
-                if !back && rounds >= self.patience && !(length * f64::from(1_u32 << late) <= NEARLY) {
-                    return Err(Lost::after(rounds));
+            let near = step.within(simd, worth_a_bracket(self.limits));
+            if near {
+                // The bracket where Newton's step leads, by extrapolation: mostly no other evaluation is needed.
+                let next_a = side_a.extrapolate(simd, &jet_a, &local_a, step.dx);
+                let next_b = side_b.extrapolate(simd, &jet_b, &local_b, step.dy);
+                let next = subtract::<S, f64>(add::<S, f64>(difference, step.dx), step.dy);
+                let found = bracket(simd, (side_a, &next_a), (side_b, &next_b), next);
+                let settled = step.within(simd, self.limits.map(|limit| SETTLED * limit));
+                let verdict = match self.relation.judge(simd, &found, &at.frame, next) {
+                    // No step is left to take: rounding keeps the bracket wide.
+                    Verdict::Wide if settled && self.relation.ends_at_contact() => last_resort(&found),
+                    verdict => verdict,
+                };
+                match verdict {
+                    Verdict::Proven { lower, upper } => {
+                        let x = moved::<S, f64>(at.x, add::<S, f64>(step.dx, found.to_a), &at.frame);
+                        let y = moved::<S, f64>(at.y, add::<S, f64>(step.dy, found.to_b), &at.frame);
+                        if !(side_a.others_hold(simd, x) && side_b.others_hold(simd, y)) {
+                            return Err(Lost::after(rounds));
+                        }
+                        let n = apply_transposed::<S, f64>(&at.frame, found.normal);
+                        trace.take_down(simd, relative, [x, y, n], &at.frame, response);
+                        let (active, multipliers) = (trace.active, found.multipliers);
+                        return Ok(Proven { lower, upper, x, y, n, active, multipliers, rounds });
+                    }
+                    Verdict::Wide => {}
+                    Verdict::Overlap => {
+                        let middle = self.middle(simd, at.x, at.y);
+                        let deep = -next[2] > NEARLY * self.limits[0].min(self.limits[1]);
+                        if middle.is_some() || settled || deep && rounds >= PATIENCE {
+                            let grazing = (!deep).then(|| at.grazing(simd, &step, &found, trace.active, rounds));
+                            return Err(Lost { rounds, middle, grazing });
+                        }
+                    }
                 }
-                self.shorten(simd, &mut step, (&local_a, &local_b));
-                at.advance(simd, &step);
-                continue;
             }
-            // The bracket where Newton's step leads, by extrapolation: mostly no other evaluation is needed.
-            let next_a = side_a.extrapolate(simd, &jet_a, &local_a, step.dx);
-            let next_b = side_b.extrapolate(simd, &jet_b, &local_b, step.dy);
-            let next = subtract::<S, f64>(add::<S, f64>(difference, step.dx), step.dy);
-            let found = bracket(simd, (side_a, &next_a), (side_b, &next_b), next);
-            let settled = step.within(simd, self.limits.map(|limit| SETTLED * limit));
-            let verdict = match self.relation.judge(simd, &found, &at.frame, next) {
-                // No step is left to take: rounding keeps the bracket wide.
-                Verdict::Wide if settled && self.relation.ends_at_contact() => last_resort(&found),
-                verdict => verdict,
+            let local = (&local_a, &local_b);
+            let astray = !near && rounds >= self.patience && {
+                let late = f64::from(1_u32 << (rounds - self.patience));
+                !(self.relative_length(simd, &step, local) * late <= NEARLY)
             };
-            match verdict {
-                Verdict::Proven { lower, upper } => {
-                    let x = moved::<S, f64>(at.x, add::<S, f64>(step.dx, found.to_a), &at.frame);
-                    let y = moved::<S, f64>(at.y, add::<S, f64>(step.dy, found.to_b), &at.frame);
-                    if !(side_a.others_hold(simd, x) && side_b.others_hold(simd, y)) {
-                        return Err(Lost::after(rounds));
-                    }
-                    let n = apply_transposed::<S, f64>(&at.frame, found.normal);
-                    trace.take_down(simd, relative, [x, y, n], &at.frame, response);
-                    let (active, multipliers) = (trace.active, found.multipliers);
-                    return Ok(Proven { lower, upper, x, y, n, active, multipliers, rounds });
-                }
-                Verdict::Wide => {
-                    pace.stretch(simd, &mut step, &at.frame, slope(&a, &b));
-                    self.shorten(simd, &mut step, (&local_a, &local_b));
-                    at.advance(simd, &step);
-                }
-                Verdict::Overlap => {
-                    let middle = self.middle(simd, at.x, at.y);
-                    let deep = -next[2] > NEARLY * self.limits[0].min(self.limits[1]);
-                    if middle.is_some() || settled || deep && rounds >= PATIENCE {
-                        let grazing = (!deep).then(|| at.grazing(simd, &step, &found, trace.active, rounds));
-                        return Err(Lost { rounds, middle, grazing });
-                    }
-                    pace.stretch(simd, &mut step, &at.frame, slope(&a, &b));
-                    self.shorten(simd, &mut step, (&local_a, &local_b));
-                    at.advance(simd, &step);
-                }
+            let turned_back = pace.stretch(simd, &mut step, &at.frame, (&a, &b));
+            if astray && !turned_back {
+                return Err(Lost::after(rounds));
             }
+            self.shorten(simd, &mut step, local);
+            at.advance(simd, &step);
         }
         Err(Lost::after(self.most))
     }
@@ -415,11 +411,11 @@ impl<R: Relation> Correct<'_, R> {
     }
 }
 
-/// By how much the normals of both bodies differ, along the tangents.
+/// By how much the normals of both bodies differ, across the trial normal.
 #[inline(always)]
-fn slope(a: &Plane<f64>, b: &Plane<f64>) -> [f64; 2] {
-    let along = |i: usize| a.gradient[i] / a.gradient[2] - b.gradient[i] / b.gradient[2];
-    [along(0), along(1)]
+fn slope<S: Simd>(_: S, (a, b): (&Plane<f64>, &Plane<f64>), frame: &M3<f64>) -> V3<f64> {
+    let (a, b) = (a.gradient, b.gradient);
+    apply_transposed::<S, f64>(frame, [a[0] / a[2] - b[0] / b[2], a[1] / a[2] - b[1] / b[2], 0.0])
 }
 
 /// What a bracket is good for that no step makes narrower.
@@ -462,13 +458,17 @@ impl Pace {
     /// Ratios of steps that shrink slowly.
     const SLOW: std::ops::Range<f64> = 0.4..0.92;
 
-    /// Lengthens a step if it is one of a series, or turns back, which it tells, after one that was lengthened too much; `slope` is
-    /// the difference of the bodies' normals along the tangents.
+    /// Lengthens a step if it is one of a series, or turns back, which it tells, after one that was lengthened too much.
     #[inline(always)]
-    fn stretch<S: Simd>(&mut self, simd: S, step: &mut Step<f64>, frame: &M3<f64>, slope: [f64; 2]) -> bool {
-        let slope = apply_transposed::<S, f64>(frame, [slope[0], slope[1], 0.0]);
+    fn stretch<S: Simd>(
+        &mut self,
+        simd: S,
+        step: &mut Step<f64>,
+        frame: &M3<f64>,
+        planes: (&Plane<f64>, &Plane<f64>),
+    ) -> bool {
         if let Some(leap) = self.leap.take()
-            && let Some(share) = leap.back(simd, slope)
+            && let Some(share) = leap.back(simd, slope(simd, planes, frame))
         {
             let back = |way: V3<f64>| scaled::<S, f64>(apply::<S, f64>(frame, way), -share);
             (step.dx, step.dy) = (back(leap.moves[0]), back(leap.moves[1]));
@@ -490,7 +490,7 @@ impl Pace {
                 step.dy[i] += rest * both;
             }
             let moves = [step.dx, step.dy].map(|way| apply_transposed::<S, f64>(frame, way));
-            let slope = dot::<S, f64>(slope, add::<S, f64>(moves[0], moves[1]));
+            let slope = dot::<S, f64>(slope(simd, planes, frame), add::<S, f64>(moves[0], moves[1]));
             *self = Self { leap: Some(Leap { moves, slope, power: 1.0 / (1.0 - ratio) }), ..Self::default() };
         }
         false
