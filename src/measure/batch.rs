@@ -80,7 +80,7 @@ pub fn distance_batch(
         return Err(BatchError::Empty);
     }
     for answer in answers.iter_mut() {
-        answer.upper = f64::INFINITY;
+        (answer.upper, answer.iterations) = (f64::INFINITY, 0);
     }
     if let ([a], [b]) = (a.parts(), b.parts())
         && a.is_smooth()
@@ -90,7 +90,9 @@ pub fn distance_batch(
         in_lanes((a, pose_a), (b, poses_b), options, answers);
     }
     for (answer, pose_b) in answers.iter_mut().zip(poses_b).filter(|(answer, _)| answer.upper.is_infinite()) {
-        *answer = distance(a, pose_a, b, pose_b, options, &mut WarmStart::default());
+        let spent = answer.iterations;
+        *answer = distance(a, pose_a, b, pose_b, &options.after(spent), &mut WarmStart::default());
+        answer.iterations += spent;
     }
     Ok(())
 }
@@ -110,16 +112,16 @@ fn in_lanes(
 const COARSE: u32 = 2;
 
 /// Most of them.
-const MOST_COARSE: u32 = 8;
+const MOST_COARSE: u32 = 6;
 
 /// Square of the last step relative to the longest one allowed, below which the next one, of double precision, is likely to end with a
 /// narrow bracket.
 const NEAR: f64 = 1e-4;
 
 /// Most rounds of a pose before it is solved alone.
-const MOST_ROUNDS: u32 = 16;
+const MOST_ROUNDS: u32 = 8;
 
-/// A batch as work for the widest arithmetic. Answers stay as they are where a pose is to be solved alone.
+/// A batch as work for the widest arithmetic. Of a pose that is to be solved alone it takes down the iterations only.
 struct Batch<'a> {
     a: &'a Body,
     pose_a: &'a Pose,
@@ -313,7 +315,7 @@ impl Batch<'_> {
     /// they seem to overlap.
     #[inline(always)]
     fn approach<S: Simd, N: Vector<S>>(
-        &self,
+        &mut self,
         simd: S,
         mut group: Group<MAX_COARSE>,
         fresh: bool,
@@ -348,6 +350,8 @@ impl Batch<'_> {
             if open >> lane & 1 == 1 {
                 let done = close >> lane & 1 == 1 || group.rounds[lane] >= MOST_COARSE;
                 if done { near.push(&group, lane) } else { far.push(&group, lane) }
+            } else {
+                self.answers[group.pose[lane]].iterations = group.rounds[lane];
             }
         }
     }
@@ -362,6 +366,7 @@ impl Batch<'_> {
         let worth = worth_a_bracket(limits);
         let mut at = Iterate::load(simd, &group);
         let mut open = (1_u32 << group.count) - 1;
+        let mut answered = 0;
         let ((jet_a, inside_a), (jet_b, inside_b)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
         let here = at.linearize(simd, (&side_a, &jet_a), (&side_b, &jet_b), limits);
         let inside = Lanes::and(simd, inside_a, inside_b);
@@ -377,17 +382,17 @@ impl Batch<'_> {
             let settled = Lanes::and(simd, apart, Lanes::and(simd, found.off.le(splat(ALIGNED)), width.le(enough)));
             let settled = Lanes::bits(simd, settled) & open;
             // What rounding keeps wider than asked for, twice the precision narrows: one by one.
-            let proven = settled & Lanes::bits(simd, width.le(splat(self.tolerance)));
+            answered = settled & Lanes::bits(simd, width.le(splat(self.tolerance)));
             open &= !settled;
-            if proven != 0 {
+            if answered != 0 {
                 let x = moved(at.x, add(here.step.dx, found.to_a), &here.frame);
                 let y = moved(at.y, add(here.step.dy, found.to_b), &here.frame);
                 let n = apply_transposed(&here.frame, found.normal);
-                self.write(simd, &group, proven, [found.lower, found.upper], found.multipliers, [x, y, n]);
+                self.write(simd, &group, answered, [found.lower, found.upper], found.multipliers, [x, y, n]);
             }
-            if open == 0 {
-                return;
-            }
+        }
+        if answered == (1 << group.count) - 1 {
+            return;
         }
         at.advance(simd, &here);
         at.store(&mut group);
@@ -395,6 +400,8 @@ impl Batch<'_> {
             group.rounds[lane] += 1;
             if open >> lane & 1 == 1 && group.rounds[lane] < MOST_ROUNDS {
                 waiting.push(&group, lane);
+            } else if answered >> lane & 1 == 0 {
+                self.answers[group.pose[lane]].iterations = group.rounds[lane];
             }
         }
     }

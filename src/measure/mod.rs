@@ -24,6 +24,7 @@ mod motion;
 mod newton;
 mod options;
 mod outlines;
+mod pace;
 mod pair;
 mod penetration;
 mod point;

@@ -111,6 +111,11 @@ impl<'a> Options<'a> {
         self.max_iterations
     }
 
+    /// What is left of the iterations after that many.
+    pub(super) fn after(&self, iterations: u32) -> Self {
+        Self { max_iterations: self.max_iterations.saturating_sub(iterations), ..*self }
+    }
+
     /// Whether a solve that has taken this many iterations has to end.
     #[inline]
     pub(super) fn exhausted(&self, iterations: u32) -> bool {

@@ -7,11 +7,12 @@
 
 use super::drift::Drift;
 use super::options::Options;
+use super::pace::{Correction, Last, correction};
 use super::pose::Pose;
 use super::relation::{Relation, Verdict};
 use super::start::{Start, middle};
 use super::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, Response, Side, Step, bracket, moved, newton};
-use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, scaled, subtract};
+use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, subtract};
 use crate::body::Body;
 use crate::polynomial::{Scalar, Simd, WithSimd};
 use nalgebra::Vector3;
@@ -156,10 +157,13 @@ const PATIENCE: u32 = 6;
 const NEARLY: f64 = 0.05;
 
 /// Curvature times size that counts as none.
-const FLATTEST: f64 = 1e-12;
+const FLATTEST: f64 = 1e-20;
 
 /// Length of a step relative to the longest, beyond which no extrapolation is close enough for a bracket.
 const WORTH_A_BRACKET: f64 = 1e-2;
+
+/// How much narrower a step has to make the bracket of bodies that touch to be worth it.
+const NARROWER: f64 = 0.5;
 
 /// Length of a step relative to the longest, after which none is left but rounding.
 const SETTLED: f64 = 1e-9;
@@ -321,6 +325,7 @@ impl<R: Relation> Correct<'_, R> {
     ) -> Result<Proven, Lost> {
         let (side_a, side_b) = &self.sides;
         let mut pace = Pace::default();
+        let mut overlap = f64::INFINITY;
         for rounds in 1..=self.most {
             if self.options.stopped() {
                 return Err(Lost::after(rounds - 1));
@@ -372,23 +377,26 @@ impl<R: Relation> Correct<'_, R> {
                     Verdict::Overlap => {
                         let middle = self.middle(simd, at.x, at.y);
                         let deep = -next[2] > NEARLY * self.limits[0].min(self.limits[1]);
-                        if middle.is_some() || settled || deep && rounds >= PATIENCE {
+                        // Bodies that touch are left to twice the precision when the bracket gets no narrower.
+                        let touching = settled || found.upper > NARROWER * overlap;
+                        if middle.is_some() || touching || deep && rounds >= PATIENCE {
                             let grazing = (!deep).then(|| at.grazing(simd, &step, &found, trace.active, rounds));
                             return Err(Lost { rounds, middle, grazing });
                         }
+                        overlap = found.upper;
                     }
                 }
             }
             let local = (&local_a, &local_b);
-            let astray = !near && rounds >= self.patience && {
+            pace.correct(simd, &mut step, (&a, &b), &response, &at.frame);
+            if !near && rounds >= self.patience {
                 let late = f64::from(1_u32 << (rounds - self.patience));
-                !(self.relative_length(simd, &step, local) * late <= NEARLY)
-            };
-            let turned_back = pace.stretch(simd, &mut step, &at.frame, (&a, &b));
-            if astray && !turned_back {
-                return Err(Lost::after(rounds));
+                if !(self.relative_length(simd, &step, local) * late <= NEARLY) {
+                    return Err(Lost::after(rounds));
+                }
             }
             self.shorten(simd, &mut step, local);
+            pace.last.taken = step.along();
             at.advance(simd, &step);
         }
         Err(Lost::after(self.most))
@@ -411,13 +419,6 @@ impl<R: Relation> Correct<'_, R> {
     }
 }
 
-/// By how much the normals of both bodies differ, across the trial normal.
-#[inline(always)]
-fn slope<S: Simd>(_: S, (a, b): (&Plane<f64>, &Plane<f64>), frame: &M3<f64>) -> V3<f64> {
-    let (a, b) = (a.gradient, b.gradient);
-    apply_transposed::<S, f64>(frame, [a[0] / a[2] - b[0] / b[2], a[1] / a[2] - b[1] / b[2], 0.0])
-}
-
 /// What a bracket is good for that no step makes narrower.
 #[inline(always)]
 fn last_resort(found: &Bracket<f64>) -> Verdict {
@@ -428,82 +429,55 @@ fn last_resort(found: &Bracket<f64>) -> Verdict {
     }
 }
 
-/// How Newton's steps shrink. Where both surfaces are flat to order j they do so by `r = (j - 2) / (j - 1)` each and in one
-/// direction; two of them then show where all of them lead (Aitken's extrapolation), X away.
-///
-/// There the surfaces are flat, and if one is tilted against the other by next to nothing the answer is where their slopes, that
-/// grow like `X^m` with `m = j - 1 = 1 / (1 - r)` on the way back, make up for it. Newton's step would lead far beyond.
+/// The last step for [`correction`], means of both bodies.
 #[derive(Clone, Copy, Default)]
 struct Pace {
-    /// Sum of the last moves of x and y.
-    last: V3<f64>,
-    /// How much shorter than the one before.
-    ratio: f64,
-    /// What the last extrapolation has led over.
-    leap: Option<Leap>,
-}
-
-/// A way to where a series of steps leads.
-#[derive(Clone, Copy)]
-struct Leap {
-    /// Moves of x and of y.
-    moves: [V3<f64>; 2],
-    /// How much the normals of the bodies differ along the way, where it began.
-    slope: f64,
-    /// Power by which that vanishes towards its end.
-    power: f64,
+    last: Last,
+    /// The tangents along which it was made.
+    tangents: [V3<f64>; 2],
 }
 
 impl Pace {
-    /// Ratios of steps that shrink slowly.
-    const SLOW: std::ops::Range<f64> = 0.4..0.92;
-
-    /// Lengthens a step if it is one of a series, or turns back, which it tells, after one that was lengthened too much.
+    /// Makes a step as long as the last one shows that it has to be.
     #[inline(always)]
-    fn stretch<S: Simd>(
+    fn correct<S: Simd>(
         &mut self,
         simd: S,
         step: &mut Step<f64>,
+        (a, b): (&Plane<f64>, &Plane<f64>),
+        response: &Response<f64>,
         frame: &M3<f64>,
-        planes: (&Plane<f64>, &Plane<f64>),
-    ) -> bool {
-        if let Some(leap) = self.leap.take()
-            && let Some(share) = leap.back(simd, slope(simd, planes, frame))
-        {
-            let back = |way: V3<f64>| scaled::<S, f64>(apply::<S, f64>(frame, way), -share);
-            (step.dx, step.dy) = (back(leap.moves[0]), back(leap.moves[1]));
-            *self = Self::default();
-            return true;
-        }
-        let both = apply_transposed::<S, f64>(frame, add::<S, f64>(step.dx, step.dy));
-        let (along, square) = (dot::<S, f64>(both, self.last), dot::<S, f64>(self.last, self.last));
-        let ratio = along / square;
-        let straight = along * along > 0.99 * square * dot::<S, f64>(both, both);
-        let series = straight && Self::SLOW.contains(&ratio) && (ratio - self.ratio).abs() < 0.05;
-        *self = Self { last: both, ratio, leap: None };
-        if series {
-            // The rest of the series, the same for x and y: they stay where they are seen from each other.
-            let rest = 0.5 * ratio / (1.0 - ratio);
+    ) {
+        let (newton, of_a, of_b) = (step.along(), a.slope(), b.slope());
+        let slope = [of_a[0] - of_b[0], of_a[1] - of_b[1]];
+        let mut corrected = false;
+        if self.last.may_have_to_be_corrected(newton) {
+            let found = correction(newton, slope, response.give, &self.seen_along(simd, frame));
+            corrected = found != Correction::default();
+            // The same for x and y: they stay where they are seen from each other.
+            let turned = response.turned(simd, found.shorter);
             for i in 0..2 {
-                let both = step.dx[i] + step.dy[i];
-                step.dx[i] += rest * both;
-                step.dy[i] += rest * both;
+                step.dx[i] += found.longer[i] + found.shorter[i];
+                step.dy[i] += found.longer[i] + found.shorter[i];
+                step.dx[2] -= of_a[i] * found.shorter[i];
+                step.dy[2] -= of_b[i] * found.shorter[i];
+                step.dn[i] += turned[i];
             }
-            let moves = [step.dx, step.dy].map(|way| apply_transposed::<S, f64>(frame, way));
-            let slope = dot::<S, f64>(slope(simd, planes, frame), add::<S, f64>(moves[0], moves[1]));
-            *self = Self { leap: Some(Leap { moves, slope, power: 1.0 / (1.0 - ratio) }), ..Self::default() };
         }
-        false
+        self.last = Last { newton, taken: step.along(), slope, corrected };
+        self.tangents = [frame[0], frame[1]];
     }
-}
 
-impl Leap {
-    /// Which share of the way to go back, where the slope at its end shows that the answer was passed.
+    /// The last step along the tangents of now.
     #[inline(always)]
-    fn back<S: Simd>(&self, _: S, slope: V3<f64>) -> Option<f64> {
-        let slope = dot::<S, f64>(slope, add::<S, f64>(self.moves[0], self.moves[1]));
-        let passed = slope * self.slope < 0.0;
-        passed.then(|| (slope / (slope - self.slope)).powf(1.0 / self.power))
+    fn seen_along<S: Simd>(&self, _: S, frame: &M3<f64>) -> Last {
+        let [t0, t1] = self.tangents;
+        let across = |v: [f64; 2]| {
+            let v = add_scaled::<S, f64>([t0[0] * v[0], t0[1] * v[0], t0[2] * v[0]], v[1], t1);
+            [dot::<S, f64>(frame[0], v), dot::<S, f64>(frame[1], v)]
+        };
+        let Last { newton, taken, slope, corrected } = self.last;
+        Last { newton: across(newton), taken: across(taken), slope: across(slope), corrected }
     }
 }
 

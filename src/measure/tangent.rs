@@ -305,6 +305,15 @@ pub(super) struct Extrapolated<N> {
     radius: N,
 }
 
+impl Plane<f64> {
+    /// How much it falls along the normal per length along the tangents.
+    #[inline(always)]
+    pub(super) fn slope(&self) -> [f64; 2] {
+        let inverse = 1.0 / self.gradient[2];
+        [self.gradient[0] * inverse, self.gradient[1] * inverse]
+    }
+}
+
 impl<N: Copy> Plane<N> {
     /// The constraint with this jet, along the vectors of a basis in its normalized coordinates.
     #[inline(always)]
@@ -339,7 +348,7 @@ impl<N: Copy> Bend<N> {
 }
 
 /// A symmetric 2x2 matrix: entries 00, 01, 11.
-type Symmetric2<N> = [N; 3];
+pub(super) type Symmetric2<N> = [N; 3];
 
 #[inline(always)]
 fn apply2<S: Simd, N: Number<S>>(m: &Symmetric2<N>, v: [N; 2]) -> [N; 2] {
@@ -369,6 +378,12 @@ pub(super) struct Step<N> {
 }
 
 impl Step<f64> {
+    /// The mean of both points' moves along the tangents.
+    #[inline(always)]
+    pub(super) fn along(&self) -> [f64; 2] {
+        [0.5 * (self.dx[0] + self.dy[0]), 0.5 * (self.dx[1] + self.dy[1])]
+    }
+
     /// Takes only this much of the step.
     #[inline(always)]
     pub(super) fn shorten(&mut self, factor: f64) {
@@ -555,7 +570,7 @@ pub(super) struct Response<N> {
     /// `W_A`.
     curvature_a: Symmetric2<N>,
     /// `G = (W_B + W_A K)⁻¹`, with what counts as no curvature added to `W_B`.
-    give: Symmetric2<N>,
+    pub(super) give: Symmetric2<N>,
     /// `G W_A K`, by rows.
     pull: [[N; 2]; 2],
     /// `K`.
@@ -572,6 +587,13 @@ impl Response<f64> {
         let alpha = apply2::<S, f64>(&self.hold, [beta[0] - tau[0], beta[1] - tau[1]]);
         let theta = apply2::<S, f64>(&self.curvature_a, alpha);
         Step { dx: [alpha[0], alpha[1], 0.0], dy: [beta[0], beta[1], 0.0], dn: [-theta[0], -theta[1]] }
+    }
+
+    /// By how much the normal turns when x moves along the tangents.
+    #[inline(always)]
+    pub(super) fn turned<S: Simd>(&self, _: S, along: [f64; 2]) -> [f64; 2] {
+        let bent = apply2::<S, f64>(&self.curvature_a, along);
+        [-bent[0], -bent[1]]
     }
 }
 

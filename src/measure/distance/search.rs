@@ -50,6 +50,9 @@ const NEAR: f64 = 1e-3;
 /// Below this one it has none that rounding leaves.
 const NEAREST: f64 = 1e-7;
 
+/// Distance relative to the larger body below which contact is a matter of how poses are rounded.
+const CONTACT: f64 = 1e-18;
+
 /// Share of the way to an interior point that leaves a surface behind.
 const DEEPER: f64 = 1e-6;
 
@@ -90,6 +93,11 @@ impl<'a> Search<'a> {
     /// Whether the bracket is narrow enough and says on which side of contact the bodies are.
     pub(super) fn decided(&self) -> bool {
         self.done() && (self.lower > 0.0 || self.upper == 0.0)
+    }
+
+    /// Whether the distance is too short for any pose of doubles to tell it from contact.
+    fn touching(&self) -> bool {
+        self.narrow() && self.upper <= CONTACT * self.pair.size()
     }
 
     /// Whether the bracket is narrow enough or no more may be done.
@@ -291,10 +299,10 @@ impl<'a> Search<'a> {
                     self.active = found.active;
                 }
                 self.take(found.upper, found.x, found.y);
-                self.decided() || self.options.stopped()
+                self.decided() || self.touching() || self.options.stopped()
             });
             self.iterations += steps;
-            if self.decided() || self.options.exhausted(self.iterations) {
+            if self.decided() || self.touching() || self.options.exhausted(self.iterations) {
                 return;
             }
         }

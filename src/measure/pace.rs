@@ -1,0 +1,208 @@
+//! Newton's steps towards answers on flat sides.
+//!
+//! Where surfaces are flat to order `m + 1` on the way X to the answer their slopes are as `X^m` and Newton's step is X / m: of what
+//! is left, `1 - 1 / m` is left after it. How much the step changes along the way that was taken since the last one shows m, along
+//! each of the two principal directions of the curvature, and the step is made that many times as long (the secant method for
+//! the steps, which have simple zeros where slopes have multiple ones: Traub, Iterative Methods for the Solution of
+//! Equations, 1964, section 7.3).
+//!
+//! Where that leads surfaces are flat, and if one is tilted against the other by next to nothing the answer is where their slopes make
+//! up for it. Newton's step would lead far beyond; the power law of the slopes leads back.
+
+use super::tangent::Symmetric2;
+use crate::polynomial::MAX_DEGREE;
+
+/// Share of a step in the one before it, below which Newton's method is as fast as it can be.
+const FAST: f64 = 0.4;
+
+/// Change of the step along the way, relative to that, of slopes that vanish with a power.
+const SLOW: std::ops::Range<f64> = 0.06..0.6;
+
+/// Relative deviation of logarithms from those of a power.
+const TOLERATED: f64 = 0.05;
+
+/// Highest power of slopes.
+const FLATTEST: f64 = (MAX_DEGREE - 1) as f64;
+
+/// How many times as long as Newton's step one is that leads to where surfaces are flat.
+const LEAP: f64 = 1.5;
+
+/// Length of a step relative to the way taken before it, beyond which one that leads back is made of no curvature.
+const WILD: f64 = 0.3;
+
+/// How many times as long as a corrected step the next one may be.
+const FARTHER: f64 = 2.0;
+
+/// A vector along the tangents.
+type V2 = [f64; 2];
+
+/// What is known of the last step.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Last {
+    /// Newton's step.
+    pub(super) newton: V2,
+    /// The one that was taken.
+    pub(super) taken: V2,
+    /// The slope that it was made from.
+    pub(super) slope: V2,
+    /// Whether what was taken had been corrected.
+    pub(super) corrected: bool,
+}
+
+impl Last {
+    /// Whether Newton's next step is not so much shorter that there is nothing to correct.
+    #[inline(always)]
+    pub(super) fn may_have_to_be_corrected(&self, newton: V2) -> bool {
+        let last = dot(self.newton, self.newton);
+        last > 0.0 && (self.corrected || !(dot(newton, newton) < FAST * FAST * last))
+    }
+}
+
+/// What to add to Newton's step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Correction {
+    /// Where it is too short: what surfaces change by over that falls off with a power.
+    pub(super) longer: V2,
+    /// Where it is too long: what surfaces change by over that is as the step has it.
+    pub(super) shorter: V2,
+}
+
+/// What to add to Newton's step, which is `give` times the slope or nearly so.
+#[cold]
+pub(super) fn correction(newton: V2, slope: V2, give: Symmetric2<f64>, last: &Last) -> Correction {
+    // Where both surfaces are flat the one direction tells how far to go in the other.
+    let most = if last.corrected { FARTHER * dot(last.taken, last.taken).sqrt() } else { f64::INFINITY };
+    let mut correction = Correction::default();
+    for direction in principal(give) {
+        let [step, last_step, way] = [newton, last.newton, last.taken].map(|v| dot(v, direction));
+        let change = (last_step - step) / way;
+        let fall = (dot(slope, direction) / dot(last.slope, direction)).abs();
+        let power = way / last_step;
+        let length = if SLOW.contains(&change) && is_power(fall, step / last_step, 1.0 / change) {
+            step * (1.0 / change).min(FLATTEST)
+        } else if power > LEAP && fall > 0.0 && step.abs() > WILD * way.abs() {
+            (way * (1.0 + 1.0 / fall).powf(-1.0 / power)).copysign(step)
+        } else {
+            step.clamp(-most, most)
+        };
+        let part = if length.abs() < step.abs() { &mut correction.shorter } else { &mut correction.longer };
+        part[0] += (length - step) * direction[0];
+        part[1] += (length - step) * direction[1];
+    }
+    correction
+}
+
+/// Whether slopes fall about as a power of what is left of the way does.
+fn is_power(fall: f64, left: f64, power: f64) -> bool {
+    let expected = power * left.abs().ln();
+    (fall.ln() - expected).abs() < TOLERATED * expected.abs()
+}
+
+/// Eigenvectors of a symmetric matrix.
+fn principal([xx, xy, yy]: Symmetric2<f64>) -> [V2; 2] {
+    let half = 0.5 * (xx - yy);
+    let root = half.hypot(xy);
+    // Of the two forms of the first one that which does not cancel.
+    let along = if half >= 0.0 { [half + root, xy] } else { [xy, root - half] };
+    let length = along[0].hypot(along[1]);
+    let [x, y] = if length > 0.0 { along.map(|entry| entry / length) } else { [1.0, 0.0] };
+    [[x, y], [-y, x]]
+}
+
+#[inline(always)]
+fn dot(a: V2, b: V2) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::polynomial::tests::Seeded;
+
+    /// Slopes `sign(u) |u|^power - tilt` along each of two perpendicular directions.
+    struct Sides {
+        direction: V2,
+        power: [f64; 2],
+        tilt: [f64; 2],
+    }
+
+    impl Sides {
+        fn directions(&self) -> [V2; 2] {
+            let [x, y] = self.direction;
+            [[x, y], [-y, x]]
+        }
+
+        /// Newton's step from a point, its matrix and the slope.
+        fn newton(&self, at: V2) -> (V2, Symmetric2<f64>, V2) {
+            let (mut step, mut give, mut slope) = ([0.0; 2], [0.0; 3], [0.0; 2]);
+            for (k, d) in self.directions().into_iter().enumerate() {
+                let u = dot(at, d);
+                let of = -(u.abs().powf(self.power[k]).copysign(u) - self.tilt[k]);
+                let inverse = 1.0 / (self.power[k] * u.abs().powf(self.power[k] - 1.0) + 1e-20);
+                for i in 0..2 {
+                    slope[i] += of * d[i];
+                    step[i] += of * inverse * d[i];
+                }
+                give[0] += inverse * d[0] * d[0];
+                give[1] += inverse * d[0] * d[1];
+                give[2] += inverse * d[1] * d[1];
+            }
+            (step, give, slope)
+        }
+
+        /// Steps until the slope is below 1e-9 of the first one's scale.
+        fn steps(&self, mut at: V2, pace: bool) -> u32 {
+            let mut last: Option<Last> = None;
+            for count in 0..200 {
+                let (newton, give, slope) = self.newton(at);
+                if dot(slope, slope).sqrt() < 1e-9 {
+                    return count;
+                }
+                let mut taken = newton;
+                if let Some(last) = last.as_ref().filter(|_| pace) {
+                    let Correction { longer, shorter } = correction(newton, slope, give, last);
+                    taken = [0, 1].map(|i| newton[i] + longer[i] + shorter[i]);
+                }
+                let length = dot(taken, taken).sqrt();
+                let most = (0.25 / length).min(1.0);
+                taken = [taken[0] * most, taken[1] * most];
+                at = [at[0] + taken[0], at[1] + taken[1]];
+                last = Some(Last { newton, taken, slope, corrected: taken != newton });
+            }
+            200
+        }
+    }
+
+    #[test]
+    fn flat_sides_take_few_steps_however_flat_and_however_tilted() {
+        let mut random = Seeded(31);
+        let (mut most, mut sum, mut plain) = (0, 0, 0);
+        let cases = 2000;
+        for _ in 0..cases {
+            let angle = 3.0 * random.signed();
+            let power = [0, 1].map(|_| [1.0, 3.0, 5.0, 7.0][random.next() as usize % 4]);
+            let tilt =
+                [0, 1].map(|_| if random.signed() < 0.0 { 0.0 } else { 10_f64.powf(-8.5 + 3.5 * random.signed()) });
+            let sides = Sides { direction: [angle.cos(), angle.sin()], power, tilt };
+            let at = [0.3 * random.signed(), 0.3 * random.signed()];
+            let steps = sides.steps(at, true);
+            most = most.max(steps);
+            sum += steps;
+            plain += sides.steps(at, false);
+        }
+        assert!(most <= 14 && sum < 4 * cases, "seed 31: most {most}, {sum} steps in {cases} cases");
+        assert!(sum * 3 < plain, "seed 31: {sum} steps, {plain} of Newton's");
+    }
+
+    #[test]
+    fn steps_that_converge_fast_are_newtons() {
+        let last = Last { newton: [0.1, 0.0], taken: [0.1, 0.0], slope: [0.1, 0.0], corrected: false };
+        assert!(
+            !last.may_have_to_be_corrected([0.01, 0.001]) && !Last::default().may_have_to_be_corrected([0.01, 0.001])
+        );
+        let give = [1.0, 0.0, 1.0];
+        assert_eq!(correction([0.01, 0.001], [0.01, 0.001], give, &last), Correction::default());
+        // As much shorter as those of a power, but from slopes of none.
+        assert_eq!(correction([0.07, 0.0], [0.07, 0.0], give, &last), Correction::default());
+    }
+}
