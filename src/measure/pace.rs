@@ -27,7 +27,7 @@ const FLATTEST: f64 = (MAX_DEGREE - 1) as f64;
 /// How many times as long as Newton's step one is that leads to where surfaces are flat.
 const LEAP: f64 = 1.5;
 
-/// Length of a step relative to the way taken before it, beyond which one that leads back is made of no curvature.
+/// Length of a step relative to the way taken before it, beyond which it is made of next to no curvature.
 const WILD: f64 = 0.3;
 
 /// How many times as long as a corrected step the next one may be.
@@ -82,8 +82,10 @@ pub(super) fn correction(newton: V2, slope: V2, give: Symmetric2<f64>, last: &La
             step * (1.0 / change).min(FLATTEST)
         } else if power > LEAP && fall > 0.0 && step.abs() > WILD * way.abs() {
             (way * (1.0 + 1.0 / fall).powf(-1.0 / power)).copysign(step)
+        } else if step.abs() > most {
+            most.copysign(step)
         } else {
-            step.clamp(-most, most)
+            step
         };
         let part = if length.abs() < step.abs() { &mut correction.shorter } else { &mut correction.longer };
         part[0] += (length - step) * direction[0];
