@@ -13,7 +13,10 @@ use super::tangent::Symmetric2;
 use crate::polynomial::MAX_DEGREE;
 
 /// Share of a step in the one before it, below which Newton's method is as fast as it can be.
-const FAST: f64 = 0.4;
+const FAST: f64 = 0.55;
+
+/// Length of a step relative to the bodies, beyond which steps are not of a series.
+const NEAR: f64 = 0.05;
 
 /// Change of the step along the way, relative to that, of slopes that vanish with a power.
 const SLOW: std::ops::Range<f64> = 0.06..0.6;
@@ -50,11 +53,12 @@ pub(super) struct Last {
 }
 
 impl Last {
-    /// Whether Newton's next step is not so much shorter that there is nothing to correct.
+    /// Whether Newton's next step, this long relative to the bodies, is not so much shorter that there is nothing to correct.
     #[inline(always)]
-    pub(super) fn may_have_to_be_corrected(&self, newton: V2) -> bool {
+    pub(super) fn may_have_to_be_corrected(&self, newton: V2, length: f64) -> bool {
         let last = dot(self.newton, self.newton);
-        last > 0.0 && (self.corrected || !(dot(newton, newton) < FAST * FAST * last))
+        let slow = length < NEAR && dot(newton, newton) > FAST * FAST * last;
+        last > 0.0 && (self.corrected || slow)
     }
 }
 
@@ -103,10 +107,10 @@ fn is_power(fall: f64, left: f64, power: f64) -> bool {
 /// Eigenvectors of a symmetric matrix.
 fn principal([xx, xy, yy]: Symmetric2<f64>) -> [V2; 2] {
     let half = 0.5 * (xx - yy);
-    let root = half.hypot(xy);
+    let root = (half * half + xy * xy).sqrt();
     // Of the two forms of the first one that which does not cancel.
     let along = if half >= 0.0 { [half + root, xy] } else { [xy, root - half] };
-    let length = along[0].hypot(along[1]);
+    let length = dot(along, along).sqrt();
     let [x, y] = if length > 0.0 { along.map(|entry| entry / length) } else { [1.0, 0.0] };
     [[x, y], [-y, x]]
 }
@@ -200,7 +204,8 @@ mod tests {
     fn steps_that_converge_fast_are_newtons() {
         let last = Last { newton: [0.1, 0.0], taken: [0.1, 0.0], slope: [0.1, 0.0], corrected: false };
         assert!(
-            !last.may_have_to_be_corrected([0.01, 0.001]) && !Last::default().may_have_to_be_corrected([0.01, 0.001])
+            !last.may_have_to_be_corrected([0.01, 0.001], 0.01)
+                && !Last::default().may_have_to_be_corrected([0.01, 0.001], 0.01)
         );
         let give = [1.0, 0.0, 1.0];
         assert_eq!(correction([0.01, 0.001], [0.01, 0.001], give, &last), Correction::default());

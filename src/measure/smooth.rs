@@ -388,14 +388,18 @@ impl<R: Relation> Correct<'_, R> {
                 }
             }
             let local = (&local_a, &local_b);
-            pace.correct(simd, &mut step, (&a, &b), &response, &at.frame);
-            if !near && rounds >= self.patience {
-                let late = f64::from(1_u32 << (rounds - self.patience));
-                if !(self.relative_length(simd, &step, local) * late <= NEARLY) {
-                    return Err(Lost::after(rounds));
-                }
+            let mut length = self.relative_length(simd, &step, local);
+            if pace.correct(simd, &mut step, length, (&a, &b), &response, &at.frame) {
+                length = self.relative_length(simd, &step, local);
             }
-            self.shorten(simd, &mut step, local);
+            let late = f64::from(1_u32 << rounds.saturating_sub(self.patience));
+            if !near && rounds >= self.patience && !(length * late <= NEARLY) {
+                return Err(Lost::after(rounds));
+            }
+            if length > LONGEST {
+                // The linearization means nothing so far away.
+                step.shorten(LONGEST / length);
+            }
             pace.last.taken = step.along();
             at.advance(simd, &step);
         }
@@ -407,15 +411,6 @@ impl<R: Relation> Correct<'_, R> {
     fn relative_length<S: Simd>(&self, simd: S, step: &Step<f64>, (local_a, local_b): (&M3<f64>, &M3<f64>)) -> f64 {
         let (side_a, side_b) = &self.sides;
         side_a.relative_square(simd, local_a, step.dx).max(side_b.relative_square(simd, local_b, step.dy)).sqrt()
-    }
-
-    /// Takes only as much of a step as the linearization may mean anything for.
-    #[inline(always)]
-    fn shorten<S: Simd>(&self, simd: S, step: &mut Step<f64>, local: (&M3<f64>, &M3<f64>)) {
-        let length = self.relative_length(simd, step, local);
-        if length > LONGEST {
-            step.shorten(LONGEST / length);
-        }
     }
 }
 
@@ -438,20 +433,21 @@ struct Pace {
 }
 
 impl Pace {
-    /// Makes a step as long as the last one shows that it has to be.
+    /// Makes a step of this relative length as long as the last one shows that it has to be; whether that is another length.
     #[inline(always)]
     fn correct<S: Simd>(
         &mut self,
         simd: S,
         step: &mut Step<f64>,
+        length: f64,
         (a, b): (&Plane<f64>, &Plane<f64>),
         response: &Response<f64>,
         frame: &M3<f64>,
-    ) {
+    ) -> bool {
         let (newton, of_a, of_b) = (step.along(), a.slope(), b.slope());
         let slope = [of_a[0] - of_b[0], of_a[1] - of_b[1]];
         let mut corrected = false;
-        if self.last.may_have_to_be_corrected(newton) {
+        if self.last.may_have_to_be_corrected(newton, length) {
             let found = correction(newton, slope, response.give, &self.seen_along(simd, frame));
             corrected = found != Correction::default();
             // The same for x and y: they stay where they are seen from each other.
@@ -466,6 +462,7 @@ impl Pace {
         }
         self.last = Last { newton, taken: step.along(), slope, corrected };
         self.tangents = [frame[0], frame[1]];
+        corrected
     }
 
     /// The last step along the tangents of now.
