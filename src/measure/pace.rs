@@ -10,7 +10,8 @@
 //! up for it. Newton's step would lead far beyond; the power law of the slopes leads back.
 
 use super::tangent::Symmetric2;
-use crate::polynomial::MAX_DEGREE;
+use super::vector::{V3, add_scaled, scaled};
+use crate::polynomial::{MAX_DEGREE, Simd};
 
 /// Share of a step in the one before it, below which Newton's method is as fast as it can be.
 const FAST: f64 = 0.55;
@@ -52,14 +53,68 @@ pub(super) struct Last {
     pub(super) corrected: bool,
 }
 
-impl Last {
+/// A series of steps along the tangents of surfaces.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Series {
+    last: Last,
+    /// The tangents along which it was made.
+    tangents: [V3<f64>; 2],
+}
+
+impl Series {
     /// Whether Newton's next step, this long relative to the bodies, is not so much shorter that there is nothing to correct.
     #[inline(always)]
     pub(super) fn may_have_to_be_corrected(&self, newton: V2, length: f64) -> bool {
-        let last = dot(self.newton, self.newton);
+        let last = dot(self.last.newton, self.last.newton);
         let slow = length < NEAR && dot(newton, newton) > FAST * FAST * last;
-        last > 0.0 && (self.corrected || slow)
+        last > 0.0 && (self.last.corrected || slow)
     }
+
+    /// Whether the last step has been corrected.
+    #[inline(always)]
+    pub(super) fn is_corrected(&self) -> bool {
+        self.last.corrected
+    }
+
+    /// What to add to Newton's step along these tangents, made from a slope by `give`.
+    #[inline(always)]
+    pub(super) fn correction<S: Simd>(
+        &self,
+        simd: S,
+        tangents: [V3<f64>; 2],
+        (newton, slope): (V2, V2),
+        give: Symmetric2<f64>,
+    ) -> Correction {
+        let Last { newton: last, taken, slope: from, corrected } = self.last;
+        let last = along(simd, tangents, across(simd, self.tangents, last));
+        let taken = along(simd, tangents, across(simd, self.tangents, taken));
+        let from = along(simd, tangents, across(simd, self.tangents, from));
+        correction(newton, slope, give, &Last { newton: last, taken, slope: from, corrected })
+    }
+
+    /// Takes down a step along these tangents.
+    #[inline(always)]
+    pub(super) fn push(&mut self, tangents: [V3<f64>; 2], last: Last) {
+        (self.tangents, self.last) = (tangents, last);
+    }
+
+    /// Takes down that the step was cut to this.
+    #[inline(always)]
+    pub(super) fn took(&mut self, taken: V2) {
+        self.last.taken = taken;
+    }
+}
+
+/// Components of a vector along tangents.
+#[inline(always)]
+pub(super) fn along<S: Simd>(_: S, [t0, t1]: [V3<f64>; 2], v: V3<f64>) -> V2 {
+    [super::vector::dot::<S, f64>(t0, v), super::vector::dot::<S, f64>(t1, v)]
+}
+
+/// The vector with these components.
+#[inline(always)]
+pub(super) fn across<S: Simd>(_: S, [t0, t1]: [V3<f64>; 2], v: V2) -> V3<f64> {
+    add_scaled::<S, f64>(scaled::<S, f64>(t0, v[0]), v[1], t1)
 }
 
 /// What to add to Newton's step.
@@ -203,10 +258,12 @@ mod tests {
     #[test]
     fn steps_that_converge_fast_are_newtons() {
         let last = Last { newton: [0.1, 0.0], taken: [0.1, 0.0], slope: [0.1, 0.0], corrected: false };
-        assert!(
-            !last.may_have_to_be_corrected([0.01, 0.001], 0.01)
-                && !Last::default().may_have_to_be_corrected([0.01, 0.001], 0.01)
-        );
+        let mut series = Series::default();
+        assert!(!series.may_have_to_be_corrected([0.01, 0.001], 0.01), "the first");
+        series.push([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], last);
+        assert!(!series.may_have_to_be_corrected([0.01, 0.001], 0.01), "much shorter");
+        assert!(!series.may_have_to_be_corrected([0.08, 0.001], 0.08), "far");
+        assert!(series.may_have_to_be_corrected([0.08, 0.001], 0.01), "hardly shorter");
         let give = [1.0, 0.0, 1.0];
         assert_eq!(correction([0.01, 0.001], [0.01, 0.001], give, &last), Correction::default());
         // As much shorter as those of a power, but from slopes of none.

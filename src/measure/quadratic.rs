@@ -30,15 +30,22 @@ const VIOLATED: f64 = 1e-10;
 /// to mean something where the step leads (Levenberg and Marquardt).
 pub(super) const DAMPINGS: [f64; 6] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
 
+/// Most of the curvature along a gradient that is not that of the root of what rises with a power.
+pub(super) const MOST_BENT: f64 = 0.9;
+
 /// Longest step, relative to the bodies and to the distance from a centre that values rise from, that a linearization may mean
 /// anything for.
 pub(super) const LONGEST: f64 = 0.5;
 
 /// Length of a step, in the same measure, that is well within that.
-const SHORT: f64 = 0.5 * LONGEST;
+pub(super) const SHORT: f64 = 0.5 * LONGEST;
 
 /// Least damping, relative to the first: rounding tilts faces by about as much.
-const LEAST: f64 = 1e-9;
+pub(super) const LEAST: f64 = 1e-9;
+
+/// How long a step is relative to the distance from such a centre, if it leads there: the root of values that rise from a centre with a
+/// power is about a square, whose least one step finds.
+pub(super) const TO_CENTER: f64 = 0.5;
 
 /// Distance from such a centre, relative to its body, that counts as none.
 pub(super) const CENTER: f64 = 0.02;
@@ -55,6 +62,11 @@ impl Jets {
         let mut jets = [blank; MAX_CONSTRAINTS];
         jets.iter_mut().take(body.len()).enumerate().for_each(|(i, jet)| *jet = body.jet(i, v));
         Self { jets, len: body.len() }
+    }
+
+    /// A constraint.
+    pub(super) fn jet(&self, i: usize) -> &Jet {
+        &self.jets[i]
     }
 
     /// Sum of the active gradients, weighted by their multipliers.

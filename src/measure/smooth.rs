@@ -7,7 +7,7 @@
 
 use super::drift::Drift;
 use super::options::Options;
-use super::pace::{Correction, Last, correction};
+use super::pace::{Correction, Last, Series};
 use super::pose::Pose;
 use super::relation::{Relation, Verdict};
 use super::start::{Start, middle};
@@ -324,7 +324,7 @@ impl<R: Relation> Correct<'_, R> {
         trace: &mut Trace,
     ) -> Result<Proven, Lost> {
         let (side_a, side_b) = &self.sides;
-        let mut pace = Pace::default();
+        let mut series = Series::default();
         let mut overlap = f64::INFINITY;
         for rounds in 1..=self.most {
             if self.options.stopped() {
@@ -336,7 +336,7 @@ impl<R: Relation> Correct<'_, R> {
                 if rounds >= self.patience || !at.is_finite() {
                     return Err(Lost::after(rounds));
                 }
-                pace = Pace::default();
+                series = Series::default();
                 (at.x, at.y) =
                     (side_a.brought_near(simd, at.x, jet_a.value), side_b.brought_near(simd, at.y, jet_b.value));
                 continue;
@@ -389,7 +389,8 @@ impl<R: Relation> Correct<'_, R> {
             }
             let local = (&local_a, &local_b);
             let mut length = self.relative_length(simd, &step, local);
-            if pace.correct(simd, &mut step, length, (&a, &b), &response, &at.frame) {
+            let tangents = [at.frame[0], at.frame[1]];
+            if correct(simd, &mut series, (&mut step, length), (&a, &b), &response, tangents) {
                 length = self.relative_length(simd, &step, local);
             }
             let late = f64::from(1_u32 << rounds.saturating_sub(self.patience));
@@ -400,7 +401,7 @@ impl<R: Relation> Correct<'_, R> {
                 // The linearization means nothing so far away.
                 step.shorten(LONGEST / length);
             }
-            pace.last.taken = step.along();
+            series.took(step.along());
             at.advance(simd, &step);
         }
         Err(Lost::after(self.most))
@@ -424,58 +425,34 @@ fn last_resort(found: &Bracket<f64>) -> Verdict {
     }
 }
 
-/// The last step for [`correction`], means of both bodies.
-#[derive(Clone, Copy, Default)]
-struct Pace {
-    last: Last,
-    /// The tangents along which it was made.
+/// Makes a step of this relative length as long as those before it show that it has to be; whether that is another length.
+#[inline(always)]
+fn correct<S: Simd>(
+    simd: S,
+    series: &mut Series,
+    (step, length): (&mut Step<f64>, f64),
+    (a, b): (&Plane<f64>, &Plane<f64>),
+    response: &Response<f64>,
     tangents: [V3<f64>; 2],
-}
-
-impl Pace {
-    /// Makes a step of this relative length as long as the last one shows that it has to be; whether that is another length.
-    #[inline(always)]
-    fn correct<S: Simd>(
-        &mut self,
-        simd: S,
-        step: &mut Step<f64>,
-        length: f64,
-        (a, b): (&Plane<f64>, &Plane<f64>),
-        response: &Response<f64>,
-        frame: &M3<f64>,
-    ) -> bool {
-        let (newton, of_a, of_b) = (step.along(), a.slope(), b.slope());
-        let slope = [of_a[0] - of_b[0], of_a[1] - of_b[1]];
-        let mut corrected = false;
-        if self.last.may_have_to_be_corrected(newton, length) {
-            let found = correction(newton, slope, response.give, &self.seen_along(simd, frame));
-            corrected = found != Correction::default();
-            // The same for x and y: they stay where they are seen from each other.
-            let turned = response.turned(simd, found.shorter);
-            for i in 0..2 {
-                step.dx[i] += found.longer[i] + found.shorter[i];
-                step.dy[i] += found.longer[i] + found.shorter[i];
-                step.dx[2] -= of_a[i] * found.shorter[i];
-                step.dy[2] -= of_b[i] * found.shorter[i];
-                step.dn[i] += turned[i];
-            }
+) -> bool {
+    let (newton, of_a, of_b) = (step.along(), a.slope(), b.slope());
+    let slope = [of_a[0] - of_b[0], of_a[1] - of_b[1]];
+    let mut corrected = false;
+    if series.may_have_to_be_corrected(newton, length) {
+        let found = series.correction(simd, tangents, (newton, slope), response.give);
+        corrected = found != Correction::default();
+        // The same for x and y: they stay where they are seen from each other.
+        let turned = response.turned(simd, found.shorter);
+        for i in 0..2 {
+            step.dx[i] += found.longer[i] + found.shorter[i];
+            step.dy[i] += found.longer[i] + found.shorter[i];
+            step.dx[2] -= of_a[i] * found.shorter[i];
+            step.dy[2] -= of_b[i] * found.shorter[i];
+            step.dn[i] += turned[i];
         }
-        self.last = Last { newton, taken: step.along(), slope, corrected };
-        self.tangents = [frame[0], frame[1]];
-        corrected
     }
-
-    /// The last step along the tangents of now.
-    #[inline(always)]
-    fn seen_along<S: Simd>(&self, _: S, frame: &M3<f64>) -> Last {
-        let [t0, t1] = self.tangents;
-        let across = |v: [f64; 2]| {
-            let v = add_scaled::<S, f64>([t0[0] * v[0], t0[1] * v[0], t0[2] * v[0]], v[1], t1);
-            [dot::<S, f64>(frame[0], v), dot::<S, f64>(frame[1], v)]
-        };
-        let Last { newton, taken, slope, corrected } = self.last;
-        Last { newton: across(newton), taken: across(taken), slope: across(slope), corrected }
-    }
+    series.push(tangents, Last { newton, taken: step.along(), slope, corrected });
+    corrected
 }
 
 /// Trial points in the query frame and the basis whose third vector is the trial normal.

@@ -3,12 +3,25 @@
 //! ```text
 //! Σ ν_i ∇g_i + Σ μ_j ∇h_j = 0,   Σ ν_i = 1,   g_i(x) = s,   h_j(x) = 1.
 //! ```
+//!
+//! From afar values fall by orders of magnitude, and towards the least of a power d steps are a (d - 1)-th part of the way. There
+//! the Hessians are those of `g_i^(2/d)`, about a square whatever d is.
 
 use crate::measure::active::MAX_ACTIVE;
-use crate::measure::newton::{Active, At, MAX_STEPS, Pace, WORTH_A_BRACKET};
-use crate::measure::pair::Pair;
-use crate::measure::quadratic::{CENTER, Jets, LONGEST, Quadratic};
+use crate::measure::newton::{Active, At, Pace, WORTH_A_BRACKET};
+use crate::measure::pace::{Correction, Last, Series, across, along};
+use crate::measure::pair::{Pair, Posed};
+use crate::measure::quadratic::{CENTER, DAMPINGS, Jets, LONGEST, MOST_BENT, Quadratic, TO_CENTER};
+use crate::measure::vector::{V3, basis};
+use crate::polynomial::Scalar;
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
+
+/// Largest number of steps.
+const MAX_STEPS: u32 = 24;
+
+/// Length of a step, relative to the bodies and to the distance from A's interior point, after which values may still fall by orders of
+/// magnitude.
+const FAR: f64 = 0.1;
 
 /// Newton iterates of the level-distance system.
 #[derive(Clone, Copy, Debug)]
@@ -18,36 +31,45 @@ pub(in crate::measure) struct LevelNewton {
     pub(in crate::measure) b: Active,
 }
 
+/// How the iterates ended.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ended {
+    pub(super) steps: u32,
+    /// Whether there is no step left to take, though none was accepted: rounding keeps the bracket wide.
+    pub(super) settled: bool,
+}
+
 impl LevelNewton {
-    /// Iterates until `accept` takes one, they stop converging or `stop` says so after that many steps; returns the steps taken.
-    pub(in crate::measure) fn run(
+    /// Iterates until `accept` takes one, they stop converging or `stop` says so after that many steps.
+    pub(super) fn run(
         &mut self,
         pair: &Pair<'_>,
         stop: impl Fn(u32) -> bool,
         mut accept: impl FnMut(&Self) -> bool,
-    ) -> u32 {
+    ) -> Ended {
         if self.a.len == 0 {
-            return 0;
+            return Ended { steps: 0, settled: false };
         }
         let mut s = self.start(pair);
-        let mut pace = Pace::FIRST;
+        let (mut pace, mut last, mut series) = (Pace::FIRST, f64::INFINITY, Series::default());
         for step in 1..=MAX_STEPS {
             if stop(step - 1) {
-                return step - 1;
+                return Ended { steps: step - 1, settled: false };
             }
-            let Some(length) = self.step(pair, &mut s) else {
+            let Some(length) = self.step(pair, &mut s, last > FAR, &mut series) else {
                 // Where both are flat the system is singular, but the point at hand with its multipliers may do.
                 accept(self);
-                return step;
+                return Ended { steps: step, settled: false };
             };
             if (length < WORTH_A_BRACKET || step % 4 == 0) && accept(self) {
-                return step;
+                return Ended { steps: step, settled: false };
             }
             if pace.ends_with(length) {
-                return step;
+                return Ended { steps: step, settled: true };
             }
+            last = length;
         }
-        MAX_STEPS
+        Ended { steps: MAX_STEPS, settled: false }
     }
 
     /// First multipliers: equal weights of A, and those of B that fit; returns the first s.
@@ -61,25 +83,70 @@ impl LevelNewton {
     }
 
     /// One step; its length relative to B and to the distance from A's interior point, or none if it leads nowhere.
-    fn step(&mut self, pair: &Pair<'_>, s: &mut f64) -> Option<f64> {
+    fn step(&mut self, pair: &Pair<'_>, s: &mut f64, from_afar: bool, series: &mut Series) -> Option<f64> {
         let (of_a, of_b) = (Jets::new(&pair.a, &self.x), Jets::new(&pair.b, &self.x));
         let far = pair.a.relative_length(&(self.x - pair.a.interior)).max(CENTER);
-        let length = |dx: &Vector3<f64>| pair.b.relative_length(dx).max(pair.a.relative_length(dx) / far);
+        let length = |dx: &Vector3<f64>| pair.b.relative_length(dx).max(TO_CENTER * pair.a.relative_length(dx) / far);
+        let stiffness = self.stiffness(pair, &of_a, far, *s);
+        let mut hessian = of_a.hessian(&self.a) + of_b.hessian(&self.b);
+        if from_afar {
+            hessian -= self.bent(&pair.a, &of_a, &(hessian + stiffness * DAMPINGS[0]));
+        }
+        // Values of A range over orders of magnitude, those of B are about 1.
+        let scale = s.abs().max(1.0);
         let program = Quadratic {
-            hessian: of_point(of_a.hessian(&self.a) + of_b.hessian(&self.b)),
+            hessian: of_point(hessian / scale),
             cost: Vector4::w(),
-            a: of_a.rows(s.abs().max(1.0), |jet| (jet.gradient.push(-1.0), -jet.value)),
+            a: of_a.rows(1.0, |jet| ((jet.gradient / scale).push(-1.0), -jet.value / scale)),
             b: of_b.rows(1.0, |jet| (jet.gradient.push(0.0), 1.0 - jet.value)),
             free_of_b: true,
         };
-        let found = program.step(self.a, self.b, length, &of_point(self.stiffness(pair, &of_a, far, *s)))?;
+        let found = program.step(self.a, self.b, length, &of_point(stiffness / scale))?;
         let dx = found.v.xyz();
         let length = length(&dx);
         let share = (LONGEST / length).min(1.0);
-        self.x += dx * share;
-        *s += (found.v.w - *s) * share;
-        (self.a, self.b) = (found.a, found.b);
+        let same = self.a.bits() == found.a.bits() && self.b.bits() == found.b.bits();
+        let correction = match self.tangents(&of_b) {
+            Some(tangents) if same && share == 1.0 => {
+                corrected(series, tangents, &dx, length, &of_a.gradient(&self.a), &hessian)
+            }
+            _ => {
+                *series = Series::default();
+                Vector3::zeros()
+            }
+        };
+        self.x += dx * share + correction;
+        *s += (found.v.w * scale - *s) * share;
+        (self.a, self.b) = (found.a, found.b.scaled(scale));
         Some(length)
+    }
+
+    /// Along what the active constraints of B leave to move, where there is but one of A.
+    fn tangents(&self, of_b: &Jets) -> Option<[V3<f64>; 2]> {
+        let mut of_b = self.b.iter().map(|(i, _)| of_b.jet(i).gradient);
+        match (self.a.len, of_b.next(), of_b.next(), of_b.next()) {
+            (1, Some(face), None, _) => {
+                let [t, u, _] = basis(Scalar, face.into());
+                Some([t, u])
+            }
+            (1, Some(face), Some(other), None) => Some([face.cross(&other).normalize().into(), [0.0; 3]]),
+            _ => None,
+        }
+    }
+
+    /// What the Hessian of A's constraints has more than that of their roots.
+    fn bent(&self, a: &Posed<'_>, of_a: &Jets, hessian: &Matrix3<f64>) -> Matrix3<f64> {
+        let Some(inverse) = hessian.try_inverse() else { return Matrix3::zeros() };
+        let mut bent = Matrix3::zeros();
+        for (i, multiplier) in self.a.iter().filter(|(_, multiplier)| *multiplier > 0.0) {
+            let (degree, jet) = (a.body.constraints()[i].polynomial.degree() as f64, of_a.jet(i));
+            let most = MOST_BENT / (self.a.len as f64 * jet.gradient.dot(&(inverse * jet.gradient)));
+            let more = (multiplier * (1.0 - 2.0 / degree) / jet.value).min(most);
+            if more > 0.0 {
+                bent += jet.gradient * jet.gradient.transpose() * more;
+            }
+        }
+        bent
     }
 
     /// What the Hessian is about of values like s over lengths like that of B and the distance from A's interior point.
@@ -91,6 +158,31 @@ impl LevelNewton {
         let stiff_b = slope.norm() / pair.b.body.trust().radius;
         pair.a.metric() * stiff_a + pair.b.metric() * stiff_b
     }
+}
+
+/// What to add to a step of this length, as the steps before it along the tangents show.
+fn corrected(
+    series: &mut Series,
+    tangents: [V3<f64>; 2],
+    dx: &Vector3<f64>,
+    length: f64,
+    gradient: &Vector3<f64>,
+    hessian: &Matrix3<f64>,
+) -> Vector3<f64> {
+    let newton = along(Scalar, tangents, (*dx).into());
+    let slope = along(Scalar, tangents, (-gradient).into());
+    let mut correction = Correction::default();
+    if series.may_have_to_be_corrected(newton, length) {
+        let [t, u] = tangents.map(Vector3::from);
+        // Its principal directions are those of its inverse.
+        let curvature = [t.dot(&(hessian * t)), t.dot(&(hessian * u)), u.dot(&(hessian * u))];
+        correction = series.correction(Scalar, tangents, (newton, slope), curvature);
+    }
+    let Correction { longer, shorter } = correction;
+    let more: Vector3<f64> = across(Scalar, tangents, [longer[0] + shorter[0], longer[1] + shorter[1]]).into();
+    let taken = along(Scalar, tangents, (dx + more).into());
+    series.push(tangents, Last { newton, taken, slope, corrected: correction != Correction::default() });
+    more
 }
 
 /// A matrix of the point's coordinates alone.

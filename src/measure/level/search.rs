@@ -47,6 +47,8 @@ pub(super) struct Search<'a> {
     refined: bool,
     /// Where Newton's method ended last.
     ended: Option<LevelNewton>,
+    /// Whether it had no step left to take there.
+    settled: bool,
     iterations: u32,
 }
 
@@ -65,6 +67,7 @@ impl<'a> Search<'a> {
             proven: pair.b.interior,
             refined: false,
             ended: None,
+            settled: false,
             iterations,
         };
         search.attain(&pair.b.interior);
@@ -110,6 +113,9 @@ impl<'a> Search<'a> {
         {
             self.outlined(start);
         }
+        if self.settled && !self.done() && !self.exhausted() {
+            self.sharpen(self.accuracy);
+        }
         if !self.done() && !self.exhausted() {
             self.interior_point();
         }
@@ -141,7 +147,7 @@ impl<'a> Search<'a> {
             let (a, b) = (Active::near(&pair.a, &x, &outward), Active::near(&pair.b, &x, &-outward));
             self.attain(&x);
             self.newton(x, a, b);
-            if self.done() || self.exhausted() {
+            if self.done() || self.settled || self.exhausted() {
                 return;
             }
         }
@@ -272,7 +278,7 @@ impl<'a> Search<'a> {
         }
         let mut newton = LevelNewton { x, a, b };
         let (options, before) = (self.options, self.iterations);
-        let steps = newton.run(
+        let ended = newton.run(
             self.pair,
             |steps| options.exhausted(before + steps),
             |at| {
@@ -283,8 +289,8 @@ impl<'a> Search<'a> {
                 self.done()
             },
         );
-        self.iterations += steps;
-        self.ended = Some(newton);
+        self.iterations += ended.steps;
+        (self.ended, self.settled) = (Some(newton), ended.settled);
     }
 
     /// Takes the lower bound of a trial point and multipliers if it is the best so far.

@@ -3,15 +3,12 @@
 
 use crate::body::{Body, ConstraintTrust};
 use crate::measure::pose::Pose;
-use crate::measure::quadratic::{CENTER, DAMPINGS, LONGEST};
+use crate::measure::quadratic::{CENTER, DAMPINGS, LEAST, LONGEST, MOST_BENT, SHORT};
 use crate::measure::tangent::{Relative, TURNED};
 use crate::measure::vector::{
     M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, rows, scaled, times_transposed,
 };
 use crate::polynomial::{Number, NumberJet, Polynomial, Simd, gamma};
-
-/// Most of the curvature along the gradient of p that is not that of the root of p.
-const MOST_BENT: f64 = 0.9;
 
 /// The map from B's normalized coordinates w to A's, with its errors.
 pub(super) struct Map {
@@ -103,6 +100,8 @@ pub(super) struct Evaluated {
 pub(super) struct Step {
     /// Change of w.
     pub(super) delta: V3<f64>,
+    /// `G + μ b`.
+    pub(super) force: V3<f64>,
     /// Multiplier before the step, in H.
     pub(super) multiplier: f64,
     /// Lower bound of the smallest eigenvalue of H, but for the errors of its entries.
@@ -170,6 +169,7 @@ impl<'a> Sides<'a> {
     pub(super) fn newton<S: Simd>(&self, simd: S, a: &NumberJet<f64>, b: &NumberJet<f64>) -> Step {
         let (pulled, multiplier) = self.balance(simd, a, b);
         let hessian = self.hessian(simd, a, b, multiplier);
+        let force = add_scaled::<S, f64>(pulled, multiplier, b.gradient);
         let (cofactors, determinant) = cofactors(simd, hessian);
         let u = apply_symmetric::<S, f64>(&cofactors, pulled);
         let v = apply_symmetric::<S, f64>(&cofactors, b.gradient);
@@ -179,47 +179,67 @@ impl<'a> Sides<'a> {
         // The determinant over the square of half the trace, as in the tangent plane's bracket.
         let half_trace = 0.5 * (hessian[0] + hessian[3] + hessian[5]);
         let curvature = determinant / (half_trace * half_trace) - 256.0 * f64::EPSILON * half_trace;
-        Step { delta, multiplier, curvature, cofactors, determinant }
+        Step { delta, force, multiplier, curvature, cofactors, determinant }
     }
 
-    /// A step towards the solution from afar, where Newton's would be a long one: towards the least of `p^(2/d)`, d the degree of p,
-    /// which is about a square whatever d is, and damped (Levenberg and Marquardt) until it is short enough for the Hessians
-    /// to mean something where it leads.
+    /// A step towards the solution from afar, where Newton's would be a long one, with the multiplier: towards the least of `p^(2/d)`, d the
+    /// degree of p, which is about a square whatever d is, and damped (Levenberg and Marquardt) until it is short enough for
+    /// the Hessians to mean something where it leads, but not much more.
     #[inline(always)]
-    pub(super) fn damped<S: Simd>(&self, simd: S, at: &Evaluated, multiplier: Option<f64>) -> (V3<f64>, f64) {
-        let (a, b) = (&at.jet_a, &at.jet_b);
-        let (pulled, fitting) = self.balance(simd, a, b);
-        let multiplier = multiplier.unwrap_or(fitting);
-        let hessian = self.hessian(simd, a, b, multiplier);
-        let degree = self.p.degree() as f64;
-        let of_b = self.b.trust().radius;
-        let stiff_a = degree * (degree - 1.0) * a.value / self.far::<S>(at.z);
-        let stiff_b = square::<S>(pulled).sqrt() / of_b;
-        let (mut delta, mut next) = ([f64::NAN; 3], 0.0);
-        for damping in [0.0].into_iter().chain(DAMPINGS) {
-            let mut h = self.map.metric(damping * stiff_a, damping * stiff_b);
-            for (entry, of_hessian) in h.iter_mut().zip(hessian) {
-                *entry += of_hessian;
-            }
-            let (cofactors, determinant) = cofactors(simd, h);
-            let inverse = 1.0 / determinant;
-            let u = scaled::<S, f64>(apply_symmetric::<S, f64>(&cofactors, pulled), inverse);
-            let v = scaled::<S, f64>(apply_symmetric::<S, f64>(&cofactors, b.gradient), inverse);
-            // Of p^(2/d) the Hessian lacks this much of the square of the gradient; by the formula of Sherman and Morrison.
-            let (of_u, mixed) = (dot::<S, f64>(pulled, u), dot::<S, f64>(b.gradient, u));
-            let lacks = ((1.0 - 2.0 / degree) / a.value).min(MOST_BENT / of_u);
-            let more = 1.0 / (1.0 - lacks * of_u);
-            let v = add_scaled::<S, f64>(v, lacks * mixed * more, u);
-            let u = scaled::<S, f64>(u, more);
-            let excess = b.value - 1.0;
-            next = (excess - dot::<S, f64>(u, b.gradient)) / dot::<S, f64>(b.gradient, v);
-            delta = scaled::<S, f64>(add_scaled::<S, f64>(u, next, v), -1.0);
-            let length = self.length(simd, at.z, delta);
+    pub(super) fn far_step<S: Simd>(&self, simd: S, at: &Evaluated, multiplier: Option<f64>) -> (V3<f64>, f64) {
+        let (pulled, fitting) = self.balance(simd, &at.jet_a, &at.jet_b);
+        let hessian = self.hessian(simd, &at.jet_a, &at.jet_b, multiplier.unwrap_or(fitting));
+        let (mut delta, mut next) = self.damped(simd, at, &pulled, &hessian, 0.0);
+        let mut length = self.length(simd, at.z, delta);
+        for (i, damping) in DAMPINGS.into_iter().enumerate() {
             if length <= LONGEST {
                 return (delta, next);
             }
+            (delta, next) = self.damped(simd, at, &pulled, &hessian, damping);
+            length = self.length(simd, at.z, delta);
+            if i == 0 && length < SHORT {
+                // Along flat sides a step is as long as the damping is little.
+                let damping = damping * (length / SHORT).max(LEAST);
+                let longer = self.damped(simd, at, &pulled, &hessian, damping);
+                if self.length(simd, at.z, longer.0) <= LONGEST {
+                    return longer;
+                }
+            }
         }
-        (scaled::<S, f64>(delta, LONGEST / self.length(simd, at.z, delta)), next)
+        (scaled::<S, f64>(delta, (LONGEST / length).min(1.0)), next)
+    }
+
+    /// The step with that much of a stiffness, and the multiplier.
+    #[inline(always)]
+    fn damped<S: Simd>(
+        &self,
+        simd: S,
+        at: &Evaluated,
+        pulled: &V3<f64>,
+        hessian: &[f64; 6],
+        damping: f64,
+    ) -> (V3<f64>, f64) {
+        let (a, b) = (&at.jet_a, &at.jet_b);
+        let degree = self.p.degree() as f64;
+        let stiff_a = degree * (degree - 1.0) * a.value / self.far::<S>(at.z);
+        let stiff_b = square::<S>(*pulled).sqrt() / self.b.trust().radius;
+        let mut h = self.map.metric(damping * stiff_a, damping * stiff_b);
+        for (entry, of_hessian) in h.iter_mut().zip(hessian) {
+            *entry += of_hessian;
+        }
+        let (cofactors, determinant) = cofactors(simd, h);
+        let inverse = 1.0 / determinant;
+        let u = scaled::<S, f64>(apply_symmetric::<S, f64>(&cofactors, *pulled), inverse);
+        let v = scaled::<S, f64>(apply_symmetric::<S, f64>(&cofactors, b.gradient), inverse);
+        // Of p^(2/d) the Hessian lacks this much of the square of the gradient; by the formula of Sherman and Morrison.
+        let (of_u, mixed) = (dot::<S, f64>(*pulled, u), dot::<S, f64>(b.gradient, u));
+        let lacks = ((1.0 - 2.0 / degree) / a.value).min(MOST_BENT / of_u);
+        let more = 1.0 / (1.0 - lacks * of_u);
+        let v = add_scaled::<S, f64>(v, lacks * mixed * more, u);
+        let u = scaled::<S, f64>(u, more);
+        let excess = b.value - 1.0;
+        let next = (excess - dot::<S, f64>(u, b.gradient)) / dot::<S, f64>(b.gradient, v);
+        (scaled::<S, f64>(add_scaled::<S, f64>(u, next, v), -1.0), next)
     }
 
     /// `G` and the multiplier that fits the gradients best.

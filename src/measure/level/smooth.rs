@@ -42,9 +42,10 @@ use super::sides::{Evaluated, Sides, Step, square};
 use crate::body::Body;
 use crate::measure::drift::Drift;
 use crate::measure::options::Options;
+use crate::measure::pace::{Correction, Last, Series, across, along};
 use crate::measure::pose::Pose;
 use crate::measure::quadratic::LONGEST;
-use crate::measure::vector::{V3, add, apply_symmetric, apply_transposed, scaled, subtract};
+use crate::measure::vector::{V3, add, apply_symmetric, apply_transposed, basis, dot, scaled, subtract};
 use crate::polynomial::{NumberJet, Scalar, Simd, WithSimd};
 use nalgebra::Vector3;
 
@@ -227,7 +228,7 @@ impl Sides<'_> {
         most: u32,
         options: &Options<'_>,
     ) -> Result<(LevelProven, LevelTrace), LevelLost> {
-        let mut multiplier = None;
+        let (mut multiplier, mut series) = (None, Series::default());
         for rounds in 1..=most {
             if options.stopped() {
                 return Err(LevelLost::after(rounds - 1));
@@ -237,47 +238,80 @@ impl Sides<'_> {
             let at = Evaluated { x, z, jet_a: self.p.jet(simd, z), w, jet_b: self.g.jet(simd, w) };
             let step = self.newton(simd, &at.jet_a, &at.jet_b);
             let length = self.length(simd, z, step.delta);
-            if !(length <= ROOM) {
-                let (delta, next) = self.damped(simd, &at, multiplier);
-                w = add::<S, f64>(w, delta);
-                multiplier = Some(next.max(0.0));
-                if !square::<S>(w).is_finite() {
-                    return Err(LevelLost::after(rounds));
+            if length <= ROOM {
+                let end = add::<S, f64>(w, step.delta);
+                let mut found = self.bracket(simd, &at, &step, &Metric::of_b(self, step.curvature));
+                let mut proven = found.proves(options.accuracy());
+                if !proven && length <= SHORT {
+                    found = self.bracket(simd, &at, &step, &self.joint(&at));
+                    proven = found.proves(options.accuracy());
                 }
-                continue;
-            }
-            let mut found = self.bracket(simd, &at, &step, &Metric::of_b(self, step.curvature));
-            let end = add::<S, f64>(w, step.delta);
-            let mut proven = found.proves(options.accuracy());
-            if !proven && length <= SHORT {
-                found = self.bracket(simd, &at, &step, &self.joint(&at));
-                proven = found.proves(options.accuracy());
-            }
-            if proven {
-                let attained = add::<S, f64>(end, found.inward);
-                if !self.others_hold(simd, attained, found.upper) {
-                    return Err(LevelLost::after(rounds));
+                if proven {
+                    let attained = add::<S, f64>(end, found.inward);
+                    if !self.others_hold(simd, attained, found.upper) {
+                        return Err(LevelLost::after(rounds));
+                    }
+                    let of_b = (end, found.gradient_b);
+                    let trace = LevelTrace::at(simd, self.active, (z, &at.jet_a), of_b, &step);
+                    let proven = LevelProven {
+                        lower: found.lower,
+                        upper: found.upper,
+                        x: self.map.apply(simd, attained),
+                        gradient: found.gradient,
+                        multiplier: found.multiplier,
+                        rounds,
+                    };
+                    return Ok((proven, trace));
                 }
-                let of_b = (end, found.gradient_b);
-                let trace = LevelTrace::at(simd, self.active, (z, &at.jet_a), of_b, &step);
-                let proven = LevelProven {
-                    lower: found.lower,
-                    upper: found.upper,
-                    x: self.map.apply(simd, attained),
-                    gradient: found.gradient,
-                    multiplier: found.multiplier,
-                    rounds,
-                };
-                return Ok((proven, trace));
+                if length <= SETTLED {
+                    if step.multiplier == 0.0 {
+                        // On the side of B that p falls off from.
+                        return Err(LevelLost::after(rounds));
+                    }
+                    let body = self.b;
+                    let point = body.normalization().center + body.inverse() * Vector3::from(end);
+                    let settled = Some(Settled { point, active: self.active, multiplier: step.multiplier });
+                    return Err(LevelLost { rounds, settled });
+                }
             }
-            if length <= SETTLED {
-                let body = self.b;
-                let point = body.normalization().center + body.inverse() * Vector3::from(end);
-                let settled = Some(Settled { point, active: self.active, multiplier: step.multiplier });
-                return Err(LevelLost { rounds, settled });
+            let delta = if length <= ROOM || series.is_corrected() {
+                self.corrected(simd, &mut series, &at, &step, length)
+            } else {
+                let (delta, next) = self.far_step(simd, &at, multiplier);
+                (multiplier, series) = (Some(next.max(0.0)), Series::default());
+                delta
+            };
+            w = add::<S, f64>(w, delta);
+            if !square::<S>(w).is_finite() {
+                return Err(LevelLost::after(rounds));
             }
-            w = end;
         }
         Err(LevelLost::after(most))
+    }
+
+    /// A step of this length, made as long as those before it show that it has to be.
+    #[inline(always)]
+    fn corrected<S: Simd>(&self, simd: S, series: &mut Series, at: &Evaluated, step: &Step, length: f64) -> V3<f64> {
+        let [t, u, _] = basis(simd, at.jet_b.gradient);
+        let tangents = [t, u];
+        let (newton, slope) =
+            (along(simd, tangents, step.delta), along(simd, tangents, scaled::<S, f64>(step.force, -1.0)));
+        let (mut delta, mut corrected) = (step.delta, false);
+        if series.may_have_to_be_corrected(newton, length) {
+            let response = step.response(simd, at.jet_b.gradient);
+            let of_t = apply_symmetric::<S, f64>(&response, t);
+            let of_u = apply_symmetric::<S, f64>(&response, u);
+            let give = [dot::<S, f64>(t, of_t), dot::<S, f64>(t, of_u), dot::<S, f64>(u, of_u)];
+            let found = series.correction(simd, tangents, (newton, slope), give);
+            corrected = found != Correction::default();
+            let Correction { longer, shorter } = found;
+            delta = add::<S, f64>(delta, across(simd, tangents, [longer[0] + shorter[0], longer[1] + shorter[1]]));
+            let length = self.length(simd, at.z, delta);
+            if length > LONGEST {
+                delta = scaled::<S, f64>(delta, LONGEST / length);
+            }
+        }
+        series.push(tangents, Last { newton, taken: along(simd, tangents, delta), slope, corrected });
+        delta
     }
 }

@@ -279,3 +279,32 @@ fn sides_tilted_by_next_to_nothing_show_their_edges() {
     }
     assert!(longest <= 30, "{longest}");
 }
+
+#[test]
+fn flats_of_different_orders_take_few_iterations() {
+    let body = |name, half: [f64; 3], k| Body::superellipsoid(name, Vector3::zeros(), half.into(), k).unwrap();
+    let bodies = [
+        body("needle", [0.05, 0.05, 1.0], 8),
+        body("block", [0.5, 0.4, 0.3], 6),
+        body("plate", [1.0, 1.0, 0.02], 8),
+        Body::cuboid("box", Vector3::new(0.6, 0.9, 0.3)).unwrap(),
+    ];
+    let halves = [1.0, 0.3, 0.02, 0.3];
+    let (mut slow, mut solves) = (Vec::new(), 0);
+    for seed in 0..200 {
+        let mut random = Seeded(seed);
+        // Shallow tilts decide where on its side B is lowest; 1 m apart.
+        let tilt = signed(&mut random).normalize() * 10_f64.powf(-7.0 + 5.0 * random.signed());
+        for (i, j) in (0..4).flat_map(|i| (0..4).map(move |j| (i, j))).filter(|(i, j)| i != j) {
+            let pose = turned(Vector3::new(0.0, 0.0, 1.0 + halves[i] + halves[j]), tilt);
+            let level = cold(&bodies[i], &Pose::identity(), &bodies[j], &pose, 1e-9);
+            let label = format!("seed {seed}, tilt {:e}, {} over {}", tilt.norm(), bodies[i].name(), bodies[j].name());
+            assert_eq!(level.status, Status::Converged, "{label}: {level:?}");
+            solves += 1;
+            if level.iterations > 30 {
+                slow.push((level.iterations, label));
+            }
+        }
+    }
+    assert!(slow.len() * 200 <= solves, "{} of {solves}: {slow:?}", slow.len());
+}
