@@ -14,6 +14,7 @@
 use super::active::{ActiveConstraints, MAX_ACTIVE};
 use super::bracket::Multipliers;
 use super::linear::solve;
+use super::pace::{Series, tangents};
 use super::pair::{Pair, Posed};
 use super::smooth::LONGEST;
 use super::warm::ActiveSet;
@@ -269,9 +270,9 @@ impl DistanceNewton {
             return 0;
         }
         let mut at = self.evaluate(pair);
-        let mut pace = Pace::FIRST;
+        let (mut pace, mut series) = (Pace::FIRST, Series::default());
         for step in 1..=MAX_STEPS.min(limit) {
-            let Some(length) = self.step(pair, &at) else {
+            let Some(length) = self.step(pair, &at, &mut series) else {
                 // Where both are flat the system is singular, but the point at hand with its multipliers may do.
                 accept(self);
                 return step;
@@ -288,7 +289,7 @@ impl DistanceNewton {
                     | self.a.violated(&pair.a, &self.x, 1.0).is_some_and(|i| self.a.push(i))
                     | self.b.violated(&pair.b, &self.y, 1.0).is_some_and(|i| self.b.push(i));
                 if changed {
-                    (at, pace) = (self.evaluate(pair), Pace::FIRST);
+                    (at, pace, series) = (self.evaluate(pair), Pace::FIRST, Series::default());
                     continue;
                 }
             }
@@ -309,7 +310,7 @@ impl DistanceNewton {
     /// The second of the equations at the head of this file gives `dn = -(n + u) - H_A dx - G_A dλ`, G the gradients and H the
     /// weighted Hessians, and the first then `dy = (I + D H_A) dx - n dD + D G_A dλ + (x - y + D u)`, which leaves dx, dD and
     /// the multipliers.
-    fn step(&mut self, pair: &Pair<'_>, (a, b): &(At, At)) -> Option<f64> {
+    fn step(&mut self, pair: &Pair<'_>, (a, b): &(At, At), series: &mut Series) -> Option<f64> {
         let (la, lb, distance, n) = (self.a.len, self.b.len, self.distance, self.n);
         let size = 4 + la + lb;
         // Four unknowns, three constraints of each body, a right-hand side.
@@ -355,9 +356,27 @@ impl DistanceNewton {
         let dy = moved * dx - n * d[3] + of_a * distance + offset;
         // Of corners that stay where they are the normal turns.
         let dn = -(n + a.sum) - a.hessian * dx - of_a;
-        let length = pair.a.relative_length(&dx).max(pair.b.relative_length(&dy));
+        let length = |dx: &Vector3<f64>, dy: &Vector3<f64>| pair.a.relative_length(dx).max(pair.b.relative_length(dy));
+        let newton = length(&dx, &dy);
+        // What the active constraints leave to move along, where but one is of the other body.
+        let free = match (la, lb) {
+            (_, 1) => tangents(a.gradient[..la].iter().copied()),
+            (1, _) => tangents(b.gradient[..lb].iter().copied()),
+            _ => None,
+        };
+        let in_series = newton <= LONGEST || series.is_corrected();
+        let more = match free.filter(|_| in_series) {
+            Some(tangents) => series.corrected(tangents, &dx, newton, &-(a.sum + b.sum), &(a.hessian + b.hessian)),
+            None => Vector3::zeros(),
+        };
+        let (dx, dy, dn) = (dx + more, dy + more, dn - a.hessian * more);
+        let taken = length(&dx, &dy);
+        let length = newton.min(taken);
         // A longer step leaves where the linearization means anything.
-        let damping = (LONGEST / length).min(1.0);
+        let damping = (LONGEST / taken).min(1.0);
+        if damping < 1.0 || !in_series {
+            *series = Series::default();
+        }
         self.x += dx * damping;
         self.y += dy * damping;
         self.n += dn * damping;

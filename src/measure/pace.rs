@@ -10,8 +10,9 @@
 //! up for it. Newton's step would lead far beyond; the power law of the slopes leads back.
 
 use super::tangent::Symmetric2;
-use super::vector::{V3, add_scaled, scaled};
-use crate::polynomial::{MAX_DEGREE, Simd};
+use super::vector::{V3, add_scaled, basis, scaled};
+use crate::polynomial::{MAX_DEGREE, Scalar, Simd};
+use nalgebra::{Matrix3, Vector3};
 
 /// Share of a step in the one before it, below which Newton's method is as fast as it can be.
 const FAST: f64 = 0.55;
@@ -102,6 +103,45 @@ impl Series {
     #[inline(always)]
     pub(super) fn took(&mut self, taken: V2) {
         self.last.taken = taken;
+    }
+}
+
+impl Series {
+    /// What to add to a step of this length along these tangents, made from a force by a Hessian.
+    pub(super) fn corrected(
+        &mut self,
+        tangents: [V3<f64>; 2],
+        step: &Vector3<f64>,
+        length: f64,
+        force: &Vector3<f64>,
+        hessian: &Matrix3<f64>,
+    ) -> Vector3<f64> {
+        let simd = Scalar;
+        let (newton, slope) = (along(simd, tangents, (*step).into()), along(simd, tangents, (*force).into()));
+        let mut correction = Correction::default();
+        if self.may_have_to_be_corrected(newton, length) {
+            let [t, u] = tangents.map(Vector3::from);
+            // Its principal directions are those of its inverse.
+            let curvature = [t.dot(&(hessian * t)), t.dot(&(hessian * u)), u.dot(&(hessian * u))];
+            correction = self.correction(simd, tangents, (newton, slope), curvature);
+        }
+        let Correction { longer, shorter } = correction;
+        let more: Vector3<f64> = across(simd, tangents, [longer[0] + shorter[0], longer[1] + shorter[1]]).into();
+        let taken = along(simd, tangents, (step + more).into());
+        self.push(tangents, Last { newton, taken, slope, corrected: correction != Correction::default() });
+        more
+    }
+}
+
+/// Along what gradients leave to move: a plane by one, a line by two.
+pub(super) fn tangents(mut gradients: impl Iterator<Item = Vector3<f64>>) -> Option<[V3<f64>; 2]> {
+    match (gradients.next(), gradients.next(), gradients.next()) {
+        (Some(normal), None, _) => {
+            let [t, u, _] = basis(Scalar, normal.into());
+            Some([t, u])
+        }
+        (Some(one), Some(other), None) => Some([one.cross(&other).normalize().into(), [0.0; 3]]),
+        _ => None,
     }
 }
 

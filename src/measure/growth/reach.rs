@@ -13,11 +13,15 @@
 
 use crate::measure::newton::{Active, MAX_STEPS, Pace, WORTH_A_BRACKET};
 use crate::measure::options::Options;
+use crate::measure::pace::{Series, tangents};
 use crate::measure::pair::{Pair, Posed};
 use crate::measure::programs::near_boundary;
 use crate::measure::quadratic::{Jets, LONGEST, Quadratic};
 use crate::optimize::{Program, Row, Rows};
 use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, Vector3, Vector4};
+
+/// Steps after which they should no longer be cut.
+const PATIENCE: u32 = 6;
 
 /// The program in coordinates along u and across it, the same across for x and y: variables (a, p, q, b) with
 /// `x = center_a + a u + p v + q w`, `y = center_b + b u + p v + q w`, minimising b - a.
@@ -131,12 +135,12 @@ impl ReachNewton {
         before: u32,
         mut accept: impl FnMut(&Self) -> bool,
     ) -> u32 {
-        let mut pace = Pace::FIRST;
+        let (mut pace, mut series) = (Pace::FIRST, Series::default());
         for step in 1..=MAX_STEPS {
             if options.exhausted(before + step - 1) {
                 return step - 1;
             }
-            let Some(length) = self.step(pair) else {
+            let Some(length) = self.step(pair, &mut series) else {
                 // Where both are flat the system is singular, but the point at hand with its multipliers may do.
                 accept(self);
                 return step;
@@ -145,7 +149,8 @@ impl ReachNewton {
             if (length < WORTH_A_BRACKET || step % 4 == 0) && accept(self) {
                 return step;
             }
-            if pace.ends_with(length) {
+            let astray = step >= PATIENCE && length > LONGEST;
+            if astray || pace.ends_with(length) {
                 return step;
             }
         }
@@ -153,7 +158,7 @@ impl ReachNewton {
     }
 
     /// One Newton step; its length relative to the bodies, or none if it leads nowhere.
-    fn step(&mut self, pair: &Pair<'_>) -> Option<f64> {
+    fn step(&mut self, pair: &Pair<'_>, series: &mut Series) -> Option<f64> {
         let (of_a, of_b) = (Jets::new(&pair.a, &self.x), Jets::new(&pair.b, &self.y));
         let (bent_a, bent_b) = (of_a.hessian(&self.a), of_b.hessian(&self.b));
         let u = self.u;
@@ -165,17 +170,40 @@ impl ReachNewton {
             free_of_b: false,
         };
         // y moves by dx - u dρ, but how far B's constraints let dρ go is not known before.
-        let length = |dx: &Vector3<f64>| pair.a.relative_length(dx);
-        let found = program.step(self.a, self.b, length, &self.stiffness(pair, &of_a, &of_b))?;
+        let found =
+            program.step(self.a, self.b, |dx| pair.a.relative_length(dx), &self.stiffness(pair, &of_a, &of_b))?;
         let (dx, dy) = (found.v.xyz(), found.v.xyz() - u * found.v.w);
-        let length = pair.a.relative_length(&dx).max(pair.b.relative_length(&dy));
-        let share = (LONGEST / length).min(1.0);
+        let length = |dx: &Vector3<f64>, dy: &Vector3<f64>| pair.a.relative_length(dx).max(pair.b.relative_length(dy));
+        let newton = length(&dx, &dy);
+        let same = self.a.bits() == found.a.bits() && self.b.bits() == found.b.bits();
+        let gradients = |jets: &Jets, active: &Active| tangents(active.iter().map(|(i, _)| jets.jet(i).gradient));
+        // What the active constraints leave to move along, where but one is of the other body.
+        let free = match (self.a.len, self.b.len) {
+            (_, 1) => gradients(&of_a, &self.a),
+            (1, _) => gradients(&of_b, &self.b),
+            _ => None,
+        };
+        let in_series = same && (newton <= LONGEST || series.is_corrected());
+        let more = match free.filter(|_| in_series) {
+            Some(tangents) => {
+                let force = -(of_a.gradient(&self.a) + of_b.gradient(&self.b));
+                series.corrected(tangents, &dx, newton, &force, &(bent_a + bent_b))
+            }
+            None => Vector3::zeros(),
+        };
+        let (dx, dy) = (dx + more, dy + more);
+        let taken = length(&dx, &dy);
+        let share = LONGEST / taken;
+        if share < 1.0 || !in_series {
+            *series = Series::default();
+        }
+        let share = share.min(1.0);
         self.x += dx * share;
         self.y += dy * share;
         (self.a, self.b) = (found.a, found.b);
         // The linearized gradient at the new point: both bodies' are the same.
         self.n = of_a.gradient(&self.a) + bent_a * dx * share;
-        length.is_finite().then_some(length)
+        newton.is_finite().then_some(newton.min(taken))
     }
 
     /// The quadratic form of dx and dρ that is one of A of dx, and one of B of `dx - u dρ`.

@@ -9,11 +9,9 @@
 
 use crate::measure::active::MAX_ACTIVE;
 use crate::measure::newton::{Active, At, Pace, WORTH_A_BRACKET};
-use crate::measure::pace::{Correction, Last, Series, across, along};
+use crate::measure::pace::{Series, tangents};
 use crate::measure::pair::{Pair, Posed};
 use crate::measure::quadratic::{CENTER, DAMPINGS, Jets, LONGEST, MOST_BENT, Quadratic, TO_CENTER};
-use crate::measure::vector::{V3, basis};
-use crate::polynomial::Scalar;
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 /// Largest number of steps.
@@ -103,35 +101,26 @@ impl LevelNewton {
         };
         let found = program.step(self.a, self.b, length, &of_point(stiffness / scale))?;
         let dx = found.v.xyz();
-        let length = length(&dx);
-        let share = (LONGEST / length).min(1.0);
+        let newton = length(&dx);
         let same = self.a.bits() == found.a.bits() && self.b.bits() == found.b.bits();
-        let correction = match self.tangents(&of_b) {
-            Some(tangents) if same && share == 1.0 => {
-                corrected(series, tangents, &dx, length, &of_a.gradient(&self.a), &hessian)
-            }
-            _ => {
-                *series = Series::default();
-                Vector3::zeros()
-            }
+        // What the active constraints of B leave to move along, where there is but one of A.
+        let free = tangents(self.b.iter().map(|(i, _)| of_b.jet(i).gradient));
+        let in_series = self.a.len == 1 && same && (newton <= LONGEST || series.is_corrected());
+        let more = match free.filter(|_| in_series) {
+            Some(tangents) => series.corrected(tangents, &dx, newton, &-of_a.gradient(&self.a), &hessian),
+            None => Vector3::zeros(),
         };
-        self.x += dx * share + correction;
+        let dx = dx + more;
+        let taken = length(&dx);
+        let share = LONGEST / taken;
+        if share < 1.0 || !in_series {
+            *series = Series::default();
+        }
+        let share = share.min(1.0);
+        self.x += dx * share;
         *s += (found.v.w * scale - *s) * share;
         (self.a, self.b) = (found.a, found.b.scaled(scale));
-        Some(length)
-    }
-
-    /// Along what the active constraints of B leave to move, where there is but one of A.
-    fn tangents(&self, of_b: &Jets) -> Option<[V3<f64>; 2]> {
-        let mut of_b = self.b.iter().map(|(i, _)| of_b.jet(i).gradient);
-        match (self.a.len, of_b.next(), of_b.next(), of_b.next()) {
-            (1, Some(face), None, _) => {
-                let [t, u, _] = basis(Scalar, face.into());
-                Some([t, u])
-            }
-            (1, Some(face), Some(other), None) => Some([face.cross(&other).normalize().into(), [0.0; 3]]),
-            _ => None,
-        }
+        Some(newton.min(taken))
     }
 
     /// What the Hessian of A's constraints has more than that of their roots.
@@ -158,31 +147,6 @@ impl LevelNewton {
         let stiff_b = slope.norm() / pair.b.body.trust().radius;
         pair.a.metric() * stiff_a + pair.b.metric() * stiff_b
     }
-}
-
-/// What to add to a step of this length, as the steps before it along the tangents show.
-fn corrected(
-    series: &mut Series,
-    tangents: [V3<f64>; 2],
-    dx: &Vector3<f64>,
-    length: f64,
-    gradient: &Vector3<f64>,
-    hessian: &Matrix3<f64>,
-) -> Vector3<f64> {
-    let newton = along(Scalar, tangents, (*dx).into());
-    let slope = along(Scalar, tangents, (-gradient).into());
-    let mut correction = Correction::default();
-    if series.may_have_to_be_corrected(newton, length) {
-        let [t, u] = tangents.map(Vector3::from);
-        // Its principal directions are those of its inverse.
-        let curvature = [t.dot(&(hessian * t)), t.dot(&(hessian * u)), u.dot(&(hessian * u))];
-        correction = series.correction(Scalar, tangents, (newton, slope), curvature);
-    }
-    let Correction { longer, shorter } = correction;
-    let more: Vector3<f64> = across(Scalar, tangents, [longer[0] + shorter[0], longer[1] + shorter[1]]).into();
-    let taken = along(Scalar, tangents, (dx + more).into());
-    series.push(tangents, Last { newton, taken, slope, corrected: correction != Correction::default() });
-    more
 }
 
 /// A matrix of the point's coordinates alone.
