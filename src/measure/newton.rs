@@ -14,8 +14,8 @@
 use super::active::{ActiveConstraints, MAX_ACTIVE};
 use super::bracket::Multipliers;
 use super::linear::solve;
-use super::pace::{Series, tangents};
 use super::pair::{Pair, Posed};
+use super::series::{Series, Taken, tangents};
 use super::smooth::LONGEST;
 use super::warm::ActiveSet;
 use nalgebra::{Matrix3, Vector3};
@@ -356,27 +356,13 @@ impl DistanceNewton {
         let dy = moved * dx - n * d[3] + of_a * distance + offset;
         // Of corners that stay where they are the normal turns.
         let dn = -(n + a.sum) - a.hessian * dx - of_a;
-        let length = |dx: &Vector3<f64>, dy: &Vector3<f64>| pair.a.relative_length(dx).max(pair.b.relative_length(dy));
-        let newton = length(&dx, &dy);
-        // What the active constraints leave to move along, where but one is of the other body.
-        let free = match (la, lb) {
-            (_, 1) => tangents(a.gradient[..la].iter().copied()),
-            (1, _) => tangents(b.gradient[..lb].iter().copied()),
-            _ => None,
-        };
-        let in_series = newton <= LONGEST || series.is_corrected();
-        let more = match free.filter(|_| in_series) {
-            Some(tangents) => series.corrected(tangents, &dx, newton, &-(a.sum + b.sum), &(a.hessian + b.hessian)),
-            None => Vector3::zeros(),
-        };
-        let (dx, dy, dn) = (dx + more, dy + more, dn - a.hessian * more);
-        let taken = length(&dx, &dy);
-        let length = newton.min(taken);
+        let free = tangents(&a.gradient[..la], &b.gradient[..lb]);
+        let (force, bent) = (-(a.sum + b.sum), a.hessian + b.hessian);
         // A longer step leaves where the linearization means anything.
-        let damping = (LONGEST / taken).min(1.0);
-        if damping < 1.0 || !in_series {
-            *series = Series::default();
-        }
+        let Taken { more, share: damping, length } = series.take(free, &dx, (&force, &bent), LONGEST, |more| {
+            pair.a.relative_length(&(dx + more)).max(pair.b.relative_length(&(dy + more)))
+        });
+        let (dx, dy, dn) = (dx + more, dy + more, dn - a.hessian * more);
         self.x += dx * damping;
         self.y += dy * damping;
         self.n += dn * damping;

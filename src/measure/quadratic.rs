@@ -10,6 +10,7 @@
 //! left (a primal-dual active-set method; Nocedal and Wright, Numerical optimization, 2006,
 //! chapter 16 and 18).
 
+use super::active::MAX_ACTIVE;
 use super::linear::{Augmented, MAX_UNKNOWNS, solve};
 use super::newton::Active;
 use super::pair::Posed;
@@ -67,6 +68,13 @@ impl Jets {
     /// A constraint.
     pub(super) fn jet(&self, i: usize) -> &Jet {
         &self.jets[i]
+    }
+
+    /// The active gradients; beyond those zeros.
+    pub(super) fn gradients(&self, active: &Active) -> [Vector3<f64>; MAX_ACTIVE] {
+        let mut gradients = [Vector3::zeros(); MAX_ACTIVE];
+        active.iter().zip(&mut gradients).for_each(|((i, _), gradient)| *gradient = self.jets[i].gradient);
+        gradients
     }
 
     /// Sum of the active gradients, weighted by their multipliers.

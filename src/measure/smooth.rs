@@ -7,9 +7,9 @@
 
 use super::drift::Drift;
 use super::options::Options;
-use super::pace::{Correction, Last, Series};
 use super::pose::Pose;
 use super::relation::{Relation, Verdict};
+use super::series::{Correction, Last, Series};
 use super::start::{Start, middle};
 use super::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, Response, Side, Step, bracket, moved, newton};
 use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, subtract};

@@ -13,10 +13,10 @@
 
 use crate::measure::newton::{Active, MAX_STEPS, Pace, WORTH_A_BRACKET};
 use crate::measure::options::Options;
-use crate::measure::pace::{Series, tangents};
 use crate::measure::pair::{Pair, Posed};
 use crate::measure::programs::near_boundary;
 use crate::measure::quadratic::{Jets, LONGEST, Quadratic};
+use crate::measure::series::{Series, Taken, tangents};
 use crate::optimize::{Program, Row, Rows};
 use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, Vector3, Vector4};
 
@@ -173,37 +173,20 @@ impl ReachNewton {
         let found =
             program.step(self.a, self.b, |dx| pair.a.relative_length(dx), &self.stiffness(pair, &of_a, &of_b))?;
         let (dx, dy) = (found.v.xyz(), found.v.xyz() - u * found.v.w);
-        let length = |dx: &Vector3<f64>, dy: &Vector3<f64>| pair.a.relative_length(dx).max(pair.b.relative_length(dy));
-        let newton = length(&dx, &dy);
         let same = self.a.bits() == found.a.bits() && self.b.bits() == found.b.bits();
-        let gradients = |jets: &Jets, active: &Active| tangents(active.iter().map(|(i, _)| jets.jet(i).gradient));
-        // What the active constraints leave to move along, where but one is of the other body.
-        let free = match (self.a.len, self.b.len) {
-            (_, 1) => gradients(&of_a, &self.a),
-            (1, _) => gradients(&of_b, &self.b),
-            _ => None,
-        };
-        let in_series = same && (newton <= LONGEST || series.is_corrected());
-        let more = match free.filter(|_| in_series) {
-            Some(tangents) => {
-                let force = -(of_a.gradient(&self.a) + of_b.gradient(&self.b));
-                series.corrected(tangents, &dx, newton, &force, &(bent_a + bent_b))
-            }
-            None => Vector3::zeros(),
-        };
-        let (dx, dy) = (dx + more, dy + more);
-        let taken = length(&dx, &dy);
-        let share = LONGEST / taken;
-        if share < 1.0 || !in_series {
-            *series = Series::default();
-        }
-        let share = share.min(1.0);
-        self.x += dx * share;
-        self.y += dy * share;
+        let free = tangents(&of_a.gradients(&self.a)[..self.a.len], &of_b.gradients(&self.b)[..self.b.len]);
+        let force = -(of_a.gradient(&self.a) + of_b.gradient(&self.b));
+        let Taken { more, share, length } =
+            series.take(free.filter(|_| same), &dx, (&force, &(bent_a + bent_b)), LONGEST, |more| {
+                pair.a.relative_length(&(dx + more)).max(pair.b.relative_length(&(dy + more)))
+            });
+        let (dx, dy) = ((dx + more) * share, (dy + more) * share);
+        self.x += dx;
+        self.y += dy;
         (self.a, self.b) = (found.a, found.b);
         // The linearized gradient at the new point: both bodies' are the same.
-        self.n = of_a.gradient(&self.a) + bent_a * dx * share;
-        newton.is_finite().then_some(newton.min(taken))
+        self.n = of_a.gradient(&self.a) + bent_a * dx;
+        length.is_finite().then_some(length)
     }
 
     /// The quadratic form of dx and dρ that is one of A of dx, and one of B of `dx - u dρ`.

@@ -9,9 +9,9 @@
 
 use crate::measure::active::MAX_ACTIVE;
 use crate::measure::newton::{Active, At, Pace, WORTH_A_BRACKET};
-use crate::measure::pace::{Series, tangents};
 use crate::measure::pair::{Pair, Posed};
 use crate::measure::quadratic::{CENTER, DAMPINGS, Jets, LONGEST, MOST_BENT, Quadratic, TO_CENTER};
+use crate::measure::series::{Series, Taken, tangents};
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 /// Largest number of steps.
@@ -101,26 +101,17 @@ impl LevelNewton {
         };
         let found = program.step(self.a, self.b, length, &of_point(stiffness / scale))?;
         let dx = found.v.xyz();
-        let newton = length(&dx);
         let same = self.a.bits() == found.a.bits() && self.b.bits() == found.b.bits();
-        // What the active constraints of B leave to move along, where there is but one of A.
-        let free = tangents(self.b.iter().map(|(i, _)| of_b.jet(i).gradient));
-        let in_series = self.a.len == 1 && same && (newton <= LONGEST || series.is_corrected());
-        let more = match free.filter(|_| in_series) {
-            Some(tangents) => series.corrected(tangents, &dx, newton, &-of_a.gradient(&self.a), &hessian),
-            None => Vector3::zeros(),
-        };
-        let dx = dx + more;
-        let taken = length(&dx);
-        let share = LONGEST / taken;
-        if share < 1.0 || !in_series {
-            *series = Series::default();
-        }
-        let share = share.min(1.0);
-        self.x += dx * share;
+        // Of several constraints of A only the differences are held.
+        let free = tangents(&of_b.gradients(&self.b)[..self.b.len], &of_a.gradients(&self.a)[..self.a.len]);
+        let free = free.filter(|_| same && self.a.len == 1);
+        let force = -of_a.gradient(&self.a);
+        let Taken { more, share, length } =
+            series.take(free, &dx, (&force, &hessian), LONGEST, |more| length(&(dx + more)));
+        self.x += (dx + more) * share;
         *s += (found.v.w * scale - *s) * share;
         (self.a, self.b) = (found.a, found.b.scaled(scale));
-        Some(newton.min(taken))
+        Some(length)
     }
 
     /// What the Hessian of A's constraints has more than that of their roots.

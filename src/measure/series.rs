@@ -104,11 +104,34 @@ impl Series {
     pub(super) fn took(&mut self, taken: V2) {
         self.last.taken = taken;
     }
-}
 
-impl Series {
-    /// What to add to a step of this length along these tangents, made from a force by a Hessian.
-    pub(super) fn corrected(
+    /// What to take of a step that is made from a force by a Hessian: no more than is this long by `length`, which measures the step with
+    /// what is added to it. Without tangents to move along, or where a step leads out of the series, that ends and nothing is added.
+    pub(super) fn take(
+        &mut self,
+        tangents: Option<[V3<f64>; 2]>,
+        step: &Vector3<f64>,
+        (force, hessian): (&Vector3<f64>, &Matrix3<f64>),
+        longest: f64,
+        length: impl Fn(&Vector3<f64>) -> f64,
+    ) -> Taken {
+        let newton = length(&Vector3::zeros());
+        let more = match tangents.filter(|_| newton <= longest || self.is_corrected()) {
+            Some(tangents) => self.corrected(tangents, step, newton, force, hessian),
+            None => {
+                *self = Self::default();
+                Vector3::zeros()
+            }
+        };
+        let taken = length(&more);
+        if taken > longest {
+            *self = Self::default();
+        }
+        Taken { more, share: (longest / taken).min(1.0), length: newton.min(taken) }
+    }
+
+    /// What to add to a step of this length along these tangents.
+    fn corrected(
         &mut self,
         tangents: [V3<f64>; 2],
         step: &Vector3<f64>,
@@ -133,14 +156,24 @@ impl Series {
     }
 }
 
-/// Along what gradients leave to move: a plane by one, a line by two.
-pub(super) fn tangents(mut gradients: impl Iterator<Item = Vector3<f64>>) -> Option<[V3<f64>; 2]> {
-    match (gradients.next(), gradients.next(), gradients.next()) {
-        (Some(normal), None, _) => {
-            let [t, u, _] = basis(Scalar, normal.into());
+/// What is taken of a step.
+pub(super) struct Taken {
+    /// What is added to all of it.
+    pub(super) more: Vector3<f64>,
+    /// The part of the sum that is taken.
+    pub(super) share: f64,
+    /// Length of the step, or of that sum where it is shorter.
+    pub(super) length: f64,
+}
+
+/// Along what the active gradients of one body leave to move, a plane by one and a line by two, where there is but one of the other body.
+pub(super) fn tangents(of_a: &[Vector3<f64>], of_b: &[Vector3<f64>]) -> Option<[V3<f64>; 2]> {
+    match (of_a, of_b) {
+        ([normal], [_]) => {
+            let [t, u, _] = basis(Scalar, (*normal).into());
             Some([t, u])
         }
-        (Some(one), Some(other), None) => Some([one.cross(&other).normalize().into(), [0.0; 3]]),
+        ([one, other], [_]) | ([_], [one, other]) => Some([one.cross(other).try_normalize(0.0)?.into(), [0.0; 3]]),
         _ => None,
     }
 }
