@@ -206,7 +206,7 @@ impl Site<'_> {
         let Some(verdict) = answer.verdict((self.a, self.pose_a), (self.b, self.pose_b)) else { return };
         let tell = || format!("truth {:e}: {}", verdict.truth, self.tell(answer));
         tally.check(Check::Truth, verdict.inside, self.block, self.query, tell);
-        tally.check(Check::Sharp, verdict.sharp, self.block, self.query, tell);
+        tally.check(Check::Decided, verdict.decided, self.block, self.query, tell);
     }
 
     #[cfg(feature = "fit")]

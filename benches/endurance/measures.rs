@@ -21,7 +21,7 @@ pub(crate) struct Verdict {
     /// Whether the bracket contains the truth.
     pub(crate) inside: bool,
     /// Whether the reference is sharp enough to say so.
-    pub(crate) sharp: bool,
+    pub(crate) decided: bool,
     pub(crate) truth: f64,
 }
 
@@ -113,11 +113,12 @@ impl Answer {
             Answer::Distance(answer) => {
                 let truth = reference::distance(a.0, a.1, b.0, b.1, answer);
                 let small = a.0.circumscribed().radius.min(b.0.circumscribed().radius);
-                Verdict { inside: truth.inside(answer), sharp: truth.width() <= 1e-16 * small, truth: truth.value() }
+                let decided = truth.decides(answer, 1e-16 * small);
+                Verdict { inside: truth.inside(answer), decided, truth: truth.value() }
             }
             Answer::Level(answer) => {
                 let truth = reference::level_distance(a.0, a.1, b.0, b.1, answer);
-                Verdict { inside: truth.inside(answer), sharp: truth.width() <= 1e-16, truth: truth.value() }
+                Verdict { inside: truth.inside(answer), decided: truth.width() <= 1e-16, truth: truth.value() }
             }
             Answer::Growth(answer) => {
                 // Where the centres coincide the answer is 0 and has no normal.
@@ -125,7 +126,7 @@ impl Answer {
                 let centres = (a.0.growth_ball().center, b.0.growth_ball().center);
                 let truth = growth::growth_distance((a.0, a.1, &centres.0), (b.0, b.1, &centres.1), &start)?;
                 let inside = truth.lower <= big(answer.upper) && big(answer.lower) <= truth.upper;
-                Verdict { inside, sharp: truth.width() <= 1e-16 * truth.value().max(1.0), truth: truth.value() }
+                Verdict { inside, decided: truth.width() <= 1e-16 * truth.value().max(1.0), truth: truth.value() }
             }
         })
     }

@@ -70,7 +70,7 @@ pub(crate) enum Check {
     Meet,
     Feasible,
     Truth,
-    Sharp,
+    Decided,
     Solved,
     Agrees,
 }
@@ -85,7 +85,7 @@ impl Check {
             Check::Meet => "brackets of the same poses from another start meet",
             Check::Feasible => "witnesses feasible",
             Check::Truth => "truth with 200 bits in the bracket",
-            Check::Sharp => "reference sharp",
+            Check::Decided => "reference decides",
             Check::Solved => "semidefinite program solved",
             Check::Agrees => "semidefinite program agrees to 1e-6",
         }

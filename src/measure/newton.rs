@@ -162,15 +162,6 @@ impl Active {
         self.multiplier.swap(k, self.len);
     }
 
-    /// Drops the constraint with the most negative multiplier, be it the last one; whether there was one.
-    pub(super) fn drop_pulling(&mut self) -> bool {
-        let last = self.len == 1 && self.multiplier[0] < 0.0;
-        if last {
-            self.len = 0;
-        }
-        last || self.drop_negative()
-    }
-
     /// Least-squares multipliers of `Σ λ_i ∇g_i = target` at v. False if the gradients are dependent.
     pub(super) fn fit(&mut self, body: &Posed<'_>, v: &Vector3<f64>, target: &Vector3<f64>) -> bool {
         let gradients: [Vector3<f64>; MAX_ACTIVE] =

@@ -5,10 +5,10 @@
 //! min  c·v + vᵀ H v / 2   subject to   g_i·v <= r_i   for the constraints of A and of B
 //! ```
 //!
-//! From a guess of what is active the equations of its optimality are solved; what then pulls the wrong way is dropped, what is
-//! violated is added, where four are active already in place of the one that the dual simplex method gives up, until none is
-//! left (a primal-dual active-set method; Nocedal and Wright, Numerical optimization, 2006,
-//! chapter 16 and 18).
+//! From a guess of what is active the equations of its optimality are solved, and what then pulls the wrong way is dropped. After
+//! that all pull the right way: what is violated is taken, and of the others those go whose multipliers vanish as that of the
+//! new one rises, until none is violated (Goldfarb and Idnani, A numerically stable dual method for solving strictly convex
+//! quadratic programs, 1983).
 
 use super::active::MAX_ACTIVE;
 use super::linear::{Augmented, MAX_UNKNOWNS, solve};
@@ -25,7 +25,10 @@ const VARIABLES: usize = 4;
 const MAX_CHANGES: usize = 8;
 
 /// Violation of a constraint, relative to its scale, that counts as none.
-const VIOLATED: f64 = 1e-10;
+const VIOLATED: f64 = 1e-12;
+
+/// Sine of the angle between a gradient and a sum of others that makes another one of it, where no equations do.
+const APART: f64 = 1e-4;
 
 /// How much of a stiffness, what the Hessian is of such values over such lengths, is added to it until a step is short enough for it
 /// to mean something where the step leads (Levenberg and Marquardt).
@@ -104,10 +107,10 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// The constraint that is not active and that v violates most.
-    fn violated(&self, active: &Active, v: &Vector4<f64>) -> Option<usize> {
+    /// The constraint that v violates most, of those that may count.
+    fn violated(&self, v: &Vector4<f64>, counts: impl Fn(usize) -> bool) -> Option<usize> {
         (0..self.len)
-            .filter(|i| !active.index[..active.len].contains(i))
+            .filter(|&i| counts(i))
             .map(|i| (i, self.rows[i].0.dot(v) - self.rows[i].1))
             .filter(|(_, excess)| *excess > VIOLATED * self.scale)
             .max_by(|p, q| p.1.total_cmp(&q.1))
@@ -131,6 +134,31 @@ pub(super) struct Solution {
     pub(super) v: Vector4<f64>,
     pub(super) a: Active,
     pub(super) b: Active,
+}
+
+/// Active constraints of both bodies with their multipliers, one more than determine a point. Those of B are numbered on from A's.
+#[derive(Clone, Copy, Default)]
+struct Working {
+    index: [usize; VARIABLES + 1],
+    multiplier: [f64; VARIABLES + 1],
+    len: usize,
+}
+
+impl Working {
+    fn push(&mut self, index: usize) {
+        (self.index[self.len], self.multiplier[self.len]) = (index, 0.0);
+        self.len += 1;
+    }
+
+    fn remove(&mut self, k: usize) {
+        self.index.copy_within(k + 1..self.len, k);
+        self.multiplier.copy_within(k + 1..self.len, k);
+        self.len -= 1;
+    }
+
+    fn index(&self) -> &[usize] {
+        &self.index[..self.len]
+    }
 }
 
 impl Quadratic {
@@ -173,85 +201,139 @@ impl Quadratic {
         while a.len + b.len > VARIABLES {
             if a.len > b.len { a.len -= 1 } else { b.len -= 1 }
         }
-        for changes in 0..=MAX_CHANGES {
-            let v = self.equations(&mut a, &mut b)?;
-            let changed = changes < MAX_CHANGES
-                && (a.drop_negative()
-                    || (if self.free_of_b { b.drop_pulling() } else { b.drop_negative() })
-                    || self.take_violated(&mut a, &mut b, &v));
-            if !changed {
-                return Some(Solution { v, a, b });
+        let mut active = Working::default();
+        a.iter().for_each(|(i, _)| active.push(i));
+        b.iter().for_each(|(i, _)| active.push(self.a.len + i));
+        let mut v = self.equations(&mut active)?;
+        for _ in 0..MAX_CHANGES {
+            let pulling = (0..active.len).filter(|&k| active.multiplier[k] < 0.0 && self.may_lose(&active, k));
+            if let Some(k) = pulling.min_by(|&i, &j| active.multiplier[i].total_cmp(&active.multiplier[j])) {
+                active.remove(k);
+                v = self.equations(&mut active)?;
+                continue;
+            }
+            let of_a = || self.a.violated(&v, |i| !active.index().contains(&i));
+            let of_b = || Some(self.a.len + self.b.violated(&v, |i| !active.index().contains(&(self.a.len + i)))?);
+            let take = |new| self.take(new, active);
+            match of_a().and_then(take).or_else(|| of_b().and_then(take)) {
+                Some(next) => (active, v) = next,
+                None => return Some(self.solution(v, &active)),
             }
         }
         None
     }
 
-    /// Takes the constraint of A that v violates most, or else that of B; whether there is one and room for it.
-    fn take_violated(&self, a: &mut Active, b: &mut Active, v: &Vector4<f64>) -> bool {
-        if let Some(i) = self.a.violated(a, v)
-            && let Some((mut of_a, of_b)) = self.with_room(*a, *b, &self.a.rows[i].0)
-            && of_a.push(i)
-        {
-            (*a, *b) = (of_a, of_b);
-            return true;
+    /// What is active with one more constraint, and the point: until that is satisfied its multiplier rises, those of the others
+    /// change with it, and the first of them to vanish goes. None if none of them does that has to, or there are too many of the body.
+    fn take(&self, new: usize, mut active: Working) -> Option<(Working, Vector4<f64>)> {
+        active.push(new);
+        if self.of_one_body(&active, new) > MAX_ACTIVE {
+            return None;
         }
-        if let Some(i) = self.b.violated(b, v)
-            && let Some((of_a, mut of_b)) = self.with_room(*a, *b, &self.b.rows[i].0)
-            && of_b.push(i)
-        {
-            (*a, *b) = (of_a, of_b);
-            return true;
+        loop {
+            let mut then = active;
+            let solved = if active.len > VARIABLES { None } else { self.equations(&mut then) };
+            // Of a gradient that is a sum of the others' the multiplier rises without bound.
+            if solved.is_none() {
+                then = self.exchanged(active)?;
+            }
+            let others = (0..active.len - 1).filter(|&k| self.may_lose(&active, k));
+            let vanishing = others.filter_map(|k| {
+                let (now, then) = (active.multiplier[k], then.multiplier[k]);
+                let vanishes = then < if solved.is_some() { 0.0 } else { now };
+                vanishes.then(|| (k, now.max(0.0) / (now - then)))
+            });
+            let Some((first, share)) = vanishing.min_by(|p, q| p.1.total_cmp(&q.1)) else {
+                return solved.map(|v| (then, v));
+            };
+            let both = active.multiplier.iter_mut().zip(then.multiplier);
+            both.for_each(|(now, then)| *now += share * (then - *now));
+            active.remove(first);
         }
-        false
     }
 
-    /// The active constraints without one, where they determine the point: that whose multiplier is the first to vanish as the one of
-    /// the new gradient rises (the dual simplex method).
-    fn with_room(&self, mut a: Active, mut b: Active, new: &Vector4<f64>) -> Option<(Active, Active)> {
-        if a.len + b.len < VARIABLES {
-            return Some((a, b));
+    /// The multipliers as the last one rises by 1, whose gradient is a sum of the others'; none if it is not.
+    fn exchanged(&self, mut active: Working) -> Option<Working> {
+        let last = active.len - 1;
+        let gradients: [Vector4<f64>; VARIABLES + 1] =
+            std::array::from_fn(|k| if k <= last { self.row(active.index[k]).0 } else { Vector4::zeros() });
+        let (shares, rest) = least_squares(&gradients[..last], &gradients[last]);
+        (0..last).for_each(|k| active.multiplier[k] -= shares[k]);
+        active.multiplier[last] += 1.0;
+        (rest.norm() <= APART * gradients[last].norm()).then_some(active)
+    }
+
+    /// Whether the program has a solution without this one of the active constraints.
+    fn may_lose(&self, active: &Working, k: usize) -> bool {
+        let of_b = active.index[k] >= self.a.len;
+        of_b && self.free_of_b || self.of_one_body(active, active.index[k]) > 1
+    }
+
+    /// How many of the active constraints are of the body of one.
+    fn of_one_body(&self, active: &Working, one: usize) -> usize {
+        active.index().iter().filter(|&&i| (i < self.a.len) == (one < self.a.len)).count()
+    }
+
+    /// A constraint by its number.
+    fn row(&self, i: usize) -> &(Vector4<f64>, f64) {
+        if i < self.a.len { &self.a.rows[i] } else { &self.b.rows[i - self.a.len] }
+    }
+
+    /// A point with what is active there.
+    fn solution(&self, v: Vector4<f64>, active: &Working) -> Solution {
+        let (mut a, mut b) = (Active::default(), Active::default());
+        for (&i, &multiplier) in active.index().iter().zip(&active.multiplier) {
+            let (set, i) = if i < self.a.len { (&mut a, i) } else { (&mut b, i - self.a.len) };
+            if set.push(i) {
+                set.multiplier[set.len - 1] = multiplier;
+            }
         }
-        // The new gradient as a sum of the active ones.
-        let mut m = [[0.0; VARIABLES + 1]; VARIABLES];
-        let rows = a.iter().map(|(i, _)| &self.a.rows[i]).chain(b.iter().map(|(i, _)| &self.b.rows[i]));
-        for (k, (gradient, _)) in rows.enumerate() {
-            (0..VARIABLES).for_each(|i| m[i][k] = gradient[i]);
-        }
-        (0..VARIABLES).for_each(|i| m[i][VARIABLES] = new[i]);
-        let shares = solve(&mut m, VARIABLES)?;
-        let multipliers = a.multiplier[..a.len].iter().chain(&b.multiplier[..b.len]);
-        let vanishing = multipliers.zip(shares).enumerate().filter(|(_, (_, share))| *share > 0.0);
-        let ratios = vanishing.map(|(k, (multiplier, share))| (k, multiplier / share));
-        let (first, _) = ratios.min_by(|p, q| p.1.total_cmp(&q.1))?;
-        if first < a.len {
-            a.remove(first);
-        } else {
-            b.remove(first - a.len);
-        }
-        Some((a, b))
+        Solution { v, a, b }
     }
 
     /// Solves the equations of optimality with the active constraints, which get their multipliers.
-    fn equations(&self, a: &mut Active, b: &mut Active) -> Option<Vector4<f64>> {
+    fn equations(&self, active: &mut Working) -> Option<Vector4<f64>> {
         let mut m: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
-        let size = 4 + a.len + b.len;
-        for i in 0..4 {
-            (0..4).for_each(|j| m[i][j] = self.hessian[(i, j)]);
+        let size = VARIABLES + active.len;
+        for i in 0..VARIABLES {
+            (0..VARIABLES).for_each(|j| m[i][j] = self.hessian[(i, j)]);
             m[i][size] = -self.cost[i];
         }
-        let rows = a.iter().map(|(i, _)| &self.a.rows[i]).chain(b.iter().map(|(i, _)| &self.b.rows[i]));
-        for (k, (gradient, room)) in rows.enumerate() {
-            for i in 0..4 {
-                m[i][4 + k] = gradient[i];
-                m[4 + k][i] = gradient[i];
+        for (k, &index) in active.index().iter().enumerate() {
+            let (gradient, room) = self.row(index);
+            for i in 0..VARIABLES {
+                m[i][VARIABLES + k] = gradient[i];
+                m[VARIABLES + k][i] = gradient[i];
             }
-            m[4 + k][size] = *room;
+            m[VARIABLES + k][size] = *room;
         }
         let solution = solve(&mut m, size)?;
-        a.multiplier[..a.len].copy_from_slice(&solution[4..4 + a.len]);
-        b.multiplier[..b.len].copy_from_slice(&solution[4 + a.len..size]);
-        Some(Vector4::from_row_slice(&solution[..4]))
+        active.multiplier[..active.len].copy_from_slice(&solution[VARIABLES..size]);
+        Some(Vector4::from_row_slice(&solution[..VARIABLES]))
     }
+}
+
+/// The shares of independent vectors in the sum of them that comes nearest to another, and what that leaves (the modified method of
+/// Gram and Schmidt; Golub and Van Loan, Matrix computations, 2013, section 5.2.8).
+fn least_squares(vectors: &[Vector4<f64>], of: &Vector4<f64>) -> ([f64; VARIABLES], Vector4<f64>) {
+    let (mut directions, mut upper) = ([Vector4::zeros(); VARIABLES], Matrix4::zeros());
+    let (mut shares, mut rest) = ([0.0; VARIABLES], *of);
+    for (k, vector) in vectors.iter().enumerate() {
+        let mut left = *vector;
+        for i in 0..k {
+            upper[(i, k)] = directions[i].dot(&left);
+            left -= directions[i] * upper[(i, k)];
+        }
+        upper[(k, k)] = left.norm();
+        directions[k] = left / upper[(k, k)];
+        shares[k] = directions[k].dot(&rest);
+        rest -= directions[k] * shares[k];
+    }
+    for k in (0..vectors.len()).rev() {
+        let known: f64 = (k + 1..vectors.len()).map(|j| upper[(k, j)] * shares[j]).sum();
+        shares[k] = (shares[k] - known) / upper[(k, k)];
+    }
+    (shares, rest)
 }
 
 #[cfg(test)]
@@ -259,33 +341,35 @@ mod tests {
     use super::*;
     use crate::polynomial::tests::Seeded;
 
-    /// Random programs with a bounded solution: `-t` under planes around a point, as many of A as of B.
-    fn random_rows(random: &mut Seeded, slope: f64) -> Rows {
+    /// Planes around a point, `-t` as well as they: for every seed some that are the same as others but for a hair.
+    fn random_rows(random: &mut Seeded, slope: f64, others: &[(Vector4<f64>, f64)]) -> Rows {
         let mut rows = Rows { rows: [(Vector4::zeros(), 0.0); MAX_CONSTRAINTS], len: 4, scale: 1.0 };
-        for row in &mut rows.rows[..4] {
+        for k in 0..4 {
             let g = Vector3::from_fn(|_, _| random.signed());
-            *row = (g.push(slope), 0.1 + random.signed().abs());
+            rows.rows[k] = (g.push(slope), 0.1 + random.signed().abs());
+            let (same, hair) = (random.next() % 8, 10_f64.powi(-((random.next() % 16) as i32)));
+            let twin = if same < 4 { rows.rows[..k].get(same as usize) } else { others.get(same as usize - 4) };
+            if let Some((twin, room)) = twin.copied() {
+                let tilted = twin.xyz() + g * hair;
+                rows.rows[k] = (tilted.push(slope), room + random.signed() * hair);
+            }
         }
         rows
     }
 
     #[test]
     fn solutions_are_optimal() {
-        let mut solved = 0;
-        for seed in 0..2_000 {
+        let (mut solved, mut crowded) = (0, 0);
+        for seed in 0..20_000 {
             let mut random = Seeded(seed);
             let root = Matrix3::from_fn(|_, _| random.signed());
             let curvature = root * root.transpose() + Matrix3::identity() * 0.1;
             let mut hessian = Matrix4::zeros();
             hessian.fixed_view_mut::<3, 3>(0, 0).copy_from(&curvature);
             // The least t that no constraint of A exceeds, within those of B.
-            let program = Quadratic {
-                hessian,
-                cost: Vector4::w(),
-                a: random_rows(&mut random, -1.0),
-                b: random_rows(&mut random, 0.0),
-                free_of_b: true,
-            };
+            let a = random_rows(&mut random, -1.0, &[]);
+            let b = random_rows(&mut random, 0.0, &a.rows[..4]);
+            let program = Quadratic { hessian, cost: Vector4::w(), a, b, free_of_b: true };
             let (mut a, mut b) = (Active::default(), Active::default());
             a.push((random.next() % 4) as usize);
             b.push((random.next() % 4) as usize);
@@ -293,7 +377,7 @@ mod tests {
             let all = |rows: &Rows| rows.rows[..4].iter().map(|(g, r)| g.dot(&found.v) - r).fold(f64::MIN, f64::max);
             let pulling = found.a.iter().chain(found.b.iter()).any(|(_, multiplier)| multiplier < 0.0);
             if all(&program.a).max(all(&program.b)) > 1e-9 || pulling {
-                // Gone round in circles until the last change.
+                crowded += u32::from(found.a.len.max(found.b.len) == MAX_ACTIVE);
                 continue;
             }
             solved += 1;
@@ -303,9 +387,10 @@ mod tests {
             };
             let balance =
                 program.hessian * found.v + program.cost + of(&program.a, &found.a) + of(&program.b, &found.b);
-            assert!(balance.norm() < 1e-9, "seed {seed}: {balance}");
+            let largest = found.a.iter().chain(found.b.iter()).map(|(_, multiplier)| multiplier).fold(1.0, f64::max);
+            assert!(balance.norm() < 1e-9 * largest, "seed {seed}: {balance}");
         }
-        // The others went round in circles, or had more active constraints than the method keeps.
-        assert!(solved > 1_700, "{solved}");
+        // The others had more active constraints of one body than the method keeps.
+        assert!(solved > 18_000 && solved + crowded > 19_990, "{solved} solved, {crowded} crowded");
     }
 }

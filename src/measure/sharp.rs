@@ -258,7 +258,11 @@ impl<'a> SharpPair<'a> {
             for (k, value) in values_a[..la].iter().chain(&values_b[..lb]).enumerate() {
                 m[7 + k][size] = (Two::from(1.0) - *value).double();
             }
-            let Some(step_) = equilibrated(&mut m, size) else { return step };
+            let Some(step_) = equilibrated(&mut m, size) else {
+                // Where both are flat the point at hand may do.
+                accept(&self.distance_bracket(&x, &y, &of_a, &of_b));
+                return step;
+            };
             let (dx, dy) = (Vector3::from_row_slice(&step_[..3]), Vector3::from_row_slice(&step_[3..6]));
             let length = dx.norm().max(dy.norm());
             let damping = (0.5 * self.small / length).min(1.0);
@@ -340,7 +344,10 @@ impl<'a> SharpPair<'a> {
             for (k, value) in values_b[..lb].iter().enumerate() {
                 m[4 + la + k][size] = (Two::from(1.0) - *value).double();
             }
-            let Some(step_) = equilibrated(&mut m, size) else { return step };
+            let Some(step_) = equilibrated(&mut m, size) else {
+                accept(&self.level_bracket(&x, &of_a, &of_b));
+                return step;
+            };
             let dx = Vector3::from_row_slice(&step_[..3]);
             let length = dx.norm();
             let damping = (0.5 * self.small / length).min(1.0);

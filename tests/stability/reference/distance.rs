@@ -44,6 +44,12 @@ impl Truth {
         big(answer.lower) <= self.lower && self.upper <= big(answer.upper)
     }
 
+    /// Whether it tells the answer right from wrong: as sharp as this share of the size, or, as between flush faces, with all that
+    /// it may be in the answer's bracket, which proves as much.
+    pub(crate) fn decides(&self, answer: &Distance, sharp: f64) -> bool {
+        self.width() <= sharp || self.all_inside(answer)
+    }
+
     pub(crate) fn normal(&self) -> Vector3<f64> {
         doubles(&self.normal)
     }
