@@ -218,6 +218,9 @@ const AT: f64 = 0.1;
 /// Largest number of Newton steps and of changes of the active set.
 pub(super) const MAX_STEPS: u32 = 16;
 
+/// Steps after which they should no longer be cut, whatever was active before.
+pub(super) const PATIENCE: u32 = 6;
+
 /// Longest Newton step, relative to the bodies, after which a bracket may be narrow: what remains is about its square.
 pub(super) const WORTH_A_BRACKET: f64 = 1e-3;
 
@@ -284,7 +287,8 @@ impl DistanceNewton {
                     continue;
                 }
             }
-            if pace.ends_with(length) {
+            let astray = step >= PATIENCE && length > LONGEST;
+            if astray || pace.ends_with(length) {
                 return step;
             }
         }

@@ -24,7 +24,7 @@ const VARIABLES: usize = 4;
 /// Most changes of the guess.
 const MAX_CHANGES: usize = 8;
 
-/// Violation of a constraint, relative to its scale, that counts as none.
+/// Violation of a constraint, relative to its scale and to its right side, that counts as none.
 const VIOLATED: f64 = 1e-12;
 
 /// Sine of the angle between a gradient and a sum of others that makes another one of it, where no equations do.
@@ -112,7 +112,7 @@ impl Rows {
         (0..self.len)
             .filter(|&i| counts(i))
             .map(|i| (i, self.rows[i].0.dot(v) - self.rows[i].1))
-            .filter(|(_, excess)| *excess > VIOLATED * self.scale)
+            .filter(|(i, excess)| *excess > VIOLATED * self.scale.max(self.rows[*i].1.abs()))
             .max_by(|p, q| p.1.total_cmp(&q.1))
             .map(|(i, _)| i)
     }
@@ -217,19 +217,16 @@ impl Quadratic {
             let take = |new| self.take(new, active);
             match of_a().and_then(take).or_else(|| of_b().and_then(take)) {
                 Some(next) => (active, v) = next,
-                None => return Some(self.solution(v, &active)),
+                None => break,
             }
         }
-        None
+        Some(self.solution(v, &active))
     }
 
     /// What is active with one more constraint, and the point: until that is satisfied its multiplier rises, those of the others
     /// change with it, and the first of them to vanish goes. None if none of them does that has to, or there are too many of the body.
     fn take(&self, new: usize, mut active: Working) -> Option<(Working, Vector4<f64>)> {
         active.push(new);
-        if self.of_one_body(&active, new) > MAX_ACTIVE {
-            return None;
-        }
         loop {
             let mut then = active;
             let solved = if active.len > VARIABLES { None } else { self.equations(&mut then) };
@@ -241,10 +238,10 @@ impl Quadratic {
             let vanishing = others.filter_map(|k| {
                 let (now, then) = (active.multiplier[k], then.multiplier[k]);
                 let vanishes = then < if solved.is_some() { 0.0 } else { now };
-                vanishes.then(|| (k, now.max(0.0) / (now - then)))
+                vanishes.then(|| (k, if now > 0.0 { now / (now - then) } else { 0.0 }))
             });
             let Some((first, share)) = vanishing.min_by(|p, q| p.1.total_cmp(&q.1)) else {
-                return solved.map(|v| (then, v));
+                return solved.filter(|_| self.of_one_body(&then, new) <= MAX_ACTIVE).map(|v| (then, v));
             };
             let both = active.multiplier.iter_mut().zip(then.multiplier);
             both.for_each(|(now, then)| *now += share * (then - *now));

@@ -18,7 +18,7 @@ use nalgebra::{Matrix3, Vector3};
 const FAST: f64 = 0.55;
 
 /// Length of a step relative to the bodies, beyond which steps are not of a series.
-const NEAR: f64 = 0.05;
+pub(super) const REACH: f64 = 0.05;
 
 /// Change of the step along the way, relative to that, of slopes that vanish with a power.
 const SLOW: std::ops::Range<f64> = 0.06..0.6;
@@ -63,12 +63,18 @@ pub(super) struct Series {
 }
 
 impl Series {
-    /// Whether Newton's next step, this long relative to the bodies, is not so much shorter that there is nothing to correct.
+    /// Whether Newton's next step is not so much shorter than the last that the answer is near.
+    #[inline(always)]
+    pub(super) fn is_slow(&self, newton: V2) -> bool {
+        let last = dot(self.last.newton, self.last.newton);
+        last > 0.0 && dot(newton, newton) > FAST * FAST * last
+    }
+
+    /// Whether that step, this long relative to the bodies, may have to be corrected.
     #[inline(always)]
     pub(super) fn may_have_to_be_corrected(&self, newton: V2, length: f64) -> bool {
         let last = dot(self.last.newton, self.last.newton);
-        let slow = length < NEAR && dot(newton, newton) > FAST * FAST * last;
-        last > 0.0 && (self.last.corrected || slow)
+        last > 0.0 && (self.last.corrected || length < REACH && self.is_slow(newton))
     }
 
     /// Whether the last step has been corrected.

@@ -18,6 +18,9 @@ use nalgebra::{Matrix3, Vector3};
 /// Most Newton steps: tips that are flat of order eight take a dozen for each digit.
 const MAX_STEPS: u32 = 48;
 
+/// Most changes of the active constraints: a start with more wrong ones is near no solution.
+const MAX_REVISED: u32 = 4;
+
 /// Share of the evaluation's bound in doubles that bounds one of twice the precision: both count a few hundred roundings.
 const SHARE: f64 = 1e-13;
 
@@ -242,6 +245,7 @@ impl<'a> SharpPair<'a> {
     ) -> u32 {
         let (mut x, mut y, mut d) = (twos(&start.x), twos(&start.y), Two::from(start.distance));
         let (mut of_a, mut of_b) = (SharpActive::new(&start.a), SharpActive::new(&start.b));
+        let mut revised = 0;
         for step in 1..=MAX_STEPS.min(limit) {
             let (a, sum_a, values_a) = self.a.at(&of_a, &x);
             let (b, sum_b, values_b) = self.b.at(&of_b, &y);
@@ -277,7 +281,8 @@ impl<'a> SharpPair<'a> {
                     return step;
                 }
                 let changed = of_a.revise(self.a.posed, &x, 1.0) | of_b.revise(self.b.posed, &y, 1.0);
-                if !changed && length < 1e-28 {
+                revised += u32::from(changed);
+                if revised > MAX_REVISED || !changed && length < 1e-28 {
                     return step;
                 }
             }

@@ -9,7 +9,7 @@ use super::drift::Drift;
 use super::options::Options;
 use super::pose::Pose;
 use super::relation::{Relation, Verdict};
-use super::series::{Correction, Last, Series};
+use super::series::{Correction, Last, REACH, Series};
 use super::start::{Start, middle};
 use super::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, Response, Side, Step, bracket, moved, newton};
 use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, subtract};
@@ -349,11 +349,16 @@ impl<R: Relation> Correct<'_, R> {
             let (mut step, response) =
                 self.relation.newton(simd, of_a, of_b, &at.frame, difference, flattest(self.limits));
             let near = step.within(simd, worth_a_bracket(self.limits));
-            if near {
+            // Where sides are flat the point at hand may do long before its step is short enough.
+            let local = (&local_a, &local_b);
+            let flat = series.is_slow(step.along())
+                && (series.is_corrected() || self.relative_length(simd, &step, local) < REACH);
+            if near || flat {
                 // The bracket where Newton's step leads, by extrapolation: mostly no other evaluation is needed.
-                let next_a = side_a.extrapolate(simd, &jet_a, &local_a, step.dx);
-                let next_b = side_b.extrapolate(simd, &jet_b, &local_b, step.dy);
-                let next = subtract::<S, f64>(add::<S, f64>(difference, step.dx), step.dy);
+                let (dx, dy) = if flat { ([0.0; 3], [0.0; 3]) } else { (step.dx, step.dy) };
+                let next_a = side_a.extrapolate(simd, &jet_a, &local_a, dx);
+                let next_b = side_b.extrapolate(simd, &jet_b, &local_b, dy);
+                let next = subtract::<S, f64>(add::<S, f64>(difference, dx), dy);
                 let found = bracket(simd, (side_a, &next_a), (side_b, &next_b), next);
                 let settled = step.within(simd, self.limits.map(|limit| SETTLED * limit));
                 let verdict = match self.relation.judge(simd, &found, &at.frame, next) {
@@ -363,8 +368,8 @@ impl<R: Relation> Correct<'_, R> {
                 };
                 match verdict {
                     Verdict::Proven { lower, upper } => {
-                        let x = moved::<S, f64>(at.x, add::<S, f64>(step.dx, found.to_a), &at.frame);
-                        let y = moved::<S, f64>(at.y, add::<S, f64>(step.dy, found.to_b), &at.frame);
+                        let x = moved::<S, f64>(at.x, add::<S, f64>(dx, found.to_a), &at.frame);
+                        let y = moved::<S, f64>(at.y, add::<S, f64>(dy, found.to_b), &at.frame);
                         if !(side_a.others_hold(simd, x) && side_b.others_hold(simd, y)) {
                             return Err(Lost::after(rounds));
                         }
@@ -373,8 +378,7 @@ impl<R: Relation> Correct<'_, R> {
                         let (active, multipliers) = (trace.active, found.multipliers);
                         return Ok(Proven { lower, upper, x, y, n, active, multipliers, rounds });
                     }
-                    Verdict::Wide => {}
-                    Verdict::Overlap => {
+                    Verdict::Overlap if near => {
                         let middle = self.middle(simd, at.x, at.y);
                         let deep = -next[2] > NEARLY * self.limits[0].min(self.limits[1]);
                         // Bodies that touch are left to twice the precision when the bracket gets no narrower.
@@ -385,9 +389,9 @@ impl<R: Relation> Correct<'_, R> {
                         }
                         overlap = found.upper;
                     }
+                    Verdict::Wide | Verdict::Overlap => {}
                 }
             }
-            let local = (&local_a, &local_b);
             let mut length = self.relative_length(simd, &step, local);
             let tangents = [at.frame[0], at.frame[1]];
             if correct(simd, &mut series, (&mut step, length), (&a, &b), &response, tangents) {

@@ -145,7 +145,12 @@ impl<'a> Search<'a> {
         }
         // A bracket that holds 0 but is not sure of contact is as wide as rounding left it.
         let unsure = self.narrow() && !self.decided() && !self.options.exhausted(self.iterations);
-        if !self.ended() || unsure {
+        if unsure && !self.pair.smooth() {
+            // Edges that reach into a body have brought the points together where the surfaces cross.
+            let (v, n) = ((self.x + self.y) * 0.5, self.n);
+            self.deepest(&v, &n);
+        }
+        if !self.ended() || unsure && !self.decided() {
             self.sharpen();
         }
         // From points this near, values are no longer too steep to start from.

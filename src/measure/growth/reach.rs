@@ -11,7 +11,7 @@
 //! Σ λ_i ∇g_i(x) = n,   Σ μ_j ∇h_j(y) = -n,   n·u = 1.
 //! ```
 
-use crate::measure::newton::{Active, MAX_STEPS, Pace, WORTH_A_BRACKET};
+use crate::measure::newton::{Active, MAX_STEPS, PATIENCE, Pace, WORTH_A_BRACKET};
 use crate::measure::options::Options;
 use crate::measure::pair::{Pair, Posed};
 use crate::measure::programs::near_boundary;
@@ -19,9 +19,6 @@ use crate::measure::quadratic::{Jets, LONGEST, Quadratic};
 use crate::measure::series::{Series, Taken, tangents};
 use crate::optimize::{Program, Row, Rows};
 use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, Vector3, Vector4};
-
-/// Steps after which they should no longer be cut.
-const PATIENCE: u32 = 6;
 
 /// The program in coordinates along u and across it, the same across for x and y: variables (a, p, q, b) with
 /// `x = center_a + a u + p v + q w`, `y = center_b + b u + p v + q w`, minimising b - a.
