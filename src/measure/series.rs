@@ -18,7 +18,7 @@ use nalgebra::{Matrix3, Vector3};
 const FAST: f64 = 0.55;
 
 /// Length of a step relative to the bodies, beyond which steps are not of a series.
-pub(super) const REACH: f64 = 0.05;
+const NEAR: f64 = 0.05;
 
 /// Change of the step along the way, relative to that, of slopes that vanish with a power.
 const SLOW: std::ops::Range<f64> = 0.06..0.6;
@@ -74,7 +74,7 @@ impl Series {
     #[inline(always)]
     pub(super) fn may_have_to_be_corrected(&self, newton: V2, length: f64) -> bool {
         let last = dot(self.last.newton, self.last.newton);
-        last > 0.0 && (self.last.corrected || length < REACH && self.is_slow(newton))
+        last > 0.0 && (self.last.corrected || length < NEAR && self.is_slow(newton))
     }
 
     /// Whether the last step has been corrected.

@@ -9,7 +9,7 @@ use super::drift::Drift;
 use super::options::Options;
 use super::pose::Pose;
 use super::relation::{Relation, Verdict};
-use super::series::{Correction, Last, REACH, Series};
+use super::series::{Correction, Last, Series};
 use super::start::{Start, middle};
 use super::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, Response, Side, Step, bracket, moved, newton};
 use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, subtract};
@@ -352,9 +352,9 @@ impl<R: Relation> Correct<'_, R> {
             // Where sides are flat the point at hand may do long before its step is short enough.
             let local = (&local_a, &local_b);
             let flat = series.is_slow(step.along())
-                && (series.is_corrected() || self.relative_length(simd, &step, local) < REACH);
+                && series.may_have_to_be_corrected(step.along(), self.relative_length(simd, &step, local));
             if near || flat {
-                // The bracket where Newton's step leads, by extrapolation: mostly no other evaluation is needed.
+                // The bracket there, or where Newton's step leads, by extrapolation: mostly no other evaluation is needed.
                 let (dx, dy) = if flat { ([0.0; 3], [0.0; 3]) } else { (step.dx, step.dy) };
                 let next_a = side_a.extrapolate(simd, &jet_a, &local_a, dx);
                 let next_b = side_b.extrapolate(simd, &jet_b, &local_b, dy);
