@@ -15,9 +15,11 @@ use super::active::{ActiveConstraints, MAX_ACTIVE};
 use super::bracket::Multipliers;
 use super::linear::solve;
 use super::pair::{Pair, Posed};
-use super::series::{Series, Taken, tangents};
+use super::series::{Series, Taken, across, along, tangents};
 use super::smooth::LONGEST;
+use super::vector::V3;
 use super::warm::ActiveSet;
+use crate::polynomial::Scalar;
 use nalgebra::{Matrix3, Vector3};
 
 /// The active constraints of one body with their multipliers.
@@ -224,6 +226,9 @@ pub(super) const PATIENCE: u32 = 6;
 /// Longest Newton step, relative to the bodies, after which a bracket may be narrow: what remains is about its square.
 pub(super) const WORTH_A_BRACKET: f64 = 1e-3;
 
+/// Longest Newton step before it is cut, relative to the bodies: flat sides that are tilted have no curvature to end it.
+const FARTHEST: f64 = 1e3;
+
 /// Whether Newton's steps still shrink: fast near a solution, and those that do not are not near one.
 pub(super) struct Pace {
     last: f64,
@@ -300,6 +305,13 @@ impl DistanceNewton {
         (At::new(&pair.a, &self.a, &self.x), At::new(&pair.b, &self.b, &self.y))
     }
 
+    /// The least curvature that may be divided by: with it, forces along the tangents lead [`FARTHEST`]. As they vanish so does
+    /// it, which leaves Newton's method as fast as it is.
+    fn stiffness(pair: &Pair<'_>, tangents: [V3<f64>; 2], force: &Vector3<f64>) -> f64 {
+        let force = across(Scalar, tangents, along(Scalar, tangents, (*force).into())).into();
+        pair.a.relative_length(&force).max(pair.b.relative_length(&force)) / FARTHEST
+    }
+
     /// One Newton step; its length relative to the bodies, or none if the system is singular.
     ///
     /// The second of the equations at the head of this file gives `dn = -(n + u) - H_A dx - G_A dλ`, G the gradients and H the
@@ -314,11 +326,16 @@ impl DistanceNewton {
         let moved = Matrix3::identity() + a.hessian * distance;
         // u + w = 0.
         let (by_x, by_distance) = (a.hessian + b.hessian * moved, -b.hessian * n);
-        let right = -(a.sum + b.sum) - b.hessian * offset;
+        let force = -(a.sum + b.sum);
+        let right = force - b.hessian * offset;
+        let free = tangents(&a.gradient[..la], &b.gradient[..lb]);
+        // Where a corrected step has led there may be no curvature at all.
+        let stiff = free.filter(|_| series.is_corrected()).map_or(0.0, |free| Self::stiffness(pair, free, &force));
         for i in 0..3 {
             for j in 0..3 {
                 m[i][j] = by_x[(i, j)];
             }
+            m[i][i] += stiff;
             m[i][3] = by_distance[i];
             m[i][size] = right[i];
         }
@@ -351,8 +368,7 @@ impl DistanceNewton {
         let dy = moved * dx - n * d[3] + of_a * distance + offset;
         // Of corners that stay where they are the normal turns.
         let dn = -(n + a.sum) - a.hessian * dx - of_a;
-        let free = tangents(&a.gradient[..la], &b.gradient[..lb]);
-        let (force, bent) = (-(a.sum + b.sum), a.hessian + b.hessian);
+        let bent = a.hessian + b.hessian;
         // A longer step leaves where the linearization means anything.
         let Taken { more, share: damping, length } = series.take(free, &dx, (&force, &bent), LONGEST, |more| {
             pair.a.relative_length(&(dx + more)).max(pair.b.relative_length(&(dy + more)))

@@ -153,6 +153,10 @@ pub(super) const SEEK_ROUNDS: u32 = 16;
 /// should be.
 const PATIENCE: u32 = 6;
 
+/// The same from where the outlines are nearest, which is a closer look at the same bodies: what goes astray from there is thin, and
+/// takes its turns.
+const PATIENCE_OUTLINED: u32 = 12;
+
 /// Length of a step relative to a body's size that counts as near.
 const NEARLY: f64 = 0.05;
 
@@ -273,7 +277,7 @@ impl<R: Relation> WithSimd for Seek<'_, R> {
                 (start, [a.outline().active(places[0]) as u8, b.outline().active(places[1]) as u8])
             }
         };
-        let patience = if from.is_some() { most } else { PATIENCE };
+        let patience = if from.is_some() { PATIENCE_OUTLINED } else { PATIENCE };
         let sides = (Side::at_home(simd, a, active[0].into()), Side::away(b, active[1].into(), &relative));
         let correct = Correct { sides, relation, patience, most, options, limits: limits(a, b) };
         if relation.ends_at_contact() && dot::<S, f64>(start.n, subtract::<S, f64>(start.x, start.y)) < 0.0 {

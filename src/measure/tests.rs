@@ -439,3 +439,24 @@ fn flats_of_different_orders_take_few_iterations() {
         }
     }
 }
+
+/// The answer is where the slope of a tip makes up for the tilt of the face over it: on the way there is no curvature at all.
+#[test]
+fn flat_tips_meet_faces_tilted_by_next_to_nothing() {
+    let needle = Body::superellipsoid("needle", Vector3::zeros(), Vector3::new(0.05, 0.05, 1.0), 8).unwrap();
+    let block = Body::cuboid("block", Vector3::new(0.02, 0.03, 0.01)).unwrap();
+    let (mut longest, mut sum) = (0, 0);
+    for seed in 0..1000 {
+        let mut random = Seeded(seed);
+        let tilt = unit(&mut random) * 10_f64.powf(-9.0 + 2.0 * random.signed());
+        let turn = nalgebra::UnitQuaternion::from_scaled_axis(tilt);
+        let place = Vector3::new(0.0, 0.0, 1.01 + 0.03 * (1.0 + random.signed()));
+        let pose = Pose::from_quaternion(place, turn.coords.into()).unwrap();
+        let answer = cold(&needle, &Pose::identity(), &block, &pose);
+        let label = format!("seed {seed}, tilt {:e}: {answer:?}", tilt.norm());
+        assert_eq!(answer.status, Status::Converged, "{label}");
+        longest = longest.max(answer.iterations);
+        sum += answer.iterations;
+    }
+    assert!(longest <= 100 && sum <= 12 * 1000, "longest {longest}, {sum} in 1000");
+}
