@@ -221,7 +221,7 @@ const AT: f64 = 0.1;
 pub(super) const MAX_STEPS: u32 = 16;
 
 /// Steps after which they should no longer be cut, whatever was active before.
-pub(super) const PATIENCE: u32 = 6;
+const PATIENCE: u32 = 6;
 
 /// Longest Newton step, relative to the bodies, after which a bracket may be narrow: what remains is about its square.
 pub(super) const WORTH_A_BRACKET: f64 = 1e-3;
@@ -239,6 +239,12 @@ pub(super) struct Pace {
 impl Pace {
     /// Of steps towards a system that none has been taken towards yet.
     pub(super) const FIRST: Self = Self { last: f64::INFINITY, stuck: 0 };
+
+    /// Whether the steps, this one of this length the last, are still cut when they should no longer be. A single long one is taken
+    /// where sides are flat, once it shows how far they reach.
+    pub(super) fn is_astray(&self, step: u32, length: f64) -> bool {
+        step >= PATIENCE && length.min(self.last) > LONGEST
+    }
 
     /// Whether no step is worth taking after one of this length, relative to the bodies.
     pub(super) fn ends_with(&mut self, length: f64) -> bool {
@@ -292,8 +298,7 @@ impl DistanceNewton {
                     continue;
                 }
             }
-            let astray = step >= PATIENCE && length > LONGEST;
-            if astray || pace.ends_with(length) {
+            if pace.is_astray(step, length) || pace.ends_with(length) {
                 return step;
             }
         }

@@ -11,7 +11,7 @@
 //! Σ λ_i ∇g_i(x) = n,   Σ μ_j ∇h_j(y) = -n,   n·u = 1.
 //! ```
 
-use crate::measure::newton::{Active, MAX_STEPS, PATIENCE, Pace, WORTH_A_BRACKET};
+use crate::measure::newton::{Active, MAX_STEPS, Pace, WORTH_A_BRACKET};
 use crate::measure::options::Options;
 use crate::measure::pair::{Pair, Posed};
 use crate::measure::programs::near_boundary;
@@ -146,8 +146,7 @@ impl ReachNewton {
             if (length < WORTH_A_BRACKET || step % 4 == 0) && accept(self) {
                 return step;
             }
-            let astray = step >= PATIENCE && length > LONGEST;
-            if astray || pace.ends_with(length) {
+            if pace.is_astray(step, length) || pace.ends_with(length) {
                 return step;
             }
         }
