@@ -134,6 +134,9 @@ impl<'a> Search<'a> {
             self.outlined();
         }
         if !self.ended() {
+            self.again();
+        }
+        if !self.ended() {
             self.closest(NEAR);
         }
         if !self.ended() && !self.decided() && self.lower < NEAR * self.pair.size() {
@@ -142,6 +145,9 @@ impl<'a> Search<'a> {
         // Where both are elongated or edged, first order from the deepest point is not close enough.
         if !self.ended() {
             self.closest(NEAREST);
+        }
+        if !self.ended() {
+            self.again();
         }
         // A bracket that holds 0 but is not sure of contact is as wide as rounding left it.
         let unsure = self.narrow() && !self.decided() && !self.options.exhausted(self.iterations);
@@ -214,6 +220,17 @@ impl<'a> Search<'a> {
         if !self.ended() {
             self.newton(newton.x, newton.y, -newton.n.normalize(), newton.a, newton.b);
         }
+    }
+
+    /// The same for bodies with edges from the best points so far, with the constraints that are active there: what has led astray
+    /// from a start are the others.
+    fn again(&mut self) {
+        if self.pair.smooth() || self.lower == 0.0 || self.upper.is_infinite() {
+            return;
+        }
+        let (x, y, n) = (self.x, self.y, self.n);
+        let (a, b) = (Active::near(&self.pair.a, &x, &-n), Active::near(&self.pair.b, &y, &n));
+        self.along(x, y, n, a, b);
     }
 
     /// A point in A's frame from its normalization's centre on, metres.
