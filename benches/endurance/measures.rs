@@ -118,15 +118,18 @@ impl Answer {
             }
             Answer::Level(answer) => {
                 let truth = reference::level_distance(a.0, a.1, b.0, b.1, answer);
-                Verdict { inside: truth.inside(answer), decided: truth.width() <= 1e-16, truth: truth.value() }
+                Verdict { inside: truth.inside(answer), decided: truth.decides(answer), truth: truth.value() }
             }
             Answer::Growth(answer) => {
                 // Where the centres coincide the answer is 0 and has no normal.
                 let start = growth::Start { witness: answer.witness, value: answer.upper, normal: answer.normal? };
                 let centres = (a.0.growth_ball().center, b.0.growth_ball().center);
                 let truth = growth::growth_distance((a.0, a.1, &centres.0), (b.0, b.1, &centres.1), &start)?;
-                let inside = truth.lower <= big(answer.upper) && big(answer.lower) <= truth.upper;
-                Verdict { inside, decided: truth.width() <= 1e-16 * truth.value().max(1.0), truth: truth.value() }
+                let (lower, upper) = (big(answer.lower), big(answer.upper));
+                let inside = truth.lower <= upper && lower <= truth.upper;
+                let sharp = truth.width() <= 1e-16 * truth.value().max(1.0);
+                let decided = sharp || lower <= truth.lower && truth.upper <= upper;
+                Verdict { inside, decided, truth: truth.value() }
             }
         })
     }

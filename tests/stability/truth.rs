@@ -2,11 +2,11 @@
 
 use crate::bodies::{b, e, p, q, zoo};
 use crate::judge::{all, judged};
-use crate::random::{Seeded, at};
+use crate::random::{Seeded, at, pose};
 use crate::reference;
 use nalgebra::Vector3;
 use sublevel::body::Body;
-use sublevel::measure::{Options, Pose};
+use sublevel::measure::{Options, Pose, WarmStart, distance};
 
 #[test]
 fn coaxial_powers_have_closed_forms() {
@@ -104,4 +104,33 @@ fn growth_distances_have_closed_forms() {
             assert!((difference - truth.gradient[k]).abs() < 1e-8, "{seed} {k}: {difference} {}", truth.gradient[k]);
         }
     }
+}
+
+/// Witnesses far away are rounded by more than overlaps are deep that are proven all the same.
+#[test]
+fn shallow_overlaps_are_found_from_rounded_witnesses() {
+    let bodies = [b(1.0, 1.0, 1e-3), b(0.02, 0.03, 0.01), p(6, 0.02), p(6, 0.7), e(0.8, 0.5, 1.1)];
+    let options = Options::default();
+    let mut shallow = 0;
+    for seed in 0..2000 {
+        let mut random = Seeded(seed);
+        let (a, b) = (&bodies[random.index(2)], &bodies[random.index(5)]);
+        let size = a.circumscribed().radius + b.circumscribed().radius;
+        let (place, turn) = (random.unit() * 1e8, random.rotation());
+        let (pose_a, aside) = (pose(place, &turn), random.unit() * 1.5 * size);
+        let turn = random.rotation();
+        let apart = pose(place + aside, &turn);
+        let answer = distance(a, &pose_a, b, &apart, &options, &mut WarmStart::default());
+        let Some(normal) = answer.normal else { continue };
+        let deep = 10_f64.powf(-7.0 + random.signed());
+        let pose_b = pose(place + aside + normal * (answer.upper + deep), &turn);
+        let answer = distance(a, &pose_a, b, &pose_b, &options, &mut WarmStart::default());
+        if answer.upper == 0.0 {
+            shallow += 1;
+            let truth = reference::distance(a, &pose_a, b, &pose_b, &answer);
+            let label = format!("seed {seed}: {}-{} {answer:?}", a.name(), b.name());
+            assert!(truth.value() == 0.0, "{label}: {:e}", truth.value());
+        }
+    }
+    assert!(shallow > 1900, "{shallow} overlaps");
 }

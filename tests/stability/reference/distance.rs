@@ -81,6 +81,9 @@ pub(crate) fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer:
     let mut best = Best { lower: big(0.0), upper, x, y, n: vector(&Vector3::x()), unit, dual: None };
     let (x, y) = (best.x.clone(), best.y.clone());
     raise(&one, &two, &x, &y, &mut best);
+    if let Some(v) = common(&one, &two, &x).filter(|_| answer.upper == 0.0) {
+        raise(&one, &two, &v, &v, &mut best);
+    }
     let small = a.circumscribed().radius.min(b.circumscribed().radius) / unit;
     // On overlap there is no normal: any that parts the largest constraints there.
     let normal = answer.normal.unwrap_or_else(|| {
@@ -288,6 +291,27 @@ fn bracket(
         best.n = n.clone();
     }
     raise(one, two, x, y, best);
+}
+
+/// A common point next to v, which is one that has been rounded: steps into each body in turn as far as it sticks out and half as
+/// far again.
+fn common(one: &Solid<'_>, two: &Solid<'_>, v: &Vector) -> Option<Vector> {
+    let mut v = v.clone();
+    for _ in 0..100 {
+        let mut inside = true;
+        for (body, i) in [one, two].into_iter().flat_map(|body| (0..body.len()).map(move |i| (body, i))) {
+            let jet = body.jet(i, &v);
+            let excess = jet.value - big(1.0);
+            if excess > big(0.0) {
+                inside = false;
+                v = sub(&v, &scaled(&jet.gradient, &(excess * big(1.5) / dot(&jet.gradient, &jet.gradient))));
+            }
+        }
+        if inside {
+            return Some(v);
+        }
+    }
+    None
 }
 
 /// Takes trial points, pulled into their bodies, if they are closer than the best so far; a common point is at distance 0.

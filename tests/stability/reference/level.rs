@@ -36,6 +36,13 @@ impl Truth {
         (answer.lower == f64::NEG_INFINITY || big(answer.lower) <= self.upper)
             && (answer.upper == f64::INFINITY || self.lower <= big(answer.upper))
     }
+
+    /// Whether it tells the answer right from wrong, as that of distances does.
+    pub(crate) fn decides(&self, answer: &LevelDistance) -> bool {
+        let finite = answer.lower.is_finite() && answer.upper.is_finite();
+        let all_inside = finite && big(answer.lower) <= self.lower && self.upper <= big(answer.upper);
+        self.width() <= 1e-16 || all_inside
+    }
 }
 
 struct Best {
