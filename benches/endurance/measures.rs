@@ -1,7 +1,7 @@
 //! The measures under test: a table to extend when one is added.
 
 use crate::bodies::Placed;
-use crate::reference::{self, big::big, growth};
+use crate::reference::{self, growth};
 use sublevel::body::Body;
 use sublevel::measure::{
     Distance, GrowthDistance, LevelDistance, Options, Pose, Status, WarmStart, distance, growth_distance,
@@ -125,11 +125,7 @@ impl Answer {
                 let start = growth::Start { witness: answer.witness, value: answer.upper, normal: answer.normal? };
                 let centres = (a.0.growth_ball().center, b.0.growth_ball().center);
                 let truth = growth::growth_distance((a.0, a.1, &centres.0), (b.0, b.1, &centres.1), &start)?;
-                let (lower, upper) = (big(answer.lower), big(answer.upper));
-                let inside = truth.lower <= upper && lower <= truth.upper;
-                let sharp = truth.width() <= 1e-16 * truth.value().max(1.0);
-                let decided = sharp || lower <= truth.lower && truth.upper <= upper;
-                Verdict { inside, decided, truth: truth.value() }
+                Verdict { inside: truth.inside(answer), decided: truth.decides(answer), truth: truth.value() }
             }
         })
     }

@@ -226,7 +226,7 @@ const PATIENCE: u32 = 6;
 /// Longest Newton step, relative to the bodies, after which a bracket may be narrow: what remains is about its square.
 pub(super) const WORTH_A_BRACKET: f64 = 1e-3;
 
-/// Longest Newton step before it is cut, relative to the bodies: flat sides that are tilted have no curvature to end it.
+/// How far forces lead where there is no curvature, relative to the bodies and before the step is cut.
 const FARTHEST: f64 = 1e3;
 
 /// Whether Newton's steps still shrink: fast near a solution, and those that do not are not near one.
@@ -240,10 +240,10 @@ impl Pace {
     /// Of steps towards a system that none has been taken towards yet.
     pub(super) const FIRST: Self = Self { last: f64::INFINITY, stuck: 0 };
 
-    /// Whether the steps, this one of this length the last, are still cut when they should no longer be. A single long one is taken
-    /// where sides are flat, once it shows how far they reach.
-    pub(super) fn is_astray(&self, step: u32, length: f64) -> bool {
-        step >= PATIENCE && length.min(self.last) > LONGEST
+    /// Whether the steps, this one of this length the last, are still cut to the longest when they should no longer be: two in a row, or
+    /// the first towards a new system. A single long one is taken where sides are flat, once it shows how far they reach.
+    pub(super) fn is_astray(&self, step: u32, length: f64, longest: f64) -> bool {
+        step >= PATIENCE && length.min(self.last) > longest
     }
 
     /// Whether no step is worth taking after one of this length, relative to the bodies.
@@ -298,7 +298,7 @@ impl DistanceNewton {
                     continue;
                 }
             }
-            if pace.is_astray(step, length) || pace.ends_with(length) {
+            if pace.is_astray(step, length, LONGEST) || pace.ends_with(length) {
                 return step;
             }
         }
@@ -310,8 +310,8 @@ impl DistanceNewton {
         (At::new(&pair.a, &self.a, &self.x), At::new(&pair.b, &self.b, &self.y))
     }
 
-    /// The least curvature that may be divided by: with it, forces along the tangents lead [`FARTHEST`]. As they vanish so does
-    /// it, which leaves Newton's method as fast as it is.
+    /// The curvature by which forces along the tangents alone lead [`FARTHEST`]. Added to what there is it vanishes with them, which
+    /// leaves Newton's method as fast as it is.
     fn stiffness(pair: &Pair<'_>, tangents: [V3<f64>; 2], force: &Vector3<f64>) -> f64 {
         let force = across(Scalar, tangents, along(Scalar, tangents, (*force).into())).into();
         pair.a.relative_length(&force).max(pair.b.relative_length(&force)) / FARTHEST

@@ -153,8 +153,8 @@ pub(super) const SEEK_ROUNDS: u32 = 16;
 /// should be.
 const PATIENCE: u32 = 6;
 
-/// The same from where the outlines are nearest, which is a closer look at the same bodies: what goes astray from there is thin, and
-/// takes its turns.
+/// Evaluations from where the outlines are nearest after which Newton's method should be near: a closer look at bodies that are thin,
+/// and take their turns.
 const PATIENCE_OUTLINED: u32 = 12;
 
 /// Length of a step relative to a body's size that counts as near.

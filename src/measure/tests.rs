@@ -458,5 +458,58 @@ fn flat_tips_meet_faces_tilted_by_next_to_nothing() {
         longest = longest.max(answer.iterations);
         sum += answer.iterations;
     }
-    assert!(longest <= 100 && sum <= 12 * 1000, "longest {longest}, {sum} in 1000");
+    assert!(longest <= 150 && sum <= 12 * 1000, "longest {longest}, {sum} in 1000");
+}
+
+/// Thin and small boxes over sides tilted by 1e-9 to 1e-5: of 1e8 aligned draws the ones that had stayed wide.
+#[test]
+fn tilted_sides_that_had_stayed_wide() {
+    let cuboid = |x, y, z| Body::cuboid("box", Vector3::new(x, y, z)).unwrap();
+    let (small, plate) = (cuboid(0.02, 0.03, 0.01), cuboid(1.0, 1.0, 1e-3));
+    let can = Body::cylinder("can", 0.5, 0.8).unwrap();
+    let needle = Body::superellipsoid("needle", Vector3::zeros(), Vector3::new(0.05, 0.05, 1.0), 8).unwrap();
+    type Posed<'a> = (&'a Body, &'a Body, [f64; 3], [f64; 4]);
+    let cases: [Posed<'_>; 6] = [
+        (
+            &small,
+            &plate,
+            [0.0, 0.0, -1.451630489812364],
+            [-4.3685295794368196e-6, 0.7071068831899364, 1.2154812580319423e-6, 0.7071066791686047],
+        ),
+        (
+            &small,
+            &plate,
+            [0.0, -1.5474750707889364, 0.0],
+            [3.0148071891908994e-9, 4.57801976313071e-10, -3.941987911391323e-9, 1.0],
+        ),
+        (
+            &small,
+            &plate,
+            [1.451630489812364, 0.0, 0.0],
+            [3.3196615344281965e-9, 3.676189472229191e-9, -2.7076939091016753e-9, 1.0],
+        ),
+        (
+            &plate,
+            &can,
+            [1.5267891855815738, 0.0, 0.0],
+            [0.7071067847547186, -1.8987533122860062e-8, -1.609737697195995e-9, 0.7071067776183763],
+        ),
+        (
+            &plate,
+            &can,
+            [0.0, -2.374650806303116, 0.0],
+            [2.1940466524760203e-11, 0.707106782071655, -8.911641738533576e-10, 0.70710678030144],
+        ),
+        (
+            &needle,
+            &small,
+            [0.0, 0.0, 1.0399134566614892],
+            [-2.284816999302442e-10, 7.212971117697647e-10, -2.773868358421155e-11, 1.0],
+        ),
+    ];
+    for (k, (a, b, translation, quaternion)) in cases.into_iter().enumerate() {
+        let pose = Pose::from_quaternion(translation.into(), quaternion).unwrap();
+        let answer = cold(a, &Pose::identity(), b, &pose);
+        assert_eq!(answer.status, Status::Converged, "case {k}: {answer:?}");
+    }
 }

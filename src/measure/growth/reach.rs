@@ -146,7 +146,7 @@ impl ReachNewton {
             if (length < WORTH_A_BRACKET || step % 4 == 0) && accept(self) {
                 return step;
             }
-            if pace.is_astray(step, length) || pace.ends_with(length) {
+            if pace.is_astray(step, length, LONGEST) || pace.ends_with(length) {
                 return step;
             }
         }

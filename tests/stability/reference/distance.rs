@@ -81,7 +81,9 @@ pub(crate) fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer:
     let mut best = Best { lower: big(0.0), upper, x, y, n: vector(&Vector3::x()), unit, dual: None };
     let (x, y) = (best.x.clone(), best.y.clone());
     raise(&one, &two, &x, &y, &mut best);
-    if let Some(v) = common(&one, &two, &x).filter(|_| answer.upper == 0.0) {
+    if answer.upper == 0.0
+        && let Some(v) = common(&one, &two, &x)
+    {
         raise(&one, &two, &v, &v, &mut best);
     }
     let small = a.circumscribed().radius.min(b.circumscribed().radius) / unit;

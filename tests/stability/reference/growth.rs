@@ -6,7 +6,7 @@ use super::dual::Dual;
 use super::solid::{Jet, Solid};
 use nalgebra::Vector3;
 use sublevel::body::Body;
-use sublevel::measure::Pose;
+use sublevel::measure::{GrowthDistance, Pose};
 
 /// The growth distance in a bracket of its own.
 #[derive(Debug)]
@@ -28,6 +28,17 @@ impl Truth {
 
     pub(crate) fn value(&self) -> f64 {
         double(&self.upper)
+    }
+
+    /// Whether the answer's bracket contains the growth distance.
+    pub(crate) fn inside(&self, answer: &GrowthDistance) -> bool {
+        big(answer.lower) <= self.upper && self.lower <= big(answer.upper)
+    }
+
+    /// Whether it tells the answer right from wrong, as that of distances does.
+    pub(crate) fn decides(&self, answer: &GrowthDistance) -> bool {
+        let sharp = self.width() <= 1e-16 * self.value().max(1.0);
+        sharp || big(answer.lower) <= self.lower && self.upper <= big(answer.upper)
     }
 }
 
