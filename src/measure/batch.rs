@@ -15,7 +15,7 @@ use super::smooth::{limits, worth_a_bracket};
 use super::start::{Start, facing, meeting, middle};
 use super::tangent::{ALIGNED, Bend, Plane, Relative, Side, Step, bracket, moved, newton};
 use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, subtract};
-use super::warm::WarmStart;
+use super::warm::{Hint, WarmStart};
 use crate::body::{Body, Solid};
 use crate::polynomial::{
     Aligned, Lanes, MAX_LANES, MAX_SINGLES, Number, NumberJet, Simd, Singles, Twice, Vector, WithSimd, dispatch_lanes,
@@ -80,7 +80,7 @@ pub fn distance_batch(
         return Err(BatchError::Empty);
     }
     for answer in answers.iter_mut() {
-        (answer.upper, answer.iterations) = (f64::INFINITY, 0);
+        (answer.upper, answer.iterations, answer.tied) = (f64::INFINITY, 0, false);
     }
     if let ([a], [b]) = (a.parts(), b.parts())
         && a.is_smooth()
@@ -91,7 +91,8 @@ pub fn distance_batch(
     }
     for (answer, pose_b) in answers.iter_mut().zip(poses_b).filter(|(answer, _)| answer.upper.is_infinite()) {
         let spent = answer.iterations;
-        *answer = distance(a, pose_a, b, pose_b, &options.after(spent), &mut WarmStart::default());
+        let mut warm = if answer.tied { Hint::Astray.into() } else { WarmStart::default() };
+        *answer = distance(a, pose_a, b, pose_b, &options.after(spent), &mut warm);
         answer.iterations += spent;
     }
     Ok(())
@@ -118,10 +119,14 @@ const MOST_COARSE: u32 = 6;
 /// narrow bracket.
 const NEAR: f64 = 1e-4;
 
+/// The same above which Newton's method is astray after [`MOST_COARSE`] rounds: a step as long as in a search from a cold start then.
+const ASTRAY: f64 = 0.04;
+
 /// Most rounds of a pose before it is solved alone.
 const MOST_ROUNDS: u32 = 8;
 
-/// A batch as work for the widest arithmetic. Of a pose that is to be solved alone it takes down the iterations only.
+/// A batch as work for the widest arithmetic. Of a pose that is to be solved alone it takes down the iterations only,
+/// and as `tied` that they have led astray.
 struct Batch<'a> {
     a: &'a Body,
     pose_a: &'a Pose,
@@ -344,14 +349,17 @@ impl Batch<'_> {
         at.store(&mut group);
         // Where single precision has no number for something the pose is left out, too.
         let within = |most: f64| N::bits(simd, square.le(N::splat(simd, most)));
-        let (close, open) = (within(NEAR), within(f32::MAX.into()) & !overlapping);
+        let (close, straight, open) = (within(NEAR), within(ASTRAY), within(f32::MAX.into()) & !overlapping);
         for lane in 0..group.count {
             group.rounds[lane] += rounds;
-            if open >> lane & 1 == 1 {
-                let done = close >> lane & 1 == 1 || group.rounds[lane] >= MOST_COARSE;
-                if done { near.push(&group, lane) } else { far.push(&group, lane) }
+            let late = group.rounds[lane] >= MOST_COARSE;
+            let astray = late && straight >> lane & 1 == 0;
+            if open >> lane & 1 == 0 || astray {
+                self.leave(&group, lane, astray);
+            } else if late || close >> lane & 1 == 1 {
+                near.push(&group, lane);
             } else {
-                self.answers[group.pose[lane]].iterations = group.rounds[lane];
+                far.push(&group, lane);
             }
         }
     }
@@ -396,14 +404,24 @@ impl Batch<'_> {
         }
         at.advance(simd, &here);
         at.store(&mut group);
+        let straight = Lanes::bits(simd, here.square.le(splat(ASTRAY)));
         for lane in 0..group.count {
             group.rounds[lane] += 1;
-            if open >> lane & 1 == 1 && group.rounds[lane] < MOST_ROUNDS {
+            let open = open >> lane & 1 == 1;
+            let astray = open && group.rounds[lane] >= MOST_COARSE && straight >> lane & 1 == 0;
+            if open && !astray && group.rounds[lane] < MOST_ROUNDS {
                 waiting.push(&group, lane);
             } else if answered >> lane & 1 == 0 {
-                self.answers[group.pose[lane]].iterations = group.rounds[lane];
+                self.leave(&group, lane, astray);
             }
         }
+    }
+
+    /// Leaves a lane's pose to be solved alone.
+    #[inline(always)]
+    fn leave<const LANES: usize>(&mut self, group: &Group<LANES>, lane: usize, astray: bool) {
+        let answer = &mut self.answers[group.pose[lane]];
+        (answer.iterations, answer.tied) = (group.rounds[lane], astray);
     }
 
     /// The lanes in which the middle between the points seems to lie in both bodies: single queries prove that fast.

@@ -182,7 +182,7 @@ impl Goal {
         Self { near: self.near / unit, far: self.far / unit }
     }
 
-    fn is_narrow(&self) -> bool {
+    pub(super) fn is_narrow(&self) -> bool {
         self.near == f64::NEG_INFINITY && self.far == f64::INFINITY
     }
 

@@ -21,6 +21,9 @@ const MAX_STEPS: u32 = 48;
 /// Most changes of the active constraints: a start with more wrong ones is near no solution.
 const MAX_REVISED: u32 = 4;
 
+/// Steps after which one of the level distance's is still cut leads nowhere.
+const PATIENCE: u32 = 8;
+
 /// Share of the evaluation's bound in doubles that bounds one of twice the precision: both count a few hundred roundings.
 const SHARE: f64 = 1e-13;
 
@@ -331,6 +334,7 @@ impl<'a> SharpPair<'a> {
         let mut x = twos(&start.x);
         let (mut of_a, mut of_b) = (SharpActive::new(&start.a), SharpActive::new(&start.b));
         let mut s = Two::from(self.a.value_upper(&x));
+        let mut revised = 0;
         for step in 1..=MAX_STEPS.min(limit) {
             let (a, sum_a, values_a) = self.a.at(&of_a, &x);
             let (b, sum_b, values_b) = self.b.at(&of_b, &x);
@@ -369,7 +373,9 @@ impl<'a> SharpPair<'a> {
                     of_b.set.len = 0;
                 }
                 let changed = lone | of_a.revise(self.a.posed, &x, s.double()) | of_b.revise(self.b.posed, &x, 1.0);
-                if !changed && length < 1e-28 {
+                revised += u32::from(changed);
+                let astray = step >= PATIENCE && damping < 1.0;
+                if revised > MAX_REVISED || astray || !changed && length < 1e-28 {
                     return step;
                 }
             }

@@ -108,6 +108,9 @@ impl Distance {
     }
 }
 
+/// Distance of the poses relative to the sum of the bodies' sizes, above which they are far apart.
+const FAR: f64 = 2.0;
+
 /// Euclidean distance between solid `a` at `pose_a` and solid `b` at `pose_b` (body to world), 0 when they touch or overlap;
 /// of solids with several parts, that of their closest parts.
 ///
@@ -167,7 +170,11 @@ pub(super) fn between(
     }
     // Where edges face each other no single constraint is to be followed.
     let smooth = a.is_smooth() && b.is_smooth();
-    if smooth && !lost.touching() && !options.exhausted(lost.rounds) {
+    // From far away it does other than lanes, which bring no points back that have come too far from the bodies.
+    let astray = matches!(warm.hint, Hint::Astray)
+        && pose_a.translation().metric_distance(pose_b.translation())
+            < FAR * (a.circumscribed().radius + b.circumscribed().radius);
+    if smooth && !astray && !lost.touching() && !options.exhausted(lost.rounds) {
         let most = SEEK_ROUNDS.min(options.max_iterations() - lost.rounds);
         match dispatch(Cold { seek: Seek { a, b, relation, from: None, most, options }, warm }) {
             Ok(answer) => return Distance { iterations: lost.rounds + answer.iterations, ..answer },

@@ -7,7 +7,7 @@ use crate::measure::Status;
 use crate::measure::bracket::{Multipliers, distance_lower, distance_upper};
 use crate::measure::decide::{Goal, across};
 use crate::measure::growth::ReachNewton;
-use crate::measure::newton::{Active, DistanceNewton, MAX_STEPS, Pace, WORTH_A_BRACKET};
+use crate::measure::newton::{Active, DistanceNewton, Pace, WORTH_A_BRACKET};
 use crate::measure::options::Options;
 use crate::measure::outlines::approach;
 use crate::measure::pair::{Pair, Posed};
@@ -47,11 +47,20 @@ pub(super) struct Search<'a> {
 /// Below this distance relative to the larger body, ½|x - y|² has little curvature to aim by.
 const NEAR: f64 = 1e-3;
 
+/// Distance of the outlines, relative to the larger body, above which the bodies have no point in common to look for.
+const FACING: f64 = 0.1;
+
 /// Below this one it has none that rounding leaves.
 const NEAREST: f64 = 1e-7;
 
 /// Distance relative to the larger body below which contact is a matter of how poses are rounded.
 const CONTACT: f64 = 1e-18;
+
+/// Most steps towards the point deepest in both bodies.
+const MAX_DEEPEST: u32 = 10;
+
+/// Steps of twice the precision for which side of contact a narrow bracket is on: those that find out take half as many.
+const UNSURE: u32 = 8;
 
 /// Share of the way to an interior point that leaves a surface behind.
 const DEEPER: f64 = 1e-6;
@@ -123,6 +132,7 @@ impl<'a> Search<'a> {
                 }
             }
             Hint::Cold
+            | Hint::Astray
             | Hint::Overlap { .. }
             | Hint::Level { .. }
             | Hint::LevelSmooth(_)
@@ -133,6 +143,7 @@ impl<'a> Search<'a> {
         if !self.ended() {
             self.outlined();
         }
+        let tried = (self.x, self.y, self.n);
         if !self.ended() {
             self.again();
         }
@@ -146,7 +157,8 @@ impl<'a> Search<'a> {
         if !self.ended() {
             self.closest(NEAREST);
         }
-        if !self.ended() {
+        // From the same points it would end the same.
+        if !self.ended() && (self.x, self.y, self.n) != tried {
             self.again();
         }
         // A bracket that holds 0 but is not sure of contact is as wide as rounding left it.
@@ -193,7 +205,8 @@ impl<'a> Search<'a> {
                 }
             }
         }
-        if !self.ended() && self.lower == 0.0 {
+        let near = found.common.is_some() || (x - y).norm() < FACING * pair.size();
+        if !self.ended() && self.lower == 0.0 && near {
             self.deepest(&found.common.unwrap_or((x + y) * 0.5), &n);
         }
     }
@@ -217,7 +230,7 @@ impl<'a> Search<'a> {
             self.done()
         });
         self.iterations += steps;
-        if !self.ended() {
+        if !self.ended() && newton.is_near() {
             self.newton(newton.x, newton.y, -newton.n.normalize(), newton.a, newton.b);
         }
     }
@@ -316,6 +329,7 @@ impl<'a> Search<'a> {
         // Once each: from the same start it would end the same.
         while let Some(start) = self.tried.iter_mut().find_map(Option::take) {
             let left = self.options.max_iterations() - self.iterations.min(self.options.max_iterations());
+            let left = if self.narrow() && self.goals.0.is_narrow() { left.min(UNSURE) } else { left };
             let steps = sharp.distance(&start, left, |found| {
                 if self.raise(found.lower, &found.n) {
                     self.active = found.active;
@@ -389,7 +403,7 @@ impl<'a> Search<'a> {
         let (a, b) = (Active::near(&pair.a, v, &-n), Active::near(&pair.b, v, n));
         let mut deepest = Deepest::new(*v, self.depth(v), a, b);
         let mut pace = Pace::FIRST;
-        for _ in 0..MAX_STEPS {
+        for _ in 0..MAX_DEEPEST {
             if self.options.exhausted(self.iterations) {
                 return;
             }

@@ -96,7 +96,12 @@ pub(in crate::measure) struct ReachNewton {
     pub(in crate::measure) a: Active,
     pub(in crate::measure) b: Active,
     u: Vector3<f64>,
+    /// Length of the last step, relative to the bodies.
+    length: f64,
 }
+
+/// Length of a step relative to the bodies, after which the other Newton's method converges from where it has led.
+const NEAR: f64 = 0.15;
 
 impl ReachNewton {
     /// A start from points near the surfaces and a normal from A to B; none if they are of no use for u.
@@ -120,7 +125,7 @@ impl ReachNewton {
         let finite = x.iter().chain(&y).chain(&n).all(|value| value.is_finite());
         let fits = finite && a.fit(&pair.a, &x, &n) && b.fit(&pair.b, &y, &-n);
         let y = x + offset - u * (x + offset - y).dot(&u);
-        fits.then_some(Self { x, y, n, a, b, u })
+        fits.then_some(Self { x, y, n, a, b, u, length: f64::INFINITY })
     }
 
     /// Iterates until `accept` takes one, they stop converging or the options say so after `before` iterations and these;
@@ -142,6 +147,7 @@ impl ReachNewton {
                 accept(self);
                 return step;
             };
+            self.length = length;
             // A long step has not converged: its bracket is not worth its cost, but for flat bodies now and then.
             if (length < WORTH_A_BRACKET || step % 4 == 0) && accept(self) {
                 return step;
@@ -151,6 +157,11 @@ impl ReachNewton {
             }
         }
         MAX_STEPS
+    }
+
+    /// Whether the last step shows that the solution is near.
+    pub(in crate::measure) fn is_near(&self) -> bool {
+        self.length < NEAR
     }
 
     /// One Newton step; its length relative to the bodies, or none if it leads nowhere.

@@ -141,7 +141,7 @@ impl LevelLost {
 const MAX_ROUNDS: u32 = 8;
 
 /// Most evaluations from a cold start before another method takes over.
-pub(super) const SEEK_ROUNDS: u32 = 16;
+pub(super) const SEEK_ROUNDS: u32 = 20;
 
 /// Longest step that is as good as none, so that a bracket it leaves wide is worth a second one in a better metric.
 const SHORT: f64 = 1e-3;
