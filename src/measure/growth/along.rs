@@ -1,7 +1,7 @@
 //! The growth distance as a relation of two points: `x - y` along the vector between the centres, the bodies' centres on top
 //! of each other.
 
-use super::GrowthDistance;
+use super::{GrowthDistance, tolerance};
 use crate::body::Body;
 use crate::measure::Status;
 use crate::measure::pose::Pose;
@@ -53,6 +53,11 @@ impl Along {
             radius: ball_a.radius + ball_b.radius,
             accuracy,
         }
+    }
+
+    /// Whether the centres are apart for sure.
+    pub(super) fn is_sure(&self) -> bool {
+        self.square > self.delta_error * self.delta_error
     }
 
     /// `t` with `t w` nearest to delta along w, for points with the difference w.
@@ -143,9 +148,11 @@ impl Relation for Along {
         let rest = dot::<S, f64>(rest, rest).sqrt() + delta_error + t * found.rounding;
         let upper = (t + rest / self.radius) * (1.0 + SLACK);
         // The bracket of the distance is not a number where its points are not proven to be in the bodies.
-        let narrow = upper - lower <= self.accuracy * upper && found.off <= ALIGNED;
-        if width > 0.0 && found.upper.is_finite() && narrow {
-            Verdict::Proven { lower: lower.max(0.0), upper }
+        let narrow =
+            upper - lower <= tolerance(self.accuracy, upper, delta_error / self.radius) && found.off <= ALIGNED;
+        // Without a bound above 0 there is no normal either: the centres may coincide.
+        if lower > 0.0 && width > 0.0 && found.upper.is_finite() && narrow {
+            Verdict::Proven { lower, upper }
         } else {
             Verdict::Wide
         }

@@ -133,7 +133,7 @@ pub(super) fn between(
             Err(lost) => spent = lost.rounds,
         }
     }
-    if a.is_smooth() && b.is_smooth() && !options.exhausted(spent) {
+    if a.is_smooth() && b.is_smooth() && along.is_sure() && !options.exhausted(spent) {
         let most = SEEK_ROUNDS.min(options.max_iterations() - spent);
         match dispatch(Seek { a, b, relation: along, from: None, most, options }) {
             Ok((proven, trace)) => {
@@ -238,6 +238,13 @@ impl Frame<'_> {
     }
 }
 
+/// Width of a bracket that is narrow enough. It is relative to s, as normals of deep pairs need as much; but the vector between
+/// centres that all but coincide is known to `error` of the bodies only, and what that makes of either bound no method takes off.
+#[inline(always)]
+fn tolerance(accuracy: f64, upper: f64, error: f64) -> f64 {
+    (accuracy * upper + 2.0 * error).min(accuracy * upper.max(1.0))
+}
+
 /// A solve in progress: the best bracket so far and where it was attained.
 struct Search<'a> {
     frame: Frame<'a>,
@@ -255,13 +262,10 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    fn within(&self, size: f64) -> bool {
-        self.upper - self.lower <= self.options.accuracy() * size
-    }
-
-    /// Whether the bracket is as narrow as asked for, and relative to s: normals of deep pairs need as much.
+    /// Whether the bracket is as narrow as asked for.
     fn done(&self) -> bool {
-        self.within(self.upper)
+        let Frame { delta_error, radius_a, radius_b, .. } = self.frame;
+        self.upper - self.lower <= tolerance(self.options.accuracy(), self.upper, delta_error / (radius_a + radius_b))
     }
 
     /// Whether the bracket is narrow enough or no more may be done.
@@ -279,7 +283,9 @@ impl Search<'_> {
             return;
         }
         let pair = self.frame.pair;
-        if let Hint::Apart { x_a, y_b, normal_a, active_a, active_b } = hint {
+        if let Hint::Apart { x_a, y_b, normal_a, active_a, active_b } = hint
+            && !self.ended()
+        {
             let active = (Active::from_bits(*active_a, pair.a.len()), Active::from_bits(*active_b, pair.b.len()));
             if let (Some(a), Some(b)) = active {
                 self.newton(pair.a_to_query(x_a), pair.b_to_query(y_b), &-normal_a, a, b);
@@ -395,8 +401,9 @@ impl Search<'_> {
             let slope = n * (self.upper / n.dot(delta) / pair.unit());
             pair.direction_to_world(&slope)
         });
+        let narrow = self.upper - self.lower <= self.options.accuracy() * self.upper.max(1.0);
         GrowthDistance {
-            status: if self.within(self.upper.max(1.0)) { Status::Converged } else { Status::BracketWide },
+            status: if narrow { Status::Converged } else { Status::BracketWide },
             lower: self.lower,
             upper: self.upper,
             witness,
