@@ -38,6 +38,15 @@ const WILD: f64 = 0.3;
 /// How many times as long as a corrected step the next one may be.
 const FARTHER: f64 = 2.0;
 
+/// Cosine of the angle to a step that leads back.
+const BACK: f64 = -0.9;
+
+/// Length of one relative to the last step, if it leads back about as far.
+const AS_FAR: std::ops::Range<f64> = 0.5..2.0;
+
+/// Length of steps relative to the bodies, beyond which they may lead to and fro.
+const FAR: f64 = 0.1;
+
 /// A vector along the tangents.
 type V2 = [f64; 2];
 
@@ -60,6 +69,8 @@ pub(super) struct Series {
     last: Last,
     /// The tangents along which it was made.
     tangents: [V3<f64>; 2],
+    /// The last step as it was taken, whether of the series or not.
+    way: V3<f64>,
 }
 
 impl Series {
@@ -107,8 +118,23 @@ impl Series {
 
     /// Takes down that the step was cut to this.
     #[inline(always)]
-    pub(super) fn took(&mut self, taken: V2) {
+    pub(super) fn took<S: Simd>(&mut self, simd: S, taken: V2) {
         self.last.taken = taken;
+        self.way = across(simd, self.tangents, taken);
+    }
+
+    /// The part to take of a step this long relative to the bodies: all of it, but where it leads back as far as the last one has led.
+    /// What is looked for then lies between, and where steps would vanish that change evenly is as good a guess as any: Newton's
+    /// method alone may go to and fro for ever.
+    #[inline(always)]
+    pub(super) fn part<S: Simd>(&self, _: S, step: V3<f64>, length: f64) -> f64 {
+        if length <= FAR || self.last.corrected {
+            return 1.0;
+        }
+        let square = |v: V3<f64>| super::vector::dot::<S, f64>(v, v);
+        let (way, now) = (square(self.way).sqrt(), square(step).sqrt());
+        let back = super::vector::dot::<S, f64>(self.way, step) < BACK * way * now;
+        if back && AS_FAR.contains(&(now / way)) { way / (way + now) } else { 1.0 }
     }
 
     /// What to take of a step that is made from a force by a Hessian: no more than is this long by `length`, which measures the step with
@@ -122,6 +148,7 @@ impl Series {
         length: impl Fn(&Vector3<f64>) -> f64,
     ) -> Taken {
         let newton = length(&Vector3::zeros());
+        let before = *self;
         let more = match tangents.filter(|_| newton <= longest || self.is_corrected()) {
             Some(tangents) => self.corrected(tangents, step, newton, force, hessian),
             None => {
@@ -133,7 +160,9 @@ impl Series {
         if taken > longest {
             *self = Self::default();
         }
-        Taken { more, share: (longest / taken).min(1.0), length: newton.min(taken) }
+        let share = (longest / taken).min(before.part(Scalar, (step + more).into(), taken)).min(1.0);
+        self.way = ((step + more) * share).into();
+        Taken { more, share, length: newton.min(taken) }
     }
 
     /// What to add to a step of this length along these tangents.
@@ -332,6 +361,20 @@ mod tests {
         }
         assert!(most <= 14 && sum < 4 * cases, "seed 31: most {most}, {sum} steps in {cases} cases");
         assert!(sum * 3 < plain, "seed 31: {sum} steps, {plain} of Newton's");
+    }
+
+    /// Newton's method for the root of the arc tangent goes to and fro for ever from 1.3917, and ever farther from beyond.
+    #[test]
+    fn steps_to_and_fro_meet_between() {
+        for start in [1.38, 1.391_745_2, 1.4, 1.5] {
+            let (mut x, mut series) = (start, Series::default());
+            for _ in 0..8 {
+                let step = Vector3::new(-(1.0 + x * x) * f64::atan(x), 0.0, 0.0);
+                let taken = series.take(None, &step, (&step, &Matrix3::identity()), 10.0, |more| (step + more).norm());
+                x += (step.x + taken.more.x) * taken.share;
+            }
+            assert!(x.abs() < 1e-9, "from {start}: {x}");
+        }
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::drift::Drift;
 use super::options::Options;
 use super::pose::Pose;
 use super::relation::{Relation, Verdict};
-use super::series::{Correction, Last, Series};
+use super::series::{Correction, Last, Series, across};
 use super::start::{Start, middle};
 use super::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, Response, Side, Step, bracket, moved, newton};
 use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, subtract};
@@ -398,6 +398,7 @@ impl<R: Relation> Correct<'_, R> {
             }
             let mut length = self.relative_length(simd, &step, local);
             let tangents = [at.frame[0], at.frame[1]];
+            let part = series.part(simd, across(simd, tangents, step.along()), length);
             if correct(simd, &mut series, (&mut step, length), (&a, &b), &response, tangents) {
                 length = self.relative_length(simd, &step, local);
             }
@@ -405,11 +406,12 @@ impl<R: Relation> Correct<'_, R> {
             if !near && rounds >= self.patience && !(length * late <= NEARLY) {
                 return Err(Lost::after(rounds));
             }
-            if length > LONGEST {
-                // The linearization means nothing so far away.
-                step.shorten(LONGEST / length);
+            // The linearization means nothing farther away.
+            let part = part.min(LONGEST / length);
+            if part < 1.0 {
+                step.shorten(part);
             }
-            series.took(step.along());
+            series.took(simd, step.along());
             at.advance(simd, &step);
         }
         Err(Lost::after(self.most))
