@@ -5,7 +5,7 @@ use std::path::Path;
 use sublevel::body::Body;
 
 /// Analytic bodies of every kind, sizes 1e-2 to 10, thin and round; then fitted ones, from `folder` and fitted on the spot.
-pub(crate) fn catalogue(folder: &Path, more: Option<&Path>) -> Vec<Body> {
+pub(crate) fn catalogue(folder: &Path) -> Vec<Body> {
     let mut all = vec![
         e(1.0, 1.0, 1.0),
         e(1.0, 0.7, 0.4),
@@ -24,14 +24,12 @@ pub(crate) fn catalogue(folder: &Path, more: Option<&Path>) -> Vec<Body> {
         all.extend([c(degree, 0.5, 1.0), c(degree, 1.0, 0.05), p(degree, 0.7), p(degree, 0.02), p(degree, 5.0)]);
     }
     fit_missing(folder);
-    for folder in [Some(folder), more].into_iter().flatten() {
-        all.extend(read(folder));
-    }
+    all.extend(read(folder));
     all
 }
 
 /// All body files of a folder, in the order of their names.
-fn read(folder: &Path) -> Vec<Body> {
+pub(crate) fn read(folder: &Path) -> Vec<Body> {
     let entries = std::fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
     let mut paths: Vec<_> = entries.map(|entry| entry.expect("a folder entry is readable").path()).collect();
     paths.retain(|path| path.extension().is_some_and(|extension| extension == "json"));

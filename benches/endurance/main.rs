@@ -35,8 +35,9 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 use sublevel::body::Body;
 
-/// Semidefinite programs of a whole run.
-const PROGRAMS: u64 = 1000;
+/// Blocks of a whole run that hold an answer against a semidefinite program, if there is one: a fifth of them draw a growth distance,
+/// or sizes too far apart for it, and 1 000 are to be left.
+const PROGRAMS: u64 = 1300;
 
 /// Time between two writings of the state.
 const BETWEEN: Duration = Duration::from_secs(5);
@@ -56,7 +57,7 @@ struct Arguments {
     /// File for the summary.
     #[arg(long)]
     summary: Option<PathBuf>,
-    /// Folder of further body files.
+    /// Folder of body files to draw from in place of the catalogue.
     #[arg(long)]
     bodies: Option<PathBuf>,
     /// Replay only this block and tell its failures and its slow solves.
@@ -70,7 +71,11 @@ struct Arguments {
 fn main() {
     let arguments = Arguments::parse();
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("endurance");
-    let bodies = catalogue::catalogue(&folder, arguments.bodies.as_deref());
+    let bodies = match &arguments.bodies {
+        Some(folder) => catalogue::read(folder),
+        None => catalogue::catalogue(&folder),
+    };
+    assert!(!bodies.is_empty(), "no body files (.json) in {}", arguments.bodies.unwrap_or(folder).display());
     let blocks = (arguments.queries / block::SOLVES as f64).ceil() as u64;
     let every = (blocks / PROGRAMS).max(1);
     if let Some(number) = arguments.block {

@@ -55,7 +55,7 @@ pub(crate) fn distance((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose))
         program.sum_of_squares(rows, body.degree());
     }
     program.ball(&n);
-    program.solve().map(|value| -value * unit)
+    program.solve(1.0).map(|value| -value * unit)
 }
 
 /// Level distance `d(A‖B)`; about 1e-8 of `max(1, |d|)` exact where bodies are of similar size and not far apart. None if the
@@ -68,11 +68,12 @@ pub(crate) fn level_distance((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &
         (body.normalization().linear * turn.transpose(), center)
     };
     let ((l_a, c_a), (l_b, c_b)) = (place(a, pose_a), place(b, pose_b));
-    // Coordinates in which both are about round where they are nearest: w = F (x - c), FᵀF = L_AᵀL_A + L_BᵀL_B, c the minimiser
-    // of |z_A|² + |z_B|². Coefficients then are of one size.
+    // Coordinates in which both are about round where they are nearest: w = F (x - c), FᵀF = L_AᵀL_A + L_BᵀL_B, c on the way from
+    // B's centre to the minimiser of |z_A|² + |z_B|² as far as |z_B| <= 1. B's coefficients then are of size 1 and A's of the value's.
     let (w_a, w_b) = (l_a.transpose() * l_a, l_b.transpose() * l_b);
     let factor = (w_a + w_b).cholesky()?;
-    let center = factor.solve(&(w_a * c_a + w_b * c_b));
+    let way = factor.solve(&(w_a * c_a + w_b * c_b)) - c_b;
+    let center = c_b + way / (l_b * way).norm().max(1.0);
     let inverse = factor.l().transpose().try_inverse()?;
     let moved = |body: &Body, l: &Matrix3<f64>, c: &Vector3<f64>| -> Vec<Terms> {
         body.constraints().iter().map(|g| substituted(&stored(g), &(l * inverse), &(l * (center - c)))).collect()
@@ -95,7 +96,7 @@ pub(crate) fn level_distance((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &
         lagrangian(&mut rows, multiplier, terms, 1.0);
     }
     program.sum_of_squares(rows, a.degree().max(b.degree()));
-    program.solve().map(|value| -value * scale)
+    program.solve(1.0 / scale).map(|value| -value * scale)
 }
 
 fn stored(constraint: &Constraint) -> Terms {
@@ -193,8 +194,8 @@ impl Program {
         }
     }
 
-    /// The least cost.
-    fn solve(&self) -> Option<f64> {
+    /// The least cost, to 1e-6 of itself or of `size`.
+    fn solve(&self, size: f64) -> Option<f64> {
         let (mut row, mut triplets, mut b) = (0, (vec![], vec![], vec![]), Vec::new());
         let mut push = |entries: &[(usize, f64)], value: f64| {
             for &(column, coefficient) in entries {
@@ -244,7 +245,8 @@ impl Program {
             solver.solve();
             // Thin bodies leave no progress at the last digits: then the residuals decide.
             let info = &solver.info;
-            let small = info.gap_abs.min(info.gap_rel).max(info.res_primal).max(info.res_dual) < 1e-6;
+            let most = 1e-6 * size.max(solver.solution.obj_val.abs());
+            let small = info.gap_abs.max(info.res_primal).max(info.res_dual) < most;
             let stalled = [SolverStatus::AlmostSolved, SolverStatus::InsufficientProgress];
             let solved =
                 solver.solution.status == SolverStatus::Solved || stalled.contains(&solver.solution.status) && small;
