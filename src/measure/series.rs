@@ -69,7 +69,7 @@ pub(super) struct Series {
     last: Last,
     /// The tangents along which it was made.
     tangents: [V3<f64>; 2],
-    /// The last step as it was taken, whether of the series or not.
+    /// The last step that [`Series::take`] has said how much of to take, whether of the series or not.
     way: V3<f64>,
 }
 
@@ -118,23 +118,18 @@ impl Series {
 
     /// Takes down that the step was cut to this.
     #[inline(always)]
-    pub(super) fn took<S: Simd>(&mut self, simd: S, taken: V2) {
+    pub(super) fn took(&mut self, taken: V2) {
         self.last.taken = taken;
-        self.way = across(simd, self.tangents, taken);
     }
 
-    /// The part to take of a step this long relative to the bodies: all of it, but where it leads back as far as the last one has led.
-    /// What is looked for then lies between, and where steps would vanish that change evenly is as good a guess as any: Newton's
-    /// method alone may go to and fro for ever.
+    /// The part to take of a step along these tangents, this long relative to the bodies; see [`part`].
     #[inline(always)]
-    pub(super) fn part<S: Simd>(&self, _: S, step: V3<f64>, length: f64) -> f64 {
-        if length <= FAR || self.last.corrected {
-            return 1.0;
+    pub(super) fn part<S: Simd>(&self, simd: S, tangents: [V3<f64>; 2], step: V2, length: f64) -> f64 {
+        if length > FAR && !self.last.corrected {
+            part(simd, across(simd, self.tangents, self.last.taken), across(simd, tangents, step))
+        } else {
+            1.0
         }
-        let square = |v: V3<f64>| super::vector::dot::<S, f64>(v, v);
-        let (way, now) = (square(self.way).sqrt(), square(step).sqrt());
-        let back = super::vector::dot::<S, f64>(self.way, step) < BACK * way * now;
-        if back && AS_FAR.contains(&(now / way)) { way / (way + now) } else { 1.0 }
     }
 
     /// What to take of a step that is made from a force by a Hessian: no more than is this long by `length`, which measures the step with
@@ -148,7 +143,7 @@ impl Series {
         length: impl Fn(&Vector3<f64>) -> f64,
     ) -> Taken {
         let newton = length(&Vector3::zeros());
-        let before = *self;
+        let (way, was_corrected) = (self.way, self.is_corrected());
         let more = match tangents.filter(|_| newton <= longest || self.is_corrected()) {
             Some(tangents) => self.corrected(tangents, step, newton, force, hessian),
             None => {
@@ -160,8 +155,10 @@ impl Series {
         if taken > longest {
             *self = Self::default();
         }
-        let share = (longest / taken).min(before.part(Scalar, (step + more).into(), taken)).min(1.0);
-        self.way = ((step + more) * share).into();
+        let step: V3<f64> = (step + more).into();
+        let part = if taken > FAR && !was_corrected { part(Scalar, way, step) } else { 1.0 };
+        let share = (longest / taken).min(part);
+        self.way = scaled::<Scalar, f64>(step, share);
         Taken { more, share, length: newton.min(taken) }
     }
 
@@ -211,6 +208,15 @@ pub(super) fn tangents(of_a: &[Vector3<f64>], of_b: &[Vector3<f64>]) -> Option<[
         ([one, other], [_]) | ([_], [one, other]) => Some([one.cross(other).try_normalize(0.0)?.into(), [0.0; 3]]),
         _ => None,
     }
+}
+
+/// The part to take of a step after this way: all of it, but where it leads back about as far. What is looked for then lies between,
+/// and where steps would vanish that change evenly is as good a guess as any: Newton's method alone may go to and fro for ever.
+fn part<S: Simd>(_: S, way: V3<f64>, step: V3<f64>) -> f64 {
+    let dot = super::vector::dot::<S, f64>;
+    let (past, now) = (dot(way, way).sqrt(), dot(step, step).sqrt());
+    let back = dot(way, step) < BACK * past * now && AS_FAR.contains(&(now / past));
+    if back { past / (past + now) } else { 1.0 }
 }
 
 /// Components of a vector along tangents.

@@ -9,7 +9,7 @@ use super::drift::Drift;
 use super::options::Options;
 use super::pose::Pose;
 use super::relation::{Relation, Verdict};
-use super::series::{Correction, Last, Series, across};
+use super::series::{Correction, Last, Series};
 use super::start::{Start, middle};
 use super::tangent::{ALIGNED, Bend, Bracket, Plane, Relative, Response, Side, Step, bracket, moved, newton};
 use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, subtract};
@@ -398,7 +398,7 @@ impl<R: Relation> Correct<'_, R> {
             }
             let mut length = self.relative_length(simd, &step, local);
             let tangents = [at.frame[0], at.frame[1]];
-            let part = series.part(simd, across(simd, tangents, step.along()), length);
+            let part = series.part(simd, tangents, step.along(), length);
             if correct(simd, &mut series, (&mut step, length), (&a, &b), &response, tangents) {
                 length = self.relative_length(simd, &step, local);
             }
@@ -411,7 +411,7 @@ impl<R: Relation> Correct<'_, R> {
             if part < 1.0 {
                 step.shorten(part);
             }
-            series.took(simd, step.along());
+            series.took(step.along());
             at.advance(simd, &step);
         }
         Err(Lost::after(self.most))
