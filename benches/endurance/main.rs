@@ -4,6 +4,7 @@
 //! ```text
 //! cargo bench --bench endurance -- --queries 1e9 --threads 2 --state run.json --seed 1 --summary docs/endurance.md
 //! cargo bench --bench endurance -- --seed 1 --block 4711        # replay one block and tell its failures
+//! cargo bench --bench endurance -- --queries 1e7 --bodies bodies  # pairs of the body files in a folder
 //! ```
 
 #[allow(dead_code)]
@@ -144,7 +145,7 @@ fn main() {
     let mut state = shared.into_inner().expect("no thread panicked");
     keep(&mut state);
     progress(&state, blocks, before, start.elapsed());
-    let text = summary::markdown(&state, arguments.threads);
+    let text = summary::markdown(&state, arguments.bodies.is_some(), arguments.threads);
     println!("{text}");
     if let Some(path) = &arguments.summary {
         state::write(path, &text);

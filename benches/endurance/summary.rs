@@ -4,15 +4,18 @@ use crate::state::State;
 use crate::tally::WANTED;
 use std::fmt::Write;
 
-pub(crate) fn markdown(state: &State, threads: usize) -> String {
+/// `given` says whether the bodies are others than those of the catalogue.
+pub(crate) fn markdown(state: &State, given: bool, threads: usize) -> String {
     let tally = &state.tally;
     let mut text = String::new();
     let mut line = |what: std::fmt::Arguments<'_>| writeln!(text, "{what}").expect("a string takes all");
     line(format_args!("# Endurance\n"));
     line(format_args!(
-        "Random, grazing, aligned and far queries from a catalogue of body pairs; `cargo bench --bench endurance`."
+        "Random, grazing, aligned and far queries of pairs of {}; `cargo bench --bench endurance`.",
+        if given { "given bodies" } else { "the bodies of a catalogue" }
     ));
-    line(format_args!("Block N of this run replays with `-- --seed {} --block N`.\n", state.seed));
+    let with = if given { " --bodies DIR" } else { "" };
+    line(format_args!("Block N of this run replays with `-- --seed {}{with} --block N`.\n", state.seed));
     line(format_args!("| run | |\n|---|---:|"));
     line(format_args!("| bracketed solves | {} |", grouped(tally.solves)));
     line(format_args!("| blocks | {} |", grouped(state.blocks())));

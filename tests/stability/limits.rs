@@ -1,13 +1,16 @@
 //! Families about limits, hints and bad input: 2, 18, 25.
 
-use crate::bodies::{b, e, p, q, zoo};
+use crate::bodies::{b, e, fitted, p, q, zoo};
 use crate::judge::{judged, judged_level, plain, small, verdict, warm};
-use crate::random::{Seeded, pose, shifted};
+use crate::random::{Seeded, draws, pose, shifted};
 use crate::reference;
 use nalgebra::{DMatrix, Matrix3, UnitQuaternion, Vector3};
 use std::sync::atomic::AtomicBool;
 use sublevel::body::{Body, BodyError, Constraint, Normalization};
-use sublevel::measure::{Options, OptionsError, Pose, PoseError, Status, WarmStart, level_distance};
+use sublevel::measure::{
+    Distance, Options, OptionsError, Pose, PoseError, Status, WarmStart, distance_batch, growth_distance,
+    level_distance,
+};
 use sublevel::polynomial::{HessianGram, Polynomial, PolynomialError};
 
 /// Iteration limit passed off as an answer: limit 1, 2, 3: status not converged and the bracket still contains the truth.
@@ -50,6 +53,47 @@ fn family_02_iteration_limit() {
     println!("{wide} wide, {narrow} narrow");
     // A flat pair far from its start can not be solved in one iteration.
     assert!(wide > 0, "no limit was ever felt");
+}
+
+/// Bodies around meshes converge in 30 iterations however far apart, deep in each other, grazing or aligned they are: one by one,
+/// in batches, and where their centres all but coincide.
+#[test]
+fn fitted_bodies_take_few_iterations() {
+    let bodies = fitted();
+    if bodies.is_empty() {
+        return;
+    }
+    let options = Options::default();
+    let mut most = [0; 3];
+    for seed in 0..draws(2_000) {
+        let mut random = Seeded(290_000 + seed);
+        let (a, b) = (&bodies[random.index(bodies.len())], &bodies[random.index(bodies.len())]);
+        let sum = a.circumscribed().radius + b.circumscribed().radius;
+        let poses: [Pose; 16] = std::array::from_fn(|_| {
+            let reach = match random.index(4) {
+                0 => random.between(1.0, 100.0),
+                1 => random.between(1e-15, 1e-3),
+                _ => 1.6 * random.positive(),
+            };
+            let turn = if random.index(4) == 0 { UnitQuaternion::identity() } else { random.rotation() };
+            // About the interior points: the origin of a fitted body may lie at its foot.
+            pose(a.interior_point() + random.unit() * (reach * sum) - turn * b.interior_point(), &turn)
+        });
+        let here = Pose::identity();
+        let mut answers = [Distance::default(); 16];
+        distance_batch(a, &here, b, &poses, &options, &mut answers).unwrap();
+        for (pose_b, answer) in poses.iter().zip(&answers) {
+            let label = format!("seed {seed} {}-{} {pose_b:?}", a.name(), b.name());
+            let level = level_distance(a, &here, b, pose_b, &options, &mut WarmStart::default());
+            let growth = growth_distance(a, &here, b, pose_b, &options, &mut WarmStart::default());
+            let of_all = [answer.status, level.status, growth.status];
+            assert!(of_all.iter().all(|status| *status == Status::Converged), "{label}: {of_all:?}");
+            let spent = [answer.iterations, level.iterations, growth.iterations];
+            assert!(spent.iter().all(|iterations| *iterations <= 30), "{label}: {spent:?}");
+            most = std::array::from_fn(|i| most[i].max(spent[i]));
+        }
+    }
+    println!("most: distances in batches {}, level distances {}, growth distances {}", most[0], most[1], most[2]);
 }
 
 /// Bad warm start: previous, another pair's, NaN, after a 180° teleport: same bracketed value, only time differs.
