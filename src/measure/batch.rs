@@ -352,9 +352,9 @@ impl Batch<'_> {
         let (close, straight, open) = (within(NEAR), within(ASTRAY), within(f32::MAX.into()) & !overlapping);
         for lane in 0..group.count {
             group.rounds[lane] += rounds;
-            let late = group.rounds[lane] >= MOST_COARSE;
-            let astray = late && straight >> lane & 1 == 0;
-            if open >> lane & 1 == 0 || astray {
+            let (open, late) = (open >> lane & 1 == 1, group.rounds[lane] >= MOST_COARSE);
+            let astray = open && late && straight >> lane & 1 == 0;
+            if !open || astray {
                 self.leave(&group, lane, astray);
             } else if late || close >> lane & 1 == 1 {
                 near.push(&group, lane);

@@ -126,7 +126,7 @@ impl Series {
     #[inline(always)]
     pub(super) fn part<S: Simd>(&self, simd: S, tangents: [V3<f64>; 2], step: V2, length: f64) -> f64 {
         if length > FAR && !self.last.corrected {
-            part(simd, across(simd, self.tangents, self.last.taken), across(simd, tangents, step))
+            part(across(simd, self.tangents, self.last.taken), across(simd, tangents, step))
         } else {
             1.0
         }
@@ -152,11 +152,11 @@ impl Series {
             }
         };
         let taken = length(&more);
-        if taken > longest {
+        let step: V3<f64> = (step + more).into();
+        let part = if taken > FAR && !was_corrected { part(way, step) } else { 1.0 };
+        if taken > longest || part < 1.0 {
             *self = Self::default();
         }
-        let step: V3<f64> = (step + more).into();
-        let part = if taken > FAR && !was_corrected { part(Scalar, way, step) } else { 1.0 };
         let share = (longest / taken).min(part);
         self.way = scaled::<Scalar, f64>(step, share);
         Taken { more, share, length: newton.min(taken) }
@@ -212,10 +212,11 @@ pub(super) fn tangents(of_a: &[Vector3<f64>], of_b: &[Vector3<f64>]) -> Option<[
 
 /// The part to take of a step after this way: all of it, but where it leads back about as far. What is looked for then lies between,
 /// and where steps would vanish that change evenly is as good a guess as any: Newton's method alone may go to and fro for ever.
-fn part<S: Simd>(_: S, way: V3<f64>, step: V3<f64>) -> f64 {
-    let dot = super::vector::dot::<S, f64>;
-    let (past, now) = (dot(way, way).sqrt(), dot(step, step).sqrt());
-    let back = dot(way, step) < BACK * past * now && AS_FAR.contains(&(now / past));
+#[inline(always)]
+fn part(way: V3<f64>, step: V3<f64>) -> f64 {
+    let (way, step) = (Vector3::from(way), Vector3::from(step));
+    let (past, now) = (way.norm(), step.norm());
+    let back = way.dot(&step) < BACK * past * now && AS_FAR.contains(&(now / past));
     if back { past / (past + now) } else { 1.0 }
 }
 

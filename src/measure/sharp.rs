@@ -21,7 +21,7 @@ const MAX_STEPS: u32 = 48;
 /// Most changes of the active constraints: a start with more wrong ones is near no solution.
 const MAX_REVISED: u32 = 4;
 
-/// Steps after which one of the level distance's is still cut leads nowhere.
+/// Steps of the level distance after which one that is still cut leads nowhere.
 const PATIENCE: u32 = 8;
 
 /// Share of the evaluation's bound in doubles that bounds one of twice the precision: both count a few hundred roundings.

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, Matrix3, UnitQuaternion, Vector3};
 use std::sync::atomic::AtomicBool;
 use sublevel::body::{Body, BodyError, Constraint, Normalization};
 use sublevel::measure::{
-    Distance, Options, OptionsError, Pose, PoseError, Status, WarmStart, distance_batch, growth_distance,
+    Distance, Options, OptionsError, Pose, PoseError, Status, WarmStart, distance, distance_batch, growth_distance,
     level_distance,
 };
 use sublevel::polynomial::{HessianGram, Polynomial, PolynomialError};
@@ -64,7 +64,7 @@ fn fitted_bodies_take_few_iterations() {
         return;
     }
     let options = Options::default();
-    let mut most = [0; 3];
+    let mut most = [0; 4];
     for seed in 0..draws(2_000) {
         let mut random = Seeded(290_000 + seed);
         let (a, b) = (&bodies[random.index(bodies.len())], &bodies[random.index(bodies.len())]);
@@ -85,15 +85,16 @@ fn fitted_bodies_take_few_iterations() {
         for (pose_b, answer) in poses.iter().zip(&answers) {
             let label = format!("seed {seed} {}-{} {pose_b:?}", a.name(), b.name());
             let level = level_distance(a, &here, b, pose_b, &options, &mut WarmStart::default());
+            let cold = distance(a, &here, b, pose_b, &options, &mut WarmStart::default());
             let growth = growth_distance(a, &here, b, pose_b, &options, &mut WarmStart::default());
-            let of_all = [answer.status, level.status, growth.status];
+            let of_all = [answer.status, cold.status, level.status, growth.status];
             assert!(of_all.iter().all(|status| *status == Status::Converged), "{label}: {of_all:?}");
-            let spent = [answer.iterations, level.iterations, growth.iterations];
+            let spent = [answer.iterations, cold.iterations, level.iterations, growth.iterations];
             assert!(spent.iter().all(|iterations| *iterations <= 30), "{label}: {spent:?}");
             most = std::array::from_fn(|i| most[i].max(spent[i]));
         }
     }
-    println!("most: distances in batches {}, level distances {}, growth distances {}", most[0], most[1], most[2]);
+    println!("most: distances in batches {}, alone {}, level {}, growth {}", most[0], most[1], most[2], most[3]);
 }
 
 /// Bad warm start: previous, another pair's, NaN, after a 180° teleport: same bracketed value, only time differs.

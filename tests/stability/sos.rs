@@ -246,7 +246,7 @@ impl Program {
             // Thin bodies leave no progress at the last digits: then the residuals decide.
             let info = &solver.info;
             let most = 1e-6 * size.max(solver.solution.obj_val.abs());
-            let small = info.gap_abs.max(info.res_primal).max(info.res_dual) < most;
+            let small = info.gap_abs < most && info.res_primal.max(info.res_dual) < most.min(1e-6);
             let stalled = [SolverStatus::AlmostSolved, SolverStatus::InsufficientProgress];
             let solved =
                 solver.solution.status == SolverStatus::Solved || stalled.contains(&solver.solution.status) && small;

@@ -108,8 +108,14 @@ impl Distance {
     }
 }
 
-/// Distance of the poses relative to the sum of the bodies' sizes, above which they are far apart.
+/// Distance of the bodies' middles relative to the sum of their sizes, above which they are far apart.
 const FAR: f64 = 2.0;
+
+fn far_apart((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose)) -> bool {
+    let (ball_a, ball_b) = (a.circumscribed(), b.circumscribed());
+    let middles = (pose_a.transform_point(&ball_a.center), pose_b.transform_point(&ball_b.center));
+    (middles.0 - middles.1).norm() > FAR * (ball_a.radius + ball_b.radius)
+}
 
 /// Euclidean distance between solid `a` at `pose_a` and solid `b` at `pose_b` (body to world), 0 when they touch or overlap;
 /// of solids with several parts, that of their closest parts.
@@ -171,9 +177,7 @@ pub(super) fn between(
     // Where edges face each other no single constraint is to be followed.
     let smooth = a.is_smooth() && b.is_smooth();
     // From far away it does other than lanes, which bring no points back that have come too far from the bodies.
-    let astray = matches!(warm.hint, Hint::Astray)
-        && pose_a.translation().metric_distance(pose_b.translation())
-            < FAR * (a.circumscribed().radius + b.circumscribed().radius);
+    let astray = matches!(warm.hint, Hint::Astray) && !far_apart((a, pose_a), (b, pose_b));
     if smooth && !astray && !lost.touching() && !options.exhausted(lost.rounds) {
         let most = SEEK_ROUNDS.min(options.max_iterations() - lost.rounds);
         match dispatch(Cold { seek: Seek { a, b, relation, from: None, most, options }, warm }) {

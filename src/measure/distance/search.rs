@@ -143,7 +143,7 @@ impl<'a> Search<'a> {
         if !self.ended() {
             self.outlined();
         }
-        let tried = (self.x, self.y, self.n);
+        let before = (self.x, self.y, self.n);
         if !self.ended() {
             self.again();
         }
@@ -158,7 +158,7 @@ impl<'a> Search<'a> {
             self.closest(NEAREST);
         }
         // From the same points it would end the same.
-        if !self.ended() && (self.x, self.y, self.n) != tried {
+        if !self.ended() && (self.x, self.y, self.n) != before {
             self.again();
         }
         // A bracket that holds 0 but is not sure of contact is as wide as rounding left it.

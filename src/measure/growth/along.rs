@@ -149,7 +149,7 @@ impl Relation for Along {
         let upper = (t + rest / self.radius) * (1.0 + SLACK);
         // The bracket of the distance is not a number where its points are not proven to be in the bodies.
         let narrow =
-            upper - lower <= tolerance(self.accuracy, upper, delta_error / self.radius) && found.off <= ALIGNED;
+            upper - lower <= tolerance(self.accuracy, upper, self.delta_error / self.radius) && found.off <= ALIGNED;
         // Without a bound above 0 there is no normal either: the centres may coincide.
         if lower > 0.0 && width > 0.0 && found.upper.is_finite() && narrow {
             Verdict::Proven { lower, upper }

@@ -57,10 +57,10 @@ pub struct GrowthDistance {
     pub upper: f64,
     /// A point of both bodies grown by `upper`, metres: where they touch.
     pub witness: Vector3<f64>,
-    /// Unit normal of the contact, from the second body to the first; none if the centres coincide.
+    /// Unit normal of the contact, from the second body to the first; none if the centres coincide as far as doubles can tell.
     pub normal: Option<Vector3<f64>>,
     /// Derivatives with respect to the twists of the first and of the second body (1/m and 1/rad), one of them where they
-    /// are not unique; none if the centres coincide.
+    /// are not unique; none if the centres coincide as far as doubles can tell.
     pub gradients: Option<[Twist; 2]>,
     /// Whether another pair of parts may be as soon to touch, their brackets meeting: normal, witness and gradients may then jump.
     /// Never for single bodies.
@@ -127,7 +127,9 @@ pub(super) fn between(
 ) -> GrowthDistance {
     let along = Along::new(a, pose_a, b, pose_b, options.accuracy());
     let mut spent = 0;
-    if let Hint::Smooth(trace) = &mut warm.hint {
+    if let Hint::Smooth(trace) = &mut warm.hint
+        && along.is_sure()
+    {
         match dispatch(Follow { a, b, relation: along, options, trace }) {
             Ok(proven) => return along.answer(a, pose_a, pose_b, &proven),
             Err(lost) => spent = lost.rounds,
@@ -265,7 +267,8 @@ impl Search<'_> {
     /// Whether the bracket is as narrow as asked for.
     fn done(&self) -> bool {
         let Frame { delta_error, radius_a, radius_b, .. } = self.frame;
-        self.upper - self.lower <= tolerance(self.options.accuracy(), self.upper, delta_error / (radius_a + radius_b))
+        let tolerance = tolerance(self.options.accuracy(), self.upper, delta_error / (radius_a + radius_b));
+        self.upper.is_finite() && self.upper - self.lower <= tolerance
     }
 
     /// Whether the bracket is narrow enough or no more may be done.
@@ -401,7 +404,8 @@ impl Search<'_> {
             let slope = n * (self.upper / n.dot(delta) / pair.unit());
             pair.direction_to_world(&slope)
         });
-        let narrow = self.upper - self.lower <= self.options.accuracy() * self.upper.max(1.0);
+        let width = self.upper - self.lower;
+        let narrow = self.upper.is_finite() && width <= self.options.accuracy() * self.upper.max(1.0);
         GrowthDistance {
             status: if narrow { Status::Converged } else { Status::BracketWide },
             lower: self.lower,
