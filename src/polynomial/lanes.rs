@@ -2,7 +2,7 @@
 
 use super::Polynomial;
 use super::hessian_form::NumberJet;
-use super::number::Number;
+use super::number::{Constant, Number};
 use super::simd::Simd;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -69,7 +69,7 @@ macro_rules! functions {
 }
 
 macro_rules! numbers {
-    ($lanes:ident of $real:ident as $mask:ident, at most $most:ident, from $tiny:literal on: $splat:ident $neg:ident $fused:ident $le:ident $and:ident $select:ident,
+    ($lanes:ident of $real:ident, $precision:ident, as $mask:ident, at most $most:ident, from $tiny:literal on: $splat:ident $neg:ident $fused:ident $le:ident $and:ident $select:ident,
      $($functions:tt)*) => {
         impl<S: Simd> Neg for $lanes<S> {
             type Output = Self;
@@ -88,6 +88,10 @@ macro_rules! numbers {
             #[inline(always)]
             fn splat(simd: S, value: f64) -> Self {
                 Self { simd, values: simd.$splat(value as $real) }
+            }
+            #[inline(always)]
+            fn constant(simd: S, value: &Constant) -> Self {
+                Self { simd, values: simd.$splat(value.$precision) }
             }
             #[inline(always)]
             fn mul_add(self, b: Self, c: Self) -> Self {
@@ -134,10 +138,10 @@ macro_rules! numbers {
         }
     };
 }
-numbers!(Lanes of f64 as m64s, at most MAX_LANES, from 1e-150 on:
+numbers!(Lanes of f64, double, as m64s, at most MAX_LANES, from 1e-150 on:
     splat_f64s neg_f64s mul_add_e_f64s less_than_or_equal_f64s and_m64s select_f64s,
     sqrt sqrt_f64s, abs abs_f64s, min min_f64s other, max max_f64s other);
-numbers!(Singles of f32 as m32s, at most MAX_SINGLES, from 1e-18 on:
+numbers!(Singles of f32, single, as m32s, at most MAX_SINGLES, from 1e-18 on:
     splat_f32s neg_f32s mul_add_e_f32s less_than_or_equal_f32s and_m32s select_f32s,
     sqrt sqrt_f32s, abs abs_f32s, min min_f32s other, max max_f32s other);
 

@@ -13,7 +13,7 @@
 
 use super::hessian_form::NumberJet;
 use super::monomial::{Exponents, count};
-use super::number::Number;
+use super::number::{Constant, Number};
 use super::simd::Simd;
 use std::cmp::Ordering;
 
@@ -22,7 +22,7 @@ use std::cmp::Ordering;
 #[derive(Clone, Debug)]
 pub(super) struct Nested {
     degree: usize,
-    coefficients: Vec<f64>,
+    coefficients: Vec<Constant>,
 }
 
 impl Nested {
@@ -34,7 +34,7 @@ impl Nested {
                 for i in (0..=degree - k - j).rev() {
                     let exponents = [i as u8, j as u8, k as u8];
                     let known = terms.binary_search_by_key(&exponents, |term| term.0);
-                    coefficients.push(known.map_or(0.0, |index| terms[index].1));
+                    coefficients.push(known.map_or(0.0, |index| terms[index].1).into());
                 }
             }
         }
@@ -82,7 +82,7 @@ macro_rules! unrolled {
 
 /// The coefficients that are left.
 struct Coefficients<'a, const K: usize> {
-    all: &'a [f64; K],
+    all: &'a [Constant; K],
     taken: usize,
 }
 
@@ -90,7 +90,7 @@ impl<const K: usize> Coefficients<'_, K> {
     #[inline(always)]
     fn next<S: Simd, N: Number<S>>(&mut self, simd: S) -> N {
         self.taken += 1;
-        N::splat(simd, self.all[self.taken - 1])
+        N::constant(simd, &self.all[self.taken - 1])
     }
 }
 
@@ -134,7 +134,7 @@ fn in_x_y<S: Simd, N: Number<S>, const DEGREE: usize, const K: usize>(
 #[inline(always)]
 fn jet<S: Simd, N: Number<S>, const DEGREE: usize, const K: usize>(
     simd: S,
-    coefficients: &[f64],
+    coefficients: &[Constant],
     [x, y, z]: [N; 3],
 ) -> NumberJet<N> {
     // One check of the length here, none below.

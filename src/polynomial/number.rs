@@ -6,6 +6,19 @@ use super::simd::Simd;
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+/// A constant in both precisions, as vectors of either load it without a conversion.
+#[derive(Clone, Copy, Debug)]
+pub struct Constant {
+    pub(super) double: f64,
+    pub(super) single: f32,
+}
+
+impl From<f64> for Constant {
+    fn from(value: f64) -> Self {
+        Self { double: value, single: value as f32 }
+    }
+}
+
 /// Real numbers that are computed with: one double, or several doubles or singles side by side that know nothing of each other.
 pub trait Number<S: Simd>:
     Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
@@ -21,6 +34,8 @@ pub trait Number<S: Simd>:
 
     /// The same value in every lane, rounded to the precision at hand.
     fn splat(simd: S, value: f64) -> Self;
+    /// The same of a constant that was rounded before.
+    fn constant(simd: S, value: &Constant) -> Self;
     /// `self b + c`, with one rounding where that is fast and two where not.
     fn mul_add(self, b: Self, c: Self) -> Self;
     /// Square root.
@@ -54,6 +69,10 @@ impl<S: Simd> Number<S> for f64 {
     #[inline(always)]
     fn splat(_: S, value: f64) -> Self {
         value
+    }
+    #[inline(always)]
+    fn constant(_: S, value: &Constant) -> Self {
+        value.double
     }
     #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {

@@ -3,7 +3,7 @@
 use super::Polynomial;
 use super::hessian_form::NumberJet;
 use super::lanes::Vector;
-use super::number::Number;
+use super::number::{Constant, Number};
 use super::simd::Simd;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -40,6 +40,10 @@ impl<S: Simd, N: Vector<S>> Number<S> for Twice<N> {
     #[inline(always)]
     fn splat(simd: S, value: f64) -> Self {
         Self([N::splat(simd, value); 2])
+    }
+    #[inline(always)]
+    fn constant(simd: S, value: &Constant) -> Self {
+        Self([N::constant(simd, value); 2])
     }
     #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
