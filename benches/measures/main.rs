@@ -24,7 +24,7 @@ use sublevel::chart::duel::{Coal, CoalRun};
 ///
 /// Bodies are fitted once to the meshes in SUBLEVEL_DATA and kept in target/bench-bodies (delete it after changes to the
 /// fit), where the pose files are left, too. SUBLEVEL_COAL names the program that '../shared/peers/build.sh' builds;
-/// without it coal's rows, and the ratios to them, are left out.
+/// without it coal's rows, and the ratios to them, are left out. SUBLEVEL_SIMD=avx2 measures what processors without AVX-512 do.
 #[derive(Debug, Parser)]
 #[command(name = "measures", max_term_width = 100)]
 struct Args {
@@ -59,7 +59,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     } else {
         Effort { trajectories: 4, poses: 1024, passes: 15 }
     };
-    let names: Vec<String> = objects::PAIRS.iter().map(|(a, b)| format!("{a}-{b}")).collect();
+    let names: Vec<String> = objects::PAIRS.iter().map(|(a, b, _)| format!("{a}-{b}")).collect();
     if let Some(unknown) = args.pair.iter().find(|&name| !names.contains(name)) {
         return Err(format!("--pair: no pair is named '{unknown}'; there are {}", names.join(", ")).into());
     }
@@ -72,11 +72,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let mut report = Report::new(coal.as_ref());
     report.print_head();
-    for ((a, b), name) in objects::PAIRS.into_iter().zip(names) {
+    for ((a, b, coal_warm), name) in objects::PAIRS.into_iter().zip(names) {
         if !args.pair.is_empty() && !args.pair.contains(&name) {
             continue;
         }
-        let pair = Pair { name, a: Object::load(a)?, b: Object::load(b)? };
+        let pair = Pair { name, a: Object::load(a)?, b: Object::load(b)?, coal_warm };
         for kind in [Kind::Separated, Kind::Grazing, Kind::Contact] {
             if args.kind.is_some_and(|only| only != kind) {
                 continue;

@@ -10,6 +10,7 @@ use sublevel::measure::{
     Distance, ImpactOptions, ImpactStatus, Motion, Options, Pose, Ray, RayCast, Status, WarmStart, cast_ray, distance,
     distance_batch, growth_distance, level_distance, penetration, signed_distance, time_of_impact,
 };
+use sublevel::polynomial::widest;
 
 /// Label of coal's rows.
 pub(crate) const COAL_WARM: &str = "coal GJK warm";
@@ -159,10 +160,12 @@ fn distance_batches<'a>(scene: &'a Scene<'a>) -> Row<'a> {
             .expect("there are poses, and places for answers");
     };
     let judge = |answer: &Distance| Answer::new(answer.iterations, answer.status, answer.lower <= 0.0);
-    let nanoseconds = if sublevel::chart::simd() == "AVX-512" { 120.0 } else { 200.0 };
-    let nanoseconds = if scene.kind == Kind::Grazing { 2.0 * nanoseconds } else { nanoseconds };
+    let apart = if widest() == "AVX-512" { 120.0 } else { 200.0 };
+    let nanoseconds = if scene.kind == Kind::Grazing { 2.0 * apart } else { apart };
     Row::batches(format!("distance batches, degree {DEGREE}"), scene.poses(DEGREE), BATCH, batch, judge)
         .at_most(Target::Nanoseconds(nanoseconds))
+        // The same figure on a machine of any speed.
+        .at_most(scene.part(COAL_WARM, apart / scene.pair.coal_warm))
         .at_most(Target::MostIterations(30))
 }
 

@@ -274,7 +274,7 @@ impl Body {
         }
         let interior_z = normalization.linear * (interior_point - normalization.center);
         let outline = Outline::new(&constraints, &inverse, &interior_z);
-        let trust = Trust::new(&constraints, &normalization.linear, &inverse, &z_extent, outline.reach(), &interior_z);
+        let trust = Trust::new(&constraints, &normalization, &inverse, &z_extent, outline.reach(), &interior_z);
         let volume = surface::volume(&constraints, &normalization.linear, &interior_z);
         let id = BodyId::of(&normalization, &constraints, None);
         Ok(Self {

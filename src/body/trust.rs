@@ -1,7 +1,7 @@
 //! Error bounds and curvature bounds that hold wherever the normalized coordinates of a point lie in a ball a little larger
 //! than the body: made once, so that a query near the body pays for none of them.
 
-use super::{Constraint, largest};
+use super::{Constraint, Normalization, largest};
 use crate::polynomial::{ThirdCeiling, gamma};
 use nalgebra::{Matrix3, Vector3};
 
@@ -15,6 +15,8 @@ pub struct Trust {
     pub radius: f64,
     /// Bound of the distance of points of the ball from the normalization's centre.
     pub reach: f64,
+    /// Distance of the normalization's centre from the origin of the body frame.
+    pub center: f64,
     /// Bound of the distance between points of the ball and of the body.
     pub span: f64,
     /// Bound of the displacement of a point per distance from the centre by the roundings of `z = M (v - o)`, for an M of
@@ -60,7 +62,7 @@ impl Trust {
     /// Bounds for a body whose points hardly have normalized coordinates longer than `reach`.
     pub(super) fn new(
         constraints: &[Constraint],
-        linear: &Matrix3<f64>,
+        Normalization { center, linear }: &Normalization,
         inverse: &Matrix3<f64>,
         extent: &Vector3<f64>,
         reach: f64,
@@ -97,6 +99,7 @@ impl Trust {
         Self {
             radius,
             reach: inverse_norm * ball,
+            center: center.norm(),
             span: inverse_norm * ball + columns.dot(extent) * slack,
             rounding: gamma(16) * rows.dot(&columns) * slack,
             condition: norm * inverse_norm,

@@ -1,5 +1,6 @@
 //! What figures were measured on and with, for the head of a report.
 
+use crate::polynomial::widest;
 use serde::Serialize;
 use std::fs;
 use std::process::Command;
@@ -12,7 +13,7 @@ pub struct Machine {
     pub cpu: String,
     /// Cores that can be used at once.
     pub cores: usize,
-    /// What [`simd`] says.
+    /// What [`widest`] says.
     pub simd: &'static str,
     /// The sources: what `git describe` says of them, while they are where this was built.
     pub commit: String,
@@ -28,7 +29,7 @@ impl Machine {
         Self {
             cpu: cpu(),
             cores: std::thread::available_parallelism().map_or(0, usize::from),
-            simd: simd(),
+            simd: widest(),
             commit: said("git", &["describe", "--always", "--dirty", "--tags"]),
             rustc: said("rustc", &["--version"]),
             date: date(SystemTime::now()),
@@ -59,20 +60,6 @@ fn cpu() -> String {
         (Some(name), ..) => name,
         _ => std::env::consts::ARCH.to_owned(),
     }
-}
-
-/// The widest arithmetic of this processor: "AVX-512", "AVX2" or "baseline".
-pub fn simd() -> &'static str {
-    #[cfg(target_arch = "x86_64")]
-    {
-        if is_x86_feature_detected!("avx512f") {
-            return "AVX-512";
-        }
-        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-            return "AVX2";
-        }
-    }
-    "baseline"
 }
 
 /// The version of a package that is built in.

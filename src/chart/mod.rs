@@ -46,7 +46,7 @@ pub use curve::{LineChart, Mark, Series};
 #[cfg(feature = "chart")]
 pub use detail::{Detail, detail};
 #[cfg(feature = "chart")]
-pub use machine::{Machine, simd};
+pub use machine::Machine;
 #[cfg(feature = "chart")]
 pub use scatter::{Group, Marker, Point, Scatter, Stairs};
 pub use shadow::shadow;

@@ -193,6 +193,7 @@ impl Goal {
 }
 
 /// Distance of two bodies as far as the goal needs it, cheapest bounds first. `warm` stays as it is when they suffice.
+#[inline]
 pub(super) fn settle(
     of_a: (&Body, &Pose),
     of_b: (&Body, &Pose),

@@ -77,7 +77,7 @@ impl<N: Copy> Relative<N> {
         }
         let linear = rows(simd, &b.normalization().linear);
         let trust = b.trust();
-        let fixed = (TURNED + trust.rounding) * trust.reach + TURNED * center_b.norm() + gamma(8) * center_a.norm();
+        let fixed = (TURNED + trust.rounding) * trust.reach + TURNED * trust.center + gamma(8) * a.trust().center;
         let far = translation[0].abs() + translation[1].abs() + translation[2].abs();
         Self {
             rotation,
@@ -175,13 +175,11 @@ impl<'a, N: Copy> Side<'a, N> {
             Plane { value, gradient: [dot(gradient, local[0]), dot(gradient, local[1]), dot(gradient, local[2])] };
         // Second derivatives fall by at most T per length. Within 3 μ / (2 T) a rise of ½ μ |δ|² keeps half of it, and being
         // convex it only steepens after that.
-        let third_ceiling = self.trust().third.ceiling;
-        let ceiling = N::splat(simd, third_ceiling);
+        let ceiling = N::splat(simd, self.trust().third.ceiling);
         let length = square.sqrt();
         let error = N::splat(simd, self.trust().curvature_error);
         let curvature = smallest_eigenvalue(simd, &jet.hessian) - error - ceiling * length;
-        let radius =
-            (N::splat(simd, 1.5 * (1.0 - 1e-12) / third_ceiling) * curvature).min(N::splat(simd, 0.5 * leeway));
+        let radius = (N::splat(simd, self.trust().third.kept) * curvature).min(N::splat(simd, 0.5 * leeway));
         Extrapolated {
             plane,
             curvature,
@@ -394,8 +392,8 @@ impl Step<f64> {
 
     /// Whether neither x nor y moves farther than its limit, and the step is a number.
     #[inline(always)]
-    pub(super) fn within<S: Simd>(&self, simd: S, limits: [f64; 2]) -> bool {
-        self.square(simd, limits) <= 1.0
+    pub(super) fn within<S: Simd>(&self, _: S, [of_x, of_y]: [f64; 2]) -> bool {
+        dot::<S, f64>(self.dx, self.dx) <= of_x * of_x && dot::<S, f64>(self.dy, self.dy) <= of_y * of_y
     }
 }
 

@@ -25,6 +25,14 @@ pub struct ThirdCeiling {
     pub ceiling: f64,
     /// Length of a step from a point near the level along which the bound holds.
     pub leeway: f64,
+    /// Length per second derivative along which a rise keeps half of what that alone would make it: 3/2 over the ceiling.
+    pub kept: f64,
+}
+
+impl ThirdCeiling {
+    fn new(ceiling: f64, leeway: f64) -> Self {
+        Self { ceiling, leeway, kept: 1.5 * (1.0 - 1e-12) / ceiling }
+    }
 }
 
 /// Bound over the points with `|z_i| <= radius` where the convex `p` is within [`NEAR_LEVEL`] of 1, and along steps of the leeway
@@ -35,7 +43,7 @@ pub(super) fn third_ceiling(p: &Polynomial, radius: f64, absolute: f64) -> Third
     let leeway = SURROUNDINGS * half;
     let degree = p.degree();
     if degree < 3 {
-        return ThirdCeiling { ceiling: 0.0, leeway: f64::INFINITY };
+        return ThirdCeiling::new(0.0, f64::INFINITY);
     }
     let dense = dense(p.terms());
     let corner = |i: usize| 2.0 * i as f64 * half - radius;
@@ -70,7 +78,7 @@ pub(super) fn third_ceiling(p: &Polynomial, radius: f64, absolute: f64) -> Third
         }
     }
     // Each coefficient passed through fewer than 3 * 8 * 2 roundings, on a sum bounded by the one of absolute values.
-    ThirdCeiling { ceiling: (largest * (1.0 + 1e-12) + gamma(100) * absolute) * (1.0 + 1e-12), leeway }
+    ThirdCeiling::new((largest * (1.0 + 1e-12) + gamma(100) * absolute) * (1.0 + 1e-12), leeway)
 }
 
 /// Bound of the Frobenius norm of the third derivative at all points within `distance`, by Taylor's formula: the k-th derivative

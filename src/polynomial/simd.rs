@@ -8,23 +8,48 @@ use std::sync::LazyLock;
 
 pub use pulp::{Arch, Scalar, Simd, WithSimd};
 
-/// Does work that is lanes throughout with the widest arithmetic of this processor.
+/// The widest arithmetic of this processor, or less if the environment variable `SUBLEVEL_SIMD` asks for `avx2` or `baseline`: to
+/// compare them, and for the same bits on machines of several kinds. Any other value is as none.
+static WIDEST: LazyLock<Arch> = LazyLock::new(|| match std::env::var("SUBLEVEL_SIMD").as_deref() {
+    Ok("baseline") => Arch::Scalar,
+    Ok("avx2") => at_most_avx2(Arch::new()),
+    _ => Arch::new(),
+});
+
+/// What [`dispatch`] uses.
+static SUITED: LazyLock<Arch> = LazyLock::new(|| at_most_avx2(*WIDEST));
+
+/// This arithmetic, or AVX2 in place of wider vectors.
+fn at_most_avx2(arch: Arch) -> Arch {
+    match arch {
+        #[cfg(target_arch = "x86_64")]
+        Arch::V4(_) => pulp::x86::V3::try_new().map_or(arch, Arch::V3),
+        _ => arch,
+    }
+}
+
+/// The widest arithmetic in use: "AVX-512", "AVX2" or "baseline".
+pub fn widest() -> &'static str {
+    match *WIDEST {
+        #[cfg(target_arch = "x86_64")]
+        Arch::V4(_) => "AVX-512",
+        #[cfg(target_arch = "x86_64")]
+        Arch::V3(_) => "AVX2",
+        _ => "baseline",
+    }
+}
+
+/// Does work that is lanes throughout with the widest arithmetic in use.
 #[inline]
 pub fn dispatch_lanes<T: WithSimd>(work: T) -> T::Output {
-    static WIDEST: LazyLock<Arch> = LazyLock::new(Arch::new);
     WIDEST.dispatch(work)
 }
 
 /// Does work on single numbers, or on lanes now and then, with AVX2 where the processor has it: among scalar instructions those
 /// of AVX-512 cost more than they save, for while one of them is under way a port less takes all others. The searches of
 /// penetration depths, lanes between scalar work, are 4 % faster so.
-#[inline]
+#[inline(always)]
 pub fn dispatch<T: WithSimd>(work: T) -> T::Output {
-    static SUITED: LazyLock<Arch> = LazyLock::new(|| match Arch::new() {
-        #[cfg(target_arch = "x86_64")]
-        widest @ Arch::V4(_) => pulp::x86::V3::try_new().map_or(widest, Arch::V3),
-        widest => widest,
-    });
     SUITED.dispatch(work)
 }
 
