@@ -285,6 +285,10 @@ impl<'a> Search<'a> {
         if lost.middle.is_some_and(|middle| self.common(&to_query(middle))) {
             return;
         }
+        // Bodies of one shape on top of each other touch all over: a bad hint finds that, and not that they overlap.
+        if lost.touching() && self.common(&pair.a.interior.lerp(&pair.b.interior, 0.5)) {
+            return;
+        }
         if let Some(grazing) = &lost.grazing {
             self.resume(grazing);
             self.sharpen();
