@@ -357,6 +357,42 @@ fn verify_proves_and_refuses() {
 }
 
 #[test]
+fn narrower_vectors_prove_the_same() {
+    let fitted = fitted();
+    let body = fitted.body();
+    let measure = |simd: Option<&str>| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_sublevel"));
+        command.args(["measure", text(&body), text(&body), "--json", "--pose", "4,1,0.5,0,0,0.6,0.8"]);
+        match simd {
+            Some(value) => command.env("SUBLEVEL_SIMD", value),
+            None => command.env_remove("SUBLEVEL_SIMD"),
+        };
+        let output = command.output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()
+    };
+    let usual = measure(None);
+    let bound = |answer: &Value, key: &str| answer[key].as_f64().unwrap();
+    for simd in ["avx2", "baseline"] {
+        let narrow = measure(Some(simd));
+        assert_eq!(narrow["status"], "converged", "{simd}");
+        for key in ["distance", "level_ab", "level_ba"] {
+            let unit = if key == "distance" { "_m" } else { "" };
+            let [lower, upper] = ["lower", "upper"].map(|end| format!("{key}_{end}{unit}"));
+            let meet =
+                bound(&narrow, &lower) <= bound(&usual, &upper) && bound(&usual, &lower) <= bound(&narrow, &upper);
+            assert!(meet, "{simd}, {key}: {narrow} against {usual}");
+        }
+    }
+    // Fused multiplications and additions round once where plain ones round twice.
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        assert_ne!(measure(Some("baseline")), usual);
+    }
+    assert_eq!(measure(Some("no such thing")), usual);
+}
+
+#[test]
 fn measure_prints_one_line_a_pose() {
     let fitted = fitted();
     let (body, poses) = (fitted.body(), fitted.path("poses.txt"));

@@ -165,7 +165,7 @@ fn distance_batches<'a>(scene: &'a Scene<'a>) -> Row<'a> {
     Row::batches(format!("distance batches, degree {DEGREE}"), scene.poses(DEGREE), BATCH, batch, judge)
         .at_most(Target::Nanoseconds(nanoseconds))
         // The same figure on a machine of any speed.
-        .at_most(scene.part(COAL_WARM, apart / scene.pair.coal_warm))
+        .at_most(scene.part(COAL_WARM, (1e3 * apart / scene.pair.coal_warm).round() / 1e3))
         .at_most(Target::MostIterations(30))
 }
 
