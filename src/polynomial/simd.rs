@@ -8,8 +8,8 @@ use std::sync::LazyLock;
 
 pub use pulp::{Arch, Scalar, Simd, WithSimd};
 
-/// The widest arithmetic of this processor, or less if the environment variable `SUBLEVEL_SIMD` asks for `avx2` or `baseline`: to
-/// compare them, and for the same bits on machines of several kinds. Any other value is as none.
+/// The widest arithmetic of this processor, or less if the environment variable `SUBLEVEL_SIMD` asks for `avx2` or `baseline`, to
+/// compare them. Any other value is as none.
 static WIDEST: LazyLock<Arch> = LazyLock::new(|| match std::env::var("SUBLEVEL_SIMD").as_deref() {
     Ok("baseline") => Arch::Scalar,
     Ok("avx2") => at_most_avx2(Arch::new()),
