@@ -140,6 +140,9 @@ impl LevelLost {
 /// Most evaluations before another method takes over.
 const MAX_ROUNDS: u32 = 8;
 
+/// Evaluations after which an answer to follow should be near: the start from nothing takes few more.
+const PATIENCE: u32 = 2;
+
 /// Most evaluations from a cold start before another method takes over.
 pub(super) const SEEK_ROUNDS: u32 = 20;
 
@@ -183,7 +186,7 @@ impl WithSimd for FollowLevel<'_> {
         let predicted = add::<S, f64>(trace.w, delta);
         let [missed] = trace.drift.expected();
         let most = MAX_ROUNDS.min(options.max_iterations());
-        let (proven, found) = sides.correct(simd, add::<S, f64>(predicted, missed), most, options)?;
+        let (proven, found) = sides.correct(simd, add::<S, f64>(predicted, missed), PATIENCE, most, options)?;
         let mut drift = trace.drift;
         drift.update(simd, [subtract::<S, f64>(found.w, predicted)]);
         *trace = LevelTrace { drift, ..found };
@@ -214,17 +217,18 @@ impl WithSimd for SeekLevel<'_> {
         let Self { a, b, most, options, .. } = self;
         let sides = Sides::new(simd, (a, self.pose_a), (b, self.pose_b), [0, 0]);
         let w = b.normalization().linear * (self.from - b.normalization().center);
-        sides.correct(simd, w.into(), most, options)
+        sides.correct(simd, w.into(), most, most, options)
     }
 }
 
 impl Sides<'_> {
-    /// Newton's method from w until the bracket is narrow.
+    /// Newton's method from w until the bracket is narrow, or steps are still long after `patience` rounds.
     #[inline(always)]
     fn correct<S: Simd>(
         &self,
         simd: S,
         mut w: V3<f64>,
+        patience: u32,
         most: u32,
         options: &Options<'_>,
     ) -> Result<(LevelProven, LevelTrace), LevelLost> {
@@ -273,6 +277,9 @@ impl Sides<'_> {
                     let settled = Some(Settled { point, active: self.active, multiplier: step.multiplier });
                     return Err(LevelLost { rounds, settled });
                 }
+            }
+            if length > ROOM && rounds >= patience {
+                return Err(LevelLost::after(rounds));
             }
             let delta = if length <= ROOM || series.is_corrected() {
                 self.corrected(simd, &mut series, &at, &step, length)
