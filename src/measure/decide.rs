@@ -186,6 +186,11 @@ impl Goal {
         self.near == f64::NEG_INFINITY && self.far == f64::INFINITY
     }
 
+    /// Whether a narrow bracket is an answer, with all that comes with one, and not just a decision.
+    pub(super) fn wants_answer(&self) -> bool {
+        self.near == f64::NEG_INFINITY
+    }
+
     #[inline]
     pub(super) fn met(&self, lower: f64, upper: f64) -> bool {
         upper <= self.near || lower > self.far

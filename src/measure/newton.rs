@@ -17,6 +17,7 @@ use super::linear::solve;
 use super::pair::{Pair, Posed};
 use super::series::{Series, Taken, across, along, tangents};
 use super::smooth::LONGEST;
+use super::tangent::ALIGNED;
 use super::vector::V3;
 use super::warm::ActiveSet;
 use crate::polynomial::Scalar;
@@ -180,12 +181,31 @@ impl Active {
         true
     }
 
-    /// The most violated constraint that is not in the set, if violated by more than rounding.
+    /// How far what the constraints carry at v is from `target`, and how far v is at most from where those that carry anything are met
+    /// and none is violated.
+    fn misfit(&self, body: &Posed<'_>, v: &Vector3<f64>, target: &Vector3<f64>) -> (f64, f64) {
+        let multipliers = self.multipliers();
+        let (mut rest, mut gap) = (*target, 0.0_f64);
+        for (i, multiplier) in multipliers.iter().enumerate().take(body.len()) {
+            let jet = body.jet(i, v);
+            let excess = jet.value - 1.0;
+            rest -= jet.gradient * *multiplier;
+            gap = gap.max(if *multiplier > 0.0 { excess.abs() } else { excess } / jet.gradient.norm());
+        }
+        (rest.norm(), gap)
+    }
+
+    /// The most violated constraint that is not in the set, if violated by more than [`VIOLATED`].
     pub(super) fn violated(&self, body: &Posed<'_>, v: &Vector3<f64>, level: f64) -> Option<usize> {
+        self.violated_by(VIOLATED * level.abs().max(1.0), body, v, level)
+    }
+
+    /// The same if violated by more than `excess`.
+    pub(super) fn violated_by(&self, excess: f64, body: &Posed<'_>, v: &Vector3<f64>, level: f64) -> Option<usize> {
         (0..body.len())
             .filter(|i| !self.index[..self.len].contains(i))
             .map(|i| (i, body.jet(i, v).value - level))
-            .filter(|(_, excess)| *excess > 1e-10 * level.abs().max(1.0))
+            .filter(|(_, by)| *by > excess)
             .max_by(|p, q| p.1.total_cmp(&q.1))
             .map(|(i, _)| i)
     }
@@ -215,7 +235,19 @@ impl At {
 }
 
 /// How far below the highest the value of a constraint may be that counts as active, relative to that or to 1.
-const AT: f64 = 0.1;
+pub(super) const AT: f64 = 0.1;
+
+/// By how much a constraint may be violated, relative to its level, that is not active.
+pub(super) const VIOLATED: f64 = 1e-10;
+
+/// What a value rounds by at most, about.
+const ROUNDED: f64 = 8.0 * f64::EPSILON;
+
+/// Moves relative to the distance between points that are about where they stay.
+const ARRIVED: f64 = 0.1;
+
+/// Cosine of the angle between a normal and one that is about where it points.
+const ABOUT: f64 = 0.1;
 
 /// Largest number of Newton steps and of changes of the active set.
 pub(super) const MAX_STEPS: u32 = 16;
@@ -275,13 +307,19 @@ impl DistanceNewton {
             return 0;
         }
         let mut at = self.evaluate(pair);
-        let (mut pace, mut series) = (Pace::FIRST, Series::default());
+        let (mut pace, mut series, mut turned) = (Pace::FIRST, Series::default(), false);
         for step in 1..=MAX_STEPS.min(limit) {
+            let before = (self.x, self.y);
             let Some(length) = self.step(pair, &at, &mut series) else {
                 // Where both are flat the system is singular, but the point at hand with its multipliers may do.
                 accept(self);
                 return step;
             };
+            let moved = (self.x - before.0).norm() + (self.y - before.1).norm();
+            if !turned && length > LONGEST && moved < ARRIVED * (self.x - self.y).norm() {
+                self.turn(pair);
+                turned = true;
+            }
             at = self.evaluate(pair);
             // A long step has not converged: its bracket is not worth its cost, but for flat bodies now and then.
             let last_step = step == MAX_STEPS.min(limit);
@@ -289,12 +327,13 @@ impl DistanceNewton {
                 return step;
             }
             if length < WORTH_A_BRACKET || step % 4 == 0 {
+                let excess = self.negligible(pair);
                 let changed = self.a.drop_negative()
                     | self.b.drop_negative()
-                    | self.a.violated(&pair.a, &self.x, 1.0).is_some_and(|i| self.a.push(i))
-                    | self.b.violated(&pair.b, &self.y, 1.0).is_some_and(|i| self.b.push(i));
+                    | self.a.violated_by(excess, &pair.a, &self.x, 1.0).is_some_and(|i| self.a.push(i))
+                    | self.b.violated_by(excess, &pair.b, &self.y, 1.0).is_some_and(|i| self.b.push(i));
                 if changed {
-                    (at, pace, series) = (self.evaluate(pair), Pace::FIRST, Series::default());
+                    (at, pace, series, turned) = (self.evaluate(pair), Pace::FIRST, Series::default(), false);
                     continue;
                 }
             }
@@ -303,6 +342,35 @@ impl DistanceNewton {
             }
         }
         MAX_STEPS.min(limit)
+    }
+
+    /// Whether the normal is that of the solution, to [`ALIGNED`] or to what rounding leaves of so short a distance. The narrowest
+    /// of brackets holds it to about the root of its width relative to the distance; the equations tell it as it is: n is along x - y
+    /// and what the constraints of each body carry, none of them is violated, and those that carry anything hold with equality.
+    pub(super) fn is_aligned(&self, pair: &Pair<'_>) -> bool {
+        let (n, apart) = (self.n.normalize(), self.x - self.y);
+        let (turned_a, gap_a) = self.a.misfit(&pair.a, &self.x, &-n);
+        let (turned_b, gap_b) = self.b.misfit(&pair.b, &self.y, &n);
+        let across = (apart - n * n.dot(&apart)).norm();
+        let enough = (ALIGNED * apart.norm()).max(ROUNDED * pair.size());
+        turned_a <= ALIGNED && turned_b <= ALIGNED && across + gap_a + gap_b <= enough
+    }
+
+    /// Turns the normal along x - y, if that is about where it points: of corners and edges that hold both points where they are it is
+    /// off by long steps still.
+    fn turn(&mut self, pair: &Pair<'_>) {
+        let apart = self.x - self.y;
+        let distance = apart.norm().copysign(self.n.dot(&apart));
+        let (n, mut a, mut b) = (apart / distance, self.a, self.b);
+        let about = n.dot(&self.n) > ABOUT * self.n.norm();
+        if about && a.fit(&pair.a, &self.x, &-n) && b.fit(&pair.b, &self.y, &n) {
+            *self = Self { distance, n, a, b, ..*self };
+        }
+    }
+
+    /// By how much a constraint may be violated that is not active: far below the distance, or it decides the normal.
+    fn negligible(&self, pair: &Pair<'_>) -> f64 {
+        (0.1 * ALIGNED * self.distance.abs() / pair.size()).clamp(ROUNDED, VIOLATED)
     }
 
     /// Both bodies at the current iterate.

@@ -7,9 +7,10 @@
 
 use super::level::LevelNewton;
 use super::linear::{Augmented, MAX_UNKNOWNS, solve};
-use super::newton::{Active, At, DistanceNewton};
+use super::newton::{Active, At, DistanceNewton, VIOLATED};
 use super::pair::{Pair, Posed};
 use super::pose::Pose;
+use super::tangent::ALIGNED;
 use super::twofold::{Two, Twos, UNIT, apply, dot, doubles, minus, plus, product, times, transposed, twos};
 use crate::body::largest;
 use crate::polynomial::Polynomial;
@@ -20,6 +21,9 @@ const MAX_STEPS: u32 = 48;
 
 /// Most changes of the active constraints: a start with more wrong ones is near no solution.
 const MAX_REVISED: u32 = 4;
+
+/// By how much a constraint may be violated that is not active, however near the bodies are.
+const NEGLIGIBLE: f64 = 1e-26;
 
 /// Steps of the level distance after which one that is still cut leads nowhere.
 const PATIENCE: u32 = 8;
@@ -174,10 +178,13 @@ impl SharpActive {
         self.set.multiplier = self.multiplier.map(Two::double);
     }
 
-    /// Drops and takes constraints as [`DistanceNewton`] does; whether any.
-    fn revise(&mut self, body: &Posed<'_>, v: &Twos, level: f64) -> bool {
+    /// Drops constraints as [`DistanceNewton`] does and takes one that is violated by more than `excess`; whether any.
+    fn revise(&mut self, body: &SharpBody<'_>, v: &Twos, level: f64, excess: f64) -> bool {
         let mut set = self.set;
-        let changed = set.drop_negative() | set.violated(body, &doubles(v), level).is_some_and(|i| set.push(i));
+        let over = |i: usize| (body.jet(i, v).value - Two::from(level)).double();
+        let rest = (0..body.posed.len()).filter(|i| set.bits() >> i & 1 == 0).map(|i| (i, over(i)));
+        let worst = rest.filter(|(_, over)| *over > excess).max_by(|p, q| p.1.total_cmp(&q.1));
+        let changed = set.drop_negative() | worst.is_some_and(|(i, _)| set.push(i));
         if changed {
             *self = Self::new(&set);
         }
@@ -201,6 +208,8 @@ pub(super) struct SharpDistance {
     pub(super) x: Vector3<f64>,
     pub(super) y: Vector3<f64>,
     pub(super) n: Vector3<f64>,
+    /// Whether n is the normal of the solution, to [`ALIGNED`].
+    pub(super) aligned: bool,
     pub(super) active: (Active, Active),
 }
 
@@ -283,7 +292,8 @@ impl<'a> SharpPair<'a> {
                 if accept(&common.unwrap_or_else(|| self.distance_bracket(&x, &y, &of_a, &of_b))) {
                     return step;
                 }
-                let changed = of_a.revise(self.a.posed, &x, 1.0) | of_b.revise(self.b.posed, &y, 1.0);
+                let excess = (0.1 * ALIGNED * d.double().abs()).clamp(NEGLIGIBLE, VIOLATED);
+                let changed = of_a.revise(&self.a, &x, 1.0, excess) | of_b.revise(&self.b, &y, 1.0, excess);
                 revised += u32::from(changed);
                 if revised > MAX_REVISED || !changed && length < 1e-28 {
                     return step;
@@ -299,12 +309,12 @@ impl<'a> SharpPair<'a> {
         let both = self.a.value_upper(&middle) <= 1.0 && self.b.value_upper(&middle) <= 1.0;
         let v = doubles(&middle);
         let active = (of_a.set, of_b.set);
-        both.then_some(SharpDistance { lower: 0.0, upper: 0.0, x: v, y: v, n: Vector3::x(), active })
+        both.then_some(SharpDistance { lower: 0.0, upper: 0.0, x: v, y: v, n: Vector3::x(), aligned: false, active })
     }
 
     fn distance_bracket(&self, x: &Twos, y: &Twos, of_a: &SharpActive, of_b: &SharpActive) -> SharpDistance {
-        let (_, sum_a, _) = self.a.at(of_a, x);
-        let (_, sum_b, _) = self.b.at(of_b, y);
+        let (a, sum_a, values_a) = self.a.at(of_a, x);
+        let (b, sum_b, values_b) = self.b.at(of_b, y);
         let n = times(&minus(&sum_b, &sum_a), Two::from(0.5));
         let falls = self.a.descent(x, &n, of_a) + self.b.descent(y, &n.map(|value| -value), of_b);
         let length = dot(&n, &n).sqrt();
@@ -318,6 +328,16 @@ impl<'a> SharpPair<'a> {
             _ => (f64::INFINITY, *x, *y),
         };
         let lower = (bound - Two::from(slack)).double().next_down();
+        // As for doubles: opposite forces, the points along them, and no slack of what carries any.
+        let apart = minus(&p, &q);
+        let across = minus(&times(&apart, length), &times(&n, dot(&n, &apart) / length));
+        let slack = |of: &SharpActive, at: &At, values: &[Two; 3]| {
+            let carrying = (0..of.set.len).filter(|&k| of.multiplier[k].is_positive());
+            let gaps = carrying.map(|k| (Two::from(1.0) - values[k]).double().abs() / at.gradient[k].norm());
+            gaps.fold(0.0, f64::max)
+        };
+        let missed = doubles(&across).norm() + slack(of_a, &a, &values_a) + slack(of_b, &b, &values_b);
+        let opposite = doubles(&plus(&sum_a, &sum_b)).norm() <= ALIGNED;
         SharpDistance {
             // Not `max`: a NaN bounds nothing.
             lower: if lower > 0.0 { lower } else { 0.0 },
@@ -325,6 +345,7 @@ impl<'a> SharpPair<'a> {
             x: doubles(&p),
             y: doubles(&q),
             n: doubles(&n) / length.double(),
+            aligned: opposite && missed <= ALIGNED * doubles(&apart).norm(),
             active: (of_a.set, of_b.set),
         }
     }
@@ -372,7 +393,10 @@ impl<'a> SharpPair<'a> {
                 if lone {
                     of_b.set.len = 0;
                 }
-                let changed = lone | of_a.revise(self.a.posed, &x, s.double()) | of_b.revise(self.b.posed, &x, 1.0);
+                let level = s.double();
+                let changed = lone
+                    | of_a.revise(&self.a, &x, level, VIOLATED * level.abs().max(1.0))
+                    | of_b.revise(&self.b, &x, 1.0, VIOLATED);
                 revised += u32::from(changed);
                 let astray = step >= PATIENCE && damping < 1.0;
                 if revised > MAX_REVISED || astray || !changed && length < 1e-28 {

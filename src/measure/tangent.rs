@@ -653,7 +653,7 @@ pub(super) struct Bracket<N> {
 pub(super) const SLACK: f64 = 128.0 * f64::EPSILON;
 
 /// Largest angle between the bodies' normals that an answer is taken at: its gradients are off by about as much.
-pub(super) const ALIGNED: f64 = 1e-6;
+pub(super) const ALIGNED: f64 = 2.5e-7;
 
 /// How much farther a point is moved than its constraint's linearization asks, for the rounding of its gradient.
 pub(super) const NUDGE: f64 = 1e-4;

@@ -1,13 +1,14 @@
 //! Families about derivatives: 20, 21.
 
 use crate::bodies::{Placed, b, e, q, zoo};
-use crate::random::{Seeded, draws, pose, shifted, turned};
+use crate::random::{Seeded, draws, pose, replayed, seeds, shifted, turned, twisted};
 use crate::reference;
+use crate::reference::big::{Big, double};
 use nalgebra::{UnitQuaternion, Vector3};
 use sublevel::body::{Body, Compound};
 use sublevel::measure::{
-    Distance, GrowthDistance, Options, Pose, Twist, WarmStart, distance, growth_distance, level_distance, penetration,
-    signed_distance,
+    Distance, GrowthDistance, Options, Pose, Twist, WarmStart, WithinMargin, distance, growth_distance, level_distance,
+    penetration, signed_distance, within_margin,
 };
 
 /// Largest error of a gradient, relative to its norm, angular parts divided by the circumradius of the body that turns.
@@ -24,10 +25,40 @@ fn deviation(found: &[Twist; 2], truth: &[f64; 12], (a, b): (&Body, &Body)) -> f
     (sum(&|k| parts[k / 3][k % 3] - truth[k]) / sum(&|k| truth[k])).sqrt()
 }
 
+/// Steps to look around a kink by, and how far from it a pose may be that brackets do not tell from it; relative to the smaller body.
+const AROUND: f64 = 1e-7;
+const ROUNDED: f64 = 1e-11;
+
+/// Widest bracket of values to look around by.
+const SHARP: f64 = 1e-25;
+
+/// Whether a gradient at a kink, where edges touch, is one of those between that of one side and that of the other: along no twist
+/// does the value grow by less than it says. Values of 200 bits by poses.
+fn is_subgradient(draw: &Draw<'_>, found: &[Twist; 2], value: impl Fn(&Pose, &Pose) -> Big) -> bool {
+    let edged = draw.a.constraints().len() > 1 || draw.b.constraints().len() > 1;
+    if draw.gap != 0.0 || !edged {
+        return false;
+    }
+    let parts = [found[0].linear, found[0].angular, found[1].linear, found[1].angular];
+    let sizes = [1.0, draw.a.circumscribed().radius, 1.0, draw.b.circumscribed().radius];
+    let size = (0..12).map(|k| (parts[k / 3][k % 3] / sizes[k / 3]).powi(2)).sum::<f64>().sqrt();
+    let small = sizes[1].min(sizes[3]);
+    let here = value(&draw.pose_a, &draw.pose_b);
+    (0..24).all(|k| {
+        let (k, sign) = (k / 2, if k % 2 == 0 { 1.0 } else { -1.0 });
+        let step = sign * AROUND * small / sizes[k / 3];
+        let there = value(&twisted(&draw.pose_a, k, 0, step), &twisted(&draw.pose_b, k, 6, step));
+        let grown = double(&(there - &here));
+        grown - parts[k / 3][k % 3] * step >= -size * small * (ERROR * AROUND + ROUNDED)
+    })
+}
+
 /// The gradients of many answers.
 #[derive(Default)]
 struct Tally {
     count: u32,
+    /// Those at a kink that are some of many.
+    kinks: u32,
     wrong: u32,
     worst: f64,
     /// Some of those that are wrong, and the worst.
@@ -36,12 +67,17 @@ struct Tally {
 }
 
 impl Tally {
-    fn add(&mut self, error: f64, label: impl FnOnce() -> String) {
+    fn add(&mut self, error: f64, label: impl FnOnce() -> String, at_kink: impl FnOnce() -> bool) {
         self.count += 1;
-        if !(error <= ERROR) {
+        if error <= ERROR {
+            return;
+        }
+        if at_kink() {
+            self.kinks += 1;
+        } else {
             self.wrong += 1;
             let label = format!("{error:.1e}: {}", label());
-            if self.some.len() < 8 {
+            if self.some.len() < 99 {
                 self.some.push(label.split(": ").take(2).collect::<Vec<_>>().join(" "));
             }
             if !(error <= self.worst) {
@@ -51,12 +87,14 @@ impl Tally {
     }
 
     fn verdict(&self, least: u32) {
-        let Self { count, wrong, some, of_worst, .. } = self;
-        assert!(*count >= least, "only {count} gradients were there to compare");
+        let Self { count, kinks, wrong, some, of_worst, .. } = self;
         assert!(
             *wrong == 0,
             "{wrong} of {count} gradients are off by more than {ERROR:e}: {some:#?}; the worst {of_worst}"
         );
+        // Some are among those that have failed before.
+        assert!(*kinks <= 12 + count / 1000 || replayed(), "{kinks} of {count} are at kinks");
+        assert!(*count >= least || replayed(), "only {count} gradients were there to compare");
     }
 }
 
@@ -110,7 +148,7 @@ fn tight() -> Options<'static> {
 fn family_20_distance_gradients() {
     let zoo = zoo();
     let mut tally = Tally::default();
-    for seed in 200_000..200_000 + draws(420) {
+    for seed in seeds(200_000, 420, &[200_719, 201_547, 204_239, 210_637, 213_360, 216_230]) {
         let draw = Draw::new(&zoo, seed);
         let options = Options::default();
         for (kind, answer) in draw.answers(|a, b, warm| distance(a.0, a.1, b.0, b.1, &options, warm)) {
@@ -119,12 +157,56 @@ fn family_20_distance_gradients() {
                 continue;
             };
             let truth = reference::distance(draw.a, &draw.pose_a, draw.b, &draw.pose_b, &answer);
-            tally.add(deviation(&found, &truth.gradient, draw.bodies()), || {
-                format!("{} {kind}: {answer:?}", draw.label)
-            });
+            let label = || format!("{} {kind}: {answer:?}", draw.label);
+            tally.add(deviation(&found, &truth.gradient, draw.bodies()), label, || false);
         }
     }
     tally.verdict(300);
+}
+
+/// The same where the answer is that of one of several parts, whose bracket was narrowed while another one's was known, and where it
+/// was asked for within a margin: bodies with edges, whose brackets do not tell the normal.
+#[test]
+fn family_20_gradients_of_parts_and_within_margins() {
+    let zoo = zoo();
+    let mut tally = Tally::default();
+    for seed in seeds(204_000, 840, &[204_239, 210_637]) {
+        let draw = Draw::new(&zoo, seed);
+        let edged = draw.a.constraints().len() > 1 || draw.b.constraints().len() > 1;
+        if !edged || draw.gap < 1e-8 {
+            continue;
+        }
+        let options = Options::default();
+        let alone = distance(draw.a, &draw.pose_a, draw.b, &draw.pose_b, &tight(), &mut WarmStart::default());
+        let behind = draw.pose_a.rotation().inverse_transform_vector(&alone.normal.expect("apart"));
+        // Behind the body, but by the look of its ball nearer: it is asked about first.
+        let (ball, across) = (draw.a.circumscribed(), behind.cross(&Vector3::ith(behind.iamin(), 1.0)));
+        let turn = UnitQuaternion::rotation_between(&Vector3::z(), &across).unwrap_or_default();
+        let needle = e(0.01 * ball.radius, 0.01 * ball.radius, 5.0 * ball.radius);
+        let needle = needle.moved(&turn, &(ball.center + behind * (3.0 * ball.radius))).expect("finite");
+        let both = Compound::new("both", vec![needle, draw.a.clone()]).expect("two parts");
+        let mut warm = WarmStart::default();
+        let of_part = distance(&both, &draw.pose_a, draw.b, &draw.pose_b, &options, &mut warm);
+        let mut warm = WarmStart::default();
+        let margin = 2.0 * alone.upper;
+        let within = within_margin(draw.a, &draw.pose_a, draw.b, &draw.pose_b, margin, &options, &mut warm);
+        let WithinMargin::Within(within) = within.expect("a margin") else { panic!("{}: beyond", draw.label) };
+        for (kind, answer) in [("part", of_part), ("within", within)] {
+            let label = || format!("{} {kind}: {answer:?}", draw.label);
+            let Some(found) = answer.gradients(&draw.pose_a, &draw.pose_b) else {
+                assert!(draw.gap < 1e-7, "{} has no gradients", label());
+                continue;
+            };
+            assert!(kind == "within" || answer.parts == [1, 0], "{}", label());
+            let truth = reference::distance(draw.a, &draw.pose_a, draw.b, &draw.pose_b, &answer);
+            tally.add(deviation(&found, &truth.gradient, draw.bodies()), label, || false);
+        }
+    }
+    tally.verdict(150);
+}
+
+fn ordered<'a>(swapped: bool, a: Placed<'a>, b: Placed<'a>) -> (Placed<'a>, Placed<'a>) {
+    if swapped { (b, a) } else { (a, b) }
 }
 
 /// The same for level distances, in both orders and wherever the multiplier is not zero.
@@ -132,22 +214,32 @@ fn family_20_distance_gradients() {
 fn family_20_level_gradients() {
     let zoo = zoo();
     let mut tally = Tally::default();
-    for seed in 201_000..201_000 + draws(280) {
+    for seed in seeds(201_000, 280, &[202_994, 206_564, 208_146, 208_398, 210_358, 213_864]) {
         let draw = Draw::new(&zoo, seed);
         let options = Options::default();
         for swapped in [false, true] {
             let answers = draw.answers(|a, b, warm| {
-                let ((a, pose_a), (b, pose_b)) = if swapped { (b, a) } else { (a, b) };
-                (level_distance(a, pose_a, b, pose_b, &options, warm), (a.clone(), *pose_a), (b.clone(), *pose_b))
+                let (a, b) = ordered(swapped, a, b);
+                level_distance(a.0, a.1, b.0, b.1, &options, warm)
             });
-            for (kind, (answer, (a, pose_a), (b, pose_b))) in answers {
+            for (kind, answer) in answers {
+                let (a, b) = ordered(swapped, (draw.a, &draw.pose_a), (draw.b, &draw.pose_b));
                 let label = || format!("{} swapped {swapped} {kind}: {answer:?}", draw.label);
                 if answer.saturated {
                     continue;
                 }
-                let truth = reference::level_distance(&a, &pose_a, &b, &pose_b, &answer);
+                let truth = reference::level_distance(a.0, a.1, b.0, b.1, &answer);
                 let found = [answer.gradient_a, answer.gradient_b];
-                tally.add(deviation(&found, &truth.gradient, (&a, &b)), label);
+                let value = |pose_a: &Pose, pose_b: &Pose| {
+                    let (a, b) = ordered(swapped, (draw.a, pose_a), (draw.b, pose_b));
+                    let answer = level_distance(a.0, a.1, b.0, b.1, &options, &mut WarmStart::default());
+                    let truth = reference::level_distance(a.0, a.1, b.0, b.1, &answer);
+                    assert!(truth.width() <= SHARP, "{}: {truth:?}", label());
+                    truth.upper
+                };
+                let of_draw = if swapped { [found[1], found[0]] } else { found };
+                let error = deviation(&found, &truth.gradient, (a.0, b.0));
+                tally.add(error, label, || is_subgradient(&draw, &of_draw, value));
             }
         }
     }
@@ -159,23 +251,31 @@ fn family_20_level_gradients() {
 fn family_20_growth_gradients() {
     let zoo = zoo();
     let mut tally = Tally::default();
-    for seed in 202_000..202_000 + draws(500) {
+    for seed in seeds(202_000, 500, &[207_992, 208_146, 210_358, 226_520]) {
         let draw = Draw::new(&zoo, seed);
         let options = Options::default();
         for (kind, answer) in draw.answers(|a, b, warm| growth_distance(a.0, a.1, b.0, b.1, &options, warm)) {
             let label = || format!("{} {kind}: {answer:?}", draw.label);
-            let truth = growth_truth(&draw, &answer).unwrap_or_else(|| panic!("{}: no reference", label()));
+            let truth = growth_truth((draw.a, &draw.pose_a), (draw.b, &draw.pose_b), &answer)
+                .unwrap_or_else(|| panic!("{}: no reference", label()));
             let found = answer.gradients.unwrap_or_else(|| panic!("{}: no gradients", label()));
-            tally.add(deviation(&found, &truth.gradient, draw.bodies()), label);
+            let value = |pose_a: &Pose, pose_b: &Pose| {
+                let answer = growth_distance(draw.a, pose_a, draw.b, pose_b, &options, &mut WarmStart::default());
+                let truth = growth_truth((draw.a, pose_a), (draw.b, pose_b), &answer).expect("a reference");
+                assert!(truth.width() <= SHARP, "{}: {truth:?}", label());
+                truth.upper
+            };
+            let error = deviation(&found, &truth.gradient, draw.bodies());
+            tally.add(error, label, || is_subgradient(&draw, &found, value));
         }
     }
     tally.verdict(300);
 }
 
-fn growth_truth(draw: &Draw<'_>, answer: &GrowthDistance) -> Option<reference::growth::Truth> {
-    let (center_a, center_b) = (draw.a.growth_ball().center, draw.b.growth_ball().center);
+fn growth_truth(a: Placed<'_>, b: Placed<'_>, answer: &GrowthDistance) -> Option<reference::growth::Truth> {
+    let (center_a, center_b) = (a.0.growth_ball().center, b.0.growth_ball().center);
     let start = reference::growth::Start { witness: answer.witness, value: answer.upper, normal: answer.normal? };
-    reference::growth::growth_distance((draw.a, &draw.pose_a, &center_a), (draw.b, &draw.pose_b, &center_b), &start)
+    reference::growth::growth_distance((a.0, a.1, &center_a), (b.0, b.1, &center_b), &start)
 }
 
 /// The same for signed distances on both sides of contact and at it, away from ties.
@@ -183,7 +283,7 @@ fn growth_truth(draw: &Draw<'_>, answer: &GrowthDistance) -> Option<reference::g
 fn family_20_signed_gradients() {
     let zoo = zoo();
     let (mut tally, mut tied) = (Tally::default(), 0);
-    for seed in 203_000..203_000 + draws(280) {
+    for seed in seeds(203_000, 280, &[203_695, 205_502, 206_148, 206_283, 206_801, 210_637, 220_104]) {
         let draw = Draw::new(&zoo, seed);
         let options = Options::default();
         for (kind, answer) in draw.answers(|a, b, warm| signed_distance(a.0, a.1, b.0, b.1, &options, warm)) {
@@ -197,7 +297,7 @@ fn family_20_signed_gradients() {
             let truth = reference::signed::signed_distance(draw.a, &draw.pose_a, draw.b, &draw.pose_b, &answer)
                 .unwrap_or_else(|| panic!("{}: no reference", label()));
             let found = answer.gradients.unwrap_or_else(|| panic!("{}: no gradients", label()));
-            tally.add(deviation(&found, &truth.gradient, draw.bodies()), label);
+            tally.add(deviation(&found, &truth.gradient, draw.bodies()), label, || false);
         }
     }
     assert!(tied < tally.count / 2, "{tied} of {} are tied", tally.count);

@@ -12,6 +12,20 @@ pub(crate) fn draws(few: u64) -> u64 {
     }
 }
 
+/// The seeds of that many draws from `first` on and some that have failed before, or those that `SUBLEVEL_SEEDS` lists, with commas,
+/// to replay them.
+pub(crate) fn seeds(first: u64, few: u64, failed: &[u64]) -> Vec<u64> {
+    match std::env::var("SUBLEVEL_SEEDS") {
+        Err(_) => failed.iter().copied().chain(first..first + draws(few)).collect(),
+        Ok(list) => list.split(',').map(|seed| seed.trim().parse().expect("seeds with commas between them")).collect(),
+    }
+}
+
+/// Whether seeds are replayed: too few for claims about many.
+pub(crate) fn replayed() -> bool {
+    std::env::var_os("SUBLEVEL_SEEDS").is_some()
+}
+
 /// Number of draws of a family that takes long: `few`, or `many` where `SUBLEVEL_LONG` is set.
 pub(crate) fn few_or(few: u64, many: u64) -> u64 {
     if std::env::var_os("SUBLEVEL_LONG").is_some() { many } else { few }

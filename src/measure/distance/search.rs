@@ -37,6 +37,8 @@ pub(super) struct Search<'a> {
     /// Normal of the best lower bound.
     n: Vector3<f64>,
     active: (Active, Active),
+    /// Whether all of these are of one iterate whose normal is that of the solution.
+    aligned: bool,
     /// Of an answer by continuation.
     trace: Option<Trace>,
     /// Where the lower bound was found, and where Newton's method ended last.
@@ -84,6 +86,7 @@ impl<'a> Search<'a> {
             y,
             n,
             active: (Active::default(), Active::default()),
+            aligned: false,
             trace: None,
             tried: [None; 2],
             iterations,
@@ -93,6 +96,12 @@ impl<'a> Search<'a> {
     /// Whether the bracket is as narrow as asked for.
     fn narrow(&self) -> bool {
         self.upper.is_finite() && self.upper - self.lower <= self.tolerance
+    }
+
+    /// Whether nothing is missing but the normal of the solution. Of bodies nearer than what is asked for contact is as good an answer.
+    fn has_to_be_aligned(&self) -> bool {
+        let decided = self.goals.1.met(self.lower, self.upper) || !self.goals.0.wants_answer();
+        self.narrow() && self.lower > 0.0 && self.upper > self.tolerance && !self.aligned && !decided
     }
 
     fn done(&self) -> bool {
@@ -116,6 +125,7 @@ impl<'a> Search<'a> {
 
     pub(super) fn run(&mut self, hint: &Hint) {
         self.narrow_down(hint);
+        self.align();
         self.attain_any();
     }
 
@@ -174,6 +184,22 @@ impl<'a> Search<'a> {
         // From points this near, values are no longer too steep to start from.
         if !self.ended() && self.lower == 0.0 {
             self.contact();
+        }
+    }
+
+    /// Goes on to the normal of the solution: a bracket that is narrow holds it to about the root of its width relative to the distance,
+    /// and near contact to nothing.
+    fn align(&mut self) {
+        if !self.has_to_be_aligned() || self.options.exhausted(self.iterations) {
+            return;
+        }
+        let (x, y, n) = (self.x, self.y, self.n);
+        let near = || (Active::near(&self.pair.a, &x, &-n), Active::near(&self.pair.b, &y, &n));
+        let (x, y, n, (a, b)) = self.tried[0].map_or_else(|| (x, y, n, near()), |at| (at.x, at.y, at.n, (at.a, at.b)));
+        self.newton(x, y, n, a, b);
+        // So near to each other doubles may not show the normal.
+        if self.has_to_be_aligned() && self.lower < NEAREST * self.pair.size() {
+            self.sharpen();
         }
     }
 
@@ -265,6 +291,8 @@ impl<'a> Search<'a> {
             Ok((proven, trace)) => {
                 self.iterations += proven.rounds;
                 self.resume(&proven);
+                // As it was taken as proven.
+                self.aligned = true;
                 self.trace = Some(trace);
                 if !self.done() {
                     self.sharpen();
@@ -339,10 +367,14 @@ impl<'a> Search<'a> {
                     self.active = found.active;
                 }
                 self.take(found.upper, found.x, found.y);
-                self.decided() || self.touching() || self.options.stopped()
+                if found.aligned {
+                    self.align_with(found.upper, [found.x, found.y, found.n], found.active);
+                }
+                self.decided() && !self.has_to_be_aligned() || self.touching() || self.options.stopped()
             });
             self.iterations += steps;
-            if self.decided() || self.touching() || self.options.exhausted(self.iterations) {
+            let ended = self.decided() && !self.has_to_be_aligned() || self.touching();
+            if ended || self.options.exhausted(self.iterations) {
                 return;
             }
         }
@@ -495,10 +527,29 @@ impl<'a> Search<'a> {
             if raised | self.attain(&at.x, &at.y) {
                 self.active = (at.a, at.b);
             }
-            self.done() || self.options.stopped()
+            let ended = if self.has_to_be_aligned() { self.adopt(at) } else { self.done() };
+            ended || self.options.stopped()
         });
         self.iterations += steps;
         self.tried[1] = Some(newton);
+    }
+
+    /// Takes the points and the normal of an iterate if that is the one of the solution, and the bracket stays narrow; whether it is.
+    fn adopt(&mut self, at: &DistanceNewton) -> bool {
+        let pair = self.pair;
+        if !at.is_aligned(pair) {
+            return false;
+        }
+        let (Some(x), Some(y)) = (pair.a.pull_in(&at.x), pair.b.pull_in(&at.y)) else { return false };
+        self.align_with(distance_upper(pair, &x, &y), [x, y, at.n], (at.a, at.b))
+    }
+
+    fn align_with(&mut self, upper: f64, [x, y, n]: [Vector3<f64>; 3], active: (Active, Active)) -> bool {
+        let narrow = upper - self.lower <= self.tolerance;
+        if narrow {
+            (self.upper, self.x, self.y, self.n, self.active, self.aligned) = (upper, x, y, n, active, true);
+        }
+        narrow
     }
 
     /// Improves the lower bound with multipliers for unit normals, trying each body's idea of the normal.
@@ -521,7 +572,7 @@ impl<'a> Search<'a> {
     fn raise(&mut self, lower: f64, n: &Vector3<f64>) -> bool {
         let better = lower > self.lower;
         if better {
-            (self.lower, self.n) = (lower, *n);
+            (self.lower, self.n, self.aligned) = (lower, *n, false);
         }
         better
     }
@@ -536,7 +587,7 @@ impl<'a> Search<'a> {
     fn take(&mut self, upper: f64, x: Vector3<f64>, y: Vector3<f64>) -> bool {
         let better = upper < self.upper;
         if better {
-            (self.upper, self.x, self.y) = (upper, x, y);
+            (self.upper, self.x, self.y, self.aligned) = (upper, x, y, false);
         }
         better
     }

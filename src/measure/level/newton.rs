@@ -12,6 +12,7 @@ use crate::measure::newton::{Active, At, Pace, WORTH_A_BRACKET};
 use crate::measure::pair::{Pair, Posed};
 use crate::measure::quadratic::{CENTER, DAMPINGS, Jets, LONGEST, MOST_BENT, Quadratic, TO_CENTER};
 use crate::measure::series::{Series, Taken, tangents};
+use crate::measure::tangent::ALIGNED;
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 /// Largest number of steps.
@@ -68,6 +69,23 @@ impl LevelNewton {
             last = length;
         }
         Ended { steps: MAX_STEPS, settled: false }
+    }
+
+    /// Whether the forces of the bodies are opposite, to [`ALIGNED`] or to what rounding leaves of them: brackets hold them to about the
+    /// root of their width.
+    pub(super) fn is_balanced(&self, pair: &Pair<'_>) -> bool {
+        let force = |body: &Posed<'_>, active: &Active| {
+            let (mut sum, mut rounding) = (Vector3::zeros(), 0.0);
+            for (i, multiplier) in active.iter().filter(|(_, multiplier)| *multiplier > 0.0) {
+                let sample = body.sample(i, &self.x);
+                sum += sample.gradient() * multiplier;
+                rounding += sample.gradient_error() * multiplier;
+            }
+            (sum, rounding)
+        };
+        let ((of_a, error_a), (of_b, error_b)) = (force(&pair.a, &self.a), force(&pair.b, &self.b));
+        // B that holds nothing back leaves all of A's to vanish.
+        self.b.len == 0 || (of_a + of_b).norm() <= ALIGNED * of_a.norm() + error_a + error_b
     }
 
     /// First multipliers: equal weights of A, and those of B that fit; returns the first s.

@@ -43,7 +43,7 @@ pub(super) struct Search<'a> {
     multipliers: (Multipliers, Multipliers),
     /// Where that bound was found.
     proven: Vector3<f64>,
-    /// Whether its multipliers are those of Newton's method: a bracket holds others to its root only.
+    /// Whether its multipliers are those of Newton's method, balanced or of twice the precision: a bracket holds others to its root only.
     refined: bool,
     /// Where Newton's method ended last.
     ended: Option<LevelNewton>,
@@ -282,26 +282,38 @@ impl<'a> Search<'a> {
             self.pair,
             |steps| options.exhausted(before + steps),
             |at| {
-                self.refined |= self.bound(&at.x, &at.a.multipliers(), &at.b.multipliers());
+                self.bound(&at.x, &at.a.multipliers(), &at.b.multipliers());
                 if self.attain(&at.x) {
                     self.active = (at.a, at.b);
                 }
-                self.done()
+                self.done() && self.adopt(at)
             },
         );
         self.iterations += ended.steps;
         (self.ended, self.settled) = (Some(newton), ended.settled);
     }
 
+    /// Takes all of an iterate at which forces are balanced, if what it proves by itself is narrow; whether it is.
+    fn adopt(&mut self, at: &LevelNewton) -> bool {
+        let pair = self.pair;
+        let Some(x) = pair.b.pull_in(&at.x).filter(|_| at.is_balanced(pair)) else { return false };
+        let (of_a, of_b) = (at.a.multipliers(), at.b.multipliers());
+        let (lower, upper) = (level_lower(pair, &at.x, &of_a, &of_b), pair.a.value_upper(&x, pair.b.displacement(&x)));
+        let narrow = upper - lower <= self.accuracy * upper.abs().max(1.0);
+        if narrow {
+            (self.lower, self.upper, self.x, self.active) = (lower, upper, x, (at.a, at.b));
+            (self.multipliers, self.proven, self.refined) = (normalized(&of_a, &of_b), at.x, true);
+        }
+        narrow
+    }
+
     /// Takes the lower bound of a trial point and multipliers if it is the best so far.
-    fn bound(&mut self, x: &Vector3<f64>, of_a: &Multipliers, of_b: &Multipliers) -> bool {
+    fn bound(&mut self, x: &Vector3<f64>, of_a: &Multipliers, of_b: &Multipliers) {
         let lower = level_lower(self.pair, x, of_a, of_b);
-        let better = lower > self.lower;
-        if better {
+        if lower > self.lower {
             (self.lower, self.multipliers) = (lower, normalized(of_a, of_b));
             (self.proven, self.refined) = (*x, false);
         }
-        better
     }
 
     /// Pulls a trial point into B and takes it if A's polynomial is the smallest there so far.

@@ -1,10 +1,11 @@
 //! The shortest way out of an overlap that is known.
 
+use super::ELSEWHERE;
 use super::support::{SupportPoint, support};
 use crate::measure::bracket::{Multipliers, SLACK, descent};
-use crate::measure::newton::{Active, DistanceNewton};
+use crate::measure::newton::{AT, Active, DistanceNewton};
 use crate::measure::options::Options;
-use crate::measure::pair::Pair;
+use crate::measure::pair::{Pair, Posed};
 use crate::measure::pose::Pose;
 use crate::measure::relation::Through;
 use crate::measure::smooth::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
@@ -12,11 +13,13 @@ use crate::measure::warm::{ActiveSet, Hint, WarmStart};
 use crate::polynomial::dispatch;
 use nalgebra::{Vector2, Vector3};
 
-/// The middle of support points with the constraints that are active at all of them.
-fn common(points: [SupportPoint; 4]) -> SupportPoint {
-    let sum: Vector3<f64> = points.iter().map(|point| point.x).sum();
-    let active = points.iter().fold(ActiveSet::MAX, |all, point| all & point.active);
-    SupportPoint { x: sum * 0.25, active }
+/// The middle of support points with the constraints that are active at all of them, and there, too: both sides of a slab are one
+/// constraint, but the middle between them is on neither.
+fn common(body: &Posed<'_>, points: [SupportPoint; 4]) -> SupportPoint {
+    let x = points.iter().map(|point| point.x).sum::<Vector3<f64>>() * 0.25;
+    let all = points.iter().fold(ActiveSet::MAX, |all, point| all & point.active);
+    let at = |i: &usize| all >> i & 1 == 1 && body.jet(*i, &x).value > 1.0 - AT;
+    SupportPoint { x, active: (0..body.len()).filter(at).fold(0, |bits, i| bits | 1 << i) }
 }
 
 /// Weights by which points of a difference of bodies, all at least that high along n, have a point on the axis along n between them, or
@@ -57,6 +60,9 @@ fn surrounding(
 /// First and last step of the search around a direction, as the tangent of the angle.
 const FIRST_STEP: f64 = 1e-4;
 const LAST_STEP: f64 = 1e-8;
+
+/// By how much more a direction may show that is the better one of two, relative to what is asked for.
+const ROUGHLY: f64 = 0.01;
 
 /// Most rounds of that search.
 const MOST_ROUNDS: u32 = 24;
@@ -212,7 +218,8 @@ impl<'a> Best<'a> {
                 let (Some(a), Some(b)) = (a, b) else { return };
                 *found = (turned.dot(&(b.x - a.x)), turned, a, b);
             }
-            self.polish(&common(around.map(|found| found.2)), &common(around.map(|found| found.3)), &n);
+            let (x, y) = (common(&pair.a, around.map(|found| found.2)), common(&pair.b, around.map(|found| found.3)));
+            self.polish(&x, &y, &n);
             let w = around.map(|(_, _, a, b)| b.x - a.x);
             if !self.settled
                 && self.n == Some(n)
@@ -268,6 +275,8 @@ impl<'a> Best<'a> {
         let mut newton = DistanceNewton { x: x.x, y: y.x, distance: n.dot(&(x.x - y.x)), n: *n, a, b };
         let tolerance = pair.tolerance(options.accuracy());
         let limit = options.max_iterations() - self.iterations;
+        // No direction nearby is better than one of these by more than is asked for.
+        let mut known = false;
         self.iterations += newton.run(pair, limit, |at| {
             let depth = self.try_direction(&at.x, &at.y, &at.n, at.a, at.b);
             // Points of the bodies attain what the normal proves: no better direction is near.
@@ -278,8 +287,15 @@ impl<'a> Best<'a> {
             };
             let inside = || pair.a.pull_in(&at.x).zip(pair.b.pull_in(&at.y));
             let settled = attains(&at.x, &at.y) && inside().is_some_and(|(x, y)| attains(&x, &y));
-            self.settled |= settled && depth <= self.depth;
-            settled || options.exhausted(self.iterations)
+            known |= settled;
+            // Beside a short way out there is room for many normals that show about as much.
+            let aligned = settled && depth <= self.depth + ROUGHLY * tolerance && at.is_aligned(pair);
+            let same = (depth > 0.0) == (self.depth > 0.0) && self.n.is_some_and(|best| best.dot(&n) > ELSEWHERE);
+            if aligned && same {
+                self.take_direction(depth, &at.x, &at.y, &n, at.a, at.b);
+            }
+            self.settled |= known && depth <= self.depth;
+            aligned || options.exhausted(self.iterations)
         });
     }
 
@@ -289,10 +305,22 @@ impl<'a> Best<'a> {
         if depth < self.depth
             && let Some(n) = n.try_normalize(0.0)
         {
-            (self.depth, self.n, self.x, self.y, self.active) = (depth, Some(n), *x, *y, (a, b));
-            (self.attained, self.trace, self.settled) = (None, None, false);
+            self.take_direction(depth, x, y, &n, a, b);
         }
         depth
+    }
+
+    fn take_direction(
+        &mut self,
+        depth: f64,
+        x: &Vector3<f64>,
+        y: &Vector3<f64>,
+        n: &Vector3<f64>,
+        a: Active,
+        b: Active,
+    ) {
+        (self.depth, self.n, self.x, self.y, self.active) = (depth, Some(*n), *x, *y, (a, b));
+        (self.attained, self.trace, self.settled) = (None, None, false);
     }
 
     pub(in crate::measure) fn hint(&self) -> Option<WarmStart> {
