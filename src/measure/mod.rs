@@ -4,8 +4,9 @@
 //!
 //! A warm start is corrected by Newton's method on the optimality system of its active constraints (`newton`, and `smooth` where one
 //! constraint of each body is active); where that does not apply or does not converge, an interior-point method
-//! ([`crate::optimize`]) does. Neither is trusted: an answer is accepted when its bracket (`bracket`) is narrow enough. Unions are
-//! in `union`. This room knows neither clock nor allocator nor threads.
+//! ([`crate::optimize`]) does. Neither is trusted: an answer is accepted when its bracket (`bracket`) is narrow enough. As that holds
+//! a normal to about the root of its width only, the equations have to hold there, too. Unions are in `union`. This room knows
+//! neither clock nor allocator nor threads.
 
 mod active;
 mod batch;

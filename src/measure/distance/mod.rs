@@ -97,8 +97,9 @@ impl Distance {
     }
 
     /// Derivatives with respect to the twists of the first and of the second body at the poses the distance was asked for
-    /// (envelope theorem: the witnesses count as fixed to their bodies). None unless the bodies are proven apart: at contact
-    /// the distance has no gradient, which is what [`super::signed_distance`] is for.
+    /// (envelope theorem: the witnesses count as fixed to their bodies), to 1e-6 of their norm at distances above the accuracy that
+    /// was asked for. None unless the bodies are proven apart: at contact the distance has no gradient, which is what
+    /// [`super::signed_distance`] is for.
     pub fn gradients(&self, pose_a: &Pose, pose_b: &Pose) -> Option<[Twist; 2]> {
         let n = self.normal.filter(|_| self.lower > 0.0)?;
         Some([
