@@ -29,6 +29,8 @@ pub(crate) struct Scene<'a> {
     pub(crate) pair: &'a Pair,
     pub(crate) kind: Kind,
     pub(crate) hulls: Hulls,
+    /// Where the first body stands: a pose is not made anew for each query.
+    origin: Pose,
     /// Poses for the bodies of each degree: the same for all, unless grazing.
     poses: Vec<(usize, Vec<Trajectory>)>,
     parry_poses: Vec<Vec<parry3d_f64::math::Pose>>,
@@ -63,6 +65,7 @@ impl<'a> Scene<'a> {
             pair,
             kind,
             hulls: Hulls::new(&pair.a.hull, &pair.b.hull)?,
+            origin: Pose::identity(),
             poses: all,
             parry_poses: Vec::new(),
             rays: Vec::new(),
@@ -121,8 +124,9 @@ pub(crate) fn all<'a>(scene: &'a Scene<'a>) -> Vec<Row<'a>> {
 fn distance_warm<'a>(scene: &'a Scene<'a>, degree: usize) -> Row<'a> {
     let (a, b) = scene.pair.bodies(degree);
     let options = Options::default();
+    let origin = &scene.origin;
     let row = Row::warm(format!("distance warm, degree {degree}"), scene.poses(degree), move |pose, warm| {
-        let answer = distance(a, &Pose::identity(), b, pose, &options, warm);
+        let answer = distance(a, origin, b, pose, &options, warm);
         Answer::new(answer.iterations, answer.status, answer.lower <= 0.0)
     });
     let part = match degree {
@@ -142,8 +146,9 @@ fn distance_warm<'a>(scene: &'a Scene<'a>, degree: usize) -> Row<'a> {
 fn distance_cold<'a>(scene: &'a Scene<'a>, degree: usize) -> Row<'a> {
     let (a, b) = scene.pair.bodies(degree);
     let options = Options::default();
+    let origin = &scene.origin;
     let row = Row::cold(format!("distance cold, degree {degree}"), scene.poses(degree), move |pose| {
-        let answer = distance(a, &Pose::identity(), b, pose, &options, &mut WarmStart::default());
+        let answer = distance(a, origin, b, pose, &options, &mut WarmStart::default());
         Answer::new(answer.iterations, answer.status, answer.lower <= 0.0)
     });
     let row = row.at_most(Target::MostIterations(30));
@@ -155,9 +160,9 @@ fn distance_cold<'a>(scene: &'a Scene<'a>, degree: usize) -> Row<'a> {
 fn distance_batches<'a>(scene: &'a Scene<'a>) -> Row<'a> {
     let (a, b) = scene.pair.bodies(DEGREE);
     let options = Options::default();
+    let origin = &scene.origin;
     let batch = move |poses: &[Pose], answers: &mut [Distance]| {
-        distance_batch(a, &Pose::identity(), b, poses, &options, answers)
-            .expect("there are poses, and places for answers");
+        distance_batch(a, origin, b, poses, &options, answers).expect("there are poses, and places for answers");
     };
     let judge = |answer: &Distance| Answer::new(answer.iterations, answer.status, answer.lower <= 0.0);
     let apart = if widest() == "AVX-512" { 120.0 } else { 200.0 };
@@ -172,8 +177,9 @@ fn distance_batches<'a>(scene: &'a Scene<'a>) -> Row<'a> {
 fn level_warm<'a>(scene: &'a Scene<'a>) -> Row<'a> {
     let (a, b) = scene.pair.bodies(DEGREE);
     let options = Options::default();
+    let origin = &scene.origin;
     Row::warm(format!("level distance warm, degree {DEGREE}"), scene.poses(DEGREE), move |pose, warm| {
-        let answer = level_distance(a, &Pose::identity(), b, pose, &options, warm);
+        let answer = level_distance(a, origin, b, pose, &options, warm);
         Answer::new(answer.iterations, answer.status, answer.upper <= 1.0)
     })
     .at_most(scene.part(COAL_WARM, 0.35))
@@ -184,8 +190,9 @@ fn level_warm<'a>(scene: &'a Scene<'a>) -> Row<'a> {
 fn level_cold<'a>(scene: &'a Scene<'a>) -> Row<'a> {
     let (a, b) = scene.pair.bodies(DEGREE);
     let options = Options::default();
+    let origin = &scene.origin;
     Row::cold(format!("level distance cold, degree {DEGREE}"), scene.poses(DEGREE), move |pose| {
-        let answer = level_distance(a, &Pose::identity(), b, pose, &options, &mut WarmStart::default());
+        let answer = level_distance(a, origin, b, pose, &options, &mut WarmStart::default());
         Answer::new(answer.iterations, answer.status, answer.upper <= 1.0)
     })
     .at_most(Target::MostIterations(30))
@@ -194,8 +201,9 @@ fn level_cold<'a>(scene: &'a Scene<'a>) -> Row<'a> {
 fn growth_warm<'a>(scene: &'a Scene<'a>) -> Row<'a> {
     let (a, b) = scene.pair.bodies(DEGREE);
     let options = Options::default();
+    let origin = &scene.origin;
     Row::warm(format!("growth distance warm, degree {DEGREE}"), scene.poses(DEGREE), move |pose, warm| {
-        let answer = growth_distance(a, &Pose::identity(), b, pose, &options, warm);
+        let answer = growth_distance(a, origin, b, pose, &options, warm);
         Answer::new(answer.iterations, answer.status, answer.lower <= 1.0)
     })
     .at_most(Target::Nanoseconds(600.0))
@@ -204,8 +212,9 @@ fn growth_warm<'a>(scene: &'a Scene<'a>) -> Row<'a> {
 fn signed_warm<'a>(scene: &'a Scene<'a>) -> Row<'a> {
     let (a, b) = scene.pair.bodies(DEGREE);
     let options = Options::default();
+    let origin = &scene.origin;
     Row::warm(format!("signed distance warm, degree {DEGREE}"), scene.poses(DEGREE), move |pose, warm| {
-        let answer = signed_distance(a, &Pose::identity(), b, pose, &options, warm);
+        let answer = signed_distance(a, origin, b, pose, &options, warm);
         Answer::new(answer.iterations, answer.status, answer.lower <= 0.0)
     })
 }
@@ -213,8 +222,9 @@ fn signed_warm<'a>(scene: &'a Scene<'a>) -> Row<'a> {
 fn penetration_cold<'a>(scene: &'a Scene<'a>) -> Row<'a> {
     let (a, b) = scene.pair.bodies(DEGREE);
     let options = Options::default();
+    let origin = &scene.origin;
     Row::cold(format!("penetration cold, degree {DEGREE}"), &scene.overlapping, move |pose| {
-        let answer = penetration(a, &Pose::identity(), b, pose, &options, &mut WarmStart::default());
+        let answer = penetration(a, origin, b, pose, &options, &mut WarmStart::default());
         Answer::new(answer.iterations, answer.status, answer.upper > 0.0)
     })
     .at_most(Target::Nanoseconds(50_000.0))
@@ -223,8 +233,9 @@ fn penetration_cold<'a>(scene: &'a Scene<'a>) -> Row<'a> {
 fn ray_cast<'a>(scene: &'a Scene<'a>) -> Row<'a> {
     let (a, _) = scene.pair.bodies(DEGREE);
     let options = Options::default();
+    let origin = &scene.origin;
     Row::cold(format!("ray cast, hits, degree {DEGREE}"), &scene.rays, move |ray| {
-        match cast_ray(a, &Pose::identity(), ray, &options) {
+        match cast_ray(a, origin, ray, &options) {
             RayCast::Hit(hit) => Answer::new(hit.iterations, hit.status, hit.upper == 0.0),
             _ => Answer::new(0, Status::BracketWide, false),
         }

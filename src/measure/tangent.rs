@@ -231,7 +231,7 @@ impl<'a, N: Copy> Side<'a, N> {
         let near = Near::new(self);
         let length = dot(gradient, gradient).sqrt();
         let turned = splat(near.turn).mul_add(length, at.gradient_error + splat(near.gradient_error));
-        let off = dot(residual, residual).sqrt() + turned.mul_add(multiplier, splat(SLACK));
+        let off = Off::new(simd, dot(residual, residual), turned.mul_add(multiplier, splat(SLACK)));
         let bound = Bound {
             curvature: at.curvature,
             radius: at.radius,
@@ -241,7 +241,7 @@ impl<'a, N: Copy> Side<'a, N> {
         };
         let error = at.value_error + splat(self.trust().value_error);
         let slack = multiplier * (splat(1.0) - at.plane.value + error);
-        (slack + bound.loss(simd, off, multiplier)).select(splat(f64::MIN_POSITIVE).le(along), splat(f64::NAN))
+        (slack + bound.loss(simd, &off, multiplier)).select(splat(f64::MIN_POSITIVE).le(along), splat(f64::NAN))
     }
 }
 
@@ -498,10 +498,7 @@ fn straighten<S: Simd, N: Number<S>>(
     // Deep inside there is nothing to straighten.
     let deepest = N::splat(simd, 0.25);
     let (mean_a, mean_b) = (half.mul_add(a.value, half).max(deepest), half.mul_add(b.value, half).max(deepest));
-    // Divisions are slow: one for four reciprocals.
-    let (both_a, both_b) = (a.gradient[2] * mean_a, b.gradient[2] * mean_b);
-    let inverse = one / (both_a * both_b);
-    let (inverse_a, inverse_b) = (inverse * both_b, inverse * both_a);
+    let [inverse_a, inverse_b] = N::reciprocals(simd, [a.gradient[2] * mean_a, b.gradient[2] * mean_b]);
     let (of_a, of_b) = (-mean_a * inverse_a, mean_b * inverse_b);
     let straight_a = Straight::new(a, bend_a, of_a, (a.value - one) * mean_a, a.gradient[2] * inverse_a);
     let straight_b = Straight::new(b, bend_b, of_b, (one - b.value) * mean_b, b.gradient[2] * inverse_b);
@@ -544,8 +541,7 @@ fn turn<S: Simd, N: Number<S>>(
         determinant.mul_add(right_a[1] + right_b[1], pulled[1]),
     ];
     let other = sum[0] * sum[2] - sum[1] * sum[1];
-    let inverse = one / (determinant * other);
-    let (of_m, of_sum) = (inverse * other, inverse * determinant);
+    let [of_m, of_sum] = N::reciprocals(simd, [determinant, other]);
     let beta = [(sum[2] * right[0] - sum[1] * right[1]) * of_sum, (sum[0] * right[1] - sum[1] * right[0]) * of_sum];
     let rest = [beta[0] - lever[0], beta[1] - lever[1]];
     let alpha = [(m[2] * rest[0] - m[1] * rest[1]) * of_m, (m[0] * rest[1] - m[1] * rest[0]) * of_m];
@@ -680,8 +676,7 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
     let (a, b) = (&extrapolated_a.plane, &extrapolated_b.plane);
     let (near_a, near_b) = (Near::new(side_a), Near::new(side_b));
     let (length_a, length_b) = (dot(a.gradient, a.gradient).sqrt(), dot(b.gradient, b.gradient).sqrt());
-    let inverse = one / (length_a * length_b);
-    let (inverse_a, inverse_b) = (inverse * length_b, inverse * length_a);
+    let [inverse_a, inverse_b] = N::reciprocals(simd, [length_a, length_b]);
     let (outward_a, outward_b) = (scaled(a.gradient, inverse_a), scaled(b.gradient, inverse_b));
     let displaced = (side_a.displacement + side_b.displacement) * splat(1.0 + 1e-14);
     let rounding = splat(SLACK) * (difference[0].abs() + difference[1].abs() + difference[2].abs());
@@ -697,14 +692,16 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
         normal[i] = either(-outward_a[i], outward_b[i]);
         other[i] = either(b.gradient[i], -a.gradient[i]);
     }
-    let along = dot(normal, other);
-    let multiplier = one / along;
+    // The reciprocal of `normal·other`, found beside the lengths.
+    let along = -dot(a.gradient, b.gradient);
+    let multiplier = either(length_a, length_b) * (one / along);
     let residual = add_scaled(normal, -multiplier, other);
     let gradient_error_a = extrapolated_a.gradient_error + splat(near_a.gradient_error);
     let gradient_error_b = extrapolated_b.gradient_error + splat(near_b.gradient_error);
     let turned = either_constant(near_b.turn, near_a.turn)
         .mul_add(either(length_b, length_a), either(gradient_error_b, gradient_error_a));
-    let off = dot(residual, residual).sqrt() + turned.mul_add(multiplier, splat(SLACK));
+    let (square, turned) = (dot(residual, residual), turned.mul_add(multiplier, splat(SLACK)));
+    let off = Off::new(simd, square, turned);
     let bent = Bound {
         curvature: either(extrapolated_b.curvature, extrapolated_a.curvature),
         radius: either(extrapolated_b.radius, extrapolated_a.radius),
@@ -712,7 +709,7 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
         floor: either_constant(near_b.floor, near_a.floor),
         span: either_constant(near_b.span, near_a.span),
     };
-    let loss = bent.loss(simd, off, multiplier);
+    let loss = bent.loss(simd, &off, multiplier);
     let keeper = either(inverse_a, inverse_b);
     let keeper_off = either(gradient_error_a, gradient_error_b)
         .mul_add(keeper, either_constant(near_a.turn + SLACK, near_b.turn + SLACK));
@@ -723,19 +720,17 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
         floor: either_constant(near_a.floor, near_b.floor),
         span: either_constant(near_a.span, near_b.span),
     };
-    let keeper_loss = kept.loss(simd, keeper_off, keeper);
+    let keeper_loss = kept.loss(simd, &Off::by(keeper_off), keeper);
 
     let error_a = extrapolated_a.value_error + splat(side_a.trust().value_error);
     let error_b = extrapolated_b.value_error + splat(side_b.trust().value_error);
     let (of_a, of_b) = (either(inverse_a, multiplier), either(multiplier, inverse_b));
     let slack_a = of_a * (one - a.value + error_a);
     let slack_b = of_b * (one - b.value + error_b);
-    let magnitude = slack_a.abs() + slack_b.abs() + of_a + of_b + loss;
-    let lower = dot(normal, difference)
-        - (slack_a + slack_b)
-        - (loss + keeper_loss)
-        - (displaced + rounding)
-        - splat(SLACK) * magnitude;
+    let magnitude = slack_a.abs() + slack_b.abs() + of_a + of_b;
+    // The losses come last: they are what takes longest.
+    let lower = dot(normal, difference) - (slack_a + slack_b) - (displaced + rounding) - splat(SLACK) * magnitude;
+    let lower = (loss + keeper_loss).mul_add(splat(-(1.0 + SLACK)), lower);
     // Gradients that do not even point the same way leave no multiplier.
     let lower = lower.select(splat(0.0).le(along), splat(f64::NAN));
 
@@ -747,7 +742,7 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
     let upper = upper.select(N::and(simd, fine_a, fine_b), splat(f64::NAN));
     let evaluated = of_a * splat(side_a.trust().value_error) + of_b * splat(side_b.trust().value_error);
     let rounding = splat(2.0) * (displaced + rounding + evaluated);
-    Bracket { lower, upper, rounding, off, multipliers: [of_a, of_b], normal, to_a, to_b }
+    Bracket { lower, upper, rounding, off: off.angle, multipliers: [of_a, of_b], normal, to_a, to_b }
 }
 
 /// What is known of one body's active constraint near the body, in metres.
@@ -797,6 +792,36 @@ impl Near {
     }
 }
 
+/// By how much a plane is off in direction.
+struct Off<N> {
+    /// Bound of the angle.
+    angle: N,
+    /// Bound of its square.
+    square: N,
+}
+
+impl<N: Copy> Off<N> {
+    /// By the angle.
+    #[inline(always)]
+    fn by<S: Simd>(angle: N) -> Self
+    where
+        N: Number<S>,
+    {
+        Self { angle, square: angle * angle }
+    }
+
+    /// By the square of a residual r and the error e of that: `(r + e)² <= (1 + ε) r² + (1 + 1/ε) e²`, which need not wait
+    /// for the root.
+    #[inline(always)]
+    fn new<S: Simd>(simd: S, square: N, error: N) -> Self
+    where
+        N: Number<S>,
+    {
+        let (share, rest) = (N::splat(simd, 1.0 + 1.0 / 16.0), N::splat(simd, 1.0 + 16.0));
+        Self { angle: square.sqrt() + error, square: square.mul_add(share, error * error * rest) }
+    }
+}
+
 /// What bounds the rise of a constraint over its tangent plane.
 struct Bound<N> {
     curvature: N,
@@ -810,20 +835,20 @@ impl<N: Copy> Bound<N> {
     /// Bound of what a plane off by `off` in direction loses: the largest of `r·δ - λ (rise over the tangent plane)`, `|r| = off`,
     /// by the curvature at the point, by the one anywhere, and by the length of δ.
     #[inline(always)]
-    fn loss<S: Simd>(&self, simd: S, off: N, multiplier: N) -> N
+    fn loss<S: Simd>(&self, simd: S, off: &Off<N>, multiplier: N) -> N
     where
         N: Number<S>,
     {
         let splat = |value: f64| N::splat(simd, value);
         // By z, r is at most the bound of the inverse times as long.
-        let square = off * off * self.inverse_square;
+        let square = off.square * self.inverse_square;
         let slope = splat(0.25) * multiplier * self.curvature * self.radius;
         // Both factors may be negative where the surface is flat.
         let fine = N::and(simd, square.le(slope * slope), splat(0.0).le(self.curvature));
-        let here = self.curvature.select(fine, splat(0.0));
         // The stiffer of the two bounds, of the curvature here by z and of twice the one anywhere by metres.
-        let stiffness = here.max(splat(2.0) * self.floor * self.inverse_square);
-        (square / (stiffness * multiplier)).min(off * self.span)
+        let anywhere = splat(2.0) * self.floor * self.inverse_square;
+        let stiffness = (self.curvature.max(anywhere) * multiplier).select(fine, anywhere * multiplier);
+        (square / stiffness).min(off.angle * self.span)
     }
 }
 

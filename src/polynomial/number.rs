@@ -38,6 +38,13 @@ pub trait Number<S: Simd>:
     fn constant(simd: S, value: &Constant) -> Self;
     /// `self b + c`, with one rounding where that is fast and two where not.
     fn mul_add(self, b: Self, c: Self) -> Self;
+    /// One over each of two numbers, whose product is neither too large nor too small for a number. Several lanes wait for the
+    /// unit that divides: one division does for both.
+    #[inline(always)]
+    fn reciprocals(simd: S, [a, b]: [Self; 2]) -> [Self; 2] {
+        let inverse = Self::splat(simd, 1.0) / (a * b);
+        [inverse * b, inverse * a]
+    }
     /// Square root.
     fn sqrt(self) -> Self;
     /// Absolute value.
@@ -78,6 +85,11 @@ impl<S: Simd> Number<S> for f64 {
     fn mul_add(self, b: Self, c: Self) -> Self {
         // Without the instruction it would be a call.
         if S::F64_LANES > 1 { f64::mul_add(self, b, c) } else { self * b + c }
+    }
+    #[inline(always)]
+    fn reciprocals(_: S, [a, b]: [Self; 2]) -> [Self; 2] {
+        // What comes after waits for a division, not for the unit.
+        [1.0 / a, 1.0 / b]
     }
     #[inline(always)]
     fn sqrt(self) -> Self {

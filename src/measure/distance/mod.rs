@@ -152,113 +152,90 @@ pub fn distance(
 
 /// Distance of two bodies, or as much of it as the goal needs.
 pub(super) fn between(
-    (a, pose_a): (&Body, &Pose),
-    (b, pose_b): (&Body, &Pose),
+    of_a: (&Body, &Pose),
+    of_b: (&Body, &Pose),
     goal: &Goal,
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> Distance {
-    let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
-    if let Hint::Overlap { point_a } = &warm.hint {
-        let pair = Pair::new(a, pose_a, b, pose_b);
-        let mut search = Search::new(&pair, goal, options, 0);
+    let query = Query { of_a, of_b, goal, options };
+    match warm.hint {
+        Hint::Smooth(_) => dispatch(Warm { query, warm }),
+        Hint::Overlap { point_a } => query.overlapping(&point_a, warm),
+        _ => query.afresh(&Lost::after(0), warm),
+    }
+}
+
+/// What is asked. Each way to the answer hands on to the next where it fails, and none hands back: an answer is written where
+/// the caller wants it, and not copied, for loads of what was just stored in other pieces have to wait.
+#[derive(Clone, Copy)]
+struct Query<'a> {
+    of_a: (&'a Body, &'a Pose),
+    of_b: (&'a Body, &'a Pose),
+    goal: &'a Goal,
+    options: &'a Options<'a>,
+}
+
+impl<'a> Query<'a> {
+    #[inline(always)]
+    fn relation(&self) -> Apart<'a> {
+        let ((a, pose_a), (b, pose_b)) = (self.of_a, self.of_b);
+        let tolerance = self.options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
+        Apart { pose_a, pose_b, goal: self.goal, tolerance }
+    }
+
+    fn pair(&self) -> Pair<'a> {
+        let ((a, pose_a), (b, pose_b)) = (self.of_a, self.of_b);
+        Pair::new(a, pose_a, b, pose_b)
+    }
+
+    /// From a point of A in its frame that both bodies had in common.
+    fn overlapping(&self, point_a: &Vector3<f64>, warm: &mut WarmStart) -> Distance {
+        let pair = self.pair();
+        let mut search = Search::new(&pair, self.goal, self.options, 0);
         if search.common(&pair.a_to_query(point_a)) {
             return search.answer();
         }
+        self.afresh(&Lost::after(0), warm)
     }
-    let relation = Apart { pose_a, pose_b, goal, tolerance };
-    let mut lost = Lost::after(0);
-    if let Hint::Smooth(trace) = &mut warm.hint {
-        match dispatch(Warm(Follow { a, b, relation, options, trace })) {
-            Ok(answer) => return answer,
-            Err(Left::Wide(proven)) => return sharpened((a, pose_a), (b, pose_b), goal, options, &proven),
-            Err(Left::Lost(left)) => lost = left,
+
+    /// From nothing but the poses, after what continuation has left.
+    #[inline(never)]
+    fn afresh(&self, lost: &Lost, warm: &mut WarmStart) -> Distance {
+        let ((a, pose_a), (b, pose_b)) = (self.of_a, self.of_b);
+        // Where edges face each other no single constraint is to be followed.
+        let smooth = a.is_smooth() && b.is_smooth();
+        // From far away it does other than lanes, which bring no points back that have come too far from the bodies.
+        let astray = matches!(warm.hint, Hint::Astray) && !far_apart((a, pose_a), (b, pose_b));
+        if smooth && !astray && !lost.touching() && !self.options.exhausted(lost.rounds) {
+            return dispatch(Cold { query: *self, before: lost.rounds, warm });
         }
+        self.search(lost, warm)
     }
-    // Where edges face each other no single constraint is to be followed.
-    let smooth = a.is_smooth() && b.is_smooth();
-    // From far away it does other than lanes, which bring no points back that have come too far from the bodies.
-    let astray = matches!(warm.hint, Hint::Astray) && !far_apart((a, pose_a), (b, pose_b));
-    if smooth && !astray && !lost.touching() && !options.exhausted(lost.rounds) {
-        let most = SEEK_ROUNDS.min(options.max_iterations() - lost.rounds);
-        match dispatch(Cold { seek: Seek { a, b, relation, from: None, most, options }, warm }) {
-            Ok(answer) => return Distance { iterations: lost.rounds + answer.iterations, ..answer },
-            Err(Left::Wide(proven)) => {
-                let proven = Proven { rounds: lost.rounds + proven.rounds, ..proven };
-                return sharpened((a, pose_a), (b, pose_b), goal, options, &proven);
-            }
-            Err(Left::Lost(left)) => lost = Lost { rounds: lost.rounds + left.rounds, ..left },
+
+    /// By all that there is.
+    #[inline(never)]
+    fn search(&self, lost: &Lost, warm: &mut WarmStart) -> Distance {
+        let pair = self.pair();
+        let mut search = Search::new(&pair, self.goal, self.options, lost.rounds);
+        search.take_over(lost);
+        if !search.decided() {
+            search.run(&warm.hint);
         }
+        *warm = search.hint();
+        search.answer()
     }
-    let pair = Pair::new(a, pose_a, b, pose_b);
-    let mut search = Search::new(&pair, goal, options, lost.rounds);
-    search.take_over(&lost);
-    if !search.decided() {
-        search.run(&warm.hint);
-    }
-    *warm = search.hint();
-    search.answer()
-}
 
-/// What continuation leaves to do.
-enum Left {
-    /// The bracket is as narrow as doubles prove it.
-    Wide(Proven),
-    /// Nothing is proven.
-    Lost(Lost),
-}
-
-/// Continuation with its answer, as vectorized work.
-struct Warm<'a>(Follow<'a, Apart<'a>>);
-
-impl WithSimd for Warm<'_> {
-    type Output = Result<Distance, Left>;
-
+    /// The answer that a proof gives.
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Result<Distance, Left> {
-        let (a, relation) = (self.0.a, self.0.relation);
-        match self.0.with_simd(simd) {
-            Ok(proven) => relation.answer(simd, a, proven),
-            Err(lost) => Err(Left::Lost(lost)),
-        }
-    }
-}
-
-/// A start from nothing but the poses with its answer, as vectorized work.
-struct Cold<'a> {
-    seek: Seek<'a, Apart<'a>>,
-    /// Replaced if the answer is proven.
-    warm: &'a mut WarmStart,
-}
-
-impl WithSimd for Cold<'_> {
-    type Output = Result<Distance, Left>;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Result<Distance, Left> {
-        let (a, relation) = (self.seek.a, self.seek.relation);
-        match self.seek.with_simd(simd) {
-            Ok((proven, trace)) => {
-                *self.warm = Hint::Smooth(trace).into();
-                relation.answer(simd, a, proven)
-            }
-            Err(lost) => Err(Left::Lost(lost)),
-        }
-    }
-}
-
-impl Apart<'_> {
-    /// The answer that a proof gives, unless rounding keeps it wide.
-    // What is left is about as large as the answer, and there is no allocation in a solve.
-    #[allow(clippy::result_large_err)]
-    #[inline(always)]
-    fn answer<S: Simd>(&self, simd: S, a: &Body, proven: Proven) -> Result<Distance, Left> {
-        let narrow = proven.upper - proven.lower <= self.tolerance;
+    fn answer<S: Simd>(&self, simd: S, proven: &Proven, tolerance: f64) -> Distance {
+        let narrow = proven.upper - proven.lower <= tolerance;
         if !narrow && !self.goal.met(proven.lower, proven.upper) {
-            return Err(Left::Wide(proven));
+            return self.sharpened(proven);
         }
-        let [witness_a, witness_b, normal] = proven.world(simd, a, self.pose_a);
-        Ok(Distance {
+        let (a, pose_a) = self.of_a;
+        let [witness_a, witness_b, normal] = proven.world(simd, a, pose_a);
+        Distance {
             status: if narrow { Status::Converged } else { Status::BracketWide },
             lower: proven.lower,
             upper: proven.upper,
@@ -270,25 +247,73 @@ impl Apart<'_> {
             parts: [0, 0],
             tied: false,
             iterations: proven.rounds,
-        })
+        }
+    }
+
+    /// A proven answer that rounding keeps wide, gone on with in twice the precision.
+    #[cold]
+    fn sharpened(&self, proven: &Proven) -> Distance {
+        let pair = self.pair();
+        let mut search = Search::new(&pair, self.goal, self.options, proven.rounds);
+        search.resume(proven);
+        search.sharpen();
+        search.attain_any();
+        search.answer()
     }
 }
 
-/// A proven answer that rounding keeps wide, gone on with in twice the precision.
-#[cold]
-fn sharpened(
-    (a, pose_a): (&Body, &Pose),
-    (b, pose_b): (&Body, &Pose),
-    goal: &Goal,
-    options: &Options<'_>,
-    proven: &Proven,
-) -> Distance {
-    let pair = Pair::new(a, pose_a, b, pose_b);
-    let mut search = Search::new(&pair, goal, options, proven.rounds);
-    search.resume(proven);
-    search.sharpen();
-    search.attain_any();
-    search.answer()
+/// Continuation from a smooth hint, as vectorized work.
+struct Warm<'a> {
+    query: Query<'a>,
+    warm: &'a mut WarmStart,
+}
+
+impl WithSimd for Warm<'_> {
+    type Output = Distance;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Distance {
+        let Self { query, warm } = self;
+        let relation = query.relation();
+        let lost = match &mut warm.hint {
+            Hint::Smooth(trace) => {
+                let (a, b) = (query.of_a.0, query.of_b.0);
+                match (Follow { a, b, relation, options: query.options, trace }).with_simd(simd) {
+                    Ok(proven) => return query.answer(simd, &proven, relation.tolerance),
+                    Err(lost) => lost,
+                }
+            }
+            _ => Lost::after(0),
+        };
+        query.afresh(&lost, warm)
+    }
+}
+
+/// A start from nothing but the poses, as vectorized work.
+struct Cold<'a> {
+    query: Query<'a>,
+    /// Evaluations before it.
+    before: u32,
+    warm: &'a mut WarmStart,
+}
+
+impl WithSimd for Cold<'_> {
+    type Output = Distance;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Distance {
+        let Self { query, before, warm } = self;
+        let (a, b, options, relation) = (query.of_a.0, query.of_b.0, query.options, query.relation());
+        let most = SEEK_ROUNDS.min(options.max_iterations() - before);
+        match (Seek { a, b, relation, from: None, most, options }).with_simd(simd) {
+            Ok((proven, trace)) => {
+                *warm = Hint::Smooth(trace).into();
+                let proven = Proven { rounds: before + proven.rounds, ..proven };
+                query.answer(simd, &proven, relation.tolerance)
+            }
+            Err(lost) => query.search(&Lost { rounds: before + lost.rounds, ..lost }, warm),
+        }
+    }
 }
 
 /// The point of B nearest to A in the query frame and the constraints that are active there; on overlap a common point, and
