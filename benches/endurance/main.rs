@@ -6,6 +6,8 @@
 //! cargo bench --bench endurance -- --seed 1 --block 4711        # replay one block and tell its failures
 //! cargo bench --bench endurance -- --queries 1e7 --bodies bodies  # pairs of the body files in a folder
 //! ```
+//!
+//! An OpenBLAS of several threads gives the programs other last digits from run to run unless `OPENBLAS_NUM_THREADS=1`.
 
 #[allow(dead_code)]
 #[path = "../../tests/stability/bodies.rs"]

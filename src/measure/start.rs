@@ -42,8 +42,7 @@ pub(super) fn facing<S: Simd, N: Number<S>>(simd: S, a: &Body, b: &Body, relativ
     for _ in 0..TURNS {
         let (u, v) = (apply(&shape_a, n), apply(&shape_b, n));
         let (wide_a, wide_b) = (dot(n, u).sqrt(), dot(n, v).sqrt());
-        let inverse = one / (wide_a * wide_b);
-        let (of_a, of_b) = (inverse * wide_b, inverse * wide_a);
+        let [of_a, of_b] = N::reciprocals(simd, [wide_a, wide_b]);
         let mut w = [one; 3];
         for i in 0..3 {
             w[i] = -(relative.origin[i] + of_b.mul_add(v[i], of_a * u[i]));

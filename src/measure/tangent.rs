@@ -692,8 +692,8 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
         normal[i] = either(-outward_a[i], outward_b[i]);
         other[i] = either(b.gradient[i], -a.gradient[i]);
     }
-    // The reciprocal of `normal·other`, found beside the lengths.
     let along = -dot(a.gradient, b.gradient);
+    // The reciprocal of `normal·other`, found beside the lengths.
     let multiplier = either(length_a, length_b) * (one / along);
     let residual = add_scaled(normal, -multiplier, other);
     let gradient_error_a = extrapolated_a.gradient_error + splat(near_a.gradient_error);
@@ -732,7 +732,7 @@ pub(super) fn bracket<S: Simd, N: Number<S>>(
     let lower = dot(normal, difference) - (slack_a + slack_b) - (displaced + rounding) - splat(SLACK) * magnitude;
     let lower = (loss + keeper_loss).mul_add(splat(-(1.0 + SLACK)), lower);
     // Gradients that do not even point the same way leave no multiplier.
-    let lower = lower.select(splat(0.0).le(along), splat(f64::NAN));
+    let lower = lower.select(splat(f64::MIN_POSITIVE).le(along), splat(f64::NAN));
 
     let (move_a, fine_a) = near_a.move_inside(simd, a.value - one + error_a, length_a, inverse_a, gradient_error_a);
     let (move_b, fine_b) = near_b.move_inside(simd, b.value - one + error_b, length_b, inverse_b, gradient_error_b);

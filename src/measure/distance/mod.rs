@@ -190,6 +190,7 @@ impl<'a> Query<'a> {
     }
 
     /// From a point of A in its frame that both bodies had in common.
+    #[inline(never)]
     fn overlapping(&self, point_a: &Vector3<f64>, warm: &mut WarmStart) -> Distance {
         let pair = self.pair();
         let mut search = Search::new(&pair, self.goal, self.options, 0);
@@ -202,11 +203,10 @@ impl<'a> Query<'a> {
     /// From nothing but the poses, after what continuation has left.
     #[inline(never)]
     fn afresh(&self, lost: &Lost, warm: &mut WarmStart) -> Distance {
-        let ((a, pose_a), (b, pose_b)) = (self.of_a, self.of_b);
         // Where edges face each other no single constraint is to be followed.
-        let smooth = a.is_smooth() && b.is_smooth();
+        let smooth = self.of_a.0.is_smooth() && self.of_b.0.is_smooth();
         // From far away it does other than lanes, which bring no points back that have come too far from the bodies.
-        let astray = matches!(warm.hint, Hint::Astray) && !far_apart((a, pose_a), (b, pose_b));
+        let astray = matches!(warm.hint, Hint::Astray) && !far_apart(self.of_a, self.of_b);
         if smooth && !astray && !lost.touching() && !self.options.exhausted(lost.rounds) {
             return dispatch(Cold { query: *self, before: lost.rounds, warm });
         }
@@ -226,7 +226,7 @@ impl<'a> Query<'a> {
         search.answer()
     }
 
-    /// The answer that a proof gives.
+    /// The answer that a proof gives, sharpened if rounding keeps it wide.
     #[inline(always)]
     fn answer<S: Simd>(&self, simd: S, proven: &Proven, tolerance: f64) -> Distance {
         let narrow = proven.upper - proven.lower <= tolerance;
@@ -283,6 +283,7 @@ impl WithSimd for Warm<'_> {
                     Err(lost) => lost,
                 }
             }
+            // Nothing to follow.
             _ => Lost::after(0),
         };
         query.afresh(&lost, warm)
