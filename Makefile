@@ -3,7 +3,7 @@
 
 help:
 	@echo 'make demo    fit two shapes, serve them, sweep one through the other, draw the curves'
-	@echo 'make test    run all tests'
+	@echo 'make test    run all tests; SUBLEVEL_DATA=DIR adds those of real meshes'
 	@echo 'make setup   install missing system packages (demo and test do this first)'
 
 setup:
@@ -15,11 +15,18 @@ export PATH := $(PATH):$(or $(CARGO_HOME),$(HOME)/.cargo)/bin
 demo: setup
 	cargo run --release -- demo
 
+# Tests of meshes that are not part of the project run where SUBLEVEL_DATA names their folder; else they are counted as ignored.
+ifdef SUBLEVEL_DATA
+NEXTEST_IGNORED := --run-ignored all
+CARGO_IGNORED := -- --include-ignored
+endif
+
 # One profile for tests and demo: nothing is built twice.
 test: setup
 	@if cargo nextest --version >/dev/null 2>&1; then \
-	    echo 'cargo nextest run --release'; cargo nextest run --release; \
+	    echo 'cargo nextest run --release $(NEXTEST_IGNORED)'; cargo nextest run --release $(NEXTEST_IGNORED); \
 	else \
-	    echo 'cargo test --release --lib --bins --tests'; cargo test --release --lib --bins --tests; \
+	    echo 'cargo test --release --lib --bins --tests $(CARGO_IGNORED)'; \
+	    cargo test --release --lib --bins --tests $(CARGO_IGNORED); \
 	fi
 	cargo test --doc --release

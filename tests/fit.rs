@@ -5,7 +5,7 @@
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use sublevel::body::Body;
-use sublevel::fit::{FitOptions, RefinementEnd, fit, read_points};
+use sublevel::fit::{FitOptions, ReadOptions, RefinementEnd, fit, read_mesh};
 
 /// Mesh number, volume of the convex hull and vertices of it, volumes of the -log det P fits at degrees 2, 4, 6.
 const TABLE: [(u32, f64, usize, [f64; 3]); 5] = [
@@ -29,7 +29,7 @@ fn mesh(number: u32) -> Option<PathBuf> {
 fn check(row: usize) {
     let (number, hull_volume, hull_vertices, volumes) = TABLE[row];
     let Some(path) = mesh(number) else { return };
-    let points = read_points(&path, 1.0).expect("the mesh is readable");
+    let points = read_mesh(&path, &ReadOptions::default()).expect("the mesh is readable").mesh.points;
     for (degree, expected) in [2, 4, 6].into_iter().zip(volumes) {
         let options = FitOptions { degree, ..FitOptions::default() };
         let fit = fit("mesh", &points, &options, &mut |_| ControlFlow::Continue(())).expect("the mesh is fitted");
@@ -62,7 +62,7 @@ const REFINED: [[f64; 2]; 5] =
 fn refined_volumes() {
     for ((number, ..), volumes) in TABLE.into_iter().zip(REFINED) {
         let Some(path) = mesh(number) else { return };
-        let points = read_points(&path, 1.0).expect("the mesh is readable");
+        let points = read_mesh(&path, &ReadOptions::default()).expect("the mesh is readable").mesh.points;
         for (degree, expected) in [4, 6].into_iter().zip(volumes) {
             let options = FitOptions { degree, refine: true, ..FitOptions::default() };
             let fit = fit("mesh", &points, &options, &mut |_| ControlFlow::Continue(())).expect("the mesh is fitted");
@@ -112,7 +112,7 @@ fn octopus() {
 #[test]
 fn chair_at_degree_eight() {
     let Some(path) = mesh(101) else { return };
-    let points = read_points(&path, 1.0).expect("the mesh is readable");
+    let points = read_mesh(&path, &ReadOptions::default()).expect("the mesh is readable").mesh.points;
     let options = FitOptions { degree: 8, ..FitOptions::default() };
     let fit = fit("chair", &points, &options, &mut |_| ControlFlow::Continue(())).expect("the mesh is fitted");
     println!("chair: degree 8, volume {:.4} m³, {:.1} s", fit.report.volume_m3, fit.report.seconds);

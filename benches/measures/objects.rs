@@ -6,7 +6,7 @@ use std::fs;
 use std::path::PathBuf;
 use sublevel::body::Body;
 use sublevel::chart::duel::Shelf;
-use sublevel::fit::{FitOptions, Mesh, hull::convex_hull, read_mesh};
+use sublevel::fit::{FitOptions, Mesh, ReadOptions, hull::convex_hull, read_mesh};
 
 /// The pairs of the figures, with the nanoseconds of coal's cached guess where the figures that are times were set.
 pub(crate) const PAIRS: [(&str, &str, f64); 3] =
@@ -48,7 +48,7 @@ impl Object {
         let (_, number) = MESHES.into_iter().find(|(known, _)| *known == name).ok_or("no such mesh")?;
         let data = std::env::var_os("SUBLEVEL_DATA").ok_or("SUBLEVEL_DATA does not name the folder with the meshes")?;
         let path = PathBuf::from(data).join(format!("psb/{number}.off"));
-        let mesh = read_mesh(&path, 1.0)?;
+        let mesh = read_mesh(&path, &ReadOptions::default())?.mesh;
         let hull = convex_hull(&mesh.points)?.vertices.into_iter().map(|i| mesh.points[i]).collect();
         let shelf = Shelf::new(&folder()?)?;
         let bodies = DEGREES.into_iter().map(|degree| kept(&shelf, name, degree, &mesh)).collect::<Result<_, _>>()?;

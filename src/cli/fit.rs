@@ -5,7 +5,8 @@ mod remote;
 mod report;
 mod sos;
 
-use crate::fit::{Cone, Progress, read_mesh};
+use super::mesh::{MeshArgs, note};
+use crate::fit::{Cone, Progress};
 use crate::jobs::fit_mesh;
 use crate::store::FitOrder;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -19,7 +20,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Fit certified bodies around meshes or point clouds (OFF, OBJ, PLY, STL, XYZ)
+/// Fit certified bodies around meshes or point clouds (OFF, OBJ, PLY, STL, COLLADA, XYZ)
 ///
 /// Each input becomes the file <stem>-d<degree>.json in the output folder: the sos-convex polynomial of that degree whose
 /// set {p <= 1} holds every input point and, by convexity, every triangle. The volume itself is not convex in the
@@ -124,9 +125,8 @@ pub(super) struct FitArgs {
     /// Give flat inputs a thickness: copies of the points to both sides, where they extend by less than this, such as 1mm
     #[arg(long, value_name = "LENGTH", value_parser = length)]
     min_thickness: Option<f64>,
-    /// Metres per unit of the input: 0.001 for files in millimetres
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, allow_negative_numbers = true)]
-    scale: f64,
+    #[command(flatten)]
+    mesh: MeshArgs,
     /// Have this server fit, such as http://127.0.0.1:50051: it stores the bodies, and the same files are written here
     ///
     /// All options mean what they mean without a server; with --group the bodies of the inputs are stored there first. Compounds and
@@ -138,7 +138,7 @@ pub(super) struct FitArgs {
     ///
     /// Inputs may be sos-bodies, which need not be convex: the smallest body around one is its convexification.
     /// It is proven to contain every body whole, by polynomial multipliers that its file keeps: 'verify --contains' checks them.
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["ladder", "max_gap", "refine", "slabs", "trim", "min_thickness", "scale", "objective", "relax_convexity", "raw_frame", "cone", "parts"])]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["ladder", "max_gap", "refine", "slabs", "trim", "min_thickness", "scale", "drop_nan", "drop_unused", "objective", "relax_convexity", "raw_frame", "cone", "parts"])]
     pub(super) group: Option<String>,
     /// Put them into few bodies, <NAME>-1-d<degree>.json and so on, of at most 1 + FRACTION times the inputs' total volume
     ///
@@ -192,7 +192,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), Box<dyn Error>> {
     if args.json {
         serde_json::to_writer_pretty(&mut out, &rows)?;
         writeln!(out)?;
-    } else {
+    } else if !rows.is_empty() {
         report::table(&mut out, &rows)?;
     }
     failure.map_or(Ok(()), Err)
@@ -213,15 +213,17 @@ fn stem(input: &Path) -> Result<String, Box<dyn Error>> {
 fn one(args: &FitArgs, input: &Path, order: &FitOrder) -> Result<Vec<Row>, Box<dyn Error>> {
     let bar = progress_bar(&order.name);
     bar.set_message("reading");
-    let mesh = read_mesh(input, args.scale)?;
-    let points = mesh.points.len();
+    let reading = args.mesh.read(input)?;
+    bar.suspend(|| note(input, &reading));
+    let (used, odd) = (reading.mesh.used_points(), report::ReadingRow::from(&reading));
+    let mesh = reading.mesh;
     let made = match &args.server {
         Some(url) => carry_out_on(url, order, &mesh.points, &mesh.triangles, &bar),
         None => fit_mesh(order, mesh, |_, said| tell(&bar, said)).map_err(Into::into),
     }
     .map_err(|error| format!("{}: {error}", input.display()))?;
     bar.finish_and_clear();
-    report::write(&args.out, input, points, order, &made)
+    report::write(&args.out, input, used, &odd, order, &made)
 }
 
 /// Says on a bar how far a fit has come.

@@ -13,6 +13,8 @@ mod fit;
 #[cfg(feature = "fit")]
 mod group;
 mod measure;
+#[cfg(feature = "fit")]
+mod mesh;
 #[cfg(feature = "chart")]
 mod messages;
 mod push;

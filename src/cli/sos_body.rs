@@ -145,7 +145,9 @@ fn contained(
     sentences: &mut Vec<String>,
 ) -> Result<Option<String>, Box<dyn Error>> {
     let Some(path) = &args.points else { return Ok(None) };
-    let mesh = crate::fit::read_mesh(path, args.scale)?;
+    let reading = args.mesh.read(path)?;
+    super::mesh::note(path, &reading);
+    let mesh = reading.mesh;
     let fitted_to = body.points().is_some_and(|known| *known == crate::body::ContainedPoints::of(&mesh.points));
     if body.points().is_some() && !fitted_to {
         eprintln!("note: these are not the points that the set was fitted to");

@@ -1,5 +1,7 @@
 //! `sublevel verify`.
 
+#[cfg(feature = "fit")]
+use super::mesh::{MeshArgs, note};
 use super::{Outcome, one_line, read, read_obstacle, sos_body};
 use crate::body::{BasicSet, Body, Compound, Obstacle, Shape, SosBody};
 #[cfg(feature = "fit")]
@@ -36,10 +38,9 @@ pub(super) struct VerifyArgs {
     #[cfg(feature = "fit")]
     #[arg(long, value_name = "MESH")]
     pub(super) points: Option<PathBuf>,
-    /// Metres per unit of the points
     #[cfg(feature = "fit")]
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, requires = "points", allow_negative_numbers = true)]
-    pub(super) scale: f64,
+    #[command(flatten)]
+    pub(super) mesh: MeshArgs,
     /// Bodies and sos-bodies that the body must contain whole, by the proofs that its file keeps for them
     #[cfg_attr(feature = "fit", doc = "or, if it has none, by new ones")]
     #[arg(long, value_name = "FILE", num_args = 1..)]
@@ -68,6 +69,12 @@ struct Report {
 
 /// Proves, prints, and tells whether every claim holds.
 pub(super) fn run(args: &VerifyArgs) -> Outcome {
+    #[cfg(feature = "fit")]
+    if args.points.is_none() && args.mesh.are_given() {
+        return Err(
+            "--scale, --drop-nan and --drop-unused are about the mesh of --points; name it, or leave them out".into()
+        );
+    }
     let text = read(&args.file)?;
     if SosBody::is_file(&text) {
         return sos_body::verify(args, &text);
@@ -134,7 +141,9 @@ pub(super) fn run(args: &VerifyArgs) -> Outcome {
 fn contained(args: &VerifyArgs, body: &Body) -> Result<(Report, Option<String>), Box<dyn std::error::Error>> {
     let mut report = proven(body.degree());
     let Some(path) = &args.points else { return Ok((report, None)) };
-    let points = crate::fit::read_points(path, args.scale)?;
+    let reading = args.mesh.read(path)?;
+    note(path, &reading);
+    let points = reading.mesh.points;
     let fitted_to = body.points().is_some_and(|recorded| *recorded == crate::body::ContainedPoints::of(&points));
     if body.points().is_some() && !fitted_to {
         eprintln!("note: these are not the points that the body was fitted to");
@@ -183,7 +192,9 @@ fn gap(
 fn covered(args: &VerifyArgs, compound: &Compound) -> Result<(Report, Option<String>), Box<dyn std::error::Error>> {
     let mut report = proven(compound.degree());
     let Some(path) = &args.points else { return Ok((report, None)) };
-    let Mesh { points, triangles } = crate::fit::read_mesh(path, args.scale)?;
+    let reading = args.mesh.read(path)?;
+    note(path, &reading);
+    let Mesh { points, triangles } = reading.mesh;
     let covering = compound.covering();
     let cuts = covering.map_or(&[][..], |covering| &covering.cuts);
     let proof = compound.prove_covers(&points, &triangles, cuts);

@@ -1,6 +1,6 @@
 //! Points to a certified body: hull, whitening, semidefinite program, certificate, proof.
 //!
-//! The way of one fit: [`read`] the points; [`hull`] leaves those that matter; the smallest [`ellipsoid`] around them
+//! The way of one fit: [`input`] reads the points; [`hull`] leaves those that matter; the smallest [`ellipsoid`] around them
 //! gives the normalized frame (`object`); `generate` minimises an [`Objective`] over sos-convex polynomials with a margin by
 //! following the central path of the dual (`path`); `refine` goes on to the volume itself; the constant coefficient pulls every
 //! input point inside; [`Body::new`] proves the stored numbers; `slab` cuts off what is too much, and [`gap`](gap()) bounds what
@@ -24,6 +24,7 @@ mod factor;
 mod gap;
 mod generate;
 pub mod hull;
+pub mod input;
 mod ladder;
 mod lorentz;
 mod model;
@@ -35,7 +36,6 @@ mod parts;
 mod path;
 mod program;
 mod progress;
-pub mod read;
 mod refine;
 mod slab;
 mod sos;
@@ -58,12 +58,14 @@ pub use enclose::{
 };
 pub use gap::{Gap, gap};
 pub use hull::HullError;
+pub use input::{
+    Mesh, ReadError, ReadOptions, Reading, Remarks, Scale, ScaleError, Unused, UnusedCost, parse_mesh, read_mesh,
+};
 pub use ladder::{MAX_SLABS, Representation, Rung, ball, cheapest_within, coarsest_within, ladder};
 pub use objective::{Objective, UnknownObjective};
 pub use parts::{CompoundFit, MAX_PIECES, fit_parts};
 pub use program::ProgramError;
 pub use progress::Progress;
-pub use read::{Mesh, ReadError, read_mesh, read_points};
 pub use refine::RefinementEnd;
 pub use slab::CutError;
 pub use sos::{ProgramReport, SosFit, SosMethod, SosOptions, SosReport, fit_sos};
@@ -281,7 +283,7 @@ pub enum FitError {
     /// The points lie on a surface.
     #[error(
         "points: they span only {rank} of the {monomials} monomials of degree {} (they are too few, or all near a surface of that \
-         degree), so nothing bounds a polynomial of degree {degree}; lower the degree, add points, or bound convexity (c finite or 0)",
+         degree), so nothing bounds a polynomial of degree {degree}; lower the degree, add points, or fit a convex body (c = 0)",
         degree / 2
     )]
     Span {
@@ -308,14 +310,14 @@ pub enum FitError {
         rounds: usize,
     },
     /// The answer could not be verified optimal.
-    #[error(
-        "the fit is only known to be within {gap:.1e} of the optimal objective; lower the degree, or take the objective \
-         logdet-p, which no frame makes worse"
-    )]
+    #[error("the fit is only known to be within {gap:.1e} of the optimal objective; lower the degree, or add points")]
     NotOptimal {
         /// Objective minus its lower bound from the dual.
         gap: f64,
     },
+    /// What another objective might have reached.
+    #[error("{0}, or take the objective logdet-p, which no frame makes worse")]
+    OtherObjective(Box<FitError>),
     /// The numbers make no polynomial.
     #[error("the fitted polynomial is unusable: {0}; lower the degree")]
     Polynomial(#[from] PolynomialError),
@@ -343,6 +345,18 @@ pub enum FitError {
     /// A slab could not be added.
     #[error("the body could not be cut by a slab: {0}; ask for fewer slabs, or a larger gap")]
     Cut(#[from] CutError),
+}
+
+impl FitError {
+    /// The same error with the advice to take the default objective, where it was not taken and may help.
+    fn of_objective(self, objective: Objective) -> Self {
+        match self {
+            Self::Program(_) | Self::NotOptimal { .. } if objective != Objective::default() => {
+                Self::OtherObjective(Box::new(self))
+            }
+            other => other,
+        }
+    }
 }
 
 /// Fits a body of one polynomial around `points` (metres) with the least [`FitOptions::objective`], and cuts it by

@@ -200,7 +200,8 @@ impl<'a> Object<'a> {
     ) -> Result<(Optimum, Vec<f64>, Option<RefinementEnd>), FitError> {
         let coordinates = self.coordinates(options.coordinates)?;
         let problem = Problem::new(structure, options.objective, &coordinates, margin);
-        let optimum = generate(problem, &self.whitened, &self.likely.borrow(), watch)?;
+        let optimum = generate(problem, &self.whitened, &self.likely.borrow(), watch)
+            .map_err(|error| error.of_objective(options.objective))?;
         if !options.refine {
             return Ok((optimum, Vec::new(), None));
         }

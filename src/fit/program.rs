@@ -37,10 +37,7 @@ use nalgebra::{DMatrix, DVector};
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProgramError {
     /// A moment matrix lost its definiteness.
-    #[error(
-        "the points do not span the polynomials of this degree numerically; lower the degree, or take the objective \
-         logdet-p, which no frame makes worse"
-    )]
+    #[error("the points do not span the polynomials of this degree numerically; lower the degree, or add points")]
     Singular,
 }
 

@@ -190,7 +190,16 @@ fn relaxed(
     loop {
         let margin = margins.next().unwrap_or(DEFAULT_MARGIN);
         let problem = Problem::new(&structure, objective, &map, margin).relaxed(power.as_ref());
-        let Optimum { coefficients, hessian, gram, gap, objective } = generate(problem, whitened, &[], watch)?;
+        // Where convexity bounds too little the points have to: then they are what is missing.
+        let spanned = |error| match error {
+            FitError::Program(_) | FitError::NotOptimal { .. } => {
+                let all = Structure::without_convexity(options.degree);
+                moments(&all, whitened).err().unwrap_or(error)
+            }
+            other => other,
+        };
+        let Optimum { coefficients, hessian, gram, gap, objective } =
+            generate(problem, whitened, &[], watch).map_err(|error| spanned(error).of_objective(objective))?;
         let relaxation = |polynomial: &Polynomial| {
             let Some(power) = &power else { return Ok(None) };
             let gram = HessianGram::nearest_with(polynomial, power, structure.hessian_basis.clone(), hessian.clone())

@@ -5,13 +5,13 @@ use std::path::Path;
 use super::carry_out::body_name;
 use crate::body::check_name;
 use crate::fit::{
-    self, Cone, Coordinates, EncloseError, EncloseOptions, FitError, FitOptions, MAX_PIECES, MAX_SETS, Mesh, Objective,
-    ReadError, SosMethod, SosOptions,
+    Cone, Coordinates, EncloseError, EncloseOptions, FitError, FitOptions, MAX_PIECES, MAX_SETS, Objective, ReadError,
+    ReadOptions, Reading, Scale, SosMethod, SosOptions, parse_mesh,
 };
 use crate::store::{FitGroup, FitOrder, MAX_REQUEST_ID_BYTES};
 
 /// Endings of the mesh formats that can be read.
-pub use crate::fit::read::FORMATS as MESH_FORMATS;
+pub use crate::fit::input::FORMATS as MESH_FORMATS;
 
 /// Degree of bodies around groups unless told otherwise: multipliers make higher ones slow.
 const GROUP_DEGREE: usize = 4;
@@ -146,9 +146,10 @@ fn check_group(order: &FitOrder, group: &FitGroup) -> Result<(), OrderError> {
 ///
 /// # Errors
 /// What is wrong with the file, and where.
-pub fn read_mesh(bytes: &[u8], format: &str, input: &str, scale: f64) -> Result<Mesh, ReadError> {
+pub fn read_mesh(bytes: &[u8], format: &str, input: &str, scale: f64) -> Result<Reading, ReadError> {
     let name = if input.is_empty() { "the mesh" } else { input };
-    fit::read::parse(bytes, format, Path::new(name), scale)
+    let options = ReadOptions { scale: Scale::uniform(scale)?, ..ReadOptions::default() };
+    parse_mesh(bytes, format, Path::new(name), &options)
 }
 
 /// How to carry out an order about points.

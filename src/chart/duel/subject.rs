@@ -1,7 +1,7 @@
 //! The objects and the pairs of them.
 
 use super::DuelError;
-use crate::fit::{Mesh, hull::convex_hull, read_mesh};
+use crate::fit::{Mesh, ReadOptions, hull::convex_hull, read_mesh};
 use nalgebra::Vector3;
 use std::path::Path;
 
@@ -64,7 +64,7 @@ impl Subject {
     /// [`DuelError::Mesh`] or [`DuelError::Hull`].
     pub fn read(name: &'static str, data: &Path) -> Result<Self, DuelError> {
         let file = FILES.iter().find(|(known, _)| *known == name).map_or(name, |(_, file)| file);
-        let mesh = read_mesh(&data.join(file), 1.0)?;
+        let mesh = read_mesh(&data.join(file), &ReadOptions::default())?.mesh;
         let hull = convex_hull(&mesh.points).map_err(|source| DuelError::Hull { mesh: name, source })?;
         let hull: Vec<Vector3<f64>> = hull.vertices.iter().map(|&i| mesh.points[i]).collect();
         let apart = |a: &Vector3<f64>| hull.iter().map(|b| (b - a).norm_squared()).fold(0.0, f64::max);

@@ -7,8 +7,8 @@ mod rows;
 use super::{ChartError, Machine};
 use crate::body::{Aabb, Body, SosBody, Volume};
 use crate::fit::{
-    Coordinates, FitError, FitOptions, Mesh, OrientedBox, ReadError, SosMethod, SosOptions, ball, fit, fit_sos, hull,
-    hull::HullError, read_mesh, smallest_box,
+    Coordinates, FitError, FitOptions, Mesh, OrientedBox, ReadError, ReadOptions, SosMethod, SosOptions, ball, fit,
+    fit_sos, hull, hull::HullError, read_mesh, smallest_box,
 };
 use nalgebra::{Matrix3, Vector3};
 use rows::{MESHES, Method, Row, rows};
@@ -148,7 +148,7 @@ pub fn table1(
 
 impl Subject {
     fn read(name: &'static str, path: &Path) -> Result<Self, Table1Error> {
-        let mesh = read_mesh(path, 1.0)?;
+        let mesh = read_mesh(path, &ReadOptions::default())?.mesh;
         let hull = hull::convex_hull(&mesh.points).map_err(|source| Table1Error::Hull { mesh: name, source })?;
         Ok(Self { name, mesh, hull_volume_m3: hull.volume })
     }

@@ -3,7 +3,7 @@
 use super::sos;
 use crate::body::{Body, Compound};
 use crate::cli::write_atomically;
-use crate::fit::RefinementEnd;
+use crate::fit::{Reading, RefinementEnd};
 use crate::jobs::{Made, Shapes};
 use crate::store::{FitOrder, FitOutcome, FittedBody};
 use serde::Serialize;
@@ -37,6 +37,8 @@ pub(super) struct Convex {
     /// Points that were trimmed, and the largest distance of one of them from the hull of the others.
     left_out: usize,
     left_out_m: f64,
+    #[serde(flatten)]
+    reading: ReadingRow,
     hull_vertices: usize,
     /// Of a compound the union of its parts, which may overlap.
     volume_m3: f64,
@@ -54,6 +56,33 @@ pub(super) struct Convex {
     solve: Option<Solve>,
 }
 
+/// What is odd about the file.
+#[derive(Clone, Default, Serialize)]
+pub(super) struct ReadingRow {
+    /// Points left out since a coordinate of theirs was not finite.
+    dropped_points: usize,
+    /// Vertices that no triangle uses, of files with triangles, and whether they were left out.
+    unused_vertices: usize,
+    unused_dropped: bool,
+    /// Volume of the convex hull with and without them; none where there are none, or no volume.
+    hull_with_unused_m3: Option<f64>,
+    hull_without_unused_m3: Option<f64>,
+}
+
+impl From<&Reading> for ReadingRow {
+    fn from(Reading { mesh, remarks }: &Reading) -> Self {
+        let unused = remarks.unused.as_ref();
+        let cost = unused.map(|unused| unused.cost(mesh));
+        Self {
+            dropped_points: remarks.dropped_points,
+            unused_vertices: unused.map_or(0, |unused| unused.points.len()),
+            unused_dropped: unused.is_some_and(|unused| unused.dropped),
+            hull_with_unused_m3: cost.and_then(|cost| cost.hull_with_m3),
+            hull_without_unused_m3: cost.and_then(|cost| cost.hull_without_m3),
+        }
+    }
+}
+
 /// What only fits of polynomials have.
 #[derive(Serialize)]
 struct Solve {
@@ -63,11 +92,12 @@ struct Solve {
     optimality_gap: Option<f64>,
 }
 
-/// Writes what was made of an input of so many points, and describes it.
+/// Writes what was made of an input, of whose vertices the triangles use so many, and describes it.
 pub(super) fn write(
     folder: &Path,
     input: &Path,
-    points: usize,
+    used: usize,
+    reading: &ReadingRow,
     order: &FitOrder,
     made: &Made,
 ) -> Result<Vec<Row>, Box<dyn Error>> {
@@ -77,7 +107,7 @@ pub(super) fn write(
         write_atomically(&file, &json)?;
         Ok(file)
     };
-    let rows = match shapes {
+    let mut rows = match shapes {
         Shapes::Bodies(bodies) => {
             let one = |(body, took): (&Body, &FittedBody)| {
                 let file = write(kind(body, took), body.to_json())?;
@@ -88,7 +118,7 @@ pub(super) fn write(
         }
         Shapes::Compound(compound) => {
             let file = write(format!("d{}-p{}", compound.degree(), compound.parts().len()), compound.to_json())?;
-            vec![Row::Convex(compound_row(input, &file, points, compound, &outcome.bodies[0]))]
+            vec![Row::Convex(compound_row(input, &file, used, compound, &outcome.bodies[0]))]
         }
         Shapes::SosBody(body) => {
             let kind =
@@ -97,6 +127,12 @@ pub(super) fn write(
             vec![Row::Sos(sos::row(input, &file, outcome, body))]
         }
     };
+    for row in &mut rows {
+        match row {
+            Row::Convex(row) => row.reading = reading.clone(),
+            Row::Sos(row) => row.reading = reading.clone(),
+        }
+    }
     note_left_out(input, outcome, &rows);
     Ok(rows)
 }
@@ -146,6 +182,7 @@ fn body_row(input: &Path, file: &Path, outcome: &FitOutcome, body: &Body, took: 
         points: body.points().map_or(0, |points| points.count),
         left_out: outcome.left_out,
         left_out_m: outcome.left_out_m,
+        reading: ReadingRow::default(),
         hull_vertices: made.hull_vertices,
         volume_m3: body.volume().volume_m3,
         volume_error_m3: body.volume().error_m3,
@@ -179,6 +216,7 @@ fn compound_row(input: &Path, file: &Path, points: usize, compound: &Compound, t
         points,
         left_out: 0,
         left_out_m: 0.0,
+        reading: ReadingRow::default(),
         hull_vertices: made.hull_vertices,
         volume_m3: volume.volume_m3,
         volume_error_m3: volume.error_m3,

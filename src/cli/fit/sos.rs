@@ -1,5 +1,6 @@
 //! What `sublevel fit` says of sets that need not be convex.
 
+use super::report::ReadingRow;
 use crate::body::{Coverage, SosBody};
 use crate::store::FitOutcome;
 use serde::Serialize;
@@ -20,6 +21,8 @@ pub(super) struct Row {
     /// Points that were trimmed, and the largest distance of one of them from the hull of the others.
     left_out: usize,
     left_out_m: f64,
+    #[serde(flatten)]
+    pub(super) reading: ReadingRow,
     hull_vertices: usize,
     volume_m3: f64,
     volume_error_m3: f64,
@@ -49,6 +52,7 @@ pub(super) fn row(input: &Path, file: &Path, outcome: &FitOutcome, body: &SosBod
         points: body.points().map_or(0, |points| points.count),
         left_out: outcome.left_out,
         left_out_m: outcome.left_out_m,
+        reading: ReadingRow::default(),
         hull_vertices: made.hull_vertices,
         volume_m3: body.volume().volume_m3,
         volume_error_m3: body.volume().error_m3,

@@ -20,12 +20,13 @@ const OBJECTIVES: [(FitObjective, &str); 5] = [
 const CONES: [(FitCone, &str); 3] = [(FitCone::Sos, "sos"), (FitCone::Sdsos, "sdsos"), (FitCone::Dsos, "dsos")];
 
 /// Formats and the endings of their files.
-const FORMATS: [(MeshFormat, &str); 5] = [
+const FORMATS: [(MeshFormat, &str); 6] = [
     (MeshFormat::Off, "off"),
     (MeshFormat::Obj, "obj"),
     (MeshFormat::Ply, "ply"),
     (MeshFormat::Stl, "stl"),
     (MeshFormat::Xyz, "xyz"),
+    (MeshFormat::Dae, "dae"),
 ];
 
 /// The request's id, the checked order, and the format of the mesh file that follows, if one does.

@@ -81,8 +81,12 @@ impl Upload {
         let (field, points, triangles) = match content {
             Content::Points(points, triangles) => ("points", points, triangles),
             Content::Mesh(format, file) => {
-                let mesh = jobs::read_mesh(&file, format, &order.input, order.scale);
-                let mesh = mesh.map_err(|error| Invalid::new("mesh", error))?;
+                let read = jobs::read_mesh(&file, format, &order.input, order.scale);
+                let read = read.map_err(|error| Invalid::new("mesh", error))?;
+                for remark in read.remarks.sentences(&read.mesh) {
+                    tracing::warn!(name = order.name, input = order.input, "mesh of a fit: {remark}");
+                }
+                let mesh = read.mesh;
                 let triangles = if order.uses_triangles() { mesh.triangles } else { Vec::new() };
                 if triangles.len() > MAX_FIT_TRIANGLES {
                     return Err(Invalid::new("mesh", too_many()));
@@ -93,8 +97,10 @@ impl Upload {
             }
             Content::Group => return Ok(NewJob::new(request_id, order, &[], &[])),
         };
-        if !(4..=MAX_FIT_POINTS).contains(&points.len()) {
-            let why = format!("has {} points; a fit takes 4 to {MAX_FIT_POINTS}", points.len());
+        // Copies to both sides give a volume to any number of points.
+        let least = if order.min_thickness_m.is_some() { 1 } else { 4 };
+        if !(least..=MAX_FIT_POINTS).contains(&points.len()) {
+            let why = format!("has {} points; this fit takes {least} to {MAX_FIT_POINTS}", points.len());
             return Err(Invalid::new(field, why));
         }
         let is_there = |corner: &u32| usize::try_from(*corner).is_ok_and(|corner| corner < points.len());
