@@ -290,8 +290,12 @@ impl Row {
 }
 
 impl Element {
+    fn quoted(&self) -> String {
+        quoted(self.name.as_bytes())
+    }
+
     fn defect(&self, reason: impl Into<String>) -> Defect {
-        Defect::new(format!("element {:?}", self.name), reason)
+        Defect::new(format!("element {}", self.quoted()), reason)
     }
 
     /// A row that is a line, all of it.
@@ -299,7 +303,7 @@ impl Element {
         let mut fields = line.fields();
         let mut next = || {
             let field = fields.next().ok_or_else(|| {
-                line.defect(format!("the row of the element {:?} has fewer numbers than the header says", self.name))
+                line.defect(format!("the row of the element {} has fewer numbers than the header says", self.quoted()))
             })?;
             Ok((field, number(field).map_err(|reason| line.defect(reason.text).remedy(reason.remedy))?))
         };
@@ -323,9 +327,9 @@ impl Element {
         }
         match fields.next() {
             Some(field) => Err(line.defect(format!(
-                "{} comes after what the header says of a row of the element {:?}",
+                "{} comes after what the header says of a row of the element {}",
                 quoted(field),
-                self.name
+                self.quoted()
             ))),
             None => Ok(row),
         }

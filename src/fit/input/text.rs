@@ -139,6 +139,13 @@ pub(super) fn integer<T: std::str::FromStr>(field: &[u8]) -> Option<T> {
     str::from_utf8(field).ok()?.parse().ok()
 }
 
+/// The beginning of a message that may quote what a file holds, in one line.
+pub(super) fn shortened(text: &str) -> String {
+    const LONGEST: usize = 120;
+    let shown: String = text.chars().take(LONGEST).flat_map(char::escape_debug).collect();
+    if text.chars().nth(LONGEST).is_some() { shown + "..." } else { shown }
+}
+
 /// A field as an error shows it.
 pub(super) fn quoted(field: &[u8]) -> String {
     let shown = String::from_utf8_lossy(&field[..field.len().min(QUOTED)]);

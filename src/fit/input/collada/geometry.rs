@@ -1,6 +1,7 @@
 //! Meshes of a COLLADA file: sources of numbers, and the primitives that index them.
 
 use super::{Defect, Document, Xml, child, children, integers, numbers, place_of, unexpected};
+use crate::fit::input::text::quoted;
 use nalgebra::Vector3;
 
 /// A geometry in its own frame, in units of the file.
@@ -18,7 +19,8 @@ impl Geometry {
     pub(super) fn read(document: &Document<'_, '_>, geometry: Xml<'_, '_>) -> Result<Self, Defect> {
         let mesh = child(geometry, "mesh").ok_or_else(|| {
             let kinds: Vec<_> = geometry.children().filter(Xml::is_element).map(|e| e.tag_name().name()).collect();
-            let reason = format!("this geometry is no mesh but {:?}, which is not read", kinds.join(", "));
+            let reason =
+                format!("this geometry is no mesh but {}, which is not read", quoted(kinds.join(", ").as_bytes()));
             Defect::new(place_of(geometry), reason).remedy("export the shape as polygons")
         })?;
         let vertices = needed(mesh, "vertices")?;
@@ -48,7 +50,10 @@ fn count(element: Xml<'_, '_>, name: &str, default: Option<usize>) -> Result<usi
         (None, Some(default)) => Ok(default),
         (None, None) => Err(Defect::new(place_of(element), format!("the attribute {name:?} is missing"))),
         (Some(text), _) => text.trim().parse().map_err(|_| {
-            Defect::new(place_of(element), format!("the attribute {name} is {text:?}, which is no whole number"))
+            Defect::new(
+                place_of(element),
+                format!("the attribute {name} is {}, which is no whole number", quoted(text.as_bytes())),
+            )
         }),
     }
 }

@@ -30,11 +30,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Surface, Defect> {
     // Names and comments need not be UTF-8.
     let content = String::from_utf8_lossy(text::without_mark(bytes)?);
     let parsed = roxmltree::Document::parse(&content).map_err(|error| {
-        Defect::line(error.pos().row as usize, format!("this is no XML: {}", error.to_string().escape_debug()))
+        Defect::line(error.pos().row as usize, format!("this is no XML: {}", text::shortened(&error.to_string())))
     })?;
     let root = parsed.root_element();
     if root.tag_name().name() != "COLLADA" {
-        let reason = format!("the outermost element is {:?}, not \"COLLADA\"", root.tag_name().name());
+        let name = text::quoted(root.tag_name().name().as_bytes());
+        let reason = format!("the outermost element is {name}, not \"COLLADA\"");
         return Err(Defect::line(1, reason));
     }
     let document = Document::new(root);
@@ -75,7 +76,8 @@ impl<'a, 'i> Document<'a, 'i> {
         let name = element.attribute(attribute).unwrap_or_default();
         let found = name.strip_prefix('#').and_then(|id| self.ids.get(id)).copied();
         found.ok_or_else(|| {
-            let reason = format!("{attribute} is {name:?}, which names no element of this file");
+            let name = text::quoted(name.as_bytes());
+            let reason = format!("{attribute} is {name}, which names no element of this file");
             Defect::new(place_of(element), reason)
         })
     }
@@ -85,8 +87,12 @@ impl<'a, 'i> Document<'a, 'i> {
         let Some(unit) = child(self.root, "asset").and_then(|asset| child(asset, "unit")) else { return Ok(1.0) };
         let Some(meter) = unit.attribute("meter") else { return Ok(1.0) };
         let value = meter.trim().parse().ok().filter(|meter: &f64| *meter > 0.0 && meter.is_finite());
-        value
-            .ok_or_else(|| Defect::new(place_of(unit), format!("the attribute meter is {meter:?}, no positive number")))
+        value.ok_or_else(|| {
+            Defect::new(
+                place_of(unit),
+                format!("the attribute meter is {}, no positive number", text::quoted(meter.as_bytes())),
+            )
+        })
     }
 
     /// The scene that is shown; none of files that hold geometries alone.
@@ -194,8 +200,8 @@ fn children<'a, 'i, 'n>(parent: Xml<'a, 'i>, name: &'n str) -> impl Iterator<Ite
 /// An element as errors name it, with its line.
 fn place_of(element: Xml<'_, '_>) -> String {
     let line = element.document().text_pos_at(element.range().start).row;
-    let id = element.attribute("id").map(|id| format!(" {id:?}")).unwrap_or_default();
-    format!("line {line}, element {}{id}", element.tag_name().name())
+    let id = element.attribute("id").map(|id| format!(" {}", text::quoted(id.as_bytes()))).unwrap_or_default();
+    format!("line {line}, element {}{id}", text::shortened(element.tag_name().name()))
 }
 
 /// The words of an element's text, comments left out.

@@ -144,6 +144,9 @@ fn broken_collada() {
         assert_ne!(text, good, "{from}");
         assert_fails("dae", &text, parts);
     }
+    // What a file holds is quoted in part.
+    let long = format!("<COLLADA><{0}></{0}b></COLLADA>", "x".repeat(5000));
+    assert!(read("dae", long).unwrap_err().len() < 400);
     // Nodes that instance nodes, twice each, twenty levels deep.
     let level = |i: usize| format!("<node id=\"n{i}\">{0}{0}</node>", format!("<instance_node url=\"#n{}\"/>", i + 1));
     let nodes: String = (0..30).map(level).collect();
