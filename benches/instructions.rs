@@ -16,7 +16,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 use sublevel::body::Body;
-use sublevel::demo::shapes;
+use sublevel::fit::shapes;
 use sublevel::fit::{FitOptions, fit};
 use sublevel::measure::{Options, Pose, Status, WarmStart, distance, level_distance};
 

@@ -9,18 +9,16 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
-pub mod body;
+pub use sublevel_core::{body, measure, optimize, polynomial};
+#[cfg(feature = "fit")]
+pub use sublevel_fit as fit;
+pub use sublevel_scene as scene;
+
 pub mod chart;
 pub mod cli;
 #[cfg(feature = "chart")]
 pub mod demo;
 #[cfg(feature = "fit")]
-pub mod fit;
-#[cfg(feature = "fit")]
 pub mod jobs;
-pub mod measure;
-pub mod optimize;
-pub mod polynomial;
-pub mod scene;
 pub mod service;
 pub mod store;

@@ -2,10 +2,10 @@
 
 use crate::draw::{Draw, Style};
 use crate::measures::{Answer, MEASURES};
-use crate::random::{Seeded, pose};
 use crate::tally::{Check, Iterations, Tally, Worst};
 use sublevel::body::Body;
 use sublevel::measure::{Distance, MAX_ITERATIONS, Options, Pose, WarmStart, distance_batch};
+use sublevel_testkit::random::{Seeded, pose};
 
 /// Solves of one block.
 pub(crate) const SOLVES: u64 = 10_000;

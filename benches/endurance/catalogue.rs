@@ -1,8 +1,8 @@
 //! The bodies that queries are drawn from.
 
-use crate::bodies::{b, c, cylinder, e, p, q};
 use std::path::Path;
 use sublevel::body::Body;
+use sublevel_testkit::bodies::{b, c, cylinder, e, p, q};
 
 /// Analytic bodies of every kind, sizes 1e-2 to 10, thin and round; then fitted ones, from `folder` and fitted on the spot.
 pub(crate) fn catalogue(folder: &Path) -> Vec<Body> {
@@ -45,7 +45,7 @@ pub(crate) fn read(folder: &Path) -> Vec<Body> {
 #[cfg(feature = "fit")]
 fn fit_missing(folder: &Path) {
     use std::ops::ControlFlow;
-    use sublevel::demo::shapes;
+    use sublevel::fit::shapes;
     use sublevel::fit::{FitOptions, fit};
     std::fs::create_dir_all(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
     for (name, shape) in [("chair", shapes::chair()), ("human", shapes::human())] {

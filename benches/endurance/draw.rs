@@ -1,9 +1,9 @@
 //! Queries of a round: all of one pair and one measure, drawn from the seed of their block.
 
-use crate::random::{Seeded, pose, shifted, turned};
 use nalgebra::{UnitQuaternion, Vector3};
 use sublevel::body::Body;
 use sublevel::measure::{Options, Pose, WarmStart, distance};
+use sublevel_testkit::random::{Seeded, pose, shifted, turned};
 
 /// How the poses of a round are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -9,17 +9,8 @@
 //!
 //! An OpenBLAS of several threads gives the programs other last digits from run to run unless `OPENBLAS_NUM_THREADS=1`.
 
-#[allow(dead_code)]
-#[path = "../../tests/stability/bodies.rs"]
-mod bodies;
-#[allow(dead_code)]
-#[path = "../../tests/stability/random.rs"]
-mod random;
-#[allow(dead_code)]
-#[path = "../../tests/stability/reference/mod.rs"]
-mod reference;
 #[cfg(feature = "fit")]
-#[path = "../../tests/stability/sos.rs"]
+#[path = "../../crates/fit/tests/level_zero.rs"]
 mod sos;
 
 mod block;

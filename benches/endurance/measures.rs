@@ -1,12 +1,12 @@
 //! The measures under test: a table to extend when one is added.
 
-use crate::bodies::Placed;
-use crate::reference::{self, growth};
 use sublevel::body::Body;
 use sublevel::measure::{
     Distance, GrowthDistance, LevelDistance, Options, Pose, Status, WarmStart, distance, growth_distance,
     level_distance,
 };
+use sublevel_testkit::bodies::Placed;
+use sublevel_testkit::reference::{self, growth};
 
 /// An answer of any measure.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,7 @@
 //! What holds of every content of every format.
 
 use std::path::Path;
-use sublevel::fit::{ReadOptions, parse_mesh};
+use sublevel_fit::{ReadOptions, parse_mesh};
 
 /// Reads the content: a mesh whose numbers are finite and whose triangles name its points, or an
 /// error of one line that says where it is and what to do.

@@ -1,8 +1,8 @@
 //! Shapes to body files, and the table of what came out.
 
 use super::DemoError;
-use super::shapes::Shape;
 use crate::body::Body;
+use crate::fit::shapes::Shape;
 use crate::fit::{FitOptions, FitReport, fit as fit_points};
 use std::io::{self, Write};
 use std::ops::ControlFlow;

@@ -3,10 +3,10 @@
 
 mod fits;
 mod plots;
-pub mod shapes;
 mod sweep;
 mod table;
 
+use crate::fit::shapes;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 

@@ -1,12 +1,12 @@
 //! The demo's two pictures.
 
-use super::shapes::Shape;
 use super::sweep::{Answer, Sample, Sweep};
 use super::table::crossings;
 use crate::body::Body;
 use crate::chart::{
     ChartError, Ink, LineChart, Mark, Outline, Panel, Series, Silhouettes, View, boundary_points, outline,
 };
+use crate::fit::shapes::Shape;
 use nalgebra::Vector3;
 
 /// Boundary points that an outline is made of.

@@ -9,8 +9,8 @@ use super::worker::{claim, ended, finish, put_back, recover};
 use super::{Jobs, Made, Shapes};
 use crate::body::Compound;
 use crate::fit::{FitOptions, fit};
-use crate::polynomial::tests::Seeded;
 use crate::store::{Catalogue, FitOrder, FitOutcome, JobState, NewJob, Store};
+use sublevel_testkit::Seeded;
 
 fn order(degree: usize) -> FitOrder {
     FitOrder { name: "it".into(), degree: Some(degree), ..FitOrder::default() }

@@ -1,0 +1,197 @@
+//! Support points of smooth surfaces, from an outline: mostly by one or two evaluations.
+//!
+//! The point z of a body farthest along e (both in normalized coordinates, `e·z = n·x`) has `λ ∇g(z) = e`, `g(z) = 1`. Newton's
+//! step for the two,
+//!
+//! ```text
+//! λ' = (g·H⁻¹e - λ (1 - g(z))) / (g·H⁻¹g),   dz = (H⁻¹e - λ' H⁻¹g) / λ
+//! ```
+//!
+//! leaves an error of the order of its square, and what that costs along e is of the square again. Taylor's formula proves how
+//! far the end of the last step is from the best, and a point of the body beside it.
+
+use crate::body::{Body, Cell};
+use crate::measure::tangent::Side;
+use crate::measure::vector::{
+    V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, rows, scaled,
+};
+use crate::polynomial::{Lanes, MAX_LANES, Number, NumberJet, Simd, Vector, WithSimd};
+use nalgebra::Vector3;
+
+/// A point of a body that is farthest along a unit vector.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sought {
+    /// The unit vector, body frame.
+    pub(super) n: Vector3<f64>,
+    /// What the point may lack, metres.
+    pub(super) tolerance: f64,
+}
+
+/// Points within whose displacement (the rounding of their normalized coordinates) points of the body are proven to lie, each with the
+/// active constraint; from the centre of the normalization on, body frame, metres. None where Newton's method does not arrive.
+pub(super) type Found = [Option<(Vector3<f64>, usize)>; MAX_LANES];
+
+/// At most [`MAX_LANES`] points of a body, as vectorized work: a lane each where the body has one constraint. None depends
+/// on the others.
+pub(super) struct Farthest<'a> {
+    pub(super) body: &'a Body,
+    pub(super) sought: &'a [Sought],
+}
+
+/// Most evaluations.
+const MAX_ROUNDS: u32 = 6;
+
+impl WithSimd for Farthest<'_> {
+    type Output = Found;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Found {
+        let Self { body, sought } = self;
+        let mut found = [None; MAX_LANES];
+        if body.is_smooth() {
+            for (sought, found) in sought.chunks(Lanes::<S>::COUNT).zip(found.chunks_mut(Lanes::<S>::COUNT)) {
+                in_lanes(simd, body, sought, found);
+            }
+        } else {
+            for (sought, found) in sought.iter().zip(&mut found) {
+                let n: V3<f64> = sought.n.into();
+                let cell = body.outline().cell(simd, n);
+                let active = body.outline().active(cell.place);
+                let (x, proven) = farthest(simd, (body, active), &cell, n, sought.tolerance);
+                let holds = proven > 0.0 && Side::at_home(simd, body, active).others_hold(simd, x);
+                *found = holds.then(|| (x.into(), active));
+            }
+        }
+        found
+    }
+}
+
+/// As many points as there are lanes, of a body of one constraint.
+#[inline(always)]
+fn in_lanes<S: Simd>(simd: S, body: &Body, sought: &[Sought], found: &mut [Option<(Vector3<f64>, usize)>]) {
+    let mut columns = [[0.0; MAX_LANES]; 4];
+    for lane in 0..Lanes::<S>::COUNT {
+        // Lanes to spare seek the last point once more.
+        let Sought { n, tolerance } = &sought[lane.min(sought.len() - 1)];
+        for (column, entry) in columns.iter_mut().zip([n.x, n.y, n.z, *tolerance]) {
+            column[lane] = entry;
+        }
+    }
+    let mut loaded = [Lanes::<S>::splat(simd, 0.0); 4];
+    for (loaded, column) in loaded.iter_mut().zip(&columns) {
+        *loaded = Lanes::load(simd, column);
+    }
+    let [x, y, z, tolerance] = loaded;
+    let n = [x, y, z];
+    let (x, proven) = farthest(simd, (body, 0), &body.outline().cell(simd, n), n, tolerance);
+    for (number, column) in [x[0], x[1], x[2], proven].into_iter().zip(&mut columns) {
+        number.store(column);
+    }
+    for (lane, found) in found.iter_mut().enumerate().take(sought.len()) {
+        let [x, y, z, proven] = [columns[0][lane], columns[1][lane], columns[2][lane], columns[3][lane]];
+        *found = (proven > 0.0).then(|| (Vector3::new(x, y, z), 0));
+    }
+}
+
+/// The point farthest along unit vectors n, in these cells of the outline, as far as one constraint goes; and 1 where that is proven, 0
+/// where it is not.
+#[inline(always)]
+fn farthest<S: Simd, N: Number<S>>(
+    simd: S,
+    (body, active): (&Body, usize),
+    cell: &Cell<N>,
+    n: V3<N>,
+    tolerance: N,
+) -> (V3<N>, N) {
+    let (zero, one) = (N::splat(simd, 0.0), N::splat(simd, 1.0));
+    let side = Side::at_home(simd, body, active);
+    let inverse = rows(simd, body.inverse());
+    let e = apply_transposed(&inverse, n);
+    let mut x = add(cell.point, apply_symmetric(&cell.turn, n));
+    let axes = side.localize(simd, &[[one, zero, zero], [zero, one, zero], [zero, zero, one]]);
+    let (mut best, mut proven, mut open) = (x, zero, one);
+    for _ in 0..MAX_ROUNDS {
+        let (jet, inside) = side.jet(simd, x);
+        let (dz, useful) = step(simd, &jet, e);
+        let dx = apply(&inverse, dz);
+        let next = side.extrapolate(simd, &jet, &axes, dx);
+        let (inward, near) = side.inward(simd, &next);
+        let enough = (side.lack(simd, &next, n) - dot(n, inward)).le(tolerance);
+        let useful = N::and(simd, inside, useful);
+        let found = N::and(simd, N::and(simd, useful, one.le(open)), N::and(simd, near, enough));
+        x = add(x, dx);
+        for i in 0..3 {
+            best[i] = (x[i] + inward[i]).select(found, best[i]);
+        }
+        proven = one.select(found, proven);
+        open = zero.select(found, open.select(useful, zero));
+        if N::all(simd, open.le(zero)) {
+            break;
+        }
+    }
+    (best, proven)
+}
+
+/// Newton's step from a point near the surface, and whether its normal has to do with e.
+#[inline(always)]
+fn step<S: Simd, N: Number<S>>(simd: S, jet: &NumberJet<N>, e: V3<N>) -> (V3<N>, N::Mask) {
+    let (one, positive) = (N::splat(simd, 1.0), N::splat(simd, f64::MIN_POSITIVE));
+    let g = jet.gradient;
+    let (square, along) = (dot(g, g), dot(g, e));
+    let (cofactors, determinant) = cofactors(simd, jet.hessian);
+    let (of_e, of_g) = (apply_symmetric(&cofactors, e), apply_symmetric(&cofactors, g));
+    let multiplier = along / square;
+    let missing = determinant * (one - jet.value);
+    let next = (dot(g, of_e) - multiplier * missing) / dot(g, of_g);
+    let dz = scaled(add_scaled(of_e, -next, of_g), one / (multiplier * determinant));
+    let bend = N::splat(simd, 0.5) * dot(dz, apply_symmetric(&jet.hessian, dz));
+    // The surface bends away from the tangent plane by as much.
+    let dz = add_scaled(dz, -bend / square, g);
+    let short = dot(dz, dz).le(N::splat(simd, LONGEST * LONGEST));
+    (dz, N::and(simd, short, N::and(simd, positive.le(along), positive.le(next))))
+}
+
+/// Longest step, in normalized coordinates, that the linearization may mean anything for.
+const LONGEST: f64 = 0.5;
+
+#[cfg(test)]
+mod tests {
+    use super::{Farthest, Sought};
+    use crate::body::Body;
+    use crate::measure::tests::unit;
+    use crate::polynomial::dispatch;
+    use nalgebra::Vector3;
+    use sublevel_testkit::Seeded;
+
+    #[test]
+    fn points_are_as_far_as_they_can_be_whoever_their_neighbours_are() {
+        let half = Vector3::new(0.9, 0.4, 0.6);
+        let mut missing = 0;
+        for seed in 0..200 {
+            let mut random = Seeded(seed);
+            let degree = [2_u8, 4, 6, 8][seed as usize % 4];
+            let body = if degree == 2 {
+                Body::ellipsoid("egg", Vector3::zeros(), half)
+            } else {
+                Body::superellipsoid("q", Vector3::zeros(), half, degree)
+            };
+            let body = body.unwrap();
+            let tolerance = 10_f64.powi(-3 - (seed % 6) as i32);
+            let sought: Vec<Sought> = (0..8).map(|_| Sought { n: unit(&mut random), tolerance }).collect();
+            let found = dispatch(Farthest { body: &body, sought: &sought });
+            for (k, (one, Sought { n, .. })) in found.iter().zip(&sought).enumerate() {
+                assert_eq!(dispatch(Farthest { body: &body, sought: &sought[k..=k] })[0], *one, "seed {seed}, {k}");
+                // Hölder's inequality: with 1/p + 1/q = 1 the largest n·x is the q-norm of n scaled by the half-axes.
+                let q = f64::from(degree) / f64::from(degree - 1);
+                let most = n.component_mul(&half).map(|v| v.abs().powf(q)).sum().powf(1.0 / q);
+                let Some((x, _)) = one else {
+                    missing += 1;
+                    continue;
+                };
+                assert!(body.value(x) <= 1.0 + 1e-12, "seed {seed}, {k}");
+                assert!((most - tolerance..=most + 1e-12).contains(&n.dot(x)), "seed {seed}, {k}");
+            }
+        }
+        assert!(missing < 400, "{missing} of 1 600");
+    }
+}

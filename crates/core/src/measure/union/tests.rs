@@ -1,0 +1,389 @@
+//! Unions against loops over the pairs of their parts.
+
+use super::*;
+use crate::body::Compound;
+use crate::measure::signed::SignedDistance;
+use crate::measure::tests::{random_pose, twisted, unit};
+use crate::measure::{
+    Decision, HalfSpace, distance_to_half_space, distance_to_point, nearer_than, overlap, translation_hessian,
+};
+use nalgebra::{UnitQuaternion, Vector3};
+use std::sync::OnceLock;
+use sublevel_testkit::Seeded;
+
+fn heap(random: &mut Seeded, count: usize) -> Compound {
+    let mut part = || {
+        let half = Vector3::from_fn(|_, _| 0.5 * 2_f64.powf(random.signed()));
+        let body = match random.next() % 4 {
+            0 => Body::ball("part", Vector3::zeros(), half.x),
+            1 => Body::ellipsoid("part", Vector3::zeros(), half),
+            2 => Body::cuboid("part", half),
+            _ => Body::cylinder("part", half.x, half.y),
+        };
+        let turn = UnitQuaternion::from_euler_angles(random.signed(), random.signed(), random.signed());
+        body.unwrap().moved(&turn, &Vector3::from_fn(|_, _| 2.0 * random.signed())).unwrap()
+    };
+    Compound::new("heap", (0..count).map(|_| part()).collect()).unwrap()
+}
+
+#[test]
+fn the_closest_parts_count() {
+    let heaps: Vec<_> = (0..8).map(|seed| heap(&mut Seeded(seed), 1 + seed as usize % 5)).collect();
+    for seed in 0..400 {
+        let mut random = Seeded(900 + seed);
+        let (a, b) = (&heaps[random.next() as usize % 8], &heaps[random.next() as usize % 8]);
+        let pose_a = random_pose(&mut random, 1.0);
+        let options = Options::default();
+        let mut warm = WarmStart::default();
+        let start = unit(&mut random) * 6.0;
+        let step = unit(&mut random) * 0.2;
+        for k in 0..5 {
+            let place = pose_a.translation() + start + step * f64::from(k);
+            let pose_b = Pose::from_quaternion(place, [0.5, 0.5, -0.5, 0.5]).unwrap();
+            let pairs = a.parts().iter().flat_map(|p| b.parts().iter().map(move |q| (p, q)));
+            let each = pairs
+                .map(|(p, q)| crate::measure::distance(p, &pose_a, q, &pose_b, &options, &mut WarmStart::default()));
+            let (lower, upper) = each.fold((f64::MAX, f64::MAX), |(l, u), d| (l.min(d.lower), u.min(d.upper)));
+            let found = crate::measure::distance(a, &pose_a, b, &pose_b, &options, &mut warm);
+            let label = format!("seed {seed} step {k}: {found:?} against {lower} {upper}");
+            assert_eq!(found.status, Status::Converged, "{label}");
+            assert!(found.lower <= upper && lower <= found.upper, "{label}");
+            assert!(((found.witness_a - found.witness_b).norm() - found.upper).abs() < 1e-11, "{label}");
+            let decided = overlap(a, &pose_a, b, &pose_b, &options, &mut warm);
+            match decided {
+                Decision::Yes => assert!(lower == 0.0, "{label}"),
+                Decision::No => assert!(upper > 0.0, "{label}"),
+                Decision::Undecided { .. } => assert!(lower == 0.0 && upper > 0.0, "{label}"),
+            }
+            for factor in [0.7, 1.3] {
+                let nearer = nearer_than(a, &pose_a, b, &pose_b, factor * upper, &options, &mut warm);
+                let expected = if factor > 1.0 && upper > 0.0 { Decision::Yes } else { Decision::No };
+                assert_eq!(nearer, Ok(expected), "{label}");
+            }
+        }
+    }
+}
+
+#[test]
+fn hints_of_other_solids_do_no_harm() {
+    let (large, small) = (heap(&mut Seeded(1), 5), heap(&mut Seeded(2), 2));
+    let pose = Pose::from_quaternion(Vector3::new(7.0, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0]).unwrap();
+    let mut warm = WarmStart::default();
+    let options = Options::default();
+    crate::measure::distance(&large, &Pose::identity(), &large, &pose, &options, &mut warm);
+    let odd = crate::measure::distance(&small, &Pose::identity(), &small, &pose, &options, &mut warm);
+    let cold = crate::measure::distance(&small, &Pose::identity(), &small, &pose, &options, &mut WarmStart::default());
+    assert!(odd.lower <= cold.upper && cold.lower <= odd.upper, "{odd:?} {cold:?}");
+}
+
+/// Two heaps of up to six parts, the second somewhere about the first: far, near or in the midst of it.
+fn scene(seed: u64) -> (&'static Compound, &'static Compound, Pose, Pose) {
+    static HEAPS: OnceLock<Vec<Compound>> = OnceLock::new();
+    let heaps = HEAPS.get_or_init(|| (0..12).map(|k| heap(&mut Seeded(k), 1 + k as usize % 6)).collect());
+    let mut random = Seeded(seed);
+    let (a, b) = (&heaps[random.next() as usize % 12], &heaps[random.next() as usize % 12]);
+    let far = [0.0, 0.7, 1.5, 6.0][(seed % 4) as usize];
+    let pose_a = random_pose(&mut random, 3.0);
+    let pose_b = random_pose(&mut random, 1.0);
+    let place = pose_a.translation() + unit(&mut random) * far;
+    (a, b, pose_a, pose_b.with_translation(place))
+}
+
+/// Least lower and least upper bound of what `measure` says of all pairs of parts.
+fn over_pairs(a: &Compound, b: &Compound, measure: impl Fn(&Body, &Body) -> [f64; 2]) -> [f64; 2] {
+    let pairs = a.parts().iter().flat_map(|p| b.parts().iter().map(move |q| (p, q)));
+    pairs.map(|(p, q)| measure(p, q)).fold([f64::INFINITY; 2], |[l, u], [lower, upper]| [l.min(lower), u.min(upper)])
+}
+
+#[test]
+fn levels_and_growths_are_those_of_the_least_pair() {
+    let options = Options::default();
+    for seed in 0..200 {
+        let (a, b, pose_a, pose_b) = scene(seed);
+        let (mut warm_ab, mut warm_ba, mut warm_s) = Default::default();
+        for k in 0..3 {
+            let pose = pose_b.with_translation(pose_b.translation() + Vector3::new(0.1, -0.05, 0.1) * f64::from(k));
+            let orders = [((a, &pose_a), (b, &pose), &mut warm_ab), ((b, &pose), (a, &pose_a), &mut warm_ba)];
+            for ((of, pose_of), (on, pose_on), warm) in orders {
+                let found = level_distance(of, pose_of, on, pose_on, &options, warm);
+                let [lower, upper] = over_pairs(of, on, |p, q| {
+                    let one = level_distance(p, pose_of, q, pose_on, &options, &mut WarmStart::default());
+                    [one.lower, one.upper]
+                });
+                let label = format!("seed {seed}: {found:?} against {lower} {upper}");
+                assert_eq!(found.status, Status::Converged, "{label}");
+                assert!(found.lower <= upper && lower <= found.upper, "{label}");
+                let far = Vector3::repeat(1e-9);
+                let inside = on.parts().iter().any(|part| {
+                    let y = pose_on.rotation().inverse_transform_vector(&(found.witness - pose_on.translation()));
+                    part.value(&y) <= 1.0 + far.x
+                });
+                assert!(inside, "{label}");
+            }
+            let found = growth_distance(a, &pose_a, b, &pose, &options, &mut warm_s);
+            let [lower, upper] = over_pairs(a, b, |p, q| {
+                let one = growth_distance(p, &pose_a, q, &pose, &options, &mut WarmStart::default());
+                [one.lower, one.upper]
+            });
+            let label = format!("seed {seed}: {found:?} against {lower} {upper}");
+            assert_eq!(found.status, Status::Converged, "{label}");
+            assert!(found.lower <= upper && lower <= found.upper, "{label}");
+            // Above 1 exactly if apart.
+            let apart = crate::measure::distance(a, &pose_a, b, &pose, &options, &mut WarmStart::default());
+            assert!(apart.lower == 0.0 || found.upper >= 1.0, "{label} {apart:?}");
+            assert!(apart.upper > 0.0 || found.lower <= 1.0, "{label} {apart:?}");
+        }
+    }
+}
+
+#[test]
+fn cheap_bounds_are_bounds() {
+    let options = Options::default();
+    let mut useful = 0;
+    for seed in 0..100 {
+        let (a, b, pose_a, pose_b) = scene(seed);
+        for (p, q) in a.parts().iter().zip(b.parts()) {
+            let level = level_bound((p, &pose_a), (q, &pose_b));
+            let growth = growth_bound((p, &pose_a), (q, &pose_b));
+            let warm = &mut WarmStart::default();
+            assert!(level <= level_distance(p, &pose_a, q, &pose_b, &options, warm).upper, "seed {seed}");
+            assert!(growth <= growth_distance(p, &pose_a, q, &pose_b, &options, warm).upper, "seed {seed}");
+            useful += u32::from(level > 1.0);
+        }
+    }
+    assert!(useful > 20, "{useful}");
+}
+
+/// Length of the way out along n, from samples of what lies on it.
+fn sampled_exit(a: &Compound, pose_a: &Pose, b: &Compound, pose_b: &Pose, n: &Vector3<f64>, limit: f64) -> Option<f64> {
+    (0..).map(|k| 0.02 * f64::from(k)).take_while(|t| *t < limit).find(|t| {
+        let pose = pose_a.with_translation(pose_a.translation() + n * *t);
+        overlap(a, &pose, b, pose_b, &Options::default(), &mut WarmStart::default()) == Decision::No
+    })
+}
+
+#[test]
+fn ways_out_separate_and_few_are_shorter() {
+    let options = Options::default();
+    let (mut overlaps, mut narrow, mut missed) = (0, 0, 0);
+    for seed in 0..120 {
+        let (a, b, pose_a, pose_b) = scene(seed);
+        let found = penetration(a, &pose_a, b, &pose_b, &options, &mut WarmStart::default());
+        let label = format!("seed {seed}: {found:?}");
+        let [least, _] = over_pairs(a, b, |p, q| {
+            let one = penetration(p, &pose_a, q, &pose_b, &options, &mut WarmStart::default());
+            [-one.upper, -one.lower]
+        });
+        let apart = crate::measure::distance(a, &pose_a, b, &pose_b, &options, &mut WarmStart::default());
+        let Some(n) = found.direction else {
+            assert!(found.upper == 0.0 && least >= -1e-12 && apart.upper > 0.0, "{label}");
+            continue;
+        };
+        overlaps += 1;
+        narrow += u32::from(found.status == Status::Converged);
+        assert!(found.lower <= found.upper && found.upper >= -least * (1.0 - 2e-3), "{label} pairs {least}");
+        let moved = pose_a.with_translation(pose_a.translation() + n * (found.upper * (1.0 + 1e-9) + 1e-9));
+        assert_ne!(overlap(a, &moved, b, &pose_b, &options, &mut WarmStart::default()), Decision::Yes, "{label}");
+        let mut random = Seeded(seed);
+        for _ in 0..60 {
+            let n = unit(&mut random);
+            let shorter = sampled_exit(a, &pose_a, b, &pose_b, &n, found.upper);
+            assert!(shorter.is_none_or(|t| t >= found.lower), "{label}: {shorter:?} along {n:?}");
+            missed += u32::from(shorter.is_some_and(|t| t < 0.95 * found.upper));
+        }
+    }
+    assert!(overlaps >= 40 && narrow >= 20 && missed < 30, "{overlaps} overlaps, {narrow} narrow, {missed} missed");
+}
+
+#[test]
+fn signed_distances_continue_distances() {
+    let options = Options::default();
+    let mut sides = [0; 2];
+    for seed in 0..60 {
+        let (a, b, pose_a, pose_b) = scene(seed);
+        let mut random = Seeded(seed);
+        let step = unit(&mut random) * 0.15;
+        let mut warm = WarmStart::default();
+        let mut before: Option<SignedDistance> = None;
+        for k in 0..30 {
+            let pose = pose_b.with_translation(pose_b.translation() + step * f64::from(k));
+            let found = signed_distance(a, &pose_a, b, &pose, &options, &mut warm);
+            let label = format!("seed {seed} step {k}: {found:?}");
+            assert!(found.lower <= found.upper, "{label}");
+            let apart = crate::measure::distance(a, &pose_a, b, &pose, &options, &mut WarmStart::default());
+            if found.lower > 0.0 {
+                sides[0] += 1;
+                assert_eq!(found.status, Status::Converged, "{label}");
+                assert!(found.lower <= apart.upper && apart.lower <= found.upper, "{label} {apart:?}");
+            } else {
+                sides[1] += 1;
+                let depth = penetration(a, &pose_a, b, &pose, &options, &mut WarmStart::default());
+                assert!(-depth.upper <= found.upper + 1e-9 && found.lower <= -depth.lower + 1e-9, "{label} {depth:?}");
+                assert!(apart.lower <= 1e-8, "{label} {apart:?}");
+            }
+            if let Some(before) = before {
+                assert!(found.lower <= before.upper + 0.15 + 1e-12, "{label} after {before:?}");
+                assert!(found.upper >= before.lower - 0.15 - 1e-12, "{label} after {before:?}");
+            }
+            before = Some(found);
+        }
+    }
+    assert!(sides[0] > 300 && sides[1] > 300, "{sides:?}");
+}
+
+#[test]
+fn gradients_of_untied_answers_are_the_derivatives() {
+    let options = Options::default();
+    let (mut apart, mut inside, mut jumped) = (0, 0, 0);
+    for seed in 0..80 {
+        let (a, b, pose_a, pose_b) = scene(seed);
+        let value = |poses: &[Pose; 2]| {
+            signed_distance(a, &poses[0], b, &poses[1], &options, &mut WarmStart::default()).value()
+        };
+        let poses = [pose_a, pose_b];
+        let found = signed_distance(a, &pose_a, b, &pose_b, &options, &mut WarmStart::default());
+        if found.tied || found.at_contact {
+            continue;
+        }
+        let gradients = found.gradients.unwrap();
+        for (which, gradient) in gradients.iter().enumerate() {
+            for component in 0..6 {
+                let axis = Vector3::from_fn(|i, _| f64::from(u8::from(i == component % 3)));
+                let moved = |h: f64| {
+                    let mut poses = poses;
+                    poses[which] = twisted(&poses[which], &axis, component >= 3, h);
+                    value(&poses)
+                };
+                let h = 1e-5;
+                let difference = (moved(h) - moved(-h)) / (2.0 * h);
+                let exact = if component < 3 { gradient.linear } else { gradient.angular }.dot(&axis);
+                let near = (difference - exact).abs() < 5e-3;
+                if found.lower > 0.0 {
+                    apart += 1;
+                    assert!(near, "seed {seed} body {which} component {component}: {difference} {exact} {found:?}");
+                } else {
+                    inside += 1;
+                    jumped += u32::from(!near);
+                }
+            }
+        }
+    }
+    assert!(apart > 100 && inside > 300 && jumped * 20 < inside, "{apart} apart, {inside} inside, {jumped} jumped");
+}
+
+#[test]
+fn parts_that_are_about_as_near_are_told() {
+    let ball = |y: f64| Body::ball("ball", Vector3::new(0.0, y, 0.0), 0.5).unwrap();
+    let (two, one) = (Compound::new("two", vec![ball(0.8), ball(-0.8)]).unwrap(), ball(0.0));
+    let options = Options::default();
+    let here = Pose::identity();
+    // Apart, and in an overlap with both.
+    for (x, off) in [2.0, 0.5].into_iter().flat_map(|x| [0.0, 1e-3, -1e-3].map(|off| (x, off))) {
+        let pose = Pose::from_quaternion(Vector3::new(x, off, 0.0), [0.0, 0.0, 0.0, 1.0]).unwrap();
+        let cold = WarmStart::default;
+        let told = [
+            level_distance(&two, &here, &one, &pose, &options, &mut cold()).tied,
+            level_distance(&one, &pose, &two, &here, &options, &mut cold()).tied,
+            growth_distance(&two, &here, &one, &pose, &options, &mut cold()).tied,
+        ];
+        assert_eq!(told, [off == 0.0; 3], "{x} {off}");
+        let near = crate::measure::distance(&two, &here, &one, &pose, &options, &mut cold());
+        assert_eq!(near.tied, off == 0.0 && near.lower > 0.0, "{x} {off} {near:?}");
+        let signed = signed_distance(&two, &here, &one, &pose, &options, &mut cold());
+        if x > 1.0 {
+            assert_eq!(signed.tied, off == 0.0, "{x} {off} {signed:?}");
+            let n = Vector3::new(x, off - 0.8 * off.signum(), 0.0).normalize();
+            assert!(off == 0.0 || (signed.normal.unwrap() + n).norm() < 1e-4, "{signed:?}");
+        } else {
+            // The ball leaves between the others or past them: both hold it, and it has but one shortest way.
+            assert!(signed.upper < 0.0, "{signed:?}");
+        }
+        let center = *pose.translation();
+        let point = distance_to_point(&two, &here, &center, &options, &mut cold()).unwrap();
+        assert_eq!(point.tied, off == 0.0, "{x} {off} {point:?}");
+        let wall = HalfSpace::new(Vector3::x(), -2.0).unwrap();
+        let turned = UnitQuaternion::from_scaled_axis(Vector3::z() * off);
+        let pose = Pose::from_quaternion(Vector3::zeros(), turned.coords.into()).unwrap();
+        let low = distance_to_half_space(&two, &pose, &wall, &options, &mut cold());
+        assert_eq!(low.tied, off == 0.0, "{off} {low:?}");
+        // Single bodies never are.
+        assert!(!crate::measure::distance(&one, &here, &one, &pose, &options, &mut cold()).tied);
+    }
+}
+
+#[test]
+fn answers_tell_the_parts_they_are_about() {
+    let options = Options::default();
+    let mut curved = 0;
+    for seed in 0..40 {
+        let (a, b, pose_a, pose_b) = scene(seed);
+        let found = crate::measure::distance(a, &pose_a, b, &pose_b, &options, &mut WarmStart::default());
+        let (p, q) = (&a.parts()[usize::from(found.parts[0])], &b.parts()[usize::from(found.parts[1])]);
+        let one = crate::measure::distance(p, &pose_a, q, &pose_b, &options, &mut WarmStart::default());
+        assert!(one.lower <= found.upper && found.lower <= one.upper, "seed {seed}: {found:?} {one:?}");
+        let of_union = translation_hessian(a, &pose_a, b, &pose_b, &found);
+        let of_parts = translation_hessian(p, &pose_a, q, &pose_b, &one);
+        if let (Some(h), Some(k)) = (of_union, of_parts) {
+            curved += 1;
+            assert!((h - k).amax() <= 1e-3 * (1.0 + k.amax()), "seed {seed}: {h} {k}");
+        }
+    }
+    assert!(curved > 5, "{curved}");
+}
+
+/// Where the closest pair of parts changes on a path, the normal jumps; there, and hardly anywhere else, the flag is set.
+#[test]
+fn normals_jump_only_where_ties_are_told() {
+    let options = Options::default();
+    let (mut changes, mut tied, mut queries) = (0, 0, 0);
+    for seed in 0..40 {
+        let (a, b, pose_a, pose_b) = scene(4 * seed + 3);
+        let along = unit(&mut Seeded(seed)) * 8.0;
+        let at = |t: f64| {
+            let pose = pose_b.with_translation(pose_b.translation() + along * t);
+            crate::measure::distance(a, &pose_a, b, &pose, &options, &mut WarmStart::default())
+        };
+        let steps: Vec<Distance> = (0..=50).map(|k| at(f64::from(k) / 50.0)).collect();
+        queries += steps.len();
+        tied += steps.iter().filter(|found| found.tied).count();
+        for (k, pair) in steps.windows(2).enumerate() {
+            if pair[0].parts == pair[1].parts || pair.iter().any(|found| found.lower < 0.01) {
+                continue;
+            }
+            let (mut low, mut high) = (k as f64 / 50.0, (k + 1) as f64 / 50.0);
+            for _ in 0..50 {
+                let middle = 0.5 * (low + high);
+                if at(middle).parts == pair[0].parts {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            changes += 1;
+            assert!(at(low).tied && at(high).tied, "seed {seed} at {low}: {:?} {:?}", at(low), at(high));
+        }
+    }
+    assert!(changes > 20 && tied * 100 <= queries, "{changes} changes, {tied} tied of {queries}");
+}
+
+#[test]
+fn ways_out_that_are_about_as_short_are_told() {
+    let ball = |x: f64| Body::ball("ball", Vector3::new(x, 0.0, 0.0), 0.5).unwrap();
+    let (two, one) = (Compound::new("two", vec![ball(0.3), ball(-0.3)]).unwrap(), ball(0.0));
+    let options = Options::default();
+    for (y, told) in [(0.0, true), (0.1, false)] {
+        let pose = Pose::from_quaternion(Vector3::new(0.0, y, 0.0), [0.0, 0.0, 0.0, 1.0]).unwrap();
+        let signed = signed_distance(&two, &Pose::identity(), &one, &pose, &options, &mut WarmStart::default());
+        let depth = penetration(&two, &Pose::identity(), &one, &pose, &options, &mut WarmStart::default());
+        // Out sideways the balls at the ends are passed at once: (y + d)² + 0.3² = 1.
+        let truth = 0.91_f64.sqrt() - y;
+        assert!((depth.upper - truth).abs() < 1e-6 && (signed.lower + truth).abs() < 1e-6, "{depth:?} {signed:?}");
+        assert!(depth.lower <= truth && signed.upper >= -truth, "{depth:?} {signed:?}");
+        assert_eq!((depth.tied, signed.tied), (told, told), "{depth:?} {signed:?}");
+        if !told {
+            let [of_two, of_one] = signed.gradients.unwrap();
+            assert!((of_two.linear + Vector3::y()).norm() < 1e-3 && (of_one.linear - Vector3::y()).norm() < 1e-3);
+            assert!(of_two.angular.norm() < 1e-3, "{of_two:?}");
+        }
+    }
+}

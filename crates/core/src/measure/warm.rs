@@ -1,0 +1,82 @@
+//! Warm starts: what one answer tells the next query of the same pair.
+
+use super::level::LevelTrace;
+use super::pair::Pair;
+use super::smooth::Trace;
+use nalgebra::Vector3;
+
+/// Constraints of one body that hold with equality, as a bit set.
+pub(super) type ActiveSet = u16;
+
+/// A caller-owned hint from an earlier answer, for the next query of the same pair and measure in the same order;
+/// [`WarmStart::default`] is a cold start.
+///
+/// It may change the time a query takes, never its answer beyond the bracket: a hint of another pair, of a pose far away,
+/// or of nonsense is found out by the bracket and the solve starts cold. Copying it forks a trajectory.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use sublevel_core::body::Body;
+/// use sublevel_core::measure::{Options, Pose, WarmStart, distance};
+///
+/// let egg = Body::ellipsoid("egg", Vector3::zeros(), Vector3::new(1.0, 1.0, 2.0))?;
+/// let mut warm = WarmStart::default();
+/// for step in 0..10 {
+///     let x = 5.0 - 0.1 * f64::from(step);
+///     let pose = Pose::from_quaternion(Vector3::new(x, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0])?;
+///     let answer = distance(&egg, &Pose::identity(), &egg, &pose, &Options::default(), &mut warm);
+///     assert!((answer.value() - (x - 2.0)).abs() < 1e-8);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WarmStart {
+    pub(super) hint: Hint,
+    /// Which parts of the two solids it is about.
+    pub(super) parts: (u16, u16),
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) enum Hint {
+    #[default]
+    Cold,
+    /// As little, but that continuation from where the bodies face each other has led astray.
+    Astray,
+    /// Witnesses in the frames of their own bodies, normal in A's frame.
+    Apart { x_a: Vector3<f64>, y_b: Vector3<f64>, normal_a: Vector3<f64>, active_a: ActiveSet, active_b: ActiveSet },
+    /// Witnesses on smooth parts of both surfaces, with how they answer motions.
+    Smooth(Trace),
+    /// A common point in A's frame.
+    Overlap { point_a: Vector3<f64> },
+    /// Minimiser of a level distance on smooth parts of both bodies, with how it answers motions.
+    LevelSmooth(LevelTrace),
+    /// The interior point of the first body of a level distance lay in the second.
+    Saturated,
+    /// Minimiser of a level distance in B's frame.
+    Level { x_b: Vector3<f64>, active_a: ActiveSet, active_b: ActiveSet },
+    /// Witness of a single body in its frame.
+    Single { y: Vector3<f64>, active: ActiveSet },
+}
+
+impl WarmStart {
+    pub(super) fn is_cold(&self) -> bool {
+        matches!(self.hint, Hint::Cold)
+    }
+
+    pub(super) fn apart(
+        pair: &Pair<'_>,
+        x: &Vector3<f64>,
+        y: &Vector3<f64>,
+        n: &Vector3<f64>,
+        active_a: ActiveSet,
+        active_b: ActiveSet,
+    ) -> Self {
+        Hint::Apart { x_a: pair.to_a(x), y_b: pair.to_b(y), normal_a: *n, active_a, active_b }.into()
+    }
+}
+
+impl From<Hint> for WarmStart {
+    fn from(hint: Hint) -> Self {
+        Self { hint, parts: (0, 0) }
+    }
+}

@@ -1,0 +1,130 @@
+//! Distances between fitted bodies: brackets, optimality at the witnesses, several constraints, no allocation.
+
+use nalgebra::Vector3;
+use sublevel_core::body::Body;
+use sublevel_core::measure::{Distance, Options, Pose, Status, WarmStart, distance, level_distance};
+use sublevel_testkit::Seeded;
+
+/// A rotation and a translation of the given length.
+fn random_pose(random: &mut Seeded, length: f64) -> Pose {
+    let direction = Vector3::from_fn(|_, _| random.signed()).normalize();
+    let q = nalgebra::Vector4::from_fn(|_, _| random.signed()).normalize();
+    Pose::from_quaternion(direction * length, q.into()).unwrap()
+}
+
+/// Chair and human at degrees 2, 4 and 6.
+fn fitted() -> Vec<(&'static Body, &'static Body)> {
+    sublevel_testkit::bodies::fitted().as_chunks().0.iter().map(|[chair, human]| (chair, human)).collect()
+}
+
+/// Gradient of a body of one constraint at a world point, world frame, and the constraint's value.
+fn gradient(body: &Body, pose: &Pose, x: &Vector3<f64>) -> (f64, Vector3<f64>) {
+    let local = pose.rotation().inverse_transform_vector(&(x - pose.translation()));
+    let jet = body.placement().jet(&body.constraints()[0], &local);
+    (jet.value, pose.transform_direction(&jet.gradient))
+}
+
+/// The optimality conditions at the witnesses: both on the surface, normals opposite along the line between them.
+fn check_optimality(answer: &Distance, (a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose), label: &str) {
+    let n = (answer.witness_a - answer.witness_b).normalize();
+    let (value_a, g_a) = gradient(a, pose_a, &answer.witness_a);
+    let (value_b, g_b) = gradient(b, pose_b, &answer.witness_b);
+    assert!((value_a - 1.0).abs() < 1e-7 && (value_b - 1.0).abs() < 1e-7, "{label}: {value_a} {value_b}");
+    // A bracket of 1e-9 holds the angles to its square root.
+    for (name, error) in [("A", g_a.normalize() + n), ("B", g_b.normalize() - n)] {
+        assert!(error.norm() < 1e-4, "{label}: normal of {name} is off by {:e}", error.norm());
+    }
+    let reported = answer.normal.unwrap_or_else(|| panic!("{label}: no normal"));
+    assert!((reported - n).norm() < 1e-4, "{label}: reported normal is off by {:e}", (reported - n).norm());
+}
+
+#[test]
+fn two_hundred_random_poses_of_fitted_bodies() {
+    let (mut apart, mut overlapping) = (0, 0);
+    for seed in 0..200 {
+        let mut random = Seeded(seed);
+        let (chair, human) = fitted()[(seed % 3) as usize];
+        let size = chair.circumscribed().radius.max(human.circumscribed().radius);
+        let far = size * (1.2 + 1.1 * random.signed());
+        let (pose_a, pose_b) = (random_pose(&mut random, 0.3), random_pose(&mut random, far));
+        let answer = distance(chair, &pose_a, human, &pose_b, &Options::default(), &mut WarmStart::default());
+        let label = format!("seed {seed}: {answer:?}");
+        assert_eq!(answer.status, Status::Converged, "{label}");
+        assert!(answer.lower <= answer.upper && answer.upper - answer.lower <= 1e-9 * size, "{label}");
+        if answer.upper == 0.0 {
+            overlapping += 1;
+            assert_eq!(answer.witness_a, answer.witness_b, "{label}");
+            assert!(answer.normal.is_none(), "{label}");
+        } else if answer.lower > 1e-6 {
+            apart += 1;
+            check_optimality(&answer, (chair, &pose_a), (human, &pose_b), &label);
+        }
+        for (p, pose_p, q, pose_q) in [(chair, &pose_a, human, &pose_b), (human, &pose_b, chair, &pose_a)] {
+            let level = level_distance(p, pose_p, q, pose_q, &Options::default(), &mut WarmStart::default());
+            let label = format!("seed {seed}: {level:?}");
+            assert_eq!(level.status, Status::Converged, "{label}");
+            assert!(level.upper - level.lower <= 1e-9 * level.upper.abs().max(1.0), "{label}");
+            assert_eq!(level.lower > 1.0, answer.lower > 0.0, "{label} against {answer:?}");
+            // Stationarity: on the boundary of q the gradients oppose each other; inside, p's vanishes.
+            let (_, g_p) = gradient(p, pose_p, &level.witness);
+            let (value_q, g_q) = gradient(q, pose_q, &level.witness);
+            if value_q > 1.0 - 1e-6 {
+                let turn = g_p.normalize() + g_q.normalize();
+                assert!(turn.norm() < 1e-3 || g_p.norm() < 1e-3, "{label}: gradients are off by {:e}", turn.norm());
+            } else {
+                assert!(g_p.norm() * p.circumscribed().radius < 1e-3, "{label}: {:e}", g_p.norm());
+            }
+        }
+    }
+    println!("{apart} apart, {overlapping} overlapping");
+    assert!(apart > 60 && overlapping > 30, "{apart} apart, {overlapping} overlapping");
+}
+
+#[test]
+fn a_box_against_a_fitted_chair() {
+    let (chair, _) = fitted()[2];
+    let crate_ = Body::cuboid("crate", Vector3::new(0.3, 0.2, 0.25)).unwrap();
+    let can = Body::cylinder("can", 0.1, 0.4).unwrap();
+    for seed in 0..100 {
+        let mut random = Seeded(1000 + seed);
+        let other = if seed % 2 == 0 { &crate_ } else { &can };
+        let size = chair.circumscribed().radius;
+        let (pose_a, pose_b) = (random_pose(&mut random, 0.1), random_pose(&mut random, size * 1.5));
+        let answer = distance(other, &pose_a, chair, &pose_b, &Options::default(), &mut WarmStart::default());
+        let label = format!("seed {seed}: {answer:?}");
+        assert_eq!(answer.status, Status::Converged, "{label}");
+        assert!(answer.upper - answer.lower <= 1e-9 * size, "{label}");
+        // Independent: support gap of the reported normal over the boundary points of both.
+        if let Some(n) = answer.normal {
+            let along = |body: &Body, pose: &Pose, n: Vector3<f64>| {
+                let points = body.boundary().iter().map(|x| n.dot(&pose.transform_point(x)));
+                points.fold(f64::MIN, f64::max)
+            };
+            let gap = -along(other, &pose_a, -n) - along(chair, &pose_b, n);
+            assert!(gap >= answer.lower - 1e-9, "{label}: boundary points are only {gap} apart");
+        }
+        for (p, pose_p, q, pose_q) in [(other, &pose_a, chair, &pose_b), (chair, &pose_b, other, &pose_a)] {
+            let level = level_distance(p, pose_p, q, pose_q, &Options::default(), &mut WarmStart::default());
+            assert_eq!(level.status, Status::Converged, "seed {seed}: {level:?}");
+        }
+    }
+}
+
+#[test]
+fn a_solve_allocates_nothing() {
+    let (chair, human) = fitted()[2];
+    let crate_ = Body::cuboid("crate", Vector3::new(0.3, 0.2, 0.25)).unwrap();
+    for seed in 0..30 {
+        let mut random = Seeded(2000 + seed);
+        let other = if seed % 2 == 0 { human } else { &crate_ };
+        let (pose_a, pose_b) = (random_pose(&mut random, 0.0), random_pose(&mut random, 0.4 + 0.1 * seed as f64));
+        let (mut warm, mut warm_level) = (WarmStart::default(), WarmStart::default());
+        let counted = allocation_counter::measure(|| {
+            for _ in 0..2 {
+                distance(chair, &pose_a, other, &pose_b, &Options::default(), &mut warm);
+                level_distance(chair, &pose_a, other, &pose_b, &Options::default(), &mut warm_level);
+            }
+        });
+        assert_eq!(counted.count_total, 0, "seed {seed}");
+    }
+}

@@ -1,0 +1,197 @@
+//! Solves the program of a fit: the central path to its optimum, adding the points that are left outside.
+
+use super::FitError;
+use super::objective::Matrix;
+use super::path::{Centre, Interior, Pace, Path};
+use super::program::{Problem, ProgramError};
+use super::progress::Watch;
+use super::structure::Structure;
+use nalgebra::{DMatrix, DVector, Vector3};
+use sublevel_core::body::fibonacci_lattice;
+
+/// A point may be outside by this much in p before the pull-in takes it in.
+const VIOLATION: f64 = 1e-6;
+/// Largest distance of f to its lower bound, relative to f (or 1, if that is more), of a fit.
+pub(super) const OPTIMALITY_GAP: f64 = 1e-5;
+/// Distance to the optimum asked of the path, in units of log dets.
+const GAP: f64 = 3e-7;
+/// The same while points are still added.
+const ROUGH_GAP: f64 = 1e-3;
+/// Most rounds of adding points at the rough optimum, and the violation below which it does not matter.
+const PREPARATIONS: usize = 3;
+/// See [`PREPARATIONS`].
+const PREPARED: f64 = 1e-3;
+/// Points in the start, in multiples of N, and the most that are taken for likely.
+const SPREAD: usize = 10;
+/// See [`SPREAD`].
+const LIKELY: usize = 5;
+/// Points added together have at least this distance; the frame is whitened.
+const SPACING: f64 = 0.05;
+/// Growth of τ from one centre to the next.
+const GROWTH: f64 = 10.0;
+/// Newton steps on one path before settling for what there is.
+const STEPS: usize = 200;
+/// Sets of points before giving up.
+const ROUNDS: usize = 60;
+
+/// The optimum of a fit's program, feasible for all points up to [`VIOLATION`].
+#[derive(Clone, Debug)]
+pub(super) struct Optimum {
+    /// Coefficients of p on `Structure::monomials`.
+    pub(super) coefficients: DVector<f64>,
+    /// Gram matrix of its Hessian form, and of what relaxes convexity.
+    pub(super) hessian: DMatrix<f64>,
+    /// Gram matrix of p, where it is measured.
+    pub(super) gram: Option<DMatrix<f64>>,
+    /// f minus its lower bound from the dual, if there is one; at most [`OPTIMALITY_GAP`] in proportion.
+    pub(super) gap: Option<f64>,
+    /// f, in the whitened frame for log dets and volumes and in the unit frame for traces.
+    pub(super) objective: f64,
+}
+
+/// Minimises the objective over p, sos-convex as far as the problem asks for it, with `p <= 1` at `points` (whitened: the unit ball is their smallest
+/// ellipsoid). The program begins with the points that are `likely` to bound p, the likeliest first, among others; they change the
+/// answer only within its gap.
+pub(super) fn generate(
+    problem: Problem,
+    points: &[Vector3<f64>],
+    likely: &[usize],
+    watch: &mut Watch,
+) -> Result<Optimum, FitError> {
+    let structure = problem.structure;
+    let mut active = Active::start(&problem, points, likely);
+    let mut worst = 0.0;
+    for round in 1..=ROUNDS {
+        // Points come in while the optimum is still rough.
+        let path = Path::of_fit(&problem, &active.values);
+        let first = path.start().ok_or(ProgramError::Singular)?;
+        watch.round(active.values.ncols(), worst);
+        let rough = path.follow(first, pace(ROUGH_GAP), watch)?.ok_or(ProgramError::Singular)?;
+        let outside = violations(structure, points, &rough.interior.coefficients);
+        worst = outside.first().map_or(0.0, |&(excess, _)| excess);
+        if worst > PREPARED && round <= PREPARATIONS {
+            active.add(structure, points, &outside);
+            continue;
+        }
+        let last = path.follow(rough.place.clone(), pace(GAP), watch)?.unwrap_or(rough);
+        let outside = violations(structure, points, &last.interior.coefficients);
+        worst = outside.first().map_or(0.0, |&(excess, _)| excess);
+        if worst <= VIOLATION {
+            return verified(&problem, last);
+        }
+        active.add(structure, points, &outside);
+    }
+    Err(FitError::NoConvergence { rounds: ROUNDS })
+}
+
+fn pace(gap: f64) -> Pace {
+    Pace { gap, growth: GROWTH, steps: STEPS }
+}
+
+/// The optimum if the dual point proves it one.
+fn verified(problem: &Problem, centre: Centre) -> Result<Optimum, FitError> {
+    let gram = match problem.matrix {
+        Matrix::Polynomial => centre.gram.as_ref(),
+        Matrix::Hessian => Some(&centre.interior.hessian),
+    };
+    let objective = gram.and_then(|gram| problem.spectral.measure(gram)).ok_or(ProgramError::Singular)?;
+    let gap = objective - problem.lower_bound(&centre.place.dual)?;
+    if !(gap.abs() <= OPTIMALITY_GAP * objective.abs().max(1.0)) {
+        return Err(FitError::NotOptimal { gap });
+    }
+    let Interior { coefficients, hessian } = centre.interior;
+    Ok(Optimum { gap: Some(gap), objective, coefficients, hessian, gram: centre.gram })
+}
+
+/// Points with p above 1, the farthest first.
+fn violations(structure: &Structure, points: &[Vector3<f64>], coefficients: &DVector<f64>) -> Vec<(f64, usize)> {
+    let mut outside: Vec<(f64, usize)> = points
+        .iter()
+        .enumerate()
+        .map(|(index, point)| (structure.values(point).dot(coefficients) - 1.0, index))
+        .filter(|&(excess, _)| excess > VIOLATION)
+        .collect();
+    outside.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    outside
+}
+
+/// The first of some points that are not close to one before, at most so many.
+fn apart(points: &[Vector3<f64>], candidates: impl Iterator<Item = usize>, most: usize) -> Vec<usize> {
+    let mut taken: Vec<usize> = Vec::new();
+    for index in candidates {
+        if taken.len() < most && taken.iter().all(|&other| (points[other] - points[index]).norm() > SPACING) {
+            taken.push(index);
+        }
+    }
+    taken
+}
+
+/// The points a program knows.
+struct Active {
+    /// Which of the points are in.
+    used: Vec<bool>,
+    chosen: Vec<Vector3<f64>>,
+    /// Monomials of each chosen point, one column each.
+    values: DMatrix<f64>,
+}
+
+impl Active {
+    /// A well-spread subset, the likeliest points, and for convex p some inside the hull: those constrain nothing, but with weight on
+    /// them the moments are positive definite also when the points lie on a quadric, as the corners of a box do.
+    fn start(problem: &Problem, points: &[Vector3<f64>], likely: &[usize]) -> Self {
+        let structure = problem.structure;
+        let first = spread(points, SPREAD * structure.gram.size);
+        let mut chosen: Vec<Vector3<f64>> = first.iter().map(|&index| points[index]).collect();
+        if problem.is_convex() {
+            chosen.extend(inner(structure));
+        }
+        let mut used = vec![false; points.len()];
+        first.iter().for_each(|&index| used[index] = true);
+        let unused = likely.iter().copied().filter(|&index| !used[index]);
+        let likely = apart(points, unused, LIKELY * structure.gram.size);
+        likely.iter().for_each(|&index| used[index] = true);
+        chosen.extend(likely.into_iter().map(|index| points[index]));
+        let values = columns(structure, &chosen);
+        Self { used, chosen, values }
+    }
+
+    /// Adds the worst of the points outside, but not many from one spot.
+    fn add(&mut self, structure: &Structure, points: &[Vector3<f64>], outside: &[(f64, usize)]) {
+        let candidates = outside.iter().map(|&(_, index)| index).filter(|&index| !self.used[index]);
+        let added = apart(points, candidates, 2 * structure.gram.size);
+        added.iter().for_each(|&index| self.used[index] = true);
+        self.chosen.extend(added.into_iter().map(|index| points[index]));
+        self.values = columns(structure, &self.chosen);
+    }
+}
+
+fn columns(structure: &Structure, points: &[Vector3<f64>]) -> DMatrix<f64> {
+    DMatrix::from_columns(&points.iter().map(|point| structure.values(point)).collect::<Vec<_>>())
+}
+
+/// At most so many points, each the farthest from those before; the first is the farthest from 0.
+pub(super) fn spread(points: &[Vector3<f64>], most: usize) -> Vec<usize> {
+    let mut distance = vec![f64::INFINITY; points.len()];
+    let mut next = (0..points.len()).max_by(|&a, &b| points[a].norm().total_cmp(&points[b].norm())).unwrap_or(0);
+    let choose = |_| {
+        let chosen = next;
+        for (d, point) in distance.iter_mut().zip(points) {
+            *d = d.min((point - points[chosen]).norm());
+        }
+        next = (0..points.len()).max_by(|&a, &b| distance[a].total_cmp(&distance[b])).unwrap_or(0);
+        chosen
+    };
+    (0..most.min(points.len())).map(choose).collect()
+}
+
+/// Points of a ball that is in the hull, twice as many as monomials of half the degree: they constrain nothing, but with weight on them
+/// moments are positive definite also where there are few points, or points on a quadric. The unit ball is the smallest ellipsoid
+/// around the hull, so the ball of a third of its radius is inside (John's theorem).
+pub(super) fn inner(structure: &Structure) -> impl Iterator<Item = Vector3<f64>> {
+    let count = 2 * structure.gram.size;
+    fibonacci_lattice(count).enumerate().map(|(i, u)| u * (INNER * (i as f64 * RADII).fract().cbrt()))
+}
+
+/// Radius of the ball, and the step of a low-discrepancy sequence of its radii.
+const INNER: f64 = 0.33;
+const RADII: f64 = 0.754_878;

@@ -1,0 +1,347 @@
+//! The central path of a fit's dual program, followed by Newton's method.
+//!
+//! The dual of `program` has few variables, and its barrier problem, here for the Gram matrix P,
+//!
+//! ```text
+//! minimise  τ (-φ(M(m)) + Σwᵢ - ε tr S(s) + h·s) - Σ log wᵢ - log det S(s),   m = Σ wᵢ v(xᵢ) - D*s
+//! ```
+//!
+//! costs one small dense factorization per Newton step (Nesterov and Nemirovskii, Interior-Point Polynomial Algorithms,
+//! 1994). A centre is within (points + rows of S)/τ of the optimum, and a Newton step near it yields a polynomial that
+//! satisfies all constraints strictly, with its Gram matrices: an upper bound to hold against the lower bound of the dual.
+
+use super::FitError;
+use super::barrier::Barrier;
+use super::factor::{cholesky, regularised_factor, solve_lower};
+use super::model::Model;
+use super::objective::Matrix;
+use super::program::{Dual, Problem};
+use super::progress::Watch;
+use super::spectral::Spectral;
+use super::structure::{Pattern, Structure};
+use nalgebra::{Cholesky, DMatrix, DVector};
+use sublevel_core::polynomial::degree_of;
+
+/// Newton decrement below which a point counts as a centre; 1 is where its polynomial stops being feasible.
+const CENTRED: f64 = 0.9;
+
+/// Growth of τ below which a path that rounding blocks is given up.
+const LEAST_GROWTH: f64 = 1.3;
+/// Weight of a trace at the start, relative to that of a log det: 1e-2 leaves some starts too far from any centre, 1e-6 drowns
+/// the trace in rounding.
+const TRACE_SHARE: f64 = 1e-4;
+
+/// What the path minimises, besides `Σw - ε tr S + h·s`.
+#[derive(Clone, Copy)]
+pub(super) enum Goal<'a> {
+    /// `-φ` of the moment matrix of one Gram matrix.
+    Gram(Matrix, &'a Spectral),
+    /// A quadratic function of the moments.
+    Model(&'a Model),
+}
+
+/// A polynomial that satisfies every constraint of the program strictly.
+#[derive(Clone, Debug)]
+pub(super) struct Interior {
+    /// Its coefficients.
+    pub(super) coefficients: DVector<f64>,
+    /// Gram matrix of its Hessian form: `≻ εI` but for rounding, of which it may lose half.
+    pub(super) hessian: DMatrix<f64>,
+}
+
+/// A dual point and the weight of the objective there.
+#[derive(Clone, Debug)]
+pub(super) struct Place {
+    pub(super) dual: Dual,
+    pub(super) tau: f64,
+}
+
+/// How to follow a path.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pace {
+    /// Distance to the optimum at which to stop, in units of the goal.
+    pub(super) gap: f64,
+    /// Growth of τ from one centre to the next.
+    pub(super) growth: f64,
+    /// Newton steps at most.
+    pub(super) steps: usize,
+}
+
+/// A point near the path.
+#[derive(Clone, Debug)]
+pub(super) struct Centre {
+    /// Where it is.
+    pub(super) place: Place,
+    /// The polynomial that goes with it.
+    pub(super) interior: Interior,
+    /// The Gram matrix P of that polynomial; none if the goal is a model, where p needs none.
+    pub(super) gram: Option<DMatrix<f64>>,
+}
+
+/// The barrier problem.
+pub(super) struct Path<'a> {
+    structure: &'a Structure,
+    values: &'a DMatrix<f64>,
+    margin: f64,
+    goal: Goal<'a>,
+    /// D: Hessian forms x monomials.
+    derivative: DMatrix<f64>,
+    /// h: what the Hessian form of p may lack.
+    allowance: DVector<f64>,
+    /// `h·s - ε tr S` as a functional of s.
+    cost: DVector<f64>,
+}
+
+/// A damped Newton step.
+struct Newton {
+    /// Where it leads.
+    next: Dual,
+    /// Where it would lead undamped.
+    whole: Dual,
+    /// Newton decrement before it.
+    decrement: f64,
+    /// τ times the coefficients of p that the full step predicts.
+    coefficients: DVector<f64>,
+}
+
+impl<'a> Path<'a> {
+    /// The path of a fit over the points whose monomials are the columns of `values`.
+    pub(super) fn of_fit(problem: &'a Problem, values: &'a DMatrix<f64>) -> Self {
+        let mut path =
+            Self::new(problem.structure, values, problem.margin, Goal::Gram(problem.matrix, &problem.spectral));
+        if let Some(allowance) = &problem.allowance {
+            path.allowance += allowance;
+            path.cost += allowance;
+        }
+        path
+    }
+
+    pub(super) fn new(structure: &'a Structure, values: &'a DMatrix<f64>, margin: f64, goal: Goal<'a>) -> Self {
+        let forms = structure.hessian.keys;
+        let mut cost = DVector::zeros(forms);
+        for i in 0..structure.hessian.size {
+            cost[structure.hessian.key(i, i)] -= margin;
+        }
+        let derivative = structure.derivative_matrix();
+        Self { structure, values, margin, goal, derivative, allowance: DVector::zeros(forms), cost }
+    }
+
+    fn pattern(&self, matrix: Matrix) -> &'a Pattern {
+        match matrix {
+            Matrix::Polynomial => &self.structure.gram,
+            Matrix::Hessian => &self.structure.hessian,
+        }
+    }
+
+    /// What the moments of `matrix` add to the barrier problem.
+    fn barrier(&self, matrix: Matrix, tau: f64) -> Barrier<'a> {
+        let measured = match self.goal {
+            Goal::Gram(measured, spectral) if measured == matrix => Some((spectral, tau)),
+            _ => None,
+        };
+        Barrier::new(self.pattern(matrix), measured)
+    }
+
+    /// At a centre, this over τ is the distance to the optimum.
+    pub(super) fn barrier_parameter(&self) -> f64 {
+        let cone = match self.goal {
+            Goal::Model(_) => self.structure.hessian.size,
+            Goal::Gram(_, spectral) if !spectral.is_self_concordant() => {
+                self.structure.gram.size + self.structure.hessian.size
+            }
+            Goal::Gram(Matrix::Polynomial, _) => self.structure.hessian.size,
+            Goal::Gram(Matrix::Hessian, _) => self.structure.gram.size,
+        };
+        (self.values.ncols() + cone) as f64
+    }
+
+    /// The unit of gaps.
+    fn size(&self, at: &Dual) -> f64 {
+        match self.goal {
+            Goal::Gram(Matrix::Polynomial, spectral) => spectral.size(&self.structure.gram.spread(&at.moments)),
+            Goal::Gram(Matrix::Hessian, spectral) => spectral.size(&self.structure.hessian.spread(&at.form)),
+            Goal::Model(_) => Some(1.0),
+        }
+        .unwrap_or(1.0)
+    }
+
+    fn point(&self, weights: DVector<f64>, form: DVector<f64>) -> Dual {
+        Dual { moments: self.values * &weights - self.structure.pull_back(&form), weights, form }
+    }
+
+    /// Equal weights that add up to the rows of P, and y isotropic and independent of z: S is positive definite, and small
+    /// enough to leave M so. Where relaxed convexity has no points inside to go by, as of a sphere, z closer to the centre helps.
+    pub(super) fn start(&self) -> Option<Place> {
+        let points = self.values.ncols();
+        let rows = self.structure.gram.size as f64;
+        let weights = DVector::repeat(points, rows / points as f64);
+        let mean = self.values * DVector::repeat(points, 1.0 / points as f64);
+        let dual = [1.0, 0.5, 0.25].into_iter().find_map(|shrink: f64| {
+            let order = self.structure.monomials.iter().map(|&e| shrink.powi(degree_of(e) as i32));
+            let isotropic =
+                isotropic_form(self.structure, &mean.component_mul(&DVector::from_iterator(mean.len(), order)));
+            (0..40).find_map(|halvings| {
+                let point = self.point(weights.clone(), &isotropic * 0.5_f64.powi(halvings));
+                Cholesky::new(self.structure.gram.spread(&point.moments))?;
+                Some(self.point(weights.clone(), &isotropic * 0.5_f64.powi(halvings + 1)))
+            })
+        })?;
+        let Place { dual, tau } = match self.goal {
+            Goal::Gram(_, spectral) if !spectral.is_self_concordant() => {
+                // The functional is a poor guess for traces, so the barriers rule at first; then this scale is best.
+                let size = self.size(&dual);
+                let scale = size * (1.0 + self.barrier_parameter() / (TRACE_SHARE * rows));
+                let dual = self.point(dual.weights * scale.powi(2), dual.form * scale.powi(2));
+                Place { dual, tau: 1.0 / (size * scale) }
+            }
+            _ => Place { dual, tau: 1.0 },
+        };
+        // At a centre the rows of S are what relaxed convexity costs: a start that costs more is far from any.
+        let least = self.structure.hessian.size as f64 / (tau * self.cost.dot(&dual.form));
+        let share = if least > 0.0 { least.min(1.0) } else { 1.0 };
+        Some(Place { dual: self.point(dual.weights, dual.form * share), tau })
+    }
+
+    /// The last centre before the steps ran out or rounding stood in the way; its τ tells how far that is.
+    ///
+    /// # Errors
+    /// [`FitError::Cancelled`].
+    pub(super) fn follow(&self, from: Place, pace: Pace, watch: &mut Watch) -> Result<Option<Centre>, FitError> {
+        let Place { mut dual, mut tau } = from;
+        let (mut size, mut growth) = (self.size(&dual), pace.growth);
+        let mut last: Option<Centre> = None;
+        for _ in 0..pace.steps {
+            watch.iteration(self.barrier_parameter() / (tau * size))?;
+            let newton = self.step(&dual, tau);
+            let centred = newton.as_ref().is_some_and(|newton| newton.decrement < CENTRED);
+            let centre = newton.as_ref().filter(|_| centred).and_then(|newton| self.centre(&dual, newton, tau));
+            match (newton, centre) {
+                (Some(_), Some(centre)) => {
+                    size = self.size(&dual);
+                    dual.clone_from(&centre.place.dual);
+                    last = Some(centre);
+                    let end = self.barrier_parameter() / (pace.gap * size);
+                    if tau >= end {
+                        break;
+                    }
+                    tau = (tau * growth).min(end);
+                }
+                (Some(newton), None) if !centred => dual = newton.next,
+                // Rounding: from the last centre a shorter way may still be open.
+                _ => {
+                    growth = growth.sqrt();
+                    let Some(Centre { place, .. }) = last.as_ref().filter(|_| growth > LEAST_GROWTH) else { break };
+                    (dual, tau) = (place.dual.clone(), place.tau * growth);
+                }
+            }
+        }
+        Ok(last)
+    }
+
+    /// Objective of the barrier problem; none outside its domain.
+    fn objective(&self, point: &Dual, tau: f64) -> Option<f64> {
+        if point.weights.min() <= 0.0 {
+            return None;
+        }
+        let of_moments = match self.goal {
+            Goal::Model(model) => tau * model.value(&point.moments),
+            Goal::Gram(..) => self.barrier(Matrix::Polynomial, tau).value(&point.moments)?,
+        };
+        let of_form = self.barrier(Matrix::Hessian, tau).value(&point.form)?;
+        let weights = point.weights.iter().map(|w| w.ln()).sum::<f64>();
+        let cost = point.weights.sum() + self.cost.dot(&point.form);
+        let value = of_moments + of_form + tau * cost - weights;
+        value.is_finite().then_some(value)
+    }
+
+    /// Minus the gradient, and the inverse of the Hessian, of the part that depends on m.
+    fn of_moments(&self, at: &Dual, tau: f64) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        if let Goal::Model(model) = self.goal {
+            return Some((model.coefficients(&at.moments) * tau, model.flexibility() / tau));
+        }
+        let (gradient, curvature) = self.barrier(Matrix::Polynomial, tau).derivatives(&at.moments)?;
+        let factor = regularised_factor(&curvature)?;
+        let root = solve_lower(&factor, DMatrix::identity(gradient.len(), gradient.len()))?;
+        Some((gradient, root.transpose() * &root))
+    }
+
+    /// A damped Newton step; none when rounding stands in its way.
+    fn step(&self, at: &Dual, tau: f64) -> Option<Newton> {
+        let Self { values, derivative, .. } = self;
+        // 1. Gradients and Hessians of the three parts.
+        let (coefficients, flexibility) = self.of_moments(at, tau)?;
+        let (gram, curvature) = self.barrier(Matrix::Hessian, tau).derivatives(&at.form)?;
+        let form_factor = regularised_factor(&curvature)?;
+        let of_weights = (values.tr_mul(&coefficients) * -1.0).add_scalar(tau) - at.weights.map(|w| 1.0 / w);
+        let of_form = derivative * &coefficients + &self.cost * tau - gram;
+        // 2. All but the part of m is block diagonal; that has the rank of the moments (Woodbury).
+        let half = solve_lower(&form_factor, derivative.clone())?;
+        let half_gradient = form_factor.solve_lower_triangular(&of_form)?;
+        let scaled = DMatrix::from_fn(values.nrows(), values.ncols(), |i, j| values[(i, j)] * at.weights[j]);
+        let squares = at.weights.component_mul(&at.weights);
+        let plain = *values * squares.component_mul(&of_weights) - half.tr_mul(&half_gradient);
+        let system = flexibility + &scaled * scaled.transpose() + half.transpose() * &half;
+        let factor = cholesky(system)?;
+        let mut multiplier = factor.solve_lower_triangular(&plain)?;
+        factor.tr_solve_lower_triangular_mut(&mut multiplier);
+        let step_weights = -squares.component_mul(&(&of_weights - values.tr_mul(&multiplier)));
+        let step_form = -form_factor.tr_solve_lower_triangular(&(half_gradient + &half * &multiplier))?;
+        let slope = of_weights.dot(&step_weights) + of_form.dot(&step_form);
+        if slope.is_nan() || slope > 0.0 {
+            return None;
+        }
+        // 3. Shortened until everything stays positive and the objective falls.
+        let along = |length: f64| self.point(&at.weights + &step_weights * length, &at.form + &step_form * length);
+        let here = self.objective(at, tau)?;
+        let next = (0..40).find_map(|shortening| {
+            let length = 0.7_f64.powi(shortening);
+            let next = along(length);
+            let sufficient = here + 0.1 * length * slope + 1e-9 * here.abs();
+            self.objective(&next, tau).is_some_and(|value| value <= sufficient).then_some(next)
+        })?;
+        // The multiplier is minus the Hessian of the part of m times the full step.
+        Some(Newton { next, whole: along(1.0), decrement: (-slope).sqrt(), coefficients: coefficients + multiplier })
+    }
+
+    /// The polynomial that a Newton step from `at` predicts; none if rounding costs it what mathematics promises.
+    ///
+    /// With decrement below 1 the step in w keeps `dw < w`, so that `1 - p(xᵢ) = (1 - dwᵢ/wᵢ)/(τwᵢ) > 0`, and both Gram
+    /// matrices, predicted from the gradients of their barriers, are definite and match p: these are the Newton equations
+    /// read again.
+    fn centre(&self, at: &Dual, newton: &Newton, tau: f64) -> Option<Centre> {
+        let coefficients = &newton.coefficients / tau;
+        let Structure { gram, hessian, .. } = self.structure;
+        let margin = DMatrix::identity(hessian.size, hessian.size) * self.margin;
+        let form = self.barrier(Matrix::Hessian, tau).predicted(&at.form, &newton.whole.form)? / tau + &margin;
+        let form = hessian.nearest(&form, &(&self.derivative * &coefficients + &self.allowance));
+        Cholesky::new(&form - margin * 0.5)?;
+        let gram = match self.goal {
+            Goal::Model(_) => None,
+            Goal::Gram(..) => {
+                let predicted = self.barrier(Matrix::Polynomial, tau).predicted(&at.moments, &newton.whole.moments)?;
+                Some(gram.nearest(&(predicted / tau), &coefficients))
+            }
+        };
+        let place = Place { dual: newton.next.clone(), tau };
+        Some(Centre { place, interior: Interior { coefficients, hessian: form }, gram })
+    }
+}
+
+/// The functional `y_i y_j z^e -> [i = j] mean(z^e)`.
+pub(super) fn isotropic_form(structure: &Structure, mean: &DVector<f64>) -> DVector<f64> {
+    let size = structure.hessian.size / 3;
+    let basis = &structure.hessian_basis;
+    let position = |exponents: [u8; 3]| structure.monomials.iter().position(|&m| m == exponents);
+    let mut form = DVector::zeros(structure.hessian.keys);
+    for direction in 0..3 {
+        for a in direction * size..(direction + 1) * size {
+            for b in direction * size..(direction + 1) * size {
+                let exponents = std::array::from_fn(|i| basis[a].exponents[i] + basis[b].exponents[i]);
+                if let Some(index) = position(exponents) {
+                    form[structure.hessian.key(a, b)] = mean[index];
+                }
+            }
+        }
+    }
+    form
+}

@@ -1,0 +1,134 @@
+//! The semidefinite program of one fit and its dual.
+//!
+//! The programs of the paper (its section III, convex case) in the whitened frame, with a margin ε:
+//!
+//! ```text
+//! minimise  f(P) or f(H)   subject to  p = zᵀPz,  yᵀ∇²p y = wᵀHw,  P ⪰ 0,  H ⪰ εI,  p(xᵢ) <= 1
+//! ```
+//!
+//! Their duals have far fewer variables: weights w >= 0 of the points and a functional s on the Hessian form. With
+//! φ the concave conjugate of f (`spectral`), for the Gram matrix P
+//!
+//! ```text
+//! maximise  φ(M(m)) - Σwᵢ + ε tr S(s)   subject to  m = Σ wᵢ v(xᵢ) - D*s,  S(s) ⪰ 0,  w >= 0
+//! ```
+//!
+//! where M and S are (pseudo-)moment matrices, v the monomials of p and D the map from p to its Hessian form; P is then
+//! implied definite. For the Gram matrix H the two change roles, and f alone keeps H definite, so there is no ε:
+//!
+//! ```text
+//! maximise  φ(S(s)) - Σwᵢ   subject to  m = Σ wᵢ v(xᵢ) - D*s,  M(m) ⪰ 0,  w >= 0
+//! ```
+//!
+//! With convexity relaxed, `p + r` is sos-convex in place of p, for `r = c |u|^2d` in given coordinates u: with h the coefficients of the
+//! Hessian form of r, the constraint `yᵀ∇²(p + r) y = wᵀHw` takes `h·s` off the dual objective, and nothing else changes.
+//!
+//! The optimal Gram matrix is the gradient of φ at the optimum. The dual needs no exponential cones, and no block of twice
+//! the size for determinant or inverse (`path`).
+
+use super::basis::{Affine, change};
+use super::objective::{Function, Matrix, Objective};
+use super::spectral::Spectral;
+use super::structure::{Pattern, Structure};
+use nalgebra::{DMatrix, DVector};
+use sublevel_core::polynomial::NormPower;
+
+/// Why a program could not be solved.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ProgramError {
+    /// A moment matrix lost its definiteness.
+    #[error("the points do not span the polynomials of this degree numerically; lower the degree, or add points")]
+    Singular,
+}
+
+/// A dual point: weights, functional on the Hessian form, and the moments they give.
+#[derive(Clone, Debug)]
+pub(super) struct Dual {
+    /// One weight per point of the program.
+    pub(super) weights: DVector<f64>,
+    /// Functional s on the Hessian form.
+    pub(super) form: DVector<f64>,
+    /// Moments m.
+    pub(super) moments: DVector<f64>,
+}
+
+/// One fit's program but for its points.
+#[derive(Clone, Debug)]
+pub(super) struct Problem<'a> {
+    pub(super) structure: &'a Structure,
+    /// Which Gram matrix the objective measures.
+    pub(super) matrix: Matrix,
+    /// What it measures of it.
+    pub(super) spectral: Spectral,
+    /// ε; 0 when H is measured.
+    pub(super) margin: f64,
+    /// h: coefficients of the Hessian form of what relaxes convexity; none if nothing does.
+    pub(super) allowance: Option<DVector<f64>>,
+}
+
+impl<'a> Problem<'a> {
+    /// The program of an objective; `unit` maps the whitened frame to the unit frame, in which traces are measured.
+    pub(super) fn new(structure: &'a Structure, objective: Objective, unit: &Affine, margin: f64) -> Self {
+        let matrix = objective.matrix();
+        let spectral = match objective.function() {
+            Function::LogDet => Spectral::log_det(),
+            Function::TraceInverse => Spectral::trace_inverse(change(structure, matrix, unit)),
+        };
+        let margin = match matrix {
+            Matrix::Polynomial => margin,
+            Matrix::Hessian => 0.0,
+        };
+        Self { structure, matrix, spectral, margin, allowance: None }
+    }
+
+    /// The same program with convexity asked of `p + power` only.
+    pub(super) fn relaxed(mut self, power: Option<&NormPower>) -> Self {
+        self.allowance = power.map(|power| {
+            let mut coefficients = DVector::zeros(self.structure.monomials.len());
+            for (value, monomial) in coefficients.iter_mut().zip(&self.structure.monomials) {
+                *value = power.terms().iter().find(|term| term.0 == *monomial).map_or(0.0, |term| term.1);
+            }
+            self.structure.derivative_matrix() * coefficients
+        });
+        self
+    }
+
+    /// Whether every mixture of points satisfies what the points do, as p is convex.
+    pub(super) fn is_convex(&self) -> bool {
+        self.allowance.is_none() && self.structure.hessian.size > 0
+    }
+
+    /// The pattern of the measured matrix.
+    pub(super) fn pattern(&self) -> &'a Pattern {
+        match self.matrix {
+            Matrix::Polynomial => &self.structure.gram,
+            Matrix::Hessian => &self.structure.hessian,
+        }
+    }
+
+    /// Which part of a dual point is the measured matrix' moments.
+    pub(super) fn variable<'b>(&self, dual: &'b Dual) -> &'b DVector<f64> {
+        match self.matrix {
+            Matrix::Polynomial => &dual.moments,
+            Matrix::Hessian => &dual.form,
+        }
+    }
+
+    /// Moment matrix of the measured matrix.
+    pub(super) fn measured(&self, dual: &Dual) -> DMatrix<f64> {
+        self.pattern().spread(self.variable(dual))
+    }
+
+    /// The linear part of the dual objective, `Σw - ε tr S + h·s`.
+    pub(super) fn cost(&self, dual: &Dual) -> f64 {
+        let trace = if self.margin > 0.0 { self.margin * self.structure.hessian.trace(&dual.form) } else { 0.0 };
+        let allowed = self.allowance.as_ref().map_or(0.0, |allowance| allowance.dot(&dual.form));
+        dual.weights.sum() - trace + allowed
+    }
+
+    /// The dual objective: a lower bound of f over all feasible polynomials.
+    pub(super) fn lower_bound(&self, dual: &Dual) -> Result<f64, ProgramError> {
+        let bound = self.spectral.bound(&self.measured(dual)).ok_or(ProgramError::Singular)?;
+        Ok(bound - self.cost(dual))
+    }
+}

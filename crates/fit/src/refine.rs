@@ -1,0 +1,225 @@
+//! Smaller volumes: sequential convex programming on the volume itself.
+//!
+//! Log dets and traces only stand in for the volume. From the optimum of one, each step minimises a convex quadratic model of the
+//! volume (`volume`) over the same sos-convex polynomials around the same points, by following the central path of that
+//! program's dual, and goes that way as far as the volume falls. The feasible set is convex, so every polynomial on the way
+//! is feasible, and the volume never grows.
+
+use super::generate::inner;
+use super::model::Model;
+use super::path::{Goal, Interior, Pace, Path, Place};
+use super::progress::Watch;
+use super::structure::Structure;
+use super::volume::{Expansion, expansion, polynomial, volume};
+use super::{FitError, ProgramError};
+use nalgebra::{DMatrix, DVector, Vector3};
+use sublevel_core::polynomial::Polynomial;
+
+/// Steps at most.
+const STEPS: usize = 30;
+/// Relative decrease of the volume below which to stop.
+const ENOUGH: f64 = 2e-5;
+/// Accuracy of a step's program, relative to the volume.
+const GAP: f64 = 1e-5;
+/// Growth of τ from one centre to the next.
+const GROWTH: f64 = 10.0;
+/// Where a path starts, as a part of its last τ: nearer, and the first centre is far; farther, and there are more of them.
+const COLD: f64 = 1e-5;
+/// Newton steps on one path at most.
+const COLD_STEPS: usize = 3000;
+/// As [`COLD`], from the last optimum.
+const WARM: f64 = 1e-2;
+/// As [`COLD_STEPS`], from the last optimum: what works takes a few tens.
+const WARM_STEPS: usize = 80;
+/// Levenberg's term, relative to the mean curvature: directions that the rays see nothing of stay put.
+const DAMPING: f64 = 1e-7;
+
+/// Why a refinement ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RefinementEnd {
+    /// The last step hardly made the volume smaller.
+    Converged,
+    /// No polynomial on the way to a step's optimum had a smaller volume.
+    NoDescent,
+    /// The program of a step could not be solved; the steps before it count.
+    Unsolved,
+    /// The volume was still falling after the last step allowed.
+    StepLimit,
+}
+
+impl std::fmt::Display for RefinementEnd {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Converged => "converged",
+            Self::NoDescent => "no smaller volume was found on the way of the last step",
+            Self::Unsolved => "the program of the last step could not be solved",
+            Self::StepLimit => "the volume was still falling after the last step allowed",
+        })
+    }
+}
+
+/// What a refinement came to.
+#[derive(Clone, Debug)]
+pub(super) struct Refined {
+    /// Coefficients of p, with `min p = 0`.
+    pub(super) coefficients: DVector<f64>,
+    /// Gram matrix of its Hessian form.
+    pub(super) hessian: DMatrix<f64>,
+    /// Volume in the frame of p before the first step and after each, by the rule that is minimised.
+    pub(super) volumes: Vec<f64>,
+    /// Why there are no more steps.
+    pub(super) end: RefinementEnd,
+}
+
+/// Refines a polynomial that is feasible for `points` (up to a constant) with the Gram matrix `hessian ⪰ margin`.
+pub(super) fn refine(
+    structure: &Structure,
+    points: &[Vector3<f64>],
+    margin: f64,
+    coefficients: DVector<f64>,
+    hessian: DMatrix<f64>,
+    watch: &mut Watch,
+) -> Result<Refined, FitError> {
+    let known = points.iter().copied().chain(inner(structure));
+    let values = DMatrix::from_columns(&known.map(|x| structure.values(&x)).collect::<Vec<_>>());
+    let mut current = Interior { coefficients, hessian };
+    // What the solver left outside is taken in by the constant.
+    let highest = values.tr_mul(&current.coefficients).max();
+    current.coefficients[0] -= (highest - 1.0).max(0.0);
+    let mut volumes = Vec::new();
+    let mut last = None;
+    let mut center = Vector3::zeros();
+    let mut end = RefinementEnd::StepLimit;
+    for _ in 0..STEPS {
+        center = normalise(structure, &mut current, &center)?;
+        let p = polynomial(structure, &current.coefficients)?;
+        let model = expansion(structure, &p, &center);
+        let here = model.volume;
+        if volumes.is_empty() {
+            volumes.push(here);
+        }
+        let program = step_model(structure, &current.coefficients, model, &center).ok_or(ProgramError::Singular)?;
+        let path = Path::new(structure, &values, margin, Goal::Model(&program));
+        watch.round(points.len(), 0.0);
+        let Some((target, place)) = minimise(&path, here, last.take(), watch)? else {
+            end = RefinementEnd::Unsolved;
+            break;
+        };
+        last = Some(place);
+        let Some((next, smaller)) = search(structure, &current, &target, &center, here) else {
+            end = RefinementEnd::NoDescent;
+            break;
+        };
+        volumes.push(smaller);
+        current = next;
+        if smaller > here * (1.0 - ENOUGH) {
+            end = RefinementEnd::Converged;
+            break;
+        }
+    }
+    // The path ends a little inside the constraints: the constant takes that back, and then min p is 0.
+    current.coefficients[0] += 1.0 - values.tr_mul(&current.coefficients).max();
+    normalise(structure, &mut current, &center)?;
+    Ok(Refined { coefficients: current.coefficients, hessian: current.hessian, volumes, end })
+}
+
+/// The model that a step around these coefficients minimises; none where the volume has no usable curvature.
+pub(super) fn step_model(
+    structure: &Structure,
+    coefficients: &DVector<f64>,
+    expansion: Expansion,
+    center: &Vector3<f64>,
+) -> Option<Model> {
+    let Expansion { volume, gradient, mut curvature } = expansion;
+    // A multiple of p - 1 describes the same set: p(center) is held, which fixes the multiple.
+    let hold = structure.values(center);
+    let mean = curvature.trace() / hold.len() as f64;
+    curvature.ger(volume * 10.0, &hold, &hold, 1.0);
+    for i in 0..curvature.nrows() {
+        curvature[(i, i)] += DAMPING * mean;
+    }
+    Model::new(coefficients.clone(), gradient, curvature)
+}
+
+/// `p -> 1 + (p - 1)/(1 - min p)`: the same set with min p = 0. Returns the minimiser.
+pub(super) fn normalise(
+    structure: &Structure,
+    interior: &mut Interior,
+    near: &Vector3<f64>,
+) -> Result<Vector3<f64>, FitError> {
+    let p = polynomial(structure, &interior.coefficients)?;
+    let center = minimiser(&p, near).ok_or(ProgramError::Singular)?;
+    let least = p.evaluate(&center).value;
+    let factor = 1.0 / (1.0 - least);
+    if !(factor > 0.0 && factor.is_finite()) {
+        return Err(ProgramError::Singular.into());
+    }
+    interior.coefficients *= factor;
+    interior.coefficients[0] += 1.0 - factor;
+    interior.hessian *= factor;
+    Ok(center)
+}
+
+/// Minimiser of a strictly convex polynomial by damped Newton steps.
+fn minimiser(p: &Polynomial, start: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let mut z = *start;
+    for _ in 0..200 {
+        let jet = p.evaluate(&z);
+        let step = jet.hessian.cholesky()?.solve(&jet.gradient);
+        let decrease = step.dot(&jet.gradient);
+        if decrease <= 1e-16 * (1.0 + jet.value.abs()) {
+            break;
+        }
+        let shorter = |k: i32| (0.5_f64.powi(k), z - step * 0.5_f64.powi(k));
+        z = (0..40).map(shorter).find(|(t, z)| p.evaluate(z).value <= jet.value - 0.25 * t * decrease)?.1;
+    }
+    Some(z)
+}
+
+/// The minimiser of the model, to [`GAP`], and the place to start the next from.
+fn minimise(
+    path: &Path,
+    volume: f64,
+    warm: Option<Place>,
+    watch: &mut Watch,
+) -> Result<Option<(Interior, Place)>, FitError> {
+    let gap = GAP * volume;
+    let end = path.barrier_parameter() / gap;
+    // The last optimum is close to the next, but also to the boundary: from there the path is not always found.
+    let warm = warm.map(|place| (Place { tau: WARM * end, ..place }, WARM_STEPS));
+    let cold = path.start().map(|place| (Place { tau: COLD * end, ..place }, COLD_STEPS));
+    for (start, steps) in warm.into_iter().chain(cold) {
+        let centre = path.follow(start, Pace { gap, growth: GROWTH, steps }, watch)?;
+        if let Some(centre) = centre.filter(|centre| centre.place.tau >= end) {
+            return Ok(Some((centre.interior, centre.place)));
+        }
+    }
+    Ok(None)
+}
+
+/// The polynomial on the way from `from` to `to` with about the smallest volume, if one is below `here`.
+fn search(
+    structure: &Structure,
+    from: &Interior,
+    to: &Interior,
+    center: &Vector3<f64>,
+    here: f64,
+) -> Option<(Interior, f64)> {
+    let at = |t: f64| Interior {
+        coefficients: &from.coefficients + (&to.coefficients - &from.coefficients) * t,
+        hessian: &from.hessian + (&to.hessian - &from.hessian) * t,
+    };
+    let measure = |t: f64| polynomial(structure, &at(t).coefficients).map_or(f64::INFINITY, |p| volume(&p, center));
+    let mut best = (0.0, here);
+    let mut length = 1.0;
+    for _ in 0..12 {
+        let value = measure(length);
+        if value < best.1 {
+            best = (length, value);
+        } else if best.0 > 0.0 {
+            break;
+        }
+        length *= 0.6;
+    }
+    (best.0 > 0.0).then(|| (at(best.0), best.1))
+}

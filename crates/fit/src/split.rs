@@ -1,0 +1,185 @@
+//! Where to cut an object into pieces that are nearly convex.
+//!
+//! What a piece wastes is the part of its convex hull that the object does not fill. The pieces of an object fill the same, so the
+//! best cut of a piece is the one whose two sides have hulls of the least volume together; the best of all pieces is made, again and
+//! again. Planes are tried in many directions and at many heights on a sample of the piece, by hulls of the samples farthest along
+//! fixed directions; the few that promise most are made and measured exactly.
+
+use super::hull::{principal_axes, rough_volume};
+use nalgebra::Vector3;
+use sublevel_core::body::{Cut, Piece, Sphere};
+
+/// Heights tried per direction.
+const HEIGHTS: usize = 15;
+
+/// Cuts that are measured exactly.
+const FINALISTS: usize = 6;
+
+/// Part of a piece's hull that a side must at least have: thinner ones are not worth a part, nor easy to fit.
+const LEAST_SHARE: f64 = 1e-3;
+
+/// Longest distance between samples of an edge, relative to the piece.
+const SPACING: f64 = 1.0 / 64.0;
+
+/// Most samples of a piece.
+const MAX_SAMPLES: usize = 20_000;
+
+/// A mesh cut into pieces.
+pub(super) struct Partition {
+    /// The cuts in their order.
+    pub(super) cuts: Vec<Cut>,
+    /// The pieces they leave, numbered as they say.
+    pub(super) pieces: Vec<Piece>,
+    /// What is known of the best cut of each piece.
+    plans: Vec<Best>,
+}
+
+/// The best cut of a piece.
+enum Best {
+    /// It was not looked for yet.
+    Unknown,
+    /// Nothing is gained by any.
+    Nothing,
+    /// The one that gains most.
+    Cut(Plan),
+}
+
+/// A cut of a piece.
+struct Plan {
+    normal: Vector3<f64>,
+    height: f64,
+    /// By how much it reduces the volume of the hulls.
+    gain: f64,
+    sides: [Piece; 2],
+}
+
+impl Partition {
+    /// The mesh in one piece.
+    pub(super) fn new(mesh: Piece) -> Self {
+        Self { cuts: Vec::new(), pieces: vec![mesh], plans: vec![Best::Unknown] }
+    }
+
+    /// Makes the cut that gains most; tells whether there was one.
+    pub(super) fn divide(&mut self) -> bool {
+        for (piece, best) in self.pieces.iter().zip(&mut self.plans) {
+            if let Best::Unknown = best {
+                *best = plan(piece).map_or(Best::Nothing, Best::Cut);
+            }
+        }
+        let gain = |best: &Best| if let Best::Cut(plan) = best { plan.gain } else { 0.0 };
+        let part = (0..self.plans.len()).max_by(|&a, &b| gain(&self.plans[a]).total_cmp(&gain(&self.plans[b])));
+        let Some(part) = part else { return false };
+        let Best::Cut(Plan { normal, height, sides: [below, above], .. }) =
+            std::mem::replace(&mut self.plans[part], Best::Unknown)
+        else {
+            self.plans[part] = Best::Nothing;
+            return false;
+        };
+        self.cuts.push(Cut { part, normal: normal.into(), height_m: height });
+        self.pieces[part] = below;
+        self.pieces.push(above);
+        self.plans.push(Best::Unknown);
+        true
+    }
+}
+
+/// The best cut of a piece.
+fn plan(piece: &Piece) -> Option<Plan> {
+    let whole = rough_volume(&points(piece))?;
+    let mut promises = promises(piece, whole);
+    promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    promises.truncate(FINALISTS);
+    let measured = promises.into_iter().filter_map(|Promise { normal, height, .. }| {
+        let sides = piece.cut(&normal, height);
+        let volumes = [rough_volume(&points(&sides[0]))?, rough_volume(&points(&sides[1]))?];
+        let gain = whole - volumes[0] - volumes[1];
+        let thin = volumes.iter().any(|&volume| volume < LEAST_SHARE * whole);
+        (gain > 0.0 && !thin).then_some(Plan { normal, height, gain, sides })
+    });
+    measured.max_by(|a, b| a.gain.total_cmp(&b.gain))
+}
+
+fn points(piece: &Piece) -> Vec<Vector3<f64>> {
+    piece.spots().iter().map(|spot| spot.x).collect()
+}
+
+/// A plane and about what it gains.
+struct Promise {
+    normal: Vector3<f64>,
+    height: f64,
+    gain: f64,
+}
+
+/// Planes of all directions and heights with what they gain by hulls of few samples.
+fn promises(piece: &Piece, whole: f64) -> Vec<Promise> {
+    let samples = samples(piece);
+    let (_, axes, _) = principal_axes(&samples);
+    let probes = Sphere::subdivided(2);
+    let reaches: Vec<Vec<f64>> =
+        samples.iter().map(|x| probes.vertices().iter().map(|probe| probe.dot(x)).collect()).collect();
+    let even = Sphere::subdivided(1);
+    let half = even.vertices().iter().copied().filter(|n| (n.z, n.y, n.x) > (0.0, 0.0, 0.0));
+    let normals = half.chain(axes.column_iter().map(Into::into)).chain((0..3).map(|i| Vector3::ith(i, 1.0)));
+    normals.flat_map(|normal| along(&samples, &reaches, normal, whole)).collect()
+}
+
+/// The planes across one direction.
+fn along(samples: &[Vector3<f64>], reaches: &[Vec<f64>], normal: Vector3<f64>, whole: f64) -> Vec<Promise> {
+    let heights: Vec<f64> = samples.iter().map(|x| normal.dot(x)).collect();
+    let (low, high) = heights.iter().fold((f64::MAX, f64::MIN), |(low, high), &h| (low.min(h), high.max(h)));
+    let step = (high - low) / (HEIGHTS + 1) as f64;
+    // For each layer between two planes how far it reaches along each probe, and the sample that does.
+    let nothing = vec![(f64::NEG_INFINITY, 0); reaches.first().map_or(0, Vec::len)];
+    let mut layers = vec![nothing.clone(); HEIGHTS + 1];
+    for (sample, height) in heights.iter().enumerate() {
+        let layer = &mut layers[(((height - low) / step) as usize).min(HEIGHTS)];
+        for (best, &reach) in layer.iter_mut().zip(&reaches[sample]) {
+            if reach > best.0 {
+                *best = (reach, sample);
+            }
+        }
+    }
+    // Hulls of all layers up to each plane.
+    let volumes = |layers: &mut dyn Iterator<Item = &Vec<(f64, usize)>>| -> Vec<Option<f64>> {
+        let mut farthest = nothing.clone();
+        let up_to = |layer: &Vec<(f64, usize)>| {
+            farthest.iter_mut().zip(layer).for_each(|(best, one)| {
+                if one.0 > best.0 {
+                    *best = *one;
+                }
+            });
+            let mut corners: Vec<usize> =
+                farthest.iter().filter(|best| best.0.is_finite()).map(|best| best.1).collect();
+            corners.sort_unstable();
+            corners.dedup();
+            rough_volume(&corners.into_iter().map(|sample| samples[sample]).collect::<Vec<_>>())
+        };
+        layers.map(up_to).collect()
+    };
+    let below = volumes(&mut layers.iter());
+    let above = volumes(&mut layers.iter().rev());
+    let promise = |plane: usize| {
+        let gain = whole - below[plane]? - above[HEIGHTS - 1 - plane]?;
+        Some(Promise { normal, height: low + step * (plane + 1) as f64, gain })
+    };
+    (0..HEIGHTS).filter_map(promise).collect()
+}
+
+/// The corners of a piece, and points along its long edges, which planes may cut.
+fn samples(piece: &Piece) -> Vec<Vector3<f64>> {
+    let mut samples = points(piece);
+    let (low, high) = samples
+        .iter()
+        .fold((Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)), |(low, high), x| (low.inf(x), high.sup(x)));
+    let spacing = SPACING * (high - low).norm();
+    for triangle in piece.triangles() {
+        for (a, b) in [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (triangle[i], triangle[j])) {
+            let (p, q) = (samples[a], samples[b]);
+            // Most edges are passed both ways.
+            let count = if a < b { ((q - p).norm() / spacing) as usize } else { 0 };
+            samples.extend((1..=count).map(|k| p + (q - p) * (k as f64 / (count + 1) as f64)));
+        }
+    }
+    let every = samples.len().div_ceil(MAX_SAMPLES);
+    samples.into_iter().step_by(every).collect()
+}

@@ -1,0 +1,277 @@
+//! Fits of every mesh of the test data and of clouds of points that break fits: a proven body, or an error with the reason.
+
+use nalgebra::Vector3;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+use sublevel_core::body::{Body, Compound, Covered};
+use sublevel_fit::{
+    Fit, FitError, FitOptions, HullError, Progress, ReadOptions, fit, fit_parts, read_mesh, thicken, trim,
+};
+use sublevel_testkit::Seeded;
+
+/// A fit of a few hundred points that takes longer hangs.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Stops a fit that hangs, which then fails as cancelled.
+fn patient() -> impl FnMut(Progress) -> ControlFlow<()> {
+    let start = Instant::now();
+    move |_| if start.elapsed() > PATIENCE { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+}
+
+fn fitted(points: &[Vector3<f64>], degree: usize) -> Result<Fit, FitError> {
+    let options = FitOptions { degree, ..FitOptions::default() };
+    fit("cloud", points, &options, &mut patient())
+}
+
+/// What its file says alone proves that a body holds the points.
+fn prove(fit: &Fit, points: &[Vector3<f64>], what: &str) {
+    let again = Body::from_json(&fit.body.to_json()).unwrap_or_else(|error| panic!("{what}: {error}"));
+    again.prove_contains(points).unwrap_or_else(|error| panic!("{what}: {error}"));
+    let report = &fit.report;
+    let (volume, hull) = (report.volume_m3 + report.volume_error_m3, report.hull_volume_m3);
+    assert!(volume >= hull * (1.0 - 1e-6), "{what}: {volume} m³ around a hull of {hull}");
+}
+
+fn files(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("SUBLEVEL_DATA is readable").map(|entry| entry.unwrap().path()) {
+        match entry.extension().and_then(|extension| extension.to_str()) {
+            // Those have tests of their own.
+            _ if entry.ends_with("faults") => {}
+            _ if entry.is_dir() => files(&entry, found),
+            Some("off" | "obj" | "ply" | "stl") => found.push(entry),
+            _ => {}
+        }
+    }
+}
+
+/// All mesh files of the test data, in order.
+fn meshes() -> Vec<PathBuf> {
+    let Some(folder) = std::env::var_os("SUBLEVEL_DATA") else {
+        eprintln!("skipped: SUBLEVEL_DATA does not name the folder with the meshes");
+        return Vec::new();
+    };
+    let mut found = Vec::new();
+    files(Path::new(&folder), &mut found);
+    found.sort();
+    assert!(found.len() >= 29, "{} meshes in SUBLEVEL_DATA", found.len());
+    found
+}
+
+#[test]
+fn every_mesh_becomes_a_body() {
+    for path in meshes() {
+        let mesh = read_mesh(&path, &ReadOptions::default()).unwrap().mesh;
+        for degree in [2, 4, 6] {
+            let what = format!("{}, degree {degree}", path.display());
+            let fit = fitted(&mesh.points, degree).unwrap_or_else(|error| panic!("{what}: {error}"));
+            println!(
+                "{what}: {:.2} s, volume over hull {:.3}",
+                fit.report.seconds,
+                fit.report.volume_m3 / fit.report.hull_volume_m3
+            );
+            prove(&fit, &mesh.points, &what);
+        }
+    }
+}
+
+#[test]
+fn every_mesh_becomes_a_compound() {
+    for path in meshes() {
+        let what = path.display();
+        let mesh = read_mesh(&path, &ReadOptions::default()).unwrap().mesh;
+        let options = FitOptions { degree: 4, ..FitOptions::default() };
+        let compound = fit_parts("mesh", &mesh, 4, &options, &mut patient())
+            .unwrap_or_else(|error| panic!("{what}: {error}"))
+            .compound;
+        let again = Compound::from_json(&compound.to_json()).unwrap_or_else(|error| panic!("{what}: {error}"));
+        let covering = again.covering().expect("fits note what they cover");
+        let (covered, most) = again
+            .prove_covers(&mesh.points, &mesh.triangles, &covering.cuts)
+            .unwrap_or_else(|error| panic!("{what}: {error}"));
+        println!("{what}: {} parts, {covered:?}, volume {:.4e} m³", again.parts().len(), again.volume().volume_m3);
+        assert!(covered == covering.proven && most <= 1.0, "{what}");
+        let closed = ["10.off", "101.off", "spot.off", "torus.off", "hand_closed.off"];
+        let closed = path.file_name().is_some_and(|name| closed.iter().any(|known| name == *known));
+        assert!(!closed || covered == Covered::Interior, "{what} is closed");
+    }
+}
+
+/// What must come of a cloud.
+#[derive(Debug)]
+enum Must {
+    /// A body: nothing is wrong with it.
+    Fit,
+    /// The error that it is flat or has too few points.
+    Refuse,
+    /// Either.
+    Decide,
+}
+
+const KINDS: u64 = 10;
+
+/// A cloud of one of the kinds.
+fn cloud(seed: u64) -> (&'static str, Vec<Vector3<f64>>, Must) {
+    let mut random = Seeded(seed);
+    let count = 20 + random.index(400);
+    let turn = random.rotation();
+    let stretch = Vector3::from_fn(|_, _| random.between(0.2, 1.0));
+    let mut solid: Vec<Vector3<f64>> = (0..count).map(|_| turn * random.unit().component_mul(&stretch)).collect();
+    let normal = turn * Vector3::z();
+    let flat = |x: &Vector3<f64>| x - normal * normal.dot(x);
+    match seed % KINDS {
+        0 => ("coplanar", solid.iter().map(flat).collect(), Must::Refuse),
+        1 => {
+            let thickness = random.between(1e-12, 1e-3);
+            let points = solid.iter().map(|x| flat(x) + normal * (thickness * random.signed())).collect();
+            ("nearly coplanar", points, if thickness > 1e-5 { Must::Fit } else { Must::Decide })
+        }
+        2 => {
+            let noise = if random.index(2) == 0 { 0.0 } else { random.between(1e-12, 1e-3) };
+            let points = (0..count).map(|_| normal * random.signed() + random.unit() * noise).collect();
+            (
+                "collinear",
+                points,
+                if noise > 1e-4 {
+                    Must::Fit
+                } else if noise == 0.0 {
+                    Must::Refuse
+                } else {
+                    Must::Decide
+                },
+            )
+        }
+        3 => {
+            let few: Vec<_> = solid.iter().copied().take(4 + random.index(20)).collect();
+            ("duplicates", (0..20 * few.len()).map(|_| few[random.index(few.len())]).collect(), Must::Decide)
+        }
+        4 => {
+            let few = random.index(4);
+            ("at most three points", solid.iter().copied().take(few).collect(), Must::Refuse)
+        }
+        5 => {
+            let away = random.unit() * random.between(1e3, 1e16);
+            let kept = away.norm() < 1e6;
+            ("far off centre", solid.iter().map(|x| x + away).collect(), if kept { Must::Fit } else { Must::Decide })
+        }
+        6 => {
+            let scale = random.between(1e-12, 1e12);
+            ("tiny or huge", solid.iter().map(|x| x * scale).collect(), Must::Fit)
+        }
+        7 => {
+            for _ in 0..1 + random.index(5) {
+                let place = random.index(solid.len());
+                solid[place] = random.unit() * random.between(10.0, 1e5);
+            }
+            ("outliers", solid, Must::Decide)
+        }
+        8 => {
+            let shape: Vec<_> = (0..8_u8)
+                .map(|i| turn * Vector3::from_fn(|k, _| if i >> k & 1 == 1 { stretch[k] } else { -stretch[k] }))
+                .collect();
+            ("corners of a box, perhaps with points on its faces", with_mixtures(&mut random, shape), Must::Fit)
+        }
+        _ => {
+            let needle = random.between(1e-5, 1e-2);
+            let squeeze = Vector3::new(1.0, needle, random.between(1.0, 10.0) * needle);
+            let inverse = turn.inverse();
+            let points = solid.iter().map(|x| turn * (inverse * x).component_mul(&squeeze)).collect();
+            ("needle", points, Must::Fit)
+        }
+    }
+}
+
+/// Points with mixtures of two of them.
+fn with_mixtures(random: &mut Seeded, mut points: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
+    let corners = points.len();
+    for _ in 0..random.index(3) * 100 {
+        let (a, b) = (points[random.index(corners)], points[random.index(corners)]);
+        points.push(a + (b - a) * random.positive());
+    }
+    points
+}
+
+fn clouds(seeds: std::ops::Range<u64>) {
+    let mut bodies = 0;
+    for seed in seeds.clone() {
+        let (kind, points, must) = cloud(seed);
+        // Every degree meets every kind.
+        let degree = [2, 4, 6, 2, 4, 8][(seed / KINDS % 6) as usize];
+        let what = format!("seed {seed}, {kind}, {} points, degree {degree}", points.len());
+        match fitted(&points, degree) {
+            Ok(fit) => {
+                prove(&fit, &points, &what);
+                bodies += 1;
+                assert!(!matches!(must, Must::Refuse), "{what}: was fitted");
+            }
+            Err(error) => {
+                println!("{what}: {error}");
+                assert_ne!(error, FitError::Cancelled, "{what} hangs");
+                assert!(!matches!(must, Must::Fit), "{what}: {error}");
+                if matches!(must, Must::Refuse) {
+                    let reason = matches!(error, FitError::TooFewPoints(_) | FitError::Hull(HullError::Flat { .. }));
+                    assert!(reason, "{what}: {error}");
+                }
+            }
+        }
+    }
+    println!("{bodies} bodies of {} clouds", seeds.count());
+    assert!(bodies > 0);
+}
+
+#[test]
+fn family_26_first_quarter() {
+    clouds(0..50);
+}
+
+#[test]
+fn family_26_second_quarter() {
+    clouds(50..100);
+}
+
+#[test]
+fn family_26_third_quarter() {
+    clouds(100..150);
+}
+
+#[test]
+fn family_26_fourth_quarter() {
+    clouds(150..200);
+}
+
+#[test]
+fn family_26_remedies_work() {
+    for seed in 0..20 {
+        // What the errors advise: a thickness for flat points, trimming for outliers.
+        let (_, flat, _) = cloud(KINDS * seed);
+        let thick = thicken(&flat, 1e-3);
+        prove(&fitted(&thick, 4).unwrap_or_else(|error| panic!("seed {seed}: {error}")), &flat, "thickened");
+
+        let (_, outliers, _) = cloud(KINDS * seed + 7);
+        let fraction = 5.5 / outliers.len() as f64;
+        let trimmed = trim(&outliers, fraction, &mut patient()).unwrap_or_else(|error| panic!("seed {seed}: {error}"));
+        let fit = fitted(&trimmed.kept, 4).unwrap_or_else(|error| panic!("seed {seed}: {error}"));
+        prove(&fit, &trimmed.kept, "trimmed");
+        assert!(
+            trimmed.farthest_m > 1.0,
+            "seed {seed}: the outliers are among the {} left out",
+            trimmed.left_out.len()
+        );
+        assert!(fit.body.circumscribed().radius < 5.0, "seed {seed}: {}", fit.body.circumscribed().radius);
+    }
+}
+
+#[test]
+fn family_26_a_million_points() {
+    let mut random = Seeded(26);
+    let points: Vec<_> = (0..1_000_000)
+        .map(|_| {
+            let u = random.unit();
+            // The surface of a rounded box, with noise.
+            u / u.map(|v| v.abs().powi(8)).sum().powf(0.125) * (1.0 + 1e-3 * random.signed())
+        })
+        .collect();
+    let fit = fitted(&points, 4).unwrap();
+    println!("{:.2} s, volume over hull {:.4}", fit.report.seconds, fit.report.volume_m3 / fit.report.hull_volume_m3);
+    prove(&fit, &points, "a million points");
+}

@@ -1,0 +1,197 @@
+//! The bodies of the catalogue: `E`, `Q2k`, `C2k`, `P2k`, `B`, cylinders, and fitted ones.
+
+use nalgebra::{DMatrix, Matrix3, Vector3};
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
+use sublevel_core::body::{Body, Constraint, Normalization};
+use sublevel_core::measure::Pose;
+use sublevel_core::polynomial::{Exponents, HessianGram, HessianMonomial, Polynomial, degree_of, monomials};
+
+/// A body at its pose.
+pub type Placed<'a> = (&'a Body, &'a Pose);
+
+/// E: ellipsoid with these half-axes.
+pub fn e(x: f64, y: f64, z: f64) -> Body {
+    Body::ellipsoid("E", Vector3::zeros(), Vector3::new(x, y, z)).unwrap()
+}
+
+/// Q2k: `(x/a)^degree + (y/b)^degree + (z/c)^degree <= 1`.
+pub fn q(degree: u8, x: f64, y: f64, z: f64) -> Body {
+    Body::superellipsoid(&format!("Q{degree}"), Vector3::zeros(), Vector3::new(x, y, z), degree).unwrap()
+}
+
+/// C2k: `((x² + y²)/r²)^k + (z/h)^2k <= 1`, degree 2k.
+pub fn c(degree: u8, radius: f64, half_height: f64) -> Body {
+    let half = usize::from(degree / 2);
+    let mut terms = Vec::new();
+    for i in 0..=half {
+        terms.push(([2 * i as u8, 2 * (half - i) as u8, 0], binomial(half, i)));
+    }
+    terms.push(([0, 0, degree], 1.0));
+    // The Hessian form of |u|^2k, u = (x, y), is 2k |u|^(2k-2) |w|² + 4k(k-1) |u|^(2k-4) (u·w)²: definite on w_i u^e.
+    let basis: Vec<_> = (0..2)
+        .flat_map(|d| (0..half).map(move |i| (d, [i as u8, (half - 1 - i) as u8, 0])))
+        .chain([(2, [0, 0, degree / 2 - 1])])
+        .map(|(direction, exponents)| HessianMonomial { direction, exponents })
+        .collect();
+    let n = basis.len();
+    let (k, mut gram) = (half as f64, DMatrix::zeros(n, n));
+    for (i, b) in basis.iter().enumerate().take(n - 1) {
+        gram[(i, i)] += 2.0 * k * binomial(half - 1, usize::from(b.exponents[0]));
+    }
+    gram[(n - 1, n - 1)] = f64::from(degree) * f64::from(degree - 1);
+    for j in 0..half.saturating_sub(1) {
+        // (u·w) u^e with |e| = k - 2: the weight of u^2e in |u|^(2k-4).
+        let e = [j as u8, (half - 2 - j) as u8, 0];
+        let w: Vec<f64> = basis
+            .iter()
+            .map(|b| {
+                let mut raised = e;
+                raised[usize::from(b.direction)] += 1;
+                f64::from(u8::from(b.direction < 2 && b.exponents == raised))
+            })
+            .collect();
+        let factor = 4.0 * k * (k - 1.0) * binomial(half - 2, j);
+        gram += DMatrix::from_fn(n, n, |i, j| factor * w[i] * w[j]);
+    }
+    let constraint = certified(terms, basis, gram);
+    let linear = Matrix3::from_diagonal(&Vector3::new(1.0 / radius, 1.0 / radius, 1.0 / half_height));
+    Body::new(&format!("C{degree}"), Normalization { center: Vector3::zeros(), linear }, vec![constraint]).unwrap()
+}
+
+/// P2k: `Σ (a_i·x)^degree <= 1` with the a_i along the axes and the diagonals of a cube, of the given half-width.
+pub fn p(degree: u8, size: f64) -> Body {
+    let third = 1.0 / 3.0_f64.sqrt();
+    let mut directions = vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    directions
+        .extend([[1.0, 1.0, 1.0], [-1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, -1.0]].map(|d| d.map(|c| c * third)));
+    let power = |a: &[f64; 3], e: Exponents| {
+        let n = degree_of(e);
+        let multinomial = factorial(n) / e.iter().map(|&k| factorial(usize::from(k))).product::<f64>();
+        multinomial * (0..3).map(|i| a[i].powi(i32::from(e[i]))).product::<f64>()
+    };
+    let mut coefficients: BTreeMap<Exponents, f64> = BTreeMap::new();
+    for e in monomials(usize::from(degree)).into_iter().filter(|&e| degree_of(e) == usize::from(degree)) {
+        let sum = directions.iter().map(|a| power(a, e)).sum();
+        coefficients.insert(e, sum);
+    }
+    let half = usize::from(degree / 2);
+    let basis: Vec<_> = (0..3)
+        .flat_map(|direction| {
+            let of_z = monomials(half - 1).into_iter().filter(move |&e| degree_of(e) == half - 1);
+            of_z.map(move |exponents| HessianMonomial { direction, exponents })
+        })
+        .collect();
+    let n = basis.len();
+    let scale = f64::from(degree) * f64::from(degree - 1);
+    let mut gram = DMatrix::zeros(n, n);
+    for a in &directions {
+        let w: Vec<f64> = basis.iter().map(|b| a[usize::from(b.direction)] * power(a, b.exponents)).collect();
+        gram += DMatrix::from_fn(n, n, |i, j| scale * w[i] * w[j]);
+    }
+    let constraint = certified(coefficients.into_iter().collect(), basis, gram);
+    let linear = Matrix3::identity() / size;
+    Body::new(&format!("P{degree}"), Normalization { center: Vector3::zeros(), linear }, vec![constraint]).unwrap()
+}
+
+/// B: box with these half-extents.
+pub fn b(x: f64, y: f64, z: f64) -> Body {
+    Body::cuboid("B", Vector3::new(x, y, z)).unwrap()
+}
+
+pub fn cylinder(radius: f64, half_height: f64) -> Body {
+    Body::cylinder("cylinder", radius, half_height).unwrap()
+}
+
+/// A definite Gram matrix from a semidefinite one: alternating projections onto the matrices of the form and onto those with
+/// eigenvalues above a floor.
+fn certified(terms: Vec<(Exponents, f64)>, basis: Vec<HessianMonomial>, mut matrix: DMatrix<f64>) -> Constraint {
+    let polynomial = Polynomial::new(terms).unwrap();
+    let floor = 1e-3 * matrix.trace() / matrix.nrows() as f64;
+    for _ in 0..5000 {
+        let gram = HessianGram::nearest(&polynomial, basis.clone(), matrix).unwrap();
+        if gram.prove(&polynomial).is_ok() {
+            return Constraint { polynomial, gram };
+        }
+        let mut split = gram.matrix().clone().symmetric_eigen();
+        split.eigenvalues.apply(|value| *value = value.max(floor));
+        let lifted = split.recompose();
+        matrix = (&lifted + lifted.transpose()) * 0.5;
+    }
+    panic!("no definite Gram matrix was found");
+}
+
+fn factorial(n: usize) -> f64 {
+    (1..=n).map(|i| i as f64).product()
+}
+
+fn binomial(n: usize, k: usize) -> f64 {
+    factorial(n) / (factorial(k) * factorial(n - k))
+}
+
+/// Support function `max n·x` in the body frame in closed form, for E, Q2k, C2k, boxes and cylinders about their origin: the
+/// norm dual to the body's own.
+pub fn support(body: &Body, n: &Vector3<f64>) -> f64 {
+    let sizes = body.normalization().linear.diagonal().map(|l| 1.0 / l);
+    let m = n.component_mul(&sizes).abs();
+    let wall = m.x.hypot(m.y);
+    let dual = |values: &[f64]| {
+        let q = body.degree() as f64 / (body.degree() as f64 - 1.0);
+        let most = values.iter().fold(0.0_f64, |most, &value| most.max(value));
+        most * values.iter().map(|value| (value / most).powf(q)).sum::<f64>().powf(1.0 / q)
+    };
+    match body.name().as_bytes()[0] {
+        b'B' => m.sum(),
+        b'C' => dual(&[wall, m.z]),
+        b'c' => wall + m.z,
+        _ => dual(&[m.x, m.y, m.z]),
+    }
+}
+
+/// Fitted bodies: a chair and a human at degrees 2, 4 and 6, as `sublevel-fit` makes them of its sample shapes (a test there
+/// compares). Reading them proves them again.
+pub fn fitted() -> &'static [Body] {
+    static BODIES: OnceLock<Vec<Body>> = OnceLock::new();
+    BODIES.get_or_init(|| {
+        let files = [
+            include_str!("../bodies/chair-d2.json"),
+            include_str!("../bodies/human-d2.json"),
+            include_str!("../bodies/chair-d4.json"),
+            include_str!("../bodies/human-d4.json"),
+            include_str!("../bodies/chair-d6.json"),
+            include_str!("../bodies/human-d6.json"),
+        ];
+        files.map(|file| Body::from_json(file).expect("a proven body")).into()
+    })
+}
+
+/// One of each kind, of sizes about 1.
+pub fn zoo() -> Vec<Body> {
+    let mut zoo =
+        vec![e(1.0, 0.7, 0.4), b(0.6, 0.9, 0.3), cylinder(0.5, 0.8), c(4, 0.5, 1.0), c(6, 0.8, 0.3), c(8, 1.0, 0.7)];
+    zoo.extend([4, 6, 8].map(|degree| q(degree, 0.8, 0.5, 1.1)));
+    zoo.extend([4, 6, 8].map(|degree| p(degree, 0.7)));
+    zoo.extend_from_slice(fitted());
+    zoo
+}
+
+#[test]
+fn every_kind_can_be_built() {
+    for body in zoo() {
+        println!("{} degree {} radius {}", body.name(), body.degree(), body.circumscribed().radius);
+    }
+}
+
+#[test]
+fn closed_supports_are_supports() {
+    let mut random = crate::random::Seeded(1);
+    for body in zoo().iter().filter(|body| !body.name().starts_with(['F', 'P'])) {
+        for _ in 0..20 {
+            let n = random.unit();
+            let most = body.boundary().iter().map(|x| n.dot(x)).fold(f64::MIN, f64::max);
+            let closed = support(body, &n);
+            let radius = body.circumscribed().radius;
+            assert!(most <= closed + 1e-12 && closed - most < 0.25 * radius, "{}: {most} {closed}", body.name());
+        }
+    }
+}
