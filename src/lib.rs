@@ -14,10 +14,10 @@ pub use sublevel_core::{body, measure, optimize, polynomial};
 pub use sublevel_fit as fit;
 pub use sublevel_scene as scene;
 
-pub mod chart;
 pub mod cli;
-#[cfg(feature = "chart")]
+#[cfg(feature = "fit")]
 pub mod demo;
+pub mod draw;
 #[cfg(feature = "fit")]
 pub mod jobs;
 pub mod service;

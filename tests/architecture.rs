@@ -1,12 +1,13 @@
-//! Keeps the rooms of the house apart: who may import whom, and which words belong to one room only.
+//! Keeps the layers of the code apart: which may import which, and which words belong to one layer only.
 //!
-//! The sources are read as text, with comments, literals and test modules blanked out, and every path that starts at
-//! `crate::` (or climbs out of a room with `super::`) is held against the table of allowed directions.
+//! Cargo keeps the directions between crates; this test keeps those between the folders of `sublevel-core` and of `sublevel`.
+//! The sources are read as text, with comments, literals and test modules blanked out, and every path that starts at `crate::`
+//! or at one of the crates (or climbs out of a layer with `super::`) is held against the table of allowed directions.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// For each room (folder or file of `src/`), the rooms it may import.
+/// For each layer (a folder or file of `crates/core/src` or `src`, or a crate), the layers it may import.
 const DIRECTIONS: &[(&str, &[&str])] = &[
     ("polynomial", &[]),
     ("optimize", &[]),
@@ -18,15 +19,19 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
     ("store", &["body", "scene", "measure"]),
     ("jobs", &["fit", "store", "body"]),
     ("service", &["jobs", "store", "scene", "measure", "body"]),
-    ("chart", &["fit", "measure", "body", "polynomial", "optimize"]),
+    ("draw", &["body", "optimize"]),
     ("demo", ANY),
     ("cli", ANY),
 ];
 
 const ANY: &[&str] =
-    &["polynomial", "optimize", "body", "measure", "fit", "scene", "store", "jobs", "service", "chart", "demo"];
+    &["polynomial", "optimize", "body", "measure", "fit", "scene", "store", "jobs", "service", "draw", "demo"];
 
-/// Words that one room (or a few) may name, and no other: wire formats, bytes on disk.
+/// Where the layers lie: folders whose entries are layers, and crates that are one.
+const SOURCES: [(&str, Option<&str>); 4] =
+    [("crates/core/src", None), ("crates/fit/src", Some("fit")), ("crates/scene/src", Some("scene")), ("src", None)];
+
+/// Words that one layer (or a few) may name, and no other: wire formats, bytes on disk.
 const PRIVATE_WORDS: &[(&str, &[&str])] = &[
     ("prost", &["service"]),
     ("tonic", &["service"]),
@@ -36,10 +41,10 @@ const PRIVATE_WORDS: &[(&str, &[&str])] = &[
     ("tonic_types", &["service"]),
     ("redb", &["store"]),
     ("clarabel", &["fit"]),
-    ("plotters", &["chart"]),
+    ("plotters", &["draw"]),
 ];
 
-/// Words that a room may not name: `measure` knows neither clock nor allocator nor threads.
+/// Words that a layer may not name: `measure` knows neither clock nor allocator nor threads.
 const FORBIDDEN_WORDS: &[(&str, &[&str])] = &[(
     "measure",
     &[
@@ -61,80 +66,89 @@ const FORBIDDEN_WORDS: &[(&str, &[&str])] = &[(
 )];
 
 #[test]
-fn every_room_keeps_to_its_directions() {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut complaints = Vec::new();
-    for file in rust_files(&source) {
-        let inside = file.strip_prefix(&source).expect("the walk starts there");
-        let room = room_of(inside);
-        if ["lib", "main"].contains(&room.as_str()) || is_test_file(inside) {
-            continue;
+fn every_layer_keeps_to_its_directions() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut violations = Vec::new();
+    for (folder, name) in SOURCES {
+        let source = root.join(folder);
+        for file in rust_files(&source) {
+            let inside = file.strip_prefix(&source).expect("the walk starts there");
+            let layer = name.map_or_else(|| layer_of(inside), str::to_owned);
+            if ["lib", "main"].contains(&layer.as_str()) || is_test_file(inside) {
+                continue;
+            }
+            let text = fs::read_to_string(&file).expect("a source file is readable");
+            let found = check(&layer, &text, &siblings_of(&file));
+            violations.extend(found.into_iter().map(|what| format!("{folder}/{}: {what}", inside.display())));
         }
-        let text = fs::read_to_string(&file).expect("a source file is readable");
-        let siblings = siblings_of(&file);
-        complaints
-            .extend(check(&room, &text, &siblings).into_iter().map(|what| format!("src/{}: {what}", inside.display())));
     }
-    assert!(complaints.is_empty(), "\n{}", complaints.join("\n"));
+    assert!(violations.is_empty(), "\n{}", violations.join("\n"));
 }
 
 #[test]
 fn a_violation_is_found() {
-    let found = |room: &str, text: &str| !check(room, text, &[]).is_empty();
+    let found = |layer: &str, text: &str| !check(layer, text, &[]).is_empty();
     assert!(found("polynomial", "use crate::body::Body;"));
     assert!(found("body", "fn f() { crate::measure::distance() }"));
-    assert!(found("measure", "use crate::{body::Body, fit::{self, Options}};"));
+    assert!(found("measure", "use crate::{body::Body, optimize::{self, Options}}; use sublevel_fit::fit;"));
     assert!(found("store", "use super::service::wire;"));
     assert!(found("fit", "use sublevel::service::Server;"));
+    assert!(found("fit", "use sublevel_core::measure::distance;"));
+    assert!(found("scene", "use sublevel_core::{body::Body, polynomial::Jet};"));
     assert!(found("scene", "fn f(status: tonic::Status) {}"));
     assert!(found("service", "let table = redb::Database::open(path);"));
     assert!(found("measure", "let list: Vec<f64> = Vec::new();"));
     assert!(found("measure", "let start = std::time::Instant::now();"));
     assert!(found("measure", "use std::{thread, f64};"));
-    assert!(found("newcomer", "fn f() {}"), "a room that the table does not know is a violation");
+    assert!(found("newcomer", "fn f() {}"), "a layer that the table does not know is a violation");
 }
 
 #[test]
 fn what_is_allowed_passes() {
-    let clean = |room: &str, text: &str| assert_eq!(check(room, text, &[]), Vec::<String>::new());
+    let clean = |layer: &str, text: &str| assert_eq!(check(layer, text, &[]), Vec::<String>::new());
     clean("measure", "use crate::{body::{Body, Ball}, polynomial::Jet, measure::Pose};");
     clean("measure", "// Vec and String in a comment\n/* crate::fit */ const NAME: &str = \"Vec crate::fit\";");
     clean("measure", "#[cfg(test)]\nmod tests { use crate::fit::fit; fn f() { vec![1]; } }");
     clean("measure", "fn f<'a>(quote: char) -> bool { quote == '\"' || quote == '\\'' }");
+    clean("fit", "use sublevel_core::{body::Body, polynomial::Jet}; use crate::hull;");
     clean("service", "use tonic::Status; use crate::store::Catalogue;");
-    // A file of the same room may bear the name of another room.
+    // A file of the same layer may bear the name of another layer.
     assert!(check("service", "use super::store::table;", &["store".into()]).is_empty());
 }
 
-/// Everything wrong with one file of `room`; `siblings` are the modules that lie beside it in the same room.
-fn check(room: &str, text: &str, siblings: &[String]) -> Vec<String> {
+/// Everything wrong with one file of a layer; `siblings` are the modules that lie beside it in the same layer.
+fn check(layer: &str, text: &str, siblings: &[String]) -> Vec<String> {
     let code = without_tests(&without_comments_and_literals(text));
-    let Some((_, allowed)) = DIRECTIONS.iter().find(|(name, _)| *name == room) else {
-        return vec![format!("room {room} has no row in the table of directions")];
+    let Some((_, allowed)) = DIRECTIONS.iter().find(|(name, _)| *name == layer) else {
+        return vec![format!("layer {layer} has no row in the table of directions")];
     };
-    let is_room = |name: &str| DIRECTIONS.iter().any(|(room, _)| *room == name);
-    let mut complaints = Vec::new();
-    for name in names_after(&code, "crate::").into_iter().chain(names_after(&code, "sublevel::")) {
-        if is_room(&name) && name != room && !allowed.contains(&name.as_str()) {
-            complaints.push(format!("{room} may not import {name}"));
+    let is_layer = |name: &str| DIRECTIONS.iter().any(|(layer, _)| *layer == name);
+    let words: Vec<&str> = code.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
+    let mut imports: Vec<String> =
+        ["crate::", "sublevel::", "sublevel_core::"].iter().flat_map(|prefix| names_after(&code, prefix)).collect();
+    let crates = [("sublevel_fit", "fit"), ("sublevel_scene", "scene")];
+    imports.extend(crates.iter().filter(|(word, _)| words.contains(word)).map(|(_, layer)| (*layer).to_owned()));
+    let mut violations = Vec::new();
+    for name in imports {
+        if is_layer(&name) && name != layer && !allowed.contains(&name.as_str()) {
+            violations.push(format!("{layer} may not import {name}"));
         }
     }
     for name in names_after(&code, "super::") {
-        if is_room(&name) && name != room && !siblings.contains(&name) {
-            complaints.push(format!("{room} reaches {name} through super; write crate::{name}"));
+        if is_layer(&name) && name != layer && !siblings.contains(&name) {
+            violations.push(format!("{layer} reaches {name} through super; write crate::{name}"));
         }
     }
-    let words: Vec<&str> = code.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
-    for (word, rooms) in PRIVATE_WORDS {
-        if words.contains(word) && !rooms.contains(&room) {
-            complaints.push(format!("only {} may name {word}", rooms.join(", ")));
+    for (word, layers) in PRIVATE_WORDS {
+        if words.contains(word) && !layers.contains(&layer) {
+            violations.push(format!("only {} may name {word}", layers.join(", ")));
         }
     }
-    for (_, forbidden) in FORBIDDEN_WORDS.iter().filter(|(name, _)| *name == room) {
+    for (_, forbidden) in FORBIDDEN_WORDS.iter().filter(|(name, _)| *name == layer) {
         let named = forbidden.iter().filter(|word| words.contains(word));
-        complaints.extend(named.map(|word| format!("{room} may not name {word}")));
+        violations.extend(named.map(|word| format!("{layer} may not name {word}")));
     }
-    complaints
+    violations
 }
 
 /// First path segments after each `prefix`, those of a braced group one by one.
@@ -279,7 +293,7 @@ fn rust_files(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// `measure/pose.rs` and `measure.rs` both belong to `measure`.
-fn room_of(inside: &Path) -> String {
+fn layer_of(inside: &Path) -> String {
     let first = inside.iter().next().expect("the path of a file is not empty");
     Path::new(first).file_stem().expect("a file has a name").to_string_lossy().into_owned()
 }
@@ -288,7 +302,7 @@ fn is_test_file(inside: &Path) -> bool {
     inside.iter().any(|part| part == "tests" || part == "tests.rs")
 }
 
-/// Modules beside a file in the same room; none for the room's own `mod.rs`, whose `super` is the crate.
+/// Modules beside a file in the same layer; none for its own `mod.rs`, whose `super` is the crate.
 fn siblings_of(file: &Path) -> Vec<String> {
     let is_root = file.file_name().is_some_and(|name| name == "mod.rs");
     let folder = file.parent().expect("a file lies in a folder");

@@ -4,9 +4,7 @@
 
 #[cfg(feature = "fit")]
 mod certify;
-#[cfg(feature = "chart")]
-mod chart;
-#[cfg(feature = "chart")]
+#[cfg(feature = "fit")]
 mod demo;
 #[cfg(feature = "fit")]
 mod fit;
@@ -15,8 +13,6 @@ mod group;
 mod measure;
 #[cfg(feature = "fit")]
 mod mesh;
-#[cfg(feature = "chart")]
-mod messages;
 mod push;
 mod serve;
 mod show;
@@ -31,7 +27,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 /// What a command returns: whether what it was asked to check holds, or the error to print.
-type Outcome = Result<bool, Box<dyn Error>>;
+pub type Outcome = Result<bool, Box<dyn Error>>;
 
 /// Real-time collision and proximity queries on certified convex polynomial bodies
 ///
@@ -42,14 +38,11 @@ type Outcome = Result<bool, Box<dyn Error>>;
     feature = "fit",
     doc = "A first tour: 'sublevel demo'. With meshes of your own: 'fit', then 'measure' without a server, or 'serve' and 'push'."
 )]
-#[cfg_attr(
-    not(feature = "fit"),
-    doc = "Built without the feature 'fit': 'fit', 'certify', 'demo' and 'chart' are left out."
-)]
+#[cfg_attr(not(feature = "fit"), doc = "Built without the feature 'fit': 'fit', 'certify' and 'demo' are left out.")]
 #[derive(Debug, Parser)]
 #[command(version, max_term_width = 100)]
 enum Command {
-    #[cfg(feature = "chart")]
+    #[cfg(feature = "fit")]
     Demo(demo::DemoArgs),
     #[cfg(feature = "fit")]
     Fit(fit::FitArgs),
@@ -60,8 +53,6 @@ enum Command {
     Measure(measure::MeasureArgs),
     Serve(serve::ServeArgs),
     Push(push::PushArgs),
-    #[cfg(feature = "chart")]
-    Chart(chart::ChartArgs),
 }
 
 /// Runs the command line of this process. Exit code 0: done; 1: failed, with one line on standard error, or a checked claim
@@ -69,7 +60,7 @@ enum Command {
 pub fn main() -> ExitCode {
     let done = |()| true;
     let outcome: Outcome = match Command::parse() {
-        #[cfg(feature = "chart")]
+        #[cfg(feature = "fit")]
         Command::Demo(args) => demo::run(&args).map(done).map_err(Into::into),
         #[cfg(feature = "fit")]
         Command::Fit(args) => fit::run(&args).map(done),
@@ -80,9 +71,12 @@ pub fn main() -> ExitCode {
         Command::Measure(args) => measure::run(&args).map(done),
         Command::Serve(args) => serve::run(&args).map(done).map_err(Into::into),
         Command::Push(args) => push::run(&args).map(done),
-        #[cfg(feature = "chart")]
-        Command::Chart(args) => chart::run(&args).map(done),
     };
+    exit_code(outcome)
+}
+
+/// The exit code of what a command returned, its error printed in one line on standard error.
+pub fn exit_code(outcome: Outcome) -> ExitCode {
     match outcome {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
@@ -124,8 +118,11 @@ fn one_line(text: &str) -> String {
     line
 }
 
-/// Reads a text file, naming it in the error.
-fn read(path: &Path) -> Result<String, Box<dyn Error>> {
+/// Reads a text file.
+///
+/// # Errors
+/// What the system said, with the file's name and the remedy.
+pub fn read(path: &Path) -> Result<String, Box<dyn Error>> {
     std::fs::read_to_string(path).map_err(|error| format!("{}: {error}; check the path", path.display()).into())
 }
 
@@ -140,7 +137,10 @@ fn read_shape(path: &Path) -> Result<Shape, Box<dyn Error>> {
 }
 
 /// Writes a file whole or not at all: under a temporary name beside it, then renamed.
-fn write_atomically(path: &Path, content: &str) -> Result<(), Box<dyn Error>> {
+///
+/// # Errors
+/// What the system said, with the file's name and the remedy.
+pub fn write_atomically(path: &Path, content: &str) -> Result<(), Box<dyn Error>> {
     use std::io::Write;
     let failed =
         |error: std::io::Error| format!("can not write {}: {error}; check the folder and its space", path.display());

@@ -2,7 +2,7 @@
 
 use super::{read, read_shape, sos_body, write_atomically};
 use crate::body::{Body, Compound, Shape, Solid, SosBody, Sphere};
-use crate::chart::{Ink, Outline, Panel, Silhouettes, View, boundary_points, outline};
+use crate::draw::{Ink, Outline, Panel, Silhouettes, View, boundary_points, outline};
 use serde_json::json;
 use std::error::Error;
 use std::fmt::Write as _;

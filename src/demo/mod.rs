@@ -44,7 +44,7 @@ pub enum DemoError {
     },
     /// A plot can not be drawn.
     #[error(transparent)]
-    Chart(#[from] crate::chart::ChartError),
+    Chart(#[from] crate::draw::ChartError),
 }
 
 /// Runs the demo: prints its tables to `text`, writes bodies, meshes, numbers and plots into the folder `out`.

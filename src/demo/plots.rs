@@ -3,7 +3,7 @@
 use super::sweep::{Answer, Sample, Sweep};
 use super::table::crossings;
 use crate::body::Body;
-use crate::chart::{
+use crate::draw::{
     ChartError, Ink, LineChart, Mark, Outline, Panel, Series, Silhouettes, View, boundary_points, outline,
 };
 use crate::fit::shapes::Shape;

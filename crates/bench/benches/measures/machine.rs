@@ -1,0 +1,49 @@
+//! What the figures were measured on and with.
+
+use serde::Serialize;
+use std::fs;
+use sublevel_bench::{self as bench, duel::parry_version};
+
+/// The machine and the versions, as far as they can be told.
+#[derive(Debug, Serialize)]
+pub(crate) struct Machine {
+    #[serde(flatten)]
+    this: bench::Machine,
+    parry: String,
+    coal: Option<String>,
+    /// Load average of the last minute, before and after.
+    load: [Option<f64>; 2],
+}
+
+impl Machine {
+    pub(crate) fn new(coal: Option<String>) -> Self {
+        Self { this: bench::Machine::this(), parry: parry_version(), coal, load: [load(), None] }
+    }
+
+    /// Notes the load once all is measured.
+    pub(crate) fn end(&mut self) {
+        self.load[1] = load();
+    }
+
+    /// What else ran meanwhile: with more at work than there are cores, times are not to be trusted.
+    pub(crate) fn print_load(&self) {
+        if let [Some(before), Some(after)] = self.load {
+            println!("load     {before} before, {after} after, on {} cores", self.this.cores);
+            // The bench itself is one.
+            if before.max(after) > 1.5 {
+                println!("         the machine was busy: repeat this on a quiet one before quoting it");
+            }
+        }
+    }
+
+    pub(crate) fn print(&self) {
+        let bench::Machine { cpu, cores, simd, commit, rustc, date } = &self.this;
+        println!("machine  {cpu}, {cores} cores, {simd}");
+        println!("commit   {commit}, {rustc}, on {date}");
+        println!("peers    coal {}, parry3d-f64 {}", self.coal.as_deref().unwrap_or("absent"), self.parry);
+    }
+}
+
+fn load() -> Option<f64> {
+    fs::read_to_string("/proc/loadavg").ok()?.split_whitespace().next()?.parse().ok()
+}

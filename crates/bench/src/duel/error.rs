@@ -1,0 +1,72 @@
+//! Why a figure can not be made.
+
+use super::{NoHull, PeerError, ShelfError};
+use sublevel::draw::ChartError;
+use sublevel::fit::{ReadError, hull::HullError};
+use sublevel::measure::{OptionsError, PoseError};
+
+/// Why there is no figure.
+#[derive(Debug, thiserror::Error)]
+pub enum DuelError {
+    /// A mesh can not be read.
+    #[error("{0}; name the folder that has psb/101.off and meshes/mbm_mug.off with --data")]
+    Mesh(#[from] ReadError),
+    /// A mesh has no hull.
+    #[error("{mesh}: {source}")]
+    Hull {
+        /// The mesh.
+        mesh: &'static str,
+        /// What is wrong with it.
+        source: HullError,
+    },
+    /// A representation can not be made.
+    #[error("{mesh}, {method}: {what}")]
+    Representation {
+        /// The mesh.
+        mesh: &'static str,
+        /// The representation.
+        method: String,
+        /// Why not.
+        what: String,
+    },
+    /// Fits can not be made or kept.
+    #[error(transparent)]
+    Shelf(#[from] ShelfError),
+    /// Parry makes no mesh of it.
+    #[error("{mesh}: parry makes no mesh of it: {what}")]
+    ParryMesh {
+        /// The mesh.
+        mesh: &'static str,
+        /// What it said.
+        what: String,
+    },
+    /// Parry makes no hull.
+    #[error(transparent)]
+    NoHull(#[from] NoHull),
+    /// Coal or clarabel can not be timed.
+    #[error(transparent)]
+    Peer(#[from] PeerError),
+    /// A child can not be started or heard.
+    #[error("{}: {source}", program.display())]
+    Child {
+        /// The program.
+        program: std::path::PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Messages to a server can not be timed.
+    #[error("timing messages to a server on loopback: {0}")]
+    Messages(String),
+    /// An accuracy is none.
+    #[error(transparent)]
+    Options(#[from] OptionsError),
+    /// A pose is none.
+    #[error(transparent)]
+    Pose(#[from] PoseError),
+    /// Stopped by the caller.
+    #[error("the chart was cancelled")]
+    Cancelled,
+    /// A picture failed.
+    #[error(transparent)]
+    Chart(#[from] ChartError),
+}

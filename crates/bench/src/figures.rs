@@ -1,0 +1,381 @@
+//! The figures, and the command line that makes them.
+
+use crate::accuracy::accuracy;
+use crate::cost::{Messages, cost};
+use crate::detail::detail;
+use crate::duel::Shelf;
+use crate::messages::messages;
+use crate::speed::speed;
+use crate::stability::{Earlier, Lost, Method, Share, Stability, serve, stability};
+use crate::table1::{Table1Progress, table1};
+use crate::warm::warm;
+use clap::{Args, Parser, Subcommand};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::error::Error;
+use std::io::{self, Write};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use sublevel::cli::{self, write_atomically};
+use sublevel::fit::{FitOptions, ReadOptions, fit, read_mesh};
+
+/// Measure on this machine, and draw: reports as Markdown with SVG pictures, and their raw numbers as CSV
+///
+/// Examples:
+///
+///   sublevel-bench all --data DIR --quick
+///
+///   sublevel-bench table1 --meshes psb --out docs
+#[derive(Debug, Parser)]
+#[command(name = "sublevel-bench", version, max_term_width = 100)]
+struct Arguments {
+    #[command(subcommand)]
+    figure: Figure,
+}
+
+#[derive(Debug, Subcommand)]
+enum Figure {
+    All(AllArgs),
+    Speed(SpeedArgs),
+    Warm(WarmArgs),
+    Detail(DetailArgs),
+    Stability(StabilityArgs),
+    Accuracy(AccuracyArgs),
+    Cost(CostArgs),
+    Table1(Table1Args),
+    #[command(hide = true)]
+    Fit(FitArgs),
+}
+
+/// Fit one body: what the figure of cost watches for the memory that a fit takes
+#[derive(Debug, Args)]
+struct FitArgs {
+    input: PathBuf,
+    #[arg(long)]
+    degree: usize,
+    #[arg(long)]
+    out: PathBuf,
+}
+
+/// All figures, one after the other, and charts.md, which shows the main ones and leads to the others
+///
+/// Keep the machine quiet: times are measured. Takes about three quarters of an hour on one core, and under five minutes with --quick, once the
+/// fits are kept. Clarabel and coal take part as the figures' own help says.
+#[derive(Debug, Args)]
+struct AllArgs {
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Volumes and construction times of all bounding sets around five meshes, beside the paper's Table I
+///
+/// Builds balls, boxes and bodies of every objective and degree around the meshes 10 (human), 101 (chair), 121 (octopus), 181
+/// (hand) and 361 (vase) of the Princeton Mesh Segmentation Benchmark. Writes table1.md, table1.csv and the pictures
+/// table1*.svg. Takes about five minutes on one core.
+#[derive(Debug, Args)]
+struct Table1Args {
+    /// Folder with 10.off, 101.off, 121.off, 181.off and 361.off
+    #[arg(long, value_name = "DIR")]
+    meshes: PathBuf,
+    /// Folder for the report; made with its parents when it is not there
+    #[arg(long, value_name = "DIR", default_value = "sublevel-chart")]
+    out: PathBuf,
+    /// Only up to degree 4: half a minute
+    #[arg(long)]
+    quick: bool,
+}
+
+/// Time of a distance query against model error: our representations beside hulls, simplified hulls and meshes of parry and coal
+///
+/// Pairs of the five meshes of the Princeton benchmark and of household objects. Writes speed.md, speed.csv and the pictures speed*.svg. Fits
+/// are made once and kept, which takes a few minutes on one core; measuring takes about a quarter of an hour. Coal takes part when SUBLEVEL_COAL
+/// names the program that times it.
+#[derive(Debug, Args)]
+struct SpeedArgs {
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Time and iterations of queries with a hint against how far the pose before is away; and the paper's experiment
+///
+/// Steps from a 10 000th of half the larger diameter to poses that have nothing to do with each other; then the chair swept past the human, level
+/// distances and their times beside the paper's. Writes warm.md, warm.csv and the pictures warm*.svg.
+#[derive(Debug, Args)]
+struct WarmArgs {
+    #[command(flatten)]
+    common: Common,
+}
+
+/// What each rung of the ladder buys: model error, gap, iterations, time, and how many questions it settles
+///
+/// The rungs are ball, ellipsoid and degree 4, 6, 8; the question is "nearer than m?" of random pairs, m from touching to ten object sizes. Writes
+/// detail.md, detail.csv and the pictures detail*.svg.
+#[derive(Debug, Args)]
+struct DetailArgs {
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Families of queries that broke collision libraries, put to our solver and to others: who passes
+///
+/// Touching, deep, far, tiny, needle-like, nearly parallel, badly hinted and so on: each case is drawn from its seed alone, put in a child process
+/// with a time limit, and judged by points and planes. Writes stability.md and stability.csv. Takes a few minutes. Coal takes part when
+/// SUBLEVEL_COAL names the program that times it.
+///
+/// Examples:
+///
+///   sublevel-bench stability --out docs
+///
+///   sublevel-bench stability --replay 13/cold/5
+///
+///   sublevel-bench stability --quick --methods cold,warm,batch --guard docs/stability.csv
+#[derive(Debug, Args)]
+struct StabilityArgs {
+    /// Folder for the report; made with its parents when it is not there
+    #[arg(long, value_name = "DIR", default_value = "sublevel-chart")]
+    out: PathBuf,
+    /// A tenth of the cases: under a minute
+    #[arg(long)]
+    quick: bool,
+    /// Only these columns: cold, warm, batch, newton, slsqp, clarabel, parry, coal
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    methods: Vec<Method>,
+    /// Fail, with the row named, where ours fails more often than in this stability.csv of an earlier run
+    #[arg(long, value_name = "FILE")]
+    guard: Option<PathBuf>,
+    /// Put one case here and now, and print what came of it: the number of its family, the method and the seed, FROM-TO for several
+    #[arg(long, value_name = "FAMILY/METHOD/SEED", conflicts_with_all = ["out", "quick", "guard", "methods"])]
+    replay: Option<Share>,
+    /// With --replay, print one JSON object per case
+    #[arg(long, requires = "replay")]
+    json: bool,
+}
+
+/// How near our solver and the obvious alternatives come to the distance, in how much time, and where they stop coming nearer
+///
+/// Ours cold and warm at tolerances from 1e-3 to 1e-12; plain Newton, SLSQP, level 0 of the hierarchy by clarabel, and GJK on hulls of boundary points. Clarabel
+/// takes part when `cargo build --release -p sublevel-bench --example clarabel` has made its program, or SUBLEVEL_CLARABEL names it; coal when SUBLEVEL_COAL names the program
+/// that times it. Writes accuracy.md, accuracy.csv and the pictures accuracy*.svg.
+#[derive(Debug, Args)]
+struct AccuracyArgs {
+    #[command(flatten)]
+    common: Common,
+}
+
+/// How time and memory grow: queries with degree, constraints, parts and poses of a batch, messages with their pairs, fits with degree and points
+///
+/// Chair and human of the Princeton benchmark; a server on loopback in this process; fits of up to a million random points. Exponents stand beside the curves.
+/// Writes cost.md, cost.csv and the pictures cost*.svg.
+#[derive(Debug, Args)]
+struct CostArgs {
+    #[command(flatten)]
+    common: Common,
+}
+
+/// What all figures with bodies around meshes take.
+#[derive(Debug, Args)]
+struct Common {
+    /// Folder with psb/101.off, meshes/mbm_mug.off and so on
+    #[arg(long, value_name = "DIR")]
+    data: PathBuf,
+    /// Folder for the report; made with its parents when it is not there
+    #[arg(long, value_name = "DIR", default_value = "sublevel-chart")]
+    out: PathBuf,
+    /// Folder where fits are kept between runs; delete it after changes to the fit
+    #[arg(long, value_name = "DIR", default_value = "target/bench-bodies")]
+    fits: PathBuf,
+    /// Fewer objects, representations and poses: a look, not a result
+    #[arg(long)]
+    quick: bool,
+}
+
+/// The pictures that a figure wrote, the most telling first.
+type Drawn = Result<Vec<String>, Box<dyn Error>>;
+
+/// Measures and writes a figure.
+type Run = fn(&Common) -> Drawn;
+
+/// Runs the command line of this process; exit codes as `sublevel`.
+pub fn main() -> ExitCode {
+    cli::exit_code(run(&Arguments::parse().figure).map(|()| true))
+}
+
+/// Measures and writes what is asked for.
+fn run(figure: &Figure) -> Result<(), Box<dyn Error>> {
+    let drawn = match figure {
+        Figure::All(args) => return run_all(&args.common),
+        Figure::Stability(args) => return run_stability(args),
+        Figure::Fit(args) => return run_fit(args),
+        Figure::Speed(args) => run_speed(&args.common),
+        Figure::Warm(args) => run_warm(&args.common),
+        Figure::Detail(args) => run_detail(&args.common),
+        Figure::Accuracy(args) => run_accuracy(&args.common),
+        Figure::Cost(args) => run_cost(&args.common),
+        Figure::Table1(args) => run_table1(&args.meshes, &args.out, args.quick),
+    };
+    drawn.map(drop)
+}
+
+fn run_all(args: &Common) -> Result<(), Box<dyn Error>> {
+    let figures: [(&str, &str, Run); 6] = [
+        ("speed", "Speed against accuracy", run_speed),
+        ("accuracy", "Solver accuracy against time", run_accuracy),
+        ("cost", "Cost growth", run_cost),
+        ("warm", "Warm starts", run_warm),
+        ("detail", "Detail", run_detail),
+        ("table1", "Table I of the paper", |args| run_table1(&args.data.join("psb"), &args.out, args.quick)),
+    ];
+    let flags = if args.quick { " --quick" } else { "" };
+    let mut text = format!(
+        "# Charts\n\nMade by `sublevel-bench all --data DIR{flags}`. Each report names its machine, commit and versions, and the command that makes it \
+         again alone.\n\n## Stability\n\n"
+    );
+    let found = measure_stability(&args.out, &Method::ALL, args.quick)?;
+    text += &format!("{}\n[How this was judged, and each failure](stability.md)\n", found.table());
+    for (name, title, run) in figures {
+        let drawn = run(args)?;
+        text += &format!("\n## {title}\n\n");
+        if let Some(picture) = drawn.first() {
+            text += &format!("![{title}]({picture})\n\n");
+        }
+        text += &format!("[The report]({name}.md), [the numbers]({name}.csv)\n");
+    }
+    let index = args.out.join("charts.md");
+    write_atomically(&index, &text)?;
+    writeln!(io::stdout().lock(), "{}", index.display())?;
+    Ok(())
+}
+
+fn run_fit(args: &FitArgs) -> Result<(), Box<dyn Error>> {
+    let mesh = read_mesh(&args.input, &ReadOptions::default())?.mesh;
+    let options = FitOptions { degree: args.degree, ..FitOptions::default() };
+    let body = fit("it", &mesh.points, &options, &mut |_| ControlFlow::Continue(()))?.body;
+    make_folder(&args.out)?;
+    write_atomically(&args.out.join("it.json"), &body.to_json())
+}
+
+fn run_speed(args: &Common) -> Drawn {
+    with_shelf(args, |shelf, bar| {
+        let found = speed(&args.data, shelf, args.quick, &mut |at| tell(bar, at))?;
+        write_report(&args.out, "speed", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+    })
+}
+
+fn run_warm(args: &Common) -> Drawn {
+    with_shelf(args, |shelf, bar| {
+        let found = warm(&args.data, shelf, args.quick, &mut |at| tell(bar, at))?;
+        write_report(&args.out, "warm", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+    })
+}
+
+fn run_detail(args: &Common) -> Drawn {
+    with_shelf(args, |shelf, bar| {
+        let found = detail(&args.data, shelf, args.quick, &mut |at| tell(bar, at))?;
+        write_report(&args.out, "detail", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+    })
+}
+
+fn run_accuracy(args: &Common) -> Drawn {
+    with_shelf(args, |shelf, bar| {
+        let found = accuracy(&args.data, shelf, args.quick, &mut |at| tell(bar, at))?;
+        write_report(&args.out, "accuracy", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+    })
+}
+
+fn run_cost(args: &Common) -> Drawn {
+    with_shelf(args, |shelf, bar| {
+        let mut sent = |sizes: &[usize]| messages(sizes).map_err(|error| error.to_string());
+        let program = std::env::current_exe().ok();
+        let parts: (Messages<'_>, _) = (&mut sent, program.as_deref());
+        let found = cost(&args.data, shelf, args.quick, parts, &mut |at| tell(bar, at))?;
+        write_report(&args.out, "cost", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+    })
+}
+
+/// Makes the folders, and does the work under a spinner.
+fn with_shelf(args: &Common, work: impl FnOnce(&Shelf, &ProgressBar) -> Drawn) -> Drawn {
+    make_folder(&args.out)?;
+    let shelf = Shelf::new(&args.fits)?;
+    let bar = bar()?;
+    let drawn = work(&shelf, &bar);
+    bar.finish_and_clear();
+    drawn
+}
+
+fn run_stability(args: &StabilityArgs) -> Result<(), Box<dyn Error>> {
+    if let Some(share) = &args.replay {
+        return Ok(serve(share, args.json, &mut io::stdout().lock())?);
+    }
+    // Read first: what it is for is known before the work.
+    let guard = args.guard.as_ref().map(|path| guard(path)).transpose()?;
+    let methods = if args.methods.is_empty() { &Method::ALL[..] } else { &args.methods };
+    let found = measure_stability(&args.out, methods, args.quick)?;
+    let lost = guard.map_or(Vec::new(), |earlier| found.lost_against(&earlier));
+    if lost.is_empty() {
+        return Ok(());
+    }
+    let rows = lost.iter().map(|Lost { family, method, what }| format!("family {family}, {method}: {what}"));
+    Err(rows.collect::<Vec<_>>().join("\n").into())
+}
+
+fn guard(path: &Path) -> Result<Earlier, Box<dyn Error>> {
+    cli::read(path)?.parse().map_err(|error| format!("{}: {error}", path.display()).into())
+}
+
+fn measure_stability(out: &Path, methods: &[Method], quick: bool) -> Result<Stability, Box<dyn Error>> {
+    make_folder(out)?;
+    let bar = bar()?;
+    let found = stability(&std::env::current_exe()?, methods, quick, &mut |at| tell(&bar, at))?;
+    bar.finish_and_clear();
+    write_report(out, "stability", |_| found.markdown(), &found.csv(), &[])?;
+    Ok(found)
+}
+
+fn make_folder(out: &Path) -> Result<(), Box<dyn Error>> {
+    let made = std::fs::create_dir_all(out);
+    Ok(made.map_err(|error| format!("can not make {}: {error}; choose another --out", out.display()))?)
+}
+
+fn bar() -> Result<ProgressBar, Box<dyn Error>> {
+    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+    bar.set_style(ProgressStyle::with_template("{spinner} [{elapsed_precise}] {wide_msg}")?);
+    Ok(bar)
+}
+
+fn tell(bar: &ProgressBar, at: &str) -> ControlFlow<()> {
+    bar.set_message(at.to_owned());
+    bar.tick();
+    ControlFlow::Continue(())
+}
+
+/// Writes NAME.md, NAME.csv and the pictures, and prints where the report is; tells the pictures' names.
+fn write_report(
+    out: &Path,
+    name: &str,
+    markdown: impl FnOnce(&[&str]) -> String,
+    csv: &str,
+    pictures: &[(String, String)],
+) -> Drawn {
+    let names: Vec<&str> = pictures.iter().map(|(name, _)| name.as_str()).collect();
+    let report = out.join(format!("{name}.md"));
+    write_atomically(&report, &markdown(&names))?;
+    write_atomically(&out.join(format!("{name}.csv")), csv)?;
+    for (name, svg) in pictures {
+        write_atomically(&out.join(name), svg)?;
+    }
+    writeln!(io::stdout().lock(), "{}", report.display())?;
+    Ok(names.into_iter().map(str::to_owned).collect())
+}
+
+fn run_table1(meshes: &Path, out: &Path, quick: bool) -> Drawn {
+    make_folder(out)?;
+    let bar = bar()?;
+    let table = table1(meshes, quick, &mut |progress| {
+        let Table1Progress { done, cells, at } = progress;
+        tell(&bar, &format!("{} of {cells}: {at}", done + 1))
+    })?;
+    bar.finish_and_clear();
+    let mut pictures = vec![("table1.svg".to_owned(), table.volume_against_time()?)];
+    pictures.extend(table.pictures().into_iter().map(|(name, svg)| (name.to_owned(), svg)));
+    write_report(out, "table1", |names| table.markdown(names), &table.csv(), &pictures)
+}

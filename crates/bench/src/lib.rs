@@ -1,0 +1,17 @@
+//! Measurements of Sublevel beside other libraries and solvers, as reports with pictures and raw numbers; and what its benches
+//! share. Not published: whoever uses Sublevel compiles none of it.
+
+pub mod accuracy;
+pub mod cost;
+pub mod detail;
+pub mod duel;
+pub mod figures;
+mod machine;
+mod messages;
+mod rivals;
+pub mod speed;
+pub mod stability;
+pub mod table1;
+pub mod warm;
+
+pub use machine::Machine;

@@ -1,0 +1,198 @@
+//! The report: what was measured, whether the figures hold, tables, pictures, raw numbers.
+
+use super::Speed;
+use super::front::standing;
+use super::pictures::{Timing, Truth, entries};
+use super::race::{Line, Race, Who};
+use crate::duel::parry_version;
+use std::fmt::Write;
+use sublevel::measure::DEFAULT_ACCURACY;
+
+/// The figures: mean model errors, and how many times as fast as the fastest peer of equal or better accuracy one of ours is to be.
+const FIGURES: [(f64, f64); 2] = [(0.05, 2.0), (0.03, 1.6)];
+
+const NOTES: &str = "\
+How to read this:
+
+- Model error: distance of the convex hulls (parry's GJK on all their vertices) less the distance that a representation answers, \
+relative to the larger diameter of the pair; so a thousandth is a millimetre for an object of 1 m. Where a representation overlaps although \
+the hulls do not, less minus its depth. `mesh` is the same against the distance of the triangle meshes.
+- Compounds and covers of balls contain the mesh, not its hull: they stand in the charts against meshes only.
+- Smooth motions of steps of 0.5 % of the larger diameter and one degree about each other; bodies of degree 2 and up stay apart, the closest of \
+them mostly by 2.5 to 37 % of the larger diameter. Seeds 1, 2, ... of SplitMix64, those that come too close left out. Everybody walks the same \
+poses; rows take turns; in a turn each motion is walked nine times on end (once if a query takes more than 5 µs), as coal's program does it, and the median counts, then the median of the \
+turns; one thread. Parry's meshes are asked at a few of the poses only.
+- warm: with the hint from the pose before (ours, coal's cached guess, parry's initial direction). batch: all poses of a motion in one call, each \
+solved cold. Peers have no batch and stand with the faster of their two times there.
+- Hulls of n vertices are intersections of half-spaces that touch the hull, chosen one by one to cut off what stands out farthest: they contain \
+the hull like our bodies do. An object whose hull has no more vertices keeps it. Where \
+they overlap they answer 0, so that the coarsest look a little better than they are.
+- wrong: queries in which brackets of ours exclude each other or the truth, or in which coal and parry differ by more than 1e-5 of the \
+diameter.
+";
+
+impl Speed {
+    /// The report; the pictures lie beside it under these names.
+    pub fn markdown(&self, pictures: &[&str]) -> String {
+        let mut text = String::from("# Speed against accuracy\n\n");
+        // Writing to a string can not fail.
+        let flags = if self.quick { " --quick" } else { "" };
+        let _ = writeln!(text, "{}\n", self.machine.head(&format!("sublevel-bench speed --data DIR{flags}")));
+        self.write_builds(&mut text);
+        if pictures.contains(&"speed.svg") {
+            text.push_str("![speed against accuracy](speed.svg)\n\n");
+        }
+        self.write_verdicts(&mut text);
+        let _ = writeln!(text, "{NOTES}");
+        for race in &self.races {
+            race.write(&mut text);
+            let own = format!("speed-{}", race.name);
+            for picture in pictures.iter().filter(|name| name.strip_prefix(&own).is_some_and(is_ending)) {
+                let _ = writeln!(text, "![{picture}]({picture})\n");
+            }
+        }
+        text
+    }
+
+    fn write_builds(&self, text: &mut String) {
+        let coal = self.coal.as_ref().map_or("coal did not take part (SUBLEVEL_COAL is not set)".to_owned(), |version| {
+            format!(
+                "coal {version} is the wheel from PyPI, a generic build without this machine's vector instructions, at its default tolerance \
+                 of 1e-6 m, in processes of its own"
+            )
+        });
+        let _ = writeln!(
+            text,
+            "Peers: parry3d-f64 {}, built with this program, its GJK ends at 10 roundings; {coal}. Ours: brackets of at most {DEFAULT_ACCURACY:e} \
+             of the smaller body, proven. Passes: {}.\n",
+            parry_version(),
+            self.passes
+        );
+    }
+
+    /// Whether the figures hold, pair by pair.
+    fn write_verdicts(&self, text: &mut String) {
+        let _ = writeln!(
+            text,
+            "At each error allowed, the fastest of ours and the fastest peer of equal or better accuracy:\n\n\
+             | pair | against | timing | error allowed | ours | its error | peer | times as fast | figure | | as fast as any peer of the error allowed |\n\
+             |---|---|---|---|---|---|---|---|---|---|---|"
+        );
+        let mut missed = Vec::new();
+        for race in &self.races {
+            let mut against = vec![(Truth::Hulls, "hulls", Timing::Warm, "warm")];
+            against.push((Truth::Hulls, "hulls", Timing::Cold, "cold"));
+            against.push((Truth::Hulls, "hulls", Timing::Batch, "batch"));
+            if race.is_hollow() {
+                against.push((Truth::Meshes, "meshes", Timing::Warm, "warm"));
+            }
+            for (truth, of, timing, how) in against {
+                let entries = entries(race, truth, timing);
+                for (error, figure) in FIGURES {
+                    let name = &race.name;
+                    let Some(found) = standing(&entries, error) else {
+                        let _ = writeln!(
+                            text,
+                            "| {name} | {of} | {how} | {} | none | | | | {figure} | missed | |",
+                            percent(error)
+                        );
+                        missed
+                            .push(format!("{name} ({of}, {how}) at {}: none of ours is that accurate", percent(error)));
+                        continue;
+                    };
+                    let held = found.times >= figure;
+                    if !held {
+                        missed.push(format!(
+                            "{name} ({of}, {how}) at {}: {:.2} of {figure}",
+                            percent(error),
+                            found.times
+                        ));
+                    }
+                    let _ = writeln!(
+                        text,
+                        "| {name} | {of} | {how} | {} | {} | {} | {} | {:.2} | {figure} | {} | {:.2} |",
+                        percent(error),
+                        found.ours,
+                        percent(found.error),
+                        found.peer,
+                        found.times,
+                        if held { "holds" } else { "missed" },
+                        found.allowed
+                    );
+                }
+            }
+        }
+        let holds = "The figures (2 times at 5 %, 1.6 times at 3 %) hold everywhere.".to_owned();
+        let verdict =
+            if missed.is_empty() { holds } else { format!("Where the figures are missed: {}.", missed.join("; ")) };
+        let _ = writeln!(text, "\n{verdict}\n");
+    }
+
+    /// One line per pair and representation.
+    pub fn csv(&self) -> String {
+        let mut text = String::from(
+            "pair,representation,ours,hull_error_mean,hull_error_max,hull_error_min,mesh_error_mean,mesh_error_max,mesh_error_min,warm_ns,cold_ns,\
+             batch_ns,queries,failed,overlaps,wrong,diameter_m\n",
+        );
+        for race in &self.races {
+            for Line { who, hull, mesh, cold, warm, batch, failed, overlaps, contradictions } in &race.lines {
+                let number = |v: f64| if v.is_finite() { format!("{v:e}") } else { String::new() };
+                let errors = [hull, mesh].map(|e| [e.mean, e.most, e.least].map(number).join(","));
+                let times = [*warm, *cold, *batch].map(number).join(",");
+                let Race { name, queries, diameter_m, .. } = race;
+                let ours = matches!(who, Who::Ours(_));
+                let _ = writeln!(
+                    text,
+                    "{name},\"{}\",{ours},{},{},{times},{queries},{failed},{overlaps},{contradictions},{diameter_m}",
+                    who.name(),
+                    errors[0],
+                    errors[1]
+                );
+            }
+        }
+        text
+    }
+}
+
+/// What follows a pair's name in the names of its pictures: names of pairs may begin alike.
+fn is_ending(rest: &str) -> bool {
+    [".svg", "-cold.svg", "-batch.svg", "-mesh.svg"].contains(&rest)
+}
+
+fn percent(part: f64) -> String {
+    format!("{:.2} %", 100.0 * part)
+}
+
+impl Race {
+    fn write(&self, text: &mut String) {
+        let Self { name, diameter_m, hull_vertices: [a, b], triangles: [c, d], queries, distances_m, .. } = self;
+        let [least, middle, most] = distances_m;
+        let _ = writeln!(
+            text,
+            "## {name}\n\nLarger diameter {diameter_m:.3} m; hulls of {a} and {b} vertices, meshes of {c} and {d} triangles; {queries} poses, hulls \
+             {least:.3} to {most:.3} m apart, median {middle:.3}.\n\n\
+             | representation | mean error | largest | mean mm at 1 m | mesh: mean | largest | warm ns | cold ns | batch ns | failed | overlap | wrong |\n\
+             |---|---|---|---|---|---|---|---|---|---|---|---|"
+        );
+        for line in &self.lines {
+            let time = |v: f64| if v.is_finite() { format!("{v:.0}") } else { "-".into() };
+            let _ = writeln!(
+                text,
+                "| {} | {} | {} | {:.1} | {} | {} | {} | {} | {} | {} | {} | {} |",
+                line.who.name(),
+                percent(line.hull.mean),
+                percent(line.hull.most),
+                1e3 * line.hull.mean,
+                percent(line.mesh.mean),
+                percent(line.mesh.most),
+                time(line.warm),
+                time(line.cold),
+                time(line.batch),
+                line.failed,
+                line.overlaps,
+                line.contradictions
+            );
+        }
+        text.push('\n');
+    }
+}

@@ -1,0 +1,170 @@
+//! Overlap: 16, 27.
+
+use super::super::case::{Case, CaseError, Verdict};
+use super::super::method::{Method, pose, sampled};
+use super::super::zoo::{b, c, cylinder, e, q, zoo};
+use super::{any, random, somewhere};
+use crate::duel::{Hulls, parry_pose};
+use nalgebra::Vector3;
+use sublevel::measure::{
+    Options, Pose, SignedDistance, Status, WarmStart, growth_distance, level_distance, signed_distance,
+};
+
+/// Offsets of a slide, from touching to concentric.
+const STEPS: u32 = 12;
+
+/// How near to both ends there are more of them, relative to the whole slide.
+const ENDS: [f64; 5] = [1e-3, 1e-6, 1e-9, 1e-12, 1e-15];
+
+/// Offset from the common centre, relative to the whole slide, up to which the mirrored way out is as short, and told.
+const MIRRORED: f64 = 1e-6;
+
+/// Deviation that others may have from what a signed distance does, relative to the smaller body.
+const PEER_ERROR: f64 = 1e-5;
+
+/// What is said of one place of a slide, metres.
+#[derive(Clone, Copy)]
+struct Step {
+    offset: f64,
+    value: f64,
+    lower: f64,
+    upper: f64,
+    tied: bool,
+}
+
+/// A slide from touching to concentric. About their centres the bodies are their own mirror images: the signed distance falls all the
+/// way, by no more than the motion; ours tells how well it is known, that the way out is tied where it is, and has a way out everywhere.
+pub(super) fn slide(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
+    if !matches!(method, Method::Cold | Method::Warm | Method::Parry) {
+        return Ok(None);
+    }
+    let mut random = random(16, seed);
+    let bodies = [
+        e(1.0, 0.7, 0.4)?,
+        e(0.5, 0.5, 0.5)?,
+        q(4, 0.8, 0.5, 1.1)?,
+        q(8, 1.0, 0.6, 0.3)?,
+        c(6, 0.8, 0.3)?,
+        b(0.6, 0.9, 0.3)?,
+        cylinder(0.5, 0.8)?,
+    ];
+    let (a, b) = (&bodies[random.index(7)], &bodies[random.index(7)]);
+    let (pose_a, turn, direction) = (somewhere(&mut random, 0.3)?, random.rotation(), random.direction());
+    let place = |offset: f64| pose(pose_a.translation() + direction * offset, &turn);
+    let small = a.circumscribed().radius.min(b.circumscribed().radius);
+    // The offset at which they touch.
+    let (mut inside, mut outside) = (0.0, 2.0 * (a.circumscribed().radius + b.circumscribed().radius));
+    for _ in 0..60 {
+        let middle = 0.5 * (inside + outside);
+        let case = Case::new(a, pose_a, b, place(middle)?, String::new());
+        *(if case.ours(Method::Cold)?.upper > 0.0 { &mut outside } else { &mut inside }) = middle;
+    }
+    let hulls = match method {
+        Method::Parry => {
+            let Ok(made) = Hulls::new(&sampled(a), &sampled(b)) else { return Ok(Some(Verdict::NoAnswer)) };
+            Some(made)
+        }
+        _ => None,
+    };
+    let options = Options::default();
+    let mut warm = WarmStart::default();
+    let mut last: Option<Step> = None;
+    let mut shares: Vec<f64> = (0..=STEPS).map(|k| 1.05 - 1.05 * f64::from(k) / f64::from(STEPS)).collect();
+    shares.extend(ENDS.iter().flat_map(|near| [1.0 - near, *near]));
+    shares.sort_by(|p, q| q.total_cmp(p));
+    for share in shares {
+        let offset = inside * share;
+        let pose_b = place(offset)?;
+        let (step, slack) = if let Some(hulls) = &hulls {
+            let relative = parry_pose(&pose_a).inverse() * parry_pose(&pose_b);
+            let Some(value) = hulls.signed_distance(&relative) else { return Ok(Some(Verdict::NoAnswer)) };
+            (Step { offset, value, lower: value, upper: value, tied: false }, PEER_ERROR * small)
+        } else {
+            if method == Method::Cold {
+                warm = WarmStart::default();
+            }
+            let answer = signed_distance(a, &pose_a, b, &pose_b, &options, &mut warm);
+            let SignedDistance { status, lower, upper, tied, normal, .. } = answer;
+            let what = |what: &str| {
+                let pair = format!("{}-{} at {share:e} of the slide", a.name(), b.name());
+                Ok(Some(Verdict::WrongStatus(format!("{pair}: {what}, [{lower:e}, {upper:e}] m"))))
+            };
+            let depth = if upper < 0.0 { -lower } else { 0.0 };
+            let allowed = (options.accuracy() * small).max(options.depth_accuracy() * depth) * (1.0 + 1e-12);
+            if !(lower <= upper) || (status == Status::Converged) != (upper - lower <= allowed) {
+                return what("the status is not what the bracket says");
+            }
+            if normal.is_none() {
+                return what("no way out");
+            }
+            if share < MIRRORED && !tied {
+                return what("the mirrored way out is not told");
+            }
+            // Concentric balls have no way out that is better than others: wide is right there, and told as a tie.
+            if status != Status::Converged && !(tied && upper - lower <= 1e-2 * lower.abs()) {
+                return what("still wide");
+            }
+            (Step { offset, value: answer.value(), lower, upper, tied }, 2e-9 * small)
+        };
+        if let Some(before) = last.replace(step) {
+            let moved = before.offset - offset;
+            // Of ties only the brackets are known to go on.
+            let mut off = (step.lower - before.upper).max(before.lower - moved - step.upper);
+            if !step.tied && !before.tied {
+                off = off.max(step.value - before.value).max(before.value - moved - step.value);
+            }
+            if !(off <= slack) {
+                return Ok(Some(Verdict::Off((off - slack) / small)));
+            }
+        }
+    }
+    Ok(Some(Verdict::Pass))
+}
+
+/// The seed of the level distance inside the other body: flagged, while the growth distance goes on in proportion to the offset.
+pub(super) fn saturation(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
+    if !matches!(method, Method::Cold | Method::Warm) {
+        return Ok(None);
+    }
+    let mut random = random(27, seed);
+    let (a, b) = (any(&mut random, zoo()?), any(&mut random, zoo()?));
+    let (pose_a, turn, direction) = (somewhere(&mut random, 0.3)?, random.rotation(), random.direction());
+    let meet = pose_a.transform_point(&a.growth_ball().center) - turn * b.growth_ball().center;
+    let sum = a.circumscribed().radius + b.circumscribed().radius;
+    let options = Options::default();
+    let (mut growth_warm, mut level_warm) = (WarmStart::default(), WarmStart::default());
+    // Bounds of the growth distance per metre of the centres' distance.
+    let (mut low, mut high) = (0.0_f64, f64::INFINITY);
+    for share in [1.2, 0.5, 0.2, 0.1, 1e-2, 1e-4, 1e-6] {
+        if method == Method::Cold {
+            (growth_warm, level_warm) = (WarmStart::default(), WarmStart::default());
+        }
+        let pose_b: Pose = pose(meet + direction * (sum * share), &turn)?;
+        let apart = pose_b.transform_point(&b.growth_ball().center) - pose_a.transform_point(&a.growth_ball().center);
+        let known = 1e-14 * (sum + meet.norm());
+        let growth = growth_distance(a, &pose_a, b, &pose_b, &options, &mut growth_warm);
+        if growth.status != Status::Converged {
+            return Ok(Some(Verdict::WrongStatus("the growth distance is still wide".into())));
+        }
+        low = low.max(growth.lower / (apart.norm() + known));
+        high = high.min(growth.upper / (apart.norm() - known));
+        if !(low <= high * (1.0 + 1e-12)) {
+            return Ok(Some(Verdict::Off(low / high - 1.0)));
+        }
+        let level = level_distance(a, &pose_a, b, &pose_b, &options, &mut level_warm);
+        let seed_place = pose_a.transform_point(a.interior_point()) - pose_b.translation();
+        let value = b.value(&pose_b.rotation().inverse_transform_vector(&seed_place));
+        // Near the boundary, and where the value is all but the least, either is right.
+        let is_free = value > 1.0 + 1e-6 && level.lower > a.min_value() + 1e-6;
+        if (level.saturated && is_free) || (!level.saturated && value < 1.0 - 1e-6) {
+            return Ok(Some(Verdict::WrongStatus(format!("saturated: {}, the seed is at {value}", level.saturated))));
+        }
+        if level.status != Status::Converged {
+            return Ok(Some(Verdict::WrongStatus("the level distance is still wide".into())));
+        }
+        if level.saturated && (level.multiplier != 0.0 || level.gradient_b.linear != Vector3::zeros()) {
+            return Ok(Some(Verdict::WrongStatus("saturated, and yet with a gradient".into())));
+        }
+    }
+    Ok(Some(Verdict::Pass))
+}

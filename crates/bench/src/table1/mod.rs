@@ -1,0 +1,200 @@
+//! The paper's Table I, computed anew: the volumes of bounding sets of five meshes, beside those printed, and what they cost to build.
+
+mod pictures;
+mod report;
+mod rows;
+
+use super::Machine;
+use nalgebra::{Matrix3, Vector3};
+use rows::{MESHES, Method, Row, rows};
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::Instant;
+use sublevel::body::{Aabb, Body, SosBody, Volume};
+use sublevel::draw::ChartError;
+use sublevel::fit::{
+    Coordinates, FitError, FitOptions, Mesh, OrientedBox, ReadError, ReadOptions, SosMethod, SosOptions, ball, fit,
+    fit_sos, hull, hull::HullError, read_mesh, smallest_box,
+};
+
+/// Degrees of a quick run, and its limit on what is refined.
+const QUICK_DEGREE: usize = 4;
+
+/// Why there is no table.
+#[derive(Debug, thiserror::Error)]
+pub enum Table1Error {
+    /// A mesh can not be read.
+    #[error(
+        "{0}; the meshes 10, 101, 121, 181 and 361 of the Princeton Mesh Segmentation Benchmark are needed as .off files"
+    )]
+    Mesh(#[from] ReadError),
+    /// A mesh has no hull.
+    #[error("{mesh}: {source}")]
+    Hull {
+        /// The mesh.
+        mesh: &'static str,
+        /// What is wrong with it.
+        source: HullError,
+    },
+    /// Stopped by the caller.
+    #[error("the table was cancelled")]
+    Cancelled,
+    /// A picture failed.
+    #[error(transparent)]
+    Chart(#[from] ChartError),
+}
+
+/// One set around one mesh.
+#[derive(Clone, Debug)]
+struct Made {
+    volume_m3: f64,
+    /// Estimate of the error of the volume; 0 where it is a formula.
+    error_m3: f64,
+    seconds: f64,
+    /// The set, where it is one of ours.
+    set: Option<Set>,
+}
+
+/// One of our sets.
+#[derive(Clone, Debug)]
+enum Set {
+    Body(Box<Body>),
+    Sos(Box<SosBody>),
+}
+
+impl Set {
+    fn value(&self, x: &Vector3<f64>) -> f64 {
+        match self {
+            Self::Body(body) => body.value(x),
+            Self::Sos(body) => body.value(x),
+        }
+    }
+
+    fn bounding_box(&self) -> &Aabb {
+        match self {
+            Self::Body(body) => body.bounding_box(),
+            Self::Sos(body) => body.bounding_box(),
+        }
+    }
+
+    fn volume(&self) -> Volume {
+        match self {
+            Self::Body(body) => body.volume(),
+            Self::Sos(body) => body.volume(),
+        }
+    }
+}
+
+/// One of the meshes.
+struct Subject {
+    name: &'static str,
+    mesh: Mesh,
+    hull_volume_m3: f64,
+}
+
+/// What was built around every mesh, or why not.
+pub struct Table1 {
+    machine: Machine,
+    subjects: Vec<Subject>,
+    rows: Vec<(Row, Vec<Result<Made, String>>)>,
+}
+
+/// How far a table is.
+#[derive(Clone, Debug)]
+pub struct Table1Progress {
+    /// Cells done.
+    pub done: usize,
+    /// Cells in all.
+    pub cells: usize,
+    /// What is being built around what.
+    pub at: String,
+}
+
+/// Builds every set of the table around the meshes `10.off`, `101.off`, ... in `meshes`; `quick` leaves out what is above degree 4.
+///
+/// Takes about five minutes on one core, half a minute if quick. A fit that fails is a cell that says so. `progress` hears of every
+/// cell and of every Newton step in between, and can stop it.
+///
+/// # Errors
+/// [`Table1Error`]: a mesh that can not be read, or the callback's wish.
+pub fn table1(
+    meshes: &Path,
+    quick: bool,
+    progress: &mut dyn FnMut(&Table1Progress) -> ControlFlow<()>,
+) -> Result<Table1, Table1Error> {
+    let subjects = MESHES.map(|(name, number)| Subject::read(name, &meshes.join(format!("{number}.off"))));
+    let subjects = subjects.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let rows: Vec<Row> =
+        rows().into_iter().filter(|row| !quick || row.method.degree().is_none_or(|d| d <= QUICK_DEGREE)).collect();
+    let mut told = Table1Progress { done: 0, cells: rows.len() * subjects.len(), at: String::new() };
+    let mut table = Table1 { machine: Machine::this(), subjects, rows: Vec::new() };
+    for row in rows {
+        let mut cells = Vec::new();
+        for subject in &table.subjects {
+            told.at = format!("{} around the {}", row.method.name(), subject.name);
+            if progress(&told).is_break() {
+                return Err(Table1Error::Cancelled);
+            }
+            let made = subject.make(row.method, &mut || progress(&told));
+            cells.push(match made {
+                Err(FitError::Cancelled) => return Err(Table1Error::Cancelled),
+                made => made.map_err(|error| error.to_string()),
+            });
+            told.done += 1;
+        }
+        table.rows.push((row, cells));
+    }
+    Ok(table)
+}
+
+impl Subject {
+    fn read(name: &'static str, path: &Path) -> Result<Self, Table1Error> {
+        let mesh = read_mesh(path, &ReadOptions::default())?.mesh;
+        let hull = hull::convex_hull(&mesh.points).map_err(|source| Table1Error::Hull { mesh: name, source })?;
+        Ok(Self { name, mesh, hull_volume_m3: hull.volume })
+    }
+
+    fn make(&self, method: Method, progress: &mut dyn FnMut() -> ControlFlow<()>) -> Result<Made, FitError> {
+        let start = Instant::now();
+        let exact = |volume_m3| Made { volume_m3, error_m3: 0.0, seconds: start.elapsed().as_secs_f64(), set: None };
+        let points = &self.mesh.points;
+        Ok(match method {
+            Method::Hull => exact(hull::convex_hull(points)?.volume),
+            Method::AxisBox => exact(OrientedBox::along(Matrix3::identity(), points).volume()),
+            Method::OrientedBox => {
+                let vertices: Vec<_> = hull::convex_hull(points)?.vertices.iter().map(|&i| points[i]).collect();
+                exact(smallest_box(&vertices).volume())
+            }
+            Method::Ball => {
+                let rung = ball(self.name, points)?;
+                Made::of(Set::Body(Box::new(rung.body)), rung.seconds)
+            }
+            Method::Convex(objective, degree, refine) => {
+                let options = FitOptions { degree, objective, refine, ..FitOptions::default() };
+                let fit = fit(self.name, points, &options, &mut |_| progress())?;
+                Made::of(Set::Body(Box::new(fit.body)), fit.report.seconds)
+            }
+            Method::InverseMoment(degree) => self.sos(degree, SosMethod::InverseMoment, progress)?,
+            Method::Relaxed(c, objective, degree) => self.sos(degree, SosMethod::Relaxed { c, objective }, progress)?,
+        })
+    }
+
+    /// A set that need not be convex; c is measured in the meshes' own frame.
+    fn sos(
+        &self,
+        degree: usize,
+        method: SosMethod,
+        progress: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<Made, FitError> {
+        let options = SosOptions { degree, method, coordinates: Coordinates::Raw, input: String::new() };
+        let fit = fit_sos(self.name, &self.mesh.points, &[], &options, &mut |_| progress())?;
+        Ok(Made::of(Set::Sos(Box::new(fit.body)), fit.report.seconds))
+    }
+}
+
+impl Made {
+    fn of(set: Set, seconds: f64) -> Self {
+        let Volume { volume_m3, error_m3 } = set.volume();
+        Self { volume_m3, error_m3, seconds, set: Some(set) }
+    }
+}

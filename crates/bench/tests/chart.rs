@@ -1,0 +1,318 @@
+//! The reports of `sublevel-bench`, as a reader gets them.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// Rows with volumes known independently for human, chair, hand, vase and octopus, and how far above them an answer may be: exact
+/// geometry either way, fits only above.
+const KNOWN: [(&str, [f64; 5], f64); 6] = [
+    ("convex hull", [0.2936, 0.6558, 0.3627, 0.9088, 0.4993], 5e-4),
+    ("smallest ball", [3.730, 3.742, 3.848, 3.912, 4.096], 1e-3),
+    ("axis-aligned box", [0.697, 1.009, 1.222, 2.048, 1.645], 1e-3),
+    ("smallest oriented box", [0.588, 0.998, 0.806, 1.726, 1.277], 1e-3),
+    ("sos-convex 2, logdet-p", [0.5894, 1.8425, 0.8530, 1.2252, 1.3558], 3e-3),
+    ("sos-convex 4, logdet-p", [0.4553, 1.2200, 0.5453, 1.1186, 0.8971], 3e-3),
+];
+
+#[test]
+fn the_quick_table_holds_the_known_volumes() {
+    let Some(data) = std::env::var_os("SUBLEVEL_DATA").map(PathBuf::from) else {
+        eprintln!("skipped: SUBLEVEL_DATA does not name the folder with the meshes");
+        return;
+    };
+    let out = tempfile::tempdir().expect("a folder can be made");
+    let output = Command::new(env!("CARGO_BIN_EXE_sublevel-bench"))
+        .args(["table1", "--quick", "--meshes"])
+        .arg(data.join("psb"))
+        .arg("--out")
+        .arg(out.path())
+        .output()
+        .expect("the program starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let read = |name: &str| std::fs::read_to_string(out.path().join(name)).expect("the file is written");
+    let csv = read("table1.csv");
+    for (row, volumes, above) in KNOWN {
+        let line = format!("\"{row}\",");
+        let found: Vec<f64> =
+            csv.lines().filter_map(|text| text.strip_prefix(&line)?.split(',').nth(1)?.parse().ok()).collect();
+        assert_eq!(found.len(), volumes.len(), "{row}: {found:?}");
+        for (volume, known) in found.into_iter().zip(volumes) {
+            assert!((-2e-3..=above).contains(&(volume / known - 1.0)), "{row}: {volume} m³ where {known} are known");
+        }
+    }
+    let report = read("table1.md");
+    for name in ["table1.svg", "table1-degrees.svg", "table1-gram.svg", "table1-convexity.svg", "table1-levels.svg"] {
+        assert!(report.contains(name), "{name} is not in the report");
+        let picture = read(name);
+        assert!(picture.starts_with("<svg") && !picture.contains("NaN"), "{name}");
+    }
+}
+
+#[test]
+fn missing_meshes_are_told() {
+    let out = tempfile::tempdir().expect("a folder can be made");
+    let folder = out.path().to_str().expect("a plain name");
+    let output = Command::new(env!("CARGO_BIN_EXE_sublevel-bench"))
+        .args(["table1", "--meshes", folder, "--out", folder])
+        .output()
+        .expect("the program starts");
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{error}");
+    assert!(error.contains("10.off") && error.contains("Princeton"), "{error}");
+}
+
+/// `sublevel-bench FIGURE --quick` with fits kept for the next run.
+fn quick(figure: &str, data: &Path, out: &Path) -> Output {
+    let fits = Path::new(env!("CARGO_TARGET_TMPDIR")).join("chart-fits");
+    Command::new(env!("CARGO_BIN_EXE_sublevel-bench"))
+        .args([figure, "--quick", "--data"])
+        .arg(data)
+        .arg("--fits")
+        .arg(fits)
+        .arg("--out")
+        .arg(out)
+        .env_remove("SUBLEVEL_COAL")
+        .output()
+        .expect("the program starts")
+}
+
+/// The files of a quick figure: report and table as text; every picture that the report shows is looked at.
+fn made(figure: &str) -> Option<(String, String)> {
+    let Some(data) = std::env::var_os("SUBLEVEL_DATA").map(PathBuf::from) else {
+        eprintln!("skipped: SUBLEVEL_DATA does not name the folder with the meshes");
+        return None;
+    };
+    let out = tempfile::tempdir().expect("a folder can be made");
+    let output = quick(figure, &data, out.path());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let read = |name: &str| std::fs::read_to_string(out.path().join(name)).expect("the file is written");
+    let report = read(&format!("{figure}.md"));
+    let shown: Vec<&str> = report.split("](").skip(1).filter_map(|rest| rest.split(')').next()).collect();
+    assert!(shown.len() >= 3, "{shown:?}");
+    for name in shown {
+        let picture = read(name);
+        assert!(picture.starts_with("<svg") && !picture.contains("NaN"), "{name}");
+    }
+    assert!(report.contains(&format!("`sublevel-bench {figure} --data DIR --quick`")), "the command is printed");
+    Some((report, read(&format!("{figure}.csv"))))
+}
+
+/// Lines of a table whose first cells are these, as the numbers of a column; NaN where there is none.
+fn column(csv: &str, first: &str, name: &str) -> Vec<f64> {
+    let heads: Vec<&str> = csv.lines().next().expect("a head").split(',').collect();
+    let from_the_end = heads.len() - heads.iter().position(|head| *head == name).expect("a column of that name");
+    // Names in front may hold commas.
+    let cell = |line: &str| line.rsplit(',').nth(from_the_end - 1)?.parse().ok();
+    csv.lines().filter(|line| line.starts_with(first)).map(|line| cell(line).unwrap_or(f64::NAN)).collect()
+}
+
+#[test]
+fn the_quick_chart_of_speed_holds_what_is_known() {
+    let Some((report, csv)) = made("speed") else { return };
+    for pair in ["chair-human", "mug-table"] {
+        let of = |name: &str, head: &str| {
+            let found = column(&csv, &format!("{pair},\"{name}\","), head);
+            assert_eq!(found.len(), 1, "{pair}, {name}");
+            found[0]
+        };
+        // Closer and closer.
+        let names = ["ball", "ellipsoid", "degree 4", "degree 6", "degree 6, refined"];
+        let errors = names.map(|name| of(name, "hull_error_mean"));
+        assert!(errors.windows(2).all(|pair| pair[1] < pair[0]), "{pair}: {errors:?}");
+        assert!(of("hull, 64 vertices, parry", "hull_error_mean") < of("hull, 32 vertices, parry", "hull_error_mean"));
+        // All contain the hull, so that none is farther than it; the exact hull contains the mesh.
+        for name in names.into_iter().chain([
+            "axis-aligned box",
+            "oriented box",
+            "degree 4, 4 slabs",
+            "hull, 32 vertices, parry",
+        ]) {
+            assert!(of(name, "hull_error_min") > -1e-7, "{pair}, {name}");
+        }
+        for name in ["hull, parry", "compound of 4, degree 4", "cover of 32 balls"] {
+            assert!(of(name, "mesh_error_min") > -1e-7, "{pair}, {name}");
+        }
+        assert!(of("oriented box", "hull_error_mean") == of("oriented box, parry", "hull_error_mean"));
+    }
+    for name in ["failed", "wrong"] {
+        assert!(column(&csv, "", name).iter().skip(1).all(|count| *count == 0.0), "{name}: {csv}");
+    }
+    let judged = ["hold everywhere", "Where the figures are missed"];
+    assert!(judged.iter().any(|words| report.contains(words)), "no verdict");
+}
+
+#[test]
+fn the_quick_chart_of_warm_starts_counts_iterations() {
+    let Some((report, csv)) = made("warm") else { return };
+    let steps = csv.split("\n\n").next().expect("the first table");
+    for degree in [4, 6] {
+        let of = |step: &str, head: &str| column(steps, &format!("chair-human,\"degree {degree}\",{step},"), head)[0];
+        assert!(of("0.0001", "warm_iterations") < of("0.3", "warm_iterations"), "hints are worth less from afar");
+        assert!(of("0.01", "warm_iterations") < of("0.01", "cold_iterations"), "hints are worth something");
+        assert!(of("teleport", "warm_most") <= 40.0);
+    }
+    for name in ["failed", "contradictions"] {
+        assert!(column(steps, "chair-human", name).iter().all(|count| *count == 0.0), "{name}: {csv}");
+    }
+    let passage = csv.split("\n\n").nth(1).expect("the second table");
+    assert!(!passage.contains("true"), "no position has a wrong answer");
+    let levels = column(passage, "", "chair_human");
+    let (least, most) = levels.iter().skip(1).fold((f64::INFINITY, 0.0_f64), |(l, m), v| (l.min(*v), m.max(*v)));
+    assert!(least < 1.0 && most > 100.0, "through contact: {least} {most}");
+    assert!(report.contains("150 ms") && report.contains("10 ms"), "the paper's times");
+}
+
+#[test]
+fn the_quick_chart_of_detail_settles_more_on_every_rung() {
+    let Some((_, csv)) = made("detail") else { return };
+    for pair in ["chair-human", "mug-table"] {
+        let rungs = ["ball", "ellipsoid", "degree 4", "degree 6"];
+        let of = |rung: &str, head: &str| column(&csv, &format!("{pair},{rung},"), head);
+        let errors = rungs.map(|rung| of(rung, "error_mean")[0]);
+        assert!(errors.windows(2).all(|pair| pair[1] < pair[0]) && errors[3] > 0.0, "{errors:?}");
+        let settled = |rung: &str| of(rung, "yes").iter().sum::<f64>() + of(rung, "no").iter().sum::<f64>();
+        assert!(settled("degree 6") > settled("ball"));
+        for rung in rungs {
+            assert_eq!(of(rung, "gap").len(), 10, "a line for each threshold");
+            assert!(of(rung, "gap")[0] > of(rung, "error_max")[0], "{pair}, {rung}: the gap bounds the error");
+            for name in ["failed", "wrong", "contradicted"] {
+                assert!(of(rung, name).iter().all(|count| *count == 0.0), "{pair}, {rung}, {name}");
+            }
+            let last = [of(rung, "yes"), of(rung, "no")].map(|parts| parts[9]);
+            assert!(last[0] + last[1] > 0.8, "{pair}, {rung}: far questions are easy, {last:?}");
+        }
+    }
+}
+
+#[test]
+fn the_quick_chart_of_accuracy_ends_at_the_floor() {
+    let Some((report, csv)) = made("accuracy") else { return };
+    for case in ["chair-human-d4", "flat-faces-d8"] {
+        let of = |method: &str, head: &str| column(&csv, &format!("{case},{method},"), head);
+        for method in ["cold", "warm"] {
+            let (tolerances, widths) = (of(method, "setting"), of(method, "width_max"));
+            assert_eq!(tolerances.len(), 10, "{case}, {method}");
+            for ((tolerance, width), short) in tolerances.iter().zip(&widths).zip(of(method, "short")) {
+                assert!(width <= tolerance || short > 0.0, "{case}, {method}: {width} at {tolerance}");
+                assert!(*tolerance < 1e-9 || short == 0.0, "{case}, {method}: {short} short at {tolerance}");
+            }
+            assert!(of(method, "error_max").iter().zip(&widths).all(|(error, width)| error <= width));
+            assert!(of(method, "off").iter().all(|off| *off == 0.0), "{case}, {method}");
+        }
+        // Other methods come to the same distances.
+        let best = |method: &str| of(method, "error_median").into_iter().fold(f64::INFINITY, f64::min);
+        assert!(best("newton-before") < 1e-6, "{case}: {}", best("newton-before"));
+        assert!(best("slsqp") < 1e-5, "{case}: {}", best("slsqp"));
+        assert!(best("hulls-parry") < 1e-2 && best("hulls-parry") > 1e-9, "{case}: {}", best("hulls-parry"));
+        if report.contains("clarabel 0") {
+            assert!(best("level0-clarabel") < 1e-5, "{case}: {}", best("level0-clarabel"));
+        }
+    }
+}
+
+#[test]
+fn the_quick_chart_of_cost_tells_exponents() {
+    let Some((report, csv)) = made("cost") else { return };
+    let of = |curve: &str, head: &str| column(&csv, curve, head);
+    for (curve, points) in [
+        ("degree,\"cold\",ns", 3),
+        ("constraints,\"warm\",ns", 4),
+        ("parts,\"warm\",ns", 2),
+        ("batch,\"a batch\",ns", 4),
+        ("message,\"a message\",ns", 3),
+        ("fit-degree,\"fit\",ns", 3),
+        ("fit-points,\"on chair\",ns", 3),
+        ("fit-points,\"all on their hull\",ns", 3),
+    ] {
+        let costs = of(curve, "cost");
+        assert!(costs.len() >= points && costs.iter().all(|cost| *cost > 0.0), "{curve}: {costs:?}");
+        assert!(of(curve, "exponent").iter().all(|exponent| exponent.is_finite()), "{curve}");
+    }
+    // Memory is told by Linux; files and places are told everywhere.
+    assert_eq!(of("batch,\"poses and answers\",bytes", "exponent")[0], 1.0);
+    let files = of("degree,\"as a file\",bytes", "cost");
+    assert!(files.windows(2).all(|pair| pair[0] < pair[1]), "{files:?}");
+    assert!(report.contains("| exponent |"));
+}
+
+/// `sublevel-bench stability` with these arguments, of our methods.
+fn stability(arguments: &[&str], out: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sublevel-bench"))
+        .args(["stability", "--quick", "--methods", "cold,warm,batch", "--out"])
+        .arg(out)
+        .args(arguments)
+        .output()
+        .expect("the program starts")
+}
+
+/// The committed table is the guard: no family may fail more often than there.
+#[test]
+fn no_family_of_the_stability_table_is_lost() {
+    let out = tempfile::tempdir().expect("a folder can be made");
+    let committed = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/stability.csv");
+    let output = stability(&["--guard", committed], out.path());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let csv = std::fs::read_to_string(out.path().join("stability.csv")).expect("the table is written");
+    let families: std::collections::BTreeSet<&str> =
+        csv.lines().skip(1).filter_map(|line| line.split(',').next()).collect();
+    assert_eq!(families.len(), 24, "{csv}");
+    let cases: f64 = column(&csv, "", "cases").into_iter().filter(|cases| cases.is_finite()).sum();
+    assert!(cases > 2000.0, "{cases} cases");
+    let report = std::fs::read_to_string(out.path().join("stability.md")).expect("the report is written");
+    assert!(report.contains("| 13 | parallel flats") && report.contains("pass (40)"), "{report}");
+}
+
+#[test]
+fn stability_refuses_what_it_can_not_use_with_a_remedy() {
+    let out = tempfile::tempdir().expect("a folder can be made");
+    let other = out.path().join("other.csv");
+    std::fs::write(&other, "a,b\n1,2\n").expect("a file can be written");
+    let run = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_sublevel-bench"));
+        let output = command.args(["stability"]).args(arguments).current_dir(out.path()).output();
+        let output = output.expect("the program starts");
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    for (arguments, code, word) in [
+        (&["--methods", "someone"][..], 2, "none of cold, warm"),
+        (&["--replay", "17/cold/1"], 2, "FAMILY/METHOD/SEED"),
+        (&["--replay", "13/cold/1", "--quick"], 2, "cannot be used"),
+        (&["--guard", "absent.csv"], 1, "absent.csv"),
+        (&["--quick", "--methods", "coal", "--guard", "other.csv"], 1, "line 1"),
+    ] {
+        let (found, error) = run(arguments);
+        assert!(found == Some(code) && error.contains(word), "{arguments:?}: {found:?} {error}");
+    }
+    let (code, error) = run(&["--replay", "13/cold/1"]);
+    assert_eq!(code, Some(0), "{error}");
+}
+
+#[test]
+fn charts_refuse_what_they_can_not_use_with_a_remedy() {
+    let out = tempfile::tempdir().expect("a folder can be made");
+    let file = out.path().join("file");
+    std::fs::write(&file, "").expect("a file can be written");
+    let folder = out.path();
+    for figure in ["speed", "warm", "detail", "accuracy", "cost"] {
+        let told = |output: Output, code: i32, words: &[&str]| {
+            let error = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert_eq!(output.status.code(), Some(code), "{figure}: {error}");
+            assert!(words.iter().all(|word| error.contains(word)), "{figure}: {error}");
+        };
+        told(quick(figure, folder, folder), 1, &["psb/101.off", "--data"]);
+        told(quick(figure, folder, &file), 1, &["--out"]);
+        let chart = |arguments: &[&str], coal: Option<&Path>| {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_sublevel-bench"));
+            command.args([figure]).args(arguments).current_dir(folder).env_remove("SUBLEVEL_COAL");
+            coal.into_iter().for_each(|coal| {
+                command.env("SUBLEVEL_COAL", coal);
+            });
+            command.output().expect("the program starts")
+        };
+        told(chart(&[], None), 2, &["--data"]);
+        told(chart(&["--data", ".", "--fits", "file"], None), 1, &["file", "another folder"]);
+        if !["detail", "cost"].contains(&figure) {
+            told(chart(&["--data", "."], Some(Path::new("absent"))), 1, &["SUBLEVEL_COAL", "absent"]);
+        }
+    }
+}
