@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Output};
 use sublevel::fit::{Fit, FitOptions, ReadOptions, Reading, fit, fit_parts, read_mesh};
 
@@ -13,8 +13,7 @@ use sublevel::fit::{Fit, FitOptions, ReadOptions, Reading, fit, fit_parts, read_
 const HOUSE_M3: f64 = 16.755161;
 
 fn fault(name: &str) -> PathBuf {
-    let data = std::env::var_os("SUBLEVEL_DATA").expect("SUBLEVEL_DATA names the folder of the test data");
-    Path::new(&data).join("faults").join(name)
+    sublevel_testkit::data("faults").join(name)
 }
 
 fn reading(name: &str) -> Reading {

@@ -1,9 +1,9 @@
 //! The fits of the five meshes of the paper's Table I, against independently computed optima.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
 use sublevel_core::body::Body;
 use sublevel_fit::{FitOptions, ReadOptions, RefinementEnd, fit, read_mesh};
+use sublevel_testkit::data;
 
 /// Mesh number, volume of the convex hull and vertices of it, volumes of the -log det P fits at degrees 2, 4, 6.
 const TABLE: [(u32, f64, usize, [f64; 3]); 5] = [
@@ -14,19 +14,9 @@ const TABLE: [(u32, f64, usize, [f64; 3]); 5] = [
     (121, 0.4993, 414, [1.3558, 0.8971, 0.7004]),
 ];
 
-fn mesh(number: u32) -> Option<PathBuf> {
-    match std::env::var_os("SUBLEVEL_DATA") {
-        Some(folder) => Some(PathBuf::from(folder).join(format!("psb/{number}.off"))),
-        None => {
-            eprintln!("skipped: SUBLEVEL_DATA does not name the folder with the meshes");
-            None
-        }
-    }
-}
-
 fn check(row: usize) {
     let (number, hull_volume, hull_vertices, volumes) = TABLE[row];
-    let Some(path) = mesh(number) else { return };
+    let path = data(&format!("psb/{number}.off"));
     let points = read_mesh(&path, &ReadOptions::default()).expect("the mesh is readable").mesh.points;
     for (degree, expected) in [2, 4, 6].into_iter().zip(volumes) {
         let options = FitOptions { degree, ..FitOptions::default() };
@@ -57,9 +47,10 @@ const REFINED: [[f64; 2]; 5] =
     [[0.4414, 0.3823], [1.1671, 0.9331], [0.5088, 0.4357], [1.0947, 1.0233], [0.8134, 0.6396]];
 
 #[test]
+#[ignore = "needs SUBLEVEL_DATA"]
 fn refined_volumes() {
     for ((number, ..), volumes) in TABLE.into_iter().zip(REFINED) {
-        let Some(path) = mesh(number) else { return };
+        let path = data(&format!("psb/{number}.off"));
         let points = read_mesh(&path, &ReadOptions::default()).expect("the mesh is readable").mesh.points;
         for (degree, expected) in [4, 6].into_iter().zip(volumes) {
             let options = FitOptions { degree, refine: true, ..FitOptions::default() };
@@ -83,33 +74,39 @@ fn refined_volumes() {
 }
 
 #[test]
+#[ignore = "needs SUBLEVEL_DATA"]
 fn human() {
     check(0);
 }
 
 #[test]
+#[ignore = "needs SUBLEVEL_DATA"]
 fn chair() {
     check(1);
 }
 
 #[test]
+#[ignore = "needs SUBLEVEL_DATA"]
 fn hand() {
     check(2);
 }
 
 #[test]
+#[ignore = "needs SUBLEVEL_DATA"]
 fn vase() {
     check(3);
 }
 
 #[test]
+#[ignore = "needs SUBLEVEL_DATA"]
 fn octopus() {
     check(4);
 }
 
 #[test]
+#[ignore = "needs SUBLEVEL_DATA"]
 fn chair_at_degree_eight() {
-    let Some(path) = mesh(101) else { return };
+    let path = data("psb/101.off");
     let points = read_mesh(&path, &ReadOptions::default()).expect("the mesh is readable").mesh.points;
     let options = FitOptions { degree: 8, ..FitOptions::default() };
     let fit = fit("chair", &points, &options, &mut |_| ControlFlow::Continue(())).expect("the mesh is fitted");

@@ -8,7 +8,7 @@ use sublevel_core::body::{Body, Compound, Covered};
 use sublevel_fit::{
     Fit, FitError, FitOptions, HullError, Progress, ReadOptions, fit, fit_parts, read_mesh, thicken, trim,
 };
-use sublevel_testkit::Seeded;
+use sublevel_testkit::{Seeded, data};
 
 /// A fit of a few hundred points that takes longer hangs.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -47,18 +47,15 @@ fn files(folder: &Path, found: &mut Vec<PathBuf>) {
 
 /// All mesh files of the test data, in order.
 fn meshes() -> Vec<PathBuf> {
-    let Some(folder) = std::env::var_os("SUBLEVEL_DATA") else {
-        eprintln!("skipped: SUBLEVEL_DATA does not name the folder with the meshes");
-        return Vec::new();
-    };
     let mut found = Vec::new();
-    files(Path::new(&folder), &mut found);
+    files(&data(""), &mut found);
     found.sort();
     assert!(found.len() >= 29, "{} meshes in SUBLEVEL_DATA", found.len());
     found
 }
 
 #[test]
+#[ignore = "needs SUBLEVEL_DATA"]
 fn every_mesh_becomes_a_body() {
     for path in meshes() {
         let mesh = read_mesh(&path, &ReadOptions::default()).unwrap().mesh;
@@ -76,6 +73,7 @@ fn every_mesh_becomes_a_body() {
 }
 
 #[test]
+#[ignore = "needs SUBLEVEL_DATA"]
 fn every_mesh_becomes_a_compound() {
     for path in meshes() {
         let what = path.display();

@@ -4,7 +4,9 @@
 #![allow(missing_docs, unreachable_pub)]
 
 pub mod bodies;
+mod data;
 pub mod random;
 pub mod reference;
 
+pub use data::data;
 pub use random::Seeded;

@@ -1,0 +1,92 @@
+//! Paths and links in the documentation lead to what is there.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Folders that ARCHITECTURE.md names in short, and where they lie.
+const SHORT: [(&str, &str); 13] = [
+    ("polynomial/", "crates/core/src/polynomial/"),
+    ("optimize/", "crates/core/src/optimize/"),
+    ("body/", "crates/core/src/body/"),
+    ("measure/", "crates/core/src/measure/"),
+    ("fit/", "crates/fit/src/"),
+    ("scene/", "crates/scene/src/"),
+    ("bench/", "crates/bench/src/"),
+    ("store/", "src/store/"),
+    ("jobs/", "src/jobs/"),
+    ("service/", "src/service/"),
+    ("draw/", "src/draw/"),
+    ("demo/", "src/demo/"),
+    ("cli/", "src/cli/"),
+];
+
+/// Beginnings of paths from the root of the repository.
+const WHOLE: [&str; 7] = ["src/", "crates/", "tests/", "proto/", "docs/", "fuzz/", ".ci/"];
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn pages() -> Vec<PathBuf> {
+    let docs = fs::read_dir(root().join("docs")).expect("the folder is readable");
+    let pages = docs.map(|entry| entry.expect("an entry").path());
+    let pages = pages.filter(|path| path.extension().is_some_and(|extension| extension == "md"));
+    let top = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "fuzz/README.md"].map(|name| root().join(name));
+    pages.chain(top).collect()
+}
+
+/// The parts of a text between two marks.
+fn between<'a>(text: &'a str, open: &str, close: char) -> Vec<&'a str> {
+    let parts = text.split(open).skip(1).filter_map(|rest| rest.split_once(close));
+    parts.map(|(part, _)| part).collect()
+}
+
+#[test]
+fn links_lead_somewhere() {
+    let mut missing = Vec::new();
+    for page in pages() {
+        let text = fs::read_to_string(&page).expect("a page is text");
+        let folder = page.parent().expect("a page lies in a folder");
+        for link in between(&text, "](", ')').into_iter().filter(|link| !link.contains("://") && !link.starts_with('#'))
+        {
+            let file = link.split('#').next().unwrap_or_default();
+            if !folder.join(file).exists() {
+                missing.push(format!("{}: {link}", page.display()));
+            }
+        }
+    }
+    assert!(missing.is_empty(), "\n{}", missing.join("\n"));
+}
+
+#[test]
+fn paths_name_what_is_there() {
+    let exists = |path: &str| root().join(path).exists();
+    let mut missing = Vec::new();
+    let mut found = 0;
+    for name in ["docs/ARCHITECTURE.md", "CONTRIBUTING.md", "docs/server.md", "docs/numerics.md"] {
+        let text = fs::read_to_string(root().join(name)).expect("a page is text");
+        for (index, line) in text.lines().enumerate() {
+            // Every other part of a line between backticks is code.
+            for code in line.split('`').skip(1).step_by(2) {
+                let is_path = code.contains('/')
+                    && !code.contains([' ', '(', '<', '*', '='])
+                    && (code.ends_with('/') || Path::new(code).extension().is_some());
+                let short = SHORT.iter().find(|(short, _)| code.starts_with(short));
+                let whole = WHOLE.iter().any(|whole| code.starts_with(whole));
+                let path = match short {
+                    Some((short, long)) => code.replacen(short, long, 1),
+                    None => code.to_owned(),
+                };
+                // `mod.rs` of a folder that became a crate is its `lib.rs`.
+                if is_path && (whole || short.is_some()) {
+                    found += 1;
+                    if !exists(&path) && !exists(&path.replace("mod.rs", "lib.rs")) {
+                        missing.push(format!("{name}:{}: {code}", index + 1));
+                    }
+                }
+            }
+        }
+    }
+    assert!(missing.is_empty(), "\n{}", missing.join("\n"));
+    assert!(found > 100, "{found} paths were looked at");
+}
