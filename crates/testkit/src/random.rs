@@ -35,6 +35,8 @@ pub fn few_or(few: u64, many: u64) -> u64 {
 pub struct Seeded(pub u64);
 
 impl Seeded {
+    /// The next 64 bits.
+    #[allow(clippy::should_implement_trait)]
     pub fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
