@@ -51,6 +51,8 @@ pub(super) struct Decomposition {
     segmentations: Vec<(Segmentation, Nested)>,
     /// For 1, 2, 3 ... parts the least total volume of the hulls, and the search that found it.
     best: Vec<(f64, Source)>,
+    /// Components of the mesh, those whose joint hull adds nothing taken for one.
+    groups: usize,
     /// Volume of the mesh, if it is closed.
     own: Option<f64>,
 }
@@ -81,7 +83,7 @@ impl Decomposition {
         let own = mesh.is_closed().then(|| mesh.signed_volume().abs());
         let greedy = Partition::new(mesh.clone());
         let whole = greedy.totals[0];
-        let mut found = Self { best: vec![(whole, Source::Greedy)], greedy, segmentations: Vec::new(), own };
+        let mut found = Self { best: vec![(whole, Source::Greedy)], greedy, segmentations: Vec::new(), groups: 1, own };
         if most == 1 || !(whole > 0.0) {
             return Ok(found);
         }
@@ -100,6 +102,7 @@ impl Decomposition {
             if style == Style::ByLedges && !segmentation.has_ledges() {
                 continue;
             }
+            found.groups = segmentation.len();
             let regions = segmentation.len() + most + most.min(MOST_MORE) + FEW_MORE;
             while segmentation.len() < regions && segmentation.divide(regions - segmentation.len(), &mut step)? {}
             let nested = segmentation.nested(&mut step)?;
@@ -126,12 +129,15 @@ impl Decomposition {
         self.best.len()
     }
 
-    /// The number of parts, at most so many, whose hulls have the least volume, as long as each part more gains something.
+    /// The number of parts, at most so many, whose hulls have the least volume, as long as each part more gains something. What is
+    /// not connected is kept in parts of its own where that is as good.
     pub(super) fn fewest(&self, parts: usize) -> usize {
         let worth = NOTHING * self.best[0].0;
         let cost = |index: usize| self.best[index].0 + worth * index as f64;
-        let least = (0..parts.min(self.best.len())).min_by(|&a, &b| cost(a).total_cmp(&cost(b)));
-        1 + least.unwrap_or(0)
+        let known = parts.min(self.best.len());
+        let least = (0..known).min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(0);
+        let apart = self.groups.min(known).max(1) - 1;
+        1 + if apart > least && self.best[apart].0 <= self.best[least].0 + worth { apart } else { least }
     }
 
     /// Total volume of the hulls of so many parts.
