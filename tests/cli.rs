@@ -83,7 +83,7 @@ fn sorted(names: &str) -> Vec<&str> {
 fn fit_reports_and_writes_a_proven_body() {
     let fitted = fitted();
     let [row] = fitted.report.as_array().unwrap().as_slice() else { panic!("{}", fitted.report) };
-    let expected = "input body degree slabs parts covers objective refined refinement points left_out left_out_m hull_vertices volume_m3 volume_error_m3 hull_volume_m3 \
+    let expected = "input body degree slabs parts parts_asked shortfall covers objective refined refinement points left_out left_out_m hull_vertices volume_m3 volume_error_m3 hull_volume_m3 \
          gap_m mean_gap_m seconds status objective_value optimality_gap proven dropped_points unused_vertices unused_dropped hull_with_unused_m3 hull_without_unused_m3";
     assert_eq!(keys(row), sorted(expected));
     assert_eq!(row["body"], text(&fitted.body()));

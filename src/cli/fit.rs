@@ -35,9 +35,10 @@ use std::time::Duration;
 /// With --relax-convexity, and with the objective inverse-moment, the set need not be convex: tighter, but no distances are measured
 /// from it. It is proven to hold the points; which triangles of the mesh it does not hold is told.
 ///
-/// Meshes that are not convex can become compounds of several bodies: by --parts, or by --max-gap where that is cheaper to query. The
-/// mesh is cut by planes; each part holds its piece, and the gap is measured to the convex hulls of the pieces. All triangles are
-/// proven to be covered, and the interior of closed meshes ("surface_only" is said of others).
+/// Meshes that are not convex can become compounds of several bodies: by --parts, or by --max-gap where that is cheaper to
+/// query. Connected closed components are parts of their own, and the mesh is cut by planes; the gap is measured to the
+/// convex hulls of the parts. All triangles are proven to be covered, and the interior of closed meshes ("surface_only" is
+/// reported of others).
 ///
 /// Examples:
 ///
@@ -110,7 +111,8 @@ pub(super) struct FitArgs {
     max_gap: Option<f64>,
     /// Fit a compound of at most this many convex parts, each of --degree: <stem>-d6-p4.json has four
     ///
-    /// Fewer where no cut reduces the volume of the parts' convex hulls. Queries take about as many times as long as there are parts
+    /// The partition whose parts have the least volume of convex hulls of those that are found. Fewer parts where no cut reduces that
+    /// volume: then a note says why. Where a mesh has more components, those whose joint hull adds least are merged. Queries take about as many times as long as there are parts
     /// near the other body.
     #[arg(long, value_name = "N", conflicts_with_all = ["ladder", "max_gap", "trim", "min_thickness"])]
     parts: Option<usize>,

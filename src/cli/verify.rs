@@ -5,7 +5,7 @@ use super::mesh::{MeshArgs, note};
 use super::{Outcome, one_line, read, read_obstacle, sos_body};
 use crate::body::{BasicSet, Body, Compound, Obstacle, Shape, SosBody};
 #[cfg(feature = "fit")]
-use crate::body::{Covering, NotCovered, Piece};
+use crate::body::{Covering, Division, NotCovered, Piece};
 #[cfg(feature = "fit")]
 use crate::fit::Mesh;
 #[cfg(feature = "fit")]
@@ -196,8 +196,8 @@ fn covered(args: &VerifyArgs, compound: &Compound) -> Result<(Report, Option<Str
     note(path, &reading);
     let Mesh { points, triangles } = reading.mesh;
     let covering = compound.covering();
-    let cuts = covering.map_or(&[][..], |covering| &covering.cuts);
-    let proof = compound.prove_covers(&points, &triangles, cuts);
+    let division = covering.map_or_else(Division::default, |covering| covering.division.clone());
+    let proof = compound.prove_covers(&points, &triangles, &division);
     report.contains_all_points_proven = Some(proof.is_ok());
     let (proven, value) = match proof {
         Ok(proof) => proof,
@@ -221,10 +221,11 @@ fn covered(args: &VerifyArgs, compound: &Compound) -> Result<(Report, Option<Str
         eprintln!("note: this is not the mesh that the compound was fitted to");
     }
     let mut most = Some(0.0);
-    let pieces = Covering::pieces(Piece::of_mesh(&points, &triangles)?, cuts);
-    for (part, piece) in compound.parts().iter().zip(pieces) {
-        let points: Vec<_> = piece.spots().iter().map(|spot| spot.x).collect();
-        let (gap, wrong) = gap(args, part, &points, piece.uncertainty(), fitted_to);
+    let pieces = division.pieces(Piece::of_mesh(&points, &triangles)?, compound.parts().len())?;
+    for (part, pieces) in compound.parts().iter().zip(pieces) {
+        let points: Vec<_> = pieces.iter().flat_map(Piece::spots).map(|spot| spot.x).collect();
+        let uncertainty = pieces.iter().map(Piece::uncertainty).fold(0.0, f64::max);
+        let (gap, wrong) = gap(args, part, &points, uncertainty, fitted_to);
         most = most.zip(gap).map(|(most, gap): (f64, f64)| most.max(gap));
         trouble = trouble.or(wrong);
     }

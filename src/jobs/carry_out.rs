@@ -86,9 +86,10 @@ impl From<Vec<Rung>> for Made {
 }
 
 impl From<CompoundFit> for Made {
-    fn from(CompoundFit { compound, seconds }: CompoundFit) -> Self {
+    fn from(CompoundFit { compound, seconds, shortfall }: CompoundFit) -> Self {
         let (id, gap_m) = (compound.id().to_string(), compound.gap_m());
-        let took = FittedBody { kind: FittedKind::Compound, id, gap_m, seconds, ..FittedBody::default() };
+        let shortfall = shortfall.map(|shortfall| shortfall.to_string());
+        let took = FittedBody { kind: FittedKind::Compound, id, gap_m, seconds, shortfall, ..FittedBody::default() };
         Self::new(vec![took], Shapes::Compound(Box::new(compound)))
     }
 }

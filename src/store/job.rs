@@ -157,6 +157,9 @@ pub struct FittedBody {
     /// Which bodies of the group are inside, by their positions in it.
     #[serde(default, skip_serializing_if = "is_default")]
     pub members: Vec<usize>,
+    /// Why a compound has fewer parts than were asked for, if it has. Messages do not carry it.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub shortfall: Option<String>,
 }
 
 /// What a job can make.

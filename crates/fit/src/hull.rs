@@ -117,13 +117,19 @@ pub fn convex_hull(points: &[Vector3<f64>]) -> Result<Hull, HullError> {
     Err(HullError::Failed(failure))
 }
 
-/// About the volume of the convex hull, in half the time and less: nothing is checked, and points are moved a little, as those of
-/// flat facets can confuse the hull code. None for points without volume.
-pub(super) fn rough_volume(points: &[Vector3<f64>]) -> Option<f64> {
+/// About the vertices and the volume of the convex hull, in half the time and less: nothing is checked, and points are moved a little,
+/// as those of flat facets can confuse the hull code. None for points without volume.
+pub(super) fn rough_hull(points: &[Vector3<f64>]) -> Option<(Vec<Vector3<f64>>, f64)> {
     let frame = principal_frame(points).ok()?;
     let moved: Vec<_> = points.iter().enumerate().map(|(index, x)| frame.apply(x) + jitter(index) * 1e-7).collect();
-    let (_, facets) = facets(&moved).ok()?;
-    Some(volume(&moved, &facets) / frame.linear.determinant().abs())
+    let (vertices, facets) = facets(&moved).ok()?;
+    let volume = volume(&moved, &facets) / frame.linear.determinant().abs();
+    Some((vertices.into_iter().map(|vertex| points[vertex]).collect(), volume))
+}
+
+/// The volume of [`rough_hull`].
+pub(super) fn rough_volume(points: &[Vector3<f64>]) -> Option<f64> {
+    rough_hull(points).map(|(_, volume)| volume)
 }
 
 /// The frame in which the points have principal extents 1.

@@ -1,19 +1,20 @@
 //! Compounds: one body for each of the nearly convex pieces of a mesh.
 //!
-//! The mesh is cut by planes (`split`), each piece becomes a body as any points do, and [`Compound::with_covering`] proves that no
-//! triangle, and no interior of a closed mesh, is left out. Cut points are only known up to rounding, so each body is pulled around
-//! balls of that size. The gap of a part is measured to the convex hull of its own piece; the union of those hulls lies in the
-//! hull of the whole mesh.
+//! The mesh is separated into components, cut by planes, and divided among parts (`decompose`); each part becomes a body as any points
+//! do, and [`Compound::with_covering`] proves that no triangle, and no interior of a closed mesh, is left out. Cut points are only
+//! known up to rounding, so each body is pulled around balls of that size. The gap of a part is measured to the convex hull of its own
+//! pieces; the union of those hulls lies in the hull of the whole mesh.
 
+use super::decompose::{Decomposition, PartSearch};
 use super::hull::convex_hull;
 use super::ladder::{Costs, Rungs};
 use super::object::Object;
-use super::progress::Watch;
-use super::split::Partition;
-use super::{FitError, FitOptions, Mesh, Progress, Rung};
+use super::{FitError, FitOptions, Mesh, Progress, Rung, Shortfall};
+use nalgebra::Vector3;
+use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::time::Instant;
-use sublevel_core::body::{Body, Compound, Cut, Piece, Provenance};
+use sublevel_core::body::{Body, Compound, Division, NotCovered, Piece, Provenance};
 
 /// Most parts that can be asked for.
 pub const MAX_PIECES: usize = 64;
@@ -25,6 +26,8 @@ pub struct CompoundFit {
     pub compound: Compound,
     /// Wall time, seconds, with all that was tried before.
     pub seconds: f64,
+    /// Why there are fewer parts than were asked for, if there are.
+    pub shortfall: Option<Shortfall>,
 }
 
 /// A mesh with the name and the options of the compound around it.
@@ -34,8 +37,8 @@ pub(super) struct Source<'a> {
     pub(super) options: &'a FitOptions,
 }
 
-/// Cuts a mesh into at most `parts` pieces, fewer where no cut would gain anything, and fits a body to each. Triangles of a closed
-/// mesh are all counter-clockwise seen from outside, or all clockwise.
+/// Divides a mesh among at most `parts` parts, fewer where more would not make their hulls smaller, and fits a body to each. Triangles
+/// of a closed mesh are all counter-clockwise seen from outside, or all clockwise.
 ///
 /// # Errors
 /// As [`fit`](super::fit()), and [`FitError::Parts`], [`FitError::Mesh`], [`FitError::NotCovered`].
@@ -52,28 +55,39 @@ pub fn fit_parts(
     }
     let start = Instant::now();
     let source = Source { name, mesh, options };
-    let mut partition = source.whole()?;
-    while partition.pieces.len() < parts && divide(&mut partition, progress)? {}
+    let whole = source.whole()?;
+    let found = Decomposition::new(&whole, parts, PartSearch::Best, progress)?;
+    let made = found.fewest(parts);
+    let division = found.division(made);
     let mut bodies = Vec::new();
-    for (index, piece) in partition.pieces.iter().enumerate() {
-        let one = on_piece(index, piece, options, |object| {
+    for (index, points) in held(&whole, &division, made)?.into_iter().enumerate() {
+        let one = on_part(index, &points, options, |object| {
             object.cut(object.fit(options, progress)?, options.slabs, 0.0, progress)
         });
         bodies.push(one?.body);
     }
-    source.assemble(bodies, partition.cuts, start)
+    let shortfall = found.shortfall(made, parts);
+    source.assemble(bodies, division, shortfall, start)
 }
 
 impl Source<'_> {
     /// The mesh in one piece.
-    fn whole(&self) -> Result<Partition, FitError> {
-        Ok(Partition::new(Piece::of_mesh(&self.mesh.points, &self.mesh.triangles)?))
+    fn whole(&self) -> Result<Piece, FitError> {
+        Ok(Piece::of_mesh(&self.mesh.points, &self.mesh.triangles)?)
     }
 
     /// The proven compound of parts.
-    fn assemble(&self, parts: Vec<Body>, cuts: Vec<Cut>, start: Instant) -> Result<CompoundFit, FitError> {
+    fn assemble(
+        &self,
+        parts: Vec<Body>,
+        division: Division,
+        shortfall: Option<Shortfall>,
+        start: Instant,
+    ) -> Result<CompoundFit, FitError> {
         let Mesh { points, triangles } = self.mesh;
-        let hull = convex_hull(points)?;
+        // Of what is covered: vertices that no triangle uses are not.
+        let used: Vec<_> = self.whole()?.spots().iter().map(|spot| spot.x).collect();
+        let hull = convex_hull(&used)?;
         let provenance = Provenance {
             input: self.options.input.clone(),
             objective: self.options.objective.name().to_owned(),
@@ -81,21 +95,42 @@ impl Source<'_> {
             hull_vertices: hull.vertices.len(),
             hull_volume_m3: hull.volume,
         };
-        let compound = Compound::new(self.name, parts)?.with_covering(points, triangles, cuts)?;
-        Ok(CompoundFit { compound: compound.with_provenance(provenance), seconds: start.elapsed().as_secs_f64() })
+        let compound = Compound::new(self.name, parts)?.with_covering(points, triangles, division)?;
+        let compound = compound.with_provenance(provenance);
+        Ok(CompoundFit { compound, seconds: start.elapsed().as_secs_f64(), shortfall })
     }
 }
 
-/// The search for the cheapest compound within a gap. Pieces are cut further and further; what was tried of a piece is kept.
+/// The corners of the pieces that a part holds.
+pub(super) struct Held {
+    pub(super) points: Vec<Vector3<f64>>,
+    /// How far they may be from what they stand for, metres.
+    uncertainty: f64,
+}
+
+/// What each part of a division holds.
+pub(super) fn held(mesh: &Piece, division: &Division, parts: usize) -> Result<Vec<Held>, FitError> {
+    let pieces = division.pieces(mesh.clone(), parts).map_err(NotCovered::from)?;
+    let held = |pieces: Vec<Piece>| Held {
+        points: pieces.iter().flat_map(Piece::spots).map(|spot| spot.x).collect(),
+        uncertainty: pieces.iter().map(Piece::uncertainty).fold(0.0, f64::max),
+    };
+    Ok(pieces.into_iter().map(held).collect())
+}
+
+/// The search for the cheapest compound within a gap, of more and more parts; what was tried of a part is kept.
 pub(super) struct Search<'a> {
     source: Source<'a>,
     max_gap_m: f64,
     start: Instant,
-    partition: Partition,
-    tried: Vec<Tried>,
+    whole: Piece,
+    tried: HashMap<Key, Tried>,
 }
 
-/// What was tried of a piece.
+/// All coordinates of what a part holds: parts that hold the same are fitted alike.
+type Key = Vec<[u64; 3]>;
+
+/// What was tried of a part.
 #[derive(Clone, Default)]
 struct Tried {
     /// The lowest rung that is near enough.
@@ -106,7 +141,7 @@ struct Tried {
 
 impl<'a> Search<'a> {
     pub(super) fn new(source: Source<'a>, max_gap_m: f64, start: Instant) -> Result<Self, FitError> {
-        Ok(Self { partition: source.whole()?, source, max_gap_m, start, tried: vec![Tried::default()] })
+        Ok(Self { whole: source.whole()?, source, max_gap_m, start, tried: HashMap::new() })
     }
 
     /// The cheapest compound near enough that costs less than `budget`; none if there is none.
@@ -115,47 +150,45 @@ impl<'a> Search<'a> {
         budget: f64,
         progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<Option<CompoundFit>, FitError> {
+        // So many that each could cost the least.
+        let affordable = |budget: f64| ((budget / Costs::LEAST).ceil() as usize).saturating_sub(1).min(MAX_PIECES);
+        let found = Decomposition::new(&self.whole, affordable(budget).max(1), PartSearch::Best, progress)?;
         let mut best = None;
         let mut most = budget;
-        loop {
-            let parts = self.partition.pieces.len();
-            if parts > 1
-                && let Some((cost, bodies)) = self.climb(most, progress)?
-            {
-                best = Some((bodies, self.partition.cuts.clone()));
-                most = cost;
-            }
-            if (parts + 1) as f64 * Costs::LEAST >= most || !self.divide(progress)? {
+        for parts in 2..=found.most() {
+            if parts > affordable(most) {
                 break;
             }
+            if found.fewest(parts) < parts {
+                continue;
+            }
+            let division = found.division(parts);
+            let held = held(&self.whole, &division, parts)?;
+            if let Some((cost, bodies)) = self.climb(&held, most, progress)? {
+                best = Some((bodies, division));
+                most = cost;
+            }
         }
-        best.map(|(bodies, cuts)| self.source.assemble(bodies, cuts, self.start)).transpose()
+        best.map(|(bodies, division)| self.source.assemble(bodies, division, None, self.start)).transpose()
     }
 
-    fn divide(&mut self, progress: &mut dyn FnMut(Progress) -> ControlFlow<()>) -> Result<bool, FitError> {
-        if !divide(&mut self.partition, progress)? {
-            return Ok(false);
-        }
-        if let Some(cut) = self.partition.cuts.last() {
-            self.tried[cut.part] = Tried::default();
-            self.tried.push(Tried::default());
-        }
-        Ok(true)
-    }
-
-    /// The lowest rungs near enough of all pieces, if they cost less than `most` together, and what they cost.
+    /// The lowest rungs near enough of all parts, if they cost less than `most` together, and what they cost.
     fn climb(
         &mut self,
+        held: &[Held],
         most: f64,
         progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<Option<(f64, Vec<Body>)>, FitError> {
-        let Self { source, max_gap_m, partition, tried, .. } = self;
+        let Self { source, max_gap_m, tried, .. } = self;
         let mut cost = 0.0;
-        for (index, (piece, tried)) in partition.pieces.iter().zip(tried.iter_mut()).enumerate() {
-            let rest = (partition.pieces.len() - index - 1) as f64 * Costs::LEAST;
+        let mut bodies = Vec::new();
+        for (index, part) in held.iter().enumerate() {
+            let rest = (held.len() - index - 1) as f64 * Costs::LEAST;
             let allowed = most - cost - rest;
+            let tried =
+                tried.entry(part.points.iter().map(|x| [0, 1, 2].map(|i| x[i].to_bits())).collect()).or_default();
             if tried.found.is_none() && Costs::of_part(tried.rungs) < allowed {
-                on_piece(index, piece, source.options, |object| {
+                on_part(index, part, source.options, |object| {
                     let mut rungs = Rungs::new(object, *max_gap_m, source.options);
                     while tried.found.is_none() && Costs::of_part(tried.rungs) < allowed {
                         tried.found = rungs.try_one(tried.rungs, progress)?;
@@ -165,32 +198,29 @@ impl<'a> Search<'a> {
                 })?;
             }
             match &tried.found {
-                Some(rung) if Costs::of(&rung.body) < allowed => cost += Costs::of(&rung.body),
+                Some(rung) if Costs::of(&rung.body) < allowed => {
+                    cost += Costs::of(&rung.body);
+                    bodies.push(rung.body.renamed(&part_name(index))?);
+                }
                 _ => return Ok(None),
             }
         }
-        let found = tried.iter().filter_map(|tried| Some(tried.found.as_ref()?.body.clone()));
-        Ok(Some((cost, found.collect())))
+        Ok(Some((cost, bodies)))
     }
 }
 
-fn divide(partition: &mut Partition, progress: &mut dyn FnMut(Progress) -> ControlFlow<()>) -> Result<bool, FitError> {
-    let mut watch = Watch::new(progress);
-    watch.round(partition.pieces.len(), 0.0);
-    watch.iteration(0.0)?;
-    Ok(partition.divide())
+fn part_name(index: usize) -> String {
+    format!("part {index}")
 }
 
-/// Does something with the object that a piece is.
-fn on_piece<T>(
+/// Does something with the object that a part holds.
+fn on_part<T>(
     index: usize,
-    piece: &Piece,
+    held: &Held,
     options: &FitOptions,
     work: impl FnOnce(&Object<'_>) -> Result<T, FitError>,
 ) -> Result<T, FitError> {
-    let points: Vec<_> = piece.spots().iter().map(|spot| spot.x).collect();
-    let name = format!("part {index}");
-    work(&Object::new(&name, &points, &options.input)?.around(piece.uncertainty()))
+    work(&Object::new(&part_name(index), &held.points, &options.input)?.around(held.uncertainty))
 }
 
 #[cfg(test)]
@@ -269,7 +299,7 @@ mod tests {
         assert_eq!(compound.parts().len(), 3);
         let covering = compound.covering().unwrap();
         assert_eq!(covering.proven, Covered::Interior);
-        let (covered, most) = compound.prove_covers(&mesh.points, &mesh.triangles, &covering.cuts).unwrap();
+        let (covered, most) = compound.prove_covers(&mesh.points, &mesh.triangles, &covering.division).unwrap();
         assert!(covered == Covered::Interior && most <= 1.0 && most > 1.0 - 1e-9, "{most}");
         // The letter's own volume is 0.132, that of its hull 0.24.
         let volume = compound.volume().volume_m3;

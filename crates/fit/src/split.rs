@@ -1,4 +1,4 @@
-//! Where to cut an object into pieces that are nearly convex.
+//! Where to cut an object into pieces that are nearly convex: the search by gain alone.
 //!
 //! What a piece wastes is the part of its convex hull that the object does not fill. The pieces of an object fill the same, so the
 //! best cut of a piece is the one whose two sides have hulls of the least volume together; the best of all pieces is made, again and
@@ -13,10 +13,10 @@ use sublevel_core::body::{Cut, Piece, Sphere};
 const HEIGHTS: usize = 15;
 
 /// Cuts that are measured exactly.
-const FINALISTS: usize = 6;
+pub(super) const FINALISTS: usize = 6;
 
 /// Part of a piece's hull that a side must at least have: thinner ones are not worth a part, nor easy to fit.
-const LEAST_SHARE: f64 = 1e-3;
+pub(super) const LEAST_SHARE: f64 = 1e-3;
 
 /// Longest distance between samples of an edge, relative to the piece.
 const SPACING: f64 = 1.0 / 64.0;
@@ -28,8 +28,10 @@ const MAX_SAMPLES: usize = 20_000;
 pub(super) struct Partition {
     /// The cuts in their order.
     pub(super) cuts: Vec<Cut>,
+    /// Total volumes of the pieces' hulls, before each cut and after the last.
+    pub(super) totals: Vec<f64>,
     /// The pieces they leave, numbered as they say.
-    pub(super) pieces: Vec<Piece>,
+    pieces: Vec<Piece>,
     /// What is known of the best cut of each piece.
     plans: Vec<Best>,
 }
@@ -56,7 +58,8 @@ struct Plan {
 impl Partition {
     /// The mesh in one piece.
     pub(super) fn new(mesh: Piece) -> Self {
-        Self { cuts: Vec::new(), pieces: vec![mesh], plans: vec![Best::Unknown] }
+        let total = rough_volume(&points(&mesh)).unwrap_or(0.0);
+        Self { cuts: Vec::new(), totals: vec![total], pieces: vec![mesh], plans: vec![Best::Unknown] }
     }
 
     /// Makes the cut that gains most; tells whether there was one.
@@ -69,13 +72,14 @@ impl Partition {
         let gain = |best: &Best| if let Best::Cut(plan) = best { plan.gain } else { 0.0 };
         let part = (0..self.plans.len()).max_by(|&a, &b| gain(&self.plans[a]).total_cmp(&gain(&self.plans[b])));
         let Some(part) = part else { return false };
-        let Best::Cut(Plan { normal, height, sides: [below, above], .. }) =
+        let Best::Cut(Plan { normal, height, gain, sides: [below, above] }) =
             std::mem::replace(&mut self.plans[part], Best::Unknown)
         else {
             self.plans[part] = Best::Nothing;
             return false;
         };
         self.cuts.push(Cut { part, normal: normal.into(), height_m: height });
+        self.totals.extend(self.totals.last().map(|total| total - gain));
         self.pieces[part] = below;
         self.pieces.push(above);
         self.plans.push(Best::Unknown);
@@ -86,7 +90,7 @@ impl Partition {
 /// The best cut of a piece.
 fn plan(piece: &Piece) -> Option<Plan> {
     let whole = rough_volume(&points(piece))?;
-    let mut promises = promises(piece, whole);
+    let mut promises = Scan::FULL.promises(&samples(&[piece]), whole);
     promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     promises.truncate(FINALISTS);
     let measured = promises.into_iter().filter_map(|Promise { normal, height, .. }| {
@@ -104,35 +108,58 @@ fn points(piece: &Piece) -> Vec<Vector3<f64>> {
 }
 
 /// A plane and about what it gains.
-struct Promise {
-    normal: Vector3<f64>,
-    height: f64,
-    gain: f64,
+pub(super) struct Promise {
+    pub(super) normal: Vector3<f64>,
+    pub(super) height: f64,
+    pub(super) gain: f64,
 }
 
-/// Planes of all directions and heights with what they gain by hulls of few samples.
-fn promises(piece: &Piece, whole: f64) -> Vec<Promise> {
-    let samples = samples(piece);
-    let (_, axes, _) = principal_axes(&samples);
-    let probes = Sphere::subdivided(2);
-    let reaches: Vec<Vec<f64>> =
-        samples.iter().map(|x| probes.vertices().iter().map(|probe| probe.dot(x)).collect()).collect();
-    let even = Sphere::subdivided(1);
-    let half = even.vertices().iter().copied().filter(|n| (n.z, n.y, n.x) > (0.0, 0.0, 0.0));
-    let normals = half.chain(axes.column_iter().map(Into::into)).chain((0..3).map(|i| Vector3::ith(i, 1.0)));
-    normals.flat_map(|normal| along(&samples, &reaches, normal, whole)).collect()
+/// How closely planes are looked through.
+pub(super) struct Scan {
+    /// Subdivisions of the icosahedron whose vertices the samples of a hull are farthest along.
+    probes: usize,
+    /// Subdivisions of the one whose vertices are normals; principal axes and those of coordinates alone if none.
+    normals: Option<usize>,
+    /// Heights per normal.
+    heights: usize,
+}
+
+impl Scan {
+    /// All that is looked through.
+    pub(super) const FULL: Self = Self { probes: 2, normals: Some(1), heights: HEIGHTS };
+
+    /// A glance, in a fortieth of the time.
+    pub(super) const GLANCE: Self = Self { probes: 1, normals: None, heights: 7 };
+
+    /// Planes of all directions and heights with what they gain by hulls of few samples.
+    pub(super) fn promises(&self, samples: &[Vector3<f64>], whole: f64) -> Vec<Promise> {
+        let (_, axes, _) = principal_axes(samples);
+        let probes = Sphere::subdivided(self.probes);
+        let reaches: Vec<Vec<f64>> =
+            samples.iter().map(|x| probes.vertices().iter().map(|probe| probe.dot(x)).collect()).collect();
+        let even = self.normals.map(|levels| Sphere::subdivided(levels).vertices().to_vec()).unwrap_or_default();
+        let half = even.into_iter().filter(|n| (n.z, n.y, n.x) > (0.0, 0.0, 0.0));
+        let normals = half.chain(axes.column_iter().map(Into::into)).chain((0..3).map(|i| Vector3::ith(i, 1.0)));
+        normals.flat_map(|normal| along(samples, &reaches, normal, whole, self.heights)).collect()
+    }
 }
 
 /// The planes across one direction.
-fn along(samples: &[Vector3<f64>], reaches: &[Vec<f64>], normal: Vector3<f64>, whole: f64) -> Vec<Promise> {
+fn along(
+    samples: &[Vector3<f64>],
+    reaches: &[Vec<f64>],
+    normal: Vector3<f64>,
+    whole: f64,
+    planes: usize,
+) -> Vec<Promise> {
     let heights: Vec<f64> = samples.iter().map(|x| normal.dot(x)).collect();
     let (low, high) = heights.iter().fold((f64::MAX, f64::MIN), |(low, high), &h| (low.min(h), high.max(h)));
-    let step = (high - low) / (HEIGHTS + 1) as f64;
+    let step = (high - low) / (planes + 1) as f64;
     // For each layer between two planes how far it reaches along each probe, and the sample that does.
     let nothing = vec![(f64::NEG_INFINITY, 0); reaches.first().map_or(0, Vec::len)];
-    let mut layers = vec![nothing.clone(); HEIGHTS + 1];
+    let mut layers = vec![nothing.clone(); planes + 1];
     for (sample, height) in heights.iter().enumerate() {
-        let layer = &mut layers[(((height - low) / step) as usize).min(HEIGHTS)];
+        let layer = &mut layers[(((height - low) / step) as usize).min(planes)];
         for (best, &reach) in layer.iter_mut().zip(&reaches[sample]) {
             if reach > best.0 {
                 *best = (reach, sample);
@@ -159,25 +186,27 @@ fn along(samples: &[Vector3<f64>], reaches: &[Vec<f64>], normal: Vector3<f64>, w
     let below = volumes(&mut layers.iter());
     let above = volumes(&mut layers.iter().rev());
     let promise = |plane: usize| {
-        let gain = whole - below[plane]? - above[HEIGHTS - 1 - plane]?;
+        let gain = whole - below[plane]? - above[planes - 1 - plane]?;
         Some(Promise { normal, height: low + step * (plane + 1) as f64, gain })
     };
-    (0..HEIGHTS).filter_map(promise).collect()
+    (0..planes).filter_map(promise).collect()
 }
 
-/// The corners of a piece, and points along its long edges, which planes may cut.
-fn samples(piece: &Piece) -> Vec<Vector3<f64>> {
-    let mut samples = points(piece);
-    let (low, high) = samples
-        .iter()
-        .fold((Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)), |(low, high), x| (low.inf(x), high.sup(x)));
+/// The corners of pieces, and points along their long edges, which planes may cut.
+pub(super) fn samples(pieces: &[&Piece]) -> Vec<Vector3<f64>> {
+    let corners = || pieces.iter().flat_map(|piece| piece.spots()).map(|spot| spot.x);
+    let (low, high) = corners()
+        .fold((Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)), |(low, high), x| (low.inf(&x), high.sup(&x)));
     let spacing = SPACING * (high - low).norm();
-    for triangle in piece.triangles() {
-        for (a, b) in [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (triangle[i], triangle[j])) {
-            let (p, q) = (samples[a], samples[b]);
-            // Most edges are passed both ways.
-            let count = if a < b { ((q - p).norm() / spacing) as usize } else { 0 };
-            samples.extend((1..=count).map(|k| p + (q - p) * (k as f64 / (count + 1) as f64)));
+    let mut samples: Vec<_> = corners().collect();
+    for piece in pieces {
+        for triangle in piece.triangles() {
+            for (a, b) in [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (triangle[i], triangle[j])) {
+                let (p, q) = (piece.spots()[a].x, piece.spots()[b].x);
+                // Most edges are passed both ways.
+                let count = if a < b { ((q - p).norm() / spacing) as usize } else { 0 };
+                samples.extend((1..=count).map(|k| p + (q - p) * (k as f64 / (count + 1) as f64)));
+            }
         }
     }
     let every = samples.len().div_ceil(MAX_SAMPLES);

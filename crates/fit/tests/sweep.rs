@@ -85,7 +85,7 @@ fn every_mesh_becomes_a_compound() {
         let again = Compound::from_json(&compound.to_json()).unwrap_or_else(|error| panic!("{what}: {error}"));
         let covering = again.covering().expect("fits note what they cover");
         let (covered, most) = again
-            .prove_covers(&mesh.points, &mesh.triangles, &covering.cuts)
+            .prove_covers(&mesh.points, &mesh.triangles, &covering.division)
             .unwrap_or_else(|error| panic!("{what}: {error}"));
         println!("{what}: {} parts, {covered:?}, volume {:.4e} m³", again.parts().len(), again.volume().volume_m3);
         assert!(covered == covering.proven && most <= 1.0, "{what}");

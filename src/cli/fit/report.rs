@@ -28,6 +28,9 @@ pub(super) struct Convex {
     slabs: usize,
     /// 1 for a body that is no compound.
     parts: usize,
+    /// What --parts asked for, and why fewer came out if they did.
+    parts_asked: Option<usize>,
+    shortfall: Option<String>,
     /// What a compound is proven to cover of the mesh: "interior" or "surface_only".
     covers: Option<&'static str>,
     /// What was minimised: the objective, or the radius of a ball.
@@ -118,7 +121,12 @@ pub(super) fn write(
         }
         Shapes::Compound(compound) => {
             let file = write(format!("d{}-p{}", compound.degree(), compound.parts().len()), compound.to_json())?;
-            vec![Row::Convex(compound_row(input, &file, used, compound, &outcome.bodies[0]))]
+            let mut row = compound_row(input, &file, used, compound, &outcome.bodies[0]);
+            (row.parts_asked, row.shortfall) = (order.parts, shortfall(order, compound, &outcome.bodies[0]));
+            if let (Some(asked), Some(reason)) = (row.parts_asked, &row.shortfall) {
+                eprintln!("note: {}: {} of {asked} parts: {reason}", input.display(), row.parts);
+            }
+            vec![Row::Convex(row)]
         }
         Shapes::SosBody(body) => {
             let kind =
@@ -144,6 +152,13 @@ fn kind(body: &Body, took: &FittedBody) -> String {
         (Some(_), 0) => format!("d{}", body.degree()),
         (Some(_), slabs) => format!("d{}-s{slabs}", body.degree()),
     }
+}
+
+/// Why a compound has fewer parts than were asked for.
+fn shortfall(order: &FitOrder, compound: &Compound, took: &FittedBody) -> Option<String> {
+    order.parts.filter(|&asked| compound.parts().len() < asked)?;
+    let unknown = || "more would not reduce the volume of the hulls (a server's answer has no details)".to_owned();
+    Some(took.shortfall.clone().unwrap_or_else(unknown))
 }
 
 fn note_refinement(file: &Path, took: &FittedBody) {
@@ -176,6 +191,8 @@ fn body_row(input: &Path, file: &Path, outcome: &FitOutcome, body: &Body, took: 
         degree: body.degree(),
         slabs: body.constraints().len() - 1,
         parts: 1,
+        parts_asked: None,
+        shortfall: None,
         covers: None,
         objective: made.objective,
         refined: made.refined,
@@ -210,6 +227,8 @@ fn compound_row(input: &Path, file: &Path, points: usize, compound: &Compound, t
         degree: compound.degree(),
         slabs: parts.iter().map(|part| part.constraints().len() - 1).max().unwrap_or(0),
         parts: parts.len(),
+        parts_asked: None,
+        shortfall: None,
         covers: compound.covering().map(|covering| covering.proven.name()),
         objective: made.objective,
         refined: made.refined,

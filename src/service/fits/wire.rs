@@ -117,6 +117,7 @@ pub(super) fn outcome(result: &FitResult) -> Option<FitOutcome> {
                 refinement_end: Some(optimum.refinement_end.clone()).filter(|end| !end.is_empty()),
             }),
             members: made.members.iter().map(|&member| usize::try_from(member).unwrap_or(usize::MAX)).collect(),
+            shortfall: None,
         })
     };
     let bodies = result.bodies.iter().map(body).collect::<Option<_>>()?;

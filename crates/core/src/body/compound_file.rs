@@ -1,7 +1,7 @@
 //! The file of a compound: the files of its parts in one, with the record of what they were proven to cover.
 
 use super::file::{BodyFileError, FORMAT, File, check_format, read, write};
-use super::{Body, Compound, Covering, Provenance};
+use super::{Body, Compound, Covering, DivisionError, Provenance};
 use serde::{Deserialize, Serialize};
 
 pub(super) const KIND: &str = "compound";
@@ -63,15 +63,20 @@ impl Compound {
 /// Checks what no proof covers, as far as it can be.
 fn check_notes(file: &CompoundFile) -> Result<(), BodyFileError> {
     let refuse = |field: &str, reason: &str| BodyFileError::Field { field: field.into(), reason: reason.into() };
-    if let Some(Covering { corners, cuts, .. }) = &file.covering {
+    if let Some(Covering { corners, division, .. }) = &file.covering {
         corners.check("covering.corners")?;
-        if cuts.len() + 1 != file.parts.len() {
-            return Err(refuse("covering.cuts", "must be one fewer than there are parts, or covering null"));
-        }
-        if let Some(index) = Covering::bad_cut(cuts) {
-            let reason = "must divide a part made before by a plane with finite numbers and a unit normal";
-            return Err(refuse(&format!("covering.cuts[{index}]"), reason));
-        }
+        division.check(file.parts.len()).map_err(|error| {
+            let field = match error {
+                DivisionError::Pieces { .. } if division.parts.is_empty() && !division.separated => {
+                    return refuse("covering.cuts", "must be one fewer than there are parts, or covering null");
+                }
+                DivisionError::Pieces { .. } => "covering.cuts".to_owned(),
+                DivisionError::Cut(index) => format!("covering.cuts[{index}]"),
+                DivisionError::NoPart { piece, .. } => format!("covering.parts[{piece}]"),
+                DivisionError::NoPiece(_) => "covering.parts".to_owned(),
+            };
+            refuse(&field, &error.to_string())
+        })?;
     }
     if let Some(provenance) = &file.provenance {
         provenance.check()?;

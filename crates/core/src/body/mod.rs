@@ -4,11 +4,14 @@
 //! recomputes everything derived from the polynomials. What need not be convex is an [`SosBody`], which no measure takes.
 //! Lengths are metres in the body frame unless a name says otherwise; `z` is the unit-free normalized frame, `z = L (x - c)`.
 
+mod cap;
+mod component;
 mod compound;
 mod compound_file;
 mod contained_file;
 mod containment;
 mod covering;
+mod division;
 mod extent;
 mod file;
 mod id;
@@ -26,12 +29,13 @@ mod union;
 
 pub use compound::{Compound, CompoundError, MAX_PARTS, Solid};
 pub use containment::{BasicSet, ContainedSet, Containment, ProofFrame};
-pub use covering::{Covered, Covering, Cut, NotCovered};
+pub use covering::{Covered, Covering, NotCovered};
+pub use division::{Cut, Division, DivisionError};
 pub use file::BodyFileError;
 pub use id::{BodyId, ParseIdError};
 pub use obstacle::Obstacle;
 pub use outline::{Cell, Outline};
-pub use piece::{MeshError, Piece, Spot};
+pub use piece::{Caps, MeshError, Piece, Spot};
 pub use placement::{Placement, Sample};
 pub use shape::Shape;
 pub use sos::{Coverage, Relaxation, SosBody, SosBodyError, TriangleError, Uncovered};

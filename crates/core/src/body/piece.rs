@@ -7,7 +7,7 @@
 //! - **The surface** lies in the hulls of the pieces: a triangle is the union of those it is split into, and each piece has its own
 //!   among its triangles.
 //! - **The interior** of a closed mesh, where its winding number is not 0, does so too. As chains, the mesh is the sum of its pieces:
-//!   caps cancel. Each is a cycle, as caps are cones over the loops that the cuts leave of its boundary. So the winding numbers
+//!   caps cancel. Each is a cycle, as the boundary of a cap is what the cut leaves of the piece's own. So the winding numbers
 //!   about a point add up, and where the mesh's is not 0 that of some piece is not either. But about a point outside its hull a cycle
 //!   has winding number 0. (On the triangles themselves it is not defined; hulls are closed, and these points limits of others.)
 //!
@@ -16,9 +16,14 @@
 //! was used; its coordinates are known to be within a radius of it, which grows by a few roundings with each cut. So the claims
 //! hold for convex sets that contain not the spots alone but balls of their radii.
 
+use super::cap::{MOST_CORNERS, cap};
 use nalgebra::Vector3;
+use std::cmp::Ordering;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
+
+/// Spots nearer to a plane than this part of the piece's size are on it, when caps are sections.
+const NEAR: f64 = 1e-9;
 
 /// A point known up to rounding, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,6 +65,17 @@ pub enum MeshError {
     NotFinite(usize),
 }
 
+/// What closes a piece again where a plane has cut it open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Caps {
+    /// Cones over what the cut leaves of the boundary, one over each part that hangs together: they can reach across a hole.
+    Cones,
+    /// The section with the plane, triangulated; cones where it has more than a few thousand corners.
+    Sections,
+    /// Nothing: the pieces are open. They have the spots that they have with sections.
+    Missing,
+}
+
 /// A chain of triangles; each spot is a corner of some.
 #[derive(Clone, Debug, Default)]
 pub struct Piece {
@@ -95,8 +111,15 @@ impl Piece {
                 })
             }));
         }
-        piece.closed = piece.boundary_is_empty();
+        piece.closed = piece.is_cycle();
         Ok(piece)
+    }
+
+    /// The piece of some triangles between spots, with those that it needs.
+    pub(super) fn of_triangles(spots: &[Spot], triangles: Vec<[usize; 3]>) -> Self {
+        let mut piece = Self::compact(spots, triangles, false);
+        piece.closed = piece.is_cycle();
+        piece
     }
 
     /// Corners of the triangles.
@@ -149,16 +172,98 @@ impl Piece {
             chords.push(if above[lone] == 0 { (p, q) } else { (q, p) });
         }
         if self.closed {
-            let apex = apexes(&chords);
-            for &(p, q) in &chords {
-                let apex = apex[&p];
-                if apex != p && apex != q {
-                    sides[0].push([apex, q, p]);
-                    sides[1].push([apex, p, q]);
+            cone(&mut sides, &chords);
+        }
+        sides.map(|triangles| Self::compact(&spots, triangles, self.closed))
+    }
+
+    /// As [`Piece::cut`], with other caps, and more exactly along faces: spots that are near the plane, in proportion to the piece, are
+    /// on it and belong to both sides.
+    pub fn cut_with(&self, normal: &Vector3<f64>, height: f64, caps: Caps) -> [Self; 2] {
+        if caps == Caps::Cones {
+            return self.cut(normal, height);
+        }
+        let mut spots = self.spots.clone();
+        let heights = self.heights(normal, height);
+        let mut middles = HashMap::new();
+        let mut middle = |a: usize, b: usize| {
+            let (a, b) = (a.min(b), a.max(b));
+            *middles.entry((a, b)).or_insert_with(|| {
+                let t = heights[a] / (heights[a] - heights[b]);
+                spots.push(Spot::between(&spots[a], &spots[b], t));
+                spots.len() - 1
+            })
+        };
+        let mut sides = [Vec::new(), Vec::new()];
+        let mut flat = Vec::new();
+        for triangle in &self.triangles {
+            let signs = triangle.map(|corner| heights[corner].partial_cmp(&0.0).unwrap_or(Ordering::Equal));
+            let [below, above] = [Ordering::Less, Ordering::Greater].map(|sign| signs.contains(&sign));
+            match (below, above) {
+                (false, false) => flat.push(*triangle),
+                (true, false) => sides[0].push(*triangle),
+                (false, true) => sides[1].push(*triangle),
+                (true, true) => {
+                    let of = |i: usize| usize::from(signs[i] == Ordering::Greater);
+                    if let Some(i) = signs.iter().position(|&sign| sign == Ordering::Equal) {
+                        let [on, b, c] = [0, 1, 2].map(|k| triangle[(i + k) % 3]);
+                        let p = middle(b, c);
+                        sides[of((i + 1) % 3)].push([on, b, p]);
+                        sides[of((i + 2) % 3)].push([on, p, c]);
+                    } else if let Some(i) = (0..3).find(|&i| of(i) != of((i + 1) % 3) && of(i) != of((i + 2) % 3)) {
+                        let [a, b, c] = [0, 1, 2].map(|k| triangle[(i + k) % 3]);
+                        let (p, q) = (middle(a, b), middle(a, c));
+                        sides[of(i)].push([a, p, q]);
+                        sides[1 - of(i)].extend([[p, b, c], [p, c, q]]);
+                    }
                 }
             }
         }
-        sides.map(|triangles| Self::compact(&spots, triangles, self.closed))
+        if !flat.is_empty() {
+            let inward = self.signed_volume() < 0.0;
+            for triangle in flat {
+                // A face in the plane belongs to the side where the solid behind it is.
+                let [a, b, c] = triangle.map(|corner| spots[corner].x);
+                let up = (b - a).cross(&(c - a)).dot(normal) >= 0.0;
+                sides[usize::from(up == inward)].push(triangle);
+            }
+        }
+        let closed = self.closed && caps == Caps::Sections;
+        if closed {
+            // The piece is a cycle: what bounds one side bounds the other, passed the other way.
+            let chords: Vec<(usize, usize)> = boundary(&sides[0]).collect();
+            if chords.len() <= MOST_CORNERS {
+                let section = cap(&spots, &chords, normal);
+                sides[0].extend(&section);
+                sides[1].extend(section.iter().map(|&[a, b, c]| [a, c, b]));
+            } else {
+                cone(&mut sides, &chords);
+            }
+        }
+        sides.map(|triangles| Self::compact(&spots, triangles, closed))
+    }
+
+    /// Whether [`Piece::cut_with`] leaves the piece whole, below the plane (0) or above it (1); none if it is divided.
+    pub fn side(&self, normal: &Vector3<f64>, height: f64) -> Option<usize> {
+        let heights = self.heights(normal, height);
+        let [below, above] = [heights.iter().any(|&h| h < 0.0), heights.iter().any(|&h| h > 0.0)];
+        (!(below && above)).then_some(usize::from(above))
+    }
+
+    /// Heights of the spots above a plane, 0 near it.
+    fn heights(&self, normal: &Vector3<f64>, height: f64) -> Vec<f64> {
+        let ends = [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)];
+        let [low, high] = self.spots.iter().fold(ends, |[low, high], spot| [low.inf(&spot.x), high.sup(&spot.x)]);
+        let near = NEAR * (high - low).norm();
+        let above = |spot: &Spot| normal.dot(&spot.x) - height;
+        self.spots.iter().map(above).map(|h| if h.abs() <= near { 0.0 } else { h }).collect()
+    }
+
+    /// Volume inside a closed piece, negative if its triangles are clockwise seen from outside.
+    pub fn signed_volume(&self) -> f64 {
+        let Some(origin) = self.spots.first() else { return 0.0 };
+        let at = |corner: usize| self.spots[corner].x - origin.x;
+        self.triangles.iter().map(|&[a, b, c]| at(a).dot(&at(b).cross(&at(c)))).sum::<f64>() / 6.0
     }
 
     /// The piece of some triangles, with the spots that they need.
@@ -175,14 +280,37 @@ impl Piece {
         Self { spots: kept, triangles, closed }
     }
 
-    fn boundary_is_empty(&self) -> bool {
-        let mut passes: HashMap<(usize, usize), i64> = HashMap::new();
-        for &[a, b, c] in &self.triangles {
-            for (p, q) in [(a, b), (b, c), (c, a)] {
-                *passes.entry((p.min(q), p.max(q))).or_default() += (q as i64 - p as i64).signum();
-            }
+    /// Whether every edge is passed as often one way as the other, counted.
+    pub fn is_cycle(&self) -> bool {
+        boundary(&self.triangles).next().is_none()
+    }
+}
+
+/// Edges that triangles pass more often one way than the other, in their order, as often as they do.
+fn boundary(triangles: &[[usize; 3]]) -> impl Iterator<Item = (usize, usize)> {
+    let mut passes: HashMap<(usize, usize), i64> = HashMap::new();
+    for &[a, b, c] in triangles {
+        for (p, q) in [(a, b), (b, c), (c, a)] {
+            *passes.entry((p.min(q), p.max(q))).or_default() += (q as i64 - p as i64).signum();
         }
-        passes.values().all(|&net| net == 0)
+    }
+    let mut passes: Vec<_> = passes.into_iter().filter(|&(_, net)| net != 0).collect();
+    passes.sort_unstable();
+    passes.into_iter().flat_map(|((low, high), net)| {
+        let chord = if net > 0 { (low, high) } else { (high, low) };
+        std::iter::repeat_n(chord, net.unsigned_abs() as usize)
+    })
+}
+
+/// Closes both sides of a cut by cones over the chords, which pass the boundary of what is below.
+fn cone(sides: &mut [Vec<[usize; 3]>; 2], chords: &[(usize, usize)]) {
+    let apex = apexes(chords);
+    for &(p, q) in chords {
+        let apex = apex[&p];
+        if apex != p && apex != q {
+            sides[0].push([apex, q, p]);
+            sides[1].push([apex, p, q]);
+        }
     }
 }
 

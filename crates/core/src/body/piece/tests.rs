@@ -1,4 +1,4 @@
-use super::{MeshError, Piece, Spot};
+use super::{Caps, MeshError, Piece, Spot};
 use crate::body::Sphere;
 use dashu_ratio::RBig;
 use nalgebra::Vector3;
@@ -143,7 +143,7 @@ fn pieces_add_up_to_the_mesh_without_rounding() {
             pieces = halves.collect();
         }
         for (piece, truth) in &pieces {
-            assert!(piece.boundary_is_empty(), "seed {seed}");
+            assert!(piece.is_cycle(), "seed {seed}");
             for spot in piece.spots() {
                 assert!(holds(spot, &truth[&key(spot)]), "seed {seed}: {spot:?}");
                 assert!(spot.radius < 1e-13 * (1.0 + center), "seed {seed}: {spot:?}");
@@ -155,14 +155,15 @@ fn pieces_add_up_to_the_mesh_without_rounding() {
 
 #[test]
 fn winding_numbers_add_up() {
-    for seed in 0..20 {
+    for (seed, caps) in (0..20).flat_map(|seed| [(seed, Caps::Cones), (seed, Caps::Sections)]) {
         let mut random = Seeded(seed);
         let mesh = piece(&burr(seed, 0.0));
         let mut pieces = vec![mesh.clone()];
         for _ in 0..3 {
             let (normal, height) = random_plane(&mut random, 0.0);
-            pieces = pieces.iter().flat_map(|piece| piece.cut(&normal, height)).collect();
+            pieces = pieces.iter().flat_map(|piece| piece.cut_with(&normal, height, caps)).collect();
         }
+        assert!(pieces.iter().all(|piece| piece.is_closed() && piece.is_cycle()), "seed {seed}, {caps:?}");
         let mut inside = 0;
         for _ in 0..300 {
             let x = Vector3::from_fn(|_, _| 1.6 * random.signed());
@@ -205,10 +206,12 @@ fn planes_through_corners_and_along_faces_do_no_harm() {
         (turned, turned.x + turned.y),
         (Vector3::new(0.6, 0.8, 1e-17), 0.2),
     ] {
-        let halves = piece(&cube()).cut(&normal, height);
-        assert!(halves.iter().all(Piece::boundary_is_empty));
-        let sum: f64 = halves.iter().map(volume).sum();
-        assert!((sum - 8.0).abs() < 1e-12, "{normal:?} {height}: {sum}");
+        for caps in [Caps::Cones, Caps::Sections] {
+            let halves = piece(&cube()).cut_with(&normal, height, caps);
+            assert!(halves.iter().all(Piece::is_cycle));
+            let sum: f64 = halves.iter().map(volume).sum();
+            assert!((sum - 8.0).abs() < 1e-12, "{caps:?} {normal:?} {height}: {sum}");
+        }
     }
 }
 
@@ -239,4 +242,68 @@ fn open_meshes_are_told_from_closed_ones() {
     let mut nowhere = points;
     nowhere[2].y = f64::NAN;
     assert_eq!(Piece::of_mesh(&nowhere, &triangles).unwrap_err(), MeshError::NotFinite(2));
+}
+
+/// An L of two boxes, 1 m wide, and its mirror image inside out.
+fn letter_l(inward: bool) -> Piece {
+    let outline = [[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]];
+    let points: Vec<Vector3<f64>> =
+        [0.0, 1.0].iter().flat_map(|&z| outline.map(|[x, y]| Vector3::new(x, y, z))).collect();
+    let mut triangles = Vec::new();
+    for [a, b, c] in [[0, 1, 2], [0, 2, 3], [0, 3, 5], [3, 4, 5]] {
+        triangles.extend([[a, c, b], [a + 6, b + 6, c + 6]]);
+    }
+    for i in 0..6 {
+        let next = (i + 1) % 6;
+        triangles.extend([[i, next, next + 6], [i, next + 6, i + 6]]);
+    }
+    if inward {
+        triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    }
+    Piece::of_mesh(&points, &triangles).unwrap()
+}
+
+#[test]
+fn faces_in_the_plane_go_with_the_solid_behind_them() {
+    for inward in [false, true] {
+        for (normal, height) in [(Vector3::y(), 1.0), (-Vector3::y(), -1.0), (Vector3::x(), 1.0 + 1e-12)] {
+            let halves = letter_l(inward).cut_with(&normal, height, Caps::Sections);
+            for half in &halves {
+                assert!(half.is_closed() && half.is_cycle());
+                // Boxes have the corners of boxes and nothing else.
+                let (low, high) = half
+                    .spots()
+                    .iter()
+                    .fold((Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)), |(low, high), spot| {
+                        (low.inf(&spot.x), high.sup(&spot.x))
+                    });
+                let bounds: f64 = (high - low).product();
+                assert!((volume(half).abs() - bounds).abs() < 1e-9, "{inward} {normal:?}: {} {bounds}", volume(half));
+            }
+            let sum: f64 = halves.iter().map(volume).sum();
+            assert!((sum.abs() - 5.0).abs() < 1e-9, "{sum}");
+        }
+    }
+}
+
+#[test]
+fn sections_do_not_reach_across_holes() {
+    // A box with a hole through it, cut across the hole and then along it: the sides of the second cut have no spot in the hole.
+    let ring = |half: f64, z: f64| {
+        [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| Vector3::new(half * x, half * y, z))
+    };
+    let points = [ring(2.0, -1.0), ring(2.0, 1.0), ring(1.0, -1.0), ring(1.0, 1.0)].concat();
+    let quads = (0..4).flat_map(|i| {
+        let j = (i + 1) % 4;
+        [[i, j, j + 4, i + 4], [j + 8, i + 8, i + 12, j + 12], [i + 4, j + 4, j + 12, i + 12], [j, i, i + 8, j + 8]]
+    });
+    let triangles: Vec<_> = quads.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let frame = Piece::of_mesh(&points, &triangles).unwrap();
+    let second = Vector3::new(0.8, 0.6, 0.0);
+    for (caps, crossed) in [(Caps::Cones, true), (Caps::Sections, false)] {
+        let [low, _] = frame.cut_with(&Vector3::z(), 0.1, caps);
+        let halves = low.cut_with(&second, 0.05, caps);
+        let in_hole = |spot: &Spot| spot.x.x.abs() < 1.0 - 1e-9 && spot.x.y.abs() < 1.0 - 1e-9;
+        assert_eq!(halves.iter().any(|half| half.spots().iter().any(in_hole)), crossed, "{caps:?}");
+    }
 }
