@@ -15,7 +15,7 @@ pub(super) fn radius(constraints: &[Constraint], start: &Vector3<f64>, direction
         .fold(f64::INFINITY, |smallest, c| smallest.min(radius_within(&c.polynomial, start, direction, smallest)))
 }
 
-/// As [`radius`], of one convex polynomial.
+/// How far the boundary of one convex polynomial, `p = 1`, is from a point inside along a direction; normalized frame, unit-free.
 pub fn boundary_radius(polynomial: &Polynomial, start: &Vector3<f64>, direction: &Vector3<f64>) -> f64 {
     radius_within(polynomial, start, direction, f64::INFINITY)
 }
