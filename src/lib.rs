@@ -1,8 +1,8 @@
 //! Sublevel: collision and proximity queries on certified convex polynomial bodies.
 //!
-//! A body is a set `{x : g_1(x) <= 1, ..., g_m(x) <= 1}` of sos-convex polynomials that were fitted around an object
-//! offline. Distances between moving bodies are small convex programs, solved here in microseconds, and every answer is
-//! a bracket proven to contain the truth.
+//! A body is a set `{x : g_1(x) <= 1, ..., g_m(x) <= 1}` of sos-convex polynomials that were fitted
+//! around an object offline. Distances between moving bodies are small convex programs, solved here
+//! in microseconds, and every answer is a bracket proven to contain the truth.
 
 /// The README's example, kept true by the doc tests.
 #[cfg(doctest)]

@@ -1,13 +1,16 @@
-//! Keeps the layers of the code apart: which may import which, and which words belong to one layer only.
+//! Keeps the layers of the code apart: which may import which, and which words belong to one layer
+//! only.
 //!
-//! Cargo keeps the directions between crates; this test keeps those between the folders of `sublevel-core` and of `sublevel`.
-//! The sources are read as text, with comments, literals and test modules blanked out, and every path that starts at `crate::`
-//! or at one of the crates (or climbs out of a layer with `super::`) is held against the table of allowed directions.
+//! Cargo keeps the directions between crates; this test keeps those between the folders of
+//! `sublevel-core` and of `sublevel`. The sources are read as text, with comments, literals and
+//! test modules blanked out, and every path that starts at `crate::` or at one of the crates (or
+//! climbs out of a layer with `super::`) is held against the table of allowed directions.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// For each layer (a folder or file of `crates/core/src` or `src`, or a crate), the layers it may import.
+/// For each layer (a folder or file of `crates/core/src` or `src`, or a crate), the layers it may
+/// import.
 const DIRECTIONS: &[(&str, &[&str])] = &[
     ("polynomial", &[]),
     ("optimize", &[]),
@@ -116,7 +119,8 @@ fn what_is_allowed_passes() {
     assert!(check("service", "use super::store::table;", &["store".into()]).is_empty());
 }
 
-/// Everything wrong with one file of a layer; `siblings` are the modules that lie beside it in the same layer.
+/// Everything wrong with one file of a layer; `siblings` are the modules that lie beside it in the
+/// same layer.
 fn check(layer: &str, text: &str, siblings: &[String]) -> Vec<String> {
     let code = without_tests(&without_comments_and_literals(text));
     let Some((_, allowed)) = DIRECTIONS.iter().find(|(name, _)| *name == layer) else {

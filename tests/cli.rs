@@ -1,4 +1,5 @@
-//! The command line as a script uses it: JSON on standard output, one line and an exit code on errors.
+//! The command line as a script uses it: JSON on standard output, one line and an exit code on
+//! errors.
 
 #![cfg(feature = "fit")]
 
@@ -134,7 +135,8 @@ fn a_gap_chooses_the_coarsest_body_and_a_ladder_has_them_all() {
     let fitted = fitted();
     let (mesh, out) = (fitted.path("cube.off"), fitted.path("rungs"));
     let fit = |more: &[&str]| json(&[&["fit", "--json", text(&mesh), "--out", text(&out)], more].concat());
-    // The ball around a cube of side 2 reaches √3 - 1 beyond its faces; three slabs leave nothing but the cube.
+    // The ball around a cube of side 2 reaches √3 - 1 beyond its faces; three slabs leave nothing
+    // but the cube.
     for (gap, name, slabs) in [("800mm", "cube-ball.json", 0), ("1e-3", "cube-d2-s3.json", 3)] {
         let report = fit(&["--max-gap", gap]);
         let [row] = report.as_array().unwrap().as_slice() else { panic!("{report}") };
@@ -147,12 +149,12 @@ fn a_gap_chooses_the_coarsest_body_and_a_ladder_has_them_all() {
     let gap = |k: usize| report[k]["gap_m"].as_f64().unwrap();
     assert!((gap(0) - (3.0_f64.sqrt() - 1.0)).abs() < 0.02 && gap(2) < gap(1), "{report}");
 
-    let told = refusal(&["fit", text(&mesh), "--out", text(&out), "--max-gap", "1nm"]);
-    assert!(told.contains("--max-gap") && told.contains("5mm"), "{told}");
-    let told = refusal(&["fit", text(&mesh), "--out", text(&out), "--max-gap", "1e-9", "--degree", "2"]);
-    assert!(told.contains("max gap") && told.contains("slab(s)"), "{told}");
-    let told = refusal(&["fit", text(&mesh), "--out", text(&out), "--slabs", "16"]);
-    assert!(told.contains("slabs: 16"), "{told}");
+    let message = refusal(&["fit", text(&mesh), "--out", text(&out), "--max-gap", "1nm"]);
+    assert!(message.contains("--max-gap") && message.contains("5mm"), "{message}");
+    let message = refusal(&["fit", text(&mesh), "--out", text(&out), "--max-gap", "1e-9", "--degree", "2"]);
+    assert!(message.contains("max gap") && message.contains("slab(s)"), "{message}");
+    let message = refusal(&["fit", text(&mesh), "--out", text(&out), "--slabs", "16"]);
+    assert!(message.contains("slabs: 16"), "{message}");
 
     // A note that a point of the body refutes is not passed on.
     let body = out.join("cube-d4.json");
@@ -201,8 +203,8 @@ fn compounds_are_fitted_verified_shown_and_measured() {
     assert!(verified["max_value"].as_f64().unwrap() <= 1.0);
     assert_eq!(json(&["verify", "--json", text(&compound)])["contains_all_points_proven"], Value::Null);
     let larger = sublevel(&["verify", text(&compound), "--points", text(&mesh), "--scale", "1.01"]);
-    let told = String::from_utf8_lossy(&larger.stderr).into_owned();
-    assert!(larger.status.code() == Some(1) && told.contains("does not hold its piece"), "{told}");
+    let message = String::from_utf8_lossy(&larger.stderr).into_owned();
+    assert!(larger.status.code() == Some(1) && message.contains("does not hold its piece"), "{message}");
     // A note that is not true of the mesh is refused.
     let stored = std::fs::read_to_string(&compound).unwrap();
     let changed = fitted.path("changed-compound.json");
@@ -233,14 +235,14 @@ fn compounds_are_fitted_verified_shown_and_measured() {
     assert_eq!(measure(&out.join("letter-d4.json"))["distance_m"], 0.0);
 
     assert!(refusal(&["push", text(&compound)]).contains("compound"));
-    let told = refusal(&["fit", text(&ball.with_file_name("nothing.xyz")), "--out", text(&out), "--parts", "2"]);
-    assert!(told.contains("check the path"), "{told}");
-    let told = refusal(&["fit", text(&fitted.path("ball.xyz")), "--out", text(&out), "--parts", "2"]);
-    assert!(told.contains("no triangles"), "{told}");
-    let told = refusal(&["fit", text(&mesh), "--out", text(&out), "--parts", "0"]);
-    assert!(told.contains("parts: 0"), "{told}");
-    let told = refusal(&["fit", text(&mesh), "--out", text(&out), "--parts", "2", "--max-gap", "1cm"]);
-    assert!(told.contains("--max-gap"), "{told}");
+    let message = refusal(&["fit", text(&ball.with_file_name("nothing.xyz")), "--out", text(&out), "--parts", "2"]);
+    assert!(message.contains("check the path"), "{message}");
+    let message = refusal(&["fit", text(&fitted.path("ball.xyz")), "--out", text(&out), "--parts", "2"]);
+    assert!(message.contains("no triangles"), "{message}");
+    let message = refusal(&["fit", text(&mesh), "--out", text(&out), "--parts", "0"]);
+    assert!(message.contains("parts: 0"), "{message}");
+    let message = refusal(&["fit", text(&mesh), "--out", text(&out), "--parts", "2", "--max-gap", "1cm"]);
+    assert!(message.contains("--max-gap"), "{message}");
 }
 
 #[test]
@@ -268,25 +270,26 @@ fn outliers_are_trimmed_and_sheets_thickened() {
         let report: Value = serde_json::from_slice(&output.stdout).unwrap();
         (report[0].clone(), String::from_utf8_lossy(&output.stderr).into_owned())
     };
-    let (row, told) = fit(&scan, &["--trim", "0.0025"]);
+    let (row, message) = fit(&scan, &["--trim", "0.0025"]);
     assert_eq!((&row["left_out"], &row["points"]), (&1.into(), &400.into()));
     assert!(
-        (row["left_out_m"].as_f64().unwrap() - (243.0_f64.sqrt() - 1.0)).abs() < 0.1 && told.contains("1 of 401"),
+        (row["left_out_m"].as_f64().unwrap() - (243.0_f64.sqrt() - 1.0)).abs() < 0.1 && message.contains("1 of 401"),
         "{row}"
     );
     assert!(row["volume_m3"].as_f64().unwrap() < 4.4, "{row}");
     let row_gap = row["gap_m"].as_f64().unwrap();
 
-    let told = refusal(&["fit", text(&sheet), "--out", text(&out)]);
-    assert!(told.contains("coplanar") && told.contains("--min-thickness"), "{told}");
+    let message = refusal(&["fit", text(&sheet), "--out", text(&out)]);
+    assert!(message.contains("coplanar") && message.contains("--min-thickness"), "{message}");
     let (row, _) = fit(&sheet, &["--min-thickness", "1cm"]);
     assert!((row["hull_volume_m3"].as_f64().unwrap() / 0.01 - 1.0).abs() < 0.1, "{row}");
     json(&["verify", "--json", text(&out.join("sheet-d4.json")), "--points", text(&sheet)]);
-    // Against points that are not those it was fitted to, a body's gap is bounded anew, not refuted.
+    // Against points that are not those it was fitted to, a body's gap is bounded again, not
+    // refuted.
     let verified = json(&["verify", "--json", text(&out.join("scan-d4.json")), "--points", text(&half)]);
     assert!(verified["gap_m"].as_f64().unwrap() > row_gap, "{verified}");
-    let told = refusal(&["fit", text(&scan), "--out", text(&out), "--trim", "0.9"]);
-    assert!(told.contains("trim: 0.9"), "{told}");
+    let message = refusal(&["fit", text(&scan), "--out", text(&out), "--trim", "0.9"]);
+    assert!(message.contains("trim: 0.9"), "{message}");
 }
 
 #[test]

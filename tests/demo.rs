@@ -25,7 +25,8 @@ fn the_demo_sweeps_a_chair_through_a_human() {
         let [distance_lower, distance_upper] = [row[2], row[3]];
         for [value, lower, upper] in [[row[4], row[5], row[6]], [row[7], row[8], row[9]]] {
             assert!(lower <= value && value <= upper && upper - lower <= 1e-9 * value.abs().max(1.0), "{row:?}");
-            // The measures tell one story: apart in distance is above level 1, overlapping is below.
+            // The measures tell one story: apart in distance is above level 1, overlapping is
+            // below.
             assert!(!(distance_lower > 0.0 && upper < 1.0), "{row:?}");
             assert!(!(distance_upper == 0.0 && lower > 1.0), "{row:?}");
         }

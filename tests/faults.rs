@@ -1,5 +1,6 @@
-//! Files as other programs write them, and damaged ones: read as they are meant, or refused with the place, the reason and the
-//! remedy. The values are those of the data's own description, computed independently.
+//! Files as other programs write them, and damaged ones: read as they are meant, or refused with
+//! the place, the reason and the remedy. The values are those of the data's own description,
+//! computed independently.
 
 #![cfg(feature = "fit")]
 

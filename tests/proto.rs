@@ -1,4 +1,5 @@
-//! The rules `proto/` keeps: those of buf's standard lint that can be read off the descriptors, and a comment everywhere.
+//! The rules `proto/` keeps: those of buf's standard lint that can be read off the descriptors, and
+//! a comment everywhere.
 
 use std::collections::HashSet;
 
@@ -67,7 +68,8 @@ fn everything_is_commented() {
             .map(|location| location.path.as_slice())
             .collect();
         let require = |path: &[i32], what: &str| assert!(commented.contains(path), "{what} has no comment");
-        // The numbers are those of descriptor.proto: 4 messages, 5 enums, 6 services; in them 2 fields, 2 values or methods.
+        // The numbers are those of descriptor.proto: 4 messages, 5 enums, 6 services; in them 2
+        // fields, 2 values or methods.
         for (i, message) in (0..).zip(&file.message_type) {
             require(&[4, i], message.name());
             fields(message, |j, field| require(&[4, i, 2, j], &format!("{}.{field}", message.name())));

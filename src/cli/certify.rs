@@ -12,16 +12,18 @@ use std::error::Error;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-/// Make a certificate for somebody else's polynomial: a body file of {x : g_1(x) <= 1, ..., g_m(x) <= 1}
+/// Make a certificate for somebody else's polynomial: a body file of {x : g_1(x) <= 1, ..., g_m(x)
+/// <= 1}
 ///
 /// The input is JSON such as
 ///
-///   {"constraints": [{"exponents": [[4,0,0], [0,4,0], [0,0,2]], "coefficients": [1.0, 1.0, 4.0]}]}
+/// {"constraints": [{"exponents": [[4,0,0], [0,4,0], [0,0,2]], "coefficients": [1.0, 1.0, 4.0]}]}
 ///
-/// with one entry of "exponents" per coefficient, x in metres. A "normalization" {"center": [..], "linear": [[..], [..],
-/// [..]]} makes them polynomials of linear (x - center) instead, as in body files. These may be given, too: their
-/// certificates are made anew, and what no polynomial tells (points, gap, provenance) is left out. The polynomials are stored
-/// as they are; one that is not sos-convex is refused with a bound of how far it is from it.
+/// with one entry of "exponents" per coefficient, x in metres. A "normalization" {"center": [..],
+/// "linear": [[..], [..], [..]]} makes them polynomials of linear (x - center) instead, as in body
+/// files. These may be given, too: their certificates are made again, and what no polynomial says
+/// (points, gap, provenance) is left out. The polynomials are stored as they are; one that is not
+/// sos-convex is refused with a bound of how far it is from it.
 ///
 /// Example: sublevel certify quartic.json --out quartic-body.json
 #[derive(Debug, clap::Args)]
@@ -79,7 +81,7 @@ struct InputNormalization {
 struct InputConstraint {
     exponents: Vec<Exponents>,
     coefficients: Vec<f64>,
-    /// Made anew.
+    /// Made again.
     #[serde(rename = "certificate")]
     _certificate: Option<IgnoredAny>,
 }

@@ -4,10 +4,11 @@ use crate::demo::{self, DemoError};
 use std::io;
 use std::path::PathBuf;
 
-/// Run the whole job on shapes made here: fit a chair and a human, serve them, sweep one through the other
+/// Run the whole job on shapes made here: fit a chair and a human, serve them, sweep one through
+/// the other
 ///
-/// Prints the table of fits and the level-distance curve; writes meshes, body files, the numbers as CSV and the plots as
-/// SVG. Needs no input, and takes a few seconds.
+/// Prints the table of fits and the level-distance curve; writes meshes, body files, the numbers as
+/// CSV and the plots as SVG. Needs no input, and takes a few seconds.
 #[derive(Debug, clap::Args)]
 pub(super) struct DemoArgs {
     /// Folder for everything the demo writes; made when it is not there

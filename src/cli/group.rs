@@ -23,7 +23,8 @@ struct Row {
     volume_m3: f64,
     /// Sum of theirs.
     members_volume_m3: f64,
-    /// Proven bound of the distance of any point of the body from their convex hull; none for a body left as it is.
+    /// Proven bound of the distance of any point of the body from their convex hull; none for a
+    /// body left as it is.
     gap_m: Option<f64>,
     optimality_gap: Option<f64>,
     /// What is not proven is an error.

@@ -6,19 +6,22 @@ use std::path::Path;
 /// How to read a mesh or a point cloud.
 #[derive(Clone, Copy, Debug, PartialEq, clap::Args)]
 pub(super) struct MeshArgs {
-    /// Metres per unit of the file: 0.001 for millimetres, or a factor for each axis such as 1,-1,1, which mirrors
+    /// Metres per unit of the file: 0.001 for millimetres, or a factor for each axis such as
+    /// 1,-1,1, which mirrors
     ///
     /// The unit that a COLLADA file names is applied in any case; this factor comes on top of it.
     #[arg(long, value_name = "FACTOR", default_value_t, allow_hyphen_values = true)]
     pub(super) scale: Scale,
-    /// Leave out points with NaN or infinite coordinates, as scans have them, and say how many they are
+    /// Leave out points with NaN or infinite coordinates, as scans have them, and say how many they
+    /// are
     ///
     /// Without it such a point is an error. Faces that use one are left out with it.
     #[arg(long)]
     pub(super) drop_nan: bool,
     /// Leave out vertices that no triangle uses, of files with triangles
     ///
-    /// Without it they count like all others, and it is reported by how much they enlarge the convex hull.
+    /// Without it they count like all others, and it is reported by how much they enlarge the
+    /// convex hull.
     #[arg(long)]
     pub(super) drop_unused: bool,
 }

@@ -31,8 +31,8 @@ pub type Outcome = Result<bool, Box<dyn Error>>;
 
 /// Real-time collision and proximity queries on certified convex polynomial bodies
 ///
-/// Objects are stored as sets {x : p(x) <= 1} of sos-convex polynomials, fitted offline around meshes and proven to contain
-/// them. Every answer is a bracket that is proven to hold the truth.
+/// Objects are stored as sets {x : p(x) <= 1} of sos-convex polynomials, fitted offline around
+/// meshes and proven to contain them. Every answer is a bracket that is proven to hold the truth.
 ///
 #[cfg_attr(
     feature = "fit",
@@ -55,8 +55,8 @@ enum Command {
     Push(push::PushArgs),
 }
 
-/// Runs the command line of this process. Exit code 0: done; 1: failed, with one line on standard error, or a checked claim
-/// does not hold; 2: the arguments are wrong.
+/// Runs the command line of this process. Exit code 0: done; 1: failed, with one line on standard
+/// error, or a checked claim does not hold; 2: the arguments are wrong.
 pub fn main() -> ExitCode {
     let done = |()| true;
     let outcome: Outcome = match Command::parse() {
@@ -84,7 +84,7 @@ pub fn exit_code(outcome: Outcome) -> ExitCode {
         Err(error) if is_broken_pipe(error.as_ref()) => ExitCode::FAILURE,
         Err(error) => {
             // Nothing but standard output gives a bare system error: files are named.
-            let place = if error.is::<io::Error>() { "can not write the output: " } else { "" };
+            let place = if error.is::<io::Error>() { "cannot write the output: " } else { "" };
             eprintln!("error: {place}{}", one_line(&error.to_string()));
             ExitCode::FAILURE
         }
@@ -104,7 +104,8 @@ fn is_broken_pipe(error: &(dyn Error + 'static)) -> bool {
     false
 }
 
-/// One printable line of at most about a thousand characters: messages quote input, which may hold anything.
+/// One printable line of at most about a thousand characters: messages quote input, which may hold
+/// anything.
 fn one_line(text: &str) -> String {
     const LONGEST: usize = 1000;
     let mut line: String = text
@@ -143,7 +144,7 @@ fn read_shape(path: &Path) -> Result<Shape, Box<dyn Error>> {
 pub fn write_atomically(path: &Path, content: &str) -> Result<(), Box<dyn Error>> {
     use std::io::Write;
     let failed =
-        |error: std::io::Error| format!("can not write {}: {error}; check the folder and its space", path.display());
+        |error: std::io::Error| format!("cannot write {}: {error}; check the folder and its space", path.display());
     let mut name = path.file_name().ok_or_else(|| format!("{} names no file", path.display()))?.to_owned();
     name.push(format!(".{}.tmp", std::process::id()));
     let temporary = path.with_file_name(name);

@@ -10,7 +10,8 @@ use crate::service::{self, Pushed};
 
 /// Store body files in a running server
 ///
-/// Each file is re-proven here and by the server. Storing a body again changes nothing and succeeds.
+/// Each file is re-proven here and by the server. Storing a body again changes nothing and
+/// succeeds.
 ///
 /// Example: sublevel push bodies/*.json --server http://127.0.0.1:50051
 #[derive(Debug, clap::Args)]

@@ -7,9 +7,10 @@ use crate::service::{self, ServeError, ServeOptions};
 
 /// Run the gRPC server: bodies, scenes and fit jobs on disk, distances on request
 ///
-/// Prints 'listening on ADDR' as its first line on standard output; logs go to standard error, as much as RUST_LOG says
-/// (error, warn, info, debug; default info). Changes are on disk before they are acknowledged. SIGTERM or Ctrl-C stops it:
-/// calls in flight get a few seconds to end, and a fit under way goes on at the next start.
+/// Prints 'listening on ADDR' as its first line on standard output; logs go to standard error, as
+/// much as RUST_LOG says (error, warn, info, debug; default info). Changes are on disk before they
+/// are acknowledged. SIGTERM or Ctrl-C stops it: calls in flight get a few seconds to end, and a
+/// fit under way goes on at the next start.
 ///
 /// Example: sublevel serve --data /var/lib/sublevel --listen 127.0.0.1:50051
 #[derive(Debug, clap::Args)]
@@ -22,8 +23,8 @@ pub(super) struct ServeArgs {
     pub(super) data: PathBuf,
 }
 
-/// Serves until SIGTERM or Ctrl-C. Prints `listening on ADDR` first; logs go to standard error, as much as the environment
-/// variable `RUST_LOG` says (default `info`).
+/// Serves until SIGTERM or Ctrl-C. Prints `listening on ADDR` first; logs go to standard error, as
+/// much as the environment variable `RUST_LOG` says (default `info`).
 ///
 /// # Errors
 /// Why the server could not start, or ended by itself.
@@ -33,7 +34,8 @@ pub(super) fn run(args: &ServeArgs) -> Result<(), ServeError> {
     let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_ansi(false).try_init();
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
     let result = runtime.block_on(service::serve(ServeOptions { listen: args.listen, data: args.data.clone() }));
-    // Calls that outlived the drain are not waited for again; whatever they had not committed was not acknowledged.
+    // Calls that outlived the drain are not waited for again; whatever they had not committed was
+    // not acknowledged.
     runtime.shutdown_timeout(std::time::Duration::from_secs(1));
     result
 }

@@ -14,8 +14,8 @@ const SILHOUETTE_POINTS: usize = 6000;
 
 /// Describe a body or a compound, export its surface, draw its silhouettes
 ///
-/// The file is re-proven first, as by 'verify'. Lengths are metres in the body frame. Of an sos-body, which need not be convex, only
-/// the description is printed.
+/// The file is re-proven first, as by 'verify'. Lengths are metres in the body frame. Of an
+/// sos-body, which need not be convex, only the description is printed.
 ///
 /// Example: sublevel show bodies/mug-d6.json --mesh mug.obj --svg mug.svg
 #[derive(Debug, clap::Args)]
@@ -25,7 +25,8 @@ pub(super) struct ShowArgs {
     /// Print one JSON object instead of lines
     #[arg(long)]
     json: bool,
-    /// Write the surface as a triangle mesh, inscribed in the body up to rounding; of a compound that of each part
+    /// Write the surface as a triangle mesh, inscribed in the body up to rounding; of a compound
+    /// that of each part
     #[arg(long, value_name = "OUT.obj")]
     mesh: Option<PathBuf>,
     /// Write the silhouettes seen along the three axes
@@ -199,7 +200,7 @@ fn mesh(parts: &[Body]) -> String {
     for (index, body) in parts.iter().enumerate() {
         let mirrored = body.normalization().linear.determinant() < 0.0;
         let first = 1 + index * sphere.vertices().len();
-        // Writing to a string can not fail.
+        // Writing to a string cannot fail.
         let _ = writeln!(text, "# {} ({})", body.name(), body.id());
         for direction in sphere.vertices() {
             let x = body.boundary_along(direction);

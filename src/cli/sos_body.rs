@@ -109,7 +109,7 @@ struct Report {
     degree: Option<usize>,
 }
 
-/// Proves, prints, and tells whether every claim holds.
+/// Proves, prints, and returns whether every claim holds.
 pub(super) fn verify(args: &VerifyArgs, text: &str) -> Outcome {
     let mut report = Report { kind: "sos-body", points_only: true, ..Report::default() };
     let mut sentences = Vec::new();

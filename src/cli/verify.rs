@@ -16,20 +16,22 @@ use std::path::{Path, PathBuf};
 
 /// Re-prove a body or a compound from its stored numbers alone
 ///
-/// Recomputes the id, checks every certificate (no program is solved), proves the body bounded and compares every derived
-/// value but gap_m, which needs the object. With --points it also proves that every point of a mesh is inside, and bounds anew how far the body reaches beyond
-/// their convex hull. With --contains it proves that whole bodies are inside. Of a compound every part is re-proven, and with
-/// --points that it covers all triangles of the mesh, and what they enclose if they are closed: the mesh is cut again as the file
-/// says, and each part must hold its piece. Exit code 0 only if every claim holds.
+/// Recomputes the id, checks every certificate (no program is solved), proves the body bounded and
+/// compares every derived value but gap_m, which needs the object. With --points it also proves
+/// that every point of a mesh is inside, and bounds again how far the body reaches beyond their
+/// convex hull. With --contains it proves that whole bodies are inside. Of a compound every part is
+/// re-proven, and with --points that it covers all triangles of the mesh, and what they enclose if
+/// they are closed: the mesh is cut again as the file says, and each part must hold its piece. Exit
+/// code 0 only if every claim holds.
 ///
-/// An sos-body, which need not be convex, is proven to be of a sum of squares and as near to convex as it says; with --points, to hold
-/// the points, and no fewer triangles between them than it says.
+/// An sos-body, which need not be convex, is proven to be of a sum of squares and as near to convex
+/// as it says; with --points, to hold the points, and no fewer triangles between them than it says.
 ///
 /// Examples:
 ///
-///   sublevel verify bodies/mug-d6.json --points mug.obj --scale 0.001
+/// sublevel verify bodies/mug-d6.json --points mug.obj --scale 0.001
 ///
-///   sublevel verify bodies/shelf-d4.json --contains board-1.json board-2.json
+/// sublevel verify bodies/shelf-d4.json --contains board-1.json board-2.json
 #[derive(Debug, clap::Args)]
 pub(super) struct VerifyArgs {
     /// File of a body, a compound or an sos-body
@@ -41,7 +43,8 @@ pub(super) struct VerifyArgs {
     #[cfg(feature = "fit")]
     #[command(flatten)]
     pub(super) mesh: MeshArgs,
-    /// Bodies and sos-bodies that the body must contain whole, by the proofs that its file keeps for them
+    /// Bodies and sos-bodies that the body must contain whole, by the proofs that its file keeps
+    /// for them
     #[cfg_attr(feature = "fit", doc = "or, if it has none, by new ones")]
     #[arg(long, value_name = "FILE", num_args = 1..)]
     contains: Vec<PathBuf>,
@@ -59,15 +62,15 @@ struct Report {
     /// Whether each body of --contains is proven inside, in their order.
     contains_sets_proven: Option<Vec<bool>>,
     degree: Option<usize>,
-    /// Proven bound of the distance of any point of the body from the convex hull of the points, metres; of a compound from those of
-    /// the pieces of the mesh.
+    /// Proven bound of the distance of any point of the body from the convex hull of the points,
+    /// metres; of a compound from those of the pieces of the mesh.
     gap_m: Option<f64>,
     /// What is proven to be covered of the mesh: "interior" or "surface_only"; of compounds.
     #[serde(skip_serializing_if = "Option::is_none")]
     covers: Option<&'static str>,
 }
 
-/// Proves, prints, and tells whether every claim holds.
+/// Proves, prints, and returns whether every claim holds.
 pub(super) fn run(args: &VerifyArgs) -> Outcome {
     #[cfg(feature = "fit")]
     if args.points.is_none() && args.mesh.are_given() {
@@ -161,7 +164,8 @@ fn contained(args: &VerifyArgs, body: &Body) -> Result<(Report, Option<String>),
     Ok((report, trouble))
 }
 
-/// How far a body reaches beyond the hull of points inside, which are known up to a clearance, and what is wrong with its own note of that, if it is about these points.
+/// How far a body reaches beyond the hull of points inside, which are known up to a clearance, and
+/// what is wrong with its own note of that, if it is about these points.
 #[cfg(feature = "fit")]
 fn gap(
     args: &VerifyArgs,
@@ -238,7 +242,7 @@ fn contained(_: &VerifyArgs, body: &Body) -> Result<(Report, Option<String>), Bo
     Ok((proven(body.degree()), None))
 }
 
-/// Proves a body inside by the stored proof or a new one; else tells why not.
+/// Proves a body inside by the stored proof or a new one; else says why not.
 fn inside(path: &Path, body: &Body) -> Result<Option<String>, Box<dyn std::error::Error>> {
     let inner = read_obstacle(path)?;
     if inner.id() == body.id() {

@@ -20,7 +20,8 @@ pub(super) struct Fitted {
     report: FitReport,
 }
 
-/// Fits a body of the given degree, writes it to `<name>-d<degree>.json` in `out`, and proves what was written.
+/// Fits a body of the given degree, writes it to `<name>-d<degree>.json` in `out`, and proves what
+/// was written.
 pub(super) fn fit(name: &str, shape: &Shape, degree: usize, out: &Path) -> Result<Fitted, DemoError> {
     let failed = |why: String| DemoError::Fit { name: name.into(), degree, why };
     let options = FitOptions { degree, input: format!("{name}.off"), ..FitOptions::default() };

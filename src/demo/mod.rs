@@ -1,5 +1,6 @@
-//! The whole job on shapes the program makes itself: a chair and a human figure become certified bodies, a server keeps
-//! them, and a client sweeps the chair through the human and asks for distances at every step.
+//! The whole job on shapes the program makes itself: a chair and a human figure become certified
+//! bodies, a server keeps them, and a client sweeps the chair through the human and asks for
+//! distances at every step.
 
 mod fits;
 mod plots;
@@ -13,18 +14,18 @@ use std::path::{Path, PathBuf};
 /// Why the demo stopped.
 #[derive(Debug, thiserror::Error)]
 pub enum DemoError {
-    /// A file or folder can not be read or written.
-    #[error("can not use {}: {source}; choose another folder with --out", .path.display())]
+    /// A file or folder cannot be read or written.
+    #[error("cannot use {}: {source}; choose another folder with --out", .path.display())]
     File {
         /// The file or folder.
         path: PathBuf,
         /// What the system said.
         source: io::Error,
     },
-    /// The tables can not be printed.
-    #[error("can not print: {0}")]
+    /// The tables cannot be printed.
+    #[error("cannot print: {0}")]
     Print(#[from] io::Error),
-    /// A shape can not be fitted, or its body is not proven.
+    /// A shape cannot be fitted, or its body is not proven.
     #[error("no degree-{degree} body for the {name}: {why}")]
     Fit {
         /// Name of the shape.
@@ -42,12 +43,13 @@ pub enum DemoError {
         /// The reason.
         why: String,
     },
-    /// A plot can not be drawn.
+    /// A plot cannot be drawn.
     #[error(transparent)]
     Chart(#[from] crate::draw::ChartError),
 }
 
-/// Runs the demo: prints its tables to `text`, writes bodies, meshes, numbers and plots into the folder `out`.
+/// Runs the demo: prints its tables to `text`, writes bodies, meshes, numbers and plots into the
+/// folder `out`.
 ///
 /// # Errors
 /// The first step that fails; files written before it stay.

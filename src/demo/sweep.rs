@@ -14,7 +14,8 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// The chair goes from `-REACH` to `REACH` along x, metres; the human stands at the origin and faces `+x`.
+/// The chair goes from `-REACH` to `REACH` along x, metres; the human stands at the origin and
+/// faces `+x`.
 const REACH: f64 = 0.9;
 const STEPS: usize = 61;
 const SCENE: &str = "demo";

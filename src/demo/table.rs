@@ -70,7 +70,8 @@ fn state(sample: &Sample) -> &'static str {
     }
 }
 
-/// Positions where an answer passes 1, interpolated between the steps in the logarithm: level distances grow like a power.
+/// Positions where an answer passes 1, interpolated between the steps in the logarithm: level
+/// distances grow like a power.
 pub(super) fn crossings(samples: &[Sample], answer: fn(&Sample) -> Answer) -> Vec<f64> {
     let steps = samples.windows(2).filter_map(|pair| {
         let [before, after] = [&pair[0], &pair[1]].map(|sample| answer(sample).value.max(f64::MIN_POSITIVE).ln());

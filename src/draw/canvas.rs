@@ -11,7 +11,7 @@ pub enum ChartError {
     #[error("a chart needs at least one finite point; none of its series has any")]
     Empty,
     /// The drawing library gave up.
-    #[error("the chart can not be drawn: {0}")]
+    #[error("the chart cannot be drawn: {0}")]
     Drawing(String),
 }
 

@@ -45,7 +45,7 @@ pub struct LineChart {
 
 /// Width and height, pixels.
 const SIZE: (u32, u32) = (760, 440);
-/// Decades below the mark at which a curve is cut off: nothing can be told apart there.
+/// Decades below the mark at which a curve is cut off: nothing can be distinguished there.
 const DECADES_BELOW: i32 = 3;
 /// Width of a letter, pixels: a guess, as the reader's font is not known here.
 const LETTER: i32 = 8;
@@ -128,8 +128,8 @@ impl LineChart {
         Ok(())
     }
 
-    /// Corner and anchor of the mark's text: at one of the line's ends, right and left, above or below it, where no curve runs
-    /// through the text if there is such a place.
+    /// Corner and anchor of the mark's text: at one of the line's ends, right and left, above or
+    /// below it, where no curve runs through the text if there is such a place.
     fn place_of_mark(&self, ends: [(i32, i32); 2], to_pixels: impl Fn((f64, f64)) -> (i32, i32)) -> ((i32, i32), Pos) {
         let (width, height) = (px(LETTER * self.mark.label.chars().count() as i32), px(15));
         let mut curves = Vec::new();

@@ -1,4 +1,5 @@
-//! Words beside points, put where they cover neither points nor each other, as far as there is such a place.
+//! Words beside points, put where they cover neither points nor each other, as far as there is such
+//! a place.
 
 /// A rectangle, pixels, y down.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +28,8 @@ impl Area {
     }
 }
 
-/// Height of a line, and the width of a letter as a guess: the reader's font is not known here. Pixels.
+/// Height of a line, and the width of a letter as a guess: the reader's font is not known here.
+/// Pixels.
 pub(super) const TALL: f64 = 14.0;
 const WIDE: f64 = 6.8;
 
@@ -37,8 +39,8 @@ const GAP: f64 = 4.0;
 /// What a pixel away from the point counts, against square pixels of overlap.
 const FAR: f64 = 1.5;
 
-/// For each point with its text the upper left corner of the text. `taken` are areas that texts keep out of, `frame` is what they
-/// stay in, `away` how far from the point they begin, pixels.
+/// For each point with its text the upper left corner of the text. `taken` are areas that texts
+/// keep out of, `frame` is what they stay in, `away` how far from the point they begin, pixels.
 pub(super) fn place(points: &[((f64, f64), &str)], taken: &[Area], frame: &Area, away: f64) -> Vec<(f64, f64)> {
     let mut taken = taken.to_vec();
     let mut placed = Vec::new();

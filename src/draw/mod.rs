@@ -1,8 +1,9 @@
-//! Pictures as SVG: silhouettes of posed bodies ([`Silhouettes`]), curves ([`LineChart`]) and points on logarithmic axes
-//! ([`Scatter`]).
+//! Pictures as SVG: silhouettes of posed bodies ([`Silhouettes`]), curves ([`LineChart`]) and
+//! points on logarithmic axes ([`Scatter`]).
 //!
-//! Backgrounds are transparent, and every colour has a contrast of at least 3 : 1 against white and against black, so a
-//! picture can be read on light and on dark pages. Two colours never carry a meaning alone: dashes or labels do too.
+//! Backgrounds are transparent, and every colour has a contrast of at least 3 : 1 against white and
+//! against black, so a picture can be read on light and on dark pages. Two colours never carry a
+//! meaning alone: dashes or labels do too.
 
 mod canvas;
 mod curve;
@@ -17,7 +18,7 @@ pub use scatter::{Group, Marker, Point, Scatter, Stairs};
 pub use shadow::shadow;
 pub use silhouette::{Outline, Panel, Silhouettes, View, boundary_points, outline};
 
-/// Colours of a chart, told apart by colour-blind readers too (after Okabe and Ito).
+/// Colours of a chart, distinguished by colour-blind readers too (after Okabe and Ito).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ink {
     /// First object or curve.

@@ -20,7 +20,7 @@ pub struct Point {
     pub label: String,
 }
 
-/// How a point looks: told apart without colours.
+/// How a point looks: distinguished without colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Marker {
     /// A filled circle.
@@ -205,8 +205,8 @@ impl Scatter {
         Ok(())
     }
 
-    /// Names of the groups in rows between heading and axes, where no point can lie behind them. Returns where the axes may
-    /// begin, pixels from the top.
+    /// Names of the groups in rows between heading and axes, where no point can lie behind them.
+    /// Returns where the axes may begin, pixels from the top.
     fn draw_legend(&self, root: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<i32, Box<dyn std::error::Error>> {
         let wide = (WIDTH as i32 - LEFT) / COLUMNS as i32;
         for (i, group) in self.groups.iter().enumerate() {

@@ -11,11 +11,12 @@ const GRID: usize = 180;
 const DEPTHS: usize = 48;
 const REFINEMENTS: usize = 12;
 
-/// The outlines of the shadow of `{x : value(x) <= level}`, in picture coordinates, metres; holes run the other way round. The set
-/// lies in `bounds`.
+/// The outlines of the shadow of `{x : value(x) <= level}`, in picture coordinates, metres; holes
+/// run the other way round. The set lies in `bounds`.
 ///
-/// The least value along each line of sight of a grid is found by sampling and a golden section, and the outline is where that
-/// passes the level (marching squares): finer than a hundredth of the picture, whatever the shape.
+/// The least value along each line of sight of a grid is found by sampling and a golden section,
+/// and the outline is where that passes the level (marching squares): finer than a hundredth of the
+/// picture, whatever the shape.
 pub fn shadow(value: impl Fn(&Vector3<f64>) -> f64, level: f64, bounds: &Aabb, view: View) -> Vec<Vec<[f64; 2]>> {
     let (corner, opposite) = (view.project(&bounds.min), view.project(&bounds.max));
     // One empty cell all around closes every outline.
@@ -28,7 +29,8 @@ pub fn shadow(value: impl Fn(&Vector3<f64>) -> f64, level: f64, bounds: &Aabb, v
     };
     let above: Vec<f64> = (0..GRID * GRID).map(|k| least(k % GRID, k / GRID) - level).collect();
     let inside = |[i, j]: [usize; 2]| above[j * GRID + i] <= 0.0;
-    // Where the outline crosses a grid line, told by the two nodes beside it, the one inside first.
+    // Where the outline crosses a grid line, reported by the two nodes beside it, the one inside
+    // first.
     let mut next: HashMap<[[usize; 2]; 2], [[usize; 2]; 2]> = HashMap::new();
     for j in 0..GRID - 1 {
         for i in 0..GRID - 1 {
@@ -62,8 +64,9 @@ pub fn shadow(value: impl Fn(&Vector3<f64>) -> f64, level: f64, bounds: &Aabb, v
     outlines
 }
 
-/// The pieces of outline in a cell with these corners, counter-clockwise: from the side where the outline enters to the one where it
-/// leaves, with the inside to its left. Two corners across count as not joined.
+/// The pieces of outline in a cell with these corners, counter-clockwise: from the side where the
+/// outline enters to the one where it leaves, with the inside to its left. Two corners across count
+/// as not joined.
 fn crossings(
     corners: [[usize; 2]; 4],
     inside: &impl Fn([usize; 2]) -> bool,

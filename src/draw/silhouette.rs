@@ -55,14 +55,17 @@ impl View {
     }
 }
 
-/// `count` boundary points of a body, one along each of as many even directions (a Fibonacci lattice).
+/// `count` boundary points of a body, one along each of as many even directions (a Fibonacci
+/// lattice).
 ///
-/// `along` gives the boundary point met by the ray in a unit direction, such as `Body::boundary_along`.
+/// `along` gives the boundary point met by the ray in a unit direction, such as
+/// `Body::boundary_along`.
 pub fn boundary_points(along: impl Fn(&Vector3<f64>) -> Vector3<f64>, count: usize) -> Vec<Vector3<f64>> {
     fibonacci_lattice(count).map(|direction| along(&direction)).collect()
 }
 
-/// The silhouette of the convex hull of `points`: its corners in picture coordinates, metres, counter-clockwise.
+/// The silhouette of the convex hull of `points`: its corners in picture coordinates, metres,
+/// counter-clockwise.
 pub fn outline(points: &[Vector3<f64>], view: View) -> Vec<[f64; 2]> {
     let mut flat: Vec<[f64; 2]> = points.iter().map(|point| view.project(point)).collect();
     convex_outline(&mut flat)
@@ -123,7 +126,8 @@ const HEADER: f64 = 58.0;
 const FOOTER: f64 = 34.0;
 
 impl Silhouettes {
-    /// The drawing as an SVG document. Panels of a row share their vertical range, so that floors line up.
+    /// The drawing as an SVG document. Panels of a row share their vertical range, so that floors
+    /// line up.
     pub fn to_svg(&self) -> String {
         let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
         let boxes: Vec<Vec<Range2>> = self.rows.iter().map(|row| ranges(row)).collect();
@@ -140,7 +144,7 @@ impl Silhouettes {
 
         let mut svg = String::new();
         let grey = Ink::Grey.hex();
-        // Writing to a string can not fail.
+        // Writing to a string cannot fail.
         let _ = writeln!(
             svg,
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width:.0} {height:.0}\" width=\"{width:.0}\" \
@@ -220,7 +224,8 @@ fn ranges(row: &[Panel]) -> Vec<Range2> {
 fn write_outline(svg: &mut String, outline: &Outline, origin: [f64; 2], scale: f64) {
     let color = outline.ink.hex();
     let style = if outline.solid {
-        // Strokes close the hair lines between triangles; the group fades the union, not each triangle.
+        // Strokes close the hair lines between triangles; the group fades the union, not each
+        // triangle.
         format!("<g opacity=\"0.5\" stroke=\"{color}\" stroke-width=\"0.6\"><path fill=\"{color}\"")
     } else {
         format!("<g stroke=\"{color}\" stroke-width=\"2\"><path fill=\"{color}\" fill-opacity=\"0.12\"")

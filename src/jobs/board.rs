@@ -1,4 +1,4 @@
-//! What the worker tells of itself, and is told.
+//! What the worker reports of itself, and what it is asked.
 
 use crate::fit;
 
@@ -14,7 +14,7 @@ struct Running {
     job: u64,
     stop: bool,
     progress: Progress,
-    /// What the fit said last: it counts anew in each of its parts.
+    /// What the fit said last: it counts again in each of its parts.
     last: fit::Progress,
 }
 
@@ -75,7 +75,8 @@ impl Board {
         self.stopping = true;
     }
 
-    /// Notes an iteration of a job. Tells whether to go on: not when it was stopped, nor when it is not the running one any more.
+    /// Notes an iteration of a job. Tells whether to go on: not when it was stopped, nor when it is
+    /// not the running one any more.
     pub(super) fn note(&mut self, job: u64, phase: Phase, said: fit::Progress) -> bool {
         let Some(running) = self.running.as_mut().filter(|running| running.job == job) else { return false };
         let Running { progress, last, .. } = running;
@@ -99,7 +100,8 @@ mod tests {
         assert!(!board.note(7, Phase::Fitting, fit::Progress::default()), "nothing is running");
         board.begin(7);
         let said = |round, iterations| fit::Progress { round, iterations, ..fit::Progress::default() };
-        // Two programs of a trim, one of two iterations and one of one; then a fit of one program; then one of two.
+        // Two programs of a trim, one of two iterations and one of one; then a fit of one program;
+        // then one of two.
         let heard = [(1, 1), (1, 2), (2, 3), (1, 1), (1, 1), (2, 2)];
         let counts = heard.map(|(round, iterations)| {
             assert!(board.note(7, Phase::Fitting, said(round, iterations)));

@@ -35,13 +35,13 @@ pub enum Shapes {
 /// Why an order made nothing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Failure {
-    /// It can not be understood.
+    /// It cannot be understood.
     #[error(transparent)]
     Order(#[from] OrderError),
-    /// The points can not be fitted.
+    /// The points cannot be fitted.
     #[error(transparent)]
     Fit(#[from] FitError),
-    /// The bodies can not be grouped.
+    /// The bodies cannot be grouped.
     #[error(transparent)]
     Group(#[from] EncloseError),
 }
@@ -203,7 +203,8 @@ pub fn fit_group(
     Ok(Made::new(took, Shapes::Bodies(made)))
 }
 
-/// Name of a body that an order makes, counted from 0: its own, with a number where several share it.
+/// Name of a body that an order makes, counted from 0: its own, with a number where several share
+/// it.
 pub fn body_name(order: &FitOrder, index: usize) -> String {
     let name = &order.name;
     match &order.group {

@@ -1,11 +1,12 @@
 //! Fit jobs: queue, progress, cancel, restart.
 //!
-//! The catalogue holds the jobs; what is decided there is final, and the worker only follows. A job that is cancelled is
-//! CANCELLED on disk first and stopped then; the result of a fit counts only if its job is still running when it comes. So
-//! nothing depends on when the fit hears of it, and a kill at any time leaves a state that was acknowledged.
+//! The catalogue holds the jobs; what is decided there is final, and the worker only follows. A job
+//! that is cancelled is CANCELLED on disk first and stopped then; the result of a fit counts only
+//! if its job is still running when it comes. So nothing depends on when the fit hears of it, and a
+//! kill at any time leaves a state that was acknowledged.
 //!
-//! `order` is what can be asked for, `carry_out` does it, for whoever asks; `worker` does one job after the other; `board` is where it
-//! tells how far it is, and where everybody waits for news.
+//! `order` is what can be asked for, `carry_out` does it, for whoever asks; `worker` does one job
+//! after the other; `board` is where it says how far it is, and where everybody waits for news.
 
 mod board;
 mod carry_out;
@@ -37,7 +38,8 @@ impl Jobs {
         Ok(created)
     }
 
-    /// Cancels a job that has not ended, and returns it as it is then. A running fit stops at its next iteration.
+    /// Cancels a job that has not ended, and returns it as it is then. A running fit stops at its
+    /// next iteration.
     ///
     /// # Errors
     /// When there is no such job, or when the disk fails.

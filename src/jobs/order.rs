@@ -13,10 +13,10 @@ use crate::store::{FitGroup, FitOrder, MAX_REQUEST_ID_BYTES};
 /// Endings of the mesh formats that can be read.
 pub use crate::fit::input::FORMATS as MESH_FORMATS;
 
-/// Degree of bodies around groups unless told otherwise: multipliers make higher ones slow.
+/// Degree of bodies around groups unless another is asked for: multipliers make higher ones slow.
 const GROUP_DEGREE: usize = 4;
 
-/// A field of an order that can not be used.
+/// A field of an order that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{field}: {why}")]
 pub struct OrderError {
@@ -47,7 +47,7 @@ pub(super) enum Way {
 /// Checks an order before any work, and the request's id.
 ///
 /// # Errors
-/// The first field that can not be used.
+/// The first field that cannot be used.
 pub fn check(request_id: &str, order: &FitOrder) -> Result<(), OrderError> {
     if request_id.len() > MAX_REQUEST_ID_BYTES || request_id.chars().any(char::is_control) {
         let why = format!("must have at most {MAX_REQUEST_ID_BYTES} bytes and no control characters; send a UUID");
@@ -142,7 +142,8 @@ fn check_group(order: &FitOrder, group: &FitGroup) -> Result<(), OrderError> {
     })
 }
 
-/// Points, metres, and triangles of a mesh file in one of [`MESH_FORMATS`]; `input` names it in errors, `scale` is metres per unit.
+/// Points, metres, and triangles of a mesh file in one of [`MESH_FORMATS`]; `input` names it in
+/// errors, `scale` is metres per unit.
 ///
 /// # Errors
 /// What is wrong with the file, and where.

@@ -29,7 +29,8 @@ fn claimed() -> (tempfile::TempDir, Catalogue, u64) {
     (dir, catalogue, job.id)
 }
 
-/// The stop comes when the board does not know the job yet, so nobody tells the fit; its points are gone all the same.
+/// The stop comes when the board does not know the job yet, so nobody says the fit; its points are
+/// gone all the same.
 #[test]
 fn a_job_that_is_cancelled_before_it_is_on_the_board_makes_nothing() {
     let (_dir, catalogue, id) = claimed();
@@ -69,7 +70,7 @@ fn a_kill_counts_as_an_attempt_and_an_orderly_stop_does_not() {
         recover(&catalogue).expect("nothing to do");
         assert_eq!(claim(&catalogue).expect("the disk works").expect("the job").attempts, 1);
     }
-    recover(&catalogue).expect("begun anew");
+    recover(&catalogue).expect("begun again");
     assert_eq!(now(), (JobState::Queued, 1));
     assert_eq!(claim(&catalogue).expect("the disk works").expect("the job").attempts, 2);
     recover(&catalogue).expect("given up");

@@ -1,4 +1,5 @@
-//! One job after the other, on one thread: fits take a core for seconds, and queries need the others.
+//! One job after the other, on one thread: fits take a core for seconds, and queries need the
+//! others.
 
 use std::any::Any;
 use std::ops::ControlFlow;
@@ -22,11 +23,13 @@ const PAUSE: Duration = Duration::from_secs(1);
 
 type Fitted = Result<Result<Made, String>, JoinError>;
 
-/// The state that a fit leaves its job in, the bodies to be stored, and the file to be kept with it.
+/// The state that a fit leaves its job in, the bodies to be stored, and the file to be kept with
+/// it.
 pub(super) type Ended = (JobState, Vec<Body>, Option<String>);
 
 impl Jobs {
-    /// Fits job after job once the catalogue is loaded, until [`Jobs::stop`]; the jobs that a kill left running go first.
+    /// Fits job after job once the catalogue is loaded, until [`Jobs::stop`]; the jobs that a kill
+    /// left running go first.
     pub async fn work(self, mut catalogue: watch::Receiver<Option<Arc<Catalogue>>>) {
         let mut news = self.news();
         let catalogue = tokio::select! {
@@ -77,8 +80,9 @@ impl Jobs {
 
     /// On a thread of its own. An error is the reason why the job fails.
     pub(super) fn fit(&self, catalogue: &Catalogue, job: &Job) -> Result<Made, String> {
-        // A job that was cancelled since it was claimed, when nobody could tell the board, has no points any more.
-        let mesh = catalogue.job_mesh(job.id).map_err(|error| format!("its points can not be read: {error}"))?;
+        // A job that was cancelled since it was claimed, when nobody could tell the board, has no
+        // points any more.
+        let mesh = catalogue.job_mesh(job.id).map_err(|error| format!("its points cannot be read: {error}"))?;
         let progress = |phase: Phase, said: fit::Progress| {
             let mut goes_on = true;
             self.tell(|board| goes_on = board.note(job.id, phase, said));

@@ -18,7 +18,8 @@ pub(super) struct Bodies(pub(super) Ready);
 impl BodyService for Bodies {
     async fn create_body(&self, request: Request<CreateBodyRequest>) -> Result<Response<CreateBodyResponse>, Status> {
         let file = request.into_inner().body_file_json;
-        // Proving takes milliseconds to seconds, and nothing is lost when it is for nobody any more.
+        // Proving takes milliseconds to seconds, and nothing is lost when it is for nobody any
+        // more.
         let body = self.0.prove(move || wire::body_file(&file)).await??;
         let (body, created) = self.0.change("body_file_json", move |catalogue| catalogue.create_body(body)).await?;
         Ok(Response::new(CreateBodyResponse { body: Some(wire::summary(&body)), created }))

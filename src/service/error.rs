@@ -1,5 +1,6 @@
-//! The one place where errors become gRPC statuses: a code, a message with the remedy, and details for programs
-//! (`ErrorInfo` with a reason, `BadRequest` with field paths, `ResourceInfo`, `PreconditionFailure`).
+//! The one place where errors become gRPC statuses: a code, a message with the remedy, and details
+//! for programs (`ErrorInfo` with a reason, `BadRequest` with field paths, `ResourceInfo`,
+//! `PreconditionFailure`).
 
 use std::collections::HashMap;
 use std::fmt;
@@ -11,7 +12,7 @@ use tonic_types::{ErrorDetails, StatusExt};
 use crate::scene::{Entry, List, SceneError};
 use crate::store::{CatalogueError, StoreError};
 
-/// A field of a request that can not be used.
+/// A field of a request that cannot be used.
 #[derive(Debug)]
 pub(super) struct Invalid {
     /// Path in the request, such as `pairs[3].a`.
@@ -68,7 +69,8 @@ fn failed_precondition(reason: &str, subject: &str, message: String) -> Status {
     Status::with_error_details(Code::FailedPrecondition, message, details)
 }
 
-/// Maps a failure of the catalogue; `field` is where the request named the scene or body the call is about.
+/// Maps a failure of the catalogue; `field` is where the request named the scene or body the call
+/// is about.
 pub(super) fn catalogue(error: &CatalogueError, field: &str) -> Status {
     let message = error.to_string();
     match error {

@@ -1,7 +1,9 @@
-//! One gate before all calls of the services (FitService, whose uploads take long, has one of its own): what is behind it holds messages in memory, what is before it does not.
+//! One gate before all calls of the services (FitService, whose uploads take long, has one of its
+//! own): what is behind it holds messages in memory, what is before it does not.
 //!
-//! A call that waits here has not been read: HTTP/2's flow control keeps its message with the client. Health and
-//! reflection do not pass the gate, so they are answered however many calls wait.
+//! A call that waits here has not been read: HTTP/2's flow control keeps its message with the
+//! client. Health and reflection do not pass the gate, so they are answered however many calls
+//! wait.
 
 use std::convert::Infallible;
 use std::sync::Arc;

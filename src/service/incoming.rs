@@ -1,7 +1,8 @@
 //! Connections as they come in: so many at once, and only from clients that say something.
 //!
-//! A socket costs a file descriptor whether or not its client ever speaks. Each waits in a task of its own for the first
-//! bytes of HTTP/2, so that a mute client does not hold up the others, and is dropped when they do not come.
+//! A socket costs a file descriptor whether or not its client ever speaks. Each waits in a task of
+//! its own for the first bytes of HTTP/2, so that a mute client does not hold up the others, and is
+//! dropped when they do not come.
 
 use std::io;
 use std::pin::Pin;
@@ -57,9 +58,10 @@ async fn accept(listener: TcpListener, spoke: mpsc::Sender<Connection>) {
         let stream = match listener.accept().await {
             Ok((stream, _)) => stream,
             Err(error) => {
-                // Most often out of file descriptors: trying again at once would take a core and fail again.
+                // Most often out of file descriptors: trying again at once would take a core and
+                // fail again.
                 if !failing {
-                    tracing::warn!(%error, "can not accept connections; trying again until it works");
+                    tracing::warn!(%error, "cannot accept connections; trying again until it works");
                 }
                 failing = true;
                 tokio::time::sleep(ACCEPT_PAUSE).await;

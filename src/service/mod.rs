@@ -1,9 +1,11 @@
-//! The gRPC door: handlers, conversion between wire and domain, limits, errors, starting and stopping.
+//! The gRPC door: handlers, conversion between wire and domain, limits, errors, starting and
+//! stopping.
 //!
-//! The one room that knows protobuf. `incoming` lets connections in and `gate` lets calls in, so many at once. A call walks
-//! straight through: a handler (`bodies`, `scenes`, `queries`, `fits`) reads its message with `wire`, asks the catalogue or a
-//! scene's snapshot, and writes the answer with `wire`; whatever fails becomes a status in `error`. Handlers are dropped
-//! when a client goes away, so every change runs in a task of its own and is finished or not begun.
+//! The one room that knows protobuf. `incoming` lets connections in and `gate` lets calls in, so
+//! many at once. A call walks straight through: a handler (`bodies`, `scenes`, `queries`, `fits`)
+//! reads its message with `wire`, asks the catalogue or a scene's snapshot, and writes the answer
+//! with `wire`; whatever fails becomes a status in `error`. Handlers are dropped when a client goes
+//! away, so every change runs in a task of its own and is finished or not begun.
 
 mod bodies;
 mod error;

@@ -15,7 +15,8 @@ use super::proto::{BodySummary, CreateBodyRequest};
 /// Largest body file: a message less what `CreateBodyRequest` puts around it.
 const MAX_BODY_BYTES: u64 = MAX_MESSAGE_BYTES as u64 - 16;
 
-/// How long the server may take to answer for one file; proving takes seconds at worst, but others may be before it.
+/// How long the server may take to answer for one file; proving takes seconds at worst, but others
+/// may be before it.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A body file that is stored in the server.
@@ -32,7 +33,7 @@ pub struct Pushed {
 /// Why a body file is not stored.
 #[derive(Debug, thiserror::Error)]
 pub enum PushError {
-    /// The address of the server can not be read.
+    /// The address of the server cannot be read.
     #[error("--server {url} is no address of a server: {why}; write it like http://127.0.0.1:50051")]
     Url {
         /// As given.
@@ -41,15 +42,15 @@ pub enum PushError {
         why: String,
     },
     /// Nobody answers there.
-    #[error("can not reach a server at {url}: {why}; start one with `sublevel serve` or name another with --server")]
+    #[error("cannot reach a server at {url}: {why}; start one with `sublevel serve` or name another with --server")]
     Unreachable {
         /// As given.
         url: String,
         /// The reason.
         why: String,
     },
-    /// The file can not be read.
-    #[error("can not read {}: {source}; check the path and its permissions", .file.display())]
+    /// The file cannot be read.
+    #[error("cannot read {}: {source}; check the path and its permissions", .file.display())]
     Read {
         /// The file.
         file: PathBuf,
@@ -57,7 +58,7 @@ pub enum PushError {
         source: std::io::Error,
     },
     /// The file is no valid body file.
-    #[error("{} can not be stored: {why}", .file.display())]
+    #[error("{} cannot be stored: {why}", .file.display())]
     File {
         /// The file.
         file: PathBuf,
@@ -108,10 +109,11 @@ pub enum PushError {
     },
 }
 
-/// Stores body files in a running server. All files are checked before the first is sent; storing a file twice is no error.
+/// Stores body files in a running server. All files are checked before the first is sent; storing a
+/// file twice is no error.
 ///
 /// # Errors
-/// The first file that can not be stored; those before it are.
+/// The first file that cannot be stored; those before it are.
 pub async fn push(url: &str, files: &[PathBuf]) -> Result<Vec<Pushed>, PushError> {
     push_within(PATIENCE, url, files).await
 }

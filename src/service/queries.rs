@@ -55,8 +55,9 @@ impl QueryService for Queries {
         let measures: Arc<[_]> = measures.into();
         let revision = scene.revision();
 
-        // Every share queues anew behind the calls that came meanwhile, so a long call does not hold up short ones; and
-        // when the client goes away this handler is dropped and no further share is begun.
+        // Every share queues again behind the calls that came meanwhile, so a long call does not
+        // hold up short ones; and when the client goes away this handler is dropped and no further
+        // share is begun.
         let mut results = Vec::with_capacity(count);
         for from in (0..pairs.len()).step_by(PAIRS_AT_ONCE) {
             let (pairs, measures) = (pairs.clone(), measures.clone());
@@ -95,7 +96,8 @@ fn resolve(
     Ok(pairs)
 }
 
-/// Solves a share of the pairs cold, one by one, so that an answer depends on nothing but its own pair.
+/// Solves a share of the pairs cold, one by one, so that an answer depends on nothing but its own
+/// pair.
 fn evaluate(
     pairs: &[(Placed, Placed)],
     share: Range<usize>,

@@ -1,4 +1,5 @@
-//! What every handler holds: the catalogue once it is loaded, and the gates to the threads that work.
+//! What every handler holds: the catalogue once it is loaded, and the gates to the threads that
+//! work.
 
 use std::sync::Arc;
 use std::thread;
@@ -11,7 +12,8 @@ use crate::store::{Catalogue, CatalogueError};
 use super::error;
 use super::limits::LOADING_PATIENCE;
 
-/// Shared by all handlers. Work that blocks passes a gate first, so that one kind of it can not take every thread.
+/// Shared by all handlers. Work that blocks passes a gate first, so that one kind of it cannot take
+/// every thread.
 #[derive(Debug, Clone)]
 pub(super) struct Ready {
     catalogue: watch::Receiver<Option<Arc<Catalogue>>>,
@@ -30,7 +32,8 @@ impl Ready {
         Self { catalogue, solving: gate(cores), proving: gate(cores.div_ceil(2)), changing: gate(1) }
     }
 
-    /// The catalogue; waits a little while it is loading, so that a client that starts along with the server works.
+    /// The catalogue; waits a little while it is loading, so that a client that starts along with
+    /// the server works.
     pub(super) async fn catalogue(&self) -> Result<Arc<Catalogue>, Status> {
         if let Some(catalogue) = &*self.catalogue.borrow() {
             return Ok(catalogue.clone());
@@ -44,8 +47,8 @@ impl Ready {
         .ok_or_else(|| error::unavailable("LOADING", "the catalogue is loading; try again in a moment"))
     }
 
-    /// Makes a change. Once begun it runs to its end, even when the client goes away meanwhile. `field` is where the request
-    /// names what the change is about.
+    /// Makes a change. Once begun it runs to its end, even when the client goes away meanwhile.
+    /// `field` is where the request names what the change is about.
     pub(super) async fn change<T: Send + 'static>(
         &self,
         field: &'static str,
@@ -55,7 +58,8 @@ impl Ready {
         on_thread(&self.changing, move || change(&catalogue)).await?.map_err(|error| error::catalogue(&error, field))
     }
 
-    /// Answers a share of a query, or writes a large answer; keep it short, for others wait in turn.
+    /// Answers a share of a query, or writes a large answer; keep it short, for others wait in
+    /// turn.
     pub(super) async fn solve<T: Send + 'static>(
         &self,
         solve: impl FnOnce() -> T + Send + 'static,

@@ -44,21 +44,21 @@ pub struct ServeOptions {
     pub data: PathBuf,
 }
 
-/// Why a server could not start or ended before it was told to.
+/// Why a server could not start or ended before it was reported to.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
     /// Everybody on the network could change the catalogue.
     #[error("--listen {0} is no loopback address, and there is no TLS yet; listen on 127.0.0.1 or [::1]")]
     NotLoopback(SocketAddr),
-    /// The address can not be listened on.
-    #[error("can not listen on {addr}: {source}; choose another address, or port 0 for any free port")]
+    /// The address cannot be listened on.
+    #[error("cannot listen on {addr}: {source}; choose another address, or port 0 for any free port")]
     Bind {
         /// The address.
         addr: SocketAddr,
         /// What the system said.
         source: io::Error,
     },
-    /// The catalogue can not be opened or loaded.
+    /// The catalogue cannot be opened or loaded.
     #[error(transparent)]
     Store(#[from] StoreError),
     /// A task of the server panicked.
@@ -67,8 +67,8 @@ pub enum ServeError {
     /// The transport gave up.
     #[error("serving ended: {0}")]
     Transport(#[from] tonic::transport::Error),
-    /// Signals can not be listened for, or standard output is closed.
-    #[error("can not set the server up: {0}")]
+    /// Signals cannot be listened for, or standard output is closed.
+    #[error("cannot set the server up: {0}")]
     Setup(#[from] io::Error),
 }
 
@@ -84,7 +84,8 @@ impl Server {
     /// Binds the address and locks the catalogue. Connections queue until [`Server::run`].
     ///
     /// # Errors
-    /// When the address is not loopback or taken, or when the catalogue is in use or can not be opened.
+    /// When the address is not loopback or taken, or when the catalogue is in use or cannot be
+    /// opened.
     pub async fn bind(options: ServeOptions) -> Result<Self, ServeError> {
         let ServeOptions { listen, data } = options;
         if !listen.ip().is_loopback() {
@@ -104,11 +105,11 @@ impl Server {
         self.addr
     }
 
-    /// Serves until `stop` resolves, then lets open calls finish for at most [`DRAIN`]. Health says NOT_SERVING until the
-    /// catalogue is loaded and from `stop` on.
+    /// Serves until `stop` resolves, then lets open calls finish for at most [`DRAIN`]. Health says
+    /// NOT_SERVING until the catalogue is loaded and from `stop` on.
     ///
     /// # Errors
-    /// When the catalogue can not be loaded or the transport gives up.
+    /// When the catalogue cannot be loaded or the transport gives up.
     pub async fn run(self, stop: impl Future<Output = ()> + Send) -> Result<(), ServeError> {
         let (loaded, catalogue) = watch::channel(None);
         let (health, health_service) = tonic_health::server::health_reporter();
@@ -144,7 +145,7 @@ impl Server {
         loader.abort();
         set_health(&health, ServingStatus::NotServing).await;
         let _ = draining.send(());
-        // The running fit goes back into the queue, and those who watch it are told.
+        // The running fit goes back into the queue, and those who watch it are reported.
         #[cfg(feature = "fit")]
         let serving = async {
             jobs.stop();
@@ -161,8 +162,8 @@ impl Server {
     }
 }
 
-/// Runs a server until SIGTERM or Ctrl-C, which it obeys with an orderly stop; a second one cuts it short. Prints `listening on ADDR` as the first line
-/// on standard output when clients may connect.
+/// Runs a server until SIGTERM or Ctrl-C, which it obeys with an orderly stop; a second one cuts it
+/// short. Prints `listening on ADDR` as the first line on standard output when clients may connect.
 ///
 /// # Errors
 /// See [`Server::bind`] and [`Server::run`].
@@ -231,7 +232,8 @@ fn router(ready: Ready) -> Router {
         .add_service(gate.before(bodies.max_decoding_message_size(sized).max_encoding_message_size(sized)))
         .add_service(gate.before(scenes.max_decoding_message_size(sized).max_encoding_message_size(sized)))
         .add_service(gate.before(queries.max_decoding_message_size(sized).max_encoding_message_size(sized)))
-        // Older clients know v1alpha only. The descriptors are compiled in, so they are read or a test fails.
+        // Older clients know v1alpha only. The descriptors are compiled in, so they are read or a
+        // test fails.
         .add_optional_service(reflection().build_v1().ok())
         .add_optional_service(reflection().build_v1alpha().ok())
 }

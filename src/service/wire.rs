@@ -1,4 +1,5 @@
-//! Between messages and the domain: the one place that knows both. Readers name the field they refuse.
+//! Between messages and the domain: the one place that knows both. Readers name the field they
+//! refuse.
 
 use std::collections::HashMap;
 use std::sync::Arc;

@@ -17,8 +17,9 @@ use super::job::{Job, MAX_QUEUED_JOBS};
 use super::rows::{BODIES, META, OBJECTS, ObjectRow, REVISIONS, SCENES, SceneRow};
 use super::{Store, StoreError};
 
-/// The catalogue of one server. Reading takes a lock for the time of a map look-up; changes are made one after the other,
-/// each on disk before it is seen. All methods that change block on the disk.
+/// The catalogue of one server. Reading takes a lock for the time of a map look-up; changes are
+/// made one after the other, each on disk before it is seen. All methods that change block on the
+/// disk.
 #[derive(Debug)]
 pub struct Catalogue {
     /// Held over a whole change: check, commit, make visible.
@@ -60,7 +61,7 @@ pub enum CatalogueError {
     /// The name is not usable.
     #[error("the name of the scene {0}")]
     SceneName(#[from] NameError),
-    /// The update can not be applied to the scene.
+    /// The update cannot be applied to the scene.
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// No fit job has this id.
@@ -96,7 +97,7 @@ impl Catalogue {
     /// Reads everything from the store and re-proves every body.
     ///
     /// # Errors
-    /// When the file can not be read, or holds a body, pose or name that does not hold up.
+    /// When the file cannot be read, or holds a body, pose or name that does not hold up.
     pub fn load(store: Store) -> Result<Self, StoreError> {
         let state = State::read(&store, &BTreeMap::new())?;
         Ok(Self { store: Mutex::new(store), state: RwLock::new(state) })
@@ -107,7 +108,8 @@ impl Catalogue {
         self.read(|state| state.bodies.get(id).cloned())
     }
 
-    /// Up to `count` bodies in the order of their ids, from the first one after `after`; and whether more follow.
+    /// Up to `count` bodies in the order of their ids, from the first one after `after`; and
+    /// whether more follow.
     pub fn bodies(&self, after: Option<&BodyId>, count: usize) -> (Vec<Arc<Body>>, bool) {
         self.read(|state| page(&state.bodies, after, count))
     }
@@ -117,7 +119,8 @@ impl Catalogue {
         self.read(|state| state.scenes.get(name).cloned())
     }
 
-    /// Up to `count` scenes in the order of their names, from the first one after `after`; and whether more follow.
+    /// Up to `count` scenes in the order of their names, from the first one after `after`; and
+    /// whether more follow.
     pub fn scenes(&self, after: Option<&str>, count: usize) -> (Vec<Arc<Scene>>, bool) {
         let after: Option<Arc<str>> = after.map(Into::into);
         self.read(|state| page(&state.scenes, after.as_ref(), count))
@@ -128,7 +131,8 @@ impl Catalogue {
         self.read(|state| (state.bodies.len(), state.scenes.len()))
     }
 
-    /// Stores a body; the one that was there first when the content is known. Tells whether it is new.
+    /// Stores a body; the one that was there first when the content is known. Tells whether it is
+    /// new.
     ///
     /// # Errors
     /// When the disk fails.
@@ -198,7 +202,7 @@ impl Catalogue {
     /// Applies an update whole and returns the snapshot it is part of.
     ///
     /// # Errors
-    /// When there is no such scene, when the update can not be applied, or when the disk fails.
+    /// When there is no such scene, when the update cannot be applied, or when the disk fails.
     pub fn update_scene(&self, name: &str, update: &Update) -> Result<Arc<Scene>, CatalogueError> {
         let mut store = self.writer()?;
         let scene = self.scene(name).ok_or_else(|| CatalogueError::NoScene(name.to_owned()))?;
@@ -267,9 +271,10 @@ impl Catalogue {
         write: impl FnOnce(&WriteTransaction) -> Result<(), redb::Error>,
     ) -> Result<(), StoreError> {
         store.commit(write).inspect_err(|_| {
-            // The next change tries again; until then nothing can be changed, and somebody should know.
+            // The next change tries again; until then nothing can be changed, and somebody should
+            // know.
             if let Err(error) = self.reread(store) {
-                tracing::error!(%error, "the catalogue can not be read back after a failed change; changes are refused");
+                tracing::error!(%error, "the catalogue cannot be read back after a failed change; changes are refused");
             }
         })
     }

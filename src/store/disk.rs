@@ -46,13 +46,15 @@ impl Store {
     /// Opens the catalogue in a directory, making both as needed, and locks it.
     ///
     /// # Errors
-    /// [`StoreError::InUse`] when another process has it open; otherwise the reason why it can not be opened.
+    /// [`StoreError::InUse`] when another process has it open; otherwise the reason why it cannot
+    /// be opened.
     pub fn open(dir: &Path) -> Result<Self, StoreError> {
         let unusable = |source| StoreError::Directory { dir: dir.into(), source };
         fs::create_dir_all(dir).map_err(unusable)?;
         let file = dir.join("catalogue.redb");
         let fresh = match fs::metadata(&file) {
-            // redb would make a new database of it, and whatever was in it would be forgotten without a word.
+            // redb would make a new database of it, and whatever was in it would be forgotten
+            // without a word.
             Ok(found) if found.len() == 0 => return Err(StoreError::Empty { file }),
             Ok(_) => false,
             Err(error) if error.kind() == io::ErrorKind::NotFound => true,
@@ -71,7 +73,8 @@ impl Store {
         Ok(store)
     }
 
-    /// `first` is opened now; `opener` opens what is there, and never makes anything new, after a failed commit.
+    /// `first` is opened now; `opener` opens what is there, and never makes anything new, after a
+    /// failed commit.
     pub(super) fn open_with(
         dir: &Path,
         first: Result<Database, DatabaseError>,
@@ -92,7 +95,8 @@ impl Store {
         self.database.is_none()
     }
 
-    /// Opens the file again after a failed commit. One that lacks its tables is not the one that was open.
+    /// Opens the file again after a failed commit. One that lacks its tables is not the one that
+    /// was open.
     pub(super) fn reopen(&mut self) -> Result<(), StoreError> {
         self.database = None;
         let database = self.opened((self.opener)())?;
@@ -143,8 +147,9 @@ impl Store {
         }
     }
 
-    /// Commits one transaction durably: when this returns `Ok`, it is on disk. After an error the file is closed, since
-    /// the database can not tell what reached the disk; [`Store::reopen`] and [`Store::read`] can.
+    /// Commits one transaction durably: when this returns `Ok`, it is on disk. After an error the
+    /// file is closed, since the database cannot tell what reached the disk; [`Store::reopen`] and
+    /// [`Store::read`] can.
     pub(super) fn commit(
         &mut self,
         write: impl FnOnce(&WriteTransaction) -> Result<(), redb::Error>,

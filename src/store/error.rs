@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why the catalogue's file can not be opened, read or written. Nothing was changed.
+/// Why the catalogue's file cannot be opened, read or written. Nothing was changed.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// Another process holds the file's lock.
@@ -15,9 +15,9 @@ pub enum StoreError {
         /// The data directory.
         dir: PathBuf,
     },
-    /// The data directory can not be made or opened.
+    /// The data directory cannot be made or opened.
     #[error(
-        "can not use the data directory {}: {source}; check the path and its permissions",
+        "cannot use the data directory {}: {source}; check the path and its permissions",
         .dir.display()
     )]
     Directory {
@@ -68,7 +68,7 @@ pub enum StoreError {
         source: io::Error,
     },
     /// Any other failure of the disk or the database.
-    #[error("can not read or write the catalogue in {}: {source}; check the disk", .dir.display())]
+    #[error("cannot read or write the catalogue in {}: {source}; check the disk", .dir.display())]
     Disk {
         /// The data directory.
         dir: PathBuf,

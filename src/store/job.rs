@@ -9,19 +9,21 @@ use sha2::{Digest, Sha256};
 /// Most jobs that may wait; each keeps its points on disk.
 pub const MAX_QUEUED_JOBS: usize = 64;
 
-/// Jobs that are kept after they ended, the latest; with the oldest of them its request id is forgotten.
+/// Jobs that are kept after they ended, the latest; with the oldest of them its request id is
+/// forgotten.
 pub const MAX_ENDED_JOBS: usize = 1000;
 
 /// Longest request id.
 pub const MAX_REQUEST_ID_BYTES: usize = 128;
 
-/// Longest file that a job may make: what one message can hand out, with all that is said of the job.
+/// Longest file that a job may make: what one message can hand out, with all that is said of the
+/// job.
 pub const MAX_FILE_BYTES: usize = (4 << 20) - (64 << 10);
 
 /// What a job is asked for. `jobs` checks it before it is stored.
 ///
-/// Options that came later are left out where nobody chose them, so that orders of earlier versions are read, and an order means the
-/// same content under the request id that was given then.
+/// Options that came later are left out where nobody chose them, so that orders of earlier versions
+/// are read, and an order means the same content under the request id that was given then.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FitOrder {
@@ -70,9 +72,10 @@ pub struct FitOrder {
 pub struct FitGroup {
     /// Their ids.
     pub body_ids: Vec<String>,
-    /// How much volume several bodies around them may add, as a fraction of theirs; one body if not told.
+    /// How much volume several bodies around them may add, as a fraction of theirs; one body if not
+    /// reported.
     pub max_growth: Option<f64>,
-    /// Least degree of the multipliers; the default if not told.
+    /// Least degree of the multipliers; the default if not reported.
     pub multiplier_degree: Option<usize>,
 }
 
@@ -119,7 +122,7 @@ pub enum JobState {
     Running,
     /// What it made is stored.
     Succeeded(FitOutcome),
-    /// It can not be done, for this reason.
+    /// It cannot be done, for this reason.
     Failed(String),
     /// A client cancelled it.
     Cancelled,
@@ -216,14 +219,16 @@ impl FitOrder {
         self.relax_convexity != 0.0 || self.objective == "inverse-moment"
     }
 
-    /// Whether triangles matter: only the points of one convex body do, and what is trimmed has lost them.
+    /// Whether triangles matter: only the points of one convex body do, and what is trimmed has
+    /// lost them.
     pub fn uses_triangles(&self) -> bool {
         self.trim == 0.0 && (self.parts.is_some() || self.max_gap_m.is_some() || self.is_relaxed())
     }
 }
 
 impl NewJob {
-    /// A job about points, metres, that are finite, and the triangles between them; of a group about neither.
+    /// A job about points, metres, that are finite, and the triangles between them; of a group
+    /// about neither.
     pub fn new(request_id: String, order: FitOrder, points: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Self {
         let coordinates: Vec<u8> = points.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
         let corners: Vec<u8> = triangles.iter().flatten().flat_map(|corner| corner.to_le_bytes()).collect();

@@ -1,27 +1,33 @@
 //! The durable catalogue of bodies, scenes and fit jobs, embedded in the server.
 //!
-//! [`Store`] is the file: one redb database, `catalogue.redb`, in the data directory. [`Catalogue`] holds everything of it
-//! in memory for reading and writes every change through. Only this room knows bytes on disk.
+//! [`Store`] is the file: one redb database, `catalogue.redb`, in the data directory. [`Catalogue`]
+//! holds everything of it in memory for reading and writes every change through. Only this room
+//! knows bytes on disk.
 //!
 //! # What is durable, and why
 //!
-//! A change is one redb transaction committed with immediate durability: its pages and then the header that points to them
-//! are written and synced before `commit` returns, and only then is the change made in memory and answered. So:
+//! A change is one redb transaction committed with immediate durability: its pages and then the
+//! header that points to them are written and synced before `commit` returns, and only then is the
+//! change made in memory and answered. So:
 //!
-//! * **Killed or powered off before the header is on disk:** the old header still points to the old pages, which a commit
-//!   never overwrites. The change was not acknowledged and is not there.
-//! * **During the write of the header:** it names two roots with checksums; on opening, a root whose pages do not match
-//!   is passed over for the other one. The change is there whole or not at all.
+//! * **Killed or powered off before the header is on disk:** the old header still points to the old
+//!   pages, which a commit never overwrites. The change was not acknowledged and is not there.
+//! * **During the write of the header:** it names two roots with checksums; on opening, a root
+//!   whose pages do not match is passed over for the other one. The change is there whole or not at
+//!   all.
 //! * **After the sync:** the change is there, acknowledged or not.
-//! * **The disk is full or fails:** the transaction is dropped, the caller gets the reason, memory stays as it was. The
-//!   database is opened again and read back, since a failed sync leaves open which root is on disk; memory then says
-//!   what the disk says. Reading goes on meanwhile, and the next change tries again.
+//! * **The disk is full or fails:** the transaction is dropped, the caller gets the reason, memory
+//!   stays as it was. The database is opened again and read back, since a failed sync leaves open
+//!   which root is on disk; memory then says what the disk says. Reading goes on meanwhile, and the
+//!   next change tries again.
 //! * **The first start:** the directory entry of the new file is synced too.
-//! * **The file is gone or another one** when it is opened again: changes are refused until it is back. Nothing is made
-//!   anew but on a start that finds no file at all; one that finds an empty file is refused.
+//! * **The file is gone or another one** when it is opened again: changes are refused until it is
+//!   back. Nothing is made again but on a start that finds no file at all; one that finds an empty
+//!   file is refused.
 //!
-//! Memory is thus never ahead of the disk, and a revision that was seen is never given out again: a scene's revision is
-//! part of every commit that changes it, and deleting a scene raises the floor from which later scenes start.
+//! Memory is thus never ahead of the disk, and a revision that was seen is never given out again: a
+//! scene's revision is part of every commit that changes it, and deleting a scene raises the floor
+//! from which later scenes start.
 
 mod catalogue;
 mod disk;

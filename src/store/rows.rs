@@ -1,5 +1,5 @@
-//! Tables of the catalogue and what their rows hold. JSON: a few hundred bytes each, readable with any redb viewer, and
-//! numbers survive the round trip exactly.
+//! Tables of the catalogue and what their rows hold. JSON: a few hundred bytes each, readable with
+//! any redb viewer, and numbers survive the round trip exactly.
 
 use redb::TableDefinition;
 use serde::{Deserialize, Serialize};
@@ -16,15 +16,20 @@ pub(super) const META: TableDefinition<&str, u64> = TableDefinition::new("meta")
 pub(super) const BODIES: TableDefinition<&str, &[u8]> = TableDefinition::new("bodies");
 /// Scene name to [`SceneRow`].
 pub(super) const SCENES: TableDefinition<&str, &[u8]> = TableDefinition::new("scenes");
-/// Scene name to revision: apart from the scene's row, so that a new pose does not rewrite the allowed pairs.
+/// Scene name to revision: apart from the scene's row, so that a new pose does not rewrite the
+/// allowed pairs.
 pub(super) const REVISIONS: TableDefinition<&str, u64> = TableDefinition::new("revisions");
-/// Scene and object name to [`ObjectRow`]: a new pose rewrites one row, whatever the size of the scene.
+/// Scene and object name to [`ObjectRow`]: a new pose rewrites one row, whatever the size of the
+/// scene.
 pub(super) const OBJECTS: TableDefinition<(&str, &str), &[u8]> = TableDefinition::new("objects");
-/// Job id to [`Job`](super::Job). This table and the next three are missing from files of programs that did not know them.
+/// Job id to [`Job`](super::Job). This table and the next three are missing from files of programs
+/// that did not know them.
 pub(super) const JOBS: TableDefinition<u64, &[u8]> = TableDefinition::new("jobs");
-/// Job id to the coordinates of its points, metres, as little-endian f64; of jobs that have not ended.
+/// Job id to the coordinates of its points, metres, as little-endian f64; of jobs that have not
+/// ended.
 pub(super) const POINTS: TableDefinition<u64, &[u8]> = TableDefinition::new("points");
-/// Job id to the corners of the triangles between its points, as little-endian u32; of jobs that have not ended.
+/// Job id to the corners of the triangles between its points, as little-endian u32; of jobs that
+/// have not ended.
 pub(super) const TRIANGLES: TableDefinition<u64, &[u8]> = TableDefinition::new("triangles");
 /// Job id to the file of the compound or sos-body that it made.
 pub(super) const FILES: TableDefinition<u64, &[u8]> = TableDefinition::new("files");
@@ -62,7 +67,8 @@ impl ObjectRow {
         }
     }
 
-    /// The pose with the very bits that were stored: a pose is normalised when it comes in, and once only.
+    /// The pose with the very bits that were stored: a pose is normalised when it comes in, and
+    /// once only.
     pub(super) fn pose(&self) -> Result<Pose, PoseError> {
         Pose::from_quaternion(self.translation_m.into(), self.rotation)
     }

@@ -16,8 +16,8 @@ use crate::body::Body;
 use crate::measure::Pose;
 use crate::scene::{Placement, Update};
 
-/// A disk in memory that outlives the databases on it and is full on demand: it takes one more write, cut short, and
-/// refuses every other.
+/// A disk in memory that outlives the databases on it and is full on demand: it takes one more
+/// write, cut short, and refuses every other.
 #[derive(Debug, Clone, Default)]
 struct Disk {
     bytes: Arc<Mutex<Vec<u8>>>,
@@ -195,7 +195,8 @@ fn what_it_did_not_write_is_refused_by_name() {
     }
 }
 
-/// Were a new file made, the scenes would be gone from memory too and their revisions given out again.
+/// Were a new file made, the scenes would be gone from memory too and their revisions given out
+/// again.
 #[test]
 fn a_file_that_went_away_is_not_made_anew() {
     let dir = tempfile::tempdir().expect("a directory");

@@ -1,4 +1,4 @@
-//! What answers tell besides their bracket, held against closed forms of balls.
+//! What answers hold besides their bracket, held against closed forms of balls.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use sublevel::body::Body;
@@ -40,7 +40,8 @@ fn vector(v: Option<proto::Vector3>) -> Vector3<f64> {
     Vector3::new(v.x, v.y, v.z)
 }
 
-/// How far a gradient is from the force at a point, about the translation of a pose, relative to the force.
+/// How far a gradient is from the force at a point, about the translation of a pose, relative to
+/// the force.
 fn off(gradient: Option<proto::PoseGradient>, force: &Vector3<f64>, arm: &Vector3<f64>) -> f64 {
     let gradient = gradient.expect("a gradient");
     let linear = (vector(gradient.linear) - force).norm();

@@ -27,7 +27,8 @@ fn everything(a: &str, b: &str) -> EvaluateRequest {
     }
 }
 
-/// The promise of the store: what was acknowledged is there after SIGKILL, and revisions do not go back.
+/// The promise of the store: what was acknowledged is there after SIGKILL, and revisions do not go
+/// back.
 #[tokio::test(flavor = "multi_thread")]
 async fn everything_acknowledged_survives_a_kill() {
     let dir = tempfile::tempdir().expect("a directory");
@@ -42,7 +43,8 @@ async fn everything_acknowledged_survives_a_kill() {
     let mut numbers = Numbers(7);
     let mut upsert_objects: Vec<_> =
         names.iter().zip([0, 1, 2, 0]).map(|(name, i)| object(name, &files[i].0, at(0.0))).collect();
-    // Poses that are normalised on the way in, for normalising them again on the way back would show in the last bits.
+    // Poses that are normalised on the way in, for normalising them again on the way back would
+    // show in the last bits.
     upsert_objects.extend((0..60).map(|i| object(&format!("still {i}"), &files[i % 3].0, numbers.pose())));
     let count = upsert_objects.len();
     let allow_pairs = vec![pair("b", "a")];
@@ -208,7 +210,8 @@ async fn answers_are_right_and_overrides_last_one_call() {
     clients.update(UpdateSceneRequest { name: "room".into(), upsert_objects, ..Default::default() }).await;
 
     let over = EvaluateRequest { pose_overrides: vec![moved("b", at(7.0))], ..everything("a", "b") };
-    // Ball a at 0 of radius 1; ball b of radius 2 at x: p_a on b is ((x - 2) / 1)^2, p_b on a is ((x - 1) / 2)^2.
+    // Ball a at 0 of radius 1; ball b of radius 2 at x: p_a on b is ((x - 2) / 1)^2, p_b on a is
+    // ((x - 1) / 2)^2.
     for (request, x) in [(everything("a", "b"), 5.0), (over, 7.0_f64), (everything("a", "b"), 5.0)] {
         let results = clients.queries.evaluate(request).await.expect("answers").into_inner().results;
         for result in results {

@@ -86,8 +86,8 @@ async fn health_follows_loading_and_stopping() {
 #[tokio::test(flavor = "multi_thread")]
 async fn idle_connections_do_not_hold_up_the_stop() {
     let dir = tempfile::tempdir().expect("a directory");
-    // A client that has nothing to say is told to go; one that never said anything is cut after the drain, or when a
-    // second signal says so.
+    // A client that has nothing to say is asked to go; one that never said anything is cut after
+    // the drain, or when a second signal says so.
     let (soon, later) = (Duration::from_secs(4), Duration::from_secs(15));
     for (silent, twice, longest) in [(false, false, soon), (true, false, later), (true, true, soon)] {
         let mut server = Running::start(dir.path());

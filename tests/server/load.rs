@@ -15,7 +15,8 @@ use tonic_health::pb::health_client::HealthClient;
 
 use crate::harness::{Clients, Running, at, object, pair};
 
-/// As many long calls as would take every core for themselves; none of them is over when the short one is answered.
+/// As many long calls as would take every core for themselves; none of them is over when the short
+/// one is answered.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_short_query_does_not_wait_for_long_ones() {
     let dir = tempfile::tempdir().expect("a directory");
@@ -94,7 +95,7 @@ async fn running_out_of_file_descriptors_is_waited_out() {
     drop(mute);
     tokio::time::timeout(Duration::from_secs(10), call(&server)).await.expect("there is room again");
     // One line for each time it begins to fail, not one for each try.
-    let lines = Running::log(dir.path()).matches("can not accept").count();
+    let lines = Running::log(dir.path()).matches("cannot accept").count();
     assert!((1..=8).contains(&lines), "{lines} lines");
 }
 

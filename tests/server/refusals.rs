@@ -1,4 +1,5 @@
-//! What the server refuses: each bad request gets its code, names its field, and leaves everything as it was.
+//! What the server refuses: each bad request gets its code, names its field, and leaves everything
+//! as it was.
 
 use crate::harness::{Clients, Running, at, field, moved, object, pair, pose, reason};
 use nalgebra::Vector3;

@@ -1,8 +1,10 @@
-//! Counts the instructions of solves under valgrind's callgrind, which a busy machine does not change.
+//! Counts the instructions of solves under valgrind's callgrind, which a busy machine does not
+//! change.
 //!
-//! `.ci/instructions` runs it: each row in a process of its own, on the AVX2 path (valgrind knows no AVX-512), on two fitted
-//! bodies that are kept beside this file, in poses that depend on nothing. The counts are compared with those recorded in
-//! `benches/instructions.json`; they belong to one version of the compiler, which is recorded with them.
+//! `.ci/instructions` runs it: each row in a process of its own, on the AVX2 path (valgrind knows
+//! no AVX-512), on two fitted bodies that are kept beside this file, in poses that depend on
+//! nothing. The counts are compared with those recorded in `benches/instructions.json`; they belong
+//! to one version of the compiler, which is recorded with them.
 
 use clap::Parser;
 use nalgebra::Vector3;
@@ -44,7 +46,7 @@ struct Args {
     /// Record the counts instead of comparing them
     #[arg(long)]
     record: bool,
-    /// Fit the bodies of benches/instructions anew; record the counts afterwards
+    /// Fit the bodies of benches/instructions again; record the counts afterwards
     #[arg(long)]
     fit: bool,
     /// Run the solves of one row, to be counted from outside
@@ -204,8 +206,8 @@ fn solve_level_distance(bodies: &Bodies, pose: &Pose, warm: &mut WarmStart) -> (
     (answer.status, answer.iterations)
 }
 
-/// The human about the chair: round it at a varying distance, a centimetre a step, turning by a degree a step about an axis
-/// that moves.
+/// The human about the chair: round it at a varying distance, a centimetre a step, turning by a
+/// degree a step about an axis that moves.
 fn poses() -> Result<Vec<Pose>, Box<dyn Error>> {
     let mut rotation = nalgebra::UnitQuaternion::identity();
     (0..SOLVES)

@@ -1,5 +1,5 @@
-//! Measurements of Sublevel beside other libraries and solvers, as reports with pictures and raw numbers; and what its benches
-//! share. Not published: whoever uses Sublevel compiles none of it.
+//! Measurements of Sublevel beside other libraries and solvers, as reports with pictures and raw
+//! numbers; and what its benches share. Not published: whoever uses Sublevel compiles none of it.
 
 pub mod accuracy;
 pub mod cost;

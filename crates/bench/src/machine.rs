@@ -6,7 +6,7 @@ use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 use sublevel::polynomial::widest;
 
-/// The machine and the versions, as far as they can be told.
+/// The machine and the versions, as far as they can be known.
 #[derive(Clone, Debug, Serialize)]
 pub struct Machine {
     /// Name of the processor.

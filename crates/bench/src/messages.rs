@@ -23,7 +23,8 @@ const REACH: f64 = 10.0;
 /// How often each message is sent.
 const REPEATS: usize = 9;
 
-/// Nanoseconds of an Evaluate with so many pairs, none of them twice, for each of the sizes: medians, one connection.
+/// Nanoseconds of an Evaluate with this many pairs, none of them twice, for each of the sizes:
+/// medians, one connection.
 pub(crate) fn messages(sizes: &[usize]) -> Result<Vec<f64>, Box<dyn Error>> {
     let data = tempfile::Builder::new().prefix("sublevel-cost-").tempdir()?;
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;

@@ -1,4 +1,5 @@
-//! Distances between fitted bodies: brackets, optimality at the witnesses, several constraints, no allocation.
+//! Distances between fitted bodies: brackets, optimality at the witnesses, several constraints, no
+//! allocation.
 
 use nalgebra::Vector3;
 use sublevel_core::body::Body;
@@ -24,7 +25,8 @@ fn gradient(body: &Body, pose: &Pose, x: &Vector3<f64>) -> (f64, Vector3<f64>) {
     (jet.value, pose.transform_direction(&jet.gradient))
 }
 
-/// The optimality conditions at the witnesses: both on the surface, normals opposite along the line between them.
+/// The optimality conditions at the witnesses: both on the surface, normals opposite along the line
+/// between them.
 fn check_optimality(answer: &Distance, (a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose), label: &str) {
     let n = (answer.witness_a - answer.witness_b).normalize();
     let (value_a, g_a) = gradient(a, pose_a, &answer.witness_a);
@@ -65,7 +67,8 @@ fn two_hundred_random_poses_of_fitted_bodies() {
             assert_eq!(level.status, Status::Converged, "{label}");
             assert!(level.upper - level.lower <= 1e-9 * level.upper.abs().max(1.0), "{label}");
             assert_eq!(level.lower > 1.0, answer.lower > 0.0, "{label} against {answer:?}");
-            // Stationarity: on the boundary of q the gradients oppose each other; inside, p's vanishes.
+            // Stationarity: on the boundary of q the gradients oppose each other; inside, p's
+            // vanishes.
             let (_, g_p) = gradient(p, pose_p, &level.witness);
             let (value_q, g_q) = gradient(q, pose_q, &level.witness);
             if value_q > 1.0 - 1e-6 {

@@ -19,9 +19,10 @@ pub struct EnclosingBall {
 
 /// The smallest ball around `points`, its radius to a relative 1e-9; of no points, the point 0.
 ///
-/// The dual gives weights to the points: the centre is their mean, and the variance `γ = Σ w |x - c|²` is at most the square of the
-/// smallest radius. Coordinate ascent towards the farthest point, and away from the nearest one with a weight, converges
-/// linearly (Yıldırım, Two algorithms for the minimum enclosing ball problem, SIAM J. Optimization 19, 2008).
+/// The dual gives weights to the points: the centre is their mean, and the variance `γ = Σ w |x -
+/// c|²` is at most the square of the smallest radius. Coordinate ascent towards the farthest point,
+/// and away from the nearest one with a weight, converges linearly (Yıldırım, Two algorithms for
+/// the minimum enclosing ball problem, SIAM J. Optimization 19, 2008).
 pub fn smallest_ball(points: &[Vector3<f64>]) -> EnclosingBall {
     let Some(first) = points.first() else { return EnclosingBall { center: Vector3::zeros(), radius: 0.0 } };
     let farthest = |from: &Vector3<f64>| {

@@ -6,9 +6,10 @@ use nalgebra::{DMatrix, DVector};
 
 /// `-τφ - log det` of a moment matrix, of which either part may be missing.
 ///
-/// `-log det` alone keeps an unmeasured matrix definite. A log det that is measured is its own barrier. `tr X^½` is none:
-/// Newton's method on it creeps along the boundary; but matrix monotone functions become self-concordant once `-log det` is
-/// added (Faybusovich and Tsuchiya, Optim. Lett. 11, 2017).
+/// `-log det` alone keeps an unmeasured matrix definite. A log det that is measured is its own
+/// barrier. `tr X^½` is none: Newton's method on it creeps along the boundary; but matrix monotone
+/// functions become self-concordant once `-log det` is added (Faybusovich and Tsuchiya, Optim.
+/// Lett. 11, 2017).
 pub(super) struct Barrier<'a> {
     pattern: &'a Pattern,
     parts: Vec<(Spectral, f64)>,
@@ -31,7 +32,8 @@ impl<'a> Barrier<'a> {
         self.parts.iter().map(|(spectral, weight)| Some(-weight * spectral.bound(&matrix)?)).sum()
     }
 
-    /// Minus its gradient, as functional on Gram matrices collapsed to coefficients, and its Hessian.
+    /// Minus its gradient, as functional on Gram matrices collapsed to coefficients, and its
+    /// Hessian.
     pub(super) fn derivatives(&self, moments: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let matrix = self.pattern.spread(moments);
         let of_part = |(spectral, weight): &(Spectral, f64)| Some(spectral.minimiser(&matrix)? * *weight);
@@ -43,7 +45,8 @@ impl<'a> Barrier<'a> {
 
     /// Minus its gradient at the moments `to`, to first order from `at`: a Gram matrix.
     ///
-    /// Positive definite when the step is below 1 in the local norm, since that of `-log det` is part of it.
+    /// Positive definite when the step is below 1 in the local norm, since that of `-log det` is
+    /// part of it.
     pub(super) fn predicted(&self, at: &DVector<f64>, to: &DVector<f64>) -> Option<DMatrix<f64>> {
         let (at, to) = (self.pattern.spread(at), self.pattern.spread(to));
         let of_part = |(spectral, weight): &(Spectral, f64)| Some(spectral.predicted(&at, &to)? * *weight);

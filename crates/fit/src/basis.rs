@@ -12,8 +12,9 @@ pub(super) struct Affine {
     pub(super) offset: Vector3<f64>,
 }
 
-/// T with `b(u) = T b(z)` for the basis b of the matrix: a Gram matrix Q in the other frame is `TᵀQT` in the whitened
-/// one, and a moment matrix M of the whitened frame is `TMTᵀ` in the other. Size: basis x basis.
+/// T with `b(u) = T b(z)` for the basis b of the matrix: a Gram matrix Q in the other frame is
+/// `TᵀQT` in the whitened one, and a moment matrix M of the whitened frame is `TMTᵀ` in the other.
+/// Size: basis x basis.
 pub(super) fn change(structure: &Structure, matrix: Matrix, map: &Affine) -> DMatrix<f64> {
     match matrix {
         Matrix::Polynomial => of_monomials(structure.degree / 2, map),

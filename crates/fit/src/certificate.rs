@@ -1,17 +1,20 @@
-//! A certificate for a polynomial from elsewhere: a definite Gram matrix of its Hessian form, if there is one.
+//! A certificate for a polynomial from elsewhere: a definite Gram matrix of its Hessian form, if
+//! there is one.
 //!
-//! Of all Gram matrices H of the form f, `A(H) = f`, the one with the largest determinant is as far from singular as can be wished
-//! for. Its dual has one variable for each monomial of the form, a functional s with the moment matrix S(s) = A*(s):
+//! Of all Gram matrices H of the form f, `A(H) = f`, the one with the largest determinant is as far
+//! from singular as can be wished for. Its dual has one variable for each monomial of the form, a
+//! functional s with the moment matrix S(s) = A*(s):
 //!
 //! ```text
 //! minimise  f·s - log det S(s),   with  H = S(s)⁻¹  at the minimum,
 //! ```
 //!
-//! by Newton's method. For every H with `A(H) = f` and every definite S(s), `f·s = tr H S(s) >= λ_min(H) tr S(s)`: what is found on the
-//! way bounds the smallest eigenvalue of all certificates from above, and where it is negative there is none.
+//! by Newton's method. For every H with `A(H) = f` and every definite S(s), `f·s = tr H S(s) >=
+//! λ_min(H) tr S(s)`: what is found on the way bounds the smallest eigenvalue of all certificates
+//! from above, and where it is negative there is none.
 //!
-//! A square that only one product of the basis gives and that f lacks rules that element of the basis out, as those of sparse forms:
-//! of `z^4` only `y z` is left.
+//! A square that only one product of the basis gives and that f lacks rules that element of the
+//! basis out, as those of sparse forms: of `z^4` only `y z` is left.
 
 use super::factor::regularised_factor;
 use super::structure::{Pattern, Structure};
@@ -28,13 +31,15 @@ const CENTRED: f64 = 1e-6;
 /// Decrement below which a step's prediction is definite.
 const NEAR: f64 = 0.5;
 
-/// Bound of the smallest eigenvalue, relative to the largest coefficient, below which rounding leaves nothing to prove.
+/// Bound of the smallest eigenvalue, relative to the largest coefficient, below which rounding
+/// leaves nothing to prove.
 const LEAST: f64 = 1e-14;
 
 /// Why a polynomial has no certificate.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoCertificate {
-    /// A term bends the polynomial downwards somewhere, and no square of the Hessian form makes up for it.
+    /// A term bends the polynomial downwards somewhere, and no square of the Hessian form makes up
+    /// for it.
     #[error("the polynomial is not convex: nothing in it outweighs its term with exponents {0:?} in all directions")]
     NoSquare(Exponents),
     /// It is not sos-convex.
@@ -43,7 +48,8 @@ pub enum NoCertificate {
          to the largest coefficient; fit a body to points of the set instead"
     )]
     NotSosConvex {
-        /// Upper bound of the smallest eigenvalue of any Gram matrix, relative to the form's largest coefficient.
+        /// Upper bound of the smallest eigenvalue of any Gram matrix, relative to the form's
+        /// largest coefficient.
         bound: f64,
     },
     /// Its Gram matrices are all but singular.
@@ -52,7 +58,8 @@ pub enum NoCertificate {
          relative to the largest coefficient, which rounding does not leave provable; add a small multiple of |z|^2"
     )]
     Singular {
-        /// Upper bound of the smallest eigenvalue of any Gram matrix, relative to the form's largest coefficient.
+        /// Upper bound of the smallest eigenvalue of any Gram matrix, relative to the form's
+        /// largest coefficient.
         bound: f64,
     },
     /// What was found is not proven.
@@ -205,7 +212,8 @@ mod tests {
 
     #[test]
     fn what_is_not_convex_is_refuted_with_a_bound() {
-        // A double well, a saddle, and x^4 + y^4 + z^4 - 12 x²y²/5, whose Hessian is indefinite at x = y.
+        // A double well, a saddle, and x^4 + y^4 + z^4 - 12 x²y²/5, whose Hessian is indefinite at
+        // x = y.
         let wells = [([4, 0, 0], 1.0), ([2, 0, 0], -2.0), ([0, 2, 0], 1.0), ([0, 0, 2], 1.0)];
         let saddle = [([2, 0, 0], 1.0), ([1, 1, 0], 3.0), ([0, 2, 0], 1.0), ([0, 0, 2], 1.0)];
         let crossed = [([4, 0, 0], 1.0), ([0, 4, 0], 1.0), ([0, 0, 4], 1.0), ([2, 2, 0], -2.4)];
@@ -225,7 +233,8 @@ mod tests {
 
     #[test]
     fn the_edge_of_convexity_is_told_from_both_sides() {
-        // x² + y² + z² + 2 c xy is convex up to c = 1, its only Gram matrix has the eigenvalues 2 (1 ± c) and 2.
+        // x² + y² + z² + 2 c xy is convex up to c = 1, its only Gram matrix has the eigenvalues 2
+        // (1 ± c) and 2.
         let leaning =
             |c: f64| polynomial(&[([2, 0, 0], 1.0), ([0, 2, 0], 1.0), ([0, 0, 2], 1.0), ([1, 1, 0], 2.0 * c)]);
         for room in [1e-1, 1e-4, 1e-8, 1e-12] {

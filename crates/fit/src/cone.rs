@@ -1,14 +1,17 @@
-//! Where the Gram matrix of the Hessian form comes from: all semidefinite matrices, or smaller cones of them that are cheaper.
+//! Where the Gram matrix of the Hessian form comes from: all semidefinite matrices, or smaller
+//! cones of them that are cheaper.
 
 use std::fmt;
 use std::str::FromStr;
 
 /// The convex cone that the Gram matrix H of the Hessian form `yᵀ∇²p y = wᵀHw` is taken from.
 ///
-/// Every diagonally dominant matrix is scaled diagonally dominant, and every one of those positive semidefinite, so that volumes
-/// grow from one to the next; but the first needs linear and the second only second-order cones where the third needs a
-/// semidefinite one (Ahmadi and Majumdar, SIAM J. Appl. Algebra Geometry 3, 2019). Dominance depends on the frame,
-/// semidefiniteness does not: it is asked for in the frame in which the smallest ellipsoid is the unit ball, along its axes.
+/// Every diagonally dominant matrix is scaled diagonally dominant, and every one of those positive
+/// semidefinite, so that volumes grow from one to the next; but the first needs linear and the
+/// second only second-order cones where the third needs a semidefinite one (Ahmadi and Majumdar,
+/// SIAM J. Appl. Algebra Geometry 3, 2019). Dominance depends on the frame, semidefiniteness does
+/// not: it is asked for in the frame in which the smallest ellipsoid is the unit ball, along its
+/// axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Cone {
     /// Positive semidefinite: p sos-convex.

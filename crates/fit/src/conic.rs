@@ -1,18 +1,20 @@
-//! The convex quadratic program over one of the smaller cones, by a primal-dual interior-point method.
+//! The convex quadratic program over one of the smaller cones, by a primal-dual interior-point
+//! method.
 //!
 //! ```text
 //! minimise  F(c)   subject to  p(xᵢ) + tᵢ = 1, tᵢ >= 0,   D c - ε tr = A x,  every block of x in its Lorentz cone
 //! ```
 //!
-//! over the coefficients c of p, F a quadratic model (`model`), A and the blocks those of `dominance`. With multipliers λ >= 0 of the
-//! points and a functional s on the form, optimality is
+//! over the coefficients c of p, F a quadratic model (`model`), A and the blocks those of
+//! `dominance`. With multipliers λ >= 0 of the points and a functional s on the form, optimality is
 //!
 //! ```text
 //! ∇F + V λ - D* s = 0,   λᵢ tᵢ = 0,   z = A* s in the cones,  x·z = 0 block by block.
 //! ```
 //!
-//! Newton's method with the scaling of Nesterov and Todd and Mehrotra's corrector; dx = … - Θ A* ds, so that all that is left of a
-//! step is one system with the Hessian `B + V diag(λ/t) V* + D* (A Θ A*)⁻¹ D` in as many variables as p has coefficients.
+//! Newton's method with the scaling of Nesterov and Todd and Mehrotra's corrector; dx = … - Θ A*
+//! ds, so that all that is left of a step is one system with the Hessian `B + V diag(λ/t) V* + D*
+//! (A Θ A*)⁻¹ D` in as many variables as p has coefficients.
 
 use super::FitError;
 use super::dominance::{Bordered, Dominance};
@@ -89,7 +91,8 @@ struct Aims {
 }
 
 impl Conic<'_> {
-    /// The minimiser, to an absolute `gap` in F; something feasible where rounding stands in the way, or none.
+    /// The minimiser, to an absolute `gap` in F; something feasible where rounding stands in the
+    /// way, or none.
     ///
     /// # Errors
     /// [`FitError::Cancelled`].
@@ -113,8 +116,9 @@ impl Conic<'_> {
         Ok((self.residuals(&at).misses(&at) <= ROUGH).then(|| self.interior(at)))
     }
 
-    /// Centred: every product of a slack and its multiplier is the same. Blocks as large as the form asks for, and a functional that
-    /// is small beside the slope of the model, as it is at the minimum.
+    /// Centred: every product of a slack and its multiplier is the same. Blocks as large as the
+    /// form asks for, and a functional that is small beside the slope of the model, as it is at the
+    /// minimum.
     fn start(&self, coefficients: &DVector<f64>, gap: f64) -> Point {
         let Self { dominance, values, model, .. } = self;
         let slope = dominance.pull_back(&dominance.positive).norm();
@@ -145,7 +149,8 @@ impl Conic<'_> {
         }
     }
 
-    /// A predictor, to see how far the aim can be set, and the step corrected for what the predictor neglects.
+    /// A predictor, to see how far the aim can be set, and the step corrected for what the
+    /// predictor neglects.
     fn step(&self, at: &Point, residuals: &Residuals) -> Option<Point> {
         let system = self.system(at)?;
         let scaled: Vec<Vector3<f64>> = system.scalings.iter().zip(&at.duals).map(|(w, z)| w.apply(z)).collect();

@@ -4,10 +4,12 @@ use super::basis::Affine;
 use nalgebra::Vector3;
 use sublevel_core::body::Normalization;
 
-/// Coordinates that an objective, or a relaxation of convexity, depends on; log dets depend on none.
+/// Coordinates that an objective, or a relaxation of convexity, depends on; log dets depend on
+/// none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Coordinates {
-    /// The unit frame: the points have their mean at the origin and largest norm 1, so that units and place do not matter.
+    /// The unit frame: the points have their mean at the origin and largest norm 1, so that units
+    /// and place do not matter.
     #[default]
     Unit,
     /// Those of the points, metres: what the paper's tables are made in.

@@ -1,9 +1,11 @@
 //! The smallest box around points, at any orientation.
 //!
-//! Along a given axis the best box is known: the smallest rectangle around the points as seen along the axis has a side along one
-//! of the sides of their outline (Freeman and Shapira, Determining the minimum-area encasing rectangle for an arbitrary closed
-//! curve, Commun. ACM 18, 1975). What is left is a search over the axis, which has many local minima: from the best of a
-//! lattice of directions, by compass steps, and at each of them also about the other two axes of the box found.
+//! Along a given axis the best box is known: the smallest rectangle around the points as seen along
+//! the axis has a side along one of the sides of their outline (Freeman and Shapira, Determining
+//! the minimum-area encasing rectangle for an arbitrary closed curve, Commun. ACM 18, 1975). What
+//! is left is a search over the axis, which has many local minima: from the best of a lattice of
+//! directions, by compass steps, and at each of them also about the other two axes of the box
+//! found.
 
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::TAU;
@@ -49,8 +51,8 @@ impl OrientedBox {
     }
 }
 
-/// The smallest box around `points` that the search of this module finds. It has found those of the literature for common
-/// meshes; a proof that there is none smaller it has not.
+/// The smallest box around `points` that the search of this module finds. It has found those of the
+/// literature for common meshes; a proof that there is none smaller it has not.
 pub fn smallest_box(points: &[Vector3<f64>]) -> OrientedBox {
     let mut starts: Vec<(f64, Vector3<f64>)> =
         fibonacci_lattice(2 * LATTICE).take(LATTICE).map(|axis| (best_along(&axis, points).volume(), axis)).collect();
@@ -144,7 +146,8 @@ mod tests {
 
     #[test]
     fn of_a_regular_tetrahedron_is_its_cube() {
-        // Edges along the diagonals of the faces of the unit cube: the smallest box of a regular tetrahedron is that cube.
+        // Edges along the diagonals of the faces of the unit cube: the smallest box of a regular
+        // tetrahedron is that cube.
         let corners = [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]].map(Vector3::from);
         assert!((smallest_box(&corners).volume() - 1.0).abs() < 1e-6);
     }

@@ -1,7 +1,9 @@
-//! Convex decomposition: the partition of a mesh whose hulls have the least volume, for every number of parts at once.
+//! Convex decomposition: the partition of a mesh whose hulls have the least volume, for every
+//! number of parts at once.
 //!
-//! Several searches compete. One cuts by gain alone (`split`); others cut into more regions than are asked for, by gain and by ledges
-//! (`segment`), and merge them again (`merge`). Each number of parts takes the partition of the least total volume.
+//! Several searches compete. One cuts by gain alone (`split`); others cut into more regions than
+//! are asked for, by gain and by ledges (`segment`), and merge them again (`merge`). Each number of
+//! parts takes the partition of the least total volume.
 
 use super::parts::{MAX_PIECES, held};
 use super::progress::Watch;
@@ -19,14 +21,16 @@ const FEW_MORE: usize = 2;
 /// How partitions are searched for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PartSearch {
-    /// One cut after the other, each the one that gains most, as long as one gains: what the others compete with.
+    /// One cut after the other, each the one that gains most, as long as one gains: what the others
+    /// compete with.
     Greedy,
     /// All searches, and for each number of parts the best of what they find.
     Best,
 }
 
-/// The points of at most `parts` parts of a mesh, whose convex hulls have the least volume that was found: each part with all corners
-/// of its pieces. The hulls cover the mesh, and what it encloses if it is closed, up to rounding.
+/// The points of at most `parts` parts of a mesh, whose convex hulls have the least volume that was
+/// found: each part with all corners of its pieces. The hulls cover the mesh, and what it encloses
+/// if it is closed, up to rounding.
 ///
 /// # Errors
 /// [`FitError::Parts`], [`FitError::Mesh`] or [`FitError::Cancelled`].
@@ -131,8 +135,9 @@ impl Decomposition {
         self.best.len()
     }
 
-    /// The number of parts, at most so many, whose hulls have the least volume, as long as each part more gains something. What is
-    /// not connected is kept in parts of its own where that is as good.
+    /// The number of parts, at most so many, whose hulls have the least volume, as long as each
+    /// part more gains something. What is not connected is kept in parts of its own where that is
+    /// as good.
     pub(super) fn fewest(&self, parts: usize) -> usize {
         let worth = NOTHING * self.best[0].0;
         let cost = |index: usize| self.best[index].0 + worth * index as f64;
@@ -142,12 +147,12 @@ impl Decomposition {
         1 + if apart > least && self.best[apart].0 <= self.best[least].0 + worth { apart } else { least }
     }
 
-    /// Total volume of the hulls of so many parts.
+    /// Total volume of the hulls of this many parts.
     pub(super) fn total(&self, parts: usize) -> f64 {
         self.best[parts - 1].0
     }
 
-    /// How the mesh is divided among so many parts.
+    /// How the mesh is divided among this many parts.
     pub(super) fn division(&self, parts: usize) -> Division {
         match self.best[parts - 1].1 {
             Source::Greedy => Division::by_cuts(self.greedy.cuts[..parts - 1].to_vec()),

@@ -1,8 +1,9 @@
 //! Fits over the smaller cones: down in the volume itself, from the smallest ellipsoid.
 //!
-//! No log det stands in for the volume here, since that would take a semidefinite cone. Each step minimises a convex quadratic
-//! model of the volume (`volume`) over the cone and around some of the points, and goes that way as far as the volume falls when
-//! the constant coefficient takes in all points. So the volume never grows, and what had to be taken in is known to the next step.
+//! No log det stands in for the volume here, since that would take a semidefinite cone. Each step
+//! minimises a convex quadratic model of the volume (`volume`) over the cone and around some of the
+//! points, and goes that way as far as the volume falls when the constant coefficient takes in all
+//! points. So the volume never grows, and what had to be taken in is known to the next step.
 
 use super::cone::Cone;
 use super::conic::Conic;
@@ -21,15 +22,17 @@ const STEPS: usize = 30;
 const ENOUGH: f64 = 2e-3;
 /// Accuracy of a step's program, relative to the volume.
 const GAP: f64 = 1e-4;
-/// Points that the first program knows, in multiples of the rows of P, and at most as many more in each of the next.
+/// Points that the first program knows, in multiples of the rows of P, and at most as many more in
+/// each of the next.
 const SPREAD: usize = 4;
 /// Excess of p - 1 from which a point is made known to the next program.
 const OUTSIDE: f64 = 1e-4;
 /// Lengths tried of one step.
 const LENGTHS: usize = 8;
 
-/// The polynomial of about the least volume over the cone with `p <= 1` at `points` (whitened: the unit ball is their smallest
-/// ellipsoid) whose Gram matrix is in the cone also without `margin` on its diagonal.
+/// The polynomial of about the least volume over the cone with `p <= 1` at `points` (whitened: the
+/// unit ball is their smallest ellipsoid) whose Gram matrix is in the cone also without `margin` on
+/// its diagonal.
 pub(super) fn descend(
     structure: &Structure,
     cone: Cone,
@@ -79,7 +82,8 @@ pub(super) fn descend(
     Ok(Refined { coefficients: current.coefficients, hessian: current.hessian, volumes, end })
 }
 
-/// The polynomial on the way from `from` to `to` with about the smallest volume around all points, if one is below `bar`.
+/// The polynomial on the way from `from` to `to` with about the smallest volume around all points,
+/// if one is below `bar`.
 fn search(
     structure: &Structure,
     values: &DMatrix<f64>,
@@ -110,7 +114,8 @@ fn search(
     Some((best.0?, best.1))
 }
 
-/// The unit ball as the set of a polynomial of full degree: the mean of `|z|²ʲ`, j from 1 to half the degree.
+/// The unit ball as the set of a polynomial of full degree: the mean of `|z|²ʲ`, j from 1 to half
+/// the degree.
 fn ball(structure: &Structure) -> DVector<f64> {
     let factorial = |n: u8| (1..=n).map(f64::from).product::<f64>();
     let half = (structure.degree / 2) as f64;

@@ -1,10 +1,12 @@
-//! Gram matrices of Hessian forms as sums of small blocks, and the linear systems that such sums lead to.
+//! Gram matrices of Hessian forms as sums of small blocks, and the linear systems that such sums
+//! lead to.
 //!
-//! A scaled diagonally dominant matrix is a sum of semidefinite blocks `[[u + v, w], [w, u - v]]` on two rows each, (u, v, w) in a
-//! Lorentz cone; a diagonally dominant one has only those with v = 0, and a nonnegative diagonal. A block adds to three
-//! coefficients of the form: the squares of its two rows and their product. So two products that are no squares never
-//! meet in one block, and A Θ Aᵀ, with A the map from blocks to coefficients and Θ block diagonal, is a diagonal matrix but for a
-//! border as wide as there are squares: 30 of 210 at degree 6.
+//! A scaled diagonally dominant matrix is a sum of semidefinite blocks `[[u + v, w], [w, u - v]]`
+//! on two rows each, (u, v, w) in a Lorentz cone; a diagonally dominant one has only those with v =
+//! 0, and a nonnegative diagonal. A block adds to three coefficients of the form: the squares of
+//! its two rows and their product. So two products that are no squares never meet in one block, and
+//! A Θ Aᵀ, with A the map from blocks to coefficients and Θ block diagonal, is a diagonal matrix
+//! but for a border as wide as there are squares: 30 of 210 at degree 6.
 
 use super::cone::Cone;
 use super::factor::{regularised_factor, solve_lower};
@@ -17,7 +19,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 struct Block {
     /// Its two rows; twice the same for an entry of the diagonal.
     rows: [usize; 2],
-    /// Where the coefficients that it adds to are in the order of [`Dominance`]: of both squares and of the product.
+    /// Where the coefficients that it adds to are in the order of [`Dominance`]: of both squares
+    /// and of the product.
     places: [usize; 3],
     /// What (u, v, w) adds to each.
     map: Matrix3<f64>,
@@ -34,7 +37,8 @@ pub(super) struct Dominance {
     /// D in this order: each coefficient is a number times one coefficient of p.
     derivative: Vec<(usize, f64)>,
     monomials: usize,
-    /// A functional on the form that is strictly positive on every block: means over a cube, y isotropic.
+    /// A functional on the form that is strictly positive on every block: means over a cube, y
+    /// isotropic.
     pub(super) positive: DVector<f64>,
 }
 
@@ -238,7 +242,8 @@ mod tests {
         }
     }
 
-    /// Blocks, the matrix that they make and the form of that matrix agree, and A* is the adjoint of A.
+    /// Blocks, the matrix that they make and the form of that matrix agree, and A* is the adjoint
+    /// of A.
     #[test]
     fn blocks_make_gram_matrices() {
         let mut random = Seeded(12);

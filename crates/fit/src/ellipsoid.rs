@@ -18,7 +18,8 @@ pub struct Ellipsoid {
     pub center: Vector3<f64>,
     /// Symmetric positive definite; maps the ellipsoid to the unit ball.
     pub linear: Matrix3<f64>,
-    /// Weight of each point at the optimum; they add up to 1, and only points on the surface have any.
+    /// Weight of each point at the optimum; they add up to 1, and only points on the surface have
+    /// any.
     pub weights: Vec<f64>,
 }
 
@@ -29,10 +30,12 @@ impl Ellipsoid {
     }
 }
 
-/// The smallest ellipsoid by volume around `points`, to a relative 1e-6, scaled so that it holds all of them.
+/// The smallest ellipsoid by volume around `points`, to a relative 1e-6, scaled so that it holds
+/// all of them.
 ///
-/// Khachiyan's coordinate ascent on the dual with the away steps of Todd and Yıldırım (Discrete Applied Mathematics
-/// 155, 2007), which make it converge linearly. `None` when the points are flat to rounding: condition them first.
+/// Khachiyan's coordinate ascent on the dual with the away steps of Todd and Yıldırım (Discrete
+/// Applied Mathematics 155, 2007), which make it converge linearly. `None` when the points are flat
+/// to rounding: condition them first.
 pub fn minimum_ellipsoid(points: &[Vector3<f64>]) -> Option<Ellipsoid> {
     let lifted: Vec<Vector4<f64>> = points.iter().map(|p| p.push(1.0)).collect();
     let mut weights = first_weights(points)?;
@@ -52,7 +55,8 @@ pub fn minimum_ellipsoid(points: &[Vector3<f64>]) -> Option<Ellipsoid> {
         if above.max(below) <= TOLERANCE {
             break;
         }
-        // Exact line search towards the highest point, or away from the lowest (not past weight zero).
+        // Exact line search towards the highest point, or away from the lowest (not past weight
+        // zero).
         let (j, beta) = if above >= below {
             (far, (heights[far] - 4.0) / (4.0 * (heights[far] - 1.0)))
         } else {
@@ -95,9 +99,10 @@ pub fn minimum_ellipsoid(points: &[Vector3<f64>]) -> Option<Ellipsoid> {
     (reach > 0.0 && reach.is_finite()).then(|| Ellipsoid { center, linear: linear / reach, weights })
 }
 
-/// Equal weights: on all of few points, which keeps their symmetry, and with it the axes of the ellipsoid of a cube; on six that span
-/// the space of many, nearly all of which would have to lose their weight again. Those are the farthest both ways along three
-/// directions, each across the spans found before (Kumar and Yıldırım, J. Optim. Theory Appl. 126, 2005).
+/// Equal weights: on all of few points, which keeps their symmetry, and with it the axes of the
+/// ellipsoid of a cube; on six that span the space of many, nearly all of which would have to lose
+/// their weight again. Those are the farthest both ways along three directions, each across the
+/// spans found before (Kumar and Yıldırım, J. Optim. Theory Appl. 126, 2005).
 fn first_weights(points: &[Vector3<f64>]) -> Option<Vec<f64>> {
     if points.len() <= FEW {
         return Some(vec![1.0 / points.len() as f64; points.len()]);

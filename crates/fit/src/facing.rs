@@ -1,22 +1,26 @@
-//! A convex polytope as planes sorted by direction: whether a point is inside is told by the few planes that it faces.
+//! A convex polytope as planes sorted by direction: whether a point is inside is decided by the few
+//! planes that it faces.
 
 use nalgebra::Vector3;
 
 /// Most cells along an edge of the cube of directions.
 const MOST_CELLS: usize = 32;
 
-/// Half-spaces around a point, by the directions in which each can be the first that a ray from there leaves.
+/// Half-spaces around a point, by the directions in which each can be the first that a ray from
+/// there leaves.
 pub(super) struct Facing {
     center: Vector3<f64>,
     /// Unit normals, and the distance of each plane from the centre.
     planes: Vec<(Vector3<f64>, f64)>,
     grid: usize,
-    /// For each cell of directions the planes that some ray through it leaves first, and perhaps others.
+    /// For each cell of directions the planes that some ray through it leaves first, and perhaps
+    /// others.
     cells: Vec<Vec<u32>>,
 }
 
 impl Facing {
-    /// Half-spaces `normal·x <= offset` with unit normals; none unless the centre is inside them all.
+    /// Half-spaces `normal·x <= offset` with unit normals; none unless the centre is inside them
+    /// all.
     pub(super) fn new(center: Vector3<f64>, planes: impl Iterator<Item = (Vector3<f64>, f64)>) -> Option<Self> {
         let planes: Vec<_> = planes.map(|(normal, offset)| (normal, offset - normal.dot(&center))).collect();
         if planes.is_empty() || !planes.iter().all(|(_, distance)| *distance > 0.0) {
@@ -27,7 +31,8 @@ impl Facing {
         Some(Self { center, planes, grid, cells })
     }
 
-    /// How far the point is beyond the planes it faces: at most 0 just where it is inside all half-spaces.
+    /// How far the point is beyond the planes it faces: at most 0 just where it is inside all
+    /// half-spaces.
     pub(super) fn beyond(&self, x: &Vector3<f64>) -> f64 {
         let x = x - self.center;
         let faced = self.cells[cell_of(&x, self.grid)].iter().map(|&plane| self.planes[plane as usize]);
@@ -61,7 +66,8 @@ impl Cone {
 }
 
 fn first_planes(planes: &[(Vector3<f64>, f64)], cone: &Cone) -> Vec<u32> {
-    // A ray at the angle t to a normal leaves the half-space at distance / cos t, or never. In the cone t is at least and at most:
+    // A ray at the angle t to a normal leaves the half-space at distance / cos t, or never. In the
+    // cone t is at least and at most:
     let (sin, cos) = cone.angle.sin_cos();
     let cosines = planes.iter().map(|(normal, distance)| {
         let along = normal.dot(&cone.axis);

@@ -1,14 +1,17 @@
 //! Cholesky's factorization in blocks.
 //!
-//! The systems of a path have up to a thousand unknowns, and nearly all of their time goes into factors. By blocks it goes into matrix
-//! products, which the processor does many times as fast as column by column (Golub and Van Loan, Matrix Computations, 4.2.9).
+//! The systems of a path have up to a thousand unknowns, and nearly all of their time goes into
+//! factors. By blocks it goes into matrix products, which the processor does many times as fast as
+//! column by column (Golub and Van Loan, Matrix Computations, 4.2.9).
 
 use nalgebra::{Cholesky, DMatrix};
 
-/// Columns of a block: the products of wider ones are no faster, and the diagonal blocks of wider ones are slower.
+/// Columns of a block: the products of wider ones are no faster, and the diagonal blocks of wider
+/// ones are slower.
 const BLOCK: usize = 48;
 
-/// Lower factor of a symmetric positive definite matrix, of which the lower triangle is read; none if it is not.
+/// Lower factor of a symmetric positive definite matrix, of which the lower triangle is read; none
+/// if it is not.
 pub(super) fn cholesky(mut matrix: DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = matrix.nrows();
     for start in (0..n).step_by(BLOCK) {
@@ -38,8 +41,8 @@ pub(super) fn cholesky(mut matrix: DMatrix<f64>) -> Option<DMatrix<f64>> {
     matrix.iter().all(|v| v.is_finite()).then_some(matrix)
 }
 
-/// Lower factor of a matrix that is positive definite up to rounding: its diagonal grows until it is. A slightly wrong curvature
-/// changes the path of Newton's steps, not where they end.
+/// Lower factor of a matrix that is positive definite up to rounding: its diagonal grows until it
+/// is. A slightly wrong curvature changes the path of Newton's steps, not where they end.
 pub(super) fn regularised_factor(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     [0.0, 1e-14, 1e-12, 1e-10, 1e-8].into_iter().find_map(|share| {
         let mut matrix = matrix.clone();

@@ -1,18 +1,20 @@
 //! How far a body reaches beyond the convex hull of the points it holds.
 //!
-//! The gap is the one-sided Hausdorff distance, the largest distance of a point of the body from the hull. It is bounded by a search
-//! over cells of rays from the interior point, which is 0 here (branch and bound). A cell is the cone of three rays d_1, d_2, d_3.
-//! The constraints are convex, so what is in the body lies under their tangent planes where the rays meet their surfaces,
+//! The gap is the one-sided Hausdorff distance, the largest distance of a point of the body from
+//! the hull. It is bounded by a search over cells of rays from the interior point, which is 0 here
+//! (branch and bound). A cell is the cone of three rays d_1, d_2, d_3. The constraints are convex,
+//! so what is in the body lies under their tangent planes where the rays meet their surfaces,
 //!
 //! ```text
 //! g(c) + ∇g(c)·(x - c) <= 1,   that is   a_k·x <= 1
 //! ```
 //!
-//! after division by the (positive) rest. In the cone, at `x = r Σ w_i d_i` with `w_i >= 0` and `Σ w_i = 1`, these say
-//! `1 / r >= max_k Σ w_i a_k·d_i`: the largest of some functions that are linear in w. Where one of them is the largest is a polygon,
-//! and the cell's part of the body lies in the hull of 0 and the points that the corners of these polygons stand for. The
-//! distance from the hull is convex, so the largest at those points and at 0 is a bound. Across a smooth surface it is off by the
-//! square of the cell's size; along edges, where constraints meet, it is exact.
+//! after division by the (positive) rest. In the cone, at `x = r Σ w_i d_i` with `w_i >= 0` and `Σ
+//! w_i = 1`, these say `1 / r >= max_k Σ w_i a_k·d_i`: the largest of some functions that are
+//! linear in w. Where one of them is the largest is a polygon, and the cell's part of the body lies
+//! in the hull of 0 and the points that the corners of these polygons stand for. The distance from
+//! the hull is convex, so the largest at those points and at 0 is a bound. Across a smooth surface
+//! it is off by the square of the cell's size; along edges, where constraints meet, it is exact.
 
 use super::support::{farthest, height};
 use nalgebra::Vector3;
@@ -45,18 +47,20 @@ const ROUNDING: f64 = 1e-12;
 pub struct Gap {
     /// Proven upper bound of the distance of any point of the body from the hull.
     pub most_m: f64,
-    /// Largest distance found, of a point of the body as far as its computation allows; at most 2 % less than the bound, unless both
-    /// are next to nothing or the body is so intricate that the search was cut short.
+    /// Largest distance found, of a point of the body as far as its computation allows; at most 2 %
+    /// less than the bound, unless both are next to nothing or the body is so intricate that the
+    /// search was cut short.
     pub found_m: f64,
     /// Unit vector from the hull to that point, body frame.
     pub direction: Vector3<f64>,
-    /// Mean over all directions of how much farther the body reaches along them than the hull; by quadrature, which overlooks the
-    /// narrow cones of directions in which flat corners stand out.
+    /// Mean over all directions of how much farther the body reaches along them than the hull; by
+    /// quadrature, which overlooks the narrow cones of directions in which flat corners stand out.
     pub mean_m: f64,
 }
 
-/// The gap between a body and the convex hull of points inside it, of which there is one at least, metres of the body frame.
-/// Gaps below a 1e-5th of the body are not resolved: their bound is about that.
+/// The gap between a body and the convex hull of points inside it, of which there is one at least,
+/// metres of the body frame. Gaps below a 1e-5th of the body are not resolved: their bound is about
+/// that.
 pub fn gap(body: &Body, points: &[Vector3<f64>]) -> Gap {
     Search::new(body, points).run()
 }
@@ -173,8 +177,8 @@ impl<'a> Search<'a> {
             .constraints()
             .iter()
             .map(|constraint| {
-                // Where the ray crosses that constraint's own surface, be it farther out than the body's, but not at the end
-                // of the world.
+                // Where the ray crosses that constraint's own surface, be it farther out than the
+                // body's, but not at the end of the world.
                 let own = body.inverse() * u * boundary_radius(&constraint.polynomial, &start, &u);
                 self.plane(constraint, if own.norm() <= FAR * exit.norm() { &own } else { &exit })
             })
@@ -188,7 +192,8 @@ impl<'a> Search<'a> {
         self.rays.len() - 1
     }
 
-    /// The normal a of a half-space `a·y <= 1` that holds the body, by the constraint's tangent plane at x.
+    /// The normal a of a half-space `a·y <= 1` that holds the body, by the constraint's tangent
+    /// plane at x.
     fn plane(&self, constraint: &Constraint, x: &Vector3<f64>) -> Vector3<f64> {
         let (placement, interior) = (self.body.placement(), self.body.interior_point());
         let place = x + interior;
@@ -242,7 +247,8 @@ impl<'a> Search<'a> {
         if x.norm() < f64::INFINITY { distance } else { f64::INFINITY }
     }
 
-    /// Takes a point of the body if it is the farthest so far, by the plane that parts it from the hull.
+    /// Takes a point of the body if it is the farthest so far, by the plane that parts it from the
+    /// hull.
     fn find(&mut self, x: &Vector3<f64>) {
         let Some(n) = (x - nearest(&self.points, x)).try_normalize(0.0) else { return };
         let distance = n.dot(x) - height(&self.points, &n);
@@ -267,8 +273,10 @@ pub(super) fn nearest(points: &[Vector3<f64>], x: &Vector3<f64>) -> Vector3<f64>
     if found.common.is_some() { *x } else { found.x }
 }
 
-/// The part of a polygon where a linear function is not negative, and corners that rounding may have made negative: too many only
-/// widen a bound. Corners are by their weights on a triangle, the function by its values at the triangle's corners (Sutherland and Hodgman, Reentrant polygon clipping, Comm. ACM 17, 1974).
+/// The part of a polygon where a linear function is not negative, and corners that rounding may
+/// have made negative: too many only widen a bound. Corners are by their weights on a triangle, the
+/// function by its values at the triangle's corners (Sutherland and Hodgman, Reentrant polygon
+/// clipping, Comm. ACM 17, 1974).
 fn clip(polygon: &mut Vec<[f64; 3]>, function: &[f64; 3]) {
     let value = |w: &[f64; 3]| function[0] * w[0] + function[1] * w[1] + function[2] * w[2];
     let rounding = 16.0 * f64::EPSILON * function.iter().map(|value| value.abs()).sum::<f64>();
@@ -327,7 +335,8 @@ mod tests {
 
     #[test]
     fn slabs_leave_a_polytope_no_gap() {
-        // An ellipsoid around an octahedron cut by the slabs of its four pairs of faces: nothing is left but the octahedron.
+        // An ellipsoid around an octahedron cut by the slabs of its four pairs of faces: nothing is
+        // left but the octahedron.
         let points: Vec<_> = (0..6)
             .map(|i| Vector3::ith(i % 3, if i < 3 { 1.0 } else { -1.0 }).component_mul(&Vector3::new(1.0, 0.5, 0.3)))
             .collect();

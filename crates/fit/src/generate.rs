@@ -1,4 +1,5 @@
-//! Solves the program of a fit: the central path to its optimum, adding the points that are left outside.
+//! Solves the program of a fit: the central path to its optimum, adding the points that are left
+//! outside.
 
 use super::FitError;
 use super::objective::Matrix;
@@ -17,7 +18,8 @@ pub(super) const OPTIMALITY_GAP: f64 = 1e-5;
 const GAP: f64 = 3e-7;
 /// The same while points are still added.
 const ROUGH_GAP: f64 = 1e-3;
-/// Most rounds of adding points at the rough optimum, and the violation below which it does not matter.
+/// Most rounds of adding points at the rough optimum, and the violation below which it does not
+/// matter.
 const PREPARATIONS: usize = 3;
 /// See [`PREPARATIONS`].
 const PREPARED: f64 = 1e-3;
@@ -43,15 +45,17 @@ pub(super) struct Optimum {
     pub(super) hessian: DMatrix<f64>,
     /// Gram matrix of p, where it is measured.
     pub(super) gram: Option<DMatrix<f64>>,
-    /// f minus its lower bound from the dual, if there is one; at most [`OPTIMALITY_GAP`] in proportion.
+    /// f minus its lower bound from the dual, if there is one; at most [`OPTIMALITY_GAP`] in
+    /// proportion.
     pub(super) gap: Option<f64>,
     /// f, in the whitened frame for log dets and volumes and in the unit frame for traces.
     pub(super) objective: f64,
 }
 
-/// Minimises the objective over p, sos-convex as far as the problem asks for it, with `p <= 1` at `points` (whitened: the unit ball is their smallest
-/// ellipsoid). The program begins with the points that are `likely` to bound p, the likeliest first, among others; they change the
-/// answer only within its gap.
+/// Minimises the objective over p, sos-convex as far as the problem asks for it, with `p <= 1` at
+/// `points` (whitened: the unit ball is their smallest ellipsoid). The program begins with the
+/// points that are `likely` to bound p, the likeliest first, among others; they change the answer
+/// only within its gap.
 pub(super) fn generate(
     problem: Problem,
     points: &[Vector3<f64>],
@@ -136,8 +140,9 @@ struct Active {
 }
 
 impl Active {
-    /// A well-spread subset, the likeliest points, and for convex p some inside the hull: those constrain nothing, but with weight on
-    /// them the moments are positive definite also when the points lie on a quadric, as the corners of a box do.
+    /// A well-spread subset, the likeliest points, and for convex p some inside the hull: those
+    /// constrain nothing, but with weight on them the moments are positive definite also when the
+    /// points lie on a quadric, as the corners of a box do.
     fn start(problem: &Problem, points: &[Vector3<f64>], likely: &[usize]) -> Self {
         let structure = problem.structure;
         let first = spread(points, SPREAD * structure.gram.size);
@@ -169,7 +174,7 @@ fn columns(structure: &Structure, points: &[Vector3<f64>]) -> DMatrix<f64> {
     DMatrix::from_columns(&points.iter().map(|point| structure.values(point)).collect::<Vec<_>>())
 }
 
-/// At most so many points, each the farthest from those before; the first is the farthest from 0.
+/// At most this many points, each the farthest from those before; the first is the farthest from 0.
 pub(super) fn spread(points: &[Vector3<f64>], most: usize) -> Vec<usize> {
     let mut distance = vec![f64::INFINITY; points.len()];
     let mut next = (0..points.len()).max_by(|&a, &b| points[a].norm().total_cmp(&points[b].norm())).unwrap_or(0);
@@ -184,9 +189,10 @@ pub(super) fn spread(points: &[Vector3<f64>], most: usize) -> Vec<usize> {
     (0..most.min(points.len())).map(choose).collect()
 }
 
-/// Points of a ball that is in the hull, twice as many as monomials of half the degree: they constrain nothing, but with weight on them
-/// moments are positive definite also where there are few points, or points on a quadric. The unit ball is the smallest ellipsoid
-/// around the hull, so the ball of a third of its radius is inside (John's theorem).
+/// Points of a ball that is in the hull, twice as many as monomials of half the degree: they
+/// constrain nothing, but with weight on them moments are positive definite also where there are
+/// few points, or points on a quadric. The unit ball is the smallest ellipsoid around the hull, so
+/// the ball of a third of its radius is inside (John's theorem).
 pub(super) fn inner(structure: &Structure) -> impl Iterator<Item = Vector3<f64>> {
     let count = 2 * structure.gram.size;
     fibonacci_lattice(count).enumerate().map(|(i, u)| u * (INNER * (i as f64 * RADII).fract().cbrt()))

@@ -9,14 +9,16 @@ use std::collections::HashMap;
 
 /// Points thinner than this part of their longest extent count as flat.
 ///
-/// The whitening stretches the thin direction by the inverse, so smaller values would cost digits of every later
-/// proof. A sheet of paper on a desk is 1e-4.
+/// The whitening stretches the thin direction by the inverse, so smaller values would cost digits
+/// of every later proof. A sheet of paper on a desk is 1e-4.
 pub const FLATNESS: f64 = 1e-6;
 
-/// Points that differ from flat by less than this many roundings of their coordinates count as flat, too.
+/// Points that differ from flat by less than this many roundings of their coordinates count as
+/// flat, too.
 const COORDINATE_ROUNDINGS: f64 = 1e4 * f64::EPSILON;
 
-/// How far a point may lie outside the computed hull, relative to its size, before the hull is computed again.
+/// How far a point may lie outside the computed hull, relative to its size, before the hull is
+/// computed again.
 const HULL_TOLERANCE: f64 = 1e-9;
 
 /// Why points have no usable convex hull.
@@ -78,7 +80,8 @@ impl Frame {
     }
 }
 
-/// The convex hull of finite points, computed in their principal frame (hulls are affine invariant).
+/// The convex hull of finite points, computed in their principal frame (hulls are affine
+/// invariant).
 ///
 /// # Errors
 /// [`HullError::Flat`] for points without volume, with their measured thickness.
@@ -97,7 +100,8 @@ pub fn convex_hull(points: &[Vector3<f64>]) -> Result<Hull, HullError> {
         });
     }
     let mut failure = String::new();
-    // Flat facets with many points can confuse the hull code; a tiny perturbation brings them into general position.
+    // Flat facets with many points can confuse the hull code; a tiny perturbation brings them into
+    // general position.
     for perturbation in [0.0, 1e-11, 1e-9, 1e-7] {
         let moved: Vec<Vector3<f64>> = unique.iter().map(|(index, u)| u + jitter(*index) * perturbation).collect();
         match facets(&moved) {
@@ -117,8 +121,9 @@ pub fn convex_hull(points: &[Vector3<f64>]) -> Result<Hull, HullError> {
     Err(HullError::Failed(failure))
 }
 
-/// About the vertices and the volume of the convex hull, in half the time and less: nothing is checked, and points are moved a little,
-/// as those of flat facets can confuse the hull code. None for points without volume.
+/// About the vertices and the volume of the convex hull, in half the time and less: nothing is
+/// checked, and points are moved a little, as those of flat facets can confuse the hull code. None
+/// for points without volume.
 pub(super) fn rough_hull(points: &[Vector3<f64>]) -> Option<(Vec<Vector3<f64>>, f64)> {
     let frame = principal_frame(points).ok()?;
     let moved: Vec<_> = points.iter().enumerate().map(|(index, x)| frame.apply(x) + jitter(index) * 1e-7).collect();
@@ -210,8 +215,8 @@ fn volume(points: &[Vector3<f64>], facets: &[[usize; 3]]) -> f64 {
     facets.iter().map(|&[a, b, c]| points[a].dot(&points[b].cross(&points[c]))).sum::<f64>() / 6.0
 }
 
-/// How far the farthest point lies outside the plane of a facet that it faces; the points have extents near 1. Infinite if the facets
-/// enclose nothing.
+/// How far the farthest point lies outside the plane of a facet that it faces; the points have
+/// extents near 1. Infinite if the facets enclose nothing.
 fn excess(points: &[Vector3<f64>], facets: &[[usize; 3]]) -> f64 {
     // Slivers have no direction to speak of.
     let planes = facets.iter().filter_map(|&[a, b, c]| {

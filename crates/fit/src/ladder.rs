@@ -46,8 +46,8 @@ pub fn ball(name: &str, points: &[Vector3<f64>]) -> Result<Rung, FitError> {
     Object::new(name, points, &options.input)?.ball()
 }
 
-/// The rungs of an object: the smallest ball, the smallest ellipsoid, and bodies of degree 4, 6, 8 up to that of the options, each
-/// but the ball refined and cut by slabs as they say.
+/// The rungs of an object: the smallest ball, the smallest ellipsoid, and bodies of degree 4, 6, 8
+/// up to that of the options, each but the ball refined and cut by slabs as they say.
 ///
 /// # Errors
 /// As [`fit`](super::fit()).
@@ -66,10 +66,12 @@ pub fn ladder(
     Ok(rungs)
 }
 
-/// The representation of an object that is the cheapest to query of those whose gap is at most `max_gap_m`, metres.
+/// The representation of an object that is the cheapest to query of those whose gap is at most
+/// `max_gap_m`, metres.
 ///
-/// A ladder is climbed up to the degree of the options. If no rung is near enough they are cut by slabs, and the one that gets there
-/// with the fewest terms is taken: slabs make edges, which cost a query more than a degree does.
+/// A ladder is climbed up to the degree of the options. If no rung is near enough they are cut by
+/// slabs, and the one that gets there with the fewest terms is taken: slabs make edges, which cost
+/// a query more than a degree does.
 ///
 /// # Errors
 /// As [`fit`](super::fit()), and [`FitError::Gap`] with the closest that was reached.
@@ -115,11 +117,13 @@ impl From<CompoundFit> for Representation {
 /// As [`coarsest_within`], of a mesh with triangles: a compound of convex pieces is taken where
 /// that is cheaper than what else is near enough.
 ///
-/// What a query costs is taken for the sum over the parts of what one of a part alone does: 0.15, 0.2, 0.25, 0.45 µs at degree 2, 4,
-/// 6, 8 (measured, warm; the ratios matter), and 3 µs for a body with slabs. So the order is: ball, ellipsoid, degree 4, degree 6;
-/// compounds cheaper than degree 8, which are two parts of degree 2 or 4; degree 8; compounds cheaper than slabs, up to 19 parts; slabs.
-/// Each part has the lowest degree that keeps the gap, 6 at most: what needs 8 is cut further, at little more cost and in less time.
-/// Parts far from the other solid cost a query less than that.
+/// What a query costs is taken for the sum over the parts of what one of a part alone does: 0.15,
+/// 0.2, 0.25, 0.45 µs at degree 2, 4, 6, 8 (measured, warm; the ratios matter), and 3 µs for a body
+/// with slabs. So the order is: ball, ellipsoid, degree 4, degree 6; compounds cheaper than degree
+/// 8, which are two parts of degree 2 or 4; degree 8; compounds cheaper than slabs, up to 19 parts;
+/// slabs. Each part has the lowest degree that keeps the gap, 6 at most: what needs 8 is cut
+/// further, at little more cost and in less time. Parts far from the other solid cost a query less
+/// than that.
 ///
 /// # Errors
 /// As [`coarsest_within`] and [`fit_parts`](super::fit_parts).
@@ -191,7 +195,7 @@ pub(super) struct Rungs<'a> {
     options: &'a FitOptions,
     /// Those that were not near enough.
     fits: Vec<Fit>,
-    /// What fails is told if nothing else does.
+    /// What fails is reported if nothing else does.
     closest: FitError,
 }
 

@@ -1,11 +1,13 @@
 //! Points to a certified body: hull, whitening, semidefinite program, certificate, proof.
 //!
-//! The way of one fit: [`input`] reads the points; [`hull`] leaves those that matter; the smallest [`ellipsoid`] around them
-//! gives the normalized frame (`object`); `generate` minimises an [`Objective`] over sos-convex polynomials with a margin by
-//! following the central path of the dual (`path`); `refine` goes on to the volume itself; the constant coefficient pulls every
-//! input point inside; [`Body::new`] proves the stored numbers; `slab` cuts off what is too much, and [`gap`](gap()) bounds what
-//! is left of it. Nothing of that is believed: a fit returns a body only with its proofs. A [`ladder`](ladder()) has several of them.
-//! [`fit_sos`] goes the same way to sets that need not be convex.
+//! The way of one fit: [`input`] reads the points; [`hull`] leaves those that matter; the smallest
+//! [`ellipsoid`] around them gives the normalized frame (`object`); `generate` minimises an
+//! [`Objective`] over sos-convex polynomials with a margin by following the central path of the
+//! dual (`path`); `refine` goes on to the volume itself; the constant coefficient pulls every input
+//! point inside; [`Body::new`] proves the stored numbers; `slab` cuts off what is too much, and
+//! [`gap`](gap()) bounds what is left of it. Nothing of that is believed: a fit returns a body only
+//! with its proofs. A [`ladder`](ladder()) has several of them. [`fit_sos`] goes the same way to
+//! sets that need not be convex.
 
 mod ball;
 mod barrier;
@@ -103,18 +105,20 @@ pub struct FitOptions {
     pub objective: Objective,
     /// Coordinates that traces are measured in.
     pub coordinates: Coordinates,
-    /// Where the Gram matrix of the Hessian form is taken from. Over the smaller cones the volume itself is minimised, in a
-    /// fraction of the time: the objective then stays at its default, and there is nothing to refine.
+    /// Where the Gram matrix of the Hessian form is taken from. Over the smaller cones the volume
+    /// itself is minimised, in a fraction of the time: the objective then stays at its default, and
+    /// there is nothing to refine.
     pub cone: Cone,
     /// Whether to minimise the volume itself, starting from the optimum of the objective.
     pub refine: bool,
-    /// How many slabs to cut the body by, each across the direction in which it reaches farthest beyond the hull: 0 to
-    /// [`MAX_SLABS`].
+    /// How many slabs to cut the body by, each across the direction in which it reaches farthest
+    /// beyond the hull: 0 to [`MAX_SLABS`].
     pub slabs: usize,
-    /// Smallest eigenvalue asked of the Gram matrix of the Hessian form in the whitened frame; in (0, 1e-2].
+    /// Smallest eigenvalue asked of the Gram matrix of the Hessian form in the whitened frame; in
+    /// (0, 1e-2].
     ///
-    /// It pays for the rounding of the certificate. Volumes grow by about a part in 10⁴ at 1e-4. The objectives of that very
-    /// matrix keep it definite by themselves.
+    /// It pays for the rounding of the certificate. Volumes grow by about a part in 10⁴ at 1e-4.
+    /// The objectives of that very matrix keep it definite by themselves.
     pub margin: f64,
     /// Name of the input, for the provenance of the body.
     pub input: String,
@@ -139,7 +143,8 @@ impl FitOptions {
     /// Checks the options and the name of a body to be fitted, before any work.
     ///
     /// # Errors
-    /// [`FitError::Degree`], [`FitError::Objective`], [`FitError::Cone`], [`FitError::Slabs`], [`FitError::Margin`] or [`FitError::Name`].
+    /// [`FitError::Degree`], [`FitError::Objective`], [`FitError::Cone`], [`FitError::Slabs`],
+    /// [`FitError::Margin`] or [`FitError::Name`].
     pub fn check(&self, name: &str) -> Result<(), FitError> {
         if ![2, 4, 6, 8].contains(&self.degree) {
             return Err(FitError::Degree(self.degree));
@@ -174,8 +179,9 @@ pub struct FitReport {
     pub volume_m3: f64,
     /// Estimate of the error of its quadrature, m³.
     pub volume_error_m3: f64,
-    /// Volumes of the refinement before its first step and after each, m³, by the rule that it minimises; over the smaller cones
-    /// after each step from the smallest ellipsoid; none without either.
+    /// Volumes of the refinement before its first step and after each, m³, by the rule that it
+    /// minimises; over the smaller cones after each step from the smallest ellipsoid; none without
+    /// either.
     pub refinement_m3: Vec<f64>,
     /// Volume of the convex hull, m³.
     pub hull_volume_m3: f64,
@@ -183,8 +189,9 @@ pub struct FitReport {
     pub seconds: f64,
     /// Why the refinement ended, or the descent over one of the smaller cones; none without either.
     pub refinement_end: Option<RefinementEnd>,
-    /// [`FitReport::objective_value`] minus its lower bound from the dual; at most 1e-5 max(1, |value|). None for volumes: they are
-    /// not convex in the polynomial, and no lower bound of theirs is known.
+    /// [`FitReport::objective_value`] minus its lower bound from the dual; at most 1e-5 max(1,
+    /// |value|). None for volumes: they are not convex in the polynomial, and no lower bound of
+    /// theirs is known.
     pub optimality_gap: Option<f64>,
     /// Programs solved, one per set of points and one per step of a refinement.
     pub rounds: usize,
@@ -195,8 +202,8 @@ pub struct FitReport {
     /// Its optimal value: log dets in the whitened frame, traces in the chosen coordinates.
     /// Over which polynomials; the volume itself if these are not all the sos-convex ones.
     pub cone: Cone,
-    /// What was reached: log dets in the whitened frame, traces in the unit frame, volumes over the smaller cones in the whitened
-    /// frame.
+    /// What was reached: log dets in the whitened frame, traces in the unit frame, volumes over the
+    /// smaller cones in the whitened frame.
     pub objective_value: f64,
     /// Margin the certificate was proven with.
     pub margin: f64,
@@ -356,7 +363,8 @@ pub enum FitError {
 }
 
 impl FitError {
-    /// The same error with the advice to take the default objective, where it was not taken and may help.
+    /// The same error with the advice to take the default objective, where it was not taken and may
+    /// help.
     fn of_objective(self, objective: Objective) -> Self {
         match self {
             Self::Program(_) | Self::NotOptimal { .. } if objective != Objective::default() => {
@@ -367,14 +375,14 @@ impl FitError {
     }
 }
 
-/// Fits a body of one polynomial around `points` (metres) with the least [`FitOptions::objective`], and cuts it by
-/// [`FitOptions::slabs`].
+/// Fits a body of one polynomial around `points` (metres) with the least [`FitOptions::objective`],
+/// and cuts it by [`FitOptions::slabs`].
 ///
-/// Log dets are least in every affine frame at once. Traces depend on the frame: they are measured in
-/// [`FitOptions::coordinates`].
+/// Log dets are least in every affine frame at once. Traces depend on the frame: they are measured
+/// in [`FitOptions::coordinates`].
 ///
-/// `progress` hears of every Newton step (below a millisecond at degree 4 to tens of milliseconds at degree 8), those of a
-/// refinement included, and can stop the fit.
+/// `progress` hears of every Newton step (below a millisecond at degree 4 to tens of milliseconds
+/// at degree 8), those of a refinement included, and can stop the fit.
 ///
 /// # Errors
 /// [`FitError`]: bad input by field, a cancelled fit, or what could not be solved or proven and by how much.
@@ -389,9 +397,10 @@ pub fn fit(
     object.cut(object.fit(options, progress)?, options.slabs, 0.0, progress)
 }
 
-/// As [`fit()`], of points that have changed a little since `previous` was fitted, as those of the next scan of a stream: the program
-/// begins with the points near the surface of that body, which saves it rounds of looking for those that bound the new one. The
-/// answer is that of a fit from scratch within the optimality gap, whatever the body is.
+/// As [`fit()`], of points that have changed a little since `previous` was fitted, as those of the
+/// next scan of a stream: the program begins with the points near the surface of that body, which
+/// saves it rounds of looking for those that bound the new one. The answer is that of a fit from
+/// scratch within the optimality gap, whatever the body is.
 ///
 /// # Errors
 /// As [`fit()`].

@@ -1,8 +1,9 @@
 //! Lorentz cones `u >= |(v, w)|` as an interior-point method needs them.
 //!
-//! `[[u + v, w], [w, u - v]]` is positive semidefinite exactly if (u, v, w) is in the cone. With v = 0 throughout it is the cone
-//! `u >= |w|`, and with w = 0, too, the ray `u >= 0`: one arithmetic serves all three. Notation and scaling as by Alizadeh and
-//! Goldfarb (Math. Program. 95, 2003) and Nesterov and Todd (Math. Oper. Res. 22, 1997).
+//! `[[u + v, w], [w, u - v]]` is positive semidefinite exactly if (u, v, w) is in the cone. With v
+//! = 0 throughout it is the cone `u >= |w|`, and with w = 0, too, the ray `u >= 0`: one arithmetic
+//! serves all three. Notation and scaling as by Alizadeh and Goldfarb (Math. Program. 95, 2003) and
+//! Nesterov and Todd (Math. Oper. Res. 22, 1997).
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -31,7 +32,8 @@ pub(super) fn quotient(d: &Vector3<f64>, x: &Vector3<f64>) -> Vector3<f64> {
 
 /// Longest step from x inside along d that stays in the cone; infinite if every one does.
 pub(super) fn longest(x: &Vector3<f64>, d: &Vector3<f64>) -> f64 {
-    // det(x + αd) = c + 2bα + aα², c > 0: the smallest positive root; u turns negative only past it.
+    // det(x + αd) = c + 2bα + aα², c > 0: the smallest positive root; u turns negative only past
+    // it.
     let (a, b, c) = (d.dot(&mirrored(d)), d.dot(&mirrored(x)), determinant(x));
     let discriminant = b * b - a * c;
     // Of a ray it is zero but for rounding.

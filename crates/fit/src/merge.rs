@@ -1,6 +1,7 @@
-//! Parts merged two by two, always those whose joint hull adds the least volume to their own: a sequence of partitions, each in the
-//! next coarser one, for every number of parts at once. (The bottom-up half of hierarchical approximate convex decomposition; Mamou and
-//! Ghorbel, A simple and efficient approach for 3D mesh approximate convex decomposition, ICIP 2009.)
+//! Parts merged two by two, always those whose joint hull adds the least volume to their own: a
+//! sequence of partitions, each in the next coarser one, for every number of parts at once. (The
+//! bottom-up half of hierarchical approximate convex decomposition; Mamou and Ghorbel, A simple and
+//! efficient approach for 3D mesh approximate convex decomposition, ICIP 2009.)
 
 use super::FitError;
 use super::hull::rough_hull;
@@ -81,13 +82,15 @@ impl Eq for Candidate {}
 /// One merger.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Merger {
-    /// Numbers of the two: those before the first merger count the parts, each merger makes the next number.
+    /// Numbers of the two: those before the first merger count the parts, each merger makes the
+    /// next number.
     pub(super) pair: [usize; 2],
     /// Total volume of the hulls afterwards; infinite while a part has none.
     pub(super) total: f64,
 }
 
-/// Merges parts until one is left, or until the joint hull of any two adds more than `most`. `step` hears how many are left.
+/// Merges parts until one is left, or until the joint hull of any two adds more than `most`. `step`
+/// hears how many are left.
 ///
 /// # Errors
 /// What `step` returns.

@@ -5,8 +5,9 @@ use nalgebra::{DMatrix, DVector};
 
 /// `F(c) = g·(c - c0) + ½ (c - c0)ᵀ B (c - c0)` with B ≻ 0.
 ///
-/// In the dual of a program that minimises F it stands where -φ stands in that of a fit: as the conjugate
-/// `½ (m + g)ᵀ B⁻¹ (m + g) - c0·(m + g)` (up to a constant), whose negative gradient is the minimiser c.
+/// In the dual of a program that minimises F it stands where -φ stands in that of a fit: as the
+/// conjugate `½ (m + g)ᵀ B⁻¹ (m + g) - c0·(m + g)` (up to a constant), whose negative gradient is
+/// the minimiser c.
 #[derive(Clone, Debug)]
 pub(super) struct Model {
     origin: DVector<f64>,
@@ -17,8 +18,8 @@ pub(super) struct Model {
 }
 
 impl Model {
-    /// The model around coefficients `origin` (c0) with gradient `slope` (g) and curvature B; none unless B is positive
-    /// definite up to rounding.
+    /// The model around coefficients `origin` (c0) with gradient `slope` (g) and curvature B; none
+    /// unless B is positive definite up to rounding.
     pub(super) fn new(origin: DVector<f64>, slope: DVector<f64>, curvature: DMatrix<f64>) -> Option<Self> {
         let factor = regularised_factor(&curvature)?;
         Some(Self { origin, slope, curvature, factor })

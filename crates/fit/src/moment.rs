@@ -4,12 +4,12 @@ use super::FitError;
 use super::structure::Structure;
 use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
 
-/// Smallest eigenvalue of the moment matrix, relative to the largest, below which the points count as lying on a surface of half
-/// the degree: rounding leaves nothing to prove.
+/// Smallest eigenvalue of the moment matrix, relative to the largest, below which the points count
+/// as lying on a surface of half the degree: rounding leaves nothing to prove.
 const LEAST: f64 = 1e-13;
 
-/// Checks that no polynomial of half the degree vanishes at all points (whitened), also but for rounding. Their moment matrix
-/// `M = mean of m(x) m(x)ᵀ`, m the monomials of half the degree.
+/// Checks that no polynomial of half the degree vanishes at all points (whitened), also but for
+/// rounding. Their moment matrix `M = mean of m(x) m(x)ᵀ`, m the monomials of half the degree.
 pub(super) fn moments(structure: &Structure, points: &[Vector3<f64>]) -> Result<DMatrix<f64>, FitError> {
     let share = 1.0 / points.len() as f64;
     let mean = points.iter().fold(DVector::zeros(structure.monomials.len()), |mut sum, point| {
@@ -25,8 +25,8 @@ pub(super) fn moments(structure: &Structure, points: &[Vector3<f64>]) -> Result<
     Ok(matrix)
 }
 
-/// `m(x)ᵀ M⁻¹ m(x)` (Lasserre and Pauwels, NIPS 2016), with M over all `points` (whitened), divided by its largest value there:
-/// the Gram matrix. Affine maps of the points take the set along.
+/// `m(x)ᵀ M⁻¹ m(x)` (Lasserre and Pauwels, NIPS 2016), with M over all `points` (whitened), divided
+/// by its largest value there: the Gram matrix. Affine maps of the points take the set along.
 pub(super) fn inverse_moment(structure: &Structure, points: &[Vector3<f64>]) -> Result<DMatrix<f64>, FitError> {
     let matrix = moments(structure, points)?;
     let (rank, monomials) = (matrix.nrows() - 1, matrix.nrows());

@@ -127,7 +127,8 @@ impl<'a> Object<'a> {
         Ok(Rung { body, gap, seconds: self.seconds + start.elapsed().as_secs_f64(), report: None })
     }
 
-    /// How far out every point lies: the values of the polynomial of that degree with the least log det, 1 at the outermost.
+    /// How far out every point lies: the values of the polynomial of that degree with the least log
+    /// det, 1 at the outermost.
     pub(super) fn levels(&self, degree: usize, watch: &mut Watch) -> Result<Vec<f64>, FitError> {
         let structure = Structure::new(degree);
         let coordinates = self.coordinates(Coordinates::Unit)?;
@@ -137,7 +138,8 @@ impl<'a> Object<'a> {
         Ok(self.points.iter().map(value).collect())
     }
 
-    /// The body of one polynomial with the least objective, refined as asked for. The next fit begins with what bounds this one.
+    /// The body of one polynomial with the least objective, refined as asked for. The next fit
+    /// begins with what bounds this one.
     pub(super) fn fit(
         &self,
         options: &FitOptions,
@@ -190,7 +192,8 @@ impl<'a> Object<'a> {
         Ok(Fit { body, gap, report })
     }
 
-    /// The optimum of the objective over all sos-convex polynomials, refined if asked for, with the volumes of that and its end.
+    /// The optimum of the objective over all sos-convex polynomials, refined if asked for, with the
+    /// volumes of that and its end.
     fn least_objective(
         &self,
         structure: &Structure,
@@ -230,8 +233,8 @@ impl<'a> Object<'a> {
         Gap { most_m: gap.most_m + self.clearance, ..gap }
     }
 
-    /// Cuts a body by at most so many slabs, one after the other where it reaches farthest beyond the hull, until it reaches no
-    /// farther than `enough`, metres.
+    /// Cuts a body by at most this many slabs, one after the other where it reaches farthest beyond
+    /// the hull, until it reaches no farther than `enough`, metres.
     pub(super) fn cut(
         &self,
         fit: Fit,
@@ -258,7 +261,8 @@ impl<'a> Object<'a> {
         Ok(Fit { body, gap, report: FitReport { volume_m3, volume_error_m3, seconds, ..report } })
     }
 
-    /// Pulls all points, with what is around them, inside by the constant coefficient, which leaves the Hessian as it is, and proves the body.
+    /// Pulls all points, with what is around them, inside by the constant coefficient, which leaves
+    /// the Hessian as it is, and proves the body.
     fn certify(&self, structure: &Structure, optimum: &Optimum) -> Result<Body, FitError> {
         let Self { name, points, normalization, clearance, .. } = self;
         let terms = structure.monomials.iter().copied().zip(optimum.coefficients.iter().copied()).collect();
@@ -272,8 +276,8 @@ impl<'a> Object<'a> {
     }
 }
 
-/// The map from the frame of the points to that of the ellipsoid around the conditioned points, with orthogonal rows: such a
-/// map amplifies no rounding, however long the ellipsoid is.
+/// The map from the frame of the points to that of the ellipsoid around the conditioned points,
+/// with orthogonal rows: such a map amplifies no rounding, however long the ellipsoid is.
 fn whitening(frame: &Frame, ellipsoid: &Ellipsoid) -> Option<Normalization> {
     let center = frame.center + frame.linear.try_inverse()? * ellipsoid.center;
     let decomposition = (ellipsoid.linear * frame.linear).svd(false, true);
@@ -284,7 +288,8 @@ fn whitening(frame: &Frame, ellipsoid: &Ellipsoid) -> Option<Normalization> {
     Some(Normalization { center, linear: Matrix3::from_diagonal(&decomposition.singular_values) * turn })
 }
 
-/// The polynomial with the constant coefficient that brings the highest of its values at the points to `1 - room`, rounding included.
+/// The polynomial with the constant coefficient that brings the highest of its values at the points
+/// to `1 - room`, rounding included.
 pub(super) fn pulled_inside(
     mut polynomial: Polynomial,
     points: &[Vector3<f64>],
@@ -319,6 +324,6 @@ fn check(points: &[Vector3<f64>]) -> Result<(), FitError> {
         return Err(FitError::NotFinite(index));
     }
     let reach = points.iter().map(Vector3::amax).fold(0.0, f64::max);
-    // Coinciding points at the origin are told as such later.
+    // Coinciding points at the origin are reported as such later.
     if reach > 1e15 || reach > 0.0 && reach < 1e-15 { Err(FitError::OutOfRange(reach)) } else { Ok(()) }
 }

@@ -5,9 +5,9 @@ use std::str::FromStr;
 
 /// The objective of a fit, over sos-convex polynomials p with `p <= 1` at the points.
 ///
-/// With Gram matrices `p = zᵀPz` on the monomials z and `yᵀ∇²p y = wᵀHw` on the monomials w linear in y. At degree 2 both
-/// log dets are the volume of the ellipsoid; above, all four are heuristics (Ahmadi, Hall, Makadia and Sindhwani, RSS 2017,
-/// section III).
+/// With Gram matrices `p = zᵀPz` on the monomials z and `yᵀ∇²p y = wᵀHw` on the monomials w linear
+/// in y. At degree 2 both log dets are the volume of the ellipsoid; above, all four are heuristics
+/// (Ahmadi, Hall, Makadia and Sindhwani, RSS 2017, section III).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Objective {
     /// `-log det P`: tightest of the four nearly always, and the same in every affine frame.
@@ -15,8 +15,8 @@ pub enum Objective {
     LogDetP,
     /// `tr P⁻¹` in the unit frame: dominated by the largest eigenvalues of P⁻¹.
     TraceP,
-    /// `-log det H` with p a sum of squares (Magnani, Lall and Boyd, CDC 2005): curvature everywhere; the same in every
-    /// affine frame.
+    /// `-log det H` with p a sum of squares (Magnani, Lall and Boyd, CDC 2005): curvature
+    /// everywhere; the same in every affine frame.
     LogDetH,
     /// `tr H⁻¹` in the unit frame, with p a sum of squares.
     TraceH,
@@ -59,7 +59,8 @@ impl Objective {
         }
     }
 
-    /// Highest degree it is offered for: the Hessian's matrix has 60 rows at degree 8, where nothing is gained by it.
+    /// Highest degree it is offered for: the Hessian's matrix has 60 rows at degree 8, where
+    /// nothing is gained by it.
     pub fn max_degree(self) -> usize {
         match self.matrix() {
             Matrix::Polynomial => 8,

@@ -1,8 +1,9 @@
-//! Most points of a large cloud are far from its convex hull's surface: they are left out before the hull is computed.
+//! Most points of a large cloud are far from its convex hull's surface: they are left out before
+//! the hull is computed.
 //!
-//! The extreme points along some directions span a polytope inside the hull, and what lies inside that is no vertex (Akl and
-//! Toussaint, A fast convex hull algorithm, Inf. Process. Lett. 7, 1978). More directions, for the fewer points that are left,
-//! leave fewer still.
+//! The extreme points along some directions span a polytope inside the hull, and what lies inside
+//! that is no vertex (Akl and Toussaint, A fast convex hull algorithm, Inf. Process. Lett. 7,
+//! 1978). More directions, for the fewer points that are left, leave fewer still.
 
 use super::facing::{Facing, cell_count, cell_of};
 use super::hull::facets;
@@ -15,20 +16,21 @@ const MANY: usize = 4096;
 /// How corners of the polytopes are chosen, one after the other.
 const CHOICES: [Choice; 3] = [Choice::Extreme(64), Choice::Extreme(512), Choice::Farthest(24)];
 
-/// How deep inside the polytope a point must lie to be left out; the points have extents near 1, and rounding is far below.
+/// How deep inside the polytope a point must lie to be left out; the points have extents near 1,
+/// and rounding is far below.
 const DEPTH: f64 = 1e-9;
 
 /// Which points span a polytope.
 enum Choice {
     /// The extreme ones along as many directions: finds the corners of an object.
     Extreme(usize),
-    /// The farthest from the middle in each cell of directions, by cells along the edge of a cube: follows smooth surfaces, which
-    /// takes many.
+    /// The farthest from the middle in each cell of directions, by cells along the edge of a cube:
+    /// follows smooth surfaces, which takes many.
     Farthest(usize),
 }
 
-/// Indices of the points that may be vertices of the convex hull, ascending; the others lie inside the hull of these. The points
-/// have extents near 1.
+/// Indices of the points that may be vertices of the convex hull, ascending; the others lie inside
+/// the hull of these. The points have extents near 1.
 pub(super) fn outermost(points: &[Vector3<f64>]) -> Vec<usize> {
     let mut left: Vec<usize> = (0..points.len()).collect();
     for choice in CHOICES {

@@ -1,9 +1,10 @@
 //! Compounds: one body for each of the nearly convex pieces of a mesh.
 //!
-//! The mesh is separated into components, cut by planes, and divided among parts (`decompose`); each part becomes a body as any points
-//! do, and [`Compound::with_covering`] proves that no triangle, and no interior of a closed mesh, is left out. Cut points are only
-//! known up to rounding, so each body is pulled around balls of that size. The gap of a part is measured to the convex hull of its own
-//! pieces; the union of those hulls lies in the hull of the whole mesh.
+//! The mesh is separated into components, cut by planes, and divided among parts (`decompose`);
+//! each part becomes a body as any points do, and [`Compound::with_covering`] proves that no
+//! triangle, and no interior of a closed mesh, is left out. Cut points are only known up to
+//! rounding, so each body is pulled around balls of that size. The gap of a part is measured to the
+//! convex hull of its own pieces; the union of those hulls lies in the hull of the whole mesh.
 
 use super::decompose::{Decomposition, PartSearch};
 use super::hull::convex_hull;
@@ -37,8 +38,9 @@ pub(super) struct Source<'a> {
     pub(super) options: &'a FitOptions,
 }
 
-/// Divides a mesh among at most `parts` parts, fewer where more would not make their hulls smaller, and fits a body to each. Triangles
-/// of a closed mesh are all counter-clockwise seen from outside, or all clockwise.
+/// Divides a mesh among at most `parts` parts, fewer where more would not make their hulls smaller,
+/// and fits a body to each. Triangles of a closed mesh are all counter-clockwise seen from outside,
+/// or all clockwise.
 ///
 /// # Errors
 /// As [`fit`](super::fit()), and [`FitError::Parts`], [`FitError::Mesh`], [`FitError::NotCovered`].
@@ -118,7 +120,8 @@ pub(super) fn held(mesh: &Piece, division: &Division, parts: usize) -> Result<Ve
     Ok(pieces.into_iter().map(held).collect())
 }
 
-/// The search for the cheapest compound within a gap, of more and more parts; what was tried of a part is kept.
+/// The search for the cheapest compound within a gap, of more and more parts; what was tried of a
+/// part is kept.
 pub(super) struct Search<'a> {
     source: Source<'a>,
     max_gap_m: f64,
@@ -172,7 +175,8 @@ impl<'a> Search<'a> {
         best.map(|(bodies, division)| self.source.assemble(bodies, division, None, self.start)).transpose()
     }
 
-    /// The lowest rungs near enough of all parts, if they cost less than `most` together, and what they cost.
+    /// The lowest rungs near enough of all parts, if they cost less than `most` together, and what
+    /// they cost.
     fn climb(
         &mut self,
         held: &[Held],
@@ -240,8 +244,8 @@ mod tests {
         FitOptions { degree, ..FitOptions::default() }
     }
 
-    /// A closed mesh like the letter H, 2 m wide, turned so that no axis fits it. Its parts are shorter than it is, and so are their
-    /// gaps.
+    /// A closed mesh like the letter H, 2 m wide, turned so that no axis fits it. Its parts are
+    /// shorter than it is, and so are their gaps.
     fn letter() -> Mesh {
         #[rustfmt::skip]
         let outline = [
@@ -356,12 +360,12 @@ mod tests {
     fn bad_input_is_refused_and_a_fit_can_be_stopped() {
         let mesh = letter();
         for parts in [0, MAX_PIECES + 1] {
-            let told = fit_parts("letter", &mesh, parts, &options(2), &mut unwatched).unwrap_err();
-            assert!(matches!(told, FitError::Parts(count) if count == parts));
+            let message = fit_parts("letter", &mesh, parts, &options(2), &mut unwatched).unwrap_err();
+            assert!(matches!(message, FitError::Parts(count) if count == parts));
         }
         let cloud = Mesh { triangles: vec![], ..mesh.clone() };
-        let told = fit_parts("letter", &cloud, 2, &options(2), &mut unwatched).unwrap_err();
-        assert_eq!(told, FitError::Mesh(MeshError::NoTriangles));
+        let message = fit_parts("letter", &cloud, 2, &options(2), &mut unwatched).unwrap_err();
+        assert_eq!(message, FitError::Mesh(MeshError::NoTriangles));
         assert!(matches!(fit_parts("letter", &mesh, 2, &options(3), &mut unwatched), Err(FitError::Degree(3))));
         let mut heard = 0;
         let mut stop = |_: Progress| {

@@ -6,9 +6,10 @@
 //! minimise  τ (-φ(M(m)) + Σwᵢ - ε tr S(s) + h·s) - Σ log wᵢ - log det S(s),   m = Σ wᵢ v(xᵢ) - D*s
 //! ```
 //!
-//! costs one small dense factorization per Newton step (Nesterov and Nemirovskii, Interior-Point Polynomial Algorithms,
-//! 1994). A centre is within (points + rows of S)/τ of the optimum, and a Newton step near it yields a polynomial that
-//! satisfies all constraints strictly, with its Gram matrices: an upper bound to hold against the lower bound of the dual.
+//! costs one small dense factorization per Newton step (Nesterov and Nemirovskii, Interior-Point
+//! Polynomial Algorithms, 1994). A centre is within (points + rows of S)/τ of the optimum, and a
+//! Newton step near it yields a polynomial that satisfies all constraints strictly, with its Gram
+//! matrices: an upper bound to hold against the lower bound of the dual.
 
 use super::FitError;
 use super::barrier::Barrier;
@@ -22,13 +23,14 @@ use super::structure::{Pattern, Structure};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use sublevel_core::polynomial::degree_of;
 
-/// Newton decrement below which a point counts as a centre; 1 is where its polynomial stops being feasible.
+/// Newton decrement below which a point counts as a centre; 1 is where its polynomial stops being
+/// feasible.
 const CENTRED: f64 = 0.9;
 
 /// Growth of τ below which a path that rounding blocks is given up.
 const LEAST_GROWTH: f64 = 1.3;
-/// Weight of a trace at the start, relative to that of a log det: 1e-2 leaves some starts too far from any centre, 1e-6 drowns
-/// the trace in rounding.
+/// Weight of a trace at the start, relative to that of a log det: 1e-2 leaves some starts too far
+/// from any centre, 1e-6 drowns the trace in rounding.
 const TRACE_SHARE: f64 = 1e-4;
 
 /// What the path minimises, besides `Σw - ε tr S + h·s`.
@@ -169,8 +171,9 @@ impl<'a> Path<'a> {
         Dual { moments: self.values * &weights - self.structure.pull_back(&form), weights, form }
     }
 
-    /// Equal weights that add up to the rows of P, and y isotropic and independent of z: S is positive definite, and small
-    /// enough to leave M so. Where relaxed convexity has no points inside to go by, as of a sphere, z closer to the centre helps.
+    /// Equal weights that add up to the rows of P, and y isotropic and independent of z: S is
+    /// positive definite, and small enough to leave M so. Where relaxed convexity has no points
+    /// inside to go by, as of a sphere, z closer to the centre helps.
     pub(super) fn start(&self) -> Option<Place> {
         let points = self.values.ncols();
         let rows = self.structure.gram.size as f64;
@@ -188,7 +191,8 @@ impl<'a> Path<'a> {
         })?;
         let Place { dual, tau } = match self.goal {
             Goal::Gram(_, spectral) if !spectral.is_self_concordant() => {
-                // The functional is a poor guess for traces, so the barriers rule at first; then this scale is best.
+                // The functional is a poor guess for traces, so the barriers rule at first; then
+                // this scale is best.
                 let size = self.size(&dual);
                 let scale = size * (1.0 + self.barrier_parameter() / (TRACE_SHARE * rows));
                 let dual = self.point(dual.weights * scale.powi(2), dual.form * scale.powi(2));
@@ -196,13 +200,15 @@ impl<'a> Path<'a> {
             }
             _ => Place { dual, tau: 1.0 },
         };
-        // At a centre the rows of S are what relaxed convexity costs: a start that costs more is far from any.
+        // At a centre the rows of S are what relaxed convexity costs: a start that costs more is
+        // far from any.
         let least = self.structure.hessian.size as f64 / (tau * self.cost.dot(&dual.form));
         let share = if least > 0.0 { least.min(1.0) } else { 1.0 };
         Some(Place { dual: self.point(dual.weights, dual.form * share), tau })
     }
 
-    /// The last centre before the steps ran out or rounding stood in the way; its τ tells how far that is.
+    /// The last centre before the steps ran out or rounding stood in the way; its τ says how far
+    /// that is.
     ///
     /// # Errors
     /// [`FitError::Cancelled`].

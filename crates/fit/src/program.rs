@@ -6,25 +6,27 @@
 //! minimise  f(P) or f(H)   subject to  p = zᵀPz,  yᵀ∇²p y = wᵀHw,  P ⪰ 0,  H ⪰ εI,  p(xᵢ) <= 1
 //! ```
 //!
-//! Their duals have far fewer variables: weights w >= 0 of the points and a functional s on the Hessian form. With
-//! φ the concave conjugate of f (`spectral`), for the Gram matrix P
+//! Their duals have far fewer variables: weights w >= 0 of the points and a functional s on the
+//! Hessian form. With φ the concave conjugate of f (`spectral`), for the Gram matrix P
 //!
 //! ```text
 //! maximise  φ(M(m)) - Σwᵢ + ε tr S(s)   subject to  m = Σ wᵢ v(xᵢ) - D*s,  S(s) ⪰ 0,  w >= 0
 //! ```
 //!
-//! where M and S are (pseudo-)moment matrices, v the monomials of p and D the map from p to its Hessian form; P is then
-//! implied definite. For the Gram matrix H the two change roles, and f alone keeps H definite, so there is no ε:
+//! where M and S are (pseudo-)moment matrices, v the monomials of p and D the map from p to its
+//! Hessian form; P is then implied definite. For the Gram matrix H the two change roles, and f
+//! alone keeps H definite, so there is no ε:
 //!
 //! ```text
 //! maximise  φ(S(s)) - Σwᵢ   subject to  m = Σ wᵢ v(xᵢ) - D*s,  M(m) ⪰ 0,  w >= 0
 //! ```
 //!
-//! With convexity relaxed, `p + r` is sos-convex in place of p, for `r = c |u|^2d` in given coordinates u: with h the coefficients of the
-//! Hessian form of r, the constraint `yᵀ∇²(p + r) y = wᵀHw` takes `h·s` off the dual objective, and nothing else changes.
+//! With convexity relaxed, `p + r` is sos-convex in place of p, for `r = c |u|^2d` in given
+//! coordinates u: with h the coefficients of the Hessian form of r, the constraint `yᵀ∇²(p + r) y =
+//! wᵀHw` takes `h·s` off the dual objective, and nothing else changes.
 //!
-//! The optimal Gram matrix is the gradient of φ at the optimum. The dual needs no exponential cones, and no block of twice
-//! the size for determinant or inverse (`path`).
+//! The optimal Gram matrix is the gradient of φ at the optimum. The dual needs no exponential
+//! cones, and no block of twice the size for determinant or inverse (`path`).
 
 use super::basis::{Affine, change};
 use super::objective::{Function, Matrix, Objective};
@@ -67,7 +69,8 @@ pub(super) struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
-    /// The program of an objective; `unit` maps the whitened frame to the unit frame, in which traces are measured.
+    /// The program of an objective; `unit` maps the whitened frame to the unit frame, in which
+    /// traces are measured.
     pub(super) fn new(structure: &'a Structure, objective: Objective, unit: &Affine, margin: f64) -> Self {
         let matrix = objective.matrix();
         let spectral = match objective.function() {

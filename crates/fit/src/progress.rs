@@ -1,4 +1,4 @@
-//! How far a fit has come, told from inside its loops.
+//! How far a fit has come, reported from inside its loops.
 
 use super::FitError;
 use std::ops::ControlFlow;
@@ -14,8 +14,8 @@ pub struct Progress {
     pub active_points: usize,
     /// Largest p - 1 over the hull's vertices at the end of the program before, at least 0.
     pub worst_violation: f64,
-    /// About the distance to the optimum of the program, in units of log dets, or of the volume in refinements; while slabs are
-    /// cut, the gap, metres.
+    /// About the distance to the optimum of the program, in units of log dets, or of the volume in
+    /// refinements; while slabs are cut, the gap, metres.
     pub gap: f64,
 }
 

@@ -1,9 +1,10 @@
 //! Smaller volumes: sequential convex programming on the volume itself.
 //!
-//! Log dets and traces only stand in for the volume. From the optimum of one, each step minimises a convex quadratic model of the
-//! volume (`volume`) over the same sos-convex polynomials around the same points, by following the central path of that
-//! program's dual, and goes that way as far as the volume falls. The feasible set is convex, so every polynomial on the way
-//! is feasible, and the volume never grows.
+//! Log dets and traces only stand in for the volume. From the optimum of one, each step minimises a
+//! convex quadratic model of the volume (`volume`) over the same sos-convex polynomials around the
+//! same points, by following the central path of that program's dual, and goes that way as far as
+//! the volume falls. The feasible set is convex, so every polynomial on the way is feasible, and
+//! the volume never grows.
 
 use super::generate::inner;
 use super::model::Model;
@@ -23,7 +24,8 @@ const ENOUGH: f64 = 2e-5;
 const GAP: f64 = 1e-5;
 /// Growth of τ from one centre to the next.
 const GROWTH: f64 = 10.0;
-/// Where a path starts, as a part of its last τ: nearer, and the first centre is far; farther, and there are more of them.
+/// Where a path starts, as a part of its last τ: nearer, and the first centre is far; farther, and
+/// there are more of them.
 const COLD: f64 = 1e-5;
 /// Newton steps on one path at most.
 const COLD_STEPS: usize = 3000;
@@ -31,7 +33,8 @@ const COLD_STEPS: usize = 3000;
 const WARM: f64 = 1e-2;
 /// As [`COLD_STEPS`], from the last optimum: what works takes a few tens.
 const WARM_STEPS: usize = 80;
-/// Levenberg's term, relative to the mean curvature: directions that the rays see nothing of stay put.
+/// Levenberg's term, relative to the mean curvature: directions that the rays see nothing of stay
+/// put.
 const DAMPING: f64 = 1e-7;
 
 /// Why a refinement ended.
@@ -65,13 +68,15 @@ pub(super) struct Refined {
     pub(super) coefficients: DVector<f64>,
     /// Gram matrix of its Hessian form.
     pub(super) hessian: DMatrix<f64>,
-    /// Volume in the frame of p before the first step and after each, by the rule that is minimised.
+    /// Volume in the frame of p before the first step and after each, by the rule that is
+    /// minimised.
     pub(super) volumes: Vec<f64>,
     /// Why there are no more steps.
     pub(super) end: RefinementEnd,
 }
 
-/// Refines a polynomial that is feasible for `points` (up to a constant) with the Gram matrix `hessian ⪰ margin`.
+/// Refines a polynomial that is feasible for `points` (up to a constant) with the Gram matrix
+/// `hessian ⪰ margin`.
 pub(super) fn refine(
     structure: &Structure,
     points: &[Vector3<f64>],
@@ -117,13 +122,15 @@ pub(super) fn refine(
             break;
         }
     }
-    // The path ends a little inside the constraints: the constant takes that back, and then min p is 0.
+    // The path ends a little inside the constraints: the constant takes that back, and then min p
+    // is 0.
     current.coefficients[0] += 1.0 - values.tr_mul(&current.coefficients).max();
     normalise(structure, &mut current, &center)?;
     Ok(Refined { coefficients: current.coefficients, hessian: current.hessian, volumes, end })
 }
 
-/// The model that a step around these coefficients minimises; none where the volume has no usable curvature.
+/// The model that a step around these coefficients minimises; none where the volume has no usable
+/// curvature.
 pub(super) fn step_model(
     structure: &Structure,
     coefficients: &DVector<f64>,
@@ -185,7 +192,8 @@ fn minimise(
 ) -> Result<Option<(Interior, Place)>, FitError> {
     let gap = GAP * volume;
     let end = path.barrier_parameter() / gap;
-    // The last optimum is close to the next, but also to the boundary: from there the path is not always found.
+    // The last optimum is close to the next, but also to the boundary: from there the path is not
+    // always found.
     let warm = warm.map(|place| (Place { tau: WARM * end, ..place }, WARM_STEPS));
     let cold = path.start().map(|place| (Place { tau: COLD * end, ..place }, COLD_STEPS));
     for (start, steps) in warm.into_iter().chain(cold) {
@@ -197,7 +205,8 @@ fn minimise(
     Ok(None)
 }
 
-/// The polynomial on the way from `from` to `to` with about the smallest volume, if one is below `here`.
+/// The polynomial on the way from `from` to `to` with about the smallest volume, if one is below
+/// `here`.
 fn search(
     structure: &Structure,
     from: &Interior,

@@ -1,5 +1,5 @@
-//! Planes of faces at reflex edges, where a solid bends inwards: cutting there leaves a corner to neither side, so an L falls apart
-//! into two boxes exactly.
+//! Planes of faces at reflex edges, where a solid bends inwards: cutting there leaves a corner to
+//! neither side, so an L falls apart into two boxes exactly.
 
 use nalgebra::Vector3;
 use std::collections::HashMap;
@@ -11,7 +11,7 @@ const SHARP: f64 = 0.94;
 /// Planes whose normals differ by less, or whose heights do in proportion to the object, are one.
 const SAME: f64 = 1e-6;
 
-/// Most planes that are told apart.
+/// Most planes that are distinguished.
 const MAX_PLANES: usize = 48;
 
 /// A plane along faces that end in reflex edges; the solid behind them is below.
@@ -19,7 +19,8 @@ const MAX_PLANES: usize = 48;
 pub(super) struct Ledge {
     pub(super) normal: Vector3<f64>,
     pub(super) height: f64,
-    /// Part of the length of all sharp reflex edges, weighted by how far they bend, that lies in the plane.
+    /// Part of the length of all sharp reflex edges, weighted by how far they bend, that lies in
+    /// the plane.
     pub(super) share: f64,
 }
 

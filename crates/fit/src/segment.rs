@@ -1,10 +1,13 @@
-//! Objects cut into more regions than parts are asked for, which are then merged (`merge`): so the search looks beyond cuts that gain
-//! nothing by themselves, such as the first ones of a tube or an open box.
+//! Objects cut into more regions than parts are asked for, which are then merged (`merge`): so the
+//! search looks beyond cuts that gain nothing by themselves, such as the first ones of a tube or an
+//! open box.
 //!
-//! It begins with the components of the mesh; those whose joint hull adds nothing, such as a cavity and its shell, are one region. As
-//! long as some cut reduces the volume of the hulls, the one that gains most is made. Where none does, the region that fills least of
-//! its hull is cut all the same: by the plane after which the next two cuts promise most, or where that is none, by a ledge or across
-//! the middle. The style *by ledges* cuts where sharp reflex edges are before it looks for anything else.
+//! It begins with the components of the mesh; those whose joint hull adds nothing, such as a cavity
+//! and its shell, are one region. As long as some cut reduces the volume of the hulls, the one that
+//! gains most is made. Where none does, the region that fills least of its hull is cut all the
+//! same: by the plane after which the next two cuts promise most, or where that is none, by a ledge
+//! or across the middle. The style *by ledges* cuts where sharp reflex edges are before it looks
+//! for anything else.
 
 use super::FitError;
 use super::hull::principal_axes;
@@ -14,19 +17,24 @@ use super::split::{FINALISTS, LEAST_SHARE, Scan, samples};
 use nalgebra::Vector3;
 use sublevel_core::body::{Caps, Cut, Division, Piece};
 
-/// Volume that counts as none, relative to the hull of the object: the noise of rough hulls, and a little more.
+/// Volume that counts as none, relative to the hull of the object: the noise of rough hulls, and a
+/// little more.
 pub(super) const NOTHING: f64 = 1e-6;
 
-/// A cut that gains less, relative to the hull of the object, is made only if nothing better is left.
+/// A cut that gains less, relative to the hull of the object, is made only if nothing better is
+/// left.
 const WORTH: f64 = 1e-5;
 
-/// A region whose hull is larger than it by less, relative to the hull of the object, is left alone.
+/// A region whose hull is larger than it by less, relative to the hull of the object, is left
+/// alone.
 const CONVEX: f64 = 1e-3;
 
-/// Where the best cut gains less of what a region wastes, and that is more of the object, cuts that gain more together are looked for.
+/// Where the best cut gains less of what a region wastes, and that is more of the object, cuts that
+/// gain more together are looked for.
 const MUCH: f64 = 0.05;
 
-/// Most cuts in a row that gain nothing, of a closed region and of an open one, whose own volume is not known.
+/// Most cuts in a row that gain nothing, of a closed region and of an open one, whose own volume is
+/// not known.
 const BLIND_CLOSED: usize = 4;
 const BLIND_OPEN: usize = 2;
 
@@ -36,7 +44,8 @@ const GLANCES: usize = 3;
 /// Cuts that are made then: the one, and one of either side.
 const AHEAD: f64 = 3.0;
 
-/// Part of all sharp reflex edges that must lie in one plane, or an object is not one of ledges: scans have small ones everywhere.
+/// Part of all sharp reflex edges that must lie in one plane, or an object is not one of ledges:
+/// scans have small ones everywhere.
 const LEDGE_SHARE: f64 = 0.1;
 
 /// Most ledges that are measured.
@@ -152,7 +161,8 @@ impl Segmentation {
         Region { pieces, hull, own, blind, plan: None }
     }
 
-    /// Makes one more cut; tells whether there was one worth it. No more than `most` regions, those that waste most, are looked at.
+    /// Makes one more cut; returns whether there was one worth it. No more than `most` regions,
+    /// those that waste most, are looked at.
     pub(super) fn divide(&mut self, most: usize, step: Step<'_>) -> Result<bool, FitError> {
         let mut wasteful: Vec<usize> = (0..self.regions.len()).collect();
         wasteful.sort_by(|&a, &b| self.regions[b].waste().total_cmp(&self.regions[a].waste()).then(a.cmp(&b)));
@@ -298,7 +308,7 @@ impl Segmentation {
         Ok(Nested { total: all, mergers: merge(hulls, f64::INFINITY, step)? })
     }
 
-    /// The division of the mesh into so many parts.
+    /// The division of the mesh into this many parts.
     pub(super) fn division(&self, nested: &Nested, parts: usize) -> Division {
         if parts == 1 {
             return Division::default();
@@ -309,7 +319,8 @@ impl Segmentation {
                 held[*node] = part;
             }
         }
-        // Cuts are left out where both sides are held by one part; children have higher numbers than what they are of.
+        // Cuts are left out where both sides are held by one part; children have higher numbers
+        // than what they are of.
         for node in (0..self.nodes.len()).rev() {
             if let Some((_, _, [below, above])) = self.nodes[node].cut
                 && held[below] == held[above]
@@ -366,7 +377,7 @@ impl Nested {
         totals
     }
 
-    /// The regions of each of so many parts.
+    /// The regions of each of this many parts.
     fn parts(&self, regions: usize, parts: usize) -> Vec<Vec<usize>> {
         let mut groups: Vec<Vec<usize>> = (0..regions).map(|region| vec![region]).collect();
         for Merger { pair, .. } in self.mergers.iter().take(regions.saturating_sub(parts)) {

@@ -1,7 +1,8 @@
 //! The two shapes the demo makes itself: a chair and a standing human figure.
 //!
-//! Both are closed triangle surfaces in metres, z up, standing on the floor `z = 0` about the origin, front towards
-//! `+x`. They are made of overlapping parts; what a fit needs of them is their vertices.
+//! Both are closed triangle surfaces in metres, z up, standing on the floor `z = 0` about the
+//! origin, front towards `+x`. They are made of overlapping parts; what a fit needs of them is
+//! their vertices.
 
 use nalgebra::Vector3;
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -20,7 +21,7 @@ impl Shape {
     /// The surface as the text of an OFF file; a reader gets exactly these coordinates back.
     pub fn to_off(&self) -> String {
         let mut text = format!("OFF\n{} {} 0\n", self.vertices.len(), self.triangles.len());
-        // Writing to a string can not fail.
+        // Writing to a string cannot fail.
         for v in &self.vertices {
             let _ = writeln!(text, "{} {} {}", v.x, v.y, v.z);
         }
@@ -43,7 +44,8 @@ impl Shape {
         self.triangles.extend([[a, b, c], [a, c, d]]);
     }
 
-    /// Adds a straight bar with rectangular ends centred at `from` and `to`; `half` holds half its sides along x and y.
+    /// Adds a straight bar with rectangular ends centred at `from` and `to`; `half` holds half its
+    /// sides along x and y.
     fn bar(&mut self, from: Vector3<f64>, to: Vector3<f64>, half: [f64; 2]) {
         let first = self.vertices.len();
         for end in [from, to] {
@@ -132,7 +134,8 @@ fn rounded(stations: &[Station], along: &Vector3<f64>) -> Vec<Station> {
     rings
 }
 
-/// A chair, 0.48 m wide, 0.5 m deep and 0.9 m high: seat, slightly reclined back with three slats, four legs.
+/// A chair, 0.48 m wide, 0.5 m deep and 0.9 m high: seat, slightly reclined back with three slats,
+/// four legs.
 pub fn chair() -> Shape {
     let mut chair = Shape::default();
     let at = Vector3::new;
@@ -177,14 +180,16 @@ pub fn human() -> Shape {
     human.in_micrometres()
 }
 
-/// The same surface with every edge halved until none is longer than `longest` metres: a scan has many vertices too.
+/// The same surface with every edge halved until none is longer than `longest` metres: a scan has
+/// many vertices too.
 fn subdivided(shape: &Shape, longest: f64) -> Shape {
     let mut fine = Shape { vertices: shape.vertices.clone(), triangles: Vec::new() };
     let mut middles = std::collections::BTreeMap::new();
     let mut pending = shape.triangles.clone();
     while let Some([a, b, c]) = pending.pop() {
         let length = |i: usize, j: usize| (fine.vertices[i] - fine.vertices[j]).norm();
-        // The longest edge is cut, the same way from both of its triangles, so the surface stays closed.
+        // The longest edge is cut, the same way from both of its triangles, so the surface stays
+        // closed.
         let edges = [(length(a, b), [a, b, c]), (length(b, c), [b, c, a]), (length(c, a), [c, a, b])];
         let Some((size, [i, j, k])) = edges.into_iter().max_by(|x, y| x.0.total_cmp(&y.0)) else { continue };
         if size <= longest {

@@ -22,7 +22,8 @@ pub enum Shortfall {
         /// By how much the hulls are larger than the object together, as a part of it.
         excess: f64,
     },
-    /// No cut that was tried makes the hulls smaller; how large the object is, an open mesh does not say.
+    /// No cut that was tried makes the hulls smaller; how large the object is, an open mesh does
+    /// not say.
     Open {
         /// Parts that came out.
         parts: usize,
@@ -30,7 +31,8 @@ pub enum Shortfall {
 }
 
 impl Shortfall {
-    /// Of so many parts whose hulls have this volume together, and of the object's own volume if it is known.
+    /// Of this many parts whose hulls have this volume together, and of the object's own volume if
+    /// it is known.
     pub(super) fn new(parts: usize, hulls: f64, own: Option<f64>) -> Self {
         match own.filter(|own| *own > 0.0).map(|own| (hulls / own - 1.0).max(0.0)) {
             None => Self::Open { parts },

@@ -1,13 +1,15 @@
 //! Cutting bodies by slabs: pairs of parallel planes between which the object lies.
 //!
-//! A slab with the unit normal n around points with heights n·x between `m - h` and `m + h` is `l(x)² <= 1`, `l = (n·x - m) / h`. Its
-//! Hessian `2 n nᵀ / h²` is singular, and a certificate has to survive rounding; so what is stored is
+//! A slab with the unit normal n around points with heights n·x between `m - h` and `m + h` is
+//! `l(x)² <= 1`, `l = (n·x - m) / h`. Its Hessian `2 n nᵀ / h²` is singular, and a certificate has
+//! to survive rounding; so what is stored is
 //!
 //! ```text
 //! (1 - ε) l(z)² + ε |z|² / r² <= 1,
 //! ```
 //!
-//! r the largest norm of the points in normalized coordinates z: it holds them too, and bulges by ε/2 of its thickness at most.
+//! r the largest norm of the points in normalized coordinates z: it holds them too, and bulges by
+//! ε/2 of its thickness at most.
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use sublevel_core::body::{Body, BodyError, Constraint, NotContained};
@@ -30,7 +32,8 @@ pub enum CutError {
     Points(#[from] NotContained),
 }
 
-/// The body cut by the slab across the unit vector n that holds the balls of radius `clearance` about the points; what is noted of the body stays but for the gap.
+/// The body cut by the slab across the unit vector n that holds the balls of radius `clearance`
+/// about the points; what is noted of the body stays but for the gap.
 pub(super) fn cut(body: &Body, points: &[Vector3<f64>], clearance: f64, n: &Vector3<f64>) -> Result<Body, CutError> {
     let mut constraints = body.constraints().to_vec();
     constraints.push(slab(body, points, clearance, n)?);
@@ -68,7 +71,8 @@ fn slab(body: &Body, points: &[Vector3<f64>], clearance: f64, n: &Vector3<f64>) 
     let gram = HessianGram::nearest(&polynomial, basis, DMatrix::from_fn(3, 3, |i, j| hessian[(i, j)]))
         .map_err(|source| BodyError::Certificate { index: body.constraints().len(), source })?;
     let mut slab = Constraint { polynomial, gram };
-    // Thin objects feel the rounding of coordinates: what it may add the constant takes back, which leaves the Hessian as it is.
+    // Thin objects feel the rounding of coordinates: what it may add the constant takes back, which
+    // leaves the Hessian as it is.
     let value = |slab: &Constraint, x| body.placement().sample(slab, x).value_upper(clearance);
     let excess = points.iter().map(|x| value(&slab, x)).fold(f64::NEG_INFINITY, f64::max) - 1.0;
     if excess > 0.0 {

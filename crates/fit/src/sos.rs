@@ -1,8 +1,8 @@
 //! Points to a set that need not be convex, with its proofs.
 //!
-//! Two ways: the program of a body with convexity relaxed, `p + c |u|^2d` sos-convex in place of p (Ahmadi, Hall, Makadia and
-//! Sindhwani, RSS 2017, section III), and the inverse-moment polynomial (`moment`). Points between others matter as much as
-//! these, so all are used.
+//! Two ways: the program of a body with convexity relaxed, `p + c |u|^2d` sos-convex in place of p
+//! (Ahmadi, Hall, Makadia and Sindhwani, RSS 2017, section III), and the inverse-moment polynomial
+//! (`moment`). Points between others matter as much as these, so all are used.
 
 use super::coordinates::Coordinates;
 use super::generate::{Optimum, generate};
@@ -19,7 +19,8 @@ use std::time::Instant;
 use sublevel_core::body::{Placement, Provenance, Relaxation, SosBody, SosBodyError};
 use sublevel_core::polynomial::{HessianGram, NormPower, Polynomial, SosGram, monomials};
 
-/// How far below 1 all points are left: that is what lets triangles at the outermost points be proven inside.
+/// How far below 1 all points are left: that is what lets triangles at the outermost points be
+/// proven inside.
 const ROOM: f64 = 1e-9;
 
 /// What makes a set that need not be convex.
@@ -27,13 +28,14 @@ const ROOM: f64 = 1e-9;
 pub enum SosMethod {
     /// The least objective, of the Gram matrix P of p, with `p + c |u|^degree` sos-convex.
     Relaxed {
-        /// c > 0; infinity for no bound of convexity at all. For c = 0 there are bodies ([`fit`](super::fit())).
+        /// c > 0; infinity for no bound of convexity at all. For c = 0 there are bodies
+        /// ([`fit`](super::fit())).
         c: f64,
         /// What is minimised: `logdet-p` or `trace-p`.
         objective: Objective,
     },
-    /// `m(x)ᵀ M⁻¹ m(x)` with the moment matrix M of the points, below the smallest level that holds all of them (Lasserre and
-    /// Pauwels, NIPS 2016): a single matrix to invert.
+    /// `m(x)ᵀ M⁻¹ m(x)` with the moment matrix M of the points, below the smallest level that holds
+    /// all of them (Lasserre and Pauwels, NIPS 2016): a single matrix to invert.
     InverseMoment,
 }
 
@@ -103,7 +105,8 @@ impl SosOptions {
     /// Checks the options and the name of a set to be fitted, before any work.
     ///
     /// # Errors
-    /// [`FitError::Degree`], [`FitError::Relaxation`], [`FitError::RelaxedObjective`] or [`FitError::Name`].
+    /// [`FitError::Degree`], [`FitError::Relaxation`], [`FitError::RelaxedObjective`] or
+    /// [`FitError::Name`].
     pub fn check(&self, name: &str) -> Result<(), FitError> {
         let objective = match self.method {
             SosMethod::Relaxed { c, .. } if !(c > 0.0) => return Err(FitError::Relaxation(c)),
@@ -117,9 +120,11 @@ impl SosOptions {
     }
 }
 
-/// Fits an sos-body around `points` (metres), and proves which of the `triangles` between them it contains.
+/// Fits an sos-body around `points` (metres), and proves which of the `triangles` between them it
+/// contains.
 ///
-/// The points end a billionth below the level 1. `progress` hears of every Newton step and can stop the fit; an inverse moment has none.
+/// The points end a billionth below the level 1. `progress` hears of every Newton step and can stop
+/// the fit; an inverse moment has none.
 ///
 /// # Errors
 /// [`FitError`]: bad input by field, a cancelled fit, or what could not be solved or proven and by how much.
@@ -168,7 +173,8 @@ pub fn fit_sos(
     Ok(SosFit { body, report })
 }
 
-/// The least objective with convexity relaxed; of no bound of convexity the points alone keep p from growing.
+/// The least objective with convexity relaxed; of no bound of convexity the points alone keep p
+/// from growing.
 fn relaxed(
     object: &Object,
     whitened: &[Vector3<f64>],

@@ -1,4 +1,5 @@
-//! The objectives as functions of a Gram matrix, and their conjugates as functions of the moment matrix.
+//! The objectives as functions of a Gram matrix, and their conjugates as functions of the moment
+//! matrix.
 //!
 //! A Gram matrix Q measured by `f(Q)` enters the dual of a fit by
 //!
@@ -8,8 +9,8 @@
 //!   f = tr Q⁻¹:      φ = 2 tr X^½       at Q = X^-½,
 //! ```
 //!
-//! concave in X, with the minimiser Q as its gradient. Both are sums over the eigenvalues of X, so that the curvature
-//! follows from divided differences (Daleckii and Krein): with `X = UΛUᵀ`,
+//! concave in X, with the minimiser Q as its gradient. Both are sums over the eigenvalues of X, so
+//! that the curvature follows from divided differences (Daleckii and Krein): with `X = UΛUᵀ`,
 //!
 //! ```text
 //! -D²φ[Δ, Δ] = Σ κ(λᵢ, λⱼ) (UᵀΔU)ᵢⱼ²,   κ = 1/(λᵢλⱼ)   or   κ = 1/(√λᵢ √λⱼ (√λᵢ + √λⱼ)).
@@ -19,7 +20,8 @@ use super::objective::Function;
 use super::structure::Pattern;
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
-/// f, measured in a frame of its own: with T the change of basis into that frame, `P = TᵀQT` and `X = TMTᵀ` (`basis`).
+/// f, measured in a frame of its own: with T the change of basis into that frame, `P = TᵀQT` and `X
+/// = TMTᵀ` (`basis`).
 #[derive(Clone, Debug)]
 pub(super) struct Spectral {
     function: Function,
@@ -43,7 +45,8 @@ impl Spectral {
         self.function == Function::LogDet
     }
 
-    /// `⟨X, Q⟩` at the minimiser Q over the number of rows N: the unit that gaps are measured in, 1 for log dets.
+    /// `⟨X, Q⟩` at the minimiser Q over the number of rows N: the unit that gaps are measured in, 1
+    /// for log dets.
     pub(super) fn size(&self, matrix: &DMatrix<f64>) -> Option<f64> {
         match self.function {
             Function::LogDet => Some(1.0),

@@ -1,8 +1,9 @@
 //! Where to cut an object into pieces that are nearly convex: the search by gain alone.
 //!
-//! What a piece wastes is the part of its convex hull that the object does not fill. The pieces of an object fill the same, so the
-//! best cut of a piece is the one whose two sides have hulls of the least volume together; the best of all pieces is made, again and
-//! again. Planes are tried in many directions and at many heights on a sample of the piece, by hulls of the samples farthest along
+//! What a piece wastes is the part of its convex hull that the object does not fill. The pieces of
+//! an object fill the same, so the best cut of a piece is the one whose two sides have hulls of the
+//! least volume together; the best of all pieces is made, again and again. Planes are tried in many
+//! directions and at many heights on a sample of the piece, by hulls of the samples farthest along
 //! fixed directions; the few that promise most are made and measured exactly.
 
 use super::hull::{principal_axes, rough_volume};
@@ -15,7 +16,8 @@ const HEIGHTS: usize = 15;
 /// Cuts that are measured exactly.
 pub(super) const FINALISTS: usize = 6;
 
-/// Part of a piece's hull that a side must at least have: thinner ones are not worth a part, nor easy to fit.
+/// Part of a piece's hull that a side must at least have: thinner ones are not worth a part, nor
+/// easy to fit.
 pub(super) const LEAST_SHARE: f64 = 1e-3;
 
 /// Longest distance between samples of an edge, relative to the piece.
@@ -62,7 +64,7 @@ impl Partition {
         Self { cuts: Vec::new(), totals: vec![total], pieces: vec![mesh], plans: vec![Best::Unknown] }
     }
 
-    /// Makes the cut that gains most; tells whether there was one.
+    /// Makes the cut that gains most; returns whether there was one.
     pub(super) fn divide(&mut self) -> bool {
         for (piece, best) in self.pieces.iter().zip(&mut self.plans) {
             if let Best::Unknown = best {
@@ -118,7 +120,8 @@ pub(super) struct Promise {
 pub(super) struct Scan {
     /// Subdivisions of the icosahedron whose vertices the samples of a hull are farthest along.
     probes: usize,
-    /// Subdivisions of the one whose vertices are normals; principal axes and those of coordinates alone if none.
+    /// Subdivisions of the one whose vertices are normals; principal axes and those of coordinates
+    /// alone if none.
     normals: Option<usize>,
     /// Heights per normal.
     heights: usize,
@@ -155,7 +158,8 @@ fn along(
     let heights: Vec<f64> = samples.iter().map(|x| normal.dot(x)).collect();
     let (low, high) = heights.iter().fold((f64::MAX, f64::MIN), |(low, high), &h| (low.min(h), high.max(h)));
     let step = (high - low) / (planes + 1) as f64;
-    // For each layer between two planes how far it reaches along each probe, and the sample that does.
+    // For each layer between two planes how far it reaches along each probe, and the sample that
+    // does.
     let nothing = vec![(f64::NEG_INFINITY, 0); reaches.first().map_or(0, Vec::len)];
     let mut layers = vec![nothing.clone(); planes + 1];
     for (sample, height) in heights.iter().enumerate() {

@@ -1,11 +1,12 @@
-//! Which products of basis monomials give which monomial: the index maps of the two Gram matrices of a fit.
+//! Which products of basis monomials give which monomial: the index maps of the two Gram matrices
+//! of a fit.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::collections::HashMap;
 use sublevel_core::polynomial::{Exponents, HessianGram, HessianMonomial, monomials};
 
-/// A symmetric matrix whose entries are grouped by key: entries with one key add up to one coefficient (as a Gram
-/// matrix) or are equal (as a moment matrix).
+/// A symmetric matrix whose entries are grouped by key: entries with one key add up to one
+/// coefficient (as a Gram matrix) or are equal (as a moment matrix).
 #[derive(Clone, Debug)]
 pub(super) struct Pattern {
     /// Rows of the matrix.
@@ -21,7 +22,8 @@ impl Pattern {
         Self { size: basis.len(), keys: index.len(), key: key.collect() }
     }
 
-    /// Gram matrices of polynomials on all monomials up to half their degree; keys are the monomials in their order.
+    /// Gram matrices of polynomials on all monomials up to half their degree; keys are the
+    /// monomials in their order.
     pub(super) fn of_monomials(half_degree: usize) -> Self {
         let index: HashMap<Exponents, usize> = monomials(2 * half_degree).into_iter().zip(0..).collect();
         Self::new(&monomials(half_degree), &index, |a, b| std::array::from_fn(|i| a[i] + b[i]))
@@ -69,11 +71,13 @@ impl Pattern {
         (0..self.size).map(|i| values[self.key(i, i)]).sum()
     }
 
-    /// The matrix of the quadratic form `m -> tr(G M G M)`, `M = spread(m)`, G symmetric: keys x keys.
+    /// The matrix of the quadratic form `m -> tr(G M G M)`, `M = spread(m)`, G symmetric: keys x
+    /// keys.
     pub(super) fn congruence(&self, g: &DMatrix<f64>) -> DMatrix<f64> {
         let n = self.size;
         let mut form = DMatrix::zeros(self.keys, self.keys);
-        // tr(G E_a G E_b) summed over the unit entries of both keys; a pair and its mirror image share a key
+        // tr(G E_a G E_b) summed over the unit entries of both keys; a pair and its mirror image
+        // share a key
         for i in 0..n {
             for j in 0..=i {
                 let mirrored = if i == j { 1.0 } else { 2.0 };
@@ -141,7 +145,8 @@ impl Structure {
         Self { degree, monomials: all, gram, hessian_basis, hessian, derivative }
     }
 
-    /// The maps for even `degree` where nothing is asked of the Hessian: its form has no basis and no keys.
+    /// The maps for even `degree` where nothing is asked of the Hessian: its form has no basis and
+    /// no keys.
     pub(super) fn without_convexity(degree: usize) -> Self {
         let hessian = Pattern { size: 0, keys: 0, key: Vec::new() };
         Self { hessian_basis: Vec::new(), hessian, derivative: Vec::new(), ..Self::new(degree) }

@@ -89,7 +89,8 @@ fn higher_degrees_are_smaller_and_never_below_the_hull() {
     }
 }
 
-/// Feasibility, weak duality and a small gap together prove the optimum, each checked without the solver.
+/// Feasibility, weak duality and a small gap together prove the optimum, each checked without the
+/// solver.
 #[test]
 fn the_optimum_is_feasible_and_its_bound_holds() {
     let points = blob(150);
@@ -120,7 +121,8 @@ fn the_optimum_is_feasible_and_its_bound_holds() {
             let (left, right) = (y.dot(&(polynomial.evaluate(z).hessian * y)), w.dot(&(&optimum.hessian * &w)));
             assert!((left - right).abs() < 1e-5 * left.abs().max(1.0), "{left} {right}");
         }
-        // -log det P at the optimum, against a feasible polynomial Σ wⱼ |z|²ʲ with its diagonal Gram matrix
+        // -log det P at the optimum, against a feasible polynomial Σ wⱼ |z|²ʲ with its diagonal
+        // Gram matrix
         let objective = optimum.objective;
         let mut simple = f64::INFINITY;
         for share in [0.2, 0.4, 0.6] {
@@ -141,7 +143,8 @@ fn the_optimum_is_feasible_and_its_bound_holds() {
     }
 }
 
-/// Every objective at every degree it has: optimal by its own gap, proven, and least among all bodies in its own measure.
+/// Every objective at every degree it has: optimal by its own gap, proven, and least among all
+/// bodies in its own measure.
 #[test]
 fn objectives_are_optimal_and_proven() {
     let points = blob(150);
@@ -160,8 +163,9 @@ fn objectives_are_optimal_and_proven() {
     assert_eq!(error, FitError::Objective { objective: Objective::TraceH, degree: 8 });
 }
 
-/// At degree 2 with p a sum of squares, `tr H⁻¹` is half the sum of the squared semi-axes of the ellipsoid, and `log det H`
-/// its volume: closed forms for a cuboid's corners a, where the least sum of squares is (Σ aᵢ)².
+/// At degree 2 with p a sum of squares, `tr H⁻¹` is half the sum of the squared semi-axes of the
+/// ellipsoid, and `log det H` its volume: closed forms for a cuboid's corners a, where the least
+/// sum of squares is (Σ aᵢ)².
 #[test]
 fn hessian_objectives_at_degree_two_have_closed_forms() {
     let half = Vector3::new(1.0, 2.0, 0.5);
@@ -231,7 +235,8 @@ fn the_gradient_of_the_volume_agrees_with_differences() {
         let difference = (at(&(&coefficients + &step)) - at(&(&coefficients - &step))) / 2e-5;
         assert!((difference - expansion.gradient[i]).abs() < 1e-7, "{i}: {difference} {}", expansion.gradient[i]);
     }
-    // the ball |z|⁴ <= 1 has 4π/3, and scaled by 1 + ε in p the second derivative of (1 + ε)^(-3/4) times it
+    // the ball |z|⁴ <= 1 has 4π/3, and scaled by 1 + ε in p the second derivative of (1 + ε)^(-3/4)
+    // times it
     let ball =
         coefficients.map_with_location(|i, _, c| if structure.monomials[i].iter().sum::<u8>() == 4 { c } else { 0.0 });
     let p = volume::polynomial(&structure, &ball).unwrap();
@@ -264,7 +269,7 @@ fn refinement_is_monotone_contains_the_points_and_is_proven() {
 #[test]
 fn refits_of_a_stream_take_fewer_steps_and_end_where_fits_do() {
     let shape = blob(300);
-    let (mut anew, mut on) = (0, 0);
+    let (mut again, mut on) = (0, 0);
     let mut last: Option<Fit> = None;
     for frame in 0..8 {
         // It bends and swells a little from frame to frame.
@@ -277,12 +282,12 @@ fn refits_of_a_stream_take_fewer_steps_and_end_where_fits_do() {
         refit.body.prove_contains(&points).unwrap();
         let ratio = refit.report.volume_m3 / fit.report.volume_m3;
         assert!((ratio - 1.0).abs() < 1e-4, "frame {frame}: {ratio}");
-        anew += fit.report.iterations;
+        again += fit.report.iterations;
         on += refit.report.iterations;
         last = Some(refit);
     }
-    println!("{anew} steps anew, {on} from the body before");
-    assert!(on < anew * 3 / 4, "{on} {anew}");
+    println!("{again} steps again, {on} from the body before");
+    assert!(on < again * 3 / 4, "{on} {again}");
     // A body that has nothing to do with the points does no harm.
     let elsewhere = fitted(&cube(1.0), 2);
     let options = FitOptions { degree: 4, ..FitOptions::default() };

@@ -12,7 +12,8 @@ use std::ops::ControlFlow;
 /// Degree of the bodies by which points stand out.
 const DEGREE: usize = 4;
 
-/// How often points are left out, about as many each time: those that an outlier hid stand out once it is gone.
+/// How often points are left out, about as many each time: those that an outlier hid stand out once
+/// it is gone.
 const ROUNDS: usize = 5;
 
 /// Points with a larger value of the polynomial touch the body.
@@ -32,9 +33,10 @@ pub struct Trimmed {
     pub farthest_m: f64,
 }
 
-/// Leaves out that fraction of the points, rounded down: again and again the outermost as the smallest body of degree 4 around those
-/// that are left sees them, the ones with the largest values of its polynomial. Of those that touch it, the ones that stand apart from
-/// all others go first. It follows the points through affine maps.
+/// Leaves out that fraction of the points, rounded down: again and again the outermost as the
+/// smallest body of degree 4 around those that are left sees them, the ones with the largest values
+/// of its polynomial. Of those that touch it, the ones that stand apart from all others go first.
+/// It follows the points through affine maps.
 ///
 /// # Errors
 /// [`FitError::Trim`] for a fraction outside [0, 0.5], and as [`fit`](super::fit()).
@@ -59,7 +61,8 @@ pub fn trim(
         let object = Object::new("trim", &kept, "")?;
         let levels = object.levels(DEGREE, &mut watch)?;
         let leverages = leverages(&kept.iter().map(|x| object.whiten(x)).collect::<Vec<_>>())?;
-        // Few points touch on all sides of a cluster as on all sides of a body: their levels are the same but for rounding.
+        // Few points touch on all sides of a cluster as on all sides of a body: their levels are
+        // the same but for rounding.
         let outward = |i: usize| if levels[i] > TOUCHES { (true, leverages[i]) } else { (false, levels[i]) };
         let compare = |a: (bool, f64), b: (bool, f64)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1));
         let mut order: Vec<usize> = (0..kept.len()).collect();
@@ -80,8 +83,8 @@ pub fn trim(
     Ok(Trimmed { kept, left_out, farthest_m })
 }
 
-/// Squared distance of every point from the mean of all, in the metric of their covariance (Mahalanobis): what stands apart from a
-/// crowd has much, the crowd little, wherever it lies.
+/// Squared distance of every point from the mean of all, in the metric of their covariance
+/// (Mahalanobis): what stands apart from a crowd has much, the crowd little, wherever it lies.
 fn leverages(points: &[Vector3<f64>]) -> Result<Vec<f64>, ProgramError> {
     let mean = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
     let scatter: Matrix3<f64> = points.iter().map(|x| (x - mean) * (x - mean).transpose()).sum();
@@ -122,7 +125,8 @@ mod tests {
     #[test]
     fn strays_are_the_first_to_go() {
         let points = scan(20);
-        // A few more than there are strays: each round takes about as many, and the first can not see all.
+        // A few more than there are strays: each round takes about as many, and the first cannot
+        // see all.
         let found = trim(&points, 60.0 / points.len() as f64, &mut unwatched).unwrap();
         assert_eq!((found.left_out.len(), found.kept.len()), (60, points.len() - 60));
         assert!(found.kept.iter().all(|x| x.norm() < 0.7), "a stray stays");

@@ -17,8 +17,8 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use sublevel_core::body::{boundary_radius, sphere_rule};
 use sublevel_core::polynomial::{Polynomial, PolynomialError};
 
-/// Rings of rays: 2 x 36² = 2592 of them. Not the number that bodies are measured with, so that a refinement that exploits
-/// the errors of one rule shows in the other.
+/// Rings of rays: 2 x 36² = 2592 of them. Not the number that bodies are measured with, so that a
+/// refinement that exploits the errors of one rule shows in the other.
 const RINGS: usize = 36;
 
 /// Volume, gradient and curvature with respect to the coefficients.

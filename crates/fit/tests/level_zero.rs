@@ -27,7 +27,8 @@ type Terms = BTreeMap<Exponents, f64>;
 
 const ONE: Exponents = [0; 3];
 
-/// Distance of the bodies, metres; about 1e-8 of their size exact. None if the program could not be solved.
+/// Distance of the bodies, metres; about 1e-8 of their size exact. None if the program could not be
+/// solved.
 pub(crate) fn distance((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose)) -> Option<f64> {
     let unit = a.circumscribed().radius.max(b.circumscribed().radius);
     let mut program = Program::default();
@@ -58,8 +59,8 @@ pub(crate) fn distance((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose))
     program.solve(1.0).map(|value| -value * unit)
 }
 
-/// Level distance `d(A‖B)`; about 1e-8 of `max(1, |d|)` exact where bodies are of similar size and not far apart. None if the
-/// program could not be solved.
+/// Level distance `d(A‖B)`; about 1e-8 of `max(1, |d|)` exact where bodies are of similar size and
+/// not far apart. None if the program could not be solved.
 pub(crate) fn level_distance((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose)) -> Option<f64> {
     // World coordinates about A's translation, in which z_i = L_i (x - c_i).
     let place = |body: &Body, pose: &Pose| {
@@ -68,8 +69,9 @@ pub(crate) fn level_distance((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &
         (body.normalization().linear * turn.transpose(), center)
     };
     let ((l_a, c_a), (l_b, c_b)) = (place(a, pose_a), place(b, pose_b));
-    // Coordinates in which both are about round where they are nearest: w = F (x - c), FᵀF = L_AᵀL_A + L_BᵀL_B, c on the way from
-    // B's centre to the minimiser of |z_A|² + |z_B|² as far as |z_B| <= 1. B's coefficients then are of size 1 and A's of the value's.
+    // Coordinates in which both are about round where they are nearest: w = F (x - c), FᵀF =
+    // L_AᵀL_A + L_BᵀL_B, c on the way from B's centre to the minimiser of |z_A|² + |z_B|² as far as
+    // |z_B| <= 1. B's coefficients then are of size 1 and A's of the value's.
     let (w_a, w_b) = (l_a.transpose() * l_a, l_b.transpose() * l_b);
     let factor = (w_a + w_b).cholesky()?;
     let way = factor.solve(&(w_a * c_a + w_b * c_b)) - c_b;
@@ -141,7 +143,8 @@ fn substituted(g: &Terms, map: &Matrix3<f64>, origin: &Vector3<f64>) -> Terms {
     result
 }
 
-/// A conic program under construction: rows `A x + s = b` with s in a cone, grouped by cone at the end.
+/// A conic program under construction: rows `A x + s = b` with s in a cone, grouped by cone at the
+/// end.
 #[derive(Default)]
 struct Program {
     objective: Vec<f64>,
@@ -150,7 +153,8 @@ struct Program {
     nonnegative: Vec<usize>,
     /// Variables of a unit ball.
     ball: Vec<usize>,
-    /// First variable and size of each semidefinite matrix, held as the scaled upper triangle by columns.
+    /// First variable and size of each semidefinite matrix, held as the scaled upper triangle by
+    /// columns.
     semidefinite: Vec<(usize, usize)>,
 }
 
@@ -174,8 +178,8 @@ impl Program {
         self.ball = variables.to_vec();
     }
 
-    /// The polynomial with these coefficients, linear in the variables, is `mᵀ Q m` with Q positive semidefinite and m all
-    /// monomials of half the degree.
+    /// The polynomial with these coefficients, linear in the variables, is `mᵀ Q m` with Q positive
+    /// semidefinite and m all monomials of half the degree.
     fn sum_of_squares(&mut self, mut rows: BTreeMap<Exponents, Vec<(usize, f64)>>, degree: usize) {
         let basis = monomials(degree / 2);
         let first = self.objective.len();

@@ -5,7 +5,8 @@ use sublevel_core::body::Body;
 use sublevel_fit::{FitOptions, ReadOptions, RefinementEnd, fit, read_mesh};
 use sublevel_testkit::data;
 
-/// Mesh number, volume of the convex hull and vertices of it, volumes of the -log det P fits at degrees 2, 4, 6.
+/// Mesh number, volume of the convex hull and vertices of it, volumes of the -log det P fits at
+/// degrees 2, 4, 6.
 const TABLE: [(u32, f64, usize, [f64; 3]); 5] = [
     (10, 0.2936, 364, [0.5894, 0.4553, 0.3911]),
     (101, 0.6558, 320, [1.8425, 1.2200, 0.9665]),
@@ -42,7 +43,8 @@ fn check(row: usize) {
     }
 }
 
-/// Volumes after refinement that an independent program reached at degrees 4 and 6, in the order of the table.
+/// Volumes after refinement that an independent program reached at degrees 4 and 6, in the order of
+/// the table.
 const REFINED: [[f64; 2]; 5] =
     [[0.4414, 0.3823], [1.1671, 0.9331], [0.5088, 0.4357], [1.0947, 1.0233], [0.8134, 0.6396]];
 

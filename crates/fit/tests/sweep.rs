@@ -1,4 +1,5 @@
-//! Fits of every mesh of the test data and of clouds of points that break fits: a proven body, or an error with the reason.
+//! Fits of every mesh of the test data and of clouds of points that break fits: a proven body, or
+//! an error with the reason.
 
 use nalgebra::Vector3;
 use std::ops::ControlFlow;

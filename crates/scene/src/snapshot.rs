@@ -45,7 +45,8 @@ pub enum NameError {
     Control,
 }
 
-/// Checks that a name of a scene or object is usable: 1 to [`MAX_NAME_BYTES`] bytes, no control characters.
+/// Checks that a name of a scene or object is usable: 1 to [`MAX_NAME_BYTES`] bytes, no control
+/// characters.
 ///
 /// # Errors
 /// The first rule the name breaks.
@@ -71,8 +72,8 @@ impl Scene {
         Ok(Self { name: name.into(), revision, objects: BTreeMap::new(), allowed: Arc::default() })
     }
 
-    /// A scene as it was stored. The caller vouches that the names are usable and that every allowed pair is made of two
-    /// of the objects; objects are told apart by their names.
+    /// A scene as it was stored. The caller vouches that the names are usable and that every
+    /// allowed pair is made of two of the objects; objects are distinguished by their names.
     pub fn restored(
         name: Arc<str>,
         revision: u64,
@@ -110,7 +111,8 @@ impl Scene {
         self.allowed.iter()
     }
 
-    /// Whether the allowed pairs are untouched since `before`, an earlier snapshot of this scene. Takes no time.
+    /// Whether the allowed pairs are untouched since `before`, an earlier snapshot of this scene.
+    /// Takes no time.
     pub fn same_allowed_pairs(&self, before: &Self) -> bool {
         Arc::ptr_eq(&self.allowed, &before.allowed)
     }

@@ -23,8 +23,8 @@ pub struct Placement {
     pub group: Arc<str>,
 }
 
-/// A set of changes that happen together. An object may be named once over `upserts`, `poses` and `removals`, so that
-/// the order in which they are applied does not matter.
+/// A set of changes that happen together. An object may be named once over `upserts`, `poses` and
+/// `removals`, so that the order in which they are applied does not matter.
 #[derive(Debug, Clone, Default)]
 pub struct Update {
     /// When set, the update is for this revision only.
@@ -65,7 +65,7 @@ pub struct Entry {
     pub index: usize,
 }
 
-/// Why an update can not be applied. The scene is as it was.
+/// Why an update cannot be applied. The scene is as it was.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SceneError {
     /// Somebody else changed the scene first.
@@ -76,7 +76,7 @@ pub enum SceneError {
         /// Where the scene is.
         current: u64,
     },
-    /// A name can not be stored.
+    /// A name cannot be stored.
     #[error("name {error}")]
     Name {
         /// Where.
@@ -84,7 +84,7 @@ pub enum SceneError {
         /// The rule it breaks.
         error: NameError,
     },
-    /// A group label can not be stored.
+    /// A group label cannot be stored.
     #[error("group is longer than {MAX_NAME_BYTES} bytes or holds a control character; shorten it")]
     Group {
         /// Where.
@@ -166,11 +166,11 @@ impl Update {
 }
 
 impl Scene {
-    /// The next snapshot: this one with all of `update` applied and the revision grown by one; a plain copy when the
-    /// update is empty. `bodies` looks a body up by its id.
+    /// The next snapshot: this one with all of `update` applied and the revision grown by one; a
+    /// plain copy when the update is empty. `bodies` looks a body up by its id.
     ///
     /// # Errors
-    /// The first entry that can not be applied; then nothing is.
+    /// The first entry that cannot be applied; then nothing is.
     pub fn updated(&self, update: &Update, bodies: impl Fn(&BodyId) -> Option<Arc<Body>>) -> Result<Self, SceneError> {
         if let Some(expected) = update.expected_revision
             && expected != self.revision

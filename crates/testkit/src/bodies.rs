@@ -28,7 +28,8 @@ pub fn c(degree: u8, radius: f64, half_height: f64) -> Body {
         terms.push(([2 * i as u8, 2 * (half - i) as u8, 0], binomial(half, i)));
     }
     terms.push(([0, 0, degree], 1.0));
-    // The Hessian form of |u|^2k, u = (x, y), is 2k |u|^(2k-2) |w|² + 4k(k-1) |u|^(2k-4) (u·w)²: definite on w_i u^e.
+    // The Hessian form of |u|^2k, u = (x, y), is 2k |u|^(2k-2) |w|² + 4k(k-1) |u|^(2k-4) (u·w)²:
+    // definite on w_i u^e.
     let basis: Vec<_> = (0..2)
         .flat_map(|d| (0..half).map(move |i| (d, [i as u8, (half - 1 - i) as u8, 0])))
         .chain([(2, [0, 0, degree / 2 - 1])])
@@ -59,7 +60,8 @@ pub fn c(degree: u8, radius: f64, half_height: f64) -> Body {
     Body::new(&format!("C{degree}"), Normalization { center: Vector3::zeros(), linear }, vec![constraint]).unwrap()
 }
 
-/// P2k: `Σ (a_i·x)^degree <= 1` with the a_i along the axes and the diagonals of a cube, of the given half-width.
+/// P2k: `Σ (a_i·x)^degree <= 1` with the a_i along the axes and the diagonals of a cube, of the
+/// given half-width.
 pub fn p(degree: u8, size: f64) -> Body {
     let third = 1.0 / 3.0_f64.sqrt();
     let mut directions = vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -103,8 +105,8 @@ pub fn cylinder(radius: f64, half_height: f64) -> Body {
     Body::cylinder("cylinder", radius, half_height).unwrap()
 }
 
-/// A definite Gram matrix from a semidefinite one: alternating projections onto the matrices of the form and onto those with
-/// eigenvalues above a floor.
+/// A definite Gram matrix from a semidefinite one: alternating projections onto the matrices of the
+/// form and onto those with eigenvalues above a floor.
 fn certified(terms: Vec<(Exponents, f64)>, basis: Vec<HessianMonomial>, mut matrix: DMatrix<f64>) -> Constraint {
     let polynomial = Polynomial::new(terms).unwrap();
     let floor = 1e-3 * matrix.trace() / matrix.nrows() as f64;
@@ -129,8 +131,8 @@ fn binomial(n: usize, k: usize) -> f64 {
     factorial(n) / (factorial(k) * factorial(n - k))
 }
 
-/// Support function `max n·x` in the body frame in closed form, for E, Q2k, C2k, boxes and cylinders about their origin: the
-/// norm dual to the body's own.
+/// Support function `max n·x` in the body frame in closed form, for E, Q2k, C2k, boxes and
+/// cylinders about their origin: the norm dual to the body's own.
 pub fn support(body: &Body, n: &Vector3<f64>) -> f64 {
     let sizes = body.normalization().linear.diagonal().map(|l| 1.0 / l);
     let m = n.component_mul(&sizes).abs();
@@ -148,8 +150,8 @@ pub fn support(body: &Body, n: &Vector3<f64>) -> f64 {
     }
 }
 
-/// Fitted bodies: a chair and a human at degrees 2, 4 and 6, as `sublevel-fit` makes them of its sample shapes (a test there
-/// compares). Reading them proves them again.
+/// Fitted bodies: a chair and a human at degrees 2, 4 and 6, as `sublevel-fit` makes them of its
+/// sample shapes (a test there compares). Reading them proves them again.
 pub fn fitted() -> &'static [Body] {
     static BODIES: OnceLock<Vec<Body>> = OnceLock::new();
     BODIES.get_or_init(|| {

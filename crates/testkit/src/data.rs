@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-/// A file or folder of the test data. Tests that need it are ignored unless asked for, with this reason: `needs SUBLEVEL_DATA`.
+/// A file or folder of the test data. Tests that need it are ignored unless asked for, with this
+/// reason: `needs SUBLEVEL_DATA`.
 ///
 /// # Panics
 /// Where `SUBLEVEL_DATA` does not name the folder.

@@ -1,5 +1,5 @@
-//! What tests and benches of several crates share: seeded draws, the bodies of the stability catalogue as plain data, and
-//! references of 200 bits. Not published.
+//! What tests and benches of several crates share: seeded draws, the bodies of the stability
+//! catalogue as plain data, and references of 200 bits. Not published.
 
 #![allow(missing_docs, unreachable_pub)]
 

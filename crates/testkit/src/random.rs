@@ -3,7 +3,8 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use sublevel_core::measure::Pose;
 
-/// Number of random queries: `few`, or where `SUBLEVEL_LONG` is set 1e5, or what it says if that is a number above 1.
+/// Number of random queries: `few`, or where `SUBLEVEL_LONG` is set 1e5, or what it says if that is
+/// a number above 1.
 pub fn draws(few: u64) -> u64 {
     match std::env::var("SUBLEVEL_LONG").map(|value| value.parse()) {
         Err(_) => few,
@@ -12,8 +13,8 @@ pub fn draws(few: u64) -> u64 {
     }
 }
 
-/// The seeds of that many draws from `first` on and some that have failed before, or those that `SUBLEVEL_SEEDS` lists, with commas,
-/// to replay them.
+/// The seeds of that many draws from `first` on and some that have failed before, or those that
+/// `SUBLEVEL_SEEDS` lists, with commas, to replay them.
 pub fn seeds(first: u64, few: u64, failed: &[u64]) -> Vec<u64> {
     match std::env::var("SUBLEVEL_SEEDS") {
         Err(_) => failed.iter().copied().chain(first..first + draws(few)).collect(),
@@ -107,7 +108,8 @@ pub fn turned(from: &Pose, by: Vector3<f64>) -> Pose {
     pose(*from.translation(), &(UnitQuaternion::from_scaled_axis(by) * from.rotation()))
 }
 
-/// The pose after `step` along component k of the twists `(v_a, ω_a, v_b, ω_b)`, for the body whose twist starts at `first`.
+/// The pose after `step` along component k of the twists `(v_a, ω_a, v_b, ω_b)`, for the body whose
+/// twist starts at `first`.
 pub fn twisted(from: &Pose, k: usize, first: usize, step: f64) -> Pose {
     let along = |axis: usize| Vector3::from_fn(|i, _| if i == axis { step } else { 0.0 });
     match k.checked_sub(first) {

@@ -75,7 +75,7 @@ pub(in crate::cli) fn order_of_group(args: &FitArgs, name: &str, obstacles: &[Ob
     FitOrder { name: name.to_owned(), degree: args.degree, group: Some(group), ..FitOrder::default() }
 }
 
-/// An order that can be carried out, or the argument that can not be used, and why.
+/// An order that can be carried out, or the argument that cannot be used, and why.
 pub(in crate::cli) fn checked(order: FitOrder) -> Result<FitOrder, String> {
     check("", &order).map_err(|error| match error.field {
         "name" | "input" | "group.body_ids" => error.why,

@@ -8,7 +8,8 @@ use indicatif::ProgressBar;
 use nalgebra::Vector3;
 use std::error::Error;
 
-/// Has the server carry out an order about points (metres) and the triangles between them, or about bodies that it has. Ctrl-C cancels.
+/// Has the server carry out an order about points (metres) and the triangles between them, or about
+/// bodies that it has. Ctrl-C cancels.
 pub(in crate::cli) fn carry_out(
     url: &str,
     order: &FitOrder,

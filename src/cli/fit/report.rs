@@ -37,7 +37,8 @@ pub(super) struct Convex {
     objective: String,
     refined: bool,
     points: usize,
-    /// Points that were trimmed, and the largest distance of one of them from the hull of the others.
+    /// Points that were trimmed, and the largest distance of one of them from the hull of the
+    /// others.
     left_out: usize,
     left_out_m: f64,
     #[serde(flatten)]
@@ -47,7 +48,8 @@ pub(super) struct Convex {
     volume_m3: f64,
     volume_error_m3: f64,
     hull_volume_m3: f64,
-    /// Proven bound of the distance of any point of the body from the hull, of a compound from the hulls of its pieces.
+    /// Proven bound of the distance of any point of the body from the hull, of a compound from the
+    /// hulls of its pieces.
     gap_m: f64,
     /// Mean over directions of how much farther the body reaches than the hull; none for compounds.
     mean_gap_m: Option<f64>,
@@ -145,7 +147,7 @@ pub(super) fn write(
     Ok(rows)
 }
 
-/// How the file of a body is told from others of its object.
+/// How the file of a body is distinguished from others of its object.
 fn kind(body: &Body, took: &FittedBody) -> String {
     match (&took.optimum, body.constraints().len() - 1) {
         (None, _) => "ball".to_owned(),

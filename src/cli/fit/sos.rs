@@ -18,7 +18,8 @@ pub(super) struct Row {
     /// c; none where nothing bounds convexity.
     relax_convexity: Option<f64>,
     pub(super) points: usize,
-    /// Points that were trimmed, and the largest distance of one of them from the hull of the others.
+    /// Points that were trimmed, and the largest distance of one of them from the hull of the
+    /// others.
     left_out: usize,
     left_out_m: f64,
     #[serde(flatten)]

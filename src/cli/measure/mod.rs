@@ -13,13 +13,16 @@ use std::path::PathBuf;
 
 /// Measure distances between two bodies or compounds, without a server
 ///
-/// Prints the Euclidean distance and both level distances d(A‖B) = min p_A on B and d(B‖A), each with its proven bracket,
-/// for one relative pose or for each pose of a file. Successive poses of a trajectory are warm-started.
+/// Prints the Euclidean distance and both level distances d(A‖B) = min p_A on B and d(B‖A), each
+/// with its proven bracket, for one relative pose or for each pose of a file. Successive poses of a
+/// trajectory are warm-started.
 ///
-/// A pose maps the frame of B into the frame of A; witnesses and normal are in A's frame, metres, the normal from B to A
-/// (none on overlap). With --json the convex hulls of the objects have a bracket, too, where the bodies' gaps are known: their
-/// distance is at least distance_lower_m and at most hulls_distance_upper_m (of a compound it is the hulls of its pieces). Level distances are above 1 apart, 1 touching, below 1 overlapping, and use the polynomials as they
-/// are stored: 'show' tells their minimum.
+/// A pose maps the frame of B into the frame of A; witnesses and normal are in A's frame, metres,
+/// the normal from B to A (none on overlap). With --json the convex hulls of the objects have a
+/// bracket, too, where the bodies' gaps are known: their distance is at least distance_lower_m and
+/// at most hulls_distance_upper_m (of a compound it is the hulls of its pieces). Level distances
+/// are above 1 apart, 1 touching, below 1 overlapping, and use the polynomials as they are stored:
+/// 'show' prints their minimum.
 ///
 /// Example: sublevel measure a.json b.json --pose 0.5,0,0,0,0,0,1
 #[derive(Debug, clap::Args)]
@@ -31,7 +34,8 @@ pub(super) struct MeasureArgs {
     /// Pose of B in A's frame: translation (m) and quaternion [default: identity]
     #[arg(long, value_name = "X,Y,Z,QX,QY,QZ,QW", allow_hyphen_values = true, conflicts_with = "poses")]
     pose: Option<String>,
-    /// File of poses of B in A's frame, one a line: r00 r01 r02 r10 .. r22 tx ty tz; a blank line starts a new trajectory
+    /// File of poses of B in A's frame, one a line: r00 r01 r02 r10 .. r22 tx ty tz; a blank line
+    /// starts a new trajectory
     #[arg(long, value_name = "FILE")]
     poses: Option<PathBuf>,
     /// Width asked of the brackets: relative to the smaller body's circumradius, and to max(1, |d|)
@@ -40,9 +44,9 @@ pub(super) struct MeasureArgs {
     /// Print one JSON object a line instead of a table
     #[arg(long)]
     json: bool,
-    /// Print instead one JSON object of nanoseconds per query, cold and warm, and of distances in batches of up to 1024 poses:
-    /// medians of 9 passes over the poses, everything a JSON line holds included; warm starts are cold at each trajectory.
-    /// 'level' is d(A‖B)
+    /// Print instead one JSON object of nanoseconds per query, cold and warm, and of distances in
+    /// batches of up to 1024 poses: medians of 9 passes over the poses, everything a JSON line
+    /// holds included; warm starts are cold at each trajectory. 'level' is d(A‖B)
     #[arg(long)]
     time: bool,
 }
@@ -54,8 +58,8 @@ struct Line {
     distance_m: f64,
     distance_lower_m: f64,
     distance_upper_m: f64,
-    /// Of the distance of the convex hulls of the objects, if both bodies tell how far they reach beyond them; of the lower bound
-    /// it is the same.
+    /// Of the distance of the convex hulls of the objects, if both bodies tell how far they reach
+    /// beyond them; of the lower bound it is the same.
     hulls_distance_upper_m: Option<f64>,
     level_ab: f64,
     level_ab_lower: Option<f64>,

@@ -129,8 +129,8 @@ fn find(catalogue: &Catalogue, id: u64) -> Result<Arc<Job>, Status> {
     catalogue.job(id).ok_or_else(|| error::catalogue(&CatalogueError::NoJob(id.to_string()), "id"))
 }
 
-/// Sends the job as it stands whenever it has changed, until it has ended or nobody listens. A message is made when there is
-/// room for it, so who reads slowly gets the latest.
+/// Sends the job as it stands whenever it has changed, until it has ended or nobody listens. A
+/// message is made when there is room for it, so who reads slowly gets the latest.
 async fn watch(ready: Ready, jobs: Jobs, id: u64, sender: mpsc::Sender<Result<WatchFitResponse, Status>>) {
     let (mut news, mut sent) = (jobs.news(), None);
     while let Ok(room) = sender.reserve().await {

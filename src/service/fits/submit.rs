@@ -40,7 +40,7 @@ pub enum SubmitError {
     Gone(Box<Status>),
     /// The connection broke while the job was under way.
     #[error(
-        "lost the server while it fitted job {id}, which goes on there when it is back: {} ({:?}); GetFit tells how it ended",
+        "lost the server while it fitted job {id}, which goes on there when it is back: {} ({:?}); GetFit says how it ended",
         .status.message(),
         .status.code()
     )]
@@ -50,14 +50,14 @@ pub enum SubmitError {
         /// What went wrong.
         status: Box<Status>,
     },
-    /// What was sent can not be fitted.
+    /// What was sent cannot be fitted.
     #[error("{0}")]
     Failed(String),
     /// The job was cancelled, here or by another client.
     #[error("the fit was cancelled")]
     Cancelled,
     /// The server sent something that is not what the job makes.
-    #[error("the server sent what can not be proven: {0}; are the versions the same?")]
+    #[error("the server sent what cannot be proven: {0}; are the versions the same?")]
     Unproven(String),
 }
 
@@ -67,9 +67,9 @@ impl From<BodyFileError> for SubmitError {
     }
 }
 
-/// Has a server carry out an order about points (metres) and the triangles between them, or about a group of bodies that it has;
-/// fetches what it made and proves it anew. `tell` hears of the job whenever it has changed; when `cancel` resolves, the job is
-/// cancelled.
+/// Has a server carry out an order about points (metres) and the triangles between them, or about a
+/// group of bodies that it has; fetches what it made and proves it again. `tell` hears of the job
+/// whenever it has changed; when `cancel` resolves, the job is cancelled.
 ///
 /// # Errors
 /// [`SubmitError`].

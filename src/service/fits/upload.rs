@@ -1,4 +1,5 @@
-//! The stream of a CreateFit call: the header, then points and triangles, a mesh file in pieces, or nothing.
+//! The stream of a CreateFit call: the header, then points and triangles, a mesh file in pieces, or
+//! nothing.
 
 use nalgebra::Vector3;
 use tonic::{Status, Streaming};
@@ -29,7 +30,7 @@ enum Content {
     Group,
 }
 
-/// Reads the stream to its end, refusing what can not be used as soon as it comes.
+/// Reads the stream to its end, refusing what cannot be used as soon as it comes.
 pub(super) async fn receive(mut stream: Streaming<CreateFitRequest>) -> Result<Upload, Status> {
     let missing = || Invalid::new("header", "is missing; send it in the first message");
     let first = stream.message().await?.and_then(|message| message.part);

@@ -38,7 +38,8 @@ pub(super) fn job(job: &Job, progress: Option<Progress>) -> FitJob {
         state: state.into(),
         attempts: *attempts,
         failure: failure.to_owned(),
-        // The worker may not have told yet of the job it has begun, or of the one that was cancelled.
+        // The worker may not have reported yet of the job it has begun, or of the one that was
+        // cancelled.
         progress: (state == FitState::Running).then(|| progress_message(progress.unwrap_or_default())),
         result,
     }

@@ -1,5 +1,5 @@
-//! The jobs of the catalogue. Their points stay on disk until somebody fits them, and go when the job has ended; a file that it made
-//! stays there until the job is forgotten.
+//! The jobs of the catalogue. Their points stay on disk until somebody fits them, and go when the
+//! job has ended; a file that it made stays there until the job is forgotten.
 
 use std::sync::Arc;
 
@@ -26,7 +26,8 @@ impl Catalogue {
         self.read(|state| state.jobs.values().find(|job| job.state == *wanted).cloned())
     }
 
-    /// The points of a job that has not ended, metres, and the triangles between them; none of either for groups.
+    /// The points of a job that has not ended, metres, and the triangles between them; none of
+    /// either for groups.
     ///
     /// # Errors
     /// When it has ended, or when the disk fails.
@@ -43,12 +44,12 @@ impl Catalogue {
         Ok(self.writer()?.file(id)?)
     }
 
-    /// Queues a job. The one that was there first when the request id is known; tells whether it is new. The oldest of too
-    /// many jobs that have ended is forgotten.
+    /// Queues a job. The one that was there first when the request id is known; returns whether it
+    /// is new. The oldest of too many jobs that have ended is forgotten.
     ///
     /// # Errors
-    /// When the request id was used for another content, when it is about a body that is not there, when too many jobs wait, or when
-    /// the disk fails.
+    /// When the request id was used for another content, when it is about a body that is not there,
+    /// when too many jobs wait, or when the disk fails.
     pub fn create_job(&self, new: NewJob) -> Result<(Arc<Job>, bool), CatalogueError> {
         let mut store = self.writer()?;
         let NewJob { request_id, digest, order, points, coordinates, corners } = new;
@@ -90,8 +91,9 @@ impl Catalogue {
         Ok((job, true))
     }
 
-    /// Moves a job on to the state and number of attempts that `change` says, storing its bodies, or the file of what is no body, along
-    /// with that; `None` leaves all as it is. Returns the job as it is then. A job that ends loses its points.
+    /// Moves a job on to the state and number of attempts that `change` says, storing its bodies,
+    /// or the file of what is no body, along with that; `None` leaves all as it is. Returns the job
+    /// as it is then. A job that ends loses its points.
     ///
     /// # Errors
     /// When there is no such job, or when the disk fails.

@@ -1,4 +1,5 @@
-//! Jobs on disk: what is acknowledged is there, what has ended is forgotten in time, and no id is given twice.
+//! Jobs on disk: what is acknowledged is there, what has ended is forgotten in time, and no id is
+//! given twice.
 
 use nalgebra::Vector3;
 

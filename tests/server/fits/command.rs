@@ -20,7 +20,8 @@ fn write_points(file: &Path, count: usize) {
     std::fs::write(file, text).expect("written");
 }
 
-/// Runs `sublevel fit` and returns its rows without what differs from run to run: times, and the folder.
+/// Runs `sublevel fit` and returns its rows without what differs from run to run: times, and the
+/// folder.
 fn rows(args: &[&str]) -> Vec<Value> {
     let done = run(&[&["fit"][..], args, &["--json"]].concat());
     assert!(done.status.success(), "{args:?}: {}", String::from_utf8_lossy(&done.stderr));
@@ -107,9 +108,9 @@ async fn the_command_says_what_went_wrong_and_ctrl_c_cancels() {
     write_points(&file, 400);
     let (out, url) = (dir.path().join("out"), server.url());
     let (flat, file, out) = (flat.to_str().expect("text"), file.to_str().expect("text"), out.to_str().expect("text"));
-    let told = run(&["fit", file, "--out", out, "--server", &url, "--parts", "2"]);
-    let stderr = String::from_utf8_lossy(&told.stderr);
-    assert!(!told.status.success() && stderr.contains("no triangles"), "{stderr}");
+    let message = run(&["fit", file, "--out", out, "--server", &url, "--parts", "2"]);
+    let stderr = String::from_utf8_lossy(&message.stderr);
+    assert!(!message.status.success() && stderr.contains("no triangles"), "{stderr}");
     for (url, word) in [(url.as_str(), "coplanar"), ("http://127.0.0.1:1", "sublevel serve"), ("no url", "--server")] {
         let refused = run(&["fit", flat, "--out", out, "--server", url]);
         let stderr = String::from_utf8_lossy(&refused.stderr);

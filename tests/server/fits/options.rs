@@ -66,10 +66,10 @@ async fn cones_and_the_raw_frame_make_bodies() {
         (raw, body(fit::FitOptions { objective, coordinates, ..plain() })),
     ] {
         let job = ended(&mut clients, options.clone(), &mesh).await;
-        // What was left open is told.
+        // What was left open is reported.
         let (objective, cone) = (options.objective().max(FitObjective::LogdetP), options.cone().max(FitCone::Sos));
-        let told = FitOptions { objective: objective.into(), cone: cone.into(), scale: Some(1.0), ..options };
-        assert_eq!(job.options.as_ref(), Some(&told));
+        let message = FitOptions { objective: objective.into(), cone: cone.into(), scale: Some(1.0), ..options };
+        assert_eq!(job.options.as_ref(), Some(&message));
         let found = made(job);
         clients.body(&found.1).await;
         assert_eq!(found, expected);
@@ -131,7 +131,7 @@ async fn compounds_and_sets_are_kept_with_their_jobs() {
     }
 }
 
-/// Points alone do not tell where to cut, and a mesh file tells as much as triangles that are sent.
+/// Points alone do not tell where to cut, and a mesh file says as much as triangles that are sent.
 #[tokio::test(flavor = "multi_thread")]
 async fn triangles_come_as_chunks_or_in_a_mesh_file() {
     let dir = tempfile::tempdir().expect("a directory");

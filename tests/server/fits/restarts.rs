@@ -56,7 +56,8 @@ async fn what_kills_the_server_twice_is_given_up() {
     assert_eq!(clients.ended(&next).await.state(), FitState::Succeeded);
 }
 
-/// An orderly stop is no attempt: however often the server is restarted, the job is done in the end.
+/// An orderly stop is no attempt: however often the server is restarted, the job is done in the
+/// end.
 #[tokio::test(flavor = "multi_thread")]
 async fn an_orderly_stop_puts_the_job_back() {
     let dir = tempfile::tempdir().expect("a directory");
@@ -68,14 +69,14 @@ async fn an_orderly_stop_puts_the_job_back() {
         assert_eq!(clients.under_way(&id).await.attempts, 1);
         let mut watch = clients.watch(&id).await;
         server.terminate();
-        let told = loop {
+        let message = loop {
             match next(&mut watch).await {
                 Ok(Some(job)) => assert!(job.result.is_none()),
                 Ok(None) => panic!("a watch ends with the final state"),
                 Err(status) => break status,
             }
         };
-        assert_eq!((told.code(), reason(&told).as_str()), (Code::Unavailable, "STOPPING"), "{told:?}");
+        assert_eq!((message.code(), reason(&message).as_str()), (Code::Unavailable, "STOPPING"), "{message:?}");
         assert_eq!(server.wait(Duration::from_secs(15)).code(), Some(0));
         server = Running::start(dir.path());
         clients = server.connect().await;

@@ -111,7 +111,7 @@ async fn a_mesh_comes_as_the_bytes_of_its_file() {
     assert!((volume / ball - 1.0).abs() < 1e-3, "{volume} {ball}");
 }
 
-/// Points that can not be fitted are a failed job with the reason, and the next job goes on.
+/// Points that cannot be fitted are a failed job with the reason, and the next job goes on.
 #[tokio::test(flavor = "multi_thread")]
 async fn what_can_not_be_fitted_fails_by_name() {
     let dir = tempfile::tempdir().expect("a directory");
@@ -131,7 +131,8 @@ async fn what_can_not_be_fitted_fails_by_name() {
     assert_eq!(clients.ended(&done).await.state(), FitState::Succeeded);
 }
 
-/// A watch that is not read does not pile up what it missed, and who comes late hears at once how far it is.
+/// A watch that is not read does not pile up what it missed, and who comes late hears at once how
+/// far it is.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_slow_watcher_gets_the_latest() {
     let dir = tempfile::tempdir().expect("a directory");

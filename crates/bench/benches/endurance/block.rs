@@ -95,7 +95,8 @@ impl Round<'_> {
             }
             let answer = (MEASURES[measure].solve)((a, &pose_a), (b, &pose_b), &options, &mut warm);
             self.count(&site, start, &answer);
-            // Every hinted answer off a trajectory, and every tenth on one, is held against a cold one.
+            // Every hinted answer off a trajectory, and every tenth on one, is held against a cold
+            // one.
             if hinted && (!continues || self.query.is_multiple_of(10)) {
                 self.meet(&site, &answer);
             }
@@ -157,8 +158,9 @@ impl Round<'_> {
         self.tally.solves += 1;
         let worst = Worst { iterations: answer.iterations(), block: site.block, query: site.query };
         self.iterations[start as usize].count(worst);
-        let told = || format!("{}, {}: {}", MEASURES[site.measure].name, STARTS[start as usize].1, site.tell(answer));
-        self.tally.slow(worst, told);
+        let message =
+            || format!("{}, {}: {}", MEASURES[site.measure].name, STARTS[start as usize].1, site.tell(answer));
+        self.tally.slow(worst, message);
         site.cheap(self.tally, answer);
     }
 }

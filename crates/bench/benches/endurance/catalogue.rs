@@ -4,7 +4,8 @@ use std::path::Path;
 use sublevel::body::Body;
 use sublevel_testkit::bodies::{b, c, cylinder, e, p, q};
 
-/// Analytic bodies of every kind, sizes 1e-2 to 10, thin and round; then fitted ones, from `folder` and fitted on the spot.
+/// Analytic bodies of every kind, sizes 1e-2 to 10, thin and round; then fitted ones, from `folder`
+/// and fitted on the spot.
 pub(crate) fn catalogue(folder: &Path) -> Vec<Body> {
     let mut all = vec![
         e(1.0, 1.0, 1.0),

@@ -55,7 +55,8 @@ impl<'a, 'r> Draw<'a, 'r> {
         self.a.circumscribed().radius + self.b.circumscribed().radius
     }
 
-    /// Independent poses; the distance of the centres between overlap and a hundred sizes, mostly near.
+    /// Independent poses; the distance of the centres between overlap and a hundred sizes, mostly
+    /// near.
     fn independent(&mut self) -> (Pose, Pose) {
         let sum = self.sum();
         let random = &mut *self.random;

@@ -1,5 +1,5 @@
-//! The long run: billions of bracketed queries, each answer checked, some against 200 bits and some against semidefinite
-//! programs. Seeded, resumable, replayable.
+//! The long run: billions of bracketed queries, each answer checked, some against 200 bits and some
+//! against semidefinite programs. Seeded, resumable, replayable.
 //!
 //! ```text
 //! cargo bench -p sublevel-bench --bench endurance -- --queries 1e9 --threads 2 --state run.json --seed 1 --summary docs/endurance.md
@@ -7,7 +7,8 @@
 //! cargo bench -p sublevel-bench --bench endurance -- --queries 1e7 --bodies bodies  # pairs of the body files in a folder
 //! ```
 //!
-//! An OpenBLAS of several threads gives the programs other last digits from run to run unless `OPENBLAS_NUM_THREADS=1`.
+//! An OpenBLAS of several threads gives the programs other last digits from run to run unless
+//! `OPENBLAS_NUM_THREADS=1`.
 
 #[path = "../../../fit/tests/level_zero.rs"]
 mod sos;
@@ -28,8 +29,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 use sublevel::body::Body;
 
-/// Blocks of a whole run that hold an answer against a semidefinite program, if there is one: a fifth of them draw a growth distance,
-/// or sizes too far apart for it, and 1 000 are to be left.
+/// Blocks of a whole run that hold an answer against a semidefinite program, if there is one: a
+/// fifth of them draw a growth distance, or sizes too far apart for it, and 1 000 are to be left.
 const PROGRAMS: u64 = 1300;
 
 /// Time between two writings of the state.
@@ -156,7 +157,7 @@ fn begin(arguments: &Arguments, bodies: &[Body]) -> State {
     let old = arguments.state.as_deref().and_then(State::read);
     let mut state = old.unwrap_or_else(|| State { seed: arguments.seed, bodies: hash.clone(), ..State::default() });
     assert!(state.seed == arguments.seed, "the state is of seed {}, not {}", state.seed, arguments.seed);
-    assert!(state.bodies == hash, "the state is of other bodies; its queries can not be continued");
+    assert!(state.bodies == hash, "the state is of other bodies; its queries cannot be continued");
     let git = std::process::Command::new("git").args(["describe", "--always", "--dirty"]).output();
     let commit = git.ok().and_then(|output| String::from_utf8(output.stdout).ok()).unwrap_or_default();
     state.commits.insert(if commit.is_empty() { "unknown".into() } else { commit.trim().into() });

@@ -92,7 +92,8 @@ impl Answer {
         accuracy * scale * (1.0 + 1e-12)
     }
 
-    /// Whether the witnesses lie in their bodies, up to what rounding them to world coordinates moves them.
+    /// Whether the witnesses lie in their bodies, up to what rounding them to world coordinates
+    /// moves them.
     pub(crate) fn feasible(&self, a: Placed<'_>, b: Placed<'_>) -> bool {
         match self {
             Answer::Distance(answer) => within(a, &answer.witness_a) && within(b, &answer.witness_b),
@@ -125,8 +126,8 @@ impl Answer {
         })
     }
 
-    /// The answer's value and the size that an arbiter's 1e-6 is relative to. None where a semidefinite program in doubles can
-    /// not tell: sizes or values that are too far apart.
+    /// The answer's value and the size that an arbiter's 1e-6 is relative to. None where a
+    /// semidefinite program in doubles can not tell: sizes or values that are too far apart.
     pub(crate) fn comparable(&self, a: &Body, b: &Body) -> Option<(f64, f64)> {
         let (small, large) = (a.circumscribed().radius, b.circumscribed().radius);
         let (small, large) = (small.min(large), small.max(large));

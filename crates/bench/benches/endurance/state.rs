@@ -53,7 +53,8 @@ impl State {
     }
 }
 
-/// Writes a file beside its place and moves it there: a reader finds the old text or the new, never half of it.
+/// Writes a file beside its place and moves it there: a reader finds the old text or the new, never
+/// half of it.
 pub(crate) fn write(path: &Path, text: &str) {
     let beside = path.with_extension("new");
     let written = std::fs::write(&beside, text).and_then(|()| std::fs::rename(&beside, path));

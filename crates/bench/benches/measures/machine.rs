@@ -4,7 +4,7 @@ use serde::Serialize;
 use std::fs;
 use sublevel_bench::{self as bench, duel::parry_version};
 
-/// The machine and the versions, as far as they can be told.
+/// The machine and the versions, as far as they can be known.
 #[derive(Debug, Serialize)]
 pub(crate) struct Machine {
     #[serde(flatten)]
@@ -25,7 +25,8 @@ impl Machine {
         self.load[1] = load();
     }
 
-    /// What else ran meanwhile: with more at work than there are cores, times are not to be trusted.
+    /// What else ran meanwhile: with more at work than there are cores, times are not to be
+    /// trusted.
     pub(crate) fn print_load(&self) {
         if let [Some(before), Some(after)] = self.load {
             println!("load     {before} before, {after} after, on {} cores", self.this.cores);

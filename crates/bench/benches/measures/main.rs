@@ -1,7 +1,9 @@
-//! Times every measure on one thread, beside the GJK of other libraries on the convex hulls of the same objects.
+//! Times every measure on one thread, beside the GJK of other libraries on the convex hulls of the
+//! same objects.
 //!
-//! `cargo bench -p sublevel-bench --bench measures -- --help` says how. Every row walks the same poses; the rows take turns, pass by pass, so
-//! that a change of clock or load meets them all, and the median pass counts.
+//! `cargo bench -p sublevel-bench --bench measures -- --help` says how. Every row walks the same
+//! poses; the rows take turns, pass by pass, so that a change of clock or load meets them all, and
+//! the median pass counts.
 
 mod machine;
 mod motion;
@@ -22,9 +24,10 @@ use sublevel_bench::duel::{Coal, CoalRun};
 
 /// Time the measures and compare them with GJK on the hulls
 ///
-/// Bodies are fitted once to the meshes in SUBLEVEL_DATA and kept in target/bench-bodies (delete it after changes to the
-/// fit), where the pose files are left, too. SUBLEVEL_COAL names the program that '../shared/peers/build.sh' builds;
-/// without it coal's rows, and the ratios to them, are left out. SUBLEVEL_SIMD=avx2 measures what processors without AVX-512 do.
+/// Bodies are fitted once to the meshes in SUBLEVEL_DATA and kept in target/bench-bodies (delete it
+/// after changes to the fit), where the pose files are left, too. SUBLEVEL_COAL names the program
+/// that '../shared/peers/build.sh' builds; without it coal's rows, and the ratios to them, are left
+/// out. SUBLEVEL_SIMD=avx2 measures what processors without AVX-512 do.
 #[derive(Debug, Parser)]
 #[command(name = "measures", max_term_width = 100)]
 struct Args {

@@ -1,4 +1,5 @@
-//! What is asked besides distances along motions: poses in overlap, screw motions, rays; and what motions are like.
+//! What is asked besides distances along motions: poses in overlap, screw motions, rays; and what
+//! motions are like.
 
 use nalgebra::Vector3;
 use sublevel::body::Body;
@@ -28,8 +29,8 @@ impl Kind {
     }
 }
 
-/// Poses that have nothing to do with each other in all of which the bodies overlap, from all but apart to all but
-/// concentric.
+/// Poses that have nothing to do with each other in all of which the bodies overlap, from all but
+/// apart to all but concentric.
 pub(crate) fn overlapping(a: &Body, b: &Body, trajectories: usize, poses: usize) -> Result<Vec<Trajectory>, PoseError> {
     let mut random = Random(0);
     let reach = a.circumscribed().radius + b.circumscribed().radius;
@@ -51,7 +52,8 @@ pub(crate) fn overlapping(a: &Body, b: &Body, trajectories: usize, poses: usize)
     (0..trajectories).map(|_| trajectory()).collect()
 }
 
-/// Screw motions of both bodies that start in these poses, two seconds of which bring their middles about together.
+/// Screw motions of both bodies that start in these poses, two seconds of which bring their middles
+/// about together.
 pub(crate) fn screws(a: &Body, b: &Body, starts: &[Trajectory]) -> Result<Vec<Vec<(Motion, Motion)>>, MotionError> {
     let mut random = Random(0);
     let (middle_a, middle_b) = (a.circumscribed().center, b.circumscribed().center);

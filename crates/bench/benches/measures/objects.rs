@@ -1,4 +1,5 @@
-//! The objects: meshes, the vertices of their convex hulls, and the bodies of each degree around them.
+//! The objects: meshes, the vertices of their convex hulls, and the bodies of each degree around
+//! them.
 
 use nalgebra::Vector3;
 use std::error::Error;
@@ -8,7 +9,8 @@ use sublevel::body::Body;
 use sublevel::fit::{FitOptions, Mesh, ReadOptions, hull::convex_hull, read_mesh};
 use sublevel_bench::duel::Shelf;
 
-/// The pairs of the figures, with the nanoseconds of coal's cached guess where the figures that are times were set.
+/// The pairs of the figures, with the nanoseconds of coal's cached guess where the figures that are
+/// times were set.
 pub(crate) const PAIRS: [(&str, &str, f64); 3] =
     [("chair", "human", 610.0), ("hand", "vase", 790.0), ("octopus", "chair", 640.0)];
 

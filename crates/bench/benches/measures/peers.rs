@@ -6,7 +6,8 @@ use std::error::Error;
 use sublevel::measure::{Options, Pose, WarmStart, distance};
 use sublevel_bench::duel::{Coal, CoalRun, PeerError, parry_pose};
 
-/// Answers that contradict each other by more, metres, are told: ten times the tolerance coal has by default.
+/// Answers that contradict each other by more, metres, are reported: ten times the tolerance coal
+/// has by default.
 const AGREEMENT: f64 = 1e-5;
 
 /// Coal on the hulls and the poses of a scene.

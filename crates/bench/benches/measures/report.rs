@@ -36,7 +36,7 @@ struct Line {
     of_coal_cold: Option<f64>,
     mean_iterations: Option<f64>,
     most_iterations: Option<u32>,
-    /// Not told of coal.
+    /// Not reported of coal.
     failed: Option<usize>,
     overlaps: Option<usize>,
     targets: Vec<Verdict>,
@@ -85,7 +85,8 @@ impl Report {
 }
 
 impl Table {
-    /// Gathers the rows; `coal` is cold and warm, in nanoseconds, `separated` the table of the same pair on those motions.
+    /// Gathers the rows; `coal` is cold and warm, in nanoseconds, `separated` the table of the same
+    /// pair on those motions.
     pub(crate) fn new(scene: &Scene<'_>, rows: &[Row<'_>], coal: Option<(f64, f64)>, separated: Option<&Self>) -> Self {
         let queries = scene.poses(DEGREE).iter().map(Vec::len).sum();
         let mut times: Vec<(&str, f64)> =

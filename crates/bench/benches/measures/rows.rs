@@ -29,7 +29,7 @@ pub(crate) struct Scene<'a> {
     pub(crate) pair: &'a Pair,
     pub(crate) kind: Kind,
     pub(crate) hulls: Hulls,
-    /// Where the first body stands: a pose is not made anew for each query.
+    /// Where the first body stands: a pose is not made again for each query.
     origin: Pose,
     /// Poses for the bodies of each degree: the same for all, unless grazing.
     poses: Vec<(usize, Vec<Trajectory>)>,
@@ -51,7 +51,8 @@ impl<'a> Scene<'a> {
                 let shared = motion::separated(&bodies, 1.0, trajectories, poses)?;
                 DEGREES.iter().map(|&degree| (degree, shared.clone())).collect()
             }
-            // Bodies that differ in size can not all graze in one pose: each degree walks the same way along its own.
+            // Bodies that differ in size cannot all graze in one pose: each degree walks the same
+            // way along its own.
             Kind::Grazing => DEGREES
                 .iter()
                 .map(|&degree| {

@@ -51,7 +51,8 @@ impl<'a> Row<'a> {
         sweep::Row::cold(label, trajectories, query).into()
     }
 
-    /// A row of batches of up to `most` consecutive poses; `batch` writes its answers where it is told to.
+    /// A row of batches of up to `most` consecutive poses; `batch` writes its answers where it is
+    /// asked to.
     pub(crate) fn batches<P, T: Clone + Default + 'a>(
         label: impl Into<String>,
         trajectories: &'a [Vec<P>],

@@ -1,6 +1,8 @@
-//! Solves the semidefinite programs of `sublevel-bench accuracy` by clarabel and times it: `clarabel IN OUT`.
+//! Solves the semidefinite programs of `sublevel-bench accuracy` by clarabel and times it:
+//! `clarabel IN OUT`.
 //!
-//! A process of its own, as for coal: clarabel's semidefinite cones need a BLAS, and the product needs none.
+//! A process of its own, as for coal: clarabel's semidefinite cones need a BLAS, and the product
+//! needs none.
 
 mod solve;
 

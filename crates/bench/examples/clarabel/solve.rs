@@ -7,7 +7,8 @@ use openblas_src as _;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// `min cost·v` subject to `sides - entries v` in a product of cones, as `sublevel-bench accuracy` writes it.
+/// `min cost·v` subject to `sides - entries v` in a product of cones, as `sublevel-bench accuracy`
+/// writes it.
 #[derive(Debug, Deserialize)]
 pub(crate) struct Program {
     cost: Vec<f64>,

@@ -1,4 +1,5 @@
-//! The problems: pairs of bodies at random poses, each with a reference answer and what was known a step before.
+//! The problems: pairs of bodies at random poses, each with a reference answer and what was known a
+//! step before.
 
 use super::Effort;
 use crate::duel::{DuelError, Random, Shelf, Subject, motion};
@@ -7,11 +8,13 @@ use sublevel::body::Body;
 use sublevel::fit::FitOptions;
 use sublevel::measure::{Options, Pose, PoseError, WarmStart, distance};
 
-/// From the pose before to the pose of a query: in units of half of the larger diameter, and in hundredths of degrees.
+/// From the pose before to the pose of a query: in units of half of the larger diameter, and in
+/// hundredths of degrees.
 const STEP: f64 = 0.01;
 /// Objects of the pairs.
 const PAIRS: [[&str; 2]; 3] = [["chair", "human"], ["hand", "vase"], ["octopus", "chair"]];
-/// What the reference is asked for: below the floor of rounding, so that its bracket is as narrow as brackets get.
+/// What the reference is asked for: below the floor of rounding, so that its bracket is as narrow
+/// as brackets get.
 const REFERENCE: f64 = 1e-15;
 
 /// A pair at random poses.
@@ -43,7 +46,7 @@ pub(super) fn cases(
     data: &std::path::Path,
     effort: &Effort,
     shelf: &Shelf,
-    told: &mut dyn FnMut(&str) -> Result<(), DuelError>,
+    announce: &mut dyn FnMut(&str) -> Result<(), DuelError>,
 ) -> Result<Vec<Case>, DuelError> {
     let mut all = Vec::new();
     for [a, b] in &PAIRS[..effort.pairs] {
@@ -51,14 +54,14 @@ pub(super) fn cases(
         let unit_m = 0.5 * a.diameter_m.max(b.diameter_m);
         for &degree in effort.degrees {
             let name = format!("{}-{}-d{degree}", a.name, b.name);
-            told(&name)?;
+            announce(&name)?;
             let options = FitOptions { degree, ..FitOptions::default() };
             let bodies = [shelf.body(a.name, &a.mesh, &options)?, shelf.body(b.name, &b.mesh, &options)?];
             let poses = motion::stepping((&bodies[0], &bodies[1]), unit_m, Some(STEP), effort.queries, 2)?;
             all.push(Case::new(name, bodies, poses.into_iter().map(|pair| [pair[0], pair[1]]))?);
         }
     }
-    told("flat faces")?;
+    announce("flat faces")?;
     let [a, b] = [("slab", [0.5, 0.4, 0.3]), ("tile", [0.35, 0.3, 0.2])].map(|(name, [x, y, z])| {
         Body::superellipsoid(name, Vector3::zeros(), Vector3::new(x, y, z), 8)
             .map_err(|error| DuelError::Representation { mesh: "flat", method: name.into(), what: error.to_string() })
@@ -90,8 +93,8 @@ impl Case {
     }
 }
 
-/// Poses at which the upper face of the slab and the lower of the tile are nearly parallel, turned by 1e-4 to 1e-2 rad, apart by 1 to 30 cm; a
-/// step before, the tile was a centimetre aside.
+/// Poses at which the upper face of the slab and the lower of the tile are nearly parallel, turned
+/// by 1e-4 to 1e-2 rad, apart by 1 to 30 cm; a step before, the tile was a centimetre aside.
 fn flat_poses(count: usize) -> Result<Vec<[Pose; 2]>, PoseError> {
     let one = |seed: usize| {
         let mut random = Random(seed as u64);

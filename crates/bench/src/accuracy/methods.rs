@@ -16,7 +16,8 @@ pub(super) enum Method {
     /// Ours without and with the hint of the pose before.
     Cold,
     Warm,
-    /// Newton's method from where the line of centres leaves the bodies, from our witnesses of a coarse answer, and from those of the pose before.
+    /// Newton's method from where the line of centres leaves the bodies, from our witnesses of a
+    /// coarse answer, and from those of the pose before.
     NewtonPlain,
     NewtonOurs,
     NewtonBefore,
@@ -38,7 +39,7 @@ pub(super) struct Cell {
     pub(super) queries: usize,
     /// Nanoseconds per query.
     pub(super) nanoseconds: f64,
-    /// Mean, where they are told.
+    /// Mean, where they are reported.
     pub(super) iterations: Option<f64>,
     /// Median and largest, as parts of the size.
     pub(super) error: [f64; 2],
@@ -46,7 +47,8 @@ pub(super) struct Cell {
     pub(super) width: Option<[f64; 2]>,
     /// Answers that are none, or off by more than [`OFF`] of the size.
     pub(super) off: usize,
-    /// Answers that do not keep the tolerance asked for, by the method's own judgement, where it has one.
+    /// Answers that do not keep the tolerance asked for, by the method's own judgement, where it
+    /// has one.
     pub(super) short: Option<usize>,
 }
 
@@ -78,14 +80,14 @@ pub(super) fn measure(
     effort: &Effort,
     shelf: &Shelf,
     (solver, coal): (Option<&Clarabel>, Option<&Coal>),
-    told: &mut dyn FnMut(&str) -> Result<(), DuelError>,
+    announce: &mut dyn FnMut(&str) -> Result<(), DuelError>,
 ) -> Result<Vec<Cell>, DuelError> {
     let Case { a, b, size_m, queries, .. } = case;
     let chunks: Vec<Vec<Query>> = queries.chunks(CHUNK).map(<[Query]>::to_vec).collect();
     let some: Vec<Vec<Query>> = queries[..effort.few].chunks(CHUNK).map(<[Query]>::to_vec).collect();
     let mut sampled = Vec::new();
     for &points in effort.points {
-        told(&format!("{}: hulls of {points} points", case.name))?;
+        announce(&format!("{}: hulls of {points} points", case.name))?;
         let [points_a, points_b] = [a, b].map(|body| boundary(body, points));
         sampled.push((points, Hulls::new(&points_a, &points_b)?, [points_a, points_b]));
     }
@@ -132,12 +134,12 @@ pub(super) fn measure(
         timed.push(Timed::new((Method::Parry, points.to_string()), &some, *size_m, ask));
     }
     for pass in 0..effort.passes {
-        told(&format!("{}: pass {} of {}", case.name, pass + 1, effort.passes))?;
+        announce(&format!("{}: pass {} of {}", case.name, pass + 1, effort.passes))?;
         timed.iter_mut().for_each(|timed| timed.row.turn());
     }
     let mut cells: Vec<Cell> = timed.into_iter().map(Timed::finished).collect();
     if let Some(solver) = solver {
-        told(&format!("{}: semidefinite programs", case.name))?;
+        announce(&format!("{}: semidefinite programs", case.name))?;
         let few = &queries[..effort.programs];
         let origin = Pose::identity();
         let state = |query: &Query| ConicProgram::distance([(a, &origin), (b, &query.pose)], *size_m);
@@ -161,7 +163,7 @@ pub(super) fn measure(
     }
     if let Some(coal) = coal {
         for (points, _, [points_a, points_b]) in &sampled {
-            told(&format!("{}: coal, {points} points", case.name))?;
+            announce(&format!("{}: coal, {points} points", case.name))?;
             let name = format!("accuracy-{}-{points}", case.name);
             let poses: Vec<Vec<Pose>> = some.iter().map(|chunk| chunk.iter().map(|q| q.pose).collect()).collect();
             let mut run = coal.start(shelf.folder(), &name, [points_a, points_b], &poses)?;
@@ -220,7 +222,7 @@ impl<'a> Timed<'a> {
 impl Cell {
     /// All but the time.
     fn judged((method, setting): (Method, String), queries: &[Query], said: &[Said], size_m: f64) -> Self {
-        // Below half of the reference's bracket no error can be told.
+        // Below half of the reference's bracket no error can be known.
         let error = |(query, said): (&Query, &Said)| {
             let error = (said.value - query.truth).abs().max(query.half_width) / size_m;
             if error.is_finite() { error } else { f64::INFINITY }

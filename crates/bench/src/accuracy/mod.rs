@@ -1,4 +1,5 @@
-//! Accuracy: how near methods come to the distance in how much time and in how many iterations, and where they stop coming nearer.
+//! Accuracy: how near methods come to the distance in how much time and in how many iterations, and
+//! where they stop coming nearer.
 
 mod cases;
 mod methods;
@@ -17,7 +18,8 @@ struct Effort {
     /// Of the pairs of objects, and at these degrees.
     pairs: usize,
     degrees: &'static [usize],
-    /// Random poses of a case; those of them that hulls, and semidefinite programs, are asked about.
+    /// Random poses of a case; those of them that hulls, and semidefinite programs, are asked
+    /// about.
     queries: usize,
     few: usize,
     programs: usize,
@@ -48,8 +50,9 @@ struct Measured {
     cells: Vec<Cell>,
 }
 
-/// Measures three pairs of the meshes in `data` at degrees 4 and 6, or one at degree 4 if `quick`, and a pair of flat faces. Fits are kept on the
-/// `shelf`; coal takes part where `SUBLEVEL_COAL` names the program that times it, clarabel where its example is built. `progress` hears what is
+/// Measures three pairs of the meshes in `data` at degrees 4 and 6, or one at degree 4 if `quick`,
+/// and a pair of flat faces. Fits are kept on the `shelf`; coal takes part where `SUBLEVEL_COAL`
+/// names the program that times it, clarabel where its example is built. `progress` hears what is
 /// going on and can stop it.
 ///
 /// # Errors
@@ -73,11 +76,11 @@ pub fn accuracy(
             passes: 3,
         }
     };
-    let mut told = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };
+    let mut announce = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };
     let peers = (Clarabel::find()?, Coal::from_environment()?);
     let mut measured = Vec::new();
-    for case in cases(data, &effort, shelf, &mut told)? {
-        let cells = measure(&case, &effort, shelf, (peers.0.as_ref(), peers.1.as_ref()), &mut told)?;
+    for case in cases(data, &effort, shelf, &mut announce)? {
+        let cells = measure(&case, &effort, shelf, (peers.0.as_ref(), peers.1.as_ref()), &mut announce)?;
         let halves: Vec<f64> = case.queries.iter().map(|query| query.half_width / case.size_m).collect();
         let reference = [super::duel::sweep::median(&halves), halves.iter().copied().fold(0.0, f64::max)];
         let (size_m, queries) = (case.size_m, case.queries.len());

@@ -35,7 +35,7 @@ const CURVES: [Curve; 11] = [
     curve("hulls, coal", Method::Coal, false, Some((Ink::Grey, Marker::Ring))),
 ];
 
-/// Accuracies whose times are told.
+/// Accuracies whose times are reported.
 const GOALS: [f64; 3] = [1e-3, 1e-6, 1e-9];
 /// A setting is no longer better than another if its error is above this part of the other's.
 const BETTER: f64 = 0.5;
@@ -45,7 +45,7 @@ const DRAWN: f64 = 10.0;
 
 const NOTES: &str = "\
 - Errors and widths are parts of the circumradius of the smaller body, medians over the poses unless a column says otherwise. The truth is the middle of the \
-narrowest bracket of ours; no error is told below half of its width, which each case states. Times are means per query, one thread; clarabel is asked about fewer poses.
+narrowest bracket of ours; no error is reported below half of its width, which each case states. Times are means per query, one thread; clarabel is asked about fewer poses.
 - The poses of fitted bodies are random, gaps between 0.5 and 37 % of the larger diameter (seeds 1, 2, ... of SplitMix64, one for each pose); the flat faces of \
 two superellipsoids of degree 8 are turned against each other by 1e-4 to 1e-2 rad, 1 to 30 cm apart. `warm` and `pose before` know the answer a step \
 before: a hundredth of half the diameter and a degree, or a centimetre along the faces.
@@ -54,7 +54,7 @@ before: a hundredth of half the diameter and a degree, or a centimetre along the
 bodies (plain), at our witnesses of an answer to a tolerance of 1 (its time counts, its iterations do not), or at the witnesses of the pose before.
 - SLSQP: sequential quadratic programming of NLopt, exact gradients, plain start, unit lengths; 2 to 1000 evaluations at most, which count as iterations; `ftol_rel` 1e-16; the last \
 point evaluated counts, feasible or not.
-- Level 0: the hierarchy's semidefinite program in moments, one matrix per body, stated anew and solved for every query; gap and feasibility tolerances from 1e-3 to \
+- Level 0: the hierarchy's semidefinite program in moments, one matrix per body, stated again and solved for every query; gap and feasibility tolerances from 1e-3 to \
 1e-12, faer, no chordal decomposition, one thread; the time is that of set-up and solve. It is exact here, the constraints being sos-convex.
 - Hulls: of 100 points and more of the boundary, spread evenly in the normalized frame; GJK at its own tolerance, cold. A hull of boundary points lies inside, so that \
 its distance is too large.
@@ -79,7 +79,7 @@ impl Accuracy {
     /// The report; the pictures lie beside it under these names.
     pub fn markdown(&self, pictures: &[&str]) -> String {
         let mut text = String::from("# Solver accuracy against time\n\n");
-        // Writing to a string can not fail.
+        // Writing to a string cannot fail.
         let flags = if self.quick { " --quick" } else { "" };
         let _ = writeln!(text, "{}\n", self.machine.head(&format!("sublevel-bench accuracy --data DIR{flags}")));
         let part = |name: &str, version: &Option<String>, hint: &str| {
@@ -158,13 +158,13 @@ impl Accuracy {
             for cell in &case.cells {
                 let Cell { method, setting, queries, nanoseconds, iterations, error, width, off, short } = cell;
                 let name = method.name();
-                let told = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:e}"));
-                let widths = width.map_or([None; 2], |width| width.map(Some)).map(told).join(",");
+                let announce = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:e}"));
+                let widths = width.map_or([None; 2], |width| width.map(Some)).map(announce).join(",");
                 let _ = writeln!(
                     text,
                     "{},{name},{setting},{queries},{nanoseconds:.1},{},{:e},{:e},{widths},{off},{}",
                     case.name,
-                    told(*iterations),
+                    announce(*iterations),
                     error[0],
                     error[1],
                     short.map_or(String::new(), |short| short.to_string())
@@ -212,7 +212,8 @@ impl Curve {
         }
     }
 
-    /// The cheapest setting that no other is better than by a factor of two: where it stops improving.
+    /// The cheapest setting that no other is better than by a factor of two: where it stops
+    /// improving.
     fn floor<'a>(&self, cells: &'a [Cell]) -> Option<&'a Cell> {
         let best = self.of(cells).map(|cell| self.value(cell)).fold(f64::INFINITY, f64::min);
         let near = self.of(cells).filter(|cell| BETTER * self.value(cell) <= best);
@@ -277,7 +278,7 @@ impl Measured {
                 .filter_map(|cell| Some(Point { x: x(cell)?, y: curve.value(cell), label: String::new() }))
                 .filter(|point| point.x > 0.0 && point.y <= DRAWN)
                 .collect();
-            // The ends of a curve that counts something are told by what it counts.
+            // The ends of a curve that counts something are known by what it counts.
             if matches!(curve.method, Method::Parry | Method::Coal) {
                 let settings: Vec<&str> = curve.of(&self.cells).map(|cell| cell.setting.as_str()).collect();
                 for at in [0, points.len().saturating_sub(1)] {

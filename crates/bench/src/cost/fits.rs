@@ -18,12 +18,14 @@ const DEGREE: usize = 6;
 /// Fits are repeated up to this number of points; those of more take long enough to be timed once.
 const REPEATED: usize = 3_000;
 
-/// Points that are all vertices of their hull are fitted up to this number: a million would take minutes.
+/// Points that are all vertices of their hull are fitted up to this number: a million would take
+/// minutes.
 const MOST_ON_HULL: usize = 100_000;
 
 /// What fits are made of and measured with.
 pub(super) struct Fitting<'a> {
-    /// `sublevel`, whose memory is looked at in a process of its own; without it memory is not told.
+    /// `sublevel`, whose memory is looked at in a process of its own; without it memory is not
+    /// reported.
     pub(super) program: Option<&'a Path>,
     /// For its files.
     pub(super) folder: &'a Path,
@@ -34,11 +36,11 @@ pub(super) fn degrees(
     subject: &Subject,
     effort: &Effort,
     fitting: &Fitting<'_>,
-    told: &mut dyn FnMut(&str) -> Result<(), DuelError>,
+    announce: &mut dyn FnMut(&str) -> Result<(), DuelError>,
 ) -> Result<Growth, DuelError> {
     let mut lines = [Line::new("fit", Unit::Nanoseconds), Line::new("peak of the process", Unit::Bytes)];
     for &degree in effort.degrees {
-        told(&format!("fit of degree {degree}"))?;
+        announce(&format!("fit of degree {degree}"))?;
         fitting.measure(&subject.mesh.points, degree, effort.passes, degree as f64, &mut lines)?;
     }
     let lines = lines.into_iter().filter(|line| !line.points.is_empty()).collect();
@@ -56,7 +58,7 @@ pub(super) fn points(
     subject: &Subject,
     effort: &Effort,
     fitting: &Fitting<'_>,
-    told: &mut dyn FnMut(&str) -> Result<(), DuelError>,
+    announce: &mut dyn FnMut(&str) -> Result<(), DuelError>,
 ) -> Result<Growth, DuelError> {
     let failed = |what: String| DuelError::Representation { mesh: "pillow", method: "points".into(), what };
     let pillow = Body::superellipsoid("pillow", Vector3::zeros(), Vector3::new(1.0, 0.7, 0.5), 4);
@@ -71,7 +73,7 @@ pub(super) fn points(
         let mut both =
             [Line::new(&name, Unit::Nanoseconds), Line::new(&format!("{name}, peak of the process"), Unit::Bytes)];
         for &count in effort.points.iter().filter(|count| most.is_none_or(|most| **count <= most)) {
-            told(&format!("fit of {count} points {name}"))?;
+            announce(&format!("fit of {count} points {name}"))?;
             let mut random = Random(count as u64);
             let points: Vec<Vector3<f64>> = (0..count).map(|_| sample(&mut random)).collect();
             let repeats = if count > REPEATED { 1 } else { effort.passes };
@@ -118,7 +120,7 @@ impl Fitting<'_> {
         Ok(())
     }
 
-    /// The most memory of `sublevel fit`, bytes; none where it can not be told.
+    /// The most memory of `sublevel fit`, bytes; none where it cannot be known.
     fn peak(&self, program: &Path, points: &[Vector3<f64>], degree: usize) -> Option<f64> {
         let [input, out] = ["cost-points.xyz", "cost-fits"].map(|name| self.folder.join(name));
         fs::write(&input, points_text(points)).ok()?;

@@ -1,4 +1,5 @@
-//! How a cost grows with a size: measured points, and the exponent of the power of the size that they follow.
+//! How a cost grows with a size: measured points, and the exponent of the power of the size that
+//! they follow.
 
 /// What is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,8 +41,9 @@ impl Line {
     }
 }
 
-/// Slope of the line through the logarithms with the least squares of deviations, over the points whose size is at least the geometric mean of the
-/// least and the largest; none of fewer than two sizes.
+/// Slope of the line through the logarithms with the least squares of deviations, over the points
+/// whose size is at least the geometric mean of the least and the largest; none of fewer than two
+/// sizes.
 pub(super) fn exponent(points: &[(f64, f64)]) -> Option<f64> {
     let positive = || points.iter().filter(|(x, y)| *x > 0.0 && *y > 0.0 && x.is_finite() && y.is_finite());
     let least = positive().map(|(x, _)| *x).fold(f64::INFINITY, f64::min);

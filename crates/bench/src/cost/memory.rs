@@ -1,4 +1,4 @@
-//! Memory, as Linux tells it.
+//! Memory, as Linux reports it.
 
 use std::fs;
 use std::path::Path;
@@ -22,10 +22,11 @@ fn status(process: &str, field: &str) -> Option<f64> {
     Some(1024.0 * line.trim().trim_end_matches(" kB").parse::<f64>().ok()?)
 }
 
-/// Bytes of a copy of a thing, by resident memory: of a thing with so many `parts`, which guess how many copies are needed. None where that can not
-/// be told.
+/// Bytes of a copy of a thing, by resident memory: of a thing with so many `parts`, which guess how
+/// many copies are needed. None where that cannot be known.
 ///
-/// Freed memory that the allocator has at hand takes the first copies; once it is used up, rounds of as many copies take as much each.
+/// Freed memory that the allocator has at hand takes the first copies; once it is used up, rounds
+/// of as many copies take as much each.
 pub(super) fn bytes_of<T: Clone>(thing: &T, parts: usize) -> Option<f64> {
     let count = (ROUND / (GUESS * parts as f64)).ceil().max(8.0) as usize;
     let mut kept = Vec::with_capacity(ROUNDS);

@@ -1,4 +1,5 @@
-//! Cost: how time and memory grow with degree, constraints, parts, poses of a batch, pairs of a message, and points of a fit.
+//! Cost: how time and memory grow with degree, constraints, parts, poses of a batch, pairs of a
+//! message, and points of a fit.
 
 mod fits;
 mod growth;
@@ -27,7 +28,8 @@ struct Effort {
     passes: usize,
 }
 
-/// Nanoseconds of a message with so many pairs, sent to a server and answered, for each number of pairs. Who serves lives in another room.
+/// Nanoseconds of a message with this many pairs, sent to a server and answered, for each number of
+/// pairs. Who serves lives in another room.
 pub type Messages<'a> = &'a mut dyn FnMut(&[usize]) -> Result<Vec<f64>, String>;
 
 /// What grows how fast.
@@ -38,8 +40,9 @@ pub struct Cost {
     growths: Vec<Growth>,
 }
 
-/// Measures chair and human of the meshes in `data`. Fits are kept on the `shelf`; `messages` sends messages to a server, and `program` is `sublevel`, whose
-/// memory is looked at as it fits. `progress` hears what is going on and can stop it.
+/// Measures chair and human of the meshes in `data`. Fits are kept on the `shelf`; `messages` sends
+/// messages to a server, and `program` is `sublevel`, whose memory is looked at as it fits.
+/// `progress` hears what is going on and can stop it.
 ///
 /// # Errors
 /// [`DuelError`].
@@ -75,20 +78,20 @@ pub fn cost(
             passes: 5,
         }
     };
-    let mut told = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };
+    let mut announce = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };
     let [chair, human] = [Subject::read("chair", data)?, Subject::read("human", data)?];
     let pair = [&chair, &human];
     let mut growths = vec![
-        queries::degrees(pair, &effort, shelf, &mut told)?,
-        queries::constraints(pair, &effort, shelf, &mut told)?,
-        queries::parts(pair, &effort, shelf, &mut told)?,
-        queries::batches(pair, &effort, shelf, &mut told)?,
+        queries::degrees(pair, &effort, shelf, &mut announce)?,
+        queries::constraints(pair, &effort, shelf, &mut announce)?,
+        queries::parts(pair, &effort, shelf, &mut announce)?,
+        queries::batches(pair, &effort, shelf, &mut announce)?,
     ];
-    told("messages")?;
+    announce("messages")?;
     growths.push(sent(effort.messages, messages)?);
     let fitting = Fitting { program, folder: shelf.folder() };
-    growths.push(fits::degrees(&chair, &effort, &fitting, &mut told)?);
-    growths.push(fits::points(&chair, &effort, &fitting, &mut told)?);
+    growths.push(fits::degrees(&chair, &effort, &fitting, &mut announce)?);
+    growths.push(fits::points(&chair, &effort, &fitting, &mut announce)?);
     Ok(Cost { machine: Machine::this(), quick, passes: effort.passes, growths })
 }
 

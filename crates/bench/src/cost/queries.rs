@@ -18,18 +18,18 @@ const DEGREE: usize = 4;
 /// Of what the batch is about.
 const BATCH_DEGREE: usize = 6;
 
-type Told<'a> = &'a mut dyn FnMut(&str) -> Result<(), DuelError>;
+type Announce<'a> = &'a mut dyn FnMut(&str) -> Result<(), DuelError>;
 
 /// Against the degree of both bodies.
 pub(super) fn degrees(
     pair: [&Subject; 2],
     effort: &Effort,
     shelf: &Shelf,
-    told: Told<'_>,
+    announce: Announce<'_>,
 ) -> Result<Growth, DuelError> {
     let mut shapes = Vec::new();
     for &degree in effort.degrees {
-        told(&format!("degree {degree}"))?;
+        announce(&format!("degree {degree}"))?;
         let options = FitOptions { degree, ..FitOptions::default() };
         let body = |subject: &Subject| Ok::<_, DuelError>(shelf.body(subject.name, &subject.mesh, &options)?);
         shapes.push((degree, boxed(body(pair[0])?), boxed(body(pair[1])?)));
@@ -49,13 +49,13 @@ pub(super) fn constraints(
     pair: [&Subject; 2],
     effort: &Effort,
     shelf: &Shelf,
-    told: Told<'_>,
+    announce: Announce<'_>,
 ) -> Result<Growth, DuelError> {
     let mut shapes = Vec::new();
     let plain = FitOptions { degree: DEGREE, ..FitOptions::default() };
     let other = boxed(shelf.body(pair[1].name, &pair[1].mesh, &plain)?);
     for &slabs in effort.slabs {
-        told(&format!("{slabs} slabs"))?;
+        announce(&format!("{slabs} slabs"))?;
         let options = FitOptions { slabs: slabs.min(MAX_SLABS), ..plain.clone() };
         let body = shelf.body(pair[0].name, &pair[0].mesh, &options)?;
         shapes.push((body.constraints().len(), boxed(body), other.clone()));
@@ -74,13 +74,18 @@ pub(super) fn constraints(
 }
 
 /// Against the number of parts of the first solid.
-pub(super) fn parts(pair: [&Subject; 2], effort: &Effort, shelf: &Shelf, told: Told<'_>) -> Result<Growth, DuelError> {
+pub(super) fn parts(
+    pair: [&Subject; 2],
+    effort: &Effort,
+    shelf: &Shelf,
+    announce: Announce<'_>,
+) -> Result<Growth, DuelError> {
     let mut shapes: Vec<(usize, Shape, Shape)> = Vec::new();
     let options = FitOptions { degree: DEGREE, ..FitOptions::default() };
     let other = boxed(shelf.body(pair[1].name, &pair[1].mesh, &options)?);
     let Subject { name, mesh, .. } = pair[0];
     for &count in effort.parts {
-        told(&format!("{count} parts"))?;
+        announce(&format!("{count} parts"))?;
         // The name and the key of the figure of speed: both share their fits.
         let key = format!("{count} parts {options:?}");
         let shape = shelf.take(&format!("{name}-d{DEGREE}-p{count}"), mesh, &key, || {
@@ -107,9 +112,9 @@ pub(super) fn batches(
     pair: [&Subject; 2],
     effort: &Effort,
     shelf: &Shelf,
-    told: Told<'_>,
+    announce: Announce<'_>,
 ) -> Result<Growth, DuelError> {
-    told("batches")?;
+    announce("batches")?;
     let options = FitOptions { degree: BATCH_DEGREE, ..FitOptions::default() };
     let body = |subject: &Subject| Ok::<_, DuelError>(shelf.body(subject.name, &subject.mesh, &options)?);
     let (a, b) = (body(pair[0])?, body(pair[1])?);
@@ -162,7 +167,8 @@ fn unit_m([a, b]: [&Subject; 2]) -> f64 {
     0.5 * a.diameter_m.max(b.diameter_m)
 }
 
-/// Cold and warm queries, in the same poses for all sizes: those of the first, which are the widest.
+/// Cold and warm queries, in the same poses for all sizes: those of the first, which are the
+/// widest.
 fn against(pair: [&Subject; 2], shapes: &[(usize, Shape, Shape)], effort: &Effort) -> Result<Vec<Line>, DuelError> {
     let Some((_, wide_a, wide_b)) = shapes.first() else { return Ok(Vec::new()) };
     let poses = motion::stepping((wide_a, wide_b), unit_m(pair), Some(STEP), effort.trajectories, effort.poses)?;

@@ -45,7 +45,7 @@ impl Cost {
     /// The report; the pictures lie beside it under these names.
     pub fn markdown(&self, pictures: &[&str]) -> String {
         let mut text = String::from("# How costs grow\n\n");
-        // Writing to a string can not fail.
+        // Writing to a string cannot fail.
         let flags = if self.quick { " --quick" } else { "" };
         let _ = writeln!(text, "{}\n", self.machine.head(&format!("sublevel-bench cost --data DIR{flags}")));
         let _ = writeln!(text, "Passes: {}.\n\n{NOTES}", self.passes);
@@ -59,9 +59,9 @@ impl Cost {
                     growth.key,
                     line.name,
                     growth.size,
-                    line.unit.told(first.1),
+                    line.unit.text(first.1),
                     first.0,
-                    line.unit.told(last.1),
+                    line.unit.text(last.1),
                     last.0,
                     power(line)
                 );
@@ -115,7 +115,7 @@ fn power(line: &Line) -> String {
 
 impl Unit {
     /// With a fitting prefix.
-    fn told(self, value: f64) -> String {
+    fn text(self, value: f64) -> String {
         let scaled = |names: [&str; 4]| {
             let step = (0..3).find(|&step| value < 1000_f64.powi(step + 1)).unwrap_or(3);
             let digits = value / 1000_f64.powi(step);
@@ -195,7 +195,7 @@ impl Growth {
         for size in sizes {
             let cell = |line: &&Line| {
                 let found = line.points.iter().find(|point| point.0 == size);
-                found.map_or("-".into(), |point| line.unit.told(point.1))
+                found.map_or("-".into(), |point| line.unit.text(point.1))
             };
             let cells: Vec<String> = lines.iter().map(cell).collect();
             let _ = writeln!(text, "| {size} | {} |", cells.join(" | "));
@@ -211,9 +211,9 @@ mod tests {
 
     #[test]
     fn numbers_have_fitting_units() {
-        let times = [5.4, 999.0, 1234.0, 56_789.0, 1.5e6, 2.5e9].map(|ns| Unit::Nanoseconds.told(ns));
+        let times = [5.4, 999.0, 1234.0, 56_789.0, 1.5e6, 2.5e9].map(|ns| Unit::Nanoseconds.text(ns));
         assert_eq!(times, ["5 ns", "999 ns", "1.23 µs", "56.8 µs", "1.50 ms", "2.50 s"]);
-        assert_eq!(Unit::Bytes.told(34_560.0), "34.6 kB");
+        assert_eq!(Unit::Bytes.text(34_560.0), "34.6 kB");
         assert_eq!([-0.001, -1.256].map(two_places), ["0.00", "-1.26"]);
     }
 

@@ -11,7 +11,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The program that times coal: `program A.xyz B.xyz POSES OUT` walks the poses, prints its times as JSON and writes the distances.
+/// The program that times coal: `program A.xyz B.xyz POSES OUT` walks the poses, prints its times
+/// as JSON and writes the distances.
 #[derive(Clone, Debug)]
 pub struct Coal {
     program: PathBuf,
@@ -47,8 +48,8 @@ impl Coal {
         version.into_iter().next().unwrap_or_else(|| "of unknown version".to_owned())
     }
 
-    /// Writes what the program reads into `folder`, under names that begin with `name`: the points whose hulls meet, and a file of
-    /// poses for each trajectory.
+    /// Writes what the program reads into `folder`, under names that begin with `name`: the points
+    /// whose hulls meet, and a file of poses for each trajectory.
     ///
     /// # Errors
     /// [`PeerError::Io`].
@@ -82,7 +83,7 @@ impl Coal {
 pub(crate) fn points_text(points: &[Vector3<f64>]) -> String {
     let mut text = String::new();
     for v in points {
-        // Writing to a string can not fail.
+        // Writing to a string cannot fail.
         let _ = writeln!(text, "{:e} {:e} {:e}", v.x, v.y, v.z);
     }
     text
@@ -107,8 +108,8 @@ pub struct CoalRun<'a> {
 impl CoalRun<'_> {
     /// One process for each trajectory, which reports the median of 9 passes.
     ///
-    /// The parts are as short as those that our own rows are timed by, so that a busy machine does no more to one than to
-    /// the other.
+    /// The parts are as short as those that our own rows are timed by, so that a busy machine does
+    /// no more to one than to the other.
     ///
     /// # Errors
     /// [`PeerError`].
@@ -123,7 +124,8 @@ impl CoalRun<'_> {
         Ok(())
     }
 
-    /// Nanoseconds per query, cold and warm: the median run of each trajectory, averaged over the queries.
+    /// Nanoseconds per query, cold and warm: the median run of each trajectory, averaged over the
+    /// queries.
     pub fn times(&self) -> (f64, f64) {
         let mean = |time: fn(&CoalTimes) -> f64| {
             let of = |i: usize| median(&self.runs.iter().map(|run| time(&run[i])).collect::<Vec<_>>());

@@ -1,4 +1,4 @@
-//! Why a figure can not be made.
+//! Why a figure cannot be made.
 
 use super::{NoHull, PeerError, ShelfError};
 use sublevel::draw::ChartError;
@@ -8,7 +8,7 @@ use sublevel::measure::{OptionsError, PoseError};
 /// Why there is no figure.
 #[derive(Debug, thiserror::Error)]
 pub enum DuelError {
-    /// A mesh can not be read.
+    /// A mesh cannot be read.
     #[error("{0}; name the folder that has psb/101.off and meshes/mbm_mug.off with --data")]
     Mesh(#[from] ReadError),
     /// A mesh has no hull.
@@ -19,7 +19,7 @@ pub enum DuelError {
         /// What is wrong with it.
         source: HullError,
     },
-    /// A representation can not be made.
+    /// A representation cannot be made.
     #[error("{mesh}, {method}: {what}")]
     Representation {
         /// The mesh.
@@ -29,7 +29,7 @@ pub enum DuelError {
         /// Why not.
         what: String,
     },
-    /// Fits can not be made or kept.
+    /// Fits cannot be made or kept.
     #[error(transparent)]
     Shelf(#[from] ShelfError),
     /// Parry makes no mesh of it.
@@ -43,10 +43,10 @@ pub enum DuelError {
     /// Parry makes no hull.
     #[error(transparent)]
     NoHull(#[from] NoHull),
-    /// Coal or clarabel can not be timed.
+    /// Coal or clarabel cannot be timed.
     #[error(transparent)]
     Peer(#[from] PeerError),
-    /// A child can not be started or heard.
+    /// A child cannot be started or heard.
     #[error("{}: {source}", program.display())]
     Child {
         /// The program.
@@ -54,7 +54,7 @@ pub enum DuelError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// Messages to a server can not be timed.
+    /// Messages to a server cannot be timed.
     #[error("timing messages to a server on loopback: {0}")]
     Messages(String),
     /// An accuracy is none.

@@ -1,7 +1,9 @@
-//! Duels: representations of the same objects walk the same poses and are timed in turns, ours and those of other libraries.
+//! Duels: representations of the same objects walk the same poses and are timed in turns, ours and
+//! those of other libraries.
 //!
-//! Figures and `cargo bench -p sublevel-bench --bench measures` share this: motions ([`motion`]), timed rows ([`sweep`]), the peers ([`Hulls`] of
-//! parry in this process, [`Coal`] in one of its own), and fits that are kept between runs ([`Shelf`]).
+//! Figures and `cargo bench -p sublevel-bench --bench measures` share this: motions ([`motion`]),
+//! timed rows ([`sweep`]), the peers ([`Hulls`] of parry in this process, [`Coal`] in one of its
+//! own), and fits that are kept between runs ([`Shelf`]).
 
 mod coal;
 mod error;

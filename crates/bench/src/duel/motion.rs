@@ -1,5 +1,5 @@
-//! Smooth motions of one body about another in steps of one centimetre and one degree, for objects of about two metres; those
-//! of other sizes move in proportion.
+//! Smooth motions of one body about another in steps of one centimetre and one degree, for objects
+//! of about two metres; those of other sizes move in proportion.
 
 use super::Random;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -18,18 +18,21 @@ const TURN: f64 = TAU / 360.0;
 /// How much the directions of translation and rotation change in a step, radians.
 const WANDER: f64 = 0.05;
 
-/// The gap that separated motions keep about, and how far from it they are steered back with full strength, metres.
+/// The gap that separated motions keep about, and how far from it they are steered back with full
+/// strength, metres.
 const MIDDLE: f64 = 0.4;
 const HALF_RANGE: f64 = 0.35;
 /// Below this gap of any pair a separated motion is thrown away, metres.
 const CLEAR: f64 = 0.01;
 
-/// Ranges of the gap of grazing motions and of those through contact, metres, and the poses in which they go through them.
+/// Ranges of the gap of grazing motions and of those through contact, metres, and the poses in
+/// which they go through them.
 const GRAZE: (f64, f64) = (1e-6, 0.01);
 const CONTACT: (f64, f64) = (-0.05, 0.01);
 const PERIOD: f64 = 90.0;
 
-/// A body on its way: where its middle is, how it is turned, where it goes and about which axis it turns.
+/// A body on its way: where its middle is, how it is turned, where it goes and about which axis it
+/// turns.
 struct Walk {
     middle: Vector3<f64>,
     position: Vector3<f64>,
@@ -66,7 +69,8 @@ impl Walk {
     }
 }
 
-/// Motions on which every one of these pairs stays apart, the closest of them mostly by 5 to 75 cm, in units of so many metres.
+/// Motions on which every one of these pairs stays apart, the closest of them mostly by 5 to 75 cm,
+/// in units of so many metres.
 ///
 /// # Errors
 /// None that could be met: a pose that is no pose.
@@ -111,9 +115,10 @@ fn try_separated<S: Solid>(
     Ok(Some(trajectory))
 }
 
-/// Motions of steps of one size in all directions, `step` being both their length in units of so many metres and their angle in
-/// hundredths of its degrees: 0.01 is the usual step of a centimetre and a degree. Without a step, poses that have nothing to do with each
-/// other. The gap stays where that of [`separated`] motions does.
+/// Motions of steps of one size in all directions, `step` being both their length in units of so
+/// many metres and their angle in hundredths of its degrees: 0.01 is the usual step of a centimetre
+/// and a degree. Without a step, poses that have nothing to do with each other. The gap stays where
+/// that of [`separated`] motions does.
 ///
 /// # Errors
 /// None that could be met: a pose that is no pose.
@@ -156,7 +161,8 @@ pub fn stepping<S: Solid>(
     (1..=trajectories as u64).map(one).collect()
 }
 
-/// Motions of one body along the other with the gap going up and down between a micrometre and a centimetre.
+/// Motions of one body along the other with the gap going up and down between a micrometre and a
+/// centimetre.
 ///
 /// # Errors
 /// None that could be met: a pose that is no pose.
@@ -164,7 +170,8 @@ pub fn grazing(a: &Body, b: &Body, trajectories: usize, poses: usize) -> Result<
     along(a, b, trajectories, poses, GRAZE, settle)
 }
 
-/// Motions of one body along the other with the gap going up and down from a centimetre apart to five deep.
+/// Motions of one body along the other with the gap going up and down from a centimetre apart to
+/// five deep.
 ///
 /// # Errors
 /// None that could be met: a pose that is no pose.
@@ -172,8 +179,8 @@ pub fn through_contact(a: &Body, b: &Body, trajectories: usize, poses: usize) ->
     along(a, b, trajectories, poses, CONTACT, settle_signed)
 }
 
-/// Moves a body until its gap to another is as wanted, from the normal of the pose before and with its hint; tells the new
-/// normal.
+/// Moves a body until its gap to another is as wanted, from the normal of the pose before and with
+/// its hint; returns the new normal.
 type Settle = fn(&mut Walk, &Body, &Body, f64, Vector3<f64>, &mut WarmStart) -> Result<Vector3<f64>, PoseError>;
 
 /// Motions of one body along the other with the gap going up and down through a range.
@@ -205,8 +212,8 @@ fn along(
         .collect()
 }
 
-/// Moves the body along the normal until the gap is as wanted. One move is exact: the distance is convex in the translation
-/// and falls along the normal with slope 1.
+/// Moves the body along the normal until the gap is as wanted. One move is exact: the distance is
+/// convex in the translation and falls along the normal with slope 1.
 fn settle(
     walk: &mut Walk,
     a: &Body,
@@ -231,7 +238,8 @@ fn settle(
     Ok(normal)
 }
 
-/// The same by the signed distance. In overlap a move to another face may be shorter by then: a few moves come close.
+/// The same by the signed distance. In overlap a move to another face may be shorter by then: a few
+/// moves come close.
 fn settle_signed(
     walk: &mut Walk,
     a: &Body,
@@ -257,13 +265,14 @@ fn gap(a: &impl Solid, b: &impl Solid, pose: &Pose, warm: &mut WarmStart) -> (f6
     (answer.lower, answer.normal)
 }
 
-/// The poses as text: `r00 r01 r02 r10 .. r22 tx ty tz` on a line each, an empty line after each trajectory.
+/// The poses as text: `r00 r01 r02 r10 .. r22 tx ty tz` on a line each, an empty line after each
+/// trajectory.
 pub fn to_text(trajectories: &[Trajectory]) -> String {
     let mut text = String::new();
     for trajectory in trajectories {
         for pose in trajectory {
             let rotation = pose.rotation().to_rotation_matrix();
-            // Stored by columns; the text goes by rows. Writing to a string can not fail.
+            // Stored by columns; the text goes by rows. Writing to a string cannot fail.
             let rows = rotation.matrix().transpose();
             for number in rows.iter() {
                 let _ = write!(text, "{number:e} ");

@@ -54,7 +54,8 @@ impl Flight {
     }
 }
 
-/// When a box of these half-extents and a ball, metres, meet within `duration` seconds; none if they are not found to.
+/// When a box of these half-extents and a ball, metres, meet within `duration` seconds; none if
+/// they are not found to.
 pub fn parry_impact((half, a): (&Vector3<f64>, &Flight), (radius, b): (f64, &Flight), duration: f64) -> Option<f64> {
     let (cuboid, ball) = (Cuboid::new(Vector::new(half.x, half.y, half.z)), Ball::new(radius));
     let found = cast_shapes_nonlinear(&a.motion(), &cuboid, &b.motion(), &ball, 0.0, duration, true);

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use sublevel::body::{Body, Shape};
 use sublevel::fit::{FitError, FitOptions, Mesh, fit};
 
-/// Goes into every key. To be raised when a change of the fit makes other bodies of the same input: nothing else tells.
+/// Goes into every key. To be raised when a change of the fit makes other bodies of the same input:
+/// nothing else says.
 const REVISION: u32 = 1;
 
 /// A folder of kept fits.
@@ -19,7 +20,7 @@ pub struct Shelf {
 /// Why a fit is not to be had.
 #[derive(Debug, thiserror::Error)]
 pub enum ShelfError {
-    /// The folder can not be used.
+    /// The folder cannot be used.
     #[error("{}: {source}; choose another folder to keep fits in", path.display())]
     Io {
         /// File or folder.
@@ -35,7 +36,7 @@ pub enum ShelfError {
     Fit {
         /// What was fitted.
         name: String,
-        /// Why it can not be.
+        /// Why it cannot be.
         source: FitError,
     },
 }
@@ -56,8 +57,8 @@ impl Shelf {
         &self.folder
     }
 
-    /// What is kept of an earlier run for these very points, triangles and options, re-proven as any file is; else what `make` makes.
-    /// `what` is its name for people, such as "chair-d6".
+    /// What is kept of an earlier run for these very points, triangles and options, re-proven as
+    /// any file is; else what `make` makes. `what` is its name for people, such as "chair-d6".
     ///
     /// # Errors
     /// [`ShelfError`].
@@ -85,7 +86,8 @@ impl Shelf {
         Ok(made)
     }
 
-    /// The body that [`fit`] makes of the vertices of a mesh, under the mesh's name and the marks of its options.
+    /// The body that [`fit`] makes of the vertices of a mesh, under the mesh's name and the marks
+    /// of its options.
     ///
     /// # Errors
     /// [`ShelfError`].

@@ -32,7 +32,7 @@ pub struct Tally {
     pub failed: usize,
     /// Of them, those with overlap or touch.
     pub overlaps: usize,
-    /// Of each query that tells.
+    /// Of each query that says.
     iterations: Vec<u32>,
 }
 
@@ -44,7 +44,7 @@ impl Tally {
         self.iterations.extend(answer.iterations);
     }
 
-    /// Mean, median and worst number of iterations, if they are told.
+    /// Mean, median and worst number of iterations, if they are reported.
     pub fn iterations(&self) -> Option<(f64, f64, u32)> {
         let counts: Vec<f64> = self.iterations.iter().copied().map(f64::from).collect();
         let most = self.iterations.iter().max().filter(|most| **most > 0)?;
@@ -102,7 +102,8 @@ impl<'a> Row<'a> {
         Self::warm(label, trajectories, move |pose, (): &mut ()| query(pose))
     }
 
-    /// A row of batches of up to `most` consecutive poses; `batch` writes its answers where it is told to.
+    /// A row of batches of up to `most` consecutive poses; `batch` writes its answers where it is
+    /// asked to.
     pub fn batches<P, T: Clone + Default + 'a>(
         label: impl Into<String>,
         trajectories: &'a [Vec<P>],
@@ -139,8 +140,9 @@ impl<'a> Row<'a> {
         self.passes.push((self.time)(1));
     }
 
-    /// Times one pass in which each trajectory is walked nine times on end and the median walk counts: as coal's program does it, whose caches and
-    /// branches are warm by then. Slow queries are walked once.
+    /// Times one pass in which each trajectory is walked nine times on end and the median walk
+    /// counts: as coal's program does it, whose caches and branches are warm by then. Slow queries
+    /// are walked once.
     pub fn turn(&mut self) {
         // What takes long forgets the walk before by its end anyway.
         let walks = if self.nanoseconds() > SLOW_NS { 1 } else { WALKS };
@@ -149,7 +151,8 @@ impl<'a> Row<'a> {
 
     /// Nanoseconds per query: the median pass of each trajectory, summed.
     ///
-    /// Whole passes are long enough that other processes interrupt every one on a busy machine; trajectories are not.
+    /// Whole passes are long enough that other processes interrupt every one on a busy machine;
+    /// trajectories are not.
     pub fn nanoseconds(&self) -> f64 {
         let trajectories = self.passes.first().map_or(0, Vec::len);
         let of = |trajectory: usize| median(&self.passes.iter().map(|pass| pass[trajectory]).collect::<Vec<_>>());

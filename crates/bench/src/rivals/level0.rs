@@ -4,9 +4,10 @@
 //! min t   subject to   |E x - E y| <= t,   E g_i <= 1,   E h_j <= 1,   M(z_A), M(z_B) positive semidefinite
 //! ```
 //!
-//! over the moments of both bodies' normalized coordinates z up to the degree, M the matrix of the moments of all products of two
-//! monomials of half of it. It is the dual of the program of sums of squares with one Gram matrix per body, and exact for the same
-//! sets; it has fewer variables by far. Where the constraints are sos-convex, the first moments are the witnesses.
+//! over the moments of both bodies' normalized coordinates z up to the degree, M the matrix of the
+//! moments of all products of two monomials of half of it. It is the dual of the program of sums of
+//! squares with one Gram matrix per body, and exact for the same sets; it has fewer variables by
+//! far. Where the constraints are sos-convex, the first moments are the witnesses.
 
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -24,8 +25,8 @@ pub(crate) struct ConicProgram {
     entries: Vec<(usize, usize, f64)>,
     /// b.
     sides: Vec<f64>,
-    /// Nonnegative rows come first: so many; then a second-order cone of so many; then the upper triangles by columns of semidefinite matrices of
-    /// these sizes, off the diagonal times √2.
+    /// Nonnegative rows come first: so many; then a second-order cone of so many; then the upper
+    /// triangles by columns of semidefinite matrices of these sizes, off the diagonal times √2.
     nonnegative: usize,
     second_order: usize,
     semidefinite: Vec<usize>,

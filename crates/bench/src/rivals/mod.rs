@@ -1,4 +1,5 @@
-//! The obvious ways to a distance, at their best settings: plain Newton, a general nonlinear program, level 0 of the hierarchy.
+//! The obvious ways to a distance, at their best settings: plain Newton, a general nonlinear
+//! program, level 0 of the hierarchy.
 
 mod level0;
 mod newton;

@@ -1,4 +1,5 @@
-//! Newton's method on the optimality system of the distance, taken at its word: full steps, no safeguard, no test of the end.
+//! Newton's method on the optimality system of the distance, taken at its word: full steps, no
+//! safeguard, no test of the end.
 //!
 //! With the objective `|x - y|²/2`, which unlike `|x - y|` is smooth everywhere, the system is
 //!

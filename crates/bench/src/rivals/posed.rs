@@ -1,4 +1,5 @@
-//! The one constraint of a body in the world frame: what a solver is given that knows nothing of certificates and brackets.
+//! The one constraint of a body in the world frame: what a solver is given that knows nothing of
+//! certificates and brackets.
 
 use nalgebra::{Matrix3, Vector3};
 use sublevel::body::Body;
@@ -18,7 +19,8 @@ impl<'a> Posed<'a> {
         Self { body, rotation, translation: *pose.translation() }
     }
 
-    /// Constraint at a point of the world, derivatives per metre. It holds where the value is at most 1.
+    /// Constraint at a point of the world, derivatives per metre. It holds where the value is at
+    /// most 1.
     pub(crate) fn jet(&self, x: &Vector3<f64>) -> Jet {
         let at = self.rotation.tr_mul(&(x - self.translation));
         let jet = self.body.placement().jet(&self.body.constraints()[0], &at);
@@ -34,14 +36,16 @@ impl<'a> Posed<'a> {
         self.rotation * self.body.interior_point() + self.translation
     }
 
-    /// Where the ray from the interior point towards another point leaves the body; any ray if that is the same point.
+    /// Where the ray from the interior point towards another point leaves the body; any ray if that
+    /// is the same point.
     pub(crate) fn facing(&self, target: &Vector3<f64>) -> Vector3<f64> {
         let towards = self.body.normalization().linear * self.rotation.tr_mul(&(target - self.inside()));
         self.rotation * self.body.boundary_along(&towards.try_normalize(0.0).unwrap_or(Vector3::x())) + self.translation
     }
 }
 
-/// A pair of boundary points to start from: where the line between the interior points leaves both bodies.
+/// A pair of boundary points to start from: where the line between the interior points leaves both
+/// bodies.
 pub(crate) fn between([a, b]: &[Posed<'_>; 2]) -> [Vector3<f64>; 2] {
     [a.facing(&b.inside()), b.facing(&a.inside())]
 }

@@ -1,18 +1,21 @@
-//! A general solver of nonlinear programs: SLSQP, sequential quadratic programming after Kraft (ACM TOMS 20, 1994), as NLopt has it, in
-//! the translation of the crate `slsqp`.
+//! A general solver of nonlinear programs: SLSQP, sequential quadratic programming after Kraft (ACM
+//! TOMS 20, 1994), as NLopt has it, in the translation of the crate `slsqp`.
 //!
-//! It minimises `|x - y|²` over `p(x) <= 1`, `q(y) <= 1` in units of the size of the bodies, with exact gradients.
+//! It minimises `|x - y|²` over `p(x) <= 1`, `q(y) <= 1` in units of the size of the bodies, with
+//! exact gradients.
 
 use super::posed::Posed;
 use nalgebra::Vector3;
 use slsqp::{Func, StopTols, minimize};
 use std::cell::Cell;
 
-/// Relative change of the objective below which it stops: that of rounding. NLopt heeds it at feasible iterates only, and those of a convex constraint come
-/// from outside, so that a coarser one changes nothing: accuracy is bought by evaluations.
+/// Relative change of the objective below which it stops: that of rounding. NLopt heeds it at
+/// feasible iterates only, and those of a convex constraint come from outside, so that a coarser
+/// one changes nothing: accuracy is bought by evaluations.
 const CHANGE: f64 = 1e-16;
 
-/// Distance of the last points evaluated, metres, after at most so many evaluations of the objective, and how many they were.
+/// Distance of the last points evaluated, metres, after at most so many evaluations of the
+/// objective, and how many they were.
 pub(crate) fn slsqp(bodies: &[Posed<'_>; 2], start: [Vector3<f64>; 2], size_m: f64, most: u32) -> (f64, u32) {
     let (evaluations, last) = (Cell::new(0), Cell::new(f64::NAN));
     let origin = start[0];
@@ -43,8 +46,9 @@ pub(crate) fn slsqp(bodies: &[Posed<'_>; 2], start: [Vector3<f64>; 2], size_m: f
     let scaled: Vec<f64> = start.iter().flat_map(|x| <[f64; 3]>::from((x - origin) / size_m)).collect();
     let bounds = [(f64::NEG_INFINITY, f64::INFINITY); 6];
     let stop = StopTols { ftol_rel: CHANGE, ..StopTols::default() };
-    // Only the last point counts: what it returns is the best one that is feasible to the last digit, often the start, as the crate takes no
-    // tolerance of constraints and iterates come from outside. How it ended is seen from the error.
+    // Only the last point counts: what it returns is the best one that is feasible to the last
+    // digit, often the start, as the crate takes no tolerance of constraints and iterates come from
+    // outside. How it ended is seen from the error.
     let _ = minimize(objective, &scaled, &bounds, &constraints, (), most as usize, Some(stop));
     (last.get().sqrt() * size_m, evaluations.get())
 }

@@ -1,4 +1,5 @@
-//! Level 0 solved by clarabel, in a process of its own: clarabel's semidefinite cones need a BLAS, and this program needs none.
+//! Level 0 solved by clarabel, in a process of its own: clarabel's semidefinite cones need a BLAS,
+//! and this program needs none.
 
 use super::level0::ConicProgram;
 use crate::duel::peer::{PeerError, named, printed};
@@ -32,7 +33,8 @@ pub(crate) struct Solved {
 }
 
 impl Clarabel {
-    /// As `SUBLEVEL_CLARABEL` says; else the example beside this program, where cargo puts it; none if it is not there.
+    /// As `SUBLEVEL_CLARABEL` says; else the example beside this program, where cargo puts it; none
+    /// if it is not there.
     ///
     /// # Errors
     /// [`PeerError::NoProgram`].

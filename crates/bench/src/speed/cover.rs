@@ -1,7 +1,8 @@
-//! Balls that together contain every triangle of a mesh, which is what a body apart from the mesh can come near to.
+//! Balls that together contain every triangle of a mesh, which is what a body apart from the mesh
+//! can come near to.
 //!
-//! The triangles are cut small and begin as one group; the group with the largest ball is halved across its longest axis until
-//! there are as many as asked for.
+//! The triangles are cut small and begin as one group; the group with the largest ball is halved
+//! across its longest axis until there are as many as asked for.
 
 use nalgebra::Vector3;
 use sublevel::body::{Body, BodyError, Compound, CompoundError};
@@ -59,8 +60,9 @@ impl Group {
     }
 }
 
-/// A ball around points, the smallest but for [`SLACK`]: the smallest around a few of them, to which the farthest is added until none is
-/// outside. Exact ones take a look at every point in every one of thousands of steps.
+/// A ball around points, the smallest but for [`SLACK`]: the smallest around a few of them, to
+/// which the farthest is added until none is outside. Exact ones take a look at every point in
+/// every one of thousands of steps.
 fn around(points: &[Vector3<f64>]) -> EnclosingBall {
     let mut few: Vec<Vector3<f64>> = points.iter().take(1).copied().collect();
     loop {

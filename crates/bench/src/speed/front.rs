@@ -1,4 +1,5 @@
-//! Who is fastest at an accuracy: Pareto fronts, and how many times as fast as their peers ours are.
+//! Who is fastest at an accuracy: Pareto fronts, and how many times as fast as their peers ours
+//! are.
 
 /// A representation by what it costs and how wrong it is.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,8 +42,8 @@ pub(super) struct Standing {
     pub(super) allowed: f64,
 }
 
-/// The fastest of ours whose error is at most `error`, against peers. Any other of ours is slower: to look among them for one with slower peers
-/// would find a millisecond that beats a second.
+/// The fastest of ours whose error is at most `error`, against peers. Any other of ours is slower:
+/// to look among them for one with slower peers would find a millisecond that beats a second.
 pub(super) fn standing(entries: &[Entry], error: f64) -> Option<Standing> {
     let fastest = |ours: bool, error: f64| {
         let able = entries.iter().filter(move |e| e.ours == ours && e.error <= error && e.nanoseconds.is_finite());

@@ -1,7 +1,8 @@
-//! Exact distances of triangle meshes: both are trees of balls, and the pair of branches that may be nearest is opened first.
+//! Exact distances of triangle meshes: both are trees of balls, and the pair of branches that may
+//! be nearest is opened first.
 //!
-//! Parry answers the same question, and is timed at it, but looks at one mesh whole for each triangle of the other: a quarter of a second
-//! for meshes of 17 000 triangles.
+//! Parry answers the same question, and is timed at it, but looks at one mesh whole for each
+//! triangle of the other: a quarter of a second for meshes of 17 000 triangles.
 
 use crate::duel::{DuelError, Subject};
 use nalgebra::{Isometry3, Vector3};

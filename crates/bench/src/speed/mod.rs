@@ -1,4 +1,5 @@
-//! Speed against accuracy: every representation of pairs of objects by how wrong it is and how long a query takes.
+//! Speed against accuracy: every representation of pairs of objects by how wrong it is and how long
+//! a query takes.
 
 mod cover;
 mod front;
@@ -37,9 +38,9 @@ pub struct Speed {
     races: Vec<Race>,
 }
 
-/// Measures all pairs of the meshes in `data`, or two of them with fewer representations and poses if `quick`. Fits are kept on the
-/// `shelf`; coal takes part where `SUBLEVEL_COAL` names the program that times it. `progress` hears what is going on and can
-/// stop it.
+/// Measures all pairs of the meshes in `data`, or two of them with fewer representations and poses
+/// if `quick`. Fits are kept on the `shelf`; coal takes part where `SUBLEVEL_COAL` names the
+/// program that times it. `progress` hears what is going on and can stop it.
 ///
 /// # Errors
 /// [`DuelError`].
@@ -55,10 +56,10 @@ pub fn speed(
         Effort { quick, trajectories: 4, poses: 400, passes: 5, slow_poses: 8, slow_passes: 2 }
     };
     let coal = Coal::from_environment()?;
-    let mut told = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };
-    // A mesh that is missing is told before any work.
+    let mut announce = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };
+    // A mesh that is missing is reported before any work.
     let pairs = pairs(data, quick)?;
-    let races = pairs.iter().map(|[a, b]| race([a, b], &effort, shelf, coal.as_ref(), &mut told));
+    let races = pairs.iter().map(|[a, b]| race([a, b], &effort, shelf, coal.as_ref(), &mut announce));
     let races = races.collect::<Result<Vec<_>, _>>()?;
     let coal = coal.as_ref().map(Coal::version);
     Ok(Speed { machine: Machine::this(), coal, quick, passes: effort.passes, races })

@@ -1,22 +1,26 @@
 //! Convex hulls with fewer vertices that still contain the object.
 //!
-//! Planes that touch the hull are intersected. It begins with a tetrahedron of them; then, again and again, the vertex that
-//! stands out farthest from the hull is cut off by the plane that touches the hull at the point nearest to it, across the way to it.
-//! That is the greedy way to the least Hausdorff distance. Intersections of half-spaces that hold the origin are polar to
-//! convex hulls: the plane `n·x <= h` is the point `n / h`, and a facet of the hull of these points is a vertex.
+//! Planes that touch the hull are intersected. It begins with a tetrahedron of them; then, again
+//! and again, the vertex that stands out farthest from the hull is cut off by the plane that
+//! touches the hull at the point nearest to it, across the way to it. That is the greedy way to the
+//! least Hausdorff distance. Intersections of half-spaces that hold the origin are polar to convex
+//! hulls: the plane `n·x <= h` is the point `n / h`, and a facet of the hull of these points is a
+//! vertex.
 
 use nalgebra::{Matrix3, Vector3};
 use parry3d_f64::math::Vector;
 use parry3d_f64::transformation::try_convex_hull;
 use sublevel::optimize::{Corner, gjk};
 
-/// How much is left of the room between two vertices that count as one, relative to the size of the hull.
+/// How much is left of the room between two vertices that count as one, relative to the size of the
+/// hull.
 const SAME: f64 = 1e-9;
-/// Each plane is moved out by this part of the size: rounding leaves no point of the object outside.
+/// Each plane is moved out by this part of the size: rounding leaves no point of the object
+/// outside.
 const SLACK: f64 = 1e-12;
 
-/// For each of `counts` the vertices of a polytope around the hull of `hull`, whose points are its vertices; at most so many. None
-/// where the hull itself has no more, or has none that simple.
+/// For each of `counts` the vertices of a polytope around the hull of `hull`, whose points are its
+/// vertices; at most so many. None where the hull itself has no more, or has none that simple.
 pub(super) fn outer(hull: &[Vector3<f64>], counts: &[usize]) -> Vec<Option<Vec<Vector3<f64>>>> {
     let center = hull.iter().sum::<Vector3<f64>>() / hull.len() as f64;
     let points: Vec<Vector3<f64>> = hull.iter().map(|x| x - center).collect();
@@ -69,7 +73,8 @@ fn excess(points: &[Vector3<f64>], v: &Vector3<f64>, size: f64) -> Vector3<f64> 
     if nearest.common.is_some() { Vector3::zeros() } else { v - nearest.x }
 }
 
-/// The vertices of the intersection of planes given by their polar points; none if it is not bounded or can not be computed.
+/// The vertices of the intersection of planes given by their polar points; none if it is not
+/// bounded or cannot be computed.
 fn vertices(planes: &[Vector3<f64>], size: f64) -> Option<Vec<Vector3<f64>>> {
     let polar: Vec<Vector> = planes.iter().map(|p| Vector::new(p.x, p.y, p.z) * size).collect();
     // The hull code asserts its topology, which rounding can break.

@@ -1,4 +1,5 @@
-//! What ours are compared with: hulls, hulls made simpler, boxes, balls and meshes of other libraries.
+//! What ours are compared with: hulls, hulls made simpler, boxes, balls and meshes of other
+//! libraries.
 
 use super::outer::outer;
 use crate::duel::DuelError;
@@ -24,7 +25,8 @@ pub(super) struct HullPair {
     pub(super) parry: Hulls,
 }
 
-/// The exact hulls, and simpler ones of as many vertices as are allowed at each of [`COUNTS`], the exact one where an object has no more.
+/// The exact hulls, and simpler ones of as many vertices as are allowed at each of [`COUNTS`], the
+/// exact one where an object has no more.
 pub(super) fn hulls(a: &Subject, b: &Subject, quick: bool) -> Result<Vec<HullPair>, DuelError> {
     let counts = if quick { &COUNTS[1..3] } else { &COUNTS[..] };
     let simple = [a, b].map(|subject| outer(&subject.hull, counts));
@@ -44,7 +46,8 @@ pub(super) fn hulls(a: &Subject, b: &Subject, quick: bool) -> Result<Vec<HullPai
     Ok(all)
 }
 
-/// The smallest balls and boxes of a pair as parry's shapes, with the poses of the second in the frame of the first.
+/// The smallest balls and boxes of a pair as parry's shapes, with the poses of the second in the
+/// frame of the first.
 pub(super) struct Simple {
     balls: [Ball; 2],
     boxes: [Cuboid; 2],

@@ -45,7 +45,8 @@ impl Line {
         }
     }
 
-    /// Mean model error, 0 for what is exact; none for what does not contain the truth, so that it has no error of one sign.
+    /// Mean model error, 0 for what is exact; none for what does not contain the truth, so that it
+    /// has no error of one sign.
     pub(super) fn error(&self, truth: Truth) -> Option<f64> {
         let error = if truth == Truth::Hulls { self.hull } else { self.mesh };
         let held = match (truth, self.who) {

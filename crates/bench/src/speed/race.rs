@@ -21,7 +21,7 @@ pub(super) enum Who {
     ParryBall,
     /// Parry's box.
     ParryBox,
-    /// Parry's GJK on hulls of at most so many vertices, or exact ones.
+    /// Parry's GJK on hulls of at most this many vertices, or exact ones.
     ParryHull(Option<usize>),
     /// Coal's.
     CoalHull(Option<usize>),
@@ -47,15 +47,16 @@ pub(super) struct Line {
     pub(super) hull: ModelError,
     /// Against the meshes.
     pub(super) mesh: ModelError,
-    /// Nanoseconds per query without, with a hint from the pose before, and in a batch; NaN where there is no such form.
+    /// Nanoseconds per query without, with a hint from the pose before, and in a batch; NaN where
+    /// there is no such form.
     pub(super) cold: f64,
     pub(super) warm: f64,
     pub(super) batch: f64,
     /// Queries of the cold form that did not converge, and those that found overlap.
     pub(super) failed: usize,
     pub(super) overlaps: usize,
-    /// Answers of any form whose bracket does not hold the truth: cold, warm and batch apart from each other, or the object nearer than
-    /// proven.
+    /// Answers of any form whose bracket does not hold the truth: cold, warm and batch apart from
+    /// each other, or the object nearer than proven.
     pub(super) contradictions: usize,
 }
 
@@ -72,7 +73,8 @@ pub(super) struct Race {
     pub(super) lines: Vec<Line>,
 }
 
-/// Distances may contradict each other by as much, relative to the larger diameter: what parry's GJK is good for.
+/// Distances may contradict each other by as much, relative to the larger diameter: what parry's
+/// GJK is good for.
 const AGREEMENT: f64 = 1e-7;
 /// Most poses of a batch.
 const BATCH: usize = 1024;
@@ -90,21 +92,21 @@ pub(super) fn race(
     effort: &Effort,
     shelf: &Shelf,
     coal: Option<&Coal>,
-    told: &mut dyn FnMut(&str) -> Result<(), DuelError>,
+    announce: &mut dyn FnMut(&str) -> Result<(), DuelError>,
 ) -> Result<Race, DuelError> {
     let name = format!("{}-{}", a.name, b.name);
     let diameter_m = a.diameter_m.max(b.diameter_m);
     let mut ours = Vec::new();
     for method in Method::all(effort.quick) {
-        told(&format!("{name}: {}", method.name()))?;
+        announce(&format!("{name}: {}", method.name()))?;
         ours.push(Ours { method, a: method.build(a, shelf)?, b: method.build(b, shelf)? });
     }
-    told(&format!("{name}: poses"))?;
+    announce(&format!("{name}: poses"))?;
     let apart = ours.iter().filter(|o| matches!(o.method, Method::Body { refine: false, .. }));
     let apart: Vec<(&Shape, &Shape)> = apart.map(|o| (&o.a, &o.b)).collect();
     let poses = motion::separated(&apart, 0.5 * diameter_m, effort.trajectories, effort.poses)?;
     let parry_poses: Vec<Vec<ParryPose>> = poses.iter().map(|t| t.iter().map(parry_pose).collect()).collect();
-    told(&format!("{name}: exact distances"))?;
+    announce(&format!("{name}: exact distances"))?;
     let hulls = hulls(a, b, effort.quick)?;
     let meshes = Meshes::new([a, b])?;
     let simple = Simple::new(a, b, &poses);
@@ -114,7 +116,7 @@ pub(super) fn race(
 
     let mut lines = Vec::new();
     for one in &ours {
-        told(&format!("{name}: error of {}", one.method.name()))?;
+        announce(&format!("{name}: error of {}", one.method.name()))?;
         lines.push(one.line(&poses, &truth, diameter_m));
     }
     let same_as = |method: Method, lines: &[Line]| {
@@ -148,7 +150,7 @@ pub(super) fn race(
         runs.extend(run.map(|run| (Who::CoalHull(pair.count), run)));
     }
     for pass in 0..effort.passes {
-        told(&format!("{name}: pass {} of {}", pass + 1, effort.passes))?;
+        announce(&format!("{name}: pass {} of {}", pass + 1, effort.passes))?;
         for (_, run) in &mut runs {
             run.pass()?;
         }
@@ -216,7 +218,7 @@ impl Ours {
             for (pose, batched) in trajectory.iter().zip(batch) {
                 let cold = distance(&self.a, &origin, &self.b, pose, &options, &mut WarmStart::default());
                 let warm = distance(&self.a, &origin, &self.b, pose, &options, &mut hint);
-                // In overlap the depth tells how far off it is.
+                // In overlap the depth says how far off it is.
                 let overlapping = cold.upper <= 0.0;
                 values.push(if overlapping {
                     signed_distance(&self.a, &origin, &self.b, pose, &options, &mut WarmStart::default()).value()

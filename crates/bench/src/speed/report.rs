@@ -8,7 +8,8 @@ use crate::duel::parry_version;
 use std::fmt::Write;
 use sublevel::measure::DEFAULT_ACCURACY;
 
-/// The figures: mean model errors, and how many times as fast as the fastest peer of equal or better accuracy one of ours is to be.
+/// The figures: mean model errors, and how many times as fast as the fastest peer of equal or
+/// better accuracy one of ours is to be.
 const FIGURES: [(f64, f64); 2] = [(0.05, 2.0), (0.03, 1.6)];
 
 const NOTES: &str = "\
@@ -35,7 +36,7 @@ impl Speed {
     /// The report; the pictures lie beside it under these names.
     pub fn markdown(&self, pictures: &[&str]) -> String {
         let mut text = String::from("# Speed against accuracy\n\n");
-        // Writing to a string can not fail.
+        // Writing to a string cannot fail.
         let flags = if self.quick { " --quick" } else { "" };
         let _ = writeln!(text, "{}\n", self.machine.head(&format!("sublevel-bench speed --data DIR{flags}")));
         self.write_builds(&mut text);

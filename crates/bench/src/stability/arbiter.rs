@@ -1,8 +1,9 @@
 //! The truth about a distance, from bounds that do not depend on the solver which is judged.
 //!
-//! Whoever proposes them, two points inside the bodies are at least as far apart as the bodies, and the gap between the bodies'
-//! heights along a direction ([`Body::support`]) is at most the distance. The arbiter takes the best of all proposals and of
-//! directions all around: an answer that is too long is refuted by somebody's points, one that is too short by somebody's direction.
+//! Whoever proposes them, two points inside the bodies are at least as far apart as the bodies, and
+//! the gap between the bodies' heights along a direction ([`Body::support`]) is at most the
+//! distance. The arbiter takes the best of all proposals and of directions all around: an answer
+//! that is too long is refuted by somebody's points, one that is too short by somebody's direction.
 
 use super::case::Case;
 use nalgebra::{Matrix3, Matrix3xX, Vector3};
@@ -53,7 +54,8 @@ pub(super) fn judge_along(
     let sizes = a.circumscribed().radius + b.circumscribed().radius;
     let apart = pose_a.translation() - pose_b.translation();
     let away = pose_a.translation().norm().max(pose_b.translation().norm());
-    // Coordinates in the world are rounded in proportion to themselves, heights to the distance of the bodies.
+    // Coordinates in the world are rounded in proportion to themselves, heights to the distance of
+    // the bodies.
     let floor = 8.0 * f64::EPSILON * (apart.norm() + sizes) + 4.0 * f64::EPSILON * away;
     if let Some(exact) = case.exact {
         return Truth { lower: exact, upper: exact, floor };
@@ -74,7 +76,8 @@ pub(super) fn judge_along(
 }
 
 impl Case {
-    /// The gap between the bodies' heights along a unit vector from the second to the first, metres: at most their distance.
+    /// The gap between the bodies' heights along a unit vector from the second to the first,
+    /// metres: at most their distance.
     pub(super) fn height(&self, n: &Vector3<f64>) -> f64 {
         let Self { a, pose_a, b, pose_b, .. } = self;
         n.dot(&(pose_a.translation() - pose_b.translation())) - reach(a, pose_a, &-n) - reach(b, pose_b, n)
@@ -99,7 +102,8 @@ fn reach(body: &Body, pose: &Pose, n: &Vector3<f64>) -> f64 {
     body.support(&n).height_m + n.dot(body.interior_point())
 }
 
-/// As [`reach`], from tangent planes at a point of the body's frame: with any `m_i >= 0`, `r = n - Σ m_i ∇g_i` and convex g_i,
+/// As [`reach`], from tangent planes at a point of the body's frame: with any `m_i >= 0`, `r = n -
+/// Σ m_i ∇g_i` and convex g_i,
 ///
 /// ```text
 /// n·y <= Σ m_i (∇g_i·x + 1 - g_i(x)) + r·c + Σ |(L⁻ᵀ r)_k| E_k
@@ -132,7 +136,8 @@ fn tangent_reach(body: &Body, pose: &Pose, n: &Vector3<f64>, x: &Vector3<f64>, a
     plane_reach(body, &n, x, &samples)
 }
 
-/// Share of a surface's mean curvature that is added to its curvatures: of higher degree it has none across a plane of symmetry.
+/// Share of a surface's mean curvature that is added to its curvatures: of higher degree it has
+/// none across a plane of symmetry.
 const RIDGE: f64 = 1e-9;
 
 /// Steps of Newton's method towards the point farthest along a direction.
@@ -167,7 +172,8 @@ fn plane_reach(body: &Body, n: &Vector3<f64>, x: &Vector3<f64>, samples: &[(f64,
     if reach.is_finite() { reach } else { f64::INFINITY }
 }
 
-/// The point in the body's frame; one outside moved to the boundary, straight towards the interior point.
+/// The point in the body's frame; one outside moved to the boundary, straight towards the interior
+/// point.
 fn drawn_in(body: &Body, pose: &Pose, x: &Vector3<f64>) -> Vector3<f64> {
     let x = pose.rotation().inverse_transform_vector(&(x - pose.translation()));
     if body.value(&x) <= 1.0 {

@@ -23,7 +23,8 @@ pub(super) struct Case {
     pub(super) exact: Option<f64>,
     /// Largest error of our answers, metres, where the family asks for more than a true bracket.
     pub(super) bound: Option<f64>,
-    /// Largest width, metres, that the bracket of a case below the rounding floor may keep; it must say so then.
+    /// Largest width, metres, that the bracket of a case below the rounding floor may keep; it must
+    /// say so then.
     pub(super) floor: f64,
     /// What the case is, for people.
     pub(super) what: String,
@@ -73,7 +74,8 @@ impl Case {
 pub enum Verdict {
     /// As it should be.
     Pass,
-    /// The answer is off by this much: in units of the smaller body, or whatever the family compares.
+    /// The answer is off by this much: in units of the smaller body, or whatever the family
+    /// compares.
     Off(f64),
     /// It claims to be what it is not.
     WrongStatus(String),
@@ -112,7 +114,7 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// Why a case can not even be put.
+/// Why a case cannot even be put.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub(super) enum CaseError {
     /// A body.

@@ -104,8 +104,8 @@ impl Method {
         }
     }
 
-    /// Most cases of a family that a quick run and a full one put to it: those of others take long, semidefinite programs up to a second
-    /// each.
+    /// Most cases of a family that a quick run and a full one put to it: those of others take long,
+    /// semidefinite programs up to a second each.
     pub(super) fn most_cases(self) -> [u64; 2] {
         match self {
             Self::Cold | Self::Warm | Self::Batch => [u64::MAX; 2],
@@ -140,7 +140,7 @@ pub(super) struct Reply {
 }
 
 impl Case {
-    /// Puts the case to a method, and judges what it says. None where the method can not be asked.
+    /// Puts the case to a method, and judges what it says. None where the method cannot be asked.
     pub(super) fn put(&self, method: Method) -> Result<Option<Verdict>, CaseError> {
         Ok(self.hear(method)?.map(|said| said.verdict))
     }
@@ -192,7 +192,8 @@ impl Case {
         })
     }
 
-    /// What another measure of ours says, by the pose of the second body: without a hint, or warm with that of the pose nearby.
+    /// What another measure of ours says, by the pose of the second body: without a hint, or warm
+    /// with that of the pose nearby.
     pub(super) fn measured<T>(
         &self,
         method: Method,
@@ -212,7 +213,8 @@ impl Case {
         self.measured(method, |pose_b, warm| signed_distance(a, pose_a, b, pose_b, &options, warm))
     }
 
-    /// Nearest points and normal as a method finds them. None where it can not be asked: of hulls they are others.
+    /// Nearest points and normal as a method finds them. None where it cannot be asked: of hulls
+    /// they are others.
     pub(super) fn proposed(&self, method: Method) -> Result<Option<Proposal>, CaseError> {
         match method {
             Method::Cold | Method::Warm | Method::Batch => Ok(Some(proposal(&self.ours(method)?))),
@@ -267,7 +269,8 @@ impl Case {
         if iterations > self.limit.unwrap_or(MAX_ITERATIONS) {
             return Verdict::WrongStatus(format!("{iterations} iterations"));
         }
-        // Points that were proposed may all be wrong: they decide only where directions confirm them.
+        // Points that were proposed may all be wrong: they decide only where directions confirm
+        // them.
         if !self.is_known_by(truth) {
             return Verdict::WrongStatus(format!("not confirmed: [{:e}, {:e}] m", truth.lower, truth.upper));
         }
@@ -292,8 +295,8 @@ impl Case {
         truth.upper - truth.lower <= (self.accuracy * self.small()).max(self.floor) + 2.0 * truth.floor
     }
 
-    /// How far the witnesses are outside of their bodies, as levels of the polynomials, beyond what coordinates that are rounded by
-    /// `floor` metres explain.
+    /// How far the witnesses are outside of their bodies, as levels of the polynomials, beyond what
+    /// coordinates that are rounded by `floor` metres explain.
     fn beyond(&self, answer: &Distance, floor: f64) -> f64 {
         let of = |body: &Body, pose: &Pose, x: &Vector3<f64>| {
             let x = pose.rotation().inverse_transform_vector(&(x - pose.translation()));
@@ -304,7 +307,7 @@ impl Case {
         of(&self.a, &self.pose_a, &answer.witness_a).max(of(&self.b, &self.pose_b, &answer.witness_b))
     }
 
-    /// The answer of somebody else; none if it can not be asked.
+    /// The answer of somebody else; none if it cannot be asked.
     pub(super) fn ask(&self, method: Method) -> Result<Option<Reply>, CaseError> {
         let plain = |value| Reply { value, proposal: Proposal::default(), own: None };
         Ok(match method {
@@ -397,8 +400,9 @@ fn in_folder<T>(work: impl FnOnce(&Path) -> Result<T, PeerError>) -> Result<T, C
 /// Most times that the search for the distance of hulls goes on from the direction it found.
 const RESTARTS: usize = 50;
 
-/// The distance of the hulls of points, the second ones posed in the frame of the first: between points of theirs, and along the line
-/// between these; bounds that do not meet are all that is known.
+/// The distance of the hulls of points, the second ones posed in the frame of the first: between
+/// points of theirs, and along the line between these; bounds that do not meet are all that is
+/// known.
 fn polytopes(a: &[Vector3<f64>], b: &[Vector3<f64>], relative: &Pose, small: f64) -> Truth {
     let b: Vec<_> = b.iter().map(|y| relative.transform_point(y)).collect();
     let farthest = |points: &[Vector3<f64>], n: &Vector3<f64>| {

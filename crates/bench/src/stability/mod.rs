@@ -1,7 +1,8 @@
-//! The stability table: families of queries that broke collision libraries, put to our solver and to others.
+//! The stability table: families of queries that broke collision libraries, put to our solver and
+//! to others.
 //!
-//! Each case is drawn from its seed alone and judged by bounds that do not depend on the solver (`arbiter`), in a child process that is
-//! stopped where it hangs (`runner`).
+//! Each case is drawn from its seed alone and judged by bounds that do not depend on the solver
+//! (`arbiter`), in a child process that is stopped where it hangs (`runner`).
 
 mod arbiter;
 mod case;
@@ -46,9 +47,10 @@ pub struct Stability {
     rows: Vec<Row>,
 }
 
-/// Puts all families to these methods, a tenth of the cases if `quick`. `program` is what to start for the children: this one, with the
-/// command `chart stability`. Coal takes part where `SUBLEVEL_COAL` names the program that times it, clarabel where its example is built. `progress` hears what is going on
-/// and can stop it.
+/// Puts all families to these methods, a tenth of the cases if `quick`. `program` is what to start
+/// for the children: this one, with the command `chart stability`. Coal takes part where
+/// `SUBLEVEL_COAL` names the program that times it, clarabel where its example is built. `progress`
+/// hears what is going on and can stop it.
 ///
 /// # Errors
 /// [`DuelError`].

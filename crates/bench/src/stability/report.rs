@@ -11,7 +11,7 @@ use std::str::FromStr;
 /// Heading of the CSV.
 const HEAD: &str = "family,name,method,cases,failed,off,worst,wrong_status,no_answer,hang,crash,first,failed_seeds";
 
-/// The table to guard against can not be read.
+/// The table to guard against cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("line {line} is not one of a stability table ({HEAD}); give the stability.csv of an earlier run")]
 pub struct GuardError {
@@ -110,7 +110,7 @@ impl Stability {
     /// The report.
     pub fn markdown(&self) -> String {
         let mut text = String::from("# Stability where methods fail\n\n");
-        // Writing to a string can not fail.
+        // Writing to a string cannot fail.
         let flags = if self.quick { " --quick" } else { "" };
         let _ = writeln!(
             text,
@@ -142,7 +142,7 @@ impl Stability {
         text.push_str(&self.table());
         text.push_str(
             "\nErrors are relative to the smaller body, of normals in radians, of gradients relative to their norm, of times to the whole turn. \
-             `-`: the method can not be asked. Families 17, 23 and 24 are about scenes, which are not measured here. \
+             `-`: the method cannot be asked. Families 17, 23 and 24 are about scenes, which are not measured here. \
              The hulls lie inside of the bodies: where these touch, those are about a thousandth apart, so that the rows about contact ask less of GJK. \
              Cases of 1, 7, 10, 11, 15 and 19 are of several answers, which must also go together; of those of 4 others than ours get the first pair. \
              Of signed, level and growth distances, impacts and fits only ours and those of parry's that are named here are asked. \
@@ -207,7 +207,8 @@ impl Stability {
         text
     }
 
-    /// What our cells lost against an earlier run: cases that fail now and did not then, and cells that are not put any more.
+    /// What our cells lost against an earlier run: cases that fail now and did not then, and cells
+    /// that are not put any more.
     pub fn lost_against(&self, earlier: &Earlier) -> Vec<Lost> {
         let mut lost = Vec::new();
         for row in &self.rows {

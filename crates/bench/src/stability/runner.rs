@@ -34,7 +34,7 @@ pub(super) struct Cell {
 #[derive(Debug, Serialize, Deserialize)]
 struct Line {
     seed: u64,
-    /// None where the method can not be asked.
+    /// None where the method cannot be asked.
     verdict: Option<Verdict>,
 }
 
@@ -79,7 +79,8 @@ impl std::str::FromStr for Share {
     }
 }
 
-/// Puts the cases of a share in this process, and writes a line for each as soon as it is judged: of JSON, or for people.
+/// Puts the cases of a share in this process, and writes a line for each as soon as it is judged:
+/// of JSON, or for people.
 ///
 /// # Errors
 /// What stands in the way of writing.
@@ -89,14 +90,14 @@ pub fn serve(share: &Share, as_json: bool, out: &mut impl Write) -> std::io::Res
             let verdict = match family.put(seed, share.method) {
                 Ok(verdict) => verdict,
                 Err(CaseError::Crashed(_)) => Some(Verdict::Crash),
-                Err(error) => Some(Verdict::WrongStatus(format!("the case can not be put: {error}"))),
+                Err(error) => Some(Verdict::WrongStatus(format!("the case cannot be put: {error}"))),
             };
             if as_json {
                 serde_json::to_writer(&mut *out, &Line { seed, verdict })?;
                 writeln!(out)?;
             } else {
                 let what = family.describe(seed);
-                let said = verdict.as_ref().map_or("can not be asked".to_owned(), Verdict::to_string);
+                let said = verdict.as_ref().map_or("cannot be asked".to_owned(), Verdict::to_string);
                 writeln!(
                     out,
                     "{} {}, seed {seed}, {}: {said}\n{what}",
@@ -118,7 +119,7 @@ enum End {
     Crashed,
 }
 
-/// Puts so many cases of a family to a method; none if it can not be asked.
+/// Puts so many cases of a family to a method; none if it cannot be asked.
 pub(super) fn run(program: &Path, family: &Family, method: Method, count: u64) -> std::io::Result<Option<Cell>> {
     let mut cell = Cell { method, cases: 0, left_out: 0, failures: Vec::new() };
     let (mut next, mut lost, mut asked) = (0, 0, false);

@@ -1,5 +1,5 @@
-//! The bodies of the catalogue: ellipsoids E, superellipsoids Q2k, rounded cylinders C2k, rounded octahedral prisms P2k, boxes B,
-//! cylinders, and fitted ones F.
+//! The bodies of the catalogue: ellipsoids E, superellipsoids Q2k, rounded cylinders C2k, rounded
+//! octahedral prisms P2k, boxes B, cylinders, and fitted ones F.
 
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
@@ -21,7 +21,7 @@ pub(super) enum ZooError {
     /// It has no certificate.
     #[error(transparent)]
     Certificate(#[from] NoCertificate),
-    /// It can not be fitted.
+    /// It cannot be fitted.
     #[error(transparent)]
     Fit(#[from] FitError),
 }

@@ -1,4 +1,5 @@
-//! The paper's Table I, computed anew: the volumes of bounding sets of five meshes, beside those printed, and what they cost to build.
+//! The paper's Table I, computed again: the volumes of bounding sets of five meshes, beside those
+//! printed, and what they cost to build.
 
 mod pictures;
 mod report;
@@ -23,7 +24,7 @@ const QUICK_DEGREE: usize = 4;
 /// Why there is no table.
 #[derive(Debug, thiserror::Error)]
 pub enum Table1Error {
-    /// A mesh can not be read.
+    /// A mesh cannot be read.
     #[error(
         "{0}; the meshes 10, 101, 121, 181 and 361 of the Princeton Mesh Segmentation Benchmark are needed as .off files"
     )]
@@ -110,13 +111,14 @@ pub struct Table1Progress {
     pub at: String,
 }
 
-/// Builds every set of the table around the meshes `10.off`, `101.off`, ... in `meshes`; `quick` leaves out what is above degree 4.
+/// Builds every set of the table around the meshes `10.off`, `101.off`, ... in `meshes`; `quick`
+/// leaves out what is above degree 4.
 ///
-/// Takes about five minutes on one core, half a minute if quick. A fit that fails is a cell that says so. `progress` hears of every
-/// cell and of every Newton step in between, and can stop it.
+/// Takes about five minutes on one core, half a minute if quick. A fit that fails is a cell that
+/// says so. `progress` hears of every cell and of every Newton step in between, and can stop it.
 ///
 /// # Errors
-/// [`Table1Error`]: a mesh that can not be read, or the callback's wish.
+/// [`Table1Error`]: a mesh that cannot be read, or the callback's wish.
 pub fn table1(
     meshes: &Path,
     quick: bool,
@@ -126,21 +128,21 @@ pub fn table1(
     let subjects = subjects.into_iter().collect::<Result<Vec<_>, _>>()?;
     let rows: Vec<Row> =
         rows().into_iter().filter(|row| !quick || row.method.degree().is_none_or(|d| d <= QUICK_DEGREE)).collect();
-    let mut told = Table1Progress { done: 0, cells: rows.len() * subjects.len(), at: String::new() };
+    let mut announce = Table1Progress { done: 0, cells: rows.len() * subjects.len(), at: String::new() };
     let mut table = Table1 { machine: Machine::this(), subjects, rows: Vec::new() };
     for row in rows {
         let mut cells = Vec::new();
         for subject in &table.subjects {
-            told.at = format!("{} around the {}", row.method.name(), subject.name);
-            if progress(&told).is_break() {
+            announce.at = format!("{} around the {}", row.method.name(), subject.name);
+            if progress(&announce).is_break() {
                 return Err(Table1Error::Cancelled);
             }
-            let made = subject.make(row.method, &mut || progress(&told));
+            let made = subject.make(row.method, &mut || progress(&announce));
             cells.push(match made {
                 Err(FitError::Cancelled) => return Err(Table1Error::Cancelled),
                 made => made.map_err(|error| error.to_string()),
             });
-            told.done += 1;
+            announce.done += 1;
         }
         table.rows.push((row, cells));
     }

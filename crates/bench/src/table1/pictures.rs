@@ -136,7 +136,8 @@ impl Table1 {
 }
 
 impl Subject {
-    /// The mesh with its vertices on a grid of about a pixel, each triangle of the picture once: tens of kilobytes, not hundreds.
+    /// The mesh with its vertices on a grid of about a pixel, each triangle of the picture once:
+    /// tens of kilobytes, not hundreds.
     fn picture(&self, view: View) -> Outline {
         let extent = self.mesh.points.iter().map(Vector3::amax).fold(0.0, f64::max);
         let cell = 2.0 * extent / GRID;
@@ -155,8 +156,8 @@ impl Subject {
     }
 }
 
-/// A box around the largest of the level sets: p is convex, so that {p <= 2} is no more than `(2 - min p)/(1 - min p)` times as large
-/// as the body, about the point of the least value.
+/// A box around the largest of the level sets: p is convex, so that {p <= 2} is no more than `(2 -
+/// min p)/(1 - min p)` times as large as the body, about the point of the least value.
 fn grown(body: &Body) -> Aabb {
     let factor = (LEVELS[0] - body.min_value()) / (1.0 - body.min_value());
     let (bounds, center) = (body.bounding_box(), body.interior_point());

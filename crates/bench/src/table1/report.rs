@@ -1,4 +1,5 @@
-//! The table as Markdown for people, as CSV for programs, and as a plot of volume against construction time.
+//! The table as Markdown for people, as CSV for programs, and as a plot of volume against
+//! construction time.
 
 use super::rows::{MESHES, Method};
 use super::{Made, Table1};
@@ -28,10 +29,11 @@ ball, too.
 ";
 
 impl Table1 {
-    /// The report: the machine, the table, how to read it, and its pictures, which lie beside it under these names.
+    /// The report: the machine, the table, how to read it, and its pictures, which lie beside it
+    /// under these names.
     pub fn markdown(&self, pictures: &[&str]) -> String {
-        let mut text = String::from("# Table I, computed anew\n\n");
-        // Writing to a string can not fail.
+        let mut text = String::from("# Table I, computed again\n\n");
+        // Writing to a string cannot fail.
         let _ = writeln!(text, "{}\n", self.machine.head("sublevel-bench table1"));
         let heads: Vec<String> = MESHES.iter().map(|(name, number)| format!("{name} ({number})")).collect();
         let _ = writeln!(text, "| set | {} | median s |\n|---{}|---|", heads.join(" | "), "|---".repeat(heads.len()));
@@ -128,7 +130,8 @@ impl Table1 {
     }
 }
 
-/// The group of a row in the plot. Boxes and hulls are no sets of one polynomial, and the hull's ratio is 1.
+/// The group of a row in the plot. Boxes and hulls are no sets of one polynomial, and the hull's
+/// ratio is 1.
 fn style(method: Method) -> Option<(&'static str, Ink, Marker)> {
     Some(match method {
         Method::Ball => ("ball", Ink::Grey, Marker::Disc),

@@ -1,4 +1,5 @@
-//! Warm starts: what a hint from the pose before is worth, by how far that pose is away; and the paper's experiment.
+//! Warm starts: what a hint from the pose before is worth, by how far that pose is away; and the
+//! paper's experiment.
 
 mod report;
 mod steps;
@@ -15,7 +16,8 @@ use sweep::{Passage, passage};
 /// Degrees that are measured, and those of a quick run.
 const DEGREES: [usize; 3] = [4, 6, 8];
 const QUICK_DEGREES: [usize; 2] = [4, 6];
-/// Sizes of steps, in units of half of the larger diameter; none for poses that have nothing to do with each other.
+/// Sizes of steps, in units of half of the larger diameter; none for poses that have nothing to do
+/// with each other.
 const STEPS: [Option<f64>; 10] =
     [Some(1e-4), Some(3e-4), Some(1e-3), Some(3e-3), Some(1e-2), Some(3e-2), Some(0.1), Some(0.3), Some(1.0), None];
 const QUICK_STEPS: [Option<f64>; 4] = [Some(1e-4), Some(1e-2), Some(0.3), None];
@@ -41,9 +43,10 @@ pub struct Warm {
     passage: Passage,
 }
 
-/// Measures time and iterations against step size on two pairs of the meshes in `data`, or on one if `quick`, and the chair on its way past the
-/// human. Fits are kept on the `shelf`; coal takes part where `SUBLEVEL_COAL` names the program that times it. `progress` hears what
-/// is going on and can stop it.
+/// Measures time and iterations against step size on two pairs of the meshes in `data`, or on one
+/// if `quick`, and the chair on its way past the human. Fits are kept on the `shelf`; coal takes
+/// part where `SUBLEVEL_COAL` names the program that times it. `progress` hears what is going on
+/// and can stop it.
 ///
 /// # Errors
 /// [`DuelError`].
@@ -60,16 +63,16 @@ pub fn warm(
     };
     let (degrees, sizes) = if quick { (&QUICK_DEGREES[..], &QUICK_STEPS[..]) } else { (&DEGREES[..], &STEPS[..]) };
     let coal = Coal::from_environment()?;
-    let mut told = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };
+    let mut announce = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };
     let mut pairs = pairs(data, true)?;
     if quick {
         pairs.truncate(1);
     }
     let mut measured = Vec::new();
     for [a, b] in &pairs {
-        measured.push(steps([a, b], (degrees, sizes), &effort, shelf, coal.as_ref(), &mut told)?);
+        measured.push(steps([a, b], (degrees, sizes), &effort, shelf, coal.as_ref(), &mut announce)?);
     }
-    told("the chair passes the human")?;
+    announce("the chair passes the human")?;
     let [chair, human] = &pairs[0];
     let options = FitOptions { degree: 6, ..FitOptions::default() };
     let bodies = (shelf.body(chair.name, &chair.mesh, &options)?, shelf.body(human.name, &human.mesh, &options)?);

@@ -50,7 +50,7 @@ impl Warm {
     /// The report; the pictures lie beside it under these names.
     pub fn markdown(&self, pictures: &[&str]) -> String {
         let mut text = String::from("# Warm starts\n\n");
-        // Writing to a string can not fail.
+        // Writing to a string cannot fail.
         let flags = if self.quick { " --quick" } else { "" };
         let _ = writeln!(text, "{}\n", self.machine.head(&format!("sublevel-bench warm --data DIR{flags}")));
         let coal = self.coal.as_ref().map_or("coal did not take part (SUBLEVEL_COAL is not set)".to_owned(), |version| {

@@ -27,10 +27,11 @@ pub(super) struct Cell {
     /// Nanoseconds per query.
     pub(super) cold: f64,
     pub(super) warm: f64,
-    /// Mean and largest number of iterations, cold and warm, where they are told.
+    /// Mean and largest number of iterations, cold and warm, where they are reported.
     pub(super) cold_iterations: Option<(f64, u32)>,
     pub(super) warm_iterations: Option<(f64, u32)>,
-    /// Queries that did not converge, and those whose brackets with and without a hint exclude each other.
+    /// Queries that did not converge, and those whose brackets with and without a hint exclude each
+    /// other.
     pub(super) failed: usize,
     pub(super) contradictions: usize,
 }
@@ -51,20 +52,20 @@ pub(super) fn steps(
     effort: &Effort,
     shelf: &Shelf,
     coal: Option<&Coal>,
-    told: &mut dyn FnMut(&str) -> Result<(), DuelError>,
+    announce: &mut dyn FnMut(&str) -> Result<(), DuelError>,
 ) -> Result<Steps, DuelError> {
     let pair = format!("{}-{}", a.name, b.name);
     let unit_m = 0.5 * a.diameter_m.max(b.diameter_m);
     let mut bodies = Vec::new();
     for &degree in degrees {
-        told(&format!("{pair}: degree {degree}"))?;
+        announce(&format!("{pair}: degree {degree}"))?;
         let options = FitOptions { degree, ..FitOptions::default() };
         bodies.push((degree, shelf.body(a.name, &a.mesh, &options)?, shelf.body(b.name, &b.mesh, &options)?));
     }
     let hulls = Hulls::new(&a.hull, &b.hull)?;
     let mut cells = Vec::new();
     for &step in sizes {
-        told(&format!("{pair}: steps of {step:?}"))?;
+        announce(&format!("{pair}: steps of {step:?}"))?;
         // The widest bodies are those of the lowest degree: all others are apart with them.
         let Some((_, wide_a, wide_b)) = bodies.first() else { continue };
         let poses = motion::stepping((wide_a, wide_b), unit_m, step, effort.trajectories, effort.poses)?;

@@ -7,7 +7,7 @@ use std::time::Instant;
 use sublevel::body::{Body, Solid};
 use sublevel::measure::{LevelDistance, Options, Pose, PoseError, WarmStart, level_distance};
 
-/// How often a query is repeated to be timed: a clock can not see a single one.
+/// How often a query is repeated to be timed: a clock cannot see a single one.
 const REPEATS: u32 = 64;
 /// How far the chair goes beyond where the balls around both touch.
 const BEYOND: f64 = 0.2;
@@ -21,7 +21,8 @@ pub(super) struct Stop {
     pub(super) levels: [f64; 2],
     /// Widest bracket of the two, relative to max(1, d).
     pub(super) width: f64,
-    /// Nanoseconds per query of d(chair‖human), without a hint and with that of the position before.
+    /// Nanoseconds per query of d(chair‖human), without a hint and with that of the position
+    /// before.
     pub(super) cold: f64,
     pub(super) warm: f64,
     /// Iterations.
@@ -36,7 +37,8 @@ pub(super) struct Passage {
     pub(super) stops: Vec<Stop>,
 }
 
-/// Moves the chair along x in steps of one length, its centre at the height and depth of the human's.
+/// Moves the chair along x in steps of one length, its centre at the height and depth of the
+/// human's.
 pub(super) fn passage((chair, human): (&Body, &Body), positions: usize, passes: usize) -> Result<Passage, PoseError> {
     let options = Options::default();
     let level = |a: &Body, of_a: &Pose, b: &Body, of_b: &Pose, hint: &mut WarmStart| {

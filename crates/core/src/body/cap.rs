@@ -1,10 +1,12 @@
 //! Caps of cut pieces: the section of a closed piece with a plane, triangulated.
 //!
-//! A cap is a chain of triangles whose boundary is a given set of chords, reversed. That it is one is a matter of counting alone: the
-//! chords are traced into loops, holes are joined to the loops around them by bridges, which are passed once each way, and from the
-//! resulting polygons triangles are clipped until nothing is left. Where coordinates decide, as about which ear is clipped next
-//! (Meisters, Polygons have ears, Amer. Math. Monthly 82, 1975), a wrong decision makes a cap that covers more than the section, but a
-//! cap all the same. Operations are those that IEEE 754 rounds correctly, so a cut has the same caps on every machine.
+//! A cap is a chain of triangles whose boundary is a given set of chords, reversed. That it is one
+//! is a matter of counting alone: the chords are traced into loops, holes are joined to the loops
+//! around them by bridges, which are passed once each way, and from the resulting polygons
+//! triangles are clipped until nothing is left. Where coordinates decide, as about which ear is
+//! clipped next (Meisters, Polygons have ears, Amer. Math. Monthly 82, 1975), a wrong decision
+//! makes a cap that covers more than the section, but a cap all the same. Operations are those that
+//! IEEE 754 rounds correctly, so a cut has the same caps on every machine.
 
 use super::piece::Spot;
 use nalgebra::{Vector2, Vector3};
@@ -16,8 +18,8 @@ const THIN: f64 = 1e-13;
 /// Ears are looked for among no more corners than this; the time grows with the square.
 pub(super) const MOST_CORNERS: usize = 4096;
 
-/// Triangles whose boundary passes the chords, each from `p` to `q`, the other way. The chords are a cycle, near a plane with this
-/// normal.
+/// Triangles whose boundary passes the chords, each from `p` to `q`, the other way. The chords are
+/// a cycle, near a plane with this normal.
 pub(super) fn cap(spots: &[Spot], chords: &[(usize, usize)], normal: &Vector3<f64>) -> Vec<[usize; 3]> {
     let axis = normal.iamin();
     let first = normal.cross(&Vector3::ith(axis, 1.0)).normalize();
@@ -149,7 +151,8 @@ impl Section {
         }
     }
 
-    /// Makes a hole part of a polygon, by a bridge that crosses neither them nor other holes if there is one.
+    /// Makes a hole part of a polygon, by a bridge that crosses neither them nor other holes if
+    /// there is one.
     fn join(&self, polygon: &mut Vec<usize>, hole: &[usize], others: &[Vec<usize>]) {
         let rightmost = (0..hole.len()).max_by(|&i, &j| self.at[&hole[i]].x.total_cmp(&self.at[&hole[j]].x));
         let Some(from) = rightmost else { return };
@@ -200,7 +203,8 @@ impl Section {
         triangles
     }
 
-    /// Whether a triangle at three corners in a row can be clipped: it has all of the polygon outside.
+    /// Whether a triangle at three corners in a row can be clipped: it has all of the polygon
+    /// outside.
     fn is_ear(&self, polygon: &[usize], [a, b, c]: [usize; 3]) -> bool {
         let turn = self.turn(a, b, c);
         if turn.abs() <= self.thin {
@@ -246,7 +250,8 @@ mod tests {
         (0..sides).map(corner).collect()
     }
 
-    /// Checks that a cap has the chords for its boundary, and returns its area, all triangles counted as positive.
+    /// Checks that a cap has the chords for its boundary, and returns its area, all triangles
+    /// counted as positive.
     fn area(points: &[[f64; 2]], chords: &[(usize, usize)], turn: &Rotation3<f64>) -> f64 {
         let spots: Vec<Spot> = points
             .iter()

@@ -1,20 +1,24 @@
 //! Connected components of a mesh.
 //!
-//! Triangles are connected across edges, not across spots: solids that touch in a vertex stay apart. Where two triangles pass an
-//! edge in opposite directions they are neighbours. Where more do, as where solids touch along an edge or in a face, those that
-//! bound the same wedge of the solid are: going around the edge, each triangle that opens a wedge is paired with the one that closes
-//! it, like brackets (the ordering of Weiler's radial-edge structure, Edge-based data structures for solid modeling in curved-surface
-//! environments, IEEE CG&A 5, 1985). An edge that is passed more often one way than the other connects all its triangles.
+//! Triangles are connected across edges, not across spots: solids that touch in a vertex stay
+//! apart. Where two triangles pass an edge in opposite directions they are neighbours. Where more
+//! do, as where solids touch along an edge or in a face, those that bound the same wedge of the
+//! solid are: going around the edge, each triangle that opens a wedge is paired with the one that
+//! closes it, like brackets (the ordering of Weiler's radial-edge structure, Edge-based data
+//! structures for solid modeling in curved-surface environments, IEEE CG&A 5, 1985). An edge that
+//! is passed more often one way than the other connects all its triangles.
 //!
-//! So a component without such an edge is a cycle, and the others together are what is left of the mesh: as chains the components
-//! add up to the mesh whatever the pairing, and no proof depends on the angles. They are computed by operations that IEEE 754 rounds
-//! correctly, so a mesh has the same components on every machine.
+//! So a component without such an edge is a cycle, and the others together are what is left of the
+//! mesh: as chains the components add up to the mesh whatever the pairing, and no proof depends on
+//! the angles. They are computed by operations that IEEE 754 rounds correctly, so a mesh has the
+//! same components on every machine.
 
 use super::piece::{Piece, Spot};
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
-/// Triangles around an edge at angles that differ by less are taken for coincident, in quarters of a turn.
+/// Triangles around an edge at angles that differ by less are taken for coincident, in quarters of
+/// a turn.
 const COINCIDENT: f64 = 1e-9;
 
 /// A triangle that passes an edge.
@@ -47,8 +51,8 @@ impl Sets {
 }
 
 impl Piece {
-    /// The closed connected components, each a piece, in the order of their first triangles; what is in none of them is one more
-    /// piece in that order.
+    /// The closed connected components, each a piece, in the order of their first triangles; what
+    /// is in none of them is one more piece in that order.
     pub fn components(&self) -> Vec<Self> {
         let (spots, triangles) = (self.spots(), self.triangles());
         let mut edges: HashMap<(usize, usize), Vec<Pass>> = HashMap::new();
@@ -92,7 +96,8 @@ impl Piece {
     }
 }
 
-/// Triangles with equal corners bound nothing: each belongs to a triangle that has one of its spots, or else to what is open.
+/// Triangles with equal corners bound nothing: each belongs to a triangle that has one of its
+/// spots, or else to what is open.
 fn attach_degenerate(triangles: &[[usize; 3]], sets: &mut Sets, open: &mut Vec<usize>) {
     let degenerate = |&[a, b, c]: &[usize; 3]| a == b || b == c || c == a;
     if !triangles.iter().any(degenerate) {
@@ -112,7 +117,8 @@ fn attach_degenerate(triangles: &[[usize; 3]], sets: &mut Sets, open: &mut Vec<u
     }
 }
 
-/// Pairs of triangles around an edge that bound one wedge of the solid; as many pass it forward as backward.
+/// Pairs of triangles around an edge that bound one wedge of the solid; as many pass it forward as
+/// backward.
 fn wedges(ends: [&Vector3<f64>; 2], passes: &[Pass], spots: &[Spot], inward: bool) -> Vec<[usize; 2]> {
     let [low, high] = ends;
     let axis = high - low;
@@ -128,8 +134,8 @@ fn wedges(ends: [&Vector3<f64>; 2], passes: &[Pass], spots: &[Spot], inward: boo
         let arm = across(pass);
         quarters(arm.dot(&first), arm.dot(&second))
     };
-    // A triangle that passes the edge forward has its normal towards larger angles. Where normals point out of the solid, it closes
-    // the wedge that a triangle at a smaller angle has opened.
+    // A triangle that passes the edge forward has its normal towards larger angles. Where normals
+    // point out of the solid, it closes the wedge that a triangle at a smaller angle has opened.
     let mut around: Vec<(f64, bool, usize)> =
         passes.iter().map(|pass| (angle(pass), pass.forward == inward, pass.triangle)).collect();
     around.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
@@ -161,8 +167,8 @@ fn wedges(ends: [&Vector3<f64>; 2], passes: &[Pass], spots: &[Spot], inward: boo
     pairs
 }
 
-/// A number from 0 to 4 that grows with the angle of a direction: cheap, and rounded alike everywhere. Directions next to the first
-/// axis on either side count as on it.
+/// A number from 0 to 4 that grows with the angle of a direction: cheap, and rounded alike
+/// everywhere. Directions next to the first axis on either side count as on it.
 fn quarters(x: f64, y: f64) -> f64 {
     let along = y / (x.abs() + y.abs());
     let turn = match (x >= 0.0, y >= 0.0) {

@@ -1,4 +1,5 @@
-//! Several bodies as one: their union, rigidly attached to one frame; and what bodies and compounds have in common.
+//! Several bodies as one: their union, rigidly attached to one frame; and what bodies and compounds
+//! have in common.
 
 use super::{Aabb, Ball, Body, BodyError, BodyId, Covering, Provenance, check_name};
 use nalgebra::Vector3;
@@ -6,7 +7,8 @@ use nalgebra::Vector3;
 /// Most parts a compound may have.
 pub const MAX_PARTS: usize = 256;
 
-/// What measures ask of a solid: the convex bodies it is the union of, all in one frame, and a ball around them.
+/// What measures ask of a solid: the convex bodies it is the union of, all in one frame, and a ball
+/// around them.
 ///
 /// A [`Body`] is the union of itself; a measure of a single body pays nothing for this.
 pub trait Solid: sealed::Sealed {
@@ -41,7 +43,8 @@ impl Solid for Body {
     }
 }
 
-/// The union of bodies that share one frame, such as the links of a hand in one grasp; convex or not, connected or not.
+/// The union of bodies that share one frame, such as the links of a hand in one grasp; convex or
+/// not, connected or not.
 ///
 /// ```
 /// use nalgebra::{UnitQuaternion, Vector3};
@@ -92,7 +95,8 @@ impl Compound {
             max: Vector3::from_fn(|i, _| boxes().map(|b| b.max[i]).fold(f64::NEG_INFINITY, f64::max)),
         };
         let center = bounding_box.min + (bounding_box.max - bounding_box.min) * 0.5;
-        // Four roundings of the norm and one of the sum, and those of the difference, which count with the positions.
+        // Four roundings of the norm and one of the sum, and those of the difference, which count
+        // with the positions.
         let around = |ball: &Ball| {
             let positions = f64::EPSILON * (center.norm() + ball.center.norm());
             ((ball.center - center).norm() + ball.radius + positions) * (1.0 + 8.0 * f64::EPSILON)
@@ -109,7 +113,8 @@ impl Compound {
         })
     }
 
-    /// The same compound with its origin noted: the objective of its parts, and the hull of the whole object.
+    /// The same compound with its origin noted: the objective of its parts, and the hull of the
+    /// whole object.
     pub fn with_provenance(mut self, provenance: Provenance) -> Self {
         self.provenance = Some(provenance);
         self
@@ -135,9 +140,10 @@ impl Compound {
         self.parts.iter().map(Body::degree).max().unwrap_or(0)
     }
 
-    /// Upper bound of the distance of any point of the compound from the union of the convex hulls of the pieces that its parts were
-    /// fitted to, metres: the largest [`Body::gap_m`] of the parts, if all have one. The hull of the whole object holds that union,
-    /// so the bound is good for it, too.
+    /// Upper bound of the distance of any point of the compound from the union of the convex hulls
+    /// of the pieces that its parts were fitted to, metres: the largest [`Body::gap_m`] of the
+    /// parts, if all have one. The hull of the whole object holds that union, so the bound is good
+    /// for it, too.
     pub fn gap_m(&self) -> Option<f64> {
         self.parts.iter().map(Body::gap_m).try_fold(0.0, |most: f64, gap| Some(most.max(gap?)))
     }

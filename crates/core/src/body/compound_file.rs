@@ -1,4 +1,5 @@
-//! The file of a compound: the files of its parts in one, with the record of what they were proven to cover.
+//! The file of a compound: the files of its parts in one, with the record of what they were proven
+//! to cover.
 
 use super::file::{BodyFileError, FORMAT, File, check_format, read, write};
 use super::{Body, Compound, Covering, DivisionError, Provenance};
@@ -35,8 +36,8 @@ impl Compound {
         write(&file, 2)
     }
 
-    /// Reads a compound's file and re-proves every part as [`Body::from_json`] does. What it covers is a note until
-    /// [`Compound::prove_covers`] is given the mesh.
+    /// Reads a compound's file and re-proves every part as [`Body::from_json`] does. What it covers
+    /// is a note until [`Compound::prove_covers`] is given the mesh.
     ///
     /// # Errors
     /// The field that is wrong, the reason and the remedy.

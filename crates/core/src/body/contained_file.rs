@@ -6,7 +6,8 @@ use crate::polynomial::ContainmentProof;
 use nalgebra::{DMatrix, Matrix3};
 use serde::{Deserialize, Serialize};
 
-/// The identity of the set, the frame `x = origin_m + axes_m v`, and one proof per constraint of the body.
+/// The identity of the set, the frame `x = origin_m + axes_m v`, and one proof per constraint of
+/// the body.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct FileContainedSet {
@@ -17,7 +18,8 @@ pub(super) struct FileContainedSet {
     proofs: Vec<FileProof>,
 }
 
-/// Gram matrices on all monomials of v up to a degree, by degree, within a degree from `v1^t` to `v3^t`.
+/// Gram matrices on all monomials of v up to a degree, by degree, within a degree from `v1^t` to
+/// `v3^t`.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct FileProof {

@@ -1,17 +1,19 @@
 //! Proven containment of whole sets, not points, in a body.
 //!
-//! A basic set `{x : g_1(L (x - c)) <= 1, ...}` is contained in a body when each of the body's constraints has a
-//! [`ContainmentProof`]. Set and body have normalized frames of their own, so the proof has a third: a point is
-//! `x = origin + axes v`, axes invertible, v unit-free, which spans the space. There both maps `v -> L (origin + axes v - c)`
-//! are products of stored numbers, whose rounding is enclosed and paid for by the proof: it holds for the exact maps and every
-//! real x, however large, small or far from the origin the set is. A frame in which the set fills the unit ball keeps that
-//! price low.
+//! A basic set `{x : g_1(L (x - c)) <= 1, ...}` is contained in a body when each of the body's
+//! constraints has a [`ContainmentProof`]. Set and body have normalized frames of their own, so the
+//! proof has a third: a point is `x = origin + axes v`, axes invertible, v unit-free, which spans
+//! the space. There both maps `v -> L (origin + axes v - c)` are products of stored numbers, whose
+//! rounding is enclosed and paid for by the proof: it holds for the exact maps and every real x,
+//! however large, small or far from the origin the set is. A frame in which the set fills the unit
+//! ball keeps that price low.
 
 use super::{Body, BodyId, Normalization, SosBody};
 use crate::polynomial::{ContainmentProof, NotContaining, Polynomial, Substituted, Substitution};
 use nalgebra::{Matrix3, Vector3};
 
-/// A set `{x : g_1(z) <= 1, ..., g_m(z) <= 1}`, `z = L (x - c)`, x in metres; convex or not, bounded or not.
+/// A set `{x : g_1(z) <= 1, ..., g_m(z) <= 1}`, `z = L (x - c)`, x in metres; convex or not,
+/// bounded or not.
 #[derive(Clone, Debug)]
 pub struct BasicSet<'a> {
     /// The map to z.
@@ -59,7 +61,8 @@ pub struct Containment {
 }
 
 impl Containment {
-    /// Proves `inner` contained in `outer` from the stored numbers alone, rounding included; no program is solved.
+    /// Proves `inner` contained in `outer` from the stored numbers alone, rounding included; no
+    /// program is solved.
     ///
     /// # Errors
     /// What is missing, and by how much.

@@ -102,9 +102,9 @@ impl Body {
 }
 
 impl Compound {
-    /// Proves that this compound covers a mesh: every triangle, and what it encloses if it is closed. Each part must hold its pieces
-    /// of those that the mesh is divided into. Returns how much is covered, and a rigorous upper bound of the constraints over the
-    /// pieces.
+    /// Proves that this compound covers a mesh: every triangle, and what it encloses if it is
+    /// closed. Each part must hold its pieces of those that the mesh is divided into. Returns how
+    /// much is covered, and a rigorous upper bound of the constraints over the pieces.
     ///
     /// # Errors
     /// [`NotCovered`]: the part that fails, and where.
@@ -121,7 +121,8 @@ impl Compound {
         let mut most = f64::NEG_INFINITY;
         for (part, (body, pieces)) in parts.iter().zip(division.pieces(mesh, parts.len())?).enumerate() {
             for piece in pieces {
-                // What the pieces say of the interior rests on their being cycles: that is counted again.
+                // What the pieces say of the interior rests on their being cycles: that is counted
+                // again.
                 is_closed = is_closed && piece.is_cycle();
                 most = most.max(body.prove_holds(&piece).map_err(|source| NotCovered::Part { part, source })?);
             }
@@ -190,7 +191,8 @@ mod tests {
         assert_eq!((covering.proven, covering.corners.count), (Covered::Interior, 36));
         assert_eq!(covering.corners, Covering::corners(&points, &triangles));
 
-        // Bodies that only meet in the plane of the cut leave the rounding of cut points uncovered, and say so.
+        // Bodies that only meet in the plane of the cut leave the rounding of cut points uncovered,
+        // and say so.
         for (left, right) in [(0.25, 0.25), (0.249, 0.26), (0.26, 0.251)] {
             let parts = vec![slice(-1.1, left), slice(right, 1.1)];
             let failure =
@@ -257,13 +259,13 @@ mod tests {
         ] {
             let changed = text.replacen(from, to, 1);
             assert_ne!(changed, text, "{from}");
-            let told = Shape::from_json(&changed).unwrap_err().to_string();
-            assert!(told.contains(field), "{from}: {told}");
+            let message = Shape::from_json(&changed).unwrap_err().to_string();
+            assert!(message.contains(field), "{from}: {message}");
         }
         let id = compound.id().to_string();
         let other = compound.parts()[0].id().to_string();
-        let told = Compound::from_json(&text.replacen(&id, &other, 1)).unwrap_err().to_string();
-        assert!(told.starts_with("id "), "{told}");
+        let message = Compound::from_json(&text.replacen(&id, &other, 1)).unwrap_err().to_string();
+        assert!(message.starts_with("id "), "{message}");
         assert!(Body::from_json(&text).is_err());
     }
 

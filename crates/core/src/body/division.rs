@@ -8,8 +8,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cut {
-    /// Which piece it divides, of those that the cuts before have left: what is below the plane keeps this number, what is not gets
-    /// the next free one. (In files that are not separated into components, and with one piece to a part, it is a part.)
+    /// Which piece it divides, of those that the cuts before have left: what is below the plane
+    /// keeps this number, what is not gets the next free one. (In files that are not separated into
+    /// components, and with one piece to a part, it is a part.)
     pub part: usize,
     /// Normal of the plane, pointing up, of length about 1.
     pub normal: [f64; 3],
@@ -22,8 +23,9 @@ pub struct Cut {
 /// As chains the pieces add up to the mesh (see [`Piece`]), also when several are held by one part.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Division {
-    /// Whether the first pieces are the components of the mesh ([`Piece::components`]) and are cut with [`Caps::Sections`]; else the
-    /// mesh is the first piece and is cut with [`Caps::Cones`], as all files had it at first.
+    /// Whether the first pieces are the components of the mesh ([`Piece::components`]) and are cut
+    /// with [`Caps::Sections`]; else the mesh is the first piece and is cut with [`Caps::Cones`],
+    /// as all files had it at first.
     pub separated: bool,
     /// Planes that divide pieces, one after the other.
     pub cuts: Vec<Cut>,
@@ -104,7 +106,8 @@ impl Division {
         held.iter().position(|held| !held).map_or(Ok(()), |part| Err(DivisionError::NoPiece(part)))
     }
 
-    /// For each of so many parts the pieces of a mesh that it holds (see [`Piece`] for what they say of the mesh).
+    /// For each of this many parts the pieces of a mesh that it holds (see [`Piece`] for what they
+    /// say of the mesh).
     ///
     /// # Errors
     /// [`DivisionError`], also of a mesh that has other components.

@@ -1,4 +1,5 @@
-//! How far a body reaches: support bounds proven by tangent planes, bounding box, circumscribed ball, boundedness.
+//! How far a body reaches: support bounds proven by tangent planes, bounding box, circumscribed
+//! ball, boundedness.
 
 use super::placement::Placement;
 use super::sphere::Sphere;
@@ -7,8 +8,8 @@ use crate::optimize::{MAX_ROWS, Program, Row, Rows, minimise};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use std::ops::ControlFlow;
 
-/// Support points are refined until duality gap and dual residual together are this small in the normalized frame, where
-/// a body has size about 1, or as small as rounding allows.
+/// Support points are refined until duality gap and dual residual together are this small in the
+/// normalized frame, where a body has size about 1, or as small as rounding allows.
 const SUPPORT_ACCURACY: f64 = 1e-14;
 
 /// The program `max m·z` over the body in its normalized frame.
@@ -30,17 +31,20 @@ impl Program<3> for Support<'_> {
     }
 }
 
-/// A half-space `n·(x - anchor) <= reach + slope |x - point|` that contains the body, for a unit normal n.
+/// A half-space `n·(x - anchor) <= reach + slope |x - point|` that contains the body, for a unit
+/// normal n.
 ///
-/// For any λ >= 0 and any point x0, convexity gives `n·(x - x0) <= Σ λ_i (1 - g_i(x0)) + |n - Σ λ_i ∇g_i(x0)| |x - x0|`
-/// for every x of the body; the residual `slope` is tiny at the support point but multiplies a distance not yet bounded.
+/// For any λ >= 0 and any point x0, convexity gives `n·(x - x0) <= Σ λ_i (1 - g_i(x0)) + |n - Σ λ_i
+/// ∇g_i(x0)| |x - x0|` for every x of the body; the residual `slope` is tiny at the support point
+/// but multiplies a distance not yet bounded.
 pub(super) struct TangentBound {
     pub(super) point: Vector3<f64>,
     pub(super) reach: f64,
     pub(super) slope: f64,
 }
 
-/// Support point of the body in the direction of the unit vector `n` of the body frame, with its tangent bound.
+/// Support point of the body in the direction of the unit vector `n` of the body frame, with its
+/// tangent bound.
 pub(super) fn support(
     constraints: &[Constraint],
     placement: &Placement,
@@ -54,7 +58,8 @@ pub(super) fn support(
     let program = Support { constraints, direction: in_z / length };
     let reach = surface::radius(constraints, interior_z, &program.direction);
     let mut z = interior_z + program.direction * (0.9 * reach.min(1e6));
-    // Past the accuracy of doubles the method drifts away again: the best iterate counts, not the last.
+    // Past the accuracy of doubles the method drifts away again: the best iterate counts, not the
+    // last.
     let mut best = (f64::INFINITY, z, [0.0; MAX_ROWS]);
     minimise(&program, &mut z, 1.0, |iterate| {
         let mut residual = program.direction;
@@ -98,9 +103,10 @@ pub(super) struct Extent {
 impl Extent {
     /// Proves the body bounded and computes its bounding box and a circumscribed ball.
     ///
-    /// With M(x) = max over the six axis directions of n·(x - a), each tangent bound reads
-    /// `n·(x - a) <= reach + slope (√3 M + |point - a|)`, hence `M <= max(reach + slope |point - a|) / (1 - √3 max slope)`
-    /// for every x of the body: a proof of boundedness that needs no bound beforehand, only positively spanning normals.
+    /// With M(x) = max over the six axis directions of n·(x - a), each tangent bound reads `n·(x -
+    /// a) <= reach + slope (√3 M + |point - a|)`, hence `M <= max(reach + slope |point - a|) / (1 -
+    /// √3 max slope)` for every x of the body: a proof of boundedness that needs no bound
+    /// beforehand, only positively spanning normals.
     pub(super) fn prove(
         constraints: &[Constraint],
         placement: &Placement,
@@ -140,7 +146,8 @@ impl Extent {
             (largest(heights.into_iter()) + rounding) * row.norm() * (1.0 + 1e-13)
         });
 
-        // Every point of the body is within `covering` of some direction of the sphere, as seen from the centre.
+        // Every point of the body is within `covering` of some direction of the sphere, as seen
+        // from the centre.
         let center = (bounding_box.min + bounding_box.max) * 0.5;
         let half_diagonal = (bounding_box.max - bounding_box.min).norm() * 0.5;
         let sphere = Sphere::shared();
@@ -173,7 +180,8 @@ impl Program<4> for Deepest<'_> {
 
 /// Minimiser of the largest constraint in the normalized frame and the minimum.
 ///
-/// The minimum is attained for bodies; a program without one drives the value down or runs off, which boundedness catches.
+/// The minimum is attained for bodies; a program without one drives the value down or runs off,
+/// which boundedness catches.
 pub(super) fn deepest_point(constraints: &[Constraint]) -> (Vector3<f64>, f64) {
     let program = Deepest { constraints };
     let value = |z: &Vector3<f64>| largest(constraints.iter().map(|c| c.polynomial.evaluate(z).value));

@@ -14,8 +14,9 @@ use std::io;
 pub(super) const FORMAT: &str = "sublevel/1";
 const KIND: &str = "body";
 
-/// Relative difference at which a stored derived value is called wrong: far above what another machine's rounding does to
-/// it, far below what anybody could mean. Answers always use the recomputed value.
+/// Relative difference at which a stored derived value is called wrong: far above what another
+/// machine's rounding does to it, far below what anybody could mean. Answers always use the
+/// recomputed value.
 const TOLERANCE: f64 = 1e-7;
 
 /// Why a text is not a valid body file.
@@ -149,8 +150,8 @@ impl Body {
         write(&File::from(self), 1)
     }
 
-    /// Reads a body file and re-proves it: the id is recomputed, the certificates are checked, every derived value is
-    /// recomputed and compared.
+    /// Reads a body file and re-proves it: the id is recomputed, the certificates are checked,
+    /// every derived value is recomputed and compared.
     ///
     /// # Errors
     /// The field that is wrong, the reason and the remedy.
@@ -279,7 +280,8 @@ fn field(name: impl Into<String>, reason: &str) -> BodyFileError {
     BodyFileError::Field { field: name.into(), reason: reason.into() }
 }
 
-/// Checks what no proof covers, as far as it can be: notes about the input must at least be possible and printable.
+/// Checks what no proof covers, as far as it can be: notes about the input must at least be
+/// possible and printable.
 fn check_notes(file: &File) -> Result<(), BodyFileError> {
     if let Some(points) = &file.contained_points {
         points.check("contained_points")?;
@@ -325,7 +327,8 @@ impl Provenance {
     }
 }
 
-/// Holds a stored value that follows from others against the recomputed one, at the accuracy of `scale`.
+/// Holds a stored value that follows from others against the recomputed one, at the accuracy of
+/// `scale`.
 pub(super) fn check_scalar(field: &'static str, stored: f64, recomputed: f64, scale: f64) -> Result<(), BodyFileError> {
     // Not `>`: a NaN is wrong too.
     if (stored - recomputed).abs() <= TOLERANCE * scale {
@@ -421,7 +424,8 @@ impl From<&Aabb> for FileBox {
     }
 }
 
-/// Compact JSON but for a line break before each key of the outer objects, so that a file can be looked at.
+/// Compact JSON but for a line break before each key of the outer objects, so that a file can be
+/// looked at.
 struct LinePerKey {
     /// How many levels of objects are broken into lines.
     levels: usize,

@@ -7,10 +7,10 @@ use sha2::{Digest, Sha256};
 use std::fmt;
 use std::str::FromStr;
 
-/// SHA-256 of a body's content: center, linear (rows), then per constraint the number of its terms and each term's three
-/// exponents and coefficient in lexicographic order of the exponents, then, if one was set, -1 and the growth centre, or -2 for
-/// an sos-body; everything as little-endian f64. That of a compound is the SHA-256 of the ids of its parts, 32 bytes each, in their
-/// order.
+/// SHA-256 of a body's content: center, linear (rows), then per constraint the number of its terms
+/// and each term's three exponents and coefficient in lexicographic order of the exponents, then,
+/// if one was set, -1 and the growth centre, or -2 for an sos-body; everything as little-endian
+/// f64. That of a compound is the SHA-256 of the ids of its parts, 32 bytes each, in their order.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct BodyId([u8; 32]);
 

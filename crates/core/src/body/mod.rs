@@ -1,8 +1,10 @@
-//! Certified convex bodies: `{x : g_1(x) <= 1, ..., g_m(x) <= 1}` with sos-convex `g_i`, proven bounded and non-empty.
+//! Certified convex bodies: `{x : g_1(x) <= 1, ..., g_m(x) <= 1}` with sos-convex `g_i`, proven
+//! bounded and non-empty.
 //!
-//! A [`Body`] exists only with its proofs: making one, from numbers or from a file, checks every certificate and proves or
-//! recomputes everything derived from the polynomials. What need not be convex is an [`SosBody`], which no measure takes.
-//! Lengths are metres in the body frame unless a name says otherwise; `z` is the unit-free normalized frame, `z = L (x - c)`.
+//! A [`Body`] exists only with its proofs: making one, from numbers or from a file, checks every
+//! certificate and proves or recomputes everything derived from the polynomials. What need not be
+//! convex is an [`SosBody`], which no measure takes. Lengths are metres in the body frame unless a
+//! name says otherwise; `z` is the unit-free normalized frame, `z = L (x - c)`.
 
 mod cap;
 mod component;
@@ -55,7 +57,8 @@ pub const MAX_CONSTRAINTS: usize = 16;
 /// Smallest depth `1 - min g` of a body; below it the interior drowns in rounding.
 const MIN_DEPTH: f64 = 1e-9;
 
-/// The affine map `z = linear (x - center)` from the body frame (x, metres) to the normalized frame (z, unit-free).
+/// The affine map `z = linear (x - center)` from the body frame (x, metres) to the normalized frame
+/// (z, unit-free).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Normalization {
     /// Point of the body frame that z = 0 stands for, metres.
@@ -106,7 +109,8 @@ pub struct Support {
 pub struct ContainedPoints {
     /// Number of points.
     pub count: usize,
-    /// SHA-256 of their coordinates in metres as little-endian f64, in input order, as 64 hexadecimal digits.
+    /// SHA-256 of their coordinates in metres as little-endian f64, in input order, as 64
+    /// hexadecimal digits.
     pub sha256: String,
 }
 
@@ -227,8 +231,8 @@ pub struct Body {
 }
 
 impl Body {
-    /// Makes a body of its defining numbers: proves every constraint sos-convex and the set bounded with an interior, and
-    /// computes everything derived. No semidefinite program is solved.
+    /// Makes a body of its defining numbers: proves every constraint sos-convex and the set bounded
+    /// with an interior, and computes everything derived. No semidefinite program is solved.
     ///
     /// # Errors
     /// What could not be proven, and by how much it failed.
@@ -253,7 +257,8 @@ impl Body {
         Self::of_proven(name, normalization, constraints, interior)
     }
 
-    /// The body of constraints that are proven sos-convex: proves the rest and computes everything derived.
+    /// The body of constraints that are proven sos-convex: proves the rest and computes everything
+    /// derived.
     fn of_proven(
         name: &str,
         normalization: Normalization,
@@ -305,8 +310,9 @@ impl Body {
         })
     }
 
-    /// The same set moved within its frame by `x -> rotation x + translation` (metres): another normalization for the same
-    /// constraints with the same certificates. Bounds are proven anew; the records of contained points and sets do not move along.
+    /// The same set moved within its frame by `x -> rotation x + translation` (metres): another
+    /// normalization for the same constraints with the same certificates. Bounds are proven again;
+    /// the records of contained points and sets do not move along.
     ///
     /// # Errors
     /// Numbers that are not finite, or a place so far away that the body drowns in rounding.
@@ -365,12 +371,14 @@ impl Body {
         &self.placement
     }
 
-    /// Minimiser of the largest constraint, up to the accuracy of its computation; proven to lie inside.
+    /// Minimiser of the largest constraint, up to the accuracy of its computation; proven to lie
+    /// inside.
     pub fn interior_point(&self) -> &Vector3<f64> {
         &self.interior_point
     }
 
-    /// Upper bound of the largest constraint at the interior point: `min p` up to the accuracy of its computation.
+    /// Upper bound of the largest constraint at the interior point: `min p` up to the accuracy of
+    /// its computation.
     pub fn min_value(&self) -> f64 {
         self.min_value
     }
@@ -380,8 +388,8 @@ impl Body {
         self.in_radius
     }
 
-    /// A ball proven to lie inside, about the centre from which the body grows in the growth distance: the interior point
-    /// unless [`Body::with_growth_center`] set another.
+    /// A ball proven to lie inside, about the centre from which the body grows in the growth
+    /// distance: the interior point unless [`Body::with_growth_center`] set another.
     pub fn growth_ball(&self) -> Ball {
         self.growth.unwrap_or(Ball { center: self.interior_point, radius: self.in_radius })
     }
@@ -431,8 +439,8 @@ impl Body {
         &self.sets
     }
 
-    /// Upper bound of the distance of any point of the body from the convex hull of its object, metres, as its maker proved it; the
-    /// body alone does not tell.
+    /// Upper bound of the distance of any point of the body from the convex hull of its object,
+    /// metres, as its maker proved it; the body alone does not tell.
     pub fn gap_m(&self) -> Option<f64> {
         self.gap
     }
@@ -457,12 +465,14 @@ impl Body {
         self.value_upper_within(x, 0.0)
     }
 
-    /// Rigorous upper bound of the largest constraint over the ball of a radius (metres) about a point of the body frame.
+    /// Rigorous upper bound of the largest constraint over the ball of a radius (metres) about a
+    /// point of the body frame.
     pub fn value_upper_within(&self, x: &Vector3<f64>, radius: f64) -> f64 {
         largest(self.constraints.iter().map(|c| self.placement.sample(c, x).value_upper(radius)))
     }
 
-    /// Boundary point of the body frame met by the ray from the interior point along `direction` of the normalized frame.
+    /// Boundary point of the body frame met by the ray from the interior point along `direction` of
+    /// the normalized frame.
     pub fn boundary_along(&self, direction: &Vector3<f64>) -> Vector3<f64> {
         let start = self.normalization.linear * (self.interior_point - self.normalization.center);
         let radius = surface::radius(&self.constraints, &start, direction);
@@ -507,19 +517,19 @@ impl Body {
         Ok(self)
     }
 
-    /// The same body with the note of its [`Body::gap_m`]; a body's file with one that is negative or beyond the body's size is
-    /// refused.
+    /// The same body with the note of its [`Body::gap_m`]; a body's file with one that is negative
+    /// or beyond the body's size is refused.
     pub fn with_gap(mut self, gap_m: f64) -> Self {
         self.gap = Some(gap_m);
         self
     }
 
-    /// The same body growing from `center` (metres, body frame) in the growth distance. As it changes answers it changes the
-    /// id, and the body's file keeps it.
+    /// The same body growing from `center` (metres, body frame) in the growth distance. As it
+    /// changes answers it changes the id, and the body's file keeps it.
     ///
     /// # Errors
-    /// [`BodyError::GrowthCenter`] for a point that is not proven inside: it must lie within the polytope of
-    /// [`Body::boundary`], which all but reaches the boundary.
+    /// [`BodyError::GrowthCenter`] for a point that is not proven inside: it must lie within the
+    /// polytope of [`Body::boundary`], which all but reaches the boundary.
     pub fn with_growth_center(mut self, center: Vector3<f64>) -> Result<Self, BodyError> {
         let radius = surface::in_radius(&self.boundary, &center, self.inverse.determinant() < 0.0);
         // Not `<=`: a NaN is not inside.
@@ -531,7 +541,8 @@ impl Body {
         Ok(self)
     }
 
-    /// The same body with its origin noted; texts should pass [`check_name`], or the body's file is refused.
+    /// The same body with its origin noted; texts should pass [`check_name`], or the body's file is
+    /// refused.
     pub fn with_provenance(mut self, provenance: Provenance) -> Self {
         self.provenance = Some(provenance);
         self
@@ -594,7 +605,8 @@ fn invert(normalization: &Normalization) -> Result<Matrix3<f64>, BodyError> {
         return Err(BodyError::Normalization("an entry is out of range"));
     }
     let inverse = linear.try_inverse().ok_or(BodyError::Normalization("linear is singular"))?;
-    // Relative to the rows, whose lengths may differ by any factor: the bounds of a placement rest on it.
+    // Relative to the rows, whose lengths may differ by any factor: the bounds of a placement rest
+    // on it.
     let rows = Vector3::from_fn(|i, _| linear.row(i).norm());
     let error = (linear * inverse - Matrix3::identity()).abs() * rows;
     if (0..3).all(|i| error[i] <= 1e-6 * rows[i]) && inverse.amax() <= 1e30 {

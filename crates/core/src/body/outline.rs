@@ -1,11 +1,13 @@
-//! What a body looks like from outside, roughly, for any direction: where a cold start begins. Nothing is proven by it.
+//! What a body looks like from outside, roughly, for any direction: where a cold start begins.
+//! Nothing is proven by it.
 //!
-//! The point of a convex set farthest along a unit vector e, as a function of e, is the gradient of the support function: its
-//! derivative K is symmetric, not negative, and `K e = 0`. Over a small cell of directions about m it is nearly `z + K (e - m)`,
-//! that is `z + K e`; z and K are fitted to the support points along the corners and the middle of the cell, which also gives
-//! flat sides, edges and corners a K to go by. Cells are those of normalized coordinates, where no body is much longer than
-//! wide: with W the inverse of their map M, the body's point farthest along n is the one with the z for `e = Wᵀn / |Wᵀn|`, that is
-//! `W z + W K Wᵀ n / |Wᵀn|`.
+//! The point of a convex set farthest along a unit vector e, as a function of e, is the gradient of
+//! the support function: its derivative K is symmetric, not negative, and `K e = 0`. Over a small
+//! cell of directions about m it is nearly `z + K (e - m)`, that is `z + K e`; z and K are fitted
+//! to the support points along the corners and the middle of the cell, which also gives flat sides,
+//! edges and corners a K to go by. Cells are those of normalized coordinates, where no body is much
+//! longer than wide: with W the inverse of their map M, the body's point farthest along n is the
+//! one with the z for `e = Wᵀn / |Wᵀn|`, that is `W z + W K Wᵀ n / |Wᵀn|`.
 
 use super::Constraint;
 use super::sphere::Sphere;
@@ -19,12 +21,12 @@ const CELLS: usize = 16;
 /// Numbers of a cell: `W z`, and `W K Wᵀ` by its distinct entries.
 const FIELDS: usize = 9;
 
-/// Size of the ellipsoid that stands for the body, relative to the smallest one of its shape around the body: between that and
-/// the largest one inside.
+/// Size of the ellipsoid that stands for the body, relative to the smallest one of its shape around
+/// the body: between that and the largest one inside.
 const FULLNESS: f64 = 0.75;
 
-/// An ellipsoid about as large as the body, and for each cell of directions about where the body is farthest along them, with
-/// the constraint that is active along its middle.
+/// An ellipsoid about as large as the body, and for each cell of directions about where the body is
+/// farthest along them, with the constraint that is active along its middle.
 ///
 /// Points are seen from the centre of the normalization, body frame, metres.
 #[derive(Clone, Debug)]
@@ -36,8 +38,8 @@ pub struct Outline {
     active: Vec<u8>,
 }
 
-/// Where a body is farthest along unit vectors n near the one that the cell was looked up for: about `point + turn n`, a lane
-/// each.
+/// Where a body is farthest along unit vectors n near the one that the cell was looked up for:
+/// about `point + turn n`, a lane each.
 #[derive(Clone, Copy, Debug)]
 pub struct Cell<N> {
     /// Where the cell is kept.
@@ -73,7 +75,8 @@ impl Outline {
         Self { inverse: *inverse, reach, shape, cells, active }
     }
 
-    /// Largest norm of the normalized coordinates of all support points: what lies between them reaches hardly farther.
+    /// Largest norm of the normalized coordinates of all support points: what lies between them
+    /// reaches hardly farther.
     pub fn reach(&self) -> f64 {
         self.reach
     }
@@ -168,11 +171,13 @@ type Sample = (Vector3<f64>, Vector3<f64>);
 /// The fields of the cell with these samples, of a body with a smooth surface or one with edges.
 fn fitted((e, z): &Sample, corners: [&Sample; 4], smooth: bool, inverse: &Matrix3<f64>) -> [f64; FIELDS] {
     let mean = corners.iter().fold(Vector3::zeros(), |sum, corner| sum + corner.1) / 4.0;
-    // What bends like a paraboloid is a third of the corners' value on average; at corners of the body nothing bends.
+    // What bends like a paraboloid is a third of the corners' value on average; at corners of the
+    // body nothing bends.
     let point = inverse * if smooth { (z * 2.0 + mean) / 3.0 } else { *z };
     let first = e.cross(&Vector3::ith(e.iamin(), 1.0)).normalize();
     let tangents = Matrix3x2::from_columns(&[first, e.cross(&first)]);
-    // Least squares for `K Tᵀe = Tᵀz` with a symmetric matrix: its entries 00, 01, 11 have these coefficients.
+    // Least squares for `K Tᵀe = Tᵀz` with a symmetric matrix: its entries 00, 01, 11 have these
+    // coefficients.
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for (direction, corner) in corners {
         let (e, z) = (tangents.tr_mul(direction), tangents.tr_mul(&(corner - mean)));
@@ -195,7 +200,8 @@ struct Support<'a> {
     interior: &'a Vector3<f64>,
     /// Boundary points all around, normalized coordinates.
     rays: Vec<Vector3<f64>>,
-    /// The last support point, normalized coordinates, and the constraints active there, the one with the most force first.
+    /// The last support point, normalized coordinates, and the constraints active there, the one
+    /// with the most force first.
     last: Vector3<f64>,
     active: Vec<usize>,
     /// Largest norm of all support points so far.
@@ -211,13 +217,13 @@ impl<'a> Support<'a> {
 
     fn along(&mut self, e: Vector3<f64>) -> Sample {
         let found = self.farther(&e, &self.last, &self.active);
-        (self.last, self.active) = found.unwrap_or_else(|| self.anew(&e));
+        (self.last, self.active) = found.unwrap_or_else(|| self.again(&e));
         self.reach = self.reach.max(self.last.norm());
         (e, self.last)
     }
 
     /// A support point and its active constraints from the ray that leads farthest.
-    fn anew(&self, e: &Vector3<f64>) -> (Vector3<f64>, Vec<usize>) {
+    fn again(&self, e: &Vector3<f64>) -> (Vector3<f64>, Vec<usize>) {
         let farthest = self.rays.iter().max_by(|p, q| e.dot(p).total_cmp(&e.dot(q)));
         let start = farthest.copied().unwrap_or(*self.interior);
         let value = |index: &usize| self.constraints[*index].polynomial.evaluate(&start).value;
@@ -229,8 +235,9 @@ impl<'a> Support<'a> {
         found.unwrap_or((start, vec![order[0]]))
     }
 
-    /// The point of the body farthest along `e` (normalized coordinates), by Newton's method on `e = Σ ν_i ∇g_i`, `g_i = 1` over
-    /// the active constraints. None where it does not converge, as where the surface is flat, or other ones are active.
+    /// The point of the body farthest along `e` (normalized coordinates), by Newton's method on `e
+    /// = Σ ν_i ∇g_i`, `g_i = 1` over the active constraints. None where it does not converge, as
+    /// where the surface is flat, or other ones are active.
     fn farther(&self, e: &Vector3<f64>, start: &Vector3<f64>, active: &[usize]) -> Option<(Vector3<f64>, Vec<usize>)> {
         let count = active.len();
         let mut z = *start;

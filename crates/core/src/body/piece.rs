@@ -1,19 +1,23 @@
 //! Pieces of a mesh: what planes leave of it, closed again where they cut.
 //!
-//! A piece is a chain of triangles. A plane divides it into one piece below and one above: triangles with corners on both sides are
-//! split at points of their edges, and where a closed piece was cut open both sides get a cap, with opposite orientation. Two
-//! things follow, whatever the plane and however coarsely its side of a corner was told:
+//! A piece is a chain of triangles. A plane divides it into one piece below and one above:
+//! triangles with corners on both sides are split at points of their edges, and where a closed
+//! piece was cut open both sides get a cap, with opposite orientation. Two things follow, whatever
+//! the plane and however coarsely its side of a corner was decided:
 //!
-//! - **The surface** lies in the hulls of the pieces: a triangle is the union of those it is split into, and each piece has its own
-//!   among its triangles.
-//! - **The interior** of a closed mesh, where its winding number is not 0, does so too. As chains, the mesh is the sum of its pieces:
-//!   caps cancel. Each is a cycle, as the boundary of a cap is what the cut leaves of the piece's own. So the winding numbers
-//!   about a point add up, and where the mesh's is not 0 that of some piece is not either. But about a point outside its hull a cycle
-//!   has winding number 0. (On the triangles themselves it is not defined; hulls are closed, and these points limits of others.)
+//! - **The surface** lies in the hulls of the pieces: a triangle is the union of those it is split
+//!   into, and each piece has its own among its triangles.
+//! - **The interior** of a closed mesh, where its winding number is not 0, does so too. As chains,
+//!   the mesh is the sum of its pieces: caps cancel. Each is a cycle, as the boundary of a cap is
+//!   what the cut leaves of the piece's own. So the winding numbers about a point add up, and where
+//!   the mesh's is not 0 that of some piece is not either. But about a point outside its hull a
+//!   cycle has winding number 0. (On the triangles themselves it is not defined; hulls are closed,
+//!   and these points limits of others.)
 //!
-//! Neither needs the points to lie on the plane, only on the edges they split. In floating point they do not even do that. What a
-//! [`Spot`] stands for is the exact point `p + t (q - p)` of the edge between the exact points p and q, t the rounded number that
-//! was used; its coordinates are known to be within a radius of it, which grows by a few roundings with each cut. So the claims
+//! Neither needs the points to lie on the plane, only on the edges they split. In floating point
+//! they do not even do that. What a [`Spot`] stands for is the exact point `p + t (q - p)` of the
+//! edge between the exact points p and q, t the rounded number that was used; its coordinates are
+//! known to be within a radius of it, which grows by a few roundings with each cut. So the claims
 //! hold for convex sets that contain not the spots alone but balls of their radii.
 
 use super::cap::{MOST_CORNERS, cap};
@@ -37,8 +41,9 @@ pub struct Spot {
 impl Spot {
     /// The point `p + t (q - p)` for t in [0, 1].
     fn between(p: &Self, q: &Self, t: f64) -> Self {
-        // Of the difference, the product and the sum, each at most half an ε of |p| + |q|, and again as much for this bound; numbers
-        // too small to be rounded in proportion are off by less than the least normal one.
+        // Of the difference, the product and the sum, each at most half an ε of |p| + |q|, and
+        // again as much for this bound; numbers too small to be rounded in proportion are off by
+        // less than the least normal one.
         let rounding = 2.0 * f64::EPSILON * (p.x.norm() + q.x.norm()) + f64::MIN_POSITIVE;
         Self { x: p.x + (q.x - p.x) * t, radius: (p.radius.max(q.radius) + rounding) * (1.0 + 2.0 * f64::EPSILON) }
     }
@@ -68,9 +73,11 @@ pub enum MeshError {
 /// What closes a piece again where a plane has cut it open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Caps {
-    /// Cones over what the cut leaves of the boundary, one over each part that hangs together: they can reach across a hole.
+    /// Cones over what the cut leaves of the boundary, one over each part that hangs together: they
+    /// can reach across a hole.
     Cones,
-    /// The section with the plane, triangulated; cones where it has more than a few thousand corners.
+    /// The section with the plane, triangulated; cones where it has more than a few thousand
+    /// corners.
     Sections,
     /// Nothing: the pieces are open. They have the spots that they have with sections.
     Missing,
@@ -177,8 +184,8 @@ impl Piece {
         sides.map(|triangles| Self::compact(&spots, triangles, self.closed))
     }
 
-    /// As [`Piece::cut`], with other caps, and more exactly along faces: spots that are near the plane, in proportion to the piece, are
-    /// on it and belong to both sides.
+    /// As [`Piece::cut`], with other caps, and more exactly along faces: spots that are near the
+    /// plane, in proportion to the piece, are on it and belong to both sides.
     pub fn cut_with(&self, normal: &Vector3<f64>, height: f64, caps: Caps) -> [Self; 2] {
         if caps == Caps::Cones {
             return self.cut(normal, height);
@@ -243,7 +250,8 @@ impl Piece {
         sides.map(|triangles| Self::compact(&spots, triangles, closed))
     }
 
-    /// Whether [`Piece::cut_with`] leaves the piece whole, below the plane (0) or above it (1); none if it is divided.
+    /// Whether [`Piece::cut_with`] leaves the piece whole, below the plane (0) or above it (1);
+    /// none if it is divided.
     pub fn side(&self, normal: &Vector3<f64>, height: f64) -> Option<usize> {
         let heights = self.heights(normal, height);
         let [below, above] = [heights.iter().any(|&h| h < 0.0), heights.iter().any(|&h| h > 0.0)];
@@ -286,7 +294,8 @@ impl Piece {
     }
 }
 
-/// Edges that triangles pass more often one way than the other, in their order, as often as they do.
+/// Edges that triangles pass more often one way than the other, in their order, as often as they
+/// do.
 fn boundary(triangles: &[[usize; 3]]) -> impl Iterator<Item = (usize, usize)> {
     let mut passes: HashMap<(usize, usize), i64> = HashMap::new();
     for &[a, b, c] in triangles {
@@ -314,8 +323,8 @@ fn cone(sides: &mut [Vec<[usize; 3]>; 2], chords: &[(usize, usize)]) {
     }
 }
 
-/// For each end of a chord one end of the chords it hangs together with: each loop gets a cap of its own, or caps would reach from
-/// one limb of an object to the next.
+/// For each end of a chord one end of the chords it hangs together with: each loop gets a cap of
+/// its own, or caps would reach from one limb of an object to the next.
 fn apexes(chords: &[(usize, usize)]) -> HashMap<usize, usize> {
     let mut neighbours: HashMap<usize, Vec<usize>> = HashMap::new();
     for &(p, q) in chords {

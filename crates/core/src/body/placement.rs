@@ -1,16 +1,17 @@
-//! Where a body stands: the map from a frame of points in metres to the body's normalized frame, with its error.
+//! Where a body stands: the map from a frame of points in metres to the body's normalized frame,
+//! with its error.
 //!
-//! A computed map `z = M (v - o)` never is the exact one, and its product rounds. Both errors are the same as moving the
-//! point: the computed z is the exact image of a point v̂ near v. [`Placement::displacement`] bounds |v̂ - v|. A distance
-//! then loses just that displacement; a claim about the point v itself ([`Sample::value_upper`]) needs the polynomial's
-//! change over it.
+//! A computed map `z = M (v - o)` never is the exact one, and its product rounds. Both errors are
+//! the same as moving the point: the computed z is the exact image of a point v̂ near v.
+//! [`Placement::displacement`] bounds |v̂ - v|. A distance then loses just that displacement; a
+//! claim about the point v itself ([`Sample::value_upper`]) needs the polynomial's change over it.
 
 use super::Constraint;
 use crate::polynomial::{Jet, Polynomial, gamma};
 use nalgebra::{Matrix3, Vector3};
 
-/// The affine map `z = M (v - o)` from points v of some frame to the normalized frame of a body. Within the body's own frame
-/// M is its `linear` and o its `center`.
+/// The affine map `z = M (v - o)` from points v of some frame to the normalized frame of a body.
+/// Within the body's own frame M is its `linear` and o its `center`.
 #[derive(Clone, Debug)]
 pub struct Placement {
     linear: Matrix3<f64>,
@@ -54,7 +55,8 @@ impl Sample<'_> {
         &self.jet.gradient
     }
 
-    /// Rigorous upper bound of the value at the point itself and all others within `distance` of it.
+    /// Rigorous upper bound of the value at the point itself and all others within `distance` of
+    /// it.
     pub fn value_upper(&self, distance: f64) -> f64 {
         let dz = self.placement.row_norms * (self.displacement + distance);
         (self.jet.value + self.polynomial.value_error(&self.z, &self.jet.gradient, &dz)).next_up()
@@ -85,8 +87,9 @@ impl Sample<'_> {
 }
 
 impl Placement {
-    /// The map with `linear = L Rᵀ` and its `inverse`, both computed with at most three roundings per entry from an
-    /// invertible `L` and its inverse, where `R` is within `rotation_error` of the exact rotation and `origin` within `origin_error` of the exact origin.
+    /// The map with `linear = L Rᵀ` and its `inverse`, both computed with at most three roundings
+    /// per entry from an invertible `L` and its inverse, where `R` is within `rotation_error` of
+    /// the exact rotation and `origin` within `origin_error` of the exact origin.
     pub fn new(
         linear: Matrix3<f64>,
         inverse: Matrix3<f64>,
@@ -95,13 +98,14 @@ impl Placement {
         origin_error: f64,
     ) -> Self {
         let row_norms = Vector3::from_fn(|i, _| linear.row(i).norm() * (1.0 + 1e-14));
-        // An error of at most ε |M_i| |v - o| in each z_i is a displacement of at most ε K |v - o|, with K the sum of row
-        // norms of M times column norms of its inverse: 3 when the rows of L are orthogonal. The entries of M and the
-        // product with v - o round seven times together.
+        // An error of at most ε |M_i| |v - o| in each z_i is a displacement of at most ε K |v - o|,
+        // with K the sum of row norms of M times column norms of its inverse: 3 when the rows of L
+        // are orthogonal. The entries of M and the product with v - o round seven times together.
         let columns = Vector3::from_fn(|i, _| inverse.column(i).norm() * (1.0 + 1e-14));
         let k = row_norms.dot(&columns) * (1.0 + 1e-5);
         let relative_error = rotation_error + gamma(16) * k;
-        // The exact inverse is inverse (I + E)⁻¹, E what the exact M times `inverse` is off the identity.
+        // The exact inverse is inverse (I + E)⁻¹, E what the exact M times `inverse` is off the
+        // identity.
         let off = (linear * inverse - Matrix3::identity()).abs();
         let inverse_errors = Vector3::from_fn(|i, _| {
             let off = |j: usize| off[(j, i)] + (rotation_error + gamma(12)) * row_norms[j] * columns[i];
@@ -125,13 +129,14 @@ impl Placement {
         &self.row_norms
     }
 
-    /// A linear functional `r·(v' - v̂)` of points as one of their normalized coordinates, `M⁻ᵀ r`, with a bound of the error
-    /// of each component.
+    /// A linear functional `r·(v' - v̂)` of points as one of their normalized coordinates, `M⁻ᵀ r`,
+    /// with a bound of the error of each component.
     pub fn functional(&self, r: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
         (self.inverse.transpose() * r, self.inverse_errors * (r.norm() * (1.0 + 1e-14)))
     }
 
-    /// Bounds of `|z'_i - z_i|` between the image of v and those of points with `|z'_i| <= extent_i`.
+    /// Bounds of `|z'_i - z_i|` between the image of v and those of points with `|z'_i| <=
+    /// extent_i`.
     pub fn spans(&self, v: &Vector3<f64>, extent: &Vector3<f64>) -> Vector3<f64> {
         let z = self.linear * (v - self.origin);
         (extent + z.abs() + self.row_norms * self.displacement(v)) * (1.0 + 1e-14)

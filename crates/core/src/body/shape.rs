@@ -25,7 +25,8 @@ impl Shape {
         }
     }
 
-    /// How far it reaches beyond the convex hull of its object, or those of the pieces of its object, metres.
+    /// How far it reaches beyond the convex hull of its object, or those of the pieces of its
+    /// object, metres.
     pub fn gap_m(&self) -> Option<f64> {
         match self {
             Shape::Body(body) => body.gap_m(),

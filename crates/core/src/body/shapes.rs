@@ -4,7 +4,8 @@ use super::{Body, BodyError, Constraint, Normalization};
 use crate::polynomial::{Exponents, HessianGram, HessianMonomial, Polynomial};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-/// `Σ_{i in axes} z_i^degree` with its diagonal certificate `degree (degree - 1)` on `y_i z_i^(degree/2 - 1)`.
+/// `Σ_{i in axes} z_i^degree` with its diagonal certificate `degree (degree - 1)` on `y_i
+/// z_i^(degree/2 - 1)`.
 fn even_powers(axes: &[usize], degree: u8) -> Constraint {
     let along = |axis: usize, power: u8| -> Exponents { std::array::from_fn(|j| if j == axis { power } else { 0 }) };
     let terms = axes.iter().map(|&axis| (along(axis, degree), 1.0)).collect();
@@ -37,7 +38,8 @@ impl Body {
         Self::superellipsoid(name, center, half_axes, 2)
     }
 
-    /// The axis-aligned body `Σ ((x_i - c_i) / a_i)^degree <= 1` of even degree 2 to 8, half-axes in metres.
+    /// The axis-aligned body `Σ ((x_i - c_i) / a_i)^degree <= 1` of even degree 2 to 8, half-axes
+    /// in metres.
     ///
     /// # Errors
     /// A half-axis that is not positive and finite, a bad name, or another degree.
@@ -53,7 +55,8 @@ impl Body {
         Self::new(name, axis_aligned(center, half_axes)?, vec![even_powers(&[0, 1, 2], degree)])
     }
 
-    /// The box with these half-extents in metres about the origin: three quadratics, one per pair of faces.
+    /// The box with these half-extents in metres about the origin: three quadratics, one per pair
+    /// of faces.
     ///
     /// # Errors
     /// A half-extent that is not positive and finite, or a bad name.
@@ -62,7 +65,8 @@ impl Body {
         Self::new(name, axis_aligned(Vector3::zeros(), half_extents)?, slabs)
     }
 
-    /// The cylinder about the z axis through the origin, metres: one quadratic for its wall, one for its caps.
+    /// The cylinder about the z axis through the origin, metres: one quadratic for its wall, one
+    /// for its caps.
     ///
     /// # Errors
     /// A size that is not positive and finite, or a bad name.

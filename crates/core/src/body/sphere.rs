@@ -1,12 +1,13 @@
-//! Directions spread evenly over the unit sphere: a twice or more subdivided icosahedron, or a lattice of any count.
+//! Directions spread evenly over the unit sphere: a twice or more subdivided icosahedron, or a
+//! lattice of any count.
 
 use nalgebra::Vector3;
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
-/// `count` unit vectors in equal steps of height from the north pole down, each turned from the last by the golden angle. The first
-/// half are spread evenly over the northern hemisphere.
+/// `count` unit vectors in equal steps of height from the north pole down, each turned from the
+/// last by the golden angle. The first half are spread evenly over the northern hemisphere.
 pub fn fibonacci_lattice(count: usize) -> impl Iterator<Item = Vector3<f64>> {
     let golden_angle = PI * (3.0 - 5.0_f64.sqrt());
     (0..count).map(move |i| {
@@ -26,7 +27,8 @@ pub struct Sphere {
 }
 
 impl Sphere {
-    /// The icosahedron with every triangle split into four `levels` times: 12, 42, 162, 642, ... vertices.
+    /// The icosahedron with every triangle split into four `levels` times: 12, 42, 162, 642, ...
+    /// vertices.
     ///
     /// Triangles are counter-clockwise seen from outside.
     pub fn subdivided(levels: usize) -> Self {
@@ -80,7 +82,8 @@ impl Sphere {
         &self.triangles
     }
 
-    /// Cosine of the covering angle: every direction is within that angle of some vertex (rounded down).
+    /// Cosine of the covering angle: every direction is within that angle of some vertex (rounded
+    /// down).
     pub fn covering_cosine(&self) -> f64 {
         self.covering_cosine
     }

@@ -7,24 +7,27 @@ use crate::polynomial::Polynomial;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
 
-/// Distance from the interior point `start` along `direction` to the boundary, all in the normalized frame: the smallest
-/// root of `g_i = 1` over the constraints. Infinite where no constraint bounds the ray.
+/// Distance from the interior point `start` along `direction` to the boundary, all in the
+/// normalized frame: the smallest root of `g_i = 1` over the constraints. Infinite where no
+/// constraint bounds the ray.
 pub(super) fn radius(constraints: &[Constraint], start: &Vector3<f64>, direction: &Vector3<f64>) -> f64 {
     constraints
         .iter()
         .fold(f64::INFINITY, |smallest, c| smallest.min(radius_within(&c.polynomial, start, direction, smallest)))
 }
 
-/// How far the boundary of one convex polynomial, `p = 1`, is from a point inside along a direction; normalized frame, unit-free.
+/// How far the boundary of one convex polynomial, `p = 1`, is from a point inside along a
+/// direction; normalized frame, unit-free.
 pub fn boundary_radius(polynomial: &Polynomial, start: &Vector3<f64>, direction: &Vector3<f64>) -> f64 {
     radius_within(polynomial, start, direction, f64::INFINITY)
 }
 
-/// Distance from `start`, where the convex `polynomial` is below 1, along `direction` to where it is 1; infinite if that is
-/// nowhere, or not below `smallest`.
+/// Distance from `start`, where the convex `polynomial` is below 1, along `direction` to where it
+/// is 1; infinite if that is nowhere, or not below `smallest`.
 ///
-/// The polynomial is convex along the ray and below 1 at its start, so Newton's method lands outside at once and then
-/// decreases monotonically to the root. Its first guess takes it for a pure power of the distance.
+/// The polynomial is convex along the ray and below 1 at its start, so Newton's method lands
+/// outside at once and then decreases monotonically to the root. Its first guess takes it for a
+/// pure power of the distance.
 fn radius_within(polynomial: &Polynomial, start: &Vector3<f64>, direction: &Vector3<f64>, smallest: f64) -> f64 {
     let along = |r: f64| {
         let jet = polynomial.evaluate(&(start + direction * r));
@@ -85,8 +88,8 @@ pub(super) fn proven_boundary(
         .collect()
 }
 
-/// Radius of a ball about the interior point inside the body: the body contains the tetrahedra that the interior point
-/// spans with the triangles of its proven boundary points.
+/// Radius of a ball about the interior point inside the body: the body contains the tetrahedra that
+/// the interior point spans with the triangles of its proven boundary points.
 ///
 /// `mirrored` says that the map from directions to boundary points reverses orientation.
 pub(super) fn in_radius(boundary: &[Vector3<f64>], interior: &Vector3<f64>, mirrored: bool) -> f64 {
@@ -115,7 +118,8 @@ pub struct Volume {
     pub error_m3: f64,
 }
 
-/// `V = ⅓ ∫ r(u)³ du / |det L|` over the unit sphere of the normalized frame about the interior point.
+/// `V = ⅓ ∫ r(u)³ du / |det L|` over the unit sphere of the normalized frame about the interior
+/// point.
 pub(super) fn volume(constraints: &[Constraint], linear: &Matrix3<f64>, start: &Vector3<f64>) -> Volume {
     let scale = 1.0 / linear.determinant().abs();
     let rule = |rings: usize| {
@@ -125,8 +129,8 @@ pub(super) fn volume(constraints: &[Constraint], linear: &Matrix3<f64>, start: &
     Volume { volume_m3: fine, error_m3: (fine - coarse).abs() }
 }
 
-/// Nodes and weights of a rule for the unit sphere: `rings` by Gauss and Legendre, 2 `rings` sectors each. Weights add up to
-/// 4π.
+/// Nodes and weights of a rule for the unit sphere: `rings` by Gauss and Legendre, 2 `rings`
+/// sectors each. Weights add up to 4π.
 pub fn sphere_rule(rings: usize) -> impl Iterator<Item = (Vector3<f64>, f64)> {
     let sectors = 2 * rings;
     gauss_legendre(rings).into_iter().flat_map(move |(cosine, weight)| {

@@ -1,5 +1,6 @@
-//! Error bounds and curvature bounds that hold wherever the normalized coordinates of a point lie in a ball a little larger
-//! than the body: made once, so that a query near the body pays for none of them.
+//! Error bounds and curvature bounds that hold wherever the normalized coordinates of a point lie
+//! in a ball a little larger than the body: made once, so that a query near the body pays for none
+//! of them.
 
 use super::{Constraint, Normalization, largest};
 use crate::polynomial::{ThirdCeiling, gamma};
@@ -11,7 +12,8 @@ const MARGIN: f64 = 1.0625;
 /// Bounds of a body's map and constraints where `|z| <= radius`; lengths in metres, z unit-free.
 #[derive(Clone, Debug)]
 pub struct Trust {
-    /// Radius of the ball of normalized coordinates where the bounds hold; checked at each point they are used at.
+    /// Radius of the ball of normalized coordinates where the bounds hold; checked at each point
+    /// they are used at.
     pub radius: f64,
     /// Bound of the distance of points of the ball from the normalization's centre.
     pub reach: f64,
@@ -19,8 +21,8 @@ pub struct Trust {
     pub center: f64,
     /// Bound of the distance between points of the ball and of the body.
     pub span: f64,
-    /// Bound of the displacement of a point per distance from the centre by the roundings of `z = M (v - o)`, for an M of
-    /// three roundings per entry; see [`super::Placement`].
+    /// Bound of the displacement of a point per distance from the centre by the roundings of `z = M
+    /// (v - o)`, for an M of three roundings per entry; see [`super::Placement`].
     pub rounding: f64,
     /// Condition number of M: bound of `|M r| / |r|` times that of its inverse.
     pub condition: f64,
@@ -32,15 +34,16 @@ pub struct Trust {
     pub linear_norm: f64,
     /// How far a point of the ball may be moved where the curvature ceilings still hold.
     pub leeway: f64,
-    /// Lower bound of the largest constraint anywhere in space: what the smallest value can be; minus infinity if the interior
-    /// point proves none.
+    /// Lower bound of the largest constraint anywhere in space: what the smallest value can be;
+    /// minus infinity if the interior point proves none.
     pub least: f64,
     /// Per constraint.
     pub constraints: Vec<ConstraintTrust>,
 }
 
-/// Bounds of one constraint `g(z)` within the ball. What is said of z-derivatives is by unit vectors of z, what is said of
-/// derivatives in metres by unit vectors of any frame that M maps to z.
+/// Bounds of one constraint `g(z)` within the ball. What is said of z-derivatives is by unit
+/// vectors of z, what is said of derivatives in metres by unit vectors of any frame that M maps to
+/// z.
 #[derive(Clone, Copy, Debug)]
 pub struct ConstraintTrust {
     /// Of the error of a computed value.
@@ -54,7 +57,8 @@ pub struct ConstraintTrust {
     pub curvature_ceiling: f64,
     /// Of the error of computed second derivatives by z.
     pub curvature_error: f64,
-    /// Bound of the third derivatives by z, where the value is within [`crate::polynomial::NEAR_LEVEL`] of 1.
+    /// Bound of the third derivatives by z, where the value is within
+    /// [`crate::polynomial::NEAR_LEVEL`] of 1.
     pub third: ThirdCeiling,
 }
 
@@ -78,7 +82,8 @@ impl Trust {
         let (norm, inverse_norm) = (linear.norm() * (1.0 + 1e-13), inverse.norm() * slack);
         let off = (linear * inverse - Matrix3::identity()).norm();
         let (none, at) = (Vector3::zeros(), Vector3::repeat(ball));
-        // The smallest value is attained in the body, which the interior point's tangent plane bounds from below.
+        // The smallest value is attained in the body, which the interior point's tangent plane
+        // bounds from below.
         let span = ball + extent.norm() * (1.0 + 1e-13);
         let least = constraints.iter().map(|Constraint { polynomial, .. }| {
             let jet = polynomial.evaluate(interior_z);

@@ -6,7 +6,8 @@
 //! V = Σ_parts ∫_part dx / m(x) = Σ_parts ⅓ ∫ r(u)³ E[1 / m] du,
 //! ```
 //!
-//! the mean E along the ray in direction u from the part's interior point, taken evenly in the cube of the distance.
+//! the mean E along the ray in direction u from the part's interior point, taken evenly in the cube
+//! of the distance.
 
 use super::surface::{Volume, radius, sphere_rule};
 use super::{Aabb, Body, Compound};
@@ -19,8 +20,8 @@ const STEPS: usize = 16;
 const RINGS: usize = 24;
 
 impl Compound {
-    /// Volume of the union by quadrature: where parts overlap counts once. The overlaps' boundaries cost it accuracy, which the
-    /// estimate of its error tells.
+    /// Volume of the union by quadrature: where parts overlap counts once. The overlaps' boundaries
+    /// cost it accuracy, which the estimate of its error says.
     pub fn volume(&self) -> Volume {
         let rule = |rings: usize| (0..self.parts().len()).map(|part| share(self.parts(), part, rings)).sum::<f64>();
         let (fine, coarse) = (rule(RINGS), rule(RINGS / 2));

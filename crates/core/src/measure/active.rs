@@ -3,8 +3,8 @@
 /// Most constraints of one body that can be active at once in general position in space.
 pub(super) const MAX_ACTIVE: usize = 3;
 
-/// The active constraints of one body at a witness with their multipliers λ >= 0: the outward normal there is `Σ λ_i ∇g_i`, the
-/// gradients by metres, so the multipliers are in metres.
+/// The active constraints of one body at a witness with their multipliers λ >= 0: the outward
+/// normal there is `Σ λ_i ∇g_i`, the gradients by metres, so the multipliers are in metres.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -42,7 +42,8 @@ impl ActiveConstraints {
         }
     }
 
-    /// Pairs of the position of a constraint in [`crate::body::Body::constraints`] and its multiplier, metres.
+    /// Pairs of the position of a constraint in [`crate::body::Body::constraints`] and its
+    /// multiplier, metres.
     pub fn iter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         let len = usize::from(self.len);
         self.index[..len].iter().map(|&i| usize::from(i)).zip(self.multiplier[..len].iter().copied())

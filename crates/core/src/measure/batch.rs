@@ -1,10 +1,11 @@
 //! Distances of one pair at many poses at once, a pose in each lane of the vectors.
 //!
-//! All poses are solved cold: the start of [`super::start`], then rounds of evaluation and step until the bracket is narrow. The
-//! first rounds, which are far off in any precision, are of single precision, for more poses at a time. Those that bracket are
-//! of double; the poses that need more than one wait until there is a group of them, so that the slowest does not
-//! hold up the others. A lane computes from its own pose only and selects where a single query would branch, so that no answer
-//! depends on the other poses of the batch.
+//! All poses are solved cold: the start of [`super::start`], then rounds of evaluation and step
+//! until the bracket is narrow. The first rounds, which are far off in any precision, are of single
+//! precision, for more poses at a time. Those that bracket are of double; the poses that need more
+//! than one wait until there is a group of them, so that the slowest does not hold up the others. A
+//! lane computes from its own pose only and selects where a single query would branch, so that no
+//! answer depends on the other poses of the batch.
 
 use super::Status;
 use super::active::ActiveConstraints;
@@ -39,12 +40,13 @@ pub enum BatchError {
     },
 }
 
-/// Euclidean distances between solid `a` at `pose_a` and solid `b` at each of `poses_b` (body to world), written to `answers` in
-/// the order of the poses.
+/// Euclidean distances between solid `a` at `pose_a` and solid `b` at each of `poses_b` (body to
+/// world), written to `answers` in the order of the poses.
 ///
-/// Each answer is one of [`distance`] from a cold start in all that is proven of it, and depends on its own pose only, to the
-/// last bit. Single bodies of one constraint are solved several poses at a time, which takes a fraction of the time of as
-/// many queries; all others, and poses that do not converge at once such as those in contact, are solved one by one.
+/// Each answer is one of [`distance`] from a cold start in all that is proven of it, and depends on
+/// its own pose only, to the last bit. Single bodies of one constraint are solved several poses at
+/// a time, which takes a fraction of the time of as many queries; all others, and poses that do not
+/// converge at once such as those in contact, are solved one by one.
 ///
 /// # Errors
 /// No poses, or a number of places that is not the number of poses; nothing is computed then.
@@ -115,18 +117,19 @@ const COARSE: u32 = 2;
 /// Most of them.
 const MOST_COARSE: u32 = 6;
 
-/// Square of the last step relative to the longest one allowed, below which the next one, of double precision, is likely to end with a
-/// narrow bracket.
+/// Square of the last step relative to the longest one allowed, below which the next one, of double
+/// precision, is likely to end with a narrow bracket.
 const NEAR: f64 = 1e-4;
 
-/// The same above which Newton's method is astray after [`MOST_COARSE`] rounds: a step as long as in a search from a cold start then.
+/// The same above which Newton's method is astray after [`MOST_COARSE`] rounds: a step as long as
+/// in a search from a cold start then.
 const ASTRAY: f64 = 0.04;
 
 /// Most rounds of a pose before it is solved alone.
 const MOST_ROUNDS: u32 = 8;
 
-/// A batch as work for the widest arithmetic. Of a pose that is to be solved alone it takes down the iterations only,
-/// and as `tied` that they have led astray.
+/// A batch as work for the widest arithmetic. Of a pose that is to be solved alone it takes down
+/// the iterations only, and as `tied` that they have led astray.
 struct Batch<'a> {
     a: &'a Body,
     pose_a: &'a Pose,
@@ -166,7 +169,8 @@ impl WithSimd for Batch<'_> {
     }
 }
 
-/// The numbers of the first rounds, unless there are few poses: while one vector waits for its operands the other is computed with.
+/// The numbers of the first rounds, unless there are few poses: while one vector waits for its
+/// operands the other is computed with.
 type Coarse<S> = Twice<Singles<S>>;
 
 /// Most lanes of them.
@@ -220,7 +224,8 @@ impl Waiting {
         self.len += 1;
     }
 
-    /// At most so many of the last entries as a group; lanes to spare hold some that no longer wait.
+    /// At most so many of the last entries as a group; lanes to spare hold some that no longer
+    /// wait.
     #[inline(always)]
     fn take<const LANES: usize>(&mut self, lanes: usize) -> Group<LANES> {
         let count = lanes.min(self.len);
@@ -316,8 +321,8 @@ impl<N: Copy> Iterate<N> {
 }
 
 impl Batch<'_> {
-    /// Rounds in single precision, after which the poses wait for what is next; fresh ones are started first, and left out where
-    /// they seem to overlap.
+    /// Rounds in single precision, after which the poses wait for what is next; fresh ones are
+    /// started first, and left out where they seem to overlap.
     #[inline(always)]
     fn approach<S: Simd, N: Vector<S>>(
         &mut self,
@@ -424,7 +429,8 @@ impl Batch<'_> {
         (answer.iterations, answer.tied) = (group.rounds[lane], astray);
     }
 
-    /// The lanes in which the middle between the points seems to lie in both bodies: single queries prove that fast.
+    /// The lanes in which the middle between the points seems to lie in both bodies: single queries
+    /// prove that fast.
     #[inline(always)]
     fn overlapping<S: Simd, N: Vector<S>>(
         &self,
@@ -449,7 +455,8 @@ impl Batch<'_> {
         for lane in 0..N::COUNT {
             let pose = &self.poses_b[poses[lane]];
             let q = &pose.rotation().coords;
-            // Differences of translations are exact to one rounding, however far from the world origin.
+            // Differences of translations are exact to one rounding, however far from the world
+            // origin.
             let t = pose.translation() - self.pose_a.translation();
             for (column, entry) in columns.0.iter_mut().zip([q.x, q.y, q.z, q.w, t.x, t.y, t.z]) {
                 column[lane] = entry;
@@ -740,7 +747,8 @@ mod tests {
                     let unit = 2_f64.powi(exponent);
                     let found = answered_in(unit, degrees, far);
                     let context = format!("unit {unit:e}, degrees {degrees:?}, far {far}: {found} of 200");
-                    // So far away that single precision runs out of numbers some poses are solved alone.
+                    // So far away that single precision runs out of numbers some poses are solved
+                    // alone.
                     assert!(if far < 100.0 { found == count } else { found >= 180 }, "{context}, {count} in metres");
                 }
             }

@@ -5,13 +5,15 @@ use super::pose::Pose;
 use crate::body::{Body, Solid};
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector3};
 
-/// Hessian of the distance of `a` and `b` with respect to the translation of either body (world frame, 1/m), at an answer of
-/// [`super::distance`] for these poses; that with respect to both in turn is its negative.
+/// Hessian of the distance of `a` and `b` with respect to the translation of either body (world
+/// frame, 1/m), at an answer of [`super::distance`] for these poses; that with respect to both in
+/// turn is its negative.
 ///
-/// With the normal n, tangents T across it and the curvatures `W_i = Tᵀ H_i T / |g_i|` of the surfaces at the witnesses, it is
-/// `T A (A + W_B)⁺ W_B Tᵀ`, `A = W_A (I + D W_A)⁻¹`: zero along n, and where either body is flat. None on overlap, at contact,
-/// and where several constraints of one body meet: the distance has no second derivative there. Of compounds it is that of
-/// the parts the answer is about, which holds for the compounds unless the answer is tied.
+/// With the normal n, tangents T across it and the curvatures `W_i = Tᵀ H_i T / |g_i|` of the
+/// surfaces at the witnesses, it is `T A (A + W_B)⁺ W_B Tᵀ`, `A = W_A (I + D W_A)⁻¹`: zero along n,
+/// and where either body is flat. None on overlap, at contact, and where several constraints of one
+/// body meet: the distance has no second derivative there. Of compounds it is that of the parts the
+/// answer is about, which holds for the compounds unless the answer is tied.
 ///
 /// ```
 /// use nalgebra::Vector3;

@@ -1,7 +1,8 @@
-//! Questions that a bracket answers before it is narrow: overlap, nearer than a threshold, within a margin.
+//! Questions that a bracket answers before it is narrow: overlap, nearer than a threshold, within a
+//! margin.
 //!
-//! Balls come first, then the slabs of the normalized coordinates along a direction or two, then the search for the
-//! distance, which stops as soon as its bracket decides.
+//! Balls come first, then the slabs of the normalized coordinates along a direction or two, then
+//! the search for the distance, which stops as soon as its bracket decides.
 
 use super::active::ActiveConstraints;
 use super::bracket::distance_lower;
@@ -48,7 +49,8 @@ pub enum WithinMargin {
 #[error("{0} m is not a distance to compare with; give a finite number that is not negative")]
 pub struct ThresholdError(pub f64);
 
-/// Whether two solids have a point in common. `warm` as in [`super::distance`], with which it can be shared.
+/// Whether two solids have a point in common. `warm` as in [`super::distance`], with which it can
+/// be shared.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -75,8 +77,8 @@ pub fn overlap(
     decide(&union::distance(a, pose_a, b, pose_b, &Goal::compare(0.0), options, warm), 0.0)
 }
 
-/// Whether the distance of two solids is below `threshold` metres: the search ends as soon as its bracket decides. `warm` as in
-/// [`super::distance`].
+/// Whether the distance of two solids is below `threshold` metres: the search ends as soon as its
+/// bracket decides. `warm` as in [`super::distance`].
 ///
 /// # Errors
 /// A threshold that is negative or not finite.
@@ -108,8 +110,8 @@ pub fn nearer_than(
     Ok(decide(&union::distance(a, pose_a, b, pose_b, &Goal::compare(at_most), options, warm), at_most))
 }
 
-/// The distance of two solids, as accurate as [`super::distance`] gives it, unless it is proven to exceed `margin` metres:
-/// then it is not worked out. `warm` as in [`super::distance`].
+/// The distance of two solids, as accurate as [`super::distance`] gives it, unless it is proven to
+/// exceed `margin` metres: then it is not worked out. `warm` as in [`super::distance`].
 ///
 /// # Errors
 /// A margin that is negative or not finite.
@@ -186,7 +188,8 @@ impl Goal {
         self.near == f64::NEG_INFINITY && self.far == f64::INFINITY
     }
 
-    /// Whether a narrow bracket is an answer, with all that comes with one, and not just a decision.
+    /// Whether a narrow bracket is an answer, with all that comes with one, and not just a
+    /// decision.
     pub(super) fn wants_answer(&self) -> bool {
         self.near == f64::NEG_INFINITY
     }
@@ -197,7 +200,8 @@ impl Goal {
     }
 }
 
-/// Distance of two bodies as far as the goal needs it, cheapest bounds first. `warm` stays as it is when they suffice.
+/// Distance of two bodies as far as the goal needs it, cheapest bounds first. `warm` stays as it is
+/// when they suffice.
 #[inline]
 pub(super) fn settle(
     of_a: (&Body, &Pose),
@@ -271,8 +275,8 @@ fn balls((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose)) -> Distance {
     }
 }
 
-/// Lower bound of the distance in metres from the bounds of the normalized coordinates, along the line of the centres and
-/// the normal of the last answer: no polynomial is evaluated.
+/// Lower bound of the distance in metres from the bounds of the normalized coordinates, along the
+/// line of the centres and the normal of the last answer: no polynomial is evaluated.
 fn slabs((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose), hint: &Hint) -> f64 {
     let pair = Pair::new(a, pose_a, b, pose_b);
     let x = pair.a_to_query(&a.normalization().center);

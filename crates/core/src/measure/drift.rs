@@ -1,4 +1,5 @@
-//! What predictions miss along a trajectory: where motions are smooth it changes slowly, and can be foreseen.
+//! What predictions miss along a trajectory: where motions are smooth it changes slowly, and can be
+//! foreseen.
 
 use super::vector::{V3, add, dot, subtract};
 use crate::polynomial::Simd;
@@ -23,8 +24,8 @@ impl<const K: usize> Drift<K> {
         self.expected
     }
 
-    /// After a prediction that missed this: more of the same, and where the change from the last one is small against it, that
-    /// change again.
+    /// After a prediction that missed this: more of the same, and where the change from the last
+    /// one is small against it, that change again.
     #[inline(always)]
     pub(super) fn update<S: Simd>(&mut self, _: S, missed: [V3<f64>; K]) {
         for i in 0..K {

@@ -2,8 +2,9 @@
 
 /// What is known of the parameters s at which a line is in a convex set `φ(s) <= 0`, φ convex.
 ///
-/// Each value of φ with its slope cuts off the side where its tangent is positive; from outside that is Newton's method,
-/// which never passes the first root of a convex function, and from inside it bounds the root from the other side.
+/// Each value of φ with its slope cuts off the side where its tangent is positive; from outside
+/// that is Newton's method, which never passes the first root of a convex function, and from inside
+/// it bounds the root from the other side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Entry {
     /// No smaller parameter is in the set.
@@ -84,7 +85,8 @@ mod tests {
     use super::*;
     use sublevel_testkit::Seeded;
 
-    /// Tangents of |s - c|^k - h anywhere, with slopes known to a little, never cut off a parameter of the set.
+    /// Tangents of |s - c|^k - h anywhere, with slopes known to a little, never cut off a parameter
+    /// of the set.
     #[test]
     fn cuts_keep_the_set() {
         for seed in 0..2000 {

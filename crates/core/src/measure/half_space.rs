@@ -1,8 +1,9 @@
 //! Signed distance from a body to a half-space: its support point against the normal.
 //!
-//! The signed distance is `min n·x - offset` over the body. Where it is positive it is the Euclidean distance, since the
-//! nearest point of the half-space lies along n. Where it is negative its magnitude is the penetration depth: a
-//! translation t separates exactly if `n·t` makes up for it, and the shortest such t is along n.
+//! The signed distance is `min n·x - offset` over the body. Where it is positive it is the
+//! Euclidean distance, since the nearest point of the half-space lies along n. Where it is negative
+//! its magnitude is the penetration depth: a translation t separates exactly if `n·t` makes up for
+//! it, and the shortest such t is along n.
 
 use super::Status;
 use super::bracket::{SLACK, descent};
@@ -47,7 +48,8 @@ pub enum HalfSpaceError {
 }
 
 impl HalfSpace {
-    /// The points x with `normal·x <= offset` (m), for an outward normal within 1e-6 of length 1, which is normalised.
+    /// The points x with `normal·x <= offset` (m), for an outward normal within 1e-6 of length 1,
+    /// which is normalised.
     ///
     /// # Errors
     /// Numbers that are not finite, or a normal that is farther from length 1.
@@ -77,7 +79,8 @@ impl HalfSpace {
     }
 }
 
-/// Signed distance of a body from a half-space with its proof; lengths in metres, vectors in the world frame.
+/// Signed distance of a body from a half-space with its proof; lengths in metres, vectors in the
+/// world frame.
 #[derive(Clone, Copy, Debug)]
 pub struct HalfSpaceDistance {
     /// How the solve ended.
@@ -88,8 +91,8 @@ pub struct HalfSpaceDistance {
     pub upper: f64,
     /// The point of the body nearest to the half-space, or deepest in it.
     pub witness: Vector3<f64>,
-    /// Whether another part may lie as low, their brackets meeting: witness and gradient may then jump. Never for single
-    /// bodies.
+    /// Whether another part may lie as low, their brackets meeting: witness and gradient may then
+    /// jump. Never for single bodies.
     pub tied: bool,
     /// Iterations.
     pub iterations: u32,
@@ -101,18 +104,18 @@ impl HalfSpaceDistance {
         self.upper
     }
 
-    /// Gradient with respect to the pose the distance was asked for: `n` and `(x - t) × n`, x the witness; through contact
-    /// and in depth as well. It is unique where the witness is.
+    /// Gradient with respect to the pose the distance was asked for: `n` and `(x - t) × n`, x the
+    /// witness; through contact and in depth as well. It is unique where the witness is.
     pub fn pose_gradient(&self, pose: &Pose, half_space: &HalfSpace) -> Twist {
         Twist::of_force(half_space.normal, &self.witness, pose.translation())
     }
 }
 
-/// Signed distance of a solid at `pose` from a half-space: positive apart, zero in contact, minus the penetration depth in
-/// overlap.
+/// Signed distance of a solid at `pose` from a half-space: positive apart, zero in contact, minus
+/// the penetration depth in overlap.
 ///
-/// The bracket is as narrow as `options` ask, relative to the circumradius of the solid, or the status says that it is not.
-/// `warm` is read and then replaced by the hint for the next query.
+/// The bracket is as narrow as `options` ask, relative to the circumradius of the solid, or the
+/// status says that it is not. `warm` is read and then replaced by the hint for the next query.
 ///
 /// ```
 /// use nalgebra::Vector3;

@@ -1,18 +1,21 @@
 //! Time of impact of two moving bodies by conservative advancement, never late.
 //!
-//! For a unit vector n fixed to one of the bodies let `s(t)` be the width of the gap between the planes that n supports
-//! the two bodies with; the distance is at least that. If the second derivative of `n·(x - y)` in time is at most M for all
-//! points x of A and y of B ([`Motion::acceleration_between`]), then `n·(x - y)` stays above its chord minus
-//! `½ M (t - t_0)(t_1 - t)`; and so does the smallest of them,
+//! For a unit vector n fixed to one of the bodies let `s(t)` be the width of the gap between the
+//! planes that n supports the two bodies with; the distance is at least that. If the second
+//! derivative of `n·(x - y)` in time is at most M for all points x of A and y of B
+//! ([`Motion::acceleration_between`]), then `n·(x - y)` stays above its chord minus `½ M (t -
+//! t_0)(t_1 - t)`; and so does the smallest of them,
 //!
 //! ```text
 //! s(t) >= (1 - u) s(t_0) + u s(t_1) - ½ M (t_1 - t_0)² u (1 - u),   t = t_0 + u (t_1 - t_0).
 //! ```
 //!
-//! The bodies are apart up to the first root of the right-hand side. With n the normal of the closest points at t_0 and t_1
-//! where Newton's method expects contact, the bound and the distance agree to first order at t_0, and the advance closes on
-//! the contact quadratically, where bounds by the greatest speed close on it by a constant factor (Mirtich 1996). A plane
-//! that turns with a body rests on the same face of it all the time; which body it should turn with shows in the trying.
+//! The bodies are apart up to the first root of the right-hand side. With n the normal of the
+//! closest points at t_0 and t_1 where Newton's method expects contact, the bound and the distance
+//! agree to first order at t_0, and the advance closes on the contact quadratically, where bounds
+//! by the greatest speed close on it by a constant factor (Mirtich 1996). A plane that turns with a
+//! body rests on the same face of it all the time; which body it should turn with shows in the
+//! trying.
 
 use super::decide::Goal;
 use super::distance::{Distance, between};
@@ -50,7 +53,7 @@ pub struct ImpactOptions<'a> {
     stop: Option<&'a AtomicBool>,
 }
 
-/// Why a request can not be served.
+/// Why a request cannot be served.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ImpactOptionsError {
     /// A duration that is no time.
@@ -79,7 +82,8 @@ impl<'a> ImpactOptions<'a> {
         }
     }
 
-    /// The same with another distance that counts as contact, relative to the circumradius of the smaller solid.
+    /// The same with another distance that counts as contact, relative to the circumradius of the
+    /// smaller solid.
     ///
     /// # Errors
     /// A distance outside 1e-12 to 1.
@@ -116,7 +120,8 @@ pub enum ImpactStatus {
     Apart,
     /// Within the contact distance at `time`, and proven apart at all times before.
     Contact,
-    /// The query limit, the stop flag or rounding came first: proven apart up to `time`, open after.
+    /// The query limit, the stop flag or rounding came first: proven apart up to `time`, open
+    /// after.
     Stopped,
 }
 
@@ -125,15 +130,18 @@ pub enum ImpactStatus {
 pub struct Impact {
     /// How the search ended.
     pub status: ImpactStatus,
-    /// At all times from 0 to before this one, seconds, the distance is proven to exceed half the contact distance.
+    /// At all times from 0 to before this one, seconds, the distance is proven to exceed half the
+    /// contact distance.
     pub time: f64,
-    /// The distance at that time: at most the contact distance on contact; none where nothing was in reach.
+    /// The distance at that time: at most the contact distance on contact; none where nothing was
+    /// in reach.
     pub distance: Option<Distance>,
     /// Distance queries and evaluations of a separating plane, together.
     pub queries: u32,
 }
 
-/// First time at which two moving solids come within the contact distance of `options`. The answer is never late.
+/// First time at which two moving solids come within the contact distance of `options`. The answer
+/// is never late.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -303,8 +311,8 @@ impl Search<'_> {
         self.a.motion.is_turning() || self.b.motion.is_turning()
     }
 
-    /// The time up to which a plane that is normal to n at time t and fixed to one of the bodies proves them apart, at most
-    /// `next`.
+    /// The time up to which a plane that is normal to n at time t and fixed to one of the bodies
+    /// proves them apart, at most `next`.
     fn advance(&mut self, carrier: Carrier, t: f64, next: f64, n: &Vector3<f64>, found: &Distance, gap: f64) -> f64 {
         let (own, other) = self.of(carrier);
         let (turned, error) = own.motion.carry(n, t, next);
@@ -321,8 +329,9 @@ impl Search<'_> {
         }
     }
 
-    /// The time at which the closest points, going on as they do, come within three quarters of the contact distance; no
-    /// later than where the bound of the acceleration spoils what a plane can prove.
+    /// The time at which the closest points, going on as they do, come within three quarters of the
+    /// contact distance; no later than where the bound of the acceleration spoils what a plane can
+    /// prove.
     fn aim(&self, t: f64, n: &Vector3<f64>, found: &Distance, gap: f64, duration: f64) -> f64 {
         let towards = self.b.motion.velocity_at(t, &found.witness_b) - self.a.motion.velocity_at(t, &found.witness_a);
         let speed = n.dot(&towards);
@@ -331,7 +340,8 @@ impl Search<'_> {
         (t + travel.min((8.0 * gap / acceleration).sqrt())).min(duration)
     }
 
-    /// Lower bound of the gap between the supporting planes along n, known up to `error`, at time t.
+    /// Lower bound of the gap between the supporting planes along n, known up to `error`, at time
+    /// t.
     fn separation(&mut self, n: &Vector3<f64>, error: f64, from: f64, t: f64, found: &Distance) -> f64 {
         self.queries += 1;
         let options = self.options();
@@ -341,7 +351,8 @@ impl Search<'_> {
         let mut warm = [self.a.hint(from, &found.witness_a), self.b.hint(from, &found.witness_b)];
         let low = Support::new(&a, &-n).solve(narrow / a.unit, &options, &mut warm[0]);
         let high = Support::new(&b, n).solve(narrow / b.unit, &options, &mut warm[1]);
-        // n·x over A is that of its query origin less the support of -n; differences first, however far from the origin.
+        // n·x over A is that of its query origin less the support of -n; differences first, however
+        // far from the origin.
         let [arm_a, arm_b] = [(&a, &pose_a), (&b, &pose_b)]
             .map(|(single, pose)| pose.transform_direction(&single.to_body(&Vector3::zeros())));
         let offset = (pose_a.translation() - pose_b.translation()) + (arm_a - arm_b);
@@ -371,8 +382,8 @@ impl Search<'_> {
     }
 }
 
-/// The time from t_0 up to which the gap stays positive, from its lower bounds at both ends and that of its acceleration;
-/// t_1 if that is all the way.
+/// The time from t_0 up to which the gap stays positive, from its lower bounds at both ends and
+/// that of its acceleration; t_1 if that is all the way.
 fn advance(t_0: f64, t_1: f64, first: f64, last: f64, acceleration: f64) -> f64 {
     let step = t_1 - t_0;
     let bend = 0.5 * acceleration * step * step * (1.0 + 1e-12);
@@ -452,7 +463,8 @@ mod tests {
             let mut random = Seeded(seed);
             let (place, rate) = (1.0 + 0.9 * random.signed().abs(), 10_f64.powf(2.0 * random.signed()));
             let turn = 0.3 + 2.4 * random.signed().abs();
-            // The ball lies at an angle `turn` ahead; the blade's face meets it where place · sin = 0.02 + 0.05.
+            // The ball lies at an angle `turn` ahead; the blade's face meets it where place · sin =
+            // 0.02 + 0.05.
             let pose = at(Vector3::new(place * turn.cos(), place * turn.sin(), 0.03 * random.signed()));
             let spin = Motion::new(Pose::identity(), Vector3::zeros(), Vector3::z() * rate, Vector3::zeros()).unwrap();
             let truth = (turn - (0.07 / place).asin()) / rate;

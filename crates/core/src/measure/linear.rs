@@ -9,8 +9,9 @@ pub(super) const MAX_UNKNOWNS: usize = 13;
 /// A system of n <= [`MAX_UNKNOWNS`] equations; the right-hand side is column `n`.
 pub(super) type Augmented = [[f64; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
 
-/// Solves the system of the first n equations, whose right-hand side is column n, by Gaussian elimination with row scaling and
-/// partial pivoting. None if the matrix is singular to working accuracy.
+/// Solves the system of the first n equations, whose right-hand side is column n, by Gaussian
+/// elimination with row scaling and partial pivoting. None if the matrix is singular to working
+/// accuracy.
 pub(super) fn solve<const N: usize, const W: usize>(system: &mut [[f64; W]; N], n: usize) -> Option<[f64; N]> {
     dispatch(Elimination { system, n })
 }
@@ -66,8 +67,8 @@ impl<const N: usize, const W: usize> WithSimd for Elimination<'_, N, W> {
     }
 }
 
-/// Solves a system of N equations by Gaussian elimination with partial pivoting, rows scaled. None if it is singular to
-/// working accuracy.
+/// Solves a system of N equations by Gaussian elimination with partial pivoting, rows scaled. None
+/// if it is singular to working accuracy.
 pub(super) fn eliminate<const N: usize>(m: &mut [[f64; N]; N], r: &mut [f64; N]) -> Option<()> {
     for (row, right) in m.iter_mut().zip(r.iter_mut()) {
         let scale = row.iter().fold(0.0_f64, |most, entry| most.max(entry.abs()));
@@ -115,7 +116,8 @@ pub(super) struct Curvature {
 }
 
 impl Curvature {
-    /// Factors m; pivots below 1e-14 of the trace are lifted to that. None for a matrix without curvature or not finite.
+    /// Factors m; pivots below 1e-14 of the trace are lifted to that. None for a matrix without
+    /// curvature or not finite.
     pub(super) fn new(m: &Matrix3<f64>) -> Option<Self> {
         let trace = m.trace();
         if !(trace > 0.0 && trace.is_finite()) {

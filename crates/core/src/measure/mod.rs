@@ -2,11 +2,12 @@
 //!
 //! # Inside
 //!
-//! A warm start is corrected by Newton's method on the optimality system of its active constraints (`newton`, and `smooth` where one
-//! constraint of each body is active); where that does not apply or does not converge, an interior-point method
-//! ([`crate::optimize`]) does. Neither is trusted: an answer is accepted when its bracket (`bracket`) is narrow enough. As that holds
-//! a normal to about the root of its width only, the equations have to hold there, too. Unions are in `union`. This room knows
-//! neither clock nor allocator nor threads.
+//! A warm start is corrected by Newton's method on the optimality system of its active constraints
+//! (`newton`, and `smooth` where one constraint of each body is active); where that does not apply
+//! or does not converge, an interior-point method ([`crate::optimize`]) does. Neither is trusted:
+//! an answer is accepted when its bracket (`bracket`) is narrow enough. As that holds a normal to
+//! about the root of its width only, the equations have to hold there, too. Unions are in `union`.
+//! This room knows neither clock nor allocator nor threads.
 
 mod active;
 mod batch;
@@ -74,7 +75,8 @@ pub use warm::WarmStart;
 pub enum Status {
     /// The bracket is as narrow as asked for.
     Converged,
-    /// The iteration limit, the stop flag or the rounding floor came first; the bracket says what is known.
+    /// The iteration limit, the stop flag or the rounding floor came first; the bracket says what
+    /// is known.
     BracketWide,
 }
 

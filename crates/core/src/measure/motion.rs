@@ -4,15 +4,15 @@ use super::pose::{Pose, ROTATION_ERROR};
 use crate::polynomial::gamma;
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// A rigid motion: a point fixed to the body, the centre, moves with constant velocity, and the body turns about it at a
-/// constant rate,
+/// A rigid motion: a point fixed to the body, the centre, moves with constant velocity, and the
+/// body turns about it at a constant rate,
 ///
 /// ```text
 /// x(t) = c + v t + exp(ω t) (x(0) - c)
 /// ```
 ///
-/// in the world frame, seconds and metres. With v along ω it is a screw motion about the axis through c; with c the centre
-/// of mass it is free flight. Checked when made.
+/// in the world frame, seconds and metres. With v along ω it is a screw motion about the axis
+/// through c; with c the centre of mass it is free flight. Checked when made.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -41,8 +41,8 @@ pub enum MotionError {
 }
 
 impl Motion {
-    /// The motion from the pose `start`, of the centre `center` (world, m, at time 0) with `velocity` (m/s), turning at
-    /// `angular_velocity` (rad/s, along the axis).
+    /// The motion from the pose `start`, of the centre `center` (world, m, at time 0) with
+    /// `velocity` (m/s), turning at `angular_velocity` (rad/s, along the axis).
     ///
     /// # Errors
     /// Numbers that are not finite.
@@ -86,7 +86,8 @@ impl Motion {
         self.angular_velocity != Vector3::zeros()
     }
 
-    /// A direction fixed to the body, at time `to`, that is `n` at time `from`, with a bound of its error.
+    /// A direction fixed to the body, at time `to`, that is `n` at time `from`, with a bound of its
+    /// error.
     pub(super) fn carry(&self, n: &Vector3<f64>, from: f64, to: f64) -> (Vector3<f64>, f64) {
         if !self.is_turning() {
             return (*n, 0.0);
@@ -95,18 +96,19 @@ impl Motion {
         (UnitQuaternion::from_scaled_axis(turn) * n, gamma(8) * turn.norm() + gamma(32))
     }
 
-    /// Bound of `|d²/dt² n·x|` for a fixed unit vector n and the points x of the body within `radius` of `point` (body
-    /// frame), at all times: `n·(ω × (ω × ρ))` with `|ω × ρ|` constant.
+    /// Bound of `|d²/dt² n·x|` for a fixed unit vector n and the points x of the body within
+    /// `radius` of `point` (body frame), at all times: `n·(ω × (ω × ρ))` with `|ω × ρ|` constant.
     pub(super) fn acceleration_along(&self, n: &Vector3<f64>, point: &Vector3<f64>, radius: f64) -> f64 {
         let omega = &self.angular_velocity;
         n.cross(omega).norm() * (self.arm(point).cross(omega).norm() + radius * omega.norm()) * (1.0 + 1e-12)
     }
 
-    /// Bound of `|d²/dt² n·(x - y)|` between two times for a unit vector n fixed to this body, the points x of this body and
-    /// the points y of another within `radius` of `point` (its body frame).
+    /// Bound of `|d²/dt² n·(x - y)|` between two times for a unit vector n fixed to this body, the
+    /// points x of this body and the points y of another within `radius` of `point` (its body
+    /// frame).
     ///
-    /// `n·(x - c)` is constant. What remains is `n·w - n·b` with w from the other's point to c and b from it to y: by
-    /// `n' = ω × n` and the product rule
+    /// `n·(x - c)` is constant. What remains is `n·w - n·b` with w from the other's point to c and
+    /// b from it to y: by `n' = ω × n` and the product rule
     ///
     /// ```text
     /// |n''·(w - b)| + 2 |n'·(w' - b')| + |n·(w'' - b'')|,   |n'| = |ω × n|,  |n''| <= |ω| |n'|
@@ -136,14 +138,16 @@ impl Motion {
         self.start.transform_point(point) - self.center
     }
 
-    /// Bound of how far [`Motion::pose`] misplaces the points within `reach` of the body frame's origin at time t.
+    /// Bound of how far [`Motion::pose`] misplaces the points within `reach` of the body frame's
+    /// origin at time t.
     pub(super) fn error(&self, t: f64, reach: f64) -> f64 {
         let moved = self.velocity.norm() * t;
         let places = self.start.translation().norm() + moved;
         if !self.is_turning() {
             return gamma(4) * places + ROTATION_ERROR * reach;
         }
-        // The angle rounds four times, its sine and cosine and the products with them a few times more.
+        // The angle rounds four times, its sine and cosine and the products with them a few times
+        // more.
         let turned = 4.0 * f64::EPSILON * self.angular_velocity.norm() * t + ROTATION_ERROR + gamma(32);
         let arm = (self.start.translation() - self.center).norm();
         turned * (arm + reach) + gamma(8) * (places + self.center.norm())

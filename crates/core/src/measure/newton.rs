@@ -1,15 +1,16 @@
 //! Newton's method on the optimality system of the distance, for a given set of active constraints.
 //!
-//! Regular through contact: the unknowns are x, y, the distance D, the normal n and multipliers λ of A, μ of B, with
-//! `u = Σ λ_i ∇g_i(x)` and `w = Σ μ_j ∇h_j(y)`:
+//! Regular through contact: the unknowns are x, y, the distance D, the normal n and multipliers λ
+//! of A, μ of B, with `u = Σ λ_i ∇g_i(x)` and `w = Σ μ_j ∇h_j(y)`:
 //!
 //! ```text
 //! x - y = D n,   n + u = 0,   w - n = 0,   (|n|² - 1) / 2 = 0,   g_i(x) = 1,   h_j(y) = 1   (active i, j)
 //! ```
 //!
-//! The normal is an unknown of its own, although u and w say what it is: those of thin bodies turn so fast with the point that
-//! Newton's method goes astray by them from where it converges so (Albersmeyer and Diehl, The lifted Newton method and its
-//! application in optimization, SIAM J. Optimization 20, 2010).
+//! The normal is an unknown of its own, although u and w say what it is: those of thin bodies turn
+//! so fast with the point that Newton's method goes astray by them from where it converges so
+//! (Albersmeyer and Diehl, The lifted Newton method and its application in optimization, SIAM J.
+//! Optimization 20, 2010).
 
 use super::active::{ActiveConstraints, MAX_ACTIVE};
 use super::bracket::Multipliers;
@@ -65,7 +66,8 @@ impl Active {
         active
     }
 
-    /// The constraints whose multipliers times gradients at v are largest: those of thin bodies have steep ones.
+    /// The constraints whose multipliers times gradients at v are largest: those of thin bodies
+    /// have steep ones.
     pub(super) fn from_forces(body: &Posed<'_>, v: &Vector3<f64>, multipliers: &Multipliers) -> Self {
         let mut forces = *multipliers;
         let carried = forces.iter_mut().enumerate().take(body.len()).filter(|(_, force)| **force > 0.0);
@@ -165,7 +167,8 @@ impl Active {
         self.multiplier.swap(k, self.len);
     }
 
-    /// Least-squares multipliers of `Σ λ_i ∇g_i = target` at v. False if the gradients are dependent.
+    /// Least-squares multipliers of `Σ λ_i ∇g_i = target` at v. False if the gradients are
+    /// dependent.
     pub(super) fn fit(&mut self, body: &Posed<'_>, v: &Vector3<f64>, target: &Vector3<f64>) -> bool {
         let gradients: [Vector3<f64>; MAX_ACTIVE] =
             std::array::from_fn(|k| if k < self.len { body.jet(self.index[k], v).gradient } else { Vector3::zeros() });
@@ -181,8 +184,8 @@ impl Active {
         true
     }
 
-    /// How far what the constraints carry at v is from `target`, and how far v is at most from where those that carry anything are met
-    /// and none is violated.
+    /// How far what the constraints carry at v is from `target`, and how far v is at most from
+    /// where those that carry anything are met and none is violated.
     fn misfit(&self, body: &Posed<'_>, v: &Vector3<f64>, target: &Vector3<f64>) -> (f64, f64) {
         let multipliers = self.multipliers();
         let (mut rest, mut gap) = (*target, 0.0_f64);
@@ -234,7 +237,8 @@ impl At {
     }
 }
 
-/// How far below the highest the value of a constraint may be that counts as active, relative to that or to 1.
+/// How far below the highest the value of a constraint may be that counts as active, relative to
+/// that or to 1.
 pub(super) const AT: f64 = 0.1;
 
 /// By how much a constraint may be violated, relative to its level, that is not active.
@@ -255,13 +259,16 @@ pub(super) const MAX_STEPS: u32 = 16;
 /// Steps after which they should no longer be cut, whatever was active before.
 const PATIENCE: u32 = 6;
 
-/// Longest Newton step, relative to the bodies, after which a bracket may be narrow: what remains is about its square.
+/// Longest Newton step, relative to the bodies, after which a bracket may be narrow: what remains
+/// is about its square.
 pub(super) const WORTH_A_BRACKET: f64 = 1e-3;
 
-/// How far forces lead where there is no curvature, relative to the bodies and before the step is cut.
+/// How far forces lead where there is no curvature, relative to the bodies and before the step is
+/// cut.
 const FARTHEST: f64 = 1e3;
 
-/// Whether Newton's steps still shrink: fast near a solution, and those that do not are not near one.
+/// Whether Newton's steps still shrink: fast near a solution, and those that do not are not near
+/// one.
 pub(super) struct Pace {
     last: f64,
     /// How often a short step was hardly shorter than the one before.
@@ -272,8 +279,9 @@ impl Pace {
     /// Of steps towards a system that none has been taken towards yet.
     pub(super) const FIRST: Self = Self { last: f64::INFINITY, stuck: 0 };
 
-    /// Whether the steps, this one of this length the last, are still cut to the longest when they should no longer be: two in a row, or
-    /// the first towards a new system. A single long one is taken where sides are flat, once it shows how far they reach.
+    /// Whether the steps, this one of this length the last, are still cut to the longest when they
+    /// should no longer be: two in a row, or the first towards a new system. A single long one is
+    /// taken where sides are flat, once it shows how far they reach.
     pub(super) fn is_astray(&self, step: u32, length: f64, longest: f64) -> bool {
         step >= PATIENCE && length.min(self.last) > longest
     }
@@ -299,7 +307,8 @@ pub(super) struct DistanceNewton {
 }
 
 impl DistanceNewton {
-    /// Iterates until `accept` takes one, they stop converging or the limit is reached; returns the steps taken.
+    /// Iterates until `accept` takes one, they stop converging or the limit is reached; returns the
+    /// steps taken.
     pub(super) fn run(&mut self, pair: &Pair<'_>, limit: u32, mut accept: impl FnMut(&Self) -> bool) -> u32 {
         let n = self.n;
         if self.a.len == 0 || self.b.len == 0 || !self.a.fit(&pair.a, &self.x, &-n) || !self.b.fit(&pair.b, &self.y, &n)
@@ -311,7 +320,8 @@ impl DistanceNewton {
         for step in 1..=MAX_STEPS.min(limit) {
             let before = (self.x, self.y);
             let Some(length) = self.step(pair, &at, &mut series) else {
-                // Where both are flat the system is singular, but the point at hand with its multipliers may do.
+                // Where both are flat the system is singular, but the point at hand with its
+                // multipliers may do.
                 accept(self);
                 return step;
             };
@@ -321,7 +331,8 @@ impl DistanceNewton {
                 turned = true;
             }
             at = self.evaluate(pair);
-            // A long step has not converged: its bracket is not worth its cost, but for flat bodies now and then.
+            // A long step has not converged: its bracket is not worth its cost, but for flat bodies
+            // now and then.
             let last_step = step == MAX_STEPS.min(limit);
             if (length < WORTH_A_BRACKET || step % 4 == 0 || last_step) && accept(self) {
                 return step;
@@ -344,9 +355,11 @@ impl DistanceNewton {
         MAX_STEPS.min(limit)
     }
 
-    /// Whether the normal is that of the solution, to [`ALIGNED`] or to what rounding leaves of so short a distance. The narrowest
-    /// of brackets holds it to about the root of its width relative to the distance; the equations tell it as it is: n is along x - y
-    /// and what the constraints of each body carry, none of them is violated, and those that carry anything hold with equality.
+    /// Whether the normal is that of the solution, to [`ALIGNED`] or to what rounding leaves of so
+    /// short a distance. The narrowest of brackets holds it to about the root of its width relative
+    /// to the distance; the equations tell it as it is: n is along x - y and what the constraints
+    /// of each body carry, none of them is violated, and those that carry anything hold with
+    /// equality.
     pub(super) fn is_aligned(&self, pair: &Pair<'_>) -> bool {
         let (n, apart) = (self.n.normalize(), self.x - self.y);
         let (turned_a, gap_a) = self.a.misfit(&pair.a, &self.x, &-n);
@@ -356,8 +369,8 @@ impl DistanceNewton {
         turned_a <= ALIGNED && turned_b <= ALIGNED && across + gap_a + gap_b <= enough
     }
 
-    /// Turns the normal along x - y, if that is about where it points: of corners and edges that hold both points where they are it is
-    /// off by long steps still.
+    /// Turns the normal along x - y, if that is about where it points: of corners and edges that
+    /// hold both points where they are it is off by long steps still.
     fn turn(&mut self, pair: &Pair<'_>) {
         let apart = self.x - self.y;
         let distance = apart.norm().copysign(self.n.dot(&apart));
@@ -368,7 +381,8 @@ impl DistanceNewton {
         }
     }
 
-    /// By how much a constraint may be violated that is not active: far below the distance, or it decides the normal.
+    /// By how much a constraint may be violated that is not active: far below the distance, or it
+    /// decides the normal.
     fn negligible(&self, pair: &Pair<'_>) -> f64 {
         (0.1 * ALIGNED * self.distance.abs() / pair.size()).clamp(ROUNDED, VIOLATED)
     }
@@ -378,8 +392,8 @@ impl DistanceNewton {
         (At::new(&pair.a, &self.a, &self.x), At::new(&pair.b, &self.b, &self.y))
     }
 
-    /// The curvature by which forces along the tangents alone lead [`FARTHEST`]. Added to what there is it vanishes with them, which
-    /// leaves Newton's method as fast as it is.
+    /// The curvature by which forces along the tangents alone lead [`FARTHEST`]. Added to what
+    /// there is it vanishes with them, which leaves Newton's method as fast as it is.
     fn stiffness(pair: &Pair<'_>, tangents: [V3<f64>; 2], force: &Vector3<f64>) -> f64 {
         let force = across(Scalar, tangents, along(Scalar, tangents, (*force).into())).into();
         pair.a.relative_length(&force).max(pair.b.relative_length(&force)) / FARTHEST
@@ -387,9 +401,9 @@ impl DistanceNewton {
 
     /// One Newton step; its length relative to the bodies, or none if the system is singular.
     ///
-    /// The second of the equations at the head of this file gives `dn = -(n + u) - H_A dx - G_A dλ`, G the gradients and H the
-    /// weighted Hessians, and the first then `dy = (I + D H_A) dx - n dD + D G_A dλ + (x - y + D u)`, which leaves dx, dD and
-    /// the multipliers.
+    /// The second of the equations at the head of this file gives `dn = -(n + u) - H_A dx - G_A
+    /// dλ`, G the gradients and H the weighted Hessians, and the first then `dy = (I + D H_A) dx -
+    /// n dD + D G_A dλ + (x - y + D u)`, which leaves dx, dD and the multipliers.
     fn step(&mut self, pair: &Pair<'_>, (a, b): &(At, At), series: &mut Series) -> Option<f64> {
         let (la, lb, distance, n) = (self.a.len, self.b.len, self.distance, self.n);
         let size = 4 + la + lb;

@@ -1,17 +1,21 @@
-//! What a caller asks of a solve: how narrow a bracket, how many iterations, and when to stop early.
+//! What a caller asks of a solve: how narrow a bracket, how many iterations, and when to stop
+//! early.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Default accuracy: relative to the circumradius of the smaller body for lengths, to `max(1, |d|)` for level distances.
+/// Default accuracy: relative to the circumradius of the smaller body for lengths, to `max(1, |d|)`
+/// for level distances.
 pub const DEFAULT_ACCURACY: f64 = 1e-9;
 
 /// Default accuracy of penetration depths, relative to the depth.
 pub const DEFAULT_DEPTH_ACCURACY: f64 = 1e-3;
 
-/// Default and largest iteration limit: several times what the worst pairs of flat bodies met so far need.
+/// Default and largest iteration limit: several times what the worst pairs of flat bodies met so
+/// far need.
 pub const MAX_ITERATIONS: u32 = 1000;
 
-/// How a query is to be solved; checked when made, so that no solve starts with a request it can not serve.
+/// How a query is to be solved; checked when made, so that no solve starts with a request it cannot
+/// serve.
 ///
 /// ```
 /// use sublevel_core::measure::Options;
@@ -28,7 +32,7 @@ pub struct Options<'a> {
     stop: Option<&'a AtomicBool>,
 }
 
-/// Why a request can not be served.
+/// Why a request cannot be served.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum OptionsError {
     /// An accuracy that no bracket can meet, or that every bracket meets.
@@ -51,9 +55,10 @@ impl Default for Options<'_> {
 }
 
 impl<'a> Options<'a> {
-    /// The same with brackets at most this wide: relative to the circumradius of the smaller body for lengths, to
-    /// `max(1, |d|)` for values without unit. Below the rounding floor no bracket gets, and the status says so: some 1e-13 of
-    /// the larger body and of the distance between both, 1e-12 where surfaces are flat.
+    /// The same with brackets at most this wide: relative to the circumradius of the smaller body
+    /// for lengths, to `max(1, |d|)` for values without unit. Below the rounding floor no bracket
+    /// gets, and the status says so: some 1e-13 of the larger body and of the distance between
+    /// both, 1e-12 where surfaces are flat.
     ///
     /// # Errors
     /// An accuracy that is not above 0 and at most 1.
@@ -65,9 +70,10 @@ impl<'a> Options<'a> {
         }
     }
 
-    /// The same with brackets of penetration depths at most this wide, relative to the depth. A depth is the least over all
-    /// directions: the proof costs more than the value, and more the nearer other directions come to the best. Where the
-    /// depth is so small that `accuracy` asks for less, that is what counts.
+    /// The same with brackets of penetration depths at most this wide, relative to the depth. A
+    /// depth is the least over all directions: the proof costs more than the value, and more the
+    /// nearer other directions come to the best. Where the depth is so small that `accuracy` asks
+    /// for less, that is what counts.
     ///
     /// # Errors
     /// An accuracy that is not above 0 and at most 1.
@@ -79,7 +85,8 @@ impl<'a> Options<'a> {
         }
     }
 
-    /// The same with at most this many iterations of all methods together; what is known by then is the answer.
+    /// The same with at most this many iterations of all methods together; what is known by then is
+    /// the answer.
     ///
     /// # Errors
     /// A limit outside 1 to [`MAX_ITERATIONS`].
@@ -91,7 +98,8 @@ impl<'a> Options<'a> {
         }
     }
 
-    /// The same with a flag that is looked at in every iteration; once it is set, what is known by then is the answer.
+    /// The same with a flag that is looked at in every iteration; once it is set, what is known by
+    /// then is the answer.
     pub fn with_stop(self, stop: &'a AtomicBool) -> Self {
         Self { stop: Some(stop), ..self }
     }

@@ -1,5 +1,5 @@
-//! About where two bodies are nearest, by the support points that their outlines keep. Nothing is proven by it; it shows Newton's
-//! method where to begin and which constraints are active.
+//! About where two bodies are nearest, by the support points that their outlines keep. Nothing is
+//! proven by it; it shows Newton's method where to begin and which constraints are active.
 
 use super::pair::Pair;
 use super::vector::{V3, apply_symmetric};
@@ -21,7 +21,8 @@ fn farthest_b(pair: &Pair<'_>, n: &Vector3<f64>) -> Vector3<f64> {
     pair.b_to_query(&farthest(pair.b.body, &pair.direction_to_b(n)))
 }
 
-/// Point of a body's outline farthest along n, both in the body's frame: of bodies with edges one on the surface.
+/// Point of a body's outline farthest along n, both in the body's frame: of bodies with edges one
+/// on the surface.
 fn farthest(body: &Body, n: &Vector3<f64>) -> Vector3<f64> {
     let n: V3<f64> = (*n).into();
     let cell = body.outline().cell::<_, f64>(Scalar, n);
@@ -38,8 +39,9 @@ pub(super) fn approach(pair: &Pair<'_>, n: &Vector3<f64>) -> Approach {
     gjk(NONE * pair.a.radius.min(pair.b.radius).powi(2), n, support)
 }
 
-/// About where in B the polynomial of A is lowest, as A's normalized coordinates show it, in which it rises about as fast every
-/// way: the point of B's outline nearest to A's interior point, and the unit vector from there to it in those coordinates.
+/// About where in B the polynomial of A is lowest, as A's normalized coordinates show it, in which
+/// it rises about as fast every way: the point of B's outline nearest to A's interior point, and
+/// the unit vector from there to it in those coordinates.
 pub(super) fn lowest(pair: &Pair<'_>) -> Approach {
     let support = |n: &Vector3<f64>| {
         let point = farthest_b(pair, &-pair.a.pulled_back(n));

@@ -1,7 +1,8 @@
 //! Two bodies in one frame: the query frame of a measure.
 //!
-//! The query frame is the frame of the first body, moved to the centre of its circumscribed ball and scaled by a power of
-//! two near the larger circumradius, so that lengths are about 1 whatever the unit, and absolute positions play no part.
+//! The query frame is the frame of the first body, moved to the centre of its circumscribed ball
+//! and scaled by a power of two near the larger circumradius, so that lengths are about 1 whatever
+//! the unit, and absolute positions play no part.
 
 use super::pose::{Pose, ROTATION_ERROR};
 use crate::body::{Body, Placement, Sample, largest};
@@ -39,7 +40,8 @@ impl Posed<'_> {
         self.placement.displacement(v)
     }
 
-    /// A linear functional of points in the body's normalized coordinates, with a bound of each component's error.
+    /// A linear functional of points in the body's normalized coordinates, with a bound of each
+    /// component's error.
     pub(super) fn functional(&self, r: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
         self.placement.functional(r)
     }
@@ -85,13 +87,14 @@ impl Posed<'_> {
         self.placement.linear().tr_mul(gradient)
     }
 
-    /// Upper bound ρ of the distance from v, or a point within its displacement, to any point of the body.
+    /// Upper bound ρ of the distance from v, or a point within its displacement, to any point of
+    /// the body.
     pub(super) fn reach(&self, v: &Vector3<f64>) -> f64 {
         ((v - self.center).norm() + self.radius + self.displacement(v)) * (1.0 + 1e-14)
     }
 
-    /// The point where the line from v along the unit vector `direction` enters the body, up to rounding; v itself if it is
-    /// inside, anywhere if the line misses.
+    /// The point where the line from v along the unit vector `direction` enters the body, up to
+    /// rounding; v itself if it is inside, anywhere if the line misses.
     ///
     /// Each constraint is convex along the line, so Newton's method for its root never passes it.
     pub(super) fn enter(&self, v: &Vector3<f64>, direction: &Vector3<f64>) -> Vector3<f64> {
@@ -111,8 +114,9 @@ impl Posed<'_> {
 
     /// A point within whose displacement a point of the body is proven to lie, near v.
     ///
-    /// Against the gradients of the violated constraints the way to the body is shortest; where steps that way do not lead in,
-    /// the line to the interior point does. None if not even that is proven inside in this frame.
+    /// Against the gradients of the violated constraints the way to the body is shortest; where
+    /// steps that way do not lead in, the line to the interior point does. None if not even that is
+    /// proven inside in this frame.
     pub(super) fn pull_in(&self, v: &Vector3<f64>) -> Option<Vector3<f64>> {
         let mut point = *v;
         let mut nudge = 4.0 * f64::EPSILON;
@@ -130,7 +134,8 @@ impl Posed<'_> {
                 // What the steps for other constraints leave of it.
                 let left = excess + gradient.dot(&step);
                 if left > 0.0 {
-                    // Past the boundary by about the error that is paid for anyway, so that how rounding falls does not matter.
+                    // Past the boundary by about the error that is paid for anyway, so that how
+                    // rounding falls does not matter.
                     step -= gradient * ((left + error) / gradient.norm_squared() * (1.0 + nudge));
                 }
             }
@@ -146,8 +151,8 @@ impl Posed<'_> {
         self.pull_towards_interior(v)
     }
 
-    /// Convexity along the segment gives the factor `s = (1 - g(a)) / (g(v) - g(a))` from the interior point a; rounding takes a
-    /// little more.
+    /// Convexity along the segment gives the factor `s = (1 - g(a)) / (g(v) - g(a))` from the
+    /// interior point a; rounding takes a little more.
     fn pull_towards_interior(&self, v: &Vector3<f64>) -> Option<Vector3<f64>> {
         let mut value = self.nearby_value_upper(v);
         if value <= 1.0 {
@@ -173,8 +178,8 @@ impl Posed<'_> {
 }
 
 impl<'a> Posed<'a> {
-    /// A body in its own frame, moved to the centre of its circumscribed ball and scaled to units of so many metres, a power
-    /// of two.
+    /// A body in its own frame, moved to the centre of its circumscribed ball and scaled to units
+    /// of so many metres, a power of two.
     pub(super) fn own(body: &'a Body, unit: f64) -> Self {
         let (origin, center) = (body.circumscribed().center, body.normalization().center);
         let placement = Placement::new(
@@ -229,7 +234,8 @@ impl<'a> Pair<'a> {
         );
         let to_query = |point: &Vector3<f64>| (rotation * point + translation - origin) / unit;
         let other_center = b.normalization().center;
-        // Both rotations are off by at most ROTATION_ERROR; their product and the sums round a few times more.
+        // Both rotations are off by at most ROTATION_ERROR; their product and the sums round a few
+        // times more.
         let relative = 2.0 * ROTATION_ERROR + gamma(16);
         let off = |point: &Vector3<f64>| {
             (relative * (point.norm() + translation.norm()) + gamma(8) * origin.norm()) / unit * (1.0 + 1e-14)
@@ -350,7 +356,8 @@ impl<'a> Pair<'a> {
         self.rotation.transpose() * n
     }
 
-    /// Of the stored boundary points of the first body the one farthest along a direction of the query frame.
+    /// Of the stored boundary points of the first body the one farthest along a direction of the
+    /// query frame.
     pub(super) fn farthest_a(&self, n: &Vector3<f64>) -> Vector3<f64> {
         self.a_to_query(&farthest(self.a.body.boundary(), n))
     }

@@ -24,14 +24,15 @@ pub struct PointDistance {
     pub lower: f64,
     /// Proven upper bound, attained by the witness; 0 when the point is proven inside.
     pub upper: f64,
-    /// Whether the point is proven to lie in the body; the distance is then 0, and depth is not measured.
+    /// Whether the point is proven to lie in the body; the distance is then 0, and depth is not
+    /// measured.
     pub inside: bool,
     /// The nearest point of the body; the point itself if it is inside.
     pub witness: Vector3<f64>,
     /// Unit normal from the body to the point, at the witness; none inside.
     pub normal: Option<Vector3<f64>>,
-    /// Whether another part may be as near, their brackets meeting: witness, normal and gradient may then jump. Never for
-    /// single bodies, nor inside.
+    /// Whether another part may be as near, their brackets meeting: witness, normal and gradient
+    /// may then jump. Never for single bodies, nor inside.
     pub tied: bool,
     /// Iterations.
     pub iterations: u32,
@@ -55,10 +56,11 @@ impl PointDistance {
 #[error("the point is not finite, or beyond 1e15 m")]
 pub struct PointError;
 
-/// Euclidean distance of a solid at `pose` from `point` (world frame, metres), 0 when the point is inside.
+/// Euclidean distance of a solid at `pose` from `point` (world frame, metres), 0 when the point is
+/// inside.
 ///
-/// The bracket is as narrow as `options` ask, relative to the circumradius of the solid, or the status says that it is not.
-/// `warm` is read and then replaced by the hint for the next point.
+/// The bracket is as narrow as `options` ask, relative to the circumradius of the solid, or the
+/// status says that it is not. `warm` is read and then replaced by the hint for the next point.
 ///
 /// # Errors
 /// A point that is not finite.
@@ -126,7 +128,8 @@ pub(super) struct Projection<'a> {
 pub(super) struct Projected {
     pub(super) lower: f64,
     pub(super) upper: f64,
-    /// Unit vector along which the lower bound separates the point from the body; zero if there is none.
+    /// Unit vector along which the lower bound separates the point from the body; zero if there is
+    /// none.
     pub(super) normal: Vector3<f64>,
     pub(super) witness: Vector3<f64>,
     pub(super) iterations: u32,
@@ -203,7 +206,8 @@ impl<'a> Projection<'a> {
         }
     }
 
-    /// Lower bound of the distance in query units from the plane normal to the trial's pull, and that normal.
+    /// Lower bound of the distance in query units from the plane normal to the trial's pull, and
+    /// that normal.
     fn separation(&self, q: &Vector3<f64>, error: f64, trial: &Trial) -> (f64, Vector3<f64>) {
         let body = &self.single.body;
         let length = trial.pull.norm();
@@ -297,7 +301,8 @@ mod tests {
         for seed in 0..400 {
             let mut random = Seeded(seed);
             let bodies = &zoos[(seed % 4) as usize];
-            // Curved ones: the witness, and with it the gradient, is accurate to the root of the bracket elsewhere.
+            // Curved ones: the witness, and with it the gradient, is accurate to the root of the
+            // bracket elsewhere.
             let body = &bodies[(seed as usize / 4) % 2];
             let size = body.circumscribed().radius;
             let pose = random_pose(&mut random, 1.0);

@@ -5,16 +5,18 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 /// Largest deviation from a rigid motion that is normalised away; worse is refused.
 const TOLERANCE: f64 = 1e-6;
 
-/// Computed length minus 1 of a quaternion that normalising would not improve: dividing by a computed length leaves at most
-/// 1.5 epsilon.
+/// Computed length minus 1 of a quaternion that normalising would not improve: dividing by a
+/// computed length leaves at most 1.5 epsilon.
 const NORMALISED: f64 = 2.0 * f64::EPSILON;
 
-/// Bound of the distance (operator norm) between the rotation matrix of a pose, as computed, and the rotation of its quaternion
-/// normalised exactly, which is what the pose stands for. The length of the quaternion is 1 within [`NORMALISED`] = 4 u and
-/// the 3 u of computing it, hence 14 u of the matrix, and each entry costs 8 u more: below 30 u in operator norm.
+/// Bound of the distance (operator norm) between the rotation matrix of a pose, as computed, and
+/// the rotation of its quaternion normalised exactly, which is what the pose stands for. The length
+/// of the quaternion is 1 within [`NORMALISED`] = 4 u and the 3 u of computing it, hence 14 u of
+/// the matrix, and each entry costs 8 u more: below 30 u in operator norm.
 pub(super) const ROTATION_ERROR: f64 = 16.0 * f64::EPSILON;
 
-/// A rigid motion `x_world = R x_body + t`, lengths in metres; R is the rotation of the stored quaternion normalised exactly.
+/// A rigid motion `x_world = R x_body + t`, lengths in metres; R is the rotation of the stored
+/// quaternion normalised exactly.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -43,7 +45,7 @@ pub enum PoseError {
         field: &'static str,
     },
     /// A translation beyond any use.
-    #[error("translation reaches {0:e} m; at most 1e15 m can be told apart from rounding")]
+    #[error("translation reaches {0:e} m; at most 1e15 m can be distinguished from rounding")]
     TooFar(f64),
     /// A quaternion that is not of length one.
     #[error(
@@ -63,7 +65,8 @@ impl Pose {
         Self { rotation: UnitQuaternion::identity(), translation: Vector3::zeros() }
     }
 
-    /// Pose from a translation (m) and a quaternion `[x, y, z, w]` within 1e-6 of unit length, which is normalised.
+    /// Pose from a translation (m) and a quaternion `[x, y, z, w]` within 1e-6 of unit length,
+    /// which is normalised.
     ///
     /// # Errors
     /// Numbers that are not finite, or a quaternion that is farther from unit length.
@@ -77,7 +80,8 @@ impl Pose {
         if deviation > TOLERANCE {
             return Err(PoseError::NotUnit(deviation));
         }
-        // Normalising twice would move the last bits: the quaternion of a pose makes the same pose again, bit for bit.
+        // Normalising twice would move the last bits: the quaternion of a pose makes the same pose
+        // again, bit for bit.
         let rotation = if deviation <= NORMALISED {
             UnitQuaternion::new_unchecked(quaternion)
         } else {
@@ -86,11 +90,12 @@ impl Pose {
         Ok(Self { rotation, translation })
     }
 
-    /// Pose from a rotation matrix within 1e-6 of a rotation and a translation (m); the rotation used is the quaternion of
-    /// the polar factor, rounded.
+    /// Pose from a rotation matrix within 1e-6 of a rotation and a translation (m); the rotation
+    /// used is the quaternion of the polar factor, rounded.
     ///
     /// # Errors
-    /// Numbers that are not finite, or a matrix that is farther from its polar factor or a reflection.
+    /// Numbers that are not finite, or a matrix that is farther from its polar factor or a
+    /// reflection.
     pub fn from_matrix(matrix: &Matrix3<f64>, translation: Vector3<f64>) -> Result<Self, PoseError> {
         check_translation(&translation)?;
         if !matrix.iter().all(|value| value.is_finite()) {

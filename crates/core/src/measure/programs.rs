@@ -58,8 +58,8 @@ impl Program<3> for Support<'_> {
     }
 }
 
-/// A point strictly inside, most of the way from the inner point `center` along the unit vector u to the boundary, where a
-/// body is curved; flat starts show a method nothing.
+/// A point strictly inside, most of the way from the inner point `center` along the unit vector u
+/// to the boundary, where a body is curved; flat starts show a method nothing.
 pub(super) fn near_boundary(body: &Posed<'_>, center: &Vector3<f64>, u: &Vector3<f64>) -> Vector3<f64> {
     let outside = center + u * (2.0 * body.reach(center));
     let mut arm = (body.enter(&outside, &-u) - center) * 0.9;
@@ -71,8 +71,9 @@ pub(super) fn near_boundary(body: &Posed<'_>, center: &Vector3<f64>, u: &Vector3
     center + arm
 }
 
-/// `min s` over x and s subject to `g_i(x) <= s` for the constraints of A, and for those of B to `g_j(x) <= s` (the point
-/// deepest in both) or `g_j(x) <= 1` (the level distance); variables (x, s / scale).
+/// `min s` over x and s subject to `g_i(x) <= s` for the constraints of A, and for those of B to
+/// `g_j(x) <= s` (the point deepest in both) or `g_j(x) <= 1` (the level distance); variables (x, s
+/// / scale).
 pub(super) struct Level<'a> {
     pub(super) pair: &'a Pair<'a>,
     pub(super) both: bool,

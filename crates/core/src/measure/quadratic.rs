@@ -1,13 +1,15 @@
-//! Steps of Newton's method that find the active constraints on their way: quadratic programs in four variables, three of a point
-//! and one of a value, whose constraints are the linearizations of those of two bodies.
+//! Steps of Newton's method that find the active constraints on their way: quadratic programs in
+//! four variables, three of a point and one of a value, whose constraints are the linearizations of
+//! those of two bodies.
 //!
 //! ```text
 //! min  c·v + vᵀ H v / 2   subject to   g_i·v <= r_i   for the constraints of A and of B
 //! ```
 //!
-//! From a guess of what is active the equations of its optimality are solved, and what then pulls the wrong way is dropped. After
-//! that all pull the right way: what is violated is taken, and of the others those go whose multipliers vanish as that of the
-//! new one rises, until none is violated (Goldfarb and Idnani, A numerically stable dual method for solving strictly convex
+//! From a guess of what is active the equations of its optimality are solved, and what then pulls
+//! the wrong way is dropped. After that all pull the right way: what is violated is taken, and of
+//! the others those go whose multipliers vanish as that of the new one rises, until none is
+//! violated (Goldfarb and Idnani, A numerically stable dual method for solving strictly convex
 //! quadratic programs, 1983).
 
 use super::active::MAX_ACTIVE;
@@ -27,18 +29,20 @@ const MAX_CHANGES: usize = 8;
 /// Violation of a constraint, relative to its scale and to its right side, that counts as none.
 const VIOLATED: f64 = 1e-12;
 
-/// Sine of the angle between a gradient and a sum of others that makes another one of it, where no equations do.
+/// Sine of the angle between a gradient and a sum of others that makes another one of it, where no
+/// equations do.
 const APART: f64 = 1e-4;
 
-/// How much of a stiffness, what the Hessian is of such values over such lengths, is added to it until a step is short enough for it
-/// to mean something where the step leads (Levenberg and Marquardt).
+/// How much of a stiffness, what the Hessian is of such values over such lengths, is added to it
+/// until a step is short enough for it to mean something where the step leads (Levenberg and
+/// Marquardt).
 pub(super) const DAMPINGS: [f64; 6] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0];
 
 /// Most of the curvature along a gradient that is not that of the root of what rises with a power.
 pub(super) const MOST_BENT: f64 = 0.9;
 
-/// Longest step, relative to the bodies and to the distance from a centre that values rise from, that a linearization may mean
-/// anything for.
+/// Longest step, relative to the bodies and to the distance from a centre that values rise from,
+/// that a linearization may mean anything for.
 pub(super) const LONGEST: f64 = 0.5;
 
 /// Length of a step, in the same measure, that is well within that.
@@ -47,8 +51,8 @@ pub(super) const SHORT: f64 = 0.5 * LONGEST;
 /// Least damping, relative to the first: rounding tilts faces by about as much.
 pub(super) const LEAST: f64 = 1e-9;
 
-/// How long a step is relative to the distance from such a centre, if it leads there: the root of values that rise from a centre with a
-/// power is about a square, whose least one step finds.
+/// How long a step is relative to the distance from such a centre, if it leads there: the root of
+/// values that rise from a centre with a power is about a square, whose least one step finds.
 pub(super) const TO_CENTER: f64 = 0.5;
 
 /// Distance from such a centre, relative to its body, that counts as none.
@@ -85,7 +89,8 @@ impl Jets {
         active.iter().map(|(i, multiplier)| self.jets[i].gradient * multiplier).sum()
     }
 
-    /// Sum of the active Hessians, weighted by their multipliers. What pulls the wrong way is about to be dropped and bends nothing.
+    /// Sum of the active Hessians, weighted by their multipliers. What pulls the wrong way is about
+    /// to be dropped and bends nothing.
     pub(super) fn hessian(&self, active: &Active) -> Matrix3<f64> {
         active.iter().map(|(i, multiplier)| self.jets[i].hessian * multiplier.max(0.0)).sum()
     }
@@ -136,7 +141,8 @@ pub(super) struct Solution {
     pub(super) b: Active,
 }
 
-/// Active constraints of both bodies with their multipliers, one more than determine a point. Those of B are numbered on from A's.
+/// Active constraints of both bodies with their multipliers, one more than determine a point. Those
+/// of B are numbered on from A's.
 #[derive(Clone, Copy, Default)]
 struct Working {
     index: [usize; VARIABLES + 1],
@@ -162,8 +168,8 @@ impl Working {
 }
 
 impl Quadratic {
-    /// The solution from a guess of what is active on; of damped programs the first whose step is short enough, if there is
-    /// one, damped less where that leaves the step far from long.
+    /// The solution from a guess of what is active on; of damped programs the first whose step is
+    /// short enough, if there is one, damped less where that leaves the step far from long.
     pub(super) fn step(
         mut self,
         a: Active,
@@ -183,8 +189,8 @@ impl Quadratic {
             let least = length(&found);
             if least <= LONGEST {
                 if i == 0 && least < SHORT {
-                    // Along what does not bend a step is as long as the damping is little: of faces tilted by next to nothing
-                    // only such a step shows the edges.
+                    // Along what does not bend a step is as long as the damping is little: of faces
+                    // tilted by next to nothing only such a step shows the edges.
                     self.hessian = hessian + stiffness * (damping * (least / SHORT).max(LEAST));
                     let longer = self.solve(a, b);
                     return if length(&longer) <= LONGEST { longer } else { found };
@@ -223,8 +229,9 @@ impl Quadratic {
         Some(self.solution(v, &active))
     }
 
-    /// What is active with one more constraint, and the point: until that is satisfied its multiplier rises, those of the others
-    /// change with it, and the first of them to vanish goes. None if none of them does that has to, or there are too many of the body.
+    /// What is active with one more constraint, and the point: until that is satisfied its
+    /// multiplier rises, those of the others change with it, and the first of them to vanish goes.
+    /// None if none of them does that has to, or there are too many of the body.
     fn take(&self, new: usize, mut active: Working) -> Option<(Working, Vector4<f64>)> {
         active.push(new);
         loop {
@@ -249,7 +256,8 @@ impl Quadratic {
         }
     }
 
-    /// The multipliers as the last one rises by 1, whose gradient is a sum of the others'; none if it is not.
+    /// The multipliers as the last one rises by 1, whose gradient is a sum of the others'; none if
+    /// it is not.
     fn exchanged(&self, mut active: Working) -> Option<Working> {
         let last = active.len - 1;
         let gradients: [Vector4<f64>; VARIABLES + 1] =
@@ -310,8 +318,9 @@ impl Quadratic {
     }
 }
 
-/// The shares of independent vectors in the sum of them that comes nearest to another, and what that leaves (the modified method of
-/// Gram and Schmidt; Golub and Van Loan, Matrix computations, 2013, section 5.2.8).
+/// The shares of independent vectors in the sum of them that comes nearest to another, and what
+/// that leaves (the modified method of Gram and Schmidt; Golub and Van Loan, Matrix computations,
+/// 2013, section 5.2.8).
 fn least_squares(vectors: &[Vector4<f64>], of: &Vector4<f64>) -> ([f64; VARIABLES], Vector4<f64>) {
     let (mut directions, mut upper) = ([Vector4::zeros(); VARIABLES], Matrix4::zeros());
     let (mut shares, mut rest) = ([0.0; VARIABLES], *of);
@@ -338,7 +347,8 @@ mod tests {
     use super::*;
     use sublevel_testkit::Seeded;
 
-    /// Planes around a point, `-t` as well as they: for every seed some that are the same as others but for a hair.
+    /// Planes around a point, `-t` as well as they: for every seed some that are the same as others
+    /// but for a hair.
     fn random_rows(random: &mut Seeded, slope: f64, others: &[(Vector4<f64>, f64)]) -> Rows {
         let mut rows = Rows { rows: [(Vector4::zeros(), 0.0); MAX_CONSTRAINTS], len: 4, scale: 1.0 };
         for k in 0..4 {
@@ -378,7 +388,8 @@ mod tests {
                 continue;
             }
             solved += 1;
-            // Feasible, no multiplier negative, and gradients in balance: optimal, the program being convex.
+            // Feasible, no multiplier negative, and gradients in balance: optimal, the program
+            // being convex.
             let of = |rows: &Rows, active: &Active| {
                 active.iter().map(|(i, multiplier)| rows.rows[i].0 * multiplier).sum::<Vector4<f64>>()
             };

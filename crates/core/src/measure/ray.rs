@@ -1,10 +1,11 @@
 //! Ray cast: where a ray enters a body.
 //!
-//! Along a ray every constraint is a convex polynomial of one variable. Its values and slopes bound the entry from both
-//! sides ([`Entry`]); its curvature says where to look next, and an interpolation of its values, which proves nothing, where to
-//! look first. All in the normalized coordinates of the body, into which the
-//! ray is taken once: `z(τ) = z_0 + τ ż`, τ measured from the point closest to the centre of the circumscribed ball, so that
-//! a far origin costs one rounding of its own size and no more.
+//! Along a ray every constraint is a convex polynomial of one variable. Its values and slopes bound
+//! the entry from both sides ([`Entry`]); its curvature says where to look next, and an
+//! interpolation of its values, which proves nothing, where to look first. All in the normalized
+//! coordinates of the body, into which the ray is taken once: `z(τ) = z_0 + τ ż`, τ measured from
+//! the point closest to the centre of the circumscribed ball, so that a far origin costs one
+//! rounding of its own size and no more.
 
 use super::Status;
 use super::entry::Entry;
@@ -50,8 +51,8 @@ pub enum RayError {
 }
 
 impl Ray {
-    /// The ray from `origin` (m) along `direction` (any length but zero; normalised) over `max_length` metres, which may be
-    /// infinite.
+    /// The ray from `origin` (m) along `direction` (any length but zero; normalised) over
+    /// `max_length` metres, which may be infinite.
     ///
     /// # Errors
     /// Numbers that are not finite, a zero direction, or a length that is not above 0.
@@ -101,8 +102,8 @@ pub enum RayCast {
     Miss,
     /// The body: proven, with a bracket of where it is entered.
     Hit(RayHit),
-    /// The ray passes within rounding of the surface, or the iterations ran out: if it enters the body at all, then first
-    /// between these two parameters, metres.
+    /// The ray passes within rounding of the surface, or the iterations ran out: if it enters the
+    /// body at all, then first between these two parameters, metres.
     Undecided {
         /// No point of the body comes before; proven.
         lower: f64,
@@ -137,8 +138,8 @@ pub struct RayHit {
 
 /// First point of a body on a ray; with several parts the first of all.
 ///
-/// The bracket is as narrow as `options` ask, relative to the circumradius of the solid, or the status says that it is not.
-/// A ray that starts inside hits at 0.
+/// The bracket is as narrow as `options` ask, relative to the circumradius of the solid, or the
+/// status says that it is not. A ray that starts inside hits at 0.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -201,7 +202,8 @@ fn earlier(one: &RayCast, other: &RayCast, tolerance: f64) -> RayCast {
     }
 }
 
-/// Most evaluations along one ray; from outside 1 or 2 are usual, and halving the bracket alone would need about 50.
+/// Most evaluations along one ray; from outside 1 or 2 are usual, and halving the bracket alone
+/// would need about 50.
 const MAX_STEPS: u32 = 96;
 
 fn cast_at(body: &Body, pose: &Pose, ray: &Ray, tolerance: f64, options: &Options<'_>) -> RayCast {
@@ -261,8 +263,8 @@ struct Along<'a> {
     /// Bounds of the errors of the components of z and of ż.
     start_error: Vector3<f64>,
     velocity_error: Vector3<f64>,
-    /// Bounds of the error of the value, but for that by the error of z to first order, and of each component of the
-    /// gradient, of each constraint.
+    /// Bounds of the error of the value, but for that by the error of z to first order, and of each
+    /// component of the gradient, of each constraint.
     errors: [(f64, f64); MAX_CONSTRAINTS],
 }
 
@@ -276,8 +278,8 @@ struct Look {
 }
 
 impl<'a> Along<'a> {
-    /// The ray and the interval of τ where it is in the circumscribed ball and within the bounds of the normalized
-    /// coordinates; none if there is no such τ.
+    /// The ray and the interval of τ where it is in the circumscribed ball and within the bounds of
+    /// the normalized coordinates; none if there is no such τ.
     fn new(body: &'a Body, pose: &Pose, ray: &Ray) -> Option<(Self, Entry)> {
         let turn: Matrix3<f64> = pose.rotation().to_rotation_matrix().into_inner();
         let offset = ray.origin - pose.translation();
@@ -331,8 +333,8 @@ impl<'a> Along<'a> {
         Some((Self { body, base, start, velocity, start_error, velocity_error, errors }, entry))
     }
 
-    /// Where to look first: the start of a ray that may start inside, else where the last constraint is entered, as values along the
-    /// ray have it.
+    /// Where to look first: the start of a ray that may start inside, else where the last
+    /// constraint is entered, as values along the ray have it.
     fn first(&self, entry: &Entry, beyond: f64) -> f64 {
         if entry.from <= -self.base {
             return entry.from;
@@ -381,11 +383,12 @@ impl<'a> Along<'a> {
     }
 }
 
-/// Step from a point with this value `f - 1`, negative slope and curvature to the root of a model of f, or to its lowest
-/// point if it has no root.
+/// Step from a point with this value `f - 1`, negative slope and curvature to the root of a model
+/// of f, or to its lowest point if it has no root.
 ///
-/// Near the surface the model is the quadratic with these derivatives; far outside it is the power `(σ - s)^j` above the
-/// least value `1 - depth`, which the terms of highest degree make of f there.
+/// Near the surface the model is the quadratic with these derivatives; far outside it is the power
+/// `(σ - s)^j` above the least value `1 - depth`, which the terms of highest degree make of f
+/// there.
 #[inline]
 fn step(value: f64, slope: f64, curvature: f64, depth: f64) -> f64 {
     let above = value + depth;
@@ -409,7 +412,8 @@ mod tests {
         cast_ray(solid, pose, ray, &Options::default())
     }
 
-    /// First parameter at which the ray is in the body by the closed form of balls and boxes in their own frames.
+    /// First parameter at which the ray is in the body by the closed form of balls and boxes in
+    /// their own frames.
     fn ball_entry(radius: f64, o: &Vector3<f64>, d: &Vector3<f64>) -> Option<f64> {
         let (b, c) = (o.dot(d), o.norm_squared() - radius * radius);
         let discriminant = b * b - c;
@@ -507,7 +511,8 @@ mod tests {
         assert!(hits > 1000 && misses > 400, "{hits} {misses}");
     }
 
-    /// Everything with curvature against dense sampling of the constraint along the ray and bisection.
+    /// Everything with curvature against dense sampling of the constraint along the ray and
+    /// bisection.
     #[test]
     fn curved_bodies_agree_with_sampling() {
         let (mut hits, mut misses) = (0, 0);

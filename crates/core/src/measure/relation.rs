@@ -1,5 +1,5 @@
-//! What holds between the points of two bodies at the solution of a measure, and what proves it: the part of continuation in
-//! which the measures of pairs differ.
+//! What holds between the points of two bodies at the solution of a measure, and what proves it:
+//! the part of continuation in which the measures of pairs differ.
 
 use super::decide::Goal;
 use super::pose::Pose;
@@ -9,7 +9,8 @@ use super::vector::{M3, V3, add, add_scaled, dot, subtract};
 use crate::body::Body;
 use crate::polynomial::Simd;
 
-/// A measure of two bodies that is attained by a point x of A and a point y of B with opposite normals.
+/// A measure of two bodies that is attained by a point x of A and a point y of B with opposite
+/// normals.
 pub(super) trait Relation: Copy {
     /// Where B stands as seen from A.
     fn relative<S: Simd>(&self, simd: S, a: &Body, b: &Body) -> Relative<f64>;
@@ -23,8 +24,9 @@ pub(super) trait Relation: Copy {
         false
     }
 
-    /// Newton's step from points with `difference = x - y` in the frame, whose third vector is the normal from B to A: towards
-    /// points with their difference along the normal; and how the solution answers motions. `smallest`: see [`newton`].
+    /// Newton's step from points with `difference = x - y` in the frame, whose third vector is the
+    /// normal from B to A: towards points with their difference along the normal; and how the
+    /// solution answers motions. `smallest`: see [`newton`].
     #[inline(always)]
     fn newton<S: Simd>(
         &self,
@@ -38,13 +40,15 @@ pub(super) trait Relation: Copy {
         newton(simd, a, b, difference, smallest)
     }
 
-    /// How far points with `difference = x - y` in the frame are from what the relation asks for, along the tangents.
+    /// How far points with `difference = x - y` in the frame are from what the relation asks for,
+    /// along the tangents.
     #[inline(always)]
     fn aside<S: Simd>(&self, _: S, _frame: &M3<f64>, difference: V3<f64>) -> [f64; 2] {
         [difference[0], difference[1]]
     }
 
-    /// What the bracket of the distance at points with `difference = x - y` in the frame says of the measure.
+    /// What the bracket of the distance at points with `difference = x - y` in the frame says of
+    /// the measure.
     fn judge<S: Simd>(&self, simd: S, found: &Bracket<f64>, frame: &M3<f64>, difference: V3<f64>) -> Verdict;
 }
 
@@ -115,7 +119,8 @@ impl Relation for Apart<'_> {
 pub(super) struct Through<'a> {
     pub(super) pose_a: &'a Pose,
     pub(super) pose_b: &'a Pose,
-    /// From B to A, in A's frame, to start from; without one, across the gap of the ellipsoids that stand for the bodies.
+    /// From B to A, in A's frame, to start from; without one, across the gap of the ellipsoids that
+    /// stand for the bodies.
     pub(super) facing: Option<V3<f64>>,
     /// How far from attained the lower bound may be, metres.
     pub(super) tolerance: f64,

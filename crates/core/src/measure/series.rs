@@ -1,13 +1,15 @@
 //! Newton's steps towards answers on flat sides.
 //!
-//! Where surfaces are flat to order `m + 1` on the way X to the answer their slopes are as `X^m` and Newton's step is X / m: of what
-//! is left, `1 - 1 / m` is left after it. How much the step changes along the way that was taken since the last one shows m, along
-//! each of the two principal directions of the curvature, and the step is made that many times as long (the secant method for
-//! the steps, which have simple zeros where slopes have multiple ones: Traub, Iterative Methods for the Solution of
-//! Equations, 1964, section 7.3).
+//! Where surfaces are flat to order `m + 1` on the way X to the answer their slopes are as `X^m`
+//! and Newton's step is X / m: of what is left, `1 - 1 / m` is left after it. How much the step
+//! changes along the way that was taken since the last one shows m, along each of the two principal
+//! directions of the curvature, and the step is made that many times as long (the secant method for
+//! the steps, which have simple zeros where slopes have multiple ones: Traub, Iterative Methods for
+//! the Solution of Equations, 1964, section 7.3).
 //!
-//! Where that leads surfaces are flat, and if one is tilted against the other by next to nothing the answer is where their slopes make
-//! up for it. Newton's step would lead far beyond; the power law of the slopes leads back.
+//! Where that leads surfaces are flat, and if one is tilted against the other by next to nothing
+//! the answer is where their slopes make up for it. Newton's step would lead far beyond; the power
+//! law of the slopes leads back.
 
 use super::tangent::Symmetric2;
 use super::vector::{V3, add_scaled, basis, scaled};
@@ -32,7 +34,8 @@ const FLATTEST: f64 = (MAX_DEGREE - 1) as f64;
 /// How many times as long as Newton's step one is that leads to where surfaces are flat.
 const LEAP: f64 = 1.5;
 
-/// Length of a step relative to the way taken before it, beyond which it is made of next to no curvature.
+/// Length of a step relative to the way taken before it, beyond which it is made of next to no
+/// curvature.
 const WILD: f64 = 0.3;
 
 /// How many times as long as a corrected step the next one may be.
@@ -69,7 +72,8 @@ pub(super) struct Series {
     last: Last,
     /// The tangents along which it was made.
     tangents: [V3<f64>; 2],
-    /// The last step that [`Series::take`] has said how much of to take, whether of the series or not.
+    /// The last step that [`Series::take`] has said how much of to take, whether of the series or
+    /// not.
     way: V3<f64>,
 }
 
@@ -122,7 +126,8 @@ impl Series {
         self.last.taken = taken;
     }
 
-    /// The part to take of a step along these tangents, this long relative to the bodies; see [`part`].
+    /// The part to take of a step along these tangents, this long relative to the bodies; see
+    /// [`part`].
     #[inline(always)]
     pub(super) fn part<S: Simd>(&self, simd: S, tangents: [V3<f64>; 2], step: V2, length: f64) -> f64 {
         if length > FAR && !self.last.corrected {
@@ -132,8 +137,9 @@ impl Series {
         }
     }
 
-    /// What to take of a step that is made from a force by a Hessian: no more than is this long by `length`, which measures the step with
-    /// what is added to it. Without tangents to move along, or where a step leads out of the series, that ends and nothing is added.
+    /// What to take of a step that is made from a force by a Hessian: no more than is this long by
+    /// `length`, which measures the step with what is added to it. Without tangents to move along,
+    /// or where a step leads out of the series, that ends and nothing is added.
     pub(super) fn take(
         &mut self,
         tangents: Option<[V3<f64>; 2]>,
@@ -198,7 +204,8 @@ pub(super) struct Taken {
     pub(super) length: f64,
 }
 
-/// Along what the active gradients of one body leave to move, a plane by one and a line by two, where there is but one of the other body.
+/// Along what the active gradients of one body leave to move, a plane by one and a line by two,
+/// where there is but one of the other body.
 pub(super) fn tangents(of_a: &[Vector3<f64>], of_b: &[Vector3<f64>]) -> Option<[V3<f64>; 2]> {
     match (of_a, of_b) {
         ([normal], [_]) => {
@@ -210,8 +217,9 @@ pub(super) fn tangents(of_a: &[Vector3<f64>], of_b: &[Vector3<f64>]) -> Option<[
     }
 }
 
-/// The part to take of a step after this way: all of it, but where it leads back about as far. What is looked for then lies between,
-/// and where steps would vanish that change evenly is as good a guess as any: Newton's method alone may go to and fro for ever.
+/// The part to take of a step after this way: all of it, but where it leads back about as far. What
+/// is looked for then lies between, and where steps would vanish that change evenly is as good a
+/// guess as any: Newton's method alone may go to and fro for ever.
 #[inline(always)]
 fn part(way: V3<f64>, step: V3<f64>) -> f64 {
     let (way, step) = (Vector3::from(way), Vector3::from(step));
@@ -244,7 +252,7 @@ pub(super) struct Correction {
 /// What to add to Newton's step, which is `give` times the slope or nearly so.
 #[cold]
 pub(super) fn correction(newton: V2, slope: V2, give: Symmetric2<f64>, last: &Last) -> Correction {
-    // Where both surfaces are flat the one direction tells how far to go in the other.
+    // Where both surfaces are flat the one direction says how far to go in the other.
     let most = if last.corrected { FARTHER * dot(last.taken, last.taken).sqrt() } else { f64::INFINITY };
     let mut correction = Correction::default();
     for direction in principal(give) {
@@ -370,7 +378,8 @@ mod tests {
         assert!(sum * 3 < plain, "seed 31: {sum} steps, {plain} of Newton's");
     }
 
-    /// Newton's method for the root of the arc tangent goes to and fro for ever from 1.3917, and ever farther from beyond.
+    /// Newton's method for the root of the arc tangent goes to and fro for ever from 1.3917, and
+    /// ever farther from beyond.
     #[test]
     fn steps_to_and_fro_meet_between() {
         for start in [1.38, 1.391_745_2, 1.4, 1.5] {

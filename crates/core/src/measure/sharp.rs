@@ -1,9 +1,10 @@
 //! Brackets where doubles end: points, multipliers and bounds of twice the precision.
 //!
-//! Rounding leaves the brackets of [`super::bracket`] some hundred epsilon of the larger body wide, and those of level
-//! distances over needles that times the slope of the needle's polynomial. Where that is too wide, Newton's method goes on
-//! with residuals of twice the precision (iterative refinement), and the same inequalities are evaluated there. Rounding then
-//! plays no part: what is left is how near the iterates are to the solution.
+//! Rounding leaves the brackets of [`super::bracket`] some hundred epsilon of the larger body wide,
+//! and those of level distances over needles that times the slope of the needle's polynomial. Where
+//! that is too wide, Newton's method goes on with residuals of twice the precision (iterative
+//! refinement), and the same inequalities are evaluated there. Rounding then plays no part: what is
+//! left is how near the iterates are to the solution.
 
 use super::level::LevelNewton;
 use super::linear::{Augmented, MAX_UNKNOWNS, solve};
@@ -28,7 +29,8 @@ const NEGLIGIBLE: f64 = 1e-26;
 /// Steps of the level distance after which one that is still cut leads nowhere.
 const PATIENCE: u32 = 8;
 
-/// Share of the evaluation's bound in doubles that bounds one of twice the precision: both count a few hundred roundings.
+/// Share of the evaluation's bound in doubles that bounds one of twice the precision: both count a
+/// few hundred roundings.
 const SHARE: f64 = 1e-13;
 
 /// A body in the query frame, `z = linear v + offset`.
@@ -81,14 +83,15 @@ impl SharpBody<'_> {
         }
     }
 
-    /// Bound of the sum of the magnitudes that z is made of; the rows of the map are sums of larger ones for bodies that are
-    /// long and turned.
+    /// Bound of the sum of the magnitudes that z is made of; the rows of the map are sums of larger
+    /// ones for bodies that are long and turned.
     fn z_size(&self, v: &Twos) -> f64 {
         let rows: f64 = self.rounded.row_iter().map(|row| row.norm()).sum();
         rows * doubles(v).lp_norm(1) + doubles(&self.offset).lp_norm(1)
     }
 
-    /// Rigorous upper bound of `-min r·(x' - v)` over the points x' of the body: [`super::bracket::descent`].
+    /// Rigorous upper bound of `-min r·(x' - v)` over the points x' of the body:
+    /// [`super::bracket::descent`].
     fn descent(&self, v: &Twos, r: &Twos, active: &SharpActive) -> Two {
         let (mut slack, mut rest, mut error) = (Two::ZERO, *r, 0.0);
         let reach = self.posed.reach(&doubles(v));
@@ -109,7 +112,8 @@ impl SharpBody<'_> {
         slack + Two::from(error * (1.0 + 1e-12))
     }
 
-    /// The point moved into the body against the gradients of violated constraints; none if that does not lead in.
+    /// The point moved into the body against the gradients of violated constraints; none if that
+    /// does not lead in.
     fn pull_in(&self, v: &Twos) -> Option<Twos> {
         let mut point = *v;
         for _ in 0..6 {
@@ -138,7 +142,8 @@ impl SharpBody<'_> {
         largest(jets.map(|jet| (jet.value + Two::from(jet.value_error)).double().next_up()))
     }
 
-    /// For Newton's matrices, the nearest doubles; and for its residuals the sum of gradients and the values.
+    /// For Newton's matrices, the nearest doubles; and for its residuals the sum of gradients and
+    /// the values.
     fn at(&self, active: &SharpActive, v: &Twos) -> (At, Twos, [Two; 3]) {
         let mut at = At::default();
         let (mut sum, mut values) = ([Two::ZERO; 3], [Two::ZERO; 3]);
@@ -178,7 +183,8 @@ impl SharpActive {
         self.set.multiplier = self.multiplier.map(Two::double);
     }
 
-    /// Drops constraints as [`DistanceNewton`] does and takes one that is violated by more than `excess`; whether any.
+    /// Drops constraints as [`DistanceNewton`] does and takes one that is violated by more than
+    /// `excess`; whether any.
     fn revise(&mut self, body: &SharpBody<'_>, v: &Twos, level: f64, excess: f64) -> bool {
         let mut set = self.set;
         let over = |i: usize| (body.jet(i, v).value - Two::from(level)).double();
@@ -247,8 +253,9 @@ impl<'a> SharpPair<'a> {
         }
     }
 
-    /// Newton's method of twice the precision on the optimality system of the distance, from an iterate of that in doubles;
-    /// returns the steps taken. It ends when `accept` takes what an iterate proves.
+    /// Newton's method of twice the precision on the optimality system of the distance, from an
+    /// iterate of that in doubles; returns the steps taken. It ends when `accept` takes what an
+    /// iterate proves.
     pub(super) fn distance(
         &self,
         start: &DistanceNewton,
@@ -432,8 +439,9 @@ impl<'a> SharpPair<'a> {
     }
 }
 
-/// Newton's matrix of the system of the distance for dx, dy, dD and the multipliers, from what is known at the iterate and the
-/// counts of active constraints; column `7 + la + lb` is left to the residuals.
+/// Newton's matrix of the system of the distance for dx, dy, dD and the multipliers, from what is
+/// known at the iterate and the counts of active constraints; column `7 + la + lb` is left to the
+/// residuals.
 fn newton_matrix(distance: f64, a: &At, b: &At, la: usize, lb: usize) -> Augmented {
     let mut m: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
     let scaled = a.hessian * distance;
@@ -463,7 +471,8 @@ fn newton_matrix(distance: f64, a: &At, b: &At, la: usize, lb: usize) -> Augment
     m
 }
 
-/// Newton's matrix of the level distance, unknowns x, s and the multipliers; column `4 + la + lb` is left to the residuals.
+/// Newton's matrix of the level distance, unknowns x, s and the multipliers; column `4 + la + lb`
+/// is left to the residuals.
 fn level_matrix(a: &At, b: &At, la: usize, lb: usize) -> Augmented {
     let hessian = a.hessian + b.hessian;
     let mut m: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];

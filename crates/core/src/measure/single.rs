@@ -1,14 +1,16 @@
-//! Convex programs over one body: the point nearest to a given one, and the point farthest along a direction.
+//! Convex programs over one body: the point nearest to a given one, and the point farthest along a
+//! direction.
 //!
-//! Both are `min κ/2 |y|² - r·y` over the points y of the body: κ = 1 projects the point r, κ = 0 supports the direction r.
-//! The steps are those of sequential quadratic programming,
+//! Both are `min κ/2 |y|² - r·y` over the points y of the body: κ = 1 projects the point r, κ = 0
+//! supports the direction r. The steps are those of sequential quadratic programming,
 //!
 //! ```text
 //! min over d of ½ dᵀ(κ I + Σ λ_i ∇²g_i) d + (κ y - r)·d   subject to   g_i(y) + ∇g_i(y)·d <= 1
 //! ```
 //!
-//! with the constraints that hold with equality found by exchange, one at a time, without new evaluations. Where the steps
-//! do not settle, an interior-point method does. Brackets are the caller's.
+//! with the constraints that hold with equality found by exchange, one at a time, without new
+//! evaluations. Where the steps do not settle, an interior-point method does. Brackets are the
+//! caller's.
 
 use super::bracket::Multipliers;
 use super::linear::{Augmented, MAX_UNKNOWNS, solve};
@@ -21,8 +23,8 @@ use crate::polynomial::{Jet, gamma};
 use nalgebra::{Matrix3, Vector3};
 use std::ops::ControlFlow;
 
-/// One body in its own query frame: that of the body, moved to the centre of its circumscribed ball and scaled by a power
-/// of two near its radius.
+/// One body in its own query frame: that of the body, moved to the centre of its circumscribed ball
+/// and scaled by a power of two near its radius.
 pub(super) struct Single<'a> {
     pub(super) body: Posed<'a>,
     /// Metres per unit of the query frame: a power of two.
@@ -117,8 +119,8 @@ const MAX_STEPS: u32 = 12;
 /// Longest step, in query units, after which a bracket may be narrow.
 const WORTH_A_BRACKET: f64 = 1e-3;
 
-/// Minimises from a start until `accept` takes a trial point; returns the iterations and the constraints that held with
-/// equality last.
+/// Minimises from a start until `accept` takes a trial point; returns the iterations and the
+/// constraints that held with equality last.
 pub(super) fn solve_single(
     body: &Posed<'_>,
     objective: &Objective,
@@ -210,7 +212,8 @@ impl Steps<'_> {
         false
     }
 
-    /// Multipliers for a start without any: the largest constraint alone, as far as it turns against the objective.
+    /// Multipliers for a start without any: the largest constraint alone, as far as it turns
+    /// against the objective.
     fn first_multipliers(&mut self, jets: &[Jet], y: &Vector3<f64>) -> Multipliers {
         let mut multipliers = [0.0; MAX_CONSTRAINTS];
         let aim = self.objective.linear - y * self.objective.curvature;
@@ -225,7 +228,8 @@ impl Steps<'_> {
         multipliers
     }
 
-    /// The step and the new multipliers from the quadratic program, exchanging one constraint at a time.
+    /// The step and the new multipliers from the quadratic program, exchanging one constraint at a
+    /// time.
     fn step(
         &mut self,
         jets: &[Jet],

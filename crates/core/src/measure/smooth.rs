@@ -1,9 +1,11 @@
-//! Measures by continuation: from the last answer of a pair along its motion, where one constraint of each body is active.
+//! Measures by continuation: from the last answer of a pair along its motion, where one constraint
+//! of each body is active.
 //!
-//! What a hint keeps of the last answer is where it was attained, with the normal there, each body's part in its own frame,
-//! where it stays true however the bodies move, and how the solution answers motions to first order. So the first step at new
-//! poses needs no evaluation. Along a smooth trajectory what that step misses changes slowly; it is foreseen and added on.
-//! One evaluation then mostly proves the answer or leaves one more step to it.
+//! What a hint keeps of the last answer is where it was attained, with the normal there, each
+//! body's part in its own frame, where it stays true however the bodies move, and how the solution
+//! answers motions to first order. So the first step at new poses needs no evaluation. Along a
+//! smooth trajectory what that step misses changes slowly; it is foreseen and added on. One
+//! evaluation then mostly proves the answer or leaves one more step to it.
 
 use super::drift::Drift;
 use super::options::Options;
@@ -17,7 +19,8 @@ use crate::body::Body;
 use crate::polynomial::{Scalar, Simd, WithSimd};
 use nalgebra::Vector3;
 
-/// What is kept of an answer for the next query of the pair. Points from the centres of the bodies' normalizations on, metres.
+/// What is kept of an answer for the next query of the pair. Points from the centres of the bodies'
+/// normalizations on, metres.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Trace {
     /// Active constraint of A and of B.
@@ -62,7 +65,8 @@ impl Trace {
         self.of_a = Spot { point: x, normal: n };
         self.of_b.point = apply_transposed::<S, f64>(&relative.rotation, from_b);
         self.of_b.normal = apply_transposed::<S, f64>(&relative.rotation, n);
-        // The last step has turned the normal: along the old tangents the way between the points would not look like none.
+        // The last step has turned the normal: along the old tangents the way between the points
+        // would not look like none.
         let across = |tangent: V3<f64>| add_scaled::<S, f64>(tangent, -dot::<S, f64>(tangent, n), n);
         self.tangents = [across(frame[0]), across(frame[1])];
         self.response = response;
@@ -92,7 +96,8 @@ impl Trace {
     }
 }
 
-/// A proven bracket and where it is attained, from the centre of A's normalization on, in A's frame, metres.
+/// A proven bracket and where it is attained, from the centre of A's normalization on, in A's
+/// frame, metres.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Proven {
     pub(super) lower: f64,
@@ -125,10 +130,12 @@ impl Proven {
 pub(super) struct Lost {
     /// Evaluations of both bodies.
     pub(super) rounds: u32,
-    /// A point that seems to lie in both, from the centre of A's normalization on, in A's frame, metres.
+    /// A point that seems to lie in both, from the centre of A's normalization on, in A's frame,
+    /// metres.
     pub(super) middle: Option<V3<f64>>,
-    /// Where Newton's method ended without a narrow bracket, which only twice the precision may give: near contact, where
-    /// doubles do not tell on which side, or where the normals do not agree well enough.
+    /// Where Newton's method ended without a narrow bracket, which only twice the precision may
+    /// give: near contact, where doubles do not tell on which side, or where the normals do not
+    /// agree well enough.
     pub(super) grazing: Option<Proven>,
 }
 
@@ -149,12 +156,12 @@ const MAX_ROUNDS: u32 = 8;
 /// Most evaluations from a cold start before another method takes over.
 pub(super) const SEEK_ROUNDS: u32 = 16;
 
-/// Evaluations from a cold start after which Newton's method should be near, and any in an overlap after which a common point
-/// should be.
+/// Evaluations from a cold start after which Newton's method should be near, and any in an overlap
+/// after which a common point should be.
 const PATIENCE: u32 = 6;
 
-/// Evaluations from where the outlines are nearest after which Newton's method should be near: a closer look at bodies that are thin,
-/// and take their turns.
+/// Evaluations from where the outlines are nearest after which Newton's method should be near: a
+/// closer look at bodies that are thin, and take their turns.
 const PATIENCE_OUTLINED: u32 = 12;
 
 /// Length of a step relative to a body's size that counts as near.
@@ -163,7 +170,8 @@ const NEARLY: f64 = 0.05;
 /// Curvature times size that counts as none.
 const FLATTEST: f64 = 1e-20;
 
-/// Length of a step relative to the longest, beyond which no extrapolation is close enough for a bracket.
+/// Length of a step relative to the longest, beyond which no extrapolation is close enough for a
+/// bracket.
 const WORTH_A_BRACKET: f64 = 1e-2;
 
 /// How much narrower a step has to make the bracket of bodies that touch to be worth it.
@@ -172,14 +180,15 @@ const NARROWER: f64 = 0.5;
 /// Length of a step relative to the longest, after which none is left but rounding.
 const SETTLED: f64 = 1e-9;
 
-/// Moves, for the longest ones, beyond which no bracket is worth its evaluation; that is relative to the smaller body, too.
+/// Moves, for the longest ones, beyond which no bracket is worth its evaluation; that is relative
+/// to the smaller body, too.
 #[inline(always)]
 pub(super) fn worth_a_bracket([of_x, of_y]: [f64; 2]) -> [f64; 2] {
     [WORTH_A_BRACKET * of_x.min(of_y); 2]
 }
 
-/// Longest move relative to a body's size, be that in metres or in normalized coordinates, that the linearization may mean
-/// anything for.
+/// Longest move relative to a body's size, be that in metres or in normalized coordinates, that the
+/// linearization may mean anything for.
 pub(super) const LONGEST: f64 = 0.25;
 
 /// The longest moves of a point of A and of a point of B, metres.
@@ -248,8 +257,8 @@ impl<R: Relation> WithSimd for Follow<'_, R> {
     }
 }
 
-/// A start from nothing but the poses, as vectorized work: where the bodies face each other, as their
-/// outlines show it, and Newton's method from there.
+/// A start from nothing but the poses, as vectorized work: where the bodies face each other, as
+/// their outlines show it, and Newton's method from there.
 pub(super) struct Seek<'a, R> {
     pub(super) a: &'a Body,
     pub(super) b: &'a Body,
@@ -358,7 +367,8 @@ impl<R: Relation> Correct<'_, R> {
             let flat = series.is_slow(step.along())
                 && series.may_have_to_be_corrected(step.along(), self.relative_length(simd, &step, local));
             if near || flat {
-                // The bracket there, or where Newton's step leads, by extrapolation: mostly no other evaluation is needed.
+                // The bracket there, or where Newton's step leads, by extrapolation: mostly no
+                // other evaluation is needed.
                 let (dx, dy) = if flat { ([0.0; 3], [0.0; 3]) } else { (step.dx, step.dy) };
                 let next_a = side_a.extrapolate(simd, &jet_a, &local_a, dx);
                 let next_b = side_b.extrapolate(simd, &jet_b, &local_b, dy);
@@ -385,7 +395,8 @@ impl<R: Relation> Correct<'_, R> {
                     Verdict::Overlap if near => {
                         let middle = self.middle(simd, at.x, at.y);
                         let deep = -next[2] > NEARLY * self.limits[0].min(self.limits[1]);
-                        // Bodies that touch are left to twice the precision when the bracket gets no narrower.
+                        // Bodies that touch are left to twice the precision when the bracket gets
+                        // no narrower.
                         let touching = settled || found.upper > NARROWER * overlap;
                         if middle.is_some() || touching || deep && rounds >= PATIENCE {
                             let grazing = (!deep).then(|| at.grazing(simd, &step, &found, trace.active, rounds));
@@ -435,7 +446,8 @@ fn last_resort(found: &Bracket<f64>) -> Verdict {
     }
 }
 
-/// Makes a step of this relative length as long as those before it show that it has to be; whether that is another length.
+/// Makes a step of this relative length as long as those before it show that it has to be; whether
+/// that is another length.
 #[inline(always)]
 fn correct<S: Simd>(
     simd: S,

@@ -1,15 +1,17 @@
 //! Where to begin when nothing is known but the poses.
 //!
-//! The distance of two convex sets is the largest value over unit vectors n of `-h_A(-n) - h_B(n)`, h the support functions:
-//! `n·w` where w is the difference of the points that are farthest along `-n` and along `n`. Ellipsoids stand for the bodies.
-//! Theirs are `h(n) = √(nᵀ Σ n)`, and Newton's method for `w = D n` turns n by
+//! The distance of two convex sets is the largest value over unit vectors n of `-h_A(-n) - h_B(n)`,
+//! h the support functions: `n·w` where w is the difference of the points that are farthest along
+//! `-n` and along `n`. Ellipsoids stand for the bodies. Theirs are `h(n) = √(nᵀ Σ n)`, and Newton's
+//! method for `w = D n` turns n by
 //!
 //! ```text
 //! (D I + K_A + K_B) dn = w - (n·w) n,    K = (Σ - Σ n nᵀ Σ / h²) / h
 //! ```
 //!
-//! with K the derivative of the farthest point, so that such turns find about where the ellipsoids face each other. There the
-//! outlines of the bodies know about where these are farthest themselves and how that changes, for another such turn.
+//! with K the derivative of the farthest point, so that such turns find about where the ellipsoids
+//! face each other. There the outlines of the bodies know about where these are farthest themselves
+//! and how that changes, for another such turn.
 
 use super::tangent::Relative;
 use super::vector::{
@@ -65,8 +67,9 @@ pub(super) fn facing<S: Simd, N: Number<S>>(simd: S, a: &Body, b: &Body, relativ
     n
 }
 
-/// A point on the line between those where two bodies are deepest in each other that is likely to lie in both: halfway, but no
-/// farther from either than its inscribed ball is large, as a small body in a large one asks for.
+/// A point on the line between those where two bodies are deepest in each other that is likely to
+/// lie in both: halfway, but no farther from either than its inscribed ball is large, as a small
+/// body in a large one asks for.
 #[inline(always)]
 pub(super) fn middle<S: Simd, N: Number<S>>(simd: S, a: &Body, b: &Body, x: V3<N>, y: V3<N>) -> V3<N> {
     let between = subtract(x, y);
@@ -77,10 +80,12 @@ pub(super) fn middle<S: Simd, N: Number<S>>(simd: S, a: &Body, b: &Body, x: V3<N
     add_scaled(y, share, between)
 }
 
-/// Of the ellipsoid that stands for the difference `A - B` the inward normal where the ray from 0 leaves it, in A's frame.
+/// Of the ellipsoid that stands for the difference `A - B` the inward normal where the ray from 0
+/// leaves it, in A's frame.
 ///
-/// About the direction of the ray the ellipsoid with `(h_A + h_B) (Σ_A / h_A + Σ_B / h_B)` for its Σ is a tight bound of the sum of
-/// both ellipsoids (Kurzhanski and Vályi, Ellipsoidal calculus, 1997).
+/// About the direction of the ray the ellipsoid with `(h_A + h_B) (Σ_A / h_A + Σ_B / h_B)` for its
+/// Σ is a tight bound of the sum of both ellipsoids (Kurzhanski and Vályi, Ellipsoidal calculus,
+/// 1997).
 #[inline(always)]
 pub(super) fn facing_along<S: Simd>(simd: S, a: &Body, b: &Body, relative: &Relative<f64>, ray: V3<f64>) -> V3<f64> {
     let shape_a: M3<f64> = rows(simd, a.outline().shape());
@@ -116,8 +121,8 @@ pub(super) struct Start<N> {
     pub(super) n: V3<N>,
 }
 
-/// Where the outlines have `x - y` along n, or along a ray if one is given; from a unit vector n on, in A's frame. Also where A's
-/// outline keeps the cell of `-n` and B's that of n.
+/// Where the outlines have `x - y` along n, or along a ray if one is given; from a unit vector n
+/// on, in A's frame. Also where A's outline keeps the cell of `-n` and B's that of n.
 #[inline(always)]
 pub(super) fn meeting<S: Simd, N: Number<S>>(
     simd: S,
@@ -147,7 +152,8 @@ pub(super) fn meeting<S: Simd, N: Number<S>>(
         matrix[i] = if matches!(i, 0 | 3 | 5) { stiff + bent } else { bent };
     }
     let n = turned(simd, n, matrix, add_scaled(w, -distance, along), size);
-    // Of the same cells: where a side is flat a small turn leads far, to another cell for which it was not meant.
+    // Of the same cells: where a side is flat a small turn leads far, to another cell for which it
+    // was not meant.
     let x = subtract(of_a, apply_symmetric(&turn_a, n));
     let y = add(of_b, apply_symmetric(&turn_b, n));
     (Start { x, y, n }, [cell_a.place, cell_b.place])
@@ -161,12 +167,13 @@ fn turned_symmetric<S: Simd, N: Number<S>>(rotation: &M3<N>, m: &[N; 6]) -> [N; 
     [dot(r0, m0), dot(r0, m1), dot(r0, m2), dot(r1, m1), dot(r1, m2), dot(r2, m2)]
 }
 
-/// The direction of `n + M⁻¹ r`, by cofactors of the symmetric matrix M with the entries xx, xy, xz, yy, yz, zz; the turn is
-/// limited. M and r are lengths of about `size`, metres.
+/// The direction of `n + M⁻¹ r`, by cofactors of the symmetric matrix M with the entries xx, xy,
+/// xz, yy, yz, zz; the turn is limited. M and r are lengths of about `size`, metres.
 #[inline(always)]
 fn turned<S: Simd, N: Number<S>>(simd: S, n: V3<N>, matrix: [N; 6], r: V3<N>, size: f64) -> V3<N> {
     let (cofactors, determinant) = cofactors(simd, matrix);
-    // Single precision has no sixth powers of the smallest and largest sizes, of which the norm would be the root.
+    // Single precision has no sixth powers of the smallest and largest sizes, of which the norm
+    // would be the root.
     let unit = N::splat(simd, inverse_cube(size));
     let turn = scaled(apply_symmetric(&cofactors, r), unit);
     let longest = turn[0].abs().max(turn[1].abs()).max(turn[2].abs());
@@ -216,7 +223,8 @@ mod tests {
 
     #[test]
     fn ellipsoids_nearly_face_each_other() {
-        // Where the stand-ins have the shape of the bodies the normals at the farthest points oppose each other.
+        // Where the stand-ins have the shape of the bodies the normals at the farthest points
+        // oppose each other.
         let a = Body::ellipsoid("a", Vector3::zeros(), Vector3::new(1.0, 0.6, 0.4)).unwrap();
         let b = Body::ellipsoid("b", Vector3::zeros(), Vector3::new(0.5, 0.9, 0.7)).unwrap();
         let mut worst = 0.0_f64;

@@ -1,8 +1,9 @@
 //! Ball cast: where a ball swept along a ray first touches a body.
 //!
-//! The distance of the moving centre from the body is a convex function of the path, and a plane that separates the centre
-//! from the body at one place bounds it everywhere: its lower bound there is the value, and the normal times the direction
-//! the slope, of a tangent of [`Entry`]. So the touch is found like the entry of a ray, from projections of the centre.
+//! The distance of the moving centre from the body is a convex function of the path, and a plane
+//! that separates the centre from the body at one place bounds it everywhere: its lower bound there
+//! is the value, and the normal times the direction the slope, of a tangent of [`Entry`]. So the
+//! touch is found like the entry of a ray, from projections of the centre.
 
 use super::Status;
 use super::entry::Entry;
@@ -34,9 +35,9 @@ impl Sweep {
 
 /// First parameter at which a ball swept along a ray touches a solid.
 ///
-/// The bracket is as narrow as `options` ask, relative to the circumradius of the solid, or the status says that it is not;
-/// its lower end is never late. A ball that touches at the start hits at 0. The point of a hit is the body's, not that of
-/// the ray.
+/// The bracket is as narrow as `options` ask, relative to the circumradius of the solid, or the
+/// status says that it is not; its lower end is never late. A ball that touches at the start hits
+/// at 0. The point of a hit is the body's, not that of the ray.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -124,8 +125,8 @@ fn cast_at(body: &Body, pose: &Pose, sweep: &Sweep, tolerance: f64, options: &Op
     })
 }
 
-/// The parameter of the ray closest to the centre of the circumscribed ball, and the interval about it in which the swept
-/// ball touches that ball; none if it never does.
+/// The parameter of the ray closest to the centre of the circumscribed ball, and the interval about
+/// it in which the swept ball touches that ball; none if it never does.
 fn within_ball(body: &Body, pose: &Pose, sweep: &Sweep) -> Option<(f64, Entry)> {
     let Sweep { ray, radius } = sweep;
     let ball = body.circumscribed();
@@ -179,7 +180,8 @@ mod tests {
                 // The oracle's own rounding, enlarged by grazing.
                 let slack = 1e-14 * reach * reach / discriminant.sqrt() * 4.0;
                 assert!(hit.lower <= truth + slack && truth - slack <= hit.upper, "{label} {truth}");
-                // At so small an angle the bracket of a distance of 1e-11 spans more of the path than is asked for.
+                // At so small an angle the bracket of a distance of 1e-11 spans more of the path
+                // than is asked for.
                 assert!(
                     hit.status == Status::Converged || seed % 5 == 2 && hit.upper - hit.lower < 1e-7 * reach,
                     "{label}"

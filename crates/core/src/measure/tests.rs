@@ -30,7 +30,8 @@ pub(super) fn random_pose(random: &mut Seeded, distance: f64) -> Pose {
     Pose::from_quaternion(unit(random) * distance, q).unwrap()
 }
 
-/// The pose after a translation by `h axis`, or a rotation by `h axis` about the body's own translation.
+/// The pose after a translation by `h axis`, or a rotation by `h axis` about the body's own
+/// translation.
 pub(super) fn twisted(pose: &Pose, axis: &Vector3<f64>, turn: bool, h: f64) -> Pose {
     if turn {
         let rotation = UnitQuaternion::from_scaled_axis(axis * h) * pose.rotation();
@@ -48,7 +49,8 @@ fn cold_level(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose) -> LevelDistance
     level_distance(a, pose_a, b, pose_b, &Options::default(), &mut WarmStart::default())
 }
 
-/// Body-frame support point of `body` in direction `n`, by brute force over rays then projected ascent.
+/// Body-frame support point of `body` in direction `n`, by brute force over rays then projected
+/// ascent.
 pub(super) fn largest_along(body: &Body, n: &Vector3<f64>) -> f64 {
     static SPHERE: OnceLock<Sphere> = OnceLock::new();
     SPHERE
@@ -78,7 +80,8 @@ fn ball_pairs() {
         let truth = gap.max(0.0);
         let answer = cold(&a, &pose_a, &b, &pose_b);
         let label = format!("seed {seed}, gap {gap:e}, s {s:e}: {answer:?}");
-        // No bracket is narrower than rounding leaves it: some 1e-13 of the larger ball and the gap.
+        // No bracket is narrower than rounding leaves it: some 1e-13 of the larger ball and the
+        // gap.
         let attainable = 2e-13 * (s + gap.abs());
         assert_eq!(answer.status == Status::Converged, answer.upper - answer.lower <= width, "{label}");
         assert!(answer.status == Status::Converged || width < attainable, "{label}");
@@ -269,7 +272,8 @@ fn near_contact_distances_shrink_by_what_is_moved() {
         let s = a.circumscribed().radius.max(b.circumscribed().radius);
         let far = 1.5 * (a.circumscribed().radius + b.circumscribed().radius);
         let pose = random_pose(&mut random, far);
-        // A bracket of 1e-12 leaves a normal 1e-6, which needles feel: a second answer, from the first one's, has the normal.
+        // A bracket of 1e-12 leaves a normal 1e-6, which needles feel: a second answer, from the
+        // first one's, has the normal.
         let exact = Options::default().with_accuracy(1e-13).unwrap();
         let mut warm = WarmStart::default();
         distance(a, &Pose::identity(), b, &pose, &exact, &mut warm);
@@ -440,7 +444,8 @@ fn flats_of_different_orders_take_few_iterations() {
     }
 }
 
-/// The answer is where the slope of a tip makes up for the tilt of the face over it: on the way there is no curvature at all.
+/// The answer is where the slope of a tip makes up for the tilt of the face over it: on the way
+/// there is no curvature at all.
 #[test]
 fn flat_tips_meet_faces_tilted_by_next_to_nothing() {
     let needle = Body::superellipsoid("needle", Vector3::zeros(), Vector3::new(0.05, 0.05, 1.0), 8).unwrap();
@@ -467,7 +472,8 @@ fn flat_tips_meet_faces_tilted_by_next_to_nothing() {
     assert!(longest <= 150 && sum <= 12 * 1000, "longest {longest}, {sum} in 1000");
 }
 
-/// Thin and small boxes over sides tilted by 1e-9 to 1e-5: of 1e8 aligned draws the ones that had stayed wide.
+/// Thin and small boxes over sides tilted by 1e-9 to 1e-5: of 1e8 aligned draws the ones that had
+/// stayed wide.
 #[test]
 fn tilted_sides_that_had_stayed_wide() {
     let cuboid = |x, y, z| Body::cuboid("box", Vector3::new(x, y, z)).unwrap();

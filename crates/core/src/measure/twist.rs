@@ -4,9 +4,10 @@ use nalgebra::Vector3;
 
 /// Derivative of a measure with respect to the twist (v, ω) of one body, world frame.
 ///
-/// A twist moves the points of the body by `v + ω × (x - t)`, t the translation of its pose (metres): `t <- t + v`,
-/// `R <- exp(ω) R`. Chain it for other parametrizations. For a measure in metres both parts are per metre and per radian
-/// in turn: `linear` without unit, `angular` in metres per radian; for one without unit, 1/m and 1/rad.
+/// A twist moves the points of the body by `v + ω × (x - t)`, t the translation of its pose
+/// (metres): `t <- t + v`, `R <- exp(ω) R`. Chain it for other parametrizations. For a measure in
+/// metres both parts are per metre and per radian in turn: `linear` without unit, `angular` in
+/// metres per radian; for one without unit, 1/m and 1/rad.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -37,8 +38,8 @@ impl Twist {
     /// No change.
     pub(super) const ZERO: Self = Self { linear: Vector3::new(0.0, 0.0, 0.0), angular: Vector3::new(0.0, 0.0, 0.0) };
 
-    /// Derivative of a measure that grows with `force · δx` when the body's material point at `point` moves by δx; `center`
-    /// is the translation of the body's pose, all in the world frame.
+    /// Derivative of a measure that grows with `force · δx` when the body's material point at
+    /// `point` moves by δx; `center` is the translation of the body's pose, all in the world frame.
     pub(super) fn of_force(force: Vector3<f64>, point: &Vector3<f64>, center: &Vector3<f64>) -> Self {
         Self { linear: force, angular: (point - center).cross(&force) }
     }

@@ -1,8 +1,8 @@
 //! Numbers of twice the precision: unevaluated sums of two doubles.
 //!
-//! Each operation is one of Joldes, Muller and Popescu, Tight and rigorous error bounds for basic building blocks of
-//! double-word arithmetic, ACM Trans. Math. Software 44, 2017, with a relative error of at most 10 u², u = 2⁻⁵³, short of
-//! under- and overflow: below [`UNIT`].
+//! Each operation is one of Joldes, Muller and Popescu, Tight and rigorous error bounds for basic
+//! building blocks of double-word arithmetic, ACM Trans. Math. Software 44, 2017, with a relative
+//! error of at most 10 u², u = 2⁻⁵³, short of under- and overflow: below [`UNIT`].
 
 use nalgebra::Vector3;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};

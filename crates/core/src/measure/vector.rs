@@ -1,4 +1,5 @@
-//! Small vectors and matrices of [`Number`]s, which nalgebra's are not: a lane each, inlined into vectorised work.
+//! Small vectors and matrices of [`Number`]s, which nalgebra's are not: a lane each, inlined into
+//! vectorised work.
 
 use crate::polynomial::{Number, Simd};
 use nalgebra::Matrix3;
@@ -86,8 +87,8 @@ pub(super) fn apply_symmetric<S: Simd, N: Number<S>>(h: &[N; 6], v: V3<N>) -> V3
     [dot([h[0], h[1], h[2]], v), dot([h[1], h[3], h[4]], v), dot([h[2], h[4], h[5]], v)]
 }
 
-/// The cofactors of the symmetric matrix with the entries xx, xy, xz, yy, yz, zz, which are its determinant times its
-/// inverse, and the determinant.
+/// The cofactors of the symmetric matrix with the entries xx, xy, xz, yy, yz, zz, which are its
+/// determinant times its inverse, and the determinant.
 #[inline(always)]
 pub(super) fn cofactors<S: Simd, N: Number<S>>(_: S, [xx, xy, xz, yy, yz, zz]: [N; 6]) -> ([N; 6], N) {
     let cofactors = [
@@ -101,8 +102,8 @@ pub(super) fn cofactors<S: Simd, N: Number<S>>(_: S, [xx, xy, xz, yy, yz, zz]: [
     (cofactors, dot([xx, xy, xz], [cofactors[0], cofactors[1], cofactors[2]]))
 }
 
-/// A right-handed orthonormal basis whose third vector is the direction of `v` (Duff et al., Building an orthonormal basis,
-/// revisited, JCGT 6, 2017).
+/// A right-handed orthonormal basis whose third vector is the direction of `v` (Duff et al.,
+/// Building an orthonormal basis, revisited, JCGT 6, 2017).
 #[inline(always)]
 pub(super) fn basis<S: Simd, N: Number<S>>(simd: S, v: V3<N>) -> M3<N> {
     let (zero, one) = (N::splat(simd, 0.0), N::splat(simd, 1.0));

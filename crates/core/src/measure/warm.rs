@@ -1,4 +1,4 @@
-//! Warm starts: what one answer tells the next query of the same pair.
+//! Warm starts: what one answer gives the next query of the same pair.
 
 use super::level::LevelTrace;
 use super::pair::Pair;
@@ -8,11 +8,12 @@ use nalgebra::Vector3;
 /// Constraints of one body that hold with equality, as a bit set.
 pub(super) type ActiveSet = u16;
 
-/// A caller-owned hint from an earlier answer, for the next query of the same pair and measure in the same order;
-/// [`WarmStart::default`] is a cold start.
+/// A caller-owned hint from an earlier answer, for the next query of the same pair and measure in
+/// the same order; [`WarmStart::default`] is a cold start.
 ///
-/// It may change the time a query takes, never its answer beyond the bracket: a hint of another pair, of a pose far away,
-/// or of nonsense is found out by the bracket and the solve starts cold. Copying it forks a trajectory.
+/// It may change the time a query takes, never its answer beyond the bracket: a hint of another
+/// pair, of a pose far away, or of nonsense is found out by the bracket and the solve starts cold.
+/// Copying it forks a trajectory.
 ///
 /// ```
 /// use nalgebra::Vector3;

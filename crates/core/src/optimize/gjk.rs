@@ -1,6 +1,7 @@
-//! Which point of a convex set that is known by its support points is nearest to 0: the algorithm of Gilbert, Johnson and Keerthi
-//! (A fast procedure for computing the distance between complex objects in three-dimensional space, IEEE J. Robotics and
-//! Automation 4, 1988). Of two bodies the set is their difference, and 0 as near to it as they are to each other.
+//! Which point of a convex set that is known by its support points is nearest to 0: the algorithm
+//! of Gilbert, Johnson and Keerthi (A fast procedure for computing the distance between complex
+//! objects in three-dimensional space, IEEE J. Robotics and Automation 4, 1988). Of two bodies the
+//! set is their difference, and 0 as near to it as they are to each other.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -21,7 +22,8 @@ pub struct Corner {
     pub difference: Vector3<f64>,
 }
 
-/// Corners and the weights of the point nearest to 0 that they span; one with a weight of zero is none.
+/// Corners and the weights of the point nearest to 0 that they span; one with a weight of zero is
+/// none.
 #[derive(Clone, Copy)]
 struct Simplex {
     corners: [Corner; 4],
@@ -34,7 +36,8 @@ impl Simplex {
         (0..self.len).map(|k| of(&self.corners[k]) * self.weights[k]).sum()
     }
 
-    /// The part of the simplex with one more corner that holds its point nearest to 0; the new corner belongs to it.
+    /// The part of the simplex with one more corner that holds its point nearest to 0; the new
+    /// corner belongs to it.
     fn with(&self, corner: Corner) -> Self {
         let alone = Self { corners: [corner; 4], weights: [1.0, 0.0, 0.0, 0.0], len: 1 };
         let mut best = (alone, corner.difference.norm_squared());
@@ -54,7 +57,8 @@ impl Simplex {
         best.0
     }
 
-    /// Finds the weights of the point nearest to 0 of all that the corners span; whether none is negative.
+    /// Finds the weights of the point nearest to 0 of all that the corners span; whether none is
+    /// negative.
     fn weigh(&mut self) -> bool {
         let edge = |k: usize| {
             if k < self.len { self.corners[k].difference - self.corners[0].difference } else { Vector3::zeros() }
@@ -79,14 +83,15 @@ pub struct Approach {
     pub y: Vector3<f64>,
     /// Unit vector from B to A; where the sets overlap, as it was when they did not yet seem to.
     pub n: Vector3<f64>,
-    /// Points of A and of B farthest towards the other one: corners where the nearest points may lie anywhere on a side.
+    /// Points of A and of B farthest towards the other one: corners where the nearest points may
+    /// lie anywhere on a side.
     pub corners: (Vector3<f64>, Vector3<f64>),
     /// A point of both sets.
     pub common: Option<Vector3<f64>>,
 }
 
-/// What is nearest to 0 of a convex set that is known by its support points along -n, from a direction n on; a distance whose
-/// square is no larger than `none` counts as none.
+/// What is nearest to 0 of a convex set that is known by its support points along -n, from a
+/// direction n on; a distance whose square is no larger than `none` counts as none.
 pub fn gjk(none: f64, n: &Vector3<f64>, support: impl Fn(&Vector3<f64>) -> Corner) -> Approach {
     let mut last = support(n);
     let mut simplex = Simplex { corners: [last; 4], weights: [1.0, 0.0, 0.0, 0.0], len: 1 };

@@ -1,6 +1,6 @@
-//! Primal-dual interior-point method with slacks (Nocedal and Wright, Numerical Optimization, chapter 19) and Mehrotra's
-//! choice of the centring. Slacks let a full Newton step leave a curved boundary, which a method of feasible points has to
-//! creep along.
+//! Primal-dual interior-point method with slacks (Nocedal and Wright, Numerical Optimization,
+//! chapter 19) and Mehrotra's choice of the centring. Slacks let a full Newton step leave a curved
+//! boundary, which a method of feasible points has to creep along.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use std::ops::ControlFlow;
@@ -27,15 +27,16 @@ pub struct Row<const N: usize> {
     pub value: f64,
     /// Gradient with respect to all variables.
     pub gradient: SVector<f64, N>,
-    /// Hessian with respect to the three variables from `block` on; the constraint is affine in the others.
+    /// Hessian with respect to the three variables from `block` on; the constraint is affine in the
+    /// others.
     pub hessian: Matrix3<f64>,
     /// First of the three curved variables.
     pub block: usize,
 }
 
 impl<const N: usize> Row<N> {
-    /// A row curved in the three variables from `block` on and affine in the last variable with slope `last` (if it is not
-    /// one of the three).
+    /// A row curved in the three variables from `block` on and affine in the last variable with
+    /// slope `last` (if it is not one of the three).
     pub fn new(value: f64, gradient: &Vector3<f64>, hessian: Matrix3<f64>, block: usize, last: f64) -> Self {
         let mut full = SVector::<f64, N>::zeros();
         full[N - 1] = last;
@@ -91,11 +92,11 @@ pub struct Iterate<'a, const N: usize> {
     pub gap: f64,
 }
 
-/// Minimises a convex program from the strictly feasible `v`, showing each iterate to `inspect`, until that breaks off or
-/// no further progress is possible. Returns the number of iterations.
+/// Minimises a convex program from the strictly feasible `v`, showing each iterate to `inspect`,
+/// until that breaks off or no further progress is possible. Returns the number of iterations.
 ///
-/// `gap` is the size of improvement expected of the objective; it sets the first multipliers. A start that is not strictly
-/// feasible returns at once.
+/// `gap` is the size of improvement expected of the objective; it sets the first multipliers. A
+/// start that is not strictly feasible returns at once.
 pub fn minimise<const N: usize, P: Program<N>>(
     program: &P,
     v: &mut SVector<f64, N>,
@@ -105,8 +106,8 @@ pub fn minimise<const N: usize, P: Program<N>>(
     minimise_within(f64::INFINITY, program, v, gap, inspect)
 }
 
-/// As [`minimise`], with no step to where a constraint is above `farthest` that was not before: slower, but from far outside thin
-/// bodies the way back may be too long.
+/// As [`minimise`], with no step to where a constraint is above `farthest` that was not before:
+/// slower, but from far outside thin bodies the way back may be too long.
 pub fn minimise_within<const N: usize, P: Program<N>>(
     farthest: f64,
     program: &P,
@@ -135,7 +136,8 @@ pub fn minimise_within<const N: usize, P: Program<N>>(
         let Some(system) = System::factor(&gradient, hessian, rows, &dual, regularization) else {
             return iteration;
         };
-        // Predictor: aim at zero complementarity and see how far the multipliers and slacks allow it.
+        // Predictor: aim at zero complementarity and see how far the multipliers and slacks allow
+        // it.
         let complementarity = dual.complementarity(m);
         let affine = system.step(&gradient, rows, &dual, 0.0);
         let (primal, multipliers) = affine.longest(&dual, m);
@@ -171,7 +173,8 @@ pub fn minimise_within<const N: usize, P: Program<N>>(
             lengths = if lengths[0] == lengths[1] { [shorter; 2] } else { [2.0 * shorter; 2] };
         }
         if !accepted {
-            // A direction without curvature at this point makes the step longer than any halving mends.
+            // A direction without curvature at this point makes the step longer than any halving
+            // mends.
             if regularization > 1.0 {
                 return iteration;
             }
@@ -202,7 +205,8 @@ impl Dual {
         self.slacks.iter().zip(&self.multipliers).take(m).map(|(slack, multiplier)| slack * multiplier).sum()
     }
 
-    /// Norm of the perturbed optimality conditions `∇f + Σ λ_i ∇c_i = 0`, `c_i + s_i = 0`, `s_i λ_i = target`.
+    /// Norm of the perturbed optimality conditions `∇f + Σ λ_i ∇c_i = 0`, `c_i + s_i = 0`, `s_i λ_i
+    /// = target`.
     fn residual<const N: usize>(&self, gradient: &SVector<f64, N>, rows: &[Row<N>], target: f64) -> f64 {
         let mut stationarity = *gradient;
         let mut rest = 0.0;
@@ -231,7 +235,8 @@ struct Step<const N: usize> {
 }
 
 impl<const N: usize> Step<N> {
-    /// Longest steps that keep the slacks and the multipliers of the first m rows at or above zero, at most 2.
+    /// Longest steps that keep the slacks and the multipliers of the first m rows at or above zero,
+    /// at most 2.
     fn longest(&self, dual: &Dual, m: usize) -> (f64, f64) {
         let longest = |values: &[f64; MAX_ROWS], changes: &[f64; MAX_ROWS]| {
             let ratios = values.iter().zip(changes).take(m).filter(|(_, change)| **change < 0.0);

@@ -1,10 +1,11 @@
-//! Solvers for the tiny convex programs of this service: a globally convergent one for up to six variables and up to 32 rows, and
-//! the nearest point of a set that only its support points are known of ([`gjk`](gjk())); and convex hulls in the plane ([`outline`](outline())).
+//! Solvers for the tiny convex programs of this service: a globally convergent one for up to six
+//! variables and up to 32 rows, and the nearest point of a set that only its support points are
+//! known of ([`gjk`](gjk())); and convex hulls in the plane ([`outline`](outline())).
 //!
-//! Support points, deepest points, distances and level distances are all `min f(v)` subject to `c_i(v) <= 0` with smooth
-//! convex data, and all have a strictly feasible start at hand. The solver is a primal-dual interior-point method that
-//! knows no tolerance: the caller looks at each iterate and stops when its own proven bracket is narrow enough. Solving
-//! allocates nothing.
+//! Support points, deepest points, distances and level distances are all `min f(v)` subject to
+//! `c_i(v) <= 0` with smooth convex data, and all have a strictly feasible start at hand. The
+//! solver is a primal-dual interior-point method that knows no tolerance: the caller looks at each
+//! iterate and stops when its own proven bracket is narrow enough. Solving allocates nothing.
 
 mod gjk;
 mod interior_point;

@@ -1,6 +1,7 @@
 //! Convex hulls in the plane.
 
-/// Corners of the convex hull of `points`, counter-clockwise, which are sorted on the way (Andrew's monotone chain).
+/// Corners of the convex hull of `points`, counter-clockwise, which are sorted on the way (Andrew's
+/// monotone chain).
 pub fn outline(points: &mut [[f64; 2]]) -> Vec<[f64; 2]> {
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     // The lower side from left to right, the upper side back.

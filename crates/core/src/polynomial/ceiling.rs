@@ -1,8 +1,10 @@
 //! Upper bound of the third derivatives of a convex polynomial near its level 1.
 //!
-//! The sum of absolute coefficients bounds a derivative on a box about the origin, but loses all cancellation between terms: a
-//! factor of ten and more for fitted polynomials. So the neighbourhood of the level is covered with small cubes; shifted to the
-//! centre of each, the polynomial has its cancellation done, and what Taylor's formula adds for the small cube is little.
+//! The sum of absolute coefficients bounds a derivative on a box about the origin, but loses all
+//! cancellation between terms: a factor of ten and more for fitted polynomials. So the
+//! neighbourhood of the level is covered with small cubes; shifted to the centre of each, the
+//! polynomial has its cancellation done, and what Taylor's formula adds for the small cube is
+//! little.
 
 use super::Polynomial;
 use super::dense::{Dense, dense, shifted};
@@ -25,7 +27,8 @@ pub struct ThirdCeiling {
     pub ceiling: f64,
     /// Length of a step from a point near the level along which the bound holds.
     pub leeway: f64,
-    /// Length per second derivative along which a rise keeps half of what that alone would make it: 3/2 over the ceiling.
+    /// Length per second derivative along which a rise keeps half of what that alone would make it:
+    /// 3/2 over the ceiling.
     pub kept: f64,
 }
 
@@ -35,9 +38,9 @@ impl ThirdCeiling {
     }
 }
 
-/// Bound over the points with `|z_i| <= radius` where the convex `p` is within [`NEAR_LEVEL`] of 1, and along steps of the leeway
-/// from there: the largest Frobenius norm of the third derivative. `absolute` is the same bound by absolute coefficients
-/// on the cube of twice the size.
+/// Bound over the points with `|z_i| <= radius` where the convex `p` is within [`NEAR_LEVEL`] of 1,
+/// and along steps of the leeway from there: the largest Frobenius norm of the third derivative.
+/// `absolute` is the same bound by absolute coefficients on the cube of twice the size.
 pub(super) fn third_ceiling(p: &Polynomial, radius: f64, absolute: f64) -> ThirdCeiling {
     let half = radius / CUBES as f64;
     let leeway = SURROUNDINGS * half;
@@ -64,7 +67,8 @@ pub(super) fn third_ceiling(p: &Polynomial, radius: f64, absolute: f64) -> Third
             for k in 0..CUBES {
                 let center = Vector3::new(corner(i) + half, corner(j) + half, corner(k) + half);
                 let jet = p.evaluate(&center);
-                // Convexity: nowhere in the cube is p below its tangent plane, nor above its largest corner.
+                // Convexity: nowhere in the cube is p below its tangent plane, nor above its
+                // largest corner.
                 let lowest = jet.value - half * jet.gradient.abs().sum();
                 let corners = (0..8).map(|c| values[i + (c & 1)][j + (c >> 1 & 1)][k + (c >> 2)]);
                 let highest = corners.fold(f64::MIN, f64::max);
@@ -77,12 +81,14 @@ pub(super) fn third_ceiling(p: &Polynomial, radius: f64, absolute: f64) -> Third
             }
         }
     }
-    // Each coefficient passed through fewer than 3 * 8 * 2 roundings, on a sum bounded by the one of absolute values.
+    // Each coefficient passed through fewer than 3 * 8 * 2 roundings, on a sum bounded by the one
+    // of absolute values.
     ThirdCeiling::new((largest * (1.0 + 1e-12) + gamma(100) * absolute) * (1.0 + 1e-12), leeway)
 }
 
-/// Bound of the Frobenius norm of the third derivative at all points within `distance`, by Taylor's formula: the k-th derivative
-/// of `Σ c_e z^e` at the origin has the squared norm `Σ k! e! c_e²` over the e of degree k.
+/// Bound of the Frobenius norm of the third derivative at all points within `distance`, by Taylor's
+/// formula: the k-th derivative of `Σ c_e z^e` at the origin has the squared norm `Σ k! e! c_e²`
+/// over the e of degree k.
 fn norm_within(dense: &Dense, degree: usize, distance: f64) -> f64 {
     let mut squares = [0.0; 9];
     for a in 0..=degree {

@@ -1,8 +1,10 @@
-//! Where rays from one point run through `{p <= 1}`: chords, found from the Bernstein form of p along each ray.
+//! Where rays from one point run through `{p <= 1}`: chords, found from the Bernstein form of p
+//! along each ray.
 //!
-//! A polynomial on an interval lies between the least and the largest of its Bernstein coefficients, and has no more roots there
-//! than these change sign. Halving the interval (de Casteljau) leaves pieces that are inside, outside, or have a single
-//! crossing. Nothing is asked of the shape of the set.
+//! A polynomial on an interval lies between the least and the largest of its Bernstein
+//! coefficients, and has no more roots there than these change sign. Halving the interval (de
+//! Casteljau) leaves pieces that are inside, outside, or have a single crossing. Nothing is asked
+//! of the shape of the set.
 
 use super::dense::{Dense, dense, shifted};
 use super::{Exponents, Polynomial, monomials};
@@ -39,8 +41,8 @@ impl Chords {
         Self { parts, conversion }
     }
 
-    /// Calls `chord(from, to)` for the pieces `start + r direction`, `from <= r <= to`, of the ray up to r = `reach` where p is at
-    /// most 1, in their order; adjoining pieces come one by one.
+    /// Calls `chord(from, to)` for the pieces `start + r direction`, `from <= r <= to`, of the ray
+    /// up to r = `reach` where p is at most 1, in their order; adjoining pieces come one by one.
     pub fn along(&self, direction: &Vector3<f64>, reach: f64, chord: &mut impl FnMut(f64, f64)) {
         let degree = self.parts.len() - 1;
         let scaled = direction * reach;
@@ -91,7 +93,8 @@ fn inside(control: &mut [f64], (from, to): (f64, f64), depth: usize, chord: &mut
     inside(control, (middle, to), depth - 1, chord);
 }
 
-/// Splits Bernstein coefficients into those of the first half, in `left`, and those of the second, in place.
+/// Splits Bernstein coefficients into those of the first half, in `left`, and those of the second,
+/// in place.
 pub(super) fn halve(control: &mut [f64], left: &mut [f64]) {
     let n = control.len();
     for k in 0..n {
@@ -102,8 +105,8 @@ pub(super) fn halve(control: &mut [f64], left: &mut [f64]) {
     }
 }
 
-/// The only root in [0, 1] of a polynomial whose Bernstein coefficients change sign once: bisection made safe by the signs at
-/// the ends, sped up by Newton's method.
+/// The only root in [0, 1] of a polynomial whose Bernstein coefficients change sign once: bisection
+/// made safe by the signs at the ends, sped up by Newton's method.
 fn crossing(control: &[f64]) -> f64 {
     let rising = control[0] <= 0.0;
     let (mut low, mut high, mut t) = (0.0, 1.0, 0.5);

@@ -1,4 +1,5 @@
-//! Proof that one polynomial is at most 1 wherever some others are: multipliers and a sum of squares.
+//! Proof that one polynomial is at most 1 wherever some others are: multipliers and a sum of
+//! squares.
 //!
 //! If, as polynomials of v in R³,
 //!
@@ -6,14 +7,16 @@
 //! 1 - p(A v + a) - Σ_j τ_j(v) (1 - g_j(B v + b)) = σ(v),   σ = mᵀ Q m,  τ_j = m_jᵀ T_j m_j,
 //! ```
 //!
-//! m and m_j being all monomials up to some degree, `T_j ⪰ 0` and `Q ⪰ 0`, then p <= 1 at the image of every v at which all
-//! `g_j <= 1` at theirs; < 1 if `Q ≻ 0`. (Putinar, Indiana Univ. Math. J. 42, 1993, has the converse for p < 1: with
-//! multipliers of high enough degree there is such an identity, one of the g_j being a ball around the set.)
+//! m and m_j being all monomials up to some degree, `T_j ⪰ 0` and `Q ⪰ 0`, then p <= 1 at the image
+//! of every v at which all `g_j <= 1` at theirs; < 1 if `Q ≻ 0`. (Putinar, Indiana Univ. Math. J.
+//! 42, 1993, has the converse for p < 1: with multipliers of high enough degree there is such an
+//! identity, one of the g_j being a ball around the set.)
 //!
-//! Both affine maps, and with them the coefficients of the left side, are known to intervals only. With r_β a bound of what
-//! the matrices in floating point miss of monomial β, over all maps within, and n_β the number of positions of Q that
-//! produce β, `λ_min(Q) >= δ = √(Σ r_β²/n_β)` makes up for it, whatever the exact maps are (Peyrl and Parrilo, Theoret.
-//! Comput. Sci. 409, 2008). Nothing is assumed of the sets: neither convex nor bounded need they be.
+//! Both affine maps, and with them the coefficients of the left side, are known to intervals only.
+//! With r_β a bound of what the matrices in floating point miss of monomial β, over all maps
+//! within, and n_β the number of positions of Q that produce β, `λ_min(Q) >= δ = √(Σ r_β²/n_β)`
+//! makes up for it, whatever the exact maps are (Peyrl and Parrilo, Theoret. Comput. Sci. 409,
+//! 2008). Nothing is assumed of the sets: neither convex nor bounded need they be.
 
 use super::definite::is_positive_definite_above;
 use super::interval::Interval;
@@ -24,7 +27,8 @@ use nalgebra::DMatrix;
 /// Highest degree of the monomials of a Gram matrix.
 const HIGHEST: usize = 6;
 
-/// The Gram matrices of such an identity, on all monomials up to the degree that their size tells (1, 4, 10, 20, 35, 56, 84).
+/// The Gram matrices of such an identity, on all monomials up to the degree that their size says
+/// (1, 4, 10, 20, 35, 56, 84).
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContainmentProof {
     multipliers: Vec<DMatrix<f64>>,
@@ -74,7 +78,8 @@ pub enum NotContaining {
 }
 
 impl ContainmentProof {
-    /// A proof of these multipliers, one per constraint of the set, and the sum of squares that is left.
+    /// A proof of these multipliers, one per constraint of the set, and the sum of squares that is
+    /// left.
     ///
     /// # Errors
     /// [`NotContaining::Malformed`]: a matrix that is not square, symmetric, finite and of one of the sizes.
@@ -83,7 +88,8 @@ impl ContainmentProof {
         Ok(Self { multipliers, rest })
     }
 
-    /// The proof of the same multipliers with the matrix Q closest to `rest` that satisfies the identity up to rounding.
+    /// The proof of the same multipliers with the matrix Q closest to `rest` that satisfies the
+    /// identity up to rounding.
     ///
     /// # Errors
     /// [`NotContaining::Malformed`]: also when a product is of a higher degree than the squares.

@@ -5,10 +5,10 @@ use nalgebra::DMatrix;
 
 /// Whether `matrix - shift I` is proven positive definite; only the lower triangle is read.
 ///
-/// Rump's criterion (Verification of positive definiteness, BIT 46, 2006): subtract `shift + c`, rounded down, from the
-/// diagonal and run plain Cholesky; if it completes with positive pivots the exact matrix is positive definite, where
-/// `c >= ½ γ_{2(n+1)} tr A + 4 η n (2(n+1) + max a_ii)` bounds what the factorization can lose to rounding
-/// (`η = 2⁻¹⁰⁷⁴`).
+/// Rump's criterion (Verification of positive definiteness, BIT 46, 2006): subtract `shift + c`,
+/// rounded down, from the diagonal and run plain Cholesky; if it completes with positive pivots the
+/// exact matrix is positive definite, where `c >= ½ γ_{2(n+1)} tr A + 4 η n (2(n+1) + max a_ii)`
+/// bounds what the factorization can lose to rounding (`η = 2⁻¹⁰⁷⁴`).
 pub(super) fn is_positive_definite_above(matrix: &DMatrix<f64>, shift: f64) -> bool {
     let n = matrix.nrows();
     let diagonal_ok = (0..n).all(|i| matrix[(i, i)].is_finite() && matrix[(i, i)] > 0.0);

@@ -1,8 +1,9 @@
 //! Proof of sos-convexity: a Gram matrix of the Hessian form.
 //!
-//! A polynomial is sos-convex when `yᵀ ∇²p(z) y = wᵀ H w` for a positive semidefinite `H` and a basis `w` of monomials
-//! `y_i z^e`. A matrix in floating point matches the form only up to a residual; Peyrl and Parrilo (Theoret. Comput.
-//! Sci. 409, 2008) show how much positive definiteness pays for it.
+//! A polynomial is sos-convex when `yᵀ ∇²p(z) y = wᵀ H w` for a positive semidefinite `H` and a
+//! basis `w` of monomials `y_i z^e`. A matrix in floating point matches the form only up to a
+//! residual; Peyrl and Parrilo (Theoret. Comput. Sci. 409, 2008) show how much positive
+//! definiteness pays for it.
 
 use super::Polynomial;
 use super::definite::is_positive_definite_above;
@@ -20,7 +21,8 @@ pub struct HessianMonomial {
     pub exponents: Exponents,
 }
 
-/// A Gram matrix of `yᵀ ∇²p(z) y` on a basis of [`HessianMonomial`]s, which may be smaller than the full one.
+/// A Gram matrix of `yᵀ ∇²p(z) y` on a basis of [`HessianMonomial`]s, which may be smaller than the
+/// full one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HessianGram {
     basis: Vec<HessianMonomial>,
@@ -30,8 +32,8 @@ pub struct HessianGram {
 /// What a successful proof leaves: how far the matrix is from needing its definiteness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Margin {
-    /// Bound δ of the correction that makes the matrix match the polynomial exactly; its smallest eigenvalue is proven
-    /// to be larger.
+    /// Bound δ of the correction that makes the matrix match the polynomial exactly; its smallest
+    /// eigenvalue is proven to be larger.
     pub residual: f64,
 }
 
@@ -53,7 +55,7 @@ pub enum CertificateError {
     #[error("the certificate is malformed: {0}")]
     Malformed(String),
     /// The form has a monomial no product of two basis elements gives.
-    #[error("the certificate's basis can not express the {0}; use a larger basis")]
+    #[error("the certificate's basis cannot express the {0}; use a larger basis")]
     BasisTooSmall(String),
     /// The smallest eigenvalue does not exceed the residual.
     #[error(
@@ -100,8 +102,8 @@ impl HessianGram {
     /// A Gram matrix on a basis.
     ///
     /// # Errors
-    /// A basis that is empty, larger than 60, repeated or out of range; a matrix that is not square, symmetric, finite
-    /// and of the basis' size.
+    /// A basis that is empty, larger than 60, repeated or out of range; a matrix that is not
+    /// square, symmetric, finite and of the basis' size.
     pub fn new(basis: Vec<HessianMonomial>, matrix: DMatrix<f64>) -> Result<Self, CertificateError> {
         let malformed = |why: String| Err(CertificateError::Malformed(why));
         let n = basis.len();
@@ -128,7 +130,8 @@ impl HessianGram {
             .collect()
     }
 
-    /// The matrix closest to `matrix` (Frobenius norm) whose form matches the polynomial, up to rounding.
+    /// The matrix closest to `matrix` (Frobenius norm) whose form matches the polynomial, up to
+    /// rounding.
     ///
     /// # Errors
     /// As of [`HessianGram::new`].
@@ -181,8 +184,8 @@ impl HessianGram {
         residuals
     }
 
-    /// Proves the polynomial sos-convex from these numbers alone: `λ_min(H) >= δ = √(Σ r_β² / n_β)`, residuals bounded
-    /// with their rounding, the eigenvalue by Rump's criterion.
+    /// Proves the polynomial sos-convex from these numbers alone: `λ_min(H) >= δ = √(Σ r_β² /
+    /// n_β)`, residuals bounded with their rounding, the eigenvalue by Rump's criterion.
     ///
     /// # Errors
     /// What is missing for a proof, and by how much.
@@ -190,7 +193,8 @@ impl HessianGram {
         Margin::of(&self.matrix, self.residual(polynomial, None)?)
     }
 
-    /// Proves the sum of the polynomial and `power` sos-convex: the polynomial itself is, but for what `power` bends.
+    /// Proves the sum of the polynomial and `power` sos-convex: the polynomial itself is, but for
+    /// what `power` bends.
     ///
     /// # Errors
     /// What is missing for a proof, and by how much.
@@ -198,10 +202,12 @@ impl HessianGram {
         Margin::of(&self.matrix, self.residual(polynomial, Some(power))?)
     }
 
-    /// A proven c >= 0 with `yᵀ ∇²p(z) y >= c |y|²` for all y and z; 0 when there is none or none is found.
+    /// A proven c >= 0 with `yᵀ ∇²p(z) y >= c |y|²` for all y and z; 0 when there is none or none
+    /// is found.
     ///
-    /// `c |y|²` has the Gram matrix c E with ones where the basis has the plain components of y, so `H - c E` proves c as H
-    /// proves 0. The largest c that leaves it positive definite is the smallest eigenvalue of the Schur complement of the rest.
+    /// `c |y|²` has the Gram matrix c E with ones where the basis has the plain components of y, so
+    /// `H - c E` proves c as H proves 0. The largest c that leaves it positive definite is the
+    /// smallest eigenvalue of the Schur complement of the rest.
     pub fn curvature_floor(&self, polynomial: &Polynomial) -> f64 {
         let plain: Vec<usize> = (0..self.basis.len()).filter(|&i| self.basis[i].exponents == [0, 0, 0]).collect();
         let rest: Vec<usize> = (0..self.basis.len()).filter(|i| !plain.contains(i)).collect();

@@ -27,18 +27,22 @@ pub struct NumberJet<N> {
     pub hessian: [N; 6],
 }
 
-/// Row of the table: the ten distinct entries of `F` for one monomial, padded and aligned to the widest vectors.
+/// Row of the table: the ten distinct entries of `F` for one monomial, padded and aligned to the
+/// widest vectors.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 struct Row([f64; 16]);
 
-/// Index pairs (i, j), i <= j, of the ten distinct entries of the symmetric 4x4 matrix `F`, in table order.
+/// Index pairs (i, j), i <= j, of the ten distinct entries of the symmetric 4x4 matrix `F`, in
+/// table order.
 const ENTRIES: [(usize, usize); 10] = [(0, 0), (0, 1), (0, 2), (0, 3), (1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3)];
 
-/// The Hessian `F(z) = ∇²P(1, z)` of the homogenized polynomial `P(z0, z) = z0^k p(z / z0)`, as a table.
+/// The Hessian `F(z) = ∇²P(1, z)` of the homogenized polynomial `P(z0, z) = z0^k p(z / z0)`, as a
+/// table.
 ///
-/// By Euler's identity `∇P = F z̃ / (k - 1)` and `p = z̃ᵀ F z̃ / (k (k - 1))` with `z̃ = (1, z)`, so one product of the
-/// table with the monomials of degree at most k - 2 yields value, gradient and Hessian together.
+/// By Euler's identity `∇P = F z̃ / (k - 1)` and `p = z̃ᵀ F z̃ / (k (k - 1))` with `z̃ = (1, z)`,
+/// so one product of the table with the monomials of degree at most k - 2 yields value, gradient
+/// and Hessian together.
 #[derive(Clone, Debug)]
 pub(super) struct HessianForm {
     degree: usize,
@@ -117,7 +121,8 @@ impl WithSimd for Evaluation<'_> {
     }
 }
 
-/// The product of table and monomials with the degree known at compile time, so that every loop unrolls.
+/// The product of table and monomials with the degree known at compile time, so that every loop
+/// unrolls.
 #[inline(always)]
 fn jet<S: Simd, const DEGREE: usize, const K: usize>(simd: S, table: &[Row], z: [f64; 3]) -> NumberJet<f64> {
     let mut powers = [1.0; K];
@@ -141,7 +146,8 @@ fn jet<S: Simd, const DEGREE: usize, const K: usize>(simd: S, table: &[Row], z: 
     }
 }
 
-/// Sums over the rows k of `table[k][i] powers[k]`, for each of the ten entries i, which lie side by side in vectors.
+/// Sums over the rows k of `table[k][i] powers[k]`, for each of the ten entries i, which lie side
+/// by side in vectors.
 #[inline(always)]
 fn contract<S: Simd, const K: usize>(simd: S, table: &[Row; K], powers: &[f64; K]) -> [f64; ENTRIES.len()] {
     let mut sums = [0.0; ENTRIES.len()];

@@ -1,4 +1,5 @@
-//! Numbers that fill a vector of the processor: doubles, and singles for what needs no more than that.
+//! Numbers that fill a vector of the processor: doubles, and singles for what needs no more than
+//! that.
 
 use super::Polynomial;
 use super::hessian_form::NumberJet;
@@ -25,8 +26,9 @@ pub const MAX_LANES: usize = 8;
 /// Most lanes of singles of any processor served.
 pub const MAX_SINGLES: usize = 2 * MAX_LANES;
 
-/// Values that vectors are loaded from or stored to, none of them across two lines of the cache. A function with one among its
-/// variables aligns its stack, so that vectors that registers have no room for do not straddle lines either.
+/// Values that vectors are loaded from or stored to, none of them across two lines of the cache. A
+/// function with one among its variables aligns its stack, so that vectors that registers have no
+/// room for do not straddle lines either.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
 pub struct Aligned<T>(pub T);
@@ -38,7 +40,8 @@ pub struct Lanes<S: Simd> {
     values: S::f64s,
 }
 
-/// As many singles side by side as fit a vector: twice as many, for what more exact arithmetic takes over from.
+/// As many singles side by side as fit a vector: twice as many, for what more exact arithmetic
+/// takes over from.
 #[derive(Clone, Copy, Debug)]
 pub struct Singles<S: Simd> {
     simd: S,

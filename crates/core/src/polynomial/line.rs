@@ -15,7 +15,8 @@ const STEPS: usize = 8;
 /// What is interpolated from equidistant values on [-1, 1], for one degree.
 struct Scheme {
     nodes: [f64; MOST],
-    /// Row k: the coefficients, from the constant one on, of the polynomial that is 1 at node k and 0 at the others.
+    /// Row k: the coefficients, from the constant one on, of the polynomial that is 1 at node k and
+    /// 0 at the others.
     basis: [[f64; MOST]; 9],
 }
 
@@ -63,8 +64,8 @@ struct Line<'a> {
     level: f64,
 }
 
-/// About the first t in [-1, 1] at which f, if convex, falls to `level`; where f is lowest, of equidistant t, if at none of these it lies
-/// below. A guess: nothing is proven of it.
+/// About the first t in [-1, 1] at which f, if convex, falls to `level`; where f is lowest, of
+/// equidistant t, if at none of these it lies below. A guess: nothing is proven of it.
 pub(super) fn first_below(nested: &Nested, middle: &Vector3<f64>, half: &Vector3<f64>, level: f64) -> f64 {
     dispatch(Line { nested, middle, half, level })
 }

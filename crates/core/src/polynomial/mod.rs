@@ -1,8 +1,8 @@
-//! Polynomials of even degree 2 to 8 in three variables: evaluation, rounding bounds, proofs of sos-convexity and of
-//! containment.
+//! Polynomials of even degree 2 to 8 in three variables: evaluation, rounding bounds, proofs of
+//! sos-convexity and of containment.
 //!
-//! Pure mathematics in the normalized frame of a body (unit-free coordinates `z`); nothing here knows of metres, poses
-//! or bodies.
+//! Pure mathematics in the normalized frame of a body (unit-free coordinates `z`); nothing here
+//! knows of metres, poses or bodies.
 
 mod ceiling;
 mod chord;
@@ -53,7 +53,8 @@ pub const MAX_DEGREE: usize = 8;
 
 /// A polynomial `p(z) = Σ c_e z^e` of even degree 2, 4, 6 or 8 in three variables.
 ///
-/// Terms are held in lexicographic order of their exponents, without zeros, so that equal polynomials compare equal.
+/// Terms are held in lexicographic order of their exponents, without zeros, so that equal
+/// polynomials compare equal.
 #[derive(Clone, Debug)]
 pub struct Polynomial {
     terms: Vec<(Exponents, f64)>,
@@ -86,7 +87,8 @@ pub enum PolynomialError {
 }
 
 impl Polynomial {
-    /// Builds a polynomial from `(exponents, coefficient)` terms in any order; zero coefficients are dropped.
+    /// Builds a polynomial from `(exponents, coefficient)` terms in any order; zero coefficients
+    /// are dropped.
     ///
     /// # Errors
     /// A degree other than 2, 4, 6, 8, a coefficient that is not finite, or a repeated monomial.
@@ -121,76 +123,88 @@ impl Polynomial {
         &self.terms
     }
 
-    /// Value, gradient and Hessian at `z` in one pass (Euler's identity on the homogenized Hessian).
+    /// Value, gradient and Hessian at `z` in one pass (Euler's identity on the homogenized
+    /// Hessian).
     #[inline]
     pub fn evaluate(&self, z: &Vector3<f64>) -> Jet {
         self.form.evaluate(z)
     }
 
-    /// Value, gradient and Hessian at the points `z`, a lane each, to be inlined into work for [`dispatch`]: as
-    /// [`Polynomial::evaluate`] for one point, by nested Horner schemes for several.
+    /// Value, gradient and Hessian at the points `z`, a lane each, to be inlined into work for
+    /// [`dispatch`]: as [`Polynomial::evaluate`] for one point, by nested Horner schemes for
+    /// several.
     #[inline(always)]
     pub fn jet<S: Simd, N: Number<S>>(&self, simd: S, z: [N; 3]) -> NumberJet<N> {
         N::jet(simd, self, z)
     }
 
-    /// About the first t in [-1, 1] at which the polynomial, if convex along the line, falls to `level` at `middle + t half`; a t where it is
-    /// low if it hardly does. A guess: nothing is proven of it.
+    /// About the first t in [-1, 1] at which the polynomial, if convex along the line, falls to
+    /// `level` at `middle + t half`; a t where it is low if it hardly does. A guess: nothing is
+    /// proven of it.
     #[inline]
     pub fn first_below_along(&self, middle: &Vector3<f64>, half: &Vector3<f64>, level: f64) -> f64 {
         line::first_below(&self.nested, middle, half, level)
     }
 
-    /// Bound of `|computed value - p(z')|` over all `z'` with `|z'_i - z_i| <= dz_i`, `gradient` being the computed one.
+    /// Bound of `|computed value - p(z')|` over all `z'` with `|z'_i - z_i| <= dz_i`, `gradient`
+    /// being the computed one.
     ///
-    /// Covers every rounding of [`Polynomial::evaluate`], the rounded products of its table included.
+    /// Covers every rounding of [`Polynomial::evaluate`], the rounded products of its table
+    /// included.
     #[inline]
     pub fn value_error(&self, z: &Vector3<f64>, gradient: &Vector3<f64>, dz: &Vector3<f64>) -> f64 {
         self.absolute.value_error(z, gradient, dz)
     }
 
-    /// Bound of each component of `|computed gradient - ∇p(z')|` over all `z'` with `|z'_i - z_i| <= dz_i`.
+    /// Bound of each component of `|computed gradient - ∇p(z')|` over all `z'` with `|z'_i - z_i|
+    /// <= dz_i`.
     #[inline]
     pub fn gradient_error(&self, z: &Vector3<f64>, dz: &Vector3<f64>) -> f64 {
         self.absolute.gradient_error(z, dz)
     }
 
-    /// Upper bound of the second derivatives along unit vectors at all points with `|z_i| <= radius`.
+    /// Upper bound of the second derivatives along unit vectors at all points with `|z_i| <=
+    /// radius`.
     pub fn curvature_ceiling(&self, radius: f64) -> f64 {
         self.absolute.curvature_ceiling(radius)
     }
 
-    /// Bound of the error of computed second derivatives along unit vectors at all points with `|z_i| <= radius`.
+    /// Bound of the error of computed second derivatives along unit vectors at all points with
+    /// `|z_i| <= radius`.
     pub fn curvature_error(&self, radius: f64) -> f64 {
         self.absolute.curvature_error(radius)
     }
 
-    /// Upper bound of the third derivatives of this polynomial, which must be convex, over the points with `|z_i| <= radius` whose
-    /// values are within [`NEAR_LEVEL`] of 1.
+    /// Upper bound of the third derivatives of this polynomial, which must be convex, over the
+    /// points with `|z_i| <= radius` whose values are within [`NEAR_LEVEL`] of 1.
     pub fn third_ceiling(&self, radius: f64) -> ThirdCeiling {
         ceiling::third_ceiling(self, radius, self.absolute.third_ceiling(2.0 * radius))
     }
 
-    /// The value at `center`, up to rounding, and a proven lower bound of the values where `|z_i - center_i| <= half_i`.
+    /// The value at `center`, up to rounding, and a proven lower bound of the values where `|z_i -
+    /// center_i| <= half_i`.
     pub fn floor_within(&self, center: &Vector3<f64>, half: &Vector3<f64>) -> (f64, f64) {
         range::floor_within(self, center, half)
     }
 
-    /// How high the polynomial reaches on the triangle with these corners, and within `distance` (each coordinate) of it.
+    /// How high the polynomial reaches on the triangle with these corners, and within `distance`
+    /// (each coordinate) of it.
     ///
-    /// The proven bound is as tight as it takes to be on one side of `level`, or within a thousandth of the highest value found.
+    /// The proven bound is as tight as it takes to be on one side of `level`, or within a
+    /// thousandth of the highest value found.
     pub fn peak(&self, corners: &[Vector3<f64>; 3], distance: f64, level: f64) -> Peak {
         patch::peak(self, corners, distance, level)
     }
 
-    /// Bounds at all points with `|z_i| <= coordinate`, `|z| <= length`: tighter by a power of √3 for knowing both.
+    /// Bounds at all points with `|z_i| <= coordinate`, `|z| <= length`: tighter by a power of √3
+    /// for knowing both.
     #[inline(always)]
     pub fn growth(&self, coordinate: f64, length: f64) -> Growth {
         self.absolute.growth(coordinate, length)
     }
 
-    /// The same polynomial with `delta` added to its constant coefficient (rounded once); every other coefficient, and
-    /// with them the Hessian, stays bit-identical.
+    /// The same polynomial with `delta` added to its constant coefficient (rounded once); every
+    /// other coefficient, and with them the Hessian, stays bit-identical.
     pub fn with_constant_shifted(&self, delta: f64) -> Self {
         let mut terms = self.terms.clone();
         match terms.iter_mut().find(|term| term.0 == [0, 0, 0]) {
@@ -199,7 +213,7 @@ impl Polynomial {
         }
         terms.retain(|term| term.1 != 0.0);
         let absolute = AbsolutePolynomial::new(self.degree(), &terms);
-        // The constant enters the table only through F_00, but the table is cheap to make anew.
+        // The constant enters the table only through F_00, but the table is cheap to make again.
         let form = HessianForm::new(self.degree(), &terms);
         let nested = Nested::new(self.degree(), &terms);
         Self { terms, form, nested, absolute }

@@ -15,8 +15,8 @@ pub(crate) const fn count(degree: usize) -> usize {
 
 /// All monomials of degree at most `max_degree`, by degree, within a degree from `z1^t` to `z3^t`.
 ///
-/// Each degree's block follows from the one before: all of it times z1, its z1-free tail times z2, its last times z3.
-/// `fill` computes the values in the same order.
+/// Each degree's block follows from the one before: all of it times z1, its z1-free tail times z2,
+/// its last times z3. `fill` computes the values in the same order.
 pub fn monomials(max_degree: usize) -> Vec<Exponents> {
     let mut list = Vec::with_capacity(count(max_degree));
     for total in 0..=max_degree as u8 {
@@ -35,11 +35,11 @@ pub fn position(exponents: Exponents) -> usize {
     total * (total + 1) * (total + 2) / 6 + tail * (tail + 1) / 2 + usize::from(exponents[2])
 }
 
-/// Values of all monomials of degree at most `degree` <= 6 at `z`, in the order of [`monomials`]; `K` is their number and
-/// the first of `values` is 1 already.
+/// Values of all monomials of degree at most `degree` <= 6 at `z`, in the order of [`monomials`];
+/// `K` is their number and the first of `values` is 1 already.
 ///
-/// A monomial of degree t costs t - 1 multiplications in sequence, hence at most t - 1 roundings. With a constant degree
-/// every loop unrolls.
+/// A monomial of degree t costs t - 1 multiplications in sequence, hence at most t - 1 roundings.
+/// With a constant degree every loop unrolls.
 #[inline(always)]
 pub(super) fn fill<const K: usize>(degree: usize, z: [f64; 3], values: &mut [f64; K]) {
     debug_assert!(K == count(degree) && degree <= 6);

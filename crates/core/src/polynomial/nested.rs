@@ -1,15 +1,18 @@
 //! Value, gradient and Hessian at many points at once, a lane each, by nested Horner schemes.
 //!
-//! For one variable Horner's scheme with its derivatives is, for the coefficients c from the highest on,
+//! For one variable Horner's scheme with its derivatives is, for the coefficients c from the
+//! highest on,
 //!
 //! ```text
 //! e = e x + d,    d = d x + v,    v = v x + c
 //! ```
 //!
-//! with the value v, the slope d and half the curvature e at the end. A polynomial in three variables is one in z with
-//! coefficients that are polynomials in x and y, and these are polynomials in y with coefficients in x: value, slopes and
-//! curvatures of the inner schemes are the coefficients of the outer ones. Degree 6 takes 238 multiplications with additions
-//! where the product of [`super::hessian_form`] takes 350, but has no rows to spread over a vector for a single point.
+//! with the value v, the slope d and half the curvature e at the end. A polynomial in three
+//! variables is one in z with coefficients that are polynomials in x and y, and these are
+//! polynomials in y with coefficients in x: value, slopes and curvatures of the inner schemes are
+//! the coefficients of the outer ones. Degree 6 takes 238 multiplications with additions where the
+//! product of [`super::hessian_form`] takes 350, but has no rows to spread over a vector for a
+//! single point.
 
 use super::hessian_form::NumberJet;
 use super::monomial::{Exponents, count};
@@ -17,8 +20,8 @@ use super::number::{Constant, Number};
 use super::simd::Simd;
 use std::cmp::Ordering;
 
-/// All coefficients of a polynomial, zeros included, in the order the schemes take them: highest powers of z first, of equal ones
-/// highest powers of y, of equal ones highest powers of x.
+/// All coefficients of a polynomial, zeros included, in the order the schemes take them: highest
+/// powers of z first, of equal ones highest powers of y, of equal ones highest powers of x.
 #[derive(Clone, Debug)]
 pub(super) struct Nested {
     degree: usize,
@@ -67,7 +70,8 @@ fn step<S: Simd, N: Number<S>>(at: usize, first: usize, sum: N, x: N, next: N) -
     }
 }
 
-/// `$each` for all numbers from 0 up to a constant one of at most 8, each a constant: compilers do not unroll loops of loops.
+/// `$each` for all numbers from 0 up to a constant one of at most 8, each a constant: compilers do
+/// not unroll loops of loops.
 macro_rules! unrolled {
     ($constant:ident in 0..=$last:ident $each:block) => {
         unrolled!($constant $last $each 0 1 2 3 4 5 6 7 8)
@@ -110,7 +114,8 @@ fn in_x<S: Simd, N: Number<S>, const DEGREE: usize, const K: usize>(
     [r, r_x, r_xx]
 }
 
-/// The same of a polynomial in x and y: value, slopes, the halves of xx and yy with xy between them.
+/// The same of a polynomial in x and y: value, slopes, the halves of xx and yy with xy between
+/// them.
 #[inline(always)]
 fn in_x_y<S: Simd, N: Number<S>, const DEGREE: usize, const K: usize>(
     simd: S,
@@ -130,7 +135,8 @@ fn in_x_y<S: Simd, N: Number<S>, const DEGREE: usize, const K: usize>(
     [q, q_x, q_y, q_xx, q_xy, q_yy]
 }
 
-/// The schemes with the degree known at compile time, so that all is unrolled and nothing is computed with zeros.
+/// The schemes with the degree known at compile time, so that all is unrolled and nothing is
+/// computed with zeros.
 #[inline(always)]
 fn jet<S: Simd, N: Number<S>, const DEGREE: usize, const K: usize>(
     simd: S,

@@ -5,11 +5,12 @@ use super::rounding::gamma;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 
-/// Roundings on the way of any product into a coefficient of degree 8: 7 for the square of the norm, 11 for each further
-/// factor, 1 for c; some to spare.
+/// Roundings on the way of any product into a coefficient of degree 8: 7 for the square of the
+/// norm, 11 for each further factor, 1 for c; some to spare.
 const ROUNDINGS: usize = 80;
 
-/// The polynomial `c |linear z + offset|^degree`, expanded; every coefficient with a bound of its error.
+/// The polynomial `c |linear z + offset|^degree`, expanded; every coefficient with a bound of its
+/// error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormPower {
     terms: Vec<(Exponents, f64, f64)>,
@@ -19,7 +20,8 @@ pub struct NormPower {
 type Expansion = BTreeMap<Exponents, (f64, f64)>;
 
 impl NormPower {
-    /// Expands `factor |linear z + offset|^degree` for the numbers as they are given; `degree` is even, at most 8.
+    /// Expands `factor |linear z + offset|^degree` for the numbers as they are given; `degree` is
+    /// even, at most 8.
     pub fn new(factor: f64, linear: &Matrix3<f64>, offset: &Vector3<f64>, degree: usize) -> Self {
         let mut square = Expansion::new();
         for i in 0..3 {

@@ -19,7 +19,8 @@ impl From<f64> for Constant {
     }
 }
 
-/// Real numbers that are computed with: one double, or several doubles or singles side by side that know nothing of each other.
+/// Real numbers that are computed with: one double, or several doubles or singles side by side that
+/// know nothing of each other.
 pub trait Number<S: Simd>:
     Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
@@ -38,8 +39,8 @@ pub trait Number<S: Simd>:
     fn constant(simd: S, value: &Constant) -> Self;
     /// `self b + c`, with one rounding where that is fast and two where not.
     fn mul_add(self, b: Self, c: Self) -> Self;
-    /// One over each of two numbers, whose product is neither too large nor too small for a number. Several lanes wait for the
-    /// unit that divides: one division does for both.
+    /// One over each of two numbers, whose product is neither too large nor too small for a number.
+    /// Several lanes wait for the unit that divides: one division does for both.
     #[inline(always)]
     fn reciprocals(simd: S, [a, b]: [Self; 2]) -> [Self; 2] {
         let inverse = Self::splat(simd, 1.0) / (a * b);
@@ -61,9 +62,11 @@ pub trait Number<S: Simd>:
     fn all(simd: S, mask: Self::Mask) -> bool;
     /// `self` where the mask holds, else `other`.
     fn select(self, mask: Self::Mask, other: Self) -> Self;
-    /// Value, gradient and Hessian of the polynomial at points z, by the scheme that suits as many of them.
+    /// Value, gradient and Hessian of the polynomial at points z, by the scheme that suits as many
+    /// of them.
     fn jet(simd: S, polynomial: &Polynomial, z: [Self; 3]) -> NumberJet<Self>;
-    /// The rows of a table at whole-numbered places; the last one beyond its end, the first one for what is not a number.
+    /// The rows of a table at whole-numbered places; the last one beyond its end, the first one for
+    /// what is not a number.
     fn gather<const K: usize>(simd: S, table: &[[f64; K]], place: Self) -> [Self; K];
 }
 

@@ -1,8 +1,9 @@
 //! The highest value of a polynomial on a triangle, bounded by its Bernstein form there.
 //!
-//! On the triangle `v0 + s (v1 - v0) + t (v2 - v0)` a polynomial of degree n is `Σ b_ij B_ij(s, t)` with the Bernstein
-//! polynomials `B_ij = n!/(i! j! k!) s^i t^j (1 - s - t)^k`, k = n - i - j, which are nowhere negative and add up to 1: no value
-//! exceeds the largest `b_ij`, and those of the corners are attained. Halving the triangle (de Casteljau) brings the two together
+//! On the triangle `v0 + s (v1 - v0) + t (v2 - v0)` a polynomial of degree n is `Σ b_ij B_ij(s, t)`
+//! with the Bernstein polynomials `B_ij = n!/(i! j! k!) s^i t^j (1 - s - t)^k`, k = n - i - j,
+//! which are nowhere negative and add up to 1: no value exceeds the largest `b_ij`, and those of
+//! the corners are attained. Halving the triangle (de Casteljau) brings the two together
 //! quadratically (Farin, Triangular Bernstein-Bézier patches, CAGD 3, 1986).
 
 use super::chord::halve;
@@ -19,8 +20,8 @@ const DEPTH: usize = 60;
 /// How close a bound above the level must be to the value found, relative to 1.
 const CLOSE: f64 = 1e-3;
 
-/// Roundings into a coefficient: up to 4 for each of at most 24 steps of the Horner schemes, 60 for the Bernstein form, one for
-/// each of at most 8 averages in every halving; some to spare.
+/// Roundings into a coefficient: up to 4 for each of at most 24 steps of the Horner schemes, 60 for
+/// the Bernstein form, one for each of at most 8 averages in every halving; some to spare.
 const ROUNDINGS: usize = 200 + 8 * DEPTH;
 
 /// How high a polynomial reaches.
@@ -39,7 +40,8 @@ type Net = [[f64; 9]; 9];
 struct Patch {
     net: Net,
     most: f64,
-    /// Barycentric places of the corners v0 (s = t = 0), v1 (s = 1) and v2 (t = 1), all but v0's share.
+    /// Barycentric places of the corners v0 (s = t = 0), v1 (s = 1) and v2 (t = 1), all but v0's
+    /// share.
     corners: [[f64; 2]; 3],
     depth: usize,
 }
@@ -69,7 +71,8 @@ pub(super) fn peak(p: &Polynomial, corners: &[Vector3<f64>; 3], distance: f64, l
     let degree = p.degree();
     let [v0, v1, v2] = corners;
     let (e1, e2) = (v1 - v0, v2 - v0);
-    // What rounds is a sum of products of absolute values, at most |p| where all coordinates are as large as this.
+    // What rounds is a sum of products of absolute values, at most |p| where all coordinates are as
+    // large as this.
     let reach = (v0.abs() + e1.abs() + e2.abs()).amax() * (1.0 + 4.0 * f64::EPSILON) + distance;
     let (magnitude, slope) = p.absolute.magnitude(reach);
     let slack = (gamma(ROUNDINGS) * magnitude + slope * distance) * (1.0 + 1e-13);
@@ -106,7 +109,8 @@ impl Patch {
         self.net[0][0].max(self.net[degree][0]).max(self.net[0][degree])
     }
 
-    /// The two halves by the longest edge; `gram` are the products of the edges of the first triangle.
+    /// The two halves by the longest edge; `gram` are the products of the edges of the first
+    /// triangle.
     fn halves(self, degree: usize, gram: &[[f64; 2]; 2]) -> [Self; 2] {
         let square = |a: usize, b: usize| {
             let d: [f64; 2] = std::array::from_fn(|i| self.corners[b][i] - self.corners[a][i]);
@@ -149,14 +153,16 @@ fn turned(net: &Net, degree: usize) -> Net {
     let mut result = [[0.0; 9]; 9];
     for i in 0..=degree {
         for j in 0..=degree - i {
-            // i belongs to the new v1, which was v2, j to the new v2, which was v0, and the rest to what was v1.
+            // i belongs to the new v1, which was v2, j to the new v2, which was v0, and the rest to
+            // what was v1.
             result[i][j] = net[degree - i - j][i];
         }
     }
     result
 }
 
-/// Coefficients of `s^i t^j` of `p(v0 + s e1 + t e2)`: nested Horner schemes in x, y and z, each a polynomial of s and t.
+/// Coefficients of `s^i t^j` of `p(v0 + s e1 + t e2)`: nested Horner schemes in x, y and z, each a
+/// polynomial of s and t.
 fn on_triangle(p: &Polynomial, v0: &Vector3<f64>, e1: &Vector3<f64>, e2: &Vector3<f64>) -> Net {
     let degree = p.degree();
     let all = super::dense::dense(p.terms());

@@ -4,11 +4,13 @@ use super::dense::{dense, shifted};
 use super::{Polynomial, gamma};
 use nalgebra::Vector3;
 
-/// Roundings on the way into the bound: 16 in each of three shifts, 9 for a term, 165 for their sum; some to spare.
+/// Roundings on the way into the bound: 16 in each of three shifts, 9 for a term, 165 for their
+/// sum; some to spare.
 const ROUNDINGS: usize = 300;
 
-/// Value at the centre, up to rounding, and lower bound of p over the box `|z_i - center_i| <= half_i`: with `p(center + δ) = Σ c_e δ^e`, squares do not go below 0, and
-/// other terms not below `-|c_e| half^e`. The bound is short by O(half²).
+/// Value at the centre, up to rounding, and lower bound of p over the box `|z_i - center_i| <=
+/// half_i`: with `p(center + δ) = Σ c_e δ^e`, squares do not go below 0, and other terms not below
+/// `-|c_e| half^e`. The bound is short by O(half²).
 pub(super) fn floor_within(p: &Polynomial, center: &Vector3<f64>, half: &Vector3<f64>) -> (f64, f64) {
     let degree = p.degree();
     let mut here = dense(p.terms());

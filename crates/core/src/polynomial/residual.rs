@@ -1,4 +1,5 @@
-//! What a polynomial form has beyond that of a Gram matrix, monomial by monomial, rounding included.
+//! What a polynomial form has beyond that of a Gram matrix, monomial by monomial, rounding
+//! included.
 
 use super::gram::CertificateError;
 use super::rounding::gamma;
@@ -30,8 +31,8 @@ impl BoundedSum {
     }
 }
 
-/// Per monomial β: its coefficient r_β in the form minus that of the Gram matrix, and the number n_β of ordered positions of the
-/// matrix that produce β.
+/// Per monomial β: its coefficient r_β in the form minus that of the Gram matrix, and the number
+/// n_β of ordered positions of the matrix that produce β.
 #[derive(Default)]
 pub(super) struct Residuals<K>(BTreeMap<K, (BoundedSum, usize)>);
 
@@ -52,8 +53,8 @@ impl<K: Ord + Copy> Residuals<K> {
         }
     }
 
-    /// Spreads every residual evenly over the positions of the matrix that produce its monomial: the nearest matrix (Frobenius
-    /// norm) that matches the form, up to rounding.
+    /// Spreads every residual evenly over the positions of the matrix that produce its monomial:
+    /// the nearest matrix (Frobenius norm) that matches the form, up to rounding.
     pub(super) fn close(&self, matrix: &mut DMatrix<f64>, key: impl Fn(usize, usize) -> K) {
         for i in 0..matrix.nrows() {
             for j in 0..matrix.ncols() {

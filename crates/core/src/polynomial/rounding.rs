@@ -1,13 +1,15 @@
 //! Bounds of the rounding error of an evaluation, by the polynomial of absolute coefficients.
 //!
-//! Every quantity [`super::Polynomial::evaluate`] returns is a sum of products of coefficients and coordinates, and each
-//! product passes through at most `M` roundings: 1 for its table entry, at most k - 3 for its monomial, 1 for the
-//! product of the two, K for the accumulation over the K monomials, then 4 for a row of `F z̃`, 4 for the product with
-//! `z̃`, and 3 for the division by k (k - 1), so `M = K + k + 10`; in the nested schemes for many points at most 2 for each
-//! power of a coordinate and 3 for the three additions, which is less. Hence (Higham, Accuracy and Stability of Numerical
-//! Algorithms, section 3.1) the error is at most `γ_M` times the same expression with absolute values, which by Euler's
-//! identity is exactly `Σ |c_e| |z^e|`. With `r = max |z_i|` that is at most `Q(r) = Σ_j C_j r^j`, `C_j` the sum of
-//! `|c_e|` over degree j: one Horner scheme, valid everywhere. Derivatives of Q bound those of p in the same way.
+//! Every quantity [`super::Polynomial::evaluate`] returns is a sum of products of coefficients and
+//! coordinates, and each product passes through at most `M` roundings: 1 for its table entry, at
+//! most k - 3 for its monomial, 1 for the product of the two, K for the accumulation over the K
+//! monomials, then 4 for a row of `F z̃`, 4 for the product with `z̃`, and 3 for the division by k
+//! (k - 1), so `M = K + k + 10`; in the nested schemes for many points at most 2 for each power of
+//! a coordinate and 3 for the three additions, which is less. Hence (Higham, Accuracy and Stability
+//! of Numerical Algorithms, section 3.1) the error is at most `γ_M` times the same expression with
+//! absolute values, which by Euler's identity is exactly `Σ |c_e| |z^e|`. With `r = max |z_i|` that
+//! is at most `Q(r) = Σ_j C_j r^j`, `C_j` the sum of `|c_e|` over degree j: one Horner scheme,
+//! valid everywhere. Derivatives of Q bound those of p in the same way.
 
 use super::monomial::{Exponents, count, degree_of};
 use nalgebra::Vector3;
@@ -18,15 +20,15 @@ pub const fn gamma(m: usize) -> f64 {
     mu / (1.0 - mu) * (1.0 + 4.0 * f64::EPSILON)
 }
 
-/// Slack for products that underflow: fewer than 2¹⁰ operations lose at most 2⁻¹⁰⁷⁵ each, and what follows multiplies
-/// that loss by at most `56 (1 + max |c|) max(1, r)^k`.
+/// Slack for products that underflow: fewer than 2¹⁰ operations lose at most 2⁻¹⁰⁷⁵ each, and what
+/// follows multiplies that loss by at most `56 (1 + max |c|) max(1, r)^k`.
 const UNDERFLOW: f64 = 1e-300;
 
 /// How large a polynomial and its derivatives may be near a point, and how wrong when computed.
 #[derive(Clone, Copy, Debug)]
 pub struct Growth {
-    /// Bound of the error of a computed value, and of `value + gradient·δ + ½ δᵀHδ` computed at one point as what Taylor's
-    /// formula says, for δ that lead no farther than the bounds hold.
+    /// Bound of the error of a computed value, and of `value + gradient·δ + ½ δᵀHδ` computed at one
+    /// point as what Taylor's formula says, for δ that lead no farther than the bounds hold.
     pub value_error: f64,
     /// The same of a component of the gradient, and of `gradient + Hδ`.
     pub gradient_error: f64,
@@ -60,7 +62,8 @@ impl AbsolutePolynomial {
             by_degree[degree_of(exponents)] += coefficient.abs();
             squares[degree_of(exponents)] += coefficient * coefficient * factorials;
         }
-        // Σ over e of degree j of j! e! c_e² is the squared Frobenius norm of the derivative of order j.
+        // Σ over e of degree j of j! e! c_e² is the squared Frobenius norm of the derivative of
+        // order j.
         let third = std::array::from_fn(|j| (squares[j + 3] * factorial(j + 3)).sqrt() / factorial(j) * (1.0 + 1e-13));
         // The sums, Horner's scheme and the arithmetic of the bounds below round too: fewer than 2 * 165 + 64 steps,
         // which only scale the bound by 1 + γ and are covered by counting 2 roundings more.
@@ -80,7 +83,8 @@ impl AbsolutePolynomial {
         (q, dq, 2.0 * half_ddq)
     }
 
-    /// Bound of the values of p with absolute coefficients, and of the sum of its slopes, where `|z_i| <= r`.
+    /// Bound of the values of p with absolute coefficients, and of the sum of its slopes, where
+    /// `|z_i| <= r`.
     pub(super) fn magnitude(&self, r: f64) -> (f64, f64) {
         let (q, dq, _) = self.jet(r);
         (q * (1.0 + 1e-13) + self.underflow(r), dq * (1.0 + 1e-13) + self.underflow(r))
@@ -96,26 +100,27 @@ impl AbsolutePolynomial {
     pub(super) fn value_error(&self, z: &Vector3<f64>, gradient: &Vector3<f64>, dz: &Vector3<f64>) -> f64 {
         let (r, d) = (z.amax(), dz.amax());
         let (q, dq, ddq) = self.jet(r + d);
-        // Taylor along dz: the exact first derivative differs from the computed one by at most γ Q'.
+        // Taylor along dz: the exact first derivative differs from the computed one by at most γ
+        // Q'.
         let first = gradient.abs().dot(dz) + 3.0 * d * self.gamma * dq;
         let second = 0.5 * ddq * d * d;
         (self.gamma * q + first + second) * (1.0 + 1e-13) + self.underflow(r)
     }
 
-    /// Bound of second derivatives along unit vectors within `|z_i| <= r`: along the largest component Q'' bounds them, and
-    /// no component of a unit vector exceeds 1.
+    /// Bound of second derivatives along unit vectors within `|z_i| <= r`: along the largest
+    /// component Q'' bounds them, and no component of a unit vector exceeds 1.
     pub(super) fn curvature_ceiling(&self, r: f64) -> f64 {
         self.jet(r).2 * (1.0 + 1e-13) + self.underflow(r)
     }
 
-    /// Bound of the error of second derivatives along unit vectors within `|z_i| <= r`, the Hessian's entries being sums of
-    /// fewer roundings than values.
+    /// Bound of the error of second derivatives along unit vectors within `|z_i| <= r`, the
+    /// Hessian's entries being sums of fewer roundings than values.
     pub(super) fn curvature_error(&self, r: f64) -> f64 {
         3.0 * self.gamma * self.curvature_ceiling(r)
     }
 
-    /// Bound of the Frobenius norm of the third derivative within `|z_i| <= r`: none of its 27 entries exceeds the third
-    /// derivative of Q.
+    /// Bound of the Frobenius norm of the third derivative within `|z_i| <= r`: none of its 27
+    /// entries exceeds the third derivative of Q.
     pub(super) fn third_ceiling(&self, r: f64) -> f64 {
         let mut third = 0.0;
         for (k, &c) in self.by_degree.iter().enumerate().skip(3).rev() {
@@ -126,9 +131,9 @@ impl AbsolutePolynomial {
 
     /// Bounds where `|z_i| <= coordinate`, `|z| <= length`.
     ///
-    /// With both point and step in that range, the sums of absolute values of Taylor's formula are at most `Q` there. `Q`
-    /// bounds its own derivatives: `r Q'(r) <= k Q(r)`. The third derivative of the terms of degree j is a tensor applied
-    /// j - 3 times to z.
+    /// With both point and step in that range, the sums of absolute values of Taylor's formula are
+    /// at most `Q` there. `Q` bounds its own derivatives: `r Q'(r) <= k Q(r)`. The third derivative
+    /// of the terms of degree j is a tensor applied j - 3 times to z.
     #[inline(always)]
     pub(super) fn growth(&self, coordinate: f64, length: f64) -> Growth {
         let q = self.by_degree.iter().rev().fold(0.0, |sum, &c| sum * coordinate + c);
@@ -175,7 +180,8 @@ mod tests {
                 let (from, to) = (p.evaluate(&z), p.evaluate(&end));
                 let length = step.norm();
                 let slack = 2.0 * growth.value_error;
-                // Hessians differ by at most the third derivative times the length; gradients and values by its integrals.
+                // Hessians differ by at most the third derivative times the length; gradients and
+                // values by its integrals.
                 let change = (to.hessian - from.hessian).symmetric_eigenvalues().amax();
                 assert!(change <= growth.third * length + 2.0 * growth.curvature_error, "seed {seed}");
                 let bent = from.hessian * step;

@@ -1,15 +1,16 @@
 //! The arithmetic of the processor at hand, chosen when the program runs.
 //!
-//! Work for [`dispatch`] and [`dispatch_lanes`] is compiled up to three times by `pulp`: for any processor, for AVX2 with fused
-//! multiply-add, and for AVX-512. Everything it calls has to be inlined into it to profit. Results differ between the versions
-//! only within the rounding bounds, which count the roundings of the plain one.
+//! Work for [`dispatch`] and [`dispatch_lanes`] is compiled up to three times by `pulp`: for any
+//! processor, for AVX2 with fused multiply-add, and for AVX-512. Everything it calls has to be
+//! inlined into it to profit. Results differ between the versions only within the rounding bounds,
+//! which count the roundings of the plain one.
 
 use std::sync::LazyLock;
 
 pub use pulp::{Arch, Scalar, Simd, WithSimd};
 
-/// The widest arithmetic of this processor, or less if the environment variable `SUBLEVEL_SIMD` asks for `avx2` or `baseline`, to
-/// compare them. Any other value is as none.
+/// The widest arithmetic of this processor, or less if the environment variable `SUBLEVEL_SIMD`
+/// asks for `avx2` or `baseline`, to compare them. Any other value is as none.
 static WIDEST: LazyLock<Arch> = LazyLock::new(|| match std::env::var("SUBLEVEL_SIMD").as_deref() {
     Ok("baseline") => Arch::Scalar,
     Ok("avx2") => at_most_avx2(Arch::new()),
@@ -45,9 +46,10 @@ pub fn dispatch_lanes<T: WithSimd>(work: T) -> T::Output {
     WIDEST.dispatch(work)
 }
 
-/// Does work on single numbers, or on lanes now and then, with AVX2 where the processor has it: among scalar instructions those
-/// of AVX-512 cost more than they save, for while one of them is under way a port less takes all others. The searches of
-/// penetration depths, lanes between scalar work, are 4 % faster so.
+/// Does work on single numbers, or on lanes now and then, with AVX2 where the processor has it:
+/// among scalar instructions those of AVX-512 cost more than they save, for while one of them is
+/// under way a port less takes all others. The searches of penetration depths, lanes between scalar
+/// work, are 4 % faster so.
 #[inline(always)]
 pub fn dispatch<T: WithSimd>(work: T) -> T::Output {
     SUITED.dispatch(work)

@@ -1,7 +1,7 @@
 //! Proof that a polynomial is a sum of squares: a Gram matrix of the polynomial itself.
 //!
-//! As of a Hessian form (`gram`), with the monomials of half the degree for a basis: `p = mᵀ P m` with P definite beyond the
-//! residual of floating point.
+//! As of a Hessian form (`gram`), with the monomials of half the degree for a basis: `p = mᵀ P m`
+//! with P definite beyond the residual of floating point.
 
 use super::Polynomial;
 use super::definite::is_positive_definite_above;
@@ -21,8 +21,8 @@ impl SosGram {
     /// A Gram matrix on a basis.
     ///
     /// # Errors
-    /// A basis that is empty, repeated or has monomials above degree 4; a matrix that is not square, symmetric, finite and of the
-    /// basis' size.
+    /// A basis that is empty, repeated or has monomials above degree 4; a matrix that is not
+    /// square, symmetric, finite and of the basis' size.
     pub fn new(basis: Vec<Exponents>, matrix: DMatrix<f64>) -> Result<Self, CertificateError> {
         let malformed = |why: String| Err(CertificateError::Malformed(why));
         if basis.is_empty() {
@@ -40,7 +40,8 @@ impl SosGram {
         Ok(Self { basis, matrix })
     }
 
-    /// The matrix closest to `matrix` (Frobenius norm) whose form matches the polynomial, up to rounding.
+    /// The matrix closest to `matrix` (Frobenius norm) whose form matches the polynomial, up to
+    /// rounding.
     ///
     /// # Errors
     /// As of [`SosGram::new`].
@@ -72,9 +73,11 @@ impl SosGram {
         Margin::of(&self.matrix, self.residual(polynomial)?)
     }
 
-    /// A proven ρ >= 0 with `p(z) >= ρ (z^e)²` for all z, e being an element of the basis; 0 when there is none or none is found.
+    /// A proven ρ >= 0 with `p(z) >= ρ (z^e)²` for all z, e being an element of the basis; 0 when
+    /// there is none or none is found.
     ///
-    /// `P - ρ E` with a single one in E proves ρ as P proves 0. The largest that leaves it positive definite is `1/(P⁻¹)_ee`.
+    /// `P - ρ E` with a single one in E proves ρ as P proves 0. The largest that leaves it positive
+    /// definite is `1/(P⁻¹)_ee`.
     pub fn floor(&self, polynomial: &Polynomial, e: Exponents) -> f64 {
         let (Some(i), Ok(residual)) = (self.basis.iter().position(|&b| b == e), self.residual(polynomial)) else {
             return 0.0;
@@ -141,7 +144,8 @@ mod tests {
             for degree in [2, 4, 6, 8] {
                 let (p, gram) = random(seed, degree);
                 assert!(gram.prove(&p).is_ok(), "seed {seed}, degree {degree}");
-                // A constant that the matrix does not give: its least eigenvalue pays for less than that.
+                // A constant that the matrix does not give: its least eigenvalue pays for less than
+                // that.
                 let least = gram.matrix().symmetric_eigenvalues().min();
                 assert!(gram.prove(&p.with_constant_shifted(-0.9 * least)).is_ok());
                 let other = p.with_constant_shifted(-1.1 * least);

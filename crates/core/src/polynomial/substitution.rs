@@ -91,7 +91,8 @@ mod tests {
         power(&v[0], e[0]) * power(&v[1], e[1]) * power(&v[2], e[2])
     }
 
-    /// The exact value must lie between the polynomials of lower and of upper coefficients, at points with v >= 0.
+    /// The exact value must lie between the polynomials of lower and of upper coefficients, at
+    /// points with v >= 0.
     #[test]
     fn exact_values_lie_between_those_of_the_bounds() {
         for seed in 0..24 {

@@ -128,7 +128,8 @@ fn bad_terms_are_refused() {
     assert!(matches!(Polynomial::new(vec![(square(0), f64::NAN)]), Err(PolynomialError::NotFinite { index: 0, .. })));
 }
 
-/// Σ (q_r · z̃)^2k is sos-convex; its Hessian form has a Gram matrix Σ w wᵀ, definite with enough terms.
+/// Σ (q_r · z̃)^2k is sos-convex; its Hessian form has a Gram matrix Σ w wᵀ, definite with enough
+/// terms.
 fn sum_of_powers(random: &mut Seeded, degree: usize, count: usize) -> (Polynomial, DMatrix<f64>) {
     let half = degree / 2;
     let basis = HessianGram::full_basis(degree);
@@ -154,8 +155,8 @@ fn sum_of_powers(random: &mut Seeded, degree: usize, count: usize) -> (Polynomia
             basis.iter().map(|b| scale * q[1 + usize::from(b.direction)] * value(half - 1, b.exponents)).collect();
         matrix += DMatrix::from_fn(w.len(), w.len(), |i, j| w[i] * w[j]);
     }
-    // The powers span only part of the basis; |z|^2j, j = 1..d, with the diagonal matrix of 2j |z|^2(j-1) |y|² and the
-    // rank-one squares of (z·y) covers the rest.
+    // The powers span only part of the basis; |z|^2j, j = 1..d, with the diagonal matrix of 2j
+    // |z|^2(j-1) |y|² and the rank-one squares of (z·y) covers the rest.
     for j in 1..=half {
         let multinomial_of =
             |e: Exponents| factorial(degree_of(e)) / e.iter().map(|&k| factorial(usize::from(k))).product::<f64>();

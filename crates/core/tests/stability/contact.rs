@@ -16,8 +16,8 @@ fn gaps(offset: f64) -> Vec<f64> {
     gaps
 }
 
-/// Kissing contact, sub-epsilon gap: sphere-E, Q8-Q8 coaxial, gap 0, ±1 ulp(L) .. ±1e-2: monotone, error <= 1e-12, normal
-/// continuous.
+/// Kissing contact, sub-epsilon gap: sphere-E, Q8-Q8 coaxial, gap 0, ±1 ulp(L) .. ±1e-2: monotone,
+/// error <= 1e-12, normal continuous.
 #[test]
 fn family_01_kissing_contact() {
     let pairs = [
@@ -115,8 +115,8 @@ fn family_08_normal_at_contact() {
     }
 }
 
-/// Nearly parallel flats, tight tolerance: Q8/P8 faces, tilt 1e-12..1e-2, tolerance 1e-4..1e-14: error falls to the stated
-/// rounding floor, beyond it the status says the bracket is still wide.
+/// Nearly parallel flats, tight tolerance: Q8/P8 faces, tilt 1e-12..1e-2, tolerance 1e-4..1e-14:
+/// error falls to the stated rounding floor, beyond it the status says the bracket is still wide.
 #[test]
 fn family_13_parallel_flats() {
     let pairs =
@@ -144,8 +144,8 @@ fn family_13_parallel_flats() {
     }
 }
 
-/// Stopping on small progress: Q8 tip against Q8 flat (linear-rate Newton): accept by bracket only. Witnesses are certified, on
-/// the surfaces and as far apart as the answer says, never matched.
+/// Stopping on small progress: Q8 tip against Q8 flat (linear-rate Newton): accept by bracket only.
+/// Witnesses are certified, on the surfaces and as far apart as the answer says, never matched.
 #[test]
 fn family_14_small_progress() {
     let tips = [q(8, 0.1, 0.1, 1.0), q(8, 0.01, 0.02, 1.0), q(6, 0.05, 0.05, 1.0), q(4, 0.1, 0.05, 1.0)];
@@ -169,7 +169,8 @@ fn family_14_small_progress() {
                     let inside = |body: &Body, pose: &Pose, w: &Vector3<f64>| {
                         body.value(&pose.rotation().inverse_transform_vector(&(w - pose.translation())))
                     };
-                    // A coordinate's rounding moves the value of the thinnest body by 8 of its relative errors.
+                    // A coordinate's rounding moves the value of the thinnest body by 8 of its
+                    // relative errors.
                     let thin = 1e-16 * 8.0 / 0.01 * 4.0;
                     assert!(inside(flat, &Pose::identity(), &answer.witness_a) <= 1.0 + thin, "{label}");
                     assert!(inside(tip, &pose, &answer.witness_b) <= 1.0 + thin, "{label}");

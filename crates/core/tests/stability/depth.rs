@@ -9,14 +9,15 @@ use sublevel_testkit::bodies::{Placed, b, c, cylinder, e, q, support, zoo};
 use sublevel_testkit::random::{Seeded, draws, few_or, pose};
 use sublevel_testkit::reference;
 
-/// How far the first body has to move along n until a plane across n parts the bodies: the support functions in closed form.
+/// How far the first body has to move along n until a plane across n parts the bodies: the support
+/// functions in closed form.
 fn depth_along((a, pose_a): Placed<'_>, (b, pose_b): Placed<'_>, n: &Vector3<f64>) -> f64 {
     let own = |pose: &Pose, n: &Vector3<f64>| pose.rotation().inverse_transform_vector(n);
     n.dot(&(pose_b.translation() - pose_a.translation())) + support(a, &-own(pose_a, n)) + support(b, &own(pose_b, n))
 }
 
-/// The least depth that a search without derivatives finds from many directions: an upper bound of the truth, and next to it
-/// but for bodies with edges.
+/// The least depth that a search without derivatives finds from many directions: an upper bound of
+/// the truth, and next to it but for bodies with edges.
 fn shortest(a: Placed<'_>, b: Placed<'_>) -> (f64, Vector3<f64>) {
     const COUNT: usize = 1500;
     let depth = |n: &Vector3<f64>| depth_along(a, b, n);
@@ -62,8 +63,9 @@ fn signed(a: Placed<'_>, b: Placed<'_>, options: &Options<'_>, warm: &mut WarmSt
     answer
 }
 
-/// Holds a signed distance of overlapping bodies against the closed supports: no direction is better than its upper bound,
-/// and its own direction is as good as its lower one. Untied, it is no worse than any other by more than its accuracy.
+/// Holds a signed distance of overlapping bodies against the closed supports: no direction is
+/// better than its upper bound, and its own direction is as good as its lower one. Untied, it is no
+/// worse than any other by more than its accuracy.
 fn hold(a: Placed<'_>, b: Placed<'_>, answer: &SignedDistance, label: &str) {
     let floor = 1e-13 * large(a.0, b.0);
     let (least, along) = shortest(a, b);
@@ -76,9 +78,11 @@ fn hold(a: Placed<'_>, b: Placed<'_>, answer: &SignedDistance, label: &str) {
     }
 }
 
-/// Deep penetration: slide from touching to concentric: continuous, monotone, conditioning reported.
+/// Deep penetration: slide from touching to concentric: continuous, monotone, conditioning
+/// reported.
 ///
-/// About their centres the bodies are their own mirror images: then the signed distance along a slide is convex and even.
+/// About their centres the bodies are their own mirror images: then the signed distance along a
+/// slide is convex and even.
 #[test]
 fn family_16_deep_penetration() {
     let bodies = [
@@ -170,9 +174,11 @@ fn touching(depth: impl Fn(f64) -> f64) -> f64 {
     inside
 }
 
-/// Level distance reported as depth: the seed inside the other body: saturation flagged, growth distance still informative.
+/// Level distance reported as depth: the seed inside the other body: saturation flagged, growth
+/// distance still informative.
 ///
-/// Along a ray from the common centre the growth distance is the gauge of one set: exactly proportional to the offset.
+/// Along a ray from the common centre the growth distance is the gauge of one set: exactly
+/// proportional to the offset.
 #[test]
 fn family_27_level_distance_as_depth() {
     let zoo = zoo();

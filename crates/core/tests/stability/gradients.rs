@@ -11,10 +11,12 @@ use sublevel_testkit::random::{Seeded, draws, pose, replayed, seeds, shifted, tu
 use sublevel_testkit::reference;
 use sublevel_testkit::reference::big::{Big, double};
 
-/// Largest error of a gradient, relative to its norm, angular parts divided by the circumradius of the body that turns.
+/// Largest error of a gradient, relative to its norm, angular parts divided by the circumradius of
+/// the body that turns.
 const ERROR: f64 = 1e-6;
 
-/// Signed gaps of the draws, relative to the smaller body: far, near, grazing, touching, overlapping.
+/// Signed gaps of the draws, relative to the smaller body: far, near, grazing, touching,
+/// overlapping.
 const GAPS: [f64; 14] = [300.0, 10.0, 1.0, 0.1, 1e-2, 1e-4, 1e-6, 1e-8, 0.0, -1e-8, -1e-6, -1e-4, -1e-2, -0.1];
 
 /// Error of a gradient as [`ERROR`] is.
@@ -25,15 +27,17 @@ fn deviation(found: &[Twist; 2], truth: &[f64; 12], (a, b): (&Body, &Body)) -> f
     (sum(&|k| parts[k / 3][k % 3] - truth[k]) / sum(&|k| truth[k])).sqrt()
 }
 
-/// Steps to look around a kink by, and how far from it a pose may be that brackets do not tell from it; relative to the smaller body.
+/// Steps to look around a kink by, and how far from it a pose may be that brackets do not tell from
+/// it; relative to the smaller body.
 const AROUND: f64 = 1e-7;
 const ROUNDED: f64 = 1e-11;
 
 /// Widest bracket of values to look around by.
 const SHARP: f64 = 1e-25;
 
-/// Whether a gradient at a kink, where edges touch, is one of those between that of one side and that of the other: along no twist
-/// does the value grow by less than it says. Values of 200 bits by poses.
+/// Whether a gradient at a kink, where edges touch, is one of those between that of one side and
+/// that of the other: along no twist does the value grow by less than it says. Values of 200 bits
+/// by poses.
 fn is_subgradient(draw: &Draw<'_>, found: &[Twist; 2], value: impl Fn(&Pose, &Pose) -> Big) -> bool {
     let edged = draw.a.constraints().len() > 1 || draw.b.constraints().len() > 1;
     if draw.gap != 0.0 || !edged {
@@ -164,8 +168,9 @@ fn family_20_distance_gradients() {
     tally.verdict(300);
 }
 
-/// The same where the answer is that of one of several parts, whose bracket was narrowed while another one's was known, and where it
-/// was asked for within a margin: bodies with edges, whose brackets do not tell the normal.
+/// The same where the answer is that of one of several parts, whose bracket was narrowed while
+/// another one's was known, and where it was asked for within a margin: bodies with edges, whose
+/// brackets do not tell the normal.
 #[test]
 fn family_20_gradients_of_parts_and_within_margins() {
     let zoo = zoo();
@@ -307,8 +312,8 @@ fn family_20_signed_gradients() {
 /// Whether an answer flags a tie, and its normal.
 type Flagged = (bool, Vector3<f64>);
 
-/// Ties and switching gradients: symmetric poses: two ways out of a box, across a plate, along mirror planes. The flag is set
-/// where they are equally short, and wherever the normal jumps.
+/// Ties and switching gradients: symmetric poses: two ways out of a box, across a plate, along
+/// mirror planes. The flag is set where they are equally short, and wherever the normal jumps.
 #[test]
 fn family_21_ties_and_switching_gradients() {
     let balls = [e(0.2, 0.2, 0.2), q(4, 0.3, 0.2, 0.25), b(0.3, 0.2, 0.25), q(8, 0.2, 0.3, 0.2)];
@@ -337,7 +342,8 @@ fn family_21_ties_and_switching_gradients() {
         // At the common centre every way out has its mirror image.
         let (tied, _) = solve(Vector3::zeros(), &mut WarmStart::default(), &format!("seed {seed} concentric"));
         assert!(tied, "seed {seed} {}-{}: concentric and not flagged", a.name(), host.name());
-        // Mirror planes of the pair between two of its ways out: through the centre, and across a diagonal of cubes.
+        // Mirror planes of the pair between two of its ways out: through the centre, and across a
+        // diagonal of cubes.
         let from = Vector3::from_fn(|_, _| 0.3 * random.signed());
         let mirrored = Vector3::new(-from.x, from.y, from.z);
         let label = format!("seed {seed} {}-{} from {from:?}", a.name(), host.name());
@@ -349,8 +355,8 @@ fn family_21_ties_and_switching_gradients() {
     assert!(jumps >= 20, "only {jumps} jumps were met");
 }
 
-/// Follows a line from one point to another in small steps, and narrows down each jump of the normal until a flag is met;
-/// returns the number of jumps.
+/// Follows a line from one point to another in small steps, and narrows down each jump of the
+/// normal until a flag is met; returns the number of jumps.
 fn jumps_are_flagged(
     from: &Vector3<f64>,
     to: &Vector3<f64>,
@@ -379,8 +385,8 @@ fn jumps_are_flagged(
     jumps
 }
 
-/// Minimum over pairs: the gradient of a distance of compounds is that of its closest parts wherever those are closest by more
-/// than the accuracy, and the value goes on where they change.
+/// Minimum over pairs: the gradient of a distance of compounds is that of its closest parts
+/// wherever those are closest by more than the accuracy, and the value goes on where they change.
 #[test]
 fn family_21_minimum_over_pairs() {
     let mut changes = 0;

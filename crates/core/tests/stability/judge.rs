@@ -16,7 +16,8 @@ pub(crate) fn large(a: &Body, b: &Body) -> f64 {
     a.circumscribed().radius.max(b.circumscribed().radius)
 }
 
-/// A cold distance, checked without a reference: the status is what the bracket says, the numbers are numbers, the caps hold.
+/// A cold distance, checked without a reference: the status is what the bracket says, the numbers
+/// are numbers, the caps hold.
 pub(crate) fn plain((a, pose_a): Placed<'_>, (b, pose_b): Placed<'_>, options: &Options<'_>, label: &str) -> Distance {
     warm((a, pose_a), (b, pose_b), options, &mut WarmStart::default(), label)
 }
@@ -82,7 +83,8 @@ pub(crate) fn judged_level(
     let narrow = answer.upper - answer.lower <= options.accuracy() * answer.upper.abs().max(1.0) * (1.0 + 1e-12);
     assert!(narrow || answer.status == Status::BracketWide, "claims to have converged, {label}");
     assert!(answer.iterations <= options.max_iterations().min(MAX_ITERATIONS), "exceeds its limit, {label}");
-    // A thousandth of what it is compared to; at minimisers where all is flat, 200 bits get no farther.
+    // A thousandth of what it is compared to; at minimisers where all is flat, 200 bits get no
+    // farther.
     let sharp = 1e-3 * DEFAULT_ACCURACY * truth.value().abs().max(1.0);
     assert!(truth.width() <= sharp, "the reference is wide, {:e}, {label}", truth.width());
     assert!(truth.inside(&answer), "the bracket misses the truth, {label}");

@@ -13,7 +13,8 @@ use sublevel_testkit::bodies::{b, e, fitted, p, q, zoo};
 use sublevel_testkit::random::{Seeded, draws, pose, shifted};
 use sublevel_testkit::reference;
 
-/// Iteration limit passed off as an answer: limit 1, 2, 3: status not converged and the bracket still contains the truth.
+/// Iteration limit passed off as an answer: limit 1, 2, 3: status not converged and the bracket
+/// still contains the truth.
 #[test]
 fn family_02_iteration_limit() {
     let zoo = zoo();
@@ -51,12 +52,12 @@ fn family_02_iteration_limit() {
         assert!(answer.iterations <= 1 && level.iterations <= 1, "stopped, yet {answer:?} {level:?}");
     }
     println!("{wide} wide, {narrow} narrow");
-    // A flat pair far from its start can not be solved in one iteration.
+    // A flat pair far from its start cannot be solved in one iteration.
     assert!(wide > 0, "no limit was ever felt");
 }
 
-/// Bodies around meshes converge in 30 iterations however far apart, deep in each other, grazing or aligned they are: one by one,
-/// in batches, and where their centres all but coincide.
+/// Bodies around meshes converge in 30 iterations however far apart, deep in each other, grazing or
+/// aligned they are: one by one, in batches, and where their centres all but coincide.
 #[test]
 fn fitted_bodies_take_few_iterations() {
     let bodies = fitted();
@@ -97,7 +98,8 @@ fn fitted_bodies_take_few_iterations() {
     println!("most: distances in batches {}, alone {}, level {}, growth {}", most[0], most[1], most[2], most[3]);
 }
 
-/// Bad warm start: previous, another pair's, NaN, after a 180° teleport: same bracketed value, only time differs.
+/// Bad warm start: previous, another pair's, NaN, after a 180° teleport: same bracketed value, only
+/// time differs.
 #[test]
 fn family_18_bad_warm_start() {
     let zoo = zoo();
@@ -129,7 +131,8 @@ fn family_18_bad_warm_start() {
             level_distance(a, pose_a, b, pose_b, &options, &mut hint);
             hints.push(hint);
         };
-        // Previous: a small step before; another pair's; the same pair swapped; from the other side of the world.
+        // Previous: a small step before; another pair's; the same pair swapped; from the other side
+        // of the world.
         hint(a, &pose_a, b, &shifted(&pose_b, random.unit() * 0.01 * sum));
         hint(other_a, &pose_a, other_b, &pose_b);
         hint(b, &pose_b, a, &pose_a);
@@ -165,11 +168,11 @@ fn ball_of(coefficients: [f64; 3], constant: f64, linear: Matrix3<f64>) -> Resul
     Body::new("ball", Normalization { center: Vector3::zeros(), linear }, vec![Constraint { polynomial, gram }])
 }
 
-/// Ill-conditioned data: min p = 1 - 1e-12, radius 1e-8, coefficients 1e±12, perturbed Gram, NaN, non-orthonormal rotation:
-/// rejected or flagged.
+/// Ill-conditioned data: min p = 1 - 1e-12, radius 1e-8, coefficients 1e±12, perturbed Gram, NaN,
+/// non-orthonormal rotation: rejected or flagged.
 #[test]
 fn family_25_ill_conditioned_data() {
-    // Too shallow to be told from empty.
+    // Too shallow to be distinguished from empty.
     assert!(matches!(ball_of([1.0; 3], 1.0 - 1e-12, Matrix3::identity()), Err(BodyError::Interior { .. })));
     // A radius of 1e-8 and coefficients of 1e±12 are refused, or served within their bracket.
     let partner = e(1.0, 0.5, 0.7);

@@ -1,7 +1,8 @@
-//! The stability catalogue: families of queries that broke collision libraries, one function per family.
+//! The stability catalogue: families of queries that broke collision libraries, one function per
+//! family.
 //!
-//! Every answer is held against the truth with 200 bits (`sublevel_testkit::reference`) or in closed form. Sizes are small here; the same
-//! draws in their billions are the endurance bench.
+//! Every answer is held against the truth with 200 bits (`sublevel_testkit::reference`) or in
+//! closed form. Sizes are small here; the same draws in their billions are the endurance bench.
 
 mod exact;
 mod judge;

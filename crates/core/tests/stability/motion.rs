@@ -47,8 +47,8 @@ fn never_late(
     }
 }
 
-/// A rotating blade with closed form: faces strike a ball where its distance from the axis times the sine of the angle between
-/// is the sum of half thickness and radius.
+/// A rotating blade with closed form: faces strike a ball where its distance from the axis times
+/// the sine of the angle between is the sum of half thickness and radius.
 #[test]
 fn family_22_rotating_blade() {
     for seed in 0..draws(300) {
@@ -68,8 +68,8 @@ fn family_22_rotating_blade() {
         let hand = if random.signed() < 0.0 { -1.0 } else { 1.0 };
         let frame = random.rotation();
         let far = random.unit() * [0.0, 1.0, 1e3][random.index(3)];
-        // The blade lies in the plane of its two long axes and turns about one across its face's normal; a disc turns about a
-        // diameter.
+        // The blade lies in the plane of its two long axes and turns about one across its face's
+        // normal; a disc turns about a diameter.
         let (upright, spin_axis) = match seed % 3 {
             2 => (UnitQuaternion::from_scaled_axis(Vector3::x() * -std::f64::consts::FRAC_PI_2), Vector3::z()),
             _ => (UnitQuaternion::identity(), Vector3::z()),
@@ -158,7 +158,8 @@ fn family_22_grazing() {
         let direction = frame * Vector3::x();
         let side = frame * Vector3::z();
         let (half, other_half) = (random.between(0.1, 1.0), random.between(0.1, 1.0));
-        // Both lie along the frame, their tops and bottoms facing: tip to tip, face to face, or one of each.
+        // Both lie along the frame, their tops and bottoms facing: tip to tip, face to face, or one
+        // of each.
         let tall = |kind: usize, half: f64| match kind {
             0 => e(half, half, half),
             1 => q(4, 0.5, 0.7, half),

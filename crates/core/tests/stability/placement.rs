@@ -1,4 +1,5 @@
-//! Families about where bodies stand: far apart, overlapping, aligned, concentric, swapped: 4, 5, 6, 7, 19.
+//! Families about where bodies stand: far apart, overlapping, aligned, concentric, swapped: 4, 5,
+//! 6, 7, 19.
 
 use crate::judge::{all, judged, plain};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -108,7 +109,8 @@ fn family_06_axis_aligned() {
     }
 }
 
-/// Coincident centres: identical pose, then offsets 1e-18..1e-6: defined value, non-unique flag, no NaN.
+/// Coincident centres: identical pose, then offsets 1e-18..1e-6: defined value, non-unique flag, no
+/// NaN.
 #[test]
 fn family_07_coincident_centres() {
     let zoo = zoo();

@@ -1,6 +1,7 @@
-//! Every kind of bracket proven again in exact arithmetic, at both ends, for random pairs of all kinds of bodies: sizes from
-//! 1e-3 to 1e3, gaps from far apart to deep overlap, through contact, and accuracies beyond the rounding floor. There is no
-//! tolerance: an end of a bracket that is off by one part in 1e30 on the wrong side fails.
+//! Every kind of bracket proven again in exact arithmetic, at both ends, for random pairs of all
+//! kinds of bodies: sizes from 1e-3 to 1e3, gaps from far apart to deep overlap, through contact,
+//! and accuracies beyond the rounding floor. There is no tolerance: an end of a bracket that is off
+//! by one part in 1e30 on the wrong side fails.
 
 use crate::exact::number::{exact, exacts};
 use crate::exact::proof::Proof;
@@ -153,7 +154,8 @@ fn growth_distances_are_proven_exactly() {
     }
 }
 
-/// The ends of depths that one direction proves: the translation along it that takes the bodies apart.
+/// The ends of depths that one direction proves: the translation along it that takes the bodies
+/// apart.
 #[test]
 fn depths_are_proven_exactly() {
     let pool = pool();
@@ -175,7 +177,8 @@ fn depths_are_proven_exactly() {
             let truth = reference::signed::signed_distance(a.0, a.1, b.0, b.1, &way)?;
             Some(proof.parted(&truth.normal, &truth.dual))
         });
-        // At edges and corners the best direction need not be a stationary one, which is what the reference looks for.
+        // At edges and corners the best direction need not be a stationary one, which is what the
+        // reference looks for.
         let Some(shortest) = ways.max() else {
             open += 1;
             continue;

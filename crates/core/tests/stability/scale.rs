@@ -28,7 +28,8 @@ fn family_09_size_ratio() {
         let gap = [1.0, 1e-3, 1e-6, -0.1, 0.0][(seed / 6 % 5) as usize] * small(&a, &b);
         for pose_b in [far, shifted(&far, truth.normal() * (first.upper - gap))] {
             let label = format!("seed {seed} ratio {ratio:e} gap {gap:e}");
-            // At ratios above 1e5 the default accuracy lies below the rounding floor: the error counts, not the status.
+            // At ratios above 1e5 the default accuracy lies below the rounding floor: the error
+            // counts, not the status.
             let (answer, truth) = judged((&a, &pose_a), (&b, &pose_b), &Options::default(), &label);
             judged_level((&a, &pose_a), (&b, &pose_b), &Options::default(), &label);
             judged_level((&b, &pose_b), (&a, &pose_a), &Options::default(), &label);
@@ -79,8 +80,8 @@ fn scaled_pairs(s: f64) -> Vec<(Body, Body)> {
 #[test]
 fn family_11_units() {
     let ones = scaled_pairs(1.0);
-    // The query frame is scaled by powers of two, so that scales of other factors round differently: the count of iterations
-    // is compared where nothing rounds.
+    // The query frame is scaled by powers of two, so that scales of other factors round
+    // differently: the count of iterations is compared where nothing rounds.
     let powers_of_two = [-29, -20, -9, -1, 4, 15, 29].map(|k| 2_f64.powi(k));
     for s in (-9..=9).map(|k| 10_f64.powi(k)).chain(powers_of_two) {
         let exact = powers_of_two.contains(&s);

@@ -61,8 +61,8 @@ fn gradients_are_derivatives() {
     }
 }
 
-/// From starts that are off by 1e-3: closed forms of balls and of coaxial powers, any pair consistent with the distance, and
-/// gradients against differences.
+/// From starts that are off by 1e-3: closed forms of balls and of coaxial powers, any pair
+/// consistent with the distance, and gradients against differences.
 #[test]
 fn growth_distances_have_closed_forms() {
     use sublevel_testkit::reference::growth::Start;

@@ -1,8 +1,8 @@
 //! Functionals that are nonnegative on sums of squares, alone and times the slack of a constraint.
 //!
-//! A functional y on polynomials of v, held by its values on the monomials, is nonnegative on squares when its moment matrix
-//! M(y) is positive semidefinite, and on squares times a polynomial s when that of `y(s ·)` is. Either matrix is
-//! `spread(L y)` with a linear map L.
+//! A functional y on polynomials of v, held by its values on the monomials, is nonnegative on
+//! squares when its moment matrix M(y) is positive semidefinite, and on squares times a polynomial
+//! s when that of `y(s ·)` is. Either matrix is `spread(L y)` with a linear map L.
 
 use crate::structure::Pattern;
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -27,8 +27,8 @@ impl Cone {
         Self::of(Pattern::of_monomials(degree / 2))
     }
 
-    /// Moments of `y(slack ·)`, the product with squares being of even `degree` at most; coefficients of the slack in the order
-    /// of [`monomials`].
+    /// Moments of `y(slack ·)`, the product with squares being of even `degree` at most;
+    /// coefficients of the slack in the order of [`monomials`].
     pub(super) fn multiples(slack: &DVector<f64>, degree: usize) -> Self {
         let factor = (0..=degree).find(|&d| monomials(d).len() >= slack.len()).unwrap_or(degree);
         let half = (degree - factor) / 2;
@@ -83,7 +83,8 @@ impl Cone {
         Some((self.collapse(&gram), curvature))
     }
 
-    /// The inverse of the matrix at `to`, to first order from `at`: definite when the step is below 1 in the local norm.
+    /// The inverse of the matrix at `to`, to first order from `at`: definite when the step is below
+    /// 1 in the local norm.
     pub(super) fn predicted(&self, at: &DVector<f64>, to: &DVector<f64>) -> Option<DMatrix<f64>> {
         let gram = Cholesky::new(self.matrix(at))?.inverse();
         let predicted = &gram * 2.0 - &gram * self.matrix(to) * &gram;

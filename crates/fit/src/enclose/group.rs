@@ -1,8 +1,9 @@
 //! Fewer bodies for a coarser map: neighbours are put into one body while that wastes little space.
 //!
-//! Greedy: the merge that adds the least volume comes first, until the next would add too much. The hull of points inside them is a
-//! lower bound of the volume of every convex body around two groups, so a pair's program is solved only once its bound is the least
-//! of all, and never for pairs that are too far apart.
+//! Greedy: the merge that adds the least volume comes first, until the next would add too much. The
+//! hull of points inside them is a lower bound of the volume of every convex body around two
+//! groups, so a pair's program is solved only once its bound is the least of all, and never for
+//! pairs that are too far apart.
 
 use super::{EncloseError, EncloseOptions, Enclosure, MAX_SETS, Region, enclose_obstacles};
 use crate::hull::convex_hull;
@@ -70,14 +71,15 @@ impl Candidate {
     }
 }
 
-/// Puts obstacles into few groups, the volumes of whose bodies add up to at most `1 + max_growth` times those of all obstacles, an
-/// obstacle that is not convex having that of the smallest body around it.
+/// Puts obstacles into few groups, the volumes of whose bodies add up to at most `1 + max_growth`
+/// times those of all obstacles, an obstacle that is not convex having that of the smallest body
+/// around it.
 ///
 /// Obstacles that overlap count twice.
 ///
 /// # Errors
-/// [`EncloseError::Growth`] for a growth that is not positive and finite, and as [`super::enclose`] for options and cancellation; a
-/// pair around which no body is found or proven is not merged.
+/// [`EncloseError::Growth`] for a growth that is not positive and finite, and as [`super::enclose`]
+/// for options and cancellation; a pair around which no body is found or proven is not merged.
 pub fn group(
     obstacles: &[Obstacle],
     max_growth: f64,

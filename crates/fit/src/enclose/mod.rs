@@ -1,10 +1,11 @@
 //! One body around whole sets: the union of several bodies, or a set that is not convex.
 //!
-//! [`enclose`] solves the program of section V of Ahmadi, Hall, Makadia and Sindhwani (RSS 2017), sos-convex p with multipliers for
-//! every set, by the central path of its dual (`path`): the strictly feasible polynomial at its end comes with all Gram
-//! matrices, which become the [`Containment`] of each set. [`containment`] looks for such a proof when body and set are given
-//! both, and [`group`](group()) puts many bodies into few. Every set has a frame of its own for its proof (`region`), with the
-//! frames' rounding paid for ([`Containment`]).
+//! [`enclose`] solves the program of section V of Ahmadi, Hall, Makadia and Sindhwani (RSS 2017),
+//! sos-convex p with multipliers for every set, by the central path of its dual (`path`): the
+//! strictly feasible polynomial at its end comes with all Gram matrices, which become the
+//! [`Containment`] of each set. [`containment`] looks for such a proof when body and set are given
+//! both, and [`group`](group()) puts many bodies into few. Every set has a frame of its own for its
+//! proof (`region`), with the frames' rounding paid for ([`Containment`]).
 
 mod cone;
 mod group;
@@ -49,9 +50,10 @@ const MARGIN_ATTEMPTS: [f64; 3] = [1.0, 10.0, 100.0];
 pub struct EncloseOptions {
     /// Degree of the polynomial: 2, 4, 6 or 8.
     pub degree: usize,
-    /// Least degree of the multipliers: 0, 2 or 4. Where polynomial or set leave room for a higher one it is used, since nothing
-    /// is saved otherwise. Multipliers of too low a degree make the body larger than it need be: around a quartic peanut, degree 6
-    /// with 2 is 8 % larger than with 4, and larger than degree 4.
+    /// Least degree of the multipliers: 0, 2 or 4. Where polynomial or set leave room for a higher
+    /// one it is used, since nothing is saved otherwise. Multipliers of too low a degree make the
+    /// body larger than it need be: around a quartic peanut, degree 6 with 2 is 8 % larger than
+    /// with 4, and larger than degree 4.
     pub multiplier_degree: usize,
 }
 
@@ -62,9 +64,11 @@ pub struct Enclosure {
     pub body: Body,
     /// A proof for every set, in their order.
     pub containments: Vec<Containment>,
-    /// How far the body reaches at most beyond the convex hull of the sets' known points, and so of the sets.
+    /// How far the body reaches at most beyond the convex hull of the sets' known points, and so of
+    /// the sets.
     pub gap: Gap,
-    /// `-log det P`, in the frame in which the smallest ellipsoid around the known points is the unit ball.
+    /// `-log det P`, in the frame in which the smallest ellipsoid around the known points is the
+    /// unit ball.
     pub objective_value: f64,
     /// It minus its lower bound from the dual.
     pub optimality_gap: f64,
@@ -92,7 +96,7 @@ pub enum EncloseError {
     )]
     Growth(f64),
     /// A set's points tell too little of it.
-    #[error("sets[{index}]: its points can not be used: {source}")]
+    #[error("sets[{index}]: its points cannot be used: {source}")]
     Points {
         /// Which set.
         index: usize,
@@ -128,7 +132,7 @@ pub enum EncloseError {
 }
 
 impl EncloseError {
-    /// The error of a single set, told of the set that it is among others.
+    /// The error of a single set, with the name of the set that it is among others.
     fn of_set(self, index: usize) -> Self {
         match self {
             Self::NoPolynomial(_) => Self::NoPolynomial(index),
@@ -141,8 +145,8 @@ impl EncloseError {
 }
 
 impl EncloseOptions {
-    /// Multipliers that fill up to the degree of the polynomial where constraints are quadratic, as in the paper; of degree 4 at
-    /// most.
+    /// Multipliers that fill up to the degree of the polynomial where constraints are quadratic, as
+    /// in the paper; of degree 4 at most.
     pub fn new(degree: usize) -> Self {
         Self { degree, multiplier_degree: degree.saturating_sub(2).min(MAX_MULTIPLIER_DEGREE) }
     }
@@ -162,9 +166,11 @@ impl EncloseOptions {
     }
 }
 
-/// The sos-convex body with the largest `log det P` that the multipliers prove to contain all regions, with its proofs.
+/// The sos-convex body with the largest `log det P` that the multipliers prove to contain all
+/// regions, with its proofs.
 ///
-/// The same in every affine frame, but for the margin. `progress` hears of every Newton step and can stop it.
+/// The same in every affine frame, but for the margin. `progress` hears of every Newton step and
+/// can stop it.
 ///
 /// # Errors
 /// [`EncloseError`]: bad input, or what could not be solved or proven.
@@ -221,7 +227,8 @@ pub fn enclose(
     }
 }
 
-/// The smallest body around obstacles, whose file keeps the proofs. Around one that is not convex it is its convexification.
+/// The smallest body around obstacles, whose file keeps the proofs. Around one that is not convex
+/// it is its convexification.
 ///
 /// # Errors
 /// As [`enclose`].

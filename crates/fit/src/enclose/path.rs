@@ -7,16 +7,18 @@
 //!                                    1 - p = σ_k + Σ_j τ_kj (1 - g_kj),  all σ and τ sums of squares
 //! ```
 //!
-//! (Ahmadi, Hall, Makadia and Sindhwani, RSS 2017, section V). In its dual each set has a functional y_k that is nonnegative on
-//! squares and on squares times each `1 - g_kj`, where a fit to points has weights of evaluations at points:
+//! (Ahmadi, Hall, Makadia and Sindhwani, RSS 2017, section V). In its dual each set has a
+//! functional y_k that is nonnegative on squares and on squares times each `1 - g_kj`, where a fit
+//! to points has weights of evaluations at points:
 //!
 //! ```text
 //! maximise  log det M(m) + N - Σ y_k(1) + ε tr S(s)   subject to  m = Σ y_k|p - D*s,  M_kj(y_k) ⪰ 0,  S(s) ⪰ 0
 //! ```
 //!
-//! with y_k|p its values on the monomials of p, which have another frame. All but the term of m is a sum over blocks, so a Newton
-//! step of the barrier problem costs a factorization per block and one of the size of p (Woodbury). Near a centre the step
-//! predicts a strictly feasible p with all Gram matrices: its equations are the identities above.
+//! with y_k|p its values on the monomials of p, which have another frame. All but the term of m is
+//! a sum over blocks, so a Newton step of the barrier problem costs a factorization per block and
+//! one of the size of p (Woodbury). Near a centre the step predicts a strictly feasible p with all
+//! Gram matrices: its equations are the identities above.
 
 use super::cone::Cone;
 use crate::FitError;
@@ -26,7 +28,8 @@ use crate::structure::Structure;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use std::borrow::Cow;
 
-/// Newton decrement below which a point counts as a centre; 1 is where its polynomial stops being feasible.
+/// Newton decrement below which a point counts as a centre; 1 is where its polynomial stops being
+/// feasible.
 const CENTRED: f64 = 0.9;
 /// Growth of τ from one centre to the next.
 const GROWTH: f64 = 10.0;
@@ -86,8 +89,8 @@ impl Path<'_> {
         self.blocks.iter().zip(variables).map(|(block, y)| &block.map * y).sum()
     }
 
-    /// Follows the path until the objective is known to `gap`; the last centre before rounding stood in the way, if that is
-    /// earlier.
+    /// Follows the path until the objective is known to `gap`; the last centre before rounding
+    /// stood in the way, if that is earlier.
     ///
     /// # Errors
     /// [`FitError::Cancelled`].
@@ -142,7 +145,8 @@ impl Path<'_> {
 
     /// A damped Newton step; none when rounding stands in its way.
     fn step(&self, at: &[DVector<f64>], tau: f64) -> Option<Newton> {
-        // 1. The part of m: minus its gradient, τ times the coefficients of p, and the inverse of its Hessian.
+        // 1. The part of m: minus its gradient, τ times the coefficients of p, and the inverse of
+        //    its Hessian.
         let pattern = &self.structure.gram;
         let inverse = Cholesky::new(pattern.spread(&self.moments(at)))?.inverse();
         let coefficients = pattern.collapse(&inverse) * tau;
@@ -192,8 +196,8 @@ impl Path<'_> {
         Some(Newton { next, whole: along(1.0), decrement: (-slope).sqrt(), coefficients })
     }
 
-    /// The polynomial that a Newton step from `at` predicts with its Gram matrices; none if rounding costs it what mathematics
-    /// promises for decrements below 1: that all are definite.
+    /// The polynomial that a Newton step from `at` predicts with its Gram matrices; none if
+    /// rounding costs it what mathematics promises for decrements below 1: that all are definite.
     fn centre(&self, at: &[DVector<f64>], newton: &Newton, tau: f64) -> Option<Centre> {
         let coefficients = &newton.coefficients / tau;
         let mut grams = Vec::with_capacity(self.blocks.len());

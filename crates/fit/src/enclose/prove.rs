@@ -1,14 +1,14 @@
 //! A proof that a given body contains a given set, if there is one.
 //!
-//! Of all Gram matrices of `1 - p = σ + Σ τ_j (1 - g_j)`, those with the largest product of determinants are as far from singular as
-//! can be wished for. Their dual has one functional y,
+//! Of all Gram matrices of `1 - p = σ + Σ τ_j (1 - g_j)`, those with the largest product of
+//! determinants are as far from singular as can be wished for. Their dual has one functional y,
 //!
 //! ```text
 //! minimise  y(1 - p) - Σ log det M_j(y),   with the inverses of the M_j as Gram matrices at the minimum,
 //! ```
 //!
-//! by Newton's method, as in `certificate`. Where `y(1 - p) <= 0` on the way, y being nonnegative on all squares and products, there
-//! is no proof with these multipliers.
+//! by Newton's method, as in `certificate`. Where `y(1 - p) <= 0` on the way, y being nonnegative
+//! on all squares and products, there is no proof with these multipliers.
 
 use super::cone::Cone;
 use super::program::prepare;

@@ -1,4 +1,5 @@
-//! A set made ready to be contained: its frame, its constraints there, and a functional to start from.
+//! A set made ready to be contained: its frame, its constraints there, and a functional to start
+//! from.
 
 use super::cone::Cone;
 use crate::FitError;
@@ -9,11 +10,12 @@ use nalgebra::{DVector, Matrix3, Vector3};
 use sublevel_core::body::{BasicSet, Body, Normalization, Obstacle, ProofFrame, SosBody};
 use sublevel_core::polynomial::{Polynomial, degree_of, monomials, position};
 
-/// How far the points in the interior of a body are from its centre, relative to its boundary: as many as a polynomial of degree 8
-/// can tell apart.
+/// How far the points in the interior of a body are from its centre, relative to its boundary: as
+/// many as a polynomial of degree 8 can tell apart.
 const SHELLS: [f64; 4] = [0.4, 0.7, 0.9, 1.0];
 
-/// Rays whose chords give the points of a set that need not be convex, and where on them, from end to end.
+/// Rays whose chords give the points of a set that need not be convex, and where on them, from end
+/// to end.
 const RAYS: usize = 1000;
 /// See [`RAYS`].
 const ALONG: [f64; 4] = [1e-3, 0.3, 0.7, 0.999];
@@ -23,8 +25,8 @@ const ALONG: [f64; 4] = [1e-3, 0.3, 0.7, 0.999];
 pub struct Region<'a> {
     /// The set.
     pub set: BasicSet<'a>,
-    /// Points of the set, metres, all over its interior and close to its boundary: a few hundred. They give the frames and
-    /// where the solver starts, and prove nothing.
+    /// Points of the set, metres, all over its interior and close to its boundary: a few hundred.
+    /// They give the frames and where the solver starts, and prove nothing.
     pub inside: Vec<Vector3<f64>>,
 }
 
@@ -52,7 +54,8 @@ impl<'a> From<&'a Obstacle> for Region<'a> {
     }
 }
 
-/// The functionals that stand for a set: definite on squares and on squares times each constraint's slack, up to a degree.
+/// The functionals that stand for a set: definite on squares and on squares times each constraint's
+/// slack, up to a degree.
 pub(super) struct Prepared {
     /// The frame v in which the set about fills the unit ball.
     pub(super) frame: ProofFrame,
@@ -63,8 +66,8 @@ pub(super) struct Prepared {
 }
 
 impl Prepared {
-    /// For polynomials of degree `contained` to be bounded on the region, with multipliers of at least `multiplier` (even), and as
-    /// much more as is left to the same total degree.
+    /// For polynomials of degree `contained` to be bounded on the region, with multipliers of at
+    /// least `multiplier` (even), and as much more as is left to the same total degree.
     ///
     /// # Errors
     /// Points that are flat or no numbers.
@@ -98,7 +101,8 @@ impl Prepared {
         self.cones.iter().map(Cone::size).sum()
     }
 
-    /// Coefficients of a polynomial of other normalized coordinates, as one of v, on the monomials of the functionals.
+    /// Coefficients of a polynomial of other normalized coordinates, as one of v, on the monomials
+    /// of the functionals.
     pub(super) fn see(&self, polynomial: &Polynomial, normalization: &Normalization) -> DVector<f64> {
         substituted(polynomial, &affine(&self.frame, normalization)).resize_vertically(self.mean.len(), 0.0)
     }

@@ -7,7 +7,8 @@ use sublevel_testkit::Seeded;
 
 mod printed;
 
-/// Three ellipsoids apart from each other, as in the paper's figure; in units of `size` metres about `center`.
+/// Three ellipsoids apart from each other, as in the paper's figure; in units of `size` metres
+/// about `center`.
 fn three_ellipsoids(size: f64, center: Vector3<f64>) -> Vec<Body> {
     let place = [
         ([0.9, 0.4, 0.3], [0.0, 0.0, 0.0], [0.3, 0.2, 0.5]),
@@ -71,7 +72,8 @@ fn higher_degrees_are_smaller_around_three_ellipsoids_and_above_the_hull() {
     }
 }
 
-/// The smallest ellipsoid around two equal balls, by brute force over its half-axes: `(x/a)² + (r/b)² <= 1` on the balls.
+/// The smallest ellipsoid around two equal balls, by brute force over its half-axes: `(x/a)² +
+/// (r/b)² <= 1` on the balls.
 #[test]
 fn two_balls_in_an_ellipsoid() {
     let (radius, offset) = (0.7, 1.3);
@@ -140,7 +142,8 @@ fn quartic(s: f64, w: [f64; 3], level: f64, scale: f64) -> Polynomial {
 #[test]
 fn sets_that_are_not_convex_are_convexified() {
     let identity = Normalization { center: Vector3::zeros(), linear: nalgebra::Matrix3::identity() };
-    // Cassini's peanut: products of the distances to (±1, 0, 0) of at most 1.05²; and a torus of radii 1 and 0.4.
+    // Cassini's peanut: products of the distances to (±1, 0, 0) of at most 1.05²; and a torus of
+    // radii 1 and 0.4.
     let peanut = quartic(1.0, [1.0, 0.0, 0.0], 1.05_f64.powi(4), 1.05_f64.powi(4));
     let torus = quartic(1.0 - 0.16, [1.0, 1.0, 0.0], 0.0, 1.0);
     for (name, set, reach) in [("peanut", peanut, 1.5), ("torus", torus, 1.5)] {
@@ -176,7 +179,8 @@ fn proofs_of_what_is_not_so_fail() {
     let (outer, inner) = (BasicSet::from(&all.body), BasicSet::from(&bodies[0]));
     let good = &all.containments[0];
     assert_eq!(good.prove(&outer, &inner), Ok(()));
-    // The set of another proof, a set that reaches out, a body that is smaller, matrices that were changed, no frame.
+    // The set of another proof, a set that reaches out, a body that is smaller, matrices that were
+    // changed, no frame.
     assert!(all.containments[1].prove(&outer, &inner).is_err());
     let touching =
         bodies[0].boundary().iter().map(|x| (all.body.value(x), x)).max_by(|a, b| a.0.total_cmp(&b.0)).unwrap();

@@ -1,10 +1,10 @@
 //! Meshes and point clouds from files.
 //!
-//! Whatever a file holds is read or refused: what a reader does not consume is an error, and counts,
-//! terminators and sizes that a format has are checked. Numbers that stand there as text are read in
-//! double precision; binary ones have the precision of the format. One convex body that holds the
-//! vertices holds every triangle; what several bodies hold together, or one that is not convex, is
-//! known by the triangles.
+//! Whatever a file holds is read or refused: what a reader does not consume is an error, and
+//! counts, terminators and sizes that a format has are checked. Numbers that stand there as text
+//! are read in double precision; binary ones have the precision of the format. One convex body that
+//! holds the vertices holds every triangle; what several bodies hold together, or one that is not
+//! convex, is known by the triangles.
 
 mod collada;
 mod error;
@@ -37,8 +37,8 @@ pub const FORMATS: [&str; 6] = ["off", "obj", "ply", "stl", "dae", "xyz"];
 pub struct Mesh {
     /// All vertices of the file, metres, also those of no triangle.
     pub points: Vec<Vector3<f64>>,
-    /// Indices into the points; none for clouds. Faces of more corners are triangulated inside their
-    /// outlines.
+    /// Indices into the points; none for clouds. Faces of more corners are triangulated inside
+    /// their outlines.
     pub triangles: Vec<[usize; 3]>,
 }
 

@@ -94,8 +94,9 @@ fn continued<'a>(first: Line<'a>, lines: &mut impl Iterator<Item = Line<'a>>) ->
     text
 }
 
-/// The point of `v x y z`, of `v x y z w`, which is (x, y, z) / w, or of `v x y z red green blue`. All
-/// vertices have as many columns as the first one: a line that was cut would be taken for another kind.
+/// The point of `v x y z`, of `v x y z w`, which is (x, y, z) / w, or of `v x y z red green blue`.
+/// All vertices have as many columns as the first one: a line that was cut would be taken for
+/// another kind.
 fn vertex(line: Line<'_>, columns: &mut Option<usize>) -> Result<Vector3<f64>, Defect> {
     let mut fields = line.fields().skip(1);
     let point = Vector3::from(line.coordinates(&mut fields)?);

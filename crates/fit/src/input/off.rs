@@ -1,7 +1,7 @@
 //! Object file format (Geomview's OFF), text.
 //!
-//! An optional keyword, three counts, the vertices, the faces. Most files have one vertex or face in
-//! a line, and then may have colours behind them; but line ends mean nothing to the format, so a
+//! An optional keyword, three counts, the vertices, the faces. Most files have one vertex or face
+//! in a line, and then may have colours behind them; but line ends mean nothing to the format, so a
 //! file that is not laid out like that is read as the stream of numbers that it is.
 
 use super::surface::{Place, Surface};
@@ -18,8 +18,8 @@ struct Kind {
 }
 
 impl Kind {
-    /// How many numbers a vertex has. Colours have four components, or three where the first vertex,
-    /// in a line of its own, says so.
+    /// How many numbers a vertex has. Colours have four components, or three where the first
+    /// vertex, in a line of its own, says so.
     fn width(self, lines: &[Line<'_>]) -> usize {
         let least = 3 + self.extras;
         let has_three = lines.get(1).is_some_and(|line| line.fields().count() == least + 3);

@@ -150,7 +150,8 @@ mod tests {
         areas.fold((Vector3::zeros(), 0.0), |(sum, total), area| (sum + area, total + area.norm()))
     }
 
-    /// Edges of the triangles less those of the loops: empty if the triangles are bounded by the loops.
+    /// Edges of the triangles less those of the loops: empty if the triangles are bounded by the
+    /// loops.
     fn boundary(triangles: &[[usize; 3]], loops: &[&[usize]]) -> HashMap<(usize, usize), i32> {
         let mut passes = HashMap::new();
         let mut pass = |a: usize, b: usize, sign: i32| {

@@ -1,9 +1,9 @@
-//! Stereolithography, text or binary. Corners that several triangles have are one vertex; normals are
-//! not read, as the order of the corners says the same.
+//! Stereolithography, text or binary. Corners that several triangles have are one vertex; normals
+//! are not read, as the order of the corners says the same.
 //!
-//! Text holds one solid after the other, each from `solid` to `endsolid`, keywords in any case, with
-//! blanks and line ends anywhere but in names. Its numbers are read in double precision; those of
-//! binary files have single precision.
+//! Text holds one solid after the other, each from `solid` to `endsolid`, keywords in any case,
+//! with blanks and line ends anywhere but in names. Its numbers are read in double precision; those
+//! of binary files have single precision.
 
 use super::Defect;
 use super::surface::{Place, Surface};

@@ -1,8 +1,8 @@
 //! Point clouds: one point in a line, its coordinates first, then columns that are ignored.
 //!
 //! Columns are separated by blanks, commas or semicolons, of one kind in a line: a comma beside
-//! another separator may be a decimal comma, which must not be guessed. Names of columns and a count
-//! of the points may come first.
+//! another separator may be a decimal comma, which must not be guessed. Names of columns and a
+//! count of the points may come first.
 
 use super::surface::Surface;
 use super::text::{DECIMAL_COMMA, Line, is_blank, lines, number};

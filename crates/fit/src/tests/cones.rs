@@ -1,5 +1,6 @@
-//! Fits over the smaller cones, and their programs against clarabel's answers to the same programs stated otherwise: with the whole
-//! matrix H in the variables, and dominance as sums of magnitudes or of blocks with entries of their own.
+//! Fits over the smaller cones, and their programs against clarabel's answers to the same programs
+//! stated otherwise: with the whole matrix H in the variables, and dominance as sums of magnitudes
+//! or of blocks with entries of their own.
 
 use super::*;
 use crate::conic::Conic;
@@ -115,7 +116,8 @@ impl Rows {
     }
 }
 
-/// The least `½ cᵀBc + q·c` by clarabel over c, the upper triangle of H, and what dominance needs besides.
+/// The least `½ cᵀBc + q·c` by clarabel over c, the upper triangle of H, and what dominance needs
+/// besides.
 fn least(
     structure: &Structure,
     cone: Cone,
@@ -189,7 +191,8 @@ fn least(
     solver.solution.obj_val
 }
 
-/// Random models around points that are at times few: the same least values, and matrices that are in the cones.
+/// Random models around points that are at times few: the same least values, and matrices that are
+/// in the cones.
 #[test]
 fn programs_agree_with_clarabel() {
     let mut random = Seeded(31);

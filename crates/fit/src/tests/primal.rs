@@ -1,5 +1,5 @@
-//! The paper's programs as they are printed, here for traces, in the primal and given straight to clarabel: nothing of the dual, of
-//! paths or of frames is shared with what they are to check.
+//! The paper's programs as they are printed, here for traces, in the primal and given straight to
+//! clarabel: nothing of the dual, of paths or of frames is shared with what they are to check.
 
 use super::*;
 use crate::objective::Matrix;
@@ -61,8 +61,8 @@ impl Program {
         self.cones.push(SupportedConeT::ZeroConeT(self.right.len()));
     }
 
-    /// `log det Q >= Σ t` for new t, which are to be maximised: `[[Q, Z], [Zᵀ, diag Z]] ⪰ 0` with Z lower triangular and
-    /// `exp(t_i) <= Z_ii`.
+    /// `log det Q >= Σ t` for new t, which are to be maximised: `[[Q, Z], [Zᵀ, diag Z]] ⪰ 0` with Z
+    /// lower triangular and `exp(t_i) <= Z_ii`.
     pub(crate) fn log_det(&mut self, q: &[usize], size: usize) {
         let at = |i: usize, j: usize| j * (j + 1) / 2 + i;
         let z = self.matrix(size, 0.0);
@@ -105,7 +105,8 @@ impl Program {
         let mut solver =
             DefaultSolver::new(&nothing, &self.linear, &matrix, &self.right, &self.cones, settings).unwrap();
         solver.solve();
-        // The gap between these answers and ours is asserted, whatever the solver thinks of its own.
+        // The gap between these answers and ours is asserted, whatever the solver thinks of its
+        // own.
         let status = solver.solution.status;
         assert!(
             [SolverStatus::Solved, SolverStatus::AlmostSolved, SolverStatus::InsufficientProgress].contains(&status),
@@ -115,11 +116,12 @@ impl Program {
     }
 }
 
-/// Least `tr Q⁻¹` of the Gram matrix Q that `matrix` names, over sums of squares p with `H ⪰ floor I` and `p <= 1` at the points, H
-/// being a Gram matrix of the Hessian form of `p + relaxation`.
+/// Least `tr Q⁻¹` of the Gram matrix Q that `matrix` names, over sums of squares p with `H ⪰ floor
+/// I` and `p <= 1` at the points, H being a Gram matrix of the Hessian form of `p + relaxation`.
 ///
-/// With `symmetric`, the points are their own mirror images in all three coordinate planes. The average of an optimum over
-/// the mirrors is one, too: p is even in each coordinate, and both Gram matrices fall apart by parity.
+/// With `symmetric`, the points are their own mirror images in all three coordinate planes. The
+/// average of an optimum over the mirrors is one, too: p is even in each coordinate, and both Gram
+/// matrices fall apart by parity.
 fn least_trace(
     structure: &Structure,
     matrix: Matrix,
@@ -171,7 +173,8 @@ fn least_trace(
     program.minimum()
 }
 
-/// The diagonal blocks of a Gram matrix, one per class of its rows: sizes and variables. Adds them up in `sums`, by key.
+/// The diagonal blocks of a Gram matrix, one per class of its rows: sizes and variables. Adds them
+/// up in `sums`, by key.
 fn blocks(
     program: &mut Program,
     pattern: &Pattern,

@@ -56,7 +56,8 @@ fn report_hull(points: &[Vector3<f64>]) -> f64 {
     fitted(points, &options(2, SosMethod::InverseMoment)).report.hull_volume_m3
 }
 
-/// The relaxation that a set claims is one: the Hessian of the sum bends down nowhere; and claims for less fail.
+/// The relaxation that a set claims is one: the Hessian of the sum bends down nowhere; and claims
+/// for less fail.
 #[test]
 fn a_relaxation_holds_for_its_c_and_no_other() {
     let points = ring(400);
@@ -95,7 +96,8 @@ fn a_relaxation_holds_for_its_c_and_no_other() {
     }
 }
 
-/// At degree 2 without convexity `log det P` is the volume all the same: P ≻ 0 makes p convex. And any c > 0 changes nothing.
+/// At degree 2 without convexity `log det P` is the volume all the same: P ≻ 0 makes p convex. And
+/// any c > 0 changes nothing.
 #[test]
 fn degree_two_is_the_smallest_ellipsoid() {
     let points = blob(300);
@@ -106,8 +108,9 @@ fn degree_two_is_the_smallest_ellipsoid() {
     }
 }
 
-/// Without convexity the program is that of the smallest ellipsoid about 0 in the space of monomials: at the optimum the largest of
-/// the values `m(x)ᵀ P m(x)` is 1, and weights that add up to the number of monomials average to P⁻¹ (Kiefer and Wolfowitz, 1960).
+/// Without convexity the program is that of the smallest ellipsoid about 0 in the space of
+/// monomials: at the optimum the largest of the values `m(x)ᵀ P m(x)` is 1, and weights that add up
+/// to the number of monomials average to P⁻¹ (Kiefer and Wolfowitz, 1960).
 #[test]
 fn without_convexity_it_is_the_optimal_design() {
     let points = blob(200);
@@ -118,7 +121,8 @@ fn without_convexity_it_is_the_optimal_design() {
         let identity = Affine { linear: Matrix3::identity(), offset: Vector3::zeros() };
         let problem = Problem::new(&structure, Objective::LogDetP, &identity, 1e-5);
         let optimum = generate(problem, &whitened, &[], &mut Watch::new(&mut unwatched)).unwrap();
-        // Titterington's iteration w <- w m(x)ᵀ M⁻¹ m(x) / N for the dual, which only ever improves.
+        // Titterington's iteration w <- w m(x)ᵀ M⁻¹ m(x) / N for the dual, which only ever
+        // improves.
         let n = structure.gram.size as f64;
         let mut weights = DVector::repeat(points.len(), 1.0 / points.len() as f64);
         let values: Vec<_> = whitened.iter().map(|z| structure.values(z)).collect();
@@ -139,7 +143,8 @@ fn without_convexity_it_is_the_optimal_design() {
 
 #[test]
 fn inverse_moments_have_closed_forms_and_follow_affine_maps() {
-    // Points of a sphere and its centre: M = diag(1, s, s, s) with s = share/3; p = 1 + 3 |x|²/share, at most 1 + 3/share.
+    // Points of a sphere and its centre: M = diag(1, s, s, s) with s = share/3; p = 1 + 3
+    // |x|²/share, at most 1 + 3/share.
     let mut points: Vec<_> = cube(2.0 / 3.0_f64.sqrt());
     points.extend([Vector3::zeros(); 8]);
     let body = fitted(&points, &options(2, SosMethod::InverseMoment)).body;
@@ -176,8 +181,8 @@ fn units_and_place_do_not_matter_in_the_unit_frame_but_in_the_raw_one() {
         };
         let (here, there) = (volume(&points, Coordinates::Unit), volume(&moved, Coordinates::Unit));
         assert!((there * 1e9 / here - 1.0).abs() < 1e-3, "{objective}: {here} {there}");
-        // A few metres from the origin |x|⁴ lets everything bend; in the unit frame 10 of it do not. Traces change for other
-        // reasons, too.
+        // A few metres from the origin |x|⁴ lets everything bend; in the unit frame 10 of it do
+        // not. Traces change for other reasons, too.
         let raw = volume(&points, Coordinates::Raw);
         assert!(objective == Objective::TraceP || raw < 0.97 * here, "{objective}: {raw} {here}");
     }

@@ -1,4 +1,5 @@
-//! Compounds of meshes in parts: what shelves, tubes and bins leave free, and what is said where fewer parts come out than asked for.
+//! Compounds of meshes in parts: what shelves, tubes and bins leave free, and what is said where
+//! fewer parts come out than asked for.
 
 mod solids;
 
@@ -57,7 +58,8 @@ fn mesh(file: &str) -> Mesh {
 #[ignore = "needs SUBLEVEL_DATA"]
 fn a_shelf_is_its_boards() {
     let shelf = mesh("faults/shelf.off");
-    // Between the boards at z = 0.52 and 1 m, and between the sides: 0.21 m above and below a ball of 2 cm.
+    // Between the boards at z = 0.52 and 1 m, and between the sides: 0.21 m above and below a ball
+    // of 2 cm.
     let middle = Vector3::new(0.5, 0.15, 0.76);
     let truth = 0.22;
     let CompoundFit { compound, shortfall, .. } = parts(&shelf, 7, &degree(6));
@@ -180,7 +182,8 @@ fn faults_of_a_mesh_do_no_harm() {
             let (made, total, proven) = volume(&mesh, count);
             assert!(proven == covered && made >= count.min(2), "{what}, {count}: {made} parts, {proven:?}");
             let boxes = if count == 1 { 5.0 } else { 4.0 };
-            // Hulls of an open surface need not hold what it may be thought to enclose: more parts can be smaller than the boxes.
+            // Hulls of an open surface need not hold what it may be thought to enclose: more parts
+            // can be smaller than the boxes.
             let surface = covered == Covered::SurfaceOnly && count > 2;
             assert!(
                 total < boxes + 1e-6 && (surface || (total > boxes - 1e-6 && made < 3)),

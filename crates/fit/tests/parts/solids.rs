@@ -1,4 +1,5 @@
-//! Solids that tests divide into parts: closed meshes, triangles counter-clockwise seen from outside, metres.
+//! Solids that tests divide into parts: closed meshes, triangles counter-clockwise seen from
+//! outside, metres.
 
 use nalgebra::Vector3;
 use std::f64::consts::TAU;

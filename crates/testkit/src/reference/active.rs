@@ -11,14 +11,16 @@ pub struct Trial {
     pub multiplier: Vec<f64>,
 }
 
-/// How close to the level values may stand for equality: at first, and where that leads nowhere. The witness on a needle's face may be
-/// far from the edge that it belongs to, as measured by the thickness, where the edge counts for little.
+/// How close to the level values may stand for equality: at first, and where that leads nowhere.
+/// The witness on a needle's face may be far from the edge that it belongs to, as measured by the
+/// thickness, where the edge counts for little.
 pub const CLOSE: [f64; 2] = [0.05, f64::INFINITY];
 
 /// Most constraints looked at.
 const MOST: usize = 5;
 
-/// Constraints of the body whose value at v is that close to `level` or above it, largest first, with their gradients.
+/// Constraints of the body whose value at v is that close to `level` or above it, largest first,
+/// with their gradients.
 pub fn near(body: &Solid<'_>, v: &Vector, level: f64, close: f64) -> Vec<(usize, Vector3<f64>)> {
     let mut all: Vec<_> = (0..body.len()).map(|i| (i, double(&body.value(i, v)))).collect();
     all.sort_by(|p, q| q.1.total_cmp(&p.1));
@@ -34,7 +36,8 @@ pub fn subsets(near: &[(usize, Vector3<f64>)]) -> Vec<Vec<(usize, Vector3<f64>)>
     (1..1_u32 << near.len()).filter(|bits| bits.count_ones() <= 3).map(chosen).collect()
 }
 
-/// Least-squares multipliers of `columns · m = target`, negative ones cut off, with the residual they leave.
+/// Least-squares multipliers of `columns · m = target`, negative ones cut off, with the residual
+/// they leave.
 pub fn fit(columns: &[DVector<f64>], target: &DVector<f64>) -> (Vec<f64>, f64) {
     let m = DMatrix::from_columns(columns);
     let solution = m.clone().svd(true, true).solve(target, 1e-12).expect("both factors are asked for");

@@ -66,8 +66,8 @@ pub fn cross(a: &Vector, b: &Vector) -> Vector {
     [minor(1, 2), minor(2, 0), minor(0, 1)]
 }
 
-/// Solves `m x = r` by elimination with complete pivoting. What pivots below 1e-50 of the largest can not determine stays 0:
-/// where minimisers are not unique, one of them is found all the same.
+/// Solves `m x = r` by elimination with complete pivoting. What pivots below 1e-50 of the largest
+/// cannot determine stays 0: where minimisers are not unique, one of them is found all the same.
 pub fn solve(mut m: Vec<Vec<Big>>, mut r: Vec<Big>) -> Vec<Big> {
     let n = r.len();
     let mut column: Vec<usize> = (0..n).collect();

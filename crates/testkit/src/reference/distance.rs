@@ -18,7 +18,8 @@ pub struct Truth {
     pub y: Vector,
     /// Unit normal from the second body to the first.
     pub normal: Vector,
-    /// Derivative with respect to the twists `(v_a, ω_a, v_b, ω_b)` of the bodies, each about its own translation.
+    /// Derivative with respect to the twists `(v_a, ω_a, v_b, ω_b)` of the bodies, each about its
+    /// own translation.
     pub gradient: [f64; 12],
     /// What proves `lower`, with `normal`; none if nothing but 0 was proven.
     pub dual: Option<Dual>,
@@ -44,8 +45,9 @@ impl Truth {
         big(answer.lower) <= self.lower && self.upper <= big(answer.upper)
     }
 
-    /// Whether it tells the answer right from wrong: as sharp as this share of the size, or, as between flush faces, with all that
-    /// it may be in the answer's bracket, which proves as much.
+    /// Whether it distinguishes a right answer from a wrong one: as sharp as this share of the
+    /// size, or, as between flush faces, with all that it may be in the answer's bracket, which
+    /// proves as much.
     pub fn decides(&self, answer: &Distance, sharp: f64) -> bool {
         self.width() <= sharp || self.all_inside(answer)
     }
@@ -69,8 +71,8 @@ struct Best {
 /// Bracket at which an iterate is taken, in units of the larger body.
 const TARGET: f64 = 1e-40;
 
-/// Solves for the distance from the witnesses of an answer. The solve starts there and nowhere else, but what it finds is
-/// proven by its own bracket: an answer can not make it agree.
+/// Solves for the distance from the witnesses of an answer. The solve starts there and nowhere
+/// else, but what it finds is proven by its own bracket: an answer cannot make it agree.
 pub fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer: &Distance) -> Truth {
     let unit = a.circumscribed().radius.max(b.circumscribed().radius).log2().round().exp2();
     let origin = pose_a.translation();
@@ -176,8 +178,8 @@ fn newton(
     }
 }
 
-/// An iterate of Newton's method on `x - y = D n`, `n + Σ λ ∇g = 0`, `n - Σ μ ∇h = 0`, `n·n = 1`, `g = 1`, `h = 1`; D has
-/// either sign.
+/// An iterate of Newton's method on `x - y = D n`, `n + Σ λ ∇g = 0`, `n - Σ μ ∇h = 0`, `n·n = 1`,
+/// `g = 1`, `h = 1`; D has either sign.
 pub(super) struct Iterate<'a> {
     index: (&'a [usize], &'a [usize]),
     pub(super) x: Vector,
@@ -256,7 +258,8 @@ impl<'a> Iterate<'a> {
     }
 }
 
-/// Derivative of the distance with respect to the twists of both bodies, from points relative to the first one's translation.
+/// Derivative of the distance with respect to the twists of both bodies, from points relative to
+/// the first one's translation.
 pub(super) fn twists(x: &Vector, y: &Vector, n: &Vector, pose_a: &Pose, pose_b: &Pose) -> [f64; 12] {
     let arm = sub(y, &sub(&vector(pose_b.translation()), &vector(pose_a.translation())));
     let minus = |v: &Vector| -> Vector { v.clone().map(|c| -c) };
@@ -295,8 +298,8 @@ fn bracket(
     raise(one, two, x, y, best);
 }
 
-/// A common point next to v, which is one that has been rounded: steps into each body in turn as far as it sticks out and half as
-/// far again.
+/// A common point next to v, which is one that has been rounded: steps into each body in turn as
+/// far as it sticks out and half as far again.
 fn common(one: &Solid<'_>, two: &Solid<'_>, v: &Vector) -> Option<Vector> {
     let mut v = v.clone();
     for _ in 0..100 {
@@ -316,7 +319,8 @@ fn common(one: &Solid<'_>, two: &Solid<'_>, v: &Vector) -> Option<Vector> {
     None
 }
 
-/// Takes trial points, pulled into their bodies, if they are closer than the best so far; a common point is at distance 0.
+/// Takes trial points, pulled into their bodies, if they are closer than the best so far; a common
+/// point is at distance 0.
 fn raise(one: &Solid<'_>, two: &Solid<'_>, x: &Vector, y: &Vector, best: &mut Best) {
     let middle = scaled(&add(x, y), &big(0.5));
     if one.largest(&middle) <= big(1.0) && two.largest(&middle) <= big(1.0) {

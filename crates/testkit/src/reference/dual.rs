@@ -3,8 +3,8 @@
 use super::active::Trial;
 use super::big::{Big, Vector, big, scaled};
 
-/// Trial points and multipliers of both bodies; metres and world directions, points relative to the translation of the first
-/// body.
+/// Trial points and multipliers of both bodies; metres and world directions, points relative to the
+/// translation of the first body.
 #[derive(Clone, Debug)]
 pub struct Dual {
     pub x: Vector,
@@ -15,8 +15,8 @@ pub struct Dual {
 }
 
 impl Dual {
-    /// From an iterate in lengths of `unit` metres. Multipliers that turn gradients into directions or into other gradients
-    /// are lengths or not (`lengths`).
+    /// From an iterate in lengths of `unit` metres. Multipliers that turn gradients into directions
+    /// or into other gradients are lengths or not (`lengths`).
     pub(super) fn new(
         (x, y): (&Vector, &Vector),
         (p, l): (&Trial, &[Big]),

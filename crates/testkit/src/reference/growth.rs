@@ -1,4 +1,5 @@
-//! The growth distance of two bodies with 200 bits: the smallest s at which the bodies, grown by s about their centres, touch.
+//! The growth distance of two bodies with 200 bits: the smallest s at which the bodies, grown by s
+//! about their centres, touch.
 
 use super::active::{CLOSE, Trial, for_direction};
 use super::big::{Big, Vector, add, big, cross, dot, double, norm, scaled, solve, sub, vector};
@@ -13,7 +14,8 @@ use sublevel_core::measure::{GrowthDistance, Pose};
 pub struct Truth {
     pub lower: Big,
     pub upper: Big,
-    /// Derivative with respect to the twists `(v_a, ω_a, v_b, ω_b)` of the bodies, each about its own translation.
+    /// Derivative with respect to the twists `(v_a, ω_a, v_b, ω_b)` of the bodies, each about its
+    /// own translation.
     pub gradient: [f64; 12],
     /// The point of contact, metres, relative to the translation of the first body.
     pub contact: Vector,
@@ -35,14 +37,15 @@ impl Truth {
         big(answer.lower) <= self.upper && self.lower <= big(answer.upper)
     }
 
-    /// Whether it tells the answer right from wrong, as that of distances does.
+    /// Whether it distinguishes a right answer from a wrong one, as that of distances does.
     pub fn decides(&self, answer: &GrowthDistance) -> bool {
         let sharp = self.width() <= 1e-16 * self.value().max(1.0);
         sharp || big(answer.lower) <= self.lower && self.upper <= big(answer.upper)
     }
 }
 
-/// What an answer says: the point of contact of the grown bodies in the world, s, and the normal from B to A.
+/// What an answer says: the point of contact of the grown bodies in the world, s, and the normal
+/// from B to A.
 #[derive(Clone, Copy, Debug)]
 pub struct Start {
     pub witness: Vector3<f64>,
@@ -53,7 +56,8 @@ pub struct Start {
 /// A body, its pose, and its centre in the body frame.
 pub type Centred<'a> = (&'a Body, &'a Pose, &'a Vector3<f64>);
 
-/// Both bodies in the frame of work, with their centres and the vector from the first centre to the second.
+/// Both bodies in the frame of work, with their centres and the vector from the first centre to the
+/// second.
 struct Problem<'a> {
     one: Solid<'a>,
     two: Solid<'a>,
@@ -81,8 +85,8 @@ impl Best {
 /// Bracket at which an iterate is taken.
 const TARGET: f64 = 1e-40;
 
-/// Solves for the growth distance from an answer; proven by its own bracket, as [`super::distance()`]. None if no iterate proves
-/// anything, as where the centres coincide.
+/// Solves for the growth distance from an answer; proven by its own bracket, as
+/// [`super::distance()`]. None if no iterate proves anything, as where the centres coincide.
 pub fn growth_distance(a: Centred<'_>, b: Centred<'_>, start: &Start) -> Option<Truth> {
     let unit = a.0.circumscribed().radius.max(b.0.circumscribed().radius).log2().round().exp2();
     let origin = a.1.translation();
@@ -130,7 +134,8 @@ pub fn growth_distance(a: Centred<'_>, b: Centred<'_>, start: &Start) -> Option<
 }
 
 impl Problem<'_> {
-    /// Newton's method on `s (u - c_A - w + c_B) = Δ`, `Σ λ ∇g(u) + Σ μ ∇h(w) = 0`, `Σ λ ∇g(u)·Δ = 1`, `g = 1`, `h = 1`.
+    /// Newton's method on `s (u - c_A - w + c_B) = Δ`, `Σ λ ∇g(u) + Σ μ ∇h(w) = 0`, `Σ λ ∇g(u)·Δ =
+    /// 1`, `g = 1`, `h = 1`.
     fn newton(&self, p: &Trial, q: &Trial, (u, w, s): (&Vector, &Vector, &Big), best: &mut Best) {
         let (mut u, mut w, mut s) = (u.clone(), w.clone(), s.clone());
         let mut l: Vec<Big> = p.multiplier.iter().map(|&m| big(m)).collect();
@@ -196,8 +201,8 @@ impl Problem<'_> {
         }
     }
 
-    /// Below, for any r, `s >= r·Δ / (max r·(A - c_A) + max -r·(B - c_B))` with the supports bounded by duality; above, a point
-    /// that both bodies contain when grown.
+    /// Below, for any r, `s >= r·Δ / (max r·(A - c_A) + max -r·(B - c_B))` with the supports
+    /// bounded by duality; above, a point that both bodies contain when grown.
     fn bracket(
         &self,
         (p, l): (&Trial, &[Big]),

@@ -15,7 +15,8 @@ pub struct Truth {
     pub upper: Big,
     /// Minimiser, relative to the translation of the first body, metres; world directions.
     pub x: Vector,
-    /// Derivative with respect to the twists `(v_a, ω_a, v_b, ω_b)` of the bodies, each about its own translation.
+    /// Derivative with respect to the twists `(v_a, ω_a, v_b, ω_b)` of the bodies, each about its
+    /// own translation.
     pub gradient: [f64; 12],
     /// What proves `lower`.
     pub dual: Dual,
@@ -37,7 +38,7 @@ impl Truth {
             && (answer.upper == f64::INFINITY || self.lower <= big(answer.upper))
     }
 
-    /// Whether it tells the answer right from wrong, as that of distances does.
+    /// Whether it distinguishes a right answer from a wrong one, as that of distances does.
     pub fn decides(&self, answer: &LevelDistance) -> bool {
         let finite = answer.lower.is_finite() && answer.upper.is_finite();
         let all_inside = finite && big(answer.lower) <= self.lower && self.upper <= big(answer.upper);
@@ -68,7 +69,8 @@ const TARGET: f64 = 1e-40;
 /// Bracket at which the search ends where the target is out of reach.
 const SHARP: f64 = 1e-13;
 
-/// Solves for `d(A‖B)` from the witness of an answer; proven by its own bracket, as [`super::distance()`].
+/// Solves for `d(A‖B)` from the witness of an answer; proven by its own bracket, as
+/// [`super::distance()`].
 pub fn level_distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer: &LevelDistance) -> Truth {
     let unit = b.circumscribed().radius.log2().round().exp2();
     let origin = pose_a.translation();
@@ -137,7 +139,8 @@ fn newton(one: &Solid<'_>, two: &Solid<'_>, p: &Trial, q: &Trial, (start, ridge)
     let mut x = start.clone();
     let mut nu: Vec<Big> = p.multiplier.iter().map(|&m| big(m)).collect();
     let mut s = one.largest(&x);
-    // Far away the values of A are many powers of ten: brought to about 1, or the pivots of the system say nothing of its rank.
+    // Far away the values of A are many powers of ten: brought to about 1, or the pivots of the
+    // system say nothing of its rank.
     let scale = big(double(&s).abs().max(1.0).log2().round().exp2());
     let factor = big(1.0) / &scale;
     s *= &factor;

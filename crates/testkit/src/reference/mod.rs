@@ -1,9 +1,11 @@
-//! The truth with 200 bits: Newton's method on the optimality systems, started at an answer's witnesses.
+//! The truth with 200 bits: Newton's method on the optimality systems, started at an answer's
+//! witnesses.
 //!
-//! Nothing is shared with the solver but the stored numbers: polynomials are evaluated term by term from their coefficients,
-//! normalizations are exact, and a pose's quaternion is normalized exactly. What Newton's method finds is not believed either:
-//! it is bracketed by weak duality (below) and feasibility (above) in the same 200 bits, usually within 1e-40 of the size, so
-//! that "the bracket of the answer contains the truth" is decided and not estimated.
+//! Nothing is shared with the solver but the stored numbers: polynomials are evaluated term by term
+//! from their coefficients, normalizations are exact, and a pose's quaternion is normalized
+//! exactly. What Newton's method finds is not believed either: it is bracketed by weak duality
+//! (below) and feasibility (above) in the same 200 bits, usually within 1e-40 of the size, so that
+//! "the bracket of the answer contains the truth" is decided and not estimated.
 
 mod active;
 pub mod big;

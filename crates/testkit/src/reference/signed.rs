@@ -1,7 +1,8 @@
 //! The signed distance of two bodies with 200 bits, along the branch of an answer.
 //!
-//! In overlap the shortest way out is the least of many: what an answer's normal leads to is a stationary one, and the
-//! optimality system of the distance with a negative D says which. Whether another way is shorter is not decided here.
+//! In overlap the shortest way out is the least of many: what an answer's normal leads to is a
+//! stationary one, and the optimality system of the distance with a negative D says which. Whether
+//! another way is shorter is not decided here.
 
 use super::active::{CLOSE, for_direction};
 use super::big::{Big, Vector, big, double, scaled, sub, vector};
@@ -17,9 +18,11 @@ use sublevel_core::measure::{Pose, SignedDistance};
 pub struct Truth {
     /// Metres.
     pub value: f64,
-    /// Derivative with respect to the twists `(v_a, ω_a, v_b, ω_b)` of the bodies, each about its own translation.
+    /// Derivative with respect to the twists `(v_a, ω_a, v_b, ω_b)` of the bodies, each about its
+    /// own translation.
     pub gradient: [f64; 12],
-    /// Unit normal from the second body to the first, and what proves that a plane across it parts the bodies by the value.
+    /// Unit normal from the second body to the first, and what proves that a plane across it parts
+    /// the bodies by the value.
     pub normal: Vector,
     pub dual: Dual,
 }
@@ -27,7 +30,8 @@ pub struct Truth {
 /// Step at which an iterate is taken, in units of the larger body.
 const TARGET: f64 = 1e-40;
 
-/// Solves for the stationary point next to an answer. None if Newton's method finds none with multipliers of the right sign.
+/// Solves for the stationary point next to an answer. None if Newton's method finds none with
+/// multipliers of the right sign.
 pub fn signed_distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer: &SignedDistance) -> Option<Truth> {
     let (large, small) = (a.circumscribed().radius, b.circumscribed().radius);
     let (large, small) = (large.max(small), large.min(small));

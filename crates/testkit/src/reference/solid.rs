@@ -23,7 +23,8 @@ impl Jet {
     }
 }
 
-/// A body in the frame of work: world directions, origin at the first body's translation, lengths in `unit` metres.
+/// A body in the frame of work: world directions, origin at the first body's translation, lengths
+/// in `unit` metres.
 pub struct Solid<'a> {
     body: &'a Body,
     /// `z = linear v + offset` for points v of the frame of work.
@@ -121,7 +122,8 @@ impl<'a> Solid<'a> {
         super::big::norm(&sub(v, &self.center)) + &self.radius
     }
 
-    /// The point of the body where the segment from the interior point to v leaves it, or a little before; v if inside.
+    /// The point of the body where the segment from the interior point to v leaves it, or a little
+    /// before; v if inside.
     pub fn pull_in(&self, v: &Vector) -> Option<Vector> {
         let (mut point, mut value) = (v.clone(), self.largest(v));
         let deepest = self.largest(&self.interior);

@@ -28,8 +28,8 @@ enum Fate {
     TooFar,
 }
 
-/// Flat, collinear, double, few, many, far, tiny and outlying points: a certified body that holds them all, or an error that names the
-/// reason.
+/// Flat, collinear, double, few, many, far, tiny and outlying points: a certified body that holds
+/// them all, or an error that names the reason.
 pub(super) fn clouds(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
     if method != Method::Cold {
         return Ok(None);
@@ -41,7 +41,9 @@ pub(super) fn clouds(seed: u64, method: Method) -> Result<Option<Verdict>, CaseE
     Ok(Some(match (fate, made) {
         (Fate::Fits, Ok(made)) => certified(&made, &points),
         (_, Ok(_)) => Verdict::WrongStatus("points without a body were fitted".into()),
-        (Fate::Flat(shape), Err(FitError::Hull(HullError::Flat { shape: told, .. }))) if told == shape => Verdict::Pass,
+        (Fate::Flat(shape), Err(FitError::Hull(HullError::Flat { shape: announce, .. }))) if announce == shape => {
+            Verdict::Pass
+        }
         (Fate::TooFew, Err(FitError::TooFewPoints(3)))
         | (Fate::TooFar, Err(FitError::Hull(HullError::TooFar { .. }))) => Verdict::Pass,
         (_, Err(error)) => Verdict::WrongStatus(error.to_string()),

@@ -18,8 +18,8 @@ const RUN: usize = 4;
 /// Runs that go through all 31 gaps.
 const RUNS: u64 = 10;
 
-/// Coaxial, along one of the axes, at gaps that follow each other from a centimetre of overlap to a centimetre apart, over an ulp of the
-/// offset and none.
+/// Coaxial, along one of the axes, at gaps that follow each other from a centimetre of overlap to a
+/// centimetre apart, over an ulp of the offset and none.
 pub(super) fn kissing(seed: u64) -> Result<Vec<Case>, CaseError> {
     let mut random = random(1, seed);
     let all = 12 * RUNS;
@@ -93,8 +93,9 @@ pub(super) fn parallel_faces(seed: u64) -> Result<Case, CaseError> {
     Ok(Case::new(&a, Pose::identity(), &b, place, format!("gap {gap:e} m, tilt {tilt:e} rad")))
 }
 
-/// Touching pairs: the height along the normal is the distance up to what a deviation of [`NORMAL`] costs; and without a gap, on both
-/// sides of contact, the signed distance has the slopes that it says.
+/// Touching pairs: the height along the normal is the distance up to what a deviation of [`NORMAL`]
+/// costs; and without a gap, on both sides of contact, the signed distance has the slopes that it
+/// says.
 pub(super) fn normal(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
     let mut random = random(8, seed);
     let zoo = [e(1.0, 0.6, 0.8)?, q(4, 0.5, 0.7, 0.9)?, c(4, 0.6, 0.4)?, p(6, 0.7)?, q(6, 0.3, 1.0, 0.6)?];
@@ -107,7 +108,8 @@ pub(super) fn normal(seed: u64, method: Method) -> Result<Option<Verdict>, CaseE
     let between = || proposal.points.and_then(|[x, y]| (x - y).try_normalize(0.0));
     if let Some(n) = proposal.normal.or_else(between) {
         let lost = truth.upper - case.height_at(&n, &proposal) - truth.floor;
-        // Turned by an angle, the height falls by half its square times the bodies' curvature radii, or less.
+        // Turned by an angle, the height falls by half its square times the bodies' curvature
+        // radii, or less.
         let allowed = 8.0 * NORMAL * NORMAL * case.large();
         if !(lost <= allowed) {
             return Ok(Some(Verdict::Off((lost / case.large() / 8.0).sqrt())));
@@ -123,7 +125,7 @@ pub(super) fn normal(seed: u64, method: Method) -> Result<Option<Verdict>, CaseE
     both_sides(&Case { accuracy: DEFAULT_ACCURACY, ..case }, method).map(Some)
 }
 
-/// Flats of degree 8 a tenth apart: the error falls to the stated floor, beyond it the status tells.
+/// Flats of degree 8 a tenth apart: the error falls to the stated floor, beyond it the status says.
 pub(super) fn tight(seed: u64) -> Result<Case, CaseError> {
     let seed = strewn(seed, 189);
     let (a, b) = match seed % 3 {

@@ -25,8 +25,8 @@ fn ball(constant: f64, off: f64) -> Result<bool, CaseError> {
     Ok(Body::new("ball", normalization, vec![Constraint { polynomial, gram }]).is_ok())
 }
 
-/// Every other time data that must be refused, as long as there are some, else bodies that are all but degenerate: those are refused, or
-/// served within a bracket that is true.
+/// Every other time data that must be refused, as long as there are some, else bodies that are all
+/// but degenerate: those are refused, or served within a bracket that is true.
 pub(super) fn ill_conditioned(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
     let number = seed / 2;
     if seed.is_multiple_of(2) && number < BAD {

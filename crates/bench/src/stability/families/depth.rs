@@ -16,7 +16,8 @@ const STEPS: u32 = 12;
 /// How near to both ends there are more of them, relative to the whole slide.
 const ENDS: [f64; 5] = [1e-3, 1e-6, 1e-9, 1e-12, 1e-15];
 
-/// Offset from the common centre, relative to the whole slide, up to which the mirrored way out is as short, and told.
+/// Offset from the common centre, relative to the whole slide, up to which the mirrored way out is
+/// as short, and reported.
 const MIRRORED: f64 = 1e-6;
 
 /// Deviation that others may have from what a signed distance does, relative to the smaller body.
@@ -32,8 +33,9 @@ struct Step {
     tied: bool,
 }
 
-/// A slide from touching to concentric. About their centres the bodies are their own mirror images: the signed distance falls all the
-/// way, by no more than the motion; ours tells how well it is known, that the way out is tied where it is, and has a way out everywhere.
+/// A slide from touching to concentric. About their centres the bodies are their own mirror images:
+/// the signed distance falls all the way, by no more than the motion; ours says how well it is
+/// known, that the way out is tied where it is, and has a way out everywhere.
 pub(super) fn slide(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
     if !matches!(method, Method::Cold | Method::Warm | Method::Parry) {
         return Ok(None);
@@ -98,9 +100,10 @@ pub(super) fn slide(seed: u64, method: Method) -> Result<Option<Verdict>, CaseEr
                 return what("no way out");
             }
             if share < MIRRORED && !tied {
-                return what("the mirrored way out is not told");
+                return what("the mirrored way out is not reported");
             }
-            // Concentric balls have no way out that is better than others: wide is right there, and told as a tie.
+            // Concentric balls have no way out that is better than others: wide is right there, and
+            // reported as a tie.
             if status != Status::Converged && !(tied && upper - lower <= 1e-2 * lower.abs()) {
                 return what("still wide");
             }
@@ -121,7 +124,8 @@ pub(super) fn slide(seed: u64, method: Method) -> Result<Option<Verdict>, CaseEr
     Ok(Some(Verdict::Pass))
 }
 
-/// The seed of the level distance inside the other body: flagged, while the growth distance goes on in proportion to the offset.
+/// The seed of the level distance inside the other body: flagged, while the growth distance goes on
+/// in proportion to the offset.
 pub(super) fn saturation(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
     if !matches!(method, Method::Cold | Method::Warm) {
         return Ok(None);

@@ -84,7 +84,8 @@ impl Measure {
     }
 }
 
-/// The gradients of all measures, in all regimes, with respect to both poses, against differences of tight values.
+/// The gradients of all measures, in all regimes, with respect to both poses, against differences
+/// of tight values.
 pub(super) fn gradient(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
     let measure = [Measure::Distance, Measure::Signed, Measure::Level, Measure::Growth][(seed % 4) as usize];
     let is_asked = match method {
@@ -105,7 +106,8 @@ pub(super) fn gradient(seed: u64, method: Method) -> Result<Option<Verdict>, Cas
         let small = a.circumscribed().radius.min(b.circumscribed().radius);
         let regimes = if measure == Measure::Distance { APART } else { GAPS.len() as u64 };
         let mut gap = GAPS[(seed / 4 % regimes) as usize];
-        // Where edges touch, many planes part the bodies: the derivative on one side is not the one on the other.
+        // Where edges touch, many planes part the bodies: the derivative on one side is not the one
+        // on the other.
         let edged = !(a.is_smooth() && b.is_smooth());
         if edged && gap.abs() < 1e-2 {
             gap = 1e-2_f64.copysign(gap);
@@ -146,7 +148,8 @@ fn newton_gradients(case: &Case) -> Result<Option<Option<[Twist; 2]>>, CaseError
     Ok(Some(Some([of(n, x - case.pose_a.translation()), of(-n, y - case.pose_b.translation())])))
 }
 
-/// The slopes of the signed distance of touching bodies, towards each other and away, are those that it says.
+/// The slopes of the signed distance of touching bodies, towards each other and away, are those
+/// that it says.
 pub(super) fn both_sides(case: &Case, method: Method) -> Result<Verdict, CaseError> {
     let found = case.signed(method)?;
     let Some(gradients) = found.gradients else { return Ok(Verdict::NoAnswer) };
@@ -179,7 +182,8 @@ enum Side {
     Below,
 }
 
-/// Slopes of a measure along the 12 components of the twists of both bodies, angles in units of the bodies' sizes: all are per metre.
+/// Slopes of a measure along the 12 components of the twists of both bodies, angles in units of the
+/// bodies' sizes: all are per metre.
 struct Differences<'a> {
     case: &'a Case,
     value: &'a dyn Fn([&Pose; 2]) -> f64,
@@ -218,8 +222,8 @@ impl Differences<'_> {
         Ok(Verdict::WrongStatus(format!("{what}, differences of the value leave {least:.1e} open")))
     }
 
-    /// The slope along a component, extrapolated from three steps of which the first is h, and how much the last extrapolation
-    /// changed.
+    /// The slope along a component, extrapolated from three steps of which the first is h, and how
+    /// much the last extrapolation changed.
     fn slope(&self, k: usize, h: f64, size: f64, side: Side) -> Result<(f64, f64), CaseError> {
         let after = |step: f64| -> Result<f64, CaseError> {
             let Case { pose_a, pose_b, .. } = self.case;

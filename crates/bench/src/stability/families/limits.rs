@@ -15,7 +15,7 @@ fn pair(random: &mut Random) -> Result<(&'static Body, &'static Body, f64), Case
     Ok((a, b, a.circumscribed().radius + b.circumscribed().radius))
 }
 
-/// Not enough iterations: the bracket holds the truth all the same, and the status tells.
+/// Not enough iterations: the bracket holds the truth all the same, and the status says.
 pub(super) fn few_iterations(seed: u64) -> Result<Case, CaseError> {
     let mut random = random(2, seed);
     let (a, b, sum) = pair(&mut random)?;
@@ -25,7 +25,8 @@ pub(super) fn few_iterations(seed: u64) -> Result<Case, CaseError> {
     Ok(Case { limit: Some(limit), ..Case::new(a, pose_a, b, pose_b, format!("limit {limit}")) })
 }
 
-/// Hints of other poses, other pairs, swapped ones, from beyond floating point: the same bracketed value.
+/// Hints of other poses, other pairs, swapped ones, from beyond floating point: the same bracketed
+/// value.
 pub(super) fn bad_hint(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
     if method != Method::Warm {
         return Ok(None);

@@ -33,7 +33,7 @@ pub(super) enum Put {
     Distance(fn(u64) -> Result<Case, CaseError>),
     /// As distances, to all methods, whose answers must also go together.
     Distances(fn(u64) -> Result<Vec<Case>, CaseError>, Together),
-    /// In the family's own way; none where a method can not be asked.
+    /// In the family's own way; none where a method cannot be asked.
     Own(fn(u64, Method) -> Result<Option<Verdict>, CaseError>),
 }
 
@@ -115,7 +115,8 @@ fn put_together(cases: Vec<Case>, together: Together, method: Method) -> Result<
     together(&heard, method).map(Some)
 }
 
-/// The case of a seed, of so many that go through all settings: those of the first seeds are strewn over all of them.
+/// The case of a seed, of so many that go through all settings: those of the first seeds are strewn
+/// over all of them.
 fn strewn(seed: u64, cases: u64) -> u64 {
     // Prime, and no factor of the numbers of cases.
     seed % cases * 61 % cases
@@ -147,7 +148,8 @@ fn shifted(from: &Pose, by: Vector3<f64>) -> Result<Pose, CaseError> {
     pose(from.translation() + by, from.rotation())
 }
 
-/// The case with the second body moved along the line of the nearest points until the gap is this, metres; first they are apart.
+/// The case with the second body moved along the line of the nearest points until the gap is this,
+/// metres; first they are apart.
 fn moved_to(mut case: Case, gap: f64) -> Result<Case, CaseError> {
     let answer = case.ours(Method::Cold)?;
     if let Some(n) = answer.normal {

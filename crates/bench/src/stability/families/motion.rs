@@ -28,14 +28,15 @@ struct Meeting {
     /// Distance that counts as contact, relative to the smaller body.
     contact: f64,
     truth: Truth,
-    /// Half-extents of the first body and radius of the second, metres, if they are a box and a ball.
+    /// Half-extents of the first body and radius of the second, metres, if they are a box and a
+    /// ball.
     box_and_ball: Option<(Vector3<f64>, f64)>,
 }
 
 /// When they meet, seconds.
 enum Truth {
-    /// At this time; `early` is how much earlier the contact distance makes it, `rounding` what rounding of poses does, `turn` all that
-    /// errors are relative to.
+    /// At this time; `early` is how much earlier the contact distance makes it, `rounding` what
+    /// rounding of poses does, `turn` all that errors are relative to.
     At { time: f64, early: f64, rounding: f64, turn: f64 },
     /// At this time or before.
     Before(f64),
@@ -45,7 +46,8 @@ enum Truth {
     Open,
 }
 
-/// A blade that turns, a flight through a slab, and grazing by a billionth: never later than the closed form and dense sampling.
+/// A blade that turns, a flight through a slab, and grazing by a billionth: never later than the
+/// closed form and dense sampling.
 pub(super) fn impact(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
     if !matches!(method, Method::Cold | Method::Parry) {
         return Ok(None);
@@ -59,8 +61,8 @@ pub(super) fn impact(seed: u64, method: Method) -> Result<Option<Verdict>, CaseE
     if method == Method::Cold { meeting.ours().map(Some) } else { Ok(meeting.of_parry()) }
 }
 
-/// A blade strikes a ball where the ball's distance from the axis times the sine of the angle between them is the sum of half the
-/// blade's thickness and the ball's radius.
+/// A blade strikes a ball where the ball's distance from the axis times the sine of the angle
+/// between them is the sum of half the blade's thickness and the ball's radius.
 fn blade(index: u64, random: &mut Random) -> Result<Meeting, CaseError> {
     const CONTACT: f64 = 1e-6;
     let (thin, radius) = (random.between(1e-3, 0.05), random.between(1e-3, 0.1));
@@ -92,8 +94,8 @@ fn blade(index: u64, random: &mut Random) -> Result<Meeting, CaseError> {
 /// Half the thickness of a slab of a centimetre, metres.
 const SLAB: f64 = 0.005;
 
-/// Something small at 100 m/s through a slab, straight or slanted, spinning or not; every other time a ball through a box, which has a
-/// closed form.
+/// Something small at 100 m/s through a slab, straight or slanted, spinning or not; every other
+/// time a ball through a box, which has a closed form.
 fn slab(index: u64, random: &mut Random) -> Result<Meeting, CaseError> {
     const CONTACT: f64 = 1e-6;
     const SPEED: f64 = 100.0;
@@ -141,7 +143,8 @@ fn slab(index: u64, random: &mut Random) -> Result<Meeting, CaseError> {
     })
 }
 
-/// Past each other by a billionth of a metre, or touching by one: tip to tip, face to face, or one of each.
+/// Past each other by a billionth of a metre, or touching by one: tip to tip, face to face, or one
+/// of each.
 fn grazing(index: u64, random: &mut Random) -> Result<Meeting, CaseError> {
     let aside = if index.is_multiple_of(2) { 1e-9 } else { -1e-9 };
     let (half, other_half) = (random.between(0.1, 1.0), random.between(0.1, 1.0));

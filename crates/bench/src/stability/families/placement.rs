@@ -12,7 +12,8 @@ use sublevel::measure::{
     Distance, Options, Pose, Twist, WarmStart, distance, distance_batch, growth_distance, level_distance,
 };
 
-/// Pairs of bodies of a case of [`far_apart`], and poses of the second body of each: 1008 pairs of poses.
+/// Pairs of bodies of a case of [`far_apart`], and poses of the second body of each: 1008 pairs of
+/// poses.
 const PAIRS: u64 = 112;
 /// See [`PAIRS`].
 const POSES: usize = 9;
@@ -20,8 +21,9 @@ const POSES: usize = 9;
 /// Directions between the bodies that are tried for each pair, beside those of the answer.
 const DIRECTIONS: usize = 3;
 
-/// Up to a hundred sizes apart: no plane between the bodies is farther than the answer says. Ours get a block of pairs, in their batch
-/// nine at a time, warm from one to the next; others get the first pair.
+/// Up to a hundred sizes apart: no plane between the bodies is farther than the answer says. Ours
+/// get a block of pairs, in their batch nine at a time, warm from one to the next; others get the
+/// first pair.
 pub(super) fn far_apart(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
     for k in 0..PAIRS {
         let mut random = random(4, seed * PAIRS + k);
@@ -64,7 +66,8 @@ pub(super) fn far_apart(seed: u64, method: Method) -> Result<Option<Verdict>, Ca
     Ok(Some(Verdict::Pass))
 }
 
-/// Judges an answer by its own witnesses and planes, and by planes across the line of centres and near it.
+/// Judges an answer by its own witnesses and planes, and by planes across the line of centres and
+/// near it.
 fn parted(case: &Case, answer: &Distance, random: &mut Random) -> Result<Verdict, CaseError> {
     let between = case.pose_a.translation() - case.pose_b.translation();
     let axis = between.try_normalize(0.0).unwrap_or_else(Vector3::x);
@@ -99,7 +102,8 @@ pub(super) fn common_point(seed: u64) -> Result<Case, CaseError> {
     Ok(Case { exact: Some(0.0), bound: Some(0.0), ..Case::new(a, pose_a, b, pose_b, "in overlap".into()) })
 }
 
-/// Identical bodies with integer coordinates: the distance is what the offset exceeds twice the half-axis by.
+/// Identical bodies with integer coordinates: the distance is what the offset exceeds twice the
+/// half-axis by.
 pub(super) fn along_an_axis(seed: u64) -> Result<Case, CaseError> {
     let seed = strewn(seed, 336);
     let (body, halves) = match seed % 8 {
@@ -133,12 +137,13 @@ pub(super) fn concentric(seed: u64) -> Result<Vec<Case>, CaseError> {
     Ok(vec![Case { exact: Some(0.0), bound: Some(0.0), ..case }])
 }
 
-/// How far centres of symmetric bodies may be from each other, relative to the smaller body, for the way out to be flagged as tied: less
-/// than the accuracy of a depth.
+/// How far centres of symmetric bodies may be from each other, relative to the smaller body, for
+/// the way out to be flagged as tied: less than the accuracy of a depth.
 const CENTRED: f64 = 1e-5;
 
-/// All measures of bodies in each other have values, and say what is not unique: the normal of a distance, the way out of mirror images,
-/// the normal of centres that coincide, and a level that is the least there is.
+/// All measures of bodies in each other have values, and say what is not unique: the normal of a
+/// distance, the way out of mirror images, the normal of centres that coincide, and a level that is
+/// the least there is.
 pub(super) fn defined(heard: &[(Case, Said)], method: Method) -> Result<Verdict, CaseError> {
     let [(case, said)] = heard else { return Ok(Verdict::Pass) };
     let Some(answer) = &said.answer else { return Ok(Verdict::Pass) };
@@ -214,7 +219,8 @@ pub(super) fn swapped(seed: u64) -> Result<Vec<Case>, CaseError> {
 /// How far normals may turn: the bracket holds them to its square root.
 const NORMAL: f64 = 1e-3;
 
-/// The same values; of ours also the same normals, the other way round or carried along, where the gap is wide enough to tell.
+/// The same values; of ours also the same normals, the other way round or carried along, where the
+/// gap is wide enough to tell.
 pub(super) fn unswapped(heard: &[(Case, Said)], method: Method) -> Result<Verdict, CaseError> {
     let [(first, one), rest @ ..] = heard else { return Ok(Verdict::Pass) };
     let Some(value) = one.value else { return Ok(Verdict::NoAnswer) };

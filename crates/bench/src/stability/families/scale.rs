@@ -10,7 +10,8 @@ use std::f64::consts::FRAC_PI_2;
 use sublevel::body::Body;
 use sublevel::measure::{Distance, Pose};
 
-/// Ratio 10 to 1e6, apart, near, touching and overlapping: error of at most 1e-9 of the smaller and 64 ε of the larger.
+/// Ratio 10 to 1e6, apart, near, touching and overlapping: error of at most 1e-9 of the smaller and
+/// 64 ε of the larger.
 pub(super) fn ratio(seed: u64) -> Result<Case, CaseError> {
     let mut random = random(9, seed);
     let ratio = 10_f64.powi((seed % 6) as i32 + 1);
@@ -84,7 +85,8 @@ pub(super) fn units(seed: u64) -> Result<Vec<Case>, CaseError> {
     Ok(vec![at_unit(1.0)?, at_unit(s)?])
 }
 
-/// The same in other units: of ours, bit for bit with as many iterations where nothing rounds, elsewhere within the brackets.
+/// The same in other units: of ours, bit for bit with as many iterations where nothing rounds,
+/// elsewhere within the brackets.
 pub(super) fn unscaled(heard: &[(Case, Said)], method: Method) -> Result<Verdict, CaseError> {
     let [(case, one), (scaled, other)] = heard else { return Ok(Verdict::Pass) };
     let (Some(value), Some(found)) = (one.value, other.value) else { return Ok(Verdict::NoAnswer) };

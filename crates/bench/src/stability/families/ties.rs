@@ -12,7 +12,8 @@ use sublevel::measure::{Options, Pose, WarmStart, distance, signed_distance};
 /// Normals that differ by this much have jumped.
 const JUMP: f64 = 0.3;
 
-/// Steps along a line on which jumps are looked for, and the share of the line to which one is narrowed down without a flag.
+/// Steps along a line on which jumps are looked for, and the share of the line to which one is
+/// narrowed down without a flag.
 const STEPS: u32 = 20;
 /// See [`STEPS`].
 const NARROW: f64 = 1e-12;
@@ -23,7 +24,8 @@ type Flagged = (bool, Vector3<f64>);
 /// Answers along a line from 0 to 1.
 type Line<'a> = &'a dyn Fn(f64, &mut WarmStart) -> Result<Flagged, CaseError>;
 
-/// Two ways out of a symmetric overlap, two parts as near as each other: flagged there, and wherever the normal jumps.
+/// Two ways out of a symmetric overlap, two parts as near as each other: flagged there, and
+/// wherever the normal jumps.
 pub(super) fn ties(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
     if !matches!(method, Method::Cold | Method::Warm) {
         return Ok(None);
@@ -35,7 +37,8 @@ pub(super) fn ties(seed: u64, method: Method) -> Result<Option<Verdict>, CaseErr
     put(&mut random, &turn, method).map(Some)
 }
 
-/// A small body inside of a host, both turned alike: tied at the common centre, and across mirror planes.
+/// A small body inside of a host, both turned alike: tied at the common centre, and across mirror
+/// planes.
 fn ways_out(random: &mut Random, turn: &UnitQuaternion<f64>, method: Method) -> Result<Verdict, CaseError> {
     let inner = [e(0.2, 0.2, 0.2)?, q(4, 0.3, 0.2, 0.25)?, b(0.3, 0.2, 0.25)?, q(8, 0.2, 0.3, 0.2)?];
     let hosts = [b(1.0, 1.0, 1.0)?, b(1.0, 0.5, 2.0)?, q(8, 1.0, 1.0, 1.0)?, e(1.0, 1.0, 1.5)?, q(4, 1.0, 0.5, 1.0)?];
@@ -69,7 +72,8 @@ fn ways_out(random: &mut Random, turn: &UnitQuaternion<f64>, method: Method) -> 
     Ok(Verdict::Pass)
 }
 
-/// The least distance over pairs: mirror images on both sides, the third body in the mirror plane or beside it.
+/// The least distance over pairs: mirror images on both sides, the third body in the mirror plane
+/// or beside it.
 fn pairs(random: &mut Random, turn: &UnitQuaternion<f64>, method: Method) -> Result<Verdict, CaseError> {
     let part = if random.index(2) == 0 { e(0.5, 0.3, 0.4)? } else { q(4, 0.4, 0.5, 0.3)? };
     let place = |side: f64| part.moved(&UnitQuaternion::identity(), &Vector3::x().scale(side));
@@ -101,8 +105,8 @@ fn pairs(random: &mut Random, turn: &UnitQuaternion<f64>, method: Method) -> Res
     })
 }
 
-/// Follows a line in small steps, warm ones with the hint of the step before, and narrows down each jump of the normal until a flag is
-/// met; where none is.
+/// Follows a line in small steps, warm ones with the hint of the step before, and narrows down each
+/// jump of the normal until a flag is met; where none is.
 fn unflagged_jump(line: Line<'_>, method: Method) -> Result<Option<f64>, CaseError> {
     let jumped = |p: &Flagged, q: &Flagged| !p.0 && !q.0 && (p.1 - q.1).norm() > JUMP;
     let mut warm = WarmStart::default();

@@ -63,8 +63,8 @@ fn volume(piece: &Piece) -> f64 {
     piece.triangles().iter().map(|&[a, b, c]| x(a).dot(&x(b).cross(&x(c)))).sum::<f64>() / 6.0
 }
 
-/// Winding number about a point, by the solid angles of the triangles (van Oosterom and Strackee, The solid angle of a plane
-/// triangle, IEEE Trans. Biomed. Eng. 30, 1983).
+/// Winding number about a point, by the solid angles of the triangles (van Oosterom and Strackee,
+/// The solid angle of a plane triangle, IEEE Trans. Biomed. Eng. 30, 1983).
 fn winding(piece: &Piece, about: &Vector3<f64>) -> f64 {
     let angle = |triangle: &[usize; 3]| {
         let [a, b, c] = triangle.map(|i| piece.spots()[i].x - about);
@@ -101,7 +101,8 @@ fn points_of_edges_are_within_their_radius() {
     }
 }
 
-/// What the spots of a piece stand for, by all that is known of them: at 10^6 m two can have the same coordinates.
+/// What the spots of a piece stand for, by all that is known of them: at 10^6 m two can have the
+/// same coordinates.
 type Truth = HashMap<[u64; 4], Exact>;
 
 fn key(spot: &Spot) -> [u64; 4] {
@@ -180,7 +181,8 @@ fn winding_numbers_add_up() {
 
 #[test]
 fn a_corner_where_cuts_meet_inside_belongs_to_its_pieces() {
-    // No triangle of a cube's octant has the centre of the cube for a corner; without it the octants' hulls leave a hole.
+    // No triangle of a cube's octant has the centre of the cube for a corner; without it the
+    // octants' hulls leave a hole.
     let mut pieces = vec![piece(&cube())];
     for axis in 0..3 {
         pieces = pieces.iter().flat_map(|piece| piece.cut(&Vector3::ith(axis, 1.0), 0.1)).collect();
@@ -288,7 +290,8 @@ fn faces_in_the_plane_go_with_the_solid_behind_them() {
 
 #[test]
 fn sections_do_not_reach_across_holes() {
-    // A box with a hole through it, cut across the hole and then along it: the sides of the second cut have no spot in the hole.
+    // A box with a hole through it, cut across the hole and then along it: the sides of the second
+    // cut have no spot in the hole.
     let ring = |half: f64, z: f64| {
         [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| Vector3::new(half * x, half * y, z))
     };

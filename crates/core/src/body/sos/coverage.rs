@@ -29,7 +29,8 @@ pub struct Uncovered {
     pub triangle: usize,
     /// Its area, m².
     pub area_m2: f64,
-    /// A value that the polynomial takes on it, up to rounding: above 1 unless only the proof failed.
+    /// A value that the polynomial takes on it, up to rounding: above 1 unless only the proof
+    /// failed.
     pub value: f64,
     /// Proven upper bound of the values that it takes there.
     pub value_upper: f64,
@@ -50,7 +51,8 @@ pub struct TriangleError {
 }
 
 impl SosBody {
-    /// Proves triangles inside, one by one (`Polynomial::peak`); `triangles` are indices of `points`, metres.
+    /// Proves triangles inside, one by one (`Polynomial::peak`); `triangles` are indices of
+    /// `points`, metres.
     ///
     /// # Errors
     /// An index that is out of range.
@@ -84,7 +86,8 @@ impl SosBody {
     fn peak(&self, corners: &[Vector3<f64>; 3]) -> Peak {
         let placement = &self.placement;
         let z = corners.map(|x| placement.linear() * (x - placement.origin()));
-        // Every corner's exact image is this close to the computed one, in each coordinate, and so are those of their mixtures.
+        // Every corner's exact image is this close to the computed one, in each coordinate, and so
+        // are those of their mixtures.
         let displacement = corners.iter().map(|x| placement.displacement(x)).fold(0.0, f64::max);
         self.polynomial.peak(&z, displacement * placement.row_norms().amax() * (1.0 + 1e-14), 1.0)
     }

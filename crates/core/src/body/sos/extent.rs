@@ -1,4 +1,5 @@
-//! How far a set reaches, proven without convexity: a first box from the Gram matrix, closer ones by dividing it.
+//! How far a set reaches, proven without convexity: a first box from the Gram matrix, closer ones
+//! by dividing it.
 
 use super::SosBodyError;
 use crate::body::{Aabb, Ball, Placement};
@@ -7,12 +8,13 @@ use nalgebra::{Matrix3, Vector3};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// Boxes looked at for the bound along one direction, where the highest point is one, and for that of the distance, which all points of
-/// a circle may share.
+/// Boxes looked at for the bound along one direction, where the highest point is one, and for that
+/// of the distance, which all points of a circle may share.
 const BOXES: usize = 3000;
 const BOXES_ALL_AROUND: usize = 12_000;
 
-/// How close a bound is to what is attained, relative to the size of the box known before, when it is good enough.
+/// How close a bound is to what is attained, relative to the size of the box known before, when it
+/// is good enough.
 const CLOSE: f64 = 1e-3;
 
 /// Proven extent of a set in its own frame, metres.
@@ -68,7 +70,8 @@ fn unit(axis: usize) -> Vector3<f64> {
     Vector3::from_fn(|i, _| f64::from(u8::from(i == axis)))
 }
 
-/// Half the edges of a box about 0 that holds the set: `1 >= p >= ρ z_i^2j` for every power of z_i in the basis.
+/// Half the edges of a box about 0 that holds the set: `1 >= p >= ρ z_i^2j` for every power of z_i
+/// in the basis.
 fn first_box(polynomial: &Polynomial, gram: &SosGram) -> Result<Vector3<f64>, SosBodyError> {
     let mut half = Vector3::repeat(f64::INFINITY);
     for (axis, half) in half.iter_mut().enumerate() {
@@ -114,8 +117,9 @@ impl Ord for Cell {
     }
 }
 
-/// Upper bound of `height` over the points of the box `|z_i| <= first_i` with p <= 1: the highest boxes are divided until one that
-/// may hold points of the set is hardly higher than a point that is in it. An empty set has the bound minus infinity.
+/// Upper bound of `height` over the points of the box `|z_i| <= first_i` with p <= 1: the highest
+/// boxes are divided until one that may hold points of the set is hardly higher than a point that
+/// is in it. An empty set has the bound minus infinity.
 fn highest(
     polynomial: &Polynomial,
     first: &Vector3<f64>,

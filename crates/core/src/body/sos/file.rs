@@ -1,4 +1,5 @@
-//! The file of an sos-body: as that of a body, of the kind `sos-body`, and re-proven whenever it is read.
+//! The file of an sos-body: as that of a body, of the kind `sos-body`, and re-proven whenever it is
+//! read.
 
 use super::{Coverage, Relaxation, SosBody};
 use crate::body::file::{
@@ -71,8 +72,8 @@ impl SosBody {
         write(&File::from(self), 1)
     }
 
-    /// Reads a file and re-proves it: the id is recomputed, the certificates are checked, every derived value is recomputed and
-    /// compared. The coverage needs the mesh and is taken as it is.
+    /// Reads a file and re-proves it: the id is recomputed, the certificates are checked, every
+    /// derived value is recomputed and compared. The coverage needs the mesh and is taken as it is.
     ///
     /// # Errors
     /// The field that is wrong, the reason and the remedy.

@@ -1,8 +1,9 @@
 //! Sets that need not be convex: `{x : p(x) <= 1}` with p a sum of squares.
 //!
-//! An [`SosBody`] is a type of its own, so that it can not be passed where convexity is assumed. It is proven bounded, and to
-//! contain the points it was fitted around; what lies between them has to be proven triangle by triangle ([`Coverage`]).
-//! Relaxed sets also prove how far they are from convex: `p + c |u|^2d` is sos-convex ([`Relaxation`]).
+//! An [`SosBody`] is a type of its own, so that it cannot be passed where convexity is assumed. It
+//! is proven bounded, and to contain the points it was fitted around; what lies between them has to
+//! be proven triangle by triangle ([`Coverage`]). Relaxed sets also prove how far they are from
+//! convex: `p + c |u|^2d` is sos-convex ([`Relaxation`]).
 
 mod coverage;
 mod extent;
@@ -21,8 +22,8 @@ use super::{check_name, invert};
 use crate::polynomial::{CertificateError, Chords, HessianGram, NormPower, Polynomial, SosGram};
 use nalgebra::{Matrix3, Vector3};
 
-/// How far a polynomial is from sos-convex: `p(z) + c |linear z + offset|^degree` is, degree being that of p (Ahmadi, Hall,
-/// Makadia and Sindhwani, RSS 2017, section III).
+/// How far a polynomial is from sos-convex: `p(z) + c |linear z + offset|^degree` is, degree being
+/// that of p (Ahmadi, Hall, Makadia and Sindhwani, RSS 2017, section III).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Relaxation {
     /// c > 0: unit-free, as the coordinates that it belongs to.
@@ -73,8 +74,9 @@ pub enum SosBodyError {
     Empty,
 }
 
-/// A closed bounded set `{x : p(x) <= 1}` with non-empty interior, p a sum of squares, certified; immutable. It need not be
-/// convex, star-shaped or connected. Lengths are metres in the body frame.
+/// A closed bounded set `{x : p(x) <= 1}` with non-empty interior, p a sum of squares, certified;
+/// immutable. It need not be convex, star-shaped or connected. Lengths are metres in the body
+/// frame.
 #[derive(Clone, Debug)]
 pub struct SosBody {
     name: String,
@@ -94,8 +96,9 @@ pub struct SosBody {
 }
 
 impl SosBody {
-    /// Makes an sos-body of its defining numbers: proves the polynomial a sum of squares, the relaxation if there is one, the set
-    /// bounded and not empty, and computes everything derived. No semidefinite program is solved.
+    /// Makes an sos-body of its defining numbers: proves the polynomial a sum of squares, the
+    /// relaxation if there is one, the set bounded and not empty, and computes everything derived.
+    /// No semidefinite program is solved.
     ///
     /// # Errors
     /// What could not be proven, and by how much it failed.
@@ -176,7 +179,8 @@ impl SosBody {
         self.relaxation.as_ref()
     }
 
-    /// A point proven inside, in the middle of the longest chord of the rays that measure the volume.
+    /// A point proven inside, in the middle of the longest chord of the rays that measure the
+    /// volume.
     pub fn interior_point(&self) -> &Vector3<f64> {
         &self.interior_point
     }
@@ -211,8 +215,8 @@ impl SosBody {
         self.provenance.as_ref()
     }
 
-    /// Where so many rays from the centre of the circumscribed ball run through the set: both ends of each piece, metres. Thin parts
-    /// may lie between them.
+    /// Where so many rays from the centre of the circumscribed ball run through the set: both ends
+    /// of each piece, metres. Thin parts may lie between them.
     pub fn chords(&self, rays: usize) -> Vec<(Vector3<f64>, Vector3<f64>)> {
         let Normalization { center, linear } = &self.normalization;
         let ball = self.circumscribed;
@@ -261,7 +265,8 @@ impl SosBody {
         self
     }
 
-    /// The same set with its origin noted; texts should pass [`check_name`], or its file is refused.
+    /// The same set with its origin noted; texts should pass [`check_name`], or its file is
+    /// refused.
     pub fn with_provenance(mut self, provenance: Provenance) -> Self {
         self.provenance = Some(provenance);
         self

@@ -22,7 +22,8 @@ fn linear(x: f64, y: f64, z: f64, constant: f64) -> Terms {
     Terms::from([([1, 0, 0], x), ([0, 1, 0], y), ([0, 0, 1], z), ([0; 3], constant)])
 }
 
-/// The set of `Σ squares + ε Σ m² <= level` over all monomials m of half the degree: a definite Gram matrix, and hardly smaller.
+/// The set of `Σ squares + ε Σ m² <= level` over all monomials m of half the degree: a definite
+/// Gram matrix, and hardly smaller.
 fn set_of(squares: &[Terms], level: f64, epsilon: f64) -> SosBody {
     let degree = squares.iter().flatten().map(|(e, _)| e.iter().map(|&n| usize::from(n)).sum::<usize>()).max().unwrap();
     let basis = monomials(degree);
@@ -128,7 +129,8 @@ fn volumes_and_bounds_agree_with_a_grid() {
 fn triangles_are_told_apart_although_all_points_are_inside() {
     let body = torus(0.5);
     let center = body.normalization().center;
-    // Corners on the circle of the torus: a short triangle within the tube, and one across the hole.
+    // Corners on the circle of the torus: a short triangle within the tube, and one across the
+    // hole.
     let at = |angle: f64, r: f64| center + Vector3::new(angle.cos(), angle.sin(), 0.0) * r;
     let points = [at(0.0, 1.0), at(0.1, 1.1), at(0.2, 1.0), at(2.0, 1.0), at(4.0, 1.0)];
     assert!(body.prove_contains(&points).is_ok());

@@ -8,11 +8,12 @@ use std::f64::consts::PI;
 /// Rays, of which the estimate of the error takes half.
 const RAYS: usize = 20_000;
 
-/// The volume, `⅓ ∫ Σ (to³ - from³) du / |det L|` over the chords of rays from the centre of `ball`, which holds the set; and the
-/// middle of the longest chord, metres, if there is a chord.
+/// The volume, `⅓ ∫ Σ (to³ - from³) du / |det L|` over the chords of rays from the centre of
+/// `ball`, which holds the set; and the middle of the longest chord, metres, if there is a chord.
 ///
-/// Where rays graze the set the integrand is not smooth, so that rules which rest on smoothness are no better than any other, and
-/// worse where many rays of a ring graze it at once: the rays follow a Fibonacci lattice, of equal weights.
+/// Where rays graze the set the integrand is not smooth, so that rules which rest on smoothness are
+/// no better than any other, and worse where many rays of a ring graze it at once: the rays follow
+/// a Fibonacci lattice, of equal weights.
 pub(super) fn measure(
     polynomial: &Polynomial,
     normalization: &Normalization,
@@ -26,7 +27,8 @@ pub(super) fn measure(
         let mut sum = 0.0;
         for u in fibonacci_lattice(rays) {
             let metres = (inverse * u).norm();
-            // A chord may come in pieces; the last one is kept open until the next does not adjoin it.
+            // A chord may come in pieces; the last one is kept open until the next does not adjoin
+            // it.
             let mut open = (0.0, 0.0);
             let mut close = |(from, to): (f64, f64)| {
                 if (to - from) * metres > longest.0 {

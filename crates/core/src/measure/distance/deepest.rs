@@ -4,7 +4,8 @@
 //! g_i(x) <= s   for the constraints of A,   h_j(x) <= s   for those of B.
 //! ```
 //!
-//! Below 1 it lies in both. Above, its multipliers show the normal, also where the gap is too small to have a direction.
+//! Below 1 it lies in both. Above, its multipliers show the normal, also where the gap is too small
+//! to have a direction.
 
 use crate::measure::newton::Active;
 use crate::measure::pair::{Pair, Posed};
@@ -22,7 +23,8 @@ pub(super) struct Deepest {
 }
 
 impl Deepest {
-    /// A start at a point where the largest constraint is s, with the constraints that are active there.
+    /// A start at a point where the largest constraint is s, with the constraints that are active
+    /// there.
     pub(super) fn new(x: Vector3<f64>, s: f64, mut a: Active, mut b: Active) -> Self {
         let weight = 1.0 / (a.len + b.len).max(1) as f64;
         a.multiplier[..a.len].fill(weight);

@@ -36,14 +36,17 @@ pub struct Distance {
     pub witness_b: Vector3<f64>,
     /// Unit normal from the second body to the first; none on overlap.
     pub normal: Option<Vector3<f64>>,
-    /// Constraints of the first body, or of its part, that the answer rests on, with multipliers: `-n = Σ λ_i ∇g_i`; none on overlap.
+    /// Constraints of the first body, or of its part, that the answer rests on, with multipliers:
+    /// `-n = Σ λ_i ∇g_i`; none on overlap.
     pub active_a: ActiveConstraints,
-    /// Constraints of the second body, or of its part, that the answer rests on: `n = Σ λ_i ∇g_i`; none on overlap.
+    /// Constraints of the second body, or of its part, that the answer rests on: `n = Σ λ_i ∇g_i`;
+    /// none on overlap.
     pub active_b: ActiveConstraints,
-    /// Which part of each solid the answer is about: positions in [`Solid::parts`], 0 for single bodies.
+    /// Which part of each solid the answer is about: positions in [`Solid::parts`], 0 for single
+    /// bodies.
     pub parts: [u16; 2],
-    /// Whether another pair of parts may be as near, their brackets meeting: normal, witnesses and gradients may then jump.
-    /// Never for single bodies, nor on overlap.
+    /// Whether another pair of parts may be as near, their brackets meeting: normal, witnesses and
+    /// gradients may then jump. Never for single bodies, nor on overlap.
     pub tied: bool,
     /// Iterations of all methods together.
     pub iterations: u32,
@@ -74,9 +77,10 @@ impl Distance {
         0.5 * (self.lower + self.upper)
     }
 
-    /// Upper bound of the distance of the convex hulls of the objects that the bodies `a` and `b` of this answer were fitted to,
-    /// metres: the bodies contain them, so that `lower` is a bound of their distance as well, and reach at most their gaps
-    /// ([`Body::gap_m`]) beyond. None where a gap is not known. Of solids with several parts, each the hull of its own piece.
+    /// Upper bound of the distance of the convex hulls of the objects that the bodies `a` and `b`
+    /// of this answer were fitted to, metres: the bodies contain them, so that `lower` is a bound
+    /// of their distance as well, and reach at most their gaps ([`Body::gap_m`]) beyond. None where
+    /// a gap is not known. Of solids with several parts, each the hull of its own piece.
     ///
     /// ```
     /// use nalgebra::Vector3;
@@ -96,9 +100,10 @@ impl Distance {
         Some((self.upper + gaps).next_up())
     }
 
-    /// Derivatives with respect to the twists of the first and of the second body at the poses the distance was asked for
-    /// (envelope theorem: the witnesses count as fixed to their bodies), to 1e-6 of their norm at distances above the accuracy that
-    /// was asked for. None unless the bodies are proven apart: at contact the distance has no gradient, which is what
+    /// Derivatives with respect to the twists of the first and of the second body at the poses the
+    /// distance was asked for (envelope theorem: the witnesses count as fixed to their bodies), to
+    /// 1e-6 of their norm at distances above the accuracy that was asked for. None unless the
+    /// bodies are proven apart: at contact the distance has no gradient, which is what
     /// [`super::signed_distance`] is for.
     pub fn gradients(&self, pose_a: &Pose, pose_b: &Pose) -> Option<[Twist; 2]> {
         let n = self.normal.filter(|_| self.lower > 0.0)?;
@@ -109,7 +114,8 @@ impl Distance {
     }
 }
 
-/// Distance of the bodies' middles relative to the sum of their sizes, above which they are far apart.
+/// Distance of the bodies' middles relative to the sum of their sizes, above which they are far
+/// apart.
 const FAR: f64 = 2.0;
 
 fn far_apart((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose)) -> bool {
@@ -118,14 +124,15 @@ fn far_apart((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose)) -> bool {
     (middles.0 - middles.1).norm() > FAR * (ball_a.radius + ball_b.radius)
 }
 
-/// Euclidean distance between solid `a` at `pose_a` and solid `b` at `pose_b` (body to world), 0 when they touch or overlap;
-/// of solids with several parts, that of their closest parts.
+/// Euclidean distance between solid `a` at `pose_a` and solid `b` at `pose_b` (body to world), 0
+/// when they touch or overlap; of solids with several parts, that of their closest parts.
 ///
-/// The bracket is as narrow as `options` ask, or the status says that it is not.
-/// Newton's method finds the points with opposite normals along their difference: on from the last answer if `warm` has one,
-/// else from where samples of both surfaces face each other. Where that fails an interior-point method minimises ½|x - y|²;
-/// near contact, where that loses its curvature, the point deepest in both bodies decides between overlap and a gap.
-/// `warm` is read and then replaced by the hint for the next query of this pair.
+/// The bracket is as narrow as `options` ask, or the status says that it is not. Newton's method
+/// finds the points with opposite normals along their difference: on from the last answer if `warm`
+/// has one, else from where samples of both surfaces face each other. Where that fails an
+/// interior-point method minimises ½|x - y|²; near contact, where that loses its curvature, the
+/// point deepest in both bodies decides between overlap and a gap. `warm` is read and then replaced
+/// by the hint for the next query of this pair.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -166,8 +173,9 @@ pub(super) fn between(
     }
 }
 
-/// What is asked. Each way to the answer hands on to the next where it fails, and none hands back: an answer is written where
-/// the caller wants it, and not copied, for loads of what was just stored in other pieces have to wait.
+/// What is asked. Each way to the answer hands on to the next where it fails, and none hands back:
+/// an answer is written where the caller wants it, and not copied, for loads of what was just
+/// stored in other pieces have to wait.
 #[derive(Clone, Copy)]
 struct Query<'a> {
     of_a: (&'a Body, &'a Pose),
@@ -205,7 +213,8 @@ impl<'a> Query<'a> {
     fn afresh(&self, lost: &Lost, warm: &mut WarmStart) -> Distance {
         // Where edges face each other no single constraint is to be followed.
         let smooth = self.of_a.0.is_smooth() && self.of_b.0.is_smooth();
-        // From far away it does other than lanes, which bring no points back that have come too far from the bodies.
+        // From far away it does other than lanes, which bring no points back that have come too far
+        // from the bodies.
         let astray = matches!(warm.hint, Hint::Astray) && !far_apart(self.of_a, self.of_b);
         if smooth && !astray && !lost.touching() && !self.options.exhausted(lost.rounds) {
             return dispatch(Cold { query: *self, before: lost.rounds, warm });
@@ -317,8 +326,8 @@ impl WithSimd for Cold<'_> {
     }
 }
 
-/// The point of B nearest to A in the query frame and the constraints that are active there; on overlap a common point, and
-/// none.
+/// The point of B nearest to A in the query frame and the constraints that are active there; on
+/// overlap a common point, and none.
 pub(super) fn nearest(
     pair: &Pair<'_>,
     options: &Options<'_>,

@@ -1,5 +1,5 @@
-//! The search for a distance where continuation alone has not proven it: every method in turn, from the cheapest, each of them
-//! improving one bracket.
+//! The search for a distance where continuation alone has not proven it: every method in turn, from
+//! the cheapest, each of them improving one bracket.
 
 use super::deepest::Deepest;
 use super::{Distance, split};
@@ -49,7 +49,8 @@ pub(super) struct Search<'a> {
 /// Below this distance relative to the larger body, ½|x - y|² has little curvature to aim by.
 const NEAR: f64 = 1e-3;
 
-/// Distance of the outlines, relative to the larger body, above which the bodies have no point in common to look for.
+/// Distance of the outlines, relative to the larger body, above which the bodies have no point in
+/// common to look for.
 const FACING: f64 = 0.1;
 
 /// Below this one it has none that rounding leaves.
@@ -61,7 +62,8 @@ const CONTACT: f64 = 1e-18;
 /// Most steps towards the point deepest in both bodies.
 const MAX_DEEPEST: u32 = 10;
 
-/// Steps of twice the precision for which side of contact a narrow bracket is on: those that find out take half as many.
+/// Steps of twice the precision for which side of contact a narrow bracket is on: those that find
+/// out take half as many.
 const UNSURE: u32 = 8;
 
 /// Share of the way to an interior point that leaves a surface behind.
@@ -98,7 +100,8 @@ impl<'a> Search<'a> {
         self.upper.is_finite() && self.upper - self.lower <= self.tolerance
     }
 
-    /// Whether nothing is missing but the normal of the solution. Of bodies nearer than what is asked for contact is as good an answer.
+    /// Whether nothing is missing but the normal of the solution. Of bodies nearer than what is
+    /// asked for contact is as good an answer.
     fn has_to_be_aligned(&self) -> bool {
         let decided = self.goals.1.met(self.lower, self.upper) || !self.goals.0.wants_answer();
         self.narrow() && self.lower > 0.0 && self.upper > self.tolerance && !self.aligned && !decided
@@ -163,7 +166,8 @@ impl<'a> Search<'a> {
         if !self.ended() && !self.decided() && self.lower < NEAR * self.pair.size() {
             self.contact();
         }
-        // Where both are elongated or edged, first order from the deepest point is not close enough.
+        // Where both are elongated or edged, first order from the deepest point is not close
+        // enough.
         if !self.ended() {
             self.closest(NEAREST);
         }
@@ -174,7 +178,8 @@ impl<'a> Search<'a> {
         // A bracket that holds 0 but is not sure of contact is as wide as rounding left it.
         let unsure = self.narrow() && !self.decided() && !self.options.exhausted(self.iterations);
         if unsure && !self.pair.smooth() {
-            // Edges that reach into a body have brought the points together where the surfaces cross.
+            // Edges that reach into a body have brought the points together where the surfaces
+            // cross.
             let (v, n) = ((self.x + self.y) * 0.5, self.n);
             self.deepest(&v, &n);
         }
@@ -187,8 +192,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Goes on to the normal of the solution: a bracket that is narrow holds it to about the root of its width relative to the distance,
-    /// and near contact to nothing.
+    /// Goes on to the normal of the solution: a bracket that is narrow holds it to about the root
+    /// of its width relative to the distance, and near contact to nothing.
     fn align(&mut self) {
         if !self.has_to_be_aligned() || self.options.exhausted(self.iterations) {
             return;
@@ -203,8 +208,9 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Newton's method from where the outlines are nearest, with the constraints that are active there. Where two sides are all but
-    /// parallel that is anywhere on them, but the corners of one show.
+    /// Newton's method from where the outlines are nearest, with the constraints that are active
+    /// there. Where two sides are all but parallel that is anywhere on them, but the corners of one
+    /// show.
     fn outlined(&mut self) {
         let pair = self.pair;
         let found = approach(pair, &self.n);
@@ -237,8 +243,9 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Newton's method for how far apart the bodies are along a normal that is about the right one. Its steps are those of quadratic
-    /// programs, which go all the way to the edges of sides that are tilted by next to nothing.
+    /// Newton's method for how far apart the bodies are along a normal that is about the right one.
+    /// Its steps are those of quadratic programs, which go all the way to the edges of sides that
+    /// are tilted by next to nothing.
     fn along(&mut self, x: Vector3<f64>, y: Vector3<f64>, n: Vector3<f64>, a: Active, b: Active) {
         let pair = self.pair;
         let Some(mut newton) = ReachNewton::new(pair, -n, Vector3::zeros(), x, y, &-n, a, b) else { return };
@@ -261,8 +268,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The same for bodies with edges from the best points so far, with the constraints that are active there: what has led astray
-    /// from a start are the others.
+    /// The same for bodies with edges from the best points so far, with the constraints that are
+    /// active there: what has led astray from a start are the others.
     fn again(&mut self) {
         if self.pair.smooth() || self.lower == 0.0 || self.upper.is_infinite() {
             return;
@@ -313,7 +320,8 @@ impl<'a> Search<'a> {
         if lost.middle.is_some_and(|middle| self.common(&to_query(middle))) {
             return;
         }
-        // Bodies of one shape on top of each other touch all over: a bad hint finds that, and not that they overlap.
+        // Bodies of one shape on top of each other touch all over: a bad hint finds that, and not
+        // that they overlap.
         if lost.touching() && self.common(&pair.a.interior.lerp(&pair.b.interior, 0.5)) {
             return;
         }
@@ -342,7 +350,8 @@ impl<'a> Search<'a> {
         self.tried[0] = Some(DistanceNewton { x, y, distance: n.dot(&(x - y)), n, a, b });
     }
 
-    /// The interior points as an answer where nothing better was attained: early ends leave a bracket, too.
+    /// The interior points as an answer where nothing better was attained: early ends leave a
+    /// bracket, too.
     pub(super) fn attain_any(&mut self) {
         let (pair, (pose_a, pose_b)) = (self.pair, self.pair.poses());
         if self.upper.is_infinite() {
@@ -380,8 +389,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Interior-point method on ½|x - y|², with Newton's method tried as soon as it shows the active constraints; ends at
-    /// distances below `near` times the size.
+    /// Interior-point method on ½|x - y|², with Newton's method tried as soon as it shows the
+    /// active constraints; ends at distances below `near` times the size.
     fn closest(&mut self, near: f64) {
         let (start_x, start_y) = (self.pair.a.interior, self.pair.b.interior);
         let mut v = SVector::<f64, 6>::zeros();
@@ -455,7 +464,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Newton's method for the distance from a point between both bodies, with multipliers of the constraints that are largest there.
+    /// Newton's method for the distance from a point between both bodies, with multipliers of the
+    /// constraints that are largest there.
     fn part(&mut self, v: &Vector3<f64>, of_a: &Multipliers, of_b: &Multipliers) {
         let pair = self.pair;
         let (u, w) = (gradient(&pair.a, v, of_a), gradient(&pair.b, v, of_b));
@@ -478,8 +488,8 @@ impl<'a> Search<'a> {
         values.chain((0..pair.b.len()).map(|i| pair.b.jet(i, v).value)).fold(f64::MIN, f64::max)
     }
 
-    /// The point deepest in both bodies, by the interior-point method: inside both, it proves overlap; else its multipliers show the
-    /// normal.
+    /// The point deepest in both bodies, by the interior-point method: inside both, it proves
+    /// overlap; else its multipliers show the normal.
     fn contact(&mut self) {
         let pair = self.pair;
         // Far outside a small body its values would hide all else.
@@ -534,7 +544,8 @@ impl<'a> Search<'a> {
         self.tried[1] = Some(newton);
     }
 
-    /// Takes the points and the normal of an iterate if that is the one of the solution, and the bracket stays narrow; whether it is.
+    /// Takes the points and the normal of an iterate if that is the one of the solution, and the
+    /// bracket stays narrow; whether it is.
     fn adopt(&mut self, at: &DistanceNewton) -> bool {
         let pair = self.pair;
         if !at.is_aligned(pair) {
@@ -552,7 +563,8 @@ impl<'a> Search<'a> {
         narrow
     }
 
-    /// Improves the lower bound with multipliers for unit normals, trying each body's idea of the normal.
+    /// Improves the lower bound with multipliers for unit normals, trying each body's idea of the
+    /// normal.
     fn bound(&mut self, x: &Vector3<f64>, y: &Vector3<f64>, of_a: &Multipliers, of_b: &Multipliers) {
         let (u, w) = (gradient(&self.pair.a, x, of_a), gradient(&self.pair.b, y, of_b));
         let (lu, lw) = (u.norm(), w.norm());
@@ -605,7 +617,8 @@ impl<'a> Search<'a> {
         self.iterations
     }
 
-    /// The nearest point of B and the constraints that are active there; on overlap a common point, and none.
+    /// The nearest point of B and the constraints that are active there; on overlap a common point,
+    /// and none.
     pub(super) fn nearest(&self) -> (Vector3<f64>, Option<(Active, Active)>) {
         (self.y, (self.upper > 0.0).then_some(self.active))
     }
@@ -656,8 +669,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Halfway between the outward normal of B and the inward one of A at the witnesses: what the normal is where no lower bound
-    /// has proven one.
+    /// Halfway between the outward normal of B and the inward one of A at the witnesses: what the
+    /// normal is where no lower bound has proven one.
     fn between_normals(&self) -> Vector3<f64> {
         let outward = |body: &Posed<'_>, v: &Vector3<f64>| {
             let jets = (0..body.len()).map(|i| body.jet(i, v));

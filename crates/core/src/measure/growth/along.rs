@@ -1,5 +1,5 @@
-//! The growth distance as a relation of two points: `x - y` along the vector between the centres, the bodies' centres on top
-//! of each other.
+//! The growth distance as a relation of two points: `x - y` along the vector between the centres,
+//! the bodies' centres on top of each other.
 
 use super::{GrowthDistance, tolerance};
 use crate::body::Body;
@@ -131,8 +131,8 @@ impl Relation for Along {
         [difference[0] - times * ray[0], difference[1] - times * ray[1]]
     }
 
-    /// With `H = H_A(n) + H_B(-n)`, which the bracket of the distance bounds, and a point w of the difference of the bodies,
-    /// the two bounds at the head of [`super`].
+    /// With `H = H_A(n) + H_B(-n)`, which the bracket of the distance bounds, and a point w of the
+    /// difference of the bodies, the two bounds at the head of [`super`].
     #[inline(always)]
     fn judge<S: Simd>(&self, _: S, found: &Bracket<f64>, frame: &M3<f64>, difference: V3<f64>) -> Verdict {
         let delta = apply::<S, f64>(frame, self.delta);
@@ -147,7 +147,8 @@ impl Relation for Along {
         // What the points are off by counts at most half of what rounding leaves.
         let rest = dot::<S, f64>(rest, rest).sqrt() + delta_error + t * found.rounding;
         let upper = (t + rest / self.radius) * (1.0 + SLACK);
-        // The bracket of the distance is not a number where its points are not proven to be in the bodies.
+        // The bracket of the distance is not a number where its points are not proven to be in the
+        // bodies.
         let narrow =
             upper - lower <= tolerance(self.accuracy, upper, self.delta_error / self.radius) && found.off <= ALIGNED;
         // Without a bound above 0 there is no normal either: the centres may coincide.

@@ -1,16 +1,19 @@
-//! Growth distance: how much two bodies must grow about their centres to touch (Ong and Gilbert, Growth distances: new
-//! measures for object separation and penetration, IEEE Trans. Robotics and Automation 12, 1996).
+//! Growth distance: how much two bodies must grow about their centres to touch (Ong and Gilbert,
+//! Growth distances: new measures for object separation and penetration, IEEE Trans. Robotics and
+//! Automation 12, 1996).
 //!
-//! With `Δ = c_B - c_A` between the centres, `c_A + s (A - c_A)` and `c_B + s (B - c_B)` meet if and only if `Δ / s` lies in
-//! `K = (A - c_A) - (B - c_B)`. So s is the gauge of K at Δ: along the unit vector `u = Δ/|Δ|` one looks for the longest
+//! With `Δ = c_B - c_A` between the centres, `c_A + s (A - c_A)` and `c_B + s (B - c_B)` meet if
+//! and only if `Δ / s` lies in `K = (A - c_A) - (B - c_B)`. So s is the gauge of K at Δ: along the
+//! unit vector `u = Δ/|Δ|` one looks for the longest
 //!
 //! ```text
 //! ρ u = (x - c_A) - (y - c_B),   x in A, y in B,   and s = |Δ| / ρ.
 //! ```
 //!
-//! K does not depend on where the bodies are, only on how they are turned: the program is posed with the centres put on top
-//! of each other, so neither far nor deep pairs lose digits. With the support functions H about the centres and an inscribed
-//! ball of K of radius R, for every vector n, every w in K and every t >= 0
+//! K does not depend on where the bodies are, only on how they are turned: the program is posed
+//! with the centres put on top of each other, so neither far nor deep pairs lose digits. With the
+//! support functions H about the centres and an inscribed ball of K of radius R, for every vector
+//! n, every w in K and every t >= 0
 //!
 //! ```text
 //! n·Δ / (H_A(n) + H_B(-n)) <= s <= t + |Δ - t w| / R,
@@ -57,13 +60,15 @@ pub struct GrowthDistance {
     pub upper: f64,
     /// A point of both bodies grown by `upper`, metres: where they touch.
     pub witness: Vector3<f64>,
-    /// Unit normal of the contact, from the second body to the first; none if the centres coincide as far as doubles can tell.
+    /// Unit normal of the contact, from the second body to the first; none if the centres coincide
+    /// as far as doubles can tell.
     pub normal: Option<Vector3<f64>>,
-    /// Derivatives with respect to the twists of the first and of the second body (1/m and 1/rad), one of them where they
-    /// are not unique; none if the centres coincide as far as doubles can tell.
+    /// Derivatives with respect to the twists of the first and of the second body (1/m and 1/rad),
+    /// one of them where they are not unique; none if the centres coincide as far as doubles can
+    /// tell.
     pub gradients: Option<[Twist; 2]>,
-    /// Whether another pair of parts may be as soon to touch, their brackets meeting: normal, witness and gradients may then jump.
-    /// Never for single bodies.
+    /// Whether another pair of parts may be as soon to touch, their brackets meeting: normal,
+    /// witness and gradients may then jump. Never for single bodies.
     pub tied: bool,
     /// Iterations of all methods together.
     pub iterations: u32,
@@ -76,18 +81,20 @@ impl GrowthDistance {
     }
 }
 
-/// Growth distance of two bodies at their poses (body to world): the smallest s at which `c_A + s (A - c_A)` and
-/// `c_B + s (B - c_B)` touch, about the centres of [`Body::growth_ball`]. Above 1 the bodies are apart, at 1 they touch, below
-/// 1 they overlap, at 0 their centres coincide. Symmetric, and informative however deep the overlap.
+/// Growth distance of two bodies at their poses (body to world): the smallest s at which `c_A + s
+/// (A - c_A)` and `c_B + s (B - c_B)` touch, about the centres of [`Body::growth_ball`]. Above 1
+/// the bodies are apart, at 1 they touch, below 1 they overlap, at 0 their centres coincide.
+/// Symmetric, and informative however deep the overlap.
 ///
-/// The bracket is as narrow as `options` ask, relative to `max(1, s)`, or the status says that it is not. `warm` is read and
-/// then replaced by the hint for the next query of this pair.
+/// The bracket is as narrow as `options` ask, relative to `max(1, s)`, or the status says that it
+/// is not. `warm` is read and then replaced by the hint for the next query of this pair.
 ///
-/// Of solids with several parts it is the least over the pairs of parts, each of which grows about its own centre: the
-/// smallest s at which a grown part of `a` touches a grown part of `b`. About one common centre it would not be a measure of
-/// proximity: a union is not star-shaped about any point in general, so it does not grow in place, may leave what it touched
-/// before, and would not tell overlap by s < 1. Parts that contain their centres only ever grow, so that here, too, s > 1 if
-/// and only if the solids are apart. It depends on how a solid is cut into parts.
+/// Of solids with several parts it is the least over the pairs of parts, each of which grows about
+/// its own centre: the smallest s at which a grown part of `a` touches a grown part of `b`. About
+/// one common centre it would not be a measure of proximity: a union is not star-shaped about any
+/// point in general, so it does not grow in place, may leave what it touched before, and would not
+/// tell overlap by s < 1. Parts that contain their centres only ever grow, so that here, too, s > 1
+/// if and only if the solids are apart. It depends on how a solid is cut into parts.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -185,8 +192,8 @@ pub(super) fn between(
     search.answer(pose_a, pose_b)
 }
 
-/// The bodies with their centres on top of each other, and the vector Δ between the centres where they really are; query
-/// units, in the frame of the first body.
+/// The bodies with their centres on top of each other, and the vector Δ between the centres where
+/// they really are; query units, in the frame of the first body.
 struct Frame<'a> {
     pair: &'a Pair<'a>,
     delta: Vector3<f64>,
@@ -207,7 +214,8 @@ impl Frame<'_> {
         (x - self.center_a) - (y - self.center_b)
     }
 
-    /// Bound of the distance of `w(x, y)` from the point that points within the displacements of x and y stand for.
+    /// Bound of the distance of `w(x, y)` from the point that points within the displacements of x
+    /// and y stand for.
     fn w_error(&self, x: &Vector3<f64>, y: &Vector3<f64>) -> f64 {
         let rounding = SLACK * (x.norm() + y.norm() + self.center_a.norm() + self.center_b.norm());
         self.pair.a.displacement(x) + self.pair.b.displacement(y) + 2.0 * self.center_error + rounding
@@ -230,7 +238,8 @@ impl Frame<'_> {
         if rise > 0.0 && width > 0.0 { rise / width * (1.0 - SLACK) } else { 0.0 }
     }
 
-    /// `t + |Δ - t w| / R`, rounded up, with its t, for points within whose displacements points of the bodies lie.
+    /// `t + |Δ - t w| / R`, rounded up, with its t, for points within whose displacements points of
+    /// the bodies lie.
     fn upper(&self, x: &Vector3<f64>, y: &Vector3<f64>) -> (f64, f64) {
         let w = self.w(x, y);
         let along = w.dot(&self.delta) / self.gap;
@@ -240,8 +249,9 @@ impl Frame<'_> {
     }
 }
 
-/// Width of a bracket that is narrow enough. It is relative to s, as normals of deep pairs need as much; but the vector between
-/// centres that all but coincide is known to `error` of the bodies only, and what that makes of either bound no method takes off.
+/// Width of a bracket that is narrow enough. It is relative to s, as normals of deep pairs need as
+/// much; but the vector between centres that all but coincide is known to `error` of the bodies
+/// only, and what that makes of either bound no method takes off.
 #[inline(always)]
 fn tolerance(accuracy: f64, upper: f64, error: f64) -> f64 {
     (accuracy * upper + 2.0 * error).min(accuracy * upper.max(1.0))
@@ -322,8 +332,8 @@ impl Search<'_> {
         }
     }
 
-    /// Interior-point method, with Newton's method tried as soon as it shows the active constraints; for how far constraints may
-    /// be violated see [`minimise_within`].
+    /// Interior-point method, with Newton's method tried as soon as it shows the active
+    /// constraints; for how far constraints may be violated see [`minimise_within`].
     fn interior_point(&mut self, farthest: f64) {
         let pair = self.frame.pair;
         let program = ReachProgram::new(pair, &self.frame.delta, &self.frame.center_a, &self.frame.center_b);

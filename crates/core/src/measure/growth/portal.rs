@@ -1,5 +1,6 @@
-//! About where a ray from inside leaves the difference of two outlines: the refinement of portals (Snethen, Complex collision made
-//! simple, Game Programming Gems 7, 2008). Nothing is proven by it; it shows Newton's method where to begin.
+//! About where a ray from inside leaves the difference of two outlines: the refinement of portals
+//! (Snethen, Complex collision made simple, Game Programming Gems 7, 2008). Nothing is proven by
+//! it; it shows Newton's method where to begin.
 
 use crate::optimize::Corner;
 use nalgebra::Vector3;
@@ -21,7 +22,8 @@ pub(super) struct Crossing {
     pub(super) corner: Corner,
 }
 
-/// Where the ray from 0 along u leaves a convex set around 0 that is known by its points farthest along directions.
+/// Where the ray from 0 along u leaves a convex set around 0 that is known by its points farthest
+/// along directions.
 pub(super) fn crossing(u: &Vector3<f64>, support: impl Fn(&Vector3<f64>) -> Corner) -> Crossing {
     let mut a = support(u);
     let mut n = a.difference.cross(u);

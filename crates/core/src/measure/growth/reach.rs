@@ -1,5 +1,5 @@
-//! How far a difference of two bodies reaches along a ray: the program behind the growth distance, and with u a
-//! normal and no offset one that finds what a distance rests on.
+//! How far a difference of two bodies reaches along a ray: the program behind the growth distance,
+//! and with u a normal and no offset one that finds what a distance rests on.
 //!
 //! ```text
 //! max ρ   subject to   x - y + offset = ρ u,   g_i(x) <= 1,   h_j(y) <= 1
@@ -20,8 +20,8 @@ use crate::measure::series::{Series, Taken, tangents};
 use crate::optimize::{Program, Row, Rows};
 use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, Vector3, Vector4};
 
-/// The program in coordinates along u and across it, the same across for x and y: variables (a, p, q, b) with
-/// `x = center_a + a u + p v + q w`, `y = center_b + b u + p v + q w`, minimising b - a.
+/// The program in coordinates along u and across it, the same across for x and y: variables (a, p,
+/// q, b) with `x = center_a + a u + p v + q w`, `y = center_b + b u + p v + q w`, minimising b - a.
 pub(super) struct ReachProgram<'a> {
     pair: &'a Pair<'a>,
     /// Columns u, v, w.
@@ -44,7 +44,8 @@ impl<'a> ReachProgram<'a> {
         Self { pair, axes: Matrix3::from_columns(&[u, v, u.cross(&v)]), center_a: *center_a, center_b: *center_b }
     }
 
-    /// A strictly feasible start: most of the way from the centres to the boundaries, where these are curved.
+    /// A strictly feasible start: most of the way from the centres to the boundaries, where these
+    /// are curved.
     pub(super) fn start(&self) -> SVector<f64, 4> {
         let u = self.axes.column(0).into_owned();
         let x = near_boundary(&self.pair.a, &self.center_a, &u);
@@ -100,11 +101,13 @@ pub(in crate::measure) struct ReachNewton {
     length: f64,
 }
 
-/// Length of a step relative to the bodies, after which the other Newton's method converges from where it has led.
+/// Length of a step relative to the bodies, after which the other Newton's method converges from
+/// where it has led.
 const NEAR: f64 = 0.15;
 
 impl ReachNewton {
-    /// A start from points near the surfaces and a normal from A to B; none if they are of no use for u.
+    /// A start from points near the surfaces and a normal from A to B; none if they are of no use
+    /// for u.
     #[allow(clippy::too_many_arguments)]
     pub(in crate::measure) fn new(
         pair: &Pair<'_>,
@@ -128,8 +131,8 @@ impl ReachNewton {
         fits.then_some(Self { x, y, n, a, b, u, length: f64::INFINITY })
     }
 
-    /// Iterates until `accept` takes one, they stop converging or the options say so after `before` iterations and these;
-    /// returns the steps taken.
+    /// Iterates until `accept` takes one, they stop converging or the options say so after `before`
+    /// iterations and these; returns the steps taken.
     pub(in crate::measure) fn run(
         &mut self,
         pair: &Pair<'_>,
@@ -143,12 +146,14 @@ impl ReachNewton {
                 return step - 1;
             }
             let Some(length) = self.step(pair, &mut series) else {
-                // Where both are flat the system is singular, but the point at hand with its multipliers may do.
+                // Where both are flat the system is singular, but the point at hand with its
+                // multipliers may do.
                 accept(self);
                 return step;
             };
             self.length = length;
-            // A long step has not converged: its bracket is not worth its cost, but for flat bodies now and then.
+            // A long step has not converged: its bracket is not worth its cost, but for flat bodies
+            // now and then.
             if (length < WORTH_A_BRACKET || step % 4 == 0) && accept(self) {
                 return step;
             }
@@ -206,7 +211,8 @@ impl ReachNewton {
         m
     }
 
-    /// What the Hessian is about of constraints with such gradients over lengths like those of the bodies.
+    /// What the Hessian is about of constraints with such gradients over lengths like those of the
+    /// bodies.
     fn stiffness(&self, pair: &Pair<'_>, of_a: &Jets, of_b: &Jets) -> Matrix4<f64> {
         let stiff = |body: &Posed<'_>, gradient: Vector3<f64>| {
             let (slope, radius) = (body.functional(&gradient).0.norm(), body.body.trust().radius);

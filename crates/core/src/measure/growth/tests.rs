@@ -180,7 +180,7 @@ fn gradients_are_the_derivatives() {
                 let difference = (16.0 * e2 - e1) / 15.0;
                 let unit = if component < 3 { reach } else { 1.0 };
                 let exact = if component < 3 { gradient.linear } else { gradient.angular }.dot(&axis);
-                // Near-flat spots make high derivatives large; the extrapolation tells.
+                // Near-flat spots make high derivatives large; the extrapolation says.
                 if (e1 - e2).abs() * unit < 1e-7 * scale {
                     tested += 1;
                     let error = (difference - exact).abs() * unit;

@@ -12,13 +12,15 @@ const FORCE: f64 = 1e-3;
 /// Longest step that bounds are made for: relative to the distance from A's centre, or to B.
 pub(super) const ROOM: f64 = 1.0 / 16.0;
 
-/// How steps of w are measured: by a norm that bounds their lengths in both bodies' normalized coordinates.
+/// How steps of w are measured: by a norm that bounds their lengths in both bodies' normalized
+/// coordinates.
 pub(super) struct Metric {
     /// Bound of `|C d|` by the norm of d.
     of_a: f64,
     /// Bound of `|d|`.
     of_b: f64,
-    /// Lower bound of the smallest curvature by the norm's square, but for the errors of the Hessian's entries.
+    /// Lower bound of the smallest curvature by the norm's square, but for the errors of the
+    /// Hessian's entries.
     curvature: f64,
     /// Bound of the norm of a step by its length in metres.
     per_metre: f64,
@@ -55,8 +57,9 @@ impl Bracket {
 }
 
 impl Sides<'_> {
-    /// The metric that counts lengths in both bodies' normalized coordinates, `|d|² + |C d|²`: however thin a body is, none of its
-    /// bounds suffers from how long a step across it is in the coordinates of the other.
+    /// The metric that counts lengths in both bodies' normalized coordinates, `|d|² + |C d|²`:
+    /// however thin a body is, none of its bounds suffers from how long a step across it is in the
+    /// coordinates of the other.
     pub(super) fn joint(&self, at: &Evaluated) -> Metric {
         let spread = self.map.spread;
         let n = self.map.metric(1.0, 1.0);
@@ -66,7 +69,8 @@ impl Sides<'_> {
         let (_, det_h) = cofactors(Scalar, h);
         let trace = |m: &[f64; 6]| m[0] + m[3] + m[5];
         let rounding = 64.0 * f64::EPSILON;
-        // Of the eigenvalues of N⁻¹H the smallest is at least the determinant over the square of half the trace.
+        // Of the eigenvalues of N⁻¹H the smallest is at least the determinant over the square of
+        // half the trace.
         let (trace_n, trace_h) = (trace(&n), trace(&h));
         let mixed = of_n[0] * h[0] + of_n[3] * h[3] + of_n[5] * h[5];
         let mixed = mixed + 2.0 * (of_n[1] * h[1] + of_n[2] * h[2] + of_n[4] * h[4]);
@@ -85,7 +89,8 @@ impl Sides<'_> {
         }
     }
 
-    /// The bracket at the end of a step, with lengths of steps in a metric; NaN where nothing is proven.
+    /// The bracket at the end of a step, with lengths of steps in a metric; NaN where nothing is
+    /// proven.
     #[inline(always)]
     pub(super) fn bracket<S: Simd>(&self, _: S, at: &Evaluated, step: &Step, metric: &Metric) -> Bracket {
         let Self { map, .. } = self;
@@ -172,8 +177,8 @@ impl Sides<'_> {
             + slack
             + SLACK * way * sum(pulled);
 
-        // Only the minimiser counts, where A's polynomial is at most `upper`: by convexity A, scaled about its interior point by
-        // this, holds all such points.
+        // Only the minimiser counts, where A's polynomial is at most `upper`: by convexity A,
+        // scaled about its interior point by this, holds all such points.
         let scale = ((upper - self.a.min_value()) / (1.0 - self.a.min_value())).max(1.0);
         let extent = self.a.z_extent().norm() * (1.0 + 1e-9);
         let span_a = (spread * span_b).min(length + step_a + (1.0 + 2.0 * scale) * extent);
@@ -207,8 +212,8 @@ impl Sides<'_> {
         }
     }
 
-    /// Whether at the point w of B's normalized coordinates the other constraints of B are proven to hold, and those of A not
-    /// to exceed `upper`.
+    /// Whether at the point w of B's normalized coordinates the other constraints of B are proven
+    /// to hold, and those of A not to exceed `upper`.
     #[inline(always)]
     pub(super) fn others_hold<S: Simd>(&self, simd: S, w: V3<f64>, upper: f64) -> bool {
         let [active_a, active_b] = self.active.map(usize::from);

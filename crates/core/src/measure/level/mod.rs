@@ -35,21 +35,25 @@ pub struct LevelDistance {
     pub lower: f64,
     /// Proven upper bound, attained at the witness.
     pub upper: f64,
-    /// A point of the second body where the first one's polynomial is at most `upper`; world frame, metres.
+    /// A point of the second body where the first one's polynomial is at most `upper`; world frame,
+    /// metres.
     pub witness: Vector3<f64>,
-    /// How fast d falls as the level of the second body rises from 1: the sum of the multipliers of its constraints.
+    /// How fast d falls as the level of the second body rises from 1: the sum of the multipliers of
+    /// its constraints.
     pub multiplier: f64,
-    /// Whether the second body holds the minimiser of the first one's polynomial: d is its minimum, the multiplier and all
-    /// derivatives are 0, and d says no more about depth.
+    /// Whether the second body holds the minimiser of the first one's polynomial: d is its minimum,
+    /// the multiplier and all derivatives are 0, and d says no more about depth.
     pub saturated: bool,
-    /// Derivative of d with respect to the pose of the first body, 1/m and 1/rad: a twist (v, ω) changes d by `-g·v - ((x - t) × g)·ω`,
-    /// g the gradient of the first body's polynomial at the witness x (of several active constraints, weighted by their
-    /// multipliers) and t the translation.
+    /// Derivative of d with respect to the pose of the first body, 1/m and 1/rad: a twist (v, ω)
+    /// changes d by `-g·v - ((x - t) × g)·ω`, g the gradient of the first body's polynomial at the
+    /// witness x (of several active constraints, weighted by their multipliers) and t the
+    /// translation.
     pub gradient_a: Twist,
-    /// Derivative of d with respect to the pose of the second body: the same force the other way, about its own translation.
+    /// Derivative of d with respect to the pose of the second body: the same force the other way,
+    /// about its own translation.
     pub gradient_b: Twist,
-    /// Whether another pair of parts may be as low, their brackets meeting: witness, multiplier and gradients may then jump.
-    /// Never for single bodies.
+    /// Whether another pair of parts may be as low, their brackets meeting: witness, multiplier and
+    /// gradients may then jump. Never for single bodies.
     pub tied: bool,
     /// Iterations of all methods together.
     pub iterations: u32,
@@ -62,16 +66,19 @@ impl LevelDistance {
     }
 }
 
-/// Level distance of `a` over `b`: the smallest value that the stored polynomial of `a` (the largest of its constraints)
-/// takes on `b`. Above 1 the bodies are apart, at 1 they touch, below 1 they overlap; it is not symmetric.
+/// Level distance of `a` over `b`: the smallest value that the stored polynomial of `a` (the
+/// largest of its constraints) takes on `b`. Above 1 the bodies are apart, at 1 they touch, below 1
+/// they overlap; it is not symmetric.
 ///
-/// The bracket is as narrow as `options` ask, relative to `max(1, |d|)`, or the status says that it is not. When the minimiser of `a`'s
-/// polynomial lies in `b`, the answer is its minimum ([`Body::min_value`]) and says no more about depth. Derivatives are by the
-/// envelope theorem: at the minimiser x the gradients of both bodies balance, `g_a + μ g_b = 0`. `warm` is read and
-/// then replaced by the hint for the next query of this pair in this order.
+/// The bracket is as narrow as `options` ask, relative to `max(1, |d|)`, or the status says that it
+/// is not. When the minimiser of `a`'s polynomial lies in `b`, the answer is its minimum
+/// ([`Body::min_value`]) and says no more about depth. Derivatives are by the envelope theorem: at
+/// the minimiser x the gradients of both bodies balance, `g_a + μ g_b = 0`. `warm` is read and then
+/// replaced by the hint for the next query of this pair in this order.
 ///
-/// Of solids with several parts it is the least over the pairs of parts, the polynomial of a union being the least of those
-/// of its parts: one part of `a` and the part of `b` where it is lowest, to which witness, multiplier and `saturated` belong.
+/// Of solids with several parts it is the least over the pairs of parts, the polynomial of a union
+/// being the least of those of its parts: one part of `a` and the part of `b` where it is lowest,
+/// to which witness, multiplier and `saturated` belong.
 ///
 /// ```
 /// use nalgebra::Vector3;

@@ -18,8 +18,8 @@ use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 /// Largest number of steps.
 const MAX_STEPS: u32 = 24;
 
-/// Length of a step, relative to the bodies and to the distance from A's interior point, after which values may still fall by orders of
-/// magnitude.
+/// Length of a step, relative to the bodies and to the distance from A's interior point, after
+/// which values may still fall by orders of magnitude.
 const FAR: f64 = 0.1;
 
 /// Newton iterates of the level-distance system.
@@ -34,12 +34,14 @@ pub(in crate::measure) struct LevelNewton {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ended {
     pub(super) steps: u32,
-    /// Whether there is no step left to take, though none was accepted: rounding keeps the bracket wide.
+    /// Whether there is no step left to take, though none was accepted: rounding keeps the bracket
+    /// wide.
     pub(super) settled: bool,
 }
 
 impl LevelNewton {
-    /// Iterates until `accept` takes one, they stop converging or `stop` says so after that many steps.
+    /// Iterates until `accept` takes one, they stop converging or `stop` says so after that many
+    /// steps.
     pub(super) fn run(
         &mut self,
         pair: &Pair<'_>,
@@ -56,7 +58,8 @@ impl LevelNewton {
                 return Ended { steps: step - 1, settled: false };
             }
             let Some(length) = self.step(pair, &mut s, last > FAR, &mut series) else {
-                // Where both are flat the system is singular, but the point at hand with its multipliers may do.
+                // Where both are flat the system is singular, but the point at hand with its
+                // multipliers may do.
                 accept(self);
                 return Ended { steps: step, settled: false };
             };
@@ -71,8 +74,8 @@ impl LevelNewton {
         Ended { steps: MAX_STEPS, settled: false }
     }
 
-    /// Whether the forces of the bodies are opposite, to [`ALIGNED`] or to what rounding leaves of them: brackets hold them to about the
-    /// root of their width.
+    /// Whether the forces of the bodies are opposite, to [`ALIGNED`] or to what rounding leaves of
+    /// them: brackets hold them to about the root of their width.
     pub(super) fn is_balanced(&self, pair: &Pair<'_>) -> bool {
         let force = |body: &Posed<'_>, active: &Active| {
             let (mut sum, mut rounding) = (Vector3::zeros(), 0.0);
@@ -98,7 +101,8 @@ impl LevelNewton {
         a.value[..self.a.len].iter().sum::<f64>() / self.a.len as f64
     }
 
-    /// One step; its length relative to B and to the distance from A's interior point, or none if it leads nowhere.
+    /// One step; its length relative to B and to the distance from A's interior point, or none if
+    /// it leads nowhere.
     fn step(&mut self, pair: &Pair<'_>, s: &mut f64, from_afar: bool, series: &mut Series) -> Option<f64> {
         let (of_a, of_b) = (Jets::new(&pair.a, &self.x), Jets::new(&pair.b, &self.x));
         let far = pair.a.relative_length(&(self.x - pair.a.interior)).max(CENTER);
@@ -147,7 +151,8 @@ impl LevelNewton {
         bent
     }
 
-    /// What the Hessian is about of values like s over lengths like that of B and the distance from A's interior point.
+    /// What the Hessian is about of values like s over lengths like that of B and the distance from
+    /// A's interior point.
     fn stiffness(&self, pair: &Pair<'_>, of_a: &Jets, far: f64, s: f64) -> Matrix3<f64> {
         let degrees = self.a.iter().map(|(i, _)| pair.a.body.constraints()[i].polynomial.degree());
         let degree = degrees.max().unwrap_or(2) as f64;

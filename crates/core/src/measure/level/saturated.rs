@@ -10,7 +10,8 @@ use crate::measure::twist::Twist;
 use crate::measure::vector::dot;
 use crate::polynomial::{Simd, WithSimd, dispatch, gamma};
 
-/// The answer where the interior point of `a` is proven to lie in `b` and what is known of the minimum is enough.
+/// The answer where the interior point of `a` is proven to lie in `b` and what is known of the
+/// minimum is enough.
 pub(super) fn saturated(
     a: &Body,
     pose_a: &Pose,
@@ -34,7 +35,8 @@ pub(super) fn saturated(
     })
 }
 
-/// Whether the interior point of A is proven to lie in B: then B does not hold the minimiser of A's polynomial back.
+/// Whether the interior point of A is proven to lie in B: then B does not hold the minimiser of A's
+/// polynomial back.
 struct Saturated<'a> {
     a: &'a Body,
     pose_a: &'a Pose,

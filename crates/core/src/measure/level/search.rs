@@ -1,5 +1,5 @@
-//! The search for a level distance where continuation alone has not proven it: every method in turn, from the cheapest, each of
-//! them improving one bracket.
+//! The search for a level distance where continuation alone has not proven it: every method in
+//! turn, from the cheapest, each of them improving one bracket.
 
 use super::LevelDistance;
 use super::newton::LevelNewton;
@@ -26,7 +26,8 @@ const MAX_ROUNDS: u32 = 6;
 /// Starts of values above this, relative to the least known, are too steep.
 const STEEP: f64 = 1e3;
 
-/// How much narrower a bracket has to be that multipliers are taken from which Newton's method did not find.
+/// How much narrower a bracket has to be that multipliers are taken from which Newton's method did
+/// not find.
 const REFINED: f64 = 1e-3;
 
 /// A solve in progress: the best bracket so far and where it was attained, in query units.
@@ -43,7 +44,8 @@ pub(super) struct Search<'a> {
     multipliers: (Multipliers, Multipliers),
     /// Where that bound was found.
     proven: Vector3<f64>,
-    /// Whether its multipliers are those of Newton's method, balanced or of twice the precision: a bracket holds others to its root only.
+    /// Whether its multipliers are those of Newton's method, balanced or of twice the precision: a
+    /// bracket holds others to its root only.
     refined: bool,
     /// Where Newton's method ended last.
     ended: Option<LevelNewton>,
@@ -129,7 +131,8 @@ impl<'a> Search<'a> {
             self.sharpen(self.accuracy);
         }
         if !self.refined && !self.saturated() && !self.exhausted() {
-            // Constraints whose slacks are as small as the bracket is wide may carry multipliers that are not theirs.
+            // Constraints whose slacks are as small as the bracket is wide may carry multipliers
+            // that are not theirs.
             self.accuracy = REFINED * self.options.accuracy();
             self.sharpen(self.accuracy);
             if !self.done() && !self.exhausted() {
@@ -139,7 +142,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Newton's method from where the outline of B is nearest to A's interior point, with the constraints that are active there.
+    /// Newton's method from where the outline of B is nearest to A's interior point, with the
+    /// constraints that are active there.
     fn outlined(&mut self, start: &Approach) {
         let pair = self.pair;
         let outward = pair.a.pulled_back(&start.n);
@@ -153,8 +157,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Starts again from the point of B nearest to A, or a common one: where A is tiny or thin, its values rise so steeply that
-    /// nothing else shows the way, and near and low are about the same.
+    /// Starts again from the point of B nearest to A, or a common one: where A is tiny or thin, its
+    /// values rise so steeply that nothing else shows the way, and near and low are about the same.
     fn start_nearest(&mut self) {
         let (x, active) = distance::nearest(self.pair, self.options, &mut self.iterations);
         self.attain(&x);
@@ -203,8 +207,9 @@ impl<'a> Search<'a> {
         self.options.exhausted(self.iterations)
     }
 
-    /// Interior-point method from a point of B on the side of A, with Newton's method tried as soon as it shows the active
-    /// constraints. Values of A fall by orders of magnitude on the way in: each round scales them anew.
+    /// Interior-point method from a point of B on the side of A, with Newton's method tried as soon
+    /// as it shows the active constraints. Values of A fall by orders of magnitude on the way in:
+    /// each round scales them again.
     fn interior_point(&mut self) {
         let pair = self.pair;
         self.attain(&pair.a.interior);
@@ -257,7 +262,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Brackets the answer from an iterate of the interior-point method and tries Newton's method from it.
+    /// Brackets the answer from an iterate of the interior-point method and tries Newton's method
+    /// from it.
     fn examine(&mut self, x: &Vector3<f64>, rows: &[f64], scale: f64) {
         let (of_a, mut of_b) = split(self.pair, rows, 1.0);
         of_b.iter_mut().for_each(|multiplier| *multiplier *= scale);
@@ -293,7 +299,8 @@ impl<'a> Search<'a> {
         (self.ended, self.settled) = (Some(newton), ended.settled);
     }
 
-    /// Takes all of an iterate at which forces are balanced, if what it proves by itself is narrow; whether it is.
+    /// Takes all of an iterate at which forces are balanced, if what it proves by itself is narrow;
+    /// whether it is.
     fn adopt(&mut self, at: &LevelNewton) -> bool {
         let pair = self.pair;
         let Some(x) = pair.b.pull_in(&at.x).filter(|_| at.is_balanced(pair)) else { return false };
@@ -338,8 +345,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Whether B does not hold the minimiser of A's polynomial back: it holds the minimiser, or the bracket needed no
-    /// multiplier of B.
+    /// Whether B does not hold the minimiser of A's polynomial back: it holds the minimiser, or the
+    /// bracket needed no multiplier of B.
     fn saturated(&self) -> bool {
         let free = self.multipliers.1.iter().all(|multiplier| *multiplier == 0.0);
         self.done() && (free || self.pair.b.contains(&self.pair.a.interior))

@@ -1,5 +1,5 @@
-//! Two bodies as Newton's method for the level distance sees them: in B's normalized coordinates, one constraint of each active. The
-//! formulas are those of [`super::smooth`].
+//! Two bodies as Newton's method for the level distance sees them: in B's normalized coordinates,
+//! one constraint of each active. The formulas are those of [`super::smooth`].
 
 use crate::body::{Body, ConstraintTrust};
 use crate::measure::pose::Pose;
@@ -182,9 +182,10 @@ impl<'a> Sides<'a> {
         Step { delta, force, multiplier, curvature, cofactors, determinant }
     }
 
-    /// A step towards the solution from afar, where Newton's would be a long one, with the multiplier: towards the least of `p^(2/d)`, d the
-    /// degree of p, which is about a square whatever d is, and damped (Levenberg and Marquardt) until it is short enough for
-    /// the Hessians to mean something where it leads, but not much more.
+    /// A step towards the solution from afar, where Newton's would be a long one, with the
+    /// multiplier: towards the least of `p^(2/d)`, d the degree of p, which is about a square
+    /// whatever d is, and damped (Levenberg and Marquardt) until it is short enough for the
+    /// Hessians to mean something where it leads, but not much more.
     #[inline(always)]
     pub(super) fn far_step<S: Simd>(&self, simd: S, at: &Evaluated, multiplier: Option<f64>) -> (V3<f64>, f64) {
         let (pulled, fitting) = self.balance(simd, &at.jet_a, &at.jet_b);
@@ -231,7 +232,8 @@ impl<'a> Sides<'a> {
         let inverse = 1.0 / determinant;
         let u = scaled::<S, f64>(apply_symmetric::<S, f64>(&cofactors, *pulled), inverse);
         let v = scaled::<S, f64>(apply_symmetric::<S, f64>(&cofactors, b.gradient), inverse);
-        // Of p^(2/d) the Hessian lacks this much of the square of the gradient; by the formula of Sherman and Morrison.
+        // Of p^(2/d) the Hessian lacks this much of the square of the gradient; by the formula of
+        // Sherman and Morrison.
         let (of_u, mixed) = (dot::<S, f64>(*pulled, u), dot::<S, f64>(b.gradient, u));
         let lacks = ((1.0 - 2.0 / degree) / a.value).min(MOST_BENT / of_u);
         let more = 1.0 / (1.0 - lacks * of_u);

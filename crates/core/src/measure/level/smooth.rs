@@ -83,7 +83,8 @@ impl LevelTrace {
         Self::at(Scalar, active, (z, &jet_a), (w, jet_b.gradient), &step)
     }
 
-    /// The trace of the answer w with the gradient of B's constraint there, where a step led from z.
+    /// The trace of the answer w with the gradient of B's constraint there, where a step led from
+    /// z.
     #[inline(always)]
     fn at<S: Simd>(
         simd: S,
@@ -97,7 +98,8 @@ impl LevelTrace {
     }
 }
 
-/// A proven bracket and where it is attained, in A's frame from its normalization's centre on, metres.
+/// A proven bracket and where it is attained, in A's frame from its normalization's centre on,
+/// metres.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LevelProven {
     pub(super) lower: f64,
@@ -140,13 +142,15 @@ impl LevelLost {
 /// Most evaluations before another method takes over.
 const MAX_ROUNDS: u32 = 8;
 
-/// Evaluations after which an answer to follow should be near: the start from nothing takes few more.
+/// Evaluations after which an answer to follow should be near: the start from nothing takes few
+/// more.
 const PATIENCE: u32 = 2;
 
 /// Most evaluations from a cold start before another method takes over.
 pub(super) const SEEK_ROUNDS: u32 = 20;
 
-/// Longest step that is as good as none, so that a bracket it leaves wide is worth a second one in a better metric.
+/// Longest step that is as good as none, so that a bracket it leaves wide is worth a second one in
+/// a better metric.
 const SHORT: f64 = 1e-3;
 
 /// Longest step after which none is left but rounding.
@@ -222,7 +226,8 @@ impl WithSimd for SeekLevel<'_> {
 }
 
 impl Sides<'_> {
-    /// Newton's method from w until the bracket is narrow, or steps are still long after `patience` rounds.
+    /// Newton's method from w until the bracket is narrow, or steps are still long after `patience`
+    /// rounds.
     #[inline(always)]
     fn correct<S: Simd>(
         &self,

@@ -13,8 +13,8 @@ use crate::measure::warm::{ActiveSet, Hint, WarmStart};
 use crate::polynomial::dispatch;
 use nalgebra::{Vector2, Vector3};
 
-/// The middle of support points with the constraints that are active at all of them, and there, too: both sides of a slab are one
-/// constraint, but the middle between them is on neither.
+/// The middle of support points with the constraints that are active at all of them, and there,
+/// too: both sides of a slab are one constraint, but the middle between them is on neither.
 fn common(body: &Posed<'_>, points: [SupportPoint; 4]) -> SupportPoint {
     let x = points.iter().map(|point| point.x).sum::<Vector3<f64>>() * 0.25;
     let all = points.iter().fold(ActiveSet::MAX, |all, point| all & point.active);
@@ -22,8 +22,9 @@ fn common(body: &Posed<'_>, points: [SupportPoint; 4]) -> SupportPoint {
     SupportPoint { x, active: (0..body.len()).filter(at).fold(0, |bits, i| bits | 1 << i) }
 }
 
-/// Weights by which points of a difference of bodies, all at least that high along n, have a point on the axis along n between them, or
-/// one no farther from it than `near`: then no direction close to n shows a smaller depth, but for what they lack.
+/// Weights by which points of a difference of bodies, all at least that high along n, have a point
+/// on the axis along n between them, or one no farther from it than `near`: then no direction close
+/// to n shows a smaller depth, but for what they lack.
 fn surrounding(
     n: &Vector3<f64>,
     across: &Vector3<f64>,
@@ -61,7 +62,8 @@ fn surrounding(
 const FIRST_STEP: f64 = 1e-4;
 const LAST_STEP: f64 = 1e-8;
 
-/// By how much more a direction may show that is the better one of two, relative to what is asked for.
+/// By how much more a direction may show that is the better one of two, relative to what is asked
+/// for.
 const ROUGHLY: f64 = 0.01;
 
 /// Most rounds of that search.
@@ -72,8 +74,8 @@ pub(in crate::measure) fn tolerance(pair: &Pair<'_>, options: &Options<'_>, dept
     (options.depth_accuracy() * depth).max(pair.tolerance(options.accuracy()))
 }
 
-/// Rigorous upper bound of f(n), the depth along n (of any length above 0), from multipliers for -n of A and for n of B; with
-/// its sign turned, a lower bound of the signed distance.
+/// Rigorous upper bound of f(n), the depth along n (of any length above 0), from multipliers for -n
+/// of A and for n of B; with its sign turned, a lower bound of the signed distance.
 pub(in crate::measure) fn depth_along(
     pair: &Pair<'_>,
     x: &Vector3<f64>,
@@ -103,7 +105,8 @@ pub(in crate::measure) struct Best<'a> {
     pub(in crate::measure) n: Option<Vector3<f64>>,
     pub(in crate::measure) x: Vector3<f64>,
     pub(in crate::measure) y: Vector3<f64>,
-    /// Distance of points of the bodies at x and y, rounded up, where that was proven with the depth.
+    /// Distance of points of the bodies at x and y, rounded up, where that was proven with the
+    /// depth.
     pub(in crate::measure) attained: Option<f64>,
     active: (Active, Active),
     trace: Option<Trace>,
@@ -156,7 +159,8 @@ impl<'a> Best<'a> {
         }
     }
 
-    /// Looks for the shortest way out near n, or where the bodies seem to face each other; whether it found one.
+    /// Looks for the shortest way out near n, or where the bodies seem to face each other; whether
+    /// it found one.
     pub(in crate::measure) fn seek(&mut self, n: Option<&Vector3<f64>>) -> bool {
         let (pair, options, relation) = (self.pair, self.options, self.through(n));
         if options.exhausted(self.iterations) {
@@ -176,7 +180,7 @@ impl<'a> Best<'a> {
     }
 
     /// The same pair, with nothing known.
-    pub(super) fn anew(&self) -> Self {
+    pub(super) fn again(&self) -> Self {
         Self { iterations: self.iterations, ..Self::new(self.pair, self.pose_a, self.pose_b, self.options) }
     }
 
@@ -193,9 +197,10 @@ impl<'a> Best<'a> {
         self.polish(x, y, n);
     }
 
-    /// Looks around the best direction for a better one, where edges and corners keep Newton's method from showing that there
-    /// is none: what the constraints all around have in common may be the edge that is best, and otherwise a compass search
-    /// goes on, its needle turning and its steps shrinking where they lead to nothing better.
+    /// Looks around the best direction for a better one, where edges and corners keep Newton's
+    /// method from showing that there is none: what the constraints all around have in common may
+    /// be the edge that is best, and otherwise a compass search goes on, its needle turning and its
+    /// steps shrinking where they lead to nothing better.
     pub(super) fn settle(&mut self) {
         let pair = self.pair;
         let enough = 0.1 * pair.tolerance(self.options.accuracy());
@@ -225,7 +230,8 @@ impl<'a> Best<'a> {
                 && self.n == Some(n)
                 && let Some(weights) = surrounding(&n, &needle, &w, self.depth - 10.0 * enough, enough)
             {
-                // Of flat faces and edges any point is farthest: these two are along n from each other.
+                // Of flat faces and edges any point is farthest: these two are along n from each
+                // other.
                 let mean = |points: [&Vector3<f64>; 4]| points.iter().zip(weights).map(|(x, weight)| *x * weight).sum();
                 self.x = mean(around.each_ref().map(|found| &found.2.x));
                 self.y = mean(around.each_ref().map(|found| &found.3.x));
@@ -262,8 +268,8 @@ impl<'a> Best<'a> {
         }
     }
 
-    /// Newton's method on the optimality system of the distance, with a negative distance, from near support points of any
-    /// number of active constraints.
+    /// Newton's method on the optimality system of the distance, with a negative distance, from
+    /// near support points of any number of active constraints.
     fn polish(&mut self, x: &SupportPoint, y: &SupportPoint, n: &Vector3<f64>) {
         let (pair, options) = (self.pair, self.options);
         let (a, b) = (Active::from_bits(x.active, pair.a.len()), Active::from_bits(y.active, pair.b.len()));

@@ -1,20 +1,22 @@
-//! A covering of the sphere of directions by triangles, each with a proven lower bound of a support function on it.
+//! A covering of the sphere of directions by triangles, each with a proven lower bound of a support
+//! function on it.
 //!
-//! The support function of a convex body K is `h(n) = max n·w` over K: every point w known to lie in K bounds it from below
-//! by `n·w`. On a cone of directions spanned by vectors v_j the bound is least at one of them: for unit `n = Σ a_j v_j`,
-//! a_j >= 0, and `v_j·w >= r |v_j|` with r >= 0,
+//! The support function of a convex body K is `h(n) = max n·w` over K: every point w known to lie
+//! in K bounds it from below by `n·w`. On a cone of directions spanned by vectors v_j the bound is
+//! least at one of them: for unit `n = Σ a_j v_j`, a_j >= 0, and `v_j·w >= r |v_j|` with r >= 0,
 //!
 //! ```text
 //! n·w = Σ a_j v_j·w >= r Σ a_j |v_j| >= r |n| = r.
 //! ```
 //!
-//! Nothing is asked of the w, nor of where a cone is cut: better choices only give better bounds. A triangle with corners
-//! n_i whose support points w_i are known is cut into three parts, one for each w_i, that meet where two or three of the
-//! bounds are equal; for a smooth body what they lose falls with the square of the triangle's size.
+//! Nothing is asked of the w, nor of where a cone is cut: better choices only give better bounds. A
+//! triangle with corners n_i whose support points w_i are known is cut into three parts, one for
+//! each w_i, that meet where two or three of the bounds are equal; for a smooth body what they lose
+//! falls with the square of the triangle's size.
 //!
-//! A triangle is split at the edge over which the support point turns most, where the bounds of its ends are equal. So
-//! triangles become narrow across the great circles where a flat face or a long edge makes the support point jump, and stay
-//! long along them.
+//! A triangle is split at the edge over which the support point turns most, where the bounds of its
+//! ends are equal. So triangles become narrow across the great circles where a flat face or a long
+//! edge makes the support point jump, and stay long along them.
 
 use super::support::SupportPoint;
 use nalgebra::{Matrix3, Vector3};
@@ -79,8 +81,8 @@ impl<const N: usize> Covering<N> {
         self.len + splits <= N && self.open + splits <= 2 * N
     }
 
-    /// The corners of a triangle in an order that has the edge to be split first, and the direction to split it at: where
-    /// the bounds of its ends are equal, but not too near either.
+    /// The corners of a triangle in an order that has the edge to be split first, and the direction
+    /// to split it at: where the bounds of its ends are equal, but not too near either.
     pub(super) fn widest_edge(&self, [i, j, k]: [u16; 3]) -> ([u16; 3], Vector3<f64>) {
         let corners = [i, j, k].map(|i| &self.directions[usize::from(i)]);
         let (n, w) = (corners.map(|corner| corner.n), corners.map(Direction::w));
@@ -94,9 +96,9 @@ impl<const N: usize> Covering<N> {
         (order, (n[p] * share + n[q] * (1.0 - share)).normalize())
     }
 
-    /// For each corner a point of B - A: of those of A and of B known at the corners, which go together in any way, the
-    /// farthest as seen from a little inside the triangle. At a corner where the support point jumps that is the one on
-    /// this side.
+    /// For each corner a point of B - A: of those of A and of B known at the corners, which go
+    /// together in any way, the farthest as seen from a little inside the triangle. At a corner
+    /// where the support point jumps that is the one on this side.
     fn mixed(corners: [&Direction; 3]) -> [Vector3<f64>; 3] {
         let middle = (corners[0].n + corners[1].n + corners[2].n) * 0.01;
         corners.map(|own| {
@@ -149,8 +151,8 @@ impl<const N: usize> Covering<N> {
         }
     }
 
-    /// Lower bound of the support function on the triangle, but for rounding and the errors of the points, if it is found to
-    /// be at least `enough`; else about what was found.
+    /// Lower bound of the support function on the triangle, but for rounding and the errors of the
+    /// points, if it is found to be at least `enough`; else about what was found.
     pub(super) fn bound(&self, corners: [u16; 3], enough: f64) -> Result<f64, f64> {
         let corners = corners.map(|i| &self.directions[usize::from(i)]);
         let n = corners.map(|corner| corner.n);
@@ -234,8 +236,8 @@ impl<const N: usize> Covering<N> {
     }
 }
 
-/// `min over unit n in the cone of the n_i of max_i n·w_i`, from below, if that is found to be at least `enough`; else what it is
-/// at most, or about that.
+/// `min over unit n in the cone of the n_i of max_i n·w_i`, from below, if that is found to be at
+/// least `enough`; else what it is at most, or about that.
 fn lower_bound(n: [Vector3<f64>; 3], w: [Vector3<f64>; 3], enough: f64) -> Result<f64, f64> {
     // A negative r proves nothing.
     let enough = enough.max(f64::MIN_POSITIVE);

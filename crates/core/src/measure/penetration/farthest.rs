@@ -1,14 +1,15 @@
 //! Support points of smooth surfaces, from an outline: mostly by one or two evaluations.
 //!
-//! The point z of a body farthest along e (both in normalized coordinates, `e·z = n·x`) has `λ ∇g(z) = e`, `g(z) = 1`. Newton's
-//! step for the two,
+//! The point z of a body farthest along e (both in normalized coordinates, `e·z = n·x`) has `λ
+//! ∇g(z) = e`, `g(z) = 1`. Newton's step for the two,
 //!
 //! ```text
 //! λ' = (g·H⁻¹e - λ (1 - g(z))) / (g·H⁻¹g),   dz = (H⁻¹e - λ' H⁻¹g) / λ
 //! ```
 //!
-//! leaves an error of the order of its square, and what that costs along e is of the square again. Taylor's formula proves how
-//! far the end of the last step is from the best, and a point of the body beside it.
+//! leaves an error of the order of its square, and what that costs along e is of the square again.
+//! Taylor's formula proves how far the end of the last step is from the best, and a point of the
+//! body beside it.
 
 use crate::body::{Body, Cell};
 use crate::measure::tangent::Side;
@@ -27,12 +28,13 @@ pub(super) struct Sought {
     pub(super) tolerance: f64,
 }
 
-/// Points within whose displacement (the rounding of their normalized coordinates) points of the body are proven to lie, each with the
-/// active constraint; from the centre of the normalization on, body frame, metres. None where Newton's method does not arrive.
+/// Points within whose displacement (the rounding of their normalized coordinates) points of the
+/// body are proven to lie, each with the active constraint; from the centre of the normalization
+/// on, body frame, metres. None where Newton's method does not arrive.
 pub(super) type Found = [Option<(Vector3<f64>, usize)>; MAX_LANES];
 
-/// At most [`MAX_LANES`] points of a body, as vectorized work: a lane each where the body has one constraint. None depends
-/// on the others.
+/// At most [`MAX_LANES`] points of a body, as vectorized work: a lane each where the body has one
+/// constraint. None depends on the others.
 pub(super) struct Farthest<'a> {
     pub(super) body: &'a Body,
     pub(super) sought: &'a [Sought],
@@ -93,8 +95,8 @@ fn in_lanes<S: Simd>(simd: S, body: &Body, sought: &[Sought], found: &mut [Optio
     }
 }
 
-/// The point farthest along unit vectors n, in these cells of the outline, as far as one constraint goes; and 1 where that is proven, 0
-/// where it is not.
+/// The point farthest along unit vectors n, in these cells of the outline, as far as one constraint
+/// goes; and 1 where that is proven, 0 where it is not.
 #[inline(always)]
 fn farthest<S: Simd, N: Number<S>>(
     simd: S,
@@ -181,7 +183,8 @@ mod tests {
             let found = dispatch(Farthest { body: &body, sought: &sought });
             for (k, (one, Sought { n, .. })) in found.iter().zip(&sought).enumerate() {
                 assert_eq!(dispatch(Farthest { body: &body, sought: &sought[k..=k] })[0], *one, "seed {seed}, {k}");
-                // Hölder's inequality: with 1/p + 1/q = 1 the largest n·x is the q-norm of n scaled by the half-axes.
+                // Hölder's inequality: with 1/p + 1/q = 1 the largest n·x is the q-norm of n scaled
+                // by the half-axes.
                 let q = f64::from(degree) / f64::from(degree - 1);
                 let most = n.component_mul(&half).map(|v| v.abs().powf(q)).sum().powf(1.0 / q);
                 let Some((x, _)) = one else {

@@ -1,11 +1,13 @@
 //! Penetration depth: the shortest translation that takes two overlapping bodies apart.
 //!
-//! For a unit vector n let `f(n) = h_A(-n) + h_B(n)`, h the support functions: how far A has to move along n (or B along -n)
-//! until a plane across n parts them. f is the support function of the difference `B - A`, which contains 0 if and only if
-//! the bodies meet, and the depth is the least of f over all n: any n bounds it from above, but a bound from below has to
-//! cover the sphere ([`covering`]). Triangles of directions are split, those of the lowest bound first, until none is left
-//! below the best depth known by more than the accuracy asked for. Near a minimum that f leaves quadratically as many
-//! triangles are split at each size; where many directions are equally good, as for concentric balls, all of them are.
+//! For a unit vector n let `f(n) = h_A(-n) + h_B(n)`, h the support functions: how far A has to
+//! move along n (or B along -n) until a plane across n parts them. f is the support function of the
+//! difference `B - A`, which contains 0 if and only if the bodies meet, and the depth is the least
+//! of f over all n: any n bounds it from above, but a bound from below has to cover the sphere
+//! ([`covering`]). Triangles of directions are split, those of the lowest bound first, until none
+//! is left below the best depth known by more than the accuracy asked for. Near a minimum that f
+//! leaves quadratically as many triangles are split at each size; where many directions are equally
+//! good, as for concentric balls, all of them are.
 
 mod best;
 mod covering;
@@ -38,17 +40,19 @@ pub struct Penetration {
     pub status: Status,
     /// Proven lower bound over all directions; 0 if the bodies are not proven to overlap.
     pub lower: f64,
-    /// Proven upper bound: moving the first body by this much along `direction` (or the second against it) takes the bodies
-    /// apart, so that they touch at most; 0 if they are apart.
+    /// Proven upper bound: moving the first body by this much along `direction` (or the second
+    /// against it) takes the bodies apart, so that they touch at most; 0 if they are apart.
     pub upper: f64,
-    /// Unit vector from the second body to the first: the normal of the distance, continued; none if they are apart.
+    /// Unit vector from the second body to the first: the normal of the distance, continued; none
+    /// if they are apart.
     pub direction: Option<Vector3<f64>>,
     /// Point of the first body that is deepest in the second: the last to come out.
     pub witness_a: Vector3<f64>,
     /// Point of the second body that is deepest in the first.
     pub witness_b: Vector3<f64>,
-    /// Whether a direction elsewhere, or another pair of parts, was seen to be about as short, or the direction is not known to
-    /// be the best of those near it: direction and witnesses may then jump.
+    /// Whether a direction elsewhere, or another pair of parts, was seen to be about as short, or
+    /// the direction is not known to be the best of those near it: direction and witnesses may then
+    /// jump.
     pub tied: bool,
     /// Directions whose support points were computed.
     pub directions: u32,
@@ -65,15 +69,16 @@ impl Penetration {
 
 /// Penetration depth of two bodies at their poses (body to world): 0 when they are apart or touch.
 ///
-/// The bracket is as narrow as `options` ask, relative to the depth ([`Options::with_depth_accuracy`]), or the status says
-/// that it is not: with many equally short directions and an accuracy beyond about 1e-4 the table of directions is full
-/// first. `upper` is as accurate as a distance wherever its direction is the best: the bracket is about the others.
+/// The bracket is as narrow as `options` ask, relative to the depth
+/// ([`Options::with_depth_accuracy`]), or the status says that it is not: with many equally short
+/// directions and an accuracy beyond about 1e-4 the table of directions is full first. `upper` is
+/// as accurate as a distance wherever its direction is the best: the bracket is about the others.
 /// `warm` is read and then replaced by the hint for the next query of this pair.
 ///
-/// Of solids with several parts it is the shortest translation that takes every part of one off every part of the other. It is
-/// at least the depth of any pair of parts, and at most the length of a translation proven to separate them all; the
-/// shortest such is a local search's, so that where parts interlock the bracket may stay wide, and `directions` counts those
-/// of all pairs.
+/// Of solids with several parts it is the shortest translation that takes every part of one off
+/// every part of the other. It is at least the depth of any pair of parts, and at most the length
+/// of a translation proven to separate them all; the shortest such is a local search's, so that
+/// where parts interlock the bracket may stay wide, and `directions` counts those of all pairs.
 ///
 /// ```
 /// use nalgebra::{UnitQuaternion, Vector3};
@@ -151,7 +156,8 @@ pub(super) struct Proof {
     pub(super) directions: u32,
 }
 
-/// Tables of directions: one that costs little to lay out and serves nearly all pairs, and one for ties.
+/// Tables of directions: one that costs little to lay out and serves nearly all pairs, and one for
+/// ties.
 const FEW: usize = 128;
 const MANY: usize = 2048;
 
@@ -170,13 +176,15 @@ pub(super) fn prove(best: &mut Best<'_>) -> Proof {
     }
 }
 
-/// Triangles that are split together, as their support points are found together; the same on every machine.
+/// Triangles that are split together, as their support points are found together; the same on every
+/// machine.
 const GROUP: usize = MAX_LANES;
 
 /// Groups split in one iteration.
 const GROUPS: u32 = 8;
 
-/// Sweeps the sphere of directions until the bracket is narrow; also tells whether the table was full first.
+/// Sweeps the sphere of directions until the bracket is narrow; also says whether the table was
+/// full first.
 #[inline(never)]
 fn sweep<const N: usize>(best: &mut Best<'_>) -> (Proof, bool) {
     let mut sweep = Sweep {
@@ -273,7 +281,8 @@ impl<const N: usize> Sweep<'_, N> {
         }
     }
 
-    /// The lowest bound of the triangles that are left to split: until now these were only found not to be good enough.
+    /// The lowest bound of the triangles that are left to split: until now these were only found
+    /// not to be good enough.
     fn lowest(&self, best: &Best<'_>) -> f64 {
         let target = self.target(best);
         let error = self.error + 4.0 * SLACK * self.size;
@@ -290,7 +299,7 @@ impl<const N: usize> Sweep<'_, N> {
         best.depth - tolerance(self.pair, self.options, best.depth)
     }
 
-    /// Support points along each n and against it; none if one of them can not be found.
+    /// Support points along each n and against it; none if one of them cannot be found.
     fn directions(&mut self, wanted: &[Wanted], best: &Best<'_>) -> Option<[Option<Direction>; GROUP]> {
         let pair = self.pair;
         let mut sought = [[Sought::default(); GROUP]; 2];
@@ -310,7 +319,8 @@ impl<const N: usize> Sweep<'_, N> {
         Some(found)
     }
 
-    /// What support points along n may lack, query units: far above the best depth a rough bound will do.
+    /// What support points along n may lack, query units: far above the best depth a rough bound
+    /// will do.
     fn tolerated(&self, Wanted { n, between }: &Wanted, best: &Best<'_>) -> f64 {
         let known = if best.depth.is_finite() { best.depth.abs() } else { self.size };
         let depth = |end: u16| n.dot(&self.covering.directions()[usize::from(end)].w());
@@ -318,7 +328,8 @@ impl<const N: usize> Sweep<'_, N> {
         (0.1 * tolerance(self.pair, self.options, known)).max(0.02 * surplus)
     }
 
-    /// The direction with its support points, which are sought in another way where they were not found.
+    /// The direction with its support points, which are sought in another way where they were not
+    /// found.
     fn direction(
         &mut self,
         &Wanted { n, between }: &Wanted,
@@ -348,7 +359,8 @@ impl<const N: usize> Sweep<'_, N> {
         Some(Direction { n, a, b, parents: between.unwrap_or_default() })
     }
 
-    /// Tries the best of the directions from `first` on, if it promises to be better than the best known.
+    /// Tries the best of the directions from `first` on, if it promises to be better than the best
+    /// known.
     fn improve(&mut self, first: usize, best: &mut Best<'_>) {
         let directions = &self.covering.directions()[first..];
         let Some(least) = directions.iter().min_by(|p, q| p.depth().total_cmp(&q.depth())) else { return };
@@ -364,8 +376,8 @@ impl<const N: usize> Sweep<'_, N> {
 
     /// Bounds a triangle, and keeps it for later if that is not enough.
     fn open(&mut self, corners: [u16; 3], best: &Best<'_>) {
-        // Middles are rounded, so neighbours of different size leave slivers open; f changes by little over one. The sums
-        // of the bound itself round too.
+        // Middles are rounded, so neighbours of different size leave slivers open; f changes by
+        // little over one. The sums of the bound itself round too.
         let (target, error) = (self.target(best), self.error + 4.0 * SLACK * self.size);
         match self.covering.bound(corners, target + error) {
             Ok(bound) => self.floor = self.floor.min(bound - error),
@@ -386,7 +398,7 @@ impl<const N: usize> Sweep<'_, N> {
         });
     }
 
-    /// Splits the lowest triangles; false if that can not be done, all staying as it is.
+    /// Splits the lowest triangles; false if that cannot be done, all staying as it is.
     fn split(&mut self, best: &Best<'_>) -> bool {
         // Each with the middle of its widest edge if that is known, else where it is wanted.
         let (mut cells, mut count) = ([None; GROUP], 0);
@@ -431,7 +443,8 @@ impl<const N: usize> Sweep<'_, N> {
         }
         let close = best.depth + 2.0 * best.tolerance();
         let elsewhere = |n_other: &Vector3<f64>| n_other.dot(&n) < ELSEWHERE;
-        // Symmetric bodies have the mirror image of the best, which may lie between all directions known.
+        // Symmetric bodies have the mirror image of the best, which may lie between all directions
+        // known.
         let opposite = self.directions(&[Wanted { n: -n, between: None }], best).and_then(|[opposite, ..]| opposite);
         let others = self.covering.directions().iter().filter(|direction| elsewhere(&direction.n));
         let Some(least) = others.chain(&opposite).min_by(|p, q| p.depth().total_cmp(&q.depth())) else { return false };
@@ -442,7 +455,7 @@ impl<const N: usize> Sweep<'_, N> {
             return false;
         }
         // From there the way down may lead to another minimum.
-        let mut other = best.anew();
+        let mut other = best.again();
         if !other.seek(Some(&least.n)) {
             other.offer(&least.a, &least.b, &least.n);
         }

@@ -1,5 +1,6 @@
-//! A first look around all directions for the shortest way out of an overlap, by the outlines of the bodies. It proves
-//! nothing: it only spares the proof from being about a way that is not the shortest.
+//! A first look around all directions for the shortest way out of an overlap, by the outlines of
+//! the bodies. It proves nothing: it only spares the proof from being about a way that is not the
+//! shortest.
 
 use crate::measure::pair::Pair;
 use crate::measure::vector::{apply_transposed, dot, rows};
@@ -35,7 +36,8 @@ static DIRECTIONS: [[f64; COUNT]; 3] = {
 impl WithSimd for Scout<'_> {
     type Output = (Vector3<f64>, f64);
 
-    /// The best of the directions, a unit vector from B to A, and about how deep A is in B along it; query frame.
+    /// The best of the directions, a unit vector from B to A, and about how deep A is in B along
+    /// it; query frame.
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> (Vector3<f64>, f64) {
         let pair = self.pair;

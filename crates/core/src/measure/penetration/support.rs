@@ -1,4 +1,5 @@
-//! Support points: the point of a body farthest along a direction, near enough to the best and proven inside.
+//! Support points: the point of a body farthest along a direction, near enough to the best and
+//! proven inside.
 
 use crate::body::MAX_CONSTRAINTS;
 use crate::measure::active::MAX_ACTIVE;
@@ -12,7 +13,8 @@ use crate::polynomial::Jet;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::ControlFlow;
 
-/// A point within whose displacement a point of the body lies, with the constraints that hold it back.
+/// A point within whose displacement a point of the body lies, with the constraints that hold it
+/// back.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SupportPoint {
     pub(super) x: Vector3<f64>,
@@ -30,8 +32,9 @@ const MAX_STEPS: u32 = 12;
 /// Least cosine between n and the normal at a start worth starting from.
 const USEFUL: f64 = 0.7;
 
-/// Point of the body within about `tolerance` of the farthest along the unit vector n: by Newton's method from `start`, if
-/// that fails from `restart`, if that fails by the interior-point method. None only if rounding leaves no point inside.
+/// Point of the body within about `tolerance` of the farthest along the unit vector n: by Newton's
+/// method from `start`, if that fails from `restart`, if that fails by the interior-point method.
+/// None only if rounding leaves no point inside.
 pub(super) fn support(
     body: &Posed<'_>,
     n: &Vector3<f64>,
@@ -47,7 +50,8 @@ pub(super) fn support(
     if let Some(found) = newton(body, n, tolerance, &restart) {
         return Some(found);
     }
-    // The last resort ends early on surfaces that are flat at all scales, where what was known may be better.
+    // The last resort ends early on surfaces that are flat at all scales, where what was known may
+    // be better.
     let found = [Some(interior_point(body, n, tolerance)), start, Some(restart)];
     let inside =
         found.into_iter().flatten().filter_map(|point| body.pull_in(&point.x).map(|x| SupportPoint { x, ..point }));
@@ -74,7 +78,8 @@ fn smooth(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &Vector3<f6
     for _ in 0..MAX_STEPS {
         let Jet { value, gradient, hessian } = body.jet(0, &x);
         if !(0.3..2.0).contains(&value) {
-            // A step along a flat surface went far: back to the level 1, exactly if g - min g is a power of the distance.
+            // A step along a flat surface went far: back to the level 1, exactly if g - min g is a
+            // power of the distance.
             let (depth, degree) = (body.body.min_value(), body.body.degree() as f64);
             let factor = ((1.0 - depth) / (value - depth)).powf(1.0 / degree);
             if !factor.is_finite() {
@@ -85,7 +90,8 @@ fn smooth(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &Vector3<f6
         }
         let squared = gradient.norm_squared();
         let first = multiplier.is_none();
-        // At the solution n·v = λ g·v for every v, and along this one whatever the units of the axes.
+        // At the solution n·v = λ g·v for every v, and along this one whatever the units of the
+        // axes.
         let outward = x - body.interior;
         let old = multiplier.unwrap_or(n.dot(&outward) / gradient.dot(&outward));
         if !(old > 0.0) || first && !(gradient.dot(n) > USEFUL * squared.sqrt()) {
@@ -106,7 +112,8 @@ fn smooth(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &Vector3<f6
             x += dx * (0.5 / length);
             continue;
         }
-        // Second order: the surface bends away from the tangent by as much as the step gained along it.
+        // Second order: the surface bends away from the tangent by as much as the step gained along
+        // it.
         x += dx - gradient * (bend / squared);
         if new * (1.0 - value).abs() + 2.0 * old.max(new) * bend < tolerance {
             let inside = body.pull_in(&x)?;
@@ -120,7 +127,8 @@ fn smooth(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &Vector3<f6
     None
 }
 
-/// Newton's method on `Σ λ_i ∇g_i(x) = n, g_i(x) = 1`, ended by pulling in. None if it does not arrive.
+/// Newton's method on `Σ λ_i ∇g_i(x) = n, g_i(x) = 1`, ended by pulling in. None if it does not
+/// arrive.
 fn newton(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &SupportPoint) -> Option<SupportPoint> {
     if body.len() == 1 {
         return smooth(body, n, tolerance, &start.x);
@@ -181,8 +189,8 @@ fn newton(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &SupportPoi
             fitted = false;
             continue;
         }
-        // What this step gains across the surface and along it, n·dx = Σ λ_i (1 - g_i) + dx·M dx; the two may cancel. What
-        // is left is less, times the degree for pulling in.
+        // What this step gains across the surface and along it, n·dx = Σ λ_i (1 - g_i) + dx·M dx;
+        // the two may cancel. What is left is less, times the degree for pulling in.
         let across: f64 = jets.iter().zip(r).map(|(jet, m)| (m * (1.0 - jet.value)).abs()).sum();
         if across + dx.dot(&(hessian * dx)).abs() < 0.1 * tolerance {
             let changed = active.drop_negative()

@@ -49,7 +49,8 @@ fn boxes_leave_by_the_nearest_face() {
         let ways = ha + hb - shift.abs();
         let truth = ways.min().max(0.0);
         let (a, b) = (Body::cuboid("a", ha).unwrap(), Body::cuboid("b", hb).unwrap());
-        // Turned together, so that the faces are across no axis of the table of directions but in A's frame.
+        // Turned together, so that the faces are across no axis of the table of directions but in
+        // A's frame.
         let turn = random_pose(&mut random, 1.0);
         let pose_b = turn.with_translation(turn.transform_point(&shift));
         let size = ha.norm().max(hb.norm());
@@ -85,7 +86,8 @@ fn coaxial_powers_come_out_along_the_axis_or_shorter() {
     }
 }
 
-/// The least over many directions of the support gap, improved around the best: the depth from above.
+/// The least over many directions of the support gap, improved around the best: the depth from
+/// above.
 fn brute_force(support: impl Fn(&Vector3<f64>) -> f64, random: &mut Seeded) -> f64 {
     let mut best = (f64::INFINITY, Vector3::x());
     for _ in 0..20_000 {

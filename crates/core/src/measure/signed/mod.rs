@@ -1,9 +1,11 @@
-//! Signed distance: the distance of bodies that are apart, minus the penetration depth of those that overlap.
+//! Signed distance: the distance of bodies that are apart, minus the penetration depth of those
+//! that overlap.
 //!
-//! Both are one function: with the support functions h, the largest over all unit vectors n of `-h_A(-n) - h_B(n)`, how far
-//! a plane across n parts the bodies. Its optimality system is that of the distance with a distance of either sign, so
-//! Newton's method passes through contact without noticing; x and y trade places along n. What differs is the proof: apart,
-//! any pair of points bounds it from above; in overlap that takes all directions ([`super::penetration`]).
+//! Both are one function: with the support functions h, the largest over all unit vectors n of
+//! `-h_A(-n) - h_B(n)`, how far a plane across n parts the bodies. Its optimality system is that of
+//! the distance with a distance of either sign, so Newton's method passes through contact without
+//! noticing; x and y trade places along n. What differs is the proof: apart, any pair of points
+//! bounds it from above; in overlap that takes all directions ([`super::penetration`]).
 
 #[cfg(test)]
 mod tests;
@@ -37,24 +39,27 @@ pub struct SignedDistance {
     pub witness_a: Vector3<f64>,
     /// Point of the second body nearest to the first, or deepest in it.
     pub witness_b: Vector3<f64>,
-    /// Unit vector from the second body to the first: moving the first along it makes the signed distance grow as much.
-    /// None only if the solve was stopped before any was found.
+    /// Unit vector from the second body to the first: moving the first along it makes the signed
+    /// distance grow as much. None only if the solve was stopped before any was found.
     pub normal: Option<Vector3<f64>>,
-    /// Derivatives with respect to the twists of the first and of the second body; none without a normal.
+    /// Derivatives with respect to the twists of the first and of the second body; none without a
+    /// normal.
     pub gradients: Option<[Twist; 2]>,
-    /// Whether the bracket holds 0: the bodies may just touch. Smooth bodies have the same derivative on both sides; where
-    /// edges or corners touch, the derivative in overlap may be another one.
+    /// Whether the bracket holds 0: the bodies may just touch. Smooth bodies have the same
+    /// derivative on both sides; where edges or corners touch, the derivative in overlap may be
+    /// another one.
     pub at_contact: bool,
-    /// Whether another direction out of an overlap was seen to be about as short, or the one found is not known to be the best
-    /// of those near it, or another pair of parts may be as near: value and bracket hold, but normal, witnesses and gradients
-    /// may jump.
+    /// Whether another direction out of an overlap was seen to be about as short, or the one found
+    /// is not known to be the best of those near it, or another pair of parts may be as near: value
+    /// and bracket hold, but normal, witnesses and gradients may jump.
     pub tied: bool,
     /// Iterations of all methods together.
     pub iterations: u32,
 }
 
 impl SignedDistance {
-    /// The answer inside the bracket that points or a direction attain: the upper bound of bodies apart, else the lower.
+    /// The answer inside the bracket that points or a direction attain: the upper bound of bodies
+    /// apart, else the lower.
     pub fn value(&self) -> f64 {
         if self.lower > 0.0 { self.upper } else { self.lower }
     }
@@ -62,14 +67,16 @@ impl SignedDistance {
 
 /// Signed distance of body `a` at `pose_a` and body `b` at `pose_b` (body to world).
 ///
-/// The bracket is as narrow as `options` ask: relative to the smaller body when they are apart, and relative to the depth
-/// when they overlap ([`Options::with_depth_accuracy`]), where the value itself is as accurate as a distance unless another
-/// direction is a better one within that bracket. `warm` is read and then replaced by the hint for the next query of this
-/// pair; it carries through contact.
+/// The bracket is as narrow as `options` ask: relative to the smaller body when they are apart, and
+/// relative to the depth when they overlap ([`Options::with_depth_accuracy`]), where the value
+/// itself is as accurate as a distance unless another direction is a better one within that
+/// bracket. `warm` is read and then replaced by the hint for the next query of this pair; it
+/// carries through contact.
 ///
-/// Of solids with several parts it is their distance, or minus the depth of their overlap ([`super::penetration`]), which is
-/// known from a local search: in overlap the bracket may stay wide. There the gradients are those of all the pairs of parts
-/// that hold the solids back, and the witnesses belong to the one that does so most.
+/// Of solids with several parts it is their distance, or minus the depth of their overlap
+/// ([`super::penetration`]), which is known from a local search: in overlap the bracket may stay
+/// wide. There the gradients are those of all the pairs of parts that hold the solids back, and the
+/// witnesses belong to the one that does so most.
 ///
 /// ```
 /// use nalgebra::Vector3;

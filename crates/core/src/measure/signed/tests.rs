@@ -61,7 +61,8 @@ fn slides_from_touching_to_concentric_are_continuous_and_monotone() {
             let one = cold(a, &Pose::identity(), b, &pose);
             assert!(one.lower <= answer.upper && answer.lower <= one.upper, "{label} cold {one:?}");
             if let Some((before, previous)) = last {
-                // It changes by at most what was moved; and for bodies about their centres the way in only falls.
+                // It changes by at most what was moved; and for bodies about their centres the way
+                // in only falls.
                 let moved = before - offset;
                 assert!(answer.lower <= previous.upper + moved + 1e-9 * s, "{label} after {previous:?}");
                 assert!(answer.upper >= previous.lower - moved - 1e-9 * s, "{label} after {previous:?}");
@@ -147,12 +148,14 @@ fn one_normal_and_one_slope_through_contact() {
         let (n, gap) = (first.normal.unwrap(), first.value());
         let mut warm = WarmStart::default();
         for level in [1e-2, 1e-3, 1e-5, 1e-7, 0.0, -1e-7, -1e-5, -1e-3, -1e-2] {
-            // Moving B along the normal brings it nearer by exactly as much, as long as no other way is shorter.
+            // Moving B along the normal brings it nearer by exactly as much, as long as no other
+            // way is shorter.
             let moved = pose.with_translation(pose.translation() + n * (gap - level * small));
             let answer = signed_distance(a, &Pose::identity(), b, &moved, &Options::default(), &mut warm);
             let label = format!("seed {seed} {}-{} level {level:e}: {answer:?}", a.name(), b.name());
             let truth = level * small;
-            // In overlap as shallow as 1e-7, where edges touch, hardly any direction is worse than the best.
+            // In overlap as shallow as 1e-7, where edges touch, hardly any direction is worse than
+            // the best.
             let smooth = i < 5 && j < 5;
             assert!(answer.status == Status::Converged || level < 0.0 && level > -1e-4 && !smooth, "{label}");
             let floor = 3e-9 * small + 1e-13 * far;

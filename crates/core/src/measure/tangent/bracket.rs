@@ -1,4 +1,5 @@
-//! What proves a distance at trial points: the tangent planes of both bodies there, or a step away from there by Taylor's formula.
+//! What proves a distance at trial points: the tangent planes of both bodies there, or a step away
+//! from there by Taylor's formula.
 
 use super::Plane;
 use super::side::{Side, TURNED};
@@ -11,16 +12,18 @@ pub(in crate::measure) struct Extrapolated<N> {
     pub(in crate::measure) plane: Plane<N>,
     value_error: N,
     gradient_error: N,
-    /// Curvature μ, by z: the constraint rises from its tangent plane by at least `¼ μ |δ|²` within `radius`.
+    /// Curvature μ, by z: the constraint rises from its tangent plane by at least `¼ μ |δ|²` within
+    /// `radius`.
     curvature: N,
     /// Where that holds, by z; farther away the rise is at least in proportion to the distance.
     radius: N,
 }
 
 impl<N: Copy> Side<'_, N> {
-    /// The plane a step from where the jet is of, by Taylor's formula. With T the ceiling of third derivatives it is off by at
-    /// most `T |δ|³ / 6` in value and `T |δ|² / 2` in gradient, δ the step in normalized coordinates; that holds from a point
-    /// near the level for steps no longer than the leeway, else the errors are NaN. The step is in the basis that `local` is of.
+    /// The plane a step from where the jet is of, by Taylor's formula. With T the ceiling of third
+    /// derivatives it is off by at most `T |δ|³ / 6` in value and `T |δ|² / 2` in gradient, δ the
+    /// step in normalized coordinates; that holds from a point near the level for steps no longer
+    /// than the leeway, else the errors are NaN. The step is in the basis that `local` is of.
     #[inline(always)]
     pub(in crate::measure) fn extrapolate<S: Simd>(
         &self,
@@ -45,8 +48,8 @@ impl<N: Copy> Side<'_, N> {
         let third = third.select(near, N::splat(simd, f64::NAN));
         let plane =
             Plane { value, gradient: [dot(gradient, local[0]), dot(gradient, local[1]), dot(gradient, local[2])] };
-        // Second derivatives fall by at most T per length. Within 3 μ / (2 T) a rise of ½ μ |δ|² keeps half of it, and being
-        // convex it only steepens after that.
+        // Second derivatives fall by at most T per length. Within 3 μ / (2 T) a rise of ½ μ |δ|²
+        // keeps half of it, and being convex it only steepens after that.
         let ceiling = N::splat(simd, self.trust().third.ceiling);
         let length = square.sqrt();
         let error = N::splat(simd, self.trust().curvature_error);
@@ -61,8 +64,8 @@ impl<N: Copy> Side<'_, N> {
         }
     }
 
-    /// From a point with this plane to a point of the body nearby, against the gradient, in the basis of the plane, as far as the
-    /// active constraint goes; and whether that is proven.
+    /// From a point with this plane to a point of the body nearby, against the gradient, in the
+    /// basis of the plane, as far as the active constraint goes; and whether that is proven.
     #[inline(always)]
     pub(in crate::measure) fn inward<S: Simd>(&self, simd: S, at: &Extrapolated<N>) -> (V3<N>, N::Mask)
     where
@@ -79,8 +82,8 @@ impl<N: Copy> Side<'_, N> {
         (scaled(gradient, inverse * distance), fine)
     }
 
-    /// Bound of how much farther along the unit vector n the body reaches than the point with this plane; not a number if the
-    /// plane faces another way. All in the basis of the plane.
+    /// Bound of how much farther along the unit vector n the body reaches than the point with this
+    /// plane; not a number if the plane faces another way. All in the basis of the plane.
     #[inline(always)]
     pub(in crate::measure) fn lack<S: Simd>(&self, simd: S, at: &Extrapolated<N>, n: V3<N>) -> N
     where
@@ -108,8 +111,9 @@ impl<N: Copy> Side<'_, N> {
     }
 }
 
-/// Lower bound of the smallest eigenvalue of a positive definite matrix: the determinant over the square of half the trace
-/// bounds it, as the product of two numbers is at most the square of their mean. Not above 0 for any other matrix.
+/// Lower bound of the smallest eigenvalue of a positive definite matrix: the determinant over the
+/// square of half the trace bounds it, as the product of two numbers is at most the square of their
+/// mean. Not above 0 for any other matrix.
 #[inline(always)]
 fn smallest_eigenvalue<S: Simd, N: Number<S>>(simd: S, [xx, xy, xz, yy, yz, zz]: &[N; 6]) -> N {
     let half_trace = (*xx + *yy + *zz) * N::splat(simd, 0.5);
@@ -119,14 +123,16 @@ fn smallest_eigenvalue<S: Simd, N: Number<S>>(simd: S, [xx, xy, xz, yy, yz, zz]:
     (determinant / (half_trace * half_trace)) - half_trace * N::splat(simd, 256.0 * f64::EPSILON)
 }
 
-/// A proven bracket of the distance with the points that attain the upper bound, in the basis from the trial points on.
+/// A proven bracket of the distance with the points that attain the upper bound, in the basis from
+/// the trial points on.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::measure) struct Bracket<N> {
     pub(in crate::measure) lower: N,
     pub(in crate::measure) upper: N,
     /// What rounding alone leaves between them, about.
     pub(in crate::measure) rounding: N,
-    /// Bound of the angle between the outward normal of one body and the inward normal of the other, but for terms of third order.
+    /// Bound of the angle between the outward normal of one body and the inward normal of the
+    /// other, but for terms of third order.
     pub(in crate::measure) off: N,
     /// Of A's and of B's constraint, metres.
     pub(in crate::measure) multipliers: [N; 2],
@@ -138,26 +144,30 @@ pub(in crate::measure) struct Bracket<N> {
     pub(in crate::measure) to_b: V3<N>,
 }
 
-/// Relative slack for the rounding of the bracket's own arithmetic, basis included: fewer than 256 operations on the sum
-/// of magnitudes.
+/// Relative slack for the rounding of the bracket's own arithmetic, basis included: fewer than 256
+/// operations on the sum of magnitudes.
 pub(in crate::measure) const SLACK: f64 = 128.0 * f64::EPSILON;
 
-/// Largest angle between the bodies' normals that an answer is taken at: its gradients are off by about as much.
+/// Largest angle between the bodies' normals that an answer is taken at: its gradients are off by
+/// about as much.
 pub(in crate::measure) const ALIGNED: f64 = 2.5e-7;
 
-/// How much farther a point is moved than its constraint's linearization asks, for the rounding of its gradient.
+/// How much farther a point is moved than its constraint's linearization asks, for the rounding of
+/// its gradient.
 pub(in crate::measure) const NUDGE: f64 = 1e-4;
 
-/// The bracket from the constraints at x and y with `difference = x - y` in the basis. NaN where it proves nothing; it
-/// holds only if both points, and those extrapolated from, lie in their balls.
+/// The bracket from the constraints at x and y with `difference = x - y` in the basis. NaN where it
+/// proves nothing; it holds only if both points, and those extrapolated from, lie in their balls.
 ///
-/// Lower bound. For a unit vector n and any multipliers, convexity with the curvature floor c of `g(z)` gives for every
-/// point of a body `r·(x' - x) >= -λ (1 - g(x)) - |M⁻ᵀ(r + λ∇g)|² / (2 λ c)`: what the tangent plane loses to a normal that
-/// is off by ε is of the order ε². n is the normal of the body with the lower floor, which then loses only its rounding.
+/// Lower bound. For a unit vector n and any multipliers, convexity with the curvature floor c of
+/// `g(z)` gives for every point of a body `r·(x' - x) >= -λ (1 - g(x)) - |M⁻ᵀ(r + λ∇g)|² / (2 λ
+/// c)`: what the tangent plane loses to a normal that is off by ε is of the order ε². n is the
+/// normal of the body with the lower floor, which then loses only its rounding.
 ///
-/// Upper bound. Along its gradient g of length G a constraint rises from its value by `t G` and at most `½ κ t²` more, so a
-/// move by `t = (e + |e| (2q + NUDGE)) / G` against the gradient, `e = g(x) + error - 1`, `q = κ |e| / G² <= 0.1`, leads to a
-/// point of the body (or, from within, no farther than to the boundary).
+/// Upper bound. Along its gradient g of length G a constraint rises from its value by `t G` and at
+/// most `½ κ t²` more, so a move by `t = (e + |e| (2q + NUDGE)) / G` against the gradient, `e =
+/// g(x) + error - 1`, `q = κ |e| / G² <= 0.1`, leads to a point of the body (or, from within, no
+/// farther than to the boundary).
 #[inline(always)]
 pub(in crate::measure) fn bracket<S: Simd, N: Number<S>>(
     simd: S,
@@ -243,7 +253,8 @@ struct Near {
     floor: f64,
     ceiling: f64,
     gradient_error: f64,
-    /// Bound of the relative error of a gradient by the rounding of the body's map and of the basis.
+    /// Bound of the relative error of a gradient by the rounding of the body's map and of the
+    /// basis.
     turn: f64,
     span: f64,
     leeway: f64,
@@ -266,7 +277,8 @@ impl Near {
         }
     }
 
-    /// How far along the outward gradient to move so that an excess of the value over 1 is undone, and whether that is proven.
+    /// How far along the outward gradient to move so that an excess of the value over 1 is undone,
+    /// and whether that is proven.
     #[inline(always)]
     fn move_inside<S: Simd, N: Number<S>>(
         &self,
@@ -303,8 +315,8 @@ impl<N: Copy> Off<N> {
         Self { angle, square: angle * angle }
     }
 
-    /// By the square of a residual r and the error e of that: `(r + e)² <= (1 + ε) r² + (1 + 1/ε) e²`, which need not wait
-    /// for the root.
+    /// By the square of a residual r and the error e of that: `(r + e)² <= (1 + ε) r² + (1 + 1/ε)
+    /// e²`, which need not wait for the root.
     #[inline(always)]
     fn new<S: Simd>(simd: S, square: N, error: N) -> Self
     where
@@ -325,8 +337,9 @@ struct Bound<N> {
 }
 
 impl<N: Copy> Bound<N> {
-    /// Bound of what a plane off by `off` in direction loses: the largest of `r·δ - λ (rise over the tangent plane)`, `|r| = off`,
-    /// by the curvature at the point, by the one anywhere, and by the length of δ.
+    /// Bound of what a plane off by `off` in direction loses: the largest of `r·δ - λ (rise over
+    /// the tangent plane)`, `|r| = off`, by the curvature at the point, by the one anywhere, and by
+    /// the length of δ.
     #[inline(always)]
     fn loss<S: Simd>(&self, simd: S, off: &Off<N>, multiplier: N) -> N
     where
@@ -338,7 +351,8 @@ impl<N: Copy> Bound<N> {
         let slope = splat(0.25) * multiplier * self.curvature * self.radius;
         // Both factors may be negative where the surface is flat.
         let fine = N::and(simd, square.le(slope * slope), splat(0.0).le(self.curvature));
-        // The stiffer of the two bounds, of the curvature here by z and of twice the one anywhere by metres.
+        // The stiffer of the two bounds, of the curvature here by z and of twice the one anywhere
+        // by metres.
         let anywhere = splat(2.0) * self.floor * self.inverse_square;
         let stiffness = (self.curvature.max(anywhere) * multiplier).select(fine, anywhere * multiplier);
         (square / stiffness).min(off.angle * self.span)

@@ -1,10 +1,10 @@
-//! Newton's method for the distance of two bodies with one active constraint each, in the tangent plane of their normal,
-//! and the bracket that comes with it.
+//! Newton's method for the distance of two bodies with one active constraint each, in the tangent
+//! plane of their normal, and the bracket that comes with it.
 //!
-//! With the unit vector n from B to A, tangents T (3x2) across it, gradients `g`, Hessians `H` and multipliers
-//! `λ_A = -1/(n·g_A)`, `λ_B = 1/(n·g_B)`, the optimality conditions `n + λ_A g_A = 0`, `-n + λ_B g_B = 0`, `x - y = D n`,
-//! `g_A(x) = g_B(y) = 1` linearize, for steps `dx = T α + n a`, `dy = T β + n b`, `dn = T θ` and up to terms of second order,
-//! to
+//! With the unit vector n from B to A, tangents T (3x2) across it, gradients `g`, Hessians `H` and
+//! multipliers `λ_A = -1/(n·g_A)`, `λ_B = 1/(n·g_B)`, the optimality conditions `n + λ_A g_A = 0`,
+//! `-n + λ_B g_B = 0`, `x - y = D n`, `g_A(x) = g_B(y) = 1` linearize, for steps `dx = T α + n a`,
+//! `dy = T β + n b`, `dn = T θ` and up to terms of second order, to
 //!
 //! ```text
 //! θ + W_A α = r_A,    W_A = λ_A TᵀH_A T,   r_A = -λ_A Tᵀ(g_A + a H_A n),   a = (g_A(x) - 1) λ_A
@@ -20,8 +20,8 @@
 //!
 //! which are regular through contact, D = 0 included, wherever one of the bodies is curved.
 //!
-//! Points are given in A's frame from the centre of A's normalization on, metres ("query frame" in these files); `T` and `n`
-//! are the rows of the basis.
+//! Points are given in A's frame from the centre of A's normalization on, metres ("query frame" in
+//! these files); `T` and `n` are the rows of the basis.
 
 mod bracket;
 mod side;
@@ -31,7 +31,8 @@ use crate::polynomial::{Number, NumberJet, Simd};
 pub(super) use bracket::{ALIGNED, Bracket, NUDGE, SLACK, bracket};
 pub(super) use side::{Relative, Side, TURNED};
 
-/// Value and gradient of a constraint at a point, the gradient along the two tangents and the normal.
+/// Value and gradient of a constraint at a point, the gradient along the two tangents and the
+/// normal.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plane<N> {
     pub(super) value: N,
@@ -132,7 +133,8 @@ impl<N: Copy> Step<N> {
         relative(self.dx, of_x).max(relative(self.dy, of_y))
     }
 
-    /// The step scaled to its limits if it exceeds them, by the square of what it is relative to them.
+    /// The step scaled to its limits if it exceeds them, by the square of what it is relative to
+    /// them.
     #[inline(always)]
     pub(super) fn at_most<S: Simd>(self, simd: S, square: N) -> Self
     where
@@ -145,13 +147,16 @@ impl<N: Copy> Step<N> {
     }
 }
 
-/// Newton's step from points x and y with `difference = x - y` in the basis whose third vector is n.
+/// Newton's step from points x and y with `difference = x - y` in the basis whose third vector is
+/// n.
 ///
-/// In place of each constraint g it takes `2 (g - 1) / (g + 1) + 1`: the same set, and nearly 1 + ln g, which is straighter along
-/// rays, so that the surface is found from farther away. Gradients are then those of g over the square of the mean m of g and
-/// 1, Hessians `H - ∇g ∇gᵀ / m` over the same.
+/// In place of each constraint g it takes `2 (g - 1) / (g + 1) + 1`: the same set, and nearly 1 +
+/// ln g, which is straighter along rays, so that the surface is found from farther away. Gradients
+/// are then those of g over the square of the mean m of g and 1, Hessians `H - ∇g ∇gᵀ / m` over the
+/// same.
 ///
-/// `smallest` (per metre) is added to the curvature that is divided by: where both bodies are flat it bounds the step.
+/// `smallest` (per metre) is added to the curvature that is divided by: where both bodies are flat
+/// it bounds the step.
 #[inline(always)]
 pub(super) fn newton<S: Simd, N: Number<S>>(
     simd: S,
@@ -175,9 +180,9 @@ pub(super) fn newton<S: Simd, N: Number<S>>(
     (step, response)
 }
 
-/// Newton's step towards points with `x - y` along a ray, a vector in the basis, and opposite normals: the system above with
-/// `D = 0` once B is moved by the multiple ρ of the ray that makes them touch, for which all but terms of second order are at
-/// hand before.
+/// Newton's step towards points with `x - y` along a ray, a vector in the basis, and opposite
+/// normals: the system above with `D = 0` once B is moved by the multiple ρ of the ray that makes
+/// them touch, for which all but terms of second order are at hand before.
 #[inline(always)]
 pub(super) fn newton_along<S: Simd>(
     simd: S,
@@ -193,7 +198,8 @@ pub(super) fn newton_along<S: Simd>(
     let height = difference[2] + straight_a.shift - straight_b.shift;
     let off = [difference[0] - height * slope[0], difference[1] - height * slope[1]];
     let (Turn { mut alpha, beta, theta }, response) = turn(simd, &straight_a, &straight_b, 0.0, off, smallest);
-    // What the surfaces fall below their tangent planes, of second order, changes where on the ray they meet.
+    // What the surfaces fall below their tangent planes, of second order, changes where on the ray
+    // they meet.
     let fallen = |plane: &Plane<f64>, straight: &Straight<f64>, along: [f64; 2]| {
         let bent = apply2::<S, f64>(&straight.curvature, along);
         let sloped = (plane.gradient[0] * along[0] + plane.gradient[1] * along[1]) * straight.multiplier;
@@ -281,8 +287,8 @@ fn turn<S: Simd, N: Number<S>>(
     (turn, response)
 }
 
-/// How a solution answers a small motion of B, to first order, in the basis it was found in: the system at the head of this
-/// file with all but τ and r_B at 0.
+/// How a solution answers a small motion of B, to first order, in the basis it was found in: the
+/// system at the head of this file with all but τ and r_B at 0.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Response<N> {
     /// `W_A`.
@@ -296,7 +302,8 @@ pub(super) struct Response<N> {
 }
 
 impl Response<f64> {
-    /// The step by how far x - y is from along the normal and how far B's outward normal has turned, both along the tangents.
+    /// The step by how far x - y is from along the normal and how far B's outward normal has
+    /// turned, both along the tangents.
     #[inline(always)]
     pub(super) fn step<S: Simd>(&self, _: S, tau: [f64; 2], turned: [f64; 2]) -> Step<f64> {
         let pulled = apply2::<S, f64>(&self.give, turned);
@@ -328,7 +335,8 @@ struct Straight<N> {
 }
 
 impl<N: Copy> Straight<N> {
-    /// With the multiplier λ of the constraint itself, `(g - 1) m` or its negative, and `1 / m`, m the mean of g and 1.
+    /// With the multiplier λ of the constraint itself, `(g - 1) m` or its negative, and `1 / m`, m
+    /// the mean of g and 1.
     #[inline(always)]
     fn new<S: Simd>(plane: &Plane<N>, bend: &Bend<N>, multiplier: N, excess: N, inverse_mean: N) -> Self
     where
@@ -343,7 +351,8 @@ impl<N: Copy> Straight<N> {
             multiplier,
             shift,
             right: [-multiplier * shift.mul_add(tilt[0], g[0]), -multiplier * shift.mul_add(tilt[1], g[1])],
-            // Without the tangential part of ∇g ∇gᵀ, which vanishes at the solution, it stays positive semidefinite.
+            // Without the tangential part of ∇g ∇gᵀ, which vanishes at the solution, it stays
+            // positive semidefinite.
             curvature: scaled(bend.curvature, multiplier),
         }
     }

@@ -1,4 +1,5 @@
-//! Bodies as Newton's method for distances sees them: each in its normalized coordinates, B where it stands as seen from A.
+//! Bodies as Newton's method for distances sees them: each in its normalized coordinates, B where
+//! it stands as seen from A.
 
 use crate::body::{Body, ConstraintTrust};
 use crate::measure::pose::{Pose, ROTATION_ERROR};
@@ -6,8 +7,8 @@ use crate::measure::vector::{M3, V3, add_scaled, apply, apply_transposed, dot, r
 use crate::polynomial::{Number, NumberJet, Simd, gamma};
 use nalgebra::Vector3;
 
-/// Bound of the error of a relative rotation in operator norm: both rotations are off by at most [`ROTATION_ERROR`]; their
-/// product, its matrix and sums with it round a few times more.
+/// Bound of the error of a relative rotation in operator norm: both rotations are off by at most
+/// [`ROTATION_ERROR`]; their product, its matrix and sums with it round a few times more.
 pub(in crate::measure) const TURNED: f64 = 2.0 * ROTATION_ERROR + gamma(40);
 
 /// Where B stands as seen from A.
@@ -114,8 +115,8 @@ impl<'a, N: Copy> Side<'a, N> {
         &self.body.trust().constraints[self.active]
     }
 
-    /// The active constraint at a point in its normalized coordinates, and whether the point lies in the ball of the body's
-    /// [`crate::body::Trust`].
+    /// The active constraint at a point in its normalized coordinates, and whether the point lies
+    /// in the ball of the body's [`crate::body::Trust`].
     #[inline(always)]
     pub(in crate::measure) fn jet<S: Simd>(&self, simd: S, v: V3<N>) -> (NumberJet<N>, N::Mask)
     where
@@ -138,8 +139,9 @@ impl<'a, N: Copy> Side<'a, N> {
 }
 
 impl Side<'_, f64> {
-    /// The point itself if it lies in the ball of the body's [`crate::body::Trust`], else about where the line to the centre meets
-    /// the surface, by the value of the active constraint at the point.
+    /// The point itself if it lies in the ball of the body's [`crate::body::Trust`], else about
+    /// where the line to the centre meets the surface, by the value of the active constraint at the
+    /// point.
     #[inline(always)]
     pub(in crate::measure) fn brought_near<S: Simd>(&self, _: S, v: V3<f64>, value: f64) -> V3<f64> {
         let from = subtract::<S, f64>(v, self.origin);
@@ -154,15 +156,17 @@ impl Side<'_, f64> {
         add_scaled::<S, f64>(self.origin, fraction, from)
     }
 
-    /// Square of a step in the basis that `local` is of, in normalized coordinates, relative to the body's size there: however
-    /// thin a body is, its surface bends about as much over all steps of the same relative length.
+    /// Square of a step in the basis that `local` is of, in normalized coordinates, relative to the
+    /// body's size there: however thin a body is, its surface bends about as much over all steps of
+    /// the same relative length.
     #[inline(always)]
     pub(in crate::measure) fn relative_square<S: Simd>(&self, _: S, local: &M3<f64>, step: V3<f64>) -> f64 {
         let delta = apply_transposed::<S, f64>(local, step);
         dot::<S, f64>(delta, delta) / self.body.trust().radius.powi(2)
     }
 
-    /// Whether all constraints but the active one are proven to hold at (a point within the displacement of) v.
+    /// Whether all constraints but the active one are proven to hold at (a point within the
+    /// displacement of) v.
     #[inline(always)]
     pub(in crate::measure) fn others_hold<S: Simd>(&self, simd: S, v: V3<f64>) -> bool {
         let mut hold = true;

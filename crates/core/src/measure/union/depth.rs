@@ -1,7 +1,8 @@
 //! How deep unions overlap, and their signed distance.
 //!
-//! A translation that separates the unions separates every pair of parts: the depth is at least the largest of the pairs'
-//! depths. It is at most the length of any translation that is proven to separate them all ([`way`]).
+//! A translation that separates the unions separates every pair of parts: the depth is at least the
+//! largest of the pairs' depths. It is at most the length of any translation that is proven to
+//! separate them all ([`way`]).
 
 use super::least::{Least, least};
 use super::status;
@@ -112,8 +113,8 @@ pub(in crate::measure) fn signed_distance(
     }
 }
 
-/// Derivatives of minus the length of a way with respect to both poses: each pair of parts that holds the solids back adds
-/// its pull, at the points where it does (envelope theorem).
+/// Derivatives of minus the length of a way with respect to both poses: each pair of parts that
+/// holds the solids back adds its pull, at the points where it does (envelope theorem).
 fn gradients(way: &Way, pose_a: &Pose, pose_b: &Pose) -> [Twist; 2] {
     way.contacts.iter().fold([Twist::ZERO; 2], |[a, b], Contact { pull, x, y }| {
         let of_a = Twist::of_force(*pull, x, pose_a.translation());

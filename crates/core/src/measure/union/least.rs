@@ -54,12 +54,13 @@ pub(in crate::measure) struct Least<T> {
     pub(in crate::measure) iterations: u32,
 }
 
-/// Solves for the pairs of so many parts one by one, but for those whose `bound`, a cheap lower bound, exceeds the best upper
-/// bound; ends early with an upper bound of at most `enough`. The bracket of the minimum is the minimum of the brackets.
+/// Solves for the pairs of this many parts one by one, but for those whose `bound`, a cheap lower
+/// bound, exceeds the best upper bound; ends early with an upper bound of at most `enough`. The
+/// bracket of the minimum is the minimum of the brackets.
 ///
-/// The pair of the last answer comes first, or that of the lowest bound: the smaller the first answer, the fewer of the
-/// others need be looked at. `warm` is left with the hint and the parts of the least. `solve` is told the best upper bound:
-/// beyond it an answer does not count.
+/// The pair of the last answer comes first, or that of the lowest bound: the smaller the first
+/// answer, the fewer of the others need be looked at. `warm` is left with the hint and the parts of
+/// the least. `solve` is given the best upper bound: beyond it an answer does not count.
 pub(in crate::measure) fn least<T: Answer>(
     (len_a, len_b): (usize, usize),
     bound: impl Fn((usize, usize)) -> f64,

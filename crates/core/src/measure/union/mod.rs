@@ -1,8 +1,8 @@
 //! Solids with several parts: measures of unions from those of pairs of convex parts.
 //!
-//! Distance, level distance and growth distance of unions are the least of those of the pairs of parts ([`least`]). How deep
-//! unions overlap is another matter ([`depth`]): a translation has to take all pairs apart at once. Each function hands two
-//! single bodies straight on.
+//! Distance, level distance and growth distance of unions are the least of those of the pairs of
+//! parts ([`least`]). How deep unions overlap is another matter ([`depth`]): a translation has to
+//! take all pairs apart at once. Each function hands two single bodies straight on.
 
 mod depth;
 mod least;
@@ -94,8 +94,9 @@ fn lowest(
     LevelDistance { status: status(narrow), lower, tied, iterations, ..found.best }
 }
 
-/// Lower bound of the level distance from B's circumscribed ball: along a ray from the interior point c a convex p with
-/// p(c) < 1 that is 1 within the reach R is at least `p(c) + (1 - p(c)) r / R` at r >= R.
+/// Lower bound of the level distance from B's circumscribed ball: along a ray from the interior
+/// point c a convex p with p(c) < 1 that is 1 within the reach R is at least `p(c) + (1 - p(c)) r /
+/// R` at r >= R.
 fn level_bound((a, pose_a): At<'_, Body>, (b, pose_b): At<'_, Body>) -> f64 {
     let (own, other) = (a.circumscribed(), b.circumscribed());
     let (_, apart, error) = across((pose_a, a.interior_point()), (pose_b, &other.center));
@@ -139,7 +140,8 @@ fn first_to_touch(
     GrowthDistance { status: status(narrow), lower, tied, iterations, ..found.best }
 }
 
-/// Lower bound of the growth distance from balls about the centres: the distance of these over the sum of their radii.
+/// Lower bound of the growth distance from balls about the centres: the distance of these over the
+/// sum of their radii.
 fn growth_bound((a, pose_a): At<'_, Body>, (b, pose_b): At<'_, Body>) -> f64 {
     let reach = |body: &Body| {
         let (center, ball) = (body.growth_ball().center, body.circumscribed());

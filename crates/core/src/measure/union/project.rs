@@ -30,9 +30,9 @@ const MAX_EXCHANGES: usize = 64;
 
 /// The shortest vector within all bounds; none if there is no such vector, or rounding hides it.
 ///
-/// Starting from no bounds, the one that is missed most joins those that hold v back, of which at most three stay: the
-/// problem is of the kind of linear programs (Sharir and Welzl, A combinatorial bound for linear programming and related
-/// problems, STACS 1992).
+/// Starting from no bounds, the one that is missed most joins those that hold v back, of which at
+/// most three stay: the problem is of the kind of linear programs (Sharir and Welzl, A
+/// combinatorial bound for linear programming and related problems, STACS 1992).
 pub(super) fn shortest(bounds: &[Bound]) -> Option<Shortest> {
     let scale = bounds.iter().map(|bound| bound.floor.abs()).fold(0.0, f64::max);
     let tolerance = 1e-13 * scale;

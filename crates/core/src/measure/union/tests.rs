@@ -76,7 +76,8 @@ fn hints_of_other_solids_do_no_harm() {
     assert!(odd.lower <= cold.upper && cold.lower <= odd.upper, "{odd:?} {cold:?}");
 }
 
-/// Two heaps of up to six parts, the second somewhere about the first: far, near or in the midst of it.
+/// Two heaps of up to six parts, the second somewhere about the first: far, near or in the midst of
+/// it.
 fn scene(seed: u64) -> (&'static Compound, &'static Compound, Pose, Pose) {
     static HEAPS: OnceLock<Vec<Compound>> = OnceLock::new();
     let heaps = HEAPS.get_or_init(|| (0..12).map(|k| heap(&mut Seeded(k), 1 + k as usize % 6)).collect());
@@ -281,12 +282,12 @@ fn parts_that_are_about_as_near_are_told() {
     for (x, off) in [2.0, 0.5].into_iter().flat_map(|x| [0.0, 1e-3, -1e-3].map(|off| (x, off))) {
         let pose = Pose::from_quaternion(Vector3::new(x, off, 0.0), [0.0, 0.0, 0.0, 1.0]).unwrap();
         let cold = WarmStart::default;
-        let told = [
+        let message = [
             level_distance(&two, &here, &one, &pose, &options, &mut cold()).tied,
             level_distance(&one, &pose, &two, &here, &options, &mut cold()).tied,
             growth_distance(&two, &here, &one, &pose, &options, &mut cold()).tied,
         ];
-        assert_eq!(told, [off == 0.0; 3], "{x} {off}");
+        assert_eq!(message, [off == 0.0; 3], "{x} {off}");
         let near = crate::measure::distance(&two, &here, &one, &pose, &options, &mut cold());
         assert_eq!(near.tied, off == 0.0 && near.lower > 0.0, "{x} {off} {near:?}");
         let signed = signed_distance(&two, &here, &one, &pose, &options, &mut cold());
@@ -295,7 +296,8 @@ fn parts_that_are_about_as_near_are_told() {
             let n = Vector3::new(x, off - 0.8 * off.signum(), 0.0).normalize();
             assert!(off == 0.0 || (signed.normal.unwrap() + n).norm() < 1e-4, "{signed:?}");
         } else {
-            // The ball leaves between the others or past them: both hold it, and it has but one shortest way.
+            // The ball leaves between the others or past them: both hold it, and it has but one
+            // shortest way.
             assert!(signed.upper < 0.0, "{signed:?}");
         }
         let center = *pose.translation();
@@ -331,7 +333,8 @@ fn answers_tell_the_parts_they_are_about() {
     assert!(curved > 5, "{curved}");
 }
 
-/// Where the closest pair of parts changes on a path, the normal jumps; there, and hardly anywhere else, the flag is set.
+/// Where the closest pair of parts changes on a path, the normal jumps; there, and hardly anywhere
+/// else, the flag is set.
 #[test]
 fn normals_jump_only_where_ties_are_told() {
     let options = Options::default();
@@ -371,7 +374,7 @@ fn ways_out_that_are_about_as_short_are_told() {
     let ball = |x: f64| Body::ball("ball", Vector3::new(x, 0.0, 0.0), 0.5).unwrap();
     let (two, one) = (Compound::new("two", vec![ball(0.3), ball(-0.3)]).unwrap(), ball(0.0));
     let options = Options::default();
-    for (y, told) in [(0.0, true), (0.1, false)] {
+    for (y, message) in [(0.0, true), (0.1, false)] {
         let pose = Pose::from_quaternion(Vector3::new(0.0, y, 0.0), [0.0, 0.0, 0.0, 1.0]).unwrap();
         let signed = signed_distance(&two, &Pose::identity(), &one, &pose, &options, &mut WarmStart::default());
         let depth = penetration(&two, &Pose::identity(), &one, &pose, &options, &mut WarmStart::default());
@@ -379,8 +382,8 @@ fn ways_out_that_are_about_as_short_are_told() {
         let truth = 0.91_f64.sqrt() - y;
         assert!((depth.upper - truth).abs() < 1e-6 && (signed.lower + truth).abs() < 1e-6, "{depth:?} {signed:?}");
         assert!(depth.lower <= truth && signed.upper >= -truth, "{depth:?} {signed:?}");
-        assert_eq!((depth.tied, signed.tied), (told, told), "{depth:?} {signed:?}");
-        if !told {
+        assert_eq!((depth.tied, signed.tied), (message, message), "{depth:?} {signed:?}");
+        if !message {
             let [of_two, of_one] = signed.gradients.unwrap();
             assert!((of_two.linear + Vector3::y()).norm() < 1e-3 && (of_one.linear - Vector3::y()).norm() < 1e-3);
             assert!(of_two.angular.norm() < 1e-3, "{of_two:?}");

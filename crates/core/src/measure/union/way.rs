@@ -1,11 +1,13 @@
-//! A short way out of an overlap of unions: a translation of A after which none of its parts meets a part of B.
+//! A short way out of an overlap of unions: a translation of A after which none of its parts meets
+//! a part of B.
 //!
-//! Any translation after which every pair of parts is proven apart bounds the depth from above. Along a direction one is
-//! found by going on, pair by pair, until a plane across the direction parts those that still meet. From there it shrinks:
-//! where it leads, every pair of parts lies on two sides of a plane with a normal n and a gap s, so that a translation w
-//! separates it, too, if `n·w >= n·v - s`; of all w beyond these planes the shortest is next ([`shortest`]), and so on. Each
-//! is proven anew. The planes of pairs that touch turn on the way, so the search ends at a translation from which no small
-//! change is shorter, which need not be the shortest of all.
+//! Any translation after which every pair of parts is proven apart bounds the depth from above.
+//! Along a direction one is found by going on, pair by pair, until a plane across the direction
+//! parts those that still meet. From there it shrinks: where it leads, every pair of parts lies on
+//! two sides of a plane with a normal n and a gap s, so that a translation w separates it, too, if
+//! `n·w >= n·v - s`; of all w beyond these planes the shortest is next ([`shortest`]), and so on.
+//! Each is proven again. The planes of pairs that touch turn on the way, so the search ends at a
+//! translation from which no small change is shorter, which need not be the shortest of all.
 
 use super::At;
 use super::project::{Bound, Shortest, shortest};
@@ -33,7 +35,8 @@ const HOPE: f64 = 4.0;
 /// Most planes kept at a time: those with the smallest gaps.
 const PLANES: usize = 24;
 
-/// Gap left between parts, in units of the accuracy of a distance: enough to prove that they are apart.
+/// Gap left between parts, in units of the accuracy of a distance: enough to prove that they are
+/// apart.
 const MARGIN: f64 = 4.0;
 
 /// A way out for one pair of parts.
@@ -78,7 +81,8 @@ struct Plane {
     y: Vector3<f64>,
 }
 
-/// What holds A back: the pull of a pair of parts on the way, a part of its direction, and where it acts.
+/// What holds A back: the pull of a pair of parts on the way, a part of its direction, and where it
+/// acts.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Contact {
     pub(super) pull: Vector3<f64>,
@@ -94,13 +98,14 @@ pub(super) struct Way {
     pub(super) direction: Vector3<f64>,
     /// Pulls of sum `direction`, the strongest first; the others may be zero.
     pub(super) contacts: [Contact; 3],
-    /// Whether another way was seen to be about as short, or another pair of parts to be about as much in the way.
+    /// Whether another way was seen to be about as short, or another pair of parts to be about as
+    /// much in the way.
     pub(super) tied: bool,
     pub(super) iterations: u32,
 }
 
-/// The shortest way found from these starts and a few more. No way is shorter than `least` metres; lengths that differ by at
-/// most `narrow` of them count as the same.
+/// The shortest way found from these starts and a few more. No way is shorter than `least` metres;
+/// lengths that differ by at most `narrow` of them count as the same.
 pub(super) fn out(
     (a, pose_a): At<'_, impl Solid>,
     (b, pose_b): At<'_, impl Solid>,
@@ -221,7 +226,8 @@ impl Search<'_> {
         -(of_a + of_b) + 8.0 * f64::EPSILON * (of_a.abs() + of_b.abs())
     }
 
-    /// A length at which, along the direction of the start, all pairs are proven apart; none that is below the limit.
+    /// A length at which, along the direction of the start, all pairs are proven apart; none that
+    /// is below the limit.
     fn exit(&mut self, start: &Start, limit: f64) -> Option<f64> {
         let n = &start.direction;
         // Not 0: a way has a direction.
@@ -256,7 +262,8 @@ impl Search<'_> {
             .all(|pair| self.apart(pair, &pose) || length > 0.0 && self.depth_along(pair, &(way / length)) <= length)
     }
 
-    /// A way at most as long that separates all pairs as well; not worked out if it does not get as short as `wanted`.
+    /// A way at most as long that separates all pairs as well; not worked out if it does not get as
+    /// short as `wanted`.
     fn shrink(&mut self, mut way: Vector3<f64>, wanted: f64) -> Vector3<f64> {
         for _ in 0..MAX_ROUNDS {
             let Some(next) = self.beyond_planes(&way, self.margin).and_then(|(_, found)| found) else { break };
@@ -280,11 +287,13 @@ impl Search<'_> {
         way
     }
 
-    /// The planes between the pairs of parts after a translation, and the shortest translation beyond them all, by a margin.
+    /// The planes between the pairs of parts after a translation, and the shortest translation
+    /// beyond them all, by a margin.
     fn beyond_planes(&mut self, way: &Vector3<f64>, margin: f64) -> Option<(Planes, Option<Shortest>)> {
         let (pose, length) = (self.pose_after(way), way.norm());
         let mut planes = Planes::default();
-        // The shortest w beyond planes that v is beyond has |w - v|² <= |v|² - |w|²: pairs that are farther do not count.
+        // The shortest w beyond planes that v is beyond has |w - v|² <= |v|² - |w|²: pairs that are
+        // farther do not count.
         let far = (length * length - self.least * self.least).max(0.0).sqrt() + 4.0 * margin.max(self.margin);
         for (i, j) in self.pairs() {
             if self.ended() {

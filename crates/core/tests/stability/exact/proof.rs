@@ -1,8 +1,8 @@
 //! What points and multipliers prove, exactly.
 //!
 //! For every point x' of a body and multipliers λ >= 0, `1 >= g(x') >= g(x) + ∇g(x)·(x' - x)` gives
-//! `Σ λ ∇g(x)·(x' - x) <= Σ λ (1 - g(x))`. All lower bounds are sums of this over both bodies; what the gradients do not cancel
-//! counts with the reach of the body.
+//! `Σ λ ∇g(x)·(x' - x) <= Σ λ (1 - g(x))`. All lower bounds are sums of this over both bodies; what
+//! the gradients do not cancel counts with the reach of the body.
 
 use super::Solid;
 use super::number::{Vector, add, dot, near, nears, norm, scaled, sub, zero};
@@ -35,8 +35,9 @@ impl Proof<'_> {
         of.iter().map(|(i, multiplier)| (*i, near(multiplier))).collect()
     }
 
-    /// Lower bound of the signed distance: of the distance where it is positive, minus an upper bound of the depth where not. For
-    /// all x' in A and y' in B, `n·(x' - y')` is at least the bound times |n|.
+    /// Lower bound of the signed distance: of the distance where it is positive, minus an upper
+    /// bound of the depth where not. For all x' in A and y' in B, `n·(x' - y')` is at least the
+    /// bound times |n|.
     pub(crate) fn parted(&self, normal: &[Big; 3], dual: &Dual) -> RBig {
         let (n, x, y) = (nears(normal), self.point(&dual.x), self.point(&dual.y));
         let (slack_a, g) = sum(&self.a, &Self::multipliers(&dual.of_a), &x);
@@ -55,7 +56,8 @@ impl Proof<'_> {
         Some(dot(&between, &between))
     }
 
-    /// Lower bound of d(A‖B): `Σ ν g(x) - Σ μ (1 - h(x))` and what the gradients leave, the ν normalized to sum 1.
+    /// Lower bound of d(A‖B): `Σ ν g(x) - Σ μ (1 - h(x))` and what the gradients leave, the ν
+    /// normalized to sum 1.
     pub(crate) fn level_lower(&self, dual: &Dual) -> RBig {
         let x = self.point(&dual.x);
         let (of_a, of_b) = (Self::multipliers(&dual.of_a), Self::multipliers(&dual.of_b));
@@ -66,8 +68,8 @@ impl Proof<'_> {
         RBig::ONE - (slack_a + slack_b + rest * self.b.reach(&x)) / total
     }
 
-    /// Lower bound of d(A‖B) from one constraint of A at its stored interior point: exact where that is its minimiser, as at the centre
-    /// of a box, to which a reference comes close only.
+    /// Lower bound of d(A‖B) from one constraint of A at its stored interior point: exact where
+    /// that is its minimiser, as at the centre of a box, to which a reference comes close only.
     pub(crate) fn least_level(&self) -> RBig {
         let bounds = (0..self.a.len()).map(|i| {
             let (value, gradient) = self.a.jet(i, &self.a.interior);
@@ -82,7 +84,8 @@ impl Proof<'_> {
         Some(self.a.largest(&self.b.pull_in(&self.point(x))?))
     }
 
-    /// Lower bound of the growth distance about centres: `r·Δ / (max r·(A - c_A) + max -r·(B - c_B))` with r the gradient of A.
+    /// Lower bound of the growth distance about centres: `r·Δ / (max r·(A - c_A) + max -r·(B -
+    /// c_B))` with r the gradient of A.
     pub(crate) fn growth_lower(&self, centers: &[Vector; 2], dual: &Dual) -> RBig {
         let (u, w) = (self.point(&dual.x), self.point(&dual.y));
         let (slack_a, r) = sum(&self.a, &Self::multipliers(&dual.of_a), &u);

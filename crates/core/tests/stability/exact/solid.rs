@@ -1,5 +1,5 @@
-//! A posed body in rational arithmetic: `g(L (Rᵀ (v - t) - c))` with R the rotation of the stored quaternion normalised exactly,
-//! `R(q) / |q|²`, which is rational.
+//! A posed body in rational arithmetic: `g(L (Rᵀ (v - t) - c))` with R the rotation of the stored
+//! quaternion normalised exactly, `R(q) / |q|²`, which is rational.
 
 use super::number::{Vector, add, dot, exact, exacts, norm, scaled, sub};
 use dashu_int::{IBig, UBig, ops::Gcd};
@@ -86,7 +86,8 @@ impl<'a> Solid<'a> {
         self.largest(v) <= RBig::ONE
     }
 
-    /// A point of the body next to v: towards the interior point by as little as is tried. None if v is not near the body.
+    /// A point of the body next to v: towards the interior point by as little as is tried. None if
+    /// v is not near the body.
     pub(crate) fn pull_in(&self, v: &Vector) -> Option<Vector> {
         let out = sub(v, &self.interior);
         let shares = [0.0, 2_f64.powi(-100), 2_f64.powi(-85), 2_f64.powi(-70)].into_iter();
@@ -205,7 +206,8 @@ fn rotations_are_exact() {
     }
 }
 
-/// Values of powers of norms are what the powers are, and slopes what differences of an exactly quadratic function say.
+/// Values of powers of norms are what the powers are, and slopes what differences of an exactly
+/// quadratic function say.
 #[test]
 fn values_are_exact() {
     let body = sublevel_testkit::bodies::q(8, 0.5, 0.25, 2.0);

@@ -1,11 +1,13 @@
-//! The paper's program of section V as it is printed, in the primal, in one frame, given straight to clarabel.
+//! The paper's program of section V as it is printed, in the primal, in one frame, given straight
+//! to clarabel.
 
 use super::*;
 use crate::structure::Pattern;
 use crate::tests::primal::Program;
 use sublevel_core::polynomial::{monomials, position};
 
-/// Adds a Gram matrix' entries to the equations of its monomials, times a coefficient and a monomial of its own each.
+/// Adds a Gram matrix' entries to the equations of its monomials, times a coefficient and a
+/// monomial of its own each.
 fn add(
     program: &mut Program,
     equations: &mut [Vec<(usize, f64)>],
@@ -27,7 +29,8 @@ fn add(
     variables
 }
 
-/// Least `-log det P` over sos-convex p with `H ⪰ margin I` and `1 - p - τ_k (1 - g_k)` sums of squares, all τ of degree 2.
+/// Least `-log det P` over sos-convex p with `H ⪰ margin I` and `1 - p - τ_k (1 - g_k)` sums of
+/// squares, all τ of degree 2.
 fn printed(structure: &Structure, sets: &[Polynomial], margin: f64) -> f64 {
     let degree = structure.degree.max(4);
     let mut program = Program::default();

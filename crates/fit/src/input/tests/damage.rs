@@ -1,5 +1,5 @@
-//! Files that were cut, repeated in part or changed: the same points, or an error; never fewer points
-//! in silence.
+//! Files that were cut, repeated in part or changed: the same points, or an error; never fewer
+//! points in silence.
 
 use super::dialects::{DIALECTS, Dialect, below, places};
 use super::*;

@@ -1,4 +1,5 @@
-//! One mesh written in every format and dialect that is read: the same points and triangles come back.
+//! One mesh written in every format and dialect that is read: the same points and triangles come
+//! back.
 
 use super::*;
 use sublevel_testkit::Seeded;
