@@ -13,7 +13,7 @@
 //! the angles. They are computed by operations that IEEE 754 rounds correctly, so a mesh has the
 //! same components on every machine.
 
-use super::piece::{Piece, Spot};
+use super::mesh_piece::{Piece, Spot};
 use nalgebra::Vector3;
 use std::collections::HashMap;
 

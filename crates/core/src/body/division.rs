@@ -1,6 +1,6 @@
 //! How a mesh is divided among the parts of a compound.
 
-use super::piece::{Caps, Piece};
+use super::mesh_piece::{Caps, Piece};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 

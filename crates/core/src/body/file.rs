@@ -346,7 +346,7 @@ fn check_derived(file: &File, body: &Body) -> Result<(), BodyFileError> {
         (0..3).try_for_each(|i| scalar(field, stored[i], recomputed[i], place))
     };
     // The stored interior point was taken as it is; it must be as deep as the deepest.
-    let deepest = super::extent::deepest_point(&body.constraints).1;
+    let deepest = super::support_bounds::deepest_point(&body.constraints).1;
     scalar("degree", file.degree as f64, body.degree() as f64, 0.0)?;
     scalar("interior_point_m", body.min_value, deepest, 1.0 + deepest.abs())?;
     scalar("min_value", file.min_value, body.min_value, 1.0 + body.min_value.abs())?;

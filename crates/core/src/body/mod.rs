@@ -12,44 +12,44 @@ mod compound;
 mod compound_file;
 mod contained_file;
 mod containment;
-mod covering;
 mod division;
-mod extent;
+mod error_bounds;
 mod file;
 mod id;
+mod mesh_cover;
+mod mesh_piece;
 mod obstacle;
-mod outline;
-mod piece;
 mod placement;
+mod primitives;
+mod radial;
 mod shape;
-mod shapes;
 mod sos;
 mod sphere;
-mod surface;
-mod trust;
+mod support_bounds;
+mod support_table;
 mod union;
 
 pub use compound::{Compound, CompoundError, MAX_PARTS, Solid};
 pub use containment::{BasicSet, ContainedSet, Containment, ProofFrame};
-pub use covering::{Covered, Covering, NotCovered};
 pub use division::{Cut, Division, DivisionError};
+pub use error_bounds::{ConstraintTrust, Trust};
 pub use file::BodyFileError;
 pub use id::{BodyId, ParseIdError};
+pub use mesh_cover::{Covered, Covering, NotCovered};
+pub use mesh_piece::{Caps, MeshError, Piece, Spot};
 pub use obstacle::Obstacle;
-pub use outline::{Cell, Outline};
-pub use piece::{Caps, MeshError, Piece, Spot};
 pub use placement::{Placement, Sample};
+pub use radial::Volume;
+pub use radial::{boundary_radius, sphere_rule};
 pub use shape::Shape;
 pub use sos::{Coverage, Relaxation, SosBody, SosBodyError, TriangleError, Uncovered};
 pub use sphere::{Sphere, fibonacci_lattice};
-pub use surface::Volume;
-pub use surface::{boundary_radius, sphere_rule};
-pub use trust::{ConstraintTrust, Trust};
+pub use support_table::{Cell, Outline};
 
 use crate::polynomial::{CertificateError, HessianGram, NotContaining, Polynomial};
-use extent::Extent;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
+use support_bounds::Extent;
 
 /// Most constraints a body may have.
 pub const MAX_CONSTRAINTS: usize = 16;
@@ -268,22 +268,22 @@ impl Body {
         let inverse = invert(&normalization)?;
         let placement = Placement::new(normalization.linear, inverse, normalization.center, 0.0, 0.0);
         let interior_point =
-            interior.unwrap_or_else(|| inverse * extent::deepest_point(&constraints).0 + normalization.center);
+            interior.unwrap_or_else(|| inverse * support_bounds::deepest_point(&constraints).0 + normalization.center);
         let min_value = largest(constraints.iter().map(|c| placement.sample(c, &interior_point).value_upper(0.0)));
         if !(min_value <= 1.0 - MIN_DEPTH) {
             return Err(BodyError::Interior { min_value });
         }
         let Extent { bounding_box, circumscribed, z_extent } =
             Extent::prove(&constraints, &placement, &inverse, &interior_point)?;
-        let boundary = surface::proven_boundary(&constraints, &placement, &inverse, &interior_point);
-        let in_radius = surface::in_radius(&boundary, &interior_point, inverse.determinant() < 0.0);
+        let boundary = radial::proven_boundary(&constraints, &placement, &inverse, &interior_point);
+        let in_radius = radial::in_radius(&boundary, &interior_point, inverse.determinant() < 0.0);
         if !(in_radius > 0.0) {
             return Err(BodyError::Thin);
         }
         let interior_z = normalization.linear * (interior_point - normalization.center);
         let outline = Outline::new(&constraints, &inverse, &interior_z);
         let trust = Trust::new(&constraints, &normalization, &inverse, &z_extent, outline.reach(), &interior_z);
-        let volume = surface::volume(&constraints, &normalization.linear, &interior_z);
+        let volume = radial::volume(&constraints, &normalization.linear, &interior_z);
         let id = BodyId::of(&normalization, &constraints, None);
         Ok(Self {
             name: name.to_owned(),
@@ -475,7 +475,7 @@ impl Body {
     /// the normalized frame.
     pub fn boundary_along(&self, direction: &Vector3<f64>) -> Vector3<f64> {
         let start = self.normalization.linear * (self.interior_point - self.normalization.center);
-        let radius = surface::radius(&self.constraints, &start, direction);
+        let radius = radial::radius(&self.constraints, &start, direction);
         self.inverse * (direction * radius) + self.interior_point
     }
 
@@ -483,7 +483,7 @@ impl Body {
     pub fn support(&self, n: &Vector3<f64>) -> Support {
         let interior_z = self.normalization.linear * (self.interior_point - self.normalization.center);
         let anchor = &self.interior_point;
-        let bound = extent::support(&self.constraints, &self.placement, &self.inverse, &interior_z, anchor, n);
+        let bound = support_bounds::support(&self.constraints, &self.placement, &self.inverse, &interior_z, anchor, n);
         let Ball { center, radius } = &self.circumscribed;
         let farthest = (bound.point - center).norm() + radius;
         Support { point: bound.point, height_m: (bound.reach + bound.slope * farthest) * (1.0 + 1e-14) }
@@ -531,7 +531,7 @@ impl Body {
     /// [`BodyError::GrowthCenter`] for a point that is not proven inside: it must lie within the
     /// polytope of [`Body::boundary`], which all but reaches the boundary.
     pub fn with_growth_center(mut self, center: Vector3<f64>) -> Result<Self, BodyError> {
-        let radius = surface::in_radius(&self.boundary, &center, self.inverse.determinant() < 0.0);
+        let radius = radial::in_radius(&self.boundary, &center, self.inverse.determinant() < 0.0);
         // Not `<=`: a NaN is not inside.
         if !(radius > 0.0) {
             return Err(BodyError::GrowthCenter { center: center.into() });

@@ -9,7 +9,7 @@
 //! the mean E along the ray in direction u from the part's interior point, taken evenly in the cube
 //! of the distance.
 
-use super::surface::{Volume, radius, sphere_rule};
+use super::radial::{Volume, radius, sphere_rule};
 use super::{Aabb, Body, Compound};
 use nalgebra::Vector3;
 

@@ -1,23 +1,23 @@
 //! Distances of one pair at many poses at once, a pose in each lane of the vectors.
 //!
-//! All poses are solved cold: the start of [`super::start`], then rounds of evaluation and step
-//! until the bracket is narrow. The first rounds, which are far off in any precision, are of single
-//! precision, for more poses at a time. Those that bracket are of double; the poses that need more
-//! than one wait until there is a group of them, so that the slowest does not hold up the others. A
-//! lane computes from its own pose only and selects where a single query would branch, so that no
-//! answer depends on the other poses of the batch.
+//! All poses are solved cold: the start of [`crate::measure::start`], then rounds of evaluation and
+//! step until the bracket is narrow. The first rounds, which are far off in any precision, are of
+//! single precision, for more poses at a time. Those that bracket are of double; the poses that
+//! need more than one wait until there is a group of them, so that the slowest does not hold up the
+//! others. A lane computes from its own pose only and selects where a single query would branch, so
+//! that no answer depends on the other poses of the batch.
 
-use super::Status;
-use super::active::ActiveConstraints;
-use super::distance::{Distance, distance};
-use super::options::Options;
-use super::pose::Pose;
-use super::smooth::{limits, worth_a_bracket};
-use super::start::{Start, facing, meeting, middle};
-use super::tangent::{ALIGNED, Bend, Plane, Relative, Side, Step, bracket, moved, newton};
-use super::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, subtract};
-use super::warm::{Hint, WarmStart};
 use crate::body::{Body, Solid};
+use crate::measure::Status;
+use crate::measure::distance::{Distance, distance};
+use crate::measure::frames::pose::Pose;
+use crate::measure::frames::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, subtract};
+use crate::measure::options::Options;
+use crate::measure::solver::active_constraints::ActiveConstraints;
+use crate::measure::solver::continuation::{limits, worth_a_bracket};
+use crate::measure::solver::initial_guess::{Start, facing, meeting, middle};
+use crate::measure::solver::tangent_newton::{ALIGNED, Bend, Plane, Relative, Side, Step, bracket, moved, newton};
+use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::{
     Aligned, Lanes, MAX_LANES, MAX_SINGLES, Number, NumberJet, Simd, Singles, Twice, Vector, WithSimd, dispatch_lanes,
 };

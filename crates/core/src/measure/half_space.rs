@@ -5,15 +5,15 @@
 //! its magnitude is the penetration depth: a translation t separates exactly if `n·t` makes up for
 //! it, and the shortest such t is along n.
 
-use super::Status;
-use super::bracket::{SLACK, descent};
-use super::options::Options;
-use super::pose::{Pose, ROTATION_ERROR};
-use super::single::{Objective, Single, solve_single};
-use super::twist::Twist;
-use super::union::{Least, least, status};
-use super::warm::{Hint, WarmStart};
 use crate::body::{Body, Solid};
+use crate::measure::Status;
+use crate::measure::bounds::duality_bounds::{SLACK, descent};
+use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
+use crate::measure::frames::twist::Twist;
+use crate::measure::options::Options;
+use crate::measure::solver::projection::{Objective, Single, solve_single};
+use crate::measure::union::{Least, least, status};
+use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::gamma;
 use nalgebra::Vector3;
 
@@ -249,9 +249,9 @@ impl<'a> Support<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{random_pose, unit};
     use super::*;
     use crate::body::Compound;
+    use crate::measure::tests::{random_pose, unit};
     use sublevel_testkit::Seeded;
 
     #[test]

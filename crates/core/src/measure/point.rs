@@ -1,18 +1,18 @@
 //! Distance from a body to a point: the projection of the point on the body.
 //!
 //! For the unit vector n along `Σ λ_i ∇g_i(y)`, every point y' of the body has `n·(q - y') >= n·(q - y) - fall`, with the
-//! fall of [`super::bracket::descent`]; so the plane through y with the normal n separates q from the body by as much. The
+//! fall of [`crate::measure::bounds::duality_bounds::descent`]; so the plane through y with the normal n separates q from the body by as much. The
 //! program stays regular through contact: its Hessian is the identity plus what the body's curvature adds.
 
-use super::Status;
-use super::bracket::{SLACK, descent};
-use super::options::Options;
-use super::pose::Pose;
-use super::single::{Objective, Single, Trial, solve_single};
-use super::twist::Twist;
-use super::union::{Least, least};
-use super::warm::{ActiveSet, Hint, WarmStart};
 use crate::body::{Body, Solid};
+use crate::measure::Status;
+use crate::measure::bounds::duality_bounds::{SLACK, descent};
+use crate::measure::frames::pose::Pose;
+use crate::measure::frames::twist::Twist;
+use crate::measure::options::Options;
+use crate::measure::solver::projection::{Objective, Single, Trial, solve_single};
+use crate::measure::union::{Least, least};
+use crate::measure::warm::{ActiveSet, Hint, WarmStart};
 use nalgebra::Vector3;
 
 /// Distance of a body from a point with its proof; lengths in metres, vectors in the world frame.
@@ -225,9 +225,9 @@ impl<'a> Projection<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{random_pose, unit, zoo};
     use super::*;
     use crate::body::Compound;
+    use crate::measure::tests::{random_pose, unit, zoo};
     use sublevel_testkit::Seeded;
 
     fn cold(solid: &impl Solid, pose: &Pose, point: &Vector3<f64>) -> PointDistance {

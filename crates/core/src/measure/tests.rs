@@ -1,7 +1,7 @@
 //! Measures against closed forms and independent bounds.
 
-use super::*;
 use crate::body::{Body, Sphere};
+use crate::measure::*;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::sync::OnceLock;
 use sublevel_testkit::Seeded;
@@ -307,7 +307,7 @@ fn overflow_ends_in_a_wide_bracket() {
 #[test]
 fn multipliers_that_bound_nothing_claim_nothing() {
     let ball = Body::ball("ball", Vector3::zeros(), 1.0).unwrap();
-    let pair = pair::Pair::new(&ball, &Pose::identity(), &ball, &at(0.5, 0.0, 0.0));
+    let pair = frames::query_frame::Pair::new(&ball, &Pose::identity(), &ball, &at(0.5, 0.0, 0.0));
     let with = |first: f64| {
         let mut multipliers = [0.0; crate::body::MAX_CONSTRAINTS];
         multipliers[0] = first;
@@ -315,9 +315,9 @@ fn multipliers_that_bound_nothing_claim_nothing() {
     };
     let x = Vector3::zeros();
     for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let lower = bracket::level_lower(&pair, &x, &with(bad), &with(0.0));
+        let lower = bounds::duality_bounds::level_lower(&pair, &x, &with(bad), &with(0.0));
         assert!(lower == f64::NEG_INFINITY, "{bad}: {lower}");
-        let lower = bracket::distance_lower(&pair, &x, &x, &Vector3::x(), &with(bad), &with(bad));
+        let lower = bounds::duality_bounds::distance_lower(&pair, &x, &x, &Vector3::x(), &with(bad), &with(bad));
         assert!(lower == 0.0, "{bad}: {lower}");
     }
 }

@@ -1,8 +1,8 @@
 //! Warm starts: what one answer gives the next query of the same pair.
 
-use super::level::LevelTrace;
-use super::pair::Pair;
-use super::smooth::Trace;
+use crate::measure::frames::query_frame::Pair;
+use crate::measure::level::LevelTrace;
+use crate::measure::solver::continuation::Trace;
 use nalgebra::Vector3;
 
 /// Constraints of one body that hold with equality, as a bit set.

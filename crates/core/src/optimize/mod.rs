@@ -7,10 +7,10 @@
 //! solver is a primal-dual interior-point method that knows no tolerance: the caller looks at each
 //! iterate and stops when its own proven bracket is narrow enough. Solving allocates nothing.
 
+mod convex_hull_2d;
 mod gjk;
 mod interior_point;
-mod outline;
 
+pub use convex_hull_2d::{outline, turn};
 pub use gjk::{Approach, Corner, gjk};
 pub use interior_point::{Iterate, MAX_ROWS, Program, Row, Rows, minimise, minimise_within};
-pub use outline::{outline, turn};

@@ -18,9 +18,9 @@
 //! makes up for it, whatever the exact maps are (Peyrl and Parrilo, Theoret. Comput. Sci. 409,
 //! 2008). Nothing is assumed of the sets: neither convex nor bounded need they be.
 
-use super::definite::is_positive_definite_above;
 use super::interval::Interval;
 use super::monomial::{count, monomials, position};
+use super::verified_cholesky::is_positive_definite_above;
 use super::{Margin, Polynomial, Substitution};
 use nalgebra::DMatrix;
 

@@ -6,10 +6,10 @@
 //! definiteness pays for it.
 
 use super::Polynomial;
-use super::definite::is_positive_definite_above;
 use super::monomial::{Exponents, monomials};
 use super::norm_power::NormPower;
 use super::residual::{Residuals, check_matrix};
+use super::verified_cholesky::is_positive_definite_above;
 use nalgebra::DMatrix;
 
 /// Basis element `y_direction · z^exponents` of a Hessian form.

@@ -1,8 +1,8 @@
 //! One-pass value, gradient and Hessian from the Hessian of the homogenized polynomial.
 
 use super::monomial::{Exponents, count, degree_of, fill, monomials};
-use super::number::Number;
 use super::simd::{Simd, WithSimd, dispatch};
+use super::simd_real::Number;
 use nalgebra::{Matrix3, Vector3};
 
 /// Value, gradient and Hessian of a function of three variables at one point.

@@ -3,8 +3,8 @@
 
 use super::Polynomial;
 use super::hessian_form::NumberJet;
-use super::number::{Constant, Number};
 use super::simd::Simd;
+use super::simd_real::{Constant, Number};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Several numbers side by side.

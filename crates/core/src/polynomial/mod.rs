@@ -4,48 +4,48 @@
 //! Pure mathematics in the normalized frame of a body (unit-free coordinates `z`); nothing here
 //! knows of metres, poses or bodies.
 
-mod ceiling;
-mod chord;
 mod containment;
-mod definite;
 mod dense;
 mod gram;
 mod hessian_form;
+mod horner;
 mod interval;
 mod lanes;
-mod line;
+mod line_root;
 mod monomial;
-mod nested;
 mod norm_power;
-mod number;
-mod patch;
 mod range;
+mod ray_intervals;
 mod residual;
 mod rounding;
 mod simd;
+mod simd_real;
 mod sos_gram;
 mod substitution;
-mod twice;
+mod third_derivative_bound;
+mod triangle_bound;
+mod unrolled;
+mod verified_cholesky;
 
-pub use ceiling::{NEAR_LEVEL, ThirdCeiling};
-pub use chord::Chords;
 pub use containment::{ContainmentProof, NotContaining, Substituted};
 pub use gram::{CertificateError, HessianGram, HessianMonomial, Margin};
 pub use hessian_form::{Jet, NumberJet};
 pub use lanes::{Aligned, Lanes, MAX_LANES, MAX_SINGLES, Singles, Vector};
 pub use monomial::{Exponents, degree_of, monomials, position};
 pub use norm_power::NormPower;
-pub use number::{Constant, Number};
-pub use patch::Peak;
+pub use ray_intervals::Chords;
 pub use rounding::{Growth, gamma};
 pub use simd::{Arch, Scalar, Simd, WithSimd, dispatch, dispatch_lanes, widest};
+pub use simd_real::{Constant, Number};
 pub use sos_gram::SosGram;
 pub use substitution::Substitution;
-pub use twice::Twice;
+pub use third_derivative_bound::{NEAR_LEVEL, ThirdCeiling};
+pub use triangle_bound::Peak;
+pub use unrolled::Twice;
 
 use hessian_form::HessianForm;
+use horner::Nested;
 use nalgebra::Vector3;
-use nested::Nested;
 use rounding::AbsolutePolynomial;
 
 /// Highest degree a polynomial may have.
@@ -143,7 +143,7 @@ impl Polynomial {
     /// proven of it.
     #[inline]
     pub fn first_below_along(&self, middle: &Vector3<f64>, half: &Vector3<f64>, level: f64) -> f64 {
-        line::first_below(&self.nested, middle, half, level)
+        line_root::first_below(&self.nested, middle, half, level)
     }
 
     /// Bound of `|computed value - p(z')|` over all `z'` with `|z'_i - z_i| <= dz_i`, `gradient`
@@ -178,7 +178,7 @@ impl Polynomial {
     /// Upper bound of the third derivatives of this polynomial, which must be convex, over the
     /// points with `|z_i| <= radius` whose values are within [`NEAR_LEVEL`] of 1.
     pub fn third_ceiling(&self, radius: f64) -> ThirdCeiling {
-        ceiling::third_ceiling(self, radius, self.absolute.third_ceiling(2.0 * radius))
+        third_derivative_bound::third_ceiling(self, radius, self.absolute.third_ceiling(2.0 * radius))
     }
 
     /// The value at `center`, up to rounding, and a proven lower bound of the values where `|z_i -
@@ -193,7 +193,7 @@ impl Polynomial {
     /// The proven bound is as tight as it takes to be on one side of `level`, or within a
     /// thousandth of the highest value found.
     pub fn peak(&self, corners: &[Vector3<f64>; 3], distance: f64, level: f64) -> Peak {
-        patch::peak(self, corners, distance, level)
+        triangle_bound::peak(self, corners, distance, level)
     }
 
     /// Bounds at all points with `|z_i| <= coordinate`, `|z| <= length`: tighter by a power of √3

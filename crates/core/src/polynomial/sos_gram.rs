@@ -4,10 +4,10 @@
 //! with P definite beyond the residual of floating point.
 
 use super::Polynomial;
-use super::definite::is_positive_definite_above;
 use super::gram::{CertificateError, Margin};
 use super::monomial::{Exponents, degree_of};
 use super::residual::{Residuals, check_matrix};
+use super::verified_cholesky::is_positive_definite_above;
 use nalgebra::DMatrix;
 
 /// A Gram matrix of `p(z)` on a basis of monomials, which may be fewer than all of half the degree.

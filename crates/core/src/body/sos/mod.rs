@@ -6,8 +6,8 @@
 //! convex: `p + c |u|^2d` is sos-convex ([`Relaxation`]).
 
 mod coverage;
-mod extent;
 mod file;
+mod support_bounds;
 mod volume;
 
 pub(super) use file::KIND;
@@ -120,7 +120,7 @@ impl SosBody {
             gram.prove_with(&polynomial, &relaxation.power(polynomial.degree())).map_err(SosBodyError::NotRelaxed)?;
         }
         let placement = Placement::new(normalization.linear, inverse, normalization.center, 0.0, 0.0);
-        let extent = extent::Extent::prove(&polynomial, &gram, &placement, &inverse)?;
+        let extent = support_bounds::Extent::prove(&polynomial, &gram, &placement, &inverse)?;
         let (volume, deepest) = volume::measure(&polynomial, &normalization, &inverse, &extent.circumscribed);
         let interior_point = deepest.ok_or(SosBodyError::Empty)?;
         if !(placement.sample_of(&polynomial, &interior_point).value_upper(0.0) < 1.0) {

@@ -7,9 +7,9 @@
 //! Below 1 it lies in both. Above, its multipliers show the normal, also where the gap is too small
 //! to have a direction.
 
-use crate::measure::newton::Active;
-use crate::measure::pair::{Pair, Posed};
-use crate::measure::quadratic::{Jets, LONGEST, Quadratic};
+use crate::measure::frames::query_frame::{Pair, Posed};
+use crate::measure::solver::active_set_qp::{Jets, LONGEST, Quadratic};
+use crate::measure::solver::kkt_newton::Active;
 use nalgebra::{Matrix3, Vector3, Vector4};
 
 /// Newton iterates of the deepest point, query frame.

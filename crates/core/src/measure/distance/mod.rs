@@ -3,20 +3,20 @@
 mod deepest;
 mod search;
 
-use super::Status;
-use super::active::ActiveConstraints;
-use super::bracket::Multipliers;
-use super::decide::Goal;
-use super::newton::Active;
-use super::options::Options;
-use super::pair::Pair;
-use super::pose::Pose;
-use super::relation::Apart;
-use super::smooth::{Follow, Lost, Proven, SEEK_ROUNDS, Seek};
-use super::twist::Twist;
-use super::union;
-use super::warm::{Hint, WarmStart};
 use crate::body::{Body, MAX_CONSTRAINTS, Solid};
+use crate::measure::Status;
+use crate::measure::bounds::duality_bounds::Multipliers;
+use crate::measure::frames::pose::Pose;
+use crate::measure::frames::query_frame::Pair;
+use crate::measure::frames::twist::Twist;
+use crate::measure::options::Options;
+use crate::measure::overlap::Goal;
+use crate::measure::solver::active_constraints::ActiveConstraints;
+use crate::measure::solver::continuation::{Follow, Lost, Proven, SEEK_ROUNDS, Seek};
+use crate::measure::solver::kkt_newton::Active;
+use crate::measure::solver::two_point_problem::Apart;
+use crate::measure::union;
+use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::{Simd, WithSimd, dispatch};
 use nalgebra::Vector3;
 use search::Search;
@@ -104,7 +104,7 @@ impl Distance {
     /// distance was asked for (envelope theorem: the witnesses count as fixed to their bodies), to
     /// 1e-6 of their norm at distances above the accuracy that was asked for. None unless the
     /// bodies are proven apart: at contact the distance has no gradient, which is what
-    /// [`super::signed_distance`] is for.
+    /// [`crate::measure::signed_distance`] is for.
     pub fn gradients(&self, pose_a: &Pose, pose_b: &Pose) -> Option<[Twist; 2]> {
         let n = self.normal.filter(|_| self.lower > 0.0)?;
         Some([

@@ -21,32 +21,32 @@
 //!
 //! the left by duality, the right because a gauge is subadditive.
 
-mod along;
-mod portal;
-mod reach;
+mod minkowski_portal;
+mod problem;
+mod ray_program;
 #[cfg(test)]
 mod tests;
 
-use super::Status;
-use super::bracket::{Multipliers, SLACK, descent};
-use super::distance::split;
-use super::newton::Active;
-use super::options::Options;
-use super::outlines::corners;
-use super::pair::{Pair, Posed};
-use super::pose::{Pose, ROTATION_ERROR};
-use super::smooth::{Follow, SEEK_ROUNDS, Seek};
-use super::twist::Twist;
-use super::union;
-use super::warm::{Hint, WarmStart};
 use crate::body::{Body, Solid};
+use crate::measure::Status;
+use crate::measure::bounds::duality_bounds::{Multipliers, SLACK, descent};
+use crate::measure::distance::split;
+use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
+use crate::measure::frames::query_frame::{Pair, Posed};
+use crate::measure::frames::twist::Twist;
+use crate::measure::options::Options;
+use crate::measure::solver::continuation::{Follow, SEEK_ROUNDS, Seek};
+use crate::measure::solver::kkt_newton::Active;
+use crate::measure::solver::support_table_gjk::corners;
+use crate::measure::union;
+use crate::measure::warm::{Hint, WarmStart};
 use crate::optimize::{Corner, minimise_within};
 use crate::polynomial::{dispatch, gamma};
-use along::Along;
+use minkowski_portal::crossing;
 use nalgebra::Vector3;
-use portal::crossing;
-pub(in crate::measure) use reach::ReachNewton;
-use reach::ReachProgram;
+use problem::Along;
+pub(in crate::measure) use ray_program::ReachNewton;
+use ray_program::ReachProgram;
 use std::ops::ControlFlow;
 
 /// Growth distance with its proof; unit-free, vectors in the world frame.

@@ -1,8 +1,10 @@
 //! What Newton's method for the level distance proves at the end of a step; see [`super::smooth`].
 
 use super::sides::{Evaluated, Sides, Step};
-use crate::measure::tangent::{ALIGNED, NUDGE, SLACK};
-use crate::measure::vector::{V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, scaled};
+use crate::measure::frames::vector::{
+    V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, scaled,
+};
+use crate::measure::solver::tangent_newton::{ALIGNED, NUDGE, SLACK};
 use crate::polynomial::{NEAR_LEVEL, Scalar, Simd, gamma};
 use nalgebra::Vector3;
 

@@ -9,15 +9,15 @@ mod smooth;
 #[cfg(test)]
 mod tests;
 
-use super::Status;
-use super::options::Options;
-use super::outlines::lowest;
-use super::pair::Pair;
-use super::pose::Pose;
-use super::twist::Twist;
-use super::union;
-use super::warm::{Hint, WarmStart};
 use crate::body::{Body, Solid};
+use crate::measure::Status;
+use crate::measure::frames::pose::Pose;
+use crate::measure::frames::query_frame::Pair;
+use crate::measure::frames::twist::Twist;
+use crate::measure::options::Options;
+use crate::measure::solver::support_table_gjk::lowest;
+use crate::measure::union;
+use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::dispatch;
 use nalgebra::Vector3;
 pub(in crate::measure) use newton::LevelNewton;

@@ -7,12 +7,12 @@
 //! From afar values fall by orders of magnitude, and towards the least of a power d steps are a (d - 1)-th part of the way. There
 //! the Hessians are those of `g_i^(2/d)`, about a square whatever d is.
 
-use crate::measure::active::MAX_ACTIVE;
-use crate::measure::newton::{Active, At, Pace, WORTH_A_BRACKET};
-use crate::measure::pair::{Pair, Posed};
-use crate::measure::quadratic::{CENTER, DAMPINGS, Jets, LONGEST, MOST_BENT, Quadratic, TO_CENTER};
-use crate::measure::series::{Series, Taken, tangents};
-use crate::measure::tangent::ALIGNED;
+use crate::measure::frames::query_frame::{Pair, Posed};
+use crate::measure::solver::active_constraints::MAX_ACTIVE;
+use crate::measure::solver::active_set_qp::{CENTER, DAMPINGS, Jets, LONGEST, MOST_BENT, Quadratic, TO_CENTER};
+use crate::measure::solver::kkt_newton::{Active, At, Pace, WORTH_A_BRACKET};
+use crate::measure::solver::step_acceleration::{Series, Taken, tangents};
+use crate::measure::solver::tangent_newton::ALIGNED;
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 /// Largest number of steps.

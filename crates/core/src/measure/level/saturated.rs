@@ -3,11 +3,11 @@
 use super::LevelDistance;
 use crate::body::Body;
 use crate::measure::Status;
+use crate::measure::frames::pose::Pose;
+use crate::measure::frames::twist::Twist;
+use crate::measure::frames::vector::dot;
 use crate::measure::options::Options;
-use crate::measure::pose::Pose;
-use crate::measure::tangent::{Relative, Side};
-use crate::measure::twist::Twist;
-use crate::measure::vector::dot;
+use crate::measure::solver::tangent_newton::{Relative, Side};
 use crate::polynomial::{Simd, WithSimd, dispatch, gamma};
 
 /// The answer where the interior point of `a` is proven to lie in `b` and what is known of the

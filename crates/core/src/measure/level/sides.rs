@@ -2,12 +2,12 @@
 //! one constraint of each active. The formulas are those of [`super::smooth`].
 
 use crate::body::{Body, ConstraintTrust};
-use crate::measure::pose::Pose;
-use crate::measure::quadratic::{CENTER, DAMPINGS, LEAST, LONGEST, MOST_BENT, SHORT};
-use crate::measure::tangent::{Relative, TURNED};
-use crate::measure::vector::{
+use crate::measure::frames::pose::Pose;
+use crate::measure::frames::vector::{
     M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, rows, scaled, times_transposed,
 };
+use crate::measure::solver::active_set_qp::{CENTER, DAMPINGS, LEAST, LONGEST, MOST_BENT, SHORT};
+use crate::measure::solver::tangent_newton::{Relative, TURNED};
 use crate::polynomial::{Number, NumberJet, Polynomial, Simd, gamma};
 
 /// The map from B's normalized coordinates w to A's, with its errors.

@@ -32,7 +32,7 @@
 //!   point costs the square. Lengths are those of w, and where that is not good enough those of the metric `|d|² + |C d|²`:
 //!   across a thin A a short step of w is a long one of z. Without any curvature the loss is at most |ρ| times the distance of
 //!   the minimiser, of which the errors of `∇p` see only that in z: p is at most the upper bound there, so A, scaled, holds it.
-//! - From above by a point of B, moved there along b (see [`crate::measure::tangent::bracket`]), and p there by its slope and curvature.
+//! - From above by a point of B, moved there along b (see [`crate::measure::solver::tangent_newton::taylor_bounds`]), and p there by its slope and curvature.
 //!
 //! The values of p range over orders of magnitude, and z lies outside A, where what [`crate::body::Trust`] knows of A does not
 //! hold: bounds for p are made at each point ([`crate::polynomial::Growth`]).
@@ -40,12 +40,12 @@
 use super::bracket::{Metric, ROOM};
 use super::sides::{Evaluated, Sides, Step, square};
 use crate::body::Body;
-use crate::measure::drift::Drift;
+use crate::measure::frames::pose::Pose;
+use crate::measure::frames::vector::{V3, add, apply_symmetric, apply_transposed, basis, dot, scaled, subtract};
 use crate::measure::options::Options;
-use crate::measure::pose::Pose;
-use crate::measure::quadratic::LONGEST;
-use crate::measure::series::{Correction, Last, Series, across, along};
-use crate::measure::vector::{V3, add, apply_symmetric, apply_transposed, basis, dot, scaled, subtract};
+use crate::measure::solver::active_set_qp::LONGEST;
+use crate::measure::solver::predictor::Drift;
+use crate::measure::solver::step_acceleration::{Correction, Last, Series, across, along};
 use crate::polynomial::{NumberJet, Scalar, Simd, WithSimd};
 use nalgebra::Vector3;
 

@@ -12,10 +12,10 @@
 //! body beside it.
 
 use crate::body::{Body, Cell};
-use crate::measure::tangent::Side;
-use crate::measure::vector::{
+use crate::measure::frames::vector::{
     V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, rows, scaled,
 };
+use crate::measure::solver::tangent_newton::Side;
 use crate::polynomial::{Lanes, MAX_LANES, Number, NumberJet, Simd, Vector, WithSimd};
 use nalgebra::Vector3;
 

@@ -4,33 +4,33 @@
 //! move along n (or B along -n) until a plane across n parts them. f is the support function of the
 //! difference `B - A`, which contains 0 if and only if the bodies meet, and the depth is the least
 //! of f over all n: any n bounds it from above, but a bound from below has to cover the sphere
-//! ([`covering`]). Triangles of directions are split, those of the lowest bound first, until none
-//! is left below the best depth known by more than the accuracy asked for. Near a minimum that f
-//! leaves quadratically as many triangles are split at each size; where many directions are equally
-//! good, as for concentric balls, all of them are.
+//! ([`sphere_branch_and_bound`]). Triangles of directions are split, those of the lowest bound
+//! first, until none is left below the best depth known by more than the accuracy asked for. Near a
+//! minimum that f leaves quadratically as many triangles are split at each size; where many
+//! directions are equally good, as for concentric balls, all of them are.
 
-mod best;
-mod covering;
+mod direction_sampling;
 mod farthest;
-mod scout;
+mod local_search;
+mod sphere_branch_and_bound;
 mod support;
 #[cfg(test)]
 mod tests;
 
-use super::Status;
-use super::bracket::SLACK;
-use super::options::Options;
-use super::pair::{Pair, Posed};
-use super::pose::Pose;
-use super::union;
-use super::warm::WarmStart;
 use crate::body::{Body, Solid};
+use crate::measure::Status;
+use crate::measure::bounds::duality_bounds::SLACK;
+use crate::measure::frames::pose::Pose;
+use crate::measure::frames::query_frame::{Pair, Posed};
+use crate::measure::options::Options;
+use crate::measure::union;
+use crate::measure::warm::WarmStart;
 use crate::polynomial::{MAX_LANES, dispatch};
-pub(super) use best::{Best, tolerance};
-use covering::{Cell, Covering, Direction};
+use direction_sampling::Scout;
 use farthest::{Farthest, Sought};
+pub(super) use local_search::{Best, tolerance};
 use nalgebra::Vector3;
-use scout::Scout;
+use sphere_branch_and_bound::{Cell, Covering, Direction};
 use support::{SupportPoint, support};
 
 /// Penetration depth with its proof, lengths in metres, vectors in the world frame.

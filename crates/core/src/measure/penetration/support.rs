@@ -2,11 +2,11 @@
 //! proven inside.
 
 use crate::body::MAX_CONSTRAINTS;
-use crate::measure::active::MAX_ACTIVE;
-use crate::measure::linear::{Curvature, eliminate};
-use crate::measure::newton::Active;
-use crate::measure::pair::Posed;
-use crate::measure::programs::{Support, near_boundary};
+use crate::measure::frames::query_frame::Posed;
+use crate::measure::solver::active_constraints::MAX_ACTIVE;
+use crate::measure::solver::barrier_programs::{Support, near_boundary};
+use crate::measure::solver::kkt_newton::Active;
+use crate::measure::solver::linear_systems::{Curvature, eliminate};
 use crate::measure::warm::ActiveSet;
 use crate::optimize::minimise;
 use crate::polynomial::Jet;

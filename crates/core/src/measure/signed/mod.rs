@@ -5,24 +5,24 @@
 //! `-h_A(-n) - h_B(n)`, how far a plane across n parts the bodies. Its optimality system is that of
 //! the distance with a distance of either sign, so Newton's method passes through contact without
 //! noticing; x and y trade places along n. What differs is the proof: apart, any pair of points
-//! bounds it from above; in overlap that takes all directions ([`super::penetration`]).
+//! bounds it from above; in overlap that takes all directions ([`crate::measure::penetration`]).
 
 #[cfg(test)]
 mod tests;
 
-use super::Status;
-use super::bracket::distance_upper;
-use super::distance::distance;
-use super::options::Options;
-use super::pair::Pair;
-use super::penetration::{Best, prove, tolerance};
-use super::pose::Pose;
-use super::relation::Through;
-use super::smooth::{Follow, Proven};
-use super::twist::Twist;
-use super::union;
-use super::warm::{Hint, WarmStart};
 use crate::body::{Body, Solid};
+use crate::measure::Status;
+use crate::measure::bounds::duality_bounds::distance_upper;
+use crate::measure::distance::distance;
+use crate::measure::frames::pose::Pose;
+use crate::measure::frames::query_frame::Pair;
+use crate::measure::frames::twist::Twist;
+use crate::measure::options::Options;
+use crate::measure::penetration::{Best, prove, tolerance};
+use crate::measure::solver::continuation::{Follow, Proven};
+use crate::measure::solver::two_point_problem::Through;
+use crate::measure::union;
+use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::{Scalar, dispatch};
 use nalgebra::Vector3;
 
@@ -74,9 +74,9 @@ impl SignedDistance {
 /// carries through contact.
 ///
 /// Of solids with several parts it is their distance, or minus the depth of their overlap
-/// ([`super::penetration`]), which is known from a local search: in overlap the bracket may stay
-/// wide. There the gradients are those of all the pairs of parts that hold the solids back, and the
-/// witnesses belong to the one that does so most.
+/// ([`crate::measure::penetration`]), which is known from a local search: in overlap the bracket
+/// may stay wide. There the gradients are those of all the pairs of parts that hold the solids
+/// back, and the witnesses belong to the one that does so most.
 ///
 /// ```
 /// use nalgebra::Vector3;

@@ -2,18 +2,18 @@
 //!
 //! A translation that separates the unions separates every pair of parts: the depth is at least the
 //! largest of the pairs' depths. It is at most the length of any translation that is proven to
-//! separate them all ([`way`]).
+//! separate them all ([`separating_translation`]).
 
-use super::least::{Least, least};
+use super::pairwise_minimum::{Least, least};
+use super::separating_translation::{self, Contact, Start, Starts, Way};
 use super::status;
-use super::way::{self, Contact, Start, Starts, Way};
 use crate::body::Solid;
-use crate::measure::decide::ball_gap;
+use crate::measure::frames::pose::Pose;
+use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
+use crate::measure::overlap::ball_gap;
 use crate::measure::penetration::{self, Penetration};
-use crate::measure::pose::Pose;
 use crate::measure::signed::{self, SignedDistance};
-use crate::measure::twist::Twist;
 use crate::measure::warm::WarmStart;
 
 /// Penetration depth of two solids.
@@ -44,7 +44,14 @@ pub(in crate::measure) fn penetration(
     if starts.is_empty() {
         return Penetration { directions, iterations, ..best };
     }
-    let way = way::out((a, pose_a), (b, pose_b), &starts, best.lower, |depth| narrow(a, b, depth, options), options);
+    let way = separating_translation::out(
+        (a, pose_a),
+        (b, pose_b),
+        &starts,
+        best.lower,
+        |depth| narrow(a, b, depth, options),
+        options,
+    );
     let (lower, upper) = (best.lower, way.length);
     let narrow = upper - lower <= narrow(a, b, upper, options);
     Penetration {
@@ -96,7 +103,14 @@ pub(in crate::measure) fn signed_distance(
         return SignedDistance { status, lower, tied: tied || best.tied, iterations, ..best };
     }
     let least = (-best.upper).max(0.0);
-    let way = way::out((a, pose_a), (b, pose_b), &starts, least, |depth| narrow(a, b, depth, options), options);
+    let way = separating_translation::out(
+        (a, pose_a),
+        (b, pose_b),
+        &starts,
+        least,
+        |depth| narrow(a, b, depth, options),
+        options,
+    );
     let (lower, upper) = (-way.length, best.upper);
     let narrow = upper - lower <= narrow(a, b, if upper < 0.0 { way.length } else { 0.0 }, options);
     SignedDistance {

@@ -1,27 +1,28 @@
 //! Solids with several parts: measures of unions from those of pairs of convex parts.
 //!
 //! Distance, level distance and growth distance of unions are the least of those of the pairs of
-//! parts ([`least`]). How deep unions overlap is another matter ([`depth`]): a translation has to
-//! take all pairs apart at once. Each function hands two single bodies straight on.
+//! parts ([`pairwise_minimum`]). How deep unions overlap is another matter ([`depth`]): a
+//! translation has to take all pairs apart at once. Each function hands two single bodies straight
+//! on.
 
 mod depth;
-mod least;
-mod project;
+mod min_norm_point;
+mod pairwise_minimum;
+mod separating_translation;
 #[cfg(test)]
 mod tests;
-mod way;
 
-use super::Status;
-use super::decide::{Goal, across, ball_gap, settle};
-use super::distance::Distance;
-use super::growth::{self, GrowthDistance};
-use super::level::{self, LevelDistance};
-use super::options::Options;
-use super::pose::Pose;
-use super::warm::WarmStart;
 use crate::body::{Body, Solid};
+use crate::measure::Status;
+use crate::measure::distance::Distance;
+use crate::measure::frames::pose::Pose;
+use crate::measure::growth::{self, GrowthDistance};
+use crate::measure::level::{self, LevelDistance};
+use crate::measure::options::Options;
+use crate::measure::overlap::{Goal, across, ball_gap, settle};
+use crate::measure::warm::WarmStart;
 pub(super) use depth::{penetration, signed_distance};
-pub(super) use least::{Least, least};
+pub(super) use pairwise_minimum::{Least, least};
 
 /// A part or a solid with its pose.
 type At<'a, T> = (&'a T, &'a Pose);

@@ -1,0 +1,379 @@
+//! What a body looks like from outside, roughly, for any direction: where a cold start begins.
+//! Nothing is proven by it.
+//!
+//! The point of a convex set farthest along a unit vector e, as a function of e, is the gradient of
+//! the support function: its derivative K is symmetric, not negative, and `K e = 0`. Over a small
+//! cell of directions about m it is nearly `z + K (e - m)`, that is `z + K e`; z and K are fitted
+//! to the support points along the corners and the middle of the cell, which also gives flat sides,
+//! edges and corners a K to go by. Cells are those of normalized coordinates, where no body is much
+//! longer than wide: with W the inverse of their map M, the body's point farthest along n is the
+//! one with the z for `e = Wᵀn / |Wᵀn|`, that is `W z + W K Wᵀ n / |Wᵀn|`.
+
+use super::Constraint;
+use super::radial::radius;
+use super::sphere::Sphere;
+use crate::polynomial::{Number, Simd};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector3};
+
+/// Cells along each edge of the faces of a cube around all directions.
+const CELLS: usize = 16;
+
+/// Numbers of a cell: `W z`, and `W K Wᵀ` by its distinct entries.
+const FIELDS: usize = 9;
+
+/// Size of the ellipsoid that stands for the body, relative to the smallest one of its shape around
+/// the body: between that and the largest one inside.
+const FULLNESS: f64 = 0.75;
+
+/// An ellipsoid about as large as the body, and for each cell of directions about where the body is
+/// farthest along them, with the constraint that is active along its middle.
+///
+/// Points are seen from the centre of the normalization, body frame, metres.
+#[derive(Clone, Debug)]
+pub struct Outline {
+    inverse: Matrix3<f64>,
+    reach: f64,
+    shape: Matrix3<f64>,
+    cells: Vec<[f64; FIELDS]>,
+    active: Vec<u8>,
+}
+
+/// Where a body is farthest along unit vectors n near the one that the cell was looked up for:
+/// about `point + turn n`, a lane each.
+#[derive(Clone, Copy, Debug)]
+pub struct Cell<N> {
+    /// Where the cell is kept.
+    pub place: N,
+    /// Point for the middle of the cell, from the centre of the normalization, body frame, metres.
+    pub point: [N; 3],
+    /// Symmetric derivative by n, metres: xx, xy, xz, yy, yz, zz.
+    pub turn: [N; 6],
+}
+
+impl Outline {
+    /// `interior` is the interior point in normalized coordinates.
+    pub(super) fn new(constraints: &[Constraint], inverse: &Matrix3<f64>, interior: &Vector3<f64>) -> Self {
+        let mut support = Support::new(constraints, interior);
+        let (mut cells, mut active) = (Vec::with_capacity(6 * CELLS * CELLS), Vec::with_capacity(6 * CELLS * CELLS));
+        for face in 0..6 {
+            // Along the corners of all cells of the face.
+            let corners: Vec<_> = (0..(CELLS + 1) * (CELLS + 1))
+                .map(|k| support.along(direction(face, 2 * (k / (CELLS + 1)), 2 * (k % (CELLS + 1)))))
+                .collect();
+            for i in 0..CELLS {
+                for j in 0..CELLS {
+                    let middle = support.along(direction(face, 2 * i + 1, 2 * j + 1));
+                    active.push(support.active[0] as u8);
+                    let corner = |di: usize, dj: usize| &corners[(i + di) * (CELLS + 1) + j + dj];
+                    let around = [corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)];
+                    cells.push(fitted(&middle, around, constraints.len() == 1, inverse));
+                }
+            }
+        }
+        let reach = support.reach;
+        let shape = inverse * inverse.transpose() * (FULLNESS * reach).powi(2);
+        Self { inverse: *inverse, reach, shape, cells, active }
+    }
+
+    /// Largest norm of the normalized coordinates of all support points: what lies between them
+    /// reaches hardly farther.
+    pub fn reach(&self) -> f64 {
+        self.reach
+    }
+
+    /// The point of the cell kept there.
+    #[inline(always)]
+    pub fn point<S: Simd, N: Number<S>>(&self, simd: S, place: N) -> [N; 3] {
+        let [x, y, z, ..] = N::gather(simd, &self.cells, place);
+        [x, y, z]
+    }
+
+    /// The ellipsoid, as the matrix Σ of its support function `√(nᵀ Σ n)`, m².
+    pub fn shape(&self) -> &Matrix3<f64> {
+        &self.shape
+    }
+
+    /// Where the cell of a direction is kept; body frame, any length.
+    #[inline(always)]
+    pub fn place<S: Simd, N: Number<S>>(&self, simd: S, n: [N; 3]) -> N {
+        place(simd, self.normalized(simd, n))
+    }
+
+    /// The cell of a unit vector, body frame.
+    #[inline(always)]
+    pub fn cell<S: Simd, N: Number<S>>(&self, simd: S, n: [N; 3]) -> Cell<N> {
+        let e = self.normalized(simd, n);
+        let place = place(simd, e);
+        let scale = N::splat(simd, 1.0) / (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]).sqrt();
+        let [x, y, z, xx, xy, xz, yy, yz, zz] = N::gather(simd, &self.cells, place);
+        Cell { place, point: [x, y, z], turn: [xx * scale, xy * scale, xz * scale, yy * scale, yz * scale, zz * scale] }
+    }
+
+    /// `Wᵀ n`.
+    #[inline(always)]
+    fn normalized<S: Simd, N: Number<S>>(&self, simd: S, [x, y, z]: [N; 3]) -> [N; 3] {
+        let entry = N::splat;
+        let w = &self.inverse;
+        [
+            entry(simd, w.m11).mul_add(x, entry(simd, w.m21).mul_add(y, entry(simd, w.m31) * z)),
+            entry(simd, w.m12).mul_add(x, entry(simd, w.m22).mul_add(y, entry(simd, w.m32) * z)),
+            entry(simd, w.m13).mul_add(x, entry(simd, w.m23).mul_add(y, entry(simd, w.m33) * z)),
+        ]
+    }
+
+    /// The active constraint of the cell kept there.
+    #[inline(always)]
+    pub fn active(&self, place: f64) -> usize {
+        usize::from(self.active[(place as usize).min(self.active.len() - 1)])
+    }
+}
+
+/// Where the cell of a direction of normalized coordinates is kept.
+#[inline(always)]
+fn place<S: Simd, N: Number<S>>(simd: S, [x, y, z]: [N; 3]) -> N {
+    let splat = |value: f64| N::splat(simd, value);
+    let (ax, ay, az) = (x.abs(), y.abs(), z.abs());
+    let (on_x, on_y) = (N::and(simd, ay.le(ax), az.le(ax)), az.le(ay));
+    let along = x.select(on_x, y.select(on_y, z));
+    let first = y.select(on_x, z.select(on_y, x));
+    let second = z.select(on_x, x.select(on_y, y));
+    let axis = splat(0.0).select(on_x, splat(2.0).select(on_y, splat(4.0)));
+    let face = axis + splat(0.0).select(splat(0.0).le(along), splat(1.0));
+    let half = splat(0.5 * CELLS as f64);
+    let scale = half / along.abs();
+    let (i, j) = (cell(simd, first, scale), cell(simd, second, scale));
+    let cells = splat(CELLS as f64);
+    face.mul_add(cells, i).mul_add(cells, j)
+}
+
+/// Which cell along one edge of a face.
+#[inline(always)]
+fn cell<S: Simd, N: Number<S>>(simd: S, across: N, scale: N) -> N {
+    // Adding so much leaves no room for fractions; which side ties go to is of no matter.
+    let whole = N::splat(simd, 1.5 / N::EPSILON);
+    let rounded = (across.mul_add(scale, N::splat(simd, 0.5 * CELLS as f64 - 0.5)) + whole) - whole;
+    rounded.max(N::splat(simd, 0.0)).min(N::splat(simd, CELLS as f64 - 1.0))
+}
+
+/// The direction that lies on the face of the cube after so many halves of cells.
+fn direction(face: usize, i: usize, j: usize) -> Vector3<f64> {
+    let across = |halves: usize| halves as f64 / CELLS as f64 - 1.0;
+    let mut direction = Vector3::zeros();
+    direction[face / 2] = if face.is_multiple_of(2) { 1.0 } else { -1.0 };
+    direction[(face / 2 + 1) % 3] = across(i);
+    direction[(face / 2 + 2) % 3] = across(j);
+    direction.normalize()
+}
+
+/// A direction and the support point along it, in normalized coordinates.
+type Sample = (Vector3<f64>, Vector3<f64>);
+
+/// The fields of the cell with these samples, of a body with a smooth surface or one with edges.
+fn fitted((e, z): &Sample, corners: [&Sample; 4], smooth: bool, inverse: &Matrix3<f64>) -> [f64; FIELDS] {
+    let mean = corners.iter().fold(Vector3::zeros(), |sum, corner| sum + corner.1) / 4.0;
+    // What bends like a paraboloid is a third of the corners' value on average; at corners of the
+    // body nothing bends.
+    let point = inverse * if smooth { (z * 2.0 + mean) / 3.0 } else { *z };
+    let first = e.cross(&Vector3::ith(e.iamin(), 1.0)).normalize();
+    let tangents = Matrix3x2::from_columns(&[first, e.cross(&first)]);
+    // Least squares for `K Tᵀe = Tᵀz` with a symmetric matrix: its entries 00, 01, 11 have these
+    // coefficients.
+    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for (direction, corner) in corners {
+        let (e, z) = (tangents.tr_mul(direction), tangents.tr_mul(&(corner - mean)));
+        for (row, value) in [(Vector3::new(e.x, e.y, 0.0), z.x), (Vector3::new(0.0, e.x, e.y), z.y)] {
+            normal += row * row.transpose();
+            right += row * value;
+        }
+    }
+    let turn = normal.cholesky().map_or(Vector3::zeros(), |factor| factor.solve(&right));
+    let mut turn = Matrix2::new(turn.x, turn.y, turn.y, turn.z).symmetric_eigen();
+    turn.eigenvalues = turn.eigenvalues.map(|value: f64| value.max(0.0));
+    let tangents = inverse * tangents;
+    let turn = tangents * turn.recompose() * tangents.transpose();
+    [point.x, point.y, point.z, turn.m11, turn.m12, turn.m13, turn.m22, turn.m23, turn.m33]
+}
+
+/// Finds support points, one after the other along directions that lie close together.
+struct Support<'a> {
+    constraints: &'a [Constraint],
+    interior: &'a Vector3<f64>,
+    /// Boundary points all around, normalized coordinates.
+    rays: Vec<Vector3<f64>>,
+    /// The last support point, normalized coordinates, and the constraints active there, the one
+    /// with the most force first.
+    last: Vector3<f64>,
+    active: Vec<usize>,
+    /// Largest norm of all support points so far.
+    reach: f64,
+}
+
+impl<'a> Support<'a> {
+    fn new(constraints: &'a [Constraint], interior: &'a Vector3<f64>) -> Self {
+        let ray = |u: &Vector3<f64>| interior + u * radius(constraints, interior, u);
+        let rays = Sphere::fine().vertices().iter().map(ray).collect();
+        Self { constraints, interior, rays, last: *interior, active: vec![0], reach: 0.0 }
+    }
+
+    fn along(&mut self, e: Vector3<f64>) -> Sample {
+        let found = self.farther(&e, &self.last, &self.active);
+        (self.last, self.active) = found.unwrap_or_else(|| self.again(&e));
+        self.reach = self.reach.max(self.last.norm());
+        (e, self.last)
+    }
+
+    /// A support point and its active constraints from the ray that leads farthest.
+    fn again(&self, e: &Vector3<f64>) -> (Vector3<f64>, Vec<usize>) {
+        let farthest = self.rays.iter().max_by(|p, q| e.dot(p).total_cmp(&e.dot(q)));
+        let start = farthest.copied().unwrap_or(*self.interior);
+        let value = |index: &usize| self.constraints[*index].polynomial.evaluate(&start).value;
+        let mut order: Vec<usize> = (0..self.constraints.len()).collect();
+        order.sort_by(|i, j| value(j).total_cmp(&value(i)));
+        // Inside a surface, on an edge, at a corner.
+        let sets = (1..=order.len().min(3)).map(|count| &order[..count]);
+        let found = sets.filter_map(|set| self.farther(e, &start, set)).next();
+        found.unwrap_or((start, vec![order[0]]))
+    }
+
+    /// The point of the body farthest along `e` (normalized coordinates), by Newton's method on `e
+    /// = Σ ν_i ∇g_i`, `g_i = 1` over the active constraints. None where it does not converge, as
+    /// where the surface is flat, or other ones are active.
+    fn farther(&self, e: &Vector3<f64>, start: &Vector3<f64>, active: &[usize]) -> Option<(Vector3<f64>, Vec<usize>)> {
+        let count = active.len();
+        let mut z = *start;
+        let mut weights: Option<Vector3<f64>> = None;
+        for _ in 0..16 {
+            let mut gradients = Matrix3::zeros();
+            // What is left over of three constraints says that their multipliers are zero.
+            let mut matrix = SMatrix::<f64, 6, 6>::identity();
+            let mut right = SVector::<f64, 6>::zeros();
+            right.fixed_rows_mut::<3>(0).copy_from(e);
+            let jets = active.iter().map(|&i| self.constraints[i].polynomial.evaluate(&z));
+            let mut hessians = [Matrix3::zeros(); 3];
+            for (k, jet) in jets.enumerate() {
+                gradients.set_column(k, &jet.gradient);
+                matrix[(3 + k, 3 + k)] = 0.0;
+                right[3 + k] = 1.0 - jet.value;
+                hessians[k] = jet.hessian;
+            }
+            let known = match weights {
+                Some(known) => known,
+                None => {
+                    let mut normal = gradients.tr_mul(&gradients);
+                    (count..3).for_each(|k| normal[(k, k)] = 1.0);
+                    normal.cholesky()?.solve(&gradients.tr_mul(e))
+                }
+            };
+            let bent = hessians[0] * known.x + hessians[1] * known.y + hessians[2] * known.z;
+            matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&bent);
+            matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&gradients);
+            matrix.fixed_view_mut::<3, 3>(3, 0).copy_from(&gradients.transpose());
+            let solution = matrix.lu().solve(&right)?;
+            let step = solution.fixed_rows::<3>(0).into_owned();
+            let next = solution.fixed_rows::<3>(3).into_owned();
+            let length = step.norm();
+            z += step * (0.25 / length).min(1.0);
+            if length < 1e-6 {
+                let inside = |constraint: &Constraint| constraint.polynomial.evaluate(&z).value <= 1.0 + 1e-9;
+                let pressed = (0..count).all(|k| next[k] > 0.0);
+                let force = |k: &usize| next[*k] * gradients.column(*k).norm();
+                let mut active = active.to_vec();
+                if let Some(first) = (0..count).max_by(|i, j| force(i).total_cmp(&force(j))) {
+                    active.swap(0, first);
+                }
+                return (pressed && self.constraints.iter().all(inside)).then_some((z, active));
+            }
+            weights = Some(next);
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Cell;
+    use crate::body::Body;
+    use crate::polynomial::{Lanes, Scalar, Simd, Vector, WithSimd, dispatch_lanes};
+    use nalgebra::{Matrix3, Vector3};
+    use sublevel_testkit::Seeded;
+
+    /// `point + turn n`.
+    fn support(body: &Body, n: &Vector3<f64>) -> Vector3<f64> {
+        let Cell { place, point, turn: [xx, xy, xz, yy, yz, zz] } = body.outline().cell::<_, f64>(Scalar, (*n).into());
+        assert_eq!(body.outline().active(place), 0);
+        Vector3::from(point) + Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * n
+    }
+
+    #[test]
+    fn cells_reach_nearly_as_far_as_the_body() {
+        let half = Vector3::new(1.0, 0.7, 0.4);
+        let body = Body::superellipsoid("q6", Vector3::new(1.0, 2.0, 3.0), half, 6).unwrap();
+        let mut random = Seeded(11);
+        for _ in 0..2000 {
+            let n = Vector3::from_fn(|_, _| random.signed()).normalize();
+            let reach = n.dot(&support(&body, &n));
+            // The conjugate exponent of 6 is 6/5.
+            let most = (0..3).map(|i| (half[i] * n[i]).abs().powf(1.2)).sum::<f64>().powf(1.0 / 1.2);
+            assert!((reach - most).abs() < 0.025, "{n:?}: {reach} of {most}");
+        }
+    }
+
+    #[test]
+    fn cells_of_an_ellipsoid_are_as_good_as_their_size() {
+        let half = Vector3::new(1.0, 0.7, 0.4);
+        let body = Body::ellipsoid("e", Vector3::new(1.0, 2.0, 3.0), half).unwrap();
+        let mut random = Seeded(12);
+        for _ in 0..2000 {
+            let n = Vector3::from_fn(|_, _| random.signed()).normalize();
+            let farthest = half.component_mul(&half).component_mul(&n) / half.component_mul(&n).norm();
+            assert!((support(&body, &n) - farthest).norm() < 0.01, "{n:?}");
+        }
+    }
+
+    #[test]
+    fn the_ellipsoid_of_a_ball_is_a_smaller_ball() {
+        let body = Body::ball("ball", Vector3::new(1.0, 2.0, 3.0), 2.0).unwrap();
+        for radius in body.outline().shape().symmetric_eigenvalues().map(f64::sqrt).iter() {
+            assert!((1.4..1.6).contains(radius), "{radius}");
+        }
+    }
+
+    /// Cells of directions, in lanes.
+    struct Look<'a> {
+        body: &'a Body,
+        directions: [[f64; 16]; 3],
+    }
+
+    impl WithSimd for Look<'_> {
+        type Output = [[f64; 16]; 2];
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+            let mut found = [[0.0; 16]; 2];
+            for start in (0..16).step_by(Lanes::<S>::COUNT) {
+                let direction = self.directions.map(|row| Lanes::load(simd, &row[start..]));
+                let cell = self.body.outline().cell(simd, direction);
+                cell.point[1].store(&mut found[0][start..]);
+                cell.turn[5].store(&mut found[1][start..]);
+            }
+            found
+        }
+    }
+
+    #[test]
+    fn lanes_find_the_same_cells() {
+        let body = Body::superellipsoid("q6", Vector3::zeros(), Vector3::new(1.0, 0.7, 0.4), 6).unwrap();
+        let mut random = Seeded(5);
+        for _ in 0..200 {
+            let mut directions = [[0.0; 16]; 3];
+            directions.iter_mut().flatten().for_each(|entry| *entry = random.signed());
+            let found = dispatch_lanes(Look { body: &body, directions });
+            for lane in 0..16 {
+                let cell = body.outline().cell::<_, f64>(Scalar, directions.map(|row| row[lane]));
+                assert_eq!([cell.point[1], cell.turn[5]], [found[0][lane], found[1][lane]]);
+            }
+        }
+        // Nonsense finds something.
+        assert!(body.outline().cell::<_, f64>(Scalar, [f64::NAN; 3]).point.iter().all(|entry| entry.is_finite()));
+    }
+}

@@ -1,0 +1,3 @@
+//! Proven bounds that any trial points and multipliers give.
+
+pub(super) mod duality_bounds;

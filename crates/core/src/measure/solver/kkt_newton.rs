@@ -1,0 +1,487 @@
+//! Newton's method on the optimality system of the distance, for a given set of active constraints.
+//!
+//! Regular through contact: the unknowns are x, y, the distance D, the normal n and multipliers λ
+//! of A, μ of B, with `u = Σ λ_i ∇g_i(x)` and `w = Σ μ_j ∇h_j(y)`:
+//!
+//! ```text
+//! x - y = D n,   n + u = 0,   w - n = 0,   (|n|² - 1) / 2 = 0,   g_i(x) = 1,   h_j(y) = 1   (active i, j)
+//! ```
+//!
+//! The normal is an unknown of its own, although u and w say what it is: those of thin bodies turn
+//! so fast with the point that Newton's method goes astray by them from where it converges so
+//! (Albersmeyer and Diehl, The lifted Newton method and its application in optimization, SIAM J.
+//! Optimization 20, 2010).
+
+use crate::measure::bounds::duality_bounds::Multipliers;
+use crate::measure::frames::query_frame::{Pair, Posed};
+use crate::measure::frames::vector::V3;
+use crate::measure::solver::active_constraints::{ActiveConstraints, MAX_ACTIVE};
+use crate::measure::solver::continuation::LONGEST;
+use crate::measure::solver::linear_systems::solve;
+use crate::measure::solver::step_acceleration::{Series, Taken, across, along, tangents};
+use crate::measure::solver::tangent_newton::ALIGNED;
+use crate::measure::warm::ActiveSet;
+use crate::polynomial::Scalar;
+use nalgebra::{Matrix3, Vector3};
+
+/// The active constraints of one body with their multipliers.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::measure) struct Active {
+    pub(in crate::measure) index: [usize; MAX_ACTIVE],
+    pub(in crate::measure) multiplier: [f64; MAX_ACTIVE],
+    pub(in crate::measure) len: usize,
+}
+
+impl Active {
+    /// The set with these bits, all multipliers zero. None if too many for general position.
+    pub(in crate::measure) fn from_bits(bits: ActiveSet, constraints: usize) -> Option<Self> {
+        let mut active = Self::default();
+        for i in (0..constraints).filter(|i| bits >> i & 1 == 1) {
+            if active.len == MAX_ACTIVE {
+                return None;
+            }
+            active.index[active.len] = i;
+            active.len += 1;
+        }
+        Some(active)
+    }
+
+    /// The constraints that carry the largest of these multipliers.
+    pub(in crate::measure) fn from_multipliers(multipliers: &Multipliers) -> Self {
+        let largest = multipliers.iter().fold(0.0_f64, |most, &m| most.max(m));
+        let mut active = Self::default();
+        while active.len < MAX_ACTIVE {
+            let next = (0..multipliers.len())
+                .filter(|i| !active.index[..active.len].contains(i))
+                .max_by(|&i, &j| multipliers[i].total_cmp(&multipliers[j]));
+            match next {
+                Some(i) if multipliers[i] > 1e-3 * largest => {
+                    active.index[active.len] = i;
+                    active.multiplier[active.len] = multipliers[i];
+                    active.len += 1;
+                }
+                _ => break,
+            }
+        }
+        active
+    }
+
+    /// The constraints whose multipliers times gradients at v are largest: those of thin bodies
+    /// have steep ones.
+    pub(in crate::measure) fn from_forces(body: &Posed<'_>, v: &Vector3<f64>, multipliers: &Multipliers) -> Self {
+        let mut forces = *multipliers;
+        let carried = forces.iter_mut().enumerate().take(body.len()).filter(|(_, force)| **force > 0.0);
+        carried.for_each(|(i, force)| *force *= body.jet(i, v).gradient.norm());
+        let mut active = Self::from_multipliers(&forces);
+        (0..active.len).for_each(|k| active.multiplier[k] = multipliers[active.index[k]]);
+        active
+    }
+
+    /// The constraints that a point near the surface is at, as far as they carry a force `target`.
+    pub(in crate::measure) fn near(body: &Posed<'_>, v: &Vector3<f64>, target: &Vector3<f64>) -> Self {
+        let mut values = [f64::NEG_INFINITY; crate::body::MAX_CONSTRAINTS];
+        (0..body.len()).for_each(|i| values[i] = body.jet(i, v).value);
+        let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let mut active = Self::default();
+        while active.len < MAX_ACTIVE {
+            let rest = (0..body.len()).filter(|i| !active.index[..active.len].contains(i));
+            match rest.max_by(|&i, &j| values[i].total_cmp(&values[j])) {
+                Some(i) if values[i] > highest - AT * highest.abs().max(1.0) => _ = active.push(i),
+                _ => break,
+            }
+        }
+        while active.len > 1 {
+            if !active.fit(body, v, target) {
+                // Of dependent gradients the lowest constraint's goes.
+                active.len -= 1;
+            } else if !active.drop_negative() {
+                break;
+            }
+        }
+        active
+    }
+
+    /// The only constraint, if there is but one.
+    pub(in crate::measure) fn single(&self) -> Option<u8> {
+        (self.len == 1).then_some(self.index[0] as u8)
+    }
+
+    pub(in crate::measure) fn bits(&self) -> ActiveSet {
+        self.index[..self.len].iter().fold(0, |bits, i| bits | 1 << i)
+    }
+
+    /// The set for the user, with multipliers times `unit`; those not above zero are left out.
+    pub(in crate::measure) fn reported(&self, unit: f64) -> ActiveConstraints {
+        let mut reported = ActiveConstraints::default();
+        for (index, multiplier) in self.iter().filter(|(_, multiplier)| multiplier * unit > 0.0) {
+            reported.push(index, multiplier * unit);
+        }
+        reported
+    }
+
+    /// With multipliers so many times as large.
+    pub(in crate::measure) fn scaled(mut self, factor: f64) -> Self {
+        self.multiplier.iter_mut().for_each(|multiplier| *multiplier *= factor);
+        self
+    }
+
+    /// Multipliers of all constraints, negative ones cut off.
+    pub(in crate::measure) fn multipliers(&self) -> Multipliers {
+        let mut all = [0.0; crate::body::MAX_CONSTRAINTS];
+        for (i, multiplier) in self.iter() {
+            all[i] = multiplier.max(0.0);
+        }
+        all
+    }
+
+    pub(in crate::measure) fn iter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.index[..self.len].iter().copied().zip(self.multiplier[..self.len].iter().copied())
+    }
+
+    pub(in crate::measure) fn push(&mut self, index: usize) -> bool {
+        let room = self.len < MAX_ACTIVE;
+        if room {
+            self.index[self.len] = index;
+            self.multiplier[self.len] = 0.0;
+            self.len += 1;
+        }
+        room
+    }
+
+    /// Drops the constraint with the most negative multiplier; whether there was one.
+    pub(in crate::measure) fn drop_negative(&mut self) -> bool {
+        let worst = (0..self.len).min_by(|&i, &j| self.multiplier[i].total_cmp(&self.multiplier[j]));
+        match worst {
+            Some(k) if self.multiplier[k] < 0.0 && self.len > 1 => {
+                self.remove(k);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Drops the k-th constraint of the set.
+    pub(in crate::measure) fn remove(&mut self, k: usize) {
+        self.len -= 1;
+        self.index.swap(k, self.len);
+        self.multiplier.swap(k, self.len);
+    }
+
+    /// Least-squares multipliers of `Σ λ_i ∇g_i = target` at v. False if the gradients are
+    /// dependent.
+    pub(in crate::measure) fn fit(&mut self, body: &Posed<'_>, v: &Vector3<f64>, target: &Vector3<f64>) -> bool {
+        let gradients: [Vector3<f64>; MAX_ACTIVE] =
+            std::array::from_fn(|k| if k < self.len { body.jet(self.index[k], v).gradient } else { Vector3::zeros() });
+        let mut system = [[0.0; MAX_ACTIVE + 1]; MAX_ACTIVE];
+        for i in 0..self.len {
+            for j in 0..self.len {
+                system[i][j] = gradients[i].dot(&gradients[j]);
+            }
+            system[i][self.len] = gradients[i].dot(target);
+        }
+        let Some(solution) = solve(&mut system, self.len) else { return false };
+        self.multiplier[..self.len].copy_from_slice(&solution[..self.len]);
+        true
+    }
+
+    /// How far what the constraints carry at v is from `target`, and how far v is at most from
+    /// where those that carry anything are met and none is violated.
+    fn misfit(&self, body: &Posed<'_>, v: &Vector3<f64>, target: &Vector3<f64>) -> (f64, f64) {
+        let multipliers = self.multipliers();
+        let (mut rest, mut gap) = (*target, 0.0_f64);
+        for (i, multiplier) in multipliers.iter().enumerate().take(body.len()) {
+            let jet = body.jet(i, v);
+            let excess = jet.value - 1.0;
+            rest -= jet.gradient * *multiplier;
+            gap = gap.max(if *multiplier > 0.0 { excess.abs() } else { excess } / jet.gradient.norm());
+        }
+        (rest.norm(), gap)
+    }
+
+    /// The most violated constraint that is not in the set, if violated by more than [`VIOLATED`].
+    pub(in crate::measure) fn violated(&self, body: &Posed<'_>, v: &Vector3<f64>, level: f64) -> Option<usize> {
+        self.violated_by(VIOLATED * level.abs().max(1.0), body, v, level)
+    }
+
+    /// The same if violated by more than `excess`.
+    pub(in crate::measure) fn violated_by(
+        &self,
+        excess: f64,
+        body: &Posed<'_>,
+        v: &Vector3<f64>,
+        level: f64,
+    ) -> Option<usize> {
+        (0..body.len())
+            .filter(|i| !self.index[..self.len].contains(i))
+            .map(|i| (i, body.jet(i, v).value - level))
+            .filter(|(_, by)| *by > excess)
+            .max_by(|p, q| p.1.total_cmp(&q.1))
+            .map(|(i, _)| i)
+    }
+}
+
+/// Values, gradients and weighted sums of the active constraints of one body at one point.
+#[derive(Default)]
+pub(in crate::measure) struct At {
+    pub(in crate::measure) value: [f64; MAX_ACTIVE],
+    pub(in crate::measure) gradient: [Vector3<f64>; MAX_ACTIVE],
+    pub(in crate::measure) sum: Vector3<f64>,
+    pub(in crate::measure) hessian: Matrix3<f64>,
+}
+
+impl At {
+    pub(in crate::measure) fn new(body: &Posed<'_>, active: &Active, v: &Vector3<f64>) -> Self {
+        let mut at = Self::default();
+        for (k, (i, multiplier)) in active.iter().enumerate() {
+            let jet = body.jet(i, v);
+            at.value[k] = jet.value;
+            at.gradient[k] = jet.gradient;
+            at.sum += jet.gradient * multiplier;
+            at.hessian += jet.hessian * multiplier;
+        }
+        at
+    }
+}
+
+/// How far below the highest the value of a constraint may be that counts as active, relative to
+/// that or to 1.
+pub(in crate::measure) const AT: f64 = 0.1;
+
+/// By how much a constraint may be violated, relative to its level, that is not active.
+pub(in crate::measure) const VIOLATED: f64 = 1e-10;
+
+/// What a value rounds by at most, about.
+const ROUNDED: f64 = 8.0 * f64::EPSILON;
+
+/// Moves relative to the distance between points that are about where they stay.
+const ARRIVED: f64 = 0.1;
+
+/// Cosine of the angle between a normal and one that is about where it points.
+const ABOUT: f64 = 0.1;
+
+/// Largest number of Newton steps and of changes of the active set.
+pub(in crate::measure) const MAX_STEPS: u32 = 16;
+
+/// Steps after which they should no longer be cut, whatever was active before.
+const PATIENCE: u32 = 6;
+
+/// Longest Newton step, relative to the bodies, after which a bracket may be narrow: what remains
+/// is about its square.
+pub(in crate::measure) const WORTH_A_BRACKET: f64 = 1e-3;
+
+/// How far forces lead where there is no curvature, relative to the bodies and before the step is
+/// cut.
+const FARTHEST: f64 = 1e3;
+
+/// Whether Newton's steps still shrink: fast near a solution, and those that do not are not near
+/// one.
+pub(in crate::measure) struct Pace {
+    last: f64,
+    /// How often a short step was hardly shorter than the one before.
+    stuck: u32,
+}
+
+impl Pace {
+    /// Of steps towards a system that none has been taken towards yet.
+    pub(in crate::measure) const FIRST: Self = Self { last: f64::INFINITY, stuck: 0 };
+
+    /// Whether the steps, this one of this length the last, are still cut to the longest when they
+    /// should no longer be: two in a row, or the first towards a new system. A single long one is
+    /// taken where sides are flat, once it shows how far they reach.
+    pub(in crate::measure) fn is_astray(&self, step: u32, length: f64, longest: f64) -> bool {
+        step >= PATIENCE && length.min(self.last) > longest
+    }
+
+    /// Whether no step is worth taking after one of this length, relative to the bodies.
+    pub(in crate::measure) fn ends_with(&mut self, length: f64) -> bool {
+        self.stuck += u32::from(length < WORTH_A_BRACKET && length > 0.9 * self.last);
+        self.last = length;
+        self.stuck == 2 || length < 1e-14
+    }
+}
+
+/// Newton iterates of the distance system.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::measure) struct DistanceNewton {
+    pub(in crate::measure) x: Vector3<f64>,
+    pub(in crate::measure) y: Vector3<f64>,
+    pub(in crate::measure) distance: f64,
+    /// Direction from B to A; of length about 1.
+    pub(in crate::measure) n: Vector3<f64>,
+    pub(in crate::measure) a: Active,
+    pub(in crate::measure) b: Active,
+}
+
+impl DistanceNewton {
+    /// Iterates until `accept` takes one, they stop converging or the limit is reached; returns the
+    /// steps taken.
+    pub(in crate::measure) fn run(
+        &mut self,
+        pair: &Pair<'_>,
+        limit: u32,
+        mut accept: impl FnMut(&Self) -> bool,
+    ) -> u32 {
+        let n = self.n;
+        if self.a.len == 0 || self.b.len == 0 || !self.a.fit(&pair.a, &self.x, &-n) || !self.b.fit(&pair.b, &self.y, &n)
+        {
+            return 0;
+        }
+        let mut at = self.evaluate(pair);
+        let (mut pace, mut series, mut turned) = (Pace::FIRST, Series::default(), false);
+        for step in 1..=MAX_STEPS.min(limit) {
+            let before = (self.x, self.y);
+            let Some(length) = self.step(pair, &at, &mut series) else {
+                // Where both are flat the system is singular, but the point at hand with its
+                // multipliers may do.
+                accept(self);
+                return step;
+            };
+            let moved = (self.x - before.0).norm() + (self.y - before.1).norm();
+            if !turned && length > LONGEST && moved < ARRIVED * (self.x - self.y).norm() {
+                self.turn(pair);
+                turned = true;
+            }
+            at = self.evaluate(pair);
+            // A long step has not converged: its bracket is not worth its cost, but for flat bodies
+            // now and then.
+            let last_step = step == MAX_STEPS.min(limit);
+            if (length < WORTH_A_BRACKET || step % 4 == 0 || last_step) && accept(self) {
+                return step;
+            }
+            if length < WORTH_A_BRACKET || step % 4 == 0 {
+                let excess = self.negligible(pair);
+                let changed = self.a.drop_negative()
+                    | self.b.drop_negative()
+                    | self.a.violated_by(excess, &pair.a, &self.x, 1.0).is_some_and(|i| self.a.push(i))
+                    | self.b.violated_by(excess, &pair.b, &self.y, 1.0).is_some_and(|i| self.b.push(i));
+                if changed {
+                    (at, pace, series, turned) = (self.evaluate(pair), Pace::FIRST, Series::default(), false);
+                    continue;
+                }
+            }
+            if pace.is_astray(step, length, LONGEST) || pace.ends_with(length) {
+                return step;
+            }
+        }
+        MAX_STEPS.min(limit)
+    }
+
+    /// Whether the normal is that of the solution, to [`ALIGNED`] or to what rounding leaves of so
+    /// short a distance. The narrowest of brackets holds it to about the root of its width relative
+    /// to the distance; the equations tell it as it is: n is along x - y and what the constraints
+    /// of each body carry, none of them is violated, and those that carry anything hold with
+    /// equality.
+    pub(in crate::measure) fn is_aligned(&self, pair: &Pair<'_>) -> bool {
+        let (n, apart) = (self.n.normalize(), self.x - self.y);
+        let (turned_a, gap_a) = self.a.misfit(&pair.a, &self.x, &-n);
+        let (turned_b, gap_b) = self.b.misfit(&pair.b, &self.y, &n);
+        let across = (apart - n * n.dot(&apart)).norm();
+        let enough = (ALIGNED * apart.norm()).max(ROUNDED * pair.size());
+        turned_a <= ALIGNED && turned_b <= ALIGNED && across + gap_a + gap_b <= enough
+    }
+
+    /// Turns the normal along x - y, if that is about where it points: of corners and edges that
+    /// hold both points where they are it is off by long steps still.
+    fn turn(&mut self, pair: &Pair<'_>) {
+        let apart = self.x - self.y;
+        let distance = apart.norm().copysign(self.n.dot(&apart));
+        let (n, mut a, mut b) = (apart / distance, self.a, self.b);
+        let about = n.dot(&self.n) > ABOUT * self.n.norm();
+        if about && a.fit(&pair.a, &self.x, &-n) && b.fit(&pair.b, &self.y, &n) {
+            *self = Self { distance, n, a, b, ..*self };
+        }
+    }
+
+    /// By how much a constraint may be violated that is not active: far below the distance, or it
+    /// decides the normal.
+    fn negligible(&self, pair: &Pair<'_>) -> f64 {
+        (0.1 * ALIGNED * self.distance.abs() / pair.size()).clamp(ROUNDED, VIOLATED)
+    }
+
+    /// Both bodies at the current iterate.
+    fn evaluate(&self, pair: &Pair<'_>) -> (At, At) {
+        (At::new(&pair.a, &self.a, &self.x), At::new(&pair.b, &self.b, &self.y))
+    }
+
+    /// The curvature by which forces along the tangents alone lead [`FARTHEST`]. Added to what
+    /// there is it vanishes with them, which leaves Newton's method as fast as it is.
+    fn stiffness(pair: &Pair<'_>, tangents: [V3<f64>; 2], force: &Vector3<f64>) -> f64 {
+        let force = across(Scalar, tangents, along(Scalar, tangents, (*force).into())).into();
+        pair.a.relative_length(&force).max(pair.b.relative_length(&force)) / FARTHEST
+    }
+
+    /// One Newton step; its length relative to the bodies, or none if the system is singular.
+    ///
+    /// The second of the equations at the head of this file gives `dn = -(n + u) - H_A dx - G_A
+    /// dλ`, G the gradients and H the weighted Hessians, and the first then `dy = (I + D H_A) dx -
+    /// n dD + D G_A dλ + (x - y + D u)`, which leaves dx, dD and the multipliers.
+    fn step(&mut self, pair: &Pair<'_>, (a, b): &(At, At), series: &mut Series) -> Option<f64> {
+        let (la, lb, distance, n) = (self.a.len, self.b.len, self.distance, self.n);
+        let size = 4 + la + lb;
+        // Four unknowns, three constraints of each body, a right-hand side.
+        let mut m = [[0.0; 12]; 10];
+        let offset = self.x - self.y + a.sum * distance;
+        let moved = Matrix3::identity() + a.hessian * distance;
+        // u + w = 0.
+        let (by_x, by_distance) = (a.hessian + b.hessian * moved, -b.hessian * n);
+        let force = -(a.sum + b.sum);
+        let right = force - b.hessian * offset;
+        let free = tangents(&a.gradient[..la], &b.gradient[..lb]);
+        // Where a corrected step has led there may be no curvature at all.
+        let stiff = free.filter(|_| series.is_corrected()).map_or(0.0, |free| Self::stiffness(pair, free, &force));
+        for i in 0..3 {
+            for j in 0..3 {
+                m[i][j] = by_x[(i, j)];
+            }
+            m[i][i] += stiff;
+            m[i][3] = by_distance[i];
+            m[i][size] = right[i];
+        }
+        for (k, gradient) in a.gradient[..la].iter().enumerate() {
+            let column = gradient + b.hessian * gradient * distance;
+            (0..3).for_each(|i| m[i][4 + k] = column[i]);
+        }
+        for (k, gradient) in b.gradient[..lb].iter().enumerate() {
+            (0..3).for_each(|i| m[i][4 + la + k] = gradient[i]);
+        }
+        // |n| = 1.
+        let turned = a.hessian * n;
+        (0..3).for_each(|j| m[3][j] = turned[j]);
+        (0..la).for_each(|k| m[3][4 + k] = n.dot(&a.gradient[k]));
+        m[3][size] = 0.5 * (n.norm_squared() - 1.0) - n.dot(&(n + a.sum));
+        // g = 1 and h = 1.
+        for (row, (gradient, value)) in m[4..].iter_mut().zip(a.gradient[..la].iter().zip(&a.value)) {
+            row[..3].copy_from_slice(gradient.as_slice());
+            row[size] = 1.0 - value;
+        }
+        for (row, (gradient, value)) in m[4 + la..].iter_mut().zip(b.gradient[..lb].iter().zip(&b.value)) {
+            row[..3].copy_from_slice(moved.tr_mul(gradient).as_slice());
+            row[3] = -gradient.dot(&n);
+            (0..la).for_each(|k| row[4 + k] = distance * gradient.dot(&a.gradient[k]));
+            row[size] = 1.0 - value - gradient.dot(&offset);
+        }
+        let d = solve(&mut m, size)?;
+        let dx = Vector3::new(d[0], d[1], d[2]);
+        let of_a: Vector3<f64> = (0..la).map(|k| a.gradient[k] * d[4 + k]).sum();
+        let dy = moved * dx - n * d[3] + of_a * distance + offset;
+        // Of corners that stay where they are the normal turns.
+        let dn = -(n + a.sum) - a.hessian * dx - of_a;
+        let bent = a.hessian + b.hessian;
+        // A longer step leaves where the linearization means anything.
+        let Taken { more, share: damping, length } = series.take(free, &dx, (&force, &bent), LONGEST, |more| {
+            pair.a.relative_length(&(dx + more)).max(pair.b.relative_length(&(dy + more)))
+        });
+        let (dx, dy, dn) = (dx + more, dy + more, dn - a.hessian * more);
+        self.x += dx * damping;
+        self.y += dy * damping;
+        self.n += dn * damping;
+        self.distance += d[3] * damping;
+        for k in 0..la {
+            self.a.multiplier[k] += d[4 + k] * damping;
+        }
+        for k in 0..lb {
+            self.b.multiplier[k] += d[4 + la + k] * damping;
+        }
+        Some(length.max(dn.norm()))
+    }
+}

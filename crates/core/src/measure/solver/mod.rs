@@ -1,0 +1,24 @@
+//! Methods that find answers; none is believed, brackets decide.
+//!
+//! Continuation from the answer before (`continuation`, with `predictor`, `tangent_newton`,
+//! `step_acceleration` on a `two_point_problem`), guesses (`initial_guess`, `support_table_gjk`),
+//! Newton's method with active sets (`kkt_newton`, `active_set_qp`), interior points
+//! (`barrier_programs`), and refinement in twice the precision (`refinement`, `double_double`).
+
+pub(super) mod active_constraints;
+pub(super) mod active_set_qp;
+pub(super) mod barrier_programs;
+pub(super) mod continuation;
+pub(super) mod convex_root_bracket;
+pub(super) mod curvature;
+pub(super) mod double_double;
+pub(super) mod initial_guess;
+pub(super) mod kkt_newton;
+pub(super) mod linear_systems;
+pub(super) mod predictor;
+pub(super) mod projection;
+pub(super) mod refinement;
+pub(super) mod step_acceleration;
+pub(super) mod support_table_gjk;
+pub(super) mod tangent_newton;
+pub(super) mod two_point_problem;

@@ -1,0 +1,314 @@
+//! Convex programs over one body: the point nearest to a given one, and the point farthest along a
+//! direction.
+//!
+//! Both are `min κ/2 |y|² - r·y` over the points y of the body: κ = 1 projects the point r, κ = 0
+//! supports the direction r. The steps are those of sequential quadratic programming,
+//!
+//! ```text
+//! min over d of ½ dᵀ(κ I + Σ λ_i ∇²g_i) d + (κ y - r)·d   subject to   g_i(y) + ∇g_i(y)·d <= 1
+//! ```
+//!
+//! with the constraints that hold with equality found by exchange, one at a time, without new
+//! evaluations. Where the steps do not settle, an interior-point method does. Brackets are the
+//! caller's.
+
+use crate::body::{Body, MAX_CONSTRAINTS};
+use crate::measure::bounds::duality_bounds::Multipliers;
+use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
+use crate::measure::frames::query_frame::Posed;
+use crate::measure::solver::linear_systems::{Augmented, MAX_UNKNOWNS, solve};
+use crate::measure::warm::ActiveSet;
+use crate::optimize::{Program, Row, Rows, minimise};
+use crate::polynomial::{Jet, gamma};
+use nalgebra::{Matrix3, Vector3};
+use std::ops::ControlFlow;
+
+/// One body in its own query frame: that of the body, moved to the centre of its circumscribed ball
+/// and scaled by a power of two near its radius.
+pub(in crate::measure) struct Single<'a> {
+    pub(in crate::measure) body: Posed<'a>,
+    /// Metres per unit of the query frame: a power of two.
+    pub(in crate::measure) unit: f64,
+    origin: Vector3<f64>,
+    pose: Pose,
+}
+
+impl<'a> Single<'a> {
+    pub(in crate::measure) fn new(body: &'a Body, pose: &Pose) -> Self {
+        let ball = body.circumscribed();
+        let unit = ball.radius.log2().round().exp2();
+        Self { body: Posed::own(body, unit), unit, origin: ball.center, pose: *pose }
+    }
+
+    /// A world point in the query frame, with a bound of its error.
+    pub(in crate::measure) fn to_query(&self, x: &Vector3<f64>) -> (Vector3<f64>, f64) {
+        let offset = x - self.pose.translation();
+        let point = (self.pose.rotation().inverse_transform_vector(&offset) - self.origin) / self.unit;
+        let error = (ROTATION_ERROR + gamma(16)) * offset.norm() + gamma(4) * self.origin.norm();
+        (point, error / self.unit * (1.0 + 1e-14))
+    }
+
+    pub(in crate::measure) fn to_world(&self, v: &Vector3<f64>) -> Vector3<f64> {
+        self.pose.transform_point(&self.to_body(v))
+    }
+
+    /// Point of the query frame in the body frame, metres.
+    pub(in crate::measure) fn to_body(&self, v: &Vector3<f64>) -> Vector3<f64> {
+        v * self.unit + self.origin
+    }
+
+    /// Inverse of [`Single::to_body`].
+    pub(in crate::measure) fn body_to_query(&self, x: &Vector3<f64>) -> Vector3<f64> {
+        (x - self.origin) / self.unit
+    }
+
+    /// A world direction in the query frame; of the same length within `ROTATION_ERROR`.
+    pub(in crate::measure) fn direction_to_query(&self, n: &Vector3<f64>) -> Vector3<f64> {
+        self.pose.rotation().inverse_transform_vector(n)
+    }
+
+    pub(in crate::measure) fn direction_to_world(&self, n: &Vector3<f64>) -> Vector3<f64> {
+        self.pose.transform_direction(n)
+    }
+
+    /// Boundary point of the stored table that is best for the objective.
+    pub(in crate::measure) fn table(&self, objective: &Objective) -> Vector3<f64> {
+        let points = self.body.body.boundary().iter().map(|x| self.body_to_query(x));
+        let score = |y: &Vector3<f64>| (y * (0.5 * objective.curvature) - objective.linear).dot(y);
+        let best = points.map(|y| (score(&y), y)).min_by(|p, q| p.0.total_cmp(&q.0));
+        best.map_or(self.body.interior, |(_, y)| y)
+    }
+}
+
+/// `κ/2 |y|² - r·y`.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::measure) struct Objective {
+    /// κ.
+    curvature: f64,
+    /// r.
+    linear: Vector3<f64>,
+}
+
+impl Objective {
+    /// Nearest to a point.
+    pub(in crate::measure) fn nearest(point: &Vector3<f64>) -> Self {
+        Self { curvature: 1.0, linear: *point }
+    }
+
+    /// Farthest along a direction.
+    pub(in crate::measure) fn farthest(direction: &Vector3<f64>) -> Self {
+        Self { curvature: 0.0, linear: *direction }
+    }
+}
+
+/// A trial point with multipliers of all constraints: `Σ λ_i ∇g_i = r - κ y` at the solution.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::measure) struct Trial {
+    pub(in crate::measure) y: Vector3<f64>,
+    pub(in crate::measure) multipliers: Multipliers,
+    /// `Σ λ_i ∇g_i(y)`.
+    pub(in crate::measure) pull: Vector3<f64>,
+}
+
+/// Most constraints of one body that hold with equality at once in general position in space.
+const MAX_ACTIVE: usize = 3;
+
+/// Most steps of [`solve_single`] before, and after each iterate of, the interior-point method.
+const MAX_STEPS: u32 = 12;
+
+/// Longest step, in query units, after which a bracket may be narrow.
+const WORTH_A_BRACKET: f64 = 1e-3;
+
+/// Minimises from a start until `accept` takes a trial point; returns the iterations and the
+/// constraints that held with equality last.
+pub(in crate::measure) fn solve_single(
+    body: &Posed<'_>,
+    objective: &Objective,
+    start: Vector3<f64>,
+    active: ActiveSet,
+    mut exhausted: impl FnMut(u32) -> bool,
+    mut accept: impl FnMut(&Trial) -> bool,
+) -> (u32, ActiveSet) {
+    let mut steps = Steps { body, objective, active };
+    let mut count = 0;
+    if steps.run(start, &mut count, &mut exhausted, &mut accept) {
+        return (count, steps.active);
+    }
+    let mut y = body.interior;
+    let gap = (objective.linear - y * objective.curvature).norm();
+    let mut attempt = 1e-1;
+    minimise(&Inner { body, objective }, &mut y, gap.max(1e-6), |iterate| {
+        count += 1;
+        if iterate.gap < attempt * gap {
+            attempt = iterate.gap / gap * 1e-2;
+            let mut multipliers = [0.0; MAX_CONSTRAINTS];
+            multipliers[..body.len()].copy_from_slice(iterate.multipliers);
+            let pull = (0..body.len()).map(|i| body.jet(i, iterate.v).gradient * multipliers[i]).sum();
+            let done = accept(&Trial { y: *iterate.v, multipliers, pull });
+            steps.active = held(&multipliers);
+            if done || steps.run(*iterate.v, &mut count, &mut exhausted, &mut accept) {
+                return ControlFlow::Break(());
+            }
+        }
+        if attempt < 1e-18 || exhausted(count) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    (count, steps.active)
+}
+
+/// The constraints that carry the multipliers.
+fn held(multipliers: &Multipliers) -> ActiveSet {
+    let largest = multipliers.iter().fold(0.0_f64, |most, m| most.max(*m));
+    let carries = |i: &usize| multipliers[*i] > 1e-3 * largest;
+    (0..MAX_CONSTRAINTS).filter(carries).take(MAX_ACTIVE).fold(0, |bits, i| bits | 1 << i)
+}
+
+struct Steps<'a> {
+    body: &'a Posed<'a>,
+    objective: &'a Objective,
+    active: ActiveSet,
+}
+
+impl Steps<'_> {
+    /// Whether `accept` took a trial point.
+    fn run(
+        &mut self,
+        start: Vector3<f64>,
+        count: &mut u32,
+        exhausted: &mut impl FnMut(u32) -> bool,
+        accept: &mut impl FnMut(&Trial) -> bool,
+    ) -> bool {
+        let blank = Jet { value: 0.0, gradient: Vector3::zeros(), hessian: Matrix3::zeros() };
+        let mut jets = [blank; MAX_CONSTRAINTS];
+        let mut y = start;
+        let mut multipliers = [0.0; MAX_CONSTRAINTS];
+        let mut last = f64::INFINITY;
+        for step in 0..=MAX_STEPS {
+            for (i, jet) in jets.iter_mut().enumerate().take(self.body.len()) {
+                *jet = self.body.jet(i, &y);
+            }
+            let jets = &jets[..self.body.len()];
+            if step > 0 {
+                let pull = jets.iter().zip(&multipliers).map(|(jet, m)| jet.gradient * *m).sum();
+                if (last < WORTH_A_BRACKET || step % 4 == 0) && accept(&Trial { y, multipliers, pull }) {
+                    return true;
+                }
+                *count += 1;
+            } else {
+                multipliers = self.first_multipliers(jets, &y);
+            }
+            if exhausted(*count) {
+                return false;
+            }
+            let Some((d, found)) = self.step(jets, &y, &multipliers) else { return false };
+            let length = d.norm();
+            // Rounding has the word once steps stop shrinking.
+            if !length.is_finite() || length < 1e-12 && length >= last {
+                return false;
+            }
+            // Bodies have size 1 here: a longer step leaves where the linearization means anything.
+            y += d * (0.5 / length).min(1.0);
+            (multipliers, last) = (found, length);
+        }
+        false
+    }
+
+    /// Multipliers for a start without any: the largest constraint alone, as far as it turns
+    /// against the objective.
+    fn first_multipliers(&mut self, jets: &[Jet], y: &Vector3<f64>) -> Multipliers {
+        let mut multipliers = [0.0; MAX_CONSTRAINTS];
+        let aim = self.objective.linear - y * self.objective.curvature;
+        let most = (0..jets.len()).max_by(|&i, &j| jets[i].value.total_cmp(&jets[j].value)).unwrap_or(0);
+        if self.active == 0 || self.active >> jets.len() != 0 || self.active.count_ones() > MAX_ACTIVE as u32 {
+            self.active = 1 << most;
+        }
+        let share = aim.norm() / f64::from(self.active.count_ones());
+        for (i, jet) in jets.iter().enumerate().filter(|(i, _)| self.active >> i & 1 == 1) {
+            multipliers[i] = share / jet.gradient.norm().max(f64::MIN_POSITIVE);
+        }
+        multipliers
+    }
+
+    /// The step and the new multipliers from the quadratic program, exchanging one constraint at a
+    /// time.
+    fn step(
+        &mut self,
+        jets: &[Jet],
+        y: &Vector3<f64>,
+        multipliers: &Multipliers,
+    ) -> Option<(Vector3<f64>, Multipliers)> {
+        let aim = self.objective.linear - y * self.objective.curvature;
+        let mut hessian: Matrix3<f64> = jets.iter().zip(multipliers).map(|(jet, m)| jet.hessian * m.max(0.0)).sum();
+        hessian += Matrix3::identity() * self.objective.curvature;
+        // Enough for flat directions to have an answer, too little to slow the others.
+        let regularization = 1e-10 * hessian.diagonal().amax().max(1e-3 * aim.norm());
+        hessian += Matrix3::identity() * regularization;
+        for _ in 0..3 * MAX_ACTIVE {
+            let (d, found) = self.equality_step(jets, &hessian, &aim)?;
+            let held = |i: &usize| self.active >> i & 1 == 1;
+            let negative = (0..jets.len()).filter(held).min_by(|&i, &j| found[i].total_cmp(&found[j]));
+            if let Some(i) = negative.filter(|&i| found[i] < 0.0) {
+                self.active &= !(1 << i);
+                continue;
+            }
+            let excess = |i: usize| jets[i].value - 1.0 + jets[i].gradient.dot(&d);
+            let free = (0..jets.len()).filter(|i| !held(i) && excess(*i) > 1e-12);
+            match free.max_by(|&i, &j| excess(i).total_cmp(&excess(j))) {
+                Some(i) if self.active.count_ones() < MAX_ACTIVE as u32 => self.active |= 1 << i,
+                _ => return Some((d, found)),
+            }
+        }
+        None
+    }
+
+    fn equality_step(
+        &self,
+        jets: &[Jet],
+        hessian: &Matrix3<f64>,
+        aim: &Vector3<f64>,
+    ) -> Option<(Vector3<f64>, Multipliers)> {
+        let mut m: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
+        let size = 3 + self.active.count_ones() as usize;
+        let active = (0..jets.len()).filter(|i| self.active >> i & 1 == 1);
+        for (k, i) in active.clone().enumerate() {
+            // Multipliers of unit gradients: rows and columns of one size.
+            let scale = 1.0 / jets[i].gradient.norm();
+            for axis in 0..3 {
+                m[axis][3 + k] = jets[i].gradient[axis] * scale;
+                m[3 + k][axis] = jets[i].gradient[axis] * scale;
+            }
+            m[3 + k][size] = (1.0 - jets[i].value) * scale;
+        }
+        for row in 0..3 {
+            for column in 0..3 {
+                m[row][column] = hessian[(row, column)];
+            }
+            m[row][size] = aim[row];
+        }
+        let solution = solve(&mut m, size)?;
+        let mut multipliers = [0.0; MAX_CONSTRAINTS];
+        for (k, i) in active.enumerate() {
+            multipliers[i] = solution[3 + k] / jets[i].gradient.norm();
+        }
+        Some((Vector3::new(solution[0], solution[1], solution[2]), multipliers))
+    }
+}
+
+/// The same program for the interior-point method.
+struct Inner<'a> {
+    body: &'a Posed<'a>,
+    objective: &'a Objective,
+}
+
+impl Program<3> for Inner<'_> {
+    fn objective(&self, y: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
+        let Objective { curvature, linear } = self.objective;
+        (y * *curvature - linear, Matrix3::identity() * *curvature)
+    }
+
+    fn constraints(&self, y: &Vector3<f64>, rows: &mut Rows<3>) {
+        for i in 0..self.body.len() {
+            let jet = self.body.jet(i, y);
+            rows.push(Row { value: jet.value - 1.0, gradient: jet.gradient, hessian: jet.hessian, block: 0 });
+        }
+    }
+}

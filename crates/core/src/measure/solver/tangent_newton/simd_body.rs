@@ -1,0 +1,183 @@
+//! Bodies as Newton's method for distances sees them: each in its normalized coordinates, B where
+//! it stands as seen from A.
+
+use crate::body::{Body, ConstraintTrust};
+use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
+use crate::measure::frames::vector::{
+    M3, V3, add_scaled, apply, apply_transposed, dot, rows, subtract, times_transposed,
+};
+use crate::polynomial::{Number, NumberJet, Simd, gamma};
+use nalgebra::Vector3;
+
+/// Bound of the error of a relative rotation in operator norm: both rotations are off by at most
+/// [`ROTATION_ERROR`]; their product, its matrix and sums with it round a few times more.
+pub(in crate::measure) const TURNED: f64 = 2.0 * ROTATION_ERROR + gamma(40);
+
+/// Where B stands as seen from A.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::measure) struct Relative<N> {
+    /// Rotation from B's frame to A's.
+    pub(in crate::measure) rotation: M3<N>,
+    /// Centre of B's normalization in the query frame.
+    pub(in crate::measure) origin: V3<N>,
+    /// `M` of B: `z = M (y - origin)`.
+    pub(in crate::measure) linear: M3<N>,
+    /// Bound of the displacement of a computed z of B within its ball, metres.
+    pub(in crate::measure) displacement: N,
+}
+
+impl Relative<f64> {
+    /// B at `pose_b` as seen from A at `pose_a`.
+    #[inline(always)]
+    pub(in crate::measure) fn new<S: Simd>(simd: S, a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose) -> Self {
+        // Differences of translations are exact to one rounding, however far from the world origin.
+        let conjugate = pose_a.rotation().conjugate();
+        let moved = conjugate * (pose_b.translation() - pose_a.translation());
+        let rotation = (conjugate * pose_b.rotation()).to_rotation_matrix();
+        Self::from_parts(simd, a, rows(simd, rotation.matrix()), [moved.x, moved.y, moved.z], b)
+    }
+}
+
+impl<N: Copy> Relative<N> {
+    /// B turned by `rotation` and then moved by `translation`, as seen from A.
+    #[inline(always)]
+    pub(in crate::measure) fn from_parts<S: Simd>(
+        simd: S,
+        a: &Body,
+        rotation: M3<N>,
+        translation: V3<N>,
+        b: &Body,
+    ) -> Self
+    where
+        N: Number<S>,
+    {
+        let splat = |v: &Vector3<f64>| [N::splat(simd, v.x), N::splat(simd, v.y), N::splat(simd, v.z)];
+        let (center_a, center_b) = (a.normalization().center, b.normalization().center);
+        let turned = apply(&rotation, splat(&center_b));
+        let from = splat(&center_a);
+        let mut origin = from;
+        for i in 0..3 {
+            origin[i] = turned[i] + (translation[i] - from[i]);
+        }
+        let linear = rows(simd, &b.normalization().linear);
+        let trust = b.trust();
+        let fixed = (TURNED + trust.rounding) * trust.reach + TURNED * trust.center + gamma(8) * a.trust().center;
+        let far = translation[0].abs() + translation[1].abs() + translation[2].abs();
+        Self {
+            rotation,
+            origin,
+            linear: times_transposed(&linear, &rotation),
+            displacement: N::splat(simd, TURNED + gamma(8)).mul_add(far, N::splat(simd, fixed * (1.0 + 1e-13))),
+        }
+    }
+}
+
+/// A body in the query frame: its map to normalized coordinates and what is known near it.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::measure) struct Side<'a, N> {
+    pub(super) body: &'a Body,
+    /// Which of the constraints is active.
+    pub(in crate::measure) active: usize,
+    linear: M3<N>,
+    origin: V3<N>,
+    pub(super) displacement: N,
+}
+
+impl<'a, N: Copy> Side<'a, N> {
+    /// The body whose frame the query frame is.
+    #[inline(always)]
+    pub(in crate::measure) fn at_home<S: Simd>(simd: S, body: &'a Body, active: usize) -> Self
+    where
+        N: Number<S>,
+    {
+        let zero = N::splat(simd, 0.0);
+        Self {
+            body,
+            active,
+            linear: rows(simd, &body.normalization().linear),
+            origin: [zero; 3],
+            displacement: N::splat(simd, body.trust().rounding * body.trust().reach),
+        }
+    }
+
+    /// The other body.
+    #[inline(always)]
+    pub(in crate::measure) fn away(body: &'a Body, active: usize, relative: &Relative<N>) -> Self {
+        let Relative { linear, origin, displacement, .. } = *relative;
+        Self { body, active, linear, origin, displacement }
+    }
+
+    #[inline(always)]
+    pub(in crate::measure) fn body(&self) -> &'a Body {
+        self.body
+    }
+
+    #[inline(always)]
+    pub(super) fn trust(&self) -> &'a ConstraintTrust {
+        &self.body.trust().constraints[self.active]
+    }
+
+    /// The active constraint at a point in its normalized coordinates, and whether the point lies
+    /// in the ball of the body's [`crate::body::Trust`].
+    #[inline(always)]
+    pub(in crate::measure) fn jet<S: Simd>(&self, simd: S, v: V3<N>) -> (NumberJet<N>, N::Mask)
+    where
+        N: Number<S>,
+    {
+        let z = apply(&self.linear, subtract(v, self.origin));
+        let radius = self.body.trust().radius;
+        let inside = dot(z, z).le(N::splat(simd, radius * radius));
+        (self.body.constraints()[self.active].polynomial.jet(simd, z), inside)
+    }
+
+    /// The vectors of the basis, each in normalized coordinates.
+    #[inline(always)]
+    pub(in crate::measure) fn localize<S: Simd>(&self, _: S, basis: &M3<N>) -> M3<N>
+    where
+        N: Number<S>,
+    {
+        [apply(&self.linear, basis[0]), apply(&self.linear, basis[1]), apply(&self.linear, basis[2])]
+    }
+}
+
+impl Side<'_, f64> {
+    /// The point itself if it lies in the ball of the body's [`crate::body::Trust`], else about
+    /// where the line to the centre meets the surface, by the value of the active constraint at the
+    /// point.
+    #[inline(always)]
+    pub(in crate::measure) fn brought_near<S: Simd>(&self, _: S, v: V3<f64>, value: f64) -> V3<f64> {
+        let from = subtract::<S, f64>(v, self.origin);
+        let z = apply::<S, f64>(&self.linear, from);
+        let fraction = self.body.trust().radius / dot::<S, f64>(z, z).sqrt();
+        if fraction >= 1.0 {
+            return v;
+        }
+        let degree = self.body.constraints()[self.active].polynomial.degree() as f64;
+        // Well inside the ball, or rounding would leave it outside.
+        let fraction = (0.97 * fraction).min(value.powf(-1.0 / degree));
+        add_scaled::<S, f64>(self.origin, fraction, from)
+    }
+
+    /// Square of a step in the basis that `local` is of, in normalized coordinates, relative to the
+    /// body's size there: however thin a body is, its surface bends about as much over all steps of
+    /// the same relative length.
+    #[inline(always)]
+    pub(in crate::measure) fn relative_square<S: Simd>(&self, _: S, local: &M3<f64>, step: V3<f64>) -> f64 {
+        let delta = apply_transposed::<S, f64>(local, step);
+        dot::<S, f64>(delta, delta) / self.body.trust().radius.powi(2)
+    }
+
+    /// Whether all constraints but the active one are proven to hold at (a point within the
+    /// displacement of) v.
+    #[inline(always)]
+    pub(in crate::measure) fn others_hold<S: Simd>(&self, simd: S, v: V3<f64>) -> bool {
+        let mut hold = true;
+        if self.body.constraints().len() > 1 {
+            for i in (0..self.body.constraints().len()).filter(|&i| i != self.active) {
+                let (jet, inside) = Self { active: i, ..*self }.jet(simd, v);
+                hold &= inside && jet.value + self.body.trust().constraints[i].value_error <= 1.0;
+            }
+        }
+        hold
+    }
+}

@@ -1,0 +1,380 @@
+//! A short way out of an overlap of unions: a translation of A after which none of its parts meets
+//! a part of B.
+//!
+//! Any translation after which every pair of parts is proven apart bounds the depth from above.
+//! Along a direction one is found by going on, pair by pair, until a plane across the direction
+//! parts those that still meet. From there it shrinks: where it leads, every pair of parts lies on
+//! two sides of a plane with a normal n and a gap s, so that a translation w separates it, too, if
+//! `n·w >= n·v - s`; of all w beyond these planes the shortest is next ([`shortest`]), and so on.
+//! Each is proven again. The planes of pairs that touch turn on the way, so the search ends at a
+//! translation from which no small change is shorter, which need not be the shortest of all.
+
+use super::At;
+use super::min_norm_point::{Bound, Shortest, shortest};
+use crate::body::{Body, Solid};
+use crate::measure::frames::pose::Pose;
+use crate::measure::half_space::{HalfSpace, distance_to_half_space};
+use crate::measure::options::Options;
+use crate::measure::overlap::{Goal, across, ball_gap, settle};
+use crate::measure::signed;
+use crate::measure::warm::WarmStart;
+use nalgebra::Vector3;
+
+/// Directions of pairs of parts to start from.
+const STARTS: usize = 8;
+
+/// Starts that are followed to the end: those with the shortest ways.
+const FOLLOWED: usize = 3;
+
+/// Most translations on the way from one start.
+const MAX_ROUNDS: u32 = 40;
+
+/// How many times the last gain is hoped for at most.
+const HOPE: f64 = 4.0;
+
+/// Most planes kept at a time: those with the smallest gaps.
+const PLANES: usize = 24;
+
+/// Gap left between parts, in units of the accuracy of a distance: enough to prove that they are
+/// apart.
+const MARGIN: f64 = 4.0;
+
+/// A way out for one pair of parts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Start {
+    pub(super) pair: (usize, usize),
+    /// Unit vector, world frame.
+    pub(super) direction: Vector3<f64>,
+    /// How far, proven; metres.
+    pub(super) depth: f64,
+}
+
+/// The starts of the deepest pairs.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Starts([Option<Start>; STARTS]);
+
+impl Starts {
+    /// Takes a start in the place of a free one or a shallower.
+    pub(super) fn push(&mut self, start: Start) {
+        let depth = |start: &Option<Start>| start.map_or(f64::NEG_INFINITY, |start| start.depth);
+        if let Some(least) = self.0.iter_mut().min_by(|p, q| depth(p).total_cmp(&depth(q)))
+            && depth(least) < start.depth
+        {
+            *least = Some(start);
+        }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.iter().all(Option::is_none)
+    }
+}
+
+/// Where a pair of parts is parted by a plane.
+#[derive(Clone, Copy, Debug)]
+struct Plane {
+    /// Unit normal from B to A.
+    normal: Vector3<f64>,
+    /// What lies between the parts after the translation, metres; proven.
+    gap: f64,
+    /// Points of A, before the translation, and of B that lie next to it.
+    x: Vector3<f64>,
+    y: Vector3<f64>,
+}
+
+/// What holds A back: the pull of a pair of parts on the way, a part of its direction, and where it
+/// acts.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Contact {
+    pub(super) pull: Vector3<f64>,
+    pub(super) x: Vector3<f64>,
+    pub(super) y: Vector3<f64>,
+}
+
+/// A way out; metres, world frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Way {
+    /// Proven: after this much along the direction no parts meet, so that they touch at most.
+    pub(super) length: f64,
+    pub(super) direction: Vector3<f64>,
+    /// Pulls of sum `direction`, the strongest first; the others may be zero.
+    pub(super) contacts: [Contact; 3],
+    /// Whether another way was seen to be about as short, or another pair of parts to be about as
+    /// much in the way.
+    pub(super) tied: bool,
+    pub(super) iterations: u32,
+}
+
+/// The shortest way found from these starts and a few more. No way is shorter than
+/// `pairwise_minimum` metres; lengths that differ by at most `narrow` of them count as the same.
+pub(super) fn out(
+    (a, pose_a): At<'_, impl Solid>,
+    (b, pose_b): At<'_, impl Solid>,
+    starts: &Starts,
+    least: f64,
+    narrow: impl Fn(f64) -> f64,
+    options: &Options<'_>,
+) -> Way {
+    let radius = |parts: &[Body]| parts.iter().map(|part| part.circumscribed().radius).fold(0.0, f64::max);
+    // Gaps are to be provable whatever accuracy the caller asks for.
+    let options = options.with_accuracy(options.accuracy().min(1e-9)).unwrap_or(*options);
+    let mut search = Search {
+        a: a.parts(),
+        b: b.parts(),
+        pose_a: pose_a.with_translation(Vector3::zeros()),
+        pose_b: pose_b.with_translation(pose_b.translation() - pose_a.translation()),
+        least,
+        margin: MARGIN * options.accuracy() * radius(a.parts()).min(radius(b.parts())),
+        options,
+        iterations: 0,
+    };
+    let mut ways = [search.between_balls(a, b); FOLLOWED];
+    for start in starts.0.into_iter().flatten().chain(search.more_starts(&ways[0])) {
+        let limit = ways[FOLLOWED - 1].norm();
+        if let Some(length) = search.exit(&start, limit) {
+            ways[FOLLOWED - 1] = start.direction * length;
+            ways.sort_by(|v, w| v.norm().total_cmp(&w.norm()));
+        }
+    }
+    for k in 0..FOLLOWED {
+        // There may be fewer than that, and one as short as can be is enough.
+        let shortest = ways[..k].iter().map(Vector3::norm).fold(f64::INFINITY, f64::min);
+        if k == 0 || ways[k] != ways[k - 1] && shortest - least > narrow(shortest) {
+            ways[k] = search.shrink(ways[k], shortest);
+        }
+    }
+    let best = ways.into_iter().min_by(|v, w| v.norm().total_cmp(&w.norm())).unwrap_or_default();
+    let (length, direction) = (best.norm(), best.normalize());
+    let (contacts, crowded) = search.contacts(&best, &direction);
+    let from = pose_a.translation();
+    let others = ways.iter().filter(|way| way.normalize().dot(&direction) < 0.99);
+    Way {
+        length: length * (1.0 + 8.0 * f64::EPSILON) + 4.0 * f64::EPSILON * search.pose_b.translation().norm(),
+        direction,
+        contacts: contacts.map(|contact| Contact { x: contact.x + from, y: contact.y + from, ..contact }),
+        tied: crowded || others.into_iter().any(|way| way.norm() <= length + narrow(length)),
+        iterations: search.iterations,
+    }
+}
+
+/// A search, in axes along those of the world from the translation of A on.
+struct Search<'a> {
+    a: &'a [Body],
+    b: &'a [Body],
+    pose_a: Pose,
+    pose_b: Pose,
+    /// No way out is shorter: proven.
+    least: f64,
+    margin: f64,
+    options: Options<'a>,
+    iterations: u32,
+}
+
+impl Search<'_> {
+    fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let (len_a, len_b) = (self.a.len(), self.b.len());
+        (0..len_a).flat_map(move |i| (0..len_b).map(move |j| (i, j)))
+    }
+
+    /// The way that separates the circumscribed balls.
+    fn between_balls(&self, a: &impl Solid, b: &impl Solid) -> Vector3<f64> {
+        let (ball_a, ball_b) = (a.circumscribed(), b.circumscribed());
+        let (vector, apart, error) = across((&self.pose_a, &ball_a.center), (&self.pose_b, &ball_b.center));
+        let direction = vector.try_normalize(0.0).unwrap_or_else(Vector3::x);
+        let reach = ball_a.radius + ball_b.radius;
+        direction * ((reach - apart).max(0.0) + error + 16.0 * f64::EPSILON * (reach + apart))
+    }
+
+    /// The axes of A's frame and the direction between the middles.
+    fn more_starts(&self, between_balls: &Vector3<f64>) -> impl Iterator<Item = Start> + use<> {
+        let axis = |k: usize| {
+            let mut axis = Vector3::zeros();
+            axis[k % 3] = if k < 3 { 1.0 } else { -1.0 };
+            axis
+        };
+        let turn = *self.pose_a.rotation();
+        let middles = between_balls.try_normalize(0.0);
+        let directions = middles.into_iter().chain((0..6).map(move |k| turn * axis(k)));
+        directions.map(|direction| Start { pair: (usize::MAX, usize::MAX), direction, depth: 0.0 })
+    }
+
+    fn ended(&self) -> bool {
+        self.options.stopped()
+    }
+
+    fn pose_after(&self, translation: &Vector3<f64>) -> Pose {
+        self.pose_a.with_translation(*translation)
+    }
+
+    /// Whether a pair of parts is proven apart, A being at this pose.
+    fn apart(&mut self, (i, j): (usize, usize), pose: &Pose) -> bool {
+        let mut hint = WarmStart::default();
+        let (a, b) = ((&self.a[i], pose), (&self.b[j], &self.pose_b));
+        let found = settle(a, b, &Goal::compare(0.0), &self.options, &mut hint);
+        self.iterations += found.iterations;
+        found.lower > 0.0
+    }
+
+    /// How far along n, proven, a plane across n parts the pair.
+    fn depth_along(&mut self, (i, j): (usize, usize), n: &Vector3<f64>) -> f64 {
+        let mut lowest = |body: &Body, pose: &Pose, n: Vector3<f64>| {
+            let Ok(half_space) = HalfSpace::new(n, 0.0) else { return f64::NEG_INFINITY };
+            let found = distance_to_half_space(body, pose, &half_space, &self.options, &mut WarmStart::default());
+            self.iterations += found.iterations;
+            found.lower
+        };
+        let (of_a, of_b) = (lowest(&self.a[i], &self.pose_a, *n), lowest(&self.b[j], &self.pose_b, -n));
+        -(of_a + of_b) + 8.0 * f64::EPSILON * (of_a.abs() + of_b.abs())
+    }
+
+    /// A length at which, along the direction of the start, all pairs are proven apart; none that
+    /// is below the limit.
+    fn exit(&mut self, start: &Start, limit: f64) -> Option<f64> {
+        let n = &start.direction;
+        // Not 0: a way has a direction.
+        let mut length = start.depth.max(1e-3 * self.margin);
+        loop {
+            let before = length;
+            for pair in self.pairs() {
+                let pose = self.pose_after(&(n * length));
+                if !(length < limit) || self.ended() {
+                    return None;
+                }
+                if ball_gap((&self.a[pair.0], &pose), (&self.b[pair.1], &self.pose_b)) > 0.0 {
+                    continue;
+                }
+                let depth = if pair == start.pair { start.depth } else { self.depth_along(pair, n) };
+                if depth > length && !self.apart(pair, &pose) {
+                    length = depth;
+                }
+            }
+            if length == before {
+                return Some(length);
+            }
+        }
+    }
+
+    /// Whether all pairs are proven apart after a translation, or to touch at most.
+    fn separates(&mut self, way: &Vector3<f64>) -> bool {
+        let (pose, length) = (self.pose_after(way), way.norm());
+        let pairs = self.pairs();
+        pairs
+            .into_iter()
+            .all(|pair| self.apart(pair, &pose) || length > 0.0 && self.depth_along(pair, &(way / length)) <= length)
+    }
+
+    /// A way at most as long that separates all pairs as well; not worked out if it does not get as
+    /// short as `wanted`.
+    fn shrink(&mut self, mut way: Vector3<f64>, wanted: f64) -> Vector3<f64> {
+        for _ in 0..MAX_ROUNDS {
+            let Some(next) = self.beyond_planes(&way, self.margin).and_then(|(_, found)| found) else { break };
+            let mut next = next.v;
+            // Pairs whose planes were left out may be in the way: less far then.
+            let mut halvings = 0;
+            while next.norm() < way.norm() - self.margin && !self.ended() && !self.separates(&next) {
+                next = if halvings < 3 { (next + way) * 0.5 } else { way };
+                halvings += 1;
+            }
+            if self.ended() || next.norm() == 0.0 || !(next.norm() < way.norm() - self.margin) {
+                break;
+            }
+            let gained = way.norm() - next.norm();
+            way = next;
+            // What is gained falls from round to round.
+            if way.norm() - HOPE * gained > wanted {
+                break;
+            }
+        }
+        way
+    }
+
+    /// The planes between the pairs of parts after a translation, and the shortest translation
+    /// beyond them all, by a margin.
+    fn beyond_planes(&mut self, way: &Vector3<f64>, margin: f64) -> Option<(Planes, Option<Shortest>)> {
+        let (pose, length) = (self.pose_after(way), way.norm());
+        let mut planes = Planes::default();
+        // The shortest w beyond planes that v is beyond has |w - v|² <= |v|² - |w|²: pairs that are
+        // farther do not count.
+        let far = (length * length - self.least * self.least).max(0.0).sqrt() + 4.0 * margin.max(self.margin);
+        for (i, j) in self.pairs() {
+            if self.ended() {
+                return None;
+            }
+            let (a, b) = (&self.a[i], &self.b[j]);
+            let mut hint = WarmStart::default();
+            let far = Goal::beyond(far);
+            let found = settle((a, &pose), (b, &self.pose_b), &far, &self.options, &mut hint);
+            self.iterations += found.iterations;
+            if found.lower > far.far {
+                continue;
+            }
+            let proven = found.normal.filter(|_| found.lower > 0.0);
+            let (normal, gap, x, y) = if let Some(normal) = proven {
+                (normal, found.lower, found.witness_a, found.witness_b)
+            } else {
+                let found = signed::between(a, &pose, b, &self.pose_b, &self.options, &mut hint);
+                self.iterations += found.iterations;
+                let Some(normal) = found.normal else { continue };
+                (normal, found.lower, found.witness_a, found.witness_b)
+            };
+            planes.push(Plane { normal, gap, x: x - way, y });
+        }
+        let mut bounds = [Bound { normal: Vector3::zeros(), floor: 0.0 }; PLANES];
+        for (bound, plane) in bounds.iter_mut().zip(planes.all()) {
+            *bound = Bound { normal: plane.normal, floor: plane.normal.dot(way) - plane.gap + margin };
+        }
+        let found = shortest(&bounds[..planes.len]);
+        Some((planes, found))
+    }
+
+    /// What holds A back at the end of a way, and whether more does than is needed to.
+    fn contacts(&mut self, way: &Vector3<f64>, direction: &Vector3<f64>) -> ([Contact; 3], bool) {
+        let mut contacts = [Contact::default(); 3];
+        contacts[0].pull = *direction;
+        let Some((planes, found)) = self.beyond_planes(way, 0.0) else { return (contacts, false) };
+        if let Some(nearest) = planes.all().iter().min_by(|p, q| p.gap.total_cmp(&q.gap)) {
+            (contacts[0].x, contacts[0].y) = (nearest.x, nearest.y);
+        }
+        let Some(found) = found.filter(|found| found.v.norm() > 0.5 * way.norm()) else { return (contacts, true) };
+        for (contact, (k, weight)) in contacts.iter_mut().zip(found.support()) {
+            let Plane { normal, x, y, .. } = planes.all()[k];
+            *contact = Contact { pull: normal * (weight / found.v.norm()), x, y };
+        }
+        contacts.sort_by(|p, q| q.pull.norm().total_cmp(&p.pull.norm()));
+        let holds = |k: usize| found.support().any(|(other, _)| other == k);
+        let crowded = planes.all().iter().enumerate().any(|(k, plane)| {
+            let room = plane.normal.dot(&(found.v - way)) + plane.gap;
+            !holds(k) && room <= self.margin
+        });
+        (contacts, crowded)
+    }
+}
+
+/// The planes with the smallest gaps.
+struct Planes {
+    planes: [Plane; PLANES],
+    len: usize,
+}
+
+impl Default for Planes {
+    fn default() -> Self {
+        let none = Plane { normal: Vector3::zeros(), gap: 0.0, x: Vector3::zeros(), y: Vector3::zeros() };
+        Self { planes: [none; PLANES], len: 0 }
+    }
+}
+
+impl Planes {
+    fn all(&self) -> &[Plane] {
+        &self.planes[..self.len]
+    }
+
+    fn push(&mut self, plane: Plane) {
+        if self.len < PLANES {
+            self.planes[self.len] = plane;
+            self.len += 1;
+        } else if let Some(widest) = self.planes.iter_mut().max_by(|p, q| p.gap.total_cmp(&q.gap))
+            && plane.gap < widest.gap
+        {
+            *widest = plane;
+        }
+    }
+}
