@@ -12,7 +12,7 @@ use crate::store::FitOrder;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use order::{Choice, length};
 pub(super) use order::{checked, order_of_group};
-pub(super) use remote::carry_out as carry_out_on;
+pub(super) use remote::execute as execute_on;
 use report::Row;
 use std::error::Error;
 use std::io::{self, Write};
@@ -244,7 +244,7 @@ fn one(args: &FitArgs, input: &Path, order: &FitOrder) -> Result<Vec<Row>, Box<d
     let (used, odd) = (reading.mesh.used_points(), report::ReadingRow::from(&reading));
     let mesh = reading.mesh;
     let made = match &args.server {
-        Some(url) => carry_out_on(url, order, &mesh.points, &mesh.triangles, &bar),
+        Some(url) => execute_on(url, order, &mesh.points, &mesh.triangles, &bar),
         None => fit_mesh(order, mesh, |_, said| tell(&bar, said)).map_err(Into::into),
     }
     .map_err(|error| format!("{}: {error}", input.display()))?;

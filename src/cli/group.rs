@@ -1,10 +1,10 @@
 //! `sublevel fit --group`.
 
-use super::fit::{FitArgs, carry_out_on, checked, make_folder, order_of_group, progress_bar};
+use super::fit::{FitArgs, checked, execute_on, make_folder, order_of_group, progress_bar};
 use super::{read_obstacle, write_atomically};
 use crate::body::{Body, Obstacle};
 use crate::fit::Progress;
-use crate::jobs::{Made, Shapes, fit_group};
+use crate::jobs::{FitOutput, Shapes, fit_group};
 use crate::service;
 use crate::store::{FitOrder, FittedBody};
 use indicatif::ProgressBar;
@@ -38,8 +38,8 @@ pub(super) fn run(args: &FitArgs, name: &str) -> Result<(), Box<dyn Error>> {
     let order = checked(order_of_group(args, name, &obstacles))?;
     make_folder(&args.out)?;
     let bar = progress_bar(name);
-    let Made { outcome, shapes } = match &args.server {
-        Some(url) => carry_out_there(args, url, &order, &obstacles, &bar)?,
+    let FitOutput { outcome, shapes } = match &args.server {
+        Some(url) => execute_there(args, url, &order, &obstacles, &bar)?,
         None => fit_group(&order, &obstacles, |_, said| tell(&bar, said))?,
     };
     bar.finish_and_clear();
@@ -72,13 +72,13 @@ fn tell(bar: &ProgressBar, progress: Progress) -> ControlFlow<()> {
 }
 
 /// The server must have the bodies first, and it stores no others.
-fn carry_out_there(
+fn execute_there(
     args: &FitArgs,
     url: &str,
     order: &FitOrder,
     obstacles: &[Obstacle],
     bar: &ProgressBar,
-) -> Result<Made, Box<dyn Error>> {
+) -> Result<FitOutput, Box<dyn Error>> {
     if let Some(at) = obstacles.iter().position(|obstacle| matches!(obstacle, Obstacle::SosBody(_))) {
         let file = args.inputs[at].display();
         return Err(format!("{file} is an sos-body, which servers do not store; leave out --server").into());
@@ -86,7 +86,7 @@ fn carry_out_there(
     bar.set_message("sending");
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     runtime.block_on(service::push(url, &args.inputs))?;
-    carry_out_on(url, order, &[], &[], bar)
+    execute_on(url, order, &[], &[], bar)
 }
 
 /// Writes one body and describes it.

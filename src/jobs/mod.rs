@@ -5,16 +5,16 @@
 //! if its job is still running when it comes. So nothing depends on when the fit hears of it, and a
 //! kill at any time leaves a state that was acknowledged.
 //!
-//! `order` is what can be asked for, `carry_out` does it, for whoever asks; `worker` does one job
+//! `order` is what can be asked for, `execute` does it, for whoever asks; `worker` does one job
 //! after the other; `board` is where it says how far it is, and where everybody waits for news.
 
 mod board;
-mod carry_out;
+mod execute;
 mod order;
 mod worker;
 
 pub use board::{Board, Phase, Progress};
-pub use carry_out::{Failure, Made, Shapes, body_name, fit_group, fit_mesh};
+pub use execute::{Failure, FitOutput, Shapes, body_name, fit_group, fit_mesh};
 pub use order::{MESH_FORMATS, OrderError, check, read_mesh};
 
 use std::sync::Arc;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::carry_out::body_name;
+use super::execute::body_name;
 use crate::body::check_name;
 use crate::fit::{
     Cone, Coordinates, EncloseError, EncloseOptions, FitError, FitOptions, MAX_PIECES, MAX_SETS, Objective, ReadError,
@@ -37,7 +37,7 @@ impl OrderError {
 }
 
 /// How points become what is asked for.
-pub(super) enum Way {
+pub(super) enum FitPlan {
     /// Bodies, or a compound of some.
     Convex(FitOptions),
     /// A set that need not be convex.
@@ -72,12 +72,12 @@ pub fn check(request_id: &str, order: &FitOrder) -> Result<(), OrderError> {
     if let Some(group) = &order.group {
         return check_group(order, group);
     }
-    let checked = match way(order)? {
-        Way::Convex(options) => {
+    let checked = match plan(order)? {
+        FitPlan::Convex(options) => {
             check_parts(order)?;
             options.check(&order.name)
         }
-        Way::Relaxed(options) => {
+        FitPlan::Relaxed(options) => {
             if order.refine || order.ladder || order.slabs > 0 || order.max_gap_m.is_some() || order.parts.is_some() {
                 return Err(unfit(order, "refinement, ladder, slabs, parts and max gap need convex bodies"));
             }
@@ -154,7 +154,7 @@ pub fn read_mesh(bytes: &[u8], format: &str, input: &str, scale: f64) -> Result<
 }
 
 /// How to carry out an order about points.
-pub(super) fn way(order: &FitOrder) -> Result<Way, OrderError> {
+pub(super) fn plan(order: &FitOrder) -> Result<FitPlan, OrderError> {
     let is_moment = order.objective == SosMethod::InverseMoment.name();
     if is_moment && order.relax_convexity != 0.0 {
         let why = "inverse-moment asks for no convexity; leave one of the two out";
@@ -172,10 +172,10 @@ pub(super) fn way(order: &FitOrder) -> Result<Way, OrderError> {
         let degree = order.degree.unwrap_or(FitOptions::default().degree);
         let c = order.relax_convexity;
         let method = if is_moment { SosMethod::InverseMoment } else { SosMethod::Relaxed { c, objective } };
-        return Ok(Way::Relaxed(SosOptions { degree, method, coordinates, input }));
+        return Ok(FitPlan::Relaxed(SosOptions { degree, method, coordinates, input }));
     }
     let climbs = order.ladder || order.max_gap_m.is_some();
-    Ok(Way::Convex(FitOptions {
+    Ok(FitPlan::Convex(FitOptions {
         degree: order.degree.unwrap_or(if climbs { objective.max_degree() } else { FitOptions::default().degree }),
         objective,
         coordinates,

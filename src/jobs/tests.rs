@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use tokio::task::spawn_blocking;
 
 use super::worker::{claim, ended, finish, put_back, recover};
-use super::{Jobs, Made, Shapes};
+use super::{FitOutput, Jobs, Shapes};
 use crate::body::Compound;
 use crate::fit::{FitOptions, fit};
 use crate::store::{Catalogue, FitOrder, FitOutcome, JobState, NewJob, Store};
@@ -90,7 +90,7 @@ fn a_file_is_kept_if_it_fits_in_a_message() {
         let compound = Compound::new("it", vec![body.clone(); parts]).expect("a compound");
         let outcome = FitOutcome { bodies: Vec::new(), left_out: 0, left_out_m: 0.0 };
         let file = compound.to_json();
-        let made = Made { outcome, shapes: Shapes::Compound(Box::new(compound)) };
+        let made = FitOutput { outcome, shapes: Shapes::Compound(Box::new(compound)) };
         let (state, bodies, kept) = ended(Ok(Ok(made)));
         assert_eq!(matches!(state, JobState::Succeeded(_)), fits, "{} bytes: {state:?}", file.len());
         assert!(bodies.is_empty() && (!fits || kept == Some(file)));
@@ -126,7 +126,7 @@ async fn a_change_is_made_as_soon_as_the_disk_works() {
             if before < until { Err(crate::store::CatalogueError::QueueFull) } else { Ok(before) }
         }
     };
-    assert_eq!(jobs.insist(&catalogue, failing(1)).await, Some(1));
+    assert_eq!(jobs.retry_until_committed(&catalogue, failing(1)).await, Some(1));
     jobs.stop();
-    assert_eq!(jobs.insist(&catalogue, failing(usize::MAX)).await, None, "a stop ends the wait");
+    assert_eq!(jobs.retry_until_committed(&catalogue, failing(usize::MAX)).await, None, "a stop ends the wait");
 }

@@ -9,7 +9,7 @@ use std::time::Duration;
 use tokio::sync::watch;
 use tokio::task::{JoinError, spawn_blocking};
 
-use super::{Board, Jobs, Made, Phase, fit_group, fit_mesh};
+use super::{Board, FitOutput, Jobs, Phase, fit_group, fit_mesh};
 use crate::body::Body;
 use crate::body::Obstacle;
 use crate::fit::{self, Mesh};
@@ -21,7 +21,7 @@ const MAX_ATTEMPTS: u32 = 2;
 /// Pause after the disk failed.
 const PAUSE: Duration = Duration::from_secs(1);
 
-type Fitted = Result<Result<Made, String>, JoinError>;
+type Fitted = Result<Result<FitOutput, String>, JoinError>;
 
 /// The state that a fit leaves its job in, the bodies to be stored, and the file to be kept with
 /// it.
@@ -38,10 +38,10 @@ impl Jobs {
             else => None,
         };
         let Some(catalogue) = catalogue else { return };
-        self.insist(&catalogue, recover).await;
+        self.retry_until_committed(&catalogue, recover).await;
         self.tell(|_| {});
         while !news.borrow_and_update().is_stopping() {
-            match self.insist(&catalogue, claim).await.flatten() {
+            match self.retry_until_committed(&catalogue, claim).await.flatten() {
                 Some(job) => self.attempt(&catalogue, &job).await,
                 None => drop(news.changed().await),
             }
@@ -66,11 +66,13 @@ impl Jobs {
         match fitted {
             // The fit hears of it, too; whether it ends before the server does is no matter.
             None => {
-                self.insist(catalogue, move |catalogue| put_back(catalogue, id)).await;
+                self.retry_until_committed(catalogue, move |catalogue| put_back(catalogue, id)).await;
             }
             Some(fitted) => {
                 let ended = ended(fitted);
-                if let Some(job) = self.insist(catalogue, move |catalogue| finish(catalogue, id, &ended)).await {
+                if let Some(job) =
+                    self.retry_until_committed(catalogue, move |catalogue| finish(catalogue, id, &ended)).await
+                {
                     tracing::info!(id, state = %job.state, "fit job ended");
                 }
             }
@@ -79,7 +81,7 @@ impl Jobs {
     }
 
     /// On a thread of its own. An error is the reason why the job fails.
-    pub(super) fn fit(&self, catalogue: &Catalogue, job: &Job) -> Result<Made, String> {
+    pub(super) fn fit(&self, catalogue: &Catalogue, job: &Job) -> Result<FitOutput, String> {
         // A job that was cancelled since it was claimed, when nobody could tell the board, has no
         // points any more.
         let mesh = catalogue.job_mesh(job.id).map_err(|error| format!("its points cannot be read: {error}"))?;
@@ -105,7 +107,7 @@ impl Jobs {
     }
 
     /// A change of the catalogue, again and again until the disk takes it or the server stops.
-    pub(super) async fn insist<T: Send + 'static>(
+    pub(super) async fn retry_until_committed<T: Send + 'static>(
         &self,
         catalogue: &Arc<Catalogue>,
         change: impl Fn(&Catalogue) -> Result<T, CatalogueError> + Send + Sync + 'static,
@@ -177,7 +179,7 @@ pub(super) fn finish(catalogue: &Catalogue, id: u64, ended: &Ended) -> Result<Ar
 pub(super) fn ended(fitted: Fitted) -> Ended {
     let failed = |why| (JobState::Failed(why), Vec::new(), None);
     match fitted {
-        Ok(Ok(Made { outcome, shapes })) => {
+        Ok(Ok(FitOutput { outcome, shapes })) => {
             let (bodies, file) = shapes.into_stored();
             let longest = bodies.iter().map(|body| body.to_json().len()).chain(file.as_ref().map(String::len)).max();
             match longest {

@@ -2,17 +2,17 @@
 
 use tonic::{Request, Response, Status};
 
+use super::app_state::AppState;
 use super::proto::body_service_server::BodyService;
 use super::proto::{
     CreateBodyRequest, CreateBodyResponse, DeleteBodyRequest, DeleteBodyResponse, GetBodyRequest, GetBodyResponse,
     ListBodiesRequest, ListBodiesResponse,
 };
-use super::ready::Ready;
 use super::{error, wire};
 use crate::store::CatalogueError;
 
 #[derive(Debug)]
-pub(super) struct Bodies(pub(super) Ready);
+pub(super) struct Bodies(pub(super) AppState);
 
 #[tonic::async_trait]
 impl BodyService for Bodies {

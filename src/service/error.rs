@@ -57,7 +57,7 @@ pub(super) fn too_slow(limit: Duration) -> Status {
 }
 
 /// INTERNAL for a task that panicked: a defect of this program.
-pub(super) fn defect(error: &tokio::task::JoinError) -> Status {
+pub(super) fn internal_panic(error: &tokio::task::JoinError) -> Status {
     tracing::error!(%error, "a call was ended by a defect");
     let message = "the call was ended by a defect of the server; its log says more, please report it";
     Status::with_error_details(Code::Internal, message, details("DEFECT"))

@@ -17,7 +17,7 @@ use tokio::task::JoinHandle;
 use tokio_stream::Stream;
 use tonic::transport::server::{Connected, TcpConnectInfo};
 
-use super::limits::{ACCEPT_PAUSE, MAX_CONNECTIONS, MUTE_PATIENCE, MUTE_PATIENCE_CROWDED};
+use super::limits::{ACCEPT_PAUSE, MAX_CONNECTIONS, PREFACE_TIMEOUT, PREFACE_TIMEOUT_CROWDED};
 
 /// What every HTTP/2 client sends first.
 const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
@@ -73,7 +73,7 @@ async fn accept(listener: TcpListener, spoke: mpsc::Sender<Connection>) {
             tracing::debug!(%error, "a connection without TCP_NODELAY");
         }
         let crowded = places.available_permits() < MAX_CONNECTIONS / 2;
-        let patience = if crowded { MUTE_PATIENCE_CROWDED } else { MUTE_PATIENCE };
+        let patience = if crowded { PREFACE_TIMEOUT_CROWDED } else { PREFACE_TIMEOUT };
         let spoke = spoke.clone();
         tokio::spawn(async move {
             if let Ok(true) = tokio::time::timeout(patience, speaks(&stream)).await {

@@ -32,7 +32,7 @@ pub const MAX_STREAMS: u32 = 32;
 /// in both directions and what is made of it; further calls wait unread.
 pub const MAX_CALLS: usize = 64;
 
-/// Longest time from the start of a call behind the gate to its answer.
+/// Longest time from the start of a call behind the limit to its answer.
 pub const CALL_LIMIT: Duration = Duration::from_secs(120);
 
 /// Silence after which a connection is asked for a sign of life.
@@ -46,10 +46,10 @@ pub const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(10);
 pub const MAX_CONNECTIONS: usize = 512;
 
 /// How long a new connection may say nothing.
-pub const MUTE_PATIENCE: Duration = Duration::from_secs(10);
+pub const PREFACE_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The same while more than half of the places are taken.
-pub const MUTE_PATIENCE_CROWDED: Duration = Duration::from_secs(1);
+pub const PREFACE_TIMEOUT_CROWDED: Duration = Duration::from_secs(1);
 
 /// Pause after a connection could not be accepted.
 pub const ACCEPT_PAUSE: Duration = Duration::from_millis(100);

@@ -1,23 +1,23 @@
 //! The gRPC door: handlers, conversion between wire and domain, limits, errors, starting and
 //! stopping.
 //!
-//! The one room that knows protobuf. `incoming` lets connections in and `gate` lets calls in, so
+//! The one room that knows protobuf. `incoming` lets connections in and `limit` lets calls in, so
 //! many at once. A call walks straight through: a handler (`bodies`, `scenes`, `queries`, `fits`)
 //! reads its message with `wire`, asks the catalogue or a scene's snapshot, and writes the answer
 //! with `wire`; whatever fails becomes a status in `error`. Handlers are dropped when a client goes
 //! away, so every change runs in a task of its own and is finished or not begun.
 
+mod app_state;
 mod bodies;
+mod concurrency_limit;
 mod error;
 #[cfg(feature = "fit")]
 mod fits;
-mod gate;
 mod incoming;
 pub mod limits;
 pub mod proto;
 mod push;
 mod queries;
-mod ready;
 mod scenes;
 mod server;
 mod wire;

@@ -11,16 +11,16 @@ use crate::measure::{self, Pose, WarmStart};
 use crate::scene::Scene;
 use crate::store::CatalogueError;
 
+use super::app_state::AppState;
 use super::error::{self, Invalid};
 use super::limits::{MAX_EVALUATIONS, PAIRS_AT_ONCE};
 use super::proto::evaluate_result::Outcome;
 use super::proto::query_service_server::QueryService;
 use super::proto::{EvaluateRequest, EvaluateResponse, EvaluateResult, Measure};
-use super::ready::Ready;
 use super::wire::{self, Accuracy};
 
 #[derive(Debug)]
-pub(super) struct Queries(pub(super) Ready);
+pub(super) struct Queries(pub(super) AppState);
 
 /// A body where it stands: the snapshot's pose or the call's own.
 struct Placed {

@@ -2,17 +2,17 @@
 
 use tonic::{Request, Response, Status};
 
+use super::app_state::AppState;
 use super::proto::scene_service_server::SceneService;
 use super::proto::{
     CreateSceneRequest, CreateSceneResponse, DeleteSceneRequest, DeleteSceneResponse, GetSceneRequest,
     GetSceneResponse, ListScenesRequest, ListScenesResponse, UpdateSceneRequest, UpdateSceneResponse,
 };
-use super::ready::Ready;
 use super::{error, wire};
 use crate::store::CatalogueError;
 
 #[derive(Debug)]
-pub(super) struct Scenes(pub(super) Ready);
+pub(super) struct Scenes(pub(super) AppState);
 
 #[tonic::async_trait]
 impl SceneService for Scenes {

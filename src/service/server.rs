@@ -17,12 +17,13 @@ use tonic_health::server::HealthReporter;
 use crate::jobs::Jobs;
 use crate::store::{Catalogue, Store, StoreError};
 
+use super::app_state::AppState;
 use super::bodies::Bodies;
+use super::concurrency_limit::ConcurrencyLimit;
+#[cfg(feature = "fit")]
+use super::concurrency_limit::Limited;
 #[cfg(feature = "fit")]
 use super::fits::Fits;
-use super::gate::Gate;
-#[cfg(feature = "fit")]
-use super::gate::Gated;
 use super::incoming::Incoming;
 use super::limits::{DRAIN, KEEPALIVE, KEEPALIVE_TIMEOUT, MAX_MESSAGE_BYTES, MAX_STREAMS};
 use super::proto::FILE_DESCRIPTOR_SET;
@@ -32,7 +33,6 @@ use super::proto::fit_service_server::{self, FitServiceServer};
 use super::proto::query_service_server::{self, QueryServiceServer};
 use super::proto::scene_service_server::{self, SceneServiceServer};
 use super::queries::Queries;
-use super::ready::Ready;
 use super::scenes::Scenes;
 
 /// What a server needs to know.
@@ -115,13 +115,13 @@ impl Server {
         let (health, health_service) = tonic_health::server::health_reporter();
         // It starts as SERVING.
         set_health(&health, ServingStatus::NotServing).await;
-        let ready = Ready::new(catalogue.clone());
-        let router = router(ready.clone()).add_service(health_service);
+        let app = AppState::new(catalogue.clone());
+        let router = router(app.clone()).add_service(health_service);
         #[cfg(feature = "fit")]
         let (router, jobs, worker) = {
             let jobs = Jobs::default();
             let worker = tokio::spawn(jobs.clone().work(catalogue));
-            (router.add_service(fits(ready, jobs.clone())), jobs, worker)
+            (router.add_service(fits(app, jobs.clone())), jobs, worker)
         };
 
         let loading = load(self.store, loaded, health.clone());
@@ -215,34 +215,35 @@ impl Signals {
     }
 }
 
-fn router(ready: Ready) -> Router {
+fn router(app: AppState) -> Router {
     let reflection = || {
         tonic_reflection::server::Builder::configure()
             .register_encoded_file_descriptor_set(FILE_DESCRIPTOR_SET)
             .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
     };
-    let (sized, gate) = (MAX_MESSAGE_BYTES, Gate::new());
-    let bodies = BodyServiceServer::new(Bodies(ready.clone()));
-    let scenes = SceneServiceServer::new(Scenes(ready.clone()));
-    let queries = QueryServiceServer::new(Queries(ready));
+    let (sized, limit) = (MAX_MESSAGE_BYTES, ConcurrencyLimit::new());
+    let bodies = BodyServiceServer::new(Bodies(app.clone()));
+    let scenes = SceneServiceServer::new(Scenes(app.clone()));
+    let queries = QueryServiceServer::new(Queries(app));
     tonic::transport::Server::builder()
         .max_concurrent_streams(MAX_STREAMS)
         .http2_keepalive_interval(Some(KEEPALIVE))
         .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
-        .add_service(gate.before(bodies.max_decoding_message_size(sized).max_encoding_message_size(sized)))
-        .add_service(gate.before(scenes.max_decoding_message_size(sized).max_encoding_message_size(sized)))
-        .add_service(gate.before(queries.max_decoding_message_size(sized).max_encoding_message_size(sized)))
+        .add_service(limit.before(bodies.max_decoding_message_size(sized).max_encoding_message_size(sized)))
+        .add_service(limit.before(scenes.max_decoding_message_size(sized).max_encoding_message_size(sized)))
+        .add_service(limit.before(queries.max_decoding_message_size(sized).max_encoding_message_size(sized)))
         // Older clients know v1alpha only. The descriptors are compiled in, so they are read or a
         // test fails.
         .add_optional_service(reflection().build_v1().ok())
         .add_optional_service(reflection().build_v1alpha().ok())
 }
 
-/// Behind a gate of its own: uploads take long, and nothing else waits for them.
+/// Behind a limit of its own: uploads take long, and nothing else waits for them.
 #[cfg(feature = "fit")]
-fn fits(ready: Ready, jobs: Jobs) -> Gated<FitServiceServer<Fits>> {
-    let fits = FitServiceServer::new(Fits::new(ready, jobs));
-    Gate::new().before(fits.max_decoding_message_size(MAX_MESSAGE_BYTES).max_encoding_message_size(MAX_MESSAGE_BYTES))
+fn fits(app: AppState, jobs: Jobs) -> Limited<FitServiceServer<Fits>> {
+    let fits = FitServiceServer::new(Fits::new(app, jobs));
+    ConcurrencyLimit::new()
+        .before(fits.max_decoding_message_size(MAX_MESSAGE_BYTES).max_encoding_message_size(MAX_MESSAGE_BYTES))
 }
 
 /// Loads the catalogue on a thread that may block, then opens the doors.

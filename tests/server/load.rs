@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
 use sublevel::body::Body;
-use sublevel::service::limits::{MAX_CONNECTIONS, MAX_MESSAGE_BYTES, MUTE_PATIENCE};
+use sublevel::service::limits::{MAX_CONNECTIONS, MAX_MESSAGE_BYTES, PREFACE_TIMEOUT};
 use sublevel::service::proto::{Accuracy, CreateBodyRequest, EvaluateRequest, Measure, UpdateSceneRequest};
 
 use tonic_health::pb::HealthCheckRequest;
@@ -72,7 +72,7 @@ async fn silent_connections_are_closed_and_do_not_lock_others_out() {
         (0..MAX_CONNECTIONS + 20).map(|_| TcpStream::connect(server.addr).expect("connected")).collect();
     // Half a greeting is as good as none.
     mute[0].write_all(b"PRI * HT").expect("written");
-    let patience = MUTE_PATIENCE + Duration::from_secs(5);
+    let patience = PREFACE_TIMEOUT + Duration::from_secs(5);
     let mut clients = tokio::time::timeout(patience, call(&server)).await.expect("there is room again");
     mute[0].set_read_timeout(Some(patience)).expect("set");
     match mute[0].read(&mut [0; 64]) {

@@ -1,6 +1,6 @@
 //! `sublevel fit --server`: the same, made elsewhere.
 
-use crate::jobs::Made;
+use crate::jobs::FitOutput;
 use crate::service;
 use crate::service::proto::{FitJob, FitPhase, FitState};
 use crate::store::FitOrder;
@@ -10,13 +10,13 @@ use std::error::Error;
 
 /// Has the server carry out an order about points (metres) and the triangles between them, or about
 /// bodies that it has. Ctrl-C cancels.
-pub(in crate::cli) fn carry_out(
+pub(in crate::cli) fn execute(
     url: &str,
     order: &FitOrder,
     points: &[Vector3<f64>],
     triangles: &[[usize; 3]],
     bar: &ProgressBar,
-) -> Result<Made, Box<dyn Error>> {
+) -> Result<FitOutput, Box<dyn Error>> {
     bar.set_message("sending");
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let cancel = async {

@@ -4,7 +4,7 @@ use super::sos;
 use crate::body::{Body, Compound};
 use crate::cli::write_atomically;
 use crate::fit::{Reading, RefinementEnd};
-use crate::jobs::{Made, Shapes};
+use crate::jobs::{FitOutput, Shapes};
 use crate::store::{FitOrder, FitOutcome, FittedBody};
 use serde::Serialize;
 use std::error::Error;
@@ -104,9 +104,9 @@ pub(super) fn write(
     used: usize,
     reading: &ReadingRow,
     order: &FitOrder,
-    made: &Made,
+    made: &FitOutput,
 ) -> Result<Vec<Row>, Box<dyn Error>> {
-    let Made { outcome, shapes } = made;
+    let FitOutput { outcome, shapes } = made;
     let write = |kind: String, json: String| -> Result<PathBuf, Box<dyn Error>> {
         let file = folder.join(format!("{}-{kind}.json", order.name));
         write_atomically(&file, &json)?;

@@ -14,13 +14,13 @@ use tokio::sync::{Semaphore, mpsc};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Request, Response, Status, Streaming};
 
+use super::app_state::AppState;
 use super::limits::{MAX_FITS_PAGE, MAX_MESSAGE_BYTES, MAX_UPLOADS, WATCH_PAUSE};
 use super::proto::fit_service_server::FitService;
 use super::proto::{
     CancelFitRequest, CancelFitResponse, CreateFitRequest, CreateFitResponse, FitJob, GetFitRequest, GetFitResponse,
     ListFitsRequest, ListFitsResponse, WatchFitRequest, WatchFitResponse,
 };
-use super::ready::Ready;
 use super::{error, wire as shared};
 use crate::jobs::{Board, Jobs};
 use crate::store::{Catalogue, CatalogueError, Job, MAX_FILE_BYTES};
@@ -30,15 +30,15 @@ const _: () = assert!(MAX_FILE_BYTES + (32 << 10) < MAX_MESSAGE_BYTES);
 
 #[derive(Debug)]
 pub(super) struct Fits {
-    ready: Ready,
+    app: AppState,
     jobs: Jobs,
     /// Each holds its points in memory; further ones wait unread.
     uploads: Semaphore,
 }
 
 impl Fits {
-    pub(super) fn new(ready: Ready, jobs: Jobs) -> Self {
-        Self { ready, jobs, uploads: Semaphore::new(MAX_UPLOADS) }
+    pub(super) fn new(app: AppState, jobs: Jobs) -> Self {
+        Self { app, jobs, uploads: Semaphore::new(MAX_UPLOADS) }
     }
 }
 
@@ -50,22 +50,22 @@ impl FitService for Fits {
     ) -> Result<Response<CreateFitResponse>, Status> {
         let _place = self.uploads.acquire().await;
         let upload = upload::receive(request.into_inner()).await?;
-        let new = self.ready.prove(move || upload.into_job()).await??;
+        let new = self.app.prove(move || upload.into_job()).await??;
         let jobs = self.jobs.clone();
         let create = move |catalogue: &Catalogue| jobs.create(catalogue, new);
-        let (job, created) = self.ready.change("header.request_id", create).await?;
+        let (job, created) = self.app.change("header.request_id", create).await?;
         Ok(Response::new(CreateFitResponse { job: Some(self.message(&job).await?), created }))
     }
 
     async fn get_fit(&self, request: Request<GetFitRequest>) -> Result<Response<GetFitResponse>, Status> {
-        let job = find(&*self.ready.catalogue().await?, wire::id(&request.get_ref().id, "id")?)?;
+        let job = find(&*self.app.catalogue().await?, wire::id(&request.get_ref().id, "id")?)?;
         Ok(Response::new(GetFitResponse { job: Some(self.message(&job).await?) }))
     }
 
     async fn list_fits(&self, request: Request<ListFitsRequest>) -> Result<Response<ListFitsResponse>, Status> {
         let (size, after) = shared::page(request.get_ref().page_size, &request.get_ref().page_token);
         let after = after.map(|token| wire::id(token, "page_token")).transpose()?;
-        let (found, more) = self.ready.catalogue().await?.jobs(after, size.min(MAX_FITS_PAGE));
+        let (found, more) = self.app.catalogue().await?.jobs(after, size.min(MAX_FITS_PAGE));
         let progress = self.jobs.news();
         let jobs = fitting(found.iter().map(|job| wire::job(job, progress.borrow().progress(job.id))));
         let next_page_token = match jobs.last() {
@@ -79,17 +79,17 @@ impl FitService for Fits {
 
     async fn watch_fit(&self, request: Request<WatchFitRequest>) -> Result<Response<Self::WatchFitStream>, Status> {
         let id = wire::id(&request.get_ref().id, "id")?;
-        let catalogue = self.ready.catalogue().await?;
+        let catalogue = self.app.catalogue().await?;
         find(&catalogue, id)?;
         let (sender, stream) = mpsc::channel(1);
-        tokio::spawn(watch(self.ready.clone(), self.jobs.clone(), id, sender));
+        tokio::spawn(watch(self.app.clone(), self.jobs.clone(), id, sender));
         Ok(Response::new(ReceiverStream::new(stream)))
     }
 
     async fn cancel_fit(&self, request: Request<CancelFitRequest>) -> Result<Response<CancelFitResponse>, Status> {
         let id = wire::id(&request.get_ref().id, "id")?;
         let jobs = self.jobs.clone();
-        let job = self.ready.change("id", move |catalogue| jobs.cancel(catalogue, id)).await?;
+        let job = self.app.change("id", move |catalogue| jobs.cancel(catalogue, id)).await?;
         Ok(Response::new(CancelFitResponse { job: Some(self.message(&job).await?) }))
     }
 }
@@ -97,17 +97,17 @@ impl FitService for Fits {
 impl Fits {
     async fn message(&self, job: &Job) -> Result<FitJob, Status> {
         let message = wire::job(job, self.jobs.news().borrow().progress(job.id));
-        complete(&self.ready, job, message).await
+        complete(&self.app, job, message).await
     }
 }
 
 /// A job's message with the file that the job made, if it made one.
-async fn complete(ready: &Ready, job: &Job, message: FitJob) -> Result<FitJob, Status> {
+async fn complete(app: &AppState, job: &Job, message: FitJob) -> Result<FitJob, Status> {
     if !wire::has_file(job) {
         return Ok(message);
     }
-    let (catalogue, id) = (ready.catalogue().await?, job.id);
-    let file = ready.solve(move || catalogue.job_file(id)).await?.map_err(|error| error::catalogue(&error, "id"))?;
+    let (catalogue, id) = (app.catalogue().await?, job.id);
+    let file = app.solve(move || catalogue.job_file(id)).await?.map_err(|error| error::catalogue(&error, "id"))?;
     Ok(wire::with_file(message, file.unwrap_or_default()))
 }
 
@@ -131,21 +131,21 @@ fn find(catalogue: &Catalogue, id: u64) -> Result<Arc<Job>, Status> {
 
 /// Sends the job as it stands whenever it has changed, until it has ended or nobody listens. A
 /// message is made when there is room for it, so who reads slowly gets the latest.
-async fn watch(ready: Ready, jobs: Jobs, id: u64, sender: mpsc::Sender<Result<WatchFitResponse, Status>>) {
+async fn watch(app: AppState, jobs: Jobs, id: u64, sender: mpsc::Sender<Result<WatchFitResponse, Status>>) {
     let (mut news, mut sent) = (jobs.news(), None);
     while let Ok(room) = sender.reserve().await {
         let (progress, stopping) = {
             let board: &Board = &news.borrow_and_update();
             (board.progress(id), board.is_stopping())
         };
-        let job = match ready.catalogue().await.and_then(|catalogue| find(&catalogue, id)) {
+        let job = match app.catalogue().await.and_then(|catalogue| find(&catalogue, id)) {
             Ok(job) => job,
             Err(status) => return room.send(Err(status)),
         };
         let message = wire::job(&job, progress);
         if sent.as_ref() != Some(&message) {
             sent = Some(message.clone());
-            let message = complete(&ready, &job, message).await;
+            let message = complete(&app, &job, message).await;
             room.send(message.map(|job| WatchFitResponse { job: Some(job) }));
         } else if stopping {
             let why = "the server stops; watch the job again when it is back, it goes on then";

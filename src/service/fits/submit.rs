@@ -17,7 +17,7 @@ use super::super::proto::{
 use super::super::push::{PushError, connect};
 use super::{order, wire};
 use crate::body::{Body, BodyFileError, Compound, SosBody};
-use crate::jobs::{Made, Shapes, body_name};
+use crate::jobs::{FitOutput, Shapes, body_name};
 use crate::store::{FitOrder, FittedKind};
 
 /// Points, or triangles, of one message: some 1.5 MB.
@@ -80,7 +80,7 @@ pub async fn submit(
     triangles: &[[usize; 3]],
     mut tell: impl FnMut(&FitJob),
     cancel: impl Future<Output = ()>,
-) -> Result<Made, SubmitError> {
+) -> Result<FitOutput, SubmitError> {
     let channel = connect(url, CALL_LIMIT).await?;
     let mut client = FitServiceClient::new(channel.clone())
         .max_decoding_message_size(MAX_MESSAGE_BYTES)
@@ -149,7 +149,7 @@ fn chunks<T>(all: Vec<T>, part: impl Fn(&[T]) -> Part) -> impl Iterator<Item = P
 }
 
 /// What a job made, re-proven here from the server's files.
-async fn fetch(channel: Channel, order: &FitOrder, result: FitResult) -> Result<Made, SubmitError> {
+async fn fetch(channel: Channel, order: &FitOrder, result: FitResult) -> Result<FitOutput, SubmitError> {
     let unknown = || SubmitError::Unproven("something of a kind that this program does not know".to_owned());
     let outcome = wire::outcome(&result).ok_or_else(unknown)?;
     let file = || text(&result.bodies[0].file_json);
@@ -170,7 +170,7 @@ async fn fetch(channel: Channel, order: &FitOrder, result: FitResult) -> Result<
             Shapes::Bodies(bodies)
         }
     };
-    Ok(Made { outcome, shapes })
+    Ok(FitOutput { outcome, shapes })
 }
 
 fn text(file: &[u8]) -> Result<&str, SubmitError> {

@@ -12,10 +12,10 @@ use crate::store::{Catalogue, CatalogueError};
 use super::error;
 use super::limits::LOADING_PATIENCE;
 
-/// Shared by all handlers. Work that blocks passes a gate first, so that one kind of it cannot take
+/// Shared by all handlers. Work that blocks passes a limit first, so that one kind of it cannot take
 /// every thread.
 #[derive(Debug, Clone)]
-pub(super) struct Ready {
+pub(super) struct AppState {
     catalogue: watch::Receiver<Option<Arc<Catalogue>>>,
     /// One share of a query per core; who waits is let in in turn.
     solving: Arc<Semaphore>,
@@ -25,11 +25,11 @@ pub(super) struct Ready {
     changing: Arc<Semaphore>,
 }
 
-impl Ready {
+impl AppState {
     pub(super) fn new(catalogue: watch::Receiver<Option<Arc<Catalogue>>>) -> Self {
         let cores = thread::available_parallelism().map_or(1, usize::from);
-        let gate = |permits| Arc::new(Semaphore::new(permits));
-        Self { catalogue, solving: gate(cores), proving: gate(cores.div_ceil(2)), changing: gate(1) }
+        let limit = |permits| Arc::new(Semaphore::new(permits));
+        Self { catalogue, solving: limit(cores), proving: limit(cores.div_ceil(2)), changing: limit(1) }
     }
 
     /// The catalogue; waits a little while it is loading, so that a client that starts along with
@@ -76,17 +76,17 @@ impl Ready {
     }
 }
 
-/// Runs work to its end on a thread that may block, as many at once as the gate lets in.
+/// Runs work to its end on a thread that may block, as many at once as the limit lets in.
 async fn on_thread<T: Send + 'static>(
-    gate: &Arc<Semaphore>,
+    limit: &Arc<Semaphore>,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T, Status> {
-    let permit = gate.clone().acquire_owned().await;
+    let permit = limit.clone().acquire_owned().await;
     tokio::task::spawn_blocking(move || {
         // Held until the end, also when the caller is gone.
         let _permit = permit;
         work()
     })
     .await
-    .map_err(|error| error::defect(&error))
+    .map_err(|error| error::internal_panic(&error))
 }

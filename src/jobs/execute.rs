@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::ops::ControlFlow;
 
 use super::Phase;
-use super::order::{OrderError, Way, enclosing, way};
+use super::order::{FitPlan, OrderError, enclosing, plan};
 use crate::body::{Body, Compound, Obstacle, SosBody};
 use crate::fit::{
     CompoundFit, Cover, EncloseError, FitError, FitOptions, Group, Mesh, Progress, Representation, Rung, SosFit,
@@ -14,7 +14,7 @@ use crate::store::{FitGroup, FitOptimum, FitOrder, FitOutcome, FittedBody, Fitte
 
 /// All that an order made.
 #[derive(Clone, Debug)]
-pub struct Made {
+pub struct FitOutput {
     /// What it took, in the order of the shapes.
     pub outcome: FitOutcome,
     /// What it made.
@@ -57,7 +57,7 @@ impl Shapes {
     }
 }
 
-impl From<Representation> for Made {
+impl From<Representation> for FitOutput {
     fn from(made: Representation) -> Self {
         match made {
             Representation::Body(rung) => vec![*rung].into(),
@@ -66,7 +66,7 @@ impl From<Representation> for Made {
     }
 }
 
-impl From<Vec<Rung>> for Made {
+impl From<Vec<Rung>> for FitOutput {
     fn from(rungs: Vec<Rung>) -> Self {
         let took = |Rung { body, gap, seconds, report }: &Rung| FittedBody {
             id: body.id().to_string(),
@@ -85,7 +85,7 @@ impl From<Vec<Rung>> for Made {
     }
 }
 
-impl From<CompoundFit> for Made {
+impl From<CompoundFit> for FitOutput {
     fn from(CompoundFit { compound, seconds, shortfall }: CompoundFit) -> Self {
         let (id, gap_m) = (compound.id().to_string(), compound.gap_m());
         let shortfall = shortfall.map(|shortfall| shortfall.to_string());
@@ -94,7 +94,7 @@ impl From<CompoundFit> for Made {
     }
 }
 
-impl From<SosFit> for Made {
+impl From<SosFit> for FitOutput {
     fn from(SosFit { body, report }: SosFit) -> Self {
         let optimum = report.program.map(|program| FitOptimum {
             objective_value: program.objective_value,
@@ -107,7 +107,7 @@ impl From<SosFit> for Made {
     }
 }
 
-impl Made {
+impl FitOutput {
     fn new(bodies: Vec<FittedBody>, shapes: Shapes) -> Self {
         Self { outcome: FitOutcome { bodies, left_out: 0, left_out_m: 0.0 }, shapes }
     }
@@ -121,7 +121,7 @@ pub fn fit_mesh(
     order: &FitOrder,
     mut mesh: Mesh,
     mut progress: impl FnMut(Phase, Progress) -> ControlFlow<()>,
-) -> Result<Made, Failure> {
+) -> Result<FitOutput, Failure> {
     // What was thickened or trimmed has lost its triangles.
     if let Some(least_m) = order.min_thickness_m
         && let Cow::Owned(points) = thicken(&mesh.points, least_m)
@@ -135,9 +135,9 @@ pub fn fit_mesh(
         mesh = Mesh { points: trimmed.kept, triangles: Vec::new() };
     }
     let mut tell = |said| progress(Phase::Fitting, said);
-    let mut made = match way(order)? {
-        Way::Convex(options) => fit_convex(order, &mesh, &options, &mut tell)?,
-        Way::Relaxed(options) => fit_sos(&order.name, &mesh.points, &mesh.triangles, &options, &mut tell)?.into(),
+    let mut made = match plan(order)? {
+        FitPlan::Convex(options) => fit_convex(order, &mesh, &options, &mut tell)?,
+        FitPlan::Relaxed(options) => fit_sos(&order.name, &mesh.points, &mesh.triangles, &options, &mut tell)?.into(),
     };
     (made.outcome.left_out, made.outcome.left_out_m) = (left_out, left_out_m);
     Ok(made)
@@ -148,7 +148,7 @@ fn fit_convex(
     mesh: &Mesh,
     options: &FitOptions,
     tell: &mut dyn FnMut(Progress) -> ControlFlow<()>,
-) -> Result<Made, FitError> {
+) -> Result<FitOutput, FitError> {
     let (name, points) = (&order.name, &mesh.points);
     Ok(match (order.max_gap_m, order.parts) {
         (Some(most_m), _) if mesh.triangles.is_empty() => {
@@ -169,7 +169,7 @@ pub fn fit_group(
     order: &FitOrder,
     obstacles: &[Obstacle],
     mut progress: impl FnMut(Phase, Progress) -> ControlFlow<()>,
-) -> Result<Made, Failure> {
+) -> Result<FitOutput, Failure> {
     let asked = order.group.as_ref().ok_or_else(|| OrderError::new("group", "is missing; name the bodies"))?;
     let options = enclosing(order, asked);
     let mut tell = |said| progress(Phase::Fitting, said);
@@ -200,7 +200,7 @@ pub fn fit_group(
         });
         made.push(body.renamed(&body_name(order, index)).map_err(FitError::from)?);
     }
-    Ok(Made::new(took, Shapes::Bodies(made)))
+    Ok(FitOutput::new(took, Shapes::Bodies(made)))
 }
 
 /// Name of a body that an order makes, counted from 0: its own, with a number where several share

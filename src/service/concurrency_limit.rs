@@ -1,8 +1,8 @@
-//! One gate before all calls of the services (FitService, whose uploads take long, has one of its
+//! One limit before all calls of the services (FitService, whose uploads take long, has one of its
 //! own): what is behind it holds messages in memory, what is before it does not.
 //!
 //! A call that waits here has not been read: HTTP/2's flow control keeps its message with the
-//! client. Health and reflection do not pass the gate, so they are answered however many calls
+//! client. Health and reflection do not pass the limit, so they are answered however many calls
 //! wait.
 
 use std::convert::Infallible;
@@ -18,32 +18,32 @@ use tonic::server::NamedService;
 use super::error;
 use super::limits::{CALL_LIMIT, MAX_CALLS};
 
-/// Makes services share one gate.
+/// Makes services share one limit.
 #[derive(Debug, Clone)]
-pub(super) struct Gate(Arc<Semaphore>);
+pub(super) struct ConcurrencyLimit(Arc<Semaphore>);
 
-/// A service behind the gate.
+/// A service behind the limit.
 #[derive(Debug, Clone)]
-pub(super) struct Gated<S> {
+pub(super) struct Limited<S> {
     inner: S,
-    gate: Gate,
+    limit: ConcurrencyLimit,
 }
 
-impl Gate {
+impl ConcurrencyLimit {
     pub(super) fn new() -> Self {
         Self(Arc::new(Semaphore::new(MAX_CALLS)))
     }
 
-    pub(super) fn before<S>(&self, inner: S) -> Gated<S> {
-        Gated { inner, gate: self.clone() }
+    pub(super) fn before<S>(&self, inner: S) -> Limited<S> {
+        Limited { inner, limit: self.clone() }
     }
 }
 
-impl<S: NamedService> NamedService for Gated<S> {
+impl<S: NamedService> NamedService for Limited<S> {
     const NAME: &'static str = S::NAME;
 }
 
-impl<S> Service<http::Request<Body>> for Gated<S>
+impl<S> Service<http::Request<Body>> for Limited<S>
 where
     S: Service<http::Request<Body>, Response = http::Response<Body>, Error = Infallible> + Clone + Send + 'static,
     S::Future: Send,
@@ -58,9 +58,9 @@ where
 
     fn call(&mut self, request: http::Request<Body>) -> Self::Future {
         // Generated services are always ready, so the clone is as ready as the original.
-        let (mut inner, gate) = (self.inner.clone(), self.gate.0.clone());
+        let (mut inner, limit) = (self.inner.clone(), self.limit.0.clone());
         Box::pin(async move {
-            let _permit = gate.acquire_owned().await;
+            let _permit = limit.acquire_owned().await;
             let path = request.uri().path().to_owned();
             // A message that never comes to its end would keep its place for ever.
             let answer = tokio::time::timeout(CALL_LIMIT, inner.call(request)).await;
