@@ -3,7 +3,7 @@
 
 use super::FitError;
 use super::objective::Matrix;
-use super::path::{Centre, Interior, Pace, Path};
+use super::path::{Interior, Iterate, Path, PathOptions};
 use super::program::{Problem, ProgramError};
 use super::progress::Watch;
 use super::structure::Structure;
@@ -70,14 +70,14 @@ pub(super) fn generate(
         let path = Path::of_fit(&problem, &active.values);
         let first = path.start().ok_or(ProgramError::Singular)?;
         watch.round(active.values.ncols(), worst);
-        let rough = path.follow(first, pace(ROUGH_GAP), watch)?.ok_or(ProgramError::Singular)?;
+        let rough = path.follow(first, path_options(ROUGH_GAP), watch)?.ok_or(ProgramError::Singular)?;
         let outside = violations(structure, points, &rough.interior.coefficients);
         worst = outside.first().map_or(0.0, |&(excess, _)| excess);
         if worst > PREPARED && round <= PREPARATIONS {
             active.add(structure, points, &outside);
             continue;
         }
-        let last = path.follow(rough.place.clone(), pace(GAP), watch)?.unwrap_or(rough);
+        let last = path.follow(rough.place.clone(), path_options(GAP), watch)?.unwrap_or(rough);
         let outside = violations(structure, points, &last.interior.coefficients);
         worst = outside.first().map_or(0.0, |&(excess, _)| excess);
         if worst <= VIOLATION {
@@ -88,12 +88,12 @@ pub(super) fn generate(
     Err(FitError::NoConvergence { rounds: ROUNDS })
 }
 
-fn pace(gap: f64) -> Pace {
-    Pace { gap, growth: GROWTH, steps: STEPS }
+fn path_options(gap: f64) -> PathOptions {
+    PathOptions { gap, growth: GROWTH, steps: STEPS }
 }
 
 /// The optimum if the dual point proves it one.
-fn verified(problem: &Problem, centre: Centre) -> Result<Optimum, FitError> {
+fn verified(problem: &Problem, centre: Iterate) -> Result<Optimum, FitError> {
     let gram = match problem.matrix {
         Matrix::Polynomial => centre.gram.as_ref(),
         Matrix::Hessian => Some(&centre.interior.hessian),

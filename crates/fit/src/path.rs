@@ -53,14 +53,14 @@ pub(super) struct Interior {
 
 /// A dual point and the weight of the objective there.
 #[derive(Clone, Debug)]
-pub(super) struct Place {
+pub(super) struct DualPoint {
     pub(super) dual: Dual,
     pub(super) tau: f64,
 }
 
 /// How to follow a path.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Pace {
+pub(super) struct PathOptions {
     /// Distance to the optimum at which to stop, in units of the goal.
     pub(super) gap: f64,
     /// Growth of τ from one centre to the next.
@@ -71,9 +71,9 @@ pub(super) struct Pace {
 
 /// A point near the path.
 #[derive(Clone, Debug)]
-pub(super) struct Centre {
+pub(super) struct Iterate {
     /// Where it is.
-    pub(super) place: Place,
+    pub(super) place: DualPoint,
     /// The polynomial that goes with it.
     pub(super) interior: Interior,
     /// The Gram matrix P of that polynomial; none if the goal is a model, where p needs none.
@@ -174,7 +174,7 @@ impl<'a> Path<'a> {
     /// Equal weights that add up to the rows of P, and y isotropic and independent of z: S is
     /// positive definite, and small enough to leave M so. Where relaxed convexity has no points
     /// inside to go by, as of a sphere, z closer to the centre helps.
-    pub(super) fn start(&self) -> Option<Place> {
+    pub(super) fn start(&self) -> Option<DualPoint> {
         let points = self.values.ncols();
         let rows = self.structure.gram.size as f64;
         let weights = DVector::repeat(points, rows / points as f64);
@@ -189,22 +189,22 @@ impl<'a> Path<'a> {
                 Some(self.point(weights.clone(), &isotropic * 0.5_f64.powi(halvings + 1)))
             })
         })?;
-        let Place { dual, tau } = match self.goal {
+        let DualPoint { dual, tau } = match self.goal {
             Goal::Gram(_, spectral) if !spectral.is_self_concordant() => {
                 // The functional is a poor guess for traces, so the barriers rule at first; then
                 // this scale is best.
                 let size = self.size(&dual);
                 let scale = size * (1.0 + self.barrier_parameter() / (TRACE_SHARE * rows));
                 let dual = self.point(dual.weights * scale.powi(2), dual.form * scale.powi(2));
-                Place { dual, tau: 1.0 / (size * scale) }
+                DualPoint { dual, tau: 1.0 / (size * scale) }
             }
-            _ => Place { dual, tau: 1.0 },
+            _ => DualPoint { dual, tau: 1.0 },
         };
         // At a centre the rows of S are what relaxed convexity costs: a start that costs more is
         // far from any.
         let least = self.structure.hessian.size as f64 / (tau * self.cost.dot(&dual.form));
         let share = if least > 0.0 { least.min(1.0) } else { 1.0 };
-        Some(Place { dual: self.point(dual.weights, dual.form * share), tau })
+        Some(DualPoint { dual: self.point(dual.weights, dual.form * share), tau })
     }
 
     /// The last centre before the steps ran out or rounding stood in the way; its τ says how far
@@ -212,11 +212,16 @@ impl<'a> Path<'a> {
     ///
     /// # Errors
     /// [`FitError::Cancelled`].
-    pub(super) fn follow(&self, from: Place, pace: Pace, watch: &mut Watch) -> Result<Option<Centre>, FitError> {
-        let Place { mut dual, mut tau } = from;
-        let (mut size, mut growth) = (self.size(&dual), pace.growth);
-        let mut last: Option<Centre> = None;
-        for _ in 0..pace.steps {
+    pub(super) fn follow(
+        &self,
+        from: DualPoint,
+        options: PathOptions,
+        watch: &mut Watch,
+    ) -> Result<Option<Iterate>, FitError> {
+        let DualPoint { mut dual, mut tau } = from;
+        let (mut size, mut growth) = (self.size(&dual), options.growth);
+        let mut last: Option<Iterate> = None;
+        for _ in 0..options.steps {
             watch.iteration(self.barrier_parameter() / (tau * size))?;
             let newton = self.step(&dual, tau);
             let centred = newton.as_ref().is_some_and(|newton| newton.decrement < CENTRED);
@@ -226,7 +231,7 @@ impl<'a> Path<'a> {
                     size = self.size(&dual);
                     dual.clone_from(&centre.place.dual);
                     last = Some(centre);
-                    let end = self.barrier_parameter() / (pace.gap * size);
+                    let end = self.barrier_parameter() / (options.gap * size);
                     if tau >= end {
                         break;
                     }
@@ -236,7 +241,7 @@ impl<'a> Path<'a> {
                 // Rounding: from the last centre a shorter way may still be open.
                 _ => {
                     growth = growth.sqrt();
-                    let Some(Centre { place, .. }) = last.as_ref().filter(|_| growth > LEAST_GROWTH) else { break };
+                    let Some(Iterate { place, .. }) = last.as_ref().filter(|_| growth > LEAST_GROWTH) else { break };
                     (dual, tau) = (place.dual.clone(), place.tau * growth);
                 }
             }
@@ -314,7 +319,7 @@ impl<'a> Path<'a> {
     /// With decrement below 1 the step in w keeps `dw < w`, so that `1 - p(xᵢ) = (1 - dwᵢ/wᵢ)/(τwᵢ) > 0`, and both Gram
     /// matrices, predicted from the gradients of their barriers, are definite and match p: these are the Newton equations
     /// read again.
-    fn centre(&self, at: &Dual, newton: &Newton, tau: f64) -> Option<Centre> {
+    fn centre(&self, at: &Dual, newton: &Newton, tau: f64) -> Option<Iterate> {
         let coefficients = &newton.coefficients / tau;
         let Structure { gram, hessian, .. } = self.structure;
         let margin = DMatrix::identity(hessian.size, hessian.size) * self.margin;
@@ -328,8 +333,8 @@ impl<'a> Path<'a> {
                 Some(gram.nearest(&(predicted / tau), &coefficients))
             }
         };
-        let place = Place { dual: newton.next.clone(), tau };
-        Some(Centre { place, interior: Interior { coefficients, hessian: form }, gram })
+        let place = DualPoint { dual: newton.next.clone(), tau };
+        Some(Iterate { place, interior: Interior { coefficients, hessian: form }, gram })
     }
 }
 

@@ -8,7 +8,7 @@
 
 use super::generate::inner;
 use super::model::Model;
-use super::path::{Goal, Interior, Pace, Path, Place};
+use super::path::{DualPoint, Goal, Interior, Path, PathOptions};
 use super::progress::Watch;
 use super::structure::Structure;
 use super::volume::{Expansion, expansion, polynomial, volume};
@@ -187,17 +187,17 @@ fn minimiser(p: &Polynomial, start: &Vector3<f64>) -> Option<Vector3<f64>> {
 fn minimise(
     path: &Path,
     volume: f64,
-    warm: Option<Place>,
+    warm: Option<DualPoint>,
     watch: &mut Watch,
-) -> Result<Option<(Interior, Place)>, FitError> {
+) -> Result<Option<(Interior, DualPoint)>, FitError> {
     let gap = GAP * volume;
     let end = path.barrier_parameter() / gap;
     // The last optimum is close to the next, but also to the boundary: from there the path is not
     // always found.
-    let warm = warm.map(|place| (Place { tau: WARM * end, ..place }, WARM_STEPS));
-    let cold = path.start().map(|place| (Place { tau: COLD * end, ..place }, COLD_STEPS));
+    let warm = warm.map(|place| (DualPoint { tau: WARM * end, ..place }, WARM_STEPS));
+    let cold = path.start().map(|place| (DualPoint { tau: COLD * end, ..place }, COLD_STEPS));
     for (start, steps) in warm.into_iter().chain(cold) {
-        let centre = path.follow(start, Pace { gap, growth: GROWTH, steps }, watch)?;
+        let centre = path.follow(start, PathOptions { gap, growth: GROWTH, steps }, watch)?;
         if let Some(centre) = centre.filter(|centre| centre.place.tau >= end) {
             return Ok(Some((centre.interior, centre.place)));
         }

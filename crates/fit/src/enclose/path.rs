@@ -58,7 +58,7 @@ pub(super) struct Path<'a> {
 
 /// A strictly feasible polynomial.
 #[derive(Clone, Debug)]
-pub(super) struct Centre {
+pub(super) struct Iterate {
     /// Its coefficients.
     pub(super) coefficients: DVector<f64>,
     /// Its Gram matrix P.
@@ -94,11 +94,11 @@ impl Path<'_> {
     ///
     /// # Errors
     /// [`FitError::Cancelled`].
-    pub(super) fn follow(&self, gap: f64, watch: &mut Watch) -> Result<Option<Centre>, FitError> {
+    pub(super) fn follow(&self, gap: f64, watch: &mut Watch) -> Result<Option<Iterate>, FitError> {
         let end = self.barrier_parameter() / gap;
         let (mut tau, mut growth) = (1.0, GROWTH);
         let mut variables: Vec<_> = self.blocks.iter().map(|block| block.start.clone()).collect();
-        let mut last: Option<Centre> = None;
+        let mut last: Option<Iterate> = None;
         for _ in 0..STEPS {
             watch.iteration(self.barrier_parameter() / tau)?;
             let newton = self.step(&variables, tau);
@@ -127,7 +127,7 @@ impl Path<'_> {
     }
 
     /// `-log det P` of a centre, and how far below it the optimum may lie.
-    pub(super) fn objective(&self, centre: &Centre) -> Option<(f64, f64)> {
+    pub(super) fn objective(&self, centre: &Iterate) -> Option<(f64, f64)> {
         let value = -log_det(&centre.gram)?;
         let moments = self.structure.gram.spread(&self.moments(&centre.variables));
         let cost: f64 = self.blocks.iter().zip(&centre.variables).map(|(block, y)| block.cost.dot(y)).sum();
@@ -198,7 +198,7 @@ impl Path<'_> {
 
     /// The polynomial that a Newton step from `at` predicts with its Gram matrices; none if
     /// rounding costs it what mathematics promises for decrements below 1: that all are definite.
-    fn centre(&self, at: &[DVector<f64>], newton: &Newton, tau: f64) -> Option<Centre> {
+    fn centre(&self, at: &[DVector<f64>], newton: &Newton, tau: f64) -> Option<Iterate> {
         let coefficients = &newton.coefficients / tau;
         let mut grams = Vec::with_capacity(self.blocks.len());
         for ((block, at), whole) in self.blocks.iter().zip(at).zip(&newton.whole) {
@@ -215,7 +215,7 @@ impl Path<'_> {
         let inverse = Cholesky::new(pattern.spread(&self.moments(at)))?.inverse();
         let predicted = &inverse * 2.0 - &inverse * pattern.spread(&self.moments(&newton.whole)) * &inverse;
         let gram = pattern.nearest(&((&predicted + predicted.transpose()) * 0.5), &coefficients);
-        Some(Centre { coefficients, gram, grams, variables: newton.next.clone(), tau })
+        Some(Iterate { coefficients, gram, grams, variables: newton.next.clone(), tau })
     }
 }
 
