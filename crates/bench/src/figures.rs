@@ -106,10 +106,10 @@ struct WarmArgs {
     common: Common,
 }
 
-/// What each rung of the ladder buys: model error, gap, iterations, time, and how many questions it settles
+/// What each rung of the ladder buys: model error, gap, iterations, time, and how many questions it settles; and convex parts
 ///
 /// The rungs are ball, ellipsoid and degree 4, 6, 8; the question is "nearer than m?" of random pairs, m from touching to ten object sizes. Writes
-/// detail.md, detail.csv and the pictures detail*.svg.
+/// detail.md, detail.csv, detail-parts.csv and the pictures detail*.svg. Convex parts are compared with parry's V-HACD.
 #[derive(Debug, Args)]
 struct DetailArgs {
     #[command(flatten)]
@@ -271,6 +271,7 @@ fn run_warm(args: &Common) -> Drawn {
 fn run_detail(args: &Common) -> Drawn {
     with_shelf(args, |shelf, bar| {
         let found = detail(&args.data, shelf, args.quick, &mut |at| tell(bar, at))?;
+        write_atomically(&args.out.join("detail-parts.csv"), &found.parts_csv())?;
         write_report(&args.out, "detail", |names| found.markdown(names), &found.csv(), &found.pictures()?)
     })
 }

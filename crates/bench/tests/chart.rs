@@ -161,7 +161,19 @@ fn the_quick_chart_of_warm_starts_counts_iterations() {
 #[test]
 #[ignore = "needs SUBLEVEL_DATA"]
 fn the_quick_chart_of_detail_settles_more_on_every_rung() {
-    let (_, csv) = made("detail");
+    let (report, csv) = made("detail");
+    // Convex parts: ours are never larger than those of the search that competes in it, and leave nothing out.
+    for object in ["shelf", "tube", "mug"] {
+        let row = |by: &str| -> Vec<String> {
+            let head = format!("| {object} | 4 | {by} |");
+            let line = report.lines().find(|line| line.starts_with(&head)).unwrap_or_else(|| panic!("{head}"));
+            line.split('|').map(|cell| cell.trim().to_owned()).collect()
+        };
+        let of_hull = |by: &str| row(by)[6].parse::<f64>().expect("a number");
+        assert!(of_hull("ours") <= of_hull("by gain alone") + 1e-3, "{object}");
+        assert!(of_hull("V-HACD") > 0.0 && row("ours")[8] == "0.0e0", "{object}: {:?}", row("ours"));
+    }
+    assert!(report.contains("detail-parts.svg"));
     for pair in ["chair-human", "mug-table"] {
         let rungs = ["ball", "ellipsoid", "degree 4", "degree 6"];
         let of = |rung: &str, head: &str| column(&csv, &format!("{pair},{rung},"), head);

@@ -1,11 +1,15 @@
-//! Detail: what each rung of the ladder buys in accuracy, what it costs, and how many questions it settles.
+//! Detail: what each rung of the ladder buys in accuracy, what it costs, and how many questions it
+//! settles; and how closely convex parts follow an object.
 
+mod parts;
+mod parts_report;
 mod questions;
 mod report;
 mod rungs;
 
 use super::Machine;
 use super::duel::{DuelError, Shelf, pairs};
+use parts::{Divided, parts};
 use rungs::{Ladder, ladder};
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -20,12 +24,14 @@ struct Effort {
     questions: usize,
 }
 
-/// The ladders of all pairs, measured.
+/// The ladders of all pairs and the parts of objects, measured.
 pub struct Detail {
     machine: Machine,
     quick: bool,
     questions: usize,
     ladders: Vec<Ladder>,
+    /// Convex decompositions.
+    divided: Vec<Divided>,
 }
 
 /// Measures the rungs of pairs of the meshes in `data`, of two pairs up to degree 6 if `quick`. Fits are kept on the `shelf`.
@@ -44,8 +50,9 @@ pub fn detail(
     } else {
         Effort { quick, trajectories: 4, poses: 400, passes: 5, questions: 2000 }
     };
-    let mut told = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };
+    let mut announce = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };
     let pairs = pairs(data, quick)?;
-    let ladders = pairs.iter().map(|[a, b]| ladder([a, b], &effort, shelf, &mut told)).collect::<Result<_, _>>()?;
-    Ok(Detail { machine: Machine::this(), quick, questions: effort.questions, ladders })
+    let ladders = pairs.iter().map(|[a, b]| ladder([a, b], &effort, shelf, &mut announce)).collect::<Result<_, _>>()?;
+    let divided = parts(data, quick, &mut announce)?;
+    Ok(Detail { machine: Machine::this(), quick, questions: effort.questions, ladders, divided })
 }

@@ -1,8 +1,8 @@
 //! The report and its pictures.
 
-use super::Detail;
 use super::questions::THRESHOLDS;
 use super::rungs::{Ladder, Rung};
+use super::{Detail, parts_report};
 use std::fmt::Write;
 use sublevel::draw::{ChartError, Group, Ink, Marker, Point, Scatter};
 
@@ -24,7 +24,13 @@ impl Detail {
         for ladder in &self.ladders {
             all.push((format!("detail-{}.svg", ladder.pair), ladder.open_questions()?));
         }
+        all.push(("detail-parts.svg".to_owned(), parts_report::picture(&self.divided)?));
         Ok(all)
+    }
+
+    /// One line per object, number of parts and way to divide it.
+    pub fn parts_csv(&self) -> String {
+        parts_report::csv(&self.divided)
     }
 
     /// Error and gap of every rung against its time, warm: geometric means over the pairs.
@@ -80,6 +86,8 @@ impl Detail {
                 let _ = writeln!(text, "![{name}]({name})\n");
             }
         }
+        let picture = pictures.iter().copied().find(|name| *name == "detail-parts.svg");
+        text += &parts_report::markdown(&self.divided, picture);
         text
     }
 

@@ -44,7 +44,7 @@ pub(super) fn ladder(
     [a, b]: [&Subject; 2],
     effort: &Effort,
     shelf: &Shelf,
-    told: &mut dyn FnMut(&str) -> Result<(), DuelError>,
+    announce: &mut dyn FnMut(&str) -> Result<(), DuelError>,
 ) -> Result<Ladder, DuelError> {
     let pair = format!("{}-{}", a.name, b.name);
     let diameter_m = a.diameter_m.max(b.diameter_m);
@@ -52,17 +52,17 @@ pub(super) fn ladder(
     let names = if effort.quick { &names[..4] } else { &names[..] };
     let mut bodies = Vec::new();
     for (rung, &name) in names.iter().enumerate() {
-        told(&format!("{pair}: {name}"))?;
+        announce(&format!("{pair}: {name}"))?;
         bodies.push((name, body(a, rung, shelf)?, body(b, rung, shelf)?));
     }
     let hulls = Hulls::new(&a.hull, &b.hull)?;
-    told(&format!("{pair}: poses"))?;
+    announce(&format!("{pair}: poses"))?;
     let all: Vec<(&Body, &Body)> = bodies.iter().map(|(_, a, b)| (a, b)).collect();
     let poses = motion::separated(&all, 0.5 * diameter_m, effort.trajectories, effort.poses)?;
     let truth: Vec<f64> = poses.iter().flatten().map(|pose| hulls.distance(&parry_pose(pose))).collect();
     let mut rows: Vec<[Row<'_>; 3]> = all.iter().map(|(a, b)| timed(a, b, &poses)).collect();
     for pass in 0..effort.passes {
-        told(&format!("{pair}: pass {} of {}", pass + 1, effort.passes))?;
+        announce(&format!("{pair}: pass {} of {}", pass + 1, effort.passes))?;
         rows.iter_mut().flatten().for_each(Row::turn);
     }
     let mut rungs = Vec::new();
@@ -91,7 +91,7 @@ pub(super) fn ladder(
         });
     }
     for (index, part) in THRESHOLDS.into_iter().enumerate() {
-        told(&format!("{pair}: nearer than {part} diameters?"))?;
+        announce(&format!("{pair}: nearer than {part} diameters?"))?;
         let threshold_m = part * diameter_m;
         let asked = ask([a, b], &hulls, threshold_m, effort.questions, index as u64 + 1)?;
         for (rung, pair) in rungs.iter_mut().zip(&all) {
