@@ -19,13 +19,14 @@ use std::process::ExitCode;
 use sublevel::cli::{self, write_atomically};
 use sublevel::fit::{FitOptions, ReadOptions, fit, read_mesh};
 
-/// Measure on this machine, and draw: reports as Markdown with SVG pictures, and their raw numbers as CSV
+/// Measure on this machine, and draw: reports as Markdown with SVG pictures, and their raw numbers
+/// as CSV
 ///
 /// Examples:
 ///
-///   sublevel-bench all --data DIR --quick
+/// sublevel-bench all --data DIR --quick
 ///
-///   sublevel-bench table1 --meshes psb --out docs
+/// sublevel-bench table1 --meshes psb --out docs
 #[derive(Debug, Parser)]
 #[command(name = "sublevel-bench", version, max_term_width = 100)]
 struct Arguments {
@@ -57,21 +58,24 @@ struct FitArgs {
     out: PathBuf,
 }
 
-/// All figures, one after the other, and charts.md, which shows the main ones and leads to the others
+/// All figures, one after the other, and charts.md, which shows the main ones and leads to the
+/// others
 ///
-/// Keep the machine quiet: times are measured. Takes about three quarters of an hour on one core, and under five minutes with --quick, once the
-/// fits are kept. Clarabel and coal take part as the figures' own help says.
+/// Keep the machine quiet: times are measured. Takes about three quarters of an hour on one core,
+/// and under five minutes with --quick, once the fits are kept. Clarabel and coal take part as the
+/// figures' own help says.
 #[derive(Debug, Args)]
 struct AllArgs {
     #[command(flatten)]
     common: Common,
 }
 
-/// Volumes and construction times of all bounding sets around five meshes, beside the paper's Table I
+/// Volumes and construction times of all bounding sets around five meshes, beside the paper's Table
+/// I
 ///
-/// Builds balls, boxes and bodies of every objective and degree around the meshes 10 (human), 101 (chair), 121 (octopus), 181
-/// (hand) and 361 (vase) of the Princeton Mesh Segmentation Benchmark. Writes table1.md, table1.csv and the pictures
-/// table1*.svg. Takes about five minutes on one core.
+/// Builds balls, boxes and bodies of every objective and degree around the meshes 10 (human), 101
+/// (chair), 121 (octopus), 181 (hand) and 361 (vase) of the Princeton Mesh Segmentation Benchmark.
+/// Writes table1.md, table1.csv and the pictures table1*.svg. Takes about five minutes on one core.
 #[derive(Debug, Args)]
 struct Table1Args {
     /// Folder with 10.off, 101.off, 121.off, 181.off and 361.off
@@ -85,31 +89,37 @@ struct Table1Args {
     quick: bool,
 }
 
-/// Time of a distance query against model error: our representations beside hulls, simplified hulls and meshes of parry and coal
+/// Time of a distance query against model error: our representations beside hulls, simplified hulls
+/// and meshes of parry and coal
 ///
-/// Pairs of the five meshes of the Princeton benchmark and of household objects. Writes speed.md, speed.csv and the pictures speed*.svg. Fits
-/// are made once and kept, which takes a few minutes on one core; measuring takes about a quarter of an hour. Coal takes part when SUBLEVEL_COAL
-/// names the program that times it.
+/// Pairs of the five meshes of the Princeton benchmark and of household objects. Writes speed.md,
+/// speed.csv and the pictures speed*.svg. Fits are made once and kept, which takes a few minutes on
+/// one core; measuring takes about a quarter of an hour. Coal takes part when SUBLEVEL_COAL names
+/// the program that times it.
 #[derive(Debug, Args)]
 struct SpeedArgs {
     #[command(flatten)]
     common: Common,
 }
 
-/// Time and iterations of queries with a hint against how far the pose before is away; and the paper's experiment
+/// Time and iterations of queries with a hint against how far the pose before is away; and the
+/// paper's experiment
 ///
-/// Steps from a 10 000th of half the larger diameter to poses that have nothing to do with each other; then the chair swept past the human, level
-/// distances and their times beside the paper's. Writes warm.md, warm.csv and the pictures warm*.svg.
+/// Steps from a 10 000th of half the larger diameter to poses that have nothing to do with each
+/// other; then the chair swept past the human, level distances and their times beside the paper's.
+/// Writes warm.md, warm.csv and the pictures warm*.svg.
 #[derive(Debug, Args)]
 struct WarmArgs {
     #[command(flatten)]
     common: Common,
 }
 
-/// What each rung of the ladder buys: model error, gap, iterations, time, and how many questions it settles; and convex parts
+/// What each rung of the ladder buys: model error, gap, iterations, time, and how many questions it
+/// settles; and convex parts
 ///
-/// The rungs are ball, ellipsoid and degree 4, 6, 8; the question is "nearer than m?" of random pairs, m from touching to ten object sizes. Writes
-/// detail.md, detail.csv, detail-parts.csv and the pictures detail*.svg. Convex parts are compared with parry's V-HACD.
+/// The rungs are ball, ellipsoid and degree 4, 6, 8; the question is "nearer than m?" of random
+/// pairs, m from touching to ten object sizes. Writes detail.md, detail.csv, detail-parts.csv and
+/// the pictures detail*.svg. Convex parts are compared with parry's V-HACD.
 #[derive(Debug, Args)]
 struct DetailArgs {
     #[command(flatten)]
@@ -118,17 +128,18 @@ struct DetailArgs {
 
 /// Families of queries that broke collision libraries, put to our solver and to others: who passes
 ///
-/// Touching, deep, far, tiny, needle-like, nearly parallel, badly hinted and so on: each case is drawn from its seed alone, put in a child process
-/// with a time limit, and judged by points and planes. Writes stability.md and stability.csv. Takes a few minutes. Coal takes part when
+/// Touching, deep, far, tiny, needle-like, nearly parallel, badly hinted and so on: each case is
+/// drawn from its seed alone, put in a child process with a time limit, and judged by points and
+/// planes. Writes stability.md and stability.csv. Takes a few minutes. Coal takes part when
 /// SUBLEVEL_COAL names the program that times it.
 ///
 /// Examples:
 ///
-///   sublevel-bench stability --out docs
+/// sublevel-bench stability --out docs
 ///
-///   sublevel-bench stability --replay 13/cold/5
+/// sublevel-bench stability --replay 13/cold/5
 ///
-///   sublevel-bench stability --quick --methods cold,warm,batch --guard docs/stability.csv
+/// sublevel-bench stability --quick --methods cold,warm,batch --guard docs/stability.csv
 #[derive(Debug, Args)]
 struct StabilityArgs {
     /// Folder for the report; made with its parents when it is not there
@@ -140,10 +151,12 @@ struct StabilityArgs {
     /// Only these columns: cold, warm, batch, newton, slsqp, clarabel, parry, coal
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     methods: Vec<Method>,
-    /// Fail, with the row named, where ours fails more often than in this stability.csv of an earlier run
+    /// Fail, with the row named, where ours fails more often than in this stability.csv of an
+    /// earlier run
     #[arg(long, value_name = "FILE")]
     guard: Option<PathBuf>,
-    /// Put one case here and now, and print what came of it: the number of its family, the method and the seed, FROM-TO for several
+    /// Put one case here and now, and print what came of it: the number of its family, the method
+    /// and the seed, FROM-TO for several
     #[arg(long, value_name = "FAMILY/METHOD/SEED", conflicts_with_all = ["out", "quick", "guard", "methods"])]
     replay: Option<Share>,
     /// With --replay, print one JSON object per case
@@ -151,21 +164,26 @@ struct StabilityArgs {
     json: bool,
 }
 
-/// How near our solver and the obvious alternatives come to the distance, in how much time, and where they stop coming nearer
+/// How near our solver and the obvious alternatives come to the distance, in how much time, and
+/// where they stop coming nearer
 ///
-/// Ours cold and warm at tolerances from 1e-3 to 1e-12; plain Newton, SLSQP, level 0 of the hierarchy by clarabel, and GJK on hulls of boundary points. Clarabel
-/// takes part when `cargo build --release -p sublevel-bench --example clarabel` has made its program, or SUBLEVEL_CLARABEL names it; coal when SUBLEVEL_COAL names the program
-/// that times it. Writes accuracy.md, accuracy.csv and the pictures accuracy*.svg.
+/// Ours cold and warm at tolerances from 1e-3 to 1e-12; plain Newton, SLSQP, level 0 of the
+/// hierarchy by clarabel, and GJK on hulls of boundary points. Clarabel takes part when `cargo
+/// build --release -p sublevel-bench --example clarabel` has made its program, or SUBLEVEL_CLARABEL
+/// names it; coal when SUBLEVEL_COAL names the program that times it. Writes accuracy.md,
+/// accuracy.csv and the pictures accuracy*.svg.
 #[derive(Debug, Args)]
 struct AccuracyArgs {
     #[command(flatten)]
     common: Common,
 }
 
-/// How time and memory grow: queries with degree, constraints, parts and poses of a batch, messages with their pairs, fits with degree and points
+/// How time and memory grow: queries with degree, constraints, parts and poses of a batch, messages
+/// with their pairs, fits with degree and points
 ///
-/// Chair and human of the Princeton benchmark; a server on loopback in this process; fits of up to a million random points. Exponents stand beside the curves.
-/// Writes cost.md, cost.csv and the pictures cost*.svg.
+/// Chair and human of the Princeton benchmark; a server on loopback in this process; fits of up to
+/// a million random points. Exponents stand beside the curves. Writes cost.md, cost.csv and the
+/// pictures cost*.svg.
 #[derive(Debug, Args)]
 struct CostArgs {
     #[command(flatten)]
@@ -334,7 +352,7 @@ fn measure_stability(out: &Path, methods: &[Method], quick: bool) -> Result<Stab
 
 fn make_folder(out: &Path) -> Result<(), Box<dyn Error>> {
     let made = std::fs::create_dir_all(out);
-    Ok(made.map_err(|error| format!("can not make {}: {error}; choose another --out", out.display()))?)
+    Ok(made.map_err(|error| format!("cannot make {}: {error}; choose another --out", out.display()))?)
 }
 
 fn bar() -> Result<ProgressBar, Box<dyn Error>> {
@@ -349,7 +367,8 @@ fn tell(bar: &ProgressBar, at: &str) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// Writes NAME.md, NAME.csv and the pictures, and prints where the report is; tells the pictures' names.
+/// Writes NAME.md, NAME.csv and the pictures, and prints where the report is; returns the pictures'
+/// names.
 fn write_report(
     out: &Path,
     name: &str,

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::process::{Command, Output};
 use sublevel_testkit::data;
 
-/// Rows with volumes known independently for human, chair, hand, vase and octopus, and how far above them an answer may be: exact
-/// geometry either way, fits only above.
+/// Rows with volumes known independently for human, chair, hand, vase and octopus, and how far
+/// above them an answer may be: exact geometry either way, fits only above.
 const KNOWN: [(&str, [f64; 5], f64); 6] = [
     ("convex hull", [0.2936, 0.6558, 0.3627, 0.9088, 0.4993], 5e-4),
     ("smallest ball", [3.730, 3.742, 3.848, 3.912, 4.096], 1e-3),
@@ -74,7 +74,8 @@ fn quick(figure: &str, data: &Path, out: &Path) -> Output {
         .expect("the program starts")
 }
 
-/// The files of a quick figure: report and table as text; every picture that the report shows is looked at.
+/// The files of a quick figure: report and table as text; every picture that the report shows is
+/// looked at.
 fn made(figure: &str) -> (String, String) {
     let out = tempfile::tempdir().expect("a folder can be made");
     let output = quick(figure, &data(""), out.path());
@@ -91,7 +92,8 @@ fn made(figure: &str) -> (String, String) {
     (report, read(&format!("{figure}.csv")))
 }
 
-/// Lines of a table whose first cells are these, as the numbers of a column; NaN where there is none.
+/// Lines of a table whose first cells are these, as the numbers of a column; NaN where there is
+/// none.
 fn column(csv: &str, first: &str, name: &str) -> Vec<f64> {
     let heads: Vec<&str> = csv.lines().next().expect("a head").split(',').collect();
     let from_the_end = heads.len() - heads.iter().position(|head| *head == name).expect("a column of that name");
@@ -162,7 +164,8 @@ fn the_quick_chart_of_warm_starts_counts_iterations() {
 #[ignore = "needs SUBLEVEL_DATA"]
 fn the_quick_chart_of_detail_settles_more_on_every_rung() {
     let (report, csv) = made("detail");
-    // Convex parts: ours are never larger than those of the search that competes in it, and leave nothing out.
+    // Convex parts: ours are never larger than those of the search that competes in it, and leave
+    // nothing out.
     for object in ["shelf", "tube", "mug"] {
         let row = |by: &str| -> Vec<String> {
             let head = format!("| {object} | 4 | {by} |");
@@ -239,7 +242,7 @@ fn the_quick_chart_of_cost_tells_exponents() {
         assert!(costs.len() >= points && costs.iter().all(|cost| *cost > 0.0), "{curve}: {costs:?}");
         assert!(of(curve, "exponent").iter().all(|exponent| exponent.is_finite()), "{curve}");
     }
-    // Memory is told by Linux; files and places are told everywhere.
+    // Memory is decided by Linux; files and places are reported everywhere.
     assert_eq!(of("batch,\"poses and answers\",bytes", "exponent")[0], 1.0);
     let files = of("degree,\"as a file\",bytes", "cost");
     assert!(files.windows(2).all(|pair| pair[0] < pair[1]), "{files:?}");
@@ -305,13 +308,13 @@ fn charts_refuse_what_they_can_not_use_with_a_remedy() {
     std::fs::write(&file, "").expect("a file can be written");
     let folder = out.path();
     for figure in ["speed", "warm", "detail", "accuracy", "cost"] {
-        let told = |output: Output, code: i32, words: &[&str]| {
+        let fails = |output: Output, code: i32, words: &[&str]| {
             let error = String::from_utf8_lossy(&output.stderr).into_owned();
             assert_eq!(output.status.code(), Some(code), "{figure}: {error}");
             assert!(words.iter().all(|word| error.contains(word)), "{figure}: {error}");
         };
-        told(quick(figure, folder, folder), 1, &["psb/101.off", "--data"]);
-        told(quick(figure, folder, &file), 1, &["--out"]);
+        fails(quick(figure, folder, folder), 1, &["psb/101.off", "--data"]);
+        fails(quick(figure, folder, &file), 1, &["--out"]);
         let chart = |arguments: &[&str], coal: Option<&Path>| {
             let mut command = Command::new(env!("CARGO_BIN_EXE_sublevel-bench"));
             command.args([figure]).args(arguments).current_dir(folder).env_remove("SUBLEVEL_COAL");
@@ -320,10 +323,10 @@ fn charts_refuse_what_they_can_not_use_with_a_remedy() {
             });
             command.output().expect("the program starts")
         };
-        told(chart(&[], None), 2, &["--data"]);
-        told(chart(&["--data", ".", "--fits", "file"], None), 1, &["file", "another folder"]);
+        fails(chart(&[], None), 2, &["--data"]);
+        fails(chart(&["--data", ".", "--fits", "file"], None), 1, &["file", "another folder"]);
         if !["detail", "cost"].contains(&figure) {
-            told(chart(&["--data", "."], Some(Path::new("absent"))), 1, &["SUBLEVEL_COAL", "absent"]);
+            fails(chart(&["--data", "."], Some(Path::new("absent"))), 1, &["SUBLEVEL_COAL", "absent"]);
         }
     }
 }

@@ -34,8 +34,8 @@ pub struct Detail {
     divided: Vec<Divided>,
 }
 
-/// Measures the rungs of pairs of the meshes in `data`, of two pairs up to degree 6 if `quick`. Fits are kept on the `shelf`.
-/// `progress` hears what is going on and can stop it.
+/// Measures the rungs of pairs of the meshes in `data`, of two pairs up to degree 6 if `quick`.
+/// Fits are kept on the `shelf`. `progress` hears what is going on and can stop it.
 ///
 /// # Errors
 /// [`DuelError`].

@@ -258,7 +258,8 @@ fn is_closed(mesh: &Mesh) -> bool {
     sublevel::body::Piece::of_mesh(&mesh.points, &mesh.triangles).is_ok_and(|piece| piece.is_cycle())
 }
 
-/// Winding number of a closed mesh about a point, by solid angles (van Oosterom and Strackee, 1983).
+/// Winding number of a closed mesh about a point, by solid angles (van Oosterom and Strackee,
+/// 1983).
 fn winding(mesh: &Mesh, x: &Vector3<f64>) -> f64 {
     let angle = |triangle: &[usize; 3]| {
         let [a, b, c] = triangle.map(|corner| mesh.points[corner] - x);
@@ -305,7 +306,7 @@ mod tests {
         assert!(winding(&tube(), &Vector3::new(0.0, 0.0, 0.1)).abs() < 1e-9);
         let object = Object::new("tube", tube()).unwrap();
         // Its hull leaves the middle of the ends 3 cm from the tube.
-        let whole = object.measure(Divider::Ours, 1, &[object.mesh.points.clone()], 0.0).unwrap();
+        let whole = object.measure(Divider::Ours, 1, std::slice::from_ref(&object.mesh.points), 0.0).unwrap();
         assert!((whole.of_hull - 1.0).abs() < 1e-9 && (whole.of_object.unwrap() - 0.2 * area(0.05) / own).abs() < 1e-9);
         assert!((0.027..=0.03).contains(&whole.concavity_m) && whole.left_out_m == 0.0, "{whole:?}");
         // Half of the points leave the other half out.

@@ -1,4 +1,5 @@
-//! Random pairs of poses at distances about a threshold, and whether a rung can tell on which side of it the objects are.
+//! Random pairs of poses at distances about a threshold, and whether a rung can tell on which side
+//! of it the objects are.
 
 use crate::duel::{Hulls, Random, Subject, parry_pose};
 use nalgebra::Vector3;
@@ -11,8 +12,9 @@ pub(super) const THRESHOLDS: [f64; 10] = [0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 2.0, 3
 /// Halvings on the way to a distance: below a thousandth of a millionth of the way.
 const HALVINGS: usize = 40;
 
-/// Poses of `b` in the frame of `a` at which the hulls are apart by lengths that are uniform between 0 and twice `threshold_m`, or, of a threshold of 0,
-/// between 0 and one diameter; directions and rotations are random. With each the distance, metres.
+/// Poses of `b` in the frame of `a` at which the hulls are apart by lengths that are uniform
+/// between 0 and twice `threshold_m`, or, of a threshold of 0, between 0 and one diameter;
+/// directions and rotations are random. With each the distance, metres.
 pub(super) fn ask(
     [a, b]: [&Subject; 2],
     hulls: &Hulls,
@@ -33,7 +35,8 @@ pub(super) fn ask(
             let place = from + direction * way - rotation * own;
             Pose::from_quaternion(place, rotation.coords.into())
         };
-        // The distance is convex along the way and 0 where the middles meet: one way out it only grows.
+        // The distance is convex along the way and 0 where the middles meet: one way out it only
+        // grows.
         let (mut near, mut far) = (0.0, wanted + 2.0 * size);
         for _ in 0..HALVINGS {
             let way = 0.5 * (near + far);
@@ -55,7 +58,8 @@ pub(super) struct Settled {
     pub(super) wrong: usize,
 }
 
-/// Asks a rung: the hulls are at least as far apart as the bodies, and nearer than these plus both gaps.
+/// Asks a rung: the hulls are at least as far apart as the bodies, and nearer than these plus both
+/// gaps.
 pub(super) fn settle((a, b): (&Body, &Body), asked: &[(Pose, f64)], threshold_m: f64) -> Settled {
     let mut found = Settled::default();
     let part = 1.0 / asked.len() as f64;

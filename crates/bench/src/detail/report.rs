@@ -75,7 +75,7 @@ impl Detail {
     /// The report; the pictures lie beside it under these names.
     pub fn markdown(&self, pictures: &[&str]) -> String {
         let mut text = String::from("# What each level of detail buys\n\n");
-        // Writing to a string can not fail.
+        // Writing to a string cannot fail.
         let flags = if self.quick { " --quick" } else { "" };
         let _ = writeln!(text, "{}\n", self.machine.head(&format!("sublevel-bench detail --data DIR{flags}")));
         let _ = writeln!(text, "![detail](detail.svg)\n\n{NOTES}- {} questions per threshold.\n", self.questions);

@@ -16,11 +16,13 @@ pub(super) struct Rung {
     pub(super) error: [f64; 2],
     /// Proven gaps of both bodies together, as a part of the larger diameter.
     pub(super) gap: f64,
-    /// Of queries without a hint and with one: mean iterations, and nanoseconds; and nanoseconds in a batch.
+    /// Of queries without a hint and with one: mean iterations, and nanoseconds; and nanoseconds in
+    /// a batch.
     pub(super) iterations: [f64; 2],
     pub(super) nanoseconds: [f64; 2],
     pub(super) batch: f64,
-    /// Queries that did not converge, and brackets that do not hold the distance of the hulls once widened by the gaps.
+    /// Queries that did not converge, and brackets that do not hold the distance of the hulls once
+    /// widened by the gaps.
     pub(super) failed: usize,
     pub(super) wrong: usize,
     /// For each of [`THRESHOLDS`].
