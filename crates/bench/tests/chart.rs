@@ -174,7 +174,8 @@ fn the_quick_chart_of_detail_settles_more_on_every_rung() {
         };
         let of_hull = |by: &str| row(by)[6].parse::<f64>().expect("a number");
         assert!(of_hull("ours") <= of_hull("by gain alone") + 1e-3, "{object}");
-        assert!(of_hull("V-HACD") > 0.0 && row("ours")[8] == "0.0e0", "{object}: {:?}", row("ours"));
+        assert_eq!(row("ours")[8], "0.0e0", "{object}");
+        assert!(row("V-HACD")[4] == "no answer" || of_hull("V-HACD") > 0.0, "{object}");
     }
     assert!(report.contains("detail-parts.svg"));
     for pair in ["chair-human", "mug-table"] {

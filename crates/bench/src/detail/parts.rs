@@ -32,9 +32,9 @@ const PARTS: [usize; 3] = [4, 8, 16];
 /// Points sampled on the hulls of a decomposition.
 const SAMPLES: usize = 4000;
 
-/// Voxels along the longest side that V-HACD works on, and its concavity limit, low enough that the
-/// number of parts ends its search.
-const RESOLUTION: u32 = 128;
+/// Voxels along the longest side that V-HACD works on: the next where its hull code panics. And its
+/// concavity limit, low enough that the number of parts ends its search.
+const RESOLUTIONS: [u32; 3] = [128, 96, 64];
 const CONCAVITY: f64 = 1e-4;
 
 /// Who divides an object.
@@ -63,7 +63,7 @@ pub(super) struct Divided {
     pub(super) object: &'static str,
     pub(super) divider: Divider,
     pub(super) asked: usize,
-    /// Parts with volume.
+    /// Parts with volume; none if the divider failed.
     pub(super) parts: usize,
     /// Total volume of the hulls, m³, and in volumes of the object's hull.
     pub(super) volume_m3: f64,
@@ -107,7 +107,7 @@ pub(super) fn parts(
             for divider in Divider::ALL {
                 announce(&format!("{name}: {asked} parts, {}", divider.name()))?;
                 let start = Instant::now();
-                let points = object.divide(divider, asked)?;
+                let points = object.divide(divider, asked)?.unwrap_or_default();
                 let seconds = start.elapsed().as_secs_f64();
                 all.push(object.measure(divider, asked, &points, seconds)?);
             }
@@ -133,31 +133,36 @@ impl Object {
         Ok(Self { name, mesh, surface, hull_m3: hull.volume, diameter_m, own_m3 })
     }
 
-    /// The points whose hulls are the parts.
-    fn divide(&self, divider: Divider, parts: usize) -> Result<Vec<Vec<Vector3<f64>>>, DuelError> {
+    /// The points whose hulls are the parts; none where V-HACD panics at every resolution.
+    fn divide(&self, divider: Divider, parts: usize) -> Result<Option<Vec<Vec<Vector3<f64>>>>, DuelError> {
         let ours = |search| {
             convex_parts(&self.mesh, parts, search, &mut |_| ControlFlow::Continue(()))
+                .map(Some)
                 .map_err(|error: FitError| self.failed(divider, error))
         };
         match divider {
             Divider::Ours => ours(PartSearch::Best),
             Divider::Greedy => ours(PartSearch::Greedy),
-            Divider::Vhacd => {
-                let parameters = VHACDParameters {
-                    max_convex_hulls: parts as u32,
-                    resolution: RESOLUTION,
-                    concavity: CONCAVITY,
-                    ..VHACDParameters::default()
-                };
-                let points: Vec<Vector> = self.mesh.points.iter().map(parry).collect();
-                let found = VHACD::decompose(&parameters, &points, &indices(&self.mesh), true);
-                let hulls = found.compute_exact_convex_hulls(&points, &indices(&self.mesh));
-                Ok(hulls
-                    .into_iter()
-                    .map(|(points, _)| points.iter().map(|x| Vector3::new(x.x, x.y, x.z)).collect())
-                    .collect())
-            }
+            Divider::Vhacd => Ok(RESOLUTIONS.into_iter().find_map(|resolution| self.vhacd(parts, resolution))),
         }
+    }
+
+    /// The exact hulls of V-HACD; none if it panics.
+    fn vhacd(&self, parts: usize, resolution: u32) -> Option<Vec<Vec<Vector3<f64>>>> {
+        let parameters = VHACDParameters {
+            // Parry makes up to twice as many: it ends by the depth of its tree.
+            max_convex_hulls: u32::try_from(parts.div_ceil(2)).ok()?,
+            resolution,
+            concavity: CONCAVITY,
+            ..VHACDParameters::default()
+        };
+        let points: Vec<Vector> = self.mesh.points.iter().map(parry).collect();
+        let hulls = std::panic::catch_unwind(|| {
+            let found = VHACD::decompose(&parameters, &points, &indices(&self.mesh), true);
+            found.compute_exact_convex_hulls(&points, &indices(&self.mesh))
+        });
+        let corners = |points: Vec<Vector>| points.iter().map(|x| Vector3::new(x.x, x.y, x.z)).collect();
+        Some(hulls.ok()?.into_iter().map(|(points, _)| corners(points)).collect())
     }
 
     fn failed(&self, divider: Divider, what: impl ToString) -> DuelError {
@@ -239,7 +244,7 @@ impl Object {
         far.sort_by(|a, b| b.0.total_cmp(&a.0));
         // The farthest that is not inside; what an open mesh encloses nothing says.
         let outside = |x: &Vector3<f64>| self.own_m3.is_none() || winding(&self.mesh, x).abs() < 0.5;
-        far.iter().find(|(_, x)| outside(x)).map_or(0.0, |(distance, _)| *distance)
+        far.iter().find(|(_, x)| outside(x)).map_or(0.0, |(distance, _)| distance.abs())
     }
 }
 
@@ -310,11 +315,11 @@ mod tests {
         assert!((whole.of_hull - 1.0).abs() < 1e-9 && (whole.of_object.unwrap() - 0.2 * area(0.05) / own).abs() < 1e-9);
         assert!((0.027..=0.03).contains(&whole.concavity_m) && whole.left_out_m == 0.0, "{whole:?}");
         // Half of the points leave the other half out.
-        let half: Vec<_> = object.mesh.points.iter().copied().filter(|x| x.x >= 0.0).collect();
+        let half: Vec<_> = object.mesh.points.iter().copied().filter(|x| x.x >= -1e-9).collect();
         let half = object.measure(Divider::Ours, 1, &[half], 0.0).unwrap();
         assert!((half.left_out_m - 0.05).abs() < 1e-3, "{half:?}");
         for divider in Divider::ALL {
-            let parts = object.divide(divider, 8).unwrap();
+            let parts = object.divide(divider, 8).unwrap().unwrap();
             let found = object.measure(divider, 8, &parts, 0.0).unwrap();
             assert!(found.parts <= 8 && found.of_object.unwrap() > 0.99 && found.concavity_m < 0.03, "{found:?}");
         }
