@@ -84,8 +84,11 @@ impl Upload {
             Content::Mesh(format, file) => {
                 let read = jobs::read_mesh(&file, format, &order.input, order.scale);
                 let read = read.map_err(|error| Invalid::new("mesh", error))?;
-                for remark in read.remarks.sentences(&read.mesh) {
-                    tracing::warn!(name = order.name, input = order.input, "mesh of a fit: {remark}");
+                // What unused vertices cost takes a hull, which a log is not worth.
+                let unused = read.remarks.unused.as_ref().map_or(0, |unused| unused.points.len());
+                if unused > 0 || read.remarks.crossing_faces > 0 {
+                    let crossing = read.remarks.crossing_faces;
+                    tracing::warn!(name = order.name, input = order.input, unused, crossing, "mesh of a fit");
                 }
                 let mesh = read.mesh;
                 let triangles = if order.uses_triangles() { mesh.triangles } else { Vec::new() };

@@ -79,15 +79,23 @@ pub(super) fn read(bytes: &[u8]) -> Result<Surface, Defect> {
     Ok(surface)
 }
 
-/// The text of a line with those that a backslash at its end goes on with.
+/// Keywords before names, which may end with a backslash that continues nothing.
+const NAMED: [&[u8]; 7] = [b"o", b"g", b"usemtl", b"mtllib", b"usemap", b"maplib", b"shadow_obj"];
+
+/// The text of a line with those that a backslash at its end goes on with; comments and names are
+/// not continued.
 fn continued<'a>(first: Line<'a>, lines: &mut impl Iterator<Item = Line<'a>>) -> Cow<'a, [u8]> {
+    let first = first.without_comment(b"#");
     let mut text = Cow::Borrowed(first.text);
+    if first.fields().next().is_some_and(|keyword| NAMED.contains(&keyword)) {
+        return text;
+    }
     while text.trim_ascii_end().ends_with(b"\\") {
         let joined = text.to_mut();
         joined.truncate(joined.trim_ascii_end().len() - 1);
         joined.push(b' ');
         match lines.next() {
-            Some(next) => joined.extend_from_slice(next.text),
+            Some(next) => joined.extend_from_slice(next.without_comment(b"#").text),
             None => break,
         }
     }

@@ -44,6 +44,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Surface, Defect> {
         lines(bytes)?.map(|line| line.without_comment(b"#")).filter(|line| !line.is_blank()).collect();
     let (kind, lines) = keyword(&lines)?;
     by_lines(&lines).or_else(|by_lines| {
+        if is_laid_out_in_rows(&lines, kind) {
+            return Err(by_lines);
+        }
         as_stream(&lines, kind.width(&lines)).map_err(|error| match error {
             // Files with far fewer lines than rows were not laid out in lines.
             StreamError::Defect(defect, counts) if lines.len() < counts.vertices.saturating_add(counts.faces) / 2 => {
@@ -52,6 +55,17 @@ pub(super) fn read(bytes: &[u8]) -> Result<Surface, Defect> {
             _ => by_lines,
         })
     })
+}
+
+/// Whether the file has one row in a line, so that a line which lost a number must not be read on
+/// into the next: it has as many lines as rows, or most vertices, but not all, in lines of their own.
+fn is_laid_out_in_rows(lines: &[Line<'_>], kind: Kind) -> bool {
+    let Some((first, rows)) = lines.split_first() else { return false };
+    let counts: Option<Vec<usize>> = first.fields().map(text::integer).collect();
+    let Some(&[vertices, faces, ..]) = counts.as_deref() else { return false };
+    let width = kind.width(lines);
+    let whole = rows.iter().take(vertices).filter(|line| line.fields().count() == width).count();
+    Some(rows.len()) == vertices.checked_add(faces) || 2 * whole > vertices && whole < vertices
 }
 
 /// What the keyword says, and the lines behind it; without one the counts come first.

@@ -2,7 +2,7 @@
 //!
 //! Where the fan about the first corner turns one way, as seen along the vector area of the outline
 //! (Newell's normal), it lies inside the outline and is taken. Else the polygon is projected along
-//! that normal and triangulated inside its loops by a constrained Delaunay triangulation (`spade`,
+//! the axis nearest to that normal and triangulated inside its loops by a constrained Delaunay triangulation (`spade`,
 //! with exact predicates): a face is inside where the way there from outside passes an odd number
 //! of edges of the loops. Corners in the middle of an edge are kept, so that the triangles of
 //! neighbours meet edge to edge and closed meshes stay closed.
@@ -11,6 +11,9 @@ use nalgebra::Vector3;
 use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation, mitigate_underflow};
 use std::collections::HashMap;
+
+/// Areas below this part of the square of the outline's size are rounding.
+const FLAT: f64 = 1e-12;
 
 /// Adds the triangles of a polygon, an outline and loops around holes, oriented as the outline is.
 /// Loops of fewer than three corners enclose nothing.
@@ -22,8 +25,8 @@ pub(super) fn triangulate(points: &[Vector3<f64>], loops: &[&[usize]], triangles
     let Some(outline) = loops.next().filter(|corners| corners.len() >= 3) else { return true };
     let holes: Vec<Vec<usize>> = loops.filter(|corners| corners.len() >= 3).collect();
     let area = vector_area(points, &outline);
-    // An outline without area encloses nothing.
-    let is_flat = holes.is_empty() && !(area.norm() > 0.0);
+    // An outline without area, but for rounding, encloses nothing.
+    let is_flat = holes.is_empty() && !(area.norm() > FLAT * size(points, &outline).powi(2));
     if is_flat || holes.is_empty() && (outline.len() == 3 || turns_one_way(points, &outline, &area)) {
         triangles.extend(fan(&outline));
         return true;
@@ -42,6 +45,12 @@ fn without_repeats(corners: &[usize]) -> Vec<usize> {
         kept.pop();
     }
     kept
+}
+
+/// Largest coordinate of the corners as seen from the first.
+fn size(points: &[Vector3<f64>], corners: &[usize]) -> f64 {
+    let origin = corners.first().map_or_else(Vector3::zeros, |&first| points[first]);
+    corners.iter().map(|&corner| (points[corner] - origin).amax()).fold(0.0, f64::max)
 }
 
 fn fan(outline: &[usize]) -> impl Iterator<Item = [usize; 3]> {
@@ -70,21 +79,30 @@ fn inside(
     holes: &[Vec<usize>],
     area: &Vector3<f64>,
 ) -> Option<Vec<[usize; 3]>> {
-    let normal = area.try_normalize(0.0)?;
-    let right = Vector3::ith(normal.iamin(), 1.0).cross(&normal).try_normalize(0.0)?;
-    let up = normal.cross(&right);
-    let origin = points[outline[0]];
+    // Along an axis and by powers of two, so that coordinates that are exact stay so, and a corner
+    // that lies on an edge still does.
+    let axis = area.iamax();
+    let (mut right, mut up) = ((axis + 1) % 3, (axis + 2) % 3);
+    if area[axis] < 0.0 {
+        std::mem::swap(&mut right, &mut up);
+    }
     let loops = || std::iter::once(outline).chain(holes.iter().map(Vec::as_slice));
-    let size = loops().flatten().map(|&corner| (points[corner] - origin).amax()).fold(0.0, f64::max);
+    let origin = points[outline[0]];
+    let all: Vec<usize> = loops().flatten().copied().collect();
+    let unit = size(points, &all).log2().floor().exp2();
     let project = |corner: usize| {
-        let offset = (points[corner] - origin) / size;
-        mitigate_underflow(Point2::new(right.dot(&offset), up.dot(&offset)))
+        let offset = (points[corner] - origin) / unit;
+        mitigate_underflow(Point2::new(offset[right], offset[up]))
     };
 
     let mut plane = ConstrainedDelaunayTriangulation::<Point2<f64>>::new();
     let mut handles: HashMap<usize, FixedVertexHandle> = HashMap::new();
     let mut corners: HashMap<FixedVertexHandle, usize> = HashMap::new();
-    for &corner in loops().flatten() {
+    // In no order: along a curve each point would change the triangles of all before it.
+    let mut shuffled = all;
+    shuffled.sort_by_key(|corner| (*corner as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    shuffled.dedup();
+    for corner in shuffled {
         let handle = plane.insert(project(corner)).ok()?;
         handles.insert(corner, handle);
         // Points above each other have one place in the plane: no triangle there is one of both.
@@ -240,6 +258,32 @@ mod tests {
             assert!(triangulate(&line, &[short], &mut triangles) && triangles.is_empty());
         }
         assert!(triangulate(&line, &[], &mut triangles));
+    }
+
+    #[test]
+    fn corners_on_edges_and_lines_keep_their_boundary() {
+        // A corner exactly on another edge touches it and does not cross.
+        let touching = [[0.0, 0.0], [15.0, 10.0], [5.0, 25.0], [12.0, 8.0], [-10.0, 15.0]];
+        let points: Vec<_> = touching.iter().map(|[x, y]| Vector3::new(*x, *y, 0.5 * x - y)).collect();
+        let mut triangles = Vec::new();
+        assert!(triangulate(&points, &[&[0, 1, 2, 3, 4]], &mut triangles));
+        // Flat but for rounding: the fan uses every corner.
+        let line: Vec<_> = (0..6).map(|i| Vector3::new(0.1, 0.3, 0.7) * f64::from(i)).collect();
+        triangles.clear();
+        assert!(triangulate(&line, &[&[0, 1, 2, 3, 4, 5]], &mut triangles));
+        assert!(boundary(&triangles, &[&[0, 1, 2, 3, 4, 5]]).is_empty() && triangles.len() == 4);
+    }
+
+    #[test]
+    fn a_long_concave_outline_takes_little_time() {
+        let count = 20_000;
+        let mut points: Vec<_> =
+            (0..count).map(|i| f64::from(i) / f64::from(count)).map(|x| Vector3::new(x, x * x, 0.0)).collect();
+        points.push(Vector3::new(0.5, 0.6, 0.0));
+        let outline: Vec<usize> = (0..points.len()).collect();
+        let mut triangles = Vec::new();
+        assert!(triangulate(&points, &[&outline], &mut triangles));
+        assert_eq!(triangles.len(), points.len() - 2);
     }
 
     #[test]

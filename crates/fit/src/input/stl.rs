@@ -83,12 +83,11 @@ fn solids(bytes: &[u8]) -> Result<Surface, Defect> {
     let mut corners = Corners::default();
     while let Some(first) = words.next() {
         words.expect(first, "solid")?;
-        // The rest of the line is the name.
-        words.line.text = &[];
+        words.pass_name()?;
         loop {
             let word = words.needed("facet or endsolid")?;
             if word.eq_ignore_ascii_case(b"endsolid") {
-                words.line.text = &[];
+                words.pass_name()?;
                 break;
             }
             words.expect(word, "facet")?;
@@ -149,6 +148,16 @@ impl<'a, L: Iterator<Item = Line<'a>>> Words<'a, L> {
             }
             self.line = self.lines.next()?;
         }
+    }
+
+    /// Passes over the name of a solid, the rest of the line.
+    fn pass_name(&mut self) -> Result<(), Defect> {
+        if self.line.fields().any(|word| word.eq_ignore_ascii_case(b"facet")) {
+            let reason = "a facet begins in the line of the name of a solid, which the format ends with the line";
+            return Err(self.line.defect(reason).remedy("put a line end behind each name"));
+        }
+        self.line.text = &[];
+        Ok(())
     }
 
     /// The next word, of which the file is in need.

@@ -1,8 +1,8 @@
 //! Point clouds: one point in a line, its coordinates first, then columns that are ignored.
 //!
 //! Columns are separated by blanks, commas or semicolons, of one kind in a line: a comma beside
-//! another separator may be a decimal comma, which must not be guessed. Names of columns and a
-//! count of the points may come first.
+//! another separator may be a decimal comma, which must not be guessed. Names of columns, which say
+//! where x, y and z are, and a count of the points may come first.
 
 use super::surface::Surface;
 use super::text::{DECIMAL_COMMA, Line, is_blank, lines, number};
@@ -13,10 +13,15 @@ use nalgebra::Vector3;
 pub(super) fn read(bytes: &[u8]) -> Result<Surface, Defect> {
     let mut surface = Surface::default();
     let mut announced = None;
-    let mut has_names = false;
+    let mut axes = None;
     let mut columns = None;
-    for line in lines(bytes)?.map(|line| line.without_comment(b"#").without_comment(b"//")) {
+    for whole in lines(bytes)? {
+        let line = whole.without_comment(b"#").without_comment(b"//");
         if line.is_blank() {
+            // Programs put the names into a comment, too.
+            if surface.points.is_empty() && axes.is_none() {
+                axes = axes_of_comment(whole);
+            }
             continue;
         }
         let fields = columns_of(line)?;
@@ -28,12 +33,21 @@ pub(super) fn read(bytes: &[u8]) -> Result<Surface, Defect> {
                 announced = Some((line, count));
                 continue;
             }
-            if !has_names && fields.iter().all(|field| is_name(field)) {
-                has_names = true;
+            if columns.is_none() && fields.iter().all(|field| is_name(field)) {
+                axes = Some(axes_named(&fields).ok_or_else(|| {
+                    line.defect("the columns have names, but not x, y and z").remedy("name them so, or remove the line")
+                })?);
+                // Names come once.
+                columns = Some(0);
                 continue;
             }
         }
-        surface.points.push(Vector3::from(line.coordinates(fields.iter().copied())?));
+        let [x, y, z] = axes.unwrap_or([0, 1, 2]);
+        let chosen = [x, y, z].into_iter().map_while(|axis| fields.get(axis).copied());
+        surface.points.push(Vector3::from(line.coordinates(chosen)?));
+        if columns == Some(0) {
+            columns = None;
+        }
         let expected = *columns.get_or_insert(fields.len());
         if fields.len() != expected {
             return Err(line.defect(format!("{} columns where the points before have {expected}", fields.len())));
@@ -45,6 +59,29 @@ pub(super) fn read(bytes: &[u8]) -> Result<Surface, Defect> {
         }
         _ => Ok(surface),
     }
+}
+
+/// The columns that the names x, y and z have, or those of points that ParaView writes.
+fn axes_named(names: &[&[u8]]) -> Option<[usize; 3]> {
+    let names: Vec<String> = names
+        .iter()
+        .map(|name| String::from_utf8_lossy(name).trim_matches(['"', '\'', '/', '#']).to_ascii_lowercase())
+        .collect();
+    let place = |axis: usize| {
+        let known = [["x", "y", "z"][axis], ["points:0", "points:1", "points:2"][axis]];
+        let mut places = (0..names.len()).filter(|&place| known.contains(&names[place].as_str()));
+        places.next().filter(|_| places.next().is_none())
+    };
+    Some([place(0)?, place(1)?, place(2)?])
+}
+
+/// The same of a comment, if it holds nothing but names.
+fn axes_of_comment(line: Line<'_>) -> Option<[usize; 3]> {
+    let text = line.text.trim_ascii();
+    let marks = text.iter().take_while(|byte| matches!(byte, b'#' | b'/')).count();
+    let text = text[marks..].trim_ascii();
+    let fields = columns_of(Line { text, ..line }).ok()?;
+    if fields.iter().all(|field| is_name(field)) { axes_named(&fields) } else { None }
 }
 
 /// Whether a field can be the name of a column: no number, and not what is left of one.

@@ -10,7 +10,7 @@ use super::surface::{Place, Surface};
 use super::{Defect, text};
 use geometry::Geometry;
 use roxmltree::{Node, NodeId};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 use transform::Affine;
 
@@ -63,18 +63,31 @@ pub(super) fn read(bytes: &[u8]) -> Result<Surface, Defect> {
 struct Document<'a, 'i> {
     root: Xml<'a, 'i>,
     ids: HashMap<&'a str, Xml<'a, 'i>>,
+    /// Those that several elements have.
+    repeated: HashSet<&'a str>,
 }
 
 impl<'a, 'i> Document<'a, 'i> {
     fn new(root: Xml<'a, 'i>) -> Self {
-        let ids = root.descendants().filter_map(|element| Some((element.attribute("id")?, element))).collect();
-        Self { root, ids }
+        let mut document = Self { root, ids: HashMap::new(), repeated: HashSet::new() };
+        for element in root.descendants() {
+            let Some(id) = element.attribute("id") else { continue };
+            if document.ids.insert(id, element).is_some() {
+                document.repeated.insert(id);
+            }
+        }
+        document
     }
 
     /// The element that an attribute names, in the same file.
     fn referenced(&self, element: Xml<'a, 'i>, attribute: &str) -> Result<Xml<'a, 'i>, Defect> {
         let name = element.attribute(attribute).unwrap_or_default();
-        let found = name.strip_prefix('#').and_then(|id| self.ids.get(id)).copied();
+        let id = name.strip_prefix('#');
+        if id.is_some_and(|id| self.repeated.contains(id)) {
+            let reason = format!("{attribute} is {}, which several elements have", text::quoted(name.as_bytes()));
+            return Err(Defect::new(place_of(element), reason).remedy("give each element an id of its own"));
+        }
+        let found = id.and_then(|id| self.ids.get(id)).copied();
         found.ok_or_else(|| {
             let name = text::quoted(name.as_bytes());
             let reason = format!("{attribute} is {name}, which names no element of this file");
@@ -84,7 +97,14 @@ impl<'a, 'i> Document<'a, 'i> {
 
     /// Metres per unit.
     fn unit(&self) -> Result<f64, Defect> {
-        let Some(unit) = child(self.root, "asset").and_then(|asset| child(asset, "unit")) else { return Ok(1.0) };
+        let of_file = child(self.root, "asset").and_then(|asset| child(asset, "unit"));
+        let is_other =
+            |unit: &Xml<'a, 'i>| unit.is_element() && unit.tag_name().name() == "unit" && Some(*unit) != of_file;
+        if let Some(inner) = self.root.descendants().find(is_other) {
+            let reason = "a part of the file has a unit of its own, which is not read";
+            return Err(Defect::new(place_of(inner), reason).remedy("export all parts in one unit"));
+        }
+        let Some(unit) = of_file else { return Ok(1.0) };
         let Some(meter) = unit.attribute("meter") else { return Ok(1.0) };
         let value = meter.trim().parse().ok().filter(|meter: &f64| *meter > 0.0 && meter.is_finite());
         value.ok_or_else(|| {
@@ -133,6 +153,7 @@ impl<'a, 'i> Scene<'_, 'a, 'i> {
             return Err(Defect::new(place_of(node), reason).remedy("no node may have itself inside"));
         }
         for element in node.children().filter(Xml::is_element) {
+            self.visits += 1;
             match element.tag_name().name() {
                 "node" => self.add_node(element, frame, depth)?,
                 "instance_node" => self.add_node(self.document.referenced(element, "url")?, frame, depth)?,
@@ -162,7 +183,8 @@ impl<'a, 'i> Scene<'_, 'a, 'i> {
         self.geometries.insert(geometry.id(), read.clone());
         let Geometry { points, polygons } = &*read;
         let first = self.surface.points.len();
-        self.corners += polygons.iter().flatten().map(Vec::len).sum::<usize>();
+        // A loop takes memory of its own, however few corners it has.
+        self.corners += polygons.iter().flatten().map(|corners| 4 + corners.len()).sum::<usize>();
         if first + points.len() > MAX_POINTS || self.corners > 4 * MAX_POINTS {
             let reason = format!("the instances have more than {MAX_POINTS} points, or four times as many corners");
             return Err(Defect::new(place_of(geometry), reason).remedy("make the mesh coarser"));

@@ -270,3 +270,59 @@ fn concave_faces_stay_inside_their_outline() {
     let bow = reading("obj", "v 0 0 0\nv 2 2 0\nv 2 0 0\nv 0 3 0\nf 1 2 3 4\n", &ReadOptions::default()).unwrap();
     assert!(bow.remarks.sentences(&bow.mesh)[0].contains("cross themselves"), "{:?}", bow.remarks);
 }
+
+#[test]
+fn a_row_of_off_that_lost_a_number_is_an_error() {
+    let cube = "OFF\n8 6 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n4 3 2 1 0\n4 4 5 6 7\n4 0 1 5 4\n\
+                4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n";
+    assert_eq!(read("off", cube).unwrap().points.len(), 8);
+    assert_fails("off", cube.replacen("1 1 0\n", "1 1\n", 1), &["line 5", "2 coordinates"]);
+    assert_fails("off", cube.replacen("1 1 0\n", "1 1 #0\n", 1), &["line 5", "2 coordinates"]);
+    assert_fails("off", cube.replacen("1 1 0\n", "1 1 0 ", 1), &["line 5", "6 numbers"]);
+    for line in 2..16 {
+        let mut lines: Vec<&str> = cube.lines().collect();
+        let cut = lines[line].rsplit_once(' ').unwrap().0.to_owned();
+        lines[line] = &cut;
+        let error = read("off", lines.join("\n")).unwrap_err();
+        assert!(error.contains(&format!("line {}", line + 1)), "{error}");
+    }
+}
+
+#[test]
+fn names_of_columns_say_where_coordinates_are() {
+    let rows = "7 0 0 0\n7 1 0 0\n7 0 2 0\n7 0 0 .5\n";
+    for names in
+        ["id x y z\n", "# id x y z\n", "//id X Y Z\n", "\"intensity\" \"Points:0\" \"Points:1\" \"Points:2\"\n"]
+    {
+        assert_corners("xyz", format!("{names}{rows}"));
+    }
+    assert_corners("xyz", "z,y,x\n0,0,0\n0,0,1\n0,2,0\n.5,0,0\n");
+    for names in ["range azimuth elevation\n", "r g b\n", "x y\n", "x x y z\n", "OFF\n"] {
+        assert_fails("xyz", format!("{names}0 0 0\n"), &["line 1", "names"]);
+    }
+}
+
+#[test]
+fn comments_and_names_of_wavefront_are_not_continued() {
+    let vertices = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 .5\n";
+    for first in ["# C:\\models\\\n", "usemtl C:\\t\\\n", "g a\\\n", "o b\\\n"] {
+        assert_corners("obj", format!("{first}{vertices}"));
+    }
+    let mesh = read("obj", format!("{vertices}usemtl C:\\t\\\nf 1 2 3\n")).unwrap();
+    assert_eq!(mesh.triangles, [[0, 1, 2]]);
+}
+
+#[test]
+fn facets_in_the_line_of_a_name_are_refused() {
+    let text = stl_text("solid a");
+    assert_fails("stl", text.replace('\n', " "), &["line 1", "facet", "line end"]);
+    assert_fails("stl", format!("{} solid b facet normal 0 0 1", text.trim_end()), &["facet", "line end"]);
+}
+
+#[test]
+fn elements_of_collada_with_one_id_are_refused() {
+    let file = "<COLLADA><library_geometries><geometry id=\"g\"/><geometry id=\"g\"/></library_geometries>\
+                <library_visual_scenes><visual_scene id=\"s\"><node><instance_geometry url=\"#g\"/></node></visual_scene>\
+                </library_visual_scenes></COLLADA>";
+    assert_fails("dae", file, &["instance_geometry", "several elements"]);
+}
