@@ -55,7 +55,7 @@ pub enum ReadError {
     },
     /// A coordinate is NaN or infinite, in the file or after scaling.
     #[error(
-        "{}: vertex {vertex} (counted from 0) has the coordinates ({}, {}, {}), which are not all finite; \
+        "{}: vertex {vertex} (counted from 0) has the coordinates ({:e}, {:e}, {:e}), which are not all finite; \
          remove it, repair the mesh, or leave such points out by --drop-nan",
         path.display(), coordinates[0], coordinates[1], coordinates[2]
     )]

@@ -117,6 +117,7 @@ fn vertex(line: Line<'_>, columns: &mut Option<usize>) -> Result<Vector3<f64>, D
     match rest[..] {
         [] | [_, _, _] => Ok(point),
         [0.0] => Err(line.defect("the weight w is 0, which puts the vertex at infinity").remedy("remove the vertex")),
+        [weight] if !weight.is_finite() => Err(line.defect("the weight w is not finite").remedy("remove the vertex")),
         [weight] => Ok(point / weight),
         _ => Err(line.defect(format!("{found} numbers, where x y z, x y z w or x y z red green blue are expected"))),
     }

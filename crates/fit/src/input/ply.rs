@@ -143,6 +143,8 @@ impl Header {
         if first.trim_ascii() != b"ply" {
             return Err(not_ply());
         }
+        // Names are looked for among all before them.
+        const MOST_LINES: usize = 10_000;
         let mut header = Self { encoding: Encoding::Text, elements: Vec::new(), lines: 1 };
         let mut encoding = None;
         loop {
@@ -150,6 +152,9 @@ impl Header {
             let text = take_line(&mut rest, end).ok_or_else(ended)?;
             header.lines += 1;
             let line = Line { number: header.lines, text };
+            if header.lines > MOST_LINES {
+                return Err(line.defect(format!("a header of more than {MOST_LINES} lines")));
+            }
             let fields: Vec<&[u8]> = line.fields().collect();
             match fields[..] {
                 [] | [b"comment" | b"obj_info", ..] => {}
@@ -193,6 +198,14 @@ impl Header {
         };
         if list.is_some_and(|count| !count.is_integer()) {
             return Err(line.defect("the count of a list is no integer"));
+        }
+        let is_corners = matches!(name, b"vertex_indices" | b"vertex_index") && list.is_some();
+        if is_corners && matches!(element.kind, Kind::Vertex | Kind::Other) {
+            let reason = format!("the element {} has corners, but only face and tristrips are read", element.quoted());
+            return Err(line.defect(reason).remedy("export the faces as triangles or polygons"));
+        }
+        if is_corners && element.properties.iter().any(|property| property.role == Role::Corners) {
+            return Err(line.defect("the element has corners twice, as vertex_indices and as vertex_index"));
         }
         let role = match (element.kind, name, list) {
             (Kind::Vertex, b"x", None) => Role::Axis(0),
@@ -398,6 +411,8 @@ impl Collected {
         let place = row.line.map_or(Place::Face(index), Place::Line);
         match element.kind {
             Kind::Vertex => self.points.push(row.point),
+            // Fewer corners bound nothing.
+            Kind::Face if row.corners.len() < 3 => {}
             Kind::Face => self.faces.push((place, row.corners)),
             Kind::Strips => self.faces.extend(strips(&row.corners).map(|triangle| (place, triangle.to_vec()))),
             Kind::Other => {}

@@ -116,3 +116,46 @@ fn lines_that_lost_their_end_are_errors() {
         }
     }
 }
+
+/// A cube whose faces are quads, of random size, in the formats that have counts.
+fn quads(random: &mut Seeded) -> [(&'static str, String); 2] {
+    let size = 1.0 + random.signed().abs();
+    let corner = |i: usize| format!("{} {} {}\n", size * (i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2 & 1) as f64);
+    let vertices: String = (0..8).map(corner).collect();
+    let faces = "4 0 4 6 2\n4 1 3 7 5\n4 0 1 5 4\n4 2 6 7 3\n4 0 2 3 1\n4 4 5 7 6\n";
+    let header = "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n\
+                  element face 6\nproperty list uchar int vertex_indices\nend_header\n";
+    [("off", format!("OFF\n8 6 0\n{vertices}{faces}")), ("ply", format!("{header}{vertices}{faces}"))]
+}
+
+#[test]
+fn rows_that_lost_or_won_a_field_are_errors() {
+    for seed in 0..20 {
+        for (format, text) in quads(&mut Seeded(seed)) {
+            assert_eq!(read(format, &text).unwrap().points.len(), 8);
+            let lines: Vec<&str> = text.lines().collect();
+            let first = lines.len() - 14;
+            for number in first..lines.len() {
+                let fields: Vec<&str> = lines[number].split(' ').collect();
+                for field in 0..fields.len() {
+                    let mut lost = fields.clone();
+                    lost.remove(field);
+                    let mut twice = fields.clone();
+                    twice.insert(field, fields[field]);
+                    for row in [lost.join(" "), twice.join(" ")] {
+                        let mut changed = lines.clone();
+                        changed[number] = &row;
+                        let found = read(format, changed.join("\n"));
+                        // A number more behind the corners of OFF is a colour.
+                        let is_color = format == "off" && number >= first + 8 && found.is_ok();
+                        let all = places(&read(format, &text).unwrap().points);
+                        assert!(
+                            found.is_err() || is_color && places(&found.unwrap().points) == all,
+                            "{format}: {row:?}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
