@@ -129,6 +129,7 @@ fn by_lines(lines: &[Line<'_>]) -> Result<Surface, Defect> {
             return Err(line.defect(format!("{found} numbers where the vertices before have {expected}")));
         }
     }
+    let mut colors = None;
     for index in 0..counts.faces {
         let line = lines.next().ok_or_else(|| missing("face", index, counts.faces))?;
         let mut fields = line.fields();
@@ -141,6 +142,14 @@ fn by_lines(lines: &[Line<'_>]) -> Result<Surface, Defect> {
         let color = fields.map(|field| line.number(field)).collect::<Result<Vec<_>, _>>()?;
         if ![0, 1, 3, 4].contains(&color.len()) {
             return Err(line.defect(format!("{} numbers behind the {count} corners, which are no color", color.len())));
+        }
+        // A row that lost its count, or a corner, looks like one with another colour.
+        let expected = *colors.get_or_insert(color.len());
+        if color.len() != expected || count < 3 && !color.is_empty() {
+            return Err(line.defect(format!(
+                "{count} corners and {} numbers behind them, where the faces before have {expected} behind theirs",
+                color.len()
+            )));
         }
         surface.add_face(Place::Line(line.number), corners);
     }

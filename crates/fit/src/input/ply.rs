@@ -200,7 +200,8 @@ impl Header {
             return Err(line.defect("the count of a list is no integer"));
         }
         let is_corners = matches!(name, b"vertex_indices" | b"vertex_index") && list.is_some();
-        if is_corners && matches!(element.kind, Kind::Vertex | Kind::Other) {
+        // A range grid lists the points of cells, which are no faces.
+        if is_corners && matches!(element.kind, Kind::Vertex | Kind::Other) && element.name != "range_grid" {
             let reason = format!("the element {} has corners, but only face and tristrips are read", element.quoted());
             return Err(line.defect(reason).remedy("export the faces as triangles or polygons"));
         }

@@ -12,6 +12,9 @@ use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation, mitigate_underflow};
 use std::collections::HashMap;
 
+/// Edges that the loops may be divided into by corners on them, for each corner.
+const EDGES_PER_CORNER: usize = 64;
+
 /// Areas below this part of the square of the outline's size are rounding.
 const FLAT: f64 = 1e-12;
 
@@ -102,6 +105,7 @@ fn inside(
     let mut shuffled = all;
     shuffled.sort_by_key(|corner| (*corner as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
     shuffled.dedup();
+    let corner_count = shuffled.len();
     for corner in shuffled {
         let handle = plane.insert(project(corner)).ok()?;
         handles.insert(corner, handle);
@@ -111,6 +115,7 @@ fn inside(
             return None;
         }
     }
+    let mut budget = EDGES_PER_CORNER * corner_count;
     // How often the loops pass each edge.
     let mut passes: HashMap<[usize; 2], usize> = HashMap::new();
     for corners in loops() {
@@ -123,6 +128,8 @@ fn inside(
             if edges.is_empty() {
                 return None;
             }
+            // Edges through many corners: loops that overlap themselves.
+            budget = budget.checked_sub(edges.len())?;
             for edge in edges {
                 let ends = plane.directed_edge(edge).vertices().map(|vertex| vertex.fix());
                 *passes.entry(undirected(ends)).or_default() += 1;
@@ -284,6 +291,17 @@ mod tests {
         let mut triangles = Vec::new();
         assert!(triangulate(&points, &[&outline], &mut triangles));
         assert_eq!(triangles.len(), points.len() - 2);
+    }
+
+    #[test]
+    fn loops_that_overlap_themselves_take_little_time() {
+        // From end to end of a line, through more and more corners, and back by three aside.
+        let count = 4000;
+        let at = |i: u32| Vector3::new(f64::from(i), 0.0, 0.0);
+        let mut points: Vec<_> = (0..count).map(|i| at(if i % 2 == 0 { i / 2 } else { count - 1 - i / 2 })).collect();
+        points.extend([Vector3::new(9.0, 5.0, 0.0), Vector3::new(5.0, 1.0, 0.0), Vector3::new(1.0, 5.0, 0.0)]);
+        let outline: Vec<usize> = (0..points.len()).collect();
+        assert!(!triangulate(&points, &[&outline], &mut Vec::new()));
     }
 
     #[test]

@@ -152,7 +152,12 @@ impl<'a, L: Iterator<Item = Line<'a>>> Words<'a, L> {
 
     /// Passes over the name of a solid, the rest of the line.
     fn pass_name(&mut self) -> Result<(), Defect> {
-        if self.line.fields().any(|word| word.eq_ignore_ascii_case(b"facet")) {
+        let words: Vec<&[u8]> = self.line.fields().collect();
+        let begins = |pair: &[&[u8]]| {
+            let follows = [&b"normal"[..], b"outer"].iter().any(|word| pair[1].eq_ignore_ascii_case(word));
+            pair[0].eq_ignore_ascii_case(b"facet") && follows
+        };
+        if words.windows(2).any(begins) {
             let reason = "a facet begins in the line of the name of a solid, which the format ends with the line";
             return Err(self.line.defect(reason).remedy("put a line end behind each name"));
         }

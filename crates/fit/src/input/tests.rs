@@ -193,7 +193,7 @@ fn faces_become_triangles() {
     let fan = TRIANGLES.map(|corners| corners.map(|i| CORNERS[i]));
     let [a, b, c, d] = CORNERS;
     let quad = vec![[a, b, c], [a, c, d]];
-    assert_eq!(triangles("off", format!("OFF\n4 2 0\n{vertices}3 0 1 2 255 0 0\n3 0 1 3\n")), fan);
+    assert_eq!(triangles("off", format!("OFF\n4 2 0\n{vertices}3 0 1 2 255 0 0\n3 0 1 3 0 255 0\n")), fan);
     assert_eq!(triangles("off", format!("OFF\n4 1 0\n{vertices}4 0 1 2 3\n")), quad);
     assert_eq!(triangles("obj", format!("{}f 1/1/1 2/1/1 3/1/1\nf 1//7 2//7 4//7\nl 1 2\n", lines("v "))), fan);
     assert_eq!(triangles("obj", format!("{}f -4 -3 -2 -1\n", lines("v "))), quad);

@@ -15,6 +15,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Surface, Defect> {
     let mut announced = None;
     let mut axes = None;
     let mut columns = None;
+    let (mut has_commas, mut has_points) = (true, false);
     for whole in lines(bytes)? {
         let line = whole.without_comment(b"#").without_comment(b"//");
         if line.is_blank() {
@@ -37,21 +38,26 @@ pub(super) fn read(bytes: &[u8]) -> Result<Surface, Defect> {
                 axes = Some(axes_named(&fields).ok_or_else(|| {
                     line.defect("the columns have names, but not x, y and z").remedy("name them so, or remove the line")
                 })?);
-                // Names come once.
-                columns = Some(0);
+                // Names come once, one for each column.
+                columns = Some(fields.len());
                 continue;
             }
         }
         let [x, y, z] = axes.unwrap_or([0, 1, 2]);
         let chosen = [x, y, z].into_iter().map_while(|axis| fields.get(axis).copied());
         surface.points.push(Vector3::from(line.coordinates(chosen)?));
-        if columns == Some(0) {
-            columns = None;
-        }
         let expected = *columns.get_or_insert(fields.len());
         if fields.len() != expected {
-            return Err(line.defect(format!("{} columns where the points before have {expected}", fields.len())));
+            let reason = format!("{} columns where the names or the points before have {expected}", fields.len());
+            return Err(line.defect(reason));
         }
+        has_commas &= separators_are_commas(line);
+        has_points |= line.text.iter().any(|byte| matches!(byte, b'.' | b'e' | b'E'));
+    }
+    // 1,125,2,125,3,125 may be three numbers with decimal commas.
+    if has_commas && !has_points && columns.is_some_and(|columns| columns >= 6 && columns % 2 == 0) {
+        let reason = "the columns are whole numbers between commas, which may be decimal commas";
+        return Err(Defect::new("all lines", reason).remedy("separate the columns by blanks or semicolons"));
     }
     match announced {
         Some((line, count)) if count != surface.points.len() => {
@@ -88,6 +94,12 @@ fn axes_of_comment(line: Line<'_>) -> Option<[usize; 3]> {
 fn is_name(field: &[u8]) -> bool {
     let begins = |byte: &u8| byte.is_ascii_alphabetic() || matches!(byte, b'"' | b'_' | 0x80..);
     field.first().is_some_and(begins) && number(field).is_err()
+}
+
+/// Whether commas alone, without blanks, separate the columns of a line.
+fn separators_are_commas(line: Line<'_>) -> bool {
+    let text = line.text.trim_ascii();
+    text.contains(&b',') && !text.iter().any(|byte| is_blank(*byte) || *byte == b';')
 }
 
 /// The columns of a line.

@@ -29,6 +29,7 @@ const MAX_POINTS: usize = 1 << 24;
 pub(super) fn read(bytes: &[u8]) -> Result<Surface, Defect> {
     // Names and comments need not be UTF-8.
     let content = String::from_utf8_lossy(text::without_mark(bytes)?);
+    check_tags(&content)?;
     let parsed = roxmltree::Document::parse(&content).map_err(|error| {
         Defect::line(error.pos().row as usize, format!("this is no XML: {}", text::shortened(&error.to_string())))
     })?;
@@ -57,6 +58,30 @@ pub(super) fn read(bytes: &[u8]) -> Result<Surface, Defect> {
     let unit = document.unit()?;
     surface.points.iter_mut().for_each(|point| *point *= unit);
     Ok(surface)
+}
+
+/// Most bytes of a tag, and most declarations of namespaces: the parser compares each with all others.
+const MOST_TAG_BYTES: usize = 4096;
+const MOST_NAMESPACES: usize = 64;
+
+/// Refuses what takes the parser long.
+fn check_tags(content: &str) -> Result<(), Defect> {
+    let remedy = "export it with another program";
+    if content.matches("xmlns").nth(MOST_NAMESPACES).is_some() {
+        return Err(Defect::new("namespaces", format!("more than {MOST_NAMESPACES} are declared")).remedy(remedy));
+    }
+    // Comments and text in between are no tags.
+    let mut rest = content;
+    while let Some(start) = rest.find('<') {
+        rest = &rest[start..];
+        let (end, is_tag) = if rest.starts_with("<!--") { (rest.find("-->"), false) } else { (rest.find('>'), true) };
+        let length = end.unwrap_or(rest.len());
+        if is_tag && !rest.starts_with("<![CDATA[") && length > MOST_TAG_BYTES {
+            return Err(Defect::new("tags", format!("one has more than {MOST_TAG_BYTES} bytes")).remedy(remedy));
+        }
+        rest = &rest[length.max(1)..];
+    }
+    Ok(())
 }
 
 /// The elements of a file.
@@ -98,8 +123,12 @@ impl<'a, 'i> Document<'a, 'i> {
     /// Metres per unit.
     fn unit(&self) -> Result<f64, Defect> {
         let of_file = child(self.root, "asset").and_then(|asset| child(asset, "unit"));
-        let is_other =
-            |unit: &Xml<'a, 'i>| unit.is_element() && unit.tag_name().name() == "unit" && Some(*unit) != of_file;
+        let meter = |unit: Xml<'a, 'i>| unit.attribute("meter").unwrap_or("1").trim();
+        let is_other = |unit: &Xml<'a, 'i>| {
+            let is_unit = unit.is_element() && unit.tag_name().name() == "unit";
+            let of_asset = unit.parent().is_some_and(|asset| asset.tag_name().name() == "asset");
+            is_unit && of_asset && meter(*unit) != of_file.map_or("1", meter)
+        };
         if let Some(inner) = self.root.descendants().find(is_other) {
             let reason = "a part of the file has a unit of its own, which is not read";
             return Err(Defect::new(place_of(inner), reason).remedy("export all parts in one unit"));

@@ -122,10 +122,11 @@ fn quads(random: &mut Seeded) -> [(&'static str, String); 2] {
     let size = 1.0 + random.signed().abs();
     let corner = |i: usize| format!("{} {} {}\n", size * (i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2 & 1) as f64);
     let vertices: String = (0..8).map(corner).collect();
-    let faces = "4 0 4 6 2\n4 1 3 7 5\n4 0 1 5 4\n4 2 6 7 3\n4 0 2 3 1\n4 4 5 7 6\n";
+    // A face that lost its count would have a proper one still.
+    let faces = "4 4 6 2 0\n4 6 2 0 4\n4 1 3 7 5\n4 0 1 5 4\n4 2 6 7 3\n4 0 2 3 1\n4 4 5 7 6\n";
     let header = "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n\
-                  element face 6\nproperty list uchar int vertex_indices\nend_header\n";
-    [("off", format!("OFF\n8 6 0\n{vertices}{faces}")), ("ply", format!("{header}{vertices}{faces}"))]
+                  element face 7\nproperty list uchar int vertex_indices\nend_header\n";
+    [("off", format!("OFF\n8 7 0\n{vertices}{faces}")), ("ply", format!("{header}{vertices}{faces}"))]
 }
 
 #[test]
@@ -134,7 +135,7 @@ fn rows_that_lost_or_won_a_field_are_errors() {
         for (format, text) in quads(&mut Seeded(seed)) {
             assert_eq!(read(format, &text).unwrap().points.len(), 8);
             let lines: Vec<&str> = text.lines().collect();
-            let first = lines.len() - 14;
+            let first = lines.len() - 15;
             for number in first..lines.len() {
                 let fields: Vec<&str> = lines[number].split(' ').collect();
                 for field in 0..fields.len() {

@@ -138,9 +138,15 @@ fn obj(mesh: &Mesh, random: &mut Seeded) -> Vec<u8> {
 
 fn xyz(mesh: &Mesh, random: &mut Seeded) -> Vec<u8> {
     let separator = [" ", "\t", ",", ", ", ";", "; "][below(random, 6)];
-    let header = [vec![], vec!["x y z".to_owned()], vec![mesh.points.len().to_string()], vec!["//X,Y,Z".to_owned()]];
-    let mut lines = header[below(random, 4)].clone();
     let columns = below(random, 4);
+    let names: String = (0..columns).map(|i| format!("{separator}c{i}")).collect();
+    let header = [
+        vec![],
+        vec![format!("x{separator}y{separator}z{names}")],
+        vec![mesh.points.len().to_string()],
+        vec!["//X,Y,Z".to_owned()],
+    ];
+    let mut lines = header[below(random, 4)].clone();
     for x in &mesh.points {
         let mut row = [x.x, x.y, x.z].map(|value| spelled(value, random)).to_vec();
         row.extend((0..columns).map(|_| below(random, 256).to_string()));

@@ -148,6 +148,8 @@ fn other_elements_and_strips_of_ply() {
     assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 3], [0, 1, 3]]);
     let edges = format!("element edge 2\nproperty int a\nproperty list uchar float b\n{vertex}");
     assert_corners("ply", header(&edges) + "1 0\n1 2 .5 .5\n" + rows);
+    let grid = format!("{vertex}element range_grid 1\nproperty list uchar int vertex_indices\n");
+    assert_corners("ply", header(&grid) + rows + "1 0\n");
     for (element, reason) in [
         ("element face 1\nproperty list uchar float vertex_indices\n", "no integers"),
         ("element face 1\nproperty int flags\n", "vertex_indices"),
@@ -299,6 +301,9 @@ fn names_of_columns_say_where_coordinates_are() {
         assert_corners("xyz", format!("{names}{rows}"));
     }
     assert_corners("xyz", "z,y,x\n0,0,0\n0,0,1\n0,2,0\n.5,0,0\n");
+    assert_fails("xyz", "x y z\n1 0 0 0\n2 1 0 0\n", &["line 2", "4 columns", "3"]);
+    assert_fails("xyz", "1,125000,2,125000,3,125000\n4,000000,5,500000,6,250000\n", &["decimal commas"]);
+    assert_eq!(read("xyz", "1,2,3,255,0,0\n1.5,2,3,255,0,0\n").unwrap().points.len(), 2);
     for names in ["range azimuth elevation\n", "r g b\n", "x y\n", "x x y z\n", "OFF\n"] {
         assert_fails("xyz", format!("{names}0 0 0\n"), &["line 1", "names"]);
     }
@@ -317,6 +322,7 @@ fn comments_and_names_of_wavefront_are_not_continued() {
 #[test]
 fn facets_in_the_line_of_a_name_are_refused() {
     let text = stl_text("solid a");
+    assert_corners("stl", stl_text("solid facet clamp"));
     assert_fails("stl", text.replace('\n', " "), &["line 1", "facet", "line end"]);
     assert_fails("stl", format!("{} solid b facet normal 0 0 1", text.trim_end()), &["facet", "line end"]);
 }
