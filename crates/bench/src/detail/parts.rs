@@ -32,9 +32,7 @@ const PARTS: [usize; 3] = [4, 8, 16];
 /// Points sampled on the hulls of a decomposition.
 const SAMPLES: usize = 4000;
 
-/// Voxels along the longest side that V-HACD works on: the next where its hull code panics. And its
-/// concavity limit, low enough that the number of parts ends its search.
-const RESOLUTIONS: [u32; 3] = [128, 96, 64];
+/// Concavity limit of V-HACD, low enough that the number of parts ends its search.
 const CONCAVITY: f64 = 1e-4;
 
 /// Who divides an object.
@@ -42,17 +40,19 @@ const CONCAVITY: f64 = 1e-4;
 pub(super) enum Divider {
     Ours,
     Greedy,
-    Vhacd,
+    /// With this many voxels along the longest side.
+    Vhacd(u32),
 }
 
 impl Divider {
-    pub(super) const ALL: [Self; 3] = [Self::Ours, Self::Greedy, Self::Vhacd];
+    /// V-HACD twice: neither resolution is the better one for all objects.
+    pub(super) const ALL: [Self; 4] = [Self::Ours, Self::Greedy, Self::Vhacd(64), Self::Vhacd(128)];
 
-    pub(super) fn name(self) -> &'static str {
+    pub(super) fn name(self) -> String {
         match self {
-            Self::Ours => "ours",
-            Self::Greedy => "by gain alone",
-            Self::Vhacd => "V-HACD",
+            Self::Ours => "ours".into(),
+            Self::Greedy => "by gain alone".into(),
+            Self::Vhacd(resolution) => format!("V-HACD {resolution}"),
         }
     }
 }
@@ -133,7 +133,7 @@ impl Object {
         Ok(Self { name, mesh, surface, hull_m3: hull.volume, diameter_m, own_m3 })
     }
 
-    /// The points whose hulls are the parts; none where V-HACD panics at every resolution.
+    /// The points whose hulls are the parts; none where V-HACD panics.
     fn divide(&self, divider: Divider, parts: usize) -> Result<Option<Vec<Vec<Vector3<f64>>>>, DuelError> {
         let ours = |search| {
             convex_parts(&self.mesh, parts, search, &mut |_| ControlFlow::Continue(()))
@@ -143,7 +143,7 @@ impl Object {
         match divider {
             Divider::Ours => ours(PartSearch::Best),
             Divider::Greedy => ours(PartSearch::Greedy),
-            Divider::Vhacd => Ok(RESOLUTIONS.into_iter().find_map(|resolution| self.vhacd(parts, resolution))),
+            Divider::Vhacd(resolution) => Ok(self.vhacd(parts, resolution)),
         }
     }
 
@@ -166,7 +166,7 @@ impl Object {
     }
 
     fn failed(&self, divider: Divider, what: impl ToString) -> DuelError {
-        DuelError::Representation { mesh: self.name, method: divider.name().into(), what: what.to_string() }
+        DuelError::Representation { mesh: self.name, method: divider.name(), what: what.to_string() }
     }
 
     fn measure(
