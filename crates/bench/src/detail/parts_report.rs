@@ -1,6 +1,7 @@
 //! The section and the picture of the convex decompositions.
 
 use super::parts::{Divided, Divider};
+use crate::duel::parry_version;
 use std::fmt::Write;
 use sublevel::draw::{ChartError, Group, Ink, Marker, Point, Scatter, Stairs};
 
@@ -24,8 +25,9 @@ pub(super) fn markdown(divided: &[Divided], picture: Option<&str>) -> String {
     }
     let _ = writeln!(
         text,
-        "{NOTES}\n| object | parts asked | by | parts | volume, of the object | of its hull | concavity | left out m | seconds |\n\
-         |---|---|---|---|---|---|---|---|---|"
+        "{NOTES}- Parry is parry3d-f64 {}.\n\n| object | parts asked | by | parts | volume, of the object | of its hull | concavity | left out m | seconds |\n\
+         |---|---|---|---|---|---|---|---|---|",
+        parry_version()
     );
     for row in divided {
         if row.parts == 0 {
