@@ -8,7 +8,6 @@
 //! that no answer depends on the other poses of the batch.
 
 use crate::body::{Body, Solid};
-use crate::measure::Status;
 use crate::measure::distance::{Distance, distance};
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, subtract};
@@ -17,6 +16,7 @@ use crate::measure::solver::active_constraints::ActiveConstraints;
 use crate::measure::solver::continuation::{limits, worth_a_bracket};
 use crate::measure::solver::initial_guess::{Start, facing, meeting, middle};
 use crate::measure::solver::tangent_newton::{ALIGNED, Bend, Plane, Relative, Side, Step, bracket, moved, newton};
+use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::{
     Aligned, Lanes, MAX_LANES, MAX_SINGLES, Number, NumberJet, Simd, Singles, Twice, Vector, WithSimd, dispatch_lanes,

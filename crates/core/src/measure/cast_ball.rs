@@ -6,12 +6,12 @@
 //! touch is found like the entry of a ray, from projections of the centre.
 
 use crate::body::{Body, Solid};
-use crate::measure::Status;
 use crate::measure::cast_ray::{Ray, RayCast, RayError, RayHit, first_hit};
 use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::options::Options;
 use crate::measure::point::Projection;
 use crate::measure::solver::convex_root_bracket::Entry;
+use crate::measure::status::Status;
 use crate::measure::warm::WarmStart;
 use crate::polynomial::gamma;
 use nalgebra::Vector3;

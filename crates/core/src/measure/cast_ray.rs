@@ -8,10 +8,10 @@
 //! rounding of its own size and no more.
 
 use crate::body::{Body, MAX_CONSTRAINTS, Solid};
-use crate::measure::Status;
 use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::options::Options;
 use crate::measure::solver::convex_root_bracket::Entry;
+use crate::measure::status::Status;
 use crate::polynomial::{Polynomial, gamma};
 use nalgebra::{Matrix3, Vector3};
 

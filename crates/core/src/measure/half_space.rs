@@ -6,13 +6,13 @@
 //! it, and the shortest such t is along n.
 
 use crate::body::{Body, Solid};
-use crate::measure::Status;
 use crate::measure::bounds::duality_bounds::{SLACK, descent};
 use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
+use crate::measure::pairwise_minimum::{Least, bracketed, least};
 use crate::measure::solver::projection::{Objective, Single, solve_single};
-use crate::measure::union::{Least, least, status};
+use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::gamma;
 use nalgebra::Vector3;
@@ -150,7 +150,7 @@ pub fn distance_to_half_space(
         from_body(&parts[i], pose, half_space, tolerance, options, hint)
     });
     let Least { best, lower, tied, iterations } = found;
-    HalfSpaceDistance { status: status(best.upper - lower <= tolerance), lower, tied, iterations, ..best }
+    HalfSpaceDistance { status: Status::of(best.upper - lower <= tolerance), lower, tied, iterations, ..best }
 }
 
 fn from_body(
@@ -246,6 +246,8 @@ impl<'a> Support<'a> {
         found
     }
 }
+
+bracketed!(HalfSpaceDistance);
 
 #[cfg(test)]
 mod tests {

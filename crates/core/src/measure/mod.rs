@@ -20,12 +20,14 @@ mod half_space;
 mod level;
 mod options;
 mod overlap;
+mod pairwise_minimum;
 mod penetration;
 mod point;
 mod signed;
 mod solver;
+mod status;
 mod time_of_impact;
-mod union;
+mod translation_hessian;
 mod warm;
 
 pub use batch::{BatchError, distance_batch};
@@ -44,21 +46,12 @@ pub use penetration::{Penetration, penetration};
 pub use point::{PointDistance, PointError, distance_to_point};
 pub use signed::{SignedDistance, signed_distance};
 pub use solver::active_constraints::ActiveConstraints;
-pub use solver::curvature::translation_hessian;
+pub use status::Status;
 pub use time_of_impact::{
     DEFAULT_CONTACT, Impact, ImpactOptions, ImpactOptionsError, ImpactStatus, MAX_QUERIES, time_of_impact,
 };
+pub use translation_hessian::translation_hessian;
 pub use warm::WarmStart;
-
-/// How a solve ended. The bracket is true in every case.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Status {
-    /// The bracket is as narrow as asked for.
-    Converged,
-    /// The iteration limit, the stop flag or the rounding floor came first; the bracket says what
-    /// is known.
-    BracketWide,
-}
 
 #[cfg(test)]
 mod tests;

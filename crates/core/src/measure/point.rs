@@ -5,14 +5,15 @@
 //! program stays regular through contact: its Hessian is the identity plus what the body's curvature adds.
 
 use crate::body::{Body, Solid};
-use crate::measure::Status;
 use crate::measure::bounds::duality_bounds::{SLACK, descent};
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
+use crate::measure::pairwise_minimum::{Least, bracketed, least};
+use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::projection::{Objective, Single, Trial, solve_single};
-use crate::measure::union::{Least, least};
-use crate::measure::warm::{ActiveSet, Hint, WarmStart};
+use crate::measure::status::Status;
+use crate::measure::warm::{Hint, WarmStart};
 use nalgebra::Vector3;
 
 /// Distance of a body from a point with its proof; lengths in metres, vectors in the world frame.
@@ -222,6 +223,8 @@ impl<'a> Projection<'a> {
         (if bound > 0.0 { bound } else { 0.0 }, n)
     }
 }
+
+bracketed!(Projected);
 
 #[cfg(test)]
 mod tests {

@@ -1,5 +1,8 @@
 //! Measures against closed forms and independent bounds.
 
+mod compounds;
+mod stages;
+
 use crate::body::{Body, Sphere};
 use crate::measure::*;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};

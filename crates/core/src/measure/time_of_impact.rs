@@ -23,8 +23,8 @@ use crate::measure::frames::motion::Motion;
 use crate::measure::frames::pose::ROTATION_ERROR;
 use crate::measure::half_space::Support;
 use crate::measure::options::Options;
-use crate::measure::overlap::Goal;
 use crate::measure::solver::projection::Single;
+use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::gamma;
 use nalgebra::Vector3;
@@ -300,7 +300,7 @@ impl Search<'_> {
         let accuracy = (0.1 * self.contact / radius).min(1.0);
         let options = self.options().with_accuracy(accuracy).unwrap_or(self.options());
         let (pose_a, pose_b) = (self.a.motion.pose(t), self.b.motion.pose(t));
-        between((a, &pose_a), (b, &pose_b), &Goal::NARROW, &options, warm)
+        between((a, &pose_a), (b, &pose_b), &StopCriterion::NARROW, &options, warm)
     }
 
     fn errors(&self, t: f64) -> f64 {

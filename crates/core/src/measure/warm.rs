@@ -1,12 +1,10 @@
 //! Warm starts: what one answer gives the next query of the same pair.
 
 use crate::measure::frames::query_frame::Pair;
-use crate::measure::level::LevelTrace;
+use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::continuation::Trace;
+use crate::measure::solver::level_continuation::LevelTrace;
 use nalgebra::Vector3;
-
-/// Constraints of one body that hold with equality, as a bit set.
-pub(super) type ActiveSet = u16;
 
 /// A caller-owned hint from an earlier answer, for the next query of the same pair and measure in
 /// the same order; [`WarmStart::default`] is a cold start.

@@ -1,3 +1,4 @@
 //! Proven bounds that any trial points and multipliers give.
 
+pub(super) mod culling;
 pub(super) mod duality_bounds;

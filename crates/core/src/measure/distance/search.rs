@@ -1,22 +1,24 @@
 //! The search for a distance where continuation alone has not proven it: every method in turn, from
 //! the cheapest, each of them improving one bracket.
 
+use super::answer::Distance;
 use super::deepest::Deepest;
-use super::{Distance, split};
-use crate::measure::Status;
+use crate::measure::bounds::culling::across;
 use crate::measure::bounds::duality_bounds::{Multipliers, distance_lower, distance_upper};
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::frames::vector::V3;
-use crate::measure::growth::ReachNewton;
 use crate::measure::options::Options;
-use crate::measure::overlap::{Goal, across};
-use crate::measure::solver::barrier_programs::{Closest, Level, points};
+use crate::measure::solver::barrier_programs::{Closest, Level, points, split};
 use crate::measure::solver::continuation::{Lost, Proven, SEEK_ROUNDS, Seek, Trace};
 use crate::measure::solver::initial_guess::Start;
 use crate::measure::solver::kkt_newton::{Active, DistanceNewton, Pace, WORTH_A_BRACKET};
+use crate::measure::solver::ray_program::ReachNewton;
 use crate::measure::solver::refinement::SharpPair;
+use crate::measure::solver::stages::{Stage, runs};
+use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::solver::support_table_gjk::approach;
 use crate::measure::solver::two_point_problem::Apart;
+use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
 use crate::optimize::{Approach, minimise};
 use crate::polynomial::dispatch;
@@ -29,7 +31,7 @@ pub(super) struct Search<'a> {
     options: &'a Options<'a>,
     tolerance: f64,
     /// In metres, and in query units.
-    goals: (&'a Goal, Goal),
+    goals: (&'a StopCriterion, StopCriterion),
     lower: f64,
     upper: f64,
     x: Vector3<f64>,
@@ -74,7 +76,7 @@ const STEEP: f64 = 1e3;
 
 impl<'a> Search<'a> {
     /// A search that knows nothing yet, after that many iterations.
-    pub(super) fn new(pair: &'a Pair<'a>, goal: &'a Goal, options: &'a Options<'a>, iterations: u32) -> Self {
+    pub(super) fn new(pair: &'a Pair<'a>, goal: &'a StopCriterion, options: &'a Options<'a>, iterations: u32) -> Self {
         let (x, y) = (pair.a.interior, pair.b.interior);
         let n = (x - y).try_normalize(0.0).unwrap_or_else(Vector3::x);
         Self {
@@ -195,7 +197,7 @@ impl<'a> Search<'a> {
     /// Goes on to the normal of the solution: a bracket that is narrow holds it to about the root
     /// of its width relative to the distance, and near contact to nothing.
     fn align(&mut self) {
-        if !self.has_to_be_aligned() || self.options.exhausted(self.iterations) {
+        if !runs(Stage::Alignment) || !self.has_to_be_aligned() || self.options.exhausted(self.iterations) {
             return;
         }
         let (x, y, n) = (self.x, self.y, self.n);
@@ -212,6 +214,9 @@ impl<'a> Search<'a> {
     /// there. Where two sides are all but parallel that is anywhere on them, but the corners of one
     /// show.
     fn outlined(&mut self) {
+        if !runs(Stage::SupportTables) {
+            return;
+        }
         let pair = self.pair;
         let found = approach(pair, &self.n);
         if let Some(v) = found.common {
@@ -247,6 +252,9 @@ impl<'a> Search<'a> {
     /// Its steps are those of quadratic programs, which go all the way to the edges of sides that
     /// are tilted by next to nothing.
     fn along(&mut self, x: Vector3<f64>, y: Vector3<f64>, n: Vector3<f64>, a: Active, b: Active) {
+        if !runs(Stage::Ray) {
+            return;
+        }
         let pair = self.pair;
         let Some(mut newton) = ReachNewton::new(pair, -n, Vector3::zeros(), x, y, &-n, a, b) else { return };
         let steps = newton.run(pair, self.options, self.iterations, |at| {
@@ -287,7 +295,7 @@ impl<'a> Search<'a> {
     /// Continuation of smooth bodies from two points and a normal.
     fn seek(&mut self, x: &Vector3<f64>, y: &Vector3<f64>, n: &Vector3<f64>) {
         let (pair, options) = (self.pair, self.options);
-        if options.exhausted(self.iterations) {
+        if !runs(Stage::Seek) || options.exhausted(self.iterations) {
             return;
         }
         let (pose_a, pose_b) = pair.poses();
@@ -365,6 +373,9 @@ impl<'a> Search<'a> {
 
     /// Goes on in twice the precision where rounding keeps the bracket wide.
     pub(super) fn sharpen(&mut self) {
+        if !runs(Stage::Refinement) {
+            return;
+        }
         let pair = self.pair;
         let sharp = SharpPair::new(pair);
         // Once each: from the same start it would end the same.
@@ -392,6 +403,9 @@ impl<'a> Search<'a> {
     /// Interior-point method on ½|x - y|², with Newton's method tried as soon as it shows the
     /// active constraints; ends at distances below `near` times the size.
     fn closest(&mut self, near: f64) {
+        if !runs(Stage::InteriorDistance) {
+            return;
+        }
         let (start_x, start_y) = (self.pair.a.interior, self.pair.b.interior);
         let mut v = SVector::<f64, 6>::zeros();
         v.fixed_rows_mut::<3>(0).copy_from(&start_x);
@@ -444,6 +458,9 @@ impl<'a> Search<'a> {
 
     /// The point deepest in both bodies, by Newton's method from a point and a normal.
     fn deepest(&mut self, v: &Vector3<f64>, n: &Vector3<f64>) {
+        if !runs(Stage::Deepest) {
+            return;
+        }
         let pair = self.pair;
         let (a, b) = (Active::near(&pair.a, v, &-n), Active::near(&pair.b, v, n));
         let mut deepest = Deepest::new(*v, self.depth(v), a, b);
@@ -491,6 +508,9 @@ impl<'a> Search<'a> {
     /// The point deepest in both bodies, by the interior-point method: inside both, it proves
     /// overlap; else its multipliers show the normal.
     fn contact(&mut self) {
+        if !runs(Stage::InteriorLevel) {
+            return;
+        }
         let pair = self.pair;
         // Far outside a small body its values would hide all else.
         let starts = [(self.x + self.y) * 0.5, self.x, self.y];
@@ -517,7 +537,7 @@ impl<'a> Search<'a> {
     }
 
     fn newton(&mut self, x: Vector3<f64>, y: Vector3<f64>, n: Vector3<f64>, a: Active, b: Active) {
-        if ![x, y, n].iter().all(|v| v.iter().all(|value| value.is_finite())) {
+        if !runs(Stage::Newton) || ![x, y, n].iter().all(|v| v.iter().all(|value| value.is_finite())) {
             return;
         }
         let distance = n.dot(&(x - y)).max(0.0);

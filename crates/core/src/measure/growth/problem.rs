@@ -1,9 +1,8 @@
 //! The growth distance as a relation of two points: `x - y` along the vector between the centres,
 //! the bodies' centres on top of each other.
 
-use super::{GrowthDistance, tolerance};
+use super::answer::GrowthDistance;
 use crate::body::Body;
-use crate::measure::Status;
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::twist::Twist;
 use crate::measure::frames::vector::{M3, V3, add, apply, dot, normalized, rows, scaled, subtract};
@@ -13,6 +12,7 @@ use crate::measure::solver::tangent_newton::{
     ALIGNED, Bend, Bracket, Plane, Relative, Response, SLACK, Step, TURNED, newton_along,
 };
 use crate::measure::solver::two_point_problem::{Relation, Verdict};
+use crate::measure::status::Status;
 use crate::polynomial::{Scalar, Simd, gamma};
 use nalgebra::{Matrix3, Vector3};
 
@@ -160,4 +160,12 @@ impl Relation for Along {
             Verdict::Wide
         }
     }
+}
+
+/// Width of a bracket that is narrow enough. It is relative to s, as normals of deep pairs need as
+/// much; but the vector between centres that all but coincide is known to `error` of the bodies
+/// only, and what that makes of either bound no method takes off.
+#[inline(always)]
+pub(super) fn tolerance(accuracy: f64, upper: f64, error: f64) -> f64 {
+    (accuracy * upper + 2.0 * error).min(accuracy * upper.max(1.0))
 }

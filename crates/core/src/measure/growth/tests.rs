@@ -1,7 +1,10 @@
 //! Growth distances against closed forms, laws and differences.
 
 use super::*;
+use crate::body::Body;
 use crate::measure::tests::{at, random_pose, unit, zoo};
+use crate::measure::warm::Hint;
+use nalgebra::Vector3;
 use sublevel_testkit::Seeded;
 
 fn cold(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose) -> GrowthDistance {

@@ -1,70 +1,21 @@
 //! Level distance `d(A‖B) = min p_A(x)` over x in B, p the largest constraint.
 
-mod bracket;
-mod newton;
+mod answer;
+mod pair;
 mod saturated;
 mod search;
-mod sides;
-mod smooth;
 #[cfg(test)]
 mod tests;
 
 use crate::body::{Body, Solid};
-use crate::measure::Status;
+use crate::measure::bounds::culling::{CULLING_SLACK, across};
 use crate::measure::frames::pose::Pose;
-use crate::measure::frames::query_frame::Pair;
-use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
-use crate::measure::solver::support_table_gjk::lowest;
-use crate::measure::union;
-use crate::measure::warm::{Hint, WarmStart};
-use crate::polynomial::dispatch;
-use nalgebra::Vector3;
-pub(in crate::measure) use newton::LevelNewton;
-use saturated::saturated;
-use search::Search;
-pub(in crate::measure) use smooth::LevelTrace;
-use smooth::{FollowLevel, LevelProven, SEEK_ROUNDS, SeekLevel};
-
-/// Level distance with its proof; unit-free but for the witness.
-#[derive(Clone, Copy, Debug)]
-pub struct LevelDistance {
-    /// How the solve ended.
-    pub status: Status,
-    /// Proven lower bound.
-    pub lower: f64,
-    /// Proven upper bound, attained at the witness.
-    pub upper: f64,
-    /// A point of the second body where the first one's polynomial is at most `upper`; world frame,
-    /// metres.
-    pub witness: Vector3<f64>,
-    /// How fast d falls as the level of the second body rises from 1: the sum of the multipliers of
-    /// its constraints.
-    pub multiplier: f64,
-    /// Whether the second body holds the minimiser of the first one's polynomial: d is its minimum,
-    /// the multiplier and all derivatives are 0, and d says no more about depth.
-    pub saturated: bool,
-    /// Derivative of d with respect to the pose of the first body, 1/m and 1/rad: a twist (v, ω)
-    /// changes d by `-g·v - ((x - t) × g)·ω`, g the gradient of the first body's polynomial at the
-    /// witness x (of several active constraints, weighted by their multipliers) and t the
-    /// translation.
-    pub gradient_a: Twist,
-    /// Derivative of d with respect to the pose of the second body: the same force the other way,
-    /// about its own translation.
-    pub gradient_b: Twist,
-    /// Whether another pair of parts may be as low, their brackets meeting: witness, multiplier and
-    /// gradients may then jump. Never for single bodies.
-    pub tied: bool,
-    /// Iterations of all methods together.
-    pub iterations: u32,
-}
-
-impl LevelDistance {
-    /// The answer inside the bracket: the upper bound, which the witness attains.
-    pub fn value(&self) -> f64 {
-        self.upper
-    }
-}
+use crate::measure::pairwise_minimum::{At, least};
+use crate::measure::status::Status;
+use crate::measure::warm::WarmStart;
+pub use answer::LevelDistance;
+use pair::between;
 
 /// Level distance of `a` over `b`: the smallest value that the stored polynomial of `a` (the
 /// largest of its constraints) takes on `b`. Above 1 the bodies are apart, at 1 they touch, below 1
@@ -104,78 +55,36 @@ pub fn level_distance(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> LevelDistance {
-    union::level_distance(a, pose_a, b, pose_b, options, warm)
+    match (a.parts(), b.parts()) {
+        ([a], [b]) => between(a, pose_a, b, pose_b, options, warm),
+        (a, b) => lowest((a, pose_a), (b, pose_b), options, warm),
+    }
 }
 
-/// Level distance of one body over another.
-pub(super) fn between(
-    a: &Body,
-    pose_a: &Pose,
-    b: &Body,
-    pose_b: &Pose,
+fn lowest(
+    (a, pose_a): At<'_, [Body]>,
+    (b, pose_b): At<'_, [Body]>,
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> LevelDistance {
-    let mut spent = 0;
-    let mut settled = None;
-    match &mut warm.hint {
-        Hint::LevelSmooth(trace) => match dispatch(FollowLevel { a, pose_a, b, pose_b, options, trace }) {
-            Ok(proven) => return proven.answer(a, pose_a, pose_b),
-            Err(lost) => (spent, settled) = (lost.rounds, lost.settled),
-        },
-        Hint::Saturated => {
-            if let Some(answer) = saturated(a, pose_a, b, pose_b, options) {
-                return answer;
-            }
-        }
-        _ => {}
-    }
-    let pair = Pair::new(a, pose_a, b, pose_b);
-    let followed = matches!(warm.hint, Hint::Level { .. }) || settled.is_some();
-    let start = if followed || options.exhausted(spent) { None } else { Some(lowest(&pair)) };
-    if start.as_ref().is_some_and(|start| start.common.is_some())
-        && let Some(answer) = saturated(a, pose_a, b, pose_b, options)
-    {
-        *warm = Hint::Saturated.into();
-        return LevelDistance { iterations: spent, ..answer };
-    }
-    if let Some(start) = &start
-        && pair.smooth()
-    {
-        let most = SEEK_ROUNDS.min(options.max_iterations() - spent);
-        match dispatch(SeekLevel { a, pose_a, b, pose_b, from: &pair.to_b(&start.x), most, options }) {
-            Ok((proven, trace)) => {
-                *warm = Hint::LevelSmooth(trace).into();
-                let rounds = spent + proven.rounds;
-                return LevelDistance { iterations: rounds, ..proven.answer(a, pose_a, pose_b) };
-            }
-            Err(lost) => (spent, settled) = (spent + lost.rounds, lost.settled),
-        }
-    }
-    let mut search = Search::new(&pair, options, spent);
-    if let Some(settled) = &settled {
-        search.resume(settled);
-    }
-    search.run(&warm.hint, start.as_ref());
-    *warm = search.hint().into();
-    search.answer(pose_a, pose_b)
+    let bound = |(i, j): (usize, usize)| level_bound((&a[i], pose_a), (&b[j], pose_b));
+    let found = least((a.len(), b.len()), bound, f64::NEG_INFINITY, warm, |(i, j), _, hint| {
+        between(&a[i], pose_a, &b[j], pose_b, options, hint)
+    });
+    let narrow = found.best.upper - found.lower <= options.accuracy() * found.best.upper.abs().max(1.0);
+    let (lower, tied, iterations) = (found.lower, found.tied, found.iterations);
+    LevelDistance { status: Status::of(narrow), lower, tied, iterations, ..found.best }
 }
 
-impl LevelProven {
-    fn answer(&self, a: &Body, pose_a: &Pose, pose_b: &Pose) -> LevelDistance {
-        let witness = pose_a.transform_point(&(a.normalization().center + Vector3::from(self.x)));
-        let force = pose_a.transform_direction(&Vector3::from(self.gradient));
-        LevelDistance {
-            status: Status::Converged,
-            lower: self.lower,
-            upper: self.upper,
-            witness,
-            multiplier: self.multiplier,
-            saturated: false,
-            gradient_a: Twist::of_force(-force, &witness, pose_a.translation()),
-            gradient_b: Twist::of_force(force, &witness, pose_b.translation()),
-            tied: false,
-            iterations: self.rounds,
-        }
-    }
+/// Lower bound of the level distance from B's circumscribed ball: along a ray from the interior
+/// point c a convex p with p(c) < 1 that is 1 within the reach R is at least `p(c) + (1 - p(c)) r /
+/// R` at r >= R.
+pub(super) fn level_bound((a, pose_a): At<'_, Body>, (b, pose_b): At<'_, Body>) -> f64 {
+    let (own, other) = (a.circumscribed(), b.circumscribed());
+    let (_, apart, error) = across((pose_a, a.interior_point()), (pose_b, &other.center));
+    let reach = (a.interior_point() - own.center).norm() + own.radius;
+    let times = ((apart - error - other.radius) / reach - CULLING_SLACK * (apart + other.radius) / reach)
+        * (1.0 - CULLING_SLACK);
+    let least = a.min_value();
+    if times > 1.0 { least + (1.0 - least) * times - CULLING_SLACK * times } else { f64::NEG_INFINITY }
 }

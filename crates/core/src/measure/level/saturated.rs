@@ -1,13 +1,13 @@
 //! Level distances that are the minimum of A's polynomial, which it takes in B.
 
-use super::LevelDistance;
+use super::answer::LevelDistance;
 use crate::body::Body;
-use crate::measure::Status;
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::twist::Twist;
 use crate::measure::frames::vector::dot;
 use crate::measure::options::Options;
 use crate::measure::solver::tangent_newton::{Relative, Side};
+use crate::measure::status::Status;
 use crate::polynomial::{Simd, WithSimd, dispatch, gamma};
 
 /// The answer where the interior point of `a` is proven to lie in `b` and what is known of the

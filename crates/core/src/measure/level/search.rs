@@ -1,20 +1,22 @@
 //! The search for a level distance where continuation alone has not proven it: every method in
 //! turn, from the cheapest, each of them improving one bracket.
 
-use super::LevelDistance;
-use super::newton::LevelNewton;
-use super::smooth::{LevelTrace, Settled};
+use super::answer::LevelDistance;
 use crate::body::MAX_CONSTRAINTS;
-use crate::measure::Status;
 use crate::measure::bounds::duality_bounds::{Multipliers, level_lower};
-use crate::measure::distance::{self, split};
+use crate::measure::distance;
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::query_frame::Pair;
 use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
 use crate::measure::solver::barrier_programs::Level;
+use crate::measure::solver::barrier_programs::split;
 use crate::measure::solver::kkt_newton::Active;
+use crate::measure::solver::level_continuation::{LevelTrace, Settled};
+use crate::measure::solver::level_newton::LevelNewton;
 use crate::measure::solver::refinement::SharpPair;
+use crate::measure::solver::stages::{Stage, runs};
+use crate::measure::status::Status;
 use crate::measure::warm::Hint;
 use crate::optimize::{Approach, minimise};
 use nalgebra::{SVector, Vector3};
@@ -145,6 +147,9 @@ impl<'a> Search<'a> {
     /// Newton's method from where the outline of B is nearest to A's interior point, with the
     /// constraints that are active there.
     fn outlined(&mut self, start: &Approach) {
+        if !runs(Stage::SupportTables) {
+            return;
+        }
         let pair = self.pair;
         let outward = pair.a.pulled_back(&start.n);
         for x in [start.x, start.corners.1] {
@@ -177,6 +182,9 @@ impl<'a> Search<'a> {
 
     /// Goes on in twice the precision where rounding keeps the bracket wide.
     fn sharpen(&mut self, accuracy: f64) {
+        if !runs(Stage::Refinement) {
+            return;
+        }
         let pair = self.pair;
         let sharp = SharpPair::new(pair);
         let (of_a, of_b) = &self.multipliers;
@@ -211,6 +219,9 @@ impl<'a> Search<'a> {
     /// as it shows the active constraints. Values of A fall by orders of magnitude on the way in:
     /// each round scales them again.
     fn interior_point(&mut self) {
+        if !runs(Stage::InteriorLevel) {
+            return;
+        }
         let pair = self.pair;
         self.attain(&pair.a.interior);
         if pair.b.contains(&pair.a.interior) {
@@ -279,6 +290,9 @@ impl<'a> Search<'a> {
     }
 
     fn newton(&mut self, x: Vector3<f64>, a: Active, b: Active) {
+        if !runs(Stage::Newton) {
+            return;
+        }
         if !x.iter().all(|value| value.is_finite()) {
             return;
         }

@@ -1,6 +1,8 @@
 //! Level distances by continuation against closed forms, cold answers and differences of values.
 
 use super::*;
+use crate::measure::Twist;
+use nalgebra::Vector3;
 use std::sync::atomic::AtomicBool;
 use sublevel_testkit::Seeded;
 

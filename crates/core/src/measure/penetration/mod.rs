@@ -1,71 +1,20 @@
-//! Penetration depth: the shortest translation that takes two overlapping bodies apart.
-//!
-//! For a unit vector n let `f(n) = h_A(-n) + h_B(n)`, h the support functions: how far A has to
-//! move along n (or B along -n) until a plane across n parts them. f is the support function of the
-//! difference `B - A`, which contains 0 if and only if the bodies meet, and the depth is the least
-//! of f over all n: any n bounds it from above, but a bound from below has to cover the sphere
-//! ([`sphere_branch_and_bound`]). Triangles of directions are split, those of the lowest bound
-//! first, until none is left below the best depth known by more than the accuracy asked for. Near a
-//! minimum that f leaves quadratically as many triangles are split at each size; where many
-//! directions are equally good, as for concentric balls, all of them are.
+//! Penetration depth: the shortest translation that takes two overlapping solids apart.
 
-mod direction_sampling;
-mod farthest;
-mod local_search;
-mod sphere_branch_and_bound;
-mod support;
+mod answer;
+mod pair;
 #[cfg(test)]
 mod tests;
 
-use crate::body::{Body, Solid};
-use crate::measure::Status;
-use crate::measure::bounds::duality_bounds::SLACK;
+use crate::body::Solid;
+use crate::measure::bounds::culling::ball_gap;
 use crate::measure::frames::pose::Pose;
-use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::options::Options;
-use crate::measure::union;
+use crate::measure::pairwise_minimum::{Least, least};
+use crate::measure::signed::separating_translation::{self, Start, Starts, narrow};
+use crate::measure::status::Status;
 use crate::measure::warm::WarmStart;
-use crate::polynomial::{MAX_LANES, dispatch};
-use direction_sampling::Scout;
-use farthest::{Farthest, Sought};
-pub(super) use local_search::{Best, tolerance};
-use nalgebra::Vector3;
-use sphere_branch_and_bound::{Cell, Covering, Direction};
-use support::{SupportPoint, support};
-
-/// Penetration depth with its proof, lengths in metres, vectors in the world frame.
-#[derive(Clone, Copy, Debug)]
-pub struct Penetration {
-    /// How the solve ended.
-    pub status: Status,
-    /// Proven lower bound over all directions; 0 if the bodies are not proven to overlap.
-    pub lower: f64,
-    /// Proven upper bound: moving the first body by this much along `direction` (or the second
-    /// against it) takes the bodies apart, so that they touch at most; 0 if they are apart.
-    pub upper: f64,
-    /// Unit vector from the second body to the first: the normal of the distance, continued; none
-    /// if they are apart.
-    pub direction: Option<Vector3<f64>>,
-    /// Point of the first body that is deepest in the second: the last to come out.
-    pub witness_a: Vector3<f64>,
-    /// Point of the second body that is deepest in the first.
-    pub witness_b: Vector3<f64>,
-    /// Whether a direction elsewhere, or another pair of parts, was seen to be about as short, or
-    /// the direction is not known to be the best of those near it: direction and witnesses may then
-    /// jump.
-    pub tied: bool,
-    /// Directions whose support points were computed.
-    pub directions: u32,
-    /// Iterations: sweeps over triangles, and steps of Newton's method.
-    pub iterations: u32,
-}
-
-impl Penetration {
-    /// The answer inside the bracket: the upper bound, which the direction attains.
-    pub fn value(&self) -> f64 {
-        self.upper
-    }
-}
+pub use answer::Penetration;
+use pair::between;
 
 /// Penetration depth of two bodies at their poses (body to world): 0 when they are apart or touch.
 ///
@@ -109,362 +58,44 @@ pub fn penetration(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> Penetration {
-    union::penetration(a, pose_a, b, pose_b, options, warm)
-}
-
-/// Penetration depth of two bodies.
-pub(super) fn between(
-    a: &Body,
-    pose_a: &Pose,
-    b: &Body,
-    pose_b: &Pose,
-    options: &Options<'_>,
-    warm: &mut WarmStart,
-) -> Penetration {
-    let pair = Pair::new(a, pose_a, b, pose_b);
-    let mut best = Best::new(&pair, pose_a, pose_b, options);
-    best.follow(&warm.hint);
-    let proof = prove(&mut best);
-    if let Some(hint) = best.hint() {
-        *warm = hint;
+    let (parts_a, parts_b) = (a.parts(), b.parts());
+    if let ([a], [b]) = (parts_a, parts_b) {
+        return between(a, pose_a, b, pose_b, options, warm);
     }
-    let apart = best.depth <= 0.0;
-    let upper = best.depth.max(0.0);
-    let unit = pair.unit();
-    Penetration {
-        status: if upper - proof.lower <= tolerance(&pair, options, upper) {
-            Status::Converged
-        } else {
-            Status::BracketWide
-        },
-        lower: proof.lower * unit,
-        upper: upper * unit,
-        direction: best.n.filter(|_| !apart).map(|n| pair.direction_to_world(&n)),
-        witness_a: pair.to_world(&best.x),
-        witness_b: pair.to_world(&best.y),
-        tied: proof.tied,
-        directions: proof.directions,
-        iterations: best.iterations,
-    }
-}
-
-/// What is known of all directions.
-pub(super) struct Proof {
-    /// Lower bound of the depth, query units.
-    pub(super) lower: f64,
-    pub(super) tied: bool,
-    pub(super) directions: u32,
-}
-
-/// Tables of directions: one that costs little to lay out and serves nearly all pairs, and one for
-/// ties.
-const FEW: usize = 128;
-const MANY: usize = 2048;
-
-/// Bounds the depth from below, improving the best direction on the way.
-pub(super) fn prove(best: &mut Best<'_>) -> Proof {
-    let (n, depth) = dispatch(Scout { pair: best.pair });
-    if !(best.depth <= depth) {
-        best.seek(Some(&n));
-    }
-    match sweep::<FEW>(best) {
-        (proof, true) if !best.options.exhausted(best.iterations) => {
-            let (more, _) = sweep::<MANY>(best);
-            Proof { lower: more.lower.max(proof.lower), directions: more.directions + proof.directions, ..more }
-        }
-        (proof, _) => proof,
-    }
-}
-
-/// Triangles that are split together, as their support points are found together; the same on every
-/// machine.
-const GROUP: usize = MAX_LANES;
-
-/// Groups split in one iteration.
-const GROUPS: u32 = 8;
-
-/// Sweeps the sphere of directions until the bracket is narrow; also says whether the table was
-/// full first.
-#[inline(never)]
-fn sweep<const N: usize>(best: &mut Best<'_>) -> (Proof, bool) {
-    let mut sweep = Sweep {
-        pair: best.pair,
-        options: best.options,
-        covering: Covering::<N>::new(),
-        floor: f64::INFINITY,
-        error: 0.0,
-        size: 0.0,
-    };
-    let full = sweep.run(best).is_none();
-    let lower = sweep.lowest(best).min(sweep.floor);
-    if best.depth > 0.0 && !best.settled {
-        best.settle();
-    }
-    let lower = if sweep.covering.directions().len() < 6 || best.depth <= 0.0 { 0.0 } else { lower.max(0.0) };
-    let proof = Proof {
-        lower: lower.min(best.depth.max(0.0)),
-        tied: sweep.tied(best),
-        directions: sweep.covering.directions().len() as u32,
-    };
-    (proof, full)
-}
-
-/// A direction whose support points are wanted.
-#[derive(Clone, Copy)]
-struct Wanted {
-    /// Unit vector, query frame.
-    n: Vector3<f64>,
-    /// The directions it lies between, in their order; none if it lies anywhere.
-    between: Option<[u16; 2]>,
-}
-
-struct Sweep<'a, const N: usize> {
-    pair: &'a Pair<'a>,
-    options: &'a Options<'a>,
-    covering: Covering<N>,
-    /// Lowest bound of the triangles that were left as they are.
-    floor: f64,
-    /// Largest error of a known point of B - A.
-    error: f64,
-    /// Bound of |w| over B - A: how fast f can change.
-    size: f64,
-}
-
-/// Where to look for the support point along n between two others.
-fn between_points(body: &Posed<'_>, p: &SupportPoint, q: &SupportPoint, n: &Vector3<f64>) -> SupportPoint {
-    let farther = if n.dot(&p.x) > n.dot(&q.x) { *p } else { *q };
-    // Between near points of one smooth surface it has the right normal, and is inside by little.
-    let smooth = body.len() == 1 && (p.x - q.x).norm() < 0.4;
-    if smooth { SupportPoint { x: (p.x + q.x) * 0.5, ..*p } } else { farther }
-}
-
-impl<const N: usize> Sweep<'_, N> {
-    /// None if the table is full before the bracket is narrow.
-    fn run(&mut self, best: &mut Best<'_>) -> Option<()> {
-        let origin = Vector3::zeros();
-        self.size = self.pair.a.reach(&origin) + self.pair.b.reach(&origin);
-        // The octahedron: a box's own axes are among its corners.
-        let mut axes = [Wanted { n: origin, between: None }; 6];
-        for (k, axis) in axes.iter_mut().enumerate() {
-            axis.n[k % 3] = if k < 3 { 1.0 } else { -1.0 };
-        }
-        for direction in self.directions(&axes, best)?.into_iter().flatten() {
-            self.covering.add(direction);
-        }
-        self.improve(0, best);
-        for k in 0..8 {
-            let sign = |axis: u16| if k >> axis & 1 == 0 { axis } else { axis + 3 };
-            self.open([sign(0), sign(1), sign(2)], best);
-        }
-        loop {
-            let before = self.covering.directions().len();
-            for _ in 0..GROUPS {
-                if best.depth <= 0.0 || self.covering.is_closed() {
-                    return Some(());
-                }
-                if !self.covering.has_room(GROUP) {
-                    return None;
-                }
-                if !self.split(best) {
-                    return Some(());
-                }
+    let (mut starts, mut directions) = (Starts::default(), 0);
+    let gap = |(i, j): (usize, usize)| ball_gap((&parts_a[i], pose_a), (&parts_b[j], pose_b));
+    let Least { best, iterations, .. } =
+        least((parts_a.len(), parts_b.len()), gap, f64::NEG_INFINITY, warm, |pair, _, hint| {
+            let found = between(&parts_a[pair.0], pose_a, &parts_b[pair.1], pose_b, options, hint);
+            directions += found.directions;
+            if let Some(direction) = found.direction {
+                starts.push(Start { pair, direction, depth: found.upper });
             }
-            best.iterations += 1;
-            let depth = best.depth;
-            self.improve(before, best);
-            if best.depth < depth {
-                self.close(best);
-            }
-            if self.options.exhausted(best.iterations) {
-                return Some(());
-            }
-        }
-    }
-
-    /// The lowest bound of the triangles that are left to split: until now these were only found
-    /// not to be good enough.
-    fn lowest(&self, best: &Best<'_>) -> f64 {
-        let target = self.target(best);
-        let error = self.error + 4.0 * SLACK * self.size;
-        let bound = |cell: Cell| {
-            let shares = (0..10).map(|k| 1.0 - 1e-3 * f64::from(1 << k));
-            let mut bounds = shares.filter_map(|share| self.covering.bound(cell.corners, share * target + error).ok());
-            bounds.next().map_or(0.0, |bound| bound - error)
-        };
-        self.covering.cells().map(bound).fold(f64::INFINITY, f64::min)
-    }
-
-    /// Triangles at or above this bound are good enough.
-    fn target(&self, best: &Best<'_>) -> f64 {
-        best.depth - tolerance(self.pair, self.options, best.depth)
-    }
-
-    /// Support points along each n and against it; none if one of them cannot be found.
-    fn directions(&mut self, wanted: &[Wanted], best: &Best<'_>) -> Option<[Option<Direction>; GROUP]> {
-        let pair = self.pair;
-        let mut sought = [[Sought::default(); GROUP]; 2];
-        let mut tolerated = [0.0; GROUP];
-        for (k, want) in wanted.iter().enumerate() {
-            tolerated[k] = self.tolerated(want, best);
-            let tolerance = tolerated[k] * pair.unit();
-            sought[0][k] = Sought { n: -want.n, tolerance };
-            sought[1][k] = Sought { n: pair.direction_to_b(&want.n), tolerance };
-        }
-        let of_a = dispatch(Farthest { body: pair.a.body, sought: &sought[0][..wanted.len()] });
-        let of_b = dispatch(Farthest { body: pair.b.body, sought: &sought[1][..wanted.len()] });
-        let mut found = [None; GROUP];
-        for (k, want) in wanted.iter().enumerate() {
-            found[k] = Some(self.direction(want, tolerated[k], [of_a[k], of_b[k]])?);
-        }
-        Some(found)
-    }
-
-    /// What support points along n may lack, query units: far above the best depth a rough bound
-    /// will do.
-    fn tolerated(&self, Wanted { n, between }: &Wanted, best: &Best<'_>) -> f64 {
-        let known = if best.depth.is_finite() { best.depth.abs() } else { self.size };
-        let depth = |end: u16| n.dot(&self.covering.directions()[usize::from(end)].w());
-        let surplus = between.map_or(0.0, |ends| ends.into_iter().map(depth).fold(0.0, f64::max) - known);
-        (0.1 * tolerance(self.pair, self.options, known)).max(0.02 * surplus)
-    }
-
-    /// The direction with its support points, which are sought in another way where they were not
-    /// found.
-    fn direction(
-        &mut self,
-        &Wanted { n, between }: &Wanted,
-        tolerance: f64,
-        [of_a, of_b]: [Option<(Vector3<f64>, usize)>; 2],
-    ) -> Option<Direction> {
-        let pair = self.pair;
-        let ends = between.map(|ends| ends.map(|i| self.covering.directions()[usize::from(i)]));
-        let (a, b) = (&pair.a, &pair.b);
-        let to_a = |x: &Vector3<f64>| pair.a_to_query(&(x + a.body.normalization().center));
-        let to_b = |y: &Vector3<f64>| pair.b_to_query(&(y + b.body.normalization().center));
-        let a = match of_a {
-            Some((x, active)) => SupportPoint { x: to_a(&x), active: 1 << active },
-            None => {
-                let start = ends.map(|[p, q]| between_points(a, &p.a, &q.a, &-n));
-                support(a, &-n, tolerance, start, || pair.farthest_a(&-n))?
-            }
-        };
-        let b = match of_b {
-            Some((y, active)) => SupportPoint { x: to_b(&y), active: 1 << active },
-            None => {
-                let start = ends.map(|[p, q]| between_points(b, &p.b, &q.b, &n));
-                support(b, &n, tolerance, start, || pair.farthest_b(&n))?
-            }
-        };
-        self.error = self.error.max(pair.a.displacement(&a.x) + pair.b.displacement(&b.x));
-        Some(Direction { n, a, b, parents: between.unwrap_or_default() })
-    }
-
-    /// Tries the best of the directions from `first` on, if it promises to be better than the best
-    /// known.
-    fn improve(&mut self, first: usize, best: &mut Best<'_>) {
-        let directions = &self.covering.directions()[first..];
-        let Some(least) = directions.iter().min_by(|p, q| p.depth().total_cmp(&q.depth())) else { return };
-        let promising = best.depth - 0.5 * best.tolerance();
-        if !(least.depth() < promising) && best.depth.is_finite() {
-            return;
-        }
-        let smooth = self.pair.smooth();
-        if !(smooth && best.seek(Some(&least.n)) && best.depth <= least.depth()) {
-            best.offer(&least.a, &least.b, &least.n);
-        }
-    }
-
-    /// Bounds a triangle, and keeps it for later if that is not enough.
-    fn open(&mut self, corners: [u16; 3], best: &Best<'_>) {
-        // Middles are rounded, so neighbours of different size leave slivers open; f changes by
-        // little over one. The sums of the bound itself round too.
-        let (target, error) = (self.target(best), self.error + 4.0 * SLACK * self.size);
-        match self.covering.bound(corners, target + error) {
-            Ok(bound) => self.floor = self.floor.min(bound - error),
-            Err(guess) => self.covering.push(Cell { corners, guess }),
-        }
-    }
-
-    /// Drops the triangles that are good enough for a better depth.
-    fn close(&mut self, best: &Best<'_>) {
-        let (target, error) = (self.target(best), self.error + 4.0 * SLACK * self.size);
-        let floor = &mut self.floor;
-        self.covering.close(|covering, cell| match covering.bound(cell.corners, target + error) {
-            Ok(bound) => {
-                *floor = floor.min(bound - error);
-                true
-            }
-            Err(_) => false,
+            found
         });
+    if starts.is_empty() {
+        return Penetration { directions, iterations, ..best };
     }
-
-    /// Splits the lowest triangles; false if that cannot be done, all staying as it is.
-    fn split(&mut self, best: &Best<'_>) -> bool {
-        // Each with the middle of its widest edge if that is known, else where it is wanted.
-        let (mut cells, mut count) = ([None; GROUP], 0);
-        let (mut wanted, mut missing) = ([Wanted { n: Vector3::zeros(), between: None }; GROUP], 0);
-        while count < GROUP
-            && let Some(cell) = self.covering.pop()
-        {
-            let ([i, j, k], n) = self.covering.widest_edge(cell.corners);
-            let between = Some([i.min(j), i.max(j)]);
-            let shared = wanted[..missing].iter().position(|other| other.between == between);
-            let middle = match (self.covering.middle(i, j), shared) {
-                (Some(known), _) => Ok(known),
-                (None, Some(shared)) => Err(shared),
-                (None, None) => {
-                    wanted[missing] = Wanted { n, between };
-                    missing += 1;
-                    Err(missing - 1)
-                }
-            };
-            cells[count] = Some((cell, [i, j, k], middle));
-            count += 1;
-        }
-        let found = if missing > 0 { self.directions(&wanted[..missing], best) } else { Some([None; GROUP]) };
-        let Some(found) = found else {
-            cells.into_iter().flatten().for_each(|(cell, ..)| self.covering.push(cell));
-            return false;
-        };
-        let added = found.map(|direction| direction.map_or(0, |direction| self.covering.add_middle(direction)));
-        for (_, [i, j, k], middle) in cells.into_iter().flatten() {
-            let middle = middle.unwrap_or_else(|wanted| added[wanted]);
-            self.open([i, middle, k], best);
-            self.open([middle, j, k], best);
-        }
-        true
-    }
-
-    /// Whether a direction far from the best is about as good, or one near it may be better.
-    fn tied(&mut self, best: &Best<'_>) -> bool {
-        let Some(n) = best.n.filter(|_| best.depth > 0.0) else { return false };
-        if !best.settled {
-            return true;
-        }
-        let close = best.depth + 2.0 * best.tolerance();
-        let elsewhere = |n_other: &Vector3<f64>| n_other.dot(&n) < ELSEWHERE;
-        // Symmetric bodies have the mirror image of the best, which may lie between all directions
-        // known.
-        let opposite = self.directions(&[Wanted { n: -n, between: None }], best).and_then(|[opposite, ..]| opposite);
-        let others = self.covering.directions().iter().filter(|direction| elsewhere(&direction.n));
-        let Some(least) = others.chain(&opposite).min_by(|p, q| p.depth().total_cmp(&q.depth())) else { return false };
-        if least.depth() <= close {
-            return true;
-        }
-        if least.depth() > WORTH_A_LOOK * best.depth {
-            return false;
-        }
-        // From there the way down may lead to another minimum.
-        let mut other = best.again();
-        if !other.seek(Some(&least.n)) {
-            other.offer(&least.a, &least.b, &least.n);
-        }
-        other.depth <= close && other.n.is_some_and(|n| elsewhere(&n))
+    let way = separating_translation::out(
+        (a, pose_a),
+        (b, pose_b),
+        &starts,
+        best.lower,
+        |depth| narrow(a, b, depth, options),
+        options,
+    );
+    let (lower, upper) = (best.lower, way.length);
+    let narrow = upper - lower <= narrow(a, b, upper, options);
+    Penetration {
+        status: Status::of(narrow),
+        lower,
+        upper,
+        direction: Some(way.direction),
+        witness_a: way.contacts[0].x,
+        witness_b: way.contacts[0].y,
+        // Another way out for the deepest pair counts if that pair is what decides.
+        tied: way.tied || best.tied && narrow,
+        directions,
+        iterations: iterations + way.iterations,
     }
 }
-
-/// Cosine of the angle beyond which a direction is another one than the best.
-const ELSEWHERE: f64 = 0.99;
-
-/// Relative to the best, depth of a direction elsewhere that may lead down to one as good.
-const WORTH_A_LOOK: f64 = 1.1;

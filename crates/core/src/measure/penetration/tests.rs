@@ -1,7 +1,9 @@
 //! Penetration depths against closed forms, brute force over directions, and laws.
 
 use super::*;
+use crate::body::Body;
 use crate::measure::tests::{at, random_pose, unit, zoo};
+use nalgebra::Vector3;
 use sublevel_testkit::Seeded;
 
 fn cold(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose) -> Penetration {

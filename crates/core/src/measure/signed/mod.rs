@@ -7,63 +7,23 @@
 //! noticing; x and y trade places along n. What differs is the proof: apart, any pair of points
 //! bounds it from above; in overlap that takes all directions ([`crate::measure::penetration`]).
 
+mod answer;
+mod pair;
+pub(super) mod separating_translation;
 #[cfg(test)]
 mod tests;
 
-use crate::body::{Body, Solid};
-use crate::measure::Status;
-use crate::measure::bounds::duality_bounds::distance_upper;
-use crate::measure::distance::distance;
+use crate::body::Solid;
+use crate::measure::bounds::culling::ball_gap;
 use crate::measure::frames::pose::Pose;
-use crate::measure::frames::query_frame::Pair;
 use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
-use crate::measure::penetration::{Best, prove, tolerance};
-use crate::measure::solver::continuation::{Follow, Proven};
-use crate::measure::solver::two_point_problem::Through;
-use crate::measure::union;
-use crate::measure::warm::{Hint, WarmStart};
-use crate::polynomial::{Scalar, dispatch};
-use nalgebra::Vector3;
-
-/// Signed distance with its proof, lengths in metres, vectors in the world frame.
-#[derive(Clone, Copy, Debug)]
-pub struct SignedDistance {
-    /// How the solve ended.
-    pub status: Status,
-    /// Proven lower bound; negative when the bodies may overlap.
-    pub lower: f64,
-    /// Proven upper bound; negative when the bodies are proven to overlap.
-    pub upper: f64,
-    /// Point of the first body nearest to the second, or deepest in it.
-    pub witness_a: Vector3<f64>,
-    /// Point of the second body nearest to the first, or deepest in it.
-    pub witness_b: Vector3<f64>,
-    /// Unit vector from the second body to the first: moving the first along it makes the signed
-    /// distance grow as much. None only if the solve was stopped before any was found.
-    pub normal: Option<Vector3<f64>>,
-    /// Derivatives with respect to the twists of the first and of the second body; none without a
-    /// normal.
-    pub gradients: Option<[Twist; 2]>,
-    /// Whether the bracket holds 0: the bodies may just touch. Smooth bodies have the same
-    /// derivative on both sides; where edges or corners touch, the derivative in overlap may be
-    /// another one.
-    pub at_contact: bool,
-    /// Whether another direction out of an overlap was seen to be about as short, or the one found
-    /// is not known to be the best of those near it, or another pair of parts may be as near: value
-    /// and bracket hold, but normal, witnesses and gradients may jump.
-    pub tied: bool,
-    /// Iterations of all methods together.
-    pub iterations: u32,
-}
-
-impl SignedDistance {
-    /// The answer inside the bracket that points or a direction attain: the upper bound of bodies
-    /// apart, else the lower.
-    pub fn value(&self) -> f64 {
-        if self.lower > 0.0 { self.upper } else { self.lower }
-    }
-}
+use crate::measure::pairwise_minimum::{Least, least};
+use crate::measure::status::Status;
+use crate::measure::warm::WarmStart;
+pub use answer::SignedDistance;
+use pair::between;
+use separating_translation::{Contact, Start, Starts, Way, narrow};
 
 /// Signed distance of body `a` at `pose_a` and body `b` at `pose_b` (body to world).
 ///
@@ -107,162 +67,55 @@ pub fn signed_distance(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> SignedDistance {
-    union::signed_distance(a, pose_a, b, pose_b, options, warm)
-}
-
-/// Signed distance of two bodies.
-pub(super) fn between(
-    a: &Body,
-    pose_a: &Pose,
-    b: &Body,
-    pose_b: &Pose,
-    options: &Options<'_>,
-    warm: &mut WarmStart,
-) -> SignedDistance {
-    let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
-    let mut spent = 0;
-    if let Hint::Smooth(trace) = &mut warm.hint {
-        let relation = Through { pose_a, pose_b, facing: None, tolerance };
-        // Apart, or nearly, the normal proves all there is.
-        match dispatch(Follow { a, b, relation, options, trace }) {
-            Ok(proven) if proven.upper - proven.lower <= tolerance => {
-                let [x, y, normal] = proven.world(Scalar, a, pose_a);
-                return Answer::of(&proven).report((x, y), Some(normal), pose_a, pose_b);
-            }
-            Ok(proven) => spent = proven.rounds,
-            Err(lost) => spent = lost.rounds,
+    let (parts_a, parts_b) = (a.parts(), b.parts());
+    if let ([a], [b]) = (parts_a, parts_b) {
+        return between(a, pose_a, b, pose_b, options, warm);
+    }
+    let mut starts = Starts::default();
+    let gap = |(i, j): (usize, usize)| ball_gap((&parts_a[i], pose_a), (&parts_b[j], pose_b));
+    let found = least((parts_a.len(), parts_b.len()), gap, f64::NEG_INFINITY, warm, |pair, _, hint| {
+        let found = between(&parts_a[pair.0], pose_a, &parts_b[pair.1], pose_b, options, hint);
+        if let Some(direction) = found.normal.filter(|_| found.lower <= 0.0) {
+            starts.push(Start { pair, direction, depth: -found.lower });
         }
+        found
+    });
+    let Least { best, lower, tied, iterations } = found;
+    if lower > 0.0 || starts.is_empty() {
+        let status = Status::of(best.upper - lower <= narrow(a, b, 0.0, options));
+        return SignedDistance { status, lower, tied: tied || best.tied, iterations, ..best };
     }
-    let pair = Pair::new(a, pose_a, b, pose_b);
-    let mut best = Best::new(&pair, pose_a, pose_b, options);
-    best.iterations = spent;
-    best.follow(&warm.hint);
-    if best.depth.is_infinite() {
-        best.seek(None);
-    }
-    let mut known = Known::of(&best);
-    if best.depth.is_infinite() {
-        // Nothing to follow: the distance says on which side the bodies are.
-        let apart = distance(a, pose_a, b, pose_b, options, warm);
-        best.iterations += apart.iterations;
-        if apart.lower > 0.0 {
-            let iterations = best.iterations;
-            let answer =
-                Answer { lower: apart.lower, upper: apart.upper, tied: false, iterations, status: apart.status };
-            return answer.report((apart.witness_a, apart.witness_b), apart.normal, pose_a, pose_b);
-        }
-        best.follow(&warm.hint);
-        known = Known::of(&best);
-        known.attain(
-            apart.upper / pair.unit(),
-            pair.world_to_query(&apart.witness_a),
-            pair.world_to_query(&apart.witness_b),
-        );
-    }
-    if known.lower < 0.0 && !known.narrow(&best) {
-        // Halfway between the deepest points is mostly a common one.
-        let middle = (known.x + known.y) * 0.5;
-        if pair.common(&middle) {
-            known.attain(0.0, middle, middle);
-        }
-    }
-    let mut tied = false;
-    if best.depth > 0.0 && !known.narrow(&best) {
-        let proof = prove(&mut best);
-        tied = proof.tied;
-        let before = known;
-        known = Known::of(&best);
-        if proof.lower > 0.0 {
-            known.upper = -proof.lower;
-        } else {
-            known.attain(before.upper, before.x, before.y);
-        }
-    }
-    if let Some(hint) = best.hint() {
-        *warm = hint;
-    }
-    if known.lower > 0.0 && !known.narrow(&best) {
-        let apart = distance(a, pose_a, b, pose_b, options, warm);
-        let answer = Answer {
-            lower: apart.lower.max(known.lower * pair.unit()),
-            upper: apart.upper,
-            tied,
-            iterations: best.iterations + apart.iterations,
-            status: apart.status,
-        };
-        return answer.report((apart.witness_a, apart.witness_b), apart.normal, pose_a, pose_b);
-    }
-    let status = if known.narrow(&best) { Status::Converged } else { Status::BracketWide };
-    let unit = pair.unit();
-    let answer =
-        Answer { lower: known.lower * unit, upper: known.upper * unit, tied, iterations: best.iterations, status };
-    let normal = best.n.map(|n| pair.direction_to_world(&n));
-    answer.report((pair.to_world(&known.x), pair.to_world(&known.y)), normal, pose_a, pose_b)
-}
-
-/// A bracket of the signed distance in query units, and the points behind it.
-struct Known {
-    lower: f64,
-    upper: f64,
-    x: Vector3<f64>,
-    y: Vector3<f64>,
-}
-
-impl Known {
-    /// What the best direction shows, and the points of the bodies there.
-    fn of(best: &Best<'_>) -> Self {
-        let (lower, pair) = (-best.depth, best.pair);
-        if let Some(upper) = best.attained {
-            return Self { lower, upper, x: best.x, y: best.y };
-        }
-        match (pair.a.pull_in(&best.x), pair.b.pull_in(&best.y)) {
-            (Some(x), Some(y)) => Self { lower, upper: distance_upper(pair, &x, &y), x, y },
-            _ => Self { lower, upper: f64::INFINITY, x: best.x, y: best.y },
-        }
-    }
-
-    /// Takes points that are nearer.
-    fn attain(&mut self, upper: f64, x: Vector3<f64>, y: Vector3<f64>) {
-        if upper < self.upper {
-            (self.upper, self.x, self.y) = (upper, x, y);
-        }
-    }
-
-    fn narrow(&self, best: &Best<'_>) -> bool {
-        let depth = if self.upper < 0.0 { -self.lower } else { 0.0 };
-        self.upper - self.lower <= tolerance(best.pair, best.options, depth)
+    let least = (-best.upper).max(0.0);
+    let way = separating_translation::out(
+        (a, pose_a),
+        (b, pose_b),
+        &starts,
+        least,
+        |depth| narrow(a, b, depth, options),
+        options,
+    );
+    let (lower, upper) = (-way.length, best.upper);
+    let narrow = upper - lower <= narrow(a, b, if upper < 0.0 { way.length } else { 0.0 }, options);
+    SignedDistance {
+        status: Status::of(narrow),
+        lower,
+        upper,
+        witness_a: way.contacts[0].x,
+        witness_b: way.contacts[0].y,
+        normal: Some(way.direction),
+        gradients: Some(gradients(&way, pose_a, pose_b)),
+        at_contact: lower <= 0.0 && upper >= 0.0,
+        tied: way.tied || best.tied && narrow,
+        iterations: iterations + way.iterations,
     }
 }
 
-struct Answer {
-    lower: f64,
-    upper: f64,
-    tied: bool,
-    iterations: u32,
-    status: Status,
-}
-
-impl Answer {
-    fn of(proven: &Proven) -> Self {
-        let Proven { lower, upper, rounds, .. } = *proven;
-        Self { lower, upper, tied: false, iterations: rounds, status: Status::Converged }
-    }
-
-    fn report(
-        self,
-        (witness_a, witness_b): (Vector3<f64>, Vector3<f64>),
-        normal: Option<Vector3<f64>>,
-        pose_a: &Pose,
-        pose_b: &Pose,
-    ) -> SignedDistance {
-        let Self { lower, upper, tied, iterations, status } = self;
-        let gradients = normal.map(|n| {
-            [
-                Twist::of_force(n, &witness_a, pose_a.translation()),
-                Twist::of_force(-n, &witness_b, pose_b.translation()),
-            ]
-        });
-        let at_contact = lower <= 0.0 && upper >= 0.0;
-        SignedDistance { status, lower, upper, witness_a, witness_b, normal, gradients, at_contact, tied, iterations }
-    }
+/// Derivatives of minus the length of a way with respect to both poses: each pair of parts that
+/// holds the solids back adds its pull, at the points where it does (envelope theorem).
+fn gradients(way: &Way, pose_a: &Pose, pose_b: &Pose) -> [Twist; 2] {
+    way.contacts.iter().fold([Twist::ZERO; 2], |[a, b], Contact { pull, x, y }| {
+        let of_a = Twist::of_force(*pull, x, pose_a.translation());
+        let of_b = Twist::of_force(-pull, y, pose_b.translation());
+        [a + of_a, b + of_b]
+    })
 }

@@ -1,7 +1,9 @@
 //! Signed distances against closed forms, differences, and themselves through contact.
 
 use super::*;
+use crate::body::Body;
 use crate::measure::tests::{at, random_pose, twisted, unit, zoo};
+use nalgebra::Vector3;
 use sublevel_testkit::Seeded;
 
 fn cold(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose) -> SignedDistance {

@@ -1,6 +1,7 @@
 //! The convex programs behind the measures, for the interior-point method.
 
-use crate::body::largest;
+use crate::body::{MAX_CONSTRAINTS, largest};
+use crate::measure::bounds::duality_bounds::Multipliers;
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::optimize::{Program, Row, Rows};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
@@ -102,4 +103,14 @@ impl Program<4> for Level<'_> {
             });
         }
     }
+}
+
+/// Splits the multipliers of a program's rows into those of A and of B, times `factor`.
+pub(in crate::measure) fn split(pair: &Pair<'_>, rows: &[f64], factor: f64) -> (Multipliers, Multipliers) {
+    let (mut of_a, mut of_b) = ([0.0; MAX_CONSTRAINTS], [0.0; MAX_CONSTRAINTS]);
+    let (first, second) = rows.split_at(pair.a.len());
+    for (to, from) in of_a.iter_mut().zip(first).chain(of_b.iter_mut().zip(second)) {
+        *to = from * factor;
+    }
+    (of_a, of_b)
 }

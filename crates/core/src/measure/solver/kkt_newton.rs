@@ -15,12 +15,12 @@
 use crate::measure::bounds::duality_bounds::Multipliers;
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::frames::vector::V3;
+use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::active_constraints::{ActiveConstraints, MAX_ACTIVE};
 use crate::measure::solver::continuation::LONGEST;
 use crate::measure::solver::linear_systems::solve;
 use crate::measure::solver::step_acceleration::{Series, Taken, across, along, tangents};
 use crate::measure::solver::tangent_newton::ALIGNED;
-use crate::measure::warm::ActiveSet;
 use crate::polynomial::Scalar;
 use nalgebra::{Matrix3, Vector3};
 

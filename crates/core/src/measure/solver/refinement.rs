@@ -9,11 +9,11 @@
 use crate::body::largest;
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::query_frame::{Pair, Posed};
-use crate::measure::level::LevelNewton;
 use crate::measure::solver::double_double::{
     Two, Twos, UNIT, apply, dot, doubles, minus, plus, product, times, transposed, twos,
 };
 use crate::measure::solver::kkt_newton::{Active, At, DistanceNewton, VIOLATED};
+use crate::measure::solver::level_newton::LevelNewton;
 use crate::measure::solver::linear_systems::{Augmented, MAX_UNKNOWNS, solve};
 use crate::measure::solver::tangent_newton::ALIGNED;
 use crate::polynomial::Polynomial;

@@ -4,8 +4,8 @@
 use crate::body::Body;
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::vector::{M3, V3, add, add_scaled, dot, subtract};
-use crate::measure::overlap::Goal;
 use crate::measure::solver::initial_guess::{Start, facing, meeting};
+use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::solver::tangent_newton::{ALIGNED, Bend, Bracket, Plane, Relative, Response, Step, newton};
 use crate::polynomial::Simd;
 
@@ -73,7 +73,7 @@ pub(in crate::measure) struct Apart<'a> {
     pub(in crate::measure) pose_a: &'a Pose,
     pub(in crate::measure) pose_b: &'a Pose,
     /// What the bracket has to decide, if that is less than being narrow.
-    pub(in crate::measure) goal: &'a Goal,
+    pub(in crate::measure) goal: &'a StopCriterion,
     /// Width of the bracket that is narrow enough, metres.
     pub(in crate::measure) tolerance: f64,
 }

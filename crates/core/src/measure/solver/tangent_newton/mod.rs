@@ -23,42 +23,15 @@
 //! Points are given in A's frame from the centre of A's normalization on, metres ("query frame" in
 //! these files); `T` and `n` are the rows of the basis.
 
+mod plane;
 mod simd_body;
 mod taylor_bounds;
 
 use crate::measure::frames::vector::{M3, V3, apply_symmetric, apply_transposed, dot, scaled};
 use crate::polynomial::{Number, NumberJet, Simd};
+pub(in crate::measure) use plane::Plane;
 pub(in crate::measure) use simd_body::{Relative, Side, TURNED};
 pub(in crate::measure) use taylor_bounds::{ALIGNED, Bracket, NUDGE, SLACK, bracket};
-
-/// Value and gradient of a constraint at a point, the gradient along the two tangents and the
-/// normal.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::measure) struct Plane<N> {
-    pub(in crate::measure) value: N,
-    pub(in crate::measure) gradient: V3<N>,
-}
-
-impl Plane<f64> {
-    /// How much it falls along the normal per length along the tangents.
-    #[inline(always)]
-    pub(in crate::measure) fn slope(&self) -> [f64; 2] {
-        let inverse = 1.0 / self.gradient[2];
-        [self.gradient[0] * inverse, self.gradient[1] * inverse]
-    }
-}
-
-impl<N: Copy> Plane<N> {
-    /// The constraint with this jet, along the vectors of a basis in its normalized coordinates.
-    #[inline(always)]
-    pub(in crate::measure) fn new<S: Simd>(_: S, jet: &NumberJet<N>, [t0, t1, n]: &M3<N>) -> Self
-    where
-        N: Number<S>,
-    {
-        let g = jet.gradient;
-        Self { value: jet.value, gradient: [dot(g, *t0), dot(g, *t1), dot(g, *n)] }
-    }
-}
 
 /// Second derivatives of a constraint at a point.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,7 @@
 //! What proves a distance at trial points: the tangent planes of both bodies there, or a step away
 //! from there by Taylor's formula.
 
-use super::Plane;
+use super::plane::Plane;
 use super::simd_body::{Side, TURNED};
 use crate::measure::frames::vector::{M3, V3, add_scaled, apply_symmetric, apply_transposed, dot, scaled, subtract};
 use crate::polynomial::{NEAR_LEVEL, Number, NumberJet, Simd, gamma};

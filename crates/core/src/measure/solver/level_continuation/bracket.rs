@@ -1,4 +1,4 @@
-//! What Newton's method for the level distance proves at the end of a step; see [`super::smooth`].
+//! What Newton's method for the level distance proves at the end of a step; see [`super`].
 
 use super::sides::{Evaluated, Sides, Step};
 use crate::measure::frames::vector::{

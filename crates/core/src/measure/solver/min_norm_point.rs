@@ -4,15 +4,15 @@ use nalgebra::{Matrix3, Vector3};
 
 /// The half-space `{v : normal·v >= floor}`.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Bound {
-    pub(super) normal: Vector3<f64>,
-    pub(super) floor: f64,
+pub(in crate::measure) struct Bound {
+    pub(in crate::measure) normal: Vector3<f64>,
+    pub(in crate::measure) floor: f64,
 }
 
 /// The shortest vector `v = Σ weight_k normal_k` of an intersection of half-spaces.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Shortest {
-    pub(super) v: Vector3<f64>,
+pub(in crate::measure) struct Shortest {
+    pub(in crate::measure) v: Vector3<f64>,
     index: [usize; 3],
     weight: [f64; 3],
     len: usize,
@@ -20,7 +20,7 @@ pub(super) struct Shortest {
 
 impl Shortest {
     /// The bounds that hold with equality, and their weights.
-    pub(super) fn support(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+    pub(in crate::measure) fn support(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         self.index[..self.len].iter().copied().zip(self.weight[..self.len].iter().copied())
     }
 }
@@ -33,7 +33,7 @@ const MAX_EXCHANGES: usize = 64;
 /// Starting from no bounds, the one that is missed most joins those that hold v back, of which at
 /// most three stay: the problem is of the kind of linear programs (Sharir and Welzl, A
 /// combinatorial bound for linear programming and related problems, STACS 1992).
-pub(super) fn shortest(bounds: &[Bound]) -> Option<Shortest> {
+pub(in crate::measure) fn shortest(bounds: &[Bound]) -> Option<Shortest> {
     let scale = bounds.iter().map(|bound| bound.floor.abs()).fold(0.0, f64::max);
     let tolerance = 1e-13 * scale;
     let missed = |v: &Vector3<f64>, k: usize| bounds[k].floor - bounds[k].normal.dot(v);

@@ -22,7 +22,7 @@ use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, Vector3, Vector4};
 
 /// The program in coordinates along u and across it, the same across for x and y: variables (a, p,
 /// q, b) with `x = center_a + a u + p v + q w`, `y = center_b + b u + p v + q w`, minimising b - a.
-pub(super) struct ReachProgram<'a> {
+pub(in crate::measure) struct ReachProgram<'a> {
     pair: &'a Pair<'a>,
     /// Columns u, v, w.
     axes: Matrix3<f64>,
@@ -31,7 +31,7 @@ pub(super) struct ReachProgram<'a> {
 }
 
 impl<'a> ReachProgram<'a> {
-    pub(super) fn new(
+    pub(in crate::measure) fn new(
         pair: &'a Pair<'a>,
         ray: &Vector3<f64>,
         center_a: &Vector3<f64>,
@@ -46,7 +46,7 @@ impl<'a> ReachProgram<'a> {
 
     /// A strictly feasible start: most of the way from the centres to the boundaries, where these
     /// are curved.
-    pub(super) fn start(&self) -> SVector<f64, 4> {
+    pub(in crate::measure) fn start(&self) -> SVector<f64, 4> {
         let u = self.axes.column(0).into_owned();
         let x = near_boundary(&self.pair.a, &self.center_a, &u);
         let y = near_boundary(&self.pair.b, &self.center_b, &-u);
@@ -54,7 +54,7 @@ impl<'a> ReachProgram<'a> {
     }
 
     /// The two points of the variables.
-    pub(super) fn points(&self, v: &SVector<f64, 4>) -> (Vector3<f64>, Vector3<f64>) {
+    pub(in crate::measure) fn points(&self, v: &SVector<f64, 4>) -> (Vector3<f64>, Vector3<f64>) {
         (
             self.center_a + self.axes * Vector3::new(v[0], v[1], v[2]),
             self.center_b + self.axes * Vector3::new(v[3], v[1], v[2]),

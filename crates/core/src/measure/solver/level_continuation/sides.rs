@@ -1,5 +1,5 @@
 //! Two bodies as Newton's method for the level distance sees them: in B's normalized coordinates,
-//! one constraint of each active. The formulas are those of [`super::smooth`].
+//! one constraint of each active. The formulas are those of [`super`].
 
 use crate::body::{Body, ConstraintTrust};
 use crate::measure::frames::pose::Pose;

@@ -1,23 +1,27 @@
-//! The least answer of all parts, or pairs of parts.
+//! The least answer of all parts, or pairs of parts: measures of solids with several parts from
+//! those of convex bodies.
+//!
+//! Distance, level distance and growth distance of unions are the least of those of the pairs of
+//! parts. How deep unions overlap is another matter: a translation has to take all pairs apart at
+//! once ([`crate::measure::signed::separating_translation`]).
 
-use crate::measure::distance::Distance;
-use crate::measure::growth::GrowthDistance;
-use crate::measure::half_space::HalfSpaceDistance;
-use crate::measure::level::LevelDistance;
-use crate::measure::penetration::Penetration;
-use crate::measure::point::Projected;
-use crate::measure::signed::SignedDistance;
+use crate::measure::frames::pose::Pose;
 use crate::measure::warm::WarmStart;
 
+/// A part or a solid with its pose.
+pub(in crate::measure) type At<'a, T> = (&'a T, &'a Pose);
+
 /// What can be least: an answer about one or two bodies with its bracket.
-pub(in crate::measure) trait Answer {
+pub(in crate::measure) trait Bracketed {
+    /// Lower and upper bound of what is to be least.
     fn bracket(&self) -> [f64; 2];
     fn iterations(&self) -> u32;
 }
 
-macro_rules! answer {
-    ($($measure:ty),*) => {$(
-        impl Answer for $measure {
+/// Answers whose fields are `lower`, `upper` and `iterations`.
+macro_rules! bracketed {
+    ($measure:ty) => {
+        impl crate::measure::pairwise_minimum::Bracketed for $measure {
             fn bracket(&self) -> [f64; 2] {
                 [self.lower, self.upper]
             }
@@ -26,21 +30,9 @@ macro_rules! answer {
                 self.iterations
             }
         }
-    )*};
+    };
 }
-
-answer!(Distance, GrowthDistance, HalfSpaceDistance, LevelDistance, Projected, SignedDistance);
-
-/// A depth counts as a negative distance.
-impl Answer for Penetration {
-    fn bracket(&self) -> [f64; 2] {
-        [-self.upper, -self.lower]
-    }
-
-    fn iterations(&self) -> u32 {
-        self.iterations
-    }
-}
+pub(in crate::measure) use bracketed;
 
 /// The least of the answers, by their upper bounds, and what the others say of it.
 #[derive(Clone, Copy, Debug)]
@@ -61,7 +53,7 @@ pub(in crate::measure) struct Least<T> {
 /// The pair of the last answer comes first, or that of the lowest bound: the smaller the first
 /// answer, the fewer of the others need be looked at. `warm` is left with the hint and the parts of
 /// the least. `solve` is given the best upper bound: beyond it an answer does not count.
-pub(in crate::measure) fn least<T: Answer>(
+pub(in crate::measure) fn least<T: Bracketed>(
     (len_a, len_b): (usize, usize),
     bound: impl Fn((usize, usize)) -> f64,
     enough: f64,

@@ -37,8 +37,9 @@
 //! The values of p range over orders of magnitude, and z lies outside A, where what [`crate::body::Trust`] knows of A does not
 //! hold: bounds for p are made at each point ([`crate::polynomial::Growth`]).
 
-use super::bracket::{Metric, ROOM};
-use super::sides::{Evaluated, Sides, Step, square};
+mod bracket;
+mod sides;
+
 use crate::body::Body;
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::vector::{V3, add, apply_symmetric, apply_transposed, basis, dot, scaled, subtract};
@@ -47,7 +48,9 @@ use crate::measure::solver::active_set_qp::LONGEST;
 use crate::measure::solver::predictor::Drift;
 use crate::measure::solver::step_acceleration::{Correction, Last, Series, across, along};
 use crate::polynomial::{NumberJet, Scalar, Simd, WithSimd};
+use bracket::{Metric, ROOM};
 use nalgebra::Vector3;
+use sides::{Evaluated, Sides, Step, square};
 
 /// What is kept of an answer for the next query of the pair.
 #[derive(Clone, Copy, Debug)]
@@ -68,7 +71,7 @@ pub(in crate::measure) struct LevelTrace {
 
 impl LevelTrace {
     /// The trace of a minimiser, x in A's frame and y in B's.
-    pub(super) fn new(
+    pub(in crate::measure) fn new(
         (a, pose_a, x): (&Body, &Pose, &Vector3<f64>),
         (b, pose_b, y): (&Body, &Pose, &Vector3<f64>),
         active: [u8; 2],
@@ -101,36 +104,36 @@ impl LevelTrace {
 /// A proven bracket and where it is attained, in A's frame from its normalization's centre on,
 /// metres.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LevelProven {
-    pub(super) lower: f64,
-    pub(super) upper: f64,
-    pub(super) x: V3<f64>,
+pub(in crate::measure) struct LevelProven {
+    pub(in crate::measure) lower: f64,
+    pub(in crate::measure) upper: f64,
+    pub(in crate::measure) x: V3<f64>,
     /// Gradient of A's constraint at x, per metre.
-    pub(super) gradient: V3<f64>,
+    pub(in crate::measure) gradient: V3<f64>,
     /// Multiplier of B's constraint.
-    pub(super) multiplier: f64,
+    pub(in crate::measure) multiplier: f64,
     /// Evaluations of both bodies.
-    pub(super) rounds: u32,
+    pub(in crate::measure) rounds: u32,
 }
 
 /// What is left where nothing was proven.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LevelLost {
+pub(in crate::measure) struct LevelLost {
     /// Evaluations of both bodies.
-    pub(super) rounds: u32,
+    pub(in crate::measure) rounds: u32,
     /// Where Newton's method ended, with a bracket that rounding keeps wide.
-    pub(super) settled: Option<Settled>,
+    pub(in crate::measure) settled: Option<Settled>,
 }
 
 /// A minimiser as good as doubles give it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Settled {
+pub(in crate::measure) struct Settled {
     /// In B's frame, metres.
-    pub(super) point: Vector3<f64>,
+    pub(in crate::measure) point: Vector3<f64>,
     /// Active constraint of A and of B.
-    pub(super) active: [u8; 2],
+    pub(in crate::measure) active: [u8; 2],
     /// Multiplier of B's constraint.
-    pub(super) multiplier: f64,
+    pub(in crate::measure) multiplier: f64,
 }
 
 impl LevelLost {
@@ -147,7 +150,7 @@ const MAX_ROUNDS: u32 = 8;
 const PATIENCE: u32 = 2;
 
 /// Most evaluations from a cold start before another method takes over.
-pub(super) const SEEK_ROUNDS: u32 = 20;
+pub(in crate::measure) const SEEK_ROUNDS: u32 = 20;
 
 /// Longest step that is as good as none, so that a bracket it leaves wide is worth a second one in
 /// a better metric.
@@ -157,14 +160,14 @@ const SHORT: f64 = 1e-3;
 const SETTLED: f64 = 1e-9;
 
 /// Continuation as vectorized work.
-pub(super) struct FollowLevel<'a> {
-    pub(super) a: &'a Body,
-    pub(super) pose_a: &'a Pose,
-    pub(super) b: &'a Body,
-    pub(super) pose_b: &'a Pose,
-    pub(super) options: &'a Options<'a>,
+pub(in crate::measure) struct FollowLevel<'a> {
+    pub(in crate::measure) a: &'a Body,
+    pub(in crate::measure) pose_a: &'a Pose,
+    pub(in crate::measure) b: &'a Body,
+    pub(in crate::measure) pose_b: &'a Pose,
+    pub(in crate::measure) options: &'a Options<'a>,
     /// Read, and replaced if the answer is proven.
-    pub(super) trace: &'a mut LevelTrace,
+    pub(in crate::measure) trace: &'a mut LevelTrace,
 }
 
 impl WithSimd for FollowLevel<'_> {
@@ -199,17 +202,17 @@ impl WithSimd for FollowLevel<'_> {
 }
 
 /// A start from a point of B, as vectorized work; for smooth bodies.
-pub(super) struct SeekLevel<'a> {
-    pub(super) a: &'a Body,
-    pub(super) pose_a: &'a Pose,
-    pub(super) b: &'a Body,
-    pub(super) pose_b: &'a Pose,
+pub(in crate::measure) struct SeekLevel<'a> {
+    pub(in crate::measure) a: &'a Body,
+    pub(in crate::measure) pose_a: &'a Pose,
+    pub(in crate::measure) b: &'a Body,
+    pub(in crate::measure) pose_b: &'a Pose,
     /// Where to begin, in B's frame, metres.
-    pub(super) from: &'a Vector3<f64>,
+    pub(in crate::measure) from: &'a Vector3<f64>,
     /// Most rounds.
-    pub(super) most: u32,
+    pub(in crate::measure) most: u32,
     /// Whose stop flag is polled.
-    pub(super) options: &'a Options<'a>,
+    pub(in crate::measure) options: &'a Options<'a>,
 }
 
 impl WithSimd for SeekLevel<'_> {

@@ -32,17 +32,17 @@ pub(in crate::measure) struct LevelNewton {
 
 /// How the iterates ended.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Ended {
-    pub(super) steps: u32,
+pub(in crate::measure) struct Ended {
+    pub(in crate::measure) steps: u32,
     /// Whether there is no step left to take, though none was accepted: rounding keeps the bracket
     /// wide.
-    pub(super) settled: bool,
+    pub(in crate::measure) settled: bool,
 }
 
 impl LevelNewton {
     /// Iterates until `accept` takes one, they stop converging or `stop` says so after that many
     /// steps.
-    pub(super) fn run(
+    pub(in crate::measure) fn run(
         &mut self,
         pair: &Pair<'_>,
         stop: impl Fn(u32) -> bool,
@@ -76,7 +76,7 @@ impl LevelNewton {
 
     /// Whether the forces of the bodies are opposite, to [`ALIGNED`] or to what rounding leaves of
     /// them: brackets hold them to about the root of their width.
-    pub(super) fn is_balanced(&self, pair: &Pair<'_>) -> bool {
+    pub(in crate::measure) fn is_balanced(&self, pair: &Pair<'_>) -> bool {
         let force = |body: &Posed<'_>, active: &Active| {
             let (mut sum, mut rounding) = (Vector3::zeros(), 0.0);
             for (i, multiplier) in active.iter().filter(|(_, multiplier)| *multiplier > 0.0) {

@@ -1,12 +1,10 @@
 //! Unions against loops over the pairs of their parts.
 
-use super::*;
-use crate::body::Compound;
-use crate::measure::signed::SignedDistance;
-use crate::measure::tests::{random_pose, twisted, unit};
-use crate::measure::{
-    Decision, HalfSpace, distance_to_half_space, distance_to_point, nearer_than, overlap, translation_hessian,
-};
+use super::{random_pose, twisted, unit};
+use crate::body::{Body, Compound};
+use crate::measure::growth::growth_bound;
+use crate::measure::level::level_bound;
+use crate::measure::*;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::sync::OnceLock;
 use sublevel_testkit::Seeded;

@@ -9,14 +9,16 @@
 //! Each is proven again. The planes of pairs that touch turn on the way, so the search ends at a
 //! translation from which no small change is shorter, which need not be the shortest of all.
 
-use super::At;
-use super::min_norm_point::{Bound, Shortest, shortest};
+use super::pair::between;
 use crate::body::{Body, Solid};
+use crate::measure::bounds::culling::{across, ball_gap};
+use crate::measure::distance::settle;
 use crate::measure::frames::pose::Pose;
 use crate::measure::half_space::{HalfSpace, distance_to_half_space};
 use crate::measure::options::Options;
-use crate::measure::overlap::{Goal, across, ball_gap, settle};
-use crate::measure::signed;
+use crate::measure::pairwise_minimum::At;
+use crate::measure::solver::min_norm_point::{Bound, Shortest, shortest};
+use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::warm::WarmStart;
 use nalgebra::Vector3;
 
@@ -41,21 +43,21 @@ const MARGIN: f64 = 4.0;
 
 /// A way out for one pair of parts.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Start {
-    pub(super) pair: (usize, usize),
+pub(in crate::measure) struct Start {
+    pub(in crate::measure) pair: (usize, usize),
     /// Unit vector, world frame.
-    pub(super) direction: Vector3<f64>,
+    pub(in crate::measure) direction: Vector3<f64>,
     /// How far, proven; metres.
-    pub(super) depth: f64,
+    pub(in crate::measure) depth: f64,
 }
 
 /// The starts of the deepest pairs.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Starts([Option<Start>; STARTS]);
+pub(in crate::measure) struct Starts([Option<Start>; STARTS]);
 
 impl Starts {
     /// Takes a start in the place of a free one or a shallower.
-    pub(super) fn push(&mut self, start: Start) {
+    pub(in crate::measure) fn push(&mut self, start: Start) {
         let depth = |start: &Option<Start>| start.map_or(f64::NEG_INFINITY, |start| start.depth);
         if let Some(least) = self.0.iter_mut().min_by(|p, q| depth(p).total_cmp(&depth(q)))
             && depth(least) < start.depth
@@ -64,7 +66,7 @@ impl Starts {
         }
     }
 
-    pub(super) fn is_empty(&self) -> bool {
+    pub(in crate::measure) fn is_empty(&self) -> bool {
         self.0.iter().all(Option::is_none)
     }
 }
@@ -84,29 +86,29 @@ struct Plane {
 /// What holds A back: the pull of a pair of parts on the way, a part of its direction, and where it
 /// acts.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Contact {
-    pub(super) pull: Vector3<f64>,
-    pub(super) x: Vector3<f64>,
-    pub(super) y: Vector3<f64>,
+pub(in crate::measure) struct Contact {
+    pub(in crate::measure) pull: Vector3<f64>,
+    pub(in crate::measure) x: Vector3<f64>,
+    pub(in crate::measure) y: Vector3<f64>,
 }
 
 /// A way out; metres, world frame.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Way {
+pub(in crate::measure) struct Way {
     /// Proven: after this much along the direction no parts meet, so that they touch at most.
-    pub(super) length: f64,
-    pub(super) direction: Vector3<f64>,
+    pub(in crate::measure) length: f64,
+    pub(in crate::measure) direction: Vector3<f64>,
     /// Pulls of sum `direction`, the strongest first; the others may be zero.
-    pub(super) contacts: [Contact; 3],
+    pub(in crate::measure) contacts: [Contact; 3],
     /// Whether another way was seen to be about as short, or another pair of parts to be about as
     /// much in the way.
-    pub(super) tied: bool,
-    pub(super) iterations: u32,
+    pub(in crate::measure) tied: bool,
+    pub(in crate::measure) iterations: u32,
 }
 
 /// The shortest way found from these starts and a few more. No way is shorter than
 /// `pairwise_minimum` metres; lengths that differ by at most `narrow` of them count as the same.
-pub(super) fn out(
+pub(in crate::measure) fn out(
     (a, pose_a): At<'_, impl Solid>,
     (b, pose_b): At<'_, impl Solid>,
     starts: &Starts,
@@ -209,7 +211,7 @@ impl Search<'_> {
     fn apart(&mut self, (i, j): (usize, usize), pose: &Pose) -> bool {
         let mut hint = WarmStart::default();
         let (a, b) = ((&self.a[i], pose), (&self.b[j], &self.pose_b));
-        let found = settle(a, b, &Goal::compare(0.0), &self.options, &mut hint);
+        let found = settle(a, b, &StopCriterion::compare(0.0), &self.options, &mut hint);
         self.iterations += found.iterations;
         found.lower > 0.0
     }
@@ -301,7 +303,7 @@ impl Search<'_> {
             }
             let (a, b) = (&self.a[i], &self.b[j]);
             let mut hint = WarmStart::default();
-            let far = Goal::beyond(far);
+            let far = StopCriterion::beyond(far);
             let found = settle((a, &pose), (b, &self.pose_b), &far, &self.options, &mut hint);
             self.iterations += found.iterations;
             if found.lower > far.far {
@@ -311,7 +313,7 @@ impl Search<'_> {
             let (normal, gap, x, y) = if let Some(normal) = proven {
                 (normal, found.lower, found.witness_a, found.witness_b)
             } else {
-                let found = signed::between(a, &pose, b, &self.pose_b, &self.options, &mut hint);
+                let found = between(a, &pose, b, &self.pose_b, &self.options, &mut hint);
                 self.iterations += found.iterations;
                 let Some(normal) = found.normal else { continue };
                 (normal, found.lower, found.witness_a, found.witness_b)
@@ -377,4 +379,10 @@ impl Planes {
             *widest = plane;
         }
     }
+}
+
+/// Width of the bracket of a depth that is asked for, metres.
+pub(in crate::measure) fn narrow(a: &impl Solid, b: &impl Solid, depth: f64, options: &Options<'_>) -> f64 {
+    let radius = a.circumscribed().radius.min(b.circumscribed().radius);
+    (options.depth_accuracy() * depth).max(options.accuracy() * radius)
 }

@@ -1,15 +1,15 @@
 //! The shortest way out of an overlap that is known.
 
-use super::ELSEWHERE;
 use super::support::{SupportPoint, support};
 use crate::measure::bounds::duality_bounds::{Multipliers, SLACK, descent};
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::options::Options;
+use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::continuation::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
 use crate::measure::solver::kkt_newton::{AT, Active, DistanceNewton};
 use crate::measure::solver::two_point_problem::Through;
-use crate::measure::warm::{ActiveSet, Hint, WarmStart};
+use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::dispatch;
 use nalgebra::{Vector2, Vector3};
 
@@ -111,7 +111,7 @@ pub(in crate::measure) struct Best<'a> {
     active: (Active, Active),
     trace: Option<Trace>,
     /// Whether no direction nearby is better: the points attain what the normal proves.
-    pub(super) settled: bool,
+    pub(in crate::measure) settled: bool,
     pub(in crate::measure) iterations: u32,
 }
 
@@ -180,7 +180,7 @@ impl<'a> Best<'a> {
     }
 
     /// The same pair, with nothing known.
-    pub(super) fn again(&self) -> Self {
+    pub(in crate::measure) fn again(&self) -> Self {
         Self { iterations: self.iterations, ..Self::new(self.pair, self.pose_a, self.pose_b, self.options) }
     }
 
@@ -201,7 +201,7 @@ impl<'a> Best<'a> {
     /// method from showing that there is none: what the constraints all around have in common may
     /// be the edge that is best, and otherwise a compass search goes on, its needle turning and its
     /// steps shrinking where they lead to nothing better.
-    pub(super) fn settle(&mut self) {
+    pub(in crate::measure) fn settle(&mut self) {
         let pair = self.pair;
         let enough = 0.1 * pair.tolerance(self.options.accuracy());
         let mut step = FIRST_STEP;
@@ -340,6 +340,9 @@ impl<'a> Best<'a> {
         tolerance(self.pair, self.options, self.depth)
     }
 }
+
+/// Cosine of the angle beyond which a direction is another one than the best.
+pub(super) const ELSEWHERE: f64 = 0.99;
 
 #[cfg(test)]
 mod tests {

@@ -3,11 +3,11 @@
 
 use crate::body::MAX_CONSTRAINTS;
 use crate::measure::frames::query_frame::Posed;
+use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::active_constraints::MAX_ACTIVE;
 use crate::measure::solver::barrier_programs::{Support, near_boundary};
 use crate::measure::solver::kkt_newton::Active;
 use crate::measure::solver::linear_systems::{Curvature, eliminate};
-use crate::measure::warm::ActiveSet;
 use crate::optimize::minimise;
 use crate::polynomial::Jet;
 use nalgebra::{Matrix3, Vector3};

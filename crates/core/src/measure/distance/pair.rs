@@ -1,0 +1,240 @@
+//! Distance of two bodies: continuation first, then the general search.
+
+use super::answer::Distance;
+use super::search::Search;
+use crate::body::Body;
+use crate::measure::bounds::culling::{BallBounds, balls, slabs};
+use crate::measure::frames::pose::Pose;
+use crate::measure::frames::query_frame::Pair;
+use crate::measure::options::Options;
+use crate::measure::solver::active_constraints::ActiveConstraints;
+use crate::measure::solver::continuation::{Follow, Lost, Proven, SEEK_ROUNDS, Seek};
+use crate::measure::solver::kkt_newton::Active;
+use crate::measure::solver::stages::{Stage, runs};
+use crate::measure::solver::stop_criterion::StopCriterion;
+use crate::measure::solver::two_point_problem::Apart;
+use crate::measure::status::Status;
+use crate::measure::warm::{Hint, WarmStart};
+use crate::polynomial::{Simd, WithSimd, dispatch};
+use nalgebra::Vector3;
+
+/// Distance of two bodies as far as the goal needs it, cheapest bounds first. `warm` stays as it is
+/// when they suffice.
+#[inline]
+pub(in crate::measure) fn settle(
+    of_a: (&Body, &Pose),
+    of_b: (&Body, &Pose),
+    goal: &StopCriterion,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> Distance {
+    if goal.is_narrow() {
+        return between(of_a, of_b, goal, options, warm);
+    }
+    let BallBounds { lower, upper, witness_a, witness_b, normal } = balls(of_a, of_b);
+    let mut bound = Distance { lower, upper, witness_a, witness_b, normal, ..Distance::default() };
+    if goal.met(bound.lower, bound.upper) {
+        return bound;
+    }
+    let normal_a = if let Hint::Apart { normal_a, .. } = &warm.hint { Some(normal_a) } else { None };
+    bound.lower = bound.lower.max(slabs(of_a, of_b, normal_a));
+    if goal.met(bound.lower, bound.upper) {
+        return bound;
+    }
+    let found = between(of_a, of_b, goal, options, warm);
+    // A search that stopped early may know less than the bounds it came after.
+    let upper = if found.upper <= bound.upper { found } else { bound };
+    Distance { lower: found.lower.max(bound.lower), status: found.status, iterations: found.iterations, ..upper }
+}
+
+/// Distance of two bodies, or as much of it as the goal needs.
+pub(in crate::measure) fn between(
+    of_a: (&Body, &Pose),
+    of_b: (&Body, &Pose),
+    goal: &StopCriterion,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> Distance {
+    let query = Query { of_a, of_b, goal, options };
+    match warm.hint {
+        Hint::Smooth(_) if runs(Stage::Follow) => dispatch(Warm { query, warm }),
+        Hint::Overlap { point_a } => query.overlapping(&point_a, warm),
+        _ => query.afresh(&Lost::after(0), warm),
+    }
+}
+
+/// What is asked. Each way to the answer hands on to the next where it fails, and none hands back:
+/// an answer is written where the caller wants it, and not copied, for loads of what was just
+/// stored in other pieces have to wait.
+#[derive(Clone, Copy)]
+struct Query<'a> {
+    of_a: (&'a Body, &'a Pose),
+    of_b: (&'a Body, &'a Pose),
+    goal: &'a StopCriterion,
+    options: &'a Options<'a>,
+}
+
+impl<'a> Query<'a> {
+    #[inline(always)]
+    fn relation(&self) -> Apart<'a> {
+        let ((a, pose_a), (b, pose_b)) = (self.of_a, self.of_b);
+        let tolerance = self.options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
+        Apart { pose_a, pose_b, goal: self.goal, tolerance }
+    }
+
+    fn pair(&self) -> Pair<'a> {
+        let ((a, pose_a), (b, pose_b)) = (self.of_a, self.of_b);
+        Pair::new(a, pose_a, b, pose_b)
+    }
+
+    /// From a point of A in its frame that both bodies had in common.
+    #[inline(never)]
+    fn overlapping(&self, point_a: &Vector3<f64>, warm: &mut WarmStart) -> Distance {
+        let pair = self.pair();
+        let mut search = Search::new(&pair, self.goal, self.options, 0);
+        if search.common(&pair.a_to_query(point_a)) {
+            return search.answer();
+        }
+        self.afresh(&Lost::after(0), warm)
+    }
+
+    /// From nothing but the poses, after what continuation has left.
+    #[inline(never)]
+    fn afresh(&self, lost: &Lost, warm: &mut WarmStart) -> Distance {
+        // Where edges face each other no single constraint is to be followed.
+        let smooth = self.of_a.0.is_smooth() && self.of_b.0.is_smooth();
+        // From far away it does other than lanes, which bring no points back that have come too far
+        // from the bodies.
+        let astray = matches!(warm.hint, Hint::Astray) && !far_apart(self.of_a, self.of_b);
+        if runs(Stage::Seek) && smooth && !astray && !lost.touching() && !self.options.exhausted(lost.rounds) {
+            return dispatch(Cold { query: *self, before: lost.rounds, warm });
+        }
+        self.search(lost, warm)
+    }
+
+    /// By all that there is.
+    #[inline(never)]
+    fn search(&self, lost: &Lost, warm: &mut WarmStart) -> Distance {
+        let pair = self.pair();
+        let mut search = Search::new(&pair, self.goal, self.options, lost.rounds);
+        search.take_over(lost);
+        if !search.decided() {
+            search.run(&warm.hint);
+        }
+        *warm = search.hint();
+        search.answer()
+    }
+
+    /// The answer that a proof gives, sharpened if rounding keeps it wide.
+    #[inline(always)]
+    fn answer<S: Simd>(&self, simd: S, proven: &Proven, tolerance: f64) -> Distance {
+        let narrow = proven.upper - proven.lower <= tolerance;
+        if !narrow && !self.goal.met(proven.lower, proven.upper) {
+            return self.sharpened(proven);
+        }
+        let (a, pose_a) = self.of_a;
+        let [witness_a, witness_b, normal] = proven.world(simd, a, pose_a);
+        Distance {
+            status: if narrow { Status::Converged } else { Status::BracketWide },
+            lower: proven.lower,
+            upper: proven.upper,
+            witness_a,
+            witness_b,
+            normal: Some(normal),
+            active_a: ActiveConstraints::single(proven.active[0], proven.multipliers[0]),
+            active_b: ActiveConstraints::single(proven.active[1], proven.multipliers[1]),
+            parts: [0, 0],
+            tied: false,
+            iterations: proven.rounds,
+        }
+    }
+
+    /// A proven answer that rounding keeps wide, gone on with in twice the precision.
+    #[cold]
+    fn sharpened(&self, proven: &Proven) -> Distance {
+        let pair = self.pair();
+        let mut search = Search::new(&pair, self.goal, self.options, proven.rounds);
+        search.resume(proven);
+        search.sharpen();
+        search.attain_any();
+        search.answer()
+    }
+}
+
+/// Continuation from a smooth hint, as vectorized work.
+struct Warm<'a> {
+    query: Query<'a>,
+    warm: &'a mut WarmStart,
+}
+
+impl WithSimd for Warm<'_> {
+    type Output = Distance;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Distance {
+        let Self { query, warm } = self;
+        let relation = query.relation();
+        let lost = match &mut warm.hint {
+            Hint::Smooth(trace) => {
+                let (a, b) = (query.of_a.0, query.of_b.0);
+                match (Follow { a, b, relation, options: query.options, trace }).with_simd(simd) {
+                    Ok(proven) => return query.answer(simd, &proven, relation.tolerance),
+                    Err(lost) => lost,
+                }
+            }
+            // Nothing to follow.
+            _ => Lost::after(0),
+        };
+        query.afresh(&lost, warm)
+    }
+}
+
+/// A start from nothing but the poses, as vectorized work.
+struct Cold<'a> {
+    query: Query<'a>,
+    /// Evaluations before it.
+    before: u32,
+    warm: &'a mut WarmStart,
+}
+
+impl WithSimd for Cold<'_> {
+    type Output = Distance;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Distance {
+        let Self { query, before, warm } = self;
+        let (a, b, options, relation) = (query.of_a.0, query.of_b.0, query.options, query.relation());
+        let most = SEEK_ROUNDS.min(options.max_iterations() - before);
+        match (Seek { a, b, relation, from: None, most, options }).with_simd(simd) {
+            Ok((proven, trace)) => {
+                *warm = Hint::Smooth(trace).into();
+                let proven = Proven { rounds: before + proven.rounds, ..proven };
+                query.answer(simd, &proven, relation.tolerance)
+            }
+            Err(lost) => query.search(&Lost { rounds: before + lost.rounds, ..lost }, warm),
+        }
+    }
+}
+
+/// The point of B nearest to A in the query frame and the constraints that are active there; on
+/// overlap a common point, and none.
+pub(in crate::measure) fn nearest(
+    pair: &Pair<'_>,
+    options: &Options<'_>,
+    iterations: &mut u32,
+) -> (Vector3<f64>, Option<(Active, Active)>) {
+    let mut search = Search::new(pair, &StopCriterion::NARROW, options, *iterations);
+    search.run(&Hint::Cold);
+    *iterations = search.iterations();
+    search.nearest()
+}
+
+/// Distance of the bodies' middles relative to the sum of their sizes, above which they are far
+/// apart.
+const FAR: f64 = 2.0;
+
+fn far_apart((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose)) -> bool {
+    let (ball_a, ball_b) = (a.circumscribed(), b.circumscribed());
+    let middles = (pose_a.transform_point(&ball_a.center), pose_b.transform_point(&ball_b.center));
+    (middles.0 - middles.1).norm() > FAR * (ball_a.radius + ball_b.radius)
+}

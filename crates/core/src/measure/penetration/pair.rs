@@ -1,0 +1,47 @@
+//! Penetration depth of two bodies.
+
+use super::answer::Penetration;
+use crate::body::Body;
+use crate::measure::frames::pose::Pose;
+use crate::measure::frames::query_frame::Pair;
+use crate::measure::options::Options;
+use crate::measure::solver::depth::local_search::{Best, tolerance};
+use crate::measure::solver::depth::sweep::prove;
+use crate::measure::status::Status;
+use crate::measure::warm::WarmStart;
+
+/// Penetration depth of two bodies.
+pub(super) fn between(
+    a: &Body,
+    pose_a: &Pose,
+    b: &Body,
+    pose_b: &Pose,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> Penetration {
+    let pair = Pair::new(a, pose_a, b, pose_b);
+    let mut best = Best::new(&pair, pose_a, pose_b, options);
+    best.follow(&warm.hint);
+    let proof = prove(&mut best);
+    if let Some(hint) = best.hint() {
+        *warm = hint;
+    }
+    let apart = best.depth <= 0.0;
+    let upper = best.depth.max(0.0);
+    let unit = pair.unit();
+    Penetration {
+        status: if upper - proof.lower <= tolerance(&pair, options, upper) {
+            Status::Converged
+        } else {
+            Status::BracketWide
+        },
+        lower: proof.lower * unit,
+        upper: upper * unit,
+        direction: best.n.filter(|_| !apart).map(|n| pair.direction_to_world(&n)),
+        witness_a: pair.to_world(&best.x),
+        witness_b: pair.to_world(&best.y),
+        tied: proof.tied,
+        directions: proof.directions,
+        iterations: best.iterations,
+    }
+}

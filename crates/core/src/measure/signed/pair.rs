@@ -1,0 +1,175 @@
+//! Signed distance of two bodies.
+
+use super::answer::SignedDistance;
+use crate::body::Body;
+use crate::measure::bounds::duality_bounds::distance_upper;
+use crate::measure::distance::distance;
+use crate::measure::frames::pose::Pose;
+use crate::measure::frames::query_frame::Pair;
+use crate::measure::frames::twist::Twist;
+use crate::measure::options::Options;
+use crate::measure::solver::continuation::{Follow, Proven};
+use crate::measure::solver::depth::local_search::{Best, tolerance};
+use crate::measure::solver::depth::sweep::prove;
+use crate::measure::solver::two_point_problem::Through;
+use crate::measure::status::Status;
+use crate::measure::warm::{Hint, WarmStart};
+use crate::polynomial::{Scalar, dispatch};
+use nalgebra::Vector3;
+
+/// Signed distance of two bodies.
+pub(super) fn between(
+    a: &Body,
+    pose_a: &Pose,
+    b: &Body,
+    pose_b: &Pose,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> SignedDistance {
+    let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
+    let mut spent = 0;
+    if let Hint::Smooth(trace) = &mut warm.hint {
+        let relation = Through { pose_a, pose_b, facing: None, tolerance };
+        // Apart, or nearly, the normal proves all there is.
+        match dispatch(Follow { a, b, relation, options, trace }) {
+            Ok(proven) if proven.upper - proven.lower <= tolerance => {
+                let [x, y, normal] = proven.world(Scalar, a, pose_a);
+                return Answer::of(&proven).report((x, y), Some(normal), pose_a, pose_b);
+            }
+            Ok(proven) => spent = proven.rounds,
+            Err(lost) => spent = lost.rounds,
+        }
+    }
+    let pair = Pair::new(a, pose_a, b, pose_b);
+    let mut best = Best::new(&pair, pose_a, pose_b, options);
+    best.iterations = spent;
+    best.follow(&warm.hint);
+    if best.depth.is_infinite() {
+        best.seek(None);
+    }
+    let mut known = Known::of(&best);
+    if best.depth.is_infinite() {
+        // Nothing to follow: the distance says on which side the bodies are.
+        let apart = distance(a, pose_a, b, pose_b, options, warm);
+        best.iterations += apart.iterations;
+        if apart.lower > 0.0 {
+            let iterations = best.iterations;
+            let answer =
+                Answer { lower: apart.lower, upper: apart.upper, tied: false, iterations, status: apart.status };
+            return answer.report((apart.witness_a, apart.witness_b), apart.normal, pose_a, pose_b);
+        }
+        best.follow(&warm.hint);
+        known = Known::of(&best);
+        known.attain(
+            apart.upper / pair.unit(),
+            pair.world_to_query(&apart.witness_a),
+            pair.world_to_query(&apart.witness_b),
+        );
+    }
+    if known.lower < 0.0 && !known.narrow(&best) {
+        // Halfway between the deepest points is mostly a common one.
+        let middle = (known.x + known.y) * 0.5;
+        if pair.common(&middle) {
+            known.attain(0.0, middle, middle);
+        }
+    }
+    let mut tied = false;
+    if best.depth > 0.0 && !known.narrow(&best) {
+        let proof = prove(&mut best);
+        tied = proof.tied;
+        let before = known;
+        known = Known::of(&best);
+        if proof.lower > 0.0 {
+            known.upper = -proof.lower;
+        } else {
+            known.attain(before.upper, before.x, before.y);
+        }
+    }
+    if let Some(hint) = best.hint() {
+        *warm = hint;
+    }
+    if known.lower > 0.0 && !known.narrow(&best) {
+        let apart = distance(a, pose_a, b, pose_b, options, warm);
+        let answer = Answer {
+            lower: apart.lower.max(known.lower * pair.unit()),
+            upper: apart.upper,
+            tied,
+            iterations: best.iterations + apart.iterations,
+            status: apart.status,
+        };
+        return answer.report((apart.witness_a, apart.witness_b), apart.normal, pose_a, pose_b);
+    }
+    let status = if known.narrow(&best) { Status::Converged } else { Status::BracketWide };
+    let unit = pair.unit();
+    let answer =
+        Answer { lower: known.lower * unit, upper: known.upper * unit, tied, iterations: best.iterations, status };
+    let normal = best.n.map(|n| pair.direction_to_world(&n));
+    answer.report((pair.to_world(&known.x), pair.to_world(&known.y)), normal, pose_a, pose_b)
+}
+
+/// A bracket of the signed distance in query units, and the points behind it.
+struct Known {
+    lower: f64,
+    upper: f64,
+    x: Vector3<f64>,
+    y: Vector3<f64>,
+}
+
+impl Known {
+    /// What the best direction shows, and the points of the bodies there.
+    fn of(best: &Best<'_>) -> Self {
+        let (lower, pair) = (-best.depth, best.pair);
+        if let Some(upper) = best.attained {
+            return Self { lower, upper, x: best.x, y: best.y };
+        }
+        match (pair.a.pull_in(&best.x), pair.b.pull_in(&best.y)) {
+            (Some(x), Some(y)) => Self { lower, upper: distance_upper(pair, &x, &y), x, y },
+            _ => Self { lower, upper: f64::INFINITY, x: best.x, y: best.y },
+        }
+    }
+
+    /// Takes points that are nearer.
+    fn attain(&mut self, upper: f64, x: Vector3<f64>, y: Vector3<f64>) {
+        if upper < self.upper {
+            (self.upper, self.x, self.y) = (upper, x, y);
+        }
+    }
+
+    fn narrow(&self, best: &Best<'_>) -> bool {
+        let depth = if self.upper < 0.0 { -self.lower } else { 0.0 };
+        self.upper - self.lower <= tolerance(best.pair, best.options, depth)
+    }
+}
+
+struct Answer {
+    lower: f64,
+    upper: f64,
+    tied: bool,
+    iterations: u32,
+    status: Status,
+}
+
+impl Answer {
+    fn of(proven: &Proven) -> Self {
+        let Proven { lower, upper, rounds, .. } = *proven;
+        Self { lower, upper, tied: false, iterations: rounds, status: Status::Converged }
+    }
+
+    fn report(
+        self,
+        (witness_a, witness_b): (Vector3<f64>, Vector3<f64>),
+        normal: Option<Vector3<f64>>,
+        pose_a: &Pose,
+        pose_b: &Pose,
+    ) -> SignedDistance {
+        let Self { lower, upper, tied, iterations, status } = self;
+        let gradients = normal.map(|n| {
+            [
+                Twist::of_force(n, &witness_a, pose_a.translation()),
+                Twist::of_force(-n, &witness_b, pose_b.translation()),
+            ]
+        });
+        let at_contact = lower <= 0.0 && upper >= 0.0;
+        SignedDistance { status, lower, upper, witness_a, witness_b, normal, gradients, at_contact, tied, iterations }
+    }
+}

@@ -1,0 +1,61 @@
+//! The stages of a search. A stage that fails hands on to the next, so that a broken one would be
+//! replaced without a trace: tests switch the others off and have each solve a catalogue alone
+//! (`tests/stages.rs`).
+
+/// A method behind distances, level distances or growth distances.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::measure) enum Stage {
+    /// Continuation from the answer before.
+    Follow,
+    /// Continuation from the poses alone, or from GJK's points.
+    Seek,
+    /// Newton's method on the optimality conditions with active sets.
+    Newton,
+    /// Sequential quadratic programming along a ray, which finds active sets.
+    Ray,
+    /// GJK, or a Minkowski portal, on support tables.
+    SupportTables,
+    /// The point deepest in both bodies, by sequential quadratic programming.
+    Deepest,
+    /// Interior-point method on the distance, or on the ray of growth distances.
+    InteriorDistance,
+    /// Interior-point method for the point deepest in both bodies, or the level.
+    InteriorLevel,
+    /// Newton's method and brackets in double-double arithmetic.
+    Refinement,
+    /// Newton's method until the normal is that of the solution.
+    Alignment,
+}
+
+/// Whether a stage may run: always, but in tests that switch it off.
+#[cfg(not(test))]
+#[inline(always)]
+pub(in crate::measure) fn runs(_: Stage) -> bool {
+    true
+}
+
+#[cfg(test)]
+pub(in crate::measure) use mask::{only, runs};
+
+#[cfg(test)]
+mod mask {
+    use super::Stage;
+    use std::cell::Cell;
+
+    thread_local! {
+        /// A bit for each stage that may run; tests run in threads of their own.
+        static MASK: Cell<u32> = const { Cell::new(u32::MAX) };
+    }
+
+    pub(in crate::measure) fn runs(stage: Stage) -> bool {
+        MASK.get() >> stage as u32 & 1 == 1
+    }
+
+    /// Does `work` with no other stages than these.
+    pub(in crate::measure) fn only<T>(stages: &[Stage], work: impl FnOnce() -> T) -> T {
+        let before = MASK.replace(stages.iter().fold(0, |mask, stage| mask | 1 << *stage as u32));
+        let done = work();
+        MASK.set(before);
+        done
+    }
+}

@@ -1,0 +1,229 @@
+//! Each stage of a search, alone, on a catalogue of pairs: a stage that is broken fails here, while
+//! in use the next one would take its place.
+//!
+//! What a stage alone has to solve is what it is there for: smooth bodies for continuation, bodies
+//! with edges for active sets, overlaps for the deepest points. The shares asked for are a little
+//! below those reached, which each failure prints.
+
+use super::{random_pose, unit, zoo};
+use crate::body::Body;
+use crate::measure::solver::stages::{Stage, only};
+use crate::measure::*;
+use std::sync::OnceLock;
+use sublevel_testkit::Seeded;
+
+/// One pair of the catalogue, apart or overlapping, with the answers of all stages together.
+struct Case {
+    seed: u64,
+    a: Body,
+    b: Body,
+    poses: [Pose; 2],
+    /// The second pose a little later: 1 % of the smaller body's size away.
+    next: Pose,
+    distance: Distance,
+    next_distance: Distance,
+}
+
+impl Case {
+    fn new(seed: u64) -> Self {
+        let mut random = Seeded(90_000 + seed);
+        let mut bodies = zoo(&mut random);
+        let a = bodies.swap_remove(random.next() as usize % bodies.len());
+        let b = bodies.swap_remove(random.next() as usize % bodies.len());
+        let reach = a.circumscribed().radius + b.circumscribed().radius;
+        let far = reach * 2_f64.powf(1.5 * random.signed());
+        let poses = [random_pose(&mut random, 0.0), random_pose(&mut random, far)];
+        let step = unit(&mut random) * (0.01 * a.circumscribed().radius.min(b.circumscribed().radius));
+        let next = poses[1].with_translation(poses[1].translation() + step);
+        let to = |pose: &Pose| distance(&a, &poses[0], &b, pose, &Options::default(), &mut WarmStart::default());
+        let (distance, next_distance) = (to(&poses[1]), to(&next));
+        Self { seed, a, b, poses, next, distance, next_distance }
+    }
+
+    fn is_smooth(&self) -> bool {
+        self.a.is_smooth() && self.b.is_smooth()
+    }
+
+    fn is_apart(&self) -> bool {
+        self.distance.lower > 1e-3 * self.size() && self.next_distance.lower > 0.0
+    }
+
+    /// Radius of the smaller body, metres.
+    fn size(&self) -> f64 {
+        self.a.circumscribed().radius.min(self.b.circumscribed().radius)
+    }
+}
+
+fn catalogue() -> &'static [Case] {
+    static CASES: OnceLock<Vec<Case>> = OnceLock::new();
+    CASES.get_or_init(|| (0..400).map(Case::new).collect())
+}
+
+/// How many percent of the cases that `domain` takes `solve` solves: a converged bracket that meets
+/// the one of all stages. A bracket that does not meet it fails at once.
+fn solved(what: &str, domain: impl Fn(&Case) -> bool, solve: impl Fn(&Case) -> (Status, [f64; 2], [f64; 2])) -> f64 {
+    let (mut cases, mut done) = (0, 0);
+    for case in catalogue().iter().filter(|case| domain(case)) {
+        let (status, [lower, upper], [least, most]) = solve(case);
+        let label = format!("{what}, seed {}: {}-{}", case.seed, case.a.name(), case.b.name());
+        assert!(lower <= most && least <= upper, "{label}: [{lower}, {upper}] for [{least}, {most}]");
+        cases += 1;
+        done += u32::from(status == Status::Converged);
+    }
+    assert!(cases >= 30, "{what}: only {cases} cases");
+    100.0 * f64::from(done) / f64::from(cases)
+}
+
+#[track_caller]
+fn at_least(what: &str, percent: f64, solved: f64) {
+    println!("{what}: {solved:.1} % solved alone");
+    assert!(solved >= percent, "{what}: {solved:.1} % solved alone, {percent} expected");
+}
+
+fn cold_distance(case: &Case, stages: &[Stage]) -> (Status, [f64; 2], [f64; 2]) {
+    let [pose_a, pose_b] = &case.poses;
+    let mut warm = WarmStart::default();
+    let found = only(stages, || distance(&case.a, pose_a, &case.b, pose_b, &Options::default(), &mut warm));
+    (found.status, [found.lower, found.upper], [case.distance.lower, case.distance.upper])
+}
+
+/// From the hint of all stages at the pose before.
+fn warm_distance(case: &Case, stages: &[Stage]) -> (Status, [f64; 2], [f64; 2]) {
+    let (pose_a, options, mut warm) = (&case.poses[0], Options::default(), WarmStart::default());
+    distance(&case.a, pose_a, &case.b, &case.poses[1], &options, &mut warm);
+    let found = only(stages, || distance(&case.a, pose_a, &case.b, &case.next, &options, &mut warm));
+    (found.status, [found.lower, found.upper], [case.next_distance.lower, case.next_distance.upper])
+}
+
+#[test]
+fn nothing_is_solved_by_no_stage() {
+    let alone = solved("nothing", Case::is_apart, |case| cold_distance(case, &[]));
+    assert!(alone == 0.0, "{alone} % solved without a stage");
+}
+
+#[test]
+fn continuation_follows_alone() {
+    let domain = |case: &Case| case.is_smooth() && case.is_apart();
+    at_least("follow", 97.0, solved("follow", domain, |case| warm_distance(case, &[Stage::Follow])));
+}
+
+#[test]
+fn continuation_seeks_alone() {
+    let domain = |case: &Case| case.is_smooth() && case.is_apart();
+    at_least("seek", 97.0, solved("seek", domain, |case| cold_distance(case, &[Stage::Seek])));
+}
+
+#[test]
+fn active_sets_follow_alone() {
+    let domain = |case: &Case| !case.is_smooth() && case.is_apart();
+    at_least("Newton", 90.0, solved("Newton", domain, |case| warm_distance(case, &[Stage::Newton])));
+}
+
+#[test]
+fn support_tables_start_newton() {
+    let stages = [Stage::SupportTables, Stage::Newton];
+    let domain = |case: &Case| !case.is_smooth() && case.is_apart();
+    at_least("GJK and Newton", 60.0, solved("GJK and Newton", domain, |case| cold_distance(case, &stages)));
+}
+
+#[test]
+fn support_tables_start_quadratic_programs() {
+    let stages = [Stage::SupportTables, Stage::Ray];
+    let domain = |case: &Case| !case.is_smooth() && case.is_apart();
+    at_least("GJK and rays", 60.0, solved("GJK and rays", domain, |case| cold_distance(case, &stages)));
+}
+
+#[test]
+fn interior_points_find_distances_alone() {
+    let stages = [Stage::InteriorDistance];
+    at_least("interior", 90.0, solved("interior", Case::is_apart, |case| cold_distance(case, &stages)));
+}
+
+#[test]
+fn deepest_points_decide_overlaps_alone() {
+    let overlapping = |case: &Case| case.distance.upper == 0.0;
+    let stages = [Stage::SupportTables, Stage::Deepest];
+    at_least("deepest", 90.0, solved("deepest", overlapping, |case| cold_distance(case, &stages)));
+    let stages = [Stage::InteriorLevel];
+    at_least("level", 90.0, solved("level", overlapping, |case| cold_distance(case, &stages)));
+}
+
+/// Twice the precision solves what doubles leave wide: an accuracy that no bracket of theirs has.
+#[test]
+fn refinement_goes_on_alone() {
+    let options = Options::default().with_accuracy(1e-15).unwrap();
+    let with = |stages: &[Stage], case: &Case| {
+        let [pose_a, pose_b] = &case.poses;
+        only(stages, || distance(&case.a, pose_a, &case.b, pose_b, &options, &mut WarmStart::default()))
+    };
+    let (mut cases, mut narrower) = (0, 0);
+    for case in catalogue().iter().filter(|case| case.is_apart()).take(100) {
+        let doubles = with(&[Stage::SupportTables, Stage::Newton], case);
+        let refined = with(&[Stage::SupportTables, Stage::Newton, Stage::Refinement], case);
+        if doubles.upper - doubles.lower < 1e-9 * case.size() && doubles.status != Status::Converged {
+            cases += 1;
+            narrower += u32::from(refined.upper - refined.lower < 0.5 * (doubles.upper - doubles.lower));
+        }
+    }
+    println!("refinement: {narrower} of {cases} narrower");
+    assert!(cases >= 20 && 10 * narrower >= 9 * cases, "{narrower} of {cases}");
+}
+
+#[test]
+fn stages_of_level_distances_solve_alone() {
+    let truth = |case: &Case, pose: &Pose| {
+        level_distance(&case.a, &case.poses[0], &case.b, pose, &Options::default(), &mut WarmStart::default())
+    };
+    let cold = |case: &Case, stages: &[Stage]| {
+        let [pose_a, pose_b] = &case.poses;
+        let mut warm = WarmStart::default();
+        let found = only(stages, || level_distance(&case.a, pose_a, &case.b, pose_b, &Options::default(), &mut warm));
+        let all = truth(case, pose_b);
+        (found.status, [found.lower, found.upper], [all.lower, all.upper])
+    };
+    let warm = |case: &Case, stages: &[Stage]| {
+        let (pose_a, options, mut warm) = (&case.poses[0], Options::default(), WarmStart::default());
+        level_distance(&case.a, pose_a, &case.b, &case.poses[1], &options, &mut warm);
+        let found = only(stages, || level_distance(&case.a, pose_a, &case.b, &case.next, &options, &mut warm));
+        let all = truth(case, &case.next);
+        (found.status, [found.lower, found.upper], [all.lower, all.upper])
+    };
+    let smooth = |case: &Case| case.is_smooth() && case.is_apart();
+    let edged = |case: &Case| !case.is_smooth() && case.is_apart();
+    at_least("level follow", 95.0, solved("level follow", smooth, |case| warm(case, &[Stage::Follow])));
+    at_least("level seek", 95.0, solved("level seek", smooth, |case| cold(case, &[Stage::Seek])));
+    at_least("level Newton", 90.0, solved("level Newton", edged, |case| warm(case, &[Stage::Newton])));
+    let stages = [Stage::SupportTables, Stage::Newton];
+    at_least("level GJK", 60.0, solved("level GJK", edged, |case| cold(case, &stages)));
+    let stages = [Stage::InteriorLevel];
+    at_least("level interior", 60.0, solved("level interior", Case::is_apart, |case| cold(case, &stages)));
+}
+
+#[test]
+fn stages_of_growth_distances_solve_alone() {
+    let truth = |case: &Case, pose: &Pose| {
+        growth_distance(&case.a, &case.poses[0], &case.b, pose, &Options::default(), &mut WarmStart::default())
+    };
+    let cold = |case: &Case, stages: &[Stage]| {
+        let [pose_a, pose_b] = &case.poses;
+        let mut warm = WarmStart::default();
+        let found = only(stages, || growth_distance(&case.a, pose_a, &case.b, pose_b, &Options::default(), &mut warm));
+        let all = truth(case, pose_b);
+        (found.status, [found.lower, found.upper], [all.lower, all.upper])
+    };
+    let warm = |case: &Case, stages: &[Stage]| {
+        let (pose_a, options, mut warm) = (&case.poses[0], Options::default(), WarmStart::default());
+        growth_distance(&case.a, pose_a, &case.b, &case.poses[1], &options, &mut warm);
+        let found = only(stages, || growth_distance(&case.a, pose_a, &case.b, &case.next, &options, &mut warm));
+        let all = truth(case, &case.next);
+        (found.status, [found.lower, found.upper], [all.lower, all.upper])
+    };
+    let edged = |case: &Case| !case.is_smooth();
+    at_least("growth follow", 95.0, solved("growth follow", Case::is_smooth, |case| warm(case, &[Stage::Follow])));
+    at_least("growth seek", 95.0, solved("growth seek", Case::is_smooth, |case| cold(case, &[Stage::Seek])));
+    at_least("growth ray", 90.0, solved("growth ray", edged, |case| warm(case, &[Stage::Ray])));
+    let stages = [Stage::SupportTables, Stage::Ray];
+    at_least("growth portal", 60.0, solved("growth portal", edged, |case| cold(case, &stages)));
+    let stages = [Stage::InteriorDistance];
+    at_least("growth interior", 60.0, solved("growth interior", |_| true, |case| cold(case, &stages)));
+}
