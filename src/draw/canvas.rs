@@ -1,6 +1,7 @@
 //! What all plots have in common: a fine canvas, inks, tick labels.
 
 use super::Ink;
+use super::compact::compact;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
@@ -35,7 +36,7 @@ pub(super) fn svg(
     }
     // Drawn fine, shown at its size: the view box keeps the fine units.
     let fine = format!("width=\"{}\" height=\"{}\"", width * FINE, height * FINE);
-    Ok(svg.replacen(&fine, &format!("width=\"{width}\" height=\"{height}\""), 1))
+    Ok(compact(&svg.replacen(&fine, &format!("width=\"{width}\" height=\"{height}\""), 1)))
 }
 
 /// Pixels in the units of the drawing.

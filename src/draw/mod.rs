@@ -4,13 +4,21 @@
 //! Backgrounds are transparent, and every colour has a contrast of at least 3 : 1 against white and
 //! against black, so a picture can be read on light and on dark pages. Two colours never carry a
 //! meaning alone: dashes or labels do too.
+//!
+//! Pictures are small: curves keep the vertices that matter on a screen, marks of a series are one
+//! path, and meshes are drawn as the area that they cover.
 
 mod canvas;
+mod compact;
+mod contour;
 mod curve;
 mod labels;
+mod path;
+mod region;
 mod scatter;
 mod shadow;
 mod silhouette;
+mod thin;
 
 pub use canvas::ChartError;
 pub use curve::{LineChart, Mark, Series};

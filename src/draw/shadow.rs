@@ -1,9 +1,9 @@
 //! Shadows of sets that need not be convex: what `{x : p(x) <= level}` covers of the picture plane.
 
 use super::View;
+use super::contour::contours;
 use crate::body::Aabb;
 use nalgebra::Vector3;
-use std::collections::HashMap;
 
 /// Grid lines per side of the picture.
 const GRID: usize = 180;
@@ -21,63 +21,19 @@ pub fn shadow(value: impl Fn(&Vector3<f64>) -> f64, level: f64, bounds: &Aabb, v
     let (corner, opposite) = (view.project(&bounds.min), view.project(&bounds.max));
     // One empty cell all around closes every outline.
     let step = [0, 1].map(|i| (opposite[i] - corner[i]) / (GRID - 3) as f64);
-    let place = |i: usize, j: usize| [corner[0] + (i as f64 - 1.0) * step[0], corner[1] + (j as f64 - 1.0) * step[1]];
+    let place = |i: f64, j: f64| [corner[0] + (i - 1.0) * step[0], corner[1] + (j - 1.0) * step[1]];
     let (near, far) = (view.depth(&bounds.min), view.depth(&bounds.max));
     let least = |i: usize, j: usize| {
         let edge = [i, j].iter().any(|&k| k == 0 || k == GRID - 1);
-        if edge { f64::INFINITY } else { least_along(|depth| value(&view.lift(place(i, j), depth)), near, far) }
+        if edge {
+            f64::INFINITY
+        } else {
+            least_along(|depth| value(&view.lift(place(i as f64, j as f64), depth)), near, far)
+        }
     };
     let above: Vec<f64> = (0..GRID * GRID).map(|k| least(k % GRID, k / GRID) - level).collect();
-    let inside = |[i, j]: [usize; 2]| above[j * GRID + i] <= 0.0;
-    // Where the outline crosses a grid line, reported by the two nodes beside it, the one inside
-    // first.
-    let mut next: HashMap<[[usize; 2]; 2], [[usize; 2]; 2]> = HashMap::new();
-    for j in 0..GRID - 1 {
-        for i in 0..GRID - 1 {
-            let corners = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]];
-            for (out, into) in crossings(corners, &inside) {
-                next.insert(out, into);
-            }
-        }
-    }
-    let point = |[a, b]: [[usize; 2]; 2]| {
-        let (low, high) = (above[a[1] * GRID + a[0]], above[b[1] * GRID + b[0]]);
-        let share = if high.is_finite() { low / (low - high) } else { 0.5 };
-        let (from, to) = (place(a[0], a[1]), place(b[0], b[1]));
-        [from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1])]
-    };
-    let mut outlines = Vec::new();
-    let mut starts: Vec<_> = next.keys().copied().collect();
-    // A hash map's order is not the same twice; a picture should be.
-    starts.sort_unstable();
-    for start in starts {
-        let mut outline = Vec::new();
-        let mut at = start;
-        while let Some(following) = next.remove(&at) {
-            outline.push(point(at));
-            at = following;
-        }
-        if !outline.is_empty() {
-            outlines.push(outline);
-        }
-    }
-    outlines
-}
-
-/// The pieces of outline in a cell with these corners, counter-clockwise: from the side where the
-/// outline enters to the one where it leaves, with the inside to its left. Two corners across count
-/// as not joined.
-fn crossings(
-    corners: [[usize; 2]; 4],
-    inside: &impl Fn([usize; 2]) -> bool,
-) -> impl Iterator<Item = ([[usize; 2]; 2], [[usize; 2]; 2])> {
-    let within = corners.map(inside);
-    // Walking around the cell, an outline enters where the inside begins and leaves where it ends.
-    let begins = (0..4).filter(move |&k| !within[k] && within[(k + 1) % 4]);
-    begins.filter_map(move |k| {
-        let ends = (1..4).map(|s| (k + s) % 4).find(|&m| within[m] && !within[(m + 1) % 4])?;
-        Some(([corners[ends], corners[(ends + 1) % 4]], [corners[(k + 1) % 4], corners[k]]))
-    })
+    let metres = |outline: Vec<[f64; 2]>| outline.into_iter().map(|[i, j]| place(i, j)).collect();
+    contours(&above, GRID).into_iter().map(metres).collect()
 }
 
 /// The least of a function between two ends, as far as samples tell.

@@ -1,6 +1,9 @@
 //! Silhouettes of convex bodies, and drawings of them in a grid of panels with one common scale.
 
 use super::Ink;
+use super::path::{Unit, push_line};
+use super::region::covered;
+use super::thin::thinned_loop;
 use crate::body::fibonacci_lattice;
 use crate::optimize::{outline as convex_outline, turn};
 use nalgebra::Vector3;
@@ -78,7 +81,7 @@ pub struct Outline {
     pub ink: Ink,
     /// Polygons in picture coordinates, metres.
     pub polygons: Vec<Vec<[f64; 2]>>,
-    /// Drawn as one filled area, the union of the polygons; otherwise as lines over a faint area.
+    /// Drawn as one filled area, the union of the polygons, which are convex; otherwise as lines over a faint area.
     pub solid: bool,
 }
 
@@ -124,6 +127,8 @@ const GAP: f64 = 18.0;
 const CAPTION: f64 = 22.0;
 const HEADER: f64 = 58.0;
 const FOOTER: f64 = 34.0;
+/// How far an outline may move for the sake of fewer vertices, pixels.
+const TOLERANCE: f64 = 0.2;
 
 impl Silhouettes {
     /// The drawing as an SVG document. Panels of a row share their vertical range, so that floors
@@ -224,25 +229,27 @@ fn ranges(row: &[Panel]) -> Vec<Range2> {
 fn write_outline(svg: &mut String, outline: &Outline, origin: [f64; 2], scale: f64) {
     let color = outline.ink.hex();
     let style = if outline.solid {
-        // Strokes close the hair lines between triangles; the group fades the union, not each
-        // triangle.
-        format!("<g opacity=\"0.5\" stroke=\"{color}\" stroke-width=\"0.6\"><path fill=\"{color}\"")
+        format!(" opacity=\"0.5\" stroke=\"{color}\" stroke-width=\"0.6\" fill=\"{color}\"")
     } else {
-        format!("<g stroke=\"{color}\" stroke-width=\"2\"><path fill=\"{color}\" fill-opacity=\"0.12\"")
+        format!(" stroke=\"{color}\" stroke-width=\"2\" fill=\"{color}\" fill-opacity=\"0.12\"")
     };
-    let _ = write!(svg, "{style} stroke-linejoin=\"round\" d=\"");
-    for polygon in &outline.polygons {
-        // Steps in tenths of a pixel: thousands of triangles would else make a file of megabytes.
-        let mut last = [0, 0];
-        for (corner, point) in polygon.iter().enumerate() {
-            let pixel = [origin[0] + point[0] * scale, origin[1] - point[1] * scale].map(|c| (c * 10.0).round() as i64);
-            let step = [pixel[0] - last[0], pixel[1] - last[1]].map(|c| c as f64 / 10.0);
-            let _ = write!(svg, "{}{} {}", if corner == 0 { 'M' } else { 'l' }, step[0], step[1]);
-            last = pixel;
-        }
-        svg.push('Z');
+    let pixel = |point: &[f64; 2]| [origin[0] + point[0] * scale, origin[1] - point[1] * scale];
+    let polygons = outline.polygons.iter().map(|polygon| polygon.iter().map(pixel).collect());
+    let mut polygons: Vec<Vec<[f64; 2]>> = polygons.collect();
+    if outline.solid {
+        polygons = covered(&polygons);
     }
-    svg.push_str("\"/></g>\n");
+    let mut d = String::new();
+    for polygon in &polygons {
+        let thin = thinned_loop(polygon, TOLERANCE);
+        // What the tolerance leaves no area of is smaller than can be seen.
+        if thin.len() > 2 || polygon.len() < 3 {
+            let tenths: Vec<[i64; 2]> = thin.iter().map(|p| p.map(|c| (c * 10.0).round() as i64)).collect();
+            push_line(&mut d, &tenths, true, Unit::Tenth);
+        }
+    }
+    // Writing to a string cannot fail.
+    let _ = writeln!(svg, "<path{style} stroke-linejoin=\"round\" d=\"{d}\"/>");
 }
 
 /// A bar of a round length, about a quarter of a panel.

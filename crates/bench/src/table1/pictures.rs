@@ -3,15 +3,12 @@
 use super::rows::{MESHES, Method};
 use super::{Set, Subject, Table1};
 use nalgebra::Vector3;
-use std::collections::HashSet;
 use sublevel::body::{Aabb, Body};
 use sublevel::draw::{Ink, Outline, Panel, Silhouettes, View, boundary_points, outline, shadow};
 use sublevel::fit::Objective;
 
 /// Boundary points that an outline is made of.
 const POINTS: usize = 6000;
-/// Steps of the grid that a mesh is drawn on, across its size.
-const GRID: f64 = 240.0;
 /// The levels of the paper's picture.
 const LEVELS: [f64; 3] = [2.0, 1.0, 0.75];
 
@@ -136,23 +133,8 @@ impl Table1 {
 }
 
 impl Subject {
-    /// The mesh with its vertices on a grid of about a pixel, each triangle of the picture once:
-    /// tens of kilobytes, not hundreds.
     fn picture(&self, view: View) -> Outline {
-        let extent = self.mesh.points.iter().map(Vector3::amax).fold(0.0, f64::max);
-        let cell = 2.0 * extent / GRID;
-        let snapped: Vec<Vector3<f64>> = self.mesh.points.iter().map(|x| (x / cell).map(f64::round) * cell).collect();
-        let flat = |corner: usize| view.project(&snapped[corner]).map(|c| (c / cell).round() as i64);
-        let mut seen = HashSet::new();
-        let distinct = |corners: &&[usize; 3]| {
-            let mut flat = corners.map(flat);
-            let [a, b, c] = flat;
-            let towards = (b[0] - a[0]) * (c[1] - a[1]) > (b[1] - a[1]) * (c[0] - a[0]);
-            flat.sort_unstable();
-            seen.insert((flat, towards))
-        };
-        let triangles: Vec<[usize; 3]> = self.mesh.triangles.iter().filter(distinct).copied().collect();
-        Outline::surface(Ink::Blue, &snapped, &triangles, view)
+        Outline::surface(Ink::Blue, &self.mesh.points, &self.mesh.triangles, view)
     }
 }
 
