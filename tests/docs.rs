@@ -90,3 +90,36 @@ fn paths_name_what_is_there() {
     assert!(missing.is_empty(), "\n{}", missing.join("\n"));
     assert!(found > 100, "{found} paths were looked at");
 }
+
+/// Bytes of all files in docs/, and of one picture.
+const MOST: u64 = 1_500_000;
+const MOST_OF_A_PICTURE: u64 = 100_000;
+
+#[test]
+fn docs_stay_small() {
+    let (mut all, mut pictures, mut large) = (0, 0, Vec::new());
+    for entry in fs::read_dir(root().join("docs")).expect("the folder is readable") {
+        let entry = entry.expect("an entry");
+        let size = entry.metadata().expect("it can be looked at").len();
+        assert!(entry.path().is_file(), "a folder, which this does not look into: {}", entry.path().display());
+        all += size;
+        if entry.path().extension().is_some_and(|extension| extension == "svg") {
+            pictures += 1;
+            if size > MOST_OF_A_PICTURE {
+                large.push(format!("{} has {size} bytes", entry.path().display()));
+            }
+        }
+    }
+    assert!(large.is_empty(), "\n{}", large.join("\n"));
+    assert!(all <= MOST, "docs/ has {all} bytes");
+    assert!(pictures > 20, "{pictures} pictures were looked at");
+}
+
+#[test]
+fn docs_have_no_picture_that_no_page_shows() {
+    let text: String = pages().iter().map(|page| fs::read_to_string(page).expect("a page is text")).collect();
+    for entry in fs::read_dir(root().join("docs")).expect("the folder is readable") {
+        let name = entry.expect("an entry").file_name().into_string().expect("a plain name");
+        assert!(!name.ends_with(".svg") || text.contains(&format!("{name})")), "no page shows docs/{name}");
+    }
+}

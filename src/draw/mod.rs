@@ -1,5 +1,5 @@
 //! Pictures as SVG: silhouettes of posed bodies ([`Silhouettes`]), curves ([`LineChart`]) and
-//! points on logarithmic axes ([`Scatter`]).
+//! points on logarithmic axes ([`Scatter`]), several of them in one picture ([`stacked`]).
 //!
 //! Backgrounds are transparent, and every colour has a contrast of at least 3 : 1 against white and
 //! against black, so a picture can be read on light and on dark pages. Two colours never carry a
@@ -18,6 +18,7 @@ mod region;
 mod scatter;
 mod shadow;
 mod silhouette;
+mod stack;
 mod thin;
 
 pub use canvas::ChartError;
@@ -25,6 +26,7 @@ pub use curve::{LineChart, Mark, Series};
 pub use scatter::{Group, Marker, Point, Scatter, Stairs};
 pub use shadow::shadow;
 pub use silhouette::{Outline, Panel, Silhouettes, View, boundary_points, outline};
+pub use stack::stacked;
 
 /// Colours of a chart, distinguished by colour-blind readers too (after Okabe and Ito).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,9 +5,10 @@ use crate::cost::{Messages, cost};
 use crate::detail::detail;
 use crate::duel::Shelf;
 use crate::messages::messages;
+use crate::numbers;
 use crate::speed::speed;
 use crate::stability::{Earlier, Lost, Method, Share, Stability, serve, stability};
-use crate::table1::{Table1Progress, table1};
+use crate::table1::{Table1, Table1Error, Table1Progress, table1};
 use crate::warm::warm;
 use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -44,6 +45,7 @@ enum Figure {
     Accuracy(AccuracyArgs),
     Cost(CostArgs),
     Table1(Table1Args),
+    Tables(TablesArgs),
     #[command(hide = true)]
     Fit(FitArgs),
 }
@@ -87,6 +89,25 @@ struct Table1Args {
     /// Only up to degree 4: half a minute
     #[arg(long)]
     quick: bool,
+    /// Take volumes and times from the table1.csv that lies in the folder of the report; fit again
+    /// only what the pictures show, and draw it
+    #[arg(long, conflicts_with = "quick")]
+    redraw: bool,
+}
+
+/// Write the numbers of pages again from the CSV files: nothing is measured
+///
+/// Blocks between `<!-- from FILE.csv: NAME -->` and `<!-- end -->` are replaced in all pages of
+/// --out and in those that are named.
+///
+/// sublevel-bench tables --out docs README.md
+#[derive(Debug, Args)]
+struct TablesArgs {
+    /// Folder with the CSV files and their pages
+    #[arg(long, value_name = "DIR", default_value = "docs")]
+    out: PathBuf,
+    /// Pages elsewhere that show numbers of these CSV files
+    pages: Vec<PathBuf>,
 }
 
 /// Time of a distance query against model error: our representations beside hulls, simplified hulls
@@ -194,8 +215,8 @@ struct CostArgs {
 #[derive(Debug, Args)]
 struct Common {
     /// Folder with psb/101.off, meshes/mbm_mug.off and so on
-    #[arg(long, value_name = "DIR")]
-    data: PathBuf,
+    #[arg(long, value_name = "DIR", required_unless_present = "redraw")]
+    data: Option<PathBuf>,
     /// Folder for the report; made with its parents when it is not there
     #[arg(long, value_name = "DIR", default_value = "sublevel-chart")]
     out: PathBuf,
@@ -205,6 +226,17 @@ struct Common {
     /// Fewer objects, representations and poses: a look, not a result
     #[arg(long)]
     quick: bool,
+    /// Measure nothing: draw the pictures and write the tables again from the CSV that an earlier
+    /// run left in the folder of the report
+    #[arg(long, conflicts_with_all = ["quick", "data"])]
+    redraw: bool,
+}
+
+impl Common {
+    /// The folder; only `--redraw` does without.
+    fn data(&self) -> &Path {
+        self.data.as_deref().unwrap_or(Path::new(""))
+    }
 }
 
 /// The pictures that a figure wrote, the most telling first.
@@ -224,24 +256,37 @@ fn run(figure: &Figure) -> Result<(), Box<dyn Error>> {
         Figure::All(args) => return run_all(&args.common),
         Figure::Stability(args) => return run_stability(args),
         Figure::Fit(args) => return run_fit(args),
+        Figure::Speed(args) if args.common.redraw => redraw(&args.common.out, "speed"),
         Figure::Speed(args) => run_speed(&args.common),
+        Figure::Warm(args) if args.common.redraw => redraw(&args.common.out, "warm"),
         Figure::Warm(args) => run_warm(&args.common),
+        Figure::Detail(args) if args.common.redraw => redraw(&args.common.out, "detail"),
         Figure::Detail(args) => run_detail(&args.common),
+        Figure::Accuracy(args) if args.common.redraw => redraw(&args.common.out, "accuracy"),
         Figure::Accuracy(args) => run_accuracy(&args.common),
+        Figure::Cost(args) if args.common.redraw => redraw(&args.common.out, "cost"),
         Figure::Cost(args) => run_cost(&args.common),
+        Figure::Tables(args) => return write_numbers(args),
+        Figure::Table1(args) if args.redraw => redraw_table1(&args.meshes, &args.out),
         Figure::Table1(args) => run_table1(&args.meshes, &args.out, args.quick),
     };
     drawn.map(drop)
 }
 
 fn run_all(args: &Common) -> Result<(), Box<dyn Error>> {
+    if args.redraw {
+        // Table I takes the meshes, and a command of its own.
+        return ["speed", "accuracy", "cost", "warm", "detail"]
+            .into_iter()
+            .try_for_each(|name| redraw(&args.out, name).map(drop));
+    }
     let figures: [(&str, &str, Run); 6] = [
         ("speed", "Speed against accuracy", run_speed),
         ("accuracy", "Solver accuracy against time", run_accuracy),
         ("cost", "Cost growth", run_cost),
         ("warm", "Warm starts", run_warm),
         ("detail", "Detail", run_detail),
-        ("table1", "Table I of the paper", |args| run_table1(&args.data.join("psb"), &args.out, args.quick)),
+        ("table1", "Table I of the paper", |args| run_table1(&args.data().join("psb"), &args.out, args.quick)),
     ];
     let flags = if args.quick { " --quick" } else { "" };
     let mut text = format!(
@@ -274,30 +319,34 @@ fn run_fit(args: &FitArgs) -> Result<(), Box<dyn Error>> {
 
 fn run_speed(args: &Common) -> Drawn {
     with_shelf(args, |shelf, bar| {
-        let found = speed(&args.data, shelf, args.quick, &mut |at| tell(bar, at))?;
-        write_report(&args.out, "speed", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+        let found = speed(args.data(), shelf, args.quick, &mut |at| tell(bar, at))?;
+        write_report(&args.out, "speed", &found.markdown(), &found.csv())?;
+        redraw(&args.out, "speed")
     })
 }
 
 fn run_warm(args: &Common) -> Drawn {
     with_shelf(args, |shelf, bar| {
-        let found = warm(&args.data, shelf, args.quick, &mut |at| tell(bar, at))?;
-        write_report(&args.out, "warm", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+        let found = warm(args.data(), shelf, args.quick, &mut |at| tell(bar, at))?;
+        write_report(&args.out, "warm", &found.markdown(), &found.csv())?;
+        redraw(&args.out, "warm")
     })
 }
 
 fn run_detail(args: &Common) -> Drawn {
     with_shelf(args, |shelf, bar| {
-        let found = detail(&args.data, shelf, args.quick, &mut |at| tell(bar, at))?;
+        let found = detail(args.data(), shelf, args.quick, &mut |at| tell(bar, at))?;
         write_atomically(&args.out.join("detail-parts.csv"), &found.parts_csv())?;
-        write_report(&args.out, "detail", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+        write_report(&args.out, "detail", &found.markdown(), &found.csv())?;
+        redraw(&args.out, "detail")
     })
 }
 
 fn run_accuracy(args: &Common) -> Drawn {
     with_shelf(args, |shelf, bar| {
-        let found = accuracy(&args.data, shelf, args.quick, &mut |at| tell(bar, at))?;
-        write_report(&args.out, "accuracy", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+        let found = accuracy(args.data(), shelf, args.quick, &mut |at| tell(bar, at))?;
+        write_report(&args.out, "accuracy", &found.markdown(), &found.csv())?;
+        redraw(&args.out, "accuracy")
     })
 }
 
@@ -306,8 +355,9 @@ fn run_cost(args: &Common) -> Drawn {
         let mut sent = |sizes: &[usize]| messages(sizes).map_err(|error| error.to_string());
         let program = std::env::current_exe().ok();
         let parts: (Messages<'_>, _) = (&mut sent, program.as_deref());
-        let found = cost(&args.data, shelf, args.quick, parts, &mut |at| tell(bar, at))?;
-        write_report(&args.out, "cost", |names| found.markdown(names), &found.csv(), &found.pictures()?)
+        let found = cost(args.data(), shelf, args.quick, parts, &mut |at| tell(bar, at))?;
+        write_report(&args.out, "cost", &found.markdown(), &found.csv())?;
+        redraw(&args.out, "cost")
     })
 }
 
@@ -346,7 +396,8 @@ fn measure_stability(out: &Path, methods: &[Method], quick: bool) -> Result<Stab
     let bar = bar()?;
     let found = stability(&std::env::current_exe()?, methods, quick, &mut |at| tell(&bar, at))?;
     bar.finish_and_clear();
-    write_report(out, "stability", |_| found.markdown(), &found.csv(), &[])?;
+    write_report(out, "stability", &found.markdown(), &found.csv())?;
+    print_place(out, "stability")?;
     Ok(found)
 }
 
@@ -367,35 +418,75 @@ fn tell(bar: &ProgressBar, at: &str) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// Writes NAME.md, NAME.csv and the pictures, and prints where the report is; returns the pictures'
-/// names.
-fn write_report(
-    out: &Path,
-    name: &str,
-    markdown: impl FnOnce(&[&str]) -> String,
-    csv: &str,
-    pictures: &[(String, String)],
-) -> Drawn {
-    let names: Vec<&str> = pictures.iter().map(|(name, _)| name.as_str()).collect();
-    let report = out.join(format!("{name}.md"));
-    write_atomically(&report, &markdown(&names))?;
+/// Writes NAME.md, whose blocks are still empty, and NAME.csv.
+fn write_report(out: &Path, name: &str, markdown: &str, csv: &str) -> Result<(), Box<dyn Error>> {
     write_atomically(&out.join(format!("{name}.csv")), csv)?;
-    for (name, svg) in pictures {
+    write_atomically(&out.join(format!("{name}.md")), markdown)
+}
+
+/// Draws the pictures of a figure from its CSV and fills the blocks of its report.
+fn redraw(out: &Path, name: &str) -> Drawn {
+    let mut pictures = numbers::pictures(&format!("{name}.csv"), out)?;
+    if name == "detail" {
+        pictures.extend(numbers::pictures("detail-parts.csv", out)?);
+    }
+    finish(out, name, pictures)
+}
+
+/// Writes pictures, fills the blocks of the report, and prints where that is; returns the names of
+/// the pictures.
+fn finish(out: &Path, name: &str, pictures: Vec<(String, String)>) -> Drawn {
+    for (name, svg) in &pictures {
         write_atomically(&out.join(name), svg)?;
     }
-    writeln!(io::stdout().lock(), "{}", report.display())?;
-    Ok(names.into_iter().map(str::to_owned).collect())
+    write_numbers_of(&out.join(format!("{name}.md")), out)?;
+    print_place(out, name)?;
+    Ok(pictures.into_iter().map(|(name, _)| name).collect())
+}
+
+fn print_place(out: &Path, name: &str) -> Result<(), Box<dyn Error>> {
+    Ok(writeln!(io::stdout().lock(), "{}", out.join(format!("{name}.md")).display())?)
+}
+
+fn write_numbers(args: &TablesArgs) -> Result<(), Box<dyn Error>> {
+    for page in numbers::pages(&args.out)?.iter().chain(&args.pages) {
+        write_numbers_of(page, &args.out)?;
+    }
+    Ok(())
+}
+
+/// Fills the blocks of a page from the CSV files of a folder.
+fn write_numbers_of(page: &Path, folder: &Path) -> Result<(), Box<dyn Error>> {
+    let old = cli::read(page)?;
+    let new = numbers::written_again(&old, folder).map_err(|error| format!("{}: {error}", page.display()))?;
+    if new != old {
+        write_atomically(page, &new)?;
+    }
+    Ok(())
 }
 
 fn run_table1(meshes: &Path, out: &Path, quick: bool) -> Drawn {
     make_folder(out)?;
+    let table = watched(|progress| table1(meshes, quick, progress))?;
+    write_report(out, "table1", &table.markdown(), &table.csv())?;
+    finish(out, "table1", table.pictures()?)
+}
+
+fn redraw_table1(meshes: &Path, out: &Path) -> Drawn {
+    let csv = cli::read(&out.join("table1.csv"))?;
+    let table = watched(|progress| Table1::fitted_again(&csv, meshes, progress))?;
+    finish(out, "table1", table.pictures()?)
+}
+
+/// Makes a table under a spinner.
+fn watched(
+    make: impl FnOnce(&mut dyn FnMut(&Table1Progress) -> ControlFlow<()>) -> Result<Table1, Table1Error>,
+) -> Result<Table1, Box<dyn Error>> {
     let bar = bar()?;
-    let table = table1(meshes, quick, &mut |progress| {
+    let table = make(&mut |progress| {
         let Table1Progress { done, cells, at } = progress;
         tell(&bar, &format!("{} of {cells}: {at}", done + 1))
     })?;
     bar.finish_and_clear();
-    let mut pictures = vec![("table1.svg".to_owned(), table.volume_against_time()?)];
-    pictures.extend(table.pictures().into_iter().map(|(name, svg)| (name.to_owned(), svg)));
-    write_report(out, "table1", |names| table.markdown(names), &table.csv(), &pictures)
+    Ok(table)
 }

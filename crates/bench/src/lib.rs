@@ -2,16 +2,21 @@
 //! numbers; and what its benches share. Not published: whoever uses Sublevel compiles none of it.
 
 pub mod accuracy;
+mod blocks;
 pub mod cost;
+mod csv;
 pub mod detail;
 pub mod duel;
 pub mod figures;
 mod machine;
+mod measures;
 mod messages;
+pub mod numbers;
 mod rivals;
 pub mod speed;
 pub mod stability;
 pub mod table1;
 pub mod warm;
+mod words;
 
 pub use machine::Machine;

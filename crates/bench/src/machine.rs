@@ -37,7 +37,7 @@ impl Machine {
     }
 
     /// The first line of a report of a figure that one core makes: the command, and where this was.
-    pub(super) fn head(&self, command: &str) -> String {
+    pub fn head(&self, command: &str) -> String {
         self.head_with(command, "of which one is used")
     }
 

@@ -37,6 +37,21 @@ impl Machine {
         }
     }
 
+    /// Two comments for the head of a CSV: command and machine, peers and load.
+    pub(crate) fn comments(&self, quick: bool) -> String {
+        let flags = if quick { "--quick --csv FILE" } else { "--csv FILE" };
+        let command = format!("cargo bench -p sublevel-bench --bench measures -- {flags}");
+        let load = self.load.map(|load| load.map_or("unknown".to_owned(), |load| load.to_string()));
+        format!(
+            "# {}\n# Peers: coal {}, parry3d-f64 {}. Load average of the machine: {} before, {} after.\n",
+            self.this.head(&command),
+            self.coal.as_deref().unwrap_or("absent"),
+            self.parry,
+            load[0],
+            load[1]
+        )
+    }
+
     pub(crate) fn print(&self) {
         let bench::Machine { cpu, cores, simd, commit, rustc, date } = &self.this;
         println!("machine  {cpu}, {cores} cores, {simd}");

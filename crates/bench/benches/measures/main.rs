@@ -43,6 +43,10 @@ struct Args {
     /// Write the results as JSON, too
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Write the results as CSV, too, with machine, commit and peers in its head: docs/measures.csv
+    /// is what README and docs/benchmarks.md show once `make docs-numbers` has run
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
     /// Given by cargo
     #[arg(long, hide = true)]
     bench: bool,
@@ -97,6 +101,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     if let Some(path) = args.json {
         fs::write(&path, serde_json::to_string_pretty(&report)? + "\n")
             .map_err(|error| format!("--json: {}: {error}", path.display()))?;
+    }
+    if let Some(path) = args.csv {
+        fs::write(&path, report.csv(args.quick)).map_err(|error| format!("--csv: {}: {error}", path.display()))?;
     }
     Ok(())
 }

@@ -5,6 +5,7 @@ use crate::motion::{Character, Kind};
 use crate::rows::{COAL_COLD, COAL_WARM, DEGREE, Scene};
 use crate::sweep::{Row, Target};
 use serde::Serialize;
+use std::fmt::Write;
 use sublevel_bench::duel::Coal;
 
 /// All results of a run.
@@ -35,6 +36,7 @@ struct Line {
     of_coal_warm: Option<f64>,
     of_coal_cold: Option<f64>,
     mean_iterations: Option<f64>,
+    median_iterations: Option<f64>,
     most_iterations: Option<u32>,
     /// Not reported of coal.
     failed: Option<usize>,
@@ -66,6 +68,28 @@ impl Report {
 
     pub(crate) fn end(&mut self) {
         self.machine.end();
+    }
+
+    /// One line per pair, kind of motion and row; the head says how it was made.
+    pub(crate) fn csv(&self, quick: bool) -> String {
+        let mut text = self.machine.comments(quick);
+        text.push_str("pair,motion,row,ns,iterations_mean,iterations_median,iterations_most,failed,overlaps\n");
+        for Table { pair, kind, rows, .. } in &self.tables {
+            for line in rows {
+                let mean = line.mean_iterations.map_or_else(String::new, |mean| format!("{mean:.4}"));
+                let (median, most) = (count(line.median_iterations), count(line.most_iterations));
+                let [failed, overlaps] = [line.failed, line.overlaps].map(count);
+                // Writing to a string cannot fail.
+                let _ = writeln!(
+                    text,
+                    "{pair},{},\"{}\",{:.1},{mean},{median},{most},{failed},{overlaps}",
+                    kind.name(),
+                    line.label,
+                    line.nanoseconds
+                );
+            }
+        }
+        text
     }
 
     pub(crate) fn print_foot(&self) {
@@ -124,6 +148,7 @@ impl Table {
                 of_coal_warm: time(COAL_WARM).map(|time| nanoseconds / time),
                 of_coal_cold: time(COAL_COLD).map(|time| nanoseconds / time),
                 mean_iterations: counts.map(|(mean, ..)| mean),
+                median_iterations: counts.map(|(_, median, _)| median),
                 most_iterations: counts.map(|(.., most)| most),
                 failed: row.map(|row| row.timed.tally.failed),
                 overlaps: row.map(|row| row.timed.tally.overlaps),

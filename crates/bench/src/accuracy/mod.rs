@@ -4,12 +4,14 @@
 mod cases;
 mod methods;
 mod report;
+mod shown;
 
 use super::Machine;
 use super::duel::{Coal, DuelError, Shelf};
 use super::rivals::Clarabel;
 use cases::cases;
 use methods::{Cell, measure};
+pub(crate) use shown::Shown;
 use std::ops::ControlFlow;
 use std::path::Path;
 

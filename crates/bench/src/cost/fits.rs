@@ -1,7 +1,7 @@
 //! Fits against degree and number of points.
 
 use super::Effort;
-use super::growth::{Growth, Line, Unit};
+use super::growth::{self, Growth, Line, Unit};
 use super::memory::peak;
 use crate::duel::sweep::median;
 use crate::duel::{DuelError, Random, ShelfError, Subject, points_text};
@@ -45,9 +45,7 @@ pub(super) fn degrees(
     }
     let lines = lines.into_iter().filter(|line| !line.points.is_empty()).collect();
     Ok(Growth {
-        key: "fit-degree",
-        title: "A fit against the degree",
-        size: "degree",
+        axis: growth::FIT_DEGREE,
         what: format!("The {} vertices of {}, log det.", subject.mesh.points.len(), subject.name),
         lines,
     })
@@ -82,9 +80,7 @@ pub(super) fn points(
         lines.extend(both.into_iter().filter(|line| !line.points.is_empty()));
     }
     Ok(Growth {
-        key: "fit-points",
-        title: "A fit against the number of points",
-        size: "points",
+        axis: growth::FIT_POINTS,
         what: format!(
             "Degree {DEGREE}, log det: random points on the surface of {}, few of them vertices of their hull, and on a superellipsoid of degree 4, all of them vertices.",
             subject.name

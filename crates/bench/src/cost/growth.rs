@@ -17,14 +17,36 @@ pub(super) struct Line {
     pub(super) points: Vec<(f64, f64)>,
 }
 
-/// Costs against one size.
-#[derive(Clone, Debug)]
-pub(super) struct Growth {
+/// What costs are measured against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Axis {
     /// For names of files and the table.
     pub(super) key: &'static str,
     pub(super) title: &'static str,
     /// Name of the size.
     pub(super) size: &'static str,
+}
+
+const fn axis(key: &'static str, title: &'static str, size: &'static str) -> Axis {
+    Axis { key, title, size }
+}
+
+pub(super) const DEGREE: Axis = axis("degree", "A distance query against the degree", "degree of both bodies");
+pub(super) const CONSTRAINTS: Axis =
+    axis("constraints", "A distance query against the number of constraints", "constraints of one body");
+pub(super) const PARTS: Axis = axis("parts", "A distance query against the parts of a compound", "parts of one solid");
+pub(super) const BATCH: Axis = axis("batch", "A batch of distances against its poses", "poses of a batch");
+pub(super) const MESSAGE: Axis = axis("message", "A message to the server against its pairs", "pairs of a message");
+pub(super) const FIT_DEGREE: Axis = axis("fit-degree", "A fit against the degree", "degree");
+pub(super) const FIT_POINTS: Axis = axis("fit-points", "A fit against the number of points", "points");
+
+/// All of them.
+pub(super) const AXES: [Axis; 7] = [DEGREE, CONSTRAINTS, PARTS, BATCH, MESSAGE, FIT_DEGREE, FIT_POINTS];
+
+/// Costs against one size.
+#[derive(Clone, Debug)]
+pub(super) struct Growth {
+    pub(super) axis: Axis,
     /// What was measured, for people.
     pub(super) what: String,
     pub(super) lines: Vec<Line>,

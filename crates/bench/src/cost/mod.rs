@@ -6,11 +6,13 @@ mod growth;
 mod memory;
 mod queries;
 mod report;
+mod shown;
 
 use super::Machine;
 use super::duel::{DuelError, Shelf, Subject};
 use fits::Fitting;
 use growth::{Growth, Line, Unit};
+pub(crate) use shown::Shown;
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -104,9 +106,7 @@ fn sent(sizes: &[usize], messages: Messages<'_>) -> Result<Growth, DuelError> {
         each.points.push((size as f64, time / size as f64));
     }
     Ok(Growth {
-        key: "message",
-        title: "A message to the server against its pairs",
-        size: "pairs of a message",
+        axis: growth::MESSAGE,
         what: "Evaluate over gRPC on loopback, client and server in one process: distances of pairs of bodies of degree 4, 64 of each of two kinds in a scene of \
                20 m, all pairs of a message different."
             .into(),

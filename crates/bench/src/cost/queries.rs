@@ -1,7 +1,7 @@
 //! Queries against degree, constraints, parts, and poses in a batch.
 
 use super::Effort;
-use super::growth::{Growth, Line, Unit};
+use super::growth::{self, Growth, Line, Unit};
 use super::memory::bytes_of;
 use crate::duel::motion::{self, Trajectory};
 use crate::duel::sweep::{Answer, Row};
@@ -36,9 +36,7 @@ pub(super) fn degrees(
     }
     let lines = against(pair, &shapes, effort)?;
     Ok(Growth {
-        key: "degree",
-        title: "A distance query against the degree",
-        size: "degree of both bodies",
+        axis: growth::DEGREE,
         what: format!("{} and {}, one constraint each.", pair[0].name, pair[1].name),
         lines,
     })
@@ -62,9 +60,7 @@ pub(super) fn constraints(
     }
     let lines = against(pair, &shapes, effort)?;
     Ok(Growth {
-        key: "constraints",
-        title: "A distance query against the number of constraints",
-        size: "constraints of one body",
+        axis: growth::CONSTRAINTS,
         what: format!(
             "{} of degree {DEGREE}, cut by slabs, each a constraint of degree 2; {} has one constraint.",
             pair[0].name, pair[1].name
@@ -99,9 +95,7 @@ pub(super) fn parts(
     }
     let lines = against(pair, &shapes, effort)?;
     Ok(Growth {
-        key: "parts",
-        title: "A distance query against the parts of a compound",
-        size: "parts of one solid",
+        axis: growth::PARTS,
         what: format!("{name} in parts of degree {DEGREE}; {} is one body.", pair[1].name),
         lines,
     })
@@ -145,9 +139,7 @@ pub(super) fn batches(
         places.points.push((count, count * (size_of::<Pose>() + size_of::<Distance>()) as f64));
     }
     Ok(Growth {
-        key: "batch",
-        title: "A batch of distances against its poses",
-        size: "poses of a batch",
+        axis: growth::BATCH,
         what: format!(
             "{} and {} of degree {BATCH_DEGREE}. A pose takes {} bytes and an answer {}, both in places of the caller; a batch allocates nothing.",
             pair[0].name,

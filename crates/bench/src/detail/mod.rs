@@ -6,11 +6,14 @@ mod parts_report;
 mod questions;
 mod report;
 mod rungs;
+mod shown;
 
 use super::Machine;
 use super::duel::{DuelError, Shelf, pairs};
 use parts::{Divided, parts};
+pub(crate) use parts_report::Shown as PartsShown;
 use rungs::{Ladder, ladder};
+pub(crate) use shown::Shown;
 use std::ops::ControlFlow;
 use std::path::Path;
 

@@ -14,7 +14,7 @@ use std::time::Instant;
 use sublevel::fit::{FitError, Mesh, PartSearch, ReadOptions, convex_parts, hull::convex_hull, read_mesh};
 
 /// Objects by name and file; the tube, which has none, is made.
-const OBJECTS: [(&str, &str); 7] = [
+pub(super) const OBJECTS: [(&str, &str); 7] = [
     ("shelf", "faults/shelf.off"),
     ("tube", ""),
     ("mug", "meshes/mbm_mug.off"),

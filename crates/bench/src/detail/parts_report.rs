@@ -1,6 +1,8 @@
 //! The section and the picture of the convex decompositions.
 
-use super::parts::{Divided, Divider};
+use super::parts::{Divided, Divider, OBJECTS};
+use crate::blocks::block;
+use crate::csv::{CsvError, Row, Table};
 use crate::duel::parry_version;
 use std::fmt::Write;
 use sublevel::draw::{ChartError, Group, Ink, Marker, Point, Scatter, Stairs};
@@ -16,18 +18,62 @@ out: the largest distance of a vertex of the object from all hulls; ours leave o
 without volume are not counted. Seconds of the search alone, one thread.
 ";
 
-/// The section, for the end of the report.
-pub(super) fn markdown(divided: &[Divided], picture: Option<&str>) -> String {
-    let mut text = String::from("## Convex parts\n\n");
-    if let Some(name) = picture {
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "![{name}]({name})\n");
+/// The section, for the end of the report, but for what [`Shown`] writes into its block.
+pub(super) fn markdown() -> String {
+    let parry = parry_version();
+    format!("## Convex parts\n\nParry is parry3d-f64 {parry}.\n\n{}", block("detail-parts.csv", "parts", ""))
+}
+
+/// The decompositions of a CSV.
+pub(crate) struct Shown {
+    divided: Vec<Divided>,
+}
+
+impl Shown {
+    /// Reads what [`csv`] wrote.
+    pub(crate) fn read(text: &str) -> Result<Self, CsvError> {
+        let divided = Table::read(text)?.rows().map(|row| divided(&row)).collect::<Result<_, _>>()?;
+        Ok(Self { divided })
     }
+
+    /// The picture with its name.
+    pub(crate) fn pictures(&self) -> Result<Vec<(String, String)>, ChartError> {
+        Ok(vec![("detail-parts.svg".to_owned(), picture(&self.divided)?)])
+    }
+
+    /// What a block of a page holds.
+    pub(crate) fn block(&self, name: &str) -> Option<String> {
+        (name == "parts").then(|| table(&self.divided))
+    }
+}
+
+fn divided(row: &Row<'_>) -> Result<Divided, CsvError> {
+    let (object, by) = (row.text("object")?, row.text("by")?);
+    let known = OBJECTS.into_iter().map(|(name, _)| name).find(|name| *name == object);
+    let divider = Divider::ALL.into_iter().find(|divider| divider.name() == by);
+    Ok(Divided {
+        object: known.ok_or_else(|| row.error(format!("no object is named '{object}'")))?,
+        divider: divider.ok_or_else(|| row.error(format!("nobody named '{by}' divides objects")))?,
+        asked: row.get("asked")?,
+        parts: row.get("parts")?,
+        volume_m3: row.number("volume_m3")?,
+        of_hull: row.number("volume_of_hull")?,
+        of_object: row.maybe("volume_of_object")?,
+        concavity_m: row.number("concavity_m")?,
+        concavity: row.number("concavity")?,
+        left_out_m: row.number("left_out_m")?,
+        seconds: row.number("seconds")?,
+    })
+}
+
+/// The picture, how to read the table, the table and the verdict.
+fn table(divided: &[Divided]) -> String {
+    let mut text = String::from("![detail-parts.svg](detail-parts.svg)\n\n");
+    // Writing to a string cannot fail.
     let _ = writeln!(
         text,
-        "{NOTES}- Parry is parry3d-f64 {}.\n\n| object | parts asked | by | parts | volume, of the object | of its hull | concavity | left out m | seconds |\n\
-         |---|---|---|---|---|---|---|---|---|",
-        parry_version()
+        "{NOTES}\n| object | parts asked | by | parts | volume, of the object | of its hull | concavity | left out m | seconds |\n\
+         |---|---|---|---|---|---|---|---|---|"
     );
     for row in divided {
         if row.parts == 0 {
@@ -102,7 +148,11 @@ pub(super) fn csv(divided: &[Divided]) -> String {
     let mut text = String::from(
         "object,asked,by,parts,volume_m3,volume_of_object,volume_of_hull,concavity_m,concavity,left_out_m,seconds\n",
     );
-    for row in divided.iter().filter(|row| row.parts > 0) {
+    for row in divided {
+        if row.parts == 0 {
+            let _ = writeln!(text, "{},{},{},0,,,,,,,", row.object, row.asked, row.divider.name());
+            continue;
+        }
         let of_object = row.of_object.map_or(String::new(), |of| format!("{of:e}"));
         let _ = writeln!(
             text,
@@ -123,7 +173,7 @@ pub(super) fn csv(divided: &[Divided]) -> String {
 }
 
 /// Volume as a part of V-HACD's against that: lower is better, and below the line better than V-HACD.
-pub(super) fn picture(divided: &[Divided]) -> Result<String, ChartError> {
+fn picture(divided: &[Divided]) -> Result<String, ChartError> {
     let styles = [(Divider::Ours, Ink::Blue, Marker::Disc), (Divider::Greedy, Ink::Orange, Marker::Ring)];
     let groups: Vec<Group> = styles
         .into_iter()

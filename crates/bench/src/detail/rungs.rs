@@ -8,6 +8,9 @@ use sublevel::body::{Body, Shape};
 use sublevel::fit::{FitError, FitOptions, ball};
 use sublevel::measure::{Distance, Options, Pose, WarmStart, distance, distance_batch};
 
+/// Names of the rungs.
+pub(super) const RUNGS: [&str; 5] = ["ball", "ellipsoid", "degree 4", "degree 6", "degree 8"];
+
 /// A rung of a pair.
 #[derive(Clone, Debug)]
 pub(super) struct Rung {
@@ -50,8 +53,7 @@ pub(super) fn ladder(
 ) -> Result<Ladder, DuelError> {
     let pair = format!("{}-{}", a.name, b.name);
     let diameter_m = a.diameter_m.max(b.diameter_m);
-    let names = ["ball", "ellipsoid", "degree 4", "degree 6", "degree 8"];
-    let names = if effort.quick { &names[..4] } else { &names[..] };
+    let names = if effort.quick { &RUNGS[..4] } else { &RUNGS[..] };
     let mut bodies = Vec::new();
     for (rung, &name) in names.iter().enumerate() {
         announce(&format!("{pair}: {name}"))?;

@@ -10,10 +10,12 @@ mod peers;
 mod pictures;
 mod race;
 mod report;
+mod shown;
 
 use super::Machine;
 use super::duel::{Coal, DuelError, Shelf, pairs};
-use race::{Race, race};
+use race::{About, Race, race};
+pub(crate) use shown::Shown;
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -35,7 +37,7 @@ pub struct Speed {
     coal: Option<String>,
     quick: bool,
     passes: usize,
-    races: Vec<Race>,
+    races: Vec<(Race, About)>,
 }
 
 /// Measures all pairs of the meshes in `data`, or two of them with fewer representations and poses

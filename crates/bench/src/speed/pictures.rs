@@ -1,10 +1,9 @@
 //! The charts: model error across, time up, a point for each representation.
 
-use super::Speed;
 use super::front::{Entry, front};
 use super::ours::Method;
 use super::race::{Line, Race, Who};
-use sublevel::draw::{ChartError, Group, Ink, Marker, Point, Scatter, Stairs};
+use sublevel::draw::{ChartError, Group, Ink, Marker, Point, Scatter, Stairs, stacked};
 
 /// Which times are drawn, or judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,48 +125,50 @@ impl Race {
     }
 }
 
-impl Speed {
-    /// The pictures by name.
-    ///
-    /// # Errors
-    /// [`ChartError::Empty`] if nothing was measured.
-    pub fn pictures(&self) -> Result<Vec<(String, String)>, ChartError> {
-        let mut all = vec![("speed.svg".to_owned(), self.overall()?)];
-        for race in &self.races {
-            let name = &race.name;
-            all.push((format!("speed-{name}.svg"), chart(race, Truth::Hulls, Timing::Warm)?));
-            all.push((format!("speed-{name}-cold.svg"), chart(race, Truth::Hulls, Timing::Cold)?));
-            all.push((format!("speed-{name}-batch.svg"), chart(race, Truth::Hulls, Timing::Batch)?));
-            if race.is_hollow() {
-                all.push((format!("speed-{name}-mesh.svg"), chart(race, Truth::Meshes, Timing::Warm)?));
-            }
+/// The pictures by name: all pairs together, and of each pair one chart below the other.
+///
+/// # Errors
+/// [`ChartError::Empty`] if nothing was measured.
+pub(super) fn pictures(races: &[Race]) -> Result<Vec<(String, String)>, ChartError> {
+    let mut all = vec![("speed.svg".to_owned(), overall(races)?)];
+    for race in races {
+        let mut charts = Vec::new();
+        for timing in [Timing::Warm, Timing::Cold, Timing::Batch] {
+            charts.push(chart(race, Truth::Hulls, timing)?);
         }
-        Ok(all)
+        if race.is_hollow() {
+            charts.push(chart(race, Truth::Meshes, Timing::Warm)?);
+        }
+        all.push((picture(race), stacked(&charts)));
     }
+    Ok(all)
+}
 
-    /// Means over all pairs: of errors the mean, of times the geometric one.
-    fn overall(&self) -> Result<String, ChartError> {
-        let Some(first) = self.races.first() else { return Err(ChartError::Empty) };
-        let whos = first.lines.iter().map(|line| line.who);
-        let lines = whos.filter_map(|who| {
-            let same = self.races.iter().map(|race| race.lines.iter().find(|line| line.who == who));
-            let same: Vec<&Line> = same.collect::<Option<_>>()?;
-            let count = same.len() as f64;
-            let errors = same.iter().map(|line| line.error(Truth::Hulls)).collect::<Option<Vec<f64>>>()?;
-            let logs = same.iter().map(|line| line.nanoseconds(Timing::Warm).ln()).sum::<f64>();
-            Some((who, errors.iter().sum::<f64>() / count, (logs / count).exp()))
-        });
-        draw(
-            lines.collect(),
-            format!("Distance queries with a hint, means over {} pairs", self.races.len()),
-            Truth::Hulls,
-        )
-    }
+/// Name of the picture of a pair.
+pub(super) fn picture(race: &Race) -> String {
+    format!("speed-{}.svg", race.name)
+}
+
+/// Means over all pairs: of errors the mean, of times the geometric one.
+fn overall(races: &[Race]) -> Result<String, ChartError> {
+    let Some(first) = races.first() else { return Err(ChartError::Empty) };
+    let whos = first.lines.iter().map(|line| line.who);
+    let lines = whos.filter_map(|who| {
+        let same = races.iter().map(|race| race.lines.iter().find(|line| line.who == who));
+        let same: Vec<&Line> = same.collect::<Option<_>>()?;
+        let count = same.len() as f64;
+        let errors = same.iter().map(|line| line.error(Truth::Hulls)).collect::<Option<Vec<f64>>>()?;
+        let logs = same.iter().map(|line| line.nanoseconds(Timing::Warm).ln()).sum::<f64>();
+        Some((who, errors.iter().sum::<f64>() / count, (logs / count).exp()))
+    });
+    let title = format!("Distance queries with a hint, means over {} pairs", races.len());
+    draw(lines.collect(), title, Truth::Hulls)
 }
 
 fn chart(race: &Race, truth: Truth, timing: Timing) -> Result<String, ChartError> {
     let lines = race.lines.iter().filter_map(|line| Some((line.who, line.error(truth)?, line.nanoseconds(timing))));
     let how = match timing {
+        Timing::Warm if truth == Truth::Meshes => " with a hint, against meshes",
         Timing::Warm => " with a hint from the pose before",
         Timing::Cold => " without a hint",
         Timing::Batch => ", ours in batches",

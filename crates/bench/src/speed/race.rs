@@ -65,12 +65,17 @@ pub(super) struct Line {
 pub(super) struct Race {
     pub(super) name: String,
     pub(super) diameter_m: f64,
+    pub(super) queries: usize,
+    pub(super) lines: Vec<Line>,
+}
+
+/// What the CSV does not hold of a pair.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct About {
     pub(super) hull_vertices: [usize; 2],
     pub(super) triangles: [usize; 2],
-    pub(super) queries: usize,
     /// Least, median and largest distance of the hulls, metres.
     pub(super) distances_m: [f64; 3],
-    pub(super) lines: Vec<Line>,
 }
 
 /// Distances may contradict each other by as much, relative to the larger diameter: what parry's
@@ -93,7 +98,7 @@ pub(super) fn race(
     shelf: &Shelf,
     coal: Option<&Coal>,
     announce: &mut dyn FnMut(&str) -> Result<(), DuelError>,
-) -> Result<Race, DuelError> {
+) -> Result<(Race, About), DuelError> {
     let name = format!("{}-{}", a.name, b.name);
     let diameter_m = a.diameter_m.max(b.diameter_m);
     let mut ours = Vec::new();
@@ -178,7 +183,7 @@ pub(super) fn race(
     sorted.sort_by(f64::total_cmp);
     let distances_m = [0, sorted.len() / 2, sorted.len() - 1].map(|i| sorted[i]);
     let (hull_vertices, triangles) = ([a, b].map(|s| s.hull.len()), [a, b].map(|s| s.mesh.triangles.len()));
-    Ok(Race { name, diameter_m, hull_vertices, triangles, queries: sorted.len(), distances_m, lines })
+    Ok((Race { name, diameter_m, queries: sorted.len(), lines }, About { hull_vertices, triangles, distances_m }))
 }
 
 /// Coal's own tolerance is 1e-6 m; ten times that, for objects of a metre.

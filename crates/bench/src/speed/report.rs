@@ -1,18 +1,14 @@
 //! The report: what was measured, whether the figures hold, tables, pictures, raw numbers.
 
 use super::Speed;
-use super::front::standing;
-use super::pictures::{Timing, Truth, entries};
-use super::race::{Line, Race, Who};
+use super::race::{About, Line, Race, Who};
+use crate::blocks::block;
 use crate::duel::parry_version;
 use std::fmt::Write;
 use sublevel::measure::DEFAULT_ACCURACY;
 
-/// The figures: mean model errors, and how many times as fast as the fastest peer of equal or
-/// better accuracy one of ours is to be.
-const FIGURES: [(f64, f64); 2] = [(0.05, 2.0), (0.03, 1.6)];
-
-const NOTES: &str = "\
+/// How to read the tables.
+pub(super) const NOTES: &str = "\
 How to read this:
 
 - Model error: distance of the convex hulls (parry's GJK on all their vertices) less the distance that a representation answers, \
@@ -33,24 +29,26 @@ diameter.
 ";
 
 impl Speed {
-    /// The report; the pictures lie beside it under these names.
-    pub fn markdown(&self, pictures: &[&str]) -> String {
+    /// The report, but for what [`Shown`](super::Shown) writes into its blocks.
+    pub fn markdown(&self) -> String {
         let mut text = String::from("# Speed against accuracy\n\n");
         // Writing to a string cannot fail.
         let flags = if self.quick { " --quick" } else { "" };
         let _ = writeln!(text, "{}\n", self.machine.head(&format!("sublevel-bench speed --data DIR{flags}")));
         self.write_builds(&mut text);
-        if pictures.contains(&"speed.svg") {
-            text.push_str("![speed against accuracy](speed.svg)\n\n");
-        }
-        self.write_verdicts(&mut text);
-        let _ = writeln!(text, "{NOTES}");
-        for race in &self.races {
-            race.write(&mut text);
-            let own = format!("speed-{}", race.name);
-            for picture in pictures.iter().filter(|name| name.strip_prefix(&own).is_some_and(is_ending)) {
-                let _ = writeln!(text, "![{picture}]({picture})\n");
-            }
+        text.push_str("![speed against accuracy](speed.svg)\n\n");
+        text += &block("speed.csv", "verdicts", "");
+        text.push('\n');
+        text += &block("speed.csv", "notes", "");
+        for (race, about) in &self.races {
+            let Race { name, diameter_m, queries, .. } = race;
+            let About { hull_vertices: [a, b], triangles: [c, d], distances_m: [least, middle, most] } = about;
+            let _ = writeln!(
+                text,
+                "\n## {name}\n\nLarger diameter {diameter_m:.3} m; hulls of {a} and {b} vertices, meshes of {c} and {d} triangles; {queries} poses, hulls \
+                 {least:.3} to {most:.3} m apart, median {middle:.3}.\n"
+            );
+            text += &block("speed.csv", name, "");
         }
         text
     }
@@ -71,71 +69,13 @@ impl Speed {
         );
     }
 
-    /// Whether the figures hold, pair by pair.
-    fn write_verdicts(&self, text: &mut String) {
-        let _ = writeln!(
-            text,
-            "At each error allowed, the fastest of ours and the fastest peer of equal or better accuracy:\n\n\
-             | pair | against | timing | error allowed | ours | its error | peer | times as fast | figure | | as fast as any peer of the error allowed |\n\
-             |---|---|---|---|---|---|---|---|---|---|---|"
-        );
-        let mut missed = Vec::new();
-        for race in &self.races {
-            let mut against = vec![(Truth::Hulls, "hulls", Timing::Warm, "warm")];
-            against.push((Truth::Hulls, "hulls", Timing::Cold, "cold"));
-            against.push((Truth::Hulls, "hulls", Timing::Batch, "batch"));
-            if race.is_hollow() {
-                against.push((Truth::Meshes, "meshes", Timing::Warm, "warm"));
-            }
-            for (truth, of, timing, how) in against {
-                let entries = entries(race, truth, timing);
-                for (error, figure) in FIGURES {
-                    let name = &race.name;
-                    let Some(found) = standing(&entries, error) else {
-                        let _ = writeln!(
-                            text,
-                            "| {name} | {of} | {how} | {} | none | | | | {figure} | missed | |",
-                            percent(error)
-                        );
-                        missed
-                            .push(format!("{name} ({of}, {how}) at {}: none of ours is that accurate", percent(error)));
-                        continue;
-                    };
-                    let held = found.times >= figure;
-                    if !held {
-                        missed.push(format!(
-                            "{name} ({of}, {how}) at {}: {:.2} of {figure}",
-                            percent(error),
-                            found.times
-                        ));
-                    }
-                    let _ = writeln!(
-                        text,
-                        "| {name} | {of} | {how} | {} | {} | {} | {} | {:.2} | {figure} | {} | {:.2} |",
-                        percent(error),
-                        found.ours,
-                        percent(found.error),
-                        found.peer,
-                        found.times,
-                        if held { "holds" } else { "missed" },
-                        found.allowed
-                    );
-                }
-            }
-        }
-        let holds = "The figures (2 times at 5 %, 1.6 times at 3 %) hold everywhere.".to_owned();
-        let verdict =
-            if missed.is_empty() { holds } else { format!("Where the figures are missed: {}.", missed.join("; ")) };
-        let _ = writeln!(text, "\n{verdict}\n");
-    }
-
     /// One line per pair and representation.
     pub fn csv(&self) -> String {
         let mut text = String::from(
             "pair,representation,ours,hull_error_mean,hull_error_max,hull_error_min,mesh_error_mean,mesh_error_max,mesh_error_min,warm_ns,cold_ns,\
              batch_ns,queries,failed,overlaps,wrong,diameter_m\n",
         );
-        for race in &self.races {
+        for (race, _) in &self.races {
             for Line { who, hull, mesh, cold, warm, batch, failed, overlaps, contradictions } in &race.lines {
                 let number = |v: f64| if v.is_finite() { format!("{v:e}") } else { String::new() };
                 let errors = [hull, mesh].map(|e| [e.mean, e.most, e.least].map(number).join(","));
@@ -152,48 +92,5 @@ impl Speed {
             }
         }
         text
-    }
-}
-
-/// What follows a pair's name in the names of its pictures: names of pairs may begin alike.
-fn is_ending(rest: &str) -> bool {
-    [".svg", "-cold.svg", "-batch.svg", "-mesh.svg"].contains(&rest)
-}
-
-fn percent(part: f64) -> String {
-    format!("{:.2} %", 100.0 * part)
-}
-
-impl Race {
-    fn write(&self, text: &mut String) {
-        let Self { name, diameter_m, hull_vertices: [a, b], triangles: [c, d], queries, distances_m, .. } = self;
-        let [least, middle, most] = distances_m;
-        let _ = writeln!(
-            text,
-            "## {name}\n\nLarger diameter {diameter_m:.3} m; hulls of {a} and {b} vertices, meshes of {c} and {d} triangles; {queries} poses, hulls \
-             {least:.3} to {most:.3} m apart, median {middle:.3}.\n\n\
-             | representation | mean error | largest | mean mm at 1 m | mesh: mean | largest | warm ns | cold ns | batch ns | failed | overlap | wrong |\n\
-             |---|---|---|---|---|---|---|---|---|---|---|---|"
-        );
-        for line in &self.lines {
-            let time = |v: f64| if v.is_finite() { format!("{v:.0}") } else { "-".into() };
-            let _ = writeln!(
-                text,
-                "| {} | {} | {} | {:.1} | {} | {} | {} | {} | {} | {} | {} | {} |",
-                line.who.name(),
-                percent(line.hull.mean),
-                percent(line.hull.most),
-                1e3 * line.hull.mean,
-                percent(line.mesh.mean),
-                percent(line.mesh.most),
-                time(line.warm),
-                time(line.cold),
-                time(line.batch),
-                line.failed,
-                line.overlaps,
-                line.contradictions
-            );
-        }
-        text.push('\n');
     }
 }

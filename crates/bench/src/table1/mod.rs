@@ -6,6 +6,7 @@ mod report;
 mod rows;
 
 use super::Machine;
+use crate::csv::{self, CsvError};
 use nalgebra::{Matrix3, Vector3};
 use rows::{MESHES, Method, Row, rows};
 use std::ops::ControlFlow;
@@ -43,7 +44,26 @@ pub enum Table1Error {
     /// A picture failed.
     #[error(transparent)]
     Chart(#[from] ChartError),
+    /// The numbers of an earlier run cannot be read.
+    #[error(transparent)]
+    Csv(#[from] CsvError),
+    /// A fit of today is not that of the earlier run.
+    #[error("{set} around the {mesh} has {now} m³ now, and {then} m³ in the CSV; make the whole table again")]
+    Changed {
+        /// The set.
+        set: String,
+        /// The mesh.
+        mesh: &'static str,
+        /// Its volume now.
+        now: f64,
+        /// In the CSV.
+        then: f64,
+    },
 }
+
+/// Volumes of the same fit may differ by as much, as a part: on other processors, in the last
+/// digits.
+const SAME: f64 = 1e-6;
 
 /// One set around one mesh.
 #[derive(Clone, Debug)]
@@ -89,6 +109,7 @@ impl Set {
 /// One of the meshes.
 struct Subject {
     name: &'static str,
+    /// Empty where only the numbers are known.
     mesh: Mesh,
     hull_volume_m3: f64,
 }
@@ -147,6 +168,81 @@ pub fn table1(
         table.rows.push((row, cells));
     }
     Ok(table)
+}
+
+impl Table1 {
+    /// The numbers of an earlier run, out of what [`Self::csv`] wrote: for the tables, not for the
+    /// pictures of shapes.
+    ///
+    /// # Errors
+    /// [`CsvError`].
+    pub(crate) fn read(csv: &str) -> Result<Self, CsvError> {
+        let table = csv::Table::read(csv)?;
+        let mut subjects: Vec<Subject> = Vec::new();
+        let mut rows: Vec<(Row, Vec<Result<Made, String>>)> = Vec::new();
+        for line in table.rows() {
+            let (set, mesh) = (line.text("set")?, line.text("mesh")?);
+            let name = MESHES.iter().map(|(name, _)| *name).find(|name| *name == mesh);
+            let name = name.ok_or_else(|| line.error(format!("no mesh is named '{mesh}'")))?;
+            if !subjects.iter().any(|subject| subject.name == name) {
+                let hull_volume_m3 = line.number("hull_volume_m3")?;
+                subjects.push(Subject { name, mesh: Mesh::default(), hull_volume_m3 });
+            }
+            let row = self::rows().into_iter().find(|row| row.method.name() == set);
+            let row = row.ok_or_else(|| line.error(format!("no set is named '{set}'")))?;
+            let made = line.maybe("volume_m3")?.ok_or_else(|| "refused".to_owned());
+            let (error_m3, seconds) = (line.number("volume_error_m3")?, line.number("seconds")?);
+            let made = made.map(|volume_m3| Made { volume_m3, error_m3, seconds, set: None });
+            match rows.last_mut().filter(|(known, _)| known.method == row.method) {
+                Some((_, cells)) => cells.push(made),
+                None => rows.push((row, vec![made])),
+            }
+        }
+        Ok(Self { machine: Machine::this(), subjects, rows })
+    }
+
+    /// Fits again what the pictures show of an earlier run around the meshes; volumes and times
+    /// stay those of that run.
+    ///
+    /// # Errors
+    /// [`Table1Error`]: a mesh that cannot be read, a fit that is another now, or the callback's
+    /// wish.
+    pub fn fitted_again(
+        csv: &str,
+        meshes: &Path,
+        progress: &mut dyn FnMut(&Table1Progress) -> ControlFlow<()>,
+    ) -> Result<Self, Table1Error> {
+        let mut table = Self::read(csv)?;
+        for subject in &mut table.subjects {
+            let number = MESHES.iter().find(|(name, _)| *name == subject.name).map_or("", |(_, number)| number);
+            *subject = Subject::read(subject.name, &meshes.join(format!("{number}.off")))?;
+        }
+        let drawn = |row: &Row| row.method.is_drawn();
+        let cells = table.rows.iter().filter(|(row, _)| drawn(row)).map(|(_, cells)| cells.len()).sum();
+        let mut announce = Table1Progress { done: 0, cells, at: String::new() };
+        for (row, cells) in table.rows.iter_mut().filter(|(row, _)| drawn(row)) {
+            for (made, subject) in cells.iter_mut().zip(&table.subjects) {
+                announce.at = format!("{} around the {}", row.method.name(), subject.name);
+                if progress(&announce).is_break() {
+                    return Err(Table1Error::Cancelled);
+                }
+                let now = match subject.make(row.method, &mut || progress(&announce)) {
+                    Err(FitError::Cancelled) => return Err(Table1Error::Cancelled),
+                    now => now,
+                };
+                announce.done += 1;
+                let (Ok(made), Ok(now)) = (made, now) else { continue };
+                let (volume, then) = (now.volume_m3, made.volume_m3);
+                // Written so that NaN differs, too.
+                if !((volume - then).abs() <= SAME * then) {
+                    let (set, mesh) = (row.method.name(), subject.name);
+                    return Err(Table1Error::Changed { set, mesh, now: volume, then });
+                }
+                made.set = now.set;
+            }
+        }
+        Ok(table)
+    }
 }
 
 impl Subject {

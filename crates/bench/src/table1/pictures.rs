@@ -4,7 +4,7 @@ use super::rows::{MESHES, Method};
 use super::{Set, Subject, Table1};
 use nalgebra::Vector3;
 use sublevel::body::{Aabb, Body};
-use sublevel::draw::{Ink, Outline, Panel, Silhouettes, View, boundary_points, outline, shadow};
+use sublevel::draw::{ChartError, Ink, Outline, Panel, Silhouettes, View, boundary_points, outline, shadow};
 use sublevel::fit::Objective;
 
 /// Boundary points that an outline is made of.
@@ -12,15 +12,29 @@ const POINTS: usize = 6000;
 /// The levels of the paper's picture.
 const LEVELS: [f64; 3] = [2.0, 1.0, 0.75];
 
+/// Names of all pictures, in the order of the report.
+pub(super) const PICTURES: [&str; 5] =
+    ["table1.svg", "table1-degrees.svg", "table1-gram.svg", "table1-convexity.svg", "table1-levels.svg"];
+
+impl Method {
+    /// Whether the set is drawn.
+    pub(super) fn is_drawn(self) -> bool {
+        match self {
+            Self::Convex(Objective::LogDetP | Objective::LogDetH, _, refined) => !refined,
+            Self::Relaxed(_, Objective::LogDetP, degree) => degree >= 6,
+            _ => false,
+        }
+    }
+}
+
 impl Table1 {
-    /// The pictures by name: what could be built is drawn.
-    pub fn pictures(&self) -> Vec<(&'static str, String)> {
-        vec![
-            ("table1-degrees.svg", self.degrees()),
-            ("table1-gram.svg", self.grams()),
-            ("table1-convexity.svg", self.convexity()),
-            ("table1-levels.svg", self.levels()),
-        ]
+    /// The pictures by name, the most telling first: what could be built is drawn.
+    ///
+    /// # Errors
+    /// [`ChartError::Empty`] if nothing could be built.
+    pub fn pictures(&self) -> Result<Vec<(String, String)>, ChartError> {
+        let drawn = [self.volume_against_time()?, self.degrees(), self.grams(), self.convexity(), self.levels()];
+        Ok(PICTURES.map(str::to_owned).into_iter().zip(drawn).collect())
     }
 
     /// A row of bodies of rising degree around each of two meshes.

@@ -1,8 +1,10 @@
 //! The table as Markdown for people, as CSV for programs, and as a plot of volume against
 //! construction time.
 
+use super::pictures::PICTURES;
 use super::rows::{MESHES, Method};
 use super::{Made, Table1};
+use crate::blocks::block;
 use std::fmt::Write as _;
 use sublevel::draw::{ChartError, Group, Ink, Marker, Point, Scatter};
 use sublevel::fit::Objective;
@@ -29,12 +31,34 @@ ball, too.
 ";
 
 impl Table1 {
-    /// The report: the machine, the table, how to read it, and its pictures, which lie beside it
-    /// under these names.
-    pub fn markdown(&self, pictures: &[&str]) -> String {
+    /// The report: the machine, the pictures, and the blocks of [`Self::block`], which are left
+    /// empty.
+    pub fn markdown(&self) -> String {
         let mut text = String::from("# Table I, computed again\n\n");
         // Writing to a string cannot fail.
         let _ = writeln!(text, "{}\n", self.machine.head("sublevel-bench table1"));
+        text += &block("table1.csv", "volumes", "");
+        text.push('\n');
+        text += &block("table1.csv", "notes", "");
+        text.push('\n');
+        self.write_refusals(&mut text);
+        for picture in PICTURES {
+            let _ = writeln!(text, "![{picture}]({picture})\n");
+        }
+        text
+    }
+
+    /// What a block of a page holds.
+    pub(crate) fn block(&self, name: &str) -> Option<String> {
+        match name {
+            "volumes" => Some(self.volumes()),
+            "notes" => Some(NOTES.to_owned()),
+            _ => None,
+        }
+    }
+
+    fn volumes(&self) -> String {
+        let mut text = String::new();
         let heads: Vec<String> = MESHES.iter().map(|(name, number)| format!("{name} ({number})")).collect();
         let _ = writeln!(text, "| set | {} | median s |\n|---{}|---|", heads.join(" | "), "|---".repeat(heads.len()));
         for (row, cells) in &self.rows {
@@ -53,11 +77,6 @@ impl Table1 {
             let seconds = median(cells.iter().flatten().map(|made| made.seconds));
             let seconds = seconds.map_or("-".to_owned(), |s| format!("{s:.2}"));
             let _ = writeln!(text, "| {} | {} | {seconds} |", row.method.name(), cells_text.join(" | "));
-        }
-        let _ = writeln!(text, "\n{NOTES}");
-        self.write_refusals(&mut text);
-        for picture in pictures {
-            let _ = writeln!(text, "![{picture}]({picture})\n");
         }
         text
     }

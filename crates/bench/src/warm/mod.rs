@@ -2,11 +2,13 @@
 //! paper's experiment.
 
 mod report;
+mod shown;
 mod steps;
 mod sweep;
 
 use super::Machine;
 use super::duel::{Coal, DuelError, Shelf, pairs};
+pub(crate) use shown::Shown;
 use std::ops::ControlFlow;
 use std::path::Path;
 use steps::{Steps, steps};
