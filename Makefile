@@ -1,11 +1,18 @@
 # Everything a fresh Debian or Ubuntu machine needs beyond Rust (rustup), make and a C compiler.
-.PHONY: help setup demo test charts
+.PHONY: help setup demo test check charts docs-numbers acceptance endurance fuzz draws measures
 
 help:
-	@echo 'make demo    fit two shapes, serve them, sweep one through the other, draw the curves'
-	@echo 'make test    run all tests; SUBLEVEL_DATA=DIR adds those of real meshes'
-	@echo 'make charts  measure beside other libraries, and draw: SUBLEVEL_DATA=DIR with the meshes'
-	@echo 'make setup   install missing system packages (demo and test do this first)'
+	@echo 'make demo          fit two shapes, serve them, sweep one through the other, draw the curves'
+	@echo 'make test          run all tests; SUBLEVEL_DATA=DIR adds those of real meshes'
+	@echo 'make check         everything a change must pass, as continuous integration runs it: SUBLEVEL_DATA=DIR'
+	@echo 'make charts        measure beside other libraries, and draw: SUBLEVEL_DATA=DIR with the meshes'
+	@echo 'make docs-numbers  write the numbers of README.md and docs/ again from the CSV files in docs/'
+	@echo 'make acceptance    what is too long for every change, all four of these: SUBLEVEL_DATA=DIR'
+	@echo '  make endurance     1e8 checked queries; interrupted, it continues where it was (QUERIES=1e9 for more)'
+	@echo '  make fuzz          1e6 damaged files for each reader of meshes (RUNS=10000000 for more)'
+	@echo '  make draws         1e5 draws of each family of the stability tests (DRAWS=1000 for fewer)'
+	@echo '  make measures      time every measure beside coal and parry, and fail where a target is missed'
+	@echo 'make setup         install missing system packages (demo and test do this first)'
 
 setup:
 	@.ci/setup
@@ -16,21 +23,37 @@ export PATH := $(PATH):$(or $(CARGO_HOME),$(HOME)/.cargo)/bin
 demo: setup
 	cargo run --release -- demo
 
-# Tests of meshes that are not part of the project run where SUBLEVEL_DATA names their folder; else they are counted as ignored.
-ifdef SUBLEVEL_DATA
-NEXTEST_IGNORED := --run-ignored all
-CARGO_IGNORED := -- --include-ignored
-endif
-
-# One profile for tests and demo: nothing is built twice.
+# Tests of meshes that are not part of the project run where SUBLEVEL_DATA names their folder; else they are left out.
 test: setup
-	@if cargo nextest --version >/dev/null 2>&1; then \
-	    echo 'cargo nextest run --release --workspace $(NEXTEST_IGNORED)'; cargo nextest run --release --workspace $(NEXTEST_IGNORED); \
-	else \
-	    echo 'cargo test --release --workspace --lib --bins --tests $(CARGO_IGNORED)'; \
-	    cargo test --release --workspace --lib --bins --tests $(CARGO_IGNORED); \
-	fi
-	cargo test --doc --release --workspace
+	@.ci/test
+
+check:
+	@.ci/check
 
 charts:
 	cargo run --release -p sublevel-bench -- all --data '$(SUBLEVEL_DATA)' --out docs
+
+docs-numbers:
+	cargo run --release -p sublevel-bench -- tables --out docs README.md
+
+acceptance: endurance fuzz draws measures
+
+QUERIES ?= 1e8
+RUNS ?= 1000000
+DRAWS ?= 100000
+
+# Runs of different lengths keep states of their own.
+endurance: setup
+	@mkdir -p target/acceptance
+	OPENBLAS_NUM_THREADS=1 cargo bench -p sublevel-bench --bench endurance -- --queries $(QUERIES) --threads 2 \
+	    --state target/acceptance/endurance-$(QUERIES).json --summary target/acceptance/endurance-$(QUERIES).md
+
+fuzz:
+	fuzz/run $(RUNS)
+
+draws: setup
+	SUBLEVEL_LONG=$(DRAWS) cargo test --release -p sublevel-core --test stability
+
+measures:
+	@[ -d '$(SUBLEVEL_DATA)' ] || { echo 'measures: the meshes are missing; name their folder: SUBLEVEL_DATA=DIR make measures' >&2; exit 1; }
+	cargo bench -p sublevel-bench --bench measures -- --strict

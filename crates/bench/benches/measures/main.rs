@@ -47,6 +47,9 @@ struct Args {
     /// is what README and docs/benchmarks.md show once `make docs-numbers` has run
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// Fail when a target is missed
+    #[arg(long)]
+    strict: bool,
     /// Given by cargo
     #[arg(long, hide = true)]
     bench: bool,
@@ -104,6 +107,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     if let Some(path) = args.csv {
         fs::write(&path, report.csv(args.quick)).map_err(|error| format!("--csv: {}: {error}", path.display()))?;
+    }
+    let missed = report.missed();
+    if args.strict && !missed.is_empty() {
+        return Err(format!("targets are missed:\n{}", missed.join("\n")).into());
     }
     Ok(())
 }

@@ -92,6 +92,16 @@ impl Report {
         text
     }
 
+    /// The targets that are missed, with their rows.
+    pub(crate) fn missed(&self) -> Vec<String> {
+        let rows = self.tables.iter().flat_map(|table| table.rows.iter().map(move |line| (table, line)));
+        let missed = rows.flat_map(|(Table { pair, kind, .. }, line)| {
+            let verdicts = line.targets.iter().filter(|verdict| verdict.met == Some(false));
+            verdicts.map(move |verdict| format!("{pair}, {}, {}: {}", kind.name(), line.label, verdict.text()))
+        });
+        missed.collect()
+    }
+
     pub(crate) fn print_foot(&self) {
         let verdicts = self.tables.iter().flat_map(|table| &table.rows).flat_map(|line| &line.targets);
         let (mut met, mut missed, mut open) = (0, 0, 0);
