@@ -105,6 +105,8 @@ impl Shown {
         row("distance cold, of coal's cold time", &|pair| self.of(pair, "distance cold, degree 6", COAL_COLD));
         row("distance in a batch of 1024 poses", &|pair| self.time(pair, "separated", BATCHES));
         row("penetration depth, to 1e-3", &|pair| self.depth(pair));
+        text.push('\n');
+        text += &self.head;
         (!text.contains("| - |")).then_some(text)
     }
 

@@ -34,7 +34,7 @@ const CURVES: [Curve; 11] = [
     curve("hulls, coal", Method::Coal, false, Some((Ink::Grey, Marker::Ring))),
 ];
 
-/// Accuracies whose times are reported.
+/// Accuracies whose times are shown.
 const GOALS: [f64; 3] = [1e-3, 1e-6, 1e-9];
 /// A setting is no longer better than another if its error is above this part of the other's.
 const BETTER: f64 = 0.5;
@@ -44,7 +44,7 @@ const DRAWN: f64 = 10.0;
 
 const NOTES: &str = "\
 - Errors and widths are parts of the circumradius of the smaller body, medians over the poses unless a column says otherwise. The truth is the middle of the \
-narrowest bracket of ours; no error is reported below half of its width, which each case states. Times are means per query, one thread; clarabel is asked about fewer poses.
+narrowest bracket of ours; no error is given below half of its width, which each case states. Times are means per query, one thread; clarabel is asked about fewer poses.
 - The poses of fitted bodies are random, gaps between 0.5 and 37 % of the larger diameter (seeds 1, 2, ... of SplitMix64, one for each pose); the flat faces of \
 two superellipsoids of degree 8 are turned against each other by 1e-4 to 1e-2 rad, 1 to 30 cm apart. `warm` and `pose before` know the answer a step \
 before: a hundredth of half the diameter and a degree, or a centimetre along the faces.

@@ -163,7 +163,7 @@ impl Shown {
             ("ball", Who::Ours(Method::Ball)),
             ("ball, parry (a formula)", Who::ParryBall),
         ] {
-            let cell = |time: fn(&Line) -> f64| self.span(who, time).map_or("-".into(), |span| span.microseconds());
+            let cell = |time: fn(&Line) -> f64| self.span(who, time).map_or("-".into(), Span::microseconds);
             let _ = writeln!(text, "| {name} | {} | {} |", cell(|line| line.warm), cell(|line| line.cold));
         }
         text
@@ -219,7 +219,7 @@ impl Shown {
             let span = self.span(who, |line| 100.0 * line.hull.mean);
             span.map_or("-".into(), |span| span.text(1))
         };
-        let warm = |who| self.span(who, |line| line.warm).map_or("-".into(), |span| span.microseconds());
+        let warm = |who| self.span(who, |line| line.warm).map_or("-".into(), Span::microseconds);
         let [few, more] = [64, 128].map(|count| Who::CoalHull(Some(count)));
         format!(
             "Degree 8 has mean errors of {} % and takes {} with a hint; coal on a hull of 64 vertices has {} % and takes {}, on one of 128 \
@@ -243,8 +243,8 @@ impl Shown {
         });
         let errors: Vec<String> = errors.into_iter().collect::<Option<_>>()?;
         Some(format!(
-            "coal and parry answer for the hulls exactly and prove nothing; bodies of degree 6 are too near by\n\
-             {} % of the larger diameter in the mean.\n",
+            "coal and parry answer for the hulls exactly; bodies of degree 6 are too near by {} % of the larger\n\
+             diameter in the mean.\n",
             listed(errors)
         ))
     }
