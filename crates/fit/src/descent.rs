@@ -5,7 +5,7 @@
 //! points, and goes that way as far as the volume falls when the constant coefficient takes in all
 //! points. So the volume never grows, and what had to be taken in is known to the next step.
 
-use super::cone::Cone;
+use super::Cone;
 use super::conic::Conic;
 use super::dominance::Dominance;
 use super::path::Interior;

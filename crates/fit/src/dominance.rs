@@ -8,7 +8,7 @@
 //! A Θ Aᵀ, with A the map from blocks to coefficients and Θ block diagonal, is a diagonal matrix
 //! but for a border as wide as there are squares: 30 of 210 at degree 6.
 
-use super::cone::Cone;
+use super::Cone;
 use super::factor::{regularised_factor, solve_lower};
 use super::path::isotropic_form;
 use super::structure::Structure;

@@ -13,7 +13,6 @@ mod ball;
 mod barrier;
 mod basis;
 mod certificate;
-mod cone;
 mod conic;
 mod coordinates;
 mod cuboid;
@@ -57,7 +56,6 @@ mod volume;
 
 pub use ball::{EnclosingBall, smallest_ball};
 pub use certificate::{NoCertificate, certificate};
-pub use cone::{Cone, UnknownCone};
 pub use coordinates::Coordinates;
 pub use cuboid::{OrientedBox, smallest_box};
 pub use decompose::{PartSearch, convex_parts};
@@ -71,14 +69,14 @@ pub use input::{
     Mesh, ReadError, ReadOptions, Reading, Remarks, Scale, ScaleError, Unused, UnusedCost, parse_mesh, read_mesh,
 };
 pub use ladder::{MAX_SLABS, Representation, Rung, ball, cheapest_within, coarsest_within, ladder};
-pub use objective::{Objective, UnknownObjective};
 pub use parts::{CompoundFit, MAX_PIECES, fit_parts};
 pub use program::ProgramError;
 pub use progress::Progress;
 pub use refine::RefinementEnd;
 pub use shortfall::Shortfall;
 pub use slab::CutError;
-pub use sos::{ProgramReport, SosFit, SosMethod, SosOptions, SosReport, fit_sos};
+pub use sos::{ProgramReport, SosFit, SosOptions, SosReport, fit_sos};
+pub use sublevel_core::body::{Cone, Objective, SosMethod, UnknownCone, UnknownObjective};
 pub use thicken::thicken;
 pub use trim::{Trimmed, trim};
 

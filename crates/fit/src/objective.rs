@@ -1,26 +1,6 @@
-//! What a fit minimises: a measure of a Gram matrix that stands in for the volume.
+//! Which Gram matrix an objective measures, and by which function.
 
-use std::fmt;
-use std::str::FromStr;
-
-/// The objective of a fit, over sos-convex polynomials p with `p <= 1` at the points.
-///
-/// With Gram matrices `p = zᵀPz` on the monomials z and `yᵀ∇²p y = wᵀHw` on the monomials w linear
-/// in y. At degree 2 both log dets are the volume of the ellipsoid; above, all four are heuristics
-/// (Ahmadi, Hall, Makadia and Sindhwani, RSS 2017, section III).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Objective {
-    /// `-log det P`: tightest of the four nearly always, and the same in every affine frame.
-    #[default]
-    LogDetP,
-    /// `tr P⁻¹` in the unit frame: dominated by the largest eigenvalues of P⁻¹.
-    TraceP,
-    /// `-log det H` with p a sum of squares (Magnani, Lall and Boyd, CDC 2005): curvature
-    /// everywhere; the same in every affine frame.
-    LogDetH,
-    /// `tr H⁻¹` in the unit frame, with p a sum of squares.
-    TraceH,
-}
+use sublevel_core::body::Objective;
 
 /// Which of the two Gram matrices an objective measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,72 +20,26 @@ pub(super) enum Function {
     TraceInverse,
 }
 
-/// A name that is no objective.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("objective: {0:?} is not one of logdet-p, trace-p, logdet-h, trace-h; logdet-p is nearly always the tightest")]
-pub struct UnknownObjective(pub String);
+/// What the programs need to know of an objective.
+pub(super) trait Measure {
+    /// The matrix that it measures.
+    fn matrix(self) -> Matrix;
+    /// The function that it minimises.
+    fn function(self) -> Function;
+}
 
-impl Objective {
-    /// All objectives.
-    pub const ALL: [Self; 4] = [Self::LogDetP, Self::TraceP, Self::LogDetH, Self::TraceH];
-
-    /// Name on the command line, in reports and in the provenance of bodies.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::LogDetP => "logdet-p",
-            Self::TraceP => "trace-p",
-            Self::LogDetH => "logdet-h",
-            Self::TraceH => "trace-h",
-        }
-    }
-
-    /// Highest degree it is offered for: the Hessian's matrix has 60 rows at degree 8, where
-    /// nothing is gained by it.
-    pub fn max_degree(self) -> usize {
-        match self.matrix() {
-            Matrix::Polynomial => 8,
-            Matrix::Hessian => 6,
-        }
-    }
-
-    pub(super) fn matrix(self) -> Matrix {
+impl Measure for Objective {
+    fn matrix(self) -> Matrix {
         match self {
             Self::LogDetP | Self::TraceP => Matrix::Polynomial,
             Self::LogDetH | Self::TraceH => Matrix::Hessian,
         }
     }
 
-    pub(super) fn function(self) -> Function {
+    fn function(self) -> Function {
         match self {
             Self::LogDetP | Self::LogDetH => Function::LogDet,
             Self::TraceP | Self::TraceH => Function::TraceInverse,
         }
-    }
-}
-
-impl fmt::Display for Objective {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Objective {
-    type Err = UnknownObjective;
-
-    fn from_str(name: &str) -> Result<Self, UnknownObjective> {
-        Self::ALL.into_iter().find(|o| o.name() == name).ok_or_else(|| UnknownObjective(name.to_owned()))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_are_read_back() {
-        for objective in Objective::ALL {
-            assert_eq!(objective.to_string().parse(), Ok(objective));
-        }
-        assert!("volume".parse::<Objective>().unwrap_err().to_string().contains("logdet-p"));
     }
 }

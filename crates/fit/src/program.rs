@@ -28,8 +28,9 @@
 //! The optimal Gram matrix is the gradient of φ at the optimum. The dual needs no exponential
 //! cones, and no block of twice the size for determinant or inverse (`path`).
 
+use super::Objective;
 use super::basis::{Affine, change};
-use super::objective::{Function, Matrix, Objective};
+use super::objective::{Function, Matrix, Measure};
 use super::spectral::Spectral;
 use super::structure::{Pattern, Structure};
 use nalgebra::{DMatrix, DVector};

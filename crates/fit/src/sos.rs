@@ -8,7 +8,7 @@ use super::coordinates::Coordinates;
 use super::generate::{Optimum, generate};
 use super::moment::{inverse_moment, moments};
 use super::object::{Object, pulled_inside};
-use super::objective::Matrix;
+use super::objective::{Matrix, Measure};
 use super::program::Problem;
 use super::progress::{Progress, Watch};
 use super::structure::Structure;
@@ -16,38 +16,12 @@ use super::{DEFAULT_MARGIN, FitError, FitOptions, MARGIN_ATTEMPTS, Objective, Pr
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::ops::ControlFlow;
 use std::time::Instant;
-use sublevel_core::body::{Placement, Provenance, Relaxation, SosBody, SosBodyError};
+use sublevel_core::body::{Placement, Provenance, Relaxation, SosBody, SosBodyError, SosMethod};
 use sublevel_core::polynomial::{HessianGram, NormPower, Polynomial, SosGram, monomials};
 
 /// How far below 1 all points are left: that is what lets triangles at the outermost points be
 /// proven inside.
 const ROOM: f64 = 1e-9;
-
-/// What makes a set that need not be convex.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum SosMethod {
-    /// The least objective, of the Gram matrix P of p, with `p + c |u|^degree` sos-convex.
-    Relaxed {
-        /// c > 0; infinity for no bound of convexity at all. For c = 0 there are bodies
-        /// ([`fit`](super::fit())).
-        c: f64,
-        /// What is minimised: `logdet-p` or `trace-p`.
-        objective: Objective,
-    },
-    /// `m(x)ᵀ M⁻¹ m(x)` with the moment matrix M of the points, below the smallest level that holds
-    /// all of them (Lasserre and Pauwels, NIPS 2016): a single matrix to invert.
-    InverseMoment,
-}
-
-impl SosMethod {
-    /// Name in reports and in the provenance of sets.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Relaxed { objective, .. } => objective.name(),
-            Self::InverseMoment => "inverse-moment",
-        }
-    }
-}
 
 /// What to fit.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 //! clarabel: nothing of the dual, of paths or of frames is shared with what they are to check.
 
 use super::*;
-use crate::objective::Matrix;
+use crate::objective::{Matrix, Measure};
 use crate::structure::Pattern;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};

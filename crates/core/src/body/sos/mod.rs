@@ -7,12 +7,14 @@
 
 mod coverage;
 mod file;
+mod method;
 mod support_bounds;
 mod volume;
 
 pub(super) use file::KIND;
 
 pub use coverage::{Coverage, TriangleError, Uncovered};
+pub use method::SosMethod;
 
 use super::{
     Aabb, Ball, BodyError, BodyId, ContainedPoints, Normalization, NotContained, Placement, Provenance, Volume,

@@ -4,6 +4,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 /// The convex cone that the Gram matrix H of the Hessian form `yᵀ∇²p y = wᵀHw` is taken from.
 ///
 /// Every diagonally dominant matrix is scaled diagonally dominant, and every one of those positive
@@ -12,7 +14,8 @@ use std::str::FromStr;
 /// SIAM J. Appl. Algebra Geometry 3, 2019). Dominance depends on the frame, semidefiniteness does
 /// not: it is asked for in the frame in which the smallest ellipsoid is the unit ball, along its
 /// axes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Cone {
     /// Positive semidefinite: p sos-convex.
     #[default]
@@ -32,7 +35,7 @@ impl Cone {
     /// All cones, the largest first.
     pub const ALL: [Self; 3] = [Self::Sos, Self::Sdsos, Self::Dsos];
 
-    /// Name on the command line and in reports.
+    /// Name on the command line, in reports and in stored requests.
     pub fn name(self) -> &'static str {
         match self {
             Self::Sos => "sos",
@@ -64,6 +67,7 @@ mod tests {
     fn names_are_read_back() {
         for cone in Cone::ALL {
             assert_eq!(cone.to_string().parse(), Ok(cone));
+            assert_eq!(serde_json::to_string(&cone).unwrap(), format!("{:?}", cone.name()));
         }
         assert!("socp".parse::<Cone>().unwrap_err().to_string().contains("sdsos"));
     }
