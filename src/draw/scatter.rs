@@ -88,8 +88,8 @@ const COLUMNS: usize = 3;
 const ROW: i32 = 20;
 /// Radius of a marker, pixels.
 const RADIUS: i32 = 5;
-/// Room beyond the outermost points, as a factor.
-const ROOM: f64 = 1.25;
+/// Space beyond the outermost points, as a factor.
+const SPACE: f64 = 1.25;
 /// How far the edge, and the line beside it, lie left of the leftmost point, as factors.
 const EDGE: f64 = 2.6;
 const BESIDE: f64 = 1.7;
@@ -127,7 +127,7 @@ impl Scatter {
         x_ticks.extend(self.named.iter().map(|(x, _)| *x));
         let x = if self.edge.is_some() {
             x_ticks.push(edge);
-            (edge / ROOM.powi(2), data.1)
+            (edge / SPACE.powi(2), data.1)
         } else {
             data
         };
@@ -261,11 +261,11 @@ fn draw_marker(
     Ok(())
 }
 
-/// The range of positive values, with some room.
+/// The range of positive values, with some space.
 fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let ends = values
         .fold(None, |ends: Option<(f64, f64)>, v| Some(ends.map_or((v, v), |(low, high)| (low.min(v), high.max(v)))));
-    ends.map(|(low, high)| (low / ROOM, high * ROOM))
+    ends.map(|(low, high)| (low / SPACE, high * SPACE))
 }
 
 /// Where the axis is labelled: whole decades, and the fewer there are, the more of their multiples.
