@@ -1,8 +1,8 @@
 //! The gRPC door: handlers, conversion between wire and domain, limits, errors, starting and
 //! stopping.
 //!
-//! The one room that knows protobuf. `incoming` lets connections in and `limit` lets calls in, so
-//! many at once. A call walks straight through: a handler (`bodies`, `scenes`, `queries`, `fits`)
+//! The one layer that knows protobuf. `incoming` lets connections in and `concurrency_limit` calls,
+//! so many at once. A call walks straight through: a handler (`bodies`, `scenes`, `queries`, `fits`)
 //! reads its message with `wire`, asks the catalogue or a scene's snapshot, and writes the answer
 //! with `wire`; whatever fails becomes a status in `error`. Handlers are dropped when a client goes
 //! away, so every change runs in a task of its own and is finished or not begun.

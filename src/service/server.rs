@@ -62,8 +62,8 @@ pub enum ServeError {
     #[error(transparent)]
     Store(#[from] StoreError),
     /// A task of the server panicked.
-    #[error("loading the catalogue was ended by a defect: {0}; please report it")]
-    Defect(String),
+    #[error("loading the catalogue was ended by a panic: {0}; please report it")]
+    InternalPanic(String),
     /// The transport gave up.
     #[error("serving ended: {0}")]
     Transport(#[from] tonic::transport::Error),
@@ -96,7 +96,7 @@ impl Server {
         let addr = listener.local_addr().map_err(bind)?;
         let store = tokio::task::spawn_blocking(move || Store::open(&data))
             .await
-            .map_err(|error| ServeError::Defect(error.to_string()))??;
+            .map_err(|error| ServeError::InternalPanic(error.to_string()))??;
         Ok(Self { listener, addr, store })
     }
 
@@ -254,7 +254,7 @@ async fn load(
 ) -> Result<(), ServeError> {
     let catalogue = tokio::task::spawn_blocking(move || Catalogue::load(store))
         .await
-        .map_err(|error| ServeError::Defect(error.to_string()))??;
+        .map_err(|error| ServeError::InternalPanic(error.to_string()))??;
     let (bodies, scenes) = catalogue.counts();
     tracing::info!(bodies, scenes, "catalogue loaded");
     loaded.send_replace(Some(Arc::new(catalogue)));
