@@ -1,19 +1,19 @@
 //! `sublevel fit`.
 
-mod order;
 mod remote;
 mod report;
+mod request;
 mod sos;
 
 use super::mesh::{MeshArgs, note};
 use crate::fit::{Cone, Progress};
 use crate::jobs::fit_mesh;
-use crate::store::FitOrder;
+use crate::store::FitRequest;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use order::{Choice, length};
-pub(super) use order::{checked, order_of_group};
 pub(super) use remote::execute as execute_on;
 use report::Row;
+use request::{Choice, length};
+pub(super) use request::{checked, request_of_group};
 use std::error::Error;
 use std::io::{self, Write};
 use std::ops::ControlFlow;
@@ -198,14 +198,15 @@ pub(super) fn run(args: &FitArgs) -> Result<(), Box<dyn Error>> {
         }
     }
     let checked = |(input, stem): (&PathBuf, &String)| {
-        checked(order::order(args, input, stem)).map_err(|error| format!("{}: {error}", input.display()))
+        let request = request::request(args, input, stem).and_then(self::checked);
+        request.map_err(|error| format!("{}: {error}", input.display()))
     };
-    let orders = args.inputs.iter().zip(&stems).map(checked).collect::<Result<Vec<_>, _>>()?;
+    let requests = args.inputs.iter().zip(&stems).map(checked).collect::<Result<Vec<_>, _>>()?;
     make_folder(&args.out)?;
     let mut rows = Vec::new();
     let mut failure = None;
-    for (input, order) in args.inputs.iter().zip(&orders) {
-        match one(args, input, order) {
+    for (input, request) in args.inputs.iter().zip(&requests) {
+        match one(args, input, request) {
             Ok(of_input) => rows.extend(of_input),
             // What was fitted before is on disk: it is reported before the error.
             Err(error) => {
@@ -236,20 +237,20 @@ fn stem(input: &Path) -> Result<String, Box<dyn Error>> {
 }
 
 /// Fits what is asked for of one input, here or on a server, and writes it.
-fn one(args: &FitArgs, input: &Path, order: &FitOrder) -> Result<Vec<Row>, Box<dyn Error>> {
-    let bar = progress_bar(&order.name);
+fn one(args: &FitArgs, input: &Path, request: &FitRequest) -> Result<Vec<Row>, Box<dyn Error>> {
+    let bar = progress_bar(&request.name);
     bar.set_message("reading");
     let reading = args.mesh.read(input)?;
     bar.suspend(|| note(input, &reading));
     let (used, odd) = (reading.mesh.used_points(), report::ReadingRow::from(&reading));
     let mesh = reading.mesh;
     let made = match &args.server {
-        Some(url) => execute_on(url, order, &mesh.points, &mesh.triangles, &bar),
-        None => fit_mesh(order, mesh, |_, said| tell(&bar, said)).map_err(Into::into),
+        Some(url) => execute_on(url, request, &mesh.points, &mesh.triangles, &bar),
+        None => fit_mesh(request, mesh, |_, said| tell(&bar, said)).map_err(Into::into),
     }
     .map_err(|error| format!("{}: {error}", input.display()))?;
     bar.finish_and_clear();
-    report::write(&args.out, input, used, &odd, order, &made)
+    report::write(&args.out, input, used, &odd, request, &made)
 }
 
 /// Says on a bar how far a fit has come.

@@ -1,12 +1,12 @@
 //! `sublevel fit --group`.
 
-use super::fit::{FitArgs, checked, execute_on, make_folder, order_of_group, progress_bar};
+use super::fit::{FitArgs, checked, execute_on, make_folder, progress_bar, request_of_group};
 use super::{read_obstacle, write_atomically};
 use crate::body::{Body, Obstacle};
 use crate::fit::Progress;
 use crate::jobs::{FitOutput, Shapes, fit_group};
 use crate::service;
-use crate::store::{FitOrder, FittedBody};
+use crate::store::{FitRequest, FittedBody};
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::error::Error;
@@ -35,12 +35,12 @@ struct Row {
 pub(super) fn run(args: &FitArgs, name: &str) -> Result<(), Box<dyn Error>> {
     let start = Instant::now();
     let obstacles = args.inputs.iter().map(|path| read_obstacle(path)).collect::<Result<Vec<_>, _>>()?;
-    let order = checked(order_of_group(args, name, &obstacles))?;
+    let request = checked(request_of_group(args, name, &obstacles))?;
     make_folder(&args.out)?;
     let bar = progress_bar(name);
     let FitOutput { outcome, shapes } = match &args.server {
-        Some(url) => execute_there(args, url, &order, &obstacles, &bar)?,
-        None => fit_group(&order, &obstacles, |_, said| tell(&bar, said))?,
+        Some(url) => execute_there(args, url, &request, &obstacles, &bar)?,
+        None => fit_group(&request, &obstacles, |_, said| tell(&bar, said))?,
     };
     bar.finish_and_clear();
     let Shapes::Bodies(made) = shapes else { return Err("groups become bodies; are the versions the same?".into()) };
@@ -75,7 +75,7 @@ fn tell(bar: &ProgressBar, progress: Progress) -> ControlFlow<()> {
 fn execute_there(
     args: &FitArgs,
     url: &str,
-    order: &FitOrder,
+    request: &FitRequest,
     obstacles: &[Obstacle],
     bar: &ProgressBar,
 ) -> Result<FitOutput, Box<dyn Error>> {
@@ -86,7 +86,7 @@ fn execute_there(
     bar.set_message("sending");
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     runtime.block_on(service::push(url, &args.inputs))?;
-    execute_on(url, order, &[], &[], bar)
+    execute_on(url, request, &[], &[], bar)
 }
 
 /// Writes one body and describes it.

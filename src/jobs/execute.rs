@@ -1,18 +1,18 @@
-//! Orders carried out: all that they make, with what it took.
+//! Requests executed: all that they make, with what it took.
 
 use std::borrow::Cow;
 use std::ops::ControlFlow;
 
 use super::Phase;
-use super::order::{FitPlan, OrderError, enclosing, plan};
+use super::request::{FitPlan, RequestError, asked_group, enclosing, plan};
 use crate::body::{Body, Compound, Obstacle, SosBody};
 use crate::fit::{
-    CompoundFit, Cover, EncloseError, FitError, FitOptions, Group, Mesh, Progress, Representation, Rung, SosFit,
-    cheapest_within, coarsest_within, enclose_obstacles, fit, fit_parts, fit_sos, group, ladder, thicken, trim,
+    CompoundFit, Cover, EncloseError, FitError, Group, Mesh, Progress, Representation, Rung, SosFit, cheapest_within,
+    coarsest_within, enclose_obstacles, fit, fit_parts, fit_sos, group, ladder, thicken, trim,
 };
-use crate::store::{FitGroup, FitOptimum, FitOrder, FitOutcome, FittedBody, FittedKind};
+use crate::store::{FitOptimum, FitOutcome, FitPreparation, FitRequest, FittedBody, FittedKind};
 
-/// All that an order made.
+/// All that a request made.
 #[derive(Clone, Debug)]
 pub struct FitOutput {
     /// What it took, in the order of the shapes.
@@ -21,7 +21,7 @@ pub struct FitOutput {
     pub shapes: Shapes,
 }
 
-/// What an order can make.
+/// What a request can make.
 #[derive(Clone, Debug)]
 pub enum Shapes {
     /// Bodies: one, the rungs of a ladder, or those around a group.
@@ -32,12 +32,12 @@ pub enum Shapes {
     SosBody(Box<SosBody>),
 }
 
-/// Why an order made nothing.
+/// Why a request made nothing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Failure {
-    /// It cannot be understood.
+    /// It cannot be used.
     #[error(transparent)]
-    Order(#[from] OrderError),
+    Request(#[from] RequestError),
     /// The points cannot be fitted.
     #[error(transparent)]
     Fit(#[from] FitError),
@@ -113,71 +113,73 @@ impl FitOutput {
     }
 }
 
-/// Carries out an order about a mesh: thickens, trims and fits. `progress` can stop it.
+/// Executes a request about a mesh: thickens, trims and fits. `progress` can stop it.
 ///
 /// # Errors
-/// What is wrong with the order or the mesh, and what could not be solved or proven.
+/// What is wrong with the request or the mesh, and what could not be solved or proven.
 pub fn fit_mesh(
-    order: &FitOrder,
+    request: &FitRequest,
     mut mesh: Mesh,
     mut progress: impl FnMut(Phase, Progress) -> ControlFlow<()>,
 ) -> Result<FitOutput, Failure> {
     // What was thickened or trimmed has lost its triangles.
-    if let Some(least_m) = order.min_thickness_m
+    let FitPreparation { trim: fraction, min_thickness_m } = request.mode.preparation();
+    if let Some(least_m) = min_thickness_m
         && let Cow::Owned(points) = thicken(&mesh.points, least_m)
     {
         mesh = Mesh { points, triangles: Vec::new() };
     }
     let (mut left_out, mut left_out_m) = (0, 0.0);
-    if order.trim > 0.0 {
-        let trimmed = trim(&mesh.points, order.trim, &mut |said| progress(Phase::Trimming, said))?;
+    if fraction > 0.0 {
+        let trimmed = trim(&mesh.points, fraction, &mut |said| progress(Phase::Trimming, said))?;
         (left_out, left_out_m) = (trimmed.left_out.len(), trimmed.farthest_m);
         mesh = Mesh { points: trimmed.kept, triangles: Vec::new() };
     }
-    let mut tell = |said| progress(Phase::Fitting, said);
-    let mut made = match plan(order)? {
-        FitPlan::Convex(options) => fit_convex(order, &mesh, &options, &mut tell)?,
-        FitPlan::Relaxed(options) => fit_sos(&order.name, &mesh.points, &mesh.triangles, &options, &mut tell)?.into(),
-    };
-    (made.outcome.left_out, made.outcome.left_out_m) = (left_out, left_out_m);
-    Ok(made)
+    let mut output = fit_prepared(request, &mesh, &mut |said| progress(Phase::Fitting, said))?;
+    (output.outcome.left_out, output.outcome.left_out_m) = (left_out, left_out_m);
+    Ok(output)
 }
 
-fn fit_convex(
-    order: &FitOrder,
+fn fit_prepared(
+    request: &FitRequest,
     mesh: &Mesh,
-    options: &FitOptions,
     tell: &mut dyn FnMut(Progress) -> ControlFlow<()>,
-) -> Result<FitOutput, FitError> {
-    let (name, points) = (&order.name, &mesh.points);
-    Ok(match (order.max_gap_m, order.parts) {
-        (Some(most_m), _) if mesh.triangles.is_empty() => {
-            vec![coarsest_within(name, points, most_m, options, tell)?].into()
+) -> Result<FitOutput, Failure> {
+    let (name, points) = (&request.name, &mesh.points);
+    Ok(match plan(request) {
+        FitPlan::Body(options) => vec![fit(name, points, &options, tell)?.into()].into(),
+        FitPlan::Ladder(options) => ladder(name, points, &options, tell)?.into(),
+        FitPlan::WithinGap(most_m, options) if mesh.triangles.is_empty() => {
+            vec![coarsest_within(name, points, most_m, &options, tell)?].into()
         }
-        (Some(most_m), _) => cheapest_within(name, mesh, most_m, options, tell)?.into(),
-        (None, Some(parts)) => fit_parts(name, mesh, parts, options, tell)?.into(),
-        (None, None) if order.ladder => ladder(name, points, options, tell)?.into(),
-        (None, None) => vec![fit(name, points, options, tell)?.into()].into(),
+        FitPlan::WithinGap(most_m, options) => cheapest_within(name, mesh, most_m, &options, tell)?.into(),
+        FitPlan::Compound(parts, options) => fit_parts(name, mesh, parts, &options, tell)?.into(),
+        FitPlan::SosBody(options) => fit_sos(name, points, &mesh.triangles, &options, tell)?.into(),
+        FitPlan::Group(_) => return Err(about_bodies().into()),
     })
 }
 
-/// Carries out an order about a group, which is of these obstacles. `progress` can stop it.
+fn about_bodies() -> RequestError {
+    RequestError::new("group", "is about stored bodies, and a mesh is given; choose another mode")
+}
+
+/// Executes a request about a group, which is of these obstacles. `progress` can stop it.
 ///
 /// # Errors
-/// What is wrong with the order, and what could not be solved or proven.
+/// What is wrong with the request, and what could not be solved or proven.
 pub fn fit_group(
-    order: &FitOrder,
+    request: &FitRequest,
     obstacles: &[Obstacle],
     mut progress: impl FnMut(Phase, Progress) -> ControlFlow<()>,
 ) -> Result<FitOutput, Failure> {
-    let asked = order.group.as_ref().ok_or_else(|| OrderError::new("group", "is missing; name the bodies"))?;
-    let options = enclosing(order, asked);
+    let asked = asked_group(request)?;
+    let options = enclosing(asked);
     let mut tell = |said| progress(Phase::Fitting, said);
     let groups = match asked.max_growth {
         Some(max_growth) => group(obstacles, max_growth, &options, &mut tell)?,
         None => {
             let all: Vec<&Obstacle> = obstacles.iter().collect();
-            let enclosure = enclose_obstacles(&order.name, &all, &options, &mut tell)?;
+            let enclosure = enclose_obstacles(&request.name, &all, &options, &mut tell)?;
             let cover = Cover::Around(Box::new(enclosure));
             vec![Group { members: (0..obstacles.len()).collect(), cover }]
         }
@@ -198,17 +200,17 @@ pub fn fit_group(
             members,
             ..FittedBody::default()
         });
-        made.push(body.renamed(&body_name(order, index)).map_err(FitError::from)?);
+        made.push(body.renamed(&body_name(request, index)).map_err(FitError::from)?);
     }
     Ok(FitOutput::new(took, Shapes::Bodies(made)))
 }
 
-/// Name of a body that an order makes, counted from 0: its own, with a number where several share
+/// Name of a body that a request makes, counted from 0: its own, with a number where several share
 /// it.
-pub fn body_name(order: &FitOrder, index: usize) -> String {
-    let name = &order.name;
-    match &order.group {
-        Some(FitGroup { max_growth: Some(_), .. }) => format!("{name}-{}", index + 1),
-        _ => name.clone(),
+pub fn body_name(request: &FitRequest, index: usize) -> String {
+    let name = &request.name;
+    match request.group().and_then(|group| group.max_growth) {
+        Some(_) => format!("{name}-{}", index + 1),
+        None => name.clone(),
     }
 }

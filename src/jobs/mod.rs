@@ -2,20 +2,20 @@
 //!
 //! The catalogue holds the jobs; what is decided there is final, and the worker only follows. A job
 //! that is cancelled is CANCELLED on disk first and stopped then; the result of a fit counts only
-//! if its job is still running when it comes. So nothing depends on when the fit hears of it, and a
+//! if its job is still running when it comes. So nothing depends on when the fit learns of it, and a
 //! kill at any time leaves a state that was acknowledged.
 //!
-//! `order` is what can be asked for, `execute` does it, for whoever asks; `worker` does one job
+//! `request` checks what is asked for, `execute` does it, for whoever asks; `worker` does one job
 //! after the other; `board` is where it says how far it is, and where everybody waits for news.
 
 mod board;
 mod execute;
-mod order;
+mod request;
 mod worker;
 
 pub use board::{Board, Phase, Progress};
 pub use execute::{Failure, FitOutput, Shapes, body_name, fit_group, fit_mesh};
-pub use order::{MESH_FORMATS, OrderError, check, read_mesh};
+pub use request::{MESH_FORMATS, RequestError, check, read_mesh};
 
 use std::sync::Arc;
 

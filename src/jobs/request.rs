@@ -5,10 +5,10 @@ use std::path::Path;
 use super::execute::body_name;
 use crate::body::check_name;
 use crate::fit::{
-    Cone, Coordinates, EncloseError, EncloseOptions, FitError, FitOptions, MAX_PIECES, MAX_SETS, Objective, ReadError,
-    ReadOptions, Reading, Scale, SosMethod, SosOptions, parse_mesh,
+    Coordinates, EncloseError, EncloseOptions, FitError, FitOptions, MAX_PIECES, MAX_SETS, ReadError, ReadOptions,
+    Reading, Scale, SosOptions, parse_mesh,
 };
-use crate::store::{FitGroup, FitOrder, MAX_REQUEST_ID_BYTES};
+use crate::store::{FitGroup, FitMode, FitPolynomial, FitPreparation, FitRequest, FitSosBody, MAX_REQUEST_ID_BYTES};
 
 /// Endings of the mesh formats that can be read.
 pub use crate::fit::input::FORMATS as MESH_FORMATS;
@@ -16,130 +16,126 @@ pub use crate::fit::input::FORMATS as MESH_FORMATS;
 /// Degree of bodies around groups unless another is asked for: multipliers make higher ones slow.
 const GROUP_DEGREE: usize = 4;
 
-/// A field of an order that cannot be used.
+/// A field of a request that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{field}: {why}")]
-pub struct OrderError {
-    /// Its name in [`FitOrder`], or `request_id`.
+pub struct RequestError {
+    /// Its name among the options of its mode, in [`FitRequest`], or `request_id`; `group` for all
+    /// options of a group together.
     pub field: &'static str,
     /// The reason and the remedy.
     pub why: String,
 }
 
-impl OrderError {
+impl RequestError {
     pub(super) fn new(field: &'static str, why: impl ToString) -> Self {
         let why = why.to_string();
         // Fits name their options themselves.
-        let words = field.trim_start_matches("group.").replace('_', " ");
-        let why = why.strip_prefix(&words).and_then(|why| why.strip_prefix(": ")).unwrap_or(&why).to_owned();
-        Self { field, why }
+        let named = |words: &str| why.strip_prefix(words)?.strip_prefix(": ").map(str::to_owned);
+        let words = if field == "c" { "relax convexity".to_owned() } else { field.replace('_', " ") };
+        Self { field, why: named(&words).unwrap_or(why) }
     }
 }
 
-/// How points become what is asked for.
+/// What the library is asked for.
 pub(super) enum FitPlan {
-    /// Bodies, or a compound of some.
-    Convex(FitOptions),
+    /// One body.
+    Body(FitOptions),
+    /// The rungs up to a degree.
+    Ladder(FitOptions),
+    /// What is near enough, metres.
+    WithinGap(f64, FitOptions),
+    /// A compound of at most so many parts.
+    Compound(usize, FitOptions),
     /// A set that need not be convex.
-    Relaxed(SosOptions),
+    SosBody(SosOptions),
+    /// Bodies around a group.
+    Group(EncloseOptions),
 }
 
-/// Checks an order before any work, and the request's id.
+/// Checks a request before any work, and its id.
 ///
 /// # Errors
 /// The first field that cannot be used.
-pub fn check(request_id: &str, order: &FitOrder) -> Result<(), OrderError> {
+pub fn check(request_id: &str, request: &FitRequest) -> Result<(), RequestError> {
     if request_id.len() > MAX_REQUEST_ID_BYTES || request_id.chars().any(char::is_control) {
         let why = format!("must have at most {MAX_REQUEST_ID_BYTES} bytes and no control characters; send a UUID");
-        return Err(OrderError::new("request_id", why));
+        return Err(RequestError::new("request_id", why));
     }
-    check_name(&order.name).map_err(|error| OrderError::new("name", error))?;
-    if !order.input.is_empty() {
-        check_name(&order.input).map_err(|error| OrderError::new("input", error))?;
+    check_name(&request.name).map_err(|error| RequestError::new("name", error))?;
+    if !request.input.is_empty() {
+        check_name(&request.input).map_err(|error| RequestError::new("input", error))?;
     }
-    for (field, value) in [
-        ("max_gap_m", order.max_gap_m.unwrap_or(1.0)),
-        ("min_thickness_m", order.min_thickness_m.unwrap_or(1.0)),
-        ("scale", order.scale),
-    ] {
-        if !(value > 0.0 && value.is_finite()) {
-            return Err(OrderError::new(field, format!("is {value}; send a positive finite number or leave it out")));
+    check_positive("scale", request.scale, "; send a positive finite number or leave it out")?;
+    check_preparation(request.mode.preparation())?;
+    let checked = match plan(request) {
+        FitPlan::Body(options) | FitPlan::Ladder(options) => options.check(&request.name),
+        FitPlan::WithinGap(max_gap_m, options) => {
+            check_positive("max_gap_m", max_gap_m, " m; send a positive finite length, or choose another mode")?;
+            options.check(&request.name)
         }
-    }
-    if !(0.0..=0.5).contains(&order.trim) {
-        return Err(OrderError::new("trim", FitError::Trim(order.trim)));
-    }
-    if let Some(group) = &order.group {
-        return check_group(order, group);
-    }
-    let checked = match plan(order)? {
-        FitPlan::Convex(options) => {
-            check_parts(order)?;
-            options.check(&order.name)
-        }
-        FitPlan::Relaxed(options) => {
-            if order.refine || order.ladder || order.slabs > 0 || order.max_gap_m.is_some() || order.parts.is_some() {
-                return Err(unfit(order, "refinement, ladder, slabs, parts and max gap need convex bodies"));
+        FitPlan::Compound(parts, options) => {
+            if !(1..=MAX_PIECES).contains(&parts) {
+                return Err(RequestError::new("parts", FitError::Parts(parts)));
             }
-            if order.cone != Cone::default().name() {
-                return Err(unfit(order, "the cones sdsos and dsos make convex bodies"));
-            }
-            options.check(&order.name)
+            options.check(&request.name)
         }
+        FitPlan::SosBody(options) => options.check(&request.name),
+        FitPlan::Group(options) => return check_group(request, &options),
     };
-    checked.map_err(|error| {
-        let field = match error {
-            FitError::Degree(_) => "degree",
-            FitError::Objective { .. } | FitError::RelaxedObjective(_) => "objective",
-            FitError::Relaxation(_) => "relax_convexity",
-            FitError::Cone(_) => "cone",
-            FitError::Slabs(_) => "slabs",
-            _ => "name",
-        };
-        OrderError::new(field, error)
-    })
+    checked.map_err(|error| RequestError::new(field_of(&error), error))
 }
 
-/// What does not go with a set that need not be convex.
-fn unfit(order: &FitOrder, why: &str) -> OrderError {
-    let field = if order.relax_convexity == 0.0 { "objective" } else { "relax_convexity" };
-    OrderError::new(field, format!("{why}; leave them out, or relaxed convexity and inverse-moment"))
-}
-
-fn check_parts(order: &FitOrder) -> Result<(), OrderError> {
-    if order.max_gap_m.is_some() && (order.ladder || order.slabs > 0 || order.parts.is_some()) {
-        let why = "chooses degree, slabs and parts itself; leave out ladder, slabs and parts";
-        return Err(OrderError::new("max_gap_m", why));
+fn check_positive(field: &'static str, value: f64, remedy: &str) -> Result<(), RequestError> {
+    if value > 0.0 && value.is_finite() {
+        return Ok(());
     }
-    match order.parts {
-        Some(parts) if !(1..=MAX_PIECES).contains(&parts) => Err(OrderError::new("parts", FitError::Parts(parts))),
-        Some(_) if order.ladder || order.trim > 0.0 || order.min_thickness_m.is_some() => {
-            Err(OrderError::new("parts", "cut the mesh as it is; leave out ladder, trimming and thickness, or parts"))
-        }
-        _ => Ok(()),
+    Err(RequestError::new(field, format!("is {value}{remedy}")))
+}
+
+fn check_preparation(preparation: FitPreparation) -> Result<(), RequestError> {
+    let FitPreparation { trim, min_thickness_m } = preparation;
+    let thickness = min_thickness_m.unwrap_or(1.0);
+    check_positive("min_thickness_m", thickness, "; send a positive finite number or leave it out")?;
+    if (0.0..=0.5).contains(&trim) { Ok(()) } else { Err(RequestError::new("trim", FitError::Trim(trim))) }
+}
+
+/// The field that an error of the library is about.
+fn field_of(error: &FitError) -> &'static str {
+    match error {
+        FitError::Degree(_) => "degree",
+        FitError::Objective { .. } | FitError::RelaxedObjective(_) => "objective",
+        FitError::Relaxation(_) => "c",
+        FitError::Cone(_) => "cone",
+        FitError::Slabs(_) => "slabs",
+        _ => "name",
     }
 }
 
-fn check_group(order: &FitOrder, group: &FitGroup) -> Result<(), OrderError> {
-    let FitOrder { name, input, degree, .. } = order.clone();
-    if (FitOrder { group: None, ..order.clone() }) != (FitOrder { name, input, degree, ..FitOrder::default() }) {
-        let why = "is about stored bodies, which options of points do not change; leave out all but the degree";
-        return Err(OrderError::new("group", why));
+fn check_group(request: &FitRequest, options: &EncloseOptions) -> Result<(), RequestError> {
+    let group = asked_group(request)?;
+    if request.scale != 1.0 {
+        let why = "is about stored bodies, which options of points do not change; leave out the scale";
+        return Err(RequestError::new("group", why));
     }
     let count = group.body_ids.len();
     if count == 0 || (group.max_growth.is_none() && count > MAX_SETS) {
         let why = format!("has {count} bodies; name 1 to {MAX_SETS}, or more with a max growth, which makes several");
-        return Err(OrderError::new("group.body_ids", why));
+        return Err(RequestError::new("body_ids", why));
     }
     if let Some(growth) = group.max_growth.filter(|growth| !(*growth > 0.0 && growth.is_finite())) {
-        return Err(OrderError::new("group.max_growth", EncloseError::Growth(growth)));
+        return Err(RequestError::new("max_growth", EncloseError::Growth(growth)));
     }
-    check_name(&body_name(order, count - 1)).map_err(|error| OrderError::new("name", error))?;
-    enclosing(order, group).check().map_err(|error| {
-        let field =
-            if matches!(error, EncloseError::MultiplierDegree(_)) { "group.multiplier_degree" } else { "degree" };
-        OrderError::new(field, error)
+    check_name(&body_name(request, count - 1)).map_err(|error| RequestError::new("name", error))?;
+    options.check().map_err(|error| {
+        let field = if matches!(error, EncloseError::MultiplierDegree(_)) { "multiplier_degree" } else { "degree" };
+        RequestError::new(field, error)
     })
+}
+
+/// The group of a request about one.
+pub(super) fn asked_group(request: &FitRequest) -> Result<&FitGroup, RequestError> {
+    request.group().ok_or_else(|| RequestError::new("group", "is missing; name the bodies"))
 }
 
 /// Points, metres, and triangles of a mesh file in one of [`MESH_FORMATS`]; `input` names it in
@@ -153,42 +149,53 @@ pub fn read_mesh(bytes: &[u8], format: &str, input: &str, scale: f64) -> Result<
     parse_mesh(bytes, format, Path::new(name), &options)
 }
 
-/// How to carry out an order about points.
-pub(super) fn plan(order: &FitOrder) -> Result<FitPlan, OrderError> {
-    let is_moment = order.objective == SosMethod::InverseMoment.name();
-    if is_moment && order.relax_convexity != 0.0 {
-        let why = "inverse-moment asks for no convexity; leave one of the two out";
-        return Err(OrderError::new("relax_convexity", why));
+/// How to execute a request.
+pub(super) fn plan(request: &FitRequest) -> FitPlan {
+    let input = &request.input;
+    let default = FitOptions::default().degree;
+    match &request.mode {
+        FitMode::Body(body) => FitPlan::Body(convex(&body.polynomial, default, body.slabs, input)),
+        FitMode::Ladder(ladder) => {
+            let highest = ladder.polynomial.objective.max_degree();
+            FitPlan::Ladder(convex(&ladder.polynomial, highest, ladder.slabs, input))
+        }
+        FitMode::WithinGap(within) => {
+            let highest = within.polynomial.objective.max_degree();
+            FitPlan::WithinGap(within.max_gap_m, convex(&within.polynomial, highest, 0, input))
+        }
+        FitMode::Compound(compound) => {
+            FitPlan::Compound(compound.parts, convex(&compound.polynomial, default, compound.slabs, input))
+        }
+        FitMode::SosBody(FitSosBody { method, degree, raw_frame, .. }) => FitPlan::SosBody(SosOptions {
+            degree: degree.unwrap_or(default),
+            method: *method,
+            coordinates: coordinates(*raw_frame),
+            input: input.clone(),
+        }),
+        FitMode::Group(group) => FitPlan::Group(enclosing(group)),
     }
-    let objective: Objective = match order.objective.parse() {
-        Ok(objective) => objective,
-        Err(_) if is_moment => Objective::default(),
-        Err(error) => return Err(OrderError::new("objective", error)),
-    };
-    let cone: Cone = order.cone.parse().map_err(|error| OrderError::new("cone", error))?;
-    let coordinates = if order.raw_frame { Coordinates::Raw } else { Coordinates::Unit };
-    let input = order.input.clone();
-    if order.is_relaxed() {
-        let degree = order.degree.unwrap_or(FitOptions::default().degree);
-        let c = order.relax_convexity;
-        let method = if is_moment { SosMethod::InverseMoment } else { SosMethod::Relaxed { c, objective } };
-        return Ok(FitPlan::Relaxed(SosOptions { degree, method, coordinates, input }));
-    }
-    let climbs = order.ladder || order.max_gap_m.is_some();
-    Ok(FitPlan::Convex(FitOptions {
-        degree: order.degree.unwrap_or(if climbs { objective.max_degree() } else { FitOptions::default().degree }),
-        objective,
-        coordinates,
-        cone,
-        refine: order.refine,
-        slabs: order.slabs,
-        input,
-        ..FitOptions::default()
-    }))
 }
 
-/// How to carry out an order about a group.
-pub(super) fn enclosing(order: &FitOrder, group: &FitGroup) -> EncloseOptions {
-    let options = EncloseOptions::new(order.degree.unwrap_or(GROUP_DEGREE));
+fn convex(polynomial: &FitPolynomial, default: usize, slabs: usize, input: &str) -> FitOptions {
+    let FitPolynomial { degree, objective, cone, raw_frame, refine } = *polynomial;
+    FitOptions {
+        degree: degree.unwrap_or(default),
+        objective,
+        coordinates: coordinates(raw_frame),
+        cone,
+        refine,
+        slabs,
+        input: input.to_owned(),
+        ..FitOptions::default()
+    }
+}
+
+fn coordinates(raw_frame: bool) -> Coordinates {
+    if raw_frame { Coordinates::Raw } else { Coordinates::Unit }
+}
+
+/// How to enclose a group.
+pub(super) fn enclosing(group: &FitGroup) -> EncloseOptions {
+    let options = EncloseOptions::new(group.degree.unwrap_or(GROUP_DEGREE));
     EncloseOptions { multiplier_degree: group.multiplier_degree.unwrap_or(options.multiplier_degree), ..options }
 }

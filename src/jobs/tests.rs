@@ -6,14 +6,15 @@ use nalgebra::Vector3;
 use tokio::task::spawn_blocking;
 
 use super::worker::{claim, ended, finish, put_back, recover};
-use super::{FitOutput, Jobs, Shapes};
+use super::{FitOutput, Jobs, Shapes, fit_group, fit_mesh};
 use crate::body::Compound;
 use crate::fit::{FitOptions, fit};
-use crate::store::{Catalogue, FitOrder, FitOutcome, JobState, NewJob, Store};
+use crate::store::{Catalogue, FitBody, FitGroup, FitOutcome, FitPolynomial, FitRequest, JobState, NewJob, Store};
 use sublevel_testkit::Seeded;
 
-fn order(degree: usize) -> FitOrder {
-    FitOrder { name: "it".into(), degree: Some(degree), ..FitOrder::default() }
+fn request(degree: usize) -> FitRequest {
+    let polynomial = FitPolynomial { degree: Some(degree), ..FitPolynomial::default() };
+    FitRequest::new("it", FitBody { polynomial, ..FitBody::default() })
 }
 
 /// A catalogue with one job that was claimed, and where it lies.
@@ -22,7 +23,7 @@ fn claimed() -> (tempfile::TempDir, Catalogue, u64) {
     let catalogue = Catalogue::load(Store::open(dir.path()).expect("a new catalogue")).expect("loads");
     let mut random = Seeded(5);
     let points: Vec<_> = (0..40).map(|_| Vector3::from_fn(|_, _| random.signed())).collect();
-    catalogue.create_job(NewJob::new(String::new(), order(4), &points, &[])).expect("queued");
+    catalogue.create_job(NewJob::new(String::new(), request(4), &points, &[])).expect("queued");
     let job = claim(&catalogue).expect("the disk works").expect("a job");
     assert_eq!((&job.state, job.attempts), (&JobState::Running, 1));
     assert!(claim(&catalogue).expect("the disk works").is_none(), "one job is claimed once");
@@ -100,13 +101,13 @@ fn a_file_is_kept_if_it_fits_in_a_message() {
 #[tokio::test]
 async fn a_panic_is_a_failed_job_with_its_message() {
     let points: Vec<u8> = Vec::new();
-    let defects = [
+    let panics = [
         (spawn_blocking(|| panic!("so it {}", "ends")), "so it ends"),
         (spawn_blocking(|| panic!("plainly")), "plainly"),
         (spawn_blocking(move || panic!("{}", points[3])), "index out of bounds"),
     ];
-    for (defect, word) in defects {
-        match ended(defect.await) {
+    for (panic, word) in panics {
+        match ended(panic.await) {
             (JobState::Failed(why), bodies, None) => assert!(why.contains(word) && bodies.is_empty(), "{why}"),
             (state, ..) => panic!("{state:?}"),
         }
@@ -129,4 +130,17 @@ async fn a_change_is_made_as_soon_as_the_disk_works() {
     assert_eq!(jobs.retry_until_committed(&catalogue, failing(1)).await, Some(1));
     jobs.stop();
     assert_eq!(jobs.retry_until_committed(&catalogue, failing(usize::MAX)).await, None, "a stop ends the wait");
+}
+
+/// Points and groups go to functions of their own.
+#[test]
+fn a_request_about_bodies_is_not_executed_on_a_mesh_nor_the_other_way_round() {
+    let unwatched = |_, _| std::ops::ControlFlow::Continue(());
+    let points = vec![Vector3::zeros(), Vector3::x(), Vector3::y(), Vector3::z()];
+    let mesh = crate::fit::Mesh { points, triangles: Vec::new() };
+    let group = FitRequest::new("it", FitGroup::default());
+    for failed in [fit_mesh(&group, mesh, unwatched), fit_group(&request(4), &[], unwatched)] {
+        let why = failed.expect_err("the wrong mode").to_string();
+        assert!(why.starts_with("group: "), "{why}");
+    }
 }

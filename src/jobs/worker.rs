@@ -13,7 +13,7 @@ use super::{Board, FitOutput, Jobs, Phase, fit_group, fit_mesh};
 use crate::body::Body;
 use crate::body::Obstacle;
 use crate::fit::{self, Mesh};
-use crate::store::{Catalogue, CatalogueError, FitGroup, Job, JobState, MAX_FILE_BYTES};
+use crate::store::{Catalogue, CatalogueError, Job, JobState, MAX_FILE_BYTES};
 
 /// Attempts at a job. One that was running whenever the server was killed may be what kills it.
 const MAX_ATTEMPTS: u32 = 2;
@@ -51,7 +51,7 @@ impl Jobs {
     /// One attempt at a job that was claimed.
     async fn attempt(&self, catalogue: &Arc<Catalogue>, job: &Arc<Job>) {
         let id = job.id;
-        tracing::info!(id, name = job.order.name, points = job.points, attempt = job.attempts, "fit job begun");
+        tracing::info!(id, name = job.request.name, points = job.points, attempt = job.attempts, "fit job begun");
         self.tell(|board| board.begin(id));
         let fit = {
             let (jobs, catalogue, job) = (self.clone(), catalogue.clone(), job.clone());
@@ -64,7 +64,7 @@ impl Jobs {
             fitted = fit => Some(fitted),
         };
         match fitted {
-            // The fit hears of it, too; whether it ends before the server does is no matter.
+            // The fit learns of it, too; whether it ends before the server does is no matter.
             None => {
                 self.retry_until_committed(catalogue, move |catalogue| put_back(catalogue, id)).await;
             }
@@ -90,18 +90,16 @@ impl Jobs {
             self.tell(|board| goes_on = board.note(job.id, phase, said));
             if goes_on { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         };
-        let made = match &job.order.group {
-            Some(FitGroup { body_ids, .. }) => {
-                let body = |id: &String| {
-                    let found = id.parse().ok().and_then(|id| catalogue.body(&id));
-                    found
-                        .map(|body| Obstacle::from((*body).clone()))
-                        .ok_or_else(|| format!("body {id} was deleted meanwhile; create it again"))
+        let made = match job.request.group() {
+            Some(group) => {
+                let body = |id| {
+                    let found = catalogue.body(id).map(|body| Obstacle::from((*body).clone()));
+                    found.ok_or_else(|| format!("body {id} was deleted meanwhile; create it again"))
                 };
-                let bodies = body_ids.iter().map(body).collect::<Result<Vec<_>, _>>()?;
-                fit_group(&job.order, &bodies, progress)
+                let bodies = group.body_ids.iter().map(body).collect::<Result<Vec<_>, _>>()?;
+                fit_group(&job.request, &bodies, progress)
             }
-            None => fit_mesh(&job.order, Mesh { points: mesh.0, triangles: mesh.1 }, progress),
+            None => fit_mesh(&job.request, Mesh { points: mesh.0, triangles: mesh.1 }, progress),
         };
         made.map_err(|error| error.to_string())
     }
@@ -118,7 +116,7 @@ impl Jobs {
             match spawn_blocking(move || change(&catalogue)).await {
                 Ok(Ok(done)) => return Some(done),
                 Ok(Err(error)) => tracing::warn!(%error, "a fit job waits for the disk"),
-                Err(error) => tracing::error!(%error, "a change of a fit job was ended by a defect"),
+                Err(error) => tracing::error!(%error, "a change of a fit job was ended by a panic"),
             }
             let stopping = news.wait_for(Board::is_stopping);
             if tokio::time::timeout(PAUSE, stopping).await.is_ok() {
@@ -154,7 +152,7 @@ pub(super) fn claim(catalogue: &Catalogue) -> Result<Option<Arc<Job>>, Catalogue
     let is_queued = |job: &Job| job.state == JobState::Queued;
     let job = catalogue
         .change_job(job.id, Vec::new(), None, |job| is_queued(job).then_some((JobState::Running, job.attempts + 1)))?;
-    // Cancelled meanwhile: who asks for news hears of it and comes back.
+    // Cancelled meanwhile: who asks for news learns of it and comes back.
     Ok(Some(job).filter(|job| job.state == JobState::Running))
 }
 
@@ -195,8 +193,8 @@ pub(super) fn ended(fitted: Fitted) -> Ended {
         Err(error) => {
             let what =
                 error.try_into_panic().map_or_else(|error| error.to_string(), |panic| message(&*panic).to_owned());
-            tracing::error!(what, "a fit was ended by a defect");
-            failed(format!("the fit was ended by a defect of the program: {what}; please report it with the points"))
+            tracing::error!(what, "a fit was ended by a panic");
+            failed(format!("the fit was ended by a panic in the program: {what}; please report it with the points"))
         }
     }
 }

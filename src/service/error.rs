@@ -56,11 +56,11 @@ pub(super) fn too_slow(limit: Duration) -> Status {
     Status::with_error_details(Code::DeadlineExceeded, message, details("CALL_TOO_LONG"))
 }
 
-/// INTERNAL for a task that panicked: a defect of this program.
+/// INTERNAL for a task that panicked.
 pub(super) fn internal_panic(error: &tokio::task::JoinError) -> Status {
-    tracing::error!(%error, "a call was ended by a defect");
-    let message = "the call was ended by a defect of the server; its log says more, please report it";
-    Status::with_error_details(Code::Internal, message, details("DEFECT"))
+    tracing::error!(%error, "a call was ended by a panic");
+    let message = "the call was ended by a panic in the server; its log says more, please report it";
+    Status::with_error_details(Code::Internal, message, details("INTERNAL_PANIC"))
 }
 
 fn failed_precondition(reason: &str, subject: &str, message: String) -> Status {
@@ -83,7 +83,7 @@ pub(super) fn catalogue(error: &CatalogueError, field: &str) -> Status {
             Status::with_error_details(Code::AlreadyExists, message, details)
         }
         CatalogueError::NoMember { index, id } => {
-            not_found("body", id, &format!("header.options.group.body_ids[{index}]"), message)
+            not_found("body", &id.to_string(), &format!("header.options.group.body_ids[{index}]"), message)
         }
         CatalogueError::NoJob(id) => not_found("fit", id, field, message),
         CatalogueError::RequestUsed { request_id, .. } => {

@@ -82,8 +82,8 @@ pub enum CatalogueError {
     NoMember {
         /// Its place in the group.
         index: usize,
-        /// As given.
-        id: String,
+        /// The body.
+        id: BodyId,
     },
     /// Too many jobs wait.
     #[error("{MAX_QUEUED_JOBS} fit jobs wait already; try again when some are done, or cancel some")]

@@ -28,7 +28,8 @@ pub enum StoreError {
     },
     /// A newer or older version of the program wrote the file.
     #[error(
-        "the catalogue in {} has format {found}, this program reads format {expected}; use the version that wrote it",
+        "the catalogue in {} has format {found}, this program reads format {expected}; use the version that wrote it, or \
+         another directory, into which bodies can be pushed again",
         .dir.display()
     )]
     Format {

@@ -1,10 +1,12 @@
-//! What a fit job is, as it is kept: JSON that any later version can read.
+//! What a fit job is, as it is kept: JSON.
 
 use std::fmt;
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+
+use super::request::FitRequest;
 
 /// Most jobs that may wait; each keeps its points on disk.
 pub const MAX_QUEUED_JOBS: usize = 64;
@@ -20,71 +22,12 @@ pub const MAX_REQUEST_ID_BYTES: usize = 128;
 /// job.
 pub const MAX_FILE_BYTES: usize = (4 << 20) - (64 << 10);
 
-/// What a job is asked for. `jobs` checks it before it is stored.
-///
-/// Options that came later are left out where nobody chose them, so that orders of earlier versions
-/// are read, and an order means the same content under the request id that was given then.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FitOrder {
-    /// Name of the bodies to be made.
-    pub name: String,
-    /// Where the points are from, for their provenance; may be empty.
-    pub input: String,
-    /// Degree of the polynomial, or the highest tried; the default when there is none.
-    pub degree: Option<usize>,
-    /// Name of what is minimised, or `inverse-moment`.
-    pub objective: String,
-    /// Name of the cone that the Gram matrix of the Hessian form is taken from.
-    #[serde(default = "sos", skip_serializing_if = "is_sos")]
-    pub cone: String,
-    /// Whether traces and what relaxes convexity are measured in the coordinates of the points.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub raw_frame: bool,
-    /// How far convexity is relaxed; 0 makes bodies.
-    #[serde(default, skip_serializing_if = "is_default", with = "number_as_text")]
-    pub relax_convexity: f64,
-    /// Whether to minimise the volume itself afterwards.
-    pub refine: bool,
-    /// Most slabs to cut the body by.
-    pub slabs: usize,
-    /// Whether to fit every rung.
-    pub ladder: bool,
-    /// How far the body may reach beyond the hull, metres, if that is what matters.
-    pub max_gap_m: Option<f64>,
-    /// Most parts of the compound, if one is wanted.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub parts: Option<usize>,
-    /// Fraction of the points to leave out.
-    pub trim: f64,
-    /// Thickness of points that have less, metres.
-    pub min_thickness_m: Option<f64>,
-    /// Metres per unit of the coordinates that were sent.
-    pub scale: f64,
-    /// Stored bodies to be put into fewer, in place of points.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub group: Option<FitGroup>,
-}
-
-/// Bodies to be put into one or few.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FitGroup {
-    /// Their ids.
-    pub body_ids: Vec<String>,
-    /// How much volume several bodies around them may add, as a fraction of theirs; one body if not
-    /// reported.
-    pub max_growth: Option<f64>,
-    /// Least degree of the multipliers; the default if not reported.
-    pub multiplier_degree: Option<usize>,
-}
-
 /// A job that is not stored yet.
 #[derive(Clone, Debug)]
 pub struct NewJob {
     pub(super) request_id: String,
     pub(super) digest: String,
-    pub(super) order: FitOrder,
+    pub(super) request: FitRequest,
     pub(super) points: usize,
     /// Coordinates of the points, metres, as little-endian f64.
     pub(super) coordinates: Vec<u8>,
@@ -100,10 +43,10 @@ pub struct Job {
     pub id: u64,
     /// What the client calls its request; empty when it does not say.
     pub request_id: String,
-    /// SHA-256 of the order, the points and the triangles.
+    /// SHA-256 of the request, the points and the triangles.
     pub digest: String,
     /// What it is asked for.
-    pub order: FitOrder,
+    pub request: FitRequest,
     /// How many points were sent.
     pub points: usize,
     /// How often it was begun.
@@ -190,82 +133,25 @@ pub struct FitOptimum {
     pub refinement_end: Option<String>,
 }
 
-impl Default for FitOrder {
-    fn default() -> Self {
-        Self {
-            name: String::new(),
-            input: String::new(),
-            degree: None,
-            objective: "logdet-p".into(),
-            cone: sos(),
-            raw_frame: false,
-            relax_convexity: 0.0,
-            refine: false,
-            slabs: 0,
-            ladder: false,
-            max_gap_m: None,
-            parts: None,
-            trim: 0.0,
-            min_thickness_m: None,
-            scale: 1.0,
-            group: None,
-        }
-    }
-}
-
-impl FitOrder {
-    /// Whether it makes a set that need not be convex.
-    pub fn is_relaxed(&self) -> bool {
-        self.relax_convexity != 0.0 || self.objective == "inverse-moment"
-    }
-
-    /// Whether triangles matter: only the points of one convex body do, and what is trimmed has
-    /// lost them.
-    pub fn uses_triangles(&self) -> bool {
-        self.trim == 0.0 && (self.parts.is_some() || self.max_gap_m.is_some() || self.is_relaxed())
-    }
-}
-
 impl NewJob {
     /// A job about points, metres, that are finite, and the triangles between them; of a group
     /// about neither.
-    pub fn new(request_id: String, order: FitOrder, points: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Self {
+    pub fn new(request_id: String, request: FitRequest, points: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Self {
         let coordinates: Vec<u8> = points.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
         let corners: Vec<u8> = triangles.iter().flatten().flat_map(|corner| corner.to_le_bytes()).collect();
         // What the hash reads has one form only: fields in their order, shortest numbers.
-        let mut asked = serde_json::to_string(&order).unwrap_or_default();
+        let mut asked = serde_json::to_string(&request).unwrap_or_default();
         if !triangles.is_empty() {
             asked += &format!("{} triangles", triangles.len());
         }
         let hash = Sha256::new().chain_update(asked).chain_update(&coordinates).chain_update(&corners).finalize();
         let digest = hash.iter().map(|byte| format!("{byte:02x}")).collect();
-        Self { request_id, digest, order, points: points.len(), coordinates, corners }
+        Self { request_id, digest, request, points: points.len(), coordinates, corners }
     }
-}
-
-fn sos() -> String {
-    "sos".into()
-}
-
-fn is_sos(cone: &str) -> bool {
-    cone == "sos"
 }
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
-}
-
-/// JSON has no infinity; the shortest decimal text has.
-mod number_as_text {
-    use serde::{Deserialize, Deserializer, Serializer, de::Error};
-
-    pub(super) fn serialize<S: Serializer>(number: &f64, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(number)
-    }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-        String::deserialize(deserializer)?.parse().map_err(D::Error::custom)
-    }
 }
 
 impl JobState {

@@ -1,7 +1,7 @@
 //! The durable catalogue of bodies, scenes and fit jobs, embedded in the server.
 //!
 //! [`Store`] is the file: one redb database, `catalogue.redb`, in the data directory. [`Catalogue`]
-//! holds everything of it in memory for reading and writes every change through. Only this room
+//! holds everything of it in memory for reading and writes every change through. Only this layer
 //! knows bytes on disk.
 //!
 //! # What is durable, and why
@@ -33,15 +33,20 @@ mod catalogue;
 mod disk;
 mod error;
 mod job;
+mod request;
 mod rows;
 
 pub use catalogue::{Catalogue, CatalogueError};
 pub use disk::{JobMesh, Store};
 pub use error::StoreError;
 pub use job::{
-    FitGroup, FitOptimum, FitOrder, FitOutcome, FittedBody, FittedKind, Job, JobState, MAX_ENDED_JOBS, MAX_FILE_BYTES,
-    MAX_QUEUED_JOBS, MAX_REQUEST_ID_BYTES, NewJob,
+    FitOptimum, FitOutcome, FittedBody, FittedKind, Job, JobState, MAX_ENDED_JOBS, MAX_FILE_BYTES, MAX_QUEUED_JOBS,
+    MAX_REQUEST_ID_BYTES, NewJob,
+};
+pub use request::{
+    FitBody, FitCompound, FitGroup, FitLadder, FitMode, FitPolynomial, FitPreparation, FitRequest, FitSosBody,
+    FitWithinGap,
 };
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

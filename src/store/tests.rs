@@ -1,6 +1,7 @@
 //! The catalogue on a disk that fails, fills up, or holds something else.
 
 mod jobs;
+pub(crate) mod requests;
 
 use std::io::{self, ErrorKind};
 use std::path::Path;
@@ -134,9 +135,9 @@ fn a_full_disk_is_reported_and_changes_nothing() {
         assert_eq!(still.object("o").map(|object| object.pose), before.object("o").map(|object| object.pose));
         assert_eq!(catalogue.counts(), (1, 1));
 
-        // With room again, the next change works without a restart.
+        // With space again, the next change works without a restart.
         disk.set_full(false);
-        let next = catalogue.update_scene("room", &moved(f64::from(round))).expect("room again");
+        let next = catalogue.update_scene("room", &moved(f64::from(round))).expect("space again");
         assert_eq!(next.revision(), before.revision() + 1);
         assert_eq!(catalogue.scene("room").expect("there").revision(), next.revision());
     }

@@ -3,16 +3,16 @@
 use crate::jobs::FitOutput;
 use crate::service;
 use crate::service::proto::{FitJob, FitPhase, FitState};
-use crate::store::FitOrder;
+use crate::store::FitRequest;
 use indicatif::ProgressBar;
 use nalgebra::Vector3;
 use std::error::Error;
 
-/// Has the server carry out an order about points (metres) and the triangles between them, or about
+/// Has the server execute a request about points (metres) and the triangles between them, or about
 /// bodies that it has. Ctrl-C cancels.
 pub(in crate::cli) fn execute(
     url: &str,
-    order: &FitOrder,
+    request: &FitRequest,
     points: &[Vector3<f64>],
     triangles: &[[usize; 3]],
     bar: &ProgressBar,
@@ -26,7 +26,7 @@ pub(in crate::cli) fn execute(
         }
     };
     let tell = |job: &FitJob| bar.set_message(describe(job));
-    Ok(runtime.block_on(service::submit(url, order, points, triangles, tell, cancel))?)
+    Ok(runtime.block_on(service::submit(url, request, points, triangles, tell, cancel))?)
 }
 
 fn describe(job: &FitJob) -> String {

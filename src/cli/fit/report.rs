@@ -1,11 +1,11 @@
 //! What was made of an input: its files, and what is said of it.
 
 use super::sos;
-use crate::body::{Body, Compound};
+use crate::body::{Body, Compound, SosMethod};
 use crate::cli::write_atomically;
 use crate::fit::{Reading, RefinementEnd};
 use crate::jobs::{FitOutput, Shapes};
-use crate::store::{FitOrder, FitOutcome, FittedBody};
+use crate::store::{FitMode, FitOutcome, FitRequest, FittedBody};
 use serde::Serialize;
 use std::error::Error;
 use std::io::{self, Write};
@@ -103,12 +103,12 @@ pub(super) fn write(
     input: &Path,
     used: usize,
     reading: &ReadingRow,
-    order: &FitOrder,
+    request: &FitRequest,
     made: &FitOutput,
 ) -> Result<Vec<Row>, Box<dyn Error>> {
     let FitOutput { outcome, shapes } = made;
     let write = |kind: String, json: String| -> Result<PathBuf, Box<dyn Error>> {
-        let file = folder.join(format!("{}-{kind}.json", order.name));
+        let file = folder.join(format!("{}-{kind}.json", request.name));
         write_atomically(&file, &json)?;
         Ok(file)
     };
@@ -124,16 +124,15 @@ pub(super) fn write(
         Shapes::Compound(compound) => {
             let file = write(format!("d{}-p{}", compound.degree(), compound.parts().len()), compound.to_json())?;
             let mut row = compound_row(input, &file, used, compound, &outcome.bodies[0]);
-            (row.parts_asked, row.shortfall) = (order.parts, shortfall(order, compound, &outcome.bodies[0]));
+            row.parts_asked = parts_asked(request);
+            row.shortfall = shortfall(row.parts_asked, compound, &outcome.bodies[0]);
             if let (Some(asked), Some(reason)) = (row.parts_asked, &row.shortfall) {
                 eprintln!("note: {}: {} of {asked} parts: {reason}", input.display(), row.parts);
             }
             vec![Row::Convex(row)]
         }
         Shapes::SosBody(body) => {
-            let kind =
-                if order.relax_convexity == 0.0 { "im".to_owned() } else { format!("c{}", order.relax_convexity) };
-            let file = write(format!("d{}-{kind}", body.degree()), body.to_json())?;
+            let file = write(format!("d{}-{}", body.degree(), method(request)), body.to_json())?;
             vec![Row::Sos(sos::row(input, &file, outcome, body))]
         }
     };
@@ -156,9 +155,28 @@ fn kind(body: &Body, took: &FittedBody) -> String {
     }
 }
 
+/// How the file of an sos-body is distinguished from others of its object and degree.
+fn method(request: &FitRequest) -> String {
+    match &request.mode {
+        FitMode::SosBody(set) => match set.method {
+            SosMethod::Relaxed { c, .. } => format!("c{c}"),
+            SosMethod::InverseMoment => "im".to_owned(),
+        },
+        // Only that mode makes sos-bodies.
+        _ => "sos".to_owned(),
+    }
+}
+
+fn parts_asked(request: &FitRequest) -> Option<usize> {
+    match &request.mode {
+        FitMode::Compound(compound) => Some(compound.parts),
+        _ => None,
+    }
+}
+
 /// Why a compound has fewer parts than were asked for.
-fn shortfall(order: &FitOrder, compound: &Compound, took: &FittedBody) -> Option<String> {
-    order.parts.filter(|&asked| compound.parts().len() < asked)?;
+fn shortfall(asked: Option<usize>, compound: &Compound, took: &FittedBody) -> Option<String> {
+    asked.filter(|&asked| compound.parts().len() < asked)?;
     let unknown = || "more would not reduce the volume of the hulls (a server's answer has no details)".to_owned();
     Some(took.shortfall.clone().unwrap_or_else(unknown))
 }

@@ -1,10 +1,12 @@
-//! What the arguments ask for, as an order: carried out here or by a server, it makes the same.
+//! What the arguments ask for, as a request: executed here or by a server, it makes the same.
 
 use super::FitArgs;
-use crate::body::Obstacle;
-use crate::fit::{Objective, SosMethod, UnknownObjective};
+use crate::body::{Cone, Objective, Obstacle, SosMethod, UnknownObjective};
 use crate::jobs::check;
-use crate::store::{FitGroup, FitOrder};
+use crate::store::{
+    FitBody, FitCompound, FitGroup, FitLadder, FitMode, FitPolynomial, FitPreparation, FitRequest, FitSosBody,
+    FitWithinGap,
+};
 use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
@@ -44,47 +46,70 @@ impl FromStr for Choice {
     }
 }
 
-/// The order of one input, whose points are in metres when they are fitted.
-pub(super) fn order(args: &FitArgs, input: &Path, stem: &str) -> FitOrder {
-    FitOrder {
-        name: stem.to_owned(),
-        input: input.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
-        degree: args.degree,
-        objective: args.objective.to_string(),
-        cone: args.cone.to_string(),
-        raw_frame: args.raw_frame,
-        relax_convexity: args.relax_convexity,
-        refine: args.refine,
-        slabs: args.slabs,
-        ladder: args.ladder,
-        max_gap_m: args.max_gap,
-        parts: args.parts,
-        trim: args.trim,
-        min_thickness_m: args.min_thickness,
-        ..FitOrder::default()
+/// The request about one input, whose points are in metres when they are fitted; or the arguments
+/// that exclude each other.
+pub(super) fn request(args: &FitArgs, input: &Path, stem: &str) -> Result<FitRequest, String> {
+    let input = input.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    Ok(FitRequest { input, ..FitRequest::new(stem, mode(args)?) })
+}
+
+/// Arguments that need no check here exclude each other on the command line already.
+fn mode(args: &FitArgs) -> Result<FitMode, String> {
+    let preparation = FitPreparation { trim: args.trim, min_thickness_m: args.min_thickness };
+    let objective = match (args.objective, args.relax_convexity) {
+        (Choice::Minimise(objective), 0.0) => objective,
+        (Choice::Minimise(objective), c) => {
+            return sos_body(args, SosMethod::Relaxed { c, objective }, preparation);
+        }
+        (Choice::InverseMoment, 0.0) => return sos_body(args, SosMethod::InverseMoment, preparation),
+        (Choice::InverseMoment, _) => {
+            return Err("--relax-convexity: inverse-moment asks for no convexity; leave one of the two out".to_owned());
+        }
+    };
+    let FitArgs { degree, cone, raw_frame, refine, slabs, .. } = *args;
+    let polynomial = FitPolynomial { degree, objective, cone, raw_frame, refine };
+    Ok(match (args.max_gap, args.parts) {
+        (Some(max_gap_m), _) => FitWithinGap { max_gap_m, polynomial, preparation }.into(),
+        (None, Some(parts)) => FitCompound { parts, polynomial, slabs }.into(),
+        (None, None) if args.ladder => FitLadder { polynomial, slabs, preparation }.into(),
+        (None, None) => FitBody { polynomial, slabs, preparation }.into(),
+    })
+}
+
+fn sos_body(args: &FitArgs, method: SosMethod, preparation: FitPreparation) -> Result<FitMode, String> {
+    let unfit = if args.refine || args.ladder || args.slabs > 0 || args.max_gap.is_some() || args.parts.is_some() {
+        Some("refinement, ladder, slabs, parts and max gap need convex bodies")
+    } else {
+        (args.cone != Cone::default()).then_some("the cones sdsos and dsos make convex bodies")
+    };
+    match unfit {
+        Some(why) => {
+            let argument = if method == SosMethod::InverseMoment { "objective" } else { "relax-convexity" };
+            Err(format!("--{argument}: {why}; leave them out, or relaxed convexity and inverse-moment"))
+        }
+        None => Ok(FitSosBody { method, degree: args.degree, raw_frame: args.raw_frame, preparation }.into()),
     }
 }
 
-/// The order of `--group`.
-pub(in crate::cli) fn order_of_group(args: &FitArgs, name: &str, obstacles: &[Obstacle]) -> FitOrder {
+/// The request of `--group`.
+pub(in crate::cli) fn request_of_group(args: &FitArgs, name: &str, obstacles: &[Obstacle]) -> FitRequest {
     let group = FitGroup {
-        body_ids: obstacles.iter().map(|obstacle| obstacle.id().to_string()).collect(),
+        body_ids: obstacles.iter().map(|obstacle| *obstacle.id()).collect(),
         max_growth: args.max_growth,
         multiplier_degree: args.multiplier_degree,
+        degree: args.degree,
     };
-    FitOrder { name: name.to_owned(), degree: args.degree, group: Some(group), ..FitOrder::default() }
+    FitRequest::new(name, group)
 }
 
-/// An order that can be carried out, or the argument that cannot be used, and why.
-pub(in crate::cli) fn checked(order: FitOrder) -> Result<FitOrder, String> {
-    check("", &order).map_err(|error| match error.field {
-        "name" | "input" | "group.body_ids" => error.why,
-        field => {
-            let argument = field.trim_start_matches("group.").trim_end_matches("_m").replace('_', "-");
-            format!("--{argument}: {}", error.why)
-        }
+/// A request that can be executed, or the argument that cannot be used, and why.
+pub(in crate::cli) fn checked(request: FitRequest) -> Result<FitRequest, String> {
+    check("", &request).map_err(|error| match error.field {
+        "name" | "input" | "body_ids" => error.why,
+        "c" => format!("--relax-convexity: {}", error.why),
+        field => format!("--{}: {}", field.trim_end_matches("_m").replace('_', "-"), error.why),
     })?;
-    Ok(order)
+    Ok(request)
 }
 
 /// A length with its unit, or in metres.

@@ -1,6 +1,6 @@
 //! FitService.
 
-mod order;
+mod request;
 mod submit;
 mod upload;
 mod wire;
@@ -130,26 +130,26 @@ fn find(catalogue: &Catalogue, id: u64) -> Result<Arc<Job>, Status> {
 }
 
 /// Sends the job as it stands whenever it has changed, until it has ended or nobody listens. A
-/// message is made when there is room for it, so who reads slowly gets the latest.
+/// message is made when there is space for it, so who reads slowly gets the latest.
 async fn watch(app: AppState, jobs: Jobs, id: u64, sender: mpsc::Sender<Result<WatchFitResponse, Status>>) {
     let (mut news, mut sent) = (jobs.news(), None);
-    while let Ok(room) = sender.reserve().await {
+    while let Ok(space) = sender.reserve().await {
         let (progress, stopping) = {
             let board: &Board = &news.borrow_and_update();
             (board.progress(id), board.is_stopping())
         };
         let job = match app.catalogue().await.and_then(|catalogue| find(&catalogue, id)) {
             Ok(job) => job,
-            Err(status) => return room.send(Err(status)),
+            Err(status) => return space.send(Err(status)),
         };
         let message = wire::job(&job, progress);
         if sent.as_ref() != Some(&message) {
             sent = Some(message.clone());
             let message = complete(&app, &job, message).await;
-            room.send(message.map(|job| WatchFitResponse { job: Some(job) }));
+            space.send(message.map(|job| WatchFitResponse { job: Some(job) }));
         } else if stopping {
             let why = "the server stops; watch the job again when it is back, it goes on then";
-            return room.send(Err(error::unavailable("STOPPING", why)));
+            return space.send(Err(error::unavailable("STOPPING", why)));
         }
         if job.state.is_final() {
             return;

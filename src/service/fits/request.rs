@@ -1,23 +1,34 @@
-//! Between the headers of CreateFit and orders.
+//! Between the headers of CreateFit and requests.
 
 use super::super::error::Invalid;
 use super::super::limits::MAX_GROUP_BODIES;
-use super::super::proto::{FitCone, FitGroup, FitHeader, FitObjective, FitOptions, MeshFormat};
+use super::super::proto::fit_options::Mode;
+use super::super::proto::fit_sos_body::Method;
+use super::super::proto::{
+    self, FitCone, FitHeader, FitInverseMoment, FitObjective, FitOptions, FitRelaxed, MeshFormat,
+};
 use super::super::wire::{body_id, count};
-use crate::jobs::check;
-use crate::store::{self, FitOrder};
+use crate::body::{Cone, Objective, SosMethod};
+use crate::jobs::{RequestError, check};
+use crate::store::{
+    FitBody, FitCompound, FitGroup, FitLadder, FitMode, FitPolynomial, FitPreparation, FitRequest, FitSosBody,
+    FitWithinGap,
+};
 
-/// Objectives and their names in orders.
-const OBJECTIVES: [(FitObjective, &str); 5] = [
-    (FitObjective::LogdetP, "logdet-p"),
-    (FitObjective::TraceP, "trace-p"),
-    (FitObjective::LogdetH, "logdet-h"),
-    (FitObjective::TraceH, "trace-h"),
-    (FitObjective::InverseMoment, "inverse-moment"),
+/// Where the options are in a CreateFit call.
+const OPTIONS: &str = "header.options";
+
+/// Objectives of messages and of requests.
+const OBJECTIVES: [(FitObjective, Objective); 4] = [
+    (FitObjective::LogdetP, Objective::LogDetP),
+    (FitObjective::TraceP, Objective::TraceP),
+    (FitObjective::LogdetH, Objective::LogDetH),
+    (FitObjective::TraceH, Objective::TraceH),
 ];
 
-/// Cones and their names in orders.
-const CONES: [(FitCone, &str); 3] = [(FitCone::Sos, "sos"), (FitCone::Sdsos, "sdsos"), (FitCone::Dsos, "dsos")];
+/// Cones of messages and of requests.
+const CONES: [(FitCone, Cone); 3] =
+    [(FitCone::Sos, Cone::Sos), (FitCone::Sdsos, Cone::Sdsos), (FitCone::Dsos, Cone::Dsos)];
 
 /// Formats and the endings of their files.
 const FORMATS: [(MeshFormat, &str); 6] = [
@@ -29,57 +40,101 @@ const FORMATS: [(MeshFormat, &str); 6] = [
     (MeshFormat::Dae, "dae"),
 ];
 
-/// The request's id, the checked order, and the format of the mesh file that follows, if one does.
-pub(super) fn order(header: FitHeader) -> Result<(String, FitOrder, Option<&'static str>), Invalid> {
+/// The request's id, the checked request, and the format of the mesh file that follows, if one
+/// does.
+pub(super) fn request(header: FitHeader) -> Result<(String, FitRequest, Option<&'static str>), Invalid> {
     let format = header.mesh_format();
     if i32::from(format) != header.mesh_format {
         return Err(Invalid::new("header.mesh_format", "is no format this server knows"));
     }
-    let options = header.options.unwrap_or_default();
-    let objective = match options.objective() {
-        known if i32::from(known) != options.objective => None,
-        FitObjective::Unspecified => Some("logdet-p"),
-        known => name_of(&OBJECTIVES, known),
-    };
-    let cone = match options.cone() {
-        known if i32::from(known) != options.cone => None,
-        FitCone::Unspecified => Some("sos"),
-        known => name_of(&CONES, known),
-    };
-    let unknown = |field: &str| Invalid::new(format!("header.options.{field}"), "is none that this server knows");
-    let order = FitOrder {
-        name: header.name,
-        input: header.input,
-        degree: given(options.degree),
-        objective: objective.ok_or_else(|| unknown("objective"))?.to_owned(),
-        cone: cone.ok_or_else(|| unknown("cone"))?.to_owned(),
-        raw_frame: options.raw_frame,
-        relax_convexity: options.relax_convexity,
-        refine: options.refine,
-        slabs: number(options.slabs),
-        ladder: options.ladder,
-        max_gap_m: options.max_gap_m,
-        parts: given(options.parts),
-        trim: options.trim,
-        min_thickness_m: options.min_thickness_m,
-        scale: options.scale.unwrap_or(1.0),
-        group: options.group.map(group).transpose()?,
-    };
-    check(&header.request_id, &order).map_err(|error| {
-        let inside = if ["name", "input", "request_id"].contains(&error.field) { "" } else { "options." };
-        Invalid::new(format!("header.{inside}{}", error.field), error.why)
-    })?;
-    let format = name_of(&FORMATS, format);
-    if order.group.is_some() && format.is_some() {
+    let FitOptions { scale, trim, min_thickness_m, mode } = header.options.unwrap_or_default();
+    let preparation = FitPreparation { trim, min_thickness_m };
+    let mode = read_mode(mode.unwrap_or_default(), preparation)?;
+    let request = FitRequest { name: header.name, input: header.input, scale: scale.unwrap_or(1.0), mode };
+    check(&header.request_id, &request).map_err(|error| refused(&request.mode, error))?;
+    let format = FORMATS.iter().find(|(known, _)| *known == format).map(|(_, ending)| *ending);
+    if request.group().is_some() && format.is_some() {
         let why = "announces a mesh file where the options name a group of stored bodies; leave out one of the two";
         return Err(Invalid::new("header.mesh_format", why));
     }
-    Ok((header.request_id, order, format))
+    Ok((header.request_id, request, format))
 }
 
-fn group(group: FitGroup) -> Result<store::FitGroup, Invalid> {
-    let FitGroup { body_ids, max_growth, multiplier_degree } = group;
-    let field = "header.options.group.body_ids";
+/// A field of a request as the path of the message's field.
+fn refused(mode: &FitMode, RequestError { field, why }: RequestError) -> Invalid {
+    let path = match (field, mode) {
+        ("request_id" | "name" | "input", _) => format!("header.{field}"),
+        ("scale" | "trim" | "min_thickness_m" | "group", _) => format!("{OPTIONS}.{field}"),
+        ("c" | "objective", FitMode::SosBody(_)) => format!("{OPTIONS}.sos_body.relaxed.{field}"),
+        _ => format!("{OPTIONS}.{}.{field}", mode.name()),
+    };
+    Invalid::new(path, why)
+}
+
+fn read_mode(mode: Mode, preparation: FitPreparation) -> Result<FitMode, Invalid> {
+    let is_prepared = preparation != FitPreparation::default();
+    Ok(match mode {
+        Mode::Body(proto::FitBody { degree, objective, cone, raw_frame, refine, slabs }) => {
+            let polynomial = polynomial("body", (degree, objective, cone, raw_frame, refine))?;
+            FitBody { polynomial, slabs: number(slabs), preparation }.into()
+        }
+        Mode::Ladder(proto::FitLadder { degree, objective, cone, raw_frame, refine, slabs }) => {
+            let polynomial = polynomial("ladder", (degree, objective, cone, raw_frame, refine))?;
+            FitLadder { polynomial, slabs: number(slabs), preparation }.into()
+        }
+        Mode::WithinGap(proto::FitWithinGap { max_gap_m, degree, objective, cone, raw_frame, refine }) => {
+            let polynomial = polynomial("within_gap", (degree, objective, cone, raw_frame, refine))?;
+            FitWithinGap { max_gap_m, polynomial, preparation }.into()
+        }
+        Mode::Compound(_) if is_prepared => {
+            let why = "cut the mesh as it is; leave out trim and min_thickness_m, or choose another mode";
+            return Err(Invalid::new(format!("{OPTIONS}.compound.parts"), why));
+        }
+        Mode::Compound(proto::FitCompound { parts, degree, objective, cone, raw_frame, refine, slabs }) => {
+            let polynomial = polynomial("compound", (degree, objective, cone, raw_frame, refine))?;
+            FitCompound { parts: number(parts), polynomial, slabs: number(slabs) }.into()
+        }
+        Mode::SosBody(message) => read_sos_body(message, preparation)?.into(),
+        Mode::Group(_) if is_prepared => {
+            let why =
+                "is about stored bodies, which options of points do not change; leave out trim and min_thickness_m";
+            return Err(Invalid::new(format!("{OPTIONS}.group"), why));
+        }
+        Mode::Group(message) => read_group(message)?.into(),
+    })
+}
+
+/// Degree, objective, cone, raw frame and refinement of a message.
+type Numbers = (Option<u32>, i32, i32, bool, bool);
+
+fn polynomial(mode: &str, (degree, objective, cone, raw_frame, refine): Numbers) -> Result<FitPolynomial, Invalid> {
+    Ok(FitPolynomial {
+        degree: degree.map(number),
+        objective: read_objective(objective, mode)?,
+        cone: known(&CONES, cone, FitCone::Unspecified, &format!("{OPTIONS}.{mode}.cone"))?,
+        raw_frame,
+        refine,
+    })
+}
+
+fn read_sos_body(message: proto::FitSosBody, preparation: FitPreparation) -> Result<FitSosBody, Invalid> {
+    let proto::FitSosBody { degree, raw_frame, method } = message;
+    let method = match method {
+        Some(Method::Relaxed(FitRelaxed { c, objective })) => {
+            SosMethod::Relaxed { c, objective: read_objective(objective, "sos_body.relaxed")? }
+        }
+        Some(Method::InverseMoment(FitInverseMoment {})) => SosMethod::InverseMoment,
+        None => {
+            let why = "names no method; send `relaxed` with its c, or `inverse_moment`";
+            return Err(Invalid::new(format!("{OPTIONS}.sos_body"), why));
+        }
+    };
+    Ok(FitSosBody { method, degree: degree.map(number), raw_frame, preparation })
+}
+
+fn read_group(message: proto::FitGroup) -> Result<FitGroup, Invalid> {
+    let proto::FitGroup { body_ids, max_growth, multiplier_degree, degree } = message;
+    let field = format!("{OPTIONS}.group.body_ids");
     if body_ids.len() > MAX_GROUP_BODIES {
         let why = format!(
             "has {} bodies; group at most {MAX_GROUP_BODIES} at once, such as those near each other",
@@ -87,53 +142,106 @@ fn group(group: FitGroup) -> Result<store::FitGroup, Invalid> {
         );
         return Err(Invalid::new(field, why));
     }
-    for (index, id) in body_ids.iter().enumerate() {
-        body_id(id, &format!("{field}[{index}]"))?;
-    }
-    Ok(store::FitGroup { body_ids, max_growth, multiplier_degree: multiplier_degree.map(number) })
+    let ids = body_ids.iter().enumerate().map(|(index, id)| body_id(id, &format!("{field}[{index}]")));
+    let (multiplier_degree, degree) = (multiplier_degree.map(number), degree.map(number));
+    Ok(FitGroup { body_ids: ids.collect::<Result<_, _>>()?, max_growth, multiplier_degree, degree })
 }
 
-/// The header of an order for points that are sent in metres, or for a group.
-pub(super) fn header(order: &FitOrder) -> FitHeader {
-    let FitOrder { name, input, .. } = order.clone();
+fn read_objective(objective: i32, at: &str) -> Result<Objective, Invalid> {
+    known(&OBJECTIVES, objective, FitObjective::Unspecified, &format!("{OPTIONS}.{at}.objective"))
+}
+
+/// What a number of an enumeration stands for; the default for the unspecified one.
+fn known<M, T>(table: &[(M, T)], number: i32, unspecified: M, field: &str) -> Result<T, Invalid>
+where
+    M: Copy + Into<i32>,
+    T: Copy + Default,
+{
+    if number == unspecified.into() {
+        return Ok(T::default());
+    }
+    let found = table.iter().find(|(message, _)| (*message).into() == number).map(|(_, known)| *known);
+    found.ok_or_else(|| Invalid::new(field, "is none that this server knows"))
+}
+
+/// The header of a request about points that are sent in metres, or about a group.
+pub(super) fn header(request: &FitRequest) -> FitHeader {
+    let FitRequest { name, input, .. } = request.clone();
     let mesh_format = MeshFormat::Unspecified.into();
-    FitHeader { name, request_id: String::new(), input, mesh_format, options: Some(options(order)) }
+    FitHeader { name, request_id: String::new(), input, mesh_format, options: Some(options(request)) }
 }
 
-pub(super) fn options(order: &FitOrder) -> FitOptions {
-    let objective = OBJECTIVES.iter().find(|(_, name)| *name == order.objective);
-    let cone = CONES.iter().find(|(_, name)| *name == order.cone);
-    FitOptions {
-        degree: count(order.degree.unwrap_or(0)),
-        objective: objective.map_or(FitObjective::Unspecified, |(objective, _)| *objective).into(),
-        refine: order.refine,
-        slabs: count(order.slabs),
-        ladder: order.ladder,
-        max_gap_m: order.max_gap_m,
-        trim: order.trim,
-        min_thickness_m: order.min_thickness_m,
-        scale: Some(order.scale),
-        cone: cone.map_or(FitCone::Unspecified, |(cone, _)| *cone).into(),
-        raw_frame: order.raw_frame,
-        parts: count(order.parts.unwrap_or(0)),
-        relax_convexity: order.relax_convexity,
-        group: order.group.as_ref().map(|group| FitGroup {
-            body_ids: group.body_ids.clone(),
-            max_growth: group.max_growth,
-            multiplier_degree: group.multiplier_degree.map(count),
-        }),
+/// The options of a request, with what was left open.
+pub(super) fn options(request: &FitRequest) -> FitOptions {
+    let FitPreparation { trim, min_thickness_m } = request.mode.preparation();
+    let scale = request.group().is_none().then_some(request.scale);
+    FitOptions { scale, trim, min_thickness_m, mode: Some(write_mode(&request.mode)) }
+}
+
+fn write_mode(mode: &FitMode) -> Mode {
+    match mode {
+        FitMode::Body(FitBody { polynomial, slabs, .. }) => {
+            let (degree, objective, cone, raw_frame, refine) = numbers(polynomial);
+            Mode::Body(proto::FitBody { degree, objective, cone, raw_frame, refine, slabs: count(*slabs) })
+        }
+        FitMode::Ladder(FitLadder { polynomial, slabs, .. }) => {
+            let (degree, objective, cone, raw_frame, refine) = numbers(polynomial);
+            Mode::Ladder(proto::FitLadder { degree, objective, cone, raw_frame, refine, slabs: count(*slabs) })
+        }
+        FitMode::WithinGap(FitWithinGap { max_gap_m, polynomial, .. }) => {
+            let (degree, objective, cone, raw_frame, refine) = numbers(polynomial);
+            Mode::WithinGap(proto::FitWithinGap { max_gap_m: *max_gap_m, degree, objective, cone, raw_frame, refine })
+        }
+        FitMode::Compound(FitCompound { parts, polynomial, slabs }) => {
+            let (degree, objective, cone, raw_frame, refine) = numbers(polynomial);
+            let (parts, slabs) = (count(*parts), count(*slabs));
+            Mode::Compound(proto::FitCompound { parts, degree, objective, cone, raw_frame, refine, slabs })
+        }
+        FitMode::SosBody(set) => Mode::SosBody(write_sos_body(set)),
+        FitMode::Group(group) => Mode::Group(write_group(group)),
     }
 }
 
-fn name_of<T: PartialEq>(names: &[(T, &'static str)], wanted: T) -> Option<&'static str> {
-    names.iter().find(|(known, _)| *known == wanted).map(|(_, name)| *name)
+fn write_sos_body(set: &FitSosBody) -> proto::FitSosBody {
+    let FitSosBody { method, degree, raw_frame, .. } = *set;
+    let method = match method {
+        SosMethod::Relaxed { c, objective } => {
+            Method::Relaxed(FitRelaxed { c, objective: number_of(&OBJECTIVES, objective) })
+        }
+        SosMethod::InverseMoment => Method::InverseMoment(FitInverseMoment {}),
+    };
+    proto::FitSosBody { degree: degree.map(count), raw_frame, method: Some(method) }
 }
 
-/// None for 0, which stands for the default.
-fn given(count: u32) -> Option<usize> {
-    Some(number(count)).filter(|&count| count != 0)
+fn write_group(group: &FitGroup) -> proto::FitGroup {
+    let FitGroup { body_ids, max_growth, multiplier_degree, degree } = group;
+    proto::FitGroup {
+        body_ids: body_ids.iter().map(ToString::to_string).collect(),
+        max_growth: *max_growth,
+        multiplier_degree: multiplier_degree.map(count),
+        degree: degree.map(count),
+    }
+}
+
+fn numbers(polynomial: &FitPolynomial) -> Numbers {
+    let FitPolynomial { degree, objective, cone, raw_frame, refine } = *polynomial;
+    (degree.map(count), number_of(&OBJECTIVES, objective), number_of(&CONES, cone), raw_frame, refine)
+}
+
+/// The number of an enumeration that stands for this; 0 for what it does not have.
+fn number_of<M: Copy + Into<i32>, T: PartialEq>(table: &[(M, T)], wanted: T) -> i32 {
+    table.iter().find(|(_, known)| *known == wanted).map_or(0, |(message, _)| (*message).into())
 }
 
 fn number(count: u32) -> usize {
     usize::try_from(count).unwrap_or(usize::MAX)
 }
+
+impl Default for Mode {
+    fn default() -> Self {
+        Self::Body(proto::FitBody::default())
+    }
+}
+
+#[cfg(test)]
+mod tests;

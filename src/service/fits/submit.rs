@@ -15,10 +15,10 @@ use super::super::proto::{
     WatchFitRequest,
 };
 use super::super::push::{PushError, connect};
-use super::{order, wire};
+use super::{request, wire};
 use crate::body::{Body, BodyFileError, Compound, SosBody};
 use crate::jobs::{FitOutput, Shapes, body_name};
-use crate::store::{FitOrder, FittedKind};
+use crate::store::{FitRequest, FittedKind};
 
 /// Points, or triangles, of one message: some 1.5 MB.
 const CHUNK: usize = 1 << 16;
@@ -67,15 +67,15 @@ impl From<BodyFileError> for SubmitError {
     }
 }
 
-/// Has a server carry out an order about points (metres) and the triangles between them, or about a
-/// group of bodies that it has; fetches what it made and proves it again. `tell` hears of the job
+/// Has a server execute a request about points (metres) and the triangles between them, or about a
+/// group of bodies that it has; fetches what it made and proves it again. `tell` learns of the job
 /// whenever it has changed; when `cancel` resolves, the job is cancelled.
 ///
 /// # Errors
 /// [`SubmitError`].
 pub async fn submit(
     url: &str,
-    order: &FitOrder,
+    asked: &FitRequest,
     points: &[Vector3<f64>],
     triangles: &[[usize; 3]],
     mut tell: impl FnMut(&FitJob),
@@ -87,7 +87,7 @@ pub async fn submit(
         .max_encoding_message_size(MAX_MESSAGE_BYTES);
     tokio::pin!(cancel);
     let created = tokio::select! {
-        created = client.create_fit(tokio_stream::iter(messages(order, points, triangles))) => created,
+        created = client.create_fit(tokio_stream::iter(messages(asked, points, triangles))) => created,
         // What is not sent to its end makes no job.
         () = &mut cancel => return Err(SubmitError::Cancelled),
     };
@@ -119,12 +119,12 @@ pub async fn submit(
         FitState::Cancelled => return Err(SubmitError::Cancelled),
         _ => return Err(SubmitError::Failed(job.failure)),
     }
-    fetch(channel, order, job.result.unwrap_or_default()).await
+    fetch(channel, asked, job.result.unwrap_or_default()).await
 }
 
 /// The header, and the points and triangles in pieces, each made when it is sent.
 fn messages(
-    order: &FitOrder,
+    asked: &FitRequest,
     points: &[Vector3<f64>],
     triangles: &[[usize; 3]],
 ) -> impl Iterator<Item = CreateFitRequest> + use<> {
@@ -137,8 +137,8 @@ fn messages(
         let corner = |&corner| u32::try_from(corner).unwrap_or(u32::MAX);
         Part::Triangles(TriangleChunk { corners: chunk.iter().flatten().map(corner).collect() })
     };
-    let triangles = if order.uses_triangles() { triangles } else { &[] };
-    std::iter::once(Part::Header(order::header(order)))
+    let triangles = if asked.uses_triangles() { triangles } else { &[] };
+    std::iter::once(Part::Header(request::header(asked)))
         .chain(chunks(points.to_vec(), coordinates))
         .chain(chunks(triangles.to_vec(), corners))
         .map(|part| CreateFitRequest { part: Some(part) })
@@ -149,7 +149,7 @@ fn chunks<T>(all: Vec<T>, part: impl Fn(&[T]) -> Part) -> impl Iterator<Item = P
 }
 
 /// What a job made, re-proven here from the server's files.
-async fn fetch(channel: Channel, order: &FitOrder, result: FitResult) -> Result<FitOutput, SubmitError> {
+async fn fetch(channel: Channel, asked: &FitRequest, result: FitResult) -> Result<FitOutput, SubmitError> {
     let unknown = || SubmitError::Unproven("something of a kind that this program does not know".to_owned());
     let outcome = wire::outcome(&result).ok_or_else(unknown)?;
     let file = || text(&result.bodies[0].file_json);
@@ -164,7 +164,7 @@ async fn fetch(channel: Channel, order: &FitOrder, result: FitResult) -> Result<
                 let found = found.map_err(|status| SubmitError::Gone(Box::new(status)))?.into_inner();
                 let body = Body::from_json(text(&found.body_file_json)?)?;
                 // The server may have had it under another name.
-                let named = body.renamed(&body_name(order, index));
+                let named = body.renamed(&body_name(asked, index));
                 bodies.push(named.map_err(|error| SubmitError::Unproven(error.to_string()))?);
             }
             Shapes::Bodies(bodies)

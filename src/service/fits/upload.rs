@@ -8,15 +8,15 @@ use super::super::error::Invalid;
 use super::super::limits::{MAX_FIT_POINTS, MAX_FIT_TRIANGLES, MAX_MESH_BYTES};
 use super::super::proto::create_fit_request::Part;
 use super::super::proto::{CreateFitRequest, FitHeader};
-use super::order::order;
+use super::request::request;
 use crate::jobs;
-use crate::store::{FitOrder, NewJob};
+use crate::store::{FitMode, FitRequest, NewJob};
 
 /// Everything a client sent.
 #[derive(Debug)]
 pub(super) struct Upload {
     request_id: String,
-    order: FitOrder,
+    request: FitRequest,
     content: Content,
 }
 
@@ -44,13 +44,13 @@ pub(super) async fn receive(mut stream: Streaming<CreateFitRequest>) -> Result<U
 
 impl Upload {
     fn new(header: FitHeader) -> Result<Self, Invalid> {
-        let (request_id, order, format) = order(header)?;
+        let (request_id, request, format) = request(header)?;
         let content = match format {
-            _ if order.group.is_some() => Content::Group,
+            _ if request.group().is_some() => Content::Group,
             Some(format) => Content::Mesh(format, Vec::new()),
             None => Content::Points(Vec::new(), Vec::new()),
         };
-        Ok(Self { request_id, order, content })
+        Ok(Self { request_id, request, content })
     }
 
     fn add(&mut self, part: Option<Part>) -> Result<(), Invalid> {
@@ -63,10 +63,10 @@ impl Upload {
         };
         let why = match (part, &mut self.content) {
             (Some(Part::Points(chunk)), Content::Points(points, _)) => {
-                return add_points(points, &chunk.coordinates, self.order.scale);
+                return add_points(points, &chunk.coordinates, self.request.scale);
             }
             (Some(Part::Triangles(chunk)), Content::Points(_, triangles)) => {
-                return add_triangles(triangles, &chunk.corners, self.order.uses_triangles());
+                return add_triangles(triangles, &chunk.corners, self.request.uses_triangles());
             }
             (Some(Part::Mesh(bytes)), Content::Mesh(_, file)) => return add_bytes(file, &bytes),
             (_, Content::Group) => "not expected where the options name a group of stored bodies; send the header only",
@@ -78,20 +78,20 @@ impl Upload {
 
     /// Reads the mesh, if it is one. Takes a while for large ones.
     pub(super) fn into_job(self) -> Result<NewJob, Invalid> {
-        let Self { request_id, order, content } = self;
+        let Self { request_id, request, content } = self;
         let (field, points, triangles) = match content {
             Content::Points(points, triangles) => ("points", points, triangles),
             Content::Mesh(format, file) => {
-                let read = jobs::read_mesh(&file, format, &order.input, order.scale);
+                let read = jobs::read_mesh(&file, format, &request.input, request.scale);
                 let read = read.map_err(|error| Invalid::new("mesh", error))?;
                 // What unused vertices cost takes a hull, which a log is not worth.
                 let unused = read.remarks.unused.as_ref().map_or(0, |unused| unused.points.len());
                 if unused > 0 || read.remarks.crossing_faces > 0 {
                     let crossing = read.remarks.crossing_faces;
-                    tracing::warn!(name = order.name, input = order.input, unused, crossing, "mesh of a fit");
+                    tracing::warn!(name = request.name, input = request.input, unused, crossing, "mesh of a fit");
                 }
                 let mesh = read.mesh;
-                let triangles = if order.uses_triangles() { mesh.triangles } else { Vec::new() };
+                let triangles = if request.uses_triangles() { mesh.triangles } else { Vec::new() };
                 if triangles.len() > MAX_FIT_TRIANGLES {
                     return Err(Invalid::new("mesh", too_many()));
                 }
@@ -99,10 +99,10 @@ impl Upload {
                 let corner = |corner| u32::try_from(corner).unwrap_or(u32::MAX);
                 ("mesh", mesh.points, triangles.into_iter().map(|corners| corners.map(corner)).collect())
             }
-            Content::Group => return Ok(NewJob::new(request_id, order, &[], &[])),
+            Content::Group => return Ok(NewJob::new(request_id, request, &[], &[])),
         };
         // Copies to both sides give a volume to any number of points.
-        let least = if order.min_thickness_m.is_some() { 1 } else { 4 };
+        let least = if request.mode.preparation().min_thickness_m.is_some() { 1 } else { 4 };
         if !(least..=MAX_FIT_POINTS).contains(&points.len()) {
             let why = format!("has {} points; this fit takes {least} to {MAX_FIT_POINTS}", points.len());
             return Err(Invalid::new(field, why));
@@ -114,11 +114,11 @@ impl Upload {
                 format!("triangle {index} (counted from 0) has the corners {corners:?}, but there are {count} points");
             return Err(Invalid::new("triangles.corners", why + "; count points from 0, and send all of them"));
         }
-        if order.parts.is_some() && triangles.is_empty() {
-            let why = "parts are cut from a mesh, and no triangles are sent; send them, or leave out parts";
+        if matches!(request.mode, FitMode::Compound(_)) && triangles.is_empty() {
+            let why = "parts are cut from a mesh, and no triangles are sent; send them, or choose another mode";
             return Err(Invalid::new(if field == "mesh" { "mesh" } else { "triangles" }, why));
         }
-        Ok(NewJob::new(request_id, order, &points, &triangles))
+        Ok(NewJob::new(request_id, request, &points, &triangles))
     }
 }
 

@@ -3,7 +3,7 @@
 use super::super::error::Invalid;
 use super::super::proto::{self, FitJob, FitPhase, FitProgress, FitResult, FitState};
 use super::super::wire::count;
-use super::order::options;
+use super::request::options;
 use crate::jobs::{Phase, Progress};
 use crate::store::{FitOptimum, FitOutcome, FittedBody, FittedKind, Job, JobState};
 
@@ -20,7 +20,7 @@ pub(super) fn id(id: &str, field: &str) -> Result<u64, Invalid> {
 
 /// A job without the file that it made.
 pub(super) fn job(job: &Job, progress: Option<Progress>) -> FitJob {
-    let Job { id, request_id, order, points, attempts, state, .. } = job;
+    let Job { id, request_id, request, points, attempts, state, .. } = job;
     let (state, failure, result) = match state {
         JobState::Queued => (FitState::Queued, "", None),
         JobState::Running => (FitState::Running, "", None),
@@ -30,10 +30,10 @@ pub(super) fn job(job: &Job, progress: Option<Progress>) -> FitJob {
     };
     FitJob {
         id: id.to_string(),
-        name: order.name.clone(),
+        name: request.name.clone(),
         request_id: request_id.clone(),
-        input: order.input.clone(),
-        options: Some(options(order)),
+        input: request.input.clone(),
+        options: Some(options(request)),
         point_count: *points as u64,
         state: state.into(),
         attempts: *attempts,

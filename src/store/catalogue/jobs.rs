@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use crate::body::Body;
 use crate::store::JobMesh;
-use crate::store::job::{FitOrder, Job, JobState, MAX_ENDED_JOBS, MAX_QUEUED_JOBS, NewJob};
+use crate::store::job::{Job, JobState, MAX_ENDED_JOBS, MAX_QUEUED_JOBS, NewJob};
+use crate::store::request::FitRequest;
 use crate::store::rows::{BODIES, FILES, JOBS, POINTS, TRIANGLES};
 
 use super::{Catalogue, CatalogueError, State, json, page};
@@ -52,14 +53,14 @@ impl Catalogue {
     /// when too many jobs wait, or when the disk fails.
     pub fn create_job(&self, new: NewJob) -> Result<(Arc<Job>, bool), CatalogueError> {
         let mut store = self.writer()?;
-        let NewJob { request_id, digest, order, points, coordinates, corners } = new;
+        let NewJob { request_id, digest, request, points, coordinates, corners } = new;
         let (known, missing, queued, ended, id) = self.read(|state| {
             let jobs = || state.jobs.values();
             let known = jobs().find(|job| !request_id.is_empty() && job.request_id == request_id).cloned();
             let queued = jobs().filter(|job| job.state == JobState::Queued).count();
             let ended: Vec<u64> = jobs().filter(|job| job.state.is_final()).map(|job| job.id).collect();
             // The latest job is never forgotten, so no id is given twice.
-            (known, state.missing(&order), queued, ended, state.jobs.last_key_value().map_or(1, |(last, _)| last + 1))
+            (known, state.missing(&request), queued, ended, state.jobs.last_key_value().map_or(1, |(last, _)| last + 1))
         });
         match (known, missing) {
             (Some(known), _) if known.digest == digest => return Ok((known, false)),
@@ -68,7 +69,7 @@ impl Catalogue {
             (None, None) if queued >= MAX_QUEUED_JOBS => return Err(CatalogueError::QueueFull),
             (None, None) => {}
         }
-        let job = Arc::new(Job { id, request_id, digest, order, points, attempts: 0, state: JobState::Queued });
+        let job = Arc::new(Job { id, request_id, digest, request, points, attempts: 0, state: JobState::Queued });
         let forgotten = &ended[..ended.len().saturating_sub(MAX_ENDED_JOBS)];
         self.commit(&mut store, |transaction| {
             transaction.open_table(POINTS)?.insert(id, coordinates.as_slice())?;
@@ -87,7 +88,7 @@ impl Catalogue {
             forgotten.iter().for_each(|id| drop(state.jobs.remove(id)));
             state.jobs.insert(id, job.clone())
         });
-        tracing::debug!(id, name = job.order.name, points, "fit job queued");
+        tracing::debug!(id, name = job.request.name, points, "fit job queued");
         Ok((job, true))
     }
 
@@ -135,10 +136,10 @@ impl Catalogue {
 }
 
 impl State {
-    /// The first body of an order's group that is not there.
-    fn missing(&self, order: &FitOrder) -> Option<CatalogueError> {
-        let mut ids = order.group.iter().flat_map(|group| &group.body_ids).enumerate();
-        let is_there = |id: &str| id.parse().is_ok_and(|id| self.bodies.contains_key(&id));
-        ids.find(|(_, id)| !is_there(id)).map(|(index, id)| CatalogueError::NoMember { index, id: id.clone() })
+    /// The first body of the request's group that is not there.
+    fn missing(&self, request: &FitRequest) -> Option<CatalogueError> {
+        let mut ids = request.group()?.body_ids.iter().enumerate();
+        let (index, id) = ids.find(|(_, id)| !self.bodies.contains_key(id))?;
+        Some(CatalogueError::NoMember { index, id: *id })
     }
 }

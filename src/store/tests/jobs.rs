@@ -4,15 +4,17 @@
 use nalgebra::Vector3;
 
 use super::{Disk, ball};
-use crate::store::rows::{FILES, JOBS, POINTS, TRIANGLES};
+use crate::store::rows::{FILES, JOBS, META, POINTS, TRIANGLES};
 use crate::store::{
-    Catalogue, CatalogueError, FitGroup, FitOrder, FitOutcome, FittedKind, Job, JobState, MAX_ENDED_JOBS,
-    MAX_QUEUED_JOBS, NewJob, StoreError,
+    Catalogue, CatalogueError, FitGroup, FitOutcome, FitPolynomial, FitPreparation, FitRequest, FitWithinGap,
+    FittedKind, Job, JobState, MAX_ENDED_JOBS, MAX_QUEUED_JOBS, NewJob, StoreError,
 };
 
-fn order(name: &str) -> FitOrder {
-    let (degree, max_gap_m) = (Some(4), Some(0.1 + 0.2));
-    FitOrder { name: name.into(), degree, max_gap_m, trim: 1.0 / 3.0, scale: 1e-3, ..FitOrder::default() }
+fn request(name: &str) -> FitRequest {
+    let polynomial = FitPolynomial { degree: Some(4), ..FitPolynomial::default() };
+    let preparation = FitPreparation { trim: 1.0 / 3.0, min_thickness_m: None };
+    let mode = FitWithinGap { max_gap_m: 0.1 + 0.2, polynomial, preparation };
+    FitRequest { scale: 1e-3, ..FitRequest::new(name, mode) }
 }
 
 const CORNERS: [[u32; 3]; 1] = [[0, 1, 1]];
@@ -23,7 +25,7 @@ fn points() -> Vec<Vector3<f64>> {
 }
 
 fn job(request_id: &str) -> NewJob {
-    NewJob::new(request_id.into(), order("it"), &points(), &CORNERS)
+    NewJob::new(request_id.into(), request("it"), &points(), &CORNERS)
 }
 
 fn done() -> JobState {
@@ -66,47 +68,57 @@ fn every_acknowledged_state_is_on_disk() {
     assert_eq!(end(&catalogue, made.id, &JobState::Cancelled).expect("as it is"), ended);
 }
 
-/// An order and a job as they were written when there were fewer options.
+/// A job as it is written: what later versions have to read, or to refuse by their format.
 #[test]
-fn jobs_of_earlier_versions_are_read_and_keep_their_request_ids() {
-    let order_then = r#"{"name":"it","input":"","degree":4,"objective":"logdet-p","refine":false,"slabs":0,"ladder":false,"max_gap_m":0.30000000000000004,"trim":0.3333333333333333,"min_thickness_m":null,"scale":0.001}"#;
-    // What request ids are compared by.
-    assert_eq!(serde_json::to_string(&order("it")).expect("JSON"), order_then);
-    let new = NewJob::new("r".into(), order("it"), &points(), &[]);
+fn the_row_of_a_job_has_one_form_and_is_what_request_ids_are_compared_by() {
+    let polynomial = r#"{"degree":4,"objective":"logdet-p","cone":"sos","raw_frame":false,"refine":false}"#;
+    let preparation = r#"{"trim":0.3333333333333333,"min_thickness_m":null}"#;
+    let mode = format!(
+        r#"{{"within_gap":{{"max_gap_m":0.30000000000000004,"polynomial":{polynomial},"preparation":{preparation}}}}}"#
+    );
+    let written = format!(r#"{{"name":"it","input":"","scale":0.001,"mode":{mode}}}"#);
+    assert_eq!(serde_json::to_string(&request("it")).expect("JSON"), written);
+    let new = NewJob::new("r".into(), request("it"), &points(), &[]);
     let body = r#"{"id":"5f","gap_m":0.25,"mean_gap_m":0.125,"seconds":1.5,"optimum":null}"#;
     let state = format!(r#"{{"succeeded":{{"bodies":[{body}],"left_out":0,"left_out_m":0.0}}}}"#);
     let row = format!(
-        r#"{{"id":1,"request_id":"r","digest":"{}","order":{order_then},"points":2,"attempts":1,"state":{state}}}"#,
+        r#"{{"id":1,"request_id":"r","digest":"{}","request":{written},"points":2,"attempts":1,"state":{state}}}"#,
         new.digest
     );
     let disk = Disk::default();
     drop(disk.load().expect("a new catalogue"));
-    disk.meddle(|transaction| {
-        transaction.open_table(JOBS).expect("a table").insert(1, row.as_bytes()).expect("written");
-    });
+    write_job(&disk, &row);
     let catalogue = disk.load().expect("loads");
     let (known, created) = catalogue.create_job(new).expect("known");
-    assert!(!created && known.order == order("it"), "{known:?}");
+    assert!(!created && known.request == request("it"), "{known:?}");
     let JobState::Succeeded(outcome) = &known.state else { panic!("{known:?}") };
     assert_eq!((outcome.bodies[0].kind, outcome.bodies[0].gap_m), (FittedKind::Body, Some(0.25)));
     assert_eq!(serde_json::to_string(&*known).expect("JSON"), row, "nor is it written otherwise now");
 }
 
+/// Files of format 1 held flat orders: the file is refused by its format, such a row by its name.
 #[test]
-fn every_option_is_read_back() {
-    let group = FitGroup { body_ids: vec!["5f".into()], max_growth: Some(0.2), multiplier_degree: Some(0) };
-    for relax_convexity in [0.0, 0.1 + 0.2, f64::INFINITY] {
-        let order = FitOrder {
-            cone: "dsos".into(),
-            raw_frame: true,
-            relax_convexity,
-            parts: Some(3),
-            group: Some(group.clone()),
-            ..order("it")
-        };
-        let text = serde_json::to_string(&order).expect("JSON");
-        assert_eq!(serde_json::from_str::<FitOrder>(&text).expect("an order"), order);
-    }
+fn orders_of_earlier_versions_are_refused() {
+    let order = r#"{"name":"it","input":"","degree":4,"objective":"logdet-p","refine":false,"slabs":0,"ladder":false,"max_gap_m":null,"trim":0.0,"min_thickness_m":null,"scale":1.0}"#;
+    let row =
+        format!(r#"{{"id":1,"request_id":"","digest":"5f","order":{order},"points":2,"attempts":0,"state":"queued"}}"#);
+    let disk = Disk::default();
+    drop(disk.load().expect("a new catalogue"));
+    write_job(&disk, &row);
+    let error = disk.load().expect_err("no request").to_string();
+    assert!(error.contains("fit job 1") && error.contains("damaged"), "{error}");
+    disk.meddle(|transaction| {
+        transaction.open_table(META).expect("a table").insert("format", 1).expect("written");
+    });
+    let error = disk.load().expect_err("format 1").to_string();
+    assert!(error.contains("has format 1") && error.contains("reads format 2"), "{error}");
+    assert!(error.contains("another directory"), "{error}");
+}
+
+fn write_job(disk: &Disk, row: &str) {
+    disk.meddle(|transaction| {
+        transaction.open_table(JOBS).expect("a table").insert(1, row.as_bytes()).expect("written");
+    });
 }
 
 #[test]
@@ -130,13 +142,13 @@ fn a_file_stays_until_its_job_is_forgotten() {
 #[test]
 fn a_group_is_of_bodies_that_are_stored() {
     let catalogue = Disk::default().load().expect("a new catalogue");
-    let there = catalogue.create_body(ball(1.0)).expect("stored").0.id().to_string();
-    let grouping = |body_ids: Vec<String>| {
-        let group = FitGroup { body_ids, max_growth: None, multiplier_degree: None };
-        NewJob::new(String::new(), FitOrder { group: Some(group), ..FitOrder::default() }, &[], &[])
+    let there = *catalogue.create_body(ball(1.0)).expect("stored").0.id();
+    let grouping = |body_ids| {
+        let group = FitGroup { body_ids, ..FitGroup::default() };
+        NewJob::new(String::new(), FitRequest::new("them", group), &[], &[])
     };
-    let missing = ball(2.0).id().to_string();
-    match catalogue.create_job(grouping(vec![there.clone(), missing.clone()])) {
+    let missing = *ball(2.0).id();
+    match catalogue.create_job(grouping(vec![there, missing])) {
         Err(CatalogueError::NoMember { index, id }) => assert_eq!((index, id), (1, missing)),
         unexpected => panic!("{unexpected:?}"),
     }
@@ -157,7 +169,7 @@ fn a_full_disk_leaves_jobs_as_they_were() {
     assert!(catalogue.body(ball(3.0).id()).is_none(), "half of a change");
     disk.set_full(false);
     assert_eq!(catalogue.job_mesh(id).expect("kept").0, points());
-    assert_eq!(end(&catalogue, id, &done()).expect("room again").state, done());
+    assert_eq!(end(&catalogue, id, &done()).expect("space again").state, done());
     assert!(catalogue.body(ball(3.0).id()).is_some());
     assert_eq!(catalogue.jobs(None, 9).0.len(), 1);
 }
@@ -166,10 +178,10 @@ fn a_full_disk_leaves_jobs_as_they_were() {
 fn a_request_id_is_for_one_content() {
     let catalogue = Disk::default().load().expect("a new catalogue");
     let first = catalogue.create_job(job("r")).expect("queued").0;
-    let other_points = NewJob::new("r".into(), order("it"), &points()[1..], &CORNERS);
-    let other_triangles = NewJob::new("r".into(), order("it"), &points(), &[[0, 1, 0]]);
-    let other_order = NewJob::new("r".into(), order("that"), &points(), &CORNERS);
-    for other in [other_points, other_triangles, other_order] {
+    let other_points = NewJob::new("r".into(), request("it"), &points()[1..], &CORNERS);
+    let other_triangles = NewJob::new("r".into(), request("it"), &points(), &[[0, 1, 0]]);
+    let other_request = NewJob::new("r".into(), request("that"), &points(), &CORNERS);
+    for other in [other_points, other_triangles, other_request] {
         match catalogue.create_job(other) {
             Err(CatalogueError::RequestUsed { request_id, job }) => assert_eq!((&*request_id, job), ("r", first.id)),
             unexpected => panic!("{unexpected:?}"),
@@ -185,7 +197,7 @@ fn the_queue_is_bounded_and_the_oldest_that_ended_are_forgotten() {
         catalogue.create_job(job("")).expect("queued");
     }
     assert!(matches!(catalogue.create_job(job("")), Err(CatalogueError::QueueFull)));
-    let known = catalogue.create_job(NewJob::new("r".into(), order("it"), &points(), &CORNERS));
+    let known = catalogue.create_job(NewJob::new("r".into(), request("it"), &points(), &CORNERS));
     assert!(matches!(known, Err(CatalogueError::QueueFull)));
     // The first goes on waiting while others come and go.
     let mut last = MAX_QUEUED_JOBS as u64;
@@ -204,7 +216,7 @@ fn the_queue_is_bounded_and_the_oldest_that_ended_are_forgotten() {
 }
 
 #[test]
-fn files_of_programs_that_knew_no_jobs_are_read() {
+fn files_that_never_had_a_job_are_read() {
     let disk = Disk::default();
     drop(super::furnished(&disk));
     disk.meddle(|transaction| {

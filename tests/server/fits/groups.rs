@@ -6,10 +6,11 @@ use nalgebra::Vector3;
 use sublevel::body::{BasicSet, Body, Obstacle};
 use sublevel::fit::{EncloseOptions, enclose_obstacles};
 use sublevel::service::proto::create_fit_request::Part;
+use sublevel::service::proto::fit_options::Mode;
 use sublevel::service::proto::{DeleteBodyRequest, FitGroup, FitHeader, FitOptions, FitState};
 use tonic::Code;
 
-use super::{chunk, cloud, header, long, message};
+use super::{asked, chunk, cloud, header, long, message};
 use crate::harness::{Clients, Running, field, reason};
 
 /// Balls of radius 1/2 about points of the x axis.
@@ -20,7 +21,7 @@ fn balls() -> [Body; 3] {
 
 fn grouping(name: &str, body_ids: &[String], group: FitGroup) -> FitHeader {
     let group = FitGroup { body_ids: body_ids.to_vec(), ..group };
-    header(name, FitOptions { group: Some(group), ..FitOptions::default() })
+    header(name, asked(Mode::Group(group)))
 }
 
 async fn stored(clients: &mut Clients) -> Vec<String> {
@@ -53,10 +54,8 @@ async fn stored_bodies_are_put_into_one_or_few() {
         set.containment.prove(&BasicSet::from(&found), &BasicSet::from(ball)).expect("proven to be inside");
     }
 
-    let few = FitGroup { max_growth: Some(0.9), multiplier_degree: Some(4), ..FitGroup::default() };
-    let mut header = grouping("some", &ids, few);
-    header.options.as_mut().unwrap().degree = 6;
-    let id = clients.queue(header, &[]).await.id;
+    let few = FitGroup { max_growth: Some(0.9), multiplier_degree: Some(4), degree: Some(6), ..FitGroup::default() };
+    let id = clients.queue(grouping("some", &ids, few), &[]).await.id;
     let made = clients.ended(&id).await.result.expect("two bodies").bodies;
     assert_eq!(made.iter().map(|made| &made.members[..]).collect::<Vec<_>>(), [&[0, 1][..], &[2]]);
     assert_eq!((&made[1].body_id, made[1].gap_m), (&ids[2], None));
@@ -94,7 +93,7 @@ async fn a_group_is_of_bodies_that_are_there() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn bad_groups_are_told_by_field() {
+async fn bad_groups_are_refused_by_field() {
     let dir = tempfile::tempdir().expect("a directory");
     let server = Running::start(dir.path());
     let mut clients = server.connect().await;
@@ -107,6 +106,7 @@ async fn bad_groups_are_told_by_field() {
         change(header.options.as_mut().unwrap());
         header
     };
+    let of_degree = |degree| FitGroup { degree: Some(degree), ..FitGroup::default() };
     let odd = FitGroup { multiplier_degree: Some(3), ..FitGroup::default() };
     for (header, at) in [
         (grouping("it", &[], FitGroup::default()), "group.body_ids"),
@@ -116,10 +116,10 @@ async fn bad_groups_are_told_by_field() {
         (grouping("it", &ids, few(0.0)), "group.max_growth"),
         (grouping("it", &ids, few(f64::NAN)), "group.max_growth"),
         (grouping("it", &ids, odd), "group.multiplier_degree"),
-        (with(|options| options.degree = 5), "degree"),
-        (with(|options| options.ladder = true), "group"),
-        (with(|options| options.relax_convexity = 1.0), "group"),
-        (with(|options| options.parts = 2), "group"),
+        (grouping("it", &ids, of_degree(5)), "group.degree"),
+        (grouping("it", &ids, of_degree(0)), "group.degree"),
+        (with(|options| options.trim = 0.1), "group"),
+        (with(|options| options.min_thickness_m = Some(0.1)), "group"),
         (with(|options| options.scale = Some(1e-3)), "group"),
     ] {
         let status = clients.upload(vec![message(Part::Header(header))]).await.expect_err(at);

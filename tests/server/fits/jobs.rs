@@ -87,7 +87,7 @@ async fn the_queue_has_an_end_and_lists_have_pages() {
     assert_eq!(pages(&mut clients, 0).await, ids);
 
     clients.cancel(&ids[30]).await;
-    let last = clients.upload(one_more).await.expect("room again").job.expect("a job").id;
+    let last = clients.upload(one_more).await.expect("space again").job.expect("a job").id;
     clients.cancel(&ids[0]).await;
     // The last comes last.
     clients.ended(&last).await;

@@ -14,9 +14,10 @@ use nalgebra::Vector3;
 use sublevel::body::Body;
 use sublevel::fit::Mesh;
 use sublevel::service::proto::create_fit_request::Part;
+use sublevel::service::proto::fit_options::Mode;
 use sublevel::service::proto::{
-    CancelFitRequest, CreateFitRequest, CreateFitResponse, FitHeader, FitJob, FitOptions, FitState, GetBodyRequest,
-    GetFitRequest, PointChunk, TriangleChunk, WatchFitRequest, WatchFitResponse,
+    CancelFitRequest, CreateFitRequest, CreateFitResponse, FitBody, FitHeader, FitJob, FitOptions, FitState,
+    GetBodyRequest, GetFitRequest, PointChunk, TriangleChunk, WatchFitRequest, WatchFitResponse,
 };
 use tonic::{Status, Streaming};
 
@@ -65,14 +66,23 @@ fn header(name: &str, options: FitOptions) -> FitHeader {
     FitHeader { name: name.into(), options: Some(options), ..FitHeader::default() }
 }
 
+fn asked(mode: Mode) -> FitOptions {
+    FitOptions { mode: Some(mode), ..FitOptions::default() }
+}
+
+/// One body of this degree.
+fn body(degree: u32) -> FitBody {
+    FitBody { degree: Some(degree), ..FitBody::default() }
+}
+
 /// Fits in well below a second.
 fn quick() -> FitOptions {
-    FitOptions { degree: 2, ..FitOptions::default() }
+    asked(Mode::Body(body(2)))
 }
 
 /// Fits for much longer than any test waits for it to begin.
 fn long() -> FitOptions {
-    FitOptions { degree: 8, refine: true, slabs: 15, ..FitOptions::default() }
+    asked(Mode::Body(FitBody { refine: true, slabs: 15, ..body(8) }))
 }
 
 fn message(part: Part) -> CreateFitRequest {

@@ -4,11 +4,14 @@ use std::ops::ControlFlow;
 
 use sublevel::fit::{self, Mesh, Objective, Progress, Representation, SosMethod};
 use sublevel::service::proto::create_fit_request::Part;
+use sublevel::service::proto::fit_options::Mode;
+use sublevel::service::proto::fit_sos_body::Method;
 use sublevel::service::proto::{
-    FitCone, FitJob, FitObjective, FitOptions, FitState, FittedKind, ListBodiesRequest, ListFitsRequest, MeshFormat,
+    FitBody, FitCompound, FitCone, FitInverseMoment, FitJob, FitObjective, FitOptions, FitRelaxed, FitSosBody,
+    FitState, FitWithinGap, FittedKind, ListBodiesRequest, ListFitsRequest, MeshFormat,
 };
 
-use super::{arc, chunk, header, long, message, off, triangles};
+use super::{arc, asked, body, chunk, header, long, message, off, triangles};
 use crate::harness::{Clients, Running};
 
 fn unwatched(_: Progress) -> ControlFlow<()> {
@@ -23,8 +26,19 @@ fn made(job: FitJob) -> (FittedKind, String, String) {
     (made.kind(), made.body_id.clone(), file)
 }
 
-fn degree(degree: u32) -> FitOptions {
-    FitOptions { degree, ..FitOptions::default() }
+/// A compound of at most this many parts of degree 2.
+fn cut(parts: u32) -> FitOptions {
+    asked(Mode::Compound(FitCompound { parts, degree: Some(2), ..FitCompound::default() }))
+}
+
+/// What is near enough, of at most this degree.
+fn within(max_gap_m: f64, degree: u32) -> FitOptions {
+    asked(Mode::WithinGap(FitWithinGap { max_gap_m, degree: Some(degree), ..FitWithinGap::default() }))
+}
+
+/// A set of degree 4 that need not be convex.
+fn set(method: Method) -> FitOptions {
+    asked(Mode::SosBody(FitSosBody { degree: Some(4), raw_frame: false, method: Some(method) }))
 }
 
 fn compound(mesh: &Mesh, parts: usize) -> sublevel::body::Compound {
@@ -40,6 +54,14 @@ fn sos(mesh: &Mesh, method: SosMethod) -> (FittedKind, String, String) {
     (FittedKind::SosBody, body.id().to_string(), body.to_json())
 }
 
+/// The method of a set that need not be convex, if one is asked for.
+fn method(options: &FitOptions) -> Option<Method> {
+    match options.mode {
+        Some(Mode::SosBody(set)) => set.method,
+        _ => None,
+    }
+}
+
 async fn ended(clients: &mut Clients, options: FitOptions, mesh: &Mesh) -> FitJob {
     let id = clients.queue_mesh(header("arc", options), mesh).await.id;
     clients.ended(&id).await
@@ -51,25 +73,26 @@ async fn cones_and_the_raw_frame_make_bodies() {
     let server = Running::start(dir.path());
     let mut clients = server.connect().await;
     let mesh = arc();
-    let body = |options: fit::FitOptions| {
+    let fitted = |options: fit::FitOptions| {
         let body = fit::fit("arc", &mesh.points, &options, &mut unwatched).expect("a fit").body;
         (FittedKind::Body, body.id().to_string(), String::new())
     };
     let plain = || fit::FitOptions { degree: 4, ..fit::FitOptions::default() };
-    let cone = |cone: FitCone| FitOptions { cone: cone.into(), ..degree(4) };
-    let raw = FitOptions { objective: FitObjective::TraceP.into(), raw_frame: true, ..degree(4) };
+    let cone = |cone: FitCone| FitBody { cone: cone.into(), ..body(4) };
+    let raw = FitBody { objective: FitObjective::TraceP.into(), raw_frame: true, ..body(4) };
     let (objective, coordinates) = (Objective::TraceP, fit::Coordinates::Raw);
-    for (options, expected) in [
-        (cone(FitCone::Sos), body(plain())),
-        (cone(FitCone::Sdsos), body(fit::FitOptions { cone: fit::Cone::Sdsos, ..plain() })),
-        (cone(FitCone::Dsos), body(fit::FitOptions { cone: fit::Cone::Dsos, ..plain() })),
-        (raw, body(fit::FitOptions { objective, coordinates, ..plain() })),
+    for (asked_body, expected) in [
+        (cone(FitCone::Sos), fitted(plain())),
+        (cone(FitCone::Sdsos), fitted(fit::FitOptions { cone: fit::Cone::Sdsos, ..plain() })),
+        (cone(FitCone::Dsos), fitted(fit::FitOptions { cone: fit::Cone::Dsos, ..plain() })),
+        (raw, fitted(fit::FitOptions { objective, coordinates, ..plain() })),
     ] {
-        let job = ended(&mut clients, options.clone(), &mesh).await;
+        let job = ended(&mut clients, asked(Mode::Body(asked_body)), &mesh).await;
         // What was left open is reported.
-        let (objective, cone) = (options.objective().max(FitObjective::LogdetP), options.cone().max(FitCone::Sos));
-        let message = FitOptions { objective: objective.into(), cone: cone.into(), scale: Some(1.0), ..options };
-        assert_eq!(job.options.as_ref(), Some(&message));
+        let objective = asked_body.objective().max(FitObjective::LogdetP).into();
+        let cone = asked_body.cone().max(FitCone::Sos).into();
+        let reported = asked(Mode::Body(FitBody { objective, cone, ..asked_body }));
+        assert_eq!(job.options, Some(FitOptions { scale: Some(1.0), ..reported }));
         let found = made(job);
         clients.body(&found.1).await;
         assert_eq!(found, expected);
@@ -88,26 +111,25 @@ async fn compounds_and_sets_are_kept_with_their_jobs() {
     // A gap for which three parts of degree 2 are the cheapest.
     let gap = three.gap_m().expect("a gap") * 1.0001;
     let library = fit::FitOptions { degree: 2, ..fit::FitOptions::default() };
-    let within = match fit::cheapest_within("arc", &mesh, gap, &library, &mut unwatched).expect("a compound") {
+    let near = match fit::cheapest_within("arc", &mesh, gap, &library, &mut unwatched).expect("a compound") {
         Representation::Compound(fit) => fit.compound,
         Representation::Body(rung) => panic!("{:?}", rung.gap),
     };
+    let asked_c = |c: f64| set(Method::Relaxed(FitRelaxed { c, objective: FitObjective::LogdetP.into() }));
     let relaxed = |c: f64| sos(&mesh, SosMethod::Relaxed { c, objective: Objective::default() });
     let cases = [
-        (FitOptions { parts: 3, ..degree(2) }, file_of(&three)),
-        (FitOptions { max_gap_m: Some(gap), ..degree(2) }, file_of(&within)),
-        (FitOptions { relax_convexity: 10.0, ..degree(4) }, relaxed(10.0)),
-        (FitOptions { relax_convexity: f64::INFINITY, ..degree(4) }, relaxed(f64::INFINITY)),
-        (
-            FitOptions { objective: FitObjective::InverseMoment.into(), ..degree(4) },
-            sos(&mesh, SosMethod::InverseMoment),
-        ),
+        (cut(3), file_of(&three)),
+        (within(gap, 2), file_of(&near)),
+        (asked_c(10.0), relaxed(10.0)),
+        (asked_c(f64::INFINITY), relaxed(f64::INFINITY)),
+        (set(Method::InverseMoment(FitInverseMoment {})), sos(&mesh, SosMethod::InverseMoment)),
     ];
     let mut jobs = Vec::new();
     for (options, expected) in &cases {
         let job = ended(&mut clients, options.clone(), &mesh).await;
         assert_eq!(made(job.clone()), *expected, "{options:?}");
-        assert_eq!(job.options.as_ref().map(|options| options.relax_convexity), Some(options.relax_convexity));
+        let reported = job.options.clone().expect("options");
+        assert_eq!(method(&reported), method(options), "{reported:?}");
         jobs.push(job);
     }
     let bodies = clients.bodies.list_bodies(ListBodiesRequest::default()).await.expect("a list").into_inner().bodies;
@@ -139,8 +161,7 @@ async fn triangles_come_as_chunks_or_in_a_mesh_file() {
     let mut clients = server.connect().await;
     let mesh = arc();
     let two = compound(&mesh, 2);
-    let parts = || FitOptions { parts: 2, ..degree(2) };
-    let mut from_file = header("arc", parts());
+    let mut from_file = header("arc", cut(2));
     from_file.mesh_format = MeshFormat::Off.into();
     let mut messages = vec![message(Part::Header(from_file))];
     messages.extend(off(&mesh).into_bytes().chunks(1000).map(|bytes| message(Part::Mesh(bytes.to_vec().into()))));
@@ -148,7 +169,7 @@ async fn triangles_come_as_chunks_or_in_a_mesh_file() {
     let (_, id, file) = made(clients.ended(&id).await);
     assert_eq!((id, file), (two.id().to_string(), two.to_json()));
 
-    let gap = FitOptions { max_gap_m: Some(two.gap_m().expect("a gap") * 1.0001), ..degree(8) };
+    let gap = within(two.gap_m().expect("a gap") * 1.0001, 8);
     let id = clients.queue(header("arc", gap.clone()), &mesh.points).await.id;
     assert_eq!(made(clients.ended(&id).await).0, FittedKind::Body);
     // What is trimmed or thickened has lost them.
@@ -167,7 +188,7 @@ async fn what_was_asked_for_survives_a_kill() {
     let first = clients.queue(header("first", long()), &super::cloud(400, 43)).await.id;
     clients.under_way(&first).await;
     let request = |parts: u32, count: usize| {
-        let mut header = header("arc", FitOptions { parts, ..degree(2) });
+        let mut header = header("arc", cut(parts));
         header.request_id = "1679091c".into();
         vec![message(Part::Header(header)), chunk(&mesh.points), triangles(&mesh.triangles[..count])]
     };

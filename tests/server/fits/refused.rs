@@ -1,13 +1,15 @@
 //! Uploads that the server refuses: each names its field, and nothing is queued.
 
 use sublevel::service::proto::create_fit_request::Part;
+use sublevel::service::proto::fit_options::Mode;
+use sublevel::service::proto::fit_sos_body::Method;
 use sublevel::service::proto::{
-    CreateFitRequest, FitCone, FitHeader, FitObjective, FitOptions, ListFitsRequest, MeshFormat, PointChunk,
-    TriangleChunk,
+    CreateFitRequest, FitBody, FitCompound, FitCone, FitHeader, FitLadder, FitObjective, FitOptions, FitRelaxed,
+    FitSosBody, FitWithinGap, ListFitsRequest, MeshFormat, PointChunk, TriangleChunk,
 };
 use tonic::Code;
 
-use super::{chunk, cloud, header, message, quick};
+use super::{asked, body, chunk, cloud, header, message, quick};
 use crate::harness::{Running, field, reason};
 
 fn first(header: FitHeader) -> CreateFitRequest {
@@ -27,22 +29,27 @@ fn bytes(text: &str) -> CreateFitRequest {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn bad_uploads_are_told_by_field() {
+async fn bad_uploads_are_refused_by_field() {
     let dir = tempfile::tempdir().expect("a directory");
     let server = Running::start(dir.path());
     let mut clients = server.connect().await;
     let points = || chunk(&cloud(20, 31));
     let good = || first(header("it", quick()));
     let named = |name: &str| first(header(name, quick()));
-    let asked = |options| first(header("it", options));
+    let options = |options| first(header("it", options));
+    let mode = |mode| first(header("it", asked(mode)));
+    let one = |body| mode(Mode::Body(body));
+    let gap = |max_gap_m| mode(Mode::WithinGap(FitWithinGap { max_gap_m, ..FitWithinGap::default() }));
+    let cut = |parts| Mode::Compound(FitCompound { parts, ..FitCompound::default() });
+    let parts = || asked(cut(2));
+    let set = |method| mode(Mode::SosBody(FitSosBody { method, ..FitSosBody::default() }));
+    let relaxed = |c| set(Some(Method::Relaxed(FitRelaxed { c, objective: 0 })));
     let mesh = || first(FitHeader { mesh_format: MeshFormat::Off.into(), ..header("it", quick()) });
     let with = |change: fn(&mut FitHeader)| {
         let mut header = header("it", quick());
         change(&mut header);
         first(header)
     };
-    let inverse_moment = || FitOptions { objective: FitObjective::InverseMoment.into(), ..quick() };
-    let parts = || FitOptions { parts: 2, ..quick() };
     let scaled = FitOptions { scale: Some(1e300), ..quick() };
     let cases = [
         (vec![], "header"),
@@ -56,63 +63,52 @@ async fn bad_uploads_are_told_by_field() {
         (vec![with(|header| header.request_id = "\0".into()), points()], "header.request_id"),
         (vec![with(|header| header.input = "\t".into()), points()], "header.input"),
         (vec![with(|header| header.mesh_format = 99), points()], "header.mesh_format"),
-        (vec![asked(FitOptions { degree: 5, ..quick() }), points()], "header.options.degree"),
-        (vec![asked(FitOptions { degree: u32::MAX, ..quick() }), points()], "header.options.degree"),
-        (vec![asked(FitOptions { objective: 99, ..quick() }), points()], "header.options.objective"),
+        (vec![one(body(5)), points()], "header.options.body.degree"),
+        (vec![one(body(0)), points()], "header.options.body.degree"),
+        (vec![one(body(u32::MAX)), points()], "header.options.body.degree"),
+        (vec![one(FitBody { objective: 99, ..body(2) }), points()], "header.options.body.objective"),
         (
-            vec![asked(FitOptions { degree: 8, objective: FitObjective::TraceH.into(), ..quick() }), points()],
-            "header.options.objective",
+            vec![one(FitBody { objective: FitObjective::TraceH.into(), ..body(8) }), points()],
+            "header.options.body.objective",
         ),
-        (vec![asked(FitOptions { slabs: 16, ..quick() }), points()], "header.options.slabs"),
-        (vec![asked(FitOptions { trim: 0.6, ..quick() }), points()], "header.options.trim"),
-        (vec![asked(FitOptions { trim: f64::NAN, ..quick() }), points()], "header.options.trim"),
-        (vec![asked(FitOptions { max_gap_m: Some(0.0), ..quick() }), points()], "header.options.max_gap_m"),
+        (vec![one(FitBody { slabs: 16, ..body(2) }), points()], "header.options.body.slabs"),
         (
-            vec![asked(FitOptions { max_gap_m: Some(0.1), ladder: true, ..quick() }), points()],
-            "header.options.max_gap_m",
+            vec![mode(Mode::Ladder(FitLadder { slabs: 16, ..FitLadder::default() })), points()],
+            "header.options.ladder.slabs",
         ),
+        (vec![options(FitOptions { trim: 0.6, ..quick() }), points()], "header.options.trim"),
+        (vec![options(FitOptions { trim: f64::NAN, ..quick() }), points()], "header.options.trim"),
+        (vec![gap(0.0), points()], "header.options.within_gap.max_gap_m"),
+        (vec![gap(f64::INFINITY), points()], "header.options.within_gap.max_gap_m"),
         (
-            vec![asked(FitOptions { min_thickness_m: Some(f64::INFINITY), ..quick() }), points()],
+            vec![options(FitOptions { min_thickness_m: Some(f64::INFINITY), ..quick() }), points()],
             "header.options.min_thickness_m",
         ),
-        (vec![asked(FitOptions { scale: Some(-1.0), ..quick() }), points()], "header.options.scale"),
-        (vec![asked(FitOptions { cone: 99, ..quick() }), points()], "header.options.cone"),
+        (vec![options(FitOptions { scale: Some(-1.0), ..quick() }), points()], "header.options.scale"),
+        (vec![one(FitBody { cone: 99, ..body(2) }), points()], "header.options.body.cone"),
         (
-            vec![asked(FitOptions { cone: FitCone::Dsos.into(), refine: true, ..quick() }), points()],
-            "header.options.cone",
+            vec![one(FitBody { cone: FitCone::Dsos.into(), refine: true, ..body(2) }), points()],
+            "header.options.body.cone",
         ),
-        (vec![asked(FitOptions { parts: 65, ..quick() }), points()], "header.options.parts"),
-        (vec![asked(FitOptions { trim: 0.01, ..parts() }), points()], "header.options.parts"),
-        (vec![asked(FitOptions { ladder: true, ..parts() }), points()], "header.options.parts"),
-        (vec![asked(FitOptions { min_thickness_m: Some(0.1), ..parts() }), points()], "header.options.parts"),
-        (vec![asked(FitOptions { max_gap_m: Some(0.1), ..parts() }), points()], "header.options.max_gap_m"),
-        (vec![asked(FitOptions { relax_convexity: -1.0, ..quick() }), points()], "header.options.relax_convexity"),
-        (vec![asked(FitOptions { relax_convexity: f64::NAN, ..quick() }), points()], "header.options.relax_convexity"),
+        (vec![mode(cut(65)), points()], "header.options.compound.parts"),
+        (vec![mode(cut(0)), points()], "header.options.compound.parts"),
+        (vec![options(FitOptions { trim: 0.01, ..parts() }), points()], "header.options.compound.parts"),
         (
-            vec![asked(FitOptions { relax_convexity: 1.0, ladder: true, ..quick() }), points()],
-            "header.options.relax_convexity",
+            vec![options(FitOptions { min_thickness_m: Some(0.1), ..parts() }), points()],
+            "header.options.compound.parts",
         ),
-        (vec![asked(FitOptions { relax_convexity: 1.0, ..parts() }), points()], "header.options.relax_convexity"),
+        (vec![relaxed(-1.0), points()], "header.options.sos_body.relaxed.c"),
+        (vec![relaxed(0.0), points()], "header.options.sos_body.relaxed.c"),
+        (vec![relaxed(f64::NAN), points()], "header.options.sos_body.relaxed.c"),
+        (vec![set(None), points()], "header.options.sos_body"),
         (
-            vec![asked(FitOptions { relax_convexity: 1.0, ..inverse_moment() }), points()],
-            "header.options.relax_convexity",
+            vec![set(Some(Method::Relaxed(FitRelaxed { c: 1.0, objective: FitObjective::LogdetH.into() }))), points()],
+            "header.options.sos_body.relaxed.objective",
         ),
-        (
-            vec![
-                asked(FitOptions { relax_convexity: 1.0, objective: FitObjective::LogdetH.into(), ..quick() }),
-                points(),
-            ],
-            "header.options.objective",
-        ),
-        (vec![asked(FitOptions { slabs: 1, ..inverse_moment() }), points()], "header.options.objective"),
-        (
-            vec![asked(FitOptions { cone: FitCone::Sdsos.into(), ..inverse_moment() }), points()],
-            "header.options.objective",
-        ),
-        (vec![asked(parts()), points()], "triangles"),
-        (vec![asked(parts()), points(), corners(vec![0, 1])], "triangles.corners"),
-        (vec![asked(parts()), corners(vec![0, 1, 2, 2, 1, 20]), points()], "triangles.corners"),
-        (vec![asked(parts()), corners(vec![0, 1, u32::MAX]), points()], "triangles.corners"),
+        (vec![options(parts()), points()], "triangles"),
+        (vec![options(parts()), points(), corners(vec![0, 1])], "triangles.corners"),
+        (vec![options(parts()), corners(vec![0, 1, 2, 2, 1, 20]), points()], "triangles.corners"),
+        (vec![options(parts()), corners(vec![0, 1, u32::MAX]), points()], "triangles.corners"),
         (vec![mesh(), corners(vec![0, 1, 2])], "triangles"),
         (
             vec![
@@ -126,7 +122,7 @@ async fn bad_uploads_are_told_by_field() {
         (vec![good(), numbers(vec![1.0, 2.0])], "points.coordinates"),
         (vec![good(), points(), numbers(vec![0.0, f64::NAN, 0.0])], "points.coordinates"),
         (vec![good(), numbers(vec![0.0, 0.0, f64::NEG_INFINITY])], "points.coordinates"),
-        (vec![asked(scaled), numbers(vec![1e10; 12])], "points.coordinates"),
+        (vec![options(scaled), numbers(vec![1e10; 12])], "points.coordinates"),
         (vec![good(), bytes("OFF")], "mesh"),
         (vec![mesh(), points()], "points"),
         (vec![mesh()], "mesh"),
@@ -158,7 +154,8 @@ async fn too_much_is_refused_while_it_comes() {
     assert_eq!((status.code(), field(&status).as_str()), (Code::InvalidArgument, "points.coordinates"), "{status:?}");
     assert!(status.message().contains("2097152"), "{}", status.message());
 
-    let mut messages = vec![first(header("meshed", FitOptions { parts: 2, ..quick() }))];
+    let mut messages =
+        vec![first(header("meshed", asked(Mode::Compound(FitCompound { parts: 2, ..FitCompound::default() }))))];
     messages.extend(std::iter::repeat_n(corners(vec![1; 3 * 400_000]), 11));
     let status = clients.upload(messages).await.expect_err("too many");
     assert_eq!((status.code(), field(&status).as_str()), (Code::InvalidArgument, "triangles.corners"), "{status:?}");

@@ -2,10 +2,11 @@
 
 use std::time::Duration;
 
-use sublevel::service::proto::{FitOptions, FitState};
+use sublevel::service::proto::fit_options::Mode;
+use sublevel::service::proto::{FitBody, FitState};
 use tonic::Code;
 
-use super::{cloud, header, long, next, quick};
+use super::{asked, body, cloud, header, long, next, quick};
 use crate::harness::{Running, reason};
 
 #[tokio::test(flavor = "multi_thread")]
@@ -14,7 +15,7 @@ async fn a_job_survives_a_kill_and_is_not_repeated_once_done() {
     let server = Running::start(dir.path());
     let mut clients = server.connect().await;
     let points = cloud(300, 19);
-    let options = FitOptions { degree: 6, refine: true, ..FitOptions::default() };
+    let options = asked(Mode::Body(FitBody { refine: true, ..body(6) }));
     let id = clients.queue(header("survivor", options), &points).await.id;
     let after = clients.queue(header("after", quick()), &points).await.id;
     assert_eq!(clients.under_way(&id).await.attempts, 1);

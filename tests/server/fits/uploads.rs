@@ -5,9 +5,12 @@ use std::time::Instant;
 use nalgebra::Vector3;
 use sublevel::fit;
 use sublevel::service::proto::create_fit_request::Part;
-use sublevel::service::proto::{FitObjective, FitOptions, FitPhase, FitState, MeshFormat};
+use sublevel::service::proto::fit_options::Mode;
+use sublevel::service::proto::{
+    FitBody, FitLadder, FitObjective, FitOptions, FitPhase, FitState, FitWithinGap, MeshFormat,
+};
 
-use super::{cloud, header, message, next, quick};
+use super::{asked, body, cloud, header, message, next, quick};
 use crate::harness::{Numbers, Running};
 
 #[tokio::test(flavor = "multi_thread")]
@@ -21,8 +24,7 @@ async fn a_million_points_become_a_body_and_progress_only_grows() {
     let points: Vec<_> = (0..1_000_000)
         .map(|_| Vector3::from_fn(|_, _| (1.5 * numbers.next()).clamp(-1.0, 1.0)).component_mul(&sides))
         .collect();
-    let options = FitOptions { degree: 4, trim: 0.0, ..FitOptions::default() };
-    let job = clients.queue(header("box", options), &points).await;
+    let job = clients.queue(header("box", asked(Mode::Body(body(4)))), &points).await;
     assert_eq!((job.point_count, job.name.as_str()), (1_000_000, "box"));
 
     let mut watch = clients.watch(&job.id).await;
@@ -63,9 +65,9 @@ async fn options_mean_what_they_mean_to_the_library() {
     let refined = fit::FitOptions { refine: true, slabs: 2, ..library(4) };
     let cases = [
         (FitOptions::default(), fitted(&library(6))),
-        (FitOptions { degree: 4, objective: FitObjective::TraceP.into(), ..FitOptions::default() }, fitted(&trace)),
-        (FitOptions { degree: 4, refine: true, slabs: 2, ..FitOptions::default() }, fitted(&refined)),
-        (FitOptions { max_gap_m: Some(10.0), ..FitOptions::default() }, {
+        (asked(Mode::Body(FitBody { objective: FitObjective::TraceP.into(), ..body(4) })), fitted(&trace)),
+        (asked(Mode::Body(FitBody { refine: true, slabs: 2, ..body(4) })), fitted(&refined)),
+        (asked(Mode::WithinGap(FitWithinGap { max_gap_m: 10.0, ..FitWithinGap::default() })), {
             let tell = &mut |_| std::ops::ControlFlow::Continue(());
             fit::coarsest_within("it", &points, 10.0, &library(8), tell).expect("the ball").body
         }),
@@ -80,7 +82,8 @@ async fn options_mean_what_they_mean_to_the_library() {
         let stored = clients.body(&result.bodies[0].body_id).await;
         assert_eq!(stored.provenance(), expected.provenance());
     }
-    let options = FitOptions { degree: 4, ladder: true, trim: 0.01, scale: Some(1e-3), ..FitOptions::default() };
+    let ladder = FitLadder { degree: Some(4), ..FitLadder::default() };
+    let options = FitOptions { trim: 0.01, scale: Some(1e-3), ..asked(Mode::Ladder(ladder)) };
     let id = clients.queue(header("it", options), &points).await.id;
     let result = clients.ended(&id).await.result.expect("a ladder");
     assert_eq!((result.bodies.len(), result.left_out_count), (3, 3));
@@ -113,14 +116,14 @@ async fn a_mesh_comes_as_the_bytes_of_its_file() {
 
 /// Points that cannot be fitted are a failed job with the reason, and the next job goes on.
 #[tokio::test(flavor = "multi_thread")]
-async fn what_can_not_be_fitted_fails_by_name() {
+async fn what_cannot_be_fitted_fails_by_name() {
     let dir = tempfile::tempdir().expect("a directory");
     let server = Running::start(dir.path());
     let mut clients = server.connect().await;
     let flat: Vec<_> = cloud(50, 5).into_iter().map(|point| Vector3::new(point.x, point.y, 0.0)).collect();
     let failed = clients.queue(header("sheet", quick()), &flat).await.id;
-    let close = FitOptions { max_gap_m: Some(1e-9), degree: 2, ..FitOptions::default() };
-    let far = clients.queue(header("ball", close), &cloud(50, 6)).await.id;
+    let close = FitWithinGap { max_gap_m: 1e-9, degree: Some(2), ..FitWithinGap::default() };
+    let far = clients.queue(header("ball", asked(Mode::WithinGap(close))), &cloud(50, 6)).await.id;
     let thick = FitOptions { min_thickness_m: Some(1e-3), ..quick() };
     let done = clients.queue(header("sheet", thick), &flat).await.id;
     let job = clients.ended(&failed).await;
@@ -138,7 +141,7 @@ async fn a_slow_watcher_gets_the_latest() {
     let dir = tempfile::tempdir().expect("a directory");
     let server = Running::start(dir.path());
     let mut clients = server.connect().await;
-    let many_steps = FitOptions { degree: 4, refine: true, slabs: 15, ..FitOptions::default() };
+    let many_steps = asked(Mode::Body(FitBody { refine: true, slabs: 15, ..body(4) }));
     let begun = Instant::now();
     let id = clients.queue(header("steps", many_steps), &cloud(400, 9)).await.id;
     let mut slow = clients.watch(&id).await;
