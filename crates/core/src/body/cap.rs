@@ -8,7 +8,7 @@
 //! makes a cap that covers more than the section, but a cap all the same. Operations are those that
 //! IEEE 754 rounds correctly, so a cut has the same caps on every machine.
 
-use super::mesh_piece::Spot;
+use super::spot::Spot;
 use nalgebra::{Vector2, Vector3};
 use std::collections::{BTreeMap, HashMap};
 

@@ -13,7 +13,8 @@
 //! the angles. They are computed by operations that IEEE 754 rounds correctly, so a mesh has the
 //! same components on every machine.
 
-use super::mesh_piece::{Piece, Spot};
+use super::mesh_piece::Piece;
+use super::spot::Spot;
 use nalgebra::Vector3;
 use std::collections::HashMap;
 

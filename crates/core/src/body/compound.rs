@@ -1,47 +1,16 @@
-//! Several bodies as one: their union, rigidly attached to one frame; and what bodies and compounds
-//! have in common.
+//! Several bodies as one: their union, rigidly attached to one frame.
 
-use super::{Aabb, Ball, Body, BodyError, BodyId, Covering, Provenance, check_name};
+use super::body_error::{BodyError, check_name};
+use super::bounds::{Aabb, Ball};
+use super::convex_body::Body;
+use super::covering::Covering;
+use super::id::BodyId;
+use super::provenance::Provenance;
+use super::solid::{Sealed, Solid};
 use nalgebra::Vector3;
 
 /// Most parts a compound may have.
 pub const MAX_PARTS: usize = 256;
-
-/// What measures ask of a solid: the convex bodies it is the union of, all in one frame, and a ball
-/// around them.
-///
-/// A [`Body`] is the union of itself; a measure of a single body pays nothing for this.
-pub trait Solid: sealed::Sealed {
-    /// The parts, at least one and at most [`MAX_PARTS`].
-    fn parts(&self) -> &[Body];
-    /// A ball proven to contain all parts, metres.
-    fn circumscribed(&self) -> &Ball;
-    /// A box proven to contain all parts, metres.
-    fn bounding_box(&self) -> &Aabb;
-}
-
-mod sealed {
-    /// Keeps the promise of at least one part.
-    pub trait Sealed {}
-    impl Sealed for super::Body {}
-    impl Sealed for super::Compound {}
-    impl Sealed for crate::body::Shape {}
-}
-
-impl Solid for Body {
-    #[inline]
-    fn parts(&self) -> &[Body] {
-        std::slice::from_ref(self)
-    }
-
-    fn circumscribed(&self) -> &Ball {
-        Body::circumscribed(self)
-    }
-
-    fn bounding_box(&self) -> &Aabb {
-        Body::bounding_box(self)
-    }
-}
 
 /// The union of bodies that share one frame, such as the links of a hand in one grasp; convex or
 /// not, connected or not.
@@ -168,6 +137,8 @@ impl Compound {
         &self.bounding_box
     }
 }
+
+impl Sealed for Compound {}
 
 impl Solid for Compound {
     fn parts(&self) -> &[Body] {

@@ -1,11 +1,15 @@
 //! The file of a compound: the files of its parts in one, with the record of what they were proven
 //! to cover.
 
-use super::file::{BodyFileError, FORMAT, File, check_format, read, write};
-use super::{Body, Compound, Covering, DivisionError, Provenance};
+use super::compound::Compound;
+use super::convex_body::Body;
+use super::covering::Covering;
+use super::division::DivisionError;
+use super::file::File;
+use super::file_error::BodyFileError;
+use super::file_format::{COMPOUND_KIND, FORMAT, check_format, read, write};
+use super::provenance::Provenance;
 use serde::{Deserialize, Serialize};
-
-pub(super) const KIND: &str = "compound";
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -25,7 +29,7 @@ impl Compound {
     pub fn to_json(&self) -> String {
         let file = CompoundFile {
             format: FORMAT.into(),
-            kind: KIND.into(),
+            kind: COMPOUND_KIND.into(),
             id: self.id().to_string(),
             name: self.name().into(),
             gap_m: self.gap_m(),
@@ -43,7 +47,7 @@ impl Compound {
     /// The field that is wrong, the reason and the remedy.
     pub fn from_json(text: &str) -> Result<Self, BodyFileError> {
         let file: CompoundFile = read(text)?;
-        check_format(&file.format, &file.kind, KIND)?;
+        check_format(&file.format, &file.kind, COMPOUND_KIND)?;
         check_notes(&file)?;
         let part = |(index, part)| {
             Body::from_file(part).map_err(|source| BodyFileError::Part { index, source: Box::new(source) })

@@ -1,7 +1,9 @@
 //! How a body file keeps the proofs of contained sets.
 
+use super::body_error::check_name;
 use super::containment::{ContainedSet, Containment, ProofFrame};
-use super::file::BodyFileError;
+use super::file_error::BodyFileError;
+use super::id::ParseIdError;
 use crate::polynomial::ContainmentProof;
 use nalgebra::{DMatrix, Matrix3};
 use serde::{Deserialize, Serialize};
@@ -50,8 +52,8 @@ impl FileContainedSet {
     pub(super) fn read(&self, index: usize) -> Result<ContainedSet, BodyFileError> {
         let place = format!("contained_sets[{index}]");
         let field = |key: &str, reason: String| BodyFileError::Field { field: format!("{place}.{key}"), reason };
-        super::check_name(&self.name).map_err(|error| field("name", error.to_string()))?;
-        let id = self.id.parse().map_err(|error: super::ParseIdError| field("id", error.to_string()))?;
+        check_name(&self.name).map_err(|error| field("name", error.to_string()))?;
+        let id = self.id.parse().map_err(|error: ParseIdError| field("id", error.to_string()))?;
         let matrix = |rows: &Vec<Vec<f64>>| {
             let n = rows.len();
             let square = rows.iter().all(|row| row.len() == n);

@@ -8,7 +8,8 @@
 //! however large, small or far from the origin the set is. A frame in which the set fills the unit
 //! ball keeps that price low.
 
-use super::{Body, BodyId, Normalization, SosBody};
+use super::id::BodyId;
+use super::normalization::Normalization;
 use crate::polynomial::{ContainmentProof, NotContaining, Polynomial, Substituted, Substitution};
 use nalgebra::{Matrix3, Vector3};
 
@@ -20,19 +21,6 @@ pub struct BasicSet<'a> {
     pub normalization: &'a Normalization,
     /// The polynomials g.
     pub polynomials: Vec<&'a Polynomial>,
-}
-
-impl<'a> From<&'a Body> for BasicSet<'a> {
-    fn from(body: &'a Body) -> Self {
-        let polynomials = body.constraints().iter().map(|constraint| &constraint.polynomial).collect();
-        Self { normalization: body.normalization(), polynomials }
-    }
-}
-
-impl<'a> From<&'a SosBody> for BasicSet<'a> {
-    fn from(body: &'a SosBody) -> Self {
-        Self { normalization: body.normalization(), polynomials: vec![body.polynomial()] }
-    }
 }
 
 /// The frame of a proof: points `x = origin + axes v` in metres.

@@ -2,7 +2,8 @@
 //! in a ball a little larger than the body: made once, so that a query near the body pays for none
 //! of them.
 
-use super::{Constraint, Normalization, largest};
+use super::constraint::{Constraint, largest};
+use super::normalization::Normalization;
 use crate::polynomial::{ThirdCeiling, gamma};
 use nalgebra::{Matrix3, Vector3};
 
@@ -62,15 +63,24 @@ pub struct ConstraintTrust {
     pub third: ThirdCeiling,
 }
 
+/// Lengths of a body in its normalized frame.
+pub(super) struct BodyLengths {
+    /// Bounds of the coordinates' magnitudes.
+    pub(super) z_extent: Vector3<f64>,
+    /// Largest norm of its support points: hardly any point of it is farther from the origin.
+    pub(super) reach: f64,
+    /// Its interior point.
+    pub(super) interior_z: Vector3<f64>,
+}
+
 impl Trust {
-    /// Bounds for a body whose points hardly have normalized coordinates longer than `reach`.
+    /// Bounds for a body of these constraints, its normalization with the inverse of its linear
+    /// part, and its lengths.
     pub(super) fn new(
         constraints: &[Constraint],
         Normalization { center, linear }: &Normalization,
         inverse: &Matrix3<f64>,
-        extent: &Vector3<f64>,
-        reach: f64,
-        interior_z: &Vector3<f64>,
+        &BodyLengths { z_extent: ref extent, reach, ref interior_z }: &BodyLengths,
     ) -> Self {
         let radius = reach * MARGIN;
         // Whether a point is in the ball is decided in floating point.

@@ -1,67 +1,13 @@
-//! What a compound covers of a mesh, and the division by which that is proven.
+//! Proof that a compound covers a mesh, by a division of the mesh among its parts.
 
-use super::division::{Cut, Division, DivisionError};
+use super::compound::Compound;
+use super::contained_points::{NotContained, all_inside};
+use super::convex_body::Body;
+use super::covering::{Covered, Covering};
+use super::division::{Division, DivisionError};
 use super::mesh_piece::{MeshError, Piece};
-use super::{Body, Compound, ContainedPoints, NotContained};
+use super::spot::Spot;
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
-
-/// How much of a mesh is covered.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Covered {
-    /// Every triangle, but not what an open mesh may be thought to enclose.
-    SurfaceOnly,
-    /// Every triangle, and every point about which the closed mesh has a winding number other than 0.
-    Interior,
-}
-
-impl Covered {
-    /// As files and reports call it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Covered::SurfaceOnly => "surface_only",
-            Covered::Interior => "interior",
-        }
-    }
-}
-
-/// Which mesh a compound was proven to cover, and how.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(from = "Record", into = "Record")]
-pub struct Covering {
-    /// How much of it.
-    pub proven: Covered,
-    /// The corners of its triangles, one triangle after the other.
-    pub corners: ContainedPoints,
-    /// How it is divided among the parts.
-    pub division: Division,
-}
-
-/// As files have it. The first files had no components, and one piece to a part.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Record {
-    proven: Covered,
-    corners: ContainedPoints,
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    separated: bool,
-    cuts: Vec<Cut>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    parts: Vec<usize>,
-}
-
-impl From<Record> for Covering {
-    fn from(Record { proven, corners, separated, cuts, parts }: Record) -> Self {
-        Self { proven, corners, division: Division { separated, cuts, parts } }
-    }
-}
-
-impl From<Covering> for Record {
-    fn from(Covering { proven, corners, division: Division { separated, cuts, parts } }: Covering) -> Self {
-        Self { proven, corners, separated, cuts, parts }
-    }
-}
 
 /// Why a compound is not proven to cover a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -82,22 +28,14 @@ pub enum NotCovered {
     },
 }
 
-impl Covering {
-    /// The record of a mesh: the corners of its triangles, all of which must exist.
-    pub fn corners(points: &[Vector3<f64>], triangles: &[[usize; 3]]) -> ContainedPoints {
-        let corners: Vec<_> = triangles.iter().flatten().map(|&corner| points[corner]).collect();
-        ContainedPoints::of(&corners)
-    }
-}
-
 impl Body {
     /// Proves a piece of a mesh inside, rounding included.
     ///
     /// # Errors
     /// The spot that fails most.
     pub fn prove_holds(&self, piece: &Piece) -> Result<f64, NotContained> {
-        let value = |spot: &super::Spot| self.value_upper_within(&spot.x, spot.radius);
-        super::all_inside(piece.spots().iter().map(value))
+        let value = |spot: &Spot| self.value_upper_within(&spot.x, spot.radius);
+        all_inside(piece.spots().iter().map(value))
     }
 }
 
@@ -149,8 +87,8 @@ impl Compound {
 
 #[cfg(test)]
 mod tests {
-    use super::{Covered, Covering, Cut, Division, DivisionError, NotCovered};
-    use crate::body::{Aabb, Body, Compound, MeshError, Shape};
+    use super::{Covered, Covering, Division, DivisionError, NotCovered};
+    use crate::body::{Aabb, Body, Compound, Cut, MeshError, Shape};
     use nalgebra::{UnitQuaternion, Vector3};
 
     const CUT: Cut = Cut { part: 0, normal: [1.0, 0.0, 0.0], height_m: 0.25 };

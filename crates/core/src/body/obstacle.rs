@@ -1,6 +1,6 @@
 //! What a body can be proven to contain whole: a body, or a set that need not be convex.
 
-use super::file::BodyFileError;
+use super::file_error::BodyFileError;
 use super::{BasicSet, Body, BodyId, SosBody, Volume};
 
 /// A set of space that bodies are put around, with the proof that they contain it.

@@ -1,7 +1,11 @@
 //! Whatever a file holds: a body or a compound.
 
-use super::file::{BodyFileError, kind};
-use super::{Aabb, Ball, Body, Compound, Solid, compound_file};
+use super::bounds::{Aabb, Ball};
+use super::compound::Compound;
+use super::convex_body::Body;
+use super::file_error::BodyFileError;
+use super::file_format::{COMPOUND_KIND, kind};
+use super::solid::{Sealed, Solid};
 
 /// A body or a compound, which measures take alike.
 #[derive(Clone, Debug)]
@@ -18,7 +22,7 @@ impl Shape {
     /// # Errors
     /// As [`Body::from_json`] and [`Compound::from_json`].
     pub fn from_json(text: &str) -> Result<Self, BodyFileError> {
-        if kind(text)? == compound_file::KIND {
+        if kind(text)? == COMPOUND_KIND {
             Compound::from_json(text).map(|compound| Shape::Compound(Box::new(compound)))
         } else {
             Body::from_json(text).map(|body| Shape::Body(Box::new(body)))
@@ -34,6 +38,8 @@ impl Shape {
         }
     }
 }
+
+impl Sealed for Shape {}
 
 impl Solid for Shape {
     #[inline]

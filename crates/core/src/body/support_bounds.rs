@@ -13,12 +13,12 @@ use std::ops::ControlFlow;
 const SUPPORT_ACCURACY: f64 = 1e-14;
 
 /// The program `max m·z` over the body in its normalized frame.
-struct Support<'a> {
+struct FarthestPoint<'a> {
     constraints: &'a [Constraint],
     direction: Vector3<f64>,
 }
 
-impl Program<3> for Support<'_> {
+impl Program<3> for FarthestPoint<'_> {
     fn objective(&self, _: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
         (-self.direction, Matrix3::zeros())
     }
@@ -43,20 +43,26 @@ pub(super) struct TangentBound {
     pub(super) slope: f64,
 }
 
+/// What the support points of a body are computed from.
+pub(super) struct SupportProblem<'a> {
+    pub(super) constraints: &'a [Constraint],
+    pub(super) placement: &'a Placement,
+    /// Inverse of the placement's linear part, metres.
+    pub(super) inverse: &'a Matrix3<f64>,
+    /// A point inside, normalized frame.
+    pub(super) interior_z: Vector3<f64>,
+    /// Point from which heights are measured, body frame, metres.
+    pub(super) anchor: &'a Vector3<f64>,
+}
+
 /// Support point of the body in the direction of the unit vector `n` of the body frame, with its
 /// tangent bound.
-pub(super) fn support(
-    constraints: &[Constraint],
-    placement: &Placement,
-    inverse: &Matrix3<f64>,
-    interior_z: &Vector3<f64>,
-    anchor: &Vector3<f64>,
-    n: &Vector3<f64>,
-) -> TangentBound {
+pub(super) fn support(problem: &SupportProblem, n: &Vector3<f64>) -> TangentBound {
+    let SupportProblem { constraints, placement, inverse, interior_z, anchor } = *problem;
     let in_z = inverse.transpose() * n;
     let length = in_z.norm();
-    let program = Support { constraints, direction: in_z / length };
-    let reach = radial::radius(constraints, interior_z, &program.direction);
+    let program = FarthestPoint { constraints, direction: in_z / length };
+    let reach = radial::radius(constraints, &interior_z, &program.direction);
     let mut z = interior_z + program.direction * (0.9 * reach.min(1e6));
     // Past the accuracy of doubles the method drifts away again: the best iterate counts, not the
     // last.
@@ -114,7 +120,8 @@ impl Extent {
         interior: &Vector3<f64>,
     ) -> Result<Self, BodyError> {
         let interior_z = placement.linear() * (interior - placement.origin());
-        let bound = |n: &Vector3<f64>| support(constraints, placement, inverse, &interior_z, interior, n);
+        let problem = SupportProblem { constraints, placement, inverse, interior_z, anchor: interior };
+        let bound = |n: &Vector3<f64>| support(&problem, n);
         let axes: [Vector3<f64>; 6] = std::array::from_fn(|k| {
             let sign = if k < 3 { 1.0 } else { -1.0 };
             Vector3::from_fn(|i, _| if i == k % 3 { sign } else { 0.0 })

@@ -53,7 +53,7 @@ pub struct Cell<N> {
 impl Outline {
     /// `interior` is the interior point in normalized coordinates.
     pub(super) fn new(constraints: &[Constraint], inverse: &Matrix3<f64>, interior: &Vector3<f64>) -> Self {
-        let mut support = Support::new(constraints, interior);
+        let mut support = SupportTracer::new(constraints, interior);
         let (mut cells, mut active) = (Vec::with_capacity(6 * CELLS * CELLS), Vec::with_capacity(6 * CELLS * CELLS));
         for face in 0..6 {
             // Along the corners of all cells of the face.
@@ -195,7 +195,7 @@ fn fitted((e, z): &Sample, corners: [&Sample; 4], smooth: bool, inverse: &Matrix
 }
 
 /// Finds support points, one after the other along directions that lie close together.
-struct Support<'a> {
+struct SupportTracer<'a> {
     constraints: &'a [Constraint],
     interior: &'a Vector3<f64>,
     /// Boundary points all around, normalized coordinates.
@@ -208,7 +208,7 @@ struct Support<'a> {
     reach: f64,
 }
 
-impl<'a> Support<'a> {
+impl<'a> SupportTracer<'a> {
     fn new(constraints: &'a [Constraint], interior: &'a Vector3<f64>) -> Self {
         let ray = |u: &Vector3<f64>| interior + u * radius(constraints, interior, u);
         let rays = Sphere::fine().vertices().iter().map(ray).collect();

@@ -1,6 +1,7 @@
 //! Laws of bodies: extents, proofs and files.
 
 use super::*;
+use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
 use sublevel_testkit::Seeded;
 
@@ -262,4 +263,17 @@ fn growth_centers_lie_inside_and_are_part_of_the_identity() {
     }
     let text = moved.to_json().replace("\"growth_center_m\": [0.5", "\"growth_center_m\": [0.25");
     assert!(matches!(Body::from_json(&text), Err(BodyFileError::Derived { field: "id", .. })), "{text}");
+}
+
+/// A depth of ten times the least is enough, a tenth of it is not.
+#[test]
+fn a_body_needs_a_depth_above_rounding() {
+    let ball = Body::ball("ball", Vector3::zeros(), 1.0).unwrap();
+    let Constraint { polynomial, gram } = ball.constraints()[0].clone();
+    let of_depth = |depth: f64| {
+        let polynomial = polynomial.with_constant_shifted(1.0 - depth);
+        Body::new("shallow", *ball.normalization(), vec![Constraint { polynomial, gram: gram.clone() }])
+    };
+    assert!(of_depth(1e-8).is_ok());
+    assert!(matches!(of_depth(1e-10), Err(BodyError::Interior { .. })));
 }

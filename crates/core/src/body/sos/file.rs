@@ -1,17 +1,21 @@
 //! The file of an sos-body: as that of a body, of the kind `sos-body`, and re-proven whenever it is
 //! read.
 
-use super::{Coverage, Relaxation, SosBody};
-use crate::body::file::{
-    BodyFileError, FORMAT, FileBall, FileBox, FileCertificate, FileNormalization, check_format, check_scalar, kind,
+use super::coverage::Coverage;
+use super::relaxation::Relaxation;
+use super::sos_body::SosBody;
+use crate::body::contained_points::ContainedPoints;
+use crate::body::file_error::BodyFileError;
+use crate::body::file_format::{
+    FORMAT, FileBall, FileBox, FileCertificate, FileNormalization, SOS_BODY_KIND, check_format, check_scalar, kind,
     read, read_gram, read_hessian, read_polynomial, rows, write,
 };
-use crate::body::{BodyId, ContainedPoints, Normalization, Provenance};
+use crate::body::id::BodyId;
+use crate::body::normalization::Normalization;
+use crate::body::provenance::Provenance;
 use crate::polynomial::{Exponents, SosGram};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
-
-pub(in crate::body) const KIND: &str = "sos-body";
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -64,7 +68,7 @@ struct FileRelaxation {
 impl SosBody {
     /// Whether a text says that it is the file of an sos-body.
     pub fn is_file(text: &str) -> bool {
-        kind(text).is_ok_and(|kind| kind == KIND)
+        kind(text).is_ok_and(|kind| kind == SOS_BODY_KIND)
     }
 
     /// The file of this set; reading it back gives the same numbers exactly.
@@ -79,7 +83,7 @@ impl SosBody {
     /// The field that is wrong, the reason and the remedy.
     pub fn from_json(text: &str) -> Result<Self, BodyFileError> {
         let file: File = read(text)?;
-        check_format(&file.format, &file.kind, KIND)?;
+        check_format(&file.format, &file.kind, SOS_BODY_KIND)?;
         let field = |field: &str, reason: String| BodyFileError::Field { field: field.into(), reason };
         let normalization = Normalization::from(&file.normalization);
         let FilePolynomial { exponents, coefficients, certificate } = &file.polynomial;
@@ -158,7 +162,7 @@ impl From<&SosBody> for File {
         let certificate = SosCertificate { basis: body.gram.basis().to_vec(), gram: rows(body.gram.matrix()) };
         Self {
             format: FORMAT.into(),
-            kind: KIND.into(),
+            kind: SOS_BODY_KIND.into(),
             id: body.id.to_string(),
             name: body.name.clone(),
             degree: body.degree(),

@@ -1,7 +1,7 @@
 //! How far a set reaches, proven without convexity: a first box from the Gram matrix, closer ones
 //! by dividing it.
 
-use super::SosBodyError;
+use super::error::SosBodyError;
 use crate::body::{Aabb, Ball, Placement};
 use crate::polynomial::{Polynomial, SosGram};
 use nalgebra::{Matrix3, Vector3};
@@ -91,27 +91,27 @@ fn first_box(polynomial: &Polynomial, gram: &SosGram) -> Result<Vector3<f64>, So
 }
 
 /// A box of the normalized frame with a bound of the height of its points.
-struct Cell {
+struct BoundedBox {
     center: Vector3<f64>,
     half: Vector3<f64>,
     height: f64,
 }
 
-impl PartialEq for Cell {
+impl PartialEq for BoundedBox {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other).is_eq()
     }
 }
 
-impl Eq for Cell {}
+impl Eq for BoundedBox {}
 
-impl PartialOrd for Cell {
+impl PartialOrd for BoundedBox {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl Ord for Cell {
+impl Ord for BoundedBox {
     fn cmp(&self, other: &Self) -> Ordering {
         self.height.total_cmp(&other.height)
     }
@@ -127,7 +127,7 @@ fn highest(
     close: f64,
     boxes: usize,
 ) -> f64 {
-    let cell = |center: Vector3<f64>, half: Vector3<f64>| Cell { center, half, height: height(&center, &half) };
+    let cell = |center: Vector3<f64>, half: Vector3<f64>| BoundedBox { center, half, height: height(&center, &half) };
     let mut heap = BinaryHeap::from([cell(Vector3::zeros(), *first)]);
     let mut attained = f64::NEG_INFINITY;
     for _ in 0..boxes {
@@ -135,7 +135,7 @@ fn highest(
         if top.height - attained <= close {
             break;
         }
-        let Some(Cell { center, half, .. }) = heap.pop() else { break };
+        let Some(BoundedBox { center, half, .. }) = heap.pop() else { break };
         let (middle, least) = polynomial.floor_within(&center, &half);
         if least > 1.0 {
             continue;

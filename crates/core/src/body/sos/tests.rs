@@ -1,7 +1,7 @@
 use super::*;
-use crate::body::{Body, BodyFileError};
-use crate::polynomial::{Exponents, monomials};
-use nalgebra::DMatrix;
+use crate::body::{Aabb, Ball, Body, BodyFileError, Normalization, Provenance, Volume};
+use crate::polynomial::{Exponents, Polynomial, SosGram, monomials};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use sublevel_testkit::Seeded;

@@ -1,0 +1,37 @@
+//! What bodies, compounds and what a file holds of either have in common.
+
+use super::bounds::{Aabb, Ball};
+use super::convex_body::Body;
+
+/// What measures ask of a solid: the convex bodies it is the union of, all in one frame, and a ball
+/// around them.
+///
+/// A [`Body`] is the union of itself; a measure of a single body pays nothing for this.
+pub trait Solid: Sealed {
+    /// The parts, at least one and at most [`MAX_PARTS`](super::MAX_PARTS).
+    fn parts(&self) -> &[Body];
+    /// A ball proven to contain all parts, metres.
+    fn circumscribed(&self) -> &Ball;
+    /// A box proven to contain all parts, metres.
+    fn bounding_box(&self) -> &Aabb;
+}
+
+/// Keeps the promise of at least one part: nobody else can implement [`Solid`].
+pub trait Sealed {}
+
+impl Sealed for Body {}
+
+impl Solid for Body {
+    #[inline]
+    fn parts(&self) -> &[Body] {
+        std::slice::from_ref(self)
+    }
+
+    fn circumscribed(&self) -> &Ball {
+        Body::circumscribed(self)
+    }
+
+    fn bounding_box(&self) -> &Aabb {
+        Body::bounding_box(self)
+    }
+}
