@@ -5,10 +5,11 @@
 //! residual; Peyrl and Parrilo (Theoret. Comput. Sci. 409, 2008) show how much positive
 //! definiteness pays for it.
 
-use super::Polynomial;
+use super::certificate_error::CertificateError;
 use super::monomial::{Exponents, monomials};
 use super::norm_power::NormPower;
 use super::residual::{Residuals, check_matrix};
+use super::trivariate::Polynomial;
 use super::verified_cholesky::is_positive_definite_above;
 use nalgebra::DMatrix;
 
@@ -46,28 +47,6 @@ impl Margin {
         let smallest_eigenvalue = matrix.symmetric_eigenvalues().min();
         Err(CertificateError::NotDefinite { residual, smallest_eigenvalue })
     }
-}
-
-/// Why a certificate proves nothing.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum CertificateError {
-    /// The basis or matrix is malformed.
-    #[error("the certificate is malformed: {0}")]
-    Malformed(String),
-    /// The form has a monomial no product of two basis elements gives.
-    #[error("the certificate's basis cannot express the {0}; use a larger basis")]
-    BasisTooSmall(String),
-    /// The smallest eigenvalue does not exceed the residual.
-    #[error(
-        "the Gram matrix is not proven positive definite beyond its residual {residual:.3e} \
-         (smallest eigenvalue about {smallest_eigenvalue:.3e}); use one farther from singular"
-    )]
-    NotDefinite {
-        /// Bound δ of the correction.
-        residual: f64,
-        /// Smallest eigenvalue, computed without proof.
-        smallest_eigenvalue: f64,
-    },
 }
 
 /// A monomial `y_i y_j z^e` of a Hessian form, i <= j.

@@ -1,31 +1,10 @@
 //! One-pass value, gradient and Hessian from the Hessian of the homogenized polynomial.
 
+use super::jet::{Jet, NumberJet};
 use super::monomial::{Exponents, count, degree_of, fill, monomials};
 use super::simd::{Simd, WithSimd, dispatch};
 use super::simd_real::Number;
 use nalgebra::{Matrix3, Vector3};
-
-/// Value, gradient and Hessian of a function of three variables at one point.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Jet {
-    /// Value.
-    pub value: f64,
-    /// Gradient.
-    pub gradient: Vector3<f64>,
-    /// Symmetric Hessian.
-    pub hessian: Matrix3<f64>,
-}
-
-/// Value, gradient and Hessian (xx, xy, xz, yy, yz, zz) in every lane.
-#[derive(Clone, Copy, Debug)]
-pub struct NumberJet<N> {
-    /// Value.
-    pub value: N,
-    /// Gradient.
-    pub gradient: [N; 3],
-    /// Distinct entries of the symmetric Hessian: xx, xy, xz, yy, yz, zz.
-    pub hessian: [N; 6],
-}
 
 /// Row of the table: the ten distinct entries of `F` for one monomial, padded and aligned to the
 /// widest vectors.

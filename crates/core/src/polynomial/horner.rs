@@ -14,7 +14,7 @@
 //! product of [`super::hessian_form`] takes 350, but has no rows to spread over a vector for a
 //! single point.
 
-use super::hessian_form::NumberJet;
+use super::jet::NumberJet;
 use super::monomial::{Exponents, count};
 use super::simd::Simd;
 use super::simd_real::{Constant, Number};

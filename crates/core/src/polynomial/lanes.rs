@@ -1,10 +1,9 @@
 //! Numbers that fill a vector of the processor: doubles, and singles for what needs no more than
 //! that.
 
-use super::Polynomial;
-use super::hessian_form::NumberJet;
+use super::jet::NumberJet;
 use super::simd::Simd;
-use super::simd_real::{Constant, Number};
+use super::simd_real::{Constant, Number, Schemes};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Several numbers side by side.
@@ -118,8 +117,8 @@ macro_rules! numbers {
                 Self { simd: self.simd, values: self.simd.$select(mask, self.values, other.values) }
             }
             #[inline(always)]
-            fn jet(simd: S, polynomial: &Polynomial, z: [Self; 3]) -> NumberJet<Self> {
-                polynomial.nested.jet(simd, z)
+            fn jet(simd: S, schemes: &impl Schemes<S>, z: [Self; 3]) -> NumberJet<Self> {
+                schemes.several(simd, z)
             }
             #[inline(always)]
             fn gather<const K: usize>(simd: S, table: &[[f64; K]], place: Self) -> [Self; K] {

@@ -8,10 +8,18 @@ use nalgebra::Vector3;
 /// sum; some to spare.
 const ROUNDINGS: usize = 300;
 
+impl Polynomial {
+    /// The value at `center`, up to rounding, and a proven lower bound of the values where `|z_i -
+    /// center_i| <= half_i`.
+    pub fn floor_within(&self, center: &Vector3<f64>, half: &Vector3<f64>) -> (f64, f64) {
+        floor_within(self, center, half)
+    }
+}
+
 /// Value at the centre, up to rounding, and lower bound of p over the box `|z_i - center_i| <=
 /// half_i`: with `p(center + δ) = Σ c_e δ^e`, squares do not go below 0, and other terms not below
 /// `-|c_e| half^e`. The bound is short by O(half²).
-pub(super) fn floor_within(p: &Polynomial, center: &Vector3<f64>, half: &Vector3<f64>) -> (f64, f64) {
+fn floor_within(p: &Polynomial, center: &Vector3<f64>, half: &Vector3<f64>) -> (f64, f64) {
     let degree = p.degree();
     let mut here = dense(p.terms());
     for axis in 0..3 {

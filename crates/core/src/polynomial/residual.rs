@@ -1,7 +1,7 @@
 //! What a polynomial form has beyond that of a Gram matrix, monomial by monomial, rounding
 //! included.
 
-use super::gram::CertificateError;
+use super::certificate_error::CertificateError;
 use super::rounding::gamma;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;

@@ -1,7 +1,6 @@
 //! What is computed with: one double, or several numbers side by side.
 
-use super::Polynomial;
-use super::hessian_form::NumberJet;
+use super::jet::NumberJet;
 use super::simd::Simd;
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -62,12 +61,20 @@ pub trait Number<S: Simd>:
     fn all(simd: S, mask: Self::Mask) -> bool;
     /// `self` where the mask holds, else `other`.
     fn select(self, mask: Self::Mask, other: Self) -> Self;
-    /// Value, gradient and Hessian of the polynomial at points z, by the scheme that suits as many
-    /// of them.
-    fn jet(simd: S, polynomial: &Polynomial, z: [Self; 3]) -> NumberJet<Self>;
+    /// Value, gradient and Hessian of a polynomial at points z, by the scheme that suits as many of
+    /// them.
+    fn jet(simd: S, schemes: &impl Schemes<S>, z: [Self; 3]) -> NumberJet<Self>;
     /// The rows of a table at whole-numbered places; the last one beyond its end, the first one for
     /// what is not a number.
     fn gather<const K: usize>(simd: S, table: &[[f64; K]], place: Self) -> [Self; K];
+}
+
+/// A polynomial with a scheme of evaluation for one point and another for several.
+pub trait Schemes<S: Simd> {
+    /// Value, gradient and Hessian at one point.
+    fn one(&self, simd: S, z: [f64; 3]) -> NumberJet<f64>;
+    /// The same at several points, a lane each.
+    fn several<N: Number<S>>(&self, simd: S, z: [N; 3]) -> NumberJet<N>;
 }
 
 impl<S: Simd> Number<S> for f64 {
@@ -127,8 +134,8 @@ impl<S: Simd> Number<S> for f64 {
         if mask { self } else { other }
     }
     #[inline(always)]
-    fn jet(simd: S, polynomial: &Polynomial, z: [Self; 3]) -> NumberJet<Self> {
-        polynomial.form.jet(simd, z)
+    fn jet(simd: S, schemes: &impl Schemes<S>, z: [Self; 3]) -> NumberJet<Self> {
+        schemes.one(simd, z)
     }
     #[inline(always)]
     fn gather<const K: usize>(_: S, table: &[[f64; K]], place: Self) -> [Self; K] {

@@ -4,7 +4,8 @@
 //! with P definite beyond the residual of floating point.
 
 use super::Polynomial;
-use super::gram::{CertificateError, Margin};
+use super::certificate_error::CertificateError;
+use super::gram::Margin;
 use super::monomial::{Exponents, degree_of};
 use super::residual::{Residuals, check_matrix};
 use super::verified_cholesky::is_positive_definite_above;

@@ -1,8 +1,8 @@
-//! Laws of the polynomial room, checked against exact rational arithmetic.
+//! Laws of polynomials, checked against exact rational arithmetic.
 
 use super::*;
 use dashu_ratio::RBig;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector3};
 use sublevel_testkit::Seeded;
 
 fn random_polynomial(random: &mut Seeded, degree: usize) -> Polynomial {

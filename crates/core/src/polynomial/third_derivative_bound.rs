@@ -38,10 +38,18 @@ impl ThirdCeiling {
     }
 }
 
+impl Polynomial {
+    /// Upper bound of the third derivatives of this polynomial, which must be convex, over the
+    /// points with `|z_i| <= radius` whose values are within [`NEAR_LEVEL`] of 1.
+    pub fn third_ceiling(&self, radius: f64) -> ThirdCeiling {
+        third_ceiling(self, radius, self.absolute.third_ceiling(2.0 * radius))
+    }
+}
+
 /// Bound over the points with `|z_i| <= radius` where the convex `p` is within [`NEAR_LEVEL`] of 1,
 /// and along steps of the leeway from there: the largest Frobenius norm of the third derivative.
 /// `absolute` is the same bound by absolute coefficients on the cube of twice the size.
-pub(super) fn third_ceiling(p: &Polynomial, radius: f64, absolute: f64) -> ThirdCeiling {
+fn third_ceiling(p: &Polynomial, radius: f64, absolute: f64) -> ThirdCeiling {
     let half = radius / CUBES as f64;
     let leeway = SURROUNDINGS * half;
     let degree = p.degree();

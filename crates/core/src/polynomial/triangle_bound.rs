@@ -66,8 +66,19 @@ impl Ord for Patch {
     }
 }
 
+impl Polynomial {
+    /// How high the polynomial reaches on the triangle with these corners, and within `distance`
+    /// (each coordinate) of it.
+    ///
+    /// The proven bound is as tight as it takes to be on one side of `level`, or within a
+    /// thousandth of the highest value found.
+    pub fn peak(&self, corners: &[Vector3<f64>; 3], distance: f64, level: f64) -> Peak {
+        peak(self, corners, distance, level)
+    }
+}
+
 /// See [`Polynomial::peak`].
-pub(super) fn peak(p: &Polynomial, corners: &[Vector3<f64>; 3], distance: f64, level: f64) -> Peak {
+fn peak(p: &Polynomial, corners: &[Vector3<f64>; 3], distance: f64, level: f64) -> Peak {
     let degree = p.degree();
     let [v0, v1, v2] = corners;
     let (e1, e2) = (v1 - v0, v2 - v0);

@@ -1,10 +1,9 @@
 //! Two numbers in one.
 
-use super::Polynomial;
-use super::hessian_form::NumberJet;
+use super::jet::NumberJet;
 use super::lanes::Vector;
 use super::simd::Simd;
-use super::simd_real::{Constant, Number};
+use super::simd_real::{Constant, Number, Schemes};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Twice as many numbers: while one vector waits for its operands the other one is computed with.
@@ -82,8 +81,8 @@ impl<S: Simd, N: Vector<S>> Number<S> for Twice<N> {
         Self([self.0[0].select(mask[0], other.0[0]), self.0[1].select(mask[1], other.0[1])])
     }
     #[inline(always)]
-    fn jet(simd: S, polynomial: &Polynomial, z: [Self; 3]) -> NumberJet<Self> {
-        polynomial.nested.jet(simd, z)
+    fn jet(simd: S, schemes: &impl Schemes<S>, z: [Self; 3]) -> NumberJet<Self> {
+        schemes.several(simd, z)
     }
     #[inline(always)]
     fn gather<const K: usize>(simd: S, table: &[[f64; K]], place: Self) -> [Self; K] {
