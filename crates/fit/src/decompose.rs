@@ -5,11 +5,11 @@
 //! are asked for, by gain and by ledges (`segment`), and merge them again (`merge`). Each number of
 //! parts takes the partition of the least total volume.
 
-use super::parts::{MAX_PIECES, held};
+use super::part_points::part_points;
 use super::progress::Watch;
 use super::segment::{NOTHING, Nested, Segmentation, Style};
 use super::split::Partition;
-use super::{FitError, Mesh, Progress, Shortfall};
+use super::{FitError, MAX_PIECES, Mesh, Progress, Shortfall};
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 use sublevel_core::body::{Division, Piece};
@@ -45,8 +45,8 @@ pub fn convex_parts(
     }
     let whole = Piece::of_mesh(&mesh.points, &mesh.triangles)?;
     let found = Decomposition::new(&whole, parts, search, progress)?;
-    let made = found.fewest(parts);
-    Ok(held(&whole, &found.division(made), made)?.into_iter().map(|part| part.points).collect())
+    let count = found.fewest(parts);
+    Ok(part_points(&whole, &found.division(count), count)?.into_iter().map(|part| part.points).collect())
 }
 
 /// Partitions of a mesh.

@@ -8,6 +8,7 @@
 use super::Cone;
 use super::conic::Conic;
 use super::dominance::Dominance;
+use super::farthest_points::farthest_points;
 use super::path::Interior;
 use super::progress::Watch;
 use super::refine::{Refined, RefinementEnd, normalise, step_model};
@@ -141,18 +142,7 @@ struct Known {
 impl Known {
     /// So many of the points, each the farthest from those before it.
     fn start(points: &[Vector3<f64>], most: usize) -> Self {
-        let mut distances = vec![f64::INFINITY; points.len()];
-        let mut indices = Vec::new();
-        let mut next =
-            points.iter().map(Vector3::norm).enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(i, _)| i);
-        while indices.len() < most.min(points.len()) {
-            indices.push(next);
-            for (distance, point) in distances.iter_mut().zip(points) {
-                *distance = distance.min((point - points[next]).norm());
-            }
-            next = distances.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).map_or(0, |(i, _)| i);
-        }
-        Self { indices, most, worst: 0.0 }
+        Self { indices: farthest_points(points, most), most, worst: 0.0 }
     }
 
     /// Adds those that were left outside the farthest, but not many from one spot.

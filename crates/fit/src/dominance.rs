@@ -10,8 +10,7 @@
 
 use super::Cone;
 use super::factor::{regularised_factor, solve_lower};
-use super::path::isotropic_form;
-use super::structure::Structure;
+use super::structure::{Structure, isotropic_form};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 /// One block.

@@ -27,7 +27,8 @@ impl Facing {
             return None;
         }
         let grid = (((planes.len() / 6) as f64).sqrt() as usize).clamp(1, MOST_CELLS);
-        let cells = (0..cell_count(grid)).map(|cell| first_planes(&planes, &Cone::around(cell, grid))).collect();
+        let cells =
+            (0..cell_count(grid)).map(|cell| first_planes(&planes, &DirectionCap::around(cell, grid))).collect();
         Some(Self { center, planes, grid, cells })
     }
 
@@ -40,13 +41,13 @@ impl Facing {
     }
 }
 
-/// The directions of a cell lie within this angle of its axis.
-struct Cone {
+/// A spherical cap that holds the directions of a cell: those within an angle of an axis.
+struct DirectionCap {
     axis: Vector3<f64>,
     angle: f64,
 }
 
-impl Cone {
+impl DirectionCap {
     fn around(cell: usize, grid: usize) -> Self {
         let (face, row, column) = (cell / (grid * grid), cell / grid % grid, cell % grid);
         let at = |i: f64, j: f64| {
@@ -65,12 +66,12 @@ impl Cone {
     }
 }
 
-fn first_planes(planes: &[(Vector3<f64>, f64)], cone: &Cone) -> Vec<u32> {
+fn first_planes(planes: &[(Vector3<f64>, f64)], cap: &DirectionCap) -> Vec<u32> {
     // A ray at the angle t to a normal leaves the half-space at distance / cos t, or never. In the
-    // cone t is at least and at most:
-    let (sin, cos) = cone.angle.sin_cos();
+    // cap t is at least and at most:
+    let (sin, cos) = cap.angle.sin_cos();
     let cosines = planes.iter().map(|(normal, distance)| {
-        let along = normal.dot(&cone.axis);
+        let along = normal.dot(&cap.axis);
         let across = (1.0 - along * along).max(0.0).sqrt();
         let least = if along >= cos { 1.0 } else { along * cos + across * sin };
         (*distance, least, along * cos - across * sin)

@@ -2,6 +2,7 @@
 //! outside.
 
 use super::FitError;
+use super::farthest_points::farthest_points;
 use super::objective::Matrix;
 use super::path::{Interior, Iterate, Path, PathOptions};
 use super::program::{Problem, ProgramError};
@@ -145,7 +146,7 @@ impl Active {
     /// points lie on a quadric, as the corners of a box do.
     fn start(problem: &Problem, points: &[Vector3<f64>], likely: &[usize]) -> Self {
         let structure = problem.structure;
-        let first = spread(points, SPREAD * structure.gram.size);
+        let first = farthest_points(points, SPREAD * structure.gram.size);
         let mut chosen: Vec<Vector3<f64>> = first.iter().map(|&index| points[index]).collect();
         if problem.is_convex() {
             chosen.extend(inner(structure));
@@ -172,21 +173,6 @@ impl Active {
 
 fn columns(structure: &Structure, points: &[Vector3<f64>]) -> DMatrix<f64> {
     DMatrix::from_columns(&points.iter().map(|point| structure.values(point)).collect::<Vec<_>>())
-}
-
-/// At most this many points, each the farthest from those before; the first is the farthest from 0.
-pub(super) fn spread(points: &[Vector3<f64>], most: usize) -> Vec<usize> {
-    let mut distance = vec![f64::INFINITY; points.len()];
-    let mut next = (0..points.len()).max_by(|&a, &b| points[a].norm().total_cmp(&points[b].norm())).unwrap_or(0);
-    let choose = |_| {
-        let chosen = next;
-        for (d, point) in distance.iter_mut().zip(points) {
-            *d = d.min((point - points[chosen]).norm());
-        }
-        next = (0..points.len()).max_by(|&a, &b| distance[a].total_cmp(&distance[b])).unwrap_or(0);
-        chosen
-    };
-    (0..most.min(points.len())).map(choose).collect()
 }
 
 /// Points of a ball that is in the hull, twice as many as monomials of half the degree: they

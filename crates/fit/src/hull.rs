@@ -1,10 +1,9 @@
 //! Convex hull of the input points: only its vertices constrain a convex polynomial.
 
+use super::facets::facets;
 use super::facing::Facing;
 use super::outermost::outermost;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
-use parry3d_f64::math::Vector as GlamVector;
-use parry3d_f64::transformation::try_convex_hull;
 use std::collections::HashMap;
 
 /// Points thinner than this part of their longest extent count as flat.
@@ -190,24 +189,6 @@ pub(super) fn principal_axes(points: &[Vector3<f64>]) -> (Vector3<f64>, Matrix3<
         high - low
     });
     (mean, axes, extents)
-}
-
-/// Vertices and facets of the hull, as indices into `points`.
-pub(super) fn facets(points: &[Vector3<f64>]) -> Result<(Vec<usize>, Vec<[usize; 3]>), String> {
-    let converted: Vec<GlamVector> = points.iter().map(|p| GlamVector::new(p.x, p.y, p.z)).collect();
-    // The hull code asserts its topology, which rounding can break.
-    let (vertices, triangles) = std::panic::catch_unwind(|| try_convex_hull(&converted))
-        .map_err(|_| "its facets lost their topology".to_string())?
-        .map_err(|error| error.to_string())?;
-    let index: HashMap<[u64; 3], usize> =
-        points.iter().enumerate().map(|(i, p)| ([p.x.to_bits(), p.y.to_bits(), p.z.to_bits()], i)).collect();
-    let vertices: Vec<usize> =
-        vertices.iter().filter_map(|v| index.get(&[v.x.to_bits(), v.y.to_bits(), v.z.to_bits()]).copied()).collect();
-    let triangles: Option<Vec<[usize; 3]>> = triangles
-        .iter()
-        .map(|t| Some([*vertices.get(t[0] as usize)?, *vertices.get(t[1] as usize)?, *vertices.get(t[2] as usize)?]))
-        .collect();
-    Ok((vertices.clone(), triangles.ok_or("it names a vertex that is not a point")?))
 }
 
 /// Volume of a closed surface around the origin of an arbitrary frame.

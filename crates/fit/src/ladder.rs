@@ -1,40 +1,12 @@
 //! The same object at several levels of detail, from the smallest ball around it to degree 8.
 
 use super::object::Object;
-use super::parts::{Search, Source};
-use super::{CompoundFit, Fit, FitError, FitOptions, FitReport, Gap, Mesh, Progress};
+use super::parts::{CompoundSearch, Source};
+use super::rungs::{Costs, DEGREES, Rungs, degree_options};
+use super::{CompoundFit, FitError, FitOptions, Mesh, Progress, Rung};
 use nalgebra::Vector3;
-use std::ops::{ControlFlow, RangeInclusive};
+use std::ops::ControlFlow;
 use std::time::Instant;
-use sublevel_core::body::{Body, MAX_CONSTRAINTS};
-
-/// Most slabs a body may be cut by.
-pub const MAX_SLABS: usize = MAX_CONSTRAINTS - 1;
-
-/// Terms of a slab's quadratic.
-const SLAB_TERMS: usize = 10;
-
-/// Degrees of the rungs above the ball.
-const DEGREES: [usize; 4] = [2, 4, 6, 8];
-
-/// One representation of an object, which it contains.
-#[derive(Clone, Debug)]
-pub struct Rung {
-    /// The body, proven.
-    pub body: Body,
-    /// How far it reaches beyond the convex hull of the points.
-    pub gap: Gap,
-    /// Wall time, seconds, with all that was tried before.
-    pub seconds: f64,
-    /// What the fit took and reached; none for the ball.
-    pub report: Option<FitReport>,
-}
-
-impl From<Fit> for Rung {
-    fn from(fit: Fit) -> Self {
-        Self { body: fit.body, gap: fit.gap, seconds: fit.report.seconds, report: Some(fit.report) }
-    }
-}
 
 /// The lowest rung: the smallest ball around the points, metres.
 ///
@@ -60,7 +32,7 @@ pub fn ladder(
     options.check(name)?;
     let object = Object::new(name, points, &options.input)?;
     let mut rungs = vec![object.ball()?];
-    for options in climb(options) {
+    for options in degree_options(options) {
         rungs.push(object.cut(object.fit(&options, progress)?, options.slabs, 0.0, progress)?.into());
     }
     Ok(rungs)
@@ -142,7 +114,7 @@ pub fn cheapest_within(
     if let Some(rung) = rungs.climb(0..=3, progress)? {
         return Ok(timed(rung));
     }
-    let mut compounds = Search::new(Source { name, mesh, options }, max_gap_m, start)?;
+    let mut compounds = CompoundSearch::new(Source { name, mesh, options }, max_gap_m, start)?;
     if let Some(found) = compounds.cheaper_than(Costs::of_rung(4), progress)? {
         return Ok(found.into());
     }
@@ -160,126 +132,10 @@ fn check(name: &str, max_gap_m: f64, options: &FitOptions) -> Result<(), FitErro
     if max_gap_m > 0.0 { Ok(()) } else { Err(FitError::MaxGap(max_gap_m)) }
 }
 
-/// What a warm distance query of a body costs, about, µs.
-pub(super) struct Costs;
-
-impl Costs {
-    /// Of the ball and of [`DEGREES`].
-    const RUNGS: [f64; 5] = [0.15, 0.15, 0.2, 0.25, 0.45];
-
-    /// Of the cheapest body.
-    pub(super) const LEAST: f64 = 0.15;
-
-    /// Of a body with edges.
-    pub(super) const SLABBED: f64 = 3.0;
-
-    /// Of a rung, counted from the ball.
-    fn of_rung(rung: usize) -> f64 {
-        Self::RUNGS[rung]
-    }
-
-    /// Of a part of a compound, on a rung counted from the ball; none is taken above degree 6.
-    pub(super) fn of_part(rung: usize) -> f64 {
-        if rung < 4 { Self::of_rung(rung) } else { f64::INFINITY }
-    }
-
-    pub(super) fn of(body: &Body) -> f64 {
-        if body.is_smooth() { Self::of_rung(body.degree() / 2) } else { Self::SLABBED }
-    }
-}
-
-/// The rungs of an object on the way to a gap.
-pub(super) struct Rungs<'a> {
-    object: &'a Object<'a>,
-    max_gap_m: f64,
-    options: &'a FitOptions,
-    /// Those that were not near enough.
-    fits: Vec<Fit>,
-    /// What fails is reported if nothing else does.
-    closest: FitError,
-}
-
-impl<'a> Rungs<'a> {
-    pub(super) fn new(object: &'a Object<'a>, max_gap_m: f64, options: &'a FitOptions) -> Self {
-        let closest = FitError::Gap { asked_m: max_gap_m, reached_m: f64::INFINITY, degree: 0, slabs: 0 };
-        Self { object, max_gap_m, options, fits: Vec::new(), closest }
-    }
-
-    /// The lowest of some rungs, counted from the ball, that is near enough.
-    fn climb(
-        &mut self,
-        rungs: RangeInclusive<usize>,
-        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
-    ) -> Result<Option<Rung>, FitError> {
-        for rung in rungs {
-            if let Some(found) = self.try_one(rung, progress)? {
-                return Ok(Some(found));
-            }
-        }
-        Ok(None)
-    }
-
-    /// One rung, counted from the ball, if it is near enough and the options reach that high.
-    pub(super) fn try_one(
-        &mut self,
-        rung: usize,
-        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
-    ) -> Result<Option<Rung>, FitError> {
-        if rung == 0 {
-            let ball = self.object.ball()?;
-            return Ok((ball.gap.most_m <= self.max_gap_m).then_some(ball));
-        }
-        let Some(options) = climb(self.options).nth(rung - 1) else { return Ok(None) };
-        match self.object.fit(&options, progress) {
-            Ok(fit) if fit.gap.most_m <= self.max_gap_m => return Ok(Some(fit.into())),
-            Ok(fit) => self.fits.push(fit),
-            Err(FitError::Cancelled) => return Err(FitError::Cancelled),
-            Err(error) => self.closest = error,
-        }
-        Ok(None)
-    }
-
-    /// The rungs cut by slabs: the one near enough with the fewest terms.
-    fn slabbed(mut self, progress: &mut dyn FnMut(Progress) -> ControlFlow<()>) -> Result<Rung, FitError> {
-        let mut cheapest: Option<Fit> = None;
-        for fit in self.fits {
-            let room =
-                cheapest.as_ref().map_or(usize::MAX, |known| terms(&known.body).saturating_sub(terms(&fit.body)));
-            let slabs = MAX_SLABS.min(room.saturating_sub(1) / SLAB_TERMS);
-            match self.object.cut(fit, slabs, self.max_gap_m, progress) {
-                Ok(fit) if fit.gap.most_m <= self.max_gap_m => cheapest = Some(fit),
-                Ok(Fit { body, gap, .. }) => {
-                    if let FitError::Gap { reached_m, degree, slabs, .. } = &mut self.closest
-                        && gap.most_m < *reached_m
-                    {
-                        (*reached_m, *degree, *slabs) = (gap.most_m, body.degree(), body.constraints().len() - 1);
-                    }
-                }
-                Err(FitError::Cancelled) => return Err(FitError::Cancelled),
-                Err(error) => self.closest = error,
-            }
-        }
-        cheapest.map(Into::into).ok_or(self.closest)
-    }
-}
-
-/// Terms of all constraints, which queries evaluate.
-fn terms(body: &Body) -> usize {
-    body.constraints().iter().map(|constraint| constraint.polynomial.terms().len()).sum()
-}
-
-/// The options of the rungs above the ball.
-fn climb(options: &FitOptions) -> impl Iterator<Item = FitOptions> {
-    DEGREES
-        .into_iter()
-        .filter(|&degree| degree <= options.degree)
-        .map(|degree| FitOptions { degree, ..options.clone() })
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{MAX_SLABS, Rung, coarsest_within, ladder};
-    use crate::{FitError, FitOptions, Progress, fit};
+    use super::{Rung, coarsest_within, ladder};
+    use crate::{FitError, FitOptions, MAX_SLABS, Progress, fit};
     use nalgebra::Vector3;
     use std::ops::ControlFlow;
     use sublevel_testkit::Seeded;

@@ -5,8 +5,8 @@
 //! that is no vertex (Akl and Toussaint, A fast convex hull algorithm, Inf. Process. Lett. 7,
 //! 1978). More directions, for the fewer points that are left, leave fewer still.
 
+use super::facets::facets;
 use super::facing::{Facing, cell_count, cell_of};
-use super::hull::facets;
 use nalgebra::Vector3;
 use sublevel_core::body::fibonacci_lattice;
 

@@ -8,17 +8,14 @@
 
 use super::decompose::{Decomposition, PartSearch};
 use super::hull::convex_hull;
-use super::ladder::{Costs, Rungs};
 use super::object::Object;
-use super::{FitError, FitOptions, Mesh, Progress, Rung, Shortfall};
-use nalgebra::Vector3;
+use super::part_points::{PartPoints, part_points};
+use super::rungs::{Costs, Rungs};
+use super::{FitError, FitOptions, MAX_PIECES, Mesh, Progress, Rung, Shortfall};
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::time::Instant;
-use sublevel_core::body::{Body, Compound, Division, NotCovered, Piece, Provenance};
-
-/// Most parts that can be asked for.
-pub const MAX_PIECES: usize = 64;
+use sublevel_core::body::{Body, Compound, Division, Piece, Provenance};
 
 /// A fitted compound.
 #[derive(Clone, Debug)]
@@ -59,16 +56,16 @@ pub fn fit_parts(
     let source = Source { name, mesh, options };
     let whole = source.whole()?;
     let found = Decomposition::new(&whole, parts, PartSearch::Best, progress)?;
-    let made = found.fewest(parts);
-    let division = found.division(made);
+    let count = found.fewest(parts);
+    let division = found.division(count);
     let mut bodies = Vec::new();
-    for (index, points) in held(&whole, &division, made)?.into_iter().enumerate() {
+    for (index, points) in part_points(&whole, &division, count)?.into_iter().enumerate() {
         let one = on_part(index, &points, options, |object| {
             object.cut(object.fit(options, progress)?, options.slabs, 0.0, progress)
         });
         bodies.push(one?.body);
     }
-    let shortfall = found.shortfall(made, parts);
+    let shortfall = found.shortfall(count, parts);
     source.assemble(bodies, division, shortfall, start)
 }
 
@@ -103,26 +100,9 @@ impl Source<'_> {
     }
 }
 
-/// The corners of the pieces that a part holds.
-pub(super) struct Held {
-    pub(super) points: Vec<Vector3<f64>>,
-    /// How far they may be from what they stand for, metres.
-    uncertainty: f64,
-}
-
-/// What each part of a division holds.
-pub(super) fn held(mesh: &Piece, division: &Division, parts: usize) -> Result<Vec<Held>, FitError> {
-    let pieces = division.pieces(mesh.clone(), parts).map_err(NotCovered::from)?;
-    let held = |pieces: Vec<Piece>| Held {
-        points: pieces.iter().flat_map(Piece::spots).map(|spot| spot.x).collect(),
-        uncertainty: pieces.iter().map(Piece::uncertainty).fold(0.0, f64::max),
-    };
-    Ok(pieces.into_iter().map(held).collect())
-}
-
 /// The search for the cheapest compound within a gap, of more and more parts; what was tried of a
 /// part is kept.
-pub(super) struct Search<'a> {
+pub(super) struct CompoundSearch<'a> {
     source: Source<'a>,
     max_gap_m: f64,
     start: Instant,
@@ -142,7 +122,7 @@ struct Tried {
     rungs: usize,
 }
 
-impl<'a> Search<'a> {
+impl<'a> CompoundSearch<'a> {
     pub(super) fn new(source: Source<'a>, max_gap_m: f64, start: Instant) -> Result<Self, FitError> {
         Ok(Self { whole: source.whole()?, source, max_gap_m, start, tried: HashMap::new() })
     }
@@ -166,8 +146,8 @@ impl<'a> Search<'a> {
                 continue;
             }
             let division = found.division(parts);
-            let held = held(&self.whole, &division, parts)?;
-            if let Some((cost, bodies)) = self.climb(&held, most, progress)? {
+            let points = part_points(&self.whole, &division, parts)?;
+            if let Some((cost, bodies)) = self.climb(&points, most, progress)? {
                 best = Some((bodies, division));
                 most = cost;
             }
@@ -179,15 +159,15 @@ impl<'a> Search<'a> {
     /// they cost.
     fn climb(
         &mut self,
-        held: &[Held],
+        parts: &[PartPoints],
         most: f64,
         progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<Option<(f64, Vec<Body>)>, FitError> {
         let Self { source, max_gap_m, tried, .. } = self;
         let mut cost = 0.0;
         let mut bodies = Vec::new();
-        for (index, part) in held.iter().enumerate() {
-            let rest = (held.len() - index - 1) as f64 * Costs::LEAST;
+        for (index, part) in parts.iter().enumerate() {
+            let rest = (parts.len() - index - 1) as f64 * Costs::LEAST;
             let allowed = most - cost - rest;
             let tried =
                 tried.entry(part.points.iter().map(|x| [0, 1, 2].map(|i| x[i].to_bits())).collect()).or_default();
@@ -220,17 +200,17 @@ fn part_name(index: usize) -> String {
 /// Does something with the object that a part holds.
 fn on_part<T>(
     index: usize,
-    held: &Held,
+    points: &PartPoints,
     options: &FitOptions,
     work: impl FnOnce(&Object<'_>) -> Result<T, FitError>,
 ) -> Result<T, FitError> {
-    work(&Object::new(&part_name(index), &held.points, &options.input)?.around(held.uncertainty))
+    work(&Object::new(&part_name(index), &points.points, &options.input)?.around(points.uncertainty))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{CompoundFit, MAX_PIECES, fit_parts};
-    use crate::{FitError, FitOptions, Mesh, Progress, Representation, cheapest_within, fit};
+    use super::{CompoundFit, fit_parts};
+    use crate::{FitError, FitOptions, MAX_PIECES, Mesh, Progress, Representation, cheapest_within, fit};
     use nalgebra::{Rotation3, Vector3};
     use std::ops::ControlFlow;
     use sublevel_core::body::{Compound, Covered, MeshError};

@@ -19,7 +19,7 @@ use super::objective::Matrix;
 use super::program::{Dual, Problem};
 use super::progress::Watch;
 use super::spectral::Spectral;
-use super::structure::{Pattern, Structure};
+use super::structure::{Pattern, Structure, isotropic_form};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use sublevel_core::polynomial::degree_of;
 
@@ -336,23 +336,4 @@ impl<'a> Path<'a> {
         let place = DualPoint { dual: newton.next.clone(), tau };
         Some(Iterate { place, interior: Interior { coefficients, hessian: form }, gram })
     }
-}
-
-/// The functional `y_i y_j z^e -> [i = j] mean(z^e)`.
-pub(super) fn isotropic_form(structure: &Structure, mean: &DVector<f64>) -> DVector<f64> {
-    let size = structure.hessian.size / 3;
-    let basis = &structure.hessian_basis;
-    let position = |exponents: [u8; 3]| structure.monomials.iter().position(|&m| m == exponents);
-    let mut form = DVector::zeros(structure.hessian.keys);
-    for direction in 0..3 {
-        for a in direction * size..(direction + 1) * size {
-            for b in direction * size..(direction + 1) * size {
-                let exponents = std::array::from_fn(|i| basis[a].exponents[i] + basis[b].exponents[i]);
-                if let Some(index) = position(exponents) {
-                    form[structure.hessian.key(a, b)] = mean[index];
-                }
-            }
-        }
-    }
-    form
 }

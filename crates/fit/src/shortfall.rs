@@ -1,6 +1,9 @@
-//! Why a compound has fewer parts than were asked for.
+//! How many parts a compound may have, and why it has fewer than were asked for.
 
 use std::fmt;
+
+/// Most parts that can be asked for.
+pub const MAX_PIECES: usize = 64;
 
 /// Hulls larger than the object by less are said to fill it.
 const FILLED: f64 = 0.01;

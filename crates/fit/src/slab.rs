@@ -12,8 +12,11 @@
 //! ε/2 of its thickness at most.
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
-use sublevel_core::body::{Body, BodyError, Constraint, NotContained};
+use sublevel_core::body::{Body, BodyError, Constraint, MAX_CONSTRAINTS, NotContained};
 use sublevel_core::polynomial::{Exponents, HessianGram, HessianMonomial, Polynomial, PolynomialError};
+
+/// Most slabs a body may be cut by.
+pub const MAX_SLABS: usize = MAX_CONSTRAINTS - 1;
 
 /// ε.
 const BULGE: f64 = 1e-6;

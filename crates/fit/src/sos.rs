@@ -6,13 +6,14 @@
 
 use super::coordinates::Coordinates;
 use super::generate::{Optimum, generate};
+use super::margin::{DEFAULT_MARGIN, MARGIN_ATTEMPTS};
 use super::moment::{inverse_moment, moments};
 use super::object::{Object, pulled_inside};
 use super::objective::{Matrix, Measure};
 use super::program::Problem;
 use super::progress::{Progress, Watch};
 use super::structure::Structure;
-use super::{DEFAULT_MARGIN, FitError, FitOptions, MARGIN_ATTEMPTS, Objective, ProgramError};
+use super::{FitError, FitOptions, Objective, ProgramError};
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::ops::ControlFlow;
 use std::time::Instant;

@@ -186,6 +186,25 @@ impl Structure {
     }
 }
 
+/// The functional `y_i y_j z^e -> [i = j] mean(z^e)`.
+pub(super) fn isotropic_form(structure: &Structure, mean: &DVector<f64>) -> DVector<f64> {
+    let size = structure.hessian.size / 3;
+    let basis = &structure.hessian_basis;
+    let position = |exponents: [u8; 3]| structure.monomials.iter().position(|&m| m == exponents);
+    let mut form = DVector::zeros(structure.hessian.keys);
+    for direction in 0..3 {
+        for a in direction * size..(direction + 1) * size {
+            for b in direction * size..(direction + 1) * size {
+                let exponents = std::array::from_fn(|i| basis[a].exponents[i] + basis[b].exponents[i]);
+                if let Some(index) = position(exponents) {
+                    form[structure.hessian.key(a, b)] = mean[index];
+                }
+            }
+        }
+    }
+    form
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

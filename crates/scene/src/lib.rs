@@ -4,18 +4,10 @@
 //! makes the next snapshot, one revision on; readers keep the snapshot they hold. Nothing here
 //! knows of disks or wires. Lengths are metres, poses map body frame to world frame.
 
+mod limits;
 mod snapshot;
 mod update;
 
+pub use limits::{MAX_ALLOWED_PAIRS, MAX_NAME_BYTES, MAX_OBJECTS};
 pub use snapshot::{NameError, Object, Scene, check_name};
 pub use update::{Entry, List, Placement, SceneError, Update};
-
-/// Longest name of a scene, object or group, in bytes.
-pub const MAX_NAME_BYTES: usize = 128;
-
-/// Most objects in one scene. With [`MAX_NAME_BYTES`] and [`MAX_ALLOWED_PAIRS`] it keeps a whole
-/// scene within one gRPC message of 4 MiB.
-pub const MAX_OBJECTS: usize = 4096;
-
-/// Most allowed pairs in one scene.
-pub const MAX_ALLOWED_PAIRS: usize = 8192;

@@ -5,7 +5,10 @@
 //! groups, so a pair's program is solved only once its bound is the least of all, and never for
 //! pairs that are too far apart.
 
-use super::{EncloseError, EncloseOptions, Enclosure, MAX_SETS, Region, enclose_obstacles};
+use super::enclosure::{Enclosure, enclose_obstacles};
+use super::error::{EncloseError, MAX_SETS};
+use super::options::EncloseOptions;
+use super::region::Region;
 use crate::hull::convex_hull;
 use crate::{FitError, Progress};
 use nalgebra::Vector3;

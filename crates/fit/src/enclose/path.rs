@@ -20,7 +20,7 @@
 //! one of the size of p (Woodbury). Near a centre the step predicts a strictly feasible p with all
 //! Gram matrices: its equations are the identities above.
 
-use super::cone::Cone;
+use super::localizing::LocalizingMatrix;
 use crate::FitError;
 use crate::factor::{regularised_factor, solve_lower};
 use crate::progress::Watch;
@@ -41,7 +41,7 @@ const STEPS: usize = 300;
 /// Variables with their own barrier: the functional of a set, or of the Hessian form.
 pub(super) struct Block<'a> {
     /// Matrices that stay definite; of the first, the Gram matrix takes what rounding leaves.
-    pub(super) cones: Cow<'a, [Cone]>,
+    pub(super) cones: Cow<'a, [LocalizingMatrix]>,
     /// Cost of the variables.
     pub(super) cost: DVector<f64>,
     /// What they add to m: monomials of p x variables.
@@ -82,7 +82,7 @@ struct Newton {
 impl Path<'_> {
     /// At a centre, this over τ is the distance to the optimum.
     fn barrier_parameter(&self) -> f64 {
-        self.blocks.iter().flat_map(|block| block.cones.iter()).map(Cone::size).sum::<usize>() as f64
+        self.blocks.iter().flat_map(|block| block.cones.iter()).map(LocalizingMatrix::size).sum::<usize>() as f64
     }
 
     fn moments(&self, variables: &[DVector<f64>]) -> DVector<f64> {
@@ -202,7 +202,7 @@ impl Path<'_> {
         let coefficients = &newton.coefficients / tau;
         let mut grams = Vec::with_capacity(self.blocks.len());
         for ((block, at), whole) in self.blocks.iter().zip(at).zip(&newton.whole) {
-            let predicted = |cone: &Cone| Some(cone.predicted(at, whole)? / tau);
+            let predicted = |cone: &LocalizingMatrix| Some(cone.predicted(at, whole)? / tau);
             let mut of_block = block.cones.iter().map(predicted).collect::<Option<Vec<_>>>()?;
             // The first takes what the others leave of the identity.
             let others = block.cones.iter().zip(&of_block).skip(1).map(|(cone, gram)| cone.collapse(gram));

@@ -1,14 +1,14 @@
 //! The program of an enclosure: its blocks and where its path starts.
 
-use super::cone::Cone;
+use super::error::EncloseError;
+use super::localizing::LocalizingMatrix;
+use super::options::EncloseOptions;
 use super::path::{Block, Path};
 use super::region::{Prepared, Region, affine};
-use super::{EncloseError, EncloseOptions};
 use crate::basis::of_monomials;
 use crate::object::Object;
-use crate::path::isotropic_form;
 use crate::program::ProgramError;
-use crate::structure::Structure;
+use crate::structure::{Structure, isotropic_form};
 use nalgebra::{Cholesky, DVector};
 use std::borrow::Cow;
 
@@ -59,7 +59,7 @@ pub(super) fn program<'a>(
         .find(|form| Cholesky::new(structure.gram.spread(&(&mean * rows - structure.pull_back(form)))).is_some())
         .ok_or(ProgramError::Singular)?;
     blocks.push(Block {
-        cones: Cow::Owned(vec![Cone::of(form.clone())]),
+        cones: Cow::Owned(vec![LocalizingMatrix::of(form.clone())]),
         cost: -trace * margin,
         map: -structure.derivative_matrix().transpose(),
         start: start * 0.5,

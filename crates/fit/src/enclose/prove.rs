@@ -10,10 +10,11 @@
 //! by Newton's method, as in `certificate`. Where `y(1 - p) <= 0` on the way, y being nonnegative
 //! on all squares and products, there is no proof with these multipliers.
 
-use super::cone::Cone;
+use super::error::EncloseError;
+use super::localizing::LocalizingMatrix;
+use super::options::EncloseOptions;
 use super::program::prepare;
 use super::region::{Prepared, Region};
-use super::{EncloseError, EncloseOptions};
 use crate::factor::regularised_factor;
 use nalgebra::{DMatrix, DVector};
 use sublevel_core::body::{BasicSet, Body, Containment};
@@ -122,7 +123,7 @@ fn centre(prepared: &Prepared, minus_p: DVector<f64>) -> Result<Vec<DMatrix<f64>
         let Some(change) = factor.tr_solve_lower_triangular(&half).map(|change| -change) else { break };
         let decrement = half.norm();
         if decrement < NEAR {
-            let predicted = |cone: &Cone| cone.predicted(&y, &(&y + &change));
+            let predicted = |cone: &LocalizingMatrix| cone.predicted(&y, &(&y + &change));
             found = prepared.cones.iter().map(predicted).collect::<Option<Vec<_>>>().or(found);
         }
         if !(decrement > CENTRED) {

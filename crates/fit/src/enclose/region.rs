@@ -1,7 +1,7 @@
 //! A set made ready to be contained: its frame, its constraints there, and a functional to start
 //! from.
 
-use super::cone::Cone;
+use super::localizing::LocalizingMatrix;
 use crate::FitError;
 use crate::basis::{Affine, of_monomials};
 use crate::object::Object;
@@ -60,7 +60,7 @@ pub(super) struct Prepared {
     /// The frame v in which the set about fills the unit ball.
     pub(super) frame: ProofFrame,
     /// Squares first, then one per constraint.
-    pub(super) cones: Vec<Cone>,
+    pub(super) cones: Vec<LocalizingMatrix>,
     /// The mean over points inside: a functional in the interior of all cones.
     pub(super) mean: DVector<f64>,
 }
@@ -76,8 +76,8 @@ impl Prepared {
         let highest = region.set.polynomials.iter().map(|g| g.degree()).max().unwrap_or(0);
         let degree = contained.max(highest + multiplier);
         let slack = |g: &&Polynomial| -substituted(g, &affine(&frame, region.set.normalization)) + one(g.degree());
-        let slacks = region.set.polynomials.iter().map(|g| Cone::multiples(&slack(g), degree));
-        let cones = std::iter::once(Cone::squares(degree)).chain(slacks).collect();
+        let slacks = region.set.polynomials.iter().map(|g| LocalizingMatrix::multiples(&slack(g), degree));
+        let cones = std::iter::once(LocalizingMatrix::squares(degree)).chain(slacks).collect();
         let inverse = frame.axes.try_inverse().ok_or(ProgramError::Singular)?;
         let order = monomials(degree);
         let share = 1.0 / region.inside.len() as f64;
@@ -98,7 +98,7 @@ impl Prepared {
 
     /// Rows of all matrices.
     pub(super) fn rows(&self) -> usize {
-        self.cones.iter().map(Cone::size).sum()
+        self.cones.iter().map(LocalizingMatrix::size).sum()
     }
 
     /// Coefficients of a polynomial of other normalized coordinates, as one of v, on the monomials

@@ -1,8 +1,10 @@
 use super::*;
 use crate::tests::unwatched;
-use crate::{Coordinates, Objective, SosMethod, SosOptions, certificate, fit_sos};
-use nalgebra::{Rotation3, UnitQuaternion};
-use sublevel_core::body::{Normalization, SosBody};
+use crate::{Coordinates, FitError, Objective, SosMethod, SosOptions, certificate, fit_sos};
+use nalgebra::{Rotation3, UnitQuaternion, Vector3};
+use std::ops::ControlFlow;
+use sublevel_core::body::{BasicSet, Body, Containment, Normalization, Obstacle, SosBody};
+use sublevel_core::polynomial::{ContainmentProof, NotContaining, Polynomial};
 use sublevel_testkit::Seeded;
 
 mod printed;

@@ -9,8 +9,10 @@
 mod collada;
 mod error;
 mod foreign;
+mod mesh;
 mod obj;
 mod off;
+mod options;
 mod ply;
 mod polygon;
 mod remarks;
@@ -22,51 +24,16 @@ mod xyz;
 
 pub(crate) use error::Defect;
 pub use error::ReadError;
+pub use mesh::Mesh;
+pub use options::ReadOptions;
 pub use remarks::{Remarks, Unused, UnusedCost};
 pub use scale::{Scale, ScaleError};
 
-use nalgebra::Vector3;
 use std::path::Path;
 use surface::SurfaceError;
 
 /// Endings of the formats that can be read.
 pub const FORMATS: [&str; 6] = ["off", "obj", "ply", "stl", "dae", "xyz"];
-
-/// Vertices and the triangles between them.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Mesh {
-    /// All vertices of the file, metres, also those of no triangle.
-    pub points: Vec<Vector3<f64>>,
-    /// Indices into the points; none for clouds. Faces of more corners are triangulated inside
-    /// their outlines.
-    pub triangles: Vec<[usize; 3]>,
-}
-
-impl Mesh {
-    /// How many vertices the triangles use.
-    pub fn used_points(&self) -> usize {
-        self.are_used().into_iter().filter(|used| *used).count()
-    }
-
-    /// Whether the triangles use each vertex.
-    fn are_used(&self) -> Vec<bool> {
-        let mut are_used = vec![false; self.points.len()];
-        self.triangles.iter().flatten().for_each(|&corner| are_used[corner] = true);
-        are_used
-    }
-}
-
-/// How to read a file.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ReadOptions {
-    /// Metres per unit of the file. COLLADA files name their unit: there it comes on top.
-    pub scale: Scale,
-    /// Leave out points with a coordinate that is not finite, as scans have them where nothing was
-    /// seen, with the faces that use them; else they are an error.
-    pub drop_nan: bool,
-    /// Leave out vertices that no triangle uses, of files with triangles.
-    pub drop_unused: bool,
-}
 
 /// What a file holds.
 #[derive(Clone, Debug, Default, PartialEq)]

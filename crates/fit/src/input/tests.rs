@@ -1,4 +1,5 @@
 use super::*;
+use nalgebra::Vector3;
 
 mod collada;
 mod damage;

@@ -2,7 +2,8 @@
 //! to clarabel.
 
 use super::*;
-use crate::structure::Pattern;
+use crate::DEFAULT_MARGIN;
+use crate::structure::{Pattern, Structure};
 use crate::tests::primal::Program;
 use sublevel_core::polynomial::{monomials, position};
 

@@ -1,6 +1,8 @@
 //! Meshes of a COLLADA file: sources of numbers, and the primitives that index them.
 
-use super::{Defect, Document, Xml, child, children, integers, numbers, place_of, unexpected};
+use super::document::Document;
+use super::xml::{Xml, child, children, integers, numbers, place_of, unexpected};
+use crate::input::error::Defect;
 use crate::input::text::quoted;
 use nalgebra::Vector3;
 

@@ -3,18 +3,20 @@
 //! The unit that the file names is applied. Its `up_axis` is not: coordinates stay in the axes of
 //! the file, as RViz and MoveIt read the meshes of robots.
 
+mod document;
 mod geometry;
 mod transform;
+mod xml;
 
 use super::surface::{Place, Surface};
 use super::{Defect, text};
+use document::Document;
 use geometry::Geometry;
-use roxmltree::{Node, NodeId};
-use std::collections::{HashMap, HashSet};
+use roxmltree::NodeId;
+use std::collections::HashMap;
 use std::rc::Rc;
 use transform::Affine;
-
-type Xml<'a, 'i> = Node<'a, 'i>;
+use xml::{Xml, children, place_of, unexpected};
 
 /// Deepest nesting of nodes, those of instances included: a node may name itself.
 const MAX_DEPTH: usize = 64;
@@ -82,83 +84,6 @@ fn check_tags(content: &str) -> Result<(), Defect> {
         rest = &rest[length.max(1)..];
     }
     Ok(())
-}
-
-/// The elements of a file.
-struct Document<'a, 'i> {
-    root: Xml<'a, 'i>,
-    ids: HashMap<&'a str, Xml<'a, 'i>>,
-    /// Those that several elements have.
-    repeated: HashSet<&'a str>,
-}
-
-impl<'a, 'i> Document<'a, 'i> {
-    fn new(root: Xml<'a, 'i>) -> Self {
-        let mut document = Self { root, ids: HashMap::new(), repeated: HashSet::new() };
-        for element in root.descendants() {
-            let Some(id) = element.attribute("id") else { continue };
-            if document.ids.insert(id, element).is_some() {
-                document.repeated.insert(id);
-            }
-        }
-        document
-    }
-
-    /// The element that an attribute names, in the same file.
-    fn referenced(&self, element: Xml<'a, 'i>, attribute: &str) -> Result<Xml<'a, 'i>, Defect> {
-        let name = element.attribute(attribute).unwrap_or_default();
-        let id = name.strip_prefix('#');
-        if id.is_some_and(|id| self.repeated.contains(id)) {
-            let reason = format!("{attribute} is {}, which several elements have", text::quoted(name.as_bytes()));
-            return Err(Defect::new(place_of(element), reason).remedy("give each element an id of its own"));
-        }
-        let found = id.and_then(|id| self.ids.get(id)).copied();
-        found.ok_or_else(|| {
-            let name = text::quoted(name.as_bytes());
-            let reason = format!("{attribute} is {name}, which names no element of this file");
-            Defect::new(place_of(element), reason)
-        })
-    }
-
-    /// Metres per unit.
-    fn unit(&self) -> Result<f64, Defect> {
-        let of_file = child(self.root, "asset").and_then(|asset| child(asset, "unit"));
-        let meter = |unit: Xml<'a, 'i>| unit.attribute("meter").unwrap_or("1").trim();
-        let is_other = |unit: &Xml<'a, 'i>| {
-            let is_unit = unit.is_element() && unit.tag_name().name() == "unit";
-            let of_asset = unit.parent().is_some_and(|asset| asset.tag_name().name() == "asset");
-            is_unit && of_asset && meter(*unit) != of_file.map_or("1", meter)
-        };
-        if let Some(inner) = self.root.descendants().find(is_other) {
-            let reason = "a part of the file has a unit of its own, which is not read";
-            return Err(Defect::new(place_of(inner), reason).remedy("export all parts in one unit"));
-        }
-        let Some(unit) = of_file else { return Ok(1.0) };
-        let Some(meter) = unit.attribute("meter") else { return Ok(1.0) };
-        let value = meter.trim().parse().ok().filter(|meter: &f64| *meter > 0.0 && meter.is_finite());
-        value.ok_or_else(|| {
-            Defect::new(
-                place_of(unit),
-                format!("the attribute meter is {}, no positive number", text::quoted(meter.as_bytes())),
-            )
-        })
-    }
-
-    /// The scene that is shown; none of files that hold geometries alone.
-    fn scene(&self) -> Result<Option<Xml<'a, 'i>>, Defect> {
-        let instance = child(self.root, "scene").and_then(|scene| child(scene, "instance_visual_scene"));
-        if let Some(instance) = instance {
-            return self.referenced(instance, "url").map(Some);
-        }
-        let libraries = children(self.root, "library_visual_scenes");
-        let scenes: Vec<_> = libraries.flat_map(|library| children(library, "visual_scene")).collect();
-        match scenes[..] {
-            [] => Ok(None),
-            [scene] => Ok(Some(scene)),
-            _ => Err(Defect::new("scene", "the file holds several scenes and says of none that it is shown")
-                .remedy("export one scene")),
-        }
-    }
 }
 
 /// What was collected of a scene.
@@ -231,51 +156,4 @@ impl<'a, 'i> Scene<'_, 'a, 'i> {
         }
         Ok(())
     }
-}
-
-/// An element that the format does not have there: passing over it could leave out a shape.
-fn unexpected(element: Xml<'_, '_>) -> Defect {
-    Defect::new(place_of(element), "the format has no such element here")
-}
-
-/// The first child element of a name.
-fn child<'a, 'i>(parent: Xml<'a, 'i>, name: &str) -> Option<Xml<'a, 'i>> {
-    parent.children().find(|element| element.is_element() && element.tag_name().name() == name)
-}
-
-/// All child elements of a name.
-fn children<'a, 'i, 'n>(parent: Xml<'a, 'i>, name: &'n str) -> impl Iterator<Item = Xml<'a, 'i>> + use<'a, 'i, 'n> {
-    parent.children().filter(move |element| element.is_element() && element.tag_name().name() == name)
-}
-
-/// An element as errors name it, with its line.
-fn place_of(element: Xml<'_, '_>) -> String {
-    let line = element.document().text_pos_at(element.range().start).row;
-    let id = element.attribute("id").map(|id| format!(" {}", text::quoted(id.as_bytes()))).unwrap_or_default();
-    format!("line {line}, element {}{id}", text::shortened(element.tag_name().name()))
-}
-
-/// The words of an element's text, comments left out.
-fn words<'a>(element: Xml<'a, '_>) -> impl Iterator<Item = &'a str> {
-    element.children().filter(Xml::is_text).filter_map(|text| text.text()).flat_map(str::split_ascii_whitespace)
-}
-
-/// The numbers in an element.
-fn numbers(element: Xml<'_, '_>) -> Result<Vec<f64>, Defect> {
-    let number = |word: &str| {
-        text::number(word.as_bytes())
-            .map_err(|reason| Defect::new(place_of(element), reason.text).remedy(reason.remedy))
-    };
-    words(element).map(number).collect()
-}
-
-/// The whole numbers in an element.
-fn integers(element: Xml<'_, '_>) -> Result<Vec<usize>, Defect> {
-    let integer = |word: &str| {
-        text::integer(word.as_bytes()).ok_or_else(|| {
-            let reason = format!("{} is not the number of a vertex", text::quoted(word.as_bytes()));
-            Defect::new(place_of(element), reason)
-        })
-    };
-    words(element).map(integer).collect()
 }

@@ -1,6 +1,7 @@
 //! Transformations of COLLADA's nodes.
 
-use super::{Defect, Xml, numbers, place_of};
+use super::xml::{Xml, numbers, place_of};
+use crate::input::error::Defect;
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
 /// `x -> linear x + translation`, in units of the file.

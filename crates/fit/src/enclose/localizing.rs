@@ -10,13 +10,13 @@ use sublevel_core::polynomial::{degree_of, monomials, position};
 
 /// A matrix linear in y that must be definite.
 #[derive(Clone)]
-pub(super) struct Cone {
+pub(super) struct LocalizingMatrix {
     pattern: Pattern,
     /// L; the identity if there is none.
     map: Option<DMatrix<f64>>,
 }
 
-impl Cone {
+impl LocalizingMatrix {
     /// The matrix of that pattern itself.
     pub(super) fn of(pattern: Pattern) -> Self {
         Self { pattern, map: None }
@@ -57,7 +57,7 @@ impl Cone {
         }
     }
 
-    /// What a Gram matrix adds to the coefficients of the identity; adjoint of [`Cone::matrix`].
+    /// What a Gram matrix adds to the coefficients of the identity; adjoint of [`LocalizingMatrix::matrix`].
     pub(super) fn collapse(&self, gram: &DMatrix<f64>) -> DVector<f64> {
         let own = self.pattern.collapse(gram);
         self.map.as_ref().map_or_else(|| own.clone(), |map| map.tr_mul(&own))
@@ -108,7 +108,9 @@ mod tests {
         let y = DVector::from_iterator(84, monomials(6).into_iter().map(|e| value(e, v)));
         let slack = DVector::from_iterator(10, (0..10).map(|i| (f64::from(i) * 1.3).sin()));
         let of_slack: f64 = slack.iter().zip(monomials(2)).map(|(c, e)| c * value(e, v)).sum();
-        for (cone, factor, size) in [(Cone::squares(6), 1.0, 20), (Cone::multiples(&slack, 6), of_slack, 10)] {
+        for (cone, factor, size) in
+            [(LocalizingMatrix::squares(6), 1.0, 20), (LocalizingMatrix::multiples(&slack, 6), of_slack, 10)]
+        {
             let matrix = cone.matrix(&y);
             assert_eq!(matrix.nrows(), size);
             let order = monomials(3);
@@ -125,7 +127,7 @@ mod tests {
             sum + DVector::from_iterator(35, monomials(4).into_iter().map(|e| value(e, v)))
         });
         let direction = DVector::from_iterator(35, (0..35).map(|i| (f64::from(i) * 0.37).cos()));
-        for cone in [Cone::squares(4), Cone::multiples(&slack, 4)] {
+        for cone in [LocalizingMatrix::squares(4), LocalizingMatrix::multiples(&slack, 4)] {
             let along = |t: f64| cone.log_det(&(&y + &direction * t)).unwrap();
             let (gradient, curvature) = cone.derivatives(&y).unwrap();
             let h = 1e-4;
