@@ -11,10 +11,19 @@ pub const MAX_ROWS: usize = 32;
 /// Most iterations of [`minimise`]; 12 to 25 are usual.
 const MAX_ITERATIONS: u32 = 80;
 
-/// Largest fraction of the way to zero one step may take slacks and multipliers.
+/// Largest fraction of the distance to zero by which one step may shorten slacks and multipliers;
+/// dimensionless.
+///
+/// The usual value of primal-dual methods. Closer to 1, iterates stick to the boundary; smaller,
+/// the convergence is slower. Pinned by `extents_of_exact_bodies_match_closed_forms`, whose
+/// accuracy needs convergence within [`MAX_ITERATIONS`].
 const TO_BOUNDARY: f64 = 0.995;
 
-/// Levenberg's regularization where nothing asks for more, relative to the largest curvature.
+/// Least diagonal term of the Newton matrix, relative to the largest curvature; dimensionless.
+///
+/// Of the size of rounding: it changes no step, and makes singular matrices factorizable. A larger
+/// value slows the convergence where curvatures differ much; a smaller one is lost in rounding.
+/// Pinned by `extents_of_exact_bodies_match_closed_forms`.
 const LEAST_REGULARIZATION: f64 = 1e-15;
 
 /// Most halvings of one step.
@@ -136,8 +145,8 @@ pub fn minimise_within<const N: usize, P: Program<N>>(
         let Some(system) = System::factor(&gradient, hessian, rows, &dual, regularization) else {
             return iteration;
         };
-        // Predictor: aim at zero complementarity and see how far the multipliers and slacks allow
-        // it.
+        // Predictor: a step towards zero complementarity shows how far the multipliers and slacks
+        // allow it.
         let complementarity = dual.complementarity(m);
         let affine = system.step(&gradient, rows, &dual, 0.0);
         let (primal, multipliers) = affine.longest(&dual, m);

@@ -4,8 +4,9 @@
 //!
 //! Support points, deepest points, distances and level distances are all `min f(v)` subject to
 //! `c_i(v) <= 0` with smooth convex data, and all have a strictly feasible start at hand. The
-//! solver is a primal-dual interior-point method that knows no tolerance: the caller looks at each
-//! iterate and stops when its own proven bracket is narrow enough. Solving allocates nothing.
+//! solver is a primal-dual interior-point method without a tolerance of its own: the caller looks
+//! at each iterate and stops when its own proven bracket is narrow enough. Solving allocates
+//! nothing.
 
 mod convex_hull_2d;
 mod gjk;

@@ -67,7 +67,7 @@ pub enum NotContaining {
     /// What the multipliers leave is not proven a sum of squares.
     #[error(
         "what the multipliers leave is not proven a sum of squares: smallest eigenvalue about {smallest_eigenvalue:.3e}, \
-         residual {residual:.3e}; the polynomials or the proof were changed, or rounding ate it"
+         residual {residual:.3e}; the polynomials or the proof were changed, or it was lost in rounding"
     )]
     NotDefinite {
         /// Bound δ of the correction.
@@ -82,7 +82,8 @@ impl ContainmentProof {
     /// left.
     ///
     /// # Errors
-    /// [`NotContaining::Malformed`]: a matrix that is not square, symmetric, finite and of one of the sizes.
+    /// [`NotContaining::Malformed`]: a matrix that is not square, symmetric, finite and of one of
+    /// the sizes.
     pub fn new(multipliers: Vec<DMatrix<f64>>, rest: DMatrix<f64>) -> Result<Self, NotContaining> {
         multipliers.iter().chain([&rest]).try_for_each(check)?;
         Ok(Self { multipliers, rest })

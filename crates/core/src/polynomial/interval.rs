@@ -1,7 +1,7 @@
 //! Intervals of real numbers that are sure to hold the exact result of every operation.
 //!
 //! The bounds of a result are rounded to nearest and then moved one floating-point number outwards,
-//! which pays for that rounding, underflow included. A NaN, as from infinite bounds, spreads to
+//! which covers that rounding, underflow included. A NaN, as from infinite bounds, spreads to
 //! whatever is computed of it.
 
 use std::ops::{Add, Mul, Neg, Sub};

@@ -7,17 +7,17 @@ use super::simd_real::Number;
 use nalgebra::Vector3;
 
 /// Most values that are computed: those of degree 8, rounded up to whole vectors.
-const MOST: usize = 16;
+const MAX_LINE_VALUES: usize = 16;
 
 /// Steps of Newton's method; the first guess is the root of a chord, and 3 to 5 are usual.
-const STEPS: usize = 8;
+const ROOT_STEPS: usize = 8;
 
 /// What is interpolated from equidistant values on [-1, 1], for one degree.
 struct Scheme {
-    nodes: [f64; MOST],
+    nodes: [f64; MAX_LINE_VALUES],
     /// Row k: the coefficients, from the constant one on, of the polynomial that is 1 at node k and
     /// 0 at the others.
-    basis: [[f64; MOST]; 9],
+    basis: [[f64; MAX_LINE_VALUES]; 9],
 }
 
 /// One for each even degree.
@@ -25,7 +25,7 @@ static SCHEMES: [Scheme; 4] = [Scheme::new(2), Scheme::new(4), Scheme::new(6), S
 
 impl Scheme {
     const fn new(degree: usize) -> Self {
-        let (mut nodes, mut basis) = ([1.0; MOST], [[0.0; MOST]; 9]);
+        let (mut nodes, mut basis) = ([1.0; MAX_LINE_VALUES], [[0.0; MAX_LINE_VALUES]; 9]);
         let mut k = 0;
         while k <= degree {
             nodes[k] = 2.0 * k as f64 / degree as f64 - 1.0;
@@ -89,7 +89,7 @@ impl WithSimd for Line<'_> {
         // The chord of a convex function runs above it.
         let share = (values[k - 1] - self.level) / (values[k - 1] - values[k]);
         let mut t = nodes[k - 1] + share * (nodes[k] - nodes[k - 1]);
-        for _ in 0..STEPS {
+        for _ in 0..ROOT_STEPS {
             let (mut value, mut slope) = (0.0, 0.0);
             for &c in coefficients[..=self.nested.degree()].iter().rev() {
                 slope = Number::<S>::mul_add(slope, t, value);
@@ -113,9 +113,9 @@ impl WithSimd for Line<'_> {
 impl Line<'_> {
     /// The values at the nodes, and the coefficients of f from the constant one on.
     #[inline(always)]
-    fn interpolate<S: Simd>(&self, simd: S, scheme: &Scheme) -> ([f64; MOST], [f64; MOST]) {
+    fn interpolate<S: Simd>(&self, simd: S, scheme: &Scheme) -> ([f64; MAX_LINE_VALUES], [f64; MAX_LINE_VALUES]) {
         let splat = |v: f64| Lanes::<S>::splat(simd, v);
-        let (mut values, mut coefficients) = ([0.0; MOST], [0.0; MOST]);
+        let (mut values, mut coefficients) = ([0.0; MAX_LINE_VALUES], [0.0; MAX_LINE_VALUES]);
         for from in (0..=self.nested.degree()).step_by(Lanes::<S>::COUNT) {
             let t = Lanes::<S>::load(simd, &scheme.nodes[from..]);
             let mut z = [t; 3];

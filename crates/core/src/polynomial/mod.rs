@@ -2,7 +2,7 @@
 //! sos-convexity and of containment.
 //!
 //! Pure mathematics in the normalized frame of a body (unit-free coordinates `z`); nothing here
-//! knows of metres, poses or bodies.
+//! depends on metres, poses or bodies.
 
 mod certificate_error;
 mod containment;

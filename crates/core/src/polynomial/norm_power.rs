@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 /// Roundings on the way of any product into a coefficient of degree 8: 7 for the square of the
 /// norm, 11 for each further factor, 1 for c; some to spare.
-const ROUNDINGS: usize = 80;
+const POWER_ROUNDINGS: usize = 80;
 
 /// The polynomial `c |linear z + offset|^degree`, expanded; every coefficient with a bound of its
 /// error.
@@ -35,7 +35,8 @@ impl NormPower {
             add_product(&mut next, &power, &square);
             power = next;
         }
-        let error = |magnitude: f64| gamma(ROUNDINGS) * magnitude * (1.0 + gamma(ROUNDINGS)) + f64::MIN_POSITIVE;
+        let error =
+            |magnitude: f64| gamma(POWER_ROUNDINGS) * magnitude * (1.0 + gamma(POWER_ROUNDINGS)) + f64::MIN_POSITIVE;
         Self { terms: power.into_iter().map(|(e, (value, magnitude))| (e, value, error(magnitude))).collect() }
     }
 

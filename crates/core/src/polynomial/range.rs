@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 /// Roundings on the way into the bound: 16 in each of three shifts, 9 for a term, 165 for their
 /// sum; some to spare.
-const ROUNDINGS: usize = 300;
+const RANGE_ROUNDINGS: usize = 300;
 
 impl Polynomial {
     /// The value at `center`, up to rounding, and a proven lower bound of the values where `|z_i -
@@ -46,7 +46,7 @@ fn floor_within(p: &Polynomial, center: &Vector3<f64>, half: &Vector3<f64>) -> (
     }
     // Every product that enters is one of |p| expanded at |center| and taken at half.
     let (magnitude, _) = p.absolute.magnitude((center.abs() + half).amax() * (1.0 + f64::EPSILON));
-    (here[0][0][0], least - gamma(ROUNDINGS) * magnitude)
+    (here[0][0][0], least - gamma(RANGE_ROUNDINGS) * magnitude)
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use super::{Exponents, Polynomial, monomials};
 use nalgebra::Vector3;
 
 /// Halvings after which a piece counts as what it is in its middle: p touches 1 there, or nearly.
-const DEPTH: usize = 40;
+const MAX_CHORD_DEPTH: usize = 40;
 
 /// A polynomial about a point, ready to be followed along rays from there.
 #[derive(Clone, Debug)]
@@ -62,7 +62,7 @@ impl Chords {
         for (target, row) in control.iter_mut().zip(&self.conversion) {
             *target = row.iter().zip(&line).map(|(w, c)| w * c).sum();
         }
-        inside(&mut control[..=degree], (0.0, reach), DEPTH, chord);
+        inside(&mut control[..=degree], (0.0, reach), MAX_CHORD_DEPTH, chord);
     }
 }
 

@@ -65,8 +65,9 @@ impl AbsolutePolynomial {
         // Σ over e of degree j of j! e! c_e² is the squared Frobenius norm of the derivative of
         // order j.
         let third = std::array::from_fn(|j| (squares[j + 3] * factorial(j + 3)).sqrt() / factorial(j) * (1.0 + 1e-13));
-        // The sums, Horner's scheme and the arithmetic of the bounds below round too: fewer than 2 * 165 + 64 steps,
-        // which only scale the bound by 1 + γ and are covered by counting 2 roundings more.
+        // The sums, Horner's scheme and the arithmetic of the bounds below round too: fewer than 2
+        // * 165 + 64 steps, which only scale the bound by 1 + γ and are covered by counting 2
+        // roundings more.
         let gamma = gamma(count(degree - 2) + degree + 12);
         let sum = by_degree.iter().sum();
         Self { by_degree, gamma, sum, degree, third }

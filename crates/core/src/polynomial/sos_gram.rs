@@ -145,7 +145,7 @@ mod tests {
             for degree in [2, 4, 6, 8] {
                 let (p, gram) = random(seed, degree);
                 assert!(gram.prove(&p).is_ok(), "seed {seed}, degree {degree}");
-                // A constant that the matrix does not give: its least eigenvalue pays for less than
+                // A constant that the matrix does not give: its least eigenvalue covers less than
                 // that.
                 let least = gram.matrix().symmetric_eigenvalues().min();
                 assert!(gram.prove(&p.with_constant_shifted(-0.9 * least)).is_ok());

@@ -13,8 +13,8 @@ pub struct Substitution {
 }
 
 impl Substitution {
-    /// The exact `z = linear (origin + axes v - center)`: from a frame v, whose points are `origin + axes v` in metres, to
-    /// normalized coordinates z.
+    /// The exact `z = linear (origin + axes v - center)`: from a frame v, whose points are
+    /// `origin + axes v` in metres, to normalized coordinates z.
     pub fn new(linear: &Matrix3<f64>, center: &Vector3<f64>, axes: &Matrix3<f64>, origin: &Vector3<f64>) -> Self {
         let row = |i: usize, column: &dyn Fn(usize) -> Interval| {
             (0..3).fold(Interval::ZERO, |sum, k| sum + Interval::of(linear[(i, k)]) * column(k))

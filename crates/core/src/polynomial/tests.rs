@@ -191,7 +191,7 @@ fn certificates_prove_and_perturbed_ones_fail() {
         let margin = gram.prove(&p).unwrap_or_else(|e| panic!("degree {degree}: {e}"));
         assert!(margin.residual < 1e-12 * matrix.norm(), "degree {degree}: {margin:?}");
 
-        // A gross change of one entry breaks the match by more than the eigenvalue can pay for.
+        // A gross change of one entry breaks the match by more than the eigenvalue covers.
         let mut broken = matrix.clone();
         let shift = 2.0 * matrix.symmetric_eigenvalues().min() * (basis.len() as f64).sqrt() + 1.0;
         broken[(0, 0)] += shift;

@@ -14,10 +14,19 @@ use nalgebra::Vector3;
 /// Cubes along each axis of the cube around the ball.
 const CUBES: usize = 16;
 
-/// Values this close to 1 are near the level.
+/// Distance of a value from 1 up to which the bound of the third derivatives holds; dimensionless.
+///
+/// Searches end at the level 1 and use the bound for their last steps only. A larger value makes
+/// the bound larger, a smaller one leaves fewer points where it can be used. Pinned by
+/// `no_difference_of_hessians_exceeds_it`, which draws values from this interval, and by
+/// `it_is_not_much_above_what_is_met`.
 pub const NEAR_LEVEL: f64 = 0.25;
 
-/// How far around a cube the bound holds, relative to half its edge.
+/// Distance from a cube up to which its bound holds, relative to half its edge; dimensionless.
+///
+/// A step from a point near the level may end that far outside of the cubes that meet the level. A
+/// larger value makes the bound larger; a smaller one shortens the steps that it covers. Pinned by
+/// `no_difference_of_hessians_exceeds_it` and `it_is_not_much_above_what_is_met`.
 const SURROUNDINGS: f64 = 0.125;
 
 /// A bound of third derivatives and how far from where it holds it still does.
@@ -159,7 +168,8 @@ mod tests {
 
     #[test]
     fn it_is_not_much_above_what_is_met() {
-        // |z|^6: third derivatives of norm at most 6 · 4 · 5 on the unit sphere, times the count of their index orders.
+        // |z|^6: third derivatives of norm at most 6 · 4 · 5 on the unit sphere, times the count of
+        // their index orders.
         let p = Polynomial::new(
             (0..=3_u8)
                 .flat_map(|i| (0..=3 - i).map(move |j| [i, j, 3 - i - j]))

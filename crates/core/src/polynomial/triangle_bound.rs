@@ -14,15 +14,20 @@ use std::collections::BinaryHeap;
 /// Halvings of a triangle before the bound is left as it is.
 const HALVINGS: usize = 2000;
 
-/// Largest depth of halvings: what they round is paid for up to there.
-const DEPTH: usize = 60;
+/// Largest depth of halvings: the bound covers their rounding up to there.
+const MAX_TRIANGLE_DEPTH: usize = 60;
 
-/// How close a bound above the level must be to the value found, relative to 1.
-const CLOSE: f64 = 1e-3;
+/// Difference of a bound above the level from the value found at which the search for it ends; in
+/// values of the polynomial, relative to 1.
+///
+/// It decides only how closely a triangle that reaches outside is reported. A larger value reports
+/// larger peaks than there are; a smaller one takes more halvings. Pinned by
+/// `no_sample_exceeds_the_bound_and_the_bound_is_close`.
+const PEAK_ACCURACY: f64 = 1e-3;
 
 /// Roundings into a coefficient: up to 4 for each of at most 24 steps of the Horner schemes, 60 for
 /// the Bernstein form, one for each of at most 8 averages in every halving; some to spare.
-const ROUNDINGS: usize = 200 + 8 * DEPTH;
+const BERNSTEIN_ROUNDINGS: usize = 200 + 8 * MAX_TRIANGLE_DEPTH;
 
 /// How high a polynomial reaches.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,7 +91,7 @@ fn peak(p: &Polynomial, corners: &[Vector3<f64>; 3], distance: f64, level: f64) 
     // large as this.
     let reach = (v0.abs() + e1.abs() + e2.abs()).amax() * (1.0 + 4.0 * f64::EPSILON) + distance;
     let (magnitude, slope) = p.absolute.magnitude(reach);
-    let slack = (gamma(ROUNDINGS) * magnitude + slope * distance) * (1.0 + 1e-13);
+    let slack = (gamma(BERNSTEIN_ROUNDINGS) * magnitude + slope * distance) * (1.0 + 1e-13);
     let gram = [e1, e2].map(|a| [e1, e2].map(|b| a.dot(&b)));
 
     let first =
@@ -96,9 +101,9 @@ fn peak(p: &Polynomial, corners: &[Vector3<f64>; 3], distance: f64, level: f64) 
     for _ in 0..HALVINGS {
         let Some(highest) = heap.peek() else { break };
         let most = highest.most + slack;
-        let decided = most <= level || attained > level && most - attained <= CLOSE * attained.abs().max(1.0);
+        let decided = most <= level || attained > level && most - attained <= PEAK_ACCURACY * attained.abs().max(1.0);
         // A NaN is never decided, but halving does not mend it.
-        if decided || highest.depth == DEPTH || most.is_nan() {
+        if decided || highest.depth == MAX_TRIANGLE_DEPTH || most.is_nan() {
             break;
         }
         let Some(patch) = heap.pop() else { break };

@@ -1,4 +1,5 @@
-//! Polynomials in three variables, held as lists of terms and as the tables that they are evaluated by.
+//! Polynomials in three variables, held as lists of terms and as the tables that they are evaluated
+//! by.
 
 use super::hessian_form::HessianForm;
 use super::horner::Nested;
@@ -93,8 +94,8 @@ impl Polynomial {
     }
 
     /// Value, gradient and Hessian at the points `z`, a lane each, to be inlined into work for
-    /// [`dispatch`](super::dispatch): as [`Polynomial::evaluate`] for one point, by nested Horner schemes for
-    /// several.
+    /// [`dispatch`](super::dispatch): as [`Polynomial::evaluate`] for one point, by nested Horner
+    /// schemes for several.
     #[inline(always)]
     pub fn jet<S: Simd, N: Number<S>>(&self, simd: S, z: [N; 3]) -> NumberJet<N> {
         N::jet(simd, self, z)
