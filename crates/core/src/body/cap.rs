@@ -12,7 +12,12 @@ use super::spot::Spot;
 use nalgebra::{Vector2, Vector3};
 use std::collections::{BTreeMap, HashMap};
 
-/// Areas below this part of the square of the section's size count as none.
+/// Area below which a triangle of a section counts as flat, relative to the square of the size of
+/// the section; dimensionless.
+///
+/// Areas round at about 1e-16. A smaller value lets rounding decide which corner is clipped; a
+/// larger one makes caps of thin sections cover too much. Pinned by
+/// `caps_cover_the_section_and_no_more`.
 const THIN: f64 = 1e-13;
 
 /// Ears are looked for among no more corners than this; the time grows with the square.

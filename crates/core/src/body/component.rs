@@ -18,8 +18,12 @@ use super::spot::Spot;
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
-/// Triangles around an edge at angles that differ by less are taken for coincident, in quarters of
-/// a turn.
+/// Difference of the angles around an edge, in quarters of a turn, below which two triangles are
+/// taken for coincident.
+///
+/// The angles round at about 1e-16. A smaller value pairs coincident faces in an order that
+/// rounding decides; a larger one takes the faces of thin wedges for one. Pinned by
+/// `solids_that_touch_are_apart`.
 const COINCIDENT: f64 = 1e-9;
 
 /// A triangle that passes an edge.

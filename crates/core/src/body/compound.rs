@@ -21,7 +21,8 @@ pub const MAX_PARTS: usize = 256;
 ///
 /// let head = Body::ball("head", Vector3::new(0.0, 0.0, 0.5), 0.1)?;
 /// let handle = Body::cylinder("handle", 0.02, 0.5)?;
-/// let tilted = handle.moved(&UnitQuaternion::from_euler_angles(0.1, 0.0, 0.0), &Vector3::zeros())?;
+/// let tilt = UnitQuaternion::from_euler_angles(0.1, 0.0, 0.0);
+/// let tilted = handle.moved(&tilt, &Vector3::zeros())?;
 /// let hammer = Compound::new("hammer", vec![head, tilted])?;
 /// assert_eq!(hammer.parts().len(), 2);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

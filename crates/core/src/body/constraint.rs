@@ -7,10 +7,10 @@ pub const MAX_CONSTRAINTS: usize = 16;
 
 /// Smallest depth `1 - min g` of a body, in values of the constraints, which are dimensionless.
 ///
-/// The bounds of evaluation errors are below 1e-12 for bodies of size 1 in the normalized frame: a depth
-/// of 1e-9 stays a thousand times above them, so that a ball around the interior point can be proven
-/// inside. A larger value refuses thin bodies that can be proven; a smaller one lets bodies pass whose
-/// interior is lost in rounding. Pinned by `a_body_needs_a_depth_above_rounding`.
+/// The bounds of evaluation errors are below 1e-12 for bodies of size 1 in the normalized frame: a
+/// depth of 1e-9 stays a thousand times above them, so that a ball around the interior point can be
+/// proven inside. A larger value refuses thin bodies that can be proven; a smaller one lets bodies
+/// pass whose interior is lost in rounding. Pinned by `a_body_needs_a_depth_above_rounding`.
 pub(super) const MIN_DEPTH: f64 = 1e-9;
 
 /// One sos-convex constraint `g(z) <= 1` with the certificate that it is sos-convex.

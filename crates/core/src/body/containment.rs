@@ -4,9 +4,9 @@
 //! constraints has a [`ContainmentProof`]. Set and body have normalized frames of their own, so the
 //! proof has a third: a point is `x = origin + axes v`, axes invertible, v unit-free, which spans
 //! the space. There both maps `v -> L (origin + axes v - c)` are products of stored numbers, whose
-//! rounding is enclosed and paid for by the proof: it holds for the exact maps and every real x,
-//! however large, small or far from the origin the set is. A frame in which the set fills the unit
-//! ball keeps that price low.
+//! rounding is enclosed and covered by the margin of the proof: it holds for the exact maps and
+//! every real x, however large, small or far from the origin the set is. A frame in which the set
+//! fills the unit ball keeps that price low.
 
 use super::id::BodyId;
 use super::normalization::Normalization;

@@ -262,7 +262,7 @@ impl Body {
     }
 
     /// Upper bound of the distance of any point of the body from the convex hull of its object,
-    /// metres, as its maker proved it; the body alone does not tell.
+    /// metres, as its maker proved it; it cannot be computed from the body alone.
     pub fn gap_m(&self) -> Option<f64> {
         self.gap
     }
@@ -338,7 +338,7 @@ impl Body {
     /// The same body with the record of a set it contains, which is proven here and now.
     ///
     /// # Errors
-    /// What the proof lacks.
+    /// Why the proof fails.
     pub fn with_set(mut self, set: &BasicSet, record: ContainedSet) -> Result<Self, NotContaining> {
         record.containment.prove(&BasicSet::from(&self), set)?;
         self.sets.push(record);

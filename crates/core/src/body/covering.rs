@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 pub enum Covered {
     /// Every triangle, but not what an open mesh may be thought to enclose.
     SurfaceOnly,
-    /// Every triangle, and every point about which the closed mesh has a winding number other than 0.
+    /// Every triangle, and every point about which the closed mesh has a winding number other than
+    /// 0.
     Interior,
 }
 

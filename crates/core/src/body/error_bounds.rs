@@ -1,5 +1,5 @@
 //! Error bounds and curvature bounds that hold wherever the normalized coordinates of a point lie
-//! in a ball a little larger than the body: made once, so that a query near the body pays for none
+//! in a ball a little larger than the body: made once, so that a query near the body computes none
 //! of them.
 
 use super::constraint::{Constraint, largest};
@@ -7,8 +7,13 @@ use super::normalization::Normalization;
 use crate::polynomial::{ThirdCeiling, gamma};
 use nalgebra::{Matrix3, Vector3};
 
-/// How much larger than the body, as its support points show it, the ball is.
-const MARGIN: f64 = 1.0625;
+/// Radius of the ball in which the bounds hold, relative to the farthest support point of the body;
+/// dimensionless.
+///
+/// Trial points of a search lie a little outside of the body: a smaller value lets queries compute
+/// the bounds again at many points, a larger one makes the bounds themselves larger. Pinned by
+/// `the_ball_of_the_bounds_is_little_larger_than_the_body`.
+const BALL_ENLARGEMENT: f64 = 1.0625;
 
 /// Bounds of a body's map and constraints where `|z| <= radius`; lengths in metres, z unit-free.
 #[derive(Clone, Debug)]
@@ -82,7 +87,7 @@ impl Trust {
         inverse: &Matrix3<f64>,
         &BodyLengths { z_extent: ref extent, reach, ref interior_z }: &BodyLengths,
     ) -> Self {
-        let radius = reach * MARGIN;
+        let radius = reach * BALL_ENLARGEMENT;
         // Whether a point is in the ball is decided in floating point.
         let ball = radius * (1.0 + 1e-12);
         let rows = Vector3::from_fn(|i, _| linear.row(i).norm() * (1.0 + 1e-14));

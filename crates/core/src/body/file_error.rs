@@ -15,9 +15,9 @@ pub enum BodyFileError {
     Format {
         /// Key in the file.
         field: &'static str,
-        /// What it says.
+        /// Value in the file.
         found: String,
-        /// What it should say.
+        /// Value that this version reads.
         expected: &'static str,
     },
     /// A defining value is not valid.

@@ -1,5 +1,5 @@
-//! What the files of bodies, sos-bodies and compounds have in common: format, kinds, the JSON of their
-//! numbers, and the comparison of stored values with recomputed ones.
+//! What the files of bodies, sos-bodies and compounds have in common: format, kinds, the JSON of
+//! their numbers, and the comparison of stored values with recomputed ones.
 
 use super::body_error::check_name;
 use super::bounds::{Aabb, Ball};
@@ -18,10 +18,14 @@ pub(super) const BODY_KIND: &str = "body";
 pub(super) const SOS_BODY_KIND: &str = "sos-body";
 pub(super) const COMPOUND_KIND: &str = "compound";
 
-/// Relative difference at which a stored derived value is called wrong: far above what another
-/// machine's rounding does to it, far below what anybody could mean. Answers always use the
-/// recomputed value.
-const TOLERANCE: f64 = 1e-7;
+/// Largest difference of a stored derived value from the recomputed one, relative to the size of
+/// the quantity; dimensionless.
+///
+/// Another machine's rounding changes derived values by 1e-12 or less; an edit changes them by far
+/// more. A smaller value refuses files of other machines; a larger one accepts files whose derived
+/// values do not follow from the polynomials. Answers always use the recomputed value. Pinned by
+/// `stored_values_may_differ_by_rounding_only`.
+const DERIVED_TOLERANCE: f64 = 1e-7;
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -57,7 +61,7 @@ pub(super) fn read<'a, T: Deserialize<'a>>(text: &'a str) -> Result<T, BodyFileE
     serde_json::from_str(text).map_err(|error| BodyFileError::Json(error.to_string()))
 }
 
-/// What kind a file says it is of.
+/// The kind that a file names as its own.
 pub(super) fn kind(text: &str) -> Result<String, BodyFileError> {
     #[derive(Deserialize)]
     struct Header {
@@ -166,7 +170,7 @@ impl Provenance {
 /// `scale`.
 pub(super) fn check_scalar(field: &'static str, stored: f64, recomputed: f64, scale: f64) -> Result<(), BodyFileError> {
     // Not `>`: a NaN is wrong too.
-    if (stored - recomputed).abs() <= TOLERANCE * scale {
+    if (stored - recomputed).abs() <= DERIVED_TOLERANCE * scale {
         return Ok(());
     }
     Err(BodyFileError::Derived { field, stored: format!("{stored:e}"), recomputed: format!("{recomputed:e}") })

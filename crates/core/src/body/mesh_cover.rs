@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn what_can_not_be_proven_is_refused() {
+    fn what_cannot_be_proven_is_refused() {
         let (points, triangles) = unit();
         let compound = Compound::new("two", vec![slice(-1.1, 1.1), slice(-1.1, 1.1)]).unwrap();
         let prove = |cuts: &[Cut]| compound.prove_covers(&points, &triangles, &by(cuts));

@@ -27,8 +27,14 @@ use std::cmp::Ordering;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
-/// Spots nearer to a plane than this part of the piece's size are on it, when caps are sections.
-const NEAR: f64 = 1e-9;
+/// Distance from a plane, relative to the size of the piece, below which a spot counts as on it
+/// when caps are sections; dimensionless.
+///
+/// Coordinates of cut points round at about 1e-15, and planes are placed at corners only up to
+/// that. A smaller value splits triangles into slivers beside the plane; a larger one takes thin
+/// features for part of the plane. Pinned by `planes_through_corners_and_along_faces_do_no_harm`
+/// and `faces_in_the_plane_go_with_the_solid_behind_them`.
+const ON_PLANE: f64 = 1e-9;
 
 /// Why triangles are no mesh.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -243,7 +249,7 @@ impl Piece {
     fn heights(&self, normal: &Vector3<f64>, height: f64) -> Vec<f64> {
         let ends = [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)];
         let [low, high] = self.spots.iter().fold(ends, |[low, high], spot| [low.inf(&spot.x), high.sup(&spot.x)]);
-        let near = NEAR * (high - low).norm();
+        let near = ON_PLANE * (high - low).norm();
         let above = |spot: &Spot| normal.dot(&spot.x) - height;
         self.spots.iter().map(above).map(|h| if h.abs() <= near { 0.0 } else { h }).collect()
     }

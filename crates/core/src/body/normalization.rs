@@ -16,8 +16,8 @@ pub struct Normalization {
 /// The inverse of the linear part, metres; rounded.
 ///
 /// # Errors
-/// [`BodyError::Normalization`] for entries that are not finite or out of range, and for a matrix that
-/// is singular up to rounding.
+/// [`BodyError::Normalization`] for entries that are not finite or out of range, and for a matrix
+/// that is singular up to rounding.
 pub(super) fn invert(normalization: &Normalization) -> Result<Matrix3<f64>, BodyError> {
     let Normalization { center, linear } = normalization;
     if !center.iter().chain(linear.iter()).all(|value| value.is_finite()) {

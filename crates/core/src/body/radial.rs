@@ -72,7 +72,7 @@ pub(super) fn proven_boundary(
         .iter()
         .map(|u| {
             let ray = inverse * u * radius(constraints, &start, u);
-            // Pull in until rounding is paid for; the interior point itself is inside.
+            // Pulled in by the rounding; the interior point itself is inside.
             let mut pull = 1e-15;
             loop {
                 let x = interior + ray * (1.0 - pull);
@@ -91,7 +91,7 @@ pub(super) fn proven_boundary(
 /// Radius of a ball about the interior point inside the body: the body contains the tetrahedra that
 /// the interior point spans with the triangles of its proven boundary points.
 ///
-/// `mirrored` says that the map from directions to boundary points reverses orientation.
+/// `mirrored` states that the map from directions to boundary points reverses orientation.
 pub(super) fn in_radius(boundary: &[Vector3<f64>], interior: &Vector3<f64>, mirrored: bool) -> f64 {
     let outward = if mirrored { -1.0 } else { 1.0 };
     let size = interior.norm() + boundary.iter().map(Vector3::norm).fold(0.0, f64::max);

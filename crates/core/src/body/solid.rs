@@ -6,7 +6,7 @@ use super::convex_body::Body;
 /// What measures ask of a solid: the convex bodies it is the union of, all in one frame, and a ball
 /// around them.
 ///
-/// A [`Body`] is the union of itself; a measure of a single body pays nothing for this.
+/// A [`Body`] is the union of itself; a measure of a single body takes no longer for this.
 pub trait Solid: Sealed {
     /// The parts, at least one and at most [`MAX_PARTS`](super::MAX_PARTS).
     fn parts(&self) -> &[Body];

@@ -22,7 +22,10 @@ const CELLS: usize = 16;
 const FIELDS: usize = 9;
 
 /// Size of the ellipsoid that stands for the body, relative to the smallest one of its shape around
-/// the body: between that and the largest one inside.
+/// the body; dimensionless.
+///
+/// It lies between that and the largest one inside. Only guesses depend on it: other values make
+/// cold starts slower. Pinned by `the_ellipsoid_of_a_ball_is_a_smaller_ball`.
 const FULLNESS: f64 = 0.75;
 
 /// An ellipsoid about as large as the body, and for each cell of directions about where the body is
@@ -244,7 +247,7 @@ impl<'a> SupportTracer<'a> {
         let mut weights: Option<Vector3<f64>> = None;
         for _ in 0..16 {
             let mut gradients = Matrix3::zeros();
-            // What is left over of three constraints says that their multipliers are zero.
+            // Rows of constraints beyond the active ones set their multipliers to zero.
             let mut matrix = SMatrix::<f64, 6, 6>::identity();
             let mut right = SVector::<f64, 6>::zeros();
             right.fixed_rows_mut::<3>(0).copy_from(e);

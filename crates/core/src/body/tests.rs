@@ -277,3 +277,22 @@ fn a_body_needs_a_depth_above_rounding() {
     assert!(of_depth(1e-8).is_ok());
     assert!(matches!(of_depth(1e-10), Err(BodyError::Interior { .. })));
 }
+
+/// Another machine's rounding passes, a change does not.
+#[test]
+fn stored_values_may_differ_by_rounding_only() {
+    let body = Body::ellipsoid("egg", Vector3::zeros(), Vector3::new(0.3, 0.4, 0.5)).unwrap();
+    let stored = |factor: f64| {
+        let mut value: serde_json::Value = serde_json::from_str(&body.to_json()).unwrap();
+        value["volume_m3"] = (body.volume().volume_m3 * factor).into();
+        Body::from_json(&value.to_string())
+    };
+    assert!(stored(1.0 + 2e-8).is_ok());
+    assert!(matches!(stored(1.0 + 5e-7), Err(BodyFileError::Derived { field: "volume_m3", .. })));
+}
+
+#[test]
+fn the_ball_of_the_bounds_is_little_larger_than_the_body() {
+    let radius = Body::ball("ball", Vector3::zeros(), 2.0).unwrap().trust().radius;
+    assert!((1.03..1.12).contains(&radius), "{radius}");
+}

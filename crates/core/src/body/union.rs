@@ -14,17 +14,17 @@ use super::{Aabb, Body, Compound};
 use nalgebra::Vector3;
 
 /// Points along a ray.
-const STEPS: usize = 16;
+const UNION_RAY_POINTS: usize = 16;
 
 /// Rings of rays.
-const RINGS: usize = 24;
+const UNION_RINGS: usize = 24;
 
 impl Compound {
     /// Volume of the union by quadrature: where parts overlap counts once. The overlaps' boundaries
-    /// cost it accuracy, which the estimate of its error says.
+    /// cost it accuracy, which the estimate of its error includes.
     pub fn volume(&self) -> Volume {
         let rule = |rings: usize| (0..self.parts().len()).map(|part| share(self.parts(), part, rings)).sum::<f64>();
-        let (fine, coarse) = (rule(RINGS), rule(RINGS / 2));
+        let (fine, coarse) = (rule(UNION_RINGS), rule(UNION_RINGS / 2));
         Volume { volume_m3: fine, error_m3: (fine - coarse).abs() }
     }
 }
@@ -39,12 +39,12 @@ fn share(parts: &[Body], part: usize, rings: usize) -> f64 {
         let r = radius(body.constraints(), &start, &u);
         let ray = body.inverse() * u * r;
         let share = |step: usize| {
-            let x = body.interior_point() + ray * ((step as f64 + 0.5) / STEPS as f64).cbrt();
+            let x = body.interior_point() + ray * ((step as f64 + 0.5) / UNION_RAY_POINTS as f64).cbrt();
             let holders =
                 near.iter().filter(|other| inside(other.bounding_box(), &x) && other.value(&x) <= 1.0).count();
             1.0 / (1 + holders) as f64
         };
-        weight * r.powi(3) / 3.0 * (0..STEPS).map(share).sum::<f64>() / STEPS as f64
+        weight * r.powi(3) / 3.0 * (0..UNION_RAY_POINTS).map(share).sum::<f64>() / UNION_RAY_POINTS as f64
     };
     sphere_rule(rings).map(along).sum::<f64>() / body.normalization().linear.determinant().abs()
 }

@@ -66,7 +66,7 @@ struct FileRelaxation {
 }
 
 impl SosBody {
-    /// Whether a text says that it is the file of an sos-body.
+    /// Whether a text names itself the file of an sos-body.
     pub fn is_file(text: &str) -> bool {
         kind(text).is_ok_and(|kind| kind == SOS_BODY_KIND)
     }

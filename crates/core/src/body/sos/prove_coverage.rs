@@ -1,4 +1,4 @@
-//! Proof that a set contains triangles, one by one: convexity does not tell here.
+//! Proof that a set contains triangles, one by one: convexity proves nothing here.
 
 use super::coverage::{Coverage, TriangleError, Uncovered};
 use super::sos_body::SosBody;

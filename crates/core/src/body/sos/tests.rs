@@ -52,7 +52,8 @@ fn cassini() -> SosBody {
     set_of(&[norm, linear(0.0, 4.0, 0.0, 0.0), linear(0.0, 0.0, 4.0, 0.0)], 1.0, 1e-9)
 }
 
-/// The torus `(|v|² + 1 - r²)² <= 4 (x² + y²)` with tube radius r about the unit circle, as `(|v|² - 1 - r²)² + 4 z² <= 4 r²`.
+/// The torus `(|v|² + 1 - r²)² <= 4 (x² + y²)` with tube radius r about the unit circle, as
+/// `(|v|² - 1 - r²)² + 4 z² <= 4 r²`.
 fn torus(r: f64) -> SosBody {
     let norm = Terms::from([([2, 0, 0], 1.0), ([0, 2, 0], 1.0), ([0, 0, 2], 1.0), ([0; 3], -1.0 - r * r)]);
     set_of(&[norm, linear(0.0, 0.0, 2.0, 0.0)], 4.0 * r * r, 1e-10)

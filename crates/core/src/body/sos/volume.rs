@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
 
 /// Rays, of which the estimate of the error takes half.
-const RAYS: usize = 20_000;
+const VOLUME_RAYS: usize = 20_000;
 
 /// The volume, `⅓ ∫ Σ (to³ - from³) du / |det L|` over the chords of rays from the centre of
 /// `ball`, which holds the set; and the middle of the longest chord, metres, if there is a chord.
@@ -49,6 +49,6 @@ pub(super) fn measure(
         // A third of the cubes' mean times the area of the sphere.
         sum * (4.0 * PI / 3.0 / rays as f64) * inverse.determinant().abs()
     };
-    let (fine, coarse) = (rule(RAYS), rule(RAYS / 2));
+    let (fine, coarse) = (rule(VOLUME_RAYS), rule(VOLUME_RAYS / 2));
     (Volume { volume_m3: fine, error_m3: (fine - coarse).abs() }, longest.1)
 }
