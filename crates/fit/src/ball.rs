@@ -2,11 +2,15 @@
 
 use nalgebra::Vector3;
 
-/// Relative accuracy of the square of the radius.
-const TOLERANCE: f64 = 1e-9;
+/// Relative accuracy of the square of the radius; dimensionless.
+///
+/// The ball is the coarsest rung of a ladder, whose gap is measured afterwards. A larger value
+/// makes the ball larger than need be; a smaller one takes more of the linearly convergent steps.
+/// Pinned by `it_is_the_smallest`.
+const SQUARED_RADIUS_TOLERANCE: f64 = 1e-9;
 
 /// Steps before giving up; tens to a few thousand are used in practice.
-const STEPS: usize = 200_000;
+const MAX_ASCENT_STEPS: usize = 200_000;
 
 /// A ball, units of the points.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +41,7 @@ pub fn smallest_ball(points: &[Vector3<f64>]) -> EnclosingBall {
     weights[other] += 0.5;
     let mut center = (points[one] + points[other]) * 0.5;
     let mut radius = 0.0;
-    for step in 0..STEPS {
+    for step in 0..MAX_ASCENT_STEPS {
         let squares: Vec<f64> = points.iter().map(|x| (x - center).norm_squared()).collect();
         let variance: f64 = squares.iter().zip(&weights).map(|(square, weight)| square * weight).sum();
         let (mut far, mut near) = (0, None::<usize>);
@@ -52,7 +56,7 @@ pub fn smallest_ball(points: &[Vector3<f64>]) -> EnclosingBall {
         radius = squares[far].sqrt();
         let (Some(near), true) = (near, variance > 0.0) else { break };
         let (above, below) = (squares[far] / variance - 1.0, 1.0 - squares[near] / variance);
-        if above <= TOLERANCE || step + 1 == STEPS {
+        if above <= SQUARED_RADIUS_TOLERANCE || step + 1 == MAX_ASCENT_STEPS {
             break;
         }
         // Exact line search; away from a point not past weight zero.

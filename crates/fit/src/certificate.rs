@@ -13,8 +13,8 @@
 //! λ_min(H) tr S(s)`: what is found on the way bounds the smallest eigenvalue of all certificates
 //! from above, and where it is negative there is none.
 //!
-//! A square that only one product of the basis gives and that f lacks rules that element of the
-//! basis out, as those of sparse forms: of `z^4` only `y z` is left.
+//! A square that only one product of the basis gives and that is missing in f rules that element of
+//! the basis out, as those of sparse forms: of `z^4` only `y z` is left.
 
 use super::factor::regularised_factor;
 use super::structure::{Pattern, Structure};
@@ -23,17 +23,31 @@ use sublevel_core::body::sphere_rule;
 use sublevel_core::polynomial::{CertificateError, Exponents, HessianGram, HessianMonomial, Polynomial};
 
 /// Newton steps before giving up; ten to thirty are used where there is a certificate.
-const STEPS: usize = 300;
+const MAX_NEWTON_STEPS: usize = 300;
 
-/// Newton decrement at which the matrix is the best one for all practical purposes.
-const CENTRED: f64 = 1e-6;
+/// Newton decrement at which the determinant is the largest for all practical purposes;
+/// dimensionless.
+///
+/// The eigenvalues are then known to this relative accuracy. A larger value ends with certificates
+/// of smaller eigenvalues; a smaller one is not reached near the edge of convexity. Pinned by
+/// `the_edge_of_convexity_is_told_from_both_sides`.
+const OPTIMAL_DECREMENT: f64 = 1e-6;
 
-/// Decrement below which a step's prediction is definite.
-const NEAR: f64 = 0.5;
+/// Newton decrement below which the matrix that a step predicts is tried as a certificate;
+/// dimensionless.
+///
+/// Below 1 the prediction is definite, and a half keeps away from there. A larger value tries
+/// matrices that are not definite; a smaller one takes more steps. Pinned by
+/// `sparse_and_full_forms_get_proven_certificates`.
+const DEFINITE_DECREMENT: f64 = 0.5;
 
-/// Bound of the smallest eigenvalue, relative to the largest coefficient, below which rounding
-/// leaves nothing to prove.
-const LEAST: f64 = 1e-14;
+/// Bound of the smallest eigenvalue, relative to the largest coefficient, below which a polynomial
+/// is refused; dimensionless.
+///
+/// The residual of a proof in double precision is about 1e-15 of the coefficients. A larger value
+/// refuses polynomials that can be proven; a smaller one searches where nothing can be. Pinned by
+/// `the_edge_of_convexity_is_told_from_both_sides`.
+const LEAST_PROVABLE_EIGENVALUE: f64 = 1e-14;
 
 /// Why a polynomial has no certificate.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -143,7 +157,7 @@ fn centre(pattern: &Pattern, form: &DVector<f64>, start: &DVector<f64>) -> Resul
     let mut s = start.clone();
     let mut bound = f64::INFINITY;
     let mut found = None;
-    for step in 0..STEPS {
+    for step in 0..MAX_NEWTON_STEPS {
         let moments = pattern.spread(&s);
         let trace = moments.trace();
         let Some(gram) = Cholesky::new(moments).map(|factor| factor.inverse()) else { break };
@@ -163,11 +177,11 @@ fn centre(pattern: &Pattern, form: &DVector<f64>, start: &DVector<f64>) -> Resul
         let Some(half) = factor.solve_lower_triangular(&slope) else { break };
         let Some(change) = factor.tr_solve_lower_triangular(&half).map(|change| -change) else { break };
         let decrement = half.norm();
-        if decrement < NEAR {
+        if decrement < DEFINITE_DECREMENT {
             let predicted = &gram * 2.0 - &gram * pattern.spread(&(&s + &change)) * &gram;
             found = Some((&predicted + predicted.transpose()) * 0.5);
         }
-        if !(decrement > CENTRED) || bound < LEAST {
+        if !(decrement > OPTIMAL_DECREMENT) || bound < LEAST_PROVABLE_EIGENVALUE {
             break;
         }
         s += change / (1.0 + decrement);

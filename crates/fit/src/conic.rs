@@ -2,7 +2,8 @@
 //! method.
 //!
 //! ```text
-//! minimise  F(c)   subject to  p(xᵢ) + tᵢ = 1, tᵢ >= 0,   D c - ε tr = A x,  every block of x in its Lorentz cone
+//! minimise  F(c)   subject to  p(xᵢ) + tᵢ = 1,  tᵢ >= 0,
+//!                              D c - ε tr = A x,  every block of x in its Lorentz cone
 //! ```
 //!
 //! over the coefficients c of p, F a quadratic model (`model`), A and the blocks those of
@@ -26,14 +27,14 @@ use super::progress::Watch;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 /// Steps at most; 10 to 25 are usual.
-const STEPS: usize = 60;
+const MAX_CONIC_STEPS: usize = 60;
 /// Largest part of the way to the boundary that a step takes.
-const TO_BOUNDARY: f64 = 0.98;
+const CONIC_STEP_SHARE: f64 = 0.98;
 /// Error of the equations at which to stop, relative to the largest block.
-const FEASIBLE: f64 = 1e-9;
+const FEASIBILITY_ERROR: f64 = 1e-9;
 
 /// The same of what is taken when there is no better.
-const ROUGH: f64 = 1e-6;
+const ROUGH_FEASIBILITY_ERROR: f64 = 1e-6;
 
 /// Size of the functional to start from, beside the slope of the model.
 const FUNCTIONAL: f64 = 0.5;
@@ -62,7 +63,7 @@ struct Point {
     duals: Vec<Vector3<f64>>,
 }
 
-/// By how much a point misses the linear equations.
+/// Residuals of the linear equations at a point.
 struct Residuals {
     gradient: DVector<f64>,
     points: DVector<f64>,
@@ -71,7 +72,7 @@ struct Residuals {
 
 impl Residuals {
     /// The largest error of what makes a point feasible, relative to its largest block.
-    fn misses(&self, at: &Point) -> f64 {
+    fn infeasibility(&self, at: &Point) -> f64 {
         let size = at.blocks.iter().map(|x| x.x).fold(1.0, f64::max);
         self.form.amax().max(self.points.amax()) / size
     }
@@ -80,6 +81,8 @@ impl Residuals {
 /// What one factorization serves: predictor and corrector.
 struct System<'a> {
     scalings: Vec<Scaling>,
+    /// Duals in the scaled frames, where they equal the blocks.
+    scaled: Vec<Vector3<f64>>,
     normal: Bordered<'a>,
     factor: DMatrix<f64>,
 }
@@ -103,17 +106,18 @@ impl Conic<'_> {
         watch: &mut Watch,
     ) -> Result<Option<Interior>, FitError> {
         let mut at = self.start(start, gap);
-        for _ in 0..STEPS {
+        for _ in 0..MAX_CONIC_STEPS {
             watch.iteration(at.gap())?;
             let residuals = self.residuals(&at);
-            if residuals.misses(&at) <= FEASIBLE && at.gap() <= gap && residuals.gradient.amax() <= gap {
+            if residuals.infeasibility(&at) <= FEASIBILITY_ERROR && at.gap() <= gap && residuals.gradient.amax() <= gap
+            {
                 return Ok(Some(self.interior(at)));
             }
             let Some(next) = self.step(&at, &residuals) else { break };
             at = next;
         }
         // Feasible all the same, it may still be a way down.
-        Ok((self.residuals(&at).misses(&at) <= ROUGH).then(|| self.interior(at)))
+        Ok((self.residuals(&at).infeasibility(&at) <= ROUGH_FEASIBILITY_ERROR).then(|| self.interior(at)))
     }
 
     /// Centred: every product of a slack and its multiplier is the same. Blocks as large as the
@@ -153,12 +157,11 @@ impl Conic<'_> {
     /// predictor neglects.
     fn step(&self, at: &Point, residuals: &Residuals) -> Option<Point> {
         let system = self.system(at)?;
-        let scaled: Vec<Vector3<f64>> = system.scalings.iter().zip(&at.duals).map(|(w, z)| w.apply(z)).collect();
         let plain = Aims {
             points: -at.slacks.component_mul(&at.multipliers),
-            blocks: scaled.iter().map(|l| -product(l, l)).collect(),
+            blocks: system.scaled.iter().map(|l| -product(l, l)).collect(),
         };
-        let predictor = self.direction(&system, at, residuals, &scaled, &plain);
+        let predictor = self.direction(&system, at, residuals, &plain);
         let reach = at.longest(&predictor).min(1.0);
         let mean = at.gap() / (at.slacks.len() + at.blocks.len()) as f64;
         let centre = (1.0 - reach).powi(3).clamp(1e-4, 0.8) * mean;
@@ -168,8 +171,8 @@ impl Conic<'_> {
             points: (&plain.points - predictor.slacks.component_mul(&predictor.multipliers)).add_scalar(centre),
             blocks: plain.blocks.iter().zip(corrections).map(|(aim, by)| aim - by + Vector3::x() * centre).collect(),
         };
-        let step = self.direction(&system, at, residuals, &scaled, &aims);
-        let length = (TO_BOUNDARY * at.longest(&step)).min(1.0);
+        let step = self.direction(&system, at, residuals, &aims);
+        let length = (CONIC_STEP_SHARE * at.longest(&step)).min(1.0);
         let next = at.moved(&step, length);
         (length > 1e-8 && next.gap().is_finite()).then_some(next)
     }
@@ -177,6 +180,7 @@ impl Conic<'_> {
     fn system(&self, at: &Point) -> Option<System<'_>> {
         let pairs = at.blocks.iter().zip(&at.duals);
         let scalings = pairs.map(|(x, z)| Scaling::new(x, z)).collect::<Option<Vec<_>>>()?;
+        let scaled = scalings.iter().zip(&at.duals).map(|(w, z)| w.apply(z)).collect();
         let normal = self.dominance.normal(scalings.iter().map(Scaling::square))?;
         let weights = at.multipliers.component_div(&at.slacks);
         let mut weighted = self.values.clone();
@@ -184,24 +188,17 @@ impl Conic<'_> {
             column *= *weight;
         }
         let hessian = self.model.flexibility() + weighted * self.values.transpose() + normal.curvature()?;
-        Some(System { scalings, normal, factor: regularised_factor(&hessian)? })
+        Some(System { scalings, scaled, normal, factor: regularised_factor(&hessian)? })
     }
 
     /// The Newton step towards the aims.
-    fn direction(
-        &self,
-        system: &System,
-        at: &Point,
-        residuals: &Residuals,
-        scaled: &[Vector3<f64>],
-        aims: &Aims,
-    ) -> Point {
+    fn direction(&self, system: &System, at: &Point, residuals: &Residuals, aims: &Aims) -> Point {
         let Self { dominance, values, .. } = self;
         // dx = toward - Θ dz,  dλ = (aim - λ dt)/t
         let toward: Vec<Vector3<f64>> = system
             .scalings
             .iter()
-            .zip(scaled.iter().zip(&aims.blocks))
+            .zip(system.scaled.iter().zip(&aims.blocks))
             .map(|(w, (l, aim))| w.apply(&quotient(aim, l)))
             .collect();
         let push = (&aims.points - at.multipliers.component_mul(&residuals.points)).component_div(&at.slacks);

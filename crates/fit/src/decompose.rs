@@ -7,7 +7,7 @@
 
 use super::part_points::part_points;
 use super::progress::Watch;
-use super::segment::{NOTHING, Nested, Segmentation, Style};
+use super::segment::{NEGLIGIBLE_VOLUME, Nested, Segmentation, Style};
 use super::split::Partition;
 use super::{FitError, MAX_PIECES, Mesh, Progress, Shortfall};
 use nalgebra::Vector3;
@@ -122,8 +122,10 @@ impl Decomposition {
             match self.best.get_mut(index) {
                 // What is as good within the noise is not worth a change, but to one that keeps
                 // components apart.
-                Some(best) if total < best.0 * (1.0 - NOTHING) => *best = (total, source),
-                Some(best) if best.1 == Source::Greedy && total <= best.0 * (1.0 + NOTHING) => *best = (total, source),
+                Some(best) if total < best.0 * (1.0 - NEGLIGIBLE_VOLUME) => *best = (total, source),
+                Some(best) if best.1 == Source::Greedy && total <= best.0 * (1.0 + NEGLIGIBLE_VOLUME) => {
+                    *best = (total, source);
+                }
                 Some(_) => {}
                 None => self.best.push((total, source)),
             }
@@ -139,7 +141,7 @@ impl Decomposition {
     /// part more gains something. What is not connected is kept in parts of its own where that is
     /// as good.
     pub(super) fn fewest(&self, parts: usize) -> usize {
-        let worth = NOTHING * self.best[0].0;
+        let worth = NEGLIGIBLE_VOLUME * self.best[0].0;
         let cost = |index: usize| self.best[index].0 + worth * index as f64;
         let known = parts.min(self.best.len());
         let least = (0..known).min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(0);

@@ -260,10 +260,10 @@ mod tests {
                 let gram = dominance.gram(&blocks);
                 assert!(gram.clone().symmetric_eigenvalues().min() > 0.0);
                 let form = dominance.collapse(&blocks);
-                // A functional on the form sees the same in both orders.
+                // A functional on the form has the same value in both orders.
                 let means = isotropic_form(&structure, &cube_moments(&structure));
-                let seen = means.dot(&structure.hessian.collapse(&gram));
-                assert!((dominance.positive.dot(&form) - seen).abs() < 1e-10 * form.amax());
+                let value = means.dot(&structure.hessian.collapse(&gram));
+                assert!((dominance.positive.dot(&form) - value).abs() < 1e-10 * form.amax());
                 assert!(dominance.spread(&dominance.positive).iter().all(|z| z.x > z.y.hypot(z.z)));
                 if cone == Cone::Dsos {
                     for (i, row) in gram.row_iter().enumerate() {

@@ -2,10 +2,14 @@
 
 use nalgebra::{Matrix3, Matrix4, SymmetricEigen, Vector3, Vector4};
 
-/// Relative accuracy of the optimality conditions; the volume is off by about twice this.
-const TOLERANCE: f64 = 1e-7;
+/// Relative accuracy of the optimality conditions; dimensionless.
+///
+/// The volume is off by about twice this. A larger value makes bodies of degree 2 larger than need
+/// be; a smaller one takes more of the linearly convergent steps, up to [`MAX_ASCENT_STEPS`].
+/// Pinned by `of_a_cuboid`.
+const HEIGHT_TOLERANCE: f64 = 1e-7;
 /// Steps before giving up; tens to a few thousand are used in practice.
-const STEPS: usize = 200_000;
+const MAX_ASCENT_STEPS: usize = 200_000;
 /// Points that may all have a weight at first.
 const FEW: usize = 1000;
 /// Rank-one updates between two factorizations from scratch, which bounds the drift of the inverse.
@@ -40,7 +44,7 @@ pub fn minimum_ellipsoid(points: &[Vector3<f64>]) -> Option<Ellipsoid> {
     let lifted: Vec<Vector4<f64>> = points.iter().map(|p| p.push(1.0)).collect();
     let mut weights = first_weights(points)?;
     let (mut inverse, mut heights) = heights(&lifted, &weights)?;
-    for step in 1..=STEPS {
+    for step in 1..=MAX_ASCENT_STEPS {
         let (mut far, mut near) = (0, None::<usize>);
         for (i, &height) in heights.iter().enumerate() {
             if height > heights[far] {
@@ -52,7 +56,7 @@ pub fn minimum_ellipsoid(points: &[Vector3<f64>]) -> Option<Ellipsoid> {
         }
         let near = near?;
         let (above, below) = (heights[far] / 4.0 - 1.0, 1.0 - heights[near] / 4.0);
-        if above.max(below) <= TOLERANCE {
+        if above.max(below) <= HEIGHT_TOLERANCE {
             break;
         }
         // Exact line search towards the highest point, or away from the lowest (not past weight

@@ -105,7 +105,7 @@ pub enum FitError {
     /// The progress callback asked to stop.
     #[error("the fit was cancelled")]
     Cancelled,
-    /// The program has no usable start, or rounding ate it.
+    /// The program has no usable start, or was lost in rounding.
     #[error(transparent)]
     Program(#[from] ProgramError),
     /// Points were left outside again and again.

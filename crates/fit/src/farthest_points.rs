@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-/// Indices of at most `most` of the points: first the farthest from the origin, then again and again
-/// the farthest from all those chosen before (Gonzalez, Theoret. Comput. Sci. 38, 1985). Of points
-/// that are equally far the last one is chosen.
+/// Indices of at most `most` of the points: first the farthest from the origin, then again and
+/// again the farthest from all those chosen before (Gonzalez, Theoret. Comput. Sci. 38, 1985). Of
+/// points that are equally far the last one is chosen.
 pub(super) fn farthest_points(points: &[Vector3<f64>], most: usize) -> Vec<usize> {
     let mut distances = vec![f64::INFINITY; points.len()];
     let mut next = (0..points.len()).max_by(|&a, &b| points[a].norm().total_cmp(&points[b].norm())).unwrap_or(0);

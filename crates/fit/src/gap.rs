@@ -24,23 +24,41 @@ use std::f64::consts::PI;
 use sublevel_core::body::{Body, Constraint, Sphere, boundary_radius, sphere_rule};
 use sublevel_core::optimize::{Corner, gjk};
 
-/// How much larger than a distance found the bound may be.
-const ACCURACY: f64 = 0.02;
+/// How much larger than the distance found the bound may be, as a part of it; dimensionless.
+///
+/// A user compares gaps with millimetres. A larger value makes ladders choose finer rungs than
+/// needed; a smaller one takes more cells. Pinned by
+/// `the_bound_holds_in_all_directions_and_is_close`.
+const GAP_ACCURACY: f64 = 0.02;
 
-/// Distance, relative to the body, that is as good as none.
-pub(super) const NONE: f64 = 1e-5;
+/// Gap, relative to the size of the body, that is not resolved any further; dimensionless.
+///
+/// Cells near edges of a polytope shrink linearly: the search would take thousands of times as many
+/// for each digit. A larger value leaves bounds of bodies that are close at that; a smaller one
+/// uses up [`MAX_CELLS`]. Pinned by `a_box_does_not_reach_beyond_its_corners`.
+pub(super) const RESOLVED_GAP: f64 = 1e-5;
 
 /// Most cells looked at; the bound holds after fewer, too.
 const MAX_CELLS: usize = 30_000;
 
 /// Rings of the rule for the mean.
-const RINGS: usize = 24;
+const MEAN_RINGS: usize = 24;
 
-/// How far out a constraint's surface may be met, relative to the body's.
-const FAR: f64 = 100.0;
+/// Distance at which a ray may meet the surface of one constraint, relative to that at which it
+/// leaves the body; dimensionless.
+///
+/// Tangent planes there bound the body best, but rounding grows with the distance. A larger value
+/// loosens the bound by rounding; a smaller one takes planes at points that are not on the surface.
+/// Pinned by `slabs_leave_a_polytope_no_gap`.
+const MAX_CONSTRAINT_REACH: f64 = 100.0;
 
-/// What rounding may add, relative to the body.
-const ROUNDING: f64 = 1e-12;
+/// What rounding may add to a height or a distance, relative to the size of the body;
+/// dimensionless.
+///
+/// Fewer than a thousand roundings of 1e-16 each lead to one of them. A smaller value would make
+/// the bound unproven; a larger one lets gaps of close bodies be nothing but this allowance. Pinned
+/// by `a_box_does_not_reach_beyond_its_corners`.
+const GAP_ROUNDING: f64 = 1e-12;
 
 /// How far a body reaches beyond a convex hull inside it, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,7 +80,7 @@ pub struct Gap {
 /// metres of the body frame. Gaps below a 1e-5th of the body are not resolved: their bound is about
 /// that.
 pub fn gap(body: &Body, points: &[Vector3<f64>]) -> Gap {
-    Search::new(body, points).run()
+    GapSearch::new(body, points).run()
 }
 
 /// A ray, everything seen from the interior point, metres.
@@ -101,7 +119,7 @@ impl Ord for Cell {
     }
 }
 
-struct Search<'a> {
+struct GapSearch<'a> {
     body: &'a Body,
     /// Points seen from the interior point.
     points: Vec<Vector3<f64>>,
@@ -116,7 +134,7 @@ struct Search<'a> {
     direction: Vector3<f64>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> GapSearch<'a> {
     fn new(body: &'a Body, points: &[Vector3<f64>]) -> Self {
         let points: Vec<_> = points.iter().map(|x| x - body.interior_point()).collect();
         let ball = body.circumscribed();
@@ -140,7 +158,7 @@ impl<'a> Search<'a> {
         let mut most = f64::INFINITY;
         while let Some(cell) = cells.pop() {
             most = cell.most;
-            if most <= (self.found * (1.0 + ACCURACY)).max(NONE * self.size) || cells.len() >= MAX_CELLS {
+            if most <= (self.found * (1.0 + GAP_ACCURACY)).max(RESOLVED_GAP * self.size) || cells.len() >= MAX_CELLS {
                 break;
             }
             let [a, b, c] = cell.rays;
@@ -178,9 +196,9 @@ impl<'a> Search<'a> {
             .iter()
             .map(|constraint| {
                 // Where the ray crosses that constraint's own surface, be it farther out than the
-                // body's, but not at the end of the world.
+                // body's, unless rounding would be too large there.
                 let own = body.inverse() * u * boundary_radius(&constraint.polynomial, &start, &u);
-                self.plane(constraint, if own.norm() <= FAR * exit.norm() { &own } else { &exit })
+                self.plane(constraint, if own.norm() <= MAX_CONSTRAINT_REACH * exit.norm() { &own } else { &exit })
             })
             // Without one of them the others still hold the body.
             .filter(|a| a.iter().all(|entry| entry.is_finite()))
@@ -202,7 +220,7 @@ impl<'a> Search<'a> {
         let slack = sample.nearby_value_error()
             + (gradient.norm() + sample.gradient_error()) * placement.displacement(&place)
             + sample.gradient_error() * (self.size + x.norm())
-            + ROUNDING * (1.0 + sample.value().abs() + gradient.norm() * (place.norm() + interior.norm()));
+            + GAP_ROUNDING * (1.0 + sample.value().abs() + gradient.norm() * (place.norm() + interior.norm()));
         gradient / (gradient.dot(x) + 1.0 - sample.value() + slack)
     }
 
@@ -229,7 +247,7 @@ impl<'a> Search<'a> {
                 let along = rays[0].d * w[0] + rays[1].d * w[1] + rays[2].d * w[2];
                 let reach = plane[0] * w[0] + plane[1] * w[1] + plane[2] * w[2];
                 let rounded = plane[0].abs() * w[0] + plane[1].abs() * w[1] + plane[2].abs() * w[2];
-                let reach = reach - ROUNDING * rounded;
+                let reach = reach - GAP_ROUNDING * rounded;
                 // Planes that leave the cell open somewhere bound nothing there.
                 if !(reach > 0.0) {
                     return f64::INFINITY;
@@ -242,7 +260,7 @@ impl<'a> Search<'a> {
 
     /// Bound of the distance of x from the hull.
     fn distance(&self, x: &Vector3<f64>) -> f64 {
-        let distance = (x - nearest(&self.points, x)).norm() + ROUNDING * self.size;
+        let distance = (x - nearest(&self.points, x)).norm() + GAP_ROUNDING * self.size;
         // A plane that bounds nothing.
         if x.norm() < f64::INFINITY { distance } else { f64::INFINITY }
     }
@@ -259,7 +277,7 @@ impl<'a> Search<'a> {
 
     fn mean(&self) -> f64 {
         let gap = |n: &Vector3<f64>| self.body.support(n).height_m - height(&self.points, n);
-        sphere_rule(RINGS).map(|(n, weight)| gap(&n) * weight).sum::<f64>() / (4.0 * PI)
+        sphere_rule(MEAN_RINGS).map(|(n, weight)| gap(&n) * weight).sum::<f64>() / (4.0 * PI)
     }
 }
 

@@ -7,35 +7,57 @@ use super::objective::Matrix;
 use super::path::{Interior, Iterate, Path, PathOptions};
 use super::program::{Problem, ProgramError};
 use super::progress::Watch;
+use super::spaced_points::spaced_points;
 use super::structure::Structure;
 use nalgebra::{DMatrix, DVector, Vector3};
 use sublevel_core::body::fibonacci_lattice;
 
-/// A point may be outside by this much in p before the pull-in takes it in.
+/// Excess of p over 1 up to which a point is left to the shift of the constant coefficient;
+/// dimensionless.
+///
+/// The shift grows the volume by about as much. A larger value makes bodies larger than the
+/// optimum; a smaller one takes more rounds than the solver is accurate for. Pinned by
+/// `the_optimum_is_feasible_and_its_bound_holds`.
 const VIOLATION: f64 = 1e-6;
-/// Largest distance of f to its lower bound, relative to f (or 1, if that is more), of a fit.
+
+/// Largest distance of f to its lower bound, relative to f (or 1, if that is more), of a fit;
+/// dimensionless.
+///
+/// It is a promise of the reports. A larger value would weaken the promise; a smaller one refuses
+/// fits that rounding keeps from it. Pinned by `objectives_are_optimal_and_proven`.
 pub(super) const OPTIMALITY_GAP: f64 = 1e-5;
+
 /// Distance to the optimum asked of the path, in units of log dets.
-const GAP: f64 = 3e-7;
-/// The same while points are still added.
+///
+/// Well below [`OPTIMALITY_GAP`], so that fits pass it. A larger value fails that check; a smaller
+/// one is not reached where rounding stops the path. Pinned by `objectives_are_optimal_and_proven`.
+const FINE_GAP: f64 = 3e-7;
+
+/// As [`FINE_GAP`], while points are still added: which points are outside hardly depends on the
+/// last digits.
+///
+/// A larger value adds points that do not bound the optimum; a smaller one takes more Newton steps
+/// in every round. Pinned by `refits_of_a_stream_take_fewer_steps_and_end_where_fits_do`.
 const ROUGH_GAP: f64 = 1e-3;
 /// Most rounds of adding points at the rough optimum, and the violation below which it does not
 /// matter.
 const PREPARATIONS: usize = 3;
-/// See [`PREPARATIONS`].
+
+/// Excess of p over 1 up to which the rough optimum needs no further points; dimensionless.
+///
+/// See [`PREPARATIONS`]. It changes how many rounds a fit takes and not its answer, which
+/// [`VIOLATION`] decides.
 const PREPARED: f64 = 1e-3;
 /// Points in the start, in multiples of N, and the most that are taken for likely.
-const SPREAD: usize = 10;
-/// See [`SPREAD`].
-const LIKELY: usize = 5;
-/// Points added together have at least this distance; the frame is whitened.
-const SPACING: f64 = 0.05;
+const START_MULTIPLE: usize = 10;
+/// See [`START_MULTIPLE`].
+const LIKELY_MULTIPLE: usize = 5;
 /// Growth of τ from one centre to the next.
 const GROWTH: f64 = 10.0;
 /// Newton steps on one path before settling for what there is.
-const STEPS: usize = 200;
+const MAX_PATH_STEPS: usize = 200;
 /// Sets of points before giving up.
-const ROUNDS: usize = 60;
+const MAX_POINT_ROUNDS: usize = 60;
 
 /// The optimum of a fit's program, feasible for all points up to [`VIOLATION`].
 #[derive(Clone, Debug)]
@@ -66,7 +88,7 @@ pub(super) fn generate(
     let structure = problem.structure;
     let mut active = Active::start(&problem, points, likely);
     let mut worst = 0.0;
-    for round in 1..=ROUNDS {
+    for round in 1..=MAX_POINT_ROUNDS {
         // Points come in while the optimum is still rough.
         let path = Path::of_fit(&problem, &active.values);
         let first = path.start().ok_or(ProgramError::Singular)?;
@@ -78,7 +100,7 @@ pub(super) fn generate(
             active.add(structure, points, &outside);
             continue;
         }
-        let last = path.follow(rough.place.clone(), path_options(GAP), watch)?.unwrap_or(rough);
+        let last = path.follow(rough.point.clone(), path_options(FINE_GAP), watch)?.unwrap_or(rough);
         let outside = violations(structure, points, &last.interior.coefficients);
         worst = outside.first().map_or(0.0, |&(excess, _)| excess);
         if worst <= VIOLATION {
@@ -86,11 +108,11 @@ pub(super) fn generate(
         }
         active.add(structure, points, &outside);
     }
-    Err(FitError::NoConvergence { rounds: ROUNDS })
+    Err(FitError::NoConvergence { rounds: MAX_POINT_ROUNDS })
 }
 
 fn path_options(gap: f64) -> PathOptions {
-    PathOptions { gap, growth: GROWTH, steps: STEPS }
+    PathOptions { gap, growth: GROWTH, steps: MAX_PATH_STEPS }
 }
 
 /// The optimum if the dual point proves it one.
@@ -100,7 +122,7 @@ fn verified(problem: &Problem, centre: Iterate) -> Result<Optimum, FitError> {
         Matrix::Hessian => Some(&centre.interior.hessian),
     };
     let objective = gram.and_then(|gram| problem.spectral.measure(gram)).ok_or(ProgramError::Singular)?;
-    let gap = objective - problem.lower_bound(&centre.place.dual)?;
+    let gap = objective - problem.lower_bound(&centre.point.dual)?;
     if !(gap.abs() <= OPTIMALITY_GAP * objective.abs().max(1.0)) {
         return Err(FitError::NotOptimal { gap });
     }
@@ -120,17 +142,6 @@ fn violations(structure: &Structure, points: &[Vector3<f64>], coefficients: &DVe
     outside
 }
 
-/// The first of some points that are not close to one before, at most so many.
-fn apart(points: &[Vector3<f64>], candidates: impl Iterator<Item = usize>, most: usize) -> Vec<usize> {
-    let mut taken: Vec<usize> = Vec::new();
-    for index in candidates {
-        if taken.len() < most && taken.iter().all(|&other| (points[other] - points[index]).norm() > SPACING) {
-            taken.push(index);
-        }
-    }
-    taken
-}
-
 /// The points a program knows.
 struct Active {
     /// Which of the points are in.
@@ -146,7 +157,7 @@ impl Active {
     /// points lie on a quadric, as the corners of a box do.
     fn start(problem: &Problem, points: &[Vector3<f64>], likely: &[usize]) -> Self {
         let structure = problem.structure;
-        let first = farthest_points(points, SPREAD * structure.gram.size);
+        let first = farthest_points(points, START_MULTIPLE * structure.gram.size);
         let mut chosen: Vec<Vector3<f64>> = first.iter().map(|&index| points[index]).collect();
         if problem.is_convex() {
             chosen.extend(inner(structure));
@@ -154,7 +165,7 @@ impl Active {
         let mut used = vec![false; points.len()];
         first.iter().for_each(|&index| used[index] = true);
         let unused = likely.iter().copied().filter(|&index| !used[index]);
-        let likely = apart(points, unused, LIKELY * structure.gram.size);
+        let likely = spaced_points(points, unused, LIKELY_MULTIPLE * structure.gram.size);
         likely.iter().for_each(|&index| used[index] = true);
         chosen.extend(likely.into_iter().map(|index| points[index]));
         let values = columns(structure, &chosen);
@@ -164,7 +175,7 @@ impl Active {
     /// Adds the worst of the points outside, but not many from one spot.
     fn add(&mut self, structure: &Structure, points: &[Vector3<f64>], outside: &[(f64, usize)]) {
         let candidates = outside.iter().map(|&(_, index)| index).filter(|&index| !self.used[index]);
-        let added = apart(points, candidates, 2 * structure.gram.size);
+        let added = spaced_points(points, candidates, 2 * structure.gram.size);
         added.iter().for_each(|&index| self.used[index] = true);
         self.chosen.extend(added.into_iter().map(|index| points[index]));
         self.values = columns(structure, &self.chosen);
@@ -181,9 +192,9 @@ fn columns(structure: &Structure, points: &[Vector3<f64>]) -> DMatrix<f64> {
 /// the ball of a third of its radius is inside (John's theorem).
 pub(super) fn inner(structure: &Structure) -> impl Iterator<Item = Vector3<f64>> {
     let count = 2 * structure.gram.size;
-    fibonacci_lattice(count).enumerate().map(|(i, u)| u * (INNER * (i as f64 * RADII).fract().cbrt()))
+    fibonacci_lattice(count).enumerate().map(|(i, u)| u * (INNER_RADIUS * (i as f64 * RADIUS_STEP).fract().cbrt()))
 }
 
 /// Radius of the ball, and the step of a low-discrepancy sequence of its radii.
-const INNER: f64 = 0.33;
-const RADII: f64 = 0.754_878;
+const INNER_RADIUS: f64 = 0.33;
+const RADIUS_STEP: f64 = 0.754_878;

@@ -6,18 +6,28 @@ use super::outermost::outermost;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use std::collections::HashMap;
 
-/// Points thinner than this part of their longest extent count as flat.
+/// Thickness below which points count as flat, relative to their longest extent; dimensionless.
 ///
 /// The whitening stretches the thin direction by the inverse, so smaller values would cost digits
-/// of every later proof. A sheet of paper on a desk is 1e-4.
+/// of every later proof; a larger one refuses thin objects: a sheet of paper on a desk is 1e-4.
+/// Pinned by `flat_points_are_refused_with_their_thickness` and
+/// `a_thin_sheet_above_the_threshold_is_accepted`.
 pub const FLATNESS: f64 = 1e-6;
 
-/// Points that differ from flat by less than this many roundings of their coordinates count as
-/// flat, too.
+/// Thickness below which points count as flat, relative to their largest coordinate; dimensionless:
+/// ten thousand roundings, so that the shape keeps four digits.
+///
+/// A smaller value fits bodies to rounding errors; a larger one refuses objects that are only far
+/// from the origin. Pinned by `scales_and_offsets_change_only_the_units` and
+/// `points_far_away_are_refused_by_name`.
 const COORDINATE_ROUNDINGS: f64 = 1e4 * f64::EPSILON;
 
-/// How far a point may lie outside the computed hull, relative to its size, before the hull is
-/// computed again.
+/// Distance by which a point may lie outside of the computed hull before the hull is computed
+/// again, relative to its size; dimensionless.
+///
+/// The hull code's own tolerances are near 1e-10. A larger value accepts hulls that lost a vertex;
+/// a smaller one refuses hulls of points on flat facets. Pinned by
+/// `of_a_grid_with_many_coplanar_points`.
 const HULL_TOLERANCE: f64 = 1e-9;
 
 /// Why points have no usable convex hull.
@@ -280,6 +290,13 @@ mod tests {
                 other => panic!("{other:?}"),
             }
         }
+    }
+
+    #[test]
+    fn points_far_away_are_refused_by_name() {
+        let far = |distance: f64| convex_hull(&cuboid([1.0; 3], Vector3::new(distance, 0.0, 0.0)));
+        assert!(far(1e10).is_ok());
+        assert!(matches!(far(1e13), Err(HullError::TooFar { .. })));
     }
 
     #[test]

@@ -1,13 +1,13 @@
 //! Points to a certified body: hull, whitening, semidefinite program, certificate, proof.
 //!
-//! The way of one fit: [`input`] reads the points; [`hull`] leaves those that matter; the smallest
-//! [`ellipsoid`] around them gives the normalized frame (`object`); `generate` minimises an
-//! [`Objective`] over sos-convex polynomials with a margin by following the central path of the
-//! dual (`path`); `refine` goes on to the volume itself; the constant coefficient pulls every input
-//! point inside; [`Body::new`] proves the stored numbers; `slab` cuts off what is too much, and
-//! [`gap`](gap()) bounds what is left of it. Nothing of that is believed: a fit returns a body only
-//! with its proofs. A [`ladder`](ladder()) has several of them. [`fit_sos`] goes the same way to
-//! sets that need not be convex.
+//! The steps of one fit: [`input`] reads the points; [`hull`] leaves those that matter; the
+//! smallest [`ellipsoid`] around them gives the normalized frame (`object`); `generate` minimises
+//! an [`Objective`] over sos-convex polynomials with a margin by following the central path of the
+//! dual (`path`); `refine` then minimises the volume itself; the constant coefficient pulls every
+//! input point inside; [`Body::new`] proves the stored numbers; `slab` cuts off what is too much,
+//! and [`gap`](gap()) bounds what is left of it. No proof depends on any of that: a fit returns a
+//! body only with its proofs. A [`ladder`](ladder()) has several of them. [`fit_sos`] takes the
+//! same steps to sets that need not be convex.
 
 mod ball;
 mod barrier;
@@ -54,6 +54,7 @@ pub mod shapes;
 mod shortfall;
 mod slab;
 mod sos;
+mod spaced_points;
 mod spectral;
 mod split;
 mod structure;
@@ -103,11 +104,12 @@ use sublevel_core::body::Body;
 /// Log dets are least in every affine frame at once. Traces depend on the frame: they are measured
 /// in [`FitOptions::coordinates`].
 ///
-/// `progress` hears of every Newton step (below a millisecond at degree 4 to tens of milliseconds
-/// at degree 8), those of a refinement included, and can stop the fit.
+/// `progress` is called at every Newton step (below a millisecond at degree 4 to tens of
+/// milliseconds at degree 8), those of a refinement included, and can stop the fit.
 ///
 /// # Errors
-/// [`FitError`]: bad input by field, a cancelled fit, or what could not be solved or proven and by how much.
+/// [`FitError`]: bad input by field, a cancelled fit, or what could not be solved or proven and by
+/// how much.
 pub fn fit(
     name: &str,
     points: &[Vector3<f64>],

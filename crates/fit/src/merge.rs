@@ -90,7 +90,7 @@ pub(super) struct Merger {
 }
 
 /// Merges parts until one is left, or until the joint hull of any two adds more than `most`. `step`
-/// hears how many are left.
+/// is called with how many are left.
 ///
 /// # Errors
 /// What `step` returns.

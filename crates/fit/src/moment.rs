@@ -5,8 +5,12 @@ use super::structure::Structure;
 use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
 
 /// Smallest eigenvalue of the moment matrix, relative to the largest, below which the points count
-/// as lying on a surface of half the degree: rounding leaves nothing to prove.
-const LEAST: f64 = 1e-13;
+/// as lying on a surface of half the degree; dimensionless.
+///
+/// The inverse is then lost in rounding. A larger value refuses clouds that can be fitted; a
+/// smaller one ends in unproven polynomials. Pinned by `bad_input_is_refused_by_field` of sets that
+/// need not be convex.
+const LEAST_MOMENT_EIGENVALUE: f64 = 1e-13;
 
 /// Checks that no polynomial of half the degree vanishes at all points (whitened), also but for
 /// rounding. Their moment matrix `M = mean of m(x) m(x)ᵀ`, m the monomials of half the degree.
@@ -18,7 +22,7 @@ pub(super) fn moments(structure: &Structure, points: &[Vector3<f64>]) -> Result<
     });
     let matrix = structure.gram.spread(&mean);
     let eigenvalues = matrix.symmetric_eigenvalues();
-    let rank = eigenvalues.iter().filter(|&&value| value > LEAST * eigenvalues.max()).count();
+    let rank = eigenvalues.iter().filter(|&&value| value > LEAST_MOMENT_EIGENVALUE * eigenvalues.max()).count();
     if rank < matrix.nrows() {
         return Err(FitError::Span { degree: structure.degree, rank, monomials: matrix.nrows() });
     }

@@ -5,10 +5,11 @@ use super::basis::Affine;
 use super::coordinates::Coordinates;
 use super::descent::descend;
 use super::ellipsoid::{Ellipsoid, minimum_ellipsoid};
-use super::gap::{Gap, NONE, gap};
+use super::gap::{Gap, RESOLVED_GAP, gap};
 use super::generate::{Optimum, generate};
 use super::hull::{Frame, Hull, convex_hull};
 use super::margin::{DEFAULT_MARGIN, MARGIN_ATTEMPTS};
+use super::path::Interior;
 use super::program::{Problem, ProgramError};
 use super::progress::{Progress, Watch};
 use super::refine::{Refined, RefinementEnd, refine};
@@ -22,11 +23,16 @@ use std::time::Instant;
 use sublevel_core::body::{Body, BodyError, Constraint, Normalization, Placement, Provenance, Volume};
 use sublevel_core::polynomial::{HessianGram, Polynomial};
 
-/// What the smallest ball is said to minimise.
+/// What the smallest ball minimises, as its provenance names it.
 const BALL: &str = "radius";
 
-/// Vertices where a body's constraint is above this are likely to bound the next body.
-const NEAR: f64 = 0.9;
+/// Value of the previous body's constraint above which a vertex is likely to bound the next body;
+/// dimensionless, 1 on the surface.
+///
+/// Only the first set of points depends on it. A larger value misses points that come to bound the
+/// body, a smaller one starts with many that do not. Pinned by
+/// `refits_of_a_stream_take_fewer_steps_and_end_where_fits_do`.
+const LIKELY_VALUE: f64 = 0.9;
 
 /// Points with what every fit around them needs.
 pub(super) struct Object<'a> {
@@ -82,7 +88,7 @@ impl<'a> Object<'a> {
     /// Lets the next fit begin with the vertices near the surface of a body, or outside of it.
     pub(super) fn begin_with(&self, body: &Body) {
         let values = self.vertices.iter().map(|x| body.value(x)).enumerate();
-        let mut near: Vec<(usize, f64)> = values.filter(|(_, value)| *value > NEAR).collect();
+        let mut near: Vec<(usize, f64)> = values.filter(|(_, value)| *value > LIKELY_VALUE).collect();
         near.sort_by(|a, b| b.1.total_cmp(&a.1));
         self.likely.replace(near.into_iter().map(|(index, _)| index).collect());
     }
@@ -121,7 +127,7 @@ impl<'a> Object<'a> {
     pub(super) fn ball(&self) -> Result<Rung, FitError> {
         let start = Instant::now();
         let ball = smallest_ball(&self.vertices);
-        // Rounding of the coordinates, as seen from the centre.
+        // Rounding of the coordinates relative to the centre.
         let body = Body::ball(self.name, ball.center, ball.radius * (1.0 + 1e-12) + 2.0 * self.clearance)?
             .with_points(self.points)?;
         let (body, gap) = self.finish(body, BALL, false);
@@ -166,12 +172,12 @@ impl<'a> Object<'a> {
                 Err(error) => return Err(error),
             }
         };
-        let made = match options.cone {
+        let objective = match options.cone {
             Cone::Sos => options.objective.name().to_owned(),
             cone => format!("volume, {cone}"),
         };
         self.begin_with(&body);
-        let (body, gap) = self.finish(body, &made, options.refine && volumes.len() > 1);
+        let (body, gap) = self.finish(body, &objective, options.refine && volumes.len() > 1);
         let report = FitReport {
             degree: options.degree,
             points: self.points.len(),
@@ -211,7 +217,7 @@ impl<'a> Object<'a> {
         }
         let Optimum { coefficients, hessian, gap, objective, .. } = optimum;
         let Refined { coefficients, hessian, volumes, end } =
-            refine(structure, &self.whitened, margin, coefficients, hessian, watch)?;
+            refine(structure, &self.whitened, margin, Interior { coefficients, hessian }, watch)?;
         Ok((Optimum { coefficients, hessian, gram: None, gap, objective }, volumes, Some(end)))
     }
 
@@ -248,7 +254,7 @@ impl<'a> Object<'a> {
         let Fit { mut body, mut gap, report } = fit;
         for _ in 0..most {
             // Below what is resolved there is nothing to cut off.
-            if gap.most_m <= enough.max(2.0 * NONE * body.circumscribed().radius) {
+            if gap.most_m <= enough.max(2.0 * RESOLVED_GAP * body.circumscribed().radius) {
                 break;
             }
             watch.round(self.vertices.len(), 0.0);
@@ -290,15 +296,16 @@ fn whitening(frame: &Frame, ellipsoid: &Ellipsoid) -> Option<Normalization> {
 }
 
 /// The polynomial with the constant coefficient that brings the highest of its values at the points
-/// to `1 - room`, rounding included.
+/// to `1 - slack`, rounding included.
 pub(super) fn pulled_inside(
     mut polynomial: Polynomial,
     points: &[Vector3<f64>],
     placement: &Placement,
     clearance: f64,
-    room: f64,
+    slack: f64,
 ) -> Polynomial {
-    // A million points are looked at once: which are highest does not change with the constant.
+    // Each of a million points is evaluated only once: which are highest does not depend on the
+    // constant.
     let values: Vec<f64> = points.iter().map(|x| placement.sample_of(&polynomial, x).value()).collect();
     let top = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let outermost: Vec<_> = points.iter().zip(&values).filter(|(_, v)| **v >= top - 1e-3).map(|(x, _)| x).collect();
@@ -308,7 +315,7 @@ pub(super) fn pulled_inside(
             .iter()
             .map(|x| placement.sample_of(&polynomial, x).value_upper(clearance))
             .fold(f64::NEG_INFINITY, f64::max);
-        let excess = highest - (1.0 - room);
+        let excess = highest - (1.0 - slack);
         if (-1e-15..=0.0).contains(&excess) {
             break;
         }

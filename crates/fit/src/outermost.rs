@@ -16,9 +16,12 @@ const MANY: usize = 4096;
 /// How corners of the polytopes are chosen, one after the other.
 const CHOICES: [Choice; 3] = [Choice::Extreme(64), Choice::Extreme(512), Choice::Farthest(24)];
 
-/// How deep inside the polytope a point must lie to be left out; the points have extents near 1,
-/// and rounding is far below.
-const DEPTH: f64 = 1e-9;
+/// Depth inside of the polytope from which a point is left out, the points having extents near 1;
+/// dimensionless.
+///
+/// Depths round at about 1e-15. A smaller value leaves out points whose side rounding decides; a
+/// larger one keeps more points, which only costs time. Pinned by `corners_and_duplicates_stay`.
+const LEAST_DEPTH_INSIDE: f64 = 1e-9;
 
 /// Which points span a polytope.
 enum Choice {
@@ -39,7 +42,7 @@ pub(super) fn outermost(points: &[Vector3<f64>]) -> Vec<usize> {
         }
         // Without a polytope nothing is known to be inside.
         if let Some(polytope) = polytope(points, &choice.among(points, &left)) {
-            left.retain(|&i| polytope.beyond(&points[i]) > -DEPTH);
+            left.retain(|&i| polytope.beyond(&points[i]) > -LEAST_DEPTH_INSIDE);
         }
     }
     left

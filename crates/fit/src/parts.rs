@@ -134,7 +134,7 @@ impl<'a> CompoundSearch<'a> {
         progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<Option<CompoundFit>, FitError> {
         // So many that each could cost the least.
-        let affordable = |budget: f64| ((budget / Costs::LEAST).ceil() as usize).saturating_sub(1).min(MAX_PIECES);
+        let affordable = |budget: f64| ((budget / Costs::CHEAPEST).ceil() as usize).saturating_sub(1).min(MAX_PIECES);
         let found = Decomposition::new(&self.whole, affordable(budget).max(1), PartSearch::Best, progress)?;
         let mut best = None;
         let mut most = budget;
@@ -167,7 +167,7 @@ impl<'a> CompoundSearch<'a> {
         let mut cost = 0.0;
         let mut bodies = Vec::new();
         for (index, part) in parts.iter().enumerate() {
-            let rest = (parts.len() - index - 1) as f64 * Costs::LEAST;
+            let rest = (parts.len() - index - 1) as f64 * Costs::CHEAPEST;
             let allowed = most - cost - rest;
             let tried =
                 tried.entry(part.points.iter().map(|x| [0, 1, 2].map(|i| x[i].to_bits())).collect()).or_default();

@@ -35,7 +35,7 @@ const TRACE_SHARE: f64 = 1e-4;
 
 /// What the path minimises, besides `Σw - ε tr S + h·s`.
 #[derive(Clone, Copy)]
-pub(super) enum Goal<'a> {
+pub(super) enum PathObjective<'a> {
     /// `-φ` of the moment matrix of one Gram matrix.
     Gram(Matrix, &'a Spectral),
     /// A quadratic function of the moments.
@@ -61,7 +61,7 @@ pub(super) struct DualPoint {
 /// How to follow a path.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PathOptions {
-    /// Distance to the optimum at which to stop, in units of the goal.
+    /// Distance to the optimum at which to stop, in units of the objective.
     pub(super) gap: f64,
     /// Growth of τ from one centre to the next.
     pub(super) growth: f64,
@@ -73,10 +73,10 @@ pub(super) struct PathOptions {
 #[derive(Clone, Debug)]
 pub(super) struct Iterate {
     /// Where it is.
-    pub(super) place: DualPoint,
-    /// The polynomial that goes with it.
+    pub(super) point: DualPoint,
+    /// The polynomial that belongs to it.
     pub(super) interior: Interior,
-    /// The Gram matrix P of that polynomial; none if the goal is a model, where p needs none.
+    /// The Gram matrix P of that polynomial; none if the objective is a model, where p needs none.
     pub(super) gram: Option<DMatrix<f64>>,
 }
 
@@ -85,10 +85,10 @@ pub(super) struct Path<'a> {
     structure: &'a Structure,
     values: &'a DMatrix<f64>,
     margin: f64,
-    goal: Goal<'a>,
+    objective: PathObjective<'a>,
     /// D: Hessian forms x monomials.
     derivative: DMatrix<f64>,
-    /// h: what the Hessian form of p may lack.
+    /// h: deficit of convexity that is allowed to the Hessian form of p.
     allowance: DVector<f64>,
     /// `h·s - ε tr S` as a functional of s.
     cost: DVector<f64>,
@@ -109,8 +109,12 @@ struct Newton {
 impl<'a> Path<'a> {
     /// The path of a fit over the points whose monomials are the columns of `values`.
     pub(super) fn of_fit(problem: &'a Problem, values: &'a DMatrix<f64>) -> Self {
-        let mut path =
-            Self::new(problem.structure, values, problem.margin, Goal::Gram(problem.matrix, &problem.spectral));
+        let mut path = Self::new(
+            problem.structure,
+            values,
+            problem.margin,
+            PathObjective::Gram(problem.matrix, &problem.spectral),
+        );
         if let Some(allowance) = &problem.allowance {
             path.allowance += allowance;
             path.cost += allowance;
@@ -118,14 +122,19 @@ impl<'a> Path<'a> {
         path
     }
 
-    pub(super) fn new(structure: &'a Structure, values: &'a DMatrix<f64>, margin: f64, goal: Goal<'a>) -> Self {
+    pub(super) fn new(
+        structure: &'a Structure,
+        values: &'a DMatrix<f64>,
+        margin: f64,
+        objective: PathObjective<'a>,
+    ) -> Self {
         let forms = structure.hessian.keys;
         let mut cost = DVector::zeros(forms);
         for i in 0..structure.hessian.size {
             cost[structure.hessian.key(i, i)] -= margin;
         }
         let derivative = structure.derivative_matrix();
-        Self { structure, values, margin, goal, derivative, allowance: DVector::zeros(forms), cost }
+        Self { structure, values, margin, objective, derivative, allowance: DVector::zeros(forms), cost }
     }
 
     fn pattern(&self, matrix: Matrix) -> &'a Pattern {
@@ -137,8 +146,8 @@ impl<'a> Path<'a> {
 
     /// What the moments of `matrix` add to the barrier problem.
     fn barrier(&self, matrix: Matrix, tau: f64) -> Barrier<'a> {
-        let measured = match self.goal {
-            Goal::Gram(measured, spectral) if measured == matrix => Some((spectral, tau)),
+        let measured = match self.objective {
+            PathObjective::Gram(measured, spectral) if measured == matrix => Some((spectral, tau)),
             _ => None,
         };
         Barrier::new(self.pattern(matrix), measured)
@@ -146,23 +155,25 @@ impl<'a> Path<'a> {
 
     /// At a centre, this over τ is the distance to the optimum.
     pub(super) fn barrier_parameter(&self) -> f64 {
-        let cone = match self.goal {
-            Goal::Model(_) => self.structure.hessian.size,
-            Goal::Gram(_, spectral) if !spectral.is_self_concordant() => {
+        let cone = match self.objective {
+            PathObjective::Model(_) => self.structure.hessian.size,
+            PathObjective::Gram(_, spectral) if !spectral.is_self_concordant() => {
                 self.structure.gram.size + self.structure.hessian.size
             }
-            Goal::Gram(Matrix::Polynomial, _) => self.structure.hessian.size,
-            Goal::Gram(Matrix::Hessian, _) => self.structure.gram.size,
+            PathObjective::Gram(Matrix::Polynomial, _) => self.structure.hessian.size,
+            PathObjective::Gram(Matrix::Hessian, _) => self.structure.gram.size,
         };
         (self.values.ncols() + cone) as f64
     }
 
     /// The unit of gaps.
     fn size(&self, at: &Dual) -> f64 {
-        match self.goal {
-            Goal::Gram(Matrix::Polynomial, spectral) => spectral.size(&self.structure.gram.spread(&at.moments)),
-            Goal::Gram(Matrix::Hessian, spectral) => spectral.size(&self.structure.hessian.spread(&at.form)),
-            Goal::Model(_) => Some(1.0),
+        match self.objective {
+            PathObjective::Gram(Matrix::Polynomial, spectral) => {
+                spectral.size(&self.structure.gram.spread(&at.moments))
+            }
+            PathObjective::Gram(Matrix::Hessian, spectral) => spectral.size(&self.structure.hessian.spread(&at.form)),
+            PathObjective::Model(_) => Some(1.0),
         }
         .unwrap_or(1.0)
     }
@@ -189,8 +200,8 @@ impl<'a> Path<'a> {
                 Some(self.point(weights.clone(), &isotropic * 0.5_f64.powi(halvings + 1)))
             })
         })?;
-        let DualPoint { dual, tau } = match self.goal {
-            Goal::Gram(_, spectral) if !spectral.is_self_concordant() => {
+        let DualPoint { dual, tau } = match self.objective {
+            PathObjective::Gram(_, spectral) if !spectral.is_self_concordant() => {
                 // The functional is a poor guess for traces, so the barriers rule at first; then
                 // this scale is best.
                 let size = self.size(&dual);
@@ -207,8 +218,8 @@ impl<'a> Path<'a> {
         Some(DualPoint { dual: self.point(dual.weights, dual.form * share), tau })
     }
 
-    /// The last centre before the steps ran out or rounding stood in the way; its τ says how far
-    /// that is.
+    /// The last centre before the steps ran out or rounding stood in the way; its τ bounds how far
+    /// that is from the optimum.
     ///
     /// # Errors
     /// [`FitError::Cancelled`].
@@ -229,7 +240,7 @@ impl<'a> Path<'a> {
             match (newton, centre) {
                 (Some(_), Some(centre)) => {
                     size = self.size(&dual);
-                    dual.clone_from(&centre.place.dual);
+                    dual.clone_from(&centre.point.dual);
                     last = Some(centre);
                     let end = self.barrier_parameter() / (options.gap * size);
                     if tau >= end {
@@ -238,11 +249,11 @@ impl<'a> Path<'a> {
                     tau = (tau * growth).min(end);
                 }
                 (Some(newton), None) if !centred => dual = newton.next,
-                // Rounding: from the last centre a shorter way may still be open.
+                // Rounding: from the last centre a shorter step may still be possible.
                 _ => {
                     growth = growth.sqrt();
-                    let Some(Iterate { place, .. }) = last.as_ref().filter(|_| growth > LEAST_GROWTH) else { break };
-                    (dual, tau) = (place.dual.clone(), place.tau * growth);
+                    let Some(Iterate { point, .. }) = last.as_ref().filter(|_| growth > LEAST_GROWTH) else { break };
+                    (dual, tau) = (point.dual.clone(), point.tau * growth);
                 }
             }
         }
@@ -254,9 +265,9 @@ impl<'a> Path<'a> {
         if point.weights.min() <= 0.0 {
             return None;
         }
-        let of_moments = match self.goal {
-            Goal::Model(model) => tau * model.value(&point.moments),
-            Goal::Gram(..) => self.barrier(Matrix::Polynomial, tau).value(&point.moments)?,
+        let of_moments = match self.objective {
+            PathObjective::Model(model) => tau * model.value(&point.moments),
+            PathObjective::Gram(..) => self.barrier(Matrix::Polynomial, tau).value(&point.moments)?,
         };
         let of_form = self.barrier(Matrix::Hessian, tau).value(&point.form)?;
         let weights = point.weights.iter().map(|w| w.ln()).sum::<f64>();
@@ -267,7 +278,7 @@ impl<'a> Path<'a> {
 
     /// Minus the gradient, and the inverse of the Hessian, of the part that depends on m.
     fn of_moments(&self, at: &Dual, tau: f64) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        if let Goal::Model(model) = self.goal {
+        if let PathObjective::Model(model) = self.objective {
             return Some((model.coefficients(&at.moments) * tau, model.flexibility() / tau));
         }
         let (gradient, curvature) = self.barrier(Matrix::Polynomial, tau).derivatives(&at.moments)?;
@@ -314,11 +325,12 @@ impl<'a> Path<'a> {
         Some(Newton { next, whole: along(1.0), decrement: (-slope).sqrt(), coefficients: coefficients + multiplier })
     }
 
-    /// The polynomial that a Newton step from `at` predicts; none if rounding costs it what mathematics promises.
+    /// The polynomial that a Newton step from `at` predicts; none if it is infeasible because of
+    /// rounding.
     ///
-    /// With decrement below 1 the step in w keeps `dw < w`, so that `1 - p(xᵢ) = (1 - dwᵢ/wᵢ)/(τwᵢ) > 0`, and both Gram
-    /// matrices, predicted from the gradients of their barriers, are definite and match p: these are the Newton equations
-    /// read again.
+    /// With decrement below 1 the step in w keeps `dw < w`, so that
+    /// `1 - p(xᵢ) = (1 - dwᵢ/wᵢ)/(τwᵢ) > 0`, and both Gram matrices, predicted from the gradients
+    /// of their barriers, are definite and match p: these are the Newton equations read again.
     fn centre(&self, at: &Dual, newton: &Newton, tau: f64) -> Option<Iterate> {
         let coefficients = &newton.coefficients / tau;
         let Structure { gram, hessian, .. } = self.structure;
@@ -326,14 +338,14 @@ impl<'a> Path<'a> {
         let form = self.barrier(Matrix::Hessian, tau).predicted(&at.form, &newton.whole.form)? / tau + &margin;
         let form = hessian.nearest(&form, &(&self.derivative * &coefficients + &self.allowance));
         Cholesky::new(&form - margin * 0.5)?;
-        let gram = match self.goal {
-            Goal::Model(_) => None,
-            Goal::Gram(..) => {
+        let gram = match self.objective {
+            PathObjective::Model(_) => None,
+            PathObjective::Gram(..) => {
                 let predicted = self.barrier(Matrix::Polynomial, tau).predicted(&at.moments, &newton.whole.moments)?;
                 Some(gram.nearest(&(predicted / tau), &coefficients))
             }
         };
-        let place = DualPoint { dual: newton.next.clone(), tau };
-        Some(Iterate { place, interior: Interior { coefficients, hessian: form }, gram })
+        let point = DualPoint { dual: newton.next.clone(), tau };
+        Some(Iterate { point, interior: Interior { coefficients, hessian: form }, gram })
     }
 }

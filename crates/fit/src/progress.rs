@@ -19,15 +19,15 @@ pub struct Progress {
     pub gap: f64,
 }
 
-/// Keeps the count, and hears from the caller whether to go on.
+/// Keeps the counts, and asks the caller whether to continue.
 pub(super) struct Watch<'a> {
     progress: Progress,
-    tell: &'a mut dyn FnMut(Progress) -> ControlFlow<()>,
+    report: &'a mut dyn FnMut(Progress) -> ControlFlow<()>,
 }
 
 impl<'a> Watch<'a> {
-    pub(super) fn new(tell: &'a mut dyn FnMut(Progress) -> ControlFlow<()>) -> Self {
-        Self { progress: Progress::default(), tell }
+    pub(super) fn new(report: &'a mut dyn FnMut(Progress) -> ControlFlow<()>) -> Self {
+        Self { progress: Progress::default(), report }
     }
 
     /// A program begins; the one before left its points outside by `worst_violation`.
@@ -43,7 +43,7 @@ impl<'a> Watch<'a> {
     pub(super) fn iteration(&mut self, gap: f64) -> Result<(), FitError> {
         self.progress.iterations += 1;
         self.progress.gap = gap;
-        if (self.tell)(self.progress).is_break() { Err(FitError::Cancelled) } else { Ok(()) }
+        if (self.report)(self.progress).is_break() { Err(FitError::Cancelled) } else { Ok(()) }
     }
 
     /// The counts so far.

@@ -2,13 +2,13 @@
 //!
 //! Log dets and traces only stand in for the volume. From the optimum of one, each step minimises a
 //! convex quadratic model of the volume (`volume`) over the same sos-convex polynomials around the
-//! same points, by following the central path of that program's dual, and goes that way as far as
-//! the volume falls. The feasible set is convex, so every polynomial on the way is feasible, and
+//! same points, by following the central path of that program's dual, and moves towards it as long
+//! as the volume falls. The feasible set is convex, so every polynomial in between is feasible, and
 //! the volume never grows.
 
 use super::generate::inner;
 use super::model::Model;
-use super::path::{DualPoint, Goal, Interior, Path, PathOptions};
+use super::path::{DualPoint, Interior, Path, PathObjective, PathOptions};
 use super::progress::Watch;
 use super::structure::Structure;
 use super::volume::{Expansion, expansion, polynomial, volume};
@@ -17,11 +17,20 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use sublevel_core::polynomial::Polynomial;
 
 /// Steps at most.
-const STEPS: usize = 30;
-/// Relative decrease of the volume below which to stop.
-const ENOUGH: f64 = 2e-5;
-/// Accuracy of a step's program, relative to the volume.
-const GAP: f64 = 1e-5;
+const MAX_VOLUME_STEPS: usize = 30;
+
+/// Relative decrease of the volume below which a refinement ends; dimensionless.
+///
+/// Steps converge linearly. A larger value ends early with larger bodies; a smaller one takes steps
+/// that nobody notices. Pinned by `refined_volumes`.
+const REFINED_VOLUME_DECREASE: f64 = 2e-5;
+
+/// Accuracy of a step's program, relative to the volume; dimensionless.
+///
+/// Half of [`REFINED_VOLUME_DECREASE`], so that a step's decrease is not its error. A larger value
+/// ends refinements early; a smaller one takes more Newton steps. Pinned by
+/// `refinement_is_monotone_contains_the_points_and_is_proven`.
+const PATH_STEP_GAP: f64 = 1e-5;
 /// Growth of τ from one centre to the next.
 const GROWTH: f64 = 10.0;
 /// Where a path starts, as a part of its last τ: nearer, and the first centre is far; farther, and
@@ -33,8 +42,12 @@ const COLD_STEPS: usize = 3000;
 const WARM: f64 = 1e-2;
 /// As [`COLD_STEPS`], from the last optimum: what works takes a few tens.
 const WARM_STEPS: usize = 80;
-/// Levenberg's term, relative to the mean curvature: directions that the rays see nothing of stay
-/// put.
+
+/// Levenberg's term, relative to the mean curvature; dimensionless: it keeps directions that no ray
+/// measures where they are.
+///
+/// A larger value shortens all steps; a smaller one makes the model singular to rounding. Pinned by
+/// `refined_volumes`.
 const DAMPING: f64 = 1e-7;
 
 /// Why a refinement ended.
@@ -75,19 +88,18 @@ pub(super) struct Refined {
     pub(super) end: RefinementEnd,
 }
 
-/// Refines a polynomial that is feasible for `points` (up to a constant) with the Gram matrix
-/// `hessian ⪰ margin`.
+/// Refines a polynomial that is feasible for `points` (up to a constant) with a Gram matrix `⪰
+/// margin` of its Hessian form.
 pub(super) fn refine(
     structure: &Structure,
     points: &[Vector3<f64>],
     margin: f64,
-    coefficients: DVector<f64>,
-    hessian: DMatrix<f64>,
+    from: Interior,
     watch: &mut Watch,
 ) -> Result<Refined, FitError> {
     let known = points.iter().copied().chain(inner(structure));
     let values = DMatrix::from_columns(&known.map(|x| structure.values(&x)).collect::<Vec<_>>());
-    let mut current = Interior { coefficients, hessian };
+    let mut current = from;
     // What the solver left outside is taken in by the constant.
     let highest = values.tr_mul(&current.coefficients).max();
     current.coefficients[0] -= (highest - 1.0).max(0.0);
@@ -95,7 +107,7 @@ pub(super) fn refine(
     let mut last = None;
     let mut center = Vector3::zeros();
     let mut end = RefinementEnd::StepLimit;
-    for _ in 0..STEPS {
+    for _ in 0..MAX_VOLUME_STEPS {
         center = normalise(structure, &mut current, &center)?;
         let p = polynomial(structure, &current.coefficients)?;
         let model = expansion(structure, &p, &center);
@@ -104,20 +116,20 @@ pub(super) fn refine(
             volumes.push(here);
         }
         let program = step_model(structure, &current.coefficients, model, &center).ok_or(ProgramError::Singular)?;
-        let path = Path::new(structure, &values, margin, Goal::Model(&program));
+        let path = Path::new(structure, &values, margin, PathObjective::Model(&program));
         watch.round(points.len(), 0.0);
-        let Some((target, place)) = minimise(&path, here, last.take(), watch)? else {
+        let Some((target, point)) = minimise(&path, here, last.take(), watch)? else {
             end = RefinementEnd::Unsolved;
             break;
         };
-        last = Some(place);
+        last = Some(point);
         let Some((next, smaller)) = search(structure, &current, &target, &center, here) else {
             end = RefinementEnd::NoDescent;
             break;
         };
         volumes.push(smaller);
         current = next;
-        if smaller > here * (1.0 - ENOUGH) {
+        if smaller > here * (1.0 - REFINED_VOLUME_DECREASE) {
             end = RefinementEnd::Converged;
             break;
         }
@@ -138,10 +150,10 @@ pub(super) fn step_model(
     center: &Vector3<f64>,
 ) -> Option<Model> {
     let Expansion { volume, gradient, mut curvature } = expansion;
-    // A multiple of p - 1 describes the same set: p(center) is held, which fixes the multiple.
-    let hold = structure.values(center);
-    let mean = curvature.trace() / hold.len() as f64;
-    curvature.ger(volume * 10.0, &hold, &hold, 1.0);
+    // A multiple of p - 1 describes the same set: a penalty on changes of p(center) fixes it.
+    let at_center = structure.values(center);
+    let mean = curvature.trace() / at_center.len() as f64;
+    curvature.ger(volume * 10.0, &at_center, &at_center, 1.0);
     for i in 0..curvature.nrows() {
         curvature[(i, i)] += DAMPING * mean;
     }
@@ -183,23 +195,23 @@ fn minimiser(p: &Polynomial, start: &Vector3<f64>) -> Option<Vector3<f64>> {
     Some(z)
 }
 
-/// The minimiser of the model, to [`GAP`], and the place to start the next from.
+/// The minimiser of the model, to [`PATH_STEP_GAP`], and the dual point to start the next from.
 fn minimise(
     path: &Path,
     volume: f64,
     warm: Option<DualPoint>,
     watch: &mut Watch,
 ) -> Result<Option<(Interior, DualPoint)>, FitError> {
-    let gap = GAP * volume;
+    let gap = PATH_STEP_GAP * volume;
     let end = path.barrier_parameter() / gap;
     // The last optimum is close to the next, but also to the boundary: from there the path is not
     // always found.
-    let warm = warm.map(|place| (DualPoint { tau: WARM * end, ..place }, WARM_STEPS));
-    let cold = path.start().map(|place| (DualPoint { tau: COLD * end, ..place }, COLD_STEPS));
+    let warm = warm.map(|point| (DualPoint { tau: WARM * end, ..point }, WARM_STEPS));
+    let cold = path.start().map(|point| (DualPoint { tau: COLD * end, ..point }, COLD_STEPS));
     for (start, steps) in warm.into_iter().chain(cold) {
         let centre = path.follow(start, PathOptions { gap, growth: GROWTH, steps }, watch)?;
-        if let Some(centre) = centre.filter(|centre| centre.place.tau >= end) {
-            return Ok(Some((centre.interior, centre.place)));
+        if let Some(centre) = centre.filter(|centre| centre.point.tau >= end) {
+            return Ok(Some((centre.interior, centre.point)));
         }
     }
     Ok(None)

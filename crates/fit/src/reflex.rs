@@ -5,10 +5,18 @@ use nalgebra::Vector3;
 use std::collections::HashMap;
 use sublevel_core::body::Piece;
 
-/// Cosine of the angle between the normals at an edge above which it is not sharp: 20°.
+/// Cosine of the angle between the normals at an edge below which it is sharp: that of 20°.
+///
+/// Closer to 1, edges of curved surfaces count as ledges; smaller, chamfers are missed. Pinned by
+/// `edges_are_sharp_from_twenty_degrees`.
 const SHARP: f64 = 0.94;
 
-/// Planes whose normals differ by less, or whose heights do in proportion to the object, are one.
+/// Difference below which normals, and heights in proportion to the object, belong to one plane;
+/// dimensionless.
+///
+/// Files in single precision round at 1e-7. A smaller value tells planes apart that are one but for
+/// rounding; a larger one joins planes of different ledges. Pinned by
+/// `faces_in_one_plane_are_one_ledge`.
 const SAME: f64 = 1e-6;
 
 /// Most planes that are distinguished.
@@ -90,4 +98,42 @@ fn reflex_edges(piece: &Piece) -> Vec<Edge> {
         (reflex && cosine < SHARP).then(|| Edge { weight: along.norm() * (1.0 - cosine).min(1.0), faces })
     };
     order.into_iter().filter_map(edge).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ledges;
+    use nalgebra::Vector3;
+    use sublevel_core::body::Piece;
+
+    /// A bar along z with a notch whose sides differ by an angle, in two lengths; the notch is
+    /// deeper by `deeper` at the far end.
+    fn notched(degrees: f64, deeper: f64) -> Piece {
+        let depth = (0.5 * degrees.to_radians()).tan();
+        let outline = |depth: f64| [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0 - depth], [0.0, 1.0]];
+        let layer = |z: f64, depth: f64| outline(depth).map(|[x, y]| Vector3::new(x, y, z));
+        let points = [layer(0.0, depth), layer(1.0, depth), layer(2.0, depth + deeper)].concat();
+        let mut triangles = Vec::new();
+        for [a, b, c] in [[3, 4, 0], [3, 0, 1], [3, 1, 2]] {
+            triangles.extend([[a, c, b], [a + 10, b + 10, c + 10]]);
+        }
+        for (first, i) in [0, 5].into_iter().flat_map(|first| (0..5).map(move |i| (first, i))) {
+            let (p, q) = (first + i, first + (i + 1) % 5);
+            triangles.extend([[p, q, q + 5], [p, q + 5, p + 5]]);
+        }
+        Piece::of_mesh(&points, &triangles).unwrap()
+    }
+
+    #[test]
+    fn edges_are_sharp_from_twenty_degrees() {
+        assert!(ledges(&[&notched(17.0, 0.0)]).is_empty());
+        assert!(!ledges(&[&notched(23.0, 0.0)]).is_empty());
+    }
+
+    #[test]
+    fn faces_in_one_plane_are_one_ledge() {
+        for (deeper, planes) in [(0.0, 2), (1e-7, 2), (1e-4, 4)] {
+            assert_eq!(ledges(&[&notched(40.0, deeper)]).len(), planes, "{deeper}");
+        }
+    }
 }

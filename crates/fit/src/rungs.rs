@@ -23,7 +23,7 @@ impl Costs {
     const RUNGS: [f64; 5] = [0.15, 0.15, 0.2, 0.25, 0.45];
 
     /// Of the cheapest body.
-    pub(super) const LEAST: f64 = 0.15;
+    pub(super) const CHEAPEST: f64 = 0.15;
 
     /// Of a body with edges.
     pub(super) const SLABBED: f64 = 3.0;

@@ -17,21 +17,33 @@ use super::split::{FINALISTS, LEAST_SHARE, Scan, samples};
 use nalgebra::Vector3;
 use sublevel_core::body::{Caps, Cut, Division, Piece};
 
-/// Volume that counts as none, relative to the hull of the object: the noise of rough hulls, and a
-/// little more.
-pub(super) const NOTHING: f64 = 1e-6;
+/// Volume that counts as none, relative to the hull of the object; dimensionless: the noise of
+/// rough hulls, whose points are moved by 1e-7, and a little more.
+///
+/// A smaller value makes cuts that gain noise; a larger one misses small parts. Pinned by
+/// `convex_objects_are_one_part_whatever_is_asked`.
+pub(super) const NEGLIGIBLE_VOLUME: f64 = 1e-6;
 
-/// A cut that gains less, relative to the hull of the object, is made only if nothing better is
-/// left.
-const WORTH: f64 = 1e-5;
+/// Gain, relative to the hull of the object, below which a cut is made only if nothing better is
+/// left; dimensionless.
+///
+/// Ten times the noise of rough hulls. A larger value turns to the region that wastes most too
+/// early; a smaller one follows noise. Pinned by `no_search_is_worse_than_the_greedy_one`.
+const WORTHWHILE_GAIN: f64 = 1e-5;
 
-/// A region whose hull is larger than it by less, relative to the hull of the object, is left
-/// alone.
-const CONVEX: f64 = 1e-3;
+/// Excess of a region's hull over its volume, relative to the hull of the object, below which the
+/// region is left alone; dimensionless.
+///
+/// A larger value leaves parts uncut that a user would see; a smaller one spends the regions on
+/// facets of curved surfaces. Pinned by `no_search_is_worse_than_the_greedy_one`.
+const CONVEX_EXCESS: f64 = 1e-3;
 
-/// Where the best cut gains less of what a region wastes, and that is more of the object, cuts that
-/// gain more together are looked for.
-const MUCH: f64 = 0.05;
+/// Gain of the best cut, as a part of what a region wastes, and waste, as a part of the object,
+/// that together start a search for cuts that gain more together; dimensionless.
+///
+/// A larger value looks ahead nearly always, which takes long; a smaller one stops at regions that
+/// need two cuts. Pinned by `cuts_that_only_divided_a_part_are_left_out`.
+const LOOK_AHEAD_SHARE: f64 = 0.05;
 
 /// Most cuts in a row that gain nothing, of a closed region and of an open one, whose own volume is
 /// not known.
@@ -41,11 +53,15 @@ const BLIND_OPEN: usize = 2;
 /// Cuts of a side that are measured when looking ahead.
 const GLANCES: usize = 3;
 
-/// Cuts that are made then: the one, and one of either side.
+/// How many cuts are counted when looking ahead: the one, and one of either side; their joint gain
+/// is divided by it.
 const AHEAD: f64 = 3.0;
 
-/// Part of all sharp reflex edges that must lie in one plane, or an object is not one of ledges:
-/// scans have small ones everywhere.
+/// Part of the length of all sharp reflex edges that must lie in one plane for an object of ledges;
+/// dimensionless.
+///
+/// Scans have small ledges everywhere. A larger value misses furniture; a smaller one takes scans
+/// for it. Pinned by `no_search_is_worse_than_the_greedy_one`.
 const LEDGE_SHARE: f64 = 0.1;
 
 /// Most ledges that are measured.
@@ -124,7 +140,7 @@ impl Segmentation {
         let nodes: Vec<Node> = mesh.components().into_iter().map(|piece| Node { piece, cut: None }).collect();
         let hulls: Vec<Hull> = nodes.iter().map(|node| Hull::of(corners(&[&node.piece]))).collect();
         let mut groups: Vec<Vec<usize>> = (0..nodes.len()).map(|piece| vec![piece]).collect();
-        for Merger { pair, .. } in merge(hulls, NOTHING * whole, step)? {
+        for Merger { pair, .. } in merge(hulls, NEGLIGIBLE_VOLUME * whole, step)? {
             let joint = pair.map(|part| std::mem::take(&mut groups[part])).concat();
             groups.push(joint);
         }
@@ -174,7 +190,7 @@ impl Segmentation {
         }
         // By what is gained; where nothing is, by what is wasted.
         let rank = |region: &Region| match region.plan {
-            Some(Plan::Cut { merit, .. }) if self.style == Style::ByGain && merit > WORTH * self.whole => {
+            Some(Plan::Cut { merit, .. }) if self.style == Style::ByGain && merit > WORTHWHILE_GAIN * self.whole => {
                 Some((1, merit))
             }
             Some(Plan::Cut { .. }) => Some((0, region.waste())),
@@ -207,7 +223,7 @@ impl Segmentation {
                 }
             }
         }
-        let blind = if gain > WORTH * self.whole { 0 } else { self.regions[index].blind + 1 };
+        let blind = if gain > WORTHWHILE_GAIN * self.whole { 0 } else { self.regions[index].blind + 1 };
         let [below, above] = sides.map(|pieces| {
             let hull = Hull::of(corners(&self.pieces(&pieces)));
             self.region(pieces, hull, blind)
@@ -219,14 +235,14 @@ impl Segmentation {
     /// The best cut of a region.
     fn plan(&self, region: &Region, step: Step<'_>) -> Result<Plan, FitError> {
         let Some(whole) = region.hull.volume else { return Ok(Plan::Nothing) };
-        if region.waste() < CONVEX * self.whole {
+        if region.waste() < CONVEX_EXCESS * self.whole {
             return Ok(Plan::Nothing);
         }
         let pieces = self.pieces(&region.pieces);
         let mut ledges = ledges(&pieces);
         ledges.truncate(LEDGES);
         let halves = |normal: Vector3<f64>, height: f64| halves(&pieces, whole, normal, height);
-        let worth = WORTH * self.whole;
+        let worth = WORTHWHILE_GAIN * self.whole;
         if self.style == Style::ByLedges && !ledges.is_empty() {
             let merit = |ledge: &Ledge, gain: f64| ledge.share + gain.max(0.0) / region.waste().max(worth);
             let measured = ledges
@@ -248,7 +264,9 @@ impl Segmentation {
         let next = measured.max_by(|a, b| a.gain.total_cmp(&b.gain)).filter(|next| next.gain > worth);
         let next = next.map(|Halves { normal, height, gain, .. }| Plan::Cut { normal, height, gain, merit: gain });
         let gain = if let Some(Plan::Cut { gain, .. }) = next { gain } else { 0.0 };
-        if gain > MUCH * region.waste() || (next.is_some() && region.waste() < MUCH * self.whole) {
+        if gain > LOOK_AHEAD_SHARE * region.waste()
+            || (next.is_some() && region.waste() < LOOK_AHEAD_SHARE * self.whole)
+        {
             return Ok(next.unwrap_or(Plan::Nothing));
         }
         let most = if region.own.is_some() { BLIND_CLOSED } else { BLIND_OPEN };
@@ -290,7 +308,7 @@ impl Segmentation {
                 best = Some((gain, halves));
             }
         }
-        let best = best.filter(|(gain, _)| *gain > WORTH * self.whole);
+        let best = best.filter(|(gain, _)| *gain > WORTHWHILE_GAIN * self.whole);
         let ledge = || ledges.iter().find_map(|ledge| halves(ledge.normal, ledge.height));
         let across = || {
             let longest = middles.iter().max_by(|a, b| a.2.total_cmp(&b.2));

@@ -5,7 +5,10 @@ use std::fmt;
 /// Most parts that can be asked for.
 pub const MAX_PIECES: usize = 64;
 
-/// Hulls larger than the object by less are said to fill it.
+/// Excess of the hulls over the object, as a part of it, below which they fill it; dimensionless.
+///
+/// A percent is not seen. It decides only how a shortfall is worded. Pinned by
+/// `reasons_name_their_quantities`.
 const FILLED: f64 = 0.01;
 
 /// Why fewer parts came out than were asked for: what the search found of the object.
@@ -89,6 +92,7 @@ mod tests {
         for (shortfall, words) in [
             (Shortfall::new(1, 1.003, Some(1.0)), "is convex: its hull is 0.30 % larger"),
             (Shortfall::new(3, 0.9999999, Some(1.0)), "3 convex parts: their hulls are 0.00 % larger"),
+            (Shortfall::new(2, 1.03, Some(1.0)), "the hulls of 2 parts are 3.0 % larger"),
             (Shortfall::new(1, 2.0, Some(1.0)), "the hull is 100.0 % larger"),
             (Shortfall::new(2, 1.5, Some(1.0)), "the hulls of 2 parts are 50.0 % larger"),
             (Shortfall::new(2, 1.5, None), "open mesh"),

@@ -18,7 +18,12 @@ use sublevel_core::polynomial::{Exponents, HessianGram, HessianMonomial, Polynom
 /// Most slabs a body may be cut by.
 pub const MAX_SLABS: usize = MAX_CONSTRAINTS - 1;
 
-/// ε.
+/// ε: share of the round term in the quadratic of a slab; dimensionless.
+///
+/// The slab bulges by half of it. The certificate needs eigenvalues above the rounding of 1e-15 in
+/// proportion. A larger value leaves a visible bulge; a smaller one fails proofs of slabs across
+/// long objects. Pinned by `slabs_leave_a_polytope_no_gap` and
+/// `slabs_bring_a_body_closer_each_time`.
 const BULGE: f64 = 1e-6;
 
 /// Why a body could not be cut.

@@ -1,8 +1,8 @@
 //! Points to a set that need not be convex, with its proofs.
 //!
-//! Two ways: the program of a body with convexity relaxed, `p + c |u|^2d` sos-convex in place of p
-//! (Ahmadi, Hall, Makadia and Sindhwani, RSS 2017, section III), and the inverse-moment polynomial
-//! (`moment`). Points between others matter as much as these, so all are used.
+//! Two methods: the program of a body with convexity relaxed, `p + c |u|^2d` sos-convex in place of
+//! p (Ahmadi, Hall, Makadia and Sindhwani, RSS 2017, section III), and the inverse-moment
+//! polynomial (`moment`). Points between others matter as much as these, so all are used.
 
 use super::coordinates::Coordinates;
 use super::generate::{Optimum, generate};
@@ -22,7 +22,7 @@ use sublevel_core::polynomial::{HessianGram, NormPower, Polynomial, SosGram, mon
 
 /// How far below 1 all points are left: that is what lets triangles at the outermost points be
 /// proven inside.
-const ROOM: f64 = 1e-9;
+const SLACK_BELOW_LEVEL: f64 = 1e-9;
 
 /// What to fit.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,11 +98,12 @@ impl SosOptions {
 /// Fits an sos-body around `points` (metres), and proves which of the `triangles` between them it
 /// contains.
 ///
-/// The points end a billionth below the level 1. `progress` hears of every Newton step and can stop
-/// the fit; an inverse moment has none.
+/// The points end a billionth below the level 1. `progress` is called at every Newton step and can
+/// stop the fit; an inverse moment has none.
 ///
 /// # Errors
-/// [`FitError`]: bad input by field, a cancelled fit, or what could not be solved or proven and by how much.
+/// [`FitError`]: bad input by field, a cancelled fit, or what could not be solved or proven and by
+/// how much.
 pub fn fit_sos(
     name: &str,
     points: &[Vector3<f64>],
@@ -116,7 +117,8 @@ pub fn fit_sos(
     let whitened: Vec<_> = points.iter().map(|x| object.whiten(x)).collect();
     let (body, program) = match options.method {
         SosMethod::Relaxed { c, objective } => {
-            let (body, program) = relaxed(&object, &whitened, options, c, objective, &mut Watch::new(progress))?;
+            let relaxed = RelaxedProgram { object: &object, whitened: &whitened, options, c, objective };
+            let (body, program) = relaxed.solve(&mut Watch::new(progress))?;
             (body, Some(program))
         }
         SosMethod::InverseMoment => {
@@ -148,60 +150,68 @@ pub fn fit_sos(
     Ok(SosFit { body, report })
 }
 
-/// The least objective with convexity relaxed; of no bound of convexity the points alone keep p
-/// from growing.
-fn relaxed(
-    object: &Object,
-    whitened: &[Vector3<f64>],
-    options: &SosOptions,
+/// The program of a set with relaxed convexity.
+struct RelaxedProgram<'a> {
+    object: &'a Object<'a>,
+    /// All points, whitened.
+    whitened: &'a [Vector3<f64>],
+    options: &'a SosOptions,
+    /// See [`SosMethod::Relaxed`].
     c: f64,
     objective: Objective,
-    watch: &mut Watch,
-) -> Result<(SosBody, ProgramReport), FitError> {
-    let map = object.coordinates(options.coordinates)?;
-    let structure = if c.is_finite() {
-        Structure::new(options.degree)
-    } else {
-        let structure = Structure::without_convexity(options.degree);
-        moments(&structure, whitened)?;
-        structure
-    };
-    let power = c.is_finite().then(|| NormPower::new(c, &map.linear, &map.offset, options.degree));
-    let mut margins = MARGIN_ATTEMPTS.iter().map(|factor| factor * DEFAULT_MARGIN);
-    loop {
-        let margin = margins.next().unwrap_or(DEFAULT_MARGIN);
-        let problem = Problem::new(&structure, objective, &map, margin).relaxed(power.as_ref());
-        // Where convexity bounds too little the points have to: then they are what is missing.
-        let spanned = |error| match error {
-            FitError::Program(_) | FitError::NotOptimal { .. } => {
-                let all = Structure::without_convexity(options.degree);
-                moments(&all, whitened).err().unwrap_or(error)
-            }
-            other => other,
+}
+
+impl RelaxedProgram<'_> {
+    /// The set with the least objective. Without a bound of convexity only the points keep p from
+    /// growing.
+    fn solve(&self, watch: &mut Watch) -> Result<(SosBody, ProgramReport), FitError> {
+        let Self { object, whitened, options, c, objective } = *self;
+        let map = object.coordinates(options.coordinates)?;
+        let structure = if c.is_finite() {
+            Structure::new(options.degree)
+        } else {
+            let structure = Structure::without_convexity(options.degree);
+            moments(&structure, whitened)?;
+            structure
         };
-        let Optimum { coefficients, hessian, gram, gap, objective } =
-            generate(problem, whitened, &[], watch).map_err(|error| spanned(error).of_objective(objective))?;
-        let relaxation = |polynomial: &Polynomial| {
-            let Some(power) = &power else { return Ok(None) };
-            let gram = HessianGram::nearest_with(polynomial, power, structure.hessian_basis.clone(), hessian.clone())
-                .map_err(SosBodyError::NotRelaxed)?;
-            Ok(Some(Relaxation { c, linear: map.linear, offset: map.offset, gram }))
-        };
-        let gram = gram.ok_or(ProgramError::Singular)?;
-        match certify(object, &structure, &coefficients, gram, relaxation) {
-            Ok(body) => {
-                let (rounds, iterations) = (watch.progress().round, watch.progress().iterations);
-                let report = ProgramReport {
-                    objective_value: objective,
-                    optimality_gap: gap.unwrap_or(f64::INFINITY),
-                    rounds,
-                    iterations,
-                    margin,
-                };
-                return Ok((body, report));
+        let power = c.is_finite().then(|| NormPower::new(c, &map.linear, &map.offset, options.degree));
+        let mut margins = MARGIN_ATTEMPTS.iter().map(|factor| factor * DEFAULT_MARGIN);
+        loop {
+            let margin = margins.next().unwrap_or(DEFAULT_MARGIN);
+            let problem = Problem::new(&structure, objective, &map, margin).relaxed(power.as_ref());
+            // Where convexity bounds too little the points have to: then they are what is missing.
+            let spanned = |error| match error {
+                FitError::Program(_) | FitError::NotOptimal { .. } => {
+                    let all = Structure::without_convexity(options.degree);
+                    moments(&all, whitened).err().unwrap_or(error)
+                }
+                other => other,
+            };
+            let Optimum { coefficients, hessian, gram, gap, objective } =
+                generate(problem, whitened, &[], watch).map_err(|error| spanned(error).of_objective(objective))?;
+            let relaxation = |polynomial: &Polynomial| {
+                let Some(power) = &power else { return Ok(None) };
+                let gram =
+                    HessianGram::nearest_with(polynomial, power, structure.hessian_basis.clone(), hessian.clone())
+                        .map_err(SosBodyError::NotRelaxed)?;
+                Ok(Some(Relaxation { c, linear: map.linear, offset: map.offset, gram }))
+            };
+            let gram = gram.ok_or(ProgramError::Singular)?;
+            match certify(object, &structure, &coefficients, gram, relaxation) {
+                Ok(body) => {
+                    let (rounds, iterations) = (watch.progress().round, watch.progress().iterations);
+                    let report = ProgramReport {
+                        objective_value: objective,
+                        optimality_gap: gap.unwrap_or(f64::INFINITY),
+                        rounds,
+                        iterations,
+                        margin,
+                    };
+                    return Ok((body, report));
+                }
+                Err(FitError::UnprovenSos(SosBodyError::NotRelaxed(_))) if margins.len() > 0 => {}
+                Err(error) => return Err(error),
             }
-            Err(FitError::UnprovenSos(SosBodyError::NotRelaxed(_))) if margins.len() > 0 => {}
-            Err(error) => return Err(error),
         }
     }
 }
@@ -218,7 +228,7 @@ fn certify(
     let inverse = normalization.linear.try_inverse().ok_or(ProgramError::Singular)?;
     let placement = Placement::new(normalization.linear, inverse, normalization.center, 0.0, 0.0);
     let terms = structure.monomials.iter().copied().zip(coefficients.iter().copied()).collect();
-    let polynomial = pulled_inside(Polynomial::new(terms)?, object.points(), &placement, 0.0, ROOM);
+    let polynomial = pulled_inside(Polynomial::new(terms)?, object.points(), &placement, 0.0, SLACK_BELOW_LEVEL);
     let gram = SosGram::nearest(&polynomial, monomials(structure.degree / 2), gram).map_err(SosBodyError::NotSos)?;
     let relaxation = relaxation(&polynomial)?;
     let body = SosBody::new(object.name(), normalization, polynomial, gram, relaxation)?;

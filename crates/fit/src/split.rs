@@ -16,12 +16,18 @@ const HEIGHTS: usize = 15;
 /// Cuts that are measured exactly.
 pub(super) const FINALISTS: usize = 6;
 
-/// Part of a piece's hull that a side must at least have: thinner ones are not worth a part, nor
-/// easy to fit.
+/// Least volume of a side of a cut, as a part of the hull of the piece; dimensionless.
+///
+/// Thinner sides are not worth a part, and near [`FLATNESS`](crate::hull::FLATNESS) no body can be
+/// fitted to them. A larger value forbids useful cuts beside thin walls. Pinned by
+/// `slivers_are_not_cut_off`.
 pub(super) const LEAST_SHARE: f64 = 1e-3;
 
-/// Longest distance between samples of an edge, relative to the piece.
-const SPACING: f64 = 1.0 / 64.0;
+/// Longest distance between samples of an edge, relative to the size of the piece; dimensionless.
+///
+/// A larger value estimates hulls of halves from too few points; a smaller one takes more time for
+/// the same cuts. Pinned by `samples_are_no_farther_apart_than_the_spacing`.
+const SAMPLE_SPACING: f64 = 1.0 / 64.0;
 
 /// Most samples of a piece.
 const MAX_SAMPLES: usize = 20_000;
@@ -201,7 +207,7 @@ pub(super) fn samples(pieces: &[&Piece]) -> Vec<Vector3<f64>> {
     let corners = || pieces.iter().flat_map(|piece| piece.spots()).map(|spot| spot.x);
     let (low, high) = corners()
         .fold((Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)), |(low, high), x| (low.inf(&x), high.sup(&x)));
-    let spacing = SPACING * (high - low).norm();
+    let spacing = SAMPLE_SPACING * (high - low).norm();
     let mut samples: Vec<_> = corners().collect();
     for piece in pieces {
         for triangle in piece.triangles() {
@@ -215,4 +221,50 @@ pub(super) fn samples(pieces: &[&Piece]) -> Vec<Vector3<f64>> {
     }
     let every = samples.len().div_ceil(MAX_SAMPLES);
     samples.into_iter().step_by(every).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{plan, points, samples};
+    use crate::hull::rough_volume;
+    use nalgebra::Vector3;
+    use sublevel_core::body::Piece;
+
+    /// A cube with edge 1 and another one beside it.
+    fn two_cubes(edge: f64) -> Piece {
+        let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        let (mut corners, mut triangles) = (Vec::new(), Vec::new());
+        for (edge, shift) in [(1.0, 0.0), (edge, 2.0)] {
+            let first = corners.len();
+            corners.extend((0..8_u8).map(|i| Vector3::from_fn(|axis, _| shift + edge * f64::from(i >> axis & 1))));
+            triangles.extend(faces.iter().flat_map(|&[a, b, c, d]| {
+                [[a, b, c], [a, c, d]].map(|triangle: [usize; 3]| triangle.map(|corner| corner + first))
+            }));
+        }
+        Piece::of_mesh(&corners, &triangles).unwrap()
+    }
+
+    #[test]
+    fn slivers_are_not_cut_off() {
+        // 2e-5 and 5e-3 of the whole hull.
+        for (edge, is_cut_off) in [(0.03, false), (0.2, true)] {
+            let piece = two_cubes(edge);
+            let whole = rough_volume(&points(&piece)).unwrap();
+            let found = plan(&piece).map(|plan| plan.sides.map(|side| rough_volume(&points(&side)).unwrap()));
+            let least = found.map_or(whole, |volumes| volumes[0].min(volumes[1]));
+            assert!(least >= 1e-3 * whole, "edge {edge}: {least} of {whole}");
+            assert_eq!(least < 1.1 * edge.powi(3), is_cut_off, "edge {edge}: {least}");
+        }
+    }
+
+    #[test]
+    fn samples_are_no_farther_apart_than_the_spacing() {
+        let corners = [Vector3::zeros(), Vector3::new(3.0, 0.0, 0.0), Vector3::new(0.0, 4.0, 0.0)];
+        let piece = Piece::of_mesh(&corners, &[[0, 1, 2]]).unwrap();
+        // The piece has the size 5; one edge runs from (0, 0) to (3, 0).
+        let mut along: Vec<f64> = samples(&[&piece]).iter().filter(|x| x.y == 0.0).map(|x| x.x).collect();
+        along.sort_by(f64::total_cmp);
+        let widest = along.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+        assert!((5.0 / 80.0..=5.0 / 64.0).contains(&widest), "{widest}");
+    }
 }

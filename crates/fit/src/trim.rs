@@ -10,17 +10,23 @@ use nalgebra::{Matrix3, Vector3};
 use std::ops::ControlFlow;
 
 /// Degree of the bodies by which points stand out.
-const DEGREE: usize = 4;
+const TRIM_DEGREE: usize = 4;
 
 /// How often points are left out, about as many each time: those that an outlier hid stand out once
 /// it is gone.
-const ROUNDS: usize = 5;
+const TRIM_ROUNDS: usize = 5;
 
-/// Points with a larger value of the polynomial touch the body.
+/// Value of the polynomial above which a point touches the body; dimensionless, 1 on the surface.
+///
+/// Active points of a fit lie within 1e-6 of the surface. Closer to 1, active points would be
+/// ordered by rounding; smaller, points of the crowd count as touching. Pinned by
+/// `as_few_strays_as_corners_of_a_simplex_go_before_the_crowd`.
 const TOUCHES: f64 = 1.0 - 1e-3;
 
-/// Most of the points that may be left out.
-const MOST: f64 = 0.5;
+/// Most of the points that may be left out; a fraction.
+///
+/// What is more than half is no outlier. Pinned by `fractions_are_checked_and_it_can_be_stopped`.
+const MAX_TRIM_FRACTION: f64 = 0.5;
 
 /// What is left of points.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,9 +40,9 @@ pub struct Trimmed {
 }
 
 /// Leaves out that fraction of the points, rounded down: again and again the outermost as the
-/// smallest body of degree 4 around those that are left sees them, the ones with the largest values
-/// of its polynomial. Of those that touch it, the ones that stand apart from all others go first.
-/// It follows the points through affine maps.
+/// smallest body of degree 4 around those that are left orders them, the ones with the largest
+/// values of its polynomial. Of those that touch it, the ones that stand apart from all others go
+/// first. It follows the points through affine maps.
 ///
 /// # Errors
 /// [`FitError::Trim`] for a fraction outside [0, 0.5], and as [`fit`](super::fit()).
@@ -45,21 +51,21 @@ pub fn trim(
     fraction: f64,
     progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Trimmed, FitError> {
-    if !(0.0..=MOST).contains(&fraction) {
+    if !(0.0..=MAX_TRIM_FRACTION).contains(&fraction) {
         return Err(FitError::Trim(fraction));
     }
     let mut watch = Watch::new(progress);
     let mut left = (fraction * points.len() as f64).floor() as usize;
     let mut stays = vec![true; points.len()];
-    for round in 0..ROUNDS {
-        let share = left.div_ceil(ROUNDS - round);
+    for round in 0..TRIM_ROUNDS {
+        let share = left.div_ceil(TRIM_ROUNDS - round);
         if share == 0 {
             break;
         }
         let (indices, kept): (Vec<_>, Vec<_>) =
             points.iter().enumerate().filter(|(i, _)| stays[*i]).map(|(i, x)| (i, *x)).unzip();
         let object = Object::new("trim", &kept, "")?;
-        let levels = object.levels(DEGREE, &mut watch)?;
+        let levels = object.levels(TRIM_DEGREE, &mut watch)?;
         let leverages = leverages(&kept.iter().map(|x| object.whiten(x)).collect::<Vec<_>>())?;
         // Few points touch on all sides of a cluster as on all sides of a body: their levels are
         // the same but for rounding.
@@ -75,7 +81,7 @@ pub fn trim(
     let mut farthest_m = 0.0_f64;
     if !left_out.is_empty() {
         let hull: Vec<_> = convex_hull(&kept)?.vertices.iter().map(|&i| kept[i]).collect();
-        // Seen from near by, as rounding wants it.
+        // Relative to a point near by, which keeps rounding small.
         let from = hull[0];
         let hull: Vec<_> = hull.iter().map(|x| x - from).collect();
         farthest_m = left_out.iter().map(|x| (x - from - nearest(&hull, &(x - from))).norm()).fold(0.0, f64::max);
@@ -125,8 +131,8 @@ mod tests {
     #[test]
     fn strays_are_the_first_to_go() {
         let points = scan(20);
-        // A few more than there are strays: each round takes about as many, and the first cannot
-        // see all.
+        // A few more than there are strays: each round takes about as many, and the first round
+        // cannot find all.
         let found = trim(&points, 60.0 / points.len() as f64, &mut unwatched).unwrap();
         assert_eq!((found.left_out.len(), found.kept.len()), (60, points.len() - 60));
         assert!(found.kept.iter().all(|x| x.norm() < 0.7), "a stray stays");

@@ -1,16 +1,18 @@
-//! The level-0 program of the hierarchy, solved by an interior-point method for semidefinite programs: an arbiter that shares
-//! neither method nor starting point with the solver.
+//! The level-0 program of the hierarchy, solved by an interior-point method for semidefinite
+//! programs: an arbiter that shares neither method nor starting point with the solver.
 //!
-//! For sos-convex constraints level 0 is exact. With a unit vector n from B to A, `|x - y| >= n·(x - y)`, and the Lagrangian
-//! splits into one polynomial in x and one in y, so that one small Gram matrix per body remains:
+//! For sos-convex constraints level 0 is exact. With a unit vector n from B to A,
+//! `|x - y| >= n·(x - y)`, and the Lagrangian splits into one polynomial in x and one in y, so that
+//! one small Gram matrix per body remains:
 //!
 //! ```text
 //! D = max γ_A + γ_B   subject to   |n| <= 1,  λ, μ >= 0,
 //!      n·x + Σ λ_i (g_i(x) - 1) - γ_A  sos,     -n·y + Σ μ_j (h_j(y) - 1) - γ_B  sos
 //! ```
 //!
-//! Any feasible point proves `D >= γ_A + γ_B`; at the optimum both polynomials are sos-convex with minimum 0, hence sos. The
-//! level distance needs one Gram matrix: `d = max γ` with `Σ ν_i g_i + Σ μ_j (h_j - 1) - γ` sos, ν, μ >= 0, Σ ν = 1.
+//! Any feasible point proves `D >= γ_A + γ_B`; at the optimum both polynomials are sos-convex with
+//! minimum 0, hence sos. The level distance needs one Gram matrix: `d = max γ` with
+//! `Σ ν_i g_i + Σ μ_j (h_j - 1) - γ` sos, ν, μ >= 0, Σ ν = 1.
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};

@@ -2,7 +2,7 @@
 //!
 //! A [`Scene`] is an immutable snapshot. [`Scene::updated`] checks a whole [`Update`] and then
 //! makes the next snapshot, one revision on; readers keep the snapshot they hold. Nothing here
-//! knows of disks or wires. Lengths are metres, poses map body frame to world frame.
+//! depends on storage or on the network. Lengths are metres, poses map body frame to world frame.
 
 mod limits;
 mod snapshot;

@@ -17,10 +17,10 @@ use sublevel_core::body::{BasicSet, Body, BodyError, BodyId, Constraint, Contain
 use sublevel_core::polynomial::{ContainmentProof, HessianGram, NotContaining, Polynomial, Substituted};
 
 /// Distance to the optimum asked of the path, in units of log dets.
-const GAP: f64 = 1e-5;
+const ENCLOSURE_PATH_GAP: f64 = 1e-5;
 
 /// Largest such distance of an enclosure.
-const OPTIMALITY_GAP: f64 = 1e-3;
+const ENCLOSURE_OPTIMALITY_GAP: f64 = 1e-3;
 
 /// A body around sets, and how it came about.
 #[derive(Clone, Debug)]
@@ -46,8 +46,8 @@ pub struct Enclosure {
 /// The sos-convex body with the largest `log det P` that the multipliers prove to contain all
 /// regions, with its proofs.
 ///
-/// The same in every affine frame, but for the margin. `progress` hears of every Newton step and
-/// can stop it.
+/// The same in every affine frame, but for the margin. `progress` is called at every Newton step
+/// and can stop it.
 ///
 /// # Errors
 /// [`EncloseError`]: bad input, or what could not be solved or proven.
@@ -74,9 +74,9 @@ pub fn enclose(
         let program = program(&structure, &object, &prepared, margin).map_err(FitError::from)?;
         watch.round(regions.len(), 0.0);
         let unsolved = EncloseError::Unsolved { multiplier_degree: options.multiplier_degree };
-        let centre = program.follow(GAP, &mut watch)?.ok_or_else(|| unsolved.clone())?;
+        let centre = program.follow(ENCLOSURE_PATH_GAP, &mut watch)?.ok_or_else(|| unsolved.clone())?;
         let (objective_value, optimality_gap) = program.objective(&centre).ok_or(unsolved.clone())?;
-        if !(optimality_gap <= OPTIMALITY_GAP * objective_value.abs().max(1.0)) {
+        if !(optimality_gap <= ENCLOSURE_OPTIMALITY_GAP * objective_value.abs().max(1.0)) {
             return Err(FitError::NotOptimal { gap: optimality_gap }.into());
         }
         let terms = structure.monomials.iter().copied().zip(centre.coefficients.iter().copied()).collect();

@@ -23,7 +23,7 @@ pub enum EncloseError {
         "max growth: {0} is not positive; give the volume that grouping may add, such as 0.2 of that of all bodies"
     )]
     Growth(f64),
-    /// A set's points tell too little of it.
+    /// A set's points do not determine a frame for it.
     #[error("sets[{index}]: its points cannot be used: {source}")]
     Points {
         /// Which set.
@@ -54,7 +54,7 @@ pub enum EncloseError {
     Unproven {
         /// Which set.
         index: usize,
-        /// What the proof lacks.
+        /// Why the proof fails.
         source: NotContaining,
     },
 }

@@ -57,7 +57,8 @@ impl LocalizingMatrix {
         }
     }
 
-    /// What a Gram matrix adds to the coefficients of the identity; adjoint of [`LocalizingMatrix::matrix`].
+    /// What a Gram matrix adds to the coefficients of the identity; adjoint of
+    /// [`LocalizingMatrix::matrix`].
     pub(super) fn collapse(&self, gram: &DMatrix<f64>) -> DVector<f64> {
         let own = self.pattern.collapse(gram);
         self.map.as_ref().map_or_else(|| own.clone(), |map| map.tr_mul(&own))

@@ -4,7 +4,7 @@
 //!
 //! ```text
 //! minimise  -log det P   subject to  p = zᵀPz,  yᵀ∇²p y = wᵀHw,  H ⪰ εI,
-//!                                    1 - p = σ_k + Σ_j τ_kj (1 - g_kj),  all σ and τ sums of squares
+//!                              1 - p = σ_k + Σ_j τ_kj (1 - g_kj),  all σ and τ sums of squares
 //! ```
 //!
 //! (Ahmadi, Hall, Makadia and Sindhwani, RSS 2017, section V). In its dual each set has a
@@ -12,7 +12,8 @@
 //! to points has weights of evaluations at points:
 //!
 //! ```text
-//! maximise  log det M(m) + N - Σ y_k(1) + ε tr S(s)   subject to  m = Σ y_k|p - D*s,  M_kj(y_k) ⪰ 0,  S(s) ⪰ 0
+//! maximise  log det M(m) + N - Σ y_k(1) + ε tr S(s)
+//! subject to  m = Σ y_k|p - D*s,  M_kj(y_k) ⪰ 0,  S(s) ⪰ 0
 //! ```
 //!
 //! with y_k|p its values on the monomials of p, which have another frame. All but the term of m is
@@ -36,7 +37,7 @@ const GROWTH: f64 = 10.0;
 /// Growth of τ below which a path that rounding blocks is given up.
 const LEAST_GROWTH: f64 = 1.3;
 /// Newton steps at most.
-const STEPS: usize = 300;
+const MAX_NEWTON_STEPS: usize = 300;
 
 /// Variables with their own barrier: the functional of a set, or of the Hessian form.
 pub(super) struct Block<'a> {
@@ -99,7 +100,7 @@ impl Path<'_> {
         let (mut tau, mut growth) = (1.0, GROWTH);
         let mut variables: Vec<_> = self.blocks.iter().map(|block| block.start.clone()).collect();
         let mut last: Option<Iterate> = None;
-        for _ in 0..STEPS {
+        for _ in 0..MAX_NEWTON_STEPS {
             watch.iteration(self.barrier_parameter() / tau)?;
             let newton = self.step(&variables, tau);
             let centred = newton.as_ref().is_some_and(|newton| newton.decrement < CENTRED);

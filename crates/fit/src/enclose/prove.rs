@@ -4,7 +4,8 @@
 //! determinants are as far from singular as can be wished for. Their dual has one functional y,
 //!
 //! ```text
-//! minimise  y(1 - p) - Σ log det M_j(y),   with the inverses of the M_j as Gram matrices at the minimum,
+//! minimise  y(1 - p) - Σ log det M_j(y),
+//! with the inverses of the M_j as Gram matrices at the minimum,
 //! ```
 //!
 //! by Newton's method, as in `certificate`. Where `y(1 - p) <= 0` on the way, y being nonnegative
@@ -21,13 +22,13 @@ use sublevel_core::body::{BasicSet, Body, Containment};
 use sublevel_core::polynomial::{ContainmentProof, NotContaining, Substituted};
 
 /// Newton steps before giving up.
-const STEPS: usize = 300;
+const MAX_NEWTON_STEPS: usize = 300;
 
 /// Newton decrement at which the matrices are the best ones for all practical purposes.
-const CENTRED: f64 = 1e-4;
+const CENTRED_DECREMENT: f64 = 1e-4;
 
 /// Decrement below which a step's prediction is definite.
-const NEAR: f64 = 0.5;
+const DEFINITE_DECREMENT: f64 = 0.5;
 
 /// Why a set has no proof that a body contains it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -101,7 +102,7 @@ fn centre(prepared: &Prepared, minus_p: DVector<f64>) -> Result<Vec<DMatrix<f64>
     let mut y = prepared.mean.clone();
     let mut bound = f64::INFINITY;
     let mut found = None;
-    for step in 0..STEPS {
+    for step in 0..MAX_NEWTON_STEPS {
         let value = target.dot(&y);
         bound = bound.min(value / y[0]);
         if value <= 0.0 {
@@ -122,11 +123,11 @@ fn centre(prepared: &Prepared, minus_p: DVector<f64>) -> Result<Vec<DMatrix<f64>
         let Some(half) = factor.solve_lower_triangular(&slope) else { break };
         let Some(change) = factor.tr_solve_lower_triangular(&half).map(|change| -change) else { break };
         let decrement = half.norm();
-        if decrement < NEAR {
+        if decrement < DEFINITE_DECREMENT {
             let predicted = |cone: &LocalizingMatrix| cone.predicted(&y, &(&y + &change));
             found = prepared.cones.iter().map(predicted).collect::<Option<Vec<_>>>().or(found);
         }
-        if !(decrement > CENTRED) {
+        if !(decrement > CENTRED_DECREMENT) {
             break;
         }
         y += change / (1.0 + decrement);

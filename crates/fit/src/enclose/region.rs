@@ -16,8 +16,8 @@ const SHELLS: [f64; 4] = [0.4, 0.7, 0.9, 1.0];
 
 /// Rays whose chords give the points of a set that need not be convex, and where on them, from end
 /// to end.
-const RAYS: usize = 1000;
-/// See [`RAYS`].
+const CHORD_RAYS: usize = 1000;
+/// See [`CHORD_RAYS`].
 const ALONG: [f64; 4] = [1e-3, 0.3, 0.7, 0.999];
 
 /// A basic set to be contained, and points of it.
@@ -41,7 +41,7 @@ impl<'a> From<&'a Body> for Region<'a> {
 impl<'a> From<&'a SosBody> for Region<'a> {
     fn from(body: &'a SosBody) -> Self {
         let inside = |(from, to): (Vector3<f64>, Vector3<f64>)| ALONG.map(|share| from + (to - from) * share);
-        Self { set: body.into(), inside: body.chords(RAYS).into_iter().flat_map(inside).collect() }
+        Self { set: body.into(), inside: body.chords(CHORD_RAYS).into_iter().flat_map(inside).collect() }
     }
 }
 

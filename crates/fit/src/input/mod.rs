@@ -44,7 +44,7 @@ pub struct Reading {
     pub remarks: Remarks,
 }
 
-/// Reads the mesh or point cloud at `path`; the ending of its name says which format it has.
+/// Reads the mesh or point cloud at `path`; the ending of its name determines the format.
 ///
 /// # Errors
 /// [`ReadError`]; every variant names the file, the place, the reason and the remedy. Counts and
@@ -77,8 +77,8 @@ pub fn parse_mesh(bytes: &[u8], format: &str, path: &Path, options: &ReadOptions
             return Err(ReadError::UnknownFormat { path: path.to_owned(), extension: format.to_owned() });
         }
     };
-    let made = surface.map_err(SurfaceError::from).and_then(|surface| surface.into_mesh(options));
-    let (mut mesh, mut remarks) = made.map_err(|error| match error {
+    let mesh = surface.map_err(SurfaceError::from).and_then(|surface| surface.into_mesh(options));
+    let (mut mesh, mut remarks) = mesh.map_err(|error| match error {
         SurfaceError::Defect(Defect { place, reason, remedy }) => {
             ReadError::Malformed { path: path.to_owned(), place, reason, remedy }
         }

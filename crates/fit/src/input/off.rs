@@ -9,7 +9,7 @@ use super::text::{Line, lines, quoted};
 use super::{Defect, text};
 use nalgebra::Vector3;
 
-/// What the keyword says.
+/// What the keyword states.
 #[derive(Clone, Copy, Debug)]
 struct Kind {
     /// Numbers that each vertex has behind its coordinates, normals and texture coordinates alone.
@@ -58,7 +58,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Surface, Defect> {
 }
 
 /// Whether the file has one row in a line, so that a line which lost a number must not be read on
-/// into the next: it has as many lines as rows, or most vertices, but not all, in lines of their own.
+/// into the next: it has as many lines as rows, or most vertices, but not all, in lines of their
+/// own.
 fn is_laid_out_in_rows(lines: &[Line<'_>], kind: Kind) -> bool {
     let Some((first, rows)) = lines.split_first() else { return false };
     let counts: Option<Vec<usize>> = first.fields().map(text::integer).collect();
@@ -68,7 +69,7 @@ fn is_laid_out_in_rows(lines: &[Line<'_>], kind: Kind) -> bool {
     Some(rows.len()) == vertices.checked_add(faces) || 2 * whole > vertices && whole < vertices
 }
 
-/// What the keyword says, and the lines behind it; without one the counts come first.
+/// What the keyword states, and the lines behind it; without one the counts come first.
 fn keyword<'a>(lines: &[Line<'a>]) -> Result<(Kind, Vec<Line<'a>>), Defect> {
     let first = *lines.first().ok_or_else(counts_missing)?;
     let Some(at) = first.text.windows(3).position(|word| word == b"OFF") else {

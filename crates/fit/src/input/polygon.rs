@@ -2,10 +2,10 @@
 //!
 //! Where the fan about the first corner turns one way, as seen along the vector area of the outline
 //! (Newell's normal), it lies inside the outline and is taken. Else the polygon is projected along
-//! the axis nearest to that normal and triangulated inside its loops by a constrained Delaunay triangulation (`spade`,
-//! with exact predicates): a face is inside where the way there from outside passes an odd number
-//! of edges of the loops. Corners in the middle of an edge are kept, so that the triangles of
-//! neighbours meet edge to edge and closed meshes stay closed.
+//! the axis nearest to that normal and triangulated inside its loops by a constrained Delaunay
+//! triangulation (`spade`, with exact predicates): a face is inside where the way there from
+//! outside passes an odd number of edges of the loops. Corners in the middle of an edge are kept,
+//! so that the triangles of neighbours meet edge to edge and closed meshes stay closed.
 
 use nalgebra::Vector3;
 use spade::handles::FixedVertexHandle;
@@ -15,8 +15,14 @@ use std::collections::HashMap;
 /// Edges that the loops may be divided into by corners on them, for each corner.
 const EDGES_PER_CORNER: usize = 64;
 
-/// Areas below this part of the square of the outline's size are rounding.
-const FLAT: f64 = 1e-12;
+/// Area of an outline below which it counts as flat, relative to the square of its size;
+/// dimensionless.
+///
+/// Areas of coordinates in double precision round at about 1e-16, and of those in single precision
+/// they are no less exact, being computed from the same numbers. A smaller value triangulates along
+/// a direction that rounding chose; a larger one fans slender faces. Pinned by
+/// `slender_outlines_are_triangulated_and_flat_ones_fanned`.
+const FLAT_AREA: f64 = 1e-12;
 
 /// Adds the triangles of a polygon, an outline and loops around holes, oriented as the outline is.
 /// Loops of fewer than three corners enclose nothing.
@@ -29,7 +35,7 @@ pub(super) fn triangulate(points: &[Vector3<f64>], loops: &[&[usize]], triangles
     let holes: Vec<Vec<usize>> = loops.filter(|corners| corners.len() >= 3).collect();
     let area = vector_area(points, &outline);
     // An outline without area, but for rounding, encloses nothing.
-    let is_flat = holes.is_empty() && !(area.norm() > FLAT * size(points, &outline).powi(2));
+    let is_flat = holes.is_empty() && !(area.norm() > FLAT_AREA * size(points, &outline).powi(2));
     if is_flat || holes.is_empty() && (outline.len() == 3 || turns_one_way(points, &outline, &area)) {
         triangles.extend(fan(&outline));
         return true;
@@ -248,6 +254,17 @@ mod tests {
         let mut triangles = Vec::new();
         assert!(triangulate(&points, &[&[0, 1, 2, 3], &[7, 6, 5, 4]], &mut triangles));
         assert!((areas(&points, &triangles).1 - 24.0).abs() < 1e-9, "however the hole turns");
+    }
+
+    #[test]
+    fn slender_outlines_are_triangulated_and_flat_ones_fanned() {
+        let outline = |h: f64| placed(&[[0.0, 0.0], [4.0, 0.0], [4.0, h], [2.0, 0.25 * h], [0.0, h]]);
+        let mut triangles = Vec::new();
+        assert!(triangulate(&outline(1e-9), &[&[0, 1, 2, 3, 4]], &mut triangles));
+        assert_ne!(triangles, [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
+        triangles.clear();
+        assert!(triangulate(&outline(1e-13), &[&[0, 1, 2, 3, 4]], &mut triangles));
+        assert_eq!(triangles, [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
     }
 
     #[test]

@@ -1,5 +1,5 @@
 //! Stereolithography, text or binary. Corners that several triangles have are one vertex; normals
-//! are not read, as the order of the corners says the same.
+//! are not read, as the order of the corners gives the same.
 //!
 //! Text holds one solid after the other, each from `solid` to `endsolid`, keywords in any case,
 //! with blanks and line ends anywhere but in names. Its numbers are read in double precision; those

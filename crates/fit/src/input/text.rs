@@ -3,7 +3,7 @@
 use super::Defect;
 
 /// Longest part of a field that an error quotes, bytes.
-const QUOTED: usize = 40;
+const MAX_QUOTED_BYTES: usize = 40;
 
 /// A line of a text file.
 #[derive(Clone, Copy, Debug)]
@@ -141,13 +141,13 @@ pub(super) fn integer<T: std::str::FromStr>(field: &[u8]) -> Option<T> {
 
 /// The beginning of a message that may quote what a file holds, in one line.
 pub(super) fn shortened(text: &str) -> String {
-    const LONGEST: usize = 120;
-    let shown: String = text.chars().take(LONGEST).flat_map(char::escape_debug).collect();
-    if text.chars().nth(LONGEST).is_some() { shown + "..." } else { shown }
+    const MAX_MESSAGE_CHARS: usize = 120;
+    let shown: String = text.chars().take(MAX_MESSAGE_CHARS).flat_map(char::escape_debug).collect();
+    if text.chars().nth(MAX_MESSAGE_CHARS).is_some() { shown + "..." } else { shown }
 }
 
 /// A field as an error shows it.
 pub(super) fn quoted(field: &[u8]) -> String {
-    let shown = String::from_utf8_lossy(&field[..field.len().min(QUOTED)]);
-    if field.len() > QUOTED { format!("{shown:?}...") } else { format!("{shown:?}") }
+    let shown = String::from_utf8_lossy(&field[..field.len().min(MAX_QUOTED_BYTES)]);
+    if field.len() > MAX_QUOTED_BYTES { format!("{shown:?}...") } else { format!("{shown:?}") }
 }

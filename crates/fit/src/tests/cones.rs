@@ -123,8 +123,7 @@ fn least(
     cone: Cone,
     values: &DMatrix<f64>,
     margin: f64,
-    curvature: &DMatrix<f64>,
-    linear: &DVector<f64>,
+    (curvature, linear): (&DMatrix<f64>, &DVector<f64>),
 ) -> f64 {
     let (count, size) = (structure.monomials.len(), structure.hessian.size);
     let entry = |i: usize, j: usize| count + i.max(j) * (i.max(j) + 1) / 2 + i.min(j);
@@ -158,7 +157,8 @@ fn least(
         rows.cones.push(SupportedConeT::NonnegativeConeT(2 * pairs.len() + size));
         columns += pairs.len();
     } else {
-        // h_ii - ε = Σ_j m_ij, with (m_ij, m_ji, h_ij) a semidefinite block: m_ij + m_ji >= |(m_ij - m_ji, 2 h_ij)|
+        // h_ii - ε = Σ_j m_ij, with (m_ij, m_ji, h_ij) a semidefinite block: m_ij + m_ji >= |(m_ij
+        // - m_ji, 2 h_ij)|
         let share = |i: usize, j: usize| columns + i * size + j;
         for i in 0..size {
             let others = (0..size).filter(|&j| j != i).map(|j| (share(i, j), 1.0));
@@ -219,7 +219,7 @@ fn programs_agree_with_clarabel() {
             let scale = 1.0 + linear.norm();
             let found = program.minimise(&origin, 1e-8 * scale, &mut Watch::new(&mut unwatched)).unwrap().unwrap();
             let value = |c: &DVector<f64>| 0.5 * c.dot(&(&curvature * c)) + linear.dot(c);
-            let expected = least(&structure, cone, &values, margin, &curvature, &linear);
+            let expected = least(&structure, cone, &values, margin, (&curvature, &linear));
             let difference = (value(&found.coefficients) - expected) / scale;
             println!("{cone}, degree {degree}, {} points: {expected}, {difference:.1e} of {scale:.0}", points.len());
             assert!(difference.abs() < 1e-6, "{difference}");

@@ -125,9 +125,8 @@ impl Program {
 fn least_trace(
     structure: &Structure,
     matrix: Matrix,
-    points: &[Vector3<f64>],
+    (points, symmetric): (&[Vector3<f64>], bool),
     floor: f64,
-    symmetric: bool,
     relaxation: &DVector<f64>,
 ) -> f64 {
     let parity = |e: [u8; 3]| if symmetric { e.map(|n| n % 2) } else { [0; 3] };
@@ -219,7 +218,7 @@ fn traces_agree_with_the_printed_programs() {
             let problem = Problem::new(&structure, objective, &unit, margin);
             let ours = generate(problem, &whitened, &[], &mut Watch::new(&mut unwatched)).unwrap();
             let nothing = DVector::zeros(structure.monomials.len());
-            let printed = least_trace(&structure, objective.matrix(), unit_points, margin, symmetric, &nothing);
+            let printed = least_trace(&structure, objective.matrix(), (unit_points, symmetric), margin, &nothing);
             let difference = ours.objective / printed - 1.0;
             println!(
                 "{objective}, degree {degree}: {:.8}, as printed {printed:.8}, relative difference {difference:.1e}",
@@ -255,7 +254,7 @@ fn relaxed_programs_agree_with_the_printed_one() {
                 *value = power.terms().iter().find(|term| term.0 == *monomial).map_or(0.0, |term| term.1);
             }
         }
-        let printed = least_trace(&structure, objective.matrix(), &points, margin, false, &plain);
+        let printed = least_trace(&structure, objective.matrix(), (&points, false), margin, &plain);
         let difference = ours.objective / printed - 1.0;
         println!("c = {c}: {:.8}, as printed {printed:.8}, relative difference {difference:.1e}", ours.objective);
         assert!(difference.abs() < 2e-6);

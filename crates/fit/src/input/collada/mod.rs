@@ -62,7 +62,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Surface, Defect> {
     Ok(surface)
 }
 
-/// Most bytes of a tag, and most declarations of namespaces: the parser compares each with all others.
+/// Most bytes of a tag, and most declarations of namespaces: the parser compares each with all
+/// others.
 const MOST_TAG_BYTES: usize = 4096;
 const MOST_NAMESPACES: usize = 64;
 
