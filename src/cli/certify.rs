@@ -1,6 +1,6 @@
 //! `sublevel certify`.
 
-use super::{read, write_atomically};
+use super::files::{read, write_atomically};
 use crate::body::{Body, Constraint, Normalization};
 use crate::fit::certificate;
 use crate::polynomial::{Exponents, Polynomial};

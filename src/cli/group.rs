@@ -1,7 +1,11 @@
 //! `sublevel fit --group`.
 
-use super::fit::{FitArgs, checked, execute_on, make_folder, progress_bar, request_of_group};
-use super::{read_obstacle, write_atomically};
+use super::files::make_folder;
+use super::files::{read_obstacle, write_atomically};
+use super::fit::args::FitArgs;
+use super::fit::remote::execute as execute_on;
+use super::fit::request::{checked, request_of_group};
+use super::progress::progress_bar;
 use crate::body::{Body, Obstacle};
 use crate::fit::Progress;
 use crate::jobs::{FitOutput, Shapes, fit_group};

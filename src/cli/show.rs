@@ -1,6 +1,7 @@
 //! `sublevel show`.
 
-use super::{read, read_shape, sos_body, write_atomically};
+use super::files::{read, read_shape, write_atomically};
+use super::sos_body;
 use crate::body::{Body, Compound, Shape, Solid, SosBody, Sphere};
 use crate::draw::{Ink, Outline, Panel, Silhouettes, View, boundary_points, outline};
 use serde_json::json;

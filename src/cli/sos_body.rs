@@ -1,7 +1,8 @@
 //! `sublevel show` and `sublevel verify` of sos-bodies.
 
-use super::verify::VerifyArgs;
-use super::{Outcome, one_line, read};
+use super::files::read;
+use super::outcome::{Outcome, one_line};
+use super::verify_args::VerifyArgs;
 use crate::body::{Coverage, SosBody, Uncovered};
 use serde::Serialize;
 use serde_json::json;

@@ -1,6 +1,6 @@
 //! Shapes to body files, and the table of what came out.
 
-use super::DemoError;
+use super::error::{DemoError, write};
 use crate::body::Body;
 use crate::fit::shapes::Shape;
 use crate::fit::{FitOptions, FitReport, fit as fit_points};
@@ -28,7 +28,7 @@ pub(super) fn fit(name: &str, shape: &Shape, degree: usize, out: &Path) -> Resul
     let fit = fit_points(name, &shape.vertices, &options, &mut |_| ControlFlow::Continue(()))
         .map_err(|error| failed(error.to_string()))?;
 
-    let file = super::write(&out.join(format!("{name}-d{degree}.json")), &fit.body.to_json())?;
+    let file = write(&out.join(format!("{name}-d{degree}.json")), &fit.body.to_json())?;
     let text = std::fs::read_to_string(&file).map_err(|source| DemoError::File { path: file.clone(), source })?;
     let body = Body::from_json(&text).map_err(|error| failed(error.to_string()))?;
     body.prove_contains(&shape.vertices).map_err(|error| failed(error.to_string()))?;

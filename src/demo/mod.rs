@@ -2,51 +2,17 @@
 //! bodies, a server keeps them, and a client sweeps the chair through the human and asks for
 //! distances at every step.
 
+mod error;
 mod fits;
 mod plots;
 mod sweep;
 mod table;
 
 use crate::fit::shapes;
-use std::io::{self, Write};
-use std::path::{Path, PathBuf};
-
-/// Why the demo stopped.
-#[derive(Debug, thiserror::Error)]
-pub enum DemoError {
-    /// A file or folder cannot be read or written.
-    #[error("cannot use {}: {source}; choose another folder with --out", .path.display())]
-    File {
-        /// The file or folder.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// The tables cannot be printed.
-    #[error("cannot print: {0}")]
-    Print(#[from] io::Error),
-    /// A shape cannot be fitted, or its body is not proven.
-    #[error("no degree-{degree} body for the {name}: {why}")]
-    Fit {
-        /// Name of the shape.
-        name: String,
-        /// Degree asked for.
-        degree: usize,
-        /// The reason.
-        why: String,
-    },
-    /// The server does not start or does not answer.
-    #[error("{step}: {why}")]
-    Server {
-        /// What was being done.
-        step: &'static str,
-        /// The reason.
-        why: String,
-    },
-    /// A plot cannot be drawn.
-    #[error(transparent)]
-    Chart(#[from] crate::draw::ChartError),
-}
+pub use error::DemoError;
+use error::write;
+use std::io::Write;
+use std::path::Path;
 
 /// Runs the demo: prints its tables to `text`, writes bodies, meshes, numbers and plots into the
 /// folder `out`.
@@ -91,9 +57,4 @@ pub fn run(out: &Path, text: &mut impl Write) -> Result<(), DemoError> {
         writeln!(text, "  {}", file.display())?;
     }
     Ok(())
-}
-
-fn write(path: &Path, content: &str) -> Result<PathBuf, DemoError> {
-    std::fs::write(path, content).map_err(|source| DemoError::File { path: path.into(), source })?;
-    Ok(path.into())
 }

@@ -1,6 +1,6 @@
 //! The chair swept through the human, over gRPC against a real server.
 
-use super::DemoError;
+use super::error::DemoError;
 use crate::service::proto::body_service_client::BodyServiceClient;
 use crate::service::proto::query_service_client::QueryServiceClient;
 use crate::service::proto::scene_service_client::SceneServiceClient;

@@ -1,7 +1,7 @@
 //! What all plots have in common: a fine canvas, inks, tick labels.
 
-use super::Ink;
 use super::compact::compact;
+use super::ink::Ink;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 

@@ -1,7 +1,7 @@
 //! Line charts with a logarithmic vertical axis.
 
-use super::Ink;
 use super::canvas::{ChartError, FINE, FONT, LEFT, color, px, svg, tidy};
+use super::ink::Ink;
 use plotters::coord::combinators::IntoLogRange;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};

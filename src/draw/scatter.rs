@@ -1,7 +1,7 @@
 //! Points on two logarithmic axes, each with a word beside it; fronts as stairs below them.
 
-use super::Ink;
 use super::canvas::{ChartError, FINE, FONT, LEFT, color, px, svg, tidy};
+use super::ink::Ink;
 use super::labels::{Area, place};
 use plotters::coord::Shift;
 use plotters::coord::combinators::{BindKeyPoints, IntoLogRange};

@@ -1,7 +1,7 @@
 //! Shadows of sets that need not be convex: what `{x : p(x) <= level}` covers of the picture plane.
 
-use super::View;
 use super::contour::contours;
+use super::silhouette::View;
 use crate::body::Aabb;
 use nalgebra::Vector3;
 

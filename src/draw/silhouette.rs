@@ -1,6 +1,6 @@
 //! Silhouettes of convex bodies, and drawings of them in a grid of panels with one common scale.
 
-use super::Ink;
+use super::ink::Ink;
 use super::path::{Unit, push_line};
 use super::region::covered;
 use super::thin::thinned_loop;

@@ -204,13 +204,3 @@ pub fn fit_group(
     }
     Ok(FitOutput::new(took, Shapes::Bodies(made)))
 }
-
-/// Name of a body that a request makes, counted from 0: its own, with a number where several share
-/// it.
-pub fn body_name(request: &FitRequest, index: usize) -> String {
-    let name = &request.name;
-    match request.group().and_then(|group| group.max_growth) {
-        Some(_) => format!("{name}-{}", index + 1),
-        None => name.clone(),
-    }
-}

@@ -14,7 +14,7 @@ mod request;
 mod worker;
 
 pub use board::{Board, Phase, Progress};
-pub use execute::{Failure, FitOutput, Shapes, body_name, fit_group, fit_mesh};
+pub use execute::{Failure, FitOutput, Shapes, fit_group, fit_mesh};
 pub use request::{MESH_FORMATS, RequestError, check, read_mesh};
 
 use std::sync::Arc;

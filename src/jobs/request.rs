@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use super::execute::body_name;
 use crate::body::check_name;
 use crate::fit::{
     Coordinates, EncloseError, EncloseOptions, FitError, FitOptions, MAX_PIECES, MAX_SETS, ReadError, ReadOptions,
@@ -198,4 +197,14 @@ fn coordinates(raw_frame: bool) -> Coordinates {
 pub(super) fn enclosing(group: &FitGroup) -> EncloseOptions {
     let options = EncloseOptions::new(group.degree.unwrap_or(GROUP_DEGREE));
     EncloseOptions { multiplier_degree: group.multiplier_degree.unwrap_or(options.multiplier_degree), ..options }
+}
+
+/// Name of a body that a request makes, counted from 0: its own, with a number where several share
+/// it.
+pub fn body_name(request: &FitRequest, index: usize) -> String {
+    let name = &request.name;
+    match request.group().and_then(|group| group.max_growth) {
+        Some(_) => format!("{name}-{}", index + 1),
+        None => name.clone(),
+    }
 }

@@ -1,12 +1,12 @@
 //! Why there is no fit.
 
-use super::cone::Cone;
 use super::hull::HullError;
 use super::margin::DEFAULT_MARGIN;
-use super::objective::Objective;
 use super::program::ProgramError;
 use super::shortfall::MAX_PIECES;
 use super::slab::{CutError, MAX_SLABS};
+use sublevel_core::body::Cone;
+use sublevel_core::body::Objective;
 use sublevel_core::body::{BodyError, CompoundError, MeshError, NotContained, NotCovered, SosBodyError, TriangleError};
 use sublevel_core::polynomial::PolynomialError;
 

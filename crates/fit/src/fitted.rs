@@ -1,10 +1,10 @@
 //! Fitted bodies, and how they came about.
 
-use super::cone::Cone;
 use super::gap::Gap;
-use super::objective::Objective;
 use super::refine::RefinementEnd;
 use sublevel_core::body::Body;
+use sublevel_core::body::Cone;
+use sublevel_core::body::Objective;
 
 /// What a fit took and reached.
 #[derive(Clone, Debug, PartialEq)]

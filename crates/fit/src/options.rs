@@ -1,11 +1,11 @@
 //! What to fit.
 
-use super::cone::Cone;
 use super::coordinates::Coordinates;
 use super::error::FitError;
 use super::margin::DEFAULT_MARGIN;
-use super::objective::Objective;
 use super::slab::MAX_SLABS;
+use sublevel_core::body::Cone;
+use sublevel_core::body::Objective;
 use sublevel_core::body::check_name;
 
 /// What to fit.

@@ -1,8 +1,9 @@
 //! What was made of an input: its files, and what is said of it.
 
+use super::reading_row::ReadingRow;
 use super::sos;
 use crate::body::{Body, Compound, SosMethod};
-use crate::cli::write_atomically;
+use crate::cli::files::write_atomically;
 use crate::fit::{Reading, RefinementEnd};
 use crate::jobs::{FitOutput, Shapes};
 use crate::store::{FitMode, FitOutcome, FitRequest, FittedBody};
@@ -59,33 +60,6 @@ pub(super) struct Convex {
     proven: bool,
     #[serde(flatten)]
     solve: Option<Solve>,
-}
-
-/// What is odd about the file.
-#[derive(Clone, Default, Serialize)]
-pub(super) struct ReadingRow {
-    /// Points left out since a coordinate of theirs was not finite.
-    dropped_points: usize,
-    /// Vertices that no triangle uses, of files with triangles, and whether they were left out.
-    unused_vertices: usize,
-    unused_dropped: bool,
-    /// Volume of the convex hull with and without them; none where there are none, or no volume.
-    hull_with_unused_m3: Option<f64>,
-    hull_without_unused_m3: Option<f64>,
-}
-
-impl From<&Reading> for ReadingRow {
-    fn from(Reading { mesh, remarks }: &Reading) -> Self {
-        let unused = remarks.unused.as_ref();
-        let cost = unused.map(|unused| unused.cost(mesh));
-        Self {
-            dropped_points: remarks.dropped_points,
-            unused_vertices: unused.map_or(0, |unused| unused.points.len()),
-            unused_dropped: unused.is_some_and(|unused| unused.dropped),
-            hull_with_unused_m3: cost.and_then(|cost| cost.hull_with_m3),
-            hull_without_unused_m3: cost.and_then(|cost| cost.hull_without_m3),
-        }
-    }
 }
 
 /// What only fits of polynomials have.

@@ -1,50 +1,14 @@
 //! What the arguments ask for, as a request: executed here or by a server, it makes the same.
 
-use super::FitArgs;
-use crate::body::{Cone, Objective, Obstacle, SosMethod, UnknownObjective};
+use super::args::FitArgs;
+use super::choice::Choice;
+use crate::body::{Cone, Objective, Obstacle, SosMethod};
 use crate::jobs::check;
 use crate::store::{
     FitBody, FitCompound, FitGroup, FitLadder, FitMode, FitPolynomial, FitPreparation, FitRequest, FitSosBody,
     FitWithinGap,
 };
-use std::fmt;
 use std::path::Path;
-use std::str::FromStr;
-
-/// What `--objective` names.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Choice {
-    /// An objective of a program.
-    Minimise(Objective),
-    /// The inverse moment, which minimises nothing.
-    InverseMoment,
-}
-
-impl Default for Choice {
-    fn default() -> Self {
-        Self::Minimise(Objective::default())
-    }
-}
-
-impl fmt::Display for Choice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Minimise(objective) => objective.fmt(f),
-            Self::InverseMoment => f.write_str(SosMethod::InverseMoment.name()),
-        }
-    }
-}
-
-impl FromStr for Choice {
-    type Err = UnknownObjective;
-
-    fn from_str(name: &str) -> Result<Self, UnknownObjective> {
-        if name == SosMethod::InverseMoment.name() {
-            return Ok(Self::InverseMoment);
-        }
-        name.parse().map(Self::Minimise)
-    }
-}
 
 /// The request about one input, whose points are in metres when they are fitted; or the arguments
 /// that exclude each other.
@@ -110,29 +74,4 @@ pub(in crate::cli) fn checked(request: FitRequest) -> Result<FitRequest, String>
         field => format!("--{}: {}", field.trim_end_matches("_m").replace('_', "-"), error.why),
     })?;
     Ok(request)
-}
-
-/// A length with its unit, or in metres.
-pub(super) fn length(text: &str) -> Result<f64, String> {
-    let units = [("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("", 1.0)];
-    units
-        .into_iter()
-        .find_map(|(unit, metres)| Some(text.strip_suffix(unit)?.trim_end().parse::<f64>().ok()? * metres))
-        .filter(|length| *length > 0.0 && length.is_finite())
-        .ok_or_else(|| "not a positive length such as 5mm, 2cm or 0.005 (metres)".to_owned())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::length;
-
-    #[test]
-    fn lengths_have_units_or_are_metres() {
-        for (text, metres) in [("5mm", 5e-3), ("2 cm", 2e-2), ("0.5m", 0.5), ("3e-3", 3e-3), ("1e3mm", 1.0)] {
-            assert!((length(text).unwrap() - metres).abs() < 1e-15, "{text}");
-        }
-        for text in ["", "mm", "5in", "-1mm", "0", "nan", "inf", "5 5mm"] {
-            assert!(length(text).is_err(), "{text}");
-        }
-    }
 }

@@ -1,6 +1,6 @@
 //! What `sublevel fit` says of sets that need not be convex.
 
-use super::report::ReadingRow;
+use super::reading_row::ReadingRow;
 use crate::body::{Coverage, SosBody};
 use crate::store::FitOutcome;
 use serde::Serialize;

@@ -1,11 +1,13 @@
 //! `sublevel measure`.
 
 mod poses;
+mod query;
 mod timing;
 
-use super::{read, read_shape};
+use super::files::{read, read_shape};
 use crate::body::Shape;
 use crate::measure::{Distance, LevelDistance, Options, Pose, Status, WarmStart, distance, level_distance};
+use query::Query;
 use serde::Serialize;
 use std::error::Error;
 use std::io::{self, BufWriter, Write};
@@ -95,27 +97,6 @@ impl Line {
             normal: distance.normal.map(Into::into),
             iterations: distance.iterations,
         }
-    }
-}
-
-/// Two bodies or compounds and the accuracy asked for.
-struct Query {
-    a: Shape,
-    b: Shape,
-    options: Options<'static>,
-}
-
-impl Query {
-    fn distance(&self, pose: &Pose, warm: &mut WarmStart) -> Distance {
-        distance(&self.a, &Pose::identity(), &self.b, pose, &self.options, warm)
-    }
-
-    fn level_ab(&self, pose: &Pose, warm: &mut WarmStart) -> LevelDistance {
-        level_distance(&self.a, &Pose::identity(), &self.b, pose, &self.options, warm)
-    }
-
-    fn level_ba(&self, pose: &Pose, warm: &mut WarmStart) -> LevelDistance {
-        level_distance(&self.b, pose, &self.a, &Pose::identity(), &self.options, warm)
     }
 }
 

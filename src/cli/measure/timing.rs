@@ -1,6 +1,6 @@
 //! Time per query: cold, warm and in batches.
 
-use super::Query;
+use super::query::Query;
 use crate::measure::{Distance, Pose, WarmStart, distance_batch};
 use serde::Serialize;
 use std::hint::black_box;

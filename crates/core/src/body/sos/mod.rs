@@ -16,8 +16,8 @@ mod support_bounds;
 mod volume;
 
 pub use coverage::{Coverage, TriangleError, Uncovered};
-pub use method::SosMethod;
 pub use error::SosBodyError;
+pub use method::SosMethod;
 pub use relaxation::Relaxation;
 pub use sos_body::SosBody;
 

@@ -1,0 +1,5 @@
+//! The structure of the code: which layer may import which, and that no files import each other.
+
+mod circles;
+mod directions;
+mod source;
