@@ -45,6 +45,7 @@ pub fn write_atomically(path: &Path, content: &str) -> Result<(), Box<dyn Error>
 }
 
 /// Makes the output folder.
+#[cfg(feature = "fit")]
 pub(super) fn make_folder(path: &Path) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(path)
         .map_err(|error| format!("cannot make {}: {error}; choose another --out", path.display()).into())

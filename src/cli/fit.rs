@@ -12,11 +12,11 @@ mod sos;
 use super::files::make_folder;
 use super::mesh::note;
 use super::progress::progress_bar;
-use crate::fit::{Cone, Progress};
+use crate::fit::Progress;
 use crate::jobs::fit_mesh;
 use crate::store::FitRequest;
 use args::FitArgs;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::ProgressBar;
 use reading_row::ReadingRow;
 use remote::execute as execute_on;
 use report::Row;
@@ -25,7 +25,6 @@ use std::error::Error;
 use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 /// Fits every input in turn; what was fitted before an error stays.
 pub(super) fn run(args: &FitArgs) -> Result<(), Box<dyn Error>> {

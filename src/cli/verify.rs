@@ -2,7 +2,7 @@
 
 use super::files::{read, read_obstacle};
 #[cfg(feature = "fit")]
-use super::mesh::{MeshArgs, note};
+use super::mesh::note;
 use super::outcome::{Outcome, one_line};
 use super::sos_body;
 use super::verify_args::VerifyArgs;
@@ -15,7 +15,7 @@ use crate::fit::Mesh;
 use nalgebra::Vector3;
 use serde::Serialize;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 #[derive(Serialize)]
 struct Report {

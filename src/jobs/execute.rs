@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::ops::ControlFlow;
 
 use super::Phase;
-use super::request::{FitPlan, RequestError, asked_group, enclosing, plan};
+use super::request::{FitPlan, RequestError, asked_group, body_name, enclosing, plan};
 use crate::body::{Body, Compound, Obstacle, SosBody};
 use crate::fit::{
     CompoundFit, Cover, EncloseError, FitError, Group, Mesh, Progress, Representation, Rung, SosFit, cheapest_within,

@@ -15,7 +15,7 @@ mod worker;
 
 pub use board::{Board, Phase, Progress};
 pub use execute::{Failure, FitOutput, Shapes, fit_group, fit_mesh};
-pub use request::{MESH_FORMATS, RequestError, check, read_mesh};
+pub use request::{MESH_FORMATS, RequestError, body_name, check, read_mesh};
 
 use std::sync::Arc;
 

@@ -4,12 +4,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// What the text begins with, as far as it is an identifier.
-pub fn identifier(text: &str) -> String {
+pub(crate) fn identifier(text: &str) -> String {
     text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()
 }
 
 /// The same text with comments and the contents of string and character literals removed.
-pub fn without_comments_and_literals(text: &str) -> String {
+pub(crate) fn without_comments_and_literals(text: &str) -> String {
     let mut code = String::new();
     let mut rest = text;
     while let Some(c) = rest.chars().next() {
@@ -81,7 +81,7 @@ fn quoted(text: &str, quote: char) -> usize {
 }
 
 /// The same code without the items under `#[cfg(test)]`.
-pub fn without_tests(code: &str) -> String {
+pub(crate) fn without_tests(code: &str) -> String {
     let mut kept = String::new();
     let mut rest = code;
     while let Some(at) = rest.find("#[cfg(test)]") {
@@ -102,7 +102,7 @@ pub fn without_tests(code: &str) -> String {
 }
 
 /// All Rust files below a folder.
-pub fn rust_files(folder: &Path) -> Vec<PathBuf> {
+pub(crate) fn rust_files(folder: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).expect("a source folder is readable") {
         let path = entry.expect("a folder entry is readable").path();
@@ -116,6 +116,6 @@ pub fn rust_files(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Whether it holds tests only, by its name.
-pub fn is_test_file(inside: &Path) -> bool {
+pub(crate) fn is_test_file(inside: &Path) -> bool {
     inside.iter().any(|part| part == "tests" || part == "tests.rs")
 }

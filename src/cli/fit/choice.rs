@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 /// What `--objective` names.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Choice {
+pub(in crate::cli) enum Choice {
     /// An objective of a program.
     Minimise(Objective),
     /// The inverse moment, which minimises nothing.

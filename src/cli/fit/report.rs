@@ -4,7 +4,7 @@ use super::reading_row::ReadingRow;
 use super::sos;
 use crate::body::{Body, Compound, SosMethod};
 use crate::cli::files::write_atomically;
-use crate::fit::{Reading, RefinementEnd};
+use crate::fit::RefinementEnd;
 use crate::jobs::{FitOutput, Shapes};
 use crate::store::{FitMode, FitOutcome, FitRequest, FittedBody};
 use serde::Serialize;

@@ -2,7 +2,7 @@
 
 use super::args::FitArgs;
 use super::choice::Choice;
-use crate::body::{Cone, Objective, Obstacle, SosMethod};
+use crate::body::{Cone, Obstacle, SosMethod};
 use crate::jobs::check;
 use crate::store::{
     FitBody, FitCompound, FitGroup, FitLadder, FitMode, FitPolynomial, FitPreparation, FitRequest, FitSosBody,

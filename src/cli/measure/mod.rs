@@ -5,8 +5,7 @@ mod query;
 mod timing;
 
 use super::files::{read, read_shape};
-use crate::body::Shape;
-use crate::measure::{Distance, LevelDistance, Options, Pose, Status, WarmStart, distance, level_distance};
+use crate::measure::{Distance, LevelDistance, Options, Pose, Status, WarmStart};
 use query::Query;
 use serde::Serialize;
 use std::error::Error;

@@ -15,8 +15,8 @@ use sublevel_testkit::Seeded;
 /// One pair of the catalogue, apart or overlapping, with the answers of all stages together.
 struct Case {
     seed: u64,
-    a: Body,
-    b: Body,
+    a: &'static Body,
+    b: &'static Body,
     poses: [Pose; 2],
     /// The second pose a little later: 1 % of the smaller body's size away.
     next: Pose,
@@ -26,16 +26,19 @@ struct Case {
 
 impl Case {
     fn new(seed: u64) -> Self {
-        let mut random = Seeded(90_000 + seed);
-        let mut bodies = zoo(&mut random);
-        let a = bodies.swap_remove(random.next() as usize % bodies.len());
-        let b = bodies.swap_remove(random.next() as usize % bodies.len());
+        static ZOOS: OnceLock<Vec<Vec<Body>>> = OnceLock::new();
+        let zoos = ZOOS.get_or_init(|| (0..6).map(|seed| zoo(&mut Seeded(90_000 + seed))).collect());
+        let mut random = Seeded(91_000 + seed);
+        let bodies = &zoos[seed as usize % zoos.len()];
+        let i = random.next() as usize % bodies.len();
+        let j = (i + 1 + random.next() as usize % (bodies.len() - 1)) % bodies.len();
+        let (a, b) = (&bodies[i], &bodies[j]);
         let reach = a.circumscribed().radius + b.circumscribed().radius;
         let far = reach * 2_f64.powf(1.5 * random.signed());
         let poses = [random_pose(&mut random, 0.0), random_pose(&mut random, far)];
         let step = unit(&mut random) * (0.01 * a.circumscribed().radius.min(b.circumscribed().radius));
         let next = poses[1].with_translation(poses[1].translation() + step);
-        let to = |pose: &Pose| distance(&a, &poses[0], &b, pose, &Options::default(), &mut WarmStart::default());
+        let to = |pose: &Pose| distance(a, &poses[0], b, pose, &Options::default(), &mut WarmStart::default());
         let (distance, next_distance) = (to(&poses[1]), to(&next));
         Self { seed, a, b, poses, next, distance, next_distance }
     }
@@ -83,15 +86,15 @@ fn at_least(what: &str, percent: f64, solved: f64) {
 fn cold_distance(case: &Case, stages: &[Stage]) -> (Status, [f64; 2], [f64; 2]) {
     let [pose_a, pose_b] = &case.poses;
     let mut warm = WarmStart::default();
-    let found = only(stages, || distance(&case.a, pose_a, &case.b, pose_b, &Options::default(), &mut warm));
+    let found = only(stages, || distance(case.a, pose_a, case.b, pose_b, &Options::default(), &mut warm));
     (found.status, [found.lower, found.upper], [case.distance.lower, case.distance.upper])
 }
 
 /// From the hint of all stages at the pose before.
 fn warm_distance(case: &Case, stages: &[Stage]) -> (Status, [f64; 2], [f64; 2]) {
     let (pose_a, options, mut warm) = (&case.poses[0], Options::default(), WarmStart::default());
-    distance(&case.a, pose_a, &case.b, &case.poses[1], &options, &mut warm);
-    let found = only(stages, || distance(&case.a, pose_a, &case.b, &case.next, &options, &mut warm));
+    distance(case.a, pose_a, case.b, &case.poses[1], &options, &mut warm);
+    let found = only(stages, || distance(case.a, pose_a, case.b, &case.next, &options, &mut warm));
     (found.status, [found.lower, found.upper], [case.next_distance.lower, case.next_distance.upper])
 }
 
@@ -154,7 +157,7 @@ fn refinement_goes_on_alone() {
     let options = Options::default().with_accuracy(1e-15).unwrap();
     let with = |stages: &[Stage], case: &Case| {
         let [pose_a, pose_b] = &case.poses;
-        only(stages, || distance(&case.a, pose_a, &case.b, pose_b, &options, &mut WarmStart::default()))
+        only(stages, || distance(case.a, pose_a, case.b, pose_b, &options, &mut WarmStart::default()))
     };
     let (mut cases, mut narrower) = (0, 0);
     for case in catalogue().iter().filter(|case| case.is_apart()).take(100) {
@@ -172,19 +175,19 @@ fn refinement_goes_on_alone() {
 #[test]
 fn stages_of_level_distances_solve_alone() {
     let truth = |case: &Case, pose: &Pose| {
-        level_distance(&case.a, &case.poses[0], &case.b, pose, &Options::default(), &mut WarmStart::default())
+        level_distance(case.a, &case.poses[0], case.b, pose, &Options::default(), &mut WarmStart::default())
     };
     let cold = |case: &Case, stages: &[Stage]| {
         let [pose_a, pose_b] = &case.poses;
         let mut warm = WarmStart::default();
-        let found = only(stages, || level_distance(&case.a, pose_a, &case.b, pose_b, &Options::default(), &mut warm));
+        let found = only(stages, || level_distance(case.a, pose_a, case.b, pose_b, &Options::default(), &mut warm));
         let all = truth(case, pose_b);
         (found.status, [found.lower, found.upper], [all.lower, all.upper])
     };
     let warm = |case: &Case, stages: &[Stage]| {
         let (pose_a, options, mut warm) = (&case.poses[0], Options::default(), WarmStart::default());
-        level_distance(&case.a, pose_a, &case.b, &case.poses[1], &options, &mut warm);
-        let found = only(stages, || level_distance(&case.a, pose_a, &case.b, &case.next, &options, &mut warm));
+        level_distance(case.a, pose_a, case.b, &case.poses[1], &options, &mut warm);
+        let found = only(stages, || level_distance(case.a, pose_a, case.b, &case.next, &options, &mut warm));
         let all = truth(case, &case.next);
         (found.status, [found.lower, found.upper], [all.lower, all.upper])
     };
@@ -202,19 +205,19 @@ fn stages_of_level_distances_solve_alone() {
 #[test]
 fn stages_of_growth_distances_solve_alone() {
     let truth = |case: &Case, pose: &Pose| {
-        growth_distance(&case.a, &case.poses[0], &case.b, pose, &Options::default(), &mut WarmStart::default())
+        growth_distance(case.a, &case.poses[0], case.b, pose, &Options::default(), &mut WarmStart::default())
     };
     let cold = |case: &Case, stages: &[Stage]| {
         let [pose_a, pose_b] = &case.poses;
         let mut warm = WarmStart::default();
-        let found = only(stages, || growth_distance(&case.a, pose_a, &case.b, pose_b, &Options::default(), &mut warm));
+        let found = only(stages, || growth_distance(case.a, pose_a, case.b, pose_b, &Options::default(), &mut warm));
         let all = truth(case, pose_b);
         (found.status, [found.lower, found.upper], [all.lower, all.upper])
     };
     let warm = |case: &Case, stages: &[Stage]| {
         let (pose_a, options, mut warm) = (&case.poses[0], Options::default(), WarmStart::default());
-        growth_distance(&case.a, pose_a, &case.b, &case.poses[1], &options, &mut warm);
-        let found = only(stages, || growth_distance(&case.a, pose_a, &case.b, &case.next, &options, &mut warm));
+        growth_distance(case.a, pose_a, case.b, &case.poses[1], &options, &mut warm);
+        let found = only(stages, || growth_distance(case.a, pose_a, case.b, &case.next, &options, &mut warm));
         let all = truth(case, &case.next);
         (found.status, [found.lower, found.upper], [all.lower, all.upper])
     };
