@@ -1,9 +1,9 @@
 //! The figures, and the command line that makes them.
 
 use crate::accuracy::accuracy;
+use crate::comparison::FitCache;
 use crate::cost::{Messages, cost};
 use crate::detail::detail;
-use crate::duel::Shelf;
 use crate::messages::messages;
 use crate::numbers;
 use crate::speed::speed;
@@ -318,24 +318,24 @@ fn run_fit(args: &FitArgs) -> Result<(), Box<dyn Error>> {
 }
 
 fn run_speed(args: &Common) -> Drawn {
-    with_shelf(args, |shelf, bar| {
-        let found = speed(args.data(), shelf, args.quick, &mut |at| tell(bar, at))?;
+    with_fit_cache(args, |cache, bar| {
+        let found = speed(args.data(), cache, args.quick, &mut |at| tell(bar, at))?;
         write_report(&args.out, "speed", &found.markdown(), &found.csv())?;
         redraw(&args.out, "speed")
     })
 }
 
 fn run_warm(args: &Common) -> Drawn {
-    with_shelf(args, |shelf, bar| {
-        let found = warm(args.data(), shelf, args.quick, &mut |at| tell(bar, at))?;
+    with_fit_cache(args, |cache, bar| {
+        let found = warm(args.data(), cache, args.quick, &mut |at| tell(bar, at))?;
         write_report(&args.out, "warm", &found.markdown(), &found.csv())?;
         redraw(&args.out, "warm")
     })
 }
 
 fn run_detail(args: &Common) -> Drawn {
-    with_shelf(args, |shelf, bar| {
-        let found = detail(args.data(), shelf, args.quick, &mut |at| tell(bar, at))?;
+    with_fit_cache(args, |cache, bar| {
+        let found = detail(args.data(), cache, args.quick, &mut |at| tell(bar, at))?;
         write_atomically(&args.out.join("detail-parts.csv"), &found.parts_csv())?;
         write_report(&args.out, "detail", &found.markdown(), &found.csv())?;
         redraw(&args.out, "detail")
@@ -343,30 +343,30 @@ fn run_detail(args: &Common) -> Drawn {
 }
 
 fn run_accuracy(args: &Common) -> Drawn {
-    with_shelf(args, |shelf, bar| {
-        let found = accuracy(args.data(), shelf, args.quick, &mut |at| tell(bar, at))?;
+    with_fit_cache(args, |cache, bar| {
+        let found = accuracy(args.data(), cache, args.quick, &mut |at| tell(bar, at))?;
         write_report(&args.out, "accuracy", &found.markdown(), &found.csv())?;
         redraw(&args.out, "accuracy")
     })
 }
 
 fn run_cost(args: &Common) -> Drawn {
-    with_shelf(args, |shelf, bar| {
+    with_fit_cache(args, |cache, bar| {
         let mut sent = |sizes: &[usize]| messages(sizes).map_err(|error| error.to_string());
         let program = std::env::current_exe().ok();
         let parts: (Messages<'_>, _) = (&mut sent, program.as_deref());
-        let found = cost(args.data(), shelf, args.quick, parts, &mut |at| tell(bar, at))?;
+        let found = cost(args.data(), cache, args.quick, parts, &mut |at| tell(bar, at))?;
         write_report(&args.out, "cost", &found.markdown(), &found.csv())?;
         redraw(&args.out, "cost")
     })
 }
 
 /// Makes the folders, and does the work under a spinner.
-fn with_shelf(args: &Common, work: impl FnOnce(&Shelf, &ProgressBar) -> Drawn) -> Drawn {
+fn with_fit_cache(args: &Common, work: impl FnOnce(&FitCache, &ProgressBar) -> Drawn) -> Drawn {
     make_folder(&args.out)?;
-    let shelf = Shelf::new(&args.fits)?;
+    let cache = FitCache::new(&args.fits)?;
     let bar = bar()?;
-    let drawn = work(&shelf, &bar);
+    let drawn = work(&cache, &bar);
     bar.finish_and_clear();
     drawn
 }

@@ -2,17 +2,17 @@
 //! numbers; and what its benches share. Not published: whoever uses Sublevel compiles none of it.
 
 pub mod accuracy;
+mod baselines;
 mod blocks;
+pub mod comparison;
 pub mod cost;
 mod csv;
 pub mod detail;
-pub mod duel;
 pub mod figures;
 mod machine;
 mod measures;
 mod messages;
 pub mod numbers;
-mod rivals;
 pub mod speed;
 pub mod stability;
 pub mod table1;

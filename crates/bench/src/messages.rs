@@ -1,6 +1,6 @@
 //! Times messages to a server on loopback, for `sublevel-bench cost`.
 
-use crate::duel::{Random, sweep::median};
+use crate::comparison::{Random, sweep::median};
 use std::error::Error;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::time::{Duration, Instant};
@@ -18,7 +18,7 @@ use sublevel::service::{ServeOptions, Server};
 const SCENE: &str = "cost";
 /// Objects of each of two kinds: all pairs of them are the most pairs of a message.
 const OBJECTS: usize = 64;
-/// Half of the edge of the cube that they are strewn over, metres.
+/// Half of the edge of the cube that they are scattered over, metres.
 const REACH: f64 = 10.0;
 /// How often each message is sent.
 const REPEATS: usize = 9;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use std::fs;
-use sublevel_bench::{self as bench, duel::parry_version};
+use sublevel_bench::{self as bench, comparison::parry_version};
 
 /// The machine and the versions, as far as they can be known.
 #[derive(Debug, Serialize)]

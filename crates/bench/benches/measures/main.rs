@@ -20,7 +20,7 @@ use report::{Report, Table};
 use std::error::Error;
 use std::fs;
 use std::path::PathBuf;
-use sublevel_bench::duel::{Coal, CoalRun};
+use sublevel_bench::comparison::{Coal, CoalRun};
 
 /// Time the measures and compare them with GJK on the hulls
 ///

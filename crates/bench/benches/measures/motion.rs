@@ -4,8 +4,8 @@
 use nalgebra::Vector3;
 use sublevel::body::Body;
 use sublevel::measure::{Motion, MotionError, Options, Pose, PoseError, Ray, RayError, WarmStart, signed_distance};
-use sublevel_bench::duel::Random;
-pub(crate) use sublevel_bench::duel::motion::{Trajectory, grazing, separated, through_contact, to_text};
+use sublevel_bench::comparison::Random;
+pub(crate) use sublevel_bench::comparison::motion::{Trajectory, grazing, separated, through_contact, to_text};
 
 /// How close the bodies come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, clap::ValueEnum)]

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::PathBuf;
 use sublevel::body::Body;
 use sublevel::fit::{FitOptions, Mesh, ReadOptions, hull::convex_hull, read_mesh};
-use sublevel_bench::duel::Shelf;
+use sublevel_bench::comparison::FitCache;
 
 /// The pairs of the figures, with the nanoseconds of coal's cached guess where the figures that are
 /// times were set.
@@ -52,8 +52,8 @@ impl Object {
         let path = PathBuf::from(data).join(format!("psb/{number}.off"));
         let mesh = read_mesh(&path, &ReadOptions::default())?.mesh;
         let hull = convex_hull(&mesh.points)?.vertices.into_iter().map(|i| mesh.points[i]).collect();
-        let shelf = Shelf::new(&folder()?)?;
-        let bodies = DEGREES.into_iter().map(|degree| kept(&shelf, name, degree, &mesh)).collect::<Result<_, _>>()?;
+        let cache = FitCache::new(&folder()?)?;
+        let bodies = DEGREES.into_iter().map(|degree| kept(&cache, name, degree, &mesh)).collect::<Result<_, _>>()?;
         Ok(Self { hull, bodies })
     }
 
@@ -72,7 +72,7 @@ pub(crate) fn folder() -> Result<PathBuf, Box<dyn Error>> {
 }
 
 /// The body of an earlier run, or a new fit.
-fn kept(shelf: &Shelf, name: &str, degree: usize, mesh: &Mesh) -> Result<Body, Box<dyn Error>> {
+fn kept(cache: &FitCache, name: &str, degree: usize, mesh: &Mesh) -> Result<Body, Box<dyn Error>> {
     let options = FitOptions { degree, ..FitOptions::default() };
-    Ok(shelf.body(name, mesh, &options)?)
+    Ok(cache.body(name, mesh, &options)?)
 }

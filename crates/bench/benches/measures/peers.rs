@@ -4,7 +4,7 @@ use crate::objects::folder;
 use crate::rows::{DEGREE, Scene};
 use std::error::Error;
 use sublevel::measure::{Options, Pose, WarmStart, distance};
-use sublevel_bench::duel::{Coal, CoalRun, PeerError, parry_pose};
+use sublevel_bench::comparison::{Coal, CoalRun, PeerError, parry_pose};
 
 /// Answers that contradict each other by more, metres, are reported: ten times the tolerance coal
 /// has by default.

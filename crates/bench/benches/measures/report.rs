@@ -6,7 +6,7 @@ use crate::rows::{COAL_COLD, COAL_WARM, DEGREE, Scene};
 use crate::sweep::{Row, Target};
 use serde::Serialize;
 use std::fmt::Write;
-use sublevel_bench::duel::Coal;
+use sublevel_bench::comparison::Coal;
 
 /// All results of a run.
 #[derive(Serialize)]

@@ -10,7 +10,7 @@ use sublevel::measure::{
     distance_batch, growth_distance, level_distance, penetration, signed_distance, time_of_impact,
 };
 use sublevel::polynomial::widest;
-use sublevel_bench::duel::{Hulls, parry_pose};
+use sublevel_bench::comparison::{Hulls, parry_pose};
 
 /// Label of coal's rows.
 pub(crate) const COAL_WARM: &str = "coal GJK warm";

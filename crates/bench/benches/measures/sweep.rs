@@ -1,7 +1,7 @@
 //! A row: one query over all poses, timed pass by pass, and what its time is held against.
 
-use sublevel_bench::duel::sweep;
-pub(crate) use sublevel_bench::duel::sweep::Answer;
+use sublevel_bench::comparison::sweep;
+pub(crate) use sublevel_bench::comparison::sweep::Answer;
 
 /// A bound that a row is to stay below.
 #[derive(Clone, Copy, Debug)]

@@ -2,7 +2,7 @@
 //! step before.
 
 use super::Effort;
-use crate::duel::{DuelError, Random, Shelf, Subject, motion};
+use crate::comparison::{ComparisonError, FitCache, Random, Subject, motion};
 use nalgebra::{UnitQuaternion, Vector3};
 use sublevel::body::Body;
 use sublevel::fit::FitOptions;
@@ -45,9 +45,9 @@ pub(super) struct Query {
 pub(super) fn cases(
     data: &std::path::Path,
     effort: &Effort,
-    shelf: &Shelf,
-    announce: &mut dyn FnMut(&str) -> Result<(), DuelError>,
-) -> Result<Vec<Case>, DuelError> {
+    cache: &FitCache,
+    announce: &mut dyn FnMut(&str) -> Result<(), ComparisonError>,
+) -> Result<Vec<Case>, ComparisonError> {
     let mut all = Vec::new();
     for [a, b] in &PAIRS[..effort.pairs] {
         let [a, b] = [Subject::read(a, data)?, Subject::read(b, data)?];
@@ -56,15 +56,16 @@ pub(super) fn cases(
             let name = format!("{}-{}-d{degree}", a.name, b.name);
             announce(&name)?;
             let options = FitOptions { degree, ..FitOptions::default() };
-            let bodies = [shelf.body(a.name, &a.mesh, &options)?, shelf.body(b.name, &b.mesh, &options)?];
+            let bodies = [cache.body(a.name, &a.mesh, &options)?, cache.body(b.name, &b.mesh, &options)?];
             let poses = motion::stepping((&bodies[0], &bodies[1]), unit_m, Some(STEP), effort.queries, 2)?;
             all.push(Case::new(name, bodies, poses.into_iter().map(|pair| [pair[0], pair[1]]))?);
         }
     }
     announce("flat faces")?;
     let [a, b] = [("slab", [0.5, 0.4, 0.3]), ("tile", [0.35, 0.3, 0.2])].map(|(name, [x, y, z])| {
-        Body::superellipsoid(name, Vector3::zeros(), Vector3::new(x, y, z), 8)
-            .map_err(|error| DuelError::Representation { mesh: "flat", method: name.into(), what: error.to_string() })
+        Body::superellipsoid(name, Vector3::zeros(), Vector3::new(x, y, z), 8).map_err(|error| {
+            ComparisonError::Representation { mesh: "flat", method: name.into(), what: error.to_string() }
+        })
     });
     all.push(Case::new("flat-faces-d8".into(), [a?, b?], flat_poses(effort.queries)?)?);
     Ok(all)
@@ -76,7 +77,7 @@ impl Case {
         name: String,
         [a, b]: [Body; 2],
         poses: impl IntoIterator<Item = [Pose; 2]>,
-    ) -> Result<Self, DuelError> {
+    ) -> Result<Self, ComparisonError> {
         let size_m = a.circumscribed().radius.min(b.circumscribed().radius);
         let sharp = Options::default().with_accuracy(REFERENCE)?;
         let origin = Pose::identity();

@@ -2,9 +2,9 @@
 
 use super::Effort;
 use super::cases::{Case, Query};
-use crate::duel::sweep::{Answer, Row, median};
-use crate::duel::{Coal, DuelError, Hulls, Shelf, parry_pose};
-use crate::rivals::{Clarabel, ConicProgram, Posed, between, newton, slsqp};
+use crate::baselines::{Clarabel, ConicProgram, Posed, between, newton, slsqp};
+use crate::comparison::sweep::{Answer, Row, median};
+use crate::comparison::{Coal, ComparisonError, FitCache, Hulls, parry_pose};
 use nalgebra::Vector3;
 use std::hint::black_box;
 use sublevel::body::{Body, fibonacci_lattice};
@@ -66,7 +66,7 @@ const EARLY: f64 = 1.0;
 const CHUNK: usize = 20;
 
 /// What a method says of a query, lengths in metres.
-struct Said {
+struct MethodAnswer {
     value: f64,
     width: Option<f64>,
     iterations: Option<u32>,
@@ -78,10 +78,10 @@ struct Said {
 pub(super) fn measure(
     case: &Case,
     effort: &Effort,
-    shelf: &Shelf,
+    cache: &FitCache,
     (solver, coal): (Option<&Clarabel>, Option<&Coal>),
-    announce: &mut dyn FnMut(&str) -> Result<(), DuelError>,
-) -> Result<Vec<Cell>, DuelError> {
+    announce: &mut dyn FnMut(&str) -> Result<(), ComparisonError>,
+) -> Result<Vec<Cell>, ComparisonError> {
     let Case { a, b, size_m, queries, .. } = case;
     let chunks: Vec<Vec<Query>> = queries.chunks(CHUNK).map(<[Query]>::to_vec).collect();
     let some: Vec<Vec<Query>> = queries[..effort.few].chunks(CHUNK).map(<[Query]>::to_vec).collect();
@@ -113,7 +113,7 @@ pub(super) fn measure(
                     _ => between(&bodies),
                 };
                 let value = newton(&bodies, start, steps).apart();
-                Said { value, width: None, iterations: Some(steps), kept: None }
+                MethodAnswer { value, width: None, iterations: Some(steps), kept: None }
             };
             timed.push(Timed::new((method, steps.to_string()), &chunks, *size_m, ask));
         }
@@ -122,14 +122,14 @@ pub(super) fn measure(
         let ask = move |query: &Query| {
             let bodies = [Posed::new(a, &Pose::identity()), Posed::new(b, &query.pose)];
             let (value, evaluations) = slsqp(&bodies, between(&bodies), *size_m, most);
-            Said { value, width: None, iterations: Some(evaluations), kept: None }
+            MethodAnswer { value, width: None, iterations: Some(evaluations), kept: None }
         };
         timed.push(Timed::new((Method::Slsqp, most.to_string()), &chunks, *size_m, ask));
     }
     for (points, hulls, _) in &sampled {
         let ask = move |query: &Query| {
             let value = hulls.distance(&parry_pose(&query.pose));
-            Said { value, width: None, iterations: None, kept: None }
+            MethodAnswer { value, width: None, iterations: None, kept: None }
         };
         timed.push(Timed::new((Method::Parry, points.to_string()), &some, *size_m, ask));
     }
@@ -145,11 +145,11 @@ pub(super) fn measure(
         let state = |query: &Query| ConicProgram::distance([(a, &origin), (b, &query.pose)], *size_m);
         let name = format!("accuracy-{}", case.name);
         let programs = few.iter().map(state).collect();
-        let answers = solver.solve((shelf.folder(), &name), programs, &CLARABEL, effort.passes)?;
+        let answers = solver.solve((cache.folder(), &name), programs, &CLARABEL, effort.passes)?;
         for (tolerance, answers) in CLARABEL.iter().zip(answers) {
-            let said: Vec<Said> = answers
+            let said: Vec<MethodAnswer> = answers
                 .iter()
-                .map(|found| Said {
+                .map(|found| MethodAnswer {
                     value: found.value.unwrap_or(f64::NAN) * size_m,
                     width: None,
                     iterations: Some(found.iterations),
@@ -166,12 +166,12 @@ pub(super) fn measure(
             announce(&format!("{}: coal, {points} points", case.name))?;
             let name = format!("accuracy-{}-{points}", case.name);
             let poses: Vec<Vec<Pose>> = some.iter().map(|chunk| chunk.iter().map(|q| q.pose).collect()).collect();
-            let mut run = coal.start(shelf.folder(), &name, [points_a, points_b], &poses)?;
+            let mut run = coal.start(cache.folder(), &name, [points_a, points_b], &poses)?;
             // A process takes the median of nine walks by itself.
             run.pass()?;
             let found = run.distances()?.concat();
-            let said: Vec<Said> =
-                found.iter().map(|&value| Said { value, width: None, iterations: None, kept: None }).collect();
+            let said: Vec<MethodAnswer> =
+                found.iter().map(|&value| MethodAnswer { value, width: None, iterations: None, kept: None }).collect();
             let mut cell = Cell::judged((Method::Coal, points.to_string()), &queries[..effort.few], &said, *size_m);
             cell.nanoseconds = run.times().0;
             cells.push(cell);
@@ -180,10 +180,10 @@ pub(super) fn measure(
     Ok(cells)
 }
 
-fn ours(a: &Body, b: &Body, query: &Query, options: &Options<'_>, method: Method) -> Said {
+fn ours(a: &Body, b: &Body, query: &Query, options: &Options<'_>, method: Method) -> MethodAnswer {
     let mut hint = if method == Method::Warm { query.hint } else { WarmStart::default() };
     let found = distance(a, &Pose::identity(), b, &query.pose, options, &mut hint);
-    Said {
+    MethodAnswer {
         value: found.value(),
         width: Some(found.upper - found.lower),
         iterations: Some(found.iterations),
@@ -203,9 +203,14 @@ struct Timed<'a> {
 }
 
 impl<'a> Timed<'a> {
-    fn new(what: (Method, String), chunks: &'a [Vec<Query>], size_m: f64, ask: impl Fn(&Query) -> Said + 'a) -> Self {
+    fn new(
+        what: (Method, String),
+        chunks: &'a [Vec<Query>],
+        size_m: f64,
+        ask: impl Fn(&Query) -> MethodAnswer + 'a,
+    ) -> Self {
         let queries: Vec<Query> = chunks.iter().flatten().cloned().collect();
-        let said: Vec<Said> = queries.iter().map(&ask).collect();
+        let said: Vec<MethodAnswer> = queries.iter().map(&ask).collect();
         let cell = Cell::judged(what, &queries, &said, size_m);
         let row = Row::cold("", chunks, move |query: &Query| {
             let said = black_box(ask(query));
@@ -221,9 +226,9 @@ impl<'a> Timed<'a> {
 
 impl Cell {
     /// All but the time.
-    fn judged((method, setting): (Method, String), queries: &[Query], said: &[Said], size_m: f64) -> Self {
+    fn judged((method, setting): (Method, String), queries: &[Query], said: &[MethodAnswer], size_m: f64) -> Self {
         // Below half of the reference's bracket no error can be known.
-        let error = |(query, said): (&Query, &Said)| {
+        let error = |(query, said): (&Query, &MethodAnswer)| {
             let error = (said.value - query.truth).abs().max(query.half_width) / size_m;
             if error.is_finite() { error } else { f64::INFINITY }
         };

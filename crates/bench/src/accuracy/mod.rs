@@ -7,8 +7,8 @@ mod report;
 mod shown;
 
 use super::Machine;
-use super::duel::{Coal, DuelError, Shelf};
-use super::rivals::Clarabel;
+use super::baselines::Clarabel;
+use super::comparison::{Coal, ComparisonError, FitCache};
 use cases::cases;
 use methods::{Cell, measure};
 pub(crate) use shown::Shown;
@@ -53,18 +53,18 @@ struct Measured {
 }
 
 /// Measures three pairs of the meshes in `data` at degrees 4 and 6, or one at degree 4 if `quick`,
-/// and a pair of flat faces. Fits are kept on the `shelf`; coal takes part where `SUBLEVEL_COAL`
-/// names the program that times it, clarabel where its example is built. `progress` hears what is
+/// and a pair of flat faces. Fits are kept in the `cache`; coal takes part where `SUBLEVEL_COAL`
+/// names the program that times it, clarabel where its example is built. `progress` is told what is
 /// going on and can stop it.
 ///
 /// # Errors
-/// [`DuelError`].
+/// [`ComparisonError`].
 pub fn accuracy(
     data: &Path,
-    shelf: &Shelf,
+    cache: &FitCache,
     quick: bool,
     progress: &mut dyn FnMut(&str) -> ControlFlow<()>,
-) -> Result<Accuracy, DuelError> {
+) -> Result<Accuracy, ComparisonError> {
     let effort = if quick {
         Effort { pairs: 1, degrees: &[4], queries: 40, few: 20, programs: 3, points: &[100, 1000, 10_000], passes: 1 }
     } else {
@@ -78,13 +78,13 @@ pub fn accuracy(
             passes: 3,
         }
     };
-    let mut announce = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };
+    let mut announce = |at: &str| if progress(at).is_break() { Err(ComparisonError::Cancelled) } else { Ok(()) };
     let peers = (Clarabel::find()?, Coal::from_environment()?);
     let mut measured = Vec::new();
-    for case in cases(data, &effort, shelf, &mut announce)? {
-        let cells = measure(&case, &effort, shelf, (peers.0.as_ref(), peers.1.as_ref()), &mut announce)?;
+    for case in cases(data, &effort, cache, &mut announce)? {
+        let cells = measure(&case, &effort, cache, (peers.0.as_ref(), peers.1.as_ref()), &mut announce)?;
         let halves: Vec<f64> = case.queries.iter().map(|query| query.half_width / case.size_m).collect();
-        let reference = [super::duel::sweep::median(&halves), halves.iter().copied().fold(0.0, f64::max)];
+        let reference = [super::comparison::sweep::median(&halves), halves.iter().copied().fold(0.0, f64::max)];
         let (size_m, queries) = (case.size_m, case.queries.len());
         measured.push(Measured { name: case.name, size_m, queries, reference, cells });
     }
@@ -103,7 +103,7 @@ mod tests {
     use super::cases::Case;
     use super::methods::{Method, measure};
     use super::*;
-    use crate::rivals::tests::{at, axes_apart};
+    use crate::baselines::tests::{at, axes_apart};
 
     #[test]
     fn all_methods_approach_the_distance_of_ellipsoids() {
@@ -114,10 +114,10 @@ mod tests {
         });
         let case = Case::new("eggs".into(), [a, b], poses).unwrap();
         let folder = tempfile::tempdir().unwrap();
-        let shelf = Shelf::new(folder.path()).unwrap();
+        let cache = FitCache::new(folder.path()).unwrap();
         let effort =
             Effort { pairs: 0, degrees: &[], queries: 4, few: 4, programs: 0, points: &[100, 1000], passes: 1 };
-        let cells = measure(&case, &effort, &shelf, (None, None), &mut |_| Ok(())).unwrap();
+        let cells = measure(&case, &effort, &cache, (None, None), &mut |_| Ok(())).unwrap();
         let of = |method| cells.iter().filter(move |cell| cell.method == method);
         let best = |method| of(method).map(|cell| cell.error[1]).fold(f64::INFINITY, f64::min);
         for method in [Method::Cold, Method::Warm, Method::NewtonPlain, Method::NewtonOurs, Method::NewtonBefore] {

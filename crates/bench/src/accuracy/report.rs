@@ -3,7 +3,7 @@
 use super::methods::Cell;
 use super::{Accuracy, Measured};
 use crate::blocks::block;
-use crate::duel::parry_version;
+use crate::comparison::parry_version;
 use crate::machine::locked;
 use std::fmt::Write;
 

@@ -3,8 +3,8 @@
 use super::Effort;
 use super::growth::{self, Growth, Line, Unit};
 use super::memory::peak;
-use crate::duel::sweep::median;
-use crate::duel::{DuelError, Random, ShelfError, Subject, points_text};
+use crate::comparison::sweep::median;
+use crate::comparison::{ComparisonError, FitCacheError, Random, Subject, points_text};
 use nalgebra::Vector3;
 use std::fs;
 use std::ops::ControlFlow;
@@ -36,8 +36,8 @@ pub(super) fn degrees(
     subject: &Subject,
     effort: &Effort,
     fitting: &Fitting<'_>,
-    announce: &mut dyn FnMut(&str) -> Result<(), DuelError>,
-) -> Result<Growth, DuelError> {
+    announce: &mut dyn FnMut(&str) -> Result<(), ComparisonError>,
+) -> Result<Growth, ComparisonError> {
     let mut lines = [Line::new("fit", Unit::Nanoseconds), Line::new("peak of the process", Unit::Bytes)];
     for &degree in effort.degrees {
         announce(&format!("fit of degree {degree}"))?;
@@ -56,9 +56,9 @@ pub(super) fn points(
     subject: &Subject,
     effort: &Effort,
     fitting: &Fitting<'_>,
-    announce: &mut dyn FnMut(&str) -> Result<(), DuelError>,
-) -> Result<Growth, DuelError> {
-    let failed = |what: String| DuelError::Representation { mesh: "pillow", method: "points".into(), what };
+    announce: &mut dyn FnMut(&str) -> Result<(), ComparisonError>,
+) -> Result<Growth, ComparisonError> {
+    let failed = |what: String| ComparisonError::Representation { mesh: "pillow", method: "points".into(), what };
     let pillow = Body::superellipsoid("pillow", Vector3::zeros(), Vector3::new(1.0, 0.7, 0.5), 4);
     let pillow = pillow.map_err(|error| failed(error.to_string()))?;
     let mut lines = Vec::new();
@@ -98,14 +98,14 @@ impl Fitting<'_> {
         repeats: usize,
         size: f64,
         [time, memory]: &mut [Line; 2],
-    ) -> Result<(), DuelError> {
+    ) -> Result<(), ComparisonError> {
         let options = FitOptions { degree, ..FitOptions::default() };
         let mut runs = Vec::new();
         for _ in 0..repeats {
             let start = Instant::now();
             let made = fit("cost", points, &options, &mut |_| ControlFlow::Continue(()));
             runs.push(start.elapsed().as_nanos() as f64);
-            made.map_err(|source| ShelfError::Fit {
+            made.map_err(|source| FitCacheError::Fit {
                 name: format!("{} points, degree {degree}", points.len()),
                 source,
             })?;

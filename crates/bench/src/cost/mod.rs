@@ -9,7 +9,7 @@ mod report;
 mod shown;
 
 use super::Machine;
-use super::duel::{DuelError, Shelf, Subject};
+use super::comparison::{ComparisonError, FitCache, Subject};
 use fits::Fitting;
 use growth::{Growth, Line, Unit};
 pub(crate) use shown::Shown;
@@ -31,7 +31,7 @@ struct Effort {
 }
 
 /// Nanoseconds of a message with this many pairs, sent to a server and answered, for each number of
-/// pairs. Who serves lives in another room.
+/// pairs. The server lives in another module.
 pub type Messages<'a> = &'a mut dyn FnMut(&[usize]) -> Result<Vec<f64>, String>;
 
 /// What grows how fast.
@@ -42,19 +42,19 @@ pub struct Cost {
     growths: Vec<Growth>,
 }
 
-/// Measures chair and human of the meshes in `data`. Fits are kept on the `shelf`; `messages` sends
+/// Measures chair and human of the meshes in `data`. Fits are kept in the `cache`; `messages` sends
 /// messages to a server, and `program` is `sublevel`, whose memory is looked at as it fits.
-/// `progress` hears what is going on and can stop it.
+/// `progress` is told what is going on and can stop it.
 ///
 /// # Errors
-/// [`DuelError`].
+/// [`ComparisonError`].
 pub fn cost(
     data: &Path,
-    shelf: &Shelf,
+    cache: &FitCache,
     quick: bool,
     (messages, program): (Messages<'_>, Option<&Path>),
     progress: &mut dyn FnMut(&str) -> ControlFlow<()>,
-) -> Result<Cost, DuelError> {
+) -> Result<Cost, ComparisonError> {
     let effort = if quick {
         Effort {
             degrees: &[2, 4, 6],
@@ -80,25 +80,25 @@ pub fn cost(
             passes: 5,
         }
     };
-    let mut announce = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };
+    let mut announce = |at: &str| if progress(at).is_break() { Err(ComparisonError::Cancelled) } else { Ok(()) };
     let [chair, human] = [Subject::read("chair", data)?, Subject::read("human", data)?];
     let pair = [&chair, &human];
     let mut growths = vec![
-        queries::degrees(pair, &effort, shelf, &mut announce)?,
-        queries::constraints(pair, &effort, shelf, &mut announce)?,
-        queries::parts(pair, &effort, shelf, &mut announce)?,
-        queries::batches(pair, &effort, shelf, &mut announce)?,
+        queries::degrees(pair, &effort, cache, &mut announce)?,
+        queries::constraints(pair, &effort, cache, &mut announce)?,
+        queries::parts(pair, &effort, cache, &mut announce)?,
+        queries::batches(pair, &effort, cache, &mut announce)?,
     ];
     announce("messages")?;
     growths.push(sent(effort.messages, messages)?);
-    let fitting = Fitting { program, folder: shelf.folder() };
+    let fitting = Fitting { program, folder: cache.folder() };
     growths.push(fits::degrees(&chair, &effort, &fitting, &mut announce)?);
     growths.push(fits::points(&chair, &effort, &fitting, &mut announce)?);
     Ok(Cost { machine: Machine::this(), quick, passes: effort.passes, growths })
 }
 
-fn sent(sizes: &[usize], messages: Messages<'_>) -> Result<Growth, DuelError> {
-    let times = messages(sizes).map_err(DuelError::Messages)?;
+fn sent(sizes: &[usize], messages: Messages<'_>) -> Result<Growth, ComparisonError> {
+    let times = messages(sizes).map_err(ComparisonError::Messages)?;
     let mut whole = Line::new("a message", Unit::Nanoseconds);
     let mut each = Line::new("a pair of it", Unit::Nanoseconds);
     for (&size, time) in sizes.iter().zip(times) {

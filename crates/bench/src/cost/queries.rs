@@ -3,9 +3,9 @@
 use super::Effort;
 use super::growth::{self, Growth, Line, Unit};
 use super::memory::bytes_of;
-use crate::duel::motion::{self, Trajectory};
-use crate::duel::sweep::{Answer, Row};
-use crate::duel::{DuelError, Shelf, Subject};
+use crate::comparison::motion::{self, Trajectory};
+use crate::comparison::sweep::{Answer, Row};
+use crate::comparison::{ComparisonError, FitCache, Subject};
 use std::ops::ControlFlow;
 use sublevel::body::{Body, Shape, Solid};
 use sublevel::fit::{FitOptions, MAX_SLABS, fit_parts};
@@ -18,20 +18,20 @@ const DEGREE: usize = 4;
 /// Of what the batch is about.
 const BATCH_DEGREE: usize = 6;
 
-type Announce<'a> = &'a mut dyn FnMut(&str) -> Result<(), DuelError>;
+type Announce<'a> = &'a mut dyn FnMut(&str) -> Result<(), ComparisonError>;
 
 /// Against the degree of both bodies.
 pub(super) fn degrees(
     pair: [&Subject; 2],
     effort: &Effort,
-    shelf: &Shelf,
+    cache: &FitCache,
     announce: Announce<'_>,
-) -> Result<Growth, DuelError> {
+) -> Result<Growth, ComparisonError> {
     let mut shapes = Vec::new();
     for &degree in effort.degrees {
         announce(&format!("degree {degree}"))?;
         let options = FitOptions { degree, ..FitOptions::default() };
-        let body = |subject: &Subject| Ok::<_, DuelError>(shelf.body(subject.name, &subject.mesh, &options)?);
+        let body = |subject: &Subject| Ok::<_, ComparisonError>(cache.body(subject.name, &subject.mesh, &options)?);
         shapes.push((degree, boxed(body(pair[0])?), boxed(body(pair[1])?)));
     }
     let lines = against(pair, &shapes, effort)?;
@@ -46,16 +46,16 @@ pub(super) fn degrees(
 pub(super) fn constraints(
     pair: [&Subject; 2],
     effort: &Effort,
-    shelf: &Shelf,
+    cache: &FitCache,
     announce: Announce<'_>,
-) -> Result<Growth, DuelError> {
+) -> Result<Growth, ComparisonError> {
     let mut shapes = Vec::new();
     let plain = FitOptions { degree: DEGREE, ..FitOptions::default() };
-    let other = boxed(shelf.body(pair[1].name, &pair[1].mesh, &plain)?);
+    let other = boxed(cache.body(pair[1].name, &pair[1].mesh, &plain)?);
     for &slabs in effort.slabs {
         announce(&format!("{slabs} slabs"))?;
         let options = FitOptions { slabs: slabs.min(MAX_SLABS), ..plain.clone() };
-        let body = shelf.body(pair[0].name, &pair[0].mesh, &options)?;
+        let body = cache.body(pair[0].name, &pair[0].mesh, &options)?;
         shapes.push((body.constraints().len(), boxed(body), other.clone()));
     }
     let lines = against(pair, &shapes, effort)?;
@@ -73,18 +73,18 @@ pub(super) fn constraints(
 pub(super) fn parts(
     pair: [&Subject; 2],
     effort: &Effort,
-    shelf: &Shelf,
+    cache: &FitCache,
     announce: Announce<'_>,
-) -> Result<Growth, DuelError> {
+) -> Result<Growth, ComparisonError> {
     let mut shapes: Vec<(usize, Shape, Shape)> = Vec::new();
     let options = FitOptions { degree: DEGREE, ..FitOptions::default() };
-    let other = boxed(shelf.body(pair[1].name, &pair[1].mesh, &options)?);
+    let other = boxed(cache.body(pair[1].name, &pair[1].mesh, &options)?);
     let Subject { name, mesh, .. } = pair[0];
     for &count in effort.parts {
         announce(&format!("{count} parts"))?;
         // The name and the key of the figure of speed: both share their fits.
         let key = format!("{count} parts {options:?}");
-        let shape = shelf.take(&format!("{name}-d{DEGREE}-p{count}"), mesh, &key, || {
+        let shape = cache.take(&format!("{name}-d{DEGREE}-p{count}"), mesh, &key, || {
             let made = fit_parts(name, mesh, count, &options, &mut |_| ControlFlow::Continue(()))?;
             Ok(Shape::Compound(Box::new(made.compound)))
         })?;
@@ -105,12 +105,12 @@ pub(super) fn parts(
 pub(super) fn batches(
     pair: [&Subject; 2],
     effort: &Effort,
-    shelf: &Shelf,
+    cache: &FitCache,
     announce: Announce<'_>,
-) -> Result<Growth, DuelError> {
+) -> Result<Growth, ComparisonError> {
     announce("batches")?;
     let options = FitOptions { degree: BATCH_DEGREE, ..FitOptions::default() };
-    let body = |subject: &Subject| Ok::<_, DuelError>(shelf.body(subject.name, &subject.mesh, &options)?);
+    let body = |subject: &Subject| Ok::<_, ComparisonError>(cache.body(subject.name, &subject.mesh, &options)?);
     let (a, b) = (body(pair[0])?, body(pair[1])?);
     let most = effort.batches.iter().copied().max().unwrap_or(1);
     let poses = motion::stepping((&a, &b), unit_m(pair), Some(STEP), 1, most)?;
@@ -161,7 +161,11 @@ fn unit_m([a, b]: [&Subject; 2]) -> f64 {
 
 /// Cold and warm queries, in the same poses for all sizes: those of the first, which are the
 /// widest.
-fn against(pair: [&Subject; 2], shapes: &[(usize, Shape, Shape)], effort: &Effort) -> Result<Vec<Line>, DuelError> {
+fn against(
+    pair: [&Subject; 2],
+    shapes: &[(usize, Shape, Shape)],
+    effort: &Effort,
+) -> Result<Vec<Line>, ComparisonError> {
     let Some((_, wide_a, wide_b)) = shapes.first() else { return Ok(Vec::new()) };
     let poses = motion::stepping((wide_a, wide_b), unit_m(pair), Some(STEP), effort.trajectories, effort.poses)?;
     let mut rows: Vec<[Row<'_>; 2]> = shapes.iter().map(|(_, a, b)| timed(a, b, &poses)).collect();

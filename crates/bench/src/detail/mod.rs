@@ -9,7 +9,7 @@ mod rungs;
 mod shown;
 
 use super::Machine;
-use super::duel::{DuelError, Shelf, pairs};
+use super::comparison::{ComparisonError, FitCache, pairs};
 use parts::{Divided, parts};
 pub(crate) use parts_report::Shown as PartsShown;
 use rungs::{Ladder, ladder};
@@ -38,24 +38,24 @@ pub struct Detail {
 }
 
 /// Measures the rungs of pairs of the meshes in `data`, of two pairs up to degree 6 if `quick`.
-/// Fits are kept on the `shelf`. `progress` hears what is going on and can stop it.
+/// Fits are kept in the `cache`. `progress` is told what is going on and can stop it.
 ///
 /// # Errors
-/// [`DuelError`].
+/// [`ComparisonError`].
 pub fn detail(
     data: &Path,
-    shelf: &Shelf,
+    cache: &FitCache,
     quick: bool,
     progress: &mut dyn FnMut(&str) -> ControlFlow<()>,
-) -> Result<Detail, DuelError> {
+) -> Result<Detail, ComparisonError> {
     let effort = if quick {
         Effort { quick, trajectories: 2, poses: 100, passes: 3, questions: 100 }
     } else {
         Effort { quick, trajectories: 4, poses: 400, passes: 5, questions: 2000 }
     };
-    let mut announce = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };
+    let mut announce = |at: &str| if progress(at).is_break() { Err(ComparisonError::Cancelled) } else { Ok(()) };
     let pairs = pairs(data, quick)?;
-    let ladders = pairs.iter().map(|[a, b]| ladder([a, b], &effort, shelf, &mut announce)).collect::<Result<_, _>>()?;
+    let ladders = pairs.iter().map(|[a, b]| ladder([a, b], &effort, cache, &mut announce)).collect::<Result<_, _>>()?;
     let divided = parts(data, quick, &mut announce)?;
     Ok(Detail { machine: Machine::this(), quick, questions: effort.questions, ladders, divided })
 }

@@ -1,7 +1,7 @@
 //! Convex decompositions compared at equal numbers of parts: ours, the search by gain alone, and
 //! V-HACD as parry has it (Mamou and Ghorbel, ICIP 2009).
 
-use crate::duel::{DuelError, Random};
+use crate::comparison::{ComparisonError, Random};
 use nalgebra::Vector3;
 use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::query::PointQuery;
@@ -15,7 +15,7 @@ use sublevel::fit::{FitError, Mesh, PartSearch, ReadOptions, convex_parts, hull:
 
 /// Objects by name and file; the tube, which has none, is made.
 pub(super) const OBJECTS: [(&str, &str); 7] = [
-    ("shelf", "faults/shelf.off"),
+    ("shelf", "faults/cache.off"),
     ("tube", ""),
     ("mug", "meshes/mbm_mug.off"),
     ("wingnut", "meshes/wingnut.off"),
@@ -92,12 +92,12 @@ struct Object {
 /// Divides all objects by all means.
 ///
 /// # Errors
-/// [`DuelError`].
+/// [`ComparisonError`].
 pub(super) fn parts(
     data: &Path,
     quick: bool,
-    announce: &mut dyn FnMut(&str) -> Result<(), DuelError>,
-) -> Result<Vec<Divided>, DuelError> {
+    announce: &mut dyn FnMut(&str) -> Result<(), ComparisonError>,
+) -> Result<Vec<Divided>, ComparisonError> {
     let (objects, counts) = if quick { (&OBJECTS[..QUICK_OBJECTS], &PARTS[..1]) } else { (&OBJECTS[..], &PARTS[..]) };
     let mut all = Vec::new();
     for &(name, file) in objects {
@@ -121,11 +121,11 @@ fn parry(x: &Vector3<f64>) -> Vector {
 }
 
 impl Object {
-    fn new(name: &'static str, mesh: Mesh) -> Result<Self, DuelError> {
+    fn new(name: &'static str, mesh: Mesh) -> Result<Self, ComparisonError> {
         let points: Vec<Vector> = mesh.points.iter().map(parry).collect();
         let surface = TriMesh::new(points, indices(&mesh))
-            .map_err(|error| DuelError::ParryMesh { mesh: name, what: error.to_string() })?;
-        let hull = convex_hull(&mesh.points).map_err(|source| DuelError::Hull { mesh: name, source })?;
+            .map_err(|error| ComparisonError::ParryMesh { mesh: name, what: error.to_string() })?;
+        let hull = convex_hull(&mesh.points).map_err(|source| ComparisonError::Hull { mesh: name, source })?;
         let corners: Vec<_> = hull.vertices.iter().map(|&i| mesh.points[i]).collect();
         let apart = |a: &Vector3<f64>| corners.iter().map(|b| (b - a).norm()).fold(0.0, f64::max);
         let diameter_m = corners.iter().map(apart).fold(0.0, f64::max);
@@ -134,7 +134,7 @@ impl Object {
     }
 
     /// The points whose hulls are the parts; none where V-HACD panics.
-    fn divide(&self, divider: Divider, parts: usize) -> Result<Option<Vec<Vec<Vector3<f64>>>>, DuelError> {
+    fn divide(&self, divider: Divider, parts: usize) -> Result<Option<Vec<Vec<Vector3<f64>>>>, ComparisonError> {
         let ours = |search| {
             convex_parts(&self.mesh, parts, search, &mut |_| ControlFlow::Continue(()))
                 .map(Some)
@@ -165,8 +165,8 @@ impl Object {
         Some(hulls.ok()?.into_iter().map(|(points, _)| corners(points)).collect())
     }
 
-    fn failed(&self, divider: Divider, what: impl ToString) -> DuelError {
-        DuelError::Representation { mesh: self.name, method: divider.name(), what: what.to_string() }
+    fn failed(&self, divider: Divider, what: impl ToString) -> ComparisonError {
+        ComparisonError::Representation { mesh: self.name, method: divider.name(), what: what.to_string() }
     }
 
     fn measure(
@@ -175,7 +175,7 @@ impl Object {
         asked: usize,
         parts: &[Vec<Vector3<f64>>],
         seconds: f64,
-    ) -> Result<Divided, DuelError> {
+    ) -> Result<Divided, ComparisonError> {
         let mut hulls = Vec::new();
         let mut volume_m3 = 0.0;
         for points in parts {

@@ -2,8 +2,8 @@
 
 use super::parts::{Divided, Divider, OBJECTS};
 use crate::blocks::block;
+use crate::comparison::parry_version;
 use crate::csv::{CsvError, Row, Table};
-use crate::duel::parry_version;
 use std::fmt::Write;
 use sublevel::draw::{ChartError, Group, Ink, Marker, Point, Scatter, Stairs};
 
@@ -114,7 +114,7 @@ fn verdict(divided: &[Divided]) -> String {
         .iter()
         .filter(|row| row.divider == Divider::Ours)
         .filter_map(|ours| {
-            let others = rivals(divided, ours);
+            let others = peers_of(divided, ours);
             let least = others.clone().map(|row| row.volume_m3).min_by(f64::total_cmp)?;
             Some((ours, least, others.map(|row| row.concavity).min_by(f64::total_cmp)?))
         })
@@ -180,7 +180,7 @@ fn picture(divided: &[Divided]) -> Result<String, ChartError> {
         .map(|(divider, ink, marker)| {
             let rows = divided.iter().filter(|row| row.divider == divider && row.parts > 0);
             let points = rows.filter_map(|row| {
-                let least = rivals(divided, row).map(|other| other.volume_m3).min_by(f64::total_cmp)?;
+                let least = peers_of(divided, row).map(|other| other.volume_m3).min_by(f64::total_cmp)?;
                 let label = match divider {
                     Divider::Ours => format!("{} {}", row.object, row.asked),
                     _ => String::new(),
@@ -205,7 +205,7 @@ fn picture(divided: &[Divided]) -> Result<String, ChartError> {
 }
 
 /// What V-HACD made of the same object and number of parts.
-fn rivals<'a>(divided: &'a [Divided], of: &'a Divided) -> impl Iterator<Item = &'a Divided> + Clone {
+fn peers_of<'a>(divided: &'a [Divided], of: &'a Divided) -> impl Iterator<Item = &'a Divided> + Clone {
     divided.iter().filter(|row| {
         let same = row.object == of.object && row.asked == of.asked && row.parts > 0;
         same && matches!(row.divider, Divider::Vhacd(_))

@@ -1,7 +1,7 @@
 //! Random pairs of poses at distances about a threshold, and whether a rung can tell on which side
 //! of it the objects are.
 
-use crate::duel::{Hulls, Random, Subject, parry_pose};
+use crate::comparison::{Hulls, Random, Subject, parry_pose};
 use nalgebra::Vector3;
 use sublevel::body::Body;
 use sublevel::measure::{Options, Pose, PoseError, WarmStart, distance};

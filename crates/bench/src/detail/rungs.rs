@@ -2,8 +2,8 @@
 
 use super::Effort;
 use super::questions::{Settled, THRESHOLDS, ask, settle};
-use crate::duel::sweep::{Answer, Row};
-use crate::duel::{DuelError, Hulls, Shelf, Subject, motion, parry_pose};
+use crate::comparison::sweep::{Answer, Row};
+use crate::comparison::{ComparisonError, FitCache, Hulls, Subject, motion, parry_pose};
 use sublevel::body::{Body, Shape};
 use sublevel::fit::{FitError, FitOptions, ball};
 use sublevel::measure::{Distance, Options, Pose, WarmStart, distance, distance_batch};
@@ -48,16 +48,16 @@ const AGREEMENT: f64 = 1e-7;
 pub(super) fn ladder(
     [a, b]: [&Subject; 2],
     effort: &Effort,
-    shelf: &Shelf,
-    announce: &mut dyn FnMut(&str) -> Result<(), DuelError>,
-) -> Result<Ladder, DuelError> {
+    cache: &FitCache,
+    announce: &mut dyn FnMut(&str) -> Result<(), ComparisonError>,
+) -> Result<Ladder, ComparisonError> {
     let pair = format!("{}-{}", a.name, b.name);
     let diameter_m = a.diameter_m.max(b.diameter_m);
     let names = if effort.quick { &RUNGS[..4] } else { &RUNGS[..] };
     let mut bodies = Vec::new();
     for (rung, &name) in names.iter().enumerate() {
         announce(&format!("{pair}: {name}"))?;
-        bodies.push((name, body(a, rung, shelf)?, body(b, rung, shelf)?));
+        bodies.push((name, body(a, rung, cache)?, body(b, rung, cache)?));
     }
     let hulls = Hulls::new(&a.hull, &b.hull)?;
     announce(&format!("{pair}: poses"))?;
@@ -106,14 +106,14 @@ pub(super) fn ladder(
 }
 
 /// A rung of one object, counted from the ball.
-fn body(subject: &Subject, rung: usize, shelf: &Shelf) -> Result<Body, DuelError> {
+fn body(subject: &Subject, rung: usize, cache: &FitCache) -> Result<Body, ComparisonError> {
     let Subject { name, mesh, .. } = subject;
-    let failed = |what: String| DuelError::Representation { mesh: name, method: "ball".into(), what };
+    let failed = |what: String| ComparisonError::Representation { mesh: name, method: "ball".into(), what };
     if rung > 0 {
-        return Ok(shelf.body(name, mesh, &FitOptions { degree: 2 * rung, ..FitOptions::default() })?);
+        return Ok(cache.body(name, mesh, &FitOptions { degree: 2 * rung, ..FitOptions::default() })?);
     }
     let made = || -> Result<Shape, FitError> { Ok(Shape::Body(Box::new(ball(name, &mesh.points)?.body))) };
-    match shelf.take(&format!("{name}-ball"), mesh, "ball", made)? {
+    match cache.take(&format!("{name}-ball"), mesh, "ball", made)? {
         Shape::Body(body) => Ok(*body),
         Shape::Compound(_) => Err(failed("a compound is kept where a ball is looked for; delete it".into())),
     }

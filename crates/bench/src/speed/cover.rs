@@ -99,7 +99,7 @@ fn fine(mesh: &Mesh) -> Vec<Triangle> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::duel::Random;
+    use crate::comparison::Random;
 
     #[test]
     fn the_balls_hold_every_triangle_and_shrink_as_they_grow_more() {

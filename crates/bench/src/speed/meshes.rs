@@ -4,7 +4,7 @@
 //! Parry answers the same question, and is timed at it, but looks at one mesh whole for each
 //! triangle of the other: a quarter of a second for meshes of 17 000 triangles.
 
-use crate::duel::{DuelError, Subject};
+use crate::comparison::{ComparisonError, Subject};
 use nalgebra::{Isometry3, Vector3};
 use parry3d_f64::math::{Pose as ParryPose, Vector};
 use parry3d_f64::query::details::distance_support_map_support_map;
@@ -20,12 +20,12 @@ pub(super) struct Meshes {
 }
 
 impl Meshes {
-    pub(super) fn new(subjects: [&Subject; 2]) -> Result<Self, DuelError> {
+    pub(super) fn new(subjects: [&Subject; 2]) -> Result<Self, ComparisonError> {
         let [a, b] = subjects.map(|subject| {
             let points = subject.mesh.points.iter().map(|v| Vector::new(v.x, v.y, v.z)).collect();
             let triangles = subject.mesh.triangles.iter().map(|t| t.map(|corner| corner as u32)).collect();
             TriMesh::new(points, triangles)
-                .map_err(|error| DuelError::ParryMesh { mesh: subject.name, what: error.to_string() })
+                .map_err(|error| ComparisonError::ParryMesh { mesh: subject.name, what: error.to_string() })
         });
         Ok(Self { trees: subjects.map(Tree::new), parry: [a?, b?] })
     }
@@ -148,7 +148,7 @@ impl Tree {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::duel::{Random, parry_pose};
+    use crate::comparison::{Random, parry_pose};
     use sublevel::fit::Mesh;
     use sublevel::measure::Pose;
 

@@ -13,7 +13,7 @@ mod report;
 mod shown;
 
 use super::Machine;
-use super::duel::{Coal, DuelError, Shelf, pairs};
+use super::comparison::{Coal, ComparisonError, FitCache, pairs};
 use race::{About, Race, race};
 pub(crate) use shown::Shown;
 use std::ops::ControlFlow;
@@ -41,27 +41,27 @@ pub struct Speed {
 }
 
 /// Measures all pairs of the meshes in `data`, or two of them with fewer representations and poses
-/// if `quick`. Fits are kept on the `shelf`; coal takes part where `SUBLEVEL_COAL` names the
-/// program that times it. `progress` hears what is going on and can stop it.
+/// if `quick`. Fits are kept in the `cache`; coal takes part where `SUBLEVEL_COAL` names the
+/// program that times it. `progress` is told what is going on and can stop it.
 ///
 /// # Errors
-/// [`DuelError`].
+/// [`ComparisonError`].
 pub fn speed(
     data: &Path,
-    shelf: &Shelf,
+    cache: &FitCache,
     quick: bool,
     progress: &mut dyn FnMut(&str) -> ControlFlow<()>,
-) -> Result<Speed, DuelError> {
+) -> Result<Speed, ComparisonError> {
     let effort = if quick {
         Effort { quick, trajectories: 2, poses: 100, passes: 3, slow_poses: 2, slow_passes: 1 }
     } else {
         Effort { quick, trajectories: 4, poses: 400, passes: 5, slow_poses: 8, slow_passes: 2 }
     };
     let coal = Coal::from_environment()?;
-    let mut announce = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };
+    let mut announce = |at: &str| if progress(at).is_break() { Err(ComparisonError::Cancelled) } else { Ok(()) };
     // A mesh that is missing is reported before any work.
     let pairs = pairs(data, quick)?;
-    let races = pairs.iter().map(|[a, b]| race([a, b], &effort, shelf, coal.as_ref(), &mut announce));
+    let races = pairs.iter().map(|[a, b]| race([a, b], &effort, cache, coal.as_ref(), &mut announce));
     let races = races.collect::<Result<Vec<_>, _>>()?;
     let coal = coal.as_ref().map(Coal::version);
     Ok(Speed { machine: Machine::this(), coal, quick, passes: effort.passes, races })

@@ -1,9 +1,9 @@
 //! Our representations of an object: all contain it, and this is proven when they are made.
 
 use super::cover::cover;
-use crate::duel::DuelError;
-use crate::duel::Shelf;
-use crate::duel::Subject;
+use crate::comparison::ComparisonError;
+use crate::comparison::FitCache;
+use crate::comparison::Subject;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::ControlFlow;
 use sublevel::body::{Body, BodyError, Normalization, Shape};
@@ -85,9 +85,9 @@ impl Method {
     }
 
     /// The representation of an object.
-    pub(super) fn build(self, subject: &Subject, shelf: &Shelf) -> Result<Shape, DuelError> {
+    pub(super) fn build(self, subject: &Subject, cache: &FitCache) -> Result<Shape, ComparisonError> {
         let Subject { name, mesh, hull, .. } = subject;
-        let failed = |what: String| DuelError::Representation { mesh: name, method: self.name(), what };
+        let failed = |what: String| ComparisonError::Representation { mesh: name, method: self.name(), what };
         let boxed = |found: OrientedBox| {
             let body = cuboid(name, &found).map_err(|error| failed(error.to_string()))?;
             let body = body.with_points(&mesh.points).map_err(|error| failed(error.to_string()))?;
@@ -102,16 +102,16 @@ impl Method {
             Self::OrientedBox => boxed(smallest_box(hull)),
             Self::Body { degree, refine } => {
                 let options = FitOptions { degree, refine, ..FitOptions::default() };
-                Ok(Shape::Body(Box::new(shelf.body(name, mesh, &options)?)))
+                Ok(Shape::Body(Box::new(cache.body(name, mesh, &options)?)))
             }
             Self::Slabs { degree, slabs } => {
                 let options = FitOptions { degree, slabs, ..FitOptions::default() };
-                Ok(Shape::Body(Box::new(shelf.body(name, mesh, &options)?)))
+                Ok(Shape::Body(Box::new(cache.body(name, mesh, &options)?)))
             }
             Self::Parts { parts, degree } => {
                 let options = FitOptions { degree, ..FitOptions::default() };
                 let key = format!("{parts} parts {options:?}");
-                Ok(shelf.take(&format!("{name}-d{degree}-p{parts}"), mesh, &key, || {
+                Ok(cache.take(&format!("{name}-d{degree}-p{parts}"), mesh, &key, || {
                     let made = fit_parts(name, mesh, parts, &options, &mut |_| ControlFlow::Continue(()))?;
                     Ok(Shape::Compound(Box::new(made.compound)))
                 })?)

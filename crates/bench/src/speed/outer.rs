@@ -12,8 +12,8 @@ use parry3d_f64::math::Vector;
 use parry3d_f64::transformation::try_convex_hull;
 use sublevel::optimize::{Corner, gjk};
 
-/// How much is left of the room between two vertices that count as one, relative to the size of the
-/// hull.
+/// How much is left of the space between two vertices that count as one, relative to the size of
+/// the hull.
 const SAME: f64 = 1e-9;
 /// Each plane is moved out by this part of the size: rounding leaves no point of the object
 /// outside.
@@ -101,7 +101,7 @@ fn vertices(planes: &[Vector3<f64>], size: f64) -> Option<Vec<Vector3<f64>>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::duel::Random;
+    use crate::comparison::Random;
     use sublevel::fit::hull::convex_hull;
 
     #[test]

@@ -2,9 +2,9 @@
 //! libraries.
 
 use super::outer::outer;
-use crate::duel::DuelError;
-use crate::duel::Subject;
-use crate::duel::{Hulls, parry_pose, sweep::Answer};
+use crate::comparison::ComparisonError;
+use crate::comparison::Subject;
+use crate::comparison::{Hulls, parry_pose, sweep::Answer};
 use nalgebra::{UnitQuaternion, Vector3};
 use parry3d_f64::math::{Pose as ParryPose, Rotation, Vector};
 use parry3d_f64::query::details::{distance_ball_ball, distance_cuboid_cuboid};
@@ -27,12 +27,12 @@ pub(super) struct HullPair {
 
 /// The exact hulls, and simpler ones of as many vertices as are allowed at each of [`COUNTS`], the
 /// exact one where an object has no more.
-pub(super) fn hulls(a: &Subject, b: &Subject, quick: bool) -> Result<Vec<HullPair>, DuelError> {
+pub(super) fn hulls(a: &Subject, b: &Subject, quick: bool) -> Result<Vec<HullPair>, ComparisonError> {
     let counts = if quick { &COUNTS[1..3] } else { &COUNTS[..] };
     let simple = [a, b].map(|subject| outer(&subject.hull, counts));
     let pair = |count, vertices: [Vec<Vector3<f64>>; 2]| {
         let parry = Hulls::new(&vertices[0], &vertices[1])?;
-        Ok::<_, DuelError>(HullPair { count, vertices, parry })
+        Ok::<_, ComparisonError>(HullPair { count, vertices, parry })
     };
     let mut all = vec![pair(None, [a.hull.clone(), b.hull.clone()])?];
     for (k, &count) in counts.iter().enumerate() {

@@ -4,10 +4,10 @@ use super::Effort;
 use super::meshes::Meshes;
 use super::ours::Method;
 use super::peers::{HullPair, Simple, hulls, judged};
-use crate::duel::DuelError;
-use crate::duel::Subject;
-use crate::duel::sweep::{Answer, Row};
-use crate::duel::{Coal, Shelf, motion, parry_pose};
+use crate::comparison::ComparisonError;
+use crate::comparison::Subject;
+use crate::comparison::sweep::{Answer, Row};
+use crate::comparison::{Coal, FitCache, motion, parry_pose};
 use parry3d_f64::math::Pose as ParryPose;
 use sublevel::body::Shape;
 use sublevel::measure::{Distance, Options, Pose, WarmStart, distance, distance_batch, signed_distance};
@@ -95,16 +95,16 @@ struct Ours {
 pub(super) fn race(
     [a, b]: [&Subject; 2],
     effort: &Effort,
-    shelf: &Shelf,
+    cache: &FitCache,
     coal: Option<&Coal>,
-    announce: &mut dyn FnMut(&str) -> Result<(), DuelError>,
-) -> Result<(Race, About), DuelError> {
+    announce: &mut dyn FnMut(&str) -> Result<(), ComparisonError>,
+) -> Result<(Race, About), ComparisonError> {
     let name = format!("{}-{}", a.name, b.name);
     let diameter_m = a.diameter_m.max(b.diameter_m);
     let mut ours = Vec::new();
     for method in Method::all(effort.quick) {
         announce(&format!("{name}: {}", method.name()))?;
-        ours.push(Ours { method, a: method.build(a, shelf)?, b: method.build(b, shelf)? });
+        ours.push(Ours { method, a: method.build(a, cache)?, b: method.build(b, cache)? });
     }
     announce(&format!("{name}: poses"))?;
     let apart = ours.iter().filter(|o| matches!(o.method, Method::Body { refine: false, .. }));
@@ -151,7 +151,7 @@ pub(super) fn race(
         let of = pair.count.map_or("exact".to_owned(), |count| count.to_string());
         let vertices = pair.vertices.each_ref().map(Vec::as_slice);
         let run =
-            coal.map(|coal| coal.start(shelf.folder(), &format!("speed-{name}-{of}"), vertices, &poses)).transpose()?;
+            coal.map(|coal| coal.start(cache.folder(), &format!("speed-{name}-{of}"), vertices, &poses)).transpose()?;
         runs.extend(run.map(|run| (Who::CoalHull(pair.count), run)));
     }
     for pass in 0..effort.passes {

@@ -3,7 +3,7 @@
 use super::Speed;
 use super::race::{About, Line, Race, Who};
 use crate::blocks::block;
-use crate::duel::parry_version;
+use crate::comparison::parry_version;
 use std::fmt::Write;
 use sublevel::measure::DEFAULT_ACCURACY;
 

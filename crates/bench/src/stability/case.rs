@@ -1,7 +1,7 @@
 //! One query of a family, and what came of it.
 
 use super::zoo::ZooError;
-use crate::duel::PeerError;
+use crate::comparison::PeerError;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::fmt;

@@ -2,8 +2,8 @@
 
 use super::arbiter::{Proposal, Truth, judge};
 use super::case::{Case, CaseError, Verdict};
-use crate::duel::{Coal, Hulls, PeerError, motion::Trajectory, parry_pose};
-use crate::rivals::{Clarabel, ConicProgram, Posed, between, newton, slsqp};
+use crate::baselines::{Clarabel, ConicProgram, Posed, between, newton, slsqp};
+use crate::comparison::{Coal, Hulls, PeerError, motion::Trajectory, parry_pose};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::path::Path;
 use std::str::FromStr;
@@ -122,7 +122,7 @@ impl Method {
 
 /// What a method says of a case, and what that is worth.
 #[derive(Clone, Debug)]
-pub(super) struct Said {
+pub(super) struct Answer {
     pub(super) verdict: Verdict,
     /// The distance, metres, where it found one.
     pub(super) value: Option<f64>,
@@ -142,14 +142,14 @@ pub(super) struct Reply {
 impl Case {
     /// Puts the case to a method, and judges what it says. None where the method cannot be asked.
     pub(super) fn put(&self, method: Method) -> Result<Option<Verdict>, CaseError> {
-        Ok(self.hear(method)?.map(|said| said.verdict))
+        Ok(self.run(method)?.map(|said| said.verdict))
     }
 
     /// As [`Case::put`], with what was said.
-    pub(super) fn hear(&self, method: Method) -> Result<Option<Said>, CaseError> {
+    pub(super) fn run(&self, method: Method) -> Result<Option<Answer>, CaseError> {
         if method.is_ours() {
             let answer = self.ours(method)?;
-            return Ok(Some(Said {
+            return Ok(Some(Answer {
                 verdict: self.verdict(&answer)?,
                 value: Some(answer.value()),
                 answer: Some(answer),
@@ -161,7 +161,7 @@ impl Case {
         }
         let Some(reply) = self.ask(method)? else { return Ok(None) };
         let truth = reply.own.map_or_else(|| self.truth(std::slice::from_ref(&reply.proposal)), Ok)?;
-        Ok(Some(Said { verdict: reply.verdict(&truth, self), value: reply.value, answer: None }))
+        Ok(Some(Answer { verdict: reply.verdict(&truth, self), value: reply.value, answer: None }))
     }
 
     /// How much answers of a method may differ from the truth, metres.

@@ -13,8 +13,8 @@ mod runner;
 mod zoo;
 
 use super::Machine;
-use super::duel::{Coal, DuelError};
-use super::rivals::Clarabel;
+use super::baselines::Clarabel;
+use super::comparison::{Coal, ComparisonError};
 pub use case::Verdict;
 use families::FAMILIES;
 pub use method::{Method, UnknownMethod};
@@ -50,16 +50,16 @@ pub struct Stability {
 /// Puts all families to these methods, a tenth of the cases if `quick`. `program` is what to start
 /// for the children: this one, with the command `chart stability`. Coal takes part where
 /// `SUBLEVEL_COAL` names the program that times it, clarabel where its example is built. `progress`
-/// hears what is going on and can stop it.
+/// is told what is going on and can stop it.
 ///
 /// # Errors
-/// [`DuelError`].
+/// [`ComparisonError`].
 pub fn stability(
     program: &Path,
     methods: &[Method],
     quick: bool,
     progress: &mut dyn FnMut(&str) -> ControlFlow<()>,
-) -> Result<Stability, DuelError> {
+) -> Result<Stability, ComparisonError> {
     let (coal, solver) = (Coal::from_environment()?, Clarabel::find()?);
     let tasks: Vec<_> = (0..FAMILIES.len()).flat_map(|row| methods.iter().map(move |method| (row, *method))).collect();
     let next = AtomicUsize::new(0);
@@ -85,14 +85,14 @@ pub fn stability(
         for (count, (row, method, found)) in done.iter().enumerate() {
             let found = found.map_err(|source| {
                 next.store(tasks.len(), Ordering::Relaxed);
-                DuelError::Child { program: program.to_owned(), source }
+                ComparisonError::Child { program: program.to_owned(), source }
             })?;
             rows[row].cells.extend(found);
             let at = format!("{} of {}: {}, {}", count + 1, tasks.len(), FAMILIES[row].name, method.title());
             if progress(&at).is_break() {
                 // No more tasks for anyone.
                 next.store(tasks.len(), Ordering::Relaxed);
-                return Err(DuelError::Cancelled);
+                return Err(ComparisonError::Cancelled);
             }
         }
         Ok(())

@@ -4,7 +4,7 @@ use super::case::Verdict;
 use super::method::Method;
 use super::runner::{Cell, PATIENCE};
 use super::{Row, Stability};
-use crate::duel::parry_version;
+use crate::comparison::parry_version;
 use std::fmt::Write;
 use std::str::FromStr;
 

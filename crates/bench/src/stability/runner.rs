@@ -149,8 +149,8 @@ pub(super) fn run(program: &Path, family: &Family, method: Method, count: u64) -
     Ok(asked.then_some(cell))
 }
 
-/// Starts a child and hears its lines.
-fn child(program: &Path, share: &str, mut hear: impl FnMut(Line)) -> std::io::Result<End> {
+/// Starts a child and passes on each of its lines.
+fn child(program: &Path, share: &str, mut on_line: impl FnMut(Line)) -> std::io::Result<End> {
     let mut child = Command::new(program)
         .args(["stability", "--replay", share, "--json"])
         .stdin(Stdio::null())
@@ -169,7 +169,7 @@ fn child(program: &Path, share: &str, mut hear: impl FnMut(Line)) -> std::io::Re
     });
     let end = loop {
         match lines.recv_timeout(PATIENCE) {
-            Ok(line) => match serde_json::from_str(&line).map(&mut hear) {
+            Ok(line) => match serde_json::from_str(&line).map(&mut on_line) {
                 Ok(()) => {}
                 Err(_) => break End::Crashed,
             },

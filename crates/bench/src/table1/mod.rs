@@ -67,7 +67,7 @@ const SAME: f64 = 1e-6;
 
 /// One set around one mesh.
 #[derive(Clone, Debug)]
-struct Made {
+struct FitOutput {
     volume_m3: f64,
     /// Estimate of the error of the volume; 0 where it is a formula.
     error_m3: f64,
@@ -118,7 +118,7 @@ struct Subject {
 pub struct Table1 {
     machine: Machine,
     subjects: Vec<Subject>,
-    rows: Vec<(Row, Vec<Result<Made, String>>)>,
+    rows: Vec<(Row, Vec<Result<FitOutput, String>>)>,
 }
 
 /// How far a table is.
@@ -136,7 +136,7 @@ pub struct Table1Progress {
 /// leaves out what is above degree 4.
 ///
 /// Takes about five minutes on one core, half a minute if quick. A fit that fails is a cell that
-/// says so. `progress` hears of every cell and of every Newton step in between, and can stop it.
+/// says so. `progress` is told of every cell and of every Newton step in between, and can stop it.
 ///
 /// # Errors
 /// [`Table1Error`]: a mesh that cannot be read, or the callback's wish.
@@ -179,7 +179,7 @@ impl Table1 {
     pub(crate) fn read(csv: &str) -> Result<Self, CsvError> {
         let table = csv::Table::read(csv)?;
         let mut subjects: Vec<Subject> = Vec::new();
-        let mut rows: Vec<(Row, Vec<Result<Made, String>>)> = Vec::new();
+        let mut rows: Vec<(Row, Vec<Result<FitOutput, String>>)> = Vec::new();
         for line in table.rows() {
             let (set, mesh) = (line.text("set")?, line.text("mesh")?);
             let name = MESHES.iter().map(|(name, _)| *name).find(|name| *name == mesh);
@@ -192,7 +192,7 @@ impl Table1 {
             let row = row.ok_or_else(|| line.error(format!("no set is named '{set}'")))?;
             let made = line.maybe("volume_m3")?.ok_or_else(|| "refused".to_owned());
             let (error_m3, seconds) = (line.number("volume_error_m3")?, line.number("seconds")?);
-            let made = made.map(|volume_m3| Made { volume_m3, error_m3, seconds, set: None });
+            let made = made.map(|volume_m3| FitOutput { volume_m3, error_m3, seconds, set: None });
             match rows.last_mut().filter(|(known, _)| known.method == row.method) {
                 Some((_, cells)) => cells.push(made),
                 None => rows.push((row, vec![made])),
@@ -252,9 +252,10 @@ impl Subject {
         Ok(Self { name, mesh, hull_volume_m3: hull.volume })
     }
 
-    fn make(&self, method: Method, progress: &mut dyn FnMut() -> ControlFlow<()>) -> Result<Made, FitError> {
+    fn make(&self, method: Method, progress: &mut dyn FnMut() -> ControlFlow<()>) -> Result<FitOutput, FitError> {
         let start = Instant::now();
-        let exact = |volume_m3| Made { volume_m3, error_m3: 0.0, seconds: start.elapsed().as_secs_f64(), set: None };
+        let exact =
+            |volume_m3| FitOutput { volume_m3, error_m3: 0.0, seconds: start.elapsed().as_secs_f64(), set: None };
         let points = &self.mesh.points;
         Ok(match method {
             Method::Hull => exact(hull::convex_hull(points)?.volume),
@@ -265,12 +266,12 @@ impl Subject {
             }
             Method::Ball => {
                 let rung = ball(self.name, points)?;
-                Made::of(Set::Body(Box::new(rung.body)), rung.seconds)
+                FitOutput::of(Set::Body(Box::new(rung.body)), rung.seconds)
             }
             Method::Convex(objective, degree, refine) => {
                 let options = FitOptions { degree, objective, refine, ..FitOptions::default() };
                 let fit = fit(self.name, points, &options, &mut |_| progress())?;
-                Made::of(Set::Body(Box::new(fit.body)), fit.report.seconds)
+                FitOutput::of(Set::Body(Box::new(fit.body)), fit.report.seconds)
             }
             Method::InverseMoment(degree) => self.sos(degree, SosMethod::InverseMoment, progress)?,
             Method::Relaxed(c, objective, degree) => self.sos(degree, SosMethod::Relaxed { c, objective }, progress)?,
@@ -283,14 +284,14 @@ impl Subject {
         degree: usize,
         method: SosMethod,
         progress: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Result<Made, FitError> {
+    ) -> Result<FitOutput, FitError> {
         let options = SosOptions { degree, method, coordinates: Coordinates::Raw, input: String::new() };
         let fit = fit_sos(self.name, &self.mesh.points, &[], &options, &mut |_| progress())?;
-        Ok(Made::of(Set::Sos(Box::new(fit.body)), fit.report.seconds))
+        Ok(FitOutput::of(Set::Sos(Box::new(fit.body)), fit.report.seconds))
     }
 }
 
-impl Made {
+impl FitOutput {
     fn of(set: Set, seconds: f64) -> Self {
         let Volume { volume_m3, error_m3 } = set.volume();
         Self { volume_m3, error_m3, seconds, set: Some(set) }

@@ -3,7 +3,7 @@
 
 use super::pictures::PICTURES;
 use super::rows::{MESHES, Method};
-use super::{Made, Table1};
+use super::{FitOutput, Table1};
 use crate::blocks::block;
 use std::fmt::Write as _;
 use sublevel::draw::{ChartError, Group, Ink, Marker, Point, Scatter};
@@ -62,7 +62,7 @@ impl Table1 {
         let heads: Vec<String> = MESHES.iter().map(|(name, number)| format!("{name} ({number})")).collect();
         let _ = writeln!(text, "| set | {} | median s |\n|---{}|---|", heads.join(" | "), "|---".repeat(heads.len()));
         for (row, cells) in &self.rows {
-            let cell = |(k, made): (usize, &Result<Made, String>)| {
+            let cell = |(k, made): (usize, &Result<FitOutput, String>)| {
                 let printed = row.printed.map(|printed| printed[k]);
                 match (made, printed) {
                     (Ok(made), Some(printed)) => {
@@ -123,8 +123,9 @@ impl Table1 {
             if made.len() < self.subjects.len() {
                 continue;
             }
-            let mean =
-                |f: &dyn Fn(&Made) -> f64| (made.iter().map(|(m, _)| f(m).ln()).sum::<f64>() / made.len() as f64).exp();
+            let mean = |f: &dyn Fn(&FitOutput) -> f64| {
+                (made.iter().map(|(m, _)| f(m).ln()).sum::<f64>() / made.len() as f64).exp()
+            };
             let hull = (made.iter().map(|(_, s)| s.hull_volume_m3.ln()).sum::<f64>() / made.len() as f64).exp();
             let name = row.method.degree().map_or(String::new(), |degree| degree.to_string());
             let point = Point { x: mean(&|m| m.seconds), y: mean(&|m| m.volume_m3) / hull, label: name };

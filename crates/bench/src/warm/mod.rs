@@ -7,7 +7,7 @@ mod steps;
 mod sweep;
 
 use super::Machine;
-use super::duel::{Coal, DuelError, Shelf, pairs};
+use super::comparison::{Coal, ComparisonError, FitCache, pairs};
 pub(crate) use shown::Shown;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -46,18 +46,18 @@ pub struct Warm {
 }
 
 /// Measures time and iterations against step size on two pairs of the meshes in `data`, or on one
-/// if `quick`, and the chair on its way past the human. Fits are kept on the `shelf`; coal takes
-/// part where `SUBLEVEL_COAL` names the program that times it. `progress` hears what is going on
+/// if `quick`, and the chair on its way past the human. Fits are kept in the `cache`; coal takes
+/// part where `SUBLEVEL_COAL` names the program that times it. `progress` is told what is going on
 /// and can stop it.
 ///
 /// # Errors
-/// [`DuelError`].
+/// [`ComparisonError`].
 pub fn warm(
     data: &Path,
-    shelf: &Shelf,
+    cache: &FitCache,
     quick: bool,
     progress: &mut dyn FnMut(&str) -> ControlFlow<()>,
-) -> Result<Warm, DuelError> {
+) -> Result<Warm, ComparisonError> {
     let effort = if quick {
         Effort { trajectories: 2, poses: 100, passes: 3, positions: 61 }
     } else {
@@ -65,19 +65,19 @@ pub fn warm(
     };
     let (degrees, sizes) = if quick { (&QUICK_DEGREES[..], &QUICK_STEPS[..]) } else { (&DEGREES[..], &STEPS[..]) };
     let coal = Coal::from_environment()?;
-    let mut announce = |at: &str| if progress(at).is_break() { Err(DuelError::Cancelled) } else { Ok(()) };
+    let mut announce = |at: &str| if progress(at).is_break() { Err(ComparisonError::Cancelled) } else { Ok(()) };
     let mut pairs = pairs(data, true)?;
     if quick {
         pairs.truncate(1);
     }
     let mut measured = Vec::new();
     for [a, b] in &pairs {
-        measured.push(steps([a, b], (degrees, sizes), &effort, shelf, coal.as_ref(), &mut announce)?);
+        measured.push(steps([a, b], (degrees, sizes), &effort, cache, coal.as_ref(), &mut announce)?);
     }
     announce("the chair passes the human")?;
     let [chair, human] = &pairs[0];
     let options = FitOptions { degree: 6, ..FitOptions::default() };
-    let bodies = (shelf.body(chair.name, &chair.mesh, &options)?, shelf.body(human.name, &human.mesh, &options)?);
+    let bodies = (cache.body(chair.name, &chair.mesh, &options)?, cache.body(human.name, &human.mesh, &options)?);
     let passage = passage((&bodies.0, &bodies.1), effort.positions, effort.passes)?;
     let coal = coal.as_ref().map(Coal::version);
     Ok(Warm { machine: Machine::this(), coal, quick, passes: effort.passes, steps: measured, passage })

@@ -3,7 +3,7 @@
 use super::Warm;
 use super::steps::{Cell, Steps};
 use crate::blocks::block;
-use crate::duel::parry_version;
+use crate::comparison::parry_version;
 use std::fmt::Write;
 
 impl Warm {

@@ -3,8 +3,8 @@
 use super::Passage;
 use super::steps::{Cell, Steps, Who};
 use super::sweep::Stop;
+use crate::comparison::sweep::median;
 use crate::csv::{CsvError, Row, Table};
-use crate::duel::sweep::median;
 use crate::words::Span;
 use std::fmt::Write;
 use sublevel::draw::{ChartError, Group, Ink, LineChart, Mark, Marker, Point, Scatter, Series, stacked};

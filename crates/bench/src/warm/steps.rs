@@ -1,8 +1,8 @@
 //! Time and iterations against how far the pose before is away.
 
 use super::Effort;
-use crate::duel::sweep::{Answer, Row};
-use crate::duel::{Coal, DuelError, Hulls, Shelf, Subject, motion, parry_pose};
+use crate::comparison::sweep::{Answer, Row};
+use crate::comparison::{Coal, ComparisonError, FitCache, Hulls, Subject, motion, parry_pose};
 use sublevel::body::Body;
 use sublevel::fit::FitOptions;
 use sublevel::measure::{Distance, Options, Pose, WarmStart, distance};
@@ -50,17 +50,17 @@ pub(super) fn steps(
     [a, b]: [&Subject; 2],
     (degrees, sizes): (&[usize], &[Option<f64>]),
     effort: &Effort,
-    shelf: &Shelf,
+    cache: &FitCache,
     coal: Option<&Coal>,
-    announce: &mut dyn FnMut(&str) -> Result<(), DuelError>,
-) -> Result<Steps, DuelError> {
+    announce: &mut dyn FnMut(&str) -> Result<(), ComparisonError>,
+) -> Result<Steps, ComparisonError> {
     let pair = format!("{}-{}", a.name, b.name);
     let unit_m = 0.5 * a.diameter_m.max(b.diameter_m);
     let mut bodies = Vec::new();
     for &degree in degrees {
         announce(&format!("{pair}: degree {degree}"))?;
         let options = FitOptions { degree, ..FitOptions::default() };
-        bodies.push((degree, shelf.body(a.name, &a.mesh, &options)?, shelf.body(b.name, &b.mesh, &options)?));
+        bodies.push((degree, cache.body(a.name, &a.mesh, &options)?, cache.body(b.name, &b.mesh, &options)?));
     }
     let hulls = Hulls::new(&a.hull, &b.hull)?;
     let mut cells = Vec::new();
@@ -78,7 +78,7 @@ pub(super) fn steps(
         ];
         rows.push((Who::Parry, parry));
         let name = format!("warm-{pair}-{}", step.map_or("teleport".to_owned(), |step| format!("{step:e}")));
-        let mut run = coal.map(|coal| coal.start(shelf.folder(), &name, [&a.hull, &b.hull], &poses)).transpose()?;
+        let mut run = coal.map(|coal| coal.start(cache.folder(), &name, [&a.hull, &b.hull], &poses)).transpose()?;
         for _ in 0..effort.passes {
             if let Some(run) = &mut run {
                 run.pass()?;
@@ -99,7 +99,7 @@ pub(super) fn steps(
                 contradictions: body.map_or(0, |(_, a, b)| contradictions(a, b, &poses)),
             });
         }
-        if let Some((cold, warm)) = run.as_ref().map(crate::duel::CoalRun::times) {
+        if let Some((cold, warm)) = run.as_ref().map(crate::comparison::CoalRun::times) {
             let none = (None, None, 0, 0);
             let (cold_iterations, warm_iterations, failed, contradictions) = none;
             cells.push(Cell {

@@ -1,6 +1,6 @@
 //! The paper's experiment: the chair moves past the human, through the place where it stands.
 
-use crate::duel::sweep::median;
+use crate::comparison::sweep::median;
 use nalgebra::Vector3;
 use std::hint::black_box;
 use std::time::Instant;

@@ -3,7 +3,7 @@
 use super::super::case::{CaseError, Verdict};
 use super::super::method::Method;
 use super::random;
-use crate::duel::Random;
+use crate::comparison::Random;
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 use sublevel::body::Body;

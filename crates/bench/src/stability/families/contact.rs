@@ -1,10 +1,10 @@
 //! Touching, flat and nearly touching bodies: 1, 3, 8, 13, 14, 15.
 
 use super::super::case::{Case, CaseError, Verdict};
-use super::super::method::{Method, Said, pose};
+use super::super::method::{Answer, Method, pose};
 use super::super::zoo::{c, e, p, q};
 use super::derivatives::both_sides;
-use super::{at, moved_to, random, somewhere, strewn};
+use super::{at, moved_to, permuted_index, random, somewhere};
 use nalgebra::{UnitQuaternion, Vector3};
 use sublevel::body::Body;
 use sublevel::measure::{DEFAULT_ACCURACY, Pose, Status};
@@ -23,7 +23,7 @@ const RUNS: u64 = 10;
 pub(super) fn kissing(seed: u64) -> Result<Vec<Case>, CaseError> {
     let mut random = random(1, seed);
     let all = 12 * RUNS;
-    let index = strewn(seed, all);
+    let index = permuted_index(seed, all);
     let (axis, first) = ((index / 4 % 3) as usize, (index / 12) as usize * (RUN - 1));
     let ball = [0.5; 3];
     // Beyond the first round of all settings with other sizes.
@@ -53,9 +53,9 @@ pub(super) fn kissing(seed: u64) -> Result<Vec<Case>, CaseError> {
 }
 
 /// From gap to gap no value falls, and no normal leaves the axis.
-pub(super) fn rising(heard: &[(Case, Said)], method: Method) -> Result<Verdict, CaseError> {
+pub(super) fn rising(answers: &[(Case, Answer)], method: Method) -> Result<Verdict, CaseError> {
     let mut last = f64::NEG_INFINITY;
-    for (case, said) in heard {
+    for (case, said) in answers {
         let Some(value) = said.value else { return Ok(Verdict::NoAnswer) };
         let offset = case.pose_b.translation();
         let slack = if method.is_ours() { 4.0 * f64::EPSILON * offset.norm() } else { 2.0 * case.slack(method) };
@@ -81,7 +81,7 @@ pub(super) fn rising(heard: &[(Case, Said)], method: Method) -> Result<Verdict, 
 
 /// Faces of degree 8, gap 1e-3 to 1e-12, tilt 1e-9 to 1e-3 rad.
 pub(super) fn parallel_faces(seed: u64) -> Result<Case, CaseError> {
-    let seed = strewn(seed, 80);
+    let seed = permuted_index(seed, 80);
     let (a, b) = (q(8, 1.0, 1.0, 0.5)?, q(8, 0.75, 1.25, 0.5)?);
     let gap = 10_f64.powi(-3 - (seed % 10) as i32);
     let tilt = match seed / 10 % 8 {
@@ -127,7 +127,7 @@ pub(super) fn normal(seed: u64, method: Method) -> Result<Option<Verdict>, CaseE
 
 /// Flats of degree 8 a tenth apart: the error falls to the stated floor, beyond it the status says.
 pub(super) fn tight(seed: u64) -> Result<Case, CaseError> {
-    let seed = strewn(seed, 189);
+    let seed = permuted_index(seed, 189);
     let (a, b) = match seed % 3 {
         0 => (q(8, 1.0, 1.0, 0.5)?, q(8, 0.75, 1.25, 0.5)?),
         1 => (q(8, 1.0, 1.0, 0.5)?, p(8, 0.5)?),
@@ -147,7 +147,7 @@ pub(super) fn tight(seed: u64) -> Result<Case, CaseError> {
 
 /// Where Newton's method converges linearly: a tip of degree 8 against a flat of degree 8.
 pub(super) fn tips(seed: u64) -> Result<Case, CaseError> {
-    let seed = strewn(seed, 192);
+    let seed = permuted_index(seed, 192);
     let mut random = random(14, seed);
     let tip = match seed % 4 {
         0 => q(8, 0.1, 0.1, 1.0)?,
@@ -202,8 +202,8 @@ const SMOOTH: f64 = 1e-10;
 const GRAZE: f64 = 2e-3;
 
 /// The same of the depth: signed distances say it on both sides.
-pub(super) fn deep(heard: &[(Case, Said)], method: Method) -> Result<Verdict, CaseError> {
-    let [(case, said)] = heard else { return Ok(Verdict::Pass) };
+pub(super) fn deep(answers: &[(Case, Answer)], method: Method) -> Result<Verdict, CaseError> {
+    let [(case, said)] = answers else { return Ok(Verdict::Pass) };
     if !matches!(method, Method::Cold | Method::Warm) {
         return Ok(Verdict::Pass);
     }

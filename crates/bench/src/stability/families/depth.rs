@@ -4,7 +4,7 @@ use super::super::case::{Case, CaseError, Verdict};
 use super::super::method::{Method, pose, sampled};
 use super::super::zoo::{b, c, cylinder, e, q, zoo};
 use super::{any, random, somewhere};
-use crate::duel::{Hulls, parry_pose};
+use crate::comparison::{Hulls, parry_pose};
 use nalgebra::Vector3;
 use sublevel::measure::{
     Options, Pose, SignedDistance, Status, WarmStart, growth_distance, level_distance, signed_distance,

@@ -4,7 +4,7 @@ use super::super::case::{Case, CaseError, Verdict};
 use super::super::method::{Method, pose};
 use super::super::zoo::{q, zoo};
 use super::{any, random, shifted, somewhere};
-use crate::duel::Random;
+use crate::comparison::Random;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 use sublevel::body::Body;

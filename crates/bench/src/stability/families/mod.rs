@@ -12,8 +12,8 @@ mod scale;
 mod ties;
 
 use super::case::{Case, CaseError, Verdict};
-use super::method::{Method, Said, pose};
-use crate::duel::Random;
+use super::method::{Answer, Method, pose};
+use crate::comparison::Random;
 use nalgebra::{UnitQuaternion, Vector3};
 use sublevel::body::Body;
 use sublevel::measure::Pose;
@@ -38,7 +38,7 @@ pub(super) enum Put {
 }
 
 /// Judges answers that passed each for itself, a case and what was said of it at a time.
-type Together = fn(&[(Case, Said)], Method) -> Result<Verdict, CaseError>;
+type Together = fn(&[(Case, Answer)], Method) -> Result<Verdict, CaseError>;
 
 /// All rows, in the order of the catalogue.
 pub(super) const FAMILIES: [Family; 24] = [
@@ -104,20 +104,20 @@ impl Family {
 
 /// Each for itself, then all together; the first failure counts.
 fn put_together(cases: Vec<Case>, together: Together, method: Method) -> Result<Option<Verdict>, CaseError> {
-    let mut heard = Vec::new();
+    let mut answers = Vec::new();
     for case in cases {
-        let Some(said) = case.hear(method)? else { return Ok(None) };
+        let Some(said) = case.run(method)? else { return Ok(None) };
         if said.verdict != Verdict::Pass {
             return Ok(Some(said.verdict));
         }
-        heard.push((case, said));
+        answers.push((case, said));
     }
-    together(&heard, method).map(Some)
+    together(&answers, method).map(Some)
 }
 
-/// The case of a seed, of so many that go through all settings: those of the first seeds are strewn
-/// over all of them.
-fn strewn(seed: u64, cases: u64) -> u64 {
+/// The index of a seed's case among so many that go through all settings, permuted so that the
+/// first seeds meet all settings.
+fn permuted_index(seed: u64, cases: u64) -> u64 {
     // Prime, and no factor of the numbers of cases.
     seed % cases * 61 % cases
 }

@@ -4,7 +4,7 @@ use super::super::case::{CaseError, Verdict};
 use super::super::method::{Method, pose};
 use super::super::zoo::{b, c, cylinder, e, q};
 use super::random;
-use crate::duel::{Flight, Random, parry_impact};
+use crate::comparison::{Flight, Random, parry_impact};
 use nalgebra::Vector3;
 use sublevel::body::Body;
 use sublevel::measure::{

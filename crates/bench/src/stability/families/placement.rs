@@ -2,10 +2,10 @@
 
 use super::super::arbiter::judge_along;
 use super::super::case::{Case, CaseError, Verdict};
-use super::super::method::{Method, Said, pose, proposal};
+use super::super::method::{Answer, Method, pose, proposal};
 use super::super::zoo::{b, c, cylinder, e, q, zoo};
-use super::{any, at, random, shifted, somewhere, strewn};
-use crate::duel::Random;
+use super::{any, at, permuted_index, random, shifted, somewhere};
+use crate::comparison::Random;
 use nalgebra::{UnitQuaternion, Vector3};
 use sublevel::body::Body;
 use sublevel::measure::{
@@ -105,7 +105,7 @@ pub(super) fn common_point(seed: u64) -> Result<Case, CaseError> {
 /// Identical bodies with integer coordinates: the distance is what the offset exceeds twice the
 /// half-axis by.
 pub(super) fn along_an_axis(seed: u64) -> Result<Case, CaseError> {
-    let seed = strewn(seed, 336);
+    let seed = permuted_index(seed, 336);
     let (body, halves) = match seed % 8 {
         0 => (e(1.0, 1.0, 1.0)?, [1.0, 1.0, 1.0]),
         1 => (e(2.0, 1.0, 3.0)?, [2.0, 1.0, 3.0]),
@@ -144,8 +144,8 @@ const CENTRED: f64 = 1e-5;
 /// All measures of bodies in each other have values, and say what is not unique: the normal of a
 /// distance, the way out of mirror images, the normal of centres that coincide, and a level that is
 /// the least there is.
-pub(super) fn defined(heard: &[(Case, Said)], method: Method) -> Result<Verdict, CaseError> {
-    let [(case, said)] = heard else { return Ok(Verdict::Pass) };
+pub(super) fn defined(answers: &[(Case, Answer)], method: Method) -> Result<Verdict, CaseError> {
+    let [(case, said)] = answers else { return Ok(Verdict::Pass) };
     let Some(answer) = &said.answer else { return Ok(Verdict::Pass) };
     let Case { a, pose_a, b, pose_b, .. } = case;
     let wrong = |what: String| Ok(Verdict::WrongStatus(what));
@@ -221,8 +221,8 @@ const NORMAL: f64 = 1e-3;
 
 /// The same values; of ours also the same normals, the other way round or carried along, where the
 /// gap is wide enough to tell.
-pub(super) fn unswapped(heard: &[(Case, Said)], method: Method) -> Result<Verdict, CaseError> {
-    let [(first, one), rest @ ..] = heard else { return Ok(Verdict::Pass) };
+pub(super) fn unswapped(answers: &[(Case, Answer)], method: Method) -> Result<Verdict, CaseError> {
+    let [(first, one), rest @ ..] = answers else { return Ok(Verdict::Pass) };
     let Some(value) = one.value else { return Ok(Verdict::NoAnswer) };
     let sum = first.small() + first.large();
     for (k, (case, said)) in rest.iter().enumerate() {
@@ -232,7 +232,7 @@ pub(super) fn unswapped(heard: &[(Case, Said)], method: Method) -> Result<Verdic
         if !(off <= 2.0 * first.slack(method)) {
             return Ok(Verdict::Off(off / first.small()));
         }
-        let normal = |said: &Said| said.answer.and_then(|answer| answer.normal);
+        let normal = |said: &Answer| said.answer.and_then(|answer| answer.normal);
         let (Some(n), Some(m)) = (normal(one), normal(said)) else { continue };
         let turn = case.pose_a.rotation() * first.pose_a.rotation().inverse();
         let back = if k == 0 { -m } else { turn.inverse_transform_vector(&m) };

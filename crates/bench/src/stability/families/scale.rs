@@ -1,10 +1,10 @@
 //! Sizes and units: 9, 10, 11, 12.
 
 use super::super::case::{Case, CaseError, Verdict};
-use super::super::method::{Method, Said, pose};
+use super::super::method::{Answer, Method, pose};
 use super::super::zoo::{ZooError, b, c, e, p, q};
 use super::{moved_to, random, shifted, somewhere};
-use crate::duel::Random;
+use crate::comparison::Random;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::FRAC_PI_2;
 use sublevel::body::Body;
@@ -50,8 +50,8 @@ pub(super) fn far_from_the_origin(seed: u64) -> Result<Vec<Case>, CaseError> {
 }
 
 /// The same value but for what the coordinates lose.
-pub(super) fn unmoved(heard: &[(Case, Said)], method: Method) -> Result<Verdict, CaseError> {
-    let [(case, near), (there, far)] = heard else { return Ok(Verdict::Pass) };
+pub(super) fn unmoved(answers: &[(Case, Answer)], method: Method) -> Result<Verdict, CaseError> {
+    let [(case, near), (there, far)] = answers else { return Ok(Verdict::Pass) };
     let (Some(one), Some(other)) = (near.value, far.value) else { return Ok(Verdict::NoAnswer) };
     let lost = 4.0 * f64::EPSILON * there.pose_a.translation().norm();
     let slack = if method.is_ours() { case.slack(method) } else { 2.0 * case.slack(method) };
@@ -87,8 +87,8 @@ pub(super) fn units(seed: u64) -> Result<Vec<Case>, CaseError> {
 
 /// The same in other units: of ours, bit for bit with as many iterations where nothing rounds,
 /// elsewhere within the brackets.
-pub(super) fn unscaled(heard: &[(Case, Said)], method: Method) -> Result<Verdict, CaseError> {
-    let [(case, one), (scaled, other)] = heard else { return Ok(Verdict::Pass) };
+pub(super) fn unscaled(answers: &[(Case, Answer)], method: Method) -> Result<Verdict, CaseError> {
+    let [(case, one), (scaled, other)] = answers else { return Ok(Verdict::Pass) };
     let (Some(value), Some(found)) = (one.value, other.value) else { return Ok(Verdict::NoAnswer) };
     // Exactly, where it is a power of two.
     let s = scaled.pose_b.translation().x / case.pose_b.translation().x;

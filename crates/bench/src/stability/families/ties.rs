@@ -4,7 +4,7 @@ use super::super::case::{CaseError, Verdict};
 use super::super::method::{Method, pose};
 use super::super::zoo::{b, e, q};
 use super::random;
-use crate::duel::Random;
+use crate::comparison::Random;
 use nalgebra::{UnitQuaternion, Vector3};
 use sublevel::body::{Body, Compound};
 use sublevel::measure::{Options, Pose, WarmStart, distance, signed_distance};

@@ -13,13 +13,13 @@ const REVISION: u32 = 1;
 
 /// A folder of kept fits.
 #[derive(Clone, Debug)]
-pub struct Shelf {
+pub struct FitCache {
     folder: PathBuf,
 }
 
 /// Why a fit is not to be had.
 #[derive(Debug, thiserror::Error)]
-pub enum ShelfError {
+pub enum FitCacheError {
     /// The folder cannot be used.
     #[error("{}: {source}; choose another folder to keep fits in", path.display())]
     Io {
@@ -41,15 +41,15 @@ pub enum ShelfError {
     },
 }
 
-impl Shelf {
+impl FitCache {
     /// Keeps fits in this folder, which is made if it is not there.
     ///
     /// # Errors
-    /// [`ShelfError::Io`].
-    pub fn new(folder: &Path) -> Result<Self, ShelfError> {
-        let shelf = Self { folder: folder.to_owned() };
-        fs::create_dir_all(folder).map_err(|source| shelf.failed(folder, source))?;
-        Ok(shelf)
+    /// [`FitCacheError::Io`].
+    pub fn new(folder: &Path) -> Result<Self, FitCacheError> {
+        let cache = Self { folder: folder.to_owned() };
+        fs::create_dir_all(folder).map_err(|source| cache.failed(folder, source))?;
+        Ok(cache)
     }
 
     /// The folder.
@@ -61,19 +61,19 @@ impl Shelf {
     /// any file is; else what `make` makes. `what` is its name for people, such as "chair-d6".
     ///
     /// # Errors
-    /// [`ShelfError`].
+    /// [`FitCacheError`].
     pub fn take(
         &self,
         what: &str,
         mesh: &Mesh,
         options: &str,
         make: impl FnOnce() -> Result<Shape, FitError>,
-    ) -> Result<Shape, ShelfError> {
+    ) -> Result<Shape, FitCacheError> {
         let path = self.folder.join(format!("{what}-{}.json", key(mesh, options)));
         if let Some(kept) = fs::read_to_string(&path).ok().and_then(|text| Shape::from_json(&text).ok()) {
             return Ok(kept);
         }
-        let made = make().map_err(|source| ShelfError::Fit { name: what.to_owned(), source })?;
+        let made = make().map_err(|source| FitCacheError::Fit { name: what.to_owned(), source })?;
         let text = match &made {
             Shape::Body(body) => body.to_json(),
             Shape::Compound(compound) => compound.to_json(),
@@ -90,8 +90,8 @@ impl Shelf {
     /// of its options.
     ///
     /// # Errors
-    /// [`ShelfError`].
-    pub fn body(&self, name: &str, mesh: &Mesh, options: &FitOptions) -> Result<Body, ShelfError> {
+    /// [`FitCacheError`].
+    pub fn body(&self, name: &str, mesh: &Mesh, options: &FitOptions) -> Result<Body, FitCacheError> {
         let FitOptions { degree, refine, slabs, .. } = options;
         let mut what = format!("{name}-d{degree}{}", if *refine { "-refined" } else { "" });
         if *slabs > 0 {
@@ -104,12 +104,12 @@ impl Shelf {
         })?;
         match made {
             Shape::Body(body) => Ok(*body),
-            Shape::Compound(_) => Err(ShelfError::Kind(what)),
+            Shape::Compound(_) => Err(FitCacheError::Kind(what)),
         }
     }
 
-    fn failed(&self, path: &Path, source: std::io::Error) -> ShelfError {
-        ShelfError::Io { path: path.to_owned(), source }
+    fn failed(&self, path: &Path, source: std::io::Error) -> FitCacheError {
+        FitCacheError::Io { path: path.to_owned(), source }
     }
 }
 
@@ -135,7 +135,7 @@ mod tests {
     #[test]
     fn a_fit_is_kept_for_its_input_only() {
         let folder = tempfile::tempdir().expect("a folder can be made");
-        let shelf = Shelf::new(folder.path()).unwrap();
+        let cache = FitCache::new(folder.path()).unwrap();
         let mesh = |x: f64| Mesh { points: vec![Vector3::repeat(x)], triangles: vec![] };
         let ball = |radius: f64| {
             move || Ok(Shape::Body(Box::new(Body::ball("ball", Vector3::zeros(), radius).expect("a radius"))))
@@ -144,7 +144,7 @@ mod tests {
             Shape::Body(body) => body.circumscribed().radius.round(),
             Shape::Compound(_) => f64::NAN,
         };
-        let take = |x: f64, options: &str, r: f64| radius(&shelf.take("ball", &mesh(x), options, ball(r)).unwrap());
+        let take = |x: f64, options: &str, r: f64| radius(&cache.take("ball", &mesh(x), options, ball(r)).unwrap());
         assert_eq!(take(0.0, "a", 1.0), 1.0);
         assert_eq!(take(0.0, "a", 2.0), 1.0, "kept");
         assert_eq!(take(0.5, "a", 3.0), 3.0, "other points");

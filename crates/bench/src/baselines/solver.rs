@@ -2,7 +2,7 @@
 //! and this program needs none.
 
 use super::level0::ConicProgram;
-use crate::duel::peer::{PeerError, named, printed};
+use crate::comparison::peer::{PeerError, named, printed};
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,25 +1,25 @@
-//! Duels: representations of the same objects walk the same poses and are timed in turns, ours and
+//! Comparisons: representations of the same objects walk the same poses and are timed in turns, ours and
 //! those of other libraries.
 //!
 //! Figures and `cargo bench -p sublevel-bench --bench measures` share this: motions ([`motion`]),
 //! timed rows ([`sweep`]), the peers ([`Hulls`] of parry in this process, [`Coal`] in one of its
-//! own), and fits that are kept between runs ([`Shelf`]).
+//! own), and fits that are kept between runs ([`FitCache`]).
 
 mod coal;
 mod error;
+mod fit_cache;
 pub mod motion;
 mod parry;
 pub(crate) mod peer;
 mod random;
-mod shelf;
 mod subject;
 pub mod sweep;
 
 pub(crate) use coal::points_text;
 pub use coal::{Coal, CoalRun};
-pub use error::DuelError;
+pub use error::ComparisonError;
+pub use fit_cache::{FitCache, FitCacheError};
 pub use parry::{Flight, Hulls, NoHull, parry_impact, parry_pose, parry_version};
 pub use peer::PeerError;
 pub use random::Random;
-pub use shelf::{Shelf, ShelfError};
 pub use subject::{Subject, pairs};

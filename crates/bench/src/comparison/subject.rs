@@ -1,6 +1,6 @@
 //! The objects and the pairs of them.
 
-use super::DuelError;
+use super::ComparisonError;
 use nalgebra::Vector3;
 use std::path::Path;
 use sublevel::fit::{Mesh, ReadOptions, hull::convex_hull, read_mesh};
@@ -51,8 +51,8 @@ pub struct Subject {
 /// The pairs of the figures, or the first two.
 ///
 /// # Errors
-/// [`DuelError::Mesh`] or [`DuelError::Hull`].
-pub fn pairs(data: &Path, quick: bool) -> Result<Vec<[Subject; 2]>, DuelError> {
+/// [`ComparisonError::Mesh`] or [`ComparisonError::Hull`].
+pub fn pairs(data: &Path, quick: bool) -> Result<Vec<[Subject; 2]>, ComparisonError> {
     let pairs = if quick { &PAIRS[..QUICK_PAIRS] } else { &PAIRS[..] };
     pairs.iter().map(|(a, b)| Ok([Subject::read(a, data)?, Subject::read(b, data)?])).collect()
 }
@@ -61,11 +61,11 @@ impl Subject {
     /// Reads it from the folder with the data.
     ///
     /// # Errors
-    /// [`DuelError::Mesh`] or [`DuelError::Hull`].
-    pub fn read(name: &'static str, data: &Path) -> Result<Self, DuelError> {
+    /// [`ComparisonError::Mesh`] or [`ComparisonError::Hull`].
+    pub fn read(name: &'static str, data: &Path) -> Result<Self, ComparisonError> {
         let file = FILES.iter().find(|(known, _)| *known == name).map_or(name, |(_, file)| file);
         let mesh = read_mesh(&data.join(file), &ReadOptions::default())?.mesh;
-        let hull = convex_hull(&mesh.points).map_err(|source| DuelError::Hull { mesh: name, source })?;
+        let hull = convex_hull(&mesh.points).map_err(|source| ComparisonError::Hull { mesh: name, source })?;
         let hull: Vec<Vector3<f64>> = hull.vertices.iter().map(|&i| mesh.points[i]).collect();
         let apart = |a: &Vector3<f64>| hull.iter().map(|b| (b - a).norm_squared()).fold(0.0, f64::max);
         let diameter_m = hull.iter().map(apart).fold(0.0, f64::max).sqrt();

@@ -1,13 +1,13 @@
 //! Why a figure cannot be made.
 
-use super::{NoHull, PeerError, ShelfError};
+use super::{FitCacheError, NoHull, PeerError};
 use sublevel::draw::ChartError;
 use sublevel::fit::{ReadError, hull::HullError};
 use sublevel::measure::{OptionsError, PoseError};
 
 /// Why there is no figure.
 #[derive(Debug, thiserror::Error)]
-pub enum DuelError {
+pub enum ComparisonError {
     /// A mesh cannot be read.
     #[error("{0}; name the folder that has psb/101.off and meshes/mbm_mug.off with --data")]
     Mesh(#[from] ReadError),
@@ -31,7 +31,7 @@ pub enum DuelError {
     },
     /// Fits cannot be made or kept.
     #[error(transparent)]
-    Shelf(#[from] ShelfError),
+    FitCache(#[from] FitCacheError),
     /// Parry makes no mesh of it.
     #[error("{mesh}: parry makes no mesh of it: {what}")]
     ParryMesh {
@@ -46,7 +46,7 @@ pub enum DuelError {
     /// Coal or clarabel cannot be timed.
     #[error(transparent)]
     Peer(#[from] PeerError),
-    /// A child cannot be started or heard.
+    /// A child cannot be started or read.
     #[error("{}: {source}", program.display())]
     Child {
         /// The program.
