@@ -558,7 +558,8 @@ fn sets_that_need_not_be_convex_are_told_from_bodies_everywhere() {
         std::fs::write(&path, value.to_string()).unwrap();
         path
     };
-    // A triangle across the hole; with c |u|^4 there is none, as that has no curvature where u is 0.
+    // A triangle across the hole; with c |u|^4 there is none, as that has no curvature where u is
+    // 0.
     let bridged = folder.path().join("bridged.off");
     std::fs::write(&bridged, ring().replacen("936", "937", 1) + "3 0 160 320\n").unwrap();
     let free = folder.path().join("ring-d4-cinf.json");

@@ -30,8 +30,8 @@ impl Machine {
             cpu: cpu(),
             cores: std::thread::available_parallelism().map_or(0, usize::from),
             simd: widest(),
-            commit: said("git", &["describe", "--always", "--dirty", "--tags"]),
-            rustc: said("rustc", &["--version"]),
+            commit: printed_by("git", &["describe", "--always", "--dirty", "--tags"]),
+            rustc: printed_by("rustc", &["--version"]),
             date: date(SystemTime::now()),
         }
     }
@@ -71,7 +71,7 @@ pub(super) fn locked(package: &str) -> String {
 }
 
 /// First line a program prints, or "unknown".
-fn said(program: &str, arguments: &[&str]) -> String {
+fn printed_by(program: &str, arguments: &[&str]) -> String {
     let output = Command::new(program).args(arguments).current_dir(env!("CARGO_MANIFEST_DIR")).output();
     let line = output.ok().filter(|output| output.status.success()).and_then(|output| {
         let text = String::from_utf8(output.stdout).ok()?;

@@ -6,13 +6,6 @@ use sublevel_core::body::Body;
 use sublevel_core::measure::{Distance, Options, Pose, Status, WarmStart, distance, level_distance};
 use sublevel_testkit::Seeded;
 
-/// A rotation and a translation of the given length.
-fn random_pose(random: &mut Seeded, length: f64) -> Pose {
-    let direction = Vector3::from_fn(|_, _| random.signed()).normalize();
-    let q = nalgebra::Vector4::from_fn(|_, _| random.signed()).normalize();
-    Pose::from_quaternion(direction * length, q.into()).unwrap()
-}
-
 /// Chair and human at degrees 2, 4 and 6.
 fn fitted() -> Vec<(&'static Body, &'static Body)> {
     sublevel_testkit::bodies::fitted().as_chunks().0.iter().map(|[chair, human]| (chair, human)).collect()
@@ -48,7 +41,7 @@ fn two_hundred_random_poses_of_fitted_bodies() {
         let (chair, human) = fitted()[(seed % 3) as usize];
         let size = chair.circumscribed().radius.max(human.circumscribed().radius);
         let far = size * (1.2 + 1.1 * random.signed());
-        let (pose_a, pose_b) = (random_pose(&mut random, 0.3), random_pose(&mut random, far));
+        let (pose_a, pose_b) = (random.pose(0.3), random.pose(far));
         let answer = distance(chair, &pose_a, human, &pose_b, &Options::default(), &mut WarmStart::default());
         let label = format!("seed {seed}: {answer:?}");
         assert_eq!(answer.status, Status::Converged, "{label}");
@@ -92,7 +85,7 @@ fn a_box_against_a_fitted_chair() {
         let mut random = Seeded(1000 + seed);
         let other = if seed % 2 == 0 { &crate_ } else { &can };
         let size = chair.circumscribed().radius;
-        let (pose_a, pose_b) = (random_pose(&mut random, 0.1), random_pose(&mut random, size * 1.5));
+        let (pose_a, pose_b) = (random.pose(0.1), random.pose(size * 1.5));
         let answer = distance(other, &pose_a, chair, &pose_b, &Options::default(), &mut WarmStart::default());
         let label = format!("seed {seed}: {answer:?}");
         assert_eq!(answer.status, Status::Converged, "{label}");
@@ -120,7 +113,7 @@ fn a_solve_allocates_nothing() {
     for seed in 0..30 {
         let mut random = Seeded(2000 + seed);
         let other = if seed % 2 == 0 { human } else { &crate_ };
-        let (pose_a, pose_b) = (random_pose(&mut random, 0.0), random_pose(&mut random, 0.4 + 0.1 * seed as f64));
+        let (pose_a, pose_b) = (random.pose(0.0), random.pose(0.4 + 0.1 * seed as f64));
         let (mut warm, mut warm_level) = (WarmStart::default(), WarmStart::default());
         let counted = allocation_counter::measure(|| {
             for _ in 0..2 {

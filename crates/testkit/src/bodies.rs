@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use std::collections::BTreeMap;
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock};
 use sublevel_core::body::{Body, Constraint, Normalization};
 use sublevel_core::measure::Pose;
 use sublevel_core::polynomial::{Exponents, HessianGram, HessianMonomial, Polynomial, degree_of, monomials};
@@ -22,6 +22,13 @@ pub fn q(degree: u8, x: f64, y: f64, z: f64) -> Body {
 
 /// C2k: `((x² + y²)/r²)^k + (z/h)^2k <= 1`, degree 2k.
 pub fn c(degree: u8, radius: f64, half_height: f64) -> Body {
+    let constraint = known(&format!("C{degree}"), || rounded_cylinder(degree));
+    let linear = Matrix3::from_diagonal(&Vector3::new(1.0 / radius, 1.0 / radius, 1.0 / half_height));
+    Body::new(&format!("C{degree}"), Normalization { center: Vector3::zeros(), linear }, vec![constraint]).unwrap()
+}
+
+/// The constraint of C2k of unit sizes.
+fn rounded_cylinder(degree: u8) -> Constraint {
     let half = usize::from(degree / 2);
     let mut terms = Vec::new();
     for i in 0..=half {
@@ -55,14 +62,19 @@ pub fn c(degree: u8, radius: f64, half_height: f64) -> Body {
         let factor = 4.0 * k * (k - 1.0) * binomial(half - 2, j);
         gram += DMatrix::from_fn(n, n, |i, j| factor * w[i] * w[j]);
     }
-    let constraint = certified(terms, basis, gram);
-    let linear = Matrix3::from_diagonal(&Vector3::new(1.0 / radius, 1.0 / radius, 1.0 / half_height));
-    Body::new(&format!("C{degree}"), Normalization { center: Vector3::zeros(), linear }, vec![constraint]).unwrap()
+    certified(terms, basis, gram)
 }
 
 /// P2k: `Σ (a_i·x)^degree <= 1` with the a_i along the axes and the diagonals of a cube, of the
 /// given half-width.
 pub fn p(degree: u8, size: f64) -> Body {
+    let constraint = known(&format!("P{degree}"), || octahedral_prism(degree));
+    let linear = Matrix3::identity() / size;
+    Body::new(&format!("P{degree}"), Normalization { center: Vector3::zeros(), linear }, vec![constraint]).unwrap()
+}
+
+/// The constraint of P2k of unit half-width.
+fn octahedral_prism(degree: u8) -> Constraint {
     let third = 1.0 / 3.0_f64.sqrt();
     let mut directions = vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     directions
@@ -91,9 +103,7 @@ pub fn p(degree: u8, size: f64) -> Body {
         let w: Vec<f64> = basis.iter().map(|b| a[usize::from(b.direction)] * power(a, b.exponents)).collect();
         gram += DMatrix::from_fn(n, n, |i, j| scale * w[i] * w[j]);
     }
-    let constraint = certified(coefficients.into_iter().collect(), basis, gram);
-    let linear = Matrix3::identity() / size;
-    Body::new(&format!("P{degree}"), Normalization { center: Vector3::zeros(), linear }, vec![constraint]).unwrap()
+    certified(coefficients.into_iter().collect(), basis, gram)
 }
 
 /// B: box with these half-extents.
@@ -103,6 +113,13 @@ pub fn b(x: f64, y: f64, z: f64) -> Body {
 
 pub fn cylinder(radius: f64, half_height: f64) -> Body {
     Body::cylinder("cylinder", radius, half_height).unwrap()
+}
+
+/// The constraint of that name, made once: of all sizes it is the same.
+fn known(name: &str, make: impl FnOnce() -> Constraint) -> Constraint {
+    static KNOWN: Mutex<BTreeMap<String, Constraint>> = Mutex::new(BTreeMap::new());
+    let mut known = KNOWN.lock().expect("nothing fails in here");
+    known.entry(name.to_owned()).or_insert_with(make).clone()
 }
 
 /// A definite Gram matrix from a semidefinite one: alternating projections onto the matrices of the
@@ -167,10 +184,43 @@ pub fn fitted() -> &'static [Body] {
     })
 }
 
+/// Two bars in an L, metres: off-centre and not symmetric.
+pub fn bars() -> Vec<Vector3<f64>> {
+    let bars = [([-0.5, -0.15, -0.1], [0.5, 0.15, 0.1]), ([0.3, -0.15, -0.1], [0.5, 0.15, 0.9])];
+    let corner = |(low, high): &([f64; 3], [f64; 3]), i: usize| {
+        Vector3::from_fn(|k, _| if i >> k & 1 == 1 { high[k] } else { low[k] })
+    };
+    bars.iter().flat_map(|bar| (0..8).map(move |i| corner(bar, i))).collect()
+}
+
+/// Fitted bodies around the [`bars`], of degrees 4 and 6, as [`fitted`] are.
+fn fitted_bars() -> [Body; 2] {
+    let files = [include_str!("../bodies/bars-d4.json"), include_str!("../bodies/bars-d6.json")];
+    files.map(|file| Body::from_json(file).expect("a proven body"))
+}
+
+/// The bodies of the stability chart, in the order that its seeds go by: those of [`zoo`] with
+/// bars in place of furniture and people.
+pub fn chart_zoo() -> &'static [Body] {
+    static ZOO: OnceLock<Vec<Body>> = OnceLock::new();
+    ZOO.get_or_init(|| {
+        let mut zoo = analytic();
+        for degree in [4, 6, 8] {
+            zoo.extend([q(degree, 0.8, 0.5, 1.1), p(degree, 0.7)]);
+        }
+        zoo.extend(fitted_bars());
+        zoo
+    })
+}
+
+/// Those of the zoos that have no degree of their own or are round about an axis.
+fn analytic() -> Vec<Body> {
+    vec![e(1.0, 0.7, 0.4), b(0.6, 0.9, 0.3), cylinder(0.5, 0.8), c(4, 0.5, 1.0), c(6, 0.8, 0.3), c(8, 1.0, 0.7)]
+}
+
 /// One of each kind, of sizes about 1.
 pub fn zoo() -> Vec<Body> {
-    let mut zoo =
-        vec![e(1.0, 0.7, 0.4), b(0.6, 0.9, 0.3), cylinder(0.5, 0.8), c(4, 0.5, 1.0), c(6, 0.8, 0.3), c(8, 1.0, 0.7)];
+    let mut zoo = analytic();
     zoo.extend([4, 6, 8].map(|degree| q(degree, 0.8, 0.5, 1.1)));
     zoo.extend([4, 6, 8].map(|degree| p(degree, 0.7)));
     zoo.extend_from_slice(fitted());

@@ -1,9 +1,10 @@
-//! What tests and benches of several crates share: seeded draws, the bodies of the stability
-//! catalogue as plain data, and references of 200 bits. Not published.
+//! What tests and benches of several crates share: seeded draws, the bodies and the cases of the
+//! stability catalogue as plain data, and references of 200 bits. Not published.
 
 #![allow(missing_docs, unreachable_pub)]
 
 pub mod bodies;
+pub mod catalogue;
 mod data;
 pub mod random;
 pub mod reference;

@@ -32,7 +32,58 @@ pub fn few_or(few: u64, many: u64) -> u64 {
     if std::env::var_os("SUBLEVEL_LONG").is_some() { many } else { few }
 }
 
-/// SplitMix64.
+/// Numbers that look random and are the same everywhere, as the catalogue draws its cases from
+/// them. Each kind of generator keeps its own ways to indices and rotations, for the sake of the
+/// seeds that are on record for it.
+pub trait Draws {
+    /// Uniform in [-1, 1).
+    fn signed(&mut self) -> f64;
+
+    /// Below `count`, which is positive.
+    fn index(&mut self, count: usize) -> usize;
+
+    /// Uniform on the sphere.
+    fn unit(&mut self) -> Vector3<f64>;
+
+    fn rotation(&mut self) -> UnitQuaternion<f64>;
+
+    /// A rotation, and a translation of this length, metres.
+    fn pose(&mut self, length: f64) -> Pose;
+
+    /// Uniform in [0, 1).
+    fn positive(&mut self) -> f64 {
+        0.5 * (self.signed() + 1.0)
+    }
+
+    /// Between `low` and `high`, uniform in the logarithm.
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low * (high / low).powf(self.positive())
+    }
+}
+
+impl Draws for Seeded {
+    fn signed(&mut self) -> f64 {
+        Self::signed(self)
+    }
+
+    fn index(&mut self, count: usize) -> usize {
+        Self::index(self, count)
+    }
+
+    fn unit(&mut self) -> Vector3<f64> {
+        Self::unit(self)
+    }
+
+    fn rotation(&mut self) -> UnitQuaternion<f64> {
+        Self::rotation(self)
+    }
+
+    fn pose(&mut self, length: f64) -> Pose {
+        Self::pose(self, length)
+    }
+}
+
+/// SplitMix64 (Steele, Lea, Flood 2014).
 pub struct Seeded(pub u64);
 
 impl Seeded {
@@ -108,8 +159,8 @@ pub fn turned(from: &Pose, by: Vector3<f64>) -> Pose {
     pose(*from.translation(), &(UnitQuaternion::from_scaled_axis(by) * from.rotation()))
 }
 
-/// The pose after `step` along component k of the twists `(v_a, ω_a, v_b, ω_b)`, for the body whose
-/// twist starts at `first`.
+/// The pose after `step` along component k of the twists `(v_a, ω_a, v_b, ω_b)`, for the body
+/// whose twist starts at `first`.
 pub fn twisted(from: &Pose, k: usize, first: usize, step: f64) -> Pose {
     let along = |axis: usize| Vector3::from_fn(|i, _| if i == axis { step } else { 0.0 });
     match k.checked_sub(first) {

@@ -2,9 +2,12 @@
 //! against semidefinite programs. Seeded, resumable, replayable.
 //!
 //! ```text
-//! cargo bench -p sublevel-bench --bench endurance -- --queries 1e9 --threads 2 --state run.json --seed 1 --summary docs/endurance.md
-//! cargo bench -p sublevel-bench --bench endurance -- --seed 1 --block 4711        # replay one block and tell its failures
-//! cargo bench -p sublevel-bench --bench endurance -- --queries 1e7 --bodies bodies  # pairs of the body files in a folder
+//! cargo bench -p sublevel-bench --bench endurance -- --queries 1e9 --threads 2 \
+//!     --state run.json --seed 1 --summary docs/endurance.md
+//! # Replay one block and report its failures:
+//! cargo bench -p sublevel-bench --bench endurance -- --seed 1 --block 4711
+//! # Pairs of the body files in a folder:
+//! cargo bench -p sublevel-bench --bench endurance -- --queries 1e7 --bodies bodies
 //! ```
 //!
 //! An OpenBLAS of several threads gives the programs other last digits from run to run unless

@@ -147,7 +147,7 @@ pub(super) fn measure(
         let programs = few.iter().map(state).collect();
         let answers = solver.solve((cache.folder(), &name), programs, &CLARABEL, effort.passes)?;
         for (tolerance, answers) in CLARABEL.iter().zip(answers) {
-            let said: Vec<MethodAnswer> = answers
+            let replies: Vec<MethodAnswer> = answers
                 .iter()
                 .map(|found| MethodAnswer {
                     value: found.value.unwrap_or(f64::NAN) * size_m,
@@ -156,7 +156,7 @@ pub(super) fn measure(
                     kept: Some(found.solved),
                 })
                 .collect();
-            let mut cell = Cell::judged((Method::LevelZero, format!("{tolerance:e}")), few, &said, *size_m);
+            let mut cell = Cell::judged((Method::LevelZero, format!("{tolerance:e}")), few, &replies, *size_m);
             cell.nanoseconds = answers.iter().map(|found| found.nanoseconds).sum::<f64>() / answers.len() as f64;
             cells.push(cell);
         }
@@ -170,9 +170,9 @@ pub(super) fn measure(
             // A process takes the median of nine walks by itself.
             run.pass()?;
             let found = run.distances()?.concat();
-            let said: Vec<MethodAnswer> =
+            let replies: Vec<MethodAnswer> =
                 found.iter().map(|&value| MethodAnswer { value, width: None, iterations: None, kept: None }).collect();
-            let mut cell = Cell::judged((Method::Coal, points.to_string()), &queries[..effort.few], &said, *size_m);
+            let mut cell = Cell::judged((Method::Coal, points.to_string()), &queries[..effort.few], &replies, *size_m);
             cell.nanoseconds = run.times().0;
             cells.push(cell);
         }
@@ -210,11 +210,11 @@ impl<'a> Timed<'a> {
         ask: impl Fn(&Query) -> MethodAnswer + 'a,
     ) -> Self {
         let queries: Vec<Query> = chunks.iter().flatten().cloned().collect();
-        let said: Vec<MethodAnswer> = queries.iter().map(&ask).collect();
-        let cell = Cell::judged(what, &queries, &said, size_m);
+        let replies: Vec<MethodAnswer> = queries.iter().map(&ask).collect();
+        let cell = Cell::judged(what, &queries, &replies, size_m);
         let row = Row::cold("", chunks, move |query: &Query| {
-            let said = black_box(ask(query));
-            Answer { iterations: said.iterations, failed: false, overlap: false }
+            let reply = black_box(ask(query));
+            Answer { iterations: reply.iterations, failed: false, overlap: false }
         });
         Self { cell, row }
     }
@@ -226,21 +226,21 @@ impl<'a> Timed<'a> {
 
 impl Cell {
     /// All but the time.
-    fn judged((method, setting): (Method, String), queries: &[Query], said: &[MethodAnswer], size_m: f64) -> Self {
+    fn judged((method, setting): (Method, String), queries: &[Query], replies: &[MethodAnswer], size_m: f64) -> Self {
         // Below half of the reference's bracket no error can be known.
-        let error = |(query, said): (&Query, &MethodAnswer)| {
-            let error = (said.value - query.truth).abs().max(query.half_width) / size_m;
+        let error = |(query, reply): (&Query, &MethodAnswer)| {
+            let error = (reply.value - query.truth).abs().max(query.half_width) / size_m;
             if error.is_finite() { error } else { f64::INFINITY }
         };
-        let errors: Vec<f64> = queries.iter().zip(said).map(error).collect();
+        let errors: Vec<f64> = queries.iter().zip(replies).map(error).collect();
         let both = |values: &[f64]| [median(values), values.iter().copied().fold(0.0, f64::max)];
-        let widths: Option<Vec<f64>> = said.iter().map(|said| Some(said.width? / size_m)).collect();
-        let counts: Option<Vec<f64>> = said.iter().map(|said| said.iterations.map(f64::from)).collect();
-        let kept: Option<Vec<bool>> = said.iter().map(|said| said.kept).collect();
+        let widths: Option<Vec<f64>> = replies.iter().map(|reply| Some(reply.width? / size_m)).collect();
+        let counts: Option<Vec<f64>> = replies.iter().map(|reply| reply.iterations.map(f64::from)).collect();
+        let kept: Option<Vec<bool>> = replies.iter().map(|reply| reply.kept).collect();
         Self {
             method,
             setting,
-            queries: said.len(),
+            queries: replies.len(),
             nanoseconds: f64::NAN,
             iterations: counts.map(|counts| counts.iter().sum::<f64>() / counts.len() as f64),
             error: both(&errors),

@@ -1,7 +1,8 @@
 //! The distance as level 0 of the hierarchy has it, one semidefinite program per query, in moments.
 //!
 //! ```text
-//! min t   subject to   |E x - E y| <= t,   E g_i <= 1,   E h_j <= 1,   M(z_A), M(z_B) positive semidefinite
+//! min t   subject to   |E x - E y| <= t,   E g_i <= 1,   E h_j <= 1,
+//!                      M(z_A), M(z_B) positive semidefinite
 //! ```
 //!
 //! over the moments of both bodies' normalized coordinates z up to the degree, M the matrix of the

@@ -19,12 +19,9 @@ pub(crate) mod tests {
     use nalgebra::Vector3;
     use sublevel::body::Body;
     use sublevel::measure::Pose;
+    pub(crate) use sublevel_testkit::random::at;
 
     type Known = (Body, Body, Pose, f64);
-
-    pub(crate) fn at(x: f64, y: f64, z: f64) -> Pose {
-        Pose::from_quaternion(Vector3::new(x, y, z), [0.0, 0.0, 0.0, 1.0]).unwrap()
-    }
 
     /// Balls of radius 1 and 0.5, centres 3 apart.
     pub(crate) fn balls_apart() -> Known {

@@ -116,8 +116,8 @@ impl CoalRun<'_> {
     pub fn pass(&mut self) -> Result<(), PeerError> {
         let run = self.poses.iter().map(|poses| {
             let mut command = Command::new(self.program);
-            let said = printed(self.program, command.args([&self.a, &self.b, poses, &poses.with_extension("coal")]))?;
-            serde_json::from_slice(&said)
+            let output = printed(self.program, command.args([&self.a, &self.b, poses, &poses.with_extension("coal")]))?;
+            serde_json::from_slice(&output)
                 .map_err(|error| PeerError::program(self.program, format!("prints no times: {error}")))
         });
         self.runs.push(run.collect::<Result<_, _>>()?);

@@ -1,5 +1,5 @@
-//! Comparisons: representations of the same objects walk the same poses and are timed in turns, ours and
-//! those of other libraries.
+//! Comparisons: representations of the same objects walk the same poses and are timed in turns,
+//! ours and those of other libraries.
 //!
 //! Figures and `cargo bench -p sublevel-bench --bench measures` share this: motions ([`motion`]),
 //! timed rows ([`sweep`]), the peers ([`Hulls`] of parry in this process, [`Coal`] in one of its
@@ -19,7 +19,7 @@ pub(crate) use coal::points_text;
 pub use coal::{Coal, CoalRun};
 pub use error::ComparisonError;
 pub use fit_cache::{FitCache, FitCacheError};
-pub use parry::{Flight, Hulls, NoHull, parry_impact, parry_pose, parry_version};
+pub use parry::{Hulls, NoHull, parry_impact, parry_pose, parry_version};
 pub use peer::PeerError;
 pub use random::Random;
 pub use subject::{Subject, pairs};

@@ -12,6 +12,7 @@ use parry3d_f64::query::gjk::{GJKResult, VoronoiSimplex};
 use parry3d_f64::query::{NonlinearRigidMotion, cast_shapes_nonlinear};
 use parry3d_f64::shape::{Ball, ConvexPolyhedron, Cuboid};
 use sublevel::measure::Pose;
+use sublevel_testkit::catalogue::motion::Flight;
 
 /// Two convex hulls as parry's shapes.
 #[derive(Clone, Debug)]
@@ -36,29 +37,16 @@ pub fn parry_version() -> String {
     locked("parry3d-f64")
 }
 
-/// A rigid motion of a body about the origin of its frame.
-#[derive(Clone, Copy, Debug)]
-pub struct Flight {
-    /// Pose at time 0.
-    pub start: Pose,
-    /// Velocity of the origin, m/s, world.
-    pub velocity: Vector3<f64>,
-    /// Angular velocity, rad/s, world.
-    pub spin: Vector3<f64>,
-}
-
-impl Flight {
-    fn motion(&self) -> NonlinearRigidMotion {
-        let vector = |v: &Vector3<f64>| Vector::new(v.x, v.y, v.z);
-        NonlinearRigidMotion::new(parry_pose(&self.start), Vector::ZERO, vector(&self.velocity), vector(&self.spin))
-    }
+fn parry_motion(flight: &Flight) -> NonlinearRigidMotion {
+    let vector = |v: &Vector3<f64>| Vector::new(v.x, v.y, v.z);
+    NonlinearRigidMotion::new(parry_pose(&flight.start), Vector::ZERO, vector(&flight.velocity), vector(&flight.spin))
 }
 
 /// When a box of these half-extents and a ball, metres, meet within `duration` seconds; none if
 /// they are not found to.
 pub fn parry_impact((half, a): (&Vector3<f64>, &Flight), (radius, b): (f64, &Flight), duration: f64) -> Option<f64> {
     let (cuboid, ball) = (Cuboid::new(Vector::new(half.x, half.y, half.z)), Ball::new(radius));
-    let found = cast_shapes_nonlinear(&a.motion(), &cuboid, &b.motion(), &ball, 0.0, duration, true);
+    let found = cast_shapes_nonlinear(&parry_motion(a), &cuboid, &parry_motion(b), &ball, 0.0, duration, true);
     found.ok()?.map(|hit| hit.time_of_impact)
 }
 

@@ -71,15 +71,15 @@ const PANICKED: i32 = 101;
 /// [`PeerError::Io`], [`PeerError::Crashed`] or [`PeerError::Program`].
 pub(crate) fn printed(program: &Path, command: &mut Command) -> Result<Vec<u8>, PeerError> {
     let output = command.output().map_err(PeerError::io(program))?;
-    let said = String::from_utf8_lossy(&output.stderr);
+    let stderr = String::from_utf8_lossy(&output.stderr);
     match output.status.code() {
         Some(0) => Ok(output.stdout),
         // Ended by a signal, it has no code.
         None | Some(PANICKED) => Err(PeerError::Crashed {
             program: program.to_owned(),
-            reason: format!("{}; {}", output.status, said.trim()),
+            reason: format!("{}; {}", output.status, stderr.trim()),
         }),
-        Some(_) => Err(PeerError::program(program, format!("failed: {}", said.trim()))),
+        Some(_) => Err(PeerError::program(program, format!("failed: {}", stderr.trim()))),
     }
 }
 

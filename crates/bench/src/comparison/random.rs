@@ -2,6 +2,8 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
+use sublevel::measure::Pose;
+use sublevel_testkit::random::{Draws, pose};
 
 /// SplitMix64 (Steele, Lea, Flood 2014): the same motions everywhere.
 #[derive(Clone, Debug)]
@@ -45,5 +47,29 @@ impl Random {
     /// A rotation about a random axis.
     pub fn rotation(&mut self) -> UnitQuaternion<f64> {
         UnitQuaternion::new(self.direction() * (TAU * self.signed()))
+    }
+}
+
+/// As the cases of the stability chart are drawn.
+impl Draws for Random {
+    fn signed(&mut self) -> f64 {
+        Self::signed(self)
+    }
+
+    fn index(&mut self, count: usize) -> usize {
+        Self::index(self, count)
+    }
+
+    fn unit(&mut self) -> Vector3<f64> {
+        self.direction()
+    }
+
+    fn rotation(&mut self) -> UnitQuaternion<f64> {
+        Self::rotation(self)
+    }
+
+    fn pose(&mut self, length: f64) -> Pose {
+        let rotation = Self::rotation(self);
+        pose(self.direction() * length, &rotation)
     }
 }

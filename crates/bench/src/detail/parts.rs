@@ -15,7 +15,7 @@ use sublevel::fit::{FitError, Mesh, PartSearch, ReadOptions, convex_parts, hull:
 
 /// Objects by name and file; the tube, which has none, is made.
 pub(super) const OBJECTS: [(&str, &str); 7] = [
-    ("shelf", "faults/cache.off"),
+    ("shelf", "faults/shelf.off"),
     ("tube", ""),
     ("mug", "meshes/mbm_mug.off"),
     ("wingnut", "meshes/wingnut.off"),

@@ -172,7 +172,8 @@ pub(super) fn csv(divided: &[Divided]) -> String {
     text
 }
 
-/// Volume as a part of V-HACD's against that: lower is better, and below the line better than V-HACD.
+/// Volume as a part of V-HACD's against that: lower is better, and below the line better than
+/// V-HACD.
 fn picture(divided: &[Divided]) -> Result<String, ChartError> {
     let styles = [(Divider::Ours, Ink::Blue, Marker::Disc), (Divider::Greedy, Ink::Orange, Marker::Ring)];
     let groups: Vec<Group> = styles

@@ -5,11 +5,12 @@
 //! distance. The arbiter takes the best of all proposals and of directions all around: an answer
 //! that is too long is refuted by somebody's points, one that is too short by somebody's direction.
 
-use super::case::Case;
+use super::question::Question;
 use nalgebra::{Matrix3, Matrix3xX, Vector3};
 use sublevel::body::{Body, fibonacci_lattice};
 use sublevel::measure::Pose;
 use sublevel::polynomial::Jet;
+use sublevel_testkit::catalogue::Case;
 
 /// Directions that are tried whatever is proposed.
 const LATTICE: usize = 200;
@@ -40,17 +41,17 @@ impl Truth {
 }
 
 /// The best bounds for a case; a known value is taken for granted.
-pub(super) fn judge(case: &Case, proposals: &[Proposal]) -> Truth {
+pub(super) fn judge(case: &Question, proposals: &[Proposal]) -> Truth {
     judge_along(case, proposals, fibonacci_lattice(LATTICE))
 }
 
 /// As [`judge`], with these directions, unit vectors, in place of some all around.
 pub(super) fn judge_along(
-    case: &Case,
+    case: &Question,
     proposals: &[Proposal],
     directions: impl IntoIterator<Item = Vector3<f64>>,
 ) -> Truth {
-    let Case { a, pose_a, b, pose_b, .. } = case;
+    let Case { a, pose_a, b, pose_b, .. } = &case.0;
     let sizes = a.circumscribed().radius + b.circumscribed().radius;
     let apart = pose_a.translation() - pose_b.translation();
     let away = pose_a.translation().norm().max(pose_b.translation().norm());
@@ -75,17 +76,17 @@ pub(super) fn judge_along(
     truth
 }
 
-impl Case {
+impl Question {
     /// The gap between the bodies' heights along a unit vector from the second to the first,
     /// metres: at most their distance.
     pub(super) fn height(&self, n: &Vector3<f64>) -> f64 {
-        let Self { a, pose_a, b, pose_b, .. } = self;
+        let Case { a, pose_a, b, pose_b, .. } = &self.0;
         n.dot(&(pose_a.translation() - pose_b.translation())) - reach(a, pose_a, &-n) - reach(b, pose_b, n)
     }
 
     /// The same, where tangent planes at or near proposed points may show it better.
     pub(super) fn height_at(&self, n: &Vector3<f64>, proposal: &Proposal) -> f64 {
-        let Self { a, pose_a, b, pose_b, .. } = self;
+        let Case { a, pose_a, b, pose_b, .. } = &self.0;
         let Some([x, y]) = proposal.points else { return self.height(n) };
         let (x, y) = (drawn_in(a, pose_a, &x), drawn_in(b, pose_b, &y));
         let [of_a, of_b] = &proposal.active;

@@ -1,7 +1,7 @@
 //! Who answers: our solver in its three forms, and others.
 
 use super::arbiter::{Proposal, Truth, judge};
-use super::case::{Case, CaseError, Verdict};
+use super::question::{CaseError, Question, Verdict};
 use crate::baselines::{Clarabel, ConicProgram, Posed, between, newton, slsqp};
 use crate::comparison::{Coal, Hulls, PeerError, motion::Trajectory, parry_pose};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -13,6 +13,8 @@ use sublevel::measure::{
     signed_distance,
 };
 use sublevel::optimize::{Corner, gjk};
+use sublevel_testkit::catalogue::Case;
+use sublevel_testkit::random::pose;
 
 /// Points of a body's surface whose convex hull stands for it where polytopes are asked for.
 const SAMPLES: usize = 1000;
@@ -120,14 +122,14 @@ impl Method {
     }
 }
 
-/// What a method says of a case, and what that is worth.
+/// A method's answer to a case, and what it is worth.
 #[derive(Clone, Debug)]
 pub(super) struct Answer {
     pub(super) verdict: Verdict,
     /// The distance, metres, where it found one.
     pub(super) value: Option<f64>,
     /// All of the answer, if it is one of ours.
-    pub(super) answer: Option<Distance>,
+    pub(super) ours: Option<Distance>,
 }
 
 /// An answer of somebody else.
@@ -139,20 +141,20 @@ pub(super) struct Reply {
     pub(super) own: Option<Truth>,
 }
 
-impl Case {
-    /// Puts the case to a method, and judges what it says. None where the method cannot be asked.
+impl Question {
+    /// Puts the case to a method, and judges its answer. None where the method cannot be asked.
     pub(super) fn put(&self, method: Method) -> Result<Option<Verdict>, CaseError> {
-        Ok(self.run(method)?.map(|said| said.verdict))
+        Ok(self.run(method)?.map(|answer| answer.verdict))
     }
 
-    /// As [`Case::put`], with what was said.
+    /// As [`Question::put`], with the answer.
     pub(super) fn run(&self, method: Method) -> Result<Option<Answer>, CaseError> {
         if method.is_ours() {
             let answer = self.ours(method)?;
             return Ok(Some(Answer {
                 verdict: self.verdict(&answer)?,
                 value: Some(answer.value()),
-                answer: Some(answer),
+                ours: Some(answer),
             }));
         }
         // Others have other limits.
@@ -161,7 +163,7 @@ impl Case {
         }
         let Some(reply) = self.ask(method)? else { return Ok(None) };
         let truth = reply.own.map_or_else(|| self.truth(std::slice::from_ref(&reply.proposal)), Ok)?;
-        Ok(Some(Answer { verdict: reply.verdict(&truth, self), value: reply.value, answer: None }))
+        Ok(Some(Answer { verdict: reply.verdict(&truth, self), value: reply.value, ours: None }))
     }
 
     /// How much answers of a method may differ from the truth, metres.
@@ -172,8 +174,8 @@ impl Case {
     /// Our answer.
     pub(super) fn ours(&self, method: Method) -> Result<Distance, CaseError> {
         let options = self.options()?;
-        let Self { a, pose_a, b, pose_b, .. } = self;
-        let near = self.pose_nearby()?;
+        let Case { a, pose_a, b, pose_b, .. } = &self.0;
+        let near = self.pose_nearby();
         Ok(match method {
             Method::Batch => {
                 let mut poses = [near; 9];
@@ -194,23 +196,19 @@ impl Case {
 
     /// What another measure of ours says, by the pose of the second body: without a hint, or warm
     /// with that of the pose nearby.
-    pub(super) fn measured<T>(
-        &self,
-        method: Method,
-        measure: impl Fn(&Pose, &mut WarmStart) -> T,
-    ) -> Result<T, CaseError> {
+    pub(super) fn measured<T>(&self, method: Method, measure: impl Fn(&Pose, &mut WarmStart) -> T) -> T {
         let mut warm = WarmStart::default();
         if method == Method::Warm {
-            measure(&self.pose_nearby()?, &mut warm);
+            measure(&self.pose_nearby(), &mut warm);
         }
-        Ok(measure(&self.pose_b, &mut warm))
+        measure(&self.pose_b, &mut warm)
     }
 
     /// Our signed distance.
     pub(super) fn signed(&self, method: Method) -> Result<SignedDistance, CaseError> {
-        let Self { a, pose_a, b, .. } = self;
+        let Case { a, pose_a, b, .. } = &self.0;
         let options = self.options()?;
-        self.measured(method, |pose_b, warm| signed_distance(a, pose_a, b, pose_b, &options, warm))
+        Ok(self.measured(method, |pose_b, warm| signed_distance(a, pose_a, b, pose_b, &options, warm)))
     }
 
     /// Nearest points and normal as a method finds them. None where it cannot be asked: of hulls
@@ -230,7 +228,7 @@ impl Case {
     }
 
     /// A hundredth of the second body's size and half a degree before.
-    fn pose_nearby(&self) -> Result<Pose, CaseError> {
+    fn pose_nearby(&self) -> Pose {
         let step = Vector3::new(0.006, -0.005, 0.006) * self.b.circumscribed().radius;
         let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.005, 0.005, -0.005));
         pose(self.pose_b.translation() + step, &(turn * self.pose_b.rotation()))
@@ -239,7 +237,7 @@ impl Case {
     /// The truth, as these proposals and those of a tight answer of ours show it.
     pub(super) fn truth(&self, proposals: &[Proposal]) -> Result<Truth, CaseError> {
         let tight = Options::default().with_accuracy(TIGHT)?;
-        let Self { a, pose_a, b, pose_b, .. } = self;
+        let Case { a, pose_a, b, pose_b, .. } = &self.0;
         let answer = distance(a, pose_a, b, pose_b, &tight, &mut WarmStart::default());
         let mut all = proposals.to_vec();
         all.push(proposal(&answer));
@@ -251,7 +249,7 @@ impl Case {
         Ok(self.verdict_by(answer, &self.truth(&[proposal(answer)])?))
     }
 
-    /// As [`Case::verdict`], by a truth that is known.
+    /// As [`Question::verdict`], by a truth that is known.
     pub(super) fn verdict_by(&self, answer: &Distance, truth: &Truth) -> Verdict {
         let Distance { lower, upper, status, iterations, .. } = *answer;
         let small = self.small();
@@ -341,12 +339,12 @@ impl Case {
                 // Of some needles it makes no hull.
                 let Ok(hulls) = Hulls::new(&a, &b) else { return Ok(Some(plain(None))) };
                 let relative = parry_pose(&self.pose_a).inverse() * parry_pose(&self.pose_b);
-                let own = Some(polytopes(&a, &b, &self.relative()?, self.small()));
+                let own = Some(polytopes(&a, &b, &self.relative(), self.small()));
                 Some(Reply { value: Some(hulls.distance(&relative)), own, ..plain(None) })
             }
             Method::Coal => {
                 let Some(coal) = Coal::from_environment()? else { return Ok(None) };
-                let (a, b, relative) = (sampled(&self.a), sampled(&self.b), self.relative()?);
+                let (a, b, relative) = (sampled(&self.a), sampled(&self.b), self.relative());
                 let value = in_folder(|folder| coal_distance(&coal, folder, [&a, &b], relative))?;
                 Some(Reply { value, own: Some(polytopes(&a, &b, &relative, self.small())), ..plain(None) })
             }
@@ -358,7 +356,7 @@ impl Case {
     }
 
     /// The second body's pose in the frame of the first.
-    fn relative(&self) -> Result<Pose, CaseError> {
+    fn relative(&self) -> Pose {
         let back = self.pose_a.rotation().inverse();
         pose(back * (self.pose_b.translation() - self.pose_a.translation()), &(back * self.pose_b.rotation()))
     }
@@ -366,7 +364,7 @@ impl Case {
 
 impl Reply {
     /// Judges it.
-    pub(super) fn verdict(&self, truth: &Truth, case: &Case) -> Verdict {
+    pub(super) fn verdict(&self, truth: &Truth, case: &Question) -> Verdict {
         let Some(value) = self.value else { return Verdict::NoAnswer };
         // Not `>`: a NaN is off.
         let error = (truth.lower - value).max(value - truth.upper) - truth.floor;
@@ -439,9 +437,4 @@ pub(super) fn sampled(body: &Body) -> Vec<Vector3<f64>> {
 pub(super) fn proposal(answer: &Distance) -> Proposal {
     let active = [&answer.active_a, &answer.active_b].map(|active| active.iter().map(|(index, _)| index).collect());
     Proposal { points: Some([answer.witness_a, answer.witness_b]), normal: answer.normal, active }
-}
-
-/// A pose of a rotation that is one.
-pub(super) fn pose(translation: Vector3<f64>, rotation: &UnitQuaternion<f64>) -> Result<Pose, CaseError> {
-    Ok(Pose::from_quaternion(translation, rotation.coords.into())?)
 }

@@ -1,23 +1,23 @@
 //! The stability table: families of queries that broke collision libraries, put to our solver and
 //! to others.
 //!
-//! Each case is drawn from its seed alone and judged by bounds that do not depend on the solver
-//! (`arbiter`), in a child process that is stopped where it hangs (`runner`).
+//! The cases are those of `sublevel_testkit::catalogue`. Each is drawn from its seed alone and
+//! judged by bounds that do not depend on the solver (`arbiter`), in a child process that is
+//! stopped where it hangs (`runner`).
 
 mod arbiter;
-mod case;
 mod families;
 mod method;
+mod question;
 mod report;
 mod runner;
-mod zoo;
 
 use super::Machine;
 use super::baselines::Clarabel;
 use super::comparison::{Coal, ComparisonError};
-pub use case::Verdict;
 use families::FAMILIES;
 pub use method::{Method, UnknownMethod};
+pub use question::Verdict;
 pub use report::{Earlier, GuardError, Lost};
 use runner::Cell;
 pub use runner::{NoShare, Share, serve};
@@ -65,7 +65,7 @@ pub fn stability(
     let next = AtomicUsize::new(0);
     let workers = thread::available_parallelism().map_or(1, usize::from);
     let mut rows: Vec<Row> =
-        FAMILIES.iter().map(|family| Row { number: family.number, name: family.name, cells: Vec::new() }).collect();
+        FAMILIES.iter().map(|family| Row { number: family.number(), name: family.name(), cells: Vec::new() }).collect();
     let (send, done) = channel();
     thread::scope(|scope| {
         for _ in 0..workers {
@@ -88,7 +88,7 @@ pub fn stability(
                 ComparisonError::Child { program: program.to_owned(), source }
             })?;
             rows[row].cells.extend(found);
-            let at = format!("{} of {}: {}, {}", count + 1, tasks.len(), FAMILIES[row].name, method.title());
+            let at = format!("{} of {}: {}, {}", count + 1, tasks.len(), FAMILIES[row].name(), method.title());
             if progress(&at).is_break() {
                 // No more tasks for anyone.
                 next.store(tasks.len(), Ordering::Relaxed);

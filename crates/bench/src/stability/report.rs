@@ -1,7 +1,7 @@
 //! The table as Markdown and CSV, and what was lost against an earlier one.
 
-use super::case::Verdict;
 use super::method::Method;
+use super::question::Verdict;
 use super::runner::{Cell, PATIENCE};
 use super::{Row, Stability};
 use crate::comparison::parry_version;

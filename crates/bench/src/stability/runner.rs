@@ -1,8 +1,8 @@
 //! Cases in processes of their own: what hangs is stopped, what crashes takes nothing with it.
 
-use super::case::{CaseError, Verdict};
 use super::families::{FAMILIES, Family};
 use super::method::Method;
+use super::question::{CaseError, Verdict};
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::process::CommandExt;
@@ -64,7 +64,7 @@ impl std::str::FromStr for Share {
         let parse = || {
             let mut parts = text.split('/');
             let (family, method, seeds) = (parts.next()?.parse().ok()?, parts.next()?, parts.next()?);
-            let known = FAMILIES.iter().any(|row| row.number == family) && parts.next().is_none();
+            let known = FAMILIES.iter().any(|row| row.number() == family) && parts.next().is_none();
             let method = method.parse().ok().filter(|_| known)?;
             // Seeds of different families are a million apart.
             let within = |share: &Self| share.from < share.to && share.to <= 1_000_000;
@@ -85,7 +85,7 @@ impl std::str::FromStr for Share {
 /// # Errors
 /// What stands in the way of writing.
 pub fn serve(share: &Share, as_json: bool, out: &mut impl Write) -> std::io::Result<()> {
-    for family in FAMILIES.iter().filter(|family| family.number == share.family) {
+    for family in FAMILIES.iter().filter(|family| family.number() == share.family) {
         for seed in share.from..share.to {
             let verdict = match family.put(seed, share.method) {
                 Ok(verdict) => verdict,
@@ -97,12 +97,12 @@ pub fn serve(share: &Share, as_json: bool, out: &mut impl Write) -> std::io::Res
                 writeln!(out)?;
             } else {
                 let what = family.describe(seed);
-                let said = verdict.as_ref().map_or("cannot be asked".to_owned(), Verdict::to_string);
+                let outcome = verdict.as_ref().map_or("cannot be asked".to_owned(), Verdict::to_string);
                 writeln!(
                     out,
-                    "{} {}, seed {seed}, {}: {said}\n{what}",
-                    family.number,
-                    family.name,
+                    "{} {}, seed {seed}, {}: {outcome}\n{what}",
+                    family.number(),
+                    family.name(),
                     share.method.title()
                 )?;
             }
@@ -124,7 +124,7 @@ pub(super) fn run(program: &Path, family: &Family, method: Method, count: u64) -
     let mut cell = Cell { method, cases: 0, left_out: 0, failures: Vec::new() };
     let (mut next, mut lost, mut asked) = (0, 0, false);
     while next < count && lost < MOST_LOST {
-        let share = format!("{}/{}/{next}-{count}", family.number, method.name());
+        let share = format!("{}/{}/{next}-{count}", family.number(), method.name());
         let end = child(program, &share, |line| {
             next = line.seed + 1;
             if let Some(verdict) = line.verdict {

@@ -5,8 +5,9 @@ use nalgebra::Vector3;
 use sublevel_core::measure::{
     Options, Pose, SignedDistance, Status, WarmStart, growth_distance, level_distance, signed_distance,
 };
-use sublevel_testkit::bodies::{Placed, b, c, cylinder, e, q, support, zoo};
-use sublevel_testkit::random::{Seeded, draws, few_or, pose};
+use sublevel_testkit::bodies::{Placed, support, zoo};
+use sublevel_testkit::catalogue::depth::{Saturation, Slide, saturation, slide};
+use sublevel_testkit::random::{Seeded, draws, few_or};
 use sublevel_testkit::reference;
 
 /// How far the first body has to move along n until a plane across n parts the bodies: the support
@@ -85,40 +86,20 @@ fn hold(a: Placed<'_>, b: Placed<'_>, answer: &SignedDistance, label: &str) {
 /// slide is convex and even.
 #[test]
 fn family_16_deep_penetration() {
-    let bodies = [
-        e(1.0, 0.7, 0.4),
-        e(0.5, 0.5, 0.5),
-        q(4, 0.8, 0.5, 1.1),
-        q(8, 1.0, 0.6, 0.3),
-        c(6, 0.8, 0.3),
-        b(0.6, 0.9, 0.3),
-        cylinder(0.5, 0.8),
-    ];
     for seed in 0..few_or(3, 28) {
-        let mut random = Seeded(160_000 + seed);
-        let (a, b) = (&bodies[random.index(bodies.len())], &bodies[random.index(bodies.len())]);
-        let (size, least) = (large(a, b), small(a, b));
         // Every fourth pair is turned alike: faces and axes are parallel all the way.
-        let (pose_a, turn) = (random.pose(0.3), random.rotation());
-        let turn = if seed % 4 == 0 { *pose_a.rotation() } else { turn };
-        let direction =
-            if seed % 4 == 0 { pose_a.rotation() * Vector3::ith(random.index(3), 1.0) } else { random.unit() };
-        let place = |offset: f64| pose(pose_a.translation() + direction * offset, &turn);
+        let slide = slide(seed % 4 == 0, &mut Seeded(160_000 + seed));
+        let Slide { a, pose_a, b, .. } = &slide;
+        let (size, least) = (large(a, b), small(a, b));
         // From where they touch: how far they have to part along the slide.
-        let reach = touching(|offset| shortest((a, &pose_a), (b, &place(offset))).0);
-        let mut offsets: Vec<f64> = (0..=12).map(|k| reach * (1.05 - 0.0875 * f64::from(k))).collect();
-        offsets.extend([1e-3, 1e-6, 1e-9, 1e-12, 1e-15].map(|near| reach * (1.0 - near)));
-        offsets.extend([1e-3, 1e-6, 1e-9, 1e-12, 1e-15].map(|near| reach * near));
-        offsets.retain(|offset| *offset > 0.0);
-        offsets.push(0.0);
-        offsets.sort_by(|p, q| q.total_cmp(p));
+        let reach = touching(|offset| shortest((a, pose_a), (b, &slide.place(offset))).0);
         let options = Options::default();
         let mut warm = WarmStart::default();
         let mut last: Option<(f64, SignedDistance)> = None;
         let mut previous: Option<(f64, SignedDistance)> = None;
-        for offset in offsets {
-            let pose_b = place(offset);
-            let (p, q) = ((a, &pose_a), (b, &pose_b));
+        for offset in Slide::shares().into_iter().map(|share| share * reach) {
+            let pose_b = slide.place(offset);
+            let (p, q) = ((a, pose_a), (b, &pose_b));
             let label = format!("seed {seed} {}-{} offset {:e} of {reach}", a.name(), b.name(), offset / reach);
             let answer = signed(p, q, &options, &mut warm, &label);
             let cold = signed(p, q, &options, &mut WarmStart::default(), &format!("{label} cold"));
@@ -184,24 +165,18 @@ fn family_27_level_distance_as_depth() {
     let zoo = zoo();
     let (mut flagged, mut free) = (0, 0);
     for seed in 0..draws(50) {
-        let mut random = Seeded(270_000 + seed);
-        let (a, b) = (&zoo[random.index(zoo.len())], &zoo[random.index(zoo.len())]);
-        let (pose_a, turn, direction) = (random.pose(0.3), random.rotation(), random.unit());
-        let meet = pose_a.transform_point(&a.growth_ball().center) - turn * b.growth_ball().center;
-        let sum = a.circumscribed().radius + b.circumscribed().radius;
+        let pair = saturation(&zoo, &mut Seeded(270_000 + seed));
+        let Saturation { a, pose_a, b, meet, .. } = &pair;
         let options = Options::default();
         let (mut warm, mut level_warm) = (WarmStart::default(), WarmStart::default());
         // Bounds of the growth distance per offset, and the last answer.
         let (mut low, mut high, mut last) = (0.0_f64, f64::INFINITY, f64::INFINITY);
-        for share in [1.2, 0.9, 0.5, 0.3, 0.2, 0.1, 0.03, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6] {
-            let offset = sum * share;
-            let pose_b = pose(meet + direction * offset, &turn);
-            // The pose is rounded: this is how far the centres really are apart.
-            let apart =
-                pose_b.transform_point(&b.growth_ball().center) - pose_a.transform_point(&a.growth_ball().center);
-            let known = 1e-14 * (sum + meet.norm());
+        for share in Saturation::SHARES {
+            let pose_b = pair.place(share);
+            let apart = pair.centres(&pose_b);
+            let known = 1e-14 * (pair.sum() + meet.norm());
             let label = format!("seed {seed} {}-{} offset {share:e}", a.name(), b.name());
-            let growth = growth_distance(a, &pose_a, b, &pose_b, &options, &mut warm);
+            let growth = growth_distance(a, pose_a, b, &pose_b, &options, &mut warm);
             let label = format!("{label}: {growth:?}");
             assert_eq!(growth.status, Status::Converged, "{label}");
             assert!(growth.upper - growth.lower <= 1e-9 * growth.upper.max(1.0), "{label}");
@@ -224,15 +199,14 @@ fn family_27_level_distance_as_depth() {
                     value: growth.upper,
                     normal: growth.normal.expect("centres apart"),
                 };
-                let truth =
-                    reference::growth::growth_distance((a, &pose_a, &center.0), (b, &pose_b, &center.1), &start);
+                let truth = reference::growth::growth_distance((a, pose_a, &center.0), (b, &pose_b, &center.1), &start);
                 let truth = truth.unwrap_or_else(|| panic!("{label}: no reference"));
                 assert!(growth.lower <= truth.value() && truth.value() <= growth.upper, "{label}: {truth:?}");
             }
 
-            let level = level_distance(a, &pose_a, b, &pose_b, &options, &mut level_warm);
-            let (cold, truth) = judged_level((a, &pose_a), (b, &pose_b), &options, &label);
-            let seed_in_b = b.value(&local(&pose_b, &pose_a.transform_point(a.interior_point())));
+            let level = level_distance(a, pose_a, b, &pose_b, &options, &mut level_warm);
+            let (cold, truth) = judged_level((a, pose_a), (b, &pose_b), &options, &label);
+            let seed_in_b = pair.seed_level(&pose_b);
             for level in [level, cold] {
                 assert!(truth.inside(&level), "{label}: {level:?}");
                 if seed_in_b < 1.0 - 1e-6 {
@@ -249,9 +223,4 @@ fn family_27_level_distance_as_depth() {
         }
     }
     assert!(flagged > 200 && free > 80, "{flagged} flagged, {free} free");
-}
-
-/// A world point in the body frame.
-fn local(pose: &Pose, x: &Vector3<f64>) -> Vector3<f64> {
-    pose.rotation().inverse_transform_vector(&(x - pose.translation()))
 }

@@ -6,7 +6,10 @@ use sublevel_core::measure::{
     Distance, GrowthDistance, Options, Pose, Twist, WarmStart, WithinMargin, distance, growth_distance, level_distance,
     penetration, signed_distance, within_margin,
 };
-use sublevel_testkit::bodies::{Placed, b, e, q, zoo};
+use sublevel_testkit::bodies::{Placed, e, zoo};
+use sublevel_testkit::catalogue::Case;
+use sublevel_testkit::catalogue::derivatives::{GAPS, apart};
+use sublevel_testkit::catalogue::ties::{Flagged, Parts, any_parts, follow, ways_out};
 use sublevel_testkit::random::{Seeded, draws, pose, replayed, seeds, shifted, turned, twisted};
 use sublevel_testkit::reference;
 use sublevel_testkit::reference::big::{Big, double};
@@ -14,10 +17,6 @@ use sublevel_testkit::reference::big::{Big, double};
 /// Largest error of a gradient, relative to its norm, angular parts divided by the circumradius of
 /// the body that turns.
 const ERROR: f64 = 1e-6;
-
-/// Signed gaps of the draws, relative to the smaller body: far, near, grazing, touching,
-/// overlapping.
-const GAPS: [f64; 14] = [300.0, 10.0, 1.0, 0.1, 1e-2, 1e-4, 1e-6, 1e-8, 0.0, -1e-8, -1e-6, -1e-4, -1e-2, -0.1];
 
 /// Error of a gradient as [`ERROR`] is.
 fn deviation(found: &[Twist; 2], truth: &[f64; 12], (a, b): (&Body, &Body)) -> f64 {
@@ -38,7 +37,7 @@ const SHARP: f64 = 1e-25;
 /// Whether a gradient at a kink, where edges touch, is one of those between that of one side and
 /// that of the other: along no twist does the value grow by less than it says. Values of 200 bits
 /// by poses.
-fn is_subgradient(draw: &Draw<'_>, found: &[Twist; 2], value: impl Fn(&Pose, &Pose) -> Big) -> bool {
+fn is_subgradient(draw: &Draw, found: &[Twist; 2], value: impl Fn(&Pose, &Pose) -> Big) -> bool {
     let edged = draw.a.constraints().len() > 1 || draw.b.constraints().len() > 1;
     if draw.gap != 0.0 || !edged {
         return false;
@@ -103,9 +102,9 @@ impl Tally {
 }
 
 /// A random pair at one of the [`GAPS`], and a pose of the second body a short step before.
-struct Draw<'a> {
-    a: &'a Body,
-    b: &'a Body,
+struct Draw {
+    a: Body,
+    b: Body,
     pose_a: Pose,
     pose_b: Pose,
     before: Pose,
@@ -113,13 +112,12 @@ struct Draw<'a> {
     label: String,
 }
 
-impl<'a> Draw<'a> {
-    fn new(zoo: &'a [Body], seed: u64) -> Self {
+impl Draw {
+    fn new(zoo: &[Body], seed: u64) -> Self {
         let mut random = Seeded(seed);
-        let (a, b) = (&zoo[random.index(zoo.len())], &zoo[random.index(zoo.len())]);
+        let Case { a, pose_a, b, pose_b: far, .. } = apart(zoo, &mut random);
         let (radius_a, radius_b) = (a.circumscribed().radius, b.circumscribed().radius);
-        let (pose_a, far) = (random.pose(0.3), random.pose(2.5 * (radius_a + radius_b)));
-        let first = distance(a, &pose_a, b, &far, &tight(), &mut WarmStart::default());
+        let first = distance(&a, &pose_a, &b, &far, &tight(), &mut WarmStart::default());
         let n = first.normal.expect("apart");
         let gap = GAPS[(seed % GAPS.len() as u64) as usize];
         // Along the normal both witnesses stay what they are: the gap is what it is meant to be.
@@ -130,13 +128,13 @@ impl<'a> Draw<'a> {
         Self { a, b, pose_a, pose_b, before, gap, label }
     }
 
-    fn bodies(&self) -> (&'a Body, &'a Body) {
-        (self.a, self.b)
+    fn bodies(&self) -> (&Body, &Body) {
+        (&self.a, &self.b)
     }
 
     /// A cold answer, and one that continues from the pose before.
     fn answers<T>(&self, solve: impl Fn(Placed<'_>, Placed<'_>, &mut WarmStart) -> T) -> [(&'static str, T); 2] {
-        let at = |pose_b: &Pose, warm: &mut WarmStart| solve((self.a, &self.pose_a), (self.b, pose_b), warm);
+        let at = |pose_b: &Pose, warm: &mut WarmStart| solve((&self.a, &self.pose_a), (&self.b, pose_b), warm);
         let mut warm = WarmStart::default();
         at(&self.before, &mut warm);
         [("cold", at(&self.pose_b, &mut WarmStart::default())), ("warm", at(&self.pose_b, &mut warm))]
@@ -160,7 +158,7 @@ fn family_20_distance_gradients() {
                 assert!(draw.gap < 1e-7, "{} {kind}: {answer:?} has no gradients", draw.label);
                 continue;
             };
-            let truth = reference::distance(draw.a, &draw.pose_a, draw.b, &draw.pose_b, &answer);
+            let truth = reference::distance(&draw.a, &draw.pose_a, &draw.b, &draw.pose_b, &answer);
             let label = || format!("{} {kind}: {answer:?}", draw.label);
             tally.add(deviation(&found, &truth.gradient, draw.bodies()), label, || false);
         }
@@ -182,7 +180,7 @@ fn family_20_gradients_of_parts_and_within_margins() {
             continue;
         }
         let options = Options::default();
-        let alone = distance(draw.a, &draw.pose_a, draw.b, &draw.pose_b, &tight(), &mut WarmStart::default());
+        let alone = distance(&draw.a, &draw.pose_a, &draw.b, &draw.pose_b, &tight(), &mut WarmStart::default());
         let behind = draw.pose_a.rotation().inverse_transform_vector(&alone.normal.expect("apart"));
         // Behind the body, but by the look of its ball nearer: it is asked about first.
         let (ball, across) = (draw.a.circumscribed(), behind.cross(&Vector3::ith(behind.iamin(), 1.0)));
@@ -191,10 +189,10 @@ fn family_20_gradients_of_parts_and_within_margins() {
         let needle = needle.moved(&turn, &(ball.center + behind * (3.0 * ball.radius))).expect("finite");
         let both = Compound::new("both", vec![needle, draw.a.clone()]).expect("two parts");
         let mut warm = WarmStart::default();
-        let of_part = distance(&both, &draw.pose_a, draw.b, &draw.pose_b, &options, &mut warm);
+        let of_part = distance(&both, &draw.pose_a, &draw.b, &draw.pose_b, &options, &mut warm);
         let mut warm = WarmStart::default();
         let margin = 2.0 * alone.upper;
-        let within = within_margin(draw.a, &draw.pose_a, draw.b, &draw.pose_b, margin, &options, &mut warm);
+        let within = within_margin(&draw.a, &draw.pose_a, &draw.b, &draw.pose_b, margin, &options, &mut warm);
         let WithinMargin::Within(within) = within.expect("a margin") else { panic!("{}: beyond", draw.label) };
         for (kind, answer) in [("part", of_part), ("within", within)] {
             let label = || format!("{} {kind}: {answer:?}", draw.label);
@@ -203,7 +201,7 @@ fn family_20_gradients_of_parts_and_within_margins() {
                 continue;
             };
             assert!(kind == "within" || answer.parts == [1, 0], "{}", label());
-            let truth = reference::distance(draw.a, &draw.pose_a, draw.b, &draw.pose_b, &answer);
+            let truth = reference::distance(&draw.a, &draw.pose_a, &draw.b, &draw.pose_b, &answer);
             tally.add(deviation(&found, &truth.gradient, draw.bodies()), label, || false);
         }
     }
@@ -228,7 +226,7 @@ fn family_20_level_gradients() {
                 level_distance(a.0, a.1, b.0, b.1, &options, warm)
             });
             for (kind, answer) in answers {
-                let (a, b) = ordered(swapped, (draw.a, &draw.pose_a), (draw.b, &draw.pose_b));
+                let (a, b) = ordered(swapped, (&draw.a, &draw.pose_a), (&draw.b, &draw.pose_b));
                 let label = || format!("{} swapped {swapped} {kind}: {answer:?}", draw.label);
                 if answer.saturated {
                     continue;
@@ -236,7 +234,7 @@ fn family_20_level_gradients() {
                 let truth = reference::level_distance(a.0, a.1, b.0, b.1, &answer);
                 let found = [answer.gradient_a, answer.gradient_b];
                 let value = |pose_a: &Pose, pose_b: &Pose| {
-                    let (a, b) = ordered(swapped, (draw.a, pose_a), (draw.b, pose_b));
+                    let (a, b) = ordered(swapped, (&draw.a, pose_a), (&draw.b, pose_b));
                     let answer = level_distance(a.0, a.1, b.0, b.1, &options, &mut WarmStart::default());
                     let truth = reference::level_distance(a.0, a.1, b.0, b.1, &answer);
                     assert!(truth.width() <= SHARP, "{}: {truth:?}", label());
@@ -261,12 +259,12 @@ fn family_20_growth_gradients() {
         let options = Options::default();
         for (kind, answer) in draw.answers(|a, b, warm| growth_distance(a.0, a.1, b.0, b.1, &options, warm)) {
             let label = || format!("{} {kind}: {answer:?}", draw.label);
-            let truth = growth_truth((draw.a, &draw.pose_a), (draw.b, &draw.pose_b), &answer)
+            let truth = growth_truth((&draw.a, &draw.pose_a), (&draw.b, &draw.pose_b), &answer)
                 .unwrap_or_else(|| panic!("{}: no reference", label()));
             let found = answer.gradients.unwrap_or_else(|| panic!("{}: no gradients", label()));
             let value = |pose_a: &Pose, pose_b: &Pose| {
-                let answer = growth_distance(draw.a, pose_a, draw.b, pose_b, &options, &mut WarmStart::default());
-                let truth = growth_truth((draw.a, pose_a), (draw.b, pose_b), &answer).expect("a reference");
+                let answer = growth_distance(&draw.a, pose_a, &draw.b, pose_b, &options, &mut WarmStart::default());
+                let truth = growth_truth((&draw.a, pose_a), (&draw.b, pose_b), &answer).expect("a reference");
                 assert!(truth.width() <= SHARP, "{}: {truth:?}", label());
                 truth.upper
             };
@@ -299,7 +297,7 @@ fn family_20_signed_gradients() {
                 tied += 1;
                 continue;
             }
-            let truth = reference::signed::signed_distance(draw.a, &draw.pose_a, draw.b, &draw.pose_b, &answer)
+            let truth = reference::signed::signed_distance(&draw.a, &draw.pose_a, &draw.b, &draw.pose_b, &answer)
                 .unwrap_or_else(|| panic!("{}: no reference", label()));
             let found = answer.gradients.unwrap_or_else(|| panic!("{}: no gradients", label()));
             tally.add(deviation(&found, &truth.gradient, draw.bodies()), label, || false);
@@ -309,26 +307,20 @@ fn family_20_signed_gradients() {
     tally.verdict(300);
 }
 
-/// Whether an answer flags a tie, and its normal.
-type Flagged = (bool, Vector3<f64>);
-
 /// Ties and switching gradients: symmetric poses: two ways out of a box, across a plate, along
 /// mirror planes. The flag is set where they are equally short, and wherever the normal jumps.
 #[test]
 fn family_21_ties_and_switching_gradients() {
-    let balls = [e(0.2, 0.2, 0.2), q(4, 0.3, 0.2, 0.25), b(0.3, 0.2, 0.25), q(8, 0.2, 0.3, 0.2)];
-    let hosts = [b(1.0, 1.0, 1.0), b(1.0, 0.5, 2.0), q(8, 1.0, 1.0, 1.0), e(1.0, 1.0, 1.5), q(4, 1.0, 0.5, 1.0)];
     let mut jumps = 0;
     for seed in 0..draws(60) {
         let mut random = Seeded(210_000 + seed);
-        let (a, host) = (&balls[random.index(balls.len())], &hosts[random.index(hosts.len())]);
-        // Both turned alike; half of the time by nothing, so that ties are exact.
+        // Half of the time turned by nothing, so that ties are exact.
         let turn = if seed % 2 == 0 { UnitQuaternion::identity() } else { random.rotation() };
-        let still = pose(Vector3::zeros(), &turn);
-        let depth_accuracy = [1e-3, 1e-5][(seed / 2 % 2) as usize];
-        let options = Options::default().with_depth_accuracy(depth_accuracy).expect("in range");
+        let case = ways_out(&turn, &mut random);
+        let (a, host, still) = (&case.inner, &case.host, case.still());
+        let options = Options::default().with_depth_accuracy(case.depth_accuracy).expect("in range");
         let solve = |x: Vector3<f64>, warm: &mut WarmStart, label: &str| -> Flagged {
-            let moved = pose(turn * x, &turn);
+            let moved = case.place(&x);
             let answer = signed_distance(a, &moved, host, &still, &options, warm);
             let deep = penetration(a, &moved, host, &still, &options, &mut WarmStart::default());
             let label = format!("{label}: {answer:?} {deep:?}");
@@ -344,45 +336,14 @@ fn family_21_ties_and_switching_gradients() {
         assert!(tied, "seed {seed} {}-{}: concentric and not flagged", a.name(), host.name());
         // Mirror planes of the pair between two of its ways out: through the centre, and across a
         // diagonal of cubes.
-        let from = Vector3::from_fn(|_, _| 0.3 * random.signed());
-        let mirrored = Vector3::new(-from.x, from.y, from.z);
-        let label = format!("seed {seed} {}-{} from {from:?}", a.name(), host.name());
-        jumps += jumps_are_flagged(&from, &mirrored, |x, warm| solve(x, warm, &label));
-        let axis = random.index(3);
-        let other = Vector3::from_fn(|i, _| if i == axis { 0.35 } else { 0.05 * random.signed() });
-        jumps += jumps_are_flagged(&from, &other, |x, warm| solve(x, warm, &label));
+        for [from, to] in &case.lines {
+            let label = format!("seed {seed} {}-{} from {from:?}", a.name(), host.name());
+            let line = follow(false, |t, warm| solve(from + (to - from) * t, warm, &label));
+            assert!(line.unflagged.is_none(), "{label}: the normal jumps without a flag: {line:?}");
+            jumps += line.count;
+        }
     }
     assert!(jumps >= 20, "only {jumps} jumps were met");
-}
-
-/// Follows a line from one point to another in small steps, and narrows down each jump of the
-/// normal until a flag is met; returns the number of jumps.
-fn jumps_are_flagged(
-    from: &Vector3<f64>,
-    to: &Vector3<f64>,
-    solve: impl Fn(Vector3<f64>, &mut WarmStart) -> Flagged,
-) -> u32 {
-    let at = |t: f64| from + (to - from) * t;
-    let mut warm = WarmStart::default();
-    let mut last = (0.0, solve(at(0.0), &mut warm));
-    let mut jumps = 0;
-    for k in 1..=20 {
-        let t = f64::from(k) / 20.0;
-        let found = solve(at(t), &mut warm);
-        let (mut low, mut high) = (last, (t, found));
-        let jumped = |p: &Flagged, q: &Flagged| !p.0 && !q.0 && (p.1 - q.1).norm() > 0.3;
-        if jumped(&low.1, &high.1) {
-            jumps += 1;
-            while jumped(&low.1, &high.1) {
-                let middle = 0.5 * (low.0 + high.0);
-                assert!(high.0 - low.0 > 1e-12, "the normal jumps at {} without a flag: {low:?} {high:?}", at(middle));
-                let found = (middle, solve(at(middle), &mut WarmStart::default()));
-                *(if jumped(&low.1, &found.1) { &mut high } else { &mut low }) = found;
-            }
-        }
-        last = (t, found);
-    }
-    jumps
 }
 
 /// Minimum over pairs: the gradient of a distance of compounds is that of its closest parts
@@ -392,13 +353,7 @@ fn family_21_minimum_over_pairs() {
     let mut changes = 0;
     for seed in 0..draws(60) {
         let mut random = Seeded(211_000 + seed);
-        let part = |random: &mut Seeded, side: f64| {
-            let body = if random.index(2) == 0 { e(0.5, 0.3, 0.4) } else { q(4, 0.4, 0.5, 0.3) };
-            body.moved(&random.rotation(), &Vector3::new(side, 0.0, 0.0)).expect("finite")
-        };
-        let parts = vec![part(&mut random, -1.0), part(&mut random, 1.0)];
-        let both = Compound::new("both", parts.clone()).expect("two parts");
-        let other = q(6, 0.6, 0.5, 0.4);
+        let Parts { parts, both, third: other } = any_parts(&mut random);
         let (frame, turn) = (random.pose(0.1), random.rotation());
         let options = Options::default();
         let least = parts.iter().map(|part| part.circumscribed().radius).fold(f64::INFINITY, f64::min);
@@ -408,7 +363,7 @@ fn family_21_minimum_over_pairs() {
         for k in -40..=40 {
             // Finer and finer towards the middle, where the closest parts change.
             let x = f64::from(i32::signum(k)) * 10_f64.powf((f64::from(k.abs()) - 40.0) * 0.25);
-            let place = frame.transform_point(&Vector3::new(x, 2.0, 0.3));
+            let place = frame.transform_point(&Parts::passing(x));
             let pose_b = pose(place, &turn);
             let found = distance(&both, &frame, &other, &pose_b, &options, &mut warm);
             let each: Vec<_> = parts

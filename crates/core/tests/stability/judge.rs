@@ -5,7 +5,26 @@ use sublevel_core::measure::{
     DEFAULT_ACCURACY, Distance, LevelDistance, MAX_ITERATIONS, Options, Status, WarmStart, distance, level_distance,
 };
 use sublevel_testkit::bodies::Placed;
+use sublevel_testkit::catalogue::Case;
 use sublevel_testkit::reference;
+
+/// As [`all`], of a case.
+pub(crate) fn all_of(case: &Case, label: &str) -> (Distance, reference::distance::Truth) {
+    let (a, b) = case.placed();
+    all(a, b, label)
+}
+
+/// As [`judged`], of a case, with its own accuracy and limit.
+pub(crate) fn judged_of(case: &Case, label: &str) -> (Distance, reference::distance::Truth) {
+    let (a, b) = case.placed();
+    judged(a, b, &options_of(case), label)
+}
+
+/// What a case asks for.
+pub(crate) fn options_of(case: &Case) -> Options<'static> {
+    let options = Options::default().with_accuracy(case.accuracy).expect("in range");
+    options.with_max_iterations(case.limit.unwrap_or(MAX_ITERATIONS)).expect("in range")
+}
 
 /// The size that lengths are relative to: the circumradius of the smaller body.
 pub(crate) fn small(a: &Body, b: &Body) -> f64 {

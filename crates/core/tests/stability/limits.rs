@@ -1,16 +1,15 @@
 //! Families about limits, hints and bad input: 2, 18, 25.
 
-use crate::judge::{judged, judged_level, plain, small, verdict, warm};
-use nalgebra::{DMatrix, Matrix3, UnitQuaternion, Vector3};
+use crate::judge::{judged, judged_level, options_of, plain, small, verdict, warm};
+use nalgebra::UnitQuaternion;
 use std::sync::atomic::AtomicBool;
-use sublevel_core::body::{Body, BodyError, Constraint, Normalization};
 use sublevel_core::measure::{
-    Distance, Options, OptionsError, Pose, PoseError, Status, WarmStart, distance, distance_batch, growth_distance,
-    level_distance,
+    Distance, Options, Pose, Status, WarmStart, distance, distance_batch, growth_distance, level_distance,
 };
-use sublevel_core::polynomial::{HessianGram, Polynomial, PolynomialError};
-use sublevel_testkit::bodies::{b, e, fitted, p, q, zoo};
-use sublevel_testkit::random::{Seeded, draws, pose, shifted};
+use sublevel_testkit::bodies::{fitted, zoo};
+use sublevel_testkit::catalogue::data::{EXTREMES, KINDS, attempts, extreme, nearly_orthonormal};
+use sublevel_testkit::catalogue::limits::{Hints, LIMITS, bad_hints, few_iterations};
+use sublevel_testkit::random::{Seeded, draws, pose};
 use sublevel_testkit::reference;
 
 /// Iteration limit passed off as an answer: limit 1, 2, 3: status not converged and the bracket
@@ -19,37 +18,33 @@ use sublevel_testkit::reference;
 fn family_02_iteration_limit() {
     let zoo = zoo();
     let (mut wide, mut narrow) = (0, 0);
-    for seed in 0..200 {
-        let mut random = Seeded(20_000 + seed);
-        let (a, b) = (&zoo[random.index(zoo.len())], &zoo[random.index(zoo.len())]);
-        let sum = a.circumscribed().radius + b.circumscribed().radius;
-        let reach = sum * random.between(0.2, 4.0);
-        let (pose_a, pose_b) = (random.pose(0.2), random.pose(reach));
-        let full = plain((a, &pose_a), (b, &pose_b), &Options::default(), &format!("seed {seed}"));
-        let full_level = level_distance(a, &pose_a, b, &pose_b, &Options::default(), &mut WarmStart::default());
-        for limit in 1..=3 {
+    for seed in 20_000..20_200 {
+        for limit in LIMITS {
+            let case = few_iterations(limit, &zoo, &mut Seeded(seed));
+            let ((a, pose_a), (b, pose_b)) = case.placed();
+            let label = format!("seed {seed} {}", case.what);
+            let full = plain((a, pose_a), (b, pose_b), &Options::default(), &label);
+            let full_level = level_distance(a, pose_a, b, pose_b, &Options::default(), &mut WarmStart::default());
             // The limit and the honest status are part of every verdict.
-            let options = Options::default().with_max_iterations(limit).unwrap();
-            let label = format!("seed {seed} limit {limit}");
-            let answer = plain((a, &pose_a), (b, &pose_b), &options, &label);
+            let options = options_of(&case);
+            let answer = plain((a, pose_a), (b, pose_b), &options, &label);
             // The reference needs a start near the solution, which is what the limit denies.
-            let truth = reference::distance(a, &pose_a, b, &pose_b, &full);
+            let truth = reference::distance(a, pose_a, b, pose_b, &full);
             assert!(truth.width() <= 1e-16 * small(a, b) && truth.inside(&answer), "{label}: {answer:?}");
-            let level = level_distance(a, &pose_a, b, &pose_b, &options, &mut WarmStart::default());
-            let truth = reference::level_distance(a, &pose_a, b, &pose_b, &full_level);
-            assert!(
-                truth.width() <= 1e-12 * truth.value().abs().max(1.0) && truth.inside(&level),
-                "{label}: {level:?}"
-            );
+            let level = level_distance(a, pose_a, b, pose_b, &options, &mut WarmStart::default());
+            let truth_of_level = reference::level_distance(a, pose_a, b, pose_b, &full_level);
+            let sharp = 1e-12 * truth_of_level.value().abs().max(1.0);
+            assert!(truth_of_level.width() <= sharp && truth_of_level.inside(&level), "{label}: {level:?}");
             assert!(level.iterations <= limit, "{label}: {level:?}");
             *(if answer.status == Status::BracketWide { &mut wide } else { &mut narrow }) += 1;
+
+            let stop = AtomicBool::new(true);
+            let options = Options::default().with_stop(&stop);
+            let answer = plain((a, pose_a), (b, pose_b), &options, &format!("{label} stopped"));
+            assert!(truth.inside(&answer), "{label} stopped: {answer:?}");
+            let level = level_distance(a, pose_a, b, pose_b, &options, &mut WarmStart::default());
+            assert!(answer.iterations <= 1 && level.iterations <= 1, "stopped, yet {answer:?} {level:?}");
         }
-        let stop = AtomicBool::new(true);
-        let options = Options::default().with_stop(&stop);
-        let answer = plain((a, &pose_a), (b, &pose_b), &options, &format!("seed {seed} stopped"));
-        assert!(reference::distance(a, &pose_a, b, &pose_b, &full).inside(&answer), "seed {seed} stopped: {answer:?}");
-        let level = level_distance(a, &pose_a, b, &pose_b, &options, &mut WarmStart::default());
-        assert!(answer.iterations <= 1 && level.iterations <= 1, "stopped, yet {answer:?} {level:?}");
     }
     println!("{wide} wide, {narrow} narrow");
     // A flat pair far from its start cannot be solved in one iteration.
@@ -103,144 +98,56 @@ fn fitted_bodies_take_few_iterations() {
 #[test]
 fn family_18_bad_warm_start() {
     let zoo = zoo();
-    // Overflow fills a hint with what floating point has to offer.
-    let tiny = q(8, 1e-24, 1e-24, 1e-24);
-    let nowhere = pose(Vector3::new(1e15, -1e15, 1e15), &UnitQuaternion::identity());
-    let mut bad = Vec::new();
-    for (a, b) in [(&tiny, &tiny), (&tiny, &zoo[0]), (&zoo[0], &tiny)] {
-        let mut hint = WarmStart::default();
-        sublevel_core::measure::distance(a, &Pose::identity(), b, &nowhere, &Options::default(), &mut hint);
-        bad.push(hint);
-        level_distance(a, &Pose::identity(), b, &nowhere, &Options::default(), &mut hint);
-        bad.push(hint);
-    }
-    for seed in 0..200 {
-        let mut random = Seeded(180_000 + seed);
-        let (a, b) = (&zoo[random.index(zoo.len())], &zoo[random.index(zoo.len())]);
-        let (other_a, other_b) = (&zoo[random.index(zoo.len())], &zoo[random.index(zoo.len())]);
-        let sum = a.circumscribed().radius + b.circumscribed().radius;
-        let reach = sum * random.between(0.3, 3.0);
-        let (pose_a, pose_b) = (random.pose(0.2), random.pose(reach));
+    for seed in 180_000..180_200 {
+        let Hints { case, sources } = bad_hints(&zoo, &mut Seeded(seed));
+        let ((a, pose_a), (b, pose_b)) = case.placed();
         let options = Options::default();
-        let (cold, _) = judged((a, &pose_a), (b, &pose_b), &options, &format!("seed {seed} cold"));
-        let mut hints = bad.clone();
-        let mut hint = |a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose| {
+        let (cold, _) = judged((a, pose_a), (b, pose_b), &options, &format!("seed {seed} cold"));
+        let mut hints = Vec::new();
+        for (p, pose_p, q, pose_q) in &sources {
             let mut hint = WarmStart::default();
-            sublevel_core::measure::distance(a, pose_a, b, pose_b, &options, &mut hint);
+            distance(p, pose_p, q, pose_q, &options, &mut hint);
             hints.push(hint);
-            level_distance(a, pose_a, b, pose_b, &options, &mut hint);
+            level_distance(p, pose_p, q, pose_q, &options, &mut hint);
             hints.push(hint);
-        };
-        // Previous: a small step before; another pair's; the same pair swapped; from the other side
-        // of the world.
-        hint(a, &pose_a, b, &shifted(&pose_b, random.unit() * 0.01 * sum));
-        hint(other_a, &pose_a, other_b, &pose_b);
-        hint(b, &pose_b, a, &pose_a);
-        let half_turn = UnitQuaternion::from_scaled_axis(random.unit() * std::f64::consts::PI);
-        hint(a, &pose_a, b, &pose(-pose_b.translation(), &(half_turn * pose_b.rotation())));
-        hint(a, &pose_a, b, &pose_a);
-        let level = level_distance(a, &pose_a, b, &pose_b, &options, &mut WarmStart::default());
+        }
+        let level = level_distance(a, pose_a, b, pose_b, &options, &mut WarmStart::default());
         for (k, hint) in hints.iter().enumerate() {
             let label = format!("seed {seed} hint {k} {hint:?}");
-            let answer = warm((a, &pose_a), (b, &pose_b), &options, &mut hint.clone(), &label);
-            verdict((a, &pose_a), (b, &pose_b), &answer, &label);
+            let answer = warm((a, pose_a), (b, pose_b), &options, &mut hint.clone(), &label);
+            verdict((a, pose_a), (b, pose_b), &answer, &label);
             assert_eq!(answer.status, Status::Converged, "{label}: {answer:?}");
             assert!(answer.lower <= cold.upper && cold.lower <= answer.upper, "{label}: {cold:?} {answer:?}");
             assert!((answer.value() - cold.value()).abs() <= 1e-9 * small(a, b), "{label}: {cold:?} {answer:?}");
-            let again = level_distance(a, &pose_a, b, &pose_b, &options, &mut hint.clone());
+            let again = level_distance(a, pose_a, b, pose_b, &options, &mut hint.clone());
             assert_eq!(again.status, Status::Converged, "{label}: {again:?}");
             assert!(again.lower <= level.upper && level.lower <= again.upper, "{label}: {level:?} {again:?}");
         }
     }
 }
 
-fn square(coefficients: [f64; 3], constant: f64) -> Result<Polynomial, PolynomialError> {
-    let axis = |i: usize| std::array::from_fn(|j| if i == j { 2 } else { 0 });
-    let mut terms: Vec<_> = (0..3).map(|i| (axis(i), coefficients[i])).collect();
-    terms.push(([0, 0, 0], constant));
-    Polynomial::new(terms)
-}
-
-fn ball_of(coefficients: [f64; 3], constant: f64, linear: Matrix3<f64>) -> Result<Body, BodyError> {
-    let polynomial = square(coefficients, constant).expect("finite");
-    let matrix = DMatrix::from_diagonal(&nalgebra::DVector::from_iterator(3, coefficients.iter().map(|c| 2.0 * c)));
-    let gram = HessianGram::new(HessianGram::full_basis(2), matrix).expect("well formed");
-    Body::new("ball", Normalization { center: Vector3::zeros(), linear }, vec![Constraint { polynomial, gram }])
-}
-
 /// Ill-conditioned data: min p = 1 - 1e-12, radius 1e-8, coefficients 1e±12, perturbed Gram, NaN,
 /// non-orthonormal rotation: rejected or flagged.
 #[test]
 fn family_25_ill_conditioned_data() {
-    // Too shallow to be distinguished from empty.
-    assert!(matches!(ball_of([1.0; 3], 1.0 - 1e-12, Matrix3::identity()), Err(BodyError::Interior { .. })));
+    for attempt in (0..KINDS).flat_map(attempts) {
+        assert!(attempt.is_right(), "{attempt:?}");
+    }
     // A radius of 1e-8 and coefficients of 1e±12 are refused, or served within their bracket.
-    let partner = e(1.0, 0.5, 0.7);
-    let small_ball = Body::ball("small", Vector3::zeros(), 1e-8);
-    let bodies = [
-        small_ball,
-        ball_of([1e12; 3], 0.0, Matrix3::identity()),
-        ball_of([1e-12; 3], 0.0, Matrix3::identity()),
-        ball_of([1e12, 1.0, 1e-12], 0.0, Matrix3::identity()),
-        ball_of([1.0; 3], 0.0, Matrix3::from_diagonal(&Vector3::new(1e8, 1.0, 1e-4))),
-    ];
-    for (k, body) in bodies.iter().enumerate() {
-        let Ok(body) = body else {
-            println!("{k}: {}", body.as_ref().unwrap_err());
-            continue;
-        };
-        for seed in 0..5 {
-            let mut random = Seeded(250_000 + seed);
-            let reach = 2.0 * random.positive() + 1.5 * body.circumscribed().radius;
-            let (pose_a, pose_b) = (random.pose(0.1), random.pose(reach));
-            let label = format!("body {k} seed {seed}");
-            judged((body, &pose_a), (&partner, &pose_b), &Options::default(), &label);
-            judged_level((body, &pose_a), (&partner, &pose_b), &Options::default(), &label);
-            judged_level((&partner, &pose_b), (body, &pose_a), &Options::default(), &label);
+    for kind in 0..EXTREMES {
+        for seed in 250_000..250_005 {
+            let Some(case) = extreme(kind, &mut Seeded(seed)) else {
+                println!("body {kind} is refused");
+                continue;
+            };
+            let (a, b) = case.placed();
+            let label = format!("body {kind} seed {seed}");
+            judged(a, b, &Options::default(), &label);
+            judged_level(a, b, &Options::default(), &label);
+            judged_level(b, a, &Options::default(), &label);
         }
     }
-    // A Gram matrix that is off.
-    let polynomial = square([1.0; 3], 0.0).unwrap();
-    for off in [1e-3, 1.0, -1.0, 3.0] {
-        let mut matrix = DMatrix::identity(3, 3) * 2.0;
-        matrix[(0, 0)] += off;
-        let gram = HessianGram::new(HessianGram::full_basis(2), matrix).unwrap();
-        let made = Body::new(
-            "off",
-            Normalization { center: Vector3::zeros(), linear: Matrix3::identity() },
-            vec![Constraint { polynomial: polynomial.clone(), gram }],
-        );
-        // The smallest eigenvalue pays for a small residual, never for a gross one.
-        assert!(made.is_ok() == (off == 1e-3 || off == 1.0), "{off}: {made:?}");
-    }
-    assert!(matches!(square([f64::NAN, 1.0, 1.0], 0.0), Err(PolynomialError::NotFinite { .. })));
-    assert!(matches!(square([f64::INFINITY, 1.0, 1.0], 0.0), Err(PolynomialError::NotFinite { .. })));
-    for bad in [f64::NAN, f64::INFINITY, 0.0, -1.0] {
-        assert!(Body::ball("bad", Vector3::zeros(), bad).is_err());
-        assert!(Body::cuboid("bad", Vector3::new(1.0, bad, 1.0)).is_err());
-        assert!(Body::cylinder("bad", 1.0, bad).is_err());
-        assert!(Body::ball("bad", Vector3::new(bad, 0.0, 0.0), 1.0).is_err() || bad.abs() <= 1.0);
-        assert!(Options::default().with_accuracy(bad).is_err());
-    }
-    assert!(matches!(Options::default().with_max_iterations(0), Err(OptionsError::Iterations(0))));
-    let none = Vector3::zeros();
-    for quaternion in [[f64::NAN, 0.0, 0.0, 1.0], [0.0; 4], [0.0, 0.0, 0.0, 1.001], [f64::INFINITY, 0.0, 0.0, 0.0]] {
-        assert!(Pose::from_quaternion(none, quaternion).is_err());
-    }
-    assert!(matches!(
-        Pose::from_quaternion(Vector3::new(0.0, f64::NAN, 0.0), [0.0, 0.0, 0.0, 1.0]),
-        Err(PoseError::NotFinite { .. })
-    ));
-    let sheared = Matrix3::new(1.0, 1e-3, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
-    for matrix in
-        [sheared, Matrix3::identity() * 1.01, -Matrix3::identity(), Matrix3::zeros(), Matrix3::repeat(f64::NAN)]
-    {
-        assert!(Pose::from_matrix(&matrix, none).is_err());
-    }
-    // Deviations that are taken are removed, not carried along.
-    let nearly =
-        UnitQuaternion::from_scaled_axis(Vector3::new(0.3, 0.2, 0.1)).to_rotation_matrix().into_inner() * (1.0 + 1e-7);
-    let (a, b) = (p(4, 0.5), b(0.3, 0.2, 0.4));
-    let pose_a = Pose::from_matrix(&nearly, Vector3::new(2.0, 0.0, 0.0)).unwrap();
-    judged((&a, &pose_a), (&b, &Pose::identity()), &Options::default(), "nearly orthonormal");
+    let case = nearly_orthonormal();
+    let (a, b) = case.placed();
+    judged(a, b, &Options::default(), &case.what);
 }

@@ -1,20 +1,14 @@
 //! Overlap: 16, 27.
 
-use super::super::case::{Case, CaseError, Verdict};
-use super::super::method::{Method, pose, sampled};
-use super::super::zoo::{b, c, cylinder, e, q, zoo};
-use super::{any, random, somewhere};
+use super::super::method::{Method, sampled};
+use super::super::question::{CaseError, Question, Verdict};
+use super::random;
 use crate::comparison::{Hulls, parry_pose};
 use nalgebra::Vector3;
-use sublevel::measure::{
-    Options, Pose, SignedDistance, Status, WarmStart, growth_distance, level_distance, signed_distance,
-};
-
-/// Offsets of a slide, from touching to concentric.
-const STEPS: u32 = 12;
-
-/// How near to both ends there are more of them, relative to the whole slide.
-const ENDS: [f64; 5] = [1e-3, 1e-6, 1e-9, 1e-12, 1e-15];
+use sublevel::measure::{Options, SignedDistance, Status, WarmStart, growth_distance, level_distance, signed_distance};
+use sublevel_testkit::bodies::chart_zoo;
+use sublevel_testkit::catalogue::Case;
+use sublevel_testkit::catalogue::depth::{self, Saturation, Slide};
 
 /// Offset from the common centre, relative to the whole slide, up to which the mirrored way out is
 /// as short, and reported.
@@ -40,26 +34,15 @@ pub(super) fn slide(seed: u64, method: Method) -> Result<Option<Verdict>, CaseEr
     if !matches!(method, Method::Cold | Method::Warm | Method::Parry) {
         return Ok(None);
     }
-    let mut random = random(16, seed);
-    let bodies = [
-        e(1.0, 0.7, 0.4)?,
-        e(0.5, 0.5, 0.5)?,
-        q(4, 0.8, 0.5, 1.1)?,
-        q(8, 1.0, 0.6, 0.3)?,
-        c(6, 0.8, 0.3)?,
-        b(0.6, 0.9, 0.3)?,
-        cylinder(0.5, 0.8)?,
-    ];
-    let (a, b) = (&bodies[random.index(7)], &bodies[random.index(7)]);
-    let (pose_a, turn, direction) = (somewhere(&mut random, 0.3)?, random.rotation(), random.direction());
-    let place = |offset: f64| pose(pose_a.translation() + direction * offset, &turn);
+    let slide = depth::slide(false, &mut random(16, seed));
+    let Slide { a, pose_a, b, .. } = &slide;
     let small = a.circumscribed().radius.min(b.circumscribed().radius);
     // The offset at which they touch.
     let (mut inside, mut outside) = (0.0, 2.0 * (a.circumscribed().radius + b.circumscribed().radius));
     for _ in 0..60 {
         let middle = 0.5 * (inside + outside);
-        let case = Case::new(a, pose_a, b, place(middle)?, String::new());
-        *(if case.ours(Method::Cold)?.upper > 0.0 { &mut outside } else { &mut inside }) = middle;
+        let question = Question(Case::new(a, *pose_a, b, slide.place(middle), "on a slide"));
+        *(if question.ours(Method::Cold)?.upper > 0.0 { &mut outside } else { &mut inside }) = middle;
     }
     let hulls = match method {
         Method::Parry => {
@@ -71,21 +54,18 @@ pub(super) fn slide(seed: u64, method: Method) -> Result<Option<Verdict>, CaseEr
     let options = Options::default();
     let mut warm = WarmStart::default();
     let mut last: Option<Step> = None;
-    let mut shares: Vec<f64> = (0..=STEPS).map(|k| 1.05 - 1.05 * f64::from(k) / f64::from(STEPS)).collect();
-    shares.extend(ENDS.iter().flat_map(|near| [1.0 - near, *near]));
-    shares.sort_by(|p, q| q.total_cmp(p));
-    for share in shares {
+    for share in Slide::shares() {
         let offset = inside * share;
-        let pose_b = place(offset)?;
+        let pose_b = slide.place(offset);
         let (step, slack) = if let Some(hulls) = &hulls {
-            let relative = parry_pose(&pose_a).inverse() * parry_pose(&pose_b);
+            let relative = parry_pose(pose_a).inverse() * parry_pose(&pose_b);
             let Some(value) = hulls.signed_distance(&relative) else { return Ok(Some(Verdict::NoAnswer)) };
             (Step { offset, value, lower: value, upper: value, tied: false }, PEER_ERROR * small)
         } else {
             if method == Method::Cold {
                 warm = WarmStart::default();
             }
-            let answer = signed_distance(a, &pose_a, b, &pose_b, &options, &mut warm);
+            let answer = signed_distance(a, pose_a, b, &pose_b, &options, &mut warm);
             let SignedDistance { status, lower, upper, tied, normal, .. } = answer;
             let what = |what: &str| {
                 let pair = format!("{}-{} at {share:e} of the slide", a.name(), b.name());
@@ -130,23 +110,20 @@ pub(super) fn saturation(seed: u64, method: Method) -> Result<Option<Verdict>, C
     if !matches!(method, Method::Cold | Method::Warm) {
         return Ok(None);
     }
-    let mut random = random(27, seed);
-    let (a, b) = (any(&mut random, zoo()?), any(&mut random, zoo()?));
-    let (pose_a, turn, direction) = (somewhere(&mut random, 0.3)?, random.rotation(), random.direction());
-    let meet = pose_a.transform_point(&a.growth_ball().center) - turn * b.growth_ball().center;
-    let sum = a.circumscribed().radius + b.circumscribed().radius;
+    let pair = depth::saturation(chart_zoo(), &mut random(27, seed));
+    let Saturation { a, pose_a, b, meet, .. } = &pair;
     let options = Options::default();
     let (mut growth_warm, mut level_warm) = (WarmStart::default(), WarmStart::default());
     // Bounds of the growth distance per metre of the centres' distance.
     let (mut low, mut high) = (0.0_f64, f64::INFINITY);
-    for share in [1.2, 0.5, 0.2, 0.1, 1e-2, 1e-4, 1e-6] {
+    for share in Saturation::SHARES {
         if method == Method::Cold {
             (growth_warm, level_warm) = (WarmStart::default(), WarmStart::default());
         }
-        let pose_b: Pose = pose(meet + direction * (sum * share), &turn)?;
-        let apart = pose_b.transform_point(&b.growth_ball().center) - pose_a.transform_point(&a.growth_ball().center);
-        let known = 1e-14 * (sum + meet.norm());
-        let growth = growth_distance(a, &pose_a, b, &pose_b, &options, &mut growth_warm);
+        let pose_b = pair.place(share);
+        let apart = pair.centres(&pose_b);
+        let known = 1e-14 * (pair.sum() + meet.norm());
+        let growth = growth_distance(a, pose_a, b, &pose_b, &options, &mut growth_warm);
         if growth.status != Status::Converged {
             return Ok(Some(Verdict::WrongStatus("the growth distance is still wide".into())));
         }
@@ -155,9 +132,8 @@ pub(super) fn saturation(seed: u64, method: Method) -> Result<Option<Verdict>, C
         if !(low <= high * (1.0 + 1e-12)) {
             return Ok(Some(Verdict::Off(low / high - 1.0)));
         }
-        let level = level_distance(a, &pose_a, b, &pose_b, &options, &mut level_warm);
-        let seed_place = pose_a.transform_point(a.interior_point()) - pose_b.translation();
-        let value = b.value(&pose_b.rotation().inverse_transform_vector(&seed_place));
+        let level = level_distance(a, pose_a, b, &pose_b, &options, &mut level_warm);
+        let value = pair.seed_level(&pose_b);
         // Near the boundary, and where the value is all but the least, either is right.
         let is_free = value > 1.0 + 1e-6 && level.lower > a.min_value() + 1e-6;
         if (level.saturated && is_free) || (!level.saturated && value < 1.0 - 1e-6) {

@@ -1,12 +1,15 @@
 //! Gradients against differences: 20, and both sides of contact for 8.
 
-use super::super::case::{Case, CaseError, Verdict};
-use super::super::method::{Method, pose};
-use super::super::zoo::zoo;
-use super::{any, moved_to, random, somewhere};
-use nalgebra::{UnitQuaternion, Vector3};
+use super::super::method::Method;
+use super::super::question::{CaseError, Question, Verdict};
+use super::random;
+use nalgebra::Vector3;
 use sublevel::body::Body;
 use sublevel::measure::{Options, Pose, Twist, WarmStart, distance, growth_distance, level_distance, signed_distance};
+use sublevel_testkit::bodies::chart_zoo;
+use sublevel_testkit::catalogue::Case;
+use sublevel_testkit::catalogue::derivatives::{APART, GAPS, apart};
+use sublevel_testkit::random::twisted;
 
 /// Largest error of a gradient, relative to its norm.
 const ERROR: f64 = 1e-6;
@@ -19,11 +22,6 @@ const DOUBT: f64 = 2e-7;
 
 /// Steps of differences, relative to the usual one, until one leaves no more open than [`DOUBT`].
 const STEPS: [f64; 7] = [1.0, 0.25, 4.0, 0.0625, 16.0, 0.015625, 64.0];
-
-/// Signed gaps, relative to the smaller body: far, near, grazing, touching, overlapping.
-const GAPS: [f64; 14] = [300.0, 10.0, 1.0, 0.1, 1e-2, 1e-4, 1e-6, 1e-8, 0.0, -1e-8, -1e-6, -1e-4, -1e-2, -0.1];
-/// How many of these are apart.
-const APART: u64 = 8;
 
 /// Draws of a case until one has a gradient: most have.
 const DRAWS: u32 = 20;
@@ -98,30 +96,30 @@ pub(super) fn gradient(seed: u64, method: Method) -> Result<Option<Verdict>, Cas
     }
     let mut random = random(20, seed);
     for _ in 0..DRAWS {
-        let (a, b) = (any(&mut random, zoo()?), any(&mut random, zoo()?));
+        let apart = apart(chart_zoo(), &mut random);
+        let ((a, _), (b, _)) = apart.placed();
         if method == Method::Newton && !(a.is_smooth() && b.is_smooth()) {
             return Ok(None);
         }
-        let sizes = a.circumscribed().radius + b.circumscribed().radius;
-        let small = a.circumscribed().radius.min(b.circumscribed().radius);
-        let regimes = if measure == Measure::Distance { APART } else { GAPS.len() as u64 };
-        let mut gap = GAPS[(seed / 4 % regimes) as usize];
+        let small = apart.small();
+        let regimes = if measure == Measure::Distance { APART } else { GAPS.len() };
+        let mut gap = GAPS[seed as usize / 4 % regimes];
         // Where edges touch, many planes part the bodies: the derivative on one side is not the one
         // on the other.
         let edged = !(a.is_smooth() && b.is_smooth());
         if edged && gap.abs() < 1e-2 {
             gap = 1e-2_f64.copysign(gap);
         }
-        let (pose_a, far) = (somewhere(&mut random, 0.3)?, somewhere(&mut random, 2.5 * sizes)?);
-        let apart = Case::new(a, pose_a, b, far, format!("{} at a gap of {gap:e}", measure.name()));
-        let case = moved_to(apart, gap * small)?;
+        let what = format!("{}-{} {} at a gap of {gap:e}", a.name(), b.name(), measure.name());
+        let case = Question(Case { what, ..apart }.moved_to(gap * small));
+        let (a, b) = (&case.a, &case.b);
         let answer = match method {
             Method::Newton => newton_gradients(&case)?,
             Method::Batch => Some(case.ours(method)?.gradients(&case.pose_a, &case.pose_b)),
             _ => {
                 let found = case.measured(method, |pose_b, warm| {
                     measure.of((a, b), [&case.pose_a, pose_b], &Options::default(), warm)
-                })?;
+                });
                 (!found.flagged).then_some(found.gradients)
             }
         };
@@ -133,13 +131,13 @@ pub(super) fn gradient(seed: u64, method: Method) -> Result<Option<Verdict>, Cas
             |poses: [&Pose; 2]| measure.through_contact().of((a, b), poses, &options, &mut WarmStart::default()).value;
         let usual = 2e-3 * (gap.abs() * small).clamp(0.1 * small, small);
         let differences = Differences { case: &case, value: &value };
-        return differences.verdict(&found, usual, Side::Both).map(Some);
+        return Ok(Some(differences.verdict(&found, usual, Side::Both)));
     }
     Ok(Some(Verdict::WrongStatus("the gradient is flagged in every draw".into())))
 }
 
 /// As the points of plain Newton show them; the inner one is none without an answer.
-fn newton_gradients(case: &Case) -> Result<Option<Option<[Twist; 2]>>, CaseError> {
+fn newton_gradients(case: &Question) -> Result<Option<Option<[Twist; 2]>>, CaseError> {
     let points = case.proposed(Method::Newton)?.and_then(|proposal| proposal.points);
     let normal = points.and_then(|[x, y]| (x - y).try_normalize(0.0));
     let (Some([x, y]), Some(n)) = (points, normal) else { return Ok(Some(None)) };
@@ -150,7 +148,7 @@ fn newton_gradients(case: &Case) -> Result<Option<Option<[Twist; 2]>>, CaseError
 
 /// The slopes of the signed distance of touching bodies, towards each other and away, are those
 /// that it says.
-pub(super) fn both_sides(case: &Case, method: Method) -> Result<Verdict, CaseError> {
+pub(super) fn both_sides(case: &Question, method: Method) -> Result<Verdict, CaseError> {
     let found = case.signed(method)?;
     let Some(gradients) = found.gradients else { return Ok(Verdict::NoAnswer) };
     if found.tied {
@@ -164,7 +162,7 @@ pub(super) fn both_sides(case: &Case, method: Method) -> Result<Verdict, CaseErr
     let value = |poses: [&Pose; 2]| Measure::Signed.of(bodies, poses, &options, &mut touching.clone()).value;
     let differences = Differences { case, value: &value };
     for side in [Side::Above, Side::Below] {
-        let verdict = differences.verdict(&gradients, 2e-4 * case.small(), side)?;
+        let verdict = differences.verdict(&gradients, 2e-4 * case.small(), side);
         if verdict != Verdict::Pass {
             return Ok(verdict);
         }
@@ -185,13 +183,13 @@ enum Side {
 /// Slopes of a measure along the 12 components of the twists of both bodies, angles in units of the
 /// bodies' sizes: all are per metre.
 struct Differences<'a> {
-    case: &'a Case,
+    case: &'a Question,
     value: &'a dyn Fn([&Pose; 2]) -> f64,
 }
 
 impl Differences<'_> {
     /// Holds gradients against differences of the first step that leaves little open.
-    fn verdict(&self, found: &[Twist; 2], usual: f64, side: Side) -> Result<Verdict, CaseError> {
+    fn verdict(&self, found: &[Twist; 2], usual: f64, side: Side) -> Verdict {
         let sizes = [self.case.a.circumscribed().radius, self.case.b.circumscribed().radius];
         let mut parts = [0.0; 12];
         for (k, part) in parts.iter_mut().enumerate() {
@@ -209,57 +207,37 @@ impl Differences<'_> {
                     Side::Below => -parts[k],
                 };
                 let h = (usual * step).copysign(towards);
-                (slopes[k], doubts[k]) = self.slope(k, h, sizes[k / 6], side)?;
+                (slopes[k], doubts[k]) = self.slope(k, h, sizes[k / 6], side);
                 off[k] = parts[k] - slopes[k];
             }
             least = least.min(norm(&doubts) / norm(&slopes));
             if least <= DOUBT {
                 let error = norm(&off) / norm(&slopes);
-                return Ok(if error <= ERROR { Verdict::Pass } else { Verdict::Off(error) });
+                return if error <= ERROR { Verdict::Pass } else { Verdict::Off(error) };
             }
         }
         let what = &self.case.what;
-        Ok(Verdict::WrongStatus(format!("{what}, differences of the value leave {least:.1e} open")))
+        Verdict::WrongStatus(format!("{what}, differences of the value leave {least:.1e} open"))
     }
 
     /// The slope along a component, extrapolated from three steps of which the first is h, and how
     /// much the last extrapolation changed.
-    fn slope(&self, k: usize, h: f64, size: f64, side: Side) -> Result<(f64, f64), CaseError> {
-        let after = |step: f64| -> Result<f64, CaseError> {
-            let Case { pose_a, pose_b, .. } = self.case;
+    fn slope(&self, k: usize, h: f64, size: f64, side: Side) -> (f64, f64) {
+        let after = |step: f64| {
+            let Case { pose_a, pose_b, .. } = &self.case.0;
             let step = if k % 6 < 3 { step } else { step / size };
-            let (moved_a, moved_b);
-            let poses = if k < 6 {
-                moved_a = twisted(pose_a, k, step)?;
-                [&moved_a, pose_b]
-            } else {
-                moved_b = twisted(pose_b, k - 6, step)?;
-                [pose_a, &moved_b]
-            };
-            Ok((self.value)(poses))
+            (self.value)([&twisted(pose_a, k, 0, step), &twisted(pose_b, k, 6, step)])
         };
         // Errors are series in h², of one-sided differences in h.
-        let (ratio, here) = if side == Side::Both { (4.0, None) } else { (2.0, Some(after(0.0)?)) };
-        let slope = |h: f64| -> Result<f64, CaseError> {
-            Ok(match here {
-                None => (after(h)? - after(-h)?) / (2.0 * h),
-                Some(here) => (after(h)? - here) / h,
-            })
+        let (ratio, here) = if side == Side::Both { (4.0, None) } else { (2.0, Some(after(0.0))) };
+        let slope = |h: f64| match here {
+            None => (after(h) - after(-h)) / (2.0 * h),
+            Some(here) => (after(h) - here) / h,
         };
-        let (one, two, four) = (slope(h)?, slope(h / 2.0)?, slope(h / 4.0)?);
+        let (one, two, four) = (slope(h), slope(h / 2.0), slope(h / 4.0));
         let better = |rough: f64, fine: f64, ratio: f64| (ratio * fine - rough) / (ratio - 1.0);
         let (first, second) = (better(one, two, ratio), better(two, four, ratio));
         let last = better(first, second, ratio * ratio);
-        Ok((last, (last - second).abs()))
-    }
-}
-
-/// The pose after a step along one component of a twist about its own translation.
-fn twisted(from: &Pose, component: usize, step: f64) -> Result<Pose, CaseError> {
-    let along = Vector3::ith(component % 3, step);
-    if component < 3 {
-        pose(from.translation() + along, from.rotation())
-    } else {
-        pose(*from.translation(), &(UnitQuaternion::from_scaled_axis(along) * from.rotation()))
+        (last, (last - second).abs())
     }
 }

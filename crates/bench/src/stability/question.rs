@@ -1,47 +1,30 @@
 //! One query of a family, and what came of it.
 
-use super::zoo::ZooError;
 use crate::comparison::PeerError;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use std::ops::Deref;
 use sublevel::body::Body;
-use sublevel::measure::{OptionsError, Pose, PoseError};
+use sublevel::measure::{OptionsError, Pose};
+use sublevel_testkit::catalogue::Case;
 
-/// Two bodies at their poses whose distance is asked for.
+/// A case of the catalogue that is put to methods.
 #[derive(Clone, Debug)]
-pub(super) struct Case {
-    pub(super) a: Body,
-    pub(super) pose_a: Pose,
-    pub(super) b: Body,
-    pub(super) pose_b: Pose,
-    /// Accuracy asked for, relative to the smaller body.
-    pub(super) accuracy: f64,
-    /// Most iterations, where the family is about that.
-    pub(super) limit: Option<u32>,
-    /// The distance, metres, where it is known.
-    pub(super) exact: Option<f64>,
-    /// Largest error of our answers, metres, where the family asks for more than a true bracket.
-    pub(super) bound: Option<f64>,
-    /// Largest width, metres, that the bracket of a case below the rounding floor may keep; it must
-    /// say so then.
-    pub(super) floor: f64,
-    /// What the case is, for people.
-    pub(super) what: String,
+pub(super) struct Question(pub(super) Case);
+
+impl Deref for Question {
+    type Target = Case;
+
+    fn deref(&self) -> &Case {
+        &self.0
+    }
 }
 
-impl Case {
-    /// At the default accuracy, with nothing known.
-    pub(super) fn new(a: &Body, pose_a: Pose, b: &Body, pose_b: Pose, what: String) -> Self {
-        let accuracy = sublevel::measure::DEFAULT_ACCURACY;
-        let what = format!("{}-{} {what}", a.name(), b.name());
-        let (a, b) = (a.clone(), b.clone());
-        Self { a, pose_a, b, pose_b, accuracy, limit: None, exact: None, bound: None, floor: 0.0, what }
-    }
-
+impl Question {
     /// Bodies, poses, our answer and the truth, for people.
     pub(super) fn describe(&self) -> String {
-        let Self { a, pose_a, b, pose_b, accuracy, what, .. } = self;
+        let Case { a, pose_a, b, pose_b, accuracy, what, .. } = &self.0;
         let placed = |body: &Body, pose: &Pose| {
             let sizes =
                 body.normalization().linear.try_inverse().map_or(Vector3::zeros(), |inverse| inverse.diagonal());
@@ -56,16 +39,6 @@ impl Case {
             placed(a, pose_a),
             placed(b, pose_b)
         )
-    }
-
-    /// Circumradius of the smaller body, metres.
-    pub(super) fn small(&self) -> f64 {
-        self.a.circumscribed().radius.min(self.b.circumscribed().radius)
-    }
-
-    /// Circumradius of the larger body, metres.
-    pub(super) fn large(&self) -> f64 {
-        self.a.circumscribed().radius.max(self.b.circumscribed().radius)
     }
 }
 
@@ -117,12 +90,6 @@ impl fmt::Display for Verdict {
 /// Why a case cannot even be put.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub(super) enum CaseError {
-    /// A body.
-    #[error(transparent)]
-    Zoo(#[from] ZooError),
-    /// A pose.
-    #[error(transparent)]
-    Pose(#[from] PoseError),
     /// Options of a query.
     #[error(transparent)]
     Options(#[from] OptionsError),
