@@ -18,6 +18,9 @@ use sublevel::service::proto::{
 use tonic::transport::{Channel, Endpoint};
 use tonic_types::StatusExt;
 
+/// Longest time that anything may take before it counts as hung. No test compares times.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(120);
+
 pub(crate) fn ball(radius: f64) -> Body {
     Body::ball("ball", nalgebra::Vector3::zeros(), radius).expect("a ball")
 }
@@ -121,8 +124,8 @@ impl Running {
         assert!(Command::new("kill").args([name, &pid]).status().expect("kill runs").success());
     }
 
-    /// Waits for the end, at most so long.
-    pub(crate) fn wait(&mut self, longest: Duration) -> ExitStatus {
+    /// Waits for the end, at most [`PATIENCE`].
+    pub(crate) fn wait(&mut self) -> ExitStatus {
         let start = Instant::now();
         loop {
             if let Some(status) = self.child.try_wait().expect("waited for") {
@@ -131,7 +134,7 @@ impl Running {
                 assert_eq!(rest, "", "stdout holds the first line only");
                 return status;
             }
-            assert!(start.elapsed() < longest, "still running after {longest:?}");
+            assert!(start.elapsed() < PATIENCE, "still running after {PATIENCE:?}");
             std::thread::sleep(Duration::from_millis(10));
         }
     }

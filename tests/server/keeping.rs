@@ -1,6 +1,6 @@
 //! What the catalogue keeps, and the answers about it.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use nalgebra::Vector3;
 use sublevel::body::Body;
@@ -10,7 +10,7 @@ use sublevel::service::proto::{
 };
 use tonic::Code;
 
-use crate::harness::{Numbers, Running, at, ball, bits, moved, object, pair, reason};
+use crate::harness::{Numbers, PATIENCE, Running, at, ball, bits, moved, object, pair, reason};
 
 fn shapes() -> [Body; 3] {
     let cuboid = Body::cuboid("box", Vector3::new(0.2, 0.3, 0.4)).expect("a box");
@@ -82,6 +82,7 @@ async fn everything_acknowledged_survives_a_kill() {
 
     // Somebody is writing at the very moment of the kill.
     let mut racing = server.connect().await;
+    let (tally, mut counted) = tokio::sync::watch::channel(0);
     let racer = tokio::spawn(async move {
         let mut numbers = Numbers(11);
         let mut acknowledged = (revision, at(0.0));
@@ -90,12 +91,16 @@ async fn everything_acknowledged_survives_a_kill() {
             let set_poses = vec![moved("racer", pose)];
             let update = UpdateSceneRequest { name: "room".into(), set_poses, ..Default::default() };
             match racing.scenes.update_scene(update).await {
-                Ok(response) => acknowledged = (response.into_inner().revision, pose),
+                Ok(response) => {
+                    acknowledged = (response.into_inner().revision, pose);
+                    tally.send_modify(|count| *count += 1);
+                }
                 Err(_) => return (acknowledged, pose),
             }
         }
     });
-    tokio::time::sleep(Duration::from_millis(200)).await;
+    let written = tokio::time::timeout(PATIENCE, counted.wait_for(|count| *count >= 20)).await;
+    written.expect("the racer is acknowledged").expect("the racer goes on");
     server.kill();
     let ((acknowledged, last), unanswered) = racer.await.expect("the racer");
     assert!(acknowledged > revision, "the racer was acknowledged before the kill");

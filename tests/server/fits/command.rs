@@ -10,7 +10,7 @@ use sublevel::body::Body;
 use sublevel::service::proto::{FitState, ListFitsRequest};
 
 use super::{arc, cloud, off};
-use crate::harness::{Running, run};
+use crate::harness::{PATIENCE, Running, run};
 
 fn write_points(file: &Path, count: usize) {
     let text = cloud(count, 41).iter().fold(String::new(), |mut text, point| {
@@ -130,7 +130,7 @@ async fn the_command_says_what_went_wrong_and_ctrl_c_cancels() {
         if let Some(job) = jobs.iter().find(|job| job.name == "cloud") {
             break job.id.clone();
         }
-        assert!(begun.elapsed() < super::PATIENCE && child.try_wait().expect("waited for").is_none());
+        assert!(begun.elapsed() < PATIENCE && child.try_wait().expect("waited for").is_none());
         tokio::time::sleep(Duration::from_millis(20)).await;
     };
     clients.under_way(&id).await;

@@ -8,7 +8,7 @@ mod refused;
 mod restarts;
 mod uploads;
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use nalgebra::Vector3;
 use sublevel::body::Body;
@@ -21,10 +21,7 @@ use sublevel::service::proto::{
 };
 use tonic::{Status, Streaming};
 
-use crate::harness::{Clients, Numbers};
-
-/// Long enough for any job here on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(120);
+use crate::harness::{Clients, Numbers, PATIENCE};
 
 /// Points on a ball with a bite of noise, metres: all but a few are vertices of their hull.
 fn cloud(count: usize, seed: u64) -> Vec<Vector3<f64>> {
