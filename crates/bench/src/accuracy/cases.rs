@@ -1,7 +1,7 @@
 //! The problems: pairs of bodies at random poses, each with a reference answer and what was known a
 //! step before.
 
-use super::Effort;
+use super::effort::Effort;
 use crate::comparison::{ComparisonError, FitCache, Random, Subject, motion};
 use nalgebra::{UnitQuaternion, Vector3};
 use sublevel::body::Body;

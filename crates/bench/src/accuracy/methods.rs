@@ -1,7 +1,7 @@
 //! The methods at all their settings, asked about the same poses.
 
-use super::Effort;
 use super::cases::{Case, Query};
+use super::effort::Effort;
 use crate::baselines::{Clarabel, ConicProgram, Posed, between, newton, slsqp};
 use crate::comparison::sweep::{Answer, Row, median};
 use crate::comparison::{Coal, ComparisonError, FitCache, Hulls, parry_pose};

@@ -2,6 +2,7 @@
 //! where they stop coming nearer.
 
 mod cases;
+mod effort;
 mod methods;
 mod report;
 mod shown;
@@ -10,25 +11,11 @@ use super::Machine;
 use super::baselines::Clarabel;
 use super::comparison::{Coal, ComparisonError, FitCache};
 use cases::cases;
+use effort::Effort;
 use methods::{Cell, measure};
 pub(crate) use shown::Shown;
 use std::ops::ControlFlow;
 use std::path::Path;
-
-/// How much is run.
-struct Effort {
-    /// Of the pairs of objects, and at these degrees.
-    pairs: usize,
-    degrees: &'static [usize],
-    /// Random poses of a case; those of them that hulls, and semidefinite programs, are asked
-    /// about.
-    queries: usize,
-    few: usize,
-    programs: usize,
-    /// Boundary points of hulls.
-    points: &'static [usize],
-    passes: usize,
-}
 
 /// All methods on all cases.
 pub struct Accuracy {

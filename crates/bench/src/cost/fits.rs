@@ -1,6 +1,6 @@
 //! Fits against degree and number of points.
 
-use super::Effort;
+use super::effort::Effort;
 use super::growth::{self, Growth, Line, Unit};
 use super::memory::peak;
 use crate::comparison::sweep::median;

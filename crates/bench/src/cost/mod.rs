@@ -1,6 +1,7 @@
 //! Cost: how time and memory grow with degree, constraints, parts, poses of a batch, pairs of a
 //! message, and points of a fit.
 
+mod effort;
 mod fits;
 mod growth;
 mod memory;
@@ -10,25 +11,12 @@ mod shown;
 
 use super::Machine;
 use super::comparison::{ComparisonError, FitCache, Subject};
+use effort::Effort;
 use fits::Fitting;
 use growth::{Growth, Line, Unit};
 pub(crate) use shown::Shown;
 use std::ops::ControlFlow;
 use std::path::Path;
-
-/// How much is run.
-struct Effort {
-    degrees: &'static [usize],
-    slabs: &'static [usize],
-    parts: &'static [usize],
-    /// Poses of a batch, pairs of a message, points of a fit.
-    batches: &'static [usize],
-    messages: &'static [usize],
-    points: &'static [usize],
-    trajectories: usize,
-    poses: usize,
-    passes: usize,
-}
 
 /// Nanoseconds of a message with this many pairs, sent to a server and answered, for each number of
 /// pairs. The server lives in another module.

@@ -1,6 +1,6 @@
 //! Queries against degree, constraints, parts, and poses in a batch.
 
-use super::Effort;
+use super::effort::Effort;
 use super::growth::{self, Growth, Line, Unit};
 use super::memory::bytes_of;
 use crate::comparison::motion::{self, Trajectory};

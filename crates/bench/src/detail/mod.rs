@@ -1,6 +1,7 @@
 //! Detail: what each rung of the ladder buys in accuracy, what it costs, and how many questions it
 //! settles; and how closely convex parts follow an object.
 
+mod effort;
 mod parts;
 mod parts_report;
 mod questions;
@@ -10,22 +11,13 @@ mod shown;
 
 use super::Machine;
 use super::comparison::{ComparisonError, FitCache, pairs};
+use effort::Effort;
 use parts::{Divided, parts};
 pub(crate) use parts_report::Shown as PartsShown;
 use rungs::{Ladder, ladder};
 pub(crate) use shown::Shown;
 use std::ops::ControlFlow;
 use std::path::Path;
-
-/// How much is run.
-struct Effort {
-    quick: bool,
-    trajectories: usize,
-    poses: usize,
-    passes: usize,
-    /// Random pairs of poses per threshold.
-    questions: usize,
-}
 
 /// The ladders of all pairs and the parts of objects, measured.
 pub struct Detail {

@@ -1,6 +1,6 @@
 //! The rungs of a pair: model errors, gaps, iterations, times.
 
-use super::Effort;
+use super::effort::Effort;
 use super::questions::{Settled, THRESHOLDS, ask, settle};
 use crate::comparison::sweep::{Answer, Row};
 use crate::comparison::{ComparisonError, FitCache, Hulls, Subject, motion, parry_pose};

@@ -2,6 +2,7 @@
 //! a query takes.
 
 mod cover;
+mod effort;
 mod front;
 mod meshes;
 mod ours;
@@ -14,21 +15,11 @@ mod shown;
 
 use super::Machine;
 use super::comparison::{Coal, ComparisonError, FitCache, pairs};
+use effort::Effort;
 use race::{About, Race, race};
 pub(crate) use shown::Shown;
 use std::ops::ControlFlow;
 use std::path::Path;
-
-/// How much is run.
-struct Effort {
-    quick: bool,
-    trajectories: usize,
-    poses: usize,
-    passes: usize,
-    /// Poses, about, and passes of what takes ten thousand times as long as the rest.
-    slow_poses: usize,
-    slow_passes: usize,
-}
 
 /// All pairs, measured.
 pub struct Speed {

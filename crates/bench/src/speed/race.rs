@@ -1,6 +1,6 @@
 //! One pair: everybody walks the same poses, in turns.
 
-use super::Effort;
+use super::effort::Effort;
 use super::meshes::Meshes;
 use super::ours::Method;
 use super::peers::{HullPair, Simple, hulls, judged};

@@ -2,31 +2,11 @@
 
 use super::Speed;
 use super::race::{About, Line, Race, Who};
+use super::shown::NOTES;
 use crate::blocks::block;
 use crate::comparison::parry_version;
 use std::fmt::Write;
 use sublevel::measure::DEFAULT_ACCURACY;
-
-/// How to read the tables.
-pub(super) const NOTES: &str = "\
-How to read this:
-
-- Model error: distance of the convex hulls (parry's GJK on all their vertices) less the distance that a representation answers, \
-relative to the larger diameter of the pair; so a thousandth is a millimetre for an object of 1 m. Where a representation overlaps although \
-the hulls do not, less minus its depth. `mesh` is the same against the distance of the triangle meshes.
-- Compounds and covers of balls contain the mesh, not its hull: they stand in the charts against meshes only.
-- Smooth motions of steps of 0.5 % of the larger diameter and one degree about each other; bodies of degree 2 and up stay apart, the closest of \
-them mostly by 2.5 to 37 % of the larger diameter. Seeds 1, 2, ... of SplitMix64, those that come too close left out. Everybody walks the same \
-poses; rows take turns; in a turn each motion is walked nine times on end (once if a query takes more than 5 µs), as coal's program does it, and the median counts, then the median of the \
-turns; one thread. Parry's meshes are asked at a few of the poses only.
-- warm: with the hint from the pose before (ours, coal's cached guess, parry's initial direction). batch: all poses of a motion in one call, each \
-solved cold. Peers have no batch and stand with the faster of their two times there.
-- Hulls of n vertices are intersections of half-spaces that touch the hull, chosen one by one to cut off what stands out farthest: they contain \
-the hull like our bodies do. An object whose hull has no more vertices keeps it. Where \
-they overlap they answer 0, so that the coarsest look a little better than they are.
-- wrong: queries in which brackets of ours exclude each other or the truth, or in which coal and parry differ by more than 1e-5 of the \
-diameter.
-";
 
 impl Speed {
     /// The report, but for what [`Shown`](super::Shown) writes into its blocks.

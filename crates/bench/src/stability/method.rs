@@ -142,6 +142,26 @@ pub(super) struct Reply {
 }
 
 impl Question {
+    /// Bodies, poses, our answer and the truth, for people.
+    pub(super) fn describe(&self) -> String {
+        let Case { a, pose_a, b, pose_b, accuracy, what, .. } = &self.0;
+        let placed = |body: &Body, pose: &Pose| {
+            let sizes =
+                body.normalization().linear.try_inverse().map_or(Vector3::zeros(), |inverse| inverse.diagonal());
+            let (t, q) = (pose.translation(), pose.rotation().coords);
+            format!("{} of half-axes {sizes:?} m at {t:?} m, quaternion {q:?}", body.name())
+        };
+        let answer = self.ours(Method::Cold).map_or_else(|error| error.to_string(), |answer| format!("{answer:?}"));
+        let truth = self.truth(&[]).map_or_else(|error| error.to_string(), |truth| format!("{truth:?}"));
+        format!(
+            "  {what}, accuracy {accuracy:e}\n  {}\n  {}\n  ours, cold: {answer}\n  {truth}",
+            placed(a, pose_a),
+            placed(b, pose_b)
+        )
+    }
+}
+
+impl Question {
     /// Puts the case to a method, and judges its answer. None where the method cannot be asked.
     pub(super) fn put(&self, method: Method) -> Result<Option<Verdict>, CaseError> {
         Ok(self.run(method)?.map(|answer| answer.verdict))

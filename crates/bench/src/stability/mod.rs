@@ -11,6 +11,7 @@ mod method;
 mod question;
 mod report;
 mod runner;
+mod table;
 
 use super::Machine;
 use super::baselines::Clarabel;
@@ -19,33 +20,14 @@ use families::FAMILIES;
 pub use method::{Method, UnknownMethod};
 pub use question::Verdict;
 pub use report::{Earlier, GuardError, Lost};
-use runner::Cell;
 pub use runner::{NoShare, Share, serve};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
 use std::thread;
-
-/// One row: the cells of the methods that can be asked.
-struct Row {
-    number: u8,
-    name: &'static str,
-    cells: Vec<Cell>,
-}
-
-/// Who passes what.
-pub struct Stability {
-    machine: Machine,
-    /// Version of coal, if it took part.
-    coal: Option<String>,
-    /// Version of clarabel, if it took part.
-    solver: Option<String>,
-    quick: bool,
-    /// The columns that were asked for.
-    methods: Vec<Method>,
-    rows: Vec<Row>,
-}
+use table::Row;
+pub use table::Stability;
 
 /// Puts all families to these methods, a tenth of the cases if `quick`. `program` is what to start
 /// for the children: this one, with the command `chart stability`. Coal takes part where

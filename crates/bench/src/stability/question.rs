@@ -1,12 +1,10 @@
 //! One query of a family, and what came of it.
 
 use crate::comparison::PeerError;
-use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::ops::Deref;
-use sublevel::body::Body;
-use sublevel::measure::{OptionsError, Pose};
+use sublevel::measure::OptionsError;
 use sublevel_testkit::catalogue::Case;
 
 /// A case of the catalogue that is put to methods.
@@ -18,27 +16,6 @@ impl Deref for Question {
 
     fn deref(&self) -> &Case {
         &self.0
-    }
-}
-
-impl Question {
-    /// Bodies, poses, our answer and the truth, for people.
-    pub(super) fn describe(&self) -> String {
-        let Case { a, pose_a, b, pose_b, accuracy, what, .. } = &self.0;
-        let placed = |body: &Body, pose: &Pose| {
-            let sizes =
-                body.normalization().linear.try_inverse().map_or(Vector3::zeros(), |inverse| inverse.diagonal());
-            let (t, q) = (pose.translation(), pose.rotation().coords);
-            format!("{} of half-axes {sizes:?} m at {t:?} m, quaternion {q:?}", body.name())
-        };
-        let answer =
-            self.ours(super::Method::Cold).map_or_else(|error| error.to_string(), |answer| format!("{answer:?}"));
-        let truth = self.truth(&[]).map_or_else(|error| error.to_string(), |truth| format!("{truth:?}"));
-        format!(
-            "  {what}, accuracy {accuracy:e}\n  {}\n  {}\n  ours, cold: {answer}\n  {truth}",
-            placed(a, pose_a),
-            placed(b, pose_b)
-        )
     }
 }
 

@@ -3,7 +3,7 @@
 use super::method::Method;
 use super::question::Verdict;
 use super::runner::{Cell, PATIENCE};
-use super::{Row, Stability};
+use super::table::{Row, Stability};
 use crate::comparison::parry_version;
 use std::fmt::Write;
 use std::str::FromStr;

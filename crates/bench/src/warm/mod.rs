@@ -1,6 +1,7 @@
 //! Warm starts: what a hint from the pose before is worth, by how far that pose is away; and the
 //! paper's experiment.
 
+mod effort;
 mod report;
 mod shown;
 mod steps;
@@ -8,6 +9,7 @@ mod sweep;
 
 use super::Machine;
 use super::comparison::{Coal, ComparisonError, FitCache, pairs};
+use effort::Effort;
 pub(crate) use shown::Shown;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -23,15 +25,6 @@ const QUICK_DEGREES: [usize; 2] = [4, 6];
 const STEPS: [Option<f64>; 10] =
     [Some(1e-4), Some(3e-4), Some(1e-3), Some(3e-3), Some(1e-2), Some(3e-2), Some(0.1), Some(0.3), Some(1.0), None];
 const QUICK_STEPS: [Option<f64>; 4] = [Some(1e-4), Some(1e-2), Some(0.3), None];
-
-/// How much is run.
-struct Effort {
-    trajectories: usize,
-    poses: usize,
-    passes: usize,
-    /// Positions of the chair.
-    positions: usize,
-}
 
 /// What hints are worth.
 pub struct Warm {

@@ -1,8 +1,7 @@
 //! What pages show of `warm.csv`: tables, pictures, and sentences with numbers.
 
-use super::Passage;
 use super::steps::{Cell, Steps, Who};
-use super::sweep::Stop;
+use super::sweep::{Passage, Stop};
 use crate::comparison::sweep::median;
 use crate::csv::{CsvError, Row, Table};
 use crate::words::Span;

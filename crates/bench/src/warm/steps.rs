@@ -1,6 +1,6 @@
 //! Time and iterations against how far the pose before is away.
 
-use super::Effort;
+use super::effort::Effort;
 use crate::comparison::sweep::{Answer, Row};
 use crate::comparison::{Coal, ComparisonError, FitCache, Hulls, Subject, motion, parry_pose};
 use sublevel::body::Body;

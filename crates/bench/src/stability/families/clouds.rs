@@ -2,7 +2,7 @@
 
 use super::super::method::Method;
 use super::super::question::{CaseError, Verdict};
-use super::random;
+use super::draws::random;
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 use sublevel::body::Body;

@@ -3,7 +3,7 @@
 use super::super::method::{Answer, Method};
 use super::super::question::{CaseError, Question, Verdict};
 use super::derivatives::both_sides;
-use super::{permuted_index, random};
+use super::draws::{permuted_index, random};
 use sublevel::measure::{DEFAULT_ACCURACY, Status};
 use sublevel_testkit::catalogue::contact::{self, GRAZE, SMOOTH, TOUCHING};
 use sublevel_testkit::catalogue::{Case, Draws};

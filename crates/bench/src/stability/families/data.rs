@@ -2,7 +2,7 @@
 
 use super::super::method::Method;
 use super::super::question::{CaseError, Question, Verdict};
-use super::random;
+use super::draws::random;
 use sublevel_testkit::catalogue::data::{EXTREMES, KINDS, attempts, extreme};
 
 /// Every other time data that must be refused, as long as there are some, else bodies that are all

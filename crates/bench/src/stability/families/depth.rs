@@ -2,7 +2,7 @@
 
 use super::super::method::{Method, sampled};
 use super::super::question::{CaseError, Question, Verdict};
-use super::random;
+use super::draws::random;
 use crate::comparison::{Hulls, parry_pose};
 use nalgebra::Vector3;
 use sublevel::measure::{Options, SignedDistance, Status, WarmStart, growth_distance, level_distance, signed_distance};

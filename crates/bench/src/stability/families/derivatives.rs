@@ -2,7 +2,7 @@
 
 use super::super::method::Method;
 use super::super::question::{CaseError, Question, Verdict};
-use super::random;
+use super::draws::random;
 use nalgebra::Vector3;
 use sublevel::body::Body;
 use sublevel::measure::{Options, Pose, Twist, WarmStart, distance, growth_distance, level_distance, signed_distance};

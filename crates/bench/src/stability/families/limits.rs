@@ -2,7 +2,7 @@
 
 use super::super::method::Method;
 use super::super::question::{CaseError, Question, Verdict};
-use super::random;
+use super::draws::random;
 use sublevel::measure::{Distance, Options, Status, WarmStart, distance, level_distance};
 use sublevel_testkit::bodies::chart_zoo;
 use sublevel_testkit::catalogue::Case;

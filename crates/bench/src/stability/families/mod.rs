@@ -5,6 +5,7 @@ mod contact;
 mod data;
 mod depth;
 mod derivatives;
+mod draws;
 mod limits;
 mod motion;
 mod placement;
@@ -13,7 +14,6 @@ mod ties;
 
 use super::method::{Answer, Method};
 use super::question::{CaseError, Question, Verdict};
-use crate::comparison::Random;
 use sublevel_testkit::catalogue::{self, Case};
 
 /// A row of the table.
@@ -121,16 +121,4 @@ fn put_together(cases: Vec<Case>, together: Together, method: Method) -> Result<
         answers.push((question, answer));
     }
     together(&answers, method).map(Some)
-}
-
-/// The index of a seed's case among so many that go through all settings, permuted so that the
-/// first seeds meet all settings.
-fn permuted_index(seed: u64, cases: u64) -> u64 {
-    // Prime, and no factor of the numbers of cases.
-    seed % cases * 61 % cases
-}
-
-/// A draw for a case of a family.
-fn random(family: u64, seed: u64) -> Random {
-    Random(family * 1_000_000 + seed)
 }

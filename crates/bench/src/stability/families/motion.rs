@@ -2,7 +2,7 @@
 
 use super::super::method::Method;
 use super::super::question::{CaseError, Verdict};
-use super::random;
+use super::draws::random;
 use crate::comparison::parry_impact;
 use sublevel::measure::{Impact, ImpactStatus, Motion, Options, WarmStart, distance, time_of_impact};
 use sublevel_testkit::catalogue::motion::{Bullet, Meeting, Truth, blade, grazing, slab};

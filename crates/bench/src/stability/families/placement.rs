@@ -3,7 +3,7 @@
 use super::super::arbiter::judge_along;
 use super::super::method::{Answer, Method, proposal};
 use super::super::question::{CaseError, Question, Verdict};
-use super::{permuted_index, random};
+use super::draws::{permuted_index, random};
 use crate::comparison::Random;
 use nalgebra::Vector3;
 use sublevel::measure::{

@@ -2,7 +2,7 @@
 
 use super::super::method::{Answer, Method};
 use super::super::question::{CaseError, Question, Verdict};
-use super::random;
+use super::draws::random;
 use sublevel::measure::Distance;
 use sublevel_testkit::catalogue::Case;
 use sublevel_testkit::catalogue::scale::{self, DOUBLINGS, NEEDLE_SETTINGS, NEEDLES, PARTNERS, UNIT_PAIRS};

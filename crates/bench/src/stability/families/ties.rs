@@ -2,7 +2,7 @@
 
 use super::super::method::Method;
 use super::super::question::{CaseError, Verdict};
-use super::random;
+use super::draws::random;
 use crate::comparison::Random;
 use nalgebra::{UnitQuaternion, Vector3};
 use sublevel::measure::{Options, WarmStart, distance, signed_distance};
