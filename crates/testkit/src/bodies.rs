@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use std::collections::BTreeMap;
+use std::fmt::Debug;
 use std::sync::{Mutex, OnceLock};
 use sublevel_core::body::{Body, Constraint, Normalization};
 use sublevel_core::measure::Pose;
@@ -12,19 +13,23 @@ pub type Placed<'a> = (&'a Body, &'a Pose);
 
 /// E: ellipsoid with these half-axes.
 pub fn e(x: f64, y: f64, z: f64) -> Body {
-    Body::ellipsoid("E", Vector3::zeros(), Vector3::new(x, y, z)).unwrap()
+    kept("E", [x, y, z], || Body::ellipsoid("E", Vector3::zeros(), Vector3::new(x, y, z)))
 }
 
 /// Q2k: `(x/a)^degree + (y/b)^degree + (z/c)^degree <= 1`.
 pub fn q(degree: u8, x: f64, y: f64, z: f64) -> Body {
-    Body::superellipsoid(&format!("Q{degree}"), Vector3::zeros(), Vector3::new(x, y, z), degree).unwrap()
+    let name = format!("Q{degree}");
+    kept(&name, [x, y, z], || Body::superellipsoid(&name, Vector3::zeros(), Vector3::new(x, y, z), degree))
 }
 
 /// C2k: `((x² + y²)/r²)^k + (z/h)^2k <= 1`, degree 2k.
 pub fn c(degree: u8, radius: f64, half_height: f64) -> Body {
-    let constraint = known(&format!("C{degree}"), || rounded_cylinder(degree));
+    let name = format!("C{degree}");
     let linear = Matrix3::from_diagonal(&Vector3::new(1.0 / radius, 1.0 / radius, 1.0 / half_height));
-    Body::new(&format!("C{degree}"), Normalization { center: Vector3::zeros(), linear }, vec![constraint]).unwrap()
+    kept(&name, [radius, radius, half_height], || {
+        let constraint = known(&name, || rounded_cylinder(degree));
+        Body::new(&name, Normalization { center: Vector3::zeros(), linear }, vec![constraint])
+    })
 }
 
 /// The constraint of C2k of unit sizes.
@@ -68,9 +73,12 @@ fn rounded_cylinder(degree: u8) -> Constraint {
 /// P2k: `Σ (a_i·x)^degree <= 1` with the a_i along the axes and the diagonals of a cube, of the
 /// given half-width.
 pub fn p(degree: u8, size: f64) -> Body {
-    let constraint = known(&format!("P{degree}"), || octahedral_prism(degree));
+    let name = format!("P{degree}");
     let linear = Matrix3::identity() / size;
-    Body::new(&format!("P{degree}"), Normalization { center: Vector3::zeros(), linear }, vec![constraint]).unwrap()
+    kept(&name, [size; 3], || {
+        let constraint = known(&name, || octahedral_prism(degree));
+        Body::new(&name, Normalization { center: Vector3::zeros(), linear }, vec![constraint])
+    })
 }
 
 /// The constraint of P2k of unit half-width.
@@ -108,11 +116,23 @@ fn octahedral_prism(degree: u8) -> Constraint {
 
 /// B: box with these half-extents.
 pub fn b(x: f64, y: f64, z: f64) -> Body {
-    Body::cuboid("B", Vector3::new(x, y, z)).unwrap()
+    kept("B", [x, y, z], || Body::cuboid("B", Vector3::new(x, y, z)))
 }
 
 pub fn cylinder(radius: f64, half_height: f64) -> Body {
     Body::cylinder("cylinder", radius, half_height).unwrap()
+}
+
+/// The body of that name and these sizes, made once: cases share them, and proofs take their time.
+fn kept<E: Debug>(name: &str, sizes: [f64; 3], make: impl FnOnce() -> Result<Body, E>) -> Body {
+    static KEPT: Mutex<BTreeMap<(String, [u64; 3]), Body>> = Mutex::new(BTreeMap::new());
+    let key = (name.to_owned(), sizes.map(f64::to_bits));
+    let found = KEPT.lock().expect("nothing fails in here").get(&key).cloned();
+    found.unwrap_or_else(|| {
+        let body = make().expect("a body of the catalogue");
+        KEPT.lock().expect("nothing fails in here").insert(key, body.clone());
+        body
+    })
 }
 
 /// The constraint of that name, made once: of all sizes it is the same.
