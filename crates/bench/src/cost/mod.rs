@@ -32,7 +32,7 @@ pub struct Cost {
 
 /// Measures chair and human of the meshes in `data`. Fits are kept in the `cache`; `messages` sends
 /// messages to a server, and `program` is `sublevel`, whose memory is looked at as it fits.
-/// `progress` is told what is going on and can stop it.
+/// `progress` receives what is going on and can stop it.
 ///
 /// # Errors
 /// [`ComparisonError`].

@@ -30,7 +30,7 @@ pub struct Detail {
 }
 
 /// Measures the rungs of pairs of the meshes in `data`, of two pairs up to degree 6 if `quick`.
-/// Fits are kept in the `cache`. `progress` is told what is going on and can stop it.
+/// Fits are kept in the `cache`. `progress` receives what is going on and can stop it.
 ///
 /// # Errors
 /// [`ComparisonError`].

@@ -33,7 +33,7 @@ pub struct Speed {
 
 /// Measures all pairs of the meshes in `data`, or two of them with fewer representations and poses
 /// if `quick`. Fits are kept in the `cache`; coal takes part where `SUBLEVEL_COAL` names the
-/// program that times it. `progress` is told what is going on and can stop it.
+/// program that times it. `progress` receives what is going on and can stop it.
 ///
 /// # Errors
 /// [`ComparisonError`].

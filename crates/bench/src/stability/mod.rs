@@ -32,7 +32,7 @@ pub use table::Stability;
 /// Puts all families to these methods, a tenth of the cases if `quick`. `program` is what to start
 /// for the children: this one, with the command `chart stability`. Coal takes part where
 /// `SUBLEVEL_COAL` names the program that times it, clarabel where its example is built. `progress`
-/// is told what is going on and can stop it.
+/// receives what is going on and can stop it.
 ///
 /// # Errors
 /// [`ComparisonError`].

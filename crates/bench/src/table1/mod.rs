@@ -136,7 +136,7 @@ pub struct Table1Progress {
 /// leaves out what is above degree 4.
 ///
 /// Takes about five minutes on one core, half a minute if quick. A fit that fails is a cell that
-/// says so. `progress` is told of every cell and of every Newton step in between, and can stop it.
+/// says so. `progress` receives every cell and of every Newton step in between, and can stop it.
 ///
 /// # Errors
 /// [`Table1Error`]: a mesh that cannot be read, or the callback's wish.

@@ -40,7 +40,7 @@ pub struct Warm {
 
 /// Measures time and iterations against step size on two pairs of the meshes in `data`, or on one
 /// if `quick`, and the chair on its way past the human. Fits are kept in the `cache`; coal takes
-/// part where `SUBLEVEL_COAL` names the program that times it. `progress` is told what is going on
+/// part where `SUBLEVEL_COAL` names the program that times it. `progress` receives what is going on
 /// and can stop it.
 ///
 /// # Errors

@@ -93,7 +93,7 @@ pub fn distance_batch(
     }
     for (answer, pose_b) in answers.iter_mut().zip(poses_b).filter(|(answer, _)| answer.upper.is_infinite()) {
         let spent = answer.iterations;
-        let mut warm = if answer.tied { Hint::Astray.into() } else { WarmStart::default() };
+        let mut warm = if answer.tied { Hint::Diverged.into() } else { WarmStart::default() };
         *answer = distance(a, pose_a, b, pose_b, &options.after(spent), &mut warm);
         answer.iterations += spent;
     }
@@ -121,7 +121,7 @@ const MOST_COARSE: u32 = 6;
 /// precision, is likely to end with a narrow bracket.
 const NEAR: f64 = 1e-4;
 
-/// The same above which Newton's method is astray after [`MOST_COARSE`] rounds: a step as long as
+/// The same above which Newton's method has diverged after [`MOST_COARSE`] rounds: a step as long as
 /// in a search from a cold start then.
 const ASTRAY: f64 = 0.04;
 
@@ -129,7 +129,7 @@ const ASTRAY: f64 = 0.04;
 const MOST_ROUNDS: u32 = 8;
 
 /// A batch as work for the widest arithmetic. Of a pose that is to be solved alone it takes down
-/// the iterations only, and as `tied` that they have led astray.
+/// the iterations only, and as `tied` that they have diverged.
 struct Batch<'a> {
     a: &'a Body,
     pose_a: &'a Pose,
@@ -358,9 +358,9 @@ impl Batch<'_> {
         for lane in 0..group.count {
             group.rounds[lane] += rounds;
             let (open, late) = (open >> lane & 1 == 1, group.rounds[lane] >= MOST_COARSE);
-            let astray = open && late && straight >> lane & 1 == 0;
-            if !open || astray {
-                self.leave(&group, lane, astray);
+            let diverged = open && late && straight >> lane & 1 == 0;
+            if !open || diverged {
+                self.leave(&group, lane, diverged);
             } else if late || close >> lane & 1 == 1 {
                 near.push(&group, lane);
             } else {
@@ -413,20 +413,20 @@ impl Batch<'_> {
         for lane in 0..group.count {
             group.rounds[lane] += 1;
             let open = open >> lane & 1 == 1;
-            let astray = open && group.rounds[lane] >= MOST_COARSE && straight >> lane & 1 == 0;
-            if open && !astray && group.rounds[lane] < MOST_ROUNDS {
+            let diverged = open && group.rounds[lane] >= MOST_COARSE && straight >> lane & 1 == 0;
+            if open && !diverged && group.rounds[lane] < MOST_ROUNDS {
                 waiting.push(&group, lane);
             } else if answered >> lane & 1 == 0 {
-                self.leave(&group, lane, astray);
+                self.leave(&group, lane, diverged);
             }
         }
     }
 
     /// Leaves a lane's pose to be solved alone.
     #[inline(always)]
-    fn leave<const LANES: usize>(&mut self, group: &Group<LANES>, lane: usize, astray: bool) {
+    fn leave<const LANES: usize>(&mut self, group: &Group<LANES>, lane: usize, diverged: bool) {
         let answer = &mut self.answers[group.pose[lane]];
-        (answer.iterations, answer.tied) = (group.rounds[lane], astray);
+        (answer.iterations, answer.tied) = (group.rounds[lane], diverged);
     }
 
     /// The lanes in which the middle between the points seems to lie in both bodies: single queries

@@ -39,8 +39,8 @@ pub struct WarmStart {
 pub(super) enum Hint {
     #[default]
     Cold,
-    /// As little, but that continuation from where the bodies face each other has led astray.
-    Astray,
+    /// As little, but that continuation from where the bodies face each other has diverged.
+    Diverged,
     /// Witnesses in the frames of their own bodies, normal in A's frame.
     Apart { x_a: Vector3<f64>, y_b: Vector3<f64>, normal_a: Vector3<f64>, active_a: ActiveSet, active_b: ActiveSet },
     /// Witnesses on smooth parts of both surfaces, with how they answer motions.

@@ -105,8 +105,8 @@ impl<'a> Query<'a> {
         let smooth = self.of_a.0.is_smooth() && self.of_b.0.is_smooth();
         // From far away it does other than lanes, which bring no points back that have come too far
         // from the bodies.
-        let astray = matches!(warm.hint, Hint::Astray) && !far_apart(self.of_a, self.of_b);
-        if runs(Stage::Seek) && smooth && !astray && !lost.touching() && !self.options.exhausted(lost.rounds) {
+        let diverged = matches!(warm.hint, Hint::Diverged) && !far_apart(self.of_a, self.of_b);
+        if runs(Stage::Seek) && smooth && !diverged && !lost.touching() && !self.options.exhausted(lost.rounds) {
             return dispatch(Cold { query: *self, before: lost.rounds, warm });
         }
         self.search(lost, warm)

@@ -147,7 +147,7 @@ impl<'a> Search<'a> {
                 }
             }
             Hint::Cold
-            | Hint::Astray
+            | Hint::Diverged
             | Hint::Overlap { .. }
             | Hint::Level { .. }
             | Hint::LevelSmooth(_)
@@ -277,7 +277,7 @@ impl<'a> Search<'a> {
     }
 
     /// The same for bodies with edges from the best points so far, with the constraints that are
-    /// active there: what has led astray from a start are the others.
+    /// active there: from a start the others have diverged.
     fn again(&mut self) {
         if self.pair.smooth() || self.lower == 0.0 || self.upper.is_infinite() {
             return;

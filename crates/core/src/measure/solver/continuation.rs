@@ -136,7 +136,7 @@ pub(in crate::measure) struct Lost {
     /// metres.
     pub(in crate::measure) middle: Option<V3<f64>>,
     /// Where Newton's method ended without a narrow bracket, which only twice the precision may
-    /// give: near contact, where doubles do not tell on which side, or where the normals do not
+    /// compliance: near contact, where doubles do not tell on which side, or where the normals do not
     /// agree well enough.
     pub(in crate::measure) grazing: Option<Proven>,
 }
@@ -463,7 +463,7 @@ fn correct<S: Simd>(
     let slope = [of_a[0] - of_b[0], of_a[1] - of_b[1]];
     let mut corrected = false;
     if series.may_have_to_be_corrected(newton, length) {
-        let found = series.correction(simd, tangents, (newton, slope), response.give);
+        let found = series.correction(simd, tangents, (newton, slope), response.compliance);
         corrected = found != Correction::default();
         // The same for x and y: they stay where they are seen from each other.
         let turned = response.turned(simd, found.shorter);

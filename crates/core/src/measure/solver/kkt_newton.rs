@@ -8,7 +8,7 @@
 //! ```
 //!
 //! The normal is an unknown of its own, although u and w say what it is: those of thin bodies turn
-//! so fast with the point that Newton's method goes astray by them from where it converges so
+//! so fast with the point that Newton's method diverges by them from where it converges so
 //! (Albersmeyer and Diehl, The lifted Newton method and its application in optimization, SIAM J.
 //! Optimization 20, 2010).
 
@@ -288,7 +288,7 @@ impl Pace {
     /// Whether the steps, this one of this length the last, are still cut to the longest when they
     /// should no longer be: two in a row, or the first towards a new system. A single long one is
     /// taken where sides are flat, once it shows how far they reach.
-    pub(in crate::measure) fn is_astray(&self, step: u32, length: f64, longest: f64) -> bool {
+    pub(in crate::measure) fn has_diverged(&self, step: u32, length: f64, longest: f64) -> bool {
         step >= PATIENCE && length.min(self.last) > longest
     }
 
@@ -359,7 +359,7 @@ impl DistanceNewton {
                     continue;
                 }
             }
-            if pace.is_astray(step, length, LONGEST) || pace.ends_with(length) {
+            if pace.has_diverged(step, length, LONGEST) || pace.ends_with(length) {
                 return step;
             }
         }

@@ -157,7 +157,7 @@ impl ReachNewton {
             if (length < WORTH_A_BRACKET || step % 4 == 0) && accept(self) {
                 return step;
             }
-            if pace.is_astray(step, length, LONGEST) || pace.ends_with(length) {
+            if pace.has_diverged(step, length, LONGEST) || pace.ends_with(length) {
                 return step;
             }
         }

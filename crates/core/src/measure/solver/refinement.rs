@@ -412,8 +412,8 @@ impl<'a> SharpPair<'a> {
                     | of_a.revise(&self.a, &x, level, VIOLATED * level.abs().max(1.0))
                     | of_b.revise(&self.b, &x, 1.0, VIOLATED);
                 revised += u32::from(changed);
-                let astray = step >= PATIENCE && damping < 1.0;
-                if revised > MAX_REVISED || astray || !changed && length < 1e-28 {
+                let diverged = step >= PATIENCE && damping < 1.0;
+                if revised > MAX_REVISED || diverged || !changed && length < 1e-28 {
                     return step;
                 }
             }

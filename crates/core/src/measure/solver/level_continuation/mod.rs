@@ -316,8 +316,8 @@ impl Sides<'_> {
             let response = step.response(simd, at.jet_b.gradient);
             let of_t = apply_symmetric::<S, f64>(&response, t);
             let of_u = apply_symmetric::<S, f64>(&response, u);
-            let give = [dot::<S, f64>(t, of_t), dot::<S, f64>(t, of_u), dot::<S, f64>(u, of_u)];
-            let found = series.correction(simd, tangents, (newton, slope), give);
+            let compliance = [dot::<S, f64>(t, of_t), dot::<S, f64>(t, of_u), dot::<S, f64>(u, of_u)];
+            let found = series.correction(simd, tangents, (newton, slope), compliance);
             corrected = found != Correction::default();
             let Correction { longer, shorter } = found;
             delta = add::<S, f64>(delta, across(simd, tangents, [longer[0] + shorter[0], longer[1] + shorter[1]]));

@@ -232,8 +232,8 @@ fn turn<S: Simd, N: Number<S>>(
     let determinant = m[0] * m[2] - m[1] * m[1];
     let more = distance * (w_a[0] * w_a[2] - w_a[1] * w_a[1]);
     let both = [w_a[0] + more, w_a[1], w_a[2] + more];
-    let lever = [tau[0] - distance * right_a[0], tau[1] - distance * right_a[1]];
-    let pulled = apply2(&both, lever);
+    let moment_arm = [tau[0] - distance * right_a[0], tau[1] - distance * right_a[1]];
+    let pulled = apply2(&both, moment_arm);
     let sum = [
         determinant.mul_add(w_b[0] + smallest, both[0]),
         determinant.mul_add(w_b[1], both[1]),
@@ -246,15 +246,15 @@ fn turn<S: Simd, N: Number<S>>(
     let other = sum[0] * sum[2] - sum[1] * sum[1];
     let [of_m, of_sum] = N::reciprocals(simd, [determinant, other]);
     let beta = [(sum[2] * right[0] - sum[1] * right[1]) * of_sum, (sum[0] * right[1] - sum[1] * right[0]) * of_sum];
-    let rest = [beta[0] - lever[0], beta[1] - lever[1]];
+    let rest = [beta[0] - moment_arm[0], beta[1] - moment_arm[1]];
     let alpha = [(m[2] * rest[0] - m[1] * rest[1]) * of_m, (m[0] * rest[1] - m[1] * rest[0]) * of_m];
     let bent = apply2(&w_a, alpha);
     let turn = Turn { alpha, beta, theta: [right_a[0] - bent[0], right_a[1] - bent[1]] };
-    let give = scaled([sum[2], -sum[1], sum[0]], of_sum);
+    let compliance = scaled([sum[2], -sum[1], sum[0]], of_sum);
     let response = Response {
         curvature_a: w_a,
-        give: scaled(give, determinant),
-        pull: [apply2(&both, [give[0], give[1]]), apply2(&both, [give[1], give[2]])],
+        compliance: scaled(compliance, determinant),
+        pull: [apply2(&both, [compliance[0], compliance[1]]), apply2(&both, [compliance[1], compliance[2]])],
         hold: scaled([m[2], -m[1], m[0]], of_m),
     };
     (turn, response)
@@ -267,7 +267,7 @@ pub(in crate::measure) struct Response<N> {
     /// `W_A`.
     curvature_a: Symmetric2<N>,
     /// `G = (W_B + W_A K)⁻¹`, with what counts as no curvature added to `W_B`.
-    pub(in crate::measure) give: Symmetric2<N>,
+    pub(in crate::measure) compliance: Symmetric2<N>,
     /// `G W_A K`, by rows.
     pull: [[N; 2]; 2],
     /// `K`.
@@ -279,7 +279,7 @@ impl Response<f64> {
     /// turned, both along the tangents.
     #[inline(always)]
     pub(in crate::measure) fn step<S: Simd>(&self, _: S, tau: [f64; 2], turned: [f64; 2]) -> Step<f64> {
-        let pulled = apply2::<S, f64>(&self.give, turned);
+        let pulled = apply2::<S, f64>(&self.compliance, turned);
         let along = |row: [f64; 2], less: f64| row[0] * tau[0] + row[1] * tau[1] - less;
         let beta = [along(self.pull[0], pulled[0]), along(self.pull[1], pulled[1])];
         let alpha = apply2::<S, f64>(&self.hold, [beta[0] - tau[0], beta[1] - tau[1]]);

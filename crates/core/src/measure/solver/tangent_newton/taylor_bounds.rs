@@ -85,7 +85,7 @@ impl<N: Copy> Side<'_, N> {
     /// Bound of how much farther along the unit vector n the body reaches than the point with this
     /// plane; not a number if the plane faces another way. All in the basis of the plane.
     #[inline(always)]
-    pub(in crate::measure) fn lack<S: Simd>(&self, simd: S, at: &Extrapolated<N>, n: V3<N>) -> N
+    pub(in crate::measure) fn support_deficit<S: Simd>(&self, simd: S, at: &Extrapolated<N>, n: V3<N>) -> N
     where
         N: Number<S>,
     {
