@@ -2,7 +2,7 @@
 
 use sublevel_testkit::Seeded;
 
-use crate::body::{Body, Cone, Objective, SosMethod};
+use crate::body::{Cone, Objective, SosMethod};
 use crate::store::{
     FitBody, FitCompound, FitGroup, FitLadder, FitMode, FitPolynomial, FitPreparation, FitRequest, FitSosBody,
     FitWithinGap,
@@ -30,8 +30,7 @@ pub(crate) fn drawn(seed: u64) -> Vec<FitRequest> {
     let raw_frame = sometimes(&mut random);
     let degree = polynomial.degree;
     let bodies = 1 + random.index(3);
-    let id =
-        |random: &mut Seeded| *Body::ball("ball", nalgebra::Vector3::zeros(), 1.0 + random.positive()).unwrap().id();
+    let id = |random: &mut Seeded| format!("{:016x}", random.next()).repeat(4).parse().expect("an id");
     let group = FitGroup {
         body_ids: (0..bodies).map(|_| id(&mut random)).collect(),
         max_growth: sometimes(&mut random).then(|| 1e-3 + random.positive()),
