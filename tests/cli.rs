@@ -590,13 +590,19 @@ fn sets_that_need_not_be_convex_are_told_from_bodies_everywhere() {
         &["--parts", "2"],
         &["--cone", "dsos"],
     ] {
-        let refused = refusal(&[&["fit", mesh, "--out", out, "--relax-convexity", "1"], more].concat());
-        assert!(refused.contains("convex bodies"), "{refused}");
+        for set in [["--relax-convexity", "1"], ["--objective", "inverse-moment"]] {
+            let refused = refusal(&[&["fit", mesh, "--out", out], &set[..], more].concat());
+            assert!(refused.contains("convex bodies") && refused.contains(&format!("{}: ", set[0])), "{refused}");
+        }
     }
     assert!(refusal(&["fit", mesh, "--out", out, "--relax-convexity", "-1"]).contains("--relax-convexity: -1"));
     assert!(
         refusal(&["fit", mesh, "--out", out, "--relax-convexity", "1", "--objective", "trace-h"]).contains("logdet-p")
     );
+    for (one, other) in [("--max-gap=1cm", "--ladder"), ("--parts=2", "--ladder"), ("--parts=2", "--trim=0.1")] {
+        let refused = refusal(&["fit", mesh, "--out", out, one, other]);
+        assert!(refused.contains("cannot be used") && refused.contains(other.split('=').next().unwrap()), "{refused}");
+    }
     let both = ["fit", mesh, "--out", out, "--relax-convexity", "1", "--objective", "inverse-moment"];
     assert!(refusal(&both).contains("leave one of the two out"));
 }
