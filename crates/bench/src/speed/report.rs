@@ -2,7 +2,6 @@
 
 use super::Speed;
 use super::race::{About, Line, Race, Who};
-use super::shown::NOTES;
 use crate::blocks::block;
 use crate::comparison::parry_version;
 use std::fmt::Write;
