@@ -44,9 +44,9 @@ const DEFINITE_DECREMENT: f64 = 0.5;
 /// Bound of the smallest eigenvalue, relative to the largest coefficient, below which a polynomial
 /// is refused; dimensionless.
 ///
-/// The residual of a proof in double precision is about 1e-15 of the coefficients. A larger value
-/// refuses polynomials that can be proven; a smaller one searches where nothing can be. Pinned by
-/// `the_edge_of_convexity_is_told_from_both_sides`.
+/// The residual of a proof in double precision is about 1e-15 of the coefficients. It decides only
+/// when a search is given up: a larger value ends some with a worse matrix, a smaller one continues
+/// where nothing can be proven. No test fixes it.
 const LEAST_PROVABLE_EIGENVALUE: f64 = 1e-14;
 
 /// Why a polynomial has no certificate.

@@ -31,8 +31,8 @@ const CONE_VOLUME_DECREASE: f64 = 2e-3;
 /// Accuracy of a step's program, relative to the volume; dimensionless.
 ///
 /// A twentieth of [`CONE_VOLUME_DECREASE`], so that a step's decrease is not its error. A larger
-/// value ends descents early; a smaller one takes more Newton steps. Pinned by
-/// `degree_two_over_any_cone_is_the_smallest_ellipsoid`.
+/// value ends descents early; a smaller one takes more Newton steps. The search along each step
+/// hides its effect on volumes, and no test fixes it.
 const CONE_STEP_GAP: f64 = 1e-4;
 /// Points that the first program knows, in multiples of the rows of P, and at most as many more in
 /// each of the next.

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Matrix4, SymmetricEigen, Vector3, Vector4};
 ///
 /// The volume is off by about twice this. A larger value makes bodies of degree 2 larger than need
 /// be; a smaller one takes more of the linearly convergent steps, up to [`MAX_ASCENT_STEPS`].
-/// Pinned by `of_a_cuboid`.
+/// Pinned by `of_points_on_a_known_ellipsoid`.
 const HEIGHT_TOLERANCE: f64 = 1e-7;
 /// Steps before giving up; tens to a few thousand are used in practice.
 const MAX_ASCENT_STEPS: usize = 200_000;

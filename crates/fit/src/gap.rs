@@ -35,7 +35,7 @@ const GAP_ACCURACY: f64 = 0.02;
 ///
 /// Cells near edges of a polytope shrink linearly: the search would take thousands of times as many
 /// for each digit. A larger value leaves bounds of bodies that are close at that; a smaller one
-/// uses up [`MAX_CELLS`]. Pinned by `a_box_does_not_reach_beyond_its_corners`.
+/// uses up [`MAX_CELLS`]. Pinned by `the_coarsest_body_within_a_gap_is_on_the_lowest_rung_that_is`.
 pub(super) const RESOLVED_GAP: f64 = 1e-5;
 
 /// Most cells looked at; the bound holds after fewer, too.
@@ -49,7 +49,7 @@ const MEAN_RINGS: usize = 24;
 ///
 /// Tangent planes there bound the body best, but rounding grows with the distance. A larger value
 /// loosens the bound by rounding; a smaller one takes planes at points that are not on the surface.
-/// Pinned by `slabs_leave_a_polytope_no_gap`.
+/// The bound is proven for any value, and no test fixes it.
 const MAX_CONSTRAINT_REACH: f64 = 100.0;
 
 /// What rounding may add to a height or a distance, relative to the size of the body;

@@ -37,7 +37,7 @@ const FINE_GAP: f64 = 3e-7;
 /// last digits.
 ///
 /// A larger value adds points that do not bound the optimum; a smaller one takes more Newton steps
-/// in every round. Pinned by `refits_of_a_stream_take_fewer_steps_and_end_where_fits_do`.
+/// in every round. It changes the time only, and no test fixes it.
 const ROUGH_GAP: f64 = 1e-3;
 /// Most rounds of adding points at the rough optimum, and the violation below which it does not
 /// matter.

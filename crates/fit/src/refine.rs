@@ -22,7 +22,8 @@ const MAX_VOLUME_STEPS: usize = 30;
 /// Relative decrease of the volume below which a refinement ends; dimensionless.
 ///
 /// Steps converge linearly. A larger value ends early with larger bodies; a smaller one takes steps
-/// that nobody notices. Pinned by `refined_volumes`.
+/// that nobody notices. Pinned by `refinement_is_monotone_contains_the_points_and_is_proven` and
+/// `refined_volumes`.
 const REFINED_VOLUME_DECREASE: f64 = 2e-5;
 
 /// Accuracy of a step's program, relative to the volume; dimensionless.
@@ -47,7 +48,7 @@ const WARM_STEPS: usize = 80;
 /// measures where they are.
 ///
 /// A larger value shortens all steps; a smaller one makes the model singular to rounding. Pinned by
-/// `refined_volumes`.
+/// `refinement_is_monotone_contains_the_points_and_is_proven`.
 const DAMPING: f64 = 1e-7;
 
 /// Why a refinement ended.

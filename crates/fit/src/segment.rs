@@ -28,21 +28,24 @@ pub(super) const NEGLIGIBLE_VOLUME: f64 = 1e-6;
 /// left; dimensionless.
 ///
 /// Ten times the noise of rough hulls. A larger value turns to the region that wastes most too
-/// early; a smaller one follows noise. Pinned by `no_search_is_worse_than_the_greedy_one`.
+/// early; a smaller one follows noise. It steers the search, and no test fixes it: its effect shows
+/// in the comparison of convex parts (`crates/bench`).
 const WORTHWHILE_GAIN: f64 = 1e-5;
 
 /// Excess of a region's hull over its volume, relative to the hull of the object, below which the
 /// region is left alone; dimensionless.
 ///
 /// A larger value leaves parts uncut that a user would see; a smaller one spends the regions on
-/// facets of curved surfaces. Pinned by `no_search_is_worse_than_the_greedy_one`.
+/// facets of curved surfaces. It steers the search, and no test fixes it: its effect shows in the
+/// comparison of convex parts (`crates/bench`).
 const CONVEX_EXCESS: f64 = 1e-3;
 
 /// Gain of the best cut, as a part of what a region wastes, and waste, as a part of the object,
 /// that together start a search for cuts that gain more together; dimensionless.
 ///
 /// A larger value looks ahead nearly always, which takes long; a smaller one stops at regions that
-/// need two cuts. Pinned by `cuts_that_only_divided_a_part_are_left_out`.
+/// need two cuts. It steers the search, and no test fixes it: its effect shows in the comparison of
+/// convex parts (`crates/bench`).
 const LOOK_AHEAD_SHARE: f64 = 0.05;
 
 /// Most cuts in a row that gain nothing, of a closed region and of an open one, whose own volume is
@@ -61,7 +64,8 @@ const AHEAD: f64 = 3.0;
 /// dimensionless.
 ///
 /// Scans have small ledges everywhere. A larger value misses furniture; a smaller one takes scans
-/// for it. Pinned by `no_search_is_worse_than_the_greedy_one`.
+/// for it. It steers the search, and no test fixes it: its effect shows in the comparison of convex
+/// parts (`crates/bench`).
 const LEDGE_SHARE: f64 = 0.1;
 
 /// Most ledges that are measured.

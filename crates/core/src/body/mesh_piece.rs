@@ -32,8 +32,7 @@ use std::collections::hash_map::Entry;
 ///
 /// Coordinates of cut points round at about 1e-15, and planes are placed at corners only up to
 /// that. A smaller value splits triangles into slivers beside the plane; a larger one takes thin
-/// features for part of the plane. Pinned by `planes_through_corners_and_along_faces_do_no_harm`
-/// and `faces_in_the_plane_go_with_the_solid_behind_them`.
+/// features for part of the plane. Pinned by `corners_near_a_plane_are_on_it`.
 const ON_PLANE: f64 = 1e-9;
 
 /// Why triangles are no mesh.

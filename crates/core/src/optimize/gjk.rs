@@ -12,8 +12,8 @@ const MAX_STEPS: usize = 16;
 /// squared distance; dimensionless.
 ///
 /// The simplex method is used for first guesses only. A larger value stops at worse guesses; a
-/// smaller one spends [`MAX_STEPS`] on rounding. Pinned by the tests of the gap in the crate
-/// `sublevel-fit`, whose distances end with it.
+/// smaller one spends [`MAX_STEPS`] on rounding. Pinned by
+/// `the_bound_holds_in_all_directions_and_is_close`, a test of the gap in the crate `sublevel-fit`.
 const LEAST_APPROACH: f64 = 1e-6;
 
 /// Points of two sets, and their difference.

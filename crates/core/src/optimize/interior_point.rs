@@ -15,8 +15,7 @@ const MAX_ITERATIONS: u32 = 80;
 /// dimensionless.
 ///
 /// The usual value of primal-dual methods. Closer to 1, iterates stick to the boundary; smaller,
-/// the convergence is slower. Pinned by `extents_of_exact_bodies_match_closed_forms`, whose
-/// accuracy needs convergence within [`MAX_ITERATIONS`].
+/// the convergence is slower. It changes the number of iterations only, and no test fixes it.
 const TO_BOUNDARY: f64 = 0.995;
 
 /// Least diagonal term of the Newton matrix, relative to the largest curvature; dimensionless.

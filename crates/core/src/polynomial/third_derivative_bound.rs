@@ -17,16 +17,15 @@ const CUBES: usize = 16;
 /// Distance of a value from 1 up to which the bound of the third derivatives holds; dimensionless.
 ///
 /// Searches end at the level 1 and use the bound for their last steps only. A larger value makes
-/// the bound larger, a smaller one leaves fewer points where it can be used. Pinned by
-/// `no_difference_of_hessians_exceeds_it`, which draws values from this interval, and by
-/// `it_is_not_much_above_what_is_met`.
+/// the bound larger, a smaller one leaves fewer points where it can be used. No test fixes the
+/// value: those of the bound draw points from whatever interval it states.
 pub const NEAR_LEVEL: f64 = 0.25;
 
 /// Distance from a cube up to which its bound holds, relative to half its edge; dimensionless.
 ///
 /// A step from a point near the level may end that far outside of the cubes that meet the level. A
-/// larger value makes the bound larger; a smaller one shortens the steps that it covers. Pinned by
-/// `no_difference_of_hessians_exceeds_it` and `it_is_not_much_above_what_is_met`.
+/// larger value makes the bound larger; a smaller one shortens the steps that it covers. No test
+/// fixes the value: those of the bound draw steps of the length that follows from it.
 const SURROUNDINGS: f64 = 0.125;
 
 /// A bound of third derivatives and how far from where it holds it still does.

@@ -310,3 +310,12 @@ fn sections_do_not_reach_across_holes() {
         assert_eq!(halves.iter().any(|half| half.spots().iter().any(in_hole)), crossed, "{caps:?}");
     }
 }
+
+#[test]
+fn corners_near_a_plane_are_on_it() {
+    // The cube has the size 3.5: a plane that cuts off 1e-10 of it leaves its corners alone.
+    for (depth, is_cut) in [(1e-10, false), (1e-6, true)] {
+        let [below, _] = piece(&cube()).cut_with(&Vector3::x(), 1.0 - depth, Caps::Sections);
+        assert_eq!(below.spots().iter().any(|spot| spot.x.x < 1.0 && spot.x.x > 0.5), is_cut, "{depth}");
+    }
+}
