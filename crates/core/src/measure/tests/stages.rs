@@ -224,10 +224,10 @@ fn stages_of_growth_distances_solve_alone() {
     let smooth = |case: &Case| case.is_smooth() && case.is_apart();
     let edged = |case: &Case| !case.is_smooth();
     at_least("growth follow", 60.0, solved("growth follow", smooth, |case| warm(case, &[Stage::Follow])));
-    at_least("growth seek", 40.0, solved("growth seek", smooth, |case| cold(case, &[Stage::Seek])));
-    at_least("growth ray", 40.0, solved("growth ray", edged, |case| warm(case, &[Stage::Ray])));
+    at_least("growth seek", 60.0, solved("growth seek", smooth, |case| cold(case, &[Stage::Seek])));
+    at_least("growth ray", 95.0, solved("growth ray", edged, |case| warm(case, &[Stage::Ray])));
     let stages = [Stage::SupportTables, Stage::Ray];
-    at_least("growth portal", 40.0, solved("growth portal", edged, |case| cold(case, &stages)));
+    at_least("growth portal", 95.0, solved("growth portal", edged, |case| cold(case, &stages)));
     let stages = [Stage::InteriorDistance];
-    at_least("growth interior", 40.0, solved("growth interior", |_| true, |case| cold(case, &stages)));
+    at_least("growth interior", 95.0, solved("growth interior", |_| true, |case| cold(case, &stages)));
 }
