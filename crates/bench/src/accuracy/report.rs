@@ -8,7 +8,7 @@ use crate::machine::locked;
 use std::fmt::Write;
 
 impl Accuracy {
-    /// The report, but for what [`Shown`](super::Shown) writes into its blocks.
+    /// The report, but for what `Shown` writes into its blocks.
     pub fn markdown(&self) -> String {
         let mut text = String::from("# Solver accuracy against time\n\n");
         // Writing to a string cannot fail.

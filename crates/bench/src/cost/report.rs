@@ -16,7 +16,7 @@ SplitMix64), cold and with the hint of the pose before, the same poses for all s
 ";
 
 impl Cost {
-    /// The report, but for what [`Shown`](super::Shown) writes into its blocks.
+    /// The report, but for what `Shown` writes into its blocks.
     pub fn markdown(&self) -> String {
         let mut text = String::from("# How costs grow\n\n");
         // Writing to a string cannot fail.

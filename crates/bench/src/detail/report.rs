@@ -12,7 +12,7 @@ impl Detail {
         parts_report::csv(&self.divided)
     }
 
-    /// The report, but for what [`Shown`](super::Shown) writes into its blocks.
+    /// The report, but for what `Shown` writes into its blocks.
     pub fn markdown(&self) -> String {
         let mut text = String::from("# What each level of detail buys\n\n");
         // Writing to a string cannot fail.

@@ -8,7 +8,7 @@ use std::fmt::Write;
 use sublevel::measure::DEFAULT_ACCURACY;
 
 impl Speed {
-    /// The report, but for what [`Shown`](super::Shown) writes into its blocks.
+    /// The report, but for what `Shown` writes into its blocks.
     pub fn markdown(&self) -> String {
         let mut text = String::from("# Speed against accuracy\n\n");
         // Writing to a string cannot fail.

@@ -31,7 +31,7 @@ ball, too.
 ";
 
 impl Table1 {
-    /// The report: the machine, the pictures, and the blocks of [`Self::block`], which are left
+    /// The report: the machine, the pictures, and the blocks of `Self::block`, which are left
     /// empty.
     pub fn markdown(&self) -> String {
         let mut text = String::from("# Table I, computed again\n\n");

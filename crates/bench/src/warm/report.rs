@@ -7,7 +7,7 @@ use crate::comparison::parry_version;
 use std::fmt::Write;
 
 impl Warm {
-    /// The report, but for what [`Shown`](super::Shown) writes into its blocks.
+    /// The report, but for what `Shown` writes into its blocks.
     pub fn markdown(&self) -> String {
         let mut text = String::from("# Warm starts\n\n");
         // Writing to a string cannot fail.
