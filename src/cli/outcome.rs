@@ -12,7 +12,7 @@ pub fn exit_code(outcome: Outcome) -> ExitCode {
     match outcome {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
-        // Whoever reads our output went away; nobody is left to tell.
+        // The reader of the output has closed it: no message would arrive.
         Err(error) if is_broken_pipe(error.as_ref()) => ExitCode::FAILURE,
         Err(error) => {
             // Nothing but standard output gives a bare system error: files are named.

@@ -9,7 +9,8 @@ pub(super) fn contours(values: &[f64], width: usize) -> Vec<Vec<[f64; 2]>> {
     let height = values.len() / width.max(1);
     let value = |[i, j]: [usize; 2]| values[j * width + i];
     let inside = |corner: [usize; 2]| value(corner) <= 0.0;
-    // Where the outline crosses a grid line, named by the two nodes beside it, the one inside first.
+    // Where the outline crosses a grid line, named by the two nodes beside it, the one inside
+    // first.
     let mut next: HashMap<[[usize; 2]; 2], [[usize; 2]; 2]> = HashMap::new();
     for j in 0..height.saturating_sub(1) {
         for i in 0..width.saturating_sub(1) {

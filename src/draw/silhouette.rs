@@ -81,7 +81,8 @@ pub struct Outline {
     pub ink: Ink,
     /// Polygons in picture coordinates, metres.
     pub polygons: Vec<Vec<[f64; 2]>>,
-    /// Drawn as one filled area, the union of the polygons, which are convex; otherwise as lines over a faint area.
+    /// Drawn as one filled area, the union of the polygons, which are convex; otherwise as lines
+    /// over a faint area.
     pub solid: bool,
 }
 

@@ -2,8 +2,8 @@
 //!
 //! The catalogue holds the jobs; what is decided there is final, and the worker only follows. A job
 //! that is cancelled is CANCELLED on disk first and stopped then; the result of a fit counts only
-//! if its job is still running when it comes. So nothing depends on when the fit learns of it, and a
-//! kill at any time leaves a state that was acknowledged.
+//! if its job is still running when it comes. So nothing depends on when the fit learns of it, and
+//! a kill at any time leaves a state that was acknowledged.
 //!
 //! `request` checks what is asked for, `execute` does it, for whoever asks; `worker` does one job
 //! after the other; `board` is where it says how far it is, and where everybody waits for news.

@@ -12,8 +12,8 @@ use crate::store::{Catalogue, CatalogueError};
 use super::error;
 use super::limits::LOADING_PATIENCE;
 
-/// Shared by all handlers. Work that blocks passes a limit first, so that one kind of it cannot take
-/// every thread.
+/// Shared by all handlers. Work that blocks passes a limit first, so that one kind of it cannot
+/// take every thread.
 #[derive(Debug, Clone)]
 pub(super) struct AppState {
     catalogue: watch::Receiver<Option<Arc<Catalogue>>>,

@@ -2,10 +2,10 @@
 //! stopping.
 //!
 //! The one layer that knows protobuf. `incoming` lets connections in and `concurrency_limit` calls,
-//! so many at once. A call walks straight through: a handler (`bodies`, `scenes`, `queries`, `fits`)
-//! reads its message with `wire`, asks the catalogue or a scene's snapshot, and writes the answer
-//! with `wire`; whatever fails becomes a status in `error`. Handlers are dropped when a client goes
-//! away, so every change runs in a task of its own and is finished or not begun.
+//! so many at once. A call walks straight through: a handler (`bodies`, `scenes`, `queries`,
+//! `fits`) reads its message with `wire`, asks the catalogue or a scene's snapshot, and writes the
+//! answer with `wire`; whatever fails becomes a status in `error`. Handlers are dropped when a
+//! client goes away, so every change runs in a task of its own and is finished or not begun.
 
 mod app_state;
 mod bodies;

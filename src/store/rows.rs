@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use crate::measure::{Pose, PoseError};
 use crate::scene::{Object, Scene};
 
-/// Raised whenever older programs could not read the tables any more, or this one not theirs. 2: fit
-/// jobs hold a request with a mode.
+/// Raised whenever older programs could not read the tables any more, or this one not theirs. 2:
+/// fit jobs hold a request with a mode.
 pub(super) const FORMAT: u64 = 2;
 
 /// `format`, and `revision_floor`: no new scene starts at or below it.
@@ -23,8 +23,8 @@ pub(super) const REVISIONS: TableDefinition<&str, u64> = TableDefinition::new("r
 /// Scene and object name to [`ObjectRow`]: a new pose rewrites one row, whatever the size of the
 /// scene.
 pub(super) const OBJECTS: TableDefinition<(&str, &str), &[u8]> = TableDefinition::new("objects");
-/// Job id to [`Job`](super::Job). This table and the next three are missing from files that never had
-/// a job.
+/// Job id to [`Job`](super::Job). This table and the next three are missing from files that never
+/// had a job.
 pub(super) const JOBS: TableDefinition<u64, &[u8]> = TableDefinition::new("jobs");
 /// Job id to the coordinates of its points, metres, as little-endian f64; of jobs that have not
 /// ended.

@@ -1,5 +1,5 @@
-//! No two files import each other, directly or over others: whoever reads a file has to know the
-//! files below it only.
+//! No two files import each other, directly or through others, so that a file can be understood
+//! from the files that it imports.
 //!
 //! The sources are read as text. A path counts for the file that defines what it names: re-exports
 //! (`pub use`) are followed. A module that declares its children does not import them by that.

@@ -6,8 +6,9 @@
 //! test modules blanked out, and every path that starts at `crate::` or at one of the crates (or
 //! climbs out of a layer with `super::`) is held against the table of allowed directions.
 
+use crate::source::{identifier, is_test_file, rust_files, without_comments_and_literals, without_tests};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// For each layer (a folder or file of `crates/core/src` or `src`, or a crate), the layers it may
 /// import.
@@ -186,124 +187,10 @@ fn names_after(code: &str, prefix: &str) -> Vec<String> {
     names
 }
 
-fn identifier(text: &str) -> String {
-    text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()
-}
-
-/// The same text with comments and the contents of string and character literals removed.
-fn without_comments_and_literals(text: &str) -> String {
-    let mut code = String::new();
-    let mut rest = text;
-    while let Some(c) = rest.chars().next() {
-        let skip = if rest.starts_with("//") {
-            rest.find('\n').unwrap_or(rest.len())
-        } else if rest.starts_with("/*") {
-            block_comment(rest)
-        } else if let Some(length) = raw_string(rest, &code) {
-            length
-        } else if c == '"' {
-            quoted(rest, '"')
-        } else if c == '\'' && (rest[1..].starts_with('\\') || rest.chars().nth(2) == Some('\'')) {
-            quoted(rest, '\'') // and not a lifetime
-        } else {
-            code.push(c);
-            rest = &rest[c.len_utf8()..];
-            continue;
-        };
-        code.push(' ');
-        rest = &rest[skip..];
-    }
-    code
-}
-
-/// Length of a block comment, which may hold others.
-fn block_comment(text: &str) -> usize {
-    let (mut depth, mut at) = (0, 0);
-    while at < text.len() {
-        let rest = &text[at..];
-        if rest.starts_with("/*") {
-            depth += 1;
-            at += 2;
-        } else if rest.starts_with("*/") {
-            depth -= 1;
-            at += 2;
-            if depth == 0 {
-                return at;
-            }
-        } else {
-            at += rest.chars().next().map_or(1, char::len_utf8);
-        }
-    }
-    text.len()
-}
-
-/// Length of a raw string such as `r#"..."#`, if one starts here.
-fn raw_string(text: &str, before: &str) -> Option<usize> {
-    if before.ends_with(|c: char| c.is_alphanumeric() && c != 'b' || c == '_') {
-        return None;
-    }
-    let hashes = text.strip_prefix('r')?.chars().take_while(|c| *c == '#').count();
-    let body = text[1 + hashes..].strip_prefix('"')?;
-    let end = format!("\"{}", "#".repeat(hashes));
-    Some(2 + hashes + body.find(&end).map_or(body.len(), |at| at + end.len()))
-}
-
-/// Length of a literal between two `quote`s, escapes respected.
-fn quoted(text: &str, quote: char) -> usize {
-    let mut escaped = false;
-    for (at, c) in text.char_indices().skip(1) {
-        match c {
-            _ if escaped => escaped = false,
-            '\\' => escaped = true,
-            c if c == quote => return at + c.len_utf8(),
-            _ => {}
-        }
-    }
-    text.len()
-}
-
-/// The same code without the items under `#[cfg(test)]`.
-fn without_tests(code: &str) -> String {
-    let mut kept = String::new();
-    let mut rest = code;
-    while let Some(at) = rest.find("#[cfg(test)]") {
-        kept.push_str(&rest[..at]);
-        rest = &rest[at..];
-        let mut depth = 0;
-        let end = rest.char_indices().find_map(|(at, c)| {
-            match c {
-                '{' => depth += 1,
-                '}' => depth -= 1,
-                _ => {}
-            }
-            (depth == 0 && (c == '}' || c == ';')).then_some(at + 1)
-        });
-        rest = &rest[end.unwrap_or(rest.len())..];
-    }
-    kept + rest
-}
-
-fn rust_files(folder: &Path) -> Vec<PathBuf> {
-    let mut files = Vec::new();
-    for entry in fs::read_dir(folder).expect("a source folder is readable") {
-        let path = entry.expect("a folder entry is readable").path();
-        if path.is_dir() {
-            files.extend(rust_files(&path));
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
-            files.push(path);
-        }
-    }
-    files
-}
-
 /// `measure/pose.rs` and `measure.rs` both belong to `measure`.
 fn layer_of(inside: &Path) -> String {
     let first = inside.iter().next().expect("the path of a file is not empty");
     Path::new(first).file_stem().expect("a file has a name").to_string_lossy().into_owned()
-}
-
-fn is_test_file(inside: &Path) -> bool {
-    inside.iter().any(|part| part == "tests" || part == "tests.rs")
 }
 
 /// Modules beside a file in the same layer; none for its own `mod.rs`, whose `super` is the crate.

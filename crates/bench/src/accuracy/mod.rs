@@ -41,8 +41,8 @@ struct Measured {
 
 /// Measures three pairs of the meshes in `data` at degrees 4 and 6, or one at degree 4 if `quick`,
 /// and a pair of flat faces. Fits are kept in the `cache`; coal takes part where `SUBLEVEL_COAL`
-/// names the program that times it, clarabel where its example is built. `progress` receives what is
-/// going on and can stop it.
+/// names the program that times it, clarabel where its example is built. `progress` receives what
+/// is going on and can stop it.
 ///
 /// # Errors
 /// [`ComparisonError`].

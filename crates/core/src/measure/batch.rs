@@ -121,8 +121,8 @@ const MOST_COARSE: u32 = 6;
 /// precision, is likely to end with a narrow bracket.
 const NEAR: f64 = 1e-4;
 
-/// The same above which Newton's method has diverged after [`MOST_COARSE`] rounds: a step as long as
-/// in a search from a cold start then.
+/// The same above which Newton's method has diverged after [`MOST_COARSE`] rounds: a step as long
+/// as in a search from a cold start then.
 const ASTRAY: f64 = 0.04;
 
 /// Most rounds of a pose before it is solved alone.

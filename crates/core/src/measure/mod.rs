@@ -7,8 +7,9 @@
 //! where that does not apply or does not converge, an interior-point method ([`crate::optimize`])
 //! does. Neither is trusted: an answer is accepted when its bracket (`bounds`) is narrow enough. As
 //! that holds a normal to about the root of its width only, the equations have to hold there, too.
-//! Solids of several parts are solved pair by pair (`pairwise_minimum`). Imports go one way: measures
-//! on `solver`, that on `bounds`, these on `frames`. Neither clock nor allocator nor threads are used.
+//! Solids of several parts are solved pair by pair (`pairwise_minimum`). Imports go one way:
+//! measures on `solver`, that on `bounds`, these on `frames`. Neither clock nor allocator nor
+//! threads are used.
 
 mod batch;
 mod bounds;

@@ -234,7 +234,8 @@ mod tests {
             assert!(nearer_than(&ball, &here, &ball, &here, bad, &options, &mut WarmStart::default()).is_err());
             assert!(within_margin(&ball, &here, &ball, &here, bad, &options, &mut WarmStart::default()).is_err());
         }
-        // Touching counts as overlap as soon as rounding allows to say so; nothing is nearer than 0.
+        // Touching counts as overlap as soon as rounding allows to say so; nothing is nearer
+        // than 0.
         let options = Options::default();
         let inside = nearer_than(&ball, &here, &ball, &here, 0.0, &options, &mut WarmStart::default());
         assert_eq!(inside, Ok(Decision::No));

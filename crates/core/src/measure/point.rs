@@ -1,8 +1,10 @@
 //! Distance from a body to a point: the projection of the point on the body.
 //!
-//! For the unit vector n along `Σ λ_i ∇g_i(y)`, every point y' of the body has `n·(q - y') >= n·(q - y) - fall`, with the
-//! fall of [`crate::measure::bounds::duality_bounds::descent`]; so the plane through y with the normal n separates q from the body by as much. The
-//! program stays regular through contact: its Hessian is the identity plus what the body's curvature adds.
+//! For the unit vector n along `Σ λ_i ∇g_i(y)`, every point y' of the body has
+//! `n·(q - y') >= n·(q - y) - fall`, with the fall of
+//! [`crate::measure::bounds::duality_bounds::descent`]; so the plane through y with the normal n
+//! separates q from the body by as much. The program stays regular through contact: its Hessian is
+//! the identity plus what the body's curvature adds.
 
 use crate::body::{Body, Solid};
 use crate::measure::bounds::duality_bounds::{SLACK, descent};
@@ -45,8 +47,9 @@ impl PointDistance {
         self.upper
     }
 
-    /// Gradient with respect to the pose the distance was asked for; that with respect to the point is `normal`. By the
-    /// envelope theorem the witness counts as fixed to the body: `-n` and `-(y - t) × n`. None inside.
+    /// Gradient with respect to the pose the distance was asked for; that with respect to the point
+    /// is `normal`. By the envelope theorem the witness counts as fixed to the body: `-n` and
+    /// `-(y - t) × n`. None inside.
     pub fn pose_gradient(&self, pose: &Pose) -> Option<Twist> {
         self.normal.map(|n| Twist::of_force(-n, &self.witness, pose.translation()))
     }

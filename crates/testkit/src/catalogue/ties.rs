@@ -15,7 +15,7 @@ pub struct WaysOut {
     pub turn: UnitQuaternion<f64>,
     pub depth_accuracy: f64,
     /// Ends of lines of the inner body's centre in the host's frame, metres: to the mirror image of
-    /// the start, and across a diagonal to where another way out is the shortest.
+    /// the start, and across a diagonal to where another translation is the shortest.
     pub lines: [[Vector3<f64>; 2]; 2],
 }
 

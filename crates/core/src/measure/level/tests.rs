@@ -128,7 +128,8 @@ fn far_values_stay_bracketed() {
     }
 }
 
-/// Derivatives of the value with respect to both twists: central differences, extrapolated to step 0.
+/// Derivatives of the value with respect to both twists: central differences, extrapolated to
+/// step 0.
 fn differences(a: &Body, b: &Body, poses: [Pose; 2], step: f64) -> [Twist; 2] {
     let value = |body: usize, linear: Vector3<f64>, angular: Vector3<f64>| {
         let mut moved = poses;

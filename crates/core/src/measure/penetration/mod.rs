@@ -93,7 +93,7 @@ pub fn penetration(
         direction: Some(way.direction),
         witness_a: way.contacts[0].x,
         witness_b: way.contacts[0].y,
-        // Another way out for the deepest pair counts if that pair is what decides.
+        // A second direction for the deepest pair is a tie if that pair decides the depth.
         tied: way.tied || best.tied && narrow,
         directions,
         iterations: iterations + way.iterations,

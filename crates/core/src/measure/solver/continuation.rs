@@ -136,8 +136,8 @@ pub(in crate::measure) struct Lost {
     /// metres.
     pub(in crate::measure) middle: Option<V3<f64>>,
     /// Where Newton's method ended without a narrow bracket, which only twice the precision may
-    /// compliance: near contact, where doubles do not tell on which side, or where the normals do not
-    /// agree well enough.
+    /// compliance: near contact, where doubles do not tell on which side, or where the normals do
+    /// not agree well enough.
     pub(in crate::measure) grazing: Option<Proven>,
 }
 

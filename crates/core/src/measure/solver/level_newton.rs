@@ -1,11 +1,13 @@
-//! Newton's method for the level distance, by quadratic programs: the unknowns are x, s and the multipliers of
+//! Newton's method for the level distance, by quadratic programs: the unknowns are x, s and the
+//! multipliers of
 //!
 //! ```text
 //! Σ ν_i ∇g_i + Σ μ_j ∇h_j = 0,   Σ ν_i = 1,   g_i(x) = s,   h_j(x) = 1.
 //! ```
 //!
-//! From afar values fall by orders of magnitude, and towards the least of a power d steps are a (d - 1)-th part of the way. There
-//! the Hessians are those of `g_i^(2/d)`, about a square whatever d is.
+//! From afar values fall by orders of magnitude, and towards the least of a power d steps are a
+//! (d - 1)-th part of the way. There the Hessians are those of `g_i^(2/d)`, about a square whatever
+//! d is.
 
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::solver::active_constraints::MAX_ACTIVE;

@@ -110,11 +110,12 @@ impl Relation for Apart<'_> {
     }
 }
 
-/// The signed distance near a direction: x - y along the normal, one way or the other, so that Newton's method passes through
-/// contact without noticing.
+/// The signed distance near a direction: x - y along the normal, one way or the other, so that
+/// Newton's method passes through contact without noticing.
 ///
-/// The lower bound is one of the signed distance, for a plane across any n shows at least `-h_A(-n) - h_B(n)` of it; it is
-/// taken as proven where the points attain it, so that no normal nearby shows more. The upper bound is that of the distance.
+/// The lower bound is one of the signed distance, for a plane across any n shows at least
+/// `-h_A(-n) - h_B(n)` of it; it is taken as proven where the points attain it, so that no normal
+/// nearby shows more. The upper bound is that of the distance.
 #[derive(Clone, Copy)]
 pub(in crate::measure) struct Through<'a> {
     pub(in crate::measure) pose_a: &'a Pose,

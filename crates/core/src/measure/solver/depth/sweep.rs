@@ -1,4 +1,5 @@
-//! The proof of a penetration depth: bounds over all directions of translations that take bodies apart.
+//! The proof of a penetration depth: bounds over all directions of translations that take bodies
+//! apart.
 //!
 //! For a unit vector n let `f(n) = h_A(-n) + h_B(n)`, h the support functions: how far A has to
 //! move along n (or B along -n) until a plane across n parts them. f is the support function of the

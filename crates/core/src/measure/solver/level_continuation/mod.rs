@@ -1,15 +1,17 @@
-//! Level distance by continuation: from the last answer of a pair along its motion, where one constraint of each body is
-//! active.
+//! Level distance by continuation: from the last answer of a pair along its motion, where one
+//! constraint of each body is active.
 //!
-//! Points are given in B's normalized coordinates w, in which B never moves and its constraint g is evaluated without any
-//! error of place. A is carried along by the affine map `z = M_A x`, `x = K w + o` to its own normalized coordinates, x in metres
-//! in A's frame from its normalization's centre on: `C = M_A K`. For A's constraint p the optimality conditions are
+//! Points are given in B's normalized coordinates w, in which B never moves and its constraint g is
+//! evaluated without any error of place. A is carried along by the affine map `z = M_A x`,
+//! `x = K w + o` to its own normalized coordinates, x in metres in A's frame from its
+//! normalization's centre on: `C = M_A K`. For A's constraint p the optimality conditions are
 //!
 //! ```text
 //! G + μ b = 0,   g(w) = 1,   μ >= 0,   G = Cᵀ∇p(z),   b = ∇g(w)
 //! ```
 //!
-//! and with `H = Cᵀ∇²p C + μ ∇²g` Newton's step δ and its multiplier μ' follow from `H δ + μ' b = -G`, `b·δ = 1 - g`:
+//! and with `H = Cᵀ∇²p C + μ ∇²g` Newton's step δ and its multiplier μ' follow from
+//! `H δ + μ' b = -G`, `b·δ = 1 - g`:
 //!
 //! ```text
 //! μ' = -(1 - g + b·H⁻¹G) / (b·H⁻¹b),   δ = -H⁻¹(G + μ' b),   μ = -G·b / b·b before
@@ -17,25 +19,32 @@
 //!
 //! H is regular wherever one of the bodies is curved, H⁻¹ by its cofactors.
 //!
-//! **Prediction.** The last answer w obeyed `G + μ b = 0` where A was then; where A is now G is another, by the quadratic model of
-//! p about the point of the last jet: `∇p + ∇²p s`, s the way from there to w's image. To first order the answer moves by
-//! `-P G`, `P = H⁻¹ - H⁻¹b bᵀH⁻¹ / (b·H⁻¹b)`, for `P b = 0`. So the first step needs no evaluation. What it misses changes slowly
-//! along a smooth trajectory; it is foreseen and added on.
+//! **Prediction.** The last answer w obeyed `G + μ b = 0` where A was then; where A is now G is
+//! another, by the quadratic model of p about the point of the last jet: `∇p + ∇²p s`, s the way
+//! from there to w's image. To first order the answer moves by `-P G`,
+//! `P = H⁻¹ - H⁻¹b bᵀH⁻¹ / (b·H⁻¹b)`, for `P b = 0`. So the first step needs no evaluation. What it
+//! misses changes slowly along a smooth trajectory; it is foreseen and added on.
 //!
-//! **Bracket**, at the point w' = w + δ where the step leads, values and gradients there by Taylor's formula from the one
-//! evaluation; with its remainders and all rounding errors, `η` for the error of x, metres:
+//! **Bracket**, at the point w' = w + δ where the step leads, values and gradients there by
+//! Taylor's formula from the one evaluation; with its remainders and all rounding errors, `η` for
+//! the error of x, metres:
 //!
 //! - From below, for any μ >= 0 and every point w'' of B, by `g(w'') <= 1`,
-//!   `p >= p(z') - |M_Aᵀ∇p| η + μ (g(w') - 1) + ρ·(w'' - w') + rise`, `ρ = G + μ b`, where the rise of the convex `p + μ g` over its
-//!   tangent plane is at least `¼ λ |w'' - w'|²` near w', λ a lower bound of the smallest eigenvalue of H around w', and
-//!   farther away in proportion to the distance. So `d >= p(z') - |M_Aᵀ∇p| η + μ (g(w') - 1) - |ρ|²/λ`: an error of the
-//!   point costs the square. Lengths are those of w, and where that is not good enough those of the metric `|d|² + |C d|²`:
-//!   across a thin A a short step of w is a long one of z. Without any curvature the loss is at most |ρ| times the distance of
-//!   the minimiser, of which the errors of `∇p` see only that in z: p is at most the upper bound there, so A, scaled, holds it.
-//! - From above by a point of B, moved there along b (see [`crate::measure::solver::tangent_newton::taylor_bounds`]), and p there by its slope and curvature.
+//!   `p >= p(z') - |M_Aᵀ∇p| η + μ (g(w') - 1) + ρ·(w'' - w') + rise`, `ρ = G + μ b`, where the rise
+//!   of the convex `p + μ g` over its tangent plane is at least `¼ λ |w'' - w'|²` near w', λ a
+//!   lower bound of the smallest eigenvalue of H around w', and farther away in proportion to the
+//!   distance. So `d >= p(z') - |M_Aᵀ∇p| η + μ (g(w') - 1) - |ρ|²/λ`: an error of the point costs
+//!   the square. Lengths are those of w, and where that is not good enough those of the metric
+//!   `|d|² + |C d|²`: across a thin A a short step of w is a long one of z. Without any curvature
+//!   the loss is at most |ρ| times the distance of the minimiser, of which the errors of `∇p` see
+//!   only that in z: p is at most the upper bound there, so A, scaled, holds it.
+//! - From above by a point of B, moved there along b (see
+//!   [`crate::measure::solver::tangent_newton::taylor_bounds`]), and p there by its slope and
+//!   curvature.
 //!
-//! The values of p range over orders of magnitude, and z lies outside A, where what [`crate::body::Trust`] knows of A does not
-//! hold: bounds for p are made at each point ([`crate::polynomial::Growth`]).
+//! The values of p range over orders of magnitude, and z lies outside A, where what
+//! [`crate::body::Trust`] knows of A does not hold: bounds for p are made at each point
+//! ([`crate::polynomial::Growth`]).
 
 mod bracket;
 mod sides;
