@@ -18,5 +18,7 @@ pub mod stability;
 pub mod table1;
 pub mod warm;
 mod words;
+mod workspace;
 
 pub use machine::Machine;
+pub use workspace::enter_workspace;

@@ -31,6 +31,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 use sublevel::body::Body;
+use sublevel_bench::enter_workspace;
 
 /// Blocks of a whole run that hold an answer against a semidefinite program, if there is one: a
 /// fifth of them draw a growth distance, or sizes too far apart for it, and 1 000 are to be left.
@@ -67,6 +68,9 @@ struct Arguments {
 
 fn main() {
     let arguments = Arguments::parse();
+    if arguments.bench {
+        enter_workspace().expect("the workspace is where it was compiled");
+    }
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("endurance");
     let bodies = match &arguments.bodies {
         Some(folder) => catalogue::read(folder),

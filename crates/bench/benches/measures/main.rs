@@ -21,6 +21,7 @@ use std::error::Error;
 use std::fs;
 use std::path::PathBuf;
 use sublevel_bench::comparison::{Coal, CoalRun};
+use sublevel_bench::enter_workspace;
 
 /// Time the measures and compare them with GJK on the hulls
 ///
@@ -64,6 +65,17 @@ struct Effort {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let args = Args::parse();
+    if args.bench {
+        enter_workspace()?;
+    }
+    // A run takes minutes: a file that cannot be written is refused before.
+    for (flag, path) in [("--json", &args.json), ("--csv", &args.csv)] {
+        if let Some(path) = path {
+            fs::OpenOptions::new().append(true).create(true).open(path).map_err(|error| {
+                format!("{flag}: {}: {error}; relative paths begin at the root of the workspace", path.display())
+            })?;
+        }
+    }
     let effort = if args.quick {
         Effort { trajectories: 1, poses: 1024, passes: 3 }
     } else {
