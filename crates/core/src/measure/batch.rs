@@ -15,6 +15,7 @@ use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveConstraints;
 use crate::measure::solver::continuation::{limits, worth_a_bracket};
 use crate::measure::solver::initial_guess::{Start, facing, meeting, middle};
+use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::tangent_newton::{ALIGNED, Bend, Plane, Relative, Side, Step, bracket, moved, newton};
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
@@ -81,34 +82,20 @@ pub fn distance_batch(
     if poses_b.is_empty() {
         return Err(BatchError::Empty);
     }
-    for answer in answers.iter_mut() {
-        (answer.upper, answer.iterations, answer.tied) = (f64::INFINITY, 0, false);
-    }
     if let ([a], [b]) = (a.parts(), b.parts())
         && a.is_smooth()
         && b.is_smooth()
         && options.max_iterations() >= MOST_ROUNDS
+        && runs(Stage::Lanes)
     {
-        in_lanes((a, pose_a), (b, poses_b), options, answers);
-    }
-    for (answer, pose_b) in answers.iter_mut().zip(poses_b).filter(|(answer, _)| answer.upper.is_infinite()) {
-        let spent = answer.iterations;
-        let mut warm = if answer.tied { Hint::Diverged.into() } else { WarmStart::default() };
-        *answer = distance(a, pose_a, b, pose_b, &options.after(spent), &mut warm);
-        answer.iterations += spent;
+        let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
+        dispatch_lanes(Batch { a, pose_a, b, poses_b, options, tolerance, answers });
+    } else {
+        for (answer, pose_b) in answers.iter_mut().zip(poses_b) {
+            *answer = distance(a, pose_a, b, pose_b, options, &mut WarmStart::default());
+        }
     }
     Ok(())
-}
-
-/// Answers what can be answered several poses at a time.
-fn in_lanes(
-    (a, pose_a): (&Body, &Pose),
-    (b, poses_b): (&Body, &[Pose]),
-    options: &Options<'_>,
-    answers: &mut [Distance],
-) {
-    let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
-    dispatch_lanes(Batch { a, pose_a, b, poses_b, options, tolerance, answers });
 }
 
 /// Rounds in single precision that every pose goes through.
@@ -128,8 +115,8 @@ const ASTRAY: f64 = 0.04;
 /// Most rounds of a pose before it is solved alone.
 const MOST_ROUNDS: u32 = 8;
 
-/// A batch as work for the widest arithmetic. Of a pose that is to be solved alone it takes down
-/// the iterations only, and as `tied` that they have diverged.
+/// A batch as work for the widest arithmetic. Each answer is written once: by the lanes, or by a
+/// query for the pose alone.
 struct Batch<'a> {
     a: &'a Body,
     pose_a: &'a Pose,
@@ -165,6 +152,15 @@ impl WithSimd for Batch<'_> {
             } else {
                 return;
             }
+        }
+        // Stopped: what is known by now of the poses that are left is the answer.
+        for waiting in [&far, &near] {
+            for (pose, rounds) in waiting.pose.iter().zip(&waiting.rounds).take(waiting.len) {
+                self.solve_alone(*pose, *rounds, WarmStart::default());
+            }
+        }
+        for pose in next..self.poses_b.len() {
+            self.solve_alone(pose, 0, WarmStart::default());
         }
     }
 }
@@ -239,6 +235,11 @@ impl Waiting {
         }
         group
     }
+}
+
+/// A start that says whether Newton's method in lanes has diverged, as it would from there again.
+fn cold_start(diverged: bool) -> WarmStart {
+    if diverged { Hint::Diverged.into() } else { WarmStart::default() }
 }
 
 /// Trial points, and a normal of any length.
@@ -360,7 +361,7 @@ impl Batch<'_> {
             let (open, late) = (open >> lane & 1 == 1, group.rounds[lane] >= MOST_COARSE);
             let diverged = open && late && straight >> lane & 1 == 0;
             if !open || diverged {
-                self.leave(&group, lane, diverged);
+                self.solve_alone(group.pose[lane], group.rounds[lane], cold_start(diverged));
             } else if late || close >> lane & 1 == 1 {
                 near.push(&group, lane);
             } else {
@@ -417,16 +418,17 @@ impl Batch<'_> {
             if open && !diverged && group.rounds[lane] < MOST_ROUNDS {
                 waiting.push(&group, lane);
             } else if answered >> lane & 1 == 0 {
-                self.leave(&group, lane, diverged);
+                self.solve_alone(group.pose[lane], group.rounds[lane], cold_start(diverged));
             }
         }
     }
 
-    /// Leaves a lane's pose to be solved alone.
-    #[inline(always)]
-    fn leave<const LANES: usize>(&mut self, group: &Group<LANES>, lane: usize, diverged: bool) {
-        let answer = &mut self.answers[group.pose[lane]];
-        (answer.iterations, answer.tied) = (group.rounds[lane], diverged);
+    /// Answers a pose by a query for it alone, after the rounds that it has gone through in lanes.
+    #[inline(never)]
+    fn solve_alone(&mut self, pose: usize, rounds: u32, mut warm: WarmStart) {
+        let options = self.options.after(rounds);
+        let found = distance(self.a, self.pose_a, self.b, &self.poses_b[pose], &options, &mut warm);
+        self.answers[pose] = Distance { iterations: found.iterations + rounds, ..found };
     }
 
     /// The lanes in which the middle between the points seems to lie in both bodies: single queries
@@ -532,8 +534,9 @@ impl Batch<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::{BatchError, distance_batch, in_lanes};
+    use super::{BatchError, distance_batch};
     use crate::body::{Body, Compound};
+    use crate::measure::solver::stages::{Stage, only};
     use crate::measure::{Distance, Options, Pose, Status, WarmStart, distance};
     use nalgebra::{Vector3, Vector4};
     use std::sync::atomic::AtomicBool;
@@ -709,12 +712,12 @@ mod tests {
         }
     }
 
-    /// Which poses are answered in lanes.
+    /// How many poses are answered in lanes, without any method that solves a pose alone.
     fn answered(a: &Body, b: &Body, poses: &[Pose]) -> usize {
-        let unknown = Distance { upper: f64::INFINITY, ..Distance::default() };
-        let mut answers = vec![unknown; poses.len()];
-        in_lanes((a, &Pose::identity()), (b, poses), &Options::default(), &mut answers);
-        answers.iter().filter(|answer| answer.upper.is_finite()).count()
+        let mut answers = vec![Distance::default(); poses.len()];
+        let options = Options::default();
+        only(&[Stage::Lanes], || distance_batch(a, &Pose::identity(), b, poses, &options, &mut answers)).unwrap();
+        answers.iter().filter(|answer| answer.status == Status::Converged && answer.lower > 0.0).count()
     }
 
     #[test]

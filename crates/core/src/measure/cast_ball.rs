@@ -11,6 +11,7 @@ use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::options::Options;
 use crate::measure::point::Projection;
 use crate::measure::solver::convex_root_bracket::Entry;
+use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::status::Status;
 use crate::measure::warm::WarmStart;
 use crate::polynomial::gamma;
@@ -104,8 +105,11 @@ fn cast_at(body: &Body, pose: &Pose, sweep: &Sweep, tolerance: f64, options: &Op
         } else {
             2.0 * excess / (discriminant.sqrt() - slope)
         };
-        let guess = s + step + 0.25 * tolerance;
+        let guess = if runs(Stage::Curvature) { s + step + 0.25 * tolerance } else { f64::NAN };
         let next = if (guess - s).abs() > 0.5 * steps[0] || idle > 0 { f64::NAN } else { guess };
+        if !runs(Stage::Halving) && entry.safeguard(next) != next {
+            break;
+        }
         let next = entry.safeguard(next);
         steps = [steps[1], (next - s).abs()];
         s = next;

@@ -11,6 +11,7 @@ use crate::body::{Body, MAX_CONSTRAINTS, Solid};
 use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::options::Options;
 use crate::measure::solver::convex_root_bracket::Entry;
+use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::status::Status;
 use crate::polynomial::{Polynomial, gamma};
 use nalgebra::{Matrix3, Vector3};
@@ -231,8 +232,11 @@ fn cast_at(body: &Body, pose: &Pose, ray: &Ray, tolerance: f64, options: &Option
             break;
         }
         // Steps that do not shrink (Brent's rule) or help make way for a halving.
-        let guess = look.guess + beyond;
+        let guess = if runs(Stage::Curvature) { look.guess + beyond } else { f64::NAN };
         let next = if (guess - s).abs() > 0.5 * steps[0] || idle > 0 { f64::NAN } else { guess };
+        if !runs(Stage::Halving) && entry.safeguard(next) != next {
+            break;
+        }
         let next = entry.safeguard(next);
         steps = [steps[1], (next - s).abs()];
         s = next;
@@ -336,7 +340,7 @@ impl<'a> Along<'a> {
     /// Where to look first: the start of a ray that may start inside, else where the last
     /// constraint is entered, as values along the ray have it.
     fn first(&self, entry: &Entry, beyond: f64) -> f64 {
-        if entry.from <= -self.base {
+        if entry.from <= -self.base || !runs(Stage::Interpolation) {
             return entry.from;
         }
         let (middle, half) = (0.5 * (entry.from + entry.to), 0.5 * (entry.to - entry.from));

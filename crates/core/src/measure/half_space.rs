@@ -149,7 +149,7 @@ pub fn distance_to_half_space(
     let found = least((parts.len(), 1), bound, f64::NEG_INFINITY, warm, |(i, _), _, hint| {
         from_body(&parts[i], pose, half_space, tolerance, options, hint)
     });
-    let Least { best, lower, tied, iterations } = found;
+    let Least { best, lower, tied, iterations, .. } = found;
     HalfSpaceDistance { status: Status::of(best.upper - lower <= tolerance), lower, tied, iterations, ..best }
 }
 

@@ -38,6 +38,8 @@ pub(in crate::measure) use bracketed;
 #[derive(Clone, Copy, Debug)]
 pub(in crate::measure) struct Least<T> {
     pub(in crate::measure) best: T,
+    /// The parts that `best` is about.
+    pub(in crate::measure) parts: (usize, usize),
     /// Proven lower bound of all.
     pub(in crate::measure) lower: f64,
     /// Whether the bracket of another pair meets that of the best: it may be the least as well.
@@ -66,8 +68,7 @@ pub(in crate::measure) fn least<T: Bracketed>(
         first = pairs().min_by(|p, q| bound(*p).total_cmp(&bound(*q))).unwrap_or((0, 0));
         *warm = WarmStart::default();
     }
-    let mut best = solve(first, f64::INFINITY, warm);
-    warm.parts = (first.0 as u16, first.1 as u16);
+    let (mut best, mut parts) = (solve(first, f64::INFINITY, warm), first);
     let (mut iterations, mut rival) = (best.iterations(), f64::INFINITY);
     for pair in pairs().filter(|pair| *pair != first) {
         let [lower, upper] = best.bracket();
@@ -82,13 +83,13 @@ pub(in crate::measure) fn least<T: Bracketed>(
         iterations += found.iterations();
         if found.bracket()[1] < upper {
             rival = rival.min(lower);
-            best = found;
+            (best, parts) = (found, pair);
             *warm = hint;
-            warm.parts = (pair.0 as u16, pair.1 as u16);
         } else {
             rival = rival.min(found.bracket()[0]);
         }
     }
+    warm.parts = (parts.0 as u16, parts.1 as u16);
     let [lower, upper] = best.bracket();
-    Least { best, lower: lower.min(rival), tied: rival <= upper, iterations }
+    Least { best, parts, lower: lower.min(rival), tied: rival <= upper, iterations }
 }

@@ -117,7 +117,7 @@ fn nearest(
     let found = least((parts.len(), 1), bound, 0.0, warm, |(i, _), _, hint| {
         Projection::new(&parts[i], pose).to(point, tolerance, options, hint)
     });
-    let Least { best, lower, tied, iterations } = found;
+    let Least { best, lower, tied, iterations, .. } = found;
     let answer = Projected { lower, iterations, ..best }.into_distance(tolerance);
     PointDistance { tied: tied && !answer.inside, ..answer }
 }

@@ -24,6 +24,7 @@ use crate::measure::frames::pose::ROTATION_ERROR;
 use crate::measure::half_space::Support;
 use crate::measure::options::Options;
 use crate::measure::solver::projection::Single;
+use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::gamma;
@@ -210,6 +211,13 @@ enum Carrier {
 }
 
 impl Carrier {
+    fn stage(self) -> Stage {
+        match self {
+            Self::A => Stage::PlaneOfA,
+            Self::B => Stage::PlaneOfB,
+        }
+    }
+
     fn other(self) -> Self {
         match self {
             Self::A => Self::B,
@@ -244,7 +252,7 @@ impl Search<'_> {
         let half = 0.5 * self.contact;
         let (mut t, mut warm) = (0.0, WarmStart::default());
         let mut last = None;
-        if self.balls_stay_apart(duration) {
+        if runs(Stage::MovingBalls) && self.balls_stay_apart(duration) {
             return self.end(ImpactStatus::Apart, duration, None);
         }
         let mut carrier = Carrier::A;
@@ -314,6 +322,9 @@ impl Search<'_> {
     /// The time up to which a plane that is normal to n at time t and fixed to one of the bodies
     /// proves them apart, at most `next`.
     fn advance(&mut self, carrier: Carrier, t: f64, next: f64, n: &Vector3<f64>, found: &Distance, gap: f64) -> f64 {
+        if !runs(carrier.stage()) {
+            return t;
+        }
         let (own, other) = self.of(carrier);
         let (turned, error) = own.motion.carry(n, t, next);
         let acceleration = own.acceleration(&other, n, t, next);

@@ -82,6 +82,6 @@ fn closest(
         settle((&a[i], pose_a), (&b[j], pose_b), &goal, options, hint)
     });
     let tied = found.tied && found.best.normal.is_some();
-    let parts = warm.parts.into();
+    let parts = [found.parts.0 as u16, found.parts.1 as u16];
     Distance { lower: found.lower, parts, tied, iterations: found.iterations, ..found.best }
 }

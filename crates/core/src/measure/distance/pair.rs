@@ -33,11 +33,16 @@ pub(in crate::measure) fn settle(
     }
     let BallBounds { lower, upper, witness_a, witness_b, normal } = balls(of_a, of_b);
     let mut bound = Distance { lower, upper, witness_a, witness_b, normal, ..Distance::default() };
+    if !runs(Stage::Balls) {
+        (bound.lower, bound.upper) = (0.0, f64::INFINITY);
+    }
     if goal.met(bound.lower, bound.upper) {
         return bound;
     }
     let normal_a = if let Hint::Apart { normal_a, .. } = &warm.hint { Some(normal_a) } else { None };
-    bound.lower = bound.lower.max(slabs(of_a, of_b, normal_a));
+    if runs(Stage::Slabs) {
+        bound.lower = bound.lower.max(slabs(of_a, of_b, normal_a));
+    }
     if goal.met(bound.lower, bound.upper) {
         return bound;
     }

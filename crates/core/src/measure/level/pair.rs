@@ -34,7 +34,7 @@ pub(super) fn between(
                 Err(lost) => (spent, settled) = (lost.rounds, lost.settled),
             }
         }
-        Hint::Saturated => {
+        Hint::Saturated if runs(Stage::Saturation) => {
             if let Some(answer) = saturated(a, pose_a, b, pose_b, options) {
                 return answer;
             }
@@ -45,6 +45,7 @@ pub(super) fn between(
     let followed = matches!(warm.hint, Hint::Level { .. }) || settled.is_some();
     let start = if followed || options.exhausted(spent) { None } else { Some(lowest(&pair)) };
     if start.as_ref().is_some_and(|start| start.common.is_some())
+        && runs(Stage::Saturation)
         && let Some(answer) = saturated(a, pose_a, b, pose_b, options)
     {
         *warm = Hint::Saturated.into();

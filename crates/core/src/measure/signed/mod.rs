@@ -80,7 +80,7 @@ pub fn signed_distance(
         }
         found
     });
-    let Least { best, lower, tied, iterations } = found;
+    let Least { best, lower, tied, iterations, .. } = found;
     if lower > 0.0 || starts.is_empty() {
         let status = Status::of(best.upper - lower <= narrow(a, b, 0.0, options));
         return SignedDistance { status, lower, tied: tied || best.tied, iterations, ..best };

@@ -11,6 +11,7 @@ use crate::measure::options::Options;
 use crate::measure::solver::continuation::{Follow, Proven};
 use crate::measure::solver::depth::local_search::{Best, tolerance};
 use crate::measure::solver::depth::sweep::prove;
+use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::two_point_problem::Through;
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
@@ -28,7 +29,9 @@ pub(super) fn between(
 ) -> SignedDistance {
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
     let mut spent = 0;
-    if let Hint::Smooth(trace) = &mut warm.hint {
+    if let Hint::Smooth(trace) = &mut warm.hint
+        && runs(Stage::Follow)
+    {
         let relation = Through { pose_a, pose_b, facing: None, tolerance };
         // Apart, or nearly, the normal proves all there is.
         match dispatch(Follow { a, b, relation, options, trace }) {

@@ -18,6 +18,7 @@ use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::frames::query_frame::Posed;
 use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::linear_systems::{Augmented, MAX_UNKNOWNS, solve};
+use crate::measure::solver::stages::{Stage, runs};
 use crate::optimize::{Program, Row, Rows, minimise};
 use crate::polynomial::{Jet, gamma};
 use nalgebra::{Matrix3, Vector3};
@@ -134,6 +135,9 @@ pub(in crate::measure) fn solve_single(
     if steps.run(start, &mut count, &mut exhausted, &mut accept) {
         return (count, steps.active);
     }
+    if !runs(Stage::ProjectionInterior) {
+        return (count, steps.active);
+    }
     let mut y = body.interior;
     let gap = (objective.linear - y * objective.curvature).norm();
     let mut attempt = 1e-1;
@@ -177,6 +181,9 @@ impl Steps<'_> {
         exhausted: &mut impl FnMut(u32) -> bool,
         accept: &mut impl FnMut(&Trial) -> bool,
     ) -> bool {
+        if !runs(Stage::ProjectionSteps) {
+            return false;
+        }
         let blank = Jet { value: 0.0, gradient: Vector3::zeros(), hessian: Matrix3::zeros() };
         let mut jets = [blank; MAX_CONSTRAINTS];
         let mut y = start;

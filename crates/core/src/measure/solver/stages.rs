@@ -2,7 +2,7 @@
 //! replaced without a trace: tests switch the others off and have each solve a catalogue alone
 //! (`tests/stages.rs`).
 
-/// A method behind distances, level distances or growth distances.
+/// A method that finds an answer, or a part of one, which another one would find as well.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::measure) enum Stage {
     /// Continuation from the answer before.
@@ -25,6 +25,40 @@ pub(in crate::measure) enum Stage {
     Refinement,
     /// Newton's method until the normal is that of the solution.
     Alignment,
+    /// The minimum of one body's polynomial where it lies in the other body.
+    Saturation,
+    /// Newton's method for several poses of a batch at once.
+    Lanes,
+    /// The gap between circumscribed balls, and what balls inside the bodies have in common.
+    Balls,
+    /// Bounds by the boxes of the normalized coordinates.
+    Slabs,
+    /// A first look around all directions for the shortest way out of an overlap.
+    DirectionSampling,
+    /// Search around a direction for a better one, where edges stop Newton's method.
+    CompassSearch,
+    /// Support points by Newton's method, several at once.
+    SupportLanes,
+    /// Support points by Newton's method, one by one.
+    SupportNewton,
+    /// Support points by an interior-point method.
+    SupportInterior,
+    /// Sequential quadratic programming over one body.
+    ProjectionSteps,
+    /// An interior-point method over one body.
+    ProjectionInterior,
+    /// Where a ray enters a body, by an interpolation of the values along it.
+    Interpolation,
+    /// Where a ray or a ball comes to touch a body, by the curvature of what was evaluated.
+    Curvature,
+    /// The middle of the bracket of a cast.
+    Halving,
+    /// Proof that moving circumscribed balls stay apart.
+    MovingBalls,
+    /// A separating plane that turns with the first body.
+    PlaneOfA,
+    /// A separating plane that turns with the second body.
+    PlaneOfB,
 }
 
 /// Whether a stage may run: always, but in tests that switch it off.

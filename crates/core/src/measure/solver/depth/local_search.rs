@@ -8,6 +8,7 @@ use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::continuation::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
 use crate::measure::solver::kkt_newton::{AT, Active, DistanceNewton};
+use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::two_point_problem::Through;
 use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::dispatch;
@@ -142,7 +143,7 @@ impl<'a> Best<'a> {
     /// Starts from the answer to an earlier query.
     pub(in crate::measure) fn follow(&mut self, hint: &Hint) {
         match hint {
-            Hint::Smooth(trace) => {
+            Hint::Smooth(trace) if runs(Stage::Follow) => {
                 let mut trace = *trace;
                 let (a, b, relation) = (self.pair.a.body, self.pair.b.body, self.through(None));
                 match dispatch(Follow { a, b, relation, options: self.options, trace: &mut trace }) {
@@ -163,7 +164,7 @@ impl<'a> Best<'a> {
     /// it found one.
     pub(in crate::measure) fn seek(&mut self, n: Option<&Vector3<f64>>) -> bool {
         let (pair, options, relation) = (self.pair, self.options, self.through(n));
-        if options.exhausted(self.iterations) {
+        if !runs(Stage::Seek) || options.exhausted(self.iterations) {
             return false;
         }
         let most = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
@@ -202,6 +203,9 @@ impl<'a> Best<'a> {
     /// be the edge that is best, and otherwise a compass search goes on, its needle turning and its
     /// steps shrinking where they lead to nothing better.
     pub(in crate::measure) fn settle(&mut self) {
+        if !runs(Stage::CompassSearch) {
+            return;
+        }
         let pair = self.pair;
         let enough = 0.1 * pair.tolerance(self.options.accuracy());
         let mut step = FIRST_STEP;
@@ -275,7 +279,7 @@ impl<'a> Best<'a> {
         let (a, b) = (Active::from_bits(x.active, pair.a.len()), Active::from_bits(y.active, pair.b.len()));
         let (Some(a), Some(b)) = (a, b) else { return };
         let finite = x.x.iter().chain(&y.x).chain(n).all(|value| value.is_finite());
-        if !finite || options.exhausted(self.iterations) {
+        if !runs(Stage::Newton) || !finite || options.exhausted(self.iterations) {
             return;
         }
         let mut newton = DistanceNewton { x: x.x, y: y.x, distance: n.dot(&(x.x - y.x)), n: *n, a, b };

@@ -8,6 +8,7 @@ use crate::measure::solver::active_constraints::MAX_ACTIVE;
 use crate::measure::solver::barrier_programs::{Support, near_boundary};
 use crate::measure::solver::kkt_newton::Active;
 use crate::measure::solver::linear_systems::{Curvature, eliminate};
+use crate::measure::solver::stages::{Stage, runs};
 use crate::optimize::minimise;
 use crate::polynomial::Jet;
 use nalgebra::{Matrix3, Vector3};
@@ -52,7 +53,8 @@ pub(super) fn support(
     }
     // The last resort ends early on surfaces that are flat at all scales, where what was known may
     // be better.
-    let found = [Some(interior_point(body, n, tolerance)), start, Some(restart)];
+    let last = runs(Stage::SupportInterior).then(|| interior_point(body, n, tolerance));
+    let found = [last, start, Some(restart)];
     let inside =
         found.into_iter().flatten().filter_map(|point| body.pull_in(&point.x).map(|x| SupportPoint { x, ..point }));
     inside.max_by(|p, q| n.dot(&p.x).total_cmp(&n.dot(&q.x)))
@@ -130,6 +132,9 @@ fn smooth(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &Vector3<f6
 /// Newton's method on `Σ λ_i ∇g_i(x) = n, g_i(x) = 1`, ended by pulling in. None if it does not
 /// arrive.
 fn newton(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &SupportPoint) -> Option<SupportPoint> {
+    if !runs(Stage::SupportNewton) {
+        return None;
+    }
     if body.len() == 1 {
         return smooth(body, n, tolerance, &start.x);
     }

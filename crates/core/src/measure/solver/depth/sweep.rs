@@ -18,6 +18,7 @@ use super::support::{SupportPoint, support};
 use crate::measure::bounds::duality_bounds::SLACK;
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::options::Options;
+use crate::measure::solver::stages::{Stage, runs};
 use crate::polynomial::{MAX_LANES, dispatch};
 use nalgebra::Vector3;
 
@@ -36,9 +37,11 @@ const MANY: usize = 2048;
 
 /// Bounds the depth from below, improving the best direction on the way.
 pub(in crate::measure) fn prove(best: &mut Best<'_>) -> Proof {
-    let (n, depth) = dispatch(Scout { pair: best.pair });
-    if !(best.depth <= depth) {
-        best.seek(Some(&n));
+    if runs(Stage::DirectionSampling) {
+        let (n, depth) = dispatch(Scout { pair: best.pair });
+        if !(best.depth <= depth) {
+            best.seek(Some(&n));
+        }
     }
     match sweep::<FEW>(best) {
         (proof, true) if !best.options.exhausted(best.iterations) => {
@@ -183,8 +186,11 @@ impl<const N: usize> Sweep<'_, N> {
             sought[0][k] = Sought { n: -want.n, tolerance };
             sought[1][k] = Sought { n: pair.direction_to_b(&want.n), tolerance };
         }
-        let of_a = dispatch(Farthest { body: pair.a.body, sought: &sought[0][..wanted.len()] });
-        let of_b = dispatch(Farthest { body: pair.b.body, sought: &sought[1][..wanted.len()] });
+        let (mut of_a, mut of_b) = ([None; GROUP], [None; GROUP]);
+        if runs(Stage::SupportLanes) {
+            of_a = dispatch(Farthest { body: pair.a.body, sought: &sought[0][..wanted.len()] });
+            of_b = dispatch(Farthest { body: pair.b.body, sought: &sought[1][..wanted.len()] });
+        }
         let mut found = [None; GROUP];
         for (k, want) in wanted.iter().enumerate() {
             found[k] = Some(self.direction(want, tolerated[k], [of_a[k], of_b[k]])?);

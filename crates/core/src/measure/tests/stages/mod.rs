@@ -5,10 +5,16 @@
 //! with edges for active sets, overlaps for the deepest points. The shares asked for are a little
 //! below those reached, which each failure prints.
 
+mod batches;
+mod casts;
+mod depths;
+mod impacts;
+
 use super::{random_pose, unit, zoo};
 use crate::body::Body;
 use crate::measure::solver::stages::{Stage, only};
 use crate::measure::*;
+use nalgebra::Vector3;
 use std::sync::OnceLock;
 use sublevel_testkit::Seeded;
 
@@ -51,6 +57,10 @@ impl Case {
         self.distance.lower > 1e-3 * self.size() && self.next_distance.lower > 0.0
     }
 
+    fn overlaps(&self) -> bool {
+        self.distance.upper == 0.0
+    }
+
     /// Radius of the smaller body, metres.
     fn size(&self) -> f64 {
         self.a.circumscribed().radius.min(self.b.circumscribed().radius)
@@ -62,9 +72,12 @@ fn catalogue() -> &'static [Case] {
     CASES.get_or_init(|| (0..400).map(Case::new).collect())
 }
 
+/// How a solve ended, its bracket, and that of all stages.
+type Found = (Status, [f64; 2], [f64; 2]);
+
 /// How many percent of the cases that `domain` takes `solve` solves: a converged bracket that meets
 /// the one of all stages. A bracket that does not meet it fails at once.
-fn solved(what: &str, domain: impl Fn(&Case) -> bool, solve: impl Fn(&Case) -> (Status, [f64; 2], [f64; 2])) -> f64 {
+fn solved(what: &str, domain: impl Fn(&Case) -> bool, solve: impl Fn(&Case) -> Found) -> f64 {
     let (mut cases, mut done) = (0, 0);
     for case in catalogue().iter().filter(|case| domain(case)) {
         let (status, [lower, upper], [least, most]) = solve(case);
@@ -83,7 +96,7 @@ fn at_least(what: &str, percent: f64, solved: f64) {
     assert!(solved >= percent, "{what}: {solved:.1} % solved alone, {percent} expected");
 }
 
-fn cold_distance(case: &Case, stages: &[Stage]) -> (Status, [f64; 2], [f64; 2]) {
+fn cold_distance(case: &Case, stages: &[Stage]) -> Found {
     let [pose_a, pose_b] = &case.poses;
     let mut warm = WarmStart::default();
     let found = only(stages, || distance(case.a, pose_a, case.b, pose_b, &Options::default(), &mut warm));
@@ -91,7 +104,7 @@ fn cold_distance(case: &Case, stages: &[Stage]) -> (Status, [f64; 2], [f64; 2]) 
 }
 
 /// From the hint of all stages at the pose before.
-fn warm_distance(case: &Case, stages: &[Stage]) -> (Status, [f64; 2], [f64; 2]) {
+fn warm_distance(case: &Case, stages: &[Stage]) -> Found {
     let (pose_a, options, mut warm) = (&case.poses[0], Options::default(), WarmStart::default());
     distance(case.a, pose_a, case.b, &case.poses[1], &options, &mut warm);
     let found = only(stages, || distance(case.a, pose_a, case.b, &case.next, &options, &mut warm));
@@ -144,11 +157,10 @@ fn interior_points_find_distances_alone() {
 
 #[test]
 fn deepest_points_decide_overlaps_alone() {
-    let overlapping = |case: &Case| case.distance.upper == 0.0;
     let stages = [Stage::SupportTables, Stage::Deepest];
-    at_least("deepest", 95.0, solved("deepest", overlapping, |case| cold_distance(case, &stages)));
+    at_least("deepest", 95.0, solved("deepest", Case::overlaps, |case| cold_distance(case, &stages)));
     let stages = [Stage::InteriorLevel];
-    at_least("level", 97.0, solved("level", overlapping, |case| cold_distance(case, &stages)));
+    at_least("level", 97.0, solved("level", Case::overlaps, |case| cold_distance(case, &stages)));
 }
 
 /// Twice the precision solves what doubles leave wide: an accuracy that no bracket of theirs has.
@@ -230,4 +242,99 @@ fn stages_of_growth_distances_solve_alone() {
     at_least("growth portal", 95.0, solved("growth portal", edged, |case| cold(case, &stages)));
     let stages = [Stage::InteriorDistance];
     at_least("growth interior", 95.0, solved("growth interior", |_| true, |case| cold(case, &stages)));
+}
+
+/// Level distances below 1: the minimum of A's polynomial, which it takes in B.
+#[test]
+fn saturation_is_proven_alone() {
+    let solve = |case: &Case| {
+        let (b, pose_b, mut random) = (case.b, &case.poses[1], Seeded(97_000 + case.seed));
+        let half = Vector3::from_fn(|_, _| 0.3 * b.in_radius() * 3_f64.powf(random.signed()));
+        let a = Body::superellipsoid("small", Vector3::zeros(), half, [2, 4, 8][case.seed as usize % 3]).unwrap();
+        let place = pose_b.transform_point(&(b.interior_point() + unit(&mut random) * (0.9 * b.in_radius())));
+        let pose_a = random_pose(&mut random, 0.0).with_translation(place);
+        let with = |stages: &[Stage]| {
+            only(stages, || level_distance(&a, &pose_a, b, pose_b, &Options::default(), &mut WarmStart::default()))
+        };
+        let (found, other) = (with(&[Stage::Saturation]), with(&[Stage::InteriorLevel]));
+        (found.status, [found.lower, found.upper], [other.lower, other.upper])
+    };
+    at_least("saturation", 95.0, solved("saturation", |_| true, solve));
+}
+
+/// Twice the precision narrows level distances, too.
+#[test]
+fn refinement_of_levels_goes_on_alone() {
+    let options = Options::default().with_accuracy(1e-15).unwrap();
+    let with = |stages: &[Stage], case: &Case| {
+        let [pose_a, pose_b] = &case.poses;
+        only(stages, || level_distance(case.a, pose_a, case.b, pose_b, &options, &mut WarmStart::default()))
+    };
+    let (mut cases, mut narrower) = (0, 0);
+    for case in catalogue().iter().filter(|case| case.is_apart()).take(100) {
+        let doubles = with(&[Stage::SupportTables, Stage::Newton], case);
+        let refined = with(&[Stage::SupportTables, Stage::Newton, Stage::Refinement], case);
+        assert!(refined.lower <= doubles.upper && doubles.lower <= refined.upper, "seed {}", case.seed);
+        if doubles.upper - doubles.lower < 1e-9 * doubles.upper && doubles.status != Status::Converged {
+            cases += 1;
+            narrower += u32::from(refined.upper - refined.lower < 0.5 * (doubles.upper - doubles.lower));
+        }
+    }
+    println!("refinement of levels: {narrower} of {cases} narrower");
+    assert!(cases >= 20 && 10 * narrower >= 9 * cases, "{narrower} of {cases}");
+}
+
+/// A narrow bracket holds the normal to the root of its width only: the last stage turns it into
+/// that of the solution.
+#[test]
+fn alignment_turns_normals() {
+    let exact = Options::default().with_accuracy(1e-13).unwrap();
+    let coarse = Options::default().with_accuracy(1e-4).unwrap();
+    let (mut before, mut after, mut cases) = (Vec::new(), Vec::new(), 0);
+    for case in catalogue().iter().filter(|case| case.is_apart() && !case.is_smooth()) {
+        let [pose_a, pose_b] = &case.poses;
+        let to = |options: &Options<'_>, warm: &mut WarmStart| distance(case.a, pose_a, case.b, pose_b, options, warm);
+        let mut warm = WarmStart::default();
+        to(&exact, &mut warm);
+        let Some(truth) = to(&exact, &mut warm).normal else { continue };
+        let stages = [Stage::InteriorDistance, Stage::Newton];
+        let doubles = only(&stages, || to(&coarse, &mut WarmStart::default()));
+        let aligned = only(&[&stages[..], &[Stage::Alignment]].concat(), || to(&coarse, &mut WarmStart::default()));
+        if let (Some(n), Some(m)) = (doubles.normal, aligned.normal) {
+            cases += 1;
+            before.push((n - truth).norm());
+            after.push((m - truth).norm());
+        }
+    }
+    before.sort_by(f64::total_cmp);
+    after.sort_by(f64::total_cmp);
+    let at = |errors: &[f64]| [errors[cases / 2], errors[cases * 9 / 10], errors[cases * 97 / 100]];
+    println!("alignment: errors of {cases} normals {:?} before, {:?} after", at(&before), at(&after));
+    assert!(cases >= 150 && before[cases * 9 / 10] > 1e-6 && after[cases * 9 / 10] < 1e-8);
+}
+
+/// Decisions by the bounds that come before any search.
+#[test]
+fn bounds_decide_alone() {
+    let decide = |case: &Case, threshold: f64, stages: &[Stage]| {
+        let [pose_a, pose_b] = &case.poses;
+        let (options, mut warm) = (Options::default(), WarmStart::default());
+        only(stages, || nearer_than(case.a, pose_a, case.b, pose_b, threshold, &options, &mut warm)).unwrap()
+    };
+    let share = |what: &str, percent: f64, domain: &dyn Fn(&Case) -> bool, decided: &dyn Fn(&Case) -> bool| {
+        let cases: Vec<&Case> = catalogue().iter().filter(|case| domain(case)).collect();
+        let met = cases.iter().filter(|case| decided(case)).count();
+        assert!(cases.len() >= 30, "{what}: only {} cases", cases.len());
+        at_least(what, percent, 100.0 * met as f64 / cases.len() as f64);
+    };
+    let apart = |case: &Case| case.is_apart();
+    // No: a tenth of the distance is less than the distance.
+    let far =
+        |stages: &'static [Stage]| move |case: &Case| decide(case, 0.1 * case.distance.lower, stages) == Decision::No;
+    assert!(!catalogue().iter().filter(|case| case.is_apart()).any(|case| far(&[])(case)), "decided by no bound");
+    share("balls", 60.0, &apart, &far(&[Stage::Balls]));
+    share("boxes", 70.0, &apart, &far(&[Stage::Slabs]));
+    // Yes: balls inside the bodies meet.
+    let meet = |case: &Case| decide(case, 1e-3 * case.size(), &[Stage::Balls]) == Decision::Yes;
+    share("balls inside", 12.0, &Case::overlaps, &meet);
 }
