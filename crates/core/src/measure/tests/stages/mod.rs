@@ -328,12 +328,12 @@ fn bounds_decide_alone() {
         at_least(what, percent, 100.0 * met as f64 / cases.len() as f64);
     };
     let apart = |case: &Case| case.is_apart();
-    // No: a tenth of the distance is less than the distance.
+    // No: half the distance is less than the distance.
     let far =
-        |stages: &'static [Stage]| move |case: &Case| decide(case, 0.1 * case.distance.lower, stages) == Decision::No;
+        |stages: &'static [Stage]| move |case: &Case| decide(case, 0.5 * case.distance.lower, stages) == Decision::No;
     assert!(!catalogue().iter().filter(|case| case.is_apart()).any(|case| far(&[])(case)), "decided by no bound");
-    share("balls", 60.0, &apart, &far(&[Stage::Balls]));
-    share("boxes", 70.0, &apart, &far(&[Stage::Slabs]));
+    share("balls", 45.0, &apart, &far(&[Stage::Balls]));
+    share("boxes", 62.0, &apart, &far(&[Stage::Slabs]));
     // Yes: balls inside the bodies meet.
     let meet = |case: &Case| decide(case, 1e-3 * case.size(), &[Stage::Balls]) == Decision::Yes;
     share("balls inside", 12.0, &Case::overlaps, &meet);
