@@ -88,14 +88,25 @@ pub fn distance_batch(
         && options.max_iterations() >= MOST_ROUNDS
         && runs(Stage::Lanes)
     {
-        let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
-        dispatch_lanes(Batch { a, pose_a, b, poses_b, options, tolerance, answers });
+        in_lanes((a, pose_a), (b, poses_b), options, answers);
     } else {
         for (answer, pose_b) in answers.iter_mut().zip(poses_b) {
             *answer = distance(a, pose_a, b, pose_b, options, &mut WarmStart::default());
         }
     }
     Ok(())
+}
+
+/// The answers of single bodies of one constraint. Not generic, so that it is compiled with this
+/// crate, whatever its callers are compiled for.
+fn in_lanes(
+    (a, pose_a): (&Body, &Pose),
+    (b, poses_b): (&Body, &[Pose]),
+    options: &Options<'_>,
+    answers: &mut [Distance],
+) {
+    let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
+    dispatch_lanes(Batch { a, pose_a, b, poses_b, options, tolerance, answers });
 }
 
 /// Rounds in single precision that every pose goes through.

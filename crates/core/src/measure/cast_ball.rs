@@ -120,7 +120,7 @@ fn cast_at(body: &Body, pose: &Pose, sweep: &Sweep, tolerance: f64, options: &Op
     let started = entry.inside <= -base;
     let upper = if started { 0.0 } else { upper };
     RayCast::Hit(RayHit {
-        status: if entry.width() <= tolerance { Status::Converged } else { Status::BracketWide },
+        status: Status::of(entry.width() <= tolerance),
         lower: lower.min(upper),
         upper,
         point: found.witness,

@@ -186,7 +186,7 @@ pub(super) fn first_hit(
 fn earlier(one: &RayCast, other: &RayCast, tolerance: f64) -> RayCast {
     let sooner = |hit: &RayHit, lower: f64| {
         let lower = hit.lower.min(lower);
-        let status = if hit.upper - lower <= tolerance { Status::Converged } else { Status::BracketWide };
+        let status = Status::of(hit.upper - lower <= tolerance);
         RayCast::Hit(RayHit { lower, status, ..*hit })
     };
     match (one, other) {
@@ -248,7 +248,7 @@ fn cast_at(body: &Body, pose: &Pose, ray: &Ray, tolerance: f64, options: &Option
     let started = entry.inside <= -along.base;
     let upper = if started { 0.0 } else { (along.base + entry.inside).next_up().min(ray.max_length) };
     RayCast::Hit(RayHit {
-        status: if entry.width() <= tolerance { Status::Converged } else { Status::BracketWide },
+        status: Status::of(entry.width() <= tolerance),
         lower: lower.min(upper),
         upper,
         point: ray.point(upper),

@@ -10,7 +10,7 @@ use crate::measure::bounds::duality_bounds::{SLACK, descent};
 use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
-use crate::measure::pairwise_minimum::{Least, bracketed, least};
+use crate::measure::pairwise_minimum::{At, Least, bracketed, least};
 use crate::measure::solver::projection::{Objective, Single, solve_single};
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
@@ -138,7 +138,7 @@ pub fn distance_to_half_space(
     let tolerance = options.accuracy() * solid.circumscribed().radius;
     let parts = solid.parts();
     if let [body] = parts {
-        return from_body(body, pose, half_space, tolerance, options, warm);
+        return from_body((body, pose), half_space, tolerance, options, warm);
     }
     let bound = |(i, _): (usize, usize)| {
         let ball = parts[i].circumscribed();
@@ -147,15 +147,14 @@ pub fn distance_to_half_space(
         half_space.normal.dot(&center) - half_space.offset - ball.radius - 1e-12 * size
     };
     let found = least((parts.len(), 1), bound, f64::NEG_INFINITY, warm, |(i, _), _, hint| {
-        from_body(&parts[i], pose, half_space, tolerance, options, hint)
+        from_body((&parts[i], pose), half_space, tolerance, options, hint)
     });
     let Least { best, lower, tied, iterations, .. } = found;
     HalfSpaceDistance { status: Status::of(best.upper - lower <= tolerance), lower, tied, iterations, ..best }
 }
 
 fn from_body(
-    body: &Body,
-    pose: &Pose,
+    (body, pose): At<'_, Body>,
     half_space: &HalfSpace,
     tolerance: f64,
     options: &Options<'_>,
@@ -172,7 +171,7 @@ fn from_body(
     let slack = (ROTATION_ERROR + gamma(16)) * size;
     let [lower, upper] = [height - found.upper * single.unit - slack, height - found.lower * single.unit + slack];
     HalfSpaceDistance {
-        status: if upper - lower <= tolerance { Status::Converged } else { Status::BracketWide },
+        status: Status::of(upper - lower <= tolerance),
         lower,
         upper,
         witness: single.to_world(&found.point),

@@ -69,7 +69,7 @@ pub fn overlap(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> Decision {
-    decide(&distance_until(a, pose_a, b, pose_b, &StopCriterion::compare(0.0), options, warm), 0.0)
+    decide(&distance_until((a, pose_a), (b, pose_b), &StopCriterion::compare(0.0), options, warm), 0.0)
 }
 
 /// Whether the distance of two solids is below `threshold` metres: the search ends as soon as its
@@ -102,7 +102,7 @@ pub fn nearer_than(
     check(threshold)?;
     // Below the threshold is at most the number before it.
     let at_most = threshold.next_down();
-    Ok(decide(&distance_until(a, pose_a, b, pose_b, &StopCriterion::compare(at_most), options, warm), at_most))
+    Ok(decide(&distance_until((a, pose_a), (b, pose_b), &StopCriterion::compare(at_most), options, warm), at_most))
 }
 
 /// The distance of two solids, as accurate as [`crate::measure::distance`] gives it, unless it is
@@ -134,7 +134,7 @@ pub fn within_margin(
     warm: &mut WarmStart,
 ) -> Result<WithinMargin, ThresholdError> {
     check(margin)?;
-    let found = distance_until(a, pose_a, b, pose_b, &StopCriterion::beyond(margin), options, warm);
+    let found = distance_until((a, pose_a), (b, pose_b), &StopCriterion::beyond(margin), options, warm);
     Ok(if found.lower > margin { WithinMargin::Beyond { lower: found.lower } } else { WithinMargin::Within(found) })
 }
 

@@ -11,7 +11,7 @@ use crate::measure::bounds::duality_bounds::{SLACK, descent};
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
-use crate::measure::pairwise_minimum::{Least, bracketed, least};
+use crate::measure::pairwise_minimum::{At, Least, bracketed, least};
 use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::projection::{Objective, Single, Trial, solve_single};
 use crate::measure::status::Status;
@@ -96,14 +96,13 @@ pub fn distance_to_point(
     let tolerance = options.accuracy() * solid.circumscribed().radius;
     Ok(match solid.parts() {
         [body] => Projection::new(body, pose).to(point, tolerance, options, warm).into_distance(tolerance),
-        parts => nearest(parts, pose, point, tolerance, options, warm),
+        parts => nearest((parts, pose), point, tolerance, options, warm),
     })
 }
 
 /// The nearest part.
 fn nearest(
-    parts: &[Body],
-    pose: &Pose,
+    (parts, pose): At<'_, [Body]>,
     point: &Vector3<f64>,
     tolerance: f64,
     options: &Options<'_>,
@@ -143,7 +142,7 @@ impl Projected {
     fn into_distance(self, tolerance: f64) -> PointDistance {
         let inside = self.upper == 0.0;
         PointDistance {
-            status: if self.upper - self.lower <= tolerance { Status::Converged } else { Status::BracketWide },
+            status: Status::of(self.upper - self.lower <= tolerance),
             lower: self.lower,
             upper: self.upper,
             inside,

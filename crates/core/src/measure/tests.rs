@@ -320,7 +320,10 @@ fn multipliers_that_bound_nothing_claim_nothing() {
     for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let lower = bounds::duality_bounds::level_lower(&pair, &x, &with(bad), &with(0.0));
         assert!(lower == f64::NEG_INFINITY, "{bad}: {lower}");
-        let lower = bounds::duality_bounds::distance_lower(&pair, &x, &x, &Vector3::x(), &with(bad), &with(bad));
+        let lower = bounds::duality_bounds::distance_lower(
+            &pair,
+            &bounds::duality_bounds::DualTrial { x: &x, y: &x, n: &Vector3::x(), of_a: &with(bad), of_b: &with(bad) },
+        );
         assert!(lower == 0.0, "{bad}: {lower}");
     }
 }

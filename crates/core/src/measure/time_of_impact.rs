@@ -203,6 +203,17 @@ struct Search<'a> {
     queries: u32,
 }
 
+/// What is known of the gap at a time.
+struct Gap<'a> {
+    /// Seconds.
+    t: f64,
+    /// Unit normal from B to A, world frame.
+    n: Vector3<f64>,
+    found: &'a Distance,
+    /// Lower bound of what the distance exceeds half the contact distance by, metres.
+    width: f64,
+}
+
 /// Which body a separating plane is fixed to.
 #[derive(Clone, Copy)]
 enum Carrier {
@@ -267,11 +278,12 @@ impl Search<'_> {
             if t >= duration {
                 return self.end(ImpactStatus::Apart, duration, last);
             }
-            let next = self.aim(t, &n, &found, gap, duration);
-            let mut advanced = self.advance(carrier, t, next, &n, &found, gap);
+            let now = Gap { t, n, found: &found, width: gap };
+            let next = self.aim(&now, duration);
+            let mut advanced = self.advance(carrier, &now, next);
             // Where a plane fixed to one body does not get far, one fixed to the other may.
             if advanced < t + 0.7 * (next - t) && self.turning() {
-                let other = self.advance(carrier.other(), t, next, &n, &found, gap);
+                let other = self.advance(carrier.other(), &now, next);
                 if other > advanced {
                     (advanced, carrier) = (other, carrier.other());
                 }
@@ -319,9 +331,10 @@ impl Search<'_> {
         self.a.motion.is_turning() || self.b.motion.is_turning()
     }
 
-    /// The time up to which a plane that is normal to n at time t and fixed to one of the bodies
-    /// proves them apart, at most `next`.
-    fn advance(&mut self, carrier: Carrier, t: f64, next: f64, n: &Vector3<f64>, found: &Distance, gap: f64) -> f64 {
+    /// The time up to which a plane that is normal to n now and fixed to one of the bodies proves
+    /// them apart, at most `next`.
+    fn advance(&mut self, carrier: Carrier, now: &Gap<'_>, next: f64) -> f64 {
+        let Gap { t, ref n, found, width } = *now;
         if !runs(carrier.stage()) {
             return t;
         }
@@ -329,7 +342,7 @@ impl Search<'_> {
         let (turned, error) = own.motion.carry(n, t, next);
         let acceleration = own.acceleration(&other, n, t, next);
         let at_next = self.separation(&turned, error, t, next, found) - 0.5 * self.contact;
-        advance(t, next, gap, at_next, acceleration)
+        advance(t, next, width, at_next, acceleration)
     }
 
     /// The body that carries the plane, and the other.
@@ -343,7 +356,8 @@ impl Search<'_> {
     /// The time at which the closest points, going on as they do, come within three quarters of the
     /// contact distance; no later than where the bound of the acceleration spoils what a plane can
     /// prove.
-    fn aim(&self, t: f64, n: &Vector3<f64>, found: &Distance, gap: f64, duration: f64) -> f64 {
+    fn aim(&self, now: &Gap<'_>, duration: f64) -> f64 {
+        let Gap { t, ref n, found, width: gap } = *now;
         let towards = self.b.motion.velocity_at(t, &found.witness_b) - self.a.motion.velocity_at(t, &found.witness_a);
         let speed = n.dot(&towards);
         let travel = if speed > 0.0 { (gap - 0.25 * self.contact).max(0.5 * gap) / speed } else { f64::INFINITY };
@@ -541,13 +555,13 @@ mod tests {
             let found = time_of_impact(body, &shot, &slab, &still, &ImpactOptions::new(1.0).unwrap());
             let label = format!("seed {seed} {}: {found:?}", body.name());
             assert_eq!(found.status, ImpactStatus::Contact, "{label}");
-            never_late(body, &shot, &slab, &still, &found, &label);
+            never_late((body, &shot), (&slab, &still), &found, &label);
             assert!(found.queries <= 60, "{label}");
         }
     }
 
     /// Dense sampling before the impact finds no contact, and at the impact the bodies are close.
-    fn never_late(a: &impl Solid, motion_a: &Motion, b: &impl Solid, motion_b: &Motion, found: &Impact, label: &str) {
+    fn never_late((a, motion_a): (&Body, &Motion), (b, motion_b): (&Body, &Motion), found: &Impact, label: &str) {
         let mut warm = WarmStart::default();
         let contact = 1e-6 * a.circumscribed().radius.min(b.circumscribed().radius);
         let mut at = |t: f64| distance(a, &motion_a.pose(t), b, &motion_b.pose(t), &Options::default(), &mut warm);
@@ -583,7 +597,7 @@ mod tests {
             let found = time_of_impact(a, &one, b, &other, &ImpactOptions::new(2.0).unwrap());
             let label = format!("seed {seed} {}-{}: {found:?}", a.name(), b.name());
             assert_ne!(found.status, ImpactStatus::Stopped, "{label}");
-            never_late(a, &one, b, &other, &found, &label);
+            never_late((a, &one), (b, &other), &found, &label);
             hits += u32::from(found.status == ImpactStatus::Contact);
             queries.push(found.queries);
         }

@@ -3,6 +3,7 @@
 use crate::measure::frames::query_frame::Pair;
 use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::continuation::Trace;
+use crate::measure::solver::kkt_newton::Active;
 use crate::measure::solver::level_continuation::LevelTrace;
 use nalgebra::Vector3;
 
@@ -62,14 +63,10 @@ impl WarmStart {
         matches!(self.hint, Hint::Cold)
     }
 
-    pub(super) fn apart(
-        pair: &Pair<'_>,
-        x: &Vector3<f64>,
-        y: &Vector3<f64>,
-        n: &Vector3<f64>,
-        active_a: ActiveSet,
-        active_b: ActiveSet,
-    ) -> Self {
+    /// A hint of witnesses x of A and y of B with the normal, in the query frame, and what is active
+    /// there.
+    pub(super) fn apart(pair: &Pair<'_>, [x, y, n]: [&Vector3<f64>; 3], (a, b): &(Active, Active)) -> Self {
+        let (active_a, active_b) = (a.bits(), b.bits());
         Hint::Apart { x_a: pair.to_a(x), y_b: pair.to_b(y), normal_a: *n, active_a, active_b }.into()
     }
 }

@@ -1,10 +1,9 @@
 //! Bounds of distances that evaluate no polynomial: balls, and slabs of normalized coordinates.
 
 use crate::body::{Body, MAX_CONSTRAINTS};
-use crate::measure::bounds::duality_bounds::distance_lower;
-use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
+use crate::measure::bounds::duality_bounds::{DualTrial, distance_lower};
+use crate::measure::frames::pose::{Pose, RELATIVE_ERROR};
 use crate::measure::frames::query_frame::Pair;
-use crate::polynomial::gamma;
 use nalgebra::Vector3;
 
 /// A vector from a point y of B to a point x of A, its length and a bound of their errors.
@@ -15,7 +14,7 @@ pub(in crate::measure) fn across(
     let offset = pose_a.translation() - pose_b.translation();
     let vector = offset + (pose_a.transform_direction(x) - pose_b.transform_direction(y));
     let size = offset.norm() + x.norm() + y.norm();
-    (vector, vector.norm(), (2.0 * ROTATION_ERROR + gamma(16)) * size)
+    (vector, vector.norm(), RELATIVE_ERROR * size)
 }
 
 /// Lower bound of the distance from the circumscribed balls; negative where they overlap.
@@ -66,7 +65,7 @@ pub(in crate::measure) fn slabs(
     let x = pair.a_to_query(&a.normalization().center);
     let y = pair.b_to_query(&b.normalization().center);
     let none = [0.0; MAX_CONSTRAINTS];
-    let along = |n: &Vector3<f64>| distance_lower(&pair, &x, &y, n, &none, &none);
+    let along = |n: &Vector3<f64>| distance_lower(&pair, &DualTrial { x: &x, y: &y, n, of_a: &none, of_b: &none });
     let mut lower = along(&(x - y));
     if let Some(normal) = normal_a {
         lower = lower.max(along(normal));

@@ -59,17 +59,26 @@ pub(in crate::measure) fn descent(
     slack + rest * (1.0 + SLACK) + SLACK * magnitude
 }
 
-/// Lower bound of the distance in query units, from trial points x and y, a direction `n` from B to
-/// A (normalized here) and multipliers of both bodies for it. Never below 0, which is always a
-/// bound.
-pub(in crate::measure) fn distance_lower(
-    pair: &Pair<'_>,
-    x: &Vector3<f64>,
-    y: &Vector3<f64>,
-    n: &Vector3<f64>,
-    of_a: &Multipliers,
-    of_b: &Multipliers,
-) -> f64 {
+/// What a bound of the distance or of a depth along a direction is made of; query frame.
+#[derive(Clone, Copy)]
+pub(in crate::measure) struct DualTrial<'a> {
+    /// Trial point of A.
+    pub(in crate::measure) x: &'a Vector3<f64>,
+    /// Trial point of B.
+    pub(in crate::measure) y: &'a Vector3<f64>,
+    /// Direction from B to A, of any length above 0: the bounds normalize it.
+    pub(in crate::measure) n: &'a Vector3<f64>,
+    /// Multipliers of A.
+    pub(in crate::measure) of_a: &'a Multipliers,
+    /// Multipliers of B.
+    pub(in crate::measure) of_b: &'a Multipliers,
+}
+
+/// Lower bound of the distance in query units, from multipliers for the unit direction. Never below
+/// 0, which is always a bound.
+#[inline]
+pub(in crate::measure) fn distance_lower(pair: &Pair<'_>, trial: &DualTrial<'_>) -> f64 {
+    let DualTrial { x, y, n, of_a, of_b } = *trial;
     let n = n / n.norm();
     let falls = descent(&pair.a, x, &n, of_a) + descent(&pair.b, y, &-n, of_b);
     let displaced = (pair.a.displacement(x) + pair.b.displacement(y)) * (1.0 + 1e-14);

@@ -46,16 +46,14 @@ pub fn distance(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> Distance {
-    distance_until(a, pose_a, b, pose_b, &StopCriterion::NARROW, options, warm)
+    distance_until((a, pose_a), (b, pose_b), &StopCriterion::NARROW, options, warm)
 }
 
 /// Distance of two solids, or as much of it as the criterion needs.
 #[inline]
 pub(super) fn distance_until(
-    a: &impl Solid,
-    pose_a: &Pose,
-    b: &impl Solid,
-    pose_b: &Pose,
+    (a, pose_a): At<'_, impl Solid>,
+    (b, pose_b): At<'_, impl Solid>,
     goal: &StopCriterion,
     options: &Options<'_>,
     warm: &mut WarmStart,

@@ -140,7 +140,7 @@ impl<'a> Query<'a> {
         let (a, pose_a) = self.of_a;
         let [witness_a, witness_b, normal] = proven.world(simd, a, pose_a);
         Distance {
-            status: if narrow { Status::Converged } else { Status::BracketWide },
+            status: Status::of(narrow),
             lower: proven.lower,
             upper: proven.upper,
             witness_a,

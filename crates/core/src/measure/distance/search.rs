@@ -4,7 +4,7 @@
 use super::answer::Distance;
 use super::deepest::Deepest;
 use crate::measure::bounds::culling::across;
-use crate::measure::bounds::duality_bounds::{Multipliers, distance_lower, distance_upper};
+use crate::measure::bounds::duality_bounds::{DualTrial, Multipliers, distance_lower, distance_upper};
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::frames::vector::V3;
 use crate::measure::options::Options;
@@ -12,7 +12,7 @@ use crate::measure::solver::barrier_programs::{Closest, Level, points, split};
 use crate::measure::solver::continuation::{Lost, Proven, SEEK_ROUNDS, Seek, Trace};
 use crate::measure::solver::initial_guess::Start;
 use crate::measure::solver::kkt_newton::{Active, DistanceNewton, Pace, WORTH_A_BRACKET};
-use crate::measure::solver::ray_program::ReachNewton;
+use crate::measure::solver::ray_program::{RayStart, ReachNewton};
 use crate::measure::solver::refinement::SharpPair;
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
@@ -256,11 +256,16 @@ impl<'a> Search<'a> {
             return;
         }
         let pair = self.pair;
-        let Some(mut newton) = ReachNewton::new(pair, -n, Vector3::zeros(), x, y, &-n, a, b) else { return };
+        let Some(mut newton) = ReachNewton::new(pair, RayStart { u: -n, offset: Vector3::zeros(), x, y, n: -n, a, b })
+        else {
+            return;
+        };
         let steps = newton.run(pair, self.options, self.iterations, |at| {
             let scale = 1.0 / at.n.norm();
             let (n, a, b) = (-at.n * scale, at.a.scaled(scale), at.b.scaled(scale));
-            let raised = self.raise(distance_lower(pair, &at.x, &at.y, &n, &a.multipliers(), &b.multipliers()), &n);
+            let (of_a, of_b) = (a.multipliers(), b.multipliers());
+            let trial = DualTrial { x: &at.x, y: &at.y, n: &n, of_a: &of_a, of_b: &of_b };
+            let raised = self.raise(distance_lower(pair, &trial), &n);
             if raised {
                 let distance = n.dot(&(at.x - at.y));
                 self.tried[0] = Some(DistanceNewton { x: at.x, y: at.y, distance, n, a, b });
@@ -485,7 +490,7 @@ impl<'a> Search<'a> {
     /// constraints that are largest there.
     fn part(&mut self, v: &Vector3<f64>, of_a: &Multipliers, of_b: &Multipliers) {
         let pair = self.pair;
-        let (u, w) = (gradient(&pair.a, v, of_a), gradient(&pair.b, v, of_b));
+        let (u, w) = (pair.a.weighted_gradient(v, of_a), pair.b.weighted_gradient(v, of_b));
         if !(u.norm() > 0.0 && w.norm() > 0.0) {
             return;
         }
@@ -549,7 +554,8 @@ impl<'a> Search<'a> {
                 return self.common(&((at.x + at.y) * 0.5));
             }
             let (of_a, of_b) = (at.a.multipliers(), at.b.multipliers());
-            let lower = distance_lower(self.pair, &at.x, &at.y, &at.n, &of_a, &of_b);
+            let trial = DualTrial { x: &at.x, y: &at.y, n: &at.n, of_a: &of_a, of_b: &of_b };
+            let lower = distance_lower(self.pair, &trial);
             let raised = self.raise(lower, &at.n);
             if raised {
                 self.tried[0] = Some(*at);
@@ -586,14 +592,15 @@ impl<'a> Search<'a> {
     /// Improves the lower bound with multipliers for unit normals, trying each body's idea of the
     /// normal.
     fn bound(&mut self, x: &Vector3<f64>, y: &Vector3<f64>, of_a: &Multipliers, of_b: &Multipliers) {
-        let (u, w) = (gradient(&self.pair.a, x, of_a), gradient(&self.pair.b, y, of_b));
+        let (u, w) = (self.pair.a.weighted_gradient(x, of_a), self.pair.b.weighted_gradient(y, of_b));
         let (lu, lw) = (u.norm(), w.norm());
         if !(lu > 0.0 && lw > 0.0) {
             return;
         }
         let (of_a, of_b) = (of_a.map(|m| m / lu), of_b.map(|m| m / lw));
         for n in [-u / lu, w / lw] {
-            if self.raise(distance_lower(self.pair, x, y, &n, &of_a, &of_b), &n) {
+            let trial = DualTrial { x, y, n: &n, of_a: &of_a, of_b: &of_b };
+            if self.raise(distance_lower(self.pair, &trial), &n) {
                 let (a, b) = (Active::from_forces(&self.pair.a, x, &of_a), Active::from_forces(&self.pair.b, y, &of_b));
                 self.tried[0] = Some(DistanceNewton { x: *x, y: *y, distance: n.dot(&(x - y)), n, a, b });
             }
@@ -649,7 +656,7 @@ impl<'a> Search<'a> {
         } else if let Some(trace) = self.trace() {
             Hint::Smooth(trace).into()
         } else {
-            WarmStart::apart(self.pair, &self.x, &self.y, &self.n, self.active.0.bits(), self.active.1.bits())
+            WarmStart::apart(self.pair, [&self.x, &self.y, &self.n], &self.active)
         }
     }
 
@@ -675,7 +682,7 @@ impl<'a> Search<'a> {
             (self.pair.to_world(&self.y), n)
         };
         Distance {
-            status: if self.narrow() { Status::Converged } else { Status::BracketWide },
+            status: Status::of(self.narrow()),
             lower: self.lower * unit,
             upper: self.upper * unit,
             witness_a,
@@ -704,8 +711,4 @@ impl<'a> Search<'a> {
 /// Of three points the one of the least value.
 fn least_of(points: [Vector3<f64>; 3], value: impl Fn(&Vector3<f64>) -> f64) -> Vector3<f64> {
     points.into_iter().min_by(|p, q| value(p).total_cmp(&value(q))).unwrap_or(points[0])
-}
-
-fn gradient(body: &Posed<'_>, v: &Vector3<f64>, multipliers: &Multipliers) -> Vector3<f64> {
-    (0..body.len()).map(|i| body.jet(i, v).gradient * multipliers[i]).sum()
 }

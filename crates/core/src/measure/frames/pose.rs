@@ -1,5 +1,6 @@
 //! Poses: rigid motions from a body frame to the world frame.
 
+use crate::polynomial::gamma;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 /// Largest deviation from a rigid motion that is normalised away; worse is refused.
@@ -14,6 +15,15 @@ const NORMALISED: f64 = 2.0 * f64::EPSILON;
 /// of the quaternion is 1 within [`NORMALISED`] = 4 u and the 3 u of computing it, hence 14 u of
 /// the matrix, and each entry costs 8 u more: below 30 u in operator norm.
 pub(in crate::measure) const ROTATION_ERROR: f64 = 16.0 * f64::EPSILON;
+
+/// Bound of the error of a relative rotation in operator norm that is the product of two rotation
+/// matrices: each is off by at most [`ROTATION_ERROR`]; their product and sums with it round a few
+/// times more, fewer than 16. Smaller, brackets of poses far from the axes would miss the truth.
+pub(in crate::measure) const RELATIVE_ERROR: f64 = 2.0 * ROTATION_ERROR + gamma(16);
+
+/// The same of one that is the matrix of a product of two quaternions, as vectors compute it, with
+/// fewer than 40 roundings: a bound of its own, for the other would widen with it.
+pub(in crate::measure) const RELATIVE_QUATERNION_ERROR: f64 = 2.0 * ROTATION_ERROR + gamma(40);
 
 /// A rigid motion `x_world = R x_body + t`, lengths in metres; R is the rotation of the stored
 /// quaternion normalised exactly.

@@ -5,7 +5,7 @@
 //! the unit, and absolute positions play no part.
 
 use crate::body::{Body, Placement, Sample, largest};
-use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
+use crate::measure::frames::pose::{Pose, RELATIVE_ERROR};
 use crate::polynomial::gamma;
 use nalgebra::{Matrix3, Vector3};
 
@@ -28,6 +28,11 @@ impl Posed<'_> {
     /// Constraint i at the point v.
     pub(in crate::measure) fn jet(&self, i: usize, v: &Vector3<f64>) -> crate::polynomial::Jet {
         self.placement.jet(&self.body.constraints()[i], v)
+    }
+
+    /// Sum of the gradients at v, weighted by multipliers of all constraints.
+    pub(in crate::measure) fn weighted_gradient(&self, v: &Vector3<f64>, multipliers: &[f64]) -> Vector3<f64> {
+        (0..self.len()).map(|i| self.jet(i, v).gradient * multipliers[i]).sum()
     }
 
     /// Constraint i at the point v with its error bounds.
@@ -234,9 +239,7 @@ impl<'a> Pair<'a> {
         );
         let to_query = |point: &Vector3<f64>| (rotation * point + translation - origin) / unit;
         let other_center = b.normalization().center;
-        // Both rotations are off by at most ROTATION_ERROR; their product and the sums round a few
-        // times more.
-        let relative = 2.0 * ROTATION_ERROR + gamma(16);
+        let relative = RELATIVE_ERROR;
         let off = |point: &Vector3<f64>| {
             (relative * (point.norm() + translation.norm()) + gamma(8) * origin.norm()) / unit * (1.0 + 1e-14)
         };
@@ -347,7 +350,7 @@ impl<'a> Pair<'a> {
     /// Growth centres of both bodies, and a bound of the error of either.
     pub(in crate::measure) fn growth_centers(&self) -> (Vector3<f64>, Vector3<f64>, f64) {
         let (a, b) = (self.a.body.growth_ball().center, self.b.body.growth_ball().center);
-        let relative = 2.0 * ROTATION_ERROR + gamma(16);
+        let relative = RELATIVE_ERROR;
         let lengths = a.norm() + b.norm() + self.translation.norm() + self.origin.norm();
         (self.a_to_query(&a), self.b_to_query(&b), relative * lengths / self.unit * (1.0 + 1e-14))
     }

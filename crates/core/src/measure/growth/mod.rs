@@ -78,7 +78,7 @@ pub fn growth_distance(
     warm: &mut WarmStart,
 ) -> GrowthDistance {
     match (a.parts(), b.parts()) {
-        ([a], [b]) => between(a, pose_a, b, pose_b, options, warm),
+        ([a], [b]) => between((a, pose_a), (b, pose_b), options, warm),
         (a, b) => first_to_touch((a, pose_a), (b, pose_b), options, warm),
     }
 }
@@ -91,7 +91,7 @@ fn first_to_touch(
 ) -> GrowthDistance {
     let bound = |(i, j): (usize, usize)| growth_bound((&a[i], pose_a), (&b[j], pose_b));
     let found = least((a.len(), b.len()), bound, f64::NEG_INFINITY, warm, |(i, j), _, hint| {
-        between(&a[i], pose_a, &b[j], pose_b, options, hint)
+        between((&a[i], pose_a), (&b[j], pose_b), options, hint)
     });
     let narrow = found.best.upper - found.lower <= options.accuracy() * found.best.upper.max(1.0);
     let (lower, tied, iterations) = (found.lower, found.tied, found.iterations);

@@ -6,13 +6,14 @@ use super::problem::{Along, tolerance};
 use crate::body::Body;
 use crate::measure::bounds::duality_bounds::{Multipliers, SLACK, descent};
 use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
-use crate::measure::frames::query_frame::{Pair, Posed};
+use crate::measure::frames::query_frame::Pair;
 use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
+use crate::measure::pairwise_minimum::At;
 use crate::measure::solver::barrier_programs::split;
 use crate::measure::solver::continuation::{Follow, SEEK_ROUNDS, Seek};
 use crate::measure::solver::kkt_newton::Active;
-use crate::measure::solver::ray_program::{ReachNewton, ReachProgram};
+use crate::measure::solver::ray_program::{RayStart, ReachNewton, ReachProgram};
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::support_table_gjk::corners;
 use crate::measure::status::Status;
@@ -24,10 +25,8 @@ use std::ops::ControlFlow;
 
 /// Growth distance of two bodies.
 pub(super) fn between(
-    a: &Body,
-    pose_a: &Pose,
-    b: &Body,
-    pose_b: &Pose,
+    (a, pose_a): At<'_, Body>,
+    (b, pose_b): At<'_, Body>,
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> GrowthDistance {
@@ -245,7 +244,7 @@ impl Search<'_> {
             if relative < attempt {
                 attempt = relative * 1e-2;
                 let (of_a, of_b) = split(pair, iterate.multipliers, 1.0);
-                let normals = [gradient(&pair.a, &x, &of_a), -gradient(&pair.b, &y, &of_b)];
+                let normals = [pair.a.weighted_gradient(&x, &of_a), -pair.b.weighted_gradient(&y, &of_b)];
                 for n in normals {
                     let lower = self.frame.lower(&x, &y, &n, &of_a, &of_b);
                     self.raise(lower, &n);
@@ -268,7 +267,9 @@ impl Search<'_> {
         }
         let u = self.frame.delta / self.frame.gap;
         let offset = self.frame.center_b - self.frame.center_a;
-        let Some(mut newton) = ReachNewton::new(self.frame.pair, u, offset, x, y, n, a, b) else { return };
+        let Some(mut newton) = ReachNewton::new(self.frame.pair, RayStart { u, offset, x, y, n: *n, a, b }) else {
+            return;
+        };
         let steps = newton.run(self.frame.pair, self.options, self.iterations, |at| {
             let lower = self.frame.lower(&at.x, &at.y, &at.n, &at.a.multipliers(), &at.b.multipliers());
             self.raise(lower, &at.n);
@@ -299,7 +300,7 @@ impl Search<'_> {
 
     fn hint(&self) -> Option<WarmStart> {
         let n = -self.n?.try_normalize(0.0)?;
-        Some(WarmStart::apart(self.frame.pair, &self.x, &self.y, &n, self.active.0.bits(), self.active.1.bits()))
+        Some(WarmStart::apart(self.frame.pair, [&self.x, &self.y, &n], &self.active))
     }
 
     fn answer(&self, pose_a: &Pose, pose_b: &Pose) -> GrowthDistance {
@@ -318,7 +319,7 @@ impl Search<'_> {
         let width = self.upper - self.lower;
         let narrow = self.upper.is_finite() && width <= self.options.accuracy() * self.upper.max(1.0);
         GrowthDistance {
-            status: if narrow { Status::Converged } else { Status::BracketWide },
+            status: Status::of(narrow),
             lower: self.lower,
             upper: self.upper,
             witness,
@@ -333,9 +334,4 @@ impl Search<'_> {
             iterations: self.iterations,
         }
     }
-}
-
-/// `Σ λ_i ∇g_i(v)`.
-fn gradient(body: &Posed<'_>, v: &Vector3<f64>, multipliers: &Multipliers) -> Vector3<f64> {
-    (0..body.len()).map(|i| body.jet(i, v).gradient * multipliers[i]).sum()
 }

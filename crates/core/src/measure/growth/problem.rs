@@ -3,13 +3,13 @@
 
 use super::answer::GrowthDistance;
 use crate::body::Body;
-use crate::measure::frames::pose::Pose;
+use crate::measure::frames::pose::{Pose, RELATIVE_QUATERNION_ERROR};
 use crate::measure::frames::twist::Twist;
 use crate::measure::frames::vector::{M3, V3, add, apply, dot, normalized, rows, scaled, subtract};
 use crate::measure::solver::continuation::Proven;
 use crate::measure::solver::initial_guess::{Start, facing_along, meeting};
 use crate::measure::solver::tangent_newton::{
-    ALIGNED, Bend, Bracket, Plane, Relative, Response, SLACK, Step, TURNED, newton_along,
+    ALIGNED, Bend, Bracket, Plane, Relative, Response, SLACK, Step, newton_along,
 };
 use crate::measure::solver::two_point_problem::{Relation, Verdict};
 use crate::measure::status::Status;
@@ -49,9 +49,9 @@ impl Along {
             rotation: rows::<Scalar, f64>(Scalar, &rotation),
             translation: translation.into(),
             delta: delta.into(),
-            delta_error: (TURNED + gamma(16)) * lengths,
+            delta_error: (RELATIVE_QUATERNION_ERROR + gamma(16)) * lengths,
             square: delta.norm_squared(),
-            center_error: (TURNED + gamma(16)) * (ball_a.center.norm() + ball_b.center.norm()),
+            center_error: (RELATIVE_QUATERNION_ERROR + gamma(16)) * (ball_a.center.norm() + ball_b.center.norm()),
             radius: ball_a.radius + ball_b.radius,
             accuracy,
         }

@@ -56,7 +56,7 @@ pub fn level_distance(
     warm: &mut WarmStart,
 ) -> LevelDistance {
     match (a.parts(), b.parts()) {
-        ([a], [b]) => between(a, pose_a, b, pose_b, options, warm),
+        ([a], [b]) => between((a, pose_a), (b, pose_b), options, warm),
         (a, b) => lowest((a, pose_a), (b, pose_b), options, warm),
     }
 }
@@ -69,7 +69,7 @@ fn lowest(
 ) -> LevelDistance {
     let bound = |(i, j): (usize, usize)| level_bound((&a[i], pose_a), (&b[j], pose_b));
     let found = least((a.len(), b.len()), bound, f64::NEG_INFINITY, warm, |(i, j), _, hint| {
-        between(&a[i], pose_a, &b[j], pose_b, options, hint)
+        between((&a[i], pose_a), (&b[j], pose_b), options, hint)
     });
     let narrow = found.best.upper - found.lower <= options.accuracy() * found.best.upper.abs().max(1.0);
     let (lower, tied, iterations) = (found.lower, found.tied, found.iterations);

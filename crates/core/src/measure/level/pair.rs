@@ -8,6 +8,7 @@ use crate::measure::frames::pose::Pose;
 use crate::measure::frames::query_frame::Pair;
 use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
+use crate::measure::pairwise_minimum::At;
 use crate::measure::solver::level_continuation::{FollowLevel, LevelProven, SEEK_ROUNDS, SeekLevel};
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::support_table_gjk::lowest;
@@ -18,10 +19,8 @@ use nalgebra::Vector3;
 
 /// Level distance of one body over another.
 pub(super) fn between(
-    a: &Body,
-    pose_a: &Pose,
-    b: &Body,
-    pose_b: &Pose,
+    (a, pose_a): At<'_, Body>,
+    (b, pose_b): At<'_, Body>,
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> LevelDistance {

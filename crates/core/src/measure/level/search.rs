@@ -238,6 +238,9 @@ impl<'a> Search<'a> {
 
     /// Rounds of the interior-point method from points that far inside B.
     fn descend(&mut self, mut inset: f64) {
+        if !runs(Stage::InteriorLevel) {
+            return;
+        }
         let pair = self.pair;
         for _ in 0..MAX_ROUNDS {
             // Strictly inside, by less each round: the scale must not rise again.
@@ -369,12 +372,11 @@ impl<'a> Search<'a> {
     pub(super) fn answer(&self, pose_a: &Pose, pose_b: &Pose) -> LevelDistance {
         let (pair, saturated) = (self.pair, self.saturated());
         let (of_a, of_b) = &self.multipliers;
-        let gradient = of_a.iter().enumerate().take(pair.a.len()).filter(|(_, weight)| **weight > 0.0);
-        let gradient: Vector3<f64> = gradient.map(|(i, weight)| pair.a.jet(i, &self.x).gradient * *weight).sum();
+        let gradient = pair.a.weighted_gradient(&self.x, &of_a.map(|weight| weight.max(0.0)));
         let force = pair.direction_to_world(&gradient) / pair.unit() * if saturated { 0.0 } else { 1.0 };
         let witness = pair.to_world(&self.x);
         LevelDistance {
-            status: if self.done() { Status::Converged } else { Status::BracketWide },
+            status: Status::of(self.done()),
             lower: self.lower,
             upper: self.upper,
             witness,

@@ -60,13 +60,13 @@ pub fn penetration(
 ) -> Penetration {
     let (parts_a, parts_b) = (a.parts(), b.parts());
     if let ([a], [b]) = (parts_a, parts_b) {
-        return between(a, pose_a, b, pose_b, options, warm);
+        return between((a, pose_a), (b, pose_b), options, warm);
     }
     let (mut starts, mut directions) = (Starts::default(), 0);
     let gap = |(i, j): (usize, usize)| ball_gap((&parts_a[i], pose_a), (&parts_b[j], pose_b));
     let Least { best, iterations, .. } =
         least((parts_a.len(), parts_b.len()), gap, f64::NEG_INFINITY, warm, |pair, _, hint| {
-            let found = between(&parts_a[pair.0], pose_a, &parts_b[pair.1], pose_b, options, hint);
+            let found = between((&parts_a[pair.0], pose_a), (&parts_b[pair.1], pose_b), options, hint);
             directions += found.directions;
             if let Some(direction) = found.direction {
                 starts.push(Start { pair, direction, depth: found.upper });

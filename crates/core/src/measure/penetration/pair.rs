@@ -2,9 +2,9 @@
 
 use super::answer::Penetration;
 use crate::body::Body;
-use crate::measure::frames::pose::Pose;
 use crate::measure::frames::query_frame::Pair;
 use crate::measure::options::Options;
+use crate::measure::pairwise_minimum::At;
 use crate::measure::solver::depth::local_search::{Best, tolerance};
 use crate::measure::solver::depth::sweep::prove;
 use crate::measure::status::Status;
@@ -12,10 +12,8 @@ use crate::measure::warm::WarmStart;
 
 /// Penetration depth of two bodies.
 pub(super) fn between(
-    a: &Body,
-    pose_a: &Pose,
-    b: &Body,
-    pose_b: &Pose,
+    (a, pose_a): At<'_, Body>,
+    (b, pose_b): At<'_, Body>,
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> Penetration {
@@ -30,11 +28,7 @@ pub(super) fn between(
     let upper = best.depth.max(0.0);
     let unit = pair.unit();
     Penetration {
-        status: if upper - proof.lower <= tolerance(&pair, options, upper) {
-            Status::Converged
-        } else {
-            Status::BracketWide
-        },
+        status: Status::of(upper - proof.lower <= tolerance(&pair, options, upper)),
         lower: proof.lower * unit,
         upper: upper * unit,
         direction: best.n.filter(|_| !apart).map(|n| pair.direction_to_world(&n)),

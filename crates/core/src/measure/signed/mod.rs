@@ -69,12 +69,12 @@ pub fn signed_distance(
 ) -> SignedDistance {
     let (parts_a, parts_b) = (a.parts(), b.parts());
     if let ([a], [b]) = (parts_a, parts_b) {
-        return between(a, pose_a, b, pose_b, options, warm);
+        return between((a, pose_a), (b, pose_b), options, warm);
     }
     let mut starts = Starts::default();
     let gap = |(i, j): (usize, usize)| ball_gap((&parts_a[i], pose_a), (&parts_b[j], pose_b));
     let found = least((parts_a.len(), parts_b.len()), gap, f64::NEG_INFINITY, warm, |pair, _, hint| {
-        let found = between(&parts_a[pair.0], pose_a, &parts_b[pair.1], pose_b, options, hint);
+        let found = between((&parts_a[pair.0], pose_a), (&parts_b[pair.1], pose_b), options, hint);
         if let Some(direction) = found.normal.filter(|_| found.lower <= 0.0) {
             starts.push(Start { pair, direction, depth: -found.lower });
         }

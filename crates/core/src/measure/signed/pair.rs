@@ -8,6 +8,7 @@ use crate::measure::frames::pose::Pose;
 use crate::measure::frames::query_frame::Pair;
 use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
+use crate::measure::pairwise_minimum::At;
 use crate::measure::solver::continuation::{Follow, Proven};
 use crate::measure::solver::depth::local_search::{Best, tolerance};
 use crate::measure::solver::depth::sweep::prove;
@@ -20,10 +21,8 @@ use nalgebra::Vector3;
 
 /// Signed distance of two bodies.
 pub(super) fn between(
-    a: &Body,
-    pose_a: &Pose,
-    b: &Body,
-    pose_b: &Pose,
+    (a, pose_a): At<'_, Body>,
+    (b, pose_b): At<'_, Body>,
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> SignedDistance {
@@ -102,7 +101,7 @@ pub(super) fn between(
         };
         return answer.report((apart.witness_a, apart.witness_b), apart.normal, pose_a, pose_b);
     }
-    let status = if known.narrow(&best) { Status::Converged } else { Status::BracketWide };
+    let status = Status::of(known.narrow(&best));
     let unit = pair.unit();
     let answer =
         Answer { lower: known.lower * unit, upper: known.upper * unit, tied, iterations: best.iterations, status };

@@ -313,7 +313,7 @@ impl Search<'_> {
             let (normal, gap, x, y) = if let Some(normal) = proven {
                 (normal, found.lower, found.witness_a, found.witness_b)
             } else {
-                let found = between(a, &pose, b, &self.pose_b, &self.options, &mut hint);
+                let found = between((a, &pose), (b, &self.pose_b), &self.options, &mut hint);
                 self.iterations += found.iterations;
                 let Some(normal) = found.normal else { continue };
                 (normal, found.lower, found.witness_a, found.witness_b)

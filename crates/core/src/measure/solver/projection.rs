@@ -16,7 +16,7 @@ use crate::body::{Body, MAX_CONSTRAINTS};
 use crate::measure::bounds::duality_bounds::Multipliers;
 use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::frames::query_frame::Posed;
-use crate::measure::solver::active_constraints::ActiveSet;
+use crate::measure::solver::active_constraints::{ActiveSet, MAX_ACTIVE};
 use crate::measure::solver::linear_systems::{Augmented, MAX_UNKNOWNS, solve};
 use crate::measure::solver::stages::{Stage, runs};
 use crate::optimize::{Program, Row, Rows, minimise};
@@ -111,9 +111,6 @@ pub(in crate::measure) struct Trial {
     pub(in crate::measure) pull: Vector3<f64>,
 }
 
-/// Most constraints of one body that hold with equality at once in general position in space.
-const MAX_ACTIVE: usize = 3;
-
 /// Most steps of [`solve_single`] before, and after each iterate of, the interior-point method.
 const MAX_STEPS: u32 = 12;
 
@@ -147,7 +144,7 @@ pub(in crate::measure) fn solve_single(
             attempt = iterate.gap / gap * 1e-2;
             let mut multipliers = [0.0; MAX_CONSTRAINTS];
             multipliers[..body.len()].copy_from_slice(iterate.multipliers);
-            let pull = (0..body.len()).map(|i| body.jet(i, iterate.v).gradient * multipliers[i]).sum();
+            let pull = body.weighted_gradient(iterate.v, &multipliers);
             let done = accept(&Trial { y: *iterate.v, multipliers, pull });
             steps.active = held(&multipliers);
             if done || steps.run(*iterate.v, &mut count, &mut exhausted, &mut accept) {

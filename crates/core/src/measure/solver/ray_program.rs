@@ -88,6 +88,24 @@ impl Program<4> for ReachProgram<'_> {
     }
 }
 
+/// The program's ray, and a start for it; query frame.
+pub(in crate::measure) struct RayStart {
+    /// Unit vector along the ray.
+    pub(in crate::measure) u: Vector3<f64>,
+    /// What is added to x - y.
+    pub(in crate::measure) offset: Vector3<f64>,
+    /// A point near A's surface.
+    pub(in crate::measure) x: Vector3<f64>,
+    /// A point near B's surface.
+    pub(in crate::measure) y: Vector3<f64>,
+    /// About the normal there, from A to B, of any length.
+    pub(in crate::measure) n: Vector3<f64>,
+    /// What seems to be active of A.
+    pub(in crate::measure) a: Active,
+    /// What seems to be active of B.
+    pub(in crate::measure) b: Active,
+}
+
 /// Newton iterates of the program in x and ρ, with `y = x + offset - ρ u`.
 pub(in crate::measure) struct ReachNewton {
     pub(in crate::measure) x: Vector3<f64>,
@@ -106,19 +124,9 @@ pub(in crate::measure) struct ReachNewton {
 const NEAR: f64 = 0.15;
 
 impl ReachNewton {
-    /// A start from points near the surfaces and a normal from A to B; none if they are of no use
-    /// for u.
-    #[allow(clippy::too_many_arguments)]
-    pub(in crate::measure) fn new(
-        pair: &Pair<'_>,
-        u: Vector3<f64>,
-        offset: Vector3<f64>,
-        x: Vector3<f64>,
-        y: Vector3<f64>,
-        n: &Vector3<f64>,
-        mut a: Active,
-        mut b: Active,
-    ) -> Option<Self> {
+    /// The first iterate; none if the start is of no use for u.
+    pub(in crate::measure) fn new(pair: &Pair<'_>, start: RayStart) -> Option<Self> {
+        let RayStart { u, offset, x, y, n, mut a, mut b } = start;
         // A normal nearly across u has turned too far to be the start of anything.
         let along = n.dot(&u);
         if !(along > 1e-3 * n.norm()) || a.len == 0 || b.len == 0 {

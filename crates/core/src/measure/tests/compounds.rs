@@ -154,7 +154,12 @@ fn cheap_bounds_are_bounds() {
 }
 
 /// Length of the way out along n, from samples of what lies on it.
-fn sampled_exit(a: &Compound, pose_a: &Pose, b: &Compound, pose_b: &Pose, n: &Vector3<f64>, limit: f64) -> Option<f64> {
+fn sampled_exit(
+    (a, pose_a): (&Compound, &Pose),
+    (b, pose_b): (&Compound, &Pose),
+    n: &Vector3<f64>,
+    limit: f64,
+) -> Option<f64> {
     (0..).map(|k| 0.02 * f64::from(k)).take_while(|t| *t < limit).find(|t| {
         let pose = pose_a.with_translation(pose_a.translation() + n * *t);
         overlap(a, &pose, b, pose_b, &Options::default(), &mut WarmStart::default()) == Decision::No
@@ -186,7 +191,7 @@ fn ways_out_separate_and_few_are_shorter() {
         let mut random = Seeded(seed);
         for _ in 0..60 {
             let n = unit(&mut random);
-            let shorter = sampled_exit(a, &pose_a, b, &pose_b, &n, found.upper);
+            let shorter = sampled_exit((a, &pose_a), (b, &pose_b), &n, found.upper);
             assert!(shorter.is_none_or(|t| t >= found.lower), "{label}: {shorter:?} along {n:?}");
             missed += u32::from(shorter.is_some_and(|t| t < 0.95 * found.upper));
         }

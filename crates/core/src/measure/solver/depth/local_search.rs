@@ -1,7 +1,7 @@
 //! The shortest way out of an overlap that is known.
 
 use super::support::{SupportPoint, support};
-use crate::measure::bounds::duality_bounds::{Multipliers, SLACK, descent};
+use crate::measure::bounds::duality_bounds::{DualTrial, SLACK, descent};
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::options::Options;
@@ -75,16 +75,10 @@ pub(in crate::measure) fn tolerance(pair: &Pair<'_>, options: &Options<'_>, dept
     (options.depth_accuracy() * depth).max(pair.tolerance(options.accuracy()))
 }
 
-/// Rigorous upper bound of f(n), the depth along n (of any length above 0), from multipliers for -n
-/// of A and for n of B; with its sign turned, a lower bound of the signed distance.
-pub(in crate::measure) fn depth_along(
-    pair: &Pair<'_>,
-    x: &Vector3<f64>,
-    y: &Vector3<f64>,
-    n: &Vector3<f64>,
-    of_a: &Multipliers,
-    of_b: &Multipliers,
-) -> f64 {
+/// Rigorous upper bound of f(n), the depth along n, from multipliers for -n of A and for n of B as
+/// long as it is; with its sign turned, a lower bound of the signed distance.
+fn depth_along(pair: &Pair<'_>, trial: &DualTrial<'_>) -> f64 {
+    let DualTrial { x, y, n, of_a, of_b } = *trial;
     let length = n.norm();
     let n = n / length;
     let falls =
@@ -93,6 +87,17 @@ pub(in crate::measure) fn depth_along(
     let bound = n.dot(&(y - x)) + falls + displaced + SLACK * (x.norm() + y.norm() + falls.abs());
     // A NaN bounds nothing.
     if bound.is_nan() { f64::INFINITY } else { bound }
+}
+
+/// A direction with points near the surfaces that may be farthest against it and along it, and what
+/// is active there with its multipliers; query frame.
+#[derive(Clone, Copy)]
+struct Candidate {
+    x: Vector3<f64>,
+    y: Vector3<f64>,
+    n: Vector3<f64>,
+    a: Active,
+    b: Active,
 }
 
 /// The shortest way out known, in query units.
@@ -193,7 +198,7 @@ impl<'a> Best<'a> {
             Active::from_bits(y.active, pair.b.len()).unwrap_or_default(),
         );
         if a.fit(&pair.a, &x.x, &-n) && b.fit(&pair.b, &y.x, n) {
-            self.try_direction(&x.x, &y.x, n, a, b);
+            self.try_direction(&Candidate { x: x.x, y: y.x, n: *n, a, b });
         }
         self.polish(x, y, n);
     }
@@ -288,7 +293,7 @@ impl<'a> Best<'a> {
         // No direction nearby is better than one of these by more than is asked for.
         let mut known = false;
         self.iterations += newton.run(pair, limit, |at| {
-            let depth = self.try_direction(&at.x, &at.y, &at.n, at.a, at.b);
+            let depth = self.try_direction(&Candidate { x: at.x, y: at.y, n: at.n, a: at.a, b: at.b });
             // Points of the bodies attain what the normal proves: no better direction is near.
             let n = at.n.normalize();
             let attains = |x: &Vector3<f64>, y: &Vector3<f64>| {
@@ -302,7 +307,7 @@ impl<'a> Best<'a> {
             let aligned = settled && depth <= self.depth + ROUGHLY * tolerance && at.is_aligned(pair);
             let same = (depth > 0.0) == (self.depth > 0.0) && self.n.is_some_and(|best| best.dot(&n) > ELSEWHERE);
             if aligned && same {
-                self.take_direction(depth, &at.x, &at.y, &n, at.a, at.b);
+                self.take_direction(depth, &Candidate { x: at.x, y: at.y, n, a: at.a, b: at.b });
             }
             self.settled |= known && depth <= self.depth;
             aligned || options.exhausted(self.iterations)
@@ -310,32 +315,26 @@ impl<'a> Best<'a> {
     }
 
     /// Takes a direction if it is the shortest way out so far; returns its depth.
-    fn try_direction(&mut self, x: &Vector3<f64>, y: &Vector3<f64>, n: &Vector3<f64>, a: Active, b: Active) -> f64 {
-        let depth = depth_along(self.pair, x, y, n, &a.multipliers(), &b.multipliers());
+    fn try_direction(&mut self, candidate: &Candidate) -> f64 {
+        let Candidate { x, y, n, a, b } = candidate;
+        let (of_a, of_b) = (a.multipliers(), b.multipliers());
+        let depth = depth_along(self.pair, &DualTrial { x, y, n, of_a: &of_a, of_b: &of_b });
         if depth < self.depth
             && let Some(n) = n.try_normalize(0.0)
         {
-            self.take_direction(depth, x, y, &n, a, b);
+            self.take_direction(depth, &Candidate { n, ..*candidate });
         }
         depth
     }
 
-    fn take_direction(
-        &mut self,
-        depth: f64,
-        x: &Vector3<f64>,
-        y: &Vector3<f64>,
-        n: &Vector3<f64>,
-        a: Active,
-        b: Active,
-    ) {
-        (self.depth, self.n, self.x, self.y, self.active) = (depth, Some(*n), *x, *y, (a, b));
+    /// Takes a direction, a unit vector, with its proven depth.
+    fn take_direction(&mut self, depth: f64, &Candidate { x, y, n, a, b }: &Candidate) {
+        (self.depth, self.n, self.x, self.y, self.active) = (depth, Some(n), x, y, (a, b));
         (self.attained, self.trace, self.settled) = (None, None, false);
     }
 
     pub(in crate::measure) fn hint(&self) -> Option<WarmStart> {
-        let (a, b) = &self.active;
-        let apart = |n: &Vector3<f64>| WarmStart::apart(self.pair, &self.x, &self.y, n, a.bits(), b.bits());
+        let apart = |n: &Vector3<f64>| WarmStart::apart(self.pair, [&self.x, &self.y, n], &self.active);
         self.n.as_ref().map(|n| self.trace.map_or_else(|| apart(n), |trace| Hint::Smooth(trace).into()))
     }
 

@@ -3,11 +3,12 @@
 
 use crate::body::{Body, ConstraintTrust};
 use crate::measure::frames::pose::Pose;
+use crate::measure::frames::pose::RELATIVE_QUATERNION_ERROR;
 use crate::measure::frames::vector::{
     M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, rows, scaled, times_transposed,
 };
 use crate::measure::solver::active_set_qp::{CENTER, DAMPINGS, LEAST, LONGEST, MOST_BENT, SHORT};
-use crate::measure::solver::tangent_newton::{Relative, TURNED};
+use crate::measure::solver::tangent_newton::Relative;
 use crate::polynomial::{Number, NumberJet, Polynomial, Simd, gamma};
 
 /// The map from B's normalized coordinates w to A's, with its errors.
@@ -38,7 +39,7 @@ impl Map {
         let linear = times_transposed::<S, f64>(&relative.rotation, &inverse);
         let both = product::<S>(&to_a, &linear);
         let trust = b.trust();
-        let turn = (TURNED + gamma(16)) * trust.inverse_norm + trust.inverse_error;
+        let turn = (RELATIVE_QUATERNION_ERROR + gamma(16)) * trust.inverse_norm + trust.inverse_error;
         let far = origin[0].abs() + origin[1].abs() + origin[2].abs();
         let rounding = a.trust().rounding;
         let frobenius = (square::<S>(both[0]) + square::<S>(both[1]) + square::<S>(both[2])).sqrt();

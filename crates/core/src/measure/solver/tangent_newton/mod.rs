@@ -30,7 +30,7 @@ mod taylor_bounds;
 use crate::measure::frames::vector::{M3, V3, apply_symmetric, apply_transposed, dot, scaled};
 use crate::polynomial::{Number, NumberJet, Simd};
 pub(in crate::measure) use plane::Plane;
-pub(in crate::measure) use simd_body::{Relative, Side, TURNED};
+pub(in crate::measure) use simd_body::{Relative, Side};
 pub(in crate::measure) use taylor_bounds::{ALIGNED, Bracket, NUDGE, SLACK, bracket};
 
 /// Second derivatives of a constraint at a point.

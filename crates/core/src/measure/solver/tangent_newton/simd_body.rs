@@ -2,16 +2,12 @@
 //! it stands as seen from A.
 
 use crate::body::{Body, ConstraintTrust};
-use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
+use crate::measure::frames::pose::{Pose, RELATIVE_QUATERNION_ERROR};
 use crate::measure::frames::vector::{
     M3, V3, add_scaled, apply, apply_transposed, dot, rows, subtract, times_transposed,
 };
 use crate::polynomial::{Number, NumberJet, Simd, gamma};
 use nalgebra::Vector3;
-
-/// Bound of the error of a relative rotation in operator norm: both rotations are off by at most
-/// [`ROTATION_ERROR`]; their product, its matrix and sums with it round a few times more.
-pub(in crate::measure) const TURNED: f64 = 2.0 * ROTATION_ERROR + gamma(40);
 
 /// Where B stands as seen from A.
 #[derive(Clone, Copy, Debug)]
@@ -61,13 +57,16 @@ impl<N: Copy> Relative<N> {
         }
         let linear = rows(simd, &b.normalization().linear);
         let trust = b.trust();
-        let fixed = (TURNED + trust.rounding) * trust.reach + TURNED * trust.center + gamma(8) * a.trust().center;
+        let fixed = (RELATIVE_QUATERNION_ERROR + trust.rounding) * trust.reach
+            + RELATIVE_QUATERNION_ERROR * trust.center
+            + gamma(8) * a.trust().center;
         let far = translation[0].abs() + translation[1].abs() + translation[2].abs();
         Self {
             rotation,
             origin,
             linear: times_transposed(&linear, &rotation),
-            displacement: N::splat(simd, TURNED + gamma(8)).mul_add(far, N::splat(simd, fixed * (1.0 + 1e-13))),
+            displacement: N::splat(simd, RELATIVE_QUATERNION_ERROR + gamma(8))
+                .mul_add(far, N::splat(simd, fixed * (1.0 + 1e-13))),
         }
     }
 }

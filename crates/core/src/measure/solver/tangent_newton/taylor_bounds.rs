@@ -2,7 +2,8 @@
 //! from there by Taylor's formula.
 
 use super::plane::Plane;
-use super::simd_body::{Side, TURNED};
+use super::simd_body::Side;
+use crate::measure::frames::pose::RELATIVE_QUATERNION_ERROR;
 use crate::measure::frames::vector::{M3, V3, add_scaled, apply_symmetric, apply_transposed, dot, scaled, subtract};
 use crate::polynomial::{NEAR_LEVEL, Number, NumberJet, Simd, gamma};
 
@@ -270,7 +271,7 @@ impl Near {
             floor: constraint.curvature_floor,
             ceiling: constraint.curvature_ceiling,
             gradient_error: constraint.gradient_error,
-            turn: TURNED + gamma(64) * body.condition,
+            turn: RELATIVE_QUATERNION_ERROR + gamma(64) * body.condition,
             span: body.span,
             leeway: body.leeway,
             inverse_square: body.inverse_norm * body.inverse_norm,
