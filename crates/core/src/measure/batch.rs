@@ -16,7 +16,9 @@ use crate::measure::solver::active_constraints::ActiveConstraints;
 use crate::measure::solver::continuation::{limits, worth_a_bracket};
 use crate::measure::solver::initial_guess::{Start, facing, meeting, middle};
 use crate::measure::solver::stages::{Stage, runs};
-use crate::measure::solver::tangent_newton::{ALIGNED, Bend, Plane, Relative, Side, Step, bracket, moved, newton};
+use crate::measure::solver::tangent_newton::{
+    ALIGNED, Plane, Relative, Side, Step, SurfaceCurvature, bracket, moved, newton,
+};
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::{
@@ -115,13 +117,15 @@ const COARSE: u32 = 2;
 /// Most of them.
 const MOST_COARSE: u32 = 6;
 
-/// Square of the last step relative to the longest one allowed, below which the next one, of double
-/// precision, is likely to end with a narrow bracket.
-const NEAR: f64 = 1e-4;
+/// Square of the last step relative to the longest one allowed, below which the next one, of
+/// double precision, is likely to end with a narrow bracket: a hundredth of a move leaves about
+/// its square. It changes time only; no test pins it.
+const NEARLY_CONVERGED: f64 = 1e-4;
 
-/// The same above which Newton's method has diverged after [`MOST_COARSE`] rounds: a step as long
-/// as in a search from a cold start then.
-const ASTRAY: f64 = 0.04;
+/// The same above which Newton's method has diverged after [`MOST_COARSE`] rounds: a fifth of the
+/// longest move, as long as in a search from a cold start then. Smaller, poses that would have
+/// converged are solved alone: `lanes_answer_alike_in_any_unit` counts them.
+const DIVERGED: f64 = 0.04;
 
 /// Most rounds of a pose before it is solved alone.
 const MOST_ROUNDS: u32 = 8;
@@ -286,10 +290,11 @@ impl<N: Copy> Iterate<N> {
         let frame = basis(simd, self.n);
         let local = (side_a.localize(simd, &frame), side_b.localize(simd, &frame));
         let (a, b) = (Plane::new(simd, jet_a, &local.0), Plane::new(simd, jet_b, &local.1));
-        let (bend_a, bend_b) = (Bend::new(simd, jet_a, &local.0), Bend::new(simd, jet_b, &local.1));
+        let (curvature_a, curvature_b) =
+            (SurfaceCurvature::new(simd, jet_a, &local.0), SurfaceCurvature::new(simd, jet_b, &local.1));
         let difference = apply(&frame, subtract(self.x, self.y));
         let zero = N::splat(simd, 0.0);
-        let (step, _) = newton(simd, (&a, &bend_a), (&b, &bend_b), difference, zero);
+        let (step, _) = newton(simd, (&a, &curvature_a), (&b, &curvature_b), difference, zero);
         let square = step.square(simd, limits);
         Linearized { frame, local, difference, step, square }
     }
@@ -366,7 +371,8 @@ impl Batch<'_> {
         at.store(&mut group);
         // Where single precision has no number for something the pose is left out, too.
         let within = |most: f64| N::bits(simd, square.le(N::splat(simd, most)));
-        let (close, straight, open) = (within(NEAR), within(ASTRAY), within(f32::MAX.into()) & !overlapping);
+        let (close, straight, open) =
+            (within(NEARLY_CONVERGED), within(DIVERGED), within(f32::MAX.into()) & !overlapping);
         for lane in 0..group.count {
             group.rounds[lane] += rounds;
             let (open, late) = (open >> lane & 1 == 1, group.rounds[lane] >= MOST_COARSE);
@@ -421,7 +427,7 @@ impl Batch<'_> {
         }
         at.advance(simd, &here);
         at.store(&mut group);
-        let straight = Lanes::bits(simd, here.square.le(splat(ASTRAY)));
+        let straight = Lanes::bits(simd, here.square.le(splat(DIVERGED)));
         for lane in 0..group.count {
             group.rounds[lane] += 1;
             let open = open >> lane & 1 == 1;

@@ -152,7 +152,7 @@ fn within_ball(body: &Body, pose: &Pose, sweep: &Sweep) -> Option<(f64, Entry)> 
 mod tests {
     use super::*;
     use crate::measure::distance_to_point;
-    use crate::measure::tests::{random_pose, unit, zoo};
+    use crate::measure::tests::{random_pose, zoo};
     use sublevel_testkit::Seeded;
 
     #[test]
@@ -163,8 +163,8 @@ mod tests {
             let radius = 10_f64.powf(2.0 * random.signed());
             let reach = 0.7 + radius;
             let pose = random_pose(&mut random, 1.0);
-            let d = unit(&mut random);
-            let side = d.cross(&unit(&mut random)).normalize();
+            let d = random.unit();
+            let side = d.cross(&random.unit()).normalize();
             // Head on, and grazing from either side.
             let aside = reach * [0.0, 0.5, 1.0 - 1e-6, 1.0 + 1e-6, 1.1][(seed % 5) as usize];
             let back = reach * (1.5 + random.signed());
@@ -205,8 +205,8 @@ mod tests {
             let size = body.circumscribed().radius;
             let pose = random_pose(&mut random, 1.0);
             let center = pose.transform_point(&body.circumscribed().center);
-            let origin = center + unit(&mut random) * size * 4.0;
-            let aim = center + unit(&mut random) * size * 1.3 - origin;
+            let origin = center + random.unit() * size * 4.0;
+            let aim = center + random.unit() * size * 1.3 - origin;
             let radius = size * 10_f64.powf(-1.0 + random.signed());
             let ray = Ray::new(origin, aim, 10.0 * size).unwrap();
             let found = cast_ball(body, &pose, &Sweep::new(ray, radius).unwrap(), &Options::default());

@@ -408,7 +408,7 @@ fn step(value: f64, slope: f64, curvature: f64, depth: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::body::Compound;
-    use crate::measure::tests::{random_pose, unit, zoo};
+    use crate::measure::tests::{random_pose, zoo};
     use nalgebra::UnitQuaternion;
     use sublevel_testkit::Seeded;
 
@@ -440,8 +440,8 @@ mod tests {
         for seed in 0..2000 {
             let mut random = Seeded(seed);
             let pose = random_pose(&mut random, 1.0);
-            let d = if seed % 2 == 0 { Vector3::repeat(1.0).normalize() } else { unit(&mut random) };
-            let aside = d.cross(&unit(&mut random)) * if seed % 3 == 0 { 0.0 } else { 1.1 * random.signed().abs() };
+            let d = if seed % 2 == 0 { Vector3::repeat(1.0).normalize() } else { random.unit() };
+            let aside = d.cross(&random.unit()) * if seed % 3 == 0 { 0.0 } else { 1.1 * random.signed().abs() };
             let Some(truth) = ball_entry(1.0, &(aside - d * 3.0), &d) else { continue };
             let short = 10_f64.powi(-2 - (seed % 9) as i32);
             let origin = pose.transform_point(&(aside - d * 3.0));
@@ -471,14 +471,11 @@ mod tests {
             let (scale, is_box) = (*scale, seed % 2 == 0);
             let size = body.circumscribed().radius;
             let pose = random_pose(&mut random, scale * 3.0);
-            let o = unit(&mut random) * size * 6_f64.powf(1.0 + random.signed()) * 0.3;
+            let o = random.unit() * size * 6_f64.powf(1.0 + random.signed()) * 0.3;
             // Half of the rays aim at the surface's edge: grazing on purpose.
-            let side = unit(&mut random).cross(&o).normalize();
-            let aim = if seed % 4 < 2 {
-                unit(&mut random) * size * 0.7
-            } else {
-                side * half.x * (1.0 + 1e-3 * random.signed())
-            };
+            let side = random.unit().cross(&o).normalize();
+            let aim =
+                if seed % 4 < 2 { random.unit() * size * 0.7 } else { side * half.x * (1.0 + 1e-3 * random.signed()) };
             let d = (aim - o).normalize();
             let length = if seed % 7 == 0 { o.norm() } else { f64::INFINITY };
             let world = |v: &Vector3<f64>| pose.transform_direction(v);
@@ -527,8 +524,8 @@ mod tests {
             let body = &bodies[random.next() as usize % bodies.len()];
             let ball = body.circumscribed();
             let pose = random_pose(&mut random, 2.0);
-            let o = ball.center + unit(&mut random) * ball.radius * (1.0 + 3.0 * random.signed().abs());
-            let aim = ball.center + unit(&mut random) * ball.radius * 0.4;
+            let o = ball.center + random.unit() * ball.radius * (1.0 + 3.0 * random.signed().abs());
+            let aim = ball.center + random.unit() * ball.radius * 0.4;
             let d = (aim - o).normalize();
             let ray = Ray::new(pose.transform_point(&o), pose.transform_direction(&d), f64::INFINITY).unwrap();
             let found = cast(body, &pose, &ray);
@@ -628,8 +625,8 @@ mod tests {
                 .collect();
             let compound = Compound::new("c", parts).unwrap();
             let pose = random_pose(&mut random, 2.0);
-            let origin = pose.translation() + unit(&mut random) * 10.0;
-            let ray = Ray::new(origin, pose.translation() - origin + unit(&mut random), f64::INFINITY).unwrap();
+            let origin = pose.translation() + random.unit() * 10.0;
+            let ray = Ray::new(origin, pose.translation() - origin + random.unit(), f64::INFINITY).unwrap();
             let found = cast(&compound, &pose, &ray);
             let first = compound.parts().iter().filter_map(|part| cast(part, &pose, &ray).hit().copied());
             let first = first.min_by(|a, b| a.upper.total_cmp(&b.upper));

@@ -6,7 +6,7 @@
 //! it, and the shortest such t is along n.
 
 use crate::body::{Body, Solid};
-use crate::measure::bounds::duality_bounds::{SLACK, descent};
+use crate::measure::bounds::duality_bounds::{DUALITY_ROUNDING, descent};
 use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
@@ -107,7 +107,7 @@ impl HalfSpaceDistance {
     /// Gradient with respect to the pose the distance was asked for: `n` and `(x - t) × n`, x the
     /// witness; through contact and in depth as well. It is unique where the witness is.
     pub fn pose_gradient(&self, pose: &Pose, half_space: &HalfSpace) -> Twist {
-        Twist::of_force(half_space.normal, &self.witness, pose.translation())
+        Twist::of_gradient(half_space.normal, &self.witness, pose.translation())
     }
 }
 
@@ -223,13 +223,13 @@ impl<'a> Support<'a> {
         let (iterations, active) = solve_single(body, &objective, start, active, stop, |trial| {
             let multipliers = trial.multipliers.map(|m| m.max(0.0));
             let rise = descent(body, &trial.y, &-r, &multipliers);
-            let slack = SLACK * (trial.y.norm() + rise.abs());
+            let slack = DUALITY_ROUNDING * (trial.y.norm() + rise.abs());
             let upper = r.dot(&trial.y) + rise + body.displacement(&trial.y) + slack + turned;
             // Not `min`: a NaN bounds nothing.
             if upper < found.upper {
                 found.upper = upper;
             }
-            if let Some(y) = body.pull_in(&trial.y) {
+            if let Some(y) = body.move_inside(&trial.y) {
                 let lower = r.dot(&y) - body.displacement(&y) - turned;
                 if lower > found.lower {
                     (found.lower, found.point) = (lower, y);
@@ -252,7 +252,7 @@ bracketed!(HalfSpaceDistance);
 mod tests {
     use super::*;
     use crate::body::Compound;
-    use crate::measure::tests::{random_pose, unit};
+    use crate::measure::tests::random_pose;
     use sublevel_testkit::Seeded;
 
     #[test]
@@ -279,7 +279,7 @@ mod tests {
             let (body, support) = &cases[(seed % 6) as usize];
             let pose = random_pose(&mut random, 3.0);
             // General directions, and nearly or exactly along an axis or a face.
-            let mut n = unit(&mut random);
+            let mut n = random.unit();
             if seed % 5 > 1 {
                 let small = [0.0, 1e-12, 1e-6, 1e-3][(random.next() % 4) as usize];
                 n = (Vector3::from_fn(|i, _| f64::from(u8::from(i as u64 == seed % 3))) + n * small).normalize();
@@ -308,7 +308,7 @@ mod tests {
         for seed in 0..200 {
             let mut random = Seeded(seed);
             let pose = random_pose(&mut random, 2.0);
-            let half_space = HalfSpace::new(unit(&mut random), 2.0 * random.signed()).unwrap();
+            let half_space = HalfSpace::new(random.unit(), 2.0 * random.signed()).unwrap();
             let at =
                 |pose: &Pose| distance_to_half_space(&body, pose, &half_space, &options, &mut WarmStart::default());
             let gradient = at(&pose).pose_gradient(&pose, &half_space);

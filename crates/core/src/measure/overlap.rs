@@ -157,7 +157,7 @@ mod tests {
     use super::*;
     use crate::body::Body;
     use crate::measure::Status;
-    use crate::measure::tests::{random_pose, unit, zoo};
+    use crate::measure::tests::{random_pose, zoo};
     use crate::measure::{distance, level_distance};
     use nalgebra::Vector3;
     use sublevel_testkit::Seeded;
@@ -173,7 +173,7 @@ mod tests {
                 (&bodies[random.next() as usize % bodies.len()], &bodies[random.next() as usize % bodies.len()]);
             let reach = a.circumscribed().radius + b.circumscribed().radius;
             let (pose_a, far) = (random_pose(&mut random, 1.0), reach * 2_f64.powf(1.5 * random.signed()));
-            let shift = pose_a.translation() + unit(&mut random) * far;
+            let shift = pose_a.translation() + random.unit() * far;
             let pose_b = Pose::from_quaternion(shift, random_pose(&mut random, 0.0).rotation().coords.into()).unwrap();
             let options = Options::default();
             let truth = distance(a, &pose_a, b, &pose_b, &options, &mut WarmStart::default());

@@ -7,7 +7,7 @@
 //! the identity plus what the body's curvature adds.
 
 use crate::body::{Body, Solid};
-use crate::measure::bounds::duality_bounds::{SLACK, descent};
+use crate::measure::bounds::duality_bounds::{DUALITY_ROUNDING, descent};
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
@@ -51,7 +51,7 @@ impl PointDistance {
     /// is `normal`. By the envelope theorem the witness counts as fixed to the body: `-n` and
     /// `-(y - t) × n`. None inside.
     pub fn pose_gradient(&self, pose: &Pose) -> Option<Twist> {
-        self.normal.map(|n| Twist::of_force(-n, &self.witness, pose.translation()))
+        self.normal.map(|n| Twist::of_gradient(-n, &self.witness, pose.translation()))
     }
 }
 
@@ -187,7 +187,7 @@ impl<'a> Projection<'a> {
             if bound > lower || normal == Vector3::zeros() {
                 (lower, normal) = (bound.max(0.0), n);
             }
-            if let Some(y) = body.pull_in(&trial.y) {
+            if let Some(y) = body.move_inside(&trial.y) {
                 let apart = (q - y).norm() + body.displacement(&y) + error;
                 if apart < upper {
                     (upper, witness) = (apart, y);
@@ -213,13 +213,13 @@ impl<'a> Projection<'a> {
     /// that normal.
     fn separation(&self, q: &Vector3<f64>, error: f64, trial: &Trial) -> (f64, Vector3<f64>) {
         let body = &self.single.body;
-        let length = trial.pull.norm();
+        let length = trial.dual_gradient.norm();
         if !(length > 0.0 && length.is_finite()) {
             return (0.0, Vector3::zeros());
         }
-        let n = trial.pull / length;
+        let n = trial.dual_gradient / length;
         let fall = descent(body, &trial.y, &-n, &trial.multipliers.map(|m| (m / length).max(0.0)));
-        let slack = SLACK * (q.norm() + trial.y.norm() + fall.abs());
+        let slack = DUALITY_ROUNDING * (q.norm() + trial.y.norm() + fall.abs());
         let bound = n.dot(&(q - trial.y)) - fall - body.displacement(&trial.y) - error - slack;
         // Not `max`: a NaN bounds nothing.
         (if bound > 0.0 { bound } else { 0.0 }, n)
@@ -232,7 +232,7 @@ bracketed!(Projected);
 mod tests {
     use super::*;
     use crate::body::Compound;
-    use crate::measure::tests::{random_pose, unit, zoo};
+    use crate::measure::tests::{random_pose, zoo};
     use sublevel_testkit::Seeded;
 
     fn cold(solid: &impl Solid, pose: &Pose, point: &Vector3<f64>) -> PointDistance {
@@ -276,7 +276,7 @@ mod tests {
             let body = &bodies[random.next() as usize % bodies.len()];
             let size = body.circumscribed().radius;
             let pose = random_pose(&mut random, 1.0);
-            let x = body.circumscribed().center + unit(&mut random) * size * 10_f64.powf(random.signed());
+            let x = body.circumscribed().center + random.unit() * size * 10_f64.powf(random.signed());
             let mut warm = WarmStart::default();
             for k in 0..3 {
                 let point = pose.transform_point(&x) + Vector3::new(0.01, 0.02, 0.0) * size * f64::from(k);
@@ -311,7 +311,7 @@ mod tests {
             let body = &bodies[(seed as usize / 4) % 2];
             let size = body.circumscribed().radius;
             let pose = random_pose(&mut random, 1.0);
-            let point = pose.transform_point(&(body.circumscribed().center + unit(&mut random) * 2.5 * size));
+            let point = pose.transform_point(&(body.circumscribed().center + random.unit() * 2.5 * size));
             let value = |pose: &Pose| {
                 distance_to_point(body, pose, &point, &accurate, &mut WarmStart::default()).unwrap().value()
             };

@@ -1,4 +1,7 @@
 //! Measures against closed forms and independent bounds.
+//!
+//! The testkit is compiled with the library as its users see it, whose poses and bodies are other
+//! types than those of unit tests: helpers that make any are here, all else is in the testkit.
 
 mod compounds;
 mod stages;
@@ -13,15 +16,6 @@ pub(super) fn at(x: f64, y: f64, z: f64) -> Pose {
     Pose::from_quaternion(Vector3::new(x, y, z), [0.0, 0.0, 0.0, 1.0]).unwrap()
 }
 
-pub(super) fn unit(random: &mut Seeded) -> Vector3<f64> {
-    loop {
-        let v = Vector3::from_fn(|_, _| random.signed());
-        if v.norm() > 0.1 && v.norm() <= 1.0 {
-            return v.normalize();
-        }
-    }
-}
-
 pub(super) fn random_pose(random: &mut Seeded, distance: f64) -> Pose {
     let q = loop {
         let q: [f64; 4] = std::array::from_fn(|_| random.signed());
@@ -30,7 +24,7 @@ pub(super) fn random_pose(random: &mut Seeded, distance: f64) -> Pose {
             break q.map(|c| c / norm);
         }
     };
-    Pose::from_quaternion(unit(random) * distance, q).unwrap()
+    Pose::from_quaternion(random.unit() * distance, q).unwrap()
 }
 
 /// The pose after a translation by `h axis`, or a rotation by `h axis` about the body's own
@@ -77,7 +71,7 @@ fn ball_pairs() {
         // From deep overlap through grazing to far.
         let gap = s * [-0.5, -1e-6, -1e-10, 0.0, 1e-12, 1e-9, 1e-7, 1e-5, 1e-3, 1.0, 30.0][(seed % 11) as usize];
         let pose_a = random_pose(&mut random, scale * 5.0);
-        let direction = unit(&mut random);
+        let direction = random.unit();
         let moved = pose_a.translation() + direction * (ra + rb + gap);
         let pose_b = Pose::from_quaternion(moved, [0.5, 0.5, 0.5, 0.5]).unwrap();
         let truth = gap.max(0.0);
@@ -241,8 +235,8 @@ fn warm_starts_change_time_not_answers() {
         let (a, b) = (&bodies[i], &bodies[j]);
         let s = a.circumscribed().radius.max(b.circumscribed().radius);
         let (mut warm, mut warm_level) = (WarmStart::default(), WarmStart::default());
-        let start = unit(&mut random) * (a.circumscribed().radius + b.circumscribed().radius) * 1.2;
-        let step = unit(&mut random) * 0.02 * s;
+        let start = random.unit() * (a.circumscribed().radius + b.circumscribed().radius) * 1.2;
+        let step = random.unit() * 0.02 * s;
         for k in 0..40 {
             let angle = 0.01 * f64::from(k);
             let pose =
@@ -415,7 +409,7 @@ fn distances_of_sides_tilted_by_next_to_nothing() {
     for seed in 0..400 {
         let mut random = Seeded(seed);
         let (a, b) = &pairs[(seed % 4) as usize];
-        let tilt = unit(&mut random) * 10_f64.powf(-7.5 + random.signed());
+        let tilt = random.unit() * 10_f64.powf(-7.5 + random.signed());
         let turn = UnitQuaternion::from_scaled_axis(tilt);
         let mut place = Vector3::zeros();
         place[(seed / 4 % 3) as usize] = 3.0 + 0.9 * random.signed();
@@ -437,7 +431,7 @@ fn flats_of_different_orders_take_few_iterations() {
         let mut random = Seeded(seed);
         // Shallow tilts decide where on its side a body is nearest; 1 m apart.
         let tilt = 10_f64.powf(-7.0 + 5.0 * random.signed());
-        let turn = UnitQuaternion::from_scaled_axis(unit(&mut random) * tilt);
+        let turn = UnitQuaternion::from_scaled_axis(random.unit() * tilt);
         let pairs = [(&needle, &block, 1.3), (&block, &plate, 0.32), (&plate, &needle, 1.02), (&plate, &plate, 0.04)];
         for (a, b, halves) in pairs {
             let pose = Pose::from_quaternion(Vector3::new(0.0, 0.0, 1.0 + halves), turn.coords.into()).unwrap();
@@ -459,15 +453,12 @@ fn flat_tips_meet_faces_tilted_by_next_to_nothing() {
     let (mut longest, mut sum) = (0, 0);
     for seed in 0..1000 {
         let mut random = Seeded(seed);
-        let tilt = unit(&mut random) * 10_f64.powf(-9.0 + 2.0 * random.signed());
+        let tilt = random.unit() * 10_f64.powf(-9.0 + 2.0 * random.signed());
         let turn = UnitQuaternion::from_scaled_axis(tilt);
         let place = Vector3::new(0.0, 0.0, 1.01 + 0.03 * (1.0 + random.signed()));
         // Along the axes and across: no system may lean on a tip's having coordinates of its own.
-        let across = if seed % 2 == 0 {
-            UnitQuaternion::identity()
-        } else {
-            UnitQuaternion::from_scaled_axis(unit(&mut random))
-        };
+        let across =
+            if seed % 2 == 0 { UnitQuaternion::identity() } else { UnitQuaternion::from_scaled_axis(random.unit()) };
         let pose = Pose::from_quaternion(across * place, (across * turn).coords.into()).unwrap();
         let answer = cold(&needle.moved(&across, &Vector3::zeros()).unwrap(), &Pose::identity(), &block, &pose);
         let label = format!("seed {seed}, tilt {:e}: {answer:?}", tilt.norm());

@@ -433,7 +433,7 @@ fn advance(t_0: f64, t_1: f64, first: f64, last: f64, acceleration: f64) -> f64 
 mod tests {
     use super::*;
     use crate::body::Compound;
-    use crate::measure::tests::{random_pose, unit, zoo};
+    use crate::measure::tests::{random_pose, zoo};
     use crate::measure::{Pose, distance};
     use sublevel_testkit::Seeded;
 
@@ -451,13 +451,13 @@ mod tests {
         let mut queries = [0_u32; 500];
         for seed in 0..500 {
             let mut random = Seeded(seed);
-            let d = unit(&mut random);
-            let side = d.cross(&unit(&mut random)).normalize();
+            let d = random.unit();
+            let side = d.cross(&random.unit()).normalize();
             // Head on to past each other; grazing by a billionth on purpose.
             let aside = [0.0, 0.6, 0.99, 1.0 - 1e-9, 1.0 + 1e-9, 1.01][(seed % 6) as usize];
             let speed = 10_f64.powf(2.0 * random.signed());
-            let drift = unit(&mut random) * speed * 3.0;
-            let origin = unit(&mut random) * 10.0;
+            let drift = random.unit() * speed * 3.0;
+            let origin = random.unit() * 10.0;
             let back = 2.0 + random.signed();
             let (one, other) = (gliding(origin, d * speed + drift), gliding(origin + d * back + side * aside, drift));
             let options = ImpactOptions::new(10.0 / speed).unwrap().with_contact(1e-10).unwrap();
@@ -549,7 +549,7 @@ mod tests {
                 start.rotation().coords.into(),
             )
             .unwrap();
-            let spin = if seed % 3 == 0 { Vector3::zeros() } else { unit(&mut random) * 30.0 };
+            let spin = if seed % 3 == 0 { Vector3::zeros() } else { random.unit() * 30.0 };
             let shot = Motion::new(start, Vector3::new(100.0, 0.0, 0.0), spin, *start.translation()).unwrap();
             let still = Motion::still(Pose::identity());
             let found = time_of_impact(body, &shot, &slab, &still, &ImpactOptions::new(1.0).unwrap());
@@ -586,13 +586,13 @@ mod tests {
                 (&bodies[random.next() as usize % bodies.len()], &bodies[random.next() as usize % bodies.len()]);
             let reach = a.circumscribed().radius + b.circumscribed().radius;
             let motion = |random: &mut Seeded, start: Pose, towards: Vector3<f64>| {
-                let spin = unit(random) * 2.0 * random.signed();
-                let center = start.translation() + unit(random) * reach * 0.3;
+                let spin = random.unit() * 2.0 * random.signed();
+                let center = start.translation() + random.unit() * reach * 0.3;
                 Motion::new(start, towards, spin, center).unwrap()
             };
             let far = reach * 2.5;
             let (pose_a, pose_b) = (random_pose(&mut random, 0.3), random_pose(&mut random, far));
-            let aim = (pose_a.translation() - pose_b.translation()) + unit(&mut random) * reach * 0.7;
+            let aim = (pose_a.translation() - pose_b.translation()) + random.unit() * reach * 0.7;
             let (one, other) = (motion(&mut random, pose_a, Vector3::zeros()), motion(&mut random, pose_b, aim));
             let found = time_of_impact(a, &one, b, &other, &ImpactOptions::new(2.0).unwrap());
             let label = format!("seed {seed} {}-{}: {found:?}", a.name(), b.name());

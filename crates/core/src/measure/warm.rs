@@ -63,8 +63,8 @@ impl WarmStart {
         matches!(self.hint, Hint::Cold)
     }
 
-    /// A hint of witnesses x of A and y of B with the normal, in the query frame, and what is active
-    /// there.
+    /// A hint of witnesses x of A and y of B with the normal, in the query frame, and what is
+    /// active there.
     pub(super) fn apart(pair: &Pair<'_>, [x, y, n]: [&Vector3<f64>; 3], (a, b): &(Active, Active)) -> Self {
         let (active_a, active_b) = (a.bits(), b.bits());
         Hint::Apart { x_a: pair.to_a(x), y_b: pair.to_b(y), normal_a: *n, active_a, active_b }.into()

@@ -28,9 +28,10 @@ use crate::body::MAX_CONSTRAINTS;
 use crate::measure::frames::query_frame::{Pair, Posed};
 use nalgebra::Vector3;
 
-/// Relative slack for the rounding of a bound's own arithmetic: fewer than 128 operations on the
-/// sum of magnitudes.
-pub(in crate::measure) const SLACK: f64 = 64.0 * f64::EPSILON;
+/// Rounding of a duality bound's own arithmetic, relative to the sum of magnitudes: fewer than 128
+/// operations of half an epsilon each. Smaller, a bound could exceed what it bounds: exact re-
+/// checks (`tests/stability/recheck.rs`) compare it with rational arithmetic.
+pub(in crate::measure) const DUALITY_ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// Multipliers of the constraints of one body; zero where inactive.
 pub(in crate::measure) type Multipliers = [f64; MAX_CONSTRAINTS];
@@ -45,18 +46,18 @@ pub(in crate::measure) fn descent(
 ) -> f64 {
     let (mut residual, mut error) = body.functional(r);
     let (mut slack, mut magnitude) = (0.0, 0.0);
-    error += residual.abs() * SLACK;
+    error += residual.abs() * DUALITY_ROUNDING;
     for (i, &multiplier) in multipliers.iter().enumerate().take(body.len()) {
         if multiplier > 0.0 {
             let sample = body.sample(i, v);
             slack += multiplier * (1.0 - sample.value() + sample.nearby_value_error());
             magnitude += multiplier * (1.0 + sample.value().abs());
             residual += sample.z_gradient() * multiplier;
-            error += (sample.z_gradient().abs() * SLACK).add_scalar(sample.z_gradient_error()) * multiplier;
+            error += (sample.z_gradient().abs() * DUALITY_ROUNDING).add_scalar(sample.z_gradient_error()) * multiplier;
         }
     }
     let rest = (residual.abs() + error).dot(&body.spans(v));
-    slack + rest * (1.0 + SLACK) + SLACK * magnitude
+    slack + rest * (1.0 + DUALITY_ROUNDING) + DUALITY_ROUNDING * magnitude
 }
 
 /// What a bound of the distance or of a depth along a direction is made of; query frame.
@@ -83,7 +84,7 @@ pub(in crate::measure) fn distance_lower(pair: &Pair<'_>, trial: &DualTrial<'_>)
     let falls = descent(&pair.a, x, &n, of_a) + descent(&pair.b, y, &-n, of_b);
     let displaced = (pair.a.displacement(x) + pair.b.displacement(y)) * (1.0 + 1e-14);
     // n is a unit vector up to 4 roundings: a length of 1 + ε scales the bound by as much.
-    let slack = SLACK * (x.norm() + y.norm() + falls.abs());
+    let slack = DUALITY_ROUNDING * (x.norm() + y.norm() + falls.abs());
     let bound = n.dot(&(x - y)) - falls - displaced - slack;
     // Not `max`: a NaN bounds nothing.
     if bound > 0.0 { bound } else { 0.0 }
@@ -119,11 +120,11 @@ pub(in crate::measure) fn level_lower(
         value += weight * (sample.value() - sample.nearby_value_error());
         magnitude += weight * sample.value().abs();
         gradient += sample.gradient() * weight;
-        gradient_error += weight * (sample.gradient_error() + SLACK * sample.gradient().norm());
+        gradient_error += weight * (sample.gradient_error() + DUALITY_ROUNDING * sample.gradient().norm());
     }
     let fall = descent(&pair.b, x, &gradient, of_b);
     let displaced = (pair.a.displacement(x) + pair.b.displacement(x)) * (gradient.norm() + gradient_error);
     let rest = gradient_error * pair.b.reach(x) + displaced;
-    let bound = value - fall - rest * (1.0 + SLACK) - SLACK * (magnitude + fall.abs());
+    let bound = value - fall - rest * (1.0 + DUALITY_ROUNDING) - DUALITY_ROUNDING * (magnitude + fall.abs());
     if bound.is_nan() { f64::NEG_INFINITY } else { bound }
 }

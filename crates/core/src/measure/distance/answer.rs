@@ -95,8 +95,8 @@ impl Distance {
     pub fn gradients(&self, pose_a: &Pose, pose_b: &Pose) -> Option<[Twist; 2]> {
         let n = self.normal.filter(|_| self.lower > 0.0)?;
         Some([
-            Twist::of_force(n, &self.witness_a, pose_a.translation()),
-            Twist::of_force(-n, &self.witness_b, pose_b.translation()),
+            Twist::of_gradient(n, &self.witness_a, pose_a.translation()),
+            Twist::of_gradient(-n, &self.witness_b, pose_b.translation()),
         ])
     }
 }

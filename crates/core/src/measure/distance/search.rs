@@ -48,15 +48,18 @@ pub(super) struct Search<'a> {
     iterations: u32,
 }
 
-/// Below this distance relative to the larger body, ½|x - y|² has little curvature to aim by.
-const NEAR: f64 = 1e-3;
+/// Distance relative to the larger body, below which ½|x - y|² has little curvature to aim by. The
+/// interior-point method then goes for the deepest point first; larger, it does for bodies that
+/// are well apart, which takes time. No test pins it.
+const SHORT_DISTANCE: f64 = 1e-3;
 
 /// Distance of the outlines, relative to the larger body, above which the bodies have no point in
 /// common to look for.
 const FACING: f64 = 0.1;
 
-/// Below this one it has none that rounding leaves.
-const NEAREST: f64 = 1e-7;
+/// Distance relative to the larger body, below which rounding leaves the interior-point method on
+/// ½|x - y|² nothing to aim by, and refinement takes over. No test pins it.
+const SHORTEST_DISTANCE: f64 = 1e-7;
 
 /// Distance relative to the larger body below which contact is a matter of how poses are rounded.
 const CONTACT: f64 = 1e-18;
@@ -163,15 +166,15 @@ impl<'a> Search<'a> {
             self.again();
         }
         if !self.ended() {
-            self.closest(NEAR);
+            self.closest(SHORT_DISTANCE);
         }
-        if !self.ended() && !self.decided() && self.lower < NEAR * self.pair.size() {
+        if !self.ended() && !self.decided() && self.lower < SHORT_DISTANCE * self.pair.size() {
             self.contact();
         }
         // Where both are elongated or edged, first order from the deepest point is not close
         // enough.
         if !self.ended() {
-            self.closest(NEAREST);
+            self.closest(SHORTEST_DISTANCE);
         }
         // From the same points it would end the same.
         if !self.ended() && (self.x, self.y, self.n) != before {
@@ -205,7 +208,7 @@ impl<'a> Search<'a> {
         let (x, y, n, (a, b)) = self.tried[0].map_or_else(|| (x, y, n, near()), |at| (at.x, at.y, at.n, (at.a, at.b)));
         self.newton(x, y, n, a, b);
         // So near to each other doubles may not show the normal.
-        if self.has_to_be_aligned() && self.lower < NEAREST * self.pair.size() {
+        if self.has_to_be_aligned() && self.lower < SHORTEST_DISTANCE * self.pair.size() {
             self.sharpen();
         }
     }
@@ -577,7 +580,7 @@ impl<'a> Search<'a> {
         if !at.is_aligned(pair) {
             return false;
         }
-        let (Some(x), Some(y)) = (pair.a.pull_in(&at.x), pair.b.pull_in(&at.y)) else { return false };
+        let (Some(x), Some(y)) = (pair.a.move_inside(&at.x), pair.b.move_inside(&at.y)) else { return false };
         self.align_with(distance_upper(pair, &x, &y), [x, y, at.n], (at.a, at.b))
     }
 
@@ -601,7 +604,10 @@ impl<'a> Search<'a> {
         for n in [-u / lu, w / lw] {
             let trial = DualTrial { x, y, n: &n, of_a: &of_a, of_b: &of_b };
             if self.raise(distance_lower(self.pair, &trial), &n) {
-                let (a, b) = (Active::from_forces(&self.pair.a, x, &of_a), Active::from_forces(&self.pair.b, y, &of_b));
+                let (a, b) = (
+                    Active::from_weighted_multipliers(&self.pair.a, x, &of_a),
+                    Active::from_weighted_multipliers(&self.pair.b, y, &of_b),
+                );
                 self.tried[0] = Some(DistanceNewton { x: *x, y: *y, distance: n.dot(&(x - y)), n, a, b });
             }
         }
@@ -618,7 +624,7 @@ impl<'a> Search<'a> {
 
     /// Pulls trial points into their bodies and takes them if they are the closest so far.
     fn attain(&mut self, x: &Vector3<f64>, y: &Vector3<f64>) -> bool {
-        let (Some(x), Some(y)) = (self.pair.a.pull_in(x), self.pair.b.pull_in(y)) else { return false };
+        let (Some(x), Some(y)) = (self.pair.a.move_inside(x), self.pair.b.move_inside(y)) else { return false };
         self.take(distance_upper(self.pair, &x, &y), x, y)
     }
 

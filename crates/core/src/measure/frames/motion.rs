@@ -157,7 +157,7 @@ impl Motion {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::tests::{random_pose, unit};
+    use crate::measure::tests::random_pose;
     use sublevel_testkit::Seeded;
 
     #[test]
@@ -180,7 +180,7 @@ mod tests {
                 arm * angle.cos() + axis.cross(&arm) * angle.sin() + axis * axis.dot(&arm) * (1.0 - angle.cos());
             let truth = c + v * t + turned;
             assert!((x(t) - truth).norm() < motion.error(t, point.norm()) + 1e-14, "seed {seed}");
-            let n = unit(&mut random);
+            let n = random.unit();
             let second = n.dot(&(x(t + 1e-3) + x(t - 1e-3) - x(t) * 2.0)) / 1e-6;
             assert!(second.abs() <= motion.acceleration_along(&n, &point, 0.0) + 1e-6, "seed {seed}");
         }

@@ -122,7 +122,7 @@ impl Posed<'_> {
     /// Against the gradients of the violated constraints the way to the body is shortest; where
     /// steps that way do not lead in, the line to the interior point does. None if not even that is
     /// proven inside in this frame.
-    pub(in crate::measure) fn pull_in(&self, v: &Vector3<f64>) -> Option<Vector3<f64>> {
+    pub(in crate::measure) fn move_inside(&self, v: &Vector3<f64>) -> Option<Vector3<f64>> {
         let mut point = *v;
         let mut nudge = 4.0 * f64::EPSILON;
         for _ in 0..4 {
@@ -133,7 +133,7 @@ impl Posed<'_> {
                 let excess = (sample.value() + error).next_up() - 1.0;
                 inside &= excess <= 0.0;
                 if excess.is_nan() {
-                    return self.pull_towards_interior(v);
+                    return self.move_towards_interior(v);
                 }
                 let gradient = sample.gradient();
                 // What the steps for other constraints leave of it.
@@ -153,12 +153,12 @@ impl Posed<'_> {
             point += step;
             nudge = 1e-6;
         }
-        self.pull_towards_interior(v)
+        self.move_towards_interior(v)
     }
 
     /// Convexity along the segment gives the factor `s = (1 - g(a)) / (g(v) - g(a))` from the
     /// interior point a; rounding takes a little more.
-    fn pull_towards_interior(&self, v: &Vector3<f64>) -> Option<Vector3<f64>> {
+    fn move_towards_interior(&self, v: &Vector3<f64>) -> Option<Vector3<f64>> {
         let mut value = self.nearby_value_upper(v);
         if value <= 1.0 {
             return Some(*v);

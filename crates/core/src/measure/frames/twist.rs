@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 /// use nalgebra::Vector3;
 /// use sublevel_core::measure::Twist;
 ///
-/// // A force n at the point x, about the translation t.
+/// // A gradient n at the point x, about the translation t.
 /// let (n, x, t) = (Vector3::x(), Vector3::new(0.0, 2.0, 0.0), Vector3::zeros());
 /// let gradient = Twist { linear: n, angular: (x - t).cross(&n) };
 /// assert_eq!(gradient.angular, Vector3::new(0.0, 0.0, -2.0));
@@ -39,9 +39,9 @@ impl Twist {
     pub(in crate::measure) const ZERO: Self =
         Self { linear: Vector3::new(0.0, 0.0, 0.0), angular: Vector3::new(0.0, 0.0, 0.0) };
 
-    /// Derivative of a measure that grows with `force · δx` when the body's material point at
+    /// Derivative of a measure that grows with `gradient · δx` when the body's material point at
     /// `point` moves by δx; `center` is the translation of the body's pose, all in the world frame.
-    pub(in crate::measure) fn of_force(force: Vector3<f64>, point: &Vector3<f64>, center: &Vector3<f64>) -> Self {
-        Self { linear: force, angular: (point - center).cross(&force) }
+    pub(in crate::measure) fn of_gradient(gradient: Vector3<f64>, point: &Vector3<f64>, center: &Vector3<f64>) -> Self {
+        Self { linear: gradient, angular: (point - center).cross(&gradient) }
     }
 }

@@ -87,7 +87,6 @@ pub(super) fn crossing(u: &Vector3<f64>, support: impl Fn(&Vector3<f64>) -> Corn
 #[cfg(test)]
 mod tests {
     use super::crossing;
-    use crate::measure::tests::unit;
     use crate::optimize::Corner;
     use nalgebra::Vector3;
     use sublevel_testkit::Seeded;
@@ -106,7 +105,7 @@ mod tests {
             let mut random = Seeded(seed);
             let half = Vector3::from_fn(|_, _| 10.0_f64.powf(2.0 * random.signed()));
             let center = Vector3::from_fn(|i, _| 0.9 * half[i] * random.signed());
-            let u = unit(&mut random);
+            let u = random.unit();
             let found = crossing(&u, cuboid(half, center));
             let reach = (0..3).map(|i| (half[i] + center[i] * u[i].signum()) / u[i].abs()).fold(f64::MAX, f64::min);
             let truth = u * reach;
@@ -132,7 +131,7 @@ mod tests {
                 let x = radii.component_mul(&scaled) / scaled.norm();
                 Corner { x, y: -x, difference: x * 2.0 }
             };
-            let u = unit(&mut random);
+            let u = random.unit();
             let found = crossing(&u, support);
             let truth = u / u.component_div(&radii).norm();
             assert!((found.x - truth).norm() <= 0.05 * radii.max(), "seed {seed}: {found:?} {truth}");

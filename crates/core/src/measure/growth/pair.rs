@@ -4,7 +4,7 @@ use super::answer::GrowthDistance;
 use super::minkowski_portal::crossing;
 use super::problem::{Along, tolerance};
 use crate::body::Body;
-use crate::measure::bounds::duality_bounds::{Multipliers, SLACK, descent};
+use crate::measure::bounds::duality_bounds::{DUALITY_ROUNDING, Multipliers, descent};
 use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::frames::query_frame::Pair;
 use crate::measure::frames::twist::Twist;
@@ -116,7 +116,7 @@ impl Frame<'_> {
     /// Bound of the distance of `w(x, y)` from the point that points within the displacements of x
     /// and y stand for.
     fn w_error(&self, x: &Vector3<f64>, y: &Vector3<f64>) -> f64 {
-        let rounding = SLACK * (x.norm() + y.norm() + self.center_a.norm() + self.center_b.norm());
+        let rounding = DUALITY_ROUNDING * (x.norm() + y.norm() + self.center_a.norm() + self.center_b.norm());
         self.pair.a.displacement(x) + self.pair.b.displacement(y) + 2.0 * self.center_error + rounding
     }
 
@@ -129,12 +129,12 @@ impl Frame<'_> {
         of_a: &Multipliers,
         of_b: &Multipliers,
     ) -> f64 {
-        let length = n.norm() * (1.0 + SLACK);
-        let rise = n.dot(&self.delta) - length * (self.delta_error + SLACK * self.gap);
+        let length = n.norm() * (1.0 + DUALITY_ROUNDING);
+        let rise = n.dot(&self.delta) - length * (self.delta_error + DUALITY_ROUNDING * self.gap);
         let falls = descent(&self.pair.a, x, &-n, of_a) + descent(&self.pair.b, y, n, of_b);
-        let width = n.dot(&self.w(x, y)) + falls + SLACK * falls.abs() + length * self.w_error(x, y);
+        let width = n.dot(&self.w(x, y)) + falls + DUALITY_ROUNDING * falls.abs() + length * self.w_error(x, y);
         // A NaN bounds nothing.
-        if rise > 0.0 && width > 0.0 { rise / width * (1.0 - SLACK) } else { 0.0 }
+        if rise > 0.0 && width > 0.0 { rise / width * (1.0 - DUALITY_ROUNDING) } else { 0.0 }
     }
 
     /// `t + |Δ - t w| / R`, rounded up, with its t, for points within whose displacements points of
@@ -143,8 +143,9 @@ impl Frame<'_> {
         let w = self.w(x, y);
         let along = w.dot(&self.delta) / self.gap;
         let t = if along > 0.0 { self.gap / along } else { 0.0 };
-        let rest = (self.delta - w * t).norm() + self.delta_error + t * self.w_error(x, y) + SLACK * self.gap;
-        ((t + rest / (self.radius_a + self.radius_b)) * (1.0 + SLACK), t)
+        let rest =
+            (self.delta - w * t).norm() + self.delta_error + t * self.w_error(x, y) + DUALITY_ROUNDING * self.gap;
+        ((t + rest / (self.radius_a + self.radius_b)) * (1.0 + DUALITY_ROUNDING), t)
     }
 }
 
@@ -182,7 +183,8 @@ impl Search<'_> {
         self.attain(&x, &y);
         if !(self.frame.gap > 0.0) {
             // The centres coincide: s is 0 up to the error of knowing where they are.
-            self.upper = self.frame.delta_error / (self.frame.radius_a + self.frame.radius_b) * (1.0 + SLACK);
+            self.upper =
+                self.frame.delta_error / (self.frame.radius_a + self.frame.radius_b) * (1.0 + DUALITY_ROUNDING);
             self.scale = 0.0;
             return;
         }
@@ -289,7 +291,9 @@ impl Search<'_> {
 
     /// Pulls trial points into their bodies and takes them if they give the smallest s so far.
     fn attain(&mut self, x: &Vector3<f64>, y: &Vector3<f64>) -> bool {
-        let (Some(x), Some(y)) = (self.frame.pair.a.pull_in(x), self.frame.pair.b.pull_in(y)) else { return false };
+        let (Some(x), Some(y)) = (self.frame.pair.a.move_inside(x), self.frame.pair.b.move_inside(y)) else {
+            return false;
+        };
         let (upper, scale) = self.frame.upper(&x, &y);
         let better = upper < self.upper;
         if better {
@@ -326,8 +330,8 @@ impl Search<'_> {
             normal: slopes.and_then(|slope| (-slope).try_normalize(0.0)),
             gradients: slopes.map(|slope| {
                 [
-                    Twist::of_force(-slope, &witness, pose_a.translation()),
-                    Twist::of_force(slope, &witness, pose_b.translation()),
+                    Twist::of_gradient(-slope, &witness, pose_a.translation()),
+                    Twist::of_gradient(slope, &witness, pose_b.translation()),
                 ]
             }),
             tied: false,

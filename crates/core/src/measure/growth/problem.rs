@@ -9,7 +9,7 @@ use crate::measure::frames::vector::{M3, V3, add, apply, dot, normalized, rows, 
 use crate::measure::solver::continuation::Proven;
 use crate::measure::solver::initial_guess::{Start, facing_along, meeting};
 use crate::measure::solver::tangent_newton::{
-    ALIGNED, Bend, Bracket, Plane, Relative, Response, SLACK, Step, newton_along,
+    ALIGNED, Bracket, Plane, Relative, Response, Step, SurfaceCurvature, TAYLOR_ROUNDING, newton_along,
 };
 use crate::measure::solver::two_point_problem::{Relation, Verdict};
 use crate::measure::status::Status;
@@ -91,8 +91,8 @@ impl Along {
             witness,
             normal: Some(normal),
             gradients: Some([
-                Twist::of_force(-slope, &witness, pose_a.translation()),
-                Twist::of_force(slope, &witness, pose_b.translation()),
+                Twist::of_gradient(-slope, &witness, pose_a.translation()),
+                Twist::of_gradient(slope, &witness, pose_b.translation()),
             ]),
             iterations: proven.rounds,
         }
@@ -117,8 +117,8 @@ impl Relation for Along {
     fn newton<S: Simd>(
         &self,
         simd: S,
-        a: (&Plane<f64>, &Bend<f64>),
-        b: (&Plane<f64>, &Bend<f64>),
+        a: (&Plane<f64>, &SurfaceCurvature<f64>),
+        b: (&Plane<f64>, &SurfaceCurvature<f64>),
         frame: &M3<f64>,
         difference: V3<f64>,
         smallest: f64,
@@ -139,16 +139,16 @@ impl Relation for Along {
     fn judge<S: Simd>(&self, _: S, found: &Bracket<f64>, frame: &M3<f64>, difference: V3<f64>) -> Verdict {
         let delta = apply::<S, f64>(frame, self.delta);
         let gap = self.square.sqrt();
-        let delta_error = self.delta_error + SLACK * gap;
+        let delta_error = self.delta_error + TAYLOR_ROUNDING * gap;
         let width = -found.lower;
-        let lower = (-dot::<S, f64>(found.normal, delta) - delta_error) / width * (1.0 - SLACK);
+        let lower = (-dot::<S, f64>(found.normal, delta) - delta_error) / width * (1.0 - TAYLOR_ROUNDING);
 
         let w = subtract::<S, f64>(add::<S, f64>(difference, found.to_a), found.to_b);
         let t = self.scale::<S>(w, delta);
         let rest = subtract::<S, f64>(delta, scaled::<S, f64>(w, t));
         // What the points are off by counts at most half of what rounding leaves.
         let rest = dot::<S, f64>(rest, rest).sqrt() + delta_error + t * found.rounding;
-        let upper = (t + rest / self.radius) * (1.0 + SLACK);
+        let upper = (t + rest / self.radius) * (1.0 + TAYLOR_ROUNDING);
         // The bracket of the distance is not a number where its points are not proven to be in the
         // bodies.
         let narrow =

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::body::Body;
-use crate::measure::tests::{at, random_pose, unit, zoo};
+use crate::measure::tests::{at, random_pose, zoo};
 use crate::measure::warm::Hint;
 use nalgebra::Vector3;
 use sublevel_testkit::Seeded;
@@ -22,7 +22,7 @@ fn ball_pairs_and_other_centers() {
         let truth = [1e-15_f64, 1e-9, 1e-4, 0.3, 1.0 - 1e-9, 1.0, 1.0 + 1e-9, 2.0, 1e3, 1e9][(seed % 10) as usize];
         let truth = truth.min(1e14 / (ra + rb));
         let pose_a = random_pose(&mut random, 0.0);
-        let direction = unit(&mut random);
+        let direction = random.unit();
         let pose_b = Pose::from_quaternion(direction * (truth * (ra + rb)), [0.5, 0.5, 0.5, 0.5]).unwrap();
         let answer = cold(&a, &pose_a, &b, &pose_b);
         let label = format!("seed {seed}, s {truth:e}, radii {ra:e} {rb:e}: {answer:?}");
@@ -32,7 +32,7 @@ fn ball_pairs_and_other_centers() {
         assert!(answer.upper - answer.lower <= 1e-9 * truth.max(1e-5), "{label}");
         assert!((answer.normal.unwrap() + direction).norm() < 1e-6, "{label}");
         // An off-centre ball: |s (x - c_A)| meets |Δ| where the quadratic says.
-        let offset = unit(&mut random) * 0.7 * ra;
+        let offset = random.unit() * 0.7 * ra;
         let a = a.with_growth_center(offset).unwrap();
         let pose_b = at(1.7 * (ra + rb), 0.0, 0.0);
         let answer = cold(&a, &Pose::identity(), &b, &pose_b);
@@ -74,7 +74,7 @@ fn coaxial_powers_and_boxes_have_closed_forms() {
         let mut random = Seeded(seed);
         let half = |random: &mut Seeded| Vector3::from_fn(|_, _| 10_f64.powf(random.signed()));
         let (ha, hb) = (half(&mut random), half(&mut random));
-        let shift = unit(&mut random) * 10_f64.powf(random.signed());
+        let shift = random.unit() * 10_f64.powf(random.signed());
         let truth = shift.abs().component_div(&(ha + hb)).max();
         let (a, b) = (Body::cuboid("a", ha).unwrap(), Body::cuboid("b", hb).unwrap());
         let answer = cold(&a, &Pose::identity(), &b, &at(shift.x, shift.y, shift.z));
@@ -210,7 +210,7 @@ fn warm_starts_change_time_not_answers() {
         let (a, b) = (&bodies[i], &bodies[j]);
         let s = a.circumscribed().radius.max(b.circumscribed().radius);
         let mut warm = WarmStart::default();
-        let (start, step) = (unit(&mut random) * s, unit(&mut random) * 0.02 * s);
+        let (start, step) = (random.unit() * s, random.unit() * 0.02 * s);
         for k in 0..40 {
             let angle = 0.01 * f64::from(k);
             let pose =
@@ -289,7 +289,7 @@ fn sides_tilted_by_next_to_nothing_show_their_edges() {
     for seed in 0..600 {
         let mut random = Seeded(seed);
         let (a, b) = &pairs[(seed % 7) as usize];
-        let tilt = unit(&mut random) * 10_f64.powf(-9.5 + 1.5 * random.signed());
+        let tilt = random.unit() * 10_f64.powf(-9.5 + 1.5 * random.signed());
         let quarter = nalgebra::UnitQuaternion::from_scaled_axis(Vector3::z() * [0.0, 0.5][(seed / 7 % 2) as usize]);
         let turn = nalgebra::UnitQuaternion::from_scaled_axis(tilt) * quarter;
         let mut place = Vector3::zeros();

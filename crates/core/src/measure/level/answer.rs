@@ -28,8 +28,8 @@ pub struct LevelDistance {
     /// witness x (of several active constraints, weighted by their multipliers) and t the
     /// translation.
     pub gradient_a: Twist,
-    /// Derivative of d with respect to the pose of the second body: the same force the other way,
-    /// about its own translation.
+    /// Derivative of d with respect to the pose of the second body: the same gradient the other
+    /// way, about its own translation.
     pub gradient_b: Twist,
     /// Whether another pair of parts may be as low, their brackets meeting: witness, multiplier and
     /// gradients may then jump. Never for single bodies.

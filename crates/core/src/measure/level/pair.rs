@@ -76,7 +76,7 @@ pub(super) fn between(
 impl LevelProven {
     fn answer(&self, a: &Body, pose_a: &Pose, pose_b: &Pose) -> LevelDistance {
         let witness = pose_a.transform_point(&(a.normalization().center + Vector3::from(self.x)));
-        let force = pose_a.transform_direction(&Vector3::from(self.gradient));
+        let gradient = pose_a.transform_direction(&Vector3::from(self.gradient));
         LevelDistance {
             status: Status::Converged,
             lower: self.lower,
@@ -84,8 +84,8 @@ impl LevelProven {
             witness,
             multiplier: self.multiplier,
             saturated: false,
-            gradient_a: Twist::of_force(-force, &witness, pose_a.translation()),
-            gradient_b: Twist::of_force(force, &witness, pose_b.translation()),
+            gradient_a: Twist::of_gradient(-gradient, &witness, pose_a.translation()),
+            gradient_b: Twist::of_gradient(gradient, &witness, pose_b.translation()),
             tied: false,
             iterations: self.rounds,
         }

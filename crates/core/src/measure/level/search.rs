@@ -188,8 +188,10 @@ impl<'a> Search<'a> {
         let pair = self.pair;
         let sharp = SharpPair::new(pair);
         let (of_a, of_b) = &self.multipliers;
-        let (a, b) =
-            (Active::from_forces(&pair.a, &self.proven, of_a), Active::from_forces(&pair.b, &self.proven, of_b));
+        let (a, b) = (
+            Active::from_weighted_multipliers(&pair.a, &self.proven, of_a),
+            Active::from_weighted_multipliers(&pair.b, &self.proven, of_b),
+        );
         let proven = LevelNewton { x: self.proven, a, b };
         for start in [Some(proven), self.ended].into_iter().flatten().filter(|start| start.a.len > 0) {
             let left = self.options.max_iterations() - self.iterations.min(self.options.max_iterations());
@@ -320,7 +322,7 @@ impl<'a> Search<'a> {
     /// whether it is.
     fn adopt(&mut self, at: &LevelNewton) -> bool {
         let pair = self.pair;
-        let Some(x) = pair.b.pull_in(&at.x).filter(|_| at.is_balanced(pair)) else { return false };
+        let Some(x) = pair.b.move_inside(&at.x).filter(|_| at.is_balanced(pair)) else { return false };
         let (of_a, of_b) = (at.a.multipliers(), at.b.multipliers());
         let (lower, upper) = (level_lower(pair, &at.x, &of_a, &of_b), pair.a.value_upper(&x, pair.b.displacement(&x)));
         let narrow = upper - lower <= self.accuracy * upper.abs().max(1.0);
@@ -342,7 +344,7 @@ impl<'a> Search<'a> {
 
     /// Pulls a trial point into B and takes it if A's polynomial is the smallest there so far.
     fn attain(&mut self, x: &Vector3<f64>) -> bool {
-        let Some(x) = self.pair.b.pull_in(x) else { return false };
+        let Some(x) = self.pair.b.move_inside(x) else { return false };
         let upper = self.pair.a.value_upper(&x, self.pair.b.displacement(&x));
         let better = upper < self.upper;
         if better {
@@ -373,7 +375,7 @@ impl<'a> Search<'a> {
         let (pair, saturated) = (self.pair, self.saturated());
         let (of_a, of_b) = &self.multipliers;
         let gradient = pair.a.weighted_gradient(&self.x, &of_a.map(|weight| weight.max(0.0)));
-        let force = pair.direction_to_world(&gradient) / pair.unit() * if saturated { 0.0 } else { 1.0 };
+        let gradient = pair.direction_to_world(&gradient) / pair.unit() * if saturated { 0.0 } else { 1.0 };
         let witness = pair.to_world(&self.x);
         LevelDistance {
             status: Status::of(self.done()),
@@ -382,8 +384,8 @@ impl<'a> Search<'a> {
             witness,
             multiplier: if saturated { 0.0 } else { of_b.iter().sum() },
             saturated,
-            gradient_a: Twist::of_force(-force, &witness, pose_a.translation()),
-            gradient_b: Twist::of_force(force, &witness, pose_b.translation()),
+            gradient_a: Twist::of_gradient(-gradient, &witness, pose_a.translation()),
+            gradient_b: Twist::of_gradient(gradient, &witness, pose_b.translation()),
             tied: false,
             iterations: self.iterations,
         }

@@ -76,26 +76,19 @@ pub fn penetration(
     if starts.is_empty() {
         return Penetration { directions, iterations, ..best };
     }
-    let way = separating_translation::out(
-        (a, pose_a),
-        (b, pose_b),
-        &starts,
-        best.lower,
-        |depth| narrow(a, b, depth, options),
-        options,
-    );
-    let (lower, upper) = (best.lower, way.length);
+    let found = separating_translation::separate((a, pose_a), (b, pose_b), &starts, best.lower, options);
+    let (lower, upper) = (best.lower, found.length);
     let narrow = upper - lower <= narrow(a, b, upper, options);
     Penetration {
         status: Status::of(narrow),
         lower,
         upper,
-        direction: Some(way.direction),
-        witness_a: way.contacts[0].x,
-        witness_b: way.contacts[0].y,
+        direction: Some(found.direction),
+        witness_a: found.contacts[0].x,
+        witness_b: found.contacts[0].y,
         // A second direction for the deepest pair is a tie if that pair decides the depth.
-        tied: way.tied || best.tied && narrow,
+        tied: found.tied || best.tied && narrow,
         directions,
-        iterations: iterations + way.iterations,
+        iterations: iterations + found.iterations,
     }
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::body::Body;
-use crate::measure::tests::{at, random_pose, unit, zoo};
+use crate::measure::tests::{at, random_pose, zoo};
 use nalgebra::Vector3;
 use sublevel_testkit::Seeded;
 
@@ -29,7 +29,7 @@ fn ball_pairs() {
         let small = ra.min(rb);
         let truth = [-0.5, -1e-6, 0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0][(seed % 9) as usize] * small;
         let pose_a = random_pose(&mut random, 3.0 * scale);
-        let direction = unit(&mut random);
+        let direction = random.unit();
         let moved = pose_a.translation() + direction * (ra + rb - truth);
         let pose_b = Pose::from_quaternion(moved, [0.5, 0.5, 0.5, 0.5]).unwrap();
         let answer = cold(&a, &pose_a, &b, &pose_b);
@@ -93,7 +93,7 @@ fn coaxial_powers_come_out_along_the_axis_or_shorter() {
 fn brute_force(support: impl Fn(&Vector3<f64>) -> f64, random: &mut Seeded) -> f64 {
     let mut best = (f64::INFINITY, Vector3::x());
     for _ in 0..20_000 {
-        let n = unit(random);
+        let n = random.unit();
         let value = support(&n);
         if value < best.0 {
             best = (value, n);
@@ -102,7 +102,7 @@ fn brute_force(support: impl Fn(&Vector3<f64>) -> f64, random: &mut Seeded) -> f
     let mut radius = 0.1;
     while radius > 1e-9 {
         for _ in 0..40 {
-            let n = (best.1 + unit(random) * radius).normalize();
+            let n = (best.1 + random.unit() * radius).normalize();
             let value = support(&n);
             if value < best.0 {
                 best = (value, n);
@@ -167,7 +167,7 @@ fn moving_out_by_the_depth_separates_and_by_less_does_not() {
         assert!(apart.upper > 0.0 || apart.lower > 0.0, "{label}: {apart:?}");
         // Less than the lower bound is not enough, whatever the direction.
         for _ in 0..10 {
-            let shift = unit(&mut random) * answer.lower * 0.999;
+            let shift = random.unit() * answer.lower * 0.999;
             let moved = pose_a.with_translation(pose_a.translation() + shift);
             let still = crate::measure::tests::cold(a, &moved, b, &pose_b);
             assert!(still.lower == 0.0, "{label}: {still:?}");

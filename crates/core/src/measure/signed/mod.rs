@@ -23,7 +23,7 @@ use crate::measure::status::Status;
 use crate::measure::warm::WarmStart;
 pub use answer::SignedDistance;
 use pair::between;
-use separating_translation::{Contact, Start, Starts, Way, narrow};
+use separating_translation::{Contact, SeparatingTranslation, Start, Starts, narrow};
 
 /// Signed distance of body `a` at `pose_a` and body `b` at `pose_b` (body to world).
 ///
@@ -86,36 +86,29 @@ pub fn signed_distance(
         return SignedDistance { status, lower, tied: tied || best.tied, iterations, ..best };
     }
     let least = (-best.upper).max(0.0);
-    let way = separating_translation::out(
-        (a, pose_a),
-        (b, pose_b),
-        &starts,
-        least,
-        |depth| narrow(a, b, depth, options),
-        options,
-    );
-    let (lower, upper) = (-way.length, best.upper);
-    let narrow = upper - lower <= narrow(a, b, if upper < 0.0 { way.length } else { 0.0 }, options);
+    let found = separating_translation::separate((a, pose_a), (b, pose_b), &starts, least, options);
+    let (lower, upper) = (-found.length, best.upper);
+    let narrow = upper - lower <= narrow(a, b, if upper < 0.0 { found.length } else { 0.0 }, options);
     SignedDistance {
         status: Status::of(narrow),
         lower,
         upper,
-        witness_a: way.contacts[0].x,
-        witness_b: way.contacts[0].y,
-        normal: Some(way.direction),
-        gradients: Some(gradients(&way, pose_a, pose_b)),
+        witness_a: found.contacts[0].x,
+        witness_b: found.contacts[0].y,
+        normal: Some(found.direction),
+        gradients: Some(gradients(&found, pose_a, pose_b)),
         at_contact: lower <= 0.0 && upper >= 0.0,
-        tied: way.tied || best.tied && narrow,
-        iterations: iterations + way.iterations,
+        tied: found.tied || best.tied && narrow,
+        iterations: iterations + found.iterations,
     }
 }
 
-/// Derivatives of minus the length of a way with respect to both poses: each pair of parts that
-/// holds the solids back adds its pull, at the points where it does (envelope theorem).
-fn gradients(way: &Way, pose_a: &Pose, pose_b: &Pose) -> [Twist; 2] {
-    way.contacts.iter().fold([Twist::ZERO; 2], |[a, b], Contact { pull, x, y }| {
-        let of_a = Twist::of_force(*pull, x, pose_a.translation());
-        let of_b = Twist::of_force(-pull, y, pose_b.translation());
+/// Derivatives of minus the length of a translation with respect to both poses: each pair of parts
+/// that touches adds its weighted normal, at the points where it does (envelope theorem).
+fn gradients(found: &SeparatingTranslation, pose_a: &Pose, pose_b: &Pose) -> [Twist; 2] {
+    found.contacts.iter().fold([Twist::ZERO; 2], |[a, b], Contact { weighted_normal, x, y }| {
+        let of_a = Twist::of_gradient(*weighted_normal, x, pose_a.translation());
+        let of_b = Twist::of_gradient(-weighted_normal, y, pose_b.translation());
         [a + of_a, b + of_b]
     })
 }

@@ -124,7 +124,7 @@ impl Known {
         if let Some(upper) = best.attained {
             return Self { lower, upper, x: best.x, y: best.y };
         }
-        match (pair.a.pull_in(&best.x), pair.b.pull_in(&best.y)) {
+        match (pair.a.move_inside(&best.x), pair.b.move_inside(&best.y)) {
             (Some(x), Some(y)) => Self { lower, upper: distance_upper(pair, &x, &y), x, y },
             _ => Self { lower, upper: f64::INFINITY, x: best.x, y: best.y },
         }
@@ -167,8 +167,8 @@ impl Answer {
         let Self { lower, upper, tied, iterations, status } = self;
         let gradients = normal.map(|n| {
             [
-                Twist::of_force(n, &witness_a, pose_a.translation()),
-                Twist::of_force(-n, &witness_b, pose_b.translation()),
+                Twist::of_gradient(n, &witness_a, pose_a.translation()),
+                Twist::of_gradient(-n, &witness_b, pose_b.translation()),
             ]
         });
         let at_contact = lower <= 0.0 && upper >= 0.0;

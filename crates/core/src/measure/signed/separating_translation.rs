@@ -1,12 +1,12 @@
-//! A short way out of an overlap of unions: a translation of A after which none of its parts meets
-//! a part of B.
+//! A short separating translation of overlapping unions: one of A after which none of its parts
+//! meets a part of B.
 //!
 //! Any translation after which every pair of parts is proven apart bounds the depth from above.
 //! Along a direction one is found by going on, pair by pair, until a plane across the direction
 //! parts those that still meet. From there it shrinks: where it leads, every pair of parts lies on
 //! two sides of a plane with a normal n and a gap s, so that a translation w separates it, too, if
 //! `n·w >= n·v - s`; of all w beyond these planes the shortest is next ([`shortest`]), and so on.
-//! Each is proven again. The planes of pairs that touch turn on the way, so the search ends at a
+//! Each is proven again. The planes of pairs that touch turn meanwhile, so the search ends at a
 //! translation from which no small change is shorter, which need not be the shortest of all.
 
 use super::pair::between;
@@ -25,10 +25,10 @@ use nalgebra::Vector3;
 /// Directions of pairs of parts to start from.
 const STARTS: usize = 8;
 
-/// Starts that are followed to the end: those with the shortest ways.
+/// Starts that are followed to the end: those with the shortest translations.
 const FOLLOWED: usize = 3;
 
-/// Most translations on the way from one start.
+/// Most translations tried from one start.
 const MAX_ROUNDS: u32 = 40;
 
 /// How many times the last gain is hoped for at most.
@@ -41,7 +41,7 @@ const PLANES: usize = 24;
 /// apart.
 const MARGIN: f64 = 4.0;
 
-/// A way out for one pair of parts.
+/// A direction that separates one pair of parts.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::measure) struct Start {
     pub(in crate::measure) pair: (usize, usize),
@@ -83,42 +83,42 @@ struct Plane {
     y: Vector3<f64>,
 }
 
-/// What holds A back: the pull of a pair of parts on the way, a part of its direction, and where it
-/// acts.
+/// A pair of parts that would meet after a shorter translation: the normal of its plane times its
+/// multiplier, a part of the direction, and where the parts touch.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::measure) struct Contact {
-    pub(in crate::measure) pull: Vector3<f64>,
+    pub(in crate::measure) weighted_normal: Vector3<f64>,
     pub(in crate::measure) x: Vector3<f64>,
     pub(in crate::measure) y: Vector3<f64>,
 }
 
-/// A way out; metres, world frame.
+/// A separating translation; metres, world frame.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::measure) struct Way {
+pub(in crate::measure) struct SeparatingTranslation {
     /// Proven: after this much along the direction no parts meet, so that they touch at most.
     pub(in crate::measure) length: f64,
     pub(in crate::measure) direction: Vector3<f64>,
-    /// Pulls of sum `direction`, the strongest first; the others may be zero.
+    /// Their weighted normals have the sum `direction`, the longest first; the others may be zero.
     pub(in crate::measure) contacts: [Contact; 3],
-    /// Whether another way was seen to be about as short, or another pair of parts to be about as
-    /// much in the way.
+    /// Whether another direction was seen to be about as short, or another pair of parts to touch
+    /// at the end.
     pub(in crate::measure) tied: bool,
     pub(in crate::measure) iterations: u32,
 }
 
-/// The shortest way found from these starts and a few more. No way is shorter than
-/// `pairwise_minimum` metres; lengths that differ by at most `narrow` of them count as the same.
-pub(in crate::measure) fn out(
+/// The shortest one found from these starts and a few more. None is shorter than
+/// `least` metres; lengths that differ by at most what the options ask for count as the same.
+pub(in crate::measure) fn separate(
     (a, pose_a): At<'_, impl Solid>,
     (b, pose_b): At<'_, impl Solid>,
     starts: &Starts,
     least: f64,
-    narrow: impl Fn(f64) -> f64,
-    options: &Options<'_>,
-) -> Way {
+    asked: &Options<'_>,
+) -> SeparatingTranslation {
     let radius = |parts: &[Body]| parts.iter().map(|part| part.circumscribed().radius).fold(0.0, f64::max);
     // Gaps are to be provable whatever accuracy the caller asks for.
-    let options = options.with_accuracy(options.accuracy().min(1e-9)).unwrap_or(*options);
+    let options = asked.with_accuracy(asked.accuracy().min(1e-9)).unwrap_or(*asked);
+    let narrow = |depth: f64| narrow(a, b, depth, asked);
     let mut search = Search {
         a: a.parts(),
         b: b.parts(),
@@ -129,31 +129,31 @@ pub(in crate::measure) fn out(
         options,
         iterations: 0,
     };
-    let mut ways = [search.between_balls(a, b); FOLLOWED];
-    for start in starts.0.into_iter().flatten().chain(search.more_starts(&ways[0])) {
-        let limit = ways[FOLLOWED - 1].norm();
+    let mut translations = [search.between_balls(a, b); FOLLOWED];
+    for start in starts.0.into_iter().flatten().chain(search.more_starts(&translations[0])) {
+        let limit = translations[FOLLOWED - 1].norm();
         if let Some(length) = search.exit(&start, limit) {
-            ways[FOLLOWED - 1] = start.direction * length;
-            ways.sort_by(|v, w| v.norm().total_cmp(&w.norm()));
+            translations[FOLLOWED - 1] = start.direction * length;
+            translations.sort_by(|v, w| v.norm().total_cmp(&w.norm()));
         }
     }
     for k in 0..FOLLOWED {
         // There may be fewer than that, and one as short as can be is enough.
-        let shortest = ways[..k].iter().map(Vector3::norm).fold(f64::INFINITY, f64::min);
-        if k == 0 || ways[k] != ways[k - 1] && shortest - least > narrow(shortest) {
-            ways[k] = search.shrink(ways[k], shortest);
+        let shortest = translations[..k].iter().map(Vector3::norm).fold(f64::INFINITY, f64::min);
+        if k == 0 || translations[k] != translations[k - 1] && shortest - least > narrow(shortest) {
+            translations[k] = search.shrink(translations[k], shortest);
         }
     }
-    let best = ways.into_iter().min_by(|v, w| v.norm().total_cmp(&w.norm())).unwrap_or_default();
+    let best = translations.into_iter().min_by(|v, w| v.norm().total_cmp(&w.norm())).unwrap_or_default();
     let (length, direction) = (best.norm(), best.normalize());
     let (contacts, crowded) = search.contacts(&best, &direction);
     let from = pose_a.translation();
-    let others = ways.iter().filter(|way| way.normalize().dot(&direction) < 0.99);
-    Way {
+    let others = translations.iter().filter(|translation| translation.normalize().dot(&direction) < 0.99);
+    SeparatingTranslation {
         length: length * (1.0 + 8.0 * f64::EPSILON) + 4.0 * f64::EPSILON * search.pose_b.translation().norm(),
         direction,
         contacts: contacts.map(|contact| Contact { x: contact.x + from, y: contact.y + from, ..contact }),
-        tied: crowded || others.into_iter().any(|way| way.norm() <= length + narrow(length)),
+        tied: crowded || others.into_iter().any(|translation| translation.norm() <= length + narrow(length)),
         iterations: search.iterations,
     }
 }
@@ -164,7 +164,7 @@ struct Search<'a> {
     b: &'a [Body],
     pose_a: Pose,
     pose_b: Pose,
-    /// No way out is shorter: proven.
+    /// No separating translation is shorter: proven.
     least: f64,
     margin: f64,
     options: Options<'a>,
@@ -177,7 +177,7 @@ impl Search<'_> {
         (0..len_a).flat_map(move |i| (0..len_b).map(move |j| (i, j)))
     }
 
-    /// The way that separates the circumscribed balls.
+    /// The translation that separates the circumscribed balls.
     fn between_balls(&self, a: &impl Solid, b: &impl Solid) -> Vector3<f64> {
         let (ball_a, ball_b) = (a.circumscribed(), b.circumscribed());
         let (vector, apart, error) = across((&self.pose_a, &ball_a.center), (&self.pose_b, &ball_b.center));
@@ -232,7 +232,7 @@ impl Search<'_> {
     /// is below the limit.
     fn exit(&mut self, start: &Start, limit: f64) -> Option<f64> {
         let n = &start.direction;
-        // Not 0: a way has a direction.
+        // Not 0: a translation has a direction.
         let mut length = start.depth.max(1e-3 * self.margin);
         loop {
             let before = length;
@@ -256,43 +256,43 @@ impl Search<'_> {
     }
 
     /// Whether all pairs are proven apart after a translation, or to touch at most.
-    fn separates(&mut self, way: &Vector3<f64>) -> bool {
-        let (pose, length) = (self.pose_after(way), way.norm());
+    fn separates(&mut self, translation: &Vector3<f64>) -> bool {
+        let (pose, length) = (self.pose_after(translation), translation.norm());
         let pairs = self.pairs();
-        pairs
-            .into_iter()
-            .all(|pair| self.apart(pair, &pose) || length > 0.0 && self.depth_along(pair, &(way / length)) <= length)
+        pairs.into_iter().all(|pair| {
+            self.apart(pair, &pose) || length > 0.0 && self.depth_along(pair, &(translation / length)) <= length
+        })
     }
 
-    /// A way at most as long that separates all pairs as well; not worked out if it does not get as
+    /// One at most as long that separates all pairs as well; not worked out if it does not get as
     /// short as `wanted`.
-    fn shrink(&mut self, mut way: Vector3<f64>, wanted: f64) -> Vector3<f64> {
+    fn shrink(&mut self, mut translation: Vector3<f64>, wanted: f64) -> Vector3<f64> {
         for _ in 0..MAX_ROUNDS {
-            let Some(next) = self.beyond_planes(&way, self.margin).and_then(|(_, found)| found) else { break };
+            let Some(next) = self.beyond_planes(&translation, self.margin).and_then(|(_, found)| found) else { break };
             let mut next = next.v;
-            // Pairs whose planes were left out may be in the way: less far then.
+            // Pairs whose planes were left out may meet: less far then.
             let mut halvings = 0;
-            while next.norm() < way.norm() - self.margin && !self.ended() && !self.separates(&next) {
-                next = if halvings < 3 { (next + way) * 0.5 } else { way };
+            while next.norm() < translation.norm() - self.margin && !self.ended() && !self.separates(&next) {
+                next = if halvings < 3 { (next + translation) * 0.5 } else { translation };
                 halvings += 1;
             }
-            if self.ended() || next.norm() == 0.0 || !(next.norm() < way.norm() - self.margin) {
+            if self.ended() || next.norm() == 0.0 || !(next.norm() < translation.norm() - self.margin) {
                 break;
             }
-            let gained = way.norm() - next.norm();
-            way = next;
+            let gained = translation.norm() - next.norm();
+            translation = next;
             // What is gained falls from round to round.
-            if way.norm() - HOPE * gained > wanted {
+            if translation.norm() - HOPE * gained > wanted {
                 break;
             }
         }
-        way
+        translation
     }
 
     /// The planes between the pairs of parts after a translation, and the shortest translation
     /// beyond them all, by a margin.
-    fn beyond_planes(&mut self, way: &Vector3<f64>, margin: f64) -> Option<(Planes, Option<Shortest>)> {
-        let (pose, length) = (self.pose_after(way), way.norm());
+    fn beyond_planes(&mut self, translation: &Vector3<f64>, margin: f64) -> Option<(Planes, Option<Shortest>)> {
+        let (pose, length) = (self.pose_after(translation), translation.norm());
         let mut planes = Planes::default();
         // The shortest w beyond planes that v is beyond has |w - v|² <= |v|² - |w|²: pairs that are
         // farther do not count.
@@ -318,33 +318,35 @@ impl Search<'_> {
                 let Some(normal) = found.normal else { continue };
                 (normal, found.lower, found.witness_a, found.witness_b)
             };
-            planes.push(Plane { normal, gap, x: x - way, y });
+            planes.push(Plane { normal, gap, x: x - translation, y });
         }
         let mut bounds = [Bound { normal: Vector3::zeros(), floor: 0.0 }; PLANES];
         for (bound, plane) in bounds.iter_mut().zip(planes.all()) {
-            *bound = Bound { normal: plane.normal, floor: plane.normal.dot(way) - plane.gap + margin };
+            *bound = Bound { normal: plane.normal, floor: plane.normal.dot(translation) - plane.gap + margin };
         }
         let found = shortest(&bounds[..planes.len]);
         Some((planes, found))
     }
 
-    /// What holds A back at the end of a way, and whether more does than is needed to.
-    fn contacts(&mut self, way: &Vector3<f64>, direction: &Vector3<f64>) -> ([Contact; 3], bool) {
+    /// What touches at the end of a translation, and whether more does than decides it.
+    fn contacts(&mut self, translation: &Vector3<f64>, direction: &Vector3<f64>) -> ([Contact; 3], bool) {
         let mut contacts = [Contact::default(); 3];
-        contacts[0].pull = *direction;
-        let Some((planes, found)) = self.beyond_planes(way, 0.0) else { return (contacts, false) };
+        contacts[0].weighted_normal = *direction;
+        let Some((planes, found)) = self.beyond_planes(translation, 0.0) else { return (contacts, false) };
         if let Some(nearest) = planes.all().iter().min_by(|p, q| p.gap.total_cmp(&q.gap)) {
             (contacts[0].x, contacts[0].y) = (nearest.x, nearest.y);
         }
-        let Some(found) = found.filter(|found| found.v.norm() > 0.5 * way.norm()) else { return (contacts, true) };
+        let Some(found) = found.filter(|found| found.v.norm() > 0.5 * translation.norm()) else {
+            return (contacts, true);
+        };
         for (contact, (k, weight)) in contacts.iter_mut().zip(found.support()) {
             let Plane { normal, x, y, .. } = planes.all()[k];
-            *contact = Contact { pull: normal * (weight / found.v.norm()), x, y };
+            *contact = Contact { weighted_normal: normal * (weight / found.v.norm()), x, y };
         }
-        contacts.sort_by(|p, q| q.pull.norm().total_cmp(&p.pull.norm()));
+        contacts.sort_by(|p, q| q.weighted_normal.norm().total_cmp(&p.weighted_normal.norm()));
         let holds = |k: usize| found.support().any(|(other, _)| other == k);
         let crowded = planes.all().iter().enumerate().any(|(k, plane)| {
-            let room = plane.normal.dot(&(found.v - way)) + plane.gap;
+            let room = plane.normal.dot(&(found.v - translation)) + plane.gap;
             !holds(k) && room <= self.margin
         });
         (contacts, crowded)

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::body::Body;
-use crate::measure::tests::{at, random_pose, twisted, unit, zoo};
+use crate::measure::tests::{at, random_pose, twisted, zoo};
 use nalgebra::Vector3;
 use sublevel_testkit::Seeded;
 
@@ -21,7 +21,7 @@ fn ball_pairs_on_both_sides() {
         let gaps = [-1.0, -0.1, -1e-3, -1e-6, -1e-9, -1e-12, 0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, 30.0];
         let truth = gaps[(seed % 13) as usize] * small;
         let pose_a = random_pose(&mut random, 3.0 * scale);
-        let direction = unit(&mut random);
+        let direction = random.unit();
         let moved = pose_a.translation() + direction * (ra + rb + truth);
         let pose_b = Pose::from_quaternion(moved, [0.5, 0.5, 0.5, 0.5]).unwrap();
         let answer = cold(&a, &pose_a, &b, &pose_b);
@@ -49,7 +49,7 @@ fn slides_from_touching_to_concentric_are_continuous_and_monotone() {
         let small = a.circumscribed().radius.min(b.circumscribed().radius);
         let turn = random_pose(&mut random, 0.0);
         let (ca, cb) = (*a.interior_point(), turn.transform_point(b.interior_point()));
-        let direction = unit(&mut random);
+        let direction = random.unit();
         let start = 1.2 * (a.circumscribed().radius + b.circumscribed().radius);
         let mut warm = WarmStart::default();
         let mut last: Option<(f64, SignedDistance)> = None;

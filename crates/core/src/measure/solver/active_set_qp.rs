@@ -41,12 +41,14 @@ pub(in crate::measure) const DAMPINGS: [f64; 6] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1,
 /// Most of the curvature along a gradient that is not that of the root of what rises with a power.
 pub(in crate::measure) const MOST_BENT: f64 = 0.9;
 
-/// Longest step, relative to the bodies and to the distance from a centre that values rise from,
-/// that a linearization may mean anything for.
-pub(in crate::measure) const LONGEST: f64 = 0.5;
+/// Longest step of a quadratic program, relative to the bodies and to the distance from a centre
+/// that values rise from, that its linearizations may mean anything for. Twice that of the tangent
+/// plane: the program knows all constraints and goes from edge to edge. `active_sets_follow_alone`
+/// and `stages_of_level_distances_solve_alone` count what is solved with it.
+pub(in crate::measure) const LONGEST_PROGRAM_STEP: f64 = 0.5;
 
 /// Length of a step, in the same measure, that is well within that.
-pub(in crate::measure) const SHORT: f64 = 0.5 * LONGEST;
+pub(in crate::measure) const SHORT: f64 = 0.5 * LONGEST_PROGRAM_STEP;
 
 /// Least damping, relative to the first: rounding tilts faces by about as much.
 pub(in crate::measure) const LEAST: f64 = 1e-9;
@@ -179,7 +181,7 @@ impl Quadratic {
     ) -> Option<Solution> {
         let length = |found: &Option<Solution>| found.as_ref().map_or(f64::INFINITY, |step| length(&step.v.xyz()));
         let mut found = self.solve(a, b);
-        if length(&found) <= LONGEST {
+        if length(&found) <= LONGEST_PROGRAM_STEP {
             return found;
         }
         let hessian = self.hessian;
@@ -187,13 +189,13 @@ impl Quadratic {
             self.hessian = hessian + stiffness * damping;
             found = self.solve(a, b).or(found);
             let least = length(&found);
-            if least <= LONGEST {
+            if least <= LONGEST_PROGRAM_STEP {
                 if i == 0 && least < SHORT {
                     // Along what does not bend a step is as long as the damping is little: of faces
                     // tilted by next to nothing only such a step shows the edges.
                     self.hessian = hessian + stiffness * (damping * (least / SHORT).max(LEAST));
                     let longer = self.solve(a, b);
-                    return if length(&longer) <= LONGEST { longer } else { found };
+                    return if length(&longer) <= LONGEST_PROGRAM_STEP { longer } else { found };
                 }
                 break;
             }

@@ -15,7 +15,7 @@ use crate::measure::solver::initial_guess::{Start, middle};
 use crate::measure::solver::predictor::Drift;
 use crate::measure::solver::step_acceleration::{Correction, Last, Series};
 use crate::measure::solver::tangent_newton::{
-    ALIGNED, Bend, Bracket, Plane, Relative, Response, Side, Step, bracket, moved, newton,
+    ALIGNED, Bracket, Plane, Relative, Response, Side, Step, SurfaceCurvature, bracket, moved, newton,
 };
 use crate::measure::solver::two_point_problem::{Relation, Verdict};
 use crate::polynomial::{Scalar, Simd, WithSimd};
@@ -86,7 +86,7 @@ impl Trace {
         let frame = basis(simd, n);
         let linearized = |side: &Side<'_, f64>, v: V3<f64>| {
             let ((jet, _), local) = (side.jet(simd, v), side.localize(simd, &frame));
-            (Plane::new(simd, &jet, &local), Bend::new(simd, &jet, &local))
+            (Plane::new(simd, &jet, &local), SurfaceCurvature::new(simd, &jet, &local))
         };
         let of_a = linearized(&Side::at_home(simd, a, active[0].into()), x);
         let of_b = linearized(&Side::away(b, active[1].into(), &relative), y);
@@ -135,8 +135,8 @@ pub(in crate::measure) struct Lost {
     /// A point that seems to lie in both, from the centre of A's normalization on, in A's frame,
     /// metres.
     pub(in crate::measure) middle: Option<V3<f64>>,
-    /// Where Newton's method ended without a narrow bracket, which only twice the precision may
-    /// compliance: near contact, where doubles do not tell on which side, or where the normals do
+    /// Where Newton's method ended without a narrow bracket, which only double-double arithmetic
+    /// may prove: near contact, where doubles do not show on which side, or where the normals do
     /// not agree well enough.
     pub(in crate::measure) grazing: Option<Proven>,
 }
@@ -189,14 +189,16 @@ pub(in crate::measure) fn worth_a_bracket([of_x, of_y]: [f64; 2]) -> [f64; 2] {
     [WORTH_A_BRACKET * of_x.min(of_y); 2]
 }
 
-/// Longest move relative to a body's size, be that in metres or in normalized coordinates, that the
-/// linearization may mean anything for.
-pub(in crate::measure) const LONGEST: f64 = 0.25;
+/// Longest move relative to a body's size, be that in metres or in normalized coordinates, that a
+/// linearization in the tangent plane may mean anything for. Longer, Newton's method diverges from
+/// cold starts; shorter, it needs more rounds: `continuation_seeks_alone` counts what it solves
+/// within its limit.
+pub(in crate::measure) const LONGEST_MOVE: f64 = 0.25;
 
 /// The longest moves of a point of A and of a point of B, metres.
 #[inline(always)]
 pub(in crate::measure) fn limits(a: &Body, b: &Body) -> [f64; 2] {
-    [LONGEST * a.trust().reach, LONGEST * b.trust().reach]
+    [LONGEST_MOVE * a.trust().reach, LONGEST_MOVE * b.trust().reach]
 }
 
 /// Curvature that counts as none for bodies with these longest moves, per metre.
@@ -358,9 +360,10 @@ impl<R: Relation> Correct<'_, R> {
             }
             let (local_a, local_b) = (side_a.localize(simd, &at.frame), side_b.localize(simd, &at.frame));
             let (a, b) = (Plane::new(simd, &jet_a, &local_a), Plane::new(simd, &jet_b, &local_b));
-            let (bend_a, bend_b) = (Bend::new(simd, &jet_a, &local_a), Bend::new(simd, &jet_b, &local_b));
+            let (curvature_a, curvature_b) =
+                (SurfaceCurvature::new(simd, &jet_a, &local_a), SurfaceCurvature::new(simd, &jet_b, &local_b));
             let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
-            let (of_a, of_b) = ((&a, &bend_a), (&b, &bend_b));
+            let (of_a, of_b) = ((&a, &curvature_a), (&b, &curvature_b));
             let (mut step, response) =
                 self.relation.newton(simd, of_a, of_b, &at.frame, difference, flattest(self.limits));
             let near = step.within(simd, worth_a_bracket(self.limits));
@@ -420,7 +423,7 @@ impl<R: Relation> Correct<'_, R> {
                 return Err(Lost::after(rounds));
             }
             // The linearization means nothing farther away.
-            let part = part.min(LONGEST / length);
+            let part = part.min(LONGEST_MOVE / length);
             if part < 1.0 {
                 step.shorten(part);
             }

@@ -17,7 +17,7 @@ use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::frames::vector::V3;
 use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::active_constraints::{ActiveConstraints, MAX_ACTIVE};
-use crate::measure::solver::continuation::LONGEST;
+use crate::measure::solver::continuation::LONGEST_MOVE;
 use crate::measure::solver::linear_systems::solve;
 use crate::measure::solver::step_acceleration::{Series, Taken, across, along, tangents};
 use crate::measure::solver::tangent_newton::ALIGNED;
@@ -68,16 +68,21 @@ impl Active {
 
     /// The constraints whose multipliers times gradients at v are largest: those of thin bodies
     /// have steep ones.
-    pub(in crate::measure) fn from_forces(body: &Posed<'_>, v: &Vector3<f64>, multipliers: &Multipliers) -> Self {
-        let mut forces = *multipliers;
-        let carried = forces.iter_mut().enumerate().take(body.len()).filter(|(_, force)| **force > 0.0);
-        carried.for_each(|(i, force)| *force *= body.jet(i, v).gradient.norm());
-        let mut active = Self::from_multipliers(&forces);
+    pub(in crate::measure) fn from_weighted_multipliers(
+        body: &Posed<'_>,
+        v: &Vector3<f64>,
+        multipliers: &Multipliers,
+    ) -> Self {
+        let mut weighted = *multipliers;
+        let carried = weighted.iter_mut().enumerate().take(body.len()).filter(|(_, residual)| **residual > 0.0);
+        carried.for_each(|(i, residual)| *residual *= body.jet(i, v).gradient.norm());
+        let mut active = Self::from_multipliers(&weighted);
         (0..active.len).for_each(|k| active.multiplier[k] = multipliers[active.index[k]]);
         active
     }
 
-    /// The constraints that a point near the surface is at, as far as they carry a force `target`.
+    /// The constraints that a point near the surface is at, as far as they carry a dual gradient
+    /// `target`.
     pub(in crate::measure) fn near(body: &Posed<'_>, v: &Vector3<f64>, target: &Vector3<f64>) -> Self {
         let mut values = [f64::NEG_INFINITY; crate::body::MAX_CONSTRAINTS];
         (0..body.len()).for_each(|i| values[i] = body.jet(i, v).value);
@@ -269,8 +274,8 @@ const PATIENCE: u32 = 6;
 /// is about its square.
 pub(in crate::measure) const WORTH_A_BRACKET: f64 = 1e-3;
 
-/// How far forces lead where there is no curvature, relative to the bodies and before the step is
-/// cut.
+/// How far residuals lead where there is no curvature, relative to the bodies and before the step
+/// is cut.
 const FARTHEST: f64 = 1e3;
 
 /// Whether Newton's steps still shrink: fast near a solution, and those that do not are not near
@@ -337,7 +342,7 @@ impl DistanceNewton {
                 return step;
             };
             let moved = (self.x - before.0).norm() + (self.y - before.1).norm();
-            if !turned && length > LONGEST && moved < ARRIVED * (self.x - self.y).norm() {
+            if !turned && length > LONGEST_MOVE && moved < ARRIVED * (self.x - self.y).norm() {
                 self.turn(pair);
                 turned = true;
             }
@@ -359,7 +364,7 @@ impl DistanceNewton {
                     continue;
                 }
             }
-            if pace.has_diverged(step, length, LONGEST) || pace.ends_with(length) {
+            if pace.has_diverged(step, length, LONGEST_MOVE) || pace.ends_with(length) {
                 return step;
             }
         }
@@ -403,11 +408,11 @@ impl DistanceNewton {
         (At::new(&pair.a, &self.a, &self.x), At::new(&pair.b, &self.b, &self.y))
     }
 
-    /// The curvature by which forces along the tangents alone lead [`FARTHEST`]. Added to what
+    /// The curvature by which residuals along the tangents alone lead [`FARTHEST`]. Added to what
     /// there is it vanishes with them, which leaves Newton's method as fast as it is.
-    fn stiffness(pair: &Pair<'_>, tangents: [V3<f64>; 2], force: &Vector3<f64>) -> f64 {
-        let force = across(Scalar, tangents, along(Scalar, tangents, (*force).into())).into();
-        pair.a.relative_length(&force).max(pair.b.relative_length(&force)) / FARTHEST
+    fn stiffness(pair: &Pair<'_>, tangents: [V3<f64>; 2], residual: &Vector3<f64>) -> f64 {
+        let residual = across(Scalar, tangents, along(Scalar, tangents, (*residual).into())).into();
+        pair.a.relative_length(&residual).max(pair.b.relative_length(&residual)) / FARTHEST
     }
 
     /// One Newton step; its length relative to the bodies, or none if the system is singular.
@@ -424,11 +429,11 @@ impl DistanceNewton {
         let moved = Matrix3::identity() + a.hessian * distance;
         // u + w = 0.
         let (by_x, by_distance) = (a.hessian + b.hessian * moved, -b.hessian * n);
-        let force = -(a.sum + b.sum);
-        let right = force - b.hessian * offset;
+        let residual = -(a.sum + b.sum);
+        let right = residual - b.hessian * offset;
         let free = tangents(&a.gradient[..la], &b.gradient[..lb]);
         // Where a corrected step has led there may be no curvature at all.
-        let stiff = free.filter(|_| series.is_corrected()).map_or(0.0, |free| Self::stiffness(pair, free, &force));
+        let stiff = free.filter(|_| series.is_corrected()).map_or(0.0, |free| Self::stiffness(pair, free, &residual));
         for i in 0..3 {
             for j in 0..3 {
                 m[i][j] = by_x[(i, j)];
@@ -468,7 +473,7 @@ impl DistanceNewton {
         let dn = -(n + a.sum) - a.hessian * dx - of_a;
         let bent = a.hessian + b.hessian;
         // A longer step leaves where the linearization means anything.
-        let Taken { more, share: damping, length } = series.take(free, &dx, (&force, &bent), LONGEST, |more| {
+        let Taken { more, share: damping, length } = series.take(free, &dx, (&residual, &bent), LONGEST_MOVE, |more| {
             pair.a.relative_length(&(dx + more)).max(pair.b.relative_length(&(dy + more)))
         });
         let (dx, dy, dn) = (dx + more, dy + more, dn - a.hessian * more);

@@ -11,7 +11,9 @@
 
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::solver::active_constraints::MAX_ACTIVE;
-use crate::measure::solver::active_set_qp::{CENTER, DAMPINGS, Jets, LONGEST, MOST_BENT, Quadratic, TO_CENTER};
+use crate::measure::solver::active_set_qp::{
+    CENTER, DAMPINGS, Jets, LONGEST_PROGRAM_STEP, MOST_BENT, Quadratic, TO_CENTER,
+};
 use crate::measure::solver::kkt_newton::{Active, At, Pace, WORTH_A_BRACKET};
 use crate::measure::solver::step_acceleration::{Series, Taken, tangents};
 use crate::measure::solver::tangent_newton::ALIGNED;
@@ -21,8 +23,10 @@ use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 const MAX_STEPS: u32 = 24;
 
 /// Length of a step, relative to the bodies and to the distance from A's interior point, after
-/// which values may still fall by orders of magnitude.
-const FAR: f64 = 0.1;
+/// which values may still fall by orders of magnitude, as a power of the distance. Larger, Newton's
+/// steps are a (d - 1)-th part of the way: `stages_of_level_distances_solve_alone` counts what is
+/// solved.
+const POWER_LAW_STEP: f64 = 0.1;
 
 /// Newton iterates of the level-distance system.
 #[derive(Clone, Copy, Debug)]
@@ -59,7 +63,7 @@ impl LevelNewton {
             if stop(step - 1) {
                 return Ended { steps: step - 1, settled: false };
             }
-            let Some(length) = self.step(pair, &mut s, last > FAR, &mut series) else {
+            let Some(length) = self.step(pair, &mut s, last > POWER_LAW_STEP, &mut series) else {
                 // Where both are flat the system is singular, but the point at hand with its
                 // multipliers may do.
                 accept(self);
@@ -131,7 +135,7 @@ impl LevelNewton {
         let free = free.filter(|_| same && self.a.len == 1);
         let force = -of_a.gradient(&self.a);
         let Taken { more, share, length } =
-            series.take(free, &dx, (&force, &hessian), LONGEST, |more| length(&(dx + more)));
+            series.take(free, &dx, (&force, &hessian), LONGEST_PROGRAM_STEP, |more| length(&(dx + more)));
         self.x += (dx + more) * share;
         *s += (found.v.w * scale - *s) * share;
         (self.a, self.b) = (found.a, found.b.scaled(scale));

@@ -85,18 +85,17 @@ impl Shortest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::tests::unit;
     use sublevel_testkit::Seeded;
 
     #[test]
     fn nothing_within_the_bounds_is_shorter() {
         for seed in 0..2000 {
             let mut random = Seeded(seed);
-            let inside = unit(&mut random) * (2.0 * random.signed());
+            let inside = random.unit() * (2.0 * random.signed());
             let count = 1 + random.next() as usize % 20;
             let bounds: Vec<Bound> = (0..count)
                 .map(|_| {
-                    let normal = unit(&mut random);
+                    let normal = random.unit();
                     Bound { normal, floor: normal.dot(&inside) - random.signed().abs() }
                 })
                 .collect();

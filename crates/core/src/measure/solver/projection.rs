@@ -108,7 +108,7 @@ pub(in crate::measure) struct Trial {
     pub(in crate::measure) y: Vector3<f64>,
     pub(in crate::measure) multipliers: Multipliers,
     /// `Σ λ_i ∇g_i(y)`.
-    pub(in crate::measure) pull: Vector3<f64>,
+    pub(in crate::measure) dual_gradient: Vector3<f64>,
 }
 
 /// Most steps of [`solve_single`] before, and after each iterate of, the interior-point method.
@@ -144,8 +144,8 @@ pub(in crate::measure) fn solve_single(
             attempt = iterate.gap / gap * 1e-2;
             let mut multipliers = [0.0; MAX_CONSTRAINTS];
             multipliers[..body.len()].copy_from_slice(iterate.multipliers);
-            let pull = body.weighted_gradient(iterate.v, &multipliers);
-            let done = accept(&Trial { y: *iterate.v, multipliers, pull });
+            let dual_gradient = body.weighted_gradient(iterate.v, &multipliers);
+            let done = accept(&Trial { y: *iterate.v, multipliers, dual_gradient });
             steps.active = held(&multipliers);
             if done || steps.run(*iterate.v, &mut count, &mut exhausted, &mut accept) {
                 return ControlFlow::Break(());
@@ -192,8 +192,8 @@ impl Steps<'_> {
             }
             let jets = &jets[..self.body.len()];
             if step > 0 {
-                let pull = jets.iter().zip(&multipliers).map(|(jet, m)| jet.gradient * *m).sum();
-                if (last < WORTH_A_BRACKET || step % 4 == 0) && accept(&Trial { y, multipliers, pull }) {
+                let dual_gradient = jets.iter().zip(&multipliers).map(|(jet, m)| jet.gradient * *m).sum();
+                if (last < WORTH_A_BRACKET || step % 4 == 0) && accept(&Trial { y, multipliers, dual_gradient }) {
                     return true;
                 }
                 *count += 1;

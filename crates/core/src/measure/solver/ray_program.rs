@@ -13,7 +13,7 @@
 
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::options::Options;
-use crate::measure::solver::active_set_qp::{Jets, LONGEST, Quadratic};
+use crate::measure::solver::active_set_qp::{Jets, LONGEST_PROGRAM_STEP, Quadratic};
 use crate::measure::solver::barrier_programs::near_boundary;
 use crate::measure::solver::kkt_newton::{Active, MAX_STEPS, Pace, WORTH_A_BRACKET};
 use crate::measure::solver::step_acceleration::{Series, Taken, tangents};
@@ -119,9 +119,10 @@ pub(in crate::measure) struct ReachNewton {
     length: f64,
 }
 
-/// Length of a step relative to the bodies, after which the other Newton's method converges from
-/// where it has led.
-const NEAR: f64 = 0.15;
+/// Length of a step relative to the bodies, after which Newton's method for the distance converges
+/// from where the ray's has led. Larger, its iterations are in vain; smaller, it is not tried:
+/// `support_tables_start_quadratic_programs` counts what is solved.
+const HANDOVER_STEP: f64 = 0.15;
 
 impl ReachNewton {
     /// The first iterate; none if the start is of no use for u.
@@ -165,7 +166,7 @@ impl ReachNewton {
             if (length < WORTH_A_BRACKET || step % 4 == 0) && accept(self) {
                 return step;
             }
-            if pace.has_diverged(step, length, LONGEST) || pace.ends_with(length) {
+            if pace.has_diverged(step, length, LONGEST_PROGRAM_STEP) || pace.ends_with(length) {
                 return step;
             }
         }
@@ -174,7 +175,7 @@ impl ReachNewton {
 
     /// Whether the last step shows that the solution is near.
     pub(in crate::measure) fn is_near(&self) -> bool {
-        self.length < NEAR
+        self.length < HANDOVER_STEP
     }
 
     /// One Newton step; its length relative to the bodies, or none if it leads nowhere.
@@ -195,9 +196,9 @@ impl ReachNewton {
         let (dx, dy) = (found.v.xyz(), found.v.xyz() - u * found.v.w);
         let same = self.a.bits() == found.a.bits() && self.b.bits() == found.b.bits();
         let free = tangents(&of_a.gradients(&self.a)[..self.a.len], &of_b.gradients(&self.b)[..self.b.len]);
-        let force = -(of_a.gradient(&self.a) + of_b.gradient(&self.b));
+        let residual = -(of_a.gradient(&self.a) + of_b.gradient(&self.b));
         let Taken { more, share, length } =
-            series.take(free.filter(|_| same), &dx, (&force, &(bent_a + bent_b)), LONGEST, |more| {
+            series.take(free.filter(|_| same), &dx, (&residual, &(bent_a + bent_b)), LONGEST_PROGRAM_STEP, |more| {
                 pair.a.relative_length(&(dx + more)).max(pair.b.relative_length(&(dy + more)))
             });
         let (dx, dy) = ((dx + more) * share, (dy + more) * share);

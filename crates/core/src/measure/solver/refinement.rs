@@ -116,7 +116,7 @@ impl SharpBody<'_> {
 
     /// The point moved into the body against the gradients of violated constraints; none if that
     /// does not lead in.
-    fn pull_in(&self, v: &Twos) -> Option<Twos> {
+    fn move_inside(&self, v: &Twos) -> Option<Twos> {
         let mut point = *v;
         for _ in 0..6 {
             let worst = (0..self.posed.len())
@@ -329,7 +329,7 @@ impl<'a> SharpPair<'a> {
         let length = dot(&n, &n).sqrt();
         let bound = (dot(&n, &minus(x, y)) - falls) / length;
         let slack = 64.0 * UNIT * (doubles(x).norm() + doubles(y).norm() + falls.double().abs());
-        let (upper, p, q) = match (self.a.pull_in(x), self.b.pull_in(y)) {
+        let (upper, p, q) = match (self.a.move_inside(x), self.b.move_inside(y)) {
             (Some(p), Some(q)) => {
                 let apart = minus(&p, &q);
                 ((dot(&apart, &apart).sqrt().double() * (1.0 + 64.0 * UNIT)).next_up(), p, q)
@@ -422,20 +422,20 @@ impl<'a> SharpPair<'a> {
     }
 
     fn level_bracket(&self, x: &Twos, of_a: &SharpActive, of_b: &SharpActive) -> SharpLevel {
-        let (mut value, mut pull, mut total) = (Two::ZERO, [Two::ZERO; 3], Two::ZERO);
+        let (mut value, mut dual_gradient, mut total) = (Two::ZERO, [Two::ZERO; 3], Two::ZERO);
         let (mut error, mut slope_error) = (0.0, 0.0);
         for (i, weight) in of_a.positive() {
             let jet = self.a.jet(i, x);
             value += jet.value * weight;
-            pull = plus(&pull, &times(&jet.gradient, weight));
+            dual_gradient = plus(&dual_gradient, &times(&jet.gradient, weight));
             total += weight;
             error += weight.double() * (jet.value_error + 64.0 * UNIT * jet.value.double().abs());
             slope_error += weight.double() * (jet.z_gradient_error * self.a.rounded.norm() + 64.0 * UNIT * jet.size);
         }
         error += 2.0 * slope_error * self.b.posed.reach(&doubles(x));
-        let fall = self.b.descent(x, &pull, of_b);
+        let fall = self.b.descent(x, &dual_gradient, of_b);
         let lower = ((value - fall - Two::from(error * (1.0 + 1e-12))) / total).double();
-        let upper = self.b.pull_in(x).map(|x| (self.a.value_upper(&x), x));
+        let upper = self.b.move_inside(x).map(|x| (self.a.value_upper(&x), x));
         let (upper, point) = upper.unwrap_or((f64::INFINITY, *x));
         SharpLevel {
             lower: if lower.is_finite() { lower.next_down() } else { f64::NEG_INFINITY },

@@ -33,7 +33,7 @@ pub(in crate::measure) enum Stage {
     Balls,
     /// Bounds by the boxes of the normalized coordinates.
     Slabs,
-    /// A first look around all directions for the shortest way out of an overlap.
+    /// A first look around all directions for the least depth.
     DirectionSampling,
     /// Search around a direction for a better one, where edges stop Newton's method.
     CompassSearch,

@@ -19,8 +19,10 @@ use nalgebra::{Matrix3, Vector3};
 /// Share of a step in the one before it, below which Newton's method is as fast as it can be.
 const FAST: f64 = 0.55;
 
-/// Length of a step relative to the bodies, beyond which steps are not of a series.
-const NEAR: f64 = 0.05;
+/// Length of a step relative to the bodies, beyond which steps are not of a series: surfaces are a
+/// power of the way near the solution only. `steps_that_converge_fast_are_newtons` pins that far
+/// steps are left alone.
+const SERIES_STEP: f64 = 0.05;
 
 /// Change of the step along the way, relative to that, of slopes that vanish with a power.
 const SLOW: std::ops::Range<f64> = 0.06..0.6;
@@ -47,8 +49,9 @@ const BACK: f64 = -0.9;
 /// Length of one relative to the last step, if it leads back about as far.
 const AS_FAR: std::ops::Range<f64> = 0.5..2.0;
 
-/// Length of steps relative to the bodies, beyond which they may lead to and fro.
-const FAR: f64 = 0.1;
+/// Length of steps relative to the bodies, beyond which they may lead to and fro: twice that of a
+/// series. `steps_to_and_fro_meet_between` pins that such steps are cut.
+const RETURNING_STEP: f64 = 0.1;
 
 /// A vector along the tangents.
 type V2 = [f64; 2];
@@ -89,7 +92,7 @@ impl Series {
     #[inline(always)]
     pub(in crate::measure) fn may_have_to_be_corrected(&self, newton: V2, length: f64) -> bool {
         let last = dot(self.last.newton, self.last.newton);
-        last > 0.0 && (self.last.corrected || length < NEAR && self.is_slow(newton))
+        last > 0.0 && (self.last.corrected || length < SERIES_STEP && self.is_slow(newton))
     }
 
     /// Whether the last step has been corrected.
@@ -98,20 +101,20 @@ impl Series {
         self.last.corrected
     }
 
-    /// What to add to Newton's step along these tangents, made from a slope by `give`.
+    /// What to add to Newton's step along these tangents, made from a slope by `compliance`.
     #[inline(always)]
     pub(in crate::measure) fn correction<S: Simd>(
         &self,
         simd: S,
         tangents: [V3<f64>; 2],
         (newton, slope): (V2, V2),
-        give: Symmetric2<f64>,
+        compliance: Symmetric2<f64>,
     ) -> Correction {
         let Last { newton: last, taken, slope: from, corrected } = self.last;
         let last = along(simd, tangents, across(simd, self.tangents, last));
         let taken = along(simd, tangents, across(simd, self.tangents, taken));
         let from = along(simd, tangents, across(simd, self.tangents, from));
-        correction(newton, slope, give, &Last { newton: last, taken, slope: from, corrected })
+        correction(newton, slope, compliance, &Last { newton: last, taken, slope: from, corrected })
     }
 
     /// Takes down a step along these tangents.
@@ -130,28 +133,28 @@ impl Series {
     /// [`part`].
     #[inline(always)]
     pub(in crate::measure) fn part<S: Simd>(&self, simd: S, tangents: [V3<f64>; 2], step: V2, length: f64) -> f64 {
-        if length > FAR && !self.last.corrected {
+        if length > RETURNING_STEP && !self.last.corrected {
             part(across(simd, self.tangents, self.last.taken), across(simd, tangents, step))
         } else {
             1.0
         }
     }
 
-    /// What to take of a step that is made from a force by a Hessian: no more than is this long by
-    /// `length`, which measures the step with what is added to it. Without tangents to move along,
-    /// or where a step leads out of the series, that ends and nothing is added.
+    /// What to take of a step that is made from a gradient by a Hessian: no more than is this long
+    /// by `length`, which measures the step with what is added to it. Without tangents to move
+    /// along, or where a step leads out of the series, that ends and nothing is added.
     pub(in crate::measure) fn take(
         &mut self,
         tangents: Option<[V3<f64>; 2]>,
         step: &Vector3<f64>,
-        (force, hessian): (&Vector3<f64>, &Matrix3<f64>),
+        (gradient, hessian): (&Vector3<f64>, &Matrix3<f64>),
         longest: f64,
         length: impl Fn(&Vector3<f64>) -> f64,
     ) -> Taken {
         let newton = length(&Vector3::zeros());
         let (way, was_corrected) = (self.way, self.is_corrected());
         let more = match tangents.filter(|_| newton <= longest || self.is_corrected()) {
-            Some(tangents) => self.corrected(tangents, step, newton, force, hessian),
+            Some(tangents) => self.corrected(tangents, step, newton, gradient, hessian),
             None => {
                 *self = Self::default();
                 Vector3::zeros()
@@ -159,7 +162,7 @@ impl Series {
         };
         let taken = length(&more);
         let step: V3<f64> = (step + more).into();
-        let part = if taken > FAR && !was_corrected { part(way, step) } else { 1.0 };
+        let part = if taken > RETURNING_STEP && !was_corrected { part(way, step) } else { 1.0 };
         if taken > longest || part < 1.0 {
             *self = Self::default();
         }
@@ -174,11 +177,11 @@ impl Series {
         tangents: [V3<f64>; 2],
         step: &Vector3<f64>,
         length: f64,
-        force: &Vector3<f64>,
+        gradient: &Vector3<f64>,
         hessian: &Matrix3<f64>,
     ) -> Vector3<f64> {
         let simd = Scalar;
-        let (newton, slope) = (along(simd, tangents, (*step).into()), along(simd, tangents, (*force).into()));
+        let (newton, slope) = (along(simd, tangents, (*step).into()), along(simd, tangents, (*gradient).into()));
         let mut correction = Correction::default();
         if self.may_have_to_be_corrected(newton, length) {
             let [t, u] = tangents.map(Vector3::from);
@@ -249,13 +252,13 @@ pub(in crate::measure) struct Correction {
     pub(in crate::measure) shorter: V2,
 }
 
-/// What to add to Newton's step, which is `give` times the slope or nearly so.
+/// What to add to Newton's step, which is `compliance` times the slope or nearly so.
 #[cold]
-pub(in crate::measure) fn correction(newton: V2, slope: V2, give: Symmetric2<f64>, last: &Last) -> Correction {
+pub(in crate::measure) fn correction(newton: V2, slope: V2, compliance: Symmetric2<f64>, last: &Last) -> Correction {
     // Where both surfaces are flat the one direction says how far to go in the other.
     let most = if last.corrected { FARTHER * dot(last.taken, last.taken).sqrt() } else { f64::INFINITY };
     let mut correction = Correction::default();
-    for direction in principal(give) {
+    for direction in principal(compliance) {
         let [step, last_step, way] = [newton, last.newton, last.taken].map(|v| dot(v, direction));
         let change = (last_step - step) / way;
         let fall = (dot(slope, direction) / dot(last.slope, direction)).abs();
@@ -318,7 +321,7 @@ mod tests {
 
         /// Newton's step from a point, its matrix and the slope.
         fn newton(&self, at: V2) -> (V2, Symmetric2<f64>, V2) {
-            let (mut step, mut give, mut slope) = ([0.0; 2], [0.0; 3], [0.0; 2]);
+            let (mut step, mut compliance, mut slope) = ([0.0; 2], [0.0; 3], [0.0; 2]);
             for (k, d) in self.directions().into_iter().enumerate() {
                 let u = dot(at, d);
                 let of = -(u.abs().powf(self.power[k]).copysign(u) - self.tilt[k]);
@@ -327,24 +330,24 @@ mod tests {
                     slope[i] += of * d[i];
                     step[i] += of * inverse * d[i];
                 }
-                give[0] += inverse * d[0] * d[0];
-                give[1] += inverse * d[0] * d[1];
-                give[2] += inverse * d[1] * d[1];
+                compliance[0] += inverse * d[0] * d[0];
+                compliance[1] += inverse * d[0] * d[1];
+                compliance[2] += inverse * d[1] * d[1];
             }
-            (step, give, slope)
+            (step, compliance, slope)
         }
 
         /// Steps until the slope is below 1e-9 of the first one's scale.
         fn steps(&self, mut at: V2, pace: bool) -> u32 {
             let mut last: Option<Last> = None;
             for count in 0..200 {
-                let (newton, give, slope) = self.newton(at);
+                let (newton, compliance, slope) = self.newton(at);
                 if dot(slope, slope).sqrt() < 1e-9 {
                     return count;
                 }
                 let mut taken = newton;
                 if let Some(last) = last.as_ref().filter(|_| pace) {
-                    let Correction { longer, shorter } = correction(newton, slope, give, last);
+                    let Correction { longer, shorter } = correction(newton, slope, compliance, last);
                     taken = [0, 1].map(|i| newton[i] + longer[i] + shorter[i]);
                 }
                 let length = dot(taken, taken).sqrt();
@@ -402,9 +405,9 @@ mod tests {
         assert!(!series.may_have_to_be_corrected([0.01, 0.001], 0.01), "much shorter");
         assert!(!series.may_have_to_be_corrected([0.08, 0.001], 0.08), "far");
         assert!(series.may_have_to_be_corrected([0.08, 0.001], 0.01), "hardly shorter");
-        let give = [1.0, 0.0, 1.0];
-        assert_eq!(correction([0.01, 0.001], [0.01, 0.001], give, &last), Correction::default());
+        let compliance = [1.0, 0.0, 1.0];
+        assert_eq!(correction([0.01, 0.001], [0.01, 0.001], compliance, &last), Correction::default());
         // As much shorter as those of a power, but from slopes of none.
-        assert_eq!(correction([0.07, 0.0], [0.07, 0.0], give, &last), Correction::default());
+        assert_eq!(correction([0.07, 0.0], [0.07, 0.0], compliance, &last), Correction::default());
     }
 }

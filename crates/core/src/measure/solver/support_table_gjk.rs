@@ -58,7 +58,7 @@ mod tests {
     use crate::body::Body;
     use crate::measure::Pose;
     use crate::measure::frames::query_frame::Pair;
-    use crate::measure::tests::{at, random_pose, unit};
+    use crate::measure::tests::{at, random_pose};
     use nalgebra::Vector3;
     use sublevel_testkit::Seeded;
 
@@ -94,7 +94,7 @@ mod tests {
             let (a, b) = (cuboid(1.0, 0.8, 0.6), cuboid(0.5, 0.4, 0.3));
             let pose = random_pose(&mut random, 3.0);
             let pair = Pair::new(&a, &Pose::identity(), &b, &pose);
-            let found = approach(&pair, &unit(&mut random));
+            let found = approach(&pair, &random.unit());
             assert!(found.common.is_none(), "three metres apart");
             // Alternating projections between the boxes, a linear rate.
             let clamp = |v: Vector3<f64>, h: [f64; 3]| Vector3::from_fn(|i, _| v[i].clamp(-h[i], h[i]));
@@ -117,7 +117,7 @@ mod tests {
             let (a, b) = (cuboid(1.0, 0.8, 0.6), Body::cylinder("can", 0.4, 0.5).unwrap());
             let pose = random_pose(&mut random, 0.5);
             let pair = Pair::new(&a, &Pose::identity(), &b, &pose);
-            let common = approach(&pair, &unit(&mut random)).common.expect("half a metre apart");
+            let common = approach(&pair, &random.unit()).common.expect("half a metre apart");
             assert!(pair.common(&common), "seed {seed}");
         }
     }

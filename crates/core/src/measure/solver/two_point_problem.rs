@@ -6,7 +6,9 @@ use crate::measure::frames::pose::Pose;
 use crate::measure::frames::vector::{M3, V3, add, add_scaled, dot, subtract};
 use crate::measure::solver::initial_guess::{Start, facing, meeting};
 use crate::measure::solver::stop_criterion::StopCriterion;
-use crate::measure::solver::tangent_newton::{ALIGNED, Bend, Bracket, Plane, Relative, Response, Step, newton};
+use crate::measure::solver::tangent_newton::{
+    ALIGNED, Bracket, Plane, Relative, Response, Step, SurfaceCurvature, newton,
+};
 use crate::polynomial::Simd;
 
 /// A measure of two bodies that is attained by a point x of A and a point y of B with opposite
@@ -31,8 +33,8 @@ pub(in crate::measure) trait Relation: Copy {
     fn newton<S: Simd>(
         &self,
         simd: S,
-        a: (&Plane<f64>, &Bend<f64>),
-        b: (&Plane<f64>, &Bend<f64>),
+        a: (&Plane<f64>, &SurfaceCurvature<f64>),
+        b: (&Plane<f64>, &SurfaceCurvature<f64>),
         _frame: &M3<f64>,
         difference: V3<f64>,
         smallest: f64,

@@ -1,6 +1,6 @@
 //! Unions against loops over the pairs of their parts.
 
-use super::{random_pose, twisted, unit};
+use super::{random_pose, twisted};
 use crate::body::{Body, Compound};
 use crate::measure::growth::growth_bound;
 use crate::measure::level::level_bound;
@@ -33,8 +33,8 @@ fn the_closest_parts_count() {
         let pose_a = random_pose(&mut random, 1.0);
         let options = Options::default();
         let mut warm = WarmStart::default();
-        let start = unit(&mut random) * 6.0;
-        let step = unit(&mut random) * 0.2;
+        let start = random.unit() * 6.0;
+        let step = random.unit() * 0.2;
         for k in 0..5 {
             let place = pose_a.translation() + start + step * f64::from(k);
             let pose_b = Pose::from_quaternion(place, [0.5, 0.5, -0.5, 0.5]).unwrap();
@@ -84,7 +84,7 @@ fn scene(seed: u64) -> (&'static Compound, &'static Compound, Pose, Pose) {
     let far = [0.0, 0.7, 1.5, 6.0][(seed % 4) as usize];
     let pose_a = random_pose(&mut random, 3.0);
     let pose_b = random_pose(&mut random, 1.0);
-    let place = pose_a.translation() + unit(&mut random) * far;
+    let place = pose_a.translation() + random.unit() * far;
     (a, b, pose_a, pose_b.with_translation(place))
 }
 
@@ -153,7 +153,7 @@ fn cheap_bounds_are_bounds() {
     assert!(useful > 20, "{useful}");
 }
 
-/// Length of the way out along n, from samples of what lies on it.
+/// Length of a separating translation along n, from samples.
 fn sampled_exit(
     (a, pose_a): (&Compound, &Pose),
     (b, pose_b): (&Compound, &Pose),
@@ -167,7 +167,7 @@ fn sampled_exit(
 }
 
 #[test]
-fn ways_out_separate_and_few_are_shorter() {
+fn translations_separate_and_few_are_shorter() {
     let options = Options::default();
     let (mut overlaps, mut narrow, mut missed) = (0, 0, 0);
     for seed in 0..120 {
@@ -190,7 +190,7 @@ fn ways_out_separate_and_few_are_shorter() {
         assert_ne!(overlap(a, &moved, b, &pose_b, &options, &mut WarmStart::default()), Decision::Yes, "{label}");
         let mut random = Seeded(seed);
         for _ in 0..60 {
-            let n = unit(&mut random);
+            let n = random.unit();
             let shorter = sampled_exit((a, &pose_a), (b, &pose_b), &n, found.upper);
             assert!(shorter.is_none_or(|t| t >= found.lower), "{label}: {shorter:?} along {n:?}");
             missed += u32::from(shorter.is_some_and(|t| t < 0.95 * found.upper));
@@ -206,7 +206,7 @@ fn signed_distances_continue_distances() {
     for seed in 0..60 {
         let (a, b, pose_a, pose_b) = scene(seed);
         let mut random = Seeded(seed);
-        let step = unit(&mut random) * 0.15;
+        let step = random.unit() * 0.15;
         let mut warm = WarmStart::default();
         let mut before: Option<SignedDistance> = None;
         for k in 0..30 {
@@ -344,7 +344,7 @@ fn normals_jump_only_where_ties_are_told() {
     let (mut changes, mut tied, mut queries) = (0, 0, 0);
     for seed in 0..40 {
         let (a, b, pose_a, pose_b) = scene(4 * seed + 3);
-        let along = unit(&mut Seeded(seed)) * 8.0;
+        let along = Seeded(seed).unit() * 8.0;
         let at = |t: f64| {
             let pose = pose_b.with_translation(pose_b.translation() + along * t);
             crate::measure::distance(a, &pose_a, b, &pose, &options, &mut WarmStart::default())

@@ -1,6 +1,6 @@
-//! A first look around all directions for the shortest way out of an overlap, by the outlines of
-//! the bodies. It proves nothing: it only spares the proof from being about a way that is not the
-//! shortest.
+//! A first look around all directions for the shortest translation out of an overlap, by the
+//! outlines of the bodies. It proves nothing: it only spares the proof from being about one that is
+//! not the shortest.
 
 use crate::measure::frames::query_frame::Pair;
 use crate::measure::frames::vector::{apply_transposed, dot, rows};

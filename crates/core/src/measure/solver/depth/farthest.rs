@@ -24,7 +24,7 @@ use nalgebra::Vector3;
 pub(super) struct Sought {
     /// The unit vector, body frame.
     pub(super) n: Vector3<f64>,
-    /// What the point may lack, metres.
+    /// Largest support deficit of the point, metres.
     pub(super) tolerance: f64,
 }
 
@@ -149,18 +149,19 @@ fn step<S: Simd, N: Number<S>>(simd: S, jet: &NumberJet<N>, e: V3<N>) -> (V3<N>,
     let bend = N::splat(simd, 0.5) * dot(dz, apply_symmetric(&jet.hessian, dz));
     // The surface bends away from the tangent plane by as much.
     let dz = add_scaled(dz, -bend / square, g);
-    let short = dot(dz, dz).le(N::splat(simd, LONGEST * LONGEST));
+    let short = dot(dz, dz).le(N::splat(simd, LONGEST_SUPPORT_STEP * LONGEST_SUPPORT_STEP));
     (dz, N::and(simd, short, N::and(simd, positive.le(along), positive.le(next))))
 }
 
-/// Longest step, in normalized coordinates, that the linearization may mean anything for.
-const LONGEST: f64 = 0.5;
+/// Longest step, in normalized coordinates, where a body has size about 1, that the linearization
+/// of a support point may mean anything for. Longer, the point may leave the body's side; what is
+/// not found is left to other methods: `support_points_are_found_alone` counts how many are.
+const LONGEST_SUPPORT_STEP: f64 = 0.5;
 
 #[cfg(test)]
 mod tests {
     use super::{Farthest, Sought};
     use crate::body::Body;
-    use crate::measure::tests::unit;
     use crate::polynomial::dispatch;
     use nalgebra::Vector3;
     use sublevel_testkit::Seeded;
@@ -179,7 +180,7 @@ mod tests {
             };
             let body = body.unwrap();
             let tolerance = 10_f64.powi(-3 - (seed % 6) as i32);
-            let sought: Vec<Sought> = (0..8).map(|_| Sought { n: unit(&mut random), tolerance }).collect();
+            let sought: Vec<Sought> = (0..8).map(|_| Sought { n: random.unit(), tolerance }).collect();
             let found = dispatch(Farthest { body: &body, sought: &sought });
             for (k, (one, Sought { n, .. })) in found.iter().zip(&sought).enumerate() {
                 assert_eq!(dispatch(Farthest { body: &body, sought: &sought[k..=k] })[0], *one, "seed {seed}, {k}");

@@ -1,7 +1,7 @@
-//! The shortest way out of an overlap that is known.
+//! The shortest known translation that takes overlapping bodies apart.
 
 use super::support::{SupportPoint, support};
-use crate::measure::bounds::duality_bounds::{DualTrial, SLACK, descent};
+use crate::measure::bounds::duality_bounds::{DUALITY_ROUNDING, DualTrial, descent};
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::options::Options;
@@ -25,7 +25,7 @@ fn common(body: &Posed<'_>, points: [SupportPoint; 4]) -> SupportPoint {
 
 /// Weights by which points of a difference of bodies, all at least that high along n, have a point
 /// on the axis along n between them, or one no farther from it than `near`: then no direction close
-/// to n shows a smaller depth, but for what they lack.
+/// to n shows a smaller depth, but for their support deficit.
 fn surrounding(
     n: &Vector3<f64>,
     across: &Vector3<f64>,
@@ -84,7 +84,7 @@ fn depth_along(pair: &Pair<'_>, trial: &DualTrial<'_>) -> f64 {
     let falls =
         descent(&pair.a, x, &n, &of_a.map(|m| m / length)) + descent(&pair.b, y, &-n, &of_b.map(|m| m / length));
     let displaced = (pair.a.displacement(x) + pair.b.displacement(y)) * (1.0 + 1e-14);
-    let bound = n.dot(&(y - x)) + falls + displaced + SLACK * (x.norm() + y.norm() + falls.abs());
+    let bound = n.dot(&(y - x)) + falls + displaced + DUALITY_ROUNDING * (x.norm() + y.norm() + falls.abs());
     // A NaN bounds nothing.
     if bound.is_nan() { f64::INFINITY } else { bound }
 }
@@ -100,7 +100,7 @@ struct Candidate {
     b: Active,
 }
 
-/// The shortest way out known, in query units.
+/// The shortest separating translation known, in query units.
 pub(in crate::measure) struct Best<'a> {
     pub(in crate::measure) pair: &'a Pair<'a>,
     pose_a: &'a Pose,
@@ -165,8 +165,8 @@ impl<'a> Best<'a> {
         }
     }
 
-    /// Looks for the shortest way out near n, or where the bodies seem to face each other; whether
-    /// it found one.
+    /// Looks for the shortest translation near n, or where the bodies seem to face each other;
+    /// whether it found one.
     pub(in crate::measure) fn seek(&mut self, n: Option<&Vector3<f64>>) -> bool {
         let (pair, options, relation) = (self.pair, self.options, self.through(n));
         if !runs(Stage::Seek) || options.exhausted(self.iterations) {
@@ -264,7 +264,7 @@ impl<'a> Best<'a> {
         Through { pose_a: self.pose_a, pose_b: self.pose_b, facing: n.map(|n| (*n).into()), tolerance }
     }
 
-    /// Takes a direction proven in metres if it is the shortest way out so far.
+    /// Takes a direction proven in metres if its translation is the shortest so far.
     pub(in crate::measure) fn take(&mut self, proven: &Proven, trace: Trace) {
         self.iterations += proven.rounds;
         let (pair, unit) = (self.pair, self.pair.unit());
@@ -300,10 +300,10 @@ impl<'a> Best<'a> {
                 let attained = n.dot(&(y - x));
                 depth - attained <= tolerance && (x - y + n * attained).norm() <= tolerance
             };
-            let inside = || pair.a.pull_in(&at.x).zip(pair.b.pull_in(&at.y));
+            let inside = || pair.a.move_inside(&at.x).zip(pair.b.move_inside(&at.y));
             let settled = attains(&at.x, &at.y) && inside().is_some_and(|(x, y)| attains(&x, &y));
             known |= settled;
-            // Beside a short way out there is room for many normals that show about as much.
+            // Beside a short translation there is room for many normals that show about as much.
             let aligned = settled && depth <= self.depth + ROUGHLY * tolerance && at.is_aligned(pair);
             let same = (depth > 0.0) == (self.depth > 0.0) && self.n.is_some_and(|best| best.dot(&n) > ELSEWHERE);
             if aligned && same {
@@ -314,7 +314,7 @@ impl<'a> Best<'a> {
         });
     }
 
-    /// Takes a direction if it is the shortest way out so far; returns its depth.
+    /// Takes a direction if its translation is the shortest so far; returns its depth.
     fn try_direction(&mut self, candidate: &Candidate) -> f64 {
         let Candidate { x, y, n, a, b } = candidate;
         let (of_a, of_b) = (a.multipliers(), b.multipliers());

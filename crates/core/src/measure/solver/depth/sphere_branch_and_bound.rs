@@ -289,23 +289,22 @@ const EDGES: [(usize, usize); 3] = [(0, 1), (1, 2), (2, 0)];
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::tests::unit;
     use sublevel_testkit::Seeded;
 
     #[test]
     fn bounds_hold_on_the_whole_triangle_and_are_all_but_exact() {
         for seed in 0..2000 {
             let mut random = Seeded(seed);
-            let axis = unit(&mut random);
+            let axis = random.unit();
             let size = 10_f64.powf(-1.0 + random.signed());
-            let n: [Vector3<f64>; 3] = std::array::from_fn(|_| (axis + unit(&mut random) * size).normalize());
+            let n: [Vector3<f64>; 3] = std::array::from_fn(|_| (axis + random.unit() * size).normalize());
             // Support points of an ellipsoid, moved off its centre, or any points at all.
             let half = Vector3::from_fn(|_, _| 2_f64.powf(random.signed()));
-            let center = unit(&mut random) * 0.2;
+            let center = random.unit() * 0.2;
             let w: [Vector3<f64>; 3] = std::array::from_fn(|i| {
                 let scaled = n[i].component_mul(&half);
                 let support = center + scaled.component_mul(&half) / scaled.norm();
-                if seed % 3 == 0 { unit(&mut random) + axis } else { support }
+                if seed % 3 == 0 { random.unit() + axis } else { support }
             });
             let mut least = f64::INFINITY;
             for i in 0..=60 {

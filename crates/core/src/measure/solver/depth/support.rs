@@ -56,7 +56,7 @@ pub(super) fn support(
     let last = runs(Stage::SupportInterior).then(|| interior_point(body, n, tolerance));
     let found = [last, start, Some(restart)];
     let inside =
-        found.into_iter().flatten().filter_map(|point| body.pull_in(&point.x).map(|x| SupportPoint { x, ..point }));
+        found.into_iter().flatten().filter_map(|point| body.move_inside(&point.x).map(|x| SupportPoint { x, ..point }));
     inside.max_by(|p, q| n.dot(&p.x).total_cmp(&n.dot(&q.x)))
 }
 
@@ -118,7 +118,7 @@ fn smooth(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &Vector3<f6
         // it.
         x += dx - gradient * (bend / squared);
         if new * (1.0 - value).abs() + 2.0 * old.max(new) * bend < tolerance {
-            let inside = body.pull_in(&x)?;
+            let inside = body.move_inside(&x)?;
             // Where the surface is flat a step means little: it may have gone far outside.
             if n.dot(&(x - inside)) < tolerance {
                 return Some(SupportPoint { x: inside, active: 1 });
@@ -202,7 +202,7 @@ fn newton(body: &Posed<'_>, n: &Vector3<f64>, tolerance: f64, start: &SupportPoi
                 | (body.len() > active.len && active.violated(body, &x, 1.0).is_some_and(|i| active.push(i)));
             let holds = active.multiplier[..active.len].iter().all(|&m| m >= 0.0);
             if !changed && holds {
-                let inside = body.pull_in(&x)?;
+                let inside = body.move_inside(&x)?;
                 // Where the surface is flat a step means little: it may have gone far outside.
                 if n.dot(&(x - inside)) < tolerance {
                     return Some(SupportPoint { x: inside, active: active.bits() });

@@ -15,7 +15,7 @@ use super::farthest::{Farthest, Sought};
 use super::local_search::{Best, ELSEWHERE, tolerance};
 use super::sphere_branch_and_bound::{Cell, Covering, Direction};
 use super::support::{SupportPoint, support};
-use crate::measure::bounds::duality_bounds::SLACK;
+use crate::measure::bounds::duality_bounds::DUALITY_ROUNDING;
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::options::Options;
 use crate::measure::solver::stages::{Stage, runs};
@@ -161,7 +161,7 @@ impl<const N: usize> Sweep<'_, N> {
     /// not to be good enough.
     fn lowest(&self, best: &Best<'_>) -> f64 {
         let target = self.target(best);
-        let error = self.error + 4.0 * SLACK * self.size;
+        let error = self.error + 4.0 * DUALITY_ROUNDING * self.size;
         let bound = |cell: Cell| {
             let shares = (0..10).map(|k| 1.0 - 1e-3 * f64::from(1 << k));
             let mut bounds = shares.filter_map(|share| self.covering.bound(cell.corners, share * target + error).ok());
@@ -198,7 +198,7 @@ impl<const N: usize> Sweep<'_, N> {
         Some(found)
     }
 
-    /// What support points along n may lack, query units: far above the best depth a rough bound
+    /// Largest support deficit along n, query units: far above the best depth a rough bound
     /// will do.
     fn tolerated(&self, Wanted { n, between }: &Wanted, best: &Best<'_>) -> f64 {
         let known = if best.depth.is_finite() { best.depth.abs() } else { self.size };
@@ -257,7 +257,7 @@ impl<const N: usize> Sweep<'_, N> {
     fn open(&mut self, corners: [u16; 3], best: &Best<'_>) {
         // Middles are rounded, so neighbours of different size leave slivers open; f changes by
         // little over one. The sums of the bound itself round too.
-        let (target, error) = (self.target(best), self.error + 4.0 * SLACK * self.size);
+        let (target, error) = (self.target(best), self.error + 4.0 * DUALITY_ROUNDING * self.size);
         match self.covering.bound(corners, target + error) {
             Ok(bound) => self.floor = self.floor.min(bound - error),
             Err(guess) => self.covering.push(Cell { corners, guess }),
@@ -266,7 +266,7 @@ impl<const N: usize> Sweep<'_, N> {
 
     /// Drops the triangles that are good enough for a better depth.
     fn close(&mut self, best: &Best<'_>) {
-        let (target, error) = (self.target(best), self.error + 4.0 * SLACK * self.size);
+        let (target, error) = (self.target(best), self.error + 4.0 * DUALITY_ROUNDING * self.size);
         let floor = &mut self.floor;
         self.covering.close(|covering, cell| match covering.bound(cell.corners, target + error) {
             Ok(bound) => {
@@ -333,7 +333,7 @@ impl<const N: usize> Sweep<'_, N> {
         if least.depth() > WORTH_A_LOOK * best.depth {
             return false;
         }
-        // From there the way down may lead to another minimum.
+        // From there descent may lead to another minimum.
         let mut other = best.again();
         if !other.seek(Some(&least.n)) {
             other.offer(&least.a, &least.b, &least.n);

@@ -4,12 +4,12 @@ use super::sides::{Evaluated, Sides, Step};
 use crate::measure::frames::vector::{
     V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, scaled,
 };
-use crate::measure::solver::tangent_newton::{ALIGNED, NUDGE, SLACK};
+use crate::measure::solver::tangent_newton::{ALIGNED, NUDGE, TAYLOR_ROUNDING};
 use crate::polynomial::{NEAR_LEVEL, Scalar, Simd, gamma};
 use nalgebra::Vector3;
 
 /// Slope of p per length of A that an answer's gradient need not be better than relative to.
-const FORCE: f64 = 1e-3;
+const LEAST_GRADIENT: f64 = 1e-3;
 
 /// Longest step that bounds are made for: relative to the distance from A's centre, or to B.
 pub(super) const ROOM: f64 = 1.0 / 16.0;
@@ -116,7 +116,7 @@ impl Sides<'_> {
         let gradient_error = 1.8 * growth.gradient_error + half_third_a + gamma(16) * sum(gradient_z);
         let gradient = apply_transposed::<S, f64>(&map.to_a, gradient_z);
         let slope = norm(gradient) * (1.0 + 1e-14) + trust_a.linear_norm * gradient_error;
-        let pulled = apply_transposed::<S, f64>(&map.linear, gradient);
+        let gradient_a = apply_transposed::<S, f64>(&map.linear, gradient);
         let displaced = map.displacement + map.rounding * sum(at.x);
         let trace = |h: &[f64; 6]| h[0] + h[3] + h[5];
         let (trace_a, trace_b) = (trace(&at.jet_a.hessian), trace(&at.jet_b.hessian));
@@ -143,10 +143,11 @@ impl Sides<'_> {
         // Lower bound.
         let square = dot::<S, f64>(b, b);
         let inverse = 1.0 / square.sqrt();
-        let multiplier = -dot::<S, f64>(pulled, b) * (inverse * inverse);
+        let multiplier = -dot::<S, f64>(gradient_a, b) * (inverse * inverse);
         let (of_a, of_b) = (metric.of_a, metric.of_b);
-        let rest =
-            norm(add_scaled::<S, f64>(pulled, multiplier, b)) + (w_error + multiplier * b_error) + SLACK * sum(pulled);
+        let rest = norm(add_scaled::<S, f64>(gradient_a, multiplier, b))
+            + (w_error + multiplier * b_error)
+            + TAYLOR_ROUNDING * sum(gradient_a);
         let off = of_a * z_error + of_b * rest;
         let entries = of_a * of_a * growth.curvature_error
             + trace_a
@@ -163,21 +164,22 @@ impl Sides<'_> {
         let slope_there =
             0.25 * curvature * if 1.5 * curvature < bending * reach { 1.5 * curvature / bending } else { reach };
         let span_b = trust_b.radius * (1.0 + ROOM) + self.b.z_extent().norm() * (1.0 + 1e-14);
-        let slack = SLACK * (value_a.abs() + multiplier * (1.0 + value_b.abs()) + error_a) + slope * displaced;
+        let slack =
+            TAYLOR_ROUNDING * (value_a.abs() + multiplier * (1.0 + value_b.abs()) + error_a) + slope * displaced;
 
         // Upper bound: into B along b, as far as its curvature may ask.
         let excess = value_b - 1.0 + error_b;
         let ceiling = trace_b + third.ceiling * (step_b + room_b) + 2.0 * self.trust.curvature_error;
         let q = ceiling * excess.abs() * inverse * inverse * (1.0 + 1e-9);
         let distance = (excess + excess.abs() * (2.0 * q + NUDGE)) * inverse;
-        let way = distance.abs();
-        let lift = spread * way + trust_a.linear_norm * displaced;
+        let moved = distance.abs();
+        let lift = spread * moved + trust_a.linear_norm * displaced;
         let upper = value_a
             + error_a
             + distance * multiplier * square * inverse
-            + (way * pulled_error + 0.5 * ceiling_a * lift * lift)
+            + (moved * pulled_error + 0.5 * ceiling_a * lift * lift)
             + slack
-            + SLACK * way * sum(pulled);
+            + TAYLOR_ROUNDING * moved * sum(gradient_a);
 
         // Only the minimiser counts, where A's polynomial is at most `upper`: by convexity A,
         // scaled about its interior point by this, holds all such points.
@@ -187,21 +189,21 @@ impl Sides<'_> {
         let linear = z_error * span_a + rest * span_b;
         let loss = if curvature > 0.0 && off <= slope_there { (off * off / curvature).min(linear) } else { linear };
         let fall = multiplier * (value_b - 1.0 - error_b);
-        let slack = slack + SLACK * loss;
+        let slack = slack + TAYLOR_ROUNDING * loss;
         let lower = value_a - error_a + fall - loss - slack;
 
         let inside = dot::<S, f64>(at.w, at.w) <= trust_b.radius * trust_b.radius
             && (at.jet_b.value - 1.0).abs() <= NEAR_LEVEL
             && step_b <= room_b
-            && way <= room_b
+            && moved <= room_b
             && step_a <= room
             && lift <= room
             && multiplier >= 0.0
             && q <= 0.1
             && b_error * (4.0 / NUDGE) * inverse <= 1.0;
         // The point has yet to move into B, which turns the gradient, too.
-        let least = FORCE / trust_a.inverse_norm;
-        let turned = off + of_a * trace_a * spread * way;
+        let least = LEAST_GRADIENT / trust_a.inverse_norm;
+        let turned = off + of_a * trace_a * spread * moved;
         let aligned = turned * metric.per_metre <= ALIGNED * if slope > least { slope } else { least };
         Bracket {
             lower: if inside { lower } else { f64::NAN },

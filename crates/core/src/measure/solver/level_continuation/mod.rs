@@ -53,7 +53,7 @@ use crate::body::Body;
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::vector::{V3, add, apply_symmetric, apply_transposed, basis, dot, scaled, subtract};
 use crate::measure::options::Options;
-use crate::measure::solver::active_set_qp::LONGEST;
+use crate::measure::solver::active_set_qp::LONGEST_PROGRAM_STEP;
 use crate::measure::solver::predictor::Drift;
 use crate::measure::solver::step_acceleration::{Correction, Last, Series, across, along};
 use crate::polynomial::{NumberJet, Scalar, Simd, WithSimd};
@@ -192,11 +192,11 @@ impl WithSimd for FollowLevel<'_> {
         }
         let sides = Sides::new(simd, (a, self.pose_a), (b, self.pose_b), trace.active);
         let image = sides.map.to_a(simd, sides.map.apply(simd, trace.w));
-        let way = subtract::<S, f64>(image, trace.z);
-        let gradient = add::<S, f64>(trace.gradient, apply_symmetric::<S, f64>(&trace.hessian, way));
-        let pulled = apply_transposed::<S, f64>(&sides.map.both, gradient);
-        let delta = scaled::<S, f64>(apply_symmetric::<S, f64>(&trace.response, pulled), -1.0);
-        if !(sides.length(simd, trace.z, delta) <= LONGEST) {
+        let moved = subtract::<S, f64>(image, trace.z);
+        let gradient = add::<S, f64>(trace.gradient, apply_symmetric::<S, f64>(&trace.hessian, moved));
+        let gradient_a = apply_transposed::<S, f64>(&sides.map.both, gradient);
+        let delta = scaled::<S, f64>(apply_symmetric::<S, f64>(&trace.response, gradient_a), -1.0);
+        if !(sides.length(simd, trace.z, delta) <= LONGEST_PROGRAM_STEP) {
             return Err(LevelLost::after(0));
         }
         let predicted = add::<S, f64>(trace.w, delta);
@@ -319,7 +319,7 @@ impl Sides<'_> {
         let [t, u, _] = basis(simd, at.jet_b.gradient);
         let tangents = [t, u];
         let (newton, slope) =
-            (along(simd, tangents, step.delta), along(simd, tangents, scaled::<S, f64>(step.force, -1.0)));
+            (along(simd, tangents, step.delta), along(simd, tangents, scaled::<S, f64>(step.dual_gradient, -1.0)));
         let (mut delta, mut corrected) = (step.delta, false);
         if series.may_have_to_be_corrected(newton, length) {
             let response = step.response(simd, at.jet_b.gradient);
@@ -331,8 +331,8 @@ impl Sides<'_> {
             let Correction { longer, shorter } = found;
             delta = add::<S, f64>(delta, across(simd, tangents, [longer[0] + shorter[0], longer[1] + shorter[1]]));
             let length = self.length(simd, at.z, delta);
-            if length > LONGEST {
-                delta = scaled::<S, f64>(delta, LONGEST / length);
+            if length > LONGEST_PROGRAM_STEP {
+                delta = scaled::<S, f64>(delta, LONGEST_PROGRAM_STEP / length);
             }
         }
         series.push(tangents, Last { newton, taken: along(simd, tangents, delta), slope, corrected });

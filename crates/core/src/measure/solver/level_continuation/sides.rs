@@ -7,7 +7,7 @@ use crate::measure::frames::pose::RELATIVE_QUATERNION_ERROR;
 use crate::measure::frames::vector::{
     M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, rows, scaled, times_transposed,
 };
-use crate::measure::solver::active_set_qp::{CENTER, DAMPINGS, LEAST, LONGEST, MOST_BENT, SHORT};
+use crate::measure::solver::active_set_qp::{CENTER, DAMPINGS, LEAST, LONGEST_PROGRAM_STEP, MOST_BENT, SHORT};
 use crate::measure::solver::tangent_newton::Relative;
 use crate::polynomial::{Number, NumberJet, Polynomial, Simd, gamma};
 
@@ -102,7 +102,7 @@ pub(super) struct Step {
     /// Change of w.
     pub(super) delta: V3<f64>,
     /// `G + μ b`.
-    pub(super) force: V3<f64>,
+    pub(super) dual_gradient: V3<f64>,
     /// Multiplier before the step, in H.
     pub(super) multiplier: f64,
     /// Lower bound of the smallest eigenvalue of H, but for the errors of its entries.
@@ -113,7 +113,8 @@ pub(super) struct Step {
 }
 
 impl Step {
-    /// How the answer moves against a force: `H⁻¹ - H⁻¹b bᵀH⁻¹ / (b·H⁻¹b)`, xx, xy, xz, yy, yz, zz.
+    /// How the answer moves against a gradient: `H⁻¹ - H⁻¹b bᵀH⁻¹ / (b·H⁻¹b)`, xx, xy, xz, yy, yz,
+    /// zz.
     #[inline(always)]
     pub(super) fn response<S: Simd>(&self, _: S, b: V3<f64>) -> [f64; 6] {
         let v = apply_symmetric::<S, f64>(&self.cofactors, b);
@@ -168,11 +169,11 @@ impl<'a> Sides<'a> {
     /// Newton's step.
     #[inline(always)]
     pub(super) fn newton<S: Simd>(&self, simd: S, a: &NumberJet<f64>, b: &NumberJet<f64>) -> Step {
-        let (pulled, multiplier) = self.balance(simd, a, b);
+        let (gradient_a, multiplier) = self.balance(simd, a, b);
         let hessian = self.hessian(simd, a, b, multiplier);
-        let force = add_scaled::<S, f64>(pulled, multiplier, b.gradient);
+        let dual_gradient = add_scaled::<S, f64>(gradient_a, multiplier, b.gradient);
         let (cofactors, determinant) = cofactors(simd, hessian);
-        let u = apply_symmetric::<S, f64>(&cofactors, pulled);
+        let u = apply_symmetric::<S, f64>(&cofactors, gradient_a);
         let v = apply_symmetric::<S, f64>(&cofactors, b.gradient);
         let excess = b.value - 1.0;
         let next = (determinant * excess - dot::<S, f64>(u, b.gradient)) / dot::<S, f64>(b.gradient, v);
@@ -180,7 +181,7 @@ impl<'a> Sides<'a> {
         // The determinant over the square of half the trace, as in the tangent plane's bracket.
         let half_trace = 0.5 * (hessian[0] + hessian[3] + hessian[5]);
         let curvature = determinant / (half_trace * half_trace) - 256.0 * f64::EPSILON * half_trace;
-        Step { delta, force, multiplier, curvature, cofactors, determinant }
+        Step { delta, dual_gradient, multiplier, curvature, cofactors, determinant }
     }
 
     /// A step towards the solution from afar, where Newton's would be a long one, with the
@@ -189,26 +190,26 @@ impl<'a> Sides<'a> {
     /// Hessians to mean something where it leads, but not much more.
     #[inline(always)]
     pub(super) fn far_step<S: Simd>(&self, simd: S, at: &Evaluated, multiplier: Option<f64>) -> (V3<f64>, f64) {
-        let (pulled, fitting) = self.balance(simd, &at.jet_a, &at.jet_b);
+        let (gradient_a, fitting) = self.balance(simd, &at.jet_a, &at.jet_b);
         let hessian = self.hessian(simd, &at.jet_a, &at.jet_b, multiplier.unwrap_or(fitting));
-        let (mut delta, mut next) = self.damped(simd, at, &pulled, &hessian, 0.0);
+        let (mut delta, mut next) = self.damped(simd, at, &gradient_a, &hessian, 0.0);
         let mut length = self.length(simd, at.z, delta);
         for (i, damping) in DAMPINGS.into_iter().enumerate() {
-            if length <= LONGEST {
+            if length <= LONGEST_PROGRAM_STEP {
                 return (delta, next);
             }
-            (delta, next) = self.damped(simd, at, &pulled, &hessian, damping);
+            (delta, next) = self.damped(simd, at, &gradient_a, &hessian, damping);
             length = self.length(simd, at.z, delta);
             if i == 0 && length < SHORT {
                 // Along flat sides a step is as long as the damping is little.
                 let damping = damping * (length / SHORT).max(LEAST);
-                let longer = self.damped(simd, at, &pulled, &hessian, damping);
-                if self.length(simd, at.z, longer.0) <= LONGEST {
+                let longer = self.damped(simd, at, &gradient_a, &hessian, damping);
+                if self.length(simd, at.z, longer.0) <= LONGEST_PROGRAM_STEP {
                     return longer;
                 }
             }
         }
-        (scaled::<S, f64>(delta, (LONGEST / length).min(1.0)), next)
+        (scaled::<S, f64>(delta, (LONGEST_PROGRAM_STEP / length).min(1.0)), next)
     }
 
     /// The step with that much of a stiffness, and the multiplier.
@@ -217,28 +218,28 @@ impl<'a> Sides<'a> {
         &self,
         simd: S,
         at: &Evaluated,
-        pulled: &V3<f64>,
+        gradient_a: &V3<f64>,
         hessian: &[f64; 6],
         damping: f64,
     ) -> (V3<f64>, f64) {
         let (a, b) = (&at.jet_a, &at.jet_b);
         let degree = self.p.degree() as f64;
         let stiff_a = degree * (degree - 1.0) * a.value / self.far::<S>(at.z);
-        let stiff_b = square::<S>(*pulled).sqrt() / self.b.trust().radius;
+        let stiff_b = square::<S>(*gradient_a).sqrt() / self.b.trust().radius;
         let mut h = self.map.metric(damping * stiff_a, damping * stiff_b);
         for (entry, of_hessian) in h.iter_mut().zip(hessian) {
             *entry += of_hessian;
         }
         let (cofactors, determinant) = cofactors(simd, h);
         let inverse = 1.0 / determinant;
-        let u = scaled::<S, f64>(apply_symmetric::<S, f64>(&cofactors, *pulled), inverse);
+        let u = scaled::<S, f64>(apply_symmetric::<S, f64>(&cofactors, *gradient_a), inverse);
         let v = scaled::<S, f64>(apply_symmetric::<S, f64>(&cofactors, b.gradient), inverse);
         // Of p^(2/d) the Hessian lacks this much of the square of the gradient; by the formula of
         // Sherman and Morrison.
-        let (of_u, mixed) = (dot::<S, f64>(*pulled, u), dot::<S, f64>(b.gradient, u));
-        let lacks = ((1.0 - 2.0 / degree) / a.value).min(MOST_BENT / of_u);
-        let more = 1.0 / (1.0 - lacks * of_u);
-        let v = add_scaled::<S, f64>(v, lacks * mixed * more, u);
+        let (of_u, mixed) = (dot::<S, f64>(*gradient_a, u), dot::<S, f64>(b.gradient, u));
+        let missing = ((1.0 - 2.0 / degree) / a.value).min(MOST_BENT / of_u);
+        let more = 1.0 / (1.0 - missing * of_u);
+        let v = add_scaled::<S, f64>(v, missing * mixed * more, u);
         let u = scaled::<S, f64>(u, more);
         let excess = b.value - 1.0;
         let next = (excess - dot::<S, f64>(u, b.gradient)) / dot::<S, f64>(b.gradient, v);
@@ -248,10 +249,10 @@ impl<'a> Sides<'a> {
     /// `G` and the multiplier that fits the gradients best.
     #[inline(always)]
     pub(super) fn balance<S: Simd>(&self, _: S, a: &NumberJet<f64>, b: &NumberJet<f64>) -> (V3<f64>, f64) {
-        let pulled = apply_transposed::<S, f64>(&self.map.both, a.gradient);
+        let gradient_a = apply_transposed::<S, f64>(&self.map.both, a.gradient);
         // Where p falls inward B's constraint holds nothing back.
-        let multiplier = (-dot::<S, f64>(pulled, b.gradient) / dot::<S, f64>(b.gradient, b.gradient)).max(0.0);
-        (pulled, multiplier)
+        let multiplier = (-dot::<S, f64>(gradient_a, b.gradient) / dot::<S, f64>(b.gradient, b.gradient)).max(0.0);
+        (gradient_a, multiplier)
     }
 
     /// `H`: xx, xy, xz, yy, yz, zz.
@@ -264,8 +265,8 @@ impl<'a> Sides<'a> {
         let mut k = 0;
         for i in 0..3 {
             for j in i..3 {
-                let pulled = fused::<S>(c[2][i], bent[2][j], fused::<S>(c[1][i], bent[1][j], c[0][i] * bent[0][j]));
-                hessian[k] = fused::<S>(multiplier, hessian[k], pulled);
+                let gradient_a = fused::<S>(c[2][i], bent[2][j], fused::<S>(c[1][i], bent[1][j], c[0][i] * bent[0][j]));
+                hessian[k] = fused::<S>(multiplier, hessian[k], gradient_a);
                 k += 1;
             }
         }

@@ -31,18 +31,18 @@ use crate::measure::frames::vector::{M3, V3, apply_symmetric, apply_transposed, 
 use crate::polynomial::{Number, NumberJet, Simd};
 pub(in crate::measure) use plane::Plane;
 pub(in crate::measure) use simd_body::{Relative, Side};
-pub(in crate::measure) use taylor_bounds::{ALIGNED, Bracket, NUDGE, SLACK, bracket};
+pub(in crate::measure) use taylor_bounds::{ALIGNED, Bracket, NUDGE, TAYLOR_ROUNDING, bracket};
 
 /// Second derivatives of a constraint at a point.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::measure) struct Bend<N> {
+pub(in crate::measure) struct SurfaceCurvature<N> {
     /// `TᵀHT`: 00, 01, 11.
     pub(in crate::measure) curvature: [N; 3],
     /// `TᵀHn`.
     pub(in crate::measure) tilt: [N; 2],
 }
 
-impl<N: Copy> Bend<N> {
+impl<N: Copy> SurfaceCurvature<N> {
     /// The constraint with this jet, along the vectors of a basis in its normalized coordinates.
     #[inline(always)]
     pub(in crate::measure) fn new<S: Simd>(_: S, jet: &NumberJet<N>, [t0, t1, n]: &M3<N>) -> Self
@@ -133,12 +133,12 @@ impl<N: Copy> Step<N> {
 #[inline(always)]
 pub(in crate::measure) fn newton<S: Simd, N: Number<S>>(
     simd: S,
-    (a, bend_a): (&Plane<N>, &Bend<N>),
-    (b, bend_b): (&Plane<N>, &Bend<N>),
+    (a, curvature_a): (&Plane<N>, &SurfaceCurvature<N>),
+    (b, curvature_b): (&Plane<N>, &SurfaceCurvature<N>),
     difference: V3<N>,
     smallest: N,
 ) -> (Step<N>, Response<N>) {
-    let (straight_a, straight_b) = straighten(simd, (a, bend_a), (b, bend_b));
+    let (straight_a, straight_b) = straighten(simd, (a, curvature_a), (b, curvature_b));
     let distance = difference[2] + straight_a.shift - straight_b.shift;
     let (turn, response) = turn(simd, &straight_a, &straight_b, distance, [difference[0], difference[1]], smallest);
     let (alpha, beta) = (turn.alpha, turn.beta);
@@ -159,13 +159,13 @@ pub(in crate::measure) fn newton<S: Simd, N: Number<S>>(
 #[inline(always)]
 pub(in crate::measure) fn newton_along<S: Simd>(
     simd: S,
-    (a, bend_a): (&Plane<f64>, &Bend<f64>),
-    (b, bend_b): (&Plane<f64>, &Bend<f64>),
+    (a, curvature_a): (&Plane<f64>, &SurfaceCurvature<f64>),
+    (b, curvature_b): (&Plane<f64>, &SurfaceCurvature<f64>),
     difference: V3<f64>,
     ray: V3<f64>,
     smallest: f64,
 ) -> (Step<f64>, Response<f64>) {
-    let (straight_a, straight_b) = straighten(simd, (a, bend_a), (b, bend_b));
+    let (straight_a, straight_b) = straighten(simd, (a, curvature_a), (b, curvature_b));
     let inverse = 1.0 / ray[2];
     let slope = [ray[0] * inverse, ray[1] * inverse];
     let height = difference[2] + straight_a.shift - straight_b.shift;
@@ -194,8 +194,8 @@ pub(in crate::measure) fn newton_along<S: Simd>(
 #[inline(always)]
 fn straighten<S: Simd, N: Number<S>>(
     simd: S,
-    (a, bend_a): (&Plane<N>, &Bend<N>),
-    (b, bend_b): (&Plane<N>, &Bend<N>),
+    (a, curvature_a): (&Plane<N>, &SurfaceCurvature<N>),
+    (b, curvature_b): (&Plane<N>, &SurfaceCurvature<N>),
 ) -> (Straight<N>, Straight<N>) {
     let (one, half) = (N::splat(simd, 1.0), N::splat(simd, 0.5));
     // Deep inside there is nothing to straighten.
@@ -203,8 +203,8 @@ fn straighten<S: Simd, N: Number<S>>(
     let (mean_a, mean_b) = (half.mul_add(a.value, half).max(deepest), half.mul_add(b.value, half).max(deepest));
     let [inverse_a, inverse_b] = N::reciprocals(simd, [a.gradient[2] * mean_a, b.gradient[2] * mean_b]);
     let (of_a, of_b) = (-mean_a * inverse_a, mean_b * inverse_b);
-    let straight_a = Straight::new(a, bend_a, of_a, (a.value - one) * mean_a, a.gradient[2] * inverse_a);
-    let straight_b = Straight::new(b, bend_b, of_b, (one - b.value) * mean_b, b.gradient[2] * inverse_b);
+    let straight_a = Straight::new(a, curvature_a, of_a, (a.value - one) * mean_a, a.gradient[2] * inverse_a);
+    let straight_b = Straight::new(b, curvature_b, of_b, (one - b.value) * mean_b, b.gradient[2] * inverse_b);
     (straight_a, straight_b)
 }
 
@@ -311,7 +311,7 @@ impl<N: Copy> Straight<N> {
     /// With the multiplier λ of the constraint itself, `(g - 1) m` or its negative, and `1 / m`, m
     /// the mean of g and 1.
     #[inline(always)]
-    fn new<S: Simd>(plane: &Plane<N>, bend: &Bend<N>, multiplier: N, excess: N, inverse_mean: N) -> Self
+    fn new<S: Simd>(plane: &Plane<N>, bend: &SurfaceCurvature<N>, multiplier: N, excess: N, inverse_mean: N) -> Self
     where
         N: Number<S>,
     {

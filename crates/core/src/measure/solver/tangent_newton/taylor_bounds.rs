@@ -98,7 +98,7 @@ impl<N: Copy> Side<'_, N> {
         let near = Near::new(self);
         let length = dot(gradient, gradient).sqrt();
         let turned = splat(near.turn).mul_add(length, at.gradient_error + splat(near.gradient_error));
-        let off = Off::new(simd, dot(residual, residual), turned.mul_add(multiplier, splat(SLACK)));
+        let off = Off::new(simd, dot(residual, residual), turned.mul_add(multiplier, splat(TAYLOR_ROUNDING)));
         let bound = Bound {
             curvature: at.curvature,
             radius: at.radius,
@@ -145,9 +145,11 @@ pub(in crate::measure) struct Bracket<N> {
     pub(in crate::measure) to_b: V3<N>,
 }
 
-/// Relative slack for the rounding of the bracket's own arithmetic, basis included: fewer than 256
-/// operations on the sum of magnitudes.
-pub(in crate::measure) const SLACK: f64 = 128.0 * f64::EPSILON;
+/// Rounding of a Taylor bracket's own arithmetic, basis included, relative to the sum of
+/// magnitudes: fewer than 256 operations of half an epsilon each. Smaller, a bracket could miss
+/// the distance: exact re-checks (`tests/stability/recheck.rs`) compare it with rational
+/// arithmetic.
+pub(in crate::measure) const TAYLOR_ROUNDING: f64 = 128.0 * f64::EPSILON;
 
 /// Largest angle between the bodies' normals that an answer is taken at: its gradients are off by
 /// about as much.
@@ -184,7 +186,7 @@ pub(in crate::measure) fn bracket<S: Simd, N: Number<S>>(
     let [inverse_a, inverse_b] = N::reciprocals(simd, [length_a, length_b]);
     let (outward_a, outward_b) = (scaled(a.gradient, inverse_a), scaled(b.gradient, inverse_b));
     let displaced = (side_a.displacement + side_b.displacement) * splat(1.0 + 1e-14);
-    let rounding = splat(SLACK) * (difference[0].abs() + difference[1].abs() + difference[2].abs());
+    let rounding = splat(TAYLOR_ROUNDING) * (difference[0].abs() + difference[1].abs() + difference[2].abs());
 
     // The flatter body keeps its own normal; the other one's gradient leaves a residual across it.
     let a_keeps = (extrapolated_a.curvature * splat(near_b.inverse_square) * inverse_a)
@@ -205,7 +207,7 @@ pub(in crate::measure) fn bracket<S: Simd, N: Number<S>>(
     let gradient_error_b = extrapolated_b.gradient_error + splat(near_b.gradient_error);
     let turned = either_constant(near_b.turn, near_a.turn)
         .mul_add(either(length_b, length_a), either(gradient_error_b, gradient_error_a));
-    let off = Off::new(simd, dot(residual, residual), turned.mul_add(multiplier, splat(SLACK)));
+    let off = Off::new(simd, dot(residual, residual), turned.mul_add(multiplier, splat(TAYLOR_ROUNDING)));
     let bent = Bound {
         curvature: either(extrapolated_b.curvature, extrapolated_a.curvature),
         radius: either(extrapolated_b.radius, extrapolated_a.radius),
@@ -216,7 +218,7 @@ pub(in crate::measure) fn bracket<S: Simd, N: Number<S>>(
     let loss = bent.loss(simd, &off, multiplier);
     let keeper = either(inverse_a, inverse_b);
     let keeper_off = either(gradient_error_a, gradient_error_b)
-        .mul_add(keeper, either_constant(near_a.turn + SLACK, near_b.turn + SLACK));
+        .mul_add(keeper, either_constant(near_a.turn + TAYLOR_ROUNDING, near_b.turn + TAYLOR_ROUNDING));
     let kept = Bound {
         curvature: either(extrapolated_a.curvature, extrapolated_b.curvature),
         radius: either(extrapolated_a.radius, extrapolated_b.radius),
@@ -233,8 +235,9 @@ pub(in crate::measure) fn bracket<S: Simd, N: Number<S>>(
     let slack_b = of_b * (one - b.value + error_b);
     let magnitude = slack_a.abs() + slack_b.abs() + of_a + of_b;
     // The losses come last: they are what takes longest.
-    let lower = dot(normal, difference) - (slack_a + slack_b) - (displaced + rounding) - splat(SLACK) * magnitude;
-    let lower = (loss + keeper_loss).mul_add(splat(-(1.0 + SLACK)), lower);
+    let lower =
+        dot(normal, difference) - (slack_a + slack_b) - (displaced + rounding) - splat(TAYLOR_ROUNDING) * magnitude;
+    let lower = (loss + keeper_loss).mul_add(splat(-(1.0 + TAYLOR_ROUNDING)), lower);
     // Gradients that do not even point the same way leave no multiplier.
     let lower = lower.select(splat(f64::MIN_POSITIVE).le(along), splat(f64::NAN));
 
@@ -242,7 +245,7 @@ pub(in crate::measure) fn bracket<S: Simd, N: Number<S>>(
     let (move_b, fine_b) = near_b.move_inside(simd, b.value - one + error_b, length_b, inverse_b, gradient_error_b);
     let (to_a, to_b) = (scaled(outward_a, move_a), scaled(outward_b, move_b));
     let between = subtract(add_scaled(difference, one, to_a), to_b);
-    let upper = dot(between, between).sqrt() * splat(1.0 + SLACK) + displaced + rounding;
+    let upper = dot(between, between).sqrt() * splat(1.0 + TAYLOR_ROUNDING) + displaced + rounding;
     let upper = upper.select(N::and(simd, fine_a, fine_b), splat(f64::NAN));
     let evaluated = of_a * splat(side_a.trust().value_error) + of_b * splat(side_b.trust().value_error);
     let rounding = splat(2.0) * (displaced + rounding + evaluated);

@@ -1,18 +1,19 @@
 //! The lanes of batches.
 
-use super::{at_least, catalogue, unit};
+use super::{at_least, catalogue};
 use crate::measure::solver::stages::{Stage, only};
 use crate::measure::*;
 use sublevel_testkit::Seeded;
 
-/// Lanes answer about as many poses of smooth bodies as continuation from a cold start, and no other stage takes their place.
+/// Lanes answer about as many poses of smooth bodies as continuation from a cold start, and no
+/// other stage takes their place.
 #[test]
 fn lanes_answer_alone() {
     let (mut cases, mut done) = (0, 0);
     for case in catalogue().iter().filter(|case| case.is_smooth() && case.is_apart()) {
         let mut random = Seeded(96_000 + case.seed);
         let poses: [Pose; 16] = std::array::from_fn(|_| {
-            let shift = unit(&mut random) * (0.3 * case.distance.lower);
+            let shift = random.unit() * (0.3 * case.distance.lower);
             case.poses[1].with_translation(case.poses[1].translation() + shift)
         });
         let mut answers = [Distance::default(); 16];

@@ -1,6 +1,6 @@
 //! Stages of casts, projections and supports.
 
-use super::{Case, at_least, catalogue, unit};
+use super::{Case, at_least, catalogue};
 use crate::body::Body;
 use crate::measure::solver::stages::{Stage, only};
 use crate::measure::*;
@@ -11,8 +11,8 @@ use sublevel_testkit::Seeded;
 fn ray(case: &Case) -> Ray {
     let (body, mut random) = (case.a, Seeded(92_000 + case.seed));
     let size = body.circumscribed().radius;
-    let origin = body.circumscribed().center + unit(&mut random) * (size * (2.0 + random.signed()));
-    let target = body.interior_point() + unit(&mut random) * (0.5 * body.in_radius());
+    let origin = body.circumscribed().center + random.unit() * (size * (2.0 + random.signed()));
+    let target = body.interior_point() + random.unit() * (0.5 * body.in_radius());
     Ray::new(origin, target - origin, f64::INFINITY).unwrap()
 }
 
@@ -75,7 +75,7 @@ fn balls_touch_by_each_stage_alone() {
 fn point(case: &Case) -> Vector3<f64> {
     let mut random = Seeded(93_000 + case.seed);
     let ball = case.a.circumscribed();
-    ball.center + unit(&mut random) * (ball.radius * 3_f64.powf(random.signed()))
+    ball.center + random.unit() * (ball.radius * 3_f64.powf(random.signed()))
 }
 
 fn projected(domain: impl Fn(&Body) -> bool, stages: &[Stage]) -> f64 {
@@ -100,7 +100,7 @@ fn projected(domain: impl Fn(&Body) -> bool, stages: &[Stage]) -> f64 {
 fn supported(domain: impl Fn(&Body) -> bool, stages: &[Stage]) -> f64 {
     let (mut done, mut cases) = (0, 0);
     for case in catalogue().iter().filter(|case| domain(case.a)) {
-        let half_space = HalfSpace::new(unit(&mut Seeded(94_000 + case.seed)), 0.0).unwrap();
+        let half_space = HalfSpace::new(Seeded(94_000 + case.seed).unit(), 0.0).unwrap();
         let to = || {
             let (options, mut warm) = (Options::default(), WarmStart::default());
             distance_to_half_space(case.a, &case.poses[0], &half_space, &options, &mut warm)

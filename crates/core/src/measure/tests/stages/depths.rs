@@ -7,7 +7,7 @@ use sublevel_testkit::Seeded;
 
 /// The second pose of a case after a step that leaves the bodies as deep, or nearly so.
 fn moved(case: &Case) -> Pose {
-    let step = super::unit(&mut Seeded(case.seed)) * (0.001 * case.size());
+    let step = Seeded(case.seed).unit() * (0.001 * case.size());
     case.poses[1].with_translation(case.poses[1].translation() + step)
 }
 

@@ -1,6 +1,6 @@
 //! Stages of times of impact.
 
-use super::{Case, catalogue, unit};
+use super::{Case, catalogue};
 use crate::measure::solver::stages::{Stage, only};
 use crate::measure::*;
 use nalgebra::Vector3;
@@ -21,10 +21,10 @@ enum Scene {
 
 fn motions(case: &Case, scene: Scene) -> [Motion; 2] {
     let mut random = Seeded(95_000 + case.seed);
-    let spin = unit(&mut random) * 2.0;
+    let spin = random.unit() * 2.0;
     let [start_a, start_b] = case.poses;
     let reach = case.a.circumscribed().radius + case.b.circumscribed().radius;
-    let towards = start_a.translation() + unit(&mut random) * (0.3 * reach) - start_b.translation();
+    let towards = start_a.translation() + random.unit() * (0.3 * reach) - start_b.translation();
     let (spins, velocity) = match scene {
         Scene::FirstTurns => ([spin, Vector3::zeros()], towards),
         Scene::SecondTurns => ([Vector3::zeros(), spin], towards),

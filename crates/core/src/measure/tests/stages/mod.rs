@@ -10,7 +10,7 @@ mod casts;
 mod depths;
 mod impacts;
 
-use super::{random_pose, unit, zoo};
+use super::{random_pose, zoo};
 use crate::body::Body;
 use crate::measure::solver::stages::{Stage, only};
 use crate::measure::*;
@@ -42,7 +42,7 @@ impl Case {
         let reach = a.circumscribed().radius + b.circumscribed().radius;
         let far = reach * 2_f64.powf(1.5 * random.signed());
         let poses = [random_pose(&mut random, 0.0), random_pose(&mut random, far)];
-        let step = unit(&mut random) * (0.01 * a.circumscribed().radius.min(b.circumscribed().radius));
+        let step = random.unit() * (0.01 * a.circumscribed().radius.min(b.circumscribed().radius));
         let next = poses[1].with_translation(poses[1].translation() + step);
         let to = |pose: &Pose| distance(a, &poses[0], b, pose, &Options::default(), &mut WarmStart::default());
         let (distance, next_distance) = (to(&poses[1]), to(&next));
@@ -155,8 +155,8 @@ fn interior_points_find_distances_alone() {
     at_least("interior", 97.0, solved("interior", Case::is_apart, |case| cold_distance(case, &stages)));
 }
 
-/// Overlaps by a thousandth of the smaller body, where the tables of support points have no point in
-/// common.
+/// Overlaps by a thousandth of the smaller body, where the tables of support points have no point
+/// in common.
 #[test]
 fn deepest_points_decide_overlaps_alone() {
     let share = |domain: &dyn Fn(&Case) -> bool, stages: &[Stage]| {
@@ -275,7 +275,7 @@ fn saturation_is_proven_alone() {
         let (b, pose_b, mut random) = (case.b, &case.poses[1], Seeded(97_000 + case.seed));
         let half = Vector3::from_fn(|_, _| 0.3 * b.in_radius() * 3_f64.powf(random.signed()));
         let a = Body::superellipsoid("small", Vector3::zeros(), half, [2, 4, 8][case.seed as usize % 3]).unwrap();
-        let place = pose_b.transform_point(&(b.interior_point() + unit(&mut random) * (0.9 * b.in_radius())));
+        let place = pose_b.transform_point(&(b.interior_point() + random.unit() * (0.9 * b.in_radius())));
         let pose_a = random_pose(&mut random, 0.0).with_translation(place);
         let with = |stages: &[Stage]| {
             only(stages, || level_distance(&a, &pose_a, b, pose_b, &Options::default(), &mut WarmStart::default()))
