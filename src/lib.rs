@@ -15,6 +15,7 @@ pub use sublevel_fit as fit;
 pub use sublevel_scene as scene;
 
 pub mod cli;
+pub mod client;
 #[cfg(feature = "fit")]
 pub mod demo;
 pub mod draw;

@@ -234,7 +234,8 @@ fn compounds_are_fitted_verified_shown_and_measured() {
     assert!(apart["distance_m"].as_f64().unwrap() > 0.02 && apart["status"] == "converged", "{apart}");
     assert_eq!(measure(&out.join("letter-d4.json"))["distance_m"], 0.0);
 
-    assert!(refusal(&["push", text(&compound)]).contains("compound"));
+    // Servers store compounds, too; what is missing is the server.
+    assert!(refusal(&["push", text(&compound), "--server", "http://127.0.0.1:9"]).contains("sublevel serve"));
     let message = refusal(&["fit", text(&ball.with_file_name("nothing.xyz")), "--out", text(&out), "--parts", "2"]);
     assert!(message.contains("check the path"), "{message}");
     let message = refusal(&["fit", text(&fitted.path("ball.xyz")), "--out", text(&out), "--parts", "2"]);
@@ -575,12 +576,11 @@ fn sets_that_need_not_be_convex_are_told_from_bodies_everywhere() {
     let verdict = json(&["verify", text(&hull), "--contains", file, "--json"]);
     assert_eq!(verdict["contains_sets_proven"], serde_json::json!([true]));
     let there = ["fit", file, "--group", "hull", "--out", out, "--server", "http://127.0.0.1:9"];
-    assert!(refusal(&there).contains("leave out --server"));
+    assert!(refusal(&there).contains("sublevel serve"));
 
     // Where convexity is needed it is refused for what it is.
     let body = folder.path().join("ring-d4.json");
     assert!(refusal(&["measure", text(&body), file]).contains("need not be convex"));
-    assert!(refusal(&["push", file, "--server", "http://127.0.0.1:9"]).contains("need not be convex"));
     assert!(refusal(&["show", file, "--svg", text(&folder.path().join("x.svg"))]).contains("sos-body"));
     for more in [
         &["--refine"][..],
@@ -658,5 +658,34 @@ fn bodies_are_grouped_into_one_that_is_proven_to_hold_them() {
     ] {
         let error = refusal(&[&["fit", near, next, "--out", text(&out), "--group"], arguments].concat());
         assert!(error.contains(reason), "{error}");
+    }
+}
+
+#[test]
+fn primitives_are_written_exactly_and_refused_by_argument() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("text").to_owned();
+    let made = |args: &[&str]| {
+        let done = sublevel(args);
+        assert!(done.status.success(), "{args:?}: {}", String::from_utf8_lossy(&done.stderr));
+    };
+    let (table, can, floor) = (path("table.json"), path("can.json"), path("floor.json"));
+    made(&["primitive", "box", "--half-extents", "0.5,0.3,0.02", "--out", &table, "--name", "table"]);
+    made(&["primitive", "cylinder", "--radius", "0.05", "--half-height", "0.1", "--out", &can]);
+    made(&["primitive", "half-space", "--normal", "0,0,2", "--offset", "0", "--out", &floor]);
+    made(&["primitive", "ball", "--radius", "1", "--out", &path("ball.json")]);
+    made(&["primitive", "ellipsoid", "--half-axes", "1,2,3", "--out", &path("egg.json")]);
+    let apart = json(&["measure", &table, &can, "--json", "--pose", "0,0,1,0,0,0,1"]);
+    assert!((apart["distance_m"].as_f64().unwrap() - 0.88).abs() < 1e-8, "{apart}");
+    let half_space: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&floor).unwrap()).unwrap();
+    assert_eq!((half_space["kind"].as_str(), half_space["normal"][2].as_f64()), (Some("half-space"), Some(1.0)));
+    for (args, word) in [
+        (vec!["primitive", "box", "--half-extents", "0.5,-0.3,0.02", "--out", &table], "--half-extents"),
+        (vec!["primitive", "ball", "--radius", "nan", "--out", &table], "--radius"),
+        (vec!["primitive", "cylinder", "--radius", "0", "--half-height", "1", "--out", &table], "--radius"),
+        (vec!["primitive", "half-space", "--normal", "0,0,0", "--offset", "0", "--out", &table], "--normal"),
+        (vec!["primitive", "capsule", "--radius", "1", "--half-height", "1", "--out", &table], "not available"),
+    ] {
+        assert!(refusal(&args).contains(word), "{args:?}: {}", refusal(&args));
     }
 }

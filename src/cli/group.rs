@@ -6,10 +6,10 @@ use super::fit::args::FitArgs;
 use super::fit::remote::execute as execute_on;
 use super::fit::request::{checked, request_of_group};
 use super::progress::progress_bar;
+use super::push;
 use crate::body::{Body, Obstacle};
 use crate::fit::Progress;
 use crate::jobs::{FitOutput, Shapes, fit_group};
-use crate::service;
 use crate::store::{FitRequest, FittedBody};
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -42,8 +42,8 @@ pub(super) fn run(args: &FitArgs, name: &str) -> Result<(), Box<dyn Error>> {
     let request = checked(request_of_group(args, name, &obstacles))?;
     make_folder(&args.out)?;
     let bar = progress_bar(name);
-    let FitOutput { outcome, shapes } = match &args.server {
-        Some(url) => execute_there(args, url, &request, &obstacles, &bar)?,
+    let FitOutput { outcome, shapes, .. } = match &args.server {
+        Some(url) => execute_there(args, url, &request, &bar)?,
         None => fit_group(&request, &obstacles, |_, said| tell(&bar, said))?,
     };
     bar.finish_and_clear();
@@ -80,16 +80,10 @@ fn execute_there(
     args: &FitArgs,
     url: &str,
     request: &FitRequest,
-    obstacles: &[Obstacle],
     bar: &ProgressBar,
 ) -> Result<FitOutput, Box<dyn Error>> {
-    if let Some(at) = obstacles.iter().position(|obstacle| matches!(obstacle, Obstacle::SosBody(_))) {
-        let file = args.inputs[at].display();
-        return Err(format!("{file} is an sos-body, which servers do not store; leave out --server").into());
-    }
     bar.set_message("sending");
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    runtime.block_on(service::push(url, &args.inputs))?;
+    push::store(url, &args.inputs)?;
     execute_on(url, request, &[], &[], bar)
 }
 

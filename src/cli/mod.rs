@@ -15,9 +15,11 @@ mod measure;
 #[cfg(feature = "fit")]
 mod mesh;
 mod outcome;
+mod primitive;
 #[cfg(feature = "fit")]
 mod progress;
 mod push;
+mod scene;
 mod serve;
 mod show;
 mod sos_body;
@@ -53,6 +55,8 @@ enum Command {
     Measure(measure::MeasureArgs),
     Serve(serve::ServeArgs),
     Push(push::PushArgs),
+    Primitive(primitive::PrimitiveArgs),
+    Scene(scene::SceneArgs),
 }
 
 /// Runs the command line of this process. Exit code 0: done; 1: failed, with one line on standard
@@ -71,6 +75,8 @@ pub fn main() -> ExitCode {
         Command::Measure(args) => measure::run(&args).map(done),
         Command::Serve(args) => serve::run(&args).map(done).map_err(Into::into),
         Command::Push(args) => push::run(&args).map(done),
+        Command::Primitive(args) => primitive::run(&args).map(done),
+        Command::Scene(args) => scene::run(&args).map(done),
     };
     exit_code(outcome)
 }

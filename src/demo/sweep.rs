@@ -1,14 +1,11 @@
 //! The chair swept through the human, over gRPC against a real server.
 
 use super::error::DemoError;
-use crate::service::proto::body_service_client::BodyServiceClient;
-use crate::service::proto::query_service_client::QueryServiceClient;
-use crate::service::proto::scene_service_client::SceneServiceClient;
-use crate::service::proto::{
-    CreateBodyRequest, CreateSceneRequest, EvaluateRequest, Measure, Object, ObjectPair, ObjectPose, Pose, Quaternion,
-    UpdateSceneRequest, Vector3, evaluate_result::Outcome,
-};
+use crate::client::{Client, PairRow, Question};
+use crate::measure::Pose;
+use crate::scene::query::Measure;
 use crate::service::{ServeOptions, Server};
+use nalgebra::Vector3;
 use std::fmt::Display;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::Path;
@@ -82,38 +79,25 @@ pub(super) fn run(chair: &Path, human: &Path) -> Result<Sweep, DemoError> {
 
 /// The client's side.
 async fn talk(url: &str, chair: &Path, human: &Path) -> Result<Sweep, DemoError> {
-    let mut bodies = BodyServiceClient::connect(url.to_owned()).await.map_err(failed("connecting"))?;
-    let mut objects = Vec::new();
-    for (name, file, x) in [(CHAIR, chair, -REACH), (HUMAN, human, 0.0)] {
-        let json = std::fs::read(file).map_err(|source| DemoError::File { path: file.into(), source })?;
-        let request = CreateBodyRequest { body_file_json: json.into() };
-        let response = bodies.create_body(request).await.map_err(failed("storing a body"))?.into_inner();
-        let body_id = response.body.ok_or("the reply holds no body").map_err(failed("storing a body"))?.id;
-        objects.push(Object { name: name.into(), body_id, pose: Some(at(x)), group: String::new() });
+    let client = Client::connect(url).await.map_err(failed("connecting"))?;
+    let mut bodies = Vec::new();
+    for file in [chair, human] {
+        let json = std::fs::read_to_string(file).map_err(|source| DemoError::File { path: file.into(), source })?;
+        bodies.push(client.create_from_file(json).await.map_err(failed("storing a body"))?.id);
     }
+    client.create_scene(SCENE).await.map_err(failed("creating the scene"))?;
+    let objects = [(CHAIR, &bodies[0], at(-REACH)?), (HUMAN, &bodies[1], at(0.0)?)];
+    client.put_objects(SCENE, objects).await.map_err(failed("placing the objects"))?;
 
-    let mut scenes = SceneServiceClient::connect(url.to_owned()).await.map_err(failed("connecting"))?;
-    scenes.create_scene(CreateSceneRequest { name: SCENE.into() }).await.map_err(failed("creating the scene"))?;
-    let update = UpdateSceneRequest { name: SCENE.into(), upsert_objects: objects, ..Default::default() };
-    scenes.update_scene(update).await.map_err(failed("placing the objects"))?;
-
-    let mut queries = QueryServiceClient::connect(url.to_owned()).await.map_err(failed("connecting"))?;
-    let question = EvaluateRequest {
-        scene: SCENE.into(),
-        pairs: vec![ObjectPair { a: CHAIR.into(), b: HUMAN.into() }],
-        measures: [Measure::Distance, Measure::LevelDistanceAOnB, Measure::LevelDistanceBOnA].map(i32::from).to_vec(),
-        ..Default::default()
-    };
+    let measures = [Measure::Distance, Measure::LevelAOnB, Measure::LevelBOnA];
     let mut sweep = Sweep { samples: Vec::with_capacity(STEPS), revision: 0, elapsed: Duration::ZERO };
     let start = Instant::now();
     for step in 0..STEPS {
         let x = REACH * (2.0 * step as f64 / (STEPS - 1) as f64 - 1.0);
-        let set_poses = vec![ObjectPose { name: CHAIR.into(), pose: Some(at(x)) }];
-        let update = UpdateSceneRequest { name: SCENE.into(), set_poses, ..Default::default() };
-        sweep.revision = scenes.update_scene(update).await.map_err(failed("moving the chair"))?.into_inner().revision;
-        let answers = queries.evaluate(question.clone()).await.map_err(failed("asking for distances"))?.into_inner();
-        let outcomes: Vec<_> = answers.results.into_iter().filter_map(|result| result.outcome).collect();
-        let sample = sample(x, &outcomes).ok_or("the reply does not answer what was asked");
+        sweep.revision = client.set_poses(SCENE, [(CHAIR, at(x)?)]).await.map_err(failed("moving the chair"))?;
+        let question = Question::pairs([(CHAIR, HUMAN)]);
+        let answers = client.evaluate(SCENE, question, &measures).await.map_err(failed("asking for distances"))?;
+        let sample = sample(x, &answers.rows).ok_or("the reply does not answer what was asked");
         sweep.samples.push(sample.map_err(failed("asking for distances"))?);
     }
     sweep.elapsed = start.elapsed();
@@ -121,23 +105,19 @@ async fn talk(url: &str, chair: &Path, human: &Path) -> Result<Sweep, DemoError>
 }
 
 /// Upright at `x` metres.
-fn at(x: f64) -> Pose {
-    Pose {
-        translation_m: Some(Vector3 { x, y: 0.0, z: 0.0 }),
-        rotation: Some(Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }),
-    }
+fn at(x: f64) -> Result<Pose, DemoError> {
+    Pose::from_quaternion(Vector3::new(x, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0]).map_err(failed("placing the objects"))
 }
 
-/// The three outcomes in the order asked for.
-fn sample(x: f64, outcomes: &[Outcome]) -> Option<Sample> {
-    let [Outcome::Distance(d), Outcome::LevelDistanceAOnB(ab), Outcome::LevelDistanceBOnA(ba)] = outcomes else {
-        return None;
-    };
+/// The three answers in the order asked for.
+fn sample(x: f64, rows: &[PairRow]) -> Option<Sample> {
+    let answer = |row: &PairRow| Some(Answer { value: row.value?, lower: row.answer.lower, upper: row.answer.upper });
+    let [distance, chair_on_human, human_on_chair] = rows else { return None };
     Some(Sample {
         x,
-        distance: Answer { value: d.value_m, lower: d.lower_m, upper: d.upper_m },
-        chair_on_human: Answer { value: ab.value, lower: ab.lower, upper: ab.upper },
-        human_on_chair: Answer { value: ba.value, lower: ba.lower, upper: ba.upper },
+        distance: answer(distance)?,
+        chair_on_human: answer(chair_on_human)?,
+        human_on_chair: answer(human_on_chair)?,
     })
 }
 

@@ -2,14 +2,16 @@
 
 use std::borrow::Cow;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use super::Phase;
 use super::request::{FitPlan, RequestError, asked_group, body_name, enclosing, plan};
-use crate::body::{Body, Compound, Obstacle, SosBody};
+use crate::body::{Body, Compound, Obstacle, Shape, SosBody};
 use crate::fit::{
     CompoundFit, Cover, EncloseError, FitError, Group, Mesh, Progress, Representation, Rung, SosFit, cheapest_within,
     coarsest_within, enclose_obstacles, fit, fit_parts, fit_sos, group, ladder, thicken, trim,
 };
+use crate::scene::{Geometry, Ladder};
 use crate::store::{FitOptimum, FitOutcome, FitPreparation, FitRequest, FittedBody, FittedKind};
 
 /// All that a request made.
@@ -19,6 +21,8 @@ pub struct FitOutput {
     pub outcome: FitOutcome,
     /// What it made.
     pub shapes: Shapes,
+    /// The ladder of the bodies, if they make one.
+    pub ladder: Option<Arc<Ladder>>,
 }
 
 /// What a request can make.
@@ -46,14 +50,16 @@ pub enum Failure {
     Group(#[from] EncloseError),
 }
 
-impl Shapes {
-    /// The bodies, which a catalogue keeps; and the file of what it does not.
-    pub(super) fn into_stored(self) -> (Vec<Body>, Option<String>) {
-        match self {
-            Self::Bodies(bodies) => (bodies, None),
-            Self::Compound(compound) => (Vec::new(), Some(compound.to_json())),
-            Self::SosBody(body) => (Vec::new(), Some(body.to_json())),
-        }
+impl FitOutput {
+    /// All of it as a catalogue keeps it.
+    pub(super) fn into_stored(self) -> Vec<Geometry> {
+        let mut stored: Vec<Geometry> = match self.shapes {
+            Shapes::Bodies(bodies) => bodies.into_iter().map(Geometry::from).collect(),
+            Shapes::Compound(compound) => vec![(*compound).into()],
+            Shapes::SosBody(body) => vec![(*body).into()],
+        };
+        stored.extend(self.ladder.map(Geometry::Ladder));
+        stored
     }
 }
 
@@ -109,7 +115,8 @@ impl From<SosFit> for FitOutput {
 
 impl FitOutput {
     fn new(bodies: Vec<FittedBody>, shapes: Shapes) -> Self {
-        Self { outcome: FitOutcome { bodies, left_out: 0, left_out_m: 0.0 }, shapes }
+        let outcome = FitOutcome { bodies, ladder: None, left_out: 0, left_out_m: 0.0 };
+        Self { outcome, shapes, ladder: None }
     }
 }
 
@@ -148,7 +155,7 @@ fn fit_prepared(
     let (name, points) = (&request.name, &mesh.points);
     Ok(match plan(request) {
         FitPlan::Body(options) => vec![fit(name, points, &options, tell)?.into()].into(),
-        FitPlan::Ladder(options) => ladder(name, points, &options, tell)?.into(),
+        FitPlan::Ladder(options) => as_ladder(name, ladder(name, points, &options, tell)?.into()),
         FitPlan::WithinGap(most_m, options) if mesh.triangles.is_empty() => {
             vec![coarsest_within(name, points, most_m, &options, tell)?].into()
         }
@@ -157,6 +164,21 @@ fn fit_prepared(
         FitPlan::SosBody(options) => fit_sos(name, points, &mesh.triangles, &options, tell)?.into(),
         FitPlan::Group(_) => return Err(about_bodies().into()),
     })
+}
+
+/// Rungs with the ladder that they make; a single one makes none.
+fn as_ladder(name: &str, mut made: FitOutput) -> FitOutput {
+    if let Shapes::Bodies(bodies) = &made.shapes {
+        let rungs = bodies.iter().cloned().map(|body| Arc::new(Shape::Body(Box::new(body)))).collect();
+        match Ladder::new(name, rungs) {
+            Ok(ladder) => {
+                made.outcome.ladder = Some(ladder.id().to_string());
+                made.ladder = Some(Arc::new(ladder));
+            }
+            Err(error) => tracing::warn!(name, %error, "the rungs of a fit make no ladder"),
+        }
+    }
+    made
 }
 
 fn about_bodies() -> RequestError {

@@ -44,9 +44,8 @@ impl Jobs {
     /// # Errors
     /// When there is no such job, or when the disk fails.
     pub fn cancel(&self, catalogue: &Catalogue, id: u64) -> Result<Arc<Job>, CatalogueError> {
-        let job = catalogue.change_job(id, Vec::new(), None, |job| {
-            (!job.state.is_final()).then_some((JobState::Cancelled, job.attempts))
-        })?;
+        let job = catalogue
+            .change_job(id, Vec::new(), |job| (!job.state.is_final()).then_some((JobState::Cancelled, job.attempts)))?;
         self.tell(|board| board.stop(id));
         Ok(job)
     }

@@ -6,10 +6,8 @@ use nalgebra::Vector3;
 use tokio::task::spawn_blocking;
 
 use super::worker::{claim, ended, finish, put_back, recover};
-use super::{FitOutput, Jobs, Shapes, fit_group, fit_mesh};
-use crate::body::Compound;
-use crate::fit::{FitOptions, fit};
-use crate::store::{Catalogue, FitBody, FitGroup, FitOutcome, FitPolynomial, FitRequest, JobState, NewJob, Store};
+use super::{Jobs, fit_group, fit_mesh};
+use crate::store::{Catalogue, FitBody, FitGroup, FitPolynomial, FitRequest, JobState, NewJob, Store};
 use sublevel_testkit::Seeded;
 
 fn request(degree: usize) -> FitRequest {
@@ -39,8 +37,7 @@ fn a_job_that_is_cancelled_before_it_is_on_the_board_makes_nothing() {
     assert_eq!(jobs.cancel(&catalogue, id).expect("cancelled").state, JobState::Cancelled);
     jobs.tell(|board| board.begin(id));
     jobs.fit(&catalogue, &job).expect_err("nothing to fit");
-    let state =
-        finish(&catalogue, id, &(JobState::Failed("why".into()), Vec::new(), None)).expect("as it is").state.clone();
+    let state = finish(&catalogue, id, &(JobState::Failed("why".into()), Vec::new())).expect("as it is").state.clone();
     assert_eq!(state, JobState::Cancelled);
 }
 
@@ -80,24 +77,6 @@ fn a_kill_counts_as_an_attempt_and_an_orderly_stop_does_not() {
     assert!(claim(&catalogue).expect("the disk works").is_none());
 }
 
-/// A compound is kept with its job, and fails it where no message could hand it out.
-#[test]
-fn a_file_is_kept_if_it_fits_in_a_message() {
-    let mut random = Seeded(7);
-    let points: Vec<_> = (0..60).map(|_| Vector3::from_fn(|_, _| random.signed())).collect();
-    let unwatched = &mut |_| std::ops::ControlFlow::Continue(());
-    let body = fit("it", &points, &FitOptions::default(), unwatched).expect("a fit").body;
-    for (parts, fits) in [(2, true), (256, false)] {
-        let compound = Compound::new("it", vec![body.clone(); parts]).expect("a compound");
-        let outcome = FitOutcome { bodies: Vec::new(), left_out: 0, left_out_m: 0.0 };
-        let file = compound.to_json();
-        let made = FitOutput { outcome, shapes: Shapes::Compound(Box::new(compound)) };
-        let (state, bodies, kept) = ended(Ok(Ok(made)));
-        assert_eq!(matches!(state, JobState::Succeeded(_)), fits, "{} bytes: {state:?}", file.len());
-        assert!(bodies.is_empty() && (!fits || kept == Some(file)));
-    }
-}
-
 #[tokio::test]
 async fn a_panic_is_a_failed_job_with_its_message() {
     let points: Vec<u8> = Vec::new();
@@ -108,7 +87,7 @@ async fn a_panic_is_a_failed_job_with_its_message() {
     ];
     for (panic, word) in panics {
         match ended(panic.await) {
-            (JobState::Failed(why), bodies, None) => assert!(why.contains(word) && bodies.is_empty(), "{why}"),
+            (JobState::Failed(why), bodies) => assert!(why.contains(word) && bodies.is_empty(), "{why}"),
             (state, ..) => panic!("{state:?}"),
         }
     }

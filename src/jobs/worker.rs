@@ -10,10 +10,10 @@ use tokio::sync::watch;
 use tokio::task::{JoinError, spawn_blocking};
 
 use super::{Board, FitOutput, Jobs, Phase, fit_group, fit_mesh};
-use crate::body::Body;
-use crate::body::Obstacle;
+use crate::body::{Obstacle, Shape};
 use crate::fit::{self, Mesh};
-use crate::store::{Catalogue, CatalogueError, Job, JobState, MAX_FILE_BYTES};
+use crate::scene::Geometry;
+use crate::store::{Catalogue, CatalogueError, Job, JobState};
 
 /// Attempts at a job. One that was running whenever the server was killed may be what kills it.
 const MAX_ATTEMPTS: u32 = 2;
@@ -23,9 +23,8 @@ const PAUSE: Duration = Duration::from_secs(1);
 
 type Fitted = Result<Result<FitOutput, String>, JoinError>;
 
-/// The state that a fit leaves its job in, the bodies to be stored, and the file to be kept with
-/// it.
-pub(super) type Ended = (JobState, Vec<Body>, Option<String>);
+/// The state that a fit leaves its job in, and the bodies to be stored.
+pub(super) type Ended = (JobState, Vec<Geometry>);
 
 impl Jobs {
     /// Fits job after job once the catalogue is loaded, until [`Jobs::stop`]; the jobs that a kill
@@ -93,8 +92,9 @@ impl Jobs {
         let made = match job.request.group() {
             Some(group) => {
                 let body = |id| {
-                    let found = catalogue.body(id).map(|body| Obstacle::from((*body).clone()));
-                    found.ok_or_else(|| format!("body {id} was deleted meanwhile; create it again"))
+                    let found = catalogue.geometry(id);
+                    obstacle(&found.ok_or_else(|| format!("body {id} was deleted meanwhile; create it again"))?)
+                        .ok_or_else(|| format!("body {id} is no single body; a group takes bodies and sos-bodies"))
                 };
                 let bodies = group.body_ids.iter().map(body).collect::<Result<Vec<_>, _>>()?;
                 fit_group(&job.request, &bodies, progress)
@@ -126,10 +126,22 @@ impl Jobs {
     }
 }
 
+/// What a group can hold.
+fn obstacle(geometry: &Geometry) -> Option<Obstacle> {
+    match geometry {
+        Geometry::Solid(shape) => match &**shape {
+            Shape::Body(body) => Some(Obstacle::from((**body).clone())),
+            Shape::Compound(_) => None,
+        },
+        Geometry::SosBody(body) => Some(Obstacle::from((**body).clone())),
+        Geometry::Ladder(_) | Geometry::HalfSpace(_) => None,
+    }
+}
+
 /// Jobs that were running when the server was killed: back into the queue, or given up.
 pub(super) fn recover(catalogue: &Catalogue) -> Result<(), CatalogueError> {
     while let Some(job) = catalogue.first_job(&JobState::Running) {
-        let job = catalogue.change_job(job.id, Vec::new(), None, |job| {
+        let job = catalogue.change_job(job.id, Vec::new(), |job| {
             let state = if job.attempts < MAX_ATTEMPTS {
                 JobState::Queued
             } else {
@@ -151,7 +163,7 @@ pub(super) fn claim(catalogue: &Catalogue) -> Result<Option<Arc<Job>>, Catalogue
     let Some(job) = catalogue.first_job(&JobState::Queued) else { return Ok(None) };
     let is_queued = |job: &Job| job.state == JobState::Queued;
     let job = catalogue
-        .change_job(job.id, Vec::new(), None, |job| is_queued(job).then_some((JobState::Running, job.attempts + 1)))?;
+        .change_job(job.id, Vec::new(), |job| is_queued(job).then_some((JobState::Running, job.attempts + 1)))?;
     // Cancelled meanwhile: who asks for news learns of it and comes back.
     Ok(Some(job).filter(|job| job.state == JobState::Running))
 }
@@ -159,7 +171,7 @@ pub(super) fn claim(catalogue: &Catalogue) -> Result<Option<Arc<Job>>, Catalogue
 /// Back into the queue, as if it had not been begun.
 pub(super) fn put_back(catalogue: &Catalogue, id: u64) -> Result<(), CatalogueError> {
     let is_running = |job: &Job| job.state == JobState::Running;
-    catalogue.change_job(id, Vec::new(), None, |job| {
+    catalogue.change_job(id, Vec::new(), |job| {
         is_running(job).then(|| (JobState::Queued, job.attempts.saturating_sub(1)))
     })?;
     Ok(())
@@ -167,28 +179,16 @@ pub(super) fn put_back(catalogue: &Catalogue, id: u64) -> Result<(), CatalogueEr
 
 /// The end of a job, unless it was cancelled meanwhile.
 pub(super) fn finish(catalogue: &Catalogue, id: u64, ended: &Ended) -> Result<Arc<Job>, CatalogueError> {
-    let (state, bodies, file) = ended;
+    let (state, bodies) = ended;
     let is_running = |job: &Job| job.state == JobState::Running;
-    catalogue
-        .change_job(id, bodies.clone(), file.as_deref(), |job| is_running(job).then(|| (state.clone(), job.attempts)))
+    catalogue.change_job(id, bodies.clone(), |job| is_running(job).then(|| (state.clone(), job.attempts)))
 }
 
 /// What a fit leaves.
 pub(super) fn ended(fitted: Fitted) -> Ended {
-    let failed = |why| (JobState::Failed(why), Vec::new(), None);
+    let failed = |why| (JobState::Failed(why), Vec::new());
     match fitted {
-        Ok(Ok(FitOutput { outcome, shapes })) => {
-            let (bodies, file) = shapes.into_stored();
-            let longest = bodies.iter().map(|body| body.to_json().len()).chain(file.as_ref().map(String::len)).max();
-            match longest {
-                // Nobody could fetch it.
-                Some(bytes) if bytes > MAX_FILE_BYTES => failed(format!(
-                    "its file has {bytes} bytes, and a message hands out {MAX_FILE_BYTES} at most; ask for a lower degree, fewer \
-                     parts or a smaller group, or fit it without a server"
-                )),
-                _ => (JobState::Succeeded(outcome), bodies, file),
-            }
-        }
+        Ok(Ok(output)) => (JobState::Succeeded(output.outcome.clone()), output.into_stored()),
         Ok(Err(why)) => failed(why),
         Err(error) => {
             let what =

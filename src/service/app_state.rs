@@ -4,11 +4,15 @@
 use std::sync::Arc;
 use std::thread;
 
-use tokio::sync::{Semaphore, watch};
+use tokio::sync::{Semaphore, oneshot, watch};
 use tonic::Status;
 
+use crate::scene::{Crew, Panicked, Question, Stop};
 use crate::store::{Catalogue, CatalogueError};
 
+use super::blobs::Blobs;
+use super::body_mesh::Meshes;
+use super::call_time::{CallTime, until};
 use super::error;
 use super::limits::LOADING_PATIENCE;
 
@@ -17,8 +21,14 @@ use super::limits::LOADING_PATIENCE;
 #[derive(Debug, Clone)]
 pub(super) struct AppState {
     catalogue: watch::Receiver<Option<Arc<Catalogue>>>,
-    /// One share of a query per core; who waits is let in in turn.
+    /// Answers questions on all cores.
+    crew: Arc<Crew>,
+    /// Trees of scenes, and large answers, are made on one thread per core; who waits is let in in
+    /// turn.
     solving: Arc<Semaphore>,
+    stopping: watch::Receiver<bool>,
+    blobs: Arc<Blobs>,
+    meshes: Arc<Meshes>,
     /// Half the cores at most re-prove new bodies, which takes long; queries go on beside it.
     proving: Arc<Semaphore>,
     /// Changes are made one after the other; they wait here rather than on a thread.
@@ -26,10 +36,79 @@ pub(super) struct AppState {
 }
 
 impl AppState {
-    pub(super) fn new(catalogue: watch::Receiver<Option<Arc<Catalogue>>>) -> Self {
+    pub(super) fn new(
+        catalogue: watch::Receiver<Option<Arc<Catalogue>>>,
+        stopping: watch::Receiver<bool>,
+    ) -> std::io::Result<Self> {
         let cores = thread::available_parallelism().map_or(1, usize::from);
         let limit = |permits| Arc::new(Semaphore::new(permits));
-        Self { catalogue, solving: limit(cores), proving: limit(cores.div_ceil(2)), changing: limit(1) }
+        Ok(Self {
+            catalogue,
+            crew: Arc::new(Crew::new(cores)?),
+            solving: limit(cores),
+            stopping,
+            blobs: Arc::default(),
+            meshes: Arc::default(),
+            proving: limit(cores.div_ceil(2)),
+            changing: limit(1),
+        })
+    }
+
+    /// Becomes true when the server stops.
+    pub(super) fn stopping(&self) -> watch::Receiver<bool> {
+        self.stopping.clone()
+    }
+
+    /// Files in pieces.
+    pub(super) fn blobs(&self) -> &Blobs {
+        &self.blobs
+    }
+
+    /// Meshes of bodies that were asked for.
+    pub(super) fn meshes(&self) -> &Meshes {
+        &self.meshes
+    }
+
+    /// Whether the catalogue is loaded.
+    pub(super) fn is_loaded(&self) -> bool {
+        self.catalogue.borrow().is_some()
+    }
+
+    /// The threads that answer questions.
+    pub(super) fn crew(&self) -> Arc<Crew> {
+        self.crew.clone()
+    }
+
+    /// Answers a question on all cores. It ends with what is known when the budget is over, and
+    /// without an answer at the deadline or when the caller is gone.
+    pub(super) async fn ask<Q: Question>(&self, question: Arc<Q>, time: CallTime) -> Result<Vec<Q::Part>, Status> {
+        let stop = Arc::<Stop>::default();
+        let (sender, receiver) = oneshot::channel();
+        self.crew.submit(question, stop.clone(), move |parts| {
+            let _ = sender.send(parts);
+        });
+        let parts = ended(async { receiver.await.unwrap_or(Err(Panicked)) }, &stop, time).await?;
+        parts.map_err(|_| error::abandoned())
+    }
+
+    /// Runs a search that asks several questions, one after the other, with the same limits of
+    /// time.
+    pub(super) async fn search<T: Send + 'static>(
+        &self,
+        search: impl FnOnce(&Arc<Stop>) -> T + Send + 'static,
+        time: CallTime,
+    ) -> Result<T, Status> {
+        let stop = Arc::<Stop>::default();
+        let flag = stop.clone();
+        ended(on_thread(&self.solving, move || search(&flag)), &stop, time).await?
+    }
+
+    /// Prepares a question, such as by making the tree of a scene.
+    pub(super) async fn prepare<T: Send + 'static>(
+        &self,
+        prepare: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, Status> {
+        on_thread(&self.solving, prepare).await
     }
 
     /// The catalogue; waits a little while it is loading, so that a client that starts along with
@@ -58,21 +137,48 @@ impl AppState {
         on_thread(&self.changing, move || change(&catalogue)).await?.map_err(|error| error::catalogue(&error, field))
     }
 
-    /// Answers a share of a query, or writes a large answer; keep it short, for others wait in
-    /// turn.
-    pub(super) async fn solve<T: Send + 'static>(
-        &self,
-        solve: impl FnOnce() -> T + Send + 'static,
-    ) -> Result<T, Status> {
-        on_thread(&self.solving, solve).await
-    }
-
     /// Proves a new body.
     pub(super) async fn prove<T: Send + 'static>(
         &self,
         prove: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Status> {
         on_thread(&self.proving, prove).await
+    }
+}
+
+/// Waits until the server stops.
+pub(super) async fn stopped(stopping: &mut watch::Receiver<bool>) {
+    // A sender that is gone has stopped, too.
+    let _ = stopping.wait_for(|stopping| *stopping).await;
+}
+
+/// Waits for work, stopping it when its time is over or the caller is gone.
+async fn ended<T>(work: impl Future<Output = T>, stop: &Arc<Stop>, time: CallTime) -> Result<T, Status> {
+    /// Abandons the work unless it came to its end.
+    struct Guard(Option<Arc<Stop>>);
+    impl Drop for Guard {
+        fn drop(&mut self) {
+            if let Some(stop) = self.0.take() {
+                stop.abandon();
+            }
+        }
+    }
+    let mut guard = Guard(Some(stop.clone()));
+    tokio::pin!(work);
+    let mut budget = time.budget;
+    loop {
+        tokio::select! {
+            biased;
+            done = &mut work => {
+                guard.0 = None;
+                return Ok(done);
+            }
+            () = until(time.deadline) => return Err(error::deadline()),
+            () = until(budget) => {
+                stop.set();
+                budget = None;
+            }
+        }
     }
 }
 

@@ -15,8 +15,10 @@ use tonic::body::Body;
 use tonic::codegen::{BoxFuture, Service, http};
 use tonic::server::NamedService;
 
+use super::call_time::{CallTime, Deadline, until};
 use super::error;
 use super::limits::{CALL_LIMIT, MAX_CALLS};
+use super::message_limit::Measured;
 
 /// Makes services share one limit.
 #[derive(Debug, Clone)]
@@ -60,11 +62,23 @@ where
         // Generated services are always ready, so the clone is as ready as the original.
         let (mut inner, limit) = (self.inner.clone(), self.limit.0.clone());
         Box::pin(async move {
-            let _permit = limit.acquire_owned().await;
             let path = request.uri().path().to_owned();
+            let deadline = CallTime::deadline(request.headers());
+            let _permit = tokio::select! {
+                permit = limit.acquire_owned() => permit,
+                () = until(deadline) => return Ok(error::deadline().into_http()),
+            };
+            let mut request = request.map(|body| Body::new(Measured::new(body)));
+            if let Some(deadline) = deadline {
+                request.extensions_mut().insert(Deadline(deadline));
+            }
             // A message that never comes to its end would keep its place for ever.
-            let answer = tokio::time::timeout(CALL_LIMIT, inner.call(request)).await;
-            let response = answer.unwrap_or_else(|_| Ok(error::too_slow(CALL_LIMIT).into_http()))?;
+            let answer = tokio::time::timeout(CALL_LIMIT, inner.call(request));
+            let response = tokio::select! {
+                biased;
+                answer = answer => answer.unwrap_or_else(|_| Ok(error::too_slow(CALL_LIMIT).into_http()))?,
+                () = until(deadline) => error::deadline().into_http(),
+            };
             if let Some(status) = Status::from_header_map(response.headers()) {
                 tracing::debug!(call = path, code = ?status.code(), why = status.message(), "refused");
             }

@@ -10,7 +10,10 @@ use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt};
 
 use crate::scene::{Entry, List, SceneError};
-use crate::store::{CatalogueError, StoreError};
+use crate::store::{CatalogueError, MAX_FORKS, StoreError};
+
+use super::limits::MAX_MESSAGE_BYTES;
+use super::proto::StreamError;
 
 /// A field of a request that cannot be used.
 #[derive(Debug)]
@@ -43,6 +46,91 @@ pub(super) fn not_found(kind: &str, name: &str, field: &str, why: impl fmt::Disp
     details.set_resource_info(kind, name, "", why.clone());
     details.add_bad_request_violation(field, why.clone());
     Status::with_error_details(Code::NotFound, format!("{field}: {why}"), details)
+}
+
+/// ABORTED: somebody else was first; `revision` is where the scene is now.
+pub(super) fn aborted(reason: &str, field: &str, why: impl fmt::Display, revision: u64) -> Status {
+    let mut details = details_with(reason, [("revision", revision.to_string())]);
+    let why = short(why.to_string());
+    details.add_bad_request_violation(field, why.clone());
+    Status::with_error_details(Code::Aborted, why, details)
+}
+
+/// RESOURCE_EXHAUSTED where a list is longer than its limit, which has a name in `Limits`.
+pub(super) fn at_most(field: &str, count: usize, (name, limit): (&str, usize)) -> Result<(), Status> {
+    if count <= limit {
+        return Ok(());
+    }
+    let why = format!("asks for {count}, and a call takes at most {limit} ({name}); split it into several calls");
+    let mut details = details_with("LIMIT_EXCEEDED", [("limit", name.to_owned()), ("value", limit.to_string())]);
+    details.add_bad_request_violation(field, why.clone());
+    Err(Status::with_error_details(Code::ResourceExhausted, format!("{field}: {why}"), details))
+}
+
+/// RESOURCE_EXHAUSTED for a message that is longer than its limit.
+pub(super) fn message_fits(bytes: usize) -> Result<(), Status> {
+    let limit = MAX_MESSAGE_BYTES;
+    if bytes <= limit {
+        return Ok(());
+    }
+    let message = format!(
+        "the message has {bytes} bytes, and one may have {limit} (max_message_bytes); split it, or upload files with \
+         UploadBlob"
+    );
+    let limits = [("limit", "max_message_bytes".to_owned()), ("value", limit.to_string())];
+    Err(Status::with_error_details(Code::ResourceExhausted, message, details_with("LIMIT_EXCEEDED", limits)))
+}
+
+/// RESOURCE_EXHAUSTED where an answer does not fit in a message.
+pub(super) fn fits(response: &impl prost::Message) -> Result<(), Status> {
+    let (bytes, limit) = (response.encoded_len(), MAX_MESSAGE_BYTES);
+    if bytes <= limit {
+        return Ok(());
+    }
+    let message = format!(
+        "the answer has {bytes} bytes, and a message at most {limit} (max_message_bytes); ask for fewer pairs, states \
+         or outputs, or for LAYOUT_COLUMNS"
+    );
+    let limits = [("limit", "max_message_bytes".to_owned()), ("value", limit.to_string())];
+    Err(Status::with_error_details(Code::ResourceExhausted, message, details_with("LIMIT_EXCEEDED", limits)))
+}
+
+/// FAILED_PRECONDITION: a body without a bounded surface.
+pub(super) fn no_surface(id: &str) -> Status {
+    let message = format!("body {id} is a half-space, which has no bounded surface; draw its plane");
+    failed_precondition("NO_SURFACE", &format!("body/{id}"), message)
+}
+
+/// DEADLINE_EXCEEDED: the client's own time is over.
+pub(super) fn deadline() -> Status {
+    let message = "the deadline of the call has passed; ask for less, allow more time, or send budget_ms for what is \
+                   known by then";
+    Status::with_error_details(Code::DeadlineExceeded, message, details("DEADLINE"))
+}
+
+/// INTERNAL: a question ended without an answer.
+pub(super) fn abandoned() -> Status {
+    tracing::error!("a question was ended by a panic");
+    let message = "the question was ended by a panic in the server; its log says more, please report it";
+    Status::with_error_details(Code::Internal, message, details("INTERNAL_PANIC"))
+}
+
+/// INTERNAL for what cannot happen.
+pub(super) fn internal(error: &dyn fmt::Display) -> Status {
+    tracing::error!(%error, "a defect");
+    Status::with_error_details(Code::Internal, "a defect of the server; please report it", details("INTERNAL"))
+}
+
+/// A status inside a stream that goes on.
+pub(super) fn in_stream(status: &Status) -> StreamError {
+    let details = status.get_error_details();
+    let violation = details.bad_request().and_then(|bad| bad.field_violations.first());
+    StreamError {
+        code: u32::try_from(i32::from(status.code())).unwrap_or(0),
+        reason: details.error_info().map(|info| info.reason.clone()).unwrap_or_default(),
+        field: violation.map(|violation| violation.field.clone()).unwrap_or_default(),
+        message: status.message().to_owned(),
+    }
 }
 
 /// UNAVAILABLE: the client may try again.
@@ -83,16 +171,24 @@ pub(super) fn catalogue(error: &CatalogueError, field: &str) -> Status {
             Status::with_error_details(Code::AlreadyExists, message, details)
         }
         CatalogueError::NoMember { index, id } => {
-            not_found("body", &id.to_string(), &format!("header.options.group.body_ids[{index}]"), message)
+            not_found("body", &id.to_string(), &format!("options.group.body_ids[{index}]"), message)
         }
-        CatalogueError::NoJob(id) => not_found("fit", id, field, message),
+        CatalogueError::RungUsed { id, .. } => failed_precondition("BODY_IN_USE", &format!("body/{id}"), message),
+        CatalogueError::NoJob(id) => not_found("job", id, field, message),
         CatalogueError::RequestUsed { request_id, .. } => {
             let mut details = details("REQUEST_ID_USED");
-            details.set_resource_info("fit", request_id, "", message.clone());
+            details.set_resource_info("job", request_id, "", message.clone());
             Status::with_error_details(Code::AlreadyExists, message, details)
         }
         CatalogueError::QueueFull => {
             Status::with_error_details(Code::ResourceExhausted, message, details("QUEUE_FULL"))
+        }
+        CatalogueError::NoFork(_) => failed_precondition("NOT_A_FORK", "fork", message),
+        CatalogueError::NoParent { .. } => failed_precondition("PARENT_GONE", "fork", message),
+        CatalogueError::ParentChanged { current, .. } => aborted("PARENT_CHANGED", field, message, *current),
+        CatalogueError::TooManyForks => {
+            let limits = [("limit", "max_forks".to_owned()), ("value", MAX_FORKS.to_string())];
+            Status::with_error_details(Code::ResourceExhausted, message, details_with("LIMIT_EXCEEDED", limits))
         }
         CatalogueError::SceneName(error) => Invalid::new(field, error).into(),
         CatalogueError::Scene(error) => scene(error),
@@ -103,14 +199,20 @@ pub(super) fn catalogue(error: &CatalogueError, field: &str) -> Status {
 fn scene(error: &SceneError) -> Status {
     let invalid = |at: &Entry, leaf| Invalid::new(path(at, leaf), error).into();
     match error {
-        SceneError::Revision { .. } => failed_precondition("REVISION_MISMATCH", "expected_revision", error.to_string()),
+        SceneError::Revision { current, .. } => aborted("REVISION_MISMATCH", "expected_revision", error, *current),
         SceneError::Full { .. } => failed_precondition("SCENE_FULL", "scene", error.to_string()),
         SceneError::NoObject { at, name } => not_found("object", name, &path(at, Leaf::Name), error),
         SceneError::NoBody { at, id } => not_found("body", &id.to_string(), &path(at, Leaf::Body), error),
         SceneError::Group { at } => invalid(at, Leaf::Group),
+        SceneError::Padding { at, .. } => invalid(at, Leaf::Padding),
+        SceneError::NoPose { at, .. } => invalid(at, Leaf::Pose),
+        SceneError::NoPlace { at, .. } => invalid(at, Leaf::Attachment),
         SceneError::Name { at, .. } | SceneError::Twice { at, .. } | SceneError::Itself { at, .. } => {
             invalid(at, Leaf::Name)
         }
+        SceneError::Pose { .. } => Invalid::new("set_poses", error).into(),
+        SceneError::Circle { .. } => Invalid::new("attach", error).into(),
+        SceneError::Holds { .. } => failed_precondition("OBJECT_HOLDS", "remove_objects", error.to_string()),
     }
 }
 
@@ -119,6 +221,9 @@ enum Leaf {
     Name,
     Body,
     Group,
+    Pose,
+    Padding,
+    Attachment,
 }
 
 /// Path of an entry of an update in `UpdateSceneRequest`.
@@ -129,12 +234,23 @@ fn path(at: &Entry, leaf: Leaf) -> String {
         List::Removals => "remove_objects",
         List::Allow => "allow_pairs",
         List::Forbid => "forbid_pairs",
+        List::ObjectPaddings => "set_object_paddings",
+        List::GroupPaddings => "set_group_paddings",
+        List::PairPaddings => "set_pair_paddings",
+        List::Attach => "attach",
+        List::Detach => "detach",
     };
     let leaf = match (at.list, leaf) {
-        (List::Removals | List::Allow | List::Forbid, _) => "",
+        (List::Removals | List::Allow | List::Forbid | List::Detach, _) => "",
+        (List::ObjectPaddings | List::Attach, Leaf::Name) => ".object",
+        (List::GroupPaddings, Leaf::Name) => ".group",
+        (List::PairPaddings, Leaf::Name) => ".pair",
         (_, Leaf::Name) => ".name",
         (_, Leaf::Body) => ".body_id",
         (_, Leaf::Group) => ".group",
+        (_, Leaf::Pose) => ".pose",
+        (_, Leaf::Padding) => ".padding_m",
+        (_, Leaf::Attachment) => ".attachment.pose",
     };
     format!("{list}[{}]{leaf}", at.index)
 }
@@ -154,7 +270,12 @@ fn store(error: &StoreError) -> Status {
 }
 
 fn details(reason: &str) -> ErrorDetails {
-    ErrorDetails::with_error_info(reason, "sublevel", HashMap::new())
+    details_with(reason, [])
+}
+
+fn details_with<const N: usize>(reason: &str, about: [(&str, String); N]) -> ErrorDetails {
+    let about: HashMap<String, String> = about.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
+    ErrorDetails::with_error_info(reason, "sublevel", about)
 }
 
 /// Statuses travel in headers, which clients limit; a reason that quotes the input is cut.

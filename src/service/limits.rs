@@ -5,12 +5,32 @@ use std::time::Duration;
 /// Largest message in both directions, in bytes; tonic answers OUT_OF_RANGE above it.
 pub const MAX_MESSAGE_BYTES: usize = 4 << 20;
 
-/// Most results (pairs times measures) of one Evaluate.
-pub const MAX_EVALUATIONS: usize = 4096;
+/// Most answers (pairs times measures) of one Evaluate.
+pub const MAX_ANSWERS: usize = 1 << 17;
 
-/// Pairs an Evaluate solves before it lets other calls go first: some tens of milliseconds at
-/// worst.
-pub const PAIRS_AT_ONCE: usize = 32;
+/// Most states of one CheckStates or Clearance.
+pub const MAX_STATES: usize = 1 << 16;
+
+/// Most poses (states times objects) of one CheckStates or Clearance: what fits in a message.
+pub const MAX_STATE_POSES: usize = MAX_MESSAGE_BYTES / 56;
+
+/// Most rays of one CastRays.
+pub const MAX_RAYS: usize = 1 << 16;
+
+/// Objects of a page of GetScene when the request does not say.
+pub const DEFAULT_OBJECTS_PAGE: usize = 1000;
+
+/// Most objects of a page of GetScene.
+pub const MAX_OBJECTS_PAGE: usize = 10_000;
+
+/// Pause between two messages of WatchScene and Watch when the request does not say: 60 Hz.
+pub const DEFAULT_WATCH_PAUSE: Duration = Duration::from_micros(16_667);
+
+/// How long a question waits for the revision it asks for.
+pub const REVISION_PATIENCE: Duration = Duration::from_secs(1);
+
+/// How often streamed poses are written.
+pub const POSES_WRITTEN_EVERY: Duration = Duration::from_millis(500);
 
 /// Items of a page when the request does not say.
 pub const DEFAULT_PAGE: usize = 100;
@@ -64,14 +84,29 @@ pub const MAX_FIT_TRIANGLES: usize = 4 << 20;
 /// Most bodies of one group: the hulls of all pairs are looked at before the first program.
 pub const MAX_GROUP_BODIES: usize = 256;
 
-/// Longest mesh file of a fit job, in bytes.
-pub const MAX_MESH_BYTES: usize = 128 << 20;
+/// Longest blob, in bytes.
+pub const MAX_BLOB_BYTES: usize = 128 << 20;
 
-/// Uploads that are read at once, each with as much in memory; further ones wait unread.
+/// Most bytes of all blobs together.
+pub const MAX_BLOBS_BYTES: usize = 512 << 20;
+
+/// Time after which a blob that nobody uses is forgotten.
+pub const BLOB_IDLE: Duration = Duration::from_secs(600);
+
+/// Divisions of the edges of a body's mesh when the request does not say.
+pub const DEFAULT_MESH_DIVISIONS: u32 = 8;
+
+/// Most divisions of the edges of a body's mesh.
+pub const MAX_MESH_DIVISIONS: u32 = 32;
+
+/// Meshes that are kept for those who ask again.
+pub const MAX_KEPT_MESHES: usize = 64;
+
+/// Meshes of fits that are read at once; further ones wait.
 pub const MAX_UPLOADS: usize = 2;
 
-/// Most items of a page of fit jobs, whose descriptions are long.
-pub const MAX_FITS_PAGE: usize = 500;
+/// Most items of a page of jobs, whose descriptions are long.
+pub const MAX_JOBS_PAGE: usize = 500;
 
-/// Pause between two messages about a fit job.
+/// Pause between two messages about a job.
 pub const WATCH_PAUSE: Duration = Duration::from_millis(100);

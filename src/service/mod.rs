@@ -1,28 +1,40 @@
 //! The gRPC door: handlers, conversion between wire and domain, limits, errors, starting and
 //! stopping.
 //!
-//! The one layer that knows protobuf. `incoming` lets connections in and `concurrency_limit` calls,
-//! so many at once. A call walks straight through: a handler (`bodies`, `scenes`, `queries`,
-//! `fits`) reads its message with `wire`, asks the catalogue or a scene's snapshot, and writes the
-//! answer with `wire`; whatever fails becomes a status in `error`. Handlers are dropped when a
-//! client goes away, so every change runs in a task of its own and is finished or not begun.
+//! Only this layer and the client know protobuf. `incoming` lets connections in, `concurrency_limit`
+//! calls, and `message_limit` messages. A call walks straight through: a handler (`bodies`, `blobs`,
+//! `scenes`, `queries`, `fits`, `jobs`) reads its message with a `wire`, asks the catalogue or a
+//! scene's snapshot, and writes the answer with the `wire`; whatever fails becomes a status in
+//! `error`. Handlers are dropped when a client goes away, so every change runs in a task of its own
+//! and is finished or not begun, and every question is stopped.
 
 mod app_state;
+mod blob_calls;
+mod blobs;
 mod bodies;
+mod body_mesh;
+mod body_wire;
+mod call_time;
 mod concurrency_limit;
+mod contact_watch;
 mod error;
 #[cfg(feature = "fit")]
-mod fits;
+pub(crate) mod fits;
 mod incoming;
+#[cfg(feature = "fit")]
+mod jobs;
 pub mod limits;
+mod message_limit;
+mod packed;
+mod pose_stream;
 pub mod proto;
-mod push;
 mod queries;
+mod query_wire;
+mod scene_watch;
+mod scene_wire;
 mod scenes;
 mod server;
+mod server_info;
 mod wire;
 
-#[cfg(feature = "fit")]
-pub use fits::{SubmitError, submit};
-pub use push::{PushError, Pushed, push};
 pub use server::{ServeError, ServeOptions, Server, serve};

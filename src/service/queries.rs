@@ -1,135 +1,393 @@
 //! QueryService: snapshot, pairs, solver, answers.
 
-use std::collections::HashMap;
-use std::ops::Range;
 use std::sync::Arc;
 
-use tonic::{Request, Response, Status};
-
-use crate::body::Body;
-use crate::measure::{self, Pose, WarmStart};
-use crate::scene::Scene;
-use crate::store::CatalogueError;
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::{Request, Response, Status, Streaming};
 
 use super::app_state::AppState;
+use super::call_time::CallTime;
 use super::error::{self, Invalid};
-use super::limits::{MAX_EVALUATIONS, PAIRS_AT_ONCE};
-use super::proto::evaluate_result::Outcome;
+use super::limits::{MAX_ANSWERS, MAX_RAYS, MAX_STATE_POSES, MAX_STATES, REVISION_PATIENCE};
+use super::packed::{self, Packed};
+use super::proto::evaluate_request::Question;
 use super::proto::query_service_server::QueryService;
-use super::proto::{EvaluateRequest, EvaluateResponse, EvaluateResult, Measure};
-use super::wire::{self, Accuracy};
+use super::proto::{
+    self, CastRaysRequest, CastRaysResponse, CheckStatesRequest, CheckStatesResponse, ClearanceRequest,
+    ClearanceResponse, EvaluateRequest, EvaluateResponse, EvaluateStreamRequest, EvaluateStreamResponse, StreamError,
+    WatchRequest, WatchResponse,
+};
+use super::query_wire::{NOTHING, NameTable, Outputs};
+use super::{contact_watch, query_wire, wire};
+use crate::scene::query::{
+    Answer, AnswerStatus, Ask, Certainty, Clearance, Found, Pairs, RayAnswer, Rays, StateAnswer, StateVerdict, States,
+    Within, closest_pair, combined,
+};
+use crate::scene::{Scene, Stop};
+use crate::store::CatalogueError;
 
 #[derive(Debug)]
 pub(super) struct Queries(pub(super) AppState);
 
-/// A body where it stands: the snapshot's pose or the call's own.
-struct Placed {
-    body: Arc<Body>,
-    pose: Pose,
-}
-
 #[tonic::async_trait]
 impl QueryService for Queries {
     async fn evaluate(&self, request: Request<EvaluateRequest>) -> Result<Response<EvaluateResponse>, Status> {
+        let time = CallTime::of(&request, request.get_ref().budget_ms)?;
+        evaluate(&self.0, request.get_ref(), time).await.map(Response::new)
+    }
+
+    type EvaluateStreamStream = ReceiverStream<Result<EvaluateStreamResponse, Status>>;
+
+    async fn evaluate_stream(
+        &self,
+        request: Request<Streaming<EvaluateStreamRequest>>,
+    ) -> Result<Response<Self::EvaluateStreamStream>, Status> {
+        let (sender, stream) = mpsc::channel(1);
+        let (app, mut messages) = (self.0.clone(), request.into_inner());
+        // One question after the other: a client that reads slowly is not read on.
+        tokio::spawn(async move {
+            while let Some(message) = messages.message().await.transpose() {
+                let message = match message {
+                    Ok(message) => message,
+                    Err(status) => {
+                        let _ = sender.send(Err(status)).await;
+                        return;
+                    }
+                };
+                let answered = tokio::select! {
+                    answered = answer(&app, message) => answered,
+                    () = sender.closed() => return,
+                };
+                if sender.send(Ok(answered)).await.is_err() {
+                    return;
+                }
+            }
+        });
+        Ok(Response::new(ReceiverStream::new(stream)))
+    }
+
+    async fn check_states(
+        &self,
+        request: Request<CheckStatesRequest>,
+    ) -> Result<Response<CheckStatesResponse>, Status> {
+        let time = CallTime::of(&request, request.get_ref().budget_ms)?;
         let request = request.into_inner();
-        wire::name(&request.scene, "scene")?;
-        let measures = wire::measures(&request)?;
-        let count = request.pairs.len() * measures.len();
-        if count == 0 {
-            return Err(Invalid::new("pairs", "is empty; name at least one pair").into());
-        }
-        if count > MAX_EVALUATIONS {
-            let why = format!("asks for {count} results with these measures; at most {MAX_EVALUATIONS} fit, split it");
-            return Err(Invalid::new("pairs", why).into());
-        }
-        let accuracy = wire::accuracy(request.accuracy.as_ref())?;
-        let overrides = wire::overrides(&request.pose_overrides)?;
-
-        let scene = self
-            .0
-            .catalogue()
-            .await?
-            .scene(&request.scene)
-            .ok_or_else(|| error::catalogue(&CatalogueError::NoScene(request.scene.clone()), "scene"))?;
-        let pairs: Arc<[_]> = resolve(&request, &scene, &overrides)?.into();
-        let measures: Arc<[_]> = measures.into();
+        let scene = snapshot(&self.0, &request.scene, request.at_least_revision).await?;
+        let slots = query_wire::slots(&scene, &request.objects, "objects")?;
+        let margin = query_wire::length(request.margin_m, "margin_m")?;
+        let poses = state_poses(&request.poses, slots.len())?;
         let revision = scene.revision();
-
-        // Every share queues again behind the calls that came meanwhile, so a long call does not
-        // hold up short ones; and when the client goes away this handler is dropped and no further
-        // share is begun.
-        let mut results = Vec::with_capacity(count);
-        for from in (0..pairs.len()).step_by(PAIRS_AT_ONCE) {
-            let (pairs, measures) = (pairs.clone(), measures.clone());
-            let share = from..(from + PAIRS_AT_ONCE).min(pairs.len());
-            results.extend(self.0.solve(move || evaluate(&pairs, share, &measures, accuracy, revision)).await?);
+        let states = States::new(scene.clone(), &slots, poses, margin, request.include_allowed);
+        let mut states = states.map_err(|error| query_wire::states_error(&error))?;
+        match proto::Detail::try_from(request.detail) {
+            Ok(proto::Detail::Unspecified | proto::Detail::Verdicts) => {}
+            Ok(proto::Detail::WorstPair) => {
+                let refused = |error| Invalid::new("accuracy", error);
+                states = states.with_worst_pair(request.accuracy).map_err(refused)?;
+            }
+            Err(_) => return Err(Invalid::new("detail", "is no detail this server knows").into()),
         }
-        Ok(Response::new(EvaluateResponse { results }))
+        if request.stop_at_first {
+            states = states.stopping_at_first();
+        }
+        if request.cold {
+            states = states.cold();
+        }
+        let parts = self.0.ask(Arc::new(states), time).await?;
+        let answers: Vec<StateAnswer> = parts.into_iter().flatten().collect();
+        Ok(Response::new(states_response(&answers, &scene, revision)))
+    }
+
+    async fn clearance(&self, request: Request<ClearanceRequest>) -> Result<Response<ClearanceResponse>, Status> {
+        let time = CallTime::of(&request, request.get_ref().budget_ms)?;
+        let request = request.into_inner();
+        let scene = snapshot(&self.0, &request.scene, request.at_least_revision).await?;
+        let slots = query_wire::slots(&scene, &request.objects, "objects")?;
+        let influence = query_wire::length(request.influence_m, "influence_m")?;
+        let poses = state_poses(&request.poses, slots.len())?;
+        let clearance = Clearance::new(scene.clone(), &slots, poses, influence, request.include_allowed);
+        let mut clearance = clearance.map_err(|error| query_wire::states_error(&error))?;
+        if let Some(accuracy) = request.accuracy {
+            clearance = clearance.with_accuracy(accuracy).map_err(|error| Invalid::new("accuracy", error))?;
+        }
+        if let Some(most) = request.max_pairs {
+            clearance = clearance.with_max_pairs(usize::try_from(most).unwrap_or(usize::MAX));
+        }
+        if request.without_gradients {
+            clearance = clearance.without_gradients();
+        }
+        if request.cold {
+            clearance = clearance.cold();
+        }
+        let parts = self.0.ask(Arc::new(clearance), time).await?;
+        let gradients = !request.without_gradients;
+        let response = query_wire::clearance(parts.into_iter().flatten(), &scene, gradients);
+        error::fits(&response)?;
+        Ok(Response::new(response))
+    }
+
+    async fn cast_rays(&self, request: Request<CastRaysRequest>) -> Result<Response<CastRaysResponse>, Status> {
+        let time = CallTime::of(&request, request.get_ref().budget_ms)?;
+        let request = request.into_inner();
+        let scene = snapshot(&self.0, &request.scene, request.at_least_revision).await?;
+        let selection = query_wire::selection(request.selection.as_ref(), &scene, "selection")?;
+        let origins = packed::rows::<3>(&request.origins_m, "origins_m")?;
+        let directions = packed::rows::<3>(&request.directions, "directions")?;
+        if origins.len() != directions.len() {
+            let why = format!("holds {} rays, and origins_m {}; send as many", directions.len(), origins.len());
+            return Err(Invalid::new("directions", why).into());
+        }
+        if origins.is_empty() {
+            return Err(Invalid::new("origins_m", "is empty; send at least one ray").into());
+        }
+        error::at_most("origins_m", origins.len(), ("max_rays", MAX_RAYS))?;
+        let rays: Vec<_> = origins.into_iter().map(Into::into).zip(directions.into_iter().map(Into::into)).collect();
+        let sizes = (request.max_length_m, request.radius_m.unwrap_or(0.0));
+        let rays = Rays::new(scene.clone(), selection, &rays, sizes).map_err(query_wire::rays_error)?;
+        let rays = match request.accuracy {
+            Some(accuracy) => rays.with_accuracy(accuracy).map_err(|error| Invalid::new("accuracy", error))?,
+            None => rays,
+        };
+        let parts = self.0.ask(Arc::new(rays), time).await?;
+        let answers: Vec<RayAnswer> = parts.into_iter().flatten().collect();
+        Ok(Response::new(rays_response(&answers, &scene)))
+    }
+
+    type WatchStream = ReceiverStream<Result<WatchResponse, Status>>;
+
+    async fn watch(&self, request: Request<WatchRequest>) -> Result<Response<Self::WatchStream>, Status> {
+        let request = request.into_inner();
+        let pause = wire::pause(request.max_rate_hz)?;
+        query_wire::length(request.margin_m, "margin_m")?;
+        wire::name(&request.scene, "scene")?;
+        let missing = || error::catalogue(&CatalogueError::NoScene(request.scene.clone()), "scene");
+        let live = self.0.catalogue().await?.live_scene(&request.scene).ok_or_else(missing)?;
+        // A selection that names nobody is refused now, not in the stream.
+        query_wire::selection(request.selection.as_ref(), &live.snapshot(), "selection")?;
+        let (sender, stream) = mpsc::channel(1);
+        tokio::spawn(contact_watch::run(self.0.clone(), live, (request, pause), sender));
+        Ok(Response::new(ReceiverStream::new(stream)))
     }
 }
 
-/// Looks up both objects of every pair.
-fn resolve(
-    request: &EvaluateRequest,
-    scene: &Scene,
-    overrides: &HashMap<&str, Pose>,
-) -> Result<Vec<(Placed, Placed)>, Status> {
-    let find = |name: &str, field: String| {
-        wire::name(name, &field)?;
-        let missing = || format!("no object \"{name}\" in scene \"{}\"; add it first", scene.name());
-        let object = scene.object(name).ok_or_else(|| error::not_found("object", name, &field, missing()))?;
-        let pose = overrides.get(name).copied().unwrap_or(object.pose);
-        Ok::<_, Status>(Placed { body: object.body.clone(), pose })
+/// The snapshot a question is about.
+async fn snapshot(app: &AppState, name: &str, at_least_revision: Option<u64>) -> Result<Scene, Status> {
+    wire::name(name, "scene")?;
+    let missing = || error::catalogue(&CatalogueError::NoScene(name.to_owned()), "scene");
+    let live = app.catalogue().await?.live_scene(name).ok_or_else(missing)?;
+    let scene = live.snapshot();
+    let Some(least) = at_least_revision.filter(|least| *least > scene.revision()) else { return Ok(scene) };
+    let mut changes = live.changes();
+    let reached = changes.wait_for(|scene| scene.revision() >= least);
+    match tokio::time::timeout(REVISION_PATIENCE, reached).await {
+        Ok(Ok(scene)) => Ok(scene.clone()),
+        Ok(Err(_)) => Err(missing()),
+        Err(_) => {
+            let why = format!(
+                "scene \"{name}\" is at revision {}, not yet at {least} (at_least_revision); try again",
+                live.snapshot().revision()
+            );
+            Err(error::unavailable("REVISION_NOT_REACHED", &why))
+        }
+    }
+}
+
+/// Answers one message of a stream.
+async fn answer(app: &AppState, message: EvaluateStreamRequest) -> EvaluateStreamResponse {
+    use proto::evaluate_stream_response::Result as Answered;
+    let EvaluateStreamRequest { sequence, evaluate: question } = message;
+    let answered = async {
+        let question = question.ok_or_else(|| Invalid::new("evaluate", "is missing; send the question"))?;
+        let time = CallTime::new(question.budget_ms)?;
+        evaluate(app, &question, time).await
     };
-    for (index, object) in request.pose_overrides.iter().enumerate() {
-        find(&object.name, format!("pose_overrides[{index}].name"))?;
-    }
-    let mut pairs = Vec::with_capacity(request.pairs.len());
-    for (index, pair) in request.pairs.iter().enumerate() {
-        let a = find(&pair.a, format!("pairs[{index}].a"))?;
-        let b = find(&pair.b, format!("pairs[{index}].b"))?;
-        if pair.a == pair.b {
-            return Err(Invalid::new(format!("pairs[{index}]"), "pairs an object with itself; name two").into());
+    let result = match answered.await {
+        Ok(answer) => Answered::Answer(answer),
+        Err(status) => {
+            let StreamError { code, reason, field, message } = error::in_stream(&status);
+            Answered::Error(StreamError { code, reason, field, message })
         }
-        pairs.push((a, b));
-    }
-    Ok(pairs)
+    };
+    EvaluateStreamResponse { sequence, result: Some(result) }
 }
 
-/// Solves a share of the pairs cold, one by one, so that an answer depends on nothing but its own
-/// pair.
-fn evaluate(
-    pairs: &[(Placed, Placed)],
-    share: Range<usize>,
-    measures: &[Measure],
-    accuracy: Accuracy,
+async fn evaluate(app: &AppState, request: &EvaluateRequest, time: CallTime) -> Result<EvaluateResponse, Status> {
+    let Some(question) = &request.question else {
+        return Err(Invalid::new("question", "is missing; send pairs, within, closest or first_contact").into());
+    };
+    let scene = snapshot(app, &request.scene, request.at_least_revision).await?;
+    let outputs = query_wire::outputs(request)?;
+    let ask = query_wire::ask(request, &outputs, &scene)?;
+    let scene = match &request.pose_overrides {
+        Some(table) => {
+            let poses = query_wire::overrides(table, &scene)?;
+            scene.posed(&poses).map_err(|error| Invalid::new("pose_overrides", error))?
+        }
+        None => scene,
+    };
+    let response = match question {
+        Question::Pairs(list) => pairs(app, list, (scene, ask, outputs), time).await?,
+        Question::Within(within) => {
+            let margin = query_wire::length(within.margin_m, "within.margin_m")?;
+            let selection = query_wire::selection(within.selection.as_ref(), &scene, "within.selection")?;
+            let make = move |scene, ask| Within::new(scene, ask, selection, margin);
+            within_margin(app, make, (scene, ask, outputs), time).await?
+        }
+        Question::FirstContact(first) => {
+            let margin = query_wire::length(first.margin_m.unwrap_or(0.0), "first_contact.margin_m")?;
+            let selection = query_wire::selection(first.selection.as_ref(), &scene, "first_contact.selection")?;
+            let make = move |scene, ask| Within::first(scene, ask, selection, margin);
+            within_margin(app, make, (scene, ask, outputs), time).await?
+        }
+        Question::Closest(closest) => {
+            let most = match closest.max_distance_m {
+                Some(most) => query_wire::length(most, "closest.max_distance_m")?,
+                None => f64::INFINITY,
+            };
+            let selection = query_wire::selection(closest.selection.as_ref(), &scene, "closest.selection")?;
+            let revision = scene.revision();
+            let (crew, of, asked) = (app.crew(), scene.clone(), ask.clone());
+            let search = move |stop: &Arc<Stop>| closest_pair(&crew, stop, (&of, &asked), &selection, most);
+            let (found, complete) = app.search(search, time).await?.map_err(|_| error::abandoned())?;
+            found_response(found.as_slice(), complete, (&scene, &ask, &outputs), revision)
+        }
+    };
+    error::fits(&response)?;
+    Ok(response)
+}
+
+async fn pairs(
+    app: &AppState,
+    list: &proto::PairList,
+    (scene, ask, outputs): (Scene, Ask, Outputs),
+    time: CallTime,
+) -> Result<EvaluateResponse, Status> {
+    let (operands, pairs) = query_wire::pair_list(list, &scene)?;
+    if pairs.is_empty() {
+        return Err(Invalid::new("pairs", "is empty; name at least one pair").into());
+    }
+    error::at_most("pairs", pairs.len() * ask.measures().len(), ("max_answers", MAX_ANSWERS))?;
+    let scene_revision = scene.revision();
+    let question = Pairs::new(scene, ask.clone(), operands, pairs).map_err(query_wire::pairs_error)?;
+    let parts = app.ask(Arc::new(question), time).await?;
+    let answers: Vec<Answer> = parts.into_iter().flatten().collect();
+    let complete = answers.iter().all(|answer| answer.status != AnswerStatus::Deadline);
+    let outcome = proto::Outcome::Found.into();
+    let mut response = EvaluateResponse { scene_revision, outcome, complete, ..Default::default() };
+    query_wire::write(&answers, &ask, &outputs, &mut response);
+    Ok(response)
+}
+
+async fn within_margin(
+    app: &AppState,
+    make: impl FnOnce(Scene, Ask) -> Within + Send + 'static,
+    (scene, ask, outputs): (Scene, Ask, Outputs),
+    time: CallTime,
+) -> Result<EvaluateResponse, Status> {
+    let revision = scene.revision();
+    // The tree of a large scene takes milliseconds: not on a thread that serves connections.
+    let (of, asked) = (scene.clone(), ask.clone());
+    let question = app.prepare(move || make(of, asked)).await?;
+    let parts = app.ask(Arc::new(question), time).await?;
+    let (found, complete) = combined(&scene, parts);
+    error::at_most("within", found.len() * ask.measures().len(), ("max_answers", MAX_ANSWERS))?;
+    Ok(found_response(&found, complete, (&scene, &ask, &outputs), revision))
+}
+
+fn found_response(
+    found: &[Found],
+    complete: bool,
+    (scene, ask, outputs): (&Scene, &Ask, &Outputs),
     scene_revision: u64,
-) -> Vec<EvaluateResult> {
-    let mut results = Vec::with_capacity(share.len() * measures.len());
-    for index in share {
-        let (a, b) = &pairs[index];
-        for &measure in measures {
-            let outcome = one(a, b, measure, accuracy);
-            results.push(EvaluateResult { pair_index: wire::count(index), scene_revision, outcome });
-        }
+) -> EvaluateResponse {
+    let (mut names, mut pairs) = (NameTable::default(), Packed::default());
+    for slot in found.iter().flat_map(|found| found.pair) {
+        pairs.index(names.place(slot, scene));
     }
-    results
+    let outcome = if found.is_empty() { proto::Outcome::NothingInRange } else { proto::Outcome::Found };
+    let mut response = EvaluateResponse {
+        scene_revision,
+        outcome: outcome.into(),
+        complete,
+        objects: names.names,
+        pairs: pairs.into_bytes(),
+        ..Default::default()
+    };
+    let answers: Vec<Answer> = found.iter().flat_map(|found| &found.answers).copied().collect();
+    query_wire::write(&answers, ask, outputs, &mut response);
+    response
 }
 
-fn one(a: &Placed, b: &Placed, measure: Measure, accuracy: Accuracy) -> Option<Outcome> {
-    let level = |on: &Placed, of: &Placed| {
-        let warm = &mut WarmStart::default();
-        let found = measure::level_distance(&*on.body, &on.pose, &*of.body, &of.pose, &accuracy.level, warm);
-        wire::level_distance(&found)
-    };
-    match measure {
-        Measure::Unspecified => None,
-        Measure::Distance => {
-            let warm = &mut WarmStart::default();
-            let found = measure::distance(&*a.body, &a.pose, &*b.body, &b.pose, &accuracy.distance, warm);
-            Some(Outcome::Distance(wire::distance(&found, (&a.body, &a.pose), (&b.body, &b.pose))))
+/// Packed poses of states, within their limits.
+fn state_poses(bytes: &[u8], objects: usize) -> Result<Vec<f64>, Status> {
+    let numbers = packed::numbers(bytes, "poses")?;
+    let poses = numbers.len() / packed::POSE_NUMBERS;
+    error::at_most("poses", poses, ("max_state_poses", MAX_STATE_POSES))?;
+    error::at_most("poses", poses / objects.max(1), ("max_states", MAX_STATES))?;
+    Ok(numbers)
+}
+
+fn states_response(answers: &[StateAnswer], scene: &Scene, scene_revision: u64) -> CheckStatesResponse {
+    let mut names = NameTable::default();
+    let (mut verdicts, mut certainties, mut pairs) = (Packed::default(), Packed::default(), Packed::default());
+    let (mut lower, mut upper) = (Packed::default(), Packed::default());
+    for answer in answers {
+        let verdict = match answer.verdict {
+            StateVerdict::Free => proto::Verdict::Free,
+            StateVerdict::Contact => proto::Verdict::Contact,
+            StateVerdict::Undecided => proto::Verdict::Undecided,
+            StateVerdict::Invalid => proto::Verdict::Invalid,
+            StateVerdict::NotChecked => proto::Verdict::NotChecked,
+        };
+        let certainty = match answer.certainty {
+            Certainty::None => proto::Certainty::Unspecified,
+            Certainty::Certain => proto::Certainty::Certain,
+            Certainty::Possible => proto::Certainty::Possible,
+        };
+        verdicts.byte(u8::try_from(i32::from(verdict)).unwrap_or(0));
+        certainties.byte(u8::try_from(i32::from(certainty)).unwrap_or(0));
+        match answer.pair {
+            Some(pair) => pair.into_iter().for_each(|slot| pairs.index(names.place(slot, scene))),
+            None => [NOTHING; 2].into_iter().for_each(|index| pairs.index(index)),
         }
-        Measure::LevelDistanceAOnB => Some(Outcome::LevelDistanceAOnB(level(a, b))),
-        Measure::LevelDistanceBOnA => Some(Outcome::LevelDistanceBOnA(level(b, a))),
+        lower.number(answer.lower_m);
+        upper.number(answer.upper_m);
+    }
+    CheckStatesResponse {
+        scene_revision,
+        verdicts: verdicts.into_bytes(),
+        certainties: certainties.into_bytes(),
+        objects: names.names,
+        pairs: pairs.into_bytes(),
+        lower_m: lower.into_bytes(),
+        upper_m: upper.into_bytes(),
+        complete: answers.iter().all(|answer| answer.verdict != StateVerdict::NotChecked),
+        solved_pairs: answers.iter().map(|answer| u64::from(answer.solved)).sum(),
+    }
+}
+
+fn rays_response(answers: &[RayAnswer], scene: &Scene) -> CastRaysResponse {
+    let (mut names, mut hits, mut status) = (NameTable::default(), Packed::default(), Packed::default());
+    let (mut lower, mut upper) = (Packed::default(), Packed::default());
+    let (mut points, mut normals) = (Packed::default(), Packed::default());
+    for answer in answers {
+        hits.index(answer.hit.map_or(NOTHING, |slot| names.place(slot, scene)));
+        status.byte(u8::try_from(i32::from(query_wire::status(answer.status))).unwrap_or(0));
+        lower.number(answer.lower_m);
+        upper.number(answer.upper_m);
+        points.vector(answer.point.as_ref());
+        normals.vector(answer.normal.as_ref());
+    }
+    CastRaysResponse {
+        scene_revision: scene.revision(),
+        objects: names.names,
+        hits: hits.into_bytes(),
+        status: status.into_bytes(),
+        lower_m: lower.into_bytes(),
+        upper_m: upper.into_bytes(),
+        points_m: points.into_bytes(),
+        normals: normals.into_bytes(),
+        complete: answers.iter().all(|answer| answer.status != AnswerStatus::Deadline),
     }
 }

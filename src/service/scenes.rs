@@ -1,15 +1,22 @@
 //! SceneService.
 
-use tonic::{Request, Response, Status};
+use std::sync::Arc;
+
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::{Request, Response, Status, Streaming};
 
 use super::app_state::AppState;
+use super::limits::{DEFAULT_OBJECTS_PAGE, MAX_OBJECTS_PAGE};
 use super::proto::scene_service_server::SceneService;
 use super::proto::{
-    CreateSceneRequest, CreateSceneResponse, DeleteSceneRequest, DeleteSceneResponse, GetSceneRequest,
-    GetSceneResponse, ListScenesRequest, ListScenesResponse, UpdateSceneRequest, UpdateSceneResponse,
+    CommitForkRequest, CommitForkResponse, CreateSceneRequest, CreateSceneResponse, DeleteSceneRequest,
+    DeleteSceneResponse, ForkSceneRequest, ForkSceneResponse, GetSceneRequest, GetSceneResponse, ListScenesRequest,
+    ListScenesResponse, SceneSummary, StreamPosesRequest, StreamPosesResponse, UpdateSceneRequest, UpdateSceneResponse,
+    WatchSceneRequest, WatchSceneResponse,
 };
-use super::{error, wire};
-use crate::store::CatalogueError;
+use super::{error, pose_stream, scene_watch, scene_wire, wire};
+use crate::store::{CatalogueError, LiveScene};
 
 #[derive(Debug)]
 pub(super) struct Scenes(pub(super) AppState);
@@ -22,19 +29,19 @@ impl SceneService for Scenes {
     ) -> Result<Response<CreateSceneResponse>, Status> {
         let name = request.into_inner().name;
         let scene = self.0.change("name", move |catalogue| catalogue.create_scene(&name)).await?;
-        Ok(Response::new(CreateSceneResponse { scene: Some(wire::scene_summary(&scene)) }))
+        Ok(Response::new(CreateSceneResponse { scene: Some(scene_wire::summary(&scene, None)) }))
     }
 
     async fn get_scene(&self, request: Request<GetSceneRequest>) -> Result<Response<GetSceneResponse>, Status> {
-        let name = request.into_inner().name;
-        wire::name(&name, "name")?;
-        let scene = self
-            .0
-            .catalogue()
-            .await?
-            .scene(&name)
-            .ok_or_else(|| error::catalogue(&CatalogueError::NoScene(name), "name"))?;
-        Ok(Response::new(GetSceneResponse { scene: Some(wire::scene(&scene)) }))
+        let GetSceneRequest { name, page_size, page_token } = request.into_inner();
+        let live = self.find(&name, "name").await?;
+        let scene = live.snapshot();
+        let size = match usize::try_from(page_size).unwrap_or(MAX_OBJECTS_PAGE) {
+            0 => DEFAULT_OBJECTS_PAGE,
+            size => size.min(MAX_OBJECTS_PAGE),
+        };
+        let after = scene_wire::page_token(&page_token, &scene)?;
+        Ok(Response::new(scene_wire::page(&scene, live.origin(), after.as_deref(), size)))
     }
 
     async fn update_scene(
@@ -42,20 +49,20 @@ impl SceneService for Scenes {
         request: Request<UpdateSceneRequest>,
     ) -> Result<Response<UpdateSceneResponse>, Status> {
         let request = request.into_inner();
-        wire::name(&request.name, "name")?;
-        let update = wire::update(&request)?;
-        let scene = self.0.change("name", move |catalogue| catalogue.update_scene(&request.name, &update)).await?;
+        wire::name(&request.scene, "scene")?;
+        let update = scene_wire::update(&request)?;
+        let scene = self.0.change("scene", move |catalogue| catalogue.update_scene(&request.scene, &update)).await?;
         Ok(Response::new(UpdateSceneResponse { revision: scene.revision() }))
     }
 
     async fn list_scenes(&self, request: Request<ListScenesRequest>) -> Result<Response<ListScenesResponse>, Status> {
         let (size, after) = wire::page(request.get_ref().page_size, &request.get_ref().page_token);
         let (scenes, more) = self.0.catalogue().await?.scenes(after, size);
+        let scenes: Vec<SceneSummary> = scenes.iter().map(|live| summary(live)).collect();
         let next_page_token = match scenes.last() {
-            Some(last) if more => last.name().to_string(),
+            Some(last) if more => last.name.clone(),
             _ => String::new(),
         };
-        let scenes = scenes.iter().map(|scene| wire::scene_summary(scene)).collect();
         Ok(Response::new(ListScenesResponse { scenes, next_page_token }))
     }
 
@@ -68,4 +75,60 @@ impl SceneService for Scenes {
         self.0.change("name", move |catalogue| catalogue.delete_scene(&name)).await?;
         Ok(Response::new(DeleteSceneResponse {}))
     }
+
+    async fn fork_scene(&self, request: Request<ForkSceneRequest>) -> Result<Response<ForkSceneResponse>, Status> {
+        let ForkSceneRequest { scene, fork, expected_revision } = request.into_inner();
+        wire::name(&scene, "scene")?;
+        wire::name(&fork, "fork")?;
+        // In memory, and in constant time: no thread of its own.
+        let made = self.0.catalogue().await?.fork_scene(&scene, &fork, expected_revision);
+        let made = made.map_err(|error| {
+            error::catalogue(&error, if matches!(error, CatalogueError::SceneExists(_)) { "fork" } else { "scene" })
+        })?;
+        Ok(Response::new(ForkSceneResponse { fork: Some(summary(&made)) }))
+    }
+
+    async fn commit_fork(&self, request: Request<CommitForkRequest>) -> Result<Response<CommitForkResponse>, Status> {
+        let fork = request.into_inner().fork;
+        wire::name(&fork, "fork")?;
+        let scene = self.0.change("fork", move |catalogue| catalogue.commit_fork(&fork)).await?;
+        Ok(Response::new(CommitForkResponse { revision: scene.revision() }))
+    }
+
+    type StreamPosesStream = ReceiverStream<Result<StreamPosesResponse, Status>>;
+
+    async fn stream_poses(
+        &self,
+        request: Request<Streaming<StreamPosesRequest>>,
+    ) -> Result<Response<Self::StreamPosesStream>, Status> {
+        let (sender, stream) = mpsc::channel(1);
+        tokio::spawn(pose_stream::run(self.0.clone(), request.into_inner(), sender));
+        Ok(Response::new(ReceiverStream::new(stream)))
+    }
+
+    type WatchSceneStream = ReceiverStream<Result<WatchSceneResponse, Status>>;
+
+    async fn watch_scene(
+        &self,
+        request: Request<WatchSceneRequest>,
+    ) -> Result<Response<Self::WatchSceneStream>, Status> {
+        let WatchSceneRequest { scene, from_revision, max_rate_hz } = request.into_inner();
+        let pause = wire::pause(max_rate_hz)?;
+        let live = self.find(&scene, "scene").await?;
+        let (sender, stream) = mpsc::channel(1);
+        tokio::spawn(scene_watch::run((live, self.0.stopping()), from_revision, pause, sender));
+        Ok(Response::new(ReceiverStream::new(stream)))
+    }
+}
+
+impl Scenes {
+    async fn find(&self, name: &str, field: &str) -> Result<Arc<LiveScene>, Status> {
+        wire::name(name, field)?;
+        let missing = || error::catalogue(&CatalogueError::NoScene(name.to_owned()), field);
+        self.0.catalogue().await?.live_scene(name).ok_or_else(missing)
+    }
+}
+
+fn summary(live: &LiveScene) -> SceneSummary {
+    scene_wire::summary(&live.snapshot(), live.origin())
 }

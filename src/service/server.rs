@@ -15,25 +15,31 @@ use tonic_health::server::HealthReporter;
 
 #[cfg(feature = "fit")]
 use crate::jobs::Jobs;
-use crate::store::{Catalogue, Store, StoreError};
+use crate::store::{Catalogue, FORK_IDLE, Store, StoreError};
 
 use super::app_state::AppState;
+use super::blob_calls::BlobCalls;
 use super::bodies::Bodies;
 use super::concurrency_limit::ConcurrencyLimit;
 #[cfg(feature = "fit")]
-use super::concurrency_limit::Limited;
-#[cfg(feature = "fit")]
 use super::fits::Fits;
 use super::incoming::Incoming;
-use super::limits::{DRAIN, KEEPALIVE, KEEPALIVE_TIMEOUT, MAX_MESSAGE_BYTES, MAX_STREAMS};
+#[cfg(feature = "fit")]
+use super::jobs::JobCalls;
+use super::limits::{DRAIN, KEEPALIVE, KEEPALIVE_TIMEOUT, MAX_STREAMS, POSES_WRITTEN_EVERY};
 use super::proto::FILE_DESCRIPTOR_SET;
+use super::proto::blob_service_server::{self, BlobServiceServer};
 use super::proto::body_service_server::{self, BodyServiceServer};
 #[cfg(feature = "fit")]
 use super::proto::fit_service_server::{self, FitServiceServer};
+#[cfg(feature = "fit")]
+use super::proto::job_service_server::{self, JobServiceServer};
 use super::proto::query_service_server::{self, QueryServiceServer};
 use super::proto::scene_service_server::{self, SceneServiceServer};
+use super::proto::server_service_server::{self, ServerServiceServer};
 use super::queries::Queries;
 use super::scenes::Scenes;
+use super::server_info::ServerInfo;
 
 /// What a server needs to know.
 #[derive(Debug, Clone)]
@@ -115,13 +121,15 @@ impl Server {
         let (health, health_service) = tonic_health::server::health_reporter();
         // It starts as SERVING.
         set_health(&health, ServingStatus::NotServing).await;
-        let app = AppState::new(catalogue.clone());
+        let (stop_streams, stopping) = watch::channel(false);
+        let app = AppState::new(catalogue.clone(), stopping)?;
         let router = router(app.clone()).add_service(health_service);
+        let keeper = tokio::spawn(keep_scenes(catalogue.clone()));
         #[cfg(feature = "fit")]
         let (router, jobs, worker) = {
             let jobs = Jobs::default();
-            let worker = tokio::spawn(jobs.clone().work(catalogue));
-            (router.add_service(fits(app, jobs.clone())), jobs, worker)
+            let worker = tokio::spawn(jobs.clone().work(catalogue.clone()));
+            (with_jobs(router, &app, &jobs), jobs, worker)
         };
 
         let loading = load(self.store, loaded, health.clone());
@@ -145,6 +153,7 @@ impl Server {
         loader.abort();
         set_health(&health, ServingStatus::NotServing).await;
         let _ = draining.send(());
+        stop_streams.send_replace(true);
         // The running fit goes back into the queue, and those who watch it are reported.
         #[cfg(feature = "fit")]
         let serving = async {
@@ -158,6 +167,8 @@ impl Server {
         } else {
             tracing::warn!("some connections were still open after {DRAIN:?} and are cut");
         }
+        keeper.abort();
+        write_poses(&catalogue, true).await;
         ended
     }
 }
@@ -221,15 +232,19 @@ fn router(app: AppState) -> Router {
             .register_encoded_file_descriptor_set(FILE_DESCRIPTOR_SET)
             .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
     };
-    let (sized, limit) = (MAX_MESSAGE_BYTES, ConcurrencyLimit::new());
+    // Messages are measured before tonic reads them, see `message_limit`; answers by the handlers.
+    let (sized, limit) = (usize::MAX, ConcurrencyLimit::new());
     let bodies = BodyServiceServer::new(Bodies(app.clone()));
+    let blobs = BlobServiceServer::new(BlobCalls(app.clone()));
     let scenes = SceneServiceServer::new(Scenes(app.clone()));
-    let queries = QueryServiceServer::new(Queries(app));
+    let queries = QueryServiceServer::new(Queries(app.clone()));
     tonic::transport::Server::builder()
         .max_concurrent_streams(MAX_STREAMS)
         .http2_keepalive_interval(Some(KEEPALIVE))
         .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
+        .add_service(ServerServiceServer::new(ServerInfo(app)))
         .add_service(limit.before(bodies.max_decoding_message_size(sized).max_encoding_message_size(sized)))
+        .add_service(limit.before(blobs.max_decoding_message_size(sized).max_encoding_message_size(sized)))
         .add_service(limit.before(scenes.max_decoding_message_size(sized).max_encoding_message_size(sized)))
         .add_service(limit.before(queries.max_decoding_message_size(sized).max_encoding_message_size(sized)))
         // Older clients know v1alpha only. The descriptors are compiled in, so they are read or a
@@ -238,12 +253,35 @@ fn router(app: AppState) -> Router {
         .add_optional_service(reflection().build_v1alpha().ok())
 }
 
-/// Behind a limit of its own: uploads take long, and nothing else waits for them.
+/// Fits behind a limit of their own: meshes take long to read, and nothing else waits for them.
 #[cfg(feature = "fit")]
-fn fits(app: AppState, jobs: Jobs) -> Limited<FitServiceServer<Fits>> {
-    let fits = FitServiceServer::new(Fits::new(app, jobs));
-    ConcurrencyLimit::new()
-        .before(fits.max_decoding_message_size(MAX_MESSAGE_BYTES).max_encoding_message_size(MAX_MESSAGE_BYTES))
+fn with_jobs(router: Router, app: &AppState, jobs: &Jobs) -> Router {
+    let fits = FitServiceServer::new(Fits::new(app.clone(), jobs.clone()));
+    let calls = JobServiceServer::new(JobCalls { app: app.clone(), jobs: jobs.clone() });
+    let (sized, limit) = (usize::MAX, ConcurrencyLimit::new());
+    router
+        .add_service(limit.before(fits.max_decoding_message_size(sized).max_encoding_message_size(sized)))
+        .add_service(limit.before(calls.max_decoding_message_size(sized).max_encoding_message_size(sized)))
+}
+
+/// Writes streamed poses and removes forks that are idle, until it is ended.
+async fn keep_scenes(catalogue: watch::Receiver<Option<Arc<Catalogue>>>) {
+    loop {
+        tokio::time::sleep(POSES_WRITTEN_EVERY).await;
+        write_poses(&catalogue, false).await;
+        if let Some(catalogue) = catalogue.borrow().clone() {
+            catalogue.expire_forks(FORK_IDLE);
+        }
+    }
+}
+
+async fn write_poses(catalogue: &watch::Receiver<Option<Arc<Catalogue>>>, last: bool) {
+    let Some(catalogue) = catalogue.borrow().clone() else { return };
+    match tokio::task::spawn_blocking(move || catalogue.write_poses(last)).await {
+        Ok(Ok(_)) => {}
+        Ok(Err(error)) => tracing::error!(%error, "streamed poses could not be written; they are tried again"),
+        Err(error) => tracing::error!(%error, "writing streamed poses was ended by a panic"),
+    }
 }
 
 /// Loads the catalogue on a thread that may block, then opens the doors.
@@ -263,10 +301,16 @@ async fn load(
 }
 
 async fn set_health(health: &HealthReporter, status: ServingStatus) {
-    let services =
-        ["", body_service_server::SERVICE_NAME, scene_service_server::SERVICE_NAME, query_service_server::SERVICE_NAME];
+    let services = [
+        "",
+        blob_service_server::SERVICE_NAME,
+        body_service_server::SERVICE_NAME,
+        query_service_server::SERVICE_NAME,
+        scene_service_server::SERVICE_NAME,
+        server_service_server::SERVICE_NAME,
+    ];
     #[cfg(feature = "fit")]
-    let services = services.into_iter().chain([fit_service_server::SERVICE_NAME]);
+    let services = services.into_iter().chain([fit_service_server::SERVICE_NAME, job_service_server::SERVICE_NAME]);
     for service in services {
         health.set_service_status(service, status).await;
     }

@@ -1,21 +1,26 @@
 //! All bodies, scenes and jobs in memory, every change written through.
 
 mod jobs;
+mod live_scene;
+mod scenes;
 
-use std::collections::{BTreeMap, HashMap};
+pub use live_scene::{FORK_IDLE, LiveScene, MAX_FORKS, Origin};
+
+use std::collections::BTreeMap;
 use std::ops::Bound;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::thread;
 
 use redb::WriteTransaction;
 
-use crate::body::{Body, BodyId};
-use crate::scene::{NameError, Object, Scene, SceneError, Update, check_name};
+use crate::body::BodyId;
+use crate::scene::{Geometry, GeometryFileError, NameError, SceneError};
 
 use super::disk::Contents;
 use super::job::{Job, MAX_QUEUED_JOBS};
-use super::rows::{BODIES, META, OBJECTS, ObjectRow, REVISIONS, SCENES, SceneRow};
+use super::rows::{BODIES, LADDERS, LadderRow};
 use super::{Store, StoreError};
+use live_scene::Scenes;
 
 /// The catalogue of one server. Reading takes a lock for the time of a map look-up; changes are
 /// made one after the other, each on disk before it is seen. All methods that change block on the
@@ -29,8 +34,9 @@ pub struct Catalogue {
 
 #[derive(Debug, Default)]
 struct State {
-    bodies: BTreeMap<BodyId, Arc<Body>>,
-    scenes: BTreeMap<Arc<str>, Arc<Scene>>,
+    /// Bodies of every kind.
+    bodies: BTreeMap<BodyId, Geometry>,
+    scenes: Scenes,
     jobs: BTreeMap<u64, Arc<Job>>,
     /// No new scene starts at or below it.
     revision_floor: u64,
@@ -52,12 +58,47 @@ pub enum CatalogueError {
         /// An object made of it.
         object: Arc<str>,
     },
+    /// The body is a rung.
+    #[error("body {id} is a rung of ladder {ladder}; delete the ladder first")]
+    RungUsed {
+        /// The body.
+        id: BodyId,
+        /// The ladder.
+        ladder: BodyId,
+    },
     /// No scene has this name.
     #[error("no scene \"{0}\"; list the scenes, or create it first")]
     NoScene(String),
     /// The name is taken.
     #[error("there is a scene \"{0}\"; use it, delete it, or choose another name")]
     SceneExists(String),
+    /// The scene is no fork.
+    #[error("scene \"{0}\" is no fork; name one that ForkScene made")]
+    NoFork(String),
+    /// A fork has lost its parent.
+    #[error("scene \"{parent}\", of which \"{fork}\" was made, was deleted; create it again or delete the fork")]
+    NoParent {
+        /// The fork.
+        fork: String,
+        /// Its parent.
+        parent: Arc<str>,
+    },
+    /// The parent has changed since the fork was made.
+    #[error(
+        "fork \"{fork}\" was made at revision {expected} of its parent, which is at {current} now; fork it again and \
+         repeat the changes"
+    )]
+    ParentChanged {
+        /// The fork.
+        fork: String,
+        /// Revision of the parent then.
+        expected: u64,
+        /// Revision of the parent now.
+        current: u64,
+    },
+    /// Too many forks.
+    #[error("there are {MAX_FORKS} forks (max_forks); delete or commit some")]
+    TooManyForks,
     /// The name is not usable.
     #[error("the name of the scene {0}")]
     SceneName(#[from] NameError),
@@ -103,27 +144,15 @@ impl Catalogue {
         Ok(Self { store: Mutex::new(store), state: RwLock::new(state) })
     }
 
-    /// One body by id.
-    pub fn body(&self, id: &BodyId) -> Option<Arc<Body>> {
+    /// One body of whatever kind by id.
+    pub fn geometry(&self, id: &BodyId) -> Option<Geometry> {
         self.read(|state| state.bodies.get(id).cloned())
     }
 
     /// Up to `count` bodies in the order of their ids, from the first one after `after`; and
     /// whether more follow.
-    pub fn bodies(&self, after: Option<&BodyId>, count: usize) -> (Vec<Arc<Body>>, bool) {
+    pub fn bodies(&self, after: Option<&BodyId>, count: usize) -> (Vec<Geometry>, bool) {
         self.read(|state| page(&state.bodies, after, count))
-    }
-
-    /// The latest snapshot of one scene.
-    pub fn scene(&self, name: &str) -> Option<Arc<Scene>> {
-        self.read(|state| state.scenes.get(name).cloned())
-    }
-
-    /// Up to `count` scenes in the order of their names, from the first one after `after`; and
-    /// whether more follow.
-    pub fn scenes(&self, after: Option<&str>, count: usize) -> (Vec<Arc<Scene>>, bool) {
-        let after: Option<Arc<str>> = after.map(Into::into);
-        self.read(|state| page(&state.scenes, after.as_ref(), count))
     }
 
     /// How many bodies and scenes there are.
@@ -131,28 +160,24 @@ impl Catalogue {
         self.read(|state| (state.bodies.len(), state.scenes.len()))
     }
 
-    /// Stores a body; the one that was there first when the content is known. Tells whether it is
-    /// new.
+    /// Stores a body, of a ladder with its rungs; the one that was there first when the content is
+    /// known. Returns whether it is new.
     ///
     /// # Errors
     /// When the disk fails.
-    pub fn create_body(&self, body: Body) -> Result<(Arc<Body>, bool), CatalogueError> {
+    pub fn create_body(&self, body: Geometry) -> Result<(Geometry, bool), CatalogueError> {
         let mut store = self.writer()?;
-        if let Some(known) = self.body(body.id()) {
+        if let Some(known) = self.geometry(body.id()) {
             return Ok((known, false));
         }
-        let (key, file) = (body.id().to_string(), body.to_json());
-        self.commit(&mut store, |transaction| {
-            transaction.open_table(BODIES)?.insert(key.as_str(), file.as_bytes())?;
-            Ok(())
-        })?;
-        let body = Arc::new(body);
-        self.write(|state| state.bodies.insert(*body.id(), body.clone()));
+        let fresh = self.read(|state| state.fresh(vec![body.clone()]));
+        self.commit(&mut store, |transaction| put_bodies(transaction, &fresh))?;
+        self.write(|state| state.bodies.extend(fresh.into_iter().map(|body| (*body.id(), body))));
         tracing::debug!(id = %body.id(), "body created");
         Ok((body, true))
     }
 
-    /// Removes a body that no scene uses.
+    /// Removes a body that no scene and no ladder uses.
     ///
     /// # Errors
     /// When there is none, when it is in use, or when the disk fails.
@@ -162,97 +187,30 @@ impl Catalogue {
             if !state.bodies.contains_key(id) {
                 return Err(CatalogueError::NoBody(*id));
             }
-            let mut objects =
-                state.scenes.values().flat_map(|scene| scene.objects().map(move |object| (scene, object)));
-            match objects.find(|(_, object)| object.body.id() == id) {
-                None => Ok(()),
-                Some((scene, object)) => {
-                    Err(CatalogueError::BodyUsed { id: *id, scene: scene.name().clone(), object: object.name.clone() })
+            let holds = |body: &&Geometry| match body {
+                Geometry::Ladder(ladder) => ladder.rungs().iter().any(|rung| rung.id() == id),
+                Geometry::Solid(_) | Geometry::SosBody(_) | Geometry::HalfSpace(_) => false,
+            };
+            if let Some(ladder) = state.bodies.values().find(holds) {
+                return Err(CatalogueError::RungUsed { id: *id, ladder: *ladder.id() });
+            }
+            for live in state.scenes.values() {
+                let scene = live.snapshot();
+                if let Some((_, object, _)) = scene.objects().find(|(_, object, _)| object.geometry.id() == id) {
+                    let (scene, object) = (scene.name().clone(), object.name.clone());
+                    return Err(CatalogueError::BodyUsed { id: *id, scene, object });
                 }
             }
+            Ok(())
         })?;
         let key = id.to_string();
         self.commit(&mut store, |transaction| {
             transaction.open_table(BODIES)?.remove(key.as_str())?;
+            transaction.open_table(LADDERS)?.remove(key.as_str())?;
             Ok(())
         })?;
         self.write(|state| state.bodies.remove(id));
         tracing::debug!(%id, "body deleted");
-        Ok(())
-    }
-
-    /// Creates an empty scene, one revision above every scene that was deleted.
-    ///
-    /// # Errors
-    /// When the name is taken or not usable, or when the disk fails.
-    pub fn create_scene(&self, name: &str) -> Result<Arc<Scene>, CatalogueError> {
-        check_name(name)?;
-        let mut store = self.writer()?;
-        let (taken, floor) = self.read(|state| (state.scenes.contains_key(name), state.revision_floor));
-        if taken {
-            return Err(CatalogueError::SceneExists(name.to_owned()));
-        }
-        let scene = Arc::new(Scene::new(name, floor + 1)?);
-        self.commit(&mut store, |transaction| put_scene(transaction, &scene))?;
-        self.write(|state| state.scenes.insert(scene.name().clone(), scene.clone()));
-        tracing::debug!(scene = name, revision = scene.revision(), "scene created");
-        Ok(scene)
-    }
-
-    /// Applies an update whole and returns the snapshot it is part of.
-    ///
-    /// # Errors
-    /// When there is no such scene, when the update cannot be applied, or when the disk fails.
-    pub fn update_scene(&self, name: &str, update: &Update) -> Result<Arc<Scene>, CatalogueError> {
-        let mut store = self.writer()?;
-        let scene = self.scene(name).ok_or_else(|| CatalogueError::NoScene(name.to_owned()))?;
-        let next = Arc::new(scene.updated(update, |id| self.body(id))?);
-        if update.is_empty() {
-            return Ok(next);
-        }
-        self.commit(&mut store, |transaction| {
-            if next.same_allowed_pairs(&scene) {
-                put_revision(transaction, &next)?;
-            } else {
-                put_scene(transaction, &next)?;
-            }
-            let mut objects = transaction.open_table(OBJECTS)?;
-            for removed in &update.removals {
-                objects.remove((name, &**removed))?;
-            }
-            for object in update.written().filter_map(|written| next.object(written)) {
-                objects.insert((name, &*object.name), json(&ObjectRow::of(object))?.as_slice())?;
-            }
-            Ok(())
-        })?;
-        self.write(|state| state.scenes.insert(next.name().clone(), next.clone()));
-        tracing::debug!(scene = name, revision = next.revision(), "scene updated");
-        Ok(next)
-    }
-
-    /// Removes a scene and its objects; their bodies stay.
-    ///
-    /// # Errors
-    /// When there is no such scene, or when the disk fails.
-    pub fn delete_scene(&self, name: &str) -> Result<(), CatalogueError> {
-        let mut store = self.writer()?;
-        let scene = self.scene(name).ok_or_else(|| CatalogueError::NoScene(name.to_owned()))?;
-        let floor = self.read(|state| state.revision_floor).max(scene.revision());
-        self.commit(&mut store, |transaction| {
-            transaction.open_table(META)?.insert("revision_floor", floor)?;
-            transaction.open_table(SCENES)?.remove(name)?;
-            transaction.open_table(REVISIONS)?.remove(name)?;
-            let mut objects = transaction.open_table(OBJECTS)?;
-            for object in scene.objects() {
-                objects.remove((name, &*object.name))?;
-            }
-            Ok(())
-        })?;
-        self.write(|state| {
-            state.revision_floor = floor;
-            state.scenes.remove(name)
-        });
-        tracing::debug!(scene = name, revision = scene.revision(), "scene deleted");
         Ok(())
     }
 
@@ -279,12 +237,13 @@ impl Catalogue {
         })
     }
 
-    /// Makes memory say what the disk says.
+    /// Makes memory say what the disk says. Forks, which are not on disk, stay; so do scenes that
+    /// are on disk as they are here or further behind, with those who watch them.
     fn reread(&self, store: &mut Store) -> Result<(), StoreError> {
         store.reopen()?;
         let known = self.read(|state| state.bodies.clone());
         let fresh = State::read(store, &known)?;
-        self.write(|state| std::mem::replace(state, fresh));
+        self.write(|state| state.replace(fresh));
         Ok(())
     }
 
@@ -301,9 +260,9 @@ impl Catalogue {
 
 impl State {
     /// Everything in the store; bodies in `known` are not proven again.
-    fn read(store: &Store, known: &BTreeMap<BodyId, Arc<Body>>) -> Result<Self, StoreError> {
+    fn read(store: &Store, known: &BTreeMap<BodyId, Geometry>) -> Result<Self, StoreError> {
         let damaged = |what: String| StoreError::damaged(store.dir(), what);
-        let Contents { bodies, scenes, objects, jobs, revision_floor } = store.read()?;
+        let Contents { bodies, ladders, scenes, objects, jobs, revision_floor } = store.read()?;
         tracing::info!(
             bodies = bodies.len(),
             scenes = scenes.len(),
@@ -311,48 +270,73 @@ impl State {
         );
         let bodies: BTreeMap<_, _> =
             prove(&bodies, known).map_err(damaged)?.into_iter().map(|body| (*body.id(), body)).collect();
-        let ids: HashMap<String, &Arc<Body>> = bodies.iter().map(|(id, body)| (id.to_string(), body)).collect();
-
-        let mut placed: HashMap<String, Vec<Object>> = HashMap::new();
-        for (scene, name, row) in objects {
-            let fault = |what: &str| damaged(format!("object \"{name}\" of scene \"{scene}\" {what}"));
-            let body = ids.get(&row.body).ok_or_else(|| fault("is made of a body that is not stored"))?;
-            let pose = row.pose().map_err(|error| fault(&format!("has no pose: {error}")))?;
-            check_name(&name).map_err(|error| fault(&error.to_string()))?;
-            let object =
-                Object { name: name.as_str().into(), body: Arc::clone(body), pose, group: row.group.as_str().into() };
-            placed.entry(scene).or_default().push(object);
-        }
         let jobs = jobs.into_iter().map(|job| (job.id, Arc::new(job))).collect();
-        let mut state = Self { scenes: BTreeMap::new(), revision_floor, bodies: BTreeMap::new(), jobs };
-        for (name, revision, row) in scenes {
-            check_name(&name).map_err(|error| damaged(format!("scene {name:?} {error}")))?;
-            let objects = placed.remove(&name).unwrap_or_default();
-            let allowed = row.allowed.into_iter().map(|(a, b)| (a.into(), b.into()));
-            let scene = Scene::restored(name.as_str().into(), revision, objects, allowed);
-            if scene.allowed_pairs().any(|(a, b)| scene.object(a).is_none() || scene.object(b).is_none()) {
-                return Err(damaged(format!("scene \"{name}\" allows a pair of objects it does not have")));
+        let mut state = Self { scenes: Scenes::new(), revision_floor, bodies, jobs };
+        for (id, row) in ladders {
+            let ladder = row.ladder(|id| state.bodies.get(id).cloned());
+            let ladder = ladder.map_err(|why| damaged(format!("ladder {id} {why}")))?;
+            if ladder.id().to_string() != id {
+                return Err(damaged(format!("ladder {id} has the content of ladder {}", ladder.id())));
             }
-            state.scenes.insert(scene.name().clone(), Arc::new(scene));
+            state.bodies.insert(*ladder.id(), Geometry::Ladder(Arc::new(ladder)));
         }
-        if let Some(scene) = placed.keys().next() {
-            return Err(damaged(format!("objects of scene \"{scene}\", which is not stored")));
-        }
-        drop(ids);
-        state.bodies = bodies;
+        state.restore_scenes(scenes, objects, store)?;
         Ok(state)
+    }
+
+    /// Takes over what was read again.
+    fn replace(&mut self, fresh: Self) -> Self {
+        let before = std::mem::replace(self, fresh);
+        self.keep_live(&before.scenes);
+        before
+    }
+
+    /// Of these bodies and the rungs of their ladders, those that are not there, each once; rungs
+    /// come before their ladder.
+    fn fresh(&self, bodies: Vec<Geometry>) -> Vec<Geometry> {
+        let mut fresh: Vec<Geometry> = Vec::new();
+        for body in bodies {
+            let rungs = match &body {
+                Geometry::Ladder(ladder) => ladder.rungs().iter().cloned().map(Geometry::Solid).collect(),
+                Geometry::Solid(_) | Geometry::SosBody(_) | Geometry::HalfSpace(_) => Vec::new(),
+            };
+            for body in rungs.into_iter().chain([body]) {
+                let known = self.bodies.contains_key(body.id()) || fresh.iter().any(|other| other.id() == body.id());
+                if !known {
+                    fresh.push(body);
+                }
+            }
+        }
+        fresh
     }
 }
 
+/// Rows of bodies that are new; of a ladder which rungs it has.
+fn put_bodies(transaction: &WriteTransaction, bodies: &[Geometry]) -> Result<(), redb::Error> {
+    let (mut files, mut ladders) = (transaction.open_table(BODIES)?, transaction.open_table(LADDERS)?);
+    for body in bodies {
+        let id = body.id().to_string();
+        match body {
+            Geometry::Ladder(ladder) => {
+                ladders.insert(id.as_str(), json(&LadderRow::of(ladder))?.as_slice())?;
+            }
+            Geometry::Solid(_) | Geometry::SosBody(_) | Geometry::HalfSpace(_) => {
+                files.insert(id.as_str(), body.to_json().as_bytes())?;
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Bodies from their files, re-proven on all cores: the only part of loading that takes time.
-fn prove(files: &[(String, String)], known: &BTreeMap<BodyId, Arc<Body>>) -> Result<Vec<Arc<Body>>, String> {
+fn prove(files: &[(String, String)], known: &BTreeMap<BodyId, Geometry>) -> Result<Vec<Geometry>, String> {
     let one = |(id, file): &(String, String)| {
         if let Some(body) = id.parse().ok().and_then(|id: BodyId| known.get(&id)) {
             return Ok(body.clone());
         }
-        let body = Body::from_json(file).map_err(|error| format!("body {id}: {error}"))?;
+        let body = Geometry::from_json(file).map_err(|error: GeometryFileError| format!("body {id}: {error}"))?;
         if body.id().to_string() == *id {
-            Ok(Arc::new(body))
+            Ok(body)
         } else {
             Err(format!("body {id} has the content of body {}", body.id()))
         }
@@ -370,16 +354,6 @@ fn prove(files: &[(String, String)], known: &BTreeMap<BodyId, Arc<Body>>) -> Res
         }
         Ok(bodies)
     })
-}
-
-fn put_scene(transaction: &WriteTransaction, scene: &Scene) -> Result<(), redb::Error> {
-    transaction.open_table(SCENES)?.insert(&**scene.name(), json(&SceneRow::of(scene))?.as_slice())?;
-    put_revision(transaction, scene)
-}
-
-fn put_revision(transaction: &WriteTransaction, scene: &Scene) -> Result<(), redb::Error> {
-    transaction.open_table(REVISIONS)?.insert(&**scene.name(), scene.revision())?;
-    Ok(())
 }
 
 fn json(row: &impl serde::Serialize) -> Result<Vec<u8>, redb::Error> {

@@ -13,7 +13,8 @@ use redb::{
 use serde::de::DeserializeOwned;
 
 use super::rows::{
-    BODIES, FILES, FORMAT, JOBS, META, OBJECTS, ObjectRow, POINTS, REVISIONS, SCENES, SceneRow, TRIANGLES,
+    BODIES, FORMAT, JOBS, LADDERS, LadderRow, META, OBJECTS, ObjectRow, POINTS, RESERVES, REVISIONS, SCENES, SceneRow,
+    TRIANGLES,
 };
 use super::{Job, StoreError};
 
@@ -33,6 +34,8 @@ pub type JobMesh = (Vec<Vector3<f64>>, Vec<[usize; 3]>);
 /// Everything in the file, as stored.
 pub(super) struct Contents {
     pub(super) bodies: Vec<(String, String)>,
+    /// In the order of their ids.
+    pub(super) ladders: Vec<(String, LadderRow)>,
     /// Scene, revision, row.
     pub(super) scenes: Vec<(String, u64, SceneRow)>,
     /// Scene, object, row; in the order of scene and object.
@@ -137,7 +140,9 @@ impl Store {
             None if !tables => commit(database, |transaction| {
                 transaction.open_table(META)?.insert("format", FORMAT)?;
                 transaction.open_table(BODIES)?;
+                transaction.open_table(LADDERS)?;
                 transaction.open_table(SCENES)?;
+                transaction.open_table(RESERVES)?;
                 transaction.open_table(REVISIONS)?;
                 transaction.open_table(OBJECTS)?;
                 Ok(())
@@ -174,6 +179,7 @@ impl Store {
         let read = database.begin_read()?;
         let mut contents = Contents {
             bodies: Vec::new(),
+            ladders: Vec::new(),
             scenes: Vec::new(),
             objects: Vec::new(),
             jobs: Vec::new(),
@@ -186,14 +192,22 @@ impl Store {
                 .map_err(|error| ReadError::Row(format!("body {id} is no text: {error}")))?;
             contents.bodies.push((id, file));
         }
-        let revisions = read.open_table(REVISIONS)?;
+        for entry in read.open_table(LADDERS)?.iter()? {
+            let (id, row) = entry?;
+            let id = id.value().to_owned();
+            let row = parse(row.value(), || format!("ladder {id}"))?;
+            contents.ladders.push((id, row));
+        }
+        let (revisions, reserves) = (read.open_table(REVISIONS)?, read.open_table(RESERVES)?);
         for entry in read.open_table(SCENES)?.iter()? {
             let (name, row) = entry?;
             let name = name.value().to_owned();
             let row = parse(row.value(), || format!("scene \"{name}\""))?;
             let revision = revisions.get(name.as_str())?.map(|value| value.value());
             let revision = revision.ok_or_else(|| ReadError::Row(format!("scene \"{name}\" has no revision")))?;
-            contents.scenes.push((name, revision, row));
+            // The server was cut off while it gave out revisions that it had not written.
+            let reserve = reserves.get(name.as_str())?.map_or(0, |value| value.value() + 1);
+            contents.scenes.push((name, revision.max(reserve), row));
         }
         for entry in read.open_table(OBJECTS)?.iter()? {
             let (key, row) = entry?;
@@ -223,11 +237,6 @@ impl Store {
         let triangles = corners.as_chunks::<4>().0.as_chunks::<3>().0;
         let index = |corner| usize::try_from(u32::from_le_bytes(corner)).unwrap_or(usize::MAX);
         Ok(Some((points, triangles.iter().map(|corners| corners.map(index)).collect())))
-    }
-
-    /// The file that a job made, if it made one.
-    pub(super) fn file(&self, id: u64) -> Result<Option<Vec<u8>>, StoreError> {
-        self.job_bytes(FILES, id)
     }
 
     fn job_bytes(

@@ -18,10 +18,6 @@ pub const MAX_ENDED_JOBS: usize = 1000;
 /// Longest request id.
 pub const MAX_REQUEST_ID_BYTES: usize = 128;
 
-/// Longest file that a job may make: what one message can hand out, with all that is said of the
-/// job.
-pub const MAX_FILE_BYTES: usize = (4 << 20) - (64 << 10);
-
 /// A job that is not stored yet.
 #[derive(Clone, Debug)]
 pub struct NewJob {
@@ -77,6 +73,9 @@ pub enum JobState {
 pub struct FitOutcome {
     /// The bodies, coarsest first; or the one compound or sos-body.
     pub bodies: Vec<FittedBody>,
+    /// Id of the ladder that the bodies make, if they do.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub ladder: Option<String>,
     /// Points that were left out.
     pub left_out: usize,
     /// Largest distance of one of them from the hull of the others, metres.
@@ -112,12 +111,12 @@ pub struct FittedBody {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FittedKind {
-    /// A body, which the catalogue keeps with all others.
+    /// A convex body.
     #[default]
     Body,
-    /// A union of bodies, whose file is kept with the job.
+    /// A union of bodies.
     Compound,
-    /// A set that need not be convex, whose file is kept with the job.
+    /// A set that need not be convex.
     SosBody,
 }
 

@@ -25,9 +25,11 @@
 //!   back. Nothing is made again but on a start that finds no file at all; one that finds an empty
 //!   file is refused.
 //!
-//! Memory is thus never ahead of the disk, and a revision that was seen is never given out again: a
-//! scene's revision is part of every commit that changes it, and deleting a scene raises the floor
-//! from which later scenes start.
+//! Memory is thus never ahead of the disk but for streamed poses, which are written within a second,
+//! and for forks, which end with the server. A revision that was seen is never given out again: a
+//! scene's revision is part of every commit that changes it, revisions of streamed poses are taken
+//! from a reserve that was written before, and deleting a scene raises the floor from which later
+//! scenes start.
 
 mod catalogue;
 mod disk;
@@ -36,11 +38,11 @@ mod job;
 mod request;
 mod rows;
 
-pub use catalogue::{Catalogue, CatalogueError};
+pub use catalogue::{Catalogue, CatalogueError, FORK_IDLE, LiveScene, MAX_FORKS, Origin};
 pub use disk::{JobMesh, Store};
 pub use error::StoreError;
 pub use job::{
-    FitOptimum, FitOutcome, FittedBody, FittedKind, Job, JobState, MAX_ENDED_JOBS, MAX_FILE_BYTES, MAX_QUEUED_JOBS,
+    FitOptimum, FitOutcome, FittedBody, FittedKind, Job, JobState, MAX_ENDED_JOBS, MAX_QUEUED_JOBS,
     MAX_REQUEST_ID_BYTES, NewJob,
 };
 pub use request::{

@@ -15,7 +15,7 @@ use super::rows::{BODIES, META, OBJECTS, REVISIONS, SCENES};
 use super::{Catalogue, CatalogueError, Store, StoreError};
 use crate::body::Body;
 use crate::measure::Pose;
-use crate::scene::{Placement, Update};
+use crate::scene::{Placement, Scene, Update};
 
 /// A disk in memory that outlives the databases on it and is full on demand: it takes one more
 /// write, cut short, and refuses every other.
@@ -102,7 +102,8 @@ fn at(x: f64) -> Pose {
 }
 
 fn placed(name: &str, body: &Body) -> Update {
-    let placement = Placement { name: name.into(), body: *body.id(), pose: at(0.1), group: "g".into() };
+    let (name, body, pose) = (name.into(), *body.id(), Some(at(0.1)));
+    let placement = Placement { name, body, pose, group: "g".into(), padding_m: Some(0.25), attachment: None };
     Update { upserts: vec![placement], ..Update::default() }
 }
 
@@ -110,9 +111,14 @@ fn moved(x: f64) -> Update {
     Update { poses: vec![("o".into(), at(x))], ..Update::default() }
 }
 
+/// Where `o` stands.
+fn pose(scene: &Scene) -> Pose {
+    *scene.slot("o").and_then(|slot| scene.pose(slot)).expect("there")
+}
+
 fn furnished(disk: &Disk) -> Catalogue {
     let catalogue = disk.load().expect("a new catalogue");
-    catalogue.create_body(ball(1.0)).expect("stored");
+    catalogue.create_body(ball(1.0).into()).expect("stored");
     catalogue.create_scene("room").expect("made");
     catalogue.update_scene("room", &placed("o", &ball(1.0))).expect("placed");
     catalogue
@@ -127,12 +133,12 @@ fn a_full_disk_is_reported_and_changes_nothing() {
         let before = catalogue.scene("room").expect("there");
         let failed = catalogue.update_scene("room", &moved(1.0)).expect_err("full");
         assert!(matches!(failed, CatalogueError::Store(StoreError::Full { .. })), "{failed}");
-        assert!(catalogue.create_body(ball(2.0 + f64::from(round))).is_err());
+        assert!(catalogue.create_body(ball(2.0 + f64::from(round)).into()).is_err());
         assert!(catalogue.create_scene("hall").is_err());
         assert!(catalogue.delete_scene("room").is_err());
         let still = catalogue.scene("room").expect("still there");
         assert_eq!(still.revision(), before.revision());
-        assert_eq!(still.object("o").map(|object| object.pose), before.object("o").map(|object| object.pose));
+        assert_eq!(pose(&still), pose(&before));
         assert_eq!(catalogue.counts(), (1, 1));
 
         // With space again, the next change works without a restart.
@@ -146,7 +152,7 @@ fn a_full_disk_is_reported_and_changes_nothing() {
     let again = disk.load().expect("loads");
     assert_eq!(again.counts(), (1, 1));
     let scene = again.scene("room").expect("there");
-    assert_eq!((scene.revision(), scene.object("o").expect("there").pose), (revision, at(2.0)));
+    assert_eq!((scene.revision(), pose(&scene)), (revision, at(2.0)));
 }
 
 /// What is on disk between two commits is one of the two states, however the process ends.
@@ -161,8 +167,8 @@ fn every_acknowledged_change_is_on_disk() {
         copy.bytes.lock().expect("sound").clone_from(&disk.bytes.lock().expect("sound"));
         let scene = copy.load().expect("loads").scene("room").expect("there");
         assert_eq!(scene.revision(), revision);
-        let object = scene.object("o").expect("there");
-        assert_eq!((object.pose, &*object.group), (at(f64::from(step) / 3.0), "g"));
+        let object = scene.slot("o").and_then(|slot| scene.object(slot)).expect("there");
+        assert_eq!((pose(&scene), &*object.group, object.padding_m), (at(f64::from(step) / 3.0), "g", Some(0.25)));
     }
 }
 
@@ -173,17 +179,19 @@ fn what_it_did_not_write_is_refused_by_name() {
         ("format 7", |t| drop(t.open_table(META).expect("a table").insert("format", 7))),
         ("body", |t| drop(t.open_table(BODIES).expect("a table").insert("feed", &b"{}"[..]))),
         ("scene \"room\"", |t| drop(t.open_table(SCENES).expect("a table").insert("room", &b"{}"[..]))),
-        ("is made of a body", |t| {
-            let row = br#"{"body":"?","translation_m":[0,0,0],"rotation":[0,0,0,1],"group":""}"#;
+        ("is made of no body", |t| {
+            let row = br#"{"body":"?","pose":{"translation_m":[0,0,0],"rotation":[0,0,0,1]},"group":"","padding_m":null,"attachment":null}"#;
             drop(t.open_table(OBJECTS).expect("a table").insert(("room", "p"), &row[..]));
         }),
         ("has no pose", |t| {
-            let row =
-                format!(r#"{{"body":"{}","translation_m":[0,0,0],"rotation":[0,0,0,2],"group":""}}"#, ball(1.0).id());
+            let row = format!(
+                r#"{{"body":"{}","pose":{{"translation_m":[0,0,0],"rotation":[0,0,0,2]}},"group":"","padding_m":null,"attachment":null}}"#,
+                ball(1.0).id()
+            );
             drop(t.open_table(OBJECTS).expect("a table").insert(("room", "p"), row.as_bytes()));
         }),
-        ("does not have", |t| {
-            let row = br#"{"allowed":[["a","b"]]}"#;
+        ("does not hold up", |t| {
+            let row = br#"{"allowed":[[{"object":"a"},{"object":"b"}]],"group_paddings_m":[],"pair_paddings_m":[]}"#;
             drop(t.open_table(SCENES).expect("a table").insert("room", &row[..]));
         }),
     ];
@@ -225,7 +233,7 @@ fn an_empty_file_is_not_taken_for_a_new_catalogue() {
 fn a_new_pose_leaves_the_scenes_row_alone() {
     let disk = Disk::default();
     let before = furnished(&disk).scene("room").expect("there").revision();
-    let mark = br#"{"allowed": []}"#;
+    let mark = br#"{"allowed": [], "group_paddings_m": [], "pair_paddings_m": []}"#;
     disk.meddle(|t| drop(t.open_table(SCENES).expect("a table").insert("room", &mark[..])));
     let catalogue = disk.load().expect("loads");
     assert_eq!(catalogue.update_scene("room", &moved(1.0)).expect("moved").revision(), before + 1);
@@ -259,7 +267,7 @@ fn pages_cover_everything_once() {
     }
     let names = |after, count| {
         let (page, more) = catalogue.scenes(after, count);
-        (page.iter().map(|scene| scene.name().to_string()).collect::<Vec<_>>().concat(), more)
+        (page.iter().map(|live| live.snapshot().name().to_string()).collect::<Vec<_>>().concat(), more)
     };
     assert_eq!(names(None, 2), ("ab".into(), true));
     assert_eq!(names(Some("b"), 2), ("cd".into(), true));

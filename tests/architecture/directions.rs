@@ -21,15 +21,30 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
     ("scene", &["measure", "body"]),
     // Of measure, the pose.
     ("store", &["body", "scene", "measure"]),
-    ("jobs", &["fit", "store", "body"]),
-    ("service", &["jobs", "store", "scene", "measure", "body"]),
+    ("jobs", &["fit", "store", "scene", "body"]),
+    // Of polynomial, the instruction set.
+    ("service", &["jobs", "store", "scene", "measure", "body", "polynomial"]),
+    // Of service, the messages.
+    ("client", &["service", "jobs", "store", "scene", "measure", "body"]),
     ("draw", &["body", "optimize"]),
     ("demo", ANY),
     ("cli", ANY),
 ];
 
-const ANY: &[&str] =
-    &["polynomial", "optimize", "body", "measure", "fit", "scene", "store", "jobs", "service", "draw", "demo"];
+const ANY: &[&str] = &[
+    "polynomial",
+    "optimize",
+    "body",
+    "measure",
+    "fit",
+    "scene",
+    "store",
+    "jobs",
+    "service",
+    "client",
+    "draw",
+    "demo",
+];
 
 /// Where the layers lie: folders whose entries are layers, and crates that are one.
 const SOURCES: [(&str, Option<&str>); 4] =
@@ -37,12 +52,12 @@ const SOURCES: [(&str, Option<&str>); 4] =
 
 /// Words that one layer (or a few) may name, and no other: wire formats, bytes on disk.
 const PRIVATE_WORDS: &[(&str, &[&str])] = &[
-    ("prost", &["service"]),
-    ("tonic", &["service"]),
+    ("prost", &["service", "client"]),
+    ("tonic", &["service", "client"]),
     ("tonic_prost", &["service"]),
     ("tonic_health", &["service"]),
     ("tonic_reflection", &["service"]),
-    ("tonic_types", &["service"]),
+    ("tonic_types", &["service", "client"]),
     ("redb", &["store"]),
     ("clarabel", &["fit"]),
     ("plotters", &["draw"]),

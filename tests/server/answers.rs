@@ -2,29 +2,21 @@
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use sublevel::body::Body;
-use sublevel::service::proto::{
-    self, Accuracy, DistanceResult, EvaluateRequest, LevelDistanceResult, Measure, UpdateSceneRequest,
-    evaluate_result::Outcome,
-};
+use sublevel::service::proto::{self, Answer, EvaluateRequest, Measure, UpdateSceneRequest};
 
-use crate::harness::{Clients, Numbers, Running, at, ball, moved, object, pair};
+use crate::harness::{Clients, Numbers, Running, at, ball, moved, object, pair, question, rows};
 
-/// All three measures of the objects `a` and `b` of the scene `room`, `b` elsewhere for this call.
-async fn answers(clients: &mut Clients, b: proto::Pose) -> (DistanceResult, LevelDistanceResult, LevelDistanceResult) {
+/// Distance and both level distances of the objects `a` and `b` of the scene `room`, `b` elsewhere
+/// for this call.
+async fn answers(clients: &mut Clients, b: proto::Pose) -> (Answer, Answer, Answer) {
     let measures = [Measure::Distance, Measure::LevelDistanceAOnB, Measure::LevelDistanceBOnA];
     let request = EvaluateRequest {
-        scene: "room".into(),
-        pairs: vec![pair("a", "b")],
-        measures: measures.map(Into::into).to_vec(),
-        pose_overrides: vec![moved("b", b)],
-        accuracy: Some(Accuracy { distance_relative: Some(1e-12), level_relative: Some(1e-12) }),
+        pose_overrides: rows(vec![moved("b", b)]),
+        accuracy: Some(1e-12),
+        ..question(vec![pair("a", "b")], &measures)
     };
-    let results = clients.queries.evaluate(request).await.expect("answers").into_inner().results;
-    let outcomes: Vec<_> = results.into_iter().map(|result| result.outcome.expect("an outcome")).collect();
-    match <[Outcome; 3]>::try_from(outcomes).expect("three results") {
-        [Outcome::Distance(d), Outcome::LevelDistanceAOnB(ab), Outcome::LevelDistanceBOnA(ba)] => (d, ab, ba),
-        other => panic!("measures in another order: {other:?}"),
-    }
+    let answers = clients.queries.evaluate(request).await.expect("answers").into_inner().answers;
+    <[Answer; 3]>::try_from(answers).expect("three answers").into()
 }
 
 /// A scene `room` of two bodies: `a` at this pose, `b` at the origin.
@@ -32,7 +24,7 @@ async fn room(clients: &mut Clients, (a, pose): (&Body, proto::Pose), b: &Body) 
     let (a, b) = (clients.put(a).await, clients.put(b).await);
     clients.make_scene("room").await;
     let upsert_objects = vec![object("a", &a, pose), object("b", &b, at(0.0))];
-    clients.update(UpdateSceneRequest { name: "room".into(), upsert_objects, ..Default::default() }).await;
+    clients.update(UpdateSceneRequest { scene: "room".into(), upsert_objects, ..Default::default() }).await;
 }
 
 fn vector(v: Option<proto::Vector3>) -> Vector3<f64> {
@@ -73,8 +65,8 @@ async fn gradients_are_those_of_balls_off_their_origins() {
         let (length, n) = (between.norm(), between.normalize());
         let (distance, ab, ba) = answers(&mut clients, pose_b).await;
         let label = format!("seed 17 step {step}: {distance:?} {ab:?} {ba:?}");
-        assert!(!distance.tied && !ab.tied && !ba.tied, "{label}");
-        assert_eq!((distance.part_a, distance.part_b, distance.hulls_upper_m), (0, 0, None), "{label}");
+        assert!(!distance.not_unique && !ab.not_unique && !ba.not_unique, "{label}");
+        assert_eq!((distance.part_a, distance.part_b, distance.objects_upper), (0, 0, None), "{label}");
         if length < radius_a + radius_b {
             assert!(distance.gradient_a.is_none() && distance.gradient_b.is_none(), "{label}");
             continue;
@@ -86,10 +78,13 @@ async fn gradients_are_those_of_balls_off_their_origins() {
             [(ab, radius_a, radius_b, arm_a, arm_b, n), (ba, radius_b, radius_a, arm_b, arm_a, -n)]
         {
             let force = n * (2.0 * (length - q) / (p * p));
-            assert!(off(level.gradient_p, &force, &of_p) < 1e-6, "{label}");
-            assert!(off(level.gradient_q, &-force, &of_q) < 1e-6, "{label}");
+            // Gradients are in the order of the pair.
+            let (force_a, force_b) = if of_p == arm_a { (force, -force) } else { (-force, force) };
+            assert!(off(level.gradient_a, &force_a, &arm_a) < 1e-6, "{label}");
+            assert!(off(level.gradient_b, &force_b, &arm_b) < 1e-6, "{label} {of_q}");
             let multiplier = (length - q) * q / (p * p);
-            assert!((level.multiplier - multiplier).abs() <= 1e-6 * multiplier && !level.saturated, "{label}");
+            let found = level.multiplier.expect("a multiplier");
+            assert!((found - multiplier).abs() <= 1e-6 * multiplier && !level.saturated, "{label}");
         }
     }
     assert!(apart > 30, "{apart} of 60 are apart");
@@ -104,9 +99,9 @@ async fn gaps_widen_the_bracket_for_the_objects() {
     room(&mut clients, (&ball(1.0).with_gap(0.25), at(0.0)), &ball(2.0).with_gap(0.5)).await;
     for x in [5.0, 3.0 + 1e-9, 1.0] {
         let (distance, ..) = answers(&mut clients, at(x)).await;
-        let hulls = distance.hulls_upper_m.expect("both gaps are known");
-        assert!(hulls >= distance.upper_m + 0.75 && hulls <= (distance.upper_m + 0.75) * (1.0 + 1e-15), "{distance:?}");
-        assert!((distance.upper_m - (x - 3.0).max(0.0)).abs() < 1e-8, "{distance:?}");
+        let hulls = distance.objects_upper.expect("both gaps are known");
+        assert!(hulls >= distance.upper + 0.75 && hulls <= (distance.upper + 0.75) * (1.0 + 1e-15), "{distance:?}");
+        assert!((distance.upper - (x - 3.0).max(0.0)).abs() < 1e-8, "{distance:?}");
     }
 }
 
@@ -118,8 +113,9 @@ async fn saturated_levels_say_so() {
     room(&mut clients, (&ball(1.0), at(0.0)), &ball(2.0)).await;
     // The centre of A lies in B, that of B outside A.
     let (distance, ab, ba) = answers(&mut clients, at(1.5)).await;
-    assert!(distance.gradient_a.is_none() && distance.upper_m == 0.0, "{distance:?}");
+    assert!(distance.gradient_a.is_none() && distance.upper == 0.0, "{distance:?}");
     let still = proto::Vector3 { x: 0.0, y: 0.0, z: 0.0 };
-    assert!(ab.saturated && ab.multiplier == 0.0 && ab.gradient_p.expect("one").linear == Some(still), "{ab:?}");
-    assert!(!ba.saturated && (ba.value - 0.0625).abs() < 1e-8 && ba.multiplier > 0.0, "{ba:?}");
+    assert!(ab.saturated && ab.multiplier == Some(0.0) && ab.gradient_a.expect("one").linear == Some(still), "{ab:?}");
+    let value = ba.value.expect("a value");
+    assert!(!ba.saturated && (value - 0.0625).abs() < 1e-8 && ba.multiplier > Some(0.0), "{ba:?}");
 }

@@ -7,13 +7,19 @@ use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use sublevel::body::Body;
+use sublevel::client::Client;
+use sublevel::service::proto::blob_service_client::BlobServiceClient;
 use sublevel::service::proto::body_service_client::BodyServiceClient;
+use sublevel::service::proto::create_body_request::Source;
+use sublevel::service::proto::evaluate_request::Question;
 use sublevel::service::proto::fit_service_client::FitServiceClient;
+use sublevel::service::proto::job_service_client::JobServiceClient;
 use sublevel::service::proto::query_service_client::QueryServiceClient;
 use sublevel::service::proto::scene_service_client::SceneServiceClient;
 use sublevel::service::proto::{
-    CreateBodyRequest, CreateSceneRequest, GetSceneRequest, Object, ObjectPair, ObjectPose, Pose, Quaternion, Scene,
-    UpdateSceneRequest, Vector3,
+    self, CreateBodyRequest, CreateSceneRequest, EvaluateRequest, GetSceneRequest, GetSceneResponse, Object,
+    ObjectPair, ObjectPose, PairList, Pose, PoseTable, Quaternion, Subject, SubjectPair, UpdateSceneRequest, Vector3,
+    subject,
 };
 use tonic::transport::{Channel, Endpoint};
 use tonic_types::StatusExt;
@@ -99,8 +105,16 @@ impl Running {
             scenes: SceneServiceClient::new(channel.clone()),
             queries: QueryServiceClient::new(channel.clone()),
             fits: FitServiceClient::new(channel.clone()),
+            jobs: JobServiceClient::new(channel.clone()),
+            blobs: BlobServiceClient::new(channel.clone()),
             channel,
+            url: self.url(),
         }
+    }
+
+    /// The typed client.
+    pub(crate) async fn client(&self) -> Client {
+        Client::connect(&self.url()).await.expect("the server answers")
     }
 
     /// SIGKILL: no time to tidy up.
@@ -156,14 +170,29 @@ pub(crate) struct Clients {
     pub(crate) scenes: SceneServiceClient<Channel>,
     pub(crate) queries: QueryServiceClient<Channel>,
     pub(crate) fits: FitServiceClient<Channel>,
+    pub(crate) jobs: JobServiceClient<Channel>,
+    pub(crate) blobs: BlobServiceClient<Channel>,
     pub(crate) channel: Channel,
+    /// Where the server is.
+    pub(crate) url: String,
 }
 
 impl Clients {
     /// Stores a body and returns its id.
     pub(crate) async fn put(&mut self, body: &Body) -> String {
-        let request = CreateBodyRequest { body_file_json: body.to_json().into_bytes().into() };
-        self.bodies.create_body(request).await.expect("stored").into_inner().body.expect("a body").id
+        self.put_file(body.to_json()).await
+    }
+
+    /// Stores the body of a file of any kind and returns its id.
+    pub(crate) async fn put_file(&mut self, file: String) -> String {
+        self.bodies
+            .create_body(body_file(file.into_bytes()))
+            .await
+            .expect("stored")
+            .into_inner()
+            .body
+            .expect("a body")
+            .id
     }
 
     pub(crate) async fn make_scene(&mut self, name: &str) -> u64 {
@@ -175,9 +204,14 @@ impl Clients {
         self.scenes.update_scene(update).await.expect("updated").into_inner().revision
     }
 
-    pub(crate) async fn scene(&mut self, name: &str) -> Scene {
-        let response = self.scenes.get_scene(GetSceneRequest { name: name.into() }).await.expect("a scene");
-        response.into_inner().scene.expect("a scene")
+    /// A scene that fits in one page.
+    pub(crate) async fn scene(&mut self, name: &str) -> GetSceneResponse {
+        let request = GetSceneRequest { name: name.into(), page_size: 10_000, page_token: String::new() };
+        self.scenes.get_scene(request).await.expect("a scene").into_inner()
+    }
+
+    pub(crate) async fn revision(&mut self, name: &str) -> u64 {
+        self.scene(name).await.scene.expect("a summary").revision
     }
 }
 
@@ -193,7 +227,7 @@ pub(crate) fn at(x: f64) -> Pose {
 }
 
 pub(crate) fn object(name: &str, body_id: &str, pose: Pose) -> Object {
-    Object { name: name.into(), body_id: body_id.into(), pose: Some(pose), group: String::new() }
+    Object { name: name.into(), body_id: body_id.into(), pose: Some(pose), ..Default::default() }
 }
 
 pub(crate) fn moved(name: &str, pose: Pose) -> ObjectPose {
@@ -202,6 +236,42 @@ pub(crate) fn moved(name: &str, pose: Pose) -> ObjectPose {
 
 pub(crate) fn pair(a: &str, b: &str) -> ObjectPair {
     ObjectPair { a: a.into(), b: b.into() }
+}
+
+/// Poses as plain rows.
+pub(crate) fn rows(rows: Vec<ObjectPose>) -> Option<PoseTable> {
+    Some(PoseTable { rows, ..PoseTable::default() })
+}
+
+/// Two objects by name, for rules.
+pub(crate) fn subjects(a: &str, b: &str) -> SubjectPair {
+    let object = |name: &str| Some(Subject { subject: Some(subject::Subject::Object(name.into())) });
+    SubjectPair { a: object(a), b: object(b) }
+}
+
+pub(crate) fn body_file(file: Vec<u8>) -> CreateBodyRequest {
+    CreateBodyRequest { name: String::new(), source: Some(Source::File(file.into())) }
+}
+
+/// Measures of pairs of the scene `room`, with everything that is known of them.
+pub(crate) fn question(pairs: Vec<ObjectPair>, measures: &[sublevel::service::proto::Measure]) -> EvaluateRequest {
+    let outputs = [
+        proto::Output::Value,
+        proto::Output::Witnesses,
+        proto::Output::Normal,
+        proto::Output::Gradients,
+        proto::Output::Flags,
+        proto::Output::Parts,
+        proto::Output::Solver,
+        proto::Output::Objects,
+    ];
+    EvaluateRequest {
+        scene: "room".into(),
+        question: Some(Question::Pairs(PairList { rows: pairs, ..PairList::default() })),
+        measures: measures.iter().map(|&measure| measure.into()).collect(),
+        outputs: outputs.map(i32::from).to_vec(),
+        ..EvaluateRequest::default()
+    }
 }
 
 /// Every number of a pose, bit for bit.

@@ -5,12 +5,14 @@ use std::time::Instant;
 use nalgebra::Vector3;
 use sublevel::body::Body;
 use sublevel::service::proto::{
-    CreateBodyRequest, DeleteBodyRequest, DeleteSceneRequest, EvaluateRequest, GetBodyRequest, ListBodiesRequest,
-    ListScenesRequest, Measure, UpdateSceneRequest, evaluate_result::Outcome,
+    DeleteBodyRequest, DeleteSceneRequest, EvaluateRequest, GetBodyRequest, ListBodiesRequest, ListScenesRequest,
+    Measure, UpdateSceneRequest, get_body_response::Content,
 };
 use tonic::Code;
 
-use crate::harness::{Numbers, PATIENCE, Running, at, ball, bits, moved, object, pair, reason};
+use crate::harness::{
+    Numbers, PATIENCE, Running, at, ball, bits, body_file, moved, object, pair, question, reason, rows, subjects,
+};
 
 fn shapes() -> [Body; 3] {
     let cuboid = Body::cuboid("box", Vector3::new(0.2, 0.3, 0.4)).expect("a box");
@@ -18,13 +20,7 @@ fn shapes() -> [Body; 3] {
 }
 
 fn everything(a: &str, b: &str) -> EvaluateRequest {
-    let measures = [Measure::Distance, Measure::LevelDistanceAOnB, Measure::LevelDistanceBOnA];
-    EvaluateRequest {
-        scene: "room".into(),
-        pairs: vec![pair(a, b)],
-        measures: measures.map(Into::into).to_vec(),
-        ..EvaluateRequest::default()
-    }
+    question(vec![pair(a, b)], &[Measure::Distance, Measure::LevelDistanceAOnB, Measure::LevelDistanceBOnA])
 }
 
 /// The promise of the store: what was acknowledged is there after SIGKILL, and revisions do not go
@@ -47,38 +43,33 @@ async fn everything_acknowledged_survives_a_kill() {
     // show in the last bits.
     upsert_objects.extend((0..60).map(|i| object(&format!("still {i}"), &files[i % 3].0, numbers.pose())));
     let count = upsert_objects.len();
-    let allow_pairs = vec![pair("b", "a")];
+    let allow_pairs = vec![subjects("b", "a")];
     let mut revision = clients
-        .update(UpdateSceneRequest { name: "room".into(), upsert_objects, allow_pairs, ..Default::default() })
+        .update(UpdateSceneRequest { scene: "room".into(), upsert_objects, allow_pairs, ..Default::default() })
         .await;
 
     let start = Instant::now();
     for step in 0..1000 {
         let name = names[step % 3];
         let update = UpdateSceneRequest {
-            name: "room".into(),
+            scene: "room".into(),
             expected_revision: Some(revision),
-            set_poses: vec![moved(name, numbers.pose())],
+            set_poses: rows(vec![moved(name, numbers.pose())]),
             ..Default::default()
         };
         let next = clients.update(update).await;
         assert_eq!(next, revision + 1);
         revision = next;
-        let results = clients.queries.evaluate(everything("a", "b")).await.expect("answers").into_inner().results;
-        assert_eq!(results.len(), 3);
-        for result in results {
-            assert_eq!(result.scene_revision, revision);
-            match result.outcome.expect("an outcome") {
-                Outcome::Distance(found) => assert!(found.lower_m <= found.upper_m && found.lower_m >= 0.0),
-                Outcome::LevelDistanceAOnB(found) | Outcome::LevelDistanceBOnA(found) => {
-                    assert!(found.lower <= found.upper);
-                }
-            }
+        let request = EvaluateRequest { include_allowed: true, ..everything("a", "b") };
+        let response = clients.queries.evaluate(request).await.expect("answers").into_inner();
+        assert_eq!((response.answers.len(), response.scene_revision), (3, revision));
+        for answer in response.answers {
+            assert!(answer.lower <= answer.upper, "{answer:?}");
         }
     }
     println!("1000 durable updates and 1000 queries of 3 measures in {:?}", start.elapsed());
     let before = clients.scene("room").await;
-    assert_eq!(before.revision, revision);
+    assert_eq!(before.scene.as_ref().map(|scene| scene.revision), Some(revision));
 
     // Somebody is writing at the very moment of the kill.
     let mut racing = server.connect().await;
@@ -88,8 +79,8 @@ async fn everything_acknowledged_survives_a_kill() {
         let mut acknowledged = (revision, at(0.0));
         loop {
             let pose = numbers.pose();
-            let set_poses = vec![moved("racer", pose)];
-            let update = UpdateSceneRequest { name: "room".into(), set_poses, ..Default::default() };
+            let set_poses = rows(vec![moved("racer", pose)]);
+            let update = UpdateSceneRequest { scene: "room".into(), set_poses, ..Default::default() };
             match racing.scenes.update_scene(update).await {
                 Ok(response) => {
                     acknowledged = (response.into_inner().revision, pose);
@@ -108,8 +99,9 @@ async fn everything_acknowledged_survives_a_kill() {
     let server = Running::start(dir.path());
     let mut clients = server.connect().await;
     let after = clients.scene("room").await;
-    let landed = after.revision == acknowledged + 1;
-    assert!(landed || after.revision == acknowledged, "{} after {acknowledged}", after.revision);
+    let now = after.scene.as_ref().expect("a summary").revision;
+    let landed = now == acknowledged + 1;
+    assert!(landed || now == acknowledged, "{now} after {acknowledged}");
     for (was, is) in before.objects.iter().zip(&after.objects) {
         let (was_pose, is_pose) = (was.pose.as_ref().expect("a pose"), is.pose.as_ref().expect("a pose"));
         assert_eq!((&was.name, &was.body_id, &was.group), (&is.name, &is.body_id, &is.group));
@@ -124,11 +116,11 @@ async fn everything_acknowledged_survives_a_kill() {
     assert_eq!(before.allowed_pairs, after.allowed_pairs);
     for (id, file) in files {
         let found = clients.bodies.get_body(GetBodyRequest { id }).await.expect("the body").into_inner();
-        assert_eq!(found.body_file_json, file.as_bytes());
+        assert_eq!(found.content, Some(Content::File(file.into_bytes().into())));
     }
-    let set_poses = vec![moved("a", at(1.0))];
-    let next = clients.update(UpdateSceneRequest { name: "room".into(), set_poses, ..Default::default() }).await;
-    assert_eq!(next, after.revision + 1);
+    let set_poses = rows(vec![moved("a", at(1.0))]);
+    let next = clients.update(UpdateSceneRequest { scene: "room".into(), set_poses, ..Default::default() }).await;
+    assert_eq!(next, now + 1);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -137,14 +129,15 @@ async fn bodies_are_stored_once_listed_in_pages_and_kept_while_used() {
     let server = Running::start(dir.path());
     let mut clients = server.connect().await;
     let file = ball(1.0).to_json().into_bytes();
-    let request = CreateBodyRequest { body_file_json: file.clone().into() };
+    let request = body_file(file.clone());
     let first = clients.bodies.create_body(request.clone()).await.expect("stored").into_inner();
     let again = clients.bodies.create_body(request).await.expect("stored").into_inner();
     assert!(first.created && !again.created);
     assert_eq!(first.body, again.body);
     let used = first.body.expect("a body");
     assert_eq!((used.degree, used.constraint_count, used.name.as_str()), (2, 1, "ball"));
-    assert!((used.volume_m3 - 4.0 / 3.0 * std::f64::consts::PI).abs() < 1e-6, "{}", used.volume_m3);
+    let volume = used.volume_m3.expect("a volume");
+    assert!((volume - 4.0 / 3.0 * std::f64::consts::PI).abs() < 1e-6, "{volume}");
 
     let mut ids = vec![used.id.clone()];
     for radius in [2.0, 3.0, 4.0, 5.0] {
@@ -167,13 +160,13 @@ async fn bodies_are_stored_once_listed_in_pages_and_kept_while_used() {
 
     clients.make_scene("room").await;
     let upsert_objects = vec![object("o", &used.id, at(0.0))];
-    clients.update(UpdateSceneRequest { name: "room".into(), upsert_objects, ..Default::default() }).await;
+    clients.update(UpdateSceneRequest { scene: "room".into(), upsert_objects, ..Default::default() }).await;
     let delete = DeleteBodyRequest { id: used.id.clone() };
     let refused = clients.bodies.delete_body(delete.clone()).await.expect_err("in use");
     assert_eq!((refused.code(), reason(&refused).as_str()), (Code::FailedPrecondition, "BODY_IN_USE"));
     assert!(refused.message().contains("\"o\"") && refused.message().contains("\"room\""), "{}", refused.message());
     let remove_objects = vec!["o".into()];
-    clients.update(UpdateSceneRequest { name: "room".into(), remove_objects, ..Default::default() }).await;
+    clients.update(UpdateSceneRequest { scene: "room".into(), remove_objects, ..Default::default() }).await;
     clients.bodies.delete_body(delete.clone()).await.expect("deleted");
     let gone = clients.bodies.delete_body(delete).await.expect_err("gone");
     assert_eq!((gone.code(), reason(&gone).as_str()), (Code::NotFound, "BODY_NOT_FOUND"));
@@ -189,7 +182,7 @@ async fn a_deleted_scene_never_hands_out_its_revisions_again() {
     let id = clients.put(&ball(1.0)).await;
     assert_eq!(clients.make_scene("room").await, 1);
     let upsert_objects = vec![object("o", &id, at(0.0))];
-    clients.update(UpdateSceneRequest { name: "room".into(), upsert_objects, ..Default::default() }).await;
+    clients.update(UpdateSceneRequest { scene: "room".into(), upsert_objects, ..Default::default() }).await;
     clients.scenes.delete_scene(DeleteSceneRequest { name: "room".into() }).await.expect("deleted");
     server.kill();
 
@@ -212,32 +205,25 @@ async fn answers_are_right_and_overrides_last_one_call() {
     let (one, two) = (clients.put(&ball(1.0)).await, clients.put(&ball(2.0)).await);
     clients.make_scene("room").await;
     let upsert_objects = vec![object("a", &one, at(0.0)), object("b", &two, at(5.0))];
-    clients.update(UpdateSceneRequest { name: "room".into(), upsert_objects, ..Default::default() }).await;
+    clients.update(UpdateSceneRequest { scene: "room".into(), upsert_objects, ..Default::default() }).await;
 
-    let over = EvaluateRequest { pose_overrides: vec![moved("b", at(7.0))], ..everything("a", "b") };
+    let over = EvaluateRequest { pose_overrides: rows(vec![moved("b", at(7.0))]), ..everything("a", "b") };
     // Ball a at 0 of radius 1; ball b of radius 2 at x: p_a on b is ((x - 2) / 1)^2, p_b on a is
     // ((x - 1) / 2)^2.
     for (request, x) in [(everything("a", "b"), 5.0), (over, 7.0_f64), (everything("a", "b"), 5.0)] {
-        let results = clients.queries.evaluate(request).await.expect("answers").into_inner().results;
-        for result in results {
-            let (lower, value, upper, truth) = match result.outcome.expect("an outcome") {
-                Outcome::Distance(found) => {
-                    let normal = found.normal.expect("a normal when apart");
-                    assert!((normal.x + 1.0).abs() < 1e-6, "from B to A: {normal:?}");
-                    assert!((found.witness_a_m.expect("a witness").x - 1.0).abs() < 1e-6);
-                    assert!((found.witness_b_m.expect("a witness").x - (x - 2.0)).abs() < 1e-6);
-                    (found.lower_m, found.value_m, found.upper_m, x - 3.0)
-                }
-                Outcome::LevelDistanceAOnB(found) => (found.lower, found.value, found.upper, (x - 2.0).powi(2)),
-                Outcome::LevelDistanceBOnA(found) => (found.lower, found.value, found.upper, ((x - 1.0) / 2.0).powi(2)),
-            };
+        let answers = clients.queries.evaluate(request).await.expect("answers").into_inner().answers;
+        let normal = answers[0].normal.expect("a normal when apart");
+        assert!((normal.x + 1.0).abs() < 1e-6, "from B to A: {normal:?}");
+        assert!((answers[0].witness_a_m.expect("a witness").x - 1.0).abs() < 1e-6);
+        assert!((answers[0].witness_b_m.expect("a witness").x - (x - 2.0)).abs() < 1e-6);
+        for (answer, truth) in answers.iter().zip([x - 3.0, (x - 2.0).powi(2), ((x - 1.0) / 2.0).powi(2)]) {
+            let (lower, value, upper) = (answer.lower, answer.value.expect("a value"), answer.upper);
             assert!(lower <= truth * (1.0 + 1e-12) && truth * (1.0 - 1e-12) <= upper, "{lower} {truth} {upper}");
             assert!((value - truth).abs() <= 1e-7 * truth && upper - lower <= 1e-7 * truth, "{lower} {truth} {upper}");
         }
     }
-    let results = EvaluateRequest { pose_overrides: vec![moved("b", at(0.5))], ..everything("a", "b") };
-    let results = clients.queries.evaluate(results).await.expect("answers").into_inner().results;
-    let Some(Outcome::Distance(touching)) = &results[0].outcome else { panic!("distance comes first") };
-    assert_eq!((touching.lower_m, touching.upper_m), (0.0, 0.0));
+    let results = EvaluateRequest { pose_overrides: rows(vec![moved("b", at(0.5))]), ..everything("a", "b") };
+    let touching = clients.queries.evaluate(results).await.expect("answers").into_inner().answers[0];
+    assert_eq!((touching.lower, touching.upper), (0.0, 0.0));
     assert!(touching.normal.is_none() && touching.witness_a_m == touching.witness_b_m);
 }

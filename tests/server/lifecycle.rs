@@ -175,7 +175,7 @@ async fn push_stores_files_and_says_what_went_wrong() {
     let large = dir.path().join("large.json");
     std::fs::write(&large, " ".repeat((4 << 20) + 1)).expect("written");
     for (args, word) in [
-        (["push", large.to_str().expect("text"), "--server", &url], "4194305 bytes"),
+        (["push", large.to_str().expect("text"), "--server", &url], "large.json"),
         (["push", "missing.json", "--server", &url], "check the path"),
         (["push", changed.to_str().expect("text"), "--server", &url], "changed.json"),
         (["push", "missing.json", "--server", &url], "missing.json"),

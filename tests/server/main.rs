@@ -1,10 +1,14 @@
 //! The server as its users meet it: a real process, gRPC, signals, and a disk.
 
 mod answers;
+mod deadlines;
+mod families;
 #[cfg(feature = "fit")]
 mod fits;
 mod harness;
 mod keeping;
 mod lifecycle;
 mod load;
+mod readme;
 mod refusals;
+mod streams;

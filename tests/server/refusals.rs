@@ -1,12 +1,16 @@
 //! What the server refuses: each bad request gets its code, names its field, and leaves everything
 //! as it was.
 
-use crate::harness::{Clients, Running, at, field, moved, object, pair, pose, reason};
+use crate::harness::{
+    Clients, Running, at, body_file, field, moved, object, pair, pose, question, reason, rows, subjects,
+};
 use nalgebra::Vector3;
 use sublevel::body::Body;
+use sublevel::service::proto::evaluate_request::Question;
 use sublevel::service::proto::{
-    Accuracy, CreateBodyRequest, CreateSceneRequest, DeleteBodyRequest, DeleteSceneRequest, EvaluateRequest,
-    GetBodyRequest, GetSceneRequest, ListBodiesRequest, Measure, Object, ObjectPose, Pose, UpdateSceneRequest,
+    CastRaysRequest, CheckStatesRequest, CreateSceneRequest, DeleteBodyRequest, DeleteSceneRequest, EvaluateRequest,
+    GetBodyRequest, GetSceneRequest, Layout, ListBodiesRequest, Measure, MeasureAccuracy, Object, ObjectPair,
+    ObjectPose, PairList, Pose, Selection, UpdateSceneRequest, WithinMargin,
 };
 use tonic::{Code, Status};
 
@@ -17,7 +21,7 @@ async fn room() -> (tempfile::TempDir, Running, Clients, String) {
     let id = clients.put(&Body::ball("ball", Vector3::zeros(), 1.0).expect("a ball")).await;
     clients.make_scene("room").await;
     let upsert_objects = vec![object("a", &id, at(0.0)), object("b", &id, at(3.0))];
-    clients.update(UpdateSceneRequest { name: "room".into(), upsert_objects, ..Default::default() }).await;
+    clients.update(UpdateSceneRequest { scene: "room".into(), upsert_objects, ..Default::default() }).await;
     (dir, server, clients, id)
 }
 
@@ -30,15 +34,16 @@ fn check(status: &Status, code: Code, at: &str) {
 async fn scene_updates() {
     let (_dir, _server, mut clients, id) = room().await;
     let before = clients.scene("room").await;
-    let update = || UpdateSceneRequest { name: "room".into(), ..Default::default() };
+    let update = || UpdateSceneRequest { scene: "room".into(), ..Default::default() };
     let upsert = |object: Object| UpdateSceneRequest { upsert_objects: vec![object], ..update() };
-    let set = |pose: Pose| UpdateSceneRequest { set_poses: vec![moved("a", at(1.0)), moved("b", pose)], ..update() };
+    let set =
+        |pose: Pose| UpdateSceneRequest { set_poses: rows(vec![moved("a", at(1.0)), moved("b", pose)]), ..update() };
     let (invalid, missing) = (Code::InvalidArgument, Code::NotFound);
     let unit = [0.0, 0.0, 0.0, 1.0];
     let unknown = "0".repeat(64);
     let cases = [
-        (UpdateSceneRequest { name: "elsewhere".into(), ..update() }, missing, "name"),
-        (UpdateSceneRequest { name: String::new(), ..update() }, invalid, "name"),
+        (UpdateSceneRequest { scene: "elsewhere".into(), ..update() }, missing, "scene"),
+        (UpdateSceneRequest { scene: String::new(), ..update() }, invalid, "scene"),
         (upsert(object("c", &unknown, at(0.0))), missing, "upsert_objects[0].body_id"),
         (upsert(object("c", "chair", at(0.0))), invalid, "upsert_objects[0].body_id"),
         (upsert(object("", &id, at(0.0))), invalid, "upsert_objects[0].name"),
@@ -46,36 +51,33 @@ async fn scene_updates() {
         (upsert(object(&"x".repeat(129), &id, at(0.0))), invalid, "upsert_objects[0].name"),
         (upsert(Object { pose: None, ..object("c", &id, at(0.0)) }), invalid, "upsert_objects[0].pose"),
         (upsert(Object { group: "g".repeat(129), ..object("c", &id, at(0.0)) }), invalid, "upsert_objects[0].group"),
-        (set(pose([f64::NAN, 0.0, 0.0], unit)), invalid, "set_poses[1].pose.translation_m.x"),
-        (set(pose([0.0, f64::INFINITY, 0.0], unit)), invalid, "set_poses[1].pose.translation_m.y"),
-        (set(pose([0.0; 3], [0.0, 0.0, f64::NAN, 1.0])), invalid, "set_poses[1].pose.rotation.z"),
-        (set(pose([0.0; 3], [0.0, 0.0, 0.0, 1.00001])), invalid, "set_poses[1].pose.rotation"),
-        (set(pose([0.0; 3], [0.0; 4])), invalid, "set_poses[1].pose.rotation"),
-        (set(pose([0.0; 3], [1e200; 4])), invalid, "set_poses[1].pose.rotation"),
-        (set(Pose { rotation: None, ..at(0.0) }), invalid, "set_poses[1].pose.rotation"),
-        (set(Pose { translation_m: None, ..at(0.0) }), invalid, "set_poses[1].pose.translation_m"),
-        (UpdateSceneRequest { set_poses: vec![moved("z", at(0.0))], ..update() }, missing, "set_poses[0].name"),
+        (set(pose([f64::NAN, 0.0, 0.0], unit)), invalid, "set_poses.rows[1].pose.translation_m.x"),
+        (set(pose([0.0, f64::INFINITY, 0.0], unit)), invalid, "set_poses.rows[1].pose.translation_m.y"),
+        (set(pose([0.0; 3], [0.0, 0.0, f64::NAN, 1.0])), invalid, "set_poses.rows[1].pose.rotation.z"),
+        (set(pose([0.0; 3], [0.0, 0.0, 0.0, 1.00001])), invalid, "set_poses.rows[1].pose.rotation"),
+        (set(pose([0.0; 3], [0.0; 4])), invalid, "set_poses.rows[1].pose.rotation"),
+        (set(pose([0.0; 3], [1e200; 4])), invalid, "set_poses.rows[1].pose.rotation"),
+        (set(Pose { rotation: None, ..at(0.0) }), invalid, "set_poses.rows[1].pose.rotation"),
+        (set(Pose { translation_m: None, ..at(0.0) }), invalid, "set_poses.rows[1].pose.translation_m"),
+        (UpdateSceneRequest { set_poses: rows(vec![moved("z", at(0.0))]), ..update() }, missing, "set_poses[0].name"),
         (UpdateSceneRequest { remove_objects: vec!["z".into()], ..update() }, missing, "remove_objects[0]"),
         (UpdateSceneRequest { remove_objects: vec!["a".into(), "a".into()], ..update() }, invalid, "remove_objects[1]"),
-        (UpdateSceneRequest { allow_pairs: vec![pair("a", "z")], ..update() }, missing, "allow_pairs[0]"),
-        (UpdateSceneRequest { forbid_pairs: vec![pair("a", "a")], ..update() }, invalid, "forbid_pairs[0]"),
+        (UpdateSceneRequest { allow_pairs: vec![subjects("a", "z")], ..update() }, missing, "allow_pairs[0]"),
+        (UpdateSceneRequest { forbid_pairs: vec![subjects("a", "a")], ..update() }, invalid, "forbid_pairs[0]"),
     ];
     for (request, code, at) in cases {
         // A refused update changes nothing, so the good half of it must not be seen either.
         let request =
-            UpdateSceneRequest { allow_pairs: [vec![pair("a", "b")], request.allow_pairs].concat(), ..request };
+            UpdateSceneRequest { allow_pairs: [vec![subjects("a", "b")], request.allow_pairs].concat(), ..request };
         let at = at.replace("allow_pairs[0]", "allow_pairs[1]");
         let status = clients.scenes.update_scene(request).await.expect_err(&at);
         check(&status, code, &at);
     }
-    let stale = UpdateSceneRequest { expected_revision: Some(before.revision - 1), ..update() };
+    let stale =
+        UpdateSceneRequest { expected_revision: Some(before.scene.as_ref().expect("one").revision - 1), ..update() };
     let stale = clients.scenes.update_scene(stale).await.expect_err("stale");
-    assert_eq!((stale.code(), reason(&stale).as_str()), (Code::FailedPrecondition, "REVISION_MISMATCH"));
-    assert!(stale.message().contains(&before.revision.to_string()));
-
-    let upsert_objects = (0..5000).map(|i| object(&format!("o{i}"), &id, at(0.0))).collect();
-    let full = clients.scenes.update_scene(UpdateSceneRequest { upsert_objects, ..update() }).await.expect_err("full");
-    assert_eq!((full.code(), reason(&full).as_str()), (Code::FailedPrecondition, "SCENE_FULL"));
+    assert_eq!((stale.code(), reason(&stale).as_str()), (Code::Aborted, "REVISION_MISMATCH"));
+    assert!(stale.message().contains(&before.scene.as_ref().expect("one").revision.to_string()));
 
     assert_eq!(clients.scene("room").await, before);
     let rounded = set(pose([0.0; 3], [0.0, 0.0, 0.0, 1.0 + 5e-7]));
@@ -92,7 +94,11 @@ async fn scenes_and_bodies() {
     assert_eq!((taken.code(), reason(&taken).as_str()), (Code::AlreadyExists, "SCENE_EXISTS"));
     check(&clients.scenes.create_scene(create("")).await.expect_err("empty"), Code::InvalidArgument, "name");
     check(
-        &clients.scenes.get_scene(GetSceneRequest { name: "hall".into() }).await.expect_err("unknown"),
+        &clients
+            .scenes
+            .get_scene(GetSceneRequest { name: "hall".into(), ..Default::default() })
+            .await
+            .expect_err("unknown"),
         Code::NotFound,
         "name",
     );
@@ -124,11 +130,11 @@ async fn scenes_and_bodies() {
     let (center, volume) = (edited("/normalization/center/1", 1e-300), edited("/volume_m3", 33.0));
     for bad in [String::new(), "{}".into(), truncated, coefficient, center, volume, "\u{0}".into()] {
         assert_ne!(bad, good);
-        let status = clients.bodies.create_body(CreateBodyRequest { body_file_json: bad.into_bytes().into() }).await;
-        check(&status.expect_err("refused"), Code::InvalidArgument, "body_file_json");
+        let status = clients.bodies.create_body(body_file(bad.into_bytes())).await;
+        check(&status.expect_err("refused"), Code::InvalidArgument, "file");
     }
-    let status = clients.bodies.create_body(CreateBodyRequest { body_file_json: vec![0xff, 0xfe].into() }).await;
-    check(&status.expect_err("refused"), Code::InvalidArgument, "body_file_json");
+    let status = clients.bodies.create_body(body_file(vec![0xff, 0xfe])).await;
+    check(&status.expect_err("refused"), Code::InvalidArgument, "file");
     let listed = clients.bodies.list_bodies(ListBodiesRequest::default()).await.expect("a list").into_inner();
     assert_eq!(listed.bodies.len(), 1, "nothing was stored");
 }
@@ -136,56 +142,153 @@ async fn scenes_and_bodies() {
 #[tokio::test(flavor = "multi_thread")]
 async fn queries() {
     let (_dir, _server, mut clients, _) = room().await;
-    let distance = || EvaluateRequest {
-        scene: "room".into(),
-        pairs: vec![pair("a", "b")],
-        measures: vec![Measure::Distance.into()],
-        ..EvaluateRequest::default()
+    let distance = || question(vec![pair("a", "b")], &[Measure::Distance]);
+    let of = |list: PairList| EvaluateRequest { question: Some(Question::Pairs(list)), ..distance() };
+    let pairs = |rows: Vec<ObjectPair>| of(PairList { rows, ..PairList::default() });
+    let packed = |indices: &[u32]| {
+        let bytes: Vec<u8> = indices.iter().flat_map(|index| index.to_le_bytes()).collect();
+        of(PairList { objects: vec!["a".into(), "b".into()], pairs: bytes.into(), ..PairList::default() })
     };
-    let accurate = |accuracy| EvaluateRequest { accuracy: Some(accuracy), ..distance() };
-    let over = |pose_overrides| EvaluateRequest { pose_overrides, ..distance() };
-    let relative = |number| Accuracy { distance_relative: Some(number), level_relative: None };
+    let within = |margin_m: f64| {
+        let within = WithinMargin { margin_m, selection: None };
+        EvaluateRequest { question: Some(Question::Within(within)), ..distance() }
+    };
+    let over = |poses| EvaluateRequest { pose_overrides: rows(poses), ..distance() };
     let (invalid, missing) = (Code::InvalidArgument, Code::NotFound);
+    let three = PairList { points_m: vec![0; 20].into(), ..PairList::default() };
+    let both = PairList { objects: vec!["a".into()], rows: vec![pair("a", "b")], ..PairList::default() };
+    let unit = [1.0, 0.0, 0.0, f64::NAN].iter().flat_map(|number: &f64| number.to_le_bytes()).collect::<Vec<u8>>();
+    let plane = PairList { half_spaces: unit.into(), ..PairList::default() };
+    let accuracies = vec![MeasureAccuracy { measure: Measure::Distance.into(), accuracy: -1e-9 }];
+    let nearer =
+        |threshold_m| EvaluateRequest { measures: vec![Measure::NearerThan.into()], threshold_m, ..distance() };
     let cases = [
         (EvaluateRequest { scene: "hall".into(), ..distance() }, missing, "scene"),
         (EvaluateRequest { scene: String::new(), ..distance() }, invalid, "scene"),
-        (EvaluateRequest { pairs: vec![], ..distance() }, invalid, "pairs"),
-        (EvaluateRequest { pairs: vec![pair("a", "z")], ..distance() }, missing, "pairs[0].b"),
-        (EvaluateRequest { pairs: vec![pair("a", "b"), pair("", "b")], ..distance() }, invalid, "pairs[1].a"),
-        (EvaluateRequest { pairs: vec![pair("a", "a")], ..distance() }, invalid, "pairs[0]"),
-        (EvaluateRequest { pairs: vec![pair("a", "b"); 4097], ..distance() }, invalid, "pairs"),
+        (EvaluateRequest { question: None, ..distance() }, invalid, "question"),
+        (pairs(vec![]), invalid, "pairs"),
+        (pairs(vec![pair("a", "z")]), missing, "pairs.rows[0].b"),
+        (pairs(vec![pair("a", "b"), pair("", "b")]), invalid, "pairs.rows[1].a"),
+        (pairs(vec![pair("a", "a")]), invalid, "pairs[0]"),
+        (packed(&[0, 1, 0]), invalid, "pairs.pairs"),
+        (packed(&[0, 1, 0, 2]), invalid, "pairs[1]"),
+        (packed(&[1, 1]), invalid, "pairs[0]"),
+        (of(three), invalid, "pairs.points_m"),
+        (of(both), invalid, "pairs.rows"),
+        (of(plane), invalid, "pairs.half_spaces[0]"),
+        (within(-1e-9), invalid, "within.margin_m"),
+        (within(f64::INFINITY), invalid, "within.margin_m"),
+        (within(f64::NAN), invalid, "within.margin_m"),
         (EvaluateRequest { measures: vec![], ..distance() }, invalid, "measures"),
         (EvaluateRequest { measures: vec![0], ..distance() }, invalid, "measures[0]"),
         (EvaluateRequest { measures: vec![77], ..distance() }, invalid, "measures[0]"),
-        (EvaluateRequest { measures: vec![1, 1], ..distance() }, invalid, "measures[1]"),
-        (accurate(relative(0.0)), invalid, "accuracy.distance_relative"),
-        (accurate(relative(f64::NAN)), invalid, "accuracy.distance_relative"),
-        (
-            accurate(Accuracy { distance_relative: None, level_relative: Some(-1e-9) }),
-            invalid,
-            "accuracy.level_relative",
-        ),
-        (over(vec![moved("z", at(0.0))]), missing, "pose_overrides[0].name"),
-        (over(vec![moved("a", at(0.0)), moved("a", at(1.0))]), invalid, "pose_overrides[1].name"),
-        (over(vec![moved("a", at(f64::NAN))]), invalid, "pose_overrides[0].pose.translation_m.x"),
-        (over(vec![ObjectPose { name: "a".into(), pose: None }]), invalid, "pose_overrides[0].pose"),
+        (EvaluateRequest { measures: vec![1, 1], ..distance() }, invalid, "measures"),
+        (EvaluateRequest { outputs: vec![99], ..distance() }, invalid, "outputs[0]"),
+        (EvaluateRequest { layout: 9, ..distance() }, invalid, "layout"),
+        (EvaluateRequest { accuracy: Some(0.0), ..distance() }, invalid, "accuracy"),
+        (EvaluateRequest { accuracy: Some(f64::NAN), ..distance() }, invalid, "accuracy"),
+        (EvaluateRequest { accuracies, ..distance() }, invalid, "accuracies[0].accuracy"),
+        (EvaluateRequest { budget_ms: Some(0), ..distance() }, invalid, "budget_ms"),
+        (EvaluateRequest { measures: vec![Measure::TimeOfImpact.into()], ..distance() }, invalid, "motions"),
+        (nearer(None), invalid, "threshold_m"),
+        (nearer(Some(-1.0)), invalid, "threshold_m"),
+        (over(vec![moved("z", at(0.0))]), missing, "pose_overrides.rows[0]"),
+        (over(vec![moved("a", at(0.0)), moved("a", at(1.0))]), invalid, "pose_overrides.rows[1]"),
+        (over(vec![moved("a", at(f64::NAN))]), invalid, "pose_overrides.rows[0].pose.translation_m.x"),
+        (over(vec![ObjectPose { name: "a".into(), pose: None }]), invalid, "pose_overrides.rows[0].pose"),
     ];
     for (request, code, at) in cases {
         let status = clients.queries.evaluate(request).await.expect_err(at);
         check(&status, code, at);
     }
-    let most = EvaluateRequest { pairs: vec![pair("a", "b"); 4096], ..distance() };
-    let results = clients.queries.evaluate(most).await.expect("the limit itself is fine").into_inner().results;
-    assert_eq!(results.len(), 4096);
-    assert_eq!(results.last().map(|result| result.pair_index), Some(4095));
+    let later = EvaluateRequest { at_least_revision: Some(1 << 40), ..distance() };
+    let status = clients.queries.evaluate(later).await.expect_err("not reached");
+    assert_eq!((status.code(), reason(&status).as_str()), (Code::Unavailable, "REVISION_NOT_REACHED"));
+
+    let many = |count: usize| packed(&[0, 1].repeat(count));
+    let most = EvaluateRequest { layout: Layout::Columns.into(), outputs: Vec::new(), ..many(1 << 17) };
+    let columns = clients.queries.evaluate(most).await.expect("the limit itself is fine").into_inner().columns;
+    assert_eq!((columns[0].status.len(), columns[0].lower.len()), (1 << 17, 8 << 17));
+    let status = clients.queries.evaluate(many((1 << 17) + 1)).await.expect_err("too many");
+    check(&status, Code::ResourceExhausted, "pairs");
+    assert!(status.message().contains("max_answers"), "{}", status.message());
+    let status = clients.queries.evaluate(many(1 << 16)).await.expect_err("too long an answer");
+    assert_eq!(status.code(), Code::ResourceExhausted);
+    assert!(status.message().contains("max_message_bytes"), "{}", status.message());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn states_and_rays() {
+    let (_dir, _server, mut clients, _) = room().await;
+    let numbers = |numbers: &[f64]| numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>();
+    let still = numbers(&[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+    let states = || CheckStatesRequest {
+        scene: "room".into(),
+        objects: vec!["a".into()],
+        poses: still.clone().into(),
+        ..Default::default()
+    };
+    let (invalid, missing) = (Code::InvalidArgument, Code::NotFound);
+    let twice = CheckStatesRequest { objects: vec!["a".into(), "a".into()], ..states() };
+    let cases = [
+        (CheckStatesRequest { scene: "hall".into(), ..states() }, missing, "scene"),
+        (CheckStatesRequest { objects: vec![], ..states() }, invalid, "objects"),
+        (CheckStatesRequest { objects: vec!["z".into()], ..states() }, missing, "objects[0]"),
+        (CheckStatesRequest { poses: vec![0; 55].into(), ..states() }, invalid, "poses"),
+        (CheckStatesRequest { poses: vec![0; 64].into(), ..states() }, invalid, "poses"),
+        (CheckStatesRequest { poses: vec![].into(), ..states() }, invalid, "poses"),
+        (CheckStatesRequest { poses: [still.clone(), still.clone()].concat().into(), ..twice }, invalid, "objects[1]"),
+        (CheckStatesRequest { margin_m: -0.1, ..states() }, invalid, "margin_m"),
+        (CheckStatesRequest { margin_m: f64::INFINITY, ..states() }, invalid, "margin_m"),
+        (CheckStatesRequest { detail: 9, ..states() }, invalid, "detail"),
+    ];
+    for (request, code, at) in cases {
+        let status = clients.queries.check_states(request).await.expect_err(at);
+        check(&status, code, at);
+    }
+    // A pose that is none makes its state INVALID, and the others are answered.
+    let mut poses = still.clone();
+    poses.extend(numbers(&[f64::NAN, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
+    poses.extend(numbers(&[3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
+    poses.extend(numbers(&[3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0]));
+    let request = CheckStatesRequest { poses: poses.into(), ..states() };
+    let verdicts = clients.queries.check_states(request).await.expect("answers").into_inner().verdicts;
+    assert_eq!(&verdicts[..], [1, 4, 2, 4]);
+
+    let rays = || CastRaysRequest {
+        scene: "room".into(),
+        origins_m: numbers(&[-5.0, 0.0, 0.0]).into(),
+        directions: numbers(&[2.0, 0.0, 0.0]).into(),
+        max_length_m: 10.0,
+        ..Default::default()
+    };
+    let selection = |name: &str| Some(Selection { objects: vec![name.into()], groups: Vec::new() });
+    let cases = [
+        (CastRaysRequest { origins_m: vec![].into(), directions: vec![].into(), ..rays() }, invalid, "origins_m"),
+        (CastRaysRequest { directions: vec![0; 8].into(), ..rays() }, invalid, "directions"),
+        (CastRaysRequest { directions: vec![0; 24].into(), ..rays() }, invalid, "rays[0]"),
+        (CastRaysRequest { directions: vec![0; 48].into(), ..rays() }, invalid, "directions"),
+        (CastRaysRequest { max_length_m: 0.0, ..rays() }, invalid, "max_length_m"),
+        (CastRaysRequest { radius_m: Some(-1.0), ..rays() }, invalid, "radius_m"),
+        (CastRaysRequest { selection: selection("z"), ..rays() }, missing, "selection.objects[0]"),
+        (CastRaysRequest { accuracy: Some(2.0), ..rays() }, invalid, "accuracy"),
+    ];
+    for (request, code, at) in cases {
+        let status = clients.queries.cast_rays(request).await.expect_err(at);
+        check(&status, code, at);
+    }
+    let hit = clients.queries.cast_rays(rays()).await.expect("answers").into_inner();
+    let lower = f64::from_le_bytes(hit.lower_m[..8].try_into().expect("a number"));
+    assert_eq!((hit.objects, &hit.hits[..]), (vec!["a".to_owned()], &[0, 0, 0, 0][..]));
+    assert!((lower - 4.0).abs() < 1e-8, "{lower}");
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn oversized_messages() {
     let (_dir, _server, mut clients, _) = room().await;
-    let body_file_json = vec![b' '; (4 << 20) + 1].into();
-    let status = clients.bodies.create_body(CreateBodyRequest { body_file_json }).await.expect_err("too large");
-    assert_eq!(status.code(), Code::OutOfRange, "{}", status.message());
+    let status = clients.bodies.create_body(body_file(vec![b' '; (4 << 20) + 1])).await.expect_err("too large");
+    assert_eq!(status.code(), Code::ResourceExhausted, "{}", status.message());
+    assert!(status.message().contains("max_message_bytes"), "{}", status.message());
     assert_eq!(clients.scene("room").await.objects.len(), 2, "the server goes on");
 }
 
@@ -194,13 +297,17 @@ async fn long_names_do_not_break_the_answer() {
     let (_dir, _server, mut clients, _) = room().await;
     let name = "x".repeat(1 << 20);
     check(
-        &clients.scenes.get_scene(GetSceneRequest { name: name.clone() }).await.expect_err("long"),
+        &clients
+            .scenes
+            .get_scene(GetSceneRequest { name: name.clone(), ..Default::default() })
+            .await
+            .expect_err("long"),
         Code::InvalidArgument,
         "name",
     );
     let get = GetBodyRequest { id: name.clone() };
     check(&clients.bodies.get_body(get).await.expect_err("long"), Code::InvalidArgument, "id");
-    let body_file_json = format!("{{\"format\": \"{name}\"}}").into_bytes().into();
-    let status = clients.bodies.create_body(CreateBodyRequest { body_file_json }).await.expect_err("long");
-    check(&status, Code::InvalidArgument, "body_file_json");
+    let file = format!("{{\"format\": \"{name}\"}}").into_bytes();
+    let status = clients.bodies.create_body(body_file(file)).await.expect_err("long");
+    check(&status, Code::InvalidArgument, "file");
 }

@@ -1,18 +1,15 @@
 //! Times messages to a server on loopback, for `sublevel-bench cost`.
 
 use crate::comparison::{Random, sweep::median};
+use nalgebra::Vector3;
 use std::error::Error;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::time::{Duration, Instant};
 use sublevel::body::Body;
-use sublevel::service::limits::MAX_MESSAGE_BYTES;
-use sublevel::service::proto::body_service_client::BodyServiceClient;
-use sublevel::service::proto::query_service_client::QueryServiceClient;
-use sublevel::service::proto::scene_service_client::SceneServiceClient;
-use sublevel::service::proto::{
-    CreateBodyRequest, CreateSceneRequest, EvaluateRequest, Measure, Object, ObjectPair, Pose, Quaternion,
-    UpdateSceneRequest, Vector3,
-};
+use sublevel::client::{Client, Question};
+use sublevel::measure::Pose;
+use sublevel::scene::query::Measure;
+use sublevel::service::proto::Output;
 use sublevel::service::{ServeOptions, Server};
 
 const SCENE: &str = "cost";
@@ -47,44 +44,35 @@ pub(crate) fn messages(sizes: &[usize]) -> Result<Vec<f64>, Box<dyn Error>> {
 
 /// The client's side.
 async fn talk(url: String, sizes: &[usize]) -> Result<Vec<f64>, Box<dyn Error>> {
-    let mut bodies = BodyServiceClient::connect(url.clone()).await?;
+    let client = Client::connect(&url).await?;
+    client.create_scene(SCENE).await?;
     let mut random = Random(1);
-    let mut upsert_objects = Vec::new();
     for (kind, [x, y, z]) in [("brick", [0.5, 0.3, 0.2]), ("post", [0.2, 0.2, 0.9])] {
-        let body = Body::superellipsoid(kind, nalgebra::Vector3::zeros(), nalgebra::Vector3::new(x, y, z), 4)?;
-        let request = CreateBodyRequest { body_file_json: body.to_json().into_bytes().into() };
-        let stored = bodies.create_body(request).await?.into_inner().body.ok_or("the reply holds no body")?;
+        let body = Body::superellipsoid(kind, Vector3::zeros(), Vector3::new(x, y, z), 4)?;
+        let stored = client.create_from_file(body.to_json()).await?;
+        let mut objects = Vec::new();
         for index in 0..OBJECTS {
-            let (q, t) = (random.rotation(), [0; 3].map(|_| REACH * random.signed()));
-            let pose = Pose {
-                translation_m: Some(Vector3 { x: t[0], y: t[1], z: t[2] }),
-                rotation: Some(Quaternion { x: q.i, y: q.j, z: q.k, w: q.w }),
-            };
-            let name = format!("{kind}-{index}");
-            upsert_objects.push(Object { name, body_id: stored.id.clone(), pose: Some(pose), group: String::new() });
+            let (rotation, translation) = (random.rotation(), [0; 3].map(|_| REACH * random.signed()));
+            let pose = Pose::from_quaternion(translation.into(), rotation.coords.into())?;
+            objects.push((format!("{kind}-{index}"), pose));
         }
+        client.put_objects(SCENE, objects.iter().map(|(name, pose)| (name.as_str(), &stored.id, *pose))).await?;
     }
-    let mut scenes = SceneServiceClient::connect(url.clone()).await?;
-    scenes.create_scene(CreateSceneRequest { name: SCENE.into() }).await?;
-    scenes.update_scene(UpdateSceneRequest { name: SCENE.into(), upsert_objects, ..Default::default() }).await?;
-
-    let all: Vec<ObjectPair> = (0..OBJECTS * OBJECTS)
-        .map(|i| ObjectPair { a: format!("brick-{}", i % OBJECTS), b: format!("post-{}", i / OBJECTS) })
-        .collect();
-    let mut queries = QueryServiceClient::connect(url).await?.max_decoding_message_size(MAX_MESSAGE_BYTES);
+    let all: Vec<(String, String)> =
+        (0..OBJECTS * OBJECTS).map(|i| (format!("brick-{}", i % OBJECTS), format!("post-{}", i / OBJECTS))).collect();
     let mut times = Vec::new();
     for &size in sizes {
-        let pairs = all.get(..size).ok_or("more pairs than there are")?.to_vec();
-        let measures = vec![Measure::Distance.into()];
-        let question = EvaluateRequest { scene: SCENE.into(), pairs, measures, ..Default::default() };
+        let pairs = all.get(..size).ok_or("more pairs than there are")?;
+        let mut question = Question::pairs(pairs.iter().map(|(a, b)| (a.as_str(), b.as_str())));
+        question.request_mut().outputs = vec![Output::Value.into()];
         let mut runs = Vec::new();
         // The first one finds everything cold.
         for _ in 0..=REPEATS {
             let question = question.clone();
             let start = Instant::now();
-            let answers = queries.evaluate(question).await?.into_inner();
+            let answers = client.evaluate(SCENE, question, &[Measure::Distance]).await?;
             runs.push(start.elapsed().as_nanos() as f64);
-            if answers.results.len() != size {
+            if answers.rows.len() != size {
                 return Err("the reply does not answer what was asked".into());
             }
         }

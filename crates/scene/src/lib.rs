@@ -1,13 +1,32 @@
-//! Scenes: named objects with poses, a revision, and the pairs that may touch.
+//! Scenes: named objects with poses, a revision, and the questions that are asked of them.
 //!
 //! A [`Scene`] is an immutable snapshot. [`Scene::updated`] checks a whole [`Update`] and then
-//! makes the next snapshot, one revision on; readers keep the snapshot they hold. Nothing here
-//! depends on storage or on the network. Lengths are metres, poses map body frame to world frame.
+//! makes the next snapshot, one revision on; readers keep the snapshot they hold, and snapshots and
+//! forks share whatever is equal. Questions ([`query`]) are split over the threads of a [`Crew`].
+//! Nothing here depends on storage or on the network. Lengths are metres, poses map body frame to
+//! world frame.
 
+mod broad_phase;
+mod crew;
+mod error;
+mod geometry;
 mod limits;
-mod snapshot;
+mod name;
+mod object;
+mod pair_cache;
+mod poses;
+pub mod query;
+mod rules;
+mod scene;
+mod structure;
 mod update;
 
-pub use limits::{MAX_ALLOWED_PAIRS, MAX_NAME_BYTES, MAX_OBJECTS};
-pub use snapshot::{NameError, Object, Scene, check_name};
-pub use update::{Entry, List, Placement, SceneError, Update};
+pub use crew::{Crew, Panicked, Question, Stop};
+pub use error::{Entry, List, SceneError};
+pub use geometry::{Geometry, GeometryFileError, Ladder, LadderError, MAX_RUNGS, NamedHalfSpace};
+pub use limits::{MAX_NAME_BYTES, MAX_OBJECTS, MAX_PADDING_M, MAX_PAIR_RULES};
+pub use name::{NameError, check_name};
+pub use object::{Attachment, Object, Slot, Subject};
+pub use rules::{Rules, SubjectPair};
+pub use scene::Scene;
+pub use update::{Attach, Placement, Update};

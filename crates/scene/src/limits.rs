@@ -3,9 +3,12 @@
 /// Longest name of a scene, object or group, in bytes.
 pub const MAX_NAME_BYTES: usize = 128;
 
-/// Most objects in one scene. With [`MAX_NAME_BYTES`] and [`MAX_ALLOWED_PAIRS`] it keeps a whole
-/// scene within one gRPC message of 4 MiB.
-pub const MAX_OBJECTS: usize = 4096;
+/// Most objects in one scene.
+pub const MAX_OBJECTS: usize = 1 << 17;
 
-/// Most allowed pairs in one scene.
-pub const MAX_ALLOWED_PAIRS: usize = 8192;
+/// Most allowed pairs, and most pairs with a padding, in one scene.
+pub const MAX_PAIR_RULES: usize = 1 << 16;
+
+/// Largest padding of an object, group or pair, either way, metres: beyond it every pair is a
+/// candidate and the tree is of no use.
+pub const MAX_PADDING_M: f64 = 1e3;

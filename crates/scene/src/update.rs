@@ -1,14 +1,18 @@
 //! From one snapshot to the next: an update is checked whole, then applied whole.
 
-use std::collections::BTreeSet;
-use std::fmt;
+use std::collections::HashSet;
 use std::sync::Arc;
 
-use sublevel_core::body::{Body, BodyId};
+use sublevel_core::body::BodyId;
 use sublevel_core::measure::Pose;
 
-use super::snapshot::ordered;
-use super::{MAX_ALLOWED_PAIRS, MAX_NAME_BYTES, MAX_OBJECTS, NameError, Object, Scene, check_name};
+use super::error::{Entry, List, SceneError};
+use super::object::{Attachment, Object, Slot, Subject};
+use super::poses::{compose, relative};
+use super::rules::{SubjectPair, ordered};
+use super::scene::Scene;
+use super::structure::Structure;
+use super::{Geometry, MAX_OBJECTS, MAX_PADDING_M, MAX_PAIR_RULES, check_name};
 
 /// An object to add or to replace.
 #[derive(Debug, Clone)]
@@ -17,14 +21,32 @@ pub struct Placement {
     pub name: Arc<str>,
     /// Id of the body it is made of.
     pub body: BodyId,
-    /// Body frame to world frame, metres.
-    pub pose: Pose,
+    /// Body frame to world frame, metres; none if it is held.
+    pub pose: Option<Pose>,
     /// Free label, may be empty.
     pub group: Arc<str>,
+    /// Padding of its own, metres.
+    pub padding_m: Option<f64>,
+    /// What holds it.
+    pub attachment: Option<Attachment>,
 }
 
-/// A set of changes that happen together. An object may be named once over `upserts`, `poses` and
-/// `removals`, so that the order in which they are applied does not matter.
+/// An object to be held by another.
+#[derive(Debug, Clone)]
+pub struct Attach {
+    /// The object.
+    pub name: Arc<str>,
+    /// Name of the object that holds it.
+    pub to: Arc<str>,
+    /// Frame of the held body to the frame of the holder, metres; none: it stays where it is in the
+    /// world.
+    pub pose: Option<Pose>,
+    /// What it may touch besides its holder.
+    pub touch: Vec<Subject>,
+}
+
+/// A set of changes that happen together. An object may be named once over `upserts`, `poses`,
+/// `attach`, `detach` and `removals`, so that the order in which they are applied does not matter.
 #[derive(Debug, Clone, Default)]
 pub struct Update {
     /// When set, the update is for this revision only.
@@ -33,132 +55,69 @@ pub struct Update {
     pub upserts: Vec<Placement>,
     /// New poses (body frame to world frame, metres) of objects that are there.
     pub poses: Vec<(Arc<str>, Pose)>,
-    /// Objects to remove, with their allowed pairs.
+    /// Objects to remove, with their rules.
     pub removals: Vec<Arc<str>>,
     /// Pairs that may touch from now on.
-    pub allow: Vec<(Arc<str>, Arc<str>)>,
+    pub allow: Vec<SubjectPair>,
     /// Pairs that may not touch any more.
-    pub forbid: Vec<(Arc<str>, Arc<str>)>,
-}
-
-/// The lists of an [`Update`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum List {
-    /// [`Update::upserts`].
-    Upserts,
-    /// [`Update::poses`].
-    Poses,
-    /// [`Update::removals`].
-    Removals,
-    /// [`Update::allow`].
-    Allow,
-    /// [`Update::forbid`].
-    Forbid,
-}
-
-/// An entry of an [`Update`]: which list, and the position in it from 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Entry {
-    /// The list.
-    pub list: List,
-    /// Position in the list, from 0.
-    pub index: usize,
-}
-
-/// Why an update cannot be applied. The scene is as it was.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum SceneError {
-    /// Somebody else changed the scene first.
-    #[error("the scene is at revision {current}, not at the expected {expected}; read it again and repeat the update")]
-    Revision {
-        /// What the update was made for.
-        expected: u64,
-        /// Where the scene is.
-        current: u64,
-    },
-    /// A name cannot be stored.
-    #[error("name {error}")]
-    Name {
-        /// Where.
-        at: Entry,
-        /// The rule it breaks.
-        error: NameError,
-    },
-    /// A group label cannot be stored.
-    #[error("group is longer than {MAX_NAME_BYTES} bytes or holds a control character; shorten it")]
-    Group {
-        /// Where.
-        at: Entry,
-    },
-    /// Two entries change one object, so their order would matter.
-    #[error("object \"{name}\" is named twice in one update; name it once")]
-    Twice {
-        /// The second entry.
-        at: Entry,
-        /// The object.
-        name: Arc<str>,
-    },
-    /// The update speaks of an object that the scene does not have.
-    #[error("no object \"{name}\" in the scene; add it first")]
-    NoObject {
-        /// Where.
-        at: Entry,
-        /// The object.
-        name: Arc<str>,
-    },
-    /// The update places a body that is not stored.
-    #[error("no body {id}; create it first")]
-    NoBody {
-        /// Where.
-        at: Entry,
-        /// The body.
-        id: BodyId,
-    },
-    /// A pair needs two objects.
-    #[error("object \"{name}\" is paired with itself; name two objects")]
-    Itself {
-        /// Where.
-        at: Entry,
-        /// The object.
-        name: Arc<str>,
-    },
-    /// The scene would be too large.
-    #[error("the scene would hold {count} {what}, at most {limit} fit; split it into several scenes")]
-    Full {
-        /// Objects or allowed pairs.
-        what: &'static str,
-        /// How many there would be.
-        count: usize,
-        /// How many fit.
-        limit: usize,
-    },
+    pub forbid: Vec<SubjectPair>,
+    /// Paddings of objects, metres.
+    pub object_paddings: Vec<(Arc<str>, Option<f64>)>,
+    /// Paddings of groups, metres.
+    pub group_paddings: Vec<(Arc<str>, Option<f64>)>,
+    /// Paddings of pairs, metres.
+    pub pair_paddings: Vec<(SubjectPair, Option<f64>)>,
+    /// Objects to be held from now on.
+    pub attach: Vec<Attach>,
+    /// Objects not to be held any more; each stays where it is.
+    pub detach: Vec<Arc<str>>,
 }
 
 impl Update {
     /// Whether there is nothing to do.
     pub fn is_empty(&self) -> bool {
+        self.poses.is_empty() && self.keeps_structure()
+    }
+
+    /// Whether at most poses change.
+    fn keeps_structure(&self) -> bool {
         self.upserts.is_empty()
-            && self.poses.is_empty()
             && self.removals.is_empty()
             && self.allow.is_empty()
             && self.forbid.is_empty()
+            && self.object_paddings.is_empty()
+            && self.group_paddings.is_empty()
+            && self.pair_paddings.is_empty()
+            && self.attach.is_empty()
+            && self.detach.is_empty()
     }
 
-    /// Names of the objects that are there afterwards and may differ from before.
-    pub fn written(&self) -> impl Iterator<Item = &Arc<str>> {
-        self.upserts.iter().map(|placement| &placement.name).chain(self.poses.iter().map(|(name, _)| name))
-    }
-
-    /// Every object named in `upserts`, `poses` and `removals` is named once, with a usable name.
+    /// Every object is named once over the lists that place objects, with a usable name.
     fn check_names(&self) -> Result<(), SceneError> {
-        let mut seen = BTreeSet::new();
+        let mut seen = HashSet::new();
         let upserts = entries(List::Upserts, self.upserts.iter().map(|placement| &placement.name));
         let poses = entries(List::Poses, self.poses.iter().map(|(name, _)| name));
+        let attach = entries(List::Attach, self.attach.iter().map(|attach| &attach.name));
+        let detach = entries(List::Detach, self.detach.iter());
         let removals = entries(List::Removals, self.removals.iter());
-        for (at, name) in upserts.chain(poses).chain(removals) {
+        for (at, name) in upserts.chain(poses).chain(attach).chain(detach).chain(removals) {
             check_name(name).map_err(|error| SceneError::Name { at, error })?;
             if !seen.insert(name) {
                 return Err(SceneError::Twice { at, name: name.clone() });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_paddings(&self) -> Result<(), SceneError> {
+        let upserts = entries(List::Upserts, self.upserts.iter().map(|placement| placement.padding_m));
+        let objects = entries(List::ObjectPaddings, self.object_paddings.iter().map(|(_, padding)| *padding));
+        let groups = entries(List::GroupPaddings, self.group_paddings.iter().map(|(_, padding)| *padding));
+        let pairs = entries(List::PairPaddings, self.pair_paddings.iter().map(|(_, padding)| *padding));
+        for (at, padding) in upserts.chain(objects).chain(groups).chain(pairs) {
+            // Not `>`: a NaN is refused too.
+            if let Some(padding_m) = padding.filter(|padding| !(padding.abs() <= MAX_PADDING_M)) {
+                return Err(SceneError::Padding { at, padding_m });
             }
         }
         Ok(())
@@ -171,77 +130,275 @@ impl Scene {
     ///
     /// # Errors
     /// The first entry that cannot be applied; then nothing is.
-    pub fn updated(&self, update: &Update, bodies: impl Fn(&BodyId) -> Option<Arc<Body>>) -> Result<Self, SceneError> {
-        if let Some(expected) = update.expected_revision
-            && expected != self.revision
-        {
-            return Err(SceneError::Revision { expected, current: self.revision });
+    pub fn updated(&self, update: &Update, bodies: impl Fn(&BodyId) -> Option<Geometry>) -> Result<Self, SceneError> {
+        if let Some(expected) = update.expected_revision.filter(|expected| *expected != self.revision()) {
+            return Err(SceneError::Revision { expected, current: self.revision() });
+        }
+        if update.is_empty() {
+            return Ok(self.clone());
         }
         update.check_names()?;
+        update.check_paddings()?;
+        if update.keeps_structure() {
+            let mut moved = Vec::with_capacity(update.poses.len());
+            for (at, (name, pose)) in entries(List::Poses, &update.poses) {
+                moved.push((find(&self.structure, at, name)?, *pose));
+            }
+            return self.with_poses(&moved);
+        }
+        self.restructured(update, bodies)
+    }
 
-        let mut next = self.clone();
-        if update.is_empty() {
-            return Ok(next);
+    /// The next snapshot with other world poses of objects that are there; what they hold moves
+    /// along. Of an object that is held this changes its place in its holder.
+    ///
+    /// # Errors
+    /// A held object that would end up too far away to have a pose.
+    pub fn with_poses(&self, moved: &[(Slot, Pose)]) -> Result<Self, SceneError> {
+        let mut next = self.next();
+        let mut changed: Vec<Slot> = moved.iter().map(|(slot, _)| *slot).collect();
+        for &(slot, pose) in moved {
+            next.set_pose(slot, pose);
         }
-        for (at, name) in entries(List::Removals, &update.removals) {
-            next.objects.remove(name).ok_or_else(|| SceneError::NoObject { at, name: name.clone() })?;
+        let held = self.structure.held_by(&changed);
+        changed.extend(follow(&self.structure, &mut next, &held)?);
+        let is_held = |slot: Slot| self.structure.object(slot).is_some_and(|object| object.attachment.is_some());
+        if moved.iter().any(|(slot, _)| is_held(*slot)) {
+            // Now that holders are where they will be.
+            let mut structure = Structure::clone(&self.structure);
+            keep_places(&mut structure, &next, moved)?;
+            let slots: Vec<Slot> = moved.iter().map(|(slot, _)| *slot).collect();
+            let held = slots.iter().copied().filter(|slot| is_held(*slot)).chain(structure.held_by(&slots));
+            let held: Vec<Slot> = held.collect();
+            changed.extend(follow(&structure, &mut next, &held)?);
+            next.set_structure(structure);
         }
-        let stays = |(a, b): &(Arc<str>, Arc<str>)| next.objects.contains_key(a) && next.objects.contains_key(b);
-        if !update.removals.is_empty() && !next.allowed.iter().all(stays) {
-            Arc::make_mut(&mut next.allowed).retain(stays);
-        }
-        for (at, (name, pose)) in entries(List::Poses, &update.poses) {
-            let object = next.objects.get_mut(name).ok_or_else(|| SceneError::NoObject { at, name: name.clone() })?;
-            object.pose = *pose;
-        }
-        for (at, placement) in entries(List::Upserts, &update.upserts) {
-            let object = place(at, placement, &bodies)?;
-            next.objects.insert(object.name.clone(), object);
-        }
-        for (at, (a, b)) in entries(List::Allow, &update.allow) {
-            let pair = next.pair(at, a, b)?;
-            if !next.allowed.contains(&pair) {
-                Arc::make_mut(&mut next.allowed).insert(pair);
-            }
-        }
-        for (at, (a, b)) in entries(List::Forbid, &update.forbid) {
-            let pair = next.pair(at, a, b)?;
-            if next.allowed.contains(&pair) {
-                Arc::make_mut(&mut next.allowed).remove(&pair);
-            }
-        }
-        within("objects", next.objects.len(), MAX_OBJECTS)?;
-        within("allowed pairs", next.allowed.len(), MAX_ALLOWED_PAIRS)?;
-        next.revision += 1;
+        next.set_changed(&changed);
         Ok(next)
     }
 
-    /// A pair of two different objects of this scene, in the order it is kept.
-    fn pair(&self, at: Entry, a: &Arc<str>, b: &Arc<str>) -> Result<(Arc<str>, Arc<str>), SceneError> {
-        for name in [a, b] {
-            check_name(name).map_err(|error| SceneError::Name { at, error })?;
-            if !self.objects.contains_key(name) {
-                return Err(SceneError::NoObject { at, name: name.clone() });
+    /// This snapshot, at its revision, with other world poses of some objects for one call; what
+    /// they hold moves along unless it is named itself.
+    ///
+    /// # Errors
+    /// A held object that would end up too far away to have a pose.
+    pub fn posed(&self, poses: &[(Slot, Pose)]) -> Result<Self, SceneError> {
+        let mut posed = self.clone();
+        let mut changed: Vec<Slot> = poses.iter().map(|(slot, _)| *slot).collect();
+        for &(slot, pose) in poses {
+            posed.set_pose(slot, pose);
+        }
+        let mut held = self.structure.held_by(&changed);
+        held.retain(|slot| !changed.contains(slot));
+        changed.extend(follow(&self.structure, &mut posed, &held)?);
+        posed.set_changed(&changed);
+        Ok(posed)
+    }
+
+    fn restructured(&self, update: &Update, bodies: impl Fn(&BodyId) -> Option<Geometry>) -> Result<Self, SceneError> {
+        let mut structure = Structure::clone(&self.structure);
+        let mut next = self.next();
+        let mut changed = Vec::new();
+        for (at, name) in entries(List::Removals, &update.removals) {
+            let slot = structure.remove(name).ok_or_else(|| SceneError::NoObject { at, name: name.clone() })?;
+            next.clear_pose(slot);
+            changed.push(slot);
+        }
+        if !update.removals.is_empty() {
+            let removed: HashSet<&str> = update.removals.iter().map(|name| &**name).collect();
+            structure.rules.forget(|name| removed.contains(name));
+        }
+        for (at, placement) in entries(List::Upserts, &update.upserts) {
+            let slot = structure.put(place(at, placement, &bodies)?);
+            changed.push(slot);
+            match (placement.pose, &placement.attachment) {
+                (_, Some(_)) => {}
+                (Some(pose), None) => next.set_pose(slot, pose),
+                (None, None) => return Err(SceneError::NoPose { at, name: placement.name.clone() }),
             }
         }
-        if a == b {
-            return Err(SceneError::Itself { at, name: a.clone() });
+        for (at, name) in entries(List::Detach, &update.detach) {
+            let slot = find(&structure, at, name)?;
+            structure.change(slot, |object| object.attachment = None);
         }
-        Ok(ordered(a.clone(), b.clone()))
+        let mut moved = Vec::with_capacity(update.poses.len());
+        for (at, (name, pose)) in entries(List::Poses, &update.poses) {
+            let slot = find(&structure, at, name)?;
+            next.set_pose(slot, *pose);
+            moved.push((slot, *pose));
+            changed.push(slot);
+        }
+        // What is held follows its holder before anything looks for its place in one.
+        structure.derive();
+        check_holders(&structure)?;
+        changed.extend(follow_all(&structure, &mut next)?);
+        keep_places(&mut structure, &next, &moved)?;
+        attach(&mut structure, &next, update)?;
+        apply_rules(&mut structure, update)?;
+        structure.derive();
+        check_holders(&structure)?;
+        within("objects", structure.by_name.len(), MAX_OBJECTS)?;
+        within("allowed pairs", structure.rules.allowed.len(), MAX_PAIR_RULES)?;
+        within("pairs with a padding", structure.rules.pairs.len(), MAX_PAIR_RULES)?;
+        changed.extend(follow_all(&structure, &mut next)?);
+        next.set_structure(structure);
+        next.set_changed(&changed);
+        Ok(next)
     }
 }
 
-fn place(
+/// Held objects that were moved by themselves keep where they are: their places in their holders
+/// change.
+fn keep_places(structure: &mut Structure, next: &Scene, moved: &[(Slot, Pose)]) -> Result<(), SceneError> {
+    for &(slot, pose) in moved {
+        let Some(object) = structure.object(slot) else { continue };
+        let (Some(attachment), name) = (&object.attachment, object.name.clone()) else { continue };
+        let Some(holder) = structure.slot(&attachment.to) else { continue };
+        let place = relative(next.pose_at(holder), &pose).map_err(|error| SceneError::Pose { name, error })?;
+        structure.change(slot, |object| {
+            if let Some(attachment) = &mut object.attachment {
+                attachment.pose = place;
+            }
+        });
+    }
+    Ok(())
+}
+
+/// Sets the poses of everything that is held, see [`follow`].
+fn follow_all(structure: &Structure, next: &mut Scene) -> Result<Vec<Slot>, SceneError> {
+    let is_free = |slot: &Slot| structure.object(*slot).is_some_and(|object| object.attachment.is_none());
+    let roots: Vec<Slot> = structure.holding.keys().copied().filter(is_free).collect();
+    follow(structure, next, &structure.held_by(&roots))
+}
+
+/// Sets the poses of held objects, each listed after its holder, and returns which have changed.
+fn follow(structure: &Structure, next: &mut Scene, held: &[Slot]) -> Result<Vec<Slot>, SceneError> {
+    let mut changed = Vec::new();
+    for &slot in held {
+        let Some(object) = structure.object(slot) else { continue };
+        let Some(attachment) = &object.attachment else { continue };
+        let Some(holder) = structure.slot(&attachment.to) else { continue };
+        let pose = compose(next.pose_at(holder), &attachment.pose)
+            .map_err(|error| SceneError::Pose { name: object.name.clone(), error })?;
+        if !next.has_pose(slot) || *next.pose_at(slot) != pose {
+            next.set_pose(slot, pose);
+            changed.push(slot);
+        }
+    }
+    Ok(changed)
+}
+
+fn attach(structure: &mut Structure, next: &Scene, update: &Update) -> Result<(), SceneError> {
+    for (at, attach) in entries(List::Attach, &update.attach) {
+        let slot = find(structure, at, &attach.name)?;
+        let holder = find(structure, at, &attach.to)?;
+        if slot == holder {
+            return Err(SceneError::Itself { at, name: attach.name.clone() });
+        }
+        check_touch(structure, at, &attach.touch)?;
+        let pose = match attach.pose {
+            Some(pose) => pose,
+            None if !next.has_pose(holder) => return Err(SceneError::NoPlace { at, name: attach.to.clone() }),
+            None => relative(next.pose_at(holder), next.pose_at(slot))
+                .map_err(|error| SceneError::Pose { name: attach.name.clone(), error })?,
+        };
+        let attachment = Attachment { to: attach.to.clone(), pose, touch: attach.touch.clone() };
+        structure.change(slot, |object| object.attachment = Some(attachment));
+    }
+    for (at, placement) in entries(List::Upserts, &update.upserts) {
+        if let Some(attachment) = &placement.attachment {
+            find(structure, at, &attachment.to)?;
+            if attachment.to == placement.name {
+                return Err(SceneError::Itself { at, name: placement.name.clone() });
+            }
+            check_touch(structure, at, &attachment.touch)?;
+        }
+    }
+    Ok(())
+}
+
+fn apply_rules(structure: &mut Structure, update: &Update) -> Result<(), SceneError> {
+    for (at, (name, padding)) in entries(List::ObjectPaddings, &update.object_paddings) {
+        let slot = find(structure, at, name)?;
+        structure.change(slot, |object| object.padding_m = *padding);
+    }
+    for (at, (group, padding)) in entries(List::GroupPaddings, &update.group_paddings) {
+        check_name(group).map_err(|error| SceneError::Name { at, error })?;
+        match padding {
+            Some(padding) => structure.rules.groups.insert(group.clone(), *padding),
+            None => structure.rules.groups.remove(group),
+        };
+    }
+    for (at, pair) in entries(List::Allow, &update.allow) {
+        let pair = checked(structure, at, pair)?;
+        structure.rules.allowed.insert(pair);
+    }
+    for (at, pair) in entries(List::Forbid, &update.forbid) {
+        let pair = checked(structure, at, pair)?;
+        structure.rules.allowed.remove(&pair);
+    }
+    for (at, (pair, padding)) in entries(List::PairPaddings, &update.pair_paddings) {
+        let pair = checked(structure, at, pair)?;
+        match padding {
+            Some(padding) => structure.rules.pairs.insert(pair, *padding),
+            None => structure.rules.pairs.remove(&pair),
+        };
+    }
+    Ok(())
+}
+
+/// A pair of two different objects of the scene, or of groups, in the order it is kept.
+fn checked(structure: &Structure, at: Entry, (a, b): &SubjectPair) -> Result<SubjectPair, SceneError> {
+    check_touch(structure, at, [a, b])?;
+    match (a, b) {
+        (Subject::Object(a), Subject::Object(b)) if a == b => Err(SceneError::Itself { at, name: a.clone() }),
+        (a, b) => Ok(ordered((a.clone(), b.clone()))),
+    }
+}
+
+/// Objects are there, groups have usable names.
+fn check_touch<'a>(
+    structure: &Structure,
     at: Entry,
-    placement: &Placement,
-    bodies: impl Fn(&BodyId) -> Option<Arc<Body>>,
-) -> Result<Object, SceneError> {
-    let Placement { name, body: id, pose, group } = placement;
+    subjects: impl IntoIterator<Item = &'a Subject>,
+) -> Result<(), SceneError> {
+    for subject in subjects {
+        let (Subject::Object(name) | Subject::Group(name)) = subject;
+        check_name(name).map_err(|error| SceneError::Name { at, error })?;
+        if matches!(subject, Subject::Object(_)) {
+            find(structure, at, name)?;
+        }
+    }
+    Ok(())
+}
+
+/// Nothing is held by itself or by an object that is gone.
+fn check_holders(structure: &Structure) -> Result<(), SceneError> {
+    if let Some(name) = structure.circle() {
+        return Err(SceneError::Circle { name: name.clone() });
+    }
+    for (_, object) in structure.objects() {
+        if let Some(attachment) = &object.attachment
+            && structure.slot(&attachment.to).is_none()
+        {
+            return Err(SceneError::Holds { name: attachment.to.clone(), held: object.name.clone() });
+        }
+    }
+    Ok(())
+}
+
+fn place(at: Entry, placement: &Placement, bodies: impl Fn(&BodyId) -> Option<Geometry>) -> Result<Object, SceneError> {
+    let Placement { name, body: id, group, padding_m, attachment, .. } = placement;
     if !group.is_empty() && check_name(group).is_err() {
         return Err(SceneError::Group { at });
     }
-    let body = bodies(id).ok_or(SceneError::NoBody { at, id: *id })?;
-    Ok(Object { name: name.clone(), body, pose: *pose, group: group.clone() })
+    let geometry = bodies(id).ok_or(SceneError::NoBody { at, id: *id })?;
+    Ok(Object::new(name.clone(), geometry, group.clone(), *padding_m, attachment.clone()))
+}
+
+fn find(structure: &Structure, at: Entry, name: &Arc<str>) -> Result<Slot, SceneError> {
+    check_name(name).map_err(|error| SceneError::Name { at, error })?;
+    structure.slot(name).ok_or_else(|| SceneError::NoObject { at, name: name.clone() })
 }
 
 fn within(what: &'static str, count: usize, limit: usize) -> Result<(), SceneError> {
@@ -250,131 +407,4 @@ fn within(what: &'static str, count: usize, limit: usize) -> Result<(), SceneErr
 
 fn entries<T>(list: List, items: impl IntoIterator<Item = T>) -> impl Iterator<Item = (Entry, T)> {
     items.into_iter().enumerate().map(move |(index, item)| (Entry { list, index }, item))
-}
-
-impl fmt::Display for Entry {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:?}[{}]", self.list, self.index)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use nalgebra::Vector3;
-
-    fn at(x: f64) -> Pose {
-        Pose::from_quaternion(Vector3::new(x, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0]).expect("a pose")
-    }
-
-    fn ball() -> Arc<Body> {
-        Arc::new(Body::ball("ball", Vector3::zeros(), 1.0).expect("a ball"))
-    }
-
-    fn put(name: &str, body: &Body) -> Placement {
-        Placement { name: name.into(), body: *body.id(), pose: at(0.0), group: "".into() }
-    }
-
-    fn two() -> (Scene, Arc<Body>) {
-        let body = ball();
-        let update = Update {
-            upserts: vec![put("a", &body), put("b", &body)],
-            allow: vec![("b".into(), "a".into())],
-            ..Update::default()
-        };
-        let scene = Scene::new("s", 7).expect("a name").updated(&update, |_| Some(body.clone())).expect("an update");
-        (scene, body)
-    }
-
-    #[test]
-    fn an_update_makes_the_next_revision_and_leaves_the_old_snapshot() {
-        let (scene, body) = two();
-        assert_eq!(scene.revision(), 8);
-        assert!(scene.is_allowed("a", "b") && scene.is_allowed("b", "a"));
-        let update = Update {
-            poses: vec![("b".into(), at(3.0))],
-            removals: vec!["a".into()],
-            upserts: vec![put("c", &body)],
-            ..Update::default()
-        };
-        let next = scene.updated(&update, |_| Some(body.clone())).expect("an update");
-        assert_eq!(next.revision(), 9);
-        assert_eq!(next.objects().map(|object| &*object.name).collect::<Vec<_>>(), ["b", "c"]);
-        assert_eq!(next.object("b").expect("b").pose, at(3.0));
-        assert_eq!(next.allowed_pairs().len(), 0);
-        assert_eq!(scene.object("b").expect("b").pose, at(0.0));
-        assert_eq!(scene.objects().len(), 2);
-    }
-
-    #[test]
-    fn allowed_pairs_are_shared_until_they_change() {
-        let (scene, _) = two();
-        let shares = |update: Update| scene.updated(&update, |_| None).expect("an update").same_allowed_pairs(&scene);
-        let d = Update::default;
-        assert!(shares(Update { poses: vec![("a".into(), at(1.0))], ..d() }));
-        assert!(shares(Update { allow: vec![("a".into(), "b".into())], ..d() }), "allowed before");
-        assert!(!shares(Update { forbid: vec![("a".into(), "b".into())], ..d() }));
-        assert!(!shares(Update { removals: vec!["a".into()], ..d() }));
-    }
-
-    #[test]
-    fn an_empty_update_changes_nothing() {
-        let (scene, _) = two();
-        assert_eq!(scene.updated(&Update::default(), |_| None).expect("nothing").revision(), 8);
-    }
-
-    #[test]
-    fn each_bad_update_is_refused_by_name() {
-        let (scene, body) = two();
-        let refused = |update: Update| {
-            scene.updated(&update, |id| (id == body.id()).then(|| body.clone())).map(|_| ()).expect_err("refused")
-        };
-        let other = Body::ball("other", Vector3::zeros(), 2.0).expect("a ball");
-        let entry = |list, index| Entry { list, index };
-        let d = Update::default;
-        assert_eq!(
-            refused(Update { expected_revision: Some(7), ..d() }),
-            SceneError::Revision { expected: 7, current: 8 }
-        );
-        assert_eq!(
-            refused(Update { removals: vec!["a".into()], poses: vec![("a".into(), at(1.0))], ..d() }),
-            SceneError::Twice { at: entry(List::Removals, 0), name: "a".into() }
-        );
-        assert_eq!(
-            refused(Update { upserts: vec![put("c", &body), put("", &body)], ..d() }),
-            SceneError::Name { at: entry(List::Upserts, 1), error: NameError::Empty }
-        );
-        assert_eq!(
-            refused(Update { upserts: vec![put("c", &other)], ..d() }),
-            SceneError::NoBody { at: entry(List::Upserts, 0), id: *other.id() }
-        );
-        assert_eq!(
-            refused(Update { poses: vec![("z".into(), at(1.0))], ..d() }),
-            SceneError::NoObject { at: entry(List::Poses, 0), name: "z".into() }
-        );
-        assert_eq!(
-            refused(Update { removals: vec!["z".into()], ..d() }),
-            SceneError::NoObject { at: entry(List::Removals, 0), name: "z".into() }
-        );
-        assert_eq!(
-            refused(Update { allow: vec![("a".into(), "a".into())], ..d() }),
-            SceneError::Itself { at: entry(List::Allow, 0), name: "a".into() }
-        );
-        assert_eq!(
-            refused(Update { removals: vec!["a".into()], allow: vec![("a".into(), "b".into())], ..d() }),
-            SceneError::NoObject { at: entry(List::Allow, 0), name: "a".into() }
-        );
-        assert_eq!(
-            refused(Update { upserts: vec![Placement { group: "x".repeat(129).into(), ..put("c", &body) }], ..d() }),
-            SceneError::Group { at: entry(List::Upserts, 0) }
-        );
-    }
-
-    #[test]
-    fn a_scene_has_room_for_so_many_objects() {
-        let (scene, body) = two();
-        let upserts = (0..MAX_OBJECTS).map(|i| put(&format!("o{i}"), &body)).collect();
-        let error = scene.updated(&Update { upserts, ..Update::default() }, |_| Some(body.clone())).expect_err("full");
-        assert_eq!(error, SceneError::Full { what: "objects", count: MAX_OBJECTS + 2, limit: MAX_OBJECTS });
-    }
 }

@@ -1,8 +1,9 @@
 //! `sublevel fit --server`: the same, made elsewhere.
 
+use crate::client::{Client, JobProgress, SubmitError};
 use crate::jobs::FitOutput;
-use crate::service;
-use crate::service::proto::{FitJob, FitPhase, FitState};
+use crate::service::limits::CALL_LIMIT;
+use crate::service::proto::FitPhase;
 use crate::store::FitRequest;
 use indicatif::ProgressBar;
 use nalgebra::Vector3;
@@ -25,13 +26,16 @@ pub(in crate::cli) fn execute(
             std::future::pending::<()>().await;
         }
     };
-    let tell = |job: &FitJob| bar.set_message(describe(job));
-    Ok(runtime.block_on(service::submit(url, request, points, triangles, tell, cancel))?)
+    let tell = |job: &JobProgress| bar.set_message(describe(job));
+    let fitted = runtime.block_on(async {
+        let client = Client::connect_with_patience(url, CALL_LIMIT).await?;
+        client.fit(request, (points, triangles), tell, cancel).await
+    });
+    Ok(fitted.map_err(|error: SubmitError| error)?)
 }
 
-fn describe(job: &FitJob) -> String {
-    let waits = format!("job {} waits for its turn", job.id);
-    let Some(progress) = job.progress.filter(|_| job.state() == FitState::Running) else { return waits };
+fn describe(job: &JobProgress) -> String {
+    let Some(progress) = job.progress else { return format!("job {} waits for its turn", job.id) };
     match progress.phase() {
         FitPhase::Trimming | FitPhase::Fitting => format!(
             "job {}: round {}, step {}, {:.0e} from the optimum of {} points",

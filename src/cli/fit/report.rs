@@ -6,6 +6,7 @@ use crate::body::{Body, Compound, SosMethod};
 use crate::cli::files::write_atomically;
 use crate::fit::RefinementEnd;
 use crate::jobs::{FitOutput, Shapes};
+use crate::scene::Geometry;
 use crate::store::{FitMode, FitOutcome, FitRequest, FittedBody};
 use serde::Serialize;
 use std::error::Error;
@@ -80,12 +81,16 @@ pub(super) fn write(
     request: &FitRequest,
     made: &FitOutput,
 ) -> Result<Vec<Row>, Box<dyn Error>> {
-    let FitOutput { outcome, shapes } = made;
+    let FitOutput { outcome, shapes, ladder } = made;
     let write = |kind: String, json: String| -> Result<PathBuf, Box<dyn Error>> {
         let file = folder.join(format!("{}-{kind}.json", request.name));
         write_atomically(&file, &json)?;
         Ok(file)
     };
+    if let Some(ladder) = ladder {
+        // All rungs in one file, for scenes.
+        write("ladder".to_owned(), Geometry::Ladder(ladder.clone()).to_json())?;
+    }
     let mut rows = match shapes {
         Shapes::Bodies(bodies) => {
             let one = |(body, took): (&Body, &FittedBody)| {

@@ -1,11 +1,11 @@
-//! Between the headers of CreateFit and requests.
+//! Between the messages of CreateFit and requests.
 
 use super::super::error::Invalid;
 use super::super::limits::MAX_GROUP_BODIES;
 use super::super::proto::fit_options::Mode;
 use super::super::proto::fit_sos_body::Method;
 use super::super::proto::{
-    self, FitCone, FitHeader, FitInverseMoment, FitObjective, FitOptions, FitRelaxed, MeshFormat,
+    self, CreateFitRequest, FitCone, FitInverseMoment, FitObjective, FitOptions, FitRelaxed, MeshFormat,
 };
 use super::super::wire::{body_id, count};
 use crate::body::{Cone, Objective, SosMethod};
@@ -16,7 +16,7 @@ use crate::store::{
 };
 
 /// Where the options are in a CreateFit call.
-const OPTIONS: &str = "header.options";
+const OPTIONS: &str = "options";
 
 /// Objectives of messages and of requests.
 const OBJECTIVES: [(FitObjective, Objective); 4] = [
@@ -40,30 +40,26 @@ const FORMATS: [(MeshFormat, &str); 6] = [
     (MeshFormat::Dae, "dae"),
 ];
 
-/// The request's id, the checked request, and the format of the mesh file that follows, if one
-/// does.
-pub(super) fn request(header: FitHeader) -> Result<(String, FitRequest, Option<&'static str>), Invalid> {
-    let format = header.mesh_format();
-    if i32::from(format) != header.mesh_format {
-        return Err(Invalid::new("header.mesh_format", "is no format this server knows"));
-    }
-    let FitOptions { scale, trim, min_thickness_m, mode } = header.options.unwrap_or_default();
+/// The request's id, and the checked request.
+pub(super) fn request(message: CreateFitRequest) -> Result<(String, FitRequest), Invalid> {
+    let FitOptions { scale, trim, min_thickness_m, mode } = message.options.unwrap_or_default();
     let preparation = FitPreparation { trim, min_thickness_m };
     let mode = read_mode(mode.unwrap_or_default(), preparation)?;
-    let request = FitRequest { name: header.name, input: header.input, scale: scale.unwrap_or(1.0), mode };
-    check(&header.request_id, &request).map_err(|error| refused(&request.mode, error))?;
-    let format = FORMATS.iter().find(|(known, _)| *known == format).map(|(_, ending)| *ending);
-    if request.group().is_some() && format.is_some() {
-        let why = "announces a mesh file where the options name a group of stored bodies; leave out one of the two";
-        return Err(Invalid::new("header.mesh_format", why));
-    }
-    Ok((header.request_id, request, format))
+    let request = FitRequest { name: message.name, input: message.input, scale: scale.unwrap_or(1.0), mode };
+    check(&message.request_id, &request).map_err(|error| refused(&request.mode, error))?;
+    Ok((message.request_id, request))
+}
+
+/// Format of a mesh file, by its ending.
+pub(super) fn format(number: i32) -> Result<&'static str, Invalid> {
+    let known = FORMATS.iter().find(|(known, _)| i32::from(*known) == number);
+    known.map(|(_, ending)| *ending).ok_or_else(|| Invalid::new("mesh.format", "is no format this server knows"))
 }
 
 /// A field of a request as the path of the message's field.
 fn refused(mode: &FitMode, RequestError { field, why }: RequestError) -> Invalid {
     let path = match (field, mode) {
-        ("request_id" | "name" | "input", _) => format!("header.{field}"),
+        ("request_id" | "name" | "input", _) => field.to_owned(),
         ("scale" | "trim" | "min_thickness_m" | "group", _) => format!("{OPTIONS}.{field}"),
         ("c" | "objective", FitMode::SosBody(_)) => format!("{OPTIONS}.sos_body.relaxed.{field}"),
         _ => format!("{OPTIONS}.{}.{field}", mode.name()),
@@ -164,11 +160,10 @@ where
     found.ok_or_else(|| Invalid::new(field, "is none that this server knows"))
 }
 
-/// The header of a request about points that are sent in metres, or about a group.
-pub(super) fn header(request: &FitRequest) -> FitHeader {
+/// The message of a request, without points.
+pub(crate) fn message(request: &FitRequest) -> CreateFitRequest {
     let FitRequest { name, input, .. } = request.clone();
-    let mesh_format = MeshFormat::Unspecified.into();
-    FitHeader { name, request_id: String::new(), input, mesh_format, options: Some(options(request)) }
+    CreateFitRequest { name, request_id: String::new(), input, options: Some(options(request)), source: None }
 }
 
 /// The options of a request, with what was left open.

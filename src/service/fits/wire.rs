@@ -1,64 +1,53 @@
-//! Between the messages of FitService and jobs.
+//! Between messages and jobs.
 
 use super::super::error::Invalid;
-use super::super::proto::{self, FitJob, FitPhase, FitProgress, FitResult, FitState};
+use super::super::proto::job::Task;
+use super::super::proto::{self, BodyKind, FitPhase, FitProgress, FitResult, FitTask};
 use super::super::wire::count;
 use super::request::options;
 use crate::jobs::{Phase, Progress};
 use crate::store::{FitOptimum, FitOutcome, FittedBody, FittedKind, Job, JobState};
 
 /// What a job can make.
-const KINDS: [(FittedKind, proto::FittedKind); 3] = [
-    (FittedKind::Body, proto::FittedKind::Body),
-    (FittedKind::Compound, proto::FittedKind::Compound),
-    (FittedKind::SosBody, proto::FittedKind::SosBody),
+const KINDS: [(FittedKind, BodyKind); 3] = [
+    (FittedKind::Body, BodyKind::Body),
+    (FittedKind::Compound, BodyKind::Compound),
+    (FittedKind::SosBody, BodyKind::SosBody),
 ];
 
-pub(super) fn id(id: &str, field: &str) -> Result<u64, Invalid> {
-    id.parse().map_err(|_| Invalid::new(field, "is no id of a fit job; give the one CreateFit returned"))
+pub(in crate::service) fn id(id: &str, field: &str) -> Result<u64, Invalid> {
+    id.parse().map_err(|_| Invalid::new(field, "is no id of a job; give the one CreateFit returned"))
 }
 
-/// A job without the file that it made.
-pub(super) fn job(job: &Job, progress: Option<Progress>) -> FitJob {
+/// A job as it stands.
+pub(in crate::service) fn job(job: &Job, progress: Option<Progress>) -> proto::Job {
     let Job { id, request_id, request, points, attempts, state, .. } = job;
     let (state, failure, result) = match state {
-        JobState::Queued => (FitState::Queued, "", None),
-        JobState::Running => (FitState::Running, "", None),
-        JobState::Succeeded(outcome) => (FitState::Succeeded, "", Some(result(outcome))),
-        JobState::Failed(why) => (FitState::Failed, why.as_str(), None),
-        JobState::Cancelled => (FitState::Cancelled, "", None),
+        JobState::Queued => (proto::JobState::Queued, "", None),
+        JobState::Running => (proto::JobState::Running, "", None),
+        JobState::Succeeded(outcome) => (proto::JobState::Succeeded, "", Some(result(outcome))),
+        JobState::Failed(why) => (proto::JobState::Failed, why.as_str(), None),
+        JobState::Cancelled => (proto::JobState::Cancelled, "", None),
     };
-    FitJob {
-        id: id.to_string(),
+    let running = state == proto::JobState::Running;
+    let fit = FitTask {
         name: request.name.clone(),
-        request_id: request_id.clone(),
         input: request.input.clone(),
         options: Some(options(request)),
         point_count: *points as u64,
+        // The worker may not have reported yet of the job it has begun, or of the one that was
+        // cancelled.
+        progress: running.then(|| progress_message(progress.unwrap_or_default())),
+        result,
+    };
+    proto::Job {
+        id: id.to_string(),
+        request_id: request_id.clone(),
         state: state.into(),
         attempts: *attempts,
         failure: failure.to_owned(),
-        // The worker may not have reported yet of the job it has begun, or of the one that was
-        // cancelled.
-        progress: (state == FitState::Running).then(|| progress_message(progress.unwrap_or_default())),
-        result,
+        task: Some(Task::Fit(fit)),
     }
-}
-
-/// Whether a job has made a file that [`job`] leaves out.
-pub(super) fn has_file(job: &Job) -> bool {
-    match &job.state {
-        JobState::Succeeded(outcome) => outcome.bodies.iter().any(|made| made.kind != FittedKind::Body),
-        _ => false,
-    }
-}
-
-/// Adds the file to the message of a job that made one.
-pub(super) fn with_file(mut job: FitJob, file: Vec<u8>) -> FitJob {
-    if let Some(made) = job.result.as_mut().and_then(|result| result.bodies.first_mut()) {
-        made.file_json = file.into();
-    }
-    job
 }
 
 fn progress_message(progress: Progress) -> FitProgress {
@@ -81,6 +70,7 @@ fn result(outcome: &FitOutcome) -> FitResult {
         bodies: outcome.bodies.iter().map(fitted).collect(),
         left_out_count: outcome.left_out as u64,
         left_out_m: outcome.left_out_m,
+        ladder_id: outcome.ladder.clone().unwrap_or_default(),
     }
 }
 
@@ -96,14 +86,13 @@ fn fitted(made: &FittedBody) -> proto::FittedBody {
             optimality_gap: optimum.optimality_gap,
             refinement_end: optimum.refinement_end.clone().unwrap_or_default(),
         }),
-        kind: kind.map_or(proto::FittedKind::Unspecified, |(_, kind)| *kind).into(),
-        file_json: Default::default(),
+        kind: kind.map_or(BodyKind::Unspecified, |(_, kind)| *kind).into(),
         members: made.members.iter().map(|&member| count(member)).collect(),
     }
 }
 
 /// What a message says that a job made; none of a kind that this program does not know.
-pub(super) fn outcome(result: &FitResult) -> Option<FitOutcome> {
+pub(crate) fn outcome(result: &FitResult) -> Option<FitOutcome> {
     let body = |made: &proto::FittedBody| {
         let (kind, _) = KINDS.iter().find(|(_, kind)| *kind == made.kind())?;
         Some(FittedBody {
@@ -123,5 +112,6 @@ pub(super) fn outcome(result: &FitResult) -> Option<FitOutcome> {
     };
     let bodies = result.bodies.iter().map(body).collect::<Option<_>>()?;
     let left_out = usize::try_from(result.left_out_count).unwrap_or(usize::MAX);
-    Some(FitOutcome { bodies, left_out, left_out_m: result.left_out_m })
+    let ladder = Some(result.ladder_id.clone()).filter(|id| !id.is_empty());
+    Some(FitOutcome { bodies, ladder, left_out, left_out_m: result.left_out_m })
 }

@@ -1,15 +1,15 @@
 //! The jobs of the catalogue. Their points stay on disk until somebody fits them, and go when the
-//! job has ended; a file that it made stays there until the job is forgotten.
+//! job has ended.
 
 use std::sync::Arc;
 
-use crate::body::Body;
+use crate::scene::Geometry;
 use crate::store::JobMesh;
 use crate::store::job::{Job, JobState, MAX_ENDED_JOBS, MAX_QUEUED_JOBS, NewJob};
 use crate::store::request::FitRequest;
-use crate::store::rows::{BODIES, FILES, JOBS, POINTS, TRIANGLES};
+use crate::store::rows::{JOBS, POINTS, TRIANGLES};
 
-use super::{Catalogue, CatalogueError, State, json, page};
+use super::{Catalogue, CatalogueError, State, json, page, put_bodies};
 
 impl Catalogue {
     /// One job by id.
@@ -35,14 +35,6 @@ impl Catalogue {
     pub fn job_mesh(&self, id: u64) -> Result<JobMesh, CatalogueError> {
         let mesh = self.writer()?.mesh(id)?;
         mesh.ok_or_else(|| CatalogueError::NoJob(id.to_string()))
-    }
-
-    /// The file of the compound or sos-body that a job made, if it made one.
-    ///
-    /// # Errors
-    /// When the disk fails.
-    pub fn job_file(&self, id: u64) -> Result<Option<Vec<u8>>, CatalogueError> {
-        Ok(self.writer()?.file(id)?)
     }
 
     /// Queues a job. The one that was there first when the request id is known; returns whether it
@@ -76,11 +68,10 @@ impl Catalogue {
             if !corners.is_empty() {
                 transaction.open_table(TRIANGLES)?.insert(id, corners.as_slice())?;
             }
-            let (mut jobs, mut files) = (transaction.open_table(JOBS)?, transaction.open_table(FILES)?);
+            let mut jobs = transaction.open_table(JOBS)?;
             jobs.insert(id, json(&*job)?.as_slice())?;
             for id in forgotten {
                 jobs.remove(id)?;
-                files.remove(id)?;
             }
             Ok(())
         })?;
@@ -92,8 +83,8 @@ impl Catalogue {
         Ok((job, true))
     }
 
-    /// Moves a job on to the state and number of attempts that `change` says, storing its bodies,
-    /// or the file of what is no body, along with that; `None` leaves all as it is. Returns the job
+    /// Moves a job on to the state and number of attempts that `change` says, storing its bodies
+    /// along with that; `None` leaves all as it is. Returns the job
     /// as it is then. A job that ends loses its points.
     ///
     /// # Errors
@@ -101,27 +92,19 @@ impl Catalogue {
     pub fn change_job(
         &self,
         id: u64,
-        bodies: Vec<Body>,
-        file: Option<&str>,
+        bodies: Vec<Geometry>,
         change: impl FnOnce(&Job) -> Option<(JobState, u32)>,
     ) -> Result<Arc<Job>, CatalogueError> {
         let mut store = self.writer()?;
         let job = self.job(id).ok_or_else(|| CatalogueError::NoJob(id.to_string()))?;
         let Some((state, attempts)) = change(&job) else { return Ok(job) };
         let next = Arc::new(Job { state, attempts, ..(*job).clone() });
-        let fresh: Vec<Arc<Body>> =
-            bodies.into_iter().filter(|body| self.body(body.id()).is_none()).map(Arc::new).collect();
+        let fresh = self.read(|state| state.fresh(bodies));
         self.commit(&mut store, |transaction| {
-            let mut table = transaction.open_table(BODIES)?;
-            for body in &fresh {
-                table.insert(body.id().to_string().as_str(), body.to_json().as_bytes())?;
-            }
+            put_bodies(transaction, &fresh)?;
             if next.state.is_final() {
                 transaction.open_table(POINTS)?.remove(id)?;
                 transaction.open_table(TRIANGLES)?.remove(id)?;
-            }
-            if let Some(file) = file {
-                transaction.open_table(FILES)?.insert(id, file.as_bytes())?;
             }
             transaction.open_table(JOBS)?.insert(id, json(&*next)?.as_slice())?;
             Ok(())

@@ -4,7 +4,7 @@
 use nalgebra::Vector3;
 
 use super::{Disk, ball};
-use crate::store::rows::{FILES, JOBS, META, POINTS, TRIANGLES};
+use crate::store::rows::{JOBS, META, POINTS, TRIANGLES};
 use crate::store::{
     Catalogue, CatalogueError, FitGroup, FitOutcome, FitPolynomial, FitPreparation, FitRequest, FitWithinGap,
     FittedKind, Job, JobState, MAX_ENDED_JOBS, MAX_QUEUED_JOBS, NewJob, StoreError,
@@ -29,12 +29,12 @@ fn job(request_id: &str) -> NewJob {
 }
 
 fn done() -> JobState {
-    JobState::Succeeded(FitOutcome { bodies: Vec::new(), left_out: 2, left_out_m: 0.1 })
+    JobState::Succeeded(FitOutcome { bodies: Vec::new(), ladder: None, left_out: 2, left_out_m: 0.1 })
 }
 
 fn end(catalogue: &Catalogue, id: u64, state: &JobState) -> Result<std::sync::Arc<Job>, CatalogueError> {
     catalogue
-        .change_job(id, vec![ball(3.0)], None, |job| (!job.state.is_final()).then(|| (state.clone(), job.attempts)))
+        .change_job(id, vec![ball(3.0).into()], |job| (!job.state.is_final()).then(|| (state.clone(), job.attempts)))
 }
 
 #[test]
@@ -57,12 +57,12 @@ fn every_acknowledged_state_is_on_disk() {
     let (known, created) = again.create_job(job("r")).expect("known");
     assert!(!created && known == made);
 
-    let running = catalogue.change_job(made.id, Vec::new(), None, |_| Some((JobState::Running, 1))).expect("moved on");
+    let running = catalogue.change_job(made.id, Vec::new(), |_| Some((JobState::Running, 1))).expect("moved on");
     assert_eq!((running.attempts, &running.state), (1, &JobState::Running));
     saved(&running);
     let ended = end(&catalogue, made.id, &done()).expect("ended");
     let again = saved(&ended);
-    assert!(again.body(ball(3.0).id()).is_some(), "the body came with the state");
+    assert!(again.geometry(ball(3.0).id()).is_some(), "the body came with the state");
     assert!(matches!(again.job_mesh(made.id), Err(CatalogueError::NoJob(_))), "the points went with it");
     // What has ended is not changed any more when its caller looks at it.
     assert_eq!(end(&catalogue, made.id, &JobState::Cancelled).expect("as it is"), ended);
@@ -111,7 +111,7 @@ fn orders_of_earlier_versions_are_refused() {
         transaction.open_table(META).expect("a table").insert("format", 1).expect("written");
     });
     let error = disk.load().expect_err("format 1").to_string();
-    assert!(error.contains("has format 1") && error.contains("reads format 2"), "{error}");
+    assert!(error.contains("has format 1") && error.contains("reads format 3"), "{error}");
     assert!(error.contains("another directory"), "{error}");
 }
 
@@ -122,27 +122,35 @@ fn write_job(disk: &Disk, row: &str) {
 }
 
 #[test]
-fn a_file_stays_until_its_job_is_forgotten() {
+fn a_ladder_is_stored_with_its_rungs_and_keeps_them() {
+    let points = [Vector3::new(0.1, 0.0, 0.0)];
+    let rung = |radius| {
+        let body = ball(radius).with_points(&points).expect("contained");
+        std::sync::Arc::new(crate::body::Shape::Body(Box::new(body)))
+    };
+    let ladder = crate::scene::Ladder::new("steps", vec![rung(2.0), rung(1.0)]).expect("a ladder");
     let disk = Disk::default();
     let catalogue = disk.load().expect("a new catalogue");
     let id = catalogue.create_job(job("")).expect("queued").0.id;
-    assert_eq!(catalogue.job_file(id).expect("read"), None);
-    catalogue.change_job(id, Vec::new(), Some("{}"), |_| Some((done(), 1))).expect("ended");
-    assert_eq!(catalogue.job_file(id).expect("read").as_deref(), Some(&b"{}"[..]));
-    drop(catalogue);
-    let catalogue = disk.load().expect("loads");
-    assert_eq!(catalogue.job_file(id).expect("read").as_deref(), Some(&b"{}"[..]));
-    for _ in 0..=MAX_ENDED_JOBS {
-        let next = catalogue.create_job(job("")).expect("queued").0.id;
-        end(&catalogue, next, &JobState::Cancelled).expect("cancelled");
+    let stored = crate::scene::Geometry::Ladder(std::sync::Arc::new(ladder));
+    let ladder = *stored.id();
+    catalogue.change_job(id, vec![stored], |_| Some((done(), 1))).expect("ended");
+    for catalogue in [catalogue, disk.load().expect("loads")] {
+        assert_eq!(catalogue.counts(), (3, 0));
+        assert_eq!(catalogue.geometry(&ladder).expect("stored").rungs().len(), 2);
+        let used = catalogue.delete_body(ball(2.0).id()).expect_err("a rung");
+        assert!(matches!(used, CatalogueError::RungUsed { .. }), "{used}");
     }
-    assert!(catalogue.job(id).is_none() && catalogue.job_file(id).expect("read").is_none());
+    let catalogue = disk.load().expect("loads");
+    catalogue.delete_body(&ladder).expect("deleted");
+    catalogue.delete_body(ball(2.0).id()).expect("no rung any more");
+    assert_eq!(disk.load().expect("loads").counts(), (1, 0));
 }
 
 #[test]
 fn a_group_is_of_bodies_that_are_stored() {
     let catalogue = Disk::default().load().expect("a new catalogue");
-    let there = *catalogue.create_body(ball(1.0)).expect("stored").0.id();
+    let there = *catalogue.create_body(ball(1.0).into()).expect("stored").0.id();
     let grouping = |body_ids| {
         let group = FitGroup { body_ids, ..FitGroup::default() };
         NewJob::new(String::new(), FitRequest::new("them", group), &[], &[])
@@ -166,11 +174,11 @@ fn a_full_disk_leaves_jobs_as_they_were() {
     assert!(matches!(failed, CatalogueError::Store(StoreError::Full { .. })), "{failed}");
     assert!(catalogue.create_job(job("")).is_err());
     assert_eq!(catalogue.job(id).expect("there").state, JobState::Queued);
-    assert!(catalogue.body(ball(3.0).id()).is_none(), "half of a change");
+    assert!(catalogue.geometry(ball(3.0).id()).is_none(), "half of a change");
     disk.set_full(false);
     assert_eq!(catalogue.job_mesh(id).expect("kept").0, points());
     assert_eq!(end(&catalogue, id, &done()).expect("space again").state, done());
-    assert!(catalogue.body(ball(3.0).id()).is_some());
+    assert!(catalogue.geometry(ball(3.0).id()).is_some());
     assert_eq!(catalogue.jobs(None, 9).0.len(), 1);
 }
 
@@ -221,7 +229,7 @@ fn files_that_never_had_a_job_are_read() {
     drop(super::furnished(&disk));
     disk.meddle(|transaction| {
         transaction.delete_table(JOBS).expect("deleted");
-        for table in [POINTS, TRIANGLES, FILES] {
+        for table in [POINTS, TRIANGLES] {
             transaction.delete_table(table).expect("deleted");
         }
     });

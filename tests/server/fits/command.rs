@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use sublevel::body::Body;
-use sublevel::service::proto::{FitState, ListFitsRequest};
+use sublevel::service::proto::job::Task;
+use sublevel::service::proto::{Job, JobState, ListJobsRequest};
 
 use super::{arc, cloud, off};
 use crate::harness::{PATIENCE, Running, run};
@@ -126,8 +127,9 @@ async fn the_command_says_what_went_wrong_and_ctrl_c_cancels() {
         .expect("it starts");
     let begun = Instant::now();
     let id = loop {
-        let jobs = clients.fits.list_fits(ListFitsRequest::default()).await.expect("a list").into_inner().jobs;
-        if let Some(job) = jobs.iter().find(|job| job.name == "cloud") {
+        let jobs = clients.jobs.list_jobs(ListJobsRequest::default()).await.expect("a list").into_inner().jobs;
+        let is_cloud = |job: &&Job| matches!(&job.task, Some(Task::Fit(fit)) if fit.name == "cloud");
+        if let Some(job) = jobs.iter().find(is_cloud) {
             break job.id.clone();
         }
         assert!(begun.elapsed() < PATIENCE && child.try_wait().expect("waited for").is_none());
@@ -139,5 +141,5 @@ async fn the_command_says_what_went_wrong_and_ctrl_c_cancels() {
     let ended = child.wait_with_output().expect("it ends");
     let stderr = String::from_utf8_lossy(&ended.stderr);
     assert!(ended.status.code() == Some(1) && stderr.contains("cancelled"), "{stderr}");
-    assert_eq!(clients.job(&id).await.state(), FitState::Cancelled);
+    assert_eq!(clients.job(&id).await.state(), JobState::Cancelled);
 }

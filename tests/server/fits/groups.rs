@@ -5,12 +5,11 @@ use std::ops::ControlFlow;
 use nalgebra::Vector3;
 use sublevel::body::{BasicSet, Body, Obstacle};
 use sublevel::fit::{EncloseOptions, enclose_obstacles};
-use sublevel::service::proto::create_fit_request::Part;
 use sublevel::service::proto::fit_options::Mode;
-use sublevel::service::proto::{DeleteBodyRequest, FitGroup, FitHeader, FitOptions, FitState};
+use sublevel::service::proto::{CreateFitRequest, DeleteBodyRequest, FitGroup, FitOptions, JobState};
 use tonic::Code;
 
-use super::{asked, chunk, cloud, header, long, message};
+use super::{asked, cloud, header, long, mesh_file, points};
 use crate::harness::{Clients, Running, field, reason};
 
 /// Balls of radius 1/2 about points of the x axis.
@@ -19,7 +18,7 @@ fn balls() -> [Body; 3] {
     [ball("near", 0.0), ball("next", 1.2), ball("far", 9.0)]
 }
 
-fn grouping(name: &str, body_ids: &[String], group: FitGroup) -> FitHeader {
+fn grouping(name: &str, body_ids: &[String], group: FitGroup) -> CreateFitRequest {
     let group = FitGroup { body_ids: body_ids.to_vec(), ..group };
     header(name, asked(Mode::Group(group)))
 }
@@ -41,7 +40,7 @@ async fn stored_bodies_are_put_into_one_or_few() {
 
     let id = clients.queue(grouping("pair", &ids[..2], FitGroup::default()), &[]).await.id;
     let job = clients.ended(&id).await;
-    assert_eq!((job.state(), job.point_count), (FitState::Succeeded, 0), "{}", job.failure);
+    assert_eq!((job.state(), job.point_count), (JobState::Succeeded, 0), "{}", job.failure);
     let made = job.result.expect("a result").bodies.remove(0);
     let options = EncloseOptions::new(4);
     let unwatched = &mut |_| ControlFlow::Continue(());
@@ -71,10 +70,9 @@ async fn a_group_is_of_bodies_that_are_there() {
     let ids = stored(&mut clients).await;
     let nobody = format!("{:064x}", 7);
     let unknown = [ids[0].clone(), nobody.clone()];
-    let upload = vec![message(Part::Header(grouping("it", &unknown, FitGroup::default())))];
-    let status = clients.upload(upload).await.expect_err("no such body");
+    let status = clients.upload(grouping("it", &unknown, FitGroup::default())).await.expect_err("no such body");
     let found = (status.code(), field(&status), reason(&status));
-    let expected = (Code::NotFound, "header.options.group.body_ids[1]".to_owned(), "BODY_NOT_FOUND".to_owned());
+    let expected = (Code::NotFound, "options.group.body_ids[1]".to_owned(), "BODY_NOT_FOUND".to_owned());
     assert_eq!(found, expected, "{status:?}");
     assert!(status.message().contains(&nobody), "{}", status.message());
 
@@ -87,7 +85,7 @@ async fn a_group_is_of_bodies_that_are_there() {
     clients.bodies.delete_body(DeleteBodyRequest { id: ids[1].clone() }).await.expect("no scene uses it");
     clients.cancel(&first).await;
     let failed = clients.ended(&waiting).await;
-    assert_eq!(failed.state(), FitState::Failed);
+    assert_eq!(failed.state(), JobState::Failed);
     assert!(failed.failure.contains(&ids[1]) && failed.failure.contains("deleted"), "{}", failed.failure);
     assert_eq!(clients.queue(request, &[]).await, failed);
 }
@@ -122,18 +120,12 @@ async fn bad_groups_are_refused_by_field() {
         (with(|options| options.min_thickness_m = Some(0.1)), "group"),
         (with(|options| options.scale = Some(1e-3)), "group"),
     ] {
-        let status = clients.upload(vec![message(Part::Header(header))]).await.expect_err(at);
-        assert_eq!(
-            (status.code(), field(&status)),
-            (Code::InvalidArgument, format!("header.options.{at}")),
-            "{status:?}"
-        );
+        let status = clients.upload(header).await.expect_err(at);
+        assert_eq!((status.code(), field(&status)), (Code::InvalidArgument, format!("options.{at}")), "{status:?}");
         assert!(status.message().len() > at.len() + 40, "{}", status.message());
     }
-    let with_points = vec![message(Part::Header(plain())), chunk(&cloud(20, 53))];
-    let status = clients.upload(with_points).await.expect_err("points");
-    assert_eq!((status.code(), field(&status).as_str()), (Code::InvalidArgument, "points"), "{status:?}");
-    let with_mesh = FitHeader { mesh_format: 1, ..plain() };
-    let status = clients.upload(vec![message(Part::Header(with_mesh))]).await.expect_err("a mesh");
-    assert_eq!(field(&status), "header.mesh_format", "{status:?}");
+    for source in [points(&cloud(20, 53)), mesh_file(1, "OFF\n")] {
+        let status = clients.upload(CreateFitRequest { source, ..plain() }).await.expect_err("points");
+        assert_eq!((status.code(), field(&status).as_str()), (Code::InvalidArgument, "source"), "{status:?}");
+    }
 }

@@ -13,11 +13,15 @@ use std::time::Instant;
 use nalgebra::Vector3;
 use sublevel::body::Body;
 use sublevel::fit::Mesh;
-use sublevel::service::proto::create_fit_request::Part;
+use sublevel::scene::Geometry;
+use sublevel::service::proto::create_fit_request::Source;
+use sublevel::service::proto::fit_mesh::Content;
 use sublevel::service::proto::fit_options::Mode;
+use sublevel::service::proto::fit_points::{Coordinates, Corners};
+use sublevel::service::proto::job::Task;
 use sublevel::service::proto::{
-    CancelFitRequest, CreateFitRequest, CreateFitResponse, FitBody, FitHeader, FitJob, FitOptions, FitState,
-    GetBodyRequest, GetFitRequest, PointChunk, TriangleChunk, WatchFitRequest, WatchFitResponse,
+    CancelJobRequest, CreateFitRequest, FitBody, FitMesh, FitOptions, FitPoints, FitProgress, FitResult,
+    GetBodyRequest, GetJobRequest, Job, JobState, WatchJobRequest, WatchJobResponse, get_body_response,
 };
 use tonic::{Status, Streaming};
 
@@ -54,13 +58,9 @@ fn off(mesh: &Mesh) -> String {
     text
 }
 
-fn triangles(triangles: &[[usize; 3]]) -> CreateFitRequest {
-    let corners = triangles.iter().flatten().map(|&corner| corner as u32).collect();
-    message(Part::Triangles(TriangleChunk { corners }))
-}
-
-fn header(name: &str, options: FitOptions) -> FitHeader {
-    FitHeader { name: name.into(), options: Some(options), ..FitHeader::default() }
+/// What a fit is asked for, before its points.
+fn header(name: &str, options: FitOptions) -> CreateFitRequest {
+    CreateFitRequest { name: name.into(), options: Some(options), ..CreateFitRequest::default() }
 }
 
 fn asked(mode: Mode) -> FitOptions {
@@ -82,45 +82,106 @@ fn long() -> FitOptions {
     asked(Mode::Body(FitBody { refine: true, slabs: 15, ..body(8) }))
 }
 
-fn message(part: Part) -> CreateFitRequest {
-    CreateFitRequest { part: Some(part) }
+fn coordinates(points: &[Vector3<f64>]) -> Vec<u8> {
+    points.iter().flatten().flat_map(|number| number.to_le_bytes()).collect()
 }
 
-fn chunk(points: &[Vector3<f64>]) -> CreateFitRequest {
-    let coordinates = points.iter().flat_map(|point| [point.x, point.y, point.z]).collect();
-    message(Part::Points(PointChunk { coordinates }))
+fn corners(triangles: &[[usize; 3]]) -> Vec<u8> {
+    triangles.iter().flatten().flat_map(|&corner| (corner as u32).to_le_bytes()).collect()
+}
+
+/// Points without triangles, in the message itself.
+fn points(points: &[Vector3<f64>]) -> Option<Source> {
+    let coordinates = Some(Coordinates::Points(coordinates(points).into()));
+    Some(Source::Points(FitPoints { coordinates, corners: None }))
+}
+
+/// Points with triangles, in the message itself.
+fn triangles(mesh: &Mesh) -> Option<Source> {
+    let coordinates = Some(Coordinates::Points(coordinates(&mesh.points).into()));
+    let corners = Some(Corners::Triangles(corners(&mesh.triangles).into()));
+    Some(Source::Points(FitPoints { coordinates, corners }))
+}
+
+/// A mesh file in the message itself.
+fn mesh_file(format: i32, file: &str) -> Option<Source> {
+    Some(Source::Mesh(FitMesh { format, content: Some(Content::File(file.to_owned().into_bytes().into())) }))
+}
+
+/// A job as tests look at it.
+#[derive(Clone, Debug, PartialEq)]
+struct FitJob {
+    id: String,
+    name: String,
+    options: Option<FitOptions>,
+    point_count: u64,
+    state: JobState,
+    attempts: u32,
+    failure: String,
+    progress: Option<FitProgress>,
+    result: Option<FitResult>,
+}
+
+impl FitJob {
+    fn state(&self) -> JobState {
+        self.state
+    }
+}
+
+impl From<Job> for FitJob {
+    fn from(job: Job) -> Self {
+        let (state, Job { id, attempts, failure, task, .. }) = (job.state(), job);
+        let Some(Task::Fit(fit)) = task else { panic!("a fit") };
+        let (name, options, point_count) = (fit.name, fit.options, fit.point_count);
+        Self { id, name, options, point_count, state, attempts, failure, progress: fit.progress, result: fit.result }
+    }
+}
+
+/// What a call that makes a job answers, with the job.
+#[derive(Debug)]
+struct Created {
+    job: FitJob,
+    created: bool,
 }
 
 impl Clients {
-    async fn upload(&mut self, messages: Vec<CreateFitRequest>) -> Result<CreateFitResponse, Status> {
-        Ok(self.fits.create_fit(tokio_stream::iter(messages)).await?.into_inner())
+    async fn upload(&mut self, request: CreateFitRequest) -> Result<Created, Status> {
+        let response = self.fits.create_fit(request).await?.into_inner();
+        Ok(Created { job: self.job(&response.job_id).await, created: response.created })
     }
 
-    /// Queues a job about these points.
-    async fn queue(&mut self, header: FitHeader, points: &[Vector3<f64>]) -> FitJob {
-        let mut messages = vec![message(Part::Header(header))];
-        messages.extend(points.chunks(50_000).map(chunk));
-        self.upload(messages).await.expect("queued").job.expect("a job")
+    /// Queues a job about these points; many are sent as a blob.
+    async fn queue(&mut self, header: CreateFitRequest, cloud: &[Vector3<f64>]) -> FitJob {
+        let source = if cloud.is_empty() {
+            None
+        } else if cloud.len() > 10_000 {
+            let client = sublevel::client::Client::connect(&self.url).await.expect("the server answers");
+            let blob = client.upload(&coordinates(cloud)).await.expect("uploaded");
+            let coordinates = Some(Coordinates::PointsBlobId(blob));
+            Some(Source::Points(FitPoints { coordinates, corners: None }))
+        } else {
+            points(cloud)
+        };
+        self.upload(CreateFitRequest { source, ..header }).await.expect("queued").job
     }
 
     /// Queues a job about this mesh.
-    async fn queue_mesh(&mut self, header: FitHeader, mesh: &Mesh) -> FitJob {
-        let (some, others) = mesh.triangles.split_at(mesh.triangles.len() / 3);
-        let messages = vec![message(Part::Header(header)), triangles(some), chunk(&mesh.points), triangles(others)];
-        self.upload(messages).await.expect("queued").job.expect("a job")
+    async fn queue_mesh(&mut self, header: CreateFitRequest, mesh: &Mesh) -> FitJob {
+        self.upload(CreateFitRequest { source: triangles(mesh), ..header }).await.expect("queued").job
     }
 
     async fn job(&mut self, id: &str) -> FitJob {
-        self.fits.get_fit(GetFitRequest { id: id.into() }).await.expect("there").into_inner().job.expect("a job")
+        let response = self.jobs.get_job(GetJobRequest { id: id.into() }).await.expect("there").into_inner();
+        response.job.expect("a job").into()
     }
 
     async fn cancel(&mut self, id: &str) -> FitJob {
-        let request = CancelFitRequest { id: id.into() };
-        self.fits.cancel_fit(request).await.expect("cancelled").into_inner().job.expect("a job")
+        let request = CancelJobRequest { id: id.into() };
+        self.jobs.cancel_job(request).await.expect("cancelled").into_inner().job.expect("a job").into()
     }
 
-    async fn watch(&mut self, id: &str) -> Streaming<WatchFitResponse> {
-        self.fits.watch_fit(WatchFitRequest { id: id.into() }).await.expect("a watch").into_inner()
+    async fn watch(&mut self, id: &str) -> Streaming<WatchJobResponse> {
+        self.jobs.watch_job(WatchJobRequest { id: id.into() }).await.expect("a watch").into_inner()
     }
 
     /// Waits until the job is being solved: past its hull, in the middle of its first program.
@@ -130,7 +191,7 @@ impl Clients {
         loop {
             let job = next(&mut watch).await.expect("it goes on").expect("it has not ended");
             if job.progress.is_some_and(|progress| progress.iterations > 0) {
-                assert_eq!(job.state(), FitState::Running);
+                assert_eq!(job.state(), JobState::Running);
                 return job;
             }
             assert!(start.elapsed() < PATIENCE, "{job:?}");
@@ -147,17 +208,23 @@ impl Clients {
         last.expect("a state")
     }
 
+    /// The file of a stored body of any kind.
+    async fn file(&mut self, id: &str) -> String {
+        let response = self.bodies.get_body(GetBodyRequest { id: id.into() }).await.expect("stored").into_inner();
+        let Some(get_body_response::Content::File(file)) = response.content else { panic!("a file") };
+        let file = String::from_utf8(file.to_vec()).expect("text");
+        assert_eq!(Geometry::from_json(&file).expect("proven").id().to_string(), id);
+        file
+    }
+
     /// The stored body, re-proven from its file.
     async fn body(&mut self, id: &str) -> Body {
-        let response = self.bodies.get_body(GetBodyRequest { id: id.into() }).await.expect("stored").into_inner();
-        let body = Body::from_json(std::str::from_utf8(&response.body_file_json).expect("text")).expect("proven");
-        assert_eq!(body.id().to_string(), id);
-        body
+        Body::from_json(&self.file(id).await).expect("proven")
     }
 }
 
 /// The next message of a watch; none at its end.
-async fn next(watch: &mut Streaming<WatchFitResponse>) -> Result<Option<FitJob>, Status> {
+async fn next(watch: &mut Streaming<WatchJobResponse>) -> Result<Option<FitJob>, Status> {
     let message = tokio::time::timeout(PATIENCE, watch.message()).await.expect("in time")?;
-    Ok(message.map(|message| message.job.expect("a job")))
+    Ok(message.map(|message| message.job.expect("a job").into()))
 }

@@ -1,7 +1,7 @@
 //! Jobs outlive their server, and what kills it twice is given up.
 
 use sublevel::service::proto::fit_options::Mode;
-use sublevel::service::proto::{FitBody, FitState};
+use sublevel::service::proto::{FitBody, JobState};
 use tonic::Code;
 
 use super::{asked, body, cloud, header, long, next, quick};
@@ -22,11 +22,11 @@ async fn a_job_survives_a_kill_and_is_not_repeated_once_done() {
     let server = Running::start(dir.path());
     let mut clients = server.connect().await;
     let job = clients.ended(&id).await;
-    assert_eq!((job.state(), job.attempts), (FitState::Succeeded, 2), "{}", job.failure);
+    assert_eq!((job.state(), job.attempts), (JobState::Succeeded, 2), "{}", job.failure);
     let body = clients.body(&job.result.as_ref().expect("a result").bodies[0].body_id).await;
     body.prove_contains(&points).expect("the points were kept");
     let other = clients.ended(&after).await;
-    assert_eq!((other.state(), other.attempts), (FitState::Succeeded, 1));
+    assert_eq!((other.state(), other.attempts), (JobState::Succeeded, 1));
     server.kill();
 
     // Bit for bit as it ended, its time included: it was not fitted again.
@@ -49,10 +49,10 @@ async fn what_kills_the_server_twice_is_given_up() {
         clients = server.connect().await;
     }
     let job = clients.ended(&id).await;
-    assert_eq!((job.state(), job.attempts), (FitState::Failed, 2));
+    assert_eq!((job.state(), job.attempts), (JobState::Failed, 2));
     assert!(job.failure.contains("killed 2 times") && job.failure.contains("memory"), "{}", job.failure);
     let next = clients.queue(header("next", quick()), &points).await.id;
-    assert_eq!(clients.ended(&next).await.state(), FitState::Succeeded);
+    assert_eq!(clients.ended(&next).await.state(), JobState::Succeeded);
 }
 
 /// An orderly stop is no attempt: however often the server is restarted, the job is done in the
@@ -81,8 +81,8 @@ async fn an_orderly_stop_puts_the_job_back() {
         clients = server.connect().await;
     }
     assert_eq!(clients.under_way(&id).await.attempts, 1);
-    assert_eq!(clients.cancel(&id).await.state(), FitState::Cancelled);
+    assert_eq!(clients.cancel(&id).await.state(), JobState::Cancelled);
     server.kill();
     let server = Running::start(dir.path());
-    assert_eq!(server.connect().await.job(&id).await.state(), FitState::Cancelled);
+    assert_eq!(server.connect().await.job(&id).await.state(), JobState::Cancelled);
 }

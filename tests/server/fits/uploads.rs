@@ -3,14 +3,15 @@
 use std::time::Instant;
 
 use nalgebra::Vector3;
+use sha2::{Digest, Sha256};
 use sublevel::fit;
-use sublevel::service::proto::create_fit_request::Part;
 use sublevel::service::proto::fit_options::Mode;
 use sublevel::service::proto::{
-    FitBody, FitLadder, FitObjective, FitOptions, FitPhase, FitState, FitWithinGap, MeshFormat,
+    CreateFitRequest, FitBody, FitLadder, FitMesh, FitObjective, FitOptions, FitPhase, FitWithinGap, JobState,
+    MeshFormat, UploadBlobRequest, create_fit_request::Source, fit_mesh::Content,
 };
 
-use super::{asked, body, cloud, header, message, next, quick};
+use super::{asked, body, cloud, header, mesh_file, next, quick};
 use crate::harness::{Numbers, Running};
 
 #[tokio::test(flavor = "multi_thread")]
@@ -38,7 +39,7 @@ async fn a_million_points_become_a_body_and_progress_only_grows() {
         last = job;
     }
     assert!(order.is_sorted_by_key(|state| i32::from(*state)), "{order:?}");
-    assert_eq!(last.state(), FitState::Succeeded, "{}", last.failure);
+    assert_eq!(last.state(), JobState::Succeeded, "{}", last.failure);
     let result = last.result.expect("a result");
     let [fitted] = &result.bodies[..] else { panic!("{result:?}") };
     let body = clients.body(&fitted.body_id).await;
@@ -88,6 +89,8 @@ async fn options_mean_what_they_mean_to_the_library() {
     let result = clients.ended(&id).await.result.expect("a ladder");
     assert_eq!((result.bodies.len(), result.left_out_count), (3, 3));
     assert!(result.bodies.iter().all(|body| body.gap_m > Some(0.0) && body.gap_m < Some(1e-3)), "{result:?}");
+    let ladder: serde_json::Value = serde_json::from_str(&clients.file(&result.ladder_id).await).expect("JSON");
+    assert_eq!((ladder["kind"].as_str(), ladder["rungs"].as_array().map(Vec::len)), (Some("ladder"), Some(3)));
     assert!(result.bodies[0].optimum.is_none() && result.left_out_m < 1e-3, "{result:?}");
 }
 
@@ -100,15 +103,25 @@ async fn a_mesh_comes_as_the_bytes_of_its_file() {
     for i in 0..8 {
         file += &format!("{} {} {}\n", i & 1, i >> 1 & 1, i >> 2);
     }
-    let mut header = header("cube", quick());
-    header.mesh_format = MeshFormat::Off.into();
-    let mut messages = vec![message(Part::Header(header))];
-    // Cut where it hurts, in the middle of numbers and lines.
-    messages.extend(file.as_bytes().chunks(7).map(|bytes| message(Part::Mesh(bytes.to_vec().into()))));
-    let job = clients.upload(messages).await.expect("queued").job.expect("a job");
-    assert_eq!(job.point_count, 8);
-    let result = clients.ended(&job.id).await.result.expect("a body");
-    let volume = clients.body(&result.bodies[0].body_id).await.volume().volume_m3;
+    // In the message itself, and in pieces that are cut in the middle of numbers and lines.
+    let blob_id: String = Sha256::digest(&file).iter().map(|byte| format!("{byte:02x}")).collect();
+    for (index, piece) in file.as_bytes().chunks(7).enumerate() {
+        let (blob_id, total_bytes, offset) = (blob_id.clone(), file.len() as u64, 7 * index as u64);
+        let request = UploadBlobRequest { blob_id, total_bytes, offset, data: piece.to_vec().into() };
+        let response = clients.blobs.upload_blob(request).await.expect("a piece").into_inner();
+        assert_eq!(response.complete, response.received_bytes == total_bytes);
+    }
+    let format = MeshFormat::Off.into();
+    let mut volume = 0.0;
+    for source in
+        [mesh_file(format, &file), Some(Source::Mesh(FitMesh { format, content: Some(Content::BlobId(blob_id)) }))]
+    {
+        let request = CreateFitRequest { source, ..header("cube", quick()) };
+        let job = clients.upload(request).await.expect("queued").job;
+        assert_eq!(job.point_count, 8);
+        let result = clients.ended(&job.id).await.result.expect("a body");
+        volume = clients.body(&result.bodies[0].body_id).await.volume().volume_m3;
+    }
     // The smallest ellipsoid around a unit cube is its ball.
     let ball = std::f64::consts::PI * 3.0_f64.sqrt() / 2.0;
     assert!((volume / ball - 1.0).abs() < 1e-3, "{volume} {ball}");
@@ -127,11 +140,11 @@ async fn what_cannot_be_fitted_fails_by_name() {
     let thick = FitOptions { min_thickness_m: Some(1e-3), ..quick() };
     let done = clients.queue(header("sheet", thick), &flat).await.id;
     let job = clients.ended(&failed).await;
-    assert_eq!(job.state(), FitState::Failed);
+    assert_eq!(job.state(), JobState::Failed);
     assert!(job.failure.contains("coplanar") && job.result.is_none(), "{}", job.failure);
     let job = clients.ended(&far).await;
     assert!(job.failure.contains("max gap") && job.attempts == 1, "{}", job.failure);
-    assert_eq!(clients.ended(&done).await.state(), FitState::Succeeded);
+    assert_eq!(clients.ended(&done).await.state(), JobState::Succeeded);
 }
 
 /// A watch that is not read does not pile up what it missed, and who comes late hears at once how
@@ -149,7 +162,7 @@ async fn a_slow_watcher_gets_the_latest() {
     let late = next(&mut clients.watch(&id).await).await.expect("it goes on").expect("a job");
     assert!(late.progress.is_some_and(|progress| progress.phase() == FitPhase::Fitting && progress.iterations > 0));
     let ended = clients.ended(&id).await;
-    assert_eq!(ended.state(), FitState::Succeeded, "{}", ended.failure);
+    assert_eq!(ended.state(), JobState::Succeeded, "{}", ended.failure);
     let (mut count, mut last, elapsed) = (0, None, begun.elapsed().as_secs_f64());
     while let Some(job) = next(&mut slow).await.expect("it goes on") {
         (count, last) = (count + 1, Some(job));

@@ -51,6 +51,22 @@ impl BodyId {
         Self(hash.finalize().into())
     }
 
+    /// That of a ladder: SHA-256 of `ladder` and the ids of its rungs, 32 bytes each, in their
+    /// order.
+    pub fn of_ladder<'a>(rungs: impl Iterator<Item = &'a Self>) -> Self {
+        let mut hash = Sha256::new_with_prefix("ladder");
+        rungs.for_each(|rung| hash.update(rung.0));
+        Self(hash.finalize().into())
+    }
+
+    /// That of a half-space: SHA-256 of `half-space`, the normal and the offset, as little-endian
+    /// f64.
+    pub fn of_half_space(normal: &Vector3<f64>, offset: f64) -> Self {
+        let mut hash = Sha256::new_with_prefix("half-space");
+        normal.iter().chain([&offset]).for_each(|value| hash.update(value.to_le_bytes()));
+        Self(hash.finalize().into())
+    }
+
     pub(super) fn of_parts<'a>(parts: impl Iterator<Item = &'a Self>) -> Self {
         let mut hash = Sha256::new();
         parts.for_each(|part| hash.update(part.0));

@@ -5,6 +5,7 @@ use super::compound::Compound;
 use super::convex_body::Body;
 use super::file_error::BodyFileError;
 use super::file_format::{COMPOUND_KIND, kind};
+use super::id::BodyId;
 use super::solid::{Sealed, Solid};
 
 /// A body or a compound, which measures take alike.
@@ -26,6 +27,22 @@ impl Shape {
             Compound::from_json(text).map(|compound| Shape::Compound(Box::new(compound)))
         } else {
             Body::from_json(text).map(|body| Shape::Body(Box::new(body)))
+        }
+    }
+
+    /// Its id.
+    pub fn id(&self) -> &BodyId {
+        match self {
+            Shape::Body(body) => body.id(),
+            Shape::Compound(compound) => compound.id(),
+        }
+    }
+
+    /// Name given by its maker.
+    pub fn name(&self) -> &str {
+        match self {
+            Shape::Body(body) => body.name(),
+            Shape::Compound(compound) => compound.name(),
         }
     }
 

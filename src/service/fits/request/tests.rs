@@ -5,20 +5,20 @@ use tonic::Status;
 use super::*;
 use crate::store::tests::requests::drawn;
 
-fn sent(options: FitOptions) -> FitHeader {
-    FitHeader { name: "it".into(), options: Some(options), ..FitHeader::default() }
+fn sent(options: FitOptions) -> CreateFitRequest {
+    CreateFitRequest { name: "it".into(), options: Some(options), ..CreateFitRequest::default() }
 }
 
-/// The request of a header that is accepted.
-fn accepted(header: FitHeader) -> FitRequest {
-    request(header).unwrap_or_else(|invalid| panic!("{invalid:?}")).1
+/// The request of a message that is accepted.
+fn accepted(message: CreateFitRequest) -> FitRequest {
+    request(message).unwrap_or_else(|invalid| panic!("{invalid:?}")).1
 }
 
 #[test]
 fn requests_are_read_back_from_the_wire() {
     for wanted in (0..200).flat_map(drawn) {
-        let header = header(&wanted);
-        assert_eq!(accepted(header.clone()), wanted, "{header:?}");
+        let message = message(&wanted);
+        assert_eq!(accepted(message.clone()), wanted, "{message:?}");
     }
 }
 
@@ -26,7 +26,7 @@ fn requests_are_read_back_from_the_wire() {
 fn an_unset_mode_is_a_body_of_the_default_degree() {
     let expected = FitRequest::new("it", FitBody::default());
     assert_eq!(accepted(sent(FitOptions::default())), expected);
-    assert_eq!(accepted(FitHeader { name: "it".into(), ..FitHeader::default() }), expected);
+    assert_eq!(accepted(CreateFitRequest { name: "it".into(), ..CreateFitRequest::default() }), expected);
     let trimmed = accepted(sent(FitOptions { trim: 0.25, ..FitOptions::default() }));
     let preparation = FitPreparation { trim: 0.25, min_thickness_m: None };
     assert_eq!(trimmed.mode, FitBody { preparation, ..FitBody::default() }.into());
@@ -72,7 +72,7 @@ fn options_of_points_go_with_points_only() {
         (with(Mode::Group(group()), scale), "group"),
     ] {
         let message = refusal(options);
-        assert!(message.starts_with(&format!("header.options.{at}: ")) && message.contains("leave out"), "{message}");
+        assert!(message.starts_with(&format!("options.{at}: ")) && message.contains("leave out"), "{message}");
     }
     assert!(accepted(sent(with(compound(), scale))).uses_triangles());
 }
@@ -106,5 +106,5 @@ fn refusal(options: FitOptions) -> String {
 
 fn refuses(mode: Mode, at: &str, remedy: &str) {
     let message = refusal(FitOptions { mode: Some(mode), ..FitOptions::default() });
-    assert!(message.starts_with(&format!("header.options.{at}: ")) && message.contains(remedy), "{message}");
+    assert!(message.starts_with(&format!("options.{at}: ")) && message.contains(remedy), "{message}");
 }

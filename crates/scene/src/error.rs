@@ -1,0 +1,165 @@
+//! Why an update cannot be applied.
+
+use std::fmt;
+use std::sync::Arc;
+
+use sublevel_core::body::BodyId;
+use sublevel_core::measure::PoseError;
+
+use super::structure::MAX_HOLDERS;
+use super::{MAX_NAME_BYTES, MAX_PADDING_M, NameError};
+
+/// The lists of an [`Update`](super::Update).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum List {
+    /// Objects to add or replace.
+    Upserts,
+    /// New poses.
+    Poses,
+    /// Objects to remove.
+    Removals,
+    /// Pairs to allow.
+    Allow,
+    /// Pairs to forbid.
+    Forbid,
+    /// Paddings of objects.
+    ObjectPaddings,
+    /// Paddings of groups.
+    GroupPaddings,
+    /// Paddings of pairs.
+    PairPaddings,
+    /// Objects to be held.
+    Attach,
+    /// Objects not to be held.
+    Detach,
+}
+
+/// An entry of an [`Update`](super::Update): which list, and the position in it from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Entry {
+    /// The list.
+    pub list: List,
+    /// Position in the list, from 0.
+    pub index: usize,
+}
+
+/// Why an update cannot be applied. The scene is as it was.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SceneError {
+    /// Somebody else changed the scene first.
+    #[error("the scene is at revision {current}, not at the expected {expected}; read it again and repeat the update")]
+    Revision {
+        /// What the update was made for.
+        expected: u64,
+        /// Where the scene is.
+        current: u64,
+    },
+    /// A name cannot be stored.
+    #[error("name {error}")]
+    Name {
+        /// Where.
+        at: Entry,
+        /// The rule it breaks.
+        error: NameError,
+    },
+    /// A group label cannot be stored.
+    #[error("group is longer than {MAX_NAME_BYTES} bytes or holds a control character; shorten it")]
+    Group {
+        /// Where.
+        at: Entry,
+    },
+    /// Two entries change one object, so their order would matter.
+    #[error("object \"{name}\" is named twice in one update; name it once")]
+    Twice {
+        /// The second entry.
+        at: Entry,
+        /// The object.
+        name: Arc<str>,
+    },
+    /// The update names an object that the scene does not have.
+    #[error("no object \"{name}\" in the scene; add it first")]
+    NoObject {
+        /// Where.
+        at: Entry,
+        /// The object.
+        name: Arc<str>,
+    },
+    /// The update places a body that is not stored.
+    #[error("no body {id}; create it first")]
+    NoBody {
+        /// Where.
+        at: Entry,
+        /// The body.
+        id: BodyId,
+    },
+    /// A pair needs two objects.
+    #[error("object \"{name}\" is paired with itself; name two objects")]
+    Itself {
+        /// Where.
+        at: Entry,
+        /// The object.
+        name: Arc<str>,
+    },
+    /// An object that is not held has no pose.
+    #[error("object \"{name}\" has no pose and is held by nothing; give it a pose")]
+    NoPose {
+        /// Where.
+        at: Entry,
+        /// The object.
+        name: Arc<str>,
+    },
+    /// A new object is to keep a place that it does not have.
+    #[error("object \"{name}\" is new, so it has no place to keep; give its pose in the holder's frame")]
+    NoPlace {
+        /// Where.
+        at: Entry,
+        /// The object.
+        name: Arc<str>,
+    },
+    /// What would be held would have no pose.
+    #[error("object \"{name}\" is held at no usable pose: {error}")]
+    Pose {
+        /// Name of the held object.
+        name: Arc<str>,
+        /// The reason.
+        error: PoseError,
+    },
+    /// A padding that is no length.
+    #[error("padding is {padding_m} m; give a finite number of at most {MAX_PADDING_M} m either way")]
+    Padding {
+        /// Where.
+        at: Entry,
+        /// The padding.
+        padding_m: f64,
+    },
+    /// Objects that hold one another in a circle.
+    #[error("object \"{name}\" is held by itself, or through more than {MAX_HOLDERS} others; attach it elsewhere")]
+    Circle {
+        /// One of them.
+        name: Arc<str>,
+    },
+    /// An object that others are attached to cannot go.
+    #[error("object \"{name}\" holds \"{held}\"; detach or remove that in the same update")]
+    Holds {
+        /// Name of the holder.
+        name: Arc<str>,
+        /// What it holds.
+        held: Arc<str>,
+    },
+    /// The scene would be too large.
+    #[error("the scene would hold {count} {what}, at most {limit} fit; split it into several scenes")]
+    Full {
+        /// What there would be too many of.
+        what: &'static str,
+        /// How many there would be.
+        count: usize,
+        /// How many fit.
+        limit: usize,
+    },
+}
+
+impl fmt::Display for Entry {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?}[{}]", self.list, self.index)
+    }
+}

@@ -1,0 +1,12 @@
+//! What an object is made of: bodies, compounds, ladders, sos-bodies and half-spaces, and their
+//! files.
+
+mod file;
+mod half_space;
+mod kinds;
+mod ladder;
+
+pub use file::GeometryFileError;
+pub use half_space::NamedHalfSpace;
+pub use kinds::Geometry;
+pub use ladder::{Ladder, LadderError, MAX_RUNGS};

@@ -1,0 +1,98 @@
+//! Warm starts of pairs from one question to the next. They change how long an answer takes, never
+//! the answer beyond its bracket, so a wrong entry is harmless and the table may forget.
+
+use std::sync::{Mutex, OnceLock, TryLockError};
+
+use sublevel_core::measure::WarmStart;
+
+use super::object::Slot;
+
+/// Entries of a table: a pair has one place only, so memory is bounded by about 28 MB, and by what
+/// is used, block by block.
+const ENTRIES: usize = 1 << 16;
+
+/// Entries that are allocated together.
+const BLOCK: usize = 64;
+
+/// Warm starts of the pairs of one scene and its forks.
+#[derive(Debug)]
+pub(crate) struct PairCache {
+    blocks: Box<[OnceLock<Block>]>,
+}
+
+/// Entries side by side, each with a lock of its own.
+type Block = Box<[Mutex<Entry>]>;
+
+#[derive(Debug, Default)]
+struct Entry {
+    key: PairKey,
+    warm: WarmStart,
+}
+
+/// What a warm start is of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct PairKey {
+    pub(crate) a: Slot,
+    pub(crate) b: Slot,
+    /// Rungs of the two.
+    pub(crate) rungs: [u8; 2],
+    /// Kind of the question: hints of one kind are of no use to another.
+    pub(crate) kind: u8,
+}
+
+impl PairKey {
+    /// A number that is spread evenly (the finalizer of SplitMix64).
+    fn mixed(self) -> u64 {
+        let [rung_a, rung_b] = self.rungs.map(u64::from);
+        let mut x = (u64::from(self.a) << 32 | u64::from(self.b)) ^ (rung_a << 59 | rung_b << 27);
+        x = x.wrapping_add(u64::from(self.kind)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        x ^ x >> 31
+    }
+}
+
+impl Default for PairCache {
+    fn default() -> Self {
+        Self::with_entries(ENTRIES)
+    }
+}
+
+impl PairCache {
+    /// A table of so many entries, rounded up to a power of two.
+    pub(crate) fn with_entries(entries: usize) -> Self {
+        let blocks = entries.next_power_of_two().div_ceil(BLOCK);
+        Self { blocks: (0..blocks).map(|_| OnceLock::new()).collect() }
+    }
+
+    /// Lends the warm start of a pair; a cold one where it is not known or in use elsewhere.
+    pub(crate) fn with<T>(&self, key: PairKey, solve: impl FnOnce(&mut WarmStart) -> T) -> T {
+        let index = key.mixed() as usize % (self.blocks.len() * BLOCK);
+        let block = self.blocks[index / BLOCK].get_or_init(|| (0..BLOCK).map(|_| Mutex::default()).collect());
+        let mut entry = match block[index % BLOCK].try_lock() {
+            Ok(entry) => entry,
+            // A panic elsewhere left a hint, which may be anything.
+            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+            Err(TryLockError::WouldBlock) => return solve(&mut WarmStart::default()),
+        };
+        if entry.key != key {
+            *entry = Entry { key, warm: WarmStart::default() };
+        }
+        solve(&mut entry.warm)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_entry_is_lent_to_its_pair_only() {
+        let cache = PairCache::with_entries(64);
+        let key = |a| PairKey { a, b: 1_000_000, ..PairKey::default() };
+        let put = |a| cache.with(key(a), |warm| *warm = WarmStart::default());
+        // More pairs than places: nothing grows, nothing fails.
+        (0..1000).for_each(put);
+        cache.with(key(5), |_| cache.with(key(5), |_| ()));
+        assert_eq!(cache.blocks.iter().filter(|block| block.get().is_some()).count(), 1);
+    }
+}

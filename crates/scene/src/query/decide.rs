@@ -1,0 +1,179 @@
+//! Whether a pair is nearer than a threshold, from the coarsest rungs on.
+
+use sublevel_core::body::Solid;
+use sublevel_core::measure::{Decision, Options, nearer_than, overlap, signed_distance};
+
+use super::answer::Verdict;
+use super::ask::Measure;
+use super::solver::{Pair, Solver};
+use super::thing::Thing;
+
+/// A decision with what is known of the signed distance, metres.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bracket {
+    /// YES: the signed distance is below the threshold (at 0 m: at most).
+    pub(crate) verdict: Verdict,
+    pub(crate) lower: f64,
+    pub(crate) upper: f64,
+    pub(crate) rungs: [u8; 2],
+    /// Whether the solver was needed.
+    pub(crate) solved: bool,
+}
+
+impl Bracket {
+    fn of(verdict: Verdict, lower: f64, upper: f64) -> Self {
+        Self { verdict, lower, upper, rungs: [0; 2], solved: true }
+    }
+
+    /// What a decision says of the signed distance when it is compared with a threshold.
+    fn decided(decision: Decision, threshold: f64) -> Self {
+        match decision {
+            Decision::Yes => Self::of(Verdict::Yes, f64::NEG_INFINITY, threshold),
+            Decision::No => Self::of(Verdict::No, threshold, f64::INFINITY),
+            Decision::Undecided { lower, upper } => {
+                // A distance of 0 says nothing about depth.
+                let lower = if lower > 0.0 { lower } else { f64::NEG_INFINITY };
+                Self::of(Verdict::Undecided, lower, upper)
+            }
+        }
+    }
+}
+
+/// Compares the signed distance of a pair with a threshold in metres, which may be negative.
+pub(crate) fn decide(solver: &Solver<'_>, pair: &Pair<'_>, threshold: f64, options: Options<'_>) -> Bracket {
+    let gap = pair.a.ball_gap_m(&pair.b);
+    if gap > threshold {
+        return Bracket { solved: false, ..Bracket::of(Verdict::No, gap, f64::INFINITY) };
+    }
+    if solver.stop.is_set() {
+        return Bracket { solved: false, ..Bracket::of(Verdict::Undecided, gap, f64::INFINITY) };
+    }
+    match (&pair.a, &pair.b) {
+        (Thing::Solid { outer: false, .. }, Thing::Solid { outer: false, .. }) => {
+            solids(solver, pair, threshold, options)
+        }
+        (Thing::Solid { outer: false, rungs, pose }, Thing::HalfSpace(half_space))
+        | (Thing::HalfSpace(half_space), Thing::Solid { outer: false, rungs, pose }) => {
+            let Some(solid) = rungs.last() else { return Bracket::of(Verdict::Undecided, gap, f64::INFINITY) };
+            let found = solver.half_space_distance(solid, pose, half_space, (pair.slots, &options));
+            let ball = solid.circumscribed();
+            let slack = half_space.slack_m(pose.translation().norm() + ball.center.norm() + ball.radius);
+            let (lower, upper) = (found.lower - slack, found.upper + slack);
+            Bracket::of(compare::against(lower, upper, threshold), lower, upper)
+        }
+        (Thing::HalfSpace(_), Thing::HalfSpace(_)) => Bracket {
+            solved: false,
+            // Two of them overlap nearly always, and nobody asks.
+            ..Bracket::of(Verdict::No, f64::NEG_INFINITY, f64::INFINITY)
+        },
+        _ => {
+            let lower = compare::lower_m(solver, pair, options);
+            let lower = if lower > 0.0 { lower } else { f64::NEG_INFINITY };
+            let verdict = if lower > threshold { Verdict::No } else { Verdict::Undecided };
+            Bracket::of(verdict, lower, f64::INFINITY)
+        }
+    }
+}
+
+fn solids(solver: &Solver<'_>, pair: &Pair<'_>, threshold: f64, options: Options<'_>) -> Bracket {
+    let (Thing::Solid { rungs: rungs_a, pose: pose_a, .. }, Thing::Solid { rungs: rungs_b, pose: pose_b, .. }) =
+        (&pair.a, &pair.b)
+    else {
+        return Bracket::of(Verdict::Undecided, f64::NEG_INFINITY, f64::INFINITY);
+    };
+    let finest = [rungs_a.len() - 1, rungs_b.len() - 1];
+    for step in 0..=finest[0].max(finest[1]) {
+        let rungs = [step.min(finest[0]), step.min(finest[1])];
+        let (a, b) = (&*rungs_a[rungs[0]], &*rungs_b[rungs[1]]);
+        let is_finest = rungs == finest;
+        let mut found = if threshold < 0.0 {
+            if !is_finest {
+                continue;
+            }
+            let found = solver
+                .warm(pair.slots, rungs, Measure::Signed, |warm| signed_distance(a, pose_a, b, pose_b, &options, warm));
+            Bracket::of(compare::below(found.lower, found.upper, threshold), found.lower, found.upper)
+        } else {
+            let decision = solver.warm(pair.slots, rungs, Measure::Distance, |warm| {
+                if threshold == 0.0 {
+                    return overlap(a, pose_a, b, pose_b, &options, warm);
+                }
+                // Only thresholds that are no lengths are refused.
+                nearer_than(a, pose_a, b, pose_b, threshold, &options, warm)
+                    .unwrap_or(Decision::Undecided { lower: 0.0, upper: f64::INFINITY })
+            });
+            Bracket::decided(decision, threshold)
+        };
+        found.rungs = rungs.map(|rung| u8::try_from(rung).unwrap_or(u8::MAX));
+        if is_finest || found.verdict == Verdict::No {
+            return found;
+        }
+    }
+    Bracket::of(Verdict::Undecided, f64::NEG_INFINITY, f64::INFINITY)
+}
+
+/// Brackets against thresholds.
+pub(crate) mod compare {
+    use sublevel_core::body::Solid;
+    use sublevel_core::measure::{Options, distance, distance_to_point};
+
+    use crate::query::answer::Verdict;
+    use crate::query::ask::Measure;
+    use crate::query::solver::{Pair, Solver};
+    use crate::query::thing::Thing;
+
+    /// Whether a value is below a threshold.
+    pub(crate) fn below(lower: f64, upper: f64, threshold: f64) -> Verdict {
+        if upper < threshold {
+            Verdict::Yes
+        } else if lower >= threshold {
+            Verdict::No
+        } else {
+            Verdict::Undecided
+        }
+    }
+
+    /// Whether a value is at most a threshold.
+    pub(crate) fn below_or_at(lower: f64, upper: f64, threshold: f64) -> Verdict {
+        if upper <= threshold {
+            Verdict::Yes
+        } else if lower > threshold {
+            Verdict::No
+        } else {
+            Verdict::Undecided
+        }
+    }
+
+    /// Whether a signed distance counts as contact: touching does, at a threshold of 0.
+    pub(crate) fn against(lower: f64, upper: f64, threshold: f64) -> Verdict {
+        if threshold == 0.0 { below_or_at(lower, upper, threshold) } else { below(lower, upper, threshold) }
+    }
+
+    /// Lower bound of the distance of a pair whose solids contain what is meant, metres; 0 where
+    /// nothing better is known.
+    pub(crate) fn lower_m(solver: &Solver<'_>, pair: &Pair<'_>, options: Options<'_>) -> f64 {
+        match (&pair.a, &pair.b) {
+            (Thing::Solid { rungs: a, pose: pose_a, .. }, Thing::Solid { rungs: b, pose: pose_b, .. }) => {
+                let (Some(a), Some(b)) = (a.last(), b.last()) else { return 0.0 };
+                solver.warm(pair.slots, [0; 2], Measure::Distance, |warm| {
+                    distance(&**a, pose_a, &**b, pose_b, &options, warm).lower
+                })
+            }
+            (Thing::Solid { rungs, pose, .. }, Thing::HalfSpace(half_space))
+            | (Thing::HalfSpace(half_space), Thing::Solid { rungs, pose, .. }) => {
+                let Some(solid) = rungs.last() else { return 0.0 };
+                let ball = solid.circumscribed();
+                let slack = half_space.slack_m(pose.translation().norm() + ball.center.norm() + ball.radius);
+                solver.half_space_distance(solid, pose, half_space, (pair.slots, &options)).lower - slack
+            }
+            (Thing::Solid { rungs, pose, .. }, Thing::Point(point))
+            | (Thing::Point(point), Thing::Solid { rungs, pose, .. }) => {
+                let Some(solid) = rungs.last() else { return 0.0 };
+                solver.warm(pair.slots, [0; 2], Measure::Distance, |warm| {
+                    distance_to_point(&**solid, pose, point, &options, warm).map_or(0.0, |found| found.lower)
+                })
+            }
+            _ => 0.0,
+        }
+    }
+}

@@ -1,0 +1,32 @@
+//! Questions about a snapshot: pairs, everything within a margin, the closest pair, contact, states,
+//! clearances, rays. Each is a [`Question`](crate::crew::Question) for a [`Crew`](crate::Crew).
+//!
+//! `thing` is what stands in a pair; `solve` measures a
+//! pair, `decide` compares it with a threshold. The questions are in files of their own.
+
+mod answer;
+mod ask;
+mod candidates;
+mod clearance;
+mod closest;
+mod decide;
+mod pairs;
+mod placed;
+mod rays;
+mod selection;
+mod solve;
+mod solver;
+mod states;
+mod thing;
+mod within;
+
+pub use answer::{Answer, AnswerStatus, Verdict};
+pub use ask::{Ask, AskError, Measure, Motions};
+pub use clearance::{Clearance, ClearanceRow, StateClearance};
+pub use closest::{Closest, closest_pair};
+pub use pairs::{Operand, Pairs, PairsError};
+pub use placed::StatesError;
+pub use rays::{RayAnswer, Rays, RaysError};
+pub use selection::Selection;
+pub use states::{Certainty, StateAnswer, StateVerdict, States};
+pub use within::{Found, Within, combined};

@@ -1,0 +1,73 @@
+//! What solving a pair takes: the question, warm starts, and the pair where it stands.
+
+use sublevel_core::body::Shape;
+use sublevel_core::measure::{HalfSpaceDistance, Options, Pose, WarmStart, distance_to_half_space};
+
+use super::ask::{Ask, Measure};
+use super::thing::{PairSlots, Thing, WorldHalfSpace};
+use crate::crew::Stop;
+use crate::pair_cache::{PairCache, PairKey};
+
+/// What solving a pair needs besides the pair.
+#[derive(Clone, Copy)]
+pub(crate) struct Solver<'a> {
+    pub(crate) ask: &'a Ask,
+    /// Warm starts; none: every pair is solved cold.
+    pub(crate) cache: Option<&'a PairCache>,
+    pub(crate) stop: &'a Stop,
+}
+
+/// A pair of things with its place in the table of warm starts; without one it is solved cold.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pair<'a> {
+    pub(crate) a: Thing<'a>,
+    pub(crate) b: Thing<'a>,
+    pub(crate) slots: Option<PairSlots>,
+}
+
+impl Pair<'_> {
+    pub(crate) fn swapped(&self) -> Self {
+        Self { a: self.b, b: self.a, slots: self.slots.map(|PairSlots { a, b }| PairSlots { a: b, b: a }) }
+    }
+}
+
+/// Two solids of one pair where they stand.
+#[derive(Clone, Copy)]
+pub(crate) struct Solids<'a> {
+    pub(crate) a: &'a Shape,
+    pub(crate) pose_a: &'a Pose,
+    pub(crate) b: &'a Shape,
+    pub(crate) pose_b: &'a Pose,
+}
+
+impl Solver<'_> {
+    /// Lends the warm start of a pair at two rungs for one kind of question.
+    pub(crate) fn warm<T>(
+        &self,
+        slots: Option<PairSlots>,
+        rungs: [usize; 2],
+        kind: Measure,
+        solve: impl FnOnce(&mut WarmStart) -> T,
+    ) -> T {
+        match (self.cache, slots) {
+            (Some(cache), Some(PairSlots { a, b })) => {
+                let rungs = rungs.map(|rung| u8::try_from(rung).unwrap_or(u8::MAX));
+                cache.with(PairKey { a, b, rungs, kind: kind as u8 }, solve)
+            }
+            _ => solve(&mut WarmStart::default()),
+        }
+    }
+
+    /// The signed distance of a solid from a half-space, metres.
+    pub(crate) fn half_space_distance(
+        &self,
+        solid: &Shape,
+        pose: &Pose,
+        half_space: &WorldHalfSpace,
+        (slots, options): (Option<PairSlots>, &Options<'_>),
+    ) -> HalfSpaceDistance {
+        self.warm(slots, [0; 2], Measure::Signed, |warm| {
+            distance_to_half_space(solid, pose, &half_space.half_space, options, warm)
+        })
+    }
+}

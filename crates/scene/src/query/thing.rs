@@ -1,0 +1,121 @@
+//! What stands on one side of a pair.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use sublevel_core::body::{Shape, Solid};
+use sublevel_core::measure::{HalfSpace, Pose};
+
+use crate::geometry::Geometry;
+use crate::object::{Object, Slot};
+
+/// A ball of the world frame: centre and radius, metres.
+pub(crate) type WorldBall = (Vector3<f64>, f64);
+
+/// One side of a pair, where it stands.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Thing<'a> {
+    /// Solids of one object, coarsest first, at a world pose. `outer`: they only contain it, as the
+    /// box around an sos-body does.
+    Solid { rungs: &'a [Arc<Shape>], pose: &'a Pose, outer: bool },
+    /// A half-space of the world frame; its plane is known to within `slack_m` on points up to
+    /// `reach_m` from the origin.
+    HalfSpace(WorldHalfSpace),
+    /// A point of the world frame, metres.
+    Point(Vector3<f64>),
+}
+
+/// A half-space of the world frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct WorldHalfSpace {
+    pub(crate) half_space: HalfSpace,
+    /// About which it turns, metres.
+    pub(crate) origin: Vector3<f64>,
+    /// Whether it was turned or moved here, and so rounded.
+    rounded: bool,
+}
+
+impl WorldHalfSpace {
+    /// A half-space given in the world frame.
+    pub(crate) fn fixed(half_space: HalfSpace) -> Self {
+        Self { half_space, origin: Vector3::zeros(), rounded: false }
+    }
+
+    /// A half-space of a body frame where it stands.
+    fn placed(half_space: &HalfSpace, pose: &Pose) -> Self {
+        if *pose == Pose::identity() {
+            return Self::fixed(*half_space);
+        }
+        let normal = pose.transform_direction(half_space.normal()).normalize();
+        let offset = half_space.offset() + normal.dot(pose.translation());
+        let placed = HalfSpace::new(normal, offset).unwrap_or(*half_space);
+        Self { half_space: placed, origin: *pose.translation(), rounded: true }
+    }
+
+    /// Bound of the error of a signed distance of points within `reach_m` of the world's origin,
+    /// metres: of the normal, some ten roundings on the way from the plane's origin, and of the
+    /// offset.
+    pub(crate) fn slack_m(&self, reach_m: f64) -> f64 {
+        if !self.rounded {
+            return 0.0;
+        }
+        let offset = self.half_space.offset().abs() + self.origin.norm();
+        16.0 * f64::EPSILON * (reach_m + offset)
+    }
+}
+
+impl<'a> Thing<'a> {
+    /// An object where it stands.
+    pub(crate) fn object(object: &'a Object, pose: &'a Pose) -> Self {
+        match &object.geometry {
+            Geometry::HalfSpace(half_space) => Self::HalfSpace(WorldHalfSpace::placed(half_space.half_space(), pose)),
+            Geometry::SosBody(_) => Self::Solid { rungs: object.solids(), pose, outer: true },
+            Geometry::Solid(_) | Geometry::Ladder(_) => Self::Solid { rungs: object.solids(), pose, outer: false },
+        }
+    }
+
+    /// A ball around it in the world frame: centre and radius, metres; none around a half-space.
+    pub(crate) fn ball(&self) -> Option<WorldBall> {
+        match self {
+            Self::Solid { rungs, pose, .. } => {
+                let ball = rungs.last()?.circumscribed();
+                Some((pose.transform_point(&ball.center), ball.radius))
+            }
+            Self::HalfSpace(_) => None,
+            Self::Point(point) => Some((*point, 0.0)),
+        }
+    }
+
+    /// Lower bound of the signed distance from balls alone, metres; −∞ where balls say nothing.
+    pub(crate) fn ball_gap_m(&self, other: &Self) -> f64 {
+        match (self, other) {
+            (Self::HalfSpace(half_space), thing) | (thing, Self::HalfSpace(half_space)) => {
+                thing.ball().map_or(f64::NEG_INFINITY, |ball| half_space_gap(half_space, ball))
+            }
+            (a, b) => match (a.ball(), b.ball()) {
+                (Some(a), Some(b)) => ball_gap(a, b),
+                _ => f64::NEG_INFINITY,
+            },
+        }
+    }
+}
+
+/// Lower bound of the distance of two balls, rounding included, metres.
+pub(crate) fn ball_gap((a, radius_a): WorldBall, (b, radius_b): WorldBall) -> f64 {
+    let (distance, radii) = ((a - b).norm(), radius_a + radius_b);
+    // Rounding of the centres where they stand, of the norm and of the differences.
+    distance - radii - 32.0 * f64::EPSILON * (a.norm() + b.norm() + radii)
+}
+
+fn half_space_gap(of: &WorldHalfSpace, (center, radius): WorldBall) -> f64 {
+    let reach = center.norm() + radius;
+    let height = of.half_space.normal().dot(&center) - of.half_space.offset();
+    height - radius - of.slack_m(reach) - 32.0 * f64::EPSILON * (reach + of.half_space.offset().abs())
+}
+
+/// Which pair of a scene is solved, for its warm starts.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PairSlots {
+    pub(crate) a: Slot,
+    pub(crate) b: Slot,
+}

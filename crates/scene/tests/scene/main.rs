@@ -1,0 +1,6 @@
+//! Scenes against references that are as simple as can be: a model of names and poses, and all
+//! pairs measured one by one.
+
+mod brute_force;
+mod model;
+mod worlds;

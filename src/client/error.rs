@@ -1,0 +1,84 @@
+//! Why a call has no answer.
+
+use tonic::{Code, Status};
+use tonic_types::StatusExt;
+
+/// Why a call has no answer.
+#[derive(Debug, thiserror::Error)]
+pub enum ClientError {
+    /// The address of the server cannot be read.
+    #[error("{url} is no address of a server: {why}; write --server like http://127.0.0.1:50051")]
+    Url {
+        /// As given.
+        url: String,
+        /// The reason.
+        why: String,
+    },
+    /// Nobody answers there.
+    #[error("cannot reach a server at {url}: {why}; start one with `sublevel serve` or name another with --server")]
+    Unreachable {
+        /// As given.
+        url: String,
+        /// The reason.
+        why: String,
+    },
+    /// The server is connected and says nothing.
+    #[error("the server at {url} did not answer in time; see whether it is a sublevel server and try again")]
+    Silent {
+        /// As given.
+        url: String,
+    },
+    /// The server refused.
+    #[error("the server refused: {} ({:?})", .0.message(), .0.code())]
+    Refused(Box<Status>),
+    /// The server answered something else.
+    #[error("the server answered what this program does not understand: {0}; are the versions the same?")]
+    Unexpected(&'static str),
+}
+
+impl ClientError {
+    pub(super) fn of(url: &str, status: Status) -> Self {
+        match status.code() {
+            // What tonic makes of its own timeout; the server cancels nothing.
+            Code::Cancelled => Self::Silent { url: url.into() },
+            _ => Self::Refused(Box::new(status)),
+        }
+    }
+
+    /// Number of the gRPC status, if the server sent one.
+    pub fn code(&self) -> Option<Code> {
+        match self {
+            Self::Refused(status) => Some(status.code()),
+            _ => None,
+        }
+    }
+
+    /// Reason for programs, such as `INVALID_FIELD`.
+    pub fn reason(&self) -> Option<String> {
+        match self {
+            Self::Refused(status) => status.get_error_details().error_info().map(|info| info.reason.clone()),
+            _ => None,
+        }
+    }
+
+    /// Path of the field that is to blame.
+    pub fn field(&self) -> Option<String> {
+        match self {
+            Self::Refused(status) => {
+                let details = status.get_error_details();
+                let violation = details.bad_request().and_then(|bad| bad.field_violations.first());
+                violation.map(|violation| violation.field.clone())
+            }
+            _ => None,
+        }
+    }
+}
+
+/// tonic's own message is "transport error"; the reason is at the bottom.
+pub(super) fn root_cause(error: &dyn std::error::Error) -> String {
+    let mut cause = error;
+    while let Some(deeper) = cause.source() {
+        cause = deeper;
+    }
+    cause.to_string()
+}

@@ -1,0 +1,37 @@
+//! A typed client: domain types in and out. The command line, the demo, tests and users share it.
+//!
+//! ```no_run
+//! # async fn run() -> Result<(), Box<dyn std::error::Error>> {
+//! use nalgebra::Vector3;
+//! use sublevel::client::{Client, Question};
+//! use sublevel::measure::Pose;
+//! use sublevel::scene::query::Measure;
+//!
+//! let client = Client::connect("http://127.0.0.1:50051").await?;
+//! let ball = client.create_ball("ball", 0.1).await?;
+//! client.create_scene("cell").await?;
+//! let at = |x: f64| Pose::from_quaternion(Vector3::new(x, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0]);
+//! client.put_objects("cell", [("a", &ball, at(0.0)?), ("b", &ball, at(0.5)?)]).await?;
+//! let answers = client.evaluate("cell", Question::pairs([("a", "b")]), &[Measure::Distance]).await?;
+//! assert!((answers.rows[0].value.unwrap_or(f64::NAN) - 0.3).abs() < 1e-8);
+//! # Ok(())
+//! # }
+//! ```
+
+mod bodies;
+mod connection;
+mod error;
+#[cfg(feature = "fit")]
+mod fits;
+mod pose_stream;
+mod queries;
+mod scenes;
+
+pub use bodies::{BodySource, StoredBody};
+pub use connection::{Client, ServerInfo};
+pub use error::ClientError;
+#[cfg(feature = "fit")]
+pub use fits::{JobProgress, SubmitError};
+pub use pose_stream::{PoseStream, StreamedPoses};
+pub use queries::{Answers, CheckedStates, PairRow, Question, StatesQuestion};
+pub use scenes::SceneState;

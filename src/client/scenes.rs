@@ -1,0 +1,184 @@
+//! Scenes.
+
+use std::collections::BTreeMap;
+
+use tonic::transport::Channel;
+
+use super::connection::Client;
+use super::error::ClientError;
+use crate::body::BodyId;
+use crate::measure::Pose;
+use crate::service::limits::MAX_MESSAGE_BYTES;
+use crate::service::proto::scene_service_client::SceneServiceClient;
+use crate::service::proto::{
+    self, CommitForkRequest, CreateSceneRequest, DeleteSceneRequest, ForkSceneRequest, GetSceneRequest,
+    ListScenesRequest, UpdateSceneRequest,
+};
+
+/// A scene as it was read.
+#[derive(Clone, Debug, Default)]
+pub struct SceneState {
+    /// Revision all of this is true of.
+    pub revision: u64,
+    /// Objects by name: body id, world pose, and what holds them.
+    pub objects: BTreeMap<String, proto::Object>,
+    /// Pairs that may touch.
+    pub allowed_pairs: Vec<proto::SubjectPair>,
+}
+
+impl Client {
+    pub(super) fn scenes(&self) -> SceneServiceClient<Channel> {
+        SceneServiceClient::new(self.channel()).max_decoding_message_size(MAX_MESSAGE_BYTES)
+    }
+
+    /// Creates an empty scene; returns its revision.
+    ///
+    /// # Errors
+    /// When the name is taken or not usable.
+    pub async fn create_scene(&self, name: &str) -> Result<u64, ClientError> {
+        let request = CreateSceneRequest { name: name.into() };
+        let response = self.scenes().create_scene(request).await.map_err(self.refused())?;
+        Ok(response.into_inner().scene.map_or(0, |scene| scene.revision))
+    }
+
+    /// Names and revisions of all scenes and forks.
+    ///
+    /// # Errors
+    /// When the server does not answer.
+    pub async fn list_scenes(&self) -> Result<Vec<proto::SceneSummary>, ClientError> {
+        let (mut client, mut scenes, mut page_token) = (self.scenes(), Vec::new(), String::new());
+        loop {
+            let request = ListScenesRequest { page_size: 1000, page_token };
+            let page = client.list_scenes(request).await.map_err(self.refused())?.into_inner();
+            scenes.extend(page.scenes);
+            page_token = page.next_page_token;
+            if page_token.is_empty() {
+                return Ok(scenes);
+            }
+        }
+    }
+
+    /// Reads a scene whole.
+    ///
+    /// # Errors
+    /// When there is none, or it changes all the time while it is read.
+    pub async fn scene(&self, name: &str) -> Result<SceneState, ClientError> {
+        let (mut client, mut state, mut page_token) = (self.scenes(), SceneState::default(), String::new());
+        loop {
+            let request = GetSceneRequest { name: name.into(), page_size: 10_000, page_token };
+            let page = client.get_scene(request).await.map_err(self.refused())?.into_inner();
+            state.revision = page.scene.map_or(0, |scene| scene.revision);
+            state.objects.extend(page.objects.into_iter().map(|object| (object.name.clone(), object)));
+            state.allowed_pairs.extend(page.allowed_pairs);
+            page_token = page.next_page_token;
+            if page_token.is_empty() {
+                return Ok(state);
+            }
+        }
+    }
+
+    /// Adds objects, or replaces those whose names are known; returns the revision.
+    ///
+    /// # Errors
+    /// When a name or body is not usable.
+    pub async fn put_objects<'a>(
+        &self,
+        scene: &str,
+        objects: impl IntoIterator<Item = (&'a str, &'a BodyId, Pose)>,
+    ) -> Result<u64, ClientError> {
+        let object = |(name, body, pose): (&str, &BodyId, Pose)| proto::Object {
+            name: name.into(),
+            body_id: body.to_string(),
+            pose: Some(pose_message(&pose)),
+            ..Default::default()
+        };
+        let upsert_objects = objects.into_iter().map(object).collect();
+        self.update_scene(UpdateSceneRequest { scene: scene.into(), upsert_objects, ..Default::default() }).await
+    }
+
+    /// Sets world poses of objects, on disk before it returns; returns the revision.
+    ///
+    /// # Errors
+    /// When an object is not there.
+    pub async fn set_poses<'a>(
+        &self,
+        scene: &str,
+        poses: impl IntoIterator<Item = (&'a str, Pose)>,
+    ) -> Result<u64, ClientError> {
+        let poses = pose_table(poses);
+        self.update_scene(UpdateSceneRequest { scene: scene.into(), set_poses: Some(poses), ..Default::default() })
+            .await
+    }
+
+    /// Lets an object be held by another, where it is now; returns the revision.
+    ///
+    /// # Errors
+    /// When an object is not there, or would be held by itself.
+    pub async fn attach(&self, scene: &str, object: &str, to: &str) -> Result<u64, ClientError> {
+        let attachment = proto::Attachment { to: to.into(), pose: None, touch: Vec::new() };
+        let attach = vec![proto::Attach { object: object.into(), attachment: Some(attachment) }];
+        self.update_scene(UpdateSceneRequest { scene: scene.into(), attach, ..Default::default() }).await
+    }
+
+    /// Any update, in the words of the protocol; returns the revision.
+    ///
+    /// # Errors
+    /// When the update cannot be applied.
+    pub async fn update_scene(&self, update: UpdateSceneRequest) -> Result<u64, ClientError> {
+        let response = self.scenes().update_scene(update).await.map_err(self.refused())?;
+        Ok(response.into_inner().revision)
+    }
+
+    /// Removes a scene or fork.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub async fn delete_scene(&self, name: &str) -> Result<(), ClientError> {
+        self.scenes().delete_scene(DeleteSceneRequest { name: name.into() }).await.map_err(self.refused())?;
+        Ok(())
+    }
+
+    /// Makes a fork of a scene; returns its revision.
+    ///
+    /// # Errors
+    /// When there is no such scene, the name is taken, or there are too many.
+    pub async fn fork_scene(&self, scene: &str, fork: &str) -> Result<u64, ClientError> {
+        let request = ForkSceneRequest { scene: scene.into(), fork: fork.into(), expected_revision: None };
+        let response = self.scenes().fork_scene(request).await.map_err(self.refused())?;
+        Ok(response.into_inner().fork.map_or(0, |fork| fork.revision))
+    }
+
+    /// Makes what a fork holds the next revision of its parent; returns that.
+    ///
+    /// # Errors
+    /// When the parent has changed since.
+    pub async fn commit_fork(&self, fork: &str) -> Result<u64, ClientError> {
+        let response = self.scenes().commit_fork(CommitForkRequest { fork: fork.into() }).await;
+        Ok(response.map_err(self.refused())?.into_inner().revision)
+    }
+}
+
+/// A pose in the words of the protocol.
+pub(super) fn pose_message(pose: &Pose) -> proto::Pose {
+    let (t, q) = (pose.translation(), pose.rotation().coords);
+    proto::Pose {
+        translation_m: Some(proto::Vector3 { x: t.x, y: t.y, z: t.z }),
+        rotation: Some(proto::Quaternion { x: q.x, y: q.y, z: q.z, w: q.w }),
+    }
+}
+
+/// Poses by name, packed.
+pub(super) fn pose_table<'a>(poses: impl IntoIterator<Item = (&'a str, Pose)>) -> proto::PoseTable {
+    let (mut names, mut packed) = (Vec::new(), Vec::new());
+    for (name, pose) in poses {
+        names.push(name.to_owned());
+        pack_pose(&pose, &mut packed);
+    }
+    proto::PoseTable { names, poses: packed.into(), rows: Vec::new() }
+}
+
+/// Seven little-endian numbers: translation, then quaternion x y z w.
+pub(super) fn pack_pose(pose: &Pose, packed: &mut Vec<u8>) {
+    let numbers = pose.translation().iter().chain(pose.rotation().coords.iter());
+    numbers.for_each(|number| packed.extend_from_slice(&number.to_le_bytes()));
+}

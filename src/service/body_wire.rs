@@ -1,0 +1,133 @@
+//! Bodies in messages.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use tonic::Status;
+
+use crate::body::{Body, BodyError, BodyId, Shape};
+use crate::measure::HalfSpace;
+use crate::scene::{Geometry, Ladder, NamedHalfSpace};
+use crate::store::CatalogueError;
+
+use super::blobs::Blobs;
+use super::error::{self, Invalid};
+use super::proto::create_body_request::Source;
+use super::proto::{self, BodyKind};
+use super::wire;
+
+/// The body that a request is about; `stored` looks up the rungs of a ladder.
+pub(super) fn geometry(
+    request: &proto::CreateBodyRequest,
+    blobs: &Blobs,
+    stored: impl Fn(&BodyId) -> Result<Geometry, CatalogueError>,
+) -> Result<Geometry, Status> {
+    let Some(source) = &request.source else {
+        return Err(Invalid::new("source", "is missing; send a file, a blob_id, or the sizes of a primitive").into());
+    };
+    let named = |kind: &str| if request.name.is_empty() { kind.to_owned() } else { request.name.clone() };
+    let exact = |body: Result<Body, BodyError>, field: &str| -> Result<Geometry, Status> {
+        let body = body.map_err(|error| Invalid::new(field, error))?;
+        Ok(body.with_gap(0.0).into())
+    };
+    match source {
+        Source::File(file) => read(file, "file"),
+        Source::BlobId(id) => read(&blobs.get(id, "blob_id")?, "blob_id"),
+        Source::Ball(size) => exact(Body::ball(&named("ball"), Vector3::zeros(), size.radius_m), "ball"),
+        Source::Ellipsoid(size) => {
+            let half_axes = vector(size.half_axes_m.as_ref(), "ellipsoid.half_axes_m")?;
+            exact(Body::ellipsoid(&named("ellipsoid"), Vector3::zeros(), half_axes), "ellipsoid.half_axes_m")
+        }
+        Source::Box(size) => {
+            let half_extents = vector(size.half_extents_m.as_ref(), "box.half_extents_m")?;
+            exact(Body::cuboid(&named("box"), half_extents), "box.half_extents_m")
+        }
+        Source::Cylinder(size) => {
+            exact(Body::cylinder(&named("cylinder"), size.radius_m, size.half_height_m), "cylinder")
+        }
+        Source::Capsule(_) => Err(Status::unimplemented(
+            "capsule: capsules are not available yet; use a cylinder, or an ellipsoid that contains it",
+        )),
+        Source::HalfSpace(size) => {
+            let normal = vector(size.normal.as_ref(), "half_space.normal")?;
+            let half_space = HalfSpace::new(normal, size.offset_m);
+            let half_space = half_space.map_err(|error| Invalid::new("half_space.normal", error))?;
+            let named = NamedHalfSpace::new(&named("half-space"), half_space);
+            let half_space = named.map_err(|error| Invalid::new("name", error))?;
+            Ok(Geometry::HalfSpace(Arc::new(half_space)))
+        }
+        Source::Ladder(rungs) => {
+            let rung = |(index, id): (usize, &String)| {
+                let field = format!("ladder.body_ids[{index}]");
+                let id = wire::body_id(id, &field)?;
+                match stored(&id).map_err(|error| error::catalogue(&error, &field))? {
+                    Geometry::Solid(shape) => Ok(shape),
+                    _ => Err(Invalid::new(field, "is no single body; a ladder is made of bodies").into()),
+                }
+            };
+            let rungs: Vec<Arc<Shape>> = rungs.body_ids.iter().enumerate().map(rung).collect::<Result<_, Status>>()?;
+            let ladder = Ladder::new(&named("ladder"), rungs);
+            Ok(Geometry::Ladder(Arc::new(ladder.map_err(|error| Invalid::new("ladder.body_ids", error))?)))
+        }
+    }
+}
+
+fn read(file: &[u8], field: &str) -> Result<Geometry, Status> {
+    let text = std::str::from_utf8(file).map_err(|error| Invalid::new(field, format!("is no UTF-8 text: {error}")))?;
+    Geometry::from_json(text).map_err(|error| Invalid::new(field, error).into())
+}
+
+fn vector(vector: Option<&proto::Vector3>, field: &str) -> Result<Vector3<f64>, Invalid> {
+    let vector = vector.ok_or_else(|| Invalid::new(field, "is missing; send x, y and z"))?;
+    Ok(Vector3::new(vector.x, vector.y, vector.z))
+}
+
+/// What a body is.
+pub(super) fn kind(geometry: &Geometry) -> BodyKind {
+    match geometry {
+        Geometry::Solid(shape) => match **shape {
+            Shape::Body(_) => BodyKind::Body,
+            Shape::Compound(_) => BodyKind::Compound,
+        },
+        Geometry::Ladder(_) => BodyKind::Ladder,
+        Geometry::SosBody(_) => BodyKind::SosBody,
+        Geometry::HalfSpace(_) => BodyKind::HalfSpace,
+    }
+}
+
+pub(super) fn summary(geometry: &Geometry) -> proto::BodySummary {
+    let parts: &[Body] = match geometry {
+        Geometry::Solid(shape) => crate::body::Solid::parts(&**shape),
+        Geometry::Ladder(ladder) => crate::body::Solid::parts(&**ladder.finest()),
+        Geometry::SosBody(_) | Geometry::HalfSpace(_) => &[],
+    };
+    let single = match parts {
+        [body] => Some(body),
+        _ => None,
+    };
+    let volume_m3 = match geometry {
+        Geometry::SosBody(body) => Some(body.volume().volume_m3),
+        _ => single.map(|body| body.volume().volume_m3),
+    };
+    let rungs = match geometry {
+        Geometry::Ladder(ladder) => ladder.rungs(),
+        _ => &[],
+    };
+    let constraints: usize = parts.iter().map(|part| part.constraints().len()).sum();
+    proto::BodySummary {
+        id: geometry.id().to_string(),
+        name: geometry.name().to_owned(),
+        kind: kind(geometry).into(),
+        degree: wire::count(geometry.degree()),
+        constraint_count: wire::count(constraints.max(1)),
+        part_count: wire::count(if rungs.is_empty() { parts.len().max(1) } else { rungs.len() }),
+        volume_m3,
+        min_value: single.map(Body::min_value),
+        bounding_box: geometry.bounding_box().map(|bounds| proto::BoundingBox {
+            min_m: Some(wire::vector(&bounds.min)),
+            max_m: Some(wire::vector(&bounds.max)),
+        }),
+        gap_m: geometry.gap_m(),
+        rung_ids: rungs.iter().map(|rung| rung.id().to_string()).collect(),
+    }
+}

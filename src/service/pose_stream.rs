@@ -1,0 +1,220 @@
+//! StreamPoses: messages are read while poses are applied; what comes meanwhile is merged, the latest
+//! pose of each object wins.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use tokio::sync::mpsc;
+use tonic::{Status, Streaming};
+
+use super::app_state::AppState;
+use super::error::{self, Invalid};
+use super::proto::{StreamPosesRequest, StreamPosesResponse};
+use super::{packed, wire};
+use crate::measure::Pose;
+use crate::scene::{MAX_OBJECTS, Scene, SceneError};
+use crate::store::{CatalogueError, LiveScene};
+
+type Replies = mpsc::Sender<Result<StreamPosesResponse, Status>>;
+
+/// What messages refer to.
+#[derive(Debug)]
+struct Table {
+    scene: String,
+    live: Arc<LiveScene>,
+    names: Vec<Arc<str>>,
+}
+
+/// Poses that wait to be applied: at most one for each object of the scene.
+#[derive(Debug, Default)]
+struct Pending {
+    poses: HashMap<Arc<str>, Pose>,
+    sequence: u64,
+    messages: u32,
+    merged: u32,
+}
+
+/// Applies the messages of a client until it has sent all, or is gone.
+pub(super) async fn run(app: AppState, mut messages: Streaming<StreamPosesRequest>, replies: Replies) {
+    let mut table: Option<Table> = None;
+    let (mut pending, mut ended) = (Pending::default(), false);
+    let mut applying: Option<tokio::task::JoinHandle<Result<StreamPosesResponse, Status>>> = None;
+    let mut reply: Option<StreamPosesResponse> = None;
+    loop {
+        if applying.is_none()
+            && pending.messages > 0
+            && let Some(table) = &table
+        {
+            let poses = std::mem::take(&mut pending);
+            applying = Some(tokio::spawn(apply(app.clone(), table.scene.clone(), table.live.clone(), poses)));
+        }
+        if ended && applying.is_none() && reply.is_none() {
+            return;
+        }
+        tokio::select! {
+            message = messages.message(), if !ended => match message {
+                Ok(Some(message)) => {
+                    let sequence = message.sequence;
+                    if let Err(status) = read(&app, message, &mut table, &mut pending).await {
+                        if table.is_none() {
+                            // Nothing can follow: which scene is meant is not known.
+                            let _ = replies.send(Err(status)).await;
+                            return;
+                        }
+                        let refused = StreamPosesResponse {
+                            sequence,
+                            error: Some(error::in_stream(&status)),
+                            ..Default::default()
+                        };
+                        // A client that sends nonsense and reads nothing is not read on.
+                        if replies.send(Ok(refused)).await.is_err() {
+                            return;
+                        }
+                    }
+                }
+                Ok(None) => ended = true,
+                Err(status) => {
+                    let _ = replies.send(Err(status)).await;
+                    return;
+                }
+            },
+            applied = async { match &mut applying { Some(task) => task.await, None => std::future::pending().await } } => {
+                applying = None;
+                match applied {
+                    Ok(Ok(done)) => reply = Some(merged(reply.take(), done)),
+                    Ok(Err(status)) => { let _ = replies.send(Err(status)).await; return; }
+                    Err(error) => { let _ = replies.send(Err(error::internal_panic(&error))).await; return; }
+                }
+            },
+            space = replies.reserve(), if reply.is_some() => match space {
+                Ok(space) => if let Some(reply) = reply.take() { space.send(Ok(reply)); },
+                Err(_) => return,
+            },
+        }
+    }
+}
+
+/// One acknowledgement in place of two that were not read.
+fn merged(before: Option<StreamPosesResponse>, now: StreamPosesResponse) -> StreamPosesResponse {
+    let Some(before) = before else { return now };
+    StreamPosesResponse {
+        message_count: before.message_count.saturating_add(now.message_count),
+        merged_count: before.merged_count.saturating_add(now.merged_count),
+        ..now
+    }
+}
+
+/// Reads a message whole, or refuses it whole.
+async fn read(
+    app: &AppState,
+    message: StreamPosesRequest,
+    table: &mut Option<Table>,
+    pending: &mut Pending,
+) -> Result<(), Status> {
+    let StreamPosesRequest { scene, names, indices, poses, sequence } = message;
+    match table {
+        None => {
+            wire::name(&scene, "scene")?;
+            let missing = || error::catalogue(&CatalogueError::NoScene(scene.clone()), "scene");
+            let live = app.catalogue().await?.live_scene(&scene).ok_or_else(missing)?;
+            *table = Some(Table { scene, live, names: Vec::new() });
+        }
+        Some(table) if !scene.is_empty() && scene != table.scene => {
+            let why = format!("is another scene than \"{}\" before; open a stream for each", table.scene);
+            return Err(Invalid::new("scene", why).into());
+        }
+        Some(_) => {}
+    }
+    let Some(table) = table else { return Ok(()) };
+    let current = table.live.snapshot();
+    if !names.is_empty() {
+        table.names = checked(&names, &current, &table.scene)?;
+    }
+    let poses = packed::poses(&poses, "poses")?;
+    let indices: Vec<u32> = packed::indices::<1>(&indices, "indices")?.into_iter().flatten().collect();
+    let count = if indices.is_empty() { table.names.len() } else { indices.len() };
+    if poses.len() != count && !(poses.is_empty() && indices.is_empty()) {
+        let why = format!("holds {} poses for {count} objects; send one for each", poses.len());
+        return Err(Invalid::new("poses", why).into());
+    }
+    let mut moved = Vec::with_capacity(poses.len());
+    for (place, pose) in poses.into_iter().enumerate() {
+        let index = indices.get(place).map_or(Some(place), |index| usize::try_from(*index).ok());
+        let name = index.and_then(|index| table.names.get(index)).ok_or_else(|| {
+            let why = format!("is no position in the table of {} names; count from 0", table.names.len());
+            Status::from(Invalid::new(format!("indices[{place}]"), why))
+        })?;
+        if current.slot(name).is_none() {
+            return Err(no_object(name, "names", &table.scene));
+        }
+        moved.push((name.clone(), pose));
+    }
+    for (name, pose) in moved {
+        pending.merged += u32::from(pending.poses.insert(name, pose).is_some());
+    }
+    (pending.sequence, pending.messages) = (sequence, pending.messages.saturating_add(1));
+    Ok(())
+}
+
+fn checked(names: &[String], scene: &Scene, of: &str) -> Result<Vec<Arc<str>>, Status> {
+    if names.len() > MAX_OBJECTS {
+        let why = format!("names {} objects; a scene has at most {MAX_OBJECTS} (max_objects)", names.len());
+        return Err(Invalid::new("names", why).into());
+    }
+    let mut seen = std::collections::HashSet::new();
+    let mut table = Vec::with_capacity(names.len());
+    for (index, name) in names.iter().enumerate() {
+        let at = || format!("names[{index}]");
+        wire::name(name, &at())?;
+        if !seen.insert(name) {
+            return Err(Invalid::new(at(), format!("object \"{name}\" is named twice; name it once")).into());
+        }
+        if scene.slot(name).is_none() {
+            return Err(no_object(name, &at(), of));
+        }
+        table.push(name.as_str().into());
+    }
+    Ok(table)
+}
+
+fn no_object(name: &str, field: &str, scene: &str) -> Status {
+    let why = format!("no object \"{name}\" in scene \"{scene}\"; add it first");
+    error::not_found("object", name, field, why)
+}
+
+async fn apply(
+    app: AppState,
+    scene: String,
+    live: Arc<LiveScene>,
+    pending: Pending,
+) -> Result<StreamPosesResponse, Status> {
+    let catalogue = app.catalogue().await?;
+    let is_there = catalogue.live_scene(&scene).is_some_and(|now| Arc::ptr_eq(&now, &live));
+    if !is_there {
+        return Err(error::catalogue(&CatalogueError::NoScene(scene), "scene"));
+    }
+    let Pending { poses, sequence, messages, merged } = pending;
+    let moved = tokio::task::spawn_blocking(move || {
+        catalogue.stream_poses::<CatalogueError>(&live, |scene| {
+            // An object that was removed meanwhile needs no pose.
+            Ok(poses.into_iter().filter_map(|(name, pose)| Some((scene.slot(&name)?, pose))).collect())
+        })
+    });
+    let next = match moved.await.map_err(|error| error::internal_panic(&error))? {
+        Ok(next) => next,
+        Err(CatalogueError::Scene(SceneError::Pose { name, error })) => {
+            let why = format!("object \"{name}\" would be held at no usable pose: {error}");
+            let status = Status::from(Invalid::new("poses", why));
+            let error = Some(error::in_stream(&status));
+            return Ok(StreamPosesResponse { sequence, error, ..Default::default() });
+        }
+        Err(error) => return Err(error::catalogue(&error, "scene")),
+    };
+    Ok(StreamPosesResponse {
+        revision: next.revision(),
+        sequence,
+        message_count: messages,
+        merged_count: merged,
+        error: None,
+    })
+}

@@ -1,0 +1,223 @@
+//! Scenes in messages.
+
+use std::sync::Arc;
+
+use tonic::Status;
+
+use crate::measure::Pose;
+use crate::scene::{Attach, Attachment, Object, Placement, Scene, Subject, SubjectPair, Update};
+use crate::store::Origin;
+
+use super::error::{self, Invalid};
+use super::limits::MAX_MESSAGE_BYTES;
+use super::proto::{self, subject};
+use super::{packed, wire};
+
+/// An update as it is asked for.
+pub(super) fn update(request: &proto::UpdateSceneRequest) -> Result<Update, Invalid> {
+    let mut update = Update { expected_revision: request.expected_revision, ..Update::default() };
+    for (index, object) in request.upsert_objects.iter().enumerate() {
+        update.upserts.push(placement(object, index)?);
+    }
+    if let Some(table) = &request.set_poses {
+        update.poses = pose_table(table, "set_poses")?;
+    }
+    update.removals = names(&request.remove_objects);
+    update.detach = names(&request.detach);
+    update.allow = subject_pairs(&request.allow_pairs, "allow_pairs")?;
+    update.forbid = subject_pairs(&request.forbid_pairs, "forbid_pairs")?;
+    let objects = request.set_object_paddings.iter();
+    update.object_paddings = objects.map(|padding| (padding.object.as_str().into(), padding.padding_m)).collect();
+    let groups = request.set_group_paddings.iter();
+    update.group_paddings = groups.map(|padding| (padding.group.as_str().into(), padding.padding_m)).collect();
+    for (index, padding) in request.set_pair_paddings.iter().enumerate() {
+        let at = || format!("set_pair_paddings[{index}].pair");
+        let pair = padding.pair.as_ref().ok_or_else(|| missing(at()))?;
+        update.pair_paddings.push((subject_pair(pair, at)?, padding.padding_m));
+    }
+    for (index, attach) in request.attach.iter().enumerate() {
+        let at = |leaf: &str| format!("attach[{index}].attachment{leaf}");
+        let attachment = attach.attachment.as_ref().ok_or_else(|| missing(at("")))?;
+        update.attach.push(Attach {
+            name: attach.object.as_str().into(),
+            to: attachment.to.as_str().into(),
+            pose: attachment.pose.as_ref().map(|pose| wire::pose(Some(pose), &at(".pose"))).transpose()?,
+            touch: subjects(&attachment.touch, || at(".touch"))?,
+        });
+    }
+    Ok(update)
+}
+
+fn placement(object: &proto::Object, index: usize) -> Result<Placement, Invalid> {
+    let at = |leaf: &str| format!("upsert_objects[{index}].{leaf}");
+    let attachment = match &object.attachment {
+        None => None,
+        Some(attachment) => Some(Attachment {
+            to: attachment.to.as_str().into(),
+            pose: wire::pose(attachment.pose.as_ref(), &at("attachment.pose"))?,
+            touch: subjects(&attachment.touch, || at("attachment.touch"))?,
+        }),
+    };
+    let pose = match (&object.pose, &attachment) {
+        (None, Some(_)) => None,
+        (pose, _) => Some(wire::pose(pose.as_ref(), &at("pose"))?),
+    };
+    Ok(Placement {
+        name: object.name.as_str().into(),
+        body: wire::body_id(&object.body_id, &at("body_id"))?,
+        pose,
+        group: object.group.as_str().into(),
+        padding_m: object.padding_m,
+        attachment,
+    })
+}
+
+/// Poses by object name, packed or as rows.
+pub(super) fn pose_table(table: &proto::PoseTable, field: &str) -> Result<Vec<(Arc<str>, Pose)>, Invalid> {
+    let proto::PoseTable { names, poses, rows } = table;
+    if !rows.is_empty() {
+        if !names.is_empty() || !poses.is_empty() {
+            return Err(Invalid::new(format!("{field}.rows"), "are sent along with names and poses; send either"));
+        }
+        let row = |(index, row): (usize, &proto::ObjectPose)| {
+            let pose = wire::pose(row.pose.as_ref(), &format!("{field}.rows[{index}].pose"))?;
+            Ok((row.name.as_str().into(), pose))
+        };
+        return rows.iter().enumerate().map(row).collect();
+    }
+    let poses = packed::poses(poses, &format!("{field}.poses"))?;
+    if names.len() != poses.len() {
+        let why = format!("holds {} poses for {} names; send one for each", poses.len(), names.len());
+        return Err(Invalid::new(format!("{field}.poses"), why));
+    }
+    Ok(names.iter().map(|name| name.as_str().into()).zip(poses).collect())
+}
+
+fn names(names: &[String]) -> Vec<Arc<str>> {
+    names.iter().map(|name| name.as_str().into()).collect()
+}
+
+fn missing(field: String) -> Invalid {
+    Invalid::new(field, "is missing; send it")
+}
+
+fn subject(subject: &proto::Subject, field: impl Fn() -> String) -> Result<Subject, Invalid> {
+    match &subject.subject {
+        Some(subject::Subject::Object(name)) => Ok(Subject::Object(name.as_str().into())),
+        Some(subject::Subject::Group(name)) => Ok(Subject::Group(name.as_str().into())),
+        None => Err(Invalid::new(field(), "names neither an object nor a group; name one")),
+    }
+}
+
+fn subjects(subjects: &[proto::Subject], field: impl Fn() -> String) -> Result<Vec<Subject>, Invalid> {
+    let one = |(index, one): (usize, &proto::Subject)| subject(one, || format!("{}[{index}]", field()));
+    subjects.iter().enumerate().map(one).collect()
+}
+
+fn subject_pair(pair: &proto::SubjectPair, field: impl Fn() -> String) -> Result<SubjectPair, Invalid> {
+    let side = |side: &Option<proto::Subject>, leaf: &str| {
+        let at = || format!("{}.{leaf}", field());
+        subject(side.as_ref().ok_or_else(|| missing(at()))?, at)
+    };
+    Ok((side(&pair.a, "a")?, side(&pair.b, "b")?))
+}
+
+fn subject_pairs(pairs: &[proto::SubjectPair], field: &str) -> Result<Vec<SubjectPair>, Invalid> {
+    let one = |(index, pair): (usize, &proto::SubjectPair)| subject_pair(pair, || format!("{field}[{index}]"));
+    pairs.iter().enumerate().map(one).collect()
+}
+
+pub(super) fn summary(scene: &Scene, origin: Option<&Origin>) -> proto::SceneSummary {
+    proto::SceneSummary {
+        name: scene.name().to_string(),
+        revision: scene.revision(),
+        object_count: wire::count(scene.len()),
+        parent: origin.map(|origin| origin.parent.to_string()).unwrap_or_default(),
+        parent_revision: origin.map_or(0, |origin| origin.revision),
+    }
+}
+
+/// Name of the last object of the page before; a page of another revision is refused.
+pub(super) fn page_token(token: &str, scene: &Scene) -> Result<Option<String>, Status> {
+    if token.is_empty() {
+        return Ok(None);
+    }
+    let malformed = || Invalid::new("page_token", "is no token of GetScene; begin with an empty one");
+    let (revision, name) = token.split_once(' ').ok_or_else(malformed)?;
+    let revision: u64 = revision.parse().map_err(|_| malformed())?;
+    if revision != scene.structure_revision() {
+        let why = "objects came or went since the page before; begin again with an empty page_token";
+        return Err(error::aborted("SCENE_CHANGED", "page_token", why, scene.revision()));
+    }
+    Ok(Some(name.to_owned()))
+}
+
+/// A page of a scene: as many objects as were asked for and fit in a message.
+pub(super) fn page(
+    scene: &Scene,
+    origin: Option<&Origin>,
+    after: Option<&str>,
+    size: usize,
+) -> proto::GetSceneResponse {
+    let mut response = proto::GetSceneResponse { scene: Some(summary(scene, origin)), ..Default::default() };
+    if after.is_none() {
+        let rules = scene.rules();
+        response.allowed_pairs = rules.allowed().map(pair_message).collect();
+        let groups = rules.group_paddings();
+        let group = |(group, padding): (&Arc<str>, f64)| proto::GroupPadding {
+            group: group.to_string(),
+            padding_m: Some(padding),
+        };
+        response.group_paddings = groups.map(group).collect();
+        let pair = |(pair, padding): (&SubjectPair, f64)| proto::PairPadding {
+            pair: Some(pair_message(pair)),
+            padding_m: Some(padding),
+        };
+        response.pair_paddings = rules.pair_paddings().map(pair).collect();
+    }
+    let mut bytes = prost::Message::encoded_len(&response);
+    let rest: Box<dyn Iterator<Item = _>> = match after {
+        None => Box::new(scene.objects()),
+        Some(name) => Box::new(scene.objects_after(name)),
+    };
+    for (_, object, pose) in rest {
+        let message = object_message(object, pose);
+        bytes += prost::Message::encoded_len(&message) + 16;
+        let full = bytes > MAX_MESSAGE_BYTES - 1024 && !response.objects.is_empty();
+        if response.objects.len() == size || full {
+            let last = response.objects.last().map(|last| last.name.as_str()).unwrap_or_default();
+            response.next_page_token = format!("{} {last}", scene.structure_revision());
+            break;
+        }
+        response.objects.push(message);
+    }
+    response
+}
+
+pub(super) fn object_message(object: &Object, pose: &Pose) -> proto::Object {
+    let attachment = object.attachment.as_ref().map(|attachment| proto::Attachment {
+        to: attachment.to.to_string(),
+        pose: Some(wire::pose_message(&attachment.pose)),
+        touch: attachment.touch.iter().map(subject_message).collect(),
+    });
+    proto::Object {
+        name: object.name.to_string(),
+        body_id: object.geometry.id().to_string(),
+        pose: Some(wire::pose_message(pose)),
+        group: object.group.to_string(),
+        padding_m: object.padding_m,
+        attachment,
+    }
+}
+
+fn subject_message(subject: &Subject) -> proto::Subject {
+    let subject = match subject {
+        Subject::Object(name) => subject::Subject::Object(name.to_string()),
+        Subject::Group(name) => subject::Subject::Group(name.to_string()),
+    };
+    proto::Subject { subject: Some(subject) }
+}
+
+fn pair_message((a, b): &SubjectPair) -> proto::SubjectPair {
+    proto::SubjectPair { a: Some(subject_message(a)), b: Some(subject_message(b)) }
+}

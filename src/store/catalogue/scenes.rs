@@ -1,0 +1,393 @@
+//! The scenes of the catalogue. What is created, updated, committed or deleted is on disk before it
+//! is seen; streamed poses are seen at once and written by [`Catalogue::write_poses`]; forks are in
+//! memory only.
+//!
+//! Streamed poses give out revisions that are not on disk. So before a scene takes the first of
+//! them a reserve of revisions is written, and a scene that was cut off starts above its reserve:
+//! no revision is given out twice.
+
+use std::collections::HashMap;
+use std::ops::Bound;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use redb::WriteTransaction;
+
+use crate::body::BodyId;
+use crate::measure::Pose;
+use crate::scene::{Geometry, Placement, Scene, SceneError, Slot, Update, check_name};
+use crate::store::rows::{META, OBJECTS, ObjectRow, RESERVES, REVISIONS, SCENES, SceneRow};
+use crate::store::{Store, StoreError};
+
+use super::live_scene::{LiveScene, MAX_FORKS, Origin, RESERVE, Scenes};
+use super::{Catalogue, CatalogueError, State, json};
+
+impl Catalogue {
+    /// A scene or fork by name. Forks that are asked for stay.
+    pub fn live_scene(&self, name: &str) -> Option<Arc<LiveScene>> {
+        let live = self.read(|state| state.scenes.get(name).cloned())?;
+        if live.origin.is_some() {
+            live.touch();
+        }
+        Some(live)
+    }
+
+    /// The latest snapshot of one scene.
+    pub fn scene(&self, name: &str) -> Option<Scene> {
+        self.live_scene(name).map(|live| live.snapshot())
+    }
+
+    /// Up to `count` scenes and forks in the order of their names, from the first one after
+    /// `after`; and whether more follow.
+    pub fn scenes(&self, after: Option<&str>, count: usize) -> (Vec<Arc<LiveScene>>, bool) {
+        self.read(|state| {
+            let from = after.map_or(Bound::Unbounded, Bound::Excluded);
+            let mut rest = state.scenes.range::<str, _>((from, Bound::Unbounded)).map(|(_, live)| live.clone());
+            let page = rest.by_ref().take(count).collect();
+            (page, rest.next().is_some())
+        })
+    }
+
+    fn find(&self, name: &str) -> Result<Arc<LiveScene>, CatalogueError> {
+        self.live_scene(name).ok_or_else(|| CatalogueError::NoScene(name.to_owned()))
+    }
+
+    /// Creates an empty scene, one revision above every scene that was deleted.
+    ///
+    /// # Errors
+    /// When the name is taken or not usable, or when the disk fails.
+    pub fn create_scene(&self, name: &str) -> Result<Scene, CatalogueError> {
+        check_name(name)?;
+        let mut store = self.writer()?;
+        let (taken, floor) = self.read(|state| (state.scenes.contains_key(name), state.revision_floor));
+        if taken {
+            return Err(CatalogueError::SceneExists(name.to_owned()));
+        }
+        let scene = Scene::new(name, floor + 1)?;
+        self.commit(&mut store, |transaction| put_scene(transaction, &scene))?;
+        let live = Arc::new(LiveScene::new(scene.clone(), None));
+        self.write(|state| state.scenes.insert(scene.name().clone(), live));
+        tracing::debug!(scene = name, revision = scene.revision(), "scene created");
+        Ok(scene)
+    }
+
+    /// Applies an update whole and returns the snapshot it is part of.
+    ///
+    /// # Errors
+    /// When there is no such scene, when the update cannot be applied, or when the disk fails.
+    pub fn update_scene(&self, name: &str, update: &Update) -> Result<Scene, CatalogueError> {
+        let bodies = |id: &BodyId| self.geometry(id);
+        let live = self.find(name)?;
+        if live.origin.is_some() {
+            // Deleting a body looks at forks, too, under the same lock.
+            let _store = self.writer()?;
+            let _changing = live.change();
+            let next = live.snapshot().updated(update, bodies)?;
+            live.publish(next.clone());
+            return Ok(next);
+        }
+        let mut store = self.writer()?;
+        let live = self.find(name)?;
+        let _changing = live.change();
+        let scene = live.snapshot();
+        let next = scene.updated(update, bodies)?;
+        if !update.is_empty() {
+            self.commit_scene(&mut store, &live, (&scene, &next))?;
+            tracing::debug!(scene = name, revision = next.revision(), "scene updated");
+        }
+        Ok(next)
+    }
+
+    /// Writes what differs between two snapshots of a scene, then makes the later one current.
+    fn commit_scene(
+        &self,
+        store: &mut Store,
+        live: &LiveScene,
+        (scene, next): (&Scene, &Scene),
+    ) -> Result<(), StoreError> {
+        let written = live.written.load(Ordering::Relaxed);
+        self.commit(store, |transaction| {
+            if next.same_structure(scene) {
+                put_revision(transaction, next)?;
+            } else {
+                put_scene(transaction, next)?;
+            }
+            put_objects(transaction, scene, next, written)?;
+            transaction.open_table(RESERVES)?.remove(&**next.name())?;
+            Ok(())
+        })?;
+        live.written.store(next.revision(), Ordering::Relaxed);
+        live.reserved.store(next.revision(), Ordering::Relaxed);
+        live.publish(next.clone());
+        Ok(())
+    }
+
+    /// Removes a scene with its objects, or a fork; the bodies stay.
+    ///
+    /// # Errors
+    /// When there is no such scene, or when the disk fails.
+    pub fn delete_scene(&self, name: &str) -> Result<(), CatalogueError> {
+        let mut store = self.writer()?;
+        let live = self.find(name)?;
+        let _changing = live.change();
+        let scene = live.snapshot();
+        if live.origin.is_some() {
+            self.write(|state| state.scenes.remove(name));
+            return Ok(());
+        }
+        let floor = self.read(|state| state.revision_floor).max(scene.revision());
+        self.commit(&mut store, |transaction| {
+            transaction.open_table(META)?.insert("revision_floor", floor)?;
+            transaction.open_table(SCENES)?.remove(name)?;
+            transaction.open_table(REVISIONS)?.remove(name)?;
+            transaction.open_table(RESERVES)?.remove(name)?;
+            let mut objects = transaction.open_table(OBJECTS)?;
+            for (_, object, _) in scene.objects() {
+                objects.remove((name, &*object.name))?;
+            }
+            Ok(())
+        })?;
+        self.write(|state| {
+            state.revision_floor = floor;
+            state.scenes.remove(name)
+        });
+        tracing::debug!(scene = name, revision = scene.revision(), "scene deleted");
+        Ok(())
+    }
+
+    /// Makes a fork, in constant time and in memory only.
+    ///
+    /// # Errors
+    /// When there is no such scene, when it is not at the expected revision, when the name is taken
+    /// or not usable, or when there are too many forks.
+    pub fn fork_scene(
+        &self,
+        name: &str,
+        fork: &str,
+        expected_revision: Option<u64>,
+    ) -> Result<Arc<LiveScene>, CatalogueError> {
+        let parent = self.find(name)?;
+        let scene = parent.snapshot();
+        if let Some(expected) = expected_revision.filter(|expected| *expected != scene.revision()) {
+            return Err(SceneError::Revision { expected, current: scene.revision() }.into());
+        }
+        let forked = scene.fork(fork)?;
+        let origin = Origin { parent: scene.name().clone(), revision: scene.revision() };
+        let live = Arc::new(LiveScene::new(forked, Some(origin)));
+        self.write(|state| {
+            if state.scenes.contains_key(fork) {
+                return Err(CatalogueError::SceneExists(fork.to_owned()));
+            }
+            if state.scenes.values().filter(|live| live.origin.is_some()).count() >= MAX_FORKS {
+                return Err(CatalogueError::TooManyForks);
+            }
+            state.scenes.insert(fork.into(), live.clone());
+            Ok(())
+        })?;
+        Ok(live)
+    }
+
+    /// Makes what a fork holds the next revision of its parent, and removes the fork.
+    ///
+    /// # Errors
+    /// When it is no fork, when the parent is gone or has changed since, or when the disk fails.
+    pub fn commit_fork(&self, name: &str) -> Result<Scene, CatalogueError> {
+        let mut store = self.writer()?;
+        let fork = self.find(name)?;
+        let Some(origin) = fork.origin.clone() else { return Err(CatalogueError::NoFork(name.to_owned())) };
+        let gone = || CatalogueError::NoParent { fork: name.to_owned(), parent: origin.parent.clone() };
+        let parent = self.live_scene(&origin.parent).ok_or_else(gone)?;
+        let _changing_fork = fork.change();
+        let _changing_parent = parent.change();
+        let scene = parent.snapshot();
+        if scene.revision() != origin.revision {
+            let (expected, current) = (origin.revision, scene.revision());
+            return Err(CatalogueError::ParentChanged { fork: name.to_owned(), expected, current });
+        }
+        let next = fork.snapshot().committed_to(&scene);
+        if parent.origin.is_some() {
+            parent.publish(next.clone());
+        } else {
+            self.commit_scene(&mut store, &parent, (&scene, &next))?;
+        }
+        self.write(|state| state.scenes.remove(name));
+        tracing::debug!(scene = &*origin.parent, revision = next.revision(), "fork committed");
+        Ok(next)
+    }
+
+    /// Removes forks that nobody has used for a while.
+    pub fn expire_forks(&self, idle: Duration) {
+        let is_idle =
+            |live: &LiveScene| live.origin.is_some() && live.current.receiver_count() == 0 && live.idle_for() >= idle;
+        self.write(|state| {
+            state.scenes.retain(|name, live| {
+                let expired = is_idle(live);
+                if expired {
+                    tracing::debug!(scene = &**name, "fork expired");
+                }
+                !expired
+            });
+        });
+    }
+
+    /// Sets poses without writing them; [`Catalogue::write_poses`] does that. `place` turns the
+    /// current snapshot into slots and poses.
+    ///
+    /// # Errors
+    /// When a pose cannot be set, or when the first reserve of revisions cannot be written.
+    pub fn stream_poses<E: From<CatalogueError>>(
+        &self,
+        live: &LiveScene,
+        place: impl FnOnce(&Scene) -> Result<Vec<(Slot, Pose)>, E>,
+    ) -> Result<Scene, E> {
+        if live.origin.is_some() {
+            live.touch();
+        } else if live.current.borrow().revision() + RESERVE / 2 > live.reserved.load(Ordering::Relaxed) {
+            self.reserve(live).map_err(CatalogueError::from)?;
+        }
+        let _changing = live.change();
+        let scene = live.snapshot();
+        let next = scene.with_poses(&place(&scene)?).map_err(CatalogueError::from)?;
+        live.publish(next.clone());
+        Ok(next)
+    }
+
+    fn reserve(&self, live: &LiveScene) -> Result<(), StoreError> {
+        let mut store = self.writer()?;
+        let scene = live.snapshot();
+        let reserved = scene.revision() + RESERVE;
+        self.commit(&mut store, |transaction| {
+            transaction.open_table(RESERVES)?.insert(&**scene.name(), reserved)?;
+            Ok(())
+        })?;
+        live.reserved.store(reserved, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// Writes poses that were streamed since the last time; with `last`, revisions that are
+    /// reserved are given up, too. Returns how many scenes were written.
+    ///
+    /// # Errors
+    /// When the disk fails; poses stay to be written.
+    pub fn write_poses(&self, last: bool) -> Result<usize, StoreError> {
+        let is_open = |live: &LiveScene| {
+            let revision = live.current.borrow().revision();
+            live.origin.is_none()
+                && (revision > live.written.load(Ordering::Relaxed)
+                    || last && live.reserved.load(Ordering::Relaxed) > revision)
+        };
+        let open: Vec<_> = self.read(|state| state.scenes.values().filter(|live| is_open(live)).cloned().collect());
+        for live in &open {
+            let mut store = self.writer()?;
+            // Deleted meanwhile, or written by an update.
+            let name = live.snapshot().name().clone();
+            let is_there = self.read(|state| state.scenes.get(&name).is_some_and(|now| Arc::ptr_eq(now, live)));
+            if !is_there {
+                continue;
+            }
+            let (scene, written) = (live.snapshot(), live.written.load(Ordering::Relaxed));
+            self.commit(&mut store, |transaction| {
+                put_revision(transaction, &scene)?;
+                put_objects(transaction, &scene, &scene, written)?;
+                if last {
+                    transaction.open_table(RESERVES)?.remove(&**scene.name())?;
+                }
+                Ok(())
+            })?;
+            live.written.store(scene.revision(), Ordering::Relaxed);
+        }
+        Ok(open.len())
+    }
+}
+
+impl State {
+    /// Forks stay, and scenes that were read again go on where they are, if that is not behind the
+    /// disk.
+    pub(super) fn keep_live(&mut self, before: &Scenes) {
+        for (name, live) in before {
+            if live.origin.is_some() {
+                self.scenes.insert(name.clone(), live.clone());
+            } else if let Some(stored) = self.scenes.get_mut(name) {
+                let (here, stored_there) = (live.snapshot(), stored.snapshot());
+                if stored_there.revision() > here.revision() {
+                    // The change that seemed to fail is on disk.
+                    live.written.store(stored_there.revision(), Ordering::Relaxed);
+                    live.publish(stored_there);
+                }
+                *stored = live.clone();
+            }
+        }
+    }
+
+    /// The scenes as they were stored.
+    pub(super) fn restore_scenes(
+        &mut self,
+        scenes: Vec<(String, u64, SceneRow)>,
+        objects: Vec<(String, String, ObjectRow)>,
+        store: &Store,
+    ) -> Result<(), StoreError> {
+        let damaged = |what: String| StoreError::damaged(store.dir(), what);
+        let mut placed: HashMap<String, Vec<Placement>> = HashMap::new();
+        for (scene, name, row) in objects {
+            let fault = |what: String| damaged(format!("object \"{name}\" of scene \"{scene}\" {what}"));
+            let placement = row.placement(&name).map_err(fault)?;
+            placed.entry(scene).or_default().push(placement);
+        }
+        for (name, revision, row) in scenes {
+            let fault = |what: String| damaged(format!("scene \"{name}\" {what}"));
+            let mut update = row.update();
+            update.upserts = placed.remove(&name).unwrap_or_default();
+            let bodies = |id: &BodyId| -> Option<Geometry> { self.bodies.get(id).cloned() };
+            let scene = Scene::new(&name, 0).map_err(|error| fault(format!("has a name that {error}")))?;
+            let scene = scene.updated(&update, bodies).map_err(|error| fault(format!("does not hold up: {error}")))?;
+            let live = LiveScene::new(scene.at_revision(revision), None);
+            self.scenes.insert(name.as_str().into(), Arc::new(live));
+        }
+        match placed.keys().next() {
+            Some(scene) => Err(damaged(format!("objects of scene \"{scene}\", which is not stored"))),
+            None => Ok(()),
+        }
+    }
+}
+
+fn put_scene(transaction: &WriteTransaction, scene: &Scene) -> Result<(), redb::Error> {
+    transaction.open_table(SCENES)?.insert(&**scene.name(), json(&SceneRow::of(scene))?.as_slice())?;
+    put_revision(transaction, scene)
+}
+
+fn put_revision(transaction: &WriteTransaction, scene: &Scene) -> Result<(), redb::Error> {
+    transaction.open_table(REVISIONS)?.insert(&**scene.name(), scene.revision())?;
+    Ok(())
+}
+
+/// Rows of objects that are new, changed or moved since a revision, and those of objects that are
+/// gone.
+fn put_objects(transaction: &WriteTransaction, before: &Scene, scene: &Scene, written: u64) -> Result<(), redb::Error> {
+    let mut rows = transaction.open_table(OBJECTS)?;
+    let name = &**scene.name();
+    let mut put = |slot: Slot| -> Result<(), redb::Error> {
+        if let (Some(object), Some(pose)) = (scene.object(slot), scene.pose(slot)) {
+            rows.insert((name, &*object.name), json(&ObjectRow::of(object, pose))?.as_slice())?;
+        }
+        Ok(())
+    };
+    let mut moved: Vec<Slot> = scene.moved_since(written).collect();
+    if !scene.same_structure(before) {
+        for (slot, object, _) in scene.objects() {
+            let same = before.object(slot).is_some_and(|earlier| Arc::ptr_eq(earlier, object));
+            if !same {
+                moved.push(slot);
+            }
+        }
+    }
+    moved.into_iter().try_for_each(&mut put)?;
+    if !scene.same_structure(before) {
+        for (_, object, _) in before.objects() {
+            if scene.slot(&object.name).is_none() {
+                rows.remove((name, &*object.name))?;
+            }
+        }
+    }
+    Ok(())
+}
