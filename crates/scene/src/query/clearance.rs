@@ -139,6 +139,9 @@ impl Clearance {
             && let ([a], [b]) = (rungs_a, rungs_b)
             && threshold >= 0.0
         {
+            if pair.a.box_gap_m(&pair.b) > threshold {
+                return None;
+            }
             let found = solver.warm(pair.slots, [0; 2], Measure::Distance, |warm| {
                 within_margin(&**a, pose_a, &**b, pose_b, threshold, &options, warm)
             });

@@ -41,7 +41,10 @@ impl Bracket {
 
 /// Compares the signed distance of a pair with a threshold in metres, which may be negative.
 pub(crate) fn decide(solver: &Solver<'_>, pair: &Pair<'_>, threshold: f64, options: Options<'_>) -> Bracket {
-    let gap = pair.a.ball_gap_m(&pair.b);
+    let mut gap = pair.a.ball_gap_m(&pair.b);
+    if gap <= threshold && threshold >= 0.0 {
+        gap = gap.max(pair.a.box_gap_m(&pair.b));
+    }
     if gap > threshold {
         return Bracket { solved: false, ..Bracket::of(Verdict::No, gap, f64::INFINITY) };
     }

@@ -9,7 +9,8 @@ use crate::scene::Scene;
 /// Objects that are selected; none means all.
 #[derive(Clone, Debug, Default)]
 pub struct Selection {
-    slots: Option<HashSet<Slot>>,
+    /// By slot; none: all.
+    slots: Option<Vec<bool>>,
 }
 
 impl Selection {
@@ -20,16 +21,18 @@ impl Selection {
 
     /// These objects and the members of these groups.
     pub fn of(scene: &Scene, slots: impl IntoIterator<Item = Slot>, groups: &HashSet<Arc<str>>) -> Self {
-        let mut selected: HashSet<Slot> = slots.into_iter().collect();
-        if !groups.is_empty() {
-            let members = scene.objects().filter(|(_, object, _)| groups.contains(&object.group));
-            selected.extend(members.map(|(slot, _, _)| slot));
+        let mut selected = vec![false; scene.structure.slots.len()];
+        let members = scene.structure.objects().filter(|(_, object)| groups.contains(&object.group));
+        for slot in slots.into_iter().chain(members.map(|(slot, _)| slot)) {
+            if let Some(selected) = selected.get_mut(slot as usize) {
+                *selected = true;
+            }
         }
         Self { slots: Some(selected) }
     }
 
     /// Whether an object is selected.
     pub fn contains(&self, slot: Slot) -> bool {
-        self.slots.as_ref().is_none_or(|slots| slots.contains(&slot))
+        self.slots.as_ref().is_none_or(|slots| slots.get(slot as usize).is_some_and(|selected| *selected))
     }
 }

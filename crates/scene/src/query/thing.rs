@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use sublevel_core::body::{Shape, Solid};
 use sublevel_core::measure::{HalfSpace, Pose};
 
@@ -98,6 +98,36 @@ impl<'a> Thing<'a> {
             },
         }
     }
+
+    /// Lower bound of the distance from the boxes around two solids in their own frames, metres: the
+    /// largest gap along an edge of either (six of the fifteen directions of the separating axis
+    /// theorem; any of them bounds from below). −∞ where a side has no box.
+    pub(crate) fn box_gap_m(&self, other: &Self) -> f64 {
+        let (Some(a), Some(b)) = (self.oriented_box(), other.oriented_box()) else { return f64::NEG_INFINITY };
+        let between = b.center - a.center;
+        let rotation = a.axes.tr_mul(&b.axes);
+        let (in_a, in_b) = (a.axes.tr_mul(&between), b.axes.tr_mul(&between));
+        let turned = rotation.abs();
+        let (reach_a, reach_b) = (a.half + turned * b.half, b.half + turned.tr_mul(&a.half));
+        let gap = (in_a.abs() - reach_a).max().max((in_b.abs() - reach_b).max());
+        // Some twenty roundings, each relative to the largest length that occurs.
+        gap - 64.0 * f64::EPSILON * (a.center.amax() + b.center.amax() + a.half.amax() + b.half.amax())
+    }
+
+    fn oriented_box(&self) -> Option<OrientedBox> {
+        let Self::Solid { rungs, pose, .. } = self else { return None };
+        let bounds = rungs.last()?.bounding_box();
+        let (middle, half) = ((bounds.max + bounds.min) * 0.5, (bounds.max - bounds.min) * 0.5);
+        let axes = pose.rotation().to_rotation_matrix().into_inner();
+        Some(OrientedBox { center: axes * middle + pose.translation(), axes, half })
+    }
+}
+
+/// A box with its edges along the columns of a rotation, metres, world frame.
+struct OrientedBox {
+    center: Vector3<f64>,
+    axes: Matrix3<f64>,
+    half: Vector3<f64>,
 }
 
 /// Lower bound of the distance of two balls, rounding included, metres.

@@ -64,7 +64,7 @@ impl Within {
             ) = (&pair.a, &pair.b)
             && let ([a], [b]) = (rungs_a, rungs_b)
         {
-            if pair.a.ball_gap_m(&pair.b) > threshold {
+            if pair.a.ball_gap_m(&pair.b) > threshold || pair.a.box_gap_m(&pair.b) > threshold {
                 return None;
             }
             let options = self.ask.options(index, solver.stop);
