@@ -183,6 +183,7 @@ pub(super) fn catalogue(error: &CatalogueError, field: &str) -> Status {
         CatalogueError::QueueFull => {
             Status::with_error_details(Code::ResourceExhausted, message, details("QUEUE_FULL"))
         }
+        CatalogueError::Ladder(_) => failed_precondition("RUNG_WITHOUT_POINTS", field, message),
         CatalogueError::NoFork(_) => failed_precondition("NOT_A_FORK", "fork", message),
         CatalogueError::NoParent { .. } => failed_precondition("PARENT_GONE", "fork", message),
         CatalogueError::ParentChanged { current, .. } => aborted("PARENT_CHANGED", field, message, *current),

@@ -13,8 +13,8 @@ use std::thread;
 
 use redb::WriteTransaction;
 
-use crate::body::BodyId;
-use crate::scene::{Geometry, GeometryFileError, NameError, SceneError};
+use crate::body::{BodyId, Shape};
+use crate::scene::{Geometry, GeometryFileError, Ladder, LadderError, NameError, SceneError};
 
 use super::disk::Contents;
 use super::job::{Job, MAX_QUEUED_JOBS};
@@ -66,6 +66,9 @@ pub enum CatalogueError {
         /// The ladder.
         ladder: BodyId,
     },
+    /// A rung was stored before, without what a ladder needs of it.
+    #[error("a rung of the ladder is stored already, and {0}; delete that body, and store the ladder again")]
+    Ladder(#[from] LadderError),
     /// No scene has this name.
     #[error("no scene \"{0}\"; list the scenes, or create it first")]
     NoScene(String),
@@ -170,7 +173,7 @@ impl Catalogue {
         if let Some(known) = self.geometry(body.id()) {
             return Ok((known, false));
         }
-        let fresh = self.read(|state| state.fresh(vec![body.clone()]));
+        let fresh = self.read(|state| state.fresh(vec![body.clone()]))?;
         self.commit(&mut store, |transaction| put_bodies(transaction, &fresh))?;
         self.write(|state| state.bodies.extend(fresh.into_iter().map(|body| (*body.id(), body))));
         tracing::debug!(id = %body.id(), "body created");
@@ -292,22 +295,34 @@ impl State {
     }
 
     /// Of these bodies and the rungs of their ladders, those that are not there, each once; rungs
-    /// come before their ladder.
-    fn fresh(&self, bodies: Vec<Geometry>) -> Vec<Geometry> {
+    /// come before their ladder, which is made of those that are there already where they are.
+    ///
+    /// # Errors
+    /// A ladder with a rung that is there already, without the points that it has to contain.
+    fn fresh(&self, bodies: Vec<Geometry>) -> Result<Vec<Geometry>, LadderError> {
         let mut fresh: Vec<Geometry> = Vec::new();
         for body in bodies {
-            let rungs = match &body {
-                Geometry::Ladder(ladder) => ladder.rungs().iter().cloned().map(Geometry::Solid).collect(),
-                Geometry::Solid(_) | Geometry::SosBody(_) | Geometry::HalfSpace(_) => Vec::new(),
+            let mut all = Vec::new();
+            let body = match body {
+                Geometry::Ladder(ladder) => {
+                    let stored = |rung: &Arc<Shape>| match self.bodies.get(rung.id()) {
+                        Some(Geometry::Solid(stored)) => stored.clone(),
+                        _ => rung.clone(),
+                    };
+                    let rungs: Vec<_> = ladder.rungs().iter().map(stored).collect();
+                    all.extend(rungs.iter().cloned().map(Geometry::Solid));
+                    Geometry::Ladder(Arc::new(Ladder::new(ladder.name(), rungs)?))
+                }
+                body @ (Geometry::Solid(_) | Geometry::SosBody(_) | Geometry::HalfSpace(_)) => body,
             };
-            for body in rungs.into_iter().chain([body]) {
+            for body in all.into_iter().chain([body]) {
                 let known = self.bodies.contains_key(body.id()) || fresh.iter().any(|other| other.id() == body.id());
                 if !known {
                     fresh.push(body);
                 }
             }
         }
-        fresh
+        Ok(fresh)
     }
 }
 

@@ -99,7 +99,12 @@ impl Catalogue {
         let job = self.job(id).ok_or_else(|| CatalogueError::NoJob(id.to_string()))?;
         let Some((state, attempts)) = change(&job) else { return Ok(job) };
         let next = Arc::new(Job { state, attempts, ..(*job).clone() });
-        let fresh = self.read(|state| state.fresh(bodies));
+        let fresh = self.read(|state| state.fresh(bodies.clone())).or_else(|error| {
+            // The bodies are worth keeping without their ladder.
+            tracing::warn!(id, %error, "a ladder cannot be stored");
+            let bodies = bodies.into_iter().filter(|body| !matches!(body, Geometry::Ladder(_)));
+            self.read(|state| state.fresh(bodies.collect()))
+        })?;
         self.commit(&mut store, |transaction| {
             put_bodies(transaction, &fresh)?;
             if next.state.is_final() {

@@ -147,6 +147,29 @@ fn a_ladder_is_stored_with_its_rungs_and_keeps_them() {
     assert_eq!(disk.load().expect("loads").counts(), (1, 0));
 }
 
+/// The body that came first stays, and a ladder is made of what is stored: it has to hold up when it
+/// is loaded.
+#[test]
+fn a_ladder_of_rungs_that_are_stored_without_their_points_is_refused() {
+    let points = [Vector3::new(0.1, 0.0, 0.0)];
+    let rung = |radius| {
+        let body = ball(radius).with_points(&points).expect("contained");
+        std::sync::Arc::new(crate::body::Shape::Body(Box::new(body)))
+    };
+    let ladder = crate::scene::Ladder::new("steps", vec![rung(2.0), rung(1.0)]).expect("a ladder");
+    let disk = Disk::default();
+    let catalogue = disk.load().expect("a new catalogue");
+    catalogue.create_body(ball(1.0).into()).expect("stored");
+    let ladder = crate::scene::Geometry::Ladder(std::sync::Arc::new(ladder));
+    let refused = catalogue.create_body(ladder.clone()).expect_err("a rung without points");
+    assert!(matches!(refused, CatalogueError::Ladder(_)), "{refused}");
+    assert_eq!(disk.load().expect("loads").counts(), (1, 0));
+    // A job keeps what it has made besides.
+    let id = catalogue.create_job(job("")).expect("queued").0.id;
+    catalogue.change_job(id, vec![ball(3.0).into(), ladder], |_| Some((done(), 1))).expect("ended");
+    assert_eq!(disk.load().expect("loads").counts(), (2, 0));
+}
+
 #[test]
 fn a_group_is_of_bodies_that_are_stored() {
     let catalogue = Disk::default().load().expect("a new catalogue");

@@ -37,3 +37,20 @@ impl NamedHalfSpace {
         &self.half_space
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sublevel_testkit::Seeded;
+
+    #[test]
+    fn normals_settle() {
+        let mut random = Seeded(11);
+        for index in 0..200_000 {
+            let length = 1.0 + 1e-7 * random.signed();
+            let half_space = HalfSpace::new(random.unit() * length, random.signed()).expect("a half-space");
+            let again = HalfSpace::new(*half_space.normal(), half_space.offset()).expect("a half-space");
+            assert!(again == half_space, "seed 11, {index}: {half_space:?} {again:?}");
+        }
+    }
+}
