@@ -481,7 +481,7 @@ fn bad_input_is_refused_in_one_line() {
 
     let pose = |text_: &str| refusal(&["measure", text(&body), text(&body), "--pose", text_]);
     assert!(pose("0,0,0,0,0,0,1.1").contains("deviates by 1.000e-1"));
-    assert!(pose("0,0,0,0,0,1").contains("6 numbers where 7"));
+    assert!(pose("0,0,0,0,0,1").contains("6 numbers; give"));
     assert!(pose("inf,0,0,0,0,0,1").contains("not finite"));
     let accuracy = refusal(&["measure", text(&body), text(&body), "--accuracy", "0"]);
     assert!(accuracy.contains("--accuracy"), "{accuracy}");

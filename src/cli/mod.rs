@@ -14,6 +14,7 @@ mod group;
 mod measure;
 #[cfg(feature = "fit")]
 mod mesh;
+mod numbers;
 mod outcome;
 mod primitive;
 #[cfg(feature = "fit")]

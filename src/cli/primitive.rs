@@ -2,11 +2,11 @@
 
 use std::error::Error;
 use std::path::PathBuf;
-use std::str::FromStr;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::numbers::Triple;
 use super::write_atomically;
 use crate::body::Body;
 use crate::measure::HalfSpace;
@@ -98,28 +98,6 @@ struct FileArgs {
     /// Name of the body; the kind of shape if not given
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
-}
-
-/// Three numbers with commas between them.
-#[derive(Clone, Copy, Debug)]
-struct Triple(Vector3<f64>);
-
-impl FromStr for Triple {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let numbers: Vec<f64> = text
-            .split(',')
-            .map(|number| number.trim().parse().map_err(|_| format!("\"{number}\" is no number")))
-            .collect::<Result<_, _>>()?;
-        let [x, y, z] = numbers[..] else {
-            return Err(format!(
-                "{} numbers; give three with commas between them, such as 0.5,0.3,0.02",
-                numbers.len()
-            ));
-        };
-        Ok(Self(Vector3::new(x, y, z)))
-    }
 }
 
 /// Writes the file.

@@ -72,8 +72,8 @@ pub(super) fn run(args: &PushArgs) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Stores files in a running server, for `sublevel fit --group`. All are checked before the first is
-/// sent.
+/// Stores files in a running server, for `sublevel fit --group`. All are checked before the first
+/// is sent.
 ///
 /// # Errors
 /// The first file that could not be stored; those before it are.

@@ -2,14 +2,12 @@
 
 use std::error::Error;
 use std::io::{self, Write};
-use std::str::FromStr;
 
-use nalgebra::{Vector3, Vector4};
-
+use super::numbers::PoseNumbers;
 use crate::body::BodyId;
-use crate::client::{Client, ClientError, SceneState};
+use crate::client::{Client, SceneState, SceneSummary};
 use crate::measure::Pose;
-use crate::service::proto::{self, SceneSummary, UpdateSceneRequest, subject};
+use crate::scene::{Placement, Subject, Update};
 
 /// Make, show and edit the scenes of a running server
 ///
@@ -51,7 +49,7 @@ enum SceneCommand {
         body: BodyId,
         /// Where it stands
         #[arg(long, value_name = "POSE", allow_hyphen_values = true, default_value = "0,0,0")]
-        pose: PoseArg,
+        pose: PoseNumbers,
         /// Label that puts objects together
         #[arg(long, value_name = "NAME", default_value = "")]
         group: String,
@@ -65,7 +63,7 @@ enum SceneCommand {
         object: String,
         /// Where it stands now
         #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
-        pose: PoseArg,
+        pose: PoseNumbers,
     },
     /// Remove an object
     Remove { scene: String, object: String },
@@ -83,27 +81,6 @@ enum SceneCommand {
     Commit { fork: String },
     /// Delete a scene or fork
     Delete { scene: String },
-}
-
-/// A pose of the command line.
-#[derive(Clone, Copy, Debug)]
-struct PoseArg(Pose);
-
-impl FromStr for PoseArg {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let numbers: Vec<f64> = text
-            .split(',')
-            .map(|number| number.trim().parse().map_err(|_| format!("\"{number}\" is no number")))
-            .collect::<Result<_, _>>()?;
-        let (translation, quaternion) = match numbers[..] {
-            [x, y, z] => (Vector3::new(x, y, z), Vector4::new(0.0, 0.0, 0.0, 1.0)),
-            [x, y, z, i, j, k, w] => (Vector3::new(x, y, z), Vector4::new(i, j, k, w)),
-            _ => return Err(format!("{} numbers; give X,Y,Z or X,Y,Z,QX,QY,QZ,QW", numbers.len())),
-        };
-        Pose::from_quaternion(translation, quaternion.into()).map(Self).map_err(|error| error.to_string())
-    }
 }
 
 /// Does what is asked for and prints what is there then.
@@ -131,51 +108,35 @@ async fn execute(args: &SceneArgs) -> Result<String, Box<dyn Error>> {
         }
         SceneCommand::Move { scene, object, pose } => client.set_poses(scene, [(object.as_str(), pose.0)]).await?,
         SceneCommand::Attach { scene, object, to } => client.attach(scene, object, to).await?,
-        SceneCommand::Put { .. }
-        | SceneCommand::Remove { .. }
-        | SceneCommand::Allow { .. }
-        | SceneCommand::Forbid { .. }
-        | SceneCommand::Detach { .. } => edit(&client, &args.command).await?,
+        SceneCommand::Put { scene, object, body, pose, group, padding } => {
+            let placement = Placement {
+                name: object.as_str().into(),
+                body: *body,
+                pose: Some(pose.0),
+                group: group.as_str().into(),
+                padding_m: *padding,
+                attachment: None,
+            };
+            client.update_scene(scene, &Update { upserts: vec![placement], ..Update::default() }).await?
+        }
+        SceneCommand::Remove { scene, object } => {
+            client.update_scene(scene, &Update { removals: vec![object.as_str().into()], ..Update::default() }).await?
+        }
+        SceneCommand::Allow { scene, a, b } => {
+            client.update_scene(scene, &Update { allow: vec![objects(a, b)], ..Update::default() }).await?
+        }
+        SceneCommand::Forbid { scene, a, b } => {
+            client.update_scene(scene, &Update { forbid: vec![objects(a, b)], ..Update::default() }).await?
+        }
+        SceneCommand::Detach { scene, object } => {
+            client.update_scene(scene, &Update { detach: vec![object.as_str().into()], ..Update::default() }).await?
+        }
     };
     Ok(if args.json { format!("{{\"revision\": {revision}}}\n") } else { format!("revision {revision}\n") })
 }
 
-async fn edit(client: &Client, command: &SceneCommand) -> Result<u64, ClientError> {
-    let of = |scene: &String| UpdateSceneRequest { scene: scene.clone(), ..Default::default() };
-    let pair = |a: &String, b: &String| proto::SubjectPair { a: Some(object(a)), b: Some(object(b)) };
-    let update = match command {
-        SceneCommand::Put { scene, object, body, pose, group, padding } => {
-            let object = proto::Object {
-                name: object.clone(),
-                body_id: body.to_string(),
-                pose: Some(pose_message(&pose.0)),
-                group: group.clone(),
-                padding_m: *padding,
-                attachment: None,
-            };
-            UpdateSceneRequest { upsert_objects: vec![object], ..of(scene) }
-        }
-        SceneCommand::Remove { scene, object } => {
-            UpdateSceneRequest { remove_objects: vec![object.clone()], ..of(scene) }
-        }
-        SceneCommand::Allow { scene, a, b } => UpdateSceneRequest { allow_pairs: vec![pair(a, b)], ..of(scene) },
-        SceneCommand::Forbid { scene, a, b } => UpdateSceneRequest { forbid_pairs: vec![pair(a, b)], ..of(scene) },
-        SceneCommand::Detach { scene, object } => UpdateSceneRequest { detach: vec![object.clone()], ..of(scene) },
-        _ => return Err(ClientError::Unexpected("no edit")),
-    };
-    client.update_scene(update).await
-}
-
-fn object(name: &str) -> proto::Subject {
-    proto::Subject { subject: Some(subject::Subject::Object(name.into())) }
-}
-
-fn pose_message(pose: &Pose) -> proto::Pose {
-    let (t, q) = (pose.translation(), pose.rotation().coords);
-    proto::Pose {
-        translation_m: Some(proto::Vector3 { x: t.x, y: t.y, z: t.z }),
-        rotation: Some(proto::Quaternion { x: q.x, y: q.y, z: q.z, w: q.w }),
-    }
+fn objects(a: &str, b: &str) -> (Subject, Subject) {
+    (Subject::Object(a.into()), Subject::Object(b.into()))
 }
 
 fn list(scenes: &[SceneSummary], json: bool) -> Result<String, serde_json::Error> {
@@ -201,10 +162,10 @@ fn list(scenes: &[SceneSummary], json: bool) -> Result<String, serde_json::Error
 }
 
 fn show(scene: &SceneState, json: bool) -> Result<String, serde_json::Error> {
-    let numbers = |object: &proto::Object| -> Vec<f64> {
-        let pose = object.pose.unwrap_or_default();
-        let (t, q) = (pose.translation_m.unwrap_or_default(), pose.rotation.unwrap_or_default());
-        vec![t.x, t.y, t.z, q.x, q.y, q.z, q.w]
+    let numbers = |object: &Placement| -> Vec<f64> {
+        // What is read has its world pose.
+        let pose = object.pose.unwrap_or(Pose::identity());
+        pose.translation().iter().chain(pose.rotation().coords.iter()).copied().collect()
     };
     if json {
         let objects: Vec<_> = scene
@@ -212,8 +173,9 @@ fn show(scene: &SceneState, json: bool) -> Result<String, serde_json::Error> {
             .values()
             .map(|object| {
                 serde_json::json!({
-                    "name": object.name, "body": object.body_id, "pose": numbers(object), "group": object.group,
-                    "padding_m": object.padding_m, "held_by": object.attachment.as_ref().map(|held| &held.to),
+                    "name": &*object.name, "body": object.body.to_string(), "pose": numbers(object),
+                    "group": &*object.group, "padding_m": object.padding_m,
+                    "held_by": object.attachment.as_ref().map(|held| &*held.to),
                 })
             })
             .collect();
@@ -225,7 +187,7 @@ fn show(scene: &SceneState, json: bool) -> Result<String, serde_json::Error> {
         format!("revision {}\n{:width$}  body          pose (m, quaternion x y z w)\n", scene.revision, "object");
     for (name, object) in &scene.objects {
         let pose: Vec<String> = numbers(object).iter().map(|number| format!("{number:.4}")).collect();
-        let short: String = object.body_id.chars().take(12).collect();
+        let short: String = object.body.to_string().chars().take(12).collect();
         text += &format!("{name:width$}  {short}  {}", pose.join(" "));
         if !object.group.is_empty() {
             text += &format!("  group {}", object.group);
@@ -235,12 +197,11 @@ fn show(scene: &SceneState, json: bool) -> Result<String, serde_json::Error> {
         }
         text.push('\n');
     }
-    for proto::SubjectPair { a, b } in &scene.allowed_pairs {
-        let name = |side: &Option<proto::Subject>| match side.as_ref().and_then(|side| side.subject.clone()) {
-            Some(subject::Subject::Object(name)) => name,
-            Some(subject::Subject::Group(name)) => format!("group {name}"),
-            None => String::new(),
-        };
+    let name = |subject: &Subject| match subject {
+        Subject::Object(name) => name.to_string(),
+        Subject::Group(name) => format!("group {name}"),
+    };
+    for (a, b) in &scene.allowed_pairs {
         text += &format!("may touch: {} and {}\n", name(a), name(b));
     }
     Ok(text)

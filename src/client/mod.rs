@@ -27,6 +27,7 @@ mod pose_stream;
 mod queries;
 mod scenes;
 
+pub use crate::service::proto::SceneSummary;
 pub use bodies::{BodySource, StoredBody};
 pub use connection::{Client, ServerInfo};
 pub use error::ClientError;

@@ -6,8 +6,8 @@ use tonic::Streaming;
 
 use super::connection::Client;
 use super::error::ClientError;
-use super::scenes::pack_pose;
 use crate::measure::Pose;
+use crate::service::packed::{POSE_NUMBERS, Packed};
 use crate::service::proto::{StreamPosesRequest, StreamPosesResponse};
 
 /// A stream of poses of some objects of a scene.
@@ -61,11 +61,11 @@ impl PoseStream {
     /// # Errors
     /// When the server has ended the stream.
     pub async fn send(&mut self, poses: &[Pose]) -> Result<u64, ClientError> {
-        let mut packed = Vec::with_capacity(56 * poses.len());
-        poses.iter().for_each(|pose| pack_pose(pose, &mut packed));
+        let mut packed = Packed::with_capacity(8 * POSE_NUMBERS * poses.len());
+        poses.iter().for_each(|pose| packed.pose(pose));
         self.sequence += 1;
         let sequence = self.sequence;
-        let message = StreamPosesRequest { poses: packed.into(), sequence, ..StreamPosesRequest::default() };
+        let message = StreamPosesRequest { poses: packed.into_bytes(), sequence, ..StreamPosesRequest::default() };
         let ended = |_| ClientError::Silent { url: self.url.clone() };
         self.messages.send(message).await.map_err(ended)?;
         Ok(sequence)

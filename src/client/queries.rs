@@ -4,15 +4,16 @@ use tonic::transport::Channel;
 
 use super::connection::Client;
 use super::error::ClientError;
-use super::scenes::{pack_pose, pose_table};
 use crate::measure::Pose;
 use crate::scene::query::Measure;
 use crate::service::limits::MAX_MESSAGE_BYTES;
+use crate::service::packed::{POSE_NUMBERS, Packed};
 use crate::service::proto::evaluate_request;
 use crate::service::proto::query_service_client::QueryServiceClient;
 use crate::service::proto::{
     self, CheckStatesRequest, EvaluateRequest, ObjectPair, Output, PairList, Selection, WithinMargin,
 };
+use crate::service::{query_wire, scene_wire};
 
 /// Which pairs a question is about, and how it is asked.
 #[derive(Clone, Debug, Default)]
@@ -84,7 +85,7 @@ impl Question {
 
     /// Poses that stand in for the scene's own.
     pub fn with_poses<'a>(mut self, poses: impl IntoIterator<Item = (&'a str, Pose)>) -> Self {
-        self.request.pose_overrides = Some(pose_table(poses));
+        self.request.pose_overrides = Some(scene_wire::pose_table_message(poses));
         self
     }
 
@@ -116,27 +117,25 @@ impl Question {
 #[derive(Clone, Debug, Default)]
 pub struct StatesQuestion {
     request: CheckStatesRequest,
+    poses: Packed,
 }
 
 impl StatesQuestion {
     /// States that place these objects.
     pub fn new<'a>(objects: impl IntoIterator<Item = &'a str>) -> Self {
         let objects = objects.into_iter().map(Into::into).collect();
-        Self { request: CheckStatesRequest { objects, ..CheckStatesRequest::default() } }
+        Self { request: CheckStatesRequest { objects, ..CheckStatesRequest::default() }, poses: Packed::default() }
     }
 
     /// Adds a state: one pose per object, in their order.
     pub fn push(&mut self, poses: &[Pose]) {
-        let mut packed = std::mem::take(&mut self.request.poses).to_vec();
-        poses.iter().for_each(|pose| pack_pose(pose, &mut packed));
-        self.request.poses = packed.into();
+        poses.iter().for_each(|pose| self.poses.pose(pose));
     }
 
     /// Sets all states at once: the poses of the first, then of the second, and so on.
     pub fn with_states(mut self, poses: &[Pose]) -> Self {
-        let mut packed = Vec::with_capacity(poses.len() * 56);
-        poses.iter().for_each(|pose| pack_pose(pose, &mut packed));
-        self.request.poses = packed.into();
+        self.poses = Packed::with_capacity(poses.len() * 8 * POSE_NUMBERS);
+        self.push(poses);
         self
     }
 
@@ -146,7 +145,7 @@ impl StatesQuestion {
         self
     }
 
-    /// The request, for what this type does not say.
+    /// The request without its poses, for what this type does not say.
     pub fn request_mut(&mut self) -> &mut CheckStatesRequest {
         &mut self.request
     }
@@ -180,7 +179,7 @@ impl Client {
     ) -> Result<Answers, ClientError> {
         let mut request = question.request;
         request.scene = scene.into();
-        request.measures = measures.iter().map(|&of| measure(of).into()).collect();
+        request.measures = measures.iter().map(|&measure| query_wire::measure_message(measure).into()).collect();
         let named = match &request.question {
             Some(evaluate_request::Question::Pairs(list)) => list.rows.clone(),
             _ => Vec::new(),
@@ -202,7 +201,8 @@ impl Client {
     /// # Errors
     /// When the question cannot be answered.
     pub async fn check_states(&self, scene: &str, question: StatesQuestion) -> Result<CheckedStates, ClientError> {
-        let request = CheckStatesRequest { scene: scene.into(), ..question.request };
+        let poses = question.poses.into_bytes();
+        let request = CheckStatesRequest { scene: scene.into(), poses, ..question.request };
         let response = self.queries().check_states(request).await.map_err(self.refused())?.into_inner();
         let verdict = |&byte: &u8| proto::Verdict::try_from(i32::from(byte)).unwrap_or_default();
         let name = |index: u32| usize::try_from(index).ok().and_then(|index| response.objects.get(index)).cloned();
@@ -225,18 +225,4 @@ fn found(response: &proto::EvaluateResponse) -> Result<Vec<ObjectPair>, ClientEr
     let pair = |[a, b]: [u32; 2]| Some(ObjectPair { a: name(a)?, b: name(b)? });
     let pairs: Option<Vec<_>> = index_pairs(&response.pairs).map(pair).collect();
     pairs.ok_or(ClientError::Unexpected("a pair without names"))
-}
-
-fn measure(measure: Measure) -> proto::Measure {
-    match measure {
-        Measure::Distance => proto::Measure::Distance,
-        Measure::LevelAOnB => proto::Measure::LevelDistanceAOnB,
-        Measure::LevelBOnA => proto::Measure::LevelDistanceBOnA,
-        Measure::Growth => proto::Measure::GrowthDistance,
-        Measure::Signed => proto::Measure::SignedDistance,
-        Measure::Penetration => proto::Measure::PenetrationDepth,
-        Measure::Overlap => proto::Measure::Overlap,
-        Measure::NearerThan => proto::Measure::NearerThan,
-        Measure::TimeOfImpact => proto::Measure::TimeOfImpact,
-    }
 }

@@ -1,6 +1,7 @@
 //! Scenes.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use tonic::transport::Channel;
 
@@ -8,22 +9,24 @@ use super::connection::Client;
 use super::error::ClientError;
 use crate::body::BodyId;
 use crate::measure::Pose;
+use crate::scene::{Attach, Placement, SubjectPair, Update};
 use crate::service::limits::MAX_MESSAGE_BYTES;
 use crate::service::proto::scene_service_client::SceneServiceClient;
 use crate::service::proto::{
-    self, CommitForkRequest, CreateSceneRequest, DeleteSceneRequest, ForkSceneRequest, GetSceneRequest,
-    ListScenesRequest, UpdateSceneRequest,
+    CommitForkRequest, CreateSceneRequest, DeleteSceneRequest, ForkSceneRequest, GetSceneRequest, ListScenesRequest,
+    SceneSummary, UpdateSceneRequest,
 };
+use crate::service::scene_wire;
 
 /// A scene as it was read.
 #[derive(Clone, Debug, Default)]
 pub struct SceneState {
     /// Revision all of this is true of.
     pub revision: u64,
-    /// Objects by name: body id, world pose, and what holds them.
-    pub objects: BTreeMap<String, proto::Object>,
+    /// Objects by name; each has its world pose, held ones, too.
+    pub objects: BTreeMap<Arc<str>, Placement>,
     /// Pairs that may touch.
-    pub allowed_pairs: Vec<proto::SubjectPair>,
+    pub allowed_pairs: Vec<SubjectPair>,
 }
 
 impl Client {
@@ -45,7 +48,7 @@ impl Client {
     ///
     /// # Errors
     /// When the server does not answer.
-    pub async fn list_scenes(&self) -> Result<Vec<proto::SceneSummary>, ClientError> {
+    pub async fn list_scenes(&self) -> Result<Vec<SceneSummary>, ClientError> {
         let (mut client, mut scenes, mut page_token) = (self.scenes(), Vec::new(), String::new());
         loop {
             let request = ListScenesRequest { page_size: 1000, page_token };
@@ -68,8 +71,13 @@ impl Client {
             let request = GetSceneRequest { name: name.into(), page_size: 10_000, page_token };
             let page = client.get_scene(request).await.map_err(self.refused())?.into_inner();
             state.revision = page.scene.map_or(0, |scene| scene.revision);
-            state.objects.extend(page.objects.into_iter().map(|object| (object.name.clone(), object)));
-            state.allowed_pairs.extend(page.allowed_pairs);
+            let unreadable = |_| ClientError::Unexpected("an object or pair of a scene that cannot be read");
+            for object in &page.objects {
+                let placement = scene_wire::placement(object, || "objects".into()).map_err(unreadable)?;
+                state.objects.insert(placement.name.clone(), placement);
+            }
+            let pairs = scene_wire::subject_pairs(&page.allowed_pairs, "allowed_pairs");
+            state.allowed_pairs.extend(pairs.map_err(unreadable)?);
             page_token = page.next_page_token;
             if page_token.is_empty() {
                 return Ok(state);
@@ -86,14 +94,16 @@ impl Client {
         scene: &str,
         objects: impl IntoIterator<Item = (&'a str, &'a BodyId, Pose)>,
     ) -> Result<u64, ClientError> {
-        let object = |(name, body, pose): (&str, &BodyId, Pose)| proto::Object {
+        let placement = |(name, body, pose): (&str, &BodyId, Pose)| Placement {
             name: name.into(),
-            body_id: body.to_string(),
-            pose: Some(pose_message(&pose)),
-            ..Default::default()
+            body: *body,
+            pose: Some(pose),
+            group: "".into(),
+            padding_m: None,
+            attachment: None,
         };
-        let upsert_objects = objects.into_iter().map(object).collect();
-        self.update_scene(UpdateSceneRequest { scene: scene.into(), upsert_objects, ..Default::default() }).await
+        let upserts = objects.into_iter().map(placement).collect();
+        self.update_scene(scene, &Update { upserts, ..Update::default() }).await
     }
 
     /// Sets world poses of objects, on disk before it returns; returns the revision.
@@ -105,9 +115,8 @@ impl Client {
         scene: &str,
         poses: impl IntoIterator<Item = (&'a str, Pose)>,
     ) -> Result<u64, ClientError> {
-        let poses = pose_table(poses);
-        self.update_scene(UpdateSceneRequest { scene: scene.into(), set_poses: Some(poses), ..Default::default() })
-            .await
+        let set_poses = Some(scene_wire::pose_table_message(poses));
+        self.send_update(UpdateSceneRequest { scene: scene.into(), set_poses, ..Default::default() }).await
     }
 
     /// Lets an object be held by another, where it is now; returns the revision.
@@ -115,17 +124,20 @@ impl Client {
     /// # Errors
     /// When an object is not there, or would be held by itself.
     pub async fn attach(&self, scene: &str, object: &str, to: &str) -> Result<u64, ClientError> {
-        let attachment = proto::Attachment { to: to.into(), pose: None, touch: Vec::new() };
-        let attach = vec![proto::Attach { object: object.into(), attachment: Some(attachment) }];
-        self.update_scene(UpdateSceneRequest { scene: scene.into(), attach, ..Default::default() }).await
+        let attach = vec![Attach { name: object.into(), to: to.into(), pose: None, touch: Vec::new() }];
+        self.update_scene(scene, &Update { attach, ..Update::default() }).await
     }
 
-    /// Any update, in the words of the protocol; returns the revision.
+    /// Applies any update, whole or not at all; returns the revision.
     ///
     /// # Errors
     /// When the update cannot be applied.
-    pub async fn update_scene(&self, update: UpdateSceneRequest) -> Result<u64, ClientError> {
-        let response = self.scenes().update_scene(update).await.map_err(self.refused())?;
+    pub async fn update_scene(&self, scene: &str, update: &Update) -> Result<u64, ClientError> {
+        self.send_update(scene_wire::update_message(scene, update)).await
+    }
+
+    async fn send_update(&self, request: UpdateSceneRequest) -> Result<u64, ClientError> {
+        let response = self.scenes().update_scene(request).await.map_err(self.refused())?;
         Ok(response.into_inner().revision)
     }
 
@@ -156,29 +168,4 @@ impl Client {
         let response = self.scenes().commit_fork(CommitForkRequest { fork: fork.into() }).await;
         Ok(response.map_err(self.refused())?.into_inner().revision)
     }
-}
-
-/// A pose in the words of the protocol.
-pub(super) fn pose_message(pose: &Pose) -> proto::Pose {
-    let (t, q) = (pose.translation(), pose.rotation().coords);
-    proto::Pose {
-        translation_m: Some(proto::Vector3 { x: t.x, y: t.y, z: t.z }),
-        rotation: Some(proto::Quaternion { x: q.x, y: q.y, z: q.z, w: q.w }),
-    }
-}
-
-/// Poses by name, packed.
-pub(super) fn pose_table<'a>(poses: impl IntoIterator<Item = (&'a str, Pose)>) -> proto::PoseTable {
-    let (mut names, mut packed) = (Vec::new(), Vec::new());
-    for (name, pose) in poses {
-        names.push(name.to_owned());
-        pack_pose(&pose, &mut packed);
-    }
-    proto::PoseTable { names, poses: packed.into(), rows: Vec::new() }
-}
-
-/// Seven little-endian numbers: translation, then quaternion x y z w.
-pub(super) fn pack_pose(pose: &Pose, packed: &mut Vec<u8>) {
-    let numbers = pose.translation().iter().chain(pose.rotation().coords.iter());
-    numbers.for_each(|number| packed.extend_from_slice(&number.to_le_bytes()));
 }

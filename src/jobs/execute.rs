@@ -166,11 +166,20 @@ fn fit_prepared(
     })
 }
 
-/// Rungs with the ladder that they make; a single one makes none.
+/// Rungs with the ladder that they make; a single one makes none. Of a higher degree is not always
+/// smaller: a rung that is larger than one before it is made all the same, and is none of the
+/// ladder.
 fn as_ladder(name: &str, mut made: FitOutput) -> FitOutput {
     if let Shapes::Bodies(bodies) = &made.shapes {
-        let rungs = bodies.iter().cloned().map(|body| Arc::new(Shape::Body(Box::new(body)))).collect();
-        match Ladder::new(name, rungs) {
+        let mut least_m3 = f64::INFINITY;
+        let is_smaller = |body: &&Body| {
+            let volume_m3 = body.volume().volume_m3;
+            let smaller = volume_m3 <= least_m3;
+            least_m3 = least_m3.min(volume_m3);
+            smaller
+        };
+        let rungs = bodies.iter().filter(is_smaller).map(|body| Arc::new(Shape::Body(Box::new(body.clone()))));
+        match Ladder::new(name, rungs.collect()) {
             Ok(ladder) => {
                 made.outcome.ladder = Some(ladder.id().to_string());
                 made.ladder = Some(Arc::new(ladder));
@@ -225,4 +234,32 @@ pub fn fit_group(
         made.push(body.renamed(&body_name(request, index)).map_err(FitError::from)?);
     }
     Ok(FitOutput::new(took, Shapes::Bodies(made)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::Solid;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn a_rung_that_is_larger_is_left_out_of_the_ladder() {
+        let points = [Vector3::new(0.1, 0.0, 0.0), Vector3::new(0.0, -0.2, 0.1)];
+        let ball = |radius: f64| {
+            let ball = Body::ball("rung", Vector3::zeros(), radius).expect("a ball");
+            ball.with_points(&points).expect("contained")
+        };
+        let made = |radii: &[f64]| {
+            let bodies: Vec<Body> = radii.iter().map(|radius| ball(*radius)).collect();
+            as_ladder("steps", FitOutput::new(Vec::new(), Shapes::Bodies(bodies)))
+        };
+        let radii = |made: &FitOutput| {
+            let ladder = made.ladder.as_ref().expect("a ladder");
+            ladder.rungs().iter().map(|rung| rung.circumscribed().radius).collect::<Vec<_>>()
+        };
+        assert_eq!(radii(&made(&[1.0, 0.8, 0.9, 0.7, 0.75])), [1.0, 0.8, 0.7]);
+        let Shapes::Bodies(bodies) = made(&[1.0, 0.8, 0.9]).shapes else { panic!("bodies") };
+        assert_eq!(bodies.len(), 3);
+        assert!(made(&[0.8, 0.9]).ladder.is_none());
+    }
 }

@@ -1,5 +1,5 @@
-//! Triangle meshes of bodies, for viewers: an icosahedron whose faces are divided, every vertex moved
-//! to the surface along its direction from an interior point.
+//! Triangle meshes of bodies, for viewers: an icosahedron whose faces are divided, every vertex
+//! moved to the surface along its direction from an interior point.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -83,8 +83,8 @@ fn outermost(body: &SosBody, direction: &Vector3<f64>) -> Vector3<f64> {
     at(low)
 }
 
-/// Unit vectors and the triangles between them, counter-clockwise seen from outside: an icosahedron,
-/// each edge cut into so many pieces.
+/// Unit vectors and the triangles between them, counter-clockwise seen from outside: an
+/// icosahedron, each edge cut into so many pieces.
 fn sphere(divisions: u32) -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
     let golden = f64::midpoint(1.0, 5.0_f64.sqrt());
     let corners: Vec<Vector3<f64>> = (0..3)

@@ -61,9 +61,10 @@ where
     fn call(&mut self, request: http::Request<Body>) -> Self::Future {
         // Generated services are always ready, so the clone is as ready as the original.
         let (mut inner, limit) = (self.inner.clone(), self.limit.0.clone());
+        // Now: it may take a while until the future is polled.
+        let deadline = CallTime::deadline(request.headers());
         Box::pin(async move {
             let path = request.uri().path().to_owned();
-            let deadline = CallTime::deadline(request.headers());
             let _permit = tokio::select! {
                 permit = limit.acquire_owned() => permit,
                 () = until(deadline) => return Ok(error::deadline().into_http()),

@@ -9,11 +9,15 @@ use tonic::Status;
 
 use super::app_state::{AppState, stopped};
 use super::call_time::CallTime;
+use super::limits::MAX_MESSAGE_BYTES;
 use super::proto::{Crossing, WatchRequest, WatchResponse};
 use super::{error, query_wire};
-use crate::scene::Scene;
 use crate::scene::query::{Ask, Measure, Within, combined};
+use crate::scene::{MAX_NAME_BYTES, Scene};
 use crate::store::LiveScene;
+
+/// Crossings in one message: two names and two numbers each.
+const PIECE_CROSSINGS: usize = MAX_MESSAGE_BYTES / 4 / (2 * MAX_NAME_BYTES + 32);
 
 type Messages = mpsc::Sender<Result<WatchResponse, Status>>;
 
@@ -23,8 +27,8 @@ type Names = (Arc<str>, Arc<str>);
 /// Near pairs with the brackets of their signed distances, metres.
 type Near = BTreeMap<Names, (f64, f64)>;
 
-/// Sends crossings until the client or the scene is gone, or the server stops. A message is made when
-/// there is space for it, so who reads slowly gets the latest.
+/// Sends crossings until the client or the scene is gone, or the server stops. A message is made
+/// when there is space for it, so who reads slowly gets the latest.
 pub(super) async fn run(
     app: AppState,
     live: Arc<LiveScene>,
@@ -32,32 +36,29 @@ pub(super) async fn run(
     messages: Messages,
 ) {
     let (mut changes, mut stopping) = (live.changes(), app.stopping());
+    let mut scene = changes.borrow_and_update().clone();
+    let resumed = request.from_revision == Some(scene.revision()) && live.knows(scene.revision());
     // The watcher must not keep a scene alive that was deleted.
     drop(live);
-    let mut scene = changes.borrow_and_update().clone();
-    let mut known = None;
-    if request.from_revision == Some(scene.revision()) {
-        match near(&app, &scene, &request).await {
-            Ok(near) => known = Some(near),
-            Err(status) => return drop(messages.send(Err(status)).await),
-        }
-    }
-    let mut first = true;
+    let mut known: Option<Near> = None;
     loop {
         let now = match near(&app, &scene, &request).await {
             Ok(now) => now,
             Err(status) => return drop(messages.send(Err(status)).await),
         };
-        let reset = known.is_none();
-        let crossings = crossings(&known.take().unwrap_or_default(), &now);
+        let first = known.is_none();
+        let before = match known.take() {
+            Some(known) => known,
+            None if resumed => now.clone(),
+            None => Near::new(),
+        };
+        let crossed = crossings(&before, &now);
         known = Some(now);
-        if first || reset || !crossings.is_empty() {
-            let message = WatchResponse { scene_revision: scene.revision(), reset, crossings };
-            if messages.send(Ok(message)).await.is_err() {
-                return;
-            }
+        if (first || !crossed.is_empty())
+            && send(crossed, scene.revision(), first && !resumed, &messages).await.is_none()
+        {
+            return;
         }
-        first = false;
         tokio::time::sleep(pause).await;
         tokio::select! {
             changed = changes.changed() => if changed.is_err() {
@@ -71,6 +72,21 @@ pub(super) async fn run(
             () = messages.closed() => return,
         }
         scene = changes.borrow_and_update().clone();
+    }
+}
+
+/// What crossed, in pieces; none when the client is gone.
+async fn send(mut crossed: Vec<Crossing>, scene_revision: u64, reset: bool, messages: &Messages) -> Option<()> {
+    let mut reset = reset;
+    loop {
+        let rest = crossed.split_off(crossed.len().min(PIECE_CROSSINGS));
+        let complete = rest.is_empty();
+        let message = WatchResponse { scene_revision, reset, crossings: crossed, complete };
+        messages.send(Ok(message)).await.ok()?;
+        if complete {
+            return Some(());
+        }
+        (crossed, reset) = (rest, false);
     }
 }
 

@@ -17,7 +17,7 @@ use super::proto::StreamError;
 
 /// A field of a request that cannot be used.
 #[derive(Debug)]
-pub(super) struct Invalid {
+pub(crate) struct Invalid {
     /// Path in the request, such as `pairs[3].a`.
     field: String,
     /// The reason and the remedy.

@@ -15,7 +15,7 @@ pub const MAX_STATES: usize = 1 << 16;
 pub const MAX_STATE_POSES: usize = MAX_MESSAGE_BYTES / 56;
 
 /// Most rays of one CastRays.
-pub const MAX_RAYS: usize = 1 << 16;
+pub const MAX_RAYS: usize = 1 << 15;
 
 /// Objects of a page of GetScene when the request does not say.
 pub const DEFAULT_OBJECTS_PAGE: usize = 1000;

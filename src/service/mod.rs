@@ -1,12 +1,13 @@
 //! The gRPC door: handlers, conversion between wire and domain, limits, errors, starting and
 //! stopping.
 //!
-//! Only this layer and the client know protobuf. `incoming` lets connections in, `concurrency_limit`
-//! calls, and `message_limit` messages. A call walks straight through: a handler (`bodies`, `blobs`,
-//! `scenes`, `queries`, `fits`, `jobs`) reads its message with a `wire`, asks the catalogue or a
-//! scene's snapshot, and writes the answer with the `wire`; whatever fails becomes a status in
-//! `error`. Handlers are dropped when a client goes away, so every change runs in a task of its own
-//! and is finished or not begun, and every question is stopped.
+//! Only this layer and the client know protobuf. `incoming` lets connections in,
+//! `concurrency_limit` calls, and `message_limit` messages. A call walks straight through: a
+//! handler (`bodies`, `blobs`, `scenes`, `queries`, `fits`, `jobs`) reads its message with a
+//! `wire`, asks the catalogue or a scene's snapshot, and writes the answer with the `wire`;
+//! whatever fails becomes a status in `error`. Handlers are dropped when a client goes away, so
+//! every change runs in a task of its own and is finished or not begun, and every question is
+//! stopped.
 
 mod app_state;
 mod blob_calls;
@@ -25,16 +26,16 @@ mod incoming;
 mod jobs;
 pub mod limits;
 mod message_limit;
-mod packed;
+pub(crate) mod packed;
 mod pose_stream;
 pub mod proto;
 mod queries;
-mod query_wire;
+pub(crate) mod query_wire;
 mod scene_watch;
-mod scene_wire;
+pub(crate) mod scene_wire;
 mod scenes;
 mod server;
 mod server_info;
-mod wire;
+pub(crate) mod wire;
 
 pub use server::{ServeError, ServeOptions, Server, serve};

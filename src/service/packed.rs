@@ -8,7 +8,7 @@ use crate::measure::{Pose, PoseError, Twist};
 use super::error::Invalid;
 
 /// Numbers of a pose: translation, then quaternion x y z w.
-pub(super) const POSE_NUMBERS: usize = 7;
+pub(crate) const POSE_NUMBERS: usize = 7;
 
 /// Numbers in rows of `WIDTH`.
 pub(super) fn rows<const WIDTH: usize>(bytes: &[u8], field: &str) -> Result<Vec<[f64; WIDTH]>, Invalid> {
@@ -54,11 +54,11 @@ pub(super) fn poses(bytes: &[u8], field: &str) -> Result<Vec<Pose>, Invalid> {
 }
 
 /// A packed array that is written.
-#[derive(Debug, Default)]
-pub(super) struct Packed(Vec<u8>);
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Packed(Vec<u8>);
 
 impl Packed {
-    pub(super) fn with_capacity(bytes: usize) -> Self {
+    pub(crate) fn with_capacity(bytes: usize) -> Self {
         Self(Vec::with_capacity(bytes))
     }
 
@@ -87,12 +87,12 @@ impl Packed {
     }
 
     /// Seven numbers.
-    pub(super) fn pose(&mut self, pose: &Pose) {
+    pub(crate) fn pose(&mut self, pose: &Pose) {
         self.vector(Some(pose.translation()));
         pose.rotation().coords.iter().for_each(|&number| self.number(number));
     }
 
-    pub(super) fn into_bytes(self) -> Bytes {
+    pub(crate) fn into_bytes(self) -> Bytes {
         self.0.into()
     }
 }

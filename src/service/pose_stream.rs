@@ -1,5 +1,5 @@
-//! StreamPoses: messages are read while poses are applied; what comes meanwhile is merged, the latest
-//! pose of each object wins.
+//! StreamPoses: messages are read while poses are applied; what comes meanwhile is merged, the
+//! latest pose of each object wins.
 
 use std::collections::HashMap;
 use std::sync::Arc;

@@ -151,7 +151,9 @@ impl QueryService for Queries {
         };
         let parts = self.0.ask(Arc::new(rays), time).await?;
         let answers: Vec<RayAnswer> = parts.into_iter().flatten().collect();
-        Ok(Response::new(rays_response(&answers, &scene)))
+        let response = rays_response(&answers, &scene);
+        error::fits(&response)?;
+        Ok(Response::new(response))
     }
 
     type WatchStream = ReceiverStream<Result<WatchResponse, Status>>;

@@ -112,7 +112,7 @@ fn measure(number: i32, field: &str) -> Result<Measure, Invalid> {
     })
 }
 
-fn measure_number(measure: Measure) -> proto::Measure {
+pub(crate) fn measure_message(measure: Measure) -> proto::Measure {
     match measure {
         Measure::Distance => proto::Measure::Distance,
         Measure::LevelAOnB => proto::Measure::LevelDistanceAOnB,
@@ -285,7 +285,8 @@ pub(super) fn flags(answer: &Answer) -> u8 {
     u8::from(answer.not_unique) | u8::from(answer.saturated) << 1 | u8::from(answer.one_sided) << 2
 }
 
-/// Answers of pairs, all measures of the first, then of the second, in the layout that was asked for.
+/// Answers of pairs, all measures of the first, then of the second, in the layout that was asked
+/// for.
 pub(super) fn write(answers: &[Answer], ask: &Ask, outputs: &Outputs, response: &mut proto::EvaluateResponse) {
     if outputs.columns {
         let count = ask.measures().len();
@@ -353,7 +354,7 @@ fn column(answers: &[Answer], (index, count): (usize, usize), measure: Measure, 
     };
     let status_byte = |answer: &Answer| u8::try_from(i32::from(status(answer.status))).unwrap_or(0);
     proto::Columns {
-        measure: measure_number(measure).into(),
+        measure: measure_message(measure).into(),
         status: pack(true, 1, &|packed, answer| packed.byte(status_byte(answer))),
         lower: pack(true, 8, &|packed, answer| packed.number(answer.lower)),
         upper: pack(true, 8, &|packed, answer| packed.number(answer.upper)),

@@ -32,12 +32,12 @@ pub(super) async fn run(
     messages: Messages,
 ) {
     let mut changes = live.changes();
+    let from_revision = from_revision.filter(|from| live.knows(*from));
     // The watcher must not keep a scene alive that was deleted.
     drop(live);
     let scene = changes.borrow_and_update().clone();
-    let known = |from: u64| (scene.structure_revision()..=scene.revision()).contains(&from);
     let sent = match from_revision {
-        Some(from) if known(from) => send_moved(&scene, from, &messages).await,
+        Some(from) if from >= scene.structure_revision() => send_moved(&scene, from, &messages).await,
         _ => send_whole(&scene, &messages).await,
     };
     let mut before = scene;

@@ -10,6 +10,7 @@ use crate::store::Origin;
 
 use super::error::{self, Invalid};
 use super::limits::MAX_MESSAGE_BYTES;
+use super::packed::Packed;
 use super::proto::{self, subject};
 use super::{packed, wire};
 
@@ -17,7 +18,7 @@ use super::{packed, wire};
 pub(super) fn update(request: &proto::UpdateSceneRequest) -> Result<Update, Invalid> {
     let mut update = Update { expected_revision: request.expected_revision, ..Update::default() };
     for (index, object) in request.upsert_objects.iter().enumerate() {
-        update.upserts.push(placement(object, index)?);
+        update.upserts.push(placement(object, || format!("upsert_objects[{index}]"))?);
     }
     if let Some(table) = &request.set_poses {
         update.poses = pose_table(table, "set_poses")?;
@@ -48,8 +49,9 @@ pub(super) fn update(request: &proto::UpdateSceneRequest) -> Result<Update, Inva
     Ok(update)
 }
 
-fn placement(object: &proto::Object, index: usize) -> Result<Placement, Invalid> {
-    let at = |leaf: &str| format!("upsert_objects[{index}].{leaf}");
+/// An object as a message tells it; `field` names where it stands.
+pub(crate) fn placement(object: &proto::Object, field: impl Fn() -> String) -> Result<Placement, Invalid> {
+    let at = |leaf: &str| format!("{}.{leaf}", field());
     let attachment = match &object.attachment {
         None => None,
         Some(attachment) => Some(Attachment {
@@ -70,6 +72,70 @@ fn placement(object: &proto::Object, index: usize) -> Result<Placement, Invalid>
         padding_m: object.padding_m,
         attachment,
     })
+}
+
+/// The message that asks for an update.
+pub(crate) fn update_message(scene: &str, update: &Update) -> proto::UpdateSceneRequest {
+    let owned = |names: &[Arc<str>]| names.iter().map(|name| name.to_string()).collect();
+    let object = |(object, padding_m): &(Arc<str>, Option<f64>)| proto::ObjectPadding {
+        object: object.to_string(),
+        padding_m: *padding_m,
+    };
+    let group = |(group, padding_m): &(Arc<str>, Option<f64>)| proto::GroupPadding {
+        group: group.to_string(),
+        padding_m: *padding_m,
+    };
+    let pair = |(pair, padding_m): &(SubjectPair, Option<f64>)| proto::PairPadding {
+        pair: Some(pair_message(pair)),
+        padding_m: *padding_m,
+    };
+    let attach = |Attach { name, to, pose, touch }: &Attach| proto::Attach {
+        object: name.to_string(),
+        attachment: Some(attachment_message(to, pose.as_ref(), touch)),
+    };
+    let poses = update.poses.iter().map(|(name, pose)| (&**name, *pose));
+    proto::UpdateSceneRequest {
+        scene: scene.to_owned(),
+        expected_revision: update.expected_revision,
+        upsert_objects: update.upserts.iter().map(placement_message).collect(),
+        set_poses: (!update.poses.is_empty()).then(|| pose_table_message(poses)),
+        remove_objects: owned(&update.removals),
+        allow_pairs: update.allow.iter().map(pair_message).collect(),
+        forbid_pairs: update.forbid.iter().map(pair_message).collect(),
+        set_object_paddings: update.object_paddings.iter().map(object).collect(),
+        set_group_paddings: update.group_paddings.iter().map(group).collect(),
+        set_pair_paddings: update.pair_paddings.iter().map(pair).collect(),
+        attach: update.attach.iter().map(attach).collect(),
+        detach: owned(&update.detach),
+    }
+}
+
+fn placement_message(placement: &Placement) -> proto::Object {
+    let Placement { name, body, pose, group, padding_m, attachment } = placement;
+    let held = |Attachment { to, pose, touch }: &Attachment| attachment_message(to, Some(pose), touch);
+    proto::Object {
+        name: name.to_string(),
+        body_id: body.to_string(),
+        pose: pose.as_ref().map(wire::pose_message),
+        group: group.to_string(),
+        padding_m: *padding_m,
+        attachment: attachment.as_ref().map(held),
+    }
+}
+
+fn attachment_message(to: &str, pose: Option<&Pose>, touch: &[Subject]) -> proto::Attachment {
+    let (pose, touch) = (pose.map(wire::pose_message), touch.iter().map(subject_message).collect());
+    proto::Attachment { to: to.to_owned(), pose, touch }
+}
+
+/// Poses by object name, packed.
+pub(crate) fn pose_table_message<'a>(poses: impl IntoIterator<Item = (&'a str, Pose)>) -> proto::PoseTable {
+    let (mut names, mut packed) = (Vec::new(), Packed::default());
+    for (name, pose) in poses {
+        names.push(name.to_owned());
+        packed.pose(&pose);
+    }
+    proto::PoseTable { names, poses: packed.into_bytes(), rows: Vec::new() }
 }
 
 /// Poses by object name, packed or as rows.
@@ -122,7 +188,7 @@ fn subject_pair(pair: &proto::SubjectPair, field: impl Fn() -> String) -> Result
     Ok((side(&pair.a, "a")?, side(&pair.b, "b")?))
 }
 
-fn subject_pairs(pairs: &[proto::SubjectPair], field: &str) -> Result<Vec<SubjectPair>, Invalid> {
+pub(crate) fn subject_pairs(pairs: &[proto::SubjectPair], field: &str) -> Result<Vec<SubjectPair>, Invalid> {
     let one = |(index, pair): (usize, &proto::SubjectPair)| subject_pair(pair, || format!("{field}[{index}]"));
     pairs.iter().enumerate().map(one).collect()
 }
@@ -195,18 +261,14 @@ pub(super) fn page(
 }
 
 pub(super) fn object_message(object: &Object, pose: &Pose) -> proto::Object {
-    let attachment = object.attachment.as_ref().map(|attachment| proto::Attachment {
-        to: attachment.to.to_string(),
-        pose: Some(wire::pose_message(&attachment.pose)),
-        touch: attachment.touch.iter().map(subject_message).collect(),
-    });
+    let held = |Attachment { to, pose, touch }: &Attachment| attachment_message(to, Some(pose), touch);
     proto::Object {
         name: object.name.to_string(),
         body_id: object.geometry.id().to_string(),
         pose: Some(wire::pose_message(pose)),
         group: object.group.to_string(),
         padding_m: object.padding_m,
-        attachment,
+        attachment: object.attachment.as_ref().map(held),
     }
 }
 

@@ -79,7 +79,7 @@ pub enum CatalogueError {
     #[error("scene \"{0}\" is no fork; name one that ForkScene made")]
     NoFork(String),
     /// A fork has lost its parent.
-    #[error("scene \"{parent}\", of which \"{fork}\" was made, was deleted; create it again or delete the fork")]
+    #[error("scene \"{parent}\", of which \"{fork}\" was made, was deleted; delete the fork")]
     NoParent {
         /// The fork.
         fork: String,
@@ -290,6 +290,7 @@ impl State {
     /// Takes over what was read again.
     fn replace(&mut self, fresh: Self) -> Self {
         let before = std::mem::replace(self, fresh);
+        self.revision_floor = self.revision_floor.max(before.revision_floor);
         self.keep_live(&before.scenes);
         before
     }

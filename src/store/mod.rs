@@ -25,11 +25,11 @@
 //!   back. Nothing is made again but on a start that finds no file at all; one that finds an empty
 //!   file is refused.
 //!
-//! Memory is thus never ahead of the disk but for streamed poses, which are written within a second,
-//! and for forks, which end with the server. A revision that was seen is never given out again: a
-//! scene's revision is part of every commit that changes it, revisions of streamed poses are taken
-//! from a reserve that was written before, and deleting a scene raises the floor from which later
-//! scenes start.
+//! Memory is thus never ahead of the disk but for streamed poses, which are written within a
+//! second, and for forks, which end with the server. A revision that was seen is never given out
+//! again: a scene's revision is part of every commit that changes it, revisions of streamed poses
+//! are taken from a reserve that was written before, and deleting a scene raises the floor from
+//! which later scenes start.
 
 mod catalogue;
 mod disk;

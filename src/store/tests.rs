@@ -15,7 +15,7 @@ use super::rows::{BODIES, META, OBJECTS, REVISIONS, SCENES};
 use super::{Catalogue, CatalogueError, Store, StoreError};
 use crate::body::Body;
 use crate::measure::Pose;
-use crate::scene::{Placement, Scene, Update};
+use crate::scene::{Attach, Placement, Scene, Subject, Update};
 
 /// A disk in memory that outlives the databases on it and is full on demand: it takes one more
 /// write, cut short, and refuses every other.
@@ -257,6 +257,75 @@ fn a_body_in_use_is_kept() {
     catalogue.delete_body(&id).expect("deleted");
     assert!(matches!(catalogue.delete_body(&id), Err(CatalogueError::NoBody(_))));
     assert!(catalogue.create_scene("room").expect("made").revision() > 2);
+}
+
+/// What a held object may touch names other objects; those may go.
+#[test]
+fn an_object_that_others_may_touch_can_be_removed() {
+    let disk = Disk::default();
+    let catalogue = furnished(&disk);
+    for name in ["hand", "shelf"] {
+        catalogue.update_scene("room", &placed(name, &ball(1.0))).expect("placed");
+    }
+    let touch = vec![Subject::Object("shelf".into()), Subject::Group("g".into())];
+    let attach = Attach { name: "o".into(), to: "hand".into(), pose: None, touch };
+    catalogue.update_scene("room", &Update { attach: vec![attach], ..Update::default() }).expect("held");
+    let removal = Update { removals: vec!["shelf".into()], ..Update::default() };
+    catalogue.update_scene("room", &removal).expect("removed");
+    let touched = |catalogue: &Catalogue| {
+        let scene = catalogue.scene("room").expect("there");
+        let object = scene.slot("o").and_then(|slot| scene.object(slot)).expect("there");
+        object.attachment.as_ref().expect("held").touch.clone()
+    };
+    assert_eq!(touched(&catalogue), [Subject::Group("g".into())]);
+    drop(catalogue);
+    assert_eq!(touched(&disk.load().expect("loads")), [Subject::Group("g".into())]);
+}
+
+/// While one thread forks a scene, another removes its object and deletes the body.
+#[test]
+fn what_a_fork_holds_stays_in_the_catalogue() {
+    let catalogue = furnished(&Disk::default());
+    let id = *ball(1.0).id();
+    let removal = Update { removals: vec!["o".into()], ..Update::default() };
+    let (mut deleted, done) = (0, AtomicBool::new(false));
+    std::thread::scope(|scope| {
+        let (done, catalogue) = (&done, &catalogue);
+        scope.spawn(move || {
+            while !done.load(Ordering::Relaxed) {
+                let fork = catalogue.fork_scene("room", "plan", None).expect("forked").snapshot();
+                for (_, object, _) in fork.objects() {
+                    assert!(catalogue.geometry(object.geometry.id()).is_some(), "deleted in use");
+                }
+                catalogue.delete_scene("plan").expect("deleted");
+            }
+        });
+        for _ in 0..2000 {
+            catalogue.update_scene("room", &removal).expect("removed");
+            match catalogue.delete_body(&id) {
+                Ok(()) => deleted += 1,
+                Err(error) => assert!(matches!(error, CatalogueError::BodyUsed { .. }), "{error}"),
+            }
+            catalogue.create_body(ball(1.0).into()).expect("stored");
+            catalogue.update_scene("room", &placed("o", &ball(1.0))).expect("placed");
+        }
+        done.store(true, Ordering::Relaxed);
+    });
+    assert!(deleted > 0);
+}
+
+/// A fork is of one scene, not of whatever has its name and revision later.
+#[test]
+fn a_fork_is_not_committed_to_another_scene_of_the_name() {
+    let catalogue = furnished(&Disk::default());
+    catalogue.fork_scene("room", "plan", None).expect("forked");
+    let revision = catalogue.update_scene("plan", &moved(1.0)).expect("moved").revision();
+    catalogue.fork_scene("plan", "detail", None).expect("forked");
+    catalogue.delete_scene("plan").expect("deleted");
+    catalogue.fork_scene("room", "plan", None).expect("forked");
+    assert_eq!(catalogue.update_scene("plan", &moved(2.0)).expect("moved").revision(), revision);
+    assert!(matches!(catalogue.commit_fork("detail"), Err(CatalogueError::NoParent { .. })));
+    assert_eq!(pose(&catalogue.scene("plan").expect("there")), at(2.0));
 }
 
 #[test]

@@ -98,8 +98,8 @@ async fn nothing_in_range_is_an_outcome() {
     assert_eq!((found.outcome(), found.answers.len()), (Outcome::Found, 1));
 }
 
-/// Family 24: while poses stream, every answer is the serial answer of the revision it names, bit for
-/// bit.
+/// Family 24: while poses stream, every answer is the serial answer of the revision it names, bit
+/// for bit.
 #[tokio::test(flavor = "multi_thread")]
 async fn answers_are_those_of_their_revision() {
     let (_dir, server, _clients) = room(8).await;

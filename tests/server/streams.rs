@@ -191,6 +191,17 @@ async fn a_watched_scene_is_what_the_scene_is() {
     clients.update(UpdateSceneRequest { scene: "room".into(), remove_objects, ..Default::default() }).await;
     follow(&mut watch, &mut known).await;
     assert_eq!(known.len(), 29);
+    // A fork that takes the name and the revision of another one is not taken for it.
+    client.fork_scene("room", "plan").await.expect("forked");
+    let last = client.set_poses("plan", [("o5", along(1.0))]).await.expect("moved");
+    client.delete_scene("plan").await.expect("deleted");
+    client.fork_scene("room", "plan").await.expect("forked");
+    assert_eq!(client.set_poses("plan", [("o5", along(2.0))]).await.expect("moved"), last);
+    let request = WatchSceneRequest { scene: "plan".into(), from_revision: Some(last), max_rate_hz: None };
+    let mut plan = clients.scenes.watch_scene(request).await.expect("a stream").into_inner();
+    let mut seen = BTreeMap::new();
+    follow(&mut plan, &mut seen).await;
+    assert_eq!(seen.len(), 29);
     client.delete_scene("room").await.expect("deleted");
     let ended = tokio::time::timeout(PATIENCE, watch.message()).await.expect("in time");
     assert_eq!(ended.expect_err("the scene is gone").code(), Code::NotFound);
@@ -204,7 +215,7 @@ async fn contacts_are_reported_when_they_come_and_go() {
         WatchRequest { scene: "room".into(), margin_m: 0.05, max_rate_hz: Some(1000.0), ..Default::default() };
     let mut watch = clients.queries.watch(request).await.expect("a stream").into_inner();
     let first = watch.message().await.expect("no error").expect("a message");
-    assert!(first.reset && first.crossings.is_empty(), "{first:?}");
+    assert!(first.reset && first.complete && first.crossings.is_empty(), "{first:?}");
     for (x, near) in [(1.22, true), (1.3, false), (1.0, true)] {
         client.set_poses("room", [("o0", along(x))]).await.expect("moved");
         let message = tokio::time::timeout(PATIENCE, watch.message()).await.expect("in time");

@@ -43,6 +43,11 @@ impl Table {
         Ok(Self { heads, rows })
     }
 
+    /// The first row.
+    pub(crate) fn first(&self) -> Result<Row<'_>, CsvError> {
+        self.rows().next().ok_or_else(|| CsvError { line: 2, what: "there is no row".into() })
+    }
+
     pub(crate) fn rows(&self) -> impl Iterator<Item = Row<'_>> {
         self.rows.iter().map(|(line, cells)| Row { heads: &self.heads, line: *line, cells })
     }
@@ -115,6 +120,7 @@ mod tests {
     fn errors_name_the_line() {
         let error = |text: &str| Table::read(text).err().map(|error| error.to_string());
         assert!(error("").unwrap().starts_with("line 1 of the CSV: there is no head"));
+        assert!(Table::read("a,b\n").unwrap().first().is_err());
         assert!(error("a,b\n1,2\n\n3\n").unwrap().starts_with("line 4 of the CSV: 1 cells"));
         let table = Table::read("a,b\n1,x\n").unwrap();
         let row = table.rows().next().unwrap();

@@ -6,6 +6,7 @@ use crate::cost::{Messages, cost};
 use crate::detail::detail;
 use crate::messages::messages;
 use crate::numbers;
+use crate::scenes::scenes;
 use crate::speed::speed;
 use crate::stability::{Earlier, Lost, Method, Share, Stability, serve, stability};
 use crate::table1::{Table1, Table1Error, Table1Progress, table1};
@@ -44,6 +45,7 @@ enum Figure {
     Stability(StabilityArgs),
     Accuracy(AccuracyArgs),
     Cost(CostArgs),
+    Scenes(ScenesArgs),
     Table1(Table1Args),
     Tables(TablesArgs),
     #[command(hide = true)]
@@ -211,6 +213,17 @@ struct CostArgs {
     common: Common,
 }
 
+/// What the server adds to the library, and how scenes grow: calls beside the same question in
+/// process, ticks of up to 100 000 objects, poses at 1 kHz, forks, ladders
+///
+/// A server on loopback in this process, on all cores; the robot and problems are those of
+/// DIR/panda. Writes scenes.md, scenes.csv and scenes-ticks.svg.
+#[derive(Debug, Args)]
+struct ScenesArgs {
+    #[command(flatten)]
+    common: Common,
+}
+
 /// What all figures with bodies around meshes take.
 #[derive(Debug, Args)]
 struct Common {
@@ -266,6 +279,8 @@ fn run(figure: &Figure) -> Result<(), Box<dyn Error>> {
         Figure::Accuracy(args) => run_accuracy(&args.common),
         Figure::Cost(args) if args.common.redraw => redraw(&args.common.out, "cost"),
         Figure::Cost(args) => run_cost(&args.common),
+        Figure::Scenes(args) if args.common.redraw => redraw(&args.common.out, "scenes"),
+        Figure::Scenes(args) => run_scenes(&args.common),
         Figure::Tables(args) => return write_numbers(args),
         Figure::Table1(args) if args.redraw => redraw_table1(&args.meshes, &args.out),
         Figure::Table1(args) => run_table1(&args.meshes, &args.out, args.quick),
@@ -276,14 +291,15 @@ fn run(figure: &Figure) -> Result<(), Box<dyn Error>> {
 fn run_all(args: &Common) -> Result<(), Box<dyn Error>> {
     if args.redraw {
         // Table I takes the meshes, and a command of its own.
-        return ["speed", "accuracy", "cost", "warm", "detail"]
+        return ["speed", "accuracy", "cost", "scenes", "warm", "detail"]
             .into_iter()
             .try_for_each(|name| redraw(&args.out, name).map(drop));
     }
-    let figures: [(&str, &str, Run); 6] = [
+    let figures: [(&str, &str, Run); 7] = [
         ("speed", "Speed against accuracy", run_speed),
         ("accuracy", "Solver accuracy against time", run_accuracy),
         ("cost", "Cost growth", run_cost),
+        ("scenes", "Scenes and questions", run_scenes),
         ("warm", "Warm starts", run_warm),
         ("detail", "Detail", run_detail),
         ("table1", "Table I of the paper", |args| run_table1(&args.data().join("psb"), &args.out, args.quick)),
@@ -358,6 +374,14 @@ fn run_cost(args: &Common) -> Drawn {
         let found = cost(args.data(), cache, args.quick, parts, &mut |at| tell(bar, at))?;
         write_report(&args.out, "cost", &found.markdown(), &found.csv())?;
         redraw(&args.out, "cost")
+    })
+}
+
+fn run_scenes(args: &Common) -> Drawn {
+    with_fit_cache(args, |cache, bar| {
+        let found = scenes(args.data(), cache, args.quick, &mut |at| tell(bar, at))?;
+        write_report(&args.out, "scenes", &found.markdown(), &found.csv())?;
+        redraw(&args.out, "scenes")
     })
 }
 

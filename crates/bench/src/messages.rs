@@ -1,16 +1,15 @@
 //! Times messages to a server on loopback, for `sublevel-bench cost`.
 
 use crate::comparison::{Random, sweep::median};
+use crate::loopback::Loopback;
 use nalgebra::Vector3;
 use std::error::Error;
-use std::net::{Ipv4Addr, SocketAddr};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use sublevel::body::Body;
 use sublevel::client::{Client, Question};
 use sublevel::measure::Pose;
 use sublevel::scene::query::Measure;
 use sublevel::service::proto::Output;
-use sublevel::service::{ServeOptions, Server};
 
 const SCENE: &str = "cost";
 /// Objects of each of two kinds: all pairs of them are the most pairs of a message.
@@ -23,28 +22,15 @@ const REPEATS: usize = 9;
 /// Nanoseconds of an Evaluate with this many pairs, none of them twice, for each of the sizes:
 /// medians, one connection.
 pub(crate) fn messages(sizes: &[usize]) -> Result<Vec<f64>, Box<dyn Error>> {
-    let data = tempfile::Builder::new().prefix("sublevel-cost-").tempdir()?;
-    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
-    let result = runtime.block_on(async {
-        let listen = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-        let server = Server::bind(ServeOptions { listen, data: data.path().to_owned() }).await?;
-        let url = format!("http://{}", server.local_addr());
-        let (stop, stopped) = tokio::sync::oneshot::channel::<()>();
-        let serving = tokio::spawn(server.run(async {
-            let _ = stopped.await;
-        }));
-        let result = talk(url, sizes).await;
-        let _ = stop.send(());
-        serving.await??;
-        result
-    });
-    runtime.shutdown_timeout(Duration::from_secs(1));
-    result
+    let server = Loopback::start()?;
+    let client = server.connect()?;
+    let times = server.clients().block_on(talk(&client, sizes))?;
+    server.stop()?;
+    Ok(times)
 }
 
 /// The client's side.
-async fn talk(url: String, sizes: &[usize]) -> Result<Vec<f64>, Box<dyn Error>> {
-    let client = Client::connect(&url).await?;
+async fn talk(client: &Client, sizes: &[usize]) -> Result<Vec<f64>, Box<dyn Error>> {
     client.create_scene(SCENE).await?;
     let mut random = Random(1);
     for (kind, [x, y, z]) in [("brick", [0.5, 0.3, 0.2]), ("post", [0.2, 0.2, 0.9])] {

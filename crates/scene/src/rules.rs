@@ -26,7 +26,7 @@ pub(crate) fn ordered((a, b): SubjectPair) -> SubjectPair {
 
 impl Rules {
     /// Removes what names an object that is gone.
-    pub(crate) fn forget(&mut self, gone: impl Fn(&str) -> bool) {
+    pub(crate) fn forget(&mut self, gone: &impl Fn(&str) -> bool) {
         let names = |subject: &Subject| matches!(subject, Subject::Object(name) if gone(name));
         self.allowed.retain(|(a, b)| !names(a) && !names(b));
         self.pairs.retain(|(a, b), _| !names(a) && !names(b));

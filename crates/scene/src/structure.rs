@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
-use super::object::{Object, Slot};
+use super::object::{Object, Slot, Subject};
 use super::rules::{RuleTable, Rules};
 
 /// Objects by slot, their names, what holds what, and the rules. Shared between snapshots until
@@ -64,12 +64,25 @@ impl Structure {
         }
     }
 
-    /// Removes an object; tells which slot it had.
+    /// Removes an object and returns its slot; [`Structure::forget`] is to follow.
     pub(crate) fn remove(&mut self, name: &str) -> Option<Slot> {
         let slot = self.by_name.remove(name)?;
         self.slots[slot as usize] = None;
         self.free.push(slot);
         Some(slot)
+    }
+
+    /// Removes objects that are gone from rules and from what held objects may touch.
+    pub(crate) fn forget(&mut self, gone: impl Fn(&str) -> bool) {
+        self.rules.forget(&gone);
+        let is_gone = |subject: &Subject| matches!(subject, Subject::Object(name) if gone(name));
+        for object in self.slots.iter_mut().flatten() {
+            if object.attachment.as_ref().is_some_and(|attachment| attachment.touch.iter().any(is_gone))
+                && let Some(attachment) = &mut Arc::make_mut(object).attachment
+            {
+                attachment.touch.retain(|subject| !is_gone(subject));
+            }
+        }
     }
 
     /// Recomputes what follows from objects and rules.

@@ -15,7 +15,7 @@ use super::structure::Structure;
 use super::{Geometry, MAX_OBJECTS, MAX_PADDING_M, MAX_PAIR_RULES, check_name};
 
 /// An object to add or to replace.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Placement {
     /// Unique in its scene.
     pub name: Arc<str>,
@@ -206,7 +206,7 @@ impl Scene {
         }
         if !update.removals.is_empty() {
             let removed: HashSet<&str> = update.removals.iter().map(|name| &**name).collect();
-            structure.rules.forget(|name| removed.contains(name));
+            structure.forget(|name| removed.contains(name));
         }
         for (at, placement) in entries(List::Upserts, &update.upserts) {
             let slot = structure.put(place(at, placement, &bodies)?);

@@ -5,6 +5,7 @@ mod query;
 mod timing;
 
 use super::files::{read, read_shape};
+use super::numbers::PoseNumbers;
 use crate::measure::{Distance, LevelDistance, Options, Pose, Status, WarmStart};
 use query::Query;
 use serde::Serialize;
@@ -32,9 +33,10 @@ pub(super) struct MeasureArgs {
     a: PathBuf,
     /// File of B
     b: PathBuf,
-    /// Pose of B in A's frame: translation (m) and quaternion [default: identity]
-    #[arg(long, value_name = "X,Y,Z,QX,QY,QZ,QW", allow_hyphen_values = true, conflicts_with = "poses")]
-    pose: Option<String>,
+    /// Pose of B in A's frame: translation (m), then quaternion unless it is not turned [default:
+    /// identity]
+    #[arg(long, value_name = "X,Y,Z[,QX,QY,QZ,QW]", allow_hyphen_values = true, conflicts_with = "poses")]
+    pose: Option<PoseNumbers>,
     /// File of poses of B in A's frame, one a line: r00 r01 r02 r10 .. r22 tx ty tz; a blank line
     /// starts a new trajectory
     #[arg(long, value_name = "FILE")]
@@ -103,7 +105,7 @@ impl Line {
 pub(super) fn run(args: &MeasureArgs) -> Result<(), Box<dyn Error>> {
     let options = Options::default().with_accuracy(args.accuracy).map_err(|error| format!("--accuracy: {error}"))?;
     let trajectories = match (&args.pose, &args.poses) {
-        (Some(text), _) => vec![vec![poses::parse_one(text).map_err(|error| format!("--pose: {error}"))?]],
+        (Some(pose), _) => vec![vec![pose.0]],
         (None, Some(path)) => {
             poses::parse_file(&read(path)?).map_err(|error| format!("{}: {error}", path.display()))?
         }

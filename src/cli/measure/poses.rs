@@ -37,13 +37,6 @@ fn numbers<const N: usize>(
     found.try_into().map_err(|_| PosesError::Count { place: place.into(), found: count, expected: N, order })
 }
 
-/// The pose `x,y,z,qx,qy,qz,qw`.
-pub(super) fn parse_one(text: &str) -> Result<Pose, PosesError> {
-    let [x, y, z, qx, qy, qz, qw] = numbers(text.split(',').map(str::trim), "", "x,y,z,qx,qy,qz,qw")?;
-    Pose::from_quaternion(Vector3::new(x, y, z), [qx, qy, qz, qw])
-        .map_err(|source| PosesError::Pose { place: String::new(), source })
-}
-
 /// Trajectories of poses `r00 r01 r02 r10 .. r22 tx ty tz`, one a line, separated by blank lines.
 pub(super) fn parse_file(text: &str) -> Result<Vec<Vec<Pose>>, PosesError> {
     let mut trajectories = vec![Vec::new()];
@@ -84,8 +77,5 @@ mod tests {
         assert!(message("1 0 0 0 1 0 0 0 1.001 0 0 0").contains("deviates by 1.0"));
         assert!(message("1 0 0 0 1 0 0 0 NaN 0 0 0").contains("not finite"));
         assert!(message(" \n\n").contains("no pose"));
-        assert!(parse_one("0,0,0,0,0,0,1").is_ok());
-        assert!(parse_one("0,0,0,0,0,0").unwrap_err().to_string().contains("6 numbers where 7"));
-        assert!(parse_one("0,0,0,0,0,0,2").unwrap_err().to_string().contains("unit quaternion"));
     }
 }

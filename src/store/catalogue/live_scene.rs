@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicU64;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
@@ -28,6 +28,9 @@ pub struct LiveScene {
     /// Held while the next snapshot is made, so that none is lost.
     pub(super) changing: Mutex<()>,
     pub(super) origin: Option<Origin>,
+    /// Revisions up to this one may be of an earlier scene of its name, or of this one before it
+    /// was loaded.
+    begun: u64,
     /// The last revision whose poses are on disk.
     pub(super) written: AtomicU64,
     /// Revisions up to this one may be given out before they are written.
@@ -42,15 +45,18 @@ pub struct Origin {
     pub parent: Arc<str>,
     /// Revision of the parent then.
     pub revision: u64,
+    pub(super) live: Weak<LiveScene>,
 }
 
 impl LiveScene {
-    pub(super) fn new(scene: Scene, origin: Option<Origin>) -> Self {
+    /// Of a snapshot; no scene that had its name went beyond revision `begun`.
+    pub(super) fn new(scene: Scene, origin: Option<Origin>, begun: u64) -> Self {
         let revision = scene.revision();
         Self {
             current: watch::Sender::new(scene),
             changing: Mutex::new(()),
             origin,
+            begun,
             written: AtomicU64::new(revision),
             reserved: AtomicU64::new(revision),
             used: Mutex::new(Instant::now()),
@@ -65,6 +71,12 @@ impl LiveScene {
     /// The latest snapshot, and every later one; ends when the scene is deleted.
     pub fn changes(&self) -> watch::Receiver<Scene> {
         self.current.subscribe()
+    }
+
+    /// Whether it has given out this revision since it was made or loaded. Who knows such a
+    /// revision knows the slots of its objects.
+    pub fn knows(&self, revision: u64) -> bool {
+        revision > self.begun && revision <= self.current.borrow().revision()
     }
 
     /// What it was made of; none if it is no fork.

@@ -8,8 +8,8 @@
 
 use std::collections::HashMap;
 use std::ops::Bound;
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Weak};
 use std::time::Duration;
 
 use redb::WriteTransaction;
@@ -53,7 +53,7 @@ impl Catalogue {
         self.live_scene(name).ok_or_else(|| CatalogueError::NoScene(name.to_owned()))
     }
 
-    /// Creates an empty scene, one revision above every scene that was deleted.
+    /// Creates an empty scene, one revision above every scene and fork that was deleted.
     ///
     /// # Errors
     /// When the name is taken or not usable, or when the disk fails.
@@ -66,7 +66,7 @@ impl Catalogue {
         }
         let scene = Scene::new(name, floor + 1)?;
         self.commit(&mut store, |transaction| put_scene(transaction, &scene))?;
-        let live = Arc::new(LiveScene::new(scene.clone(), None));
+        let live = Arc::new(LiveScene::new(scene.clone(), None, floor));
         self.write(|state| state.scenes.insert(scene.name().clone(), live));
         tracing::debug!(scene = name, revision = scene.revision(), "scene created");
         Ok(scene)
@@ -133,7 +133,7 @@ impl Catalogue {
         let _changing = live.change();
         let scene = live.snapshot();
         if live.origin.is_some() {
-            self.write(|state| state.scenes.remove(name));
+            self.write(|state| state.remove_scene(name));
             return Ok(());
         }
         let floor = self.read(|state| state.revision_floor).max(scene.revision());
@@ -148,10 +148,7 @@ impl Catalogue {
             }
             Ok(())
         })?;
-        self.write(|state| {
-            state.revision_floor = floor;
-            state.scenes.remove(name)
-        });
+        self.write(|state| state.remove_scene(name));
         tracing::debug!(scene = name, revision = scene.revision(), "scene deleted");
         Ok(())
     }
@@ -167,25 +164,29 @@ impl Catalogue {
         fork: &str,
         expected_revision: Option<u64>,
     ) -> Result<Arc<LiveScene>, CatalogueError> {
-        let parent = self.find(name)?;
-        let scene = parent.snapshot();
-        if let Some(expected) = expected_revision.filter(|expected| *expected != scene.revision()) {
-            return Err(SceneError::Revision { expected, current: scene.revision() }.into());
-        }
-        let forked = scene.fork(fork)?;
-        let origin = Origin { parent: scene.name().clone(), revision: scene.revision() };
-        let live = Arc::new(LiveScene::new(forked, Some(origin)));
+        self.find(name)?;
+        // Bodies of scenes are kept, see `delete_body`; so the snapshot becomes one of a scene
+        // under the same lock.
         self.write(|state| {
+            let parent = state.scenes.get(name).ok_or_else(|| CatalogueError::NoScene(name.to_owned()))?;
+            let scene = parent.snapshot();
+            if let Some(expected) = expected_revision.filter(|expected| *expected != scene.revision()) {
+                return Err(SceneError::Revision { expected, current: scene.revision() }.into());
+            }
+            let forked = scene.fork(fork)?;
             if state.scenes.contains_key(fork) {
                 return Err(CatalogueError::SceneExists(fork.to_owned()));
             }
             if state.scenes.values().filter(|live| live.origin.is_some()).count() >= MAX_FORKS {
                 return Err(CatalogueError::TooManyForks);
             }
+            let (parent, live) = (scene.name().clone(), Arc::downgrade(parent));
+            let origin = Origin { parent, revision: scene.revision(), live };
+            let begun = state.revision_floor.max(scene.revision());
+            let live = Arc::new(LiveScene::new(forked, Some(origin), begun));
             state.scenes.insert(fork.into(), live.clone());
-            Ok(())
-        })?;
-        Ok(live)
+            Ok(live)
+        })
     }
 
     /// Makes what a fork holds the next revision of its parent, and removes the fork.
@@ -197,7 +198,8 @@ impl Catalogue {
         let fork = self.find(name)?;
         let Some(origin) = fork.origin.clone() else { return Err(CatalogueError::NoFork(name.to_owned())) };
         let gone = || CatalogueError::NoParent { fork: name.to_owned(), parent: origin.parent.clone() };
-        let parent = self.live_scene(&origin.parent).ok_or_else(gone)?;
+        let is_it = |parent: &Arc<LiveScene>| Weak::ptr_eq(&Arc::downgrade(parent), &origin.live);
+        let parent = self.live_scene(&origin.parent).filter(is_it).ok_or_else(gone)?;
         let _changing_fork = fork.change();
         let _changing_parent = parent.change();
         let scene = parent.snapshot();
@@ -211,7 +213,7 @@ impl Catalogue {
         } else {
             self.commit_scene(&mut store, &parent, (&scene, &next))?;
         }
-        self.write(|state| state.scenes.remove(name));
+        self.write(|state| state.remove_scene(name));
         tracing::debug!(scene = &*origin.parent, revision = next.revision(), "fork committed");
         Ok(next)
     }
@@ -221,13 +223,12 @@ impl Catalogue {
         let is_idle =
             |live: &LiveScene| live.origin.is_some() && live.current.receiver_count() == 0 && live.idle_for() >= idle;
         self.write(|state| {
-            state.scenes.retain(|name, live| {
-                let expired = is_idle(live);
-                if expired {
-                    tracing::debug!(scene = &**name, "fork expired");
-                }
-                !expired
-            });
+            let idle: Vec<_> =
+                state.scenes.iter().filter(|(_, live)| is_idle(live)).map(|(name, _)| name.clone()).collect();
+            for name in idle {
+                tracing::debug!(scene = &*name, "fork expired");
+                state.remove_scene(&name);
+            }
         });
     }
 
@@ -302,6 +303,13 @@ impl Catalogue {
 }
 
 impl State {
+    /// No later scene of the name takes its revisions again.
+    fn remove_scene(&mut self, name: &str) -> Option<Arc<LiveScene>> {
+        let live = self.scenes.remove(name)?;
+        self.revision_floor = self.revision_floor.max(live.snapshot().revision());
+        Some(live)
+    }
+
     /// Forks stay, and scenes that were read again go on where they are, if that is not behind the
     /// disk.
     pub(super) fn keep_live(&mut self, before: &Scenes) {
@@ -341,7 +349,7 @@ impl State {
             let bodies = |id: &BodyId| -> Option<Geometry> { self.bodies.get(id).cloned() };
             let scene = Scene::new(&name, 0).map_err(|error| fault(format!("has a name that {error}")))?;
             let scene = scene.updated(&update, bodies).map_err(|error| fault(format!("does not hold up: {error}")))?;
-            let live = LiveScene::new(scene.at_revision(revision), None);
+            let live = LiveScene::new(scene.at_revision(revision), None, revision);
             self.scenes.insert(name.as_str().into(), Arc::new(live));
         }
         match placed.keys().next() {

@@ -147,8 +147,8 @@ fn a_ladder_is_stored_with_its_rungs_and_keeps_them() {
     assert_eq!(disk.load().expect("loads").counts(), (1, 0));
 }
 
-/// The body that came first stays, and a ladder is made of what is stored: it has to hold up when it
-/// is loaded.
+/// The body that came first stays, and a ladder is made of what is stored: it has to hold up when
+/// it is loaded.
 #[test]
 fn a_ladder_of_rungs_that_are_stored_without_their_points_is_refused() {
     let points = [Vector3::new(0.1, 0.0, 0.0)];

@@ -18,8 +18,9 @@ use crate::polynomial::gamma;
 use nalgebra::Vector3;
 
 /// Deviation of a normal from length 1 up to which it counts as normalised: five roundings, each of
-/// 2^-53, make its length and this measure of it. A smaller value would normalise again what is read
-/// from a file and move its last bits, and with them its id; pinned by `normals_settle` of scenes.
+/// 2^-53, make its length and this measure of it. A smaller value would normalise again what is
+/// read from a file and move its last bits, and with them its id; pinned by `normals_settle` of
+/// scenes.
 const NORMALISED: f64 = 3.0 * f64::EPSILON;
 
 /// The half-space `{x : normal·x <= offset}` of the world frame; checked when made.
@@ -54,7 +55,8 @@ pub enum HalfSpaceError {
 
 impl HalfSpace {
     /// The points x with `normal·x <= offset` (m), for an outward normal within 1e-6 of length 1,
-    /// which is normalised; the normal of a half-space makes the same half-space again, bit for bit.
+    /// which is normalised; the normal of a half-space makes the same half-space again, bit for
+    /// bit.
     ///
     /// # Errors
     /// Numbers that are not finite, or a normal that is farther from length 1.

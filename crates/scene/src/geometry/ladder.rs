@@ -39,8 +39,8 @@ impl Ladder {
     /// A ladder of these rungs, coarsest first.
     ///
     /// # Errors
-    /// A bad name, a number of rungs that is not accepted, compounds, and rungs that are not proven to contain
-    /// the same points or not in the order of their volumes.
+    /// A bad name, a number of rungs that is not accepted, compounds, and rungs that are not proven
+    /// to contain the same points or not in the order of their volumes.
     pub fn new(name: &str, rungs: Vec<Arc<Shape>>) -> Result<Self, LadderError> {
         check_name(name)?;
         if !(2..=MAX_RUNGS).contains(&rungs.len()) {

@@ -106,8 +106,8 @@ fn from_ordered(bits: u64) -> f64 {
     f64::from_bits(if bits >> 63 == 1 { bits & !(1 << 63) } else { !bits })
 }
 
-/// Finds the closest pair nearer than `max_distance_m`, by reaches that double until one is in them;
-/// and whether the search was completed. Blocks.
+/// Finds the closest pair nearer than `max_distance_m`, by reaches that double until one is in
+/// them; and whether the search was completed. Blocks.
 ///
 /// # Errors
 /// When a chunk panicked, or the question was abandoned.

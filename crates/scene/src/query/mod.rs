@@ -1,5 +1,6 @@
-//! Questions about a snapshot: pairs, everything within a margin, the closest pair, contact, states,
-//! clearances, rays. Each is a [`Question`](crate::crew::Question) for a [`Crew`](crate::Crew).
+//! Questions about a snapshot: pairs, everything within a margin, the closest pair, contact,
+//! states, clearances, rays. Each is a [`Question`](crate::crew::Question) for a
+//! [`Crew`](crate::Crew).
 //!
 //! `thing` is what stands in a pair; `solve` measures a
 //! pair, `decide` compares it with a threshold. The questions are in files of their own.

@@ -183,32 +183,35 @@ impl Rays {
         }
     }
 
-    /// Where a ball around a point of the ray first touches a plane.
-    fn plane(&self, slot: Slot, half_space: &WorldHalfSpace, ray: &Ray) -> Option<RayAnswer> {
-        let (normal, offset) = (half_space.half_space.normal(), half_space.half_space.offset());
+    /// Where a ball around a point of the ray first touches a plane: at height / sinking, each with
+    /// its error. None where it is proven to miss it.
+    fn plane(&self, slot: Slot, placed: &WorldHalfSpace, ray: &Ray) -> Option<RayAnswer> {
+        let (normal, offset) = (placed.half_space.normal(), placed.half_space.offset());
         let height = normal.dot(ray.origin()) - offset - self.radius_m;
-        let sinking = -normal.dot(ray.direction());
         let size = ray.origin().norm() + offset.abs() + self.radius_m;
-        let slack = half_space.slack_m(ray.origin().norm() + ray.max_length()) + 8.0 * f64::EPSILON * size;
+        let slack = placed.slack_m(ray.origin().norm()) + 8.0 * f64::EPSILON * size;
+        let sinking = -normal.dot(ray.direction());
+        // Without an error where no product is rounded: along a floor, say.
+        let rounding = 4.0 * f64::EPSILON * normal.component_mul(ray.direction()).abs().sum();
+        let tilt = placed.normal_error + rounding;
         let (lower, upper) = if height <= -slack {
             (0.0, 0.0)
-        } else if sinking <= 0.0 {
+        } else if sinking + tilt <= 0.0 && height > slack {
             return None;
         } else {
-            let scale = 1.0 / sinking;
-            // Of the quotient, whose denominator has an error of its own.
-            let relative = 8.0 * f64::EPSILON * (1.0 + scale);
-            let at = height * scale;
-            let error = slack * scale + relative * at.abs();
-            ((at - error).max(0.0), (at + error).max(0.0))
+            let up = 1.0 + 4.0 * f64::EPSILON;
+            let lower = if height > slack { (height - slack) / (sinking + tilt) / up } else { 0.0 };
+            let upper = if sinking > tilt { (height + slack) / (sinking - tilt) * up } else { f64::INFINITY };
+            (lower, upper.max(0.0))
         };
         if lower > ray.max_length() {
             return None;
         }
-        let point = ray.point(upper) - normal * self.radius_m;
-        let status = if upper > ray.max_length() { AnswerStatus::BracketWide } else { AnswerStatus::Converged };
-        let normal = Some(*normal);
-        Some(RayAnswer { status, hit: Some(slot), lower_m: lower, upper_m: upper, point: Some(point), normal })
+        let known = upper <= ray.max_length() && upper.is_finite();
+        let narrow = known && upper - lower <= self.accuracy * (size + upper);
+        let status = if narrow { AnswerStatus::Converged } else { AnswerStatus::BracketWide };
+        let point = known.then(|| ray.point(upper) - normal * self.radius_m);
+        Some(RayAnswer { status, hit: Some(slot), lower_m: lower, upper_m: upper, point, normal: Some(*normal) })
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use sublevel_core::body::{Shape, Solid};
 use sublevel_core::measure::{HalfSpace, Pose};
 
@@ -18,8 +18,7 @@ pub(crate) enum Thing<'a> {
     /// Solids of one object, coarsest first, at a world pose. `outer`: they only contain it, as the
     /// box around an sos-body does.
     Solid { rungs: &'a [Arc<Shape>], pose: &'a Pose, outer: bool },
-    /// A half-space of the world frame; its plane is known to within `slack_m` on points up to
-    /// `reach_m` from the origin.
+    /// A half-space of the world frame.
     HalfSpace(WorldHalfSpace),
     /// A point of the world frame, metres.
     Point(Vector3<f64>),
@@ -31,14 +30,16 @@ pub(crate) struct WorldHalfSpace {
     pub(crate) half_space: HalfSpace,
     /// About which it turns, metres.
     pub(crate) origin: Vector3<f64>,
-    /// Whether it was turned or moved here, and so rounded.
-    rounded: bool,
+    /// Bound of the error of its unit normal, from turning it.
+    pub(crate) normal_error: f64,
+    /// Bound of the error of its offset, metres; ∞ where it is too far away to be placed.
+    offset_error_m: f64,
 }
 
 impl WorldHalfSpace {
     /// A half-space given in the world frame.
     pub(crate) fn fixed(half_space: HalfSpace) -> Self {
-        Self { half_space, origin: Vector3::zeros(), rounded: false }
+        Self { half_space, origin: Vector3::zeros(), normal_error: 0.0, offset_error_m: 0.0 }
     }
 
     /// A half-space of a body frame where it stands.
@@ -46,21 +47,25 @@ impl WorldHalfSpace {
         if *pose == Pose::identity() {
             return Self::fixed(*half_space);
         }
-        let normal = pose.transform_direction(half_space.normal()).normalize();
-        let offset = half_space.offset() + normal.dot(pose.translation());
-        let placed = HalfSpace::new(normal, offset).unwrap_or(*half_space);
-        Self { half_space: placed, origin: *pose.translation(), rounded: true }
+        // A floor that was only moved keeps its normal, so that rays along it miss it.
+        let (normal, normal_error) = if *pose.rotation() == UnitQuaternion::identity() {
+            (*half_space.normal(), 0.0)
+        } else {
+            (pose.transform_direction(half_space.normal()).normalize(), 16.0 * f64::EPSILON)
+        };
+        let origin = *pose.translation();
+        let offset = half_space.offset() + normal.dot(&origin);
+        let offset_error_m = 8.0 * f64::EPSILON * (half_space.offset().abs() + origin.norm());
+        match HalfSpace::new(normal, offset) {
+            Ok(half_space) => Self { half_space, origin, normal_error, offset_error_m },
+            Err(_) => Self { half_space: *half_space, origin, normal_error, offset_error_m: f64::INFINITY },
+        }
     }
 
     /// Bound of the error of a signed distance of points within `reach_m` of the world's origin,
-    /// metres: of the normal, some ten roundings on the way from the plane's origin, and of the
-    /// offset.
+    /// metres.
     pub(crate) fn slack_m(&self, reach_m: f64) -> f64 {
-        if !self.rounded {
-            return 0.0;
-        }
-        let offset = self.half_space.offset().abs() + self.origin.norm();
-        16.0 * f64::EPSILON * (reach_m + offset)
+        self.normal_error * (reach_m + self.origin.norm()) + self.offset_error_m
     }
 }
 
@@ -99,9 +104,9 @@ impl<'a> Thing<'a> {
         }
     }
 
-    /// Lower bound of the distance from the boxes around two solids in their own frames, metres: the
-    /// largest gap along an edge of either (six of the fifteen directions of the separating axis
-    /// theorem; any of them bounds from below). −∞ where a side has no box.
+    /// Lower bound of the distance from the boxes around two solids in their own frames, metres:
+    /// the largest gap along an edge of either (six of the fifteen directions of the separating
+    /// axis theorem; any of them bounds from below). −∞ where a side has no box.
     pub(crate) fn box_gap_m(&self, other: &Self) -> f64 {
         let (Some(a), Some(b)) = (self.oriented_box(), other.oriented_box()) else { return f64::NEG_INFINITY };
         let between = b.center - a.center;

@@ -8,12 +8,13 @@ use sublevel_core::measure::{
     HalfSpace, Options, Pose, Ray, RayCast, WarmStart, cast_ray, distance_to_half_space, signed_distance,
 };
 use sublevel_scene::query::{
-    Ask, Clearance, Measure, Rays, Selection, StateVerdict, States, Within, closest_pair, combined,
+    AnswerStatus, Ask, Clearance, Measure, RayAnswer, Rays, Selection, StateVerdict, States, Within, closest_pair,
+    combined,
 };
-use sublevel_scene::{Crew, Geometry, Scene, Slot, Stop};
+use sublevel_scene::{Crew, Geometry, Scene, Slot, Stop, Update};
 use sublevel_testkit::Seeded;
 
-use crate::worlds::crowd;
+use crate::worlds::{crowd, floor, lookup, placement};
 
 /// Bracket of the signed distance of two objects, metres; none of two half-spaces.
 pub(crate) fn signed(scene: &Scene, [a, b]: [Slot; 2]) -> Option<[f64; 2]> {
@@ -249,6 +250,55 @@ fn rays_hit_what_is_first() {
         }
     }
     assert!(hits > 200, "{hits}");
+}
+
+/// One half-space at a pose, and rays of a length.
+fn cast_at_floor(pose: &Pose, rays: &[(Vector3<f64>, Vector3<f64>)], length_m: f64) -> Vec<RayAnswer> {
+    let bodies = [floor()];
+    let update = Update { upserts: vec![placement("floor", &bodies[0], *pose)], ..Update::default() };
+    let scene = Scene::new("hall", 0).expect("a scene").updated(&update, lookup(&bodies)).expect("placed");
+    let question = Rays::new(scene, Selection::all(), rays, (length_m, 0.0)).expect("rays");
+    Crew::new(1).expect("a thread").ask(Arc::new(question), Arc::default()).expect("answered").concat()
+}
+
+/// The oracle looks from the floor's own frame, where its plane is exact.
+#[test]
+fn rays_without_end_hit_turned_floors_within_their_brackets() {
+    let (mut random, mut hits) = (Seeded(77), 0);
+    for step in 0..2000 {
+        let pose = random.pose(3.0);
+        let (origin, direction) = (10.0 * random.unit(), random.unit());
+        let answer = cast_at_floor(&pose, &[(origin, direction)], f64::INFINITY)[0];
+        let inside = pose.rotation().inverse();
+        let (from, along) = (inside * (origin - pose.translation()), inside * direction);
+        let (height, sinking) = (from.z + 2.0, -along.z);
+        if height <= 0.0 {
+            assert!(answer.hit.is_some() && answer.upper_m == 0.0, "seed 77, {step}: {answer:?}");
+        } else if sinking > 1e-6 {
+            let at = height / sinking;
+            let slack = 1e-14 * (at + 20.0) * (1.0 + 1.0 / sinking);
+            let bracket = answer.lower_m - slack..=answer.upper_m + slack;
+            assert!(bracket.contains(&at), "seed 77, {step}: {at} {answer:?}");
+            assert_eq!(answer.status, AnswerStatus::Converged, "seed 77, {step}: {answer:?}");
+            hits += 1;
+        } else if sinking < -1e-6 {
+            assert!(answer.hit.is_none(), "seed 77, {step}: {answer:?}");
+        }
+    }
+    assert!(hits > 500, "{hits}");
+}
+
+#[test]
+fn rays_along_a_floor_are_decided_where_its_normal_is_known() {
+    let level = [(Vector3::new(0.0, 0.0, 1.0), Vector3::new(0.6, 0.8, 0.0))];
+    let moved = Pose::from_quaternion(Vector3::new(0.3, 0.1, 0.7), [0.0, 0.0, 0.0, 1.0]).expect("a pose");
+    assert!(cast_at_floor(&moved, &level, f64::INFINITY)[0].hit.is_none());
+    // Turned about its own normal: level but for rounding, which shows after 1e14 m.
+    let turned = Pose::from_quaternion(Vector3::new(0.3, 0.1, 0.7), [0.0, 0.0, 0.6, 0.8]).expect("a pose");
+    assert!(cast_at_floor(&turned, &level, 1e6)[0].hit.is_none());
+    let open = cast_at_floor(&turned, &level, f64::INFINITY)[0];
+    assert_eq!((open.status, open.upper_m, open.point), (AnswerStatus::BracketWide, f64::INFINITY, None));
+    assert!(open.lower_m > 1e13, "{open:?}");
 }
 
 #[test]
