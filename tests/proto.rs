@@ -1,9 +1,10 @@
 //! The rules `proto/` keeps: those of buf's standard lint that can be read off the descriptors, and
 //! a comment everywhere.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 
 use prost::Message;
+use prost_types::field_descriptor_proto::Label;
 use prost_types::{DescriptorProto, FileDescriptorProto, FileDescriptorSet};
 use sublevel::service::proto::FILE_DESCRIPTOR_SET;
 
@@ -87,4 +88,71 @@ fn everything_is_commented() {
 
 fn fields(message: &DescriptorProto, check: impl Fn(i32, &str)) {
     (0..).zip(&message.field).for_each(|(j, field)| check(j, field.name()));
+}
+
+/// Everything that clients of an earlier version rely on, a line each: fields with their numbers
+/// and types, values, calls.
+fn promises() -> BTreeSet<String> {
+    let mut promises = BTreeSet::new();
+    for file in files() {
+        for message in &file.message_type {
+            promise_fields(message, message.name(), &mut promises);
+        }
+        for enumeration in &file.enum_type {
+            let value = |value: &prost_types::EnumValueDescriptorProto| {
+                format!("enum {} {} = {}", enumeration.name(), value.name(), value.number())
+            };
+            promises.extend(enumeration.value.iter().map(value));
+        }
+        for service in &file.service {
+            for method in &service.method {
+                let streams = |streams| if streams { "stream " } else { "" };
+                promises.insert(format!(
+                    "call {}.{} {}-> {}",
+                    service.name(),
+                    method.name(),
+                    streams(method.client_streaming()),
+                    streams(method.server_streaming()).trim_end(),
+                ));
+            }
+        }
+    }
+    promises
+}
+
+fn promise_fields(message: &DescriptorProto, path: &str, promises: &mut BTreeSet<String>) {
+    for field in &message.field {
+        let kind = match field.type_name() {
+            "" => format!("{:?}", field.r#type()).to_lowercase(),
+            name => name.trim_start_matches(".sublevel.v1.").to_owned(),
+        };
+        let presence = match field.oneof_index {
+            _ if field.proto3_optional() => "optional ".to_owned(),
+            Some(index) => format!("oneof {} ", message.oneof_decl[index as usize].name()),
+            None => String::new(),
+        };
+        let label = if field.label() == Label::Repeated { "repeated " } else { "" };
+        promises.insert(format!("field {path}.{} = {}: {presence}{label}{kind}", field.name(), field.number()));
+    }
+    for nested in &message.nested_type {
+        promise_fields(nested, &format!("{path}.{}", nested.name()), promises);
+    }
+}
+
+/// `UPDATE_PROMISES=1 cargo test --test proto` adds what is new; what is gone or changed is removed
+/// from the file by hand, with a major version.
+#[test]
+fn nothing_that_clients_rely_on_is_gone() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/proto/promises.txt");
+    let kept: BTreeSet<String> = std::fs::read_to_string(path).unwrap_or_default().lines().map(str::to_owned).collect();
+    let now = promises();
+    let gone: Vec<&String> = kept.difference(&now).collect();
+    assert!(gone.is_empty(), "clients of an earlier version break without: {gone:#?}");
+    if std::env::var_os("UPDATE_PROMISES").is_some() {
+        let lines: Vec<String> = now.into_iter().collect();
+        std::fs::write(path, lines.join("\n") + "\n").expect("written");
+        return;
+    }
+    let new: Vec<&String> = now.difference(&kept).collect();
+    assert!(new.is_empty(), "add these with UPDATE_PROMISES=1 cargo test --test proto: {new:#?}");
 }

@@ -239,7 +239,6 @@ pub fn fit_group(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::Solid;
     use nalgebra::Vector3;
 
     #[test]
@@ -253,11 +252,9 @@ mod tests {
             let bodies: Vec<Body> = radii.iter().map(|radius| ball(*radius)).collect();
             as_ladder("steps", FitOutput::new(Vec::new(), Shapes::Bodies(bodies)))
         };
-        let radii = |made: &FitOutput| {
-            let ladder = made.ladder.as_ref().expect("a ladder");
-            ladder.rungs().iter().map(|rung| rung.circumscribed().radius).collect::<Vec<_>>()
-        };
-        assert_eq!(radii(&made(&[1.0, 0.8, 0.9, 0.7, 0.75])), [1.0, 0.8, 0.7]);
+        let ladder = made(&[1.0, 0.8, 0.9, 0.7, 0.75]).ladder.expect("a ladder");
+        let ids: Vec<_> = ladder.rungs().iter().map(|rung| *rung.id()).collect();
+        assert_eq!(ids, [1.0, 0.8, 0.7].map(|radius| *ball(radius).id()));
         let Shapes::Bodies(bodies) = made(&[1.0, 0.8, 0.9]).shapes else { panic!("bodies") };
         assert_eq!(bodies.len(), 3);
         assert!(made(&[0.8, 0.9]).ladder.is_none());

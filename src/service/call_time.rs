@@ -28,9 +28,9 @@ pub(super) async fn until(instant: Option<Instant>) {
     }
 }
 
-/// How long before the client's deadline a call ends: the transport looks at its own clock first
-/// otherwise, and says CANCELLED.
-const BEFORE_DEADLINE: Duration = Duration::from_millis(1);
+/// How long before the client's deadline a call ends: a twentieth of its time, at least and at most
+/// this. The client looks at a clock of its own, too, and may say CANCELLED.
+const BEFORE_DEADLINE: [Duration; 2] = [Duration::from_millis(1), Duration::from_millis(10)];
 
 impl CallTime {
     /// Of a request that arrives now.
@@ -42,7 +42,8 @@ impl CallTime {
     /// The deadline of the client of a call that arrives now.
     pub(super) fn deadline(headers: &http::HeaderMap) -> Option<Instant> {
         let timeout = headers.get("grpc-timeout").and_then(|value| value.to_str().ok()).and_then(timeout)?;
-        Instant::now().checked_add(timeout.saturating_sub(BEFORE_DEADLINE))
+        let [least, most] = BEFORE_DEADLINE;
+        Instant::now().checked_add(timeout.saturating_sub((timeout / 20).clamp(least, most)))
     }
 
     /// Of a message that arrives now, without a deadline.

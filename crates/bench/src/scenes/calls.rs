@@ -13,8 +13,8 @@ use sublevel::service::proto::evaluate_request::Question;
 use sublevel::service::proto::query_service_client::QueryServiceClient;
 use sublevel::service::proto::{EvaluateRequest, Layout, Measure, PairList, UploadBlobRequest, Verdict};
 
+use super::bricks::{brick, bricks, numbers, seconds};
 use super::panda::Task;
-use super::{brick, bricks, numbers, seconds};
 use crate::loopback::Loopback;
 
 /// A call, and what it is compared with.

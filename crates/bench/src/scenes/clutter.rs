@@ -11,7 +11,7 @@ use sublevel::measure::PoseError;
 use sublevel::scene::query::{StateVerdict, States};
 use sublevel::scene::{Crew, Geometry, Ladder, Scene, Slot, Update};
 
-use super::{anywhere, numbers, placement, seconds};
+use super::bricks::{anywhere, numbers, placement, seconds};
 use crate::comparison::Random;
 
 /// Objects in a cube of this half edge, metres.

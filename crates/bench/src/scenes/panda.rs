@@ -12,7 +12,7 @@ use sublevel::fit::{FitOptions, ReadOptions, read_mesh};
 use sublevel::measure::{Pose, PoseError};
 use sublevel::scene::{Geometry, Scene, Subject, Update};
 
-use super::placement;
+use super::bricks::placement;
 use crate::comparison::{FitCache, Random};
 
 /// Frame of each joint in the frame of the link before: a turn about x (radians), then where it is

@@ -12,7 +12,7 @@ use sublevel::measure::{Pose, PoseError};
 use sublevel::scene::query::Measure;
 use tokio::time::MissedTickBehavior;
 
-use super::{anywhere, brick};
+use super::bricks::{anywhere, brick};
 use crate::comparison::Random;
 use crate::loopback::Loopback;
 

@@ -9,7 +9,7 @@ use sublevel::measure::Pose;
 use sublevel::scene::query::{Ask, Measure, Operand, Pairs, Selection, Within, combined};
 use sublevel::scene::{Crew, Scene, Slot};
 
-use super::bricks;
+use super::bricks::bricks;
 use crate::comparison::Random;
 use crate::comparison::sweep::median;
 

@@ -1,6 +1,11 @@
 //! Pairs within an influence distance, state by state, with gradients.
 
-use sublevel_core::measure::{DEFAULT_ACCURACY, DEFAULT_DEPTH_ACCURACY, Pose, WithinMargin, within_margin};
+use std::collections::BTreeMap;
+
+use sublevel_core::body::Shape;
+use sublevel_core::measure::{
+    DEFAULT_ACCURACY, DEFAULT_DEPTH_ACCURACY, Distance, Options, Pose, WithinMargin, distance_batch, within_margin,
+};
 
 use super::answer::{Answer, Verdict};
 use super::ask::{Ask, AskError, Measure, options};
@@ -99,24 +104,79 @@ impl Clearance {
         self.placed.states()
     }
 
-    fn state(&self, state: usize, solver: &Solver<'_>, poses: &mut Vec<Pose>) -> StateClearance {
+    /// What is near in a state, in no order; pairs that may be near in other states of the chunk, too,
+    /// go to the batches.
+    fn look(
+        &self,
+        state: usize,
+        (solver, poses): (&Solver<'_>, &mut Vec<Pose>),
+        (place, batches): (usize, &mut Batches),
+    ) -> StateClearance {
         if solver.stop.is_set() || self.placed.poses(state, poses).is_none() {
             return StateClearance::default();
         }
         let mut rows = Vec::new();
         self.placed.visit(poses, self.influence_m, |index, other, threshold| {
             let (slot, a) = self.placed.moving(index, poses);
-            let other = match other {
+            let thing = match other {
                 Other::Moving(other) => Some(self.placed.moving(other, poses)),
                 Other::Standing(other) => self.placed.standing(other).map(|thing| (other, thing)),
             };
-            let Some((other, b)) = other else { return true };
-            let pair = Pair { a, b, slots: Some(PairSlots { a: slot, b: other }) };
+            let Some((other_slot, b)) = thing else { return true };
+            // Distances say nothing below 0.
+            if let (Other::Standing(_), Some(_), Some(_)) = (other, smooth(&a), smooth(&b))
+                && threshold >= 0.0
+            {
+                if a.box_gap_m(&b) <= threshold {
+                    batches.push((index, other_slot), Near { place, pose: poses[index], threshold });
+                }
+                return true;
+            }
+            let pair = Pair { a, b, slots: Some(PairSlots { a: slot, b: other_slot }) };
             if let Some(answer) = self.within(solver, &pair, threshold) {
-                rows.push(ClearanceRow { pair: [slot, other], answer, padding_m: threshold - self.influence_m });
+                rows.push(self.row([slot, other_slot], answer, threshold));
             }
             !solver.stop.is_set()
         });
+        StateClearance { rows, checked: !solver.stop.is_set() }
+    }
+
+    fn row(&self, pair: [Slot; 2], answer: Answer, threshold: f64) -> ClearanceRow {
+        ClearanceRow { pair, answer, padding_m: threshold - self.influence_m }
+    }
+
+    /// Measures a moving body where it stands in several states against one that stands still.
+    fn measure_batch(
+        &self,
+        solver: &Solver<'_>,
+        ((index, other), near): ((usize, Slot), &[Near]),
+        states: &mut [StateClearance],
+    ) {
+        let poses: Vec<Pose> = near.iter().map(|near| near.pose).collect();
+        let (Some(standing), Some(first)) = (self.placed.standing(other), poses.first()) else { return };
+        let ((slot, moving), mut found) = (self.placed.moving_at(index, first), vec![Distance::default(); poses.len()]);
+        let (Some((a, _)), Some((b, pose_b))) = (smooth(&moving), smooth(&standing)) else { return };
+        if distance_batch(b, pose_b, a, &poses, &self.options(solver), &mut found).is_err() {
+            return;
+        }
+        for (Near { place, pose, threshold }, found) in near.iter().zip(&found) {
+            let state = &mut states[*place];
+            if found.lower > *threshold {
+                continue;
+            }
+            let answer = if found.lower > 0.0 {
+                solver.distance(found, &Solids { a: b, pose_a: pose_b, b: a, pose_b: pose }).swapped()
+            } else {
+                let (_, moving) = self.placed.moving_at(index, pose);
+                solver.measure(0, &Pair { a: moving, b: standing, slots: Some(PairSlots { a: slot, b: other }) })
+            };
+            state.checked &= !solver.stop.is_set();
+            state.rows.push(self.row([slot, other], answer, *threshold));
+        }
+    }
+
+    /// The nearest pairs of a state, in the order of names.
+    fn order(&self, rows: &mut Vec<ClearanceRow>) {
         let ranks = &self.placed.scene().structure.ranks;
         let rank = |row: &ClearanceRow| row.pair.map(|slot| ranks[slot as usize]);
         if rows.len() > self.max_pairs {
@@ -125,12 +185,15 @@ impl Clearance {
             rows.truncate(self.max_pairs);
         }
         rows.sort_by_key(rank);
-        StateClearance { rows, checked: !solver.stop.is_set() }
+    }
+
+    fn options<'a>(&self, solver: &Solver<'a>) -> Options<'a> {
+        options(self.accuracy, self.accuracy.max(DEFAULT_DEPTH_ACCURACY), solver.stop)
     }
 
     /// The signed distance unless it is beyond the threshold.
     fn within(&self, solver: &Solver<'_>, pair: &Pair<'_>, threshold: f64) -> Option<Answer> {
-        let options = options(self.accuracy, self.accuracy.max(DEFAULT_DEPTH_ACCURACY), solver.stop);
+        let options = self.options(solver);
         // The search for the distance that decides is the answer, too, where the two are apart.
         if let (
             Thing::Solid { rungs: rungs_a, pose: pose_a, outer: false },
@@ -169,9 +232,47 @@ impl Question for Clearance {
         with_starts(|starts| {
             let cache = (!self.ask.cold).then_some(starts);
             let solver = Solver { ask: &self.ask, cache, stop };
-            let mut poses = Vec::new();
+            let (mut poses, mut batches) = (Vec::new(), Batches::default());
             let states = chunk * CHUNK..((chunk + 1) * CHUNK).min(self.placed.states());
-            states.map(|state| self.state(state, &solver, &mut poses)).collect()
+            let look = |(place, state)| self.look(state, (&solver, &mut poses), (place, &mut batches));
+            let mut states: Vec<StateClearance> = states.enumerate().map(look).collect();
+            for (pair, near) in &batches.0 {
+                self.measure_batch(&solver, (*pair, near), &mut states);
+            }
+            states.iter_mut().for_each(|state| self.order(&mut state.rows));
+            states
         })
+    }
+}
+
+/// Pairs of a moving body, by its position, and one that stands still, both smooth, with the states
+/// of a chunk in which they may be near.
+#[derive(Debug, Default)]
+struct Batches(BTreeMap<(usize, Slot), Vec<Near>>);
+
+/// A state in which a pair may be near.
+#[derive(Debug)]
+struct Near {
+    /// Position of the state in its chunk.
+    place: usize,
+    /// World pose of the moving body.
+    pose: Pose,
+    threshold: f64,
+}
+
+impl Batches {
+    fn push(&mut self, pair: (usize, Slot), near: Near) {
+        self.0.entry(pair).or_default().push(near);
+    }
+}
+
+/// A thing that is one smooth body, which [`distance_batch`] measures several at a time.
+fn smooth<'a>(thing: &Thing<'a>) -> Option<(&'a Shape, &'a Pose)> {
+    match thing {
+        Thing::Solid { rungs: [solid], pose, outer: false } => match &**solid {
+            Shape::Body(body) if body.is_smooth() => Some((solid, pose)),
+            Shape::Body(_) | Shape::Compound(_) => None,
+        },
+        _ => None,
     }
 }

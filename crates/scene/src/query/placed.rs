@@ -158,8 +158,13 @@ impl Placed {
 
     /// The thing that a moving object is at a pose.
     pub(crate) fn moving<'a>(&'a self, index: usize, poses: &'a [Pose]) -> (Slot, Thing<'a>) {
+        self.moving_at(index, &poses[index])
+    }
+
+    /// The thing that a moving object is at one pose.
+    pub(crate) fn moving_at<'a>(&'a self, index: usize, pose: &'a Pose) -> (Slot, Thing<'a>) {
         let moving = &self.moving[index];
-        (moving.slot, Thing::object(&moving.object, &poses[index]))
+        (moving.slot, Thing::object(&moving.object, pose))
     }
 
     /// The thing that stands in a slot.

@@ -138,7 +138,7 @@ fn the_closest_pair_is_the_closest_pair() {
 #[test]
 fn states_are_free_exactly_if_no_pair_is_near() {
     let crew = Crew::new(2).expect("threads");
-    let mut verdicts = [0; 2];
+    let (mut verdicts, mut apart_rows) = ([0; 2], 0);
     for seed in 0..10 {
         // Few and many objects that stand still: without the tree and with it.
         let scene = crowd(200 + seed, if seed % 2 == 0 { 25 } else { 90 }, 3.0);
@@ -193,10 +193,18 @@ fn states_are_free_exactly_if_no_pair_is_near() {
                 let answer = &row.answer;
                 assert!(answer.lower <= upper && lower <= answer.upper, "{label} {row:?}");
                 assert!(near.iter().any(|(pair, _)| *pair == row.pair || [pair[1], pair[0]] == row.pair), "{label}");
+                if let (true, Some([on_a, on_b]), Some(normal)) = (answer.lower > 0.0, answer.witnesses, answer.normal)
+                {
+                    let apart = on_a - on_b - answer.upper * normal;
+                    assert!(apart.norm() <= 1e-6, "{label} {row:?}");
+                    let [of_a, of_b] = answer.gradients.expect("apart").map(|twist| twist.linear);
+                    assert!((of_a - normal).norm() < 1e-12 && (of_b + normal).norm() < 1e-12, "{label} {row:?}");
+                    apart_rows += 1;
+                }
             }
         }
     }
-    assert!(verdicts.iter().all(|&count| count > 30), "{verdicts:?}");
+    assert!(verdicts.iter().all(|&count| count > 30) && apart_rows > 30, "{verdicts:?} {apart_rows}");
 }
 
 fn numbers(pose: &Pose) -> [f64; 7] {

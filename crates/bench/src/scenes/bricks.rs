@@ -1,0 +1,57 @@
+//! What all of these measurements are made of: bricks at random poses, and a clock.
+
+use std::error::Error;
+use std::sync::Arc;
+use std::time::Instant;
+
+use nalgebra::Vector3;
+use sublevel::body::{Body, BodyId};
+use sublevel::measure::{Pose, PoseError};
+use sublevel::scene::{Geometry, Placement, Scene, Update};
+
+use crate::comparison::Random;
+use crate::comparison::sweep::median;
+
+/// Median time of eleven runs after one that finds everything cold, seconds.
+pub(super) fn seconds(mut run: impl FnMut() -> Result<(), Box<dyn Error>>) -> Result<f64, Box<dyn Error>> {
+    run()?;
+    let mut times = Vec::new();
+    for _ in 0..11 {
+        let start = Instant::now();
+        run()?;
+        times.push(start.elapsed().as_secs_f64());
+    }
+    Ok(median(&times))
+}
+
+/// A superellipsoid of degree 6, metres.
+pub(super) fn brick() -> Result<Body, Box<dyn Error>> {
+    Ok(Body::superellipsoid("brick", Vector3::zeros(), Vector3::new(0.5, 0.3, 0.2), 6)?)
+}
+
+/// A scene of so many bricks in a cube of this half edge, metres.
+pub(super) fn bricks(seed: u64, count: usize, reach_m: f64) -> Result<Scene, Box<dyn Error>> {
+    let (mut random, body) = (Random(seed), Geometry::from(brick()?));
+    let place = |index: usize| Ok(placement(&format!("brick-{index}"), body.id(), anywhere(&mut random, reach_m)?));
+    let upserts = (0..count).map(place).collect::<Result<_, PoseError>>()?;
+    let update = Update { upserts, ..Update::default() };
+    Ok(Scene::new("bench", 0)?.updated(&update, |_: &BodyId| Some(body.clone()))?)
+}
+
+/// An object without group, padding and holder.
+pub(super) fn placement(name: &str, body: &BodyId, pose: Pose) -> Placement {
+    let (name, group): (Arc<str>, Arc<str>) = (name.into(), "".into());
+    Placement { name, body: *body, pose: Some(pose), group, padding_m: None, attachment: None }
+}
+
+/// A random pose in a cube of this half edge, metres.
+pub(super) fn anywhere(random: &mut Random, reach_m: f64) -> Result<Pose, PoseError> {
+    let (rotation, translation) = (random.rotation(), Vector3::from_fn(|_, _| reach_m * random.signed()));
+    Pose::from_quaternion(translation, rotation.coords.into())
+}
+
+/// As calls pack it: translation, then quaternion x y z w.
+pub(super) fn numbers(pose: &Pose) -> [f64; 7] {
+    let (t, q) = (pose.translation(), pose.rotation().coords);
+    [t.x, t.y, t.z, q.x, q.y, q.z, q.w]
+}
