@@ -26,7 +26,12 @@ pub(crate) struct BroadPhase {
 #[derive(Clone)]
 pub(crate) struct Tree {
     boxes: Bvh,
+    /// World balls by slot; of slots without a box anything.
+    balls: Vec<WorldBall>,
 }
+
+/// A ball of the world frame: centre and radius, metres.
+pub(crate) type WorldBall = (Vector3<f64>, f64);
 
 impl std::fmt::Debug for Tree {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -65,30 +70,39 @@ impl Tree {
     fn new(structure: &Structure, poses: &Poses) -> Self {
         let boxes = structure.objects().filter_map(|(slot, object)| Some((slot, world_box(object, poses.get(slot))?)));
         let leaves: Vec<_> = boxes.collect();
+        let mut balls = Vec::new();
+        structure.objects().for_each(|(slot, object)| set_ball(&mut balls, slot, object, poses));
         if leaves.len() < 3 {
             // parry numbers so few leaves itself when it builds a tree of them.
             let mut boxes = Bvh::new();
             leaves.into_iter().for_each(|(slot, of)| boxes.insert(of, slot));
-            return Self { boxes };
+            return Self { boxes, balls };
         }
         let leaves = leaves.into_iter().map(|(slot, of)| (slot as usize, of));
-        Self { boxes: Bvh::from_iter(BvhBuildStrategy::Binned, leaves.collect::<Vec<_>>()) }
+        Self { boxes: Bvh::from_iter(BvhBuildStrategy::Binned, leaves.collect::<Vec<_>>()), balls }
     }
 
     fn updated(&self, structure: &Structure, poses: &Poses, changed: &[Slot]) -> Self {
         let (mut boxes, mut workspace) = (self.boxes.clone(), BvhWorkspace::default());
+        let mut balls = self.balls.clone();
         for &slot in changed {
-            let now = structure.object(slot).and_then(|object| world_box(object, poses.get(slot)));
-            match now {
-                Some(now) => {
+            let object = structure.object(slot);
+            match object.and_then(|object| Some((object, world_box(object, poses.get(slot))?))) {
+                Some((object, now)) => {
                     boxes.insert_or_update_partially(now, slot, 0.0);
+                    set_ball(&mut balls, slot, object, poses);
                 }
                 None => boxes.remove(slot),
             }
         }
         boxes.refit(&mut workspace);
         boxes.optimize_incremental(&mut workspace);
-        Self { boxes }
+        Self { boxes, balls }
+    }
+
+    /// A ball around what stands in a slot; none where there is no box.
+    pub(crate) fn ball(&self, slot: Slot) -> Option<WorldBall> {
+        self.balls.get(slot as usize).copied()
     }
 
     /// Slots of all objects whose boxes meet one.
@@ -115,6 +129,17 @@ impl Tree {
             }
             reach = visit(slot).min(reach);
         }
+    }
+}
+
+fn set_ball(balls: &mut Vec<WorldBall>, slot: Slot, object: &Object, poses: &Poses) {
+    let slot_at = slot as usize;
+    if balls.len() <= slot_at {
+        balls.resize(slot_at + 1, (Vector3::zeros(), f64::INFINITY));
+    }
+    if let Some(solid) = object.solids().last() {
+        let ball = solid.circumscribed();
+        balls[slot_at] = (poses.get(slot).transform_point(&ball.center), ball.radius);
     }
 }
 

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::sync::Arc;
 use std::time::Instant;
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use sublevel::body::{Body, BodyId};
 use sublevel::measure::{Pose, PoseError};
 use sublevel::scene::{Geometry, Placement, Scene, Update};
@@ -36,6 +36,23 @@ pub(super) fn bricks(seed: u64, count: usize, reach_m: f64) -> Result<Scene, Box
     let upserts = (0..count).map(place).collect::<Result<_, PoseError>>()?;
     let update = Update { upserts, ..Update::default() };
     Ok(Scene::new("bench", 0)?.updated(&update, |_: &BodyId| Some(body.clone()))?)
+}
+
+/// A store room of so many bricks: side by side with gaps of 2.5 to 6.5 cm, each turned by a degree.
+pub(super) fn stacked(seed: u64, count: usize) -> Result<Scene, Box<dyn Error>> {
+    let (mut random, body) = (Random(seed), Geometry::from(brick()?));
+    let side = (count as f64).cbrt().ceil() as usize;
+    let place = |index: usize| {
+        let cell = [index % side, index / side % side, index / side / side].map(|at| at as f64);
+        let middle = Vector3::from(cell).component_mul(&Vector3::new(1.045, 0.645, 0.445));
+        let translation = middle + 0.01 * Vector3::from_fn(|_, _| random.signed());
+        let rotation = UnitQuaternion::new(0.02 * random.direction());
+        let pose = Pose::from_quaternion(translation, rotation.coords.into())?;
+        Ok(placement(&format!("brick-{index}"), body.id(), pose))
+    };
+    let upserts = (0..count).map(place).collect::<Result<_, PoseError>>()?;
+    let update = Update { upserts, ..Update::default() };
+    Ok(Scene::new("store room", 0)?.updated(&update, |_: &BodyId| Some(body.clone()))?)
 }
 
 /// An object without group, padding and holder.

@@ -17,7 +17,7 @@ use sublevel::scene::Crew;
 
 use super::Machine;
 use super::comparison::FitCache;
-use bricks::{bricks, seconds};
+use bricks::{seconds, stacked};
 use calls::Call;
 use clutter::Clutter;
 use poses_at_rate::Ages;
@@ -66,7 +66,7 @@ pub fn scenes(
     announce("poses at 1 kHz")?;
     let ages = poses_at_rate::ages(if quick { 2.0 } else { 10.0 })?;
     announce("forks")?;
-    let scene = bricks(5, 10_000, ticks::reach_m(10_000))?;
+    let scene = stacked(5, 10_000)?;
     let fork_us = 1e6 * seconds(|| scene.fork("fork").map(drop).map_err(Into::into))?;
     announce("ladders")?;
     let clutter = clutter::clutter(&crew)?;

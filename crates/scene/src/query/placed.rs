@@ -6,8 +6,8 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use sublevel_core::measure::Pose;
 
-use super::thing::{Thing, WorldBall, ball_gap};
-use crate::broad_phase::{Tree, grown, world_box};
+use super::thing::{Thing, ball_gap};
+use crate::broad_phase::{Tree, WorldBall, grown, world_box};
 use crate::object::{Object, Slot};
 use crate::pair_cache::PairCache;
 use crate::poses::compose;

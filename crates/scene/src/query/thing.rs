@@ -6,11 +6,9 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use sublevel_core::body::{Shape, Solid};
 use sublevel_core::measure::{HalfSpace, Pose};
 
+use crate::broad_phase::WorldBall;
 use crate::geometry::Geometry;
 use crate::object::{Object, Slot};
-
-/// A ball of the world frame: centre and radius, metres.
-pub(crate) type WorldBall = (Vector3<f64>, f64);
 
 /// One side of a pair, where it stands.
 #[derive(Clone, Copy, Debug)]
@@ -104,22 +102,17 @@ impl<'a> Thing<'a> {
         }
     }
 
-    /// Lower bound of the distance from the boxes around two solids in their own frames, metres:
-    /// the largest gap along an edge of either (six of the fifteen directions of the separating
-    /// axis theorem; any of them bounds from below). −∞ where a side has no box.
+    /// Lower bound of the signed distance from the boxes around two solids in their own frames,
+    /// metres. −∞ where a side has no box.
     pub(crate) fn box_gap_m(&self, other: &Self) -> f64 {
-        let (Some(a), Some(b)) = (self.oriented_box(), other.oriented_box()) else { return f64::NEG_INFINITY };
-        let between = b.center - a.center;
-        let rotation = a.axes.tr_mul(&b.axes);
-        let (in_a, in_b) = (a.axes.tr_mul(&between), b.axes.tr_mul(&between));
-        let turned = rotation.abs();
-        let (reach_a, reach_b) = (a.half + turned * b.half, b.half + turned.tr_mul(&a.half));
-        let gap = (in_a.abs() - reach_a).max().max((in_b.abs() - reach_b).max());
-        // Some twenty roundings, each relative to the largest length that occurs.
-        gap - 64.0 * f64::EPSILON * (a.center.amax() + b.center.amax() + a.half.amax() + b.half.amax())
+        match (self.oriented_box(), other.oriented_box()) {
+            (Some(a), Some(b)) => a.gap_m(&b),
+            _ => f64::NEG_INFINITY,
+        }
     }
 
-    fn oriented_box(&self) -> Option<OrientedBox> {
+    /// The box around a solid in its own frame, where it stands.
+    pub(crate) fn oriented_box(&self) -> Option<OrientedBox> {
         let Self::Solid { rungs, pose, .. } = self else { return None };
         let bounds = rungs.last()?.bounding_box();
         let (middle, half) = ((bounds.max + bounds.min) * 0.5, (bounds.max - bounds.min) * 0.5);
@@ -129,10 +122,33 @@ impl<'a> Thing<'a> {
 }
 
 /// A box with its edges along the columns of a rotation, metres, world frame.
-struct OrientedBox {
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OrientedBox {
     center: Vector3<f64>,
     axes: Matrix3<f64>,
     half: Vector3<f64>,
+}
+
+impl OrientedBox {
+    /// Lower bound of the signed distance of what is inside, metres, rounding included: the distance
+    /// of one box from the box along the same axes around the other, or the other way round.
+    pub(crate) fn gap_m(&self, other: &Self) -> f64 {
+        let (a, b) = (self, other);
+        let between = b.center - a.center;
+        let rotation = a.axes.tr_mul(&b.axes);
+        let (in_a, in_b) = (a.axes.tr_mul(&between), b.axes.tr_mul(&between));
+        let turned = rotation.abs();
+        let (reach_a, reach_b) = (a.half + turned * b.half, b.half + turned.tr_mul(&a.half));
+        let gap = gap_of_sides(&(in_a.abs() - reach_a)).max(gap_of_sides(&(in_b.abs() - reach_b)));
+        // Some twenty roundings, each relative to the largest length that occurs.
+        gap - 64.0 * f64::EPSILON * (a.center.amax() + b.center.amax() + a.half.amax() + b.half.amax())
+    }
+}
+
+/// Signed distance of two boxes along the same axes from their gaps along these, metres.
+fn gap_of_sides(gaps: &Vector3<f64>) -> f64 {
+    let largest = gaps.max();
+    if largest > 0.0 { gaps.sup(&Vector3::zeros()).norm() } else { largest }
 }
 
 /// Lower bound of the distance of two balls, rounding included, metres.

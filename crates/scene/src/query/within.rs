@@ -64,9 +64,6 @@ impl Within {
             ) = (&pair.a, &pair.b)
             && let ([a], [b]) = (rungs_a, rungs_b)
         {
-            if pair.a.ball_gap_m(&pair.b) > threshold || pair.a.box_gap_m(&pair.b) > threshold {
-                return None;
-            }
             let options = self.ask.options(index, solver.stop);
             let found = solver.warm(pair.slots, [0; 2], Measure::Distance, |warm| {
                 within_margin(&**a, pose_a, &**b, pose_b, threshold, &options, warm)
