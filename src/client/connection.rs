@@ -5,6 +5,7 @@ use std::time::Duration;
 use tonic::transport::{Channel, Endpoint};
 
 use super::error::{ClientError, root_cause};
+use crate::service::limits::MAX_MESSAGE_BYTES;
 use crate::service::proto;
 use crate::service::proto::server_service_client::ServerServiceClient;
 
@@ -59,6 +60,9 @@ impl Client {
             .connect_timeout(Duration::from_secs(5))
             .timeout(patience)
             .tcp_nodelay(true)
+            // An answer comes without waiting on the way.
+            .initial_stream_window_size(MAX_MESSAGE_BYTES as u32)
+            .initial_connection_window_size(2 * MAX_MESSAGE_BYTES as u32)
             .connect()
             .await
             .map_err(|error| ClientError::Unreachable { url: url.into(), why: root_cause(&error) })?;

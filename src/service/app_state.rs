@@ -7,14 +7,14 @@ use std::thread;
 use tokio::sync::{Semaphore, oneshot, watch};
 use tonic::Status;
 
-use crate::scene::{Crew, Panicked, Question, Stop};
+use crate::scene::{Crew, Panicked, Question, Scene, Stop};
 use crate::store::{Catalogue, CatalogueError};
 
 use super::blobs::Blobs;
 use super::body_mesh::Meshes;
 use super::call_time::{CallTime, until};
 use super::error;
-use super::limits::LOADING_PATIENCE;
+use super::limits::{LOADING_PATIENCE, SMALL_SCENE};
 
 /// Shared by all handlers. Work that blocks passes a limit first, so that one kind of it cannot
 /// take every thread.
@@ -103,12 +103,19 @@ impl AppState {
         ended(on_thread(&self.solving, move || search(&flag)), &stop, time).await?
     }
 
-    /// Prepares a question, such as by making the tree of a scene.
+    /// Prepares a question about a scene, such as by making its tree: at once for small scenes, else
+    /// not on a thread that serves connections.
     pub(super) async fn prepare<T: Send + 'static>(
         &self,
+        scene: &Scene,
         prepare: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Status> {
-        on_thread(&self.solving, prepare).await
+        if scene.len() <= SMALL_SCENE { Ok(prepare()) } else { self.work(prepare).await }
+    }
+
+    /// Work of some milliseconds, such as drawing a mesh.
+    pub(super) async fn work<T: Send + 'static>(&self, work: impl FnOnce() -> T + Send + 'static) -> Result<T, Status> {
+        on_thread(&self.solving, work).await
     }
 
     /// The catalogue; waits a little while it is loading, so that a client that starts along with

@@ -15,7 +15,7 @@ impl BlobService for BlobCalls {
     async fn upload_blob(&self, request: Request<UploadBlobRequest>) -> Result<Response<UploadBlobResponse>, Status> {
         let (app, request) = (self.0.clone(), request.into_inner());
         // The hash of a hundred megabytes takes a while.
-        let response = self.0.prepare(move || app.blobs().add(&request)).await??;
+        let response = self.0.work(move || app.blobs().add(&request)).await??;
         Ok(Response::new(response))
     }
 

@@ -49,7 +49,7 @@ impl BodyService for Bodies {
             };
             Ok::<_, Status>((body_wire::summary(&body), content))
         };
-        let (body, content) = self.0.prepare(written).await??;
+        let (body, content) = self.0.work(written).await??;
         Ok(Response::new(GetBodyResponse { body: Some(body), content: Some(content) }))
     }
 
@@ -83,7 +83,7 @@ impl BodyService for Bodies {
         }
         let body = self.find(&id).await?;
         let app = self.0.clone();
-        let mesh = self.0.prepare(move || app.meshes().get(&body, divisions)).await?;
+        let mesh = self.0.work(move || app.meshes().get(&body, divisions)).await?;
         let Some(mesh) = mesh else {
             return Err(error::no_surface(&id));
         };

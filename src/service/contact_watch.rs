@@ -95,7 +95,7 @@ async fn near(app: &AppState, scene: &Scene, request: &WatchRequest) -> Result<N
     let mut ask = Ask::new(vec![Measure::Signed]).map_err(|error| error::internal(&error))?;
     ask.include_allowed = request.include_allowed;
     let (of, margin) = (scene.clone(), request.margin_m);
-    let question = app.prepare(move || Within::new(of, ask, selection, margin)).await?;
+    let question = app.prepare(scene, move || Within::new(of, ask, selection, margin)).await?;
     let (found, _) = combined(scene, app.ask(Arc::new(question), CallTime::default()).await?);
     let name = |slot| scene.object(slot).map(|object| object.name.clone());
     let near = found.into_iter().filter_map(|found| {

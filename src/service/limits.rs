@@ -5,6 +5,14 @@ use std::time::Duration;
 /// Largest message in both directions, in bytes; tonic answers OUT_OF_RANGE above it.
 pub const MAX_MESSAGE_BYTES: usize = 4 << 20;
 
+/// Bytes of a message that a client may send before the server has read any of it, and of all
+/// messages of its connection: a message of many states comes without waiting on the way.
+pub const WINDOW_BYTES: [u32; 2] = [1 << 20, 1 << 20];
+
+/// Objects of a scene up to which its tree is made at once, in a tenth of a millisecond, rather than
+/// on a thread of its own.
+pub const SMALL_SCENE: usize = 2000;
+
 /// Most answers (pairs times measures) of one Evaluate.
 pub const MAX_ANSWERS: usize = 1 << 17;
 

@@ -290,7 +290,7 @@ async fn within_margin(
     let revision = scene.revision();
     // The tree of a large scene takes milliseconds: not on a thread that serves connections.
     let (of, asked) = (scene.clone(), ask.clone());
-    let question = app.prepare(move || make(of, asked)).await?;
+    let question = app.prepare(&scene, move || make(of, asked)).await?;
     let parts = app.ask(Arc::new(question), time).await?;
     let (found, complete) = combined(&scene, parts);
     error::at_most("within", found.len() * ask.measures().len(), ("max_answers", MAX_ANSWERS))?;

@@ -26,7 +26,7 @@ use super::fits::Fits;
 use super::incoming::Incoming;
 #[cfg(feature = "fit")]
 use super::jobs::JobCalls;
-use super::limits::{DRAIN, KEEPALIVE, KEEPALIVE_TIMEOUT, MAX_STREAMS, POSES_WRITTEN_EVERY};
+use super::limits::{DRAIN, KEEPALIVE, KEEPALIVE_TIMEOUT, MAX_STREAMS, POSES_WRITTEN_EVERY, WINDOW_BYTES};
 use super::proto::FILE_DESCRIPTOR_SET;
 use super::proto::blob_service_server::{self, BlobServiceServer};
 use super::proto::body_service_server::{self, BodyServiceServer};
@@ -240,6 +240,8 @@ fn router(app: AppState) -> Router {
     let queries = QueryServiceServer::new(Queries(app.clone()));
     tonic::transport::Server::builder()
         .max_concurrent_streams(MAX_STREAMS)
+        .initial_stream_window_size(WINDOW_BYTES[0])
+        .initial_connection_window_size(WINDOW_BYTES[1])
         .http2_keepalive_interval(Some(KEEPALIVE))
         .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
         .add_service(ServerServiceServer::new(ServerInfo(app)))

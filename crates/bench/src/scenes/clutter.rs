@@ -16,7 +16,7 @@ use crate::comparison::Random;
 
 /// Objects in a cube of this half edge, metres.
 const OBJECTS: usize = 400;
-const REACH_M: f64 = 2.0;
+const REACH_M: f64 = 5.0;
 /// Objects that a state places, and states.
 const MOVING: u32 = 11;
 const STATES: usize = 500;
