@@ -1,5 +1,5 @@
 # Everything a fresh Debian or Ubuntu machine needs beyond Rust (rustup), make and a C compiler.
-.PHONY: help setup demo test check charts docs-numbers acceptance endurance fuzz draws measures
+.PHONY: help setup demo test check charts docs-numbers image acceptance endurance fuzz draws measures
 
 help:
 	@echo 'make demo          fit two shapes, serve them, sweep one through the other, draw the curves'
@@ -7,6 +7,7 @@ help:
 	@echo 'make check         everything a change must pass, as continuous integration runs it: SUBLEVEL_DATA=DIR'
 	@echo 'make charts        measure beside other libraries, and draw: SUBLEVEL_DATA=DIR with the meshes'
 	@echo 'make docs-numbers  write the numbers of README.md and docs/ again from the CSV files in docs/'
+	@echo 'make image         build the container image of the server: BUILD= and RUNTIME= name other base images'
 	@echo 'make acceptance    what is too long for every change, all four of these: SUBLEVEL_DATA=DIR'
 	@echo '  make endurance     1e8 checked queries; interrupted, it continues where it was (QUERIES=1e9 for more)'
 	@echo '  make fuzz          1e6 damaged files for each reader of meshes (RUNS=10000000 for more)'
@@ -35,6 +36,10 @@ charts:
 
 docs-numbers:
 	cargo run --release -p sublevel-bench -- tables --out docs README.md
+
+image:
+	docker build -f deploy/container/Containerfile --target server $(if $(BUILD),--build-arg BUILD=$(BUILD)) \
+	    $(if $(RUNTIME),--build-arg RUNTIME=$(RUNTIME)) -t sublevel .
 
 acceptance: endurance fuzz draws measures
 

@@ -21,7 +21,7 @@ const SHORT: [(&str, &str); 13] = [
 ];
 
 /// Beginnings of paths from the root of the repository.
-const WHOLE: [&str; 7] = ["src/", "crates/", "tests/", "proto/", "docs/", "fuzz/", ".ci/"];
+const WHOLE: [&str; 8] = ["src/", "crates/", "tests/", "proto/", "docs/", "fuzz/", "deploy/", ".ci/"];
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -121,5 +121,50 @@ fn docs_have_no_picture_that_no_page_shows() {
     for entry in fs::read_dir(root().join("docs")).expect("the folder is readable") {
         let name = entry.expect("an entry").file_name().into_string().expect("a plain name");
         assert!(!name.ends_with(".svg") || text.contains(&format!("{name})")), "no page shows docs/{name}");
+    }
+}
+
+/// Sources of a folder, its folders included.
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).expect("readable").map(|entry| entry.expect("an entry").path());
+    entries
+        .flat_map(|path| if path.is_dir() { sources(&path) } else { vec![path] })
+        .filter(|path| path.extension().is_some_and(|extension| extension == "rs"))
+        .collect()
+}
+
+#[test]
+fn every_reason_of_an_error_is_explained() {
+    let page = fs::read_to_string(root().join("docs/operations.md")).expect("a page");
+    let makers = ["details(\"", "details_with(\"", "failed_precondition(\"", "aborted(\"", "unavailable(\""];
+    let (mut found, mut missing) = (0, Vec::new());
+    for source in sources(&root().join("src/service")) {
+        let text = fs::read_to_string(&source).expect("text");
+        for reason in makers.iter().flat_map(|maker| between(&text, maker, '"')) {
+            found += 1;
+            if !page.contains(&format!("`{reason}`")) {
+                missing.push(reason.to_owned());
+            }
+        }
+    }
+    assert!(found > 20 && missing.is_empty(), "{found} found, and not in docs/operations.md: {missing:?}");
+}
+
+#[test]
+fn every_setting_is_explained_with_its_default() {
+    let page = fs::read_to_string(root().join("docs/operations.md")).expect("a page");
+    let settings = sublevel::service::Config::default().to_toml();
+    let mut table = String::new();
+    for line in settings.lines().filter(|line| !line.is_empty()) {
+        if let Some(name) = line.strip_prefix('[').and_then(|line| line.strip_suffix(']')) {
+            table = format!("{name}.");
+            continue;
+        }
+        let (key, value) = line.split_once(" = ").expect("a key and a value");
+        let row = page.lines().find(|row| row.starts_with("| `") && row.contains(&format!("`{table}{key}`")));
+        let row = row.unwrap_or_else(|| panic!("{table}{key} is not in the table"));
+        let value = value.trim_matches('"');
+        let value = value.strip_suffix(".0").unwrap_or(value);
+        assert!(row.contains(value), "{table}{key}: {value} is not in {row}");
     }
 }

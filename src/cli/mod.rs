@@ -2,6 +2,7 @@
 //!
 //! Standard output holds results only; progress and logs go to standard error.
 
+mod backup;
 #[cfg(feature = "fit")]
 mod certify;
 #[cfg(feature = "fit")]
@@ -11,6 +12,7 @@ mod files;
 mod fit;
 #[cfg(feature = "fit")]
 mod group;
+mod health;
 mod measure;
 #[cfg(feature = "fit")]
 mod mesh;
@@ -24,6 +26,7 @@ mod scene;
 mod serve;
 mod show;
 mod sos_body;
+mod token;
 mod verify;
 mod verify_args;
 
@@ -58,6 +61,10 @@ enum Command {
     Push(push::PushArgs),
     Primitive(primitive::PrimitiveArgs),
     Scene(scene::SceneArgs),
+    Health(health::HealthArgs),
+    Token(token::TokenArgs),
+    Backup(backup::BackupArgs),
+    Restore(backup::RestoreArgs),
 }
 
 /// Runs the command line of this process. Exit code 0: done; 1: failed, with one line on standard
@@ -74,10 +81,14 @@ pub fn main() -> ExitCode {
         #[cfg(feature = "fit")]
         Command::Certify(args) => certify::run(&args).map(done),
         Command::Measure(args) => measure::run(&args).map(done),
-        Command::Serve(args) => serve::run(&args).map(done).map_err(Into::into),
+        Command::Serve(args) => serve::run(&args).map(done),
         Command::Push(args) => push::run(&args).map(done),
         Command::Primitive(args) => primitive::run(&args).map(done),
         Command::Scene(args) => scene::run(&args).map(done),
+        Command::Health(args) => health::run(&args),
+        Command::Token(args) => token::run(&args).map(done),
+        Command::Backup(args) => backup::backup(&args).map(done),
+        Command::Restore(args) => backup::restore(&args).map(done),
     };
     exit_code(outcome)
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::client::{Client, ClientError, StoredBody};
+use crate::client::{Client, ClientError, ClientOptions, StoredBody};
 use crate::scene::Geometry;
 
 /// Store files of bodies, compounds, ladders, sos-bodies and half-spaces in a running server
@@ -87,7 +87,8 @@ fn push(server: &str, files: &[PathBuf]) -> Result<Vec<Row>, Box<dyn Error>> {
     let contents = files.iter().map(|file| read(file)).collect::<Result<Vec<_>, _>>()?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let rows = runtime.block_on(async {
-        let client = Client::connect(server).await.map_err(PushError::Connect)?;
+        let client =
+            Client::connect_with(server, &ClientOptions::from_environment()).await.map_err(PushError::Connect)?;
         let mut rows = Vec::with_capacity(files.len());
         for (file, text) in files.iter().zip(contents) {
             let stored = client.create_from_file(text).await;

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use super::numbers::PoseNumbers;
 use crate::body::BodyId;
-use crate::client::{Client, SceneState, SceneSummary};
+use crate::client::{Client, ClientOptions, SceneState, SceneSummary};
 use crate::measure::Pose;
 use crate::scene::{Placement, Subject, Update};
 
@@ -95,7 +95,7 @@ pub(super) fn run(args: &SceneArgs) -> Result<(), Box<dyn Error>> {
 }
 
 async fn execute(args: &SceneArgs) -> Result<String, Box<dyn Error>> {
-    let client = Client::connect(&args.server).await?;
+    let client = Client::connect_with(&args.server, &ClientOptions::from_environment()).await?;
     let revision = match &args.command {
         SceneCommand::List => return Ok(list(&client.list_scenes().await?, args.json)?),
         SceneCommand::Show { scene } => return Ok(show(&client.scene(scene).await?, args.json)?),

@@ -1,10 +1,6 @@
 //! Bodies and blobs.
 
-use nalgebra::Vector3;
-use sha2::{Digest, Sha256};
-use tonic::transport::Channel;
-
-use super::connection::Client;
+use super::connection::{Client, Connection};
 use super::error::ClientError;
 use crate::body::BodyId;
 use crate::scene::Geometry;
@@ -17,6 +13,8 @@ use crate::service::proto::{
     self, BodyKind, BodySummary, CreateBodyRequest, DeleteBodyRequest, DownloadBlobRequest, GetBodyRequest,
     UploadBlobRequest,
 };
+use nalgebra::Vector3;
+use sha2::{Digest, Sha256};
 
 /// Bytes of a piece of a blob.
 const PIECE: usize = 1 << 20;
@@ -73,11 +71,11 @@ pub struct StoredBody {
 }
 
 impl Client {
-    fn bodies(&self) -> BodyServiceClient<Channel> {
+    fn bodies(&self) -> BodyServiceClient<Connection> {
         BodyServiceClient::new(self.channel()).max_decoding_message_size(MAX_MESSAGE_BYTES)
     }
 
-    fn blobs(&self) -> BlobServiceClient<Channel> {
+    fn blobs(&self) -> BlobServiceClient<Connection> {
         BlobServiceClient::new(self.channel()).max_decoding_message_size(MAX_MESSAGE_BYTES)
     }
 

@@ -1,8 +1,15 @@
 //! A connection to a server.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
-use tonic::transport::{Channel, Endpoint};
+use tonic::metadata::{Ascii, MetadataValue};
+use tonic::service::Interceptor;
+use tonic::service::interceptor::InterceptedService;
+use tonic::transport::{Certificate, Channel, ClientTlsConfig, Endpoint, Identity};
+use tonic_health::pb::HealthCheckRequest;
+use tonic_health::pb::health_check_response::ServingStatus;
+use tonic_health::pb::health_client::HealthClient;
 
 use super::error::{ClientError, root_cause};
 use crate::service::limits::MAX_MESSAGE_BYTES;
@@ -13,11 +20,62 @@ use crate::service::proto::server_service_client::ServerServiceClient;
 /// it.
 const PATIENCE: Duration = Duration::from_secs(60);
 
+/// What calls go through: the connection, and the token that each of them shows.
+pub type Connection = InterceptedService<Channel, Credentials>;
+
 /// A connection to a server. Clones share it.
 #[derive(Clone, Debug)]
 pub struct Client {
-    channel: Channel,
+    channel: Connection,
     url: String,
+}
+
+/// How a client connects.
+#[derive(Clone, Debug)]
+pub struct ClientOptions {
+    /// How long the server may take to answer.
+    pub patience: Duration,
+    /// What is shown to a server that asks for tokens.
+    pub token: Option<String>,
+    /// Roots of the server's certificate, PEM; none: those of the address must be known otherwise,
+    /// and `https` needs them.
+    pub ca: Option<PathBuf>,
+    /// The client's own certificate and its key, PEM.
+    pub identity: Option<[PathBuf; 2]>,
+}
+
+impl Default for ClientOptions {
+    fn default() -> Self {
+        Self { patience: PATIENCE, token: None, ca: None, identity: None }
+    }
+}
+
+impl ClientOptions {
+    /// The token of `SUBLEVEL_TOKEN`, the roots of `SUBLEVEL_CA`, and the client's certificate of
+    /// `SUBLEVEL_CLIENT_CERTIFICATE` and `SUBLEVEL_CLIENT_KEY`, where they are set.
+    pub fn from_environment() -> Self {
+        let path = |name: &str| std::env::var_os(name).map(PathBuf::from);
+        let identity = path("SUBLEVEL_CLIENT_CERTIFICATE").zip(path("SUBLEVEL_CLIENT_KEY"));
+        Self {
+            token: std::env::var("SUBLEVEL_TOKEN").ok(),
+            ca: path("SUBLEVEL_CA"),
+            identity: identity.map(|(certificate, key)| [certificate, key]),
+            ..Self::default()
+        }
+    }
+}
+
+/// Shows a token with every call.
+#[derive(Clone, Debug, Default)]
+pub struct Credentials(Option<MetadataValue<Ascii>>);
+
+impl Interceptor for Credentials {
+    fn call(&mut self, mut request: tonic::Request<()>) -> Result<tonic::Request<()>, tonic::Status> {
+        if let Some(token) = &self.0 {
+            request.metadata_mut().insert("authorization", token.clone());
+        }
+        Ok(request)
+    }
 }
 
 /// What a server is, see `GetServerInfo`.
@@ -38,27 +96,39 @@ pub struct ServerInfo {
 }
 
 impl Client {
-    /// Connects to a server, such as `http://127.0.0.1:50051`.
+    /// Connects to a server, such as `http://127.0.0.1:50051`, without a token.
     ///
     /// # Errors
     /// An address that is none, or that nobody answers at.
     pub async fn connect(url: &str) -> Result<Self, ClientError> {
-        Self::connect_with_patience(url, PATIENCE).await
+        Self::connect_with(url, &ClientOptions::default()).await
     }
 
-    /// The same with another limit for the time of an answer.
+    /// Connects to a server, with `https` encrypted.
     ///
     /// # Errors
-    /// As [`Client::connect`].
-    pub async fn connect_with_patience(url: &str, patience: Duration) -> Result<Self, ClientError> {
+    /// As [`Client::connect`]; certificates and tokens that cannot be used.
+    pub async fn connect_with(url: &str, options: &ClientOptions) -> Result<Self, ClientError> {
         let unusable = |why: String| ClientError::Url { url: url.into(), why };
-        let endpoint = Endpoint::from_shared(url.to_owned()).map_err(|error| unusable(error.to_string()))?;
-        if endpoint.uri().scheme_str() != Some("http") {
-            return Err(unusable("its scheme is not http (there is no TLS yet)".into()));
+        let mut endpoint = Endpoint::from_shared(url.to_owned()).map_err(|error| unusable(error.to_string()))?;
+        match endpoint.uri().scheme_str() {
+            Some("http") => {}
+            Some("https") => {
+                let tls = tls_config(options)?;
+                endpoint = endpoint.tls_config(tls).map_err(|error| ClientError::Certificates(root_cause(&error)))?;
+            }
+            _ => return Err(unusable("its scheme is neither http nor https".into())),
         }
+        let credentials = match &options.token {
+            None => Credentials::default(),
+            Some(token) => {
+                let shown = format!("Bearer {}", token.trim()).parse();
+                Credentials(Some(shown.map_err(|_| ClientError::Token)?))
+            }
+        };
         let channel = endpoint
             .connect_timeout(Duration::from_secs(5))
-            .timeout(patience)
+            .timeout(options.patience)
             .tcp_nodelay(true)
             // An answer comes without waiting on the way.
             .initial_stream_window_size(MAX_MESSAGE_BYTES as u32)
@@ -66,7 +136,7 @@ impl Client {
             .connect()
             .await
             .map_err(|error| ClientError::Unreachable { url: url.into(), why: root_cause(&error) })?;
-        Ok(Self { channel, url: url.into() })
+        Ok(Self { channel: InterceptedService::new(channel, credentials), url: url.into() })
     }
 
     /// The address it is connected to.
@@ -75,8 +145,18 @@ impl Client {
     }
 
     /// The connection, for calls that this client does not have.
-    pub fn channel(&self) -> Channel {
+    pub fn channel(&self) -> Connection {
         self.channel.clone()
+    }
+
+    /// Whether the server answers calls: not while it loads or stops.
+    ///
+    /// # Errors
+    /// When the server does not answer.
+    pub async fn health(&self) -> Result<bool, ClientError> {
+        let request = HealthCheckRequest { service: String::new() };
+        let response = HealthClient::new(self.channel()).check(request).await.map_err(self.refused())?;
+        Ok(response.into_inner().status() == ServingStatus::Serving)
     }
 
     /// What the server is.
@@ -100,4 +180,22 @@ impl Client {
         let url = self.url.clone();
         move |status| ClientError::of(&url, status)
     }
+}
+
+fn tls_config(options: &ClientOptions) -> Result<ClientTlsConfig, ClientError> {
+    let read = |path: &PathBuf| {
+        std::fs::read(path).map_err(|error| ClientError::Certificates(format!("{}: {error}", path.display())))
+    };
+    let mut tls = ClientTlsConfig::new();
+    match &options.ca {
+        Some(path) => tls = tls.ca_certificate(Certificate::from_pem(read(path)?)),
+        None => {
+            let why = "https needs the root of the server's certificate; name its PEM file in SUBLEVEL_CA";
+            return Err(ClientError::Certificates(why.into()));
+        }
+    }
+    if let Some([certificate, key]) = &options.identity {
+        tls = tls.identity(Identity::from_pem(read(certificate)?, read(key)?));
+    }
+    Ok(tls)
 }

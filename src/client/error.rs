@@ -14,6 +14,15 @@ pub enum ClientError {
         /// The reason.
         why: String,
     },
+    /// Certificates that cannot be used.
+    #[error("the certificates for the connection cannot be used: {0}")]
+    Certificates(String),
+    /// What came cannot be written.
+    #[error("cannot write what the server sent: {0}")]
+    Write(std::io::Error),
+    /// A token that is none.
+    #[error("the token holds characters that no token has; give it as `sublevel token` printed it")]
+    Token,
     /// Nobody answers there.
     #[error("cannot reach a server at {url}: {why}; start one with `sublevel serve` or name another with --server")]
     Unreachable {

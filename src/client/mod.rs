@@ -18,6 +18,7 @@
 //! # }
 //! ```
 
+mod backup;
 mod bodies;
 mod connection;
 mod error;
@@ -29,7 +30,7 @@ mod scenes;
 
 pub use crate::service::proto::SceneSummary;
 pub use bodies::{BodySource, StoredBody};
-pub use connection::{Client, ServerInfo};
+pub use connection::{Client, ClientOptions, Connection, Credentials, ServerInfo};
 pub use error::ClientError;
 #[cfg(feature = "fit")]
 pub use fits::{JobProgress, SubmitError};

@@ -1,8 +1,6 @@
 //! Questions.
 
-use tonic::transport::Channel;
-
-use super::connection::Client;
+use super::connection::{Client, Connection};
 use super::error::ClientError;
 use crate::measure::Pose;
 use crate::scene::query::Measure;
@@ -163,7 +161,7 @@ pub struct CheckedStates {
 }
 
 impl Client {
-    fn queries(&self) -> QueryServiceClient<Channel> {
+    fn queries(&self) -> QueryServiceClient<Connection> {
         QueryServiceClient::new(self.channel()).max_decoding_message_size(MAX_MESSAGE_BYTES)
     }
 

@@ -3,9 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use tonic::transport::Channel;
-
-use super::connection::Client;
+use super::connection::{Client, Connection};
 use super::error::ClientError;
 use crate::body::BodyId;
 use crate::measure::Pose;
@@ -30,7 +28,7 @@ pub struct SceneState {
 }
 
 impl Client {
-    pub(super) fn scenes(&self) -> SceneServiceClient<Channel> {
+    pub(super) fn scenes(&self) -> SceneServiceClient<Connection> {
         SceneServiceClient::new(self.channel()).max_decoding_message_size(MAX_MESSAGE_BYTES)
     }
 

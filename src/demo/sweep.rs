@@ -4,7 +4,7 @@ use super::error::DemoError;
 use crate::client::{Client, PairRow, Question};
 use crate::measure::Pose;
 use crate::scene::query::Measure;
-use crate::service::{ServeOptions, Server};
+use crate::service::{Config, Server};
 use nalgebra::Vector3;
 use std::fmt::Display;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -61,7 +61,9 @@ pub(super) fn run(chair: &Path, human: &Path) -> Result<Sweep, DemoError> {
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(failed(step))?;
     let result = runtime.block_on(async {
         let listen = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-        let server = Server::bind(ServeOptions { listen, data: data.path().to_owned() }).await.map_err(failed(step))?;
+        let server = Server::bind(Config { listen, data: data.path().to_owned(), ..Config::default() })
+            .await
+            .map_err(failed(step))?;
         let url = format!("http://{}", server.local_addr());
         let (stop, stopped) = tokio::sync::oneshot::channel::<()>();
         let serving = tokio::spawn(server.run(async {

@@ -13,14 +13,18 @@ use crate::store::{Catalogue, CatalogueError};
 use super::blobs::Blobs;
 use super::body_mesh::Meshes;
 use super::call_time::{CallTime, until};
+use super::config::LimitsConfig;
 use super::error;
 use super::limits::{LOADING_PATIENCE, SMALL_SCENE};
+use super::metrics::Metrics;
 
 /// Shared by all handlers. Work that blocks passes a limit first, so that one kind of it cannot
 /// take every thread.
 #[derive(Debug, Clone)]
 pub(super) struct AppState {
     catalogue: watch::Receiver<Option<Arc<Catalogue>>>,
+    limits: LimitsConfig,
+    metrics: Metrics,
     /// Answers questions on all cores.
     crew: Arc<Crew>,
     /// Trees of scenes, and large answers, are made on one thread per core; who waits is let in in
@@ -31,6 +35,8 @@ pub(super) struct AppState {
     meshes: Arc<Meshes>,
     /// Half the cores at most re-prove new bodies, which takes long; queries go on beside it.
     proving: Arc<Semaphore>,
+    /// Backups are made one after the other: each takes as much space as the catalogue.
+    backing_up: Arc<Semaphore>,
     /// Changes are made one after the other; they wait here rather than on a thread.
     changing: Arc<Semaphore>,
 }
@@ -39,19 +45,33 @@ impl AppState {
     pub(super) fn new(
         catalogue: watch::Receiver<Option<Arc<Catalogue>>>,
         stopping: watch::Receiver<bool>,
+        (limits, metrics): (LimitsConfig, Metrics),
     ) -> std::io::Result<Self> {
         let cores = thread::available_parallelism().map_or(1, usize::from);
         let limit = |permits| Arc::new(Semaphore::new(permits));
         Ok(Self {
             catalogue,
-            crew: Arc::new(Crew::new(cores)?),
+            crew: Arc::new(Crew::new(limits.threads())?),
+            limits,
+            metrics,
             solving: limit(cores),
             stopping,
             blobs: Arc::default(),
             meshes: Arc::default(),
             proving: limit(cores.div_ceil(2)),
+            backing_up: limit(1),
             changing: limit(1),
         })
+    }
+
+    /// Limits of connections and calls.
+    pub(super) fn limits(&self) -> &LimitsConfig {
+        &self.limits
+    }
+
+    /// What is counted.
+    pub(super) fn metrics(&self) -> &Metrics {
+        &self.metrics
     }
 
     /// Becomes true when the server stops.
@@ -142,6 +162,14 @@ impl AppState {
     ) -> Result<T, Status> {
         let catalogue = self.catalogue().await?;
         on_thread(&self.changing, move || change(&catalogue)).await?.map_err(|error| error::catalogue(&error, field))
+    }
+
+    /// Makes a backup.
+    pub(super) async fn back_up<T: Send + 'static>(
+        &self,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, Status> {
+        on_thread(&self.backing_up, work).await
     }
 
     /// Proves a new body.

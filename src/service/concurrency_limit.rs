@@ -8,21 +8,29 @@
 use std::convert::Infallible;
 use std::sync::Arc;
 use std::task::{Context, Poll};
+use std::time::{Duration, Instant};
 
 use tokio::sync::Semaphore;
-use tonic::Status;
 use tonic::body::Body;
 use tonic::codegen::{BoxFuture, Service, http};
 use tonic::server::NamedService;
 
 use super::call_time::{CallTime, Deadline, until};
+use super::config::LimitsConfig;
 use super::error;
-use super::limits::{CALL_LIMIT, MAX_CALLS};
 use super::message_limit::Measured;
+use super::metrics::Metrics;
 
 /// Makes services share one limit.
 #[derive(Debug, Clone)]
-pub(super) struct ConcurrencyLimit(Arc<Semaphore>);
+pub(super) struct ConcurrencyLimit {
+    places: Arc<Semaphore>,
+    /// Longest time that a call waits for its place.
+    queue: Duration,
+    /// Longest time from then to its answer.
+    call: Duration,
+    metrics: Metrics,
+}
 
 /// A service behind the limit.
 #[derive(Debug, Clone)]
@@ -32,8 +40,9 @@ pub(super) struct Limited<S> {
 }
 
 impl ConcurrencyLimit {
-    pub(super) fn new() -> Self {
-        Self(Arc::new(Semaphore::new(MAX_CALLS)))
+    pub(super) fn new(limits: &LimitsConfig, metrics: Metrics) -> Self {
+        let places = Arc::new(Semaphore::new(limits.calls));
+        Self { places, queue: limits.queue(), call: limits.call(), metrics }
     }
 
     pub(super) fn before<S>(&self, inner: S) -> Limited<S> {
@@ -60,30 +69,32 @@ where
 
     fn call(&mut self, request: http::Request<Body>) -> Self::Future {
         // Generated services are always ready, so the clone is as ready as the original.
-        let (mut inner, limit) = (self.inner.clone(), self.limit.0.clone());
+        let (mut inner, limit) = (self.inner.clone(), self.limit.clone());
+        let begun = Instant::now();
         // Now: it may take a while until the future is polled.
         let deadline = CallTime::deadline(request.headers());
         Box::pin(async move {
-            let path = request.uri().path().to_owned();
             let _permit = tokio::select! {
-                permit = limit.acquire_owned() => permit,
+                biased;
+                permit = limit.places.acquire_owned() => permit,
                 () = until(deadline) => return Ok(error::deadline().into_http()),
+                () = tokio::time::sleep(limit.queue) => {
+                    limit.metrics.queued(begun.elapsed(), true);
+                    return Ok(error::shed(limit.queue).into_http());
+                }
             };
+            limit.metrics.queued(begun.elapsed(), false);
             let mut request = request.map(|body| Body::new(Measured::new(body)));
             if let Some(deadline) = deadline {
                 request.extensions_mut().insert(Deadline(deadline));
             }
             // A message that never comes to its end would keep its place for ever.
-            let answer = tokio::time::timeout(CALL_LIMIT, inner.call(request));
-            let response = tokio::select! {
+            let answer = tokio::time::timeout(limit.call, inner.call(request));
+            tokio::select! {
                 biased;
-                answer = answer => answer.unwrap_or_else(|_| Ok(error::too_slow(CALL_LIMIT).into_http()))?,
-                () = until(deadline) => error::deadline().into_http(),
-            };
-            if let Some(status) = Status::from_header_map(response.headers()) {
-                tracing::debug!(call = path, code = ?status.code(), why = status.message(), "refused");
+                answer = answer => answer.unwrap_or_else(|_| Ok(error::too_slow(limit.call).into_http())),
+                () = until(deadline) => Ok(error::deadline().into_http()),
             }
-            Ok(response)
         })
     }
 }

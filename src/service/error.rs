@@ -14,6 +14,7 @@ use crate::store::{CatalogueError, MAX_FORKS, StoreError};
 
 use super::limits::MAX_MESSAGE_BYTES;
 use super::proto::StreamError;
+use super::tokens::Role;
 
 /// A field of a request that cannot be used.
 #[derive(Debug)]
@@ -106,6 +107,38 @@ pub(super) fn deadline() -> Status {
     let message = "the deadline of the call has passed; ask for less, allow more time, or send budget_ms for what is \
                    known by then";
     Status::with_error_details(Code::DeadlineExceeded, message, details("DEADLINE"))
+}
+
+/// UNAUTHENTICATED: no token, or one that is not known.
+pub(super) fn unauthenticated(shown: bool) -> Status {
+    let (reason, message) = if shown {
+        ("TOKEN_UNKNOWN", "the token is not known; send the one you were given as authorization: Bearer TOKEN")
+    } else {
+        ("TOKEN_MISSING", "the call needs a token; send it in the metadata as authorization: Bearer TOKEN")
+    };
+    Status::with_error_details(Code::Unauthenticated, message, details(reason))
+}
+
+/// PERMISSION_DENIED: the role of a token is not enough.
+pub(super) fn permission_denied(path: &str, name: &str, needed: Role) -> Status {
+    let needed = match needed {
+        Role::Read => "read",
+        Role::Write => "write",
+        Role::Admin => "admin",
+    };
+    let message =
+        format!("{path} needs the role {needed}, which the token \"{name}\" does not have; ask for one that has");
+    let details = details_with("ROLE_NEEDED", [("role", needed.to_owned())]);
+    Status::with_error_details(Code::PermissionDenied, short(message), details)
+}
+
+/// RESOURCE_EXHAUSTED: the call has waited for its turn as long as it may.
+pub(super) fn shed(waited: Duration) -> Status {
+    let message =
+        format!("the server is busy: the call waited {waited:?} for its turn; try again later, or ask less often");
+    let mut details = details("OVERLOADED");
+    details.set_retry_info(Some(waited));
+    Status::with_error_details(Code::ResourceExhausted, message, details)
 }
 
 /// INTERNAL: a question ended without an answer.
@@ -263,9 +296,10 @@ fn store(error: &StoreError) -> Status {
         StoreError::Damaged { .. } | StoreError::Empty { .. } | StoreError::Format { .. } => {
             (Code::DataLoss, "CATALOGUE_DAMAGED")
         }
-        StoreError::InUse { .. } | StoreError::Directory { .. } | StoreError::Disk { .. } => {
-            (Code::Internal, "DISK_FAILED")
-        }
+        StoreError::InUse { .. }
+        | StoreError::Occupied { .. }
+        | StoreError::Directory { .. }
+        | StoreError::Disk { .. } => (Code::Internal, "DISK_FAILED"),
     };
     Status::with_error_details(code, error.to_string(), details(reason))
 }

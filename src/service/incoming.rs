@@ -8,16 +8,20 @@ use std::io;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
-use std::time::Duration;
 
-use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 use tokio::task::JoinHandle;
+use tokio_rustls::TlsAcceptor;
+use tokio_rustls::rustls::ServerConfig;
+use tokio_rustls::server::TlsStream;
 use tokio_stream::Stream;
 use tonic::transport::server::{Connected, TcpConnectInfo};
 
-use super::limits::{ACCEPT_PAUSE, MAX_CONNECTIONS, PREFACE_TIMEOUT, PREFACE_TIMEOUT_CROWDED};
+use super::limits::{ACCEPT_PAUSE, PREFACE_TIMEOUT, PREFACE_TIMEOUT_CROWDED};
+use super::metrics::{Metrics, Open};
+use super::tls::Current;
 
 /// What every HTTP/2 client sends first.
 const PREFACE: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
@@ -29,18 +33,29 @@ pub(super) struct Incoming {
     accepting: JoinHandle<()>,
 }
 
-/// A socket, and its place among the open ones.
+/// A socket with its place among the open ones, of which the preface was read.
 #[derive(Debug)]
 pub(super) struct Connection {
-    stream: TcpStream,
+    stream: Transport,
+    /// Bytes of the preface that are still to be read again.
+    preface: &'static [u8],
     _place: OwnedSemaphorePermit,
+    _open: Open,
+}
+
+/// What bytes come through.
+#[derive(Debug)]
+enum Transport {
+    Plain(TcpStream),
+    Encrypted(Box<TlsStream<TcpStream>>),
 }
 
 impl Incoming {
-    /// Begins to accept; ends when dropped.
-    pub(super) fn new(listener: TcpListener) -> Self {
+    /// Begins to accept so many connections at once, encrypted where there are certificates; ends
+    /// when dropped.
+    pub(super) fn new(listener: TcpListener, connections: usize, tls: Option<Current>, metrics: Metrics) -> Self {
         let (spoke, speaking) = mpsc::channel(1);
-        Self { speaking, accepting: tokio::spawn(accept(listener, spoke)) }
+        Self { speaking, accepting: tokio::spawn(accept(listener, (connections, tls, metrics), spoke)) }
     }
 }
 
@@ -50,8 +65,12 @@ impl Drop for Incoming {
     }
 }
 
-async fn accept(listener: TcpListener, spoke: mpsc::Sender<Connection>) {
-    let places = Arc::new(Semaphore::new(MAX_CONNECTIONS));
+async fn accept(
+    listener: TcpListener,
+    (connections, tls, metrics): (usize, Option<Current>, Metrics),
+    spoke: mpsc::Sender<Connection>,
+) {
+    let places = Arc::new(Semaphore::new(connections));
     let mut failing = false;
     // The semaphore is never closed. While all places are taken, clients queue in the system.
     while let Ok(place) = places.clone().acquire_owned().await {
@@ -72,32 +91,44 @@ async fn accept(listener: TcpListener, spoke: mpsc::Sender<Connection>) {
         if let Err(error) = stream.set_nodelay(true) {
             tracing::debug!(%error, "a connection without TCP_NODELAY");
         }
-        let crowded = places.available_permits() < MAX_CONNECTIONS / 2;
+        let crowded = places.available_permits() < connections / 2;
         let patience = if crowded { PREFACE_TIMEOUT_CROWDED } else { PREFACE_TIMEOUT };
-        let spoke = spoke.clone();
+        let (spoke, tls) = (spoke.clone(), tls.as_ref().map(|tls| tls.borrow().clone()));
+        let open = metrics.connected();
         tokio::spawn(async move {
-            if let Ok(true) = tokio::time::timeout(patience, speaks(&stream)).await {
-                // Fails when the server is stopping; then the socket is closed.
-                let _ = spoke.send(Connection { stream, _place: place }).await;
-            } else {
-                tracing::debug!("a connection that did not begin to speak HTTP/2 is closed");
+            match tokio::time::timeout(patience, greeted(stream, tls)).await {
+                Ok(Ok(stream)) => {
+                    let connection = Connection { stream, preface: PREFACE, _place: place, _open: open };
+                    // Fails when the server is stopping; then the socket is closed.
+                    let _ = spoke.send(connection).await;
+                }
+                Ok(Err(error)) => tracing::debug!(%error, "a connection that does not speak HTTP/2 is closed"),
+                Err(_) => tracing::debug!("a connection that did not begin to speak HTTP/2 is closed"),
             }
         });
     }
 }
 
-/// Waits for the whole preface, since nobody asks a client for a sign of life before it is there.
-async fn speaks(stream: &TcpStream) -> bool {
+/// Encrypts where there are certificates, and reads the whole preface, since nobody asks a client
+/// for a sign of life before it is there.
+async fn greeted(stream: TcpStream, tls: Option<Arc<ServerConfig>>) -> io::Result<Transport> {
+    let mut stream = match tls {
+        None => Transport::Plain(stream),
+        Some(config) => Transport::Encrypted(Box::new(TlsAcceptor::from(config).accept(stream).await?)),
+    };
     let mut first = [0; PREFACE.len()];
-    loop {
-        match stream.peek(&mut first).await {
-            Ok(0) | Err(_) => return false,
-            Ok(count) if first[..count] != PREFACE[..count] => return false,
-            Ok(count) if count == PREFACE.len() => return true,
-            // Peeking returns at once as long as there is a byte.
-            Ok(_) => tokio::time::sleep(Duration::from_millis(20)).await,
+    let mut count = 0;
+    while count < PREFACE.len() {
+        let read = match &mut stream {
+            Transport::Plain(stream) => stream.read(&mut first[count..]).await?,
+            Transport::Encrypted(stream) => stream.read(&mut first[count..]).await?,
+        };
+        count += read;
+        if read == 0 || first[..count] != PREFACE[..count] {
+            return Err(io::ErrorKind::InvalidData.into());
         }
     }
+    Ok(stream)
 }
 
 impl Stream for Incoming {
@@ -112,27 +143,48 @@ impl Connected for Connection {
     type ConnectInfo = TcpConnectInfo;
 
     fn connect_info(&self) -> Self::ConnectInfo {
-        self.stream.connect_info()
+        match &self.stream {
+            Transport::Plain(stream) => stream.connect_info(),
+            Transport::Encrypted(stream) => stream.get_ref().0.connect_info(),
+        }
     }
 }
 
 impl AsyncRead for Connection {
     fn poll_read(mut self: Pin<&mut Self>, context: &mut Context<'_>, to: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_read(context, to)
+        if !self.preface.is_empty() {
+            let (now, later) = self.preface.split_at(self.preface.len().min(to.remaining()));
+            to.put_slice(now);
+            self.preface = later;
+            return Poll::Ready(Ok(()));
+        }
+        match &mut self.stream {
+            Transport::Plain(stream) => Pin::new(stream).poll_read(context, to),
+            Transport::Encrypted(stream) => Pin::new(stream).poll_read(context, to),
+        }
     }
 }
 
 impl AsyncWrite for Connection {
     fn poll_write(mut self: Pin<&mut Self>, context: &mut Context<'_>, from: &[u8]) -> Poll<io::Result<usize>> {
-        Pin::new(&mut self.stream).poll_write(context, from)
+        match &mut self.stream {
+            Transport::Plain(stream) => Pin::new(stream).poll_write(context, from),
+            Transport::Encrypted(stream) => Pin::new(stream).poll_write(context, from),
+        }
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_flush(context)
+        match &mut self.stream {
+            Transport::Plain(stream) => Pin::new(stream).poll_flush(context),
+            Transport::Encrypted(stream) => Pin::new(stream).poll_flush(context),
+        }
     }
 
     fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_shutdown(context)
+        match &mut self.stream {
+            Transport::Plain(stream) => Pin::new(stream).poll_shutdown(context),
+            Transport::Encrypted(stream) => Pin::new(stream).poll_shutdown(context),
+        }
     }
 
     fn poll_write_vectored(
@@ -140,10 +192,16 @@ impl AsyncWrite for Connection {
         context: &mut Context<'_>,
         from: &[io::IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
-        Pin::new(&mut self.stream).poll_write_vectored(context, from)
+        match &mut self.stream {
+            Transport::Plain(stream) => Pin::new(stream).poll_write_vectored(context, from),
+            Transport::Encrypted(stream) => Pin::new(stream).poll_write_vectored(context, from),
+        }
     }
 
     fn is_write_vectored(&self) -> bool {
-        self.stream.is_write_vectored()
+        match &self.stream {
+            Transport::Plain(stream) => stream.is_write_vectored(),
+            Transport::Encrypted(stream) => stream.is_write_vectored(),
+        }
     }
 }

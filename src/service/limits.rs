@@ -9,6 +9,13 @@ pub const MAX_MESSAGE_BYTES: usize = 4 << 20;
 /// messages of its connection: a message of many states comes without waiting on the way.
 pub const WINDOW_BYTES: [u32; 2] = [1 << 20, 1 << 20];
 
+/// Calls of a connection that were cancelled before the server looked at them; above it the
+/// connection is closed, since a client that resets that many does nothing else.
+pub const MAX_RESET_STREAMS: usize = 64;
+
+/// Largest headers of a call, bytes.
+pub const MAX_HEADER_BYTES: u32 = 16 << 10;
+
 /// Objects of a scene up to which its tree is made at once, in a tenth of a millisecond, rather than
 /// on a thread of its own.
 pub const SMALL_SCENE: usize = 2000;
@@ -49,29 +56,6 @@ pub const MAX_PAGE: usize = 1000;
 /// How long a call that arrives while the catalogue is loading waits for it before it gets
 /// UNAVAILABLE.
 pub const LOADING_PATIENCE: Duration = Duration::from_secs(10);
-
-/// How long open calls may go on after a stop was asked for. A second signal ends the wait.
-pub const DRAIN: Duration = Duration::from_secs(5);
-
-/// Concurrent calls of one connection; clients queue further ones.
-pub const MAX_STREAMS: u32 = 32;
-
-/// Concurrent calls of all connections together. Each may hold a message of [`MAX_MESSAGE_BYTES`]
-/// in both directions and what is made of it; further calls wait unread.
-pub const MAX_CALLS: usize = 64;
-
-/// Longest time from the start of a call behind the limit to its answer.
-pub const CALL_LIMIT: Duration = Duration::from_secs(120);
-
-/// Silence after which a connection is asked for a sign of life.
-pub const KEEPALIVE: Duration = Duration::from_secs(30);
-
-/// Time to give the sign of life before the connection is closed.
-pub const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(10);
-
-/// Connections open at once; further ones queue in the system. Half of the 1024 file descriptors a
-/// process mostly has.
-pub const MAX_CONNECTIONS: usize = 512;
 
 /// How long a new connection may say nothing.
 pub const PREFACE_TIMEOUT: Duration = Duration::from_secs(10);

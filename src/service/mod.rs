@@ -9,14 +9,20 @@
 //! every change runs in a task of its own and is finished or not begun, and every question is
 //! stopped.
 
+mod admin;
 mod app_state;
+mod authorization;
+mod backups;
 mod blob_calls;
 mod blobs;
 mod bodies;
 mod body_mesh;
 mod body_wire;
+mod call_layer;
 mod call_time;
+mod calls;
 mod concurrency_limit;
+pub mod config;
 mod contact_watch;
 mod error;
 #[cfg(feature = "fit")]
@@ -26,6 +32,7 @@ mod incoming;
 mod jobs;
 pub mod limits;
 mod message_limit;
+mod metrics;
 pub(crate) mod packed;
 mod pose_stream;
 pub mod proto;
@@ -36,6 +43,11 @@ pub(crate) mod scene_wire;
 mod scenes;
 mod server;
 mod server_info;
+mod tls;
+pub(crate) mod tokens;
 pub(crate) mod wire;
 
-pub use server::{ServeError, ServeOptions, Server, serve};
+pub use config::Config;
+pub use server::{ServeError, Server, serve};
+pub use tls::TlsError;
+pub use tokens::{Role, TokensError};

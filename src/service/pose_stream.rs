@@ -3,11 +3,12 @@
 
 use std::collections::HashMap;
 use std::sync::Arc;
+use std::time::Instant;
 
 use tokio::sync::mpsc;
 use tonic::{Status, Streaming};
 
-use super::app_state::AppState;
+use super::app_state::{AppState, stopped};
 use super::error::{self, Invalid};
 use super::proto::{StreamPosesRequest, StreamPosesResponse};
 use super::{packed, wire};
@@ -32,14 +33,17 @@ struct Pending {
     sequence: u64,
     messages: u32,
     merged: u32,
+    /// When the first of them came.
+    since: Option<Instant>,
 }
 
 /// Applies the messages of a client until it has sent all, or is gone.
 pub(super) async fn run(app: AppState, mut messages: Streaming<StreamPosesRequest>, replies: Replies) {
-    let mut table: Option<Table> = None;
+    let (mut table, mut stopping): (Option<Table>, _) = (None, app.stopping());
     let (mut pending, mut ended) = (Pending::default(), false);
     let mut applying: Option<tokio::task::JoinHandle<Result<StreamPosesResponse, Status>>> = None;
     let mut reply: Option<StreamPosesResponse> = None;
+    let mut stopped_before_end = false;
     loop {
         if applying.is_none()
             && pending.messages > 0
@@ -49,6 +53,10 @@ pub(super) async fn run(app: AppState, mut messages: Streaming<StreamPosesReques
             applying = Some(tokio::spawn(apply(app.clone(), table.scene.clone(), table.live.clone(), poses)));
         }
         if ended && applying.is_none() && reply.is_none() {
+            if stopped_before_end {
+                let why = "the server stops; stream again when it is back";
+                let _ = replies.send(Err(error::unavailable("STOPPING", why))).await;
+            }
             return;
         }
         tokio::select! {
@@ -78,6 +86,11 @@ pub(super) async fn run(app: AppState, mut messages: Streaming<StreamPosesReques
                     return;
                 }
             },
+            // What came before is applied and acknowledged; nothing more is read.
+            () = stopped(&mut stopping), if !ended => {
+                ended = true;
+                stopped_before_end = true;
+            }
             applied = async { match &mut applying { Some(task) => task.await, None => std::future::pending().await } } => {
                 applying = None;
                 match applied {
@@ -153,6 +166,7 @@ async fn read(
         pending.merged += u32::from(pending.poses.insert(name, pose).is_some());
     }
     (pending.sequence, pending.messages) = (sequence, pending.messages.saturating_add(1));
+    pending.since.get_or_insert_with(Instant::now);
     Ok(())
 }
 
@@ -193,7 +207,8 @@ async fn apply(
     if !is_there {
         return Err(error::catalogue(&CatalogueError::NoScene(scene), "scene"));
     }
-    let Pending { poses, sequence, messages, merged } = pending;
+    let Pending { poses, sequence, messages, merged, since } = pending;
+    let count = poses.len() as u64 + u64::from(merged);
     let moved = tokio::task::spawn_blocking(move || {
         catalogue.stream_poses::<CatalogueError>(&live, |scene| {
             // An object that was removed meanwhile needs no pose.
@@ -210,6 +225,7 @@ async fn apply(
         }
         Err(error) => return Err(error::catalogue(&error, "scene")),
     };
+    app.metrics().streamed(count, merged.into(), since.map(|since| since.elapsed()).unwrap_or_default());
     Ok(StreamPosesResponse {
         revision: next.revision(),
         sequence,

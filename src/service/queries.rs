@@ -6,7 +6,7 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::app_state::AppState;
+use super::app_state::{AppState, stopped};
 use super::call_time::CallTime;
 use super::error::{self, Invalid};
 use super::limits::{MAX_ANSWERS, MAX_RAYS, MAX_STATE_POSES, MAX_STATES, REVISION_PATIENCE};
@@ -47,9 +47,18 @@ impl QueryService for Queries {
         let (app, mut messages) = (self.0.clone(), request.into_inner());
         // One question after the other: a client that reads slowly is not read on.
         tokio::spawn(async move {
-            while let Some(message) = messages.message().await.transpose() {
+            let mut stopping = app.stopping();
+            loop {
+                let message = tokio::select! {
+                    message = messages.message() => message,
+                    () = stopped(&mut stopping) => {
+                        let why = "the server stops; ask again when it is back";
+                        Err(error::unavailable("STOPPING", why))
+                    }
+                };
                 let message = match message {
-                    Ok(message) => message,
+                    Ok(Some(message)) => message,
+                    Ok(None) => return,
                     Err(status) => {
                         let _ = sender.send(Err(status)).await;
                         return;
@@ -96,6 +105,7 @@ impl QueryService for Queries {
         }
         let parts = self.0.ask(Arc::new(states), time).await?;
         let answers: Vec<StateAnswer> = parts.into_iter().flatten().collect();
+        self.0.metrics().checked(&answers);
         Ok(Response::new(states_response(&answers, &scene, revision)))
     }
 
@@ -274,6 +284,7 @@ async fn pairs(
     let question = Pairs::new(scene, ask.clone(), operands, pairs).map_err(query_wire::pairs_error)?;
     let parts = app.ask(Arc::new(question), time).await?;
     let answers: Vec<Answer> = parts.into_iter().flatten().collect();
+    app.metrics().answered(&answers);
     let complete = answers.iter().all(|answer| answer.status != AnswerStatus::Deadline);
     let outcome = proto::Outcome::Found.into();
     let mut response = EvaluateResponse { scene_revision, outcome, complete, ..Default::default() };
@@ -293,6 +304,7 @@ async fn within_margin(
     let question = app.prepare(&scene, move || make(of, asked)).await?;
     let parts = app.ask(Arc::new(question), time).await?;
     let (found, complete) = combined(&scene, parts);
+    app.metrics().answered(found.iter().flat_map(|found| &found.answers));
     error::at_most("within", found.len() * ask.measures().len(), ("max_answers", MAX_ANSWERS))?;
     Ok(found_response(&found, complete, (&scene, &ask, &outputs), revision))
 }

@@ -3,7 +3,6 @@
 use std::future::Future;
 use std::io::{self, Write};
 use std::net::SocketAddr;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use tokio::net::TcpListener;
@@ -12,21 +11,27 @@ use tokio::sync::{oneshot, watch};
 use tonic::transport::server::Router;
 use tonic_health::ServingStatus;
 use tonic_health::server::HealthReporter;
+use tower::layer::util::{Identity, Stack};
 
 #[cfg(feature = "fit")]
 use crate::jobs::Jobs;
 use crate::store::{Catalogue, FORK_IDLE, Store, StoreError};
 
+use super::admin::{self, Admin};
 use super::app_state::AppState;
+use super::authorization::Authorization;
 use super::blob_calls::BlobCalls;
 use super::bodies::Bodies;
+use super::call_layer::CallLayer;
 use super::concurrency_limit::ConcurrencyLimit;
+use super::config::{Config, ConfigError};
 #[cfg(feature = "fit")]
 use super::fits::Fits;
 use super::incoming::Incoming;
 #[cfg(feature = "fit")]
 use super::jobs::JobCalls;
-use super::limits::{DRAIN, KEEPALIVE, KEEPALIVE_TIMEOUT, MAX_STREAMS, POSES_WRITTEN_EVERY, WINDOW_BYTES};
+use super::limits::{MAX_HEADER_BYTES, MAX_RESET_STREAMS, POSES_WRITTEN_EVERY, WINDOW_BYTES};
+use super::metrics::Metrics;
 use super::proto::FILE_DESCRIPTOR_SET;
 use super::proto::blob_service_server::{self, BlobServiceServer};
 use super::proto::body_service_server::{self, BodyServiceServer};
@@ -40,22 +45,21 @@ use super::proto::server_service_server::{self, ServerServiceServer};
 use super::queries::Queries;
 use super::scenes::Scenes;
 use super::server_info::ServerInfo;
-
-/// What a server needs to know.
-#[derive(Debug, Clone)]
-pub struct ServeOptions {
-    /// Address to listen on; a loopback address, port 0 for any free one.
-    pub listen: SocketAddr,
-    /// Directory of the catalogue; made when it is not there.
-    pub data: PathBuf,
-}
+use super::tls::{self, TlsError};
+use super::tokens::{self, Tokens, TokensError};
 
 /// Why a server could not start or ended before it was reported to.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
-    /// Everybody on the network could change the catalogue.
-    #[error("--listen {0} is no loopback address, and there is no TLS yet; listen on 127.0.0.1 or [::1]")]
-    NotLoopback(SocketAddr),
+    /// The settings do not go together.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// Certificates that cannot be used.
+    #[error(transparent)]
+    Tls(#[from] TlsError),
+    /// Tokens that cannot be used.
+    #[error(transparent)]
+    Tokens(#[from] TokensError),
     /// The address cannot be listened on.
     #[error("cannot listen on {addr}: {source}; choose another address, or port 0 for any free port")]
     Bind {
@@ -81,29 +85,40 @@ pub enum ServeError {
 /// A server that listens and holds the lock of its catalogue, but does not answer yet.
 #[derive(Debug)]
 pub struct Server {
+    config: Config,
     listener: TcpListener,
     addr: SocketAddr,
+    admin: Option<TcpListener>,
+    tls: Option<tls::Current>,
+    tokens: Option<watch::Receiver<Arc<Tokens>>>,
     store: Store,
 }
 
 impl Server {
-    /// Binds the address and locks the catalogue. Connections queue until [`Server::run`].
+    /// Binds the addresses, reads certificates and tokens, and locks the catalogue. Connections
+    /// queue until [`Server::run`].
     ///
     /// # Errors
-    /// When the address is not loopback or taken, or when the catalogue is in use or cannot be
-    /// opened.
-    pub async fn bind(options: ServeOptions) -> Result<Self, ServeError> {
-        let ServeOptions { listen, data } = options;
-        if !listen.ip().is_loopback() {
-            return Err(ServeError::NotLoopback(listen));
-        }
-        let bind = |source| ServeError::Bind { addr: listen, source };
-        let listener = TcpListener::bind(listen).await.map_err(bind)?;
-        let addr = listener.local_addr().map_err(bind)?;
+    /// Settings that do not go together, files that cannot be used, an address that is taken, and a
+    /// catalogue that is in use or cannot be opened.
+    pub async fn bind(config: Config) -> Result<Self, ServeError> {
+        config.check()?;
+        let tls = config.tls.clone().map(tls::certificates).transpose()?;
+        let tokens = config.tokens.clone().map(tokens::tokens).transpose()?;
+        let (listener, addr) = bind(config.listen).await?;
+        let admin = match config.admin {
+            Some(addr) => {
+                let (listener, addr) = bind(addr).await?;
+                tracing::info!(%addr, "probes and metrics");
+                Some(listener)
+            }
+            None => None,
+        };
+        let data = config.data.clone();
         let store = tokio::task::spawn_blocking(move || Store::open(&data))
             .await
             .map_err(|error| ServeError::InternalPanic(error.to_string()))??;
-        Ok(Self { listener, addr, store })
+        Ok(Self { config, listener, addr, admin, tls, tokens, store })
     }
 
     /// Where it listens; the port that was found when port 0 was asked for.
@@ -111,7 +126,7 @@ impl Server {
         self.addr
     }
 
-    /// Serves until `stop` resolves, then lets open calls finish for at most [`DRAIN`]. Health says
+    /// Serves until `stop` resolves, then lets open calls finish for a while. Health says
     /// NOT_SERVING until the catalogue is loaded and from `stop` on.
     ///
     /// # Errors
@@ -122,8 +137,14 @@ impl Server {
         // It starts as SERVING.
         set_health(&health, ServingStatus::NotServing).await;
         let (stop_streams, stopping) = watch::channel(false);
-        let app = AppState::new(catalogue.clone(), stopping)?;
-        let router = router(app.clone()).add_service(health_service);
+        let (limits, metrics) = (self.config.limits, Metrics::default());
+        let app = AppState::new(catalogue.clone(), stopping.clone(), (limits.clone(), metrics.clone()))?;
+        let calls = CallLayer::new(Authorization(self.tokens), metrics.clone());
+        let router = router(&app, calls).add_service(health_service);
+        let admin = self.admin.map(|listener| {
+            let looked_at = Admin { metrics: metrics.clone(), catalogue: catalogue.clone(), stopping };
+            tokio::spawn(admin::serve(listener, looked_at))
+        });
         let keeper = tokio::spawn(keep_scenes(catalogue.clone()));
         #[cfg(feature = "fit")]
         let (router, jobs, worker) = {
@@ -140,8 +161,9 @@ impl Server {
             }
         });
 
+        let incoming = Incoming::new(self.listener, limits.connections, self.tls, metrics);
         let (draining, drain) = oneshot::channel();
-        let serving = router.serve_with_incoming_shutdown(Incoming::new(self.listener), async {
+        let serving = router.serve_with_incoming_shutdown(incoming, async {
             let _ = drain.await;
         });
         tokio::pin!(serving);
@@ -162,12 +184,16 @@ impl Server {
             serving.await
         };
         // Streams may stay open as long as their clients like; waiting for them ends here.
-        if let Ok(result) = tokio::time::timeout(DRAIN, serving).await {
+        let drain = limits.drain();
+        if let Ok(result) = tokio::time::timeout(drain, serving).await {
             result?;
         } else {
-            tracing::warn!("some connections were still open after {DRAIN:?} and are cut");
+            tracing::warn!("some connections were still open after {drain:?} and are cut");
         }
         keeper.abort();
+        if let Some(admin) = admin {
+            admin.abort();
+        }
         write_poses(&catalogue, true).await;
         ended
     }
@@ -178,12 +204,12 @@ impl Server {
 ///
 /// # Errors
 /// See [`Server::bind`] and [`Server::run`].
-pub async fn serve(options: ServeOptions) -> Result<(), ServeError> {
+pub async fn serve(config: Config) -> Result<(), ServeError> {
     // Both before the first line on standard output: who has read it may send a signal.
     let mut signals = Signals::new()?;
     // What a relative path means is not in the log otherwise.
-    let data = std::path::absolute(&options.data)?;
-    let server = Server::bind(options).await?;
+    let data = std::path::absolute(&config.data)?;
+    let server = Server::bind(config).await?;
     let mut stdout = io::stdout();
     writeln!(stdout, "listening on {}", server.local_addr())?;
     stdout.flush()?;
@@ -226,25 +252,44 @@ impl Signals {
     }
 }
 
-fn router(app: AppState) -> Router {
+/// The services behind what every call passes first.
+type Routes = Router<Stack<CallLayer, Identity>>;
+
+async fn bind(addr: SocketAddr) -> Result<(TcpListener, SocketAddr), ServeError> {
+    let failed = |source| ServeError::Bind { addr, source };
+    let listener = TcpListener::bind(addr).await.map_err(failed)?;
+    let addr = listener.local_addr().map_err(failed)?;
+    Ok((listener, addr))
+}
+
+fn router(app: &AppState, calls: CallLayer) -> Routes {
     let reflection = || {
         tonic_reflection::server::Builder::configure()
             .register_encoded_file_descriptor_set(FILE_DESCRIPTOR_SET)
             .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
     };
+    let limits = app.limits();
     // Messages are measured before tonic reads them, see `message_limit`; answers by the handlers.
-    let (sized, limit) = (usize::MAX, ConcurrencyLimit::new());
+    let (sized, limit) = (usize::MAX, ConcurrencyLimit::new(limits, app.metrics().clone()));
     let bodies = BodyServiceServer::new(Bodies(app.clone()));
     let blobs = BlobServiceServer::new(BlobCalls(app.clone()));
     let scenes = SceneServiceServer::new(Scenes(app.clone()));
     let queries = QueryServiceServer::new(Queries(app.clone()));
-    tonic::transport::Server::builder()
-        .max_concurrent_streams(MAX_STREAMS)
+    let [keepalive, keepalive_timeout] = limits.keepalive();
+    let mut server = tonic::transport::Server::builder();
+    if let Some(age) = limits.connection_age() {
+        server = server.max_connection_age(age).max_connection_age_grace(limits.drain());
+    }
+    server
+        .layer(calls)
+        .max_concurrent_streams(limits.calls_per_connection)
+        .http2_max_pending_accept_reset_streams(Some(MAX_RESET_STREAMS))
+        .http2_max_header_list_size(MAX_HEADER_BYTES)
         .initial_stream_window_size(WINDOW_BYTES[0])
         .initial_connection_window_size(WINDOW_BYTES[1])
-        .http2_keepalive_interval(Some(KEEPALIVE))
-        .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
-        .add_service(ServerServiceServer::new(ServerInfo(app)))
+        .http2_keepalive_interval(Some(keepalive))
+        .http2_keepalive_timeout(Some(keepalive_timeout))
+        .add_service(ServerServiceServer::new(ServerInfo(app.clone())))
         .add_service(limit.before(bodies.max_decoding_message_size(sized).max_encoding_message_size(sized)))
         .add_service(limit.before(blobs.max_decoding_message_size(sized).max_encoding_message_size(sized)))
         .add_service(limit.before(scenes.max_decoding_message_size(sized).max_encoding_message_size(sized)))
@@ -257,10 +302,10 @@ fn router(app: AppState) -> Router {
 
 /// Fits behind a limit of their own: meshes take long to read, and nothing else waits for them.
 #[cfg(feature = "fit")]
-fn with_jobs(router: Router, app: &AppState, jobs: &Jobs) -> Router {
+fn with_jobs(router: Routes, app: &AppState, jobs: &Jobs) -> Routes {
     let fits = FitServiceServer::new(Fits::new(app.clone(), jobs.clone()));
     let calls = JobServiceServer::new(JobCalls { app: app.clone(), jobs: jobs.clone() });
-    let (sized, limit) = (usize::MAX, ConcurrencyLimit::new());
+    let (sized, limit) = (usize::MAX, ConcurrencyLimit::new(app.limits(), app.metrics().clone()));
     router
         .add_service(limit.before(fits.max_decoding_message_size(sized).max_encoding_message_size(sized)))
         .add_service(limit.before(calls.max_decoding_message_size(sized).max_encoding_message_size(sized)))

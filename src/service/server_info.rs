@@ -1,14 +1,16 @@
 //! ServerService.
 
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Request, Response, Status};
 
 use super::app_state::AppState;
+use super::backups;
 use super::limits::{
-    CALL_LIMIT, MAX_ANSWERS, MAX_BLOB_BYTES, MAX_BLOBS_BYTES, MAX_CALLS, MAX_MESSAGE_BYTES, MAX_RAYS, MAX_STATE_POSES,
-    MAX_STATES,
+    MAX_ANSWERS, MAX_BLOB_BYTES, MAX_BLOBS_BYTES, MAX_MESSAGE_BYTES, MAX_RAYS, MAX_STATE_POSES, MAX_STATES,
 };
 use super::proto::server_service_server::ServerService;
-use super::proto::{GetServerInfoRequest, GetServerInfoResponse, Limits};
+use super::proto::{BackupRequest, BackupResponse, GetServerInfoRequest, GetServerInfoResponse, Limits};
 use super::wire::count;
 use crate::scene::{MAX_NAME_BYTES, MAX_OBJECTS, MAX_PAIR_RULES, MAX_RUNGS};
 use crate::store::{FORK_IDLE, MAX_FORKS};
@@ -41,8 +43,8 @@ impl ServerService for ServerInfo {
             fork_idle_s: FORK_IDLE.as_secs_f64(),
             max_blob_bytes: MAX_BLOB_BYTES as u64,
             max_blobs_bytes: MAX_BLOBS_BYTES as u64,
-            max_calls: count(MAX_CALLS),
-            call_limit_s: CALL_LIMIT.as_secs_f64(),
+            max_calls: count(self.0.limits().calls),
+            call_limit_s: self.0.limits().call_s,
             max_rungs: count(MAX_RUNGS),
         };
         Ok(Response::new(GetServerInfoResponse {
@@ -54,5 +56,13 @@ impl ServerService for ServerInfo {
             limits: Some(limits),
             ready: self.0.is_loaded(),
         }))
+    }
+
+    type BackupStream = ReceiverStream<Result<BackupResponse, Status>>;
+
+    async fn backup(&self, _: Request<BackupRequest>) -> Result<Response<Self::BackupStream>, Status> {
+        let (sender, stream) = mpsc::channel(1);
+        tokio::spawn(backups::run(self.0.clone(), sender));
+        Ok(Response::new(ReceiverStream::new(stream)))
     }
 }

@@ -8,6 +8,7 @@ pub use live_scene::{FORK_IDLE, LiveScene, MAX_FORKS, Origin};
 
 use std::collections::BTreeMap;
 use std::ops::Bound;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::thread;
 
@@ -16,6 +17,7 @@ use redb::WriteTransaction;
 use crate::body::{BodyId, Shape};
 use crate::scene::{Geometry, GeometryFileError, Ladder, LadderError, NameError, SceneError};
 
+use super::copy::copy;
 use super::disk::Contents;
 use super::job::{Job, MAX_QUEUED_JOBS};
 use super::rows::{BODIES, LADDERS, LadderRow};
@@ -145,6 +147,24 @@ impl Catalogue {
     pub fn load(store: Store) -> Result<Self, StoreError> {
         let state = State::read(&store, &BTreeMap::new())?;
         Ok(Self { store: Mutex::new(store), state: RwLock::new(state) })
+    }
+
+    /// Directory of its file.
+    pub fn dir(&self) -> PathBuf {
+        self.store.lock().unwrap_or_else(PoisonError::into_inner).dir().to_owned()
+    }
+
+    /// Copies the catalogue, with all poses that were streamed, into a new file.
+    ///
+    /// # Errors
+    /// When the disk fails.
+    pub fn backup(&self, to: &Path) -> Result<(), StoreError> {
+        self.write_poses(false)?;
+        let (dir, snapshot) = {
+            let store = self.writer()?;
+            (store.dir().to_owned(), store.snapshot()?)
+        };
+        copy(&snapshot, to).map_err(|error| StoreError::from_redb(&dir, error))
     }
 
     /// One body of whatever kind by id.

@@ -18,6 +18,9 @@ use super::rows::{
 };
 use super::{Job, StoreError};
 
+/// Name of the file in its directory.
+pub(super) const FILE: &str = "catalogue.redb";
+
 /// The catalogue's file, locked by this process. Hand it to [`super::Catalogue::load`].
 pub struct Store {
     dir: PathBuf,
@@ -54,7 +57,7 @@ impl Store {
     pub fn open(dir: &Path) -> Result<Self, StoreError> {
         let unusable = |source| StoreError::Directory { dir: dir.into(), source };
         fs::create_dir_all(dir).map_err(unusable)?;
-        let file = dir.join("catalogue.redb");
+        let file = dir.join(FILE);
         let fresh = match fs::metadata(&file) {
             // redb would make a new database of it, and whatever was in it would be forgotten
             // without a word.
@@ -228,6 +231,12 @@ impl Store {
         Ok(contents)
     }
 
+    /// What a copy of everything is read from; later changes are not seen in it.
+    pub(super) fn snapshot(&self) -> Result<ReadTransaction, StoreError> {
+        let database = self.database.as_ref().ok_or_else(|| self.closed())?;
+        database.begin_read().map_err(|error| StoreError::from_redb(&self.dir, error))
+    }
+
     /// Points, metres, and triangles of a job, if it has not ended.
     pub(super) fn mesh(&self, id: u64) -> Result<Option<JobMesh>, StoreError> {
         let Some(coordinates) = self.job_bytes(POINTS, id)? else { return Ok(None) };
@@ -287,7 +296,7 @@ impl<E: Into<redb::Error>> From<E> for ReadError {
 }
 
 /// A table that older files may lack.
-fn table<K: redb::Key + 'static, V: redb::Value + 'static>(
+pub(super) fn table<K: redb::Key + 'static, V: redb::Value + 'static>(
     read: &ReadTransaction,
     definition: TableDefinition<K, V>,
 ) -> Result<Option<ReadOnlyTable<K, V>>, redb::Error> {

@@ -40,6 +40,12 @@ pub enum StoreError {
         /// What this program reads and writes.
         expected: u64,
     },
+    /// A catalogue where a backup is to be restored.
+    #[error("{} is there already; restore into another directory, or move it away first", .file.display())]
+    Occupied {
+        /// The catalogue's file.
+        file: PathBuf,
+    },
     /// The file is there and holds nothing: it was cut, or the first start did not get far.
     #[error(
         "{} is empty; restore it from a backup, or remove it to start with an empty catalogue",

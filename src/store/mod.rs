@@ -32,10 +32,12 @@
 //! which later scenes start.
 
 mod catalogue;
+mod copy;
 mod disk;
 mod error;
 mod job;
 mod request;
+mod restore;
 mod rows;
 
 pub use catalogue::{Catalogue, CatalogueError, FORK_IDLE, LiveScene, MAX_FORKS, Origin};
@@ -49,6 +51,7 @@ pub use request::{
     FitBody, FitCompound, FitGroup, FitLadder, FitMode, FitPolynomial, FitPreparation, FitRequest, FitSosBody,
     FitWithinGap,
 };
+pub use restore::restore;
 
 #[cfg(test)]
 pub(crate) mod tests;

@@ -55,7 +55,7 @@ const PRIVATE_WORDS: &[(&str, &[&str])] = &[
     ("prost", &["service", "client"]),
     ("tonic", &["service", "client"]),
     ("tonic_prost", &["service"]),
-    ("tonic_health", &["service"]),
+    ("tonic_health", &["service", "client"]),
     ("tonic_reflection", &["service"]),
     ("tonic_types", &["service", "client"]),
     ("redb", &["store"]),

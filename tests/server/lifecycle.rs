@@ -30,7 +30,7 @@ fn a_server_that_can_not_start_says_why() {
     let data = dir.path().join("data");
     let open = run(&["serve", "--listen", "0.0.0.0:0", "--data", data.to_str().expect("text")]);
     assert!(!open.status.success());
-    assert!(String::from_utf8_lossy(&open.stderr).contains("loopback"));
+    assert!(String::from_utf8_lossy(&open.stderr).contains("--insecure"));
 
     let file = dir.path().join("file");
     std::fs::write(&file, "no directory").expect("written");

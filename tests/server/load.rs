@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
 use sublevel::body::Body;
-use sublevel::service::limits::{MAX_CONNECTIONS, MAX_MESSAGE_BYTES, PREFACE_TIMEOUT};
+use sublevel::service::Config;
+use sublevel::service::limits::{MAX_MESSAGE_BYTES, PREFACE_TIMEOUT};
 use sublevel::service::proto::{EvaluateRequest, Measure, UpdateSceneRequest};
 
 use tonic_health::pb::HealthCheckRequest;
@@ -69,8 +70,8 @@ async fn call(server: &Running) -> Clients {
 async fn silent_connections_are_closed_and_do_not_lock_others_out() {
     let dir = tempfile::tempdir().expect("a directory");
     let server = Running::start(dir.path());
-    let mut mute: Vec<_> =
-        (0..MAX_CONNECTIONS + 20).map(|_| TcpStream::connect(server.addr).expect("connected")).collect();
+    let places = Config::default().limits.connections;
+    let mut mute: Vec<_> = (0..places + 20).map(|_| TcpStream::connect(server.addr).expect("connected")).collect();
     // Half a greeting is as good as none.
     mute[0].write_all(b"PRI * HT").expect("written");
     let patience = PREFACE_TIMEOUT + PATIENCE;

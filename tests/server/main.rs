@@ -9,6 +9,7 @@ mod harness;
 mod keeping;
 mod lifecycle;
 mod load;
+mod operation;
 mod readme;
 mod refusals;
 mod streams;

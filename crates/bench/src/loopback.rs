@@ -5,7 +5,7 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::time::Duration;
 
 use sublevel::client::Client;
-use sublevel::service::{ServeError, ServeOptions, Server};
+use sublevel::service::{Config, ServeError, Server};
 use tempfile::TempDir;
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::oneshot;
@@ -32,7 +32,8 @@ impl Loopback {
         let [server, clients] = [(); 2].map(|()| Builder::new_multi_thread().enable_all().build());
         let (server, clients) = (server?, clients?);
         let listen = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-        let bound = server.block_on(Server::bind(ServeOptions { listen, data: data.path().to_owned() }))?;
+        let bound =
+            server.block_on(Server::bind(Config { listen, data: data.path().to_owned(), ..Config::default() }))?;
         let url = format!("http://{}", bound.local_addr());
         let (stop, stopped) = oneshot::channel::<()>();
         let serving = server.spawn(bound.run(async {

@@ -1,13 +1,16 @@
 //! `sublevel fit --server`: the same, made elsewhere.
 
-use crate::client::{Client, JobProgress, SubmitError};
+use crate::client::{Client, ClientOptions, JobProgress, SubmitError};
 use crate::jobs::FitOutput;
-use crate::service::limits::CALL_LIMIT;
 use crate::service::proto::FitPhase;
 use crate::store::FitRequest;
 use indicatif::ProgressBar;
 use nalgebra::Vector3;
 use std::error::Error;
+use std::time::Duration;
+
+/// How long the server may take to read a mesh.
+const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Has the server execute a request about points (metres) and the triangles between them, or about
 /// bodies that it has. Ctrl-C cancels.
@@ -28,7 +31,9 @@ pub(in crate::cli) fn execute(
     };
     let tell = |job: &JobProgress| bar.set_message(describe(job));
     let fitted = runtime.block_on(async {
-        let client = Client::connect_with_patience(url, CALL_LIMIT).await?;
+        let client =
+            Client::connect_with(url, &ClientOptions { patience: PATIENCE, ..ClientOptions::from_environment() })
+                .await?;
         client.fit(request, (points, triangles), tell, cancel).await
     });
     Ok(fitted.map_err(|error: SubmitError| error)?)

@@ -1,0 +1,135 @@
+//! What every call passes first: its id, who makes it, and what is counted of it.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::task::{Context, Poll};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+use tonic::body::Body;
+use tonic::codegen::{BoxFuture, Service, http};
+use tonic::{Code, Status};
+use tower::Layer;
+use tracing::Instrument;
+
+use super::authorization::Authorization;
+use super::calls;
+use super::metrics::Metrics;
+
+/// Metadata with the id of a call: the client's, or one that is given to it.
+const REQUEST_ID: &str = "x-request-id";
+
+/// Longest id that is taken from a client.
+const LONGEST_ID: usize = 64;
+
+/// Checks, names and counts calls.
+#[derive(Clone, Debug)]
+pub(super) struct CallLayer {
+    authorization: Authorization,
+    metrics: Metrics,
+    next_id: Arc<AtomicU64>,
+}
+
+impl CallLayer {
+    pub(super) fn new(authorization: Authorization, metrics: Metrics) -> Self {
+        // Ids of one run are in order, and those of two runs differ.
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let first = since.as_nanos() as u64;
+        Self { authorization, metrics, next_id: Arc::new(AtomicU64::new(first)) }
+    }
+
+    /// The client's id if it can be printed, else a new one.
+    fn id(&self, request: &http::Request<Body>) -> http::HeaderValue {
+        let named = request.headers().get(REQUEST_ID);
+        let usable = |id: &&http::HeaderValue| {
+            let bytes = id.as_bytes();
+            (1..=LONGEST_ID).contains(&bytes.len()) && bytes.iter().all(u8::is_ascii_graphic)
+        };
+        match named.filter(usable) {
+            Some(id) => id.clone(),
+            None => {
+                let id = format!("{:016x}", self.next_id.fetch_add(1, Ordering::Relaxed));
+                http::HeaderValue::from_str(&id).unwrap_or(http::HeaderValue::from_static("?"))
+            }
+        }
+    }
+}
+
+impl<S> Layer<S> for CallLayer {
+    type Service = Watched<S>;
+
+    fn layer(&self, inner: S) -> Watched<S> {
+        Watched { inner, layer: self.clone() }
+    }
+}
+
+/// A service behind the layer.
+#[derive(Clone, Debug)]
+pub(super) struct Watched<S> {
+    inner: S,
+    layer: CallLayer,
+}
+
+impl<S> Service<http::Request<Body>> for Watched<S>
+where
+    S: Service<http::Request<Body>, Response = http::Response<Body>>,
+    S::Future: Send + 'static,
+{
+    type Response = S::Response;
+    type Error = S::Error;
+    type Future = BoxFuture<S::Response, S::Error>;
+
+    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), S::Error>> {
+        self.inner.poll_ready(context)
+    }
+
+    fn call(&mut self, request: http::Request<Body>) -> Self::Future {
+        let (start, open, metrics) = (Instant::now(), self.layer.metrics.begun(), self.layer.metrics.clone());
+        let (id, call) = (self.layer.id(&request), calls::label(request.uri().path()));
+        let span = tracing::info_span!("call", id = id.to_str().unwrap_or_default(), call);
+        let answering = self.layer.authorization.check(&request).map(|client| (client, self.inner.call(request)));
+        let answered = async move {
+            let mut response = match answering {
+                Ok((client, answering)) => {
+                    tracing::trace!(client, "begun");
+                    answering.await?
+                }
+                Err(status) => status.into_http(),
+            };
+            let status = Status::from_header_map(response.headers());
+            let code = status.as_ref().map_or(Code::Ok, Status::code);
+            let took = start.elapsed();
+            metrics.ended(call, name(code), took);
+            match status.filter(|status| status.code() != Code::Ok) {
+                Some(status) => tracing::debug!(code = name(code), ?took, why = status.message(), "refused"),
+                None => tracing::debug!(code = name(code), ?took, "answered"),
+            }
+            response.headers_mut().insert(REQUEST_ID, id);
+            drop(open);
+            Ok(response)
+        };
+        Box::pin(answered.instrument(span))
+    }
+}
+
+/// A code as gRPC writes it.
+fn name(code: Code) -> &'static str {
+    match code {
+        Code::Ok => "OK",
+        Code::Cancelled => "CANCELLED",
+        Code::Unknown => "UNKNOWN",
+        Code::InvalidArgument => "INVALID_ARGUMENT",
+        Code::DeadlineExceeded => "DEADLINE_EXCEEDED",
+        Code::NotFound => "NOT_FOUND",
+        Code::AlreadyExists => "ALREADY_EXISTS",
+        Code::PermissionDenied => "PERMISSION_DENIED",
+        Code::ResourceExhausted => "RESOURCE_EXHAUSTED",
+        Code::FailedPrecondition => "FAILED_PRECONDITION",
+        Code::Aborted => "ABORTED",
+        Code::OutOfRange => "OUT_OF_RANGE",
+        Code::Unimplemented => "UNIMPLEMENTED",
+        Code::Internal => "INTERNAL",
+        Code::Unavailable => "UNAVAILABLE",
+        Code::DataLoss => "DATA_LOSS",
+        Code::Unauthenticated => "UNAUTHENTICATED",
+    }
+}

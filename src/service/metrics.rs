@@ -1,0 +1,220 @@
+//! What the server counts, for Prometheus. Names end in their unit, as is the custom there.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use prometheus_client::encoding::{EncodeLabelSet, text};
+use prometheus_client::metrics::counter::Counter;
+use prometheus_client::metrics::family::Family;
+use prometheus_client::metrics::gauge::Gauge;
+use prometheus_client::metrics::histogram::Histogram;
+use prometheus_client::registry::{Registry, Unit};
+
+use crate::scene::query::{Answer, AnswerStatus, StateAnswer, StateVerdict};
+
+/// All that is counted. Clones share it.
+#[derive(Clone, Debug)]
+pub(super) struct Metrics(Arc<Counted>);
+
+#[derive(Debug)]
+struct Counted {
+    registry: Registry,
+    calls: Family<CallEnd, Counter>,
+    call_seconds: Family<Call, Histogram, fn() -> Histogram>,
+    in_flight: Gauge,
+    queue_seconds: Histogram,
+    shed: Counter,
+    connections: Gauge,
+    answers: Family<Ended, Counter>,
+    iterations: Histogram,
+    states: Family<Verdict, Counter>,
+    streamed_poses: Counter,
+    overtaken_poses: Counter,
+    pose_wait_seconds: Histogram,
+    ready: Gauge,
+    bodies: Gauge,
+    scenes: Gauge,
+}
+
+#[derive(Clone, Debug, Hash, PartialEq, Eq, EncodeLabelSet)]
+struct Call {
+    call: String,
+}
+
+#[derive(Clone, Debug, Hash, PartialEq, Eq, EncodeLabelSet)]
+struct CallEnd {
+    call: String,
+    code: String,
+}
+
+#[derive(Clone, Debug, Hash, PartialEq, Eq, EncodeLabelSet)]
+struct Ended {
+    status: &'static str,
+}
+
+#[derive(Clone, Debug, Hash, PartialEq, Eq, EncodeLabelSet)]
+struct Verdict {
+    verdict: &'static str,
+}
+
+/// From 50 µs to 13 s, each twice the one before.
+fn seconds() -> Histogram {
+    Histogram::new((0..19).map(|power| 50e-6 * f64::from(1 << power)))
+}
+
+impl Default for Metrics {
+    fn default() -> Self {
+        let mut registry = Registry::with_prefix("sublevel");
+        let calls = Family::default();
+        registry.register("calls", "Calls that ended, by method and gRPC code", calls.clone());
+        let call_seconds: Family<Call, Histogram, fn() -> Histogram> = Family::new_with_constructor(seconds);
+        let about = "Time of a call from its arrival to its answer, by method; of streams to their beginning";
+        registry.register_with_unit("call_duration", about, Unit::Seconds, call_seconds.clone());
+        let in_flight = Gauge::default();
+        registry.register("calls_in_flight", "Calls that are being answered", in_flight.clone());
+        let queue_seconds = seconds();
+        registry.register_with_unit(
+            "queue",
+            "Time that calls wait for their turn",
+            Unit::Seconds,
+            queue_seconds.clone(),
+        );
+        let shed = Counter::default();
+        registry.register("shed_calls", "Calls that were refused since they had waited too long", shed.clone());
+        let connections = Gauge::default();
+        registry.register("connections", "Connections that are open", connections.clone());
+        let answers = Family::default();
+        registry.register("answers", "Measures of pairs, by how they came about", answers.clone());
+        let iterations = Histogram::new([0.0, 1.0, 2.0, 3.0, 5.0, 8.0, 13.0, 21.0, 34.0]);
+        registry.register("solver_iterations", "Iterations of the solver for a measure of a pair", iterations.clone());
+        let states = Family::default();
+        registry.register("states", "States of CheckStates, by verdict", states.clone());
+        let streamed_poses = Counter::default();
+        registry.register("streamed_poses", "Poses that came in streams", streamed_poses.clone());
+        let overtaken_poses = Counter::default();
+        registry.register("overtaken_poses", "Streamed poses that later ones overtook", overtaken_poses.clone());
+        let pose_wait_seconds = seconds();
+        let about = "Time from the arrival of a message with poses until the scene holds them";
+        registry.register_with_unit("pose_wait", about, Unit::Seconds, pose_wait_seconds.clone());
+        let ready = Gauge::default();
+        registry.register("ready", "1 when the catalogue is loaded", ready.clone());
+        let (bodies, scenes) = (Gauge::default(), Gauge::default());
+        registry.register("bodies", "Bodies that are stored", bodies.clone());
+        registry.register("scenes", "Scenes and forks", scenes.clone());
+        Self(Arc::new(Counted {
+            registry,
+            calls,
+            call_seconds,
+            in_flight,
+            queue_seconds,
+            shed,
+            connections,
+            answers,
+            iterations,
+            states,
+            streamed_poses,
+            overtaken_poses,
+            pose_wait_seconds,
+            ready,
+            bodies,
+            scenes,
+        }))
+    }
+}
+
+/// Counts down when it is dropped.
+#[derive(Debug)]
+pub(super) struct Open(Gauge);
+
+impl Drop for Open {
+    fn drop(&mut self) {
+        self.0.dec();
+    }
+}
+
+impl Metrics {
+    /// A call that begins.
+    pub(super) fn begun(&self) -> Open {
+        self.0.in_flight.inc();
+        Open(self.0.in_flight.clone())
+    }
+
+    /// A call that ended with a gRPC code after a time.
+    pub(super) fn ended(&self, call: &str, code: &str, took: Duration) {
+        self.0.calls.get_or_create(&CallEnd { call: call.to_owned(), code: code.to_owned() }).inc();
+        self.0.call_seconds.get_or_create(&Call { call: call.to_owned() }).observe(took.as_secs_f64());
+    }
+
+    /// A call that waited for its turn; and whether it was refused then.
+    pub(super) fn queued(&self, waited: Duration, shed: bool) {
+        self.0.queue_seconds.observe(waited.as_secs_f64());
+        if shed {
+            self.0.shed.inc();
+        }
+    }
+
+    /// A connection that opens.
+    pub(super) fn connected(&self) -> Open {
+        self.0.connections.inc();
+        Open(self.0.connections.clone())
+    }
+
+    /// Answers of a call.
+    pub(super) fn answered<'a>(&self, answers: impl IntoIterator<Item = &'a Answer>) {
+        let mut by_status = [0_u64; 5];
+        for answer in answers {
+            by_status[answer.status as usize] += 1;
+            self.0.iterations.observe(f64::from(answer.iterations));
+        }
+        let all = [
+            (AnswerStatus::Converged, "CONVERGED"),
+            (AnswerStatus::BracketWide, "BRACKET_WIDE"),
+            (AnswerStatus::Deadline, "DEADLINE"),
+            (AnswerStatus::NotDefined, "NOT_DEFINED"),
+            (AnswerStatus::Allowed, "ALLOWED"),
+        ];
+        for (status, name) in all {
+            let count = by_status[status as usize];
+            if count > 0 {
+                self.0.answers.get_or_create(&Ended { status: name }).inc_by(count);
+            }
+        }
+    }
+
+    /// Verdicts of a call.
+    pub(super) fn checked(&self, states: &[StateAnswer]) {
+        let all = [
+            (StateVerdict::Free, "FREE"),
+            (StateVerdict::Contact, "CONTACT"),
+            (StateVerdict::Undecided, "UNDECIDED"),
+            (StateVerdict::Invalid, "INVALID"),
+            (StateVerdict::NotChecked, "NOT_CHECKED"),
+        ];
+        for (verdict, name) in all {
+            let count = states.iter().filter(|state| state.verdict == verdict).count() as u64;
+            if count > 0 {
+                self.0.states.get_or_create(&Verdict { verdict: name }).inc_by(count);
+            }
+        }
+    }
+
+    /// Streamed poses that were applied together, of which some were overtaken, and how long the
+    /// first of them waited.
+    pub(super) fn streamed(&self, poses: u64, overtaken: u64, waited: Duration) {
+        self.0.streamed_poses.inc_by(poses);
+        self.0.overtaken_poses.inc_by(overtaken);
+        self.0.pose_wait_seconds.observe(waited.as_secs_f64());
+    }
+
+    /// All of it, in the text format of Prometheus; sizes are those of the catalogue, if it is loaded.
+    pub(super) fn text(&self, sizes: Option<(usize, usize)>) -> String {
+        self.0.ready.set(i64::from(sizes.is_some()));
+        let (bodies, scenes) = sizes.unwrap_or_default();
+        self.0.bodies.set(i64::try_from(bodies).unwrap_or(i64::MAX));
+        self.0.scenes.set(i64::try_from(scenes).unwrap_or(i64::MAX));
+        let mut text = String::new();
+        // Writing to a string cannot fail.
+        let _ = text::encode(&mut text, &self.0.registry);
+        text
+    }
+}

@@ -1,0 +1,118 @@
+//! Certificates of the server, read again when their files change.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::sync::watch;
+use tokio_rustls::rustls::crypto::ring;
+use tokio_rustls::rustls::pki_types::pem::{self, PemObject};
+use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
+use tokio_rustls::rustls::server::WebPkiClientVerifier;
+use tokio_rustls::rustls::{self, RootCertStore, ServerConfig};
+
+use super::config::TlsConfig;
+
+/// How often the files are looked at.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
+
+/// Why certificates cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum TlsError {
+    /// A file that cannot be read, or is no PEM.
+    #[error("{}: {why}; {key} needs a PEM file", path.display())]
+    File {
+        /// The setting.
+        key: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        why: String,
+    },
+    /// A key that is not the certificate's, or a root that is none.
+    #[error("the certificates of [tls] cannot be used: {0}; give the key of the first certificate")]
+    Unusable(String),
+}
+
+/// What connections are encrypted with now.
+pub(super) type Current = watch::Receiver<Arc<ServerConfig>>;
+
+/// Reads the certificates, and again when a file has changed. What cannot be used then is logged,
+/// and the earlier certificates stay.
+///
+/// # Errors
+/// Files that cannot be used at the start.
+pub(super) fn certificates(files: TlsConfig) -> Result<Current, TlsError> {
+    let (sender, current) = watch::channel(Arc::new(read(&files)?));
+    tokio::spawn(async move {
+        let mut known = contents(&files).await;
+        while !sender.is_closed() {
+            tokio::time::sleep(LOOK_EVERY).await;
+            let now = contents(&files).await;
+            if now == known {
+                continue;
+            }
+            match read(&files) {
+                Ok(config) => {
+                    sender.send_replace(Arc::new(config));
+                    tracing::info!("certificates have changed and are used from now on");
+                }
+                Err(error) => tracing::error!(%error, "certificates have changed and the earlier ones stay"),
+            }
+            known = now;
+        }
+    });
+    Ok(current)
+}
+
+/// Bytes of all files; none of one that cannot be read.
+async fn contents(files: &TlsConfig) -> Vec<Option<Vec<u8>>> {
+    let mut contents = Vec::new();
+    for path in [Some(&files.certificate), Some(&files.key), files.client_ca.as_ref()].into_iter().flatten() {
+        contents.push(tokio::fs::read(path).await.ok());
+    }
+    contents
+}
+
+fn read(files: &TlsConfig) -> Result<ServerConfig, TlsError> {
+    let TlsConfig { certificate, key, client_ca } = files;
+    let refused = |key, path: &Path| {
+        let path = path.to_owned();
+        move |error: pem::Error| TlsError::File { key, path, why: reason(&error) }
+    };
+    let chain = certificate_list("tls.certificate", certificate)?;
+    let private = PrivateKeyDer::from_pem_file(key).map_err(refused("tls.key", key))?;
+    let unusable = |error: &dyn std::fmt::Display| TlsError::Unusable(error.to_string());
+    let provider = Arc::new(ring::default_provider());
+    let builder = ServerConfig::builder_with_provider(provider.clone());
+    let builder = builder.with_safe_default_protocol_versions().map_err(|error| unusable(&error))?;
+    let builder = match client_ca {
+        None => builder.with_no_client_auth(),
+        Some(path) => {
+            let mut roots = RootCertStore::empty();
+            for root in certificate_list("tls.client_ca", path)? {
+                roots.add(root).map_err(|error| unusable(&error))?;
+            }
+            let verifier = WebPkiClientVerifier::builder_with_provider(Arc::new(roots), provider).build();
+            builder.with_client_cert_verifier(verifier.map_err(|error| unusable(&error))?)
+        }
+    };
+    let mut config = builder.with_single_cert(chain, private).map_err(|error: rustls::Error| unusable(&error))?;
+    config.alpn_protocols = vec![b"h2".to_vec()];
+    Ok(config)
+}
+
+fn certificate_list(key: &'static str, path: &Path) -> Result<Vec<CertificateDer<'static>>, TlsError> {
+    let refused = |why: String| TlsError::File { key, path: path.to_owned(), why };
+    let all = CertificateDer::pem_file_iter(path).map_err(|error| refused(reason(&error)))?;
+    let all: Vec<_> = all.collect::<Result<_, _>>().map_err(|error| refused(reason(&error)))?;
+    if all.is_empty() { Err(refused("holds no certificate".into())) } else { Ok(all) }
+}
+
+fn reason(error: &pem::Error) -> String {
+    match error {
+        pem::Error::Io(error) => error.to_string(),
+        pem::Error::NoItemsFound => "holds no key".into(),
+        other => format!("is damaged: {other}"),
+    }
+}
