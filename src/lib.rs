@@ -21,5 +21,6 @@ pub mod demo;
 pub mod draw;
 #[cfg(feature = "fit")]
 pub mod jobs;
+pub mod load;
 pub mod service;
 pub mod store;

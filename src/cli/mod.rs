@@ -13,6 +13,7 @@ mod fit;
 #[cfg(feature = "fit")]
 mod group;
 mod health;
+mod load;
 mod measure;
 #[cfg(feature = "fit")]
 mod mesh;
@@ -63,6 +64,7 @@ enum Command {
     Scene(scene::SceneArgs),
     Health(health::HealthArgs),
     Token(token::TokenArgs),
+    Load(load::LoadArgs),
     Backup(backup::BackupArgs),
     Restore(backup::RestoreArgs),
 }
@@ -87,6 +89,7 @@ pub fn main() -> ExitCode {
         Command::Scene(args) => scene::run(&args).map(done),
         Command::Health(args) => health::run(&args),
         Command::Token(args) => token::run(&args).map(done),
+        Command::Load(args) => load::run(&args).map(done),
         Command::Backup(args) => backup::backup(&args).map(done),
         Command::Restore(args) => backup::restore(&args).map(done),
     };

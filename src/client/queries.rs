@@ -1,5 +1,7 @@
 //! Questions.
 
+use prost::Message;
+
 use super::connection::{Client, Connection};
 use super::error::ClientError;
 use crate::measure::Pose;
@@ -105,6 +107,12 @@ impl Question {
         self
     }
 
+    fn asked(mut self, scene: &str, measures: &[Measure]) -> EvaluateRequest {
+        self.request.scene = scene.into();
+        self.request.measures = measures.iter().map(|&measure| query_wire::measure_message(measure).into()).collect();
+        self.request
+    }
+
     /// The request, for what this type does not say.
     pub fn request_mut(&mut self) -> &mut EvaluateRequest {
         &mut self.request
@@ -143,6 +151,10 @@ impl StatesQuestion {
         self
     }
 
+    fn asked(self, scene: &str) -> CheckStatesRequest {
+        CheckStatesRequest { scene: scene.into(), poses: self.poses.into_bytes(), ..self.request }
+    }
+
     /// The request without its poses, for what this type does not say.
     pub fn request_mut(&mut self) -> &mut CheckStatesRequest {
         &mut self.request
@@ -175,9 +187,7 @@ impl Client {
         question: Question,
         measures: &[Measure],
     ) -> Result<Answers, ClientError> {
-        let mut request = question.request;
-        request.scene = scene.into();
-        request.measures = measures.iter().map(|&measure| query_wire::measure_message(measure).into()).collect();
+        let request = question.asked(scene, measures);
         let named = match &request.question {
             Some(evaluate_request::Question::Pairs(list)) => list.rows.clone(),
             _ => Vec::new(),
@@ -194,14 +204,34 @@ impl Client {
         Ok(Answers { revision: response.scene_revision, rows: rows.collect(), complete: response.complete })
     }
 
+    /// Asks about pairs of a scene, and returns how many bytes the answer has: for those who measure
+    /// servers.
+    pub(crate) async fn evaluate_bytes(
+        &self,
+        scene: &str,
+        question: &Question,
+        measures: &[Measure],
+    ) -> Result<usize, ClientError> {
+        let request = question.clone().asked(scene, measures);
+        Ok(self.queries().evaluate(request).await.map_err(self.refused())?.get_ref().encoded_len())
+    }
+
+    /// The same of states.
+    pub(crate) async fn check_states_bytes(
+        &self,
+        scene: &str,
+        question: &StatesQuestion,
+    ) -> Result<usize, ClientError> {
+        let request = question.clone().asked(scene);
+        Ok(self.queries().check_states(request).await.map_err(self.refused())?.get_ref().encoded_len())
+    }
+
     /// Asks whether anything is in contact in each of many states.
     ///
     /// # Errors
     /// When the question cannot be answered.
     pub async fn check_states(&self, scene: &str, question: StatesQuestion) -> Result<CheckedStates, ClientError> {
-        let poses = question.poses.into_bytes();
-        let request = CheckStatesRequest { scene: scene.into(), poses, ..question.request };
-        let response = self.queries().check_states(request).await.map_err(self.refused())?.into_inner();
+        let response = self.queries().check_states(question.asked(scene)).await.map_err(self.refused())?.into_inner();
         let verdict = |&byte: &u8| proto::Verdict::try_from(i32::from(byte)).unwrap_or_default();
         let name = |index: u32| usize::try_from(index).ok().and_then(|index| response.objects.get(index)).cloned();
         let pair = |[a, b]: [u32; 2]| Some([name(a)?, name(b)?]);

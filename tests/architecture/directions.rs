@@ -26,6 +26,7 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
     ("service", &["jobs", "store", "scene", "measure", "body", "polynomial"]),
     // Of service, the messages.
     ("client", &["service", "jobs", "store", "scene", "measure", "body"]),
+    ("load", &["client", "draw", "scene", "measure", "body"]),
     ("draw", &["body", "optimize"]),
     ("demo", ANY),
     ("cli", ANY),
@@ -42,6 +43,7 @@ const ANY: &[&str] = &[
     "jobs",
     "service",
     "client",
+    "load",
     "draw",
     "demo",
 ];
@@ -52,8 +54,8 @@ const SOURCES: [(&str, Option<&str>); 4] =
 
 /// Words that one layer (or a few) may name, and no other: wire formats, bytes on disk.
 const PRIVATE_WORDS: &[(&str, &[&str])] = &[
-    ("prost", &["service", "client"]),
-    ("tonic", &["service", "client"]),
+    ("prost", &["service", "client", "load"]),
+    ("tonic", &["service", "client", "load"]),
     ("tonic_prost", &["service"]),
     ("tonic_health", &["service", "client"]),
     ("tonic_reflection", &["service"]),

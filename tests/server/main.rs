@@ -9,6 +9,7 @@ mod harness;
 mod keeping;
 mod lifecycle;
 mod load;
+mod open_loop;
 mod operation;
 mod readme;
 mod refusals;

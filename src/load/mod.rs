@@ -1,0 +1,15 @@
+//! Load on a server in an open loop: calls are begun when they are due, however long earlier ones
+//! take, and their time counts from then on. A server that stands still is seen, as its clients would
+//! see it.
+
+mod echo;
+mod report;
+mod run;
+mod scenario;
+mod schedule;
+
+pub use echo::{Echo, echo};
+pub use report::{Latency, LoadReport, RateReport};
+pub use run::{LoadError, LoadOptions, Prepared, connect, measure, prepare};
+pub use scenario::{Scenario, ScenarioError, Share};
+pub use schedule::Arrivals;

@@ -1,0 +1,86 @@
+//! `sublevel load`: what it reports of a server that answers, stands still, or is not there.
+
+use std::process::{Command, Output, Stdio};
+use std::time::Duration;
+
+use serde_json::Value;
+
+use crate::harness::Running;
+
+fn load(server: &str, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sublevel"));
+    command.args(["load", "--server", server, "--connections", "2"]).args(arguments);
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+fn read(output: &Output, path: &std::path::Path) -> Value {
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_str(&std::fs::read_to_string(path).expect("written")).expect("JSON")
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_scenario_is_measured_beside_an_echo_and_leaves_nothing_behind() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(&dir.path().join("data"));
+    let (json, svg) = (dir.path().join("load.json"), dir.path().join("load.svg"));
+    for scenario in ["pair", "pairs", "within", "states", "mixed"] {
+        let mut command = load(&server.url(), &[scenario, "--rate", "40,80", "--duration", "0.5", "--warmup", "0.1"]);
+        let output = command.arg("--json").arg(&json).arg("--svg").arg(&svg).output().expect("it runs");
+        let report = read(&output, &json);
+        for target in ["server", "echo"] {
+            for (rate, of) in [40.0, 80.0].iter().zip(report[target].as_array().expect("rates")) {
+                assert_eq!(of["offered_per_s"].as_f64(), Some(*rate), "{scenario} {target}");
+                let answered = of["answered_per_s"].as_f64().expect("a number") * 0.5;
+                let due = of["due"].as_f64().expect("a number");
+                assert!(due > 0.0 && answered == due, "{scenario} {target}: {answered} of {due}");
+                assert!(of["errors"].as_object().expect("codes").is_empty(), "{scenario}: {of}");
+                let latency = |key: &str| of["latency_ms"][key].as_f64().expect("a number");
+                assert!(latency("p50") > 0.0 && latency("p50") <= latency("p99") && latency("p99") <= latency("max"));
+            }
+        }
+        let table = String::from_utf8(output.stdout).expect("text");
+        assert_eq!(table.lines().count(), 5, "{table}");
+        assert!(std::fs::read_to_string(&svg).expect("written").contains("server, 99 %"));
+    }
+    assert!(server.client().await.list_scenes().await.expect("a list").is_empty());
+}
+
+/// A tenth of the calls comes due while the server stands still; a closed loop would see one.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_that_stands_still_is_seen() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(&dir.path().join("data"));
+    let json = dir.path().join("load.json");
+    let arguments =
+        ["pair", "--rate", "200", "--duration", "3", "--warmup", "1", "--arrivals", "constant", "--no-echo"];
+    let running = load(&server.url(), &arguments).arg("--json").arg(&json).spawn().expect("it runs");
+    tokio::time::sleep(Duration::from_millis(2500)).await;
+    server.signal("-STOP");
+    tokio::time::sleep(Duration::from_millis(400)).await;
+    server.signal("-CONT");
+    let report = read(&running.wait_with_output().expect("it ends"), &json);
+    let of = &report["server"][0];
+    let latency = |key: &str| of["latency_ms"][key].as_f64().expect("a number");
+    assert!(latency("max") >= 350.0, "{of}");
+    // 400 ms of 3 s: more than a tenth of all calls waited, half of those longer than 200 ms.
+    assert!(latency("p99") >= 250.0 && latency("p50") < latency("p99"), "{of}");
+    assert!(of["errors"].as_object().expect("codes").is_empty(), "{of}");
+}
+
+#[test]
+fn what_cannot_be_measured_is_refused_with_the_remedy() {
+    let nobody = "http://127.0.0.1:9";
+    for (arguments, words) in [
+        (&["pair"][..], "cannot reach"),
+        (&["nowhere.toml"], "nowhere.toml"),
+        (&["pair", "--rate", "0"], "--rate"),
+        (&["pair", "--rate", "nan"], "--rate"),
+        (&["pair", "--duration", "-1"], "--duration"),
+        (&["pair", "--connections", "0"], "--connections"),
+    ] {
+        let output = load(nobody, arguments).output().expect("it runs");
+        let said = String::from_utf8(output.stderr).expect("text");
+        assert!(!output.status.success() && said.contains(words), "{arguments:?}: {said}");
+    }
+}
