@@ -9,6 +9,7 @@ use tonic::Status;
 use super::app_state::AppState;
 use super::proto::BackupResponse;
 use super::{error, tokens};
+use crate::store::BACKUP_PREFIX;
 
 /// Bytes of a piece.
 const PIECE_BYTES: usize = 1 << 20;
@@ -20,7 +21,10 @@ pub(super) async fn run(app: AppState, pieces: mpsc::Sender<Result<BackupRespons
         let catalogue = app.catalogue().await?;
         let work = move || -> Result<(), Status> {
             let failed = |error: &dyn std::fmt::Display| error::internal(error);
-            let folder = tempfile::tempdir_in(catalogue.dir()).map_err(|error| failed(&error))?;
+            let folder = tempfile::Builder::new()
+                .prefix(BACKUP_PREFIX)
+                .tempdir_in(catalogue.dir())
+                .map_err(|error| failed(&error))?;
             let path = folder.path().join("backup.redb");
             catalogue.backup(&path).map_err(|error| error::catalogue(&error.into(), "backup"))?;
             let mut file = std::fs::File::open(&path).map_err(|error| failed(&error))?;

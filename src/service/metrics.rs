@@ -26,7 +26,7 @@ struct Counted {
     shed: Counter,
     connections: Gauge,
     answers: Family<Ended, Counter>,
-    iterations: Histogram,
+    iterations: Counter,
     states: Family<Verdict, Counter>,
     streamed_poses: Counter,
     overtaken_poses: Counter,
@@ -85,8 +85,8 @@ impl Default for Metrics {
         registry.register("connections", "Connections that are open", connections.clone());
         let answers = Family::default();
         registry.register("answers", "Measures of pairs, by how they came about", answers.clone());
-        let iterations = Histogram::new([0.0, 1.0, 2.0, 3.0, 5.0, 8.0, 13.0, 21.0, 34.0]);
-        registry.register("solver_iterations", "Iterations of the solver for a measure of a pair", iterations.clone());
+        let iterations = Counter::default();
+        registry.register("solver_iterations", "Iterations of the solver for all answers", iterations.clone());
         let states = Family::default();
         registry.register("states", "States of CheckStates, by verdict", states.clone());
         let streamed_poses = Counter::default();
@@ -161,11 +161,12 @@ impl Metrics {
 
     /// Answers of a call.
     pub(super) fn answered<'a>(&self, answers: impl IntoIterator<Item = &'a Answer>) {
-        let mut by_status = [0_u64; 5];
+        let (mut by_status, mut iterations) = ([0_u64; 5], 0);
         for answer in answers {
             by_status[answer.status as usize] += 1;
-            self.0.iterations.observe(f64::from(answer.iterations));
+            iterations += u64::from(answer.iterations);
         }
+        self.0.iterations.inc_by(iterations);
         let all = [
             (AnswerStatus::Converged, "CONVERGED"),
             (AnswerStatus::BracketWide, "BRACKET_WIDE"),

@@ -21,6 +21,7 @@ mod body_wire;
 mod call_layer;
 mod call_time;
 mod calls;
+mod columns;
 mod concurrency_limit;
 pub mod config;
 mod contact_watch;

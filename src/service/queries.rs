@@ -8,6 +8,7 @@ use tonic::{Request, Response, Status, Streaming};
 
 use super::app_state::{AppState, stopped};
 use super::call_time::CallTime;
+use super::columns;
 use super::error::{self, Invalid};
 use super::limits::{MAX_ANSWERS, MAX_RAYS, MAX_STATE_POSES, MAX_STATES, REVISION_PATIENCE};
 use super::packed::{self, Packed};
@@ -283,12 +284,12 @@ async fn pairs(
     let scene_revision = scene.revision();
     let question = Pairs::new(scene, ask.clone(), operands, pairs).map_err(query_wire::pairs_error)?;
     let parts = app.ask(Arc::new(question), time).await?;
-    let answers: Vec<Answer> = parts.into_iter().flatten().collect();
-    app.metrics().answered(&answers);
-    let complete = answers.iter().all(|answer| answer.status != AnswerStatus::Deadline);
+    let answers = || parts.iter().flatten();
+    app.metrics().answered(answers());
+    let complete = answers().all(|answer| answer.status != AnswerStatus::Deadline);
     let outcome = proto::Outcome::Found.into();
     let mut response = EvaluateResponse { scene_revision, outcome, complete, ..Default::default() };
-    query_wire::write(&answers, &ask, &outputs, &mut response);
+    write(answers(), &ask, &outputs, &mut response);
     Ok(response)
 }
 
@@ -307,6 +308,15 @@ async fn within_margin(
     app.metrics().answered(found.iter().flat_map(|found| &found.answers));
     error::at_most("within", found.len() * ask.measures().len(), ("max_answers", MAX_ANSWERS))?;
     Ok(found_response(&found, complete, (&scene, &ask, &outputs), revision))
+}
+
+/// Answers as rows or in columns.
+fn write<'a>(answers: impl Iterator<Item = &'a Answer>, ask: &Ask, outputs: &Outputs, response: &mut EvaluateResponse) {
+    if outputs.columns {
+        response.columns = columns::write(answers, ask.measures(), outputs);
+    } else {
+        response.answers = answers.map(|answer| query_wire::row(answer, outputs)).collect();
+    }
 }
 
 fn found_response(
@@ -328,8 +338,8 @@ fn found_response(
         pairs: pairs.into_bytes(),
         ..Default::default()
     };
-    let answers: Vec<Answer> = found.iter().flat_map(|found| &found.answers).copied().collect();
-    query_wire::write(&answers, ask, outputs, &mut response);
+    let answers = found.iter().flat_map(|found| &found.answers);
+    write(answers, ask, outputs, &mut response);
     response
 }
 

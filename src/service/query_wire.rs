@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
-use bytes::Bytes;
 use nalgebra::{UnitQuaternion, Vector3};
 use tonic::Status;
 
@@ -22,15 +21,15 @@ use super::wire;
 /// What of an answer is sent, and how.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Outputs {
-    value: bool,
-    witnesses: bool,
-    normal: bool,
-    gradients: bool,
-    flags: bool,
-    parts: bool,
-    solver: bool,
-    objects: bool,
-    columns: bool,
+    pub(super) value: bool,
+    pub(super) witnesses: bool,
+    pub(super) normal: bool,
+    pub(super) gradients: bool,
+    pub(super) flags: bool,
+    pub(super) parts: bool,
+    pub(super) solver: bool,
+    pub(super) objects: bool,
+    pub(super) columns: bool,
 }
 
 pub(super) fn outputs(request: &proto::EvaluateRequest) -> Result<Outputs, Invalid> {
@@ -285,19 +284,8 @@ pub(super) fn flags(answer: &Answer) -> u8 {
     u8::from(answer.not_unique) | u8::from(answer.saturated) << 1 | u8::from(answer.one_sided) << 2
 }
 
-/// Answers of pairs, all measures of the first, then of the second, in the layout that was asked
-/// for.
-pub(super) fn write(answers: &[Answer], ask: &Ask, outputs: &Outputs, response: &mut proto::EvaluateResponse) {
-    if outputs.columns {
-        let count = ask.measures().len();
-        let columns = ask.measures().iter().enumerate();
-        response.columns = columns.map(|(index, measure)| column(answers, (index, count), *measure, outputs)).collect();
-    } else {
-        response.answers = answers.iter().map(|answer| row(answer, outputs)).collect();
-    }
-}
-
-fn row(answer: &Answer, outputs: &Outputs) -> proto::Answer {
+/// An answer as a row.
+pub(super) fn row(answer: &Answer, outputs: &Outputs) -> proto::Answer {
     let [part_a, part_b] = if outputs.parts { answer.parts.map(u32::from) } else { [0; 2] };
     let [rung_a, rung_b] = if outputs.parts { answer.rungs.map(u32::from) } else { [0; 2] };
     let witnesses = answer.witnesses.as_ref().filter(|_| outputs.witnesses);
@@ -332,56 +320,6 @@ fn decision(verdict: Verdict) -> proto::Decision {
         Verdict::Yes => proto::Decision::Yes,
         Verdict::No => proto::Decision::No,
         Verdict::Undecided => proto::Decision::Undecided,
-    }
-}
-
-/// Every `count`-th answer from `index` on, as packed arrays.
-fn column(answers: &[Answer], (index, count): (usize, usize), measure: Measure, outputs: &Outputs) -> proto::Columns {
-    let of = || answers.iter().skip(index).step_by(count);
-    let length = of().len();
-    let pack = |asked: bool, width: usize, write: &dyn Fn(&mut Packed, &Answer)| -> Bytes {
-        if !asked {
-            return Bytes::new();
-        }
-        let mut packed = Packed::with_capacity(length * width);
-        of().for_each(|answer| write(&mut packed, answer));
-        packed.into_bytes()
-    };
-    let decides = of().any(|answer| answer.verdict.is_some());
-    let verdicts = |verdict: Verdict| match decides {
-        true => packed::bits(of().map(|answer| answer.verdict == Some(verdict))),
-        false => Bytes::new(),
-    };
-    let status_byte = |answer: &Answer| u8::try_from(i32::from(status(answer.status))).unwrap_or(0);
-    proto::Columns {
-        measure: measure_message(measure).into(),
-        status: pack(true, 1, &|packed, answer| packed.byte(status_byte(answer))),
-        lower: pack(true, 8, &|packed, answer| packed.number(answer.lower)),
-        upper: pack(true, 8, &|packed, answer| packed.number(answer.upper)),
-        value: pack(outputs.value, 8, &|packed, answer| packed.number(answer.value)),
-        yes: verdicts(Verdict::Yes),
-        undecided: verdicts(Verdict::Undecided),
-        witness_a_m: pack(outputs.witnesses, 24, &|packed, answer| {
-            packed.vector(answer.witnesses.as_ref().map(|[a, _]| a));
-        }),
-        witness_b_m: pack(outputs.witnesses, 24, &|packed, answer| {
-            packed.vector(answer.witnesses.as_ref().map(|[_, b]| b));
-        }),
-        normal: pack(outputs.normal, 24, &|packed, answer| packed.vector(answer.normal.as_ref())),
-        gradient_a: pack(outputs.gradients, 48, &|packed, answer| {
-            packed.twist(answer.gradients.as_ref().map(|[a, _]| a));
-        }),
-        gradient_b: pack(outputs.gradients, 48, &|packed, answer| {
-            packed.twist(answer.gradients.as_ref().map(|[_, b]| b));
-        }),
-        flags: pack(outputs.flags, 1, &|packed, answer| packed.byte(flags(answer))),
-        parts: pack(outputs.parts, 4, &|packed, answer| {
-            answer.parts.iter().for_each(|&part| packed.byte(u8::try_from(part).unwrap_or(u8::MAX)));
-            answer.rungs.iter().for_each(|&rung| packed.byte(rung));
-        }),
-        iterations: pack(outputs.solver, 4, &|packed, answer| packed.index(answer.iterations)),
-        multiplier: pack(outputs.solver, 8, &|packed, answer| packed.number(answer.multiplier)),
-        objects_upper: pack(outputs.objects, 8, &|packed, answer| packed.number(answer.objects_upper)),
     }
 }
 

@@ -76,7 +76,7 @@ pub(crate) fn placement(object: &proto::Object, field: impl Fn() -> String) -> R
 
 /// The message that asks for an update.
 pub(crate) fn update_message(scene: &str, update: &Update) -> proto::UpdateSceneRequest {
-    let owned = |names: &[Arc<str>]| names.iter().map(|name| name.to_string()).collect();
+    let owned = |names: &[Arc<str>]| names.iter().map(ToString::to_string).collect();
     let object = |(object, padding_m): &(Arc<str>, Option<f64>)| proto::ObjectPadding {
         object: object.to_string(),
         padding_m: *padding_m,

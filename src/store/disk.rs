@@ -68,6 +68,7 @@ impl Store {
         };
         let first = if fresh { Database::create(&file) } else { Database::open(&file) };
         let store = Self::open_with(dir, first, Box::new(move || Database::open(&file)))?;
+        remove_cut_backups(dir);
         if fresh {
             // A synced file is of no use when its directory entry is lost.
             File::open(dir).and_then(|dir| dir.sync_all()).map_err(unusable)?;
@@ -263,6 +264,20 @@ impl Store {
 
     fn closed(&self) -> StoreError {
         StoreError::Disk { dir: self.dir.clone(), source: Box::new(redb::Error::DatabaseClosed) }
+    }
+}
+
+/// Beginning of the names of folders in which backups are made, in the directory of the catalogue.
+pub const BACKUP_PREFIX: &str = "backup-";
+
+/// What a server that was cut off left behind; nobody else makes backups here, since the catalogue is
+/// locked.
+fn remove_cut_backups(dir: &Path) {
+    for entry in fs::read_dir(dir).into_iter().flatten().flatten() {
+        if entry.file_name().to_string_lossy().starts_with(BACKUP_PREFIX) && entry.path().is_dir() {
+            // It takes space only.
+            let _ = fs::remove_dir_all(entry.path());
+        }
     }
 }
 

@@ -41,7 +41,7 @@ mod restore;
 mod rows;
 
 pub use catalogue::{Catalogue, CatalogueError, FORK_IDLE, LiveScene, MAX_FORKS, Origin};
-pub use disk::{JobMesh, Store};
+pub use disk::{BACKUP_PREFIX, JobMesh, Store};
 pub use error::StoreError;
 pub use job::{
     FitOptimum, FitOutcome, FittedBody, FittedKind, Job, JobState, MAX_ENDED_JOBS, MAX_QUEUED_JOBS,

@@ -76,7 +76,7 @@ fn what_cannot_be_measured_is_refused_with_the_remedy() {
         (&["nowhere.toml"], "nowhere.toml"),
         (&["pair", "--rate", "0"], "--rate"),
         (&["pair", "--rate", "nan"], "--rate"),
-        (&["pair", "--duration", "-1"], "--duration"),
+        (&["pair", "--duration", "0"], "--duration"),
         (&["pair", "--connections", "0"], "--connections"),
     ] {
         let output = load(nobody, arguments).output().expect("it runs");

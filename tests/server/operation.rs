@@ -385,6 +385,14 @@ async fn a_backup_is_the_catalogue_as_it_was() {
     assert_eq!(after.objects, before.objects);
     assert!(after.revision >= before.revision);
 
+    // What a server that was cut off left of a backup goes at the next start.
+    let cut = Path::new(&path("again")).join("backup-cut");
+    std::fs::create_dir(&cut).expect("made");
+    again.kill();
+    let again = Running::start(Path::new(&path("again")));
+    assert!(!cut.exists());
+    drop(again);
+
     // A directory that is in use, and files that are none, cut or changed.
     let occupied = run(&["restore", &path("backup.redb"), "--data", &path("again")]);
     assert!(String::from_utf8_lossy(&occupied.stderr).contains("is there already"));
