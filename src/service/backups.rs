@@ -20,6 +20,10 @@ pub(super) async fn run(app: AppState, pieces: mpsc::Sender<Result<BackupRespons
     let made = async {
         let catalogue = app.catalogue().await?;
         let work = move || -> Result<(), Status> {
+            // The client is gone since it waited for its turn.
+            if sender.is_closed() {
+                return Ok(());
+            }
             let failed = |error: &dyn std::fmt::Display| error::internal(error);
             let folder = tempfile::Builder::new()
                 .prefix(BACKUP_PREFIX)

@@ -83,11 +83,14 @@ where
     }
 
     fn call(&mut self, request: http::Request<Body>) -> Self::Future {
-        let (start, open, metrics) = (Instant::now(), self.layer.metrics.begun(), self.layer.metrics.clone());
+        let (open, metrics) = (self.layer.metrics.begun(), self.layer.metrics.clone());
         let (id, call) = (self.layer.id(&request), calls::label(request.uri().path()));
         let span = tracing::info_span!("call", id = id.to_str().unwrap_or_default(), call);
+        let ending = Ending { metrics, call, start: Instant::now(), code: "CANCELLED" };
         let answering = self.layer.authorization.check(&request).map(|client| (client, self.inner.call(request)));
         let answered = async move {
+            // Whole, so that it ends with the call.
+            let mut ending = ending;
             let mut response = match answering {
                 Ok((client, answering)) => {
                     tracing::trace!(client, "begun");
@@ -97,8 +100,8 @@ where
             };
             let status = Status::from_header_map(response.headers());
             let code = status.as_ref().map_or(Code::Ok, Status::code);
-            let took = start.elapsed();
-            metrics.ended(call, name(code), took);
+            let took = ending.start.elapsed();
+            ending.code = name(code);
             match status.filter(|status| status.code() != Code::Ok) {
                 Some(status) => tracing::debug!(code = name(code), ?took, why = status.message(), "refused"),
                 None => tracing::debug!(code = name(code), ?took, "answered"),
@@ -108,6 +111,20 @@ where
             Ok(response)
         };
         Box::pin(answered.instrument(span))
+    }
+}
+
+/// Counts a call when it is dropped: as cancelled unless it was answered before.
+struct Ending {
+    metrics: Metrics,
+    call: &'static str,
+    start: Instant,
+    code: &'static str,
+}
+
+impl Drop for Ending {
+    fn drop(&mut self) {
+        self.metrics.ended(self.call, self.code, self.start.elapsed());
     }
 }
 

@@ -7,7 +7,7 @@ pub const MAX_MESSAGE_BYTES: usize = 4 << 20;
 
 /// Bytes of a message that a client may send before the server has read any of it, and of all
 /// messages of its connection: a message of many states comes without waiting on the way.
-pub const WINDOW_BYTES: [u32; 2] = [1 << 20, 1 << 20];
+pub const WINDOW_BYTES: [u32; 2] = [1 << 20, 2 << 20];
 
 /// Calls of a connection that were cancelled before the server looked at them; above it the
 /// connection is closed, since a client that resets that many does nothing else.

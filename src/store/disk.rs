@@ -268,7 +268,7 @@ impl Store {
 }
 
 /// Beginning of the names of folders in which backups are made, in the directory of the catalogue.
-pub const BACKUP_PREFIX: &str = "backup-";
+pub const BACKUP_PREFIX: &str = "catalogue.redb.backing-up-";
 
 /// What a server that was cut off left behind; nobody else makes backups here, since the catalogue is
 /// locked.

@@ -24,7 +24,11 @@ pub fn restore(backup: &Path, dir: &Path) -> Result<(usize, usize), StoreError> 
     fs::create_dir_all(dir).map_err(unusable)?;
     let aside = tempfile::Builder::new().prefix("restoring-").tempdir_in(dir).map_err(unusable)?;
     let proven = prove(backup, aside.path()).and_then(|counts| {
-        fs::rename(aside.path().join(FILE), &file).map_err(unusable)?;
+        // A link, unlike a renaming, never takes the place of what a server has made meanwhile.
+        fs::hard_link(aside.path().join(FILE), &file).map_err(|error| match error.kind() {
+            io::ErrorKind::AlreadyExists => StoreError::Occupied { file: file.clone() },
+            _ => unusable(error),
+        })?;
         File::open(dir).and_then(|dir| dir.sync_all()).map_err(unusable)?;
         Ok(counts)
     });

@@ -197,6 +197,13 @@ async fn probes_and_metrics_say_what_was_asked() {
     client.evaluate("cell", Question::pairs([("a", "z")]), &[Measure::Distance]).await.expect_err("nobody");
     let states = StatesQuestion::new(["a"]).with_states(&[at(0.0), at(1.0)]);
     client.check_states("cell", states).await.expect("verdicts");
+    // A call that its client gives up counts, too.
+    let names: Vec<String> = (0..400).map(|index| format!("o{index}")).collect();
+    client.put_objects("cell", names.iter().map(|name| (name.as_str(), &body, at(0.5)))).await.expect("placed");
+    let long = client.evaluate("cell", Question::within(1.0).cold(), &[Measure::Penetration]);
+    assert!(tokio::time::timeout(Duration::from_millis(20), long).await.is_err());
+    let cancelled = "sublevel_calls_total{call=\"QueryService/Evaluate\",code=\"CANCELLED\"} 1";
+    eventually(async || page(admin, "/metrics").1.contains(cancelled)).await;
     assert_eq!(page(admin, "/livez"), (200, "ok\n".into()));
     assert_eq!(page(admin, "/readyz"), (200, "ok\n".into()));
     assert_eq!(page(admin, "/other").0, 404);
@@ -386,7 +393,7 @@ async fn a_backup_is_the_catalogue_as_it_was() {
     assert!(after.revision >= before.revision);
 
     // What a server that was cut off left of a backup goes at the next start.
-    let cut = Path::new(&path("again")).join("backup-cut");
+    let cut = Path::new(&path("again")).join("catalogue.redb.backing-up-cut");
     std::fs::create_dir(&cut).expect("made");
     again.kill();
     let again = Running::start(Path::new(&path("again")));

@@ -139,7 +139,7 @@ fn set_ball(balls: &mut Vec<WorldBall>, slot: Slot, object: &Object, poses: &Pos
     }
     if let Some(solid) = object.solids().last() {
         let ball = solid.circumscribed();
-        balls[slot_at] = (poses.get(slot).transform_point(&ball.center), ball.radius);
+        balls[slot_at] = world_ball(poses.get(slot), (ball.center, ball.radius));
     }
 }
 
@@ -175,6 +175,13 @@ impl WideRay {
         // Rounding of the quotients.
         (from <= to * (1.0 + 1e-12)).then_some(from * (1.0 - 1e-12))
     }
+}
+
+/// A ball of a body frame where it stands, grown by the rounding of its centre, which may be far from
+/// either origin although the ball is not.
+pub(crate) fn world_ball(pose: &Pose, (center, radius): WorldBall) -> WorldBall {
+    let rounding = 32.0 * f64::EPSILON * (pose.translation().norm() + center.norm() + radius);
+    (pose.transform_point(&center), radius + rounding)
 }
 
 /// A box proven to contain an object where it stands, metres, world frame; none around a

@@ -97,9 +97,9 @@ impl Config {
         let refuse = |key: &str, why: String| Err(ConfigError::Setting { key: key.to_owned(), why });
         let public = !self.listen.ip().is_loopback();
         if public && !self.insecure && (self.tls.is_none() || self.tokens.is_none()) {
-            let missing = if self.tls.is_none() { "[tls]" } else { "tokens" };
+            let missing = if self.tls.is_none() { "[tls] is not set" } else { "tokens is not set" };
             let why = format!(
-                "is {}, which others can reach, and there is no {missing}: set it, listen on 127.0.0.1 or [::1], or say \
+                "is {}, which others can reach, and {missing}: set it, listen on 127.0.0.1 or [::1], or say \
                  --insecure",
                 self.listen
             );
@@ -146,7 +146,7 @@ mod tests {
         assert!(Config { insecure: true, ..public.clone() }.check().is_ok());
         let tls = Some(TlsConfig { certificate: "a".into(), key: "b".into(), client_ca: None });
         let encrypted = Config { tls, ..public };
-        assert!(encrypted.check().expect_err("no tokens").to_string().contains("there is no tokens"));
+        assert!(encrypted.check().expect_err("no tokens").to_string().contains("tokens is not set"));
         assert!(Config { tokens: Some("t".into()), ..encrypted }.check().is_ok());
         let twice = Config { admin: Some(Config::default().listen), ..Config::default() };
         assert!(twice.check().expect_err("one address").to_string().starts_with("admin is"));

@@ -242,13 +242,19 @@ impl Catalogue {
         live: &LiveScene,
         place: impl FnOnce(&Scene) -> Result<Vec<(Slot, Pose)>, E>,
     ) -> Result<Scene, E> {
-        if live.origin.is_some() {
-            live.touch();
-        } else if live.current.borrow().revision() + RESERVE / 2 > live.reserved.load(Ordering::Relaxed) {
-            self.reserve(live).map_err(CatalogueError::from)?;
-        }
-        let _changing = live.change();
-        let scene = live.snapshot();
+        let (_changing, scene) = loop {
+            if live.origin.is_some() {
+                live.touch();
+            } else if live.current.borrow().revision() + RESERVE / 2 > live.reserved.load(Ordering::Relaxed) {
+                self.reserve(live).map_err(CatalogueError::from)?;
+            }
+            let changing = live.change();
+            let scene = live.snapshot();
+            // An update in between has given the reserve up.
+            if live.origin.is_some() || scene.revision() < live.reserved.load(Ordering::Relaxed) {
+                break (changing, scene);
+            }
+        };
         let next = scene.with_poses(&place(&scene)?).map_err(CatalogueError::from)?;
         live.publish(next.clone());
         Ok(next)

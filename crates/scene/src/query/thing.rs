@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use sublevel_core::body::{Shape, Solid};
 use sublevel_core::measure::{HalfSpace, Pose};
 
-use crate::broad_phase::WorldBall;
+use crate::broad_phase::{WorldBall, world_ball};
 use crate::geometry::Geometry;
 use crate::object::{Object, Slot};
 
@@ -49,7 +49,7 @@ impl WorldHalfSpace {
         let (normal, normal_error) = if *pose.rotation() == UnitQuaternion::identity() {
             (*half_space.normal(), 0.0)
         } else {
-            (pose.transform_direction(half_space.normal()).normalize(), 16.0 * f64::EPSILON)
+            (pose.transform_direction(half_space.normal()).normalize(), 32.0 * f64::EPSILON)
         };
         let origin = *pose.translation();
         let offset = half_space.offset() + normal.dot(&origin);
@@ -82,7 +82,7 @@ impl<'a> Thing<'a> {
         match self {
             Self::Solid { rungs, pose, .. } => {
                 let ball = rungs.last()?.circumscribed();
-                Some((pose.transform_point(&ball.center), ball.radius))
+                Some(world_ball(pose, (ball.center, ball.radius)))
             }
             Self::HalfSpace(_) => None,
             Self::Point(point) => Some((*point, 0.0)),
@@ -117,7 +117,9 @@ impl<'a> Thing<'a> {
         let bounds = rungs.last()?.bounding_box();
         let (middle, half) = ((bounds.max + bounds.min) * 0.5, (bounds.max - bounds.min) * 0.5);
         let axes = pose.rotation().to_rotation_matrix().into_inner();
-        Some(OrientedBox { center: axes * middle + pose.translation(), axes, half })
+        // Of the centre, which may be far from either origin although the box is not.
+        let rounding = 32.0 * f64::EPSILON * (pose.translation().amax() + middle.amax() + half.amax());
+        Some(OrientedBox { center: axes * middle + pose.translation(), axes, half: half.add_scalar(rounding) })
     }
 }
 
@@ -169,4 +171,39 @@ fn half_space_gap(of: &WorldHalfSpace, (center, radius): WorldBall) -> f64 {
 pub(crate) struct PairSlots {
     pub(crate) a: Slot,
     pub(crate) b: Slot,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sublevel_core::body::Body;
+    use sublevel_testkit::Seeded;
+
+    /// Far from their own frames' origins, and placed so that they are near the world's: balls and
+    /// boxes around the same points, which are known by their places in the world.
+    #[test]
+    fn gaps_are_bounds_far_from_the_frames_own_origin() {
+        let mut random = Seeded(5);
+        for step in 0..500 {
+            let reach = 10_f64.powf(7.0 * random.between(0.0, 1.0));
+            let mut thing = |at: Vector3<f64>| {
+                let center = reach * random.unit();
+                let rotation = random.rotation();
+                let pose = Pose::from_quaternion(at - rotation * center, rotation.coords.into()).expect("a pose");
+                let ball = Body::ball("ball", center, 0.01).expect("a ball");
+                (Arc::new(Shape::Body(Box::new(ball))), pose, pose.transform_point(&center))
+            };
+            let [(a, pose_a, at_a), (b, pose_b, at_b)] = [thing(Vector3::zeros()), thing(0.03 * Vector3::x())];
+            let things = [
+                Thing::Solid { rungs: std::slice::from_ref(&a), pose: &pose_a, outer: false },
+                Thing::Solid { rungs: std::slice::from_ref(&b), pose: &pose_b, outer: false },
+            ];
+            // What the library proves of the very bodies at the very poses.
+            let options = sublevel_core::measure::Options::default();
+            let found = sublevel_core::measure::distance(&*a, &pose_a, &*b, &pose_b, &options, &mut Default::default());
+            let label = format!("seed 5, {step}, {reach:e}: {at_a:?} {at_b:?}");
+            assert!(things[0].ball_gap_m(&things[1]) <= found.upper, "{label}");
+            assert!(things[0].box_gap_m(&things[1]) <= found.upper, "{label}");
+        }
+    }
 }
