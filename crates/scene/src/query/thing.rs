@@ -185,7 +185,7 @@ mod tests {
     fn gaps_are_bounds_far_from_the_frames_own_origin() {
         let mut random = Seeded(5);
         for step in 0..500 {
-            let reach = 10_f64.powf(7.0 * random.between(0.0, 1.0));
+            let reach = random.between(1.0, 1e7);
             let mut thing = |at: Vector3<f64>| {
                 let center = reach * random.unit();
                 let rotation = random.rotation();
