@@ -12,9 +12,9 @@ use crate::load::{Arrivals, LoadOptions, LoadReport, Scenario, connect, echo, me
 
 /// Load a running server, and report how long its answers take
 ///
-/// In an open loop: calls are begun when they are due, however long earlier ones take, and their time
-/// counts from then on. Beside it runs an echo server of equal message sizes, which shows what the
-/// transport alone takes. The scene it makes is removed at the end.
+/// In an open loop: calls are begun when they are due, however long earlier ones take, and their
+/// time counts from then on. Beside it runs an echo server of equal message sizes, which shows what
+/// the transport alone takes. The scene it makes is removed at the end.
 ///
 /// A scenario is one of pair, pairs, within, states, mixed, or a TOML file:
 ///   objects = 200          # bricks in the scene, in a cube of 2 reach_m

@@ -14,8 +14,9 @@ use crate::service::{self, ServeError};
 /// Changes are on disk before they are acknowledged. SIGTERM or Ctrl-C stops it: calls in flight
 /// get a few seconds to end, and a fit under way goes on at the next start.
 ///
-/// Every setting has a default, which a TOML file (--config), the environment (SUBLEVEL_SERVER_LISTEN,
-/// SUBLEVEL_SERVER_LIMITS__CALLS, and RUST_LOG for log.filter) and flags change, in this order.
+/// Every setting has a default, which a TOML file (--config), the environment
+/// (SUBLEVEL_SERVER_LISTEN, SUBLEVEL_SERVER_LIMITS__CALLS, and RUST_LOG for log.filter) and flags
+/// change, in this order.
 /// --print-config prints what they come to.
 ///
 /// Examples:
@@ -42,8 +43,8 @@ pub(super) struct ServeArgs {
     /// Address for probes and metrics: /livez, /readyz, /metrics [default: none]
     #[arg(long, value_name = "ADDR")]
     admin: Option<SocketAddr>,
-    /// File with the tokens that clients may show, see 'sublevel token' [default: no tokens needed].
-    /// Read again when it changes
+    /// File with the tokens that clients may show, see 'sublevel token' [default: no tokens
+    /// needed]. Read again when it changes
     #[arg(long, value_name = "FILE")]
     tokens: Option<PathBuf>,
     /// The server's certificate and those between it and its root, PEM. Read again when it changes

@@ -204,8 +204,8 @@ impl Client {
         Ok(Answers { revision: response.scene_revision, rows: rows.collect(), complete: response.complete })
     }
 
-    /// Asks about pairs of a scene, and returns how many bytes the answer has: for those who measure
-    /// servers.
+    /// Asks about pairs of a scene, and returns how many bytes the answer has: for those who
+    /// measure servers.
     pub(crate) async fn evaluate_bytes(
         &self,
         scene: &str,

@@ -1,6 +1,6 @@
 //! Load on a server in an open loop: calls are begun when they are due, however long earlier ones
-//! take, and their time counts from then on. A server that stands still is seen, as its clients would
-//! see it.
+//! take, and their time counts from then on. A server that stands still is seen, as its clients
+//! would see it.
 
 mod echo;
 mod report;

@@ -123,8 +123,8 @@ impl AppState {
         ended(on_thread(&self.solving, move || search(&flag)), &stop, time).await?
     }
 
-    /// Prepares a question about a scene, such as by making its tree: at once for small scenes, else
-    /// not on a thread that serves connections.
+    /// Prepares a question about a scene, such as by making its tree: at once for small scenes,
+    /// else not on a thread that serves connections.
     pub(super) async fn prepare<T: Send + 'static>(
         &self,
         scene: &Scene,

@@ -16,8 +16,8 @@ pub const MAX_RESET_STREAMS: usize = 64;
 /// Largest headers of a call, bytes.
 pub const MAX_HEADER_BYTES: u32 = 16 << 10;
 
-/// Objects of a scene up to which its tree is made at once, in a tenth of a millisecond, rather than
-/// on a thread of its own.
+/// Objects of a scene up to which its tree is made at once, in a tenth of a millisecond, rather
+/// than on a thread of its own.
 pub const SMALL_SCENE: usize = 2000;
 
 /// Most answers (pairs times measures) of one Evaluate.

@@ -207,7 +207,8 @@ impl Metrics {
         self.0.pose_wait_seconds.observe(waited.as_secs_f64());
     }
 
-    /// All of it, in the text format of Prometheus; sizes are those of the catalogue, if it is loaded.
+    /// All of it, in the text format of Prometheus; sizes are those of the catalogue, if it is
+    /// loaded.
     pub(super) fn text(&self, sizes: Option<(usize, usize)>) -> String {
         self.0.ready.set(i64::from(sizes.is_some()));
         let (bodies, scenes) = sizes.unwrap_or_default();

@@ -49,7 +49,7 @@ pub(super) fn update(request: &proto::UpdateSceneRequest) -> Result<Update, Inva
     Ok(update)
 }
 
-/// An object as a message tells it; `field` names where it stands.
+/// The placement that a message asks for; `field` is the path of the object in the request.
 pub(crate) fn placement(object: &proto::Object, field: impl Fn() -> String) -> Result<Placement, Invalid> {
     let at = |leaf: &str| format!("{}.{leaf}", field());
     let attachment = match &object.attachment {

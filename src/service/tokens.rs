@@ -1,5 +1,5 @@
-//! Tokens that clients show, and what they may do with them. The file holds hashes only, and is read
-//! again when it changes.
+//! Tokens that clients show, and what they may do with them. The file holds hashes only, and is
+//! read again when it changes.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -270,8 +270,8 @@ impl Store {
 /// Beginning of the names of folders in which backups are made, in the directory of the catalogue.
 pub const BACKUP_PREFIX: &str = "catalogue.redb.backing-up-";
 
-/// What a server that was cut off left behind; nobody else makes backups here, since the catalogue is
-/// locked.
+/// What a server that was cut off left behind; nobody else makes backups here, since the catalogue
+/// is locked.
 fn remove_cut_backups(dir: &Path) {
     for entry in fs::read_dir(dir).into_iter().flatten().flatten() {
         if entry.file_name().to_string_lossy().starts_with(BACKUP_PREFIX) && entry.path().is_dir() {

@@ -177,8 +177,8 @@ impl WideRay {
     }
 }
 
-/// A ball of a body frame where it stands, grown by the rounding of its centre, which may be far from
-/// either origin although the ball is not.
+/// A ball of a body frame where it stands, grown by the rounding of its centre, which may be far
+/// from either origin although the ball is not.
 pub(crate) fn world_ball(pose: &Pose, (center, radius): WorldBall) -> WorldBall {
     let rounding = 32.0 * f64::EPSILON * (pose.translation().norm() + center.norm() + radius);
     (pose.transform_point(&center), radius + rounding)

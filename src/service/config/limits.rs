@@ -26,8 +26,8 @@ pub struct LimitsConfig {
     pub keepalive_s: f64,
     /// Time to give the sign of life, seconds; then the connection is closed.
     pub keepalive_timeout_s: f64,
-    /// Age at which a connection is asked to end, seconds, so that clients spread over new servers; 0:
-    /// never.
+    /// Age at which a connection is asked to end, seconds, so that clients spread over new servers;
+    /// 0: never.
     pub connection_age_s: f64,
     /// Time that calls have to end after that, and after a stop was asked for, seconds.
     pub drain_s: f64,

@@ -10,8 +10,8 @@ use serde::Serialize;
 use super::error::ConfigError;
 use super::settings::Config;
 
-/// Beginning of the variables of the environment: `SUBLEVEL_SERVER_LISTEN`, and with two underscores
-/// for a table, `SUBLEVEL_SERVER_LIMITS__CALLS`.
+/// Beginning of the variables of the environment: `SUBLEVEL_SERVER_LISTEN`, and with two
+/// underscores for a table, `SUBLEVEL_SERVER_LIMITS__CALLS`.
 pub const ENVIRONMENT: &str = "SUBLEVEL_SERVER_";
 
 /// Settings that were given as flags.

@@ -38,7 +38,8 @@ pub(super) fn bricks(seed: u64, count: usize, reach_m: f64) -> Result<Scene, Box
     Ok(Scene::new("bench", 0)?.updated(&update, |_: &BodyId| Some(body.clone()))?)
 }
 
-/// A store room of so many bricks: side by side with gaps of 2.5 to 6.5 cm, each turned by a degree.
+/// A store room of so many bricks: side by side with gaps of 2.5 to 6.5 cm, each turned by a
+/// degree.
 pub(super) fn stacked(seed: u64, count: usize) -> Result<Scene, Box<dyn Error>> {
     let (mut random, body) = (Random(seed), Geometry::from(brick()?));
     let side = (count as f64).cbrt().ceil() as usize;

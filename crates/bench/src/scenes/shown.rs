@@ -20,7 +20,8 @@ pub(crate) struct Shown {
 }
 
 impl Shown {
-    /// Reads what [`Scenes::csv`](super::Scenes::csv) wrote: three tables, empty lines between them.
+    /// Reads what [`Scenes::csv`](super::Scenes::csv) wrote: three tables, empty lines between
+    /// them.
     pub(crate) fn read(csv: &str) -> Result<Self, CsvError> {
         let mut parts = csv.split("\n\n");
         let mut table = || Table::read(parts.next().unwrap_or_default());

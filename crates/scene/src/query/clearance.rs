@@ -104,8 +104,8 @@ impl Clearance {
         self.placed.states()
     }
 
-    /// What is near in a state, in no order; pairs that may be near in other states of the chunk, too,
-    /// go to the batches.
+    /// What is near in a state, in no order; pairs that may be near in other states of the chunk,
+    /// too, go to the batches.
     fn look(
         &self,
         state: usize,

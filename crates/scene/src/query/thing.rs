@@ -132,8 +132,9 @@ pub(crate) struct OrientedBox {
 }
 
 impl OrientedBox {
-    /// Lower bound of the signed distance of what is inside, metres, rounding included: the distance
-    /// of one box from the box along the same axes around the other, or the other way round.
+    /// Lower bound of the signed distance of what is inside, metres, rounding included: the
+    /// distance of one box from the box along the same axes around the other, or the other way
+    /// round.
     pub(crate) fn gap_m(&self, other: &Self) -> f64 {
         let (a, b) = (self, other);
         let between = b.center - a.center;
@@ -202,7 +203,8 @@ mod tests {
         }
     }
 
-    /// Where a pose takes a point, its quaternion normalised: t + (2 (q·p) q + (w² - q²) p + 2 w q x p) / |q|².
+    /// Where a pose takes a point, its quaternion normalised: t + (2 (q·p) q + (w² - q²) p + 2 w q
+    /// x p) / |q|².
     fn placed(pose: &Pose, point: &Vector3<f64>) -> [Double; 3] {
         let double = |value: f64| Double(value, 0.0);
         let [x, y, z, w]: [Double; 4] = <[f64; 4]>::from(pose.rotation().coords).map(double);
