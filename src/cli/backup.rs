@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::client::{Client, ClientOptions};
-use crate::store;
+use crate::store::{self, Counts};
 
 /// Copy the catalogue of a running server into a file
 ///
@@ -68,7 +68,7 @@ pub(super) fn backup(args: &BackupArgs) -> Result<(), Box<dyn Error>> {
 /// # Errors
 /// A directory that has one, and a file that is no backup or does not hold up.
 pub(super) fn restore(args: &RestoreArgs) -> Result<(), Box<dyn Error>> {
-    let (bodies, scenes) = store::restore(&args.file, &args.data)?;
+    let Counts { bodies, scenes, .. } = store::restore(&args.file, &args.data)?;
     writeln!(io::stdout().lock(), "{}: {bodies} bodies, {scenes} scenes", args.data.display())?;
     Ok(())
 }

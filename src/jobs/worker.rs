@@ -10,7 +10,7 @@ use tokio::sync::watch;
 use tokio::task::{JoinError, spawn_blocking};
 
 use super::{Board, FitOutput, Jobs, Phase, fit_group, fit_mesh};
-use crate::body::{Obstacle, Shape};
+use crate::body::{BodyId, Obstacle, Shape};
 use crate::fit::{self, Mesh};
 use crate::scene::Geometry;
 use crate::store::{Catalogue, CatalogueError, Job, JobState};
@@ -92,8 +92,7 @@ impl Jobs {
         let made = match job.request.group() {
             Some(group) => {
                 let body = |id| {
-                    let found = catalogue.geometry(id);
-                    obstacle(&found.ok_or_else(|| format!("body {id} was deleted meanwhile; create it again"))?)
+                    obstacle(&catalogue.geometry(id).map_err(|error| unusable(id, &error))?)
                         .ok_or_else(|| format!("body {id} is no single body; a group takes bodies and sos-bodies"))
                 };
                 let bodies = group.body_ids.iter().map(body).collect::<Result<Vec<_>, _>>()?;
@@ -123,6 +122,14 @@ impl Jobs {
                 return None;
             }
         }
+    }
+}
+
+/// Why a group cannot have a body.
+fn unusable(id: &BodyId, error: &CatalogueError) -> String {
+    match error {
+        CatalogueError::NoBody(_) => format!("body {id} was deleted meanwhile; create it again"),
+        error => error.to_string(),
     }
 }
 

@@ -11,7 +11,7 @@ use tokio::net::TcpListener;
 use tokio::sync::watch;
 
 use super::metrics::Metrics;
-use crate::store::Catalogue;
+use crate::store::{Catalogue, Counts};
 
 /// What the probes look at.
 #[derive(Clone, Debug)]
@@ -19,6 +19,13 @@ pub(super) struct Admin {
     pub(super) metrics: Metrics,
     pub(super) catalogue: watch::Receiver<Option<Arc<Catalogue>>>,
     pub(super) stopping: watch::Receiver<bool>,
+}
+
+impl Admin {
+    /// Sizes of the catalogue, if it is loaded.
+    fn counts(&self) -> Option<Counts> {
+        self.catalogue.borrow().as_ref().map(|catalogue| catalogue.counts())
+    }
 }
 
 /// Answers until it is dropped.
@@ -33,19 +40,26 @@ pub(super) async fn serve(listener: TcpListener, admin: Admin) {
     }
 }
 
-/// Ready while calls are answered: from when the catalogue is loaded until the server stops.
+/// Ready while calls are answered: from when the catalogue is loaded until the server stops. Says
+/// how many bodies are still to be proven; calls that need them wait.
 async fn ready(State(admin): State<Admin>) -> impl IntoResponse {
     if *admin.stopping.borrow() {
-        (StatusCode::SERVICE_UNAVAILABLE, "stopping\n")
-    } else if admin.catalogue.borrow().is_none() {
-        (StatusCode::SERVICE_UNAVAILABLE, "loading the catalogue\n")
-    } else {
-        (StatusCode::OK, "ok\n")
+        return (StatusCode::SERVICE_UNAVAILABLE, "stopping\n".to_owned());
     }
+    let Some(Counts { bodies, unproven_bodies, damaged_bodies, .. }) = admin.counts() else {
+        return (StatusCode::SERVICE_UNAVAILABLE, "loading the catalogue\n".to_owned());
+    };
+    let mut said = "ok\n".to_owned();
+    if unproven_bodies > 0 {
+        said += &format!("{unproven_bodies} of {bodies} bodies are still to be proven\n");
+    }
+    if damaged_bodies > 0 {
+        said += &format!("{damaged_bodies} of {bodies} bodies are damaged and not used; the log names them\n");
+    }
+    (StatusCode::OK, said)
 }
 
 async fn metrics(State(admin): State<Admin>) -> impl IntoResponse {
-    let sizes = admin.catalogue.borrow().as_ref().map(|catalogue| catalogue.counts());
     let kind = "application/openmetrics-text; version=1.0.0; charset=utf-8";
-    ([(header::CONTENT_TYPE, kind)], admin.metrics.text(sizes))
+    ([(header::CONTENT_TYPE, kind)], admin.metrics.text(admin.counts()))
 }

@@ -8,7 +8,7 @@ use tokio::sync::{Semaphore, oneshot, watch};
 use tonic::Status;
 
 use crate::scene::{Crew, Panicked, Question, Scene, Stop};
-use crate::store::{Catalogue, CatalogueError};
+use crate::store::{Catalogue, CatalogueError, Counts, LiveScene};
 
 use super::blobs::Blobs;
 use super::body_mesh::Meshes;
@@ -17,6 +17,7 @@ use super::config::LimitsConfig;
 use super::error;
 use super::limits::{LOADING_PATIENCE, SMALL_SCENE};
 use super::metrics::Metrics;
+use super::wire;
 
 /// Shared by all handlers. Work that blocks passes a limit first, so that one kind of it cannot
 /// take every thread.
@@ -153,6 +154,31 @@ impl AppState {
         .ok_or_else(|| error::unavailable("LOADING", "the catalogue is loading; try again in a moment"))
     }
 
+    /// What the catalogue says; who asks for something that is not proven yet waits a little.
+    pub(super) async fn look<T: Send + 'static>(
+        &self,
+        field: &'static str,
+        look: impl FnOnce(&Catalogue) -> Result<T, CatalogueError> + Send + 'static,
+    ) -> Result<T, Status> {
+        let catalogue = self.catalogue().await?;
+        let found = if catalogue.is_proven() { look(&catalogue) } else { proving(catalogue, look).await? };
+        found.map_err(|error| error::catalogue(&error, field))
+    }
+
+    /// A scene or fork; who asks for one whose bodies are not proven yet waits a little. `field` is
+    /// where the request names it.
+    pub(super) async fn live_scene(&self, name: &str, field: &str) -> Result<Arc<LiveScene>, Status> {
+        wire::name(name, field)?;
+        let catalogue = self.catalogue().await?;
+        let found = if catalogue.is_scene_proven(name) {
+            catalogue.live_scene(name)
+        } else {
+            let name = name.to_owned();
+            proving(catalogue, move |catalogue| catalogue.live_scene(&name)).await?
+        };
+        found.map_err(|error| error::catalogue(&error, field))
+    }
+
     /// Makes a change. Once begun it runs to its end, even when the client goes away meanwhile.
     /// `field` is where the request names what the change is about.
     pub(super) async fn change<T: Send + 'static>(
@@ -179,6 +205,22 @@ impl AppState {
     ) -> Result<T, Status> {
         on_thread(&self.proving, prove).await
     }
+}
+
+/// Looks at what is not proven yet, which takes from milliseconds to a minute; it goes on when
+/// nobody waits any more.
+async fn proving<T: Send + 'static>(
+    catalogue: Arc<Catalogue>,
+    look: impl FnOnce(&Catalogue) -> T + Send + 'static,
+) -> Result<T, Status> {
+    let looking = catalogue.clone();
+    let work = tokio::task::spawn_blocking(move || look(&looking));
+    let Ok(done) = tokio::time::timeout(LOADING_PATIENCE, work).await else {
+        let Counts { bodies, unproven_bodies, .. } = catalogue.counts();
+        let why = format!("{unproven_bodies} of {bodies} bodies are still to be proven; try again in a moment");
+        return Err(error::unavailable("LOADING", &why));
+    };
+    done.map_err(|error| error::internal_panic(&error))
 }
 
 /// Waits until the server stops.

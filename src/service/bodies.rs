@@ -12,7 +12,6 @@ use super::proto::{
 };
 use super::{body_wire, error, wire};
 use crate::scene::Geometry;
-use crate::store::CatalogueError;
 
 #[derive(Debug)]
 pub(super) struct Bodies(pub(super) AppState);
@@ -24,14 +23,8 @@ impl BodyService for Bodies {
         let catalogue = self.0.catalogue().await?;
         // Proving takes milliseconds to seconds, and nothing is lost when it is for nobody any
         // more.
-        let body = self
-            .0
-            .prove(move || {
-                body_wire::geometry(&request, app.blobs(), |id| {
-                    catalogue.geometry(id).ok_or(CatalogueError::NoBody(*id))
-                })
-            })
-            .await??;
+        let body =
+            self.0.prove(move || body_wire::geometry(&request, app.blobs(), |id| catalogue.geometry(id))).await??;
         let (body, created) = self.0.change("source", move |catalogue| catalogue.create_body(body)).await?;
         Ok(Response::new(CreateBodyResponse { body: Some(body_wire::summary(&body)), created }))
     }
@@ -56,11 +49,9 @@ impl BodyService for Bodies {
     async fn list_bodies(&self, request: Request<ListBodiesRequest>) -> Result<Response<ListBodiesResponse>, Status> {
         let (size, after) = wire::page(request.get_ref().page_size, &request.get_ref().page_token);
         let after = after.map(|token| wire::body_id(token, "page_token")).transpose()?;
-        let (bodies, more) = self.0.catalogue().await?.bodies(after.as_ref(), size);
-        let next_page_token = match bodies.last() {
-            Some(last) if more => last.id().to_string(),
-            _ => String::new(),
-        };
+        let (bodies, next) =
+            self.0.look("page_token", move |catalogue| Ok(catalogue.bodies(after.as_ref(), size))).await?;
+        let next_page_token = next.map(|id| id.to_string()).unwrap_or_default();
         let bodies = bodies.iter().map(body_wire::summary).collect();
         Ok(Response::new(ListBodiesResponse { bodies, next_page_token }))
     }
@@ -96,7 +87,6 @@ impl BodyService for Bodies {
 impl Bodies {
     async fn find(&self, id: &str) -> Result<Geometry, Status> {
         let id = wire::body_id(id, "id")?;
-        let missing = || error::catalogue(&CatalogueError::NoBody(id), "id");
-        self.0.catalogue().await?.geometry(&id).ok_or_else(missing)
+        self.0.look("id", move |catalogue| catalogue.geometry(&id)).await
     }
 }

@@ -190,12 +190,20 @@ fn failed_precondition(reason: &str, subject: &str, message: String) -> Status {
     Status::with_error_details(Code::FailedPrecondition, message, details)
 }
 
+fn damaged(reason: &str, kind: &str, name: &str, message: String) -> Status {
+    let mut details = details(reason);
+    details.set_resource_info(kind, name, "", message.clone());
+    Status::with_error_details(Code::DataLoss, message, details)
+}
+
 /// Maps a failure of the catalogue; `field` is where the request named the scene or body the call
 /// is about.
 pub(super) fn catalogue(error: &CatalogueError, field: &str) -> Status {
     let message = error.to_string();
     match error {
         CatalogueError::NoBody(id) => not_found("body", &id.to_string(), field, message),
+        CatalogueError::DamagedBody { id, .. } => damaged("DAMAGED_BODY", "body", &id.to_string(), message),
+        CatalogueError::DamagedScene { scene, .. } => damaged("DAMAGED_SCENE", "scene", scene, message),
         CatalogueError::NoScene(name) => not_found("scene", name, field, message),
         CatalogueError::BodyUsed { id, .. } => failed_precondition("BODY_IN_USE", &format!("body/{id}"), message),
         CatalogueError::SceneExists(name) => {

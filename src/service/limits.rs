@@ -53,9 +53,12 @@ pub const DEFAULT_PAGE: usize = 100;
 /// Most items of a page.
 pub const MAX_PAGE: usize = 1000;
 
-/// How long a call that arrives while the catalogue is loading waits for it before it gets
-/// UNAVAILABLE.
+/// How long a call waits for the catalogue to be loaded, and for bodies to be proven, before it
+/// gets UNAVAILABLE.
 pub const LOADING_PATIENCE: Duration = Duration::from_secs(10);
+
+/// Niceness of the threads that prove bodies in the background: a tenth of the share of others.
+pub const PROVER_NICE: i32 = 10;
 
 /// How long a new connection may say nothing.
 pub const PREFACE_TIMEOUT: Duration = Duration::from_secs(10);

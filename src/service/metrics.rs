@@ -10,7 +10,9 @@ use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::registry::{Registry, Unit};
 
+use crate::scene::WarmStartUse;
 use crate::scene::query::{Answer, AnswerStatus, StateAnswer, StateVerdict};
+use crate::store::Counts;
 
 /// All that is counted. Clones share it.
 #[derive(Clone, Debug)]
@@ -27,12 +29,16 @@ struct Counted {
     connections: Gauge,
     answers: Family<Ended, Counter>,
     iterations: Counter,
+    rungs: Family<Rung, Counter>,
+    warm_starts: Family<Found, Counter>,
     states: Family<Verdict, Counter>,
     streamed_poses: Counter,
     overtaken_poses: Counter,
     pose_wait_seconds: Histogram,
     ready: Gauge,
     bodies: Gauge,
+    unproven_bodies: Gauge,
+    damaged_bodies: Gauge,
     scenes: Gauge,
 }
 
@@ -55,6 +61,16 @@ struct Ended {
 #[derive(Clone, Debug, Hash, PartialEq, Eq, EncodeLabelSet)]
 struct Verdict {
     verdict: &'static str,
+}
+
+#[derive(Clone, Debug, Hash, PartialEq, Eq, EncodeLabelSet)]
+struct Rung {
+    rung: u32,
+}
+
+#[derive(Clone, Debug, Hash, PartialEq, Eq, EncodeLabelSet)]
+struct Found {
+    found: &'static str,
 }
 
 /// From 50 µs to 13 s, each twice the one before.
@@ -87,6 +103,12 @@ impl Default for Metrics {
         registry.register("answers", "Measures of pairs, by how they came about", answers.clone());
         let iterations = Counter::default();
         registry.register("solver_iterations", "Iterations of the solver for all answers", iterations.clone());
+        let rungs = Family::default();
+        let about = "Measures of pairs, by the finer of the two rungs that were used; 0 without ladders";
+        registry.register("answer_rungs", about, rungs.clone());
+        let warm_starts = Family::default();
+        let about = "Warm starts that pairs asked for, by whether there was one from an earlier question";
+        registry.register("warm_starts", about, warm_starts.clone());
         let states = Family::default();
         registry.register("states", "States of CheckStates, by verdict", states.clone());
         let streamed_poses = Counter::default();
@@ -100,6 +122,11 @@ impl Default for Metrics {
         registry.register("ready", "1 when the catalogue is loaded", ready.clone());
         let (bodies, scenes) = (Gauge::default(), Gauge::default());
         registry.register("bodies", "Bodies that are stored", bodies.clone());
+        let (unproven_bodies, damaged_bodies) = (Gauge::default(), Gauge::default());
+        let about = "Stored bodies that are still to be proven since the start";
+        registry.register("unproven_bodies", about, unproven_bodies.clone());
+        let about = "Stored bodies that are damaged and not used";
+        registry.register("damaged_bodies", about, damaged_bodies.clone());
         registry.register("scenes", "Scenes and forks", scenes.clone());
         Self(Arc::new(Counted {
             registry,
@@ -111,12 +138,16 @@ impl Default for Metrics {
             connections,
             answers,
             iterations,
+            rungs,
+            warm_starts,
             states,
             streamed_poses,
             overtaken_poses,
             pose_wait_seconds,
             ready,
             bodies,
+            unproven_bodies,
+            damaged_bodies,
             scenes,
         }))
     }
@@ -161,12 +192,16 @@ impl Metrics {
 
     /// Answers of a call.
     pub(super) fn answered<'a>(&self, answers: impl IntoIterator<Item = &'a Answer>) {
-        let (mut by_status, mut iterations) = ([0_u64; 5], 0);
+        let (mut by_status, mut by_rung, mut iterations) = ([0_u64; 5], [0_u64; 256], 0);
         for answer in answers {
             by_status[answer.status as usize] += 1;
+            by_rung[usize::from(answer.rungs[0].max(answer.rungs[1]))] += 1;
             iterations += u64::from(answer.iterations);
         }
         self.0.iterations.inc_by(iterations);
+        for (rung, &count) in (0..).zip(&by_rung).filter(|(_, count)| **count > 0) {
+            self.0.rungs.get_or_create(&Rung { rung }).inc_by(count);
+        }
         let all = [
             (AnswerStatus::Converged, "CONVERGED"),
             (AnswerStatus::BracketWide, "BRACKET_WIDE"),
@@ -207,13 +242,25 @@ impl Metrics {
         self.0.pose_wait_seconds.observe(waited.as_secs_f64());
     }
 
-    /// All of it, in the text format of Prometheus; sizes are those of the catalogue, if it is
+    /// All of it, in the text format of Prometheus; counts are those of the catalogue, if it is
     /// loaded.
-    pub(super) fn text(&self, sizes: Option<(usize, usize)>) -> String {
-        self.0.ready.set(i64::from(sizes.is_some()));
-        let (bodies, scenes) = sizes.unwrap_or_default();
-        self.0.bodies.set(i64::try_from(bodies).unwrap_or(i64::MAX));
-        self.0.scenes.set(i64::try_from(scenes).unwrap_or(i64::MAX));
+    pub(super) fn text(&self, counts: Option<Counts>) -> String {
+        self.0.ready.set(i64::from(counts.is_some()));
+        let Counts { bodies, unproven_bodies, damaged_bodies, scenes } = counts.unwrap_or_default();
+        let sizes = [
+            (&self.0.bodies, bodies),
+            (&self.0.unproven_bodies, unproven_bodies),
+            (&self.0.damaged_bodies, damaged_bodies),
+            (&self.0.scenes, scenes),
+        ];
+        for (gauge, size) in sizes {
+            gauge.set(i64::try_from(size).unwrap_or(i64::MAX));
+        }
+        let WarmStartUse { hits, misses } = WarmStartUse::now();
+        for (found, now) in [("yes", hits), ("no", misses)] {
+            let counter = self.0.warm_starts.get_or_create(&Found { found });
+            counter.inc_by(now.saturating_sub(counter.get()));
+        }
         let mut text = String::new();
         // Writing to a string cannot fail.
         let _ = text::encode(&mut text, &self.0.registry);

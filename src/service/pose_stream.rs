@@ -127,9 +127,7 @@ async fn read(
     let StreamPosesRequest { scene, names, indices, poses, sequence } = message;
     match table {
         None => {
-            wire::name(&scene, "scene")?;
-            let missing = || error::catalogue(&CatalogueError::NoScene(scene.clone()), "scene");
-            let live = app.catalogue().await?.live_scene(&scene).ok_or_else(missing)?;
+            let live = app.live_scene(&scene, "scene").await?;
             *table = Some(Table { scene, live, names: Vec::new() });
         }
         Some(table) if !scene.is_empty() && scene != table.scene => {
@@ -203,7 +201,7 @@ async fn apply(
     pending: Pending,
 ) -> Result<StreamPosesResponse, Status> {
     let catalogue = app.catalogue().await?;
-    let is_there = catalogue.live_scene(&scene).is_some_and(|now| Arc::ptr_eq(&now, &live));
+    let is_there = catalogue.live_scene(&scene).is_ok_and(|now| Arc::ptr_eq(&now, &live));
     if !is_there {
         return Err(error::catalogue(&CatalogueError::NoScene(scene), "scene"));
     }

@@ -173,9 +173,7 @@ impl QueryService for Queries {
         let request = request.into_inner();
         let pause = wire::pause(request.max_rate_hz)?;
         query_wire::length(request.margin_m, "margin_m")?;
-        wire::name(&request.scene, "scene")?;
-        let missing = || error::catalogue(&CatalogueError::NoScene(request.scene.clone()), "scene");
-        let live = self.0.catalogue().await?.live_scene(&request.scene).ok_or_else(missing)?;
+        let live = self.0.live_scene(&request.scene, "scene").await?;
         // A selection that names nobody is refused now, not in the stream.
         query_wire::selection(request.selection.as_ref(), &live.snapshot(), "selection")?;
         let (sender, stream) = mpsc::channel(1);
@@ -186,16 +184,14 @@ impl QueryService for Queries {
 
 /// The snapshot a question is about.
 async fn snapshot(app: &AppState, name: &str, at_least_revision: Option<u64>) -> Result<Scene, Status> {
-    wire::name(name, "scene")?;
-    let missing = || error::catalogue(&CatalogueError::NoScene(name.to_owned()), "scene");
-    let live = app.catalogue().await?.live_scene(name).ok_or_else(missing)?;
+    let live = app.live_scene(name, "scene").await?;
     let scene = live.snapshot();
     let Some(least) = at_least_revision.filter(|least| *least > scene.revision()) else { return Ok(scene) };
     let mut changes = live.changes();
     let reached = changes.wait_for(|scene| scene.revision() >= least);
     match tokio::time::timeout(REVISION_PATIENCE, reached).await {
         Ok(Ok(scene)) => Ok(scene.clone()),
-        Ok(Err(_)) => Err(missing()),
+        Ok(Err(_)) => Err(error::catalogue(&CatalogueError::NoScene(name.to_owned()), "scene")),
         Err(_) => {
             let why = format!(
                 "scene \"{name}\" is at revision {}, not yet at {least} (at_least_revision); try again",

@@ -6,7 +6,7 @@ use tonic::Status;
 
 use crate::measure::Pose;
 use crate::scene::{Attach, Attachment, Object, Placement, Scene, Subject, SubjectPair, Update};
-use crate::store::Origin;
+use crate::store::{Origin, SceneEntry};
 
 use super::error::{self, Invalid};
 use super::limits::MAX_MESSAGE_BYTES;
@@ -193,13 +193,14 @@ pub(crate) fn subject_pairs(pairs: &[proto::SubjectPair], field: &str) -> Result
     pairs.iter().enumerate().map(one).collect()
 }
 
-pub(super) fn summary(scene: &Scene, origin: Option<&Origin>) -> proto::SceneSummary {
+pub(super) fn summary(entry: &SceneEntry) -> proto::SceneSummary {
+    let SceneEntry { name, revision, objects, origin } = entry;
     proto::SceneSummary {
-        name: scene.name().to_string(),
-        revision: scene.revision(),
-        object_count: wire::count(scene.len()),
-        parent: origin.map(|origin| origin.parent.to_string()).unwrap_or_default(),
-        parent_revision: origin.map_or(0, |origin| origin.revision),
+        name: name.to_string(),
+        revision: *revision,
+        object_count: wire::count(*objects),
+        parent: origin.as_ref().map(|origin| origin.parent.to_string()).unwrap_or_default(),
+        parent_revision: origin.as_ref().map_or(0, |origin| origin.revision),
     }
 }
 
@@ -225,7 +226,8 @@ pub(super) fn page(
     after: Option<&str>,
     size: usize,
 ) -> proto::GetSceneResponse {
-    let mut response = proto::GetSceneResponse { scene: Some(summary(scene, origin)), ..Default::default() };
+    let entry = SceneEntry::of(scene, origin);
+    let mut response = proto::GetSceneResponse { scene: Some(summary(&entry)), ..Default::default() };
     if after.is_none() {
         let rules = scene.rules();
         response.allowed_pairs = rules.allowed().map(pair_message).collect();

@@ -1,7 +1,5 @@
 //! SceneService.
 
-use std::sync::Arc;
-
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Request, Response, Status, Streaming};
@@ -16,7 +14,7 @@ use super::proto::{
     WatchSceneRequest, WatchSceneResponse,
 };
 use super::{error, pose_stream, scene_watch, scene_wire, wire};
-use crate::store::{CatalogueError, LiveScene};
+use crate::store::{CatalogueError, SceneEntry};
 
 #[derive(Debug)]
 pub(super) struct Scenes(pub(super) AppState);
@@ -29,12 +27,12 @@ impl SceneService for Scenes {
     ) -> Result<Response<CreateSceneResponse>, Status> {
         let name = request.into_inner().name;
         let scene = self.0.change("name", move |catalogue| catalogue.create_scene(&name)).await?;
-        Ok(Response::new(CreateSceneResponse { scene: Some(scene_wire::summary(&scene, None)) }))
+        Ok(Response::new(CreateSceneResponse { scene: Some(scene_wire::summary(&SceneEntry::of(&scene, None))) }))
     }
 
     async fn get_scene(&self, request: Request<GetSceneRequest>) -> Result<Response<GetSceneResponse>, Status> {
         let GetSceneRequest { name, page_size, page_token } = request.into_inner();
-        let live = self.find(&name, "name").await?;
+        let live = self.0.live_scene(&name, "name").await?;
         let scene = live.snapshot();
         let size = match usize::try_from(page_size).unwrap_or(MAX_OBJECTS_PAGE) {
             0 => DEFAULT_OBJECTS_PAGE,
@@ -51,6 +49,8 @@ impl SceneService for Scenes {
         let request = request.into_inner();
         wire::name(&request.scene, "scene")?;
         let update = scene_wire::update(&request)?;
+        // What is not proven yet is proven before other changes have to wait for it.
+        self.0.live_scene(&request.scene, "scene").await?;
         let scene = self.0.change("scene", move |catalogue| catalogue.update_scene(&request.scene, &update)).await?;
         Ok(Response::new(UpdateSceneResponse { revision: scene.revision() }))
     }
@@ -58,7 +58,7 @@ impl SceneService for Scenes {
     async fn list_scenes(&self, request: Request<ListScenesRequest>) -> Result<Response<ListScenesResponse>, Status> {
         let (size, after) = wire::page(request.get_ref().page_size, &request.get_ref().page_token);
         let (scenes, more) = self.0.catalogue().await?.scenes(after, size);
-        let scenes: Vec<SceneSummary> = scenes.iter().map(|live| summary(live)).collect();
+        let scenes: Vec<SceneSummary> = scenes.iter().map(scene_wire::summary).collect();
         let next_page_token = match scenes.last() {
             Some(last) if more => last.name.clone(),
             _ => String::new(),
@@ -80,12 +80,15 @@ impl SceneService for Scenes {
         let ForkSceneRequest { scene, fork, expected_revision } = request.into_inner();
         wire::name(&scene, "scene")?;
         wire::name(&fork, "fork")?;
+        self.0.live_scene(&scene, "scene").await?;
         // In memory, and in constant time: no thread of its own.
         let made = self.0.catalogue().await?.fork_scene(&scene, &fork, expected_revision);
         let made = made.map_err(|error| {
             error::catalogue(&error, if matches!(error, CatalogueError::SceneExists(_)) { "fork" } else { "scene" })
         })?;
-        Ok(Response::new(ForkSceneResponse { fork: Some(summary(&made)) }))
+        Ok(Response::new(ForkSceneResponse {
+            fork: Some(scene_wire::summary(&SceneEntry::of(&made.snapshot(), made.origin()))),
+        }))
     }
 
     async fn commit_fork(&self, request: Request<CommitForkRequest>) -> Result<Response<CommitForkResponse>, Status> {
@@ -114,21 +117,9 @@ impl SceneService for Scenes {
     ) -> Result<Response<Self::WatchSceneStream>, Status> {
         let WatchSceneRequest { scene, from_revision, max_rate_hz } = request.into_inner();
         let pause = wire::pause(max_rate_hz)?;
-        let live = self.find(&scene, "scene").await?;
+        let live = self.0.live_scene(&scene, "scene").await?;
         let (sender, stream) = mpsc::channel(1);
         tokio::spawn(scene_watch::run((live, self.0.stopping()), from_revision, pause, sender));
         Ok(Response::new(ReceiverStream::new(stream)))
     }
-}
-
-impl Scenes {
-    async fn find(&self, name: &str, field: &str) -> Result<Arc<LiveScene>, Status> {
-        wire::name(name, field)?;
-        let missing = || error::catalogue(&CatalogueError::NoScene(name.to_owned()), field);
-        self.0.catalogue().await?.live_scene(name).ok_or_else(missing)
-    }
-}
-
-fn summary(live: &LiveScene) -> SceneSummary {
-    scene_wire::summary(&live.snapshot(), live.origin())
 }

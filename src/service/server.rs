@@ -4,6 +4,8 @@ use std::future::Future;
 use std::io::{self, Write};
 use std::net::SocketAddr;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 use tokio::net::TcpListener;
 use tokio::signal::unix::{Signal, SignalKind, signal};
@@ -15,7 +17,7 @@ use tower::layer::util::{Identity, Stack};
 
 #[cfg(feature = "fit")]
 use crate::jobs::Jobs;
-use crate::store::{Catalogue, FORK_IDLE, Store, StoreError};
+use crate::store::{Catalogue, Counts, FORK_IDLE, Store, StoreError};
 
 use super::admin::{self, Admin};
 use super::app_state::AppState;
@@ -30,7 +32,7 @@ use super::fits::Fits;
 use super::incoming::Incoming;
 #[cfg(feature = "fit")]
 use super::jobs::JobCalls;
-use super::limits::{MAX_HEADER_BYTES, MAX_RESET_STREAMS, POSES_WRITTEN_EVERY, WINDOW_BYTES};
+use super::limits::{MAX_HEADER_BYTES, MAX_RESET_STREAMS, POSES_WRITTEN_EVERY, PROVER_NICE, WINDOW_BYTES};
 use super::metrics::Metrics;
 use super::proto::FILE_DESCRIPTOR_SET;
 use super::proto::blob_service_server::{self, BlobServiceServer};
@@ -153,7 +155,8 @@ impl Server {
             (with_jobs(router, &app, &jobs), jobs, worker)
         };
 
-        let loading = load(self.store, loaded, health.clone());
+        let stop_proving = Arc::<AtomicBool>::default();
+        let loading = load(self.store, loaded, health.clone(), stop_proving.clone());
         let (failed, failure) = oneshot::channel();
         let loader = tokio::spawn(async move {
             if let Err(error) = loading.await {
@@ -173,6 +176,7 @@ impl Server {
             Ok(error) = failure => Err(error),
         };
         loader.abort();
+        stop_proving.store(true, Ordering::Relaxed);
         set_health(&health, ServingStatus::NotServing).await;
         let _ = draining.send(());
         stop_streams.send_replace(true);
@@ -331,20 +335,39 @@ async fn write_poses(catalogue: &watch::Receiver<Option<Arc<Catalogue>>>, last: 
     }
 }
 
-/// Loads the catalogue on a thread that may block, then opens the doors.
+/// Loads the catalogue on a thread that may block, then opens the doors; its bodies are proven
+/// behind them, until `stop`.
 async fn load(
     store: Store,
     loaded: watch::Sender<Option<Arc<Catalogue>>>,
     health: HealthReporter,
+    stop: Arc<AtomicBool>,
 ) -> Result<(), ServeError> {
     let catalogue = tokio::task::spawn_blocking(move || Catalogue::load(store))
         .await
         .map_err(|error| ServeError::InternalPanic(error.to_string()))??;
-    let (bodies, scenes) = catalogue.counts();
+    let Counts { bodies, scenes, .. } = catalogue.counts();
     tracing::info!(bodies, scenes, "catalogue loaded");
-    loaded.send_replace(Some(Arc::new(catalogue)));
+    let catalogue = Arc::new(catalogue);
+    loaded.send_replace(Some(catalogue.clone()));
     set_health(&health, ServingStatus::Serving).await;
+    std::thread::Builder::new().name("prover".into()).spawn(move || prove(&catalogue, &stop))?;
     Ok(())
+}
+
+/// Proves what was loaded, on threads that leave the cores to those who answer.
+fn prove(catalogue: &Catalogue, stop: &AtomicBool) {
+    if catalogue.is_proven() {
+        return;
+    }
+    // Of this thread and those that it starts. Without that it only disturbs more.
+    let _ = rustix::process::nice(PROVER_NICE);
+    let begun = Instant::now();
+    if catalogue.prove_all(stop) {
+        let Counts { bodies, damaged_bodies, .. } = catalogue.counts();
+        let seconds = begun.elapsed().as_secs_f64();
+        tracing::info!(bodies, damaged_bodies, seconds, "all bodies are proven but those that are damaged");
+    }
 }
 
 async fn set_health(health: &HealthReporter, status: ServingStatus) {

@@ -1,28 +1,39 @@
 //! All bodies, scenes and jobs in memory, every change written through.
 
+mod counts;
+mod error;
 mod jobs;
 mod live_scene;
+mod proofs;
+mod scene_entry;
 mod scenes;
+mod stored_body;
+mod stored_scene;
 
+pub use counts::Counts;
+pub use error::CatalogueError;
 pub use live_scene::{FORK_IDLE, LiveScene, MAX_FORKS, Origin};
+pub use scene_entry::SceneEntry;
 
 use std::collections::BTreeMap;
 use std::ops::Bound;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
-use std::thread;
 
 use redb::WriteTransaction;
 
 use crate::body::{BodyId, Shape};
-use crate::scene::{Geometry, GeometryFileError, Ladder, LadderError, NameError, SceneError};
+use crate::scene::{Geometry, Ladder, LadderError};
 
 use super::copy::copy;
 use super::disk::Contents;
-use super::job::{Job, MAX_QUEUED_JOBS};
+use super::job::Job;
 use super::rows::{BODIES, LADDERS, LadderRow};
 use super::{Store, StoreError};
 use live_scene::Scenes;
+use stored_body::{BodyRow, StoredBody};
+use stored_scene::StoredScene;
 
 /// The catalogue of one server. Reading takes a lock for the time of a map look-up; changes are
 /// made one after the other, each on disk before it is seen. All methods that change block on the
@@ -32,121 +43,34 @@ pub struct Catalogue {
     /// Held over a whole change: check, commit, make visible.
     store: Mutex<Store>,
     state: RwLock<State>,
+    /// See [`Catalogue::is_proven`].
+    proven: AtomicBool,
 }
+
+/// Bodies of every kind by their ids.
+type Bodies = BTreeMap<BodyId, Arc<StoredBody>>;
 
 #[derive(Debug, Default)]
 struct State {
-    /// Bodies of every kind.
-    bodies: BTreeMap<BodyId, Geometry>,
+    bodies: Bodies,
     scenes: Scenes,
+    /// Scenes that nobody asked for since they were read; none of them is in `scenes`.
+    stored_scenes: BTreeMap<Arc<str>, Arc<StoredScene>>,
     jobs: BTreeMap<u64, Arc<Job>>,
     /// No new scene starts at or below it.
     revision_floor: u64,
 }
 
-/// Why a change was not made. Memory and disk are as they were.
-#[derive(Debug, thiserror::Error)]
-pub enum CatalogueError {
-    /// No body has this id.
-    #[error("no body {0}; list the bodies, or create it first")]
-    NoBody(BodyId),
-    /// The body is in use.
-    #[error("body {id} is used by object \"{object}\" of scene \"{scene}\"; remove the object first")]
-    BodyUsed {
-        /// The body.
-        id: BodyId,
-        /// A scene that uses it.
-        scene: Arc<str>,
-        /// An object made of it.
-        object: Arc<str>,
-    },
-    /// The body is a rung.
-    #[error("body {id} is a rung of ladder {ladder}; delete the ladder first")]
-    RungUsed {
-        /// The body.
-        id: BodyId,
-        /// The ladder.
-        ladder: BodyId,
-    },
-    /// A rung was stored before, without what a ladder needs of it.
-    #[error("a rung of the ladder is stored already, and {0}; delete that body, and store the ladder again")]
-    Ladder(#[from] LadderError),
-    /// No scene has this name.
-    #[error("no scene \"{0}\"; list the scenes, or create it first")]
-    NoScene(String),
-    /// The name is taken.
-    #[error("there is a scene \"{0}\"; use it, delete it, or choose another name")]
-    SceneExists(String),
-    /// The scene is no fork.
-    #[error("scene \"{0}\" is no fork; name one that ForkScene made")]
-    NoFork(String),
-    /// A fork has lost its parent.
-    #[error("scene \"{parent}\", of which \"{fork}\" was made, was deleted; delete the fork")]
-    NoParent {
-        /// The fork.
-        fork: String,
-        /// Its parent.
-        parent: Arc<str>,
-    },
-    /// The parent has changed since the fork was made.
-    #[error(
-        "fork \"{fork}\" was made at revision {expected} of its parent, which is at {current} now; fork it again and \
-         repeat the changes"
-    )]
-    ParentChanged {
-        /// The fork.
-        fork: String,
-        /// Revision of the parent then.
-        expected: u64,
-        /// Revision of the parent now.
-        current: u64,
-    },
-    /// Too many forks.
-    #[error("there are {MAX_FORKS} forks (max_forks); delete or commit some")]
-    TooManyForks,
-    /// The name is not usable.
-    #[error("the name of the scene {0}")]
-    SceneName(#[from] NameError),
-    /// The update cannot be applied to the scene.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// No fit job has this id.
-    #[error("no fit job {0}; list the jobs, or create it first")]
-    NoJob(String),
-    /// The request id names another job.
-    #[error(
-        "the request id \"{request_id}\" was used for fit job {job}, which has other points or options; choose another id"
-    )]
-    RequestUsed {
-        /// The request id.
-        request_id: String,
-        /// The job it made.
-        job: u64,
-    },
-    /// A group names a body that is not there.
-    #[error("no body {id}; list the bodies, or create it first")]
-    NoMember {
-        /// Its place in the group.
-        index: usize,
-        /// The body.
-        id: BodyId,
-    },
-    /// Too many jobs wait.
-    #[error("{MAX_QUEUED_JOBS} fit jobs wait already; try again when some are done, or cancel some")]
-    QueueFull,
-    /// The disk failed.
-    #[error(transparent)]
-    Store(#[from] StoreError),
-}
-
 impl Catalogue {
-    /// Reads everything from the store and re-proves every body.
+    /// Reads everything from the store. Bodies are proven when they are asked for first, or by
+    /// [`Catalogue::prove_all`].
     ///
     /// # Errors
-    /// When the file cannot be read, or holds a body, pose or name that does not hold up.
+    /// When the file cannot be read, or holds a row, pose or name that does not hold up.
     pub fn load(store: Store) -> Result<Self, StoreError> {
         let state = State::read(&store, &BTreeMap::new())?;
-        Ok(Self { store: Mutex::new(store), state: RwLock::new(state) })
+        let proven = AtomicBool::new(state.is_proven());
+        Ok(Self { store: Mutex::new(store), state: RwLock::new(state), proven })
     }
 
     /// Directory of its file.
@@ -167,35 +91,38 @@ impl Catalogue {
         copy(&snapshot, to).map_err(|error| StoreError::from_redb(&dir, error))
     }
 
-    /// One body of whatever kind by id.
-    pub fn geometry(&self, id: &BodyId) -> Option<Geometry> {
-        self.read(|state| state.bodies.get(id).cloned())
+    /// One body of whatever kind by id; proven here if it is not yet.
+    ///
+    /// # Errors
+    /// When there is none, or when it is damaged.
+    pub fn geometry(&self, id: &BodyId) -> Result<Geometry, CatalogueError> {
+        self.read(|state| state.bodies.get(id).cloned()).ok_or(CatalogueError::NoBody(*id))?.geometry()
     }
 
-    /// Up to `count` bodies in the order of their ids, from the first one after `after`; and
-    /// whether more follow.
-    pub fn bodies(&self, after: Option<&BodyId>, count: usize) -> (Vec<Geometry>, bool) {
-        self.read(|state| page(&state.bodies, after, count))
-    }
-
-    /// How many bodies and scenes there are.
-    pub fn counts(&self) -> (usize, usize) {
-        self.read(|state| (state.bodies.len(), state.scenes.len()))
+    /// Up to `count` bodies in the order of their ids, from the first one after `after`, without
+    /// those that are damaged; and the last of the ids if more follow.
+    pub fn bodies(&self, after: Option<&BodyId>, count: usize) -> (Vec<Geometry>, Option<BodyId>) {
+        let (page, more) = self.read(|state| page(&state.bodies, after, count));
+        let last = page.last().map(|body| *body.id());
+        // Those that are damaged are left out.
+        let _ = self.prove_bodies(page.iter().map(|body| body.id()));
+        let bodies = page.iter().filter_map(|body| body.geometry().ok()).collect();
+        (bodies, last.filter(|_| more))
     }
 
     /// Stores a body, of a ladder with its rungs; the one that was there first when the content is
-    /// known. Returns whether it is new.
+    /// known. Returns whether it is new. A damaged one is replaced.
     ///
     /// # Errors
     /// When the disk fails.
     pub fn create_body(&self, body: Geometry) -> Result<(Geometry, bool), CatalogueError> {
         let mut store = self.writer()?;
-        if let Some(known) = self.geometry(body.id()) {
+        if let Ok(known) = self.geometry(body.id()) {
             return Ok((known, false));
         }
         let fresh = self.read(|state| state.fresh(vec![body.clone()]))?;
         self.commit(&mut store, |transaction| put_bodies(transaction, &fresh))?;
-        self.write(|state| state.bodies.extend(fresh.into_iter().map(|body| (*body.id(), body))));
+        self.write(|state| state.keep(fresh));
         tracing::debug!(id = %body.id(), "body created");
         Ok((body, true))
     }
@@ -210,12 +137,14 @@ impl Catalogue {
             if !state.bodies.contains_key(id) {
                 return Err(CatalogueError::NoBody(*id));
             }
-            let holds = |body: &&Geometry| match body {
-                Geometry::Ladder(ladder) => ladder.rungs().iter().any(|rung| rung.id() == id),
-                Geometry::Solid(_) | Geometry::SosBody(_) | Geometry::HalfSpace(_) => false,
-            };
-            if let Some(ladder) = state.bodies.values().find(holds) {
+            if let Some(ladder) = state.bodies.values().find(|body| body.rungs().contains(id)) {
                 return Err(CatalogueError::RungUsed { id: *id, ladder: *ladder.id() });
+            }
+            for stored in state.stored_scenes.values() {
+                if let Some((object, _)) = stored.objects().find(|(_, body)| *body == id) {
+                    let (scene, object) = (stored.name.clone(), object.into());
+                    return Err(CatalogueError::BodyUsed { id: *id, scene, object });
+                }
             }
             for live in state.scenes.values() {
                 let scene = live.snapshot();
@@ -266,7 +195,11 @@ impl Catalogue {
         store.reopen()?;
         let known = self.read(|state| state.bodies.clone());
         let fresh = State::read(store, &known)?;
-        self.write(|state| state.replace(fresh));
+        self.write(|state| {
+            let before = state.replace(fresh);
+            self.proven.store(state.is_proven(), Ordering::Relaxed);
+            before
+        });
         Ok(())
     }
 
@@ -283,28 +216,40 @@ impl Catalogue {
 
 impl State {
     /// Everything in the store; bodies in `known` are not proven again.
-    fn read(store: &Store, known: &BTreeMap<BodyId, Geometry>) -> Result<Self, StoreError> {
+    fn read(store: &Store, known: &Bodies) -> Result<Self, StoreError> {
         let damaged = |what: String| StoreError::damaged(store.dir(), what);
         let Contents { bodies, ladders, scenes, objects, jobs, revision_floor } = store.read()?;
-        tracing::info!(
-            bodies = bodies.len(),
-            scenes = scenes.len(),
-            "loading; every body that is not known is re-proven"
-        );
-        let bodies: BTreeMap<_, _> =
-            prove(&bodies, known).map_err(damaged)?.into_iter().map(|body| (*body.id(), body)).collect();
         let jobs = jobs.into_iter().map(|job| (job.id, Arc::new(job))).collect();
-        let mut state = Self { scenes: Scenes::new(), revision_floor, bodies, jobs };
-        for (id, row) in ladders {
-            let ladder = row.ladder(|id| state.bodies.get(id).cloned());
-            let ladder = ladder.map_err(|why| damaged(format!("ladder {id} {why}")))?;
-            if ladder.id().to_string() != id {
-                return Err(damaged(format!("ladder {id} has the content of ladder {}", ladder.id())));
-            }
-            state.bodies.insert(*ladder.id(), Geometry::Ladder(Arc::new(ladder)));
+        let mut state = Self { revision_floor, jobs, ..Self::default() };
+        let parsed = |kind: &str, id: &str| {
+            id.parse::<BodyId>().map_err(|error| damaged(format!("{kind} \"{id}\" has no usable id: {error}")))
+        };
+        for (id, file) in bodies {
+            let id = parsed("body", &id)?;
+            state.read_body(id, BodyRow::File(file), known);
         }
-        state.restore_scenes(scenes, objects, store)?;
+        for (id, row) in ladders {
+            let id = parsed("ladder", &id)?;
+            let rung = |rung: &BodyId| {
+                let stored = state.bodies.get(rung).cloned();
+                stored.ok_or_else(|| damaged(format!("ladder {id} has a rung {rung} that is not stored")))
+            };
+            let rungs = row.rungs().iter().map(rung).collect::<Result<_, _>>()?;
+            state.read_body(id, BodyRow::Ladder(row, rungs), known);
+        }
+        state.read_scenes(scenes, objects, store)?;
         Ok(state)
+    }
+
+    fn read_body(&mut self, id: BodyId, row: BodyRow, known: &Bodies) {
+        // What was damaged may have been mended on the disk.
+        let known = known.get(&id).filter(|known| !known.is_damaged()).cloned();
+        self.bodies.insert(id, known.unwrap_or_else(|| Arc::new(StoredBody::read(id, row))));
+    }
+
+    /// Takes bodies in that were just made.
+    fn keep(&mut self, bodies: Vec<Geometry>) {
+        self.bodies.extend(bodies.into_iter().map(|body| (*body.id(), Arc::new(StoredBody::new(body)))));
     }
 
     /// Takes over what was read again.
@@ -326,8 +271,8 @@ impl State {
             let mut all = Vec::new();
             let body = match body {
                 Geometry::Ladder(ladder) => {
-                    let stored = |rung: &Arc<Shape>| match self.bodies.get(rung.id()) {
-                        Some(Geometry::Solid(stored)) => stored.clone(),
+                    let stored = |rung: &Arc<Shape>| match self.bodies.get(rung.id()).map(|body| body.geometry()) {
+                        Some(Ok(Geometry::Solid(stored))) => stored,
                         _ => rung.clone(),
                     };
                     let rungs: Vec<_> = ladder.rungs().iter().map(stored).collect();
@@ -337,7 +282,8 @@ impl State {
                 body @ (Geometry::Solid(_) | Geometry::SosBody(_) | Geometry::HalfSpace(_)) => body,
             };
             for body in all.into_iter().chain([body]) {
-                let known = self.bodies.contains_key(body.id()) || fresh.iter().any(|other| other.id() == body.id());
+                let stored = self.bodies.get(body.id()).is_some_and(|stored| !stored.is_damaged());
+                let known = stored || fresh.iter().any(|other| other.id() == body.id());
                 if !known {
                     fresh.push(body);
                 }
@@ -362,34 +308,6 @@ fn put_bodies(transaction: &WriteTransaction, bodies: &[Geometry]) -> Result<(),
         }
     }
     Ok(())
-}
-
-/// Bodies from their files, re-proven on all cores: the only part of loading that takes time.
-fn prove(files: &[(String, String)], known: &BTreeMap<BodyId, Geometry>) -> Result<Vec<Geometry>, String> {
-    let one = |(id, file): &(String, String)| {
-        if let Some(body) = id.parse().ok().and_then(|id: BodyId| known.get(&id)) {
-            return Ok(body.clone());
-        }
-        let body = Geometry::from_json(file).map_err(|error: GeometryFileError| format!("body {id}: {error}"))?;
-        if body.id().to_string() == *id {
-            Ok(body)
-        } else {
-            Err(format!("body {id} has the content of body {}", body.id()))
-        }
-    };
-    let threads = thread::available_parallelism().map_or(1, usize::from);
-    let share = files.len().div_ceil(threads).max(1);
-    thread::scope(|scope| {
-        let workers: Vec<_> = files
-            .chunks(share)
-            .map(|share| scope.spawn(move || share.iter().map(one).collect::<Result<Vec<_>, _>>()))
-            .collect();
-        let mut bodies = Vec::with_capacity(files.len());
-        for worker in workers {
-            bodies.extend(worker.join().map_err(|_| "re-proving a body failed by a defect".to_owned())??);
-        }
-        Ok(bodies)
-    })
 }
 
 fn json(row: &impl serde::Serialize) -> Result<Vec<u8>, redb::Error> {

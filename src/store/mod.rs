@@ -31,6 +31,14 @@
 //! are taken from a reserve that was written before, and deleting a scene raises the floor from
 //! which later scenes start.
 
+//! # What is proven, and when
+//!
+//! The file may have been damaged or written by anybody, so each body is proven again before its
+//! first use, and a scene is made when all its bodies are. Loading reads rows only; whoever asks
+//! for a body or scene that is not proven waits for that, and [`Catalogue::prove_all`] proves the
+//! rest in the background. A damaged body is named in the log and to those who ask for it, and
+//! never used.
+
 mod catalogue;
 mod copy;
 mod disk;
@@ -40,7 +48,7 @@ mod request;
 mod restore;
 mod rows;
 
-pub use catalogue::{Catalogue, CatalogueError, FORK_IDLE, LiveScene, MAX_FORKS, Origin};
+pub use catalogue::{Catalogue, CatalogueError, Counts, FORK_IDLE, LiveScene, MAX_FORKS, Origin, SceneEntry};
 pub use disk::{BACKUP_PREFIX, JobMesh, Store};
 pub use error::StoreError;
 pub use job::{

@@ -3,9 +3,10 @@
 use std::fs::{self, File};
 use std::io;
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 use super::disk::FILE;
-use super::{Catalogue, Store, StoreError};
+use super::{Catalogue, Counts, Store, StoreError};
 
 /// Makes the catalogue of a directory out of a backup: everything in it is read and proven first,
 /// so that a directory holds all of it or is as it was. Returns how many bodies and scenes there
@@ -14,7 +15,7 @@ use super::{Catalogue, Store, StoreError};
 /// # Errors
 /// A directory that has a catalogue, a file that is no backup or does not hold up, and a disk that
 /// fails.
-pub fn restore(backup: &Path, dir: &Path) -> Result<(usize, usize), StoreError> {
+pub fn restore(backup: &Path, dir: &Path) -> Result<Counts, StoreError> {
     let unusable = |source: io::Error| StoreError::Directory { dir: dir.into(), source };
     let file = dir.join(FILE);
     if file.try_exists().map_err(unusable)? {
@@ -40,7 +41,7 @@ pub fn restore(backup: &Path, dir: &Path) -> Result<(usize, usize), StoreError> 
     proven
 }
 
-fn prove(backup: &Path, aside: &Path) -> Result<(usize, usize), StoreError> {
+fn prove(backup: &Path, aside: &Path) -> Result<Counts, StoreError> {
     let copy = aside.join(FILE);
     let copied = fs::copy(backup, &copy).and_then(|_| File::open(&copy)?.sync_all());
     copied.map_err(|source| StoreError::Directory { dir: backup.into(), source })?;
@@ -52,5 +53,10 @@ fn prove(backup: &Path, aside: &Path) -> Result<(usize, usize), StoreError> {
         StoreError::Empty { .. } => StoreError::Empty { file: backup.into() },
         other => other,
     };
-    Ok(loaded.map_err(named)?.counts())
+    let catalogue = loaded.map_err(named)?;
+    catalogue.prove_all(&AtomicBool::new(false));
+    match catalogue.damage().first() {
+        Some(damage) => Err(StoreError::damaged(backup, damage.to_string())),
+        None => Ok(catalogue.counts()),
+    }
 }

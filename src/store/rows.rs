@@ -40,7 +40,7 @@ pub(super) const POINTS: TableDefinition<u64, &[u8]> = TableDefinition::new("poi
 pub(super) const TRIANGLES: TableDefinition<u64, &[u8]> = TableDefinition::new("triangles");
 
 /// A ladder: its rungs are bodies of their own.
-#[derive(Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LadderRow {
     name: String,
@@ -53,11 +53,16 @@ impl LadderRow {
         Self { name: ladder.name().to_owned(), rungs: ladder.rungs().iter().map(|rung| *rung.id()).collect() }
     }
 
+    /// Ids of its rungs, coarsest first.
+    pub(super) fn rungs(&self) -> &[BodyId] {
+        &self.rungs
+    }
+
     /// The ladder, from bodies by their ids.
     pub(super) fn ladder(&self, body: impl Fn(&BodyId) -> Option<Geometry>) -> Result<Ladder, String> {
         let rung = |id: &BodyId| match body(id) {
             Some(Geometry::Solid(shape)) => Ok(shape),
-            _ => Err(format!("has a rung {id} that is not stored")),
+            _ => Err(format!("its rung {id} cannot be used")),
         };
         let rungs = self.rungs.iter().map(rung).collect::<Result<_, _>>()?;
         Ladder::new(&self.name, rungs).map_err(|error| error.to_string())

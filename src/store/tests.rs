@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use redb::{Database, StorageBackend};
 
 use super::rows::{BODIES, META, OBJECTS, REVISIONS, SCENES};
-use super::{Catalogue, CatalogueError, Store, StoreError};
+use super::{Catalogue, CatalogueError, Counts, Store, StoreError};
 use crate::body::Body;
 use crate::measure::Pose;
 use crate::scene::{Attach, Placement, Scene, Subject, Update};
@@ -111,6 +111,11 @@ fn moved(x: f64) -> Update {
     Update { poses: vec![("o".into(), at(x))], ..Update::default() }
 }
 
+fn sizes(catalogue: &Catalogue) -> (usize, usize) {
+    let counts = catalogue.counts();
+    (counts.bodies, counts.scenes)
+}
+
 /// Where `o` stands.
 fn pose(scene: &Scene) -> Pose {
     *scene.slot("o").and_then(|slot| scene.pose(slot)).expect("there")
@@ -139,7 +144,7 @@ fn a_full_disk_is_reported_and_changes_nothing() {
         let still = catalogue.scene("room").expect("still there");
         assert_eq!(still.revision(), before.revision());
         assert_eq!(pose(&still), pose(&before));
-        assert_eq!(catalogue.counts(), (1, 1));
+        assert_eq!(sizes(&catalogue), (1, 1));
 
         // With space again, the next change works without a restart.
         disk.set_full(false);
@@ -150,7 +155,7 @@ fn a_full_disk_is_reported_and_changes_nothing() {
     let revision = catalogue.scene("room").expect("there").revision();
     drop(catalogue);
     let again = disk.load().expect("loads");
-    assert_eq!(again.counts(), (1, 1));
+    assert_eq!(sizes(&again), (1, 1));
     let scene = again.scene("room").expect("there");
     assert_eq!((scene.revision(), pose(&scene)), (revision, at(2.0)));
 }
@@ -175,7 +180,7 @@ fn every_acknowledged_change_is_on_disk() {
 #[test]
 fn what_it_did_not_write_is_refused_by_name() {
     type Write = fn(&redb::WriteTransaction);
-    let damage: [(&str, Write); 6] = [
+    let damage: [(&str, Write); 7] = [
         ("format 7", |t| drop(t.open_table(META).expect("a table").insert("format", 7))),
         ("body", |t| drop(t.open_table(BODIES).expect("a table").insert("feed", &b"{}"[..]))),
         ("scene \"room\"", |t| drop(t.open_table(SCENES).expect("a table").insert("room", &b"{}"[..]))),
@@ -190,9 +195,17 @@ fn what_it_did_not_write_is_refused_by_name() {
             );
             drop(t.open_table(OBJECTS).expect("a table").insert(("room", "p"), row.as_bytes()));
         }),
-        ("does not hold up", |t| {
-            let row = br#"{"allowed":[[{"object":"a"},{"object":"b"}]],"group_paddings_m":[],"pair_paddings_m":[]}"#;
-            drop(t.open_table(SCENES).expect("a table").insert("room", &row[..]));
+        ("which is not stored", |t| {
+            let row = format!(
+                r#"{{"body":"{}","pose":{{"translation_m":[0,0,0],"rotation":[0,0,0,1]}},"group":"","padding_m":null,"attachment":null}}"#,
+                ball(2.0).id()
+            );
+            drop(t.open_table(OBJECTS).expect("a table").insert(("room", "p"), row.as_bytes()));
+        }),
+        ("which is not stored", |t| {
+            let row = br#"{"body":"f","pose":{"translation_m":[0,0,0],"rotation":[0,0,0,1]},"group":"","padding_m":null,"attachment":null}"#;
+            let row = String::from_utf8_lossy(row).replace("\"f\"", &format!("\"{}\"", ball(1.0).id()));
+            drop(t.open_table(OBJECTS).expect("a table").insert(("hall", "p"), row.as_bytes()));
         }),
     ];
     for (word, write) in damage {
@@ -202,6 +215,93 @@ fn what_it_did_not_write_is_refused_by_name() {
         let error = disk.load().expect_err(word).to_string();
         assert!(error.contains(word) && error.contains("disk"), "{error}");
     }
+}
+
+/// Bodies are looked at one by one, and what does not use the damaged one goes on.
+#[test]
+fn what_is_damaged_is_named_and_not_used() {
+    let disk = Disk::default();
+    let catalogue = furnished(&disk);
+    catalogue.create_body(ball(2.0).into()).expect("stored");
+    catalogue.create_scene("hall").expect("made");
+    catalogue.update_scene("hall", &placed("o", &ball(2.0))).expect("placed");
+    catalogue.create_scene("lost").expect("made");
+    drop(catalogue);
+    let (first, second) = (*ball(1.0).id(), *ball(2.0).id());
+    let damages: [(String, &str); 3] = [
+        (ball(2.0).to_json(), "has the content of body"),
+        (ball(1.0).to_json()[..99].to_owned(), "EOF"),
+        (ball(1.0).to_json().replacen("1.0", "1.5", 1), "damaged"),
+    ];
+    for (file, why) in damages {
+        disk.meddle(|t| {
+            drop(t.open_table(BODIES).expect("a table").insert(&*first.to_string(), file.as_bytes()));
+            let rules = br#"{"allowed":[[{"object":"a"},{"object":"b"}]],"group_paddings_m":[],"pair_paddings_m":[]}"#;
+            drop(t.open_table(SCENES).expect("a table").insert("lost", &rules[..]));
+        });
+        for background in [false, true] {
+            let catalogue = disk.load().expect("loads");
+            assert!(!catalogue.is_proven());
+            if background {
+                assert!(!catalogue.prove_all(&AtomicBool::new(true)), "stopped before it began");
+                assert!(catalogue.prove_all(&AtomicBool::new(false)));
+                assert_eq!(catalogue.damage().len(), 3, "a body, its scene, and one with rules for nobody");
+                assert!(!catalogue.is_proven(), "two scenes cannot be used");
+            }
+            let error = catalogue.geometry(&first).expect_err("damaged").to_string();
+            assert!(error.contains(&first.to_string()) && error.contains(why), "{error}");
+            assert!(matches!(catalogue.scene("room"), Err(CatalogueError::DamagedBody { id, .. }) if id == first));
+            assert!(matches!(catalogue.scene("lost"), Err(CatalogueError::DamagedScene { .. })));
+            let used = catalogue.update_scene("hall", &placed("p", &ball(1.0))).expect_err("damaged");
+            assert!(matches!(used, CatalogueError::DamagedBody { .. }), "{used}");
+            assert!(catalogue.fork_scene("room", "plan", None).is_err());
+            assert!(matches!(catalogue.delete_body(&first), Err(CatalogueError::BodyUsed { .. })));
+            // Lists show the rest.
+            assert_eq!(catalogue.bodies(None, 9).0.iter().map(|body| *body.id()).collect::<Vec<_>>(), [second]);
+            let (scenes, more) = catalogue.scenes(None, 9);
+            let listed: Vec<_> = scenes.iter().map(|entry| (&*entry.name, entry.revision, entry.objects)).collect();
+            assert_eq!((listed.len(), more), (3, false), "{listed:?}");
+            assert_eq!((listed[0].0, listed[0].2, listed[2].0, listed[2].2), ("hall", 1, "room", 1));
+            assert_eq!(catalogue.scene("hall").expect("whole").len(), 1);
+            let Counts { bodies, unproven_bodies, damaged_bodies, scenes } = catalogue.counts();
+            assert_eq!((bodies, unproven_bodies, damaged_bodies, scenes), (2, 0, 1, 3));
+        }
+    }
+
+    // The remedies: the body again, and the scene without its rules.
+    let catalogue = disk.load().expect("loads");
+    assert!(catalogue.geometry(&first).is_err());
+    assert!(catalogue.create_body(ball(1.0).into()).expect("stored").1, "it replaces the damaged one");
+    assert_eq!(catalogue.scene("room").expect("whole again").len(), 1);
+    let revision = catalogue.scenes(None, 9).0.iter().map(|entry| entry.revision).max().expect("there");
+    catalogue.delete_scene("lost").expect("deleted");
+    assert!(catalogue.prove_all(&AtomicBool::new(false)) && catalogue.is_proven());
+    assert!(catalogue.create_scene("lost").expect("made").revision() >= revision.min(2));
+    drop(catalogue);
+    let again = disk.load().expect("loads");
+    assert!(again.prove_all(&AtomicBool::new(false)) && again.is_proven() && again.damage().is_empty());
+}
+
+/// Many ask for the same scene while it is proven in the background.
+#[test]
+fn a_scene_that_many_ask_for_is_made_once() {
+    let disk = Disk::default();
+    let catalogue = furnished(&disk);
+    for round in 0..20 {
+        let post = Body::cylinder("post", 1.0 + f64::from(round) * 0.01, 1.0).expect("a cylinder");
+        catalogue.create_body(post.clone().into()).expect("stored");
+        catalogue.update_scene("room", &placed(&format!("post {round}"), &post)).expect("placed");
+    }
+    drop(catalogue);
+    let catalogue = disk.load().expect("loads");
+    assert_eq!(catalogue.counts().unproven_bodies, 21);
+    let scenes: Vec<_> = std::thread::scope(|scope| {
+        let asking: Vec<_> = (0..8).map(|_| scope.spawn(|| catalogue.live_scene("room").expect("there"))).collect();
+        assert!(catalogue.prove_all(&AtomicBool::new(false)));
+        asking.into_iter().map(|asking| asking.join().expect("no panic")).collect()
+    });
+    assert!(scenes.iter().all(|scene| Arc::ptr_eq(scene, &scenes[0])));
+    assert_eq!((scenes[0].snapshot().len(), catalogue.is_proven()), (21, true));
 }
 
 /// Were a new file made, the scenes would be gone from memory too and their revisions given out
@@ -295,7 +395,7 @@ fn what_a_fork_holds_stays_in_the_catalogue() {
             while !done.load(Ordering::Relaxed) {
                 let fork = catalogue.fork_scene("room", "plan", None).expect("forked").snapshot();
                 for (_, object, _) in fork.objects() {
-                    assert!(catalogue.geometry(object.geometry.id()).is_some(), "deleted in use");
+                    assert!(catalogue.geometry(object.geometry.id()).is_ok(), "deleted in use");
                 }
                 catalogue.delete_scene("plan").expect("deleted");
             }
@@ -336,7 +436,7 @@ fn pages_cover_everything_once() {
     }
     let names = |after, count| {
         let (page, more) = catalogue.scenes(after, count);
-        (page.iter().map(|live| live.snapshot().name().to_string()).collect::<Vec<_>>().concat(), more)
+        (page.iter().map(|entry| entry.name.to_string()).collect::<Vec<_>>().concat(), more)
     };
     assert_eq!(names(None, 2), ("ab".into(), true));
     assert_eq!(names(Some("b"), 2), ("cd".into(), true));

@@ -7,6 +7,7 @@ mod families;
 mod fits;
 mod harness;
 mod keeping;
+mod kills;
 mod lifecycle;
 mod load;
 mod open_loop;

@@ -7,6 +7,7 @@ use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, IsCa, KeyPair};
+use sublevel::body::Body;
 use sublevel::client::{Client, ClientError, ClientOptions, Question, StatesQuestion};
 use sublevel::measure::Pose;
 use sublevel::scene::query::Measure;
@@ -235,6 +236,39 @@ async fn probes_and_metrics_say_what_was_asked() {
         }
     }
     assert!(named > 40, "{named}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_answers_before_all_its_bodies_are_proven() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(dir.path());
+    let mut clients = server.connect().await;
+    let client = server.client().await;
+    let mut ids = Vec::new();
+    for index in 0..600 {
+        ids.push(clients.put(&Body::cylinder("post", 0.1 + 1e-3 * f64::from(index), 1.0).expect("a cylinder")).await);
+    }
+    let ball = client.create_ball("ball", 0.1).await.expect("stored");
+    client.create_scene("cell").await.expect("made");
+    let at = |x: f64| Pose::from_quaternion([x, 0.0, 0.0].into(), [0.0, 0.0, 0.0, 1.0]).expect("a pose");
+    client.put_objects("cell", [("a", &ball, at(0.0)), ("b", &ball, at(1.0))]).await.expect("placed");
+    server.kill();
+
+    let admin = std::net::TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("a port");
+    let mut serve = command(dir.path());
+    serve.args(["--admin", &admin.to_string()]);
+    let server = Running::spawn(serve);
+    eventually(async || page(admin, "/readyz").0 == 200).await;
+    let (status, text) = page(admin, "/readyz");
+    assert!(status == 200 && text.contains("of 601 bodies are still to be proven"), "{status} {text}");
+    assert!(!page(admin, "/metrics").1.contains("\nsublevel_unproven_bodies 0\n"));
+    // A scene, and a body at the end of the queue.
+    let client = server.client().await;
+    client.evaluate("cell", Question::pairs([("a", "b")]), &[Measure::Distance]).await.expect("an answer");
+    let last = ids.iter().max().expect("there").parse().expect("an id");
+    assert_eq!(client.body(&last).await.expect("proven").id(), &last);
+    eventually(async || page(admin, "/readyz").1 == "ok\n").await;
+    assert!(page(admin, "/metrics").1.contains("\nsublevel_unproven_bodies 0\n"));
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -27,6 +27,7 @@ pub use geometry::{Geometry, GeometryFileError, Ladder, LadderError, MAX_RUNGS, 
 pub use limits::{MAX_NAME_BYTES, MAX_OBJECTS, MAX_PADDING_M, MAX_PAIR_RULES};
 pub use name::{NameError, check_name};
 pub use object::{Attachment, Object, Slot, Subject};
+pub use pair_cache::WarmStartUse;
 pub use rules::{Rules, SubjectPair};
 pub use scene::Scene;
 pub use update::{Attach, Placement, Update};

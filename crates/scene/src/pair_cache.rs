@@ -1,6 +1,7 @@
 //! Warm starts of pairs from one question to the next. They change how long an answer takes, never
 //! the answer beyond its bracket, so a wrong entry is harmless and the table may forget.
 
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock, TryLockError};
 
 use sublevel_core::measure::WarmStart;
@@ -13,6 +14,34 @@ const ENTRIES: usize = 1 << 16;
 
 /// Entries that are allocated together.
 const BLOCK: usize = 64;
+
+/// How often questions found a warm start, in all scenes of this process.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WarmStartUse {
+    /// The pair was there from an earlier question.
+    pub hits: u64,
+    /// The pair was new, in the place of another, or in use by another thread.
+    pub misses: u64,
+}
+
+impl WarmStartUse {
+    /// Up to now.
+    pub fn now() -> Self {
+        let sum = |count: fn(&Uses) -> &AtomicU64| USES.iter().map(|uses| count(uses).load(Ordering::Relaxed)).sum();
+        Self { hits: sum(|uses| &uses.hits), misses: sum(|uses| &uses.misses) }
+    }
+}
+
+/// A part of the counts with a cache line of its own, so that threads do not wait for each other.
+#[derive(Debug)]
+#[repr(align(128))]
+struct Uses {
+    hits: AtomicU64,
+    misses: AtomicU64,
+}
+
+/// Counts by the place of the entry.
+static USES: [Uses; 64] = [const { Uses { hits: AtomicU64::new(0), misses: AtomicU64::new(0) } }; 64];
 
 /// Warm starts of the pairs of one scene and its forks.
 #[derive(Debug)]
@@ -68,13 +97,20 @@ impl PairCache {
     pub(crate) fn with<T>(&self, key: PairKey, solve: impl FnOnce(&mut WarmStart) -> T) -> T {
         let index = key.mixed() as usize % (self.blocks.len() * BLOCK);
         let block = self.blocks[index / BLOCK].get_or_init(|| (0..BLOCK).map(|_| Mutex::default()).collect());
+        let uses = &USES[index % USES.len()];
         let mut entry = match block[index % BLOCK].try_lock() {
             Ok(entry) => entry,
             // A panic elsewhere left a hint, which may be anything.
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
-            Err(TryLockError::WouldBlock) => return solve(&mut WarmStart::default()),
+            Err(TryLockError::WouldBlock) => {
+                uses.misses.fetch_add(1, Ordering::Relaxed);
+                return solve(&mut WarmStart::default());
+            }
         };
-        if entry.key != key {
+        if entry.key == key {
+            uses.hits.fetch_add(1, Ordering::Relaxed);
+        } else {
+            uses.misses.fetch_add(1, Ordering::Relaxed);
             *entry = Entry { key, warm: WarmStart::default() };
         }
         solve(&mut entry.warm)
@@ -84,6 +120,17 @@ impl PairCache {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn uses_are_counted() {
+        let before = WarmStartUse::now();
+        let cache = PairCache::with_entries(64);
+        let key = PairKey { a: 1, b: 2, ..PairKey::default() };
+        (0..5).for_each(|_| cache.with(key, |_| ()));
+        // Other tests count, too.
+        let WarmStartUse { hits, misses } = WarmStartUse::now();
+        assert!(hits >= before.hits + 4 && misses > before.misses);
+    }
 
     #[test]
     fn an_entry_is_lent_to_its_pair_only() {

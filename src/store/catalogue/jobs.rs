@@ -115,7 +115,7 @@ impl Catalogue {
             Ok(())
         })?;
         self.write(|state| {
-            state.bodies.extend(fresh.into_iter().map(|body| (*body.id(), body)));
+            state.keep(fresh);
             state.jobs.insert(id, next.clone())
         });
         tracing::debug!(id, attempts, state = %next.state, "fit job moved on");

@@ -16,41 +16,60 @@ use redb::WriteTransaction;
 
 use crate::body::BodyId;
 use crate::measure::Pose;
-use crate::scene::{Geometry, Placement, Scene, SceneError, Slot, Update, check_name};
+use crate::scene::{Placement, Scene, SceneError, Slot, Update, check_name};
 use crate::store::rows::{META, OBJECTS, ObjectRow, RESERVES, REVISIONS, SCENES, SceneRow};
 use crate::store::{Store, StoreError};
 
 use super::live_scene::{LiveScene, MAX_FORKS, Origin, RESERVE, Scenes};
+use super::scene_entry::SceneEntry;
+use super::stored_scene::StoredScene;
 use super::{Catalogue, CatalogueError, State, json};
 
 impl Catalogue {
-    /// A scene or fork by name. Forks that are asked for stay.
-    pub fn live_scene(&self, name: &str) -> Option<Arc<LiveScene>> {
-        let live = self.read(|state| state.scenes.get(name).cloned())?;
-        if live.origin.is_some() {
-            live.touch();
+    /// A scene or fork by name; its bodies are proven here if they are not yet. Forks that are
+    /// asked for stay.
+    ///
+    /// # Errors
+    /// When there is none, or when it or one of its bodies is damaged.
+    pub fn live_scene(&self, name: &str) -> Result<Arc<LiveScene>, CatalogueError> {
+        loop {
+            let (live, stored) =
+                self.read(|state| (state.scenes.get(name).cloned(), state.stored_scenes.get(name).cloned()));
+            match (live, stored) {
+                (Some(live), _) => {
+                    if live.origin.is_some() {
+                        live.touch();
+                    }
+                    return Ok(live);
+                }
+                (None, Some(stored)) => self.enliven(&stored)?,
+                (None, None) => return Err(CatalogueError::NoScene(name.to_owned())),
+            }
         }
-        Some(live)
     }
 
     /// The latest snapshot of one scene.
-    pub fn scene(&self, name: &str) -> Option<Scene> {
-        self.live_scene(name).map(|live| live.snapshot())
+    ///
+    /// # Errors
+    /// See [`Catalogue::live_scene`].
+    pub fn scene(&self, name: &str) -> Result<Scene, CatalogueError> {
+        Ok(self.live_scene(name)?.snapshot())
     }
 
     /// Up to `count` scenes and forks in the order of their names, from the first one after
     /// `after`; and whether more follow.
-    pub fn scenes(&self, after: Option<&str>, count: usize) -> (Vec<Arc<LiveScene>>, bool) {
+    pub fn scenes(&self, after: Option<&str>, count: usize) -> (Vec<SceneEntry>, bool) {
         self.read(|state| {
-            let from = after.map_or(Bound::Unbounded, Bound::Excluded);
-            let mut rest = state.scenes.range::<str, _>((from, Bound::Unbounded)).map(|(_, live)| live.clone());
-            let page = rest.by_ref().take(count).collect();
-            (page, rest.next().is_some())
+            let range = (after.map_or(Bound::Unbounded, Bound::Excluded), Bound::Unbounded);
+            let live =
+                state.scenes.range::<str, _>(range).map(|(_, live)| SceneEntry::of(&live.snapshot(), live.origin()));
+            let stored = state.stored_scenes.range::<str, _>(range).map(|(_, stored)| SceneEntry::of_stored(stored));
+            let mut entries: Vec<_> = live.take(count + 1).chain(stored.take(count + 1)).collect();
+            entries.sort_by(|a, b| a.name.cmp(&b.name));
+            let more = entries.len() > count;
+            entries.truncate(count);
+            (entries, more)
         })
-    }
-
-    fn find(&self, name: &str) -> Result<Arc<LiveScene>, CatalogueError> {
-        self.live_scene(name).ok_or_else(|| CatalogueError::NoScene(name.to_owned()))
     }
 
     /// Creates an empty scene, one revision above every scene and fork that was deleted.
@@ -60,7 +79,7 @@ impl Catalogue {
     pub fn create_scene(&self, name: &str) -> Result<Scene, CatalogueError> {
         check_name(name)?;
         let mut store = self.writer()?;
-        let (taken, floor) = self.read(|state| (state.scenes.contains_key(name), state.revision_floor));
+        let (taken, floor) = self.read(|state| (state.has_scene(name), state.revision_floor));
         if taken {
             return Err(CatalogueError::SceneExists(name.to_owned()));
         }
@@ -77,8 +96,9 @@ impl Catalogue {
     /// # Errors
     /// When there is no such scene, when the update cannot be applied, or when the disk fails.
     pub fn update_scene(&self, name: &str, update: &Update) -> Result<Scene, CatalogueError> {
-        let bodies = |id: &BodyId| self.geometry(id);
-        let live = self.find(name)?;
+        let bodies = |id: &BodyId| self.geometry(id).ok();
+        let live = self.live_scene(name)?;
+        self.prove_bodies(update.upserts.iter().map(|placement| &placement.body))?;
         if live.origin.is_some() {
             // Deleting a body looks at forks, too, under the same lock.
             let _store = self.writer()?;
@@ -88,7 +108,7 @@ impl Catalogue {
             return Ok(next);
         }
         let mut store = self.writer()?;
-        let live = self.find(name)?;
+        let live = self.live_scene(name)?;
         let _changing = live.change();
         let scene = live.snapshot();
         let next = scene.updated(update, bodies)?;
@@ -129,28 +149,50 @@ impl Catalogue {
     /// When there is no such scene, or when the disk fails.
     pub fn delete_scene(&self, name: &str) -> Result<(), CatalogueError> {
         let mut store = self.writer()?;
-        let live = self.find(name)?;
-        let _changing = live.change();
-        let scene = live.snapshot();
-        if live.origin.is_some() {
-            self.write(|state| state.remove_scene(name));
+        if let Some(stored) = self.read(|state| state.stored_scenes.get(name).cloned()) {
+            // Not proven for that: one that is damaged can be deleted.
+            let objects = stored.objects().map(|(object, _)| object);
+            let floor = self.forget_scene(&mut store, name, stored.revision, objects)?;
+            self.write(|state| {
+                state.revision_floor = floor;
+                state.scenes.remove(name);
+                state.stored_scenes.remove(name)
+            });
             return Ok(());
         }
-        let floor = self.read(|state| state.revision_floor).max(scene.revision());
-        self.commit(&mut store, |transaction| {
+        let live = self.live_scene(name)?;
+        let _changing = live.change();
+        let scene = live.snapshot();
+        if live.origin.is_none() {
+            let objects = scene.objects().map(|(_, object, _)| &*object.name);
+            self.forget_scene(&mut store, name, scene.revision(), objects)?;
+            tracing::debug!(scene = name, revision = scene.revision(), "scene deleted");
+        }
+        self.write(|state| state.remove_scene(name));
+        Ok(())
+    }
+
+    /// Removes the rows of a scene. Returns the revision that no later scene starts at or below.
+    fn forget_scene<'a>(
+        &self,
+        store: &mut Store,
+        name: &str,
+        revision: u64,
+        names: impl Iterator<Item = &'a str>,
+    ) -> Result<u64, StoreError> {
+        let floor = self.read(|state| state.revision_floor).max(revision);
+        self.commit(store, |transaction| {
             transaction.open_table(META)?.insert("revision_floor", floor)?;
             transaction.open_table(SCENES)?.remove(name)?;
             transaction.open_table(REVISIONS)?.remove(name)?;
             transaction.open_table(RESERVES)?.remove(name)?;
             let mut objects = transaction.open_table(OBJECTS)?;
-            for (_, object, _) in scene.objects() {
-                objects.remove((name, &*object.name))?;
+            for object in names {
+                objects.remove((name, object))?;
             }
             Ok(())
         })?;
-        self.write(|state| state.remove_scene(name));
-        tracing::debug!(scene = name, revision = scene.revision(), "scene deleted");
-        Ok(())
+        Ok(floor)
     }
 
     /// Makes a fork, in constant time and in memory only.
@@ -164,7 +206,7 @@ impl Catalogue {
         fork: &str,
         expected_revision: Option<u64>,
     ) -> Result<Arc<LiveScene>, CatalogueError> {
-        self.find(name)?;
+        self.live_scene(name)?;
         // Bodies of scenes are kept, see `delete_body`; so the snapshot becomes one of a scene
         // under the same lock.
         self.write(|state| {
@@ -174,7 +216,7 @@ impl Catalogue {
                 return Err(SceneError::Revision { expected, current: scene.revision() }.into());
             }
             let forked = scene.fork(fork)?;
-            if state.scenes.contains_key(fork) {
+            if state.has_scene(fork) {
                 return Err(CatalogueError::SceneExists(fork.to_owned()));
             }
             if state.scenes.values().filter(|live| live.origin.is_some()).count() >= MAX_FORKS {
@@ -195,11 +237,11 @@ impl Catalogue {
     /// When it is no fork, when the parent is gone or has changed since, or when the disk fails.
     pub fn commit_fork(&self, name: &str) -> Result<Scene, CatalogueError> {
         let mut store = self.writer()?;
-        let fork = self.find(name)?;
+        let fork = self.live_scene(name)?;
         let Some(origin) = fork.origin.clone() else { return Err(CatalogueError::NoFork(name.to_owned())) };
         let gone = || CatalogueError::NoParent { fork: name.to_owned(), parent: origin.parent.clone() };
         let is_it = |parent: &Arc<LiveScene>| Weak::ptr_eq(&Arc::downgrade(parent), &origin.live);
-        let parent = self.live_scene(&origin.parent).filter(is_it).ok_or_else(gone)?;
+        let parent = self.live_scene(&origin.parent).ok().filter(is_it).ok_or_else(gone)?;
         let _changing_fork = fork.change();
         let _changing_parent = parent.change();
         let scene = parent.snapshot();
@@ -316,26 +358,40 @@ impl State {
         Some(live)
     }
 
+    /// Whether there is a scene or fork of this name.
+    fn has_scene(&self, name: &str) -> bool {
+        self.scenes.contains_key(name) || self.stored_scenes.contains_key(name)
+    }
+
     /// Forks stay, and scenes that were read again go on where they are, if that is not behind the
     /// disk.
     pub(super) fn keep_live(&mut self, before: &Scenes) {
         for (name, live) in before {
             if live.origin.is_some() {
                 self.scenes.insert(name.clone(), live.clone());
-            } else if let Some(stored) = self.scenes.get_mut(name) {
-                let (here, stored_there) = (live.snapshot(), stored.snapshot());
-                if stored_there.revision() > here.revision() {
-                    // The change that seemed to fail is on disk.
-                    live.written.store(stored_there.revision(), Ordering::Relaxed);
-                    live.publish(stored_there);
-                }
-                *stored = live.clone();
+                continue;
             }
+            let Some(stored) = self.stored_scenes.get(name) else { continue };
+            if stored.revision > live.snapshot().revision() {
+                // The change that seemed to fail is on disk; its bodies were proven for it.
+                match stored.live(|id| self.bodies.get(id)?.geometry().ok()) {
+                    Ok(there) => {
+                        live.written.store(stored.revision, Ordering::Relaxed);
+                        live.publish(there.snapshot());
+                    }
+                    Err(error) => {
+                        tracing::error!(%error, "a scene that was read again is not used");
+                        continue;
+                    }
+                }
+            }
+            self.stored_scenes.remove(name);
+            self.scenes.insert(name.clone(), live.clone());
         }
     }
 
     /// The scenes as they were stored.
-    pub(super) fn restore_scenes(
+    pub(super) fn read_scenes(
         &mut self,
         scenes: Vec<(String, u64, SceneRow)>,
         objects: Vec<(String, String, ObjectRow)>,
@@ -346,17 +402,16 @@ impl State {
         for (scene, name, row) in objects {
             let fault = |what: String| damaged(format!("object \"{name}\" of scene \"{scene}\" {what}"));
             let placement = row.placement(&name).map_err(fault)?;
+            if !self.bodies.contains_key(&placement.body) {
+                return Err(fault(format!("is made of body {}, which is not stored", placement.body)));
+            }
             placed.entry(scene).or_default().push(placement);
         }
         for (name, revision, row) in scenes {
-            let fault = |what: String| damaged(format!("scene \"{name}\" {what}"));
-            let mut update = row.update();
-            update.upserts = placed.remove(&name).unwrap_or_default();
-            let bodies = |id: &BodyId| -> Option<Geometry> { self.bodies.get(id).cloned() };
-            let scene = Scene::new(&name, 0).map_err(|error| fault(format!("has a name that {error}")))?;
-            let scene = scene.updated(&update, bodies).map_err(|error| fault(format!("does not hold up: {error}")))?;
-            let live = LiveScene::new(scene.at_revision(revision), None, revision);
-            self.scenes.insert(name.as_str().into(), Arc::new(live));
+            check_name(&name).map_err(|error| damaged(format!("scene \"{name}\" has a name that {error}")))?;
+            let placed = placed.remove(&name).unwrap_or_default();
+            let stored = StoredScene::new(&name, revision, &row, placed);
+            self.stored_scenes.insert(stored.name.clone(), Arc::new(stored));
         }
         match placed.keys().next() {
             Some(scene) => Err(damaged(format!("objects of scene \"{scene}\", which is not stored"))),

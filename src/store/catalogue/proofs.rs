@@ -1,0 +1,119 @@
+//! What was read from the disk is proven before its first use: at once when somebody asks for it,
+//! else in the background.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+
+use crate::body::BodyId;
+use crate::scene::Geometry;
+
+use super::counts::Counts;
+use super::live_scene::LiveScene;
+use super::stored_body::{StoredBody, prove_each};
+use super::stored_scene::StoredScene;
+use super::{Catalogue, CatalogueError, State};
+
+impl Catalogue {
+    /// How much there is.
+    pub fn counts(&self) -> Counts {
+        self.read(|state| Counts {
+            bodies: state.bodies.len(),
+            unproven_bodies: state.bodies.values().filter(|body| !body.is_examined()).count(),
+            damaged_bodies: state.bodies.values().filter(|body| body.is_damaged()).count(),
+            scenes: state.scenes.len() + state.stored_scenes.len(),
+        })
+    }
+
+    /// Whether every body was looked at, and every scene is in memory: nothing has to be proven
+    /// for any question.
+    pub fn is_proven(&self) -> bool {
+        self.proven.load(Ordering::Relaxed)
+    }
+
+    /// Whether nothing has to be proven for a question about a scene, or there is no such scene.
+    pub fn is_scene_proven(&self, name: &str) -> bool {
+        self.is_proven() || self.read(|state| !state.stored_scenes.contains_key(name))
+    }
+
+    /// Proves on all cores what is not proven yet, that of scenes first, until `stop`. Returns
+    /// whether it came to its end. What is damaged is logged.
+    pub fn prove_all(&self, stop: &AtomicBool) -> bool {
+        let names: Vec<_> = self.read(|state| state.stored_scenes.keys().cloned().collect());
+        for name in names {
+            self.examine(self.bodies_of_scene(&name), stop);
+            if stop.load(Ordering::Relaxed) {
+                return false;
+            }
+            if let Err(error) = self.live_scene(&name) {
+                tracing::error!(scene = &*name, %error, "a scene of the catalogue cannot be used");
+            }
+        }
+        let rest = self.read(|state| state.bodies.values().filter(|body| !body.is_examined()).cloned().collect());
+        self.examine(rest, stop);
+        let ended = !stop.load(Ordering::Relaxed);
+        self.proven.store(ended && self.read(State::is_proven), Ordering::Relaxed);
+        ended
+    }
+
+    /// What is known to be damaged after [`Catalogue::prove_all`].
+    pub fn damage(&self) -> Vec<CatalogueError> {
+        let (bodies, scenes) = self.read(|state| {
+            let damaged: Vec<_> = state.bodies.values().filter(|body| body.is_damaged()).cloned().collect();
+            (damaged, state.stored_scenes.keys().cloned().collect::<Vec<_>>())
+        });
+        let bodies = bodies.iter().filter_map(|body| body.geometry().err());
+        bodies.chain(scenes.iter().filter_map(|name| self.live_scene(name).err())).collect()
+    }
+
+    /// Proves bodies on all cores; those that are not there are left out.
+    ///
+    /// # Errors
+    /// When one is not what was stored.
+    pub(super) fn prove_bodies<'a>(&self, ids: impl IntoIterator<Item = &'a BodyId>) -> Result<(), CatalogueError> {
+        let ids: BTreeSet<_> = ids.into_iter().collect();
+        let bodies: Vec<_> =
+            self.read(|state| ids.into_iter().filter_map(|id| state.bodies.get(id)).cloned().collect());
+        self.examine(bodies.iter().filter(|body| !body.is_examined()).cloned().collect(), &AtomicBool::new(false));
+        bodies.iter().try_for_each(|body| body.geometry().map(drop))
+    }
+
+    /// Makes a scene that was read from the disk a live one, when somebody asks for it.
+    pub(super) fn enliven(&self, stored: &Arc<StoredScene>) -> Result<(), CatalogueError> {
+        self.prove_bodies(stored.objects().map(|(_, body)| body))?;
+        let live = Arc::new(self.live(stored)?);
+        self.write(|state| {
+            // Deleted, or made by somebody else meanwhile.
+            let is_it = state.stored_scenes.get(&stored.name).is_some_and(|now| Arc::ptr_eq(now, stored));
+            if is_it {
+                state.stored_scenes.remove(&stored.name);
+                state.scenes.insert(stored.name.clone(), live);
+            }
+        });
+        Ok(())
+    }
+
+    fn live(&self, stored: &StoredScene) -> Result<LiveScene, CatalogueError> {
+        stored.live(|id: &BodyId| -> Option<Geometry> { self.geometry(id).ok() })
+    }
+
+    fn bodies_of_scene(&self, name: &str) -> Vec<Arc<StoredBody>> {
+        self.read(|state| {
+            let Some(scene) = state.stored_scenes.get(name) else { return Vec::new() };
+            let ids: BTreeSet<_> = scene.objects().map(|(_, body)| body).collect();
+            let bodies = ids.into_iter().filter_map(|id| state.bodies.get(id));
+            bodies.filter(|body| !body.is_examined()).cloned().collect()
+        })
+    }
+
+    fn examine(&self, bodies: Vec<Arc<StoredBody>>, stop: &AtomicBool) {
+        prove_each(&bodies, thread::available_parallelism().map_or(1, usize::from), stop);
+    }
+}
+
+impl State {
+    pub(super) fn is_proven(&self) -> bool {
+        self.stored_scenes.is_empty() && self.bodies.values().all(|body| body.is_examined())
+    }
+}
