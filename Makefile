@@ -1,5 +1,5 @@
 # Everything a fresh Debian or Ubuntu machine needs beyond Rust (rustup), make and a C compiler.
-.PHONY: help setup demo test check charts docs-numbers image acceptance endurance fuzz draws measures
+.PHONY: help setup demo test check charts docs-numbers image acceptance endurance fuzz draws measures kills
 
 help:
 	@echo 'make demo          fit two shapes, serve them, sweep one through the other, draw the curves'
@@ -8,11 +8,12 @@ help:
 	@echo 'make charts        measure beside other libraries, and draw: SUBLEVEL_DATA=DIR with the meshes'
 	@echo 'make docs-numbers  write the numbers of README.md and docs/ again from the CSV files in docs/'
 	@echo 'make image         build the container image of the server: BUILD= and RUNTIME= name other base images'
-	@echo 'make acceptance    what is too long for every change, all four of these: SUBLEVEL_DATA=DIR'
+	@echo 'make acceptance    what is too long for every change, all five of these: SUBLEVEL_DATA=DIR'
 	@echo '  make endurance     1e8 checked queries; interrupted, it continues where it was (QUERIES=1e9 for more)'
-	@echo '  make fuzz          1e6 damaged files for each reader of meshes (RUNS=10000000 for more)'
+	@echo '  make fuzz          1e6 damaged inputs for each reader of files and calls (RUNS=10000000 for more)'
 	@echo '  make draws         1e5 draws of each family of the stability tests (DRAWS=1000 for fewer)'
 	@echo '  make measures      time every measure beside coal and parry, and fail where a target is missed'
+	@echo '  make kills         kill a server under load 1e3 times, with a ledger of its answers (KILLS=100 for fewer)'
 	@echo 'make setup         install missing system packages (demo and test do this first)'
 
 setup:
@@ -41,11 +42,12 @@ image:
 	docker build -f deploy/container/Containerfile --target server $(if $(BUILD),--build-arg BUILD=$(BUILD)) \
 	    $(if $(RUNTIME),--build-arg RUNTIME=$(RUNTIME)) -t sublevel .
 
-acceptance: endurance fuzz draws measures
+acceptance: endurance fuzz draws measures kills
 
 QUERIES ?= 1e8
 RUNS ?= 1000000
 DRAWS ?= 100000
+KILLS ?= 1000
 
 # Runs of different lengths keep states of their own.
 endurance: setup
@@ -62,3 +64,6 @@ draws: setup
 measures:
 	@[ -d '$(SUBLEVEL_DATA)' ] || { echo 'measures: the meshes are missing; name their folder: SUBLEVEL_DATA=DIR make measures' >&2; exit 1; }
 	cargo bench -p sublevel-bench --bench measures -- --strict
+
+kills: setup
+	SUBLEVEL_LONG=$(KILLS) cargo test --release --test server kills:: -- --nocapture

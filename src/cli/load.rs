@@ -14,14 +14,16 @@ use crate::load::{Arrivals, LoadOptions, LoadReport, Scenario, connect, echo, me
 ///
 /// In an open loop: calls are begun when they are due, however long earlier ones take, and their
 /// time counts from then on. Beside it runs an echo server of equal message sizes, which shows what
-/// the transport alone takes. The scene it makes is removed at the end.
+/// the transport alone takes. What it makes in the server is removed at the end, also by Ctrl-C.
 ///
-/// A scenario is one of pair, pairs, within, states, mixed, or a TOML file:
+/// A scenario is one of pair, pairs, within, states, mixed, a recording (.jsonl) of
+/// 'sublevel record', or a TOML file:
 ///   objects = 200          # bricks in the scene, in a cube of 2 reach_m
 ///   reach_m = 4.0
 ///   pose_rate_hz = 100     # messages a second of a stream that moves a tenth of them
 ///   [[calls]]
-///   kind = "pairs"         # or "within" with margin_m, or "states" with states and moving
+///   kind = "pairs"         # or "within" with margin_m, "states" with states and moving,
+///                          # "recorded" with file
 ///   pairs = 64
 ///   weight = 2
 ///
@@ -122,9 +124,12 @@ pub(super) fn run(args: &LoadArgs) -> Result<(), Box<dyn Error>> {
 async fn load(args: &LoadArgs, options: &LoadOptions, scenario: &Scenario) -> Result<LoadReport, Box<dyn Error>> {
     let clients = connect(&args.server, &ClientOptions::from_environment(), options.connections).await?;
     let prepared = Arc::new(prepare(&clients[0], scenario, options.seed).await?);
-    let measured = measured(args, options, scenario, (&prepared, &clients)).await;
+    let measured = tokio::select! {
+        measured = measured(args, options, scenario, (&prepared, &clients)) => measured,
+        _ = tokio::signal::ctrl_c() => Err("stopped by Ctrl-C; nothing is reported".into()),
+    };
     // Also when something went wrong.
-    let removed = clients[0].delete_scene(prepared.scene()).await;
+    let removed = prepared.remove(&clients[0]).await;
     let report = measured?;
     removed?;
     Ok(report)

@@ -23,6 +23,7 @@ mod primitive;
 #[cfg(feature = "fit")]
 mod progress;
 mod push;
+mod record;
 mod scene;
 mod serve;
 mod show;
@@ -65,6 +66,7 @@ enum Command {
     Health(health::HealthArgs),
     Token(token::TokenArgs),
     Load(load::LoadArgs),
+    Record(record::RecordArgs),
     Backup(backup::BackupArgs),
     Restore(backup::RestoreArgs),
 }
@@ -90,6 +92,7 @@ pub fn main() -> ExitCode {
         Command::Health(args) => health::run(&args),
         Command::Token(args) => token::run(&args).map(done),
         Command::Load(args) => load::run(&args).map(done),
+        Command::Record(args) => record::run(&args).map(done),
         Command::Backup(args) => backup::backup(&args).map(done),
         Command::Restore(args) => backup::restore(&args).map(done),
     };

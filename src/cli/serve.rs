@@ -15,9 +15,8 @@ use crate::service::{self, ServeError};
 /// get a few seconds to end, and a fit under way goes on at the next start.
 ///
 /// Every setting has a default, which a TOML file (--config), the environment
-/// (SUBLEVEL_SERVER_LISTEN, SUBLEVEL_SERVER_LIMITS__CALLS, and RUST_LOG for log.filter) and flags
-/// change, in this order.
-/// --print-config prints what they come to.
+/// (SUBLEVEL_SERVER_LISTEN, SUBLEVEL_SERVER_LIMITS__CALLS; RUST_LOG for log.filter, SUBLEVEL_SIMD
+/// for simd) and flags change, in this order. --print-config prints what they come to.
 ///
 /// Examples:
 ///   sublevel serve --data /var/lib/sublevel --listen 127.0.0.1:50051

@@ -109,16 +109,6 @@ impl Client {
     /// # Errors
     /// As [`Client::connect`]; certificates and tokens that cannot be used.
     pub async fn connect_with(url: &str, options: &ClientOptions) -> Result<Self, ClientError> {
-        let unusable = |why: String| ClientError::Url { url: url.into(), why };
-        let mut endpoint = Endpoint::from_shared(url.to_owned()).map_err(|error| unusable(error.to_string()))?;
-        match endpoint.uri().scheme_str() {
-            Some("http") => {}
-            Some("https") => {
-                let tls = tls_config(options)?;
-                endpoint = endpoint.tls_config(tls).map_err(|error| ClientError::Certificates(root_cause(&error)))?;
-            }
-            _ => return Err(unusable("its scheme is neither http nor https".into())),
-        }
         let credentials = match &options.token {
             None => Credentials::default(),
             Some(token) => {
@@ -126,13 +116,8 @@ impl Client {
                 Credentials(Some(shown.map_err(|_| ClientError::Token)?))
             }
         };
-        let channel = endpoint
-            .connect_timeout(Duration::from_secs(5))
+        let channel = endpoint(url, options)?
             .timeout(options.patience)
-            .tcp_nodelay(true)
-            // An answer comes without waiting on the way.
-            .initial_stream_window_size(MAX_MESSAGE_BYTES as u32)
-            .initial_connection_window_size(2 * MAX_MESSAGE_BYTES as u32)
             .connect()
             .await
             .map_err(|error| ClientError::Unreachable { url: url.into(), why: root_cause(&error) })?;
@@ -180,6 +165,29 @@ impl Client {
         let url = self.url.clone();
         move |status| ClientError::of(&url, status)
     }
+}
+
+/// Where a server is, with certificates where its address begins with `https`.
+///
+/// # Errors
+/// An address that is none, and certificates that cannot be used.
+pub fn endpoint(url: &str, options: &ClientOptions) -> Result<Endpoint, ClientError> {
+    let unusable = |why: String| ClientError::Url { url: url.into(), why };
+    let mut endpoint = Endpoint::from_shared(url.to_owned()).map_err(|error| unusable(error.to_string()))?;
+    match endpoint.uri().scheme_str() {
+        Some("http") => {}
+        Some("https") => {
+            let tls = tls_config(options)?;
+            endpoint = endpoint.tls_config(tls).map_err(|error| ClientError::Certificates(root_cause(&error)))?;
+        }
+        _ => return Err(unusable("its scheme is neither http nor https".into())),
+    }
+    Ok(endpoint
+        .connect_timeout(Duration::from_secs(5))
+        .tcp_nodelay(true)
+        // An answer comes without waiting on the way.
+        .initial_stream_window_size(MAX_MESSAGE_BYTES as u32)
+        .initial_connection_window_size(2 * MAX_MESSAGE_BYTES as u32))
 }
 
 fn tls_config(options: &ClientOptions) -> Result<ClientTlsConfig, ClientError> {

@@ -26,11 +26,12 @@ mod error;
 mod fits;
 mod pose_stream;
 mod queries;
+mod raw;
 mod scenes;
 
 pub use crate::service::proto::SceneSummary;
 pub use bodies::{BodySource, StoredBody};
-pub use connection::{Client, ClientOptions, Connection, Credentials, ServerInfo};
+pub use connection::{Client, ClientOptions, Connection, Credentials, ServerInfo, endpoint};
 pub use error::ClientError;
 #[cfg(feature = "fit")]
 pub use fits::{JobProgress, SubmitError};

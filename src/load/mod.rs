@@ -3,12 +3,16 @@
 //! would see it.
 
 mod echo;
+mod recorder;
+mod recording;
 mod report;
 mod run;
 mod scenario;
 mod schedule;
 
 pub use echo::{Echo, echo};
+pub use recorder::Recorder;
+pub use recording::{RecordedCall, RecordingError};
 pub use report::{Latency, LoadReport, RateReport};
 pub use run::{LoadError, LoadOptions, Prepared, connect, measure, prepare};
 pub use scenario::{Scenario, ScenarioError, Share};

@@ -1,13 +1,14 @@
 //! Calls at a rate.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use hdrhistogram::Histogram;
 use nalgebra::{Quaternion, Vector3};
 
+use super::recording::{RecordedCall, RecordingError};
 use super::report::{Latency, RateReport};
 use super::scenario::{Scenario, Share};
 use super::schedule::{Arrivals, Schedule};
@@ -24,6 +25,9 @@ const LAST_ANSWERS: Duration = Duration::from_secs(10);
 
 /// Variants of each kind of call, so that not one question is asked again and again.
 const VARIANTS: usize = 16;
+
+/// Most calls of a kind of which the bytes of the answer are measured.
+const MEASURED: usize = 64;
 
 /// How load is made.
 #[derive(Clone, Debug)]
@@ -49,6 +53,9 @@ pub enum LoadError {
     /// A pose, which the scenario made too far away.
     #[error("reach_m makes a pose that is none: {0}")]
     Pose(#[from] crate::measure::PoseError),
+    /// A recording that cannot be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
     /// A body that cannot be made.
     #[error(transparent)]
     Body(#[from] crate::body::BodyError),
@@ -62,14 +69,26 @@ pub enum LoadError {
 enum Call {
     Evaluate(Box<Question>),
     States(Box<StatesQuestion>),
+    Recorded(RecordedCall),
+}
+
+/// Calls of one kind.
+#[derive(Debug)]
+struct Kind {
+    /// The weights of the kinds up to this one.
+    sum: f64,
+    variants: Vec<Call>,
+    /// Of the next call, where they are made in their order.
+    next: Option<AtomicUsize>,
 }
 
 /// A scene in a server, and the calls about it.
 #[derive(Debug)]
 pub struct Prepared {
     scene: String,
-    /// The sum of the weights up to each, and its variants.
-    calls: Vec<(f64, Vec<Call>)>,
+    /// The body of its objects, if it was not there before.
+    made_body: Option<BodyId>,
+    calls: Vec<Kind>,
     names: Vec<String>,
     poses: Vec<Pose>,
 }
@@ -81,30 +100,42 @@ pub struct Prepared {
 pub async fn prepare(client: &Client, scenario: &Scenario, seed: u64) -> Result<Prepared, LoadError> {
     let mut random = Schedule::new(Arrivals::Poisson, 1.0, seed);
     let body = Body::superellipsoid("brick", Vector3::zeros(), Vector3::new(0.5, 0.3, 0.2), 6)?;
-    let id: BodyId = client.create_from_file(body.to_json()).await?.id;
+    let stored = client.create_from_file(body.to_json()).await?;
     let scene = format!("load-{:016x}", (random.uniform() * 2_f64.powi(53)) as u64 ^ u64::from(std::process::id()));
-    client.create_scene(&scene).await?;
     let names: Vec<String> = (0..scenario.objects).map(|index| format!("o{index}")).collect();
     let mut poses = Vec::new();
     for _ in 0..scenario.objects {
         poses.push(anywhere(&mut random, scenario.reach_m)?);
     }
-    client.put_objects(&scene, names.iter().zip(&poses).map(|(name, pose)| (name.as_str(), &id, *pose))).await?;
     let (mut calls, mut sum) = (Vec::new(), 0.0);
     for share in &scenario.calls {
         sum += share.weight();
+        if let Share::Recorded { file, .. } = share {
+            let variants = RecordedCall::read(file)?.into_iter().map(Call::Recorded).collect();
+            calls.push(Kind { sum, variants, next: Some(AtomicUsize::new(0)) });
+            continue;
+        }
         let mut variants = Vec::new();
         for _ in 0..VARIANTS {
-            variants.push(call(share, &names, scenario.reach_m, &mut random)?);
+            variants.extend(call(share, &names, scenario.reach_m, &mut random)?);
         }
-        calls.push((sum, variants));
+        calls.push(Kind { sum, variants, next: None });
     }
-    Ok(Prepared { scene, calls, names, poses })
+    client.create_scene(&scene).await?;
+    let prepared = Prepared { scene, made_body: stored.created.then_some(stored.id), calls, names, poses };
+    let placed = prepared.names.iter().zip(&prepared.poses).map(|(name, pose)| (name.as_str(), &stored.id, *pose));
+    if let Err(error) = client.put_objects(&prepared.scene, placed).await {
+        // What it has made goes, and the reason stays.
+        let _ = prepared.remove(client).await;
+        return Err(error.into());
+    }
+    Ok(prepared)
 }
 
-fn call(share: &Share, names: &[String], reach_m: f64, random: &mut Schedule) -> Result<Call, LoadError> {
+fn call(share: &Share, names: &[String], reach_m: f64, random: &mut Schedule) -> Result<Option<Call>, LoadError> {
     let mut pick = |count: usize| ((random.uniform() * count as f64) as usize).min(count - 1);
-    Ok(match share {
+    Ok(Some(match share {
+        Share::Recorded { .. } => return Ok(None),
         Share::Pairs { pairs, .. } => {
             let chosen: Vec<(usize, usize)> = (0..*pairs)
                 .map(|_| {
@@ -127,7 +158,7 @@ fn call(share: &Share, names: &[String], reach_m: f64, random: &mut Schedule) ->
             let objects = names[..*moving].iter().map(String::as_str);
             Call::States(Box::new(StatesQuestion::new(objects).with_states(&poses)))
         }
-    })
+    }))
 }
 
 fn anywhere(random: &mut Schedule, reach_m: f64) -> Result<Pose, LoadError> {
@@ -143,17 +174,34 @@ impl Prepared {
         &self.scene
     }
 
-    /// Bytes of an answer in the mean, measured over all variants.
+    /// Removes what was made in the server.
+    ///
+    /// # Errors
+    /// What the server refuses.
+    pub async fn remove(&self, client: &Client) -> Result<(), LoadError> {
+        client.delete_scene(&self.scene).await?;
+        if let Some(body) = &self.made_body {
+            match client.delete_body(body).await {
+                // Somebody else uses it by now.
+                Err(error) if error.code() == Some(tonic::Code::FailedPrecondition) => {}
+                deleted => deleted?,
+            }
+        }
+        Ok(())
+    }
+
+    /// Bytes of an answer in the mean, measured over some of each kind.
     ///
     /// # Errors
     /// What the server refuses.
     pub async fn answer_bytes(&self, client: &Client) -> Result<usize, LoadError> {
         let (mut bytes, mut total) = (0.0, 0.0);
         let mut before = 0.0;
-        for (sum, variants) in &self.calls {
-            let weight = (sum - before) / variants.len() as f64;
+        for Kind { sum, variants, .. } in &self.calls {
+            let measured = &variants[..variants.len().min(MEASURED)];
+            let weight = (sum - before) / measured.len() as f64;
             before = *sum;
-            for call in variants {
+            for call in measured {
                 bytes += weight * self.send(client, call).await? as f64;
                 total += weight;
             }
@@ -166,6 +214,7 @@ impl Prepared {
         match call {
             Call::Evaluate(question) => client.evaluate_bytes(&self.scene, question, &[Measure::Distance]).await,
             Call::States(question) => client.check_states_bytes(&self.scene, question).await,
+            Call::Recorded(recorded) => client.raw(&recorded.call, recorded.message.clone()).await,
         }
     }
 
@@ -317,11 +366,14 @@ fn begin(
 impl Prepared {
     /// A call for a number in (0, 1].
     fn chosen(&self, random: f64) -> &Call {
-        let total = self.calls.last().map_or(1.0, |(sum, _)| *sum);
+        let total = self.calls.last().map_or(1.0, |kind| kind.sum);
         let at = random * total;
-        let kind = self.calls.iter().position(|(sum, _)| at <= *sum).unwrap_or(0);
-        let (sum, variants) = &self.calls[kind];
-        let before = if kind == 0 { 0.0 } else { self.calls[kind - 1].0 };
+        let kind = self.calls.iter().position(|kind| at <= kind.sum).unwrap_or(0);
+        let Kind { sum, variants, next } = &self.calls[kind];
+        if let Some(next) = next {
+            return &variants[next.fetch_add(1, Ordering::Relaxed) % variants.len()];
+        }
+        let before = if kind == 0 { 0.0 } else { self.calls[kind - 1].sum };
         let within = (at - before) / (sum - before);
         &variants[((within * variants.len() as f64) as usize).min(variants.len() - 1)]
     }

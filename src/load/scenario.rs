@@ -51,6 +51,15 @@ pub enum Share {
         #[serde(default = "weight")]
         weight: f64,
     },
+    /// Calls of a recording, in their order and again from the beginning; the server has the scenes
+    /// that they name.
+    Recorded {
+        /// The recording.
+        file: PathBuf,
+        /// How often, beside the others.
+        #[serde(default = "weight")]
+        weight: f64,
+    },
 }
 
 fn objects() -> usize {
@@ -69,7 +78,7 @@ fn weight() -> f64 {
 #[derive(Debug, thiserror::Error)]
 pub enum ScenarioError {
     /// The file cannot be read.
-    #[error("{}: {source}; name a file of a scenario, or one of pairs, within, states, mixed", path.display())]
+    #[error("{}: {source}; name a file of a scenario, or one of pair, pairs, within, states, mixed", path.display())]
     File {
         /// The file.
         path: PathBuf,
@@ -90,7 +99,10 @@ impl Share {
     /// How often, beside the others.
     pub(super) fn weight(&self) -> f64 {
         match self {
-            Self::Pairs { weight, .. } | Self::Within { weight, .. } | Self::States { weight, .. } => *weight,
+            Self::Pairs { weight, .. }
+            | Self::Within { weight, .. }
+            | Self::States { weight, .. }
+            | Self::Recorded { weight, .. } => *weight,
         }
     }
 }
@@ -110,6 +122,11 @@ impl Scenario {
                 "pose_rate_hz = 100\n\
                  calls = [{ kind = \"pairs\", pairs = 1, weight = 6 }, { kind = \"within\", margin_m = 0.05, weight = 3 }, \
                  { kind = \"states\", states = 50, moving = 11 }]"
+            }
+            // The messages of `sublevel record`.
+            path if Path::new(path).extension().is_some_and(|extension| extension == "jsonl") => {
+                let calls = vec![Share::Recorded { file: path.into(), weight: weight() }];
+                return Ok(Self { objects: 2, reach_m: reach_m(), calls, pose_rate_hz: 0.0 });
             }
             path => {
                 let path = Path::new(path);
@@ -154,7 +171,7 @@ impl Scenario {
                 Share::Within { margin_m, .. } if !(0.0..=1e6).contains(margin_m) => {
                     return Err(format!("calls[{index}].margin_m is {margin_m}; give metres, at least 0"));
                 }
-                Share::Within { .. } => {}
+                Share::Within { .. } | Share::Recorded { .. } => {}
                 Share::States { states, moving, .. } => {
                     between(&format!("calls[{index}].moving"), *moving, 1, self.objects)?;
                     between(&format!("calls[{index}].states"), *states, 1, 60_000 / moving)?;

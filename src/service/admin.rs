@@ -10,6 +10,7 @@ use axum::routing::get;
 use tokio::net::TcpListener;
 use tokio::sync::watch;
 
+use super::admin_listener::AdminListener;
 use super::metrics::Metrics;
 use crate::store::{Catalogue, Counts};
 
@@ -35,7 +36,7 @@ pub(super) async fn serve(listener: TcpListener, admin: Admin) {
         .route("/readyz", get(ready))
         .route("/metrics", get(metrics))
         .with_state(admin);
-    if let Err(error) = axum::serve(listener, routes).await {
+    if let Err(error) = axum::serve(AdminListener::new(listener), routes).await {
         tracing::error!(%error, "probes and metrics are no longer answered");
     }
 }

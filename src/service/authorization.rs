@@ -19,23 +19,61 @@ const OPEN: &str = "/grpc.health.v1.Health/";
 pub(super) struct Authorization(pub(super) Option<watch::Receiver<Arc<Tokens>>>);
 
 impl Authorization {
-    /// Name of the token that a call shows; none where it needs none.
+    /// Who makes a call.
     ///
     /// # Errors
     /// UNAUTHENTICATED or PERMISSION_DENIED.
-    pub(super) fn check(&self, request: &http::Request<Body>) -> Result<Option<String>, Status> {
+    pub(super) fn check(&self, request: &http::Request<Body>) -> Result<Admission, Status> {
         let path = request.uri().path();
-        let Some(tokens) = self.0.as_ref().filter(|_| !path.starts_with(OPEN)) else { return Ok(None) };
-        let shown = request.headers().get(http::header::AUTHORIZATION).map(http::HeaderValue::as_bytes);
-        let tokens = tokens.borrow();
-        let (name, role) = shown
-            .and_then(|shown| shown.strip_prefix(b"Bearer ").or_else(|| shown.strip_prefix(b"bearer ")))
-            .and_then(|token| tokens.find(token))
-            .ok_or_else(|| error::unauthenticated(shown.is_some()))?;
-        let needed = calls::needed(path);
-        if role < needed {
-            return Err(error::permission_denied(path, name, needed));
+        let Some(tokens) = self.0.as_ref().filter(|_| !path.starts_with(OPEN)) else { return Ok(Admission(None)) };
+        let shown = request.headers().get(http::header::AUTHORIZATION);
+        let name = permitted(&tokens.borrow(), shown, path)?;
+        let (tokens, shown, path) = (tokens.clone(), shown.cloned(), path.to_owned());
+        Ok(Admission(Some(Shown { name, tokens, shown, path })))
+    }
+}
+
+/// Name of the token that a call shows.
+fn permitted(tokens: &Tokens, shown: Option<&http::HeaderValue>, path: &str) -> Result<String, Status> {
+    let shown = shown.map(http::HeaderValue::as_bytes);
+    let (name, role) = shown
+        .and_then(|shown| shown.strip_prefix(b"Bearer ").or_else(|| shown.strip_prefix(b"bearer ")))
+        .and_then(|token| tokens.find(token))
+        .ok_or_else(|| error::unauthenticated(shown.is_some()))?;
+    let needed = calls::needed(path);
+    if role < needed { Err(error::permission_denied(path, name, needed)) } else { Ok(name.to_owned()) }
+}
+
+/// A call that may go on, as long as its token stays.
+#[derive(Debug)]
+pub(super) struct Admission(Option<Shown>);
+
+#[derive(Debug)]
+struct Shown {
+    name: String,
+    tokens: watch::Receiver<Arc<Tokens>>,
+    shown: Option<http::HeaderValue>,
+    path: String,
+}
+
+impl Admission {
+    /// Name of the token; none where none is needed.
+    pub(super) fn client(&self) -> Option<&str> {
+        self.0.as_ref().map(|shown| shown.name.as_str())
+    }
+
+    /// Waits until the token is not good for the call any more, and says why; for ever where none
+    /// is needed.
+    pub(super) async fn revoked(self) -> Status {
+        let Some(Shown { mut tokens, shown, path, .. }) = self.0 else { return std::future::pending().await };
+        loop {
+            if let Err(status) = permitted(&tokens.borrow_and_update(), shown.as_ref(), &path) {
+                return status;
+            }
+            // Ends with the server only.
+            if tokens.changed().await.is_err() {
+                return std::future::pending().await;
+            }
         }
-        Ok(Some(name.to_owned()))
     }
 }

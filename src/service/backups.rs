@@ -1,12 +1,13 @@
 //! Backup: the catalogue as one file, in pieces.
 
 use std::io::Read;
+use std::time::Duration;
 
 use sha2::{Digest, Sha256};
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, watch};
 use tonic::Status;
 
-use super::app_state::AppState;
+use super::app_state::{AppState, stopped};
 use super::proto::BackupResponse;
 use super::{error, tokens};
 use crate::store::BACKUP_PREFIX;
@@ -14,9 +15,12 @@ use crate::store::BACKUP_PREFIX;
 /// Bytes of a piece.
 const PIECE_BYTES: usize = 1 << 20;
 
+/// Longest time that a client takes for a piece.
+const PIECE_PATIENCE: Duration = Duration::from_secs(30);
+
 /// Sends a copy of the catalogue, whose hash ends it; one at a time.
 pub(super) async fn run(app: AppState, pieces: mpsc::Sender<Result<BackupResponse, Status>>) {
-    let (sender, of) = (pieces.clone(), app.clone());
+    let (sender, of, stopping) = (pieces.clone(), app.clone(), app.stopping());
     let made = async {
         let catalogue = app.catalogue().await?;
         let work = move || -> Result<(), Status> {
@@ -39,14 +43,13 @@ pub(super) async fn run(app: AppState, pieces: mpsc::Sender<Result<BackupRespons
                 if data.is_empty() {
                     let sha256 = tokens::hex(&hash.finalize().into());
                     let last = BackupResponse { data: Vec::new().into(), total_bytes, sha256 };
-                    // The client is gone.
-                    let _ = sender.blocking_send(Ok(last));
-                    return Ok(());
+                    return send(&sender, last, &stopping);
                 }
                 hash.update(&data);
                 total_bytes += data.len() as u64;
                 let piece = BackupResponse { data: data.into(), ..BackupResponse::default() };
-                if sender.blocking_send(Ok(piece)).is_err() {
+                send(&sender, piece, &stopping)?;
+                if sender.is_closed() {
                     return Ok(());
                 }
             }
@@ -56,4 +59,25 @@ pub(super) async fn run(app: AppState, pieces: mpsc::Sender<Result<BackupRespons
     if let Err(status) = made.await {
         let _ = pieces.send(Err(status)).await;
     }
+}
+
+/// Waits for the client to take the pieces before, as long as it is not too slow for the next
+/// backup and the server does not stop.
+fn send(
+    pieces: &mpsc::Sender<Result<BackupResponse, Status>>,
+    piece: BackupResponse,
+    stopping: &watch::Receiver<bool>,
+) -> Result<(), Status> {
+    let mut stopping = stopping.clone();
+    let sending = async {
+        tokio::select! {
+            // The client is gone if it cannot be sent.
+            sent = tokio::time::timeout(PIECE_PATIENCE, pieces.send(Ok(piece))) => match sent {
+                Ok(_) => Ok(()),
+                Err(_) => Err(error::not_read(PIECE_PATIENCE)),
+            },
+            () = stopped(&mut stopping) => Err(error::unavailable("STOPPING", "the server is stopping; ask again")),
+        }
+    };
+    tokio::runtime::Handle::current().block_on(sending)
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::task::{Context, Poll};
-use std::time::{Instant, SystemTime, UNIX_EPOCH};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use tonic::body::Body;
 use tonic::codegen::{BoxFuture, Service, http};
@@ -11,6 +11,7 @@ use tonic::{Code, Status};
 use tower::Layer;
 use tracing::Instrument;
 
+use super::answer_body::{AnswerBody, Ending, Revoked, name};
 use super::authorization::Authorization;
 use super::calls;
 use super::metrics::Metrics;
@@ -83,70 +84,38 @@ where
     }
 
     fn call(&mut self, request: http::Request<Body>) -> Self::Future {
-        let (open, metrics) = (self.layer.metrics.begun(), self.layer.metrics.clone());
-        let (id, call) = (self.layer.id(&request), calls::label(request.uri().path()));
+        let (id, path) = (self.layer.id(&request), request.uri().path());
+        let (call, is_stream) = (calls::label(path), calls::is_stream(path));
+        let ending = Ending::new(self.layer.metrics.clone(), call);
         let span = tracing::info_span!("call", id = id.to_str().unwrap_or_default(), call);
-        let ending = Ending { metrics, call, start: Instant::now(), code: "CANCELLED" };
-        let answering = self.layer.authorization.check(&request).map(|client| (client, self.inner.call(request)));
+        let answering = self.layer.authorization.check(&request).map(|admission| (admission, self.inner.call(request)));
         let answered = async move {
             // Whole, so that it ends with the call.
             let mut ending = ending;
-            let mut response = match answering {
-                Ok((client, answering)) => {
-                    tracing::trace!(client, "begun");
-                    answering.await?
+            let (mut response, admission) = match answering {
+                Ok((admission, answering)) => {
+                    tracing::trace!(client = admission.client(), "begun");
+                    (answering.await?, Some(admission))
                 }
-                Err(status) => status.into_http(),
+                Err(status) => (status.into_http(), None),
             };
-            let status = Status::from_header_map(response.headers());
-            let code = status.as_ref().map_or(Code::Ok, Status::code);
-            let took = ending.start.elapsed();
-            ending.code = name(code);
-            match status.filter(|status| status.code() != Code::Ok) {
-                Some(status) => tracing::debug!(code = name(code), ?took, why = status.message(), "refused"),
-                None => tracing::debug!(code = name(code), ?took, "answered"),
-            }
             response.headers_mut().insert(REQUEST_ID, id);
-            drop(open);
-            Ok(response)
+            let took = ending.begun().elapsed();
+            let status = Status::from_header_map(response.headers());
+            match status.filter(|status| status.code() != Code::Ok) {
+                Some(status) => {
+                    ending.code = status.code();
+                    tracing::debug!(code = name(status.code()), ?took, why = status.message(), "refused");
+                    Ok(response)
+                }
+                None => {
+                    tracing::debug!(code = "OK", ?took, "answered");
+                    let revoked =
+                        admission.filter(|_| is_stream).map(|admission| -> Revoked { Box::pin(admission.revoked()) });
+                    Ok(response.map(|body| Body::new(AnswerBody::new(body, ending, revoked))))
+                }
+            }
         };
         Box::pin(answered.instrument(span))
-    }
-}
-
-/// Counts a call when it is dropped: as cancelled unless it was answered before.
-struct Ending {
-    metrics: Metrics,
-    call: &'static str,
-    start: Instant,
-    code: &'static str,
-}
-
-impl Drop for Ending {
-    fn drop(&mut self) {
-        self.metrics.ended(self.call, self.code, self.start.elapsed());
-    }
-}
-
-/// A code as gRPC writes it.
-fn name(code: Code) -> &'static str {
-    match code {
-        Code::Ok => "OK",
-        Code::Cancelled => "CANCELLED",
-        Code::Unknown => "UNKNOWN",
-        Code::InvalidArgument => "INVALID_ARGUMENT",
-        Code::DeadlineExceeded => "DEADLINE_EXCEEDED",
-        Code::NotFound => "NOT_FOUND",
-        Code::AlreadyExists => "ALREADY_EXISTS",
-        Code::PermissionDenied => "PERMISSION_DENIED",
-        Code::ResourceExhausted => "RESOURCE_EXHAUSTED",
-        Code::FailedPrecondition => "FAILED_PRECONDITION",
-        Code::Aborted => "ABORTED",
-        Code::OutOfRange => "OUT_OF_RANGE",
-        Code::Unimplemented => "UNIMPLEMENTED",
-        Code::Internal => "INTERNAL",
-        Code::Unavailable => "UNAVAILABLE",
-        Code::DataLoss => "DATA_LOSS",
-        Code::Unauthenticated => "UNAUTHENTICATED",
     }
 }

@@ -44,6 +44,22 @@ pub(super) fn needed(path: &str) -> Role {
     CALLS.iter().find(|(name, _)| *name == call).map_or(Role::Admin, |(_, role)| *role)
 }
 
+/// Calls whose messages come one after the other for as long as somebody likes.
+const STREAMS: [&str; 6] = [
+    "JobService/WatchJob",
+    "QueryService/EvaluateStream",
+    "QueryService/Watch",
+    "SceneService/StreamPoses",
+    "SceneService/WatchScene",
+    "ServerService/Backup",
+];
+
+/// Whether messages of a call may come long after its beginning; what is no call of ours may be.
+pub(super) fn is_stream(path: &str) -> bool {
+    let call = path.strip_prefix(PACKAGE);
+    call.is_none_or(|call| STREAMS.contains(&call))
+}
+
 /// What a call is counted under: one name for all that are none of ours, which may be anything.
 pub(super) fn label(path: &str) -> &'static str {
     let known = path.strip_prefix(PACKAGE).and_then(|call| CALLS.iter().find(|(name, _)| *name == call));
@@ -62,10 +78,19 @@ mod tests {
         let files = FileDescriptorSet::decode(FILE_DESCRIPTOR_SET).expect("descriptors").file;
         let ours = files.iter().filter(|file| file.package() == "sublevel.v1");
         let mut calls: Vec<String> = ours
+            .clone()
             .flat_map(|file| &file.service)
             .flat_map(|service| service.method.iter().map(|method| format!("{}/{}", service.name(), method.name())))
             .collect();
         calls.sort();
+        let streams = ours.clone().flat_map(|file| &file.service).flat_map(|service| {
+            let streams = service.method.iter().filter(|method| method.client_streaming() || method.server_streaming());
+            streams.map(|method| format!("/sublevel.v1.{}/{}", service.name(), method.name()))
+        });
+        let mut streams: Vec<_> = streams.collect();
+        streams.sort();
+        assert_eq!(streams, STREAMS.map(|call| format!("{PACKAGE}{call}")));
+        assert!(!is_stream("/sublevel.v1.QueryService/Evaluate"));
         assert_eq!(CALLS.map(|(call, _)| call.to_owned()).to_vec(), calls);
         assert_eq!(needed("/sublevel.v1.SceneService/UpdateScene"), Role::Write);
         assert_eq!(needed("/sublevel.v1.SceneService/Unknown"), Role::Admin);

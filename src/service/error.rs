@@ -173,7 +173,15 @@ pub(super) fn unavailable(reason: &str, message: &str) -> Status {
 
 /// DEADLINE_EXCEEDED: a call that was too much, or whose message did not come.
 pub(super) fn too_slow(limit: Duration) -> Status {
-    let message = format!("the call was not read and answered within {} s; ask for less in one call", limit.as_secs());
+    too_long(format!("the call was not read and answered within {} s; ask for less in one call", limit.as_secs()))
+}
+
+/// DEADLINE_EXCEEDED: a piece of an answer that its client did not read.
+pub(super) fn not_read(limit: Duration) -> Status {
+    too_long(format!("the client read nothing for {} s; ask again on a better connection", limit.as_secs()))
+}
+
+fn too_long(message: String) -> Status {
     Status::with_error_details(Code::DeadlineExceeded, message, details("CALL_TOO_LONG"))
 }
 

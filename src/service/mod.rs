@@ -10,6 +10,8 @@
 //! stopped.
 
 mod admin;
+mod admin_listener;
+mod answer_body;
 mod app_state;
 mod authorization;
 mod backups;
@@ -28,6 +30,8 @@ mod contact_watch;
 mod error;
 #[cfg(feature = "fit")]
 pub(crate) mod fits;
+#[cfg(fuzzing)]
+pub mod fuzzing;
 mod incoming;
 #[cfg(feature = "fit")]
 mod jobs;
@@ -46,6 +50,7 @@ mod server;
 mod server_info;
 mod tls;
 pub(crate) mod tokens;
+mod watched_files;
 pub(crate) mod wire;
 
 pub use config::Config;

@@ -105,13 +105,18 @@ impl Server {
     /// catalogue that is in use or cannot be opened.
     pub async fn bind(config: Config) -> Result<Self, ServeError> {
         config.check()?;
+        config.simd.apply();
         let tls = config.tls.clone().map(tls::certificates).transpose()?;
         let tokens = config.tokens.clone().map(tokens::tokens).transpose()?;
         let (listener, addr) = bind(config.listen).await?;
         let admin = match config.admin {
             Some(addr) => {
                 let (listener, addr) = bind(addr).await?;
-                tracing::info!(%addr, "probes and metrics");
+                if addr.ip().is_loopback() {
+                    tracing::info!(%addr, "probes and metrics");
+                } else {
+                    tracing::warn!(%addr, "probes and metrics, for everybody who reaches this address");
+                }
                 Some(listener)
             }
             None => None,

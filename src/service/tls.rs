@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Duration;
 
 use tokio::sync::watch;
 use tokio_rustls::rustls::crypto::ring;
@@ -12,9 +11,7 @@ use tokio_rustls::rustls::server::WebPkiClientVerifier;
 use tokio_rustls::rustls::{self, RootCertStore, ServerConfig};
 
 use super::config::TlsConfig;
-
-/// How often the files are looked at.
-const LOOK_EVERY: Duration = Duration::from_secs(1);
+use super::watched_files::watched;
 
 /// Why certificates cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -43,35 +40,9 @@ pub(super) type Current = watch::Receiver<Arc<ServerConfig>>;
 /// # Errors
 /// Files that cannot be used at the start.
 pub(super) fn certificates(files: TlsConfig) -> Result<Current, TlsError> {
-    let (sender, current) = watch::channel(Arc::new(read(&files)?));
-    tokio::spawn(async move {
-        let mut known = contents(&files).await;
-        while !sender.is_closed() {
-            tokio::time::sleep(LOOK_EVERY).await;
-            let now = contents(&files).await;
-            if now == known {
-                continue;
-            }
-            match read(&files) {
-                Ok(config) => {
-                    sender.send_replace(Arc::new(config));
-                    tracing::info!("certificates have changed and are used from now on");
-                }
-                Err(error) => tracing::error!(%error, "certificates have changed and the earlier ones stay"),
-            }
-            known = now;
-        }
-    });
-    Ok(current)
-}
-
-/// Bytes of all files; none of one that cannot be read.
-async fn contents(files: &TlsConfig) -> Vec<Option<Vec<u8>>> {
-    let mut contents = Vec::new();
-    for path in [Some(&files.certificate), Some(&files.key), files.client_ca.as_ref()].into_iter().flatten() {
-        contents.push(tokio::fs::read(path).await.ok());
-    }
-    contents
+    let paths = [Some(&files.certificate), Some(&files.key), files.client_ca.as_ref()];
+    let paths = paths.into_iter().flatten().cloned().collect();
+    watched("certificates", paths, move || read(&files))
 }
 
 fn read(files: &TlsConfig) -> Result<ServerConfig, TlsError> {

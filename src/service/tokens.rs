@@ -3,15 +3,13 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use subtle::ConstantTimeEq;
 use tokio::sync::watch;
 
-/// How often the file is looked at.
-const LOOK_EVERY: Duration = Duration::from_secs(1);
+use super::watched_files::watched;
 
 /// What a token allows; each role includes those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -101,7 +99,7 @@ impl Tokens {
         Self::parse(&text).map_err(|why| TokensError::Content { path: path.to_owned(), why })
     }
 
-    fn parse(text: &str) -> Result<Self, String> {
+    pub(super) fn parse(text: &str) -> Result<Self, String> {
         let file: TokensFile = toml::from_str(text).map_err(|error| error.message().to_owned())?;
         let mut tokens: Vec<Token> = Vec::new();
         for (index, TokenEntry { name, role, sha256 }) in file.token.into_iter().enumerate() {
@@ -137,26 +135,7 @@ impl Tokens {
 /// # Errors
 /// A file that cannot be used at the start.
 pub(super) fn tokens(path: PathBuf) -> Result<watch::Receiver<Arc<Tokens>>, TokensError> {
-    let (sender, current) = watch::channel(Arc::new(Tokens::read(&path)?));
-    tokio::spawn(async move {
-        let mut known = tokio::fs::read(&path).await.ok();
-        while !sender.is_closed() {
-            tokio::time::sleep(LOOK_EVERY).await;
-            let now = tokio::fs::read(&path).await.ok();
-            if now == known {
-                continue;
-            }
-            match Tokens::read(&path) {
-                Ok(tokens) => {
-                    tracing::info!(count = tokens.0.len(), "tokens have changed and are used from now on");
-                    sender.send_replace(Arc::new(tokens));
-                }
-                Err(error) => tracing::error!(%error, "tokens have changed and the earlier ones stay"),
-            }
-            known = now;
-        }
-    });
-    Ok(current)
+    watched("tokens", vec![path.clone()], move || Tokens::read(&path))
 }
 
 /// A hash in lowercase hexadecimal digits.

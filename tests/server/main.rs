@@ -12,6 +12,7 @@ mod lifecycle;
 mod load;
 mod open_loop;
 mod operation;
+mod operations_page;
 mod readme;
 mod refusals;
 mod streams;

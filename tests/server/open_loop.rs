@@ -4,6 +4,9 @@ use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
 use serde_json::Value;
+use sublevel::client::{Question, StatesQuestion};
+use sublevel::measure::Pose;
+use sublevel::scene::query::Measure;
 
 use crate::harness::Running;
 
@@ -83,4 +86,53 @@ fn what_cannot_be_measured_is_refused_with_the_remedy() {
         let said = String::from_utf8(output.stderr).expect("text");
         assert!(!output.status.success() && said.contains(words), "{arguments:?}: {said}");
     }
+}
+
+/// What a client asks through the recorder is answered, and can be asked again.
+#[tokio::test(flavor = "multi_thread")]
+async fn recorded_calls_are_asked_again() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(&dir.path().join("data"));
+    let direct = server.client().await;
+    let body = direct.create_ball("ball", 0.1).await.expect("stored");
+    direct.create_scene("cell").await.expect("made");
+    let at = |x: f64| Pose::from_quaternion([x, 0.0, 0.0].into(), [0.0, 0.0, 0.0, 1.0]).expect("a pose");
+    direct.put_objects("cell", [("a", &body, at(0.0)), ("b", &body, at(1.0))]).await.expect("placed");
+
+    let (recording, json) = (dir.path().join("calls.jsonl"), dir.path().join("load.json"));
+    let mut record = Command::new(env!("CARGO_BIN_EXE_sublevel"));
+    record.args(["record", "--server", &server.url(), "--listen", "127.0.0.1:0", "--out"]).arg(&recording);
+    let mut recorder = {
+        record.stdin(Stdio::null()).stdout(Stdio::piped());
+        Running::spawn(record)
+    };
+    let client = recorder.client().await;
+    for x in [0.5, 0.7, 0.9] {
+        client.set_poses("cell", [("b", at(x))]).await.expect("passed on");
+        let pairs = Question::pairs([("a", "b")]);
+        let answers = client.evaluate("cell", pairs, &[Measure::Distance]).await.expect("an answer");
+        assert!((answers.rows[0].value.expect("a value") - (x - 0.2)).abs() < 1e-7);
+    }
+    let states = StatesQuestion::new(["a"]).with_states(&[at(0.0), at(9.0)]);
+    client.check_states("cell", states).await.expect("verdicts");
+    client.scene("nowhere").await.expect_err("a refusal passes, too");
+    recorder.interrupt();
+    assert!(recorder.wait().success());
+    assert_eq!(std::fs::read_to_string(&recording).expect("written").lines().count(), 4);
+
+    let name = recording.to_str().expect("text");
+    let output = load(&server.url(), &[name, "--rate", "100", "--duration", "0.5", "--warmup", "0"])
+        .arg("--json")
+        .arg(&json)
+        .output();
+    let report = read(&output.expect("it runs"), &json);
+    let of = &report["server"][0];
+    assert!(of["errors"].as_object().expect("codes").is_empty() && of["due"].as_u64().expect("a number") > 20, "{of}");
+    assert_eq!(direct.list_scenes().await.expect("a list").len(), 1, "load has removed its own");
+
+    let there = Command::new(env!("CARGO_BIN_EXE_sublevel")).args(["record", "--out", name]).output().expect("it runs");
+    assert!(String::from_utf8_lossy(&there.stderr).contains("choose another --out"));
+    std::fs::write(&recording, "{}\n").expect("written");
+    let refused = load(&server.url(), &[name]).output().expect("it runs");
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("line 1 is no call"));
 }

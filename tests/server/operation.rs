@@ -148,7 +148,7 @@ async fn tokens_allow_what_their_role_says_and_can_be_changed() {
     let nobody = Client::connect(&server.url()).await.expect("connected");
     let refused = nobody.list_scenes().await.expect_err("no token");
     assert_eq!((refused.code(), refused.reason().as_deref()), (Some(Code::Unauthenticated), Some("TOKEN_MISSING")));
-    assert!(nobody.health().await.expect("probes need no token"));
+    eventually(async || nobody.health().await.expect("probes need no token")).await;
     for wrong in ["", "x", &reader[1..], &reader.to_uppercase(), &"f".repeat(64)] {
         let refused = connect(wrong).await.list_scenes().await.expect_err(wrong);
         assert_eq!((refused.code(), refused.reason().as_deref()), (Some(Code::Unauthenticated), Some("TOKEN_UNKNOWN")));
@@ -160,6 +160,7 @@ async fn tokens_allow_what_their_role_says_and_can_be_changed() {
     assert!(refused.to_string().contains("write") && refused.to_string().contains("planner"), "{refused}");
     connect(&writer).await.create_scene("cell").await.expect("allowed");
 
+    let mut poses = connect(&writer).await.stream_poses("cell", []).await.expect("a stream");
     // A token that is gone is refused, a new one is taken; nonsense changes nothing.
     std::fs::write(&file, "token = 7").expect("written");
     tokio::time::sleep(Duration::from_millis(2500)).await;
@@ -169,6 +170,14 @@ async fn tokens_allow_what_their_role_says_and_can_be_changed() {
     eventually(async || connect(&fresh).await.list_scenes().await.is_ok()).await;
     let refused = reading.list_scenes().await.expect_err("revoked");
     assert_eq!(refused.code(), Some(Code::Unauthenticated));
+    // So do streams that were open.
+    let ended = loop {
+        match poses.next().await {
+            Ok(said) => assert!(said.is_some(), "it ended without a reason"),
+            Err(error) => break error,
+        }
+    };
+    assert_eq!((ended.code(), ended.reason().as_deref()), (Some(Code::Unauthenticated), Some("TOKEN_UNKNOWN")));
 }
 
 /// A page of the admin listener: status and text.
@@ -315,15 +324,17 @@ fn settings_come_from_file_environment_and_flags() {
     let print = |variables: &[(&str, &str)], flags: &[&str]| {
         let mut serve = Command::new(env!("CARGO_BIN_EXE_sublevel"));
         serve.args(["serve", "--print-config", "--config"]).arg(&file).args(flags);
-        serve.env_remove("RUST_LOG").envs(variables.iter().copied()).stdin(Stdio::null());
+        serve.env_remove("RUST_LOG").env_remove("SUBLEVEL_SIMD").envs(variables.iter().copied()).stdin(Stdio::null());
         serve.output().expect("it runs")
     };
     let shown = |output: Output| String::from_utf8(output.stdout).expect("text");
     let of_file = shown(print(&[], &[]));
     assert!(of_file.contains("listen = \"127.0.0.1:7001\"") && of_file.contains("calls = 7"), "{of_file}");
-    let variables = [("SUBLEVEL_SERVER_LIMITS__CALLS", "8"), ("RUST_LOG", "debug")];
+    let variables = [("SUBLEVEL_SERVER_LIMITS__CALLS", "8"), ("RUST_LOG", "debug"), ("SUBLEVEL_SIMD", "baseline")];
     let of_environment = shown(print(&variables, &["--listen", "127.0.0.1:7003"]));
-    for line in ["listen = \"127.0.0.1:7003\"", "calls = 8", "queue_ms = 70", "filter = \"debug\""] {
+    for line in
+        ["listen = \"127.0.0.1:7003\"", "calls = 8", "queue_ms = 70", "filter = \"debug\"", "simd = \"baseline\""]
+    {
         assert!(of_environment.contains(line), "{line}: {of_environment}");
     }
     // What is printed can be read again.
@@ -333,6 +344,7 @@ fn settings_come_from_file_environment_and_flags() {
         (&[("SUBLEVEL_SERVER_LISEN", "x")][..], &[][..], "SUBLEVEL_SERVER_LISEN"),
         (&[("SUBLEVEL_SERVER_LIMITS__CALLS", "many")], &[], "SUBLEVEL_SERVER_LIMITS__CALLS"),
         (&[("SUBLEVEL_SERVER_LIMITS__CALLS", "0")], &[], "limits.calls is 0"),
+        (&[("SUBLEVEL_SIMD", "avx3")], &[], "simd: "),
         (&[], &["--listen", "0.0.0.0:1"], "--insecure"),
         (&[("SUBLEVEL_SERVER_TLS__KEY", "k")], &[], "certificate"),
     ] {

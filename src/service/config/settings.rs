@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::ConfigError;
 use super::limits::LimitsConfig;
+use crate::polynomial::{SimdLimit, limit_simd};
 
 /// What a server is run with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,6 +28,8 @@ pub struct Config {
     /// Certificates; none: connections are not encrypted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tls: Option<TlsConfig>,
+    /// Widest instructions that queries use, to compare them.
+    pub simd: SimdConfig,
     /// What is logged, and how.
     pub log: LogConfig,
     /// Limits of connections and calls.
@@ -44,6 +47,29 @@ pub struct TlsConfig {
     /// Roots of the certificates that clients have to show; none: clients need none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub client_ca: Option<PathBuf>,
+}
+
+/// Widest instructions that queries use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SimdConfig {
+    /// The widest of the processor.
+    Auto,
+    /// AVX2 at most.
+    Avx2,
+    /// What every processor has.
+    Baseline,
+}
+
+impl SimdConfig {
+    /// Bounds the arithmetic of this process.
+    pub(in crate::service) fn apply(self) {
+        match self {
+            Self::Auto => {}
+            Self::Avx2 => limit_simd(SimdLimit::Avx2),
+            Self::Baseline => limit_simd(SimdLimit::Baseline),
+        }
+    }
 }
 
 /// What is logged, and how.
@@ -76,6 +102,7 @@ impl Default for Config {
             admin: None,
             tokens: None,
             tls: None,
+            simd: SimdConfig::Auto,
             log: LogConfig::default(),
             limits: LimitsConfig::default(),
         }

@@ -74,6 +74,9 @@ impl Config {
         if let Ok(filter) = std::env::var("RUST_LOG") {
             sources = sources.merge(("log.filter", filter));
         }
+        if let Ok(simd) = std::env::var("SUBLEVEL_SIMD") {
+            sources = sources.merge(("simd", simd));
+        }
         sources = sources.merge(Env::prefixed(ENVIRONMENT).split("__"));
         let config: Self =
             sources.merge(Serialized::globals(flags)).extract().map_err(|error| explained(&error, file))?;

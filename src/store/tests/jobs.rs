@@ -24,7 +24,7 @@ fn points() -> Vec<Vector3<f64>> {
     vec![Vector3::new(0.1, -0.0, f64::MIN_POSITIVE / 3.0), Vector3::new(1.0 / 3.0, f64::MAX, -1e-300)]
 }
 
-fn job(request_id: &str) -> NewJob {
+pub(super) fn job(request_id: &str) -> NewJob {
     NewJob::new(request_id.into(), request("it"), &points(), &CORNERS)
 }
 

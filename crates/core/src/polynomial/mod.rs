@@ -39,7 +39,7 @@ pub use monomial::{Exponents, degree_of, monomials, position};
 pub use norm_power::NormPower;
 pub use ray_intervals::Chords;
 pub use rounding::{Growth, gamma};
-pub use simd::{Arch, Scalar, Simd, WithSimd, dispatch, dispatch_lanes, widest};
+pub use simd::{Arch, Scalar, Simd, SimdLimit, WithSimd, dispatch, dispatch_lanes, limit_simd, widest};
 pub use simd_real::{Constant, Number, Schemes};
 pub use sos_gram::SosGram;
 pub use substitution::Substitution;

@@ -5,17 +5,41 @@
 //! inlined into it to profit. Results differ between the versions only within the rounding bounds,
 //! which count the roundings of the plain one.
 
-use std::sync::LazyLock;
+use std::sync::{LazyLock, OnceLock};
 
 pub use pulp::{Arch, Scalar, Simd, WithSimd};
 
-/// The widest arithmetic of this processor, or less if the environment variable `SUBLEVEL_SIMD`
-/// asks for `avx2` or `baseline`, to compare them. Any other value is as none.
-static WIDEST: LazyLock<Arch> = LazyLock::new(|| match std::env::var("SUBLEVEL_SIMD").as_deref() {
-    Ok("baseline") => Arch::Scalar,
-    Ok("avx2") => at_most_avx2(Arch::new()),
-    _ => Arch::new(),
+/// A bound of the arithmetic in use, to compare them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SimdLimit {
+    /// What every processor has.
+    Baseline,
+    /// AVX2 with fused multiply-add at most.
+    Avx2,
+}
+
+/// See [`limit_simd`].
+static LIMIT: OnceLock<SimdLimit> = OnceLock::new();
+
+/// The widest arithmetic of this processor, or less where [`limit_simd`] or the environment
+/// variable `SUBLEVEL_SIMD` (`avx2` or `baseline`; any other value is as none) asks for that.
+static WIDEST: LazyLock<Arch> = LazyLock::new(|| {
+    let limit = LIMIT.get().copied().or_else(|| match std::env::var("SUBLEVEL_SIMD").as_deref() {
+        Ok("baseline") => Some(SimdLimit::Baseline),
+        Ok("avx2") => Some(SimdLimit::Avx2),
+        _ => None,
+    });
+    match limit {
+        None => Arch::new(),
+        Some(SimdLimit::Avx2) => at_most_avx2(Arch::new()),
+        Some(SimdLimit::Baseline) => Arch::Scalar,
+    }
 });
+
+/// Bounds the arithmetic of this process; without effect once anything was computed.
+pub fn limit_simd(limit: SimdLimit) {
+    let _ = LIMIT.set(limit);
+}
 
 /// What [`dispatch`] uses.
 static SUITED: LazyLock<Arch> = LazyLock::new(|| at_most_avx2(*WIDEST));

@@ -1,0 +1,178 @@
+//! What is on disk does not change without a new number: rows of each format as they were written.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use redb::{ReadableTable, TableDefinition, WriteTransaction};
+
+use super::{Disk, at, ball, placed};
+use crate::body::Shape;
+use crate::measure::HalfSpace;
+use crate::scene::{Attach, Geometry, Ladder, NamedHalfSpace, Placement, Subject, Update};
+use crate::store::rows::{BODIES, FORMAT, JOBS, LADDERS, META, OBJECTS, RESERVES, REVISIONS, SCENES};
+use crate::store::{Catalogue, StoreError};
+
+/// Rows of format 3: key and value of each table, values as text.
+const FORMAT_3: &str = include_str!("format_3.json");
+
+type Rows = BTreeMap<String, BTreeMap<String, String>>;
+
+/// Something of every kind.
+fn fill(catalogue: &Catalogue) {
+    let balls = [1.0, 0.75].map(|radius| {
+        let body = ball(radius).with_points(&[Vector3::new(0.5, 0.0, 0.0)]).expect("inside");
+        Arc::new(Shape::Body(Box::new(body)))
+    });
+    let ladder = Ladder::new("ladder", balls.to_vec()).expect("a ladder");
+    catalogue.create_body(Geometry::Ladder(Arc::new(ladder))).expect("stored");
+    let floor =
+        NamedHalfSpace::new("floor", HalfSpace::new(Vector3::z(), 0.0).expect("a half-space")).expect("a floor");
+    catalogue.create_body(Geometry::HalfSpace(Arc::new(floor.clone()))).expect("stored");
+    catalogue.create_body(ball(0.5).into()).expect("stored");
+    catalogue.create_scene("room").expect("made");
+    catalogue.update_scene("room", &placed("o", &ball(0.5))).expect("placed");
+    let held = Placement {
+        name: "held".into(),
+        body: *ball(0.5).id(),
+        pose: Some(at(1.5)),
+        group: "tools".into(),
+        padding_m: None,
+        attachment: None,
+    };
+    let ground = Placement { name: "ground".into(), body: *floor.id(), ..held.clone() };
+    let (object, group) = (|name: &str| Subject::Object(name.into()), Subject::Group("tools".into()));
+    let touch = vec![group.clone()];
+    let update = Update {
+        upserts: vec![held, ground],
+        allow: vec![(object("o"), object("ground"))],
+        group_paddings: vec![("tools".into(), Some(0.01))],
+        pair_paddings: vec![((object("o"), group), Some(0.125))],
+        ..Update::default()
+    };
+    catalogue.update_scene("room", &update).expect("placed");
+    let attach = vec![Attach { name: "held".into(), to: "o".into(), pose: None, touch }];
+    catalogue.update_scene("room", &Update { attach, ..Update::default() }).expect("held");
+    catalogue.create_job(super::jobs::job("request")).expect("queued");
+}
+
+fn text_rows(transaction: &WriteTransaction) -> Rows {
+    let mut rows = Rows::new();
+    for (name, definition) in [("bodies", BODIES), ("ladders", LADDERS), ("scenes", SCENES)] {
+        let table = transaction.open_table(definition).expect("a table");
+        let text = |value: &[u8]| String::from_utf8(value.to_vec()).expect("text");
+        let all = table.iter().expect("rows").map(|row| row.expect("a row"));
+        rows.insert(name.into(), all.map(|(key, value)| (key.value().to_owned(), text(value.value()))).collect());
+    }
+    for (name, definition) in [("meta", META), ("revisions", REVISIONS), ("reserves", RESERVES)] {
+        let table = transaction.open_table(definition).expect("a table");
+        let all = table.iter().expect("rows").map(|row| row.expect("a row"));
+        rows.insert(name.into(), all.map(|(key, value)| (key.value().to_owned(), value.value().to_string())).collect());
+    }
+    let objects = transaction.open_table(OBJECTS).expect("a table");
+    let objects = objects.iter().expect("rows").map(|row| row.expect("a row")).map(|(key, value)| {
+        let (scene, name) = key.value();
+        (format!("{scene}/{name}"), String::from_utf8(value.value().to_vec()).expect("text"))
+    });
+    rows.insert("objects".into(), objects.collect());
+    let jobs = transaction.open_table(JOBS).expect("a table");
+    let jobs = jobs.iter().expect("rows").map(|row| row.expect("a row"));
+    let jobs =
+        jobs.map(|(key, value)| (key.value().to_string(), String::from_utf8(value.value().to_vec()).expect("text")));
+    rows.insert("jobs".into(), jobs.collect());
+    rows
+}
+
+fn write_rows(transaction: &WriteTransaction, rows: &Rows) {
+    let put = |definition: TableDefinition<&str, &[u8]>, name: &str| {
+        let mut table = transaction.open_table(definition).expect("a table");
+        for (key, value) in &rows[name] {
+            table.insert(key.as_str(), value.as_bytes()).expect("written");
+        }
+    };
+    put(BODIES, "bodies");
+    put(LADDERS, "ladders");
+    put(SCENES, "scenes");
+    for (name, definition) in [("meta", META), ("revisions", REVISIONS), ("reserves", RESERVES)] {
+        let mut table = transaction.open_table(definition).expect("a table");
+        for (key, value) in &rows[name] {
+            table.insert(key.as_str(), value.parse::<u64>().expect("a number")).expect("written");
+        }
+    }
+    let mut objects = transaction.open_table(OBJECTS).expect("a table");
+    for (key, value) in &rows["objects"] {
+        objects.insert(key.split_once('/').expect("scene and name"), value.as_bytes()).expect("written");
+    }
+    let mut jobs = transaction.open_table(JOBS).expect("a table");
+    for (key, value) in &rows["jobs"] {
+        jobs.insert(key.parse::<u64>().expect("a number"), value.as_bytes()).expect("written");
+    }
+}
+
+/// `UPDATE_FORMAT=1` writes the rows again, which is right only together with a new number.
+#[test]
+fn rows_are_written_as_format_3_has_them() {
+    let disk = Disk::default();
+    let catalogue = disk.load().expect("a new catalogue");
+    fill(&catalogue);
+    drop(catalogue);
+    let mut written = Rows::new();
+    disk.meddle(|transaction| written = text_rows(transaction));
+    if std::env::var_os("UPDATE_FORMAT").is_some() {
+        let text = serde_json::to_string_pretty(&written).expect("text") + "\n";
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/src/store/tests/format_3.json");
+        std::fs::write(path, text).expect("written");
+        return;
+    }
+    let known: Rows = serde_json::from_str(FORMAT_3).expect("rows");
+    assert_eq!((FORMAT, &written["meta"]), (3, &known["meta"]));
+    for (table, rows) in &known {
+        for (key, row) in rows {
+            assert_eq!(written[table].get(key), Some(row), "{table} {key}: give the format a new number");
+        }
+        assert_eq!(written[table].len(), rows.len(), "{table}");
+    }
+}
+
+#[test]
+fn rows_of_format_3_are_read() {
+    let disk = Disk::default();
+    drop(disk.load().expect("a new catalogue"));
+    let known: Rows = serde_json::from_str(FORMAT_3).expect("rows");
+    disk.meddle(|transaction| write_rows(transaction, &known));
+    let read = disk.load().expect("loads");
+    let whole = Disk::default().load().expect("a new catalogue");
+    fill(&whole);
+    let ids = |catalogue: &Catalogue| catalogue.bodies(None, 99).0.iter().map(|body| *body.id()).collect::<Vec<_>>();
+    assert_eq!(ids(&read), ids(&whole));
+    let [found, made] = [&read, &whole].map(|catalogue| catalogue.scene("room").expect("there"));
+    assert_eq!(found.revision(), made.revision());
+    assert_eq!(found.len(), 3);
+    for (_, object, pose) in made.objects() {
+        let slot = found.slot(&object.name).expect("there");
+        let (other, stands) = (found.object(slot).expect("there"), found.pose(slot).expect("there"));
+        assert_eq!((stands, other.geometry.id(), &other.group), (pose, object.geometry.id(), &object.group));
+        assert_eq!((other.padding_m, &other.attachment), (object.padding_m, &object.attachment));
+    }
+    assert!(found.rules().allowed().eq(made.rules().allowed()));
+    assert!(found.rules().group_paddings().eq(made.rules().group_paddings()));
+    assert!(found.rules().pair_paddings().eq(made.rules().pair_paddings()));
+    assert_eq!(read.job(1).expect("there").request, whole.job(1).expect("there").request);
+}
+
+#[test]
+fn other_formats_are_refused_by_number() {
+    for format in [1, 2, 4, 99] {
+        let disk = Disk::default();
+        drop(disk.load().expect("a new catalogue"));
+        disk.meddle(|transaction| {
+            transaction.open_table(META).expect("a table").insert("format", format).expect("written");
+        });
+        match disk.load() {
+            Err(error @ StoreError::Format { found, expected: FORMAT, .. }) => {
+                assert!(found == format && error.to_string().contains(&format.to_string()), "{error}");
+            }
+            other => panic!("format {format}: {other:?}"),
+        }
+    }
+}
