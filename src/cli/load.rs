@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use super::write_atomically;
 use crate::client::{Client, ClientOptions};
-use crate::load::{Arrivals, LoadOptions, LoadReport, Scenario, connect, echo, measure, prepare};
+use crate::load::{Arrivals, EchoProcess, LoadOptions, LoadReport, Scenario, connect, measure, prepare};
 
 /// Load a running server, and report how long its answers take
 ///
@@ -60,6 +60,12 @@ pub(super) struct LoadArgs {
     /// Do not measure an echo server
     #[arg(long)]
     no_echo: bool,
+    /// Core that the echo server runs on; 'taskset' gives the server and this command theirs
+    #[arg(long, value_name = "CORE")]
+    echo_core: Option<usize>,
+    /// Process id of the server, on this machine: reports how busy it keeps the cores
+    #[arg(long, value_name = "PID")]
+    server_pid: Option<u32>,
     /// File for all numbers
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -146,17 +152,19 @@ async fn measured(
         .then(|| tokio::spawn(prepared.clone().stream(clients[0].clone(), scenario.pose_rate_hz)));
     let mut server = Vec::new();
     for &rate in &args.rate {
-        server.push(measure(prepared, clients, rate, options, &mut shown("server", rate)).await?);
+        server.push(measure(prepared, clients, (rate, args.server_pid), options, &mut shown("server", rate)).await?);
     }
     if let Some(stream) = stream {
         stream.abort();
     }
     let mut of_echo = Vec::new();
     if !args.no_echo {
-        let echo = echo(answer_bytes).await?;
-        let clients = connect(&echo.url(), &ClientOptions::default(), options.connections).await?;
+        let echo = EchoProcess::start(answer_bytes, args.echo_core)
+            .map_err(|error| format!("cannot start the echo server: {error}; leave it out with --no-echo"))?;
+        let clients = connect(echo.url(), &ClientOptions::default(), options.connections).await?;
         for &rate in &args.rate {
-            of_echo.push(measure(prepared, &clients, rate, options, &mut shown("echo", rate)).await?);
+            of_echo
+                .push(measure(prepared, &clients, (rate, Some(echo.pid())), options, &mut shown("echo", rate)).await?);
         }
     }
     Ok(LoadReport {

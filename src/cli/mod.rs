@@ -7,6 +7,7 @@ mod backup;
 mod certify;
 #[cfg(feature = "fit")]
 mod demo;
+mod echo;
 mod files;
 #[cfg(feature = "fit")]
 mod fit;
@@ -67,6 +68,8 @@ enum Command {
     Token(token::TokenArgs),
     Load(load::LoadArgs),
     Record(record::RecordArgs),
+    #[command(hide = true)]
+    Echo(echo::EchoArgs),
     Backup(backup::BackupArgs),
     Restore(backup::RestoreArgs),
 }
@@ -93,6 +96,7 @@ pub fn main() -> ExitCode {
         Command::Token(args) => token::run(&args).map(done),
         Command::Load(args) => load::run(&args).map(done),
         Command::Record(args) => record::run(&args).map(done),
+        Command::Echo(args) => echo::run(&args).map(done),
         Command::Backup(args) => backup::backup(&args).map(done),
         Command::Restore(args) => backup::restore(&args).map(done),
     };

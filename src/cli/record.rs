@@ -55,7 +55,7 @@ pub(super) fn run(args: &RecordArgs) -> Result<(), Box<dyn Error>> {
             }
         };
         let calls = recorder.run(stop).await?;
-        writeln!(io::stdout(), "{}: {calls} calls", args.out.display())?;
+        writeln!(io::stderr(), "{}: {calls} calls", args.out.display())?;
         Ok(())
     })
 }

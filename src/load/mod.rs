@@ -2,7 +2,9 @@
 //! take, and their time counts from then on. A server that stands still is seen, as its clients
 //! would see it.
 
+mod cpu;
 mod echo;
+mod echo_process;
 mod recorder;
 mod recording;
 mod report;
@@ -11,6 +13,7 @@ mod scenario;
 mod schedule;
 
 pub use echo::{Echo, echo};
+pub use echo_process::EchoProcess;
 pub use recorder::Recorder;
 pub use recording::{RecordedCall, RecordingError};
 pub use report::{Latency, LoadReport, RateReport};

@@ -38,6 +38,10 @@ pub struct RateReport {
     pub errors: BTreeMap<String, u64>,
     /// Time from when a call was due to its answer, milliseconds.
     pub latency_ms: Latency,
+    /// Cores that the client kept busy.
+    pub client_cores: Option<f64>,
+    /// Cores that the server kept busy, where its process is known.
+    pub server_cores: Option<f64>,
 }
 
 /// Percentiles, milliseconds; 0 where nothing was answered.
@@ -66,17 +70,24 @@ impl Latency {
 impl LoadReport {
     /// A table for people.
     pub fn table(&self) -> String {
-        let mut text =
-            String::from("target  offered/s  answered/s  p50 ms  p90 ms  p99 ms  p99.9 ms  max ms  errors\n");
+        let mut text = String::from(
+            "target  offered/s  answered/s  p50 ms  p90 ms  p99 ms  p99.9 ms  max ms  cores of server, client  errors\n",
+        );
         for (target, rates) in [("server", &self.server), ("echo", &self.echo)] {
-            for RateReport { offered_per_s, answered_per_s, errors, latency_ms, .. } in rates {
+            for RateReport { offered_per_s, answered_per_s, errors, latency_ms, client_cores, server_cores, .. } in
+                rates
+            {
+                let cores =
+                    [server_cores, client_cores].map(|cores| cores.map_or("-".into(), |cores| format!("{cores:.2}")));
                 let Latency { p50, p90, p99, p99_9, max } = latency_ms;
                 let errors: Vec<String> = errors.iter().map(|(code, count)| format!("{count} {code}")).collect();
                 // Writing to a string cannot fail.
                 let _ = writeln!(
                     text,
                     "{target:<6}  {offered_per_s:>9.0}  {answered_per_s:>10.0}  {p50:>6.2}  {p90:>6.2}  {p99:>6.2}  \
-                     {p99_9:>8.2}  {max:>6.1}  {}",
+                     {p99_9:>8.2}  {max:>6.1}  {:>15}, {:>6}  {}",
+                    cores[0],
+                    cores[1],
                     if errors.is_empty() { "-".to_owned() } else { errors.join(", ") }
                 );
             }

@@ -1,0 +1,35 @@
+//! What processes have worked.
+
+use std::fs;
+
+/// Ticks of a second in /proc, the same on all Linux systems.
+const TICKS_PER_S: f64 = 100.0;
+
+/// Seconds of work of a process on all cores; of this one without an id. None where the system does
+/// not say.
+pub(super) fn cpu_s(pid: Option<u32>) -> Option<f64> {
+    let who = pid.map_or_else(|| "self".to_owned(), |pid| pid.to_string());
+    let stat = fs::read_to_string(format!("/proc/{who}/stat")).ok()?;
+    // After the name, which may hold anything: user and system time are the 12th and 13th.
+    let mut fields = stat.rsplit(')').next()?.split_whitespace().skip(11);
+    let user: f64 = fields.next()?.parse().ok()?;
+    let system: f64 = fields.next()?.parse().ok()?;
+    Some((user + system) / TICKS_PER_S)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_is_seen() {
+        let before = cpu_s(None).expect("this process");
+        let begun = std::time::Instant::now();
+        while begun.elapsed().as_secs_f64() < 0.2 {
+            std::hint::spin_loop();
+        }
+        let worked = cpu_s(Some(std::process::id())).expect("the same") - before;
+        assert!(worked > 0.02, "{worked}");
+        assert!(cpu_s(Some(u32::MAX)).is_none());
+    }
+}
