@@ -6,6 +6,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
+use tokio::signal::unix::{SignalKind, signal};
+
 use super::write_atomically;
 use crate::client::{Client, ClientOptions};
 use crate::load::{Arrivals, EchoProcess, LoadOptions, LoadReport, Scenario, connect, measure, prepare};
@@ -130,9 +132,11 @@ pub(super) fn run(args: &LoadArgs) -> Result<(), Box<dyn Error>> {
 async fn load(args: &LoadArgs, options: &LoadOptions, scenario: &Scenario) -> Result<LoadReport, Box<dyn Error>> {
     let clients = connect(&args.server, &ClientOptions::from_environment(), options.connections).await?;
     let prepared = Arc::new(prepare(&clients[0], scenario, options.seed).await?);
+    let mut terminate = signal(SignalKind::terminate())?;
     let measured = tokio::select! {
         measured = measured(args, options, scenario, (&prepared, &clients)) => measured,
         _ = tokio::signal::ctrl_c() => Err("stopped by Ctrl-C; nothing is reported".into()),
+        _ = terminate.recv() => Err("stopped by SIGTERM; nothing is reported".into()),
     };
     // Also when something went wrong.
     let removed = prepared.remove(&clients[0]).await;

@@ -3,9 +3,6 @@
 use std::io::{self, BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 
-use rustix::process::Pid;
-use rustix::thread::{CpuSet, sched_setaffinity};
-
 /// An echo server that runs until it is dropped.
 #[derive(Debug)]
 pub struct EchoProcess {
@@ -18,18 +15,16 @@ impl EchoProcess {
     /// is asked for.
     ///
     /// # Errors
-    /// When it cannot be started or put on the core.
+    /// When it cannot be started.
     pub fn start(answer_bytes: usize, core: Option<usize>) -> io::Result<Self> {
         let mut command = Command::new(std::env::current_exe()?);
         command.args(["echo", "--answer-bytes", &answer_bytes.to_string()]);
-        let child = command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn()?;
-        let mut echo = Self { child, url: String::new() };
-        // Before it has threads, so that all of them are there.
-        if let (Some(core), Some(pid)) = (core, i32::try_from(echo.child.id()).ok().and_then(Pid::from_raw)) {
-            let mut cores = CpuSet::new();
-            cores.set(core);
-            sched_setaffinity(Some(pid), &cores)?;
+        if let Some(core) = core {
+            command.args(["--core", &core.to_string()]);
         }
+        // It ends with its standard input, and so with this process.
+        let child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
+        let mut echo = Self { child, url: String::new() };
         let mut line = String::new();
         if let Some(stdout) = echo.child.stdout.take() {
             BufReader::new(stdout).read_line(&mut line)?;

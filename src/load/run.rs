@@ -100,8 +100,6 @@ pub struct Prepared {
 /// What the server refuses.
 pub async fn prepare(client: &Client, scenario: &Scenario, seed: u64) -> Result<Prepared, LoadError> {
     let mut random = Schedule::new(Arrivals::Poisson, 1.0, seed);
-    let body = Body::superellipsoid("brick", Vector3::zeros(), Vector3::new(0.5, 0.3, 0.2), 6)?;
-    let stored = client.create_from_file(body.to_json()).await?;
     let scene = format!("load-{:016x}", (random.uniform() * 2_f64.powi(53)) as u64 ^ u64::from(std::process::id()));
     let names: Vec<String> = (0..scenario.objects).map(|index| format!("o{index}")).collect();
     let mut poses = Vec::new();
@@ -122,10 +120,10 @@ pub async fn prepare(client: &Client, scenario: &Scenario, seed: u64) -> Result<
         }
         calls.push(Kind { sum, variants, next: None });
     }
-    client.create_scene(&scene).await?;
+    let body = Body::superellipsoid("brick", Vector3::zeros(), Vector3::new(0.5, 0.3, 0.2), 6)?;
+    let stored = client.create_from_file(body.to_json()).await?;
     let prepared = Prepared { scene, made_body: stored.created.then_some(stored.id), calls, names, poses };
-    let placed = prepared.names.iter().zip(&prepared.poses).map(|(name, pose)| (name.as_str(), &stored.id, *pose));
-    if let Err(error) = client.put_objects(&prepared.scene, placed).await {
+    if let Err(error) = prepared.place(client, &stored.id).await {
         // What it has made goes, and the reason stays.
         let _ = prepared.remove(client).await;
         return Err(error.into());
@@ -175,12 +173,23 @@ impl Prepared {
         &self.scene
     }
 
+    async fn place(&self, client: &Client, body: &BodyId) -> Result<(), ClientError> {
+        client.create_scene(&self.scene).await?;
+        let placed = self.names.iter().zip(&self.poses).map(|(name, pose)| (name.as_str(), body, *pose));
+        client.put_objects(&self.scene, placed).await?;
+        Ok(())
+    }
+
     /// Removes what was made in the server.
     ///
     /// # Errors
     /// What the server refuses.
     pub async fn remove(&self, client: &Client) -> Result<(), LoadError> {
-        client.delete_scene(&self.scene).await?;
+        match client.delete_scene(&self.scene).await {
+            // It was not made any more.
+            Err(error) if error.code() == Some(tonic::Code::NotFound) => {}
+            deleted => deleted?,
+        }
         if let Some(body) = &self.made_body {
             match client.delete_body(body).await {
                 // Somebody else uses it by now.

@@ -28,9 +28,11 @@ impl AnswerBody {
         Self { inner, ending: Some(ending), revoked }
     }
 
+    /// Without a status clients see UNKNOWN.
     fn end(&mut self, status: Option<&Status>) {
+        self.revoked = None;
         if let Some(mut ending) = self.ending.take() {
-            ending.code = status.map_or(Code::Ok, Status::code);
+            ending.code = status.map_or(Code::Unknown, Status::code);
             if let Some(status) = status.filter(|status| status.code() != Code::Ok) {
                 tracing::debug!(call = ending.call, code = name(status.code()), why = status.message(), "ended");
             }
@@ -44,7 +46,6 @@ impl http_body::Body for AnswerBody {
 
     fn poll_frame(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
         if let Some(Poll::Ready(status)) = self.revoked.as_mut().map(|revoked| revoked.as_mut().poll(context)) {
-            self.revoked = None;
             // Who makes the answer learns that nobody reads it any more.
             self.inner = Body::empty();
             let mut trailers = HeaderMap::new();

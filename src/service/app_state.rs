@@ -1,8 +1,10 @@
 //! What every handler holds: the catalogue once it is loaded, and the gates to the threads that
 //! work.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::thread;
+use std::time::Instant;
 
 use tokio::sync::{Semaphore, oneshot, watch};
 use tonic::Status;
@@ -15,7 +17,7 @@ use super::body_mesh::Meshes;
 use super::call_time::{CallTime, until};
 use super::config::LimitsConfig;
 use super::error;
-use super::limits::{LOADING_PATIENCE, SMALL_SCENE};
+use super::limits::{LOADING_PATIENCE, MAX_EXAMINING, SMALL_SCENE};
 use super::metrics::Metrics;
 use super::wire;
 
@@ -36,6 +38,8 @@ pub(super) struct AppState {
     meshes: Arc<Meshes>,
     /// Half the cores at most re-prove new bodies, which takes long; queries go on beside it.
     proving: Arc<Semaphore>,
+    /// Calls that wait for bodies to be proven take a thread each.
+    examining: Arc<Semaphore>,
     /// Backups are made one after the other: each takes as much space as the catalogue.
     backing_up: Arc<Semaphore>,
     /// Changes are made one after the other; they wait here rather than on a thread.
@@ -60,6 +64,7 @@ impl AppState {
             blobs: Arc::default(),
             meshes: Arc::default(),
             proving: limit(cores.div_ceil(2)),
+            examining: limit(MAX_EXAMINING),
             backing_up: limit(1),
             changing: limit(1),
         })
@@ -100,10 +105,16 @@ impl AppState {
         self.crew.clone()
     }
 
-    /// Answers a question on all cores. It ends with what is known when the budget is over, and
+    /// Answers a question: a brief one here and whole, others on all cores. Such a one ends with what is known when the budget is over, and
     /// without an answer at the deadline or when the caller is gone.
     pub(super) async fn ask<Q: Question>(&self, question: Arc<Q>, time: CallTime) -> Result<Vec<Q::Part>, Status> {
         let stop = Arc::<Stop>::default();
+        let now = Instant::now();
+        let has_time = [time.deadline, time.budget].iter().flatten().all(|end| now < *end);
+        if question.is_brief() && has_time {
+            let solve = || (0..question.chunks()).map(|chunk| question.solve(chunk, &stop)).collect();
+            return catch_unwind(AssertUnwindSafe(solve)).map_err(|_| error::abandoned());
+        }
         let (sender, receiver) = oneshot::channel();
         self.crew.submit(question, stop.clone(), move |parts| {
             let _ = sender.send(parts);
@@ -161,7 +172,7 @@ impl AppState {
         look: impl FnOnce(&Catalogue) -> Result<T, CatalogueError> + Send + 'static,
     ) -> Result<T, Status> {
         let catalogue = self.catalogue().await?;
-        let found = if catalogue.is_proven() { look(&catalogue) } else { proving(catalogue, look).await? };
+        let found = if catalogue.is_proven() { look(&catalogue) } else { self.proven(catalogue, look).await? };
         found.map_err(|error| error::catalogue(&error, field))
     }
 
@@ -174,9 +185,28 @@ impl AppState {
             catalogue.live_scene(name)
         } else {
             let name = name.to_owned();
-            proving(catalogue, move |catalogue| catalogue.live_scene(&name)).await?
+            self.proven(catalogue, move |catalogue| catalogue.live_scene(&name)).await?
         };
         found.map_err(|error| error::catalogue(&error, field))
+    }
+
+    /// Looks at what is not proven yet, which takes from milliseconds to a minute; it goes on when
+    /// nobody waits any more.
+    async fn proven<T: Send + 'static>(
+        &self,
+        catalogue: Arc<Catalogue>,
+        look: impl FnOnce(&Catalogue) -> T + Send + 'static,
+    ) -> Result<T, Status> {
+        let looking = catalogue.clone();
+        let work = on_thread(&self.examining, move || look(&looking));
+        match tokio::time::timeout(LOADING_PATIENCE, work).await {
+            Ok(done) => done,
+            Err(_) => {
+                let Counts { bodies, unproven_bodies, .. } = catalogue.counts();
+                let why = format!("{unproven_bodies} of {bodies} bodies are still to be proven; try again in a moment");
+                Err(error::unavailable("LOADING", &why))
+            }
+        }
     }
 
     /// Makes a change. Once begun it runs to its end, even when the client goes away meanwhile.
@@ -205,22 +235,6 @@ impl AppState {
     ) -> Result<T, Status> {
         on_thread(&self.proving, prove).await
     }
-}
-
-/// Looks at what is not proven yet, which takes from milliseconds to a minute; it goes on when
-/// nobody waits any more.
-async fn proving<T: Send + 'static>(
-    catalogue: Arc<Catalogue>,
-    look: impl FnOnce(&Catalogue) -> T + Send + 'static,
-) -> Result<T, Status> {
-    let looking = catalogue.clone();
-    let work = tokio::task::spawn_blocking(move || look(&looking));
-    let Ok(done) = tokio::time::timeout(LOADING_PATIENCE, work).await else {
-        let Counts { bodies, unproven_bodies, .. } = catalogue.counts();
-        let why = format!("{unproven_bodies} of {bodies} bodies are still to be proven; try again in a moment");
-        return Err(error::unavailable("LOADING", &why));
-    };
-    done.map_err(|error| error::internal_panic(&error))
 }
 
 /// Waits until the server stops.

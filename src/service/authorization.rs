@@ -45,10 +45,10 @@ fn permitted(tokens: &Tokens, shown: Option<&http::HeaderValue>, path: &str) -> 
 }
 
 /// A call that may go on, as long as its token stays.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Admission(Option<Shown>);
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Shown {
     name: String,
     tokens: watch::Receiver<Arc<Tokens>>,

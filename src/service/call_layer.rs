@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::task::{Context, Poll};
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use http_body::Body as _;
 use tonic::body::Body;
 use tonic::codegen::{BoxFuture, Service, http};
 use tonic::{Code, Status};
@@ -15,6 +16,7 @@ use super::answer_body::{AnswerBody, Ending, Revoked, name};
 use super::authorization::Authorization;
 use super::calls;
 use super::metrics::Metrics;
+use super::request_body::RequestBody;
 
 /// Metadata with the id of a call: the client's, or one that is given to it.
 const REQUEST_ID: &str = "x-request-id";
@@ -88,7 +90,16 @@ where
         let (call, is_stream) = (calls::label(path), calls::is_stream(path));
         let ending = Ending::new(self.layer.metrics.clone(), call);
         let span = tracing::info_span!("call", id = id.to_str().unwrap_or_default(), call);
-        let answering = self.layer.authorization.check(&request).map(|admission| (admission, self.inner.call(request)));
+        let answering = self.layer.authorization.check(&request).map(|admission| {
+            let request = match admission.client() {
+                Some(_) if is_stream => {
+                    let revoked = Box::pin(admission.clone().revoked());
+                    request.map(|body| Body::new(RequestBody::new(body, revoked)))
+                }
+                _ => request,
+            };
+            (admission, self.inner.call(request))
+        });
         let answered = async move {
             // Whole, so that it ends with the call.
             let mut ending = ending;
@@ -106,6 +117,10 @@ where
                 Some(status) => {
                     ending.code = status.code();
                     tracing::debug!(code = name(status.code()), ?took, why = status.message(), "refused");
+                    Ok(response)
+                }
+                None if response.body().is_end_stream() => {
+                    ending.code = Code::Ok;
                     Ok(response)
                 }
                 None => {

@@ -57,6 +57,9 @@ pub const MAX_PAGE: usize = 1000;
 /// gets UNAVAILABLE.
 pub const LOADING_PATIENCE: Duration = Duration::from_secs(10);
 
+/// Calls that wait for bodies to be proven at once, each on a thread.
+pub const MAX_EXAMINING: usize = 32;
+
 /// Niceness of the threads that prove bodies in the background: a tenth of the share of others.
 pub const PROVER_NICE: i32 = 10;
 

@@ -1,6 +1,6 @@
 //! What the server counts, for Prometheus. Names end in their unit, as is the custom there.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use prometheus_client::encoding::{EncodeLabelSet, text};
@@ -20,6 +20,8 @@ pub(super) struct Metrics(Arc<Counted>);
 
 #[derive(Debug)]
 struct Counted {
+    /// Held while what others count is taken over.
+    taking_over: Mutex<()>,
     registry: Registry,
     calls: Family<CallEnd, Counter>,
     call_seconds: Family<Call, Histogram, fn() -> Histogram>,
@@ -129,6 +131,7 @@ impl Default for Metrics {
         registry.register("damaged_bodies", about, damaged_bodies.clone());
         registry.register("scenes", "Scenes and forks", scenes.clone());
         Self(Arc::new(Counted {
+            taking_over: Mutex::default(),
             registry,
             calls,
             call_seconds,
@@ -256,6 +259,7 @@ impl Metrics {
         for (gauge, size) in sizes {
             gauge.set(i64::try_from(size).unwrap_or(i64::MAX));
         }
+        let _taking_over = self.0.taking_over.lock().unwrap_or_else(PoisonError::into_inner);
         let WarmStartUse { hits, misses } = WarmStartUse::now();
         for (found, now) in [("yes", hits), ("no", misses)] {
             let counter = self.0.warm_starts.get_or_create(&Found { found });

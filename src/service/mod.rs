@@ -43,6 +43,7 @@ mod pose_stream;
 pub mod proto;
 mod queries;
 pub(crate) mod query_wire;
+mod request_body;
 mod scene_watch;
 pub(crate) mod scene_wire;
 mod scenes;

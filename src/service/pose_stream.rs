@@ -99,6 +99,8 @@ pub(super) async fn run(app: AppState, mut messages: Streaming<StreamPosesReques
                     Err(error) => { let _ = replies.send(Err(error::internal_panic(&error))).await; return; }
                 }
             },
+            // Nobody waits for answers: the client is gone, or its token is.
+            () = replies.closed() => return,
             space = replies.reserve(), if reply.is_some() => match space {
                 Ok(space) => if let Some(reply) = reply.take() { space.send(Ok(reply)); },
                 Err(_) => return,

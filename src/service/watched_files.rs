@@ -27,6 +27,7 @@ where
     let mut known: Vec<_> = files.iter().map(|path| std::fs::read(path).ok()).collect();
     let (sender, current) = watch::channel(Arc::new(read()?));
     tokio::spawn(async move {
+        let mut refused = None;
         while !sender.is_closed() {
             tokio::time::sleep(LOOK_EVERY).await;
             let mut now = Vec::new();
@@ -40,10 +41,15 @@ where
                 Ok(changed) => {
                     sender.send_replace(Arc::new(changed));
                     tracing::info!("{what} have changed and are used from now on");
+                    (known, refused) = (now, None);
                 }
-                Err(error) => tracing::error!(%error, "{what} have changed and the earlier ones stay"),
+                // Tried again, since the reason may pass; said once.
+                Err(_) if refused.as_ref() == Some(&now) => {}
+                Err(error) => {
+                    tracing::error!(%error, "{what} have changed and the earlier ones stay");
+                    refused = Some(now);
+                }
             }
-            known = now;
         }
     });
     Ok(current)

@@ -18,7 +18,7 @@ pub use scene_entry::SceneEntry;
 use std::collections::BTreeMap;
 use std::ops::Bound;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
 use redb::WriteTransaction;
@@ -116,6 +116,10 @@ impl Catalogue {
     /// # Errors
     /// When the disk fails.
     pub fn create_body(&self, body: Geometry) -> Result<(Geometry, bool), CatalogueError> {
+        // Those that are stored already are proven before others have to wait for it; one that is
+        // damaged is replaced.
+        let rungs: Vec<_> = body.rungs().iter().map(|rung| *rung.id()).collect();
+        let _ = self.prove_bodies(rungs.iter().chain([body.id()]));
         let mut store = self.writer()?;
         if let Ok(known) = self.geometry(body.id()) {
             return Ok((known, false));
@@ -197,7 +201,7 @@ impl Catalogue {
         let fresh = State::read(store, &known)?;
         self.write(|state| {
             let before = state.replace(fresh);
-            self.proven.store(state.is_proven(), Ordering::Relaxed);
+            self.note_proofs(state);
             before
         });
         Ok(())
@@ -242,12 +246,12 @@ impl State {
     }
 
     fn read_body(&mut self, id: BodyId, row: BodyRow, known: &Bodies) {
-        // What was damaged may have been mended on the disk.
-        let known = known.get(&id).filter(|known| !known.is_damaged()).cloned();
+        let known = known.get(&id).cloned();
         self.bodies.insert(id, known.unwrap_or_else(|| Arc::new(StoredBody::read(id, row))));
     }
 
-    /// Takes bodies in that were just made.
+    /// Takes bodies in that were just made. A ladder keeps the rungs it was read with: one of which a
+    /// rung was damaged has to be stored again, too.
     fn keep(&mut self, bodies: Vec<Geometry>) {
         self.bodies.extend(bodies.into_iter().map(|body| (*body.id(), Arc::new(StoredBody::new(body)))));
     }

@@ -264,6 +264,8 @@ fn is_end(status: &tonic::Status) -> bool {
 struct Streamed {
     sent: u64,
     acknowledged: Vec<(Instant, u64)>,
+    /// What was on disk at the last start.
+    durable: u64,
     revision: u64,
 }
 
@@ -286,10 +288,11 @@ impl Streamed {
     /// The pose on disk is one that was sent, at most a second older than the last.
     fn settle(&mut self, x: f64, revision: u64, killed: Instant, round: u64) {
         let old = |at: &Instant| (killed - *at).as_secs_f64() > STREAMED_S;
-        let least = self.acknowledged.iter().rev().find(|(at, _)| old(at)).map_or(0, |(_, number)| *number);
+        let least =
+            self.acknowledged.iter().rev().find(|(at, _)| old(at)).map_or(0, |(_, number)| *number).max(self.durable);
         assert!((least..=self.sent).contains(&(x as u64)), "round {round}: {x} is not in {least}..={}", self.sent);
         assert!(revision >= self.revision, "round {round}: {revision} after {}", self.revision);
-        (self.acknowledged, self.revision) = (vec![(Instant::now(), x as u64)], revision);
+        (self.acknowledged, self.durable, self.revision) = (Vec::new(), x as u64, revision);
     }
 }
 
@@ -344,7 +347,7 @@ async fn what_was_acknowledged_survives_kills_and_nothing_else_is_there() {
     }
     let mut killed = Instant::now();
     for round in 0..=rounds {
-        let server = Running::start(dir.path());
+        let mut server = Running::start(dir.path());
         let client = server.client().await;
         let (found, revisions, stream) = look(&server, &client).await;
         for (writer, found) in writers.iter_mut().zip(found) {
@@ -364,6 +367,7 @@ async fn what_was_acknowledged_survives_kills_and_nothing_else_is_there() {
         // Every eighth time long enough for streamed poses to be written.
         let longest = if round % 8 == 7 { 1800.0 } else { 150.0 };
         tokio::time::sleep(Duration::from_secs_f64(1e-3 * longest * f64::midpoint(numbers.next(), 1.0))).await;
+        assert!(server.is_running(), "round {round}: it ended by itself");
         server.kill();
         killed = Instant::now();
         writers = Vec::new();

@@ -161,6 +161,7 @@ async fn tokens_allow_what_their_role_says_and_can_be_changed() {
     connect(&writer).await.create_scene("cell").await.expect("allowed");
 
     let mut poses = connect(&writer).await.stream_poses("cell", []).await.expect("a stream");
+    let mut unread = connect(&writer).await.stream_poses("cell", []).await.expect("a stream");
     // A token that is gone is refused, a new one is taken; nonsense changes nothing.
     std::fs::write(&file, "token = 7").expect("written");
     tokio::time::sleep(Duration::from_millis(2500)).await;
@@ -170,7 +171,8 @@ async fn tokens_allow_what_their_role_says_and_can_be_changed() {
     eventually(async || connect(&fresh).await.list_scenes().await.is_ok()).await;
     let refused = reading.list_scenes().await.expect_err("revoked");
     assert_eq!(refused.code(), Some(Code::Unauthenticated));
-    // So do streams that were open.
+    // So do streams that were open, also one whose client reads nothing.
+    eventually(async || unread.send(&[]).await.is_err()).await;
     let ended = loop {
         match poses.next().await {
             Ok(said) => assert!(said.is_some(), "it ended without a reason"),

@@ -45,6 +45,10 @@ fn free_port() -> u16 {
 
 #[test]
 fn the_operations_page_works_as_printed() {
+    for tool in ["bash", "openssl", "curl"] {
+        let found = Command::new(tool).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
+        assert!(found.is_ok(), "the page needs {tool}; install it");
+    }
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/operations.md");
     let page = std::fs::read_to_string(path).expect("the page");
     let [port, admin] = [free_port(), free_port()].map(|port| port.to_string());

@@ -18,6 +18,11 @@ pub trait Question: Send + Sync + 'static {
     fn chunks(&self) -> usize;
     /// Answers one chunk; soon, once `stop` is set.
     fn solve(&self, chunk: usize, stop: &Stop) -> Self::Part;
+    /// Whether all of it takes some tens of microseconds at most: less than it costs to hand it to
+    /// another thread.
+    fn is_brief(&self) -> bool {
+        false
+    }
 }
 
 /// Asks a question to end.

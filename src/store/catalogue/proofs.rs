@@ -26,8 +26,7 @@ impl Catalogue {
         })
     }
 
-    /// Whether every body was looked at, and every scene is in memory: nothing has to be proven
-    /// for any question.
+    /// Whether every body and scene was looked at: nothing has to be proven for any question.
     pub fn is_proven(&self) -> bool {
         self.proven.load(Ordering::Relaxed)
     }
@@ -47,14 +46,21 @@ impl Catalogue {
                 return false;
             }
             if let Err(error) = self.live_scene(&name) {
+                if let Some(stored) = self.read(|state| state.stored_scenes.get(&name).cloned()) {
+                    stored.set_damaged();
+                }
                 tracing::error!(scene = &*name, %error, "a scene of the catalogue cannot be used");
             }
         }
         let rest = self.read(|state| state.bodies.values().filter(|body| !body.is_examined()).cloned().collect());
         self.examine(rest, stop);
-        let ended = !stop.load(Ordering::Relaxed);
-        self.proven.store(ended && self.read(State::is_proven), Ordering::Relaxed);
-        ended
+        self.write(|state| self.note_proofs(state));
+        !stop.load(Ordering::Relaxed)
+    }
+
+    /// Sets what [`Catalogue::is_proven`] says, under the lock of those who change the state.
+    pub(super) fn note_proofs(&self, state: &State) {
+        self.proven.store(state.is_proven(), Ordering::Relaxed);
     }
 
     /// What is known to be damaged after [`Catalogue::prove_all`].
@@ -114,6 +120,7 @@ impl Catalogue {
 
 impl State {
     pub(super) fn is_proven(&self) -> bool {
-        self.stored_scenes.is_empty() && self.bodies.values().all(|body| body.is_examined())
+        self.stored_scenes.values().all(|stored| stored.is_damaged())
+            && self.bodies.values().all(|body| body.is_examined())
     }
 }

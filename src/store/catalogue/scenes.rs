@@ -154,9 +154,11 @@ impl Catalogue {
             let objects = stored.objects().map(|(object, _)| object);
             let floor = self.forget_scene(&mut store, name, stored.revision, objects)?;
             self.write(|state| {
-                state.revision_floor = floor;
+                state.revision_floor = state.revision_floor.max(floor);
                 state.scenes.remove(name);
-                state.stored_scenes.remove(name)
+                let removed = state.stored_scenes.remove(name);
+                self.note_proofs(state);
+                removed
             });
             return Ok(());
         }
@@ -236,6 +238,10 @@ impl Catalogue {
     /// # Errors
     /// When it is no fork, when the parent is gone or has changed since, or when the disk fails.
     pub fn commit_fork(&self, name: &str) -> Result<Scene, CatalogueError> {
+        // What was read from the disk is no fork, and is not proven to say so.
+        if self.read(|state| state.stored_scenes.contains_key(name)) {
+            return Err(CatalogueError::NoFork(name.to_owned()));
+        }
         let mut store = self.writer()?;
         let fork = self.live_scene(name)?;
         let Some(origin) = fork.origin.clone() else { return Err(CatalogueError::NoFork(name.to_owned())) };

@@ -114,7 +114,8 @@ pub(super) fn prove_each(bodies: &[Arc<StoredBody>], threads: usize, stop: &Atom
     };
     thread::scope(|scope| {
         for _ in 1..threads.min(bodies.len()) {
-            scope.spawn(work);
+            // Without it this thread does all.
+            let _ = thread::Builder::new().spawn_scoped(scope, work);
         }
         work();
     });

@@ -1,6 +1,7 @@
 //! A scene as it was read from the disk: its bodies are proven before its first use.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::body::BodyId;
 use crate::scene::{Geometry, Placement, Scene, Update};
@@ -14,16 +15,31 @@ pub(super) struct StoredScene {
     pub(super) name: Arc<str>,
     pub(super) revision: u64,
     contents: Update,
+    /// Whether it was looked at and cannot be used.
+    damaged: AtomicBool,
 }
 
 impl StoredScene {
     pub(super) fn new(name: &str, revision: u64, row: &SceneRow, placed: Vec<Placement>) -> Self {
-        Self { name: name.into(), revision, contents: Update { upserts: placed, ..row.update() } }
+        Self {
+            name: name.into(),
+            revision,
+            contents: Update { upserts: placed, ..row.update() },
+            damaged: AtomicBool::new(false),
+        }
     }
 
     /// Names of its objects and the bodies they are made of.
     pub(super) fn objects(&self) -> impl ExactSizeIterator<Item = (&str, &BodyId)> {
         self.contents.upserts.iter().map(|placement| (&*placement.name, &placement.body))
+    }
+
+    pub(super) fn is_damaged(&self) -> bool {
+        self.damaged.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn set_damaged(&self) {
+        self.damaged.store(true, Ordering::Relaxed);
     }
 
     /// The scene, made of proven bodies.

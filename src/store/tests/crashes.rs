@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 
 use redb::{Database, StorageBackend};
 
-use super::{ball, moved, placed, pose};
+use super::{ball, moved, placed};
 use crate::body::BodyId;
 use crate::measure::Pose;
 use crate::scene::Update;
@@ -268,11 +268,6 @@ fn any_operation_of_the_disk_may_fail() {
             assert!(same(&here, &content(&again)), "operation {operation}: memory and disk differ");
             let fits = contents[done..].iter().take(2).any(|content| same(content, &here));
             assert!(fits, "operation {operation}: after {done} changes there is {here:?}");
-            if let Ok(scene) = again.scene("room")
-                && scene.slot("o").is_some()
-            {
-                assert!(pose(&scene).translation().x.is_finite());
-            }
         }
     }
     assert!(failures > 100, "{failures} failures");

@@ -62,6 +62,15 @@ impl Geometry {
         }
     }
 
+    /// Whether it is one convex body or a half-space: no parts, no rungs.
+    pub fn is_single(&self) -> bool {
+        match self {
+            Self::Solid(shape) => matches!(**shape, Shape::Body(_)),
+            Self::HalfSpace(_) => true,
+            Self::Ladder(_) | Self::SosBody(_) => false,
+        }
+    }
+
     /// Highest degree of its polynomials; 1 of a plane.
     pub fn degree(&self) -> usize {
         let of_shape = |shape: &Shape| match shape {

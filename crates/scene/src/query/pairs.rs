@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use sublevel_core::measure::HalfSpace;
 
 use super::answer::{Answer, AnswerStatus};
-use super::ask::Ask;
+use super::ask::{Ask, Measure};
 use super::solver::{Pair, Solver};
 use super::thing::{PairSlots, Thing, WorldHalfSpace};
 use crate::crew::{Question, Stop};
@@ -53,6 +53,9 @@ pub enum PairsError {
 
 /// Pairs of a chunk: some tens of microseconds of warm work, so that threads share evenly.
 const CHUNK: usize = 64;
+
+/// Most measures of a question that is answered where it is asked.
+const BRIEF: usize = 4;
 
 /// Measures of pairs that are named, all on one snapshot.
 #[derive(Debug)]
@@ -119,6 +122,19 @@ impl Question for Pairs {
 
     fn chunks(&self) -> usize {
         self.pairs.len().div_ceil(CHUNK)
+    }
+
+    fn is_brief(&self) -> bool {
+        let measures = self.ask.measures();
+        let takes_long =
+            |measure: &Measure| matches!(measure, Measure::Penetration | Measure::Signed | Measure::TimeOfImpact);
+        let is_single = |operand: &Operand| match operand {
+            Operand::Object(slot) => self.scene.object(*slot).is_none_or(|object| object.geometry.is_single()),
+            Operand::Point(_) | Operand::HalfSpace(_) => true,
+        };
+        self.pairs.len() * measures.len() <= BRIEF
+            && !measures.iter().any(takes_long)
+            && self.operands.iter().all(is_single)
     }
 
     /// All measures of the first pair, then of the second, and so on.
