@@ -33,7 +33,7 @@ struct Stored {
 /// A change that a writer asks for.
 #[derive(Clone)]
 enum Change {
-    CreateBody(Body),
+    CreateBody(Box<Body>),
     DeleteBody(BodyId),
     CreateScene(String),
     DeleteScene(String),
@@ -109,7 +109,7 @@ impl Stored {
                 self.scenes.get_mut(scene).expect("a scene of the ledger").insert(object.clone(), (*body, *x));
             }
             Change::Move { scene, object, x } | Change::Commit { scene, object, x } => {
-                put(scene, object, &|o| o.1 = *x)
+                put(scene, object, &|o| o.1 = *x);
             }
             Change::Remove { scene, object } => {
                 self.scenes.get_mut(scene).expect("a scene of the ledger").remove(object);
@@ -148,7 +148,7 @@ impl Writer {
             // An id says nothing about the name, so everybody has sizes of their own.
             let radius = self.size + 1e-6 * f64::from(made);
             let body = Body::ball(&format!("{}-{made}", self.name), Vector3::zeros(), radius);
-            return Change::CreateBody(body.expect("a ball"));
+            return Change::CreateBody(Box::new(body.expect("a ball")));
         }
         // Names come again, so that a scene has to begin above the one that had its name.
         let scene = self.choose(4);
