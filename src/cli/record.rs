@@ -13,11 +13,11 @@ use crate::load::Recorder;
 ///
 /// A proxy: clients call it instead of the server, and everything passes. The messages of
 /// Evaluate, CheckStates, Clearance and CastRays are written to a file, one JSON object a line,
-/// until Ctrl-C. `sublevel load FILE` asks them again, of a server with the same scenes. Clients
-/// reach it without encryption, so it listens on loopback unless it is told otherwise; their tokens
-/// are passed on, and not written.
+/// until Ctrl-C. `sublevel load FILE` asks them again, of a server with the same scenes. The proxy
+/// does not encrypt what clients send to it, so it listens on loopback by default; their tokens are
+/// passed on, and not written.
 ///
-/// Example: sublevel record --server http://127.0.0.1:50051 --listen 127.0.0.1:50061 --out calls.jsonl
+/// Example: sublevel record --server http://127.0.0.1:50051 --out calls.jsonl
 #[derive(Debug, clap::Args)]
 pub(super) struct RecordArgs {
     /// Address of the server

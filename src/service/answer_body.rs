@@ -1,5 +1,5 @@
-//! The answer of a call on its way out: how it ends is counted, and a stream whose token is revoked
-//! ends.
+//! The answer of a call while it is sent: how it ends is counted, and a stream ends when its token
+//! is revoked.
 
 use std::pin::Pin;
 use std::task::{Context, Poll};

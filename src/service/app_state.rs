@@ -105,8 +105,9 @@ impl AppState {
         self.crew.clone()
     }
 
-    /// Answers a question: a brief one here and whole, others on all cores. Such a one ends with what is known when the budget is over, and
-    /// without an answer at the deadline or when the caller is gone.
+    /// Answers a question: a brief one here and whole, others on all cores. These end with what is
+    /// known when the budget is over, and without an answer at the deadline or when the caller is
+    /// gone.
     pub(super) async fn ask<Q: Question>(&self, question: Arc<Q>, time: CallTime) -> Result<Vec<Q::Part>, Status> {
         let stop = Arc::<Stop>::default();
         let now = Instant::now();

@@ -34,8 +34,8 @@
 //! # What is proven, and when
 //!
 //! The file may have been damaged or written by anybody, so each body is proven again before its
-//! first use, and a scene is made when all its bodies are. Loading reads rows only; whoever asks
-//! for a body or scene that is not proven waits for that, and [`Catalogue::prove_all`] proves the
+//! first use, and a scene is made when all its bodies are. Loading reads rows only. A call for
+//! a body or scene that is not proven waits for the proof, and [`Catalogue::prove_all`] proves the
 //! rest in the background. A damaged body is named in the log and to those who ask for it, and
 //! never used.
 

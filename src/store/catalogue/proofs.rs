@@ -46,9 +46,6 @@ impl Catalogue {
                 return false;
             }
             if let Err(error) = self.live_scene(&name) {
-                if let Some(stored) = self.read(|state| state.stored_scenes.get(&name).cloned()) {
-                    stored.set_damaged();
-                }
                 tracing::error!(scene = &*name, %error, "a scene of the catalogue cannot be used");
             }
         }
@@ -87,8 +84,9 @@ impl Catalogue {
 
     /// Makes a scene that was read from the disk a live one, when somebody asks for it.
     pub(super) fn enliven(&self, stored: &Arc<StoredScene>) -> Result<(), CatalogueError> {
-        self.prove_bodies(stored.objects().map(|(_, body)| body))?;
-        let live = Arc::new(self.live(stored)?);
+        let proven = self.prove_bodies(stored.objects().map(|(_, body)| body));
+        let live = proven.and_then(|()| self.live(stored)).inspect_err(|_| stored.set_damaged())?;
+        let live = Arc::new(live);
         self.write(|state| {
             // Deleted, or made by somebody else meanwhile.
             let is_it = state.stored_scenes.get(&stored.name).is_some_and(|now| Arc::ptr_eq(now, stored));

@@ -25,7 +25,7 @@ enum Operation {
     Acknowledged(usize),
 }
 
-/// A disk in memory that remembers what reached it, and fails when it is told to.
+/// A disk in memory that remembers what reached it, and of which a chosen operation fails.
 #[derive(Clone, Debug, Default)]
 struct Journal {
     bytes: Arc<Mutex<Vec<u8>>>,
