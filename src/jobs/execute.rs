@@ -7,12 +7,16 @@ use std::sync::Arc;
 use super::Phase;
 use super::request::{FitPlan, RequestError, asked_group, body_name, enclosing, plan};
 use crate::body::{Body, Compound, Obstacle, Shape, SosBody};
+use crate::fit;
 use crate::fit::{
     CompoundFit, Cover, EncloseError, FitError, Group, Mesh, Progress, Representation, Rung, SosFit, cheapest_within,
-    coarsest_within, enclose_obstacles, fit, fit_parts, fit_sos, group, ladder, thicken, trim,
+    coarsest_within, enclose_obstacles, fit_parts, fit_sos, group, ladder, thicken, trim,
 };
 use crate::scene::{Geometry, Ladder};
-use crate::store::{FitOptimum, FitOutcome, FitPreparation, FitRequest, FittedBody, FittedKind};
+use crate::store::{FitOptimum, FitOutcome, FitPreparation, FitRequest, FittedBody, FittedKind, SolverStep};
+
+/// Iterations of the solver that are kept with a job.
+const MAX_LOGGED_STEPS: usize = 500;
 
 /// All that a request made.
 #[derive(Clone, Debug)]
@@ -83,6 +87,9 @@ impl From<Vec<Rung>> for FitOutput {
                 objective_value: report.objective_value,
                 optimality_gap: report.optimality_gap,
                 refinement_end: report.refinement_end.map(|end| end.to_string()),
+                solver: Some(report.solver),
+                fallback: report.fallback.clone(),
+                log: logged(&report.log),
             }),
             ..FittedBody::default()
         };
@@ -106,6 +113,9 @@ impl From<SosFit> for FitOutput {
             objective_value: program.objective_value,
             optimality_gap: Some(program.optimality_gap).filter(|gap| gap.is_finite()),
             refinement_end: None,
+            solver: Some(program.solver),
+            fallback: program.fallback,
+            log: logged(&program.log),
         });
         let (id, seconds) = (body.id().to_string(), report.seconds);
         let took = FittedBody { kind: FittedKind::SosBody, id, seconds, optimum, ..FittedBody::default() };
@@ -118,6 +128,21 @@ impl FitOutput {
         let outcome = FitOutcome { bodies, ladder: None, left_out: 0, left_out_m: 0.0 };
         Self { outcome, shapes, ladder: None }
     }
+}
+
+/// The last iterations of a fit, with numbers that can be kept.
+fn logged(log: &[fit::SolverStep]) -> Vec<SolverStep> {
+    let finite = |value: f64| if value.is_finite() { value } else { f64::MAX };
+    let step = |step: &fit::SolverStep| SolverStep {
+        round: step.round,
+        iteration: step.iteration,
+        primal: finite(step.primal),
+        dual: finite(step.dual),
+        primal_residual: finite(step.primal_residual),
+        dual_residual: finite(step.dual_residual),
+        step_length: finite(step.step_length),
+    };
+    log[log.len().saturating_sub(MAX_LOGGED_STEPS)..].iter().map(step).collect()
 }
 
 /// Executes a request about a mesh: thickens, trims and fits. `progress` can stop it.
@@ -154,7 +179,7 @@ fn fit_prepared(
 ) -> Result<FitOutput, Failure> {
     let (name, points) = (&request.name, &mesh.points);
     Ok(match plan(request) {
-        FitPlan::Body(options) => vec![fit(name, points, &options, tell)?.into()].into(),
+        FitPlan::Body(options) => vec![fit::fit(name, points, &options, tell)?.into()].into(),
         FitPlan::Ladder(options) => as_ladder(name, ladder(name, points, &options, tell)?.into()),
         FitPlan::WithinGap(most_m, options) if mesh.triangles.is_empty() => {
             vec![coarsest_within(name, points, most_m, &options, tell)?].into()
@@ -227,6 +252,9 @@ pub fn fit_group(
                 objective_value: enclosure.objective_value,
                 optimality_gap: Some(enclosure.optimality_gap),
                 refinement_end: None,
+                solver: enclosure.body.provenance().and_then(|provenance| provenance.solver),
+                fallback: None,
+                log: logged(&enclosure.log),
             }),
             members,
             ..FittedBody::default()

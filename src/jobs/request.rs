@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::body::check_name;
+use crate::body::{Solver, check_name};
 use crate::fit::{
     Coordinates, EncloseError, EncloseOptions, FitError, FitOptions, MAX_PIECES, MAX_SETS, ReadError, ReadOptions,
     Reading, Scale, SosOptions, parse_mesh,
@@ -106,6 +106,7 @@ fn field_of(error: &FitError) -> &'static str {
         FitError::Objective { .. } | FitError::RelaxedObjective(_) => "objective",
         FitError::Relaxation(_) => "c",
         FitError::Cone(_) => "cone",
+        FitError::Solver => "solver",
         FitError::Slabs(_) => "slabs",
         _ => "name",
     }
@@ -113,6 +114,10 @@ fn field_of(error: &FitError) -> &'static str {
 
 fn check_group(request: &FitRequest, options: &EncloseOptions) -> Result<(), RequestError> {
     let group = asked_group(request)?;
+    if request.solver == Some(Solver::Structured) {
+        let why = "structured solves programs of points only; take clarabel, or leave the solver out";
+        return Err(RequestError::new("solver", why));
+    }
     if request.scale != 1.0 {
         let why = "is about stored bodies, which options of points do not change; leave out the scale";
         return Err(RequestError::new("group", why));
@@ -150,32 +155,32 @@ pub fn read_mesh(bytes: &[u8], format: &str, input: &str, scale: f64) -> Result<
 
 /// How to execute a request.
 pub(super) fn plan(request: &FitRequest) -> FitPlan {
-    let input = &request.input;
     let default = FitOptions::default().degree;
     match &request.mode {
-        FitMode::Body(body) => FitPlan::Body(convex(&body.polynomial, default, body.slabs, input)),
+        FitMode::Body(body) => FitPlan::Body(convex(&body.polynomial, default, body.slabs, request)),
         FitMode::Ladder(ladder) => {
             let highest = ladder.polynomial.objective.max_degree();
-            FitPlan::Ladder(convex(&ladder.polynomial, highest, ladder.slabs, input))
+            FitPlan::Ladder(convex(&ladder.polynomial, highest, ladder.slabs, request))
         }
         FitMode::WithinGap(within) => {
             let highest = within.polynomial.objective.max_degree();
-            FitPlan::WithinGap(within.max_gap_m, convex(&within.polynomial, highest, 0, input))
+            FitPlan::WithinGap(within.max_gap_m, convex(&within.polynomial, highest, 0, request))
         }
         FitMode::Compound(compound) => {
-            FitPlan::Compound(compound.parts, convex(&compound.polynomial, default, compound.slabs, input))
+            FitPlan::Compound(compound.parts, convex(&compound.polynomial, default, compound.slabs, request))
         }
         FitMode::SosBody(FitSosBody { method, degree, raw_frame, .. }) => FitPlan::SosBody(SosOptions {
             degree: degree.unwrap_or(default),
             method: *method,
             coordinates: coordinates(*raw_frame),
-            input: input.clone(),
+            solver: request.solver,
+            input: request.input.clone(),
         }),
         FitMode::Group(group) => FitPlan::Group(enclosing(group)),
     }
 }
 
-fn convex(polynomial: &FitPolynomial, default: usize, slabs: usize, input: &str) -> FitOptions {
+fn convex(polynomial: &FitPolynomial, default: usize, slabs: usize, request: &FitRequest) -> FitOptions {
     let FitPolynomial { degree, objective, cone, raw_frame, refine } = *polynomial;
     FitOptions {
         degree: degree.unwrap_or(default),
@@ -184,7 +189,8 @@ fn convex(polynomial: &FitPolynomial, default: usize, slabs: usize, input: &str)
         cone,
         refine,
         slabs,
-        input: input.to_owned(),
+        solver: request.solver,
+        input: request.input.clone(),
         ..FitOptions::default()
     }
 }

@@ -100,7 +100,7 @@ impl Tokens {
     }
 
     pub(super) fn parse(text: &str) -> Result<Self, String> {
-        let file: TokensFile = toml::from_str(text).map_err(|error| error.message().to_owned())?;
+        let file: TokensFile = toml::from_str(text).map_err(|error| toml_error(text, &error))?;
         let mut tokens: Vec<Token> = Vec::new();
         for (index, TokenEntry { name, role, sha256 }) in file.token.into_iter().enumerate() {
             let hash = unhex(&sha256)
@@ -126,6 +126,15 @@ impl Tokens {
             }
         }
         found
+    }
+}
+
+/// What is wrong with a file, and in which line, without the line: it may hold what is secret.
+fn toml_error(text: &str, error: &toml::de::Error) -> String {
+    let message = Some(error.message()).filter(|message| !message.is_empty()).unwrap_or("something is missing");
+    match error.span().and_then(|span| text.get(..span.start)) {
+        Some(before) => format!("line {}: {message}", before.matches('\n').count() + 1),
+        None => message.to_owned(),
     }
 }
 

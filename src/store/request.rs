@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::body::{BodyId, Cone, Objective, SosMethod};
+use crate::body::{BodyId, Cone, Objective, Solver, SosMethod};
 
 /// What a fit is asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -19,6 +19,9 @@ pub struct FitRequest {
     pub scale: f64,
     /// What to make, and how.
     pub mode: FitMode,
+    /// What solves the programs; none for the faster one, and the other where that fails.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub solver: Option<Solver>,
 }
 
 /// What to make, and how.
@@ -154,7 +157,7 @@ impl Default for FitMode {
 impl FitRequest {
     /// A request about points in metres, or about a group, from an input without a name.
     pub fn new(name: impl Into<String>, mode: impl Into<FitMode>) -> Self {
-        Self { name: name.into(), input: String::new(), scale: 1.0, mode: mode.into() }
+        Self { name: name.into(), input: String::new(), scale: 1.0, mode: mode.into(), solver: None }
     }
 
     /// The group that it is about, if it is about one and not about points.

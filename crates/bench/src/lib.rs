@@ -9,6 +9,7 @@ pub mod cost;
 mod csv;
 pub mod detail;
 pub mod figures;
+pub mod fits;
 mod loopback;
 mod machine;
 mod measures;

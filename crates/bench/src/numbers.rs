@@ -5,7 +5,7 @@ use crate::blocks::refreshed;
 use crate::csv::CsvError;
 use crate::measures;
 use crate::table1::Table1;
-use crate::{accuracy, cost, detail, scenes, speed, warm};
+use crate::{accuracy, cost, detail, fits, scenes, speed, warm};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use sublevel::cli;
@@ -16,6 +16,7 @@ enum Shown {
     Warm(warm::Shown),
     Accuracy(accuracy::Shown),
     Cost(cost::Shown),
+    Fits(fits::Shown),
     Scenes(scenes::Shown),
     Detail(detail::Shown),
     Parts(detail::PartsShown),
@@ -33,6 +34,7 @@ impl Shown {
             "warm.csv" => warm::Shown::read(&text).map(Self::Warm),
             "accuracy.csv" => accuracy::Shown::read(&text).map(Self::Accuracy),
             "cost.csv" => cost::Shown::read(&text).map(Self::Cost),
+            "fits.csv" => fits::Shown::read(&text).map(Self::Fits),
             "scenes.csv" => scenes::Shown::read(&text).map(Self::Scenes),
             "detail.csv" => detail::Shown::read(&text).map(Self::Detail),
             "detail-parts.csv" => detail::PartsShown::read(&text).map(Self::Parts),
@@ -52,6 +54,7 @@ impl Shown {
             Self::Warm(shown) => shown.block(name),
             Self::Accuracy(shown) => shown.block(name),
             Self::Cost(shown) => shown.block(name),
+            Self::Fits(shown) => shown.block(name),
             Self::Scenes(shown) => shown.block(name),
             Self::Detail(shown) => shown.block(name),
             Self::Parts(shown) => shown.block(name),
@@ -103,6 +106,7 @@ pub(crate) fn pictures(csv: &str, folder: &Path) -> Result<Vec<(String, String)>
         Shown::Warm(shown) => shown.pictures(),
         Shown::Accuracy(shown) => shown.pictures(),
         Shown::Cost(shown) => shown.pictures(),
+        Shown::Fits(shown) => shown.pictures(),
         Shown::Scenes(shown) => shown.pictures(),
         Shown::Detail(shown) => shown.pictures(),
         Shown::Parts(shown) => shown.pictures(),

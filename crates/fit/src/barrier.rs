@@ -1,55 +1,34 @@
 //! What a moment matrix adds to the barrier problem of a path.
 
-use super::spectral::{Spectral, symmetric};
+use super::spectral::log_det;
 use super::structure::Pattern;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
-/// `-τφ - log det` of a moment matrix, of which either part may be missing.
-///
-/// `-log det` alone keeps an unmeasured matrix definite. A log det that is measured is its own
-/// barrier. `tr X^½` is none: Newton's method on it creeps along the boundary; but matrix monotone
-/// functions become self-concordant once `-log det` is added (Faybusovich and Tsuchiya, Optim.
-/// Lett. 11, 2017).
+/// `-w log det` of a moment matrix.
 pub(super) struct Barrier<'a> {
-    pattern: &'a Pattern,
-    parts: Vec<(Spectral, f64)>,
+    pub(super) pattern: &'a Pattern,
+    /// w.
+    pub(super) weight: f64,
 }
 
-impl<'a> Barrier<'a> {
-    /// `measured` is φ with its factor τ, if the objective measures this matrix.
-    pub(super) fn new(pattern: &'a Pattern, measured: Option<(&Spectral, f64)>) -> Self {
-        let guard = measured.is_none_or(|(spectral, _)| !spectral.is_self_concordant());
-        let guard = guard.then(|| (Spectral::log_det(), 1.0));
-        Self {
-            pattern,
-            parts: measured.map(|(spectral, tau)| (spectral.clone(), tau)).into_iter().chain(guard).collect(),
-        }
-    }
-
+impl Barrier<'_> {
     /// Its value; none unless the matrix is positive definite.
     pub(super) fn value(&self, moments: &DVector<f64>) -> Option<f64> {
-        let matrix = self.pattern.spread(moments);
-        self.parts.iter().map(|(spectral, weight)| Some(-weight * spectral.bound(&matrix)?)).sum()
+        Some(-self.weight * log_det(&self.pattern.spread(moments))?)
     }
 
     /// Minus its gradient, as functional on Gram matrices collapsed to coefficients, and its
     /// Hessian.
     pub(super) fn derivatives(&self, moments: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let matrix = self.pattern.spread(moments);
-        let of_part = |(spectral, weight): &(Spectral, f64)| Some(spectral.minimiser(&matrix)? * *weight);
-        let gram = self.parts.iter().map(of_part).sum::<Option<DMatrix<f64>>>()?;
-        let of_part = |(spectral, weight): &(Spectral, f64)| Some(spectral.curvature(self.pattern, &matrix)? * *weight);
-        let curvature = self.parts.iter().map(of_part).sum::<Option<DMatrix<f64>>>()?;
-        Some((self.pattern.collapse(&gram), curvature))
+        let inverse = Cholesky::new(self.pattern.spread(moments))?.inverse();
+        Some((self.pattern.collapse(&inverse) * self.weight, self.pattern.congruence(&inverse) * self.weight))
     }
 
-    /// Minus its gradient at the moments `to`, to first order from `at`: a Gram matrix.
-    ///
-    /// Positive definite when the step is below 1 in the local norm, since that of `-log det` is
-    /// part of it.
+    /// Minus its gradient at the moments `to`, to first order from `at`: a Gram matrix, positive
+    /// definite when the step is below 1 in the local norm.
     pub(super) fn predicted(&self, at: &DVector<f64>, to: &DVector<f64>) -> Option<DMatrix<f64>> {
-        let (at, to) = (self.pattern.spread(at), self.pattern.spread(to));
-        let of_part = |(spectral, weight): &(Spectral, f64)| Some(spectral.predicted(&at, &to)? * *weight);
-        self.parts.iter().map(of_part).sum::<Option<DMatrix<f64>>>().map(symmetric)
+        let inverse = Cholesky::new(self.pattern.spread(at))?.inverse();
+        let predicted = &inverse * 2.0 - &inverse * self.pattern.spread(to) * &inverse;
+        Some((&predicted + predicted.transpose()) * (0.5 * self.weight))
     }
 }

@@ -1,52 +1,25 @@
 //! A certificate for a polynomial from elsewhere: a definite Gram matrix of its Hessian form, if
 //! there is one.
 //!
-//! Of all Gram matrices H of the form f, `A(H) = f`, the one with the largest determinant is as far
-//! from singular as can be wished for. Its dual has one variable for each monomial of the form, a
-//! functional s with the moment matrix S(s) = A*(s):
-//!
-//! ```text
-//! minimise  f·s - log det S(s),   with  H = S(s)⁻¹  at the minimum,
-//! ```
-//!
-//! by Newton's method. For every H with `A(H) = f` and every definite S(s), `f·s = tr H S(s) >=
-//! λ_min(H) tr S(s)`: what is found on the way bounds the smallest eigenvalue of all certificates
-//! from above, and where it is negative there is none.
+//! Of all Gram matrices H of the form f, `A(H) = f`, the one with the largest smallest eigenvalue is
+//! the easiest to prove (`margin_program`). A functional on the form with a definite moment matrix
+//! bounds that eigenvalue from above, and where the bound is negative there is no certificate.
 //!
 //! A square that only one product of the basis gives and that is missing in f rules that element of
 //! the basis out, as those of sparse forms: of `z^4` only `y z` is left.
 
-use super::factor::regularised_factor;
+use super::localizing::LocalizingMatrix;
+use super::margin_program::{Margin, largest_margin};
 use super::structure::{Pattern, Structure};
-use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
+use nalgebra::{DVector, Vector3};
 use sublevel_core::body::sphere_rule;
 use sublevel_core::polynomial::{CertificateError, Exponents, HessianGram, HessianMonomial, Polynomial};
 
-/// Newton steps before giving up; ten to thirty are used where there is a certificate.
-const MAX_NEWTON_STEPS: usize = 300;
-
-/// Newton decrement at which the determinant is the largest for all practical purposes;
-/// dimensionless.
-///
-/// The eigenvalues are then known to this relative accuracy. A larger value ends with certificates
-/// of smaller eigenvalues; a smaller one is not reached near the edge of convexity. Pinned by
-/// `the_edge_of_convexity_is_told_from_both_sides`.
-const OPTIMAL_DECREMENT: f64 = 1e-6;
-
-/// Newton decrement below which the matrix that a step predicts is tried as a certificate;
-/// dimensionless.
-///
-/// Below 1 the prediction is definite, and a half keeps away from there. A larger value tries
-/// matrices that are not definite; a smaller one takes more steps. Pinned by
-/// `sparse_and_full_forms_get_proven_certificates`.
-const DEFINITE_DECREMENT: f64 = 0.5;
-
 /// Bound of the smallest eigenvalue, relative to the largest coefficient, below which a polynomial
-/// is refused; dimensionless.
+/// is called barely sos-convex; dimensionless.
 ///
 /// The residual of a proof in double precision is about 1e-15 of the coefficients. It decides only
-/// when a search is given up: a larger value ends some with a worse matrix, a smaller one continues
-/// where nothing can be proven. No test fixes it.
+/// what an error says, and no test fixes it.
 const LEAST_PROVABLE_EIGENVALUE: f64 = 1e-14;
 
 /// Why a polynomial has no certificate.
@@ -81,7 +54,7 @@ pub enum NoCertificate {
     Unproven(#[from] CertificateError),
 }
 
-/// The Gram matrix of the polynomial's Hessian form that has the largest determinant, proven.
+/// The Gram matrix of the polynomial's Hessian form whose smallest eigenvalue is the largest, proven.
 ///
 /// # Errors
 /// [`NoCertificate`], by how much it failed.
@@ -93,10 +66,18 @@ pub fn certificate(polynomial: &Polynomial) -> Result<HessianGram, NoCertificate
     let (pattern, keys) = structure.hessian.restricted(&rows);
     let form = DVector::from_iterator(keys.len(), keys.iter().map(|&key| form[key] / largest));
     let basis: Vec<_> = rows.iter().map(|&row| structure.hessian_basis[row]).collect();
-    let matrix = centre(&pattern, &form, &start(&pattern, &basis))? * largest;
-    let gram = HessianGram::nearest(polynomial, basis, matrix)?;
-    gram.prove(polynomial)?;
-    Ok(gram)
+    let inside = start(&pattern, &basis);
+    let cones = [LocalizingMatrix::of(pattern)];
+    let Margin { bound, mut grams } = largest_margin(&form, &cones, &[vec![1.0; rows.len()]], &inside)
+        .map_err(|_| NoCertificate::Singular { bound: f64::NAN })?;
+    if bound < 0.0 {
+        return Err(NoCertificate::NotSosConvex { bound });
+    }
+    let gram = HessianGram::nearest(polynomial, basis, grams.remove(0) * largest)?;
+    match gram.prove(polynomial) {
+        Err(_) if bound < LEAST_PROVABLE_EIGENVALUE => Err(NoCertificate::Singular { bound }),
+        proven => Ok(proven.map(|_| gram)?),
+    }
 }
 
 /// Coefficients of the Hessian form.
@@ -150,43 +131,6 @@ fn start(pattern: &Pattern, basis: &[HessianMonomial]) -> DVector<f64> {
         }
     }
     moments
-}
-
-/// The Gram matrix of the form with the largest determinant.
-fn centre(pattern: &Pattern, form: &DVector<f64>, start: &DVector<f64>) -> Result<DMatrix<f64>, NoCertificate> {
-    let mut s = start.clone();
-    let mut bound = f64::INFINITY;
-    let mut found = None;
-    for step in 0..MAX_NEWTON_STEPS {
-        let moments = pattern.spread(&s);
-        let trace = moments.trace();
-        let Some(gram) = Cholesky::new(moments).map(|factor| factor.inverse()) else { break };
-        let rounding =
-            4.0 * f64::EPSILON * pattern.keys as f64 * form.iter().zip(&s).map(|(f, s)| (f * s).abs()).sum::<f64>();
-        bound = bound.min((form.dot(&s) + rounding) / trace);
-        if bound < 0.0 {
-            return Err(NoCertificate::NotSosConvex { bound });
-        }
-        if step == 0 {
-            // The best multiple.
-            s *= pattern.size as f64 / form.dot(&s).max(f64::MIN_POSITIVE);
-            continue;
-        }
-        let slope = form - pattern.collapse(&gram);
-        let Some(factor) = regularised_factor(&pattern.congruence(&gram)) else { break };
-        let Some(half) = factor.solve_lower_triangular(&slope) else { break };
-        let Some(change) = factor.tr_solve_lower_triangular(&half).map(|change| -change) else { break };
-        let decrement = half.norm();
-        if decrement < DEFINITE_DECREMENT {
-            let predicted = &gram * 2.0 - &gram * pattern.spread(&(&s + &change)) * &gram;
-            found = Some((&predicted + predicted.transpose()) * 0.5);
-        }
-        if !(decrement > OPTIMAL_DECREMENT) || bound < LEAST_PROVABLE_EIGENVALUE {
-            break;
-        }
-        s += change / (1.0 + decrement);
-    }
-    found.ok_or(NoCertificate::Singular { bound })
 }
 
 #[cfg(test)]

@@ -6,9 +6,10 @@
 //! all points. So the volume never grows, and what had to be taken in is known to the next step.
 
 use super::Cone;
-use super::conic::Conic;
+use super::conic_program::{ConicProgram, Expression, solve};
 use super::dominance::Dominance;
 use super::farthest_points::farthest_points;
+use super::model::Model;
 use super::path::Interior;
 use super::progress::Watch;
 use super::refine::{Refined, RefinementEnd, normalise, step_model};
@@ -28,12 +29,11 @@ const MAX_VOLUME_STEPS: usize = 30;
 /// `degree_two_over_any_cone_is_the_smallest_ellipsoid`.
 const CONE_VOLUME_DECREASE: f64 = 2e-3;
 
-/// Accuracy of a step's program, relative to the volume; dimensionless.
+/// Tolerance asked of the solver; dimensionless.
 ///
-/// A twentieth of [`CONE_VOLUME_DECREASE`], so that a step's decrease is not its error. A larger
-/// value ends descents early; a smaller one takes more Newton steps. The search along each step
-/// hides its effect on volumes, and no test fixes it.
-const CONE_STEP_GAP: f64 = 1e-4;
+/// A larger value leaves residuals that cost certificates; a smaller one takes more iterations.
+/// Pinned by `programs_agree_with_clarabel`.
+const TOLERANCE: f64 = 1e-8;
 /// Points that the first program knows, in multiples of the rows of P, and at most as many more in
 /// each of the next.
 const KNOWN_MULTIPLE: usize = 4;
@@ -44,6 +44,8 @@ const KNOWN_MULTIPLE: usize = 4;
 /// to the shift of the constant; a smaller one fills the program with points that bound alike.
 /// Pinned by `degree_two_over_any_cone_is_the_smallest_ellipsoid`.
 const OUTSIDE: f64 = 1e-4;
+/// Residual of the Hessian form, relative to its Gram matrix, that a certificate can make up for.
+const FORM_RESIDUAL: f64 = 1e-6;
 /// Lengths tried of one step.
 const LENGTHS: usize = 8;
 
@@ -72,9 +74,9 @@ pub(super) fn descend(
         let here = expansion.volume;
         let model = step_model(structure, &current.coefficients, expansion, &center).ok_or(ProgramError::Singular)?;
         let columns = values.select_columns(&known.indices);
-        let program = Conic { dominance: &dominance, values: &columns, margin, model: &model };
+        let program = ModelProgram { dominance: &dominance, structure, values: &columns, margin, model: &model };
         watch.round(columns.ncols(), known.worst);
-        let target = program.minimise(&current.coefficients, CONE_STEP_GAP * here, watch)?;
+        let target = program.minimise(watch)?;
         let Some(target) = target else {
             end = RefinementEnd::Unsolved;
             break;
@@ -99,6 +101,59 @@ pub(super) fn descend(
         return Err(ProgramError::Singular.into());
     }
     Ok(Refined { coefficients: current.coefficients, hessian: current.hessian, volumes, end })
+}
+
+/// A convex quadratic model of the coefficients c of p, to be minimised over one of the smaller
+/// cones:
+///
+/// ```text
+/// minimise  F(c)   subject to  p(xᵢ) <= 1,   D c - ε tr = the form of blocks in their cones
+/// ```
+pub(super) struct ModelProgram<'a> {
+    pub(super) dominance: &'a Dominance<'a>,
+    pub(super) structure: &'a Structure,
+    /// Monomials of each point, one column each.
+    pub(super) values: &'a DMatrix<f64>,
+    /// ε.
+    pub(super) margin: f64,
+    /// F.
+    pub(super) model: &'a Model,
+}
+
+impl ModelProgram<'_> {
+    /// The minimiser; none where the solver has none that is feasible.
+    ///
+    /// # Errors
+    /// [`FitError::Cancelled`].
+    pub(super) fn minimise(&self, watch: &mut Watch) -> Result<Option<Interior>, FitError> {
+        let Self { dominance, structure, values, margin, model } = *self;
+        let pattern = &structure.hessian;
+        let mut program = ConicProgram::default();
+        let coefficients = program.variables(structure.monomials.len());
+        let (linear, quadratic) = model.terms();
+        coefficients.clone().zip(linear.iter()).for_each(|(variable, &cost)| program.add_cost(variable, cost));
+        program.add_quadratic(coefficients.start, quadratic);
+        program.nonnegative(values.column_iter().map(|values| {
+            let terms = coefficients.clone().zip(values.iter().map(|value| -value)).collect();
+            Expression { terms, constant: 1.0 }
+        }));
+        let of_key =
+            |&(monomial, factor): &(usize, f64)| Expression::default().plus(factor, coefficients.start + monomial);
+        let mut form: Vec<Expression> = structure.derivative.iter().map(of_key).collect();
+        (0..pattern.size).for_each(|i| form[pattern.key(i, i)].constant -= margin);
+        let blocks = dominance.constrain(&mut program, form);
+        let unit = linear.amax().max(1.0);
+        let solution = match solve(&program, TOLERANCE, unit, watch) {
+            Ok(solution) => solution,
+            Err(FitError::Cancelled) => return Err(FitError::Cancelled),
+            Err(_) => return Ok(None),
+        };
+        let coefficients = solution.values(coefficients);
+        let hessian = dominance.gram(&blocks, &solution) + DMatrix::identity(pattern.size, pattern.size) * margin;
+        let residual = structure.derivative_matrix() * &coefficients - pattern.collapse(&hessian);
+        let feasible = residual.amax() <= FORM_RESIDUAL * hessian.amax().max(1.0);
+        Ok(feasible.then_some(Interior { coefficients, hessian }))
+    }
 }
 
 /// A search along a segment of polynomials for one of about the smallest volume.

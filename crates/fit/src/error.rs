@@ -41,6 +41,9 @@ pub enum FitError {
          refinement at their defaults, or take the cone sos"
     )]
     Cone(Cone),
+    /// The structured solver is asked for what it has no program for.
+    #[error("solver: structured solves logdet-p over the cone sos only; take clarabel, or leave the solver out")]
+    Solver,
     /// Too many slabs.
     #[error("slabs: {0} is more than {MAX_SLABS}; raise the degree instead")]
     Slabs(usize),

@@ -1,10 +1,12 @@
 //! Fitted bodies, and how they came about.
 
+use super::conic_program::SolverStep;
 use super::gap::Gap;
 use super::refine::RefinementEnd;
 use sublevel_core::body::Body;
 use sublevel_core::body::Cone;
 use sublevel_core::body::Objective;
+use sublevel_core::body::Solver;
 
 /// What a fit took and reached.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,6 +48,12 @@ pub struct FitReport {
     pub objective_value: f64,
     /// Margin the certificate was proven with.
     pub margin: f64,
+    /// What solved the program.
+    pub solver: Solver,
+    /// Why the solver that was tried first did not, if one was.
+    pub fallback: Option<String>,
+    /// The iterations of the conic solver, of all programs.
+    pub log: Vec<SolverStep>,
 }
 
 /// A fitted body and how it came about.

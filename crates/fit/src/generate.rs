@@ -1,16 +1,16 @@
-//! Solves the program of a fit: the central path to its optimum, adding the points that are left
-//! outside.
+//! Solves the program of a fit by one of its solvers, adding the points that are left outside, and
+//! verifies the optimum.
 
 use super::FitError;
-use super::farthest_points::farthest_points;
+use super::active_points::ActivePoints;
+use super::moment_program::{MomentOptimum, MomentProgram};
 use super::objective::Matrix;
-use super::path::{Interior, Iterate, Path, PathOptions};
+use super::path::{Interior, Path, PathOptions};
 use super::program::{Problem, ProgramError};
 use super::progress::Watch;
-use super::spaced_points::spaced_points;
 use super::structure::Structure;
 use nalgebra::{DMatrix, DVector, Vector3};
-use sublevel_core::body::fibonacci_lattice;
+use sublevel_core::body::Solver;
 
 /// Excess of p over 1 up to which a point is left to the shift of the constant coefficient;
 /// dimensionless.
@@ -48,14 +48,13 @@ const PREPARATIONS: usize = 3;
 /// See [`PREPARATIONS`]. It changes how many rounds a fit takes and not its answer, which
 /// [`VIOLATION`] decides.
 const PREPARED: f64 = 1e-3;
-/// Points in the start, in multiples of N, and the most that are taken for likely.
-const START_MULTIPLE: usize = 10;
-/// See [`START_MULTIPLE`].
-const LIKELY_MULTIPLE: usize = 5;
 /// Growth of τ from one centre to the next.
 const GROWTH: f64 = 10.0;
 /// Newton steps on one path before settling for what there is.
 const MAX_PATH_STEPS: usize = 200;
+/// Hull vertices up to which the conic solver is given all at once; above, those that were left
+/// outside come in by rounds.
+const ALL_POINTS: usize = 1000;
 /// Sets of points before giving up.
 const MAX_POINT_ROUNDS: usize = 60;
 
@@ -73,24 +72,84 @@ pub(super) struct Optimum {
     pub(super) gap: Option<f64>,
     /// f, in the whitened frame for log dets and volumes and in the unit frame for traces.
     pub(super) objective: f64,
+    /// What solved it.
+    pub(super) solver: Solver,
+    /// Why the solver that was tried before did not, if one was.
+    pub(super) fallback: Option<String>,
+}
+
+/// An optimum by one of the solvers' own account.
+struct Candidate {
+    interior: Interior,
+    gram: Option<DMatrix<f64>>,
+    lower_bound: f64,
 }
 
 /// Minimises the objective over p, sos-convex as far as the problem asks for it, with `p <= 1` at
 /// `points` (whitened: the unit ball is their smallest ellipsoid). The program begins with the
 /// points that are `likely` to bound p, the likeliest first, among others; they change the answer
-/// only within its gap.
+/// only within its gap. Unless one solver is asked for, a second one is tried where the first fails.
 pub(super) fn generate(
-    problem: Problem,
+    problem: &Problem,
     points: &[Vector3<f64>],
     likely: &[usize],
     watch: &mut Watch,
 ) -> Result<Optimum, FitError> {
+    let mut failed: Option<(Solver, FitError)> = None;
+    for solver in problem.solvers() {
+        let found = match solver {
+            Solver::Clarabel => by_conic_solver(problem, points, likely, watch),
+            Solver::Structured => by_path(problem, points, likely, watch),
+        };
+        match found.and_then(|candidate| verified(problem, candidate, solver)) {
+            Ok(optimum) => {
+                let fallback = failed.map(|(solver, error)| format!("{solver} failed: {error}"));
+                return Ok(Optimum { fallback, ..optimum });
+            }
+            Err(FitError::Cancelled) => return Err(FitError::Cancelled),
+            // The first error is about the solver that suits the program best.
+            Err(error) => failed = Some(failed.unwrap_or((solver, error))),
+        }
+    }
+    Err(failed.map_or(ProgramError::Singular.into(), |(_, error)| error))
+}
+
+/// The optimum by clarabel.
+fn by_conic_solver(
+    problem: &Problem,
+    points: &[Vector3<f64>],
+    likely: &[usize],
+    watch: &mut Watch,
+) -> Result<Candidate, FitError> {
+    let mut active = ActivePoints::start_with_all(problem, points, likely, ALL_POINTS);
+    let mut worst = 0.0;
+    for _ in 1..=MAX_POINT_ROUNDS {
+        watch.round(active.values.ncols(), worst);
+        let optimum = MomentProgram::of_points(problem, &active.values).solve(watch)?;
+        let outside = violations(problem.structure, points, &optimum.interior.coefficients);
+        worst = outside.first().map_or(0.0, |&(excess, _)| excess);
+        if worst <= VIOLATION || points.len() <= ALL_POINTS {
+            let MomentOptimum { interior, gram, lower_bound, .. } = optimum;
+            return Ok(Candidate { interior, gram: Some(gram), lower_bound });
+        }
+        active.add(problem.structure, points, &outside);
+    }
+    Err(FitError::NoConvergence { rounds: MAX_POINT_ROUNDS })
+}
+
+/// The optimum by the central path of the dual.
+fn by_path(
+    problem: &Problem,
+    points: &[Vector3<f64>],
+    likely: &[usize],
+    watch: &mut Watch,
+) -> Result<Candidate, FitError> {
     let structure = problem.structure;
-    let mut active = Active::start(&problem, points, likely);
+    let mut active = ActivePoints::start(problem, points, likely);
     let mut worst = 0.0;
     for round in 1..=MAX_POINT_ROUNDS {
         // Points come in while the optimum is still rough.
-        let path = Path::of_fit(&problem, &active.values);
+        let path = Path::of_fit(problem, &active.values);
         let first = path.start().ok_or(ProgramError::Singular)?;
         watch.round(active.values.ncols(), worst);
         let rough = path.follow(first, path_options(ROUGH_GAP), watch)?.ok_or(ProgramError::Singular)?;
@@ -104,7 +163,8 @@ pub(super) fn generate(
         let outside = violations(structure, points, &last.interior.coefficients);
         worst = outside.first().map_or(0.0, |&(excess, _)| excess);
         if worst <= VIOLATION {
-            return verified(&problem, last);
+            let lower_bound = problem.lower_bound(&last.point.dual)?;
+            return Ok(Candidate { interior: last.interior, gram: last.gram, lower_bound });
         }
         active.add(structure, points, &outside);
     }
@@ -116,18 +176,19 @@ fn path_options(gap: f64) -> PathOptions {
 }
 
 /// The optimum if the dual point proves it one.
-fn verified(problem: &Problem, centre: Iterate) -> Result<Optimum, FitError> {
-    let gram = match problem.matrix {
-        Matrix::Polynomial => centre.gram.as_ref(),
-        Matrix::Hessian => Some(&centre.interior.hessian),
+fn verified(problem: &Problem, candidate: Candidate, solver: Solver) -> Result<Optimum, FitError> {
+    let Candidate { interior, gram, lower_bound } = candidate;
+    let measured = match problem.matrix {
+        Matrix::Polynomial => gram.as_ref(),
+        Matrix::Hessian => Some(&interior.hessian),
     };
-    let objective = gram.and_then(|gram| problem.spectral.measure(gram)).ok_or(ProgramError::Singular)?;
-    let gap = objective - problem.lower_bound(&centre.point.dual)?;
+    let objective = measured.and_then(|gram| problem.spectral.measure(gram)).ok_or(ProgramError::Singular)?;
+    let gap = objective - lower_bound;
     if !(gap.abs() <= OPTIMALITY_GAP * objective.abs().max(1.0)) {
         return Err(FitError::NotOptimal { gap });
     }
-    let Interior { coefficients, hessian } = centre.interior;
-    Ok(Optimum { gap: Some(gap), objective, coefficients, hessian, gram: centre.gram })
+    let Interior { coefficients, hessian } = interior;
+    Ok(Optimum { gap: Some(gap), objective, coefficients, hessian, gram, solver, fallback: None })
 }
 
 /// Points with p above 1, the farthest first.
@@ -141,60 +202,3 @@ fn violations(structure: &Structure, points: &[Vector3<f64>], coefficients: &DVe
     outside.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     outside
 }
-
-/// The points a program knows.
-struct Active {
-    /// Which of the points are in.
-    used: Vec<bool>,
-    chosen: Vec<Vector3<f64>>,
-    /// Monomials of each chosen point, one column each.
-    values: DMatrix<f64>,
-}
-
-impl Active {
-    /// A well-spread subset, the likeliest points, and for convex p some inside the hull: those
-    /// constrain nothing, but with weight on them the moments are positive definite also when the
-    /// points lie on a quadric, as the corners of a box do.
-    fn start(problem: &Problem, points: &[Vector3<f64>], likely: &[usize]) -> Self {
-        let structure = problem.structure;
-        let first = farthest_points(points, START_MULTIPLE * structure.gram.size);
-        let mut chosen: Vec<Vector3<f64>> = first.iter().map(|&index| points[index]).collect();
-        if problem.is_convex() {
-            chosen.extend(inner(structure));
-        }
-        let mut used = vec![false; points.len()];
-        first.iter().for_each(|&index| used[index] = true);
-        let unused = likely.iter().copied().filter(|&index| !used[index]);
-        let likely = spaced_points(points, unused, LIKELY_MULTIPLE * structure.gram.size);
-        likely.iter().for_each(|&index| used[index] = true);
-        chosen.extend(likely.into_iter().map(|index| points[index]));
-        let values = columns(structure, &chosen);
-        Self { used, chosen, values }
-    }
-
-    /// Adds the worst of the points outside, but not many from one spot.
-    fn add(&mut self, structure: &Structure, points: &[Vector3<f64>], outside: &[(f64, usize)]) {
-        let candidates = outside.iter().map(|&(_, index)| index).filter(|&index| !self.used[index]);
-        let added = spaced_points(points, candidates, 2 * structure.gram.size);
-        added.iter().for_each(|&index| self.used[index] = true);
-        self.chosen.extend(added.into_iter().map(|index| points[index]));
-        self.values = columns(structure, &self.chosen);
-    }
-}
-
-fn columns(structure: &Structure, points: &[Vector3<f64>]) -> DMatrix<f64> {
-    DMatrix::from_columns(&points.iter().map(|point| structure.values(point)).collect::<Vec<_>>())
-}
-
-/// Points of a ball that is in the hull, twice as many as monomials of half the degree: they
-/// constrain nothing, but with weight on them moments are positive definite also where there are
-/// few points, or points on a quadric. The unit ball is the smallest ellipsoid around the hull, so
-/// the ball of a third of its radius is inside (John's theorem).
-pub(super) fn inner(structure: &Structure) -> impl Iterator<Item = Vector3<f64>> {
-    let count = 2 * structure.gram.size;
-    fibonacci_lattice(count).enumerate().map(|(i, u)| u * (INNER_RADIUS * (i as f64 * RADIUS_STEP).fract().cbrt()))
-}
-
-/// Radius of the ball, and the step of a low-discrepancy sequence of its radii.
-const INNER_RADIUS: f64 = 0.33;
-const RADIUS_STEP: f64 = 0.754_878;

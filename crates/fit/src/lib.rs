@@ -9,11 +9,12 @@
 //! body only with its proofs. A [`ladder`](ladder()) has several of them. [`fit_sos`] takes the
 //! same steps to sets that need not be convex.
 
+mod active_points;
 mod ball;
 mod barrier;
 mod basis;
 mod certificate;
-mod conic;
+mod conic_program;
 mod coordinates;
 mod cuboid;
 mod decompose;
@@ -32,11 +33,13 @@ mod generate;
 pub mod hull;
 pub mod input;
 mod ladder;
-mod lorentz;
+mod localizing;
 mod margin;
+mod margin_program;
 mod merge;
 mod model;
 mod moment;
+mod moment_program;
 mod object;
 mod objective;
 mod options;
@@ -65,6 +68,7 @@ mod volume;
 
 pub use ball::{EnclosingBall, smallest_ball};
 pub use certificate::{NoCertificate, certificate};
+pub use conic_program::SolverStep;
 pub use coordinates::Coordinates;
 pub use cuboid::{OrientedBox, smallest_box};
 pub use decompose::{PartSearch, convex_parts};
@@ -89,7 +93,7 @@ pub use refine::RefinementEnd;
 pub use shortfall::{MAX_PIECES, Shortfall};
 pub use slab::{CutError, MAX_SLABS};
 pub use sos::{ProgramReport, SosFit, SosOptions, SosReport, fit_sos};
-pub use sublevel_core::body::{Cone, Objective, SosMethod, UnknownCone, UnknownObjective};
+pub use sublevel_core::body::{Cone, Objective, Solver, SosMethod, UnknownCone, UnknownObjective, UnknownSolver};
 pub use thicken::thicken;
 pub use trim::{Trimmed, trim};
 
@@ -122,8 +126,9 @@ pub fn fit(
 }
 
 /// As [`fit()`], of points that have changed a little since `previous` was fitted, as those of the
-/// next scan of a stream: the program begins with the points near the surface of that body, which
-/// saves it rounds of looking for those that bound the new one. The answer is that of a fit from
+/// next scan of a stream: where a program does not begin with all points (those of the structured
+/// solver, and of more than a thousand vertices), it begins with those near the surface of that body,
+/// which saves it rounds of looking for those that bound the new one. The answer is that of a fit from
 /// scratch within the optimality gap, whatever the body is.
 ///
 /// # Errors

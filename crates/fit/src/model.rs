@@ -41,9 +41,9 @@ impl Model {
         &self.origin - change
     }
 
-    /// ∇F at coefficients c.
-    pub(super) fn gradient(&self, coefficients: &DVector<f64>) -> DVector<f64> {
-        &self.slope + &self.curvature * (coefficients - &self.origin)
+    /// `F(c) = ½ cᵀBc + q·c` but for a constant: q and B.
+    pub(super) fn terms(&self) -> (DVector<f64>, &DMatrix<f64>) {
+        (&self.slope - &self.curvature * &self.origin, &self.curvature)
     }
 
     /// B: the inverse of the conjugate's Hessian.

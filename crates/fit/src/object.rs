@@ -20,7 +20,7 @@ use nalgebra::{Matrix3, Vector3};
 use std::cell::RefCell;
 use std::ops::ControlFlow;
 use std::time::Instant;
-use sublevel_core::body::{Body, BodyError, Constraint, Normalization, Placement, Provenance, Volume};
+use sublevel_core::body::{Body, BodyError, Constraint, Normalization, Placement, Provenance, Solver, Volume};
 use sublevel_core::polynomial::{HessianGram, Polynomial};
 
 /// What the smallest ball minimises, as its provenance names it.
@@ -130,7 +130,7 @@ impl<'a> Object<'a> {
         // Rounding of the coordinates relative to the centre.
         let body = Body::ball(self.name, ball.center, ball.radius * (1.0 + 1e-12) + 2.0 * self.clearance)?
             .with_points(self.points)?;
-        let (body, gap) = self.finish(body, BALL, false);
+        let (body, gap) = self.finish(body, BALL, false, None);
         Ok(Rung { body, gap, seconds: self.seconds + start.elapsed().as_secs_f64(), report: None })
     }
 
@@ -140,7 +140,7 @@ impl<'a> Object<'a> {
         let structure = Structure::new(degree);
         let coordinates = self.coordinates(Coordinates::Unit)?;
         let problem = Problem::new(&structure, Objective::LogDetP, &coordinates, DEFAULT_MARGIN);
-        let optimum = generate(problem, &self.whitened, &[], watch)?;
+        let optimum = generate(&problem, &self.whitened, &[], watch)?;
         let value = |x: &Vector3<f64>| structure.values(&self.whiten(x)).dot(&optimum.coefficients);
         Ok(self.points.iter().map(value).collect())
     }
@@ -164,7 +164,8 @@ impl<'a> Object<'a> {
                 let found = descend(&structure, options.cone, &self.whitened, margin, &mut watch)?;
                 let objective = found.volumes.last().copied().unwrap_or(f64::NAN);
                 let Refined { coefficients, hessian, volumes, end } = found;
-                (Optimum { coefficients, hessian, gram: None, gap: None, objective }, volumes, Some(end))
+                let (gap, solver, fallback) = (None, Solver::Clarabel, None);
+                (Optimum { coefficients, hessian, gram: None, gap, objective, solver, fallback }, volumes, Some(end))
             };
             match self.certify(&structure, &optimum) {
                 Ok(body) => break (body, optimum, margin, volumes, end),
@@ -177,7 +178,8 @@ impl<'a> Object<'a> {
             cone => format!("volume, {cone}"),
         };
         self.begin_with(&body);
-        let (body, gap) = self.finish(body, &objective, options.refine && volumes.len() > 1);
+        let refined = options.refine && volumes.len() > 1;
+        let (body, gap) = self.finish(body, &objective, refined, Some(optimum.solver));
         let report = FitReport {
             degree: options.degree,
             points: self.points.len(),
@@ -195,6 +197,9 @@ impl<'a> Object<'a> {
             rounds: watch.progress().round,
             iterations: watch.progress().iterations,
             margin,
+            solver: optimum.solver,
+            fallback: optimum.fallback,
+            log: watch.log().to_vec(),
         };
         Ok(Fit { body, gap, report })
     }
@@ -209,20 +214,20 @@ impl<'a> Object<'a> {
         watch: &mut Watch,
     ) -> Result<(Optimum, Vec<f64>, Option<RefinementEnd>), FitError> {
         let coordinates = self.coordinates(options.coordinates)?;
-        let problem = Problem::new(structure, options.objective, &coordinates, margin);
-        let optimum = generate(problem, &self.whitened, &self.likely.borrow(), watch)
+        let problem = Problem::new(structure, options.objective, &coordinates, margin).solved_by(options.solver);
+        let optimum = generate(&problem, &self.whitened, &self.likely.borrow(), watch)
             .map_err(|error| error.of_objective(options.objective))?;
         if !options.refine {
             return Ok((optimum, Vec::new(), None));
         }
-        let Optimum { coefficients, hessian, gap, objective, .. } = optimum;
+        let Optimum { coefficients, hessian, gap, objective, solver, fallback, .. } = optimum;
         let Refined { coefficients, hessian, volumes, end } =
             refine(structure, &self.whitened, margin, Interior { coefficients, hessian }, watch)?;
-        Ok((Optimum { coefficients, hessian, gram: None, gap, objective }, volumes, Some(end)))
+        Ok((Optimum { coefficients, hessian, gram: None, gap, objective, solver, fallback }, volumes, Some(end)))
     }
 
     /// Notes where the body is from and how far it reaches beyond the hull.
-    pub(super) fn finish(&self, body: Body, objective: &str, refined: bool) -> (Body, Gap) {
+    pub(super) fn finish(&self, body: Body, objective: &str, refined: bool, solver: Option<Solver>) -> (Body, Gap) {
         let gap = self.gap(&body);
         let provenance = Provenance {
             input: self.input.to_owned(),
@@ -230,6 +235,7 @@ impl<'a> Object<'a> {
             refined,
             hull_vertices: self.hull.vertices.len(),
             hull_volume_m3: self.hull.volume,
+            solver,
         };
         (body.with_provenance(provenance).with_gap(gap.most_m), gap)
     }

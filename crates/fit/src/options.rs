@@ -6,6 +6,7 @@ use super::margin::DEFAULT_MARGIN;
 use super::slab::MAX_SLABS;
 use sublevel_core::body::Cone;
 use sublevel_core::body::Objective;
+use sublevel_core::body::Solver;
 use sublevel_core::body::check_name;
 
 /// What to fit.
@@ -32,6 +33,9 @@ pub struct FitOptions {
     /// It pays for the rounding of the certificate. Volumes grow by about a part in 10⁴ at 1e-4.
     /// The objectives of that very matrix keep it definite by themselves.
     pub margin: f64,
+    /// What solves the program; none takes the faster one, and the other if that fails. The
+    /// structured solver has [`Objective::LogDetP`] only, over [`Cone::Sos`].
+    pub solver: Option<Solver>,
     /// Name of the input, for the provenance of the body.
     pub input: String,
 }
@@ -46,6 +50,7 @@ impl Default for FitOptions {
             refine: false,
             slabs: 0,
             margin: DEFAULT_MARGIN,
+            solver: None,
             input: String::new(),
         }
     }
@@ -55,7 +60,7 @@ impl FitOptions {
     /// Checks the options and the name of a body to be fitted, before any work.
     ///
     /// # Errors
-    /// [`FitError::Degree`], [`FitError::Objective`], [`FitError::Cone`], [`FitError::Slabs`],
+    /// [`FitError::Degree`], [`FitError::Objective`], [`FitError::Cone`], [`FitError::Solver`], [`FitError::Slabs`],
     /// [`FitError::Margin`] or [`FitError::Name`].
     pub fn check(&self, name: &str) -> Result<(), FitError> {
         if ![2, 4, 6, 8].contains(&self.degree) {
@@ -66,6 +71,10 @@ impl FitOptions {
         }
         if self.cone != Cone::Sos && (self.objective != Objective::default() || self.refine) {
             return Err(FitError::Cone(self.cone));
+        }
+        let is_structured = self.objective == Objective::LogDetP && self.cone == Cone::Sos;
+        if self.solver == Some(Solver::Structured) && !is_structured {
+            return Err(FitError::Solver);
         }
         if self.slabs > MAX_SLABS {
             return Err(FitError::Slabs(self.slabs));

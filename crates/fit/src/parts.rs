@@ -15,7 +15,7 @@ use super::{FitError, FitOptions, MAX_PIECES, Mesh, Progress, Rung, Shortfall};
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::time::Instant;
-use sublevel_core::body::{Body, Compound, Division, Piece, Provenance};
+use sublevel_core::body::{Body, Compound, Division, Piece, Provenance, Solver};
 
 /// A fitted compound.
 #[derive(Clone, Debug)]
@@ -93,6 +93,7 @@ impl Source<'_> {
             refined: self.options.refine,
             hull_vertices: hull.vertices.len(),
             hull_volume_m3: hull.volume,
+            solver: common_solver(&parts),
         };
         let compound = Compound::new(self.name, parts)?.with_covering(points, triangles, division)?;
         let compound = compound.with_provenance(provenance);
@@ -205,6 +206,13 @@ fn on_part<T>(
     work: impl FnOnce(&Object<'_>) -> Result<T, FitError>,
 ) -> Result<T, FitError> {
     work(&Object::new(&part_name(index), &points.points, &options.input)?.around(points.uncertainty))
+}
+
+/// What solved the programs of all parts, if that is one solver.
+fn common_solver(parts: &[Body]) -> Option<Solver> {
+    let of_part = |part: &Body| part.provenance().and_then(|provenance| provenance.solver);
+    let first = of_part(parts.first()?)?;
+    parts.iter().all(|part| of_part(part) == Some(first)).then_some(first)
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! The central path of a fit's dual program, followed by Newton's method.
 //!
-//! The dual of `program` has few variables, and its barrier problem, here for the Gram matrix P,
+//! The dual of `program` has few variables, and its barrier problem, here for log det P,
 //!
 //! ```text
-//! minimise  τ (-φ(M(m)) + Σwᵢ - ε tr S(s) + h·s) - Σ log wᵢ - log det S(s),   m = Σ wᵢ v(xᵢ) - D*s
+//! minimise  τ (-log det M(m) + Σwᵢ - ε tr S(s) + h·s) - Σ log wᵢ - log det S(s),   m = Σ wᵢ v(xᵢ) - D*s
 //! ```
 //!
 //! costs one small dense factorization per Newton step (Nesterov and Nemirovskii, Interior-Point
@@ -15,11 +15,9 @@ use super::FitError;
 use super::barrier::Barrier;
 use super::factor::{cholesky, regularised_factor, solve_lower};
 use super::model::Model;
-use super::objective::Matrix;
 use super::program::{Dual, Problem};
 use super::progress::Watch;
-use super::spectral::Spectral;
-use super::structure::{Pattern, Structure, isotropic_form};
+use super::structure::{Structure, isotropic_form};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use sublevel_core::polynomial::degree_of;
 
@@ -29,15 +27,12 @@ const CENTRED: f64 = 0.9;
 
 /// Growth of τ below which a path that rounding blocks is given up.
 const LEAST_GROWTH: f64 = 1.3;
-/// Weight of a trace at the start, relative to that of a log det: 1e-2 leaves some starts too far
-/// from any centre, 1e-6 drowns the trace in rounding.
-const TRACE_SHARE: f64 = 1e-4;
 
 /// What the path minimises, besides `Σw - ε tr S + h·s`.
 #[derive(Clone, Copy)]
 pub(super) enum PathObjective<'a> {
-    /// `-φ` of the moment matrix of one Gram matrix.
-    Gram(Matrix, &'a Spectral),
+    /// `-log det` of the moment matrix of P.
+    LogDet,
     /// A quadratic function of the moments.
     Model(&'a Model),
 }
@@ -109,12 +104,7 @@ struct Newton {
 impl<'a> Path<'a> {
     /// The path of a fit over the points whose monomials are the columns of `values`.
     pub(super) fn of_fit(problem: &'a Problem, values: &'a DMatrix<f64>) -> Self {
-        let mut path = Self::new(
-            problem.structure,
-            values,
-            problem.margin,
-            PathObjective::Gram(problem.matrix, &problem.spectral),
-        );
+        let mut path = Self::new(problem.structure, values, problem.margin, PathObjective::LogDet);
         if let Some(allowance) = &problem.allowance {
             path.allowance += allowance;
             path.cost += allowance;
@@ -137,45 +127,19 @@ impl<'a> Path<'a> {
         Self { structure, values, margin, objective, derivative, allowance: DVector::zeros(forms), cost }
     }
 
-    fn pattern(&self, matrix: Matrix) -> &'a Pattern {
-        match matrix {
-            Matrix::Polynomial => &self.structure.gram,
-            Matrix::Hessian => &self.structure.hessian,
-        }
+    /// `-τ log det M`.
+    fn of_gram(&self, tau: f64) -> Barrier<'a> {
+        Barrier { pattern: &self.structure.gram, weight: tau }
     }
 
-    /// What the moments of `matrix` add to the barrier problem.
-    fn barrier(&self, matrix: Matrix, tau: f64) -> Barrier<'a> {
-        let measured = match self.objective {
-            PathObjective::Gram(measured, spectral) if measured == matrix => Some((spectral, tau)),
-            _ => None,
-        };
-        Barrier::new(self.pattern(matrix), measured)
+    /// `-log det S`.
+    fn of_form(&self) -> Barrier<'a> {
+        Barrier { pattern: &self.structure.hessian, weight: 1.0 }
     }
 
     /// At a centre, this over τ is the distance to the optimum.
     pub(super) fn barrier_parameter(&self) -> f64 {
-        let cone = match self.objective {
-            PathObjective::Model(_) => self.structure.hessian.size,
-            PathObjective::Gram(_, spectral) if !spectral.is_self_concordant() => {
-                self.structure.gram.size + self.structure.hessian.size
-            }
-            PathObjective::Gram(Matrix::Polynomial, _) => self.structure.hessian.size,
-            PathObjective::Gram(Matrix::Hessian, _) => self.structure.gram.size,
-        };
-        (self.values.ncols() + cone) as f64
-    }
-
-    /// The unit of gaps.
-    fn size(&self, at: &Dual) -> f64 {
-        match self.objective {
-            PathObjective::Gram(Matrix::Polynomial, spectral) => {
-                spectral.size(&self.structure.gram.spread(&at.moments))
-            }
-            PathObjective::Gram(Matrix::Hessian, spectral) => spectral.size(&self.structure.hessian.spread(&at.form)),
-            PathObjective::Model(_) => Some(1.0),
-        }
-        .unwrap_or(1.0)
+        (self.values.ncols() + self.structure.hessian.size) as f64
     }
 
     fn point(&self, weights: DVector<f64>, form: DVector<f64>) -> Dual {
@@ -200,22 +164,11 @@ impl<'a> Path<'a> {
                 Some(self.point(weights.clone(), &isotropic * 0.5_f64.powi(halvings + 1)))
             })
         })?;
-        let DualPoint { dual, tau } = match self.objective {
-            PathObjective::Gram(_, spectral) if !spectral.is_self_concordant() => {
-                // The functional is a poor guess for traces, so the barriers rule at first; then
-                // this scale is best.
-                let size = self.size(&dual);
-                let scale = size * (1.0 + self.barrier_parameter() / (TRACE_SHARE * rows));
-                let dual = self.point(dual.weights * scale.powi(2), dual.form * scale.powi(2));
-                DualPoint { dual, tau: 1.0 / (size * scale) }
-            }
-            _ => DualPoint { dual, tau: 1.0 },
-        };
         // At a centre the rows of S are what relaxed convexity costs: a start that costs more is
         // far from any.
-        let least = self.structure.hessian.size as f64 / (tau * self.cost.dot(&dual.form));
+        let least = self.structure.hessian.size as f64 / self.cost.dot(&dual.form);
         let share = if least > 0.0 { least.min(1.0) } else { 1.0 };
-        Some(DualPoint { dual: self.point(dual.weights, dual.form * share), tau })
+        Some(DualPoint { dual: self.point(dual.weights, dual.form * share), tau: 1.0 })
     }
 
     /// The last centre before the steps ran out or rounding stood in the way; its τ bounds how far
@@ -230,19 +183,18 @@ impl<'a> Path<'a> {
         watch: &mut Watch,
     ) -> Result<Option<Iterate>, FitError> {
         let DualPoint { mut dual, mut tau } = from;
-        let (mut size, mut growth) = (self.size(&dual), options.growth);
+        let mut growth = options.growth;
         let mut last: Option<Iterate> = None;
         for _ in 0..options.steps {
-            watch.iteration(self.barrier_parameter() / (tau * size))?;
+            watch.iteration(self.barrier_parameter() / tau)?;
             let newton = self.step(&dual, tau);
             let centred = newton.as_ref().is_some_and(|newton| newton.decrement < CENTRED);
             let centre = newton.as_ref().filter(|_| centred).and_then(|newton| self.centre(&dual, newton, tau));
             match (newton, centre) {
                 (Some(_), Some(centre)) => {
-                    size = self.size(&dual);
                     dual.clone_from(&centre.point.dual);
                     last = Some(centre);
-                    let end = self.barrier_parameter() / (options.gap * size);
+                    let end = self.barrier_parameter() / options.gap;
                     if tau >= end {
                         break;
                     }
@@ -267,9 +219,9 @@ impl<'a> Path<'a> {
         }
         let of_moments = match self.objective {
             PathObjective::Model(model) => tau * model.value(&point.moments),
-            PathObjective::Gram(..) => self.barrier(Matrix::Polynomial, tau).value(&point.moments)?,
+            PathObjective::LogDet => self.of_gram(tau).value(&point.moments)?,
         };
-        let of_form = self.barrier(Matrix::Hessian, tau).value(&point.form)?;
+        let of_form = self.of_form().value(&point.form)?;
         let weights = point.weights.iter().map(|w| w.ln()).sum::<f64>();
         let cost = point.weights.sum() + self.cost.dot(&point.form);
         let value = of_moments + of_form + tau * cost - weights;
@@ -281,7 +233,7 @@ impl<'a> Path<'a> {
         if let PathObjective::Model(model) = self.objective {
             return Some((model.coefficients(&at.moments) * tau, model.flexibility() / tau));
         }
-        let (gradient, curvature) = self.barrier(Matrix::Polynomial, tau).derivatives(&at.moments)?;
+        let (gradient, curvature) = self.of_gram(tau).derivatives(&at.moments)?;
         let factor = regularised_factor(&curvature)?;
         let root = solve_lower(&factor, DMatrix::identity(gradient.len(), gradient.len()))?;
         Some((gradient, root.transpose() * &root))
@@ -292,7 +244,7 @@ impl<'a> Path<'a> {
         let Self { values, derivative, .. } = self;
         // 1. Gradients and Hessians of the three parts.
         let (coefficients, flexibility) = self.of_moments(at, tau)?;
-        let (gram, curvature) = self.barrier(Matrix::Hessian, tau).derivatives(&at.form)?;
+        let (gram, curvature) = self.of_form().derivatives(&at.form)?;
         let form_factor = regularised_factor(&curvature)?;
         let of_weights = (values.tr_mul(&coefficients) * -1.0).add_scalar(tau) - at.weights.map(|w| 1.0 / w);
         let of_form = derivative * &coefficients + &self.cost * tau - gram;
@@ -335,13 +287,13 @@ impl<'a> Path<'a> {
         let coefficients = &newton.coefficients / tau;
         let Structure { gram, hessian, .. } = self.structure;
         let margin = DMatrix::identity(hessian.size, hessian.size) * self.margin;
-        let form = self.barrier(Matrix::Hessian, tau).predicted(&at.form, &newton.whole.form)? / tau + &margin;
+        let form = self.of_form().predicted(&at.form, &newton.whole.form)? / tau + &margin;
         let form = hessian.nearest(&form, &(&self.derivative * &coefficients + &self.allowance));
         Cholesky::new(&form - margin * 0.5)?;
         let gram = match self.objective {
             PathObjective::Model(_) => None,
-            PathObjective::Gram(..) => {
-                let predicted = self.barrier(Matrix::Polynomial, tau).predicted(&at.moments, &newton.whole.moments)?;
+            PathObjective::LogDet => {
+                let predicted = self.of_gram(tau).predicted(&at.moments, &newton.whole.moments)?;
                 Some(gram.nearest(&(predicted / tau), &coefficients))
             }
         };

@@ -34,7 +34,11 @@ use super::objective::{Function, Matrix, Measure};
 use super::spectral::Spectral;
 use super::structure::{Pattern, Structure};
 use nalgebra::{DMatrix, DVector};
+use sublevel_core::body::Solver;
 use sublevel_core::polynomial::NormPower;
+
+/// Degree from which the structured solver is more than twice as fast as clarabel.
+const STRUCTURED_DEGREE: usize = 8;
 
 /// Why a program could not be solved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -42,6 +46,9 @@ pub enum ProgramError {
     /// A moment matrix lost its definiteness.
     #[error("the points do not span the polynomials of this degree numerically; lower the degree, or add points")]
     Singular,
+    /// The solver has no answer.
+    #[error("the semidefinite program could not be solved ({0}); lower the degree, or add points")]
+    Solver(String),
 }
 
 /// A dual point: weights, functional on the Hessian form, and the moments they give.
@@ -67,6 +74,8 @@ pub(super) struct Problem<'a> {
     pub(super) margin: f64,
     /// h: coefficients of the Hessian form of what relaxes convexity; none if nothing does.
     pub(super) allowance: Option<DVector<f64>>,
+    /// What is to solve it; none for the faster one, and the other if that fails.
+    pub(super) solver: Option<Solver>,
 }
 
 impl<'a> Problem<'a> {
@@ -82,7 +91,7 @@ impl<'a> Problem<'a> {
             Matrix::Polynomial => margin,
             Matrix::Hessian => 0.0,
         };
-        Self { structure, matrix, spectral, margin, allowance: None }
+        Self { structure, matrix, spectral, margin, allowance: None, solver: None }
     }
 
     /// The same program with convexity asked of `p + power` only.
@@ -95,6 +104,22 @@ impl<'a> Problem<'a> {
             self.structure.derivative_matrix() * coefficients
         });
         self
+    }
+
+    /// The same program for one solver.
+    pub(super) fn solved_by(self, solver: Option<Solver>) -> Self {
+        Self { solver, ..self }
+    }
+
+    /// The solvers to try, in this order.
+    pub(super) fn solvers(&self) -> Vec<Solver> {
+        let is_log_det_p = self.matrix == Matrix::Polynomial && self.spectral.function() == Function::LogDet;
+        match self.solver {
+            Some(solver) => vec![solver],
+            None if !is_log_det_p => vec![Solver::Clarabel],
+            None if self.structure.degree >= STRUCTURED_DEGREE => vec![Solver::Structured, Solver::Clarabel],
+            None => vec![Solver::Clarabel, Solver::Structured],
+        }
     }
 
     /// Whether every mixture of points satisfies what the points do, as p is convex.

@@ -1,6 +1,7 @@
 //! How far a fit has come, reported from inside its loops.
 
 use super::FitError;
+use super::conic_program::SolverStep;
 use std::ops::ControlFlow;
 
 /// How far a fit has come, after each iteration of its solver.
@@ -22,12 +23,13 @@ pub struct Progress {
 /// Keeps the counts, and asks the caller whether to continue.
 pub(super) struct Watch<'a> {
     progress: Progress,
+    log: Vec<SolverStep>,
     report: &'a mut dyn FnMut(Progress) -> ControlFlow<()>,
 }
 
 impl<'a> Watch<'a> {
     pub(super) fn new(report: &'a mut dyn FnMut(Progress) -> ControlFlow<()>) -> Self {
-        Self { progress: Progress::default(), report }
+        Self { progress: Progress::default(), log: Vec::new(), report }
     }
 
     /// A program begins; the one before left its points outside by `worst_violation`.
@@ -44,6 +46,17 @@ impl<'a> Watch<'a> {
         self.progress.iterations += 1;
         self.progress.gap = gap;
         if (self.report)(self.progress).is_break() { Err(FitError::Cancelled) } else { Ok(()) }
+    }
+
+    /// As [`Watch::iteration`], with a step of the conic solver, which is logged.
+    pub(super) fn solver_step(&mut self, step: SolverStep, gap: f64) -> Result<(), FitError> {
+        self.log.push(step);
+        self.iteration(gap)
+    }
+
+    /// The steps of the conic solver so far.
+    pub(super) fn log(&self) -> &[SolverStep] {
+        &self.log
     }
 
     /// The counts so far.

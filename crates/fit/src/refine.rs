@@ -6,7 +6,7 @@
 //! as the volume falls. The feasible set is convex, so every polynomial in between is feasible, and
 //! the volume never grows.
 
-use super::generate::inner;
+use super::active_points::inner;
 use super::model::Model;
 use super::path::{DualPoint, Interior, Path, PathObjective, PathOptions};
 use super::progress::Watch;

@@ -4,6 +4,7 @@
 //! p (Ahmadi, Hall, Makadia and Sindhwani, RSS 2017, section III), and the inverse-moment
 //! polynomial (`moment`). Points between others matter as much as these, so all are used.
 
+use super::conic_program::SolverStep;
 use super::coordinates::Coordinates;
 use super::generate::{Optimum, generate};
 use super::margin::{DEFAULT_MARGIN, MARGIN_ATTEMPTS};
@@ -17,7 +18,7 @@ use super::{FitError, FitOptions, Objective, ProgramError};
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::ops::ControlFlow;
 use std::time::Instant;
-use sublevel_core::body::{Placement, Provenance, Relaxation, SosBody, SosBodyError, SosMethod};
+use sublevel_core::body::{Placement, Provenance, Relaxation, Solver, SosBody, SosBodyError, SosMethod};
 use sublevel_core::polynomial::{HessianGram, NormPower, Polynomial, SosGram, monomials};
 
 /// How far below 1 all points are left: that is what lets triangles at the outermost points be
@@ -33,6 +34,8 @@ pub struct SosOptions {
     pub method: SosMethod,
     /// Coordinates u that c refers to, and in which traces are measured.
     pub coordinates: Coordinates,
+    /// What solves the program of [`SosMethod::Relaxed`], as [`FitOptions::solver`].
+    pub solver: Option<Solver>,
     /// Name of the input, for the provenance of the set.
     pub input: String,
 }
@@ -53,7 +56,7 @@ pub struct SosReport {
 }
 
 /// What a program took and reached.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ProgramReport {
     /// Optimal value: log dets in the whitened frame, traces in the chosen coordinates.
     pub objective_value: f64,
@@ -65,6 +68,12 @@ pub struct ProgramReport {
     pub iterations: usize,
     /// Margin the certificate of the relaxation was proven with.
     pub margin: f64,
+    /// What solved it.
+    pub solver: Solver,
+    /// Why the solver that was tried first did not, if one was.
+    pub fallback: Option<String>,
+    /// The iterations of the conic solver, of all programs.
+    pub log: Vec<SolverStep>,
 }
 
 /// A fitted set and how it came about.
@@ -91,7 +100,8 @@ impl SosOptions {
             SosMethod::Relaxed { objective, .. } => objective,
             SosMethod::InverseMoment => Objective::default(),
         };
-        FitOptions { degree: self.degree, objective, input: self.input.clone(), ..FitOptions::default() }.check(name)
+        let (degree, solver, input) = (self.degree, self.solver, self.input.clone());
+        FitOptions { degree, objective, solver, input, ..FitOptions::default() }.check(name)
     }
 }
 
@@ -135,6 +145,7 @@ pub fn fit_sos(
         refined: false,
         hull_vertices: hull.vertices.len(),
         hull_volume_m3: hull.volume,
+        solver: program.as_ref().map(|program| program.solver),
     });
     if !triangles.is_empty() {
         let coverage = body.coverage(points, triangles)?;
@@ -178,7 +189,8 @@ impl RelaxedProgram<'_> {
         let mut margins = MARGIN_ATTEMPTS.iter().map(|factor| factor * DEFAULT_MARGIN);
         loop {
             let margin = margins.next().unwrap_or(DEFAULT_MARGIN);
-            let problem = Problem::new(&structure, objective, &map, margin).relaxed(power.as_ref());
+            let problem =
+                Problem::new(&structure, objective, &map, margin).relaxed(power.as_ref()).solved_by(options.solver);
             // Where convexity bounds too little the points have to: then they are what is missing.
             let spanned = |error| match error {
                 FitError::Program(_) | FitError::NotOptimal { .. } => {
@@ -187,8 +199,8 @@ impl RelaxedProgram<'_> {
                 }
                 other => other,
             };
-            let Optimum { coefficients, hessian, gram, gap, objective } =
-                generate(problem, whitened, &[], watch).map_err(|error| spanned(error).of_objective(objective))?;
+            let Optimum { coefficients, hessian, gram, gap, objective, solver, fallback } =
+                generate(&problem, whitened, &[], watch).map_err(|error| spanned(error).of_objective(objective))?;
             let relaxation = |polynomial: &Polynomial| {
                 let Some(power) = &power else { return Ok(None) };
                 let gram =
@@ -206,6 +218,9 @@ impl RelaxedProgram<'_> {
                         rounds,
                         iterations,
                         margin,
+                        solver,
+                        fallback,
+                        log: watch.log().to_vec(),
                     };
                     return Ok((body, report));
                 }

@@ -3,7 +3,7 @@
 use super::choice::Choice;
 use super::length::length;
 use crate::cli::mesh::MeshArgs;
-use crate::fit::Cone;
+use crate::fit::{Cone, Solver};
 use std::path::PathBuf;
 
 /// Fit certified bodies around meshes or point clouds (OFF, OBJ, PLY, STL, COLLADA, XYZ)
@@ -85,6 +85,13 @@ pub(in crate::cli) struct FitArgs {
     ///   Looser, and hardly faster. Both depend on the axes of the smallest ellipsoid.
     #[arg(long, value_name = "NAME", default_value_t, verbatim_doc_comment)]
     pub(in crate::cli) cone: Cone,
+    /// What solves the programs: clarabel or structured
+    ///
+    /// Left out, the faster one is taken, and the other where that fails: clarabel, a conic solver
+    /// for every objective, up to degree 6; structured, which follows the central path of logdet-p,
+    /// at degree 8. Both reach the same optimum, and every body is proven from its numbers alone.
+    #[arg(long, value_name = "NAME")]
+    pub(in crate::cli) solver: Option<Solver>,
     /// Cut the body by at most this many slabs (pairs of parallel planes), each where it reaches
     /// farthest beyond the convex hull
     ///

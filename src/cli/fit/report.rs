@@ -4,7 +4,7 @@ use super::reading_row::ReadingRow;
 use super::sos;
 use crate::body::{Body, Compound, SosMethod};
 use crate::cli::files::write_atomically;
-use crate::fit::RefinementEnd;
+use crate::fit::{RefinementEnd, Solver};
 use crate::jobs::{FitOutput, Shapes};
 use crate::scene::Geometry;
 use crate::store::{FitMode, FitOutcome, FitRequest, FittedBody};
@@ -70,6 +70,9 @@ struct Solve {
     refinement: Option<String>,
     objective_value: f64,
     optimality_gap: Option<f64>,
+    /// What solved the program, and why another did not.
+    solver: Option<Solver>,
+    fallback: Option<String>,
 }
 
 /// Writes what was made of an input, of whose vertices the triangles use so many, and describes it.
@@ -96,6 +99,7 @@ pub(super) fn write(
             let one = |(body, took): (&Body, &FittedBody)| {
                 let file = write(kind(body, took), body.to_json())?;
                 note_refinement(&file, took);
+                note_fallback(&file, took);
                 Ok(Row::Convex(body_row(input, &file, outcome, body, took)))
             };
             bodies.iter().zip(&outcome.bodies).map(one).collect::<Result<_, Box<dyn Error>>>()?
@@ -167,6 +171,13 @@ fn note_refinement(file: &Path, took: &FittedBody) {
     }
 }
 
+fn note_fallback(file: &Path, took: &FittedBody) {
+    let optimum = took.optimum.as_ref();
+    if let Some((solver, why)) = optimum.and_then(|optimum| optimum.solver.zip(optimum.fallback.as_ref())) {
+        eprintln!("note: {}: solved by {solver}, since {why}", file.display());
+    }
+}
+
 fn note_left_out(input: &Path, outcome: &FitOutcome, rows: &[Row]) {
     let FitOutcome { left_out, left_out_m, .. } = outcome;
     let kept = match rows.first() {
@@ -212,6 +223,8 @@ fn body_row(input: &Path, file: &Path, outcome: &FitOutcome, body: &Body, took: 
             refinement: optimum.refinement_end.clone(),
             objective_value: optimum.objective_value,
             optimality_gap: optimum.optimality_gap,
+            solver: optimum.solver,
+            fallback: optimum.fallback.clone(),
         }),
     }
 }

@@ -14,7 +14,7 @@ use std::path::Path;
 /// that exclude each other.
 pub(super) fn request(args: &FitArgs, input: &Path, stem: &str) -> Result<FitRequest, String> {
     let input = input.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    Ok(FitRequest { input, ..FitRequest::new(stem, mode(args)?) })
+    Ok(FitRequest { input, solver: args.solver, ..FitRequest::new(stem, mode(args)?) })
 }
 
 /// Arguments that need no check here exclude each other on the command line already.
@@ -63,7 +63,7 @@ pub(in crate::cli) fn request_of_group(args: &FitArgs, name: &str, obstacles: &[
         multiplier_degree: args.multiplier_degree,
         degree: args.degree,
     };
-    FitRequest::new(name, group)
+    FitRequest { solver: args.solver, ..FitRequest::new(name, group) }
 }
 
 /// A request that can be executed, or the argument that cannot be used, and why.

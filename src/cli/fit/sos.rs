@@ -1,7 +1,7 @@
 //! What `sublevel fit` says of sets that need not be convex.
 
 use super::reading_row::ReadingRow;
-use crate::body::{Coverage, SosBody};
+use crate::body::{Coverage, Solver, SosBody};
 use crate::store::FitOutcome;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -34,6 +34,9 @@ pub(super) struct Row {
     coverage: Option<Coverage>,
     objective_value: Option<f64>,
     optimality_gap: Option<f64>,
+    /// What solved the program, and why another did not.
+    solver: Option<Solver>,
+    fallback: Option<String>,
     seconds: f64,
     status: &'static str,
     proven: bool,
@@ -62,6 +65,8 @@ pub(super) fn row(input: &Path, file: &Path, outcome: &FitOutcome, body: &SosBod
         coverage: body.covered().copied(),
         objective_value: optimum.map(|optimum| optimum.objective_value),
         optimality_gap: optimum.and_then(|optimum| optimum.optimality_gap),
+        solver: optimum.and_then(|optimum| optimum.solver),
+        fallback: optimum.and_then(|optimum| optimum.fallback.clone()),
         seconds: took.map_or(0.0, |took| took.seconds),
         // A fit returns a set only when it is solved and proven.
         status: "solved",

@@ -5,10 +5,10 @@ use super::super::limits::MAX_GROUP_BODIES;
 use super::super::proto::fit_options::Mode;
 use super::super::proto::fit_sos_body::Method;
 use super::super::proto::{
-    self, CreateFitRequest, FitCone, FitInverseMoment, FitObjective, FitOptions, FitRelaxed, MeshFormat,
+    self, CreateFitRequest, FitCone, FitInverseMoment, FitObjective, FitOptions, FitRelaxed, FitSolver, MeshFormat,
 };
 use super::super::wire::{body_id, count};
-use crate::body::{Cone, Objective, SosMethod};
+use crate::body::{Cone, Objective, Solver, SosMethod};
 use crate::jobs::{RequestError, check};
 use crate::store::{
     FitBody, FitCompound, FitGroup, FitLadder, FitMode, FitPolynomial, FitPreparation, FitRequest, FitSosBody,
@@ -40,12 +40,28 @@ const FORMATS: [(MeshFormat, &str); 6] = [
     (MeshFormat::Dae, "dae"),
 ];
 
+/// Solvers of messages and of requests; the unspecified one leaves the choice open.
+const SOLVERS: [(FitSolver, Option<Solver>); 2] =
+    [(FitSolver::Clarabel, Some(Solver::Clarabel)), (FitSolver::Structured, Some(Solver::Structured))];
+
+/// What solves a fit, of a number in a message.
+pub(super) fn read_solver(solver: i32, field: &str) -> Result<Option<Solver>, Invalid> {
+    known(&SOLVERS, solver, FitSolver::Unspecified, field)
+}
+
+/// The number in a message of what solves a fit.
+pub(super) fn solver_message(solver: Option<Solver>) -> FitSolver {
+    let known = SOLVERS.iter().find(|(_, known)| *known == solver);
+    known.map_or(FitSolver::Unspecified, |(message, _)| *message)
+}
+
 /// The request's id, and the checked request.
 pub(super) fn request(message: CreateFitRequest) -> Result<(String, FitRequest), Invalid> {
-    let FitOptions { scale, trim, min_thickness_m, mode } = message.options.unwrap_or_default();
+    let FitOptions { scale, trim, min_thickness_m, mode, solver } = message.options.unwrap_or_default();
     let preparation = FitPreparation { trim, min_thickness_m };
     let mode = read_mode(mode.unwrap_or_default(), preparation)?;
-    let request = FitRequest { name: message.name, input: message.input, scale: scale.unwrap_or(1.0), mode };
+    let solver = read_solver(solver, "options.solver")?;
+    let request = FitRequest { name: message.name, input: message.input, scale: scale.unwrap_or(1.0), mode, solver };
     check(&message.request_id, &request).map_err(|error| refused(&request.mode, error))?;
     Ok((message.request_id, request))
 }
@@ -60,7 +76,7 @@ pub(super) fn format(number: i32) -> Result<&'static str, Invalid> {
 fn refused(mode: &FitMode, RequestError { field, why }: RequestError) -> Invalid {
     let path = match (field, mode) {
         ("request_id" | "name" | "input", _) => field.to_owned(),
-        ("scale" | "trim" | "min_thickness_m" | "group", _) => format!("{OPTIONS}.{field}"),
+        ("scale" | "trim" | "min_thickness_m" | "group" | "solver", _) => format!("{OPTIONS}.{field}"),
         ("c" | "objective", FitMode::SosBody(_)) => format!("{OPTIONS}.sos_body.relaxed.{field}"),
         _ => format!("{OPTIONS}.{}.{field}", mode.name()),
     };
@@ -170,7 +186,8 @@ pub(crate) fn message(request: &FitRequest) -> CreateFitRequest {
 pub(super) fn options(request: &FitRequest) -> FitOptions {
     let FitPreparation { trim, min_thickness_m } = request.mode.preparation();
     let scale = request.group().is_none().then_some(request.scale);
-    FitOptions { scale, trim, min_thickness_m, mode: Some(write_mode(&request.mode)) }
+    let solver = solver_message(request.solver).into();
+    FitOptions { scale, trim, min_thickness_m, mode: Some(write_mode(&request.mode)), solver }
 }
 
 fn write_mode(mode: &FitMode) -> Mode {

@@ -4,9 +4,9 @@ use super::super::error::Invalid;
 use super::super::proto::job::Task;
 use super::super::proto::{self, BodyKind, FitPhase, FitProgress, FitResult, FitTask};
 use super::super::wire::count;
-use super::request::options;
+use super::request::{options, read_solver, solver_message};
 use crate::jobs::{Phase, Progress};
-use crate::store::{FitOptimum, FitOutcome, FittedBody, FittedKind, Job, JobState};
+use crate::store::{FitOptimum, FitOutcome, FittedBody, FittedKind, Job, JobState, SolverStep};
 
 /// What a job can make.
 const KINDS: [(FittedKind, BodyKind); 3] = [
@@ -85,9 +85,31 @@ fn fitted(made: &FittedBody) -> proto::FittedBody {
             objective_value: optimum.objective_value,
             optimality_gap: optimum.optimality_gap,
             refinement_end: optimum.refinement_end.clone().unwrap_or_default(),
+            solver: solver_message(optimum.solver).into(),
+            fallback: optimum.fallback.clone().unwrap_or_default(),
+            steps: optimum.log.iter().map(step_message).collect(),
         }),
         kind: kind.map_or(BodyKind::Unspecified, |(_, kind)| *kind).into(),
         members: made.members.iter().map(|&member| count(member)).collect(),
+    }
+}
+
+fn step_message(step: &SolverStep) -> proto::SolverStep {
+    let SolverStep { round, iteration, primal, dual, primal_residual, dual_residual, step_length } = *step;
+    let (round, iteration) = (count(round), count(iteration));
+    proto::SolverStep { round, iteration, primal, dual, primal_residual, dual_residual, step_length }
+}
+
+fn read_step(step: &proto::SolverStep) -> SolverStep {
+    let number = |count: u32| usize::try_from(count).unwrap_or(usize::MAX);
+    SolverStep {
+        round: number(step.round),
+        iteration: number(step.iteration),
+        primal: step.primal,
+        dual: step.dual,
+        primal_residual: step.primal_residual,
+        dual_residual: step.dual_residual,
+        step_length: step.step_length,
     }
 }
 
@@ -105,6 +127,10 @@ pub(crate) fn outcome(result: &FitResult) -> Option<FitOutcome> {
                 objective_value: optimum.objective_value,
                 optimality_gap: optimum.optimality_gap,
                 refinement_end: Some(optimum.refinement_end.clone()).filter(|end| !end.is_empty()),
+                // One that this program does not know is as good as none.
+                solver: read_solver(optimum.solver, "").unwrap_or_default(),
+                fallback: Some(optimum.fallback.clone()).filter(|why| !why.is_empty()),
+                log: optimum.steps.iter().map(read_step).collect(),
             }),
             members: made.members.iter().map(|&member| usize::try_from(member).unwrap_or(usize::MAX)).collect(),
             shortfall: None,

@@ -2,7 +2,7 @@
 
 use sublevel_testkit::Seeded;
 
-use crate::body::{Cone, Objective, SosMethod};
+use crate::body::{Cone, Objective, Solver, SosMethod};
 use crate::store::{
     FitBody, FitCompound, FitGroup, FitLadder, FitMode, FitPolynomial, FitPreparation, FitRequest, FitSosBody,
     FitWithinGap,
@@ -15,7 +15,8 @@ pub(crate) fn drawn(seed: u64) -> Vec<FitRequest> {
     let sometimes = |random: &mut Seeded| random.index(3) > 0;
     let request = |random: &mut Seeded, mode: FitMode| {
         let scale = if matches!(mode, FitMode::Group(_)) { 1.0 } else { 1e-3 + random.positive() };
-        FitRequest { name: format!("it {seed}"), input: format!("{}.off", random.index(9)), scale, mode }
+        let solver = [None, Some(Solver::Clarabel), Some(Solver::Structured)][random.index(3)];
+        FitRequest { name: format!("it {seed}"), input: format!("{}.off", random.index(9)), scale, mode, solver }
     };
     let polynomial = polynomial(&mut random);
     let (slabs, parts) = (random.index(16), 1 + random.index(64));

@@ -47,7 +47,7 @@ fn compound(mesh: &Mesh, parts: usize) -> sublevel::body::Compound {
 
 fn sos(mesh: &Mesh, method: SosMethod) -> (BodyKind, String, String) {
     let (coordinates, input) = (fit::Coordinates::Unit, String::new());
-    let options = fit::SosOptions { degree: 4, method, coordinates, input };
+    let options = fit::SosOptions { degree: 4, method, coordinates, solver: None, input };
     let body = fit::fit_sos("arc", &mesh.points, &mesh.triangles, &options, &mut unwatched).expect("a set").body;
     assert!(body.covered().is_some_and(|covered| covered.triangles == mesh.triangles.len()));
     (BodyKind::SosBody, body.id().to_string(), body.to_json())

@@ -285,7 +285,7 @@ impl Subject {
         method: SosMethod,
         progress: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<FitOutput, FitError> {
-        let options = SosOptions { degree, method, coordinates: Coordinates::Raw, input: String::new() };
+        let options = SosOptions { degree, method, coordinates: Coordinates::Raw, solver: None, input: String::new() };
         let fit = fit_sos(self.name, &self.mesh.points, &[], &options, &mut |_| progress())?;
         Ok(FitOutput::of(Set::Sos(Box::new(fit.body)), fit.report.seconds))
     }

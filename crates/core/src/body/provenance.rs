@@ -1,5 +1,6 @@
 //! Where a body comes from.
 
+use super::solver::Solver;
 use serde::{Deserialize, Serialize};
 
 /// Where a fitted body comes from; information only, not part of its identity.
@@ -16,4 +17,7 @@ pub struct Provenance {
     pub hull_vertices: usize,
     /// Volume of the convex hull, m³.
     pub hull_volume_m3: f64,
+    /// What solved the program; none where no program made it, as of balls, or an older file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub solver: Option<Solver>,
 }

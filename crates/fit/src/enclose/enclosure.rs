@@ -2,24 +2,28 @@
 
 use super::error::{EncloseError, MAX_SETS};
 use super::options::EncloseOptions;
-use super::program::{prepare, program};
+use super::program::{maps, multiplier_margin, prepare, sources};
 use super::region::{Prepared, Region};
+use crate::conic_program::SolverStep;
+use crate::coordinates::Coordinates;
 use crate::error::FitError;
 use crate::gap::Gap;
 use crate::margin::{DEFAULT_MARGIN, MARGIN_ATTEMPTS};
+use crate::moment_program::MomentProgram;
 use crate::object::Object;
+use crate::path::Interior;
+use crate::program::{Problem, ProgramError};
 use crate::progress::{Progress, Watch};
 use crate::structure::Structure;
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 use std::ops::ControlFlow;
 use std::time::Instant;
-use sublevel_core::body::{BasicSet, Body, BodyError, BodyId, Constraint, ContainedSet, Containment, Obstacle};
+use sublevel_core::body::{
+    BasicSet, Body, BodyError, BodyId, Constraint, ContainedSet, Containment, Objective, Obstacle, Solver,
+};
 use sublevel_core::polynomial::{ContainmentProof, HessianGram, NotContaining, Polynomial, Substituted};
 
-/// Distance to the optimum asked of the path, in units of log dets.
-const ENCLOSURE_PATH_GAP: f64 = 1e-5;
-
-/// Largest such distance of an enclosure.
+/// Largest distance of an enclosure's objective to its lower bound, relative to the objective (or 1).
 const ENCLOSURE_OPTIMALITY_GAP: f64 = 1e-3;
 
 /// A body around sets, and how it came about.
@@ -37,8 +41,10 @@ pub struct Enclosure {
     pub objective_value: f64,
     /// It minus its lower bound from the dual.
     pub optimality_gap: f64,
-    /// Newton steps.
+    /// Iterations of the solver.
     pub iterations: usize,
+    /// Each of them.
+    pub log: Vec<SolverStep>,
     /// Wall time, seconds.
     pub seconds: f64,
 }
@@ -68,21 +74,28 @@ pub fn enclose(
     let object = Object::new(name, &points, "")?;
     let structure = Structure::new(options.degree);
     let mut watch = Watch::new(progress);
-    let mut attempts = MARGIN_ATTEMPTS.iter().map(|factor| factor * DEFAULT_MARGIN);
+    let maps = maps(&structure, &object, &prepared);
+    let coordinates = object.coordinates(Coordinates::Unit).map_err(FitError::from)?;
+    let mut attempts = MARGIN_ATTEMPTS.iter().copied();
     loop {
-        let margin = attempts.next().unwrap_or(DEFAULT_MARGIN);
-        let program = program(&structure, &object, &prepared, margin).map_err(FitError::from)?;
+        let factor = attempts.next().unwrap_or(1.0);
+        let margin = factor * DEFAULT_MARGIN;
+        let problem = Problem::new(&structure, Objective::LogDetP, &coordinates, margin);
+        let multiplier_margin = multiplier_margin(factor);
+        let sources = sources(&structure, &prepared, &maps, multiplier_margin);
         watch.round(regions.len(), 0.0);
-        let unsolved = EncloseError::Unsolved { multiplier_degree: options.multiplier_degree };
-        let centre = program.follow(ENCLOSURE_PATH_GAP, &mut watch)?.ok_or_else(|| unsolved.clone())?;
-        let (objective_value, optimality_gap) = program.objective(&centre).ok_or(unsolved.clone())?;
+        let optimum = MomentProgram::new(&problem, sources).solve(&mut watch).map_err(|error| match error {
+            FitError::Program(_) => EncloseError::Unsolved { multiplier_degree: options.multiplier_degree },
+            error => error.into(),
+        })?;
+        let objective_value = problem.spectral.measure(&optimum.gram).ok_or(FitError::from(ProgramError::Singular))?;
+        let optimality_gap = objective_value - optimum.lower_bound;
         if !(optimality_gap <= ENCLOSURE_OPTIMALITY_GAP * objective_value.abs().max(1.0)) {
             return Err(FitError::NotOptimal { gap: optimality_gap }.into());
         }
-        let terms = structure.monomials.iter().copied().zip(centre.coefficients.iter().copied()).collect();
+        let Interior { coefficients, hessian } = optimum.interior;
+        let terms = structure.monomials.iter().copied().zip(coefficients.iter().copied()).collect();
         let polynomial = Polynomial::new(terms).map_err(FitError::from)?;
-        let hessian = &centre.grams[regions.len()][0]
-            + DMatrix::identity(structure.hessian.size, structure.hessian.size) * margin;
         let body = match body(&object, &structure, &polynomial, hessian) {
             Ok(body) => body,
             Err(BodyError::Certificate { .. }) if attempts.len() > 0 => continue,
@@ -91,16 +104,25 @@ pub fn enclose(
         let containments = regions
             .iter()
             .zip(&prepared)
-            .zip(&centre.grams)
+            .zip(&optimum.multipliers)
             .enumerate()
-            .map(|(index, ((region, prepared), grams))| {
-                contained(&body, &region.set, prepared, grams)
+            .map(|(index, ((region, prepared), multipliers))| {
+                let grams = multipliers.iter().zip(&prepared.scales).map(|(gram, scales)| {
+                    let margins = scales.iter().map(|scale| multiplier_margin * scale * scale);
+                    gram + DMatrix::from_diagonal(&DVector::from_iterator(gram.nrows(), margins))
+                });
+                contained(&body, &region.set, prepared, grams.collect())
                     .map_err(|source| EncloseError::Unproven { index, source })
             })
-            .collect::<Result<Vec<_>, _>>()?;
-        let (body, gap) = object.finish(body, "logdet-p", false);
+            .collect::<Result<Vec<_>, _>>();
+        let containments = match containments {
+            Err(EncloseError::Unproven { .. }) if attempts.len() > 0 => continue,
+            containments => containments?,
+        };
+        let (body, gap) = object.finish(body, "logdet-p", false, Some(Solver::Clarabel));
         let (iterations, seconds) = (watch.progress().iterations, start.elapsed().as_secs_f64());
-        return Ok(Enclosure { body, containments, gap, objective_value, optimality_gap, iterations, seconds });
+        let log = watch.log().to_vec();
+        return Ok(Enclosure { body, containments, gap, objective_value, optimality_gap, iterations, log, seconds });
     }
 }
 
@@ -144,19 +166,15 @@ fn contained(
     body: &Body,
     set: &BasicSet,
     prepared: &Prepared,
-    grams: &[DMatrix<f64>],
+    mut grams: Vec<DMatrix<f64>>,
 ) -> Result<Containment, NotContaining> {
     let outer = BasicSet::from(body);
     let frame = prepared.frame;
+    let squares = grams.remove(0);
     let set_map = frame.to(set.normalization);
     let substituted = Substituted { polynomials: &set.polynomials, map: &set_map };
-    let proof = ContainmentProof::nearest(
-        outer.polynomials[0],
-        &frame.to(outer.normalization),
-        substituted,
-        grams[1..].to_vec(),
-        grams[0].clone(),
-    )?;
+    let proof =
+        ContainmentProof::nearest(outer.polynomials[0], &frame.to(outer.normalization), substituted, grams, squares)?;
     let containment = Containment { frame, proofs: vec![proof] };
     containment.prove(&outer, set)?;
     Ok(containment)

@@ -1,8 +1,7 @@
 //! One body around whole sets: the union of several bodies, or a set that is not convex.
 //!
 //! [`enclose`] solves the program of section V of Ahmadi, Hall, Makadia and Sindhwani (RSS 2017),
-//! sos-convex p with multipliers for every set, by the central path of its dual (`path`): the
-//! strictly feasible polynomial at its end comes with all Gram matrices, which become the
+//! sos-convex p with multipliers for every set (`program`); the Gram matrices of these become the
 //! [`Containment`] of each set. [`containment`] looks for such a proof when body and set are given
 //! both, and [`group`](group()) puts many bodies into few. Every set has a frame of its own for its
 //! proof (`region`), with the frames' rounding paid for ([`Containment`]).
@@ -10,9 +9,7 @@
 mod enclosure;
 mod error;
 mod group;
-mod localizing;
 mod options;
-mod path;
 mod program;
 mod prove;
 mod region;

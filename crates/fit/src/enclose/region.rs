@@ -1,9 +1,10 @@
 //! A set made ready to be contained: its frame, its constraints there, and a functional to start
 //! from.
 
-use super::localizing::LocalizingMatrix;
 use crate::FitError;
 use crate::basis::{Affine, of_monomials};
+use crate::localizing::LocalizingMatrix;
+use crate::moment_program::scales;
 use crate::object::Object;
 use crate::program::ProgramError;
 use nalgebra::{DVector, Matrix3, Vector3};
@@ -61,6 +62,8 @@ pub(super) struct Prepared {
     pub(super) frame: ProofFrame,
     /// Squares first, then one per constraint.
     pub(super) cones: Vec<LocalizingMatrix>,
+    /// For each cone the scales of its rows: one over the square roots of its pivots at the mean.
+    pub(super) scales: Vec<Vec<f64>>,
     /// The mean over points inside: a functional in the interior of all cones.
     pub(super) mean: DVector<f64>,
 }
@@ -93,12 +96,9 @@ impl Prepared {
             }
             mean += DVector::from_vec(values);
         }
-        Ok(Self { frame, cones, mean })
-    }
-
-    /// Rows of all matrices.
-    pub(super) fn rows(&self) -> usize {
-        self.cones.iter().map(LocalizingMatrix::size).sum()
+        let cones: Vec<LocalizingMatrix> = cones;
+        let scales = cones.iter().map(|cone| scales(cone.matrix(&mean))).collect();
+        Ok(Self { frame, cones, scales, mean })
     }
 
     /// Coefficients of a polynomial of other normalized coordinates, as one of v, on the monomials

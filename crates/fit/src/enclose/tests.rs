@@ -295,7 +295,7 @@ fn bent(across: f64) -> SosBody {
         points.extend([Vector3::new(across + a, b, along), Vector3::new(across + a, along, c)]);
     }
     let method = SosMethod::Relaxed { c: 100.0, objective: Objective::LogDetP };
-    let options = SosOptions { degree: 4, method, coordinates: Coordinates::Unit, input: String::new() };
+    let options = SosOptions { degree: 4, method, coordinates: Coordinates::Unit, solver: None, input: String::new() };
     fit_sos("bent", &points, &[], &options, &mut unwatched).unwrap().body
 }
 

@@ -3,7 +3,7 @@
 //! or of blocks with entries of their own.
 
 use super::*;
-use crate::conic::Conic;
+use crate::descent::ModelProgram;
 use crate::dominance::Dominance;
 use crate::model::Model;
 use clarabel::algebra::CscMatrix;
@@ -215,9 +215,10 @@ fn programs_agree_with_clarabel() {
             let linear = &slope - &curvature * &origin;
             let model = Model::new(origin.clone(), slope, curvature.clone()).unwrap();
             let dominance = Dominance::new(&structure, cone);
-            let program = Conic { dominance: &dominance, values: &values, margin, model: &model };
+            let program =
+                ModelProgram { dominance: &dominance, structure: &structure, values: &values, margin, model: &model };
             let scale = 1.0 + linear.norm();
-            let found = program.minimise(&origin, 1e-8 * scale, &mut Watch::new(&mut unwatched)).unwrap().unwrap();
+            let found = program.minimise(&mut Watch::new(&mut unwatched)).unwrap().unwrap();
             let value = |c: &DVector<f64>| 0.5 * c.dot(&(&curvature * c)) + linear.dot(c);
             let expected = least(&structure, cone, &values, margin, (&curvature, &linear));
             let difference = (value(&found.coefficients) - expected) / scale;

@@ -216,7 +216,7 @@ fn traces_agree_with_the_printed_programs() {
         let structure = Structure::new(degree);
         for objective in [Objective::TraceP, Objective::TraceH] {
             let problem = Problem::new(&structure, objective, &unit, margin);
-            let ours = generate(problem, &whitened, &[], &mut Watch::new(&mut unwatched)).unwrap();
+            let ours = generate(&problem, &whitened, &[], &mut Watch::new(&mut unwatched)).unwrap();
             let nothing = DVector::zeros(structure.monomials.len());
             let printed = least_trace(&structure, objective.matrix(), (unit_points, symmetric), margin, &nothing);
             let difference = ours.objective / printed - 1.0;
@@ -246,7 +246,7 @@ fn relaxed_programs_agree_with_the_printed_one() {
         let power = |linear: &Matrix3<f64>, offset: &Vector3<f64>| NormPower::new(c, linear, offset, degree);
         let relaxed = c.is_finite().then(|| power(&unit.linear, &unit.offset));
         let problem = Problem::new(&structure, objective, &unit, margin).relaxed(relaxed.as_ref());
-        let ours = generate(problem, &whitened, &[], &mut Watch::new(&mut unwatched)).unwrap();
+        let ours = generate(&problem, &whitened, &[], &mut Watch::new(&mut unwatched)).unwrap();
         let mut plain = DVector::zeros(structure.monomials.len());
         if c.is_finite() {
             for (value, monomial) in plain.iter_mut().zip(&structure.monomials) {

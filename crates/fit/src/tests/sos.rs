@@ -5,7 +5,7 @@ use sublevel_core::body::{SosBody, Volume};
 use sublevel_core::polynomial::{NormPower, Polynomial};
 
 fn options(degree: usize, method: SosMethod) -> SosOptions {
-    SosOptions { degree, method, coordinates: Coordinates::Unit, input: String::new() }
+    SosOptions { degree, method, coordinates: Coordinates::Unit, solver: None, input: String::new() }
 }
 
 fn relaxed(degree: usize, c: f64) -> SosOptions {
@@ -120,7 +120,7 @@ fn without_convexity_it_is_the_optimal_design() {
         let structure = Structure::without_convexity(degree);
         let identity = Affine { linear: Matrix3::identity(), offset: Vector3::zeros() };
         let problem = Problem::new(&structure, Objective::LogDetP, &identity, 1e-5);
-        let optimum = generate(problem, &whitened, &[], &mut Watch::new(&mut unwatched)).unwrap();
+        let optimum = generate(&problem, &whitened, &[], &mut Watch::new(&mut unwatched)).unwrap();
         // Titterington's iteration w <- w m(x)ᵀ M⁻¹ m(x) / N for the dual, which only ever
         // improves.
         let n = structure.gram.size as f64;

@@ -5,7 +5,7 @@
 //! s when that of `y(s ·)` is. Either matrix is `spread(L y)` with a linear map L.
 
 use crate::structure::Pattern;
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 use sublevel_core::polynomial::{degree_of, monomials, position};
 
 /// A matrix linear in y that must be definite.
@@ -57,39 +57,13 @@ impl LocalizingMatrix {
         }
     }
 
-    /// What a Gram matrix adds to the coefficients of the identity; adjoint of
-    /// [`LocalizingMatrix::matrix`].
-    pub(super) fn collapse(&self, gram: &DMatrix<f64>) -> DVector<f64> {
-        let own = self.pattern.collapse(gram);
-        self.map.as_ref().map_or_else(|| own.clone(), |map| map.tr_mul(&own))
-    }
-
-    /// The nearest Gram matrix to `gram` that gives these coefficients; for a cone without a map.
-    pub(super) fn nearest(&self, gram: &DMatrix<f64>, coefficients: &DVector<f64>) -> DMatrix<f64> {
-        self.pattern.nearest(gram, coefficients)
-    }
-
-    /// `log det` of the matrix; none unless it is definite.
-    pub(super) fn log_det(&self, y: &DVector<f64>) -> Option<f64> {
-        let factor = Cholesky::new(self.matrix(y))?;
-        let value = 2.0 * factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
-        value.is_finite().then_some(value)
-    }
-
-    /// Gradient of `log det`, and the Hessian of its negative.
-    pub(super) fn derivatives(&self, y: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let gram = Cholesky::new(self.matrix(y))?.inverse();
-        let own = self.pattern.congruence(&gram);
-        let curvature = self.map.as_ref().map_or_else(|| own.clone(), |map| map.tr_mul(&(&own * map)));
-        Some((self.collapse(&gram), curvature))
-    }
-
-    /// The inverse of the matrix at `to`, to first order from `at`: definite when the step is below
-    /// 1 in the local norm.
-    pub(super) fn predicted(&self, at: &DVector<f64>, to: &DVector<f64>) -> Option<DMatrix<f64>> {
-        let gram = Cholesky::new(self.matrix(at))?.inverse();
-        let predicted = &gram * 2.0 - &gram * self.matrix(to) * &gram;
-        Some((&predicted + predicted.transpose()) * 0.5)
+    /// The terms of an entry, as position in y and factor.
+    pub(super) fn entry(&self, i: usize, j: usize) -> Vec<(usize, f64)> {
+        let key = self.pattern.key(i, j);
+        match &self.map {
+            Some(map) => map.row(key).iter().copied().enumerate().filter(|term| term.1 != 0.0).collect(),
+            None => vec![(key, 1.0)],
+        }
     }
 }
 
@@ -121,21 +95,16 @@ mod tests {
     }
 
     #[test]
-    fn derivatives_are_those_of_the_value() {
+    fn entries_are_those_of_the_matrix() {
         let slack = DVector::from_iterator(10, monomials(2).iter().map(|e| 1.0 - value(*e, [0.2, 0.1, 0.3])));
-        let points = (0..60).map(|i| [0.7, 0.9, 1.3].map(|s| (f64::from(i) * s).sin()));
-        let y = points.fold(DVector::zeros(35), |sum: DVector<f64>, v| {
-            sum + DVector::from_iterator(35, monomials(4).into_iter().map(|e| value(e, v)))
-        });
-        let direction = DVector::from_iterator(35, (0..35).map(|i| (f64::from(i) * 0.37).cos()));
+        let y = DVector::from_fn(35, |i, _| (i as f64 * 0.37).cos());
         for cone in [LocalizingMatrix::squares(4), LocalizingMatrix::multiples(&slack, 4)] {
-            let along = |t: f64| cone.log_det(&(&y + &direction * t)).unwrap();
-            let (gradient, curvature) = cone.derivatives(&y).unwrap();
-            let h = 1e-4;
-            let first = (along(h) - along(-h)) / (2.0 * h);
-            let second = -(along(h) - 2.0 * along(0.0) + along(-h)) / (h * h);
-            assert!((first / gradient.dot(&direction) - 1.0).abs() < 1e-5);
-            assert!((second / direction.dot(&(curvature * &direction)) - 1.0).abs() < 1e-4);
+            let matrix = cone.matrix(&y);
+            let size = cone.size();
+            for (i, j) in (0..size).flat_map(|i| (0..size).map(move |j| (i, j))) {
+                let entry: f64 = cone.entry(i, j).iter().map(|&(k, factor)| factor * y[k]).sum();
+                assert!((entry - matrix[(i, j)]).abs() < 1e-14);
+            }
         }
     }
 }

@@ -1,0 +1,15 @@
+//! Conic programs, and the one door to their solver.
+//!
+//! A [`ConicProgram`] is stated in affine expressions of its variables that are zero, nonnegative,
+//! in a second-order cone or positive semidefinite; [`solve`] hands it to clarabel. Nothing that
+//! comes out is trusted: who asked verifies bounds and certificates from the numbers alone.
+
+mod program;
+mod solve;
+
+pub(crate) use program::{ConicProgram, Expression, geometric_mean};
+pub use solve::SolverStep;
+pub(crate) use solve::{ConicSolution, solve};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,171 @@
+//! The solver behind every conic program: clarabel (Goulart and Chen, arXiv 2405.12762).
+
+use super::program::ConicProgram;
+use crate::FitError;
+use crate::program::ProgramError;
+use crate::progress::Watch;
+use clarabel::solver::{DefaultInfo, DefaultSettings, DefaultSolver, IPSolver, SolverStatus};
+use nalgebra::{DMatrix, DVector};
+// Links the BLAS that clarabel's semidefinite cones call.
+use openblas_src as _;
+use std::f64::consts::FRAC_1_SQRT_2;
+use std::ops::Range;
+use std::sync::mpsc::sync_channel;
+use std::sync::{Mutex, PoisonError};
+
+/// Held while the solver runs: a serial OpenBLAS, as Debian's `libopenblas-serial-dev`, keeps its
+/// workspace in static memory, and two solvers at once give each other's numbers.
+static BLAS: Mutex<()> = Mutex::new(());
+
+/// Iterations at most; 10 to 40 are usual.
+const MAX_CONIC_ITERATIONS: u32 = 100;
+
+/// One iteration of the solver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolverStep {
+    /// Which program of the fit, counted from 1.
+    pub round: usize,
+    /// Iteration of that program, counted from 0.
+    pub iteration: usize,
+    /// Value of its objective.
+    pub primal: f64,
+    /// Value of its dual objective.
+    pub dual: f64,
+    /// Relative residual of its constraints.
+    pub primal_residual: f64,
+    /// Relative residual of the constraints of the dual.
+    pub dual_residual: f64,
+    /// Length of the step before, 0 to 1.
+    pub step_length: f64,
+}
+
+/// What the solver returned, true or not.
+#[derive(Clone, Debug)]
+pub(crate) struct ConicSolution {
+    /// Value of each variable.
+    pub(crate) variables: Vec<f64>,
+    /// Multiplier of each row.
+    pub(crate) multipliers: Vec<f64>,
+}
+
+impl ConicSolution {
+    /// Values of some variables.
+    pub(crate) fn values(&self, variables: Range<usize>) -> DVector<f64> {
+        DVector::from_column_slice(&self.variables[variables])
+    }
+
+    /// Multipliers of some rows.
+    pub(crate) fn multipliers(&self, rows: Range<usize>) -> DVector<f64> {
+        DVector::from_column_slice(&self.multipliers[rows])
+    }
+
+    /// The multiplier of a semidefinite constraint.
+    pub(crate) fn matrix_multiplier(&self, rows: Range<usize>, size: usize) -> DMatrix<f64> {
+        let triangle = &self.multipliers[rows];
+        DMatrix::from_fn(size, size, |i, j| {
+            let (i, j) = (i.min(j), i.max(j));
+            triangle[j * (j + 1) / 2 + i] * if i == j { 1.0 } else { FRAC_1_SQRT_2 }
+        })
+    }
+}
+
+/// Solves a program on one thread, one program of the process at a time, to a tolerance of the gap (absolute and relative) and of
+/// feasibility (relative). Each iteration is reported and can stop it; `unit` is what a relative gap
+/// of 1 is in the units of the report.
+///
+/// # Errors
+/// [`FitError::Cancelled`]; [`ProgramError`] where the solver found the program infeasible or
+/// unbounded, or refused its data, and for numbers that are not finite.
+pub(crate) fn solve(
+    program: &ConicProgram,
+    tolerance: f64,
+    unit: f64,
+    watch: &mut Watch,
+) -> Result<ConicSolution, FitError> {
+    if !program.is_finite() {
+        return Err(ProgramError::Solver("a number of the program is not finite".to_owned()).into());
+    }
+    // The callback of the solver outlives no borrow of ours: the solver works on a thread of its
+    // own, and asks this one at every iteration whether to continue.
+    let (report, reports) = sync_channel::<SolverStep>(0);
+    let (answer, answers) = sync_channel::<()>(0);
+    let answers = Mutex::new(answers);
+    let (round, mut cancelled) = (watch.progress().round, false);
+    let solved = std::thread::scope(|scope| {
+        let worker = scope.spawn(move || {
+            run(program, tolerance, move |info| {
+                let step = SolverStep {
+                    round,
+                    iteration: info.iterations as usize,
+                    primal: info.cost_primal,
+                    dual: info.cost_dual,
+                    primal_residual: info.res_primal,
+                    dual_residual: info.res_dual,
+                    step_length: info.step_length,
+                };
+                report.send(step).is_err() || !answers.lock().is_ok_and(|answers| answers.recv().is_ok())
+            })
+        });
+        for step in reports {
+            let scale = step.primal.abs().min(step.dual.abs()).max(1.0);
+            if watch.solver_step(step, unit * (step.primal - step.dual).abs() / scale).is_err() {
+                // Without an answer the solver ends.
+                cancelled = true;
+                break;
+            }
+            if answer.send(()).is_err() {
+                break;
+            }
+        }
+        drop(answer);
+        worker.join()
+    });
+    if cancelled {
+        return Err(FitError::Cancelled);
+    }
+    // A panic is one of the solver or of its BLAS about the numbers it met.
+    solved.unwrap_or_else(|_| Err(ProgramError::Solver("it panicked".to_owned()))).map_err(FitError::from)
+}
+
+fn run(
+    program: &ConicProgram,
+    tolerance: f64,
+    callback: impl FnMut(&DefaultInfo<f64>) -> bool + Send + Sync + 'static,
+) -> Result<ConicSolution, ProgramError> {
+    let settings = DefaultSettings {
+        verbose: false,
+        max_iter: MAX_CONIC_ITERATIONS,
+        max_threads: 1,
+        tol_gap_abs: tolerance,
+        tol_gap_rel: tolerance,
+        tol_feas: tolerance,
+        direct_solve_method: "faer".to_owned(),
+        // Moment matrices are dense: there is nothing to decompose.
+        chordal_decomposition_enable: false,
+        ..DefaultSettings::default()
+    };
+    let (quadratic, linear, constraints, constants, cones) = program.standard();
+    // A panic while it was held leaves nothing that the next run needs.
+    let _alone = BLAS.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut solver = DefaultSolver::new(&quadratic, linear, &constraints, constants, cones, settings)
+        .map_err(|error| ProgramError::Solver(error.to_string()))?;
+    solver.set_termination_callback(callback);
+    solver.solve();
+    let solution = solver.solution;
+    let status = solution.status;
+    // How near the others are is for who asked to verify.
+    if matches!(
+        status,
+        SolverStatus::PrimalInfeasible
+            | SolverStatus::DualInfeasible
+            | SolverStatus::AlmostPrimalInfeasible
+            | SolverStatus::AlmostDualInfeasible
+    ) {
+        return Err(ProgramError::Solver(format!("its status is {status:?}")));
+    }
+    let finite = solution.x.iter().chain(&solution.z).all(|value| value.is_finite());
+    if !finite {
+        return Err(ProgramError::Solver("its numbers are not finite".to_owned()));
+    }
+    Ok(ConicSolution { variables: solution.x, multipliers: solution.z })
+}
