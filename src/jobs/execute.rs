@@ -16,7 +16,7 @@ use crate::scene::{Geometry, Ladder};
 use crate::store::{FitOptimum, FitOutcome, FitPreparation, FitRequest, FittedBody, FittedKind, SolverStep};
 
 /// Iterations of the solver that are kept with a job.
-const MAX_LOGGED_STEPS: usize = 500;
+const MAX_LOGGED_STEPS: usize = 200;
 
 /// All that a request made.
 #[derive(Clone, Debug)]
@@ -132,7 +132,7 @@ impl FitOutput {
 
 /// The last iterations of a fit, with numbers that can be kept.
 fn logged(log: &[fit::SolverStep]) -> Vec<SolverStep> {
-    let finite = |value: f64| if value.is_finite() { value } else { f64::MAX };
+    let finite = |value: f64| if value.is_nan() { 0.0 } else { value.clamp(f64::MIN, f64::MAX) };
     let step = |step: &fit::SolverStep| SolverStep {
         round: step.round,
         iteration: step.iteration,

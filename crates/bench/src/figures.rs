@@ -226,11 +226,12 @@ struct ScenesArgs {
     common: Common,
 }
 
-/// Time of a fit against the volume of its body: by each solver, refined, and over the smaller cones
+/// Time of a fit against the volume of its body: by each solver, refined, and over the smaller
+/// cones
 ///
 /// The five meshes of the paper's Table I at degrees 2 to 8. Writes fits.md, fits.csv and fits.svg.
-/// Takes about ten minutes on one core, most of them for degree 8 by clarabel; a minute with --quick,
-/// which ends at degree 6.
+/// Takes about ten minutes on one core, most of them for degree 8 by clarabel; a minute with
+/// --quick, which ends at degree 6.
 #[derive(Debug, Args)]
 struct FitsArgs {
     #[command(flatten)]

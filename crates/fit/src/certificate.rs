@@ -1,13 +1,15 @@
 //! A certificate for a polynomial from elsewhere: a definite Gram matrix of its Hessian form, if
 //! there is one.
 //!
-//! Of all Gram matrices H of the form f, `A(H) = f`, the one with the largest smallest eigenvalue is
-//! the easiest to prove (`margin_program`). A functional on the form with a definite moment matrix
-//! bounds that eigenvalue from above, and where the bound is negative there is no certificate.
+//! Of all Gram matrices H of the form f, `A(H) = f`, the one with the largest smallest eigenvalue
+//! is the easiest to prove (`margin_program`). A functional on the form with a definite moment
+//! matrix bounds that eigenvalue from above, and where the bound is negative there is no
+//! certificate.
 //!
 //! A square that only one product of the basis gives and that is missing in f rules that element of
 //! the basis out, as those of sparse forms: of `z^4` only `y z` is left.
 
+use super::FitError;
 use super::localizing::LocalizingMatrix;
 use super::margin_program::{Margin, largest_margin};
 use super::structure::{Pattern, Structure};
@@ -16,7 +18,8 @@ use sublevel_core::body::sphere_rule;
 use sublevel_core::polynomial::{CertificateError, Exponents, HessianGram, HessianMonomial, Polynomial};
 
 /// Bound of the smallest eigenvalue, relative to the largest coefficient, below which a polynomial
-/// is called barely sos-convex; dimensionless.
+/// is called barely sos-convex, and above whose negative it is not called anything else;
+/// dimensionless.
 ///
 /// The residual of a proof in double precision is about 1e-15 of the coefficients. It decides only
 /// what an error says, and no test fixes it.
@@ -49,12 +52,16 @@ pub enum NoCertificate {
         /// largest coefficient.
         bound: f64,
     },
+    /// The search failed.
+    #[error("a certificate could not be looked for: {0}")]
+    Unsolved(FitError),
     /// What was found is not proven.
     #[error(transparent)]
     Unproven(#[from] CertificateError),
 }
 
-/// The Gram matrix of the polynomial's Hessian form whose smallest eigenvalue is the largest, proven.
+/// The Gram matrix of the polynomial's Hessian form whose smallest eigenvalue is the largest,
+/// proven.
 ///
 /// # Errors
 /// [`NoCertificate`], by how much it failed.
@@ -68,9 +75,9 @@ pub fn certificate(polynomial: &Polynomial) -> Result<HessianGram, NoCertificate
     let basis: Vec<_> = rows.iter().map(|&row| structure.hessian_basis[row]).collect();
     let inside = start(&pattern, &basis);
     let cones = [LocalizingMatrix::of(pattern)];
-    let Margin { bound, mut grams } = largest_margin(&form, &cones, &[vec![1.0; rows.len()]], &inside)
-        .map_err(|_| NoCertificate::Singular { bound: f64::NAN })?;
-    if bound < 0.0 {
+    let Margin { bound, mut grams } =
+        largest_margin(&form, &cones, &[vec![1.0; rows.len()]], &inside).map_err(NoCertificate::Unsolved)?;
+    if bound < -LEAST_PROVABLE_EIGENVALUE {
         return Err(NoCertificate::NotSosConvex { bound });
     }
     let gram = HessianGram::nearest(polynomial, basis, grams.remove(0) * largest)?;

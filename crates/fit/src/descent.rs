@@ -32,7 +32,7 @@ const CONE_VOLUME_DECREASE: f64 = 2e-3;
 /// Tolerance asked of the solver; dimensionless.
 ///
 /// A larger value leaves residuals that cost certificates; a smaller one takes more iterations.
-/// Pinned by `programs_agree_with_clarabel`.
+/// Pinned by `programs_agree_with_another_statement`.
 const TOLERANCE: f64 = 1e-8;
 /// Points that the first program knows, in multiples of the rows of P, and at most as many more in
 /// each of the next.
@@ -76,7 +76,7 @@ pub(super) fn descend(
         let columns = values.select_columns(&known.indices);
         let program = ModelProgram { dominance: &dominance, structure, values: &columns, margin, model: &model };
         watch.round(columns.ncols(), known.worst);
-        let target = program.minimise(watch)?;
+        let target = program.minimise(here, watch)?;
         let Some(target) = target else {
             end = RefinementEnd::Unsolved;
             break;
@@ -121,11 +121,12 @@ pub(super) struct ModelProgram<'a> {
 }
 
 impl ModelProgram<'_> {
-    /// The minimiser; none where the solver has none that is feasible.
+    /// The minimiser, progress in units of `unit`; none where the solver has none
+    /// that matches the Hessian form.
     ///
     /// # Errors
     /// [`FitError::Cancelled`].
-    pub(super) fn minimise(&self, watch: &mut Watch) -> Result<Option<Interior>, FitError> {
+    pub(super) fn minimise(&self, unit: f64, watch: &mut Watch) -> Result<Option<Interior>, FitError> {
         let Self { dominance, structure, values, margin, model } = *self;
         let pattern = &structure.hessian;
         let mut program = ConicProgram::default();
@@ -142,7 +143,6 @@ impl ModelProgram<'_> {
         let mut form: Vec<Expression> = structure.derivative.iter().map(of_key).collect();
         (0..pattern.size).for_each(|i| form[pattern.key(i, i)].constant -= margin);
         let blocks = dominance.constrain(&mut program, form);
-        let unit = linear.amax().max(1.0);
         let solution = match solve(&program, TOLERANCE, unit, watch) {
             Ok(solution) => solution,
             Err(FitError::Cancelled) => return Err(FitError::Cancelled),

@@ -35,9 +35,9 @@ pub struct FitReport {
     /// |value|). None for volumes: they are not convex in the polynomial, and no lower bound of
     /// theirs is known.
     pub optimality_gap: Option<f64>,
-    /// Programs solved, one per set of points and one per step of a refinement.
+    /// Programs solved, those of the steps of a refinement among them.
     pub rounds: usize,
-    /// Newton steps of all of them.
+    /// Iterations of all of them.
     pub iterations: usize,
     /// What was minimised, but over the smaller cones.
     pub objective: Objective,

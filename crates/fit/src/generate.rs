@@ -9,7 +9,7 @@ use super::path::{Interior, Path, PathOptions};
 use super::program::{Problem, ProgramError};
 use super::progress::Watch;
 use super::structure::Structure;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
 use sublevel_core::body::Solver;
 
 /// Excess of p over 1 up to which a point is left to the shift of the constant coefficient;
@@ -88,7 +88,8 @@ struct Candidate {
 /// Minimises the objective over p, sos-convex as far as the problem asks for it, with `p <= 1` at
 /// `points` (whitened: the unit ball is their smallest ellipsoid). The program begins with the
 /// points that are `likely` to bound p, the likeliest first, among others; they change the answer
-/// only within its gap. Unless one solver is asked for, a second one is tried where the first fails.
+/// only within its gap. Unless one solver is asked for, a second one is tried where the first
+/// fails.
 pub(super) fn generate(
     problem: &Problem,
     points: &[Vector3<f64>],
@@ -96,12 +97,17 @@ pub(super) fn generate(
     watch: &mut Watch,
 ) -> Result<Optimum, FitError> {
     let mut failed: Option<(Solver, FitError)> = None;
-    for solver in problem.solvers() {
+    let solvers = problem.solvers();
+    for &solver in &solvers {
         let found = match solver {
             Solver::Clarabel => by_conic_solver(problem, points, likely, watch),
             Solver::Structured => by_path(problem, points, likely, watch),
         };
         match found.and_then(|candidate| verified(problem, candidate, solver)) {
+            Ok(optimum) if !is_certifiable(problem, &optimum) && solvers.last() != Some(&solver) => {
+                let why = "its Gram matrix of the Hessian form is not definite";
+                failed = Some((solver, ProgramError::Solver(why.to_owned()).into()));
+            }
             Ok(optimum) => {
                 let fallback = failed.map(|(solver, error)| format!("{solver} failed: {error}"));
                 return Ok(Optimum { fallback, ..optimum });
@@ -112,6 +118,14 @@ pub(super) fn generate(
         }
     }
     Err(failed.map_or(ProgramError::Singular.into(), |(_, error)| error))
+}
+
+/// Whether H is definite by half of the margin: of what the certificate has to prove, rounding
+/// takes its part. A larger margin may help where no other solver does.
+fn is_certifiable(problem: &Problem, optimum: &Optimum) -> bool {
+    let rows = optimum.hessian.nrows();
+    let margin = DMatrix::identity(rows, rows) * (0.5 * problem.margin);
+    rows == 0 || Cholesky::new(&optimum.hessian - margin).is_some()
 }
 
 /// The optimum by clarabel.
@@ -128,9 +142,12 @@ fn by_conic_solver(
         let optimum = MomentProgram::of_points(problem, &active.values).solve(watch)?;
         let outside = violations(problem.structure, points, &optimum.interior.coefficients);
         worst = outside.first().map_or(0.0, |&(excess, _)| excess);
-        if worst <= VIOLATION || points.len() <= ALL_POINTS {
+        if worst <= VIOLATION {
             let MomentOptimum { interior, gram, lower_bound, .. } = optimum;
             return Ok(Candidate { interior, gram: Some(gram), lower_bound });
+        }
+        if points.len() <= ALL_POINTS {
+            return Err(ProgramError::Solver(format!("it leaves points outside by {worst:.1e}")).into());
         }
         active.add(problem.structure, points, &outside);
     }

@@ -30,6 +30,7 @@ mod farthest_points;
 mod fitted;
 mod gap;
 mod generate;
+mod hierarchy;
 pub mod hull;
 pub mod input;
 mod ladder;
@@ -79,6 +80,7 @@ pub use enclose::{
 pub use error::FitError;
 pub use fitted::{Fit, FitReport, Rung};
 pub use gap::{Gap, gap};
+pub use hierarchy::{HierarchyBound, HierarchyError, MAX_LEVEL, PlacedSet, hierarchy_distance};
 pub use hull::HullError;
 pub use input::{
     Mesh, ReadError, ReadOptions, Reading, Remarks, Scale, ScaleError, Unused, UnusedCost, parse_mesh, read_mesh,
@@ -127,9 +129,9 @@ pub fn fit(
 
 /// As [`fit()`], of points that have changed a little since `previous` was fitted, as those of the
 /// next scan of a stream: where a program does not begin with all points (those of the structured
-/// solver, and of more than a thousand vertices), it begins with those near the surface of that body,
-/// which saves it rounds of looking for those that bound the new one. The answer is that of a fit from
-/// scratch within the optimality gap, whatever the body is.
+/// solver, and of more than a thousand vertices), it begins with those near the surface of that
+/// body, which saves it rounds of looking for those that bound the new one. The answer is that of a
+/// fit from scratch within the optimality gap, whatever the body is.
 ///
 /// # Errors
 /// As [`fit()`].

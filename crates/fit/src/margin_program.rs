@@ -1,14 +1,14 @@
 //! The Gram matrices of an identity that are farthest from singular.
 //!
-//! Of all Gram matrices with `f = Σ_j ⟨G_j, products_j⟩`, those with the largest t in `G_j ⪰ t D_j²`
-//! are the easiest to prove. The dual has one functional y:
+//! Of all Gram matrices with `f = Σ_j ⟨G_j, products_j⟩`, those with the largest t in `G_j ⪰ t
+//! D_j²` are the easiest to prove. The dual has one functional y:
 //!
 //! ```text
 //! minimise  f(y)   subject to  M_j(y) ⪰ 0,  Σ_j tr D_j M_j(y) D_j = 1,
 //! ```
 //!
-//! with M_j its moment matrices. Its optimum is t, and `f(y) >= t` for every feasible y: where it is
-//! negative, no Gram matrices are all semidefinite.
+//! with M_j its moment matrices. Its optimum is t, and `f(y) >= t` for every feasible y: where it
+//! is negative, no Gram matrices are all semidefinite.
 
 use super::FitError;
 use super::conic_program::{ConicProgram, Expression, solve};
@@ -31,8 +31,8 @@ pub(super) struct Margin {
     pub(super) grams: Vec<DMatrix<f64>>,
 }
 
-/// The largest margin of the identity for `target`, coefficients of f. `inside` is a functional with
-/// definite moment matrices, and `scales` are the diagonals of the D_j.
+/// The largest margin of the identity for `target`, coefficients of f. `inside` is a functional
+/// with definite moment matrices, and `scales` are the diagonals of the D_j.
 ///
 /// # Errors
 /// Those of the solver.

@@ -1,22 +1,24 @@
 //! The dual program of a fit as a conic program.
 //!
-//! The variables are the moments m, those of the sources they come from, and the functional s on the
-//! Hessian form. In a fit the source is the weights of the points (`program`), around whole sets it
-//! is a functional y for each set (`enclose`). Where a log det is measured, its matrix X is cut into groups of rows by the
-//! degree of their monomials, and with Δ_k the part of a group that the groups before it leave,
+//! The variables are the moments m, those of the sources they come from, and the functional s on
+//! the Hessian form. In a fit the source is the weights of the points (`program`), around whole
+//! sets it is a functional y for each set (`enclose`). Where a log det is measured, its matrix X is
+//! cut into groups of rows by the degree of their monomials, and with Δ_k the part of a group that
+//! the groups before it leave,
 //!
 //! ```text
 //! X_{<=k} - E Δ_k Eᵀ ⪰ 0,   [[Δ_k, Z_k], [Z_kᵀ, diag Z_k]] ⪰ 0,  Z_k lower triangular
 //! ```
 //!
-//! give `det X = Π det Δ_k >= Π (Z_k)_ii`: blocks of at most twice a group, in place of one of twice
-//! the matrix. The geometric mean of those n numbers is maximised while the linear part of the dual
-//! objective is held at n. Both are homogeneous, so that is the log det's optimum, with multipliers
-//! that are p and its Gram matrices but for the factor that the multiplier of that equation is.
+//! give `det X = Π det Δ_k >= Π (Z_k)_ii`: blocks of at most twice a group, in place of one of
+//! twice the matrix. The geometric mean of those n numbers is maximised while the linear part of
+//! the dual objective is held at n. Both are homogeneous, so that is the log det's optimum, with
+//! multipliers that are p and its Gram matrices but for the factor that the multiplier of that
+//! equation is.
 //!
-//! Where `tr Q⁻¹` is measured, `tr X^½ = max tr Y` subject to `[[X, Y], [Yᵀ, I]] ⪰ 0`; with T the change
-//! of frame and `Y = T Z`, that is `[[M, Z], [Zᵀ, I]] ⪰ 0`. It is homogeneous, too, of degree one half,
-//! and is maximised in the same way.
+//! Where `tr Q⁻¹` is measured, `tr X^½ = max tr Y` subject to `[[X, Y], [Yᵀ, I]] ⪰ 0`; with T the
+//! change of frame and `Y = T Z`, that is `[[M, Z], [Zᵀ, I]] ⪰ 0`. It is homogeneous, too, of
+//! degree one half, and is maximised in the same way.
 
 use super::FitError;
 use super::conic_program::{ConicProgram, ConicSolution, Expression, geometric_mean, solve};
@@ -25,16 +27,19 @@ use super::objective::{Function, Matrix};
 use super::path::Interior;
 use super::program::{Dual, Problem, ProgramError};
 use super::progress::Watch;
-use super::structure::{Pattern, isotropic_form};
+use super::structure::{Pattern, interior_form, isotropic_form};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use std::ops::Range;
 use sublevel_core::polynomial::degree_of;
 
 /// Tolerance asked of the solver; dimensionless.
 ///
-/// 1e-8 leaves a gap of 1e-4 of log dets at degree 6 and of 1e-3 at degree 8, which fails the check of
-/// optimality; a smaller value ends in stalls. Pinned by `both_solvers_agree`.
+/// 1e-8 leaves a gap of 1e-4 of log dets at degree 6 and of 1e-3 at degree 8, which fails the check
+/// of optimality; a smaller value ends in stalls. Pinned by `both_solvers_agree`.
 const TOLERANCE: f64 = 1e-9;
+
+/// Least square root of a pivot, relative to that of the diagonal, that a row is scaled by.
+const LEAST_PIVOT: f64 = 1e-5;
 
 /// What moments come from.
 pub(super) struct Source<'a> {
@@ -82,9 +87,9 @@ pub(super) struct MomentProgram<'a> {
     of_cones: Vec<Vec<Range<usize>>>,
 }
 
-/// A moment matrix among the variables, its rows and columns scaled: the pivots of the scaled matrix
-/// are about 1. Its constraints hold to the solver's absolute tolerance, and pivots of 1e-3 would
-/// have a thousandth of that accuracy.
+/// A moment matrix among the variables, its rows and columns scaled: the pivots of the scaled
+/// matrix are about 1. Its constraints hold to the solver's absolute tolerance, and pivots of 1e-3
+/// would have a thousandth of that accuracy.
 struct MomentMatrix<'a> {
     pattern: &'a Pattern,
     /// The variable of key 0.
@@ -116,11 +121,12 @@ struct Part {
     scales: Vec<f64>,
 }
 
-/// One over the square roots of the pivots of a definite matrix; 1 where it has none.
+/// One over the square roots of the pivots of a semidefinite matrix, or of its diagonal where it
+/// has none or small ones: those of a singular matrix are rounding.
 pub(super) fn scales(matrix: DMatrix<f64>) -> Vec<f64> {
-    let size = matrix.nrows();
-    Cholesky::new(matrix)
-        .map_or(vec![1.0; size], |factor| factor.l_dirty().diagonal().iter().map(|d| 1.0 / d).collect())
+    let diagonal = matrix.diagonal().map(f64::sqrt);
+    let pivots = Cholesky::new(matrix).map_or(diagonal.clone(), |factor| factor.l_dirty().diagonal());
+    pivots.iter().zip(&diagonal).map(|(&pivot, &entry)| 1.0 / pivot.max(LEAST_PIVOT * entry)).collect()
 }
 
 impl<'a> MomentProgram<'a> {
@@ -242,7 +248,8 @@ impl<'a> MomentProgram<'a> {
         if size == 0 {
             return;
         }
-        // By as much as the solver may be in error: its dual point is feasible then.
+        // By about as much as the solver may be in error, so that its dual point mostly is feasible
+        // as it is.
         let rows = self.program.semidefinite(size, |i, j| {
             let constant = if i == j { -TOLERANCE } else { 0.0 };
             Expression { constant, ..moments.entry(i, j) }
@@ -304,12 +311,11 @@ impl<'a> MomentProgram<'a> {
             let of_sources: DVector<f64> = sources.iter().zip(of_sources).map(|(source, y)| source.map * y).sum();
             of_sources - problem.structure.pull_back(form)
         };
-        // A functional on the form so small that the moments inside stay definite.
         let inside: Vec<_> = sources.iter().map(|source| source.inside.clone()).collect();
-        let isotropic = isotropic_form(problem.structure, &moments(&inside, &DVector::zeros(hessian.keys)));
-        let is_definite = |form: &DVector<f64>| Cholesky::new(gram.spread(&moments(&inside, form))).is_some();
-        let halved = (1..40).map(|halvings| &isotropic * 0.5_f64.powi(halvings)).find(is_definite);
-        let inside_form = halved.ok_or(ProgramError::Singular)? * 0.5;
+        let rows = gram.size as f64;
+        let mean = moments(&inside, &DVector::zeros(hessian.keys)) / rows;
+        // Where none is found, the solver's point has to be feasible as it is.
+        let inside_form = interior_form(problem.structure, &mean, rows).unwrap_or_else(|| DVector::zeros(hessian.keys));
         let feasible = |share: f64| {
             let form = solution.values(self.form.clone()) + &inside_form * share;
             Cholesky::new(hessian.spread(&form))?;

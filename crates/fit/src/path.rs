@@ -17,9 +17,8 @@ use super::factor::{cholesky, regularised_factor, solve_lower};
 use super::model::Model;
 use super::program::{Dual, Problem};
 use super::progress::Watch;
-use super::structure::{Structure, isotropic_form};
+use super::structure::{Structure, interior_form};
 use nalgebra::{Cholesky, DMatrix, DVector};
-use sublevel_core::polynomial::degree_of;
 
 /// Newton decrement below which a point counts as a centre; 1 is where its polynomial stops being
 /// feasible.
@@ -146,24 +145,13 @@ impl<'a> Path<'a> {
         Dual { moments: self.values * &weights - self.structure.pull_back(&form), weights, form }
     }
 
-    /// Equal weights that add up to the rows of P, and y isotropic and independent of z: S is
-    /// positive definite, and small enough to leave M so. Where relaxed convexity has no points
-    /// inside to go by, as of a sphere, z closer to the centre helps.
+    /// Equal weights that add up to the rows of P, and a functional that leaves M definite.
     pub(super) fn start(&self) -> Option<DualPoint> {
         let points = self.values.ncols();
         let rows = self.structure.gram.size as f64;
         let weights = DVector::repeat(points, rows / points as f64);
         let mean = self.values * DVector::repeat(points, 1.0 / points as f64);
-        let dual = [1.0, 0.5, 0.25].into_iter().find_map(|shrink: f64| {
-            let order = self.structure.monomials.iter().map(|&e| shrink.powi(degree_of(e) as i32));
-            let isotropic =
-                isotropic_form(self.structure, &mean.component_mul(&DVector::from_iterator(mean.len(), order)));
-            (0..40).find_map(|halvings| {
-                let point = self.point(weights.clone(), &isotropic * 0.5_f64.powi(halvings));
-                Cholesky::new(self.structure.gram.spread(&point.moments))?;
-                Some(self.point(weights.clone(), &isotropic * 0.5_f64.powi(halvings + 1)))
-            })
-        })?;
+        let dual = self.point(weights, interior_form(self.structure, &mean, rows)?);
         // At a centre the rows of S are what relaxed convexity costs: a start that costs more is
         // far from any.
         let least = self.structure.hessian.size as f64 / self.cost.dot(&dual.form);

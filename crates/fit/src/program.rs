@@ -25,8 +25,9 @@
 //! coordinates u: with h the coefficients of the Hessian form of r, the constraint `yᵀ∇²(p + r) y =
 //! wᵀHw` takes `h·s` off the dual objective, and nothing else changes.
 //!
-//! The optimal Gram matrix is the gradient of φ at the optimum. The dual needs no exponential
-//! cones, and no block of twice the size for determinant or inverse (`path`).
+//! The optimal Gram matrix is the gradient of φ at the optimum. The structured solver follows the
+//! dual's central path in its own variables (`path`); clarabel gets it as a conic program
+//! (`moment_program`).
 
 use super::Objective;
 use super::basis::{Affine, change};
@@ -47,7 +48,7 @@ pub enum ProgramError {
     #[error("the points do not span the polynomials of this degree numerically; lower the degree, or add points")]
     Singular,
     /// The solver has no answer.
-    #[error("the semidefinite program could not be solved ({0}); lower the degree, or add points")]
+    #[error("the solver has no solution ({0}); leave the choice of the solver open, lower the degree, or add points")]
     Solver(String),
 }
 

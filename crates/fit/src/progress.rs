@@ -54,6 +54,14 @@ impl<'a> Watch<'a> {
         self.iteration(gap)
     }
 
+    /// Nothing has happened: another fit of the process has the solver.
+    ///
+    /// # Errors
+    /// [`FitError::Cancelled`] when the caller asks to stop.
+    pub(super) fn waiting(&mut self) -> Result<(), FitError> {
+        if (self.report)(self.progress).is_break() { Err(FitError::Cancelled) } else { Ok(()) }
+    }
+
     /// The steps of the conic solver so far.
     pub(super) fn log(&self) -> &[SolverStep] {
         &self.log

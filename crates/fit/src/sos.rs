@@ -62,9 +62,9 @@ pub struct ProgramReport {
     pub objective_value: f64,
     /// That minus its lower bound from the dual; at most 1e-5 max(1, |value|).
     pub optimality_gap: f64,
-    /// Programs solved, one per set of points.
+    /// Programs solved.
     pub rounds: usize,
-    /// Newton steps of all of them.
+    /// Iterations of all of them.
     pub iterations: usize,
     /// Margin the certificate of the relaxation was proven with.
     pub margin: f64,

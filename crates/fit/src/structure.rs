@@ -1,9 +1,9 @@
 //! Which products of basis monomials give which monomial: the index maps of the two Gram matrices
 //! of a fit.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
 use std::collections::HashMap;
-use sublevel_core::polynomial::{Exponents, HessianGram, HessianMonomial, monomials};
+use sublevel_core::polynomial::{Exponents, HessianGram, HessianMonomial, degree_of, monomials};
 
 /// A symmetric matrix whose entries are grouped by key: entries with one key add up to one
 /// coefficient (as a Gram matrix) or are equal (as a moment matrix).
@@ -203,6 +203,21 @@ pub(super) fn isotropic_form(structure: &Structure, mean: &DVector<f64>) -> DVec
         }
     }
     form
+}
+
+/// A functional on the Hessian form with a definite moment matrix, and so small that moments `rows
+/// mean` less what it induces are definite, too: y isotropic and independent of z. Where relaxed
+/// convexity has no points inside to go by, as of a sphere, z closer to the centre helps.
+pub(super) fn interior_form(structure: &Structure, mean: &DVector<f64>, rows: f64) -> Option<DVector<f64>> {
+    [1.0, 0.5, 0.25].into_iter().find_map(|shrink: f64| {
+        let order = structure.monomials.iter().map(|&e| shrink.powi(degree_of(e) as i32));
+        let isotropic = isotropic_form(structure, &mean.component_mul(&DVector::from_iterator(mean.len(), order)));
+        let halved = (0..40).map(|halvings| &isotropic * 0.5_f64.powi(halvings));
+        let is_inside = |form: &DVector<f64>| {
+            Cholesky::new(structure.gram.spread(&(mean * rows - structure.pull_back(form)))).is_some()
+        };
+        halved.into_iter().find(is_inside).map(|form| form * 0.5)
+    })
 }
 
 #[cfg(test)]

@@ -292,6 +292,37 @@ fn refits_of_a_stream_take_fewer_steps_and_end_where_fits_do() {
     refit(&elsewhere.body, &far, &options, &mut unwatched).unwrap().body.prove_contains(&far).unwrap();
 }
 
+/// More vertices than clarabel is given at once.
+#[test]
+fn many_vertices_come_in_by_rounds() {
+    let points = blob(2500);
+    let [clarabel, structured] = Solver::ALL.map(|solver| {
+        let options = FitOptions { degree: 4, solver: Some(solver), ..FitOptions::default() };
+        fit("test", &points, &options, &mut unwatched).unwrap().report
+    });
+    assert!(clarabel.hull_vertices > 1000 && clarabel.rounds > 1, "{clarabel:?}");
+    assert!((clarabel.objective_value - structured.objective_value).abs() < 1e-5);
+    assert!((clarabel.volume_m3 / structured.volume_m3 - 1.0).abs() < 1e-5);
+}
+
+#[test]
+fn both_solvers_are_tried_unless_one_is_asked_for() {
+    let points = blob(60);
+    let structure = Structure::new(4);
+    let unit = Affine { linear: Matrix3::identity(), offset: Vector3::zeros() };
+    // A margin of no meaning: H cannot be definite by it while p is at most 1 at the points.
+    let problem = Problem::new(&structure, Objective::LogDetP, &unit, 1e3);
+    let failed = generate(&problem, &points, &[], &mut Watch::new(&mut unwatched)).unwrap_err();
+    assert!(matches!(failed, FitError::Program(_) | FitError::NotOptimal { .. }), "{failed}");
+    let problem = Problem::new(&structure, Objective::LogDetP, &unit, 1e-5);
+    assert_eq!(problem.solvers(), [Solver::Clarabel, Solver::Structured]);
+    assert_eq!(Problem { solver: Some(Solver::Structured), ..problem.clone() }.solvers(), [Solver::Structured]);
+    let eighth = Structure::new(8);
+    let problem = Problem::new(&eighth, Objective::LogDetP, &unit, 1e-5);
+    assert_eq!(problem.solvers(), [Solver::Structured, Solver::Clarabel]);
+    assert_eq!(Problem::new(&eighth, Objective::TraceP, &unit, 1e-5).solvers(), [Solver::Clarabel]);
+}
+
 #[test]
 fn few_points_and_points_on_quadrics() {
     // the smallest ellipsoid of a tetrahedron has 8.162 times its volume

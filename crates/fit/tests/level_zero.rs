@@ -20,6 +20,7 @@ use nalgebra::{Matrix3, Vector3};
 // Links the BLAS that clarabel's semidefinite cones call.
 use openblas_src as _;
 use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
 use sublevel_core::body::{Body, Constraint};
 use sublevel_core::measure::Pose;
 use sublevel_core::polynomial::{Exponents, degree_of, monomials};
@@ -28,6 +29,8 @@ use sublevel_core::polynomial::{Exponents, degree_of, monomials};
 type Terms = BTreeMap<Exponents, f64>;
 
 const ONE: Exponents = [0; 3];
+
+static BLAS: Mutex<()> = Mutex::new(());
 
 /// Distance of the bodies, metres; about 1e-8 of their size exact. None if the program could not be
 /// solved.
@@ -247,6 +250,8 @@ impl Program {
                 ..DefaultSettings::default()
             };
             let none = CscMatrix::zeros((count, count));
+            // A serial BLAS is not made for tests of several threads.
+            let _alone = BLAS.lock().unwrap_or_else(PoisonError::into_inner);
             let mut solver = DefaultSolver::new(&none, &self.objective, &matrix, &b, &cones, settings).ok()?;
             solver.solve();
             // Thin bodies leave no progress at the last digits: then the residuals decide.

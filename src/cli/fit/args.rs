@@ -90,6 +90,7 @@ pub(in crate::cli) struct FitArgs {
     /// Left out, the faster one is taken, and the other where that fails: clarabel, a conic solver
     /// for every objective, up to degree 6; structured, which follows the central path of logdet-p,
     /// at degree 8. Both reach the same optimum, and every body is proven from its numbers alone.
+    /// The steps of --refine are always those of the structured solver.
     #[arg(long, value_name = "NAME")]
     pub(in crate::cli) solver: Option<Solver>,
     /// Cut the body by at most this many slabs (pairs of parallel planes), each where it reaches

@@ -5,8 +5,8 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-/// The solver of a fit's semidefinite program. Both solve the same program to the same accuracy, and
-/// every body is proven from its own numbers, whoever found them.
+/// The solver of a fit's semidefinite program. Both solve the same program to the same accuracy,
+/// and every body is proven from its own numbers, whoever found them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Solver {

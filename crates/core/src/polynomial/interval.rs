@@ -21,6 +21,16 @@ impl Interval {
         Self { low: value, high: value }
     }
 
+    /// All numbers within a radius of this one.
+    pub(super) fn around(value: f64, radius: f64) -> Self {
+        Self { low: (value - radius).next_down(), high: (value + radius).next_up() }
+    }
+
+    /// The lower bound.
+    pub(super) fn low(self) -> f64 {
+        self.low
+    }
+
     /// Upper bound of the magnitudes.
     pub(super) fn magnitude(self) -> f64 {
         if self.low.is_nan() || self.high.is_nan() { f64::NAN } else { self.low.abs().max(self.high.abs()) }

@@ -26,6 +26,31 @@ impl Substitution {
         }
     }
 
+    /// The map `x = R (L⁻¹ z + c) + t` from normalized coordinates to a space, R a rotation whose
+    /// matrix is rounded; none where L has no inverse that can be enclosed.
+    pub fn to_space(
+        linear: &Matrix3<f64>,
+        center: &Vector3<f64>,
+        rotation: &Matrix3<f64>,
+        translation: &Vector3<f64>,
+    ) -> Option<Self> {
+        let inverse = enclosed_inverse(linear)?;
+        let rotation: [[Interval; 3]; 3] =
+            std::array::from_fn(|i| std::array::from_fn(|j| Interval::around(rotation[(i, j)], ROTATION_ERROR)));
+        let sum = |i: usize, of: &dyn Fn(usize) -> Interval| {
+            (0..3).fold(Interval::ZERO, |sum, k| sum + rotation[i][k] * of(k))
+        };
+        Some(Self {
+            linear: std::array::from_fn(|i| std::array::from_fn(|j| sum(i, &|k| inverse[k][j]))),
+            offset: std::array::from_fn(|i| sum(i, &|k| Interval::of(center[k])) + Interval::of(translation[i])),
+        })
+    }
+
+    /// A row of A, and of b.
+    pub(super) fn row(&self, axis: usize) -> ([Interval; 3], Interval) {
+        (self.linear[axis], self.offset[axis])
+    }
+
     /// `p(A v + b)`, its coefficients in the order of [`monomials`].
     pub(super) fn apply(&self, polynomial: &Polynomial) -> Vec<Interval> {
         let order = monomials(polynomial.degree().min(MAX_DEGREE));
@@ -71,6 +96,26 @@ impl Substitution {
         let minor = |i: usize, j: usize| b[i] * c[j] - b[j] * c[i];
         (a[0] * minor(1, 2) - a[1] * minor(0, 2) + a[2] * minor(0, 1)).is_nonzero()
     }
+}
+
+/// Error of an entry of the matrix of a rotation that was computed of a unit quaternion.
+const ROTATION_ERROR: f64 = 2e-15;
+
+/// The inverse, enclosed: with `E = I - LX` small, `L⁻¹ = X + X E (I - E)⁻¹`.
+fn enclosed_inverse(linear: &Matrix3<f64>) -> Option<[[Interval; 3]; 3]> {
+    let inverse = linear.try_inverse()?;
+    let residual = |i: usize, j: usize| {
+        let product =
+            (0..3).fold(Interval::ZERO, |sum, k| sum + Interval::of(linear[(i, k)]) * Interval::of(inverse[(k, j)]));
+        (Interval::of(f64::from(u8::from(i == j))) - product).magnitude()
+    };
+    let norms = (0..3).map(|i| (0..3).map(|j| residual(i, j)).sum::<f64>());
+    let norm = norms.fold(0.0, |most: f64, norm| if norm.is_nan() { f64::NAN } else { most.max(norm) }) * (1.0 + 1e-14);
+    if !(norm < 0.5) {
+        return None;
+    }
+    let radius = |i: usize| inverse.row(i).abs().sum() * (norm / (1.0 - norm)) * (1.0 + 1e-14);
+    Some(std::array::from_fn(|i| std::array::from_fn(|j| Interval::around(inverse[(i, j)], radius(i)))))
 }
 
 #[cfg(test)]

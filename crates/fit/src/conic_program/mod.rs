@@ -1,4 +1,4 @@
-//! Conic programs, and the one door to their solver.
+//! Conic programs, and the one place that calls their solver.
 //!
 //! A [`ConicProgram`] is stated in affine expressions of its variables that are zero, nonnegative,
 //! in a second-order cone or positive semidefinite; [`solve`] hands it to clarabel. Nothing that
@@ -9,6 +9,8 @@ mod solve;
 
 pub(crate) use program::{ConicProgram, Expression, geometric_mean};
 pub use solve::SolverStep;
+#[cfg(test)]
+pub(crate) use solve::alone;
 pub(crate) use solve::{ConicSolution, solve};
 
 #[cfg(test)]

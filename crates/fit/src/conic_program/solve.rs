@@ -11,11 +11,15 @@ use openblas_src as _;
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::ops::Range;
 use std::sync::mpsc::sync_channel;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, TryLockError};
+use std::time::Duration;
 
 /// Held while the solver runs: a serial OpenBLAS, as Debian's `libopenblas-serial-dev`, keeps its
 /// workspace in static memory, and two solvers at once give each other's numbers.
 static BLAS: Mutex<()> = Mutex::new(());
+
+/// How long to wait for another solver before asking whether to continue.
+const WAIT: Duration = Duration::from_millis(5);
 
 /// Iterations at most; 10 to 40 are usual.
 const MAX_CONIC_ITERATIONS: u32 = 100;
@@ -69,9 +73,10 @@ impl ConicSolution {
     }
 }
 
-/// Solves a program on one thread, one program of the process at a time, to a tolerance of the gap (absolute and relative) and of
-/// feasibility (relative). Each iteration is reported and can stop it; `unit` is what a relative gap
-/// of 1 is in the units of the report.
+/// Solves a program, one of the process at a time, to a tolerance of the gap (absolute and
+/// relative) and of feasibility (relative). Each iteration is reported and can stop it, as can the
+/// wait for another solver; what is called must not solve programs itself. `unit` is what a
+/// relative gap of 1 is in the units of the report.
 ///
 /// # Errors
 /// [`FitError::Cancelled`]; [`ProgramError`] where the solver found the program infeasible or
@@ -85,8 +90,9 @@ pub(crate) fn solve(
     if !program.is_finite() {
         return Err(ProgramError::Solver("a number of the program is not finite".to_owned()).into());
     }
-    // The callback of the solver outlives no borrow of ours: the solver works on a thread of its
-    // own, and asks this one at every iteration whether to continue.
+    let _alone = lock(watch)?;
+    // The solver's callback must not borrow `watch`: the solver runs on a thread of its own, and
+    // waits at every iteration until this one has reported it.
     let (report, reports) = sync_channel::<SolverStep>(0);
     let (answer, answers) = sync_channel::<()>(0);
     let answers = Mutex::new(answers);
@@ -127,6 +133,27 @@ pub(crate) fn solve(
     solved.unwrap_or_else(|_| Err(ProgramError::Solver("it panicked".to_owned()))).map_err(FitError::from)
 }
 
+/// Waits for the solver, and meanwhile asks whether to continue.
+fn lock(watch: &mut Watch) -> Result<MutexGuard<'static, ()>, FitError> {
+    loop {
+        match BLAS.try_lock() {
+            Ok(guard) => return Ok(guard),
+            // A panic while it was held leaves nothing that the next run needs.
+            Err(TryLockError::Poisoned(poisoned)) => return Ok(poisoned.into_inner()),
+            Err(TryLockError::WouldBlock) => {
+                watch.waiting()?;
+                std::thread::sleep(WAIT);
+            }
+        }
+    }
+}
+
+/// For tests that call clarabel themselves.
+#[cfg(test)]
+pub(crate) fn alone() -> MutexGuard<'static, ()> {
+    BLAS.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+}
+
 fn run(
     program: &ConicProgram,
     tolerance: f64,
@@ -140,13 +167,11 @@ fn run(
         tol_gap_rel: tolerance,
         tol_feas: tolerance,
         direct_solve_method: "faer".to_owned(),
-        // Moment matrices are dense: there is nothing to decompose.
+        // The matrices are dense: there is nothing to decompose.
         chordal_decomposition_enable: false,
         ..DefaultSettings::default()
     };
     let (quadratic, linear, constraints, constants, cones) = program.standard();
-    // A panic while it was held leaves nothing that the next run needs.
-    let _alone = BLAS.lock().unwrap_or_else(PoisonError::into_inner);
     let mut solver = DefaultSolver::new(&quadratic, linear, &constraints, constants, cones, settings)
         .map_err(|error| ProgramError::Solver(error.to_string()))?;
     solver.set_termination_callback(callback);

@@ -129,6 +129,20 @@ fn every_iteration_can_stop_it() {
     }
 }
 
+#[test]
+fn who_waits_for_the_solver_can_stop() {
+    let held = super::alone();
+    let mut waits = 0;
+    let mut stopped = |_| {
+        waits += 1;
+        if waits == 3 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let error = solve(&random_program(1), 1e-9, 1.0, &mut Watch::new(&mut stopped)).unwrap_err();
+    assert_eq!((error, waits), (FitError::Cancelled, 3));
+    drop(held);
+    solved(&random_program(1)).unwrap();
+}
+
 /// A serial BLAS is not made for two threads.
 #[test]
 fn solvers_of_several_threads_do_not_disturb_each_other() {

@@ -23,7 +23,8 @@ use sublevel_core::body::{
 };
 use sublevel_core::polynomial::{ContainmentProof, HessianGram, NotContaining, Polynomial, Substituted};
 
-/// Largest distance of an enclosure's objective to its lower bound, relative to the objective (or 1).
+/// Largest distance of an enclosure's objective to its lower bound, relative to the objective (or
+/// 1).
 const ENCLOSURE_OPTIMALITY_GAP: f64 = 1e-3;
 
 /// A body around sets, and how it came about.
@@ -52,8 +53,8 @@ pub struct Enclosure {
 /// The sos-convex body with the largest `log det P` that the multipliers prove to contain all
 /// regions, with its proofs.
 ///
-/// The same in every affine frame, but for the margin. `progress` is called at every Newton step
-/// and can stop it.
+/// The same in every affine frame, but for the margin. `progress` is called at every iteration
+/// of the solver and can stop it.
 ///
 /// # Errors
 /// [`EncloseError`]: bad input, or what could not be solved or proven.
@@ -85,12 +86,14 @@ pub fn enclose(
         let sources = sources(&structure, &prepared, &maps, multiplier_margin);
         watch.round(regions.len(), 0.0);
         let optimum = MomentProgram::new(&problem, sources).solve(&mut watch).map_err(|error| match error {
-            FitError::Program(_) => EncloseError::Unsolved { multiplier_degree: options.multiplier_degree },
+            FitError::Program(source) => {
+                EncloseError::Unsolved { multiplier_degree: options.multiplier_degree, source }
+            }
             error => error.into(),
         })?;
         let objective_value = problem.spectral.measure(&optimum.gram).ok_or(FitError::from(ProgramError::Singular))?;
         let optimality_gap = objective_value - optimum.lower_bound;
-        if !(optimality_gap <= ENCLOSURE_OPTIMALITY_GAP * objective_value.abs().max(1.0)) {
+        if !(optimality_gap.abs() <= ENCLOSURE_OPTIMALITY_GAP * objective_value.abs().max(1.0)) {
             return Err(FitError::NotOptimal { gap: optimality_gap }.into());
         }
         let Interior { coefficients, hessian } = optimum.interior;

@@ -1,6 +1,7 @@
 //! Why there is no body around sets.
 
 use crate::error::FitError;
+use crate::program::ProgramError;
 use sublevel_core::polynomial::NotContaining;
 
 /// Most sets in one body.
@@ -42,12 +43,14 @@ pub enum EncloseError {
     Fit(#[from] FitError),
     /// No multipliers were found.
     #[error(
-        "no body with multipliers of degree {multiplier_degree} was found around the sets; raise the degree of the multipliers, \
+        "no body with multipliers of degree {multiplier_degree} was found around the sets ({source}); raise the degree of the multipliers, \
          or that of the body"
     )]
     Unsolved {
         /// Least degree of the multipliers.
         multiplier_degree: usize,
+        /// What the solver said.
+        source: ProgramError,
     },
     /// A containment could not be proven.
     #[error("sets[{index}] could not be proven inside: {source}; lower the degree of the body or of the multipliers")]

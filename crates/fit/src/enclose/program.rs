@@ -7,10 +7,10 @@
 //!                              1 - p = σ_k + Σ_j τ_kj (1 - g_kj),  all σ and τ sums of squares
 //! ```
 //!
-//! (Ahmadi, Hall, Makadia and Sindhwani, RSS 2017, section V), the Gram matrices of σ and τ definite
-//! by a margin like H, so that they can be proven. In its dual each set has a functional y_k that is
-//! nonnegative on squares and on squares times each `1 - g_kj`, where a fit to points has weights of
-//! evaluations at points (`moment_program`):
+//! (Ahmadi, Hall, Makadia and Sindhwani, RSS 2017, section V), the Gram matrices of σ and τ
+//! definite by a margin like H, so that they can be proven. In its dual each set has a functional
+//! y_k that is nonnegative on squares and on squares times each `1 - g_kj`, where a fit to points
+//! has weights of evaluations at points (`moment_program`):
 //!
 //! ```text
 //! maximise  log det M(m) + N - Σ y_k(1) + ε tr S(s) + ε' Σ tr D_kj M_kj(y_k) D_kj
@@ -64,7 +64,8 @@ pub(super) fn multiplier_margin(factor: f64) -> f64 {
     MULTIPLIER_MARGIN * factor
 }
 
-/// The sets' functionals as sources of moments; equal masses that add up to the rows of P are inside.
+/// The sets' functionals as sources of moments; equal masses that add up to the rows of P are
+/// inside.
 pub(super) fn sources<'a>(
     structure: &Structure,
     prepared: &'a [Prepared],

@@ -1,17 +1,21 @@
 //! A proof that a given body contains a given set, if there is one.
 //!
 //! Of all Gram matrices of `1 - p = σ + Σ τ_j (1 - g_j)`, those that are farthest from singular are
-//! taken (`margin_program`). A functional that is nonnegative on all squares and products, and not on
-//! `1 - p`, shows that there are none with these multipliers.
+//! taken (`margin_program`). A functional that is nonnegative on all squares and products, and not
+//! on `1 - p`, shows that there are none with these multipliers.
 
 use super::error::EncloseError;
 use super::options::EncloseOptions;
 use super::program::prepare;
 use super::region::{Prepared, Region};
+use crate::FitError;
 use crate::margin_program::{Margin, largest_margin};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use sublevel_core::body::{BasicSet, Body, Containment};
 use sublevel_core::polynomial::{ContainmentProof, NotContaining, Substituted};
+
+/// Value of a functional, relative to its traces, whose sign rounding leaves open.
+const LEAST_PROVABLE_BOUND: f64 = 1e-14;
 
 /// Why a set has no proof that a body contains it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -41,6 +45,9 @@ pub enum NoContainment {
         /// Value of the functional.
         bound: f64,
     },
+    /// The search failed.
+    #[error("a proof could not be looked for: {0}")]
+    Unsolved(FitError),
     /// What was found is not proven.
     #[error(transparent)]
     Unproven(#[from] NotContaining),
@@ -64,8 +71,10 @@ pub fn containment(body: &Body, region: &Region, multiplier_degree: usize) -> Re
     let set = Substituted { polynomials: &region.set.polynomials, map: &set_map };
     let proof = |(constraint, &polynomial)| {
         let slack = -prepared.see(polynomial, outer.normalization);
-        let mut grams =
-            grams(&prepared, slack).map_err(|bound| NoContainment::None { constraint, multiplier_degree, bound })?;
+        let Margin { bound, mut grams } = margin(&prepared, slack).map_err(NoContainment::Unsolved)?;
+        if bound < -LEAST_PROVABLE_BOUND {
+            return Err(NoContainment::None { constraint, multiplier_degree, bound });
+        }
         let rest = grams.remove(0);
         Ok(ContainmentProof::nearest(polynomial, &map, set, grams, rest)?)
     };
@@ -76,13 +85,8 @@ pub fn containment(body: &Body, region: &Region, multiplier_degree: usize) -> Re
 }
 
 /// The Gram matrices with the largest margin for `1 + minus_p`.
-///
-/// # Errors
-/// The value of a functional, relative to its traces, on what should be positive.
-fn grams(prepared: &Prepared, minus_p: DVector<f64>) -> Result<Vec<DMatrix<f64>>, f64> {
+fn margin(prepared: &Prepared, minus_p: DVector<f64>) -> Result<Margin, FitError> {
     let mut target = minus_p;
     target[0] += 1.0;
-    let margin = largest_margin(&target, &prepared.cones, &prepared.scales, &prepared.mean);
-    let Margin { bound, grams } = margin.map_err(|_| f64::NAN)?;
-    if bound <= 0.0 { Err(bound) } else { Ok(grams) }
+    largest_margin(&target, &prepared.cones, &prepared.scales, &prepared.mean)
 }

@@ -184,6 +184,7 @@ fn least(
     let (at_rows, at_columns, entries) = rows.at;
     let matrix = CscMatrix::new_from_triplets(rows.right.len(), columns, at_rows, at_columns, entries);
     let linear: Vec<f64> = (0..columns).map(|i| if i < count { linear[i] } else { 0.0 }).collect();
+    let _alone = crate::conic_program::alone();
     let settings = DefaultSettings { verbose: false, max_threads: 1, ..DefaultSettings::default() };
     let mut solver = DefaultSolver::new(&quadratic, &linear, &matrix, &rows.right, &rows.cones, settings).unwrap();
     solver.solve();
@@ -194,7 +195,7 @@ fn least(
 /// Random models around points that are at times few: the same least values, and matrices that are
 /// in the cones.
 #[test]
-fn programs_agree_with_clarabel() {
+fn programs_agree_with_another_statement() {
     let mut random = Seeded(31);
     let margin = 1e-4;
     for degree in [2, 4, 6] {
@@ -218,7 +219,7 @@ fn programs_agree_with_clarabel() {
             let program =
                 ModelProgram { dominance: &dominance, structure: &structure, values: &values, margin, model: &model };
             let scale = 1.0 + linear.norm();
-            let found = program.minimise(&mut Watch::new(&mut unwatched)).unwrap().unwrap();
+            let found = program.minimise(1.0, &mut Watch::new(&mut unwatched)).unwrap().unwrap();
             let value = |c: &DVector<f64>| 0.5 * c.dot(&(&curvature * c)) + linear.dot(c);
             let expected = least(&structure, cone, &values, margin, (&curvature, &linear));
             let difference = (value(&found.coefficients) - expected) / scale;

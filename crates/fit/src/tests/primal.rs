@@ -102,6 +102,7 @@ impl Program {
             ..DefaultSettings::default()
         };
         let nothing = CscMatrix::zeros((columns, columns));
+        let _alone = crate::conic_program::alone();
         let mut solver =
             DefaultSolver::new(&nothing, &self.linear, &matrix, &self.right, &self.cones, settings).unwrap();
         solver.solve();

@@ -1,0 +1,194 @@
+//! Proven lower bounds of polynomials of two points over basic sets.
+//!
+//! For u and v in the normalized coordinates of two sets, an identity
+//!
+//! ```text
+//! f(u, v) - γ = Σ bᵀG b + Σ bᵀG b (1 - g),    G ⪰ 0,
+//! ```
+//!
+//! with g <= 1 on a set, shows f >= γ there (Putinar; Lasserre, SIAM J. Optim. 11, 2001). A
+//! solver's matrices are neither quite semidefinite nor is the identity quite true: each G is
+//! raised by a multiple of I until it is proven definite, what is left over is computed in
+//! intervals, and its largest magnitude in a box around both sets is taken off. Whoever found the
+//! matrices, the bound holds.
+
+use super::Polynomial;
+use super::interval::Interval;
+use super::monomial::{Exponents, monomials};
+use super::substitution::Substitution;
+use super::verified_cholesky::is_positive_definite_above;
+use nalgebra::DMatrix;
+use std::collections::BTreeMap;
+
+/// Exponents of u and v.
+pub type PairExponents = [u8; 6];
+
+/// Which of the two points a polynomial is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Point {
+    /// u.
+    First,
+    /// v.
+    Second,
+}
+
+impl Point {
+    /// Exponents of this point alone.
+    pub fn exponents(self, [a, b, c]: Exponents) -> PairExponents {
+        match self {
+            Self::First => [a, b, c, 0, 0, 0],
+            Self::Second => [0, 0, 0, a, b, c],
+        }
+    }
+}
+
+/// A polynomial of two points whose coefficients are enclosed.
+#[derive(Clone, Debug, Default)]
+pub struct PairPolynomial(BTreeMap<PairExponents, Interval>);
+
+/// A Gram matrix on monomials of two points, times 1 or `1 - g`.
+#[derive(Clone, Debug)]
+pub struct WeightedSquares<'a> {
+    /// The monomials.
+    pub basis: Vec<PairExponents>,
+    /// The matrix, of which the lower triangle is read.
+    pub gram: DMatrix<f64>,
+    /// g, and which point it is of; none for 1.
+    pub constraint: Option<(&'a Polynomial, Point)>,
+}
+
+impl PairPolynomial {
+    /// `|x(u) - y(v)|²` of two affine maps into one space.
+    pub fn squared_distance(first: &Substitution, second: &Substitution) -> Self {
+        let mut sum = Self::default();
+        for axis in 0..3 {
+            let ([a, a0], [b, b0]) = ([first.row(axis), first.row(axis)], [second.row(axis), second.row(axis)]);
+            let mut line: Vec<(PairExponents, Interval)> = vec![([0; 6], a0.1 - b0.1)];
+            for k in 0..3 {
+                let unit: Exponents = std::array::from_fn(|i| u8::from(i == k));
+                line.push((Point::First.exponents(unit), a.0[k]));
+                line.push((Point::Second.exponents(unit), -b.0[k]));
+            }
+            for &(e, p) in &line {
+                for &(f, q) in &line {
+                    sum.add(std::array::from_fn(|i| e[i] + f[i]), p * q);
+                }
+            }
+        }
+        sum
+    }
+
+    /// `Σ weight p(map(u))`.
+    pub fn weighted_images(polynomials: &[(&Polynomial, f64)], map: &Substitution) -> Self {
+        let mut sum = Self::default();
+        for (polynomial, weight) in polynomials {
+            for (exponents, coefficient) in monomials(polynomial.degree()).into_iter().zip(map.apply(polynomial)) {
+                sum.add(Point::First.exponents(exponents), Interval::of(*weight) * coefficient);
+            }
+        }
+        sum
+    }
+
+    /// Its monomials with coefficients, rounded.
+    pub fn terms(&self) -> impl Iterator<Item = (PairExponents, f64)> {
+        self.0.iter().map(|(exponents, coefficient)| (*exponents, coefficient.middle()))
+    }
+
+    fn add(&mut self, exponents: PairExponents, value: Interval) {
+        let sum = self.0.entry(exponents).or_insert(Interval::ZERO);
+        *sum = *sum + value;
+    }
+
+    /// A proven lower bound where every g is at most 1 and coordinates are at most `most` in
+    /// magnitude; none where no matrix can be made definite, or numbers are not finite.
+    pub fn lower_bound(&self, squares: &[WeightedSquares], most: &[f64; 6]) -> Option<f64> {
+        let mut rest = self.clone();
+        for WeightedSquares { basis, gram, constraint } in squares {
+            let gram = raised(gram)?;
+            for (i, a) in basis.iter().enumerate() {
+                for (j, b) in basis.iter().enumerate().take(i + 1) {
+                    let entry = Interval::of(gram[(i, j)]) * Interval::of(if i == j { 1.0 } else { 2.0 });
+                    let product: PairExponents = std::array::from_fn(|k| a[k] + b[k]);
+                    rest.add(product, -entry);
+                    let Some((g, point)) = constraint else { continue };
+                    for &(exponents, coefficient) in g.terms() {
+                        let factor = point.exponents(exponents);
+                        let product = std::array::from_fn(|k| product[k] + factor[k]);
+                        rest.add(product, entry * Interval::of(coefficient));
+                    }
+                }
+            }
+        }
+        let mut bound = 0.0_f64;
+        for (exponents, coefficient) in &rest.0 {
+            let left = if *exponents == [0; 6] {
+                -coefficient.low()
+            } else {
+                let power = |k: usize| (0..exponents[k]).fold(1.0, |power: f64, _| (power * most[k]).next_up());
+                (0..6).fold(coefficient.magnitude(), |size, k| (size * power(k)).next_up())
+            };
+            bound = (bound - left).next_down();
+        }
+        bound.is_finite().then_some(bound)
+    }
+}
+
+/// The matrix with as little added to its diagonal as proves it definite.
+fn raised(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let size = (0..gram.nrows()).map(|i| gram[(i, i)].abs()).fold(f64::MIN_POSITIVE, f64::max);
+    let shares = std::iter::once(0.0).chain((0..24).map(|step| 1e-16 * 4_f64.powi(step)));
+    shares
+        .map(|share| gram + DMatrix::identity(gram.nrows(), gram.nrows()) * (share * size))
+        .find(|raised| is_positive_definite_above(raised, 0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix3, Vector3};
+
+    /// On the unit ball about 0 and that about (c, 0, 0) in coordinates of their own, with `f = |u
+    /// - v
+    /// - c|²`: level 0 is exact, with multiplier `c - 2` of both constraints and squares of the rest.
+    #[test]
+    fn two_balls_are_as_far_apart_as_they_are() {
+        let one = Polynomial::new(vec![([2, 0, 0], 1.0), ([0, 2, 0], 1.0), ([0, 0, 2], 1.0)]).unwrap();
+        let c = 5.0;
+        let map = |x: f64| {
+            Substitution::new(&Matrix3::identity(), &Vector3::zeros(), &Matrix3::identity(), &Vector3::new(x, 0.0, 0.0))
+        };
+        let f = PairPolynomial::squared_distance(&map(0.0), &map(c));
+        // |u - v - c e|² - (c - 2)² - (c - 2)(1 - |u|²) - (c - 2)(1 - |v|²)
+        let basis: Vec<PairExponents> =
+            std::iter::once([0; 6]).chain((0..6).map(|k| std::array::from_fn(|i| u8::from(i == k)))).collect();
+        let mut gram = DMatrix::zeros(7, 7);
+        gram[(0, 0)] = c * c - (c - 2.0).powi(2) - 2.0 * (c - 2.0);
+        for k in 1..7 {
+            gram[(k, k)] = c - 1.0;
+        }
+        for k in 1..4 {
+            gram[(k + 3, k)] = -1.0;
+        }
+        gram[(1, 0)] = -c;
+        gram[(4, 0)] = c;
+        let weight = |value: f64, point| WeightedSquares {
+            basis: vec![[0; 6]],
+            gram: DMatrix::repeat(1, 1, value),
+            constraint: Some((&one, point)),
+        };
+        let squares = |value: f64| {
+            let square = WeightedSquares { basis: basis.clone(), gram: gram.clone(), constraint: None };
+            [square, weight(value, Point::First), weight(value, Point::Second)]
+        };
+        let bound = f.lower_bound(&squares(c - 2.0), &[1.0; 6]).unwrap();
+        assert!(bound <= 9.0 && bound > 9.0 - 1e-12, "{bound}");
+        // Wrong multipliers cost what they are wrong by, and prove nothing false.
+        let wrong = f.lower_bound(&squares(c - 1.9), &[1.0; 6]).unwrap();
+        assert!(wrong < 9.0 && wrong > 8.0, "{wrong}");
+        let mut indefinite = squares(c - 2.0);
+        indefinite[0].gram[(3, 3)] = -10.0;
+        assert!(f.lower_bound(&indefinite, &[1.0; 6]).is_none_or(|bound| bound < 9.0));
+        indefinite[0].gram[(3, 3)] = f64::NAN;
+        assert_eq!(f.lower_bound(&indefinite, &[1.0; 6]), None);
+    }
+}

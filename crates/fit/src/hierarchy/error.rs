@@ -1,0 +1,37 @@
+//! Why there is no bracket.
+
+use super::{MAX_LEVEL, MAX_ROWS};
+use crate::error::FitError;
+
+/// Why the hierarchy has no bracket.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum HierarchyError {
+    /// A set without polynomials.
+    #[error("sets[{0}] has no polynomial; it is the whole space")]
+    NoPolynomial(usize),
+    /// Numbers that are not finite, a map that cannot be inverted, or bounds that hold nothing.
+    #[error("sets[{index}]: {why}")]
+    Set {
+        /// Which set.
+        index: usize,
+        /// What is wrong with it.
+        why: &'static str,
+    },
+    /// Too high a level.
+    #[error("level: {0} is not between 0 and {MAX_LEVEL}; every level takes several times as long as the one before")]
+    Level(usize),
+    /// Too large a program.
+    #[error(
+        "level: at level {level} the matrices of the program have {rows} entries, more than the {MAX_ROWS} that are solved in minutes; \
+         lower the level, or the degree of the sets"
+    )]
+    TooLarge {
+        /// The level.
+        level: usize,
+        /// Entries of the triangles of all matrices.
+        rows: usize,
+    },
+    /// The program could not be solved, or was cancelled.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+}
