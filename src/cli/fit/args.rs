@@ -76,13 +76,13 @@ pub(in crate::cli) struct FitArgs {
     /// and largest norm 1
     #[arg(long)]
     pub(in crate::cli) raw_frame: bool,
-    /// Fast fits for streams of point clouds: sdsos or dsos; sos is the tightest
+    /// Smaller cones, without semidefinite programs: sdsos or dsos; sos is the tightest
     ///
     /// sos: all sos-convex polynomials, by semidefinite programs, for the objective.
     /// sdsos: those whose Hessian form is a sum of squares of two terms each, by
     ///   second-order cones. Minimises the volume itself.
     /// dsos: those whose form is even diagonally dominant, by linear constraints.
-    ///   Looser, and hardly faster. Both depend on the axes of the smallest ellipsoid.
+    ///   Looser. Both depend on the axes of the smallest ellipsoid.
     #[arg(long, value_name = "NAME", default_value_t, verbatim_doc_comment)]
     pub(in crate::cli) cone: Cone,
     /// What solves the programs: clarabel or structured

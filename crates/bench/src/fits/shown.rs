@@ -41,6 +41,7 @@ impl Shown {
     pub(crate) fn block(&self, name: &str) -> Option<String> {
         match name {
             "medians" => Some(self.medians() + "\n![fits.svg](fits.svg)\n"),
+            "table" => Some(self.medians()),
             "agreement" => Some(self.agreement()),
             "all" => Some(self.all()),
             "solvers" => self.solvers(),
