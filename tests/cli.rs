@@ -85,7 +85,7 @@ fn fit_reports_and_writes_a_proven_body() {
     let fitted = fitted();
     let [row] = fitted.report.as_array().unwrap().as_slice() else { panic!("{}", fitted.report) };
     let expected = "input body degree slabs parts parts_asked shortfall covers objective refined refinement points left_out left_out_m hull_vertices volume_m3 volume_error_m3 hull_volume_m3 \
-         gap_m mean_gap_m seconds status objective_value optimality_gap proven dropped_points unused_vertices unused_dropped hull_with_unused_m3 hull_without_unused_m3";
+         gap_m mean_gap_m seconds status objective_value optimality_gap solver fallback proven dropped_points unused_vertices unused_dropped hull_with_unused_m3 hull_without_unused_m3";
     assert_eq!(keys(row), sorted(expected));
     assert_eq!(row["body"], text(&fitted.body()));
     assert_eq!((&row["degree"], &row["points"], &row["proven"]), (&4.into(), &8.into(), &true.into()));
@@ -533,7 +533,7 @@ fn sets_that_need_not_be_convex_are_told_from_bodies_everywhere() {
             keys(row),
             sorted(
                 "input body kind degree objective relax_convexity points left_out left_out_m hull_vertices volume_m3 volume_error_m3 \
-             hull_volume_m3 points_only coverage objective_value optimality_gap seconds status proven \
+             hull_volume_m3 points_only coverage objective_value optimality_gap solver fallback seconds status proven \
              dropped_points unused_vertices unused_dropped hull_with_unused_m3 hull_without_unused_m3"
             )
         );

@@ -1,7 +1,7 @@
 //! Fitted bodies, and how they came about.
 
-use super::conic_program::SolverStep;
 use super::gap::Gap;
+use super::progress::SolverStep;
 use super::refine::RefinementEnd;
 use sublevel_core::body::Body;
 use sublevel_core::body::Cone;

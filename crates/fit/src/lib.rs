@@ -69,7 +69,6 @@ mod volume;
 
 pub use ball::{EnclosingBall, smallest_ball};
 pub use certificate::{NoCertificate, certificate};
-pub use conic_program::SolverStep;
 pub use coordinates::Coordinates;
 pub use cuboid::{OrientedBox, smallest_box};
 pub use decompose::{PartSearch, convex_parts};
@@ -90,7 +89,7 @@ pub use margin::DEFAULT_MARGIN;
 pub use options::FitOptions;
 pub use parts::{CompoundFit, fit_parts};
 pub use program::ProgramError;
-pub use progress::Progress;
+pub use progress::{Progress, SolverStep};
 pub use refine::RefinementEnd;
 pub use shortfall::{MAX_PIECES, Shortfall};
 pub use slab::{CutError, MAX_SLABS};

@@ -4,7 +4,6 @@
 //! p (Ahmadi, Hall, Makadia and Sindhwani, RSS 2017, section III), and the inverse-moment
 //! polynomial (`moment`). Points between others matter as much as these, so all are used.
 
-use super::conic_program::SolverStep;
 use super::coordinates::Coordinates;
 use super::generate::{Optimum, generate};
 use super::margin::{DEFAULT_MARGIN, MARGIN_ATTEMPTS};
@@ -12,7 +11,7 @@ use super::moment::{inverse_moment, moments};
 use super::object::{Object, pulled_inside};
 use super::objective::{Matrix, Measure};
 use super::program::Problem;
-use super::progress::{Progress, Watch};
+use super::progress::{Progress, SolverStep, Watch};
 use super::structure::Structure;
 use super::{FitError, FitOptions, Objective, ProgramError};
 use nalgebra::{DMatrix, DVector, Vector3};

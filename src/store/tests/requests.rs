@@ -15,7 +15,8 @@ pub(crate) fn drawn(seed: u64) -> Vec<FitRequest> {
     let sometimes = |random: &mut Seeded| random.index(3) > 0;
     let request = |random: &mut Seeded, mode: FitMode| {
         let scale = if matches!(mode, FitMode::Group(_)) { 1.0 } else { 1e-3 + random.positive() };
-        let solver = [None, Some(Solver::Clarabel), Some(Solver::Structured)][random.index(3)];
+        let structured = if is_log_det_p(&mode) { Solver::Structured } else { Solver::Clarabel };
+        let solver = [None, Some(Solver::Clarabel), Some(structured)][random.index(3)];
         FitRequest { name: format!("it {seed}"), input: format!("{}.off", random.index(9)), scale, mode, solver }
     };
     let polynomial = polynomial(&mut random);
@@ -47,6 +48,21 @@ pub(crate) fn drawn(seed: u64) -> Vec<FitRequest> {
         group.into(),
     ];
     modes.map(|mode| request(&mut random, mode)).into()
+}
+
+/// Whether the structured solver has the program.
+fn is_log_det_p(mode: &FitMode) -> bool {
+    let polynomial = match mode {
+        FitMode::Body(body) => &body.polynomial,
+        FitMode::Ladder(ladder) => &ladder.polynomial,
+        FitMode::WithinGap(within) => &within.polynomial,
+        FitMode::Compound(compound) => &compound.polynomial,
+        FitMode::SosBody(set) => {
+            return matches!(set.method, SosMethod::Relaxed { objective: Objective::LogDetP, .. });
+        }
+        FitMode::Group(_) => return false,
+    };
+    polynomial.objective == Objective::LogDetP && polynomial.cone == Cone::Sos
 }
 
 /// One that the library takes: no objective and no refinement over the smaller cones.

@@ -1,5 +1,6 @@
 //! Fits: time against volume, by each solver and over each cone.
 
+mod fitting;
 mod report;
 mod shown;
 
@@ -8,10 +9,11 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
-use sublevel::fit::{Cone, FitOptions, Solver, fit};
+use sublevel::fit::{Cone, fit};
 
 use super::Machine;
 use super::comparison::Subject;
+use fitting::{Fitting, Method};
 pub(crate) use shown::Shown;
 
 /// The meshes of the paper's Table I.
@@ -20,58 +22,6 @@ const SUBJECTS: [&str; 5] = ["human", "chair", "octopus", "hand", "vase"];
 /// Runs of a fit, of which the median counts, unless one takes longer than [`LONG_S`].
 const RUNS: usize = 5;
 const LONG_S: f64 = 3.0;
-
-/// How to fit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Method {
-    Structured,
-    Clarabel,
-    Refined,
-    Sdsos,
-    Dsos,
-}
-
-impl Method {
-    const ALL: [Self; 5] = [Self::Structured, Self::Clarabel, Self::Refined, Self::Sdsos, Self::Dsos];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Structured => "structured",
-            Self::Clarabel => "clarabel",
-            Self::Refined => "refined",
-            Self::Sdsos => "sdsos",
-            Self::Dsos => "dsos",
-        }
-    }
-
-    fn options(self, degree: usize) -> FitOptions {
-        let plain = FitOptions { degree, ..FitOptions::default() };
-        match self {
-            Self::Structured => FitOptions { solver: Some(Solver::Structured), ..plain },
-            Self::Clarabel => FitOptions { solver: Some(Solver::Clarabel), ..plain },
-            Self::Refined => FitOptions { refine: true, ..plain },
-            Self::Sdsos => FitOptions { cone: Cone::Sdsos, ..plain },
-            Self::Dsos => FitOptions { cone: Cone::Dsos, ..plain },
-        }
-    }
-}
-
-/// One fit.
-#[derive(Clone, Debug, PartialEq)]
-struct Fitting {
-    mesh: String,
-    vertices: usize,
-    method: String,
-    degree: usize,
-    seconds: f64,
-    /// Volume of the body over that of the hull.
-    ratio: f64,
-    /// None over the smaller cones, which have another objective.
-    objective: Option<f64>,
-    gap: Option<f64>,
-    rounds: usize,
-    iterations: usize,
-}
 
 /// What was measured.
 pub struct Fits {

@@ -2,7 +2,8 @@
 
 use std::fmt::Write;
 
-use super::{Fits, Fitting};
+use super::Fits;
+use super::fitting::Fitting;
 use crate::blocks::block;
 
 impl Fits {

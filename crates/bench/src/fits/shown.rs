@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use sublevel::draw::{ChartError, Group, Ink, Marker, Point, Scatter};
 
-use super::{Fitting, Method};
+use super::fitting::{Fitting, Method};
 use crate::csv::{CsvError, Row, Table};
 
 /// The rows of a CSV.

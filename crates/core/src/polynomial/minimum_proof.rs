@@ -103,8 +103,10 @@ impl PairPolynomial {
     /// magnitude; none where no matrix can be made definite, or numbers are not finite.
     pub fn lower_bound(&self, squares: &[WeightedSquares], most: &[f64; 6]) -> Option<f64> {
         let mut rest = self.clone();
+        let entries = squares.iter().flat_map(|square| square.gram.iter());
+        let size = entries.fold(f64::MIN_POSITIVE, |most: f64, entry| most.max(entry.abs()));
         for WeightedSquares { basis, gram, constraint } in squares {
-            let gram = raised(gram)?;
+            let gram = raised(gram, size)?;
             for (i, a) in basis.iter().enumerate() {
                 for (j, b) in basis.iter().enumerate().take(i + 1) {
                     let entry = Interval::of(gram[(i, j)]) * Interval::of(if i == j { 1.0 } else { 2.0 });
@@ -133,13 +135,12 @@ impl PairPolynomial {
     }
 }
 
-/// The matrix with as little added to its diagonal as proves it definite.
-fn raised(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let size = (0..gram.nrows()).map(|i| gram[(i, i)].abs()).fold(f64::MIN_POSITIVE, f64::max);
-    let shares = std::iter::once(0.0).chain((0..24).map(|step| 1e-16 * 4_f64.powi(step)));
-    shares
-        .map(|share| gram + DMatrix::identity(gram.nrows(), gram.nrows()) * (share * size))
-        .find(|raised| is_positive_definite_above(raised, 0.0))
+/// The matrix with as little added to its diagonal as proves it definite, up to `size` and more.
+fn raised(gram: &DMatrix<f64>, size: f64) -> Option<DMatrix<f64>> {
+    let rows = gram.nrows();
+    let shares = std::iter::once(0.0).chain((0..30).map(|step| 1e-16 * 4_f64.powi(step)));
+    let mut raised = shares.map(|share| gram + DMatrix::identity(rows, rows) * (share * size));
+    raised.find(|raised| is_positive_definite_above(raised, 0.0))
 }
 
 #[cfg(test)]

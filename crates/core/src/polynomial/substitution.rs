@@ -110,7 +110,9 @@ fn enclosed_inverse(linear: &Matrix3<f64>) -> Option<[[Interval; 3]; 3]> {
         (Interval::of(f64::from(u8::from(i == j))) - product).magnitude()
     };
     let norms = (0..3).map(|i| (0..3).map(|j| residual(i, j)).sum::<f64>());
-    let norm = norms.fold(0.0, |most: f64, norm| if norm.is_nan() { f64::NAN } else { most.max(norm) }) * (1.0 + 1e-14);
+    let norm = norms
+        .fold(0.0, |most: f64, norm| if norm.is_nan() || most.is_nan() { f64::NAN } else { most.max(norm) })
+        * (1.0 + 1e-14);
     if !(norm < 0.5) {
         return None;
     }

@@ -8,7 +8,6 @@ mod program;
 mod solve;
 
 pub(crate) use program::{ConicProgram, Expression, geometric_mean};
-pub use solve::SolverStep;
 #[cfg(test)]
 pub(crate) use solve::alone;
 pub(crate) use solve::{ConicSolution, solve};

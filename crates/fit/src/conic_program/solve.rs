@@ -3,7 +3,7 @@
 use super::program::ConicProgram;
 use crate::FitError;
 use crate::program::ProgramError;
-use crate::progress::Watch;
+use crate::progress::{SolverStep, Watch};
 use clarabel::solver::{DefaultInfo, DefaultSettings, DefaultSolver, IPSolver, SolverStatus};
 use nalgebra::{DMatrix, DVector};
 // Links the BLAS that clarabel's semidefinite cones call.
@@ -23,25 +23,6 @@ const WAIT: Duration = Duration::from_millis(5);
 
 /// Iterations at most; 10 to 40 are usual.
 const MAX_CONIC_ITERATIONS: u32 = 100;
-
-/// One iteration of the solver.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SolverStep {
-    /// Which program of the fit, counted from 1.
-    pub round: usize,
-    /// Iteration of that program, counted from 0.
-    pub iteration: usize,
-    /// Value of its objective.
-    pub primal: f64,
-    /// Value of its dual objective.
-    pub dual: f64,
-    /// Relative residual of its constraints.
-    pub primal_residual: f64,
-    /// Relative residual of the constraints of the dual.
-    pub dual_residual: f64,
-    /// Length of the step before, 0 to 1.
-    pub step_length: f64,
-}
 
 /// What the solver returned, true or not.
 #[derive(Clone, Debug)]

@@ -1,7 +1,12 @@
 //! Why there is no bracket.
 
-use super::{MAX_LEVEL, MAX_ROWS};
 use crate::error::FitError;
+
+/// Highest level that can be asked for: the next one has a matrix of 210 rows for both points alone.
+pub const MAX_LEVEL: usize = 2;
+
+/// Rows of the triangles of all matrices up to which a program is built.
+pub(super) const MAX_ROWS: usize = 8000;
 
 /// Why the hierarchy has no bracket.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

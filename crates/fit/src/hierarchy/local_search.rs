@@ -1,6 +1,6 @@
 //! Near points of two sets, by Newton's method from many starts.
 
-use super::PlacedSet;
+use super::placed_set::{Membership, PlacedSet};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// Starts of the search: the nearest pairs of the points that the sets come with.
@@ -13,38 +13,30 @@ const MAX_PULLS: usize = 60;
 /// The least distance found of two points that are proven to lie in the sets, metres, and the
 /// points.
 pub(super) fn nearest_points(sets: [&PlacedSet; 2], guess: [Vector3<f64>; 2]) -> Option<(f64, [Vector3<f64>; 2])> {
+    let members = [sets[0].membership()?, sets[1].membership()?];
     let mut best: Option<(f64, [Vector3<f64>; 2])> = None;
     let mut keep = |points: [Vector3<f64>; 2]| {
-        let inside = [pulled(sets[0], points[0]), pulled(sets[1], points[1])];
-        let [Some(x), Some(y)] = inside else { return };
+        let inside = [0, 1].map(|side| pulled(sets[side], &members[side], points[side]));
+        let [Some(x), Some(y)] = inside else { return false };
         // One point in both is no distance apart.
-        for z in [x, y] {
-            if sets.iter().all(|set| set.holds(&z)) {
-                best = Some((0.0, [z, z]));
-            }
+        let common = [x, y].into_iter().find(|z| members.iter().all(|set| set.holds(z)));
+        let found = common.map_or((distance_up(&x, &y), [x, y]), |z| (0.0, [z, z]));
+        if best.is_none_or(|(least, _)| found.0 < least) {
+            best = Some(found);
         }
-        let far = sets[0].pose.translation.vector.amax().max(sets[1].pose.translation.vector.amax());
-        let distance = distance_up(&x, &y, far);
-        if best.is_none_or(|(least, _)| distance < least) {
-            best = Some((distance, [x, y]));
-        }
+        common.is_some()
     };
-    keep(guess);
-    let mut starts = nearest_pairs(sets);
-    starts.insert(0, guess);
-    for start in starts {
-        keep(start);
-        if let Some(points) = refined(sets, start) {
-            keep(points);
+    for start in std::iter::once(guess).chain(nearest_pairs(sets)) {
+        if keep(start) || refined(sets, start).is_some_and(&mut keep) {
+            break;
         }
     }
     best
 }
 
-/// Rounded up, with what the poses may be rounded by.
-fn distance_up(x: &Vector3<f64>, y: &Vector3<f64>, far: f64) -> f64 {
-    let size = x.amax().max(y.amax()).max(far);
-    ((x - y).norm() * (1.0 + 4.0 * f64::EPSILON) + 32.0 * f64::EPSILON * size).next_up()
+/// Rounded up.
+fn distance_up(x: &Vector3<f64>, y: &Vector3<f64>) -> f64 {
+    ((x - y).norm() * (1.0 + 8.0 * f64::EPSILON)).next_up()
 }
 
 fn nearest_pairs(sets: [&PlacedSet; 2]) -> Vec<[Vector3<f64>; 2]> {
@@ -118,11 +110,11 @@ fn refined(sets: [&PlacedSet; 2], start: [Vector3<f64>; 2]) -> Option<[Vector3<f
 }
 
 /// The point moved against the gradient until it is proven inside; none if it does not get there.
-fn pulled(set: &PlacedSet, mut x: Vector3<f64>) -> Option<Vector3<f64>> {
+fn pulled(set: &PlacedSet, member: &Membership, mut x: Vector3<f64>) -> Option<Vector3<f64>> {
     let map = set.set.normalization.linear * set.pose.rotation.to_rotation_matrix().into_inner().transpose();
     let mut extra = 1e-14;
     for _ in 0..MAX_PULLS {
-        if set.holds(&x) {
+        if member.holds(&x) {
             return Some(x);
         }
         let (g, z) = set.largest_at(&x);

@@ -3,13 +3,13 @@
 //! The least of `f(u, v)` over two basic sets is at least the largest γ for which
 //!
 //! ```text
-//! f - γ = Σ squares + Σ σ_i (1 - g_i),   σ_i sums of squares of degree 2 level,
+//! f - γ = Σ squares + Σ σ_i (1 - g_i),   σ_i sums of squares of degree 2 level at least,
 //! ```
 //!
 //! (Lasserre, SIAM J. Optim. 11, 2001). f couples the sets by the products of their coordinates
 //! alone, so the squares are of three groups of monomials: those of u, those of v, and of both up
 //! to degree 1 + level (Waki, Kim, Kojima and Muramatsu, SIAM J. Optim. 17, 2006): matrices of 10,
-//! 10 and 7 rows at degree 4 and level 0, where all monomials of both would make 84. Level 0 is
+//! 10 and 7 rows at degree 4 and level 0, where all monomials of both would make one of 28. Level 0 is
 //! exact for sos-convex sets; for others it is a lower bound, which rises with the level.
 //!
 //! The program is solved in its dual, over moments; what comes out is proven from the numbers alone
@@ -21,7 +21,8 @@ mod local_search;
 mod moments;
 mod placed_set;
 
-pub use error::HierarchyError;
+use error::MAX_ROWS;
+pub use error::{HierarchyError, MAX_LEVEL};
 pub use placed_set::PlacedSet;
 
 use crate::conic_program::solve;
@@ -32,12 +33,6 @@ use nalgebra::Vector3;
 use std::ops::ControlFlow;
 use std::time::Instant;
 use sublevel_core::polynomial::PairPolynomial;
-
-/// Highest level that can be asked for.
-pub const MAX_LEVEL: usize = 4;
-
-/// Rows of the triangles of all matrices up to which a program is built.
-const MAX_ROWS: usize = 8000;
 
 /// Width of a bracket, relative to the size of the sets, at which its lower bound is called exact.
 const EXACT: f64 = 1e-5;
@@ -57,7 +52,7 @@ pub struct HierarchyBound {
     pub upper_m: f64,
     /// These points, in the frame of the poses, metres.
     pub points: Option<[Vector3<f64>; 2]>,
-    /// Whether the lower bound is the distance, to 1e-5 of the size of the sets.
+    /// Whether the lower bound is the distance, to 1e-5 of half the diagonals of the boxes.
     pub is_exact: bool,
     /// Iterations of the solver.
     pub iterations: usize,
@@ -110,7 +105,7 @@ pub fn hierarchy_distance(
         lower_m,
         upper_m,
         points: found.map(|(_, points)| points),
-        is_exact: upper_m - lower_m <= EXACT * size,
+        is_exact: lower_m <= upper_m && upper_m - lower_m <= EXACT * size,
         iterations: watch.progress().iterations,
         seconds: start.elapsed().as_secs_f64(),
     })

@@ -1,6 +1,6 @@
 //! The moment program of a level.
 
-use super::PlacedSet;
+use super::placed_set::PlacedSet;
 use crate::conic_program::{ConicProgram, ConicSolution, Expression};
 use nalgebra::{DMatrix, Vector3};
 use std::collections::BTreeMap;

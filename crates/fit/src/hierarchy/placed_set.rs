@@ -1,6 +1,6 @@
 //! A basic set and where it is.
 
-use super::HierarchyError;
+use super::error::HierarchyError;
 use nalgebra::{Isometry3, Vector3};
 use sublevel_core::body::{Aabb, BasicSet, Body, Obstacle, Placement, SosBody};
 use sublevel_core::polynomial::{Polynomial, Substitution};
@@ -10,7 +10,7 @@ use sublevel_core::polynomial::{Polynomial, Substitution};
 pub struct PlacedSet<'a> {
     /// The set in its own frame.
     pub set: BasicSet<'a>,
-    /// A box that holds it, metres in its own frame.
+    /// A box that holds it, metres in its own frame; where it does not, the set is what is in both.
     pub bounding_box: Aabb,
     /// From its own frame to a common one, metres.
     pub pose: Isometry3<f64>,
@@ -18,6 +18,13 @@ pub struct PlacedSet<'a> {
     /// begins. They prove nothing.
     pub near_boundary: Vec<Vector3<f64>>,
 }
+
+/// Bound of the rounding of a point moved by a pose, relative to point and translation: a quaternion
+/// of unit length to a few units in the last place, applied in some thirty operations.
+const POSE_ROUNDING: f64 = 128.0 * f64::EPSILON;
+
+/// Largest deviation of the squared length of a quaternion from 1.
+const UNIT_LENGTH: f64 = 2e-15;
 
 /// Rays whose ends are the points that a search begins with.
 const RAYS: usize = 200;
@@ -51,6 +58,13 @@ impl<'a> PlacedSet<'a> {
         let pose = self.pose.to_matrix();
         if !pose.iter().all(|value| value.is_finite()) {
             return Err(HierarchyError::Set { index, why: "its pose is not finite; send finite numbers" });
+        }
+        if !((self.pose.rotation.norm_squared() - 1.0).abs() <= UNIT_LENGTH) {
+            return Err(HierarchyError::Set { index, why: "its rotation is not of unit length; normalise it" });
+        }
+        let normalization = self.set.normalization;
+        if !normalization.center.iter().chain(&normalization.linear).all(|value| value.is_finite()) {
+            return Err(HierarchyError::Set { index, why: "its normalization is not finite; fit it again" });
         }
         let Aabb { min, max } = self.bounding_box;
         if !(0..3).all(|axis| min[axis] <= max[axis] && min[axis].is_finite() && max[axis].is_finite()) {
@@ -105,13 +119,30 @@ impl<'a> PlacedSet<'a> {
         self.set.normalization.linear * (body - self.set.normalization.center)
     }
 
-    /// Whether a point of the common frame is proven to be in the set, but for the rounding of the
-    /// pose.
-    pub(super) fn holds(&self, x: &Vector3<f64>) -> bool {
+    /// A test whether points are in the set.
+    pub(super) fn membership(&self) -> Option<Membership<'_>> {
         let normalization = self.set.normalization;
-        let Some(inverse) = normalization.linear.try_inverse() else { return false };
-        let placement = Placement::new(normalization.linear, inverse, normalization.center, 0.0, 0.0);
-        let body = self.pose.inverse_transform_point(&(*x).into()).coords;
-        self.set.polynomials.iter().all(|g| placement.sample_of(g, &body).value_upper(0.0) <= 1.0)
+        let inverse = normalization.linear.try_inverse()?;
+        Some(Membership {
+            set: self,
+            placement: Placement::new(normalization.linear, inverse, normalization.center, 0.0, 0.0),
+        })
+    }
+}
+
+/// Whether points of the common frame are in a set.
+pub(super) struct Membership<'a> {
+    set: &'a PlacedSet<'a>,
+    placement: Placement,
+}
+
+impl Membership<'_> {
+    /// Whether a point is proven to be in the set, wherever the rounding of the pose leads.
+    pub(super) fn holds(&self, x: &Vector3<f64>) -> bool {
+        let PlacedSet { set, bounding_box: Aabb { min, max }, pose, .. } = self.set;
+        let rounding = POSE_ROUNDING * (x.norm() + pose.translation.vector.norm());
+        let body = pose.inverse_transform_point(&(*x).into()).coords;
+        (0..3).all(|axis| body[axis] - rounding >= min[axis] && body[axis] + rounding <= max[axis])
+            && set.polynomials.iter().all(|g| self.placement.sample_of(g, &body).value_upper(rounding) <= 1.0)
     }
 }

@@ -139,7 +139,15 @@ fn bad_input_is_refused_by_name() {
     assert!(refused(PlacedSet { bounding_box: unbounded, ..good.clone() }, 0).to_string().contains("unbounded"));
     let stopped = hierarchy_distance([&good, &good], 1, &mut |_| ControlFlow::Break(()));
     assert_eq!(stopped, Err(HierarchyError::Fit(FitError::Cancelled)));
+    let drifted = nalgebra::Quaternion::new(1.0 + 1e-9, 0.0, 0.0, 0.0);
+    let turn = UnitQuaternion::new_unchecked(drifted);
+    let turned = PlacedSet { pose: Isometry3::from_parts(Translation3::identity(), turn), ..good.clone() };
+    assert!(refused(turned, 0).to_string().contains("unit length"));
     let large = Body::superellipsoid("e", Vector3::zeros(), Vector3::repeat(1.0), 8).unwrap();
     let large = PlacedSet::of_body(&large, Isometry3::identity());
-    assert!(matches!(refused(large, 4), HierarchyError::TooLarge { level: 4, .. }));
+    assert!(matches!(refused(large, 2), HierarchyError::TooLarge { level: 2, .. }));
+    // Far from the origin two balls that touch are as far apart as poses are rounded.
+    let far = |x: f64| PlacedSet::of_body(&ball, Isometry3::translation(1e6, 0.0, x));
+    let touching = bound([&far(0.0), &far(0.2)], 0).unwrap();
+    assert!(touching.lower_m <= 1e-6 && touching.upper_m < 1e-6, "{touching:?}");
 }
