@@ -6,14 +6,14 @@ use std::sync::Arc;
 
 use super::Phase;
 use super::request::{FitPlan, RequestError, asked_group, body_name, enclosing, plan};
-use crate::body::{Body, Compound, Obstacle, Shape, SosBody};
+use crate::body::{Body, Compound, Obstacle, Shape, SolverStep, SosBody};
 use crate::fit;
 use crate::fit::{
     CompoundFit, Cover, EncloseError, FitError, Group, Mesh, Progress, Representation, Rung, SosFit, cheapest_within,
     coarsest_within, enclose_obstacles, fit_parts, fit_sos, group, ladder, thicken, trim,
 };
 use crate::scene::{Geometry, Ladder};
-use crate::store::{FitOptimum, FitOutcome, FitPreparation, FitRequest, FittedBody, FittedKind, SolverStep};
+use crate::store::{FitOptimum, FitOutcome, FitPreparation, FitRequest, FittedBody, FittedKind};
 
 /// Iterations of the solver that are kept with a job.
 const MAX_LOGGED_STEPS: usize = 200;
@@ -131,16 +131,15 @@ impl FitOutput {
 }
 
 /// The last iterations of a fit, with numbers that can be kept.
-fn logged(log: &[fit::SolverStep]) -> Vec<SolverStep> {
+fn logged(log: &[SolverStep]) -> Vec<SolverStep> {
     let finite = |value: f64| if value.is_nan() { 0.0 } else { value.clamp(f64::MIN, f64::MAX) };
-    let step = |step: &fit::SolverStep| SolverStep {
-        round: step.round,
-        iteration: step.iteration,
+    let step = |step: &SolverStep| SolverStep {
         primal: finite(step.primal),
         dual: finite(step.dual),
         primal_residual: finite(step.primal_residual),
         dual_residual: finite(step.dual_residual),
         step_length: finite(step.step_length),
+        ..*step
     };
     log[log.len().saturating_sub(MAX_LOGGED_STEPS)..].iter().map(step).collect()
 }

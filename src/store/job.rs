@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::request::FitRequest;
-use crate::body::Solver;
+use crate::body::{Solver, SolverStep};
 
 /// Most jobs that may wait; each keeps its points on disk.
 pub const MAX_QUEUED_JOBS: usize = 64;
@@ -137,29 +137,9 @@ pub struct FitOptimum {
     /// Why the solver that was tried first did not, if one was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fallback: Option<String>,
-    /// The iterations of clarabel, of all programs.
+    /// The iterations of clarabel, of all programs; values are finite.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub log: Vec<SolverStep>,
-}
-
-/// One iteration of clarabel. Values are finite.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SolverStep {
-    /// Which program of the fit, counted from 1.
-    pub round: usize,
-    /// Iteration of that program, counted from 0.
-    pub iteration: usize,
-    /// Value of its objective.
-    pub primal: f64,
-    /// Value of its dual objective.
-    pub dual: f64,
-    /// Relative residual of its constraints.
-    pub primal_residual: f64,
-    /// Relative residual of the constraints of the dual.
-    pub dual_residual: f64,
-    /// Length of the step before, 0 to 1.
-    pub step_length: f64,
 }
 
 impl NewJob {

@@ -53,7 +53,7 @@ pub use disk::{BACKUP_PREFIX, JobMesh, Store};
 pub use error::StoreError;
 pub use job::{
     FitOptimum, FitOutcome, FittedBody, FittedKind, Job, JobState, MAX_ENDED_JOBS, MAX_QUEUED_JOBS,
-    MAX_REQUEST_ID_BYTES, NewJob, SolverStep,
+    MAX_REQUEST_ID_BYTES, NewJob,
 };
 pub use request::{
     FitBody, FitCompound, FitGroup, FitLadder, FitMode, FitPolynomial, FitPreparation, FitRequest, FitSosBody,

@@ -75,8 +75,7 @@ pub fn certificate(polynomial: &Polynomial) -> Result<HessianGram, NoCertificate
     let basis: Vec<_> = rows.iter().map(|&row| structure.hessian_basis[row]).collect();
     let inside = start(&pattern, &basis);
     let cones = [LocalizingMatrix::of(pattern)];
-    let Margin { bound, mut grams } =
-        largest_margin(&form, &cones, &[vec![1.0; rows.len()]], &inside).map_err(NoCertificate::Unsolved)?;
+    let Margin { bound, mut grams } = largest_margin(&form, &cones, &inside).map_err(NoCertificate::Unsolved)?;
     if bound < -LEAST_PROVABLE_EIGENVALUE {
         return Err(NoCertificate::NotSosConvex { bound });
     }

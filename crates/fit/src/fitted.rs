@@ -1,12 +1,11 @@
 //! Fitted bodies, and how they came about.
 
 use super::gap::Gap;
-use super::progress::SolverStep;
 use super::refine::RefinementEnd;
 use sublevel_core::body::Body;
 use sublevel_core::body::Cone;
 use sublevel_core::body::Objective;
-use sublevel_core::body::Solver;
+use sublevel_core::body::{Solver, SolverStep};
 
 /// What a fit took and reached.
 #[derive(Clone, Debug, PartialEq)]

@@ -89,12 +89,14 @@ pub use margin::DEFAULT_MARGIN;
 pub use options::FitOptions;
 pub use parts::{CompoundFit, fit_parts};
 pub use program::ProgramError;
-pub use progress::{Progress, SolverStep};
+pub use progress::Progress;
 pub use refine::RefinementEnd;
 pub use shortfall::{MAX_PIECES, Shortfall};
 pub use slab::{CutError, MAX_SLABS};
 pub use sos::{ProgramReport, SosFit, SosOptions, SosReport, fit_sos};
-pub use sublevel_core::body::{Cone, Objective, Solver, SosMethod, UnknownCone, UnknownObjective, UnknownSolver};
+pub use sublevel_core::body::{
+    Cone, Objective, Solver, SolverStep, SosMethod, UnknownCone, UnknownObjective, UnknownSolver,
+};
 pub use thicken::thicken;
 pub use trim::{Trimmed, trim};
 
@@ -109,8 +111,8 @@ use sublevel_core::body::Body;
 /// Log dets are least in every affine frame at once. Traces depend on the frame: they are measured
 /// in [`FitOptions::coordinates`].
 ///
-/// `progress` is called at every Newton step (below a millisecond at degree 4 to tens of
-/// milliseconds at degree 8), those of a refinement included, and can stop the fit.
+/// `progress` is called at every iteration of the solver (a few milliseconds at degree 4 to a second
+/// at degree 8), those of a refinement included, and can stop the fit; it must not fit itself.
 ///
 /// # Errors
 /// [`FitError`]: bad input by field, a cancelled fit, or what could not be solved or proven and by

@@ -3,10 +3,19 @@
 //! A functional y on polynomials of v, held by its values on the monomials, is nonnegative on
 //! squares when its moment matrix M(y) is positive semidefinite, and on squares times a polynomial
 //! s when that of `y(s ·)` is. Either matrix is `spread(L y)` with a linear map L.
+//!
+//! In conic programs the rows of a matrix M are scaled, `D M D`, so that its pivots are about 1:
+//! constraints hold to the solver's absolute tolerance, and pivots of 1e-3 would have a thousandth
+//! of that accuracy.
 
+use crate::conic_program::{ConicProgram, ConicSolution, Expression};
 use crate::structure::Pattern;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector};
+use std::ops::Range;
 use sublevel_core::polynomial::{degree_of, monomials, position};
+
+/// Least square root of a pivot, relative to that of the diagonal, that a row is scaled by.
+const LEAST_PIVOT: f64 = 1e-5;
 
 /// A matrix linear in y that must be definite.
 #[derive(Clone)]
@@ -14,12 +23,27 @@ pub(super) struct LocalizingMatrix {
     pattern: Pattern,
     /// L; the identity if there is none.
     map: Option<DMatrix<f64>>,
+    /// Diagonal of D.
+    scales: Vec<f64>,
+}
+
+/// One over the square roots of the pivots of a semidefinite matrix, or of its diagonal where it
+/// has none or small ones: those of a singular matrix are rounding.
+pub(super) fn scales(matrix: DMatrix<f64>) -> Vec<f64> {
+    let diagonal = matrix.diagonal().map(f64::sqrt);
+    let pivots = Cholesky::new(matrix).map_or(diagonal.clone(), |factor| factor.l_dirty().diagonal());
+    pivots.iter().zip(&diagonal).map(|(&pivot, &entry)| 1.0 / pivot.max(LEAST_PIVOT * entry)).collect()
 }
 
 impl LocalizingMatrix {
     /// The matrix of that pattern itself.
     pub(super) fn of(pattern: Pattern) -> Self {
-        Self { pattern, map: None }
+        Self { scales: vec![1.0; pattern.size], pattern, map: None }
+    }
+
+    /// The same matrix with its rows scaled by what it is at y.
+    pub(super) fn scaled_at(self, y: &DVector<f64>) -> Self {
+        Self { scales: scales(self.matrix(y)), ..self }
     }
 
     /// Moments of y up to even `degree`.
@@ -41,7 +65,7 @@ impl LocalizingMatrix {
                 map[(row, position(product))] += coefficient;
             }
         }
-        Self { pattern: Pattern::of_monomials(half), map: Some(map) }
+        Self { map: Some(map), ..Self::of(Pattern::of_monomials(half)) }
     }
 
     /// Rows of the matrix.
@@ -57,8 +81,37 @@ impl LocalizingMatrix {
         }
     }
 
-    /// The terms of an entry, as position in y and factor.
-    pub(super) fn entry(&self, i: usize, j: usize) -> Vec<(usize, f64)> {
+    /// Whether the matrix is positive definite at y.
+    pub(super) fn is_definite(&self, y: &DVector<f64>) -> bool {
+        Cholesky::new(self.matrix(y)).is_some()
+    }
+
+    /// `tr D M D`, as positions in y and factors.
+    pub(super) fn trace(&self) -> impl Iterator<Item = (usize, f64)> {
+        let of_row =
+            move |i: usize| self.entry(i, i).into_iter().map(move |(k, factor)| (k, self.scales[i].powi(2) * factor));
+        (0..self.size()).flat_map(of_row)
+    }
+
+    /// Keeps `D M D` semidefinite, y being the variables from `first` on; the rows of the constraint.
+    pub(super) fn constrain(&self, program: &mut ConicProgram, first: usize) -> Range<usize> {
+        program.semidefinite(self.size(), |i, j| {
+            let scaled = |(k, factor)| (first + k, self.scales[i] * self.scales[j] * factor);
+            Expression { terms: self.entry(i, j).into_iter().map(scaled).collect(), constant: 0.0 }
+        })
+    }
+
+    /// `D (Z / factor + margin I) D`, Z the multiplier of that constraint.
+    pub(super) fn gram(&self, solution: &ConicSolution, rows: Range<usize>, factor: f64, margin: f64) -> DMatrix<f64> {
+        let multiplier = solution.matrix_multiplier(rows, self.size());
+        DMatrix::from_fn(self.size(), self.size(), |i, j| {
+            let margin = if i == j { margin } else { 0.0 };
+            self.scales[i] * self.scales[j] * (multiplier[(i, j)] / factor + margin)
+        })
+    }
+
+    /// The terms of an entry of M, as position in y and factor.
+    fn entry(&self, i: usize, j: usize) -> Vec<(usize, f64)> {
         let key = self.pattern.key(i, j);
         match &self.map {
             Some(map) => map.row(key).iter().copied().enumerate().filter(|term| term.1 != 0.0).collect(),

@@ -14,7 +14,7 @@ use super::FitError;
 use super::conic_program::{ConicProgram, Expression, solve};
 use super::localizing::LocalizingMatrix;
 use super::progress::Watch;
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 /// Tolerance asked of the solver, which stops where rounding stands in its way; dimensionless.
 ///
@@ -32,57 +32,32 @@ pub(super) struct Margin {
 }
 
 /// The largest margin of the identity for `target`, coefficients of f. `inside` is a functional
-/// with definite moment matrices, and `scales` are the diagonals of the D_j.
+/// with definite moment matrices.
 ///
 /// # Errors
 /// Those of the solver.
 pub(super) fn largest_margin(
     target: &DVector<f64>,
     cones: &[LocalizingMatrix],
-    scales: &[Vec<f64>],
     inside: &DVector<f64>,
 ) -> Result<Margin, FitError> {
     let mut program = ConicProgram::default();
     let functional = program.variables(target.len());
     functional.clone().zip(target.iter()).for_each(|(variable, &cost)| program.add_cost(variable, cost));
-    let mut trace = Expression::constant(1.0);
-    for (cone, scales) in cones.iter().zip(scales) {
-        for (i, scale) in scales.iter().enumerate() {
-            trace.terms.extend(cone.entry(i, i).into_iter().map(|(k, factor)| (k, -scale * scale * factor)));
-        }
-    }
-    let trace = program.zero([trace]).start;
-    let rows: Vec<_> = cones
-        .iter()
-        .zip(scales)
-        .map(|(cone, scales)| {
-            program.semidefinite(cone.size(), |i, j| {
-                let scaled = |(k, factor)| (k, scales[i] * scales[j] * factor);
-                Expression { terms: cone.entry(i, j).into_iter().map(scaled).collect(), constant: 0.0 }
-            })
-        })
-        .collect();
+    let trace = |cone: &LocalizingMatrix| cone.trace().map(|(k, factor)| (k, -factor)).collect::<Vec<_>>();
+    let trace = program.zero([Expression { terms: cones.iter().flat_map(trace).collect(), constant: 1.0 }]).start;
+    let rows: Vec<_> = cones.iter().map(|cone| cone.constrain(&mut program, functional.start)).collect();
     let mut ignored = |_| std::ops::ControlFlow::Continue(());
     let solution = solve(&program, TOLERANCE, 1.0, &mut Watch::new(&mut ignored))?;
     // f = Σ collapse(D (Z + t I) D), t the negative multiplier of `1 - trace`
     let margin = -solution.multipliers[trace];
-    let gram = |((cone, scales), rows): ((&LocalizingMatrix, &Vec<f64>), std::ops::Range<usize>)| {
-        let mut gram = solution.matrix_multiplier(rows, cone.size());
-        for i in 0..cone.size() {
-            gram[(i, i)] += margin;
-        }
-        DMatrix::from_fn(cone.size(), cone.size(), |i, j| scales[i] * scales[j] * gram[(i, j)])
-    };
-    let grams = cones.iter().zip(scales).zip(rows).map(gram).collect();
+    let grams = cones.iter().zip(rows).map(|(cone, rows)| cone.gram(&solution, rows, 1.0, margin)).collect();
     let functional = solution.values(functional);
     let bound = feasible(functional, cones, inside).map_or(f64::INFINITY, |y| {
         let rounding =
             4.0 * f64::EPSILON * y.len() as f64 * target.iter().zip(&y).map(|(f, y)| (f * y).abs()).sum::<f64>();
-        let trace = |(cone, scales): (&LocalizingMatrix, &Vec<f64>)| {
-            let matrix = cone.matrix(&y);
-            scales.iter().enumerate().map(|(i, scale)| scale * scale * matrix[(i, i)]).sum::<f64>()
-        };
-        (target.dot(&y) + rounding) / cones.iter().zip(scales).map(trace).sum::<f64>()
+        let trace: f64 = cones.iter().flat_map(LocalizingMatrix::trace).map(|(k, factor)| factor * y[k]).sum();
+        (target.dot(&y) + rounding) / trace
     });
     Ok(Margin { bound, grams })
 }
@@ -91,5 +66,5 @@ pub(super) fn largest_margin(
 fn feasible(y: DVector<f64>, cones: &[LocalizingMatrix], inside: &DVector<f64>) -> Option<DVector<f64>> {
     let size = y.amax() / inside.amax();
     let shares = (-15..-2).map(|exponent| size * 10_f64.powi(exponent));
-    shares.map(|share| &y + inside * share).find(|y| cones.iter().all(|cone| Cholesky::new(cone.matrix(y)).is_some()))
+    shares.map(|share| &y + inside * share).find(|y| cones.iter().all(|cone| cone.is_definite(y)))
 }

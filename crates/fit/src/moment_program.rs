@@ -22,10 +22,10 @@
 
 use super::FitError;
 use super::conic_program::{ConicProgram, ConicSolution, Expression, geometric_mean, solve};
-use super::localizing::LocalizingMatrix;
+use super::localizing::{LocalizingMatrix, scales};
 use super::objective::{Function, Matrix};
 use super::path::Interior;
-use super::program::{Dual, Problem, ProgramError};
+use super::program::{Problem, ProgramError};
 use super::progress::Watch;
 use super::structure::{Pattern, interior_form, isotropic_form};
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -38,18 +38,15 @@ use sublevel_core::polynomial::degree_of;
 /// of optimality; a smaller value ends in stalls. Pinned by `both_solvers_agree`.
 const TOLERANCE: f64 = 1e-9;
 
-/// Least square root of a pivot, relative to that of the diagonal, that a row is scaled by.
-const LEAST_PIVOT: f64 = 1e-5;
-
 /// What moments come from.
 pub(super) struct Source<'a> {
     /// What its variables add to m: monomials of p x variables.
     pub(super) map: &'a DMatrix<f64>,
     /// Their part in the linear part of the dual objective.
     pub(super) cost: DVector<f64>,
-    /// Matrices that stay semidefinite, with the scales of their rows; none if the variables
-    /// themselves stay nonnegative.
-    pub(super) cones: Option<(&'a [LocalizingMatrix], &'a [Vec<f64>])>,
+    /// Matrices that stay semidefinite, and by what margin their Gram matrices are definite, relative
+    /// to the scales of their rows; none if the variables themselves stay nonnegative.
+    pub(super) cones: Option<(&'a [LocalizingMatrix], f64)>,
     /// Variables in the interior of all that.
     pub(super) inside: DVector<f64>,
 }
@@ -61,8 +58,8 @@ pub(super) struct MomentOptimum {
     pub(super) interior: Interior,
     /// Gram matrix P of the polynomial.
     pub(super) gram: DMatrix<f64>,
-    /// Multipliers of each source's cones.
-    pub(super) multipliers: Vec<Vec<DMatrix<f64>>>,
+    /// Gram matrices of each source's cones.
+    pub(super) grams: Vec<Vec<DMatrix<f64>>>,
     /// No polynomial has a smaller objective: the dual objective of a feasible point.
     pub(super) lower_bound: f64,
 }
@@ -87,9 +84,7 @@ pub(super) struct MomentProgram<'a> {
     of_cones: Vec<Vec<Range<usize>>>,
 }
 
-/// A moment matrix among the variables, its rows and columns scaled: the pivots of the scaled
-/// matrix are about 1. Its constraints hold to the solver's absolute tolerance, and pivots of 1e-3
-/// would have a thousandth of that accuracy.
+/// A moment matrix among the variables, its rows and columns scaled (`localizing`).
 struct MomentMatrix<'a> {
     pattern: &'a Pattern,
     /// The variable of key 0.
@@ -113,20 +108,12 @@ impl MomentMatrix<'_> {
 
 /// A semidefinite constraint on a part of a moment matrix.
 struct Part {
-    /// Its rows in the program, of which the first are those of the part.
+    /// Its rows in the program.
     rows: Range<usize>,
     /// The rows of the matrix.
     basis: Vec<usize>,
     /// Their scales.
     scales: Vec<f64>,
-}
-
-/// One over the square roots of the pivots of a semidefinite matrix, or of its diagonal where it
-/// has none or small ones: those of a singular matrix are rounding.
-pub(super) fn scales(matrix: DMatrix<f64>) -> Vec<f64> {
-    let diagonal = matrix.diagonal().map(f64::sqrt);
-    let pivots = Cholesky::new(matrix).map_or(diagonal.clone(), |factor| factor.l_dirty().diagonal());
-    pivots.iter().zip(&diagonal).map(|(&pivot, &entry)| 1.0 / pivot.max(LEAST_PIVOT * entry)).collect()
 }
 
 impl<'a> MomentProgram<'a> {
@@ -179,17 +166,11 @@ impl<'a> MomentProgram<'a> {
 
     /// The linear part of the dual objective, `Σ cost - ε tr S + h·s`.
     fn cost(&self) -> Vec<(usize, f64)> {
-        let structure = self.problem.structure;
-        let mut of_form = vec![0.0; structure.hessian.keys];
-        for i in 0..structure.hessian.size {
-            of_form[structure.hessian.key(i, i)] -= self.problem.margin;
-        }
-        if let Some(allowance) = &self.problem.allowance {
-            of_form.iter_mut().zip(allowance.iter()).for_each(|(cost, allowed)| *cost += allowed);
-        }
+        let of_form = self.problem.form_cost();
         let of_sources = self.sources.iter().zip(&self.of_sources);
-        let of_sources = of_sources.flat_map(|(source, y)| y.clone().zip(source.cost.iter().copied()));
-        self.form.clone().zip(of_form).chain(of_sources).filter(|term| term.1 != 0.0).collect()
+        let of_sources =
+            of_sources.flat_map(|(source, y)| y.clone().zip(source.cost_with_margin().data.as_vec().clone()));
+        self.form.clone().zip(of_form.data.as_vec().clone()).chain(of_sources).filter(|term| term.1 != 0.0).collect()
     }
 
     /// A moment matrix, scaled by what it is inside the sources.
@@ -297,9 +278,9 @@ impl<'a> MomentProgram<'a> {
         let hessian = sum(&self.of_form, size) + DMatrix::identity(size, size) * self.problem.margin;
         let hessian = structure.hessian.nearest(&hessian, &form);
         let lower_bound = self.lower_bound(&solution)?;
-        let of_source = |(source, rows): (&Source, &Vec<Range<usize>>)| source.multipliers(&solution, rows, factor);
-        let multipliers = self.sources.iter().zip(&self.of_cones).map(of_source).collect();
-        Ok(MomentOptimum { interior: Interior { coefficients, hessian }, gram, multipliers, lower_bound })
+        let of_source = |(source, rows): (&Source, &Vec<Range<usize>>)| source.grams(&solution, rows, factor);
+        let grams = self.sources.iter().zip(&self.of_cones).map(of_source).collect();
+        Ok(MomentOptimum { interior: Interior { coefficients, hessian }, gram, grams, lower_bound })
     }
 
     /// The dual objective of the solver's dual point made feasible: as much of a point inside added
@@ -323,13 +304,12 @@ impl<'a> MomentProgram<'a> {
             let of_sources = sources.iter().zip(&self.of_sources).map(of_source).collect::<Option<Vec<_>>>()?;
             let moments = moments(&of_sources, &form);
             Cholesky::new(gram.spread(&moments))?;
-            Some((of_sources, Dual { weights: DVector::zeros(0), form, moments }))
+            Some((of_sources, form, moments))
         };
-        let (of_sources, dual) = shares().find_map(feasible).ok_or(ProgramError::Singular)?;
-        let cost: f64 = sources.iter().zip(&of_sources).map(|(source, y)| source.cost.dot(y)).sum();
-        // without weights, the cost of the form alone
-        let cost = cost + problem.cost(&dual);
-        let bound = problem.spectral.best_multiple(&problem.measured(&dual), cost);
+        let (of_sources, form, moments) = shares().find_map(feasible).ok_or(ProgramError::Singular)?;
+        let cost: f64 = sources.iter().zip(&of_sources).map(|(source, y)| source.cost_with_margin().dot(y)).sum();
+        let cost = cost + problem.form_cost().dot(&form);
+        let bound = problem.spectral.best_multiple(&problem.measured(&moments, &form), cost);
         bound.ok_or(ProgramError::Singular)
     }
 }
@@ -340,29 +320,28 @@ fn shares() -> impl Iterator<Item = f64> {
 }
 
 impl Source<'_> {
+    /// The cost of its variables, less what the margin of its Gram matrices takes off.
+    fn cost_with_margin(&self) -> DVector<f64> {
+        let mut cost = self.cost.clone();
+        if let Some((cones, margin)) = self.cones {
+            cones.iter().flat_map(LocalizingMatrix::trace).for_each(|(k, factor)| cost[k] -= margin * factor);
+        }
+        cost
+    }
+
     /// Constrains its variables; rows of the constraints of its cones.
     fn constrain(&self, program: &mut ConicProgram, variables: &Range<usize>) -> Vec<Range<usize>> {
-        let Some((cones, scales)) = self.cones else {
+        let Some((cones, _)) = self.cones else {
             program.nonnegative(variables.clone().map(Expression::of));
             return Vec::new();
         };
-        let constrain = |(cone, scales): (&LocalizingMatrix, &Vec<f64>)| {
-            program.semidefinite(cone.size(), |i, j| {
-                let scaled = |(k, factor)| (variables.start + k, scales[i] * scales[j] * factor);
-                Expression { terms: cone.entry(i, j).into_iter().map(scaled).collect(), constant: 0.0 }
-            })
-        };
-        cones.iter().zip(scales).map(constrain).collect()
+        cones.iter().map(|cone| cone.constrain(program, variables.start)).collect()
     }
 
-    /// The multipliers of its cones.
-    fn multipliers(&self, solution: &ConicSolution, rows: &[Range<usize>], factor: f64) -> Vec<DMatrix<f64>> {
-        let Some((cones, scales)) = self.cones else { return Vec::new() };
-        let of_cone = |((cone, scales), rows): ((&LocalizingMatrix, &Vec<f64>), &Range<usize>)| {
-            let gram = solution.matrix_multiplier(rows.clone(), cone.size()) / factor;
-            DMatrix::from_fn(cone.size(), cone.size(), |i, j| scales[i] * scales[j] * gram[(i, j)])
-        };
-        cones.iter().zip(scales).zip(rows).map(of_cone).collect()
+    /// The Gram matrices of its cones.
+    fn grams(&self, solution: &ConicSolution, rows: &[Range<usize>], factor: f64) -> Vec<DMatrix<f64>> {
+        let Some((cones, margin)) = self.cones else { return Vec::new() };
+        cones.iter().zip(rows).map(|(cone, rows)| cone.gram(solution, rows.clone(), factor, margin)).collect()
     }
 
     /// Variables with a share of what is inside, where that is feasible.
@@ -370,7 +349,7 @@ impl Source<'_> {
         let inside = &self.inside * share;
         let Some((cones, _)) = self.cones else { return Some(y.map(|weight| weight.max(0.0)) + inside) };
         let y = y + inside;
-        cones.iter().all(|cone| Cholesky::new(cone.matrix(&y)).is_some()).then_some(y)
+        cones.iter().all(|cone| cone.is_definite(&y)).then_some(y)
     }
 }
 
@@ -379,7 +358,7 @@ fn gram(solution: &ConicSolution, parts: &[Part], size: usize) -> DMatrix<f64> {
     let mut gram = DMatrix::zeros(size, size);
     for Part { rows, basis, scales } in parts {
         let width = basis.len();
-        let part = solution.matrix_multiplier(rows.start..rows.start + width * (width + 1) / 2, width);
+        let part = solution.matrix_multiplier(rows.clone(), width);
         for i in 0..width {
             for j in 0..width {
                 gram[(basis[i], basis[j])] += scales[i] * scales[j] * part[(i, j)];

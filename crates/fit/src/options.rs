@@ -19,7 +19,7 @@ pub struct FitOptions {
     /// Coordinates that traces are measured in.
     pub coordinates: Coordinates,
     /// Where the Gram matrix of the Hessian form is taken from. Over the smaller cones the volume
-    /// itself is minimised, in a fraction of the time: the objective then stays at its default, and
+    /// itself is minimised, without semidefinite programs: the objective then stays at its default, and
     /// there is nothing to refine.
     pub cone: Cone,
     /// Whether to minimise the volume itself, starting from the optimum of the objective.

@@ -103,12 +103,9 @@ struct Newton {
 impl<'a> Path<'a> {
     /// The path of a fit over the points whose monomials are the columns of `values`.
     pub(super) fn of_fit(problem: &'a Problem, values: &'a DMatrix<f64>) -> Self {
-        let mut path = Self::new(problem.structure, values, problem.margin, PathObjective::LogDet);
-        if let Some(allowance) = &problem.allowance {
-            path.allowance += allowance;
-            path.cost += allowance;
-        }
-        path
+        let path = Self::new(problem.structure, values, problem.margin, PathObjective::LogDet);
+        let allowance = problem.allowance.clone().unwrap_or_else(|| path.allowance.clone());
+        Self { allowance, cost: problem.form_cost(), ..path }
     }
 
     pub(super) fn new(
@@ -118,10 +115,7 @@ impl<'a> Path<'a> {
         objective: PathObjective<'a>,
     ) -> Self {
         let forms = structure.hessian.keys;
-        let mut cost = DVector::zeros(forms);
-        for i in 0..structure.hessian.size {
-            cost[structure.hessian.key(i, i)] -= margin;
-        }
+        let cost = structure.hessian.trace_form() * -margin;
         let derivative = structure.derivative_matrix();
         Self { structure, values, margin, objective, derivative, allowance: DVector::zeros(forms), cost }
     }

@@ -47,6 +47,14 @@ pub enum ProgramError {
     /// A moment matrix lost its definiteness.
     #[error("the points do not span the polynomials of this degree numerically; lower the degree, or add points")]
     Singular,
+    /// The solver has proven to its accuracy that the constraints contradict each other.
+    #[error("the program has no solution; leave the choice of the solver open, lower the degree, or add points")]
+    Infeasible,
+    /// The solver has proven to its accuracy that nothing bounds the objective.
+    #[error(
+        "nothing bounds the objective of the program; leave the choice of the solver open, lower the degree, or add points"
+    )]
+    Unbounded,
     /// The solver has no answer.
     #[error("the solver has no solution ({0}); leave the choice of the solver open, lower the degree, or add points")]
     Solver(String),
@@ -136,29 +144,23 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Which part of a dual point is the measured matrix' moments.
-    pub(super) fn variable<'b>(&self, dual: &'b Dual) -> &'b DVector<f64> {
-        match self.matrix {
-            Matrix::Polynomial => &dual.moments,
-            Matrix::Hessian => &dual.form,
-        }
-    }
-
     /// Moment matrix of the measured matrix.
-    pub(super) fn measured(&self, dual: &Dual) -> DMatrix<f64> {
-        self.pattern().spread(self.variable(dual))
+    pub(super) fn measured(&self, moments: &DVector<f64>, form: &DVector<f64>) -> DMatrix<f64> {
+        self.pattern().spread(match self.matrix {
+            Matrix::Polynomial => moments,
+            Matrix::Hessian => form,
+        })
     }
 
-    /// The linear part of the dual objective, `Σw - ε tr S + h·s`.
-    pub(super) fn cost(&self, dual: &Dual) -> f64 {
-        let trace = if self.margin > 0.0 { self.margin * self.structure.hessian.trace(&dual.form) } else { 0.0 };
-        let allowed = self.allowance.as_ref().map_or(0.0, |allowance| allowance.dot(&dual.form));
-        dual.weights.sum() - trace + allowed
+    /// `h·s - ε tr S` as a functional of s: what the form adds to the linear part of the dual objective.
+    pub(super) fn form_cost(&self) -> DVector<f64> {
+        let cost = self.structure.hessian.trace_form() * -self.margin;
+        self.allowance.as_ref().map_or_else(|| cost.clone(), |allowance| &cost + allowance)
     }
 
     /// The dual objective: a lower bound of f over all feasible polynomials.
     pub(super) fn lower_bound(&self, dual: &Dual) -> Result<f64, ProgramError> {
-        let bound = self.spectral.bound(&self.measured(dual)).ok_or(ProgramError::Singular)?;
-        Ok(bound - self.cost(dual))
+        let bound = self.spectral.bound(&self.measured(&dual.moments, &dual.form)).ok_or(ProgramError::Singular)?;
+        Ok(bound - dual.weights.sum() - self.form_cost().dot(&dual.form))
     }
 }

@@ -2,6 +2,7 @@
 
 use super::FitError;
 use std::ops::ControlFlow;
+use sublevel_core::body::SolverStep;
 
 /// How far a fit has come, after each iteration of its solver.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -17,25 +18,6 @@ pub struct Progress {
     /// About the distance to the optimum of the program, in units of log dets, or of the volume in
     /// refinements; while slabs are cut, the gap, metres.
     pub gap: f64,
-}
-
-/// One iteration of the solver.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SolverStep {
-    /// Which program of the fit, counted from 1.
-    pub round: usize,
-    /// Iteration of that program, counted from 0.
-    pub iteration: usize,
-    /// Value of its objective.
-    pub primal: f64,
-    /// Value of its dual objective.
-    pub dual: f64,
-    /// Relative residual of its constraints.
-    pub primal_residual: f64,
-    /// Relative residual of the constraints of the dual.
-    pub dual_residual: f64,
-    /// Length of the step before, 0 to 1.
-    pub step_length: f64,
 }
 
 /// Keeps the counts, and asks the caller whether to continue.

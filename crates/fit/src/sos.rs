@@ -11,13 +11,13 @@ use super::moment::{inverse_moment, moments};
 use super::object::{Object, pulled_inside};
 use super::objective::{Matrix, Measure};
 use super::program::Problem;
-use super::progress::{Progress, SolverStep, Watch};
+use super::progress::{Progress, Watch};
 use super::structure::Structure;
 use super::{FitError, FitOptions, Objective, ProgramError};
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::ops::ControlFlow;
 use std::time::Instant;
-use sublevel_core::body::{Placement, Provenance, Relaxation, Solver, SosBody, SosBodyError, SosMethod};
+use sublevel_core::body::{Placement, Provenance, Relaxation, Solver, SolverStep, SosBody, SosBodyError, SosMethod};
 use sublevel_core::polynomial::{HessianGram, NormPower, Polynomial, SosGram, monomials};
 
 /// How far below 1 all points are left: that is what lets triangles at the outermost points be
@@ -107,7 +107,7 @@ impl SosOptions {
 /// Fits an sos-body around `points` (metres), and proves which of the `triangles` between them it
 /// contains.
 ///
-/// The points end a billionth below the level 1. `progress` is called at every Newton step and can
+/// The points end a billionth below the level 1. `progress` is called at every iteration and can
 /// stop the fit; an inverse moment has none.
 ///
 /// # Errors

@@ -66,9 +66,11 @@ impl Pattern {
         matrix + self.spread(&(values - self.collapse(matrix)).component_div(&places))
     }
 
-    /// `tr spread(values)`.
-    pub(super) fn trace(&self, values: &DVector<f64>) -> f64 {
-        (0..self.size).map(|i| values[self.key(i, i)]).sum()
+    /// `tr spread(values)` as a functional of the values.
+    pub(super) fn trace_form(&self) -> DVector<f64> {
+        let mut trace = DVector::zeros(self.keys);
+        (0..self.size).for_each(|i| trace[self.key(i, i)] += 1.0);
+        trace
     }
 
     /// The matrix of the quadratic form `m -> tr(G M G M)`, `M = spread(m)`, G symmetric: keys x

@@ -5,8 +5,9 @@ use super::super::proto::job::Task;
 use super::super::proto::{self, BodyKind, FitPhase, FitProgress, FitResult, FitTask};
 use super::super::wire::count;
 use super::request::{options, read_solver, solver_message};
+use crate::body::SolverStep;
 use crate::jobs::{Phase, Progress};
-use crate::store::{FitOptimum, FitOutcome, FittedBody, FittedKind, Job, JobState, SolverStep};
+use crate::store::{FitOptimum, FitOutcome, FittedBody, FittedKind, Job, JobState};
 
 /// What a job can make.
 const KINDS: [(FittedKind, BodyKind); 3] = [

@@ -28,7 +28,7 @@ pub enum Cone {
 
 /// A name that is no cone.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("cone: {0:?} is not one of sos, sdsos, dsos; sos is the tightest, sdsos is for streams of point clouds")]
+#[error("cone: {0:?} is not one of sos, sdsos, dsos; sos is the tightest, the others need no semidefinite program")]
 pub struct UnknownCone(pub String);
 
 impl Cone {

@@ -69,7 +69,7 @@ pub use radial::Volume;
 pub use radial::{boundary_radius, sphere_rule};
 pub use shape::Shape;
 pub use solid::Solid;
-pub use solver::{Solver, UnknownSolver};
+pub use solver::{Solver, SolverStep, UnknownSolver};
 pub use sos::{Coverage, Relaxation, SosBody, SosBodyError, SosMethod, TriangleError, Uncovered};
 pub use sphere::{Sphere, fibonacci_lattice};
 pub use spot::Spot;

@@ -1,4 +1,4 @@
-//! What solves the semidefinite program of a fit.
+//! What solves the semidefinite program of a fit, and its iterations.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,7 +6,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 /// The solver of a fit's semidefinite program. Both solve the same program to the same accuracy,
-/// and every body is proven from its own numbers, whoever found them.
+/// and every body is proven from its own numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Solver {
@@ -14,6 +14,26 @@ pub enum Solver {
     Clarabel,
     /// The central path of the dual in its own variables, for log det P only: faster at degree 8.
     Structured,
+}
+
+/// One iteration of clarabel.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SolverStep {
+    /// Which program of the fit, counted from 1.
+    pub round: usize,
+    /// Iteration of that program, counted from 0.
+    pub iteration: usize,
+    /// Value of its objective.
+    pub primal: f64,
+    /// Value of its dual objective.
+    pub dual: f64,
+    /// Relative residual of its constraints.
+    pub primal_residual: f64,
+    /// Relative residual of the constraints of the dual.
+    pub dual_residual: f64,
+    /// Length of the step before, 0 to 1.
+    pub step_length: f64,
 }
 
 /// A name that is no solver.

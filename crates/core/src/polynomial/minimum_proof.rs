@@ -9,12 +9,12 @@
 //! with g <= 1 on a set, shows f >= γ there (Putinar; Lasserre, SIAM J. Optim. 11, 2001). A
 //! solver's matrices are neither quite semidefinite nor is the identity quite true: each G is
 //! raised by a multiple of I until it is proven definite, what is left over is computed in
-//! intervals, and its largest magnitude in a box around both sets is taken off. Whoever found the
-//! matrices, the bound holds.
+//! intervals, and its largest magnitude in a box around both sets is taken off: the bound
+//! does not depend on where the matrices come from.
 
 use super::Polynomial;
 use super::interval::Interval;
-use super::monomial::{Exponents, monomials};
+use super::monomial::Exponents;
 use super::substitution::Substitution;
 use super::verified_cholesky::is_positive_definite_above;
 use nalgebra::DMatrix;
@@ -73,17 +73,6 @@ impl PairPolynomial {
                 for &(f, q) in &line {
                     sum.add(std::array::from_fn(|i| e[i] + f[i]), p * q);
                 }
-            }
-        }
-        sum
-    }
-
-    /// `Σ weight p(map(u))`.
-    pub fn weighted_images(polynomials: &[(&Polynomial, f64)], map: &Substitution) -> Self {
-        let mut sum = Self::default();
-        for (polynomial, weight) in polynomials {
-            for (exponents, coefficient) in monomials(polynomial.degree()).into_iter().zip(map.apply(polynomial)) {
-                sum.add(Point::First.exponents(exponents), Interval::of(*weight) * coefficient);
             }
         }
         sum

@@ -3,7 +3,7 @@
 use super::program::ConicProgram;
 use crate::FitError;
 use crate::program::ProgramError;
-use crate::progress::{SolverStep, Watch};
+use crate::progress::Watch;
 use clarabel::solver::{DefaultInfo, DefaultSettings, DefaultSolver, IPSolver, SolverStatus};
 use nalgebra::{DMatrix, DVector};
 // Links the BLAS that clarabel's semidefinite cones call.
@@ -13,6 +13,7 @@ use std::ops::Range;
 use std::sync::mpsc::sync_channel;
 use std::sync::{Mutex, MutexGuard, TryLockError};
 use std::time::Duration;
+use sublevel_core::body::SolverStep;
 
 /// Held while the solver runs: a serial OpenBLAS, as Debian's `libopenblas-serial-dev`, keeps its
 /// workspace in static memory, and two solvers at once give each other's numbers.
@@ -160,14 +161,10 @@ fn run(
     let solution = solver.solution;
     let status = solution.status;
     // How near the others are is for who asked to verify.
-    if matches!(
-        status,
-        SolverStatus::PrimalInfeasible
-            | SolverStatus::DualInfeasible
-            | SolverStatus::AlmostPrimalInfeasible
-            | SolverStatus::AlmostDualInfeasible
-    ) {
-        return Err(ProgramError::Solver(format!("its status is {status:?}")));
+    match status {
+        SolverStatus::PrimalInfeasible | SolverStatus::AlmostPrimalInfeasible => return Err(ProgramError::Infeasible),
+        SolverStatus::DualInfeasible | SolverStatus::AlmostDualInfeasible => return Err(ProgramError::Unbounded),
+        _ => {}
     }
     let finite = solution.x.iter().chain(&solution.z).all(|value| value.is_finite());
     if !finite {

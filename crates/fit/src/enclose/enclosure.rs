@@ -12,13 +12,13 @@ use crate::moment_program::MomentProgram;
 use crate::object::Object;
 use crate::path::Interior;
 use crate::program::{Problem, ProgramError};
-use crate::progress::{Progress, SolverStep, Watch};
+use crate::progress::{Progress, Watch};
 use crate::structure::Structure;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, Vector3};
 use std::ops::ControlFlow;
 use std::time::Instant;
 use sublevel_core::body::{
-    BasicSet, Body, BodyError, BodyId, Constraint, ContainedSet, Containment, Objective, Obstacle, Solver,
+    BasicSet, Body, BodyError, BodyId, Constraint, ContainedSet, Containment, Objective, Obstacle, Solver, SolverStep,
 };
 use sublevel_core::polynomial::{ContainmentProof, HessianGram, NotContaining, Polynomial, Substituted};
 
@@ -81,8 +81,7 @@ pub fn enclose(
         let factor = attempts.next().unwrap_or(1.0);
         let margin = factor * DEFAULT_MARGIN;
         let problem = Problem::new(&structure, Objective::LogDetP, &coordinates, margin);
-        let multiplier_margin = multiplier_margin(factor);
-        let sources = sources(&structure, &prepared, &maps, multiplier_margin);
+        let sources = sources(&structure, &prepared, &maps, multiplier_margin(factor));
         watch.round(regions.len(), 0.0);
         let optimum = MomentProgram::new(&problem, sources).solve(&mut watch).map_err(|error| match error {
             FitError::Program(source) => {
@@ -106,14 +105,10 @@ pub fn enclose(
         let containments = regions
             .iter()
             .zip(&prepared)
-            .zip(&optimum.multipliers)
+            .zip(optimum.grams)
             .enumerate()
-            .map(|(index, ((region, prepared), multipliers))| {
-                let grams = multipliers.iter().zip(&prepared.scales).map(|(gram, scales)| {
-                    let margins = scales.iter().map(|scale| multiplier_margin * scale * scale);
-                    gram + DMatrix::from_diagonal(&DVector::from_iterator(gram.nrows(), margins))
-                });
-                contained(&body, &region.set, prepared, grams.collect())
+            .map(|(index, ((region, prepared), grams))| {
+                contained(&body, &region.set, prepared, grams)
                     .map_err(|source| EncloseError::Unproven { index, source })
             })
             .collect::<Result<Vec<_>, _>>();

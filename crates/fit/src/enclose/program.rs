@@ -26,7 +26,7 @@ use crate::basis::of_monomials;
 use crate::moment_program::Source;
 use crate::object::Object;
 use crate::structure::Structure;
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 /// ε': the margin of the Gram matrices of σ and τ relative to the scales of their rows, at a margin
 /// of H of [`DEFAULT_MARGIN`](crate::DEFAULT_MARGIN); dimensionless.
@@ -43,7 +43,7 @@ pub(super) fn prepare(regions: &[Region], options: &EncloseOptions) -> Result<Ve
         }
         let prepared = Prepared::new(region, options.degree, options.multiplier_degree)
             .map_err(|source| EncloseError::Points { index, source })?;
-        let definite = prepared.cones.iter().all(|cone| Cholesky::new(cone.matrix(&prepared.mean)).is_some());
+        let definite = prepared.cones.iter().all(|cone| cone.is_definite(&prepared.mean));
         definite.then_some(prepared).ok_or(EncloseError::Start(index))
     };
     regions.iter().enumerate().map(prepare).collect()
@@ -76,12 +76,7 @@ pub(super) fn sources<'a>(
     let source = |(set, map): (&'a Prepared, &'a DMatrix<f64>)| {
         let mut cost = DVector::zeros(set.mean.len());
         cost[0] = 1.0;
-        for (cone, scales) in set.cones.iter().zip(&set.scales) {
-            for (i, scale) in scales.iter().enumerate() {
-                cone.entry(i, i).into_iter().for_each(|(k, factor)| cost[k] -= margin * scale * scale * factor);
-            }
-        }
-        Source { map, cost, cones: Some((&set.cones, &set.scales)), inside: &set.mean * share }
+        Source { map, cost, cones: Some((&set.cones, margin)), inside: &set.mean * share }
     };
     prepared.iter().zip(maps).map(source).collect()
 }

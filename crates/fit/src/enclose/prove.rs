@@ -88,5 +88,5 @@ pub fn containment(body: &Body, region: &Region, multiplier_degree: usize) -> Re
 fn margin(prepared: &Prepared, minus_p: DVector<f64>) -> Result<Margin, FitError> {
     let mut target = minus_p;
     target[0] += 1.0;
-    largest_margin(&target, &prepared.cones, &prepared.scales, &prepared.mean)
+    largest_margin(&target, &prepared.cones, &prepared.mean)
 }

@@ -4,7 +4,6 @@
 use crate::FitError;
 use crate::basis::{Affine, of_monomials};
 use crate::localizing::LocalizingMatrix;
-use crate::moment_program::scales;
 use crate::object::Object;
 use crate::program::ProgramError;
 use nalgebra::{DVector, Matrix3, Vector3};
@@ -60,10 +59,8 @@ impl<'a> From<&'a Obstacle> for Region<'a> {
 pub(super) struct Prepared {
     /// The frame v in which the set about fills the unit ball.
     pub(super) frame: ProofFrame,
-    /// Squares first, then one per constraint.
+    /// Squares first, then one per constraint, scaled by what they are at the mean.
     pub(super) cones: Vec<LocalizingMatrix>,
-    /// For each cone the scales of its rows: one over the square roots of its pivots at the mean.
-    pub(super) scales: Vec<Vec<f64>>,
     /// The mean over points inside: a functional in the interior of all cones.
     pub(super) mean: DVector<f64>,
 }
@@ -80,7 +77,6 @@ impl Prepared {
         let degree = contained.max(highest + multiplier);
         let slack = |g: &&Polynomial| -substituted(g, &affine(&frame, region.set.normalization)) + one(g.degree());
         let slacks = region.set.polynomials.iter().map(|g| LocalizingMatrix::multiples(&slack(g), degree));
-        let cones = std::iter::once(LocalizingMatrix::squares(degree)).chain(slacks).collect();
         let inverse = frame.axes.try_inverse().ok_or(ProgramError::Singular)?;
         let order = monomials(degree);
         let share = 1.0 / region.inside.len() as f64;
@@ -96,9 +92,9 @@ impl Prepared {
             }
             mean += DVector::from_vec(values);
         }
-        let cones: Vec<LocalizingMatrix> = cones;
-        let scales = cones.iter().map(|cone| scales(cone.matrix(&mean))).collect();
-        Ok(Self { frame, cones, scales, mean })
+        let cones = std::iter::once(LocalizingMatrix::squares(degree)).chain(slacks);
+        let cones = cones.map(|cone| cone.scaled_at(&mean)).collect();
+        Ok(Self { frame, cones, mean })
     }
 
     /// Coefficients of a polynomial of other normalized coordinates, as one of v, on the monomials

@@ -36,6 +36,9 @@ pub enum HierarchyError {
         /// Entries of the triangles of all matrices.
         rows: usize,
     },
+    /// No functional is what points of the sets would be.
+    #[error("sets: at least one is empty: no point of it satisfies all constraints; send sets that have points")]
+    Empty,
     /// The program could not be solved, or was cancelled.
     #[error(transparent)]
     Fit(#[from] FitError),

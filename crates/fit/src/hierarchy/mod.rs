@@ -26,6 +26,8 @@ pub use error::{HierarchyError, MAX_LEVEL};
 pub use placed_set::PlacedSet;
 
 use crate::conic_program::solve;
+use crate::error::FitError;
+use crate::program::ProgramError;
 use crate::progress::{Progress, Watch};
 use local_search::nearest_points;
 use moments::MomentRelaxation;
@@ -91,7 +93,10 @@ pub fn hierarchy_distance(
     let mut watch = Watch::new(progress);
     watch.round(0, 0.0);
     let (program, parts) = relaxation.program();
-    let solution = solve(&program, TOLERANCE, relaxation.unit(), &mut watch)?;
+    let solution = solve(&program, TOLERANCE, relaxation.unit(), &mut watch).map_err(|error| match error {
+        FitError::Program(ProgramError::Infeasible) => HierarchyError::Empty,
+        error => error.into(),
+    })?;
     let squares = relaxation.squares(&solution, &parts);
     let squared = objective.lower_bound(&squares, &most).unwrap_or(0.0).max(0.0);
     let lower_m = squared.sqrt().next_down().max(0.0);

@@ -146,6 +146,9 @@ fn bad_input_is_refused_by_name() {
     let large = Body::superellipsoid("e", Vector3::zeros(), Vector3::repeat(1.0), 8).unwrap();
     let large = PlacedSet::of_body(&large, Isometry3::identity());
     assert!(matches!(bound([&large, &large], 2), Err(HierarchyError::TooLarge { level: 2, .. })));
+    let nowhere =
+        Polynomial::new(vec![([2, 0, 0], 1.0), ([0, 2, 0], 1.0), ([0, 0, 2], 1.0), ([0, 0, 0], 2.0)]).unwrap();
+    assert_eq!(refused(set(&nowhere, 1.0, Isometry3::identity()), 0), HierarchyError::Empty);
     // Far from the origin two balls that touch are as far apart as poses are rounded.
     let far = |x: f64| PlacedSet::of_body(&ball, Isometry3::translation(1e6, 0.0, x));
     let touching = bound([&far(0.0), &far(0.2)], 0).unwrap();
