@@ -9,7 +9,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
-pub use sublevel_core::{body, measure, optimize, polynomial};
+pub use sublevel_core::{body, branch_and_bound, measure, optimize, polynomial};
 #[cfg(feature = "fit")]
 pub use sublevel_fit as fit;
 pub use sublevel_scene as scene;

@@ -381,7 +381,10 @@ pub(super) fn states_error(error: &StatesError) -> Invalid {
 
 /// Which field makes pairs unusable.
 pub(super) fn pairs_error(error: PairsError) -> Invalid {
-    let (PairsError::NoOperand { pair, .. } | PairsError::Itself { pair, .. } | PairsError::NoObject { pair }) = error;
+    let (PairsError::NoOperand { pair, .. }
+    | PairsError::Itself { pair, .. }
+    | PairsError::NeedsConvex { pair, .. }
+    | PairsError::NoObject { pair }) = error;
     Invalid::new(format!("pairs[{pair}]"), error)
 }
 

@@ -17,8 +17,10 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
     ("optimize", &[]),
     ("body", &["polynomial", "optimize"]),
     ("measure", &["body", "polynomial", "optimize"]),
-    ("fit", &["body", "polynomial", "optimize"]),
-    ("scene", &["measure", "body"]),
+    ("branch_and_bound", &["measure", "body", "polynomial"]),
+    // Of measure, the pose.
+    ("fit", &["branch_and_bound", "measure", "body", "polynomial", "optimize"]),
+    ("scene", &["branch_and_bound", "measure", "body"]),
     // Of measure, the pose.
     ("store", &["body", "scene", "measure"]),
     ("jobs", &["fit", "store", "scene", "body"]),
@@ -37,6 +39,7 @@ const ANY: &[&str] = &[
     "optimize",
     "body",
     "measure",
+    "branch_and_bound",
     "fit",
     "scene",
     "store",

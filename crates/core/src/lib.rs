@@ -5,6 +5,7 @@
 //! files as text. The package `sublevel` re-exports these modules.
 
 pub mod body;
+pub mod branch_and_bound;
 pub mod measure;
 pub mod optimize;
 pub mod polynomial;

@@ -23,7 +23,7 @@ pub struct Object {
     pub padding_m: Option<f64>,
     /// What holds it, if anything does.
     pub attachment: Option<Attachment>,
-    /// What measures take of an sos-body: the box around it.
+    /// The box around an sos-body: what culling and rays take of it.
     pub(crate) enclosure: Option<Arc<Shape>>,
 }
 
@@ -72,8 +72,7 @@ impl Object {
         Self { name, geometry, group, padding_m, attachment, enclosure }
     }
 
-    /// The solids that measures take, coarsest first; the box around an sos-body; none for a
-    /// half-space.
+    /// The solids, coarsest first; the box around an sos-body; none for a half-space.
     pub(crate) fn solids(&self) -> &[Arc<Shape>] {
         match &self.enclosure {
             Some(enclosure) => std::slice::from_ref(enclosure),

@@ -8,6 +8,7 @@ pub mod catalogue;
 mod data;
 pub mod random;
 pub mod reference;
+pub mod sos_bodies;
 
 pub use data::data;
 pub use random::Seeded;

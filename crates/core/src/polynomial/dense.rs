@@ -14,9 +14,8 @@ pub(super) fn dense(terms: &[(Exponents, f64)]) -> Dense {
     dense
 }
 
-/// Coefficients of `p(z + by e_axis)`: synthetic division, line by line.
-pub(super) fn shifted(dense: &Dense, degree: usize, by: f64, axis: usize) -> Dense {
-    let mut result = *dense;
+/// Replaces the coefficients of p by those of `p(z + by e_axis)`: synthetic division, line by line.
+pub(super) fn shift(dense: &mut Dense, degree: usize, by: f64, axis: usize) {
     for i in 0..=degree {
         for j in 0..=degree - i {
             let longest = degree - i - j;
@@ -28,7 +27,7 @@ pub(super) fn shifted(dense: &Dense, degree: usize, by: f64, axis: usize) -> Den
             };
             for k in 0..=longest {
                 let [a, b, c] = place(k);
-                line[k] = result[a][b][c];
+                line[k] = dense[a][b][c];
             }
             for start in 0..longest {
                 for k in (start..longest).rev() {
@@ -37,9 +36,15 @@ pub(super) fn shifted(dense: &Dense, degree: usize, by: f64, axis: usize) -> Den
             }
             for k in 0..=longest {
                 let [a, b, c] = place(k);
-                result[a][b][c] = line[k];
+                dense[a][b][c] = line[k];
             }
         }
     }
+}
+
+/// Coefficients of `p(z + by e_axis)`.
+pub(super) fn shifted(dense: &Dense, degree: usize, by: f64, axis: usize) -> Dense {
+    let mut result = *dense;
+    shift(&mut result, degree, by, axis);
     result
 }

@@ -39,6 +39,7 @@ pub use lanes::{Aligned, Lanes, MAX_LANES, MAX_SINGLES, Singles, Vector};
 pub use minimum_proof::{PairExponents, PairPolynomial, Point, WeightedSquares};
 pub use monomial::{Exponents, degree_of, monomials, position};
 pub use norm_power::NormPower;
+pub use range::LinearBounds;
 pub use ray_intervals::Chords;
 pub use rounding::{Growth, gamma};
 pub use simd::{Arch, Scalar, Simd, SimdLimit, WithSimd, dispatch, dispatch_lanes, limit_simd, widest};

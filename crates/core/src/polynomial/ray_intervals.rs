@@ -6,7 +6,7 @@
 //! Casteljau) leaves pieces that are inside, outside, or have a single crossing. Nothing is asked
 //! of the shape of the set.
 
-use super::dense::{Dense, dense, shifted};
+use super::dense::{Dense, dense, shift};
 use super::{Exponents, Polynomial, monomials};
 use nalgebra::Vector3;
 
@@ -28,7 +28,7 @@ impl Chords {
         let degree = polynomial.degree();
         let mut here: Dense = dense(polynomial.terms());
         for axis in 0..3 {
-            here = shifted(&here, degree, start[axis], axis);
+            shift(&mut here, degree, start[axis], axis);
         }
         let mut parts = vec![Vec::new(); degree + 1];
         for e in monomials(degree) {

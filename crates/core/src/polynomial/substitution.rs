@@ -2,7 +2,7 @@
 
 use super::interval::Interval;
 use super::monomial::{Exponents, count, degree_of, monomials, position};
-use super::{MAX_DEGREE, Polynomial};
+use super::{MAX_DEGREE, Polynomial, PolynomialError};
 use nalgebra::{Matrix3, Vector3};
 
 /// An affine map `z = A v + b` known up to rounding: it stands for every map within.
@@ -44,6 +44,57 @@ impl Substitution {
             linear: std::array::from_fn(|i| std::array::from_fn(|j| sum(i, &|k| inverse[k][j]))),
             offset: std::array::from_fn(|i| sum(i, &|k| Interval::of(center[k])) + Interval::of(translation[i])),
         })
+    }
+
+    /// This map to points x of a space, followed by `z = L (Rᵀ(x - t) - c)`, R a rotation whose
+    /// matrix is rounded.
+    pub fn then_from_space(
+        &self,
+        linear: &Matrix3<f64>,
+        center: &Vector3<f64>,
+        rotation: &Matrix3<f64>,
+        translation: &Vector3<f64>,
+    ) -> Self {
+        let sum = |of: &dyn Fn(usize) -> Interval| (0..3).fold(Interval::ZERO, |sum, k| sum + of(k));
+        let back = |i: usize, k: usize| Interval::around(rotation[(k, i)], ROTATION_ERROR);
+        let turned = |j: usize| -> [Interval; 3] { std::array::from_fn(|i| sum(&|k| back(i, k) * self.linear[k][j])) };
+        let columns: [[Interval; 3]; 3] = std::array::from_fn(turned);
+        let shift = |k: usize| self.offset[k] - Interval::of(translation[k]);
+        let moved: [Interval; 3] = std::array::from_fn(|i| sum(&|k| back(i, k) * shift(k)) - Interval::of(center[i]));
+        let row = |i: usize, of: &dyn Fn(usize) -> Interval| sum(&|k| Interval::of(linear[(i, k)]) * of(k));
+        Self {
+            linear: std::array::from_fn(|i| std::array::from_fn(|j| row(i, &|k| columns[j][k]))),
+            offset: std::array::from_fn(|i| row(i, &|k| moved[k])),
+        }
+    }
+
+    /// A and b, rounded, and a bound of `|z - (A v + b)|` where `|v_i| <= most_i`, in units of z.
+    pub fn rounded(&self, most: &Vector3<f64>) -> (Matrix3<f64>, Vector3<f64>, f64) {
+        let middle = |i: usize, j: usize| self.linear[i][j].middle();
+        let (linear, offset) = (Matrix3::from_fn(middle), Vector3::from_fn(|i, _| self.offset[i].middle()));
+        let errors = Vector3::from_fn(|i, _| {
+            let radius = |interval: Interval| (interval - Interval::of(interval.middle())).magnitude();
+            (0..3).fold(radius(self.offset[i]), |sum, j| sum + radius(self.linear[i][j]) * most[j])
+        });
+        (linear, offset, errors.norm() * (1.0 + 1e-14))
+    }
+
+    /// `p(A v + b)` with rounded coefficients, and a bound of what they are off by where `|v_i| <=
+    /// most_i`.
+    ///
+    /// # Errors
+    /// A polynomial that rounding leaves without its leading terms, or numbers that are not finite.
+    pub fn compose(&self, polynomial: &Polynomial, most: &Vector3<f64>) -> Result<(Polynomial, f64), PolynomialError> {
+        let enclosed = self.apply(polynomial);
+        let order = monomials(polynomial.degree());
+        let power = |e: Exponents| (0..3).map(|k| most[k].powi(i32::from(e[k]))).product::<f64>();
+        let error: f64 = enclosed
+            .iter()
+            .zip(&order)
+            .map(|(interval, &e)| (*interval - Interval::of(interval.middle())).magnitude() * power(e))
+            .sum();
+        let terms = order.iter().zip(&enclosed).map(|(&e, interval)| (e, interval.middle())).collect();
+        Ok((Polynomial::new(terms)?, error * (1.0 + 1e-13)))
     }
 
     /// A row of A, and of b.
@@ -98,8 +149,9 @@ impl Substitution {
     }
 }
 
-/// Error of an entry of the matrix of a rotation that was computed of a unit quaternion.
-const ROTATION_ERROR: f64 = 2e-15;
+/// Error of an entry of the matrix of a rotation that was computed of a quaternion of unit length
+/// but for rounding.
+const ROTATION_ERROR: f64 = 16.0 * f64::EPSILON;
 
 /// The inverse, enclosed: with `E = I - LX` small, `L⁻¹ = X + X E (I - E)⁻¹`.
 fn enclosed_inverse(linear: &Matrix3<f64>) -> Option<[[Interval; 3]; 3]> {

@@ -14,7 +14,7 @@ pub enum Geometry {
     Solid(Arc<Shape>),
     /// One object at several levels of detail.
     Ladder(Arc<Ladder>),
-    /// A set that need not be convex: only the box around it is known to measures.
+    /// A set that need not be convex: measured by branch and bound; rays know the box around it.
     SosBody(Arc<SosBody>),
     /// Everything below a plane.
     HalfSpace(Arc<NamedHalfSpace>),

@@ -44,6 +44,11 @@ impl Measure {
         Self::NearerThan,
         Self::TimeOfImpact,
     ];
+
+    /// Whether it is a measure of convex bodies, and of unions of these.
+    pub fn needs_convex(self) -> bool {
+        matches!(self, Self::Growth | Self::Penetration | Self::TimeOfImpact)
+    }
 }
 
 /// How objects move while a time of impact is looked for.

@@ -196,8 +196,8 @@ impl Clearance {
         let options = self.options(solver);
         // The search for the distance that decides is the answer, too, where the two are apart.
         if let (
-            Thing::Solid { rungs: rungs_a, pose: pose_a, outer: false },
-            Thing::Solid { rungs: rungs_b, pose: pose_b, outer: false },
+            Thing::Solid { rungs: rungs_a, pose: pose_a, set: None },
+            Thing::Solid { rungs: rungs_b, pose: pose_b, set: None },
         ) = (&pair.a, &pair.b)
             && let ([a], [b]) = (rungs_a, rungs_b)
             && threshold >= 0.0
@@ -269,7 +269,7 @@ impl Batches {
 /// A thing that is one smooth body, which [`distance_batch`] measures several at a time.
 fn smooth<'a>(thing: &Thing<'a>) -> Option<(&'a Shape, &'a Pose)> {
     match thing {
-        Thing::Solid { rungs: [solid], pose, outer: false } => match &**solid {
+        Thing::Solid { rungs: [solid], pose, set: None } => match &**solid {
             Shape::Body(body) if body.is_smooth() => Some((solid, pose)),
             Shape::Body(_) | Shape::Compound(_) => None,
         },

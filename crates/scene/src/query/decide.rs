@@ -52,11 +52,9 @@ pub(crate) fn decide(solver: &Solver<'_>, pair: &Pair<'_>, threshold: f64, optio
         return Bracket { solved: false, ..Bracket::of(Verdict::Undecided, gap, f64::INFINITY) };
     }
     match (&pair.a, &pair.b) {
-        (Thing::Solid { outer: false, .. }, Thing::Solid { outer: false, .. }) => {
-            solids(solver, pair, threshold, options)
-        }
-        (Thing::Solid { outer: false, rungs, pose }, Thing::HalfSpace(half_space))
-        | (Thing::HalfSpace(half_space), Thing::Solid { outer: false, rungs, pose }) => {
+        (Thing::Solid { set: None, .. }, Thing::Solid { set: None, .. }) => solids(solver, pair, threshold, options),
+        (Thing::Solid { set: None, rungs, pose }, Thing::HalfSpace(half_space))
+        | (Thing::HalfSpace(half_space), Thing::Solid { set: None, rungs, pose }) => {
             let Some(solid) = rungs.last() else { return Bracket::of(Verdict::Undecided, gap, f64::INFINITY) };
             let found = solver.half_space_distance(solid, pose, half_space, (pair.slots, &options));
             let ball = solid.circumscribed();
@@ -70,10 +68,10 @@ pub(crate) fn decide(solver: &Solver<'_>, pair: &Pair<'_>, threshold: f64, optio
             ..Bracket::of(Verdict::No, f64::NEG_INFINITY, f64::INFINITY)
         },
         _ => {
-            let lower = compare::lower_m(solver, pair, options);
-            let lower = if lower > 0.0 { lower } else { f64::NEG_INFINITY };
-            let verdict = if lower > threshold { Verdict::No } else { Verdict::Undecided };
-            Bracket::of(verdict, lower, f64::INFINITY)
+            let found = solver.set_distance(pair, Some(threshold.max(0.0)), options);
+            // A distance of 0 says nothing about depth.
+            let lower = if found.lower_m > 0.0 { found.lower_m } else { f64::NEG_INFINITY };
+            Bracket::of(compare::against(lower, found.upper_m, threshold), lower, found.upper_m)
         }
     }
 }
@@ -117,13 +115,7 @@ fn solids(solver: &Solver<'_>, pair: &Pair<'_>, threshold: f64, options: Options
 
 /// Brackets against thresholds.
 pub(crate) mod compare {
-    use sublevel_core::body::Solid;
-    use sublevel_core::measure::{Options, distance, distance_to_point};
-
     use crate::query::answer::Verdict;
-    use crate::query::ask::Measure;
-    use crate::query::solver::{Pair, Solver};
-    use crate::query::thing::Thing;
 
     /// Whether a value is below a threshold.
     pub(crate) fn below(lower: f64, upper: f64, threshold: f64) -> Verdict {
@@ -150,33 +142,5 @@ pub(crate) mod compare {
     /// Whether a signed distance counts as contact: touching does, at a threshold of 0.
     pub(crate) fn against(lower: f64, upper: f64, threshold: f64) -> Verdict {
         if threshold == 0.0 { below_or_at(lower, upper, threshold) } else { below(lower, upper, threshold) }
-    }
-
-    /// Lower bound of the distance of a pair whose solids contain what is meant, metres; 0 where
-    /// nothing better is known.
-    pub(crate) fn lower_m(solver: &Solver<'_>, pair: &Pair<'_>, options: Options<'_>) -> f64 {
-        match (&pair.a, &pair.b) {
-            (Thing::Solid { rungs: a, pose: pose_a, .. }, Thing::Solid { rungs: b, pose: pose_b, .. }) => {
-                let (Some(a), Some(b)) = (a.last(), b.last()) else { return 0.0 };
-                solver.warm(pair.slots, [0; 2], Measure::Distance, |warm| {
-                    distance(&**a, pose_a, &**b, pose_b, &options, warm).lower
-                })
-            }
-            (Thing::Solid { rungs, pose, .. }, Thing::HalfSpace(half_space))
-            | (Thing::HalfSpace(half_space), Thing::Solid { rungs, pose, .. }) => {
-                let Some(solid) = rungs.last() else { return 0.0 };
-                let ball = solid.circumscribed();
-                let slack = half_space.slack_m(pose.translation().norm() + ball.center.norm() + ball.radius);
-                solver.half_space_distance(solid, pose, half_space, (pair.slots, &options)).lower - slack
-            }
-            (Thing::Solid { rungs, pose, .. }, Thing::Point(point))
-            | (Thing::Point(point), Thing::Solid { rungs, pose, .. }) => {
-                let Some(solid) = rungs.last() else { return 0.0 };
-                solver.warm(pair.slots, [0; 2], Measure::Distance, |warm| {
-                    distance_to_point(&**solid, pose, point, &options, warm).map_or(0.0, |found| found.lower)
-                })
-            }
-            _ => 0.0,
-        }
     }
 }

@@ -8,6 +8,7 @@ use super::ask::{Ask, Measure};
 use super::solver::{Pair, Solver};
 use super::thing::{PairSlots, Thing, WorldHalfSpace};
 use crate::crew::{Question, Stop};
+use crate::geometry::Geometry;
 use crate::object::Slot;
 use crate::scene::Scene;
 
@@ -42,6 +43,17 @@ pub enum PairsError {
         pair: usize,
         /// The operand.
         operand: u32,
+    },
+    /// A measure of convex bodies, of a pair with an sos-body.
+    #[error(
+        "pair {pair} holds an sos-body, which need not be convex, and {measure:?} is a measure of convex bodies; ask for \
+         Distance, LevelAOnB, LevelBOnA, Signed, Overlap or NearerThan, or place a convex body or a compound around it"
+    )]
+    NeedsConvex {
+        /// Position of the pair.
+        pair: usize,
+        /// The measure.
+        measure: Measure,
     },
     /// A pair without an object.
     #[error("pair {pair} holds no object of the scene; at least one side has to be one")]
@@ -83,7 +95,15 @@ impl Pairs {
                 (Operand::Object(slot_a), Operand::Object(slot_b)) if slot_a == slot_b => {
                     return Err(PairsError::Itself { pair, operand: sides[0] });
                 }
-                (Operand::Object(_), _) | (_, Operand::Object(_)) => {}
+                (Operand::Object(_), _) | (_, Operand::Object(_)) => {
+                    let is_sos_body =
+                        |side: Operand| matches!(side, Operand::Object(slot) if is_sos_body(&scene, slot));
+                    if let Some(&measure) = ask.measures().iter().find(|measure| measure.needs_convex())
+                        && (is_sos_body(a) || is_sos_body(b))
+                    {
+                        return Err(PairsError::NeedsConvex { pair, measure });
+                    }
+                }
                 _ => return Err(PairsError::NoObject { pair }),
             }
         }
@@ -115,6 +135,10 @@ impl Pairs {
             _ => None,
         }
     }
+}
+
+fn is_sos_body(scene: &Scene, slot: Slot) -> bool {
+    scene.object(slot).is_some_and(|object| matches!(object.geometry, Geometry::SosBody(_)))
 }
 
 impl Question for Pairs {

@@ -149,7 +149,7 @@ impl Rays {
     fn hit(&self, slot: Slot, ray: &Ray, options: &Options<'_>) -> Option<RayAnswer> {
         let object = self.scene.object(slot)?;
         match Thing::object(object, self.scene.pose_at(slot)) {
-            Thing::Solid { rungs, pose, outer } => {
+            Thing::Solid { rungs, pose, set } => {
                 let solid = &**rungs.last()?;
                 let cast = if self.radius_m > 0.0 {
                     let sweep = Sweep::new(*ray, self.radius_m).ok()?;
@@ -167,7 +167,7 @@ impl Rays {
                 match cast {
                     RayCast::Miss => None,
                     RayCast::Undecided { lower, .. } => Some(open(lower)),
-                    RayCast::Hit(RayHit { lower, .. }) if outer => Some(open(lower)),
+                    RayCast::Hit(RayHit { lower, .. }) if set.is_some() => Some(open(lower)),
                     RayCast::Hit(RayHit { status, lower, upper, point, normal, .. }) => {
                         let status = match status {
                             Status::Converged => AnswerStatus::Converged,

@@ -23,11 +23,9 @@ impl Solver<'_> {
             return self.unsolved(measure, pair);
         }
         match (&pair.a, &pair.b) {
-            (Thing::Solid { outer: false, .. }, Thing::Solid { outer: false, .. }) => self.solids(index, measure, pair),
-            (Thing::Solid { .. }, Thing::Solid { .. }) => self.outer(index, measure, pair),
-            (Thing::Solid { outer: true, .. }, Thing::HalfSpace(_) | Thing::Point(_))
-            | (Thing::HalfSpace(_) | Thing::Point(_), Thing::Solid { outer: true, .. }) => {
-                self.outer(index, measure, pair)
+            (Thing::Solid { set: None, .. }, Thing::Solid { set: None, .. }) => self.solids(index, measure, pair),
+            (Thing::Solid { set: Some(_), .. }, _) | (_, Thing::Solid { set: Some(_), .. }) => {
+                self.sets(index, measure, pair)
             }
             (Thing::Solid { rungs, pose, .. }, Thing::HalfSpace(half_space)) => {
                 self.half_space(index, (rungs, pose), half_space, pair.slots)
@@ -219,29 +217,6 @@ impl Solver<'_> {
         if let Some(found) = distance {
             answer.witnesses = Some([found.witness_a, found.witness_b]);
             (answer.normal, answer.not_unique, answer.parts) = (found.normal, found.tied, found.parts);
-        }
-        answer
-    }
-
-    /// A pair of which one side is only contained in what is solved: lower bounds hold, upper ones
-    /// do not.
-    fn outer(&self, index: usize, measure: Measure, pair: &Pair<'_>) -> Answer {
-        if !matches!(measure, Measure::Distance | Measure::Signed | Measure::Overlap | Measure::NearerThan) {
-            return Answer::without(AnswerStatus::NotDefined);
-        }
-        let bracket = compare::lower_m(self, pair, self.ask.options(index, self.stop));
-        let mut answer = Answer::without(AnswerStatus::BracketWide);
-        let beyond = |threshold: f64| if bracket > threshold { Verdict::No } else { Verdict::Undecided };
-        match measure {
-            Measure::Distance => answer.lower = bracket.max(0.0),
-            Measure::Signed if bracket > 0.0 => answer.lower = bracket,
-            Measure::Overlap => answer.verdict = Some(beyond(0.0)),
-            Measure::NearerThan => answer.verdict = Some(beyond(self.ask.threshold_m)),
-            _ => {}
-        }
-        if answer.verdict == Some(Verdict::No) {
-            answer.status = AnswerStatus::Converged;
-            answer.lower = bracket;
         }
         answer
     }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
-use sublevel_core::body::{Shape, Solid};
+use sublevel_core::body::{Shape, Solid, SosBody};
 use sublevel_core::measure::{HalfSpace, Pose};
 
 use crate::broad_phase::{WorldBall, world_ball};
@@ -13,9 +13,9 @@ use crate::object::{Object, Slot};
 /// One side of a pair, where it stands.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Thing<'a> {
-    /// Solids of one object, coarsest first, at a world pose. `outer`: they only contain it, as the
+    /// Solids of one object, coarsest first, at a world pose. With `set` they only contain it, as the
     /// box around an sos-body does.
-    Solid { rungs: &'a [Arc<Shape>], pose: &'a Pose, outer: bool },
+    Solid { rungs: &'a [Arc<Shape>], pose: &'a Pose, set: Option<&'a SosBody> },
     /// A half-space of the world frame.
     HalfSpace(WorldHalfSpace),
     /// A point of the world frame, metres.
@@ -72,8 +72,8 @@ impl<'a> Thing<'a> {
     pub(crate) fn object(object: &'a Object, pose: &'a Pose) -> Self {
         match &object.geometry {
             Geometry::HalfSpace(half_space) => Self::HalfSpace(WorldHalfSpace::placed(half_space.half_space(), pose)),
-            Geometry::SosBody(_) => Self::Solid { rungs: object.solids(), pose, outer: true },
-            Geometry::Solid(_) | Geometry::Ladder(_) => Self::Solid { rungs: object.solids(), pose, outer: false },
+            Geometry::SosBody(body) => Self::Solid { rungs: object.solids(), pose, set: Some(body) },
+            Geometry::Solid(_) | Geometry::Ladder(_) => Self::Solid { rungs: object.solids(), pose, set: None },
         }
     }
 
@@ -238,7 +238,7 @@ mod tests {
             let pose = pose.expect("a pose");
             let body = Body::ball("ball", center, 0.01).expect("a ball");
             let shape = Arc::new(Shape::Body(Box::new(body)));
-            let thing = Thing::Solid { rungs: std::slice::from_ref(&shape), pose: &pose, outer: false };
+            let thing = Thing::Solid { rungs: std::slice::from_ref(&shape), pose: &pose, set: None };
             let (ball, bounds) = (shape.circumscribed(), shape.bounding_box());
             let error = |computed: &Vector3<f64>, of: &Vector3<f64>| {
                 let exact = placed(&pose, of);

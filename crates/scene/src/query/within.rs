@@ -59,8 +59,8 @@ impl Within {
         if let (Some(index), true) =
             (measures.iter().position(|&measure| measure == Measure::Distance), threshold >= 0.0)
             && let (
-                Thing::Solid { rungs: rungs_a, pose: pose_a, outer: false },
-                Thing::Solid { rungs: rungs_b, pose: pose_b, outer: false },
+                Thing::Solid { rungs: rungs_a, pose: pose_a, set: None },
+                Thing::Solid { rungs: rungs_b, pose: pose_b, set: None },
             ) = (&pair.a, &pair.b)
             && let ([a], [b]) = (rungs_a, rungs_b)
         {

@@ -3,4 +3,5 @@
 
 mod brute_force;
 mod model;
+mod sets;
 mod worlds;

@@ -140,11 +140,11 @@ fn highest(
             break;
         }
         let Some(BoundedBox { center, half, .. }) = heap.pop() else { break };
-        let (middle, least) = polynomial.floor_within(&center, &half);
-        if least > 1.0 {
+        let linear = polynomial.linear_bounds(&center, &half);
+        if linear.least(&half) > 1.0 {
             continue;
         }
-        if middle <= 1.0 {
+        if linear.value <= 1.0 {
             attained = attained.max(height(&center, &Vector3::zeros()));
         }
         let axis = (0..3).max_by(|&a, &b| half[a].total_cmp(&half[b])).unwrap_or(0);

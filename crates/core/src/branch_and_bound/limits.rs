@@ -1,0 +1,63 @@
+//! When to stop dividing.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// Default number of pairs of boxes, or of boxes, that are divided: some tens of milliseconds.
+pub const DEFAULT_STEPS: usize = 100_000;
+
+/// Steps between two looks at the clock.
+const STEPS_PER_LOOK: usize = 32;
+
+/// When a bracket is narrow enough, and when to end before. Whatever ends it, the bracket is true.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits<'a> {
+    /// Width asked for, relative to the upper bound of a length; of a level, to `max(1, |upper|)`.
+    pub accuracy: f64,
+    /// Width asked for, in the unit of the measure; the wider of both counts.
+    pub width: f64,
+    /// A value to compare with: it ends as soon as the measure is proven above it, or not above.
+    pub threshold: Option<f64>,
+    /// A value that does not count when it is exceeded: it ends when the measure is proven above it.
+    pub beyond: Option<f64>,
+    /// Most divisions.
+    pub max_steps: usize,
+    /// Time at which it ends.
+    pub deadline: Option<Instant>,
+    /// It ends when this is set.
+    pub stop: Option<&'a AtomicBool>,
+}
+
+impl Default for Limits<'_> {
+    fn default() -> Self {
+        Self {
+            accuracy: 1e-2,
+            width: 0.0,
+            threshold: None,
+            beyond: None,
+            max_steps: DEFAULT_STEPS,
+            deadline: None,
+            stop: None,
+        }
+    }
+}
+
+impl Limits<'_> {
+    /// Whether to end after so many steps, whatever is known.
+    pub(super) fn exhausted(&self, steps: usize) -> bool {
+        steps >= self.max_steps
+            || self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
+            || steps.is_multiple_of(STEPS_PER_LOOK) && self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
+    }
+
+    /// Width that is narrow enough for a measure that is at most `upper` and of this scale.
+    pub(super) fn tolerance(&self, upper: f64, scale: f64) -> f64 {
+        if upper.is_finite() { self.width.max(self.accuracy * upper.abs().max(scale)) } else { 0.0 }
+    }
+
+    /// Whether the comparison with the threshold is decided, or the measure does not count.
+    pub(super) fn decided(&self, lower: f64, upper: f64) -> bool {
+        self.threshold.is_some_and(|threshold| lower > threshold || upper <= threshold)
+            || self.beyond.is_some_and(|beyond| lower > beyond)
+    }
+}
