@@ -100,7 +100,7 @@ impl<'a> PlacedSet<'a> {
         let normalization = other.of.set.normalization;
         let rotation = other.pose.rotation().to_rotation_matrix().into_inner();
         let space = self.frame()?;
-        Ok(space.then_from_space(&normalization.linear, &normalization.center, &rotation, other.pose.translation()))
+        Ok(space.then_normalized(&normalization.linear, &normalization.center, &rotation, other.pose.translation()))
     }
 
     /// Half the diagonal of its box, metres.

@@ -46,25 +46,25 @@ impl Substitution {
         })
     }
 
-    /// This map to points x of a space, followed by `z = L (Rᵀ(x - t) - c)`, R a rotation whose
-    /// matrix is rounded.
-    pub fn then_from_space(
+    /// This map into a space, followed by `z = L (Rᵀ (x - t) - c)` to normalized coordinates, R a
+    /// rotation whose matrix is rounded.
+    pub fn then_normalized(
         &self,
         linear: &Matrix3<f64>,
         center: &Vector3<f64>,
         rotation: &Matrix3<f64>,
         translation: &Vector3<f64>,
     ) -> Self {
+        let transposed: [[Interval; 3]; 3] =
+            std::array::from_fn(|i| std::array::from_fn(|j| Interval::around(rotation[(j, i)], ROTATION_ERROR)));
         let sum = |of: &dyn Fn(usize) -> Interval| (0..3).fold(Interval::ZERO, |sum, k| sum + of(k));
-        let back = |i: usize, k: usize| Interval::around(rotation[(k, i)], ROTATION_ERROR);
-        let turned = |j: usize| -> [Interval; 3] { std::array::from_fn(|i| sum(&|k| back(i, k) * self.linear[k][j])) };
-        let columns: [[Interval; 3]; 3] = std::array::from_fn(turned);
-        let shift = |k: usize| self.offset[k] - Interval::of(translation[k]);
-        let moved: [Interval; 3] = std::array::from_fn(|i| sum(&|k| back(i, k) * shift(k)) - Interval::of(center[i]));
-        let row = |i: usize, of: &dyn Fn(usize) -> Interval| sum(&|k| Interval::of(linear[(i, k)]) * of(k));
+        let turned = |i: usize, column: &dyn Fn(usize) -> Interval| sum(&|k| transposed[i][k] * column(k));
+        let mapped = |i: usize, column: &dyn Fn(usize) -> Interval| sum(&|k| Interval::of(linear[(i, k)]) * column(k));
+        let from_origin = |k: usize| self.offset[k] - Interval::of(translation[k]);
+        let from_center = |k: usize| turned(k, &from_origin) - Interval::of(center[k]);
         Self {
-            linear: std::array::from_fn(|i| std::array::from_fn(|j| row(i, &|k| columns[j][k]))),
-            offset: std::array::from_fn(|i| row(i, &|k| moved[k])),
+            linear: std::array::from_fn(|i| std::array::from_fn(|j| mapped(i, &|k| turned(k, &|l| self.linear[l][j])))),
+            offset: std::array::from_fn(|i| mapped(i, &from_center)),
         }
     }
 
@@ -96,7 +96,6 @@ impl Substitution {
         let terms = order.iter().zip(&enclosed).map(|(&e, interval)| (e, interval.middle())).collect();
         Ok((Polynomial::new(terms)?, error * (1.0 + 1e-13)))
     }
-
     /// A row of A, and of b.
     pub(super) fn row(&self, axis: usize) -> ([Interval; 3], Interval) {
         (self.linear[axis], self.offset[axis])
@@ -225,6 +224,38 @@ mod tests {
             }
             let error = if value > middle { value - middle } else { middle - value };
             assert!(error <= radius, "seed {seed}");
+        }
+    }
+
+    /// To a space and on to other normalized coordinates: exact images of points lie between those
+    /// of the bounds, and both maps of one frame and pose undo each other.
+    #[test]
+    fn maps_through_a_space_hold_exact_images() {
+        for seed in 0..40 {
+            let mut random = Seeded(seed);
+            let mut frame = || {
+                let linear = Matrix3::from_fn(|i, j| random.signed() + if i == j { 3.0 } else { 0.0 });
+                let [center, translation] = [0; 2].map(|_| Vector3::from_fn(|_, _| random.signed()));
+                (linear, center, random.rotation().to_rotation_matrix().into_inner(), translation)
+            };
+            let [(l, c, r, t), (m, d, q, s)] = [frame(), frame()];
+            let space = Substitution::to_space(&l, &c, &r, &t).unwrap();
+            let there = space.then_normalized(&m, &d, &q, &s);
+            let back = space.then_normalized(&l, &c, &r, &t);
+            let z = Vector3::from_fn(|_, _| random.signed());
+            let image = m * (q.transpose() * (r * (l.try_inverse().unwrap() * z + c) + t - s) - d);
+            for (map, image) in [(there, image), (back, z)] {
+                for i in 0..3 {
+                    let ((row, offset), mut width) = (map.row(i), 0.0);
+                    let sum = (0..3).fold(offset, |sum, k| sum + row[k] * Interval::of(z[k]));
+                    for entry in row.iter().chain([&offset]) {
+                        width += (*entry - Interval::of(entry.middle())).magnitude();
+                    }
+                    // The image itself is rounded, by far less than the matrices may be.
+                    let (off, half) = (image[i] - sum.middle(), (sum - Interval::of(sum.middle())).magnitude());
+                    assert!(off.abs() <= half && width < 1e-12, "seed {seed}: {off} of {half}, {width}");
+                }
+            }
         }
     }
 
