@@ -79,7 +79,10 @@ pub use enclose::{
 pub use error::FitError;
 pub use fitted::{Fit, FitReport, Rung};
 pub use gap::{Gap, gap};
-pub use hierarchy::{HierarchyBound, HierarchyError, MAX_LEVEL, PlacedSet, hierarchy_distance};
+pub use hierarchy::{
+    HierarchyBound, HierarchyError, HierarchyLevelBound, MAX_LEVEL, PlacedSet, hierarchy_distance,
+    hierarchy_level_distance,
+};
 pub use hull::HullError;
 pub use input::{
     Mesh, ReadError, ReadOptions, Reading, Remarks, Scale, ScaleError, Unused, UnusedCost, parse_mesh, read_mesh,

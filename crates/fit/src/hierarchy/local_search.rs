@@ -10,28 +10,30 @@ const MAX_STEPS: usize = 40;
 /// Steps that pull a point into its set.
 const MAX_PULLS: usize = 60;
 
-/// The least distance found of two points that are proven to lie in the sets, metres, and the
-/// points.
-pub(super) fn nearest_points(sets: [&PlacedSet; 2], guess: [Vector3<f64>; 2]) -> Option<(f64, [Vector3<f64>; 2])> {
-    let members = [sets[0].membership()?, sets[1].membership()?];
-    let mut best: Option<(f64, [Vector3<f64>; 2])> = None;
+/// Near points of two sets, proven to lie in them, and their distances, metres, the nearest first;
+/// one point, at distance 0, if one was found that both sets hold.
+pub(super) fn nearest_points(sets: [&PlacedSet; 2], guesses: &[[Vector3<f64>; 2]]) -> Vec<(f64, [Vector3<f64>; 2])> {
+    let (Some(first), Some(second)) = (sets[0].membership(), sets[1].membership()) else { return Vec::new() };
+    let members = [first, second];
+    let mut found: Vec<(f64, [Vector3<f64>; 2])> = Vec::new();
     let mut keep = |points: [Vector3<f64>; 2]| {
         let inside = [0, 1].map(|side| pulled(sets[side], &members[side], points[side]));
         let [Some(x), Some(y)] = inside else { return false };
         // One point in both is no distance apart.
         let common = [x, y].into_iter().find(|z| members.iter().all(|set| set.holds(z)));
-        let found = common.map_or((distance_up(&x, &y), [x, y]), |z| (0.0, [z, z]));
-        if best.is_none_or(|(least, _)| found.0 < least) {
-            best = Some(found);
-        }
+        found.push(common.map_or((distance_up(&x, &y), [x, y]), |z| (0.0, [z, z])));
         common.is_some()
     };
-    for start in std::iter::once(guess).chain(nearest_pairs(sets)) {
+    for start in guesses.iter().copied().chain(nearest_pairs(sets)) {
         if keep(start) || refined(sets, start).is_some_and(&mut keep) {
             break;
         }
     }
-    best
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    if found.first().is_some_and(|nearest| nearest.0 == 0.0) {
+        found.truncate(1);
+    }
+    found
 }
 
 /// Rounded up.
@@ -110,7 +112,7 @@ fn refined(sets: [&PlacedSet; 2], start: [Vector3<f64>; 2]) -> Option<[Vector3<f
 }
 
 /// The point moved against the gradient until it is proven inside; none if it does not get there.
-fn pulled(set: &PlacedSet, member: &Membership, mut x: Vector3<f64>) -> Option<Vector3<f64>> {
+pub(super) fn pulled(set: &PlacedSet, member: &Membership, mut x: Vector3<f64>) -> Option<Vector3<f64>> {
     let map = set.set.normalization.linear * set.pose.rotation.to_rotation_matrix().into_inner().transpose();
     let mut extra = 1e-14;
     for _ in 0..MAX_PULLS {

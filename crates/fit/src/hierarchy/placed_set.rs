@@ -2,7 +2,7 @@
 
 use super::error::HierarchyError;
 use nalgebra::{Isometry3, Vector3};
-use sublevel_core::body::{Aabb, BasicSet, Body, Obstacle, Placement, SosBody};
+use sublevel_core::body::{Aabb, BasicSet, Body, Normalization, Obstacle, Placement, SosBody};
 use sublevel_core::polynomial::{Polynomial, Substitution};
 
 /// A basic set at a pose.
@@ -119,6 +119,19 @@ impl<'a> PlacedSet<'a> {
         self.set.normalization.linear * (body - self.set.normalization.center)
     }
 
+    /// The point of the common frame that has these normalized coordinates, up to rounding.
+    pub(super) fn in_common_frame(&self, z: &Vector3<f64>) -> Vector3<f64> {
+        let Normalization { center, linear } = self.set.normalization;
+        self.pose.transform_point(&(linear.try_inverse().unwrap_or_default() * z + center).into()).coords
+    }
+
+    /// The map from its normalized coordinates to those of another set, enclosed.
+    pub(super) fn frame_in(&self, index: usize, other: &PlacedSet) -> Result<Substitution, HierarchyError> {
+        let rotation = other.pose.rotation.to_rotation_matrix().into_inner();
+        let Normalization { center, linear } = other.set.normalization;
+        Ok(self.frame(index)?.then_normalized(linear, center, &rotation, &other.pose.translation.vector))
+    }
+
     /// A test whether points are in the set.
     pub(super) fn membership(&self) -> Option<Membership<'_>> {
         let normalization = self.set.normalization;
@@ -144,5 +157,15 @@ impl Membership<'_> {
         let body = pose.inverse_transform_point(&(*x).into()).coords;
         (0..3).all(|axis| body[axis] - rounding >= min[axis] && body[axis] + rounding <= max[axis])
             && set.polynomials.iter().all(|g| self.placement.sample_of(g, &body).value_upper(rounding) <= 1.0)
+    }
+
+    /// Proven upper bound of the largest polynomial at a point, wherever the rounding of the pose
+    /// leads; NaN where one is not a number.
+    pub(super) fn value_upper(&self, x: &Vector3<f64>) -> f64 {
+        let PlacedSet { set, pose, .. } = self.set;
+        let rounding = POSE_ROUNDING * (x.norm() + pose.translation.vector.norm());
+        let body = pose.inverse_transform_point(&(*x).into()).coords;
+        let values = set.polynomials.iter().map(|g| self.placement.sample_of(g, &body).value_upper(rounding));
+        values.fold(f64::NEG_INFINITY, |most, value| if value.is_nan() { value } else { most.max(value) })
     }
 }
