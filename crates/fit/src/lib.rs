@@ -80,7 +80,7 @@ pub use error::FitError;
 pub use fitted::{Fit, FitReport, Rung};
 pub use gap::{Gap, gap};
 pub use hierarchy::{
-    HierarchyBound, HierarchyError, HierarchyLevelBound, MAX_LEVEL, PlacedSet, hierarchy_distance,
+    HierarchyBound, HierarchyError, HierarchyLevelBound, MAX_LEVEL, PlacedSet, check_hierarchy, hierarchy_distance,
     hierarchy_level_distance,
 };
 pub use hull::HullError;

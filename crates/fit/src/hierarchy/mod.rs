@@ -83,6 +83,29 @@ pub struct HierarchyBound {
     pub seconds: f64,
 }
 
+/// Whether the bracket of two sets can be asked for at a level, without a solve: what
+/// [`hierarchy_distance`] refuses before it builds its program. Takes milliseconds.
+///
+/// # Errors
+/// [`HierarchyError`]: sets that cannot be used, a level that is too high, and a program that would
+/// be too large.
+pub fn check_hierarchy(sets: [&PlacedSet; 2], level: usize) -> Result<(), HierarchyError> {
+    checked(sets, level).map(drop)
+}
+
+/// The objective and the moments of a bracket that can be computed.
+fn checked<'a>(
+    sets: [&'a PlacedSet<'a>; 2],
+    level: usize,
+) -> Result<(PairPolynomial, MomentRelaxation<'a>), HierarchyError> {
+    check(sets, level)?;
+    let frames = [sets[0].frame(0)?, sets[1].frame(1)?];
+    let objective = PairPolynomial::squared_distance(&frames[0], &frames[1]);
+    let relaxation = MomentRelaxation::of_two(&objective, sets, level);
+    check_size(&relaxation, level)?;
+    Ok((objective, relaxation))
+}
+
 /// The bracket of the Euclidean distance of two sets at a level of the hierarchy. `progress` is
 /// called at every iteration of the solver and can stop it.
 ///
@@ -95,13 +118,9 @@ pub fn hierarchy_distance(
     progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<HierarchyBound, HierarchyError> {
     let start = Instant::now();
-    check(sets, level)?;
-    let frames = [sets[0].frame(0)?, sets[1].frame(1)?];
-    let objective = PairPolynomial::squared_distance(&frames[0], &frames[1]);
+    let (objective, relaxation) = checked(sets, level)?;
     let most = sets.map(PlacedSet::coordinate_bounds);
     let most: [f64; 6] = std::array::from_fn(|k| most[k / 3][k % 3]);
-
-    let relaxation = MomentRelaxation::of_two(&objective, sets, level);
     let mut watch = Watch::new(progress);
     let (solution, rows) = solved(&relaxation, level, &mut watch)?;
     let squares = relaxation.squares(&objective, &solution, &rows);
@@ -158,16 +177,19 @@ fn check(sets: [&PlacedSet; 2], level: usize) -> Result<(), HierarchyError> {
     sets.iter().enumerate().try_for_each(|(index, set)| set.check(index))
 }
 
+/// Refuses programs that would be too large.
+fn check_size(relaxation: &MomentRelaxation, level: usize) -> Result<(), HierarchyError> {
+    let rows = relaxation.rows();
+    if rows > MAX_ROWS { Err(HierarchyError::TooLarge { level, rows }) } else { Ok(()) }
+}
+
 /// Solves a program that is not too large.
 fn solved(
     relaxation: &MomentRelaxation,
     level: usize,
     watch: &mut Watch,
 ) -> Result<(ConicSolution, Rows), HierarchyError> {
-    let rows = relaxation.rows();
-    if rows > MAX_ROWS {
-        return Err(HierarchyError::TooLarge { level, rows });
-    }
+    check_size(relaxation, level)?;
     watch.round(0, 0.0);
     let (program, rows) = relaxation.program();
     let solution = solve(&program, TOLERANCE, relaxation.unit(), watch).map_err(|error| match error {

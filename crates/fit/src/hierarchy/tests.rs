@@ -2,7 +2,7 @@ mod level;
 mod minimisers;
 
 use super::local_search::nearest_points;
-use super::{HierarchyBound, HierarchyError, MAX_LEVEL, PlacedSet, hierarchy_distance};
+use super::{HierarchyBound, HierarchyError, MAX_LEVEL, PlacedSet, check_hierarchy, hierarchy_distance};
 use crate::FitError;
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use std::ops::ControlFlow;
@@ -160,7 +160,14 @@ fn brackets_of_random_quartics_hold_what_is_found() {
 fn bad_input_is_refused_by_name() {
     let ball = Body::ball("ball", Vector3::zeros(), 0.1).unwrap();
     let good = PlacedSet::of_body(&ball, Isometry3::translation(1.0, 0.0, 0.0));
-    let refused = |set: PlacedSet, level: usize| bound([&good, &set], level).expect_err("bad input");
+    let refused = |set: PlacedSet, level: usize| {
+        let refused = bound([&good, &set], level).expect_err("bad input");
+        // What needs no solve is known without one.
+        let known = check_hierarchy([&good, &set], level).err();
+        assert!(known.as_ref().is_none_or(|known| *known == refused), "{known:?} {refused}");
+        assert_eq!(known.is_none(), refused == HierarchyError::Empty);
+        refused
+    };
     assert_eq!(refused(good.clone(), MAX_LEVEL + 1), HierarchyError::Level(MAX_LEVEL + 1));
     let empty = PlacedSet { set: BasicSet { normalization: &UNIT, polynomials: Vec::new() }, ..good.clone() };
     assert_eq!(refused(empty, 0), HierarchyError::NoPolynomial(1));
@@ -177,6 +184,7 @@ fn bad_input_is_refused_by_name() {
     let large = Body::superellipsoid("e", Vector3::zeros(), Vector3::repeat(1.0), 8).unwrap();
     let large = PlacedSet::of_body(&large, Isometry3::identity());
     assert!(matches!(bound([&large, &large], 2), Err(HierarchyError::TooLarge { level: 2, .. })));
+    assert_eq!(check_hierarchy([&large, &large], 2), bound([&large, &large], 2).map(drop));
     let nowhere =
         Polynomial::new(vec![([2, 0, 0], 1.0), ([0, 2, 0], 1.0), ([0, 0, 2], 1.0), ([0, 0, 0], 2.0)]).unwrap();
     assert_eq!(refused(set(&nowhere, 1.0, Isometry3::identity()), 0), HierarchyError::Empty);
