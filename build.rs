@@ -4,12 +4,13 @@ use std::{env, error::Error, fs, path::PathBuf};
 
 use protox::prost::Message;
 
-const FILES: [&str; 8] = [
+const FILES: [&str; 9] = [
     "sublevel/v1/types.proto",
     "sublevel/v1/body.proto",
     "sublevel/v1/scene.proto",
     "sublevel/v1/query.proto",
     "sublevel/v1/fit.proto",
+    "sublevel/v1/hierarchy.proto",
     "sublevel/v1/job.proto",
     "sublevel/v1/blob.proto",
     "sublevel/v1/server.proto",

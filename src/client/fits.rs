@@ -3,10 +3,10 @@
 use std::future::Future;
 
 use nalgebra::Vector3;
-use tonic::Code;
 
 use super::connection::Client;
 use super::error::ClientError;
+use super::jobs::{JobProgress, SubmitError};
 use crate::body::{BodyId, Shape};
 use crate::jobs::{FitOutput, Shapes, body_name};
 use crate::scene::Geometry;
@@ -16,51 +16,11 @@ use crate::service::proto::create_fit_request::Source;
 use crate::service::proto::fit_points::{Coordinates, Corners};
 use crate::service::proto::fit_service_client::FitServiceClient;
 use crate::service::proto::job::Task;
-use crate::service::proto::job_service_client::JobServiceClient;
-use crate::service::proto::{CancelJobRequest, FitPoints, FitProgress, Job, JobState, WatchJobRequest};
+use crate::service::proto::{FitPoints, FitProgress, Job};
 use crate::store::FitRequest;
 
 /// What does not fit in one message with what is around it.
 const LARGE: usize = MAX_MESSAGE_BYTES / 4;
-
-/// How far a job is.
-#[derive(Clone, Debug)]
-pub struct JobProgress {
-    /// Id of the job.
-    pub id: String,
-    /// What it is doing; none while it waits.
-    pub progress: Option<FitProgress>,
-}
-
-/// Why a server made no bodies.
-#[derive(Debug, thiserror::Error)]
-pub enum SubmitError {
-    /// There is no server, or it refused the job.
-    #[error(transparent)]
-    Client(#[from] ClientError),
-    /// The server has no FitService.
-    #[error("the server at {0} was built without fitting; fit without --server and `sublevel push` the bodies")]
-    Unable(String),
-    /// The connection broke while the job was under way.
-    #[error(
-        "lost the server while it fitted job {id}, which goes on there when it is back: {source}; GetJob says how it ended"
-    )]
-    Lost {
-        /// The job.
-        id: String,
-        /// What went wrong.
-        source: ClientError,
-    },
-    /// What was sent cannot be fitted.
-    #[error("{0}")]
-    Failed(String),
-    /// The job was cancelled, here or by another client.
-    #[error("the fit was cancelled")]
-    Cancelled,
-    /// The server sent something that is not what the job makes.
-    #[error("the server sent what the job does not make: {0}; are the versions the same?")]
-    Unproven(String),
-}
 
 impl Client {
     /// Has the server execute a request about points (metres) and the triangles between them, or
@@ -73,7 +33,7 @@ impl Client {
         &self,
         asked: &FitRequest,
         (points, triangles): (&[Vector3<f64>], &[[usize; 3]]),
-        mut tell: impl FnMut(&JobProgress),
+        mut tell: impl FnMut(&JobProgress<FitProgress>),
         cancel: impl Future<Output = ()>,
     ) -> Result<FitOutput, SubmitError> {
         tokio::pin!(cancel);
@@ -87,50 +47,14 @@ impl Client {
             // What is not sent to its end makes no job.
             () = &mut cancel => return Err(SubmitError::Cancelled),
         };
-        let created = created.map_err(|status| match status.code() {
-            Code::Unimplemented => SubmitError::Unable(self.url().to_owned()),
-            _ => self.refused()(status).into(),
-        })?;
-        let id = created.into_inner().job_id;
-        let job = self.follow(&id, &mut tell, &mut cancel).await?;
-        match job.state() {
-            JobState::Succeeded => {}
-            JobState::Cancelled => return Err(SubmitError::Cancelled),
-            _ => return Err(SubmitError::Failed(job.failure)),
-        }
+        let id = created.map_err(|status| self.not_queued(status))?.into_inner().job_id;
+        let progress = |job: &Job| match &job.task {
+            Some(Task::Fit(fit)) => fit.progress,
+            _ => None,
+        };
+        let tell = |job: &Job| tell(&JobProgress { id: id.clone(), progress: progress(job) });
+        let job = self.follow(&id, tell, cancel).await?;
         self.fetch(asked, job).await
-    }
-
-    /// Watches a job to its end.
-    async fn follow(
-        &self,
-        id: &str,
-        tell: &mut impl FnMut(&JobProgress),
-        cancel: &mut std::pin::Pin<&mut impl Future<Output = ()>>,
-    ) -> Result<Job, SubmitError> {
-        let lost = |status| SubmitError::Lost { id: id.to_owned(), source: self.refused()(status) };
-        let mut client = JobServiceClient::new(self.channel());
-        let request = WatchJobRequest { id: id.to_owned() };
-        let mut watch = client.clone().watch_job(request).await.map_err(lost)?.into_inner();
-        let (mut job, mut cancelling) = (Job::default(), false);
-        loop {
-            tokio::select! {
-                heard = watch.message() => match heard.map_err(lost)?.and_then(|heard| heard.job) {
-                    Some(heard) => job = heard,
-                    None => return Ok(job),
-                },
-                () = &mut *cancel, if !cancelling => {
-                    cancelling = true;
-                    client.cancel_job(CancelJobRequest { id: id.to_owned() }).await.map_err(lost)?;
-                }
-            }
-            let running = job.state() == JobState::Running;
-            let progress = match &job.task {
-                Some(Task::Fit(fit)) if running => fit.progress,
-                _ => None,
-            };
-            tell(&JobProgress { id: id.to_owned(), progress });
-        }
     }
 
     async fn points(
@@ -161,7 +85,7 @@ impl Client {
     async fn fetch(&self, asked: &FitRequest, job: Job) -> Result<FitOutput, SubmitError> {
         let result = match job.task {
             Some(Task::Fit(fit)) => fit.result.unwrap_or_default(),
-            None => return Err(SubmitError::Unproven("nothing".into())),
+            _ => return Err(SubmitError::Unproven("nothing".into())),
         };
         let unknown = || SubmitError::Unproven("something of a kind that this program does not know".into());
         let outcome = wire::outcome(&result).ok_or_else(unknown)?;

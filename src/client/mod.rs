@@ -24,6 +24,10 @@ mod connection;
 mod error;
 #[cfg(feature = "fit")]
 mod fits;
+#[cfg(feature = "fit")]
+mod hierarchy;
+#[cfg(feature = "fit")]
+mod jobs;
 mod pose_stream;
 mod queries;
 mod raw;
@@ -34,7 +38,7 @@ pub use bodies::{BodySource, StoredBody};
 pub use connection::{Client, ClientOptions, Connection, Credentials, ServerInfo, endpoint};
 pub use error::ClientError;
 #[cfg(feature = "fit")]
-pub use fits::{JobProgress, SubmitError};
+pub use jobs::{JobProgress, SubmitError};
 pub use pose_stream::{PoseStream, StreamedPoses};
 pub use queries::{Answers, CheckedStates, PairRow, Question, StatesQuestion};
 pub use scenes::SceneState;

@@ -14,11 +14,11 @@ struct Running {
     job: u64,
     stop: bool,
     progress: Progress,
-    /// What the fit said last: it counts again in each of its parts.
+    /// What a fit said last: it counts again in each of its parts.
     last: fit::Progress,
 }
 
-/// How far a fit is, counted from the begin of the attempt.
+/// How far a job is, counted from the begin of the attempt.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Progress {
     /// What it is doing.
@@ -33,16 +33,16 @@ pub struct Progress {
     pub active_points: usize,
 }
 
-/// What a fit is doing.
+/// What a job is doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Phase {
-    /// Before the first program: reading, and the convex hull.
+    /// Before the first program: reading, and of fits the convex hull.
     #[default]
     Preparing,
-    /// Looking for points to leave out.
+    /// Looking for points to leave out; fits only.
     Trimming,
-    /// Solving programs, refining, cutting.
-    Fitting,
+    /// Solving programs; fits also refine and cut.
+    Solving,
 }
 
 impl Board {
@@ -95,16 +95,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_go_on_where_a_part_of_the_fit_begins_anew() {
+    fn counts_go_on_where_a_part_of_the_fit_begins() {
         let mut board = Board::default();
-        assert!(!board.note(7, Phase::Fitting, fit::Progress::default()), "nothing is running");
+        assert!(!board.note(7, Phase::Solving, fit::Progress::default()), "nothing is running");
         board.begin(7);
         let said = |round, iterations| fit::Progress { round, iterations, ..fit::Progress::default() };
         // Two programs of a trim, one of two iterations and one of one; then a fit of one program;
         // then one of two.
         let heard = [(1, 1), (1, 2), (2, 3), (1, 1), (1, 1), (2, 2)];
         let counts = heard.map(|(round, iterations)| {
-            assert!(board.note(7, Phase::Fitting, said(round, iterations)));
+            assert!(board.note(7, Phase::Solving, said(round, iterations)));
             let progress = board.progress(7).expect("it is running");
             (progress.rounds, progress.iterations)
         });
@@ -118,13 +118,13 @@ mod tests {
         let mut board = Board::default();
         board.begin(1);
         board.stop(2);
-        assert!(board.note(1, Phase::Fitting, said));
+        assert!(board.note(1, Phase::Solving, said));
         board.stop(1);
-        assert!(!board.note(1, Phase::Fitting, said));
+        assert!(!board.note(1, Phase::Solving, said));
         board.begin(2);
-        assert!(!board.note(1, Phase::Fitting, said), "it is not the running one any more");
-        assert!(board.note(2, Phase::Fitting, said));
+        assert!(!board.note(1, Phase::Solving, said), "it is not the running one any more");
+        assert!(board.note(2, Phase::Solving, said));
         board.stop_all();
-        assert!(!board.note(2, Phase::Fitting, said));
+        assert!(!board.note(2, Phase::Solving, said));
     }
 }

@@ -166,7 +166,7 @@ pub fn fit_mesh(
         (left_out, left_out_m) = (trimmed.left_out.len(), trimmed.farthest_m);
         mesh = Mesh { points: trimmed.kept, triangles: Vec::new() };
     }
-    let mut output = fit_prepared(request, &mesh, &mut |said| progress(Phase::Fitting, said))?;
+    let mut output = fit_prepared(request, &mesh, &mut |said| progress(Phase::Solving, said))?;
     (output.outcome.left_out, output.outcome.left_out_m) = (left_out, left_out_m);
     Ok(output)
 }
@@ -229,7 +229,7 @@ pub fn fit_group(
 ) -> Result<FitOutput, Failure> {
     let asked = asked_group(request)?;
     let options = enclosing(asked);
-    let mut tell = |said| progress(Phase::Fitting, said);
+    let mut tell = |said| progress(Phase::Solving, said);
     let groups = match asked.max_growth {
         Some(max_growth) => group(obstacles, max_growth, &options, &mut tell)?,
         None => {

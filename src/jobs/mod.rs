@@ -1,20 +1,25 @@
-//! Fit jobs: queue, progress, cancel, restart.
+//! Jobs, which are fits and solves of the hierarchy: queue, progress, cancel, restart.
 //!
 //! The catalogue holds the jobs; what is decided there is final, and the worker only follows. A job
-//! that is cancelled is CANCELLED on disk first and stopped then; the result of a fit counts only
-//! if its job is still running when it comes. So nothing depends on when the fit learns of it, and
-//! a kill at any time leaves a state that was acknowledged.
+//! that is cancelled is CANCELLED on disk first and stopped then; a result counts only if its job
+//! is still running when it comes. So nothing depends on when the work learns of it, and a kill at
+//! any time leaves a state that was acknowledged.
 //!
-//! `request` checks what is asked for, `execute` does it, for whoever asks; `worker` does one job
-//! after the other; `board` is where it says how far it is, and where everybody waits for news.
+//! `request` checks what fits are asked for, `execute` does it, for whoever asks; `hierarchy` does
+//! both for solves; `obstacle` says which stored bodies can be used; `worker` does one job after the
+//! other; `board` is where it says how far it is, and where everybody waits for news.
 
 mod board;
 mod execute;
+mod hierarchy;
+mod obstacle;
 mod request;
 mod worker;
 
 pub use board::{Board, Phase, Progress};
 pub use execute::{Failure, FitOutput, Shapes, fit_group, fit_mesh};
+pub use hierarchy::{check_solve, check_solve_of, solve};
+pub use obstacle::{NotASet, obstacle};
 pub use request::{MESH_FORMATS, RequestError, body_name, check, read_mesh};
 
 use std::sync::Arc;
@@ -38,7 +43,7 @@ impl Jobs {
         Ok(created)
     }
 
-    /// Cancels a job that has not ended, and returns it as it is then. A running fit stops at its
+    /// Cancels a job that has not ended, and returns it as it is then. A running one stops at its
     /// next iteration.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! What a job is asked for, checked before any work.
+//! What a fit is asked for, checked before any work.
 
 use std::path::Path;
 
@@ -19,8 +19,8 @@ const GROUP_DEGREE: usize = 4;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{field}: {why}")]
 pub struct RequestError {
-    /// Its name among the options of its mode, in [`FitRequest`], or `request_id`; `group` for all
-    /// options of a group together.
+    /// Its name: of fits among the options of its mode or in [`FitRequest`], `group` for all options
+    /// of a group together; of solves in the message that asks for one; or `request_id`.
     pub field: &'static str,
     /// The reason and the remedy.
     pub why: String,
@@ -57,10 +57,7 @@ pub(super) enum FitPlan {
 /// # Errors
 /// The first field that cannot be used.
 pub fn check(request_id: &str, request: &FitRequest) -> Result<(), RequestError> {
-    if request_id.len() > MAX_REQUEST_ID_BYTES || request_id.chars().any(char::is_control) {
-        let why = format!("must have at most {MAX_REQUEST_ID_BYTES} bytes and no control characters; send a UUID");
-        return Err(RequestError::new("request_id", why));
-    }
+    check_request_id(request_id)?;
     check_name(&request.name).map_err(|error| RequestError::new("name", error))?;
     if !request.input.is_empty() {
         check_name(&request.input).map_err(|error| RequestError::new("input", error))?;
@@ -83,6 +80,15 @@ pub fn check(request_id: &str, request: &FitRequest) -> Result<(), RequestError>
         FitPlan::Group(options) => return check_group(request, &options),
     };
     checked.map_err(|error| RequestError::new(field_of(&error), error))
+}
+
+/// Checks what a client calls its request.
+pub(super) fn check_request_id(request_id: &str) -> Result<(), RequestError> {
+    if request_id.len() > MAX_REQUEST_ID_BYTES || request_id.chars().any(char::is_control) {
+        let why = format!("must have at most {MAX_REQUEST_ID_BYTES} bytes and no control characters; send a UUID");
+        return Err(RequestError::new("request_id", why));
+    }
+    Ok(())
 }
 
 fn check_positive(field: &'static str, value: f64, remedy: &str) -> Result<(), RequestError> {

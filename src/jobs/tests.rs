@@ -7,7 +7,7 @@ use tokio::task::spawn_blocking;
 
 use super::worker::{claim, ended, finish, put_back, recover};
 use super::{Jobs, fit_group, fit_mesh};
-use crate::store::{Catalogue, FitBody, FitGroup, FitPolynomial, FitRequest, JobState, NewJob, Store};
+use crate::store::{Catalogue, FitBody, FitGroup, FitPolynomial, FitRequest, JobOutcome, JobState, NewJob, Store};
 use sublevel_testkit::Seeded;
 
 fn request(degree: usize) -> FitRequest {
@@ -21,7 +21,7 @@ fn claimed() -> (tempfile::TempDir, Catalogue, u64) {
     let catalogue = Catalogue::load(Store::open(dir.path()).expect("a new catalogue")).expect("loads");
     let mut random = Seeded(5);
     let points: Vec<_> = (0..40).map(|_| Vector3::from_fn(|_, _| random.signed())).collect();
-    catalogue.create_job(NewJob::new(String::new(), request(4), &points, &[])).expect("queued");
+    catalogue.create_job(NewJob::fit(String::new(), request(4), &points, &[])).expect("queued");
     let job = claim(&catalogue).expect("the disk works").expect("a job");
     assert_eq!((&job.state, job.attempts), (&JobState::Running, 1));
     assert!(claim(&catalogue).expect("the disk works").is_none(), "one job is claimed once");
@@ -36,7 +36,7 @@ fn a_job_that_is_cancelled_before_it_is_on_the_board_makes_nothing() {
     let (jobs, job) = (Jobs::default(), catalogue.job(id).expect("there"));
     assert_eq!(jobs.cancel(&catalogue, id).expect("cancelled").state, JobState::Cancelled);
     jobs.tell(|board| board.begin(id));
-    jobs.fit(&catalogue, &job).expect_err("nothing to fit");
+    jobs.execute(&catalogue, &job).expect_err("nothing to fit");
     let state = finish(&catalogue, id, &(JobState::Failed("why".into()), Vec::new())).expect("as it is").state.clone();
     assert_eq!(state, JobState::Cancelled);
 }
@@ -47,8 +47,12 @@ fn a_result_that_comes_too_late_is_dropped_with_its_bodies() {
     let (_dir, catalogue, id) = claimed();
     let (jobs, job) = (Jobs::default(), catalogue.job(id).expect("there"));
     jobs.tell(|board| board.begin(id));
-    let made = ended(Ok(jobs.fit(&catalogue, &job)));
-    assert!(matches!(&made.0, JobState::Succeeded(outcome) if outcome.bodies.len() == 1), "{:?}", made.0);
+    let made = ended(Ok(jobs.execute(&catalogue, &job)));
+    assert!(
+        matches!(&made.0, JobState::Succeeded(JobOutcome::Fit(outcome)) if outcome.bodies.len() == 1),
+        "{:?}",
+        made.0
+    );
     jobs.cancel(&catalogue, id).expect("cancelled");
     assert_eq!(finish(&catalogue, id, &made).expect("as it is").state, JobState::Cancelled);
     assert_eq!(catalogue.counts().bodies, 0);

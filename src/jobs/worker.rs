@@ -1,5 +1,5 @@
-//! One job after the other, on one thread: fits take a core for seconds, and queries need the
-//! others.
+//! One job after the other, on one thread: jobs take a core for seconds to minutes, and queries need
+//! the others.
 
 use std::any::Any;
 use std::ops::ControlFlow;
@@ -9,11 +9,13 @@ use std::time::Duration;
 use tokio::sync::watch;
 use tokio::task::{JoinError, spawn_blocking};
 
-use super::{Board, FitOutput, Jobs, Phase, fit_group, fit_mesh};
-use crate::body::{BodyId, Obstacle, Shape};
+use super::board::{Board, Phase};
+use super::execute::{FitOutput, fit_group, fit_mesh};
+use super::obstacle::stored_obstacle;
+use super::{Jobs, hierarchy};
 use crate::fit::{self, Mesh};
 use crate::scene::Geometry;
-use crate::store::{Catalogue, CatalogueError, Job, JobState};
+use crate::store::{Catalogue, CatalogueError, FitRequest, FitTask, Job, JobOutcome, JobState, JobTask};
 
 /// Attempts at a job. One that was running whenever the server was killed may be what kills it.
 const MAX_ATTEMPTS: u32 = 2;
@@ -21,13 +23,14 @@ const MAX_ATTEMPTS: u32 = 2;
 /// Pause after the disk failed.
 const PAUSE: Duration = Duration::from_secs(1);
 
-type Fitted = Result<Result<FitOutput, String>, JoinError>;
+/// What a job made or found, and the bodies to be stored.
+pub(super) type Done = (JobOutcome, Vec<Geometry>);
 
-/// The state that a fit leaves its job in, and the bodies to be stored.
+/// The state that the work leaves its job in, and the bodies to be stored.
 pub(super) type Ended = (JobState, Vec<Geometry>);
 
 impl Jobs {
-    /// Fits job after job once the catalogue is loaded, until [`Jobs::stop`]; the jobs that a kill
+    /// Does job after job once the catalogue is loaded, until [`Jobs::stop`]; the jobs that a kill
     /// left running go first.
     pub async fn work(self, mut catalogue: watch::Receiver<Option<Arc<Catalogue>>>) {
         let mut news = self.news();
@@ -50,29 +53,29 @@ impl Jobs {
     /// One attempt at a job that was claimed.
     async fn attempt(&self, catalogue: &Arc<Catalogue>, job: &Arc<Job>) {
         let id = job.id;
-        tracing::info!(id, name = job.request.name, points = job.points, attempt = job.attempts, "fit job begun");
+        tracing::info!(id, task = %job.task, attempt = job.attempts, "job begun");
         self.tell(|board| board.begin(id));
-        let fit = {
+        let work = {
             let (jobs, catalogue, job) = (self.clone(), catalogue.clone(), job.clone());
-            spawn_blocking(move || jobs.fit(&catalogue, &job))
+            spawn_blocking(move || jobs.execute(&catalogue, &job))
         };
         let mut news = self.news();
-        let fitted = tokio::select! {
+        let done = tokio::select! {
             biased;
             _ = news.wait_for(Board::is_stopping) => None,
-            fitted = fit => Some(fitted),
+            done = work => Some(done),
         };
-        match fitted {
-            // The fit learns of it, too; whether it ends before the server does is no matter.
+        match done {
+            // The work learns of it, too; whether it ends before the server does is no matter.
             None => {
                 self.retry_until_committed(catalogue, move |catalogue| put_back(catalogue, id)).await;
             }
-            Some(fitted) => {
-                let ended = ended(fitted);
+            Some(done) => {
+                let ended = ended(done);
                 if let Some(job) =
                     self.retry_until_committed(catalogue, move |catalogue| finish(catalogue, id, &ended)).await
                 {
-                    tracing::info!(id, state = %job.state, "fit job ended");
+                    tracing::info!(id, state = %job.state, "job ended");
                 }
             }
         }
@@ -80,27 +83,27 @@ impl Jobs {
     }
 
     /// On a thread of its own. An error is the reason why the job fails.
-    pub(super) fn fit(&self, catalogue: &Catalogue, job: &Job) -> Result<FitOutput, String> {
-        // A job that was cancelled since it was claimed, when nobody could tell the board, has no
-        // points any more.
-        let mesh = catalogue.job_mesh(job.id).map_err(|error| format!("its points cannot be read: {error}"))?;
+    pub(super) fn execute(&self, catalogue: &Catalogue, job: &Job) -> Result<Done, String> {
+        // One that was cancelled since it was claimed, when nobody could tell the board.
+        if catalogue.job(job.id).is_none_or(|now| now.state.is_final()) {
+            return Err("it was cancelled".into());
+        }
         let progress = |phase: Phase, said: fit::Progress| {
             let mut goes_on = true;
             self.tell(|board| goes_on = board.note(job.id, phase, said));
             if goes_on { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         };
-        let made = match job.request.group() {
-            Some(group) => {
-                let body = |id| {
-                    obstacle(&catalogue.geometry(id).map_err(|error| unusable(id, &error))?)
-                        .ok_or_else(|| format!("body {id} is no single body; a group takes bodies and sos-bodies"))
-                };
-                let bodies = group.body_ids.iter().map(body).collect::<Result<Vec<_>, _>>()?;
-                fit_group(&job.request, &bodies, progress)
+        match &job.task {
+            JobTask::Fit(FitTask { request, .. }) => {
+                let made = fit(catalogue, job.id, request, progress)?;
+                Ok((JobOutcome::Fit(made.outcome.clone()), made.into_stored()))
             }
-            None => fit_mesh(&job.request, Mesh { points: mesh.0, triangles: mesh.1 }, progress),
-        };
-        made.map_err(|error| error.to_string())
+            JobTask::Hierarchy(request) => {
+                let [a, b] = request.sets.map(|set| stored_obstacle(catalogue, &set.body));
+                let found = hierarchy::solve(request, &[a?, b?], &mut |said| progress(Phase::Solving, said));
+                Ok((JobOutcome::Hierarchy(found.map_err(|error| error.to_string())?), Vec::new()))
+            }
+        }
     }
 
     /// A change of the catalogue, again and again until the disk takes it or the server stops.
@@ -114,8 +117,8 @@ impl Jobs {
             let (catalogue, change) = (catalogue.clone(), change.clone());
             match spawn_blocking(move || change(&catalogue)).await {
                 Ok(Ok(done)) => return Some(done),
-                Ok(Err(error)) => tracing::warn!(%error, "a fit job waits for the disk"),
-                Err(error) => tracing::error!(%error, "a change of a fit job was ended by a panic"),
+                Ok(Err(error)) => tracing::warn!(%error, "a job waits for the disk"),
+                Err(error) => tracing::error!(%error, "a change of a job was ended by a panic"),
             }
             let stopping = news.wait_for(Board::is_stopping);
             if tokio::time::timeout(PAUSE, stopping).await.is_ok() {
@@ -125,24 +128,24 @@ impl Jobs {
     }
 }
 
-/// Why a group cannot have a body.
-fn unusable(id: &BodyId, error: &CatalogueError) -> String {
-    match error {
-        CatalogueError::NoBody(_) => format!("body {id} was deleted meanwhile; create it again"),
-        error => error.to_string(),
-    }
-}
-
-/// What a group can hold.
-fn obstacle(geometry: &Geometry) -> Option<Obstacle> {
-    match geometry {
-        Geometry::Solid(shape) => match &**shape {
-            Shape::Body(body) => Some(Obstacle::from((**body).clone())),
-            Shape::Compound(_) => None,
-        },
-        Geometry::SosBody(body) => Some(Obstacle::from((**body).clone())),
-        Geometry::Ladder(_) | Geometry::HalfSpace(_) => None,
-    }
+/// Executes a fit.
+fn fit(
+    catalogue: &Catalogue,
+    id: u64,
+    request: &FitRequest,
+    progress: impl FnMut(Phase, fit::Progress) -> ControlFlow<()>,
+) -> Result<FitOutput, String> {
+    let made = match request.group() {
+        Some(group) => {
+            let bodies = group.body_ids.iter().map(|id| stored_obstacle(catalogue, id));
+            fit_group(request, &bodies.collect::<Result<Vec<_>, _>>()?, progress)
+        }
+        None => {
+            let mesh = catalogue.job_mesh(id).map_err(|error| format!("its points cannot be read: {error}"))?;
+            fit_mesh(request, Mesh { points: mesh.0, triangles: mesh.1 }, progress)
+        }
+    };
+    made.map_err(|error| error.to_string())
 }
 
 /// Jobs that were running when the server was killed: back into the queue, or given up.
@@ -152,15 +155,18 @@ pub(super) fn recover(catalogue: &Catalogue) -> Result<(), CatalogueError> {
             let state = if job.attempts < MAX_ATTEMPTS {
                 JobState::Queued
             } else {
+                let smaller = match &job.task {
+                    JobTask::Fit(_) => "send fewer points or a lower degree",
+                    JobTask::Hierarchy(_) => "lower the level or the degree of the sets",
+                };
                 JobState::Failed(format!(
-                    "the server was killed {} times while it fitted this; give it more memory, or send fewer points or a \
-                     lower degree",
+                    "the server was killed {} times while it worked on this; give it more memory, or {smaller}",
                     job.attempts
                 ))
             };
             Some((state, job.attempts))
         })?;
-        tracing::warn!(id = job.id, attempts = job.attempts, state = %job.state, "a fit job was running when the server was killed");
+        tracing::warn!(id = job.id, attempts = job.attempts, state = %job.state, "a job was running when the server was killed");
     }
     Ok(())
 }
@@ -191,17 +197,17 @@ pub(super) fn finish(catalogue: &Catalogue, id: u64, ended: &Ended) -> Result<Ar
     catalogue.change_job(id, bodies.clone(), |job| is_running(job).then(|| (state.clone(), job.attempts)))
 }
 
-/// What a fit leaves.
-pub(super) fn ended(fitted: Fitted) -> Ended {
+/// What the work leaves.
+pub(super) fn ended(done: Result<Result<Done, String>, JoinError>) -> Ended {
     let failed = |why| (JobState::Failed(why), Vec::new());
-    match fitted {
-        Ok(Ok(output)) => (JobState::Succeeded(output.outcome.clone()), output.into_stored()),
+    match done {
+        Ok(Ok((outcome, bodies))) => (JobState::Succeeded(outcome), bodies),
         Ok(Err(why)) => failed(why),
         Err(error) => {
             let what =
                 error.try_into_panic().map_or_else(|error| error.to_string(), |panic| message(&*panic).to_owned());
-            tracing::error!(what, "a fit was ended by a panic");
-            failed(format!("the fit was ended by a panic in the program: {what}; please report it with the points"))
+            tracing::error!(what, "a job was ended by a panic");
+            failed(format!("the job was ended by a panic in the program: {what}; please report it with its input"))
         }
     }
 }

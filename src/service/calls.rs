@@ -3,7 +3,7 @@
 use super::tokens::Role;
 
 /// The role that each call needs.
-const CALLS: [(&str, Role); 29] = [
+const CALLS: [(&str, Role); 30] = [
     ("BlobService/DownloadBlob", Role::Read),
     ("BlobService/UploadBlob", Role::Write),
     ("BodyService/CreateBody", Role::Write),
@@ -12,6 +12,7 @@ const CALLS: [(&str, Role); 29] = [
     ("BodyService/GetBodyMesh", Role::Read),
     ("BodyService/ListBodies", Role::Read),
     ("FitService/CreateFit", Role::Write),
+    ("HierarchyService/CreateHierarchySolve", Role::Write),
     ("JobService/CancelJob", Role::Write),
     ("JobService/GetJob", Role::Read),
     ("JobService/ListJobs", Role::Read),

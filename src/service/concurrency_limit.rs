@@ -1,5 +1,6 @@
-//! One limit before all calls of the services (FitService, whose uploads take long, has one of its
-//! own): what is behind it holds messages in memory, what is before it does not.
+//! One limit before all calls of the services (those that make and follow jobs, whose uploads take
+//! long, have one of their own): what is behind it holds messages in memory, what is before it does
+//! not.
 //!
 //! A call that waits here has not been read: HTTP/2's flow control keeps its message with the
 //! client. Health and reflection do not pass the limit, so they are answered however many calls

@@ -222,6 +222,10 @@ pub(super) fn catalogue(error: &CatalogueError, field: &str) -> Status {
         CatalogueError::NoMember { index, id } => {
             not_found("body", &id.to_string(), &format!("options.group.body_ids[{index}]"), message)
         }
+        CatalogueError::NoSet { index, id } => {
+            let field = if *index == 0 { "a.body_id" } else { "b.body_id" };
+            not_found("body", &id.to_string(), field, message)
+        }
         CatalogueError::RungUsed { id, .. } => failed_precondition("BODY_IN_USE", &format!("body/{id}"), message),
         CatalogueError::NoJob(id) => not_found("job", id, field, message),
         CatalogueError::RequestUsed { request_id, .. } => {

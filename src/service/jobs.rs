@@ -1,4 +1,4 @@
-//! JobService: jobs of every kind, of which fits are the only ones so far.
+//! JobService: jobs of every kind.
 
 use std::sync::Arc;
 
@@ -8,14 +8,13 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Request, Response, Status};
 
 use super::app_state::AppState;
-use super::fits::wire;
 use super::limits::{MAX_JOBS_PAGE, MAX_MESSAGE_BYTES, WATCH_PAUSE};
 use super::proto::job_service_server::JobService;
 use super::proto::{
     self, CancelJobRequest, CancelJobResponse, GetJobRequest, GetJobResponse, ListJobsRequest, ListJobsResponse,
     WatchJobRequest, WatchJobResponse,
 };
-use super::{error, wire as shared};
+use super::{error, job_wire, wire};
 use crate::jobs::{Board, Jobs};
 use crate::store::{Catalogue, CatalogueError, Job};
 
@@ -28,13 +27,13 @@ pub(super) struct JobCalls {
 #[tonic::async_trait]
 impl JobService for JobCalls {
     async fn get_job(&self, request: Request<GetJobRequest>) -> Result<Response<GetJobResponse>, Status> {
-        let job = find(&*self.app.catalogue().await?, wire::id(&request.get_ref().id, "id")?)?;
+        let job = find(&*self.app.catalogue().await?, job_wire::id(&request.get_ref().id, "id")?)?;
         Ok(Response::new(GetJobResponse { job: Some(self.message(&job)) }))
     }
 
     async fn list_jobs(&self, request: Request<ListJobsRequest>) -> Result<Response<ListJobsResponse>, Status> {
-        let (size, after) = shared::page(request.get_ref().page_size, &request.get_ref().page_token);
-        let after = after.map(|token| wire::id(token, "page_token")).transpose()?;
+        let (size, after) = wire::page(request.get_ref().page_size, &request.get_ref().page_token);
+        let after = after.map(|token| job_wire::id(token, "page_token")).transpose()?;
         let (found, more) = self.app.catalogue().await?.jobs(after, size.min(MAX_JOBS_PAGE));
         let jobs = fitting(found.iter().map(|job| self.message(job)));
         let next_page_token = match jobs.last() {
@@ -47,7 +46,7 @@ impl JobService for JobCalls {
     type WatchJobStream = ReceiverStream<Result<WatchJobResponse, Status>>;
 
     async fn watch_job(&self, request: Request<WatchJobRequest>) -> Result<Response<Self::WatchJobStream>, Status> {
-        let id = wire::id(&request.get_ref().id, "id")?;
+        let id = job_wire::id(&request.get_ref().id, "id")?;
         let catalogue = self.app.catalogue().await?;
         find(&catalogue, id)?;
         let (sender, stream) = mpsc::channel(1);
@@ -56,7 +55,7 @@ impl JobService for JobCalls {
     }
 
     async fn cancel_job(&self, request: Request<CancelJobRequest>) -> Result<Response<CancelJobResponse>, Status> {
-        let id = wire::id(&request.get_ref().id, "id")?;
+        let id = job_wire::id(&request.get_ref().id, "id")?;
         let jobs = self.jobs.clone();
         let job = self.app.change("id", move |catalogue| jobs.cancel(catalogue, id)).await?;
         Ok(Response::new(CancelJobResponse { job: Some(self.message(&job)) }))
@@ -65,7 +64,7 @@ impl JobService for JobCalls {
 
 impl JobCalls {
     fn message(&self, job: &Job) -> proto::Job {
-        wire::job(job, self.jobs.news().borrow().progress(job.id))
+        job_wire::job(job, self.jobs.news().borrow().progress(job.id))
     }
 }
 
@@ -100,7 +99,7 @@ async fn watch(app: AppState, jobs: Jobs, id: u64, sender: mpsc::Sender<Result<W
             Ok(job) => job,
             Err(status) => return space.send(Err(status)),
         };
-        let message = wire::job(&job, progress);
+        let message = job_wire::job(&job, progress);
         if sent.as_ref() != Some(&message) {
             sent = Some(message.clone());
             space.send(Ok(WatchJobResponse { job: Some(message) }));

@@ -72,10 +72,10 @@ pub const PREFACE_TIMEOUT_CROWDED: Duration = Duration::from_secs(1);
 /// Pause after a connection could not be accepted.
 pub const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// Most points of one fit job, counting those of a mesh file.
+/// Most points of one fit, counting those of a mesh file.
 pub const MAX_FIT_POINTS: usize = 2 << 20;
 
-/// Most triangles of one fit job, counting those of a mesh file: a closed mesh has twice as many as
+/// Most triangles of one fit, counting those of a mesh file: a closed mesh has twice as many as
 /// points.
 pub const MAX_FIT_TRIANGLES: usize = 4 << 20;
 

@@ -3,7 +3,7 @@
 //!
 //! Only this layer and the client know protobuf. `incoming` lets connections in,
 //! `concurrency_limit` calls, and `message_limit` messages. A call walks straight through: a
-//! handler (`bodies`, `blobs`, `scenes`, `queries`, `fits`, `jobs`) reads its message with a
+//! handler (`bodies`, `blobs`, `scenes`, `queries`, `fits`, `hierarchy`, `jobs`) reads its message with a
 //! `wire`, asks the catalogue or a scene's snapshot, and writes the answer with the `wire`;
 //! whatever fails becomes a status in `error`. Handlers are dropped when a client goes away, so
 //! every change runs in a task of its own and is finished or not begun, and every question is
@@ -32,7 +32,11 @@ mod error;
 pub(crate) mod fits;
 #[cfg(fuzzing)]
 pub mod fuzzing;
+#[cfg(feature = "fit")]
+pub(crate) mod hierarchy;
 mod incoming;
+#[cfg(feature = "fit")]
+mod job_wire;
 #[cfg(feature = "fit")]
 mod jobs;
 pub mod limits;

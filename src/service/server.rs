@@ -29,6 +29,8 @@ use super::concurrency_limit::ConcurrencyLimit;
 use super::config::{Config, ConfigError};
 #[cfg(feature = "fit")]
 use super::fits::Fits;
+#[cfg(feature = "fit")]
+use super::hierarchy::HierarchyCalls;
 use super::incoming::Incoming;
 #[cfg(feature = "fit")]
 use super::jobs::JobCalls;
@@ -39,6 +41,8 @@ use super::proto::blob_service_server::{self, BlobServiceServer};
 use super::proto::body_service_server::{self, BodyServiceServer};
 #[cfg(feature = "fit")]
 use super::proto::fit_service_server::{self, FitServiceServer};
+#[cfg(feature = "fit")]
+use super::proto::hierarchy_service_server::{self, HierarchyServiceServer};
 #[cfg(feature = "fit")]
 use super::proto::job_service_server::{self, JobServiceServer};
 use super::proto::query_service_server::{self, QueryServiceServer};
@@ -185,7 +189,7 @@ impl Server {
         set_health(&health, ServingStatus::NotServing).await;
         let _ = draining.send(());
         stop_streams.send_replace(true);
-        // The running fit goes back into the queue, and those who watch it are reported.
+        // The running job goes back into the queue, and those who watch it are reported.
         #[cfg(feature = "fit")]
         let serving = async {
             jobs.stop();
@@ -309,14 +313,17 @@ fn router(app: &AppState, calls: CallLayer) -> Routes {
         .add_optional_service(reflection().build_v1alpha().ok())
 }
 
-/// Fits behind a limit of their own: meshes take long to read, and nothing else waits for them.
+/// Jobs behind a limit of their own: meshes of fits take long to read, and nothing else waits for
+/// them.
 #[cfg(feature = "fit")]
 fn with_jobs(router: Routes, app: &AppState, jobs: &Jobs) -> Routes {
     let fits = FitServiceServer::new(Fits::new(app.clone(), jobs.clone()));
+    let solves = HierarchyServiceServer::new(HierarchyCalls { app: app.clone(), jobs: jobs.clone() });
     let calls = JobServiceServer::new(JobCalls { app: app.clone(), jobs: jobs.clone() });
     let (sized, limit) = (usize::MAX, ConcurrencyLimit::new(app.limits(), app.metrics().clone()));
     router
         .add_service(limit.before(fits.max_decoding_message_size(sized).max_encoding_message_size(sized)))
+        .add_service(limit.before(solves.max_decoding_message_size(sized).max_encoding_message_size(sized)))
         .add_service(limit.before(calls.max_decoding_message_size(sized).max_encoding_message_size(sized)))
 }
 
@@ -385,7 +392,11 @@ async fn set_health(health: &HealthReporter, status: ServingStatus) {
         server_service_server::SERVICE_NAME,
     ];
     #[cfg(feature = "fit")]
-    let services = services.into_iter().chain([fit_service_server::SERVICE_NAME, job_service_server::SERVICE_NAME]);
+    let services = services.into_iter().chain([
+        fit_service_server::SERVICE_NAME,
+        hierarchy_service_server::SERVICE_NAME,
+        job_service_server::SERVICE_NAME,
+    ]);
     for service in services {
         health.set_service_status(service, status).await;
     }

@@ -29,7 +29,7 @@ use crate::scene::{Geometry, Ladder, LadderError};
 use super::copy::copy;
 use super::disk::Contents;
 use super::job::Job;
-use super::rows::{BODIES, LADDERS, LadderRow};
+use super::rows::{BODIES, LADDERS, LadderRow, json};
 use super::{Store, StoreError};
 use live_scene::Scenes;
 use stored_body::{BodyRow, StoredBody};
@@ -312,10 +312,6 @@ fn put_bodies(transaction: &WriteTransaction, bodies: &[Geometry]) -> Result<(),
         }
     }
     Ok(())
-}
-
-fn json(row: &impl serde::Serialize) -> Result<Vec<u8>, redb::Error> {
-    serde_json::to_vec(row).map_err(|error| redb::Error::Io(error.into()))
 }
 
 fn page<K: Ord, V: Clone>(map: &BTreeMap<K, V>, after: Option<&K>, count: usize) -> (Vec<V>, bool) {

@@ -12,9 +12,10 @@ use redb::{
 };
 use serde::de::DeserializeOwned;
 
+use super::format_3::{self, FORMAT_3};
 use super::rows::{
     BODIES, FORMAT, JOBS, LADDERS, LadderRow, META, OBJECTS, ObjectRow, POINTS, RESERVES, REVISIONS, SCENES, SceneRow,
-    TRIANGLES,
+    TRIANGLES, json,
 };
 use super::{Job, StoreError};
 
@@ -135,11 +136,13 @@ impl Store {
         .map_err(|error| StoreError::from_redb(&self.dir, error))
     }
 
-    /// Checks the format of the tables, or makes them in a new file.
+    /// Checks the format of the tables, makes them in a new file, or writes those of format 3 in the
+    /// present one.
     fn check_format(&self, database: &Database) -> Result<(), StoreError> {
         let (tables, found) = self.format(database)?;
         match found {
             Some(FORMAT) => Ok(()),
+            Some(FORMAT_3) => self.upgrade(database),
             Some(found) => Err(StoreError::Format { dir: self.dir.clone(), found, expected: FORMAT }),
             None if !tables => commit(database, |transaction| {
                 transaction.open_table(META)?.insert("format", FORMAT)?;
@@ -154,6 +157,23 @@ impl Store {
             .map_err(|error| StoreError::from_redb(&self.dir, error)),
             None => Err(StoreError::damaged(&self.dir, "it names no format")),
         }
+    }
+
+    /// Writes the jobs of format 3 in their present form; all else has the same.
+    fn upgrade(&self, database: &Database) -> Result<(), StoreError> {
+        let read = || jobs::<format_3::FitJob>(&database.begin_read()?);
+        let jobs = read().map_err(|error| self.unreadable(error))?;
+        let written = commit(database, |transaction| {
+            transaction.open_table(META)?.insert("format", FORMAT)?;
+            let mut table = transaction.open_table(JOBS)?;
+            for job in &jobs {
+                table.insert(job.id, json(job)?.as_slice())?;
+            }
+            Ok(())
+        });
+        written.map_err(|error| StoreError::from_redb(&self.dir, error))?;
+        tracing::info!(from = FORMAT_3, to = FORMAT, jobs = jobs.len(), "the catalogue has a new format");
+        Ok(())
     }
 
     /// Commits one transaction durably: when this returns `Ok`, it is on disk. After an error the
@@ -173,10 +193,14 @@ impl Store {
     /// Reads everything.
     pub(super) fn read(&self) -> Result<Contents, StoreError> {
         let database = self.database.as_ref().ok_or_else(|| self.closed())?;
-        self.read_tables(database).map_err(|error| match error {
+        self.read_tables(database).map_err(|error| self.unreadable(error))
+    }
+
+    fn unreadable(&self, error: ReadError) -> StoreError {
+        match error {
             ReadError::Redb(error) => StoreError::from_redb(&self.dir, error),
             ReadError::Row(what) => StoreError::damaged(&self.dir, what),
-        })
+        }
     }
 
     fn read_tables(&self, database: &Database) -> Result<Contents, ReadError> {
@@ -186,7 +210,7 @@ impl Store {
             ladders: Vec::new(),
             scenes: Vec::new(),
             objects: Vec::new(),
-            jobs: Vec::new(),
+            jobs: jobs::<Job>(&read)?,
             revision_floor: read.open_table(META)?.get("revision_floor")?.map_or(0, |value| value.value()),
         };
         for entry in read.open_table(BODIES)?.iter()? {
@@ -218,16 +242,6 @@ impl Store {
             let (scene, name) = key.value();
             let row = parse(row.value(), || format!("object \"{name}\" of scene \"{scene}\""))?;
             contents.objects.push((scene.to_owned(), name.to_owned(), row));
-        }
-        if let Some(jobs) = table(&read, JOBS)? {
-            for entry in jobs.iter()? {
-                let (id, row) = entry?;
-                let (id, job) = (id.value(), parse::<Job>(row.value(), || format!("fit job {}", id.value()))?);
-                if job.id != id {
-                    return Err(ReadError::Row(format!("fit job {id} says that it is {}", job.id)));
-                }
-                contents.jobs.push(job);
-            }
         }
         Ok(contents)
     }
@@ -308,6 +322,22 @@ impl<E: Into<redb::Error>> From<E> for ReadError {
     fn from(error: E) -> Self {
         Self::Redb(error.into())
     }
+}
+
+/// The jobs in the order of their ids, from rows of one form.
+fn jobs<R: DeserializeOwned + Into<Job>>(read: &ReadTransaction) -> Result<Vec<Job>, ReadError> {
+    let Some(rows) = table(read, JOBS)? else { return Ok(Vec::new()) };
+    let mut jobs = Vec::new();
+    for entry in rows.iter()? {
+        let (id, row) = entry?;
+        let id = id.value();
+        let job: Job = parse::<R>(row.value(), || format!("job {id}"))?.into();
+        if job.id != id {
+            return Err(ReadError::Row(format!("job {id} says that it is {}", job.id)));
+        }
+        jobs.push(job);
+    }
+    Ok(jobs)
 }
 
 /// A table that older files may lack.

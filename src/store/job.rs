@@ -1,4 +1,4 @@
-//! What a fit job is, as it is kept: JSON.
+//! What a job is, as it is kept: JSON.
 
 use std::fmt;
 
@@ -6,10 +6,11 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::hierarchy::{HierarchyOutcome, HierarchyRequest};
 use super::request::FitRequest;
 use crate::body::{Solver, SolverStep};
 
-/// Most jobs that may wait; each keeps its points on disk.
+/// Most jobs that may wait; fits keep their points on disk.
 pub const MAX_QUEUED_JOBS: usize = 64;
 
 /// Jobs that are kept after they ended, the latest; with the oldest of them its request id is
@@ -24,9 +25,8 @@ pub const MAX_REQUEST_ID_BYTES: usize = 128;
 pub struct NewJob {
     pub(super) request_id: String,
     pub(super) digest: String,
-    pub(super) request: FitRequest,
-    pub(super) points: usize,
-    /// Coordinates of the points, metres, as little-endian f64.
+    pub(super) task: JobTask,
+    /// Coordinates of the points of a fit, metres, as little-endian f64.
     pub(super) coordinates: Vec<u8>,
     /// Corners of the triangles between them as little-endian u32.
     pub(super) corners: Vec<u8>,
@@ -40,16 +40,34 @@ pub struct Job {
     pub id: u64,
     /// What the client calls its request; empty when it does not say.
     pub request_id: String,
-    /// SHA-256 of the request, the points and the triangles.
+    /// SHA-256 of the request, and of the points and triangles of a fit.
     pub digest: String,
     /// What it is asked for.
-    pub request: FitRequest,
-    /// How many points were sent.
-    pub points: usize,
+    pub task: JobTask,
     /// How often it was begun.
     pub attempts: u32,
     /// Where it is.
     pub state: JobState,
+}
+
+/// What a job is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JobTask {
+    /// A fit.
+    Fit(FitTask),
+    /// A solve of the hierarchy.
+    Hierarchy(HierarchyRequest),
+}
+
+/// A fit that is a job.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FitTask {
+    /// What it is asked for.
+    pub request: FitRequest,
+    /// How many points were sent.
+    pub points: usize,
 }
 
 /// Where a job is.
@@ -58,17 +76,27 @@ pub struct Job {
 pub enum JobState {
     /// It waits for its turn.
     Queued,
-    /// It is being fitted.
+    /// It is being worked on.
     Running,
     /// What it made is stored.
-    Succeeded(FitOutcome),
+    Succeeded(JobOutcome),
     /// It cannot be done, for this reason.
     Failed(String),
     /// A client cancelled it.
     Cancelled,
 }
 
-/// What a job made.
+/// What a job made or found; of the kind of its task.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JobOutcome {
+    /// Of a fit.
+    Fit(FitOutcome),
+    /// Of a solve of the hierarchy.
+    Hierarchy(HierarchyOutcome),
+}
+
+/// What a fit made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FitOutcome {
@@ -83,7 +111,7 @@ pub struct FitOutcome {
     pub left_out_m: f64,
 }
 
-/// What a job made, and what that took.
+/// What a fit made, and what that took.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FittedBody {
@@ -108,7 +136,7 @@ pub struct FittedBody {
     pub shortfall: Option<String>,
 }
 
-/// What a job can make.
+/// What a fit can make.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FittedKind {
@@ -143,9 +171,9 @@ pub struct FitOptimum {
 }
 
 impl NewJob {
-    /// A job about points, metres, that are finite, and the triangles between them; of a group
-    /// about neither.
-    pub fn new(request_id: String, request: FitRequest, points: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Self {
+    /// A fit of points, metres, that are finite, and the triangles between them; of a group of
+    /// neither.
+    pub fn fit(request_id: String, request: FitRequest, points: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Self {
         let coordinates: Vec<u8> = points.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
         let corners: Vec<u8> = triangles.iter().flatten().flat_map(|corner| corner.to_le_bytes()).collect();
         // What the hash reads has one form only: fields in their order, shortest numbers.
@@ -153,10 +181,21 @@ impl NewJob {
         if !triangles.is_empty() {
             asked += &format!("{} triangles", triangles.len());
         }
-        let hash = Sha256::new().chain_update(asked).chain_update(&coordinates).chain_update(&corners).finalize();
-        let digest = hash.iter().map(|byte| format!("{byte:02x}")).collect();
-        Self { request_id, digest, request, points: points.len(), coordinates, corners }
+        let hash = Sha256::new().chain_update(asked).chain_update(&coordinates).chain_update(&corners);
+        let task = JobTask::Fit(FitTask { request, points: points.len() });
+        Self { request_id, digest: hex(hash), task, coordinates, corners }
     }
+
+    /// A solve of the hierarchy.
+    pub fn hierarchy(request_id: String, request: HierarchyRequest) -> Self {
+        let task = JobTask::Hierarchy(request);
+        let digest = hex(Sha256::new().chain_update(serde_json::to_string(&task).unwrap_or_default()));
+        Self { request_id, digest, task, coordinates: Vec::new(), corners: Vec::new() }
+    }
+}
+
+fn hex(hash: Sha256) -> String {
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
@@ -176,9 +215,27 @@ impl fmt::Display for JobState {
         match self {
             Self::Queued => f.write_str("queued"),
             Self::Running => f.write_str("running"),
-            Self::Succeeded(outcome) => write!(f, "succeeded with {} bodies", outcome.bodies.len()),
+            Self::Succeeded(JobOutcome::Fit(outcome)) => write!(f, "succeeded with {} bodies", outcome.bodies.len()),
+            Self::Succeeded(JobOutcome::Hierarchy(HierarchyOutcome { lower, upper: Some(upper), .. })) => {
+                write!(f, "succeeded with the bracket {lower:e} to {upper:e}")
+            }
+            Self::Succeeded(JobOutcome::Hierarchy(HierarchyOutcome { lower, upper: None, .. })) => {
+                write!(f, "succeeded with the lower bound {lower:e}")
+            }
             Self::Failed(why) => write!(f, "failed: {why}"),
             Self::Cancelled => f.write_str("cancelled"),
+        }
+    }
+}
+
+/// For logs: one line.
+impl fmt::Display for JobTask {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Fit(FitTask { request, points }) => write!(f, "fit \"{}\" of {points} points", request.name),
+            Self::Hierarchy(HierarchyRequest { sets: [a, b], level, .. }) => {
+                write!(f, "hierarchy of bodies {} and {} at level {level}", a.body, b.body)
+            }
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The durable catalogue of bodies, scenes and fit jobs, embedded in the server.
+//! The durable catalogue of bodies, scenes and jobs, embedded in the server.
 //!
 //! [`Store`] is the file: one redb database, `catalogue.redb`, in the data directory. [`Catalogue`]
 //! holds everything of it in memory for reading and writes every change through. Only this layer
@@ -43,7 +43,10 @@ mod catalogue;
 mod copy;
 mod disk;
 mod error;
+mod format_3;
+mod hierarchy;
 mod job;
+mod pose_row;
 mod request;
 mod restore;
 mod rows;
@@ -51,9 +54,10 @@ mod rows;
 pub use catalogue::{Catalogue, CatalogueError, Counts, FORK_IDLE, LiveScene, MAX_FORKS, Origin, SceneEntry};
 pub use disk::{BACKUP_PREFIX, JobMesh, Store};
 pub use error::StoreError;
+pub use hierarchy::{HierarchyMeasure, HierarchyOutcome, HierarchyRequest, HierarchySet};
 pub use job::{
-    FitOptimum, FitOutcome, FittedBody, FittedKind, Job, JobState, MAX_ENDED_JOBS, MAX_QUEUED_JOBS,
-    MAX_REQUEST_ID_BYTES, NewJob,
+    FitOptimum, FitOutcome, FitTask, FittedBody, FittedKind, Job, JobOutcome, JobState, JobTask, MAX_ENDED_JOBS,
+    MAX_QUEUED_JOBS, MAX_REQUEST_ID_BYTES, NewJob,
 };
 pub use request::{
     FitBody, FitCompound, FitGroup, FitLadder, FitMode, FitPolynomial, FitPreparation, FitRequest, FitSosBody,

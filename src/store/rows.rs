@@ -4,13 +4,14 @@
 use redb::TableDefinition;
 use serde::{Deserialize, Serialize};
 
+use super::pose_row::PoseRow;
 use crate::body::BodyId;
 use crate::measure::Pose;
 use crate::scene::{Attachment, Geometry, Ladder, Object, Placement, Scene, Subject, SubjectPair, Update};
 
-/// Raised whenever older programs could not read the tables any more, or this one not theirs. 3:
-/// bodies of every kind, attachments and paddings.
-pub(super) const FORMAT: u64 = 3;
+/// Raised whenever older programs could not read the tables any more, or this one not theirs. 4:
+/// jobs of several kinds.
+pub(super) const FORMAT: u64 = 4;
 
 /// `format`, and `revision_floor`: no new scene starts at or below it.
 pub(super) const META: TableDefinition<&str, u64> = TableDefinition::new("meta");
@@ -32,10 +33,10 @@ pub(super) const OBJECTS: TableDefinition<(&str, &str), &[u8]> = TableDefinition
 /// Job id to [`Job`](super::Job). This table and the next two are missing from files that never
 /// had a job.
 pub(super) const JOBS: TableDefinition<u64, &[u8]> = TableDefinition::new("jobs");
-/// Job id to the coordinates of its points, metres, as little-endian f64; of jobs that have not
+/// Job id to the coordinates of its points, metres, as little-endian f64; of fits that have not
 /// ended.
 pub(super) const POINTS: TableDefinition<u64, &[u8]> = TableDefinition::new("points");
-/// Job id to the corners of the triangles between its points, as little-endian u32; of jobs that
+/// Job id to the corners of the triangles between its points, as little-endian u32; of fits that
 /// have not ended.
 pub(super) const TRIANGLES: TableDefinition<u64, &[u8]> = TableDefinition::new("triangles");
 
@@ -103,14 +104,6 @@ struct AttachmentRow {
     touch: Vec<SubjectRow>,
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct PoseRow {
-    translation_m: [f64; 3],
-    /// x, y, z, w.
-    rotation: [f64; 4],
-}
-
 impl SceneRow {
     pub(super) fn of(scene: &Scene) -> Self {
         let pair = |(a, b): &SubjectPair| [SubjectRow::of(a), SubjectRow::of(b)];
@@ -167,12 +160,9 @@ impl ObjectRow {
         }
     }
 
-    /// The object as it is to be placed, with the very bits of the pose that were stored: a pose is
-    /// normalised when it comes in, and once only.
+    /// The object as it is to be placed.
     pub(super) fn placement(&self, name: &str) -> Result<Placement, String> {
-        let PoseRow { translation_m, rotation } = &self.pose;
-        let pose = Pose::from_quaternion((*translation_m).into(), *rotation);
-        let pose = pose.map_err(|error| format!("has no pose: {error}"))?;
+        let pose = self.pose.pose().map_err(|error| format!("has no pose: {error}"))?;
         let attachment = self.attachment.as_ref().map(|row| Attachment {
             to: row.to.as_str().into(),
             pose,
@@ -189,8 +179,7 @@ impl ObjectRow {
     }
 }
 
-impl PoseRow {
-    fn of(pose: &Pose) -> Self {
-        Self { translation_m: (*pose.translation()).into(), rotation: pose.rotation().coords.into() }
-    }
+/// A row as it is written.
+pub(super) fn json(row: &impl Serialize) -> Result<Vec<u8>, redb::Error> {
+    serde_json::to_vec(row).map_err(|error| redb::Error::Io(error.into()))
 }

@@ -13,6 +13,7 @@ use sublevel::service::proto::body_service_client::BodyServiceClient;
 use sublevel::service::proto::create_body_request::Source;
 use sublevel::service::proto::evaluate_request::Question;
 use sublevel::service::proto::fit_service_client::FitServiceClient;
+use sublevel::service::proto::hierarchy_service_client::HierarchyServiceClient;
 use sublevel::service::proto::job_service_client::JobServiceClient;
 use sublevel::service::proto::query_service_client::QueryServiceClient;
 use sublevel::service::proto::scene_service_client::SceneServiceClient;
@@ -105,6 +106,7 @@ impl Running {
             scenes: SceneServiceClient::new(channel.clone()),
             queries: QueryServiceClient::new(channel.clone()),
             fits: FitServiceClient::new(channel.clone()),
+            hierarchy: HierarchyServiceClient::new(channel.clone()),
             jobs: JobServiceClient::new(channel.clone()),
             blobs: BlobServiceClient::new(channel.clone()),
             channel,
@@ -174,6 +176,7 @@ pub(crate) struct Clients {
     pub(crate) scenes: SceneServiceClient<Channel>,
     pub(crate) queries: QueryServiceClient<Channel>,
     pub(crate) fits: FitServiceClient<Channel>,
+    pub(crate) hierarchy: HierarchyServiceClient<Channel>,
     pub(crate) jobs: JobServiceClient<Channel>,
     pub(crate) blobs: BlobServiceClient<Channel>,
     pub(crate) channel: Channel,

@@ -145,7 +145,9 @@ async fn reflection_lists_the_services() {
     let answer = answers.message().await.expect("an answer").expect("an answer").message_response;
     let Some(MessageResponse::ListServicesResponse(list)) = answer else { panic!("{answer:?}") };
     let names: Vec<_> = list.service.iter().map(|service| service.name.as_str()).collect();
-    for name in ["BodyService", "SceneService", "QueryService"].map(|name| format!("sublevel.v1.{name}")) {
+    for name in
+        ["BodyService", "SceneService", "QueryService", "HierarchyService"].map(|name| format!("sublevel.v1.{name}"))
+    {
         assert!(names.contains(&name.as_str()), "{names:?}");
     }
     assert!(names.contains(&"grpc.health.v1.Health") && names.iter().any(|name| name.starts_with("grpc.reflection")));

@@ -6,6 +6,8 @@ mod families;
 #[cfg(feature = "fit")]
 mod fits;
 mod harness;
+#[cfg(feature = "fit")]
+mod hierarchy;
 mod keeping;
 mod kills;
 mod lifecycle;

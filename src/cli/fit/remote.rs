@@ -2,7 +2,7 @@
 
 use crate::client::{Client, ClientOptions, JobProgress, SubmitError};
 use crate::jobs::FitOutput;
-use crate::service::proto::FitPhase;
+use crate::service::proto::{FitPhase, FitProgress};
 use crate::store::FitRequest;
 use indicatif::ProgressBar;
 use nalgebra::Vector3;
@@ -29,7 +29,7 @@ pub(in crate::cli) fn execute(
             std::future::pending::<()>().await;
         }
     };
-    let tell = |job: &JobProgress| bar.set_message(describe(job));
+    let tell = |job: &JobProgress<FitProgress>| bar.set_message(describe(job));
     let fitted = runtime.block_on(async {
         let client =
             Client::connect_with(url, &ClientOptions { patience: PATIENCE, ..ClientOptions::from_environment() })
@@ -39,7 +39,7 @@ pub(in crate::cli) fn execute(
     Ok(fitted.map_err(|error: SubmitError| error)?)
 }
 
-fn describe(job: &JobProgress) -> String {
+fn describe(job: &JobProgress<FitProgress>) -> String {
     let Some(progress) = job.progress else { return format!("job {} waits for its turn", job.id) };
     match progress.phase() {
         FitPhase::Trimming | FitPhase::Fitting => format!(

@@ -22,7 +22,7 @@ pub(super) fn job(mut message: CreateFitRequest, blobs: &Blobs) -> Result<NewJob
     let source = message.source.take();
     let (request_id, request) = request(message)?;
     let (field, points, triangles) = match (source, request.group()) {
-        (None, Some(_)) => return Ok(NewJob::new(request_id, request, &[], &[])),
+        (None, Some(_)) => return Ok(NewJob::fit(request_id, request, &[], &[])),
         (Some(_), Some(_)) => {
             let why = "is sent where the options name a group of stored bodies; leave out one of the two";
             return Err(Invalid::new("source", why).into());
@@ -55,7 +55,7 @@ pub(super) fn job(mut message: CreateFitRequest, blobs: &Blobs) -> Result<NewJob
         let field = if field == "mesh" { "mesh" } else { "points.triangles" };
         return Err(Invalid::new(field, why).into());
     }
-    Ok(NewJob::new(request_id, request, &points, &triangles))
+    Ok(NewJob::fit(request_id, request, &points, &triangles))
 }
 
 type Mesh = (Vec<Vector3<f64>>, Vec<[u32; 3]>);

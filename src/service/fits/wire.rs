@@ -1,13 +1,11 @@
-//! Between messages and jobs.
+//! Between messages and fits that are jobs.
 
-use super::super::error::Invalid;
-use super::super::proto::job::Task;
 use super::super::proto::{self, BodyKind, FitPhase, FitProgress, FitResult, FitTask};
 use super::super::wire::count;
 use super::request::{options, read_solver, solver_message};
 use crate::body::SolverStep;
 use crate::jobs::{Phase, Progress};
-use crate::store::{FitOptimum, FitOutcome, FittedBody, FittedKind, Job, JobState};
+use crate::store::{FitOptimum, FitOutcome, FitTask as Fit, FittedBody, FittedKind};
 
 /// What a job can make.
 const KINDS: [(FittedKind, BodyKind); 3] = [
@@ -16,38 +14,19 @@ const KINDS: [(FittedKind, BodyKind); 3] = [
     (FittedKind::SosBody, BodyKind::SosBody),
 ];
 
-pub(in crate::service) fn id(id: &str, field: &str) -> Result<u64, Invalid> {
-    id.parse().map_err(|_| Invalid::new(field, "is no id of a job; give the one CreateFit returned"))
-}
-
-/// A job as it stands.
-pub(in crate::service) fn job(job: &Job, progress: Option<Progress>) -> proto::Job {
-    let Job { id, request_id, request, points, attempts, state, .. } = job;
-    let (state, failure, result) = match state {
-        JobState::Queued => (proto::JobState::Queued, "", None),
-        JobState::Running => (proto::JobState::Running, "", None),
-        JobState::Succeeded(outcome) => (proto::JobState::Succeeded, "", Some(result(outcome))),
-        JobState::Failed(why) => (proto::JobState::Failed, why.as_str(), None),
-        JobState::Cancelled => (proto::JobState::Cancelled, "", None),
-    };
-    let running = state == proto::JobState::Running;
-    let fit = FitTask {
+/// A fit as it stands; `progress` is of running ones only.
+pub(in crate::service) fn task(
+    Fit { request, points }: &Fit,
+    progress: Option<Progress>,
+    outcome: Option<&FitOutcome>,
+) -> FitTask {
+    FitTask {
         name: request.name.clone(),
         input: request.input.clone(),
         options: Some(options(request)),
         point_count: *points as u64,
-        // The worker may not have reported yet of the job it has begun, or of the one that was
-        // cancelled.
-        progress: running.then(|| progress_message(progress.unwrap_or_default())),
-        result,
-    };
-    proto::Job {
-        id: id.to_string(),
-        request_id: request_id.clone(),
-        state: state.into(),
-        attempts: *attempts,
-        failure: failure.to_owned(),
-        task: Some(Task::Fit(fit)),
+        progress: progress.map(progress_message),
+        result: outcome.map(result),
     }
 }
 
@@ -55,7 +34,7 @@ fn progress_message(progress: Progress) -> FitProgress {
     let phase = match progress.phase {
         Phase::Preparing => FitPhase::Preparing,
         Phase::Trimming => FitPhase::Trimming,
-        Phase::Fitting => FitPhase::Fitting,
+        Phase::Solving => FitPhase::Fitting,
     };
     FitProgress {
         phase: phase.into(),

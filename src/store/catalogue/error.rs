@@ -91,13 +91,11 @@ pub enum CatalogueError {
     /// The update cannot be applied to the scene.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// No fit job has this id.
-    #[error("no fit job {0}; list the jobs, or create it first")]
+    /// No job has this id.
+    #[error("no job {0}; list the jobs, or create it first")]
     NoJob(String),
     /// The request id names another job.
-    #[error(
-        "the request id \"{request_id}\" was used for fit job {job}, which has other points or options; choose another id"
-    )]
+    #[error("the request id \"{request_id}\" was used for job {job}, which has another content; choose another id")]
     RequestUsed {
         /// The request id.
         request_id: String,
@@ -112,8 +110,16 @@ pub enum CatalogueError {
         /// The body.
         id: BodyId,
     },
+    /// A solve of the hierarchy names a body that is not there.
+    #[error("no body {id}; list the bodies, or create it first")]
+    NoSet {
+        /// Which of the two sets, from 0.
+        index: usize,
+        /// The body.
+        id: BodyId,
+    },
     /// Too many jobs wait.
-    #[error("{MAX_QUEUED_JOBS} fit jobs wait already; try again when some are done, or cancel some")]
+    #[error("{MAX_QUEUED_JOBS} jobs wait already; try again when some are done, or cancel some")]
     QueueFull,
     /// The disk failed.
     #[error(transparent)]

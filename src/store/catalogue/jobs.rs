@@ -1,15 +1,16 @@
-//! The jobs of the catalogue. Their points stay on disk until somebody fits them, and go when the
-//! job has ended.
+//! The jobs of the catalogue. The points of fits stay on disk until somebody fits them, and go when
+//! the job has ended.
 
 use std::sync::Arc;
 
+use crate::body::BodyId;
 use crate::scene::Geometry;
 use crate::store::JobMesh;
-use crate::store::job::{Job, JobState, MAX_ENDED_JOBS, MAX_QUEUED_JOBS, NewJob};
-use crate::store::request::FitRequest;
-use crate::store::rows::{JOBS, POINTS, TRIANGLES};
+use crate::store::hierarchy::HierarchyRequest;
+use crate::store::job::{FitTask, Job, JobState, JobTask, MAX_ENDED_JOBS, MAX_QUEUED_JOBS, NewJob};
+use crate::store::rows::{JOBS, POINTS, TRIANGLES, json};
 
-use super::{Catalogue, CatalogueError, State, json, page, put_bodies};
+use super::{Catalogue, CatalogueError, State, page, put_bodies};
 
 impl Catalogue {
     /// One job by id.
@@ -27,11 +28,16 @@ impl Catalogue {
         self.read(|state| state.jobs.values().find(|job| job.state == *wanted).cloned())
     }
 
-    /// The points of a job that has not ended, metres, and the triangles between them; none of
+    /// The job of a request id that a client has given, as long as it is known.
+    pub fn job_of_request(&self, request_id: &str) -> Option<Arc<Job>> {
+        self.read(|state| state.job_of_request(request_id))
+    }
+
+    /// The points of a fit that has not ended, metres, and the triangles between them; none of
     /// either for groups.
     ///
     /// # Errors
-    /// When it has ended, or when the disk fails.
+    /// When it has ended, when the job is no fit, or when the disk fails.
     pub fn job_mesh(&self, id: u64) -> Result<JobMesh, CatalogueError> {
         let mesh = self.writer()?.mesh(id)?;
         mesh.ok_or_else(|| CatalogueError::NoJob(id.to_string()))
@@ -45,14 +51,14 @@ impl Catalogue {
     /// when too many jobs wait, or when the disk fails.
     pub fn create_job(&self, new: NewJob) -> Result<(Arc<Job>, bool), CatalogueError> {
         let mut store = self.writer()?;
-        let NewJob { request_id, digest, request, points, coordinates, corners } = new;
+        let NewJob { request_id, digest, task, coordinates, corners } = new;
         let (known, missing, queued, ended, id) = self.read(|state| {
             let jobs = || state.jobs.values();
-            let known = jobs().find(|job| !request_id.is_empty() && job.request_id == request_id).cloned();
+            let known = state.job_of_request(&request_id);
             let queued = jobs().filter(|job| job.state == JobState::Queued).count();
             let ended: Vec<u64> = jobs().filter(|job| job.state.is_final()).map(|job| job.id).collect();
             // The latest job is never forgotten, so no id is given twice.
-            (known, state.missing(&request), queued, ended, state.jobs.last_key_value().map_or(1, |(last, _)| last + 1))
+            (known, state.missing(&task), queued, ended, state.jobs.last_key_value().map_or(1, |(last, _)| last + 1))
         });
         match (known, missing) {
             (Some(known), _) if known.digest == digest => return Ok((known, false)),
@@ -61,10 +67,12 @@ impl Catalogue {
             (None, None) if queued >= MAX_QUEUED_JOBS => return Err(CatalogueError::QueueFull),
             (None, None) => {}
         }
-        let job = Arc::new(Job { id, request_id, digest, request, points, attempts: 0, state: JobState::Queued });
+        let job = Arc::new(Job { id, request_id, digest, task, attempts: 0, state: JobState::Queued });
         let forgotten = &ended[..ended.len().saturating_sub(MAX_ENDED_JOBS)];
         self.commit(&mut store, |transaction| {
-            transaction.open_table(POINTS)?.insert(id, coordinates.as_slice())?;
+            if matches!(job.task, JobTask::Fit(_)) {
+                transaction.open_table(POINTS)?.insert(id, coordinates.as_slice())?;
+            }
             if !corners.is_empty() {
                 transaction.open_table(TRIANGLES)?.insert(id, corners.as_slice())?;
             }
@@ -79,7 +87,7 @@ impl Catalogue {
             forgotten.iter().for_each(|id| drop(state.jobs.remove(id)));
             state.jobs.insert(id, job.clone())
         });
-        tracing::debug!(id, name = job.request.name, points, "fit job queued");
+        tracing::debug!(id, task = %job.task, "job queued");
         Ok((job, true))
     }
 
@@ -118,16 +126,29 @@ impl Catalogue {
             state.keep(fresh);
             state.jobs.insert(id, next.clone())
         });
-        tracing::debug!(id, attempts, state = %next.state, "fit job moved on");
+        tracing::debug!(id, attempts, state = %next.state, "job moved on");
         Ok(next)
     }
 }
 
 impl State {
-    /// The first body of the request's group that is not there.
-    fn missing(&self, request: &FitRequest) -> Option<CatalogueError> {
-        let mut ids = request.group()?.body_ids.iter().enumerate();
-        let (index, id) = ids.find(|(_, id)| !self.bodies.contains_key(id))?;
-        Some(CatalogueError::NoMember { index, id: *id })
+    fn job_of_request(&self, request_id: &str) -> Option<Arc<Job>> {
+        let known = |job: &&Arc<Job>| !request_id.is_empty() && job.request_id == request_id;
+        self.jobs.values().find(known).cloned()
+    }
+
+    /// The first body that a task is about and that is not there.
+    fn missing(&self, task: &JobTask) -> Option<CatalogueError> {
+        let is_missing = |id: &BodyId| !self.bodies.contains_key(id);
+        match task {
+            JobTask::Fit(FitTask { request, .. }) => {
+                let mut ids = request.group()?.body_ids.iter().enumerate();
+                ids.find(|(_, id)| is_missing(id)).map(|(index, id)| CatalogueError::NoMember { index, id: *id })
+            }
+            JobTask::Hierarchy(HierarchyRequest { sets, .. }) => {
+                let mut ids = sets.iter().map(|set| set.body).enumerate();
+                ids.find(|(_, id)| is_missing(id)).map(|(index, id)| CatalogueError::NoSet { index, id })
+            }
+        }
     }
 }

@@ -17,13 +17,13 @@ use redb::WriteTransaction;
 use crate::body::BodyId;
 use crate::measure::Pose;
 use crate::scene::{Placement, Scene, SceneError, Slot, Update, check_name};
-use crate::store::rows::{META, OBJECTS, ObjectRow, RESERVES, REVISIONS, SCENES, SceneRow};
+use crate::store::rows::{META, OBJECTS, ObjectRow, RESERVES, REVISIONS, SCENES, SceneRow, json};
 use crate::store::{Store, StoreError};
 
 use super::live_scene::{LiveScene, MAX_FORKS, Origin, RESERVE, Scenes};
 use super::scene_entry::SceneEntry;
 use super::stored_scene::StoredScene;
-use super::{Catalogue, CatalogueError, State, json};
+use super::{Catalogue, CatalogueError, State};
 
 impl Catalogue {
     /// A scene or fork by name; its bodies are proven here if they are not yet. Forks that are

@@ -11,10 +11,13 @@ use crate::body::Shape;
 use crate::measure::HalfSpace;
 use crate::scene::{Attach, Geometry, Ladder, NamedHalfSpace, Placement, Subject, Update};
 use crate::store::rows::{BODIES, FORMAT, JOBS, LADDERS, META, OBJECTS, RESERVES, REVISIONS, SCENES};
-use crate::store::{Catalogue, StoreError};
+use crate::store::{Catalogue, FitOutcome, JobOutcome, JobState, StoreError};
 
 /// Rows of format 3: key and value of each table, values as text.
 const FORMAT_3: &str = include_str!("format_3.json");
+
+/// Rows of format 4.
+const FORMAT_4: &str = include_str!("format_4.json");
 
 type Rows = BTreeMap<String, BTreeMap<String, String>>;
 
@@ -54,6 +57,7 @@ fn fill(catalogue: &Catalogue) {
     let attach = vec![Attach { name: "held".into(), to: "o".into(), pose: None, touch }];
     catalogue.update_scene("room", &Update { attach, ..Update::default() }).expect("held");
     catalogue.create_job(super::jobs::job("request")).expect("queued");
+    catalogue.create_job(super::jobs::solve("solve", [&ball(0.5), &ball(1.0)])).expect("queued");
 }
 
 fn text_rows(transaction: &WriteTransaction) -> Rows {
@@ -111,7 +115,7 @@ fn write_rows(transaction: &WriteTransaction, rows: &Rows) {
 
 /// `UPDATE_FORMAT=1` writes the rows again, which is right only together with a new number.
 #[test]
-fn rows_are_written_as_format_3_has_them() {
+fn rows_are_written_as_format_4_has_them() {
     let disk = Disk::default();
     let catalogue = disk.load().expect("a new catalogue");
     fill(&catalogue);
@@ -120,12 +124,12 @@ fn rows_are_written_as_format_3_has_them() {
     disk.meddle(|transaction| written = text_rows(transaction));
     if std::env::var_os("UPDATE_FORMAT").is_some() {
         let text = serde_json::to_string_pretty(&written).expect("text") + "\n";
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/src/store/tests/format_3.json");
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/src/store/tests/format_4.json");
         std::fs::write(path, text).expect("written");
         return;
     }
-    let known: Rows = serde_json::from_str(FORMAT_3).expect("rows");
-    assert_eq!((FORMAT, &written["meta"]), (3, &known["meta"]));
+    let known = rows_in(FORMAT_4);
+    assert_eq!((FORMAT, &written["meta"]), (4, &known["meta"]));
     for (table, rows) in &known {
         for (key, row) in rows {
             assert_eq!(written[table].get(key), Some(row), "{table} {key}: give the format a new number");
@@ -134,18 +138,78 @@ fn rows_are_written_as_format_3_has_them() {
     }
 }
 
-#[test]
-fn rows_of_format_3_are_read() {
+fn rows_in(text: &str) -> Rows {
+    serde_json::from_str(text).expect("rows")
+}
+
+/// A disk with these rows.
+fn holding(rows: &Rows) -> Disk {
     let disk = Disk::default();
     drop(disk.load().expect("a new catalogue"));
-    let known: Rows = serde_json::from_str(FORMAT_3).expect("rows");
-    disk.meddle(|transaction| write_rows(transaction, &known));
-    let read = disk.load().expect("loads");
+    disk.meddle(|transaction| write_rows(transaction, rows));
+    disk
+}
+
+#[test]
+fn rows_of_format_4_are_read() {
+    let read = holding(&rows_in(FORMAT_4)).load().expect("loads");
+    holds_what_was_filled_in(&read);
+    let whole = Disk::default().load().expect("a new catalogue");
+    fill(&whole);
+    assert_eq!(read.jobs(None, 9).0, whole.jobs(None, 9).0);
+}
+
+/// Opening a file writes it in the present format, once.
+#[test]
+fn rows_of_format_3_are_read_and_written_as_those_of_format_4() {
+    let disk = holding(&rows_in(FORMAT_3));
+    for _ in 0..2 {
+        holds_what_was_filled_in(&disk.load().expect("loads"));
+    }
+    let mut written = Rows::new();
+    disk.meddle(|transaction| written = text_rows(transaction));
+    let mut known = rows_in(FORMAT_4);
+    known.get_mut("jobs").expect("jobs").remove("2").expect("the solve, which format 3 has not");
+    assert_eq!(written, known);
+
+    // A full disk leaves it as it was.
+    let disk = holding(&rows_in(FORMAT_3));
+    disk.set_full(true);
+    assert!(matches!(disk.load(), Err(StoreError::Full { .. })));
+    disk.set_full(false);
+    holds_what_was_filled_in(&disk.load().expect("loads"));
+}
+
+#[test]
+fn jobs_of_format_3_are_read_in_every_state() {
+    let with_job = |change: &dyn Fn(&str) -> String| {
+        let mut rows = rows_in(FORMAT_3);
+        let row = rows.get_mut("jobs").and_then(|jobs| jobs.get_mut("1")).expect("a job");
+        *row = change(row);
+        holding(&rows)
+    };
+    let made = FitOutcome { bodies: Vec::new(), ladder: None, left_out: 2, left_out_m: 0.1 };
+    for (state, expected) in [
+        (r#""queued""#, JobState::Queued),
+        (r#""running""#, JobState::Running),
+        (r#"{"succeeded":{"bodies":[],"left_out":2,"left_out_m":0.1}}"#, JobState::Succeeded(JobOutcome::Fit(made))),
+        (r#"{"failed":"why"}"#, JobState::Failed("why".into())),
+        (r#""cancelled""#, JobState::Cancelled),
+    ] {
+        let disk = with_job(&|row| row.replace(r#""state":"queued""#, &format!(r#""state":{state}"#)));
+        assert_eq!(disk.load().expect("loads").job(1).expect("there").state, expected);
+    }
+    let error = with_job(&|row| row[..row.len() / 2].to_owned()).load().expect_err("half a row").to_string();
+    assert!(error.contains("job 1") && error.contains("damaged"), "{error}");
+}
+
+/// All that [`fill`] makes, but for jobs that earlier formats do not have.
+fn holds_what_was_filled_in(read: &Catalogue) {
     let whole = Disk::default().load().expect("a new catalogue");
     fill(&whole);
     let ids = |catalogue: &Catalogue| catalogue.bodies(None, 99).0.iter().map(|body| *body.id()).collect::<Vec<_>>();
-    assert_eq!(ids(&read), ids(&whole));
-    let [found, made] = [&read, &whole].map(|catalogue| catalogue.scene("room").expect("there"));
+    assert_eq!(ids(read), ids(&whole));
+    let [found, made] = [read, &whole].map(|catalogue| catalogue.scene("room").expect("there"));
     assert_eq!(found.revision(), made.revision());
     assert_eq!(found.len(), 3);
     for (_, object, pose) in made.objects() {
@@ -157,12 +221,12 @@ fn rows_of_format_3_are_read() {
     assert!(found.rules().allowed().eq(made.rules().allowed()));
     assert!(found.rules().group_paddings().eq(made.rules().group_paddings()));
     assert!(found.rules().pair_paddings().eq(made.rules().pair_paddings()));
-    assert_eq!(read.job(1).expect("there").request, whole.job(1).expect("there").request);
+    assert_eq!(read.job(1).expect("there"), whole.job(1).expect("there"));
 }
 
 #[test]
 fn other_formats_are_refused_by_number() {
-    for format in [1, 2, 4, 99] {
+    for format in [1, 2, 5, 99] {
         let disk = Disk::default();
         drop(disk.load().expect("a new catalogue"));
         disk.meddle(|transaction| {

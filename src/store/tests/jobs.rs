@@ -4,10 +4,13 @@
 use nalgebra::Vector3;
 
 use super::{Disk, ball};
+use crate::body::Body;
+use crate::measure::Pose;
 use crate::store::rows::{JOBS, META, POINTS, TRIANGLES};
 use crate::store::{
-    Catalogue, CatalogueError, FitGroup, FitOutcome, FitPolynomial, FitPreparation, FitRequest, FitWithinGap,
-    FittedKind, Job, JobState, MAX_ENDED_JOBS, MAX_QUEUED_JOBS, NewJob, StoreError,
+    Catalogue, CatalogueError, FitGroup, FitOutcome, FitPolynomial, FitPreparation, FitRequest, FitTask, FitWithinGap,
+    FittedKind, HierarchyMeasure, HierarchyOutcome, HierarchyRequest, HierarchySet, Job, JobOutcome, JobState, JobTask,
+    MAX_ENDED_JOBS, MAX_QUEUED_JOBS, NewJob, StoreError,
 };
 
 fn request(name: &str) -> FitRequest {
@@ -25,11 +28,31 @@ fn points() -> Vec<Vector3<f64>> {
 }
 
 pub(super) fn job(request_id: &str) -> NewJob {
-    NewJob::new(request_id.into(), request("it"), &points(), &CORNERS)
+    NewJob::fit(request_id.into(), request("it"), &points(), &CORNERS)
+}
+
+/// A solve about these bodies, the second at a pose whose numbers use all their bits.
+pub(super) fn solve(request_id: &str, bodies: [&Body; 2]) -> NewJob {
+    let apart = Pose::from_quaternion(Vector3::new(2.5, -0.0, 1.0 / 3.0), [0.1, 0.7, -0.1, 0.7]).expect("a pose");
+    let sets = [(bodies[0], Pose::identity()), (bodies[1], apart)];
+    let sets = sets.map(|(body, pose)| HierarchySet { body: *body.id(), pose });
+    let request = HierarchyRequest { measure: HierarchyMeasure::Distance, sets, level: 1 };
+    NewJob::hierarchy(request_id.into(), request)
+}
+
+fn found() -> JobState {
+    JobState::Succeeded(JobOutcome::Hierarchy(HierarchyOutcome {
+        lower: 0.1,
+        upper: Some(0.1 + 0.2),
+        points_m: Some([[0.5, -0.0, 1.0 / 3.0], [0.0; 3]]),
+        is_exact: false,
+        iterations: 14,
+        seconds: 0.25,
+    }))
 }
 
 fn done() -> JobState {
-    JobState::Succeeded(FitOutcome { bodies: Vec::new(), ladder: None, left_out: 2, left_out_m: 0.1 })
+    JobState::Succeeded(JobOutcome::Fit(FitOutcome { bodies: Vec::new(), ladder: None, left_out: 2, left_out_m: 0.1 }))
 }
 
 fn end(catalogue: &Catalogue, id: u64, state: &JobState) -> Result<std::sync::Arc<Job>, CatalogueError> {
@@ -37,19 +60,23 @@ fn end(catalogue: &Catalogue, id: u64, state: &JobState) -> Result<std::sync::Ar
         .change_job(id, vec![ball(3.0).into()], |job| (!job.state.is_final()).then(|| (state.clone(), job.attempts)))
 }
 
+/// What a start would read now, a job among it that is as wanted.
+fn saved(disk: &Disk, wanted: &Job) -> Catalogue {
+    let copy = Disk::default();
+    copy.bytes.lock().expect("sound").clone_from(&disk.bytes.lock().expect("sound"));
+    let again = copy.load().expect("loads");
+    assert_eq!(*again.job(wanted.id).expect("there"), *wanted);
+    again
+}
+
 #[test]
 fn every_acknowledged_state_is_on_disk() {
     let disk = Disk::default();
     let catalogue = disk.load().expect("a new catalogue");
     let (made, created) = catalogue.create_job(job("r")).expect("queued");
-    assert!(created && made.state == JobState::Queued && made.points == 2);
-    let saved = |wanted: &Job| {
-        let copy = Disk::default();
-        copy.bytes.lock().expect("sound").clone_from(&disk.bytes.lock().expect("sound"));
-        let again = copy.load().expect("loads");
-        assert_eq!(*again.job(wanted.id).expect("there"), *wanted);
-        again
-    };
+    let JobTask::Fit(FitTask { points: 2, .. }) = made.task else { panic!("{made:?}") };
+    assert!(created && made.state == JobState::Queued);
+    let saved = |wanted: &Job| saved(&disk, wanted);
     let bits = |points: &[Vector3<f64>]| points.iter().flatten().map(|v| v.to_bits()).collect::<Vec<_>>();
     let again = saved(&made);
     let (kept, corners) = again.job_mesh(made.id).expect("kept");
@@ -78,20 +105,19 @@ fn the_row_of_a_job_has_one_form_and_is_what_request_ids_are_compared_by() {
     );
     let written = format!(r#"{{"name":"it","input":"","scale":0.001,"mode":{mode}}}"#);
     assert_eq!(serde_json::to_string(&request("it")).expect("JSON"), written);
-    let new = NewJob::new("r".into(), request("it"), &points(), &[]);
+    let new = NewJob::fit("r".into(), request("it"), &points(), &[]);
     let body = r#"{"id":"5f","gap_m":0.25,"mean_gap_m":0.125,"seconds":1.5,"optimum":null}"#;
-    let state = format!(r#"{{"succeeded":{{"bodies":[{body}],"left_out":0,"left_out_m":0.0}}}}"#);
-    let row = format!(
-        r#"{{"id":1,"request_id":"r","digest":"{}","request":{written},"points":2,"attempts":1,"state":{state}}}"#,
-        new.digest
-    );
+    let state = format!(r#"{{"succeeded":{{"fit":{{"bodies":[{body}],"left_out":0,"left_out_m":0.0}}}}}}"#);
+    let task = format!(r#"{{"fit":{{"request":{written},"points":2}}}}"#);
+    let row =
+        format!(r#"{{"id":1,"request_id":"r","digest":"{}","task":{task},"attempts":1,"state":{state}}}"#, new.digest);
     let disk = Disk::default();
     drop(disk.load().expect("a new catalogue"));
     write_job(&disk, &row);
     let catalogue = disk.load().expect("loads");
     let (known, created) = catalogue.create_job(new).expect("known");
-    assert!(!created && known.request == request("it"), "{known:?}");
-    let JobState::Succeeded(outcome) = &known.state else { panic!("{known:?}") };
+    assert_eq!((created, &known.task), (false, &JobTask::Fit(FitTask { request: request("it"), points: 2 })));
+    let JobState::Succeeded(JobOutcome::Fit(outcome)) = &known.state else { panic!("{known:?}") };
     assert_eq!((outcome.bodies[0].kind, outcome.bodies[0].gap_m), (FittedKind::Body, Some(0.25)));
     assert_eq!(serde_json::to_string(&*known).expect("JSON"), row, "nor is it written otherwise now");
 }
@@ -106,12 +132,12 @@ fn orders_of_earlier_versions_are_refused() {
     drop(disk.load().expect("a new catalogue"));
     write_job(&disk, &row);
     let error = disk.load().expect_err("no request").to_string();
-    assert!(error.contains("fit job 1") && error.contains("damaged"), "{error}");
+    assert!(error.contains("job 1") && error.contains("damaged"), "{error}");
     disk.meddle(|transaction| {
         transaction.open_table(META).expect("a table").insert("format", 1).expect("written");
     });
     let error = disk.load().expect_err("format 1").to_string();
-    assert!(error.contains("has format 1") && error.contains("reads format 3"), "{error}");
+    assert!(error.contains("has format 1") && error.contains("reads format 4"), "{error}");
     assert!(error.contains("another directory"), "{error}");
 }
 
@@ -179,7 +205,7 @@ fn a_group_is_of_bodies_that_are_stored() {
     let there = *catalogue.create_body(ball(1.0).into()).expect("stored").0.id();
     let grouping = |body_ids| {
         let group = FitGroup { body_ids, ..FitGroup::default() };
-        NewJob::new(String::new(), FitRequest::new("them", group), &[], &[])
+        NewJob::fit(String::new(), FitRequest::new("them", group), &[], &[])
     };
     let missing = *ball(2.0).id();
     match catalogue.create_job(grouping(vec![there, missing])) {
@@ -188,6 +214,50 @@ fn a_group_is_of_bodies_that_are_stored() {
     }
     let job = catalogue.create_job(grouping(vec![there])).expect("queued").0;
     assert_eq!(catalogue.job_mesh(job.id).expect("kept"), (Vec::new(), Vec::new()));
+}
+
+/// As fits, without points.
+#[test]
+fn solves_are_kept_in_every_state_and_known_by_their_content() {
+    let disk = Disk::default();
+    let catalogue = disk.load().expect("a new catalogue");
+    let balls = [ball(0.5), ball(1.0)];
+    for ball in &balls {
+        catalogue.create_body(ball.clone().into()).expect("stored");
+    }
+    let asked = || solve("r", [&balls[0], &balls[1]]);
+    let (made, created) = catalogue.create_job(asked()).expect("queued");
+    assert!(created && made.task == asked().task);
+    assert!(matches!(catalogue.job_mesh(made.id), Err(CatalogueError::NoJob(_))), "a solve has no points");
+    let running = catalogue.change_job(made.id, Vec::new(), |_| Some((JobState::Running, 1))).expect("moved on");
+    saved(&disk, &running);
+    let none = JobState::Succeeded(JobOutcome::Hierarchy(HierarchyOutcome {
+        lower: 0.0,
+        upper: None,
+        points_m: None,
+        is_exact: false,
+        iterations: 1,
+        seconds: 0.0,
+    }));
+    for state in [found(), none] {
+        let ended = catalogue.change_job(made.id, Vec::new(), |_| Some((state.clone(), 1))).expect("ended");
+        assert_eq!(ended.state, state);
+        saved(&disk, &ended);
+    }
+    drop(catalogue);
+    let again = disk.load().expect("loads");
+    assert!(!again.create_job(asked()).expect("known").1);
+    for other in [solve("r", [&balls[1], &balls[0]]), job("r")] {
+        let used = again.create_job(other).expect_err("another content");
+        assert!(matches!(used, CatalogueError::RequestUsed { job: 1, .. }), "{used}");
+    }
+    // Of a body that is gone there is no further solve, and the one that there was stays.
+    again.delete_body(balls[1].id()).expect("deleted");
+    match again.create_job(solve("", [&balls[0], &balls[1]])) {
+        Err(CatalogueError::NoSet { index: 1, id }) => assert_eq!(id, *balls[1].id()),
+        unexpected => panic!("{unexpected:?}"),
+    }
+    assert!(!again.create_job(asked()).expect("known").1);
 }
 
 #[test]
@@ -212,9 +282,9 @@ fn a_full_disk_leaves_jobs_as_they_were() {
 fn a_request_id_is_for_one_content() {
     let catalogue = Disk::default().load().expect("a new catalogue");
     let first = catalogue.create_job(job("r")).expect("queued").0;
-    let other_points = NewJob::new("r".into(), request("it"), &points()[1..], &CORNERS);
-    let other_triangles = NewJob::new("r".into(), request("it"), &points(), &[[0, 1, 0]]);
-    let other_request = NewJob::new("r".into(), request("that"), &points(), &CORNERS);
+    let other_points = NewJob::fit("r".into(), request("it"), &points()[1..], &CORNERS);
+    let other_triangles = NewJob::fit("r".into(), request("it"), &points(), &[[0, 1, 0]]);
+    let other_request = NewJob::fit("r".into(), request("that"), &points(), &CORNERS);
     for other in [other_points, other_triangles, other_request] {
         match catalogue.create_job(other) {
             Err(CatalogueError::RequestUsed { request_id, job }) => assert_eq!((&*request_id, job), ("r", first.id)),
@@ -231,7 +301,7 @@ fn the_queue_is_bounded_and_the_oldest_that_ended_are_forgotten() {
         catalogue.create_job(job("")).expect("queued");
     }
     assert!(matches!(catalogue.create_job(job("")), Err(CatalogueError::QueueFull)));
-    let known = catalogue.create_job(NewJob::new("r".into(), request("it"), &points(), &CORNERS));
+    let known = catalogue.create_job(NewJob::fit("r".into(), request("it"), &points(), &CORNERS));
     assert!(matches!(known, Err(CatalogueError::QueueFull)));
     // The first goes on waiting while others come and go.
     let mut last = MAX_QUEUED_JOBS as u64;
@@ -268,7 +338,7 @@ fn files_that_never_had_a_job_are_read() {
 
 #[test]
 fn damaged_jobs_are_refused_by_name() {
-    for (key, word) in [(1, "fit job 1"), (7, "says that it is 1")] {
+    for (key, word) in [(1, "job 1"), (7, "says that it is 1")] {
         let disk = Disk::default();
         disk.load().expect("a new catalogue").create_job(job("")).expect("queued");
         disk.meddle(|transaction| {

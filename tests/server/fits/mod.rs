@@ -35,7 +35,7 @@ fn cloud(count: usize, seed: u64) -> Vec<Vector3<f64>> {
 }
 
 /// A quarter of a ring, open at both ends and turned so that no axis fits it, metres.
-fn arc() -> Mesh {
+pub(crate) fn arc() -> Mesh {
     let turn = nalgebra::Rotation3::from_euler_angles(0.4, -0.3, 0.9);
     let (along, around) = (16, 8);
     let point = |k: u32| {
