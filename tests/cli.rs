@@ -3,10 +3,12 @@
 
 #![cfg(feature = "fit")]
 
+use nalgebra::Vector3;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
+use sublevel::body::Body;
 
 fn sublevel(args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_sublevel")).args(args).output().unwrap()
@@ -688,4 +690,59 @@ fn primitives_are_written_exactly_and_refused_by_argument() {
     ] {
         assert!(refusal(&args).contains(word), "{args:?}: {}", refusal(&args));
     }
+}
+
+#[test]
+fn hierarchy_brackets_sets_that_need_not_be_convex() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    std::fs::write(path("ring.off"), ring()).unwrap();
+    let out = text(folder.path());
+    json(&["fit", text(&path("ring.off")), "--out", out, "--degree", "4", "--relax-convexity", "inf", "--json"]);
+    let ball = Body::ball("ball", Vector3::zeros(), 0.5).unwrap();
+    std::fs::write(path("ball.json"), ball.to_json()).unwrap();
+    let (ring, ball) = (path("ring-d4-cinf.json"), path("ball.json"));
+    let (ring, ball) = (text(&ring), text(&ball));
+
+    // Two balls, whose distance is known.
+    let exact = json(&["hierarchy", ball, ball, "--pose", "0,3,4", "--json"]);
+    let fields = "lower_m upper_m is_exact level point_a_m point_b_m iterations seconds";
+    assert_eq!(keys(&exact), sorted(fields));
+    let number = |line: &Value, key: &str| line[key].as_f64().unwrap();
+    let (lower, upper) = (number(&exact, "lower_m"), number(&exact, "upper_m"));
+    assert!(lower <= 4.0 && 4.0 <= upper && upper - lower < 1e-5, "{exact}");
+    assert_eq!((&exact["is_exact"], &exact["level"]), (&true.into(), &0.into()));
+    assert!((exact["point_a_m"][1].as_f64().unwrap() - 0.3).abs() < 1e-3, "{exact}");
+
+    // One pose a line, at a level of choice; the bound rises with the level.
+    let poses = path("poses.txt");
+    std::fs::write(&poses, "1 0 0 0 1 0 0 0 1 0 0 3\n\n1 0 0 0 1 0 0 0 1 4 0 0\n").unwrap();
+    let brackets = |level: &str| -> Vec<Value> {
+        let output = sublevel(&["hierarchy", ring, ball, "--poses", text(&poses), "--level", level, "--json"]);
+        assert!(output.status.success() && output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+        let lines = String::from_utf8(output.stdout).unwrap();
+        lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    };
+    let (first, next) = (brackets("0"), brackets("1"));
+    assert_eq!((first.len(), next.len()), (2, 2));
+    for (first, next) in first.iter().zip(&next) {
+        let highest = number(first, "upper_m").min(number(next, "upper_m"));
+        assert!(0.0 < number(next, "lower_m") && number(next, "lower_m") <= highest, "{first} {next}");
+        assert!(number(first, "lower_m") <= number(next, "lower_m") + 1e-4, "{first} {next}");
+        assert_eq!((&first["level"], &next["level"]), (&0.into(), &1.into()));
+    }
+    let table = String::from_utf8(sublevel(&["hierarchy", ball, ball, "--pose", "3,0,0"]).stdout).unwrap();
+    let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split_whitespace().collect()).collect();
+    assert_eq!((rows.len(), rows[0][0], rows[1][0], rows[1][3], rows[1][4]), (2, "pose", "1", "yes", "0"), "{table}");
+
+    assert!(refusal(&["hierarchy", ball, "missing.json"]).contains("check the path"));
+    assert!(refusal(&["hierarchy", ball, text(&poses)]).contains("poses.txt"));
+    let refused = refusal(&["hierarchy", ring, ball, "--level", "3"]);
+    assert!(refused.contains("between 0 and 2") && refused.lines().count() == 1, "{refused}");
+    let octic = Body::superellipsoid("octic", Vector3::zeros(), Vector3::repeat(1.0), 8).unwrap();
+    std::fs::write(path("octic.json"), octic.to_json()).unwrap();
+    let octic = path("octic.json");
+    let refused = refusal(&["hierarchy", text(&octic), text(&octic), "--level", "2"]);
+    assert!(refused.contains("octic.json") && refused.contains("10820 entries"), "{refused}");
+    assert!(refusal(&["hierarchy", ball, ball, "--pose", "1,2"]).contains("2 numbers"));
 }

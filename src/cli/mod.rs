@@ -14,12 +14,15 @@ mod fit;
 #[cfg(feature = "fit")]
 mod group;
 mod health;
+#[cfg(feature = "fit")]
+mod hierarchy;
 mod load;
 mod measure;
 #[cfg(feature = "fit")]
 mod mesh;
 mod numbers;
 mod outcome;
+mod poses;
 mod primitive;
 #[cfg(feature = "fit")]
 mod progress;
@@ -47,7 +50,10 @@ use std::process::ExitCode;
     feature = "fit",
     doc = "A first tour: 'sublevel demo'. With meshes of your own: 'fit', then 'measure' without a server, or 'serve' and 'push'."
 )]
-#[cfg_attr(not(feature = "fit"), doc = "Built without the feature 'fit': 'fit', 'certify' and 'demo' are left out.")]
+#[cfg_attr(
+    not(feature = "fit"),
+    doc = "Built without the feature 'fit': 'fit', 'certify', 'hierarchy' and 'demo' are left out."
+)]
 #[derive(Debug, Parser)]
 #[command(version, max_term_width = 100)]
 enum Command {
@@ -60,6 +66,8 @@ enum Command {
     #[cfg(feature = "fit")]
     Certify(certify::CertifyArgs),
     Measure(measure::MeasureArgs),
+    #[cfg(feature = "fit")]
+    Hierarchy(hierarchy::HierarchyArgs),
     Serve(serve::ServeArgs),
     Push(push::PushArgs),
     Primitive(primitive::PrimitiveArgs),
@@ -88,6 +96,8 @@ pub fn main() -> ExitCode {
         #[cfg(feature = "fit")]
         Command::Certify(args) => certify::run(&args).map(done),
         Command::Measure(args) => measure::run(&args).map(done),
+        #[cfg(feature = "fit")]
+        Command::Hierarchy(args) => hierarchy::run(&args).map(done),
         Command::Serve(args) => serve::run(&args).map(done),
         Command::Push(args) => push::run(&args).map(done),
         Command::Primitive(args) => primitive::run(&args).map(done),

@@ -1,12 +1,11 @@
 //! `sublevel measure`.
 
-mod poses;
 mod query;
 mod timing;
 
-use super::files::{read, read_shape};
-use super::numbers::PoseNumbers;
-use crate::measure::{Distance, LevelDistance, Options, Pose, Status, WarmStart};
+use super::files::read_shape;
+use super::poses::PoseArgs;
+use crate::measure::{Distance, LevelDistance, Options, Status, WarmStart};
 use query::Query;
 use serde::Serialize;
 use std::error::Error;
@@ -33,14 +32,8 @@ pub(super) struct MeasureArgs {
     a: PathBuf,
     /// File of B
     b: PathBuf,
-    /// Pose of B in A's frame: translation (m), then quaternion unless it is not turned [default:
-    /// identity]
-    #[arg(long, value_name = "X,Y,Z[,QX,QY,QZ,QW]", allow_hyphen_values = true, conflicts_with = "poses")]
-    pose: Option<PoseNumbers>,
-    /// File of poses of B in A's frame, one a line: r00 r01 r02 r10 .. r22 tx ty tz; a blank line
-    /// starts a new trajectory
-    #[arg(long, value_name = "FILE")]
-    poses: Option<PathBuf>,
+    #[command(flatten)]
+    at: PoseArgs,
     /// Width asked of the brackets: relative to the smaller body's circumradius, and to max(1, |d|)
     #[arg(long, value_name = "WIDTH", default_value = "1e-9")]
     accuracy: f64,
@@ -104,13 +97,7 @@ impl Line {
 /// Measures and prints.
 pub(super) fn run(args: &MeasureArgs) -> Result<(), Box<dyn Error>> {
     let options = Options::default().with_accuracy(args.accuracy).map_err(|error| format!("--accuracy: {error}"))?;
-    let trajectories = match (&args.pose, &args.poses) {
-        (Some(pose), _) => vec![vec![pose.0]],
-        (None, Some(path)) => {
-            poses::parse_file(&read(path)?).map_err(|error| format!("{}: {error}", path.display()))?
-        }
-        (None, None) => vec![vec![Pose::identity()]],
-    };
+    let trajectories = args.at.trajectories()?;
     let query = Query { a: read_shape(&args.a)?, b: read_shape(&args.b)?, options };
     let mut out = BufWriter::new(io::stdout().lock());
     if args.time {

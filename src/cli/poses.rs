@@ -1,11 +1,44 @@
-//! Poses as text.
+//! Poses of one object in the frame of another, as arguments and in files.
 
+use super::files::read;
+use super::numbers::PoseNumbers;
 use crate::measure::{Pose, PoseError};
 use nalgebra::{Matrix3, Vector3};
+use std::error::Error;
+use std::path::PathBuf;
+
+/// Arguments that say where B is.
+#[derive(Debug, clap::Args)]
+pub(super) struct PoseArgs {
+    /// Pose of B in A's frame: translation (m), then quaternion unless it is not turned [default:
+    /// identity]
+    #[arg(long, value_name = "X,Y,Z[,QX,QY,QZ,QW]", allow_hyphen_values = true, conflicts_with = "poses")]
+    pose: Option<PoseNumbers>,
+    /// File of poses of B in A's frame, one a line: r00 r01 r02 r10 .. r22 tx ty tz; a blank line
+    /// starts a new trajectory
+    #[arg(long, value_name = "FILE")]
+    poses: Option<PathBuf>,
+}
+
+impl PoseArgs {
+    /// The poses, trajectory by trajectory.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or holds no poses, named in the error.
+    pub(super) fn trajectories(&self) -> Result<Vec<Vec<Pose>>, Box<dyn Error>> {
+        match (&self.pose, &self.poses) {
+            (Some(pose), _) => Ok(vec![vec![pose.0]]),
+            (None, Some(path)) => {
+                parse_file(&read(path)?).map_err(|error| format!("{}: {error}", path.display()).into())
+            }
+            (None, None) => Ok(vec![vec![Pose::identity()]]),
+        }
+    }
+}
 
 /// Why a text holds no poses.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum PosesError {
+enum PosesError {
     /// A number is none.
     #[error("{place}'{text}' is not a number")]
     Number { place: String, text: String },
@@ -38,7 +71,7 @@ fn numbers<const N: usize>(
 }
 
 /// Trajectories of poses `r00 r01 r02 r10 .. r22 tx ty tz`, one a line, separated by blank lines.
-pub(super) fn parse_file(text: &str) -> Result<Vec<Vec<Pose>>, PosesError> {
+fn parse_file(text: &str) -> Result<Vec<Vec<Pose>>, PosesError> {
     let mut trajectories = vec![Vec::new()];
     for (index, line) in text.lines().enumerate() {
         if line.trim().is_empty() {

@@ -1,0 +1,115 @@
+//! `sublevel hierarchy`.
+
+use super::files::read_obstacle;
+use super::poses::PoseArgs;
+use super::progress::progress_bar;
+use crate::jobs::solve;
+use crate::measure::Pose;
+use crate::store::{HierarchyMeasure, HierarchyOutcome, HierarchyRequest, HierarchySet};
+use serde::Serialize;
+use std::error::Error;
+use std::io::{self, Write};
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+/// Bracket the distance of two sets that need not be convex, without a server
+///
+/// Where both sets are convex, 'measure' takes a microsecond and is exact. Sos-bodies ('fit
+/// --relax-convexity') need not be, and for them this command solves a semidefinite program of
+/// Lasserre's hierarchy: milliseconds at level 0 and up to minutes at level 2, so it is for offline
+/// work, such as checking where two hollow objects fit into each other, and not for a control loop.
+///
+/// Prints a proven bracket of the Euclidean distance, metres. Level 0 is exact for convex bodies; of
+/// other sets the lower bound may be too low (0 if nothing is known), and rises with the level: take
+/// the next one where the bracket is too wide. The upper bound is the distance of two points that
+/// are proven to lie in the sets; 'exact' says that both bounds are the same, to 1e-5 of the size of
+/// the sets. Points are in A's frame.
+///
+/// Of compounds bracket the parts one by one. A server does the same as a job: HierarchyService.
+///
+/// Example: sublevel hierarchy ring-d4-c10.json mug-d6-cinf.json --pose 0.5,0,0 --level 1
+#[derive(Debug, clap::Args)]
+pub(super) struct HierarchyArgs {
+    /// File of A, a body or an sos-body
+    a: PathBuf,
+    /// File of B
+    b: PathBuf,
+    #[command(flatten)]
+    at: PoseArgs,
+    /// Level of the hierarchy: 0, 1 or 2; each takes ten to a hundred times as long as the one
+    /// before
+    #[arg(long, value_name = "LEVEL", default_value_t = 0)]
+    level: usize,
+    /// Print one JSON object a line instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+/// One pose's bracket.
+#[derive(Serialize)]
+struct Line {
+    lower_m: f64,
+    upper_m: Option<f64>,
+    is_exact: bool,
+    level: usize,
+    point_a_m: Option<[f64; 3]>,
+    point_b_m: Option<[f64; 3]>,
+    iterations: usize,
+    seconds: f64,
+}
+
+impl Line {
+    fn new(level: usize, outcome: HierarchyOutcome) -> Self {
+        let HierarchyOutcome { lower, upper, points_m, is_exact, iterations, seconds } = outcome;
+        let [point_a_m, point_b_m] = [0, 1].map(|index: usize| points_m.map(|points| points[index]));
+        Self { lower_m: lower, upper_m: upper, is_exact, level, point_a_m, point_b_m, iterations, seconds }
+    }
+}
+
+/// Solves and prints, pose by pose.
+pub(super) fn run(args: &HierarchyArgs) -> Result<(), Box<dyn Error>> {
+    let trajectories = args.at.trajectories()?;
+    let sets = [read_obstacle(&args.a)?, read_obstacle(&args.b)?];
+    let ids = sets.each_ref().map(|set| *set.id());
+    let bar = progress_bar(&format!("{} and {}", sets[0].name(), sets[1].name()));
+    let mut out = io::stdout().lock();
+    for (index, pose) in trajectories.iter().flatten().enumerate() {
+        let number = index + 1;
+        let at = |index: usize, pose| HierarchySet { body: ids[index], pose };
+        let request = HierarchyRequest {
+            measure: HierarchyMeasure::Distance,
+            sets: [at(0, Pose::identity()), at(1, *pose)],
+            level: args.level,
+        };
+        let solved = solve(&request, &sets, &mut |said| {
+            bar.set_message(format!("pose {number}, step {}", said.iterations));
+            ControlFlow::Continue(())
+        });
+        let named = |error| format!("{}, {}, pose {number}: {error}", args.a.display(), args.b.display());
+        let line = Line::new(args.level, solved.map_err(named)?);
+        bar.suspend(|| print(&mut out, number, &line, args.json))?;
+    }
+    bar.finish_and_clear();
+    Ok(())
+}
+
+fn print(out: &mut impl Write, number: usize, line: &Line, json: bool) -> Result<(), Box<dyn Error>> {
+    if json {
+        serde_json::to_writer(&mut *out, line)?;
+        return Ok(writeln!(out)?);
+    }
+    if number == 1 {
+        writeln!(out, "{:>5}  {:>14}  {:>14}  exact  level  steps  seconds", "pose", "lower m", "upper m")?;
+    }
+    writeln!(
+        out,
+        "{number:>5}  {:>14.9}  {:>14}  {:>5}  {:>5}  {:>5}  {:>7.2}",
+        line.lower_m,
+        line.upper_m.map_or_else(|| "-".to_owned(), |upper| format!("{upper:.9}")),
+        if line.is_exact { "yes" } else { "no" },
+        line.level,
+        line.iterations,
+        line.seconds
+    )?;
+    Ok(())
+}
