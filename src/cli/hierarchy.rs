@@ -19,11 +19,11 @@ use std::path::PathBuf;
 /// Lasserre's hierarchy: milliseconds at level 0 and up to minutes at level 2, so it is for offline
 /// work, such as checking where two hollow objects fit into each other, and not for a control loop.
 ///
-/// Prints a proven bracket of the Euclidean distance, metres. Level 0 is exact for convex bodies; of
-/// other sets the lower bound may be too low (0 if nothing is known), and rises with the level: take
-/// the next one where the bracket is too wide. The upper bound is the distance of two points that
-/// are proven to lie in the sets; 'exact' says that both bounds are the same, to 1e-5 of the size of
-/// the sets. Points are in A's frame.
+/// Prints a proven bracket of the Euclidean distance, metres. Level 0 is exact for convex bodies;
+/// of other sets the lower bound may be too low (0 if nothing is known), and rises with the level:
+/// take the next one where the bracket is too wide. The upper bound is the distance of two points
+/// that are proven to lie in the sets; 'exact' says that both bounds are the same, to 1e-5 of the
+/// size of the sets. Points are in A's frame.
 ///
 /// Of compounds bracket the parts one by one. A server does the same as a job: HierarchyService.
 ///

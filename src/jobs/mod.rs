@@ -6,8 +6,8 @@
 //! any time leaves a state that was acknowledged.
 //!
 //! `request` checks what fits are asked for, `execute` does it, for whoever asks; `hierarchy` does
-//! both for solves; `obstacle` says which stored bodies can be used; `worker` does one job after the
-//! other; `board` is where it says how far it is, and where everybody waits for news.
+//! both for solves; `obstacle` says which stored bodies can be used; `worker` does one job after
+//! the other; `board` is where it says how far it is, and where everybody waits for news.
 
 mod board;
 mod execute;

@@ -19,8 +19,8 @@ const GROUP_DEGREE: usize = 4;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{field}: {why}")]
 pub struct RequestError {
-    /// Its name: of fits among the options of its mode or in [`FitRequest`], `group` for all options
-    /// of a group together; of solves in the message that asks for one; or `request_id`.
+    /// Its name: of fits among the options of its mode or in [`FitRequest`], `group` for all
+    /// options of a group together; of solves in the message that asks for one; or `request_id`.
     pub field: &'static str,
     /// The reason and the remedy.
     pub why: String,

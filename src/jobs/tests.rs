@@ -28,8 +28,7 @@ fn claimed() -> (tempfile::TempDir, Catalogue, u64) {
     (dir, catalogue, job.id)
 }
 
-/// The stop comes when the board does not know the job yet, so nobody says the fit; its points are
-/// gone all the same.
+/// The stop comes when the board does not know the job yet; the catalogue does.
 #[test]
 fn a_job_that_is_cancelled_before_it_is_on_the_board_makes_nothing() {
     let (_dir, catalogue, id) = claimed();

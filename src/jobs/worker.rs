@@ -1,5 +1,5 @@
-//! One job after the other, on one thread: jobs take a core for seconds to minutes, and queries need
-//! the others.
+//! One job after the other, on one thread: jobs take a core for seconds to minutes, and queries
+//! need the others.
 
 use std::any::Any;
 use std::ops::ControlFlow;

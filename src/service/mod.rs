@@ -3,8 +3,8 @@
 //!
 //! Only this layer and the client know protobuf. `incoming` lets connections in,
 //! `concurrency_limit` calls, and `message_limit` messages. A call walks straight through: a
-//! handler (`bodies`, `blobs`, `scenes`, `queries`, `fits`, `hierarchy`, `jobs`) reads its message with a
-//! `wire`, asks the catalogue or a scene's snapshot, and writes the answer with the `wire`;
+//! handler (`bodies`, `blobs`, `scenes`, `queries`, `fits`, `hierarchy`, `jobs`) reads its message
+//! with a `wire`, asks the catalogue or a scene's snapshot, and writes the answer with the `wire`;
 //! whatever fails becomes a status in `error`. Handlers are dropped when a client goes away, so
 //! every change runs in a task of its own and is finished or not begun, and every question is
 //! stopped.

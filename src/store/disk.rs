@@ -136,8 +136,8 @@ impl Store {
         .map_err(|error| StoreError::from_redb(&self.dir, error))
     }
 
-    /// Checks the format of the tables, makes them in a new file, or writes those of format 3 in the
-    /// present one.
+    /// Checks the format of the tables, makes them in a new file, or writes those of format 3 in
+    /// the present one.
     fn check_format(&self, database: &Database) -> Result<(), StoreError> {
         let (tables, found) = self.format(database)?;
         match found {

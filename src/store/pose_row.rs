@@ -17,8 +17,8 @@ impl PoseRow {
         Self { translation_m: (*pose.translation()).into(), rotation: pose.rotation().coords.into() }
     }
 
-    /// The pose with the very bits that were stored: a pose is normalised when it comes in, and once
-    /// only.
+    /// The pose with the very bits that were stored: a pose is normalised when it comes in, and
+    /// once only.
     pub(super) fn pose(&self) -> Result<Pose, PoseError> {
         Pose::from_quaternion(self.translation_m.into(), self.rotation)
     }
