@@ -16,6 +16,7 @@ mod measures;
 mod messages;
 pub mod numbers;
 pub mod scenes;
+pub mod sets;
 pub mod speed;
 pub mod stability;
 pub mod table1;

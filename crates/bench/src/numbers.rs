@@ -5,7 +5,7 @@ use crate::blocks::refreshed;
 use crate::csv::CsvError;
 use crate::measures;
 use crate::table1::Table1;
-use crate::{accuracy, cost, detail, fits, scenes, speed, warm};
+use crate::{accuracy, cost, detail, fits, scenes, sets, speed, warm};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use sublevel::cli;
@@ -18,6 +18,7 @@ enum Shown {
     Cost(cost::Shown),
     Fits(fits::Shown),
     Scenes(scenes::Shown),
+    Sets(sets::Shown),
     Detail(detail::Shown),
     Parts(detail::PartsShown),
     Table1(Table1),
@@ -36,6 +37,7 @@ impl Shown {
             "cost.csv" => cost::Shown::read(&text).map(Self::Cost),
             "fits.csv" => fits::Shown::read(&text).map(Self::Fits),
             "scenes.csv" => scenes::Shown::read(&text).map(Self::Scenes),
+            "sets.csv" => sets::Shown::read(&text).map(Self::Sets),
             "detail.csv" => detail::Shown::read(&text).map(Self::Detail),
             "detail-parts.csv" => detail::PartsShown::read(&text).map(Self::Parts),
             "table1.csv" => Table1::read(&text).map(Self::Table1),
@@ -56,6 +58,7 @@ impl Shown {
             Self::Cost(shown) => shown.block(name),
             Self::Fits(shown) => shown.block(name),
             Self::Scenes(shown) => shown.block(name),
+            Self::Sets(shown) => shown.block(name),
             Self::Detail(shown) => shown.block(name),
             Self::Parts(shown) => shown.block(name),
             Self::Table1(shown) => shown.block(name),
@@ -108,6 +111,7 @@ pub(crate) fn pictures(csv: &str, folder: &Path) -> Result<Vec<(String, String)>
         Shown::Cost(shown) => shown.pictures(),
         Shown::Fits(shown) => shown.pictures(),
         Shown::Scenes(shown) => shown.pictures(),
+        Shown::Sets(shown) => shown.pictures(),
         Shown::Detail(shown) => shown.pictures(),
         Shown::Parts(shown) => shown.pictures(),
         Shown::Table1(_) | Shown::Measures(_) => Ok(Vec::new()),

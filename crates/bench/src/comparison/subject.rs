@@ -19,7 +19,7 @@ const PAIRS: [(&str, &str); 7] = [
 const QUICK_PAIRS: usize = 2;
 
 /// Where the mesh of an object lies in the data.
-const FILES: [(&str, &str); 13] = [
+const FILES: [(&str, &str); 14] = [
     ("chair", "psb/101.off"),
     ("human", "psb/10.off"),
     ("hand", "psb/181.off"),
@@ -27,6 +27,7 @@ const FILES: [(&str, &str); 13] = [
     ("octopus", "psb/121.off"),
     ("mug", "meshes/mbm_mug.off"),
     ("table", "meshes/mbm_table.off"),
+    ("wingnut", "meshes/wingnut.off"),
     ("mustard", "meshes/ycb_mustardbottle.off"),
     ("scissors", "meshes/ycb_scissors.off"),
     ("banana", "meshes/ycb_banana.off"),

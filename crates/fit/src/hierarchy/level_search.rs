@@ -83,7 +83,7 @@ fn refined(sets: [&PlacedSet; 2], start: Vector3<f64>) -> Option<Vector3<f64>> {
     bounds.truncate(MAX_ACTIVE - levels.len());
     let mut x = start;
     for _ in 0..MAX_CHANGES {
-        let active = [&levels, &bounds].map(|list| list.iter().copied().collect::<Vec<_>>());
+        let active = [&levels, &bounds].map(|list| list.to_vec());
         let of = |side: usize| active[side].iter().map(|&i| constraints[side][i]).collect::<Vec<_>>();
         let (next, multipliers) = stationary([&of(0), &of(1)], x, 0.3 * sets[1].radius_m())?;
         x = next;
