@@ -706,13 +706,16 @@ fn hierarchy_brackets_sets_that_need_not_be_convex() {
 
     // Two balls, whose distance is known.
     let exact = json(&["hierarchy", ball, ball, "--pose", "0,3,4", "--json"]);
-    let fields = "lower_m upper_m is_exact level point_a_m point_b_m iterations seconds";
+    let fields = "lower upper is_exact level point_a_m point_b_m iterations seconds";
     assert_eq!(keys(&exact), sorted(fields));
     let number = |line: &Value, key: &str| line[key].as_f64().unwrap();
-    let (lower, upper) = (number(&exact, "lower_m"), number(&exact, "upper_m"));
+    let (lower, upper) = (number(&exact, "lower"), number(&exact, "upper"));
     assert!(lower <= 4.0 && 4.0 <= upper && upper - lower < 1e-5, "{exact}");
     assert_eq!((&exact["is_exact"], &exact["level"]), (&true.into(), &0.into()));
     assert!((exact["point_a_m"][1].as_f64().unwrap() - 0.3).abs() < 1e-3, "{exact}");
+    // The polynomial of a ball of 0.5 m at 4.5 m.
+    let level = json(&["hierarchy", ball, ball, "--pose", "0,3,4", "--measure", "level-distance", "--json"]);
+    assert!((number(&level, "lower") - 81.0).abs() < 1e-3 && level["is_exact"] == true, "{level}");
 
     // One pose a line, at a level of choice; the bound rises with the level.
     let poses = path("poses.txt");
@@ -726,9 +729,9 @@ fn hierarchy_brackets_sets_that_need_not_be_convex() {
     let (first, next) = (brackets("0"), brackets("1"));
     assert_eq!((first.len(), next.len()), (2, 2));
     for (first, next) in first.iter().zip(&next) {
-        let highest = number(first, "upper_m").min(number(next, "upper_m"));
-        assert!(0.0 < number(next, "lower_m") && number(next, "lower_m") <= highest, "{first} {next}");
-        assert!(number(first, "lower_m") <= number(next, "lower_m") + 1e-4, "{first} {next}");
+        let highest = number(first, "upper").min(number(next, "upper"));
+        assert!(0.0 < number(next, "lower") && number(next, "lower") <= highest, "{first} {next}");
+        assert!(number(first, "lower") <= number(next, "lower") + 1e-4, "{first} {next}");
         assert_eq!((&first["level"], &next["level"]), (&0.into(), &1.into()));
     }
     let table = String::from_utf8(sublevel(&["hierarchy", ball, ball, "--pose", "3,0,0"]).stdout).unwrap();

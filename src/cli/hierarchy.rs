@@ -19,10 +19,11 @@ use std::path::PathBuf;
 /// Lasserre's hierarchy: milliseconds at level 0 and up to minutes at level 2, so it is for offline
 /// work, such as checking where two hollow objects fit into each other, and not for a control loop.
 ///
-/// Prints a proven bracket of the Euclidean distance, metres. Level 0 is exact for convex bodies;
+/// Prints a proven bracket of the Euclidean distance, metres, or with '--measure level-distance' of
+/// d(A||B) = min p_A over B, dimensionless. Level 0 is exact for convex bodies;
 /// of other sets the lower bound may be too low (0 if nothing is known), and rises with the level:
-/// take the next one where the bracket is too wide. The upper bound is the distance of two points
-/// that are proven to lie in the sets; 'exact' says that both bounds are the same, to 1e-5 of the
+/// take the next one where the bracket is too wide. The upper bound is the value at points that are
+/// proven to lie in the sets; 'exact' says that both bounds are the same, to 1e-5 of the
 /// size of the sets. Points are in A's frame.
 ///
 /// Of compounds bracket the parts one by one. A server does the same as a job: HierarchyService.
@@ -36,6 +37,9 @@ pub(super) struct HierarchyArgs {
     b: PathBuf,
     #[command(flatten)]
     at: PoseArgs,
+    /// What to bracket
+    #[arg(long, value_enum, default_value_t = Bracketed::Distance)]
+    measure: Bracketed,
     /// Level of the hierarchy: 0, 1 or 2; each takes ten to a hundred times as long as the one
     /// before
     #[arg(long, value_name = "LEVEL", default_value_t = 0)]
@@ -45,11 +49,29 @@ pub(super) struct HierarchyArgs {
     json: bool,
 }
 
-/// One pose's bracket.
+/// What can be bracketed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Bracketed {
+    /// Euclidean distance, metres
+    Distance,
+    /// Level distance d(A‖B), dimensionless
+    LevelDistance,
+}
+
+impl From<Bracketed> for HierarchyMeasure {
+    fn from(measure: Bracketed) -> Self {
+        match measure {
+            Bracketed::Distance => Self::Distance,
+            Bracketed::LevelDistance => Self::LevelAOnB,
+        }
+    }
+}
+
+/// One pose's bracket; bounds have the unit of the measure.
 #[derive(Serialize)]
 struct Line {
-    lower_m: f64,
-    upper_m: Option<f64>,
+    lower: f64,
+    upper: Option<f64>,
     is_exact: bool,
     level: usize,
     point_a_m: Option<[f64; 3]>,
@@ -62,7 +84,7 @@ impl Line {
     fn new(level: usize, outcome: HierarchyOutcome) -> Self {
         let HierarchyOutcome { lower, upper, points_m, is_exact, iterations, seconds } = outcome;
         let [point_a_m, point_b_m] = [0, 1].map(|index: usize| points_m.map(|points| points[index]));
-        Self { lower_m: lower, upper_m: upper, is_exact, level, point_a_m, point_b_m, iterations, seconds }
+        Self { lower, upper, is_exact, level, point_a_m, point_b_m, iterations, seconds }
     }
 }
 
@@ -77,7 +99,7 @@ pub(super) fn run(args: &HierarchyArgs) -> Result<(), Box<dyn Error>> {
         let number = index + 1;
         let at = |index: usize, pose| HierarchySet { body: ids[index], pose };
         let request = HierarchyRequest {
-            measure: HierarchyMeasure::Distance,
+            measure: args.measure.into(),
             sets: [at(0, Pose::identity()), at(1, *pose)],
             level: args.level,
         };
@@ -99,13 +121,13 @@ fn print(out: &mut impl Write, number: usize, line: &Line, json: bool) -> Result
         return Ok(writeln!(out)?);
     }
     if number == 1 {
-        writeln!(out, "{:>5}  {:>14}  {:>14}  exact  level  steps  seconds", "pose", "lower m", "upper m")?;
+        writeln!(out, "{:>5}  {:>14}  {:>14}  exact  level  steps  seconds", "pose", "lower", "upper")?;
     }
     writeln!(
         out,
         "{number:>5}  {:>14.9}  {:>14}  {:>5}  {:>5}  {:>5}  {:>7.2}",
-        line.lower_m,
-        line.upper_m.map_or_else(|| "-".to_owned(), |upper| format!("{upper:.9}")),
+        line.lower,
+        line.upper.map_or_else(|| "-".to_owned(), |upper| format!("{upper:.9}")),
         if line.is_exact { "yes" } else { "no" },
         line.level,
         line.iterations,

@@ -6,7 +6,10 @@ use nalgebra::{Isometry3, Translation3};
 
 use super::request::{RequestError, check_request_id};
 use crate::body::Obstacle;
-use crate::fit::{self, HierarchyError, MAX_LEVEL, PlacedSet, check_hierarchy, hierarchy_distance};
+use crate::fit::{
+    self, HierarchyError, MAX_LEVEL, PlacedSet, check_hierarchy, check_hierarchy_level, hierarchy_distance,
+    hierarchy_level_distance,
+};
 use crate::store::{HierarchyMeasure, HierarchyOutcome, HierarchyRequest, HierarchySet};
 
 /// Names of the two sets in a [`RequestError`].
@@ -31,7 +34,11 @@ pub fn check_solve(request_id: &str, request: &HierarchyRequest) -> Result<(), R
 /// the program would be too large.
 pub fn check_solve_of(request: &HierarchyRequest, sets: &[Obstacle; 2]) -> Result<(), RequestError> {
     let [a, b] = placed(request, sets);
-    check_hierarchy([&a, &b], request.level).map_err(|error| match error {
+    let checked = match request.measure {
+        HierarchyMeasure::Distance => check_hierarchy([&a, &b], request.level),
+        HierarchyMeasure::LevelAOnB => check_hierarchy_level([&a, &b], request.level),
+    };
+    checked.map_err(|error| match error {
         HierarchyError::Set { index, why } => RequestError::new(SETS[index.min(1)], why),
         HierarchyError::NoPolynomial(index) => RequestError::new(SETS[index.min(1)], error),
         _ => RequestError::new("level", error),
@@ -48,16 +55,35 @@ pub fn solve(
     progress: &mut dyn FnMut(fit::Progress) -> ControlFlow<()>,
 ) -> Result<HierarchyOutcome, HierarchyError> {
     let [a, b] = placed(request, sets);
-    let bound = match request.measure {
-        HierarchyMeasure::Distance => hierarchy_distance([&a, &b], request.level, progress)?,
+    let outcome = match request.measure {
+        HierarchyMeasure::Distance => {
+            let bound = hierarchy_distance([&a, &b], request.level, progress)?;
+            HierarchyOutcome {
+                lower: bound.lower_m,
+                upper: Some(bound.upper_m),
+                points_m: bound.points.map(|points| points.map(Into::into)),
+                is_exact: bound.is_exact,
+                iterations: bound.iterations,
+                seconds: bound.seconds,
+            }
+        }
+        HierarchyMeasure::LevelAOnB => {
+            let bound = hierarchy_level_distance([&a, &b], request.level, progress)?;
+            HierarchyOutcome {
+                lower: bound.lower,
+                upper: Some(bound.upper),
+                points_m: bound.point.map(|point| [point.into(); 2]),
+                is_exact: bound.is_exact,
+                iterations: bound.iterations,
+                seconds: bound.seconds,
+            }
+        }
     };
+    // What is kept as JSON is finite.
     Ok(HierarchyOutcome {
-        lower: bound.lower_m,
-        upper: Some(bound.upper_m).filter(|upper| upper.is_finite()),
-        points_m: bound.points.map(|points| points.map(Into::into)),
-        is_exact: bound.is_exact,
-        iterations: bound.iterations,
-        seconds: bound.seconds,
+        lower: outcome.lower.max(f64::MIN),
+        upper: outcome.upper.filter(|upper| upper.is_finite()),
+        ..outcome
     })
 }
 

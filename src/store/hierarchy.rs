@@ -25,6 +25,8 @@ pub enum HierarchyMeasure {
     /// Euclidean distance, metres.
     #[default]
     Distance,
+    /// Level distance d(A‖B), dimensionless.
+    LevelAOnB,
 }
 
 /// A stored set at a pose.
@@ -44,9 +46,9 @@ pub struct HierarchySet {
 pub struct HierarchyOutcome {
     /// Proven lower bound.
     pub lower: f64,
-    /// Value at two points that are proven to lie in the sets, if such were found.
+    /// Value at two points that are proven to lie in the sets, or at one of B, if such were found.
     pub upper: Option<f64>,
-    /// These points, world frame, metres.
+    /// These points, world frame, metres; the one of B twice.
     pub points_m: Option<[[f64; 3]; 2]>,
     /// Whether the lower bound is the value, to the accuracy of the solver.
     pub is_exact: bool,

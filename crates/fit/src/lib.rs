@@ -80,8 +80,8 @@ pub use error::FitError;
 pub use fitted::{Fit, FitReport, Rung};
 pub use gap::{Gap, gap};
 pub use hierarchy::{
-    HierarchyBound, HierarchyError, HierarchyLevelBound, MAX_LEVEL, PlacedSet, check_hierarchy, hierarchy_distance,
-    hierarchy_level_distance,
+    HierarchyBound, HierarchyError, HierarchyLevelBound, MAX_LEVEL, PlacedSet, check_hierarchy, check_hierarchy_level,
+    hierarchy_distance, hierarchy_level_distance,
 };
 pub use hull::HullError;
 pub use input::{

@@ -13,8 +13,10 @@ use crate::store::{HierarchyMeasure, HierarchyOutcome, HierarchyRequest, Hierarc
 pub(in crate::service) const BODIES: [&str; 2] = ["a.body_id", "b.body_id"];
 
 /// Measures of messages and of requests.
-const MEASURES: [(proto::HierarchyMeasure, HierarchyMeasure); 1] =
-    [(proto::HierarchyMeasure::Distance, HierarchyMeasure::Distance)];
+const MEASURES: [(proto::HierarchyMeasure, HierarchyMeasure); 2] = [
+    (proto::HierarchyMeasure::Distance, HierarchyMeasure::Distance),
+    (proto::HierarchyMeasure::LevelDistanceAOnB, HierarchyMeasure::LevelAOnB),
+];
 
 /// The request's id, and the request, checked but for its bodies.
 pub(super) fn request(message: &CreateHierarchySolveRequest) -> Result<(String, HierarchyRequest), Invalid> {
@@ -126,8 +128,8 @@ mod tests {
         let pose = Pose::from_quaternion([0.1, -1e-300, 1.0 / 3.0].into(), [0.6, 0.0, 0.8, 0.0]).expect("a pose");
         let set = |digit: &str, pose| HierarchySet { body: digit.repeat(64).parse().expect("an id"), pose };
         let sets = [set("a", pose), set("7", Pose::identity())];
-        for level in 0..=2 {
-            let asked = HierarchyRequest { measure: HierarchyMeasure::Distance, sets, level };
+        for (level, measure) in [(0, MEASURES[0].1), (1, MEASURES[1].1), (2, MEASURES[1].1)] {
+            let asked = HierarchyRequest { measure, sets, level };
             assert_eq!(request(&message(&asked)).expect("usable"), (String::new(), asked));
             let sent = task(&asked, None, None);
             assert_eq!((&sent.a, &sent.b, sent.level), (&message(&asked).a, &message(&asked).b, level as u32));

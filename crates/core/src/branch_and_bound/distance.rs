@@ -2,7 +2,7 @@
 
 use super::cover::{Cell, CellIndex, Cover};
 use super::limits::Limits;
-use super::local_search::PairSearch;
+use super::local_search::{NearPoints, PairSearch};
 use super::placed_set::{BoundedSet, PlacedSet, PlacedSetError};
 use super::placing::Placing;
 use super::waiting::Waiting;
@@ -46,7 +46,7 @@ impl PairDivision<'_, '_> {
         ];
         let slack = placings[0].slack_m + placings[1].slack_m;
         let search = PairSearch::new(self.sets).ok_or(PlacedSetError::Normalization)?;
-        let mut best: Option<(f64, [Vector3<f64>; 2])> = None;
+        let mut best: Option<NearPoints> = None;
         let mut waiting = BinaryHeap::from([Waiting { lower: 0.0, place: [0; 2] }]);
         // Least bound of the pairs that are not divided further.
         let (mut settled, mut steps, mut next_search) = (f64::INFINITY, 0, 0);
@@ -65,7 +65,9 @@ impl PairDivision<'_, '_> {
             };
             let both = [0, 1].map(|side| self.covers[self.of[side]].cell(cells[side]));
             if steps >= next_search {
-                search.improve([placings[0].center(both[0]), placings[1].center(both[1])], &mut best);
+                let start = [placings[0].center(both[0]), placings[1].center(both[1])];
+                let found = search.from(start).into_iter().flatten().chain(best);
+                best = found.min_by(|a, b| a.0.total_cmp(&b.0));
                 next_search = steps + 1 + steps / 2;
             }
             steps += 1;

@@ -6,30 +6,36 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 /// Newton steps at most.
 const MAX_STEPS: usize = 40;
 
-/// Steps that pull a point into its set.
-const MAX_PULLS: usize = 60;
-
 /// Largest step, relative to the radius of the smaller set: the model is good near by only.
 const LARGEST_STEP: f64 = 0.3;
 
 /// Length of a step at which the method has converged, relative to the largest.
 const CONVERGED: f64 = 1e-14;
 
-/// The least distance of two points that were found and are proven to lie in the sets, metres, and
-/// the points: 0 and one point twice if it is in both. Newton's method begins at each of the starts.
+/// Near points of two sets, proven to lie in them, and their distances, metres, the nearest first;
+/// one point, at distance 0, if one was found that is in both. Newton's method begins at each of the
+/// starts.
 pub fn nearest_points(
     sets: [&PlacedSet<'_>; 2],
     starts: impl IntoIterator<Item = [Vector3<f64>; 2]>,
-) -> Option<(f64, [Vector3<f64>; 2])> {
-    let search = PairSearch::new(sets)?;
-    let mut best = None;
+) -> Vec<NearPoints> {
+    let Some(search) = PairSearch::new(sets) else { return Vec::new() };
+    let mut found = Vec::new();
     for start in starts {
-        if search.improve(start, &mut best) {
+        found.extend(search.from(start).into_iter().flatten());
+        if found.last().is_some_and(|near: &NearPoints| near.0 == 0.0) {
             break;
         }
     }
-    best
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    if found.first().is_some_and(|nearest| nearest.0 == 0.0) {
+        found.truncate(1);
+    }
+    found
 }
+
+/// Two points that are proven to lie in two sets, and their distance, metres.
+pub type NearPoints = (f64, [Vector3<f64>; 2]);
 
 /// Two sets, ready to be searched.
 pub(super) struct PairSearch<'a> {
@@ -47,22 +53,22 @@ impl<'a> PairSearch<'a> {
         Some(Self { sets, members, linear: sets.map(PlacedSet::linear), largest_step })
     }
 
-    /// Replaces the best pair of points by a nearer one, if it finds one; whether a point is in both
-    /// sets.
-    pub(super) fn improve(&self, start: [Vector3<f64>; 2], best: &mut Option<(f64, [Vector3<f64>; 2])>) -> bool {
-        self.keep(start, best) || self.refined(start).is_some_and(|points| self.keep(points, best))
+    /// Near points at the start, and where Newton's method leads from there; the latter are left out
+    /// if the former are one point in both sets.
+    pub(super) fn from(&self, start: [Vector3<f64>; 2]) -> [Option<NearPoints>; 2] {
+        let here = self.pulled(start);
+        if here.is_some_and(|near| near.0 == 0.0) {
+            return [here, None];
+        }
+        [here, self.refined(start).and_then(|points| self.pulled(points))]
     }
 
-    fn keep(&self, points: [Vector3<f64>; 2], best: &mut Option<(f64, [Vector3<f64>; 2])>) -> bool {
-        let pulled = |side: usize| pulled(self.sets[side], &self.members[side], &self.linear[side], points[side]);
-        let (Some(x), Some(y)) = (pulled(0), pulled(1)) else { return false };
+    /// Points pulled into the sets.
+    fn pulled(&self, points: [Vector3<f64>; 2]) -> Option<NearPoints> {
+        let (x, y) = (self.members[0].pulled(points[0])?, self.members[1].pulled(points[1])?);
         // One point in both is no distance apart.
         let common = [x, y].into_iter().find(|z| self.members.iter().all(|set| set.contains(z)));
-        let found = common.map_or((distance_up(&x, &y), [x, y]), |z| (0.0, [z, z]));
-        if best.is_none_or(|(least, _)| found.0 < least) {
-            *best = Some(found);
-        }
-        common.is_some()
+        Some(common.map_or((distance_up(&x, &y), [x, y]), |z| (0.0, [z, z])))
     }
 
     /// Newton's method on `x - y + λ∇g(x) = 0, y - x + μ∇h(y) = 0, g(x) = h(y) = 1`.
@@ -115,28 +121,6 @@ impl<'a> PairSearch<'a> {
 /// Rounded up.
 pub(super) fn distance_up(x: &Vector3<f64>, y: &Vector3<f64>) -> f64 {
     ((x - y).norm() * (1.0 + 8.0 * f64::EPSILON)).next_up()
-}
-
-/// The point moved against the gradient until it is proven inside; none if it does not get there.
-pub(super) fn pulled(
-    set: &PlacedSet<'_>,
-    member: &Membership<'_>,
-    linear: &Matrix3<f64>,
-    mut x: Vector3<f64>,
-) -> Option<Vector3<f64>> {
-    let mut extra = 1e-14;
-    for _ in 0..MAX_PULLS {
-        if member.contains(&x) {
-            return Some(x);
-        }
-        let (g, z) = set.largest_at(&x);
-        let jet = g.evaluate(&z);
-        let gradient = linear.tr_mul(&jet.gradient);
-        let excess = (jet.value - 1.0).max(0.0) + extra;
-        extra *= 4.0;
-        x -= gradient * (excess / gradient.norm_squared().max(f64::MIN_POSITIVE));
-    }
-    None
 }
 
 /// A local minimiser of `objective` over a set: Newton's method on `∇f + λ∇g = 0, g = 1` for the

@@ -3,7 +3,7 @@
 use super::cover::Cover;
 use super::goal::Goal;
 use super::limits::Limits;
-use super::local_search::{pulled, refined_on};
+use super::local_search::refined_on;
 use super::placed_set::{PlacedSet, PlacedSetError};
 use super::placing::Placing;
 use super::waiting::Waiting;
@@ -42,7 +42,7 @@ pub(super) fn minimise(
         let on_boundary = refined_on(set, &linear, start, true, |x| goal.derivatives(x));
         let inside = goal.may_be_inside().then(|| refined_on(set, &linear, start, false, |x| goal.derivatives(x)));
         for point in [Some(start), on_boundary, inside.flatten()].into_iter().flatten() {
-            let Some(point) = pulled(set, &member, &linear, point) else { continue };
+            let Some(point) = member.pulled(point) else { continue };
             let value = goal.value_up(&point).max(known);
             if best.is_none_or(|(least, _)| value < least) {
                 *best = Some((value, point));

@@ -28,8 +28,8 @@ mod workspace;
 
 pub use distance::SetDistance;
 pub use limits::{DEFAULT_STEPS, Limits};
-pub use local_search::nearest_points;
-pub use placed_set::{BoundedSet, PlacedSet, PlacedSetError};
+pub use local_search::{NearPoints, nearest_points};
+pub use placed_set::{BoundedSet, Membership, PlacedSet, PlacedSetError};
 pub use single::{SetHeight, SetLevelDistance, SetPointDistance};
 pub use workspace::BranchAndBound;
 

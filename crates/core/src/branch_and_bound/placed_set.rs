@@ -9,6 +9,9 @@ use nalgebra::{Matrix3, Vector3};
 /// of unit length to a few units in the last place, applied in some thirty operations.
 const POSE_ROUNDING: f64 = 128.0 * f64::EPSILON;
 
+/// Steps that pull a point into its set.
+const MAX_PULLS: usize = 60;
+
 /// A basic set in its own frame, with a box that holds it.
 #[derive(Clone, Debug)]
 pub struct BoundedSet<'a> {
@@ -127,8 +130,8 @@ impl<'a> PlacedSet<'a> {
         self.of.set.normalization.linear * self.pose.rotation().to_rotation_matrix().into_inner().transpose()
     }
 
-    /// A test whether points are in the set.
-    pub(super) fn membership(&self) -> Option<Membership<'_>> {
+    /// A test whether points are in the set; none where its map cannot be inverted.
+    pub fn membership(&self) -> Option<Membership<'_>> {
         let normalization = self.of.set.normalization;
         let inverse = normalization.linear.try_inverse()?;
         let placement = Placement::new(normalization.linear, inverse, normalization.center, 0.0, 0.0);
@@ -141,14 +144,14 @@ impl<'a> PlacedSet<'a> {
 }
 
 /// Whether points of the common frame are in a set.
-pub(super) struct Membership<'a> {
+pub struct Membership<'a> {
     set: &'a PlacedSet<'a>,
     placement: Placement,
 }
 
 impl Membership<'_> {
     /// Whether a point is proven to be in the set, wherever the rounding of the pose leads.
-    pub(super) fn contains(&self, x: &Vector3<f64>) -> bool {
+    pub fn contains(&self, x: &Vector3<f64>) -> bool {
         let PlacedSet { of, pose } = self.set;
         let Aabb { min, max } = of.bounding_box;
         let rounding = POSE_ROUNDING * (x.norm() + pose.translation().norm());
@@ -157,12 +160,30 @@ impl Membership<'_> {
             && of.set.polynomials.iter().all(|g| self.placement.sample_of(g, &body).value_upper(rounding) <= 1.0)
     }
 
-    /// Upper bound of the largest polynomial at a point.
-    pub(super) fn largest_value(&self, x: &Vector3<f64>) -> f64 {
+    /// The point moved against the gradient until it is proven inside; none if it does not get there.
+    pub fn pulled(&self, mut x: Vector3<f64>) -> Option<Vector3<f64>> {
+        let linear = self.set.linear();
+        let mut extra = 1e-14;
+        for _ in 0..MAX_PULLS {
+            if self.contains(&x) {
+                return Some(x);
+            }
+            let (g, z) = self.set.largest_at(&x);
+            let jet = g.evaluate(&z);
+            let gradient = linear.tr_mul(&jet.gradient);
+            let excess = (jet.value - 1.0).max(0.0) + extra;
+            extra *= 4.0;
+            x -= gradient * (excess / gradient.norm_squared().max(f64::MIN_POSITIVE));
+        }
+        None
+    }
+
+    /// Upper bound of the largest polynomial at a point; NaN where one is not a number.
+    pub fn largest_value(&self, x: &Vector3<f64>) -> f64 {
         let PlacedSet { of, pose } = self.set;
         let rounding = POSE_ROUNDING * (x.norm() + pose.translation().norm());
         let body = self.set.to_body(x);
         let values = of.set.polynomials.iter().map(|g| self.placement.sample_of(g, &body).value_upper(rounding));
-        values.fold(f64::NEG_INFINITY, f64::max)
+        values.fold(f64::NEG_INFINITY, |most, value| if value.is_nan() { value } else { most.max(value) })
     }
 }

@@ -3,7 +3,7 @@
 use super::level_search::lowest_points;
 use super::minimisers::{are_all, attaining};
 use super::moments::MomentRelaxation;
-use super::{EXACT, HierarchyError, PlacedSet, check, solved};
+use super::{EXACT, HierarchyError, PlacedSet, check, check_size, solved};
 use crate::error::FitError;
 use crate::program::ProgramError;
 use crate::progress::{Progress, Watch};
@@ -74,12 +74,8 @@ pub fn hierarchy_level_distance(
     progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<HierarchyLevelBound, HierarchyError> {
     let start = Instant::now();
-    check(sets, level)?;
-    let [first, second] = sets;
-    let polynomials = &first.set.polynomials;
-    let map = second.frame_in(1, first)?;
-    let objectives: Vec<_> = polynomials.iter().map(|p| PairPolynomial::substituted(p, &map, Point::First)).collect();
-    let degree = polynomials.iter().map(|p| p.degree()).max().unwrap_or(2);
+    let (objectives, degree) = checked(sets, level)?;
+    let second = sets[1];
     let [a, b, c] = second.coordinate_bounds();
     let most = [a, b, c, 0.0, 0.0, 0.0];
     // What the box alone says: each p_i is a lower bound of the largest.
@@ -132,6 +128,27 @@ pub fn hierarchy_level_distance(
         iterations: watch.progress().iterations,
         seconds: start.elapsed().as_secs_f64(),
     })
+}
+
+/// Whether the bracket of a level distance can be asked for at a level, without a solve: what
+/// [`hierarchy_level_distance`] refuses before it builds its program. Takes milliseconds.
+///
+/// # Errors
+/// [`HierarchyError`]: sets that cannot be used, a level that is too high, and a program that would
+/// be too large.
+pub fn check_hierarchy_level(sets: [&PlacedSet; 2], level: usize) -> Result<(), HierarchyError> {
+    let (objectives, degree) = checked(sets, level)?;
+    check_size(&MomentRelaxation::of_one(&objectives, degree, sets[1], level), level)
+}
+
+/// The polynomials of the first set in the coordinates of the second, and their largest degree.
+fn checked(sets: [&PlacedSet; 2], level: usize) -> Result<(Vec<PairPolynomial>, usize), HierarchyError> {
+    check(sets, level)?;
+    let [first, second] = sets;
+    let polynomials = &first.set.polynomials;
+    let map = second.frame_in(1, first)?;
+    let objectives = polynomials.iter().map(|p| PairPolynomial::substituted(p, &map, Point::First)).collect();
+    Ok((objectives, polynomials.iter().map(|p| p.degree()).max().unwrap_or(2)))
 }
 
 /// Width of a bracket at which it is called exact.

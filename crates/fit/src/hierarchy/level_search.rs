@@ -1,7 +1,6 @@
 //! Points of one set where the largest polynomial of another is low, by Newton's method from many
 //! starts.
 
-use super::local_search::pulled;
 use super::placed_set::PlacedSet;
 use nalgebra::{DMatrix, DVector, Vector3};
 use sublevel_core::polynomial::{Jet, Polynomial};
@@ -21,12 +20,13 @@ const MAX_ACTIVE: usize = 4;
 /// polynomial of the first set there, the lowest first: from guesses, or where there are none from
 /// the middles of the sets and from points that the second set comes with.
 pub(super) fn lowest_points(sets: [&PlacedSet; 2], guesses: &[Vector3<f64>]) -> Vec<(f64, [Vector3<f64>; 1])> {
-    let (Some(levels), Some(member)) = (sets[0].membership(), sets[1].membership()) else { return Vec::new() };
+    let (Some(first), Some(second)) = (sets[0].posed(), sets[1].posed()) else { return Vec::new() };
+    let (Some(levels), Some(member)) = (first.membership(), second.membership()) else { return Vec::new() };
     let starts = if guesses.is_empty() { starts(sets) } else { guesses.to_vec() };
     let candidates = starts.into_iter().flat_map(|start| [Some(start), refined(sets, start)]).flatten();
     let found = candidates.filter_map(|x| {
-        let x = pulled(sets[1], &member, x)?;
-        let upper = levels.value_upper(&x);
+        let x = member.pulled(x)?;
+        let upper = levels.largest_value(&x);
         upper.is_finite().then_some((upper, [x]))
     });
     let mut found: Vec<_> = found.collect();

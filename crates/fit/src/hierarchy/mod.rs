@@ -31,7 +31,7 @@ mod placed_set;
 
 use error::MAX_ROWS;
 pub use error::{HierarchyError, MAX_LEVEL};
-pub use level::{HierarchyLevelBound, hierarchy_level_distance};
+pub use level::{HierarchyLevelBound, check_hierarchy_level, hierarchy_level_distance};
 pub use placed_set::PlacedSet;
 
 use crate::conic_program::{ConicSolution, solve};

@@ -2,7 +2,9 @@
 
 use super::error::HierarchyError;
 use nalgebra::{Isometry3, Vector3};
-use sublevel_core::body::{Aabb, BasicSet, Body, Normalization, Obstacle, Placement, SosBody};
+use sublevel_core::body::{Aabb, BasicSet, Body, Normalization, Obstacle, SosBody};
+use sublevel_core::branch_and_bound::{self, BoundedSet};
+use sublevel_core::measure::Pose;
 use sublevel_core::polynomial::{Polynomial, Substitution};
 
 /// A basic set at a pose.
@@ -18,10 +20,6 @@ pub struct PlacedSet<'a> {
     /// begins. They prove nothing.
     pub near_boundary: Vec<Vector3<f64>>,
 }
-
-/// Bound of the rounding of a point moved by a pose, relative to point and translation: a quaternion
-/// of unit length to a few units in the last place, applied in some thirty operations.
-const POSE_ROUNDING: f64 = 128.0 * f64::EPSILON;
 
 /// Largest deviation of the squared length of a quaternion from 1.
 const UNIT_LENGTH: f64 = 2e-15;
@@ -132,40 +130,10 @@ impl<'a> PlacedSet<'a> {
         Ok(self.frame(index)?.then_normalized(linear, center, &rotation, &other.pose.translation.vector))
     }
 
-    /// A test whether points are in the set.
-    pub(super) fn membership(&self) -> Option<Membership<'_>> {
-        let normalization = self.set.normalization;
-        let inverse = normalization.linear.try_inverse()?;
-        Some(Membership {
-            set: self,
-            placement: Placement::new(normalization.linear, inverse, normalization.center, 0.0, 0.0),
-        })
-    }
-}
-
-/// Whether points of the common frame are in a set.
-pub(super) struct Membership<'a> {
-    set: &'a PlacedSet<'a>,
-    placement: Placement,
-}
-
-impl Membership<'_> {
-    /// Whether a point is proven to be in the set, wherever the rounding of the pose leads.
-    pub(super) fn holds(&self, x: &Vector3<f64>) -> bool {
-        let PlacedSet { set, bounding_box: Aabb { min, max }, pose, .. } = self.set;
-        let rounding = POSE_ROUNDING * (x.norm() + pose.translation.vector.norm());
-        let body = pose.inverse_transform_point(&(*x).into()).coords;
-        (0..3).all(|axis| body[axis] - rounding >= min[axis] && body[axis] + rounding <= max[axis])
-            && set.polynomials.iter().all(|g| self.placement.sample_of(g, &body).value_upper(rounding) <= 1.0)
-    }
-
-    /// Proven upper bound of the largest polynomial at a point, wherever the rounding of the pose
-    /// leads; NaN where one is not a number.
-    pub(super) fn value_upper(&self, x: &Vector3<f64>) -> f64 {
-        let PlacedSet { set, pose, .. } = self.set;
-        let rounding = POSE_ROUNDING * (x.norm() + pose.translation.vector.norm());
-        let body = pose.inverse_transform_point(&(*x).into()).coords;
-        let values = set.polynomials.iter().map(|g| self.placement.sample_of(g, &body).value_upper(rounding));
-        values.fold(f64::NEG_INFINITY, |most, value| if value.is_nan() { value } else { most.max(value) })
+    /// The same for [`sublevel_core::branch_and_bound`]; none of a pose that is none.
+    pub(super) fn posed(&self) -> Option<branch_and_bound::PlacedSet<'a>> {
+        let pose = Pose::from_quaternion(self.pose.translation.vector, self.pose.rotation.coords.into()).ok()?;
+        let of = BoundedSet { set: self.set.clone(), bounding_box: self.bounding_box, id: None };
+        Some(branch_and_bound::PlacedSet { of, pose })
     }
 }

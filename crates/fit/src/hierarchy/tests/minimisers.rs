@@ -24,7 +24,7 @@ fn check(found: &HierarchyBound, sets: [&PlacedSet; 2], expected: usize) {
     for points in &found.minimisers {
         assert!((points[0] - points[1]).norm() <= found.lower_m + 1e-5 * 4.0);
         for (set, point) in sets.iter().zip(points) {
-            assert!(set.membership().unwrap().holds(point));
+            assert!(set.posed().unwrap().membership().unwrap().contains(point));
         }
     }
 }
