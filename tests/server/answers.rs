@@ -4,7 +4,9 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use sublevel::body::Body;
 use sublevel::service::proto::{self, Answer, EvaluateRequest, Measure, UpdateSceneRequest};
 
-use crate::harness::{Clients, Numbers, Running, at, ball, moved, object, pair, question, rows};
+use sublevel_testkit::sos_bodies::torus;
+
+use crate::harness::{Clients, Numbers, Running, at, ball, field, moved, object, pair, question, rows};
 
 /// Distance and both level distances of the objects `a` and `b` of the scene `room`, `b` elsewhere
 /// for this call.
@@ -118,4 +120,38 @@ async fn saturated_levels_say_so() {
     assert!(ab.saturated && ab.multiplier == Some(0.0) && ab.gradient_a.expect("one").linear == Some(still), "{ab:?}");
     let value = ba.value.expect("a value");
     assert!(!ba.saturated && (value - 0.0625).abs() < 1e-8 && ba.multiplier > Some(0.0), "{ba:?}");
+}
+
+/// A ball in the hole of a ring: the box around the ring says nothing, boxes in it say all.
+#[tokio::test(flavor = "multi_thread")]
+async fn sets_that_are_not_convex_are_measured_and_what_they_have_not_is_refused() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(dir.path());
+    let mut clients = server.connect().await;
+    let ring = clients.put_file(torus(0.2).to_json()).await;
+    let ball = clients.put(&Body::ball("ball", Vector3::zeros(), 0.3).expect("a ball")).await;
+    clients.make_scene("room").await;
+    let upsert_objects = vec![object("ring", &ring, at(0.0)), object("ball", &ball, at(0.0))];
+    clients.update(UpdateSceneRequest { scene: "room".into(), upsert_objects, ..Default::default() }).await;
+    let measures = [Measure::Distance, Measure::LevelDistanceAOnB, Measure::Overlap];
+    let asked = |x: f64, measures: &[Measure]| EvaluateRequest {
+        pose_overrides: rows(vec![moved("ball", at(x))]),
+        accuracy: Some(1e-2),
+        ..question(vec![pair("ball", "ring")], measures)
+    };
+    // The middle of the hole, off the middle, in the tube.
+    for (x, distance) in [(0.0, 0.5), (0.3, 0.2), (0.6, 0.0)] {
+        let answers = clients.queries.evaluate(asked(x, &measures)).await.expect("answers").into_inner().answers;
+        let [found, level, overlap] = <[Answer; 3]>::try_from(answers).expect("three");
+        assert!((found.lower - 1e-6..=found.upper + 1e-6).contains(&distance), "{x}: {found:?}");
+        assert!(found.upper - found.lower < 4e-3, "{x}: {found:?}");
+        // Of the ball at the inner edge of the ring.
+        let truth = ((0.8 - x) / 0.3).powi(2);
+        assert!(distance == 0.0 || (level.upper - truth).abs() < 2e-2 * truth.max(1.0), "{x}: {level:?}");
+        let expected = if distance > 0.0 { proto::Decision::No } else { proto::Decision::Yes };
+        assert_eq!(overlap.decision(), expected, "{x}: {overlap:?}");
+    }
+    let refused = clients.queries.evaluate(asked(0.0, &[Measure::GrowthDistance])).await.expect_err("not convex");
+    assert_eq!((refused.code(), field(&refused).as_str()), (tonic::Code::InvalidArgument, "pairs[0]"));
+    assert!(refused.message().contains("compound"), "{refused:?}");
 }
