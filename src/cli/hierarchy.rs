@@ -24,7 +24,8 @@ use std::path::PathBuf;
 /// of other sets the lower bound may be too low (0 if nothing is known), and rises with the level:
 /// take the next one where the bracket is too wide. The upper bound is the value at points that are
 /// proven to lie in the sets; 'exact' says that both bounds are the same, to 1e-5 of the
-/// size of the sets. Points are in A's frame.
+/// size of the sets, or of a level distance. Points are in A's frame; of a level distance both are the
+/// one of B.
 ///
 /// Of compounds bracket the parts one by one. A server does the same as a job: HierarchyService.
 ///
@@ -125,8 +126,8 @@ fn print(out: &mut impl Write, number: usize, line: &Line, json: bool) -> Result
     }
     writeln!(
         out,
-        "{number:>5}  {:>14.9}  {:>14}  {:>5}  {:>5}  {:>5}  {:>7.2}",
-        line.lower,
+        "{number:>5}  {:>14}  {:>14}  {:>5}  {:>5}  {:>5}  {:>7.2}",
+        if line.lower > f64::MIN { format!("{:.9}", line.lower) } else { "-".to_owned() },
         line.upper.map_or_else(|| "-".to_owned(), |upper| format!("{upper:.9}")),
         if line.is_exact { "yes" } else { "no" },
         line.level,

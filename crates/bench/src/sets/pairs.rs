@@ -18,7 +18,7 @@ const PAIRS: [(usize, usize, usize); 2] = [(4, 200, 20), (6, 40, 5)];
 const STEPS: [usize; 9] = [64, 256, 512, 1024, 2048, 4096, 8192, 16_384, 65_536];
 
 /// Half the edge of a box around the sets, without unit.
-const HALF: f64 = 3.0;
+const HALF: f64 = 2.0;
 
 /// Relative width at which branch and bound ends by itself.
 const NARROW: f64 = 1e-7;

@@ -3,8 +3,8 @@
 //!
 //! A [`Body`] exists only with its proofs: making one, from numbers or from a file, checks every
 //! certificate and proves or recomputes everything derived from the polynomials. What need not be
-//! convex is an [`SosBody`], which no measure takes but [`crate::branch_and_bound`]. Lengths are metres in the body frame unless a
-//! name says otherwise; `z` is the unit-free normalized frame, `z = L (x - c)`.
+//! convex is an [`SosBody`], which [`crate::branch_and_bound`] measures. Lengths are metres in the
+//! body frame unless a name says otherwise; `z` is the unit-free normalized frame, `z = L (x - c)`.
 
 mod body_error;
 mod bounds;

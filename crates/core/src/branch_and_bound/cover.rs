@@ -1,7 +1,8 @@
 //! Boxes that cover a set, in its normalized coordinates, divided as far as queries needed it.
 
 use super::cut::Cut;
-use super::placed_set::BoundedSet;
+use super::placed_set::{BoundedSet, PlacedSetError};
+use crate::body::Aabb;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::Range;
 
@@ -37,13 +38,15 @@ pub(super) struct Cover {
     /// Metres along the image of each coordinate axis.
     lengths: Vector3<f64>,
     smallest: f64,
+    /// What the first cell is around.
+    bounding_box: Aabb,
 }
 
 impl Cover {
-    /// Of one cell around the bounding box; none if it holds nothing, or the map has no inverse.
-    pub(super) fn new(of: &BoundedSet<'_>) -> Option<Self> {
+    /// Of one cell around the bounding box; none if it holds nothing.
+    pub(super) fn new(of: &BoundedSet<'_>) -> Result<Option<Self>, PlacedSetError> {
         let normalization = of.set.normalization;
-        let inverse: Matrix3<f64> = normalization.linear.try_inverse()?;
+        let inverse: Matrix3<f64> = normalization.linear.try_inverse().ok_or(PlacedSetError::Normalization)?;
         let bounds = &of.bounding_box;
         let middle = (bounds.min + bounds.max) * 0.5;
         let center = normalization.linear * (middle - normalization.center);
@@ -53,8 +56,8 @@ impl Cover {
         let half = half + size * (16.0 * f64::EPSILON);
         let lengths = Vector3::from_fn(|k, _| inverse.column(k).norm());
         let smallest = SMALLEST * (center.abs() + half).amax();
-        let mut cover = Self { cells: Vec::new(), cuts: Vec::new(), lengths, smallest };
-        cover.add(of, center, half).map(|_| cover)
+        let mut cover = Self { cells: Vec::new(), cuts: Vec::new(), lengths, smallest, bounding_box: *bounds };
+        Ok(cover.add(of, center, half).map(|_| cover))
     }
 
     /// The cell of a place.
@@ -67,9 +70,14 @@ impl Cover {
         &self.cuts[cell.cuts.start as usize..cell.cuts.end as usize]
     }
 
-    /// Number of cells.
-    pub(super) fn len(&self) -> usize {
-        self.cells.len()
+    /// Memory that it holds, bytes.
+    pub(super) fn bytes(&self) -> usize {
+        self.cells.capacity() * size_of::<Cell>() + self.cuts.capacity() * size_of::<Cut>()
+    }
+
+    /// Whether it covers a set with this bounding box.
+    pub(super) fn is_of(&self, of: &BoundedSet<'_>) -> bool {
+        self.bounding_box == of.bounding_box
     }
 
     /// Upper bounds of the magnitudes of normalized coordinates.
@@ -121,7 +129,8 @@ impl Cover {
             }
         }
         let radius_m = half.component_mul(&self.lengths).norm();
-        let index = CellIndex::try_from(self.cells.len()).ok().filter(|index| *index < NOTHING)?;
+        // A query divides far fewer.
+        let index = self.cells.len() as CellIndex;
         let cuts = start as u32..self.cuts.len() as u32;
         self.cells.push(Cell { center, half, radius_m, cuts, halves: UNDIVIDED });
         Some(index)

@@ -39,13 +39,12 @@ pub(super) struct PairDivision<'a, 'b> {
 
 impl PairDivision<'_, '_> {
     /// Divides until the limits say that it is enough.
-    pub(super) fn distance(self, limits: &Limits<'_>) -> Result<SetDistance, PlacedSetError> {
-        let placings = [
-            Placing::new(self.sets[0], &self.covers[self.of[0]])?,
-            Placing::new(self.sets[1], &self.covers[self.of[1]])?,
-        ];
+    pub(super) fn distance(self, limits: &Limits<'_>) -> Result<SetDistance, (usize, PlacedSetError)> {
+        let placing =
+            |side: usize| Placing::new(self.sets[side], &self.covers[self.of[side]]).map_err(|error| (side, error));
+        let placings = [placing(0)?, placing(1)?];
         let slack = placings[0].slack_m + placings[1].slack_m;
-        let search = PairSearch::new(self.sets).ok_or(PlacedSetError::Normalization)?;
+        let search = PairSearch::new(self.sets).ok_or((0, PlacedSetError::Normalization))?;
         let mut best: Option<NearPoints> = None;
         let mut waiting = BinaryHeap::from([Waiting { lower: 0.0, place: [0; 2] }]);
         // Least bound of the pairs that are not divided further.
@@ -129,5 +128,5 @@ impl PairDivision<'_, '_> {
 
 /// Whether two sets are one and the same, and share their cover.
 pub(super) fn are_one(a: &BoundedSet<'_>, b: &BoundedSet<'_>) -> bool {
-    a.id.is_some() && a.id == b.id
+    a.id.is_some() && a.id == b.id && a.bounding_box == b.bounding_box
 }

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-/// Default number of pairs of boxes, or of boxes, that are divided: some tens of milliseconds.
+/// Default number of pairs of boxes, or of boxes, that are divided: a few hundred milliseconds.
 pub const DEFAULT_STEPS: usize = 100_000;
 
 /// Steps between two looks at the clock.

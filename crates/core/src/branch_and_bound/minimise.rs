@@ -43,7 +43,11 @@ pub(super) fn minimise(
         let inside = goal.may_be_inside().then(|| refined_on(set, &linear, start, false, |x| goal.derivatives(x)));
         for point in [Some(start), on_boundary, inside.flatten()].into_iter().flatten() {
             let Some(point) = member.pulled(point) else { continue };
-            let value = goal.value_up(&point).max(known);
+            let value = goal.value_up(&point);
+            if value.is_nan() {
+                continue;
+            }
+            let value = value.max(known);
             if best.is_none_or(|(least, _)| value < least) {
                 *best = Some((value, point));
             }

@@ -12,14 +12,16 @@ use crate::measure::{HalfSpace, Status};
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
-/// Most cells that are kept: some 40 MB.
-const MAX_CELLS: usize = 1 << 18;
+/// Most memory of the covers that are kept, bytes.
+const MAX_BYTES: usize = 32 << 20;
 
 /// Brackets by branch and bound, with the covers of the sets that it was asked about. One for each
 /// thread.
 #[derive(Debug, Default)]
 pub struct BranchAndBound {
     covers: HashMap<BodyId, Cover>,
+    /// Memory of the covers, bytes.
+    bytes: usize,
 }
 
 impl BranchAndBound {
@@ -49,12 +51,12 @@ impl BranchAndBound {
             points: None,
             steps: 0,
         };
-        let Some(first) = self.take(&a.of) else { return Ok(empty) };
+        let Some(first) = self.take(&a.of).map_err(|error| (0, error))? else { return Ok(empty) };
         let mut covers = vec![first];
         let of = if are_one(&a.of, &b.of) {
             [0, 0]
         } else {
-            let Some(second) = self.take(&b.of) else { return Ok(empty) };
+            let Some(second) = self.take(&b.of).map_err(|error| (1, error))? else { return Ok(empty) };
             covers.push(second);
             [0, 1]
         };
@@ -62,7 +64,7 @@ impl BranchAndBound {
         for (cover, set) in covers.into_iter().zip([&a.of, &b.of]) {
             self.keep(set, cover);
         }
-        found.map_err(|error| (0, error))
+        found
     }
 
     /// Level distance d(A‖B) = min max_i g_i(x) over the points x of B, the g those of A. The
@@ -79,7 +81,7 @@ impl BranchAndBound {
     ) -> Result<SetLevelDistance, (usize, PlacedSetError)> {
         a.frame().map_err(|error| (0, error))?;
         b.frame().map_err(|error| (1, error))?;
-        let goal = |cover: &Cover| Goal::level(b, cover, a).map_err(|error| (0, error));
+        let goal = |cover: &Cover| Goal::level(b, cover, a).map_err(|error| (1, error));
         let found = self.over(b, f64::NEG_INFINITY, limits, goal).map_err(|(side, error)| (1 - side, error))?;
         Ok(SetLevelDistance {
             status: found.status,
@@ -148,7 +150,7 @@ impl BranchAndBound {
         limits: &Limits<'_>,
         goal: impl FnOnce(&Cover) -> Result<Goal<'a>, (usize, PlacedSetError)>,
     ) -> Result<Minimum, (usize, PlacedSetError)> {
-        let Some(mut cover) = self.take(&set.of) else { return Ok(Minimum::OF_NOTHING) };
+        let Some(mut cover) = self.take(&set.of).map_err(|error| (0, error))? else { return Ok(Minimum::OF_NOTHING) };
         let goal = goal(&cover)?;
         let found = minimise(set, &mut cover, &goal, known, limits).map_err(|error| (0, error));
         self.keep(&set.of, cover);
@@ -156,17 +158,23 @@ impl BranchAndBound {
     }
 
     /// The cover of a set, or a new one; none of a set that is empty.
-    fn take(&mut self, of: &BoundedSet<'_>) -> Option<Cover> {
-        of.id.and_then(|id| self.covers.remove(&id)).or_else(|| Cover::new(of))
+    fn take(&mut self, of: &BoundedSet<'_>) -> Result<Option<Cover>, PlacedSetError> {
+        let kept = of.id.and_then(|id| self.covers.remove(&id));
+        self.bytes -= kept.as_ref().map_or(0, Cover::bytes);
+        match kept.filter(|cover| cover.is_of(of)) {
+            Some(cover) => Ok(Some(cover)),
+            None => Cover::new(of),
+        }
     }
 
+    /// Keeps a cover for the next query, in place of others where memory is short.
     fn keep(&mut self, of: &BoundedSet<'_>, cover: Cover) {
-        let Some(id) = of.id else { return };
-        if self.covers.values().map(Cover::len).sum::<usize>() + cover.len() > MAX_CELLS {
-            self.covers.clear();
+        let Some(id) = of.id.filter(|_| cover.bytes() <= MAX_BYTES) else { return };
+        while self.bytes + cover.bytes() > MAX_BYTES {
+            let Some(other) = self.covers.keys().next().copied() else { break };
+            self.bytes -= self.covers.remove(&other).map_or(0, |cover| cover.bytes());
         }
-        if cover.len() <= MAX_CELLS {
-            self.covers.insert(id, cover);
-        }
+        self.bytes += cover.bytes();
+        self.covers.insert(id, cover);
     }
 }

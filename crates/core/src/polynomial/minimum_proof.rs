@@ -8,9 +8,9 @@
 //!
 //! with g <= 1 on a set, shows f >= γ there (Putinar; Lasserre, SIAM J. Optim. 11, 2001). A
 //! solver's matrices are neither quite semidefinite nor is the identity quite true: each G is
-//! raised by a multiple of I, in coordinates of about 1, until it is proven definite, what is left over is computed in
-//! intervals, and its largest magnitude in a box around both sets is taken off: the bound
-//! does not depend on where the matrices come from.
+//! raised by a multiple of I, in coordinates of about 1, until it is proven definite, what is left
+//! over is computed in intervals, and its largest magnitude in a box around both sets is taken off:
+//! the bound does not depend on where the matrices come from.
 
 use super::Polynomial;
 use super::interval::Interval;

@@ -96,6 +96,7 @@ impl Substitution {
         let terms = order.iter().zip(&enclosed).map(|(&e, interval)| (e, interval.middle())).collect();
         Ok((Polynomial::new(terms)?, error * (1.0 + 1e-13)))
     }
+
     /// A row of A, and of b.
     pub(super) fn row(&self, axis: usize) -> ([Interval; 3], Interval) {
         (self.linear[axis], self.offset[axis])

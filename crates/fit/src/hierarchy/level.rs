@@ -87,13 +87,23 @@ pub fn hierarchy_level_distance(
     let (mut lower, mut atoms) = (of_box, Vec::new());
     // The solver's errors are relative to what the objective is divided by, and which is best is not
     // known: its largest coefficient, or about its minimum.
+    let (mut is_solved, mut failed) = (false, None);
     for unit in [f64::INFINITY, expected] {
         let relaxation = MomentRelaxation::of_one(&objectives, degree, second, level).with_expected(unit);
         let (solution, rows) = match solved(&relaxation, level, &mut watch) {
             // Constraints that do not bound the set: the box does.
-            Err(HierarchyError::Fit(FitError::Program(ProgramError::Unbounded))) => break,
+            Err(HierarchyError::Fit(FitError::Program(ProgramError::Unbounded))) => {
+                is_solved = true;
+                break;
+            }
+            // The other unit may do.
+            Err(error @ HierarchyError::Fit(FitError::Program(_))) => {
+                failed = Some(error);
+                continue;
+            }
             solution => solution?,
         };
+        is_solved = true;
         let known = relaxation.atoms(&solution);
         let mut guesses = relaxation.first_moments(&solution);
         guesses.extend(known.iter().flat_map(|atoms| &atoms.points));
@@ -110,6 +120,9 @@ pub fn hierarchy_level_distance(
         if is_closed(lower, &found) {
             break;
         }
+    }
+    if let Some(error) = failed.filter(|_| !is_solved) {
+        return Err(error);
     }
     let lowest = found.first().copied();
     let upper = lowest.map_or(f64::INFINITY, |(value, _)| value);

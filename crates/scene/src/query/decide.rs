@@ -68,10 +68,13 @@ pub(crate) fn decide(solver: &Solver<'_>, pair: &Pair<'_>, threshold: f64, optio
             ..Bracket::of(Verdict::No, f64::NEG_INFINITY, f64::INFINITY)
         },
         _ => {
-            let found = solver.set_distance(pair, Some(threshold.max(0.0)), options);
+            let is_signed = matches!(pair.a, Thing::HalfSpace(_)) || matches!(pair.b, Thing::HalfSpace(_));
+            let asked = if is_signed { threshold } else { threshold.max(0.0) };
+            let found = solver.set_distance(pair, Some(asked), options);
             // A distance of 0 says nothing about depth.
-            let lower = if found.lower_m > 0.0 { found.lower_m } else { f64::NEG_INFINITY };
-            Bracket::of(compare::against(lower, found.upper_m, threshold), lower, found.upper_m)
+            let lower = if is_signed || found.lower_m > 0.0 { found.lower_m } else { f64::NEG_INFINITY };
+            let verdict = compare::against(lower, found.upper_m, threshold);
+            Bracket { rungs: pair.finest_rungs(), ..Bracket::of(verdict, lower, found.upper_m) }
         }
     }
 }

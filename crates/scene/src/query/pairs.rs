@@ -66,6 +66,9 @@ pub enum PairsError {
 /// Pairs of a chunk: some tens of microseconds of warm work, so that threads share evenly.
 const CHUNK: usize = 64;
 
+/// The same where a side need not be convex: milliseconds.
+const SET_CHUNK: usize = 1;
+
 /// Most measures of a question that is answered where it is asked.
 const BRIEF: usize = 4;
 
@@ -76,6 +79,8 @@ pub struct Pairs {
     ask: Ask,
     operands: Vec<Operand>,
     pairs: Vec<[u32; 2]>,
+    /// Pairs of a chunk.
+    chunk: usize,
 }
 
 impl Pairs {
@@ -96,10 +101,18 @@ impl Pairs {
                     return Err(PairsError::Itself { pair, operand: sides[0] });
                 }
                 (Operand::Object(_), _) | (_, Operand::Object(_)) => {
-                    let is_sos_body =
-                        |side: Operand| matches!(side, Operand::Object(slot) if is_sos_body(&scene, slot));
-                    if let Some(&measure) = ask.measures().iter().find(|measure| measure.needs_convex())
-                        && (is_sos_body(a) || is_sos_body(b))
+                    let is_set = |side: Operand| matches!(side, Operand::Object(slot) if is_sos_body(&scene, slot));
+                    let is_plane = |side: Operand| match side {
+                        Operand::Object(slot) => is_half_space(&scene, slot),
+                        Operand::HalfSpace(_) => true,
+                        Operand::Point(_) => false,
+                    };
+                    // The depth in a half-space is known of any set.
+                    let is_refused = |measure: &&Measure| {
+                        measure.needs_convex() && !(**measure == Measure::Penetration && (is_plane(a) || is_plane(b)))
+                    };
+                    if let Some(&measure) = ask.measures().iter().find(is_refused)
+                        && (is_set(a) || is_set(b))
                     {
                         return Err(PairsError::NeedsConvex { pair, measure });
                     }
@@ -107,7 +120,9 @@ impl Pairs {
                 _ => return Err(PairsError::NoObject { pair }),
             }
         }
-        Ok(Self { scene, ask, operands, pairs })
+        let is_set = |side: &Operand| matches!(*side, Operand::Object(slot) if is_sos_body(&scene, slot));
+        let chunk = if operands.iter().any(is_set) { SET_CHUNK } else { CHUNK };
+        Ok(Self { scene, ask, operands, pairs, chunk })
     }
 
     /// Number of pairs.
@@ -137,6 +152,10 @@ impl Pairs {
     }
 }
 
+fn is_half_space(scene: &Scene, slot: Slot) -> bool {
+    scene.object(slot).is_some_and(|object| matches!(object.geometry, Geometry::HalfSpace(_)))
+}
+
 fn is_sos_body(scene: &Scene, slot: Slot) -> bool {
     scene.object(slot).is_some_and(|object| matches!(object.geometry, Geometry::SosBody(_)))
 }
@@ -145,7 +164,7 @@ impl Question for Pairs {
     type Part = Vec<Answer>;
 
     fn chunks(&self) -> usize {
-        self.pairs.len().div_ceil(CHUNK)
+        self.pairs.len().div_ceil(self.chunk)
     }
 
     fn is_brief(&self) -> bool {
@@ -166,7 +185,7 @@ impl Question for Pairs {
         let cache = (!self.ask.cold).then_some(&*self.scene.cache);
         let solver = Solver { ask: &self.ask, cache, stop };
         let measures = self.ask.measures().len();
-        let pairs = &self.pairs[chunk * CHUNK..((chunk + 1) * CHUNK).min(self.pairs.len())];
+        let pairs = &self.pairs[chunk * self.chunk..((chunk + 1) * self.chunk).min(self.pairs.len())];
         let mut answers = Vec::with_capacity(pairs.len() * measures);
         for &sides in pairs {
             let slots = self.slots(sides);

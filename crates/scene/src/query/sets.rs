@@ -7,18 +7,20 @@ use sublevel_core::body::{Body, Shape, Solid, SosBody};
 use sublevel_core::branch_and_bound::{BranchAndBound, Limits, PlacedSet};
 use sublevel_core::measure::{Options, Pose, Status, Twist};
 
-use super::answer::{Answer, AnswerStatus, Verdict};
+use super::answer::{Answer, AnswerStatus};
 use super::ask::Measure;
-use super::decide::compare;
+use super::decide::decide;
+use super::solve::from_signed;
 use super::solver::{Pair, Solver};
-use super::thing::Thing;
+use super::thing::{Thing, ball_gap};
+use crate::broad_phase::{WorldBall, world_ball};
 
 thread_local! {
     /// Covers of the sets that this thread was asked about.
     static BRANCHES: RefCell<BranchAndBound> = RefCell::default();
 }
 
-/// A bracket of the distance of a pair, metres; 0 in overlap.
+/// A bracket of the distance of a pair, metres; 0 in overlap, but signed of a half-space.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SetBracket {
     status: Status,
@@ -53,6 +55,18 @@ impl Solver<'_> {
     /// A measure of a pair with an sos-body in it.
     pub(crate) fn sets(&self, index: usize, measure: Measure, pair: &Pair<'_>) -> Answer {
         let options = self.ask.options(index, self.stop);
+        // Of a half-space depths are known, too.
+        if let (Thing::Solid { .. }, Thing::HalfSpace(half_space)) = (&pair.a, &pair.b)
+            && !matches!(measure, Measure::Overlap | Measure::NearerThan)
+        {
+            let found = self.set_distance(pair, None, options);
+            let signed = self.set_answer(&found, pair);
+            let signed = Answer { normal: Some(*half_space.half_space.normal()), ..signed };
+            return from_signed(measure, signed, self.ask.threshold_m);
+        }
+        if let (Thing::HalfSpace(_), Thing::Solid { .. }) = (&pair.a, &pair.b) {
+            return self.sets(index, measure, &pair.swapped()).swapped();
+        }
         match measure {
             Measure::Distance => self.set_answer(&self.set_distance(pair, None, options), pair),
             Measure::Signed => {
@@ -65,26 +79,16 @@ impl Solver<'_> {
                 let status = if self.stop.is_set() { AnswerStatus::Deadline } else { AnswerStatus::BracketWide };
                 Answer { status, lower: f64::NEG_INFINITY, ..answer }
             }
-            Measure::Overlap => {
-                let found = self.set_distance(pair, Some(0.0), options);
-                self.set_verdict(&found, compare::below_or_at(found.lower_m, found.upper_m, 0.0))
-            }
-            Measure::NearerThan => {
-                let threshold = self.ask.threshold_m;
-                let found = self.set_distance(pair, Some(threshold), options);
-                self.set_verdict(&found, compare::below(found.lower_m, found.upper_m, threshold))
-            }
+            Measure::Overlap => self.decided(&decide(self, pair, 0.0, options)),
+            Measure::NearerThan => self.decided(&decide(self, pair, self.ask.threshold_m, options)),
             Measure::LevelAOnB => self.set_level(pair, options),
-            Measure::LevelBOnA => {
-                let answer = self.set_level(&pair.swapped(), options).swapped();
-                Answer { witnesses: answer.witnesses, ..answer }
-            }
+            Measure::LevelBOnA => self.set_level(&pair.swapped(), options).swapped(),
             Measure::Growth | Measure::Penetration | Measure::TimeOfImpact => Answer::without(AnswerStatus::NotDefined),
         }
     }
 
-    /// The distance of a pair with an sos-body in it; with a threshold, in metres, until it is
-    /// decided.
+    /// The distance of a pair with an sos-body in it, the signed one of a half-space; with a threshold,
+    /// in metres, until it is decided.
     pub(crate) fn set_distance(&self, pair: &Pair<'_>, threshold: Option<f64>, options: Options<'_>) -> SetBracket {
         let limits = self.limits(pair, threshold, &options);
         match (&pair.a, &pair.b) {
@@ -113,11 +117,11 @@ impl Solver<'_> {
                 let Ok(found) = found else { return SetBracket::OPEN };
                 let ball = body.circumscribed();
                 let slack = half_space.slack_m(pose.translation().norm() + ball.center.norm() + ball.radius);
-                let onto = |x: Vector3<f64>| x - plane.normal() * (plane.normal().dot(&x) - plane.offset()).max(0.0);
+                let onto = |x: Vector3<f64>| x - plane.normal() * (plane.normal().dot(&x) - plane.offset());
                 SetBracket {
                     status: found.status,
-                    lower_m: (found.lower_m - slack).max(0.0),
-                    upper_m: (found.upper_m + slack).max(0.0),
+                    lower_m: found.lower_m - slack,
+                    upper_m: found.upper_m + slack,
                     points: found.point.map(|x| [x, onto(x)]),
                     steps: found.steps,
                     parts: [0; 2],
@@ -140,7 +144,8 @@ impl Solver<'_> {
         };
         let limits =
             Limits { accuracy: options.accuracy(), width: 0.0, stop: Some(self.stop.flag()), ..Limits::default() };
-        let mut answer = Answer { lower: f64::INFINITY, ..Answer::without(AnswerStatus::Converged) };
+        let (not_unique, rungs) = (true, pair.finest_rungs());
+        let mut answer = Answer { lower: f64::INFINITY, not_unique, rungs, ..Answer::without(AnswerStatus::Converged) };
         let (a, b) = (parts(a, *set, pose), parts(b, *set_b, pose_b));
         for (i, first) in a.iter().enumerate() {
             for (j, second) in b.iter().enumerate() {
@@ -176,8 +181,7 @@ impl Solver<'_> {
 
     fn set_answer(&self, found: &SetBracket, pair: &Pair<'_>) -> Answer {
         let normal = found.points.and_then(|[x, y]| (x - y).try_normalize(0.0));
-        // As of convex bodies, where the two are apart; where several pairs of points are as near,
-        // it is that of one of them.
+        // Of the nearest points found, where these are proven to be the nearest.
         let gradients = || {
             let ([x, y], n) = (found.points?, normal?);
             let twist = |thing: &Thing<'_>, at: Vector3<f64>, n: Vector3<f64>| {
@@ -188,30 +192,19 @@ impl Solver<'_> {
                 };
                 Twist { linear: n, angular: arm.cross(&n) }
             };
-            (found.lower_m > 0.0).then(|| [twist(&pair.a, x, n), twist(&pair.b, y, -n)])
+            let is_known = found.status == Status::Converged && found.lower_m > 0.0;
+            is_known.then(|| [twist(&pair.a, x, n), twist(&pair.b, y, -n)])
         };
         Answer {
             witnesses: found.points,
             normal,
             gradients: if self.ask.gradients { gradients() } else { None },
+            // Sets that bend inwards may have other points that are as near.
+            not_unique: true,
             parts: found.parts,
+            rungs: pair.finest_rungs(),
             iterations: count(found.steps),
             ..Answer::bracket(found.status, found.lower_m, found.upper_m, self.stop.is_set())
-        }
-    }
-
-    fn set_verdict(&self, found: &SetBracket, verdict: Verdict) -> Answer {
-        let status = match verdict {
-            Verdict::Undecided if self.stop.is_set() => AnswerStatus::Deadline,
-            Verdict::Undecided => AnswerStatus::BracketWide,
-            Verdict::Yes | Verdict::No => AnswerStatus::Converged,
-        };
-        Answer {
-            lower: found.lower_m,
-            upper: found.upper_m,
-            verdict: Some(verdict),
-            iterations: count(found.steps),
-            ..Answer::without(status)
         }
     }
 }
@@ -224,26 +217,40 @@ fn parts<'a>(solid: &'a Shape, set: Option<&'a SosBody>, pose: &Pose) -> Vec<Pla
     }
 }
 
-/// The least distance of all pairs of parts.
+/// The least distance of all pairs of parts, those first whose boxes are nearest.
 fn least(a: &[PlacedSet<'_>], b: &[PlacedSet<'_>], limits: &Limits<'_>) -> SetBracket {
+    let mut pairs: Vec<_> = (0..a.len())
+        .flat_map(|i| (0..b.len()).map(move |j| (i, j)))
+        .map(|(i, j)| (ball_gap(ball_of(&a[i]), ball_of(&b[j])).max(0.0), i, j))
+        .collect();
+    pairs.sort_by(|p, q| p.0.total_cmp(&q.0));
     let mut all = SetBracket { status: Status::Converged, lower_m: f64::INFINITY, ..SetBracket::OPEN };
-    for (i, first) in a.iter().enumerate() {
-        for (j, second) in b.iter().enumerate() {
-            // What is proven to be farther than a pair before needs no closer look.
-            let limits = Limits { beyond: Some(all.upper_m), ..*limits };
-            let found = BRANCHES.with_borrow_mut(|branches| branches.distance(first, second, &limits));
-            let Ok(found) = found else { return SetBracket::OPEN };
-            all.lower_m = all.lower_m.min(found.lower_m);
-            all.steps += found.steps;
-            if found.status != Status::Converged {
-                all.status = Status::BracketWide;
-            }
-            if found.upper_m < all.upper_m {
-                (all.upper_m, all.points, all.parts) = (found.upper_m, found.points, [index(i), index(j)]);
-            }
+    for (gap_m, i, j) in pairs {
+        // What is proven to be farther than a pair before needs no closer look.
+        let is_settled = limits.threshold.is_some_and(|threshold| all.upper_m <= threshold || gap_m > threshold);
+        if is_settled || gap_m > all.upper_m {
+            all.lower_m = all.lower_m.min(gap_m);
+            continue;
+        }
+        let limits = Limits { beyond: Some(all.upper_m), ..*limits };
+        let found = BRANCHES.with_borrow_mut(|branches| branches.distance(&a[i], &b[j], &limits));
+        let Ok(found) = found else { return SetBracket::OPEN };
+        all.lower_m = all.lower_m.min(found.lower_m.max(gap_m));
+        all.steps += found.steps;
+        if found.status != Status::Converged {
+            all.status = Status::BracketWide;
+        }
+        if found.upper_m < all.upper_m {
+            (all.upper_m, all.points, all.parts) = (found.upper_m, found.points, [index(i), index(j)]);
         }
     }
     all
+}
+
+/// A ball around a set where it stands, metres.
+fn ball_of(set: &PlacedSet<'_>) -> WorldBall {
+    let bounds = &set.of.bounding_box;
+    world_ball(&set.pose, ((bounds.min + bounds.max) * 0.5, (bounds.max - bounds.min).norm() * 0.5))
 }
 
 fn index(part: usize) -> u16 {

@@ -178,7 +178,7 @@ impl Solver<'_> {
         Answer::bracket(status, lower, upper, self.stop.is_set())
     }
 
-    fn decided(&self, found: &Bracket) -> Answer {
+    pub(super) fn decided(&self, found: &Bracket) -> Answer {
         let status = match found.verdict {
             Verdict::Undecided if self.stop.is_set() => AnswerStatus::Deadline,
             Verdict::Undecided => AnswerStatus::BracketWide,
@@ -312,7 +312,7 @@ impl Solver<'_> {
 }
 
 /// What the signed distance of a half-space says of another measure.
-fn from_signed(measure: Measure, signed: Answer, threshold_m: f64) -> Answer {
+pub(super) fn from_signed(measure: Measure, signed: Answer, threshold_m: f64) -> Answer {
     let (lower, upper) = (signed.lower, signed.upper);
     match measure {
         Measure::Signed => signed,

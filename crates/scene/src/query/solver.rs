@@ -29,6 +29,14 @@ impl Pair<'_> {
     pub(crate) fn swapped(&self) -> Self {
         Self { a: self.b, b: self.a, slots: self.slots.map(|PairSlots { a, b }| PairSlots { a: b, b: a }) }
     }
+
+    /// The finest rungs of both; 0 where there are none.
+    pub(crate) fn finest_rungs(&self) -> [u8; 2] {
+        [&self.a, &self.b].map(|thing| match thing {
+            Thing::Solid { rungs, .. } => u8::try_from(rungs.len().saturating_sub(1)).unwrap_or(u8::MAX),
+            Thing::HalfSpace(_) | Thing::Point(_) => 0,
+        })
+    }
 }
 
 /// Two solids of one pair where they stand.

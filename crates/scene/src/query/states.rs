@@ -213,6 +213,8 @@ impl States {
         open.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut answer = StateAnswer::without(StateVerdict::Free);
         let (mut least, mut solved) = (f64::INFINITY, 0);
+        // The pair that may be nearest of those that are not proven to be free.
+        let mut doubtful: Option<([Slot; 2], Bracket, f64)> = None;
         for (bound, pair, slots, padding) in open {
             if bound > least {
                 break;
@@ -223,14 +225,19 @@ impl States {
             solved += 1;
             let found = solver.measure(0, &pair);
             let value = if found.value.is_finite() { found.value } else { found.lower };
+            let verdict = super::decide::compare::against(found.lower, found.upper, self.margin_m + padding);
+            let bracket = Bracket { verdict, lower: found.lower, upper: found.upper, rungs: found.rungs, solved: true };
+            if verdict != Verdict::No && doubtful.is_none_or(|(_, _, lower)| found.lower - padding < lower) {
+                doubtful = Some((slots, bracket, found.lower - padding));
+            }
             if value - padding < least {
                 least = value - padding;
-                let threshold = self.margin_m + padding;
-                let verdict = super::decide::compare::against(found.lower, found.upper, threshold);
-                let bracket =
-                    Bracket { verdict, lower: found.lower, upper: found.upper, rungs: found.rungs, solved: true };
                 answer = self.settled(answer, slots, &bracket);
             }
+        }
+        // The pair with the least value may be free while a wider bracket is not.
+        if let Some((slots, bracket, _)) = doubtful.filter(|_| answer.verdict == StateVerdict::Free) {
+            answer = self.settled(answer, slots, &bracket);
         }
         answer.solved = solved;
         answer

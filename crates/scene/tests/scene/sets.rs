@@ -99,10 +99,35 @@ fn levels_and_decisions_are_proven_on_both_sides() {
     }
     let verdicts: Vec<_> = found.chunks(3).map(|answers| answers[2].verdict).collect();
     assert_eq!(verdicts, [Some(Verdict::Yes), Some(Verdict::No), Some(Verdict::No)]);
+    // In the tube: nearer than any length, 0 m included.
+    let asked = ask(&[Measure::NearerThan, Measure::Overlap]);
+    let moved = Update { poses: vec![("middle".into(), at(0.6, 0.0, 0.0))], ..Update::default() };
+    let in_tube = scene.updated(&moved, |_| None).expect("an update");
+    let found = answers(&in_tube, asked, vec![object("ring"), object("middle")]);
+    assert_eq!([found[0].verdict, found[1].verdict], [Some(Verdict::Yes); 2], "{found:?}");
     for measure in [Measure::Growth, Measure::Penetration, Measure::TimeOfImpact] {
         let operands = vec![object("middle"), object("above"), object("ring")];
         let refused = Pairs::new(scene.clone(), ask(&[measure]), operands, vec![[0, 1], [1, 2]]);
         assert_eq!(refused.expect_err("not convex"), PairsError::NeedsConvex { pair: 1, measure });
+    }
+}
+
+/// The signed distance of a half-space is known on both sides of contact.
+#[test]
+fn depths_in_half_spaces_are_measured() {
+    let scene = ring();
+    let ring = Operand::Object(slot(&scene, "ring"));
+    for (offset, truth) in [(-1.0, 1.0 - TUBE), (-0.1, 0.1 - TUBE), (0.0, -TUBE)] {
+        let floor = Operand::HalfSpace(HalfSpace::new(Vector3::z(), offset).expect("a half-space"));
+        let measures = [Measure::Signed, Measure::Distance, Measure::Penetration, Measure::Overlap];
+        let asked = ask(&measures[..if truth > 0.0 { 2 } else { 4 }]);
+        let found = answers(&scene, asked, vec![ring, floor]);
+        assert!((found[0].value - truth).abs() < 2.0 * ACCURACY, "{offset}: {:?}", found[0]);
+        assert!((found[1].value - truth.max(0.0)).abs() < 2.0 * ACCURACY, "{offset}: {:?}", found[1]);
+        if truth < 0.0 {
+            assert!((found[2].value + truth).abs() < 2.0 * ACCURACY, "{offset}: {:?}", found[2]);
+            assert_eq!(found[3].verdict, Some(Verdict::Yes), "{offset}: {:?}", found[3]);
+        }
     }
 }
 
