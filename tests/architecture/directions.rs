@@ -117,7 +117,7 @@ fn a_violation_is_found() {
     assert!(found("measure", "use crate::{body::Body, optimize::{self, Options}}; use sublevel_fit::fit;"));
     assert!(found("store", "use super::service::wire;"));
     assert!(found("fit", "use sublevel::service::Server;"));
-    assert!(found("fit", "use sublevel_core::measure::distance;"));
+    assert!(found("fit", "use sublevel_scene::Scene;"));
     assert!(found("scene", "use sublevel_core::{body::Body, polynomial::Jet};"));
     assert!(found("scene", "fn f(status: tonic::Status) {}"));
     assert!(found("service", "let table = redb::Database::open(path);"));

@@ -51,9 +51,9 @@ impl PairDivision<'_, '_> {
         let (mut settled, mut steps, mut next_search) = (f64::INFINITY, 0, 0);
         let (lower, status) = loop {
             let upper = best.map_or(f64::INFINITY, |best| best.0);
-            let tolerance = limits.tolerance(upper, 0.0);
             let lower = waiting.peek().map_or(settled, |pair| pair.lower.min(settled)).min(upper);
-            if upper - lower <= tolerance || upper == 0.0 || limits.decided(lower, upper) || lower == f64::INFINITY {
+            let narrow = limits.narrow(lower, upper, 0.0, steps);
+            if narrow || upper == 0.0 || limits.decided(lower, upper) || lower == f64::INFINITY {
                 break (lower, Status::Converged);
             }
             if limits.exhausted(steps) || waiting.len() >= MAX_WAITING {
@@ -77,7 +77,7 @@ impl PairDivision<'_, '_> {
                 continue;
             }
             let upper = best.map_or(f64::INFINITY, |best| best.0);
-            let enough = upper - limits.tolerance(upper, 0.0);
+            let enough = limits.enough(upper, 0.0);
             let towards = best.and_then(|(_, [x, y])| (y - x).try_normalize(0.0));
             for half in self.covers[self.of[side]].halves(&self.sets[side].of, cells[side]) {
                 let mut cells = cells;

@@ -6,6 +6,9 @@ use std::time::Instant;
 /// Default number of pairs of boxes, or of boxes, that are divided: a few hundred milliseconds.
 pub const DEFAULT_STEPS: usize = 100_000;
 
+/// Steps that a comparison may take although the bracket is narrow: some milliseconds.
+const STEPS_TO_DECIDE: usize = 4096;
+
 /// Steps between two looks at the clock.
 const STEPS_PER_LOOK: usize = 32;
 
@@ -51,8 +54,20 @@ impl Limits<'_> {
     }
 
     /// Width that is narrow enough for a measure that is at most `upper` and of this scale.
-    pub(super) fn tolerance(&self, upper: f64, scale: f64) -> f64 {
+    fn tolerance(&self, upper: f64, scale: f64) -> f64 {
         if upper.is_finite() { self.width.max(self.accuracy * upper.abs().max(scale)) } else { 0.0 }
+    }
+
+    /// Lower bound from which on a place need not be divided.
+    pub(super) fn enough(&self, upper: f64, scale: f64) -> f64 {
+        if self.threshold.is_some() { upper } else { upper - self.tolerance(upper, scale) }
+    }
+
+    /// Whether a bracket is narrow enough after so many steps. What is compared with a threshold has
+    /// to be decided, unless that takes too long.
+    pub(super) fn narrow(&self, lower: f64, upper: f64, scale: f64, steps: usize) -> bool {
+        let is_open = self.threshold.is_some() && steps < STEPS_TO_DECIDE;
+        upper - lower <= self.tolerance(upper, scale) && !is_open
     }
 
     /// Whether the comparison with the threshold is decided, or the measure does not count.

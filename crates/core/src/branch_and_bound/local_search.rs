@@ -9,6 +9,12 @@ const MAX_STEPS: usize = 40;
 /// Largest step, relative to the radius of the smaller set: the model is good near by only.
 const LARGEST_STEP: f64 = 0.3;
 
+/// Distance of two points that are as good as one, relative to the largest step.
+const COINCIDENT: f64 = 1e-6;
+
+/// Steps that look for a common point from there: the last are as long as a tenth of a level.
+const MAX_PUSHES: usize = 44;
+
 /// Length of a step at which the method has converged, relative to the largest.
 const CONVERGED: f64 = 1e-14;
 
@@ -68,7 +74,33 @@ impl<'a> PairSearch<'a> {
         let (x, y) = (self.members[0].pulled(points[0])?, self.members[1].pulled(points[1])?);
         // One point in both is no distance apart.
         let common = [x, y].into_iter().find(|z| self.members.iter().all(|set| set.contains(z)));
+        let common = common.or_else(|| self.common(&x, &y));
         Some(common.map_or((distance_up(&x, &y), [x, y]), |z| (0.0, [z, z])))
+    }
+
+    /// A point in both sets near two that are as good as one: Newton's method ends where both
+    /// boundaries meet.
+    fn common(&self, x: &Vector3<f64>, y: &Vector3<f64>) -> Option<Vector3<f64>> {
+        if (x - y).norm() > COINCIDENT * self.largest_step {
+            return None;
+        }
+        let mut z = (x + y) * 0.5;
+        let mut extra = 1e-14;
+        for _ in 0..MAX_PUSHES {
+            if self.members.iter().all(|set| set.contains(&z)) {
+                return Some(z);
+            }
+            // Against the gradient of the polynomial that is largest there, a little deeper each time.
+            let jets = [0, 1].map(|side| {
+                let (g, at) = self.sets[side].largest_at(&z);
+                let jet = g.evaluate(&at);
+                (jet.value, self.linear[side].tr_mul(&jet.gradient))
+            });
+            let (value, gradient) = if jets[0].0 >= jets[1].0 { jets[0] } else { jets[1] };
+            z -= gradient * (((value - 1.0).max(0.0) + extra) / gradient.norm_squared().max(f64::MIN_POSITIVE));
+            extra *= 2.0;
+        }
+        None
     }
 
     /// Newton's method on `x - y + λ∇g(x) = 0, y - x + μ∇h(y) = 0, g(x) = h(y) = 1`.

@@ -58,7 +58,7 @@ pub(super) fn minimise(
     let (lower, status) = loop {
         let upper = best.map_or(f64::INFINITY, |best| best.0);
         let lower = waiting.peek().map_or(settled, |cell| cell.lower.min(settled)).min(upper);
-        let narrow = upper - lower <= limits.tolerance(upper, goal.scale());
+        let narrow = limits.narrow(lower, upper, goal.scale(), steps);
         if narrow || limits.decided(lower, upper) || lower == f64::INFINITY {
             break (lower, Status::Converged);
         }
@@ -76,7 +76,7 @@ pub(super) fn minimise(
             continue;
         }
         let upper = best.map_or(f64::INFINITY, |best| best.0);
-        let enough = upper - limits.tolerance(upper, goal.scale());
+        let enough = limits.enough(upper, goal.scale());
         for half in cover.halves(&set.of, cell) {
             let lower = goal.floor(&placing, cover, cover.cell(half)).max(known);
             if lower >= enough {

@@ -176,6 +176,29 @@ fn comparisons_end_as_soon_as_they_are_proven() {
     assert!(decided < whole, "{decided} {whole}");
 }
 
+/// Newton's method ends where the boundaries meet, which is no point of both; there is one near by.
+#[test]
+fn common_points_are_found_where_bodies_overlap() {
+    let (mut branches, mut overlapping) = (BranchAndBound::new(), 0);
+    for seed in 0..200 {
+        let mut random = Seeded(seed);
+        let degree = [2, 4, 6][seed as usize % 3];
+        let axes = Vector3::from_fn(|_, _| 0.2 + 0.4 * (1.0 + random.signed()));
+        let a = Body::superellipsoid("a", Vector3::zeros(), axes, degree).unwrap();
+        let b = Body::ball("b", Vector3::zeros(), 0.3).unwrap();
+        let poses = [random_pose(&mut random, 0.5), random_pose(&mut random, 1.0)];
+        let (options, mut warm) = (Options::default(), WarmStart::default());
+        let truth = measure::distance(&a, &poses[0], &b, &poses[1], &options, &mut warm);
+        let sets = [PlacedSet::new(&a, poses[0]), PlacedSet::new(&b, poses[1])];
+        let limits = Limits { accuracy: 0.0, width: 1e-2, threshold: Some(0.0), ..Limits::default() };
+        let found = branches.distance(&sets[0], &sets[1], &limits).unwrap();
+        overlapping += u32::from(truth.upper == 0.0);
+        assert_eq!(found.upper_m == 0.0, truth.upper == 0.0, "seed {seed}: {found:?} {truth:?}");
+        assert_eq!(found.lower_m > 0.0, truth.lower > 0.0, "seed {seed}: {found:?} {truth:?}");
+    }
+    assert!(overlapping > 40, "{overlapping}");
+}
+
 #[test]
 fn two_of_the_same_share_their_cover_and_far_ones_lose_what_poses_round() {
     let ball = Body::ball("ball", Vector3::zeros(), 0.5).unwrap();

@@ -1,9 +1,11 @@
 //! Level distances of sets that need not be convex.
 
+use super::error::HierarchyError;
 use super::level_search::lowest_points;
 use super::minimisers::{are_all, attaining};
 use super::moments::MomentRelaxation;
-use super::{EXACT, HierarchyError, PlacedSet, check, check_size, solved};
+use super::placed_set::PlacedSet;
+use super::solve::{EXACT, check, check_size, solved};
 use crate::error::FitError;
 use crate::program::ProgramError;
 use crate::progress::{Progress, Watch};

@@ -28,33 +28,25 @@ mod local_search;
 mod minimisers;
 mod moments;
 mod placed_set;
+mod solve;
 
-use error::MAX_ROWS;
 pub use error::{HierarchyError, MAX_LEVEL};
 pub use level::{HierarchyLevelBound, check_hierarchy_level, hierarchy_level_distance};
 pub use placed_set::PlacedSet;
 
-use crate::conic_program::{ConicSolution, solve};
-use crate::error::FitError;
-use crate::program::ProgramError;
 use crate::progress::{Progress, Watch};
 use atoms::Atoms;
 use local_search::nearest_points;
 use minimisers::{are_all, attaining};
-use moments::{MomentRelaxation, Rows};
+use moments::MomentRelaxation;
 use nalgebra::Vector3;
+use solve::{EXACT, check, check_size, solved};
 use std::ops::ControlFlow;
 use std::time::Instant;
 use sublevel_core::polynomial::PairPolynomial;
 
-/// Width of a bracket, relative to the size of the sets, at which its lower bound is called exact.
-const EXACT: f64 = 1e-5;
-
 /// Pairs of points that moments give with which a search begins, at most.
 const MAX_PAIRS: usize = 24;
-
-/// Tolerance asked of the solver; what it leaves is part of the bound.
-const TOLERANCE: f64 = 1e-9;
 
 /// A bracket of the distance of two sets.
 #[derive(Clone, Debug, PartialEq)]
@@ -167,36 +159,6 @@ fn guessed_pairs(sets: [&PlacedSet; 2], atoms: &[Atoms]) -> Vec<[Vector3<f64>; 2
     pairs.sort_by(|[a, b], [c, d]| (a - b).norm().total_cmp(&(c - d).norm()));
     pairs.truncate(MAX_PAIRS);
     pairs
-}
-
-/// Refuses levels and sets that cannot be used.
-fn check(sets: [&PlacedSet; 2], level: usize) -> Result<(), HierarchyError> {
-    if level > MAX_LEVEL {
-        return Err(HierarchyError::Level(level));
-    }
-    sets.iter().enumerate().try_for_each(|(index, set)| set.check(index))
-}
-
-/// Refuses programs that would be too large.
-fn check_size(relaxation: &MomentRelaxation, level: usize) -> Result<(), HierarchyError> {
-    let rows = relaxation.rows();
-    if rows > MAX_ROWS { Err(HierarchyError::TooLarge { level, rows }) } else { Ok(()) }
-}
-
-/// Solves a program that is not too large.
-fn solved(
-    relaxation: &MomentRelaxation,
-    level: usize,
-    watch: &mut Watch,
-) -> Result<(ConicSolution, Rows), HierarchyError> {
-    check_size(relaxation, level)?;
-    watch.round(0, 0.0);
-    let (program, rows) = relaxation.program();
-    let solution = solve(&program, TOLERANCE, relaxation.unit(), watch).map_err(|error| match error {
-        FitError::Program(ProgramError::Infeasible) => HierarchyError::Empty,
-        error => error.into(),
-    })?;
-    Ok((solution, rows))
 }
 
 #[cfg(test)]
