@@ -126,6 +126,7 @@ impl Shown {
                     continue;
                 }
                 let exact = found.iter().filter(|bracket| bracket.exact).count();
+                // Of sets that overlap both are 0.
                 let ratio = found.iter().map(|bracket| bracket.upper / bracket.lower).fold(1.0, f64::max);
                 let seconds = median(found.iter().map(|bracket| bracket.seconds));
                 let _ = writeln!(
@@ -277,9 +278,13 @@ fn model(kind: &str, row: Row<'_>) -> Result<Model, CsvError> {
     })
 }
 
-/// Width over the upper bound; ∞ without one.
+/// Width over the upper bound; ∞ without one, 0 of sets with a common point.
 fn width(bracket: &Bracket) -> f64 {
-    if bracket.upper.is_finite() { (bracket.upper - bracket.lower) / bracket.upper } else { f64::INFINITY }
+    match bracket.upper {
+        0.0 => 0.0,
+        upper if upper.is_finite() => (upper - bracket.lower) / upper,
+        _ => f64::INFINITY,
+    }
 }
 
 fn median(values: impl Iterator<Item = f64>) -> f64 {
