@@ -1,6 +1,6 @@
 //! Brackets of distances between sets that need not be convex, by dividing boxes.
 //!
-//! Each set is covered by boxes, divided as far as a query needs it ([`Cover`]). In a box about c,
+//! Each set is covered by boxes, divided as far as a query needs it (`cover.rs`). In a box about c,
 //! Taylor's formula bounds each polynomial of the set from below by a linear one, `g(c + δ) >= v +
 //! w·δ - r`, r of the second order: points of the set are in the half-space `w·δ <= 1 - v + r`. What
 //! is in a box and in such half-spaces reaches along a direction at most as far as the dual of a
