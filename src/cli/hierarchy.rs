@@ -20,12 +20,11 @@ use std::path::PathBuf;
 /// work, such as checking where two hollow objects fit into each other, and not for a control loop.
 ///
 /// Prints a proven bracket of the Euclidean distance, metres, or with '--measure level-distance' of
-/// d(A||B) = min p_A over B, dimensionless. Level 0 is exact for convex bodies;
-/// of other sets the lower bound may be too low (0 if nothing is known), and rises with the level:
-/// take the next one where the bracket is too wide. The upper bound is the value at points that are
-/// proven to lie in the sets; 'exact' says that both bounds are the same, to 1e-5 of the
-/// size of the sets, or of a level distance. Points are in A's frame; of a level distance both are the
-/// one of B.
+/// d(A||B) = min p_A over B, dimensionless. Level 0 is exact for convex bodies; of other sets the
+/// lower bound may be too low (0 if nothing is known), and rises with the level: take the next one
+/// where the bracket is too wide. The upper bound is the value at points that are proven to lie in
+/// the sets; 'exact' says that both bounds are the same, to 1e-5 of the size of the sets, or of a
+/// level distance. Points are in A's frame; of a level distance both are the one of B.
 ///
 /// Of compounds bracket the parts one by one. A server does the same as a job: HierarchyService.
 ///

@@ -5,9 +5,10 @@
 //! is still running when it comes. So nothing depends on when the work learns of it, and a kill at
 //! any time leaves a state that was acknowledged.
 //!
-//! `request` checks what fits are asked for, `execute` does it, for whoever asks; `hierarchy` does
-//! both for solves; `obstacle` says which stored bodies can be used; `worker` does one job after
-//! the other; `board` is where it says how far it is, and where everybody waits for news.
+//! `request` checks what fits are asked for, `execute` executes them, for jobs and the command
+//! line; `hierarchy` does both for solves; `obstacle` says which stored bodies can be used;
+//! `worker` does one job after the other; `board` is where it says how far it is, and where
+//! everybody waits for news.
 
 mod board;
 mod execute;

@@ -250,8 +250,8 @@ impl State {
         self.bodies.insert(id, known.unwrap_or_else(|| Arc::new(StoredBody::read(id, row))));
     }
 
-    /// Takes bodies in that were just made. A ladder keeps the rungs it was read with: one of which a
-    /// rung was damaged has to be stored again, too.
+    /// Takes bodies in that were just made. A ladder keeps the rungs it was read with: one of which
+    /// a rung was damaged has to be stored again, too.
     fn keep(&mut self, bodies: Vec<Geometry>) {
         self.bodies.extend(bodies.into_iter().map(|body| (*body.id(), Arc::new(StoredBody::new(body)))));
     }

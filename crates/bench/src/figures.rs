@@ -240,8 +240,8 @@ struct FitsArgs {
     common: Common,
 }
 
-/// Sets that need not be convex: brackets against time by branch and bound and by the hierarchy, and
-/// models of objects beside compounds and convex bodies
+/// Sets that need not be convex: brackets against time by branch and bound and by the hierarchy,
+/// and models of objects beside compounds and convex bodies
 ///
 /// Random pairs of degree 4 and 6; mug, wingnut, octopus, chair and hand. Writes sets.md, sets.csv
 /// and sets*.svg. Takes about ten minutes on one core, once the fits are kept; a minute with

@@ -114,8 +114,9 @@ use sublevel_core::body::Body;
 /// Log dets are least in every affine frame at once. Traces depend on the frame: they are measured
 /// in [`FitOptions::coordinates`].
 ///
-/// `progress` is called at every iteration of the solver (a few milliseconds at degree 4 to a second
-/// at degree 8), those of a refinement included, and can stop the fit; it must not fit itself.
+/// `progress` is called at every iteration of the solver (a few milliseconds at degree 4 to a
+/// second at degree 8), those of a refinement included, and can stop the fit; it must not fit
+/// itself.
 ///
 /// # Errors
 /// [`FitError`]: bad input by field, a cancelled fit, or what could not be solved or proven and by

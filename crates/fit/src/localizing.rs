@@ -93,7 +93,8 @@ impl LocalizingMatrix {
         (0..self.size()).flat_map(of_row)
     }
 
-    /// Keeps `D M D` semidefinite, y being the variables from `first` on; the rows of the constraint.
+    /// Keeps `D M D` semidefinite, y being the variables from `first` on; the rows of the
+    /// constraint.
     pub(super) fn constrain(&self, program: &mut ConicProgram, first: usize) -> Range<usize> {
         program.semidefinite(self.size(), |i, j| {
             let scaled = |(k, factor)| (first + k, self.scales[i] * self.scales[j] * factor);

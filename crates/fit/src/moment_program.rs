@@ -44,8 +44,8 @@ pub(super) struct Source<'a> {
     pub(super) map: &'a DMatrix<f64>,
     /// Their part in the linear part of the dual objective.
     pub(super) cost: DVector<f64>,
-    /// Matrices that stay semidefinite, and by what margin their Gram matrices are definite, relative
-    /// to the scales of their rows; none if the variables themselves stay nonnegative.
+    /// Matrices that stay semidefinite, and by what margin their Gram matrices are definite,
+    /// relative to the scales of their rows; none if the variables themselves stay nonnegative.
     pub(super) cones: Option<(&'a [LocalizingMatrix], f64)>,
     /// Variables in the interior of all that.
     pub(super) inside: DVector<f64>,

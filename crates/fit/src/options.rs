@@ -19,8 +19,8 @@ pub struct FitOptions {
     /// Coordinates that traces are measured in.
     pub coordinates: Coordinates,
     /// Where the Gram matrix of the Hessian form is taken from. Over the smaller cones the volume
-    /// itself is minimised, without semidefinite programs: the objective then stays at its default, and
-    /// there is nothing to refine.
+    /// itself is minimised, without semidefinite programs: the objective then stays at its default,
+    /// and there is nothing to refine.
     pub cone: Cone,
     /// Whether to minimise the volume itself, starting from the optimum of the objective.
     pub refine: bool,

@@ -152,7 +152,8 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// `h·s - ε tr S` as a functional of s: what the form adds to the linear part of the dual objective.
+    /// `h·s - ε tr S` as a functional of s: what the form adds to the linear part of the dual
+    /// objective.
     pub(super) fn form_cost(&self) -> DVector<f64> {
         let cost = self.structure.hessian.trace_form() * -self.margin;
         self.allowance.as_ref().map_or_else(|| cost.clone(), |allowance| &cost + allowance)

@@ -23,8 +23,8 @@ pub struct Sets {
 }
 
 /// Brackets the distances of random pairs of degree 4 and 6, and measures models of five objects in
-/// `data` against these. Fits of bodies are kept in the `cache`. `progress` receives what is going on
-/// and can stop it.
+/// `data` against these. Fits of bodies are kept in the `cache`. `progress` receives what is going
+/// on and can stop it.
 ///
 /// # Errors
 /// [`ComparisonError`].

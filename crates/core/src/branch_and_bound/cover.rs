@@ -15,8 +15,8 @@ const UNDIVIDED: [CellIndex; 2] = [0; 2];
 /// A half without points of the set.
 const NOTHING: CellIndex = CellIndex::MAX;
 
-/// Smallest half edge of a cell, relative to the largest coordinate of the cover: below it boxes are
-/// as small as their rounding.
+/// Smallest half edge of a cell, relative to the largest coordinate of the cover: below it boxes
+/// are as small as their rounding.
 const SMALLEST: f64 = 1e-14;
 
 /// A box that may hold points of the set.

@@ -21,7 +21,8 @@ pub struct Limits<'a> {
     pub width: f64,
     /// A value to compare with: it ends as soon as the measure is proven above it, or not above.
     pub threshold: Option<f64>,
-    /// A value that does not count when it is exceeded: it ends when the measure is proven above it.
+    /// A value that does not count when it is exceeded: it ends when the measure is proven above
+    /// it.
     pub beyond: Option<f64>,
     /// Most divisions.
     pub max_steps: usize,
@@ -63,8 +64,8 @@ impl Limits<'_> {
         if self.threshold.is_some() { upper } else { upper - self.tolerance(upper, scale) }
     }
 
-    /// Whether a bracket is narrow enough after so many steps. What is compared with a threshold has
-    /// to be decided, unless that takes too long.
+    /// Whether a bracket is narrow enough after so many steps. What is compared with a threshold
+    /// has to be decided, unless that takes too long.
     pub(super) fn narrow(&self, lower: f64, upper: f64, scale: f64, steps: usize) -> bool {
         let is_open = self.threshold.is_some() && steps < STEPS_TO_DECIDE;
         upper - lower <= self.tolerance(upper, scale) && !is_open

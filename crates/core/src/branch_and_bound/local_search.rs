@@ -19,8 +19,8 @@ const MAX_PUSHES: usize = 44;
 const CONVERGED: f64 = 1e-14;
 
 /// Near points of two sets, proven to lie in them, and their distances, metres, the nearest first;
-/// one point, at distance 0, if one was found that is in both. Newton's method begins at each of the
-/// starts.
+/// one point, at distance 0, if one was found that is in both. Newton's method begins at each of
+/// the starts.
 pub fn nearest_points(
     sets: [&PlacedSet<'_>; 2],
     starts: impl IntoIterator<Item = [Vector3<f64>; 2]>,
@@ -59,8 +59,8 @@ impl<'a> PairSearch<'a> {
         Some(Self { sets, members, linear: sets.map(PlacedSet::linear), largest_step })
     }
 
-    /// Near points at the start, and where Newton's method leads from there; the latter are left out
-    /// if the former are one point in both sets.
+    /// Near points at the start, and where Newton's method leads from there; the latter are left
+    /// out if the former are one point in both sets.
     pub(super) fn from(&self, start: [Vector3<f64>; 2]) -> [Option<NearPoints>; 2] {
         let here = self.pulled(start);
         if here.is_some_and(|near| near.0 == 0.0) {
@@ -90,7 +90,8 @@ impl<'a> PairSearch<'a> {
             if self.members.iter().all(|set| set.contains(&z)) {
                 return Some(z);
             }
-            // Against the gradient of the polynomial that is largest there, a little deeper each time.
+            // Against the gradient of the polynomial that is largest there, a little deeper each
+            // time.
             let jets = [0, 1].map(|side| {
                 let (g, at) = self.sets[side].largest_at(&z);
                 let jet = g.evaluate(&at);

@@ -2,16 +2,16 @@
 //!
 //! Each set is covered by boxes, divided as far as a query needs it (`cover.rs`). In a box about c,
 //! Taylor's formula bounds each polynomial of the set from below by a linear one, `g(c + δ) >= v +
-//! w·δ - r`, r of the second order: points of the set are in the half-space `w·δ <= 1 - v + r`. What
-//! is in a box and in such half-spaces reaches along a direction at most as far as the dual of a
-//! linear program says, so pairs of boxes are proven apart by a plane, with an error of the second
-//! order of their size. The pair with the lowest bound is divided next (branch and bound; Horst and
-//! Tuy, Global Optimization, 1996): lower bounds rise, and upper bounds are distances of points that
-//! Newton's method finds and that are proven to be in the sets. It may be stopped at any time; the
-//! bracket is true whenever that is.
+//! w·δ - r`, r of the second order: points of the set are in the half-space `w·δ <= 1 - v + r`.
+//! What is in a box and in such half-spaces reaches along a direction at most as far as the dual of
+//! a linear program says, so pairs of boxes are proven apart by a plane, with an error of the
+//! second order of their size. The pair with the lowest bound is divided next (branch and bound;
+//! Horst and Tuy, Global Optimization, 1996): lower bounds rise, and upper bounds are distances of
+//! points that Newton's method finds and that are proven to be in the sets. It may be stopped at
+//! any time; the bracket is true whenever that is.
 //!
-//! A cover depends on the set alone, so it is kept from query to query ([`BranchAndBound`]). Lengths
-//! are metres of the common frame of the poses.
+//! A cover depends on the set alone, so it is kept from query to query ([`BranchAndBound`]).
+//! Lengths are metres of the common frame of the poses.
 
 mod cover;
 mod cut;

@@ -5,8 +5,8 @@ use crate::measure::Pose;
 use crate::polynomial::{Polynomial, Substitution};
 use nalgebra::{Matrix3, Vector3};
 
-/// Bound of the rounding of a point moved by a pose, relative to point and translation: a quaternion
-/// of unit length to a few units in the last place, applied in some thirty operations.
+/// Bound of the rounding of a point moved by a pose, relative to point and translation: a
+/// quaternion of unit length to a few units in the last place, applied in some thirty operations.
 const POSE_ROUNDING: f64 = 128.0 * f64::EPSILON;
 
 /// Steps that pull a point into its set.
@@ -160,7 +160,8 @@ impl Membership<'_> {
             && of.set.polynomials.iter().all(|g| self.placement.sample_of(g, &body).value_upper(rounding) <= 1.0)
     }
 
-    /// The point moved against the gradient until it is proven inside; none if it does not get there.
+    /// The point moved against the gradient until it is proven inside; none if it does not get
+    /// there.
     pub fn pulled(&self, mut x: Vector3<f64>) -> Option<Vector3<f64>> {
         let linear = self.set.linear();
         let mut extra = 1e-14;

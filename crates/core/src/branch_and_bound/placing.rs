@@ -29,8 +29,8 @@ impl Placing {
         self.linear * cell.center + self.offset
     }
 
-    /// Lower bound of `n·x` over the points of the set in a cell, but for [`Placing::slack_m`], for a
-    /// vector n of length 1, up to rounding.
+    /// Lower bound of `n·x` over the points of the set in a cell, but for [`Placing::slack_m`], for
+    /// a vector n of length 1, up to rounding.
     pub(super) fn least_along(&self, n: &Vector3<f64>, cover: &Cover, cell: &Cell) -> f64 {
         let m = self.linear.tr_mul(n);
         n.dot(&self.offset) + m.dot(&cell.center) - support(&cell.half, cover.cuts(cell), &-m)

@@ -30,9 +30,9 @@ impl BranchAndBound {
         Self::default()
     }
 
-    /// Euclidean distance of two sets: 0 where they have a common point. The threshold of the limits
-    /// is a length in metres; with 0 it ends when the sets are proven apart or a common point is
-    /// found.
+    /// Euclidean distance of two sets: 0 where they have a common point. The threshold of the
+    /// limits is a length in metres; with 0 it ends when the sets are proven apart or a common
+    /// point is found.
     ///
     /// # Errors
     /// Which set cannot be used, and why.

@@ -118,8 +118,8 @@ impl PairPolynomial {
         *sum = *sum + value;
     }
 
-    /// The powers of two nearest to bounds of coordinates: divided by these, coordinates are about 1
-    /// at most. Matrices are raised in these units, where a solver's errors are best alike too.
+    /// The powers of two nearest to bounds of coordinates: divided by these, coordinates are about
+    /// 1 at most. Matrices are raised in these units, where a solver's errors are best alike too.
     pub fn scales(most: &[f64; 6]) -> [f64; 6] {
         most.map(|bound| if bound > 0.0 { 2_f64.powf(bound.log2().round().clamp(-20.0, 20.0)) } else { 1.0 })
     }

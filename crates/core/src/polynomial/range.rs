@@ -42,10 +42,11 @@ impl LinearBounds {
 impl Polynomial {
     /// Proven linear bounds on the box of points with `|z_i - center_i| <= half_i`.
     ///
-    /// With `p(center + δ) = Σ c_e δ^e`, a term of order two or more does not exceed `|c_e| half^e`,
-    /// nor fall below 0 where it is a positive multiple of a square. Of order two the mixed terms
-    /// are set against the squares, `2 |c δ_i δ_j| <= |c| half_i half_j (s_i² + s_j²)` with `δ_i =
-    /// half_i s_i`, so that small boxes where p is convex lose what is of order three only.
+    /// With `p(center + δ) = Σ c_e δ^e`, a term of order two or more does not exceed `|c_e|
+    /// half^e`, nor fall below 0 where it is a positive multiple of a square. Of order two the
+    /// mixed terms are set against the squares, `2 |c δ_i δ_j| <= |c| half_i half_j (s_i² + s_j²)`
+    /// with `δ_i = half_i s_i`, so that small boxes where p is convex lose what is of order three
+    /// only.
     pub fn linear_bounds(&self, center: &Vector3<f64>, half: &Vector3<f64>) -> LinearBounds {
         let degree = self.degree();
         let mut here = dense(self.terms());

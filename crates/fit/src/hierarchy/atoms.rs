@@ -1,15 +1,16 @@
 //! Points of a measure from its moments.
 //!
 //! With `M_{d-1} = Q Λ Qᵀ` the moment matrix of degree d - 1, of rank r, and `W = Q Λ^{-1/2}`, the
-//! matrices `A_k = Wᵀ y(z_k b bᵀ) W`, b the monomials up to degree d - 1, are those of multiplication
-//! by z_k: symmetric, and diagonal in one basis q, in which `z_k = qᵀ A_k q` are the coordinates of
-//! the points (Klep, Povh and Volčič, SIAM J. Optim. 28, 2018).
+//! matrices `A_k = Wᵀ y(z_k b bᵀ) W`, b the monomials up to degree d - 1, are those of
+//! multiplication by z_k: symmetric, and diagonal in one basis q, in which `z_k = qᵀ A_k q` are the
+//! coordinates of the points (Klep, Povh and Volčič, SIAM J. Optim. 28, 2018).
 //!
 //! An interior-point method ends at moments of the largest rank, so that all minimisers are common
-//! zeros of the polynomials in the kernel of `M_d` (Henrion and Lasserre, LNCIS 312, 2005), and with
-//! them of their products with coordinates. Where what these leave of the polynomials of degree d
-//! has the dimension r that it has for degree d - 1, there are at most r zeros (Curto and Fialkow;
-//! Mourrain, AAECC 13, 1999): all minimisers, if r are found. Elsewhere the points are guesses.
+//! zeros of the polynomials in the kernel of `M_d` (Henrion and Lasserre, LNCIS 312, 2005), and
+//! with them of their products with coordinates. Where what these leave of the polynomials of
+//! degree d has the dimension r that it has for degree d - 1, there are at most r zeros (Curto and
+//! Fialkow; Mourrain, AAECC 13, 1999): all minimisers, if r are found. Elsewhere the points are
+//! guesses.
 
 use nalgebra::{DMatrix, Vector3};
 use sublevel_core::polynomial::{Exponents, monomials, position};
@@ -21,7 +22,7 @@ const RANK: f64 = 3e-4;
 /// Singular values of parts of orthonormal matrices below this count as zero.
 const PART: f64 = 1e-2;
 
-/// Factors of the coordinates whose combination tells points apart.
+/// Factors of the coordinates whose weighted sum differs from point to point.
 const MIXED: [f64; 3] = [0.537_667_1, 0.733_885_0, 0.415_846_9];
 
 /// Points of a measure.
@@ -71,8 +72,8 @@ pub(super) fn atoms(degree: usize, moment: impl Fn(Exponents) -> f64) -> Atoms {
     Atoms { points, is_flat: zeros(degree, whole) == Some(kept.len()), determines_other: false }
 }
 
-/// How many common zeros the polynomials in the kernel of a moment matrix have at most, if what they
-/// leave of the polynomials of its degree says so.
+/// How many common zeros the polynomials in the kernel of a moment matrix have at most, if what
+/// they leave of the polynomials of its degree says so.
 fn zeros(degree: usize, moments: DMatrix<f64>) -> Option<usize> {
     let basis = monomials(degree);
     let lower = monomials(degree - 1).len();

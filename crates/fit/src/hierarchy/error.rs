@@ -2,7 +2,8 @@
 
 use crate::error::FitError;
 
-/// Highest level that can be asked for: the next one has a matrix of 210 rows for both points alone.
+/// Highest level that can be asked for: the next one has a matrix of 210 rows for both points
+/// alone.
 pub const MAX_LEVEL: usize = 2;
 
 /// Rows of the triangles of all matrices up to which a program is built.

@@ -45,9 +45,9 @@ pub struct HierarchyLevelBound {
 /// The bracket of the level distance `d(p‖q) = min { p(x) : q(x) <= 1 }` of two sets at a level of
 /// the hierarchy, p and q the largest of the polynomials of the first and of the second set, each
 /// at its pose: as of [`sublevel_core::measure::level_distance`], with the sets in the same order
-/// (Ahmadi, Hall, Makadia and Sindhwani, section IV-B). Above 1 the sets are apart, at 1 they touch,
-/// below 1 they overlap; it is not symmetric. Boxes bound the second set alone: the first set's
-/// polynomials count everywhere.
+/// (Ahmadi, Hall, Makadia and Sindhwani, section IV-B). Above 1 the sets are apart, at 1 they
+/// touch, below 1 they overlap; it is not symmetric. Boxes bound the second set alone: the first
+/// set's polynomials count everywhere.
 ///
 /// The program is of the normalized coordinates u of the second set, where those of the first are
 /// affine, `z(u) = A u + b`:
@@ -58,14 +58,14 @@ pub struct HierarchyLevelBound {
 ///
 /// squares of polynomials of degree `max(deg p, deg q)/2 + level`, as many in σ_j as that leaves
 /// room for. An average is nowhere above the largest p_i, so γ is a lower bound; the weights are
-/// variables of the program, multipliers of `t >= p_i`. For sos-convex polynomials level 0 is exact,
-/// with several as with one. Otherwise, of several p_i, the bound rises with the level to the
-/// largest minimum of an average, which may be below the level distance.
+/// variables of the program, multipliers of `t >= p_i`. For sos-convex polynomials level 0 is
+/// exact, with several as with one. Otherwise, of several p_i, the bound rises with the level to
+/// the largest minimum of an average, which may be below the level distance.
 ///
 /// A solver's numbers are relative to the largest values of p on the second set's box: where these
 /// are many thousand times `max(1, d)`, as for a second set that is several times larger than the
-/// first one at degree 8, the bracket is wide, and is not called exact. `progress` is called at every
-/// iteration of the solver and can stop it.
+/// first one at degree 8, the bracket is wide, and is not called exact. `progress` is called at
+/// every iteration of the solver and can stop it.
 ///
 /// # Errors
 /// [`HierarchyError`]: sets that cannot be used, a level that is too high, a program that would be
@@ -87,8 +87,8 @@ pub fn hierarchy_level_distance(
     let expected = found.first().map_or(f64::INFINITY, |lowest| lowest.0.abs().max(1.0));
     let mut watch = Watch::new(progress);
     let (mut lower, mut atoms) = (of_box, Vec::new());
-    // The solver's errors are relative to what the objective is divided by, and which is best is not
-    // known: its largest coefficient, or about its minimum.
+    // The solver's errors are relative to what the objective is divided by, and which is best is
+    // not known: its largest coefficient, or about its minimum.
     let (mut is_solved, mut failed) = (false, None);
     for unit in [f64::INFINITY, expected] {
         let relaxation = MomentRelaxation::of_one(&objectives, degree, second, level).with_expected(unit);

@@ -34,8 +34,8 @@ pub(super) fn lowest_points(sets: [&PlacedSet; 2], guesses: &[Vector3<f64>]) -> 
     found
 }
 
-/// The middles of both sets, and of the points that the second one comes with the lowest and some of
-/// the others, so that not all starts are of one spot.
+/// The middles of both sets, and of the points that the second one comes with the lowest and some
+/// of the others, so that not all starts are of one spot.
 fn starts(sets: [&PlacedSet; 2]) -> Vec<Vector3<f64>> {
     let value = |x: &Vector3<f64>| {
         let (g, z) = sets[0].largest_at(x);

@@ -9,8 +9,8 @@
 //! (Lasserre, SIAM J. Optim. 11, 2001). f couples the sets by the products of their coordinates
 //! alone, so the squares are of three groups of monomials: those of u, those of v, and of both up
 //! to degree 1 + level (Waki, Kim, Kojima and Muramatsu, SIAM J. Optim. 17, 2006): matrices of 10,
-//! 10 and 7 rows at degree 4 and level 0, where all monomials of both would make one of 28. Level 0 is
-//! exact for sos-convex sets; for others it is a lower bound, which rises with the level. Of one
+//! 10 and 7 rows at degree 4 and level 0, where all monomials of both would make one of 28. Level 0
+//! is exact for sos-convex sets; for others it is a lower bound, which rises with the level. Of one
 //! point alone, the level distance has one group (`level.rs`).
 //!
 //! The program is solved in its dual, over moments; what comes out is proven from the numbers alone

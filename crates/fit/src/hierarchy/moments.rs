@@ -69,7 +69,8 @@ impl<'a> MomentRelaxation<'a> {
         Self::new(std::slice::from_ref(objective), vec![both], points.into())
     }
 
-    /// For the largest of the polynomials `f_i(u)` of the point of a set, of degrees up to `degree`.
+    /// For the largest of the polynomials `f_i(u)` of the point of a set, of degrees up to
+    /// `degree`.
     pub(super) fn of_one(objectives: &[PairPolynomial], degree: usize, set: &'a PlacedSet<'a>, level: usize) -> Self {
         let half_degree = degree.max(highest_degree(set)) / 2 + level;
         Self::new(objectives, Vec::new(), vec![SetPoint { set, point: Point::First, half_degree }])

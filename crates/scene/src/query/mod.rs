@@ -2,8 +2,8 @@
 //! states, clearances, rays. Each is a [`Question`](crate::crew::Question) for a
 //! [`Crew`](crate::Crew).
 //!
-//! `thing` is what stands in a pair; `solve` measures a pair, `sets` one of which a side need not be
-//! convex, `decide` compares it with a threshold. The questions are in files of their own.
+//! `thing` is what stands in a pair; `solve` measures a pair, `sets` one of which a side need not
+//! be convex, `decide` compares it with a threshold. The questions are in files of their own.
 
 mod answer;
 mod ask;

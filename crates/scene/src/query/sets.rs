@@ -87,8 +87,8 @@ impl Solver<'_> {
         }
     }
 
-    /// The distance of a pair with an sos-body in it, the signed one of a half-space; with a threshold,
-    /// in metres, until it is decided.
+    /// The distance of a pair with an sos-body in it, the signed one of a half-space; with a
+    /// threshold, in metres, until it is decided.
     pub(crate) fn set_distance(&self, pair: &Pair<'_>, threshold: Option<f64>, options: Options<'_>) -> SetBracket {
         let limits = self.limits(pair, threshold, &options);
         match (&pair.a, &pair.b) {

@@ -13,8 +13,8 @@ use crate::object::{Object, Slot};
 /// One side of a pair, where it stands.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Thing<'a> {
-    /// Solids of one object, coarsest first, at a world pose. With `set` they only contain it, as the
-    /// box around an sos-body does.
+    /// Solids of one object, coarsest first, at a world pose. With `set` they only contain it, as
+    /// the box around an sos-body does.
     Solid { rungs: &'a [Arc<Shape>], pose: &'a Pose, set: Option<&'a SosBody> },
     /// A half-space of the world frame.
     HalfSpace(WorldHalfSpace),

@@ -90,7 +90,8 @@ fn levels_and_decisions_are_proven_on_both_sides() {
     let measures = [Measure::LevelAOnB, Measure::LevelBOnA, Measure::NearerThan];
     let asked = ask(&measures).with_threshold(0.6).expect("a threshold");
     let found = answers(&scene, asked, vec![object("ring"), object("middle"), object("above"), object("other")]);
-    // Of the ring at the ball's equator: ((0.3² - 1 - r²)² + 0) / 4 r²; of the ball at the inner circle.
+    // Of the ring at the ball's equator: ((0.3² - 1 - r²)² + 0) / 4 r²; of the ball at the inner
+    // circle.
     let ring_at = (0.09 - 1.0 - TUBE * TUBE).powi(2) / (4.0 * TUBE * TUBE);
     let ball_at = (0.8 / 0.3_f64).powi(2);
     for (answer, truth) in [(&found[0], ring_at), (&found[1], ball_at)] {
