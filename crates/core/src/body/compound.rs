@@ -5,6 +5,7 @@ use super::bounds::{Aabb, Ball};
 use super::convex_body::Body;
 use super::covering::Covering;
 use super::id::BodyId;
+use super::part_tree::PartTree;
 use super::provenance::Provenance;
 use super::solid::{Sealed, Solid};
 use nalgebra::Vector3;
@@ -34,6 +35,7 @@ pub struct Compound {
     parts: Vec<Body>,
     circumscribed: Ball,
     bounding_box: Aabb,
+    tree: PartTree,
     pub(super) covering: Option<Covering>,
     pub(super) provenance: Option<Provenance>,
 }
@@ -72,7 +74,9 @@ impl Compound {
             ((ball.center - center).norm() + ball.radius + positions) * (1.0 + 8.0 * f64::EPSILON)
         };
         let radius = parts.iter().map(|part| around(part.circumscribed())).fold(0.0, f64::max);
+        let balls: Vec<Ball> = parts.iter().map(|part| *part.circumscribed()).collect();
         Ok(Self {
+            tree: PartTree::new(&balls),
             name: name.to_owned(),
             id: BodyId::of_parts(parts.iter().map(Body::id)),
             parts,
@@ -152,6 +156,10 @@ impl Solid for Compound {
 
     fn bounding_box(&self) -> &Aabb {
         Compound::bounding_box(self)
+    }
+
+    fn tree(&self) -> Option<&PartTree> {
+        Some(&self.tree)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::body_error::{BodyError, check_name};
 use super::bounds::{Aabb, Ball};
+use super::closed_form::ClosedForm;
 use super::constraint::{Constraint, MAX_CONSTRAINTS, MIN_DEPTH, largest};
 use super::contained_points::{ContainedPoints, NotContained, all_inside};
 use super::containment::{BasicSet, ContainedSet};
@@ -12,6 +13,7 @@ use super::placement::Placement;
 use super::provenance::Provenance;
 use super::radial::{self, Volume};
 use super::support_bounds::{self, Extent, SupportProblem};
+use super::support_heights::{SupportGuess, SupportHeights};
 use super::support_table::Outline;
 use crate::polynomial::NotContaining;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -44,6 +46,9 @@ pub struct Body {
     pub(super) trust: Trust,
     pub(super) boundary: Vec<Vector3<f64>>,
     pub(super) outline: Outline,
+    pub(super) closed_form: Option<ClosedForm>,
+    /// None of what has a closed form.
+    pub(super) heights: Option<SupportHeights>,
     pub(super) volume: Volume,
     pub(super) points: Option<ContainedPoints>,
     pub(super) sets: Vec<ContainedSet>,
@@ -102,11 +107,16 @@ impl Body {
             return Err(BodyError::Thin);
         }
         let interior_z = normalization.linear * (interior_point - normalization.center);
-        let outline = Outline::new(&constraints, &inverse, &interior_z);
+        let (outline, corners) = Outline::new(&constraints, &inverse, &interior_z);
         let lengths = BodyLengths { z_extent, reach: outline.reach(), interior_z };
         let trust = Trust::new(&constraints, &normalization, &inverse, &lengths);
         let volume = radial::volume(&constraints, &normalization.linear, &interior_z);
         let id = BodyId::of(&normalization, &constraints, None);
+        let closed_form = ClosedForm::of(&normalization, &constraints);
+        let heights = closed_form.is_none().then(|| {
+            let guesses = corners.iter().map(|(point, active)| SupportGuess { point: *point, active });
+            SupportHeights::new(&constraints, &inverse, &interior_z, &trust, &z_extent, guesses)
+        });
         Ok(Self {
             name: name.to_owned(),
             id,
@@ -124,6 +134,8 @@ impl Body {
             trust,
             boundary,
             outline,
+            closed_form,
+            heights,
             volume,
             points: None,
             sets: Vec::new(),
@@ -241,6 +253,12 @@ impl Body {
         &self.outline
     }
 
+    /// The shape that the body is, if its projection has a closed form: box, cylinder, ball.
+    #[inline(always)]
+    pub fn closed_form(&self) -> Option<&ClosedForm> {
+        self.closed_form.as_ref()
+    }
+
     /// Points proven to lie in the body, close to its boundary, spread all around.
     pub fn boundary(&self) -> &[Vector3<f64>] {
         &self.boundary
@@ -315,6 +333,23 @@ impl Body {
         let Ball { center, radius } = &self.circumscribed;
         let farthest = (bound.point - center).norm() + radius;
         Support { point: bound.point, height_m: (bound.reach + bound.slope * farthest) * (1.0 + 1e-14) }
+    }
+
+    /// Proven upper bound of the height of the body along n above its interior point, `max n·(x -
+    /// a)`: closed for boxes, cylinders and balls, else from a table, at most some hundredths too
+    /// large. n of any length, body frame; metres times that length.
+    #[inline(always)]
+    pub fn height(&self, n: &Vector3<f64>) -> f64 {
+        match (&self.heights, &self.closed_form) {
+            (Some(heights), _) => heights.along(n),
+            (None, Some(form)) => form.height(n) + n.dot(&(form.center() - self.interior_point)),
+            (None, None) => f64::INFINITY,
+        }
+    }
+
+    /// Size of the table that [`Body::height`] is looked up in, bytes.
+    pub fn heights_bytes(&self) -> usize {
+        self.heights.as_ref().map_or(0, SupportHeights::bytes)
     }
 
     /// Proves every point inside, rounding included; with convexity their whole convex hull is.

@@ -67,6 +67,14 @@ impl BodyId {
         Self(hash.finalize().into())
     }
 
+    /// That of a capsule: SHA-256 of `capsule`, the radius and the half height, as little-endian
+    /// f64.
+    pub fn of_capsule(radius_m: f64, half_height_m: f64) -> Self {
+        let mut hash = Sha256::new_with_prefix("capsule");
+        [radius_m, half_height_m].iter().for_each(|value| hash.update(value.to_le_bytes()));
+        Self(hash.finalize().into())
+    }
+
     pub(super) fn of_parts<'a>(parts: impl Iterator<Item = &'a Self>) -> Self {
         let mut hash = Sha256::new();
         parts.for_each(|part| hash.update(part.0));

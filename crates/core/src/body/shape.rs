@@ -6,6 +6,7 @@ use super::convex_body::Body;
 use super::file_error::BodyFileError;
 use super::file_format::{COMPOUND_KIND, kind};
 use super::id::BodyId;
+use super::part_tree::PartTree;
 use super::solid::{Sealed, Solid};
 
 /// A body or a compound, which measures take alike.
@@ -78,6 +79,13 @@ impl Solid for Shape {
         match self {
             Shape::Body(body) => body.bounding_box(),
             Shape::Compound(compound) => compound.bounding_box(),
+        }
+    }
+
+    fn tree(&self) -> Option<&PartTree> {
+        match self {
+            Shape::Body(body) => body.tree(),
+            Shape::Compound(compound) => compound.tree(),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::bounds::{Aabb, Ball};
 use super::convex_body::Body;
+use super::part_tree::PartTree;
 
 /// What measures ask of a solid: the convex bodies it is the union of, all in one frame, and a ball
 /// around them.
@@ -14,6 +15,8 @@ pub trait Solid: Sealed {
     fn circumscribed(&self) -> &Ball;
     /// A box proven to contain all parts, metres.
     fn bounding_box(&self) -> &Aabb;
+    /// A tree of balls around the parts; none of a single body.
+    fn tree(&self) -> Option<&PartTree>;
 }
 
 /// Keeps the promise of at least one part: nobody else can implement [`Solid`].
@@ -33,5 +36,9 @@ impl Solid for Body {
 
     fn bounding_box(&self) -> &Aabb {
         Body::bounding_box(self)
+    }
+
+    fn tree(&self) -> Option<&PartTree> {
+        None
     }
 }

@@ -59,14 +59,15 @@ pub(super) struct SupportProblem<'a> {
     pub(super) anchor: &'a Vector3<f64>,
 }
 
-/// Support point of the body in the direction of the unit vector `n` of the body frame, with its
-/// tangent bound.
-pub(super) fn support(problem: &SupportProblem, n: &Vector3<f64>) -> TangentBound {
-    let SupportProblem { constraints, placement, inverse, interior_z, anchor } = *problem;
-    let in_z = inverse.transpose() * n;
-    let length = in_z.norm();
-    let program = FarthestPoint { constraints, direction: in_z / length };
-    let reach = radial::radius(constraints, &interior_z, &program.direction);
+/// The point of the body farthest along a unit vector, up to the accuracy of its computation, and
+/// the multipliers of the constraints; normalized frame. From a point inside.
+pub(super) fn farthest_point(
+    constraints: &[Constraint],
+    direction: &Vector3<f64>,
+    interior_z: &Vector3<f64>,
+) -> (Vector3<f64>, [f64; MAX_ROWS]) {
+    let program = FarthestPoint { constraints, direction: *direction };
+    let reach = radial::radius(constraints, interior_z, &program.direction);
     let mut z = interior_z + program.direction * (0.9 * reach.min(1e6));
     // Past the accuracy of doubles the method drifts away again: the best iterate counts, not the
     // last.
@@ -84,7 +85,16 @@ pub(super) fn support(problem: &SupportProblem, n: &Vector3<f64>) -> TangentBoun
         let settled = best.0 < SUPPORT_ACCURACY || iterate.gap < 1e-3 * SUPPORT_ACCURACY;
         if settled { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
-    let (_, z, multipliers) = best;
+    (best.1, best.2)
+}
+
+/// Support point of the body in the direction of the unit vector `n` of the body frame, with its
+/// tangent bound.
+pub(super) fn support(problem: &SupportProblem, n: &Vector3<f64>) -> TangentBound {
+    let SupportProblem { constraints, placement, inverse, interior_z, anchor } = *problem;
+    let in_z = inverse.transpose() * n;
+    let length = in_z.norm();
+    let (z, multipliers) = farthest_point(constraints, &(in_z / length), &interior_z);
     let point = inverse * z + placement.origin();
     let mut reach = n.dot(&(point - anchor)) + 8.0 * f64::EPSILON * (point.norm() + anchor.norm());
     reach += 2.0 * placement.displacement(&point);
