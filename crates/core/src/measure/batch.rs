@@ -502,7 +502,8 @@ impl Batch<'_> {
         ];
         let frame = rows(simd, self.pose_a.rotation().to_rotation_matrix().matrix());
         let translation = apply_transposed(&frame, [column(4), column(5), column(6)]);
-        Relative::from_parts(simd, self.a, rotation, translation, self.b)
+        let home = (&self.a.normalization().center, self.a.trust().center);
+        Relative::from_parts(simd, home, rotation, translation, self.b)
     }
 
     /// Writes the answers of the lanes that are set in `proven`.

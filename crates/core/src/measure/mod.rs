@@ -13,6 +13,7 @@
 
 mod batch;
 mod bounds;
+mod capsule;
 mod cast_ball;
 mod cast_ray;
 mod distance;
@@ -33,6 +34,7 @@ mod translation_hessian;
 mod warm;
 
 pub use batch::{BatchError, distance_batch};
+pub use capsule::{Capsule, CapsuleDistance, CapsuleError, distance_of_capsules, distance_to_capsule};
 pub use cast_ball::{Sweep, cast_ball};
 pub use cast_ray::{Ray, RayCast, RayError, RayHit, cast_ray};
 pub use distance::{Distance, distance};

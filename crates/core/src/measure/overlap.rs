@@ -1,8 +1,9 @@
 //! Questions that a bracket answers before it is narrow: overlap, nearer than a threshold, within a
 //! margin.
 //!
-//! Balls come first, then the slabs of the normalized coordinates along a direction or two, then
-//! the search for the distance, which stops as soon as its bracket decides.
+//! Balls come first, then planes across a few directions, whose heights are looked up. What touches
+//! a box or a cylinder, or does not, the least value of the other body's polynomial over that shape
+//! decides. The search for the distance, which stops as soon as its bracket decides, comes last.
 
 use crate::body::Solid;
 use crate::measure::distance::{Distance, distance_until};

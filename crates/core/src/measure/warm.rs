@@ -3,6 +3,7 @@
 use crate::measure::frames::query_frame::Pair;
 use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::continuation::Trace;
+use crate::measure::solver::exact_shape::ExactTrace;
 use crate::measure::solver::kkt_newton::Active;
 use crate::measure::solver::level_continuation::LevelTrace;
 use nalgebra::Vector3;
@@ -46,6 +47,10 @@ pub(super) enum Hint {
     Apart { x_a: Vector3<f64>, y_b: Vector3<f64>, normal_a: Vector3<f64>, active_a: ActiveSet, active_b: ActiveSet },
     /// Witnesses on smooth parts of both surfaces, with how they answer motions.
     Smooth(Trace),
+    /// Nearest point of a smooth body to one with a closed form.
+    Exact(ExactTrace),
+    /// Of two bodies with closed forms, the point of A that is nearest to B or in it, in A's frame.
+    Shapes { x_a: Vector3<f64> },
     /// A common point in A's frame.
     Overlap { point_a: Vector3<f64> },
     /// Minimiser of a level distance on smooth parts of both bodies, with how it answers motions.
@@ -68,6 +73,17 @@ impl WarmStart {
     pub(super) fn apart(pair: &Pair<'_>, [x, y, n]: [&Vector3<f64>; 3], (a, b): &(Active, Active)) -> Self {
         let (active_a, active_b) = (a.bits(), b.bits());
         Hint::Apart { x_a: pair.to_a(x), y_b: pair.to_b(y), normal_a: *n, active_a, active_b }.into()
+    }
+}
+
+impl Hint {
+    /// Unit normal of the last answer, from B to A, in A's frame.
+    pub(super) fn normal_a(&self) -> Option<Vector3<f64>> {
+        match self {
+            Self::Apart { normal_a, .. } => Some(*normal_a),
+            Self::Smooth(trace) => Some(trace.normal_a()),
+            _ => None,
+        }
     }
 }
 

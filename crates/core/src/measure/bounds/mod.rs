@@ -2,3 +2,4 @@
 
 pub(super) mod culling;
 pub(super) mod duality_bounds;
+pub(super) mod separation;

@@ -2,14 +2,15 @@
 
 mod answer;
 mod deepest;
+mod exact;
 mod pair;
+mod planes;
 mod search;
 
-use crate::body::{Body, Solid};
-use crate::measure::bounds::culling::ball_gap;
+use crate::body::{Ball, Body, NodeContent, PartNode, PartTree, Solid};
 use crate::measure::frames::pose::Pose;
 use crate::measure::options::Options;
-use crate::measure::pairwise_minimum::{At, least};
+use crate::measure::pairwise_minimum::{At, TreePair, nearest as nearest_parts};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::status::Status;
 use crate::measure::warm::WarmStart;
@@ -62,20 +63,27 @@ pub(super) fn distance_until(
         return settle((a, pose_a), (b, pose_b), goal, options, warm);
     }
     let radius = a.circumscribed().radius.min(b.circumscribed().radius);
-    let mut found = closest((a.parts(), pose_a), (b.parts(), pose_b), goal, options, warm);
+    let (own_a, own_b) = (only_node(a.circumscribed()), only_node(b.circumscribed()));
+    let (tree_a, tree_b) = (a.tree().map_or(&own_a[..], PartTree::nodes), b.tree().map_or(&own_b[..], PartTree::nodes));
+    let balls = TreePair::new((tree_a, pose_a), (tree_b, pose_b));
+    let mut found = closest((a.parts(), pose_a), (b.parts(), pose_b), &balls, goal, (options, warm));
     found.status = Status::of(found.upper - found.lower <= options.accuracy() * radius);
     found
+}
+
+/// The tree of a single part.
+fn only_node(ball: &Ball) -> [PartNode; 1] {
+    [PartNode { ball: *ball, content: NodeContent::Part(0) }]
 }
 
 fn closest(
     (a, pose_a): At<'_, [Body]>,
     (b, pose_b): At<'_, [Body]>,
+    balls: &TreePair<'_>,
     goal: &StopCriterion,
-    options: &Options<'_>,
-    warm: &mut WarmStart,
+    (options, warm): (&Options<'_>, &mut WarmStart),
 ) -> Distance {
-    let gap = |(i, j): (usize, usize)| ball_gap((&a[i], pose_a), (&b[j], pose_b));
-    let found = least((a.len(), b.len()), gap, goal.near.max(0.0), warm, |(i, j), nearest, hint| {
+    let found = nearest_parts(balls, goal.near.max(0.0), warm, |(i, j), nearest, hint| {
         let goal = StopCriterion { near: goal.near, far: goal.far.min(nearest) };
         settle((&a[i], pose_a), (&b[j], pose_b), &goal, options, hint)
     });

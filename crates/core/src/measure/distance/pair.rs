@@ -1,9 +1,12 @@
-//! Distance of two bodies: continuation first, then the general search.
+//! Distance of two bodies: in closed form on one side where there is one, else continuation first;
+//! then the general search.
 
 use super::answer::Distance;
+use super::exact::{Exact, of_shapes};
+use super::planes::Planes;
 use super::search::Search;
 use crate::body::Body;
-use crate::measure::bounds::culling::{BallBounds, balls, slabs};
+use crate::measure::bounds::culling::{BallBounds, balls};
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::query_frame::Pair;
 use crate::measure::options::Options;
@@ -39,14 +42,27 @@ pub(in crate::measure) fn settle(
     if goal.met(bound.lower, bound.upper) {
         return bound;
     }
-    let normal_a = if let Hint::Apart { normal_a, .. } = &warm.hint { Some(normal_a) } else { None };
-    if runs(Stage::Slabs) {
-        bound.lower = bound.lower.max(slabs(of_a, of_b, normal_a));
+    if runs(Stage::Planes) {
+        bound.lower = bound.lower.max(Planes::new(of_a, of_b, &warm.hint).lower(goal));
+        if goal.met(bound.lower, bound.upper) {
+            return bound;
+        }
     }
-    if goal.met(bound.lower, bound.upper) {
-        return bound;
+    let mut spent = 0;
+    if runs(Stage::ClosedForm)
+        && goal.is_contact()
+        && let Some(exact) = Exact::new(of_a, of_b)
+    {
+        match exact.contact(options, warm) {
+            Ok(found) => {
+                let (lower, iterations) = (found.lower.max(bound.lower), found.iterations);
+                return Distance { lower, iterations, ..if found.upper < bound.upper { found } else { bound } };
+            }
+            Err(rounds) => spent = rounds,
+        }
     }
-    let found = between(of_a, of_b, goal, options, warm);
+    let found = between(of_a, of_b, goal, &options.after(spent), warm);
+    let found = Distance { iterations: found.iterations + spent, ..found };
     // A search that stopped early may know less than the bounds it came after.
     let upper = if found.upper <= bound.upper { found } else { bound };
     Distance { lower: found.lower.max(bound.lower), status: found.status, iterations: found.iterations, ..upper }
@@ -61,6 +77,29 @@ pub(in crate::measure) fn between(
     warm: &mut WarmStart,
 ) -> Distance {
     let query = Query { of_a, of_b, goal, options };
+    if runs(Stage::ClosedForm)
+        && let Some(found) = of_shapes(of_a, of_b, options, warm)
+    {
+        return match found {
+            Ok(found) => found,
+            Err(steps) => query.search(&Lost::after(steps), warm),
+        };
+    }
+    if runs(Stage::ClosedForm)
+        && let Some(exact) = Exact::new(of_a, of_b)
+        && !matches!(warm.hint, Hint::Overlap { .. })
+    {
+        return match exact.distance(goal, options, &warm.hint) {
+            Ok((found, hint)) => {
+                *warm = hint;
+                found
+            }
+            Err((rounds, hint)) => {
+                *warm = hint;
+                query.search(&Lost::after(rounds), warm)
+            }
+        };
+    }
     match warm.hint {
         Hint::Smooth(_) if runs(Stage::Follow) => dispatch(Warm { query, warm }),
         Hint::Overlap { point_a } => query.overlapping(&point_a, warm),

@@ -150,6 +150,8 @@ impl<'a> Search<'a> {
                 }
             }
             Hint::Cold
+            | Hint::Exact(_)
+            | Hint::Shapes { .. }
             | Hint::Diverged
             | Hint::Overlap { .. }
             | Hint::Level { .. }

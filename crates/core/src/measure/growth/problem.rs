@@ -102,7 +102,8 @@ impl Along {
 impl Relation for Along {
     #[inline(always)]
     fn relative<S: Simd>(&self, simd: S, a: &Body, b: &Body) -> Relative<f64> {
-        let mut relative = Relative::from_parts(simd, a, self.rotation, self.translation, b);
+        let home = (&a.normalization().center, a.trust().center);
+        let mut relative = Relative::from_parts(simd, home, self.rotation, self.translation, b);
         relative.displacement += self.center_error;
         relative
     }

@@ -53,6 +53,11 @@ impl Trace {
         Self { active, of_a: nowhere, of_b: nowhere, tangents: [[0.0; 3]; 2], response, drift: Drift::default() }
     }
 
+    /// Unit normal from B to A, in A's frame.
+    pub(in crate::measure) fn normal_a(&self) -> Vector3<f64> {
+        self.of_a.normal.into()
+    }
+
     /// Takes down witnesses x of A and y of B, in the query frame of `relative`, with the normal.
     #[inline(always)]
     fn take_down<S: Simd>(

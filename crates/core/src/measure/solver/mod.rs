@@ -12,6 +12,7 @@ pub(super) mod continuation;
 pub(super) mod convex_root_bracket;
 pub(super) mod depth;
 pub(super) mod double_double;
+pub(super) mod exact_shape;
 pub(super) mod initial_guess;
 pub(super) mod kkt_newton;
 pub(super) mod level_continuation;

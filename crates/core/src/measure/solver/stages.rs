@@ -5,6 +5,8 @@
 /// A method that finds an answer, or a part of one, which another one would find as well.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::measure) enum Stage {
+    /// Newton's method on one body against a shape with a closed form.
+    ClosedForm,
     /// Continuation from the answer before.
     Follow,
     /// Continuation from the poses alone, or from GJK's points.
@@ -31,8 +33,8 @@ pub(in crate::measure) enum Stage {
     Lanes,
     /// The gap between circumscribed balls, and what balls inside the bodies have in common.
     Balls,
-    /// Bounds by the boxes of the normalized coordinates.
-    Slabs,
+    /// Bounds by planes across a few directions.
+    Planes,
     /// A first look around all directions for the least depth.
     DirectionSampling,
     /// Search around a direction for a better one, where edges stop Newton's method.
@@ -69,7 +71,7 @@ pub(in crate::measure) fn runs(_: Stage) -> bool {
 }
 
 #[cfg(test)]
-pub(in crate::measure) use mask::{only, runs};
+pub(in crate::measure) use mask::{except, only, runs};
 
 #[cfg(test)]
 mod mask {
@@ -87,7 +89,16 @@ mod mask {
 
     /// Does `work` with no other stages than these.
     pub(in crate::measure) fn only<T>(stages: &[Stage], work: impl FnOnce() -> T) -> T {
-        let before = MASK.replace(stages.iter().fold(0, |mask, stage| mask | 1 << *stage as u32));
+        with(stages.iter().fold(0, |mask, stage| mask | 1 << *stage as u32), work)
+    }
+
+    /// Does `work` without these stages.
+    pub(in crate::measure) fn except<T>(stages: &[Stage], work: impl FnOnce() -> T) -> T {
+        with(stages.iter().fold(u32::MAX, |mask, stage| mask & !(1 << *stage as u32)), work)
+    }
+
+    fn with<T>(mask: u32, work: impl FnOnce() -> T) -> T {
+        let before = MASK.replace(mask);
         let done = work();
         MASK.set(before);
         done

@@ -32,6 +32,11 @@ impl StopCriterion {
         self.near == f64::NEG_INFINITY && self.far == f64::INFINITY
     }
 
+    /// Whether the question is on which side of contact the bodies are.
+    pub(in crate::measure) fn is_contact(&self) -> bool {
+        self.near == 0.0 && self.far == 0.0
+    }
+
     /// Whether a narrow bracket is an answer, with all that comes with one, and not just a
     /// decision.
     pub(in crate::measure) fn wants_answer(&self) -> bool {

@@ -31,7 +31,7 @@ use crate::measure::frames::vector::{M3, V3, apply_symmetric, apply_transposed, 
 use crate::polynomial::{Number, NumberJet, Simd};
 pub(in crate::measure) use plane::Plane;
 pub(in crate::measure) use simd_body::{Relative, Side};
-pub(in crate::measure) use taylor_bounds::{ALIGNED, Bracket, NUDGE, TAYLOR_ROUNDING, bracket};
+pub(in crate::measure) use taylor_bounds::{ALIGNED, Bracket, Extrapolated, NUDGE, TAYLOR_ROUNDING, bracket};
 
 /// Second derivatives of a constraint at a point.
 #[derive(Clone, Copy, Debug)]

@@ -4,7 +4,7 @@
 use crate::body::{Body, ConstraintTrust};
 use crate::measure::frames::pose::{Pose, RELATIVE_QUATERNION_ERROR};
 use crate::measure::frames::vector::{
-    M3, V3, add_scaled, apply, apply_transposed, dot, rows, subtract, times_transposed,
+    M3, V3, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, subtract, times_transposed,
 };
 use crate::polynomial::{Number, NumberJet, Simd, gamma};
 use nalgebra::Vector3;
@@ -30,16 +30,18 @@ impl Relative<f64> {
         let conjugate = pose_a.rotation().conjugate();
         let moved = conjugate * (pose_b.translation() - pose_a.translation());
         let rotation = (conjugate * pose_b.rotation()).to_rotation_matrix();
-        Self::from_parts(simd, a, rows(simd, rotation.matrix()), [moved.x, moved.y, moved.z], b)
+        let home = (&a.normalization().center, a.trust().center);
+        Self::from_parts(simd, home, rows(simd, rotation.matrix()), [moved.x, moved.y, moved.z], b)
     }
 }
 
 impl<N: Copy> Relative<N> {
-    /// B turned by `rotation` and then moved by `translation`, as seen from A.
+    /// B turned by `rotation` and then moved by `translation`, as seen from a point of A's frame
+    /// (metres) with its distance from the origin there.
     #[inline(always)]
     pub(in crate::measure) fn from_parts<S: Simd>(
         simd: S,
-        a: &Body,
+        (center_a, center_norm): (&Vector3<f64>, f64),
         rotation: M3<N>,
         translation: V3<N>,
         b: &Body,
@@ -48,9 +50,8 @@ impl<N: Copy> Relative<N> {
         N: Number<S>,
     {
         let splat = |v: &Vector3<f64>| [N::splat(simd, v.x), N::splat(simd, v.y), N::splat(simd, v.z)];
-        let (center_a, center_b) = (a.normalization().center, b.normalization().center);
-        let turned = apply(&rotation, splat(&center_b));
-        let from = splat(&center_a);
+        let turned = apply(&rotation, splat(&b.normalization().center));
+        let from = splat(center_a);
         let mut origin = from;
         for i in 0..3 {
             origin[i] = turned[i] + (translation[i] - from[i]);
@@ -59,7 +60,7 @@ impl<N: Copy> Relative<N> {
         let trust = b.trust();
         let fixed = (RELATIVE_QUATERNION_ERROR + trust.rounding) * trust.reach
             + RELATIVE_QUATERNION_ERROR * trust.center
-            + gamma(8) * a.trust().center;
+            + gamma(8) * center_norm;
         let far = translation[0].abs() + translation[1].abs() + translation[2].abs();
         Self {
             rotation,
@@ -79,7 +80,7 @@ pub(in crate::measure) struct Side<'a, N> {
     pub(in crate::measure) active: usize,
     linear: M3<N>,
     origin: V3<N>,
-    pub(super) displacement: N,
+    pub(in crate::measure) displacement: N,
 }
 
 impl<'a, N: Copy> Side<'a, N> {
@@ -140,6 +141,34 @@ impl<'a, N: Copy> Side<'a, N> {
 }
 
 impl Side<'_, f64> {
+    /// The normalized coordinates of a point.
+    #[inline(always)]
+    pub(in crate::measure) fn normalized<S: Simd>(&self, _: S, v: V3<f64>) -> V3<f64> {
+        apply::<S, f64>(&self.linear, subtract::<S, f64>(v, self.origin))
+    }
+
+    /// The gradient by points of the query frame, per metre.
+    #[inline(always)]
+    pub(in crate::measure) fn gradient<S: Simd>(&self, _: S, jet: &NumberJet<f64>) -> V3<f64> {
+        apply_transposed::<S, f64>(&self.linear, jet.gradient)
+    }
+
+    /// The Hessian by points of the query frame, per square metre: xx, xy, xz, yy, yz, zz.
+    #[inline(always)]
+    pub(in crate::measure) fn hessian<S: Simd>(&self, _: S, jet: &NumberJet<f64>) -> [f64; 6] {
+        let column = |j: usize| [self.linear[0][j], self.linear[1][j], self.linear[2][j]];
+        let columns = [column(0), column(1), column(2)];
+        let bent = columns.map(|column| apply_symmetric::<S, f64>(&jet.hessian, column));
+        let entry = |i: usize, j: usize| dot::<S, f64>(columns[i], bent[j]);
+        [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)]
+    }
+
+    /// Bound of the relative error of a gradient by the rounding of the body's map and of the pose.
+    #[inline(always)]
+    pub(in crate::measure) fn turn(&self) -> f64 {
+        RELATIVE_QUATERNION_ERROR + gamma(64) * self.body.trust().condition
+    }
+
     /// The point itself if it lies in the ball of the body's [`crate::body::Trust`], else about
     /// where the line to the centre meets the surface, by the value of the active constraint at the
     /// point.

@@ -1,0 +1,439 @@
+//! The distance of a smooth body from a set with a closed form, inside a proven bracket.
+//!
+//! Newton's method for the nearest point x of the body ([`super::newton`]) starts from the last
+//! answer or from where the outlines face each other ([`super::start`]). What proves the distance:
+//! for a unit vector n the plane across it separates by `n·x - (how much farther the body reaches
+//! along -n) - h(n)`, h the support function of the set, which is closed; and x, moved into the
+//! body, and its projection attain an upper bound. Where the body seems to reach the set, the least
+//! value of its polynomial there decides ([`super::level`]).
+
+use super::level::{Level, LevelProblem};
+use super::newton::newton;
+use super::projectable::{Offset, Projectable};
+use super::ray::Exit;
+use super::start::{farthest, start};
+use crate::body::Body;
+use crate::measure::frames::vector::{
+    M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, scaled, subtract,
+};
+use crate::measure::options::Options;
+use crate::measure::solver::step_acceleration::{Correction, Last, Series};
+use crate::measure::solver::stop_criterion::StopCriterion;
+use crate::measure::solver::tangent_newton::{
+    ALIGNED, Extrapolated, Plane, Relative, Side, SurfaceCurvature, TAYLOR_ROUNDING, moved,
+};
+use crate::polynomial::{NumberJet, Scalar, Simd, WithSimd, dispatch};
+use nalgebra::Vector3;
+
+/// Most evaluations of Newton's method from one start.
+const MAX_ROUNDS: u32 = 16;
+
+/// Square of a step in normalized coordinates, relative to the body's size there, up to which the
+/// bracket where it leads is looked at. Larger, more brackets are too wide to end on.
+const WORTH_A_BRACKET: f64 = 1e-6;
+
+/// Square of a step, as above, after which none is left but rounding.
+const SETTLED: f64 = 1e-22;
+
+/// Square of a step, as above, that is long enough to look at the support table again.
+const FAR: f64 = 2.5e-3;
+
+/// How often that is done.
+const LOOKS: u32 = 3;
+
+/// How much nearer a point of the table has to be.
+const NEARER: f64 = 0.98;
+
+/// Longest step in normalized coordinates relative to the body's size there.
+const LONGEST: f64 = 0.5;
+
+/// Longest first step from the last answer, as above.
+const LONGEST_FOLLOWED: f64 = 0.25;
+
+/// Curvature times size that counts as none.
+const FLATTEST: f64 = 1e-20;
+
+/// Evaluations after which steps from one feature of the set to another are shortened, so that they
+/// do not go around in circles.
+const PATIENCE: u32 = 8;
+
+/// How often a step that led behind the set or into it is halved.
+const HALVINGS: u32 = 6;
+
+/// What is kept of an answer for the next query of the pair: the body's constraint at the nearest
+/// point, all in normalized coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::measure) struct ExactTrace {
+    point: V3<f64>,
+    jet: NumberJet<f64>,
+    /// What the first step from there missed last time.
+    missed: V3<f64>,
+}
+
+impl ExactTrace {
+    /// As from an answer with this witness, body frame, metres.
+    pub(in crate::measure) fn at(body: &Body, witness: &Vector3<f64>) -> Self {
+        let normalization = body.normalization();
+        let point = (normalization.linear * (witness - normalization.center)).into();
+        let jet = body.constraints()[0].polynomial.jet::<Scalar, f64>(Scalar, point);
+        Self { point, jet, missed: [0.0; 3] }
+    }
+}
+
+/// A smooth body and a set, in the frame of the set.
+pub(in crate::measure) struct ExactPair<'a, P> {
+    pub(in crate::measure) body: &'a Body,
+    /// Where the body stands as seen from the set.
+    pub(in crate::measure) relative: Relative<f64>,
+    pub(in crate::measure) set: P,
+    /// Bound of how far the set is from what it stands for, metres.
+    pub(in crate::measure) displacement: f64,
+    pub(in crate::measure) goal: &'a StopCriterion,
+    /// Width of the bracket that is narrow enough, metres.
+    pub(in crate::measure) tolerance: f64,
+    pub(in crate::measure) options: &'a Options<'a>,
+    /// Of the answer before.
+    pub(in crate::measure) trace: Option<&'a ExactTrace>,
+}
+
+/// A proven bracket, metres, and where it is attained, in the frame of the set.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::measure) struct ExactProven {
+    pub(in crate::measure) lower: f64,
+    /// 0 where a common point is known.
+    pub(in crate::measure) upper: f64,
+    /// Point of the body.
+    pub(in crate::measure) x: V3<f64>,
+    /// Point of the set.
+    pub(in crate::measure) nearest: V3<f64>,
+    /// Unit normal from the set to the body.
+    pub(in crate::measure) n: V3<f64>,
+    /// Multiplier of the body's constraint, metres.
+    pub(in crate::measure) multiplier: f64,
+    /// Evaluations of the body.
+    pub(in crate::measure) rounds: u32,
+    pub(in crate::measure) trace: Option<ExactTrace>,
+}
+
+/// What is left where nothing was proven.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::measure) struct ExactLost {
+    /// Evaluations of the body.
+    pub(in crate::measure) rounds: u32,
+    /// About where the answer is attained, where Newton's method converged; its bracket means
+    /// nothing.
+    pub(in crate::measure) about: Option<ExactProven>,
+}
+
+/// How Newton's method ended.
+enum Ended {
+    Proven(ExactProven),
+    /// The body seems to reach the set, or there is another reason why steps lead nowhere.
+    Lost,
+    /// Rounding keeps the bracket wide where no step is left to take, or there were too many.
+    Wide(ExactProven),
+}
+
+/// Where Newton's method starts: a point of the body, and the set as seen from there.
+type Guess = (V3<f64>, Offset);
+
+impl<P: Projectable> WithSimd for ExactPair<'_, P> {
+    /// The answer, or what is left.
+    type Output = Result<ExactProven, ExactLost>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let side = Side::away(self.body, 0, &self.relative);
+        let center = interior(simd, self.body, &self.relative);
+        let followed = self.trace.and_then(|trace| self.follow(simd, &side, trace));
+        let mut predicted = followed.map(|(_, predicted)| predicted);
+        let mut guess = followed.map(|(guess, _)| guess).or_else(|| self.seek(simd, center));
+        let (mut rounds, mut from_level) = (0, false);
+        loop {
+            // No closure: what is inlined into one is not compiled for the vectors at hand.
+            if let Some(guess) = guess {
+                match self.iterate(simd, &side, guess, predicted, from_level, &mut rounds) {
+                    Ended::Proven(proven) => return Ok(proven),
+                    Ended::Wide(about) => return Err(ExactLost { rounds, about: Some(about) }),
+                    Ended::Lost => {}
+                }
+            }
+            if from_level || self.options.exhausted(rounds) {
+                return Err(ExactLost { rounds, about: None });
+            }
+            // Either they overlap, or the least value shows where to start again.
+            from_level = true;
+            let most = self.options.max_iterations() - rounds;
+            let (level, count) = dispatch(self.level(simd, &side, center, most));
+            rounds += count;
+            let x = match level {
+                Level::Common(y) => return Ok(common(y, rounds)),
+                // Where the body's tangent plane there has its surface.
+                Level::Apart { lower, n, y } => add_scaled::<S, f64>(y, lower, n),
+                Level::Open => return Err(ExactLost { rounds, about: None }),
+            };
+            (guess, predicted) = (Some((x, self.set.offset(simd, x))), None);
+        }
+    }
+}
+
+impl<P: Projectable> ExactPair<'_, P> {
+    /// From the poses alone; none where the body's interior point is in the set.
+    #[inline(always)]
+    fn seek<S: Simd>(&self, simd: S, center: V3<f64>) -> Option<Guess> {
+        let seen = self.set.offset(simd, center);
+        let outside = seen.distance > 0.0;
+        outside.then(|| start(simd, &self.set, self.body, &self.relative, seen.frame[2]))
+    }
+
+    /// Which side of contact they are on, by the least value over the set.
+    #[inline(always)]
+    fn level<'a, S: Simd>(
+        &'a self,
+        simd: S,
+        side: &'a Side<'a, f64>,
+        center: V3<f64>,
+        most: u32,
+    ) -> LevelProblem<'a, P> {
+        let Self { set, displacement, .. } = *self;
+        LevelProblem { start: set.project(simd, center), set, side, displacement, settle: true, most }
+    }
+
+    /// From the last answer: Newton's step for the poses as they are now, without an evaluation,
+    /// and what it missed last time on top. Also the normalized coordinates that the step led to.
+    #[inline(always)]
+    fn follow<S: Simd>(&self, simd: S, side: &Side<'_, f64>, trace: &ExactTrace) -> Option<(Guess, V3<f64>)> {
+        let x = self.located(simd, trace.point);
+        let seen = self.set.offset(simd, x);
+        if !(seen.distance > 0.0) {
+            return None;
+        }
+        let local = side.localize(simd, &seen.frame);
+        let plane = Plane::new(simd, &trace.jet, &local);
+        let bend = SurfaceCurvature::new(simd, &trace.jet, &local);
+        let found = newton(simd, &self.set, x, &seen, (&plane, &bend), self.smallest())?;
+        if !(side.relative_square(simd, &local, found.step) < LONGEST_FOLLOWED * LONGEST_FOLLOWED) {
+            return None;
+        }
+        let predicted = add::<S, f64>(trace.point, apply_transposed::<S, f64>(&local, found.step));
+        let x = self.located(simd, add::<S, f64>(predicted, trace.missed));
+        let seen = self.set.offset(simd, x);
+        (seen.distance > 0.0).then_some(((x, seen), predicted))
+    }
+
+    /// Curvature that counts as none, per metre.
+    fn smallest(&self) -> f64 {
+        FLATTEST / self.body.trust().reach
+    }
+
+    /// A point of the body by its normalized coordinates.
+    #[inline(always)]
+    fn located<S: Simd>(&self, simd: S, z: V3<f64>) -> V3<f64> {
+        let inverse: M3<f64> = rows(simd, self.body.inverse());
+        let own = apply::<S, f64>(&inverse, z);
+        add::<S, f64>(self.relative.origin, apply::<S, f64>(&self.relative.rotation, own))
+    }
+
+    /// Newton's method from a point and the set as seen from there; `apart` if the body is known
+    /// not to reach the set, so that steps into it are too long.
+    #[inline(always)]
+    fn iterate<S: Simd>(
+        &self,
+        simd: S,
+        side: &Side<'_, f64>,
+        (mut x, mut seen): Guess,
+        predicted: Option<V3<f64>>,
+        apart: bool,
+        rounds: &mut u32,
+    ) -> Ended {
+        let (mut before, mut halved, mut looks, mut from_ray) = (None, 0, 0, false);
+        let (mut brought, mut series) = (false, Series::default());
+        for round in 1..=MAX_ROUNDS {
+            while !(seen.distance > 0.0) {
+                let Some(old) = before.filter(|_| apart && halved < HALVINGS) else { return Ended::Lost };
+                halved += 1;
+                x = scaled::<S, f64>(add::<S, f64>(x, old), 0.5);
+                seen = self.set.offset(simd, x);
+            }
+            if self.options.exhausted(*rounds) {
+                return Ended::Lost;
+            }
+            *rounds += 1;
+            let (jet, inside) = side.jet(simd, x);
+            if !inside {
+                // A step has led too far.
+                if brought || !(jet.value < f64::INFINITY) {
+                    return Ended::Lost;
+                }
+                brought = true;
+                x = side.brought_near(simd, x, jet.value);
+                (seen, before, series) = (self.set.offset(simd, x), None, Series::default());
+                continue;
+            }
+            let local = side.localize(simd, &seen.frame);
+            let plane = Plane::new(simd, &jet, &local);
+            let bend = SurfaceCurvature::new(simd, &jet, &local);
+            let Some(found) = newton(simd, &self.set, x, &seen, (&plane, &bend), self.smallest()) else {
+                // The step before has led behind the body: half of it, or from where the ray to the
+                // set leaves the body.
+                match before {
+                    Some(old) if halved < HALVINGS => {
+                        halved += 1;
+                        x = scaled::<S, f64>(add::<S, f64>(x, old), 0.5);
+                    }
+                    _ if from_ray => return Ended::Lost,
+                    _ => {
+                        from_ray = true;
+                        before = None;
+                        let center = interior(simd, self.body, &self.relative);
+                        let to = self.set.project(simd, center);
+                        let (at, count) =
+                            dispatch(Exit { side, from: center, to, most: self.options.max_iterations() - *rounds });
+                        *rounds += count;
+                        x = at;
+                    }
+                }
+                (seen, series) = (self.set.offset(simd, x), Series::default());
+                continue;
+            };
+            halved = 0;
+            let square = side.relative_square(simd, &local, found.step);
+            if square > FAR && looks < LOOKS {
+                looks += 1;
+                let (at, _) = farthest(simd, self.body, &self.relative, seen.frame[2]);
+                let there = self.set.offset(simd, at);
+                let least = (NEARER * seen.distance).min(found.next.distance);
+                if there.distance > 0.0 && there.distance < least {
+                    (x, seen, before, series) = (at, there, None, Series::default());
+                    continue;
+                }
+            }
+            let along = [found.step[0], found.step[1]];
+            // Where sides are flat the point at hand may do long before its step is short enough.
+            let may_be_flat = series.may_have_to_be_corrected(along, square.sqrt());
+            let is_flat = may_be_flat && series.is_slow(along);
+            if square < WORTH_A_BRACKET || is_flat {
+                let (step, there) = if is_flat { ([0.0; 3], &seen) } else { (found.step, &found.next) };
+                let at = side.extrapolate(simd, &jet, &local, step);
+                let to = moved::<S, f64>(x, step, &seen.frame);
+                if let Some(proven) = self.bracket(simd, side, &at, (to, there), &seen.frame) {
+                    let delta = apply_transposed::<S, f64>(&local, step);
+                    let trace = trace_of(simd, &jet, (side.normalized(simd, x), delta), predicted);
+                    return Ended::Proven(ExactProven { rounds: *rounds, trace: Some(trace), ..proven });
+                }
+                if square < SETTLED {
+                    return Ended::Wide(self.about(simd, to, &seen));
+                }
+            }
+            let tangents = [seen.frame[0], seen.frame[1]];
+            let part = series.part(simd, tangents, along, square.sqrt());
+            let (mut step, mut length, slope) = (found.step, square.sqrt(), plane.slope());
+            let mut corrected = false;
+            if may_be_flat && found.next.feature == seen.feature {
+                let more = series.correction(simd, tangents, (along, slope), found.compliance);
+                corrected = more != Correction::default();
+                for i in 0..2 {
+                    step[i] += more.longer[i] + more.shorter[i];
+                    step[2] -= slope[i] * more.shorter[i];
+                }
+                length = side.relative_square(simd, &local, step).sqrt();
+            }
+            series.push(tangents, Last { newton: along, taken: [step[0], step[1]], slope, corrected });
+            let mut share = part.min(LONGEST / length);
+            if round > PATIENCE && !corrected {
+                share *= if round & 1 == 0 { 0.5 } else { 0.8 };
+            }
+            before = Some(x);
+            if share < 1.0 {
+                step = scaled::<S, f64>(step, share);
+                series.took([step[0], step[1]]);
+            }
+            x = moved::<S, f64>(x, step, &seen.frame);
+            seen = if corrected || share < 1.0 { self.set.offset(simd, x) } else { found.next };
+        }
+        // Flat sides take more steps than this; others lead in circles.
+        if series.is_corrected() { Ended::Wide(self.about(simd, x, &seen)) } else { Ended::Lost }
+    }
+
+    /// What is known about a point that nothing proves.
+    #[inline(always)]
+    fn about<S: Simd>(&self, simd: S, x: V3<f64>, seen: &Offset) -> ExactProven {
+        ExactProven {
+            lower: 0.0,
+            upper: f64::INFINITY,
+            n: seen.frame[2],
+            nearest: self.set.project(simd, x),
+            ..common(x, 0)
+        }
+    }
+
+    /// The answer at a point that was stepped to, with the body's constraint there in the frame of
+    /// the step; none if the bracket is too wide.
+    #[inline(always)]
+    fn bracket<S: Simd>(
+        &self,
+        simd: S,
+        side: &Side<'_, f64>,
+        at: &Extrapolated<f64>,
+        (to, seen): (V3<f64>, &Offset),
+        frame: &M3<f64>,
+    ) -> Option<ExactProven> {
+        if !(seen.distance > 0.0) {
+            return None;
+        }
+        let gradient = apply_transposed::<S, f64>(frame, at.plane.gradient);
+        let length = dot::<S, f64>(gradient, gradient).sqrt();
+        let multiplier = 1.0 / length;
+        let outward = scaled::<S, f64>(gradient, -multiplier);
+        let n = self.set.in_normal_cone(simd, seen.feature, outward);
+        let facing = scaled::<S, f64>(apply::<S, f64>(frame, n), -1.0);
+        let deficit = side.support_deficit(simd, at, facing);
+        let size = to[0].abs() + to[1].abs() + to[2].abs() + self.set.reach();
+        let rounding = TAYLOR_ROUNDING * size + (self.displacement + side.displacement) * (1.0 + TAYLOR_ROUNDING);
+        let charged = deficit + TAYLOR_ROUNDING * (deficit.abs() + multiplier);
+        let lower = dot::<S, f64>(n, to) - charged - self.set.height(simd, n) - rounding;
+        let (inward, fine) = side.inward(simd, at);
+        let x = moved::<S, f64>(to, inward, frame);
+        let nearest = self.set.project(simd, x);
+        let between = subtract::<S, f64>(x, nearest);
+        let upper = dot::<S, f64>(between, between).sqrt() + rounding;
+        if !(fine && lower <= upper) {
+            return None;
+        }
+        let off = subtract::<S, f64>(outward, seen.frame[2]);
+        let is_aligned = dot::<S, f64>(off, off) <= ALIGNED * ALIGNED;
+        let narrow = upper - lower <= self.tolerance;
+        let enough = narrow && is_aligned || self.goal.met(lower, upper);
+        let proven = ExactProven { lower, upper, x, nearest, n, multiplier, rounds: 0, trace: None };
+        (enough && lower > 0.0).then_some(proven)
+    }
+}
+
+/// What to keep of an answer that a step from a point with this jet has led to, both in normalized
+/// coordinates.
+#[inline(always)]
+fn trace_of<S: Simd>(
+    _: S,
+    jet: &NumberJet<f64>,
+    (z, delta): (V3<f64>, V3<f64>),
+    predicted: Option<V3<f64>>,
+) -> ExactTrace {
+    let bent = apply_symmetric::<S, f64>(&jet.hessian, delta);
+    let point = add::<S, f64>(z, delta);
+    let value = jet.value + dot::<S, f64>(delta, add_scaled::<S, f64>(jet.gradient, 0.5, bent));
+    let jet = NumberJet { value, gradient: add::<S, f64>(jet.gradient, bent), hessian: jet.hessian };
+    let missed = predicted.map_or([0.0; 3], |predicted| subtract::<S, f64>(point, predicted));
+    ExactTrace { point, jet, missed }
+}
+
+/// A body's interior point in the frame of the set.
+#[inline(always)]
+pub(super) fn interior<S: Simd>(_: S, body: &Body, relative: &Relative<f64>) -> V3<f64> {
+    let own = body.interior_point() - body.normalization().center;
+    add::<S, f64>(relative.origin, apply::<S, f64>(&relative.rotation, own.into()))
+}
+
+/// A common point.
+pub(super) fn common(y: V3<f64>, rounds: u32) -> ExactProven {
+    ExactProven { lower: 0.0, upper: 0.0, x: y, nearest: y, n: [0.0; 3], multiplier: 0.0, rounds, trace: None }
+}

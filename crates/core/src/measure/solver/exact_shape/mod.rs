@@ -1,0 +1,19 @@
+//! Bodies against sets with closed forms: boxes, cylinders, segments, points, and all points within
+//! a radius of one. One smooth body is left to linearize; the other side costs no evaluation.
+
+mod cuboid;
+mod cylinder;
+mod distance;
+mod level;
+mod newton;
+mod placed;
+mod projectable;
+mod ray;
+mod segment;
+mod shape_pair;
+mod shapes;
+mod start;
+
+pub(in crate::measure) use distance::{ExactLost, ExactProven, ExactTrace};
+pub(in crate::measure) use placed::{ExactContact, ExactQuery, direction_to_world, normals_towards, to_world};
+pub(in crate::measure) use shapes::{ShapeDistance, between_shapes};

@@ -1,0 +1,205 @@
+//! The distance of two sets with closed forms.
+//!
+//! Of a point x of A the half squared distance from B has the gradient `v = x - P x` and the
+//! Hessian `n nᵀ + D T K Tᵀ`, in the terms of [`super::projectable`]: for boxes it is a quadratic
+//! in each region, and Newton's method for its least value over A, by [`Projectable::least`], ends
+//! after as many steps as there are changes of regions. For cylinders it converges quadratically.
+//! What proves the answer is the support functions of both: a plane across n separates by `n·t -
+//! h_A(-n) - h_B(n)`, t from the centre of B to that of A. What is off in n across an edge or a
+//! face costs its length, so that n is taken from the normals that the features have.
+
+use super::projectable::Projectable;
+use crate::measure::frames::vector::{M3, V3, add, apply, apply_transposed, dot, normalized, scaled, subtract};
+use crate::measure::options::Options;
+use crate::measure::solver::tangent_newton::{ALIGNED, TAYLOR_ROUNDING};
+use crate::polynomial::Scalar;
+
+/// Most steps; boxes take fewer than ten.
+const MAX_STEPS: u32 = 32;
+
+/// Curvature, relative to that towards B, that is given to directions along which the distance is
+/// flat, so that steps have an end. Smaller, rounding would choose them; larger, sides tilted by
+/// less take many steps: `distances_of_sides_tilted_by_next_to_nothing`.
+const FLAT: f64 = 1e-12;
+
+/// Most halvings of a step that leads farther away.
+const HALVINGS: u32 = 8;
+
+/// Largest angle between the normals of both sets that an answer is taken at. Witnesses move by it,
+/// and gradients by that times their arms: a step more costs little here.
+const FINELY_ALIGNED: f64 = ALIGNED / 8.0;
+
+/// Margin, relative to the sizes, by which sets that overlap for sure do: some times what rounding
+/// adds to an upper bound.
+const MARGIN: f64 = 1e-12;
+
+/// Two sets, A where it stands as seen from B.
+pub(super) struct ShapePair<A, B> {
+    pub(super) a: A,
+    pub(super) b: B,
+    /// From A's frame to B's.
+    pub(super) rotation: M3<f64>,
+    /// Of A's centre in B's frame, metres.
+    pub(super) translation: V3<f64>,
+    /// Bound of all errors of places, metres.
+    pub(super) displacement: f64,
+}
+
+/// A proven bracket, metres, and where it is attained; in B's frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ShapeProven {
+    pub(super) lower: f64,
+    pub(super) upper: f64,
+    pub(super) x: V3<f64>,
+    pub(super) y: V3<f64>,
+    /// Unit normal from B to A; zero where x is in both.
+    pub(super) n: V3<f64>,
+    pub(super) steps: u32,
+    /// Whether the normal is that of the solution.
+    pub(super) is_aligned: bool,
+}
+
+impl<A: Projectable, B: Projectable> ShapePair<A, B> {
+    /// From a point of A in its frame on until the bracket is as narrow as this, metres, or no step
+    /// is left.
+    pub(super) fn solve(&self, start: V3<f64>, tolerance: f64, options: &Options<'_>) -> ShapeProven {
+        let mut own = self.a.project(Scalar, start);
+        let mut best = ShapeProven {
+            lower: 0.0,
+            upper: f64::INFINITY,
+            x: self.placed(own),
+            y: [0.0; 3],
+            n: [0.0; 3],
+            steps: 0,
+            is_aligned: false,
+        };
+        for steps in 1..=MAX_STEPS {
+            if options.exhausted(steps - 1) {
+                break;
+            }
+            let x = self.placed(own);
+            let seen = self.b.offset(Scalar, x);
+            best.steps = steps;
+            if seen.distance == 0.0 {
+                return ShapeProven { lower: 0.0, upper: self.rounding(x), x, y: x, n: [0.0; 3], ..best };
+            }
+            if seen.distance.is_nan() {
+                break;
+            }
+            let (v, y) = (scaled::<Scalar, f64>(seen.frame[2], seen.distance), self.b.project(Scalar, x));
+            let rounding = self.rounding(x);
+            let upper = seen.distance + rounding;
+            if upper < best.upper {
+                (best.upper, best.x, best.y) = (upper, x, y);
+            }
+            for n in self.normals(own, seen.frame[2], seen.feature) {
+                let lower = self.along(n) - rounding;
+                if lower > best.lower || best.n == [0.0; 3] && !lower.is_nan() {
+                    (best.lower, best.n) = (lower.max(0.0), n);
+                }
+            }
+            if best.upper - best.lower <= tolerance {
+                let way = subtract::<Scalar, f64>(best.x, best.y);
+                let off = subtract::<Scalar, f64>(way, scaled::<Scalar, f64>(best.n, seen.distance));
+                // Of shorter distances no double knows the direction any better.
+                let enough =
+                    (FINELY_ALIGNED * seen.distance).max(2.0 * f64::EPSILON * (self.a.reach() + self.b.reach()));
+                let inward =
+                    apply_transposed::<Scalar, f64>(&self.rotation, scaled::<Scalar, f64>(seen.frame[2], -1.0));
+                let slides = self.a.slide(Scalar, own, inward) * seen.distance;
+                best.is_aligned = dot::<Scalar, f64>(off, off) <= enough * enough && slides <= enough;
+                if best.is_aligned || best.upper <= tolerance {
+                    break;
+                }
+            }
+            // Newton's step in A's frame.
+            let gradient = apply_transposed::<Scalar, f64>(&self.rotation, v);
+            let mut hessian = self.hessian(&seen.frame, seen.curvature.map(|k| k * seen.distance));
+            for i in [0, 3, 5] {
+                hessian[i] += FLAT;
+            }
+            let mut next = self.a.least(Scalar, own, gradient, &hessian);
+            let mut moved = false;
+            for _ in 0..HALVINGS {
+                if self.b.offset(Scalar, self.placed(next)).distance < seen.distance {
+                    moved = true;
+                    break;
+                }
+                next = scaled::<Scalar, f64>(add::<Scalar, f64>(next, own), 0.5);
+            }
+            if !moved {
+                break;
+            }
+            own = next;
+        }
+        best
+    }
+
+    /// A point of both sets, in B's frame, proven: of A made smaller by more than all errors, and
+    /// within them of B made smaller. From a point of A in its frame.
+    pub(super) fn common(&self, start: V3<f64>, options: &Options<'_>) -> Option<V3<f64>> {
+        let size = self.a.reach() + self.b.reach();
+        let by = 4.0 * self.displacement + MARGIN * size;
+        let smaller = ShapePair { a: self.a.shrunk(by), b: self.b.shrunk(by), ..*self };
+        let found = smaller.solve(start, 0.5 * by, options);
+        let thick = self.a.thinnest() > 2.0 * by && (self.b.thinnest() > 2.0 * by || self.b.thinnest() == 0.0);
+        (found.upper <= 0.5 * by && thick).then_some(found.y)
+    }
+
+    /// A point of A's frame in B's.
+    #[inline(always)]
+    fn placed(&self, own: V3<f64>) -> V3<f64> {
+        add::<Scalar, f64>(self.translation, apply::<Scalar, f64>(&self.rotation, own))
+    }
+
+    /// Inverse of [`ShapePair::placed`].
+    #[inline(always)]
+    pub(super) fn own(&self, x: V3<f64>) -> V3<f64> {
+        apply_transposed::<Scalar, f64>(&self.rotation, subtract::<Scalar, f64>(x, self.translation))
+    }
+
+    /// How far a plane across n keeps the sets apart.
+    #[inline(always)]
+    fn along(&self, n: V3<f64>) -> f64 {
+        let own = apply_transposed::<Scalar, f64>(&self.rotation, n);
+        dot::<Scalar, f64>(n, self.translation) - self.a.height(Scalar, own) - self.b.height(Scalar, n)
+    }
+
+    #[inline(always)]
+    fn rounding(&self, x: V3<f64>) -> f64 {
+        let size = x[0].abs() + x[1].abs() + x[2].abs() + 2.0 * (self.a.reach() + self.b.reach());
+        TAYLOR_ROUNDING * size + self.displacement
+    }
+
+    /// Normals that touch the features of A at a point of its frame, and of B.
+    #[inline(always)]
+    fn normals(&self, own: V3<f64>, n: V3<f64>, of_b: u8) -> [V3<f64>; 2] {
+        let of_a = self.a.feature_at(Scalar, own);
+        let first = self.b.in_normal_cone(Scalar, of_b, n);
+        let inward = scaled::<Scalar, f64>(apply_transposed::<Scalar, f64>(&self.rotation, first), -1.0);
+        let of_a_own = self.a.in_normal_cone(Scalar, of_a, inward);
+        let second = scaled::<Scalar, f64>(apply::<Scalar, f64>(&self.rotation, of_a_own), -1.0);
+        let lines = (self.a.line(Scalar, of_a), self.b.line(Scalar, of_b));
+        if let (Some(a), Some(b)) = lines {
+            let a = apply::<Scalar, f64>(&self.rotation, a);
+            let across = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+            if dot::<Scalar, f64>(across, across) > 1e-12 {
+                let across = normalized(Scalar, across);
+                let sign = 1_f64.copysign(dot::<Scalar, f64>(across, n));
+                return [first, scaled::<Scalar, f64>(across, sign)];
+            }
+        }
+        [first, second]
+    }
+
+    /// `n nᵀ + T K Tᵀ` in A's frame.
+    #[inline(always)]
+    fn hessian(&self, frame: &M3<f64>, k: [f64; 3]) -> [f64; 6] {
+        let own = frame.map(|row| apply_transposed::<Scalar, f64>(&self.rotation, row));
+        let [t0, t1, n] = own;
+        let entry = |i: usize, j: usize| {
+            n[i] * n[j] + k[0] * t0[i] * t0[j] + k[1] * (t0[i] * t1[j] + t1[i] * t0[j]) + k[2] * t1[i] * t1[j]
+        };
+        [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)]
+    }
+}

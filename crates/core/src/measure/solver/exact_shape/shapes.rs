@@ -1,0 +1,192 @@
+//! Two bodies with closed forms where they stand.
+
+use super::cuboid::Cuboid;
+use super::cylinder::Cylinder;
+use super::placed::{direction_to_world, to_world};
+use super::projectable::Projectable;
+use super::segment::Segment;
+use super::shape_pair::{ShapePair, ShapeProven};
+use crate::body::{ClosedForm, ExactShape};
+use crate::measure::frames::pose::{Pose, RELATIVE_ERROR};
+use crate::measure::frames::vector::{V3, add_scaled, rows, subtract};
+use crate::measure::options::Options;
+use crate::polynomial::{Scalar, gamma};
+use nalgebra::{Matrix3, Vector3};
+
+/// A proven bracket of the distance of two shapes, metres, and where it is attained; world frame.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::measure) struct ShapeDistance {
+    /// Of the signed distance of what has a radius: minus infinity where axes meet.
+    pub(in crate::measure) lower: f64,
+    /// 0 where a common point is known, and less by the radii.
+    pub(in crate::measure) upper: f64,
+    /// A point of both where the upper bound is not above 0.
+    pub(in crate::measure) common: Vector3<f64>,
+    pub(in crate::measure) witness_a: Vector3<f64>,
+    pub(in crate::measure) witness_b: Vector3<f64>,
+    /// Unit vector from B to A.
+    pub(in crate::measure) normal: Vector3<f64>,
+    /// The same from A to B in A's frame of its shape, and from B to A in that of B's.
+    pub(in crate::measure) own_normals: [V3<f64>; 2],
+    pub(in crate::measure) steps: u32,
+}
+
+/// A shape where it stands.
+pub(in crate::measure) type Placed<'a> = (&'a ClosedForm, &'a Pose);
+
+/// The distance, from a point of A on (world frame, metres).
+///
+/// # Errors
+/// After how many steps it is neither as narrow as the tolerance (metres) nor known to be that of
+/// an overlap.
+pub(in crate::measure) fn between_shapes(
+    of_a: Placed<'_>,
+    of_b: Placed<'_>,
+    start: Option<&Vector3<f64>>,
+    (tolerance, options): (f64, &Options<'_>),
+) -> Result<ShapeDistance, u32> {
+    match (*of_a.0.shape(), *of_b.0.shape()) {
+        // The least over a box is found exactly, step by step.
+        (ExactShape::Cylinder { .. } | ExactShape::Capsule { .. }, ExactShape::Cuboid { .. })
+        | (ExactShape::Capsule { .. }, ExactShape::Cylinder { .. }) => {
+            let found = in_order(of_b, of_a, None, (tolerance, options))?;
+            let [first, second] = found.own_normals;
+            let (witness_a, witness_b) = (found.witness_b, found.witness_a);
+            Ok(ShapeDistance { witness_a, witness_b, normal: -found.normal, own_normals: [second, first], ..found })
+        }
+        _ => in_order(of_a, of_b, start, (tolerance, options)),
+    }
+}
+
+fn in_order(
+    of_a: Placed<'_>,
+    of_b: Placed<'_>,
+    start: Option<&Vector3<f64>>,
+    (tolerance, options): (f64, &Options<'_>),
+) -> Result<ShapeDistance, u32> {
+    let problem = Problem { of_a, of_b, start, tolerance, options };
+    match *of_a.0.shape() {
+        ExactShape::Cuboid { half_extents_m, .. } => problem.with_first(Cuboid { half_extents: half_extents_m }, 0.0),
+        ExactShape::Cylinder { radius_m, half_height_m, .. } => {
+            problem.with_first(Cylinder { radius: radius_m, half_height: half_height_m }, 0.0)
+        }
+        ExactShape::Capsule { radius_m, half_length_m } => {
+            problem.with_first(Segment { half_length: half_length_m }, radius_m)
+        }
+    }
+}
+
+/// What is asked.
+struct Problem<'a> {
+    of_a: Placed<'a>,
+    of_b: Placed<'a>,
+    start: Option<&'a Vector3<f64>>,
+    tolerance: f64,
+    options: &'a Options<'a>,
+}
+
+impl Problem<'_> {
+    fn with_first<A: Projectable>(&self, a: A, radius: f64) -> Result<ShapeDistance, u32> {
+        match *self.of_b.0.shape() {
+            ExactShape::Cuboid { half_extents_m, .. } => {
+                self.solve((a, radius), (Cuboid { half_extents: half_extents_m }, 0.0))
+            }
+            ExactShape::Cylinder { radius_m, half_height_m, .. } => {
+                self.solve((a, radius), (Cylinder { radius: radius_m, half_height: half_height_m }, 0.0))
+            }
+            ExactShape::Capsule { radius_m, half_length_m } => {
+                self.solve((a, radius), (Segment { half_length: half_length_m }, radius_m))
+            }
+        }
+    }
+
+    fn solve<A: Projectable, B: Projectable>(
+        &self,
+        (a, radius_a): (A, f64),
+        (b, radius_b): (B, f64),
+    ) -> Result<ShapeDistance, u32> {
+        let ((form_a, pose_a), (form_b, pose_b)) = (self.of_a, self.of_b);
+        let to_b = pose_b.rotation().to_rotation_matrix().transpose().into_inner();
+        let mut rotation = to_b * pose_a.rotation().to_rotation_matrix().into_inner();
+        let between = to_b * (pose_a.translation() - pose_b.translation());
+        let (center_a, center_b) = (form_a.center(), form_b.center());
+        let mut translation = between + (rotation * center_a - center_b);
+        let mut factor = 1.0;
+        if let Some(axes) = form_b.axes() {
+            (rotation, translation, factor) = (axes.tr_mul(&rotation), axes.tr_mul(&translation), 2.0);
+        }
+        if let Some(axes) = form_a.axes() {
+            (rotation, factor) = (rotation * axes, 2.0);
+        }
+        let size = between.norm() + center_a.norm() + center_b.norm() + a.reach();
+        let displacement =
+            factor * (RELATIVE_ERROR + gamma(8)) * size + form_a.displacement_m() + form_b.displacement_m();
+        let rows: [V3<f64>; 3] = rows(Scalar, &rotation);
+        let pair = ShapePair { a, b, rotation: rows, translation: translation.into(), displacement };
+        // From where A is nearest to B's centre.
+        let own = match self.start {
+            Some(start) => {
+                let own = pose_a.rotation().inverse_transform_vector(&(start - pose_a.translation())) - center_a;
+                form_a.axes().map_or(own, |axes| axes.tr_mul(&own))
+            }
+            None => -rotation.tr_mul(&translation),
+        };
+        let found = pair.solve(own.into(), self.tolerance, self.options);
+        let radius = radius_a + radius_b;
+        if found.upper <= self.tolerance {
+            let met = |point: V3<f64>, [lower, upper]: [f64; 2]| {
+                let point = to_world(form_b, pose_b, point);
+                ShapeDistance {
+                    lower,
+                    upper,
+                    common: point,
+                    witness_a: point,
+                    witness_b: point,
+                    normal: Vector3::zeros(),
+                    own_normals: [[0.0; 3]; 2],
+                    steps: found.steps,
+                }
+            };
+            // How deep radii reach beyond that is not known.
+            if let Some(point) = pair.common(pair.own(found.x), self.options) {
+                return Ok(met(point, [f64::NEG_INFINITY, -radius]));
+            }
+            // Segments have no inside to be deep in.
+            let flat = pair.a.thinnest() == 0.0 && pair.b.thinnest() == 0.0;
+            if flat || radius > 0.0 {
+                let rounding = f64::EPSILON * (radius + found.upper);
+                let lower = if flat || found.lower > 0.0 { found.lower - radius - rounding } else { f64::NEG_INFINITY };
+                let way = subtract::<Scalar, f64>(found.x, found.y);
+                let share = if found.upper > radius_b { radius_b / found.upper } else { 1.0 };
+                let point = add_scaled::<Scalar, f64>(found.y, share, way);
+                return Ok(met(point, [lower, found.upper - radius + rounding]));
+            }
+        }
+        let narrow = found.upper - found.lower <= self.tolerance && found.lower > 0.0;
+        if narrow && found.is_aligned {
+            Ok(self.apart(&found, &rotation, (radius_a, radius_b)))
+        } else {
+            Err(found.steps)
+        }
+    }
+
+    fn apart(&self, found: &ShapeProven, rotation: &Matrix3<f64>, (radius_a, radius_b): (f64, f64)) -> ShapeDistance {
+        let (form_b, pose_b) = self.of_b;
+        let radius = radius_a + radius_b;
+        let rounding = f64::EPSILON * (radius + found.upper);
+        let way = subtract::<Scalar, f64>(found.x, found.y);
+        let share = if found.upper > 0.0 { (radius_b / found.upper).min(1.0) } else { 0.0 };
+        let x = add_scaled::<Scalar, f64>(found.x, -radius_a, found.n);
+        let y = add_scaled::<Scalar, f64>(found.y, radius_b, found.n);
+        ShapeDistance {
+            lower: found.lower - radius - rounding,
+            upper: found.upper - radius + rounding,
+            common: to_world(form_b, pose_b, add_scaled::<Scalar, f64>(found.y, share, way)),
+            witness_a: to_world(form_b, pose_b, x),
+            witness_b: to_world(form_b, pose_b, y),
+            normal: direction_to_world(form_b, pose_b, found.n),
+            own_normals: [(-rotation.tr_mul(&Vector3::from(found.n))).into(), found.n],
+            steps: found.steps,
+        }
+    }
+}

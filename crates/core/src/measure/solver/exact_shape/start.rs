@@ -1,0 +1,95 @@
+//! Where a cold start begins: about where a body is nearest to a set with a closed form.
+//!
+//! For a unit vector n let x(n) be the point of the body farthest along -n. The nearest point is
+//! x(n) for the n with `n(x(n)) = n`, the normal of the set's offset surface there. With U the
+//! derivative of -x by n and K that of n(x), Newton's method for it turns n by δ along the
+//! tangents, `(I + K U) δ = n(x(n)) - n`: on the ellipsoid that stands for the body first, then on
+//! its support table.
+
+use super::projectable::{Offset, Projectable};
+use crate::body::Body;
+use crate::measure::frames::vector::{
+    M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, dot, normalized, rows, scaled, subtract,
+    times_transposed,
+};
+use crate::measure::solver::tangent_newton::Relative;
+use crate::polynomial::Simd;
+
+/// Most turns on the ellipsoid.
+const ELLIPSOID_TURNS: usize = 4;
+
+/// Most looks at the support table.
+const TABLE_LOOKS: usize = 3;
+
+/// Square of a turn that is left to Newton's method on the body itself.
+const SMALL_TURN: f64 = 1e-2;
+
+/// A point of the body and the set as seen from it; from the set's normal n at the body's centre
+/// on.
+#[inline(always)]
+pub(super) fn start<S: Simd, P: Projectable>(
+    simd: S,
+    set: &P,
+    body: &Body,
+    relative: &Relative<f64>,
+    mut n: V3<f64>,
+) -> (V3<f64>, Offset) {
+    let shape: M3<f64> = rows(simd, body.outline().shape());
+    let turned = times_transposed::<S, f64>(&relative.rotation, &shape);
+    let shape = times_transposed::<S, f64>(&turned, &relative.rotation);
+    for _ in 0..ELLIPSOID_TURNS {
+        let u = apply::<S, f64>(&shape, n);
+        let inverse = 1.0 / dot::<S, f64>(n, u).sqrt();
+        let seen = set.offset(simd, add_scaled::<S, f64>(relative.origin, -inverse, u));
+        let off = subtract::<S, f64>(seen.frame[2], n);
+        if !(seen.distance > 0.0) || dot::<S, f64>(off, off) < SMALL_TURN {
+            break;
+        }
+        let [t0, t1, _] = seen.frame;
+        let (s0, s1) = (apply::<S, f64>(&shape, t0), apply::<S, f64>(&shape, t1));
+        let (q0, q1) = (dot::<S, f64>(u, t0) * inverse, dot::<S, f64>(u, t1) * inverse);
+        let bend = [
+            (dot::<S, f64>(s0, t0) - q0 * q0) * inverse,
+            (dot::<S, f64>(s0, t1) - q0 * q1) * inverse,
+            (dot::<S, f64>(s1, t1) - q1 * q1) * inverse,
+        ];
+        n = turn(simd, n, off, &seen, bend);
+    }
+    for look in 1.. {
+        let (x, bend) = farthest(simd, body, relative, n);
+        let seen = set.offset(simd, x);
+        let off = subtract::<S, f64>(seen.frame[2], n);
+        if look == TABLE_LOOKS || !(seen.distance > 0.0) || dot::<S, f64>(off, off) < SMALL_TURN {
+            return (x, seen);
+        }
+        let [t0, t1, _] = seen.frame;
+        let (a0, a1) =
+            (apply_transposed::<S, f64>(&relative.rotation, t0), apply_transposed::<S, f64>(&relative.rotation, t1));
+        let (b0, b1) = (apply_symmetric::<S, f64>(&bend, a0), apply_symmetric::<S, f64>(&bend, a1));
+        n = turn(simd, n, off, &seen, [dot::<S, f64>(b0, a0), dot::<S, f64>(b0, a1), dot::<S, f64>(b1, a1)]);
+    }
+    unreachable!("the last look returns")
+}
+
+/// About the point of the body farthest along -n, and its derivative by that direction in the
+/// body's frame.
+#[inline(always)]
+pub(super) fn farthest<S: Simd>(simd: S, body: &Body, relative: &Relative<f64>, n: V3<f64>) -> (V3<f64>, [f64; 6]) {
+    let own = scaled::<S, f64>(apply_transposed::<S, f64>(&relative.rotation, n), -1.0);
+    let cell = body.outline().cell::<S, f64>(simd, own);
+    let point = add::<S, f64>(cell.point, apply_symmetric::<S, f64>(&cell.turn, own));
+    (add::<S, f64>(relative.origin, apply::<S, f64>(&relative.rotation, point)), cell.turn)
+}
+
+/// n turned by `(I + K U)⁻¹` of what it is off by, along the tangents of the set.
+#[inline(always)]
+fn turn<S: Simd>(simd: S, n: V3<f64>, off: V3<f64>, seen: &Offset, u: [f64; 3]) -> V3<f64> {
+    let [t0, t1, _] = seen.frame;
+    let k = seen.curvature;
+    let (m00, m01) = (1.0 + k[0] * u[0] + k[1] * u[1], k[0] * u[1] + k[1] * u[2]);
+    let (m10, m11) = (k[1] * u[0] + k[2] * u[1], 1.0 + k[1] * u[1] + k[2] * u[2]);
+    let (d0, d1) = (dot::<S, f64>(off, t0), dot::<S, f64>(off, t1));
+    let inverse = 1.0 / (m00 * m11 - m01 * m10);
+    let (e0, e1) = ((m11 * d0 - m01 * d1) * inverse, (m00 * d1 - m10 * d0) * inverse);
+    normalized(simd, add_scaled::<S, f64>(add_scaled::<S, f64>(n, e0, t0), e1, t1))
+}

@@ -1,0 +1,166 @@
+//! Boxes, cylinders and balls by their closed forms, against the general search, which shares
+//! nothing with them but the bodies' polynomials.
+
+use super::{random_pose, zoo};
+use crate::body::Body;
+use crate::measure::solver::stages::{Stage, except, only};
+use crate::measure::*;
+use nalgebra::{UnitQuaternion, Vector3};
+use sublevel_testkit::Seeded;
+
+/// A box or a cylinder with sizes over two decades, in every other case turned within its frame.
+fn shape(random: &mut Seeded) -> Body {
+    let mut size = || 10_f64.powf(random.signed() - 0.5);
+    let (x, y, z) = (size(), size(), size());
+    let body = if random.next().is_multiple_of(2) {
+        Body::cuboid("box", Vector3::new(x, y, z)).unwrap()
+    } else {
+        Body::cylinder("can", x, z).unwrap()
+    };
+    if random.next().is_multiple_of(2) {
+        return body;
+    }
+    let rotation = UnitQuaternion::from_scaled_axis(random.unit() * 2.0);
+    body.moved(&rotation, &(random.unit() * 0.7)).unwrap()
+}
+
+/// A pose of the second body at about this gap, if the first stands at `pose_a`: along a random
+/// direction from wherever the bodies just touch.
+fn at_gap(a: &Body, pose_a: &Pose, b: &Body, gap: f64, random: &mut Seeded) -> Pose {
+    let turned = random_pose(random, 0.0);
+    let far = 2.0 * (a.circumscribed().radius + b.circumscribed().radius) + b.circumscribed().center.norm();
+    let start = pose_a.transform_point(&a.circumscribed().center) + random.unit() * far;
+    let mut pose = turned.with_translation(start - turned.transform_direction(&b.circumscribed().center));
+    for _ in 0..6 {
+        let found = except(&[Stage::ClosedForm], || {
+            distance(a, pose_a, b, &pose, &Options::default(), &mut WarmStart::default())
+        });
+        let Some(n) = found.normal else { break };
+        pose = pose.with_translation(pose.translation() + n * (found.value() - gap));
+    }
+    pose
+}
+
+/// How many of so many pairs the closed forms alone solve, each of them rightly.
+fn share(what: &str, count: u64, pair: impl Fn(&mut Seeded) -> (Body, Body)) -> f64 {
+    let gaps = [-0.1, -1e-3, -1e-6, 1e-9, 1e-6, 1e-3, 1e-2, 0.1, 1.0];
+    let mut solved = 0;
+    for seed in 0..count {
+        let mut random = Seeded(71_000 + seed);
+        let (a, b) = pair(&mut random);
+        let size = a.circumscribed().radius.min(b.circumscribed().radius);
+        let pose_a = random_pose(&mut random, 1.0);
+        let pose_b = at_gap(&a, &pose_a, &b, gaps[(seed % 9) as usize] * size, &mut random);
+        for (first, second) in [((&a, &pose_a), (&b, &pose_b)), ((&b, &pose_b), (&a, &pose_a))] {
+            let ask = |warm: &mut WarmStart| distance(first.0, first.1, second.0, second.1, &Options::default(), warm);
+            let truth = except(&[Stage::ClosedForm], || ask(&mut WarmStart::default()));
+            let mut warm = WarmStart::default();
+            for round in 0..2 {
+                let found = only(&[Stage::ClosedForm], || ask(&mut warm));
+                let label = format!("{what}, seed {seed}, round {round}: {found:?} against {truth:?}");
+                assert!(found.lower <= truth.upper && truth.lower <= found.upper, "{label}");
+                if round == 0 {
+                    solved += u32::from(found.status == Status::Converged);
+                }
+                let near = 1e-6 * size;
+                if found.status == Status::Converged && truth.status == Status::Converged && truth.lower > near {
+                    let (n, m) = (found.normal.expect("apart"), truth.normal.expect("apart"));
+                    assert!((n - m).norm() < 1e-5, "{label}");
+                    let along = (found.witness_a - found.witness_b).dot(&n);
+                    assert!((along - found.upper).abs() < 1e-9 * (size + found.upper), "{label}");
+                    normals_are_those_of_active_constraints(first, &found.witness_a, &-n, &found.active_a, &label);
+                    normals_are_those_of_active_constraints(second, &found.witness_b, &n, &found.active_b, &label);
+                }
+            }
+        }
+    }
+    let share = 50.0 * f64::from(solved) / count as f64;
+    println!("{what}: {share:.1} % solved alone");
+    share
+}
+
+/// `Σ λ_i ∇g_i` is the outward normal.
+fn normals_are_those_of_active_constraints(
+    (body, pose): (&Body, &Pose),
+    witness: &Vector3<f64>,
+    n: &Vector3<f64>,
+    active: &ActiveConstraints,
+    label: &str,
+) {
+    let own = pose.rotation().inverse_transform_vector(&(witness - pose.translation()));
+    let gradient = |i: usize| body.placement().jet(&body.constraints()[i], &own).gradient;
+    let sum: Vector3<f64> = active.iter().map(|(i, multiplier)| gradient(i) * multiplier).sum();
+    assert!((pose.transform_direction(&sum) - n).norm() < 1e-5, "{label}");
+}
+
+#[test]
+fn smooth_bodies_against_shapes() {
+    let smooth: Vec<Body> = (0..6).flat_map(|seed| zoo(&mut Seeded(seed))).filter(Body::is_smooth).collect();
+    let share = share("smooth against shapes", 900, |random| {
+        (smooth[random.next() as usize % smooth.len()].clone(), shape(random))
+    });
+    assert!(share > 90.0, "{share}");
+}
+
+#[test]
+fn shapes_against_shapes() {
+    let share = share("shapes against shapes", 900, |random| (shape(random), shape(random)));
+    assert!(share > 90.0, "{share}");
+}
+
+/// Boxes side by side: on faces, edges and corners, in contact, parallel and tilted by next to
+/// nothing.
+#[test]
+fn boxes_side_by_side() {
+    let (a, b) = (
+        Body::cuboid("a", Vector3::new(1.0, 0.8, 0.6)).unwrap(),
+        Body::cuboid("b", Vector3::new(0.5, 0.4, 0.3)).unwrap(),
+    );
+    for seed in 0..600 {
+        let mut random = Seeded(seed);
+        let gaps = [[0.3, 0.0, 0.0], [0.0, 0.3, 0.4], [0.2, 0.3, 0.6], [0.0, 0.0, 0.0]][(seed % 4) as usize];
+        let sums = [1.5, 1.2, 0.9];
+        let place =
+            Vector3::from_fn(|i, _| if gaps[i] > 0.0 || seed % 4 == 3 && i == 0 { sums[i] + gaps[i] } else { 0.1 });
+        let tilt = [0.0, 1e-16, 1e-12, 1e-9, 1e-6][(seed % 5) as usize];
+        let turn = UnitQuaternion::from_scaled_axis(random.unit() * tilt);
+        let pose = Pose::from_quaternion(place, turn.coords.into()).unwrap();
+        let found = distance(&a, &Pose::identity(), &b, &pose, &Options::default(), &mut WarmStart::default());
+        let truth = Vector3::from(gaps).norm();
+        let slack = 2.0 * tilt + 1e-12;
+        let label = format!("seed {seed}, tilt {tilt:e}: {found:?} against {truth}");
+        assert!(found.lower <= truth + slack && found.upper >= truth - slack, "{label}");
+        assert!(found.upper - found.lower <= 1e-9, "{label}");
+    }
+}
+
+/// Decisions near contact are right, and are those of the distance.
+#[test]
+fn contacts_of_shapes_are_decided() {
+    let smooth: Vec<Body> = zoo(&mut Seeded(3)).into_iter().filter(Body::is_smooth).collect();
+    let mut open = 0;
+    for seed in 0..1200 {
+        let mut random = Seeded(73_000 + seed);
+        let b = shape(&mut random);
+        let a = if seed % 3 == 0 { shape(&mut random) } else { smooth[random.next() as usize % smooth.len()].clone() };
+        let size = a.circumscribed().radius.min(b.circumscribed().radius);
+        let pose_a = random_pose(&mut random, 1.0);
+        let gap = size * 10_f64.powf(-5.0 + 4.0 * random.signed());
+        let pose_b = at_gap(&a, &pose_a, &b, gap, &mut random);
+        let touch = pose_b.translation() - pose_a.translation();
+        let pose_b = if seed % 2 == 0 {
+            pose_b
+        } else {
+            pose_b.with_translation(pose_b.translation() - touch * (2.0 * gap / touch.norm()))
+        };
+        let truth = except(&[Stage::ClosedForm, Stage::Planes], || {
+            distance(&a, &pose_a, &b, &pose_b, &Options::default(), &mut WarmStart::default())
+        });
+        match overlap(&a, &pose_a, &b, &pose_b, &Options::default(), &mut WarmStart::default()) {
+            Decision::Yes => assert!(truth.lower == 0.0, "seed {seed}: {truth:?}"),
+            Decision::No => assert!(truth.upper > 0.0, "seed {seed}: {truth:?}"),
+            Decision::Undecided { .. } => open += 1,
+        }
+    }
+    assert!(open == 0, "{open} open");
+}
