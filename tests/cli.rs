@@ -675,6 +675,10 @@ fn primitives_are_written_exactly_and_refused_by_argument() {
     made(&["primitive", "box", "--half-extents", "0.5,0.3,0.02", "--out", &table, "--name", "table"]);
     made(&["primitive", "cylinder", "--radius", "0.05", "--half-height", "0.1", "--out", &can]);
     made(&["primitive", "half-space", "--normal", "0,0,2", "--offset", "0", "--out", &floor]);
+    let limb = path("limb.json");
+    made(&["primitive", "capsule", "--radius", "0.05", "--half-height", "0.2", "--out", &limb]);
+    let capsule: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&limb).unwrap()).unwrap();
+    assert_eq!((capsule["kind"].as_str(), capsule["half_height_m"].as_f64()), (Some("capsule"), Some(0.2)));
     made(&["primitive", "ball", "--radius", "1", "--out", &path("ball.json")]);
     made(&["primitive", "ellipsoid", "--half-axes", "1,2,3", "--out", &path("egg.json")]);
     let apart = json(&["measure", &table, &can, "--json", "--pose", "0,0,1,0,0,0,1"]);
@@ -686,7 +690,8 @@ fn primitives_are_written_exactly_and_refused_by_argument() {
         (vec!["primitive", "ball", "--radius", "nan", "--out", &table], "--radius"),
         (vec!["primitive", "cylinder", "--radius", "0", "--half-height", "1", "--out", &table], "--radius"),
         (vec!["primitive", "half-space", "--normal", "0,0,0", "--offset", "0", "--out", &table], "--normal"),
-        (vec!["primitive", "capsule", "--radius", "1", "--half-height", "1", "--out", &table], "not available"),
+        (vec!["primitive", "capsule", "--radius", "-1", "--half-height", "1", "--out", &table], "--radius"),
+        (vec!["primitive", "capsule", "--radius", "1", "--half-height", "nan", "--out", &table], "--half-height"),
     ] {
         assert!(refusal(&args).contains(word), "{args:?}: {}", refusal(&args));
     }

@@ -9,8 +9,8 @@ use nalgebra::Vector3;
 use super::numbers::Triple;
 use super::write_atomically;
 use crate::body::Body;
-use crate::measure::HalfSpace;
-use crate::scene::{Geometry, NamedHalfSpace};
+use crate::measure::{Capsule, HalfSpace};
+use crate::scene::{Geometry, NamedCapsule, NamedHalfSpace};
 
 /// Write an exact body from its sizes
 ///
@@ -66,12 +66,12 @@ enum Shape {
         #[command(flatten)]
         file: FileArgs,
     },
-    /// A capsule about z (not available yet)
+    /// A capsule about z: all points within a radius of a segment
     Capsule {
-        /// Its radius, metres, above 0
+        /// Its radius, metres; 0 for a segment
         #[arg(long, value_name = "R", allow_hyphen_values = true)]
         radius: f64,
-        /// Half the length of its segment, metres, above 0
+        /// Half the length of its segment, metres; 0 for a ball
         #[arg(long, value_name = "H", allow_hyphen_values = true)]
         half_height: f64,
         #[command(flatten)]
@@ -116,8 +116,12 @@ pub(super) fn run(args: &PrimitiveArgs) -> Result<(), Box<dyn Error>> {
             let argument = if *radius > 0.0 { "--half-height" } else { "--radius" };
             (file, argument, Body::cylinder(&name(file, "cylinder"), *radius, *half_height))
         }
-        Shape::Capsule { .. } => {
-            return Err("capsules are not available yet; use a cylinder, or an ellipsoid that contains it".into());
+        Shape::Capsule { radius, half_height, file } => {
+            let capsule = Capsule::new(*radius, *half_height);
+            let capsule = capsule.map_err(|error| format!("--{}: {error}", error.size.replace(' ', "-")))?;
+            let named = NamedCapsule::new(&name(file, "capsule"), capsule)?;
+            write_atomically(&file.out, &Geometry::from(named).to_json())?;
+            return Ok(());
         }
         Shape::HalfSpace { normal, offset, file } => {
             let length = normal.0.norm();

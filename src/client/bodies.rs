@@ -44,6 +44,13 @@ pub enum BodySource {
         /// Half its height, m.
         half_height: f64,
     },
+    /// A capsule about z, m.
+    Capsule {
+        /// Its radius, m.
+        radius: f64,
+        /// Half the length of its segment, m.
+        half_height: f64,
+    },
     /// A half-space `{x : normal·x <= offset}`.
     HalfSpace {
         /// Unit normal.
@@ -60,7 +67,7 @@ pub struct StoredBody {
     pub id: BodyId,
     /// Its name.
     pub name: String,
-    /// What it is: `body`, `compound`, `ladder`, `sos-body` or `half-space`.
+    /// What it is: `body`, `compound`, `ladder`, `sos-body`, `capsule` or `half-space`.
     pub kind: &'static str,
     /// Highest degree of its polynomials.
     pub degree: u32,
@@ -92,6 +99,9 @@ impl Client {
             BodySource::Box { half_extents } => Source::Box(proto::BoxSize { half_extents_m: vector(half_extents) }),
             BodySource::Cylinder { radius, half_height } => {
                 Source::Cylinder(proto::CylinderSize { radius_m: radius, half_height_m: half_height })
+            }
+            BodySource::Capsule { radius, half_height } => {
+                Source::Capsule(proto::CapsuleSize { radius_m: radius, half_height_m: half_height })
             }
             BodySource::HalfSpace { normal, offset } => {
                 Source::HalfSpace(proto::HalfSpaceSize { normal: vector(normal), offset_m: offset })
@@ -190,6 +200,7 @@ fn stored(summary: BodySummary, created: bool) -> Result<StoredBody, ClientError
         BodyKind::Compound => "compound",
         BodyKind::Ladder => "ladder",
         BodyKind::SosBody => "sos-body",
+        BodyKind::Capsule => "capsule",
         BodyKind::HalfSpace => "half-space",
         BodyKind::Body | BodyKind::Unspecified => "body",
     };

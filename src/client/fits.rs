@@ -108,7 +108,7 @@ impl Client {
                     let shapes = Shapes::SosBody(Box::new((*body).clone()));
                     return Ok(FitOutput { outcome, shapes, ladder: None });
                 }
-                Geometry::Ladder(_) | Geometry::HalfSpace(_) => return Err(unknown()),
+                Geometry::Ladder(_) | Geometry::Capsule(_) | Geometry::HalfSpace(_) => return Err(unknown()),
             }
         }
         let ladder = match &outcome.ladder {

@@ -13,6 +13,9 @@ pub enum NotASet {
     /// Several levels of detail.
     #[error("is a ladder, several bodies around one object; name one of its rungs")]
     Ladder,
+    /// The set of no polynomials.
+    #[error("is a capsule, which no polynomial describes; name a cylinder or an ellipsoid around it")]
+    Capsule,
     /// Unbounded.
     #[error("is a half-space, which is unbounded; name a box that reaches as far as is needed")]
     HalfSpace,
@@ -30,6 +33,7 @@ pub fn obstacle(geometry: &Geometry) -> Result<Obstacle, NotASet> {
         },
         Geometry::SosBody(body) => Ok(Obstacle::from((**body).clone())),
         Geometry::Ladder(_) => Err(NotASet::Ladder),
+        Geometry::Capsule(_) => Err(NotASet::Capsule),
         Geometry::HalfSpace(_) => Err(NotASet::HalfSpace),
     }
 }

@@ -48,6 +48,11 @@ fn mesh(geometry: &Geometry, divisions: u32) -> Option<GetBodyMeshResponse> {
         Geometry::Solid(shape) => shape.parts().iter().map(of_body).collect(),
         Geometry::Ladder(ladder) => ladder.finest().parts().iter().map(of_body).collect(),
         Geometry::SosBody(body) => vec![directions.iter().map(|direction| outermost(body, direction)).collect()],
+        Geometry::Capsule(capsule) => {
+            let (radius, half) = (capsule.capsule().radius_m(), capsule.capsule().half_height_m());
+            let onto = |n: &Vector3<f64>| n * radius + Vector3::z() * half.copysign(n.z);
+            vec![directions.iter().map(onto).collect()]
+        }
         Geometry::HalfSpace(_) => return None,
     };
     let (mut vertices, mut triangles, mut count) = (Packed::default(), Packed::default(), 0);

@@ -6,8 +6,8 @@ use nalgebra::Vector3;
 use tonic::Status;
 
 use crate::body::{Body, BodyError, BodyId, Shape};
-use crate::measure::HalfSpace;
-use crate::scene::{Geometry, Ladder, NamedHalfSpace};
+use crate::measure::{Capsule, HalfSpace};
+use crate::scene::{Geometry, Ladder, NamedCapsule, NamedHalfSpace};
 use crate::store::CatalogueError;
 
 use super::blobs::Blobs;
@@ -45,9 +45,15 @@ pub(super) fn geometry(
         Source::Cylinder(size) => {
             exact(Body::cylinder(&named("cylinder"), size.radius_m, size.half_height_m), "cylinder")
         }
-        Source::Capsule(_) => Err(Status::unimplemented(
-            "capsule: capsules are not available yet; use a cylinder, or an ellipsoid that contains it",
-        )),
+        Source::Capsule(size) => {
+            let capsule = Capsule::new(size.radius_m, size.half_height_m);
+            let capsule = capsule.map_err(|error| {
+                let field = if error.size == "radius" { "capsule.radius_m" } else { "capsule.half_height_m" };
+                Invalid::new(field, error)
+            })?;
+            let named = NamedCapsule::new(&named("capsule"), capsule).map_err(|error| Invalid::new("name", error))?;
+            Ok(named.into())
+        }
         Source::HalfSpace(size) => {
             let normal = vector(size.normal.as_ref(), "half_space.normal")?;
             let half_space = HalfSpace::new(normal, size.offset_m);
@@ -91,6 +97,7 @@ pub(super) fn kind(geometry: &Geometry) -> BodyKind {
         },
         Geometry::Ladder(_) => BodyKind::Ladder,
         Geometry::SosBody(_) => BodyKind::SosBody,
+        Geometry::Capsule(_) => BodyKind::Capsule,
         Geometry::HalfSpace(_) => BodyKind::HalfSpace,
     }
 }
@@ -99,7 +106,7 @@ pub(super) fn summary(geometry: &Geometry) -> proto::BodySummary {
     let parts: &[Body] = match geometry {
         Geometry::Solid(shape) => crate::body::Solid::parts(&**shape),
         Geometry::Ladder(ladder) => crate::body::Solid::parts(&**ladder.finest()),
-        Geometry::SosBody(_) | Geometry::HalfSpace(_) => &[],
+        Geometry::SosBody(_) | Geometry::Capsule(_) | Geometry::HalfSpace(_) => &[],
     };
     let single = match parts {
         [body] => Some(body),
@@ -107,6 +114,7 @@ pub(super) fn summary(geometry: &Geometry) -> proto::BodySummary {
     };
     let volume_m3 = match geometry {
         Geometry::SosBody(body) => Some(body.volume().volume_m3),
+        Geometry::Capsule(capsule) => Some(capsule.volume_m3()),
         _ => single.map(|body| body.volume().volume_m3),
     };
     let rungs = match geometry {

@@ -283,7 +283,9 @@ impl State {
                     all.extend(rungs.iter().cloned().map(Geometry::Solid));
                     Geometry::Ladder(Arc::new(Ladder::new(ladder.name(), rungs)?))
                 }
-                body @ (Geometry::Solid(_) | Geometry::SosBody(_) | Geometry::HalfSpace(_)) => body,
+                body @ (Geometry::Solid(_) | Geometry::SosBody(_) | Geometry::Capsule(_) | Geometry::HalfSpace(_)) => {
+                    body
+                }
             };
             for body in all.into_iter().chain([body]) {
                 let stored = self.bodies.get(body.id()).is_some_and(|stored| !stored.is_damaged());
@@ -306,7 +308,7 @@ fn put_bodies(transaction: &WriteTransaction, bodies: &[Geometry]) -> Result<(),
             Geometry::Ladder(ladder) => {
                 ladders.insert(id.as_str(), json(&LadderRow::of(ladder))?.as_slice())?;
             }
-            Geometry::Solid(_) | Geometry::SosBody(_) | Geometry::HalfSpace(_) => {
+            Geometry::Solid(_) | Geometry::SosBody(_) | Geometry::Capsule(_) | Geometry::HalfSpace(_) => {
                 files.insert(id.as_str(), body.to_json().as_bytes())?;
             }
         }

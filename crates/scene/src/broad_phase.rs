@@ -7,7 +7,6 @@ use nalgebra::Vector3;
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
-use sublevel_core::body::Solid;
 use sublevel_core::measure::Pose;
 
 use super::object::{Object, Slot};
@@ -137,8 +136,7 @@ fn set_ball(balls: &mut Vec<WorldBall>, slot: Slot, object: &Object, poses: &Pos
     if balls.len() <= slot_at {
         balls.resize(slot_at + 1, (Vector3::zeros(), f64::INFINITY));
     }
-    if let Some(solid) = object.solids().last() {
-        let ball = solid.circumscribed();
+    if let Some(ball) = object.ball() {
         balls[slot_at] = world_ball(poses.get(slot), (ball.center, ball.radius));
     }
 }
@@ -187,7 +185,7 @@ pub(crate) fn world_ball(pose: &Pose, (center, radius): WorldBall) -> WorldBall 
 /// A box proven to contain an object where it stands, metres, world frame; none around a
 /// half-space.
 pub(crate) fn world_box(object: &Object, pose: &Pose) -> Option<Aabb> {
-    let bounds = object.solids().last()?.bounding_box();
+    let bounds = object.bounding_box()?;
     let (middle, half) = ((bounds.max + bounds.min) * 0.5, (bounds.max - bounds.min) * 0.5);
     let center = pose.transform_point(&middle);
     let rotation = pose.rotation().to_rotation_matrix();

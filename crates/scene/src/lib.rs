@@ -23,7 +23,7 @@ mod update;
 
 pub use crew::{Crew, Panicked, Question, Stop};
 pub use error::{Entry, List, SceneError};
-pub use geometry::{Geometry, GeometryFileError, Ladder, LadderError, MAX_RUNGS, NamedHalfSpace};
+pub use geometry::{Geometry, GeometryFileError, Ladder, LadderError, MAX_RUNGS, NamedCapsule, NamedHalfSpace};
 pub use limits::{MAX_NAME_BYTES, MAX_OBJECTS, MAX_PADDING_M, MAX_PAIR_RULES};
 pub use name::{NameError, check_name};
 pub use object::{Attachment, Object, Slot, Subject};

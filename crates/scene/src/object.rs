@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use sublevel_core::body::{Ball, Body, Shape, Solid};
+use nalgebra::Vector3;
+use sublevel_core::body::{Aabb, Ball, Body, Shape, Solid};
 use sublevel_core::measure::Pose;
 
 use super::Geometry;
@@ -72,7 +73,7 @@ impl Object {
         Self { name, geometry, group, padding_m, attachment, enclosure }
     }
 
-    /// The solids, coarsest first; the box around an sos-body; none for a half-space.
+    /// The solids, coarsest first; the box around an sos-body; none for capsules and half-spaces.
     pub(crate) fn solids(&self) -> &[Arc<Shape>] {
         match &self.enclosure {
             Some(enclosure) => std::slice::from_ref(enclosure),
@@ -80,8 +81,16 @@ impl Object {
         }
     }
 
+    /// A box around it in its body frame, metres; none around a half-space.
+    pub(crate) fn bounding_box(&self) -> Option<&Aabb> {
+        self.solids().last().map(|solid| solid.bounding_box()).or_else(|| self.geometry.bounding_box())
+    }
+
     /// A ball around it in its body frame, metres; none around a half-space.
-    pub(crate) fn ball(&self) -> Option<&Ball> {
-        self.solids().last().map(|solid| solid.circumscribed())
+    pub(crate) fn ball(&self) -> Option<Ball> {
+        if let Geometry::Capsule(capsule) = &self.geometry {
+            return Some(Ball { center: Vector3::zeros(), radius: capsule.capsule().reach_m().next_up() });
+        }
+        self.solids().last().map(|solid| *solid.circumscribed())
     }
 }

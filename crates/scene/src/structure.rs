@@ -94,7 +94,7 @@ impl Structure {
             if let Some(holder) = object.attachment.as_ref().and_then(|attachment| self.slot(&attachment.to)) {
                 holding.entry(holder).or_default().push(slot);
             }
-            if object.solids().is_empty() {
+            if object.bounding_box().is_none() {
                 half_spaces.push(slot);
             }
         }

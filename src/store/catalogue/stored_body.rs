@@ -37,7 +37,7 @@ impl StoredBody {
     pub(super) fn new(geometry: Geometry) -> Self {
         let rungs = match &geometry {
             Geometry::Ladder(ladder) => ladder.rungs().iter().map(|rung| *rung.id()).collect(),
-            Geometry::Solid(_) | Geometry::SosBody(_) | Geometry::HalfSpace(_) => Vec::new(),
+            Geometry::Solid(_) | Geometry::SosBody(_) | Geometry::Capsule(_) | Geometry::HalfSpace(_) => Vec::new(),
         };
         Self { id: *geometry.id(), rungs, row: Mutex::default(), proof: Ok(geometry).into() }
     }

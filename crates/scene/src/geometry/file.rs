@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use sublevel_core::body::{BodyFileError, Shape, SosBody};
-use sublevel_core::measure::HalfSpace;
+use sublevel_core::measure::{Capsule, HalfSpace};
 
+use super::capsule::NamedCapsule;
 use super::half_space::NamedHalfSpace;
 use super::kinds::Geometry;
 use super::ladder::{Ladder, LadderError};
@@ -13,12 +14,13 @@ use super::ladder::{Ladder, LadderError};
 const FORMAT: &str = "sublevel/1";
 const LADDER_KIND: &str = "ladder";
 const HALF_SPACE_KIND: &str = "half-space";
+const CAPSULE_KIND: &str = "capsule";
 
 /// Why a file is not read.
 #[derive(Debug, thiserror::Error)]
 pub enum GeometryFileError {
     /// No JSON, or not that of such a file.
-    #[error("is no file of a body, compound, ladder, sos-body or half-space: {0}")]
+    #[error("is no file of a body, compound, ladder, sos-body, capsule or half-space: {0}")]
     Json(String),
     /// A body, compound or sos-body that cannot be read or proven.
     #[error(transparent)]
@@ -71,6 +73,17 @@ struct HalfSpaceFile {
     offset_m: f64,
 }
 
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CapsuleFile {
+    format: String,
+    kind: String,
+    id: String,
+    name: String,
+    radius_m: f64,
+    half_height_m: f64,
+}
+
 impl Geometry {
     /// Reads and re-proves a file of whatever kind it names.
     ///
@@ -81,6 +94,7 @@ impl Geometry {
         match header.kind.as_str() {
             LADDER_KIND => ladder(text),
             HALF_SPACE_KIND => half_space(text),
+            CAPSULE_KIND => capsule(text),
             _ if SosBody::is_file(text) => Ok(Self::SosBody(Arc::new(SosBody::from_json(text)?))),
             _ => Ok(Self::Solid(Arc::new(Shape::from_json(text)?))),
         }
@@ -98,6 +112,14 @@ impl Geometry {
                 name: ladder.name().into(),
                 // What was just written as JSON is JSON.
                 rungs: ladder.rungs().iter().filter_map(|rung| serde_json::from_str(&shape_json(rung)).ok()).collect(),
+            }),
+            Self::Capsule(capsule) => write(&CapsuleFile {
+                format: FORMAT.into(),
+                kind: CAPSULE_KIND.into(),
+                id: capsule.id().to_string(),
+                name: capsule.name().into(),
+                radius_m: capsule.capsule().radius_m(),
+                half_height_m: capsule.capsule().half_height_m(),
             }),
             Self::HalfSpace(half_space) => write(&HalfSpaceFile {
                 format: FORMAT.into(),
@@ -140,6 +162,19 @@ fn half_space(text: &str) -> Result<Geometry, GeometryFileError> {
         .map_err(|error| GeometryFileError::Field { field: "name", why: error.to_string() })?;
     check("id", &file.id, &named.id().to_string())?;
     Ok(Geometry::HalfSpace(Arc::new(named)))
+}
+
+fn capsule(text: &str) -> Result<Geometry, GeometryFileError> {
+    let file: CapsuleFile = parse(text)?;
+    check("format", &file.format, FORMAT)?;
+    let capsule = Capsule::new(file.radius_m, file.half_height_m).map_err(|error| GeometryFileError::Field {
+        field: if error.size == "radius" { "radius_m" } else { "half_height_m" },
+        why: error.to_string(),
+    })?;
+    let named = NamedCapsule::new(&file.name, capsule)
+        .map_err(|error| GeometryFileError::Field { field: "name", why: error.to_string() })?;
+    check("id", &file.id, &named.id().to_string())?;
+    Ok(named.into())
 }
 
 fn check(field: &'static str, found: &str, expected: &str) -> Result<(), GeometryFileError> {

@@ -1,11 +1,13 @@
-//! What an object is made of: bodies, compounds, ladders, sos-bodies and half-spaces, and their
-//! files.
+//! What an object is made of: bodies, compounds, ladders, sos-bodies, capsules and half-spaces,
+//! and their files.
 
+mod capsule;
 mod file;
 mod half_space;
 mod kinds;
 mod ladder;
 
+pub use capsule::NamedCapsule;
 pub use file::GeometryFileError;
 pub use half_space::NamedHalfSpace;
 pub use kinds::Geometry;

@@ -27,8 +27,8 @@ impl Candidates {
         let mut from = Vec::new();
         for (slot, object) in (0..).zip(&scene.structure.slots) {
             let selected = selection.contains(slot);
-            let is_solid = || object.as_ref().is_some_and(|object| !object.solids().is_empty());
-            if (selected || half_spaces) && is_solid() {
+            let is_bounded = || object.as_ref().is_some_and(|object| object.bounding_box().is_some());
+            if (selected || half_spaces) && is_bounded() {
                 from.push((slot, !selected));
             }
         }

@@ -62,6 +62,11 @@ pub(crate) fn decide(solver: &Solver<'_>, pair: &Pair<'_>, threshold: f64, optio
             let (lower, upper) = (found.lower - slack, found.upper + slack);
             Bracket::of(compare::against(lower, upper, threshold), lower, upper)
         }
+        (Thing::Capsule { .. }, _) | (_, Thing::Capsule { .. }) => {
+            let found = solver.capsule_distance(pair, &options);
+            let verdict = compare::against(found.lower, found.upper, threshold);
+            Bracket { rungs: pair.finest_rungs(), ..Bracket::of(verdict, found.lower, found.upper) }
+        }
         (Thing::HalfSpace(_), Thing::HalfSpace(_)) => Bracket {
             solved: false,
             // Two of them overlap nearly always, and nobody asks.

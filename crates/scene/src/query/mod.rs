@@ -8,6 +8,7 @@
 mod answer;
 mod ask;
 mod candidates;
+mod capsules;
 mod clearance;
 mod closest;
 mod decide;

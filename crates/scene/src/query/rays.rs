@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 use sublevel_core::measure::{
-    DEFAULT_ACCURACY, Options, Ray, RayCast, RayError, RayHit, Status, Sweep, cast_ball, cast_ray,
+    Capsule, DEFAULT_ACCURACY, Options, Pose, Ray, RayCast, RayError, RayHit, Status, Sweep, cast_ball, cast_ray,
 };
 
 use super::answer::AnswerStatus;
@@ -178,6 +178,9 @@ impl Rays {
                     }
                 }
             }
+            Thing::Capsule { capsule, pose } => {
+                self.capsule(slot, &AxisDistance::new(capsule, pose, self.radius_m), ray)
+            }
             Thing::HalfSpace(half_space) => self.plane(slot, &half_space, ray),
             Thing::Point(_) => None,
         }
@@ -212,6 +215,96 @@ impl Rays {
         let status = if narrow { AnswerStatus::Converged } else { AnswerStatus::BracketWide };
         let point = known.then(|| ray.point(upper) - normal * self.radius_m);
         Some(RayAnswer { status, hit: Some(slot), lower_m: lower, upper_m: upper, point, normal: Some(*normal) })
+    }
+}
+
+/// How far the surface around a segment is from points: that of a capsule, or of one around which a
+/// ball rolls.
+struct AxisDistance<'a> {
+    pose: &'a Pose,
+    half_m: f64,
+    radius_m: f64,
+    /// Of the capsule itself, metres.
+    own_radius_m: f64,
+}
+
+impl<'a> AxisDistance<'a> {
+    fn new(capsule: &Capsule, pose: &'a Pose, ball_m: f64) -> Self {
+        let own_radius_m = capsule.radius_m();
+        Self { pose, half_m: capsule.half_height_m(), radius_m: own_radius_m + ball_m, own_radius_m }
+    }
+
+    /// The distance, negative inside, the unit vector from the axis to the point and the point of
+    /// the axis; world frame, metres.
+    fn of(&self, point: &Vector3<f64>) -> (f64, Vector3<f64>, Vector3<f64>) {
+        let axis = self.pose.transform_direction(&Vector3::z());
+        let from = point - self.pose.translation();
+        let nearest = axis * axis.dot(&from).clamp(-self.half_m, self.half_m);
+        let way = from - nearest;
+        let length = way.norm();
+        (length - self.radius_m, way.try_normalize(0.0).unwrap_or(axis), self.pose.translation() + nearest)
+    }
+}
+
+/// Halvings after which no double is left between two parameters.
+const HALVINGS: u32 = 64;
+
+impl Rays {
+    /// Where a ray enters the surface around an axis. The distance is convex along the ray: between
+    /// its start, outside, and its least value, inside, it is 0 once.
+    fn capsule(&self, slot: Slot, surface: &AxisDistance<'_>, ray: &Ray) -> Option<RayAnswer> {
+        let reach = surface.half_m + surface.radius_m;
+        let center = surface.pose.translation();
+        let along = ray.direction().dot(&(center - ray.origin()));
+        let size = ray.origin().norm() + center.norm() + reach;
+        let last = ray.max_length().min((along + reach).max(0.0));
+        let error = 64.0 * f64::EPSILON * (size + last);
+        let at = |t: f64| surface.of(&ray.point(t));
+        let found = |lower_m: f64, upper_m: f64| {
+            let (_, normal, on_axis) = at(upper_m);
+            let narrow = upper_m - lower_m <= self.accuracy * (size + upper_m);
+            let status = if narrow { AnswerStatus::Converged } else { AnswerStatus::BracketWide };
+            let point = Some(on_axis + normal * surface.own_radius_m);
+            let normal = (upper_m > 0.0).then_some(normal);
+            Some(RayAnswer { status, hit: Some(slot), lower_m, upper_m, point, normal })
+        };
+        if at(0.0).0 <= -error {
+            return found(0.0, 0.0);
+        }
+        // The least distance, by the sign of its slope.
+        let (mut low, mut high) = (0.0, last);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            let falls = at(middle).1.dot(ray.direction()) < 0.0;
+            if falls { low = middle } else { high = middle }
+        }
+        let deepest = if at(low).0 < at(high).0 { low } else { high };
+        let (least, ..) = at(deepest);
+        if least - (high - low) > error {
+            return None;
+        }
+        // The last parameter that is outside for sure, and the first that is inside.
+        let (mut outside, mut inside) = (0.0, deepest);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (outside + inside);
+            let (value, ..) = at(middle);
+            if value > error { outside = middle } else { inside = middle }
+        }
+        if least > -error {
+            let upper_m = f64::INFINITY;
+            return Some(RayAnswer {
+                hit: Some(slot),
+                lower_m: outside,
+                upper_m,
+                ..RayAnswer::without(AnswerStatus::BracketWide)
+            });
+        }
+        let (mut before, mut entered) = (outside, deepest);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (before + entered);
+            if at(middle).0 <= -error { entered = middle } else { before = middle }
+        }
+        found(outside, entered)
     }
 }
 

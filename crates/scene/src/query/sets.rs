@@ -187,6 +187,7 @@ impl Solver<'_> {
             let twist = |thing: &Thing<'_>, at: Vector3<f64>, n: Vector3<f64>| {
                 let arm = match thing {
                     Thing::Solid { pose, .. } => at - pose.translation(),
+                    Thing::Capsule { pose, .. } => at - pose.translation(),
                     Thing::HalfSpace(half_space) => at - half_space.origin,
                     Thing::Point(_) => Vector3::zeros(),
                 };

@@ -24,6 +24,7 @@ impl Solver<'_> {
         }
         match (&pair.a, &pair.b) {
             (Thing::Solid { set: None, .. }, Thing::Solid { set: None, .. }) => self.solids(index, measure, pair),
+            (Thing::Capsule { .. }, _) | (_, Thing::Capsule { .. }) => self.capsules(index, measure, pair),
             (Thing::Solid { set: Some(_), .. }, _) | (_, Thing::Solid { set: Some(_), .. }) => {
                 self.sets(index, measure, pair)
             }
@@ -319,13 +320,13 @@ pub(super) fn from_signed(measure: Measure, signed: Answer, threshold_m: f64) ->
         Measure::Distance => {
             let gradients = signed.gradients.filter(|_| lower > 0.0);
             let (lower, upper) = (lower.max(0.0), upper.max(0.0));
-            Answer { lower, upper, value: upper, gradients, ..signed }
+            Answer { lower, upper, value: known(upper), gradients, ..signed }
         }
         Measure::Penetration => {
             let gradients = signed.gradients.filter(|_| upper < 0.0);
             let gradients = gradients.map(|both| both.map(negated));
             let (lower, upper) = ((-upper).max(0.0), (-lower).max(0.0));
-            Answer { lower, upper, value: upper, gradients, ..signed }
+            Answer { lower, upper, value: known(upper), gradients, ..signed }
         }
         Measure::Overlap => with_verdict(signed, compare::below_or_at(lower, upper, 0.0)),
         Measure::NearerThan => with_verdict(signed, compare::below(lower, upper, threshold_m)),
@@ -333,6 +334,11 @@ pub(super) fn from_signed(measure: Measure, signed: Answer, threshold_m: f64) ->
             Answer::without(AnswerStatus::NotDefined)
         }
     }
+}
+
+/// A value where there is one.
+fn known(upper: f64) -> f64 {
+    if upper.is_finite() { upper } else { f64::NAN }
 }
 
 fn negated(twist: Twist) -> Twist {

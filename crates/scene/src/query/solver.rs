@@ -34,7 +34,7 @@ impl Pair<'_> {
     pub(crate) fn finest_rungs(&self) -> [u8; 2] {
         [&self.a, &self.b].map(|thing| match thing {
             Thing::Solid { rungs, .. } => u8::try_from(rungs.len().saturating_sub(1)).unwrap_or(u8::MAX),
-            Thing::HalfSpace(_) | Thing::Point(_) => 0,
+            Thing::Capsule { .. } | Thing::HalfSpace(_) | Thing::Point(_) => 0,
         })
     }
 }

@@ -299,7 +299,7 @@ struct Contact {
 /// Whether the body is the object itself.
 fn is_exact(object: &Object) -> bool {
     match &object.geometry {
-        Geometry::HalfSpace(_) => true,
+        Geometry::Capsule(_) | Geometry::HalfSpace(_) => true,
         Geometry::SosBody(_) => false,
         Geometry::Solid(_) | Geometry::Ladder(_) => {
             object.solids().last().is_some_and(|finest| finest.gap_m() == Some(0.0))

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use sublevel_core::body::{Shape, Solid, SosBody};
-use sublevel_core::measure::{HalfSpace, Pose};
+use sublevel_core::measure::{Capsule, HalfSpace, Pose};
 
 use crate::broad_phase::{WorldBall, world_ball};
 use crate::geometry::Geometry;
@@ -16,6 +16,8 @@ pub(crate) enum Thing<'a> {
     /// Solids of one object, coarsest first, at a world pose. With `set` they only contain it, as
     /// the box around an sos-body does.
     Solid { rungs: &'a [Arc<Shape>], pose: &'a Pose, set: Option<&'a SosBody> },
+    /// A capsule about the z axis of its frame, at a world pose.
+    Capsule { capsule: &'a Capsule, pose: &'a Pose },
     /// A half-space of the world frame.
     HalfSpace(WorldHalfSpace),
     /// A point of the world frame, metres.
@@ -72,6 +74,7 @@ impl<'a> Thing<'a> {
     pub(crate) fn object(object: &'a Object, pose: &'a Pose) -> Self {
         match &object.geometry {
             Geometry::HalfSpace(half_space) => Self::HalfSpace(WorldHalfSpace::placed(half_space.half_space(), pose)),
+            Geometry::Capsule(capsule) => Self::Capsule { capsule: capsule.capsule(), pose },
             Geometry::SosBody(body) => Self::Solid { rungs: object.solids(), pose, set: Some(body) },
             Geometry::Solid(_) | Geometry::Ladder(_) => Self::Solid { rungs: object.solids(), pose, set: None },
         }
@@ -84,6 +87,7 @@ impl<'a> Thing<'a> {
                 let ball = rungs.last()?.circumscribed();
                 Some(world_ball(pose, (ball.center, ball.radius)))
             }
+            Self::Capsule { capsule, pose } => Some(world_ball(pose, (Vector3::zeros(), capsule.reach_m()))),
             Self::HalfSpace(_) => None,
             Self::Point(point) => Some((*point, 0.0)),
         }
@@ -102,7 +106,7 @@ impl<'a> Thing<'a> {
         }
     }
 
-    /// Lower bound of the signed distance from the boxes around two solids in their own frames,
+    /// Lower bound of the signed distance from the boxes around two things in their own frames,
     /// metres. −∞ where a side has no box.
     pub(crate) fn box_gap_m(&self, other: &Self) -> f64 {
         match (self.oriented_box(), other.oriented_box()) {
@@ -111,11 +115,19 @@ impl<'a> Thing<'a> {
         }
     }
 
-    /// The box around a solid in its own frame, where it stands.
+    /// The box around a solid or a capsule in its own frame, where it stands.
     pub(crate) fn oriented_box(&self) -> Option<OrientedBox> {
-        let Self::Solid { rungs, pose, .. } = self else { return None };
-        let bounds = rungs.last()?.bounding_box();
-        let (middle, half) = ((bounds.max + bounds.min) * 0.5, (bounds.max - bounds.min) * 0.5);
+        let (pose, middle, half) = match self {
+            Self::Solid { rungs, pose, .. } => {
+                let bounds = rungs.last()?.bounding_box();
+                (*pose, (bounds.max + bounds.min) * 0.5, (bounds.max - bounds.min) * 0.5)
+            }
+            Self::Capsule { capsule, pose } => {
+                let radius = capsule.radius_m();
+                (*pose, Vector3::zeros(), Vector3::new(radius, radius, capsule.reach_m()))
+            }
+            Self::HalfSpace(_) | Self::Point(_) => return None,
+        };
         let axes = pose.rotation().to_rotation_matrix().into_inner();
         // Of the centre, which may be far from either origin although the box is not.
         let rounding = 32.0 * f64::EPSILON * (pose.translation().amax() + middle.amax() + half.amax());

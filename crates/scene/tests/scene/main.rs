@@ -2,6 +2,7 @@
 //! pairs measured one by one.
 
 mod brute_force;
+mod capsules;
 mod model;
 mod sets;
 mod worlds;

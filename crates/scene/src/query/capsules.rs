@@ -1,0 +1,139 @@
+//! Pairs with a capsule in them.
+
+use nalgebra::Vector3;
+use sublevel_core::measure::{
+    Capsule, CapsuleDistance, Options, Pose, Status, Twist, distance_of_capsules, distance_to_capsule,
+};
+
+use super::answer::{Answer, AnswerStatus};
+use super::ask::Measure;
+use super::solve::from_signed;
+use super::solver::{Pair, Solver};
+use super::thing::{Thing, WorldHalfSpace};
+
+/// The signed distance of a pair with a capsule in it, metres, world frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SignedCapsule {
+    status: Status,
+    pub(crate) lower: f64,
+    pub(crate) upper: f64,
+    witnesses: [Vector3<f64>; 2],
+    /// From the second to the first.
+    normal: Option<Vector3<f64>>,
+    gradients: Option<[Twist; 2]>,
+    tied: bool,
+    iterations: u32,
+}
+
+impl SignedCapsule {
+    /// What balls say, where nothing else is known.
+    fn open(lower: f64) -> Self {
+        Self {
+            status: Status::BracketWide,
+            lower,
+            upper: f64::INFINITY,
+            witnesses: [Vector3::zeros(); 2],
+            normal: None,
+            gradients: None,
+            tied: false,
+            iterations: 0,
+        }
+    }
+
+    fn of(found: &CapsuleDistance, poses: Option<(&Pose, &Pose)>) -> Self {
+        Self {
+            status: found.status,
+            lower: found.lower,
+            upper: found.upper,
+            witnesses: [found.witness, found.witness_of_capsule],
+            normal: found.normal,
+            gradients: poses.and_then(|(pose, capsule_pose)| found.gradients(pose, capsule_pose)),
+            tied: found.tied,
+            iterations: found.iterations,
+        }
+    }
+
+    fn swapped(self) -> Self {
+        let ([first, second], gradients) = (self.witnesses, self.gradients.map(|[a, b]| [b, a]));
+        Self { witnesses: [second, first], normal: self.normal.map(|n| -n), gradients, ..self }
+    }
+}
+
+impl Solver<'_> {
+    /// A measure of a pair with a capsule in it.
+    pub(crate) fn capsules(&self, index: usize, measure: Measure, pair: &Pair<'_>) -> Answer {
+        let found = self.capsule_distance(pair, &self.ask.options(index, self.stop));
+        let stopped = self.stop.is_set();
+        let signed = Answer {
+            witnesses: (found.upper < f64::INFINITY).then_some(found.witnesses),
+            normal: found.normal,
+            gradients: found.gradients.filter(|_| self.ask.gradients),
+            not_unique: found.tied,
+            iterations: found.iterations,
+            rungs: pair.finest_rungs(),
+            ..Answer::bracket(found.status, found.lower, found.upper, stopped)
+        };
+        let answer = from_signed(measure, signed, self.ask.threshold_m);
+        // A distance is known where the depth is not.
+        let settled = measure == Measure::Distance && answer.upper == 0.0;
+        if settled { Answer { status: AnswerStatus::Converged, ..answer } } else { answer }
+    }
+
+    /// The signed distance of a pair with a capsule in it.
+    pub(crate) fn capsule_distance(&self, pair: &Pair<'_>, options: &Options<'_>) -> SignedCapsule {
+        match (&pair.a, &pair.b) {
+            (Thing::Solid { rungs, pose, set }, Thing::Capsule { capsule, pose: capsule_pose }) => {
+                let Some(solid) = rungs.last() else { return SignedCapsule::open(f64::NEG_INFINITY) };
+                let rung = rungs.len() - 1;
+                let found = self.warm(pair.slots, [rung, 0], Measure::Signed, |warm| {
+                    distance_to_capsule(&**solid, pose, capsule, capsule_pose, options, warm)
+                });
+                if set.is_some() {
+                    // The solid only contains the set.
+                    return SignedCapsule::open(found.lower);
+                }
+                SignedCapsule::of(&found, Some((pose, capsule_pose)))
+            }
+            (Thing::Capsule { capsule, pose }, Thing::Capsule { capsule: other, pose: other_pose }) => {
+                let found = distance_of_capsules(capsule, pose, other, other_pose, options);
+                SignedCapsule::of(&found, Some((pose, other_pose)))
+            }
+            (Thing::Capsule { capsule, pose }, Thing::Point(point)) => {
+                let (place, dot) = (Pose::identity().moved_to(*point), Capsule::POINT);
+                let found = distance_of_capsules(capsule, pose, &dot, &place, options);
+                SignedCapsule::of(&found, Some((pose, &place)))
+            }
+            (Thing::Capsule { capsule, pose }, Thing::HalfSpace(half_space)) => above_plane(capsule, pose, half_space),
+            _ => self.capsule_distance(&pair.swapped(), options).swapped(),
+        }
+    }
+}
+
+/// The signed distance of a capsule from a half-space: that of the lower end of its axis.
+fn above_plane(capsule: &Capsule, pose: &Pose, half_space: &WorldHalfSpace) -> SignedCapsule {
+    let (normal, offset) = (half_space.half_space.normal(), half_space.half_space.offset());
+    let axis = pose.transform_direction(&Vector3::z()) * capsule.half_height_m();
+    let slope = axis.dot(normal);
+    let end = pose.translation() - if slope > 0.0 { axis } else { -axis };
+    let height = normal.dot(&end) - offset - capsule.radius_m();
+    let size = pose.translation().norm() + capsule.reach_m();
+    let slack = half_space.slack_m(size) + 64.0 * f64::EPSILON * (size + offset.abs());
+    let witness = end - normal * capsule.radius_m();
+    let on_plane = witness - normal * height;
+    let arm = witness - half_space.origin;
+    let gradients = [
+        Twist { linear: *normal, angular: (witness - pose.translation()).cross(normal) },
+        Twist { linear: -normal, angular: normal.cross(&arm) },
+    ];
+    SignedCapsule {
+        status: Status::Converged,
+        lower: height - slack,
+        upper: height + slack,
+        witnesses: [witness, on_plane],
+        normal: Some(*normal),
+        gradients: Some(gradients),
+        // A segment along the plane has all of its points as near.
+        tied: capsule.half_height_m() > 0.0 && slope.abs() <= slack,
+        iterations: 0,
+    }
+}
