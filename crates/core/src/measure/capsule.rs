@@ -150,7 +150,8 @@ bracketed!(CapsuleDistance);
 /// let forearm = Capsule::new(0.1, 0.3)?;
 /// let beside = Pose::from_quaternion(Vector3::new(1.0, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0])?;
 /// let (options, mut warm) = (Options::default(), WarmStart::default());
-/// let found = distance_to_capsule(&crate_, &Pose::identity(), &forearm, &beside, &options, &mut warm);
+/// let origin = Pose::identity();
+/// let found = distance_to_capsule(&crate_, &origin, &forearm, &beside, &options, &mut warm);
 /// assert!((found.value() - 0.4).abs() < 1e-8);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

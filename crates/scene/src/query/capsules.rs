@@ -99,7 +99,7 @@ impl Solver<'_> {
                 SignedCapsule::of(&found, Some((pose, other_pose)))
             }
             (Thing::Capsule { capsule, pose }, Thing::Point(point)) => {
-                let (place, dot) = (Pose::identity().moved_to(*point), Capsule::POINT);
+                let (place, dot) = (Pose::identity().with_translation(*point), Capsule::POINT);
                 let found = distance_of_capsules(capsule, pose, &dot, &place, options);
                 SignedCapsule::of(&found, Some((pose, &place)))
             }

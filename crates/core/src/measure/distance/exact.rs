@@ -71,7 +71,7 @@ impl<'a> Exact<'a> {
         }
     }
 
-    /// Whether the bodies overlap, if that can be told without their distance.
+    /// Whether the bodies overlap, decided without their distance.
     ///
     /// # Errors
     /// After how many evaluations it cannot.

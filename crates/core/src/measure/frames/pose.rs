@@ -145,14 +145,9 @@ impl Pose {
         &self.translation
     }
 
-    /// The same orientation elsewhere, metres.
+    /// The same orientation at another translation, metres.
     #[must_use]
-    pub fn moved_to(&self, translation: Vector3<f64>) -> Self {
-        self.with_translation(translation)
-    }
-
-    /// The same orientation elsewhere.
-    pub(in crate::measure) fn with_translation(&self, translation: Vector3<f64>) -> Self {
+    pub fn with_translation(&self, translation: Vector3<f64>) -> Self {
         Self { translation, ..*self }
     }
 

@@ -53,8 +53,8 @@ const LONGEST_FOLLOWED: f64 = 0.25;
 /// Curvature times size that counts as none.
 const FLATTEST: f64 = 1e-20;
 
-/// Evaluations after which steps from one feature of the set to another are shortened, so that they
-/// do not go around in circles.
+/// Evaluations after which steps that no series has corrected are shortened, so that they do not go
+/// around in circles.
 const PATIENCE: u32 = 8;
 
 /// How often a step that led behind the set or into it is halved.

@@ -74,8 +74,8 @@ pub(in crate::measure) struct ExactContact<'a> {
 }
 
 impl WithSimd for ExactContact<'_> {
-    /// A common point or a lower bound of the distance above 0, in the frame of the shape; or after
-    /// how many evaluations they touch as far as can be told.
+    /// A common point or a lower bound of the distance above 0, in the frame of the shape; or the
+    /// number of evaluations that decided neither.
     type Output = Result<ExactProven, u32>;
 
     #[inline(always)]
