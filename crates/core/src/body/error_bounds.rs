@@ -27,6 +27,8 @@ pub struct Trust {
     pub center: f64,
     /// Bound of the distance between points of the ball and of the body.
     pub span: f64,
+    /// The same by normalized coordinates.
+    pub normalized_span: f64,
     /// Bound of the displacement of a point per distance from the centre by the roundings of `z = M
     /// (v - o)`, for an M of three roundings per entry; see [`super::Placement`].
     pub rounding: f64,
@@ -121,6 +123,7 @@ impl Trust {
             reach: inverse_norm * ball,
             center: center.norm(),
             span: inverse_norm * ball + columns.dot(extent) * slack,
+            normalized_span: span,
             rounding: gamma(16) * rows.dot(&columns) * slack,
             condition: norm * inverse_norm,
             inverse_norm,

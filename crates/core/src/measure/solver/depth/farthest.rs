@@ -118,7 +118,7 @@ fn farthest<S: Simd, N: Number<S>>(
         let dx = apply(&inverse, dz);
         let next = side.extrapolate(simd, &jet, &axes, dx);
         let (inward, near) = side.inward(simd, &next);
-        let enough = (side.support_deficit(simd, &next, n) - dot(n, inward)).le(tolerance);
+        let enough = (side.support_deficit(simd, &next, n, e) - dot(n, inward)).le(tolerance);
         let useful = N::and(simd, inside, useful);
         let found = N::and(simd, N::and(simd, useful, one.le(open)), N::and(simd, near, enough));
         x = add(x, dx);

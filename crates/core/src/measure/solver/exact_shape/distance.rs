@@ -53,8 +53,8 @@ const LONGEST_FOLLOWED: f64 = 0.25;
 /// Curvature times size that counts as none.
 const FLATTEST: f64 = 1e-20;
 
-/// Evaluations after which steps that no series has corrected are shortened, so that they do not go
-/// around in circles.
+/// Evaluations after which long steps that no series has corrected are shortened, so that they do
+/// not go around in circles.
 const PATIENCE: u32 = 8;
 
 /// How often a step that led behind the set or into it is halved.
@@ -145,10 +145,13 @@ impl<P: Projectable> WithSimd for ExactPair<'_, P> {
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let side = Side::away(self.body, 0, &self.relative);
         let center = interior(simd, self.body, &self.relative);
+        let (mut rounds, mut from_level) = (0, false);
         let followed = self.trace.and_then(|trace| self.follow(simd, &side, trace));
         let mut predicted = followed.map(|(_, predicted)| predicted);
-        let mut guess = followed.map(|(guess, _)| guess).or_else(|| self.seek(simd, center));
-        let (mut rounds, mut from_level) = (0, false);
+        let mut guess = followed.map(|(guess, _)| guess);
+        if guess.is_none() {
+            guess = self.seek(simd, &side, center, &mut rounds);
+        }
         loop {
             // No closure: what is inlined into one is not compiled for the vectors at hand.
             if let Some(guess) = guess {
@@ -180,10 +183,22 @@ impl<P: Projectable> WithSimd for ExactPair<'_, P> {
 impl<P: Projectable> ExactPair<'_, P> {
     /// From the poses alone; none where the body's interior point is in the set.
     #[inline(always)]
-    fn seek<S: Simd>(&self, simd: S, center: V3<f64>) -> Option<Guess> {
+    fn seek<S: Simd>(&self, simd: S, side: &Side<'_, f64>, center: V3<f64>, rounds: &mut u32) -> Option<Guess> {
         let seen = self.set.offset(simd, center);
-        let outside = seen.distance > 0.0;
-        outside.then(|| start(simd, &self.set, self.body, &self.relative, seen.frame[2]))
+        if !(seen.distance > 0.0) {
+            return None;
+        }
+        let (x, n) = start(simd, &self.set, self.body, &self.relative, seen.frame[2]);
+        let seen = self.set.offset(simd, x);
+        let overshot = !(seen.distance > 0.0 && dot::<S, f64>(seen.frame[2], n) > 0.0);
+        if !overshot || self.options.exhausted(*rounds) {
+            return Some((x, seen));
+        }
+        // Tables overshoot flat tips, into the set or beyond: back to the surface.
+        *rounds += 1;
+        let (jet, _) = side.jet(simd, x);
+        let x = side.on_the_surface(simd, x, jet.value);
+        Some((x, self.set.offset(simd, x)))
     }
 
     /// Which side of contact they are on, by the least value over the set.
@@ -298,7 +313,8 @@ impl<P: Projectable> ExactPair<'_, P> {
             };
             halved = 0;
             let square = side.relative_square(simd, &local, found.step);
-            if square > FAR && looks < LOOKS {
+            // After a leap along flat sides a long step says that there is no curvature left.
+            if square > FAR && looks < LOOKS && !series.is_corrected() {
                 looks += 1;
                 let (at, _) = farthest(simd, self.body, &self.relative, seen.frame[2]);
                 let there = self.set.offset(simd, at);
@@ -313,9 +329,11 @@ impl<P: Projectable> ExactPair<'_, P> {
             let may_be_flat = series.may_have_to_be_corrected(along, square.sqrt());
             let is_flat = may_be_flat && series.is_slow(along);
             if square < WORTH_A_BRACKET || is_flat {
-                let (step, there) = if is_flat { ([0.0; 3], &seen) } else { (found.step, &found.next) };
+                // There the normal is that of the face: on to the surface.
+                let step = if is_flat { [0.0, 0.0, found.shift] } else { found.step };
                 let at = side.extrapolate(simd, &jet, &local, step);
                 let to = moved::<S, f64>(x, step, &seen.frame);
+                let there = if is_flat { &self.set.offset(simd, to) } else { &found.next };
                 if let Some(proven) = self.bracket(simd, side, &at, (to, there), &seen.frame) {
                     let delta = apply_transposed::<S, f64>(&local, step);
                     let trace = trace_of(simd, &jet, (side.normalized(simd, x), delta), predicted);
@@ -328,19 +346,27 @@ impl<P: Projectable> ExactPair<'_, P> {
             let tangents = [seen.frame[0], seen.frame[1]];
             let part = series.part(simd, tangents, along, square.sqrt());
             let (mut step, mut length, slope) = (found.step, square.sqrt(), plane.slope());
-            let mut corrected = false;
-            if may_be_flat && found.next.feature == seen.feature {
+            let (mut corrected, mut next) = (false, found.next);
+            if may_be_flat {
                 let more = series.correction(simd, tangents, (along, slope), found.compliance);
-                corrected = more != Correction::default();
-                for i in 0..2 {
-                    step[i] += more.longer[i] + more.shorter[i];
-                    step[2] -= slope[i] * more.shorter[i];
+                if more != Correction::default() {
+                    let mut tried = step;
+                    for i in 0..2 {
+                        tried[i] += more.longer[i] + more.shorter[i];
+                        tried[2] -= slope[i] * more.shorter[i];
+                    }
+                    let there = self.set.offset(simd, moved::<S, f64>(x, tried, &seen.frame));
+                    // Newton's own step may lead anywhere from where there is no curvature.
+                    corrected = found.next.feature == seen.feature || there.feature == seen.feature;
+                    if corrected {
+                        (step, next) = (tried, there);
+                        length = side.relative_square(simd, &local, step).sqrt();
+                    }
                 }
-                length = side.relative_square(simd, &local, step).sqrt();
             }
             series.push(tangents, Last { newton: along, taken: [step[0], step[1]], slope, corrected });
             let mut share = part.min(LONGEST / length);
-            if round > PATIENCE && !corrected {
+            if round > PATIENCE && !corrected && square > WORTH_A_BRACKET {
                 share *= if round & 1 == 0 { 0.5 } else { 0.8 };
             }
             before = Some(x);
@@ -349,7 +375,7 @@ impl<P: Projectable> ExactPair<'_, P> {
                 series.took([step[0], step[1]]);
             }
             x = moved::<S, f64>(x, step, &seen.frame);
-            seen = if corrected || share < 1.0 { self.set.offset(simd, x) } else { found.next };
+            seen = if share < 1.0 { self.set.offset(simd, x) } else { next };
         }
         // Flat sides take more steps than this; others lead in circles.
         if series.is_corrected() { Ended::Wide(self.about(simd, x, &seen)) } else { Ended::Lost }
@@ -387,7 +413,9 @@ impl<P: Projectable> ExactPair<'_, P> {
         let outward = scaled::<S, f64>(gradient, -multiplier);
         let n = self.set.in_normal_cone(simd, seen.feature, outward);
         let facing = scaled::<S, f64>(apply::<S, f64>(frame, n), -1.0);
-        let deficit = side.support_deficit(simd, at, facing);
+        let own = scaled::<S, f64>(apply_transposed::<S, f64>(&self.relative.rotation, n), -1.0);
+        let inverse: M3<f64> = rows(simd, self.body.inverse());
+        let deficit = side.support_deficit(simd, at, facing, apply_transposed::<S, f64>(&inverse, own));
         let size = to[0].abs() + to[1].abs() + to[2].abs() + self.set.reach();
         let rounding = TAYLOR_ROUNDING * size + (self.displacement + side.displacement) * (1.0 + TAYLOR_ROUNDING);
         let charged = deficit + TAYLOR_ROUNDING * (deficit.abs() + multiplier);

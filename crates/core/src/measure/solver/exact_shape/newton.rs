@@ -30,6 +30,8 @@ pub(super) struct Move {
     pub(super) step: V3<f64>,
     /// The set as seen from where it leads.
     pub(super) next: Offset,
+    /// The part along the normal that the value asks for.
+    pub(super) shift: f64,
     /// `(W + K)⁻¹` where it starts, metres.
     pub(super) compliance: Symmetric2<f64>,
 }
@@ -105,5 +107,5 @@ pub(super) fn newton<S: Simd, P: Projectable>(
         alpha[1] -= (j[0][0] * residual[1] - j[1][0] * residual[0]) * inverse;
         next = set.offset(simd, moved::<S, f64>(x, step(alpha), &from.frame));
     }
-    Some(Move { step: step(alpha), next, compliance })
+    Some(Move { step: step(alpha), next, shift, compliance })
 }

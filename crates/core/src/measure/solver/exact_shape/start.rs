@@ -24,8 +24,8 @@ const TABLE_LOOKS: usize = 3;
 /// Square of a turn that is left to Newton's method on the body itself.
 const SMALL_TURN: f64 = 1e-2;
 
-/// A point of the body and the set as seen from it; from the set's normal n at the body's centre
-/// on.
+/// A point of the body and the direction against which it is about the farthest one; from the
+/// set's normal n at the body's centre on.
 #[inline(always)]
 pub(super) fn start<S: Simd, P: Projectable>(
     simd: S,
@@ -33,7 +33,7 @@ pub(super) fn start<S: Simd, P: Projectable>(
     body: &Body,
     relative: &Relative<f64>,
     mut n: V3<f64>,
-) -> (V3<f64>, Offset) {
+) -> (V3<f64>, V3<f64>) {
     let shape: M3<f64> = rows(simd, body.outline().shape());
     let turned = times_transposed::<S, f64>(&relative.rotation, &shape);
     let shape = times_transposed::<S, f64>(&turned, &relative.rotation);
@@ -60,7 +60,7 @@ pub(super) fn start<S: Simd, P: Projectable>(
         let seen = set.offset(simd, x);
         let off = subtract::<S, f64>(seen.frame[2], n);
         if look == TABLE_LOOKS || !(seen.distance > 0.0) || dot::<S, f64>(off, off) < SMALL_TURN {
-            return (x, seen);
+            return (x, n);
         }
         let [t0, t1, _] = seen.frame;
         let (a0, a1) =

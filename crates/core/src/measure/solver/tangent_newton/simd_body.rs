@@ -180,10 +180,25 @@ impl Side<'_, f64> {
         if fraction >= 1.0 {
             return v;
         }
-        let degree = self.body.constraints()[self.active].polynomial.degree() as f64;
         // Well inside the ball, or rounding would leave it outside.
-        let fraction = (0.97 * fraction).min(value.powf(-1.0 / degree));
+        let fraction = (0.97 * fraction).min(self.share_within(value));
         add_scaled::<S, f64>(self.origin, fraction, from)
+    }
+
+    /// About where the line from a point outside of the body to the centre meets the surface, by
+    /// the value of the active constraint at the point, which is left where it is if it is inside.
+    #[inline(always)]
+    pub(in crate::measure) fn on_the_surface<S: Simd>(&self, _: S, v: V3<f64>, value: f64) -> V3<f64> {
+        let from = subtract::<S, f64>(v, self.origin);
+        add_scaled::<S, f64>(self.origin, self.share_within(value).min(1.0), from)
+    }
+
+    /// Which part of the way from the centre to a point with this value of the active constraint
+    /// lies in the body, about: values rise with the power of their degree.
+    #[inline(always)]
+    fn share_within(&self, value: f64) -> f64 {
+        let degree = self.body.constraints()[self.active].polynomial.degree() as f64;
+        value.powf(-1.0 / degree)
     }
 
     /// Square of a step in the basis that `local` is of, in normalized coordinates, relative to the

@@ -11,6 +11,8 @@ use crate::polynomial::{NEAR_LEVEL, Number, NumberJet, Simd, gamma};
 #[derive(Clone, Copy, Debug)]
 pub(in crate::measure) struct Extrapolated<N> {
     pub(in crate::measure) plane: Plane<N>,
+    /// The gradient by z.
+    normalized_gradient: V3<N>,
     value_error: N,
     gradient_error: N,
     /// Curvature μ, by z: the constraint rises from its tangent plane by at least `¼ μ |δ|²` within
@@ -58,6 +60,7 @@ impl<N: Copy> Side<'_, N> {
         let radius = (N::splat(simd, self.trust().third.kept) * curvature).min(N::splat(simd, 0.5 * leeway));
         Extrapolated {
             plane,
+            normalized_gradient: gradient,
             curvature,
             radius,
             value_error: third * length * N::splat(simd, 1.0 / 3.0 + 1e-9),
@@ -84,9 +87,22 @@ impl<N: Copy> Side<'_, N> {
     }
 
     /// Bound of how much farther along the unit vector n the body reaches than the point with this
-    /// plane; not a number if the plane faces another way. All in the basis of the plane.
+    /// plane; not a number if the plane faces another way. n is in the basis of the plane, `pulled`
+    /// is `M⁻ᵀ n` as computed by the body's inverse, the one that points of the body have by z.
+    ///
+    /// For every point `x + δ` of the body and λ >= 0, with `r = n - λ ∇g`,
+    /// `n·δ = r·δ + λ ∇g·δ <= r·δ + λ (1 - g(x)) - λ (rise over the tangent plane)`. What is off in
+    /// direction is bounded both in metres and by z, where `r·δ = (M⁻ᵀ n - λ ∇g)·(M δ)` with the
+    /// gradient by z: of thin bodies an error of the gradient across them counts for their thickness
+    /// only.
     #[inline(always)]
-    pub(in crate::measure) fn support_deficit<S: Simd>(&self, simd: S, at: &Extrapolated<N>, n: V3<N>) -> N
+    pub(in crate::measure) fn support_deficit<S: Simd>(
+        &self,
+        simd: S,
+        at: &Extrapolated<N>,
+        n: V3<N>,
+        pulled: V3<N>,
+    ) -> N
     where
         N: Number<S>,
     {
@@ -95,10 +111,17 @@ impl<N: Copy> Side<'_, N> {
         let along = dot(n, gradient);
         let multiplier = splat(1.0) / along;
         let residual = add_scaled(n, -multiplier, gradient);
-        let near = Near::new(self);
+        let (near, trust) = (Near::new(self), self.body.trust());
         let length = dot(gradient, gradient).sqrt();
-        let turned = splat(near.turn).mul_add(length, at.gradient_error + splat(near.gradient_error));
+        let gradient_error = at.gradient_error + splat(near.gradient_error);
+        let turned = splat(near.turn).mul_add(length, gradient_error);
         let off = Off::new(simd, dot(residual, residual), turned.mul_add(multiplier, splat(TAYLOR_ROUNDING)));
+        // Gradients by z are off by as much as those in metres are per bound of M.
+        let residual = add_scaled(pulled, -multiplier, at.normalized_gradient);
+        let pulled_error = trust.inverse_error + trust.inverse_norm * (RELATIVE_QUATERNION_ERROR + TAYLOR_ROUNDING);
+        let error = (gradient_error * splat((1.0 + TAYLOR_ROUNDING) / trust.linear_norm))
+            .mul_add(multiplier, splat(pulled_error));
+        let normalized = Off::new(simd, dot(residual, residual), error);
         let bound = Bound {
             curvature: at.curvature,
             radius: at.radius,
@@ -108,7 +131,9 @@ impl<N: Copy> Side<'_, N> {
         };
         let error = at.value_error + splat(self.trust().value_error);
         let slack = multiplier * (splat(1.0) - at.plane.value + error);
-        (slack + bound.loss(simd, &off, multiplier)).select(splat(f64::MIN_POSITIVE).le(along), splat(f64::NAN))
+        let loss = bound.loss(simd, &off, multiplier);
+        let loss = loss.min(bound.normalized_loss(simd, &normalized, multiplier, trust.normalized_span));
+        (slack + loss).select(splat(f64::MIN_POSITIVE).le(along), splat(f64::NAN))
     }
 }
 
@@ -360,5 +385,19 @@ impl<N: Copy> Bound<N> {
         let anywhere = splat(2.0) * self.floor * self.inverse_square;
         let stiffness = (self.curvature.max(anywhere) * multiplier).select(fine, anywhere * multiplier);
         (square / stiffness).min(off.angle * self.span)
+    }
+
+    /// The same by z: off is that of `M⁻ᵀ n - λ ∇g`, with the curvature at the point and the length
+    /// of δ by z.
+    #[inline(always)]
+    fn normalized_loss<S: Simd>(&self, simd: S, off: &Off<N>, multiplier: N, span: f64) -> N
+    where
+        N: Number<S>,
+    {
+        let splat = |value: f64| N::splat(simd, value);
+        let slope = splat(0.25) * multiplier * self.curvature * self.radius;
+        let fine = N::and(simd, off.square.le(slope * slope), splat(0.0).le(self.curvature));
+        let far = off.angle * splat(span);
+        (off.square / (self.curvature * multiplier)).min(far).select(fine, far)
     }
 }
