@@ -1,9 +1,9 @@
 //! Queries of a round: all of one pair and one measure, drawn from the seed of their block.
 
+// Unit tests of the measures draw the same queries, of types that are theirs.
+use super::{Body, Options, Pose, WarmStart, distance, pose, shifted, turned};
 use nalgebra::{UnitQuaternion, Vector3};
-use sublevel::body::Body;
-use sublevel::measure::{Options, Pose, WarmStart, distance};
-use sublevel_testkit::random::{Seeded, pose, shifted, turned};
+use sublevel_testkit::random::Seeded;
 
 /// How the poses of a round are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,7 +61,7 @@ impl<'a, 'r> Draw<'a, 'r> {
         let sum = self.sum();
         let random = &mut *self.random;
         let reach = if random.index(4) == 0 { random.between(1.0, 100.0) } else { 1.6 * random.positive() };
-        let first = random.pose(0.1 * sum);
+        let first = pose(random.unit() * (0.1 * sum), &random.rotation());
         // About the interior points: the origin of a fitted body may lie at its foot.
         let turn = random.rotation();
         let center = first.transform_point(self.a.interior_point()) + random.unit() * (reach * sum);

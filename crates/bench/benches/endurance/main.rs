@@ -31,7 +31,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 use sublevel::body::Body;
+use sublevel::measure::{Options, Pose, WarmStart, distance};
 use sublevel_bench::enter_workspace;
+use sublevel_testkit::random::{pose, shifted, turned};
 
 /// Blocks of a whole run that hold an answer against a semidefinite program, if there is one: a
 /// fifth of them draw a growth distance, or sizes too far apart for it, and 1 000 are to be left.

@@ -184,7 +184,7 @@ impl<'a> Search<'a> {
         }
         // A bracket that holds 0 but is not sure of contact is as wide as rounding left it.
         let unsure = self.narrow() && !self.decided() && !self.options.exhausted(self.iterations);
-        if unsure && !self.pair.smooth() {
+        if unsure && !self.pair.smooth() && runs(Stage::UnsureDeepest) {
             // Edges that reach into a body have brought the points together where the surfaces
             // cross.
             let (v, n) = ((self.x + self.y) * 0.5, self.n);
@@ -194,7 +194,7 @@ impl<'a> Search<'a> {
             self.sharpen();
         }
         // From points this near, values are no longer too steep to start from.
-        if !self.ended() && self.lower == 0.0 {
+        if !self.ended() && self.lower == 0.0 && runs(Stage::SecondContact) {
             self.contact();
         }
     }
@@ -289,7 +289,7 @@ impl<'a> Search<'a> {
     /// The same for bodies with edges from the best points so far, with the constraints that are
     /// active there: from a start the others have diverged.
     fn again(&mut self) {
-        if self.pair.smooth() || self.lower == 0.0 || self.upper.is_infinite() {
+        if !runs(Stage::Again) || self.pair.smooth() || self.lower == 0.0 || self.upper.is_infinite() {
             return;
         }
         let (x, y, n) = (self.x, self.y, self.n);

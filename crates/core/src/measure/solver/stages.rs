@@ -61,6 +61,19 @@ pub(in crate::measure) enum Stage {
     PlaneOfA,
     /// A separating plane that turns with the second body.
     PlaneOfB,
+    // From here on parts of stages, which run only within these.
+    /// Quadratic programs along the normal from the best points so far.
+    Again,
+    /// The second look for the point deepest in both bodies.
+    SecondContact,
+    /// The deepest point where a narrow bracket does not say on which side of contact it is.
+    UnsureDeepest,
+    /// A restart of the closed forms from the least value over the shape.
+    ExactLevel,
+    /// Further looks at the support table of closed forms.
+    ExactLooks,
+    /// A restart of the closed forms where a ray leaves the body.
+    ExactExit,
 }
 
 /// Whether a stage may run: always, but in tests that switch it off.
@@ -71,7 +84,7 @@ pub(in crate::measure) fn runs(_: Stage) -> bool {
 }
 
 #[cfg(test)]
-pub(in crate::measure) use mask::{except, only, runs};
+pub(in crate::measure) use mask::{asked, except, only, runs};
 
 #[cfg(test)]
 mod mask {
@@ -80,24 +93,35 @@ mod mask {
 
     thread_local! {
         /// A bit for each stage that may run; tests run in threads of their own.
-        static MASK: Cell<u32> = const { Cell::new(u32::MAX) };
+        static MASK: Cell<u64> = const { Cell::new(u64::MAX) };
+        /// A bit for each stage that has come to its turn.
+        static ASKED: Cell<u64> = const { Cell::new(0) };
     }
 
     pub(in crate::measure) fn runs(stage: Stage) -> bool {
-        MASK.get() >> stage as u32 & 1 == 1
+        ASKED.set(ASKED.get() | 1 << stage as u64);
+        MASK.get() >> stage as u64 & 1 == 1
     }
 
-    /// Does `work` with no other stages than these.
+    /// Does `work`, and which of these stages came to their turn.
+    pub(in crate::measure) fn asked<T>(stages: &[Stage], work: impl FnOnce() -> T) -> (T, Vec<Stage>) {
+        ASKED.set(0);
+        let done = work();
+        (done, stages.iter().copied().filter(|stage| ASKED.get() >> *stage as u64 & 1 == 1).collect())
+    }
+
+    /// Does `work` with no other stages than these, and the parts of stages.
     pub(in crate::measure) fn only<T>(stages: &[Stage], work: impl FnOnce() -> T) -> T {
-        with(stages.iter().fold(0, |mask, stage| mask | 1 << *stage as u32), work)
+        let parts = u64::MAX << Stage::Again as u64;
+        with(stages.iter().fold(parts, |mask, stage| mask | 1 << *stage as u64), work)
     }
 
     /// Does `work` without these stages.
     pub(in crate::measure) fn except<T>(stages: &[Stage], work: impl FnOnce() -> T) -> T {
-        with(stages.iter().fold(u32::MAX, |mask, stage| mask & !(1 << *stage as u32)), work)
+        with(stages.iter().fold(u64::MAX, |mask, stage| mask & !(1 << *stage as u64)), work)
     }
 
-    fn with<T>(mask: u32, work: impl FnOnce() -> T) -> T {
+    fn with<T>(mask: u64, work: impl FnOnce() -> T) -> T {
         let before = MASK.replace(mask);
         let done = work();
         MASK.set(before);

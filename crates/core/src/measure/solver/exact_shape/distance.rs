@@ -17,6 +17,7 @@ use crate::measure::frames::vector::{
     M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, scaled, subtract,
 };
 use crate::measure::options::Options;
+use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::step_acceleration::{Correction, Last, Series};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::solver::tangent_newton::{
@@ -161,7 +162,7 @@ impl<P: Projectable> WithSimd for ExactPair<'_, P> {
                     Ended::Lost => {}
                 }
             }
-            if from_level || self.options.exhausted(rounds) {
+            if from_level || self.options.exhausted(rounds) || !runs(Stage::ExactLevel) {
                 return Err(ExactLost { rounds, about: None });
             }
             // Either they overlap, or the least value shows where to start again.
@@ -296,7 +297,7 @@ impl<P: Projectable> ExactPair<'_, P> {
                         halved += 1;
                         x = scaled::<S, f64>(add::<S, f64>(x, old), 0.5);
                     }
-                    _ if from_ray => return Ended::Lost,
+                    _ if from_ray || !runs(Stage::ExactExit) => return Ended::Lost,
                     _ => {
                         from_ray = true;
                         before = None;
@@ -314,7 +315,7 @@ impl<P: Projectable> ExactPair<'_, P> {
             halved = 0;
             let square = side.relative_square(simd, &local, found.step);
             // After a leap along flat sides a long step says that there is no curvature left.
-            if square > FAR && looks < LOOKS && !series.is_corrected() {
+            if square > FAR && looks < LOOKS && !series.is_corrected() && runs(Stage::ExactLooks) {
                 looks += 1;
                 let (at, _) = farthest(simd, self.body, &self.relative, seen.frame[2]);
                 let there = self.set.offset(simd, at);
