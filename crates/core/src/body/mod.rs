@@ -20,6 +20,7 @@ mod contained_points;
 mod containment;
 mod convex_body;
 mod covering;
+mod direction_grid;
 mod division;
 mod error_bounds;
 mod file;

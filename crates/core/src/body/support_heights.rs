@@ -13,9 +13,9 @@
 //! body.
 
 use super::Constraint;
+use super::direction_grid::{corners, interpolated};
 use super::error_bounds::Trust;
 use super::support_bounds::farthest_point;
-use super::support_table::CELLS;
 use crate::polynomial::gamma;
 use nalgebra::{Matrix3, Vector3};
 
@@ -43,7 +43,7 @@ pub(super) struct SupportHeights {
 }
 
 impl SupportHeights {
-    /// The table, from guesses of the support points along [`corner`], face by face and row by row.
+    /// The table, from guesses of the support points along the corners of the grid, in its order.
     pub(super) fn new<'a>(
         constraints: &[Constraint],
         inverse: &Matrix3<f64>,
@@ -53,7 +53,7 @@ impl SupportHeights {
         guesses: impl Iterator<Item = SupportGuess<'a>>,
     ) -> Self {
         let bound = CornerBound { constraints, interior, trust, extent };
-        let corners: Vec<f64> = guesses.enumerate().map(|(index, guess)| bound.of(&corner(index), &guess)).collect();
+        let corners: Vec<f64> = corners().zip(guesses).map(|(corner, guess)| bound.of(&corner, &guess)).collect();
         let highest = corners.iter().fold(0.0, |most: f64, height| most.max(*height));
         // The inverse of the map and its products with directions are rounded, as is the interior
         // point in normalized coordinates.
@@ -69,55 +69,13 @@ impl SupportHeights {
     /// length, body frame; metres times that length.
     #[inline(always)]
     pub(super) fn along(&self, n: &Vector3<f64>) -> f64 {
-        let e = self.inverse.tr_mul(n);
-        let [x, y, z] = [e.x.abs(), e.y.abs(), e.z.abs()];
-        let axis = if x >= y && x >= z {
-            0
-        } else if y >= z {
-            1
-        } else {
-            2
-        };
-        let [along, first, second] = match axis {
-            0 => [e.x, e.y, e.z],
-            1 => [e.y, e.z, e.x],
-            _ => [e.z, e.x, e.y],
-        };
-        let face = 2 * axis + usize::from(along < 0.0);
-        let half = 0.5 * CELLS as f64;
-        let scale = half / along.abs();
-        // Not `clamp`: what is not a number has to end somewhere.
-        let place = |across: f64| (across * scale + half).max(0.0).min(CELLS as f64);
-        let (u, v) = (place(first), place(second));
-        let (i, j) = ((u as usize).min(CELLS - 1), (v as usize).min(CELLS - 1));
-        let (u, v) = (u - i as f64, v - j as f64);
-        let row = (face * (CELLS + 1) + i) * (CELLS + 1) + j;
-        let [near, far] = [self.corners[row], self.corners[row + CELLS + 2]];
-        let height = if u > v {
-            let middle = self.corners[row + CELLS + 1];
-            near + u * (middle - near) + v * (far - middle)
-        } else {
-            let middle = self.corners[row + 1];
-            near + v * (middle - near) + u * (far - middle)
-        };
-        height * along.abs() + self.slack_m * n.norm()
+        interpolated(&self.corners, &self.inverse.tr_mul(n)) + self.slack_m * n.norm()
     }
 
     /// Size of the table, bytes.
     pub(super) fn bytes(&self) -> usize {
         self.corners.len() * size_of::<f64>()
     }
-}
-
-/// The corner of the grid at a position of the table; its largest component is 1.
-fn corner(index: usize) -> Vector3<f64> {
-    let (face, place) = (index / ((CELLS + 1) * (CELLS + 1)), index % ((CELLS + 1) * (CELLS + 1)));
-    let across = |cells: usize| 2.0 * cells as f64 / CELLS as f64 - 1.0;
-    let mut corner = Vector3::zeros();
-    corner[face / 2] = if face.is_multiple_of(2) { 1.0 } else { -1.0 };
-    corner[(face / 2 + 1) % 3] = across(place / (CELLS + 1));
-    corner[(face / 2 + 2) % 3] = across(place % (CELLS + 1));
-    corner
 }
 
 /// What the bound along a corner is computed from; normalized coordinates.

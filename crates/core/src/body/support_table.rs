@@ -10,14 +10,11 @@
 //! one with the z for `e = Wᵀn / |Wᵀn|`, that is `W z + W K Wᵀ n / |Wᵀn|`.
 
 use super::Constraint;
+use super::direction_grid::{self, CELLS, CORNERS, corner, middle};
 use super::radial::radius;
 use super::sphere::Sphere;
 use crate::polynomial::{Number, Simd};
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector3};
-
-/// Cells along each edge of the faces of a cube around all directions. Heights of a ball between
-/// their corners are then at most 0.3 % too large: `heights_are_bounds_and_close` pins that.
-pub(super) const CELLS: usize = 16;
 
 /// Numbers of a cell: `W z`, and `W K Wᵀ` by its distinct entries.
 const FIELDS: usize = 9;
@@ -62,24 +59,27 @@ impl Outline {
     /// `interior` is the interior point in normalized coordinates. Also the support points that it
     /// was made from.
     pub(super) fn new(constraints: &[Constraint], inverse: &Matrix3<f64>, interior: &Vector3<f64>) -> (Self, Corners) {
-        let mut traced = Vec::with_capacity(6 * (CELLS + 1) * (CELLS + 1));
+        let mut traced = Vec::with_capacity(6 * CORNERS * CORNERS);
         let mut support = SupportTracer::new(constraints, interior);
         let (mut cells, mut active) = (Vec::with_capacity(6 * CELLS * CELLS), Vec::with_capacity(6 * CELLS * CELLS));
+        let mut along_corners = direction_grid::corners().map(|corner| corner.normalize());
         for face in 0..6 {
             // Along the corners of all cells of the face.
-            let corners: Vec<_> = (0..(CELLS + 1) * (CELLS + 1))
-                .map(|k| {
-                    let sample = support.along(direction(face, 2 * (k / (CELLS + 1)), 2 * (k % (CELLS + 1))));
+            let corners: Vec<_> = along_corners
+                .by_ref()
+                .take(CORNERS * CORNERS)
+                .map(|e| {
+                    let sample = support.along(e);
                     traced.push((sample.1, support.active.clone()));
                     sample
                 })
                 .collect();
             for i in 0..CELLS {
                 for j in 0..CELLS {
-                    let middle = support.along(direction(face, 2 * i + 1, 2 * j + 1));
+                    let middle = support.along(middle(face, i, j).normalize());
                     active.push(support.active[0] as u8);
-                    let corner = |di: usize, dj: usize| &corners[(i + di) * (CELLS + 1) + j + dj];
-                    let around = [corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)];
+                    let around = [(i, j), (i, j + 1), (i + 1, j), (i + 1, j + 1)];
+                    let around = around.map(|(i, j)| &corners[corner(0, i, j)]);
                     cells.push(fitted(&middle, around, constraints.len() == 1, inverse));
                 }
             }
@@ -110,14 +110,14 @@ impl Outline {
     /// Where the cell of a direction is kept; body frame, any length.
     #[inline(always)]
     pub fn place<S: Simd, N: Number<S>>(&self, simd: S, n: [N; 3]) -> N {
-        place(simd, self.normalized(simd, n))
+        direction_grid::cell(simd, self.normalized(simd, n))
     }
 
     /// The cell of a unit vector, body frame.
     #[inline(always)]
     pub fn cell<S: Simd, N: Number<S>>(&self, simd: S, n: [N; 3]) -> Cell<N> {
         let e = self.normalized(simd, n);
-        let place = place(simd, e);
+        let place = direction_grid::cell(simd, e);
         let scale = N::splat(simd, 1.0) / (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]).sqrt();
         let [x, y, z, xx, xy, xz, yy, yz, zz] = N::gather(simd, &self.cells, place);
         Cell { place, point: [x, y, z], turn: [xx * scale, xy * scale, xz * scale, yy * scale, yz * scale, zz * scale] }
@@ -140,43 +140,6 @@ impl Outline {
     pub fn active(&self, place: f64) -> usize {
         usize::from(self.active[(place as usize).min(self.active.len() - 1)])
     }
-}
-
-/// Where the cell of a direction of normalized coordinates is kept.
-#[inline(always)]
-fn place<S: Simd, N: Number<S>>(simd: S, [x, y, z]: [N; 3]) -> N {
-    let splat = |value: f64| N::splat(simd, value);
-    let (ax, ay, az) = (x.abs(), y.abs(), z.abs());
-    let (on_x, on_y) = (N::and(simd, ay.le(ax), az.le(ax)), az.le(ay));
-    let along = x.select(on_x, y.select(on_y, z));
-    let first = y.select(on_x, z.select(on_y, x));
-    let second = z.select(on_x, x.select(on_y, y));
-    let axis = splat(0.0).select(on_x, splat(2.0).select(on_y, splat(4.0)));
-    let face = axis + splat(0.0).select(splat(0.0).le(along), splat(1.0));
-    let half = splat(0.5 * CELLS as f64);
-    let scale = half / along.abs();
-    let (i, j) = (cell(simd, first, scale), cell(simd, second, scale));
-    let cells = splat(CELLS as f64);
-    face.mul_add(cells, i).mul_add(cells, j)
-}
-
-/// Which cell along one edge of a face.
-#[inline(always)]
-fn cell<S: Simd, N: Number<S>>(simd: S, across: N, scale: N) -> N {
-    // Adding so much leaves no room for fractions; which side ties go to is of no matter.
-    let whole = N::splat(simd, 1.5 / N::EPSILON);
-    let rounded = (across.mul_add(scale, N::splat(simd, 0.5 * CELLS as f64 - 0.5)) + whole) - whole;
-    rounded.max(N::splat(simd, 0.0)).min(N::splat(simd, CELLS as f64 - 1.0))
-}
-
-/// The direction that lies on the face of the cube after so many halves of cells.
-fn direction(face: usize, i: usize, j: usize) -> Vector3<f64> {
-    let across = |halves: usize| halves as f64 / CELLS as f64 - 1.0;
-    let mut direction = Vector3::zeros();
-    direction[face / 2] = if face.is_multiple_of(2) { 1.0 } else { -1.0 };
-    direction[(face / 2 + 1) % 3] = across(i);
-    direction[(face / 2 + 2) % 3] = across(j);
-    direction.normalize()
 }
 
 /// A direction and the support point along it, in normalized coordinates.

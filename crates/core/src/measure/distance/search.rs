@@ -25,6 +25,17 @@ use crate::polynomial::dispatch;
 use nalgebra::{SVector, Vector3};
 use std::ops::ControlFlow;
 
+/// What has come of a method.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Outcome {
+    /// An answer, or the end of what may be spent on one.
+    Proven,
+    /// A narrower bracket.
+    Improved,
+    /// Nothing that was not known.
+    Failed,
+}
+
 /// A solve in progress: the best bracket so far and where it was attained, in query units.
 pub(super) struct Search<'a> {
     pair: &'a Pair<'a>,
@@ -131,95 +142,49 @@ impl<'a> Search<'a> {
         self.done() || self.options.exhausted(self.iterations)
     }
 
+    /// The methods in turn, until one has proven the answer.
     pub(super) fn run(&mut self, hint: &Hint) {
-        self.narrow_down(hint);
-        self.align();
+        let methods: [fn(&mut Self, &Hint); 5] =
+            [Self::continuation, Self::starts, Self::active_sets, Self::interior_points, Self::refinement];
+        for method in methods {
+            if self.attempt(method, hint) == Outcome::Proven {
+                break;
+            }
+        }
         self.attain_any();
     }
 
-    fn narrow_down(&mut self, hint: &Hint) {
-        if self.options.exhausted(self.iterations) {
-            return;
+    fn attempt(&mut self, method: fn(&mut Self, &Hint), hint: &Hint) -> Outcome {
+        let before = (self.lower, self.upper);
+        if !self.options.exhausted(self.iterations) {
+            method(self, hint);
         }
-        match hint {
-            Hint::Apart { x_a, y_b, normal_a, active_a, active_b } => {
-                let active =
-                    (Active::from_bits(*active_a, self.pair.a.len()), Active::from_bits(*active_b, self.pair.b.len()));
-                if let (Some(a), Some(b)) = active {
-                    self.newton(self.pair.a_to_query(x_a), self.pair.b_to_query(y_b), *normal_a, a, b);
-                }
-            }
-            Hint::Cold
-            | Hint::Exact(_)
-            | Hint::Shapes { .. }
-            | Hint::Diverged
-            | Hint::Overlap { .. }
-            | Hint::Level { .. }
-            | Hint::LevelSmooth(_)
-            | Hint::Saturated
-            | Hint::Single { .. }
-            | Hint::Smooth(_) => {}
-        }
-        if !self.ended() {
-            self.outlined();
-        }
-        let before = (self.x, self.y, self.n);
-        if !self.ended() {
-            self.again();
-        }
-        if !self.ended() {
-            self.closest(SHORT_DISTANCE);
-        }
-        if !self.ended() && !self.decided() && self.lower < SHORT_DISTANCE * self.pair.size() {
-            self.contact();
-        }
-        // Where both are elongated or edged, first order from the deepest point is not close
-        // enough.
-        if !self.ended() {
-            self.closest(SHORTEST_DISTANCE);
-        }
-        // From the same points it would end the same.
-        if !self.ended() && (self.x, self.y, self.n) != before {
-            self.again();
-        }
-        // A bracket that holds 0 but is not sure of contact is as wide as rounding left it.
-        let unsure = self.narrow() && !self.decided() && !self.options.exhausted(self.iterations);
-        if unsure && !self.pair.smooth() && runs(Stage::UnsureDeepest) {
-            // Edges that reach into a body have brought the points together where the surfaces
-            // cross.
-            let (v, n) = ((self.x + self.y) * 0.5, self.n);
-            self.deepest(&v, &n);
-        }
-        if !self.ended() || unsure && !self.decided() {
-            self.sharpen();
-        }
-        // From points this near, values are no longer too steep to start from.
-        if !self.ended() && self.lower == 0.0 && runs(Stage::SecondContact) {
-            self.contact();
+        let settled = self.decided() && !self.has_to_be_aligned();
+        if settled || self.options.exhausted(self.iterations) {
+            Outcome::Proven
+        } else if (self.lower, self.upper) == before {
+            Outcome::Failed
+        } else {
+            Outcome::Improved
         }
     }
 
-    /// Goes on to the normal of the solution: a bracket that is narrow holds it to about the root
-    /// of its width relative to the distance, and near contact to nothing.
-    fn align(&mut self) {
-        if !runs(Stage::Alignment) || !self.has_to_be_aligned() || self.options.exhausted(self.iterations) {
-            return;
-        }
-        let (x, y, n) = (self.x, self.y, self.n);
-        let near = || (Active::near(&self.pair.a, &x, &-n), Active::near(&self.pair.b, &y, &n));
-        let (x, y, n, (a, b)) = self.tried[0].map_or_else(|| (x, y, n, near()), |at| (at.x, at.y, at.n, (at.a, at.b)));
-        self.newton(x, y, n, a, b);
-        // So near to each other doubles may not show the normal.
-        if self.has_to_be_aligned() && self.lower < SHORTEST_DISTANCE * self.pair.size() {
-            self.sharpen();
+    /// Newton's method on from the answer before, with its active constraints. Of smooth bodies
+    /// that is done before there is a search.
+    fn continuation(&mut self, hint: &Hint) {
+        let Hint::Apart { x_a, y_b, normal_a, active_a, active_b } = hint else { return };
+        let [a, b] = [(active_a, &self.pair.a), (active_b, &self.pair.b)]
+            .map(|(active, body)| Active::from_bits(*active, body.len()));
+        if let (Some(a), Some(b)) = (a, b) {
+            self.newton(self.pair.a_to_query(x_a), self.pair.b_to_query(y_b), *normal_a, a, b);
         }
     }
 
     /// Newton's method from where the outlines are nearest, with the constraints that are active
     /// there. Where two sides are all but parallel that is anywhere on them, but the corners of one
     /// show.
-    fn outlined(&mut self) {
-        if !runs(Stage::SupportTables) {
+    fn starts(&mut self, _: &Hint) {
+        if !runs(Stage::SupportTables) || self.ended() {
             return;
         }
         let pair = self.pair;
@@ -288,13 +253,70 @@ impl<'a> Search<'a> {
 
     /// The same for bodies with edges from the best points so far, with the constraints that are
     /// active there: from a start the others have diverged.
-    fn again(&mut self) {
-        if !runs(Stage::Again) || self.pair.smooth() || self.lower == 0.0 || self.upper.is_infinite() {
+    fn active_sets(&mut self, _: &Hint) {
+        let known = self.lower > 0.0 && self.upper.is_finite();
+        if !runs(Stage::Again) || self.pair.smooth() || !known || self.ended() {
             return;
         }
         let (x, y, n) = (self.x, self.y, self.n);
         let (a, b) = (Active::near(&self.pair.a, &x, &-n), Active::near(&self.pair.b, &y, &n));
         self.along(x, y, n, a, b);
+    }
+
+    /// Interior-point methods, and active sets from where these have led: from the same points they
+    /// would end the same.
+    fn interior_points(&mut self, hint: &Hint) {
+        if self.attempt(Self::closest_or_deepest, hint) == Outcome::Improved {
+            self.active_sets(hint);
+        }
+    }
+
+    /// The interior-point method for the distance, near contact for the deepest point.
+    fn closest_or_deepest(&mut self, _: &Hint) {
+        if !self.ended() {
+            self.closest(SHORT_DISTANCE);
+        }
+        if !self.ended() && !self.decided() && self.lower < SHORT_DISTANCE * self.pair.size() {
+            self.contact();
+        }
+        // Where both are elongated or edged, first order from the deepest point is not close
+        // enough.
+        if !self.ended() {
+            self.closest(SHORTEST_DISTANCE);
+        }
+    }
+
+    /// Twice the precision, for the bracket and for the side of contact, and Newton's method until
+    /// the normal is that of the solution.
+    fn refinement(&mut self, _: &Hint) {
+        // A bracket that holds 0 but is not sure of contact is as wide as rounding left it.
+        let unsure = self.narrow() && !self.decided();
+        if unsure && !self.pair.smooth() && runs(Stage::UnsureDeepest) {
+            // Edges that reach into a body have brought the points together where the surfaces
+            // cross.
+            let (v, n) = ((self.x + self.y) * 0.5, self.n);
+            self.deepest(&v, &n);
+        }
+        if !self.ended() || unsure && !self.decided() {
+            self.sharpen();
+        }
+        self.align();
+    }
+
+    /// Goes on to the normal of the solution: a bracket that is narrow holds it to about the root
+    /// of its width relative to the distance, and near contact to nothing.
+    fn align(&mut self) {
+        if !runs(Stage::Alignment) || !self.has_to_be_aligned() || self.options.exhausted(self.iterations) {
+            return;
+        }
+        let (x, y, n) = (self.x, self.y, self.n);
+        let near = || (Active::near(&self.pair.a, &x, &-n), Active::near(&self.pair.b, &y, &n));
+        let (x, y, n, (a, b)) = self.tried[0].map_or_else(|| (x, y, n, near()), |at| (at.x, at.y, at.n, (at.a, at.b)));
+        self.newton(x, y, n, a, b);
+        // So near to each other doubles may not show the normal.
+        if self.has_to_be_aligned() && self.lower < SHORTEST_DISTANCE * self.pair.size() {
+            self.sharpen();
+        }
     }
 
     /// A point in A's frame from its normalization's centre on, metres.

@@ -64,16 +64,10 @@ pub(in crate::measure) enum Stage {
     // From here on parts of stages, which run only within these.
     /// Quadratic programs along the normal from the best points so far.
     Again,
-    /// The second look for the point deepest in both bodies.
-    SecondContact,
     /// The deepest point where a narrow bracket does not say on which side of contact it is.
     UnsureDeepest,
     /// A restart of the closed forms from the least value over the shape.
     ExactLevel,
-    /// Further looks at the support table of closed forms.
-    ExactLooks,
-    /// A restart of the closed forms where a ray leaves the body.
-    ExactExit,
 }
 
 /// Whether a stage may run: always, but in tests that switch it off.

@@ -1,5 +1,5 @@
-//! What each stage of a search is there for: each is switched off alone, and the queries at which it
-//! came to its turn are solved once more, from the same hint.
+//! What each stage of a search is there for: each is switched off alone, and the queries at which
+//! it came to its turn are solved once more, from the same hint.
 //!
 //! The draws are those of the endurance bench, of a catalogue in which half the bodies have edges,
 //! and the cases of the stability catalogue that ask for a distance. The table of docs/numerics.md:
@@ -27,7 +27,7 @@ use sublevel_testkit::random::draws;
 
 /// The stages of distances, level and growth distances, and decisions, in the order in which they
 /// are tried.
-const STAGES: [Stage; 19] = [
+const STAGES: [Stage; 16] = [
     Stage::Balls,
     Stage::Planes,
     Stage::ClosedForm,
@@ -42,11 +42,8 @@ const STAGES: [Stage; 19] = [
     Stage::Refinement,
     Stage::Alignment,
     Stage::Again,
-    Stage::SecondContact,
     Stage::UnsureDeepest,
     Stage::ExactLevel,
-    Stage::ExactLooks,
-    Stage::ExactExit,
 ];
 
 /// Queries of one pair before the next is drawn.

@@ -10,8 +10,7 @@
 use super::level::{Level, LevelProblem};
 use super::newton::newton;
 use super::projectable::{Offset, Projectable};
-use super::ray::Exit;
-use super::start::{farthest, start};
+use super::start::start;
 use crate::body::Body;
 use crate::measure::frames::vector::{
     M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, scaled, subtract,
@@ -35,15 +34,6 @@ const WORTH_A_BRACKET: f64 = 1e-6;
 
 /// Square of a step, as above, after which none is left but rounding.
 const SETTLED: f64 = 1e-22;
-
-/// Square of a step, as above, that is long enough to look at the support table again.
-const FAR: f64 = 2.5e-3;
-
-/// How often that is done.
-const LOOKS: u32 = 3;
-
-/// How much nearer a point of the table has to be.
-const NEARER: f64 = 0.98;
 
 /// Longest step in normalized coordinates relative to the body's size there.
 const LONGEST: f64 = 0.5;
@@ -262,7 +252,7 @@ impl<P: Projectable> ExactPair<'_, P> {
         apart: bool,
         rounds: &mut u32,
     ) -> Ended {
-        let (mut before, mut halved, mut looks, mut from_ray) = (None, 0, 0, false);
+        let (mut before, mut halved) = (None, 0);
         let (mut brought, mut series) = (false, Series::default());
         for round in 1..=MAX_ROUNDS {
             while !(seen.distance > 0.0) {
@@ -290,41 +280,15 @@ impl<P: Projectable> ExactPair<'_, P> {
             let plane = Plane::new(simd, &jet, &local);
             let bend = SurfaceCurvature::new(simd, &jet, &local);
             let Some(found) = newton(simd, &self.set, x, &seen, (&plane, &bend), self.smallest()) else {
-                // The step before has led behind the body: half of it, or from where the ray to the
-                // set leaves the body.
-                match before {
-                    Some(old) if halved < HALVINGS => {
-                        halved += 1;
-                        x = scaled::<S, f64>(add::<S, f64>(x, old), 0.5);
-                    }
-                    _ if from_ray || !runs(Stage::ExactExit) => return Ended::Lost,
-                    _ => {
-                        from_ray = true;
-                        before = None;
-                        let center = interior(simd, self.body, &self.relative);
-                        let to = self.set.project(simd, center);
-                        let (at, count) =
-                            dispatch(Exit { side, from: center, to, most: self.options.max_iterations() - *rounds });
-                        *rounds += count;
-                        x = at;
-                    }
-                }
+                // The step before has led behind the body.
+                let Some(old) = before.filter(|_| halved < HALVINGS) else { return Ended::Lost };
+                halved += 1;
+                x = scaled::<S, f64>(add::<S, f64>(x, old), 0.5);
                 (seen, series) = (self.set.offset(simd, x), Series::default());
                 continue;
             };
             halved = 0;
             let square = side.relative_square(simd, &local, found.step);
-            // After a leap along flat sides a long step says that there is no curvature left.
-            if square > FAR && looks < LOOKS && !series.is_corrected() && runs(Stage::ExactLooks) {
-                looks += 1;
-                let (at, _) = farthest(simd, self.body, &self.relative, seen.frame[2]);
-                let there = self.set.offset(simd, at);
-                let least = (NEARER * seen.distance).min(found.next.distance);
-                if there.distance > 0.0 && there.distance < least {
-                    (x, seen, before, series) = (at, there, None, Series::default());
-                    continue;
-                }
-            }
             let along = [found.step[0], found.step[1]];
             // Where sides are flat the point at hand may do long before its step is short enough.
             let may_be_flat = series.may_have_to_be_corrected(along, square.sqrt());
@@ -420,7 +384,7 @@ impl<P: Projectable> ExactPair<'_, P> {
         let size = to[0].abs() + to[1].abs() + to[2].abs() + self.set.reach();
         let rounding = TAYLOR_ROUNDING * size + (self.displacement + side.displacement) * (1.0 + TAYLOR_ROUNDING);
         let charged = deficit + TAYLOR_ROUNDING * (deficit.abs() + multiplier);
-        let lower = dot::<S, f64>(n, to) - charged - self.set.height(simd, n) - rounding;
+        let lower = self.set.separation(simd, n, (to, charged)) - rounding;
         let (inward, fine) = side.inward(simd, at);
         let x = moved::<S, f64>(to, inward, frame);
         let nearest = self.set.project(simd, x);

@@ -133,7 +133,7 @@ impl<P: Projectable> LevelProblem<'_, P> {
         let n = scaled::<S, f64>(gradient, -inverse);
         // The gradient is off by so much over the way to any point of the body.
         let off = errors.value + (errors.gradient + errors.turn * length) * errors.span;
-        let gap = (jet.value - 1.0 - off) * inverse + dot::<S, f64>(n, y) - self.set.height(simd, n);
+        let gap = self.set.separation(simd, n, (y, (1.0 - jet.value + off) * inverse));
         let size = y[0].abs() + y[1].abs() + y[2].abs() + self.set.reach() + jet.value * inverse;
         let rounding = TAYLOR_ROUNDING * size + errors.displacement + self.displacement;
         (gap - rounding, n)

@@ -8,7 +8,6 @@ mod level;
 mod newton;
 mod placed;
 mod projectable;
-mod ray;
 mod segment;
 mod shape_pair;
 mod shapes;

@@ -6,7 +6,7 @@
 //! distance D around the set. It is 0 over a face, 1/D across an edge and 0 along it, and 1/D every
 //! way around a corner. Points are in the frame of the set, metres.
 
-use crate::measure::frames::vector::{M3, V3};
+use crate::measure::frames::vector::{M3, V3, dot};
 use crate::measure::solver::tangent_newton::Symmetric2;
 use crate::polynomial::Simd;
 
@@ -36,6 +36,13 @@ pub(in crate::measure) trait Projectable: Copy {
 
     /// Support function: the largest `n·y` over the set.
     fn height<S: Simd>(&self, simd: S, n: V3<f64>) -> f64;
+
+    /// How far a plane across a unit vector n keeps the set apart from what reaches no more than
+    /// `deficit` farther along -n than the point x, but for rounding; metres.
+    #[inline(always)]
+    fn separation<S: Simd>(&self, simd: S, n: V3<f64>, (x, deficit): (V3<f64>, f64)) -> f64 {
+        dot::<S, f64>(n, x) - deficit - self.height(simd, n)
+    }
 
     /// The part of a vector that the normals of a feature span, of length 1. Planes across it touch
     /// all of the feature, so that what is off across it costs nothing.

@@ -162,7 +162,7 @@ impl<A: Projectable, B: Projectable> ShapePair<A, B> {
     #[inline(always)]
     fn along(&self, n: V3<f64>) -> f64 {
         let own = apply_transposed::<Scalar, f64>(&self.rotation, n);
-        dot::<Scalar, f64>(n, self.translation) - self.a.height(Scalar, own) - self.b.height(Scalar, n)
+        self.b.separation(Scalar, n, (self.translation, self.a.height(Scalar, own)))
     }
 
     #[inline(always)]

@@ -74,7 +74,7 @@ pub(super) fn start<S: Simd, P: Projectable>(
 /// About the point of the body farthest along -n, and its derivative by that direction in the
 /// body's frame.
 #[inline(always)]
-pub(super) fn farthest<S: Simd>(simd: S, body: &Body, relative: &Relative<f64>, n: V3<f64>) -> (V3<f64>, [f64; 6]) {
+fn farthest<S: Simd>(simd: S, body: &Body, relative: &Relative<f64>, n: V3<f64>) -> (V3<f64>, [f64; 6]) {
     let own = scaled::<S, f64>(apply_transposed::<S, f64>(&relative.rotation, n), -1.0);
     let cell = body.outline().cell::<S, f64>(simd, own);
     let point = add::<S, f64>(cell.point, apply_symmetric::<S, f64>(&cell.turn, own));

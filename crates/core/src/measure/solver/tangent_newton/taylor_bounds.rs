@@ -93,8 +93,7 @@ impl<N: Copy> Side<'_, N> {
     /// For every point `x + δ` of the body and λ >= 0, with `r = n - λ ∇g`,
     /// `n·δ = r·δ + λ ∇g·δ <= r·δ + λ (1 - g(x)) - λ (rise over the tangent plane)`. What is off in
     /// direction is bounded both in metres and by z, where `r·δ = (M⁻ᵀ n - λ ∇g)·(M δ)` with the
-    /// gradient by z: of thin bodies an error of the gradient across them counts for their thickness
-    /// only.
+    /// gradient by z: across a thin body an error of the gradient counts for its thickness only.
     #[inline(always)]
     pub(in crate::measure) fn support_deficit<S: Simd>(
         &self,

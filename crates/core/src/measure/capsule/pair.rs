@@ -1,0 +1,209 @@
+//! The signed distance of one body from a capsule: by closed forms, else along its axis.
+
+use super::answer::CapsuleDistance;
+use super::shape::Capsule;
+use crate::body::{Body, ClosedForm};
+use crate::measure::bounds::culling::CULLING_SLACK;
+use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
+use crate::measure::options::Options;
+use crate::measure::pairwise_minimum::At;
+use crate::measure::point::Projection;
+use crate::measure::solver::exact_shape::{
+    ExactProven, ExactQuery, ShapeDistance, between_shapes, direction_to_world, to_world,
+};
+use crate::measure::solver::stages::{Stage, runs};
+use crate::measure::solver::stop_criterion::StopCriterion;
+use crate::measure::status::Status;
+use crate::measure::warm::{Hint, WarmStart};
+use crate::polynomial::dispatch;
+use nalgebra::Vector3;
+
+/// Most places along a segment at which the distance is taken.
+const MAX_PLACES: u32 = 64;
+
+/// A capsule where it stands, and how its distance is to be solved.
+pub(super) struct Problem<'a> {
+    pub(super) capsule: &'a Capsule,
+    pub(super) capsule_pose: &'a Pose,
+    /// Width of the bracket that is narrow enough, metres.
+    pub(super) tolerance: f64,
+    pub(super) options: &'a Options<'a>,
+}
+
+impl Problem<'_> {
+    pub(super) fn solve(&self, of_body: At<'_, Body>, warm: &mut WarmStart) -> CapsuleDistance {
+        let found = if !runs(Stage::ClosedForm) {
+            Err(0)
+        } else if let Some(form) = of_body.0.closed_form() {
+            self.of_shape((form, of_body.1), warm)
+        } else if of_body.0.is_smooth() {
+            self.of_smooth(of_body, warm)
+        } else {
+            Err(0)
+        };
+        found.unwrap_or_else(|spent| self.along_axis(of_body, spent, warm))
+    }
+
+    fn form(&self) -> ClosedForm {
+        ClosedForm::capsule(self.capsule.radius_m(), self.capsule.half_height_m())
+    }
+
+    /// Of a body with a single constraint.
+    ///
+    /// # Errors
+    /// After how many evaluations nothing is proven.
+    fn of_smooth(&self, (body, pose): At<'_, Body>, warm: &mut WarmStart) -> Result<CapsuleDistance, u32> {
+        let Self { capsule_pose: form_pose, tolerance, options, .. } = *self;
+        let (form, goal) = (self.form(), StopCriterion::NARROW);
+        let trace = if let Hint::Exact(trace) = &warm.hint { Some(trace) } else { None };
+        let query = ExactQuery { body, pose, form: &form, form_pose, goal: &goal, tolerance, options, trace };
+        let found = dispatch(query).map_err(|lost| lost.rounds)?;
+        let ExactProven { lower, upper, x, nearest, n, rounds, trace, .. } = found;
+        let [witness, on_axis] = [x, nearest].map(|point| to_world(&form, form_pose, point));
+        if upper == 0.0 {
+            *warm = WarmStart::default();
+            return Ok(self.met(&witness, rounds));
+        }
+        *warm = trace.map_or_else(WarmStart::default, |trace| Hint::Exact(trace).into());
+        let normal = direction_to_world(&form, form_pose, n);
+        Ok(self.apart([lower, upper], [witness, on_axis], normal, rounds))
+    }
+
+    /// Of a closed form where its body stands.
+    ///
+    /// # Errors
+    /// After how many steps nothing is proven.
+    fn of_shape(&self, of_body: (&ClosedForm, &Pose), warm: &mut WarmStart) -> Result<CapsuleDistance, u32> {
+        let (_, pose) = of_body;
+        let form = self.form();
+        let start = if let Hint::Shapes { x_a } = &warm.hint { Some(pose.transform_point(x_a)) } else { None };
+        let found =
+            between_shapes(of_body, (&form, self.capsule_pose), start.as_ref(), (self.tolerance, self.options))?;
+        let ShapeDistance { lower, upper, witness_a, witness_b, normal, steps, .. } = found;
+        let x_a = pose.rotation().inverse_transform_vector(&(witness_a - pose.translation()));
+        *warm = Hint::Shapes { x_a }.into();
+        if normal == Vector3::zeros() {
+            let status = Status::of(upper - lower <= self.tolerance);
+            return Ok(CapsuleDistance { status, lower, upper, ..self.met(&witness_a, steps) });
+        }
+        Ok(CapsuleDistance {
+            status: Status::of(upper - lower <= self.tolerance),
+            lower,
+            upper,
+            witness: witness_a,
+            witness_of_capsule: witness_b,
+            normal: Some(normal),
+            tied: false,
+            iterations: steps,
+        })
+    }
+
+    /// An answer by the distance from the axis.
+    fn apart(
+        &self,
+        [lower, upper]: [f64; 2],
+        [witness, on_axis]: [Vector3<f64>; 2],
+        normal: Vector3<f64>,
+        iterations: u32,
+    ) -> CapsuleDistance {
+        let radius = self.capsule.radius_m();
+        let rounding = f64::EPSILON * (radius + upper);
+        let (lower, upper) = (lower - radius - rounding, upper - radius + rounding);
+        let witness_of_capsule = on_axis + normal * radius;
+        let status = Status::of(upper - lower <= self.tolerance);
+        CapsuleDistance {
+            status,
+            lower,
+            upper,
+            witness,
+            witness_of_capsule,
+            normal: Some(normal),
+            tied: false,
+            iterations,
+        }
+    }
+
+    /// The answer where a point of the axis lies in the body.
+    fn met(&self, point: &Vector3<f64>, iterations: u32) -> CapsuleDistance {
+        CapsuleDistance {
+            status: Status::BracketWide,
+            lower: f64::NEG_INFINITY,
+            upper: -self.capsule.radius_m(),
+            witness: *point,
+            witness_of_capsule: *point,
+            normal: None,
+            tied: false,
+            iterations,
+        }
+    }
+
+    /// By the distances of points of the axis, after so many steps.
+    fn along_axis(&self, (body, pose): At<'_, Body>, spent: u32, warm: &mut WarmStart) -> CapsuleDistance {
+        let (axis, half) = (self.capsule_pose.transform_direction(&Vector3::z()), self.capsule.half_height_m());
+        let place = |at: f64| self.capsule_pose.translation() + axis * at;
+        let projection = Projection::new(body, pose);
+        // Places where the distance falls towards the other one, with tangents that bound it.
+        let mut ends: [Option<Tangent>; 2] = [None, None];
+        let mut best = CapsuleDistance { upper: f64::INFINITY, ..self.met(pose.translation(), 0) };
+        let (mut lower, mut iterations) = (f64::NEG_INFINITY, spent);
+        let center = pose.transform_point(body.interior_point()) - self.capsule_pose.translation();
+        let mut at = axis.dot(&center).clamp(-half, half);
+        let error = (ROTATION_ERROR + CULLING_SLACK) * (self.capsule_pose.translation().norm() + half);
+        for _ in 0..MAX_PLACES {
+            let point = place(at);
+            let found = projection.to(&point, self.tolerance * 0.25, &self.options.after(iterations), warm);
+            iterations += found.iterations;
+            if found.upper <= 0.0 {
+                return CapsuleDistance { upper: error - self.capsule.radius_m(), ..self.met(&point, iterations) };
+            }
+            if found.upper < best.upper + self.capsule.radius_m() {
+                let bracket = [0.0, found.upper + error];
+                best = self.apart(bracket, [found.witness, point], -found.normal, iterations);
+            }
+            let tangent = Tangent { at, lower: found.lower - error, slope: found.normal.dot(&axis) };
+            // One that does not separate is no bound.
+            if found.lower > 0.0 {
+                ends[usize::from(tangent.slope > 0.0)] = Some(tangent);
+            }
+            let (bound, next) = Tangent::least(&ends, half);
+            lower = bound.max(lower);
+            let narrow = best.upper + self.capsule.radius_m() - lower <= self.tolerance;
+            if narrow || next == at || self.options.exhausted(iterations) {
+                break;
+            }
+            at = next;
+        }
+        lower = lower.max(0.0) - self.capsule.radius_m() * (1.0 + f64::EPSILON);
+        CapsuleDistance { status: Status::of(best.upper - lower <= self.tolerance), lower, iterations, ..best }
+    }
+}
+
+/// A line below the distance along an axis.
+#[derive(Clone, Copy)]
+struct Tangent {
+    at: f64,
+    lower: f64,
+    slope: f64,
+}
+
+impl Tangent {
+    fn value(&self, at: f64) -> f64 {
+        self.lower + self.slope * (at - self.at)
+    }
+
+    /// The least value of a convex function above a line that falls and one that rises, or above
+    /// the one there is, between minus and plus `half`; and where that is.
+    fn least([falling, rising]: &[Option<Self>; 2], half: f64) -> (f64, f64) {
+        match (falling, rising) {
+            (Some(low), Some(high)) => {
+                let steep = high.slope - low.slope;
+                let crossing = (low.lower - high.lower + high.slope * high.at - low.slope * low.at) / steep;
+                let at = if steep > 0.0 { crossing.max(-half).min(half) } else { 0.5 * (low.at + high.at) };
+                (low.value(at).max(high.value(at)), at)
+            }
+            (Some(low), None) => (low.value(half), half),
+            (None, Some(high)) => (high.value(-half), -half),
+            (None, None) => (f64::NEG_INFINITY, 0.0),
+        }
+    }
+}
