@@ -12,7 +12,7 @@ use super::normalization::{Normalization, invert};
 use super::placement::Placement;
 use super::provenance::Provenance;
 use super::radial::{self, Volume};
-use super::support_bounds::{self, Extent, SupportProblem};
+use super::support_bounds::{self, Extent, SupportProblem, TangentBound};
 use super::support_heights::{SupportGuess, SupportHeights};
 use super::support_table::Outline;
 use crate::polynomial::NotContaining;
@@ -321,18 +321,43 @@ impl Body {
 
     /// How far the body reaches along the unit vector `n` of the body frame.
     pub fn support(&self, n: &Vector3<f64>) -> Support {
+        let bound = support_bounds::support(&self.support_problem(), n);
+        Support { point: bound.point, height_m: self.height_of(&bound) }
+    }
+
+    /// Proven upper bound of the height of the body along the unit vector `n` of the body frame
+    /// above its interior point, metres, from any point x0 of the body frame and multipliers λ_i >=
+    /// 0 of its constraints, metres: `n·(x - x0) <= Σ λ_i (1 - g_i(x0)) + |n - Σ λ_i ∇g_i(x0)| |x -
+    /// x0|`. It is close where the two are a support point and its multipliers, as an answer's
+    /// witness and active constraints are. Infinite where a multiplier is negative or of no
+    /// constraint.
+    pub fn tangent_height(
+        &self,
+        n: &Vector3<f64>,
+        point: &Vector3<f64>,
+        multipliers: impl IntoIterator<Item = (usize, f64)>,
+    ) -> f64 {
+        let bound = support_bounds::tangent(&self.support_problem(), n, point, multipliers.into_iter());
+        let height = self.height_of(&bound);
+        if height.is_finite() { height } else { f64::INFINITY }
+    }
+
+    fn support_problem(&self) -> SupportProblem<'_> {
         let interior_z = self.normalization.linear * (self.interior_point - self.normalization.center);
-        let problem = SupportProblem {
+        SupportProblem {
             constraints: &self.constraints,
             placement: &self.placement,
             inverse: &self.inverse,
             interior_z,
             anchor: &self.interior_point,
-        };
-        let bound = support_bounds::support(&problem, n);
+        }
+    }
+
+    /// A tangent bound over the ball around the body.
+    fn height_of(&self, bound: &TangentBound) -> f64 {
         let Ball { center, radius } = &self.circumscribed;
         let farthest = (bound.point - center).norm() + radius;
-        Support { point: bound.point, height_m: (bound.reach + bound.slope * farthest) * (1.0 + 1e-14) }
+        (bound.reach + bound.slope * farthest) * (1.0 + 1e-14)
     }
 
     /// Proven upper bound of the height of the body along n above its interior point, `max n·(x -

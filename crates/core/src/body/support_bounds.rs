@@ -91,25 +91,40 @@ pub(super) fn farthest_point(
 /// Support point of the body in the direction of the unit vector `n` of the body frame, with its
 /// tangent bound.
 pub(super) fn support(problem: &SupportProblem, n: &Vector3<f64>) -> TangentBound {
-    let SupportProblem { constraints, placement, inverse, interior_z, anchor } = *problem;
+    let SupportProblem { constraints, placement, inverse, interior_z, .. } = *problem;
     let in_z = inverse.transpose() * n;
     let length = in_z.norm();
     let (z, multipliers) = farthest_point(constraints, &(in_z / length), &interior_z);
     let point = inverse * z + placement.origin();
+    tangent(problem, n, &point, (0..).zip(multipliers.map(|multiplier| multiplier * length)).take(constraints.len()))
+}
+
+/// The half-space along the unit vector `n` of the body frame that a point, which may lie anywhere,
+/// and multipliers of constraints, metres, prove; those that are no numbers of at least 0 prove
+/// nothing.
+pub(super) fn tangent(
+    problem: &SupportProblem,
+    n: &Vector3<f64>,
+    point: &Vector3<f64>,
+    multipliers: impl Iterator<Item = (usize, f64)>,
+) -> TangentBound {
+    let SupportProblem { constraints, placement, anchor, .. } = *problem;
     let mut reach = n.dot(&(point - anchor)) + 8.0 * f64::EPSILON * (point.norm() + anchor.norm());
-    reach += 2.0 * placement.displacement(&point);
+    reach += 2.0 * placement.displacement(point);
     let mut residual = *n;
     let mut slope = 0.0;
-    for (constraint, multiplier) in constraints.iter().zip(multipliers) {
-        let lambda = multiplier * length;
-        let sample = placement.sample(constraint, &point);
+    for (index, lambda) in multipliers {
+        let Some(constraint) = constraints.get(index).filter(|_| lambda >= 0.0) else {
+            return TangentBound { point: *point, reach: f64::INFINITY, slope: f64::INFINITY };
+        };
+        let sample = placement.sample(constraint, point);
         reach += lambda * (1.0 - sample.value() + sample.nearby_value_error());
         reach += 1e-14 * lambda * (1.0 + sample.value().abs());
         residual -= sample.gradient() * lambda;
         slope += lambda * (sample.gradient_error() + 1e-14 * sample.gradient().norm());
     }
     slope += residual.norm() + 8.0 * f64::EPSILON;
-    TangentBound { point, reach: reach + reach.abs() * 1e-14, slope: slope * (1.0 + 1e-14) }
+    TangentBound { point: *point, reach: reach + reach.abs() * 1e-14, slope: slope * (1.0 + 1e-14) }
 }
 
 /// Proven extent of a body in its own frame, metres.

@@ -296,3 +296,29 @@ fn the_ball_of_the_bounds_is_little_larger_than_the_body() {
     let radius = Body::ball("ball", Vector3::zeros(), 2.0).unwrap().trust().radius;
     assert!((1.03..1.12).contains(&radius), "{radius}");
 }
+
+#[test]
+fn tangent_heights_are_bounds_from_any_point_and_close_at_support_points() {
+    let half = Vector3::new(0.3, 1.0, 0.6);
+    for (seed, degree) in [(1, 2), (2, 4), (3, 6), (4, 8)] {
+        let body = Body::superellipsoid("q", Vector3::new(0.5, -1.0, 2.0), half, degree).unwrap();
+        let mut seeded = Seeded(seed);
+        for case in 0..500 {
+            let n = seeded.unit();
+            let support = body.support(&n);
+            let reached = n.dot(&(support.point - body.interior_point()));
+            // The only constraint's gradient is along n there: λ = 1/|∇g|, by central differences.
+            let slope = (body.value(&(support.point + n * 1e-6)) - body.value(&(support.point - n * 1e-6))) / 2e-6;
+            let close = body.tangent_height(&n, &support.point, [(0, 1.0 / slope)]);
+            assert!(close >= reached && close <= reached + 1e-6, "degree {degree}, case {case}: {close} {reached}");
+            let anywhere = support.point + seeded.unit() * seeded.between(1e-9, 1.0);
+            let far = body.tangent_height(&n, &anywhere, [(0, seeded.between(1e-6, 10.0) / slope)]);
+            assert!(far >= reached, "degree {degree}, case {case}: {far} below {reached}");
+            for wrong in [[(0, -1.0)], [(0, f64::NAN)], [(1, 1.0)]] {
+                assert_eq!(body.tangent_height(&n, &support.point, wrong), f64::INFINITY);
+            }
+            let nowhere = Vector3::new(f64::NAN, 0.0, 0.0);
+            assert_eq!(body.tangent_height(&n, &nowhere, [(0, 1.0)]), f64::INFINITY);
+        }
+    }
+}
