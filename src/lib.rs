@@ -12,6 +12,7 @@ struct Readme;
 pub use sublevel_core::{body, branch_and_bound, measure, optimize, polynomial};
 #[cfg(feature = "fit")]
 pub use sublevel_fit as fit;
+pub use sublevel_robot as robot;
 pub use sublevel_scene as scene;
 
 pub mod cli;
