@@ -8,6 +8,7 @@ mod description;
 mod error;
 mod kinematics;
 mod mesh_path;
+pub mod motion;
 mod semantics;
 mod srdf;
 #[cfg(test)]

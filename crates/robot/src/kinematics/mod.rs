@@ -12,4 +12,5 @@ pub(crate) mod tests;
 mod tree;
 
 pub use configuration::ConfigurationError;
+pub(crate) use configuration::LIMIT_SLACK;
 pub use tree::{Kinematics, KinematicsError, Variable};

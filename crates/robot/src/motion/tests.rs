@@ -1,0 +1,395 @@
+//! Motions against dense samples, closed forms, and certificates that were changed.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use nalgebra::{Isometry3, Vector3};
+use sublevel_core::body::{Body, Compound, Shape};
+use sublevel_core::measure::{Capsule, HalfSpace, Options, Pose, WarmStart};
+use sublevel_testkit::Seeded;
+use sublevel_testkit::random::at;
+
+use super::placing::Placing;
+use super::solve::solve;
+use super::*;
+use crate::description::{Description, Joint, JointKind, Limits, Link};
+use crate::kinematics::Kinematics;
+use crate::kinematics::tests::{configuration, tree};
+
+fn solid(body: Body) -> MotionShape {
+    MotionShape::Solid(Arc::new(Shape::Body(Box::new(body))))
+}
+
+fn ball(radius: f64) -> MotionShape {
+    solid(Body::ball("ball", Vector3::zeros(), radius).expect("a ball"))
+}
+
+/// An arm of two links of length 1 m in the xy plane that turns about z, on a slide along z, with a
+/// ball of radius 0.1 m at its end.
+fn arm() -> Arc<Kinematics> {
+    let joint = |name: &str, kind, child: usize, x: f64| Joint {
+        name: name.into(),
+        kind,
+        parent: child - 1,
+        child,
+        origin: Isometry3::translation(x, 0.0, 0.0),
+        axis: Vector3::z_axis(),
+        limits: (kind != JointKind::Continuous).then_some(Limits { lower: -4.0, upper: 4.0 }),
+        mimic: None,
+    };
+    let links = ["base", "slide", "upper", "lower"].map(|name| Link { name: name.into(), collisions: Vec::new() });
+    let joints = vec![
+        joint("slide", JointKind::Prismatic, 1, 0.0),
+        joint("shoulder", JointKind::Revolute, 2, 0.0),
+        joint("elbow", JointKind::Continuous, 3, 1.0),
+    ];
+    Arc::new(Kinematics::new(&Description { name: "arm".into(), links: links.into(), joints }).expect("a tree"))
+}
+
+fn hand(shape: MotionShape) -> Vec<MotionBody> {
+    vec![MotionBody { name: "hand".into(), link: 3, place: at(1.0, 0.0, 0.0), shape }]
+}
+
+fn still(name: &str, shape: MotionShape, pose: Pose) -> MotionObstacle {
+    MotionObstacle { name: name.into(), placed: PlacedObstacle::Still(shape, pose) }
+}
+
+fn problem(bodies: Vec<MotionBody>, obstacles: Vec<MotionObstacle>, margin_m: f64) -> MotionProblem {
+    MotionProblem::new(arm(), &Pose::identity(), bodies, obstacles, margin_m, |_, _| Some(0.0)).expect("a problem")
+}
+
+fn edge(problem: &MotionProblem, from: &[f64], to: &[f64]) -> Path {
+    Path::waypoints(problem.kinematics(), [from, to].concat()).expect("a path")
+}
+
+fn prove(problem: &MotionProblem, path: &Path, options: &MotionOptions<'_>) -> MotionAnswer {
+    problem.prove(path, options, &mut MotionWorkspace::default())
+}
+
+const FIRST: MotionOptions<'static> = MotionOptions {
+    resolution_m: 1e-6,
+    max_configurations: 100_000,
+    first_contact: true,
+    clearance_accuracy_m: None,
+    certificate: false,
+    stop: None,
+};
+
+#[test]
+fn first_contacts_of_a_turning_ball_are_where_they_must_be() {
+    // The hand is at radius 2 on a circle; a ball of radius 0.2 stands on it at 90 degrees. Their
+    // centres are 0.3 apart where the chord is, 2 * 2 sin(angle / 2) = 0.3.
+    let apart = 2.0 * (0.3_f64 / 4.0).asin();
+    let obstacles = || vec![still("post", ball(0.2), at(0.0, 2.0, 0.0))];
+    for (margin, more) in
+        [(0.0, 0.0), (0.05, 2.0 * (0.35_f64 / 4.0).asin() - apart), (-0.05, 2.0 * (0.25_f64 / 4.0).asin() - apart)]
+    {
+        let problem = problem(hand(ball(0.1)), obstacles(), margin);
+        let path = edge(&problem, &[0.0, 0.0, 0.0], &[0.0, 3.0, 0.0]);
+        let expected = (std::f64::consts::FRAC_PI_2 - apart - more) / 3.0;
+        let found = prove(&problem, &path, &FIRST);
+        assert_eq!(found.verdict, MotionVerdict::Contact, "margin {margin}");
+        let contact = found.contact.expect("a contact");
+        assert!(
+            found.alpha <= expected + 1e-9 && expected <= contact.s + 1e-9,
+            "{} {expected} {}",
+            found.alpha,
+            contact.s
+        );
+        assert!(contact.s - found.alpha < 1e-5, "margin {margin}: {} {}", found.alpha, contact.s);
+        assert_eq!(contact.items, [MotionItem::Body(0), MotionItem::Obstacle(0)]);
+        let quick = prove(&problem, &path, &MotionOptions { first_contact: false, ..FIRST });
+        assert_eq!(quick.verdict, MotionVerdict::Contact);
+        assert!(quick.configurations < found.configurations && quick.alpha <= expected + 1e-9);
+        // Until before the first contact it is free, by as much as the chord says.
+        let path = edge(&problem, &[0.0, 0.0, 0.0], &[0.0, 3.0 * (expected - 1e-3), 0.0]);
+        let precise = MotionOptions { clearance_accuracy_m: Some(1e-5), ..FIRST };
+        let free = prove(&problem, &path, &precise);
+        assert_eq!((free.verdict, free.alpha), (MotionVerdict::Free, 1.0), "margin {margin}");
+        let least = 4.0 * (0.5 * (apart + more + 3e-3)).sin() - 0.3;
+        assert!(
+            free.clearance_lower_m <= least && free.clearance_lower_m > least - 2e-5,
+            "{} {least}",
+            free.clearance_lower_m
+        );
+        assert!(free.clearance_lower_m >= margin);
+    }
+}
+
+#[test]
+fn slides_half_spaces_capsules_and_moving_obstacles() {
+    // Down along z onto the ground at -1: the capsule lies along z, 0.3 and 0.1 below its centre.
+    let capsule = MotionShape::Capsule(Capsule::new(0.1, 0.3).expect("a capsule"));
+    let ground = HalfSpace::new(Vector3::z(), -1.0).expect("a half-space");
+    let ground = MotionObstacle { name: "ground".into(), placed: PlacedObstacle::HalfSpace(ground, 0.0) };
+    let down = problem(hand(capsule.clone()), vec![ground], 0.0);
+    let path = edge(&down, &[0.0, 0.0, 0.0], &[-1.2, 0.0, 0.0]);
+    let found = prove(&down, &path, &FIRST);
+    let contact = found.contact.expect("a contact");
+    assert!(found.alpha <= 0.5 && contact.s >= 0.5 && contact.s - found.alpha < 1e-5, "{} {}", found.alpha, contact.s);
+    assert!((contact.normal.expect("a normal") - Vector3::z()).norm() < 1e-12);
+    // A wall comes towards the robot, which stands still: it has 1.7 m to go and does 2 m.
+    let wall = Body::cuboid("wall", Vector3::new(0.1, 3.0, 3.0)).expect("a box");
+    let placed = PlacedObstacle::Moving(solid(wall), at(4.0, 0.0, 0.0), at(2.0, 0.0, 0.0));
+    let coming = vec![MotionObstacle { name: "wall".into(), placed }];
+    let stands = problem(hand(capsule), coming, 0.0);
+    let path = edge(&stands, &[0.0, 0.0, 0.0], &[0.0, 0.0, 0.0]);
+    let found = prove(&stands, &path, &FIRST);
+    let contact = found.contact.expect("a contact");
+    let expected = (4.0 - 0.1 - 2.1) / 2.0;
+    assert!(found.alpha <= expected && contact.s >= expected && contact.s - found.alpha < 1e-5);
+    // Two balls on one link never move against each other.
+    let two = |x: f64| MotionBody { name: format!("{x}").into(), link: 2, place: at(x, 0.0, 0.0), shape: ball(0.1) };
+    let rigid = problem(vec![two(0.0), two(0.5)], Vec::new(), 0.0);
+    let precise = MotionOptions { clearance_accuracy_m: Some(1e-9), ..FIRST };
+    let free = prove(&rigid, &edge(&rigid, &[0.0; 3], &[1.0, 3.0, 2.0]), &precise);
+    assert_eq!((free.verdict, free.configurations), (MotionVerdict::Free, 1));
+    assert!((free.clearance_lower_m - 0.3).abs() < 1e-9);
+    let rigid = problem(vec![two(0.0), two(0.15)], Vec::new(), 0.0);
+    let contact = prove(&rigid, &edge(&rigid, &[0.0; 3], &[1.0, 3.0, 2.0]), &FIRST);
+    assert_eq!((contact.verdict, contact.alpha), (MotionVerdict::Contact, 0.0));
+}
+
+#[test]
+fn bezier_segments_and_waypoints() {
+    let post = vec![still("post", ball(0.2), at(0.0, 2.0, 0.0))];
+    let problem = problem(hand(ball(0.1)), post, 0.0);
+    // Lifts over the post while it turns.
+    let control = vec![0.0, 0.0, 0.0, 1.5, 1.0, 0.0, 1.5, 2.0, 0.0, 0.0, 3.0, 0.0];
+    let path = Path::bezier(problem.kinematics(), control.clone()).expect("a path");
+    let found = prove(&problem, &path, &MotionOptions { certificate: true, ..FIRST });
+    assert_eq!(found.verdict, MotionVerdict::Free);
+    found.certificate.expect("a certificate").verify().expect("a proof");
+    let straight = Path::waypoints(problem.kinematics(), control).expect("a path");
+    assert_eq!(straight.segments(), 3);
+    assert_eq!(prove(&problem, &straight, &FIRST).verdict, MotionVerdict::Free);
+    let through = Path::waypoints(problem.kinematics(), vec![0.0, 0.0, 0.0, 0.0, 1.2, 0.0, 0.0, 3.0, 0.0]);
+    let found = prove(&problem, &through.expect("a path"), &FIRST);
+    assert!(found.verdict == MotionVerdict::Contact && found.alpha > 0.5 && found.alpha < 0.75, "{}", found.alpha);
+}
+
+/// A random robot with bodies of all kinds among obstacles of all kinds.
+fn random_problem(seeded: &mut Seeded, margin_m: f64) -> MotionProblem {
+    let kinematics = Arc::new(Kinematics::new(&tree(seeded, 6)).expect("a tree"));
+    let size = |seeded: &mut Seeded| Vector3::from_fn(|_, _| seeded.between(0.05, 0.4));
+    let shape = |seeded: &mut Seeded| match seeded.index(5) {
+        0 => MotionShape::Capsule(Capsule::new(0.1, 0.2).expect("a capsule")),
+        1 => solid(Body::cuboid("box", size(seeded)).expect("a box")),
+        2 => solid(Body::cylinder("cylinder", 0.1, 0.3).expect("a cylinder")),
+        3 => {
+            let parts = [-0.2, 0.2].map(|x| Body::superellipsoid("q", Vector3::new(x, 0.0, 0.0), size(seeded), 4));
+            let parts = parts.into_iter().map(|part| part.expect("a body")).collect();
+            let compound = Compound::new("two", parts).expect("a compound");
+            MotionShape::Solid(Arc::new(Shape::Compound(Box::new(compound))))
+        }
+        _ => solid(Body::superellipsoid("q6", Vector3::zeros(), size(seeded), 6).expect("a body")),
+    };
+    let bodies = (1..6).map(|link| MotionBody {
+        name: format!("body{link}").into(),
+        link,
+        place: seeded.pose(0.2),
+        shape: shape(seeded),
+    });
+    let bodies = bodies.collect();
+    let mut obstacles: Vec<_> =
+        (0..4).map(|k| still(&format!("obstacle{k}"), shape(seeded), seeded.pose(2.0))).collect();
+    let (from, to) = (seeded.pose(4.0), seeded.pose(4.0));
+    let moving = PlacedObstacle::Moving(shape(seeded), from, to);
+    obstacles.push(MotionObstacle { name: "moving".into(), placed: moving });
+    let ground = HalfSpace::new(seeded.unit(), -5.0).expect("a half-space");
+    obstacles.push(MotionObstacle { name: "ground".into(), placed: PlacedObstacle::HalfSpace(ground, 0.0) });
+    MotionProblem::new(kinematics, &seeded.pose(1.0), bodies, obstacles, margin_m, |a, b| match (a, b) {
+        (MotionItem::Body(a), MotionItem::Body(b)) => (a + 1 < b).then_some(0.01),
+        _ => Some(0.0),
+    })
+    .expect("a problem")
+}
+
+/// A random motion of it, of a size in the values.
+fn random_path(seeded: &mut Seeded, problem: &MotionProblem, size: f64) -> Path {
+    let kinematics = problem.kinematics();
+    let from = configuration(seeded, kinematics);
+    let mut to: Vec<f64> = from.iter().map(|value| value + size * seeded.signed()).collect();
+    for variable in kinematics.variables().iter().filter(|variable| variable.limits.is_some()) {
+        to[variable.first] = to[variable.first].clamp(-2.0, 2.0);
+    }
+    for variable in kinematics.variables().iter().filter(|variable| variable.kind == JointKind::Floating) {
+        let own = &mut to[variable.first + 3..variable.first + 7];
+        let length = own.iter().map(|x| x * x).sum::<f64>().sqrt();
+        own.iter_mut().for_each(|x| *x /= length);
+    }
+    edge(problem, &from, &to)
+}
+
+/// Least signed distance less padding over samples of a path, by the solver alone; of overlaps
+/// that count only as such 0.
+fn sampled(problem: &MotionProblem, path: &Path, from: f64, to: f64, samples: u32) -> f64 {
+    let (mut placing, mut least) = (Placing::default(), f64::INFINITY);
+    for sample in 0..=samples {
+        let s = from + (to - from) * f64::from(sample) / f64::from(samples);
+        // A path that stands still at s, but for what moves by itself.
+        let values = path.at(problem.kinematics(), s);
+        let here = edge(problem, &values, &values);
+        placing.set_at(problem, &here, s);
+        for pair in &problem.pairs {
+            let placed = placing.pair(problem, pair).expect("poses");
+            let [a, b] = pair.pieces.map(|piece| problem.piece(piece).1);
+            let (a, b) = ((&a, &placed[0].pose), (&b, &placed[1].pose));
+            let found = solve(a, b, pair.threshold_m < 0.0, &Options::default(), &mut WarmStart::default());
+            least = least.min(found.upper - pair.padding_m);
+        }
+    }
+    least
+}
+
+#[test]
+fn what_is_proven_free_is_free_at_samples() {
+    let mut verdicts = [0; 3];
+    for seed in 0..40 {
+        let mut seeded = Seeded(seed);
+        let margin = [0.0, 0.02, -0.02][seeded.index(3)];
+        let problem = random_problem(&mut seeded, margin);
+        let size = seeded.between(0.01, 2.0);
+        let path = random_path(&mut seeded, &problem, size);
+        let options = MotionOptions { first_contact: seed % 2 == 0, certificate: true, ..MotionOptions::default() };
+        let found = prove(&problem, &path, &options);
+        verdicts[found.verdict as usize] += 1;
+        let (end, name) = (found.alpha, format!("seed {seed}, {:?}", found.verdict));
+        if end > 0.0 {
+            let least = sampled(&problem, &path, 0.0, end, 30);
+            assert!(least >= margin - 1e-12, "{name}: {least} up to {end}");
+            assert!(
+                found.verdict != MotionVerdict::Free || least >= found.clearance_lower_m - 1e-12,
+                "{name}: {least}"
+            );
+        }
+        if let (MotionVerdict::Contact, Some(contact)) = (found.verdict, &found.contact) {
+            let there = sampled(&problem, &path, contact.s, contact.s, 1);
+            assert!(there < margin + 1e-9 && contact.s >= end, "{name}: {there}");
+        }
+        // Warm starts change nothing that is proven.
+        let mut workspace = MotionWorkspace::default();
+        problem.prove(&path, &options, &mut workspace);
+        assert_eq!(problem.prove(&path, &options, &mut workspace).verdict, found.verdict, "{name}");
+        assert_eq!(found.certificate.is_some(), found.verdict == MotionVerdict::Free, "{name}");
+        if let Some(certificate) = found.certificate {
+            let text = certificate.to_json();
+            let read = Certificate::from_json(&text).expect("a certificate");
+            let verified = read.verify().unwrap_or_else(|error| panic!("{name}: {error}"));
+            assert_eq!(read.verify_against(&problem), Ok(verified), "{name}");
+            assert!(verified.clearance_lower_m > margin, "{name}");
+        }
+    }
+    assert!(verdicts[0] > 10 && verdicts[1] > 5 && verdicts[2] < 3, "{verdicts:?}");
+}
+
+#[test]
+fn searches_end_when_they_have_to() {
+    let problem = problem(hand(ball(0.1)), vec![still("post", ball(0.2), at(0.0, 2.31, 0.0))], 0.0);
+    let path = edge(&problem, &[0.0, 0.0, 0.0], &[0.0, 3.0, 0.0]);
+    let all = prove(&problem, &path, &FIRST);
+    assert!(all.verdict == MotionVerdict::Free && all.configurations > 5 && !all.ended_early);
+    for most in 0..all.configurations {
+        let found = prove(&problem, &path, &MotionOptions { max_configurations: most, ..FIRST });
+        assert!(found.ended_early && found.verdict == MotionVerdict::Undecided && found.alpha < 1.0, "{most}");
+        assert_eq!(found.configurations, most);
+    }
+    let stop = AtomicBool::new(true);
+    let found = prove(&problem, &path, &MotionOptions { stop: Some(&stop), ..FIRST });
+    assert!(found.ended_early && found.alpha == 0.0 && found.configurations == 0);
+    // It passes at 1 cm; what moves less than a metre is not looked at again.
+    let found = prove(&problem, &path, &MotionOptions { resolution_m: 1.0, ..FIRST });
+    assert!(found.verdict == MotionVerdict::Undecided && !found.ended_early, "{found:?}");
+    assert!(found.contact.is_some_and(|open| open.lower_m > 0.0 && open.s > 0.2 && open.s < 0.8));
+}
+
+#[test]
+fn a_changed_certificate_is_refused_or_what_it_claims_is_true() {
+    let cylinder = solid(Body::cylinder("cylinder", 0.2, 0.5).expect("a cylinder"));
+    let egg = solid(Body::superellipsoid("egg", Vector3::zeros(), Vector3::new(0.1, 0.12, 0.08), 4).expect("a body"));
+    let problem = problem(hand(egg), vec![still("post", cylinder, at(0.0, 2.35, 0.0))], 0.0);
+    let path = edge(&problem, &[0.0, 0.0, 0.0], &[0.0, 3.0, 0.0]);
+    let found = prove(&problem, &path, &MotionOptions { certificate: true, ..FIRST });
+    let certificate = found.certificate.expect("a certificate");
+    let text = certificate.to_json();
+    assert!(certificate.verify().is_ok());
+    // Cut off, or a byte changed anywhere: the digest does not fit, or it is no JSON.
+    assert!(Certificate::from_json(&text[..text.len() - 1]).is_err());
+    let mut changed_bytes = 0;
+    for place in (0..text.len()).step_by(7) {
+        let mut bytes = text.clone().into_bytes();
+        bytes[place] = if bytes[place] == b'1' { b'2' } else { b'1' };
+        if let Ok(text) = String::from_utf8(bytes)
+            && let Ok(read) = Certificate::from_json(&text)
+        {
+            panic!("byte {place} was changed and read: {}", read.digest);
+        }
+        changed_bytes += 1;
+    }
+    assert!(changed_bytes > 500);
+    // Whoever computes the digest again changes what is claimed; each field in turn.
+    let value: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let (mut refused, mut kept) = (0, 0);
+    for (index, (place, number)) in numbers(&value).into_iter().enumerate() {
+        // Each number once, in turn a little changed, turned round, cleared and made huge.
+        for replaced in [[number + 0.25, -number, 0.0, 1e9][index % 4]] {
+            let mut changed = value.clone();
+            *changed.pointer_mut(&place).expect("a place") =
+                if number.fract() == 0.0 && replaced.fract() == 0.0 && replaced >= 0.0 {
+                    serde_json::json!(replaced as u64)
+                } else {
+                    serde_json::json!(replaced)
+                };
+            let Ok(mut read) = serde_json::from_value::<Certificate>(changed) else { continue };
+            read.digest = read.computed_digest();
+            match read.verify() {
+                Err(_) => refused += 1,
+                Ok(verified) => {
+                    // True of what it says now.
+                    let problem = read.claim.problem(|_| None, usize::MAX).expect("a problem");
+                    let least = sampled(&problem, &read.path, 0.0, 1.0, 20);
+                    assert!(
+                        least > read.margin_m() - 1e-12 && least >= verified.clearance_lower_m - 1e-12,
+                        "{place}: {least}"
+                    );
+                    kept += 1;
+                }
+            }
+        }
+    }
+    assert!(refused > 50 && kept > 5, "{refused} refused, {kept} kept");
+    // Another scene.
+    let mut other = problem.clone();
+    other.margin_m = 0.001;
+    other.claim = Default::default();
+    assert_eq!(certificate.verify_against(&other), Err(CertificateError::Other("margin or padding")));
+    let moved = vec![still("post", ball(0.1), at(0.0, 2.35, 0.0))];
+    let other = self::problem(hand(ball(0.1)), moved, 0.0);
+    assert_eq!(certificate.verify_against(&other), Err(CertificateError::Other("set of bodies")));
+    // A record less.
+    let mut less = (*certificate).clone();
+    less.records.pop();
+    less.digest = less.computed_digest();
+    assert!(matches!(less.verify(), Err(CertificateError::Gap { segment: 0, .. })));
+}
+
+/// Places of numbers in a document, without those of the proofs of bodies, which take long to check
+/// again and have tests of their own.
+fn numbers(value: &serde_json::Value) -> Vec<(String, f64)> {
+    let mut open = vec![(String::new(), value)];
+    let mut found = Vec::new();
+    while let Some((place, value)) = open.pop() {
+        match value {
+            serde_json::Value::Number(number) => found.extend(number.as_f64().map(|number| (place, number))),
+            serde_json::Value::Array(items) => {
+                open.extend(items.iter().enumerate().map(|(index, item)| (format!("{place}/{index}"), item)));
+            }
+            serde_json::Value::Object(fields) => {
+                let fields = fields.iter().filter(|(name, _)| *name != "solids");
+                open.extend(fields.map(|(name, field)| (format!("{place}/{name}"), field)));
+            }
+            _ => {}
+        }
+    }
+    found
+}

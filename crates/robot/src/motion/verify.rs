@@ -1,0 +1,125 @@
+//! Checks certificates: forward kinematics, support heights, bounds of motion, and that the
+//! intervals cover the path. Nothing is searched for and nothing is solved.
+
+use std::sync::Arc;
+
+use sublevel_core::body::Shape;
+
+use super::certificate::{Certificate, CertificateError, Record};
+use super::interval::Interval;
+use super::placing::Placing;
+use super::problem::MotionProblem;
+
+/// What a certificate proves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VerifiedMotion {
+    /// All pairs keep at least this signed distance less their padding, metres; infinite if there
+    /// are no pairs.
+    pub clearance_lower_m: f64,
+    /// Pairs of convex pieces.
+    pub pairs: usize,
+    /// Configurations at which they were placed.
+    pub configurations: usize,
+}
+
+impl Certificate {
+    /// Checks everything, the proofs of the bodies included.
+    ///
+    /// # Errors
+    /// The first part that is not usable, record that proves nothing, or pair that is not proven
+    /// over all of the path.
+    pub fn verify(&self) -> Result<VerifiedMotion, CertificateError> {
+        self.verify_with(|_| None)
+    }
+
+    /// The same; bodies that `known` has by their ids, with the same numbers, are not proven again.
+    ///
+    /// # Errors
+    /// As [`Certificate::verify`].
+    pub fn verify_with(&self, known: impl Fn(&str) -> Option<Arc<Shape>>) -> Result<VerifiedMotion, CertificateError> {
+        // Every pair that counts needs a record.
+        let problem = self.claim.problem(known, self.records.len())?;
+        self.verify_as(&problem)
+    }
+
+    /// Checks that the certificate is about this robot among these bodies and obstacles, as they
+    /// are, and that it proves the motion free. Takes no time to prove bodies.
+    ///
+    /// # Errors
+    /// What differs, and as [`Certificate::verify`].
+    pub fn verify_against(&self, problem: &MotionProblem) -> Result<VerifiedMotion, CertificateError> {
+        let is_same = Arc::ptr_eq(&self.claim, problem.claim());
+        if let Some(what) = self.claim.difference(problem.claim()).filter(|_| !is_same) {
+            return Err(CertificateError::Other(what));
+        }
+        self.verify_as(problem)
+    }
+
+    fn verify_as(&self, problem: &MotionProblem) -> Result<VerifiedMotion, CertificateError> {
+        if !self.path.is_usable(&problem.kinematics) {
+            let reason = "its configurations are not of this robot, or outside of its limits";
+            return Err(CertificateError::Part { part: "path".to_owned(), reason: reason.to_owned() });
+        }
+        let mut order: Vec<usize> = (0..self.records.len()).collect();
+        order.sort_by_key(|&index| self.records[index].interval);
+        let (mut placing, mut at, mut configurations) = (Placing::default(), None, 0);
+        let mut clearance_lower_m = f64::INFINITY;
+        for index in order {
+            let record = &self.records[index];
+            let pair =
+                problem.pairs.get(record.pair as usize).filter(|_| record.interval.is_usable(self.path.segments()));
+            let Some(pair) = pair else {
+                let reason = "there is no such pair or interval".to_owned();
+                return Err(CertificateError::Part { part: format!("records[{index}]"), reason });
+            };
+            if at != Some(record.interval) {
+                placing.set(problem, &self.path, &record.interval);
+                at = Some(record.interval);
+                configurations += 1;
+            }
+            let lower_m = record.lower_m(problem, &mut placing);
+            if !(lower_m > pair.threshold_m) {
+                return Err(CertificateError::Record { record: index, lower_m, threshold_m: pair.threshold_m });
+            }
+            clearance_lower_m = clearance_lower_m.min(lower_m - pair.padding_m);
+        }
+        self.check_cover(problem)?;
+        Ok(VerifiedMotion { clearance_lower_m, pairs: problem.pairs.len(), configurations })
+    }
+
+    /// Every pair has intervals that cover all segments.
+    fn check_cover(&self, problem: &MotionProblem) -> Result<(), CertificateError> {
+        let mut records: Vec<&Record> = self.records.iter().collect();
+        records.sort_by(|a, b| {
+            (a.pair, a.interval.segment)
+                .cmp(&(b.pair, b.interval.segment))
+                .then_with(|| a.interval.start().total_cmp(&b.interval.start()))
+        });
+        let mut rest = records.as_slice();
+        for (index, pair) in (0..).zip(&problem.pairs) {
+            for segment in 0..self.path.segments() {
+                let is_here = |record: &&Record| record.pair == index && record.interval.segment as usize == segment;
+                let count = rest.iter().take_while(|record| is_here(record)).count();
+                let (here, after) = rest.split_at(count);
+                rest = after;
+                if !covers(here.iter().map(|record| record.interval)) {
+                    let [a, b] = problem.items(pair).map(|item| problem.name(item).to_string());
+                    return Err(CertificateError::Gap { a, b, segment });
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether intervals, in the order of their starts, cover [0, 1] of their segment.
+fn covers(intervals: impl Iterator<Item = Interval>) -> bool {
+    let mut end = 0.0;
+    for interval in intervals {
+        if interval.start() > end {
+            return false;
+        }
+        end = interval.end().max(end);
+    }
+    end >= 1.0
+}
