@@ -8,6 +8,7 @@ use sublevel_core::measure::PoseError;
 
 use super::structure::MAX_HOLDERS;
 use super::{MAX_NAME_BYTES, MAX_PADDING_M, NameError};
+use crate::robot::JointsError;
 
 /// The lists of an [`Update`](super::Update).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,6 +33,14 @@ pub enum List {
     Attach,
     /// Objects not to be held.
     Detach,
+    /// Robots to place or replace.
+    Robots,
+    /// Joint values of robots.
+    Joints,
+    /// Base poses of robots.
+    Bases,
+    /// Robots to remove.
+    RobotRemovals,
 }
 
 /// An entry of an [`Update`](super::Update): which list, and the position in it from 0.
@@ -146,6 +155,62 @@ pub enum SceneError {
         /// What it holds.
         held: Arc<str>,
     },
+    /// The update names a robot that the scene does not have.
+    #[error("no robot \"{name}\" in the scene; place it first")]
+    NoRobot {
+        /// Where.
+        at: Entry,
+        /// The robot.
+        name: Arc<str>,
+    },
+    /// Two entries change one robot, so their order would matter.
+    #[error("robot \"{name}\" is named twice in one update; name it once")]
+    RobotTwice {
+        /// The second entry.
+        at: Entry,
+        /// The robot.
+        name: Arc<str>,
+    },
+    /// The object of a link cannot be changed by itself.
+    #[error(
+        "object \"{name}\" is a link of robot \"{robot}\"; set the joints or the base of the robot, or remove the robot"
+    )]
+    OfRobot {
+        /// Where.
+        at: Entry,
+        /// The object.
+        name: Arc<str>,
+        /// The robot.
+        robot: Arc<str>,
+    },
+    /// The object of a link would have the name of another object.
+    #[error("robot \"{robot}\" has a link for which the name \"{name}\" is taken; rename that object or the robot")]
+    NameTaken {
+        /// Where.
+        at: Entry,
+        /// Name of the object.
+        name: Arc<str>,
+        /// The robot.
+        robot: Arc<str>,
+    },
+    /// The object of a link would have a name that cannot be stored.
+    #[error("object name \"{name}\" {error}")]
+    LinkName {
+        /// Where.
+        at: Entry,
+        /// Name of the object.
+        name: Arc<str>,
+        /// The rule it breaks.
+        error: NameError,
+    },
+    /// Values of joints that cannot be taken.
+    #[error("{error}")]
+    Joints {
+        /// Where.
+        at: Entry,
+        /// The reason.
+        error: JointsError,
+    },
     /// The scene would be too large.
     #[error("the scene would hold {count} {what}, at most {limit} fit; split it into several scenes")]
     Full {
@@ -162,4 +227,9 @@ impl fmt::Display for Entry {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:?}[{}]", self.list, self.index)
     }
+}
+
+/// Items of a list with their entries.
+pub(crate) fn entries<T>(list: List, items: impl IntoIterator<Item = T>) -> impl Iterator<Item = (Entry, T)> {
+    items.into_iter().enumerate().map(move |(index, item)| (Entry { list, index }, item))
 }

@@ -16,6 +16,7 @@ mod object;
 mod pair_cache;
 mod poses;
 pub mod query;
+mod robot;
 mod rules;
 mod scene;
 mod structure;
@@ -24,10 +25,14 @@ mod update;
 pub use crew::{Crew, Panicked, Question, Stop};
 pub use error::{Entry, List, SceneError};
 pub use geometry::{Geometry, GeometryFileError, Ladder, LadderError, MAX_RUNGS, NamedCapsule, NamedHalfSpace};
-pub use limits::{MAX_NAME_BYTES, MAX_OBJECTS, MAX_PADDING_M, MAX_PAIR_RULES};
+pub use limits::{MAX_NAME_BYTES, MAX_OBJECTS, MAX_PADDING_M, MAX_PAIR_RULES, MAX_ROBOTS};
 pub use name::{NameError, check_name};
-pub use object::{Attachment, Object, Slot, Subject};
+pub use object::{Attachment, LinkOf, Object, Slot, Subject};
 pub use pair_cache::WarmStartUse;
+pub use robot::{
+    JointsError, NamedJointValues, ParseRobotIdError, PlaceRobot, PrimitiveError, Robot, RobotError, RobotId,
+    RobotInstance, RobotLink, primitive_bodies,
+};
 pub use rules::{Rules, SubjectPair};
 pub use scene::Scene;
 pub use update::{Attach, Placement, Update};

@@ -6,6 +6,9 @@ pub const MAX_NAME_BYTES: usize = 128;
 /// Most objects in one scene.
 pub const MAX_OBJECTS: usize = 1 << 17;
 
+/// Most robots in one scene.
+pub const MAX_ROBOTS: usize = 1 << 12;
+
 /// Most allowed pairs, and most pairs with a padding, in one scene.
 pub const MAX_PAIR_RULES: usize = 1 << 16;
 

@@ -24,6 +24,8 @@ pub struct Object {
     pub padding_m: Option<f64>,
     /// What holds it, if anything does.
     pub attachment: Option<Attachment>,
+    /// Of which link of which robot it is the geometry, if of any.
+    pub link: Option<LinkOf>,
     /// The box around an sos-body: what culling and rays take of it.
     pub(crate) enclosure: Option<Arc<Shape>>,
 }
@@ -37,6 +39,15 @@ pub struct Attachment {
     pub pose: Pose,
     /// What it may touch besides its holder.
     pub touch: Vec<Subject>,
+}
+
+/// The link that an object is the geometry of.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LinkOf {
+    /// Name of the robot in the scene.
+    pub robot: Arc<str>,
+    /// Position of the link in [`Kinematics::links`](sublevel_robot::Kinematics::links).
+    pub link: usize,
 }
 
 /// An object or a group of objects, by name.
@@ -70,7 +81,7 @@ impl Object {
             }
             _ => None,
         };
-        Self { name, geometry, group, padding_m, attachment, enclosure }
+        Self { name, geometry, group, padding_m, attachment, link: None, enclosure }
     }
 
     /// The solids, coarsest first; the box around an sos-body; none for capsules and half-spaces.

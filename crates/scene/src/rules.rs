@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
 
 use super::object::{Object, Slot, Subject};
+use crate::robot::LinkTable;
 
 /// An unordered pair of subjects, the smaller first.
 pub type SubjectPair = (Subject, Subject);
@@ -43,6 +44,8 @@ pub(crate) struct RuleTable {
     sides: Vec<(Key, f64)>,
     allowed: HashSet<(Key, Key)>,
     pairs: HashMap<(Key, Key), f64>,
+    /// Links of robots that may touch each other.
+    links: LinkTable,
     /// No padding of a pair exceeds it, metres.
     largest_padding_m: f64,
     padded: bool,
@@ -56,6 +59,7 @@ impl RuleTable {
         rules: &Rules,
         slots: usize,
         objects: impl Iterator<Item = (Slot, &'a Object)> + Clone,
+        links: LinkTable,
         slot_of: impl Fn(&str) -> Option<Slot>,
     ) -> Self {
         let mut groups: HashMap<Arc<str>, Key> = HashMap::new();
@@ -101,7 +105,7 @@ impl RuleTable {
         }
         let largest_padding_m = pairs.values().copied().fold(largest[0] + largest[1], f64::max);
         let padded = !pairs.is_empty() || sides.iter().any(|(_, padding)| *padding != 0.0);
-        Self { sides, allowed, pairs, largest_padding_m, padded }
+        Self { sides, allowed, pairs, links, largest_padding_m, padded }
     }
 
     /// Upper bound of the paddings of all pairs, metres, at least 0.
@@ -111,7 +115,8 @@ impl RuleTable {
 
     /// Whether two objects may touch.
     pub(crate) fn is_allowed(&self, a: Slot, b: Slot) -> bool {
-        !self.allowed.is_empty() && self.keys(a, b).any(|key| self.allowed.contains(&key))
+        let is_set = || self.keys(a, b).any(|key| self.allowed.contains(&key));
+        !self.allowed.is_empty() && is_set() || self.links.is_allowed(a, b)
     }
 
     /// What is added to the margin of a pair, metres: what is set for the pair, objects before

@@ -1,5 +1,6 @@
 //! One scene at one revision.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use sublevel_core::measure::Pose;
@@ -11,6 +12,7 @@ use super::poses::Poses;
 use super::rules::{Rules, SubjectPair};
 use super::structure::Structure;
 use super::{NameError, check_name};
+use crate::robot::{RobotInstance, Stance};
 
 /// An immutable snapshot of a scene. Cloning takes constant time and shares everything; so does
 /// [`Scene::fork`].
@@ -22,6 +24,8 @@ pub struct Scene {
     structure_revision: u64,
     pub(crate) structure: Arc<Structure>,
     poses: Poses,
+    /// Bases and joint values of robots, by name.
+    stances: Arc<BTreeMap<Arc<str>, Arc<Stance>>>,
     broad_phase: Arc<BroadPhase>,
     /// Warm starts, shared by all snapshots and forks.
     pub(crate) cache: Arc<PairCache>,
@@ -40,6 +44,7 @@ impl Scene {
             structure_revision: revision,
             structure: Arc::default(),
             poses: Poses::default(),
+            stances: Arc::default(),
             broad_phase: Arc::default(),
             cache: Arc::default(),
         })
@@ -123,6 +128,25 @@ impl Scene {
         slots.filter(move |&slot| self.poses.stamp(slot) > revision)
     }
 
+    /// Number of robots.
+    pub fn robot_count(&self) -> usize {
+        self.structure.robots.len()
+    }
+
+    /// Robots in the order of their names.
+    pub fn robots(&self) -> impl DoubleEndedIterator<Item = RobotInstance<'_>> {
+        self.structure.robots.iter().filter_map(|(name, instance)| {
+            let stance = self.stances.get(name)?;
+            Some(RobotInstance { name, instance, stance })
+        })
+    }
+
+    /// The robot of a name.
+    pub fn robot(&self, name: &str) -> Option<RobotInstance<'_>> {
+        let (name, instance) = self.structure.robots.get_key_value(name)?;
+        Some(RobotInstance { name, instance, stance: self.stances.get(name)? })
+    }
+
     /// Pairs that may touch, and paddings, as they were set.
     pub fn rules(&self) -> &Rules {
         &self.structure.rules
@@ -171,6 +195,20 @@ impl Scene {
     /// Sets one pose; [`Scene::set_changed`] is to follow.
     pub(crate) fn set_pose(&mut self, slot: Slot, pose: Pose) {
         self.poses.set([(slot, pose)], self.revision);
+    }
+
+    /// Base and joint values of a robot.
+    pub(crate) fn stance(&self, robot: &str) -> Option<&Stance> {
+        self.stances.get(robot).map(|stance| &**stance)
+    }
+
+    /// Sets base and joint values of a robot, or forgets them.
+    pub(crate) fn set_stance(&mut self, robot: &Arc<str>, stance: Option<Stance>) {
+        let stances = Arc::make_mut(&mut self.stances);
+        match stance {
+            Some(stance) => stances.insert(robot.clone(), Arc::new(stance)),
+            None => stances.remove(robot),
+        };
     }
 
     /// Forgets the pose of an object that is gone.

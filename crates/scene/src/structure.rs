@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::object::{Object, Slot, Subject};
 use super::rules::{RuleTable, Rules};
+use crate::robot::{Instance, LinkTable};
 
 /// Objects by slot, their names, what holds what, and the rules. Shared between snapshots until
 /// one of them changes.
@@ -16,6 +17,8 @@ pub(crate) struct Structure {
     /// Slots to use again.
     free: Vec<Slot>,
     pub(crate) rules: Rules,
+    /// Robots by name.
+    pub(crate) robots: BTreeMap<Arc<str>, Arc<Instance>>,
     /// Derived from all that by [`Structure::derive`].
     pub(crate) table: RuleTable,
     /// Position of each slot in the order of names; derived.
@@ -99,7 +102,9 @@ impl Structure {
             }
         }
         let objects = self.objects().map(|(slot, object)| (slot, &**object));
-        let table = RuleTable::new(&self.rules, self.slots.len(), objects, |name| self.slot(name));
+        let instances = self.robots.values().map(|instance| (&instance.robot, &*instance.slots));
+        let links = LinkTable::new(self.slots.len(), instances);
+        let table = RuleTable::new(&self.rules, self.slots.len(), objects, links, |name| self.slot(name));
         (self.table, self.ranks, self.holding, self.half_spaces) = (table, ranks, holding, half_spaces);
     }
 

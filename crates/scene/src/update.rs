@@ -6,13 +6,14 @@ use std::sync::Arc;
 use sublevel_core::body::BodyId;
 use sublevel_core::measure::Pose;
 
-use super::error::{Entry, List, SceneError};
+use super::error::{Entry, List, SceneError, entries};
 use super::object::{Attachment, Object, Slot, Subject};
 use super::poses::{compose, relative};
 use super::rules::{SubjectPair, ordered};
 use super::scene::Scene;
 use super::structure::Structure;
-use super::{Geometry, MAX_OBJECTS, MAX_PADDING_M, MAX_PAIR_RULES, check_name};
+use super::{Geometry, MAX_OBJECTS, MAX_PADDING_M, MAX_PAIR_RULES, MAX_ROBOTS, check_name};
+use crate::robot::{NamedJointValues, PlaceRobot, check_names, move_robots, place_robots, remove_robots};
 
 /// An object to add or to replace.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,15 +72,24 @@ pub struct Update {
     pub attach: Vec<Attach>,
     /// Objects not to be held any more; each stays where it is.
     pub detach: Vec<Arc<str>>,
+    /// Robots to place, or to replace whole.
+    pub robots: Vec<PlaceRobot>,
+    /// Joint values of robots that are there, by the names of the robots; joints not named keep
+    /// theirs.
+    pub joints: Vec<(Arc<str>, NamedJointValues)>,
+    /// Base poses of robots that are there: root link to world frame, metres.
+    pub bases: Vec<(Arc<str>, Pose)>,
+    /// Robots to remove, with the objects of their links and the rules of these.
+    pub robot_removals: Vec<Arc<str>>,
 }
 
 impl Update {
     /// Whether there is nothing to do.
     pub fn is_empty(&self) -> bool {
-        self.poses.is_empty() && self.keeps_structure()
+        self.poses.is_empty() && self.joints.is_empty() && self.bases.is_empty() && self.keeps_structure()
     }
 
-    /// Whether at most poses change.
+    /// Whether at most poses change, and joints and bases of robots.
     fn keeps_structure(&self) -> bool {
         self.upserts.is_empty()
             && self.removals.is_empty()
@@ -90,6 +100,8 @@ impl Update {
             && self.pair_paddings.is_empty()
             && self.attach.is_empty()
             && self.detach.is_empty()
+            && self.robots.is_empty()
+            && self.robot_removals.is_empty()
     }
 
     /// Every object is named once over the lists that place objects, with a usable name.
@@ -138,13 +150,16 @@ impl Scene {
             return Ok(self.clone());
         }
         update.check_names()?;
+        check_names((&update.robots, &update.robot_removals), &update.joints, &update.bases)?;
         update.check_paddings()?;
         if update.keeps_structure() {
             let mut moved = Vec::with_capacity(update.poses.len());
             for (at, (name, pose)) in entries(List::Poses, &update.poses) {
-                moved.push((find(&self.structure, at, name)?, *pose));
+                moved.push((find_own(&self.structure, at, name)?, *pose));
             }
-            return self.with_poses(&moved);
+            let mut next = self.next();
+            moved.extend(move_robots(&self.structure, &mut next, &update.joints, &update.bases)?);
+            return next.moved(&moved);
         }
         self.restructured(update, bodies)
     }
@@ -153,19 +168,28 @@ impl Scene {
     /// along. Of an object that is held this changes its place in its holder.
     ///
     /// # Errors
-    /// A held object that would end up too far away to have a pose.
+    /// A held object that would end up too far away to have a pose, and the link of a robot.
     pub fn with_poses(&self, moved: &[(Slot, Pose)]) -> Result<Self, SceneError> {
-        let mut next = self.next();
+        for (at, (slot, _)) in entries(List::Poses, moved) {
+            check_own(&self.structure, at, *slot)?;
+        }
+        self.next().moved(moved)
+    }
+
+    /// This snapshot, which nobody has seen yet, with other poses.
+    fn moved(self, moved: &[(Slot, Pose)]) -> Result<Self, SceneError> {
+        let mut next = self;
         let mut changed: Vec<Slot> = moved.iter().map(|(slot, _)| *slot).collect();
         for &(slot, pose) in moved {
             next.set_pose(slot, pose);
         }
-        let held = self.structure.held_by(&changed);
-        changed.extend(follow(&self.structure, &mut next, &held)?);
-        let is_held = |slot: Slot| self.structure.object(slot).is_some_and(|object| object.attachment.is_some());
+        let before = next.structure.clone();
+        let held = before.held_by(&changed);
+        changed.extend(follow(&before, &mut next, &held)?);
+        let is_held = |slot: Slot| before.object(slot).is_some_and(|object| object.attachment.is_some());
         if moved.iter().any(|(slot, _)| is_held(*slot)) {
             // Now that holders are where they will be.
-            let mut structure = Structure::clone(&self.structure);
+            let mut structure = Structure::clone(&before);
             keep_places(&mut structure, &next, moved)?;
             let slots: Vec<Slot> = moved.iter().map(|(slot, _)| *slot).collect();
             let held = slots.iter().copied().filter(|slot| is_held(*slot)).chain(structure.held_by(&slots));
@@ -198,8 +222,11 @@ impl Scene {
     fn restructured(&self, update: &Update, bodies: impl Fn(&BodyId) -> Option<Geometry>) -> Result<Self, SceneError> {
         let mut structure = Structure::clone(&self.structure);
         let mut next = self.next();
-        let mut changed = Vec::new();
+        let mut changed = remove_robots(&mut structure, &mut next, &update.robot_removals)?;
         for (at, name) in entries(List::Removals, &update.removals) {
+            if let Some(slot) = structure.slot(name) {
+                check_own(&structure, at, slot)?;
+            }
             let slot = structure.remove(name).ok_or_else(|| SceneError::NoObject { at, name: name.clone() })?;
             next.clear_pose(slot);
             changed.push(slot);
@@ -209,6 +236,9 @@ impl Scene {
             structure.forget(|name| removed.contains(name));
         }
         for (at, placement) in entries(List::Upserts, &update.upserts) {
+            if let Some(slot) = structure.slot(&placement.name) {
+                check_own(&structure, at, slot)?;
+            }
             let slot = structure.put(place(at, placement, &bodies)?);
             changed.push(slot);
             match (placement.pose, &placement.attachment) {
@@ -217,15 +247,20 @@ impl Scene {
                 (None, None) => return Err(SceneError::NoPose { at, name: placement.name.clone() }),
             }
         }
+        changed.extend(place_robots(&mut structure, &mut next, &update.robots)?);
         for (at, name) in entries(List::Detach, &update.detach) {
-            let slot = find(&structure, at, name)?;
+            let slot = find_own(&structure, at, name)?;
             structure.change(slot, |object| object.attachment = None);
         }
         let mut moved = Vec::with_capacity(update.poses.len());
         for (at, (name, pose)) in entries(List::Poses, &update.poses) {
-            let slot = find(&structure, at, name)?;
+            let slot = find_own(&structure, at, name)?;
             next.set_pose(slot, *pose);
             moved.push((slot, *pose));
+            changed.push(slot);
+        }
+        for (slot, pose) in move_robots(&structure, &mut next, &update.joints, &update.bases)? {
+            next.set_pose(slot, pose);
             changed.push(slot);
         }
         // What is held follows its holder before anything looks for its place in one.
@@ -238,6 +273,7 @@ impl Scene {
         structure.derive();
         check_holders(&structure)?;
         within("objects", structure.by_name.len(), MAX_OBJECTS)?;
+        within("robots", structure.robots.len(), MAX_ROBOTS)?;
         within("allowed pairs", structure.rules.allowed.len(), MAX_PAIR_RULES)?;
         within("pairs with a padding", structure.rules.pairs.len(), MAX_PAIR_RULES)?;
         changed.extend(follow_all(&structure, &mut next)?);
@@ -290,7 +326,7 @@ fn follow(structure: &Structure, next: &mut Scene, held: &[Slot]) -> Result<Vec<
 
 fn attach(structure: &mut Structure, next: &Scene, update: &Update) -> Result<(), SceneError> {
     for (at, attach) in entries(List::Attach, &update.attach) {
-        let slot = find(structure, at, &attach.name)?;
+        let slot = find_own(structure, at, &attach.name)?;
         let holder = find(structure, at, &attach.to)?;
         if slot == holder {
             return Err(SceneError::Itself { at, name: attach.name.clone() });
@@ -401,10 +437,22 @@ fn find(structure: &Structure, at: Entry, name: &Arc<str>) -> Result<Slot, Scene
     structure.slot(name).ok_or_else(|| SceneError::NoObject { at, name: name.clone() })
 }
 
-fn within(what: &'static str, count: usize, limit: usize) -> Result<(), SceneError> {
-    if count <= limit { Ok(()) } else { Err(SceneError::Full { what, count, limit }) }
+/// An object that is no link of a robot.
+fn find_own(structure: &Structure, at: Entry, name: &Arc<str>) -> Result<Slot, SceneError> {
+    let slot = find(structure, at, name)?;
+    check_own(structure, at, slot)?;
+    Ok(slot)
 }
 
-fn entries<T>(list: List, items: impl IntoIterator<Item = T>) -> impl Iterator<Item = (Entry, T)> {
-    items.into_iter().enumerate().map(move |(index, item)| (Entry { list, index }, item))
+/// Links of robots are not changed one by one.
+fn check_own(structure: &Structure, at: Entry, slot: Slot) -> Result<(), SceneError> {
+    let Some(object) = structure.object(slot) else { return Ok(()) };
+    match &object.link {
+        Some(of) => Err(SceneError::OfRobot { at, name: object.name.clone(), robot: of.robot.clone() }),
+        None => Ok(()),
+    }
+}
+
+fn within(what: &'static str, count: usize, limit: usize) -> Result<(), SceneError> {
+    if count <= limit { Ok(()) } else { Err(SceneError::Full { what, count, limit }) }
 }

@@ -100,6 +100,12 @@ impl Answer {
         Self { lower, upper, value, ..Self::without(status) }
     }
 
+    /// The same for sides that may be displaced by so much against each other, metres.
+    pub(crate) fn widened(self, slack_m: f64) -> Self {
+        let (lower, upper) = (self.lower - slack_m, self.upper + slack_m);
+        Self { lower, upper, objects_upper: self.objects_upper + slack_m, ..self }
+    }
+
     /// The same with the sides exchanged.
     pub(crate) fn swapped(self) -> Self {
         Self {

@@ -1,6 +1,7 @@
 //! Pairs within an influence distance, state by state, with gradients.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use sublevel_core::body::Shape;
 use sublevel_core::measure::{
@@ -10,8 +11,10 @@ use sublevel_core::measure::{
 use super::answer::{Answer, Verdict};
 use super::ask::{Ask, AskError, Measure, options};
 use super::decide::decide;
-use super::placed::{Other, Placed, StatesError, with_starts};
+use super::packed::State;
+use super::placed::{Candidate, Other, Placed, with_starts};
 use super::solver::{Pair, Solids, Solver};
+use super::states_error::StatesError;
 use super::thing::{PairSlots, Thing};
 use crate::crew::{Question, Stop};
 use crate::object::Slot;
@@ -36,8 +39,12 @@ pub struct ClearanceRow {
 pub struct StateClearance {
     /// In the order of names.
     pub rows: Vec<ClearanceRow>,
-    /// Whether the poses are usable and all pairs were looked at.
+    /// Whether the poses or joint values are usable and all pairs were looked at.
     pub checked: bool,
+    /// Of states of a robot with gradients: for every row in turn the derivatives of the signed
+    /// distance with respect to the values of the state, metres per unit of each; NaN where there
+    /// are none.
+    pub joint_gradients: Vec<f64>,
 }
 
 /// For each of many states the pairs whose signed distance less their padding is below an influence
@@ -63,7 +70,26 @@ impl Clearance {
         influence_m: f64,
         include_allowed: bool,
     ) -> Result<Self, StatesError> {
-        let placed = Placed::new(scene, slots, poses, include_allowed)?;
+        Self::of(Placed::new(scene, slots, poses, include_allowed)?, influence_m)
+    }
+
+    /// States of a robot as in [`States::of_joints`](super::States::of_joints); `influence_m` at
+    /// least 0.
+    ///
+    /// # Errors
+    /// A robot or a joint that is not there, a joint twice, and numbers that are not whole states.
+    pub fn of_joints(
+        scene: Scene,
+        robot: &str,
+        joints: &[Arc<str>],
+        values: Vec<f64>,
+        influence_m: f64,
+        include_allowed: bool,
+    ) -> Result<Self, StatesError> {
+        Self::of(Placed::of_joints(scene, robot, joints, values, include_allowed)?, influence_m)
+    }
+
+    fn of(placed: Placed, influence_m: f64) -> Result<Self, StatesError> {
         let Ok(mut ask) = Ask::new(vec![Measure::Signed]) else { return Err(StatesError::NoObject) };
         ask.gradients = true;
         Ok(Self { placed, ask, accuracy: DEFAULT_ACCURACY, influence_m, max_pairs: usize::MAX })
@@ -104,22 +130,28 @@ impl Clearance {
         self.placed.states()
     }
 
+    /// Number of values in a row of [`StateClearance::joint_gradients`]; none of states that are
+    /// poses.
+    pub fn joint_width(&self) -> Option<usize> {
+        Some(self.placed.joints()?.width())
+    }
+
     /// What is near in a state, in no order; pairs that may be near in other states of the chunk,
     /// too, go to the batches.
     fn look(
         &self,
         state: usize,
-        (solver, poses): (&Solver<'_>, &mut Vec<Pose>),
+        (solver, at): (&Solver<'_>, &mut State),
         (place, batches): (usize, &mut Batches),
     ) -> StateClearance {
-        if solver.stop.is_set() || self.placed.poses(state, poses).is_none() {
+        if solver.stop.is_set() || self.placed.place(state, at).is_none() {
             return StateClearance::default();
         }
         let mut rows = Vec::new();
-        self.placed.visit(poses, self.influence_m, |index, other, threshold| {
-            let (slot, a) = self.placed.moving(index, poses);
+        self.placed.visit(at, self.influence_m, |Candidate { index, other, threshold, slack_m }| {
+            let (slot, a) = self.placed.moving(index, at);
             let thing = match other {
-                Other::Moving(other) => Some(self.placed.moving(other, poses)),
+                Other::Moving(other) => Some(self.placed.moving(other, at)),
                 Other::Standing(other) => self.placed.standing(other).map(|thing| (other, thing)),
             };
             let Some((other_slot, b)) = thing else { return true };
@@ -127,22 +159,45 @@ impl Clearance {
             if let (Other::Standing(_), Some(_), Some(_)) = (other, smooth(&a), smooth(&b))
                 && threshold >= 0.0
             {
-                if a.box_gap_m(&b) <= threshold {
-                    batches.push((index, other_slot), Near { place, pose: poses[index], threshold });
+                if a.box_gap_m(&b) <= threshold + slack_m {
+                    batches.push((index, other_slot), Near { place, pose: at.poses[index], threshold, slack_m });
                 }
                 return true;
             }
             let pair = Pair { a, b, slots: Some(PairSlots { a: slot, b: other_slot }) };
-            if let Some(answer) = self.within(solver, &pair, threshold) {
-                rows.push(self.row([slot, other_slot], answer, threshold));
+            if let Some(answer) = self.within(solver, &pair, threshold + slack_m) {
+                rows.push(self.row([slot, other_slot], answer, (threshold, slack_m)));
             }
             !solver.stop.is_set()
         });
-        StateClearance { rows, checked: !solver.stop.is_set() }
+        StateClearance { rows, checked: !solver.stop.is_set(), joint_gradients: Vec::new() }
     }
 
-    fn row(&self, pair: [Slot; 2], answer: Answer, threshold: f64) -> ClearanceRow {
-        ClearanceRow { pair, answer, padding_m: threshold - self.influence_m }
+    fn row(&self, pair: [Slot; 2], answer: Answer, (threshold, slack_m): (f64, f64)) -> ClearanceRow {
+        ClearanceRow { pair, answer: answer.widened(slack_m), padding_m: threshold - self.influence_m }
+    }
+
+    /// Fills in the gradients with respect to joint values.
+    fn fill_joint_gradients(&self, at: &mut State, index: usize, found: &mut StateClearance) {
+        let Some(joints) = self.placed.joints().filter(|_| self.ask.gradients && !found.rows.is_empty()) else {
+            return;
+        };
+        if self.placed.place(index, at).is_none() {
+            return;
+        }
+        let (width, mut all) = (joints.width(), Vec::new());
+        found.joint_gradients.resize(found.rows.len() * width, 0.0);
+        for (row, values) in found.rows.iter().zip(found.joint_gradients.chunks_mut(width)) {
+            let Some(gradients) = &row.answer.gradients else {
+                values.fill(f64::NAN);
+                continue;
+            };
+            let twists = row.pair.iter().zip(gradients).filter_map(|(slot, twist)| {
+                let (index, moving) = self.placed.find(*slot)?;
+                Some((moving, &at.poses[index], twist))
+            });
+            joints.add_gradients(at, twists, &mut all, values);
+        }
     }
 
     /// Measures a moving body where it stands in several states against one that stands still.
@@ -159,9 +214,9 @@ impl Clearance {
         if distance_batch(b, pose_b, a, &poses, &self.options(solver), &mut found).is_err() {
             return;
         }
-        for (Near { place, pose, threshold }, found) in near.iter().zip(&found) {
+        for (Near { place, pose, threshold, slack_m }, found) in near.iter().zip(&found) {
             let state = &mut states[*place];
-            if found.lower > *threshold {
+            if found.lower > threshold + slack_m {
                 continue;
             }
             let answer = if found.lower > 0.0 {
@@ -171,7 +226,7 @@ impl Clearance {
                 solver.measure(0, &Pair { a: moving, b: standing, slots: Some(PairSlots { a: slot, b: other }) })
             };
             state.checked &= !solver.stop.is_set();
-            state.rows.push(self.row([slot, other], answer, *threshold));
+            state.rows.push(self.row([slot, other], answer, (*threshold, *slack_m)));
         }
     }
 
@@ -232,14 +287,17 @@ impl Question for Clearance {
         with_starts(|starts| {
             let cache = (!self.ask.cold).then_some(starts);
             let solver = Solver { ask: &self.ask, cache, stop };
-            let (mut poses, mut batches) = (Vec::new(), Batches::default());
-            let states = chunk * CHUNK..((chunk + 1) * CHUNK).min(self.placed.states());
-            let look = |(place, state)| self.look(state, (&solver, &mut poses), (place, &mut batches));
-            let mut states: Vec<StateClearance> = states.enumerate().map(look).collect();
+            let (mut at, mut batches) = (State::default(), Batches::default());
+            let indices = chunk * CHUNK..((chunk + 1) * CHUNK).min(self.placed.states());
+            let look = |(place, state)| self.look(state, (&solver, &mut at), (place, &mut batches));
+            let mut states: Vec<StateClearance> = indices.clone().enumerate().map(look).collect();
             for (pair, near) in &batches.0 {
                 self.measure_batch(&solver, (*pair, near), &mut states);
             }
-            states.iter_mut().for_each(|state| self.order(&mut state.rows));
+            for (index, state) in indices.zip(&mut states) {
+                self.order(&mut state.rows);
+                self.fill_joint_gradients(&mut at, index, state);
+            }
             states
         })
     }
@@ -258,6 +316,7 @@ struct Near {
     /// World pose of the moving body.
     pose: Pose,
     threshold: f64,
+    slack_m: f64,
 }
 
 impl Batches {

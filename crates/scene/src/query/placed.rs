@@ -3,18 +3,16 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use nalgebra::Vector3;
 use sublevel_core::measure::Pose;
 
+use super::moving::Moving;
+use super::packed::{JointStates, POSE_NUMBERS, Packed, State};
+use super::states_error::StatesError;
 use super::thing::{Thing, ball_gap};
 use crate::broad_phase::{Tree, WorldBall, grown, world_box};
-use crate::object::{Object, Slot};
+use crate::object::Slot;
 use crate::pair_cache::PairCache;
-use crate::poses::compose;
 use crate::scene::Scene;
-
-/// Poses of one object in a packed state: translation, then quaternion x y z w.
-pub(crate) const POSE_NUMBERS: usize = 7;
 
 /// Objects that stand still up to which all are looked at, without the tree.
 const FEW: usize = 64;
@@ -35,20 +33,9 @@ pub(crate) struct Placed {
     scene: Scene,
     /// Placed objects as they are named, then what they hold, each after its holder.
     moving: Vec<Moving>,
-    /// How many of them are named.
-    named: usize,
-    /// Packed poses, state after state.
-    poses: Vec<f64>,
+    packed: Packed,
     still: Still,
     include_allowed: bool,
-}
-
-#[derive(Debug)]
-struct Moving {
-    slot: Slot,
-    object: Arc<Object>,
-    /// Position of what holds it among the moving, and its place there; none if it is named.
-    holder: Option<(usize, Pose)>,
 }
 
 /// What stands still.
@@ -60,31 +47,8 @@ enum Still {
     Many(Arc<Tree>, HashMap<Slot, usize>),
 }
 
-/// Why states cannot be placed.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum StatesError {
-    /// No object.
-    #[error("is empty; name the objects that the states place")]
-    NoObject,
-    /// An object twice.
-    #[error("object {0} is named twice; name it once")]
-    Twice(usize),
-    /// Numbers that are not whole states.
-    #[error("holds {numbers} numbers, which is no multiple of {per_state}: 7 for each of {objects} objects")]
-    Numbers {
-        /// How many there are.
-        numbers: usize,
-        /// How many make a state.
-        per_state: usize,
-        /// Number of objects.
-        objects: usize,
-    },
-    /// No state.
-    #[error("is empty; send at least one state")]
-    NoState,
-}
-
 impl Placed {
+    /// States of objects as packed poses.
     pub(crate) fn new(
         scene: Scene,
         slots: &[Slot],
@@ -101,16 +65,37 @@ impl Placed {
         if !poses.len().is_multiple_of(per_state) {
             return Err(StatesError::Numbers { numbers: poses.len(), per_state, objects: slots.len() });
         }
-        let (mut moving, mut places) = (Vec::new(), HashMap::new());
+        let packed = Packed::Poses { objects: slots.len(), numbers: poses };
+        Self::with(scene, slots, packed, include_allowed)
+    }
+
+    /// States of a robot as packed joint values.
+    pub(crate) fn of_joints(
+        scene: Scene,
+        robot: &str,
+        joints: &[Arc<str>],
+        values: Vec<f64>,
+        include_allowed: bool,
+    ) -> Result<Self, StatesError> {
+        let instance = scene.robot(robot).ok_or_else(|| StatesError::NoRobot(robot.into()))?;
+        let slots: Vec<Slot> = instance.link_slots().iter().flatten().copied().collect();
+        if slots.is_empty() {
+            return Err(StatesError::NoGeometry(robot.into()));
+        }
+        let packed = Packed::Joints(JointStates::new(&instance, joints, values)?);
+        Self::with(scene, &slots, packed, include_allowed)
+    }
+
+    fn with(scene: Scene, slots: &[Slot], packed: Packed, include_allowed: bool) -> Result<Self, StatesError> {
+        let (mut moving, mut places) = (Vec::<Moving>::new(), HashMap::new());
         for (index, &slot) in slots.iter().enumerate() {
             if places.insert(slot, index).is_some() {
                 return Err(StatesError::Twice(index));
             }
             if let Some(object) = scene.object(slot) {
-                moving.push(Moving { slot, object: object.clone(), holder: None });
+                moving.push(Moving::named(slot, object));
             }
         }
-        let named = moving.len();
         for slot in scene.held_by(slots) {
             if places.contains_key(&slot) {
                 continue;
@@ -119,7 +104,7 @@ impl Placed {
             let Some(attachment) = &object.attachment else { continue };
             let Some(&holder) = scene.slot(&attachment.to).and_then(|holder| places.get(&holder)) else { continue };
             places.insert(slot, moving.len());
-            moving.push(Moving { slot, object: object.clone(), holder: Some((holder, attachment.pose)) });
+            moving.push(Moving::held(slot, object, (&moving[holder], holder), attachment.pose));
         }
         let standing = scene.len() - moving.len();
         let still = if standing <= FEW {
@@ -128,7 +113,7 @@ impl Placed {
         } else {
             Still::Many(scene.tree().clone(), places)
         };
-        Ok(Self { scene, moving, named, poses, still, include_allowed })
+        Ok(Self { scene, moving, packed, still, include_allowed })
     }
 
     pub(crate) fn scene(&self) -> &Scene {
@@ -137,28 +122,27 @@ impl Placed {
 
     /// Number of states.
     pub(crate) fn states(&self) -> usize {
-        self.poses.len() / (self.named * POSE_NUMBERS)
+        self.packed.len()
     }
 
-    /// World poses of all moving objects in a state; none if a number is no pose.
-    pub(crate) fn poses(&self, state: usize, poses: &mut Vec<Pose>) -> Option<()> {
-        poses.clear();
-        let from = state * self.named * POSE_NUMBERS;
-        let numbers = &self.poses[from..from + self.named * POSE_NUMBERS];
-        for pose in numbers.as_chunks::<POSE_NUMBERS>().0 {
-            let &[x, y, z, i, j, k, w] = pose;
-            poses.push(Pose::from_quaternion(Vector3::new(x, y, z), [i, j, k, w]).ok()?);
-        }
-        for moving in &self.moving[self.named..] {
-            let (holder, place) = moving.holder.as_ref()?;
-            poses.push(compose(&poses[*holder], place).ok()?);
-        }
-        Some(())
+    /// Places all moving objects in a state; none if a number is no pose or no joint value.
+    pub(crate) fn place(&self, index: usize, state: &mut State) -> Option<()> {
+        self.packed.place(index, &self.moving, state)
     }
 
-    /// The thing that a moving object is at a pose.
-    pub(crate) fn moving<'a>(&'a self, index: usize, poses: &'a [Pose]) -> (Slot, Thing<'a>) {
-        self.moving_at(index, &poses[index])
+    /// The states where they are joint values.
+    pub(crate) fn joints(&self) -> Option<&JointStates> {
+        self.packed.joints()
+    }
+
+    /// The moving object in a slot, with its position.
+    pub(crate) fn find(&self, slot: Slot) -> Option<(usize, &Moving)> {
+        self.moving.iter().enumerate().find(|(_, moving)| moving.slot == slot)
+    }
+
+    /// The thing that a moving object is in a state.
+    pub(crate) fn moving<'a>(&'a self, index: usize, state: &'a State) -> (Slot, Thing<'a>) {
+        self.moving_at(index, &state.poses[index])
     }
 
     /// The thing that a moving object is at one pose.
@@ -172,20 +156,20 @@ impl Placed {
         Some(Thing::object(self.scene.object(slot)?, self.scene.pose_at(slot)))
     }
 
-    /// Visits pairs that may be nearer than `margin` and their padding, every pair once: a moving
-    /// object by its position, and another one of them, or what stands in a slot. Ends when
+    /// Visits pairs that may be nearer than `margin` and their padding, every pair once. Ends when
     /// `visit` returns false.
-    pub(crate) fn visit(&self, poses: &[Pose], margin_m: f64, mut visit: impl FnMut(usize, Other, f64) -> bool) {
+    pub(crate) fn visit(&self, state: &State, margin_m: f64, mut visit: impl FnMut(Candidate) -> bool) {
         let table = &self.scene.structure.table;
         let counts = |a: Slot, b: Slot| self.include_allowed || !table.is_allowed(a, b);
-        let balls: Vec<_> = (0..self.moving.len()).map(|index| self.moving(index, poses).1.ball()).collect();
+        let balls: Vec<_> = (0..self.moving.len()).map(|index| self.moving(index, state).1.ball()).collect();
         for (i, moving) in self.moving.iter().enumerate() {
-            let slot = moving.slot;
+            let (slot, error_m) = (moving.slot, state.error_m(i));
             for (j, other) in self.moving.iter().enumerate().skip(i + 1) {
                 let threshold = margin_m + table.padding_m(slot, other.slot);
-                if near(&balls[i], &balls[j], threshold)
+                let slack_m = error_m + state.error_m(j);
+                if near(&balls[i], &balls[j], threshold + slack_m)
                     && counts(slot, other.slot)
-                    && !visit(i, Other::Moving(j), threshold)
+                    && !visit(Candidate { index: i, other: Other::Moving(j), threshold, slack_m })
                 {
                     return;
                 }
@@ -194,22 +178,21 @@ impl Placed {
                 Still::Few(others) => {
                     for (other, ball) in others {
                         let threshold = margin_m + table.padding_m(slot, *other);
-                        if near(&balls[i], ball, threshold)
-                            && counts(slot, *other)
-                            && !visit(i, Other::Standing(*other), threshold)
-                        {
+                        let pair = Candidate { index: i, other: Other::Standing(*other), threshold, slack_m: error_m };
+                        if near(&balls[i], ball, threshold + error_m) && counts(slot, *other) && !visit(pair) {
                             return;
                         }
                     }
                 }
                 Still::Many(tree, places) => {
-                    let reach = margin_m + table.largest_padding_m();
-                    let around = world_box(&moving.object, &poses[i]).map(|around| grown(&around, reach));
+                    let reach = margin_m + table.largest_padding_m() + error_m;
+                    let around = world_box(&moving.object, &state.poses[i]).map(|around| grown(&around, reach));
                     let met = around.iter().flat_map(|around| tree.meeting(around));
                     let half_spaces = self.scene.structure.half_spaces.iter().copied();
                     for other in met.chain(half_spaces).filter(|other| !places.contains_key(other)) {
                         let threshold = margin_m + table.padding_m(slot, other);
-                        if counts(slot, other) && !visit(i, Other::Standing(other), threshold) {
+                        let pair = Candidate { index: i, other: Other::Standing(other), threshold, slack_m: error_m };
+                        if counts(slot, other) && !visit(pair) {
                             return;
                         }
                     }
@@ -217,6 +200,18 @@ impl Placed {
             }
         }
     }
+}
+
+/// A pair that may be nearer than a threshold.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate {
+    /// Position of a moving object.
+    pub(crate) index: usize,
+    pub(crate) other: Other,
+    /// Margin and padding, metres.
+    pub(crate) threshold: f64,
+    /// How far the two together may be from where exact arithmetic puts them, metres.
+    pub(crate) slack_m: f64,
 }
 
 /// The other side of a pair with a moving object.

@@ -1,14 +1,18 @@
 //! Contact in many states.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use sublevel_core::measure::{DEFAULT_DEPTH_ACCURACY, Pose};
+use sublevel_core::measure::DEFAULT_DEPTH_ACCURACY;
 
 use super::answer::Verdict;
 use super::ask::{Ask, AskError, Measure, check_accuracy, options};
+use super::certain::decide_within;
 use super::decide::{Bracket, decide};
-use super::placed::{Other, Placed, StatesError, with_starts};
+use super::packed::State;
+use super::placed::{Candidate, Other, Placed, with_starts};
 use super::solver::{Pair, Solver};
+use super::states_error::StatesError;
 use super::thing::{PairSlots, Thing};
 use crate::crew::{Question, Stop};
 use crate::geometry::Geometry;
@@ -24,7 +28,7 @@ pub enum StateVerdict {
     Contact,
     /// Neither is proven.
     Undecided,
-    /// A pose is none.
+    /// A pose is none, or a joint value is not finite or outside its limits.
     Invalid,
     /// The question ended before.
     NotChecked,
@@ -94,7 +98,29 @@ impl States {
         margin_m: f64,
         include_allowed: bool,
     ) -> Result<Self, StatesError> {
-        let placed = Placed::new(scene, slots, poses, include_allowed)?;
+        Self::of(Placed::new(scene, slots, poses, include_allowed)?, margin_m)
+    }
+
+    /// States of a robot as packed values of joints, state after state: of those named, in their
+    /// order, or of all that follow no other one; what is not named is as in the scene. The links
+    /// and what is attached to them are checked against each other and against everything else.
+    /// What is proven holds for exact arithmetic on these values: the rounding of the kinematics is
+    /// counted.
+    ///
+    /// # Errors
+    /// A robot or a joint that is not there, a joint twice, and numbers that are not whole states.
+    pub fn of_joints(
+        scene: Scene,
+        robot: &str,
+        joints: &[Arc<str>],
+        values: Vec<f64>,
+        margin_m: f64,
+        include_allowed: bool,
+    ) -> Result<Self, StatesError> {
+        Self::of(Placed::of_joints(scene, robot, joints, values, include_allowed)?, margin_m)
+    }
+
+    fn of(placed: Placed, margin_m: f64) -> Result<Self, StatesError> {
         let Ok(ask) = Ask::new(vec![Measure::Signed]) else { return Err(StatesError::NoObject) };
         Ok(Self {
             placed,
@@ -143,16 +169,16 @@ impl States {
     fn check(
         &self,
         state: usize,
-        (solver, poses): (&Solver<'_>, &mut Vec<Pose>),
-        last: &mut Option<Contact>,
+        (solver, place): (&Solver<'_>, &mut State),
+        last: &mut Option<Candidate>,
     ) -> StateAnswer {
         if self.stop_at_first && self.first_bad.load(Ordering::Relaxed) < state || solver.stop.is_set() {
             return StateAnswer::without(StateVerdict::NotChecked);
         }
-        if self.placed.poses(state, poses).is_none() {
+        if self.placed.place(state, place).is_none() {
             return StateAnswer::without(StateVerdict::Invalid);
         }
-        let answer = if self.worst { self.worst_pair(solver, poses) } else { self.first_contact(solver, poses, last) };
+        let answer = if self.worst { self.worst_pair(solver, place) } else { self.first_contact(solver, place, last) };
         if solver.stop.is_set() && answer.verdict != StateVerdict::Contact {
             return StateAnswer { solved: answer.solved, ..StateAnswer::without(StateVerdict::NotChecked) };
         }
@@ -160,27 +186,27 @@ impl States {
     }
 
     /// What touched in the state before comes first: it often still does.
-    fn first_contact(&self, solver: &Solver<'_>, poses: &[Pose], last: &mut Option<Contact>) -> StateAnswer {
+    fn first_contact(&self, solver: &Solver<'_>, state: &State, last: &mut Option<Candidate>) -> StateAnswer {
         let mut answer = StateAnswer::without(StateVerdict::Free);
         if let Some(contact) = *last
-            && let Some((pair, slots)) = self.pair(poses, contact.index, contact.other)
+            && let Some((pair, slots)) = self.pair(state, contact)
         {
-            let found = self.decide(solver, &pair, contact.threshold);
+            let found = self.decide(solver, &pair, contact);
             answer.solved += u32::from(found.solved);
             if found.verdict == Verdict::Yes {
                 return self.settled(answer, slots, &found);
             }
         }
         *last = None;
-        self.placed.visit(poses, self.margin_m, |index, other, threshold| {
-            let Some((pair, slots)) = self.pair(poses, index, other) else { return true };
-            let found = self.decide(solver, &pair, threshold);
+        self.placed.visit(state, self.margin_m, |candidate| {
+            let Some((pair, slots)) = self.pair(state, candidate) else { return true };
+            let found = self.decide(solver, &pair, candidate);
             answer.solved += u32::from(found.solved);
             match found.verdict {
                 Verdict::No => true,
                 Verdict::Yes => {
                     answer = self.settled(answer, slots, &found);
-                    *last = Some(Contact { index, other, threshold });
+                    *last = Some(candidate);
                     false
                 }
                 Verdict::Undecided => {
@@ -194,20 +220,20 @@ impl States {
         answer
     }
 
-    fn worst_pair(&self, solver: &Solver<'_>, poses: &[Pose]) -> StateAnswer {
+    fn worst_pair(&self, solver: &Solver<'_>, state: &State) -> StateAnswer {
         let mut candidates = Vec::new();
         // Every pair counts, however far.
-        self.placed.visit(poses, f64::MAX, |index, other, _| {
-            candidates.push((index, other));
+        self.placed.visit(state, f64::MAX, |candidate| {
+            candidates.push(candidate);
             true
         });
         let scene = self.placed.scene();
         let mut open: Vec<_> = candidates
             .into_iter()
-            .filter_map(|(index, other)| {
-                let (pair, slots) = self.pair(poses, index, other)?;
-                let padding = scene.padding_m(slots[0], slots[1]);
-                Some((pair.a.ball_gap_m(&pair.b) - padding, pair, slots, padding))
+            .filter_map(|candidate| {
+                let (pair, slots) = self.pair(state, candidate)?;
+                let (padding, slack_m) = (scene.padding_m(slots[0], slots[1]), candidate.slack_m);
+                Some((pair.a.ball_gap_m(&pair.b) - slack_m - padding, pair, slots, (padding, slack_m)))
             })
             .collect();
         open.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -215,20 +241,22 @@ impl States {
         let (mut least, mut solved) = (f64::INFINITY, 0);
         // The pair that may be nearest of those that are not proven to be free.
         let mut doubtful: Option<([Slot; 2], Bracket, f64)> = None;
-        for (bound, pair, slots, padding) in open {
+        for (bound, pair, slots, (padding, slack_m)) in open {
             if bound > least {
                 break;
             }
-            if decide(solver, &pair, least.min(MOST_M) + padding, self.options(solver)).verdict == Verdict::No {
+            let cutoff = least.min(MOST_M) + padding + slack_m;
+            if decide(solver, &pair, cutoff, self.options(solver)).verdict == Verdict::No {
                 continue;
             }
             solved += 1;
             let found = solver.measure(0, &pair);
             let value = if found.value.is_finite() { found.value } else { found.lower };
-            let verdict = super::decide::compare::against(found.lower, found.upper, self.margin_m + padding);
-            let bracket = Bracket { verdict, lower: found.lower, upper: found.upper, rungs: found.rungs, solved: true };
-            if verdict != Verdict::No && doubtful.is_none_or(|(_, _, lower)| found.lower - padding < lower) {
-                doubtful = Some((slots, bracket, found.lower - padding));
+            let (lower, upper) = (found.lower - slack_m, found.upper + slack_m);
+            let verdict = super::decide::compare::against(lower, upper, self.margin_m + padding);
+            let bracket = Bracket { verdict, lower, upper, rungs: found.rungs, solved: true };
+            if verdict != Verdict::No && doubtful.is_none_or(|(_, _, least)| lower - padding < least) {
+                doubtful = Some((slots, bracket, lower - padding));
             }
             if value - padding < least {
                 least = value - padding;
@@ -247,14 +275,15 @@ impl States {
         options(self.accuracy, self.accuracy.max(DEFAULT_DEPTH_ACCURACY), solver.stop)
     }
 
-    fn decide(&self, solver: &Solver<'_>, pair: &Pair<'_>, threshold: f64) -> Bracket {
-        decide(solver, pair, threshold, options(DECISION_ACCURACY, DEFAULT_DEPTH_ACCURACY, solver.stop))
+    fn decide(&self, solver: &Solver<'_>, pair: &Pair<'_>, candidate: Candidate) -> Bracket {
+        let options = || options(DECISION_ACCURACY, DEFAULT_DEPTH_ACCURACY, solver.stop);
+        decide_within(solver, pair, (candidate.threshold, candidate.slack_m), options)
     }
 
-    fn pair<'a>(&'a self, poses: &'a [Pose], index: usize, other: Other) -> Option<(Pair<'a>, [Slot; 2])> {
-        let (slot, a) = self.placed.moving(index, poses);
-        let (other, b): (Slot, Thing<'a>) = match other {
-            Other::Moving(other) => self.placed.moving(other, poses),
+    fn pair<'a>(&'a self, state: &'a State, candidate: Candidate) -> Option<(Pair<'a>, [Slot; 2])> {
+        let (slot, a) = self.placed.moving(candidate.index, state);
+        let (other, b): (Slot, Thing<'a>) = match candidate.other {
+            Other::Moving(other) => self.placed.moving(other, state),
             Other::Standing(other) => (other, self.placed.standing(other)?),
         };
         Some((Pair { a, b, slots: Some(PairSlots { a: slot, b: other }) }, [slot, other]))
@@ -288,14 +317,6 @@ const DECISION_ACCURACY: f64 = 1e-9;
 /// Beyond any distance of two poses, metres.
 const MOST_M: f64 = 1e16;
 
-/// The pair that touched in the state before.
-#[derive(Clone, Copy, Debug)]
-struct Contact {
-    index: usize,
-    other: Other,
-    threshold: f64,
-}
-
 /// Whether the body is the object itself.
 fn is_exact(object: &Object) -> bool {
     match &object.geometry {
@@ -318,11 +339,11 @@ impl Question for States {
         with_starts(|starts| {
             let cache = (!self.ask.cold).then_some(starts);
             let solver = Solver { ask: &self.ask, cache, stop };
-            let (mut poses, mut last) = (Vec::new(), None);
+            let (mut place, mut last) = (State::default(), None);
             let states = chunk * CHUNK..((chunk + 1) * CHUNK).min(self.placed.states());
             states
                 .map(|state| {
-                    let answer = self.check(state, (&solver, &mut poses), &mut last);
+                    let answer = self.check(state, (&solver, &mut place), &mut last);
                     if answer.verdict != StateVerdict::Free {
                         self.first_bad.fetch_min(state, Ordering::Relaxed);
                     }

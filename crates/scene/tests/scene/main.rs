@@ -4,5 +4,6 @@
 mod brute_force;
 mod capsules;
 mod model;
+mod robots;
 mod sets;
 mod worlds;

@@ -1,0 +1,173 @@
+//! Packed states: poses of objects, or joint values of a robot.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Vector3};
+use sublevel_core::measure::{Pose, Twist};
+
+use super::moving::Moving;
+use super::states_error::StatesError;
+use crate::poses::compose;
+use crate::robot::{Robot, RobotInstance, isometry, link_error_m, places, pose_of};
+
+/// Poses of one object in a packed state: translation, then quaternion x y z w.
+pub(crate) const POSE_NUMBERS: usize = 7;
+
+/// Rounding of one product of poses, per metre.
+const ROUNDING: f64 = 32.0 * f64::EPSILON;
+
+/// Where everything that moves stands in one state. Kept from state to state.
+#[derive(Debug, Default)]
+pub(crate) struct State {
+    /// World poses of all moving objects.
+    pub(crate) poses: Vec<Pose>,
+    /// How far each may be from where exact arithmetic puts it, metres; empty: not at all.
+    errors: Vec<f64>,
+    /// Joint values of a robot.
+    configuration: Vec<f64>,
+    /// World poses of its links.
+    links: Vec<Isometry3<f64>>,
+}
+
+impl State {
+    /// How far points of a moving object may be from where exact arithmetic puts them, metres.
+    pub(crate) fn error_m(&self, index: usize) -> f64 {
+        self.errors.get(index).copied().unwrap_or(0.0)
+    }
+}
+
+/// Packed states, and how they place the objects that they name.
+#[derive(Debug)]
+pub(crate) enum Packed {
+    /// Poses of so many objects, 7 numbers each.
+    Poses { objects: usize, numbers: Vec<f64> },
+    /// Joint values of a robot.
+    Joints(JointStates),
+}
+
+/// States of a robot by the values of its joints.
+#[derive(Debug)]
+pub(crate) struct JointStates {
+    robot: Arc<Robot>,
+    base: Isometry3<f64>,
+    /// Values of joints that the states do not name.
+    rest: Vec<f64>,
+    /// Where the values of a state are in a configuration.
+    places: Vec<usize>,
+    numbers: Vec<f64>,
+}
+
+impl JointStates {
+    /// Packed values of some joints, of all where none is named; the others are as in the scene.
+    pub(crate) fn new(
+        instance: &RobotInstance<'_>,
+        joints: &[Arc<str>],
+        numbers: Vec<f64>,
+    ) -> Result<Self, StatesError> {
+        let places = places(instance.robot().kinematics(), joints).map_err(StatesError::Joints)?;
+        let per_state = places.len();
+        if numbers.is_empty() {
+            return Err(StatesError::NoJointState);
+        }
+        if per_state == 0 || !numbers.len().is_multiple_of(per_state) {
+            return Err(StatesError::JointNumbers { numbers: numbers.len(), per_state });
+        }
+        let (robot, base, rest) = (instance.robot().clone(), isometry(instance.base()), instance.configuration());
+        Ok(Self { robot, base, rest: rest.to_vec(), places, numbers })
+    }
+}
+
+impl Packed {
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Self::Poses { objects, numbers } => numbers.len() / (objects * POSE_NUMBERS),
+            Self::Joints(joints) => joints.numbers.len() / joints.places.len(),
+        }
+    }
+
+    /// Places all moving objects in a state; none if a number is no pose or no joint value.
+    pub(crate) fn place(&self, index: usize, moving: &[Moving], state: &mut State) -> Option<()> {
+        state.poses.clear();
+        state.errors.clear();
+        match self {
+            Self::Poses { objects, numbers } => {
+                let per_state = objects * POSE_NUMBERS;
+                let numbers = &numbers[index * per_state..(index + 1) * per_state];
+                for pose in numbers.as_chunks::<POSE_NUMBERS>().0 {
+                    let &[x, y, z, i, j, k, w] = pose;
+                    state.poses.push(Pose::from_quaternion(Vector3::new(x, y, z), [i, j, k, w]).ok()?);
+                }
+            }
+            Self::Joints(joints) => joints.place(index, moving, state)?,
+        }
+        for held in &moving[state.poses.len()..] {
+            let (holder, place) = held.holder.as_ref()?;
+            state.poses.push(compose(&state.poses[*holder], place).ok()?);
+        }
+        if let Self::Joints(joints) = self {
+            let kinematics = joints.robot.kinematics();
+            for (moving, pose) in moving.iter().zip(&state.poses) {
+                let link = moving.link?;
+                let error = link_error_m(kinematics, &state.links, &state.configuration, link, moving.reach_m);
+                let products = f64::from(moving.holders);
+                let held = products * ROUNDING * (moving.reach_m + pose.translation().norm());
+                state.errors.push(error + held);
+            }
+        }
+        Some(())
+    }
+
+    /// The states where they are joint values.
+    pub(crate) fn joints(&self) -> Option<&JointStates> {
+        match self {
+            Self::Poses { .. } => None,
+            Self::Joints(joints) => Some(joints),
+        }
+    }
+}
+
+impl JointStates {
+    fn place(&self, index: usize, moving: &[Moving], state: &mut State) -> Option<()> {
+        state.configuration.clear();
+        state.configuration.extend_from_slice(&self.rest);
+        let width = self.places.len();
+        for (place, value) in self.places.iter().zip(&self.numbers[index * width..(index + 1) * width]) {
+            state.configuration[*place] = *value;
+        }
+        let kinematics = self.robot.kinematics();
+        kinematics.check(&state.configuration).ok()?;
+        kinematics.forward(&self.base, &state.configuration, &mut state.links);
+        for moving in moving.iter().take_while(|moving| moving.holder.is_none()) {
+            state.poses.push(pose_of(&state.links[moving.link?]).ok()?);
+        }
+        Some(())
+    }
+
+    /// Number of values of a state.
+    pub(crate) fn width(&self) -> usize {
+        self.places.len()
+    }
+
+    /// Adds the derivatives of a quantity with respect to the values of a state to `row`, of
+    /// [`JointStates::width`] numbers. `twists` are its derivatives with respect to the poses of
+    /// moving objects; `all` is space for one row over all joints.
+    pub(crate) fn add_gradients<'a>(
+        &self,
+        state: &State,
+        twists: impl Iterator<Item = (&'a Moving, &'a Pose, &'a Twist)>,
+        all: &mut Vec<f64>,
+        row: &mut [f64],
+    ) {
+        let kinematics = self.robot.kinematics();
+        all.clear();
+        all.resize(kinematics.width(), 0.0);
+        for (moving, pose, twist) in twists {
+            let Some(link) = moving.link else { continue };
+            let (at, twist) = ((link, pose.translation()), (&twist.linear, &twist.angular));
+            kinematics.add_gradient(&state.links, &state.configuration, at, twist, all);
+        }
+        for (value, place) in row.iter_mut().zip(&self.places) {
+            *value += all[*place];
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! What cannot be done with robots, with the entry that is wrong.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use sublevel_core::measure::HalfSpace;
+use sublevel_robot::{Semantics, read_urdf};
+use sublevel_scene::{
+    Attach, Entry, Geometry, JointsError, List, NamedHalfSpace, Robot, RobotError, RobotId, SceneError, Update,
+};
+use sublevel_testkit::random::at;
+
+use super::{ARM, apply, cell, place, robot, set, slot, things, values};
+use crate::worlds::placement;
+
+fn refused(update: Update) -> SceneError {
+    let scene = cell(&[]);
+    let error = apply(&scene, &update).expect_err("refused");
+    assert_eq!(scene.revision(), 1);
+    error
+}
+
+fn entry(list: List) -> Entry {
+    Entry { list, index: 0 }
+}
+
+#[test]
+fn links_are_not_changed_one_by_one() {
+    let link = || Arc::<str>::from("arm/fore");
+    let [ball, _] = things();
+    let pose = at(0.0, 0.0, 0.0);
+    let attach = Attach { name: link(), to: "ball".into(), pose: None, touch: Vec::new() };
+    for (list, update) in [
+        (List::Upserts, Update { upserts: vec![placement("arm/fore", &ball, pose)], ..Update::default() }),
+        (List::Poses, Update { poses: vec![(link(), pose)], ..Update::default() }),
+        (List::Removals, Update { removals: vec![link()], ..Update::default() }),
+        (List::Attach, Update { attach: vec![attach], ..Update::default() }),
+        (List::Detach, Update { detach: vec![link()], ..Update::default() }),
+        (List::Poses, Update { poses: vec![(link(), pose)], removals: vec!["tool".into()], ..Update::default() }),
+    ] {
+        let error = refused(update);
+        let expected = SceneError::OfRobot { at: entry(list), name: link(), robot: "arm".into() };
+        assert_eq!(error, expected);
+        assert!(error.to_string().contains("set the joints or the base"));
+    }
+    let scene = cell(&[]);
+    assert!(scene.with_poses(&[(slot(&scene, "ball"), pose), (slot(&scene, "arm/fore"), pose)]).is_err());
+    assert!(scene.posed(&[(slot(&scene, "arm/fore"), pose)]).is_ok(), "a question may ask what if");
+}
+
+#[test]
+fn names_are_checked() {
+    let arm = robot(&[]);
+    let base = at(0.0, 0.0, 0.0);
+    let no_robot = |list| SceneError::NoRobot { at: entry(list), name: "leg".into() };
+    assert_eq!(refused(set("leg", values(&[], &[0.0; 4]))), no_robot(List::Joints));
+    assert_eq!(refused(Update { bases: vec![("leg".into(), base)], ..Update::default() }), no_robot(List::Bases));
+    let remove = Update { robot_removals: vec!["leg".into()], ..Update::default() };
+    assert_eq!(refused(remove), no_robot(List::RobotRemovals));
+    let twice = Update { robots: vec![place("arm", &arm, base)], ..set("arm", values(&[], &[0.0; 4])) };
+    assert_eq!(refused(twice), SceneError::RobotTwice { at: entry(List::Joints), name: "arm".into() });
+    let twice = Update { bases: vec![("arm".into(), base); 2], ..Update::default() };
+    assert!(matches!(refused(twice), SceneError::RobotTwice { at: Entry { list: List::Bases, index: 1 }, .. }));
+    let [ball, _] = things();
+    let taken = Update {
+        upserts: vec![placement("leg/fore", &ball, base)],
+        robots: vec![place("leg", &arm, base)],
+        ..Update::default()
+    };
+    assert!(matches!(refused(taken), SceneError::NameTaken { name, .. } if &*name == "leg/fore"));
+    let long = Update { robots: vec![place(&"x".repeat(125), &arm, base)], ..Update::default() };
+    assert!(matches!(refused(long), SceneError::LinkName { .. }));
+    let holds = refused(Update { robot_removals: vec!["arm".into()], ..Update::default() });
+    assert_eq!(holds, SceneError::Holds { name: "arm/wrist".into(), held: "tool".into() });
+}
+
+#[test]
+fn joint_values_are_checked() {
+    let joints = |update: Update| match refused(update) {
+        SceneError::Joints { at, error } => (at.list, error),
+        error => panic!("{error}"),
+    };
+    let (list, error) = joints(set("arm", values(&[], &[0.0; 3])));
+    assert_eq!((list, error), (List::Joints, JointsError::Width { given: 3, width: 4 }));
+    for (name, value) in [("knee", 0.0), ("follow", 0.0), ("bend", f64::NAN), ("bend", 3.1), ("slide", -0.01)] {
+        let (_, error) = joints(set("arm", values(&[name], &[value])));
+        assert!(error.to_string().contains(name), "{error}");
+    }
+    let mut placed = place("leg", &robot(&[]), at(0.0, 0.0, 0.0));
+    placed.joints = values(&["shoulder"], &[4.0]);
+    let (list, error) = joints(Update { robots: vec![placed], ..Update::default() });
+    assert_eq!(list, List::Robots);
+    assert!(error.to_string().contains("outside its limits -2.5 to 2.5"), "{error}");
+}
+
+#[test]
+fn descriptions_that_make_no_robot_are_refused() {
+    let new = |urdf: &str, bodies: &BTreeMap<Arc<str>, Geometry>| {
+        let description = read_urdf(urdf).expect("a description");
+        Robot::new(RobotId::of(urdf, "", []), &description, &Semantics::default(), bodies).map(|_| ())
+    };
+    let sphere = "<sphere radius=\"0.06\"/>";
+    let mesh = ARM.replace(sphere, "<mesh filename=\"fore.stl\"/>");
+    let error = new(&mesh, &BTreeMap::new()).expect_err("refused");
+    let expected = RobotError::Mesh { link: "fore".into(), piece: 1, uri: "fore.stl".into() };
+    assert_eq!(error, expected);
+    let [ball, _] = things();
+    assert_eq!(new(&mesh, &[("fore".into(), ball.clone())].into()), Ok(()), "a body stands for it");
+    let unknown = new(ARM, &[("knee".into(), ball)].into()).expect_err("refused");
+    assert_eq!(unknown, RobotError::NoLink { link: "knee".into(), robot: "arm".into() });
+    let plane = NamedHalfSpace::new("floor", HalfSpace::new(nalgebra::Vector3::z(), 0.0).expect("a plane"));
+    let plane = Geometry::HalfSpace(Arc::new(plane.expect("a name")));
+    let error = new(ARM, &[("fore".into(), plane)].into()).expect_err("refused");
+    assert_eq!(error, RobotError::HalfSpace { link: "fore".into() });
+}
