@@ -4,10 +4,12 @@ use std::{env, error::Error, fs, path::PathBuf};
 
 use protox::prost::Message;
 
-const FILES: [&str; 9] = [
+const FILES: [&str; 11] = [
     "sublevel/v1/types.proto",
     "sublevel/v1/body.proto",
+    "sublevel/v1/robot.proto",
     "sublevel/v1/scene.proto",
+    "sublevel/v1/motion.proto",
     "sublevel/v1/query.proto",
     "sublevel/v1/fit.proto",
     "sublevel/v1/hierarchy.proto",

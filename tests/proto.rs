@@ -11,7 +11,7 @@ use sublevel::service::proto::FILE_DESCRIPTOR_SET;
 fn files() -> Vec<FileDescriptorProto> {
     let files = FileDescriptorSet::decode(FILE_DESCRIPTOR_SET).expect("descriptors").file;
     let ours: Vec<_> = files.into_iter().filter(|file| file.package() == "sublevel.v1").collect();
-    assert_eq!(ours.len(), 9);
+    assert_eq!(ours.len(), 11);
     ours
 }
 

@@ -28,17 +28,21 @@ mod fits;
 mod hierarchy;
 #[cfg(feature = "fit")]
 mod jobs;
+mod motions;
 mod pose_stream;
 mod queries;
 mod raw;
+mod robots;
 mod scenes;
 
-pub use crate::service::proto::SceneSummary;
+pub use crate::service::proto::{RobotGroup, RobotSummary, SceneSummary};
 pub use bodies::{BodySource, StoredBody};
 pub use connection::{Client, ClientOptions, Connection, Credentials, ServerInfo, endpoint};
 pub use error::ClientError;
 #[cfg(feature = "fit")]
 pub use jobs::{JobProgress, SubmitError};
+pub use motions::{CheckedMotion, CheckedMotions, MotionsQuestion};
 pub use pose_stream::{PoseStream, StreamedPoses};
 pub use queries::{Answers, CheckedStates, PairRow, Question, StatesQuestion};
+pub use robots::{RobotPlacement, StoredLink, StoredRobot};
 pub use scenes::SceneState;

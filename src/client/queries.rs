@@ -124,13 +124,28 @@ impl Question {
 pub struct StatesQuestion {
     request: CheckStatesRequest,
     poses: Packed,
+    joint_values: Packed,
 }
 
 impl StatesQuestion {
     /// States that place these objects.
     pub fn new<'a>(objects: impl IntoIterator<Item = &'a str>) -> Self {
         let objects = objects.into_iter().map(Into::into).collect();
-        Self { request: CheckStatesRequest { objects, ..CheckStatesRequest::default() }, poses: Packed::default() }
+        Self { request: CheckStatesRequest { objects, ..CheckStatesRequest::default() }, ..Self::default() }
+    }
+
+    /// States that set joints of a robot of the scene: those that are named, or all in the order of
+    /// joint vectors. The others are as in the scene.
+    pub fn of_robot<'a>(robot: &str, joints: impl IntoIterator<Item = &'a str>) -> Self {
+        let joints = joints.into_iter().map(Into::into).collect();
+        let request = CheckStatesRequest { robot: robot.into(), joints, ..CheckStatesRequest::default() };
+        Self { request, ..Self::default() }
+    }
+
+    /// Adds states by the values of the joints, in their order: radians, metres, unit quaternions.
+    pub fn with_joint_values(mut self, values: &[f64]) -> Self {
+        values.iter().for_each(|&value| self.joint_values.number(value));
+        self
     }
 
     /// Adds a state: one pose per object, in their order.
@@ -152,7 +167,8 @@ impl StatesQuestion {
     }
 
     fn asked(self, scene: &str) -> CheckStatesRequest {
-        CheckStatesRequest { scene: scene.into(), poses: self.poses.into_bytes(), ..self.request }
+        let (poses, joint_values) = (self.poses.into_bytes(), self.joint_values.into_bytes());
+        CheckStatesRequest { scene: scene.into(), poses, joint_values, ..self.request }
     }
 
     /// The request without its poses, for what this type does not say.
@@ -173,7 +189,7 @@ pub struct CheckedStates {
 }
 
 impl Client {
-    fn queries(&self) -> QueryServiceClient<Connection> {
+    pub(super) fn queries(&self) -> QueryServiceClient<Connection> {
         QueryServiceClient::new(self.channel()).max_decoding_message_size(MAX_MESSAGE_BYTES)
     }
 
@@ -243,7 +259,7 @@ impl Client {
     }
 }
 
-fn index_pairs(bytes: &[u8]) -> impl Iterator<Item = [u32; 2]> {
+pub(super) fn index_pairs(bytes: &[u8]) -> impl Iterator<Item = [u32; 2]> {
     let pairs = bytes.as_chunks::<4>().0.as_chunks::<2>().0;
     pairs.iter().map(|pair| pair.map(u32::from_le_bytes))
 }

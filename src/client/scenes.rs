@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::connection::{Client, Connection};
 use super::error::ClientError;
+use super::robots::RobotPlacement;
 use crate::body::BodyId;
 use crate::measure::Pose;
 use crate::scene::{Attach, Placement, SubjectPair, Update};
@@ -25,6 +26,8 @@ pub struct SceneState {
     pub objects: BTreeMap<Arc<str>, Placement>,
     /// Pairs that may touch.
     pub allowed_pairs: Vec<SubjectPair>,
+    /// Robots by name, with the values of all joints; their links are among the objects.
+    pub robots: BTreeMap<Arc<str>, RobotPlacement>,
 }
 
 impl Client {
@@ -76,6 +79,10 @@ impl Client {
             }
             let pairs = scene_wire::subject_pairs(&page.allowed_pairs, "allowed_pairs");
             state.allowed_pairs.extend(pairs.map_err(unreadable)?);
+            for robot in &page.robots {
+                let placement = RobotPlacement::of(robot)?;
+                state.robots.insert(placement.name.clone(), placement);
+            }
             page_token = page.next_page_token;
             if page_token.is_empty() {
                 return Ok(state);

@@ -3,7 +3,7 @@
 use super::tokens::Role;
 
 /// The role that each call needs.
-const CALLS: [(&str, Role); 30] = [
+const CALLS: [(&str, Role); 36] = [
     ("BlobService/DownloadBlob", Role::Read),
     ("BlobService/UploadBlob", Role::Write),
     ("BodyService/CreateBody", Role::Write),
@@ -18,11 +18,17 @@ const CALLS: [(&str, Role); 30] = [
     ("JobService/ListJobs", Role::Read),
     ("JobService/WatchJob", Role::Read),
     ("QueryService/CastRays", Role::Read),
+    ("QueryService/CheckMotions", Role::Read),
     ("QueryService/CheckStates", Role::Read),
     ("QueryService/Clearance", Role::Read),
     ("QueryService/Evaluate", Role::Read),
     ("QueryService/EvaluateStream", Role::Read),
+    ("QueryService/VerifyMotion", Role::Read),
     ("QueryService/Watch", Role::Read),
+    ("RobotService/DeleteRobot", Role::Write),
+    ("RobotService/GetRobot", Role::Read),
+    ("RobotService/ListRobots", Role::Read),
+    ("RobotService/LoadRobot", Role::Write),
     ("SceneService/CommitFork", Role::Write),
     ("SceneService/CreateScene", Role::Write),
     ("SceneService/DeleteScene", Role::Write),

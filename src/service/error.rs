@@ -9,7 +9,7 @@ use std::time::Duration;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt};
 
-use crate::scene::{Entry, List, SceneError};
+use crate::scene::{Entry, JointsError, List, SceneError};
 use crate::store::{CatalogueError, MAX_FORKS, StoreError};
 
 use super::limits::MAX_MESSAGE_BYTES;
@@ -214,6 +214,14 @@ pub(super) fn catalogue(error: &CatalogueError, field: &str) -> Status {
         CatalogueError::DamagedScene { scene, .. } => damaged("DAMAGED_SCENE", "scene", scene, message),
         CatalogueError::NoScene(name) => not_found("scene", name, field, message),
         CatalogueError::BodyUsed { id, .. } => failed_precondition("BODY_IN_USE", &format!("body/{id}"), message),
+        CatalogueError::NoRobot(id) => not_found("robot", &id.to_string(), field, message),
+        CatalogueError::NoPlacedRobot { index, id } => {
+            not_found("robot", &id.to_string(), &format!("place_robots[{index}].robot_id"), message)
+        }
+        CatalogueError::RobotUsed { id, .. } => failed_precondition("ROBOT_IN_USE", &format!("robot/{id}"), message),
+        CatalogueError::BodyOfRobot { id, .. } => failed_precondition("BODY_IN_USE", &format!("body/{id}"), message),
+        CatalogueError::DamagedRobot { id, .. } => damaged("DAMAGED_ROBOT", "robot", &id.to_string(), message),
+        CatalogueError::Load(_) => Invalid::new(field, message).into(),
         CatalogueError::SceneExists(name) => {
             let mut details = details("SCENE_EXISTS");
             details.set_resource_info("scene", name, "", message.clone());
@@ -261,8 +269,20 @@ fn scene(error: &SceneError) -> Status {
         SceneError::Padding { at, .. } => invalid(at, Leaf::Padding),
         SceneError::NoPose { at, .. } => invalid(at, Leaf::Pose),
         SceneError::NoPlace { at, .. } => invalid(at, Leaf::Attachment),
-        SceneError::Name { at, .. } | SceneError::Twice { at, .. } | SceneError::Itself { at, .. } => {
-            invalid(at, Leaf::Name)
+        SceneError::Name { at, .. }
+        | SceneError::Twice { at, .. }
+        | SceneError::Itself { at, .. }
+        | SceneError::RobotTwice { at, .. }
+        | SceneError::OfRobot { at, .. }
+        | SceneError::NameTaken { at, .. }
+        | SceneError::LinkName { at, .. } => invalid(at, Leaf::Name),
+        SceneError::NoRobot { at, name } => not_found("robot", name, &path(at, Leaf::Name), error),
+        SceneError::Joints { at, error } => {
+            let leaf = match error {
+                JointsError::NoJoint { index, .. } | JointsError::Twice { index, .. } => format!("joints[{index}]"),
+                JointsError::Width { .. } | JointsError::Configuration(_) => "values".to_owned(),
+            };
+            Invalid::new(format!("{}.{leaf}", path(at, Leaf::Joints)), error).into()
         }
         SceneError::Pose { .. } => Invalid::new("set_poses", error).into(),
         SceneError::Circle { .. } => Invalid::new("attach", error).into(),
@@ -278,6 +298,7 @@ enum Leaf {
     Pose,
     Padding,
     Attachment,
+    Joints,
 }
 
 /// Path of an entry of an update in `UpdateSceneRequest`.
@@ -293,9 +314,14 @@ fn path(at: &Entry, leaf: Leaf) -> String {
         List::PairPaddings => "set_pair_paddings",
         List::Attach => "attach",
         List::Detach => "detach",
+        List::Robots => "place_robots",
+        List::Joints => "set_joints",
+        List::Bases => "set_robot_bases",
+        List::RobotRemovals => "remove_robots",
     };
     let leaf = match (at.list, leaf) {
-        (List::Removals | List::Allow | List::Forbid | List::Detach, _) => "",
+        (List::Removals | List::Allow | List::Forbid | List::Detach | List::RobotRemovals, _) => "",
+        (List::Joints | List::Bases, Leaf::Name) => ".robot",
         (List::ObjectPaddings | List::Attach, Leaf::Name) => ".object",
         (List::GroupPaddings, Leaf::Name) => ".group",
         (List::PairPaddings, Leaf::Name) => ".pair",
@@ -305,6 +331,7 @@ fn path(at: &Entry, leaf: Leaf) -> String {
         (_, Leaf::Pose) => ".pose",
         (_, Leaf::Padding) => ".padding_m",
         (_, Leaf::Attachment) => ".attachment.pose",
+        (_, Leaf::Joints) => ".joints",
     };
     format!("{list}[{}]{leaf}", at.index)
 }

@@ -29,6 +29,12 @@ pub const MAX_STATES: usize = 1 << 16;
 /// Most poses (states times objects) of one CheckStates or Clearance: what fits in a message.
 pub const MAX_STATE_POSES: usize = MAX_MESSAGE_BYTES / 56;
 
+/// Most motions of one CheckMotions.
+pub const MAX_MOTIONS: usize = 1 << 14;
+
+/// Most motions of one CheckMotions that asks for certificates, which are long.
+pub const MAX_CERTIFICATES: usize = 4;
+
 /// Most rays of one CastRays.
 pub const MAX_RAYS: usize = 1 << 15;
 

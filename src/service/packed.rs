@@ -62,11 +62,11 @@ impl Packed {
         Self(Vec::with_capacity(bytes))
     }
 
-    pub(super) fn number(&mut self, value: f64) {
+    pub(crate) fn number(&mut self, value: f64) {
         self.0.extend_from_slice(&value.to_le_bytes());
     }
 
-    pub(super) fn index(&mut self, value: u32) {
+    pub(crate) fn index(&mut self, value: u32) {
         self.0.extend_from_slice(&value.to_le_bytes());
     }
 

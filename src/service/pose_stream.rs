@@ -183,8 +183,10 @@ fn checked(names: &[String], scene: &Scene, of: &str) -> Result<Vec<Arc<str>>, S
         if !seen.insert(name) {
             return Err(Invalid::new(at(), format!("object \"{name}\" is named twice; name it once")).into());
         }
-        if scene.slot(name).is_none() {
-            return Err(no_object(name, &at(), of));
+        let slot = scene.slot(name).ok_or_else(|| no_object(name, &at(), of))?;
+        if let Some(link) = scene.object(slot).and_then(|object| object.link.as_ref()) {
+            let why = format!("object \"{name}\" is a link of robot \"{}\"; set the joints of the robot", link.robot);
+            return Err(Invalid::new(at(), why).into());
         }
         table.push(name.as_str().into());
     }
@@ -211,8 +213,12 @@ async fn apply(
     let count = poses.len() as u64 + u64::from(merged);
     let moved = tokio::task::spawn_blocking(move || {
         catalogue.stream_poses::<CatalogueError>(&live, |scene| {
-            // An object that was removed meanwhile needs no pose.
-            Ok(poses.into_iter().filter_map(|(name, pose)| Some((scene.slot(&name)?, pose))).collect())
+            // An object that was removed meanwhile, or is a link now, needs no pose.
+            let slot = |name: &str| {
+                let slot = scene.slot(name)?;
+                scene.object(slot).is_some_and(|object| object.link.is_none()).then_some(slot)
+            };
+            Ok(poses.into_iter().filter_map(|(name, pose)| Some((slot(&name)?, pose))).collect())
         })
     });
     let next = match moved.await.map_err(|error| error::internal_panic(&error))? {

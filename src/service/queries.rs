@@ -10,17 +10,18 @@ use super::app_state::{AppState, stopped};
 use super::call_time::CallTime;
 use super::columns;
 use super::error::{self, Invalid};
-use super::limits::{MAX_ANSWERS, MAX_RAYS, MAX_STATE_POSES, MAX_STATES, REVISION_PATIENCE};
+use super::limits::{MAX_ANSWERS, MAX_RAYS, REVISION_PATIENCE};
 use super::packed::{self, Packed};
+use super::placed_states::PlacedStates;
 use super::proto::evaluate_request::Question;
 use super::proto::query_service_server::QueryService;
 use super::proto::{
-    self, CastRaysRequest, CastRaysResponse, CheckStatesRequest, CheckStatesResponse, ClearanceRequest,
-    ClearanceResponse, EvaluateRequest, EvaluateResponse, EvaluateStreamRequest, EvaluateStreamResponse, StreamError,
-    WatchRequest, WatchResponse,
+    self, CastRaysRequest, CastRaysResponse, CheckMotionsRequest, CheckMotionsResponse, CheckStatesRequest,
+    CheckStatesResponse, ClearanceRequest, ClearanceResponse, EvaluateRequest, EvaluateResponse, EvaluateStreamRequest,
+    EvaluateStreamResponse, StreamError, VerifyMotionRequest, VerifyMotionResponse, WatchRequest, WatchResponse,
 };
 use super::query_wire::{NOTHING, NameTable, Outputs};
-use super::{contact_watch, query_wire, wire};
+use super::{contact_watch, motions, query_wire, wire};
 use crate::scene::query::{
     Answer, AnswerStatus, Ask, Certainty, Clearance, Found, Pairs, RayAnswer, Rays, StateAnswer, StateVerdict, States,
     Within, closest_pair, combined,
@@ -84,11 +85,18 @@ impl QueryService for Queries {
         let time = CallTime::of(&request, request.get_ref().budget_ms)?;
         let request = request.into_inner();
         let scene = snapshot(&self.0, &request.scene, request.at_least_revision).await?;
-        let slots = query_wire::slots(&scene, &request.objects, "objects")?;
         let margin = query_wire::length(request.margin_m, "margin_m")?;
-        let poses = state_poses(&request.poses, slots.len())?;
+        let given = (&request.objects[..], &request.poses[..]);
+        let of_robot = (&request.robot[..], &request.joints[..], &request.joint_values[..]);
+        let placed = PlacedStates::of(&scene, given, of_robot)?;
         let revision = scene.revision();
-        let states = States::new(scene.clone(), &slots, poses, margin, request.include_allowed);
+        let include_allowed = request.include_allowed;
+        let states = match placed {
+            PlacedStates::Poses(slots, poses) => States::new(scene.clone(), &slots, poses, margin, include_allowed),
+            PlacedStates::Joints(joints, values) => {
+                States::of_joints(scene.clone(), &request.robot, &joints, values, margin, include_allowed)
+            }
+        };
         let mut states = states.map_err(|error| query_wire::states_error(&error))?;
         match proto::Detail::try_from(request.detail) {
             Ok(proto::Detail::Unspecified | proto::Detail::Verdicts) => {}
@@ -110,14 +118,37 @@ impl QueryService for Queries {
         Ok(Response::new(states_response(&answers, &scene, revision)))
     }
 
+    async fn check_motions(
+        &self,
+        request: Request<CheckMotionsRequest>,
+    ) -> Result<Response<CheckMotionsResponse>, Status> {
+        let time = CallTime::of(&request, request.get_ref().budget_ms)?;
+        motions::check(&self.0, request.into_inner(), time).await.map(Response::new)
+    }
+
+    async fn verify_motion(
+        &self,
+        request: Request<VerifyMotionRequest>,
+    ) -> Result<Response<VerifyMotionResponse>, Status> {
+        motions::verify(&self.0, request.into_inner()).await.map(Response::new)
+    }
+
     async fn clearance(&self, request: Request<ClearanceRequest>) -> Result<Response<ClearanceResponse>, Status> {
         let time = CallTime::of(&request, request.get_ref().budget_ms)?;
         let request = request.into_inner();
         let scene = snapshot(&self.0, &request.scene, request.at_least_revision).await?;
-        let slots = query_wire::slots(&scene, &request.objects, "objects")?;
         let influence = query_wire::length(request.influence_m, "influence_m")?;
-        let poses = state_poses(&request.poses, slots.len())?;
-        let clearance = Clearance::new(scene.clone(), &slots, poses, influence, request.include_allowed);
+        let given = (&request.objects[..], &request.poses[..]);
+        let of_robot = (&request.robot[..], &request.joints[..], &request.joint_values[..]);
+        let include_allowed = request.include_allowed;
+        let clearance = match PlacedStates::of(&scene, given, of_robot)? {
+            PlacedStates::Poses(slots, poses) => {
+                Clearance::new(scene.clone(), &slots, poses, influence, include_allowed)
+            }
+            PlacedStates::Joints(joints, values) => {
+                Clearance::of_joints(scene.clone(), &request.robot, &joints, values, influence, include_allowed)
+            }
+        };
         let mut clearance = clearance.map_err(|error| query_wire::states_error(&error))?;
         if let Some(accuracy) = request.accuracy {
             clearance = clearance.with_accuracy(accuracy).map_err(|error| Invalid::new("accuracy", error))?;
@@ -183,7 +214,7 @@ impl QueryService for Queries {
 }
 
 /// The snapshot a question is about.
-async fn snapshot(app: &AppState, name: &str, at_least_revision: Option<u64>) -> Result<Scene, Status> {
+pub(super) async fn snapshot(app: &AppState, name: &str, at_least_revision: Option<u64>) -> Result<Scene, Status> {
     let live = app.live_scene(name, "scene").await?;
     let scene = live.snapshot();
     let Some(least) = at_least_revision.filter(|least| *least > scene.revision()) else { return Ok(scene) };
@@ -337,15 +368,6 @@ fn found_response(
     let answers = found.iter().flat_map(|found| &found.answers);
     write(answers, ask, outputs, &mut response);
     response
-}
-
-/// Packed poses of states, within their limits.
-fn state_poses(bytes: &[u8], objects: usize) -> Result<Vec<f64>, Status> {
-    let numbers = packed::numbers(bytes, "poses")?;
-    let poses = numbers.len() / packed::POSE_NUMBERS;
-    error::at_most("poses", poses, ("max_state_poses", MAX_STATE_POSES))?;
-    error::at_most("poses", poses / objects.max(1), ("max_states", MAX_STATES))?;
-    Ok(numbers)
 }
 
 fn states_response(answers: &[StateAnswer], scene: &Scene, scene_revision: u64) -> CheckStatesResponse {

@@ -11,7 +11,7 @@ use crate::scene::query::{
     Answer, AnswerStatus, Ask, AskError, ClearanceRow, Measure, Motions, Operand, PairsError, RaysError, Selection,
     StateClearance, StatesError, Verdict,
 };
-use crate::scene::{Scene, Slot};
+use crate::scene::{JointsError, Scene, Slot};
 
 use super::error::{self, Invalid};
 use super::packed::{self, Packed};
@@ -332,7 +332,7 @@ pub(super) fn clearance(
     let mut names = NameTable::default();
     let [mut offsets, mut pairs, mut status_bytes, mut lower, mut upper] = [(); 5].map(|()| Packed::default());
     let [mut padding, mut gradient_a, mut gradient_b, mut normal] = [(); 4].map(|()| Packed::default());
-    let [mut flag_bytes, mut checked] = [(); 2].map(|()| Packed::default());
+    let [mut flag_bytes, mut checked, mut joint_gradients] = [(); 3].map(|()| Packed::default());
     let mut rows = 0;
     offsets.index(0);
     for state in states {
@@ -350,6 +350,7 @@ pub(super) fn clearance(
             normal.vector(answer.normal.as_ref());
             flag_bytes.byte(flags(answer));
         }
+        state.joint_gradients.iter().for_each(|&number| joint_gradients.number(number));
         rows += state.rows.len();
         offsets.index(wire::count(rows));
     }
@@ -367,6 +368,7 @@ pub(super) fn clearance(
         normal: normal.into_bytes(),
         flags: flag_bytes.into_bytes(),
         checked: checked.into_bytes(),
+        joint_gradients: joint_gradients.into_bytes(),
     }
 }
 
@@ -376,6 +378,17 @@ pub(super) fn states_error(error: &StatesError) -> Invalid {
         StatesError::NoObject => Invalid::new("objects", error),
         StatesError::Twice(index) => Invalid::new(format!("objects[{index}]"), error),
         StatesError::Numbers { .. } | StatesError::NoState => Invalid::new("poses", error),
+        StatesError::JointNumbers { .. } | StatesError::NoJointState => Invalid::new("joint_values", error),
+        StatesError::Joints(of_joints) => Invalid::new(joints_field(of_joints), error),
+        StatesError::NoRobot(_) | StatesError::NoGeometry(_) => Invalid::new("robot", error),
+    }
+}
+
+/// Which field makes values of joints unusable.
+pub(super) fn joints_field(error: &JointsError) -> String {
+    match error {
+        JointsError::NoJoint { index, .. } | JointsError::Twice { index, .. } => format!("joints[{index}]"),
+        JointsError::Width { .. } | JointsError::Configuration(_) => "joint_values".to_owned(),
     }
 }
 

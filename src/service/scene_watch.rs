@@ -11,6 +11,7 @@ use super::error;
 use super::limits::MAX_MESSAGE_BYTES;
 use super::packed::Packed;
 use super::proto::{WatchSceneResponse, WatchedObject};
+use super::robot_wire;
 use super::scene_wire::object_message;
 use crate::scene::{Scene, Slot};
 use crate::store::LiveScene;
@@ -89,16 +90,27 @@ async fn send_whole(scene: &Scene, messages: &Messages) -> Option<()> {
             bytes = 0;
         }
     }
+    for robot in scene.robots() {
+        let robot = robot_wire::instance(&robot);
+        bytes += prost::Message::encoded_len(&robot);
+        piece.robots.push(robot);
+        if bytes > PIECE_BYTES {
+            messages.send(Ok(std::mem::replace(&mut piece, begin()))).await.ok()?;
+            bytes = 0;
+        }
+    }
     piece.complete = true;
     messages.send(Ok(piece)).await.ok()
 }
 
-/// Poses that were set after a revision, in pieces; none when the client is gone.
+/// Poses that were set after a revision, in pieces, with the robots that moved in the last one; none when the client is gone.
 async fn send_moved(scene: &Scene, from: u64, messages: &Messages) -> Option<()> {
     let moved: Vec<Slot> = scene.moved_since(from).collect();
     let mut pieces = moved.chunks(PIECE_POSES).peekable();
+    let robots = scene.robots().filter(|robot| robot.moved_at() > from);
+    let mut robots: Vec<_> = robots.map(|robot| robot_wire::instance(&robot)).collect();
     if pieces.peek().is_none() {
-        let message = WatchSceneResponse { revision: scene.revision(), complete: true, ..Default::default() };
+        let message = WatchSceneResponse { revision: scene.revision(), robots, complete: true, ..Default::default() };
         return messages.send(Ok(message)).await.ok();
     }
     while let Some(piece) = pieces.next() {
@@ -114,6 +126,7 @@ async fn send_moved(scene: &Scene, from: u64, messages: &Messages) -> Option<()>
             moved: indices.into_bytes(),
             poses: poses.into_bytes(),
             complete: pieces.peek().is_none(),
+            robots: if pieces.peek().is_none() { std::mem::take(&mut robots) } else { Vec::new() },
             ..Default::default()
         };
         messages.send(Ok(message)).await.ok()?;

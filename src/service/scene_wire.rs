@@ -5,19 +5,26 @@ use std::sync::Arc;
 use tonic::Status;
 
 use crate::measure::Pose;
-use crate::scene::{Attach, Attachment, Object, Placement, Scene, Subject, SubjectPair, Update};
+use crate::scene::{
+    Attach, Attachment, NamedJointValues, Object, PlaceRobot, Placement, Robot, RobotId, Scene, Subject, SubjectPair,
+    Update,
+};
 use crate::store::{Origin, SceneEntry};
 
 use super::error::{self, Invalid};
 use super::limits::MAX_MESSAGE_BYTES;
 use super::packed::Packed;
 use super::proto::{self, subject};
-use super::{packed, wire};
+use super::{packed, robot_wire, wire};
 
-/// An update as it is asked for.
+/// An update as it is asked for, without the robots that it places, which [`placed_robots`] adds.
 pub(super) fn update(request: &proto::UpdateSceneRequest) -> Result<Update, Invalid> {
     let mut update = Update { expected_revision: request.expected_revision, ..Update::default() };
     for (index, object) in request.upsert_objects.iter().enumerate() {
+        if !object.robot.is_empty() {
+            let why = "is sent only, of links of robots; set the joints of the robot instead of the object";
+            return Err(Invalid::new(format!("upsert_objects[{index}].robot"), why));
+        }
         update.upserts.push(placement(object, || format!("upsert_objects[{index}]"))?);
     }
     if let Some(table) = &request.set_poses {
@@ -46,7 +53,35 @@ pub(super) fn update(request: &proto::UpdateSceneRequest) -> Result<Update, Inva
             touch: subjects(&attachment.touch, || at(".touch"))?,
         });
     }
+    for (index, set) in request.set_joints.iter().enumerate() {
+        let field = |leaf: &str| format!("set_joints[{index}].joints{leaf}");
+        update.joints.push((set.robot.as_str().into(), robot_wire::joint_values(set.joints.as_ref(), field)?));
+    }
+    for (index, set) in request.set_robot_bases.iter().enumerate() {
+        let base = wire::pose(set.base.as_ref(), &format!("set_robot_bases[{index}].base"))?;
+        update.bases.push((set.robot.as_str().into(), base));
+    }
+    update.robot_removals = names(&request.remove_robots);
     Ok(update)
+}
+
+/// Ids of the robots that a request places, in its order.
+pub(super) fn placed_robot_ids(request: &proto::UpdateSceneRequest) -> Result<Vec<RobotId>, Invalid> {
+    let id = |(index, placed): (usize, &proto::RobotInstance)| {
+        robot_wire::robot_id(&placed.robot_id, &format!("place_robots[{index}].robot_id"))
+    };
+    request.place_robots.iter().enumerate().map(id).collect()
+}
+
+/// The robots that a request places, of [`placed_robot_ids`].
+pub(super) fn placed_robots(
+    request: &proto::UpdateSceneRequest,
+    robots: Vec<Arc<Robot>>,
+) -> Result<Vec<PlaceRobot>, Invalid> {
+    let one = |(index, (placed, robot)): (usize, (&proto::RobotInstance, Arc<Robot>))| {
+        robot_wire::placement(placed, robot, |leaf| format!("place_robots[{index}]{leaf}"))
+    };
+    request.place_robots.iter().zip(robots).enumerate().map(one).collect()
 }
 
 /// The placement that a message asks for; `field` is the path of the object in the request.
@@ -94,6 +129,18 @@ pub(crate) fn update_message(scene: &str, update: &Update) -> proto::UpdateScene
         attachment: Some(attachment_message(to, pose.as_ref(), touch)),
     };
     let poses = update.poses.iter().map(|(name, pose)| (&**name, *pose));
+    let robot = |placed: &PlaceRobot| {
+        let joints = robot_wire::joint_values_message(&placed.joints);
+        robot_wire::instance_message(&placed.name, placed.robot.id(), (&placed.base, joints))
+    };
+    let joints = |(robot, values): &(Arc<str>, NamedJointValues)| proto::SetJoints {
+        robot: robot.to_string(),
+        joints: Some(robot_wire::joint_values_message(values)),
+    };
+    let base = |(robot, base): &(Arc<str>, Pose)| proto::SetRobotBase {
+        robot: robot.to_string(),
+        base: Some(wire::pose_message(base)),
+    };
     proto::UpdateSceneRequest {
         scene: scene.to_owned(),
         expected_revision: update.expected_revision,
@@ -107,6 +154,10 @@ pub(crate) fn update_message(scene: &str, update: &Update) -> proto::UpdateScene
         set_pair_paddings: update.pair_paddings.iter().map(pair).collect(),
         attach: update.attach.iter().map(attach).collect(),
         detach: owned(&update.detach),
+        place_robots: update.robots.iter().map(robot).collect(),
+        set_joints: update.joints.iter().map(joints).collect(),
+        set_robot_bases: update.bases.iter().map(base).collect(),
+        remove_robots: owned(&update.robot_removals),
     }
 }
 
@@ -120,6 +171,7 @@ fn placement_message(placement: &Placement) -> proto::Object {
         group: group.to_string(),
         padding_m: *padding_m,
         attachment: attachment.as_ref().map(held),
+        robot: String::new(),
     }
 }
 
@@ -242,6 +294,7 @@ pub(super) fn page(
             padding_m: Some(padding),
         };
         response.pair_paddings = rules.pair_paddings().map(pair).collect();
+        response.robots = scene.robots().map(|robot| robot_wire::instance(&robot)).collect();
     }
     let mut bytes = prost::Message::encoded_len(&response);
     let rest: Box<dyn Iterator<Item = _>> = match after {
@@ -271,6 +324,7 @@ pub(super) fn object_message(object: &Object, pose: &Pose) -> proto::Object {
         group: object.group.to_string(),
         padding_m: object.padding_m,
         attachment: object.attachment.as_ref().map(held),
+        robot: object.link.as_ref().map(|of| of.robot.to_string()).unwrap_or_default(),
     }
 }
 

@@ -14,7 +14,8 @@ use super::proto::{
     WatchSceneRequest, WatchSceneResponse,
 };
 use super::{error, pose_stream, scene_watch, scene_wire, wire};
-use crate::store::{CatalogueError, SceneEntry};
+use crate::scene::RobotId;
+use crate::store::{Catalogue, CatalogueError, SceneEntry};
 
 #[derive(Debug)]
 pub(super) struct Scenes(pub(super) AppState);
@@ -48,9 +49,20 @@ impl SceneService for Scenes {
     ) -> Result<Response<UpdateSceneResponse>, Status> {
         let request = request.into_inner();
         wire::name(&request.scene, "scene")?;
-        let update = scene_wire::update(&request)?;
+        let mut update = scene_wire::update(&request)?;
         // What is not proven yet is proven before other changes have to wait for it.
         self.0.live_scene(&request.scene, "scene").await?;
+        let ids = scene_wire::placed_robot_ids(&request)?;
+        if !ids.is_empty() {
+            let robot = |catalogue: &Catalogue, (index, id): (usize, &RobotId)| match catalogue.robot(id) {
+                Ok(loaded) => Ok(loaded.robot.clone()),
+                Err(CatalogueError::NoRobot(id)) => Err(CatalogueError::NoPlacedRobot { index, id }),
+                Err(error) => Err(error),
+            };
+            let find = move |catalogue: &Catalogue| ids.iter().enumerate().map(|of| robot(catalogue, of)).collect();
+            let robots = self.0.look("place_robots", find).await?;
+            update.robots = scene_wire::placed_robots(&request, robots)?;
+        }
         let scene = self.0.change("scene", move |catalogue| catalogue.update_scene(&request.scene, &update)).await?;
         Ok(Response::new(UpdateSceneResponse { revision: scene.revision() }))
     }

@@ -46,9 +46,11 @@ use super::proto::hierarchy_service_server::{self, HierarchyServiceServer};
 #[cfg(feature = "fit")]
 use super::proto::job_service_server::{self, JobServiceServer};
 use super::proto::query_service_server::{self, QueryServiceServer};
+use super::proto::robot_service_server::{self, RobotServiceServer};
 use super::proto::scene_service_server::{self, SceneServiceServer};
 use super::proto::server_service_server::{self, ServerServiceServer};
 use super::queries::Queries;
+use super::robots::Robots;
 use super::scenes::Scenes;
 use super::server_info::ServerInfo;
 use super::tls::{self, TlsError};
@@ -286,6 +288,7 @@ fn router(app: &AppState, calls: CallLayer) -> Routes {
     let (sized, limit) = (usize::MAX, ConcurrencyLimit::new(limits, app.metrics().clone()));
     let bodies = BodyServiceServer::new(Bodies(app.clone()));
     let blobs = BlobServiceServer::new(BlobCalls(app.clone()));
+    let robots = RobotServiceServer::new(Robots(app.clone()));
     let scenes = SceneServiceServer::new(Scenes(app.clone()));
     let queries = QueryServiceServer::new(Queries(app.clone()));
     let [keepalive, keepalive_timeout] = limits.keepalive();
@@ -305,6 +308,7 @@ fn router(app: &AppState, calls: CallLayer) -> Routes {
         .add_service(ServerServiceServer::new(ServerInfo(app.clone())))
         .add_service(limit.before(bodies.max_decoding_message_size(sized).max_encoding_message_size(sized)))
         .add_service(limit.before(blobs.max_decoding_message_size(sized).max_encoding_message_size(sized)))
+        .add_service(limit.before(robots.max_decoding_message_size(sized).max_encoding_message_size(sized)))
         .add_service(limit.before(scenes.max_decoding_message_size(sized).max_encoding_message_size(sized)))
         .add_service(limit.before(queries.max_decoding_message_size(sized).max_encoding_message_size(sized)))
         // Older clients know v1alpha only. The descriptors are compiled in, so they are read or a
@@ -388,6 +392,7 @@ async fn set_health(health: &HealthReporter, status: ServingStatus) {
         blob_service_server::SERVICE_NAME,
         body_service_server::SERVICE_NAME,
         query_service_server::SERVICE_NAME,
+        robot_service_server::SERVICE_NAME,
         scene_service_server::SERVICE_NAME,
         server_service_server::SERVICE_NAME,
     ];

@@ -7,12 +7,13 @@ use tonic::{Request, Response, Status};
 use super::app_state::AppState;
 use super::backups;
 use super::limits::{
-    MAX_ANSWERS, MAX_BLOB_BYTES, MAX_BLOBS_BYTES, MAX_MESSAGE_BYTES, MAX_RAYS, MAX_STATE_POSES, MAX_STATES,
+    MAX_ANSWERS, MAX_BLOB_BYTES, MAX_BLOBS_BYTES, MAX_CERTIFICATES, MAX_MESSAGE_BYTES, MAX_MOTIONS, MAX_RAYS,
+    MAX_STATE_POSES, MAX_STATES,
 };
 use super::proto::server_service_server::ServerService;
 use super::proto::{BackupRequest, BackupResponse, GetServerInfoRequest, GetServerInfoResponse, Limits};
 use super::wire::count;
-use crate::scene::{MAX_NAME_BYTES, MAX_OBJECTS, MAX_PAIR_RULES, MAX_RUNGS};
+use crate::scene::{MAX_NAME_BYTES, MAX_OBJECTS, MAX_PAIR_RULES, MAX_ROBOTS, MAX_RUNGS};
 use crate::store::{FORK_IDLE, MAX_FORKS};
 
 #[derive(Debug)]
@@ -37,6 +38,8 @@ impl ServerService for ServerInfo {
             max_pair_rules: count(MAX_PAIR_RULES),
             max_answers: count(MAX_ANSWERS),
             max_states: count(MAX_STATES),
+            max_motions: count(MAX_MOTIONS),
+            max_certificates: count(MAX_CERTIFICATES),
             max_state_poses: count(MAX_STATE_POSES),
             max_rays: count(MAX_RAYS),
             max_forks: count(MAX_FORKS),
@@ -46,6 +49,7 @@ impl ServerService for ServerInfo {
             max_calls: count(self.0.limits().calls),
             call_limit_s: self.0.limits().call_s,
             max_rungs: count(MAX_RUNGS),
+            max_robots: count(MAX_ROBOTS),
         };
         Ok(Response::new(GetServerInfoResponse {
             version: env!("CARGO_PKG_VERSION").to_owned(),

@@ -28,7 +28,7 @@ pub(super) fn page(size: u32, token: &str) -> (usize, Option<&str>) {
     (size, Some(token).filter(|token| !token.is_empty()))
 }
 
-pub(super) fn pose(pose: Option<&proto::Pose>, field: &str) -> Result<Pose, Invalid> {
+pub(crate) fn pose(pose: Option<&proto::Pose>, field: &str) -> Result<Pose, Invalid> {
     let missing = |field: String| Invalid::new(field, "is missing; send it, identity and zero included");
     let pose = pose.ok_or_else(|| missing(field.to_owned()))?;
     let at = |leaf: &str| format!("{field}.{leaf}");

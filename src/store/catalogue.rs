@@ -5,9 +5,11 @@ mod error;
 mod jobs;
 mod live_scene;
 mod proofs;
+mod robots;
 mod scene_entry;
 mod scenes;
 mod stored_body;
+mod stored_robot;
 mod stored_scene;
 
 pub use counts::Counts;
@@ -24,7 +26,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use redb::WriteTransaction;
 
 use crate::body::{BodyId, Shape};
-use crate::scene::{Geometry, Ladder, LadderError};
+use crate::scene::{Geometry, Ladder, LadderError, RobotId};
 
 use super::copy::copy;
 use super::disk::Contents;
@@ -33,6 +35,7 @@ use super::rows::{BODIES, LADDERS, LadderRow, json};
 use super::{Store, StoreError};
 use live_scene::Scenes;
 use stored_body::{BodyRow, StoredBody};
+use stored_robot::StoredRobot;
 use stored_scene::StoredScene;
 
 /// The catalogue of one server. Reading takes a lock for the time of a map look-up; changes are
@@ -53,6 +56,7 @@ type Bodies = BTreeMap<BodyId, Arc<StoredBody>>;
 #[derive(Debug, Default)]
 struct State {
     bodies: Bodies,
+    robots: BTreeMap<RobotId, Arc<StoredRobot>>,
     scenes: Scenes,
     /// Scenes that nobody asked for since they were read; none of them is in `scenes`.
     stored_scenes: BTreeMap<Arc<str>, Arc<StoredScene>>,
@@ -131,7 +135,7 @@ impl Catalogue {
         Ok((body, true))
     }
 
-    /// Removes a body that no scene and no ladder uses.
+    /// Removes a body that no scene, no robot and no ladder uses.
     ///
     /// # Errors
     /// When there is none, when it is in use, or when the disk fails.
@@ -143,6 +147,9 @@ impl Catalogue {
             }
             if let Some(ladder) = state.bodies.values().find(|body| body.rungs().contains(id)) {
                 return Err(CatalogueError::RungUsed { id: *id, ladder: *ladder.id() });
+            }
+            if let Some(robot) = state.robot_with(id) {
+                return Err(CatalogueError::BodyOfRobot { id: *id, robot });
             }
             for stored in state.stored_scenes.values() {
                 if let Some((object, _)) = stored.objects().find(|(_, body)| *body == id) {
@@ -222,7 +229,7 @@ impl State {
     /// Everything in the store; bodies in `known` are not proven again.
     fn read(store: &Store, known: &Bodies) -> Result<Self, StoreError> {
         let damaged = |what: String| StoreError::damaged(store.dir(), what);
-        let Contents { bodies, ladders, scenes, objects, jobs, revision_floor } = store.read()?;
+        let Contents { bodies, ladders, scenes, objects, robots, instances, jobs, revision_floor } = store.read()?;
         let jobs = jobs.into_iter().map(|job| (job.id, Arc::new(job))).collect();
         let mut state = Self { revision_floor, jobs, ..Self::default() };
         let parsed = |kind: &str, id: &str| {
@@ -241,7 +248,16 @@ impl State {
             let rungs = row.rungs().iter().map(rung).collect::<Result<_, _>>()?;
             state.read_body(id, BodyRow::Ladder(row, rungs), known);
         }
-        state.read_scenes(scenes, objects, store)?;
+        for (id, row) in robots {
+            let parsed = id.parse::<RobotId>();
+            let id = parsed.map_err(|error| damaged(format!("robot \"{id}\" has no usable id: {error}")))?;
+            let robot = StoredRobot::read(id, row);
+            if let Some(body) = robot.bodies().iter().find(|body| !state.bodies.contains_key(body)) {
+                return Err(damaged(format!("robot {id} has a link of body {body}, which is not stored")));
+            }
+            state.robots.insert(id, Arc::new(robot));
+        }
+        state.read_scenes(scenes, (objects, instances), store)?;
         Ok(state)
     }
 
@@ -260,6 +276,12 @@ impl State {
     fn replace(&mut self, fresh: Self) -> Self {
         let before = std::mem::replace(self, fresh);
         self.revision_floor = self.revision_floor.max(before.revision_floor);
+        // What has the same id has the same content.
+        for (id, robot) in &mut self.robots {
+            if let Some(known) = before.robots.get(id) {
+                *robot = known.clone();
+            }
+        }
         self.keep_live(&before.scenes);
         before
     }

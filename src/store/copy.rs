@@ -5,7 +5,9 @@ use std::path::Path;
 use redb::{Database, Durability, Key, ReadTransaction, ReadableTable, TableDefinition, Value, WriteTransaction};
 
 use super::disk::table;
-use super::rows::{BODIES, JOBS, LADDERS, META, OBJECTS, POINTS, RESERVES, REVISIONS, SCENES, TRIANGLES};
+use super::rows::{
+    BODIES, INSTANCES, JOBS, LADDERS, META, OBJECTS, POINTS, RESERVES, REVISIONS, ROBOTS, SCENES, TRIANGLES,
+};
 
 /// Copies everything that a transaction sees into a new file.
 pub(super) fn copy(read: &ReadTransaction, to: &Path) -> Result<(), redb::Error> {
@@ -15,6 +17,8 @@ pub(super) fn copy(read: &ReadTransaction, to: &Path) -> Result<(), redb::Error>
     copy_table(read, &write, META)?;
     copy_table(read, &write, BODIES)?;
     copy_table(read, &write, LADDERS)?;
+    copy_table(read, &write, ROBOTS)?;
+    copy_table(read, &write, INSTANCES)?;
     copy_table(read, &write, SCENES)?;
     copy_table(read, &write, RESERVES)?;
     copy_table(read, &write, REVISIONS)?;

@@ -13,9 +13,10 @@ use redb::{
 use serde::de::DeserializeOwned;
 
 use super::format_3::{self, FORMAT_3};
+use super::robot_row::{InstanceRow, RobotRow};
 use super::rows::{
-    BODIES, FORMAT, JOBS, LADDERS, LadderRow, META, OBJECTS, ObjectRow, POINTS, RESERVES, REVISIONS, SCENES, SceneRow,
-    TRIANGLES, json,
+    BODIES, FORMAT, FORMAT_4, INSTANCES, JOBS, LADDERS, LadderRow, META, OBJECTS, ObjectRow, POINTS, RESERVES,
+    REVISIONS, ROBOTS, SCENES, SceneRow, TRIANGLES, json,
 };
 use super::{Job, StoreError};
 
@@ -44,6 +45,10 @@ pub(super) struct Contents {
     pub(super) scenes: Vec<(String, u64, SceneRow)>,
     /// Scene, object, row; in the order of scene and object.
     pub(super) objects: Vec<(String, String, ObjectRow)>,
+    /// In the order of their ids.
+    pub(super) robots: Vec<(String, RobotRow)>,
+    /// Scene, name of the robot in it, row; in the order of both.
+    pub(super) instances: Vec<(String, String, InstanceRow)>,
     /// In the order of their ids.
     pub(super) jobs: Vec<Job>,
     pub(super) revision_floor: u64,
@@ -136,18 +141,21 @@ impl Store {
         .map_err(|error| StoreError::from_redb(&self.dir, error))
     }
 
-    /// Checks the format of the tables, makes them in a new file, or writes those of format 3 in
-    /// the present one.
+    /// Checks the format of the tables, makes them in a new file, or writes those of formats 3 and
+    /// 4 in the present one.
     fn check_format(&self, database: &Database) -> Result<(), StoreError> {
         let (tables, found) = self.format(database)?;
         match found {
             Some(FORMAT) => Ok(()),
-            Some(FORMAT_3) => self.upgrade(database),
+            Some(FORMAT_3) => self.upgrade_from_3(database),
+            Some(FORMAT_4) => self.upgrade_from_4(database),
             Some(found) => Err(StoreError::Format { dir: self.dir.clone(), found, expected: FORMAT }),
             None if !tables => commit(database, |transaction| {
                 transaction.open_table(META)?.insert("format", FORMAT)?;
                 transaction.open_table(BODIES)?;
                 transaction.open_table(LADDERS)?;
+                transaction.open_table(ROBOTS)?;
+                transaction.open_table(INSTANCES)?;
                 transaction.open_table(SCENES)?;
                 transaction.open_table(RESERVES)?;
                 transaction.open_table(REVISIONS)?;
@@ -159,12 +167,27 @@ impl Store {
         }
     }
 
-    /// Writes the jobs of format 3 in their present form; all else has the same.
-    fn upgrade(&self, database: &Database) -> Result<(), StoreError> {
+    /// Makes the tables that format 4 has not; all else has the same form.
+    fn upgrade_from_4(&self, database: &Database) -> Result<(), StoreError> {
+        let written = commit(database, |transaction| {
+            transaction.open_table(META)?.insert("format", FORMAT)?;
+            transaction.open_table(ROBOTS)?;
+            transaction.open_table(INSTANCES)?;
+            Ok(())
+        });
+        written.map_err(|error| StoreError::from_redb(&self.dir, error))?;
+        tracing::info!(from = FORMAT_4, to = FORMAT, "the catalogue has a new format");
+        Ok(())
+    }
+
+    /// Writes the jobs of format 3 in their present form, and makes the tables that it has not.
+    fn upgrade_from_3(&self, database: &Database) -> Result<(), StoreError> {
         let read = || jobs::<format_3::FitJob>(&database.begin_read()?);
         let jobs = read().map_err(|error| self.unreadable(error))?;
         let written = commit(database, |transaction| {
             transaction.open_table(META)?.insert("format", FORMAT)?;
+            transaction.open_table(ROBOTS)?;
+            transaction.open_table(INSTANCES)?;
             let mut table = transaction.open_table(JOBS)?;
             for job in &jobs {
                 table.insert(job.id, json(job)?.as_slice())?;
@@ -210,6 +233,8 @@ impl Store {
             ladders: Vec::new(),
             scenes: Vec::new(),
             objects: Vec::new(),
+            robots: Vec::new(),
+            instances: Vec::new(),
             jobs: jobs::<Job>(&read)?,
             revision_floor: read.open_table(META)?.get("revision_floor")?.map_or(0, |value| value.value()),
         };
@@ -242,6 +267,18 @@ impl Store {
             let (scene, name) = key.value();
             let row = parse(row.value(), || format!("object \"{name}\" of scene \"{scene}\""))?;
             contents.objects.push((scene.to_owned(), name.to_owned(), row));
+        }
+        for entry in read.open_table(ROBOTS)?.iter()? {
+            let (id, row) = entry?;
+            let id = id.value().to_owned();
+            let row = parse(row.value(), || format!("robot {id}"))?;
+            contents.robots.push((id, row));
+        }
+        for entry in read.open_table(INSTANCES)?.iter()? {
+            let (key, row) = entry?;
+            let (scene, name) = key.value();
+            let row = parse(row.value(), || format!("robot \"{name}\" of scene \"{scene}\""))?;
+            contents.instances.push((scene.to_owned(), name.to_owned(), row));
         }
         Ok(contents)
     }

@@ -1,4 +1,4 @@
-//! The durable catalogue of bodies, scenes and jobs, embedded in the server.
+//! The durable catalogue of bodies, robots, scenes and jobs, embedded in the server.
 //!
 //! [`Store`] is the file: one redb database, `catalogue.redb`, in the data directory. [`Catalogue`]
 //! holds everything of it in memory for reading and writes every change through. Only this layer
@@ -49,6 +49,8 @@ mod job;
 mod pose_row;
 mod request;
 mod restore;
+mod robot;
+mod robot_row;
 mod rows;
 
 pub use catalogue::{Catalogue, CatalogueError, Counts, FORK_IDLE, LiveScene, MAX_FORKS, Origin, SceneEntry};
@@ -64,6 +66,7 @@ pub use request::{
     FitWithinGap,
 };
 pub use restore::restore;
+pub use robot::{LoadError, LoadedRobot, RobotSource};
 
 #[cfg(test)]
 pub(crate) mod tests;

@@ -10,8 +10,11 @@ use crate::measure::Pose;
 use crate::scene::{Attachment, Geometry, Ladder, Object, Placement, Scene, Subject, SubjectPair, Update};
 
 /// Raised whenever older programs could not read the tables any more, or this one not theirs. 4:
-/// jobs of several kinds.
-pub(super) const FORMAT: u64 = 4;
+/// jobs of several kinds. 5: robots, and their instances in scenes.
+pub(super) const FORMAT: u64 = 5;
+
+/// The format before robots: what it has is the same in the present one.
+pub(super) const FORMAT_4: u64 = 4;
 
 /// `format`, and `revision_floor`: no new scene starts at or below it.
 pub(super) const META: TableDefinition<&str, u64> = TableDefinition::new("meta");
@@ -19,6 +22,11 @@ pub(super) const META: TableDefinition<&str, u64> = TableDefinition::new("meta")
 pub(super) const BODIES: TableDefinition<&str, &[u8]> = TableDefinition::new("bodies");
 /// Ladder id to [`LadderRow`].
 pub(super) const LADDERS: TableDefinition<&str, &[u8]> = TableDefinition::new("ladders");
+/// Robot id to [`RobotRow`](super::robot_row::RobotRow).
+pub(super) const ROBOTS: TableDefinition<&str, &[u8]> = TableDefinition::new("robots");
+/// Scene name and name of a robot in it to [`InstanceRow`](super::robot_row::InstanceRow): new
+/// joint values rewrite one row. The objects of its links have no rows.
+pub(super) const INSTANCES: TableDefinition<(&str, &str), &[u8]> = TableDefinition::new("instances");
 /// Scene name to [`SceneRow`].
 pub(super) const SCENES: TableDefinition<&str, &[u8]> = TableDefinition::new("scenes");
 /// Scene name to a revision up to which revisions may have been given out without being written: a

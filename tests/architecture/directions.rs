@@ -20,14 +20,15 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
     ("branch_and_bound", &["measure", "body", "polynomial"]),
     // Of measure, the pose.
     ("fit", &["branch_and_bound", "measure", "body", "polynomial", "optimize"]),
-    ("scene", &["branch_and_bound", "measure", "body"]),
+    ("robot", &["measure", "body"]),
+    ("scene", &["robot", "branch_and_bound", "measure", "body"]),
     // Of measure, the pose.
-    ("store", &["body", "scene", "measure"]),
+    ("store", &["body", "scene", "robot", "measure"]),
     ("jobs", &["fit", "store", "scene", "body"]),
     // Of polynomial, the instruction set.
-    ("service", &["jobs", "store", "scene", "measure", "body", "polynomial"]),
+    ("service", &["jobs", "store", "scene", "robot", "measure", "body", "polynomial"]),
     // Of service, the messages.
-    ("client", &["service", "jobs", "store", "scene", "measure", "body"]),
+    ("client", &["service", "jobs", "store", "scene", "robot", "measure", "body"]),
     ("load", &["client", "draw", "scene", "measure", "body"]),
     ("draw", &["body", "optimize"]),
     ("demo", ANY),
@@ -41,6 +42,7 @@ const ANY: &[&str] = &[
     "measure",
     "branch_and_bound",
     "fit",
+    "robot",
     "scene",
     "store",
     "jobs",
@@ -52,8 +54,13 @@ const ANY: &[&str] = &[
 ];
 
 /// Where the layers lie: folders whose entries are layers, and crates that are one.
-const SOURCES: [(&str, Option<&str>); 4] =
-    [("crates/core/src", None), ("crates/fit/src", Some("fit")), ("crates/scene/src", Some("scene")), ("src", None)];
+const SOURCES: [(&str, Option<&str>); 5] = [
+    ("crates/core/src", None),
+    ("crates/fit/src", Some("fit")),
+    ("crates/robot/src", Some("robot")),
+    ("crates/scene/src", Some("scene")),
+    ("src", None),
+];
 
 /// Words that one layer (or a few) may name, and no other: wire formats, bytes on disk.
 const PRIVATE_WORDS: &[(&str, &[&str])] = &[
@@ -151,7 +158,7 @@ fn check(layer: &str, text: &str, siblings: &[String]) -> Vec<String> {
     let words: Vec<&str> = code.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
     let mut imports: Vec<String> =
         ["crate::", "sublevel::", "sublevel_core::"].iter().flat_map(|prefix| names_after(&code, prefix)).collect();
-    let crates = [("sublevel_fit", "fit"), ("sublevel_scene", "scene")];
+    let crates = [("sublevel_fit", "fit"), ("sublevel_robot", "robot"), ("sublevel_scene", "scene")];
     imports.extend(crates.iter().filter(|(word, _)| words.contains(word)).map(|(_, layer)| (*layer).to_owned()));
     let mut violations = Vec::new();
     for name in imports {

@@ -12,10 +12,14 @@ use sublevel::service::proto::blob_service_client::BlobServiceClient;
 use sublevel::service::proto::body_service_client::BodyServiceClient;
 use sublevel::service::proto::create_body_request::Source;
 use sublevel::service::proto::evaluate_request::Question;
+#[cfg(feature = "fit")]
 use sublevel::service::proto::fit_service_client::FitServiceClient;
+#[cfg(feature = "fit")]
 use sublevel::service::proto::hierarchy_service_client::HierarchyServiceClient;
+#[cfg(feature = "fit")]
 use sublevel::service::proto::job_service_client::JobServiceClient;
 use sublevel::service::proto::query_service_client::QueryServiceClient;
+use sublevel::service::proto::robot_service_client::RobotServiceClient;
 use sublevel::service::proto::scene_service_client::SceneServiceClient;
 use sublevel::service::proto::{
     self, CreateBodyRequest, CreateSceneRequest, EvaluateRequest, GetSceneRequest, GetSceneResponse, Object,
@@ -103,10 +107,14 @@ impl Running {
         let channel = endpoint.connect().await.expect("the server answers");
         Clients {
             bodies: BodyServiceClient::new(channel.clone()),
+            robots: RobotServiceClient::new(channel.clone()),
             scenes: SceneServiceClient::new(channel.clone()),
             queries: QueryServiceClient::new(channel.clone()),
+            #[cfg(feature = "fit")]
             fits: FitServiceClient::new(channel.clone()),
+            #[cfg(feature = "fit")]
             hierarchy: HierarchyServiceClient::new(channel.clone()),
+            #[cfg(feature = "fit")]
             jobs: JobServiceClient::new(channel.clone()),
             blobs: BlobServiceClient::new(channel.clone()),
             channel,
@@ -173,10 +181,14 @@ pub(crate) fn run(args: &[&str]) -> Output {
 
 pub(crate) struct Clients {
     pub(crate) bodies: BodyServiceClient<Channel>,
+    pub(crate) robots: RobotServiceClient<Channel>,
     pub(crate) scenes: SceneServiceClient<Channel>,
     pub(crate) queries: QueryServiceClient<Channel>,
+    #[cfg(feature = "fit")]
     pub(crate) fits: FitServiceClient<Channel>,
+    #[cfg(feature = "fit")]
     pub(crate) hierarchy: HierarchyServiceClient<Channel>,
+    #[cfg(feature = "fit")]
     pub(crate) jobs: JobServiceClient<Channel>,
     pub(crate) blobs: BlobServiceClient<Channel>,
     pub(crate) channel: Channel,

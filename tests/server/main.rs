@@ -17,4 +17,5 @@ mod operation;
 mod operations_page;
 mod readme;
 mod refusals;
+mod robots;
 mod streams;

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use crate::body::BodyId;
-use crate::scene::{LadderError, NameError, SceneError};
+use crate::scene::{LadderError, NameError, RobotId, SceneError};
 use crate::store::StoreError;
 use crate::store::job::MAX_QUEUED_JOBS;
+use crate::store::robot::LoadError;
 
 use super::live_scene::MAX_FORKS;
 
@@ -32,6 +33,46 @@ pub enum CatalogueError {
         id: BodyId,
         /// The ladder.
         ladder: BodyId,
+    },
+    /// The body is that of a link.
+    #[error("body {id} is that of a link of robot {robot}; delete the robot first")]
+    BodyOfRobot {
+        /// The body.
+        id: BodyId,
+        /// The robot.
+        robot: RobotId,
+    },
+    /// No robot has this id.
+    #[error("no robot {0}; list the robots, or load it first")]
+    NoRobot(RobotId),
+    /// An update places a robot that is not there.
+    #[error("no robot {id}; list the robots, or load it first")]
+    NoPlacedRobot {
+        /// Position among the robots that the update places.
+        index: usize,
+        /// The robot.
+        id: RobotId,
+    },
+    /// The robot is in use.
+    #[error("robot {id} is \"{robot}\" of scene \"{scene}\"; remove it there first")]
+    RobotUsed {
+        /// The robot.
+        id: RobotId,
+        /// A scene that has it.
+        scene: Arc<str>,
+        /// Its name there.
+        robot: Arc<str>,
+    },
+    /// The robot cannot be loaded.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// The robot on disk is not what was stored.
+    #[error("robot {id} is damaged: {why}; delete what uses it and load it again, or restore a backup")]
+    DamagedRobot {
+        /// The robot.
+        id: RobotId,
+        /// The damage.
+        why: Arc<str>,
     },
     /// A rung was stored before, without what a ladder needs of it.
     #[error("a rung of the ladder is stored already, and {0}; delete that body, and store the ladder again")]

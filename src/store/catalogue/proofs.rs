@@ -51,6 +51,12 @@ impl Catalogue {
         }
         let rest = self.read(|state| state.bodies.values().filter(|body| !body.is_examined()).cloned().collect());
         self.examine(rest, stop);
+        let robots: Vec<_> = self.read(|state| state.robots.keys().copied().collect());
+        for id in robots.iter().take_while(|_| !stop.load(Ordering::Relaxed)) {
+            if let Err(error) = self.robot(id) {
+                tracing::error!(%id, %error, "a robot of the catalogue cannot be used");
+            }
+        }
         self.write(|state| self.note_proofs(state));
         !stop.load(Ordering::Relaxed)
     }
@@ -62,11 +68,13 @@ impl Catalogue {
 
     /// What is known to be damaged after [`Catalogue::prove_all`].
     pub fn damage(&self) -> Vec<CatalogueError> {
-        let (bodies, scenes) = self.read(|state| {
+        let (bodies, robots, scenes) = self.read(|state| {
             let damaged: Vec<_> = state.bodies.values().filter(|body| body.is_damaged()).cloned().collect();
-            (damaged, state.stored_scenes.keys().cloned().collect::<Vec<_>>())
+            let robots = state.robots.iter().filter(|(_, robot)| robot.is_damaged()).map(|(id, _)| *id);
+            (damaged, robots.collect::<Vec<_>>(), state.stored_scenes.keys().cloned().collect::<Vec<_>>())
         });
         let bodies = bodies.iter().filter_map(|body| body.geometry().err());
+        let bodies = bodies.chain(robots.iter().filter_map(|id| self.robot(id).err()));
         bodies.chain(scenes.iter().filter_map(|name| self.live_scene(name).err())).collect()
     }
 
@@ -84,7 +92,8 @@ impl Catalogue {
 
     /// Makes a scene that was read from the disk a live one, when somebody asks for it.
     pub(super) fn enliven(&self, stored: &Arc<StoredScene>) -> Result<(), CatalogueError> {
-        let proven = self.prove_bodies(stored.objects().map(|(_, body)| body));
+        let robots = stored.robots().try_for_each(|(_, id)| self.robot(id).map(drop));
+        let proven = robots.and_then(|()| self.prove_bodies(stored.objects().map(|(_, body)| body)));
         let live = proven.and_then(|()| self.live(stored)).inspect_err(|_| stored.set_damaged())?;
         let live = Arc::new(live);
         self.write(|state| {
@@ -99,7 +108,10 @@ impl Catalogue {
     }
 
     fn live(&self, stored: &StoredScene) -> Result<LiveScene, CatalogueError> {
-        stored.live(|id: &BodyId| -> Option<Geometry> { self.geometry(id).ok() })
+        stored.live(
+            |id: &BodyId| -> Option<Geometry> { self.geometry(id).ok() },
+            |id| Some(self.robot(id).ok()?.robot.clone()),
+        )
     }
 
     fn bodies_of_scene(&self, name: &str) -> Vec<Arc<StoredBody>> {
@@ -120,5 +132,6 @@ impl State {
     pub(super) fn is_proven(&self) -> bool {
         self.stored_scenes.values().all(|stored| stored.is_damaged())
             && self.bodies.values().all(|body| body.is_examined())
+            && self.robots.values().all(|robot| robot.is_examined())
     }
 }

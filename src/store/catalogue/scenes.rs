@@ -17,13 +17,17 @@ use redb::WriteTransaction;
 use crate::body::BodyId;
 use crate::measure::Pose;
 use crate::scene::{Placement, Scene, SceneError, Slot, Update, check_name};
-use crate::store::rows::{META, OBJECTS, ObjectRow, RESERVES, REVISIONS, SCENES, SceneRow, json};
+use crate::store::robot_row::InstanceRow;
+use crate::store::rows::{INSTANCES, META, OBJECTS, ObjectRow, RESERVES, REVISIONS, SCENES, SceneRow, json};
 use crate::store::{Store, StoreError};
 
 use super::live_scene::{LiveScene, MAX_FORKS, Origin, RESERVE, Scenes};
 use super::scene_entry::SceneEntry;
 use super::stored_scene::StoredScene;
 use super::{Catalogue, CatalogueError, State};
+
+/// Rows with the names of their scenes and their own.
+type RowsOf<T> = Vec<(String, String, T)>;
 
 impl Catalogue {
     /// A scene or fork by name; its bodies are proven here if they are not yet. Forks that are
@@ -102,12 +106,14 @@ impl Catalogue {
         if live.origin.is_some() {
             // Deleting a body looks at forks, too, under the same lock.
             let _store = self.writer()?;
+            self.check_placed_robots(update)?;
             let _changing = live.change();
             let next = live.snapshot().updated(update, bodies)?;
             live.publish(next.clone());
             return Ok(next);
         }
         let mut store = self.writer()?;
+        self.check_placed_robots(update)?;
         let live = self.live_scene(name)?;
         let _changing = live.change();
         let scene = live.snapshot();
@@ -134,6 +140,7 @@ impl Catalogue {
                 put_scene(transaction, next)?;
             }
             put_objects(transaction, scene, next, written)?;
+            put_robots(transaction, scene, next, written)?;
             transaction.open_table(RESERVES)?.remove(&**next.name())?;
             Ok(())
         })?;
@@ -152,7 +159,8 @@ impl Catalogue {
         if let Some(stored) = self.read(|state| state.stored_scenes.get(name).cloned()) {
             // Not proven for that: one that is damaged can be deleted.
             let objects = stored.objects().map(|(object, _)| object);
-            let floor = self.forget_scene(&mut store, name, stored.revision, objects)?;
+            let robots = stored.robots().map(|(robot, _)| robot);
+            let floor = self.forget_scene(&mut store, (name, stored.revision), objects, robots)?;
             self.write(|state| {
                 state.revision_floor = state.revision_floor.max(floor);
                 state.scenes.remove(name);
@@ -167,7 +175,8 @@ impl Catalogue {
         let scene = live.snapshot();
         if live.origin.is_none() {
             let objects = scene.objects().map(|(_, object, _)| &*object.name);
-            self.forget_scene(&mut store, name, scene.revision(), objects)?;
+            let robots = scene.robots().map(|robot| &**robot.name());
+            self.forget_scene(&mut store, (name, scene.revision()), objects, robots)?;
             tracing::debug!(scene = name, revision = scene.revision(), "scene deleted");
         }
         self.write(|state| state.remove_scene(name));
@@ -178,9 +187,9 @@ impl Catalogue {
     fn forget_scene<'a>(
         &self,
         store: &mut Store,
-        name: &str,
-        revision: u64,
-        names: impl Iterator<Item = &'a str>,
+        (name, revision): (&str, u64),
+        objects: impl Iterator<Item = &'a str>,
+        robots: impl Iterator<Item = &'a str>,
     ) -> Result<u64, StoreError> {
         let floor = self.read(|state| state.revision_floor).max(revision);
         self.commit(store, |transaction| {
@@ -188,9 +197,13 @@ impl Catalogue {
             transaction.open_table(SCENES)?.remove(name)?;
             transaction.open_table(REVISIONS)?.remove(name)?;
             transaction.open_table(RESERVES)?.remove(name)?;
-            let mut objects = transaction.open_table(OBJECTS)?;
-            for object in names {
-                objects.remove((name, object))?;
+            let mut rows = transaction.open_table(OBJECTS)?;
+            for object in objects {
+                rows.remove((name, object))?;
+            }
+            let mut rows = transaction.open_table(INSTANCES)?;
+            for robot in robots {
+                rows.remove((name, robot))?;
             }
             Ok(())
         })?;
@@ -380,7 +393,7 @@ impl State {
             let Some(stored) = self.stored_scenes.get(name) else { continue };
             if stored.revision > live.snapshot().revision() {
                 // The change that seemed to fail is on disk; its bodies were proven for it.
-                match stored.live(|id| self.bodies.get(id)?.geometry().ok()) {
+                match stored.live(|id| self.bodies.get(id)?.geometry().ok(), |id| self.known_robot(id)) {
                     Ok(there) => {
                         live.written.store(stored.revision, Ordering::Relaxed);
                         live.publish(there.snapshot());
@@ -400,7 +413,7 @@ impl State {
     pub(super) fn read_scenes(
         &mut self,
         scenes: Vec<(String, u64, SceneRow)>,
-        objects: Vec<(String, String, ObjectRow)>,
+        (objects, instances): (RowsOf<ObjectRow>, RowsOf<InstanceRow>),
         store: &Store,
     ) -> Result<(), StoreError> {
         let damaged = |what: String| StoreError::damaged(store.dir(), what);
@@ -413,14 +426,24 @@ impl State {
             }
             placed.entry(scene).or_default().push(placement);
         }
+        let mut robots: HashMap<String, Vec<(String, InstanceRow)>> = HashMap::new();
+        for (scene, name, row) in instances {
+            let id = row.robot();
+            if !self.robots.contains_key(id) {
+                let what = format!("robot \"{name}\" of scene \"{scene}\" is robot {id}, which is not stored");
+                return Err(damaged(what));
+            }
+            robots.entry(scene).or_default().push((name, row));
+        }
         for (name, revision, row) in scenes {
             check_name(&name).map_err(|error| damaged(format!("scene \"{name}\" has a name that {error}")))?;
             let placed = placed.remove(&name).unwrap_or_default();
-            let stored = StoredScene::new(&name, revision, &row, placed);
+            let robots = robots.remove(&name).unwrap_or_default();
+            let stored = StoredScene::new(&name, revision, &row, (placed, robots));
             self.stored_scenes.insert(stored.name.clone(), Arc::new(stored));
         }
-        match placed.keys().next() {
-            Some(scene) => Err(damaged(format!("objects of scene \"{scene}\", which is not stored"))),
+        match placed.keys().chain(robots.keys()).next() {
+            Some(scene) => Err(damaged(format!("objects or robots of scene \"{scene}\", which is not stored"))),
             None => Ok(()),
         }
     }
@@ -442,7 +465,10 @@ fn put_objects(transaction: &WriteTransaction, before: &Scene, scene: &Scene, wr
     let mut rows = transaction.open_table(OBJECTS)?;
     let name = &**scene.name();
     let mut put = |slot: Slot| -> Result<(), redb::Error> {
-        if let (Some(object), Some(pose)) = (scene.object(slot), scene.pose(slot)) {
+        // Links of robots are where their joints put them.
+        if let (Some(object), Some(pose)) = (scene.object(slot), scene.pose(slot))
+            && object.link.is_none()
+        {
             rows.insert((name, &*object.name), json(&ObjectRow::of(object, pose))?.as_slice())?;
         }
         Ok(())
@@ -463,6 +489,21 @@ fn put_objects(transaction: &WriteTransaction, before: &Scene, scene: &Scene, wr
                 rows.remove((name, &*object.name))?;
             }
         }
+    }
+    Ok(())
+}
+
+/// Rows of robots that are new, changed or moved since a revision, and those of robots that are
+/// gone.
+fn put_robots(transaction: &WriteTransaction, before: &Scene, scene: &Scene, written: u64) -> Result<(), redb::Error> {
+    let mut rows = transaction.open_table(INSTANCES)?;
+    let name = &**scene.name();
+    let is_same = scene.same_structure(before);
+    for robot in scene.robots().filter(|robot| !is_same || robot.moved_at() > written) {
+        rows.insert((name, &**robot.name()), json(&InstanceRow::of(scene, &robot))?.as_slice())?;
+    }
+    for robot in before.robots().filter(|robot| scene.robot(robot.name()).is_none()) {
+        rows.remove((name, &**robot.name()))?;
     }
     Ok(())
 }

@@ -9,19 +9,60 @@ use redb::{ReadableTable, TableDefinition, WriteTransaction};
 use super::{Disk, at, ball, placed};
 use crate::body::Shape;
 use crate::measure::HalfSpace;
-use crate::scene::{Attach, Geometry, Ladder, NamedHalfSpace, Placement, Subject, Update};
-use crate::store::rows::{BODIES, FORMAT, JOBS, LADDERS, META, OBJECTS, RESERVES, REVISIONS, SCENES};
-use crate::store::{Catalogue, FitOutcome, JobOutcome, JobState, StoreError};
+use crate::scene::{
+    Attach, Attachment, Geometry, Ladder, NamedHalfSpace, NamedJointValues, PlaceRobot, Placement, Subject, Update,
+};
+use crate::store::rows::{
+    BODIES, FORMAT, INSTANCES, JOBS, LADDERS, META, OBJECTS, RESERVES, REVISIONS, ROBOTS, SCENES,
+};
+use crate::store::{Catalogue, FitOutcome, JobOutcome, JobState, RobotSource, StoreError};
 
 /// Rows of format 3: key and value of each table, values as text.
 const FORMAT_3: &str = include_str!("format_3.json");
 
-/// Rows of format 4.
+/// Rows of format 4, which knew no robots.
 const FORMAT_4: &str = include_str!("format_4.json");
+
+/// Rows of format 5.
+const FORMAT_5: &str = include_str!("format_5.json");
+
+/// A robot of two links of primitives, one of which a body replaces.
+const URDF: &str = r#"<robot name="arm">
+  <link name="base"><collision><geometry><sphere radius="0.5"/></geometry></collision></link>
+  <link name="tool"><collision><geometry><mesh filename="tool.stl"/></geometry></collision></link>
+  <joint name="turn" type="continuous"><parent link="base"/><child link="tool"/><origin xyz="0 0 2"/></joint>
+</robot>"#;
 
 type Rows = BTreeMap<String, BTreeMap<String, String>>;
 
-/// Something of every kind.
+/// A robot in two scenes.
+fn fill_robots(catalogue: &Catalogue) {
+    let bodies = BTreeMap::from([("tool".into(), *ball(0.5).id())]);
+    let source = RobotSource { urdf: URDF.into(), srdf: "<robot name=\"arm\"/>".into(), bodies };
+    let (loaded, created) = catalogue.load_robot(source).expect("a robot");
+    assert!(created);
+    catalogue.create_scene("hall").expect("made");
+    let joints = NamedJointValues { joints: vec!["turn".into()], values: vec![0.25] };
+    let placed = PlaceRobot { name: "arm".into(), robot: loaded.robot.clone(), base: at(0.5), joints };
+    let attachment = Attachment { to: "arm/tool".into(), pose: at(1.0), touch: Vec::new() };
+    let held = Placement {
+        name: "held".into(),
+        body: *ball(0.5).id(),
+        pose: None,
+        group: "".into(),
+        padding_m: None,
+        attachment: Some(attachment),
+    };
+    let update = Update {
+        upserts: vec![held],
+        robots: vec![placed],
+        object_paddings: vec![("arm/base".into(), Some(0.125))],
+        ..Update::default()
+    };
+    catalogue.update_scene("hall", &update).expect("placed");
+}
+
+/// Something of every kind but robots.
 fn fill(catalogue: &Catalogue) {
     let balls = [1.0, 0.75].map(|radius| {
         let body = ball(radius).with_points(&[Vector3::new(0.5, 0.0, 0.0)]).expect("inside");
@@ -62,7 +103,7 @@ fn fill(catalogue: &Catalogue) {
 
 fn text_rows(transaction: &WriteTransaction) -> Rows {
     let mut rows = Rows::new();
-    for (name, definition) in [("bodies", BODIES), ("ladders", LADDERS), ("scenes", SCENES)] {
+    for (name, definition) in [("bodies", BODIES), ("ladders", LADDERS), ("scenes", SCENES), ("robots", ROBOTS)] {
         let table = transaction.open_table(definition).expect("a table");
         let text = |value: &[u8]| String::from_utf8(value.to_vec()).expect("text");
         let all = table.iter().expect("rows").map(|row| row.expect("a row"));
@@ -73,12 +114,14 @@ fn text_rows(transaction: &WriteTransaction) -> Rows {
         let all = table.iter().expect("rows").map(|row| row.expect("a row"));
         rows.insert(name.into(), all.map(|(key, value)| (key.value().to_owned(), value.value().to_string())).collect());
     }
-    let objects = transaction.open_table(OBJECTS).expect("a table");
-    let objects = objects.iter().expect("rows").map(|row| row.expect("a row")).map(|(key, value)| {
-        let (scene, name) = key.value();
-        (format!("{scene}/{name}"), String::from_utf8(value.value().to_vec()).expect("text"))
-    });
-    rows.insert("objects".into(), objects.collect());
+    for (name, definition) in [("objects", OBJECTS), ("instances", INSTANCES)] {
+        let table = transaction.open_table(definition).expect("a table");
+        let all = table.iter().expect("rows").map(|row| row.expect("a row")).map(|(key, value)| {
+            let (scene, name) = key.value();
+            (format!("{scene}/{name}"), String::from_utf8(value.value().to_vec()).expect("text"))
+        });
+        rows.insert(name.into(), all.collect());
+    }
     let jobs = transaction.open_table(JOBS).expect("a table");
     let jobs = jobs.iter().expect("rows").map(|row| row.expect("a row"));
     let jobs =
@@ -90,10 +133,11 @@ fn text_rows(transaction: &WriteTransaction) -> Rows {
 fn write_rows(transaction: &WriteTransaction, rows: &Rows) {
     let put = |definition: TableDefinition<&str, &[u8]>, name: &str| {
         let mut table = transaction.open_table(definition).expect("a table");
-        for (key, value) in &rows[name] {
+        for (key, value) in rows.get(name).into_iter().flatten() {
             table.insert(key.as_str(), value.as_bytes()).expect("written");
         }
     };
+    put(ROBOTS, "robots");
     put(BODIES, "bodies");
     put(LADDERS, "ladders");
     put(SCENES, "scenes");
@@ -103,9 +147,11 @@ fn write_rows(transaction: &WriteTransaction, rows: &Rows) {
             table.insert(key.as_str(), value.parse::<u64>().expect("a number")).expect("written");
         }
     }
-    let mut objects = transaction.open_table(OBJECTS).expect("a table");
-    for (key, value) in &rows["objects"] {
-        objects.insert(key.split_once('/').expect("scene and name"), value.as_bytes()).expect("written");
+    for (name, definition) in [("objects", OBJECTS), ("instances", INSTANCES)] {
+        let mut table = transaction.open_table(definition).expect("a table");
+        for (key, value) in rows.get(name).into_iter().flatten() {
+            table.insert(key.split_once('/').expect("scene and name"), value.as_bytes()).expect("written");
+        }
     }
     let mut jobs = transaction.open_table(JOBS).expect("a table");
     for (key, value) in &rows["jobs"] {
@@ -115,21 +161,22 @@ fn write_rows(transaction: &WriteTransaction, rows: &Rows) {
 
 /// `UPDATE_FORMAT=1` writes the rows again, which is right only together with a new number.
 #[test]
-fn rows_are_written_as_format_4_has_them() {
+fn rows_are_written_as_format_5_has_them() {
     let disk = Disk::default();
     let catalogue = disk.load().expect("a new catalogue");
     fill(&catalogue);
+    fill_robots(&catalogue);
     drop(catalogue);
     let mut written = Rows::new();
     disk.meddle(|transaction| written = text_rows(transaction));
     if std::env::var_os("UPDATE_FORMAT").is_some() {
         let text = serde_json::to_string_pretty(&written).expect("text") + "\n";
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/src/store/tests/format_4.json");
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/src/store/tests/format_5.json");
         std::fs::write(path, text).expect("written");
         return;
     }
-    let known = rows_in(FORMAT_4);
-    assert_eq!((FORMAT, &written["meta"]), (4, &known["meta"]));
+    let known = rows_in(FORMAT_5);
+    assert_eq!((FORMAT, &written["meta"]), (5, &known["meta"]));
     for (table, rows) in &known {
         for (key, row) in rows {
             assert_eq!(written[table].get(key), Some(row), "{table} {key}: give the format a new number");
@@ -151,24 +198,60 @@ fn holding(rows: &Rows) -> Disk {
 }
 
 #[test]
-fn rows_of_format_4_are_read() {
-    let read = holding(&rows_in(FORMAT_4)).load().expect("loads");
-    holds_what_was_filled_in(&read);
+fn rows_of_format_5_are_read() {
+    let read = holding(&rows_in(FORMAT_5)).load().expect("loads");
     let whole = Disk::default().load().expect("a new catalogue");
     fill(&whole);
+    fill_robots(&whole);
+    let [found, made] = [&read, &whole].map(|catalogue| catalogue.scene("hall").expect("there"));
+    assert_eq!((found.revision(), found.len()), (made.revision(), 3));
+    for (slot, object, pose) in made.objects() {
+        let other = found.slot(&object.name).expect("there");
+        assert_eq!((found.pose(other), made.padding_m(slot, slot)), (Some(pose), found.padding_m(other, other)));
+    }
+    let [found, made] = [&found, &made].map(|scene| scene.robot("arm").expect("there"));
+    assert_eq!((found.base(), found.configuration()), (made.base(), made.configuration()));
+    assert_eq!((found.robot().id(), found.configuration()), (made.robot().id(), &[0.25][..]));
     assert_eq!(read.jobs(None, 9).0, whole.jobs(None, 9).0);
 }
 
 /// Opening a file writes it in the present format, once.
 #[test]
-fn rows_of_format_3_are_read_and_written_as_those_of_format_4() {
+fn rows_of_format_4_are_read_and_written_as_those_of_format_5() {
+    let disk = holding(&rows_in(FORMAT_4));
+    for _ in 0..2 {
+        holds_what_was_filled_in(&disk.load().expect("loads"));
+    }
+    let mut written = Rows::new();
+    disk.meddle(|transaction| written = text_rows(transaction));
+    assert_eq!(written, in_format_5(FORMAT_4));
+
+    // A full disk leaves it as it was.
+    let disk = holding(&rows_in(FORMAT_4));
+    disk.set_full(true);
+    assert!(matches!(disk.load(), Err(StoreError::Full { .. })));
+    disk.set_full(false);
+    holds_what_was_filled_in(&disk.load().expect("loads"));
+}
+
+/// The same rows with another number, and without robots.
+fn in_format_5(rows: &str) -> Rows {
+    let mut rows = rows_in(rows);
+    rows.get_mut("meta").expect("meta").insert("format".into(), "5".into());
+    rows.extend([("robots".into(), BTreeMap::new()), ("instances".into(), BTreeMap::new())]);
+    rows
+}
+
+/// Opening a file writes it in the present format, once.
+#[test]
+fn rows_of_format_3_are_read_and_written_as_those_of_format_5() {
     let disk = holding(&rows_in(FORMAT_3));
     for _ in 0..2 {
         holds_what_was_filled_in(&disk.load().expect("loads"));
     }
     let mut written = Rows::new();
     disk.meddle(|transaction| written = text_rows(transaction));
-    let mut known = rows_in(FORMAT_4);
+    let mut known = in_format_5(FORMAT_4);
     known.get_mut("jobs").expect("jobs").remove("2").expect("the solve, which format 3 has not");
     assert_eq!(written, known);
 
@@ -226,7 +309,7 @@ fn holds_what_was_filled_in(read: &Catalogue) {
 
 #[test]
 fn other_formats_are_refused_by_number() {
-    for format in [1, 2, 5, 99] {
+    for format in [1, 2, 6, 99] {
         let disk = Disk::default();
         drop(disk.load().expect("a new catalogue"));
         disk.meddle(|transaction| {
