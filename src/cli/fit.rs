@@ -2,7 +2,7 @@
 
 pub(super) mod args;
 mod choice;
-mod length;
+pub(super) mod length;
 mod reading_row;
 pub(super) mod remote;
 mod report;

@@ -28,6 +28,8 @@ mod primitive;
 mod progress;
 mod push;
 mod record;
+#[cfg(feature = "fit")]
+mod robot;
 mod scene;
 mod serve;
 mod show;
@@ -52,7 +54,7 @@ use std::process::ExitCode;
 )]
 #[cfg_attr(
     not(feature = "fit"),
-    doc = "Built without the feature 'fit': 'fit', 'certify', 'hierarchy' and 'demo' are left out."
+    doc = "Built without the feature 'fit': 'fit', 'certify', 'hierarchy', 'robot' and 'demo' are left out."
 )]
 #[derive(Debug, Parser)]
 #[command(version, max_term_width = 100)]
@@ -71,6 +73,8 @@ enum Command {
     Serve(serve::ServeArgs),
     Push(push::PushArgs),
     Primitive(primitive::PrimitiveArgs),
+    #[cfg(feature = "fit")]
+    Robot(robot::args::RobotArgs),
     Scene(scene::SceneArgs),
     Health(health::HealthArgs),
     Token(token::TokenArgs),
@@ -101,6 +105,8 @@ pub fn main() -> ExitCode {
         Command::Serve(args) => serve::run(&args).map(done),
         Command::Push(args) => push::run(&args).map(done),
         Command::Primitive(args) => primitive::run(&args).map(done),
+        #[cfg(feature = "fit")]
+        Command::Robot(args) => robot::run(&args).map(done),
         Command::Scene(args) => scene::run(&args).map(done),
         Command::Health(args) => health::run(&args),
         Command::Token(args) => token::run(&args).map(done),

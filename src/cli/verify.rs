@@ -11,6 +11,7 @@ use crate::body::{BasicSet, Body, Compound, Obstacle, Shape, SosBody};
 use crate::body::{Covering, Division, NotCovered, Piece};
 #[cfg(feature = "fit")]
 use crate::fit::Mesh;
+use crate::robot::motion::Certificate;
 #[cfg(feature = "fit")]
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -43,6 +44,9 @@ pub(super) fn run(args: &VerifyArgs) -> Outcome {
         );
     }
     let text = read(&args.file)?;
+    if Certificate::is_file(&text) {
+        return motion(args, &text);
+    }
     if SosBody::is_file(&text) {
         return sos_body::verify(args, &text);
     }
@@ -96,6 +100,67 @@ pub(super) fn run(args: &VerifyArgs) -> Outcome {
         for (path, proven) in args.contains.iter().zip(report.contains_sets_proven.iter().flatten()) {
             let verdict = if *proven { "proven to contain" } else { "not proven to contain" };
             writeln!(out, "{verdict} all of {}", path.display())?;
+        }
+    }
+    if let Some(trouble) = &trouble {
+        eprintln!("error: {}", one_line(trouble));
+    }
+    Ok(trouble.is_none())
+}
+
+/// What a certificate of a motion proves.
+#[derive(Serialize)]
+struct MotionReport {
+    free_proven: bool,
+    /// All pairs keep at least this signed distance less their padding, metres; none if there are
+    /// no pairs, or if nothing is proven.
+    clearance_lower_m: Option<f64>,
+    margin_m: Option<f64>,
+    configurations: Option<usize>,
+}
+
+/// Checks the certificate of a motion.
+fn motion(args: &VerifyArgs, text: &str) -> Outcome {
+    #[cfg(feature = "fit")]
+    let has_points = args.points.is_some();
+    #[cfg(not(feature = "fit"))]
+    let has_points = false;
+    if has_points || !args.contains.is_empty() {
+        return Err(
+            "--points and --contains are about bodies, not about the certificate of a motion; leave them out".into()
+        );
+    }
+    let checked = Certificate::from_json(text).and_then(|certificate| Ok((certificate.verify()?, certificate)));
+    let (report, trouble) = match &checked {
+        Ok((verified, certificate)) => {
+            let report = MotionReport {
+                free_proven: true,
+                clearance_lower_m: Some(verified.clearance_lower_m).filter(|clearance| clearance.is_finite()),
+                margin_m: Some(certificate.margin_m()),
+                configurations: Some(verified.configurations),
+            };
+            (report, None)
+        }
+        Err(error) => {
+            let report =
+                MotionReport { free_proven: false, clearance_lower_m: None, margin_m: None, configurations: None };
+            (report, Some(format!("{}: {error}", args.file.display())))
+        }
+    };
+    let mut out = io::stdout().lock();
+    if args.json {
+        serde_json::to_writer(&mut out, &report)?;
+        writeln!(out)?;
+    } else if let Ok((verified, certificate)) = &checked {
+        let segments = certificate.path().segments();
+        writeln!(out, "{}: proven free over all of its path of {segments} segments", args.file.display())?;
+        let configurations = verified.configurations;
+        if verified.pairs == 0 {
+            writeln!(out, "there are no pairs that could touch")?;
+        } else {
+            // Rounded downwards.
+            let least = (verified.clearance_lower_m * 1e4).floor() / 1e4;
+            writeln!(out, "{} pairs keep at least {least:.4} m, by {configurations} configurations", verified.pairs)?;
         }
     }
     if let Some(trouble) = &trouble {

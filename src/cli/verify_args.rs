@@ -17,6 +17,9 @@ use std::path::PathBuf;
 /// An sos-body, which need not be convex, is proven to be of a sum of squares and as near to convex
 /// as it says; with --points, to hold the points, and no fewer triangles between them than it says.
 ///
+/// A certificate of a motion, as CheckMotions sends it, is checked without a solver: every body is
+/// re-proven, and the motion of the robot is proven to be free once more.
+///
 /// Examples:
 ///
 /// sublevel verify bodies/mug-d6.json --points mug.obj --scale 0.001
@@ -24,7 +27,7 @@ use std::path::PathBuf;
 /// sublevel verify bodies/shelf-d4.json --contains board-1.json board-2.json
 #[derive(Debug, clap::Args)]
 pub(super) struct VerifyArgs {
-    /// File of a body, a compound or an sos-body
+    /// File of a body, a compound, an sos-body, or a certificate of a motion
     pub(super) file: PathBuf,
     /// Mesh or points that the body must contain, mesh that the compound must cover
     #[cfg(feature = "fit")]

@@ -1,7 +1,7 @@
 //! Lengths as arguments.
 
 /// A length with its unit, or in metres.
-pub(super) fn length(text: &str) -> Result<f64, String> {
+pub(in crate::cli) fn length(text: &str) -> Result<f64, String> {
     let units = [("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("", 1.0)];
     units
         .into_iter()
