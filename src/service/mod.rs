@@ -57,6 +57,7 @@ pub(crate) mod scene_wire;
 mod scenes;
 mod server;
 mod server_info;
+mod snapshot;
 mod tls;
 pub(crate) mod tokens;
 mod watched_files;

@@ -12,8 +12,8 @@ use super::packed::{self, Packed};
 use super::proto::{
     self, CheckMotionsRequest, CheckMotionsResponse, MovingObjects, VerifyMotionRequest, VerifyMotionResponse,
 };
-use super::queries::snapshot;
 use super::query_wire::{self, NOTHING, NameTable};
+use super::snapshot::snapshot;
 use crate::robot::motion::{Certificate, MotionAnswer, MotionProblemError, MotionVerdict, PathError};
 use crate::scene::Scene;
 use crate::scene::query::{MotionSettings, MovingObject, PathKind, RobotMotionAnswer, RobotMotions, RobotMotionsError};

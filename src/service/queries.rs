@@ -10,7 +10,7 @@ use super::app_state::{AppState, stopped};
 use super::call_time::CallTime;
 use super::columns;
 use super::error::{self, Invalid};
-use super::limits::{MAX_ANSWERS, MAX_RAYS, REVISION_PATIENCE};
+use super::limits::{MAX_ANSWERS, MAX_RAYS};
 use super::packed::{self, Packed};
 use super::placed_states::PlacedStates;
 use super::proto::evaluate_request::Question;
@@ -21,13 +21,13 @@ use super::proto::{
     EvaluateStreamResponse, StreamError, VerifyMotionRequest, VerifyMotionResponse, WatchRequest, WatchResponse,
 };
 use super::query_wire::{NOTHING, NameTable, Outputs};
+use super::snapshot::snapshot;
 use super::{contact_watch, motions, query_wire, wire};
 use crate::scene::query::{
     Answer, AnswerStatus, Ask, Certainty, Clearance, Found, Pairs, RayAnswer, Rays, StateAnswer, StateVerdict, States,
     Within, closest_pair, combined,
 };
 use crate::scene::{Scene, Stop};
-use crate::store::CatalogueError;
 
 #[derive(Debug)]
 pub(super) struct Queries(pub(super) AppState);
@@ -210,26 +210,6 @@ impl QueryService for Queries {
         let (sender, stream) = mpsc::channel(1);
         tokio::spawn(contact_watch::run(self.0.clone(), live, (request, pause), sender));
         Ok(Response::new(ReceiverStream::new(stream)))
-    }
-}
-
-/// The snapshot a question is about.
-pub(super) async fn snapshot(app: &AppState, name: &str, at_least_revision: Option<u64>) -> Result<Scene, Status> {
-    let live = app.live_scene(name, "scene").await?;
-    let scene = live.snapshot();
-    let Some(least) = at_least_revision.filter(|least| *least > scene.revision()) else { return Ok(scene) };
-    let mut changes = live.changes();
-    let reached = changes.wait_for(|scene| scene.revision() >= least);
-    match tokio::time::timeout(REVISION_PATIENCE, reached).await {
-        Ok(Ok(scene)) => Ok(scene.clone()),
-        Ok(Err(_)) => Err(error::catalogue(&CatalogueError::NoScene(name.to_owned()), "scene")),
-        Err(_) => {
-            let why = format!(
-                "scene \"{name}\" is at revision {}, not yet at {least} (at_least_revision); try again",
-                live.snapshot().revision()
-            );
-            Err(error::unavailable("REVISION_NOT_REACHED", &why))
-        }
     }
 }
 

@@ -137,7 +137,7 @@ fn orders_of_earlier_versions_are_refused() {
         transaction.open_table(META).expect("a table").insert("format", 1).expect("written");
     });
     let error = disk.load().expect_err("format 1").to_string();
-    assert!(error.contains("has format 1") && error.contains("reads format 4"), "{error}");
+    assert!(error.contains("has format 1") && error.contains("reads format 5"), "{error}");
     assert!(error.contains("another directory"), "{error}");
 }
 
