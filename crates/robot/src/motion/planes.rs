@@ -127,6 +127,7 @@ mod tests {
             let bound = gap((&a, &at_a, Height::Table), (&c, &at_b, Height::Table), &n);
             assert!(bound <= found.upper, "seed {seed}: {bound} > {}", found.upper);
             let half_space = HalfSpace::new(n, seeded.signed()).expect("a half-space");
+            let n = *half_space.normal();
             let found = distance_to_half_space(body, &at_a, &half_space, &options, &mut WarmStart::default());
             let plane = Piece::HalfSpace(&half_space, 0.0);
             let bound = gap((&a, &at_a, Height::Table), (&plane, &Pose::identity(), Height::Table), &n);

@@ -393,3 +393,47 @@ fn numbers(value: &serde_json::Value) -> Vec<(String, f64)> {
     }
     found
 }
+
+#[test]
+fn pairs_that_touch_never_always_or_sometimes_are_classified() {
+    // On the arm, which slides by 4 m, turns by 4 rad and folds without end: the hand comes as near
+    // to the slide's ball as it likes, a ball on the elbow's axis is always 1 m away from it.
+    let body = |name: &str, link: usize, x: f64, radius: f64| MotionBody {
+        name: name.into(),
+        link,
+        place: at(x, 0.0, 0.0),
+        shape: ball(radius),
+    };
+    let derived = |a: MotionBody, b: MotionBody, margin_m: f64| {
+        let between = body("upper", 2, 0.5, 0.01);
+        let problem = problem(vec![a, between, b], Vec::new(), margin_m);
+        let items = [MotionItem::Body(0), MotionItem::Body(2)];
+        assert!(problem.body_pairs().any(|pair| pair == items));
+        (problem.derive(items, &DeriveOptions::default()), problem)
+    };
+    let slide = |radius: f64| body("slide", 1, 0.0, radius);
+    let (never, _) = derived(slide(0.4), body("elbow", 3, 0.0, 0.55), 0.0);
+    assert_eq!((never.class, never.witness), (PairClass::Never, None));
+    assert!((never.upper_m - 0.05).abs() < 1e-6, "{}", never.upper_m);
+    let (always, _) = derived(slide(0.4), body("elbow", 3, 0.0, 0.65), 0.0);
+    assert_eq!(always.class, PairClass::Always);
+    let (always, _) = derived(slide(0.4), body("elbow", 3, 0.0, 0.55), 0.1);
+    assert_eq!(always.class, PairClass::Always, "nearer than the margin");
+    let (collides, problem) = derived(slide(0.2), body("hand", 3, 1.0, 0.1), 0.0);
+    assert_eq!(collides.class, PairClass::Collides);
+    let witness = collides.witness.expect("a configuration");
+    problem.kinematics().check(&witness).expect("within the limits");
+    let still = edge(&problem, &witness, &witness);
+    assert_eq!(prove(&problem, &still, &FIRST).verdict, MotionVerdict::Contact);
+    // Neighbours, a pair that does not count, and a search that is stopped.
+    let two = self::problem(vec![slide(0.2), body("upper", 2, 0.5, 0.1)], Vec::new(), 0.0);
+    let items = [MotionItem::Body(0), MotionItem::Body(1)];
+    assert_eq!(two.derive(items, &DeriveOptions::default()).class, PairClass::Adjacent);
+    let bodies = vec![slide(0.2), body("upper", 2, 0.5, 0.1), body("hand", 3, 1.0, 0.1)];
+    let none = MotionProblem::new(arm(), &Pose::identity(), bodies, Vec::new(), 0.0, |_, _| None).expect("a problem");
+    let items = [MotionItem::Body(0), MotionItem::Body(2)];
+    assert_eq!(none.derive(items, &DeriveOptions::default()).class, PairClass::Undecided);
+    let stop = AtomicBool::new(true);
+    let options = DeriveOptions { stop: Some(&stop), ..DeriveOptions::default() };
+    assert_eq!(problem.derive(items, &options).class, PairClass::Undecided);
+}
