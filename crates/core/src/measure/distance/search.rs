@@ -56,6 +56,8 @@ pub(super) struct Search<'a> {
     trace: Option<Trace>,
     /// Where the lower bound was found, and where Newton's method ended last.
     tried: [Option<DistanceNewton>; 2],
+    /// Points and normal that active sets began at last.
+    active_sets_from: Option<[Vector3<f64>; 3]>,
     iterations: u32,
 }
 
@@ -107,6 +109,7 @@ impl<'a> Search<'a> {
             aligned: false,
             trace: None,
             tried: [None; 2],
+            active_sets_from: None,
             iterations,
         }
     }
@@ -259,14 +262,17 @@ impl<'a> Search<'a> {
             return;
         }
         let (x, y, n) = (self.x, self.y, self.n);
+        // From the same points they would end the same.
+        if self.active_sets_from.replace([x, y, n]) == Some([x, y, n]) {
+            return;
+        }
         let (a, b) = (Active::near(&self.pair.a, &x, &-n), Active::near(&self.pair.b, &y, &n));
         self.along(x, y, n, a, b);
     }
 
-    /// Interior-point methods, and active sets from where these have led: from the same points they
-    /// would end the same.
+    /// Interior-point methods, and active sets from where these have led.
     fn interior_points(&mut self, hint: &Hint) {
-        if self.attempt(Self::closest_or_deepest, hint) == Outcome::Improved {
+        if self.attempt(Self::closest_or_deepest, hint) != Outcome::Proven {
             self.active_sets(hint);
         }
     }
