@@ -193,7 +193,7 @@ impl<'a> Query<'a> {
         }
     }
 
-    /// A proven answer that rounding keeps wide, gone on with in twice the precision.
+    /// A proven answer that rounding keeps wide, refined in double-double arithmetic.
     #[cold]
     fn sharpened(&self, proven: &Proven) -> Distance {
         let pair = self.pair();

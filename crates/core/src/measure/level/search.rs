@@ -46,7 +46,7 @@ pub(super) struct Search<'a> {
     multipliers: (Multipliers, Multipliers),
     /// Where that bound was found.
     proven: Vector3<f64>,
-    /// Whether its multipliers are those of Newton's method, balanced or of twice the precision: a
+    /// Whether its multipliers are those of Newton's method, balanced or in double-double: a
     /// bracket holds others to its root only.
     refined: bool,
     /// Where Newton's method ended last.
@@ -86,7 +86,7 @@ impl<'a> Search<'a> {
         self.upper.is_finite() && self.upper - self.lower <= accuracy * self.upper.abs().max(1.0)
     }
 
-    /// Goes on in twice the precision from where continuation has ended.
+    /// Goes on in double-double arithmetic from where continuation has ended.
     pub(super) fn resume(&mut self, settled: &Settled) {
         let [mut a, mut b] = settled.active.map(|i| {
             let mut active = Active::default();
@@ -180,7 +180,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Goes on in twice the precision where rounding keeps the bracket wide.
+    /// Goes on in double-double arithmetic where rounding keeps the bracket wide.
     fn sharpen(&mut self, accuracy: f64) {
         if !runs(Stage::Refinement) {
             return;

@@ -405,8 +405,8 @@ impl<R: Relation> Correct<'_, R> {
                     Verdict::Overlap if near => {
                         let middle = self.middle(simd, at.x, at.y);
                         let deep = -next[2] > NEARLY * self.limits[0].min(self.limits[1]);
-                        // Bodies that touch are left to twice the precision when the bracket gets
-                        // no narrower.
+                        // Bodies that touch are left to double-double arithmetic when the bracket
+                        // gets no narrower.
                         let touching = settled || found.upper > NARROWER * overlap;
                         if middle.is_some() || touching || deep && rounds >= PATIENCE {
                             let grazing = (!deep).then(|| at.grazing(simd, &step, &found, trace.active, rounds));

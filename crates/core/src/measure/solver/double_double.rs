@@ -1,4 +1,4 @@
-//! Numbers of twice the precision: unevaluated sums of two doubles.
+//! Double-double numbers: unevaluated sums of two doubles.
 //!
 //! Each operation is one of Joldes, Muller and Popescu, Tight and rigorous error bounds for basic
 //! building blocks of double-word arithmetic, ACM Trans. Math. Software 44, 2017, with a relative

@@ -3,7 +3,8 @@
 //! Continuation from the answer before (`continuation`, with `predictor`, `tangent_newton`,
 //! `step_acceleration` on a `two_point_problem`), guesses (`initial_guess`, `support_table_gjk`),
 //! Newton's method with active sets (`kkt_newton`, `active_set_qp`), interior points
-//! (`barrier_programs`), and refinement in twice the precision (`refinement`, `double_double`).
+//! (`barrier_programs`), and refinement in double-double arithmetic (`refinement`,
+//! `double_double`).
 
 pub(super) mod active_constraints;
 pub(super) mod active_set_qp;

@@ -1,4 +1,4 @@
-//! Brackets where doubles end: points, multipliers and bounds of twice the precision.
+//! Brackets where doubles end: points, multipliers and bounds in double-double arithmetic.
 //!
 //! Rounding leaves the brackets of [`crate::measure::bracket`] some hundred epsilon of the larger
 //! body wide, and those of level distances over needles that times the slope of the needle's
@@ -31,7 +31,7 @@ const NEGLIGIBLE: f64 = 1e-26;
 /// Steps of the level distance after which one that is still cut leads nowhere.
 const PATIENCE: u32 = 8;
 
-/// Share of the evaluation's bound in doubles that bounds one of twice the precision: both count a
+/// Share of the evaluation's bound in doubles that bounds one in double-double: both count a
 /// few hundred roundings.
 const SHARE: f64 = 1e-13;
 
@@ -162,7 +162,7 @@ impl SharpBody<'_> {
     }
 }
 
-/// Active constraints with multipliers of twice the precision.
+/// Active constraints with multipliers in double-double.
 struct SharpActive {
     set: Active,
     multiplier: [Two; 3],
@@ -255,8 +255,8 @@ impl<'a> SharpPair<'a> {
         }
     }
 
-    /// Newton's method of twice the precision on the optimality system of the distance, from an
-    /// iterate of that in doubles; returns the steps taken. It ends when `accept` takes what an
+    /// Newton's method in double-double arithmetic on the optimality system of the distance, from
+    /// an iterate of that in doubles; returns the steps taken. It ends when `accept` takes what an
     /// iterate proves.
     pub(in crate::measure) fn distance(
         &self,

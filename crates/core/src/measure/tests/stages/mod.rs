@@ -184,7 +184,8 @@ fn deepest_points_decide_overlaps_alone() {
     at_least("deepest by interior points, edged", 97.0, share(&edged, &[Stage::InteriorLevel]));
 }
 
-/// Twice the precision solves what doubles leave wide: an accuracy that no bracket of theirs has.
+/// Double-double arithmetic solves what doubles leave wide: an accuracy that no bracket of theirs
+/// has.
 #[test]
 fn refinement_goes_on_alone() {
     let options = Options::default().with_accuracy(1e-15).unwrap();
@@ -286,7 +287,7 @@ fn saturation_is_proven_alone() {
     at_least("saturation", 95.0, solved("saturation", |_| true, solve));
 }
 
-/// Twice the precision narrows level distances, too.
+/// Double-double arithmetic narrows level distances, too.
 #[test]
 fn refinement_of_levels_goes_on_alone() {
     let options = Options::default().with_accuracy(1e-15).unwrap();

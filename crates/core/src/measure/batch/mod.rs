@@ -1,0 +1,407 @@
+//! Distances of one pair at many poses at once, a pose in each lane of the vectors.
+//!
+//! All poses are solved cold: the start of [`crate::measure::start`], then rounds of evaluation and
+//! step until the bracket is narrow. The first rounds, which are far off in any precision, are of
+//! single precision, for more poses at a time. Those that bracket are of double; the poses that
+//! need more than one wait until there is a group of them, so that the slowest does not hold up the
+//! others. A lane computes from its own pose only and selects where a single query would branch, so
+//! that no answer depends on the other poses of the batch.
+
+mod iterate;
+mod waiting;
+
+use crate::body::{Body, Solid};
+use crate::measure::distance::{Distance, distance};
+use crate::measure::frames::pose::Pose;
+use crate::measure::frames::vector::{V3, add, apply, apply_transposed, dot, rows, subtract};
+use crate::measure::options::Options;
+use crate::measure::solver::active_constraints::ActiveConstraints;
+use crate::measure::solver::continuation::{limits, worth_a_bracket};
+use crate::measure::solver::initial_guess::{Start, facing, meeting, middle};
+use crate::measure::solver::stages::{Stage, runs};
+use crate::measure::solver::tangent_newton::{ALIGNED, Relative, Side, bracket, moved};
+use crate::measure::status::Status;
+use crate::measure::warm::{Hint, WarmStart};
+use crate::polynomial::{Aligned, Lanes, MAX_LANES, Number, Simd, Singles, Twice, Vector, WithSimd, dispatch_lanes};
+use iterate::Iterate;
+use nalgebra::Vector3;
+use waiting::{Group, MAX_COARSE, Waiting};
+
+/// Why a batch is refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BatchError {
+    /// No poses.
+    #[error("the batch is empty; give at least one pose")]
+    Empty,
+    /// Not a place for every answer.
+    #[error("{poses} poses but places for {answers} answers; give one place for each pose")]
+    Lengths {
+        /// Number of poses.
+        poses: usize,
+        /// Number of places for answers.
+        answers: usize,
+    },
+}
+
+/// Euclidean distances between solid `a` at `pose_a` and solid `b` at each of `poses_b` (body to
+/// world), written to `answers` in the order of the poses.
+///
+/// Each answer is one of [`distance`] from a cold start in all that is proven of it, and depends on
+/// its own pose only, to the last bit. Single bodies of one constraint are solved several poses at
+/// a time, which takes a fraction of the time of as many queries; all others, and poses that do not
+/// converge at once such as those in contact, are solved one by one.
+///
+/// # Errors
+/// No poses, or a number of places that is not the number of poses; nothing is computed then.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use sublevel_core::body::Body;
+/// use sublevel_core::measure::{Distance, Options, Pose, distance_batch};
+///
+/// let ball = Body::ball("ball", Vector3::zeros(), 0.5)?;
+/// let egg = Body::ellipsoid("egg", Vector3::zeros(), Vector3::new(1.0, 0.8, 0.6))?;
+/// let along = |x: f64| Pose::from_quaternion(Vector3::new(x, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0]);
+/// let poses = [along(2.0)?, along(3.0)?, along(4.0)?];
+/// let mut answers = [Distance::default(); 3];
+/// distance_batch(&egg, &Pose::identity(), &ball, &poses, &Options::default(), &mut answers)?;
+/// for (answer, gap) in answers.iter().zip([0.5, 1.5, 2.5]) {
+///     assert!((answer.value() - gap).abs() < 1e-8);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn distance_batch(
+    a: &impl Solid,
+    pose_a: &Pose,
+    b: &impl Solid,
+    poses_b: &[Pose],
+    options: &Options<'_>,
+    answers: &mut [Distance],
+) -> Result<(), BatchError> {
+    if poses_b.len() != answers.len() {
+        return Err(BatchError::Lengths { poses: poses_b.len(), answers: answers.len() });
+    }
+    if poses_b.is_empty() {
+        return Err(BatchError::Empty);
+    }
+    if let ([a], [b]) = (a.parts(), b.parts())
+        && a.is_smooth()
+        && b.is_smooth()
+        && options.max_iterations() >= MOST_ROUNDS
+        && runs(Stage::Lanes)
+    {
+        in_lanes((a, pose_a), (b, poses_b), options, answers);
+    } else {
+        for (answer, pose_b) in answers.iter_mut().zip(poses_b) {
+            *answer = distance(a, pose_a, b, pose_b, options, &mut WarmStart::default());
+        }
+    }
+    Ok(())
+}
+
+/// The answers of single bodies of one constraint. Not generic, so that it is compiled with this
+/// crate, whatever its callers are compiled for.
+fn in_lanes(
+    (a, pose_a): (&Body, &Pose),
+    (b, poses_b): (&Body, &[Pose]),
+    options: &Options<'_>,
+    answers: &mut [Distance],
+) {
+    let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
+    dispatch_lanes(Batch { a, pose_a, b, poses_b, options, tolerance, answers });
+}
+
+/// Rounds in single precision that every pose goes through.
+const COARSE: u32 = 2;
+
+/// Most of them.
+const MOST_COARSE: u32 = 6;
+
+/// Square of the last step relative to the longest one allowed, below which the next one, of
+/// double precision, is likely to end with a narrow bracket: a hundredth of a move leaves about
+/// its square. It changes time only; no test pins it.
+const NEARLY_CONVERGED: f64 = 1e-4;
+
+/// The same above which Newton's method has diverged after [`MOST_COARSE`] rounds: a fifth of the
+/// longest move, as long as in a search from a cold start then. Smaller, poses that would have
+/// converged are solved alone: `lanes_answer_alike_in_any_unit` counts them.
+const DIVERGED: f64 = 0.04;
+
+/// Most rounds of a pose before it is solved alone.
+const MOST_ROUNDS: u32 = 8;
+
+/// A batch as work for the widest arithmetic. Each answer is written once: by the lanes, or by a
+/// query for the pose alone.
+struct Batch<'a> {
+    a: &'a Body,
+    pose_a: &'a Pose,
+    b: &'a Body,
+    poses_b: &'a [Pose],
+    options: &'a Options<'a>,
+    tolerance: f64,
+    answers: &'a mut [Distance],
+}
+
+impl WithSimd for Batch<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let (lanes, singles) = (Lanes::<S>::COUNT, Coarse::<S>::COUNT);
+        let (mut far, mut near) = (Waiting::none(), Waiting::none());
+        let mut next = 0;
+        while !self.options.stopped() {
+            let left = self.poses_b.len() - next;
+            if near.len >= lanes || near.len > 0 && far.len + left == 0 {
+                let group = near.take(lanes);
+                self.prove(simd, group, &mut near);
+            } else if far.len + left > 0 {
+                let fresh = far.len < singles && left > 0;
+                let group = if fresh { Group::fresh(next..next + left.min(singles)) } else { far.take(singles) };
+                next += if fresh { group.count } else { 0 };
+                if group.count > Singles::<S>::COUNT {
+                    self.approach::<S, Coarse<S>>(simd, group, fresh, &mut far, &mut near);
+                } else {
+                    self.approach::<S, Singles<S>>(simd, group, fresh, &mut far, &mut near);
+                }
+            } else {
+                return;
+            }
+        }
+        // Stopped: what is known by now of the poses that are left is the answer.
+        for waiting in [&far, &near] {
+            for (pose, rounds) in waiting.pose.iter().zip(&waiting.rounds).take(waiting.len) {
+                self.solve_alone(*pose, *rounds, WarmStart::default());
+            }
+        }
+        for pose in next..self.poses_b.len() {
+            self.solve_alone(pose, 0, WarmStart::default());
+        }
+    }
+}
+
+/// The numbers of the first rounds, unless there are few poses: while one vector waits for its
+/// operands the other is computed with.
+type Coarse<S> = Twice<Singles<S>>;
+
+/// A start that says whether Newton's method in lanes has diverged, as it would from there again.
+fn cold_start(diverged: bool) -> WarmStart {
+    if diverged { Hint::Diverged.into() } else { WarmStart::default() }
+}
+
+impl Batch<'_> {
+    /// Rounds in single precision, after which the poses wait for what is next; fresh ones are
+    /// started first, and left out where they seem to overlap.
+    #[inline(always)]
+    fn approach<S: Simd, N: Vector<S>>(
+        &mut self,
+        simd: S,
+        mut group: Group<MAX_COARSE>,
+        fresh: bool,
+        far: &mut Waiting,
+        near: &mut Waiting,
+    ) {
+        let relative: Relative<N> = self.relative(simd, &group.pose);
+        let (side_a, side_b) = (Side::at_home(simd, self.a, 0), Side::away(self.b, 0, &relative));
+        let limits = limits(self.a, self.b);
+        let (mut at, overlapping) = if fresh {
+            let n = facing(simd, self.a, self.b, &relative);
+            let (Start { x, y, n }, _) = meeting(simd, self.a, self.b, &relative, n, None);
+            let at = Iterate { x, y, n };
+            (at, self.overlapping(simd, &at, (&side_a, &side_b)))
+        } else {
+            (Iterate::load(simd, &group), 0)
+        };
+        let rounds = if fresh { COARSE } else { 1 };
+        let mut square = N::splat(simd, f64::NAN);
+        for _ in 0..rounds {
+            let ((jet_a, _), (jet_b, _)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
+            let here = at.linearize(simd, (&side_a, &jet_a), (&side_b, &jet_b), limits);
+            at.advance(simd, &here);
+            square = here.square;
+        }
+        at.store(&mut group);
+        // Where single precision has no number for something the pose is left out, too.
+        let within = |most: f64| N::bits(simd, square.le(N::splat(simd, most)));
+        let (close, straight, open) =
+            (within(NEARLY_CONVERGED), within(DIVERGED), within(f32::MAX.into()) & !overlapping);
+        for lane in 0..group.count {
+            group.rounds[lane] += rounds;
+            let (open, late) = (open >> lane & 1 == 1, group.rounds[lane] >= MOST_COARSE);
+            let diverged = open && late && straight >> lane & 1 == 0;
+            if !open || diverged {
+                self.solve_alone(group.pose[lane], group.rounds[lane], cold_start(diverged));
+            } else if late || close >> lane & 1 == 1 {
+                near.push(&group, lane);
+            } else {
+                far.push(&group, lane);
+            }
+        }
+    }
+
+    /// One round of a group that proves: writes the answers and lets the other poses wait.
+    #[inline(always)]
+    fn prove<S: Simd>(&mut self, simd: S, mut group: Group<MAX_LANES>, waiting: &mut Waiting) {
+        let splat = |value: f64| Lanes::<S>::splat(simd, value);
+        let relative: Relative<Lanes<S>> = self.relative(simd, &group.pose);
+        let (side_a, side_b) = (Side::at_home(simd, self.a, 0), Side::away(self.b, 0, &relative));
+        let limits = limits(self.a, self.b);
+        let worth = worth_a_bracket(limits);
+        let mut at = Iterate::load(simd, &group);
+        let mut open = (1_u32 << group.count) - 1;
+        let mut answered = 0;
+        let ((jet_a, inside_a), (jet_b, inside_b)) = (side_a.jet(simd, at.x), side_b.jet(simd, at.y));
+        let here = at.linearize(simd, (&side_a, &jet_a), (&side_b, &jet_b), limits);
+        let inside = Lanes::and(simd, inside_a, inside_b);
+        let short = Lanes::and(simd, inside, here.step.square(simd, worth).le(splat(1.0)));
+        if Lanes::bits(simd, short) & open != 0 {
+            let next_a = side_a.extrapolate(simd, &jet_a, &here.local.0, here.step.dx);
+            let next_b = side_b.extrapolate(simd, &jet_b, &here.local.1, here.step.dy);
+            let next = subtract(add(here.difference, here.step.dx), here.step.dy);
+            let found = bracket(simd, (&side_a, &next_a), (&side_b, &next_b), next);
+            let enough = splat(self.tolerance).max(found.rounding * splat(4.0));
+            let width = found.upper - found.lower;
+            let apart = Lanes::and(simd, short, splat(f64::MIN_POSITIVE).le(found.lower));
+            let settled = Lanes::and(simd, apart, Lanes::and(simd, found.off.le(splat(ALIGNED)), width.le(enough)));
+            let settled = Lanes::bits(simd, settled) & open;
+            // What rounding keeps wider than asked for, double-double arithmetic narrows: one by
+            // one.
+            answered = settled & Lanes::bits(simd, width.le(splat(self.tolerance)));
+            open &= !settled;
+            if answered != 0 {
+                let x = moved(at.x, add(here.step.dx, found.to_a), &here.frame);
+                let y = moved(at.y, add(here.step.dy, found.to_b), &here.frame);
+                let n = apply_transposed(&here.frame, found.normal);
+                self.write(simd, &group, answered, [found.lower, found.upper], found.multipliers, [x, y, n]);
+            }
+        }
+        if answered == (1 << group.count) - 1 {
+            return;
+        }
+        at.advance(simd, &here);
+        at.store(&mut group);
+        let straight = Lanes::bits(simd, here.square.le(splat(DIVERGED)));
+        for lane in 0..group.count {
+            group.rounds[lane] += 1;
+            let open = open >> lane & 1 == 1;
+            let diverged = open && group.rounds[lane] >= MOST_COARSE && straight >> lane & 1 == 0;
+            if open && !diverged && group.rounds[lane] < MOST_ROUNDS {
+                waiting.push(&group, lane);
+            } else if answered >> lane & 1 == 0 {
+                self.solve_alone(group.pose[lane], group.rounds[lane], cold_start(diverged));
+            }
+        }
+    }
+
+    /// Answers a pose by a query for it alone, after the rounds that it has gone through in lanes.
+    #[inline(never)]
+    fn solve_alone(&mut self, pose: usize, rounds: u32, mut warm: WarmStart) {
+        let options = self.options.after(rounds);
+        let found = distance(self.a, self.pose_a, self.b, &self.poses_b[pose], &options, &mut warm);
+        self.answers[pose] = Distance { iterations: found.iterations + rounds, ..found };
+    }
+
+    /// The lanes in which the middle between the points seems to lie in both bodies: single queries
+    /// prove that fast.
+    #[inline(always)]
+    fn overlapping<S: Simd, N: Vector<S>>(
+        &self,
+        simd: S,
+        at: &Iterate<N>,
+        (side_a, side_b): (&Side<'_, N>, &Side<'_, N>),
+    ) -> u32 {
+        let one = N::splat(simd, 1.0);
+        let across = N::bits(simd, dot(at.n, subtract(at.x, at.y)).le(N::splat(simd, 0.0)));
+        if across == 0 {
+            return 0;
+        }
+        let middle = middle(simd, self.a, self.b, at.x, at.y);
+        let ((in_a, _), (in_b, _)) = (side_a.jet(simd, middle), side_b.jet(simd, middle));
+        across & N::bits(simd, in_a.value.max(in_b.value).le(one))
+    }
+
+    /// B at the poses as seen from A.
+    #[inline(always)]
+    fn relative<S: Simd, N: Vector<S>, const LANES: usize>(&self, simd: S, poses: &[usize; LANES]) -> Relative<N> {
+        let mut columns = Aligned([[0.0; LANES]; 7]);
+        for lane in 0..N::COUNT {
+            let pose = &self.poses_b[poses[lane]];
+            let q = &pose.rotation().coords;
+            // Differences of translations are exact to one rounding, however far from the world
+            // origin.
+            let t = pose.translation() - self.pose_a.translation();
+            for (column, entry) in columns.0.iter_mut().zip([q.x, q.y, q.z, q.w, t.x, t.y, t.z]) {
+                column[lane] = entry;
+            }
+        }
+        let splat = |value: f64| N::splat(simd, value);
+        let column = |i: usize| N::load(simd, &columns.0[i]);
+        let own = &self.pose_a.rotation().coords;
+        let (u, v) = ([splat(-own.x), splat(-own.y), splat(-own.z)], [column(0), column(1), column(2)]);
+        let (u_w, v_w) = (splat(own.w), column(3));
+        // The product of the conjugate of A's quaternion with B's.
+        let w = u_w * v_w - dot(u, v);
+        let i = u_w.mul_add(v[0], v_w * u[0]) + (u[1] * v[2] - u[2] * v[1]);
+        let j = u_w.mul_add(v[1], v_w * u[1]) + (u[2] * v[0] - u[0] * v[2]);
+        let k = u_w.mul_add(v[2], v_w * u[2]) + (u[0] * v[1] - u[1] * v[0]);
+        let (ww, ii, jj, kk) = (w * w, i * i, j * j, k * k);
+        let two = splat(2.0);
+        let (ij, ik, jk) = (two * i * j, two * i * k, two * j * k);
+        let (wi, wj, wk) = (two * w * i, two * w * j, two * w * k);
+        let rotation = [
+            [ww + ii - jj - kk, ij - wk, wj + ik],
+            [wk + ij, ww - ii + jj - kk, jk - wi],
+            [ik - wj, wi + jk, ww - ii - jj + kk],
+        ];
+        let frame = rows(simd, self.pose_a.rotation().to_rotation_matrix().matrix());
+        let translation = apply_transposed(&frame, [column(4), column(5), column(6)]);
+        let home = (&self.a.normalization().center, self.a.trust().center);
+        Relative::from_parts(simd, home, rotation, translation, self.b)
+    }
+
+    /// Writes the answers of the lanes that are set in `proven`.
+    #[inline(always)]
+    fn write<S: Simd>(
+        &mut self,
+        simd: S,
+        group: &Group<MAX_LANES>,
+        proven: u32,
+        [lower, upper]: [Lanes<S>; 2],
+        [of_a, of_b]: [Lanes<S>; 2],
+        [x, y, n]: [V3<Lanes<S>>; 3],
+    ) {
+        let frame = rows(simd, self.pose_a.rotation().to_rotation_matrix().matrix());
+        let place = self.pose_a.transform_point(&self.a.normalization().center);
+        let splat = |value: f64| Lanes::<S>::splat(simd, value);
+        let place = [splat(place.x), splat(place.y), splat(place.z)];
+        let (x, y, n) = (add(place, apply(&frame, x)), add(place, apply(&frame, y)), apply(&frame, n));
+        let mut columns = Aligned([[0.0; MAX_LANES]; 13]);
+        let numbers = [lower, upper, of_a, of_b, x[0], x[1], x[2], y[0], y[1], y[2], n[0], n[1], n[2]];
+        for (number, column) in numbers.into_iter().zip(&mut columns.0) {
+            number.store(column);
+        }
+        for lane in 0..group.count {
+            if proven >> lane & 1 == 0 {
+                continue;
+            }
+            let entry = |i: usize| columns.0[i][lane];
+            let vector = |i: usize| Vector3::new(entry(i), entry(i + 1), entry(i + 2));
+            self.answers[group.pose[lane]] = Distance {
+                parts: [0, 0],
+                tied: false,
+                status: Status::Converged,
+                lower: entry(0),
+                upper: entry(1),
+                witness_a: vector(4),
+                witness_b: vector(7),
+                normal: Some(vector(10)),
+                active_a: ActiveConstraints::single(0, entry(2)),
+                active_b: ActiveConstraints::single(0, entry(3)),
+                iterations: group.rounds[lane] + 1,
+            };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

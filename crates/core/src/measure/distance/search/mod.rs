@@ -1,0 +1,382 @@
+//! The search for a distance where continuation alone has not proven it: every method in turn, from
+//! the cheapest, each of them improving one bracket.
+//!
+//! `incumbent` keeps the bracket, `interior` has the interior-point methods, `result` the answer.
+
+mod incumbent;
+mod interior;
+mod result;
+
+use crate::measure::bounds::culling::across;
+use crate::measure::bounds::duality_bounds::{DualTrial, distance_lower};
+use crate::measure::frames::query_frame::{Pair, Posed};
+use crate::measure::frames::vector::V3;
+use crate::measure::options::Options;
+use crate::measure::solver::continuation::{Lost, SEEK_ROUNDS, Seek, Trace};
+use crate::measure::solver::initial_guess::Start;
+use crate::measure::solver::kkt_newton::{Active, DistanceNewton};
+use crate::measure::solver::ray_program::{RayStart, ReachNewton};
+use crate::measure::solver::refinement::SharpPair;
+use crate::measure::solver::stages::{Stage, runs};
+use crate::measure::solver::stop_criterion::StopCriterion;
+use crate::measure::solver::support_table_gjk::approach;
+use crate::measure::solver::two_point_problem::Apart;
+use crate::measure::warm::Hint;
+use crate::optimize::Approach;
+use crate::polynomial::dispatch;
+use nalgebra::Vector3;
+
+/// What has come of a method.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Outcome {
+    /// An answer, or the end of what may be spent on one.
+    Proven,
+    /// A narrower bracket.
+    Improved,
+    /// Nothing that was not known.
+    Failed,
+}
+
+/// A solve in progress: the best bracket so far and where it was attained, in query units.
+pub(in crate::measure::distance) struct Search<'a> {
+    pair: &'a Pair<'a>,
+    options: &'a Options<'a>,
+    tolerance: f64,
+    /// In metres, and in query units.
+    goals: (&'a StopCriterion, StopCriterion),
+    lower: f64,
+    upper: f64,
+    x: Vector3<f64>,
+    y: Vector3<f64>,
+    /// Normal of the best lower bound.
+    n: Vector3<f64>,
+    active: (Active, Active),
+    /// Whether all of these are of one iterate whose normal is that of the solution.
+    aligned: bool,
+    /// Of an answer by continuation.
+    trace: Option<Trace>,
+    /// Where the lower bound was found, and where Newton's method ended last.
+    tried: [Option<DistanceNewton>; 2],
+    /// Points and normal that active sets began at last.
+    active_sets_from: Option<[Vector3<f64>; 3]>,
+    iterations: u32,
+}
+
+/// Distance relative to the larger body, below which ½|x - y|² has little curvature to aim by. The
+/// interior-point method then goes for the deepest point first; larger, it does for bodies that
+/// are well apart, which takes time. No test pins it.
+const SHORT_DISTANCE: f64 = 1e-3;
+
+/// Distance of the outlines, relative to the larger body, above which the bodies have no point in
+/// common to look for.
+const FACING: f64 = 0.1;
+
+/// Distance relative to the larger body, below which rounding leaves the interior-point method on
+/// ½|x - y|² nothing to aim by, and refinement takes over. No test pins it.
+const SHORTEST_DISTANCE: f64 = 1e-7;
+
+/// Steps in double-double arithmetic for which side of contact a narrow bracket is on: those that
+/// find out take half as many.
+const UNSURE: u32 = 8;
+
+/// Share of the way to an interior point that leaves a surface behind.
+const DEEPER: f64 = 1e-6;
+
+impl<'a> Search<'a> {
+    /// A search that knows nothing yet, after that many iterations.
+    pub(in crate::measure::distance) fn new(
+        pair: &'a Pair<'a>,
+        goal: &'a StopCriterion,
+        options: &'a Options<'a>,
+        iterations: u32,
+    ) -> Self {
+        let (x, y) = (pair.a.interior, pair.b.interior);
+        let n = (x - y).try_normalize(0.0).unwrap_or_else(Vector3::x);
+        Self {
+            pair,
+            options,
+            tolerance: pair.tolerance(options.accuracy()),
+            goals: (goal, goal.in_units_of(pair.unit())),
+            lower: 0.0,
+            upper: f64::INFINITY,
+            x,
+            y,
+            n,
+            active: (Active::default(), Active::default()),
+            aligned: false,
+            trace: None,
+            tried: [None; 2],
+            active_sets_from: None,
+            iterations,
+        }
+    }
+
+    /// The methods in turn, until one has proven the answer.
+    pub(in crate::measure::distance) fn run(&mut self, hint: &Hint) {
+        let methods: [fn(&mut Self, &Hint); 5] =
+            [Self::continuation, Self::starts, Self::active_sets, Self::interior_points, Self::refinement];
+        for method in methods {
+            if self.attempt(method, hint) == Outcome::Proven {
+                break;
+            }
+        }
+        self.attain_any();
+    }
+
+    fn attempt(&mut self, method: fn(&mut Self, &Hint), hint: &Hint) -> Outcome {
+        let before = (self.lower, self.upper);
+        if !self.options.exhausted(self.iterations) {
+            method(self, hint);
+        }
+        let settled = self.decided() && !self.has_to_be_aligned();
+        if settled || self.options.exhausted(self.iterations) {
+            Outcome::Proven
+        } else if (self.lower, self.upper) == before {
+            Outcome::Failed
+        } else {
+            Outcome::Improved
+        }
+    }
+
+    /// Newton's method on from the answer before, with its active constraints. Of smooth bodies
+    /// that is done before there is a search.
+    fn continuation(&mut self, hint: &Hint) {
+        let Hint::Apart { x_a, y_b, normal_a, active_a, active_b } = hint else { return };
+        let [a, b] = [(active_a, &self.pair.a), (active_b, &self.pair.b)]
+            .map(|(active, body)| Active::from_bits(*active, body.len()));
+        if let (Some(a), Some(b)) = (a, b) {
+            self.newton(self.pair.a_to_query(x_a), self.pair.b_to_query(y_b), *normal_a, a, b);
+        }
+    }
+
+    /// Newton's method from where the outlines are nearest, with the constraints that are active
+    /// there. Where two sides are all but parallel that is anywhere on them, but the corners of one
+    /// show.
+    fn starts(&mut self, _: &Hint) {
+        if !runs(Stage::SupportTables) || self.ended() {
+            return;
+        }
+        let pair = self.pair;
+        let found = approach(pair, &self.n);
+        if let Some(v) = found.common {
+            // Outlines of bodies with edges lie on their surfaces.
+            let deeper = |body: &Posed<'_>| v.lerp(&body.interior, DEEPER);
+            if [v, deeper(&pair.a), deeper(&pair.b)].iter().any(|v| self.common(v)) {
+                return;
+            }
+        }
+        let Approach { x, y, n, corners, .. } = found;
+        if pair.smooth() {
+            self.seek(&x, &y, &n);
+        } else {
+            for (k, (x, y)) in [(x, y), (x, corners.1), (corners.0, y)].into_iter().enumerate() {
+                let (a, b) = (Active::near(&pair.a, &x, &-n), Active::near(&pair.b, &y, &n));
+                self.newton(x, y, n, a, b);
+                // The later attempts are from corners, which it finds by itself.
+                if k == 0 && !self.ended() {
+                    self.along(x, y, n, a, b);
+                }
+                if self.ended() || found.common.is_some() {
+                    break;
+                }
+            }
+        }
+        let near = found.common.is_some() || (x - y).norm() < FACING * pair.size();
+        if !self.ended() && self.lower == 0.0 && near {
+            self.deepest(&found.common.unwrap_or((x + y) * 0.5), &n);
+        }
+    }
+
+    /// Newton's method for how far apart the bodies are along a normal that is about the right one.
+    /// Its steps are those of quadratic programs, which go all the way to the edges of sides that
+    /// are tilted by next to nothing.
+    fn along(&mut self, x: Vector3<f64>, y: Vector3<f64>, n: Vector3<f64>, a: Active, b: Active) {
+        if !runs(Stage::Ray) {
+            return;
+        }
+        let pair = self.pair;
+        let Some(mut newton) = ReachNewton::new(pair, RayStart { u: -n, offset: Vector3::zeros(), x, y, n: -n, a, b })
+        else {
+            return;
+        };
+        let steps = newton.run(pair, self.options, self.iterations, |at| {
+            let scale = 1.0 / at.n.norm();
+            let (n, a, b) = (-at.n * scale, at.a.scaled(scale), at.b.scaled(scale));
+            let (of_a, of_b) = (a.multipliers(), b.multipliers());
+            let trial = DualTrial { x: &at.x, y: &at.y, n: &n, of_a: &of_a, of_b: &of_b };
+            let raised = self.raise(distance_lower(pair, &trial), &n);
+            if raised {
+                let distance = n.dot(&(at.x - at.y));
+                self.tried[0] = Some(DistanceNewton { x: at.x, y: at.y, distance, n, a, b });
+            }
+            if raised | self.attain(&at.x, &at.y) {
+                self.active = (a, b);
+            }
+            self.done()
+        });
+        self.iterations += steps;
+        if !self.ended() && newton.is_near() {
+            self.newton(newton.x, newton.y, -newton.n.normalize(), newton.a, newton.b);
+        }
+    }
+
+    /// The same for bodies with edges from the best points so far, with the constraints that are
+    /// active there: from a start the others have diverged.
+    fn active_sets(&mut self, _: &Hint) {
+        let known = self.lower > 0.0 && self.upper.is_finite();
+        if !runs(Stage::Again) || self.pair.smooth() || !known || self.ended() {
+            return;
+        }
+        let (x, y, n) = (self.x, self.y, self.n);
+        // From the same points they would end the same.
+        if self.active_sets_from.replace([x, y, n]) == Some([x, y, n]) {
+            return;
+        }
+        let (a, b) = (Active::near(&self.pair.a, &x, &-n), Active::near(&self.pair.b, &y, &n));
+        self.along(x, y, n, a, b);
+    }
+
+    /// Interior-point methods, and active sets from where these have led.
+    fn interior_points(&mut self, hint: &Hint) {
+        if self.attempt(Self::closest_or_deepest, hint) != Outcome::Proven {
+            self.active_sets(hint);
+        }
+    }
+
+    /// The interior-point method for the distance, near contact for the deepest point.
+    fn closest_or_deepest(&mut self, _: &Hint) {
+        if !self.ended() {
+            self.closest(SHORT_DISTANCE);
+        }
+        if !self.ended() && !self.decided() && self.lower < SHORT_DISTANCE * self.pair.size() {
+            self.contact();
+        }
+        // Where both are elongated or edged, first order from the deepest point is not close
+        // enough.
+        if !self.ended() {
+            self.closest(SHORTEST_DISTANCE);
+        }
+    }
+
+    /// Double-double arithmetic, for the bracket and for the side of contact, and Newton's method
+    /// until the normal is that of the solution.
+    fn refinement(&mut self, _: &Hint) {
+        // A bracket that holds 0 but is not sure of contact is as wide as rounding left it.
+        let unsure = self.narrow() && !self.decided();
+        if unsure && !self.pair.smooth() && runs(Stage::UnsureDeepest) {
+            // Edges that reach into a body have brought the points together where the surfaces
+            // cross.
+            let (v, n) = ((self.x + self.y) * 0.5, self.n);
+            self.deepest(&v, &n);
+        }
+        if !self.ended() || unsure && !self.decided() {
+            self.sharpen();
+        }
+        self.align();
+    }
+
+    /// Goes on to the normal of the solution: a bracket that is narrow holds it to about the root
+    /// of its width relative to the distance, and near contact to nothing.
+    fn align(&mut self) {
+        if !runs(Stage::Alignment) || !self.has_to_be_aligned() || self.options.exhausted(self.iterations) {
+            return;
+        }
+        let (x, y, n) = (self.x, self.y, self.n);
+        let near = || (Active::near(&self.pair.a, &x, &-n), Active::near(&self.pair.b, &y, &n));
+        let (x, y, n, (a, b)) = self.tried[0].map_or_else(|| (x, y, n, near()), |at| (at.x, at.y, at.n, (at.a, at.b)));
+        self.newton(x, y, n, a, b);
+        // So near to each other doubles may not show the normal.
+        if self.has_to_be_aligned() && self.lower < SHORTEST_DISTANCE * self.pair.size() {
+            self.sharpen();
+        }
+    }
+
+    /// Continuation of smooth bodies from two points and a normal.
+    fn seek(&mut self, x: &Vector3<f64>, y: &Vector3<f64>, n: &Vector3<f64>) {
+        let (pair, options) = (self.pair, self.options);
+        if !runs(Stage::Seek) || options.exhausted(self.iterations) {
+            return;
+        }
+        let (pose_a, pose_b) = pair.poses();
+        let relation = Apart { pose_a, pose_b, goal: self.goals.0, tolerance: self.tolerance * pair.unit() };
+        let from = Some(Start { x: self.centered(x), y: self.centered(y), n: (*n).into() });
+        let most = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
+        match dispatch(Seek { a: pair.a.body, b: pair.b.body, relation, from, most, options }) {
+            Ok((proven, trace)) => {
+                self.iterations += proven.rounds;
+                self.resume(&proven);
+                // As it was taken as proven.
+                self.aligned = true;
+                self.trace = Some(trace);
+                if !self.done() {
+                    self.sharpen();
+                }
+            }
+            Err(lost) => {
+                self.iterations += lost.rounds;
+                self.take_over(&lost);
+            }
+        }
+    }
+
+    /// Goes on from what continuation has left: near contact in double-double arithmetic.
+    pub(in crate::measure::distance) fn take_over(&mut self, lost: &Lost) {
+        let pair = self.pair;
+        let center = pair.a.body.normalization().center;
+        let to_query = |v: V3<f64>| pair.a_to_query(&(center + Vector3::from(v)));
+        if lost.middle.is_some_and(|middle| self.common(&to_query(middle))) {
+            return;
+        }
+        // Bodies of one shape on top of each other touch all over: a bad hint finds that, and not
+        // that they overlap.
+        if lost.touching() && self.common(&pair.a.interior.lerp(&pair.b.interior, 0.5)) {
+            return;
+        }
+        if let Some(grazing) = &lost.grazing {
+            self.resume(grazing);
+            self.sharpen();
+        }
+    }
+
+    /// The interior points as an answer where nothing better was attained: early ends leave a
+    /// bracket, too.
+    pub(in crate::measure::distance) fn attain_any(&mut self) {
+        let (pair, (pose_a, pose_b)) = (self.pair, self.pair.poses());
+        if self.upper.is_infinite() {
+            // Proven in the bodies' own frames: however far away bodies are, this one is finite.
+            let (of_a, of_b) = (pair.a.body.interior_point(), pair.b.body.interior_point());
+            let (_, apart, error) = across((pose_a, of_a), (pose_b, of_b));
+            let upper = (apart + error) * (1.0 + f64::EPSILON) / pair.unit();
+            self.take(upper, pair.a.interior, pair.b.interior);
+        }
+    }
+
+    /// Goes on in double-double arithmetic where rounding keeps the bracket wide.
+    pub(in crate::measure::distance) fn sharpen(&mut self) {
+        if !runs(Stage::Refinement) {
+            return;
+        }
+        let pair = self.pair;
+        let sharp = SharpPair::new(pair);
+        // Once each: from the same start it would end the same.
+        while let Some(start) = self.tried.iter_mut().find_map(Option::take) {
+            let left = self.options.max_iterations() - self.iterations.min(self.options.max_iterations());
+            let left = if self.narrow() && self.goals.0.is_narrow() { left.min(UNSURE) } else { left };
+            let steps = sharp.distance(&start, left, |found| {
+                if self.raise(found.lower, &found.n) {
+                    self.active = found.active;
+                }
+                self.take(found.upper, found.x, found.y);
+                if found.aligned {
+                    self.align_with(found.upper, [found.x, found.y, found.n], found.active);
+                }
+                self.decided() && !self.has_to_be_aligned() || self.touching() || self.options.stopped()
+            });
+            self.iterations += steps;
+            let ended = self.decided() && !self.has_to_be_aligned() || self.touching();
+            if ended || self.options.exhausted(self.iterations) {
+                return;
+            }
+        }
+    }
+}
