@@ -325,6 +325,14 @@ impl Body {
         Support { point: bound.point, height_m: self.height_of(&bound) }
     }
 
+    /// A support point along the unit vector `n` of the body frame, and the positions of the
+    /// constraints with their multipliers there, metres: what [`Body::tangent_height`] takes.
+    pub fn support_multipliers(&self, n: &Vector3<f64>) -> (Vector3<f64>, Vec<(usize, f64)>) {
+        let (point, multipliers) = support_bounds::support_point(&self.support_problem(), n);
+        let of_constraints = multipliers.into_iter().enumerate().take(self.constraints.len());
+        (point, of_constraints.filter(|(_, multiplier)| *multiplier > 0.0).collect())
+    }
+
     /// Proven upper bound of the height of the body along the unit vector `n` of the body frame
     /// above its interior point, metres, from any point x0 of the body frame and multipliers λ_i >=
     /// 0 of its constraints, metres: `n·(x - x0) <= Σ λ_i (1 - g_i(x0)) + |n - Σ λ_i ∇g_i(x0)| |x -

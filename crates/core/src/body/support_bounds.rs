@@ -91,12 +91,18 @@ pub(super) fn farthest_point(
 /// Support point of the body in the direction of the unit vector `n` of the body frame, with its
 /// tangent bound.
 pub(super) fn support(problem: &SupportProblem, n: &Vector3<f64>) -> TangentBound {
+    let (point, multipliers) = support_point(problem, n);
+    tangent(problem, n, &point, (0..).zip(multipliers).take(problem.constraints.len()))
+}
+
+/// Support point of the body in the direction of the unit vector `n` of the body frame, and the
+/// multipliers of the constraints there, metres.
+pub(super) fn support_point(problem: &SupportProblem, n: &Vector3<f64>) -> (Vector3<f64>, [f64; MAX_ROWS]) {
     let SupportProblem { constraints, placement, inverse, interior_z, .. } = *problem;
     let in_z = inverse.transpose() * n;
     let length = in_z.norm();
     let (z, multipliers) = farthest_point(constraints, &(in_z / length), &interior_z);
-    let point = inverse * z + placement.origin();
-    tangent(problem, n, &point, (0..).zip(multipliers.map(|multiplier| multiplier * length)).take(constraints.len()))
+    (inverse * z + placement.origin(), multipliers.map(|multiplier| multiplier * length))
 }
 
 /// The half-space along the unit vector `n` of the body frame that a point, which may lie anywhere,

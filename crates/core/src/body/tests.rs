@@ -311,6 +311,10 @@ fn tangent_heights_are_bounds_from_any_point_and_close_at_support_points() {
             let slope = (body.value(&(support.point + n * 1e-6)) - body.value(&(support.point - n * 1e-6))) / 2e-6;
             let close = body.tangent_height(&n, &support.point, [(0, 1.0 / slope)]);
             assert!(close >= reached && close <= reached + 1e-6, "degree {degree}, case {case}: {close} {reached}");
+            let (point, multipliers) = body.support_multipliers(&n);
+            assert_eq!((point, multipliers.len()), (support.point, 1));
+            let proven = body.tangent_height(&n, &point, multipliers);
+            assert!(proven >= reached && proven <= reached + 1e-9, "degree {degree}, case {case}: {proven} {reached}");
             let anywhere = support.point + seeded.unit() * seeded.between(1e-9, 1.0);
             let far = body.tangent_height(&n, &anywhere, [(0, seeded.between(1e-6, 10.0) / slope)]);
             assert!(far >= reached, "degree {degree}, case {case}: {far} below {reached}");
