@@ -2,15 +2,15 @@
 //!
 //! A certificate holds the robot, its path, all bodies and obstacles with their polynomials, the
 //! pairs that do not count, and for each pair that does a list of intervals that cover the path. On
-//! each, planes across a unit vector keep the pieces apart by more than these can move. Whoever
-//! reads it needs neither the scene nor a solver.
+//! each, planes across a unit vector keep the pieces apart by more than these can move. A reader
+//! needs neither the scene nor a solver.
 
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::claim::Claim;
+use super::claim::{DigestedClaim, hexadecimal};
 use super::interval::Interval;
 use super::path::Path;
 use super::placing::Placing;
@@ -28,10 +28,11 @@ const FAMILY: &str = "sublevel motion certificate";
 #[serde(deny_unknown_fields)]
 pub struct Certificate {
     pub(crate) format: String,
-    pub(crate) claim: Arc<Claim>,
+    pub(crate) claim: Arc<DigestedClaim>,
     pub(crate) path: Path,
     pub(crate) records: Vec<Record>,
-    /// SHA-256 of all of the above, hexadecimal.
+    /// SHA-256 of the JSON text of all of the above, with the digest of the claim in its place,
+    /// hexadecimal.
     pub(crate) digest: String,
 }
 
@@ -99,6 +100,9 @@ pub enum CertificateError {
     /// Another robot, scene or body than what it is held against.
     #[error("the certificate is of another {0}")]
     Other(&'static str),
+    /// The check was ended before it was complete.
+    #[error("the check was ended before it was complete")]
+    Stopped,
 }
 
 impl Certificate {
@@ -160,8 +164,8 @@ impl Certificate {
     }
 
     pub(crate) fn computed_digest(&self) -> String {
-        let content = serde_json::to_vec(&(&self.format, &self.claim, &self.path, &self.records)).unwrap_or_default();
-        Sha256::digest(content).iter().map(|byte| format!("{byte:02x}")).collect()
+        let parts = (&self.format, self.claim.digest(), &self.path, &self.records);
+        hexadecimal(&Sha256::digest(serde_json::to_vec(&parts).unwrap_or_default()))
     }
 }
 

@@ -1,16 +1,19 @@
 //! What a certificate is about, as plain numbers: the robot, its bodies, obstacles, pairs.
 
 use std::collections::BTreeMap;
+use std::ops::Deref;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use sha2::{Digest, Sha256};
 use sublevel_core::body::Shape;
 use sublevel_core::measure::{Capsule, HalfSpace, Pose};
 
 use super::certificate::CertificateError;
 use super::geometry::{MotionBody, MotionObstacle, MotionShape, PlacedObstacle};
 use super::problem::{MotionItem, MotionProblem};
+use super::verify::VerifyOptions;
 use crate::description::{Description, Joint, JointKind, Limits, Link, Mimic};
 use crate::kinematics::Kinematics;
 
@@ -88,6 +91,55 @@ enum PlacedRecord {
     HalfSpace([f64; 3], f64, f64),
 }
 
+/// A claim with the hash of its content, which takes milliseconds to compute.
+#[derive(Clone, Debug)]
+pub(crate) struct DigestedClaim {
+    claim: Claim,
+    /// SHA-256 of the JSON text of the claim, hexadecimal.
+    digest: String,
+}
+
+impl DigestedClaim {
+    pub(crate) fn new(claim: Claim) -> Self {
+        let text = serde_json::to_vec(&claim).unwrap_or_default();
+        Self { claim, digest: hexadecimal(&Sha256::digest(text)) }
+    }
+
+    pub(crate) fn digest(&self) -> &str {
+        &self.digest
+    }
+
+    /// What differs from another claim, if anything does.
+    pub(crate) fn difference(&self, other: &Self) -> Option<&'static str> {
+        if self.digest == other.digest { None } else { self.claim.difference(&other.claim) }
+    }
+}
+
+impl Deref for DigestedClaim {
+    type Target = Claim;
+
+    fn deref(&self) -> &Claim {
+        &self.claim
+    }
+}
+
+impl Serialize for DigestedClaim {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.claim.serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for DigestedClaim {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Claim::deserialize(deserializer).map(Self::new)
+    }
+}
+
+/// Bytes as hexadecimal digits.
+pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 impl Claim {
     /// What is claimed of a problem's paths.
     pub(crate) fn of(problem: &MotionProblem) -> Self {
@@ -127,16 +179,12 @@ impl Claim {
         }
     }
 
-    /// Makes the problem again; every body is proven again unless `known` has the shape of an id.
-    /// More than `most` pairs are refused.
-    pub(crate) fn problem(
-        &self,
-        known: impl Fn(&str) -> Option<Arc<Shape>>,
-        most: usize,
-    ) -> Result<MotionProblem, CertificateError> {
+    /// Makes the problem again; every body is proven again unless its id is known. More than `most`
+    /// pairs are refused.
+    pub(crate) fn problem(&self, options: &VerifyOptions<'_>, most: usize) -> Result<MotionProblem, CertificateError> {
         let kinematics = self.robot.kinematics()?;
         let solids: Vec<Arc<Shape>> =
-            (0..).zip(&self.solids).map(|(index, file)| solid(index, file, &known)).collect::<Result<_, _>>()?;
+            (0..).zip(&self.solids).map(|(index, file)| solid(index, file, options)).collect::<Result<_, _>>()?;
         let shape = |part: &dyn Fn() -> String, record: &ShapeRecord| match record {
             ShapeRecord::Solid(index) => {
                 let solid = solids.get(*index).ok_or_else(|| wrong(part(), "there is no such solid"))?;
@@ -192,8 +240,7 @@ impl Claim {
         Ok(rules.collect())
     }
 
-    /// What differs from another claim, if anything does.
-    pub(crate) fn difference(&self, other: &Self) -> Option<&'static str> {
+    fn difference(&self, other: &Self) -> Option<&'static str> {
         [
             (self.robot != other.robot, "robot"),
             (self.base != other.base, "base pose"),
@@ -242,12 +289,10 @@ impl Solids {
     }
 }
 
-fn solid(
-    index: usize,
-    file: &serde_json::Value,
-    known: impl Fn(&str) -> Option<Arc<Shape>>,
-) -> Result<Arc<Shape>, CertificateError> {
-    let shape = file.get("id").and_then(serde_json::Value::as_str).and_then(known);
+fn solid(index: usize, file: &serde_json::Value, options: &VerifyOptions<'_>) -> Result<Arc<Shape>, CertificateError> {
+    options.check_time()?;
+    let id = file.get("id").and_then(serde_json::Value::as_str);
+    let shape = id.zip(options.known).and_then(|(id, known)| known(id));
     // Of a body that is known the numbers have to be the same, not only the id.
     if let Some(shape) = shape.filter(|shape| Solids::default().file(shape) == *file) {
         return Ok(shape);

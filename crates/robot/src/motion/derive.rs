@@ -7,9 +7,11 @@
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
-use std::sync::atomic::{AtomicBool, Ordering as Memory};
+use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 use sublevel_core::measure::{Options, WarmStart};
 
 use super::placing::Placing;
@@ -17,7 +19,7 @@ use super::planes::{Height, gap};
 use super::problem::{MotionItem, MotionProblem, PiecePair};
 use super::solve::solve;
 use crate::description::JointKind;
-use crate::kinematics::LIMIT_SLACK;
+use crate::kinematics::{Kinematics, LIMIT_SLACK};
 
 /// Default of [`DeriveOptions::max_boxes`].
 pub const DEFAULT_MAX_BOXES: u32 = 200_000;
@@ -25,8 +27,26 @@ pub const DEFAULT_MAX_BOXES: u32 = 200_000;
 /// Default of [`DeriveOptions::resolution_m`].
 pub const DEFAULT_DERIVE_RESOLUTION_M: f64 = 1e-3;
 
+/// Numbers that boxes which wait may take, pairs of pieces counted as [`PAIR_NUMBERS`]: half a
+/// gigabyte.
+const MAX_WAITING: usize = 1 << 26;
+
+/// Numbers that an open pair of pieces takes.
+const PAIR_NUMBERS: usize = size_of::<PiecePair>() / size_of::<f64>();
+
+/// Boxes that are looked at for a deeper contact after the first one.
+const DEEPER_BOXES: u32 = 1000;
+
+/// First step of the search for the deepest contact near the one that was found, relative to the
+/// range of each joint; it is halved where no step goes deeper.
+const FIRST_STEP: f64 = 0.1;
+
+/// Last step.
+const LAST_STEP: f64 = 1e-4;
+
 /// What is known of a pair of bodies over all configurations within the joint limits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum PairClass {
     /// Their links are joined directly, through frames without geometry at most.
     Adjacent,
@@ -47,8 +67,8 @@ pub struct DerivedPair {
     pub items: [MotionItem; 2],
     /// What is known.
     pub class: PairClass,
-    /// A configuration at which they are in contact; of adjacent and undecided pairs the deepest
-    /// that was seen, if any.
+    /// A configuration at which they are in contact, the deepest that was seen; of adjacent and
+    /// undecided pairs the nearest, if any.
     pub witness: Option<Vec<f64>>,
     /// Signed distance at the witness at most, metres; of pairs that are never in contact, the
     /// least that was seen at any configuration.
@@ -59,18 +79,16 @@ pub struct DerivedPair {
 
 /// When the search for one pair ends.
 #[derive(Clone, Copy, Debug)]
-pub struct DeriveOptions<'a> {
+pub struct DeriveOptions {
     /// Most boxes for one pair.
     pub max_boxes: u32,
     /// Boxes in which no point moves by more than this, metres, are not cut again.
     pub resolution_m: f64,
-    /// Ends the search when it is set.
-    pub stop: Option<&'a AtomicBool>,
 }
 
-impl Default for DeriveOptions<'_> {
+impl Default for DeriveOptions {
     fn default() -> Self {
-        Self { max_boxes: DEFAULT_MAX_BOXES, resolution_m: DEFAULT_DERIVE_RESOLUTION_M, stop: None }
+        Self { max_boxes: DEFAULT_MAX_BOXES, resolution_m: DEFAULT_DERIVE_RESOLUTION_M }
     }
 }
 
@@ -80,7 +98,14 @@ struct JointBox {
     bound: f64,
     center: Vec<f64>,
     half: Vec<f64>,
-    open: Vec<PiecePair>,
+    open: Arc<[PiecePair]>,
+}
+
+impl JointBox {
+    /// Numbers that it takes, the open pairs shared with the other half.
+    fn numbers(&self) -> usize {
+        2 * self.center.len() + self.open.len() * PAIR_NUMBERS / 2
+    }
 }
 
 impl PartialEq for JointBox {
@@ -113,10 +138,16 @@ impl MotionProblem {
 
     /// Whether a pair of bodies that counts can be in contact within the joint limits. Obstacles
     /// play no part. Nothing is proven of pairs with joints between them that have no end but those
-    /// that turn; and of pairs that do not count.
-    pub fn derive(&self, mut items: [MotionItem; 2], options: &DeriveOptions<'_>) -> DerivedPair {
+    /// that turn; and of pairs that do not count. `progress` receives the number of boxes that were
+    /// looked at, and can end the search.
+    pub fn derive(
+        &self,
+        mut items: [MotionItem; 2],
+        options: &DeriveOptions,
+        progress: &mut dyn FnMut(u32) -> ControlFlow<()>,
+    ) -> DerivedPair {
         items.sort();
-        Derivation::new(self, items, options).run()
+        Derivation::new(self, items, options).run(progress)
     }
 
     /// Whether the links of two bodies are the same or joined directly, through frames without
@@ -139,14 +170,28 @@ impl MotionProblem {
     }
 }
 
+/// Least and largest value of the joints that have an end or turn, with their places.
+fn ranges(kinematics: &Kinematics) -> impl Iterator<Item = (usize, [f64; 2])> {
+    kinematics.variables().iter().filter_map(|variable| {
+        let range = match (variable.kind, variable.limits) {
+            (JointKind::Continuous, _) => [-std::f64::consts::PI, std::f64::consts::PI],
+            (_, Some(limits)) => [limits.lower, limits.upper],
+            _ => return None,
+        };
+        Some((variable.first, range))
+    })
+}
+
 /// The search for one pair.
-struct Derivation<'a, 'b> {
+struct Derivation<'a> {
     problem: &'a MotionProblem,
-    options: &'a DeriveOptions<'b>,
+    options: &'a DeriveOptions,
     items: [MotionItem; 2],
     placing: Placing,
     heap: BinaryHeap<JointBox>,
     boxes: u32,
+    /// Numbers that the boxes in the heap take.
+    waiting: usize,
     /// The deepest configuration that was seen, and its signed distance at most, metres.
     deepest: (Option<Vec<f64>>, f64),
     /// Whether a box is neither free nor in contact throughout, and is not cut.
@@ -169,8 +214,8 @@ struct BoxBracket {
     change: f64,
 }
 
-impl<'a, 'b> Derivation<'a, 'b> {
-    fn new(problem: &'a MotionProblem, items: [MotionItem; 2], options: &'a DeriveOptions<'b>) -> Self {
+impl<'a> Derivation<'a> {
+    fn new(problem: &'a MotionProblem, items: [MotionItem; 2], options: &'a DeriveOptions) -> Self {
         Self {
             problem,
             options,
@@ -178,6 +223,7 @@ impl<'a, 'b> Derivation<'a, 'b> {
             placing: Placing::default(),
             heap: BinaryHeap::new(),
             boxes: 0,
+            waiting: 0,
             deepest: (None, f64::INFINITY),
             is_open: false,
             is_free_somewhere: false,
@@ -185,9 +231,10 @@ impl<'a, 'b> Derivation<'a, 'b> {
         }
     }
 
-    fn run(mut self) -> DerivedPair {
-        let open: Vec<PiecePair> =
+    fn run(mut self, progress: &mut dyn FnMut(u32) -> ControlFlow<()>) -> DerivedPair {
+        let all: Vec<PiecePair> =
             self.problem.pairs.iter().filter(|pair| self.problem.items(pair) == self.items).copied().collect();
+        let open = all.clone();
         let is_adjacent = self.problem.is_adjacent(self.items);
         // Nothing is known of pairs that do not count, nor over joints without end.
         self.is_open = open.is_empty() || open.iter().any(|pair| self.is_endless(pair));
@@ -195,21 +242,26 @@ impl<'a, 'b> Derivation<'a, 'b> {
         if is_adjacent {
             first.half.fill(0.0);
         }
-        self.heap.push(first);
+        self.push(first);
+        let mut most = self.options.max_boxes;
         while let Some(joint_box) = self.heap.pop() {
-            let is_stopped = self.options.stop.is_some_and(|stop| stop.load(Memory::Relaxed));
-            if self.boxes >= self.options.max_boxes || is_stopped {
+            self.waiting -= joint_box.numbers();
+            let is_over = self.boxes >= most || self.waiting > MAX_WAITING;
+            if is_over || progress(self.boxes).is_break() {
                 self.is_open = true;
                 break;
             }
             self.boxes += 1;
             self.look(joint_box);
-            // Contact somewhere and none elsewhere: there is nothing left to learn.
-            if self.is_witnessed() && self.is_free_somewhere {
-                break;
+            // Contact somewhere and none elsewhere: nothing is left to learn but how deep it is.
+            if self.is_in_contact && self.is_free_somewhere {
+                most = most.min(self.boxes.saturating_add(DEEPER_BOXES));
             }
         }
-        let is_witnessed = self.is_witnessed();
+        let is_witnessed = self.is_in_contact;
+        if is_witnessed && !is_adjacent {
+            self.deepen(&all);
+        }
         let class = match (is_adjacent, is_witnessed) {
             (true, _) => PairClass::Adjacent,
             (false, true) if !self.is_free_somewhere && !self.is_open => PairClass::Always,
@@ -247,36 +299,30 @@ impl<'a, 'b> Derivation<'a, 'b> {
         })
     }
 
-    fn is_witnessed(&self) -> bool {
-        self.is_in_contact
-    }
-
     /// The box of all values within the limits.
     fn whole(&self, open: Vec<PiecePair>) -> JointBox {
         let kinematics = &self.problem.kinematics;
         let (mut center, mut half) = (kinematics.default_configuration(), vec![0.0; kinematics.width()]);
-        for variable in kinematics.variables() {
-            let range = match (variable.kind, variable.limits) {
-                (JointKind::Continuous, _) => Some((-std::f64::consts::PI, std::f64::consts::PI)),
-                (_, Some(limits)) => Some((limits.lower, limits.upper)),
-                _ => None,
-            };
-            if let Some((lower, upper)) = range {
-                center[variable.first] = 0.5 * lower + 0.5 * upper;
-                // What is accepted as within the limits, and the rounding of the middle.
-                let slack = LIMIT_SLACK * lower.abs().max(upper.abs()).max(1.0);
-                half[variable.first] = (0.5 * upper - 0.5 * lower) * (1.0 + 4.0 * f64::EPSILON) + slack;
-            }
+        for (place, [lower, upper]) in ranges(kinematics) {
+            center[place] = 0.5 * lower + 0.5 * upper;
+            // What is accepted as within the limits, and the rounding of the middle.
+            let slack = LIMIT_SLACK * lower.abs().max(upper.abs()).max(1.0);
+            half[place] = (0.5 * upper - 0.5 * lower) * (1.0 + 4.0 * f64::EPSILON) + slack;
         }
-        JointBox { bound: f64::NEG_INFINITY, center, half, open }
+        JointBox { bound: f64::NEG_INFINITY, center, half, open: open.into() }
+    }
+
+    fn push(&mut self, joint_box: JointBox) {
+        self.waiting += joint_box.numbers();
+        self.heap.push(joint_box);
     }
 
     /// Looks at the centre of a box, and cuts it where pairs stay open.
-    fn look(&mut self, mut joint_box: JointBox) {
+    fn look(&mut self, joint_box: JointBox) {
         self.placing.set_box(self.problem, &joint_box.center, &joint_box.half);
         let (mut bound, mut change) = (f64::INFINITY, 0.0_f64);
         let (mut is_always, mut is_free_at_center) = (false, true);
-        let mut open = std::mem::take(&mut joint_box.open);
+        let mut open = joint_box.open.to_vec();
         open.retain(|pair| {
             let Some(found) = self.bracket(pair) else {
                 (bound, is_free_at_center) = (f64::NEG_INFINITY, false);
@@ -300,9 +346,46 @@ impl<'a, 'b> Derivation<'a, 'b> {
         }
         let cut = self.widest(&open, joint_box.half.len());
         match cut.filter(|_| change > self.options.resolution_m) {
-            Some(variable) => self.cut(JointBox { bound, open, ..joint_box }, variable),
+            Some(variable) => self.cut(JointBox { bound, open: open.into(), ..joint_box }, variable),
             None => self.is_open = true,
         }
+    }
+
+    /// Goes from the deepest contact that was seen to a deeper one nearby, joint by joint.
+    fn deepen(&mut self, pairs: &[PiecePair]) {
+        let (Some(mut at), mut least) = self.deepest.clone() else { return };
+        let ranges: Vec<_> = ranges(&self.problem.kinematics).collect();
+        let mut step = FIRST_STEP;
+        while step > LAST_STEP {
+            let mut is_deeper = false;
+            for &(place, [lower, upper]) in &ranges {
+                for side in [-step, step] {
+                    let before = at[place];
+                    at[place] = (before + side * (upper - lower)).max(lower).min(upper);
+                    let found = self.signed_distance_upper_m(pairs, &at);
+                    if found < least {
+                        (least, is_deeper) = (found, true);
+                    } else {
+                        at[place] = before;
+                    }
+                }
+            }
+            if !is_deeper {
+                step *= 0.5;
+            }
+        }
+        self.deepest = (Some(at), least);
+    }
+
+    /// Upper bound of the signed distance at a configuration, metres.
+    fn signed_distance_upper_m(&mut self, pairs: &[PiecePair], at: &[f64]) -> f64 {
+        let still = vec![0.0; at.len()];
+        self.placing.set_box(self.problem, at, &still);
+        pairs
+            .iter()
+            .filter_map(|pair| self.bracket(pair))
+            .map(|found| found.upper_at_center)
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// None where a link has no pose.
@@ -350,7 +433,7 @@ impl<'a, 'b> Derivation<'a, 'b> {
             center[variable] += side * quarter;
             // The centres are rounded.
             half[variable] = quarter * (1.0 + 4.0 * f64::EPSILON) + f64::EPSILON * center[variable].abs();
-            self.heap.push(JointBox { bound: joint_box.bound, center, half, open: joint_box.open.clone() });
+            self.push(JointBox { bound: joint_box.bound, center, half, open: joint_box.open.clone() });
         }
     }
 }

@@ -31,6 +31,6 @@ pub use certificate::{Certificate, CertificateError};
 pub use derive::{DEFAULT_DERIVE_RESOLUTION_M, DEFAULT_MAX_BOXES, DeriveOptions, DerivedPair, PairClass};
 pub use geometry::{MotionBody, MotionObstacle, MotionShape, PlacedObstacle};
 pub use path::{MAX_CONTROL_POINTS, MAX_PATH_POINTS, Path, PathError};
-pub use problem::{MotionItem, MotionProblem, MotionProblemError};
+pub use problem::{MAX_PIECE_PAIRS, MotionItem, MotionProblem, MotionProblemError};
 pub use prove::{DEFAULT_MAX_CONFIGURATIONS, DEFAULT_RESOLUTION_M, MotionOptions, MotionWorkspace};
-pub use verify::VerifiedMotion;
+pub use verify::{KnownBodies, VerifiedMotion, VerifyOptions};

@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::{Isometry3, Point3, Vector3};
 use sublevel_core::measure::{Motion, Pose};
 
-use super::claim::Claim;
+use super::claim::{Claim, DigestedClaim};
 use super::geometry::{MotionBody, MotionObstacle, Piece, PlacedObstacle};
 use crate::kinematics::Kinematics;
 
@@ -23,7 +23,7 @@ pub struct MotionProblem {
     pub(crate) pieces: Vec<PieceOf>,
     pub(crate) pairs: Vec<PiecePair>,
     /// What certificates say of all this; made when first asked for.
-    pub(crate) claim: OnceLock<Arc<Claim>>,
+    pub(crate) claim: OnceLock<Arc<DigestedClaim>>,
 }
 
 /// A body or an obstacle, by its position in the list of these.
@@ -47,7 +47,16 @@ pub enum MotionProblemError {
     /// An obstacle that moves too far.
     #[error("obstacle {0} cannot move between these poses: they are too far apart")]
     Obstacle(Arc<str>),
+    /// More pairs than are kept in memory.
+    #[error(
+        "{0} pairs of convex pieces count, and at most {MAX_PIECE_PAIRS} are taken; allow pairs that cannot touch, \
+         or use bodies of fewer parts"
+    )]
+    Pairs(usize),
 }
+
+/// Most pairs of convex pieces of a problem.
+pub const MAX_PIECE_PAIRS: usize = 1 << 22;
 
 /// A convex piece of an item.
 #[derive(Clone, Copy, Debug)]
@@ -76,7 +85,8 @@ impl MotionProblem {
     /// two items in metres, or none for a pair that does not count. Pairs of obstacles never do.
     ///
     /// # Errors
-    /// A body on a link that is not there, and a margin or padding that is not finite.
+    /// A body on a link that is not there, a margin or padding that is not finite, and more pairs
+    /// than [`MAX_PIECE_PAIRS`].
     pub fn new(
         kinematics: Arc<Kinematics>,
         base: &Pose,
@@ -117,8 +127,16 @@ impl MotionProblem {
             claim: OnceLock::new(),
         };
         problem.check()?;
-        let of_bodies = problem.take_pieces();
-        problem.take_pairs(&of_bodies);
+        let firsts = problem.take_pieces();
+        let pieces = |item: MotionItem| {
+            let place = problem.place(item);
+            firsts[place + 1] - firsts[place]
+        };
+        let pairs = problem.rules.iter().map(|&(a, b, _)| pieces(a) * pieces(b)).fold(0, usize::saturating_add);
+        if pairs > MAX_PIECE_PAIRS {
+            return Err(MotionProblemError::Pairs(pairs));
+        }
+        problem.take_pairs(&firsts);
         Ok(problem)
     }
 
@@ -167,11 +185,15 @@ impl MotionProblem {
         firsts
     }
 
-    fn take_pairs(&mut self, firsts: &[usize]) {
-        let place = |item: MotionItem| match item {
+    /// Position of an item among the bodies and, after them, the obstacles.
+    fn place(&self, item: MotionItem) -> usize {
+        match item {
             MotionItem::Body(index) => index,
             MotionItem::Obstacle(index) => self.bodies.len() + index,
-        };
+        }
+    }
+
+    fn take_pairs(&mut self, firsts: &[usize]) {
         let mut pairs = Vec::new();
         // Parents come before children.
         let mut depths: Vec<u32> = Vec::new();
@@ -181,7 +203,7 @@ impl MotionProblem {
         for &(a, b, padding_m) in &self.rules {
             let steps = self.steps(a, b, &depths);
             let threshold_m = self.margin_m + padding_m;
-            let [of_a, of_b] = [place(a), place(b)].map(|item| firsts[item]..firsts[item + 1]);
+            let [of_a, of_b] = [a, b].map(|item| self.place(item)).map(|place| firsts[place]..firsts[place + 1]);
             for piece in of_a {
                 let with = of_b.clone().map(|other| PiecePair {
                     pieces: [piece, other].map(|piece| u32::try_from(piece).unwrap_or(u32::MAX)),
@@ -211,8 +233,8 @@ impl MotionProblem {
     }
 
     /// What certificates say of it.
-    pub(crate) fn claim(&self) -> &Arc<Claim> {
-        self.claim.get_or_init(|| Arc::new(Claim::of(self)))
+    pub(crate) fn claim(&self) -> &Arc<DigestedClaim> {
+        self.claim.get_or_init(|| Arc::new(DigestedClaim::new(Claim::of(self))))
     }
 
     /// The robot.

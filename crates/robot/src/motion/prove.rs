@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::Vector3;
+use sublevel_core::body::Body;
 use sublevel_core::measure::{Options, WarmStart};
 
 use super::answer::{MotionAnswer, MotionContact, MotionVerdict};
@@ -363,10 +364,10 @@ impl Search<'_, '_> {
         }
         let problem = self.problem;
         let tangents = [0, 1].map(|side| match problem.piece(pair.pair.pieces[side]).1 {
-            Piece::Body(body) if body.closed_form().is_none() => Some(Tangent {
-                point: Placing::local(&pair.placed[side], &found.witnesses[side]).into(),
-                multipliers: found.active[side].iter().collect(),
-            }),
+            Piece::Body(body) if body.closed_form().is_none() => {
+                let outward = if side == 0 { -n } else { n };
+                Some(tangent(body, &pair.placed[side], (found, side), &outward))
+            }
             _ => None,
         });
         let [of_a, of_b] = tangents.each_ref().map(|tangent| tangent.as_ref().map_or(Height::Table, Height::Tangent));
@@ -469,6 +470,18 @@ struct PairAt<'a> {
     /// Bound of the error of both poses, metres.
     error: f64,
     interval: Interval,
+}
+
+/// What proves how far a body reaches along a unit vector of the world frame: the witness and the
+/// constraints that the lower bound rests on, or a support point where it rests on none of these.
+fn tangent(body: &Body, placed: &PlacedPiece, (found, side): (&Solved, usize), outward: &Vector3<f64>) -> Tangent {
+    let mut multipliers: Vec<_> = found.active[side].iter().collect();
+    let mut point = Placing::local(placed, &found.witnesses[side]);
+    if multipliers.is_empty() {
+        let own = placed.pose.rotation().inverse_transform_vector(outward);
+        (point, multipliers) = body.support_multipliers(&own);
+    }
+    Tangent { point: point.into(), multipliers }
 }
 
 /// Whether a common point lies in one of two overlapping bodies so deep that they overlap wherever

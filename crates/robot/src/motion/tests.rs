@@ -1,9 +1,10 @@
 //! Motions against dense samples, closed forms, and certificates that were changed.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use sublevel_core::body::{Body, Compound, Shape};
 use sublevel_core::measure::{Capsule, HalfSpace, Options, Pose, WarmStart};
 use sublevel_testkit::Seeded;
@@ -168,6 +169,39 @@ fn bezier_segments_and_waypoints() {
     assert!(found.verdict == MotionVerdict::Contact && found.alpha > 0.5 && found.alpha < 0.75, "{}", found.alpha);
 }
 
+#[test]
+fn certificates_of_smooth_links_are_as_close_as_the_solver() {
+    // A body whose table is some hundredths too large, 10 µm from what it must not touch.
+    let turn = UnitQuaternion::from_euler_angles(0.4, 0.7, -0.2);
+    let body = Body::superellipsoid("q6", Vector3::zeros(), Vector3::new(0.3, 0.2, 0.1), 6).expect("a body");
+    let body = body.moved(&turn, &Vector3::zeros()).expect("a body");
+    let (down, out) = (-Vector3::z(), Vector3::x());
+    let lowest = body.support(&down).point.z;
+    let farthest = body.support(&out).point;
+    let near = 1e-5;
+    let ground = HalfSpace::new(Vector3::z(), lowest - near).expect("a half-space");
+    let ground = MotionObstacle { name: "ground".into(), placed: PlacedObstacle::HalfSpace(ground, 0.0) };
+    // The hand is 2 m out; a capsule along z stands in front of its foremost point.
+    let post = MotionShape::Capsule(Capsule::new(0.1, 0.3).expect("a capsule"));
+    let at_post = at(2.0 + farthest.x + 0.1 + near, farthest.y, farthest.z);
+    // A ball that is deeper in than the margin allows by 10 µm less.
+    let inside = at(2.0 + farthest.x + 0.1 - 0.05 + near, farthest.y, farthest.z);
+    for (name, obstacle, margin) in [
+        ("ground", ground, 0.0),
+        ("post", still("post", post, at_post), 0.0),
+        ("ball", still("ball", ball(0.1), inside), -0.05),
+    ] {
+        let problem = problem(hand(solid(body.clone())), vec![obstacle], margin);
+        let path = edge(&problem, &[0.0; 3], &[0.0; 3]);
+        assert_eq!(prove(&problem, &path, &FIRST).verdict, MotionVerdict::Free, "{name}");
+        let found = prove(&problem, &path, &MotionOptions { certificate: true, ..FIRST });
+        assert_eq!(found.verdict, MotionVerdict::Free, "{name}");
+        let verified = found.certificate.expect("a certificate").verify().expect("a proof");
+        let spare = verified.clearance_lower_m - margin;
+        assert!(spare > 0.0 && spare <= near + 1e-9, "{name}: {spare}");
+    }
+}
+
 /// A random robot with bodies of all kinds among obstacles of all kinds.
 fn random_problem(seeded: &mut Seeded, margin_m: f64) -> MotionProblem {
     let kinematics = Arc::new(Kinematics::new(&tree(seeded, 6)).expect("a tree"));
@@ -327,7 +361,7 @@ fn a_changed_certificate_is_refused_or_what_it_claims_is_true() {
         changed_bytes += 1;
     }
     assert!(changed_bytes > 500);
-    // Whoever computes the digest again changes what is claimed; each field in turn.
+    // The digest can be computed again for a changed claim; each field in turn.
     let value: serde_json::Value = serde_json::from_str(&text).expect("JSON");
     let (mut refused, mut kept) = (0, 0);
     for (index, (place, number)) in numbers(&value).into_iter().enumerate() {
@@ -346,7 +380,7 @@ fn a_changed_certificate_is_refused_or_what_it_claims_is_true() {
                 Err(_) => refused += 1,
                 Ok(verified) => {
                     // True of what it says now.
-                    let problem = read.claim.problem(|_| None, usize::MAX).expect("a problem");
+                    let problem = read.claim.problem(&VerifyOptions::default(), usize::MAX).expect("a problem");
                     let least = sampled(&problem, &read.path, 0.0, 1.0, 20);
                     assert!(
                         least > read.margin_m() - 1e-12 && least >= verified.clearance_lower_m - 1e-12,
@@ -394,6 +428,10 @@ fn numbers(value: &serde_json::Value) -> Vec<(String, f64)> {
     found
 }
 
+fn derive(problem: &MotionProblem, items: [MotionItem; 2]) -> DerivedPair {
+    problem.derive(items, &DeriveOptions::default(), &mut |_| ControlFlow::Continue(()))
+}
+
 #[test]
 fn pairs_that_touch_never_always_or_sometimes_are_classified() {
     // On the arm, which slides by 4 m, turns by 4 rad and folds without end: the hand comes as near
@@ -409,7 +447,7 @@ fn pairs_that_touch_never_always_or_sometimes_are_classified() {
         let problem = problem(vec![a, between, b], Vec::new(), margin_m);
         let items = [MotionItem::Body(0), MotionItem::Body(2)];
         assert!(problem.body_pairs().any(|pair| pair == items));
-        (problem.derive(items, &DeriveOptions::default()), problem)
+        (derive(&problem, items), problem)
     };
     let slide = |radius: f64| body("slide", 1, 0.0, radius);
     let (never, _) = derived(slide(0.4), body("elbow", 3, 0.0, 0.55), 0.0);
@@ -421,6 +459,9 @@ fn pairs_that_touch_never_always_or_sometimes_are_classified() {
     assert_eq!(always.class, PairClass::Always, "nearer than the margin");
     let (collides, problem) = derived(slide(0.2), body("hand", 3, 1.0, 0.1), 0.0);
     assert_eq!(collides.class, PairClass::Collides);
+    // Folded, the centres meet: the two balls overlap by both radii, 0.3 m, and depths are bounded
+    // to a hundredth.
+    assert!(collides.upper_m < -0.297, "{}", collides.upper_m);
     let witness = collides.witness.expect("a configuration");
     problem.kinematics().check(&witness).expect("within the limits");
     let still = edge(&problem, &witness, &witness);
@@ -428,12 +469,11 @@ fn pairs_that_touch_never_always_or_sometimes_are_classified() {
     // Neighbours, a pair that does not count, and a search that is stopped.
     let two = self::problem(vec![slide(0.2), body("upper", 2, 0.5, 0.1)], Vec::new(), 0.0);
     let items = [MotionItem::Body(0), MotionItem::Body(1)];
-    assert_eq!(two.derive(items, &DeriveOptions::default()).class, PairClass::Adjacent);
+    assert_eq!(derive(&two, items).class, PairClass::Adjacent);
     let bodies = vec![slide(0.2), body("upper", 2, 0.5, 0.1), body("hand", 3, 1.0, 0.1)];
     let none = MotionProblem::new(arm(), &Pose::identity(), bodies, Vec::new(), 0.0, |_, _| None).expect("a problem");
     let items = [MotionItem::Body(0), MotionItem::Body(2)];
-    assert_eq!(none.derive(items, &DeriveOptions::default()).class, PairClass::Undecided);
-    let stop = AtomicBool::new(true);
-    let options = DeriveOptions { stop: Some(&stop), ..DeriveOptions::default() };
-    assert_eq!(problem.derive(items, &options).class, PairClass::Undecided);
+    assert_eq!(derive(&none, items).class, PairClass::Undecided);
+    let stopped = problem.derive(items, &DeriveOptions::default(), &mut |_| ControlFlow::Break(()));
+    assert_eq!((stopped.class, stopped.boxes), (PairClass::Undecided, 0));
 }

@@ -1,7 +1,9 @@
 //! Checks certificates: forward kinematics, support heights, bounds of motion, and that the
 //! intervals cover the path. Nothing is searched for and nothing is solved.
 
+use std::fmt;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use sublevel_core::body::Shape;
 
@@ -22,6 +24,32 @@ pub struct VerifiedMotion {
     pub configurations: usize,
 }
 
+/// Bodies and compounds by their ids.
+pub type KnownBodies<'a> = dyn Fn(&str) -> Option<Arc<Shape>> + 'a;
+
+/// How certificates are checked.
+#[derive(Clone, Copy, Default)]
+pub struct VerifyOptions<'a> {
+    /// Bodies by their ids that are proven already; those with the same numbers are not proven
+    /// again.
+    pub known: Option<&'a KnownBodies<'a>>,
+    /// Ends the check when it is set.
+    pub stop: Option<&'a AtomicBool>,
+}
+
+impl fmt::Debug for VerifyOptions<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("VerifyOptions").field("known", &self.known.is_some()).field("stop", &self.stop).finish()
+    }
+}
+
+impl VerifyOptions<'_> {
+    pub(crate) fn check_time(&self) -> Result<(), CertificateError> {
+        let is_over = self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed));
+        if is_over { Err(CertificateError::Stopped) } else { Ok(()) }
+    }
+}
+
 impl Certificate {
     /// Checks everything, the proofs of the bodies included.
     ///
@@ -29,17 +57,17 @@ impl Certificate {
     /// The first part that is not usable, record that proves nothing, or pair that is not proven
     /// over all of the path.
     pub fn verify(&self) -> Result<VerifiedMotion, CertificateError> {
-        self.verify_with(|_| None)
+        self.verify_with(&VerifyOptions::default())
     }
 
-    /// The same; bodies that `known` has by their ids, with the same numbers, are not proven again.
+    /// The same with options.
     ///
     /// # Errors
-    /// As [`Certificate::verify`].
-    pub fn verify_with(&self, known: impl Fn(&str) -> Option<Arc<Shape>>) -> Result<VerifiedMotion, CertificateError> {
+    /// As [`Certificate::verify`], and [`CertificateError::Stopped`].
+    pub fn verify_with(&self, options: &VerifyOptions<'_>) -> Result<VerifiedMotion, CertificateError> {
         // Every pair that counts needs a record.
-        let problem = self.claim.problem(known, self.records.len())?;
-        self.verify_as(&problem)
+        let problem = self.claim.problem(options, self.records.len())?;
+        self.verify_as(&problem, options)
     }
 
     /// Checks that the certificate is about this robot among these bodies and obstacles, as they
@@ -48,14 +76,29 @@ impl Certificate {
     /// # Errors
     /// What differs, and as [`Certificate::verify`].
     pub fn verify_against(&self, problem: &MotionProblem) -> Result<VerifiedMotion, CertificateError> {
-        let is_same = Arc::ptr_eq(&self.claim, problem.claim());
-        if let Some(what) = self.claim.difference(problem.claim()).filter(|_| !is_same) {
-            return Err(CertificateError::Other(what));
-        }
-        self.verify_as(problem)
+        self.verify_against_with(problem, &VerifyOptions::default())
     }
 
-    fn verify_as(&self, problem: &MotionProblem) -> Result<VerifiedMotion, CertificateError> {
+    /// The same with options.
+    ///
+    /// # Errors
+    /// As [`Certificate::verify_against`], and [`CertificateError::Stopped`].
+    pub fn verify_against_with(
+        &self,
+        problem: &MotionProblem,
+        options: &VerifyOptions<'_>,
+    ) -> Result<VerifiedMotion, CertificateError> {
+        if let Some(what) = self.claim.difference(problem.claim()) {
+            return Err(CertificateError::Other(what));
+        }
+        self.verify_as(problem, options)
+    }
+
+    fn verify_as(
+        &self,
+        problem: &MotionProblem,
+        options: &VerifyOptions<'_>,
+    ) -> Result<VerifiedMotion, CertificateError> {
         if !self.path.is_usable(&problem.kinematics) {
             let reason = "its configurations are not of this robot, or outside of its limits";
             return Err(CertificateError::Part { part: "path".to_owned(), reason: reason.to_owned() });
@@ -73,6 +116,7 @@ impl Certificate {
                 return Err(CertificateError::Part { part: format!("records[{index}]"), reason });
             };
             if at != Some(record.interval) {
+                options.check_time()?;
                 placing.set(problem, &self.path, &record.interval);
                 at = Some(record.interval);
                 configurations += 1;
