@@ -92,6 +92,9 @@ struct Call {
     finish: Mutex<Option<Finish>>,
 }
 
+/// Stack of a thread: solvers that are compiled without optimisation take several megabytes.
+const STACK_BYTES: usize = 16 << 20;
+
 impl Crew {
     /// Starts so many threads.
     ///
@@ -102,8 +105,8 @@ impl Crew {
         let mut crew = Self { shared, threads: Vec::new() };
         for index in 0..threads.max(1) {
             let shared = crew.shared.clone();
-            let thread = thread::Builder::new().name(format!("solver-{index}")).spawn(move || shared.work())?;
-            crew.threads.push(thread);
+            let thread = thread::Builder::new().name(format!("solver-{index}")).stack_size(STACK_BYTES);
+            crew.threads.push(thread.spawn(move || shared.work())?);
         }
         Ok(crew)
     }

@@ -30,8 +30,8 @@ pub use name::{NameError, check_name};
 pub use object::{Attachment, LinkOf, Object, Slot, Subject};
 pub use pair_cache::WarmStartUse;
 pub use robot::{
-    JointsError, NamedJointValues, ParseRobotIdError, PlaceRobot, PrimitiveError, Robot, RobotError, RobotId,
-    RobotInstance, RobotLink, primitive_bodies,
+    DeriveProgress, DerivedLinks, JointsError, NamedJointValues, ParseRobotIdError, PlaceRobot, PrimitiveError, Robot,
+    RobotError, RobotId, RobotInstance, RobotLink, primitive_bodies,
 };
 pub use rules::{Rules, SubjectPair};
 pub use scene::Scene;

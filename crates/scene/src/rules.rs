@@ -3,6 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
 
+use foldhash::fast::RandomState;
+
 use super::object::{Object, Slot, Subject};
 use crate::robot::LinkTable;
 
@@ -42,8 +44,8 @@ type Key = u64;
 pub(crate) struct RuleTable {
     /// Per slot: the number of its group, and the padding of its side, metres.
     sides: Vec<(Key, f64)>,
-    allowed: HashSet<(Key, Key)>,
-    pairs: HashMap<(Key, Key), f64>,
+    allowed: HashSet<(Key, Key), RandomState>,
+    pairs: HashMap<(Key, Key), f64, RandomState>,
     /// Links of robots that may touch each other.
     links: LinkTable,
     /// No padding of a pair exceeds it, metres.
@@ -78,13 +80,13 @@ impl RuleTable {
             Subject::Object(name) => slot_of(name).map(Key::from),
             Subject::Group(name) => Some(group(name)),
         };
-        let mut allowed: HashSet<(Key, Key)> = HashSet::new();
+        let mut allowed: HashSet<(Key, Key), RandomState> = HashSet::default();
         for (a, b) in &rules.allowed {
             if let (Some(a), Some(b)) = (key(a), key(b)) {
                 allowed.insert(sorted(a, b));
             }
         }
-        let mut pairs: HashMap<(Key, Key), f64> = HashMap::new();
+        let mut pairs: HashMap<(Key, Key), f64, RandomState> = HashMap::default();
         for ((a, b), padding) in &rules.pairs {
             if let (Some(a), Some(b)) = (key(a), key(b)) {
                 pairs.insert(sorted(a, b), *padding);

@@ -1,7 +1,8 @@
 //! Decisions about pairs that may be displaced by rounding.
 
+use nalgebra::Vector3;
 use sublevel_core::body::{Body, Solid};
-use sublevel_core::measure::{Decision, Options, Pose, WarmStart, overlap, signed_distance};
+use sublevel_core::measure::{Options, Pose, WarmStart, distance, signed_distance};
 
 use super::answer::Verdict;
 use super::decide::{Bracket, decide};
@@ -26,8 +27,8 @@ pub(crate) fn decide_within<'o>(
     if verdict != Verdict::No {
         let inner = threshold - slack_m;
         verdict = Verdict::Undecided;
-        if let (Some(bodies), true) = (several(pair), inner < 0.0) {
-            if let Some(depth) = overlapping_parts(&bodies, inner, &options()) {
+        if let (Some(parts), true) = (solid_parts(pair), threshold == 0.0) {
+            if let Some(depth) = overlapping_parts(&parts, inner, &options()) {
                 (verdict, upper) = (Verdict::Yes, upper.min(depth));
             }
         } else {
@@ -44,18 +45,17 @@ pub(crate) fn decide_within<'o>(
 /// Parts of both sides where they stand.
 type Parts<'a> = [(&'a [Body], &'a Pose); 2];
 
-/// The parts of two solids of which one has several.
-fn several<'a>(pair: &Pair<'a>) -> Option<Parts<'a>> {
+/// The parts of two solids, of their finest rungs.
+fn solid_parts<'a>(pair: &Pair<'a>) -> Option<Parts<'a>> {
     let parts = |thing: &Thing<'a>| match *thing {
         Thing::Solid { rungs, pose, set: None } => Some((rungs.last()?.parts(), pose)),
         _ => None,
     };
-    let (a, b) = (parts(&pair.a)?, parts(&pair.b)?);
-    (a.0.len() > 1 || b.0.len() > 1).then_some([a, b])
+    Some([parts(&pair.a)?, parts(&pair.b)?])
 }
 
-/// Signed distance of two parts that overlap deeper than a threshold below 0, metres: how deep all
-/// of them overlap takes much longer, and says no more.
+/// Upper bound below a threshold of the signed distance of two parts, metres: how deep all of them
+/// overlap takes much longer, and says no more.
 fn overlapping_parts([a, b]: &Parts<'_>, threshold: f64, options: &Options<'_>) -> Option<f64> {
     let ball = |body: &Body, pose: &Pose| world_ball(pose, (body.circumscribed().center, body.circumscribed().radius));
     let mut near = Vec::new();
@@ -70,10 +70,25 @@ fn overlapping_parts([a, b]: &Parts<'_>, threshold: f64, options: &Options<'_>) 
     near.sort_by(|(a, ..), (b, ..)| a.total_cmp(b));
     near.into_iter().find_map(|(_, one, other)| {
         let mut warm = WarmStart::default();
-        if overlap(one, a.1, other, b.1, options, &mut warm) != Decision::Yes {
+        let found = distance(one, a.1, other, b.1, options, &mut warm);
+        if found.upper > 0.0 {
             return None;
         }
-        let found = signed_distance(one, a.1, other, b.1, options, &mut warm);
-        (found.upper < threshold).then_some(found.upper)
+        deep_point([(one, a.1), (other, b.1)], &found.witness_a, threshold).or_else(|| {
+            let found = signed_distance(one, a.1, other, b.1, options, &mut warm);
+            (found.upper < threshold).then_some(found.upper)
+        })
+    })
+}
+
+/// Upper bound of the signed distance of two bodies with a common point, metres, if it is below a
+/// threshold: where a ball about the point lies in one of them, that one has to move by more than
+/// its radius before the two are apart.
+fn deep_point(bodies: [(&Body, &Pose); 2], common: &Vector3<f64>, threshold: f64) -> Option<f64> {
+    bodies.into_iter().find_map(|(body, pose)| {
+        let own = pose.rotation().inverse_transform_vector(&(common - pose.translation()));
+        let rounding = 64.0 * f64::EPSILON * (common.norm() + own.norm() + pose.translation().norm());
+        let depth = -2.0 * threshold;
+        (body.value_upper_within(&own, depth + rounding) <= 1.0).then_some(-depth)
     })
 }

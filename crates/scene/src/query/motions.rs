@@ -9,6 +9,7 @@ use sublevel_core::measure::Pose;
 use sublevel_robot::motion::{
     Certificate, CertificateError, MotionAnswer, MotionBody, MotionItem, MotionObstacle, MotionOptions, MotionProblem,
     MotionProblemError, MotionShape, MotionVerdict, MotionWorkspace, Path, PathError, PlacedObstacle, VerifiedMotion,
+    VerifyOptions,
 };
 use sublevel_robot::{ConfigurationError, Kinematics};
 
@@ -295,9 +296,10 @@ impl RobotMotions {
     /// Checks a certificate against this robot and scene as they are.
     ///
     /// # Errors
-    /// What differs, or why it proves nothing.
-    pub fn verify(&self, certificate: &Certificate) -> Result<VerifiedMotion, CertificateError> {
-        certificate.verify_against(&self.problem)
+    /// What differs, or why it proves nothing; and that `stop` has ended the check.
+    pub fn verify(&self, certificate: &Certificate, stop: &Stop) -> Result<VerifiedMotion, CertificateError> {
+        let options = VerifyOptions { stop: Some(stop.flag()), ..VerifyOptions::default() };
+        certificate.verify_against_with(&self.problem, &options)
     }
 
     fn check(&self, index: usize, stop: &Stop) -> RobotMotionAnswer {

@@ -161,7 +161,7 @@ impl Placed {
     pub(crate) fn visit(&self, state: &State, margin_m: f64, mut visit: impl FnMut(Candidate) -> bool) {
         let table = &self.scene.structure.table;
         let counts = |a: Slot, b: Slot| self.include_allowed || !table.is_allowed(a, b);
-        let balls: Vec<_> = (0..self.moving.len()).map(|index| self.moving(index, state).1.ball()).collect();
+        let balls: Vec<_> = self.moving.iter().zip(&state.poses).map(|(moving, pose)| moving.ball(pose)).collect();
         for (i, moving) in self.moving.iter().enumerate() {
             let (slot, error_m) = (moving.slot, state.error_m(i));
             for (j, other) in self.moving.iter().enumerate().skip(i + 1) {

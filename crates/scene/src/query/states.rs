@@ -318,7 +318,7 @@ const DECISION_ACCURACY: f64 = 1e-9;
 const MOST_M: f64 = 1e16;
 
 /// Whether the body is the object itself.
-fn is_exact(object: &Object) -> bool {
+pub(super) fn is_exact(object: &Object) -> bool {
     match &object.geometry {
         Geometry::Capsule(_) | Geometry::HalfSpace(_) => true,
         Geometry::SosBody(_) => false,

@@ -46,4 +46,18 @@ pub enum StatesError {
     /// No state.
     #[error("is empty; send at least one state")]
     NoState,
+    /// A robot of which no joint has a value.
+    #[error("robot \"{0}\" has no joint with a value of its own; ask about its links as objects with poses")]
+    NoJoints(Arc<str>),
+    /// Several states where one is asked about.
+    #[error("holds {0} states; send one")]
+    Several(usize),
+    /// Joint values that are not one state.
+    #[error("holds {numbers} numbers; the joints of one state take {per_state}")]
+    OneState {
+        /// How many there are.
+        numbers: usize,
+        /// How many make a state.
+        per_state: usize,
+    },
 }

@@ -4,6 +4,7 @@
 //! geometry. An instance of it has a name, a base pose and joint values, and puts one object for
 //! every link with geometry into the scene, named `INSTANCE/LINK`, of the group `INSTANCE`.
 
+mod derived_pairs;
 mod id;
 mod instance;
 mod joints;
@@ -15,6 +16,7 @@ mod model;
 mod placement;
 mod update;
 
+pub use derived_pairs::{DeriveProgress, DerivedLinks};
 pub use id::{ParseRobotIdError, RobotId};
 pub use instance::RobotInstance;
 pub(crate) use instance::{Instance, Stance};

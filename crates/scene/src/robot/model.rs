@@ -44,7 +44,7 @@ pub enum RobotError {
     /// A mesh, and no body that stands for it.
     #[error(
         "collision {piece} of link \"{link}\" is the mesh {uri}; fit a body to all meshes of the link, in the frame \
-         of the link, and give it for this link"
+         of the link, and give it for this link, or send the meshes along"
     )]
     Mesh {
         /// Name of the link.

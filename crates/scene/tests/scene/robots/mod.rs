@@ -1,5 +1,7 @@
 //! Robots in scenes: links as objects, updates, states by joint values.
 
+mod derived;
+mod explanations;
 mod refusals;
 mod rules;
 mod states;
