@@ -21,7 +21,10 @@
 mod backup;
 mod bodies;
 mod connection;
+#[cfg(feature = "fit")]
+mod derive;
 mod error;
+mod explain;
 #[cfg(feature = "fit")]
 mod fits;
 #[cfg(feature = "fit")]

@@ -122,7 +122,16 @@ impl Client {
     pub async fn load_robot(&self, source: &RobotSource) -> Result<StoredRobot, ClientError> {
         let RobotSource { urdf, srdf, bodies } = source.clone();
         let body = |(link, id): (Arc<str>, BodyId)| LinkBody { link: link.to_string(), body_id: id.to_string() };
-        let request = LoadRobotRequest { urdf, srdf, link_bodies: bodies.into_iter().map(body).collect() };
+        let link_bodies = bodies.into_iter().map(body).collect();
+        self.load_robot_with(LoadRobotRequest { urdf, srdf, link_bodies, ..LoadRobotRequest::default() }).await
+    }
+
+    /// The same with everything that the protocol knows, such as the meshes of links, around which
+    /// the server fits bodies.
+    ///
+    /// # Errors
+    /// As [`Client::load_robot`], and when a mesh cannot be fitted.
+    pub async fn load_robot_with(&self, request: LoadRobotRequest) -> Result<StoredRobot, ClientError> {
         let response = self.robots().load_robot(request).await.map_err(self.refused())?.into_inner();
         StoredRobot::of(response.robot, response.created)
     }

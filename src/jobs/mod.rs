@@ -1,4 +1,5 @@
-//! Jobs, which are fits and solves of the hierarchy: queue, progress, cancel, restart.
+//! Jobs, which are fits, solves of the hierarchy and pairs of links: queue, progress, cancel,
+//! restart.
 //!
 //! The catalogue holds the jobs; what is decided there is final, and the worker only follows. A job
 //! that is cancelled is CANCELLED on disk first and stopped then; a result counts only if its job
@@ -6,20 +7,25 @@
 //! any time leaves a state that was acknowledged.
 //!
 //! `request` checks what fits are asked for, `execute` executes them, for jobs and the command
-//! line; `hierarchy` does both for solves; `obstacle` says which stored bodies can be used;
-//! `worker` does one job after the other; `board` is where it says how far it is, and where
-//! everybody waits for news.
+//! line; `hierarchy` does both for solves, `derive` for pairs of links; `link_body` makes bodies of
+//! the links of robots; `obstacle` says which stored bodies can be used; `worker` does one job
+//! after the other; `board` is where it says how far it is, and where everybody waits for news.
 
 mod board;
+mod derive;
 mod execute;
 mod hierarchy;
+mod link_body;
 mod obstacle;
 mod request;
 mod worker;
 
+pub use crate::fit::Mesh;
 pub use board::{Board, Phase, Progress};
+pub use derive::{MAX_DERIVE_BOXES, check_derive, derive};
 pub use execute::{Failure, FitOutput, Shapes, fit_group, fit_mesh};
 pub use hierarchy::{check_solve, check_solve_of, solve};
+pub use link_body::{LinkBodyError, LinkFit, exact_parts, fit_link, has_mesh, link_mesh, link_request};
 pub use obstacle::{NotASet, obstacle};
 pub use request::{MESH_FORMATS, RequestError, body_name, check, read_mesh};
 

@@ -12,7 +12,7 @@ use tokio::task::{JoinError, spawn_blocking};
 use super::board::{Board, Phase};
 use super::execute::{FitOutput, fit_group, fit_mesh};
 use super::obstacle::stored_obstacle;
-use super::{Jobs, hierarchy};
+use super::{Jobs, derive, hierarchy};
 use crate::fit::{self, Mesh};
 use crate::scene::Geometry;
 use crate::store::{Catalogue, CatalogueError, FitRequest, FitTask, Job, JobOutcome, JobState, JobTask};
@@ -22,6 +22,9 @@ const MAX_ATTEMPTS: u32 = 2;
 
 /// Pause after the disk failed.
 const PAUSE: Duration = Duration::from_secs(1);
+
+/// Boxes of joint values between two reports.
+const BOXES_TOLD: u32 = 64;
 
 /// What a job made or found, and the bodies to be stored.
 pub(super) type Done = (JobOutcome, Vec<Geometry>);
@@ -103,6 +106,18 @@ impl Jobs {
                 let found = hierarchy::solve(request, &[a?, b?], &mut |said| progress(Phase::Solving, said));
                 Ok((JobOutcome::Hierarchy(found.map_err(|error| error.to_string())?), Vec::new()))
             }
+            JobTask::Derive(request) => {
+                let loaded = catalogue.robot(&request.robot).map_err(|error| error.to_string())?;
+                let found = derive::derive(request, &loaded, &mut |at| {
+                    // Everybody who waits for news wakes up at each.
+                    if at.boxes % BOXES_TOLD != 0 {
+                        return ControlFlow::Continue(());
+                    }
+                    let (round, iterations) = (at.done + 1, at.boxes as usize + 1);
+                    progress(Phase::Solving, fit::Progress { round, iterations, ..fit::Progress::default() })
+                });
+                Ok((JobOutcome::Derive(found.map_err(|error| error.to_string())?), Vec::new()))
+            }
         }
     }
 
@@ -158,6 +173,7 @@ pub(super) fn recover(catalogue: &Catalogue) -> Result<(), CatalogueError> {
                 let smaller = match &job.task {
                     JobTask::Fit(_) => "send fewer points or a lower degree",
                     JobTask::Hierarchy(_) => "lower the level or the degree of the sets",
+                    JobTask::Derive(_) => "allow fewer boxes",
                 };
                 JobState::Failed(format!(
                     "the server was killed {} times while it worked on this; give it more memory, or {smaller}",

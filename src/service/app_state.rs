@@ -236,6 +236,17 @@ impl AppState {
     ) -> Result<T, Status> {
         on_thread(&self.proving, prove).await
     }
+
+    /// The same with limits of time, and for callers that may leave.
+    pub(super) async fn prove_within<T: Send + 'static>(
+        &self,
+        prove: impl FnOnce(&Arc<Stop>) -> T + Send + 'static,
+        time: CallTime,
+    ) -> Result<T, Status> {
+        let stop = Arc::<Stop>::default();
+        let flag = stop.clone();
+        ended(on_thread(&self.proving, move || prove(&flag)), &stop, time).await?
+    }
 }
 
 /// Waits until the server stops.

@@ -3,7 +3,7 @@
 use super::tokens::Role;
 
 /// The role that each call needs.
-const CALLS: [(&str, Role); 36] = [
+const CALLS: [(&str, Role); 38] = [
     ("BlobService/DownloadBlob", Role::Read),
     ("BlobService/UploadBlob", Role::Write),
     ("BodyService/CreateBody", Role::Write),
@@ -23,9 +23,11 @@ const CALLS: [(&str, Role); 36] = [
     ("QueryService/Clearance", Role::Read),
     ("QueryService/Evaluate", Role::Read),
     ("QueryService/EvaluateStream", Role::Read),
+    ("QueryService/Explain", Role::Read),
     ("QueryService/VerifyMotion", Role::Read),
     ("QueryService/Watch", Role::Read),
     ("RobotService/DeleteRobot", Role::Write),
+    ("RobotService/DeriveAllowedPairs", Role::Write),
     ("RobotService/GetRobot", Role::Read),
     ("RobotService/ListRobots", Role::Read),
     ("RobotService/LoadRobot", Role::Write),

@@ -2,7 +2,7 @@
 
 use super::error::Invalid;
 use super::proto::job::Task;
-use super::{fits, hierarchy, proto};
+use super::{derive_wire, fits, hierarchy, proto};
 use crate::jobs::Progress;
 use crate::store::{Job, JobOutcome, JobState, JobTask};
 
@@ -27,16 +27,23 @@ pub(super) fn job(job: &Job, progress: Option<Progress>) -> proto::Job {
         JobTask::Fit(fit) => {
             let outcome = match outcome {
                 Some(JobOutcome::Fit(outcome)) => Some(outcome),
-                Some(JobOutcome::Hierarchy(_)) | None => None,
+                Some(JobOutcome::Hierarchy(_) | JobOutcome::Derive(_)) | None => None,
             };
             Task::Fit(fits::wire::task(fit, progress, outcome))
         }
         JobTask::Hierarchy(request) => {
             let outcome = match outcome {
                 Some(JobOutcome::Hierarchy(outcome)) => Some(outcome),
-                Some(JobOutcome::Fit(_)) | None => None,
+                Some(JobOutcome::Fit(_) | JobOutcome::Derive(_)) | None => None,
             };
             Task::Hierarchy(hierarchy::wire::task(request, progress, outcome))
+        }
+        JobTask::Derive(request) => {
+            let outcome = match outcome {
+                Some(JobOutcome::Derive(outcome)) => Some(outcome),
+                Some(JobOutcome::Fit(_) | JobOutcome::Hierarchy(_)) | None => None,
+            };
+            Task::AllowedPairs(derive_wire::task(request, progress, outcome))
         }
     };
     proto::Job {

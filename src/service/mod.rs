@@ -27,7 +27,10 @@ mod columns;
 mod concurrency_limit;
 pub mod config;
 mod contact_watch;
+#[cfg(feature = "fit")]
+pub(crate) mod derive_wire;
 mod error;
+mod explain;
 #[cfg(feature = "fit")]
 pub(crate) mod fits;
 #[cfg(fuzzing)]
@@ -40,6 +43,8 @@ mod job_wire;
 #[cfg(feature = "fit")]
 mod jobs;
 pub mod limits;
+#[cfg(feature = "fit")]
+mod link_fits;
 mod message_limit;
 mod metrics;
 mod motions;

@@ -7,16 +7,16 @@ use tonic::Status;
 use super::app_state::AppState;
 use super::call_time::CallTime;
 use super::error::{self, Invalid};
-use super::limits::{MAX_CERTIFICATES, MAX_MOTIONS};
+use super::limits::{MAX_CERTIFICATES, MAX_MOTIONS, SMALL_SCENE};
 use super::packed::{self, Packed};
 use super::proto::{
     self, CheckMotionsRequest, CheckMotionsResponse, MovingObjects, VerifyMotionRequest, VerifyMotionResponse,
 };
 use super::query_wire::{self, NOTHING, NameTable};
 use super::snapshot::snapshot;
-use crate::robot::motion::{Certificate, MotionAnswer, MotionProblemError, MotionVerdict, PathError};
-use crate::scene::Scene;
+use crate::robot::motion::{Certificate, MotionAnswer, MotionProblemError, MotionVerdict, PathError, VerifyOptions};
 use crate::scene::query::{MotionSettings, MovingObject, PathKind, RobotMotionAnswer, RobotMotions, RobotMotionsError};
+use crate::scene::{Geometry, Scene, Stop};
 
 /// Answers CheckMotions.
 pub(super) async fn check(
@@ -25,9 +25,22 @@ pub(super) async fn check(
     time: CallTime,
 ) -> Result<CheckMotionsResponse, Status> {
     let scene = snapshot(app, &request.scene, request.at_least_revision).await?;
-    let motions = motions(&scene, &request.robot, request.moving.as_ref(), request.margin_m, request.include_allowed)?;
+    let is_small = scene.len() <= SMALL_SCENE && request.joint_values.len() <= SMALL_PATHS_BYTES;
+    let prepare = move || asked(&scene, &request);
+    let motions = if is_small { prepare()? } else { app.work(prepare).await?? };
+    let motions = Arc::new(motions);
+    let answers = app.ask(motions.clone(), time).await?;
+    Ok(response(&answers, &motions))
+}
+
+/// Joint values of paths, in bytes, that are read on the thread that serves the connection.
+const SMALL_PATHS_BYTES: usize = 1 << 16;
+
+/// The motions of a request.
+fn asked(scene: &Scene, request: &CheckMotionsRequest) -> Result<RobotMotions, Status> {
+    let motions = motions(scene, &request.robot, request.moving.as_ref(), request.margin_m, request.include_allowed)?;
     let values = packed::numbers(&request.joint_values, "joint_values")?;
-    let points = points(&request, values.len(), motions.kinematics().width())?;
+    let points = points(request, values.len(), motions.kinematics().width())?;
     error::at_most("point_counts", points.len(), ("max_motions", MAX_MOTIONS))?;
     if request.certificates {
         error::at_most("point_counts", points.len(), ("max_certificates", MAX_CERTIFICATES))?;
@@ -39,17 +52,16 @@ pub(super) async fn check(
     };
     let joints: Vec<Arc<str>> = request.joints.iter().map(|name| name.as_str().into()).collect();
     let motions = motions.with_joint_paths(&joints, &values, &points, kind).map_err(|error| motions_error(&error))?;
-    let mut motions = motions.with_settings(settings(&request)?);
-    if request.stop_at_first {
-        motions = motions.stopping_at_first();
-    }
-    let motions = Arc::new(motions);
-    let answers = app.ask(motions.clone(), time).await?;
-    Ok(response(&answers, &motions))
+    let motions = motions.with_settings(settings(request)?);
+    Ok(if request.stop_at_first { motions.stopping_at_first() } else { motions })
 }
 
 /// Answers VerifyMotion.
-pub(super) async fn verify(app: &AppState, request: VerifyMotionRequest) -> Result<VerifyMotionResponse, Status> {
+pub(super) async fn verify(
+    app: &AppState,
+    request: VerifyMotionRequest,
+    time: CallTime,
+) -> Result<VerifyMotionResponse, Status> {
     let certificate =
         Certificate::from_json(&request.certificate).map_err(|error| Invalid::new("certificate", error))?;
     let against = match (request.scene.is_empty(), request.robot.is_empty()) {
@@ -69,12 +81,19 @@ pub(super) async fn verify(app: &AppState, request: VerifyMotionRequest) -> Resu
         }
     };
     let scene_revision = against.as_ref().map_or(0, |motions| motions.scene().revision());
+    let catalogue = if app.is_loaded() { Some(app.catalogue().await?) } else { None };
+    let check = move |stop: &Arc<Stop>| match against {
+        Some(motions) => motions.verify(&certificate, stop),
+        None => {
+            let known = |id: &str| match catalogue.as_ref()?.geometry(&id.parse().ok()?) {
+                Ok(Geometry::Solid(shape)) => Some(shape),
+                _ => None,
+            };
+            certificate.verify_with(&VerifyOptions { known: Some(&known), stop: Some(stop.flag()) })
+        }
+    };
     // Proving the bodies of a certificate again takes some tens of milliseconds each.
-    let verified = tokio::task::spawn_blocking(move || match against {
-        Some(motions) => motions.verify(&certificate),
-        None => certificate.verify(),
-    });
-    let verified = verified.await.map_err(|error| error::internal_panic(&error))?;
+    let verified = app.prove_within(check, time).await?;
     Ok(match verified {
         Ok(verified) => VerifyMotionResponse {
             holds: true,

@@ -18,14 +18,15 @@ use super::proto::query_service_server::QueryService;
 use super::proto::{
     self, CastRaysRequest, CastRaysResponse, CheckMotionsRequest, CheckMotionsResponse, CheckStatesRequest,
     CheckStatesResponse, ClearanceRequest, ClearanceResponse, EvaluateRequest, EvaluateResponse, EvaluateStreamRequest,
-    EvaluateStreamResponse, StreamError, VerifyMotionRequest, VerifyMotionResponse, WatchRequest, WatchResponse,
+    EvaluateStreamResponse, ExplainRequest, ExplainResponse, StreamError, VerifyMotionRequest, VerifyMotionResponse,
+    WatchRequest, WatchResponse,
 };
 use super::query_wire::{NOTHING, NameTable, Outputs};
 use super::snapshot::snapshot;
-use super::{contact_watch, motions, query_wire, wire};
+use super::{contact_watch, explain, motions, query_wire, wire};
 use crate::scene::query::{
-    Answer, AnswerStatus, Ask, Certainty, Clearance, Found, Pairs, RayAnswer, Rays, StateAnswer, StateVerdict, States,
-    Within, closest_pair, combined,
+    Answer, AnswerStatus, Ask, Clearance, Found, Pairs, RayAnswer, Rays, StateAnswer, StateVerdict, States, Within,
+    closest_pair, combined,
 };
 use crate::scene::{Scene, Stop};
 
@@ -130,7 +131,8 @@ impl QueryService for Queries {
         &self,
         request: Request<VerifyMotionRequest>,
     ) -> Result<Response<VerifyMotionResponse>, Status> {
-        motions::verify(&self.0, request.into_inner()).await.map(Response::new)
+        let time = CallTime::of(&request, None)?;
+        motions::verify(&self.0, request.into_inner(), time).await.map(Response::new)
     }
 
     async fn clearance(&self, request: Request<ClearanceRequest>) -> Result<Response<ClearanceResponse>, Status> {
@@ -167,6 +169,11 @@ impl QueryService for Queries {
         let response = query_wire::clearance(parts.into_iter().flatten(), &scene, gradients);
         error::fits(&response)?;
         Ok(Response::new(response))
+    }
+
+    async fn explain(&self, request: Request<ExplainRequest>) -> Result<Response<ExplainResponse>, Status> {
+        let time = CallTime::of(&request, request.get_ref().budget_ms)?;
+        explain::explain(&self.0, request.into_inner(), time).await.map(Response::new)
     }
 
     async fn cast_rays(&self, request: Request<CastRaysRequest>) -> Result<Response<CastRaysResponse>, Status> {
@@ -355,18 +362,8 @@ fn states_response(answers: &[StateAnswer], scene: &Scene, scene_revision: u64) 
     let (mut verdicts, mut certainties, mut pairs) = (Packed::default(), Packed::default(), Packed::default());
     let (mut lower, mut upper) = (Packed::default(), Packed::default());
     for answer in answers {
-        let verdict = match answer.verdict {
-            StateVerdict::Free => proto::Verdict::Free,
-            StateVerdict::Contact => proto::Verdict::Contact,
-            StateVerdict::Undecided => proto::Verdict::Undecided,
-            StateVerdict::Invalid => proto::Verdict::Invalid,
-            StateVerdict::NotChecked => proto::Verdict::NotChecked,
-        };
-        let certainty = match answer.certainty {
-            Certainty::None => proto::Certainty::Unspecified,
-            Certainty::Certain => proto::Certainty::Certain,
-            Certainty::Possible => proto::Certainty::Possible,
-        };
+        let verdict = query_wire::verdict(answer.verdict);
+        let certainty = query_wire::certainty(answer.certainty);
         verdicts.byte(u8::try_from(i32::from(verdict)).unwrap_or(0));
         certainties.byte(u8::try_from(i32::from(certainty)).unwrap_or(0));
         match answer.pair {

@@ -8,8 +8,8 @@ use tonic::Status;
 
 use crate::measure::{HalfSpace, Motion, Pose, RayError};
 use crate::scene::query::{
-    Answer, AnswerStatus, Ask, AskError, ClearanceRow, Measure, Motions, Operand, PairsError, RaysError, Selection,
-    StateClearance, StatesError, Verdict,
+    Answer, AnswerStatus, Ask, AskError, Certainty, ClearanceRow, Measure, Motions, Operand, PairsError, RaysError,
+    Selection, StateClearance, StateVerdict, StatesError, Verdict,
 };
 use crate::scene::{JointsError, Scene, Slot};
 
@@ -269,6 +269,24 @@ impl NameTable {
 /// Position of no object.
 pub(super) const NOTHING: u32 = u32::MAX;
 
+pub(super) fn verdict(verdict: StateVerdict) -> proto::Verdict {
+    match verdict {
+        StateVerdict::Free => proto::Verdict::Free,
+        StateVerdict::Contact => proto::Verdict::Contact,
+        StateVerdict::Undecided => proto::Verdict::Undecided,
+        StateVerdict::Invalid => proto::Verdict::Invalid,
+        StateVerdict::NotChecked => proto::Verdict::NotChecked,
+    }
+}
+
+pub(super) fn certainty(certainty: Certainty) -> proto::Certainty {
+    match certainty {
+        Certainty::None => proto::Certainty::Unspecified,
+        Certainty::Certain => proto::Certainty::Certain,
+        Certainty::Possible => proto::Certainty::Possible,
+    }
+}
+
 pub(super) fn status(status: AnswerStatus) -> proto::SolveStatus {
     match status {
         AnswerStatus::Converged => proto::SolveStatus::Converged,
@@ -377,10 +395,12 @@ pub(super) fn states_error(error: &StatesError) -> Invalid {
     match error {
         StatesError::NoObject => Invalid::new("objects", error),
         StatesError::Twice(index) => Invalid::new(format!("objects[{index}]"), error),
-        StatesError::Numbers { .. } | StatesError::NoState => Invalid::new("poses", error),
-        StatesError::JointNumbers { .. } | StatesError::NoJointState => Invalid::new("joint_values", error),
+        StatesError::Numbers { .. } | StatesError::NoState | StatesError::Several(_) => Invalid::new("poses", error),
+        StatesError::JointNumbers { .. } | StatesError::NoJointState | StatesError::OneState { .. } => {
+            Invalid::new("joint_values", error)
+        }
         StatesError::Joints(of_joints) => Invalid::new(joints_field(of_joints), error),
-        StatesError::NoRobot(_) | StatesError::NoGeometry(_) => Invalid::new("robot", error),
+        StatesError::NoRobot(_) | StatesError::NoGeometry(_) | StatesError::NoJoints(_) => Invalid::new("robot", error),
     }
 }
 

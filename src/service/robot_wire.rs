@@ -19,7 +19,7 @@ pub(crate) fn robot_id(id: &str, field: &str) -> Result<RobotId, Invalid> {
 
 /// What a robot is to be loaded from.
 pub(super) fn source(request: proto::LoadRobotRequest) -> Result<RobotSource, Invalid> {
-    let proto::LoadRobotRequest { urdf, srdf, link_bodies } = request;
+    let proto::LoadRobotRequest { urdf, srdf, link_bodies, .. } = request;
     if urdf.is_empty() {
         return Err(Invalid::new("urdf", "is empty; send the text of a URDF"));
     }
@@ -108,7 +108,8 @@ pub(crate) fn joint_values_message(named: &NamedJointValues) -> proto::JointValu
     proto::JointValues { joints, values: numbers(&named.values), rows: Vec::new() }
 }
 
-fn numbers(values: &[f64]) -> bytes::Bytes {
+/// Numbers, packed.
+pub(super) fn numbers(values: &[f64]) -> bytes::Bytes {
     let mut packed = Packed::with_capacity(8 * values.len());
     values.iter().for_each(|&value| packed.number(value));
     packed.into_bytes()

@@ -35,6 +35,8 @@ use super::incoming::Incoming;
 #[cfg(feature = "fit")]
 use super::jobs::JobCalls;
 use super::limits::{MAX_HEADER_BYTES, MAX_RESET_STREAMS, POSES_WRITTEN_EVERY, PROVER_NICE, WINDOW_BYTES};
+#[cfg(feature = "fit")]
+use super::link_fits::LinkFits;
 use super::metrics::Metrics;
 use super::proto::FILE_DESCRIPTOR_SET;
 use super::proto::blob_service_server::{self, BlobServiceServer};
@@ -153,17 +155,25 @@ impl Server {
         let (limits, metrics) = (self.config.limits, Metrics::default());
         let app = AppState::new(catalogue.clone(), stopping.clone(), (limits.clone(), metrics.clone()))?;
         let calls = CallLayer::new(Authorization(self.tokens), metrics.clone());
-        let router = router(&app, calls).add_service(health_service);
+        #[cfg(feature = "fit")]
+        let jobs = Jobs::default();
+        let robots = Robots {
+            app: app.clone(),
+            #[cfg(feature = "fit")]
+            jobs: jobs.clone(),
+            #[cfg(feature = "fit")]
+            fits: LinkFits::default(),
+        };
+        let router = router(&app, robots, calls).add_service(health_service);
         let admin = self.admin.map(|listener| {
             let looked_at = Admin { metrics: metrics.clone(), catalogue: catalogue.clone(), stopping };
             tokio::spawn(admin::serve(listener, looked_at))
         });
         let keeper = tokio::spawn(keep_scenes(catalogue.clone()));
         #[cfg(feature = "fit")]
-        let (router, jobs, worker) = {
-            let jobs = Jobs::default();
+        let (router, worker) = {
             let worker = tokio::spawn(jobs.clone().work(catalogue.clone()));
-            (with_jobs(router, &app, &jobs), jobs, worker)
+            (with_jobs(router, &app, &jobs), worker)
         };
 
         let stop_proving = Arc::<AtomicBool>::default();
@@ -277,7 +287,7 @@ async fn bind(addr: SocketAddr) -> Result<(TcpListener, SocketAddr), ServeError>
     Ok((listener, addr))
 }
 
-fn router(app: &AppState, calls: CallLayer) -> Routes {
+fn router(app: &AppState, robots: Robots, calls: CallLayer) -> Routes {
     let reflection = || {
         tonic_reflection::server::Builder::configure()
             .register_encoded_file_descriptor_set(FILE_DESCRIPTOR_SET)
@@ -288,7 +298,7 @@ fn router(app: &AppState, calls: CallLayer) -> Routes {
     let (sized, limit) = (usize::MAX, ConcurrencyLimit::new(limits, app.metrics().clone()));
     let bodies = BodyServiceServer::new(Bodies(app.clone()));
     let blobs = BlobServiceServer::new(BlobCalls(app.clone()));
-    let robots = RobotServiceServer::new(Robots(app.clone()));
+    let robots = RobotServiceServer::new(robots);
     let scenes = SceneServiceServer::new(Scenes(app.clone()));
     let queries = QueryServiceServer::new(Queries(app.clone()));
     let [keepalive, keepalive_timeout] = limits.keepalive();

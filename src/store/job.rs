@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::derive::{DeriveOutcome, DeriveRequest};
 use super::hierarchy::{HierarchyOutcome, HierarchyRequest};
 use super::request::FitRequest;
 use crate::body::{Solver, SolverStep};
@@ -58,6 +59,8 @@ pub enum JobTask {
     Fit(FitTask),
     /// A solve of the hierarchy.
     Hierarchy(HierarchyRequest),
+    /// Pairs of links of a robot.
+    Derive(DeriveRequest),
 }
 
 /// A fit that is a job.
@@ -94,6 +97,8 @@ pub enum JobOutcome {
     Fit(FitOutcome),
     /// Of a solve of the hierarchy.
     Hierarchy(HierarchyOutcome),
+    /// Of pairs of links.
+    Derive(DeriveOutcome),
 }
 
 /// What a fit made.
@@ -188,7 +193,15 @@ impl NewJob {
 
     /// A solve of the hierarchy.
     pub fn hierarchy(request_id: String, request: HierarchyRequest) -> Self {
-        let task = JobTask::Hierarchy(request);
+        Self::of(request_id, JobTask::Hierarchy(request))
+    }
+
+    /// Pairs of links of a robot.
+    pub fn derive(request_id: String, request: DeriveRequest) -> Self {
+        Self::of(request_id, JobTask::Derive(request))
+    }
+
+    fn of(request_id: String, task: JobTask) -> Self {
         let digest = hex(Sha256::new().chain_update(serde_json::to_string(&task).unwrap_or_default()));
         Self { request_id, digest, task, coordinates: Vec::new(), corners: Vec::new() }
     }
@@ -222,6 +235,7 @@ impl fmt::Display for JobState {
             Self::Succeeded(JobOutcome::Hierarchy(HierarchyOutcome { lower, upper: None, .. })) => {
                 write!(f, "succeeded with the lower bound {lower:e}")
             }
+            Self::Succeeded(JobOutcome::Derive(outcome)) => write!(f, "succeeded with {} pairs", outcome.pairs.len()),
             Self::Failed(why) => write!(f, "failed: {why}"),
             Self::Cancelled => f.write_str("cancelled"),
         }
@@ -236,6 +250,7 @@ impl fmt::Display for JobTask {
             Self::Hierarchy(HierarchyRequest { sets: [a, b], level, .. }) => {
                 write!(f, "hierarchy of bodies {} and {} at level {level}", a.body, b.body)
             }
+            Self::Derive(DeriveRequest { robot, .. }) => write!(f, "pairs of links of robot {robot}"),
         }
     }
 }

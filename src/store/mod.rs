@@ -41,6 +41,7 @@
 
 mod catalogue;
 mod copy;
+mod derive;
 mod disk;
 mod error;
 mod format_3;
@@ -54,6 +55,7 @@ mod robot_row;
 mod rows;
 
 pub use catalogue::{Catalogue, CatalogueError, Counts, FORK_IDLE, LiveScene, MAX_FORKS, Origin, SceneEntry};
+pub use derive::{DeriveOutcome, DeriveRequest, DerivedLinkPair};
 pub use disk::{BACKUP_PREFIX, JobMesh, Store};
 pub use error::StoreError;
 pub use hierarchy::{HierarchyMeasure, HierarchyOutcome, HierarchyRequest, HierarchySet};

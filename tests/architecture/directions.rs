@@ -24,7 +24,7 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
     ("scene", &["robot", "branch_and_bound", "measure", "body"]),
     // Of measure, the pose.
     ("store", &["body", "scene", "robot", "measure"]),
-    ("jobs", &["fit", "store", "scene", "body"]),
+    ("jobs", &["fit", "store", "scene", "robot", "body"]),
     // Of polynomial, the instruction set.
     ("service", &["jobs", "store", "scene", "robot", "measure", "body", "polynomial"]),
     // Of service, the messages.

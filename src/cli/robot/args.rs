@@ -20,6 +20,8 @@ use crate::cli::fit::length::length;
 ///
 /// sublevel robot panda.urdf --srdf panda.srdf --out panda
 ///
+/// sublevel robot panda.urdf --srdf panda.srdf --out panda --pairs
+///
 /// sublevel robot panda.urdf --max-gap 1cm --out panda --server http://127.0.0.1:50051
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct RobotArgs {
@@ -47,6 +49,14 @@ pub(in crate::cli) struct RobotArgs {
     /// folder of the URDF is looked into last
     #[arg(long = "search", value_name = "DIR")]
     pub(super) search: Vec<PathBuf>,
+    /// Prove for every pair of links whether it can touch at any joint values within the limits,
+    /// and compare with the SRDF
+    ///
+    /// Takes seconds to minutes. Pairs that never touch need no check; where the SRDF leaves out a
+    /// pair that can, the joint values at which it does are shown. A server does the same as a job:
+    /// RobotService.DeriveAllowedPairs.
+    #[arg(long)]
+    pub(super) pairs: bool,
     /// Address of a server to load the robot into, such as http://127.0.0.1:50051
     #[arg(long, value_name = "URL")]
     pub(super) server: Option<String>,

@@ -5,23 +5,20 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use nalgebra::{Point3, Vector3};
 use sha2::{Digest, Sha256};
 
 use super::args::RobotArgs;
-use crate::body::{Body, Compound, Shape, Solid};
+use crate::body::{Body, Shape, Solid};
 use crate::cli::files::{read_shape, write_atomically};
-use crate::cli::fit::request::checked;
 use crate::cli::mesh::note;
 use crate::cli::progress::progress_bar;
 use crate::fit::{Mesh, ReadOptions, read_mesh};
-use crate::jobs::{Shapes, fit_mesh};
-use crate::robot::{Collision, Description, Geometry as Piece, Link, MeshPaths};
-use crate::scene::{Geometry, primitive_bodies};
-use crate::store::{FitBody, FitMode, FitPolynomial, FitPreparation, FitRequest, FitWithinGap};
+use crate::jobs::{LinkFit, RequestError, exact_parts, fit_link, has_mesh, link_mesh, link_request};
+use crate::robot::{Description, Link, MeshPaths};
+use crate::scene::Geometry;
 
 /// The body of a link that has meshes.
-pub(super) struct LinkFit {
+pub(super) struct FittedLink {
     pub(super) link: Arc<str>,
     /// In the frame of the link.
     pub(super) geometry: Geometry,
@@ -33,10 +30,9 @@ pub(super) struct LinkFit {
 }
 
 /// Fits every link with meshes, in the order of the file.
-pub(super) fn fit_links(args: &RobotArgs, description: &Description) -> Result<Vec<LinkFit>, Box<dyn Error>> {
+pub(super) fn fit_links(args: &RobotArgs, description: &Description) -> Result<Vec<FittedLink>, Box<dyn Error>> {
     let paths = mesh_paths(args);
-    let has_mesh = |link: &&Link| link.collisions.iter().any(|piece| matches!(piece.geometry, Piece::Mesh { .. }));
-    let links: Vec<&Link> = description.links.iter().filter(has_mesh).collect();
+    let links: Vec<&Link> = description.links.iter().filter(|link| has_mesh(link)).collect();
     let bar = progress_bar("links");
     let mut fits = Vec::with_capacity(links.len());
     for (index, link) in links.iter().enumerate() {
@@ -63,49 +59,27 @@ fn mesh_paths(args: &RobotArgs) -> MeshPaths {
 
 /// All meshes of a link in its frame, metres.
 fn joined(link: &Link, paths: &MeshPaths) -> Result<Mesh, Box<dyn Error>> {
-    let mut joined = Mesh { points: Vec::new(), triangles: Vec::new() };
-    for Collision { origin, geometry } in &link.collisions {
-        let Piece::Mesh { uri, scale } = geometry else { continue };
+    link_mesh(link, |uri| {
         let path = paths.resolve(uri)?;
         let reading = read_mesh(&path, &ReadOptions::default())?;
         note(&path, &reading);
-        let first = joined.points.len();
-        let placed = |point: &Vector3<f64>| (origin * Point3::from(point.component_mul(scale))).coords;
-        joined.points.extend(reading.mesh.points.iter().map(placed));
-        // A mirrored triangle is seen from behind.
-        let is_mirrored = scale.iter().filter(|factor| **factor < 0.0).count() % 2 == 1;
-        joined.triangles.extend(reading.mesh.triangles.iter().map(|&[a, b, c]| {
-            let [b, c] = if is_mirrored { [c, b] } else { [b, c] };
-            [a, b, c].map(|corner| corner + first)
-        }));
-    }
-    Ok(joined)
-}
-
-/// What is asked for of a link.
-fn request(args: &RobotArgs, link: &Link) -> Result<FitRequest, String> {
-    let (polynomial, preparation) = (FitPolynomial::default(), FitPreparation::default());
-    let mode: FitMode = match args.degree {
-        Some(degree) => {
-            let polynomial = FitPolynomial { degree: Some(degree), ..polynomial };
-            FitBody { polynomial, slabs: 0, preparation }.into()
-        }
-        None => FitWithinGap { max_gap_m: args.max_gap, polynomial, preparation }.into(),
-    };
-    checked(FitRequest::new(&*link.name, mode))
+        Ok(Arc::new(reading.mesh))
+    })
 }
 
 /// Fits a link, or reads the file that an earlier run has written for the same meshes and options.
-fn fit(args: &RobotArgs, link: &Link, mesh: Mesh) -> Result<LinkFit, Box<dyn Error>> {
-    let request = request(args, link)?;
+fn fit(args: &RobotArgs, link: &Link, mesh: Mesh) -> Result<FittedLink, Box<dyn Error>> {
+    let how = args.degree.map_or(LinkFit::WithinGap(args.max_gap), LinkFit::Degree);
+    let named =
+        |error: RequestError| format!("--{}: {}", error.field.trim_end_matches("_m").replace('_', "-"), error.why);
+    link_request(&link.name, how).map_err(named)?;
     let exact = exact_parts(link)?;
     let file = args.out.join(format!("{}-{}.json", file_name(&link.name), content(args, &mesh, &exact)));
     let was_kept = file.exists();
     let shape = if was_kept {
         read_shape(&file)?
     } else {
-        let made = fit_mesh(&request, mesh, |_, _| ControlFlow::Continue(()))?;
-        let shape = union(link, made.shapes, exact)?;
+        let shape = fit_link(link, mesh, how, || ControlFlow::Continue(()))?;
         let text = match &shape {
             Shape::Body(body) => body.to_json(),
             Shape::Compound(compound) => compound.to_json(),
@@ -119,32 +93,7 @@ fn fit(args: &RobotArgs, link: &Link, mesh: Mesh) -> Result<LinkFit, Box<dyn Err
         Shape::Body(body) => (*body).into(),
         Shape::Compound(compound) => (*compound).into(),
     };
-    Ok(LinkFit { link: link.name.clone(), geometry, file, was_kept, degree, parts })
-}
-
-/// Bodies of what is no mesh of a link, exactly.
-fn exact_parts(link: &Link) -> Result<Vec<Body>, Box<dyn Error>> {
-    let primitives = link.collisions.iter().filter(|piece| !matches!(piece.geometry, Piece::Mesh { .. }));
-    let mut parts = Vec::new();
-    for piece in primitives {
-        parts.extend(primitive_bodies(&link.name, piece)?);
-    }
-    Ok(parts)
-}
-
-/// What was fitted, with the exact parts of the link.
-fn union(link: &Link, shapes: Shapes, exact: Vec<Body>) -> Result<Shape, Box<dyn Error>> {
-    let mut parts = match shapes {
-        Shapes::Compound(compound) if exact.is_empty() => return Ok(Shape::Compound(compound)),
-        Shapes::Compound(compound) => compound.parts().to_vec(),
-        Shapes::Bodies(bodies) => bodies,
-        Shapes::SosBody(_) => return Err("links become convex bodies; are the options the same?".into()),
-    };
-    parts.extend(exact);
-    Ok(match parts.len() {
-        1 => Shape::Body(Box::new(parts.remove(0))),
-        _ => Shape::Compound(Box::new(Compound::new(&link.name, parts)?)),
-    })
+    Ok(FittedLink { link: link.name.clone(), geometry, file, was_kept, degree, parts })
 }
 
 /// A name of a link that is usable as one of a file.

@@ -2,6 +2,7 @@
 
 pub(super) mod args;
 mod link_fit;
+mod pairs;
 mod report;
 
 use std::collections::BTreeMap;
@@ -14,9 +15,10 @@ use crate::cli::push;
 use crate::client::{Client, ClientOptions, StoredRobot};
 use crate::robot::{Semantics, read_srdf, read_urdf};
 use crate::scene::{Geometry, Robot, RobotId};
-use crate::store::RobotSource;
+use crate::store::{LoadedRobot, RobotSource};
 use args::RobotArgs;
-use link_fit::{LinkFit, fit_links};
+use link_fit::{FittedLink, fit_links};
+use pairs::derived;
 use report::Report;
 
 /// Fits the links that are meshes, checks the robot as a whole, and loads it into a server if one
@@ -41,10 +43,14 @@ pub(super) fn run(args: &RobotArgs) -> Result<(), Box<dyn Error>> {
     let robot = Robot::new(id, &description, &semantics, &bodies)
         .map_err(|error| format!("{}: {error}", args.urdf.display()))?;
     let mut report = Report::new(&robot, &semantics, &fits);
+    let bodies = bodies.iter().map(|(link, body)| (link.clone(), *body.id())).collect();
+    let source = RobotSource { urdf, srdf, bodies };
     if let Some(url) = &args.server {
-        let source =
-            RobotSource { urdf, srdf, bodies: bodies.iter().map(|(link, body)| (link.clone(), *body.id())).collect() };
         report.loaded(&load(url, &source, &fits)?);
+    }
+    if args.pairs {
+        let loaded = LoadedRobot { source, robot: Arc::new(robot), description, semantics };
+        report.derived(derived(&loaded)?);
     }
     let mut out = io::stdout().lock();
     if args.json {
@@ -57,7 +63,7 @@ pub(super) fn run(args: &RobotArgs) -> Result<(), Box<dyn Error>> {
 }
 
 /// Stores the bodies of the links, then the robot.
-fn load(url: &str, source: &RobotSource, fits: &[LinkFit]) -> Result<StoredRobot, Box<dyn Error>> {
+fn load(url: &str, source: &RobotSource, fits: &[FittedLink]) -> Result<StoredRobot, Box<dyn Error>> {
     let files: Vec<_> = fits.iter().map(|fit| fit.file.clone()).collect();
     push::store(url, &files)?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;

@@ -4,7 +4,8 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 
-use super::link_fit::LinkFit;
+use super::link_fit::FittedLink;
+use super::pairs::Pairs;
 use crate::body::{Body, Solid};
 use crate::client::StoredRobot;
 use crate::robot::Semantics;
@@ -29,6 +30,9 @@ pub(super) struct Report {
     warnings: Vec<String>,
     /// Whether a server has made it; none without a server.
     created: Option<bool>,
+    /// Which pairs of links can touch; none unless that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pairs: Option<Pairs>,
 }
 
 #[derive(Serialize)]
@@ -52,7 +56,7 @@ struct LinkRow {
 }
 
 impl Report {
-    pub(super) fn new(robot: &Robot, semantics: &Semantics, fits: &[LinkFit]) -> Self {
+    pub(super) fn new(robot: &Robot, semantics: &Semantics, fits: &[FittedLink]) -> Self {
         let kinematics = robot.kinematics();
         let with_geometry: Vec<usize> =
             (0..robot.links().len()).filter(|&link| robot.links()[link].is_some()).collect();
@@ -81,12 +85,18 @@ impl Report {
             groups: semantics.groups.iter().map(|group| group.name.to_string()).collect(),
             warnings: semantics.warnings.iter().map(ToString::to_string).collect(),
             created: None,
+            pairs: None,
         }
     }
 
     /// The robot is loaded.
     pub(super) fn loaded(&mut self, robot: &StoredRobot) {
         self.created = Some(robot.created);
+    }
+
+    /// The pairs of links were looked at.
+    pub(super) fn derived(&mut self, pairs: Pairs) {
+        self.pairs = Some(pairs);
     }
 
     pub(super) fn write(&self, out: &mut impl Write) -> io::Result<()> {
@@ -112,12 +122,13 @@ impl Report {
             Some(true) => ", loaded",
             Some(false) => ", loaded before",
         };
-        writeln!(out, "id {}{state}", self.id)
+        writeln!(out, "id {}{state}", self.id)?;
+        self.pairs.as_ref().map_or(Ok(()), |pairs| pairs.write(out))
     }
 }
 
 impl LinkRow {
-    fn new(name: &str, geometry: &Geometry, fit: Option<&LinkFit>) -> Self {
+    fn new(name: &str, geometry: &Geometry, fit: Option<&FittedLink>) -> Self {
         let (degree, parts, gap_m) = match geometry {
             Geometry::Solid(shape) => {
                 (shape.parts().iter().map(Body::degree).max().unwrap_or(0), shape.parts().len(), shape.gap_m())

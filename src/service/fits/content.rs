@@ -93,7 +93,7 @@ fn sent_points(sent: &FitPoints, request: &FitRequest, blobs: &Blobs) -> Result<
 }
 
 fn sent_mesh(sent: &FitMesh, request: &FitRequest, blobs: &Blobs) -> Result<Mesh, Status> {
-    let format = super::request::format(sent.format)?;
+    let format = super::request::format(sent.format, "mesh.format")?;
     let blob;
     let file: Cow<'_, [u8]> = match &sent.content {
         None => return Err(Invalid::new("mesh.file", "is missing; send the file, or the blob_id of an upload").into()),

@@ -66,10 +66,10 @@ pub(super) fn request(message: CreateFitRequest) -> Result<(String, FitRequest),
     Ok((message.request_id, request))
 }
 
-/// Format of a mesh file, by its ending.
-pub(super) fn format(number: i32) -> Result<&'static str, Invalid> {
+/// Format of a mesh file, by its ending; `field` is where the request has its number.
+pub(in crate::service) fn format(number: i32, field: &str) -> Result<&'static str, Invalid> {
     let known = FORMATS.iter().find(|(known, _)| i32::from(*known) == number);
-    known.map(|(_, ending)| *ending).ok_or_else(|| Invalid::new("mesh.format", "is no format this server knows"))
+    known.map(|(_, ending)| *ending).ok_or_else(|| Invalid::new(field, "is no format this server knows"))
 }
 
 /// A field of a request as the path of the message's field.

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::body::BodyId;
 use crate::scene::Geometry;
 use crate::store::JobMesh;
+use crate::store::derive::DeriveRequest;
 use crate::store::hierarchy::HierarchyRequest;
 use crate::store::job::{FitTask, Job, JobState, JobTask, MAX_ENDED_JOBS, MAX_QUEUED_JOBS, NewJob};
 use crate::store::rows::{JOBS, POINTS, TRIANGLES, json};
@@ -148,6 +149,9 @@ impl State {
             JobTask::Hierarchy(HierarchyRequest { sets, .. }) => {
                 let mut ids = sets.iter().map(|set| set.body).enumerate();
                 ids.find(|(_, id)| is_missing(id)).map(|(index, id)| CatalogueError::NoSet { index, id })
+            }
+            JobTask::Derive(DeriveRequest { robot, .. }) => {
+                (!self.robots.contains_key(robot)).then_some(CatalogueError::NoRobot(*robot))
             }
         }
     }

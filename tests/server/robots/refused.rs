@@ -1,12 +1,13 @@
 //! What is refused, with the field that is wrong.
 
+use sublevel::service::proto::fit_mesh::Content;
 use sublevel::service::proto::{
-    CheckStatesRequest, ClearanceRequest, JointValues, LinkBody, LoadRobotRequest, Object, RobotInstance, SetJoints,
-    SetRobotBase, StreamPosesRequest, UpdateSceneRequest,
+    CheckStatesRequest, ClearanceRequest, FitMesh, JointValues, LinkBody, LinkMesh, LoadRobotRequest, MeshFormat,
+    Object, RobotInstance, SetJoints, SetRobotBase, StreamPosesRequest, UpdateSceneRequest,
 };
 use tonic::{Code, Status};
 
-use super::{SRDF, URDF, cell, served};
+use super::{CUBE, SRDF, URDF, cell, served};
 use crate::harness::{at, field, moved, object, reason, rows};
 
 fn check(status: &Status, code: Code, at: &str) {
@@ -27,8 +28,22 @@ async fn loads() {
     let plane = sublevel::client::BodySource::HalfSpace { normal, offset: 0.0 };
     let plane = client.create_body("floor", plane).await.expect("a plane").id.to_string();
     let body = |link: &str, id: &str| LinkBody { link: link.into(), body_id: id.into() };
-    let load =
-        |urdf: &str, link_bodies: Vec<LinkBody>| LoadRobotRequest { urdf: urdf.into(), srdf: SRDF.into(), link_bodies };
+    let load = |urdf: &str, link_bodies: Vec<LinkBody>| LoadRobotRequest {
+        urdf: urdf.into(),
+        srdf: SRDF.into(),
+        link_bodies,
+        ..Default::default()
+    };
+    let mesh = |uri: &str, format: MeshFormat, file: &str| LinkMesh {
+        uri: uri.into(),
+        mesh: Some(FitMesh { format: format.into(), content: Some(Content::File(file.as_bytes().to_vec().into())) }),
+    };
+    let meshes = |meshes: Vec<LinkMesh>| LoadRobotRequest { meshes, ..load(URDF, vec![]) };
+    let (stl, off) = (MeshFormat::Stl, MeshFormat::Off);
+    let blob = |uri: &str, id: &str| LinkMesh {
+        uri: uri.into(),
+        mesh: Some(FitMesh { format: off.into(), content: Some(Content::BlobId(id.into())) }),
+    };
     let hand = || body("hand", &ball);
     let (invalid, missing) = (Code::InvalidArgument, Code::NotFound);
     let cases = [
@@ -42,6 +57,19 @@ async fn loads() {
         (load(URDF, vec![body("hand", "ball")]), invalid, "link_bodies[0].body_id"),
         (load(URDF, vec![body("hand", &plane)]), invalid, "link_bodies[0].body_id"),
         (load(URDF, vec![body("hand", &"0".repeat(64))]), missing, "link_bodies[0].body_id"),
+        (meshes(vec![mesh("foot.stl", stl, "")]), invalid, "meshes"),
+        (meshes(vec![mesh("hand.stl", stl, "not a mesh")]), invalid, "meshes[0].mesh"),
+        (meshes(vec![mesh("hand.stl", MeshFormat::Unspecified, "")]), invalid, "meshes[0].mesh.format"),
+        (meshes(vec![mesh("hand.stl", off, CUBE), mesh("hand.stl", off, CUBE)]), invalid, "meshes[1].uri"),
+        (meshes(vec![mesh("hand.stl", off, CUBE), mesh("foot.stl", off, CUBE)]), invalid, "meshes[1].uri"),
+        (LoadRobotRequest { max_gap_m: Some(-1.0), ..load(URDF, vec![hand()]) }, invalid, "max_gap_m"),
+        (
+            LoadRobotRequest { max_gap_m: Some(f64::NAN), ..meshes(vec![mesh("hand.stl", off, CUBE)]) },
+            invalid,
+            "max_gap_m",
+        ),
+        (meshes(vec![LinkMesh { uri: "hand.stl".into(), mesh: None }]), invalid, "meshes[0].mesh"),
+        (meshes(vec![blob("hand.stl", &"0".repeat(64))]), missing, "meshes[0].mesh.blob_id"),
     ];
     for (request, code, at) in cases {
         check(&clients.robots.load_robot(request).await.expect_err("refused"), code, at);

@@ -1,0 +1,176 @@
+//! Links whose meshes are sent along, and robots of many kinds.
+
+use sublevel::client::{RobotPlacement, StatesQuestion};
+use sublevel::scene::NamedJointValues;
+use sublevel::service::proto::fit_mesh::Content;
+use sublevel::service::proto::{FitMesh, LinkMesh, LoadRobotRequest, MeshFormat, Verdict};
+
+use super::{CUBE, SRDF, URDF, at, served};
+
+fn mesh(uri: &str, format: MeshFormat, file: &str) -> LinkMesh {
+    let content = Content::File(file.as_bytes().to_vec().into());
+    LinkMesh { uri: uri.into(), mesh: Some(FitMesh { format: format.into(), content: Some(content) }) }
+}
+
+fn load(urdf: &str, srdf: &str, meshes: Vec<LinkMesh>) -> LoadRobotRequest {
+    LoadRobotRequest { urdf: urdf.into(), srdf: srdf.into(), meshes, ..LoadRobotRequest::default() }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_link_is_fitted_within_its_gap_and_to_the_same_body_again() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (_server, client, _clients, _) = served(dir.path()).await;
+    let asked = load(URDF, SRDF, vec![mesh("hand.stl", MeshFormat::Off, CUBE)]);
+    let first = client.load_robot_with(asked.clone()).await.expect("loaded");
+    let hand = first.links.iter().find(|link| &*link.name == "hand").expect("a hand");
+    let (body, gap) = (hand.body.expect("a body"), hand.gap_m.expect("a gap"));
+    assert!((0.0..=0.02).contains(&gap), "{gap}");
+    let again = client.load_robot_with(asked.clone()).await.expect("loaded");
+    assert_eq!((again.id, again.created), (first.id, false));
+    // The same file as a blob.
+    let blob = client.upload(CUBE.as_bytes()).await.expect("a blob");
+    let mesh = FitMesh { format: MeshFormat::Off.into(), content: Some(Content::BlobId(blob)) };
+    let meshes = vec![LinkMesh { uri: "hand.stl".into(), mesh: Some(mesh) }];
+    let of_blob = client.load_robot_with(LoadRobotRequest { meshes, ..asked.clone() }).await.expect("loaded");
+    assert_eq!(of_blob.id, first.id);
+    // A smaller gap makes another body, and another robot.
+    let finer = LoadRobotRequest { max_gap_m: Some(0.5 * gap), ..asked };
+    let finer = client.load_robot_with(finer).await.expect("loaded");
+    let hand = finer.links.iter().find(|link| &*link.name == "hand").expect("a hand");
+    assert!(hand.gap_m.expect("a gap") <= 0.5 * gap && hand.body != Some(body) && finer.id != first.id);
+}
+
+/// A cube with edges of 1 unit of 0.1 m, as COLLADA.
+const DAE: &str = r##"<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit name="decimetre" meter="0.1"/><up_axis>Z_UP</up_axis></asset>
+<library_geometries><geometry id="cube"><mesh>
+<source id="p"><float_array id="a" count="24">0 0 0 1 0 0 1 1 0 0 1 0 0 0 1 1 0 1 1 1 1 0 1 1</float_array>
+<technique_common><accessor source="#a" count="8" stride="3"><param name="X" type="float"/>
+<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="12"><input semantic="VERTEX" source="#v" offset="0"/>
+<p>0 2 1 0 3 2 4 5 6 4 6 7 0 1 5 0 5 4 1 2 6 1 6 5 2 3 7 2 7 6 3 0 4 3 4 7</p></triangles>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#cube"/></node></visual_scene>
+</library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>"##;
+
+/// A cube with edges of 0.1 m, as text STL.
+fn stl() -> String {
+    let corner = |index: usize| {
+        let bit = |axis: usize| if index >> axis & 1 == 1 { 0.1 } else { 0.0 };
+        format!("vertex {} {} {}\n", bit(0), bit(1), bit(2))
+    };
+    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
+    let facet = |corners: [usize; 3]| {
+        let corners: String = corners.iter().map(|&index| corner(index)).collect();
+        format!("facet normal 0 0 0\nouter loop\n{corners}endloop\nendfacet\n")
+    };
+    format!("solid cube\n{}endsolid cube\n", triangles.map(facet).collect::<String>())
+}
+
+/// An arm like a UR5: six joints that turn, meshes by package, COLLADA.
+fn ur5() -> String {
+    let names = ["base", "shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"];
+    let links = names.map(|name| {
+        format!(
+            "<link name=\"{name}\"><collision><geometry><mesh filename=\"package://ur/{name}.dae\" \
+             scale=\"0.6 0.6 0.6\"/></geometry></collision></link>"
+        )
+    });
+    let axes = ["0 0 1", "0 1 0", "0 1 0", "0 1 0", "0 0 1", "0 1 0"];
+    let joints = (1..names.len()).map(|index| {
+        format!(
+            "<joint name=\"{}_joint\" type=\"revolute\"><parent link=\"{}\"/><child link=\"{}\"/>\
+             <origin xyz=\"0 0 0.2\" rpy=\"0 0 0\"/><axis xyz=\"{}\"/>\
+             <limit lower=\"-6.28\" upper=\"6.28\" effort=\"1\" velocity=\"1\"/></joint>",
+            names[index],
+            names[index - 1],
+            names[index],
+            axes[index - 1]
+        )
+    });
+    format!("<robot name=\"ur5_like\">{}{}</robot>", links.concat(), joints.collect::<String>())
+}
+
+/// A mobile robot like a Fetch: a planar base, a lift, continuous joints, a mirrored STL, and a
+/// gripper whose second finger mimics the first.
+const FETCH: &str = r#"<robot name="fetch_like">
+  <link name="world"/>
+  <link name="base"><collision><geometry><cylinder radius="0.28" length="0.36"/></geometry></collision></link>
+  <link name="torso"><collision><geometry><mesh filename="torso.stl" scale="1 -1 3"/></geometry></collision></link>
+  <link name="arm"><collision><geometry><capsule radius="0.06" length="0.4"/></geometry></collision></link>
+  <link name="gripper"><collision><geometry><box size="0.06 0.12 0.06"/></geometry></collision></link>
+  <link name="left"><collision><geometry><box size="0.06 0.01 0.03"/></geometry></collision></link>
+  <link name="right"><collision><geometry><box size="0.06 0.01 0.03"/></geometry></collision></link>
+  <joint name="drive" type="planar"><parent link="world"/><child link="base"/><axis xyz="0 0 1"/></joint>
+  <joint name="lift" type="prismatic"><parent link="base"/><child link="torso"/><origin xyz="-0.1 0 0.4"/>
+    <axis xyz="0 0 1"/><limit lower="0" upper="0.4" effort="1" velocity="1"/></joint>
+  <joint name="shoulder" type="continuous"><parent link="torso"/><child link="arm"/>
+    <origin xyz="0.3 0 0.3" rpy="0 1.5708 0"/><axis xyz="0 0 1"/></joint>
+  <joint name="wrist" type="continuous"><parent link="arm"/><child link="gripper"/><origin xyz="0 0 0.4"/>
+    <axis xyz="0 0 1"/></joint>
+  <joint name="finger" type="prismatic"><parent link="gripper"/><child link="left"/><origin xyz="0 0.01 0.06"/>
+    <axis xyz="0 1 0"/><limit lower="0" upper="0.05" effort="1" velocity="1"/></joint>
+  <joint name="other" type="prismatic"><parent link="gripper"/><child link="right"/><origin xyz="0 -0.01 0.06"/>
+    <axis xyz="0 -1 0"/><limit lower="0" upper="0.05" effort="1" velocity="1"/><mimic joint="finger"/></joint>
+</robot>"#;
+
+/// Two arms on one torso, as a Baxter has them, that floats.
+fn baxter() -> String {
+    let arm = |side: &str, y: f64| {
+        format!(
+            "<link name=\"{side}_upper\"><collision><origin xyz=\"0.2 0 0\" rpy=\"0 1.5708 0\"/><geometry>\
+             <cylinder radius=\"0.06\" length=\"0.3\"/></geometry></collision></link>\
+             <link name=\"{side}_fore\"><collision><geometry><sphere radius=\"0.07\"/></geometry></collision></link>\
+             <joint name=\"{side}_s0\" type=\"revolute\"><parent link=\"torso\"/><child link=\"{side}_upper\"/>\
+             <origin xyz=\"0.1 {y} 0.4\"/><axis xyz=\"0 0 1\"/>\
+             <limit lower=\"-1.7\" upper=\"1.7\" effort=\"1\" velocity=\"1\"/></joint>\
+             <joint name=\"{side}_e0\" type=\"revolute\"><parent link=\"{side}_upper\"/><child link=\"{side}_fore\"/>\
+             <origin xyz=\"0.45 0 0\"/><axis xyz=\"1 0 0\"/>\
+             <limit lower=\"-3\" upper=\"3\" effort=\"1\" velocity=\"1\"/></joint>"
+        )
+    };
+    format!(
+        "<robot name=\"baxter_like\"><link name=\"world\"/><link name=\"torso\"><collision><geometry>\
+         <box size=\"0.2 0.4 0.8\"/></geometry></collision></link>\
+         <joint name=\"float\" type=\"floating\"><parent link=\"world\"/><child link=\"torso\"/></joint>{}{}</robot>",
+        arm("left", 0.3),
+        arm("right", -0.3)
+    )
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn robots_of_many_kinds_are_loaded_placed_and_checked() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (_server, client, _clients, _) = served(dir.path()).await;
+    let ball = client.create_ball("ball", 0.1).await.expect("a ball");
+    let dae = |name: &str| mesh(&format!("package://ur/{name}.dae"), MeshFormat::Dae, DAE);
+    let names = ["base", "shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"];
+    let folded = |width: usize| vec![0.0; width];
+    let floating = vec![0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0];
+    let robots = [
+        // The arm stands upright: its wrist is 1.2 m up.
+        (ur5(), names.map(dae).to_vec(), 6, folded(6), at(0.03, 0.03, 1.23)),
+        (FETCH.to_owned(), vec![mesh("torso.stl", MeshFormat::Stl, &stl())], 7, folded(7), at(0.7, 0.0, 0.7)),
+        (baxter(), Vec::new(), 11, floating, at(0.55, 0.3, 0.4)),
+    ];
+    for (index, (urdf, meshes, width, configuration, place)) in robots.into_iter().enumerate() {
+        let robot = client.load_robot_with(load(&urdf, "", meshes)).await.expect("loaded");
+        let given: usize = robot.joints.iter().map(|joint| joint.kind.width()).sum();
+        assert_eq!(given, width, "{}", robot.name);
+        let scene = format!("cell {index}");
+        client.create_scene(&scene).await.expect("made");
+        let base = at(0.0, 0.0, 0.0);
+        let joints = NamedJointValues { joints: Vec::new(), values: configuration.clone() };
+        let placement = RobotPlacement { name: "robot".into(), robot: robot.id, base, joints };
+        client.place_robot(&scene, &placement).await.expect("placed");
+        let ask = || StatesQuestion::of_robot("robot", []).with_joint_values(&configuration);
+        let alone = client.check_states(&scene, ask()).await.expect("answered");
+        assert_eq!(alone.verdicts, [Verdict::Free], "{}: {:?}", robot.name, alone.pairs);
+        client.put_objects(&scene, [("ball", &ball, place)]).await.expect("placed");
+        let met = client.check_states(&scene, ask()).await.expect("answered");
+        assert_eq!(met.verdicts, [Verdict::Contact], "{}", robot.name);
+    }
+}
