@@ -7,6 +7,7 @@ use crate::detail::detail;
 use crate::fits::fits;
 use crate::messages::messages;
 use crate::numbers;
+use crate::panda::panda;
 use crate::scenes::scenes;
 use crate::sets::sets;
 use crate::speed::speed;
@@ -48,6 +49,7 @@ enum Figure {
     Accuracy(AccuracyArgs),
     Cost(CostArgs),
     Fits(FitsArgs),
+    Panda(PandaArgs),
     Scenes(ScenesArgs),
     Sets(SetsArgs),
     Table1(Table1Args),
@@ -69,7 +71,7 @@ struct FitArgs {
 /// All figures, one after the other, and charts.md, which shows the main ones and leads to the
 /// others
 ///
-/// Keep the machine quiet: times are measured. Takes about three quarters of an hour on one core,
+/// Keep the machine quiet: times are measured. Takes about an hour on one core,
 /// and under five minutes with --quick, once the fits are kept. Clarabel and coal take part as the
 /// figures' own help says.
 #[derive(Debug, Args)]
@@ -228,6 +230,26 @@ struct ScenesArgs {
     common: Common,
 }
 
+/// A planner's workload: states and motions of a Franka Emika Panda among boxes and cylinders, µs
+/// per state and per radian against the free states that are kept
+///
+/// Links as spheres, ellipsoids, bodies of degree 4 and 6, ladders and compounds, in process and
+/// over gRPC in batches of 1 000; motions proven and sampled. The robot and problems are those of
+/// DIR/panda. Writes panda.md, panda.csv and panda-*.svg. Fits are made once and kept, which takes
+/// some minutes on one core; measuring takes about ten minutes, one with --quick. Coal takes
+/// part when SUBLEVEL_COAL_PANDA names the program that times it on states of this robot.
+#[derive(Debug, Args)]
+struct PandaArgs {
+    #[command(flatten)]
+    common: Common,
+    /// Other problems, in the format of DIR/panda/panda_problems.json
+    #[arg(long, value_name = "FILE", conflicts_with = "redraw")]
+    problems: Option<PathBuf>,
+    /// Print the numbers as one JSON object instead of the place of the report
+    #[arg(long, conflicts_with = "redraw")]
+    json: bool,
+}
+
 /// Time of a fit against the volume of its body: by each solver, refined, and over the smaller
 /// cones
 ///
@@ -309,6 +331,8 @@ fn run(figure: &Figure) -> Result<(), Box<dyn Error>> {
         Figure::Cost(args) => run_cost(&args.common),
         Figure::Fits(args) if args.common.redraw => redraw(&args.common.out, "fits"),
         Figure::Fits(args) => run_fits(&args.common),
+        Figure::Panda(args) if args.common.redraw => redraw(&args.common.out, "panda"),
+        Figure::Panda(args) => run_panda(&args.common, args.problems.as_deref(), args.json),
         Figure::Scenes(args) if args.common.redraw => redraw(&args.common.out, "scenes"),
         Figure::Scenes(args) => run_scenes(&args.common),
         Figure::Sets(args) if args.common.redraw => redraw(&args.common.out, "sets"),
@@ -323,16 +347,17 @@ fn run(figure: &Figure) -> Result<(), Box<dyn Error>> {
 fn run_all(args: &Common) -> Result<(), Box<dyn Error>> {
     if args.redraw {
         // Table I takes the meshes, and a command of its own.
-        return ["speed", "accuracy", "cost", "fits", "sets", "scenes", "warm", "detail"]
+        return ["speed", "accuracy", "cost", "fits", "sets", "panda", "scenes", "warm", "detail"]
             .into_iter()
             .try_for_each(|name| redraw(&args.out, name).map(drop));
     }
-    let figures: [(&str, &str, Run); 9] = [
+    let figures: [(&str, &str, Run); 10] = [
         ("speed", "Speed against accuracy", run_speed),
         ("accuracy", "Solver accuracy against time", run_accuracy),
         ("cost", "Cost growth", run_cost),
         ("fits", "Fits", run_fits),
         ("sets", "Sets that need not be convex", run_sets),
+        ("panda", "A planner's workload", |args| run_panda(args, None, false)),
         ("scenes", "Scenes and questions", run_scenes),
         ("warm", "Warm starts", run_warm),
         ("detail", "Detail", run_detail),
@@ -427,6 +452,21 @@ fn run_sets(args: &Common) -> Drawn {
     })
 }
 
+fn run_panda(args: &Common, problems: Option<&Path>, json: bool) -> Drawn {
+    with_fit_cache(args, |cache, bar| {
+        let found = panda(args.data(), problems, cache, args.quick, &mut |at| tell(bar, at))?;
+        write_report(&args.out, "panda", &found.markdown(), &found.csv())?;
+        let pictures = numbers::pictures("panda.csv", &args.out)?;
+        let names = fill(&args.out, "panda", pictures)?;
+        if json {
+            writeln!(io::stdout().lock(), "{}", found.json()?)?;
+        } else {
+            print_place(&args.out, "panda")?;
+        }
+        Ok(names)
+    })
+}
+
 fn run_scenes(args: &Common) -> Drawn {
     with_fit_cache(args, |cache, bar| {
         let found = scenes(args.data(), cache, args.quick, &mut |at| tell(bar, at))?;
@@ -510,11 +550,17 @@ fn redraw(out: &Path, name: &str) -> Drawn {
 /// Writes pictures, fills the blocks of the report, and prints where that is; returns the names of
 /// the pictures.
 fn finish(out: &Path, name: &str, pictures: Vec<(String, String)>) -> Drawn {
+    let names = fill(out, name, pictures)?;
+    print_place(out, name)?;
+    Ok(names)
+}
+
+/// The same without a word.
+fn fill(out: &Path, name: &str, pictures: Vec<(String, String)>) -> Drawn {
     for (name, svg) in &pictures {
         write_atomically(&out.join(name), svg)?;
     }
     write_numbers_of(&out.join(format!("{name}.md")), out)?;
-    print_place(out, name)?;
     Ok(pictures.into_iter().map(|(name, _)| name).collect())
 }
 

@@ -5,7 +5,7 @@ use crate::blocks::refreshed;
 use crate::csv::CsvError;
 use crate::measures;
 use crate::table1::Table1;
-use crate::{accuracy, cost, detail, fits, scenes, sets, speed, warm};
+use crate::{accuracy, cost, detail, fits, panda, scenes, sets, speed, warm};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use sublevel::cli;
@@ -17,6 +17,7 @@ enum Shown {
     Accuracy(accuracy::Shown),
     Cost(cost::Shown),
     Fits(fits::Shown),
+    Panda(panda::Shown),
     Scenes(scenes::Shown),
     Sets(sets::Shown),
     Detail(detail::Shown),
@@ -36,6 +37,7 @@ impl Shown {
             "accuracy.csv" => accuracy::Shown::read(&text).map(Self::Accuracy),
             "cost.csv" => cost::Shown::read(&text).map(Self::Cost),
             "fits.csv" => fits::Shown::read(&text).map(Self::Fits),
+            "panda.csv" => panda::Shown::read(&text).map(Self::Panda),
             "scenes.csv" => scenes::Shown::read(&text).map(Self::Scenes),
             "sets.csv" => sets::Shown::read(&text).map(Self::Sets),
             "detail.csv" => detail::Shown::read(&text).map(Self::Detail),
@@ -57,6 +59,7 @@ impl Shown {
             Self::Accuracy(shown) => shown.block(name),
             Self::Cost(shown) => shown.block(name),
             Self::Fits(shown) => shown.block(name),
+            Self::Panda(shown) => shown.block(name),
             Self::Scenes(shown) => shown.block(name),
             Self::Sets(shown) => shown.block(name),
             Self::Detail(shown) => shown.block(name),
@@ -110,6 +113,7 @@ pub(crate) fn pictures(csv: &str, folder: &Path) -> Result<Vec<(String, String)>
         Shown::Accuracy(shown) => shown.pictures(),
         Shown::Cost(shown) => shown.pictures(),
         Shown::Fits(shown) => shown.pictures(),
+        Shown::Panda(shown) => shown.pictures(),
         Shown::Scenes(shown) => shown.pictures(),
         Shown::Sets(shown) => shown.pictures(),
         Shown::Detail(shown) => shown.pictures(),

@@ -70,6 +70,7 @@ fn quick(figure: &str, data: &Path, out: &Path) -> Output {
         .arg("--out")
         .arg(out)
         .env_remove("SUBLEVEL_COAL")
+        .env_remove("SUBLEVEL_COAL_PANDA")
         .output()
         .expect("the program starts")
 }
@@ -102,7 +103,7 @@ fn made_in(out: &Path, figure: &str) -> (String, String) {
 fn charts_are_redrawn_from_their_numbers() {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
     let out = tempfile::tempdir().expect("a folder can be made");
-    for figure in ["speed", "warm", "accuracy", "cost", "detail"] {
+    for figure in ["speed", "warm", "accuracy", "cost", "detail", "panda"] {
         let names = [format!("{figure}.csv"), format!("{figure}.md"), "detail-parts.csv".to_owned()];
         for name in names {
             std::fs::copy(docs.join(&name), out.path().join(&name)).expect("a file of docs/");
@@ -190,6 +191,24 @@ fn the_quick_chart_of_speed_holds_what_is_known() {
     }
     let judged = ["hold everywhere", "Where the figures are missed"];
     assert!(judged.iter().any(|words| report.contains(words)), "no verdict");
+}
+
+#[test]
+#[ignore = "needs SUBLEVEL_DATA"]
+fn the_quick_chart_of_the_panda_keeps_what_is_free() {
+    let (report, csv) = made("panda");
+    let [states, motions] = &csv.split("\n\n").collect::<Vec<_>>()[..] else { panic!("two tables") };
+    let of = |table: &str, name: &str, head: &str| column(table, &format!("all,\"{name}\","), head);
+    let kept = |name: &str| of(states, name, "kept")[0] / of(states, name, "known")[0];
+    assert!(kept("ellipsoids") < kept("degree 4") && kept("degree 6") > 0.95, "{csv}");
+    assert_eq!(of(states, "ladder 2-4-6", "kept"), of(states, "degree 6", "kept"));
+    for name in ["degree 4", "degree 6", "two parts of degree 6 refined"] {
+        let [free, samples, contacts] = ["free", "samples", "contacts"].map(|head| of(motions, name, head));
+        assert_eq!((free.len(), samples.len()), (3, 3), "{name}");
+        assert!(free.iter().zip(&samples).all(|(free, samples)| *free > 0.0 && *samples == 100.0 * free), "{name}");
+        assert_eq!(contacts, [0.0; 3], "{name}");
+    }
+    assert!(report.contains("Coal took no part"), "no word of coal");
 }
 
 #[test]

@@ -38,14 +38,7 @@ impl Coal {
 
     /// The version of the wheel it was built against, which lies beside it.
     pub fn version(&self) -> String {
-        let libraries = self.program.parent().unwrap_or(Path::new("")).join("venv/lib");
-        let pythons = entries(&libraries);
-        let packages = pythons.iter().flat_map(|python| entries(&python.join("site-packages")));
-        let version = packages.filter_map(|path| {
-            let name = path.file_name().and_then(OsStr::to_str)?;
-            name.strip_prefix("coal-")?.strip_suffix(".dist-info").map(str::to_owned)
-        });
-        version.into_iter().next().unwrap_or_else(|| "of unknown version".to_owned())
+        version_beside(&self.program)
     }
 
     /// Writes what the program reads into `folder`, under names that begin with `name`: the points
@@ -77,6 +70,18 @@ impl Coal {
             runs: Vec::new(),
         })
     }
+}
+
+/// The version of coal's wheel in the folder of a program that was built against it.
+pub(crate) fn version_beside(program: &Path) -> String {
+    let libraries = program.parent().unwrap_or(Path::new("")).join("venv/lib");
+    let pythons = entries(&libraries);
+    let packages = pythons.iter().flat_map(|python| entries(&python.join("site-packages")));
+    let version = packages.filter_map(|path| {
+        let name = path.file_name().and_then(OsStr::to_str)?;
+        name.strip_prefix("coal-")?.strip_suffix(".dist-info").map(str::to_owned)
+    });
+    version.into_iter().next().unwrap_or_else(|| "of unknown version".to_owned())
 }
 
 /// One point per line, as coal's program and `sublevel fit` read them.

@@ -15,8 +15,8 @@ mod random;
 mod subject;
 pub mod sweep;
 
-pub(crate) use coal::points_text;
 pub use coal::{Coal, CoalRun};
+pub(crate) use coal::{points_text, version_beside};
 pub use error::ComparisonError;
 pub use fit_cache::{FitCache, FitCacheError};
 pub use parry::{Hulls, NoHull, parry_impact, parry_pose, parry_version};

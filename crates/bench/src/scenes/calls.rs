@@ -1,21 +1,18 @@
 //! Calls to a server beside the same question in process.
 
 use std::error::Error;
-use std::sync::Arc;
 
 use prost::Message;
-use sublevel::client::StatesQuestion;
 use sublevel::measure::{Options, Pose, WarmStart, distance};
-use sublevel::scene::query::{StateVerdict, States};
-use sublevel::scene::{Crew, Slot};
+use sublevel::scene::Crew;
 use sublevel::service::proto::blob_service_client::BlobServiceClient;
 use sublevel::service::proto::evaluate_request::Question;
 use sublevel::service::proto::query_service_client::QueryServiceClient;
-use sublevel::service::proto::{EvaluateRequest, Layout, Measure, PairList, UploadBlobRequest, Verdict};
+use sublevel::service::proto::{EvaluateRequest, Layout, Measure, PairList, UploadBlobRequest};
 
-use super::bricks::{brick, bricks, numbers, seconds};
-use super::panda::Task;
+use super::bricks::{brick, bricks, seconds};
 use crate::loopback::Loopback;
+use crate::panda::{Arm, LoadedArm, Problem, RobotServer, Site, StatesCall};
 
 /// A call, and what it is compared with.
 #[derive(Clone, Debug)]
@@ -117,47 +114,28 @@ pub(super) fn evaluate(crew: &Crew) -> Result<Call, Box<dyn Error>> {
     })
 }
 
-/// States of a robot among the obstacles of a problem, beside the same question in process.
-pub(super) fn check_states(task: &Task, crew: &Crew) -> Result<Call, Box<dyn Error>> {
-    let server = Loopback::start()?;
-    let client = server.connect()?;
-    server.clients().block_on(async {
-        for body in &task.bodies {
-            client.create_from_file(body.to_json()).await?;
-        }
-        client.create_scene("task").await?;
-        client.update_scene("task", &task.update).await
-    })?;
-    let links = || task.links.iter().map(String::as_str);
-    let mut checked = Vec::new();
-    let call = seconds(|| {
-        let question = StatesQuestion::new(links()).with_states(&task.states);
-        checked = server.clients().block_on(client.check_states("task", question))?.verdicts;
-        Ok(())
-    })?;
-    server.stop()?;
-
-    let scene = task.scene()?;
-    let slots: Vec<Slot> = links().filter_map(|name| scene.slot(name)).collect();
-    let packed: Vec<f64> = task.states.iter().flat_map(numbers).collect();
-    let mut verdicts = Vec::new();
-    let inside = seconds(|| {
-        let question = States::new(scene.clone(), &slots, packed.clone(), 0.0, false)?;
-        verdicts = crew.ask(Arc::new(question), Arc::default())?.concat();
-        Ok(())
-    })?;
-    let free = verdicts.iter().filter(|answer| answer.verdict == StateVerdict::Free).count();
-    if free != checked.iter().filter(|&&verdict| verdict == Verdict::Free).count() {
-        return Err("the server decides otherwise than the library".into());
+/// States of a robot among the obstacles of problems, beside the same question in process.
+pub(super) fn check_states(
+    (arm, loaded): (&Arm, &LoadedArm),
+    problems: &[&Problem],
+    crew: &Crew,
+) -> Result<Vec<Call>, Box<dyn Error>> {
+    let server = RobotServer::start()?;
+    let robot = server.load(loaded)?;
+    let mut calls = Vec::new();
+    for problem in problems {
+        let StatesCall { states, free, call_us, inside_us } =
+            server.check_states((arm, loaded, robot), &Site::new(problem)?, (crew, 11))?;
+        calls.push(Call {
+            method: "CheckStates".into(),
+            about: format!("{} bodies, {}", loaded.pieces, problem.family),
+            items: states,
+            free: Some(free),
+            call_us,
+            inside_us,
+            transport_us: 0.0,
+        });
     }
-    let items = task.states.len() / task.links.len();
-    Ok(Call {
-        method: "CheckStates".into(),
-        about: format!("{} bodies, {}", task.links.len(), task.set),
-        items,
-        free: Some(free),
-        call_us: 1e6 * call,
-        inside_us: 1e6 * inside,
-        transport_us: 0.0,
-    })
+    server.stop()?;
+    Ok(calls)
 }

@@ -3,7 +3,6 @@
 mod bricks;
 mod calls;
 mod clutter;
-mod panda;
 mod poses_at_rate;
 mod report;
 mod shown;
@@ -17,6 +16,7 @@ use sublevel::scene::Crew;
 
 use super::Machine;
 use super::comparison::FitCache;
+use super::panda::{Arm, Representation, families, read_problems};
 use bricks::{seconds, stacked};
 use calls::Call;
 use clutter::Clutter;
@@ -52,10 +52,13 @@ pub fn scenes(
     let crew = Crew::new(machine.cores)?;
     announce("pairs of one message")?;
     let mut calls = vec![calls::evaluate(&crew)?];
-    for problem in panda::problems(data, if quick { 2 } else { 7 })? {
-        announce(&format!("states of a robot: {}", problem.set))?;
-        calls.push(calls::check_states(&panda::task(&problem, data, cache)?, &crew)?);
-    }
+    announce("states of a robot")?;
+    let arm = Arm::read(data)?;
+    let loaded = arm.load(Representation::Degree6, cache)?;
+    let problems = read_problems(&data.join("panda/panda_problems.json"))?;
+    let first: Vec<_> = families(&problems, 1).concat();
+    let first = first.get(..if quick { 2 } else { first.len() }).unwrap_or(&first);
+    calls.extend(calls::check_states((&arm, &loaded), first, &crew)?);
     let sizes: &[usize] =
         if quick { &[1000, 3000, 10_000] } else { &[1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000] };
     let mut measured = Vec::new();

@@ -20,8 +20,8 @@ impl Scenes {
              ## Calls\n\n\
              The same question over gRPC and in process, on all cores. `Evaluate` is compared with a loop over the \
              library's distances, without scene, names or threads that wait, and less the transport of as many bytes. \
-             `CheckStates` are a Franka Emika Panda's links (degree 6) in 1 000 states among the boxes and cylinders of \
-             a planning problem: half of the states on the straight path of the joints, half anywhere.\n\n",
+             `CheckStates` are 1 000 states of a Franka Emika Panda (links of degree 6) by their joint values, among the \
+             boxes and cylinders of a planning problem: half of the states on the straight path of the joints, half anywhere.\n\n",
         );
         text += &block("scenes.csv", "calls", "");
         text.push_str(

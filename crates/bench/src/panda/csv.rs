@@ -1,0 +1,160 @@
+//! The rows as a CSV, and back.
+
+use std::fmt::Write;
+
+use super::rows::{MotionRow, StateRow};
+use crate::csv::{CsvError, Row, Table};
+
+/// Columns of the table of states.
+const STATES: &str = "family,representation,pieces,known,kept,kept_self,random,random_free,contacts,cold_us,scene_us,\
+                      self_us,distances_us,call_us,inside_us";
+/// Columns of the table of motions.
+const MOTIONS: &str = "family,representation,from,length_rad,problems,free,mean_us,median_us,p99_us,configurations,\
+                       sampled_us,coal_us,certified_us,verify_us,verify_part,samples,contacts,coal_samples,coal_contacts";
+
+/// Two tables, an empty line between them.
+pub(super) fn written(states: &[StateRow], motions: &[MotionRow]) -> String {
+    let mut text = format!("{STATES}\n");
+    // Writing to a string cannot fail.
+    for row in states {
+        let StateRow { family, representation, pieces, known, kept, kept_self, random, random_free, .. } = row;
+        let _ = write!(
+            text,
+            "{family},\"{representation}\",{pieces},{known},{kept},{kept_self},{random},{random_free},{}",
+            maybe(row.contacts)
+        );
+        for time in [row.cold_us, row.scene_us, row.self_us, row.distances_us, row.call_us, row.inside_us] {
+            let _ = write!(text, ",{}", number(time));
+        }
+        text.push('\n');
+    }
+    let _ = write!(text, "\n{MOTIONS}\n");
+    for row in motions {
+        let MotionRow { family, representation, from, length_rad, problems, free, .. } = row;
+        let _ = write!(text, "{family},\"{representation}\",{from},{length_rad},{problems},{free}");
+        let times = [row.mean_us, row.median_us, row.p99_us, row.configurations, row.sampled_us, row.coal_us];
+        for time in times.into_iter().chain([row.certified_us, row.verify_us, row.verify_part]) {
+            let _ = write!(text, ",{}", number(time));
+        }
+        let _ = writeln!(
+            text,
+            ",{},{},{},{}",
+            row.samples,
+            row.contacts,
+            maybe(row.coal_samples),
+            maybe(row.coal_contacts)
+        );
+    }
+    text
+}
+
+/// Reads what [`written`] wrote.
+pub(super) fn read(csv: &str) -> Result<(Vec<StateRow>, Vec<MotionRow>), CsvError> {
+    let mut parts = csv.split("\n\n");
+    let mut table = || Table::read(parts.next().unwrap_or_default());
+    let (states, motions) = (table()?, table()?);
+    Ok((states.rows().map(state).collect::<Result<_, _>>()?, motions.rows().map(motion).collect::<Result<_, _>>()?))
+}
+
+fn state(row: Row<'_>) -> Result<StateRow, CsvError> {
+    Ok(StateRow {
+        family: row.text("family")?.to_owned(),
+        representation: row.text("representation")?.to_owned(),
+        pieces: row.get("pieces")?,
+        known: row.get("known")?,
+        kept: row.get("kept")?,
+        kept_self: row.get("kept_self")?,
+        random: row.get("random")?,
+        random_free: row.get("random_free")?,
+        contacts: row.maybe("contacts")?,
+        cold_us: row.number("cold_us")?,
+        scene_us: row.number("scene_us")?,
+        self_us: row.number("self_us")?,
+        distances_us: row.number("distances_us")?,
+        call_us: row.number("call_us")?,
+        inside_us: row.number("inside_us")?,
+    })
+}
+
+fn motion(row: Row<'_>) -> Result<MotionRow, CsvError> {
+    Ok(MotionRow {
+        family: row.text("family")?.to_owned(),
+        representation: row.text("representation")?.to_owned(),
+        from: row.text("from")?.to_owned(),
+        length_rad: row.number("length_rad")?,
+        problems: row.get("problems")?,
+        free: row.get("free")?,
+        mean_us: row.number("mean_us")?,
+        median_us: row.number("median_us")?,
+        p99_us: row.number("p99_us")?,
+        configurations: row.number("configurations")?,
+        sampled_us: row.number("sampled_us")?,
+        coal_us: row.number("coal_us")?,
+        certified_us: row.number("certified_us")?,
+        verify_us: row.number("verify_us")?,
+        verify_part: row.number("verify_part")?,
+        samples: row.get("samples")?,
+        contacts: row.get("contacts")?,
+        coal_samples: row.maybe("coal_samples")?,
+        coal_contacts: row.maybe("coal_contacts")?,
+    })
+}
+
+/// Four digits; nothing of what is not measured.
+fn number(value: f64) -> String {
+    if value.is_nan() { String::new() } else { format!("{value:.4}") }
+}
+
+fn maybe(count: Option<usize>) -> String {
+    count.map(|count| count.to_string()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_come_back() {
+        let state = StateRow {
+            family: "box".into(),
+            representation: "hulls, coal".into(),
+            pieces: 11,
+            known: 200,
+            kept: 199,
+            kept_self: 198,
+            random: 300,
+            random_free: 280,
+            contacts: None,
+            cold_us: 2.5,
+            scene_us: 1.25,
+            self_us: 3.0,
+            distances_us: 100.0,
+            call_us: 4.0,
+            inside_us: 3.5,
+        };
+        let motion = MotionRow {
+            family: "all".into(),
+            representation: "degree 6".into(),
+            from: "goals".into(),
+            length_rad: 0.5,
+            problems: 100,
+            free: 90,
+            mean_us: 50.0,
+            median_us: 40.0,
+            p99_us: 400.0,
+            configurations: 7.5,
+            sampled_us: 200.0,
+            coal_us: 300.0,
+            certified_us: 60.0,
+            verify_us: 9.0,
+            verify_part: 0.1875,
+            samples: 90_000,
+            contacts: 0,
+            coal_samples: Some(1530),
+            coal_contacts: None,
+        };
+        let text = written(std::slice::from_ref(&state), std::slice::from_ref(&motion));
+        assert_eq!(read(&text), Ok((vec![state], vec![motion])));
+        assert!(read("family\nbox\n").is_err());
+    }
+}

@@ -1,0 +1,149 @@
+//! What stands for the links of the arm, and the robots that this makes.
+
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use sublevel::body::{Body, Shape};
+use sublevel::fit::{FitOptions, fit_parts};
+use sublevel::robot::{Description, read_srdf, read_urdf};
+use sublevel::scene::{Geometry, Ladder, Robot, RobotId};
+use sublevel::store::RobotSource;
+
+use super::arm::{Arm, ArmLink};
+use crate::comparison::FitCache;
+
+/// How links are represented.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Representation {
+    /// The spheres of a second URDF, which leave parts of the links out.
+    Spheres,
+    /// Bodies of degree 2.
+    Ellipsoids,
+    /// Bodies of degree 4.
+    Degree4,
+    /// Bodies of degree 6.
+    Degree6,
+    /// Bodies of degree 6 with refined volumes.
+    Refined,
+    /// Degrees 2, 4 and 6, coarsest first.
+    Ladder,
+    /// Two bodies of degree 6 per link, with refined volumes.
+    Compound,
+}
+
+impl Representation {
+    /// All of them.
+    pub(super) const ALL: [Self; 7] =
+        [Self::Spheres, Self::Ellipsoids, Self::Degree4, Self::Degree6, Self::Refined, Self::Ladder, Self::Compound];
+
+    /// Its name in tables.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Spheres => "spheres of the URDF",
+            Self::Ellipsoids => "ellipsoids",
+            Self::Degree4 => "degree 4",
+            Self::Degree6 => "degree 6",
+            Self::Refined => "degree 6 refined",
+            Self::Ladder => "ladder 2-4-6",
+            Self::Compound => "two parts of degree 6 refined",
+        }
+    }
+
+    /// Whether motions are measured of it: they are proven for the finest rung of a ladder, which
+    /// is there without the ladder.
+    pub(super) fn has_motions(self) -> bool {
+        self != Self::Ladder
+    }
+}
+
+/// The arm as a robot.
+pub(crate) struct LoadedArm {
+    pub(super) robot: Arc<Robot>,
+    /// What a server loads.
+    pub(super) source: RobotSource,
+    /// Bodies of the links; none of spheres, which the URDF holds.
+    pub(super) geometries: Vec<Geometry>,
+    /// Convex pieces of all links.
+    pub(crate) pieces: usize,
+}
+
+impl Arm {
+    /// The arm with links of a representation; fits are kept in the cache.
+    ///
+    /// # Errors
+    /// Fits that fail, and files that make no robot.
+    pub(crate) fn load(&self, links: Representation, cache: &FitCache) -> Result<LoadedArm, Box<dyn Error>> {
+        if links == Representation::Spheres {
+            let description = read_urdf(&self.sphere_urdf).map_err(|error| format!("panda_spherized.urdf: {error}"))?;
+            return self.robot(&self.sphere_urdf, &description, BTreeMap::new());
+        }
+        let mut bodies = BTreeMap::new();
+        for link in &self.links {
+            bodies.insert(link.name.clone(), geometry(link, links, cache)?);
+        }
+        self.robot(&self.urdf, &self.description, bodies)
+    }
+
+    fn robot(
+        &self,
+        urdf: &str,
+        description: &Description,
+        bodies: BTreeMap<Arc<str>, Geometry>,
+    ) -> Result<LoadedArm, Box<dyn Error>> {
+        let semantics = read_srdf(&self.srdf, description).map_err(|error| format!("panda.srdf: {error}"))?;
+        let id = RobotId::of(urdf, &self.srdf, bodies.iter().map(|(link, geometry)| (&**link, geometry.id())));
+        let robot = Robot::new(id, description, &semantics, &bodies)?;
+        let names = |robot: &Robot| robot.kinematics().variables().to_vec();
+        if names(&robot).iter().map(|joint| &joint.name).ne(self.kinematics.variables().iter().map(|joint| &joint.name))
+        {
+            return Err("panda_spherized.urdf has other joints than panda.urdf".into());
+        }
+        let of_link = |geometry: &Geometry| geometry.rungs().last().map_or(1, |shape| parts(shape).len());
+        let pieces = robot.links().iter().flatten().map(|link| of_link(&link.geometry)).sum();
+        let source = RobotSource {
+            urdf: urdf.to_owned(),
+            srdf: self.srdf.clone(),
+            bodies: bodies.iter().map(|(link, geometry)| (link.clone(), *geometry.id())).collect(),
+        };
+        Ok(LoadedArm { robot: Arc::new(robot), source, geometries: bodies.into_values().collect(), pieces })
+    }
+}
+
+fn parts(shape: &Shape) -> &[Body] {
+    match shape {
+        Shape::Body(body) => std::slice::from_ref(body),
+        Shape::Compound(compound) => compound.parts(),
+    }
+}
+
+/// The geometry of a link.
+fn geometry(link: &ArmLink, links: Representation, cache: &FitCache) -> Result<Geometry, Box<dyn Error>> {
+    let name = link.name.replace('_', "-");
+    let of_degree = |degree: usize, refine: bool| {
+        let options = FitOptions { degree, refine, ..FitOptions::default() };
+        cache.body(&name, &link.mesh, &options)
+    };
+    Ok(match links {
+        Representation::Ellipsoids => of_degree(2, false)?.into(),
+        Representation::Degree4 => of_degree(4, false)?.into(),
+        Representation::Degree6 => of_degree(6, false)?.into(),
+        Representation::Refined => of_degree(6, true)?.into(),
+        Representation::Ladder => {
+            let rung =
+                |degree: usize| Ok::<_, Box<dyn Error>>(Arc::new(Shape::Body(Box::new(of_degree(degree, false)?))));
+            let rungs = [2, 4, 6].into_iter().map(rung).collect::<Result<Vec<_>, _>>()?;
+            Geometry::Ladder(Arc::new(Ladder::new(&name, rungs)?))
+        }
+        Representation::Spheres | Representation::Compound => {
+            let options = FitOptions { degree: 6, refine: true, ..FitOptions::default() };
+            let shape =
+                cache.take(&format!("{name}-d6-refined-p2"), &link.mesh, &format!("{options:?} 2 parts"), || {
+                    let fitted = fit_parts(&name, &link.mesh, 2, &options, &mut |_| ControlFlow::Continue(()))?;
+                    Ok(Shape::Compound(Box::new(fitted.compound)))
+                })?;
+            Geometry::Solid(Arc::new(shape))
+        }
+    })
+}
