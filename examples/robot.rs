@@ -79,7 +79,7 @@ pub async fn run(url: &str) -> Result<(), Box<dyn std::error::Error>> {
         }
     }
 
-    // The certificate goes with the plan; whoever executes it checks it against the scene of then.
+    // The certificate goes with the plan; the controller checks it against the scene at that time.
     if let Some(certificate) = checked.motions[1].certificate.clone() {
         let request =
             VerifyMotionRequest { certificate, scene: scene.clone(), robot: "arm".into(), ..Default::default() };
