@@ -138,7 +138,7 @@ impl Placement {
     /// Bounds of `|z'_i - z_i|` between the image of v and those of points with `|z'_i| <=
     /// extent_i`.
     pub fn spans(&self, v: &Vector3<f64>, extent: &Vector3<f64>) -> Vector3<f64> {
-        let z = self.linear * (v - self.origin);
+        let z = self.coordinates(v);
         (extent + z.abs() + self.row_norms * self.displacement(v)) * (1.0 + 1e-14)
     }
 
@@ -148,10 +148,16 @@ impl Placement {
         (self.relative_error * (v - self.origin).norm() + self.origin_error) * (1.0 + 1e-14)
     }
 
+    /// Normalized coordinates of the point v, as they are computed.
+    #[inline]
+    pub(crate) fn coordinates(&self, v: &Vector3<f64>) -> Vector3<f64> {
+        self.linear * (v - self.origin)
+    }
+
     /// Constraint at the point v, without error bounds.
     #[inline]
     pub fn jet(&self, constraint: &Constraint, v: &Vector3<f64>) -> Jet {
-        self.pull_back(constraint.polynomial.evaluate(&(self.linear * (v - self.origin))))
+        self.pull_back(constraint.polynomial.evaluate(&self.coordinates(v)))
     }
 
     /// Constraint at the point v, with error bounds.
@@ -163,12 +169,24 @@ impl Placement {
     /// Polynomial of the normalized frame at the point v, with error bounds.
     #[inline]
     pub fn sample_of<'a>(&'a self, polynomial: &'a Polynomial, v: &Vector3<f64>) -> Sample<'a> {
-        let z = self.linear * (v - self.origin);
-        Sample { placement: self, polynomial, z, displacement: self.displacement(v), jet: polynomial.evaluate(&z) }
+        let z = self.coordinates(v);
+        self.sample_at(polynomial, v, (z, polynomial.evaluate(&z)))
     }
 
+    /// The same for a polynomial that has been evaluated at the normalized coordinates of v.
     #[inline]
-    fn pull_back(&self, jet: Jet) -> Jet {
+    pub(crate) fn sample_at<'a>(
+        &'a self,
+        polynomial: &'a Polynomial,
+        v: &Vector3<f64>,
+        (z, jet): (Vector3<f64>, Jet),
+    ) -> Sample<'a> {
+        Sample { placement: self, polynomial, z, displacement: self.displacement(v), jet }
+    }
+
+    /// A jet by normalized coordinates as one by points.
+    #[inline]
+    pub(crate) fn pull_back(&self, jet: Jet) -> Jet {
         let transposed = self.linear.transpose();
         Jet { value: jet.value, gradient: transposed * jet.gradient, hessian: transposed * jet.hessian * self.linear }
     }

@@ -2,7 +2,7 @@
 
 use super::jet::{Jet, NumberJet};
 use super::monomial::{Exponents, count, degree_of, fill, monomials};
-use super::simd::{Simd, WithSimd, dispatch};
+use super::simd::{Scalar, Simd, WithSimd, dispatch};
 use super::simd_real::Number;
 use nalgebra::{Matrix3, Vector3};
 
@@ -65,7 +65,18 @@ impl HessianForm {
     /// Value, gradient and Hessian.
     #[inline]
     pub(super) fn evaluate(&self, z: &Vector3<f64>) -> Jet {
-        dispatch(Evaluation { form: self, z: *z })
+        let task = Evaluation { form: self, z: *z };
+        // A quadratic takes less time than the choice of instructions for it.
+        if self.degree == 2 { task.with_simd(Scalar) } else { dispatch(task) }
+    }
+
+    /// Value and nothing else.
+    #[inline]
+    pub(super) fn value(&self, z: &Vector3<f64>) -> f64 {
+        let [f] = &self.table[..] else { return self.evaluate(z).value };
+        let f = &f.0;
+        let row = |a: usize, b: usize, c: usize, d: usize| f[a] + f[b] * z.x + f[c] * z.y + f[d] * z.z;
+        0.5 * (row(0, 1, 2, 3) + row(1, 4, 5, 6) * z.x + row(2, 5, 7, 8) * z.y + row(3, 6, 8, 9) * z.z)
     }
 
     /// Value, gradient and Hessian, to be inlined into work for [`dispatch`].

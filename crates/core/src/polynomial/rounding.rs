@@ -100,6 +100,11 @@ impl AbsolutePolynomial {
 
     pub(super) fn value_error(&self, z: &Vector3<f64>, gradient: &Vector3<f64>, dz: &Vector3<f64>) -> f64 {
         let (r, d) = (z.amax(), dz.amax());
+        if d == 0.0 {
+            let q = self.by_degree[..=self.degree].iter().rev().fold(0.0, |sum, &c| sum * r + c);
+            // No displacement, but a gradient that is no number leaves nothing known.
+            return (self.gamma * q + gradient.dot(dz)) * (1.0 + 1e-13) + self.underflow(r);
+        }
         let (q, dq, ddq) = self.jet(r + d);
         // Taylor along dz: the exact first derivative differs from the computed one by at most γ
         // Q'.

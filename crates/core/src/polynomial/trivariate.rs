@@ -93,6 +93,12 @@ impl Polynomial {
         self.form.evaluate(z)
     }
 
+    /// Value at `z`, with the error of that of [`Polynomial::evaluate`] at most.
+    #[inline]
+    pub(crate) fn value(&self, z: &Vector3<f64>) -> f64 {
+        self.form.value(z)
+    }
+
     /// Value, gradient and Hessian at the points `z`, a lane each, to be inlined into work for
     /// [`dispatch`](super::dispatch): as [`Polynomial::evaluate`] for one point, by nested Horner
     /// schemes for several.

@@ -6,8 +6,9 @@
 
 use crate::body::{Body, Placement, Sample, largest};
 use crate::measure::frames::pose::{Pose, RELATIVE_ERROR};
-use crate::polynomial::gamma;
+use crate::polynomial::{Jet, gamma};
 use nalgebra::{Matrix3, Vector3};
+use std::cell::Cell;
 
 /// A body in the query frame.
 pub(in crate::measure) struct Posed<'a> {
@@ -17,6 +18,21 @@ pub(in crate::measure) struct Posed<'a> {
     pub(in crate::measure) interior: Vector3<f64>,
     center: Vector3<f64>,
     pub(in crate::measure) radius: f64,
+    /// The last evaluation: a step, its bracket and its feasible point begin at the same place.
+    last: Cell<Option<Evaluated>>,
+}
+
+/// Value of a constraint below which it is met at a point and at those about as far from it as
+/// rounding leads. Above 1 it would be violated; lower, more constraints are sampled for nothing:
+/// it changes time only, and no test pins it.
+const WELL_INSIDE: f64 = 0.9;
+
+/// A constraint of more than degree 2 where it was evaluated, by normalized coordinates.
+#[derive(Clone, Copy)]
+struct Evaluated {
+    constraint: usize,
+    z: Vector3<f64>,
+    jet: Jet,
 }
 
 impl Posed<'_> {
@@ -26,18 +42,53 @@ impl Posed<'_> {
     }
 
     /// Constraint i at the point v.
-    pub(in crate::measure) fn jet(&self, i: usize, v: &Vector3<f64>) -> crate::polynomial::Jet {
-        self.placement.jet(&self.body.constraints()[i], v)
+    pub(in crate::measure) fn jet(&self, i: usize, v: &Vector3<f64>) -> Jet {
+        self.placement.pull_back(self.evaluated(i, &self.placement.coordinates(v)))
+    }
+
+    /// Value of constraint i at the point v.
+    pub(in crate::measure) fn value(&self, i: usize, v: &Vector3<f64>) -> f64 {
+        self.value_at(i, &self.placement.coordinates(v))
+    }
+
+    /// Value of constraint i by the normalized coordinates of a point.
+    fn value_at(&self, i: usize, z: &Vector3<f64>) -> f64 {
+        let polynomial = &self.body.constraints()[i].polynomial;
+        if polynomial.degree() == 2 { polynomial.value(z) } else { self.evaluated(i, z).value }
+    }
+
+    /// Value and gradient of constraint i at the point v.
+    pub(in crate::measure) fn tangent(&self, i: usize, v: &Vector3<f64>) -> (f64, Vector3<f64>) {
+        let Jet { value, gradient, .. } = self.evaluated(i, &self.placement.coordinates(v));
+        (value, self.pulled_back(&gradient))
+    }
+
+    /// Constraint i by the normalized coordinates of a point.
+    fn evaluated(&self, i: usize, z: &Vector3<f64>) -> Jet {
+        let polynomial = &self.body.constraints()[i].polynomial;
+        if polynomial.degree() == 2 {
+            return polynomial.evaluate(z);
+        }
+        if let Some(last) = self.last.get()
+            && last.constraint == i
+            && last.z == *z
+        {
+            return last.jet;
+        }
+        let jet = polynomial.evaluate(z);
+        self.last.set(Some(Evaluated { constraint: i, z: *z, jet }));
+        jet
     }
 
     /// Sum of the gradients at v, weighted by multipliers of all constraints.
     pub(in crate::measure) fn weighted_gradient(&self, v: &Vector3<f64>, multipliers: &[f64]) -> Vector3<f64> {
-        (0..self.len()).map(|i| self.jet(i, v).gradient * multipliers[i]).sum()
+        (0..self.len()).map(|i| self.tangent(i, v).1 * multipliers[i]).sum()
     }
 
     /// Constraint i at the point v with its error bounds.
     pub(in crate::measure) fn sample(&self, i: usize, v: &Vector3<f64>) -> Sample<'_> {
-        self.placement.sample(&self.body.constraints()[i], v)
+        let z = self.placement.coordinates(v);
+        self.placement.sample_at(&self.body.constraints()[i].polynomial, v, (z, self.evaluated(i, &z)))
     }
 
     /// Bound of the distance between v and the point of the exact frame that its samples are of.
@@ -58,13 +109,12 @@ impl Posed<'_> {
 
     /// Rigorous upper bound of the largest constraint at all points within `distance` of v.
     pub(in crate::measure) fn value_upper(&self, v: &Vector3<f64>, distance: f64) -> f64 {
-        let constraints = self.body.constraints().iter();
-        largest(constraints.map(|c| self.placement.sample(c, v).value_upper(distance)))
+        largest((0..self.len()).map(|i| self.sample(i, v).value_upper(distance)))
     }
 
     /// Rigorous upper bound of the largest constraint at some point within the displacement of v.
     fn nearby_value_upper(&self, v: &Vector3<f64>) -> f64 {
-        largest(self.body.constraints().iter().map(|c| self.placement.sample(c, v).nearby_value_upper()))
+        largest((0..self.len()).map(|i| self.sample(i, v).nearby_value_upper()))
     }
 
     /// Whether v is proven to lie in the body.
@@ -105,8 +155,8 @@ impl Posed<'_> {
     pub(in crate::measure) fn enter(&self, v: &Vector3<f64>, direction: &Vector3<f64>) -> Vector3<f64> {
         let mut point = *v;
         for _ in 0..16 {
-            let steps =
-                (0..self.len()).map(|i| self.jet(i, &point)).map(|jet| (jet.value - 1.0, -jet.gradient.dot(direction)));
+            let tangents = (0..self.len()).map(|i| self.tangent(i, &point));
+            let steps = tangents.map(|(value, gradient)| (value - 1.0, -gradient.dot(direction)));
             let longest =
                 steps.filter(|(excess, _)| *excess > 0.0).map(|(excess, slope)| excess / slope).fold(0.0, f64::max);
             point += direction * longest;
@@ -127,7 +177,15 @@ impl Posed<'_> {
         let mut nudge = 4.0 * f64::EPSILON;
         for _ in 0..4 {
             let (mut step, mut inside) = (Vector3::zeros(), true);
+            let z = self.placement.coordinates(&point);
+            let trust = Some(self.body.trust()).filter(|trust| z.norm() <= trust.radius);
             for i in 0..self.len() {
+                // Most constraints of many are far from their boundaries.
+                if let Some(trust) = trust
+                    && self.value_at(i, &z) + trust.constraints[i].value_error < WELL_INSIDE
+                {
+                    continue;
+                }
                 let sample = self.sample(i, &point);
                 let error = sample.nearby_value_error();
                 let excess = (sample.value() + error).next_up() - 1.0;
@@ -200,6 +258,7 @@ impl<'a> Posed<'a> {
             interior: (body.interior_point() - origin) / unit,
             center: Vector3::zeros(),
             radius: body.circumscribed().radius / unit,
+            last: Cell::new(None),
         }
     }
 }
@@ -257,6 +316,7 @@ impl<'a> Pair<'a> {
                 interior: (a.interior_point() - origin) / unit,
                 center: Vector3::zeros(),
                 radius: ball_a.radius / unit,
+                last: Cell::new(None),
             },
             b: Posed {
                 body: b,
@@ -264,6 +324,7 @@ impl<'a> Pair<'a> {
                 interior: to_query(b.interior_point()),
                 center: to_query(&ball_b.center),
                 radius: ball_b.radius / unit + off(&ball_b.center),
+                last: Cell::new(None),
             },
             unit,
             origin,

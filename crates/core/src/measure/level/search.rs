@@ -394,7 +394,7 @@ impl<'a> Search<'a> {
 
 /// The largest constraint of A.
 fn value(pair: &Pair<'_>, x: &Vector3<f64>) -> f64 {
-    (0..pair.a.len()).map(|i| pair.a.jet(i, x).value).fold(f64::MIN, f64::max)
+    (0..pair.a.len()).map(|i| pair.a.value(i, x)).fold(f64::MIN, f64::max)
 }
 
 /// The point that part of the way from x to the interior point of B.

@@ -65,7 +65,7 @@ pub(in crate::measure) fn near_boundary(body: &Posed<'_>, center: &Vector3<f64>,
     let outside = center + u * (2.0 * body.reach(center));
     let mut arm = (body.enter(&outside, &-u) - center) * 0.9;
     // Newton's method from far outside may have ended early.
-    let value = |v: &Vector3<f64>| largest((0..body.len()).map(|i| body.jet(i, v).value));
+    let value = |v: &Vector3<f64>| largest((0..body.len()).map(|i| body.value(i, v)));
     while !(value(&(center + arm)) < 1.0) && arm.norm_squared() > 0.0 {
         arm *= 0.7;
     }

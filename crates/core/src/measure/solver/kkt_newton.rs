@@ -75,7 +75,7 @@ impl Active {
     ) -> Self {
         let mut weighted = *multipliers;
         let carried = weighted.iter_mut().enumerate().take(body.len()).filter(|(_, residual)| **residual > 0.0);
-        carried.for_each(|(i, residual)| *residual *= body.jet(i, v).gradient.norm());
+        carried.for_each(|(i, residual)| *residual *= body.tangent(i, v).1.norm());
         let mut active = Self::from_multipliers(&weighted);
         (0..active.len).for_each(|k| active.multiplier[k] = multipliers[active.index[k]]);
         active
@@ -85,7 +85,7 @@ impl Active {
     /// `target`.
     pub(in crate::measure) fn near(body: &Posed<'_>, v: &Vector3<f64>, target: &Vector3<f64>) -> Self {
         let mut values = [f64::NEG_INFINITY; crate::body::MAX_CONSTRAINTS];
-        (0..body.len()).for_each(|i| values[i] = body.jet(i, v).value);
+        (0..body.len()).for_each(|i| values[i] = body.value(i, v));
         let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let mut active = Self::default();
         while active.len < MAX_ACTIVE {
@@ -176,7 +176,7 @@ impl Active {
     /// dependent.
     pub(in crate::measure) fn fit(&mut self, body: &Posed<'_>, v: &Vector3<f64>, target: &Vector3<f64>) -> bool {
         let gradients: [Vector3<f64>; MAX_ACTIVE] =
-            std::array::from_fn(|k| if k < self.len { body.jet(self.index[k], v).gradient } else { Vector3::zeros() });
+            std::array::from_fn(|k| if k < self.len { body.tangent(self.index[k], v).1 } else { Vector3::zeros() });
         let mut system = [[0.0; MAX_ACTIVE + 1]; MAX_ACTIVE];
         for i in 0..self.len {
             for j in 0..self.len {
@@ -195,10 +195,10 @@ impl Active {
         let multipliers = self.multipliers();
         let (mut rest, mut gap) = (*target, 0.0_f64);
         for (i, multiplier) in multipliers.iter().enumerate().take(body.len()) {
-            let jet = body.jet(i, v);
-            let excess = jet.value - 1.0;
-            rest -= jet.gradient * *multiplier;
-            gap = gap.max(if *multiplier > 0.0 { excess.abs() } else { excess } / jet.gradient.norm());
+            let (value, gradient) = body.tangent(i, v);
+            let excess = value - 1.0;
+            rest -= gradient * *multiplier;
+            gap = gap.max(if *multiplier > 0.0 { excess.abs() } else { excess } / gradient.norm());
         }
         (rest.norm(), gap)
     }
@@ -218,7 +218,7 @@ impl Active {
     ) -> Option<usize> {
         (0..body.len())
             .filter(|i| !self.index[..self.len].contains(i))
-            .map(|i| (i, body.jet(i, v).value - level))
+            .map(|i| (i, body.value(i, v) - level))
             .filter(|(_, by)| *by > excess)
             .max_by(|p, q| p.1.total_cmp(&q.1))
             .map(|(i, _)| i)

@@ -118,8 +118,8 @@ impl Search<'_> {
     /// The largest constraint of both bodies.
     pub(super) fn depth(&self, v: &Vector3<f64>) -> f64 {
         let pair = self.pair;
-        let values = (0..pair.a.len()).map(|i| pair.a.jet(i, v).value);
-        values.chain((0..pair.b.len()).map(|i| pair.b.jet(i, v).value)).fold(f64::MIN, f64::max)
+        let values = (0..pair.a.len()).map(|i| pair.a.value(i, v));
+        values.chain((0..pair.b.len()).map(|i| pair.b.value(i, v))).fold(f64::MIN, f64::max)
     }
 
     /// The point deepest in both bodies, by the interior-point method: inside both, it proves

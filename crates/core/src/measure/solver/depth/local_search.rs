@@ -19,7 +19,7 @@ use nalgebra::{Vector2, Vector3};
 fn common(body: &Posed<'_>, points: [SupportPoint; 4]) -> SupportPoint {
     let x = points.iter().map(|point| point.x).sum::<Vector3<f64>>() * 0.25;
     let all = points.iter().fold(ActiveSet::MAX, |all, point| all & point.active);
-    let at = |i: &usize| all >> i & 1 == 1 && body.jet(*i, &x).value > 1.0 - AT;
+    let at = |i: &usize| all >> i & 1 == 1 && body.value(*i, &x) > 1.0 - AT;
     SupportPoint { x, active: (0..body.len()).filter(at).fold(0, |bits, i| bits | 1 << i) }
 }
 
