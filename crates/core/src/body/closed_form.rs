@@ -48,6 +48,17 @@ pub enum ExactShape {
     },
 }
 
+impl ExactShape {
+    /// Radius of a ball, metres; none of other shapes.
+    #[inline(always)]
+    pub(crate) fn ball_radius_m(&self) -> Option<f64> {
+        match *self {
+            Self::Capsule { radius_m, half_length_m: 0.0 } => Some(radius_m),
+            _ => None,
+        }
+    }
+}
+
 /// A shape where it lies in the frame of its body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClosedForm {
@@ -149,6 +160,13 @@ impl ClosedForm {
     /// length, body frame; metres times that length.
     #[inline(always)]
     pub fn height(&self, n: &Vector3<f64>) -> f64 {
+        self.heights(n)[1]
+    }
+
+    /// Proven bracket of the largest `n·(x - c)` over the points x of the body, as
+    /// [`ClosedForm::height`].
+    #[inline(always)]
+    pub(crate) fn heights(&self, n: &Vector3<f64>) -> [f64; 2] {
         let own = self.axes.map_or(*n, |axes| axes.tr_mul(n));
         let height = match self.shape {
             ExactShape::Cuboid { half_extents_m: [x, y, z], .. } => x * own.x.abs() + y * own.y.abs() + z * own.z.abs(),
@@ -157,7 +175,36 @@ impl ClosedForm {
             }
             ExactShape::Capsule { radius_m, half_length_m } => radius_m * own.norm() + half_length_m * own.z.abs(),
         };
-        height * (1.0 + HEIGHT_ROUNDING) + self.displacement_m * n.norm()
+        let displaced = self.displacement_m * n.norm();
+        [height * (1.0 - HEIGHT_ROUNDING) - displaced, height * (1.0 + HEIGHT_ROUNDING) + displaced]
+    }
+
+    /// A point of the shape that is farthest along n, body frame, metres: where several are, on a
+    /// face or along an edge, one in the middle of them.
+    pub(crate) fn support_point(&self, n: &Vector3<f64>) -> Vector3<f64> {
+        let own = self.axes.map_or(*n, |axes| axes.tr_mul(n));
+        let sign = |v: f64| if v == 0.0 { 0.0 } else { v.signum() };
+        let farthest = match self.shape {
+            ExactShape::Cuboid { half_extents_m, .. } => Vector3::from_fn(|i, _| half_extents_m[i] * sign(own[i])),
+            ExactShape::Cylinder { radius_m, half_height_m, .. } => {
+                let length = own.x.hypot(own.y);
+                let share = if length > 0.0 { radius_m / length } else { 0.0 };
+                Vector3::new(own.x * share, own.y * share, half_height_m * sign(own.z))
+            }
+            ExactShape::Capsule { radius_m, half_length_m } => {
+                own.try_normalize(0.0).unwrap_or_default() * radius_m + Vector3::z() * (half_length_m * sign(own.z))
+            }
+        };
+        self.center + self.axes.map_or(farthest, |axes| axes * farthest)
+    }
+
+    /// Radius of the ball about its centre that contains the shape, metres, but for rounding.
+    pub(crate) fn reach_m(&self) -> f64 {
+        match self.shape {
+            ExactShape::Cuboid { half_extents_m, .. } => Vector3::from(half_extents_m).norm(),
+            ExactShape::Cylinder { radius_m, half_height_m, .. } => radius_m.hypot(half_height_m),
+            ExactShape::Capsule { radius_m, half_length_m } => radius_m + half_length_m,
+        }
     }
 
     /// Bound of how far a point of the body is from the shape, or one of the shape from the body,
@@ -224,6 +271,35 @@ mod tests {
             panic!("a box")
         };
         assert!((Vector3::from(half_extents_m) - half).norm() < 1e-15 && faces == [1, 2, 0]);
+    }
+
+    /// Support points are on the shape, and their heights in the bracket, along axes as well.
+    #[test]
+    fn support_points_attain_the_heights() {
+        let shapes = [
+            Body::cuboid("box", Vector3::new(0.1, 0.7, 2.3)).unwrap(),
+            Body::cylinder("can", 0.3, 0.9).unwrap(),
+            Body::ball("ball", Vector3::new(1.0, 2.0, 3.0), 0.25).unwrap(),
+        ];
+        for seed in 0..3000 {
+            let mut random = Seeded(seed);
+            let q = nalgebra::Vector4::from_fn(|_, _| random.signed()).normalize();
+            let rotation = UnitQuaternion::new_normalize(nalgebra::Quaternion::from(q));
+            let body = &shapes[(seed % 3) as usize];
+            let body = if seed % 2 == 0 { body.clone() } else { body.moved(&rotation, &random.unit()).unwrap() };
+            let form = body.closed_form().expect("a shape");
+            let axis = form.axes().map_or(Vector3::x(), |axes| axes.column(0).into());
+            let n = match seed % 5 {
+                0 => axis,
+                1 => axis + random.unit() * 1e-9,
+                _ => random.unit() * (0.1 + random.signed().abs()),
+            };
+            let (point, [least, most]) = (form.support_point(&n), form.heights(&n));
+            assert!((body.value(&point) - 1.0).abs() < 1e-11, "seed {seed}: {}", body.value(&point));
+            let height = n.dot(&(point - form.center()));
+            assert!(least <= height + 1e-15 && height <= most + 1e-15, "seed {seed}: {least} {height} {most}");
+            assert!(most - least < 1e-13, "seed {seed}");
+        }
     }
 
     #[test]

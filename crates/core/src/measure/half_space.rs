@@ -1,17 +1,19 @@
-//! Signed distance from a body to a half-space: its support point against the normal.
+//! Signed distance from a body to a half-space: its support point against the normal, closed for
+//! boxes, cylinders and balls.
 //!
 //! The signed distance is `min n·x - offset` over the body. Where it is positive it is the
 //! Euclidean distance, since the nearest point of the half-space lies along n. Where it is negative
 //! its magnitude is the penetration depth: a translation t separates exactly if `n·t` makes up for
 //! it, and the shortest such t is along n.
 
-use crate::body::{Body, Solid};
+use crate::body::{Body, ClosedForm, Solid};
 use crate::measure::bounds::duality_bounds::{DUALITY_ROUNDING, descent};
 use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::{At, Least, bracketed, least};
 use crate::measure::solver::projection::{Objective, Single, solve_single};
+use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::gamma;
@@ -168,6 +170,11 @@ fn from_body(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> HalfSpaceDistance {
+    if runs(Stage::ClosedForm)
+        && let Some(form) = body.closed_form()
+    {
+        return from_shape((form, pose), half_space, tolerance);
+    }
     let single = Single::new(body, pose);
     let HalfSpace { normal, offset } = half_space;
     let support = Support::new(&single, &-normal);
@@ -185,6 +192,27 @@ fn from_body(
         witness: single.to_world(&found.point),
         tied: false,
         iterations: found.iterations,
+    }
+}
+
+/// Of a box, a cylinder or a ball: the height of its lowest point.
+fn from_shape((form, pose): (&ClosedForm, &Pose), half_space: &HalfSpace, tolerance: f64) -> HalfSpaceDistance {
+    let HalfSpace { normal, offset } = half_space;
+    let down = pose.rotation().inverse_transform_vector(&-normal);
+    let [least, most] = form.heights(&down);
+    // n·c = n·R c + n·t, c the centre of the shape.
+    let center = normal.dot(&pose.transform_direction(form.center())) + normal.dot(pose.translation()) - offset;
+    let reach = form.reach_m();
+    let size = form.center().norm() + pose.translation().norm() + offset.abs() + reach;
+    let slack = (ROTATION_ERROR + gamma(16)) * size;
+    let (lower, upper) = (center - most - slack, center - least + slack);
+    HalfSpaceDistance {
+        status: Status::of(upper - lower <= tolerance),
+        lower,
+        upper,
+        witness: pose.transform_point(&form.support_point(&down)),
+        tied: false,
+        iterations: 0,
     }
 }
 
@@ -260,6 +288,7 @@ bracketed!(HalfSpaceDistance);
 mod tests {
     use super::*;
     use crate::body::Compound;
+    use crate::measure::solver::stages::except;
     use crate::measure::tests::random_pose;
     use sublevel_testkit::Seeded;
 
@@ -296,8 +325,11 @@ mod tests {
             let half_space = HalfSpace::new(pose.transform_direction(&n), offset).unwrap();
             let truth = half_space.normal().dot(pose.translation()) - support(&half, &-n) - offset;
             let mut warm = WarmStart::default();
-            for _ in 0..2 {
-                let found = distance_to_half_space(body, &pose, &half_space, &Options::default(), &mut warm);
+            let ask =
+                |warm: &mut WarmStart| distance_to_half_space(body, &pose, &half_space, &Options::default(), warm);
+            // Closed forms are left out once, so that the search has to find what they say.
+            for closed in [false, false, true] {
+                let found = if closed { ask(&mut warm) } else { except(&[Stage::ClosedForm], || ask(&mut warm)) };
                 let label = format!("seed {seed} {n:?}: {found:?} against {truth}");
                 assert_eq!(found.status, Status::Converged, "{label}");
                 assert!(found.lower <= truth + 1e-14 && truth - 1e-14 <= found.upper, "{label}");

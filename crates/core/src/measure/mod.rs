@@ -34,7 +34,10 @@ mod translation_hessian;
 mod warm;
 
 pub use batch::{BatchError, distance_batch};
-pub use capsule::{Capsule, CapsuleDistance, CapsuleError, distance_of_capsules, distance_to_capsule};
+pub use capsule::{
+    Capsule, CapsuleDistance, CapsuleError, distance_of_capsules, distance_to_capsule, nearer_to_capsule_than,
+    overlap_with_capsule,
+};
 pub use cast_ball::{Sweep, cast_ball};
 pub use cast_ray::{Ray, RayCast, RayError, RayHit, cast_ray};
 pub use distance::{Distance, distance};

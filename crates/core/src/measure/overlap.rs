@@ -1,9 +1,10 @@
 //! Questions that a bracket answers before it is narrow: overlap, nearer than a threshold, within a
 //! margin.
 //!
-//! Balls come first, then planes across a few directions, whose heights are looked up. What touches
-//! a box or a cylinder, or does not, the least value of the other body's polynomial over that shape
-//! decides. The search for the distance, which stops as soon as its bracket decides, comes last.
+//! Two balls have a formula. Else balls inside and around come first, then planes across a few
+//! directions, whose heights are looked up. What touches a box or a cylinder, or does not, the least
+//! value of the other body's polynomial over that shape decides; of two such shapes, a point of
+//! both or a plane between them. The search for the distance, which stops as soon as its bracket decides, comes last.
 
 use crate::body::Solid;
 use crate::measure::distance::{Distance, distance_until};
@@ -139,7 +140,7 @@ pub fn within_margin(
     Ok(if found.lower > margin { WithinMargin::Beyond { lower: found.lower } } else { WithinMargin::Within(found) })
 }
 
-fn check(threshold: f64) -> Result<(), ThresholdError> {
+pub(super) fn check(threshold: f64) -> Result<(), ThresholdError> {
     if threshold >= 0.0 && threshold.is_finite() { Ok(()) } else { Err(ThresholdError(threshold)) }
 }
 

@@ -8,6 +8,7 @@ mod exact;
 mod judge;
 mod truth;
 
+mod capsules;
 mod contact;
 mod depth;
 mod gradients;

@@ -7,6 +7,7 @@ use sublevel_core::measure::{
 
 use super::answer::{Answer, AnswerStatus};
 use super::ask::Measure;
+use super::decide::decide;
 use super::solve::from_signed;
 use super::solver::{Pair, Solver};
 use super::thing::{Thing, WorldHalfSpace};
@@ -62,7 +63,13 @@ impl SignedCapsule {
 impl Solver<'_> {
     /// A measure of a pair with a capsule in it.
     pub(crate) fn capsules(&self, index: usize, measure: Measure, pair: &Pair<'_>) -> Answer {
-        let found = self.capsule_distance(pair, &self.ask.options(index, self.stop));
+        let options = self.ask.options(index, self.stop);
+        match measure {
+            Measure::Overlap => return self.decided(&decide(self, pair, 0.0, options)),
+            Measure::NearerThan => return self.decided(&decide(self, pair, self.ask.threshold_m, options)),
+            _ => {}
+        }
+        let found = self.capsule_distance(pair, &options);
         let stopped = self.stop.is_set();
         let signed = Answer {
             witnesses: (found.upper < f64::INFINITY).then_some(found.witnesses),

@@ -1,12 +1,17 @@
 //! Whether a pair is nearer than a threshold, from the coarsest rungs on.
 
-use sublevel_core::body::Solid;
-use sublevel_core::measure::{Decision, Options, nearer_than, overlap, signed_distance};
+use std::sync::Arc;
+
+use sublevel_core::body::{Shape, Solid};
+use sublevel_core::measure::{
+    Capsule, Decision, Options, Pose, nearer_than, nearer_to_capsule_than, overlap, overlap_with_capsule,
+    signed_distance,
+};
 
 use super::answer::Verdict;
 use super::ask::Measure;
 use super::solver::{Pair, Solver};
-use super::thing::Thing;
+use super::thing::{PairSlots, Thing};
 
 /// A decision with what is known of the signed distance, metres.
 #[derive(Clone, Copy, Debug)]
@@ -61,6 +66,16 @@ pub(crate) fn decide(solver: &Solver<'_>, pair: &Pair<'_>, threshold: f64, optio
             let slack = half_space.slack_m(pose.translation().norm() + ball.center.norm() + ball.radius);
             let (lower, upper) = (found.lower - slack, found.upper + slack);
             Bracket::of(compare::against(lower, upper, threshold), lower, upper)
+        }
+        (Thing::Solid { set: None, rungs, pose }, Thing::Capsule { capsule, pose: capsule_pose })
+            if threshold >= 0.0 =>
+        {
+            solid_and_capsule(solver, (rungs, pose), (capsule, capsule_pose), threshold, (pair.slots, options))
+        }
+        (Thing::Capsule { .. }, Thing::Solid { set: None, .. }) => {
+            let found = decide(solver, &pair.swapped(), threshold, options);
+            let [solid, capsule] = found.rungs;
+            Bracket { rungs: [capsule, solid], ..found }
         }
         (Thing::Capsule { .. }, _) | (_, Thing::Capsule { .. }) => {
             let found = solver.capsule_distance(pair, &options);
@@ -119,6 +134,34 @@ fn solids(solver: &Solver<'_>, pair: &Pair<'_>, threshold: f64, options: Options
         }
     }
     Bracket::of(Verdict::Undecided, f64::NEG_INFINITY, f64::INFINITY)
+}
+
+/// Compares the distance of a solid from a capsule with a threshold that is not negative, from the
+/// coarsest rung on; rungs in this order.
+fn solid_and_capsule(
+    solver: &Solver<'_>,
+    (rungs, pose): (&[Arc<Shape>], &Pose),
+    (capsule, capsule_pose): (&Capsule, &Pose),
+    threshold: f64,
+    (slots, options): (Option<PairSlots>, Options<'_>),
+) -> Bracket {
+    let mut found = Bracket::of(Verdict::Undecided, f64::NEG_INFINITY, f64::INFINITY);
+    for (rung, solid) in rungs.iter().enumerate() {
+        let decision = solver.warm(slots, [rung, 0], Measure::Signed, |warm| {
+            if threshold == 0.0 {
+                return overlap_with_capsule(&**solid, pose, capsule, capsule_pose, &options, warm);
+            }
+            // Only thresholds that are no lengths are refused.
+            nearer_to_capsule_than(&**solid, pose, capsule, capsule_pose, threshold, &options, warm)
+                .unwrap_or(Decision::Undecided { lower: 0.0, upper: f64::INFINITY })
+        });
+        found = Bracket::decided(decision, threshold);
+        found.rungs = [u8::try_from(rung).unwrap_or(u8::MAX), 0];
+        if found.verdict == Verdict::No {
+            break;
+        }
+    }
+    found
 }
 
 /// Brackets against thresholds.

@@ -9,20 +9,24 @@
 //! and where it rose; the planes that prove the distances there bound it from below.
 
 mod answer;
+mod bounds;
+mod decision;
 mod pair;
 mod shape;
+mod solid;
 
 use crate::body::{ClosedForm, Solid};
 use crate::measure::bounds::culling::CULLING_SLACK;
 use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::options::Options;
-use crate::measure::pairwise_minimum::{Least, least};
 use crate::measure::solver::exact_shape::{ShapeDistance, between_shapes};
+use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::status::Status;
 use crate::measure::warm::WarmStart;
 pub use answer::CapsuleDistance;
-use pair::Problem;
+pub use decision::{nearer_to_capsule_than, overlap_with_capsule};
 pub use shape::{Capsule, CapsuleError};
+use solid::distance_until;
 
 /// Signed distance of a solid at `pose` from a capsule at `capsule_pose` (both to the world frame):
 /// positive apart, zero in contact, minus the penetration depth in overlap as long as the axis of
@@ -53,27 +57,7 @@ pub fn distance_to_capsule(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> CapsuleDistance {
-    let size = if capsule.reach_m() > 0.0 { capsule.reach_m() } else { f64::INFINITY };
-    let tolerance = options.accuracy() * solid.circumscribed().radius.min(size);
-    let problem = Problem { capsule, capsule_pose, tolerance, options };
-    let parts = solid.parts();
-    if let [body] = parts {
-        return problem.solve((body, pose), warm);
-    }
-    let bound = |(i, _): (usize, usize)| {
-        let ball = parts[i].circumscribed();
-        let center = pose.transform_point(&ball.center);
-        let apart = (center - capsule_pose.translation()).norm();
-        let size = center.norm() + capsule_pose.translation().norm() + ball.radius + capsule.reach_m();
-        apart - ball.radius - capsule.reach_m() - (CULLING_SLACK + ROTATION_ERROR) * size
-    };
-    let found = least((parts.len(), 1), bound, f64::NEG_INFINITY, warm, |(i, _), _, hint| {
-        problem.solve((&parts[i], pose), hint)
-    });
-    let Least { best, lower, tied, iterations, .. } = found;
-    // How deep something is in a union no single part knows.
-    let lower = if lower < 0.0 { f64::NEG_INFINITY } else { lower };
-    CapsuleDistance { status: Status::of(best.upper - lower <= tolerance), lower, tied, iterations, ..best }
+    distance_until((solid, pose), (capsule, capsule_pose), StopCriterion::NARROW, options, warm)
 }
 
 /// Signed distance of two capsules where they stand: positive apart, minus the penetration depth in

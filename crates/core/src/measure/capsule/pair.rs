@@ -1,9 +1,10 @@
 //! The signed distance of one body from a capsule: by closed forms, else along its axis.
 
 use super::answer::CapsuleDistance;
+use super::bounds::ball_and_plane;
 use super::shape::Capsule;
 use crate::body::{Body, ClosedForm};
-use crate::measure::bounds::culling::CULLING_SLACK;
+use crate::measure::bounds::culling::{CULLING_SLACK, across};
 use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::At;
@@ -28,10 +29,26 @@ pub(super) struct Problem<'a> {
     /// Width of the bracket that is narrow enough, metres.
     pub(super) tolerance: f64,
     pub(super) options: &'a Options<'a>,
+    /// What the signed distance is asked for.
+    pub(super) goal: StopCriterion,
 }
 
 impl Problem<'_> {
     pub(super) fn solve(&self, of_body: At<'_, Body>, warm: &mut WarmStart) -> CapsuleDistance {
+        let known = if self.goal.is_narrow() {
+            [f64::NEG_INFINITY, f64::INFINITY]
+        } else {
+            ball_and_plane(of_body, (self.capsule, self.capsule_pose))
+        };
+        let found = if self.goal.met(known[0], known[1]) {
+            CapsuleDistance { upper: f64::INFINITY, ..self.met(of_body.1.translation(), 0) }
+        } else {
+            self.search(of_body, warm)
+        };
+        CapsuleDistance { lower: found.lower.max(known[0]), upper: found.upper.min(known[1]), ..found }
+    }
+
+    fn search(&self, of_body: At<'_, Body>, warm: &mut WarmStart) -> CapsuleDistance {
         let found = if !runs(Stage::ClosedForm) {
             Err(0)
         } else if let Some(form) = of_body.0.closed_form() {
@@ -48,13 +65,23 @@ impl Problem<'_> {
         ClosedForm::capsule(self.capsule.radius_m(), self.capsule.half_height_m())
     }
 
+    /// What the distance from the axis is asked for, with as much to spare as rounding may take.
+    fn goal_of_axis(&self) -> StopCriterion {
+        let (radius, StopCriterion { near, far }) = (self.capsule.radius_m(), self.goal);
+        let spare = |limit: f64| 4.0 * f64::EPSILON * (radius + limit.abs());
+        if self.goal.is_narrow() {
+            return self.goal;
+        }
+        StopCriterion { near: near + radius - spare(near), far: far + radius + spare(far) }
+    }
+
     /// Of a body with a single constraint.
     ///
     /// # Errors
     /// After how many evaluations nothing is proven.
     fn of_smooth(&self, (body, pose): At<'_, Body>, warm: &mut WarmStart) -> Result<CapsuleDistance, u32> {
         let Self { capsule_pose: form_pose, tolerance, options, .. } = *self;
-        let (form, goal) = (self.form(), StopCriterion::NARROW);
+        let (form, goal) = (self.form(), self.goal_of_axis());
         let trace = if let Hint::Exact(trace) = &warm.hint { Some(trace) } else { None };
         let query = ExactQuery { body, pose, form: &form, form_pose, goal: &goal, tolerance, options, trace };
         let found = dispatch(query).map_err(|lost| lost.rounds)?;
@@ -107,8 +134,8 @@ impl Problem<'_> {
         iterations: u32,
     ) -> CapsuleDistance {
         let radius = self.capsule.radius_m();
-        let rounding = f64::EPSILON * (radius + upper);
-        let (lower, upper) = (lower - radius - rounding, upper - radius + rounding);
+        let rounding = |bound: f64| f64::EPSILON * (radius + bound);
+        let (lower, upper) = (lower - radius - rounding(lower), upper - radius + rounding(upper));
         let witness_of_capsule = on_axis + normal * radius;
         let status = Status::of(upper - lower <= self.tolerance);
         CapsuleDistance {
@@ -117,7 +144,8 @@ impl Problem<'_> {
             upper,
             witness,
             witness_of_capsule,
-            normal: Some(normal),
+            // None where the axis is nearer than any double tells.
+            normal: Some(normal).filter(|normal| *normal != Vector3::zeros()),
             tied: false,
             iterations,
         }
@@ -137,6 +165,20 @@ impl Problem<'_> {
         }
     }
 
+    /// What is known by the way from a place on the axis to the body's interior point.
+    fn to_interior_point(&self, (body, pose): At<'_, Body>, at: f64, iterations: u32) -> CapsuleDistance {
+        let (place, interior) = (Vector3::new(0.0, 0.0, at), body.interior_point());
+        let (way, apart, error) = across((pose, interior), (self.capsule_pose, &place));
+        let (radius, normal) = (self.capsule.radius_m(), way.try_normalize(0.0));
+        let on_axis = self.capsule_pose.transform_point(&place);
+        CapsuleDistance {
+            upper: (apart + error) * (1.0 + f64::EPSILON) - radius,
+            witness_of_capsule: on_axis + normal.unwrap_or_default() * radius,
+            normal,
+            ..self.met(&pose.transform_point(interior), iterations)
+        }
+    }
+
     /// By the distances of points of the axis, after so many steps.
     fn along_axis(&self, (body, pose): At<'_, Body>, spent: u32, warm: &mut WarmStart) -> CapsuleDistance {
         let (axis, half) = (self.capsule_pose.transform_direction(&Vector3::z()), self.capsule.half_height_m());
@@ -144,12 +186,17 @@ impl Problem<'_> {
         let projection = Projection::new(body, pose);
         // Places where the distance falls towards the other one, with tangents that bound it.
         let mut ends: [Option<Tangent>; 2] = [None, None];
-        let mut best = CapsuleDistance { upper: f64::INFINITY, ..self.met(pose.translation(), 0) };
         let (mut lower, mut iterations) = (f64::NEG_INFINITY, spent);
         let center = pose.transform_point(body.interior_point()) - self.capsule_pose.translation();
         let mut at = axis.dot(&center).clamp(-half, half);
-        let error = (ROTATION_ERROR + CULLING_SLACK) * (self.capsule_pose.translation().norm() + half);
+        // A ball's centre is where its pose says.
+        let turned = (ROTATION_ERROR + CULLING_SLACK) * (self.capsule_pose.translation().norm() + half);
+        let error = if half == 0.0 { 0.0 } else { turned };
+        let mut best = self.to_interior_point((body, pose), at, spent);
         for _ in 0..MAX_PLACES {
+            if self.options.exhausted(iterations) {
+                break;
+            }
             let point = place(at);
             let found = projection.to(&point, self.tolerance * 0.25, &self.options.after(iterations), warm);
             iterations += found.iterations;
@@ -167,13 +214,17 @@ impl Problem<'_> {
             }
             let (bound, next) = Tangent::least(&ends, half);
             lower = bound.max(lower);
-            let narrow = best.upper + self.capsule.radius_m() - lower <= self.tolerance;
-            if narrow || next == at || self.options.exhausted(iterations) {
+            let radius = self.capsule.radius_m();
+            let narrow = best.upper + radius - lower <= self.tolerance;
+            let met = self.goal_of_axis().met(lower, best.upper + radius);
+            if narrow || met || next == at {
                 break;
             }
             at = next;
         }
-        lower = lower.max(0.0) - self.capsule.radius_m() * (1.0 + f64::EPSILON);
+        // How deep an axis is that is not proven outside is not known.
+        let radius = self.capsule.radius_m() * (1.0 + f64::EPSILON);
+        lower = if lower > 0.0 { lower - radius } else { f64::NEG_INFINITY };
         CapsuleDistance { status: Status::of(best.upper - lower <= self.tolerance), lower, iterations, ..best }
     }
 }

@@ -2,6 +2,7 @@
 //! another with a closed form.
 
 use super::answer::Distance;
+use super::balls::of_balls;
 use crate::body::{Body, ClosedForm, ExactShape};
 use crate::measure::frames::pose::Pose;
 use crate::measure::options::Options;
@@ -159,6 +160,10 @@ pub(super) fn of_shapes(
     warm: &mut WarmStart,
 ) -> Option<Result<Distance, u32>> {
     let (form_a, form_b) = (a.closed_form()?, b.closed_form()?);
+    if let Some(found) = of_balls((form_a, pose_a), (form_b, pose_b), options) {
+        *warm = Hint::Shapes { x_a: *form_a.center() }.into();
+        return Some(Ok(found));
+    }
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
     let start = if let Hint::Shapes { x_a } = &warm.hint { Some(pose_a.transform_point(x_a)) } else { None };
     let found = match between_shapes((form_a, pose_a), (form_b, pose_b), start.as_ref(), (tolerance, options)) {

@@ -1,6 +1,7 @@
 //! Euclidean distance between two solids.
 
 mod answer;
+mod balls;
 mod deepest;
 mod exact;
 mod pair;

@@ -2,6 +2,7 @@
 //! then the general search.
 
 use super::answer::Distance;
+use super::balls::of_balls;
 use super::exact::{Exact, of_shapes};
 use super::planes::Planes;
 use super::search::Search;
@@ -12,6 +13,7 @@ use crate::measure::frames::query_frame::Pair;
 use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveConstraints;
 use crate::measure::solver::continuation::{Follow, Lost, Proven, SEEK_ROUNDS, Seek};
+use crate::measure::solver::exact_shape::{ShapeContact, contact_of_shapes};
 use crate::measure::solver::kkt_newton::Active;
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
@@ -34,6 +36,12 @@ pub(in crate::measure) fn settle(
     if goal.is_narrow() {
         return between(of_a, of_b, goal, options, warm);
     }
+    if runs(Stage::ClosedForm)
+        && let (Some(form_a), Some(form_b)) = (of_a.0.closed_form(), of_b.0.closed_form())
+        && let Some(found) = of_balls((form_a, of_a.1), (form_b, of_b.1), options)
+    {
+        return found;
+    }
     let BallBounds { lower, upper, witness_a, witness_b, normal } = balls(of_a, of_b);
     let mut bound = Distance { lower, upper, witness_a, witness_b, normal, ..Distance::default() };
     if !runs(Stage::Balls) {
@@ -49,6 +57,19 @@ pub(in crate::measure) fn settle(
         }
     }
     let mut spent = 0;
+    if runs(Stage::ClosedForm)
+        && goal.is_contact()
+        && let (Some(form_a), Some(form_b)) = (of_a.0.closed_form(), of_b.0.closed_form())
+    {
+        match contact_of_shapes((form_a, of_a.1), (form_b, of_b.1), options) {
+            Ok(ShapeContact::Common(v)) => {
+                let status = Status::Converged;
+                return Distance { status, upper: 0.0, witness_a: v, witness_b: v, ..Distance::default() };
+            }
+            Ok(ShapeContact::Apart(lower)) => return Distance { lower: lower.max(bound.lower), ..bound },
+            Err(steps) => spent = steps,
+        }
+    }
     if runs(Stage::ClosedForm)
         && goal.is_contact()
         && let Some(exact) = Exact::new(of_a, of_b)

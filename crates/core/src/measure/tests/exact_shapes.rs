@@ -108,6 +108,59 @@ fn shapes_against_shapes() {
     assert!(share > 90.0, "{share}");
 }
 
+#[test]
+fn balls_against_balls_and_shapes() {
+    let ball = |random: &mut Seeded| {
+        let ball = Body::ball("ball", random.unit() * 0.7, 10_f64.powf(random.signed() - 0.5)).unwrap();
+        // Turned, rounding leaves it axes of its own.
+        let rotation = UnitQuaternion::from_scaled_axis(random.unit() * 2.0);
+        if random.next().is_multiple_of(2) { ball } else { ball.moved(&rotation, &(random.unit() * 0.7)).unwrap() }
+    };
+    let share = share("balls against balls and shapes", 900, |random| {
+        let other = if random.next().is_multiple_of(2) { ball(random) } else { shape(random) };
+        (ball(random), other)
+    });
+    assert!(share > 90.0, "{share}");
+}
+
+/// The formula for two balls near and far from each other and from the origin, against exact
+/// differences of their centres.
+#[test]
+fn two_balls_have_a_formula() {
+    for seed in 0..2000 {
+        let mut random = Seeded(74_000 + seed);
+        let scale = 10_f64.powf(4.0 * random.signed());
+        let radii = [0, 1].map(|_| scale * 10_f64.powf(random.signed()));
+        let offsets = [0, 1].map(|_| random.unit() * scale);
+        let [a, b] = [0, 1].map(|k| Body::ball("ball", offsets[k], radii[k]).unwrap());
+        // Centres on a grid of powers of two, whose difference and its length are exact.
+        let grid = scale.log2().round().exp2();
+        let origin = Vector3::from_fn(|_, _| (random.signed() * 1e6).round() * grid);
+        let way = Vector3::new(3.0, 4.0, 12.0) * grid * 2_f64.powi((random.next() % 8) as i32 - 2);
+        let [pose_a, pose_b] = [origin + way, origin].map(|t| Pose::identity().with_translation(t));
+        // The centres are off the origins of the frames, by what cancels out but for rounding.
+        let [pose_a, pose_b] = [(pose_a, offsets[0]), (pose_b, offsets[1])].map(|(pose, offset)| {
+            let turned = random_pose(&mut random, 0.0);
+            turned.with_translation(pose.translation() - turned.transform_direction(&offset))
+        });
+        let truth = (13.0 / 12.0 * way.z - radii[0] - radii[1]).max(0.0);
+        let found = distance(&a, &pose_a, &b, &pose_b, &Options::default(), &mut WarmStart::default());
+        let label = format!("seed {seed}: {found:?} against {truth}");
+        assert_eq!(found.status, Status::Converged, "{label}");
+        // So much the translations were rounded by.
+        let moved = 4.0 * f64::EPSILON * (origin.amax() + way.norm() + scale);
+        assert!(found.lower <= truth + moved && truth - moved <= found.upper, "{label}");
+        assert!(found.upper - found.lower <= 1e-9 * radii[0].min(radii[1]), "{label}");
+        if truth > 1e-6 * scale {
+            assert_eq!(found.iterations, 0, "{label}");
+            let n = found.normal.expect("apart");
+            assert!((n - way.normalize()).norm() < 1e-12 + moved / way.norm(), "{label}");
+            assert!((found.witness_a - (origin + way - n * radii[0])).norm() < 1e-9 * scale + moved, "{label}");
+            assert!((found.witness_b - (origin + n * radii[1])).norm() < 1e-9 * scale + moved, "{label}");
+        }
+    }
+}
+
 /// Boxes side by side: on faces, edges and corners, in contact, parallel and tilted by next to
 /// nothing.
 #[test]

@@ -15,4 +15,4 @@ mod start;
 
 pub(in crate::measure) use distance::{ExactLost, ExactProven, ExactTrace};
 pub(in crate::measure) use placed::{ExactContact, ExactQuery, direction_to_world, normals_towards, to_world};
-pub(in crate::measure) use shapes::{ShapeDistance, between_shapes};
+pub(in crate::measure) use shapes::{ShapeContact, ShapeDistance, between_shapes, contact_of_shapes};

@@ -59,6 +59,17 @@ pub(super) struct ShapeProven {
     pub(super) is_aligned: bool,
 }
 
+/// On which side of contact two sets are.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Contact {
+    /// The point, in B's frame, lies in both.
+    Common(V3<f64>),
+    /// They are at least this far apart, metres.
+    Apart(f64),
+    /// Neither is proven.
+    Open,
+}
+
 impl<A: Projectable, B: Projectable> ShapePair<A, B> {
     /// From a point of A in its frame on until the bracket is as narrow as this, metres, or no step
     /// is left.
@@ -135,15 +146,23 @@ impl<A: Projectable, B: Projectable> ShapePair<A, B> {
         best
     }
 
-    /// A point of both sets, in B's frame, proven: of A made smaller by more than all errors, and
-    /// within them of B made smaller. From a point of A in its frame.
-    pub(super) fn common(&self, start: V3<f64>, options: &Options<'_>) -> Option<V3<f64>> {
+    /// On which side of contact the sets are, and after how many steps. A common point is one of A
+    /// made smaller by more than all errors, and within them of B made smaller. From a point of A
+    /// in its frame.
+    pub(super) fn contact(&self, start: V3<f64>, options: &Options<'_>) -> (Contact, u32) {
         let size = self.a.reach() + self.b.reach();
         let by = 4.0 * self.displacement + MARGIN * size;
         let smaller = ShapePair { a: self.a.shrunk(by), b: self.b.shrunk(by), ..*self };
         let found = smaller.solve(start, 0.5 * by, options);
-        let thick = self.a.thinnest() > 2.0 * by && (self.b.thinnest() > 2.0 * by || self.b.thinnest() == 0.0);
-        (found.upper <= 0.5 * by && thick).then_some(found.y)
+        // Points and segments have no inside: what is near them has to be in the other set.
+        let (of_a, of_b) = (self.a.thinnest(), self.b.thinnest());
+        let fits = |thinnest: f64| thinnest > 2.0 * by || thinnest == 0.0;
+        if found.upper <= 0.5 * by && fits(of_a) && fits(of_b) && (of_a > 0.0 || of_b > 0.0) {
+            return (Contact::Common(if of_a == 0.0 { found.x } else { found.y }), found.steps);
+        }
+        let lower = self.along(found.n) - self.rounding(found.x);
+        let apart = found.n != [0.0; 3] && lower > 0.0;
+        (if apart { Contact::Apart(lower) } else { Contact::Open }, found.steps)
     }
 
     /// A point of A's frame in B's.

@@ -5,7 +5,7 @@ use super::cylinder::Cylinder;
 use super::placed::{direction_to_world, to_world};
 use super::projectable::Projectable;
 use super::segment::Segment;
-use super::shape_pair::{ShapePair, ShapeProven};
+use super::shape_pair::{Contact, ShapePair, ShapeProven};
 use crate::body::{ClosedForm, ExactShape};
 use crate::measure::frames::pose::{Pose, RELATIVE_ERROR};
 use crate::measure::frames::vector::{V3, add_scaled, rows, subtract};
@@ -26,7 +26,8 @@ pub(in crate::measure) struct ShapeDistance {
     pub(in crate::measure) witness_b: Vector3<f64>,
     /// Unit vector from B to A.
     pub(in crate::measure) normal: Vector3<f64>,
-    /// The same from A to B in A's frame of its shape, and from B to A in that of B's.
+    /// The same from A to B in A's frame of its shape, of a ball in any, and from B to A in that of
+    /// B's.
     pub(in crate::measure) own_normals: [V3<f64>; 2],
     pub(in crate::measure) steps: u32,
 }
@@ -45,17 +46,59 @@ pub(in crate::measure) fn between_shapes(
     start: Option<&Vector3<f64>>,
     (tolerance, options): (f64, &Options<'_>),
 ) -> Result<ShapeDistance, u32> {
+    let is_ball = |form: &ClosedForm| form.shape().ball_radius_m().is_some();
+    if is_ball(of_a.0) {
+        // The projection of its centre is all there is to find.
+        return in_order(of_a, of_b, None, (tolerance, options));
+    }
     match (*of_a.0.shape(), *of_b.0.shape()) {
         // The least over a box is found exactly, step by step.
         (ExactShape::Cylinder { .. } | ExactShape::Capsule { .. }, ExactShape::Cuboid { .. })
-        | (ExactShape::Capsule { .. }, ExactShape::Cylinder { .. }) => {
-            let found = in_order(of_b, of_a, None, (tolerance, options))?;
-            let [first, second] = found.own_normals;
-            let (witness_a, witness_b) = (found.witness_b, found.witness_a);
-            Ok(ShapeDistance { witness_a, witness_b, normal: -found.normal, own_normals: [second, first], ..found })
-        }
+        | (ExactShape::Capsule { .. }, ExactShape::Cylinder { .. }) => swapped(of_a, of_b, (tolerance, options)),
+        _ if is_ball(of_b.0) => swapped(of_a, of_b, (tolerance, options)),
         _ => in_order(of_a, of_b, start, (tolerance, options)),
     }
+}
+
+/// The distance with the second shape as the one that is moved over.
+fn swapped(
+    of_a: Placed<'_>,
+    of_b: Placed<'_>,
+    (tolerance, options): (f64, &Options<'_>),
+) -> Result<ShapeDistance, u32> {
+    let found = in_order(of_b, of_a, None, (tolerance, options))?;
+    let [first, second] = found.own_normals;
+    let (witness_a, witness_b) = (found.witness_b, found.witness_a);
+    Ok(ShapeDistance { witness_a, witness_b, normal: -found.normal, own_normals: [second, first], ..found })
+}
+
+/// What is known of the contact of two shapes.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::measure) enum ShapeContact {
+    /// A point of both, world frame, metres.
+    Common(Vector3<f64>),
+    /// They are at least this far apart, metres.
+    Apart(f64),
+}
+
+/// On which side of contact two boxes or cylinders are.
+///
+/// # Errors
+/// After how many steps neither is proven; of shapes with radii after none.
+pub(in crate::measure) fn contact_of_shapes(
+    of_a: Placed<'_>,
+    of_b: Placed<'_>,
+    options: &Options<'_>,
+) -> Result<ShapeContact, u32> {
+    // What has a radius reaches beyond the points that are met.
+    if [of_a, of_b].iter().any(|(form, _)| matches!(form.shape(), ExactShape::Capsule { .. })) {
+        return Err(0);
+    }
+    let boxed = |form: &ClosedForm| matches!(form.shape(), ExactShape::Cuboid { .. });
+    let (of_a, of_b) = if boxed(of_a.0) { (of_a, of_b) } else { (of_b, of_a) };
+    let problem = Problem { of_a, of_b, start: None, tolerance: 0.0, options, goal: Goal::Contact };
+    let found = problem.by_first()?;
+    Ok(if found.lower > 0.0 { ShapeContact::Apart(found.lower) } else { ShapeContact::Common(found.common) })
 }
 
 fn in_order(
@@ -64,28 +107,41 @@ fn in_order(
     start: Option<&Vector3<f64>>,
     (tolerance, options): (f64, &Options<'_>),
 ) -> Result<ShapeDistance, u32> {
-    let problem = Problem { of_a, of_b, start, tolerance, options };
-    match *of_a.0.shape() {
-        ExactShape::Cuboid { half_extents_m, .. } => problem.with_first(Cuboid { half_extents: half_extents_m }, 0.0),
-        ExactShape::Cylinder { radius_m, half_height_m, .. } => {
-            problem.with_first(Cylinder { radius: radius_m, half_height: half_height_m }, 0.0)
-        }
-        ExactShape::Capsule { radius_m, half_length_m } => {
-            problem.with_first(Segment { half_length: half_length_m }, radius_m)
-        }
-    }
+    Problem { of_a, of_b, start, tolerance, options, goal: Goal::Distance }.by_first()
 }
 
-/// What is asked.
+/// What is asked of two shapes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Goal {
+    /// Their distance.
+    Distance,
+    /// A point of both, or a lower bound of their distance above 0.
+    Contact,
+}
+
+/// Two shapes, and what is asked of them.
 struct Problem<'a> {
     of_a: Placed<'a>,
     of_b: Placed<'a>,
     start: Option<&'a Vector3<f64>>,
     tolerance: f64,
     options: &'a Options<'a>,
+    goal: Goal,
 }
 
 impl Problem<'_> {
+    fn by_first(&self) -> Result<ShapeDistance, u32> {
+        match *self.of_a.0.shape() {
+            ExactShape::Cuboid { half_extents_m, .. } => self.with_first(Cuboid { half_extents: half_extents_m }, 0.0),
+            ExactShape::Cylinder { radius_m, half_height_m, .. } => {
+                self.with_first(Cylinder { radius: radius_m, half_height: half_height_m }, 0.0)
+            }
+            ExactShape::Capsule { radius_m, half_length_m } => {
+                self.with_first(Segment { half_length: half_length_m }, radius_m)
+            }
+        }
+    }
+
     fn with_first<A: Projectable>(&self, a: A, radius: f64) -> Result<ShapeDistance, u32> {
         match *self.of_b.0.shape() {
             ExactShape::Cuboid { half_extents_m, .. } => {
@@ -107,15 +163,20 @@ impl Problem<'_> {
     ) -> Result<ShapeDistance, u32> {
         let ((form_a, pose_a), (form_b, pose_b)) = (self.of_a, self.of_b);
         let to_b = pose_b.rotation().to_rotation_matrix().transpose().into_inner();
-        let mut rotation = to_b * pose_a.rotation().to_rotation_matrix().into_inner();
         let between = to_b * (pose_a.translation() - pose_b.translation());
         let (center_a, center_b) = (form_a.center(), form_b.center());
-        let mut translation = between + (rotation * center_a - center_b);
+        let placed_a = pose_a.rotation() * center_a;
+        let mut translation = between + (to_b * placed_a - center_b);
+        // However a point is turned, it is where it is.
+        let is_point = a.reach() == 0.0;
+        let mut rotation =
+            if is_point { Matrix3::identity() } else { to_b * pose_a.rotation().to_rotation_matrix().into_inner() };
         let mut factor = 1.0;
         if let Some(axes) = form_b.axes() {
-            (rotation, translation, factor) = (axes.tr_mul(&rotation), axes.tr_mul(&translation), 2.0);
+            (translation, factor) = (axes.tr_mul(&translation), 2.0);
+            rotation = if is_point { rotation } else { axes.tr_mul(&rotation) };
         }
-        if let Some(axes) = form_a.axes() {
+        if let Some(axes) = form_a.axes().filter(|_| !is_point) {
             (rotation, factor) = (rotation * axes, 2.0);
         }
         let size = between.norm() + center_a.norm() + center_b.norm() + a.reach();
@@ -131,25 +192,32 @@ impl Problem<'_> {
             }
             None => -rotation.tr_mul(&translation),
         };
+        let met = |point: V3<f64>, [lower, upper]: [f64; 2], steps| {
+            let point = to_world(form_b, pose_b, point);
+            ShapeDistance {
+                lower,
+                upper,
+                common: point,
+                witness_a: point,
+                witness_b: point,
+                normal: Vector3::zeros(),
+                own_normals: [[0.0; 3]; 2],
+                steps,
+            }
+        };
+        if self.goal == Goal::Contact {
+            return match pair.contact(own.into(), self.options) {
+                (Contact::Common(point), steps) => Ok(met(point, [0.0; 2], steps)),
+                (Contact::Apart(lower), steps) => Ok(met([0.0; 3], [lower, f64::INFINITY], steps)),
+                (Contact::Open, steps) => Err(steps),
+            };
+        }
         let found = pair.solve(own.into(), self.tolerance, self.options);
         let radius = radius_a + radius_b;
         if found.upper <= self.tolerance {
-            let met = |point: V3<f64>, [lower, upper]: [f64; 2]| {
-                let point = to_world(form_b, pose_b, point);
-                ShapeDistance {
-                    lower,
-                    upper,
-                    common: point,
-                    witness_a: point,
-                    witness_b: point,
-                    normal: Vector3::zeros(),
-                    own_normals: [[0.0; 3]; 2],
-                    steps: found.steps,
-                }
-            };
             // How deep radii reach beyond that is not known.
-            if let Some(point) = pair.common(pair.own(found.x), self.options) {
-                return Ok(met(point, [f64::NEG_INFINITY, -radius]));
+            if let (Contact::Common(point), _) = pair.contact(pair.own(found.x), self.options) {
+                return Ok(met(point, [f64::NEG_INFINITY, -radius], found.steps));
             }
             // Segments have no inside to be deep in.
             let flat = pair.a.thinnest() == 0.0 && pair.b.thinnest() == 0.0;
@@ -159,7 +227,7 @@ impl Problem<'_> {
                 let way = subtract::<Scalar, f64>(found.x, found.y);
                 let share = if found.upper > radius_b { radius_b / found.upper } else { 1.0 };
                 let point = add_scaled::<Scalar, f64>(found.y, share, way);
-                return Ok(met(point, [lower, found.upper - radius + rounding]));
+                return Ok(met(point, [lower, found.upper - radius + rounding], found.steps));
             }
         }
         let narrow = found.upper - found.lower <= self.tolerance && found.lower > 0.0;

@@ -1,0 +1,43 @@
+//! The signed distance of a solid from a capsule: of all its parts the least.
+
+use super::answer::CapsuleDistance;
+use super::pair::Problem;
+use super::shape::Capsule;
+use crate::body::Solid;
+use crate::measure::bounds::culling::CULLING_SLACK;
+use crate::measure::frames::pose::ROTATION_ERROR;
+use crate::measure::options::Options;
+use crate::measure::pairwise_minimum::{At, Least, least};
+use crate::measure::solver::stop_criterion::StopCriterion;
+use crate::measure::status::Status;
+use crate::measure::warm::WarmStart;
+
+/// The signed distance, or as much of it as the criterion needs.
+pub(super) fn distance_until(
+    (solid, pose): At<'_, impl Solid>,
+    (capsule, capsule_pose): At<'_, Capsule>,
+    goal: StopCriterion,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> CapsuleDistance {
+    let size = if capsule.reach_m() > 0.0 { capsule.reach_m() } else { f64::INFINITY };
+    let tolerance = options.accuracy() * solid.circumscribed().radius.min(size);
+    let problem = Problem { capsule, capsule_pose, tolerance, options, goal };
+    let parts = solid.parts();
+    if let [body] = parts {
+        return problem.solve((body, pose), warm);
+    }
+    let bound = |(i, _): (usize, usize)| {
+        let ball = parts[i].circumscribed();
+        let center = pose.transform_point(&ball.center);
+        let apart = (center - capsule_pose.translation()).norm();
+        let size = center.norm() + capsule_pose.translation().norm() + ball.radius + capsule.reach_m();
+        apart - ball.radius - capsule.reach_m() - (CULLING_SLACK + ROTATION_ERROR) * size
+    };
+    let found =
+        least((parts.len(), 1), bound, goal.near, warm, |(i, _), _, hint| problem.solve((&parts[i], pose), hint));
+    let Least { best, lower, tied, iterations, .. } = found;
+    // How deep something is in a union no single part knows.
+    let lower = if lower < 0.0 { f64::NEG_INFINITY } else { lower };
+    CapsuleDistance { status: Status::of(best.upper - lower <= tolerance), lower, tied, iterations, ..best }
+}
