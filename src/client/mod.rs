@@ -20,6 +20,8 @@
 
 mod backup;
 mod bodies;
+mod clearance;
+mod columns;
 mod connection;
 #[cfg(feature = "fit")]
 mod derive;
@@ -37,15 +39,18 @@ mod queries;
 mod raw;
 mod robots;
 mod scenes;
+mod states;
 
 pub use crate::service::proto::{RobotGroup, RobotSummary, SceneSummary};
 pub use bodies::{BodySource, StoredBody};
+pub use clearance::{ClearanceQuestion, Clearances, NearPair, StateClearance};
 pub use connection::{Client, ClientOptions, Connection, Credentials, ServerInfo, endpoint};
 pub use error::ClientError;
 #[cfg(feature = "fit")]
 pub use jobs::{JobProgress, SubmitError};
 pub use motions::{CheckedMotion, CheckedMotions, MotionsQuestion};
 pub use pose_stream::{PoseStream, StreamedPoses};
-pub use queries::{Answers, CheckedStates, PairRow, Question, StatesQuestion};
+pub use queries::{Answers, PairRow, Question};
 pub use robots::{RobotPlacement, StoredLink, StoredRobot};
 pub use scenes::SceneState;
+pub use states::{CheckedStates, StatesQuestion};

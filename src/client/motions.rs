@@ -1,8 +1,8 @@
 //! Motions of robots, and their certificates.
 
+use super::columns::{index_pairs, name, number};
 use super::connection::Client;
 use super::error::ClientError;
-use super::queries::index_pairs;
 use crate::service::packed::Packed;
 use crate::service::proto::{self, CheckMotionsRequest, VerifyMotionRequest, VerifyMotionResponse};
 
@@ -34,6 +34,12 @@ impl MotionsQuestion {
         }
         self.counts.index(count);
         self
+    }
+
+    /// Adds the edges of a path one by one: from each configuration straight to the next.
+    #[must_use]
+    pub fn with_edges<Configuration: AsRef<[f64]>>(self, path: &[Configuration]) -> Self {
+        path.windows(2).fold(self, |question, edge| question.with_path(edge.iter().map(AsRef::as_ref)))
     }
 
     /// A pair is in contact below this margin and its padding, metres.
@@ -89,6 +95,18 @@ pub struct CheckedMotions {
     pub complete: bool,
 }
 
+impl CheckedMotions {
+    /// Whether every path is proven free.
+    pub fn are_free(&self) -> bool {
+        self.verdicts().iter().all(|verdict| *verdict == proto::Verdict::Free)
+    }
+
+    /// The verdicts, one per path.
+    pub fn verdicts(&self) -> Vec<proto::Verdict> {
+        self.motions.iter().map(|motion| motion.verdict).collect()
+    }
+}
+
 impl Client {
     /// Asks whether motions of a robot are free: whole paths, not samples.
     ///
@@ -96,12 +114,9 @@ impl Client {
     /// When the question cannot be answered.
     pub async fn check_motions(&self, scene: &str, question: MotionsQuestion) -> Result<CheckedMotions, ClientError> {
         let response = self.queries().check_motions(question.asked(scene)).await.map_err(self.refused())?.into_inner();
-        let name = |index: u32| usize::try_from(index).ok().and_then(|index| response.objects.get(index)).cloned();
         let verdict = |byte: u8| proto::Verdict::try_from(i32::from(byte)).unwrap_or_default();
-        let number = |column: &[u8], row: usize| {
-            column.as_chunks::<8>().0.get(row).map_or(f64::NAN, |bytes| f64::from_le_bytes(*bytes))
-        };
-        let pairs = index_pairs(&response.pairs).map(|[a, b]| Some([name(a)?, name(b)?]));
+        let table = &response.objects;
+        let pairs = index_pairs(&response.pairs).map(|[a, b]| Some([name(table, a)?, name(table, b)?]));
         let rows = response.verdicts.iter().zip(pairs).enumerate().map(|(row, (&byte, pair))| CheckedMotion {
             verdict: verdict(byte),
             alpha: number(&response.alpha, row),

@@ -2,17 +2,15 @@
 
 use prost::Message;
 
+use super::columns::{index_pairs, name};
 use super::connection::{Client, Connection};
 use super::error::ClientError;
 use crate::measure::Pose;
 use crate::scene::query::Measure;
 use crate::service::limits::MAX_MESSAGE_BYTES;
-use crate::service::packed::{POSE_NUMBERS, Packed};
 use crate::service::proto::evaluate_request;
 use crate::service::proto::query_service_client::QueryServiceClient;
-use crate::service::proto::{
-    self, CheckStatesRequest, EvaluateRequest, ObjectPair, Output, PairList, Selection, WithinMargin,
-};
+use crate::service::proto::{self, EvaluateRequest, ObjectPair, Output, PairList, Selection, WithinMargin};
 use crate::service::{query_wire, scene_wire};
 
 /// Which pairs a question is about, and how it is asked.
@@ -119,75 +117,6 @@ impl Question {
     }
 }
 
-/// Many states of some objects.
-#[derive(Clone, Debug, Default)]
-pub struct StatesQuestion {
-    request: CheckStatesRequest,
-    poses: Packed,
-    joint_values: Packed,
-}
-
-impl StatesQuestion {
-    /// States that place these objects.
-    pub fn new<'a>(objects: impl IntoIterator<Item = &'a str>) -> Self {
-        let objects = objects.into_iter().map(Into::into).collect();
-        Self { request: CheckStatesRequest { objects, ..CheckStatesRequest::default() }, ..Self::default() }
-    }
-
-    /// States that set joints of a robot of the scene: those that are named, or all in the order of
-    /// joint vectors. The others are as in the scene.
-    pub fn of_robot<'a>(robot: &str, joints: impl IntoIterator<Item = &'a str>) -> Self {
-        let joints = joints.into_iter().map(Into::into).collect();
-        let request = CheckStatesRequest { robot: robot.into(), joints, ..CheckStatesRequest::default() };
-        Self { request, ..Self::default() }
-    }
-
-    /// Adds states by the values of the joints, in their order: radians, metres, unit quaternions.
-    pub fn with_joint_values(mut self, values: &[f64]) -> Self {
-        values.iter().for_each(|&value| self.joint_values.number(value));
-        self
-    }
-
-    /// Adds a state: one pose per object, in their order.
-    pub fn push(&mut self, poses: &[Pose]) {
-        poses.iter().for_each(|pose| self.poses.pose(pose));
-    }
-
-    /// Sets all states at once: the poses of the first, then of the second, and so on.
-    pub fn with_states(mut self, poses: &[Pose]) -> Self {
-        self.poses = Packed::with_capacity(poses.len() * 8 * POSE_NUMBERS);
-        self.push(poses);
-        self
-    }
-
-    /// A pair is in contact below this margin and its padding, metres.
-    pub fn with_margin(mut self, margin_m: f64) -> Self {
-        self.request.margin_m = margin_m;
-        self
-    }
-
-    fn asked(self, scene: &str) -> CheckStatesRequest {
-        let (poses, joint_values) = (self.poses.into_bytes(), self.joint_values.into_bytes());
-        CheckStatesRequest { scene: scene.into(), poses, joint_values, ..self.request }
-    }
-
-    /// The request without its poses, for what this type does not say.
-    pub fn request_mut(&mut self) -> &mut CheckStatesRequest {
-        &mut self.request
-    }
-}
-
-/// Verdicts of states.
-#[derive(Clone, Debug)]
-pub struct CheckedStates {
-    /// Revision all of them are true of.
-    pub revision: u64,
-    /// One per state.
-    pub verdicts: Vec<proto::Verdict>,
-    /// The pair that decided, where one did.
-    pub pairs: Vec<Option<[String; 2]>>,
-}
-
 impl Client {
     pub(super) fn queries(&self) -> QueryServiceClient<Connection> {
         QueryServiceClient::new(self.channel()).max_decoding_message_size(MAX_MESSAGE_BYTES)
@@ -231,42 +160,11 @@ impl Client {
         let request = question.clone().asked(scene, measures);
         Ok(self.queries().evaluate(request).await.map_err(self.refused())?.get_ref().encoded_len())
     }
-
-    /// The same of states.
-    pub(crate) async fn check_states_bytes(
-        &self,
-        scene: &str,
-        question: &StatesQuestion,
-    ) -> Result<usize, ClientError> {
-        let request = question.clone().asked(scene);
-        Ok(self.queries().check_states(request).await.map_err(self.refused())?.get_ref().encoded_len())
-    }
-
-    /// Asks whether anything is in contact in each of many states.
-    ///
-    /// # Errors
-    /// When the question cannot be answered.
-    pub async fn check_states(&self, scene: &str, question: StatesQuestion) -> Result<CheckedStates, ClientError> {
-        let response = self.queries().check_states(question.asked(scene)).await.map_err(self.refused())?.into_inner();
-        let verdict = |&byte: &u8| proto::Verdict::try_from(i32::from(byte)).unwrap_or_default();
-        let name = |index: u32| usize::try_from(index).ok().and_then(|index| response.objects.get(index)).cloned();
-        let pair = |[a, b]: [u32; 2]| Some([name(a)?, name(b)?]);
-        Ok(CheckedStates {
-            revision: response.scene_revision,
-            verdicts: response.verdicts.iter().map(verdict).collect(),
-            pairs: index_pairs(&response.pairs).map(pair).collect(),
-        })
-    }
-}
-
-pub(super) fn index_pairs(bytes: &[u8]) -> impl Iterator<Item = [u32; 2]> {
-    let pairs = bytes.as_chunks::<4>().0.as_chunks::<2>().0;
-    pairs.iter().map(|pair| pair.map(u32::from_le_bytes))
 }
 
 fn found(response: &proto::EvaluateResponse) -> Result<Vec<ObjectPair>, ClientError> {
-    let name = |index: u32| usize::try_from(index).ok().and_then(|index| response.objects.get(index)).cloned();
-    let pair = |[a, b]: [u32; 2]| Some(ObjectPair { a: name(a)?, b: name(b)? });
+    let table = &response.objects;
+    let pair = |[a, b]: [u32; 2]| Some(ObjectPair { a: name(table, a)?, b: name(table, b)? });
     let pairs: Option<Vec<_>> = index_pairs(&response.pairs).map(pair).collect();
     pairs.ok_or(ClientError::Unexpected("a pair without names"))
 }

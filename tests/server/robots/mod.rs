@@ -1,5 +1,6 @@
 //! Robots: loaded, placed in scenes, asked about, kept.
 
+mod clearances;
 mod explained;
 mod kept;
 mod meshes;
