@@ -1,102 +1,107 @@
-//! A planner with a robot: it is loaded and placed, a path is checked, its edges are proven free,
-//! the certificate of one is kept, and the closest links are printed.
+//! A planner with a robot of seven joints, such as a Panda: it is loaded from its files and placed,
+//! a path is checked, its edges are proven free, and the closest links are printed. Then the
+//! certificate of the path is kept, and a state that is in contact is explained.
 //!
 //! ```text
 //! sublevel serve --data sublevel-data &
-//! cargo run --release --example robot -- http://127.0.0.1:50051
+//! cargo run --release --example robot -- http://127.0.0.1:50051 panda.urdf panda.srdf
 //! ```
 
-use nalgebra::{UnitQuaternion, Vector3};
-use sublevel::client::{BodySource, Client, MotionsQuestion, Question, RobotPlacement, StatesQuestion};
-use sublevel::measure::Pose;
-use sublevel::scene::NamedJointValues;
-use sublevel::scene::query::Measure;
-use sublevel::service::proto::VerifyMotionRequest;
-use sublevel::store::RobotSource;
+use std::error::Error;
+use std::path::Path;
 
-/// An arm of two links on a turning post; boxes, capsules and spheres need no fits.
-const ARM: &str = r#"<robot name="arm">
-  <link name="post"><collision>
-    <origin xyz="0 0 0.2"/><geometry><box size="0.2 0.2 0.4"/></geometry></collision></link>
-  <link name="shoulder"/>
-  <link name="upper"><collision>
-    <origin xyz="0 0 0.3"/><geometry><capsule radius="0.05" length="0.4"/></geometry></collision></link>
-  <link name="lower"><collision>
-    <origin xyz="0 0 0.3"/><geometry><capsule radius="0.04" length="0.4"/></geometry></collision></link>
-  <link name="hand"><collision><geometry><sphere radius="0.06"/></geometry></collision></link>
-  <joint name="turn" type="revolute"><parent link="post"/><child link="shoulder"/>
-    <origin xyz="0 0 0.5"/><axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
-  <joint name="lift" type="revolute"><parent link="shoulder"/><child link="upper"/>
-    <axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
-  <joint name="bend" type="revolute"><parent link="upper"/><child link="lower"/>
-    <origin xyz="0 0 0.6"/><axis xyz="0 1 0"/><limit lower="-2.5" upper="2.5" effort="1" velocity="1"/></joint>
-  <joint name="wrist" type="fixed"><parent link="lower"/><child link="hand"/><origin xyz="0 0 0.65"/></joint>
-</robot>"#;
+use nalgebra::Vector3;
+use sublevel::client::{ClearanceQuestion, Client, MotionsQuestion, RobotFiles, RobotPlacement, StatesQuestion};
+use sublevel::measure::Pose;
+use sublevel::service::proto::VerifyMotionRequest;
+
+/// From one side of a wall over it to the other, radians.
+pub const PATH: [[f64; 7]; 4] = [
+    [-0.7, 0.2, 0.0, -1.9, 0.0, 2.1, 0.8],
+    [-0.7, -0.3, 0.0, -1.5, 0.0, 1.9, 0.8],
+    [0.7, -0.3, 0.0, -1.5, 0.0, 1.9, 0.8],
+    [0.7, 0.2, 0.0, -1.9, 0.0, 2.1, 0.8],
+];
 
 #[tokio::main]
-async fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let url = std::env::args().nth(1).unwrap_or_else(|| "http://127.0.0.1:50051".into());
-    run(&url).await
+async fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [url, urdf, srdf] = &arguments[..] else {
+        return Err(
+            "give the address of a server, a URDF and an SRDF: http://127.0.0.1:50051 panda.urdf panda.srdf".into()
+        );
+    };
+    run(url, urdf.as_ref(), srdf.as_ref()).await
 }
 
 /// All of it, against the server at an address.
-pub async fn run(url: &str) -> Result<(), Box<dyn std::error::Error>> {
+pub async fn run(url: &str, urdf: &Path, srdf: &Path) -> Result<(), Box<dyn Error>> {
+    let scene = &format!("robot-{}", std::process::id());
+    let is_free = plan(url, (urdf, srdf), scene, &PATH).await?;
+    println!("the path is {}", if is_free { "proven free" } else { "not free" });
     let client = Client::connect(url).await?;
-    let robot = client.load_robot(&RobotSource { urdf: ARM.into(), ..RobotSource::default() }).await?;
-    println!("robot {} takes {} joint values", robot.name, robot.joints.len());
+    keep(&client, scene, &PATH).await?;
+    explain(&client, scene, &PATH).await?;
+    client.delete_scene(scene).await?;
+    Ok(())
+}
 
-    // A floor, and a pole on the way.
-    let scene = format!("robot-{}", std::process::id());
-    client.create_scene(&scene).await?;
-    let floor = BodySource::HalfSpace { normal: Vector3::z(), offset: 0.0 };
-    let floor = client.create_body("floor", floor).await?.id;
-    let pole = client.create_body("pole", BodySource::Cylinder { radius: 0.05, half_height: 0.75 }).await?.id;
-    client
-        .put_objects(&scene, [("floor", &floor, at(0.0, 0.0, -0.001)?), ("pole", &pole, at(0.6, 0.6, 0.75)?)])
-        .await?;
-    let joints = NamedJointValues::default();
-    client
-        .place_robot(&scene, &RobotPlacement { name: "arm".into(), robot: robot.id, base: at(0.0, 0.0, 0.0)?, joints })
-        .await?;
+/// The planner: whether a path is free.
+pub async fn plan(
+    url: &str,
+    (urdf, srdf): (&Path, &Path),
+    scene: &str,
+    path: &[[f64; 7]],
+) -> Result<bool, Box<dyn Error>> {
+    let client = Client::connect(url).await?;
+    let robot = client.load_robot_files(&RobotFiles::new(urdf).with_srdf(srdf)).await?;
+    let wall = client.create_box("wall", Vector3::new(0.15, 0.03, 0.22)).await?;
+    client.create_scene(scene).await?;
+    client.put_objects(scene, [("wall", &wall, at(0.6, 0.0, 0.22))]).await?;
+    client.place_robot(scene, &RobotPlacement::new("arm", &robot)).await?;
 
-    // From one side of the pole to the other: straight through it, or over it.
-    let (start, goal) = ([0.0, 1.2, 0.5], [1.6, 1.2, 0.5]);
-    let over = [[0.0, 0.0, 0.5], [1.6, 0.0, 0.5]];
-    let states = StatesQuestion::of_robot("arm", []).with_joint_values(&[start, goal].concat());
-    println!("start and goal: {:?}", client.check_states(&scene, states).await?.verdicts);
+    let states = client.check_states(scene, StatesQuestion::of_robot("arm", []).with_configurations(path)).await?;
+    let edges = client.check_motions(scene, MotionsQuestion::of_robot("arm", []).with_edges(path)).await?;
+    let near = client.clearance(scene, ClearanceQuestion::of_robot("arm", [], 0.5).with_configurations(path)).await?;
+    println!("states {:?}, edges {:?}", states.verdicts, edges.verdicts());
+    for pair in near.states.iter().filter_map(|state| state.closest_to("wall")) {
+        println!("{} and {} are {:.4} m apart", pair.pair[0], pair.pair[1], pair.lower_m);
+    }
+    Ok(edges.are_free())
+}
 
-    let question = MotionsQuestion::of_robot("arm", []).with_path([&start[..], &goal]);
-    let mut question = question.with_path([&start[..], &over[0], &over[1], &goal]).with_certificates();
+/// The certificate of a path goes with the plan; the controller checks it against the scene at that
+/// time.
+async fn keep(client: &Client, scene: &str, path: &[[f64; 7]]) -> Result<(), Box<dyn Error>> {
+    let question = MotionsQuestion::of_robot("arm", []).with_path(path.iter().map(|state| &state[..]));
+    let checked = client.check_motions(scene, question.with_certificates()).await?;
+    if let Some(certificate) = checked.motions[0].certificate.clone() {
+        let (scene, robot) = (scene.to_owned(), "arm".to_owned());
+        let request = VerifyMotionRequest { certificate, scene, robot, ..Default::default() };
+        let verified = client.verify_motion(request).await?;
+        println!("the certificate holds: {}, with {:.4} m to spare", verified.holds, verified.clearance_lower_m);
+    }
+    Ok(())
+}
+
+/// The straight way from start to goal goes through the wall: how far it is free, and why no
+/// farther.
+async fn explain(client: &Client, scene: &str, path: &[[f64; 7]]) -> Result<(), Box<dyn Error>> {
+    let (start, goal) = (path[0], path[path.len() - 1]);
+    let mut question = MotionsQuestion::of_robot("arm", []).with_edges(&[start, goal]);
     question.request_mut().first_contact = true;
-    question.request_mut().clearance_accuracy_m = Some(1e-3);
-    let checked = client.check_motions(&scene, question).await?;
-    for motion in &checked.motions {
-        let verdict = motion.verdict;
-        if let Some(([a, b], s)) = &motion.contact {
-            println!("{verdict:?}: free up to {:.4}, {a} and {b} touch before {s:.4}", motion.alpha);
-        } else {
-            println!("{verdict:?}: nothing comes nearer than {:.3} m", motion.clearance_lower_m);
-        }
-    }
+    let straight = &client.check_motions(scene, question).await?.motions[0];
+    println!("straight on: {:?}, free up to {:.4} of the way", straight.verdict, straight.alpha);
 
-    // The certificate goes with the plan; the controller checks it against the scene at that time.
-    if let Some(certificate) = checked.motions[1].certificate.clone() {
-        let request =
-            VerifyMotionRequest { certificate, scene: scene.clone(), robot: "arm".into(), ..Default::default() };
-        println!("the certificate holds: {}", client.verify_motion(request).await?.holds);
+    let halfway: Vec<f64> = start.iter().zip(goal).map(|(start, goal)| 0.5 * (start + goal)).collect();
+    let found = client.explain(scene, "arm", [], &halfway, 0.0).await?;
+    for pair in found.pairs.iter().filter(|pair| pair.in_contact) {
+        println!("halfway {} and {} overlap by {:.1} mm", pair.a, pair.b, -1e3 * pair.upper_m);
     }
-
-    // Where the arm has least room, on the way over the pole.
-    client.set_joints(&scene, "arm", NamedJointValues { joints: Vec::new(), values: vec![0.8, 0.0, 0.5] }).await?;
-    for row in client.evaluate(&scene, Question::within(0.3), &[Measure::Distance]).await?.rows {
-        println!("{} to {}: between {:.6} m and {:.6} m", row.a, row.b, row.answer.lower, row.answer.upper);
-    }
-    client.delete_scene(&scene).await?;
-    client.delete_robot(&robot.id).await?;
     Ok(())
 }
 
 /// Upright at a place, metres.
-fn at(x: f64, y: f64, z: f64) -> Result<Pose, Box<dyn std::error::Error>> {
-    Ok(Pose::from_quaternion(Vector3::new(x, y, z), UnitQuaternion::identity().coords.into())?)
+fn at(x: f64, y: f64, z: f64) -> Pose {
+    Pose::identity().with_translation(Vector3::new(x, y, z))
 }

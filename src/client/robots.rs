@@ -62,6 +62,24 @@ pub struct RobotPlacement {
 }
 
 impl RobotPlacement {
+    /// A robot with its root link at the origin of the world, and its joints at 0 or at the limit
+    /// nearest to it.
+    pub fn new(name: &str, robot: &StoredRobot) -> Self {
+        Self { name: name.into(), robot: robot.id, base: Pose::identity(), joints: NamedJointValues::default() }
+    }
+
+    /// With its root link elsewhere: link frame to world frame, metres.
+    #[must_use]
+    pub fn with_base(self, base: Pose) -> Self {
+        Self { base, ..self }
+    }
+
+    /// With values of joints, radians or metres; those not named are 0, or the limit nearest to it.
+    #[must_use]
+    pub fn with_joints(self, joints: NamedJointValues) -> Self {
+        Self { joints, ..self }
+    }
+
     /// The robot of a message.
     pub(super) fn of(instance: &proto::RobotInstance) -> Result<Self, ClientError> {
         let unreadable = |_| ClientError::Unexpected("a robot of a scene that cannot be read");

@@ -19,3 +19,5 @@ mod readme;
 mod refusals;
 mod robots;
 mod streams;
+#[cfg(feature = "fit")]
+mod tutorial;

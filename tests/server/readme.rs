@@ -12,10 +12,6 @@ use crate::harness::{Running, ball};
 #[path = "../../examples/planner.rs"]
 mod planner;
 
-#[allow(dead_code, unreachable_pub)]
-#[path = "../../examples/robot.rs"]
-mod robot;
-
 /// Calls of a document: `Service/Method` and the JSON of the message.
 fn calls(text: &str) -> Vec<(String, String)> {
     text.split("$ ask ")
@@ -77,9 +73,8 @@ async fn the_queries_of_the_documents_are_answered() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_examples_run() {
+async fn the_example_of_a_planner_runs() {
     let dir = tempfile::tempdir().expect("a directory");
     let server = Running::start(dir.path());
     planner::run(&server.url()).await.expect("it runs");
-    robot::run(&server.url()).await.expect("it runs");
 }

@@ -44,7 +44,7 @@ const SRDF: &str = r#"<robot name="crane">
 </robot>"#;
 
 /// A cube with edges of 0.1 m, as OFF.
-const CUBE: &str = "OFF\n8 12 0\n0 0 0\n0.1 0 0\n0.1 0.1 0\n0 0.1 0\n0 0 0.1\n0.1 0 0.1\n0.1 0.1 0.1\n0 0.1 0.1\n\
+pub(crate) const CUBE: &str = "OFF\n8 12 0\n0 0 0\n0.1 0 0\n0.1 0.1 0\n0 0.1 0\n0 0 0.1\n0.1 0 0.1\n0.1 0.1 0.1\n0 0.1 0.1\n\
 3 0 2 1\n3 0 3 2\n3 4 5 6\n3 4 6 7\n3 0 1 5\n3 0 5 4\n3 1 2 6\n3 1 6 5\n3 2 3 7\n3 2 7 6\n3 3 0 4\n3 3 4 7\n";
 
 /// A server with the robot, and what its hand is made of.
