@@ -3,16 +3,23 @@
 use super::files::read_obstacle;
 use super::poses::PoseArgs;
 use super::progress::progress_bar;
+use super::push;
+use super::remote::{connect, interrupted};
+use crate::body::Obstacle;
+use crate::client::{Client, JobProgress};
 use crate::jobs::solve;
 use crate::measure::Pose;
+use crate::service::proto::HierarchyProgress;
 use crate::store::{HierarchyMeasure, HierarchyOutcome, HierarchyRequest, HierarchySet};
+use indicatif::ProgressBar;
 use serde::Serialize;
 use std::error::Error;
 use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use tokio::runtime::Runtime;
 
-/// Bracket the distance of two sets that need not be convex, without a server
+/// Bracket the distance of two sets that need not be convex
 ///
 /// Where both sets are convex, 'measure' takes a microsecond and is exact. Sos-bodies ('fit
 /// --relax-convexity') need not be, and for them this command solves a semidefinite program of
@@ -26,9 +33,14 @@ use std::path::PathBuf;
 /// the sets; 'exact' says that both bounds are the same, to 1e-5 of the size of the sets, or of a
 /// level distance. Points are in A's frame; of a level distance both are the one of B.
 ///
-/// Of compounds bracket the parts one by one. A server does the same as a job: HierarchyService.
+/// Of compounds bracket the parts one by one. With --server a server does the same, as a job of its
+/// HierarchyService for each pose.
 ///
-/// Example: sublevel hierarchy ring-d4-c10.json mug-d6-cinf.json --pose 0.5,0,0 --level 1
+/// Examples:
+///
+/// sublevel hierarchy ring-d4-c10.json mug-d6-cinf.json --pose 0.5,0,0 --level 1
+///
+/// sublevel hierarchy ring-d4-c10.json mug-d6-cinf.json --server http://127.0.0.1:50051
 #[derive(Debug, clap::Args)]
 pub(super) struct HierarchyArgs {
     /// File of A, a body or an sos-body
@@ -44,6 +56,12 @@ pub(super) struct HierarchyArgs {
     /// before
     #[arg(long, value_name = "LEVEL", default_value_t = 0)]
     level: usize,
+    /// Have this server solve, such as http://127.0.0.1:50051: both files are stored there first
+    ///
+    /// Jobs wait for their turn there and survive its restart. Ctrl-C cancels the one that is under
+    /// way, and no further pose is solved.
+    #[arg(long, value_name = "URL")]
+    server: Option<String>,
     /// Print one JSON object a line instead of a table
     #[arg(long)]
     json: bool,
@@ -88,11 +106,57 @@ impl Line {
     }
 }
 
+/// What solves.
+enum Solver {
+    /// This program.
+    Here,
+    /// A server, which has both sets.
+    There(Runtime, Client),
+}
+
+impl Solver {
+    /// Stores the sets in the server, if there is one.
+    fn new(args: &HierarchyArgs) -> Result<Self, Box<dyn Error>> {
+        let Some(url) = &args.server else { return Ok(Self::Here) };
+        push::store(url, &[args.a.clone(), args.b.clone()])?;
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+        let client = runtime.block_on(connect(url))?;
+        Ok(Self::There(runtime, client))
+    }
+
+    /// The bracket at a pose, which has this number.
+    fn solve(
+        &self,
+        request: &HierarchyRequest,
+        sets: &[Obstacle; 2],
+        (bar, number): (&ProgressBar, usize),
+    ) -> Result<HierarchyOutcome, Box<dyn Error>> {
+        match self {
+            Self::Here => Ok(solve(request, sets, &mut |said| {
+                bar.set_message(format!("pose {number}, step {}", said.iterations));
+                ControlFlow::Continue(())
+            })?),
+            Self::There(runtime, client) => {
+                let tell = |job: &JobProgress<HierarchyProgress>| bar.set_message(describe(number, job));
+                Ok(runtime.block_on(client.solve_hierarchy(request, tell, interrupted()))?)
+            }
+        }
+    }
+}
+
+fn describe(number: usize, JobProgress { id, progress }: &JobProgress<HierarchyProgress>) -> String {
+    match progress {
+        None => format!("pose {number}, job {id} waits for its turn"),
+        Some(progress) => format!("pose {number}, job {id}, step {}", progress.iterations),
+    }
+}
+
 /// Solves and prints, pose by pose.
 pub(super) fn run(args: &HierarchyArgs) -> Result<(), Box<dyn Error>> {
     let trajectories = args.at.trajectories()?;
     let sets = [read_obstacle(&args.a)?, read_obstacle(&args.b)?];
     let ids = sets.each_ref().map(|set| *set.id());
+    let solver = Solver::new(args)?;
     let bar = progress_bar(&format!("{} and {}", sets[0].name(), sets[1].name()));
     let mut out = io::stdout().lock();
     for (index, pose) in trajectories.iter().flatten().enumerate() {
@@ -103,12 +167,9 @@ pub(super) fn run(args: &HierarchyArgs) -> Result<(), Box<dyn Error>> {
             sets: [at(0, Pose::identity()), at(1, *pose)],
             level: args.level,
         };
-        let solved = solve(&request, &sets, &mut |said| {
-            bar.set_message(format!("pose {number}, step {}", said.iterations));
-            ControlFlow::Continue(())
-        });
-        let named = |error| format!("{}, {}, pose {number}: {error}", args.a.display(), args.b.display());
-        let line = Line::new(args.level, solved.map_err(named)?);
+        let named =
+            |error: Box<dyn Error>| format!("{}, {}, pose {number}: {error}", args.a.display(), args.b.display());
+        let line = Line::new(args.level, solver.solve(&request, &sets, (&bar, number)).map_err(named)?);
         bar.suspend(|| print(&mut out, number, &line, args.json))?;
     }
     bar.finish_and_clear();

@@ -29,6 +29,8 @@ mod progress;
 mod push;
 mod record;
 #[cfg(feature = "fit")]
+mod remote;
+#[cfg(feature = "fit")]
 mod robot;
 mod scene;
 mod serve;

@@ -1,8 +1,11 @@
 //! Solves of the hierarchy as jobs: brackets, progress, cancelling, restarts, refusals.
 
-use std::time::Instant;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use serde_json::Value;
 use sublevel::body::{Body, Compound, SosBody, SosMethod};
 use sublevel::client::SubmitError;
 use sublevel::fit::{Coordinates, FitOptions, SosOptions, fit_parts, fit_sos};
@@ -18,7 +21,7 @@ use sublevel::store::{HierarchyRequest, HierarchySet as StoredSet};
 use tonic::{Code, Status, Streaming};
 
 use crate::fits::arc;
-use crate::harness::{Clients, PATIENCE, Running, at, ball, field, pose, reason};
+use crate::harness::{Clients, PATIENCE, Running, at, ball, field, pose, reason, run};
 
 type Solve = CreateHierarchySolveRequest;
 
@@ -400,4 +403,101 @@ async fn solves_outlive_the_server_and_fail_by_name_without_their_bodies() {
     let failed = clients.solved(&orphan).await;
     assert_eq!(failed.state, JobState::Failed);
     assert!(failed.failure.contains(&large) && failed.failure.contains("deleted"), "{}", failed.failure);
+}
+
+/// Files of a ball, and of a set that need not be convex.
+fn files(dir: &Path) -> [String; 2] {
+    [("ball.json", ball(0.5).to_json()), ("arc.json", bent().to_json())].map(|(name, content)| {
+        let file = dir.join(name);
+        std::fs::write(&file, content).expect("written");
+        file.to_str().expect("text").to_owned()
+    })
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_command_brackets_the_same_with_and_without_a_server() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(&dir.path().join("data"));
+    let mut clients = server.connect().await;
+    let [ball, arc] = files(dir.path());
+    let poses = dir.path().join("poses.txt");
+    std::fs::write(&poses, "1 0 0 0 1 0 0 0 1 0 0 3\n\n1 0 0 0 1 0 0 0 1 4 0 0\n").expect("written");
+    let poses = poses.to_str().expect("text");
+    // Lines without their times.
+    let lines = |options: &[&str]| -> Vec<Value> {
+        let done = run(&[&["hierarchy", &arc, &ball, "--poses", poses, "--json"], options].concat());
+        assert!(done.status.success(), "{options:?}: {}", String::from_utf8_lossy(&done.stderr));
+        let text = String::from_utf8(done.stdout).expect("text");
+        let line = |line: &str| {
+            let mut line: Value = serde_json::from_str(line).expect("JSON");
+            assert!(line.as_object_mut().expect("a line").remove("seconds").is_some());
+            line
+        };
+        text.lines().map(line).collect()
+    };
+    let url = server.url();
+    for options in [&["--level", "1"][..], &["--measure", "level-distance"]] {
+        let there = lines(&[options, &["--server", &url]].concat());
+        assert_eq!(there, lines(options), "{options:?}");
+        assert!(
+            there.len() == 2 && there.iter().all(|line| line["lower"].as_f64().expect("a bound") > 0.5),
+            "{there:?}"
+        );
+    }
+    // They were jobs, with the sets that the command stored.
+    let jobs = clients.jobs.list_jobs(proto::ListJobsRequest::default()).await.expect("a list").into_inner().jobs;
+    assert_eq!(jobs.len(), 4);
+    let ids = [bent().id().to_string(), crate::harness::ball(0.5).id().to_string()];
+    for job in jobs.into_iter().map(SolveJob::from) {
+        let asked = [job.task.a.expect("a set"), job.task.b.expect("a set")].map(|set| set.body_id);
+        assert_eq!((job.state, &asked), (JobState::Succeeded, &ids));
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_command_says_what_went_wrong_and_ctrl_c_cancels() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(&dir.path().join("data"));
+    let mut clients = server.connect().await;
+    let [ball, _] = files(dir.path());
+    let url = server.url();
+    let octic = Body::superellipsoid("octic", Vector3::zeros(), Vector3::repeat(1.0), 8).expect("a body");
+    let (octic_file, sextic_file) = (dir.path().join("octic.json"), dir.path().join("sextic.json"));
+    std::fs::write(&octic_file, octic.to_json()).expect("written");
+    std::fs::write(&sextic_file, sextic().to_json()).expect("written");
+    let (octic, sextic) = (octic_file.to_str().expect("text"), sextic_file.to_str().expect("text"));
+    for (files, url, level, word) in [
+        ([octic, octic], url.as_str(), "2", "10820 entries"),
+        ([&*ball, &*ball], &url, "3", "between 0 and 2"),
+        ([&ball, &ball], "http://127.0.0.1:1", "0", "sublevel serve"),
+        ([&ball, &ball], "no url", "0", "--server"),
+        ([&ball, "missing.json"], &url, "0", "check the path"),
+    ] {
+        let refused = run(&["hierarchy", files[0], files[1], "--level", level, "--server", url]);
+        let stderr = String::from_utf8_lossy(&refused.stderr);
+        assert!(!refused.status.success() && stderr.contains(word), "{word}: {stderr}");
+        assert_eq!(stderr.trim_end().lines().count(), 1, "{stderr}");
+    }
+
+    let child = Command::new(env!("CARGO_BIN_EXE_sublevel"))
+        .args(["hierarchy", sextic, sextic, "--pose", "3,0,0", "--level", "2", "--server", &url])
+        .stderr(Stdio::piped())
+        .stdout(Stdio::null())
+        .spawn()
+        .expect("it starts");
+    let begun = Instant::now();
+    let id = loop {
+        let jobs = clients.jobs.list_jobs(proto::ListJobsRequest::default()).await.expect("a list").into_inner().jobs;
+        if let Some(job) = jobs.first() {
+            break job.id.clone();
+        }
+        assert!(begun.elapsed() < PATIENCE, "it makes no job");
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    };
+    clients.solving(&id).await;
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs").success());
+    let ended = child.wait_with_output().expect("it ends");
+    let stderr = String::from_utf8_lossy(&ended.stderr);
+    assert!(ended.status.code() == Some(1) && stderr.contains("cancelled"), "{stderr}");
+    assert_eq!(clients.solve_job(&id).await.state, JobState::Cancelled);
 }

@@ -1,16 +1,13 @@
 //! `sublevel fit --server`: the same, made elsewhere.
 
-use crate::client::{Client, ClientOptions, JobProgress, SubmitError};
+use crate::cli::remote::{connect, interrupted};
+use crate::client::{JobProgress, SubmitError};
 use crate::jobs::FitOutput;
 use crate::service::proto::{FitPhase, FitProgress};
 use crate::store::FitRequest;
 use indicatif::ProgressBar;
 use nalgebra::Vector3;
 use std::error::Error;
-use std::time::Duration;
-
-/// How long the server may take to read a mesh.
-const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Has the server execute a request about points (metres) and the triangles between them, or about
 /// bodies that it has. Ctrl-C cancels.
@@ -23,19 +20,9 @@ pub(in crate::cli) fn execute(
 ) -> Result<FitOutput, Box<dyn Error>> {
     bar.set_message("sending");
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    let cancel = async {
-        // Without signals nobody can cancel, and the fit ends by itself.
-        if tokio::signal::ctrl_c().await.is_err() {
-            std::future::pending::<()>().await;
-        }
-    };
     let tell = |job: &JobProgress<FitProgress>| bar.set_message(describe(job));
-    let fitted = runtime.block_on(async {
-        let client =
-            Client::connect_with(url, &ClientOptions { patience: PATIENCE, ..ClientOptions::from_environment() })
-                .await?;
-        client.fit(request, (points, triangles), tell, cancel).await
-    });
+    let fitted =
+        runtime.block_on(async { connect(url).await?.fit(request, (points, triangles), tell, interrupted()).await });
     Ok(fitted.map_err(|error: SubmitError| error)?)
 }
 
