@@ -359,7 +359,8 @@ fn verify_proves_and_refuses() {
     assert_eq!((output.status.code(), &report["sos_convex_proven"]), (Some(1), &false.into()));
     assert!(refusal(&["show", text(&changed)]).contains("id does not follow"));
     std::fs::write(&changed, &stored[..stored.len() / 2]).unwrap();
-    assert!(refusal(&["measure", text(&changed), text(&body)]).contains("not a body file"));
+    let refused = refusal(&["measure", text(&changed), text(&body)]);
+    assert!(refused.contains("is no file of a body") && refused.contains("sublevel fit"), "{refused}");
 }
 
 #[test]
@@ -582,7 +583,7 @@ fn sets_that_need_not_be_convex_are_told_from_bodies_everywhere() {
 
     // Where convexity is needed it is refused for what it is.
     let body = folder.path().join("ring-d4.json");
-    assert!(refusal(&["measure", text(&body), file]).contains("need not be convex"));
+    assert!(refusal(&["measure", text(&body), file, "--time"]).contains("fit --group"));
     assert!(refusal(&["show", file, "--svg", text(&folder.path().join("x.svg"))]).contains("sos-body"));
     for more in [
         &["--refine"][..],
@@ -753,4 +754,105 @@ fn hierarchy_brackets_sets_that_need_not_be_convex() {
     let refused = refusal(&["hierarchy", text(&octic), text(&octic), "--level", "2"]);
     assert!(refused.contains("octic.json") && refused.contains("10820 entries"), "{refused}");
     assert!(refusal(&["hierarchy", ball, ball, "--pose", "1,2"]).contains("2 numbers"));
+}
+
+#[test]
+fn measure_takes_sos_bodies_capsules_and_half_spaces() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| text(&folder.path().join(name)).to_owned();
+    std::fs::write(path("ring.off"), ring()).unwrap();
+    let out = text(folder.path());
+    json(&["fit", &path("ring.off"), "--out", out, "--degree", "4", "--relax-convexity", "inf", "--json"]);
+    let (ring, limb, floor) = (path("ring-d4-cinf.json"), path("limb.json"), path("floor.json"));
+    for primitive in [
+        &["ball", "--radius", "0.5", "--out", &path("ball.json")][..],
+        &["ball", "--radius", "0.05", "--out", &path("bead.json")],
+        &["capsule", "--radius", "0.05", "--half-height", "0.2", "--out", &limb],
+        &["half-space", "--normal", "0,0,1", "--offset", "0", "--out", &floor],
+    ] {
+        assert!(sublevel(&[&["primitive"], primitive].concat()).status.success(), "{primitive:?}");
+    }
+    let (ball, bead) = (path("ball.json"), path("bead.json"));
+    let measure = |a: &str, b: &str, pose: &str, more: &[&str]| {
+        json(&[&["measure", a, b, "--json", "--pose", pose], more].concat())
+    };
+    let number = |line: &Value, key: &str| line[key].as_f64().unwrap_or_else(|| panic!("{key}: {line}"));
+
+    // A set that is not convex: brackets as wide as asked for, that meet those of the hierarchy.
+    let apart = measure(&ring, &ball, "0,0,3", &[]);
+    let fields = "status overlap distance_m distance_lower_m distance_upper_m level_ab level_ab_lower level_ab_upper \
+                  level_ba level_ba_lower level_ba_upper witness_a witness_b normal iterations";
+    assert_eq!(keys(&apart), sorted(&fields.split_whitespace().collect::<Vec<_>>().join(" ")));
+    assert_eq!((&apart["status"], &apart["overlap"]), (&"converged".into(), &"no".into()));
+    let fine = measure(&ring, &ball, "0,0,3", &["--accuracy", "1e-5"]);
+    for (line, accuracy) in [(&apart, 1e-3), (&fine, 1e-5)] {
+        for (measured, lower, upper) in [
+            ("distance", "distance_lower_m", "distance_upper_m"),
+            ("level-distance", "level_ab_lower", "level_ab_upper"),
+        ] {
+            let exact =
+                json(&["hierarchy", &ring, &ball, "--pose", "0,0,3", "--measure", measured, "--level", "1", "--json"]);
+            let (lower, upper) = (number(line, lower), number(line, upper));
+            assert!(lower <= number(&exact, "upper") && number(&exact, "lower") <= upper, "{line} {exact}");
+            // Relative to the smaller of the two, a ball of 0.5 m, and to a level above 1.
+            let scale = if measured == "distance" { 0.5 } else { upper };
+            assert!(lower > 0.5 && upper - lower <= 1.1 * accuracy * scale, "{line}");
+        }
+    }
+    // From B to A, between the points.
+    let point = |line: &Value, key: &str| Vector3::from_fn(|axis, _| line[key][axis].as_f64().unwrap());
+    let (a, b) = (point(&fine, "witness_a"), point(&fine, "witness_b"));
+    assert!(((a - b).norm() - number(&fine, "distance_m")).abs() < 1e-6, "{fine}");
+    assert!((point(&fine, "normal") - (a - b).normalize()).norm() < 1e-6, "{fine}");
+    // The middle of the ring is free, which its hull is not.
+    let inside = measure(&ring, &bead, "0,0,0", &[]);
+    assert!(inside["overlap"] == "no" && number(&inside, "distance_lower_m") > 0.1, "{inside}");
+    let body = json(&["fit", &path("ring.off"), "--out", out, "--degree", "4", "--json"])[0]["body"].clone();
+    assert_eq!(number(&measure(body.as_str().unwrap(), &bead, "0,0,0", &[]), "distance_m"), 0.0);
+    // In contact there is no normal; the other way round the levels change places.
+    let met = measure(&ring, &bead, "1,0.2,0", &[]);
+    assert_eq!((&met["overlap"], &met["distance_upper_m"], &met["normal"]), (&"yes".into(), &0.0.into(), &Value::Null));
+    let turned = measure(&ball, &ring, "0,0,-3", &[]);
+    assert!((number(&turned, "level_ba") - number(&apart, "level_ab")).abs() < 0.01 * number(&apart, "level_ab"));
+
+    // Capsules and floors: exact distances, no levels. A stands at the origin.
+    for (a, b, pose, distance) in [
+        (&limb, &ball, "0.8,0,0.1", 0.25),
+        (&ball, &limb, "0,0,1", 1.0 - 0.5 - 0.25),
+        (&limb, &limb, "0,0.3,0.1", 0.2),
+        (&floor, &ball, "3,4,0.75", 0.25),
+        (&limb, &floor, "0,0,-0.5", 0.25),
+        (&floor, &ball, "0,0,0.25", 0.0),
+    ] {
+        let line = measure(a, b, pose, &[]);
+        let (lower, upper) = (number(&line, "distance_lower_m"), number(&line, "distance_upper_m"));
+        assert!(lower <= distance + 1e-12 && distance <= upper + 1e-12 && upper - lower < 1e-8, "{pose}: {line}");
+        assert_eq!(line["overlap"], if distance > 0.0 { "no" } else { "yes" }, "{pose}: {line}");
+        assert!(
+            line["level_ab"].is_null() && line["level_ba_lower"].is_null() && line["status"] == "converged",
+            "{line}"
+        );
+    }
+    // A set above a floor, and tables with a row a pose.
+    let above = measure(&floor, &ring, "0,0,2", &[]);
+    assert!(above["overlap"] == "no" && number(&above, "distance_lower_m") > 1.4, "{above}");
+    let poses = path("poses.txt");
+    std::fs::write(&poses, "1 0 0 0 1 0 0 0 1 0 0 1\n\n1 0 0 0 1 0 0 0 1 0.1 0 0\n").unwrap();
+    let table = String::from_utf8(sublevel(&["measure", &limb, &ball, "--poses", &poses]).stdout).unwrap();
+    let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split_whitespace().collect()).collect();
+    assert_eq!((rows.len(), rows[0].contains(&"overlap")), (3, true), "{table}");
+    assert_eq!((rows[1][3], rows[2][3], rows[2][4]), ("no", "yes", "-"), "{table}");
+
+    // What has no distance is refused with what has one.
+    for (args, words) in [
+        (&["measure", &floor, &floor][..], ["half-spaces", "measure a body"]),
+        (&["measure", &limb, &ring], ["capsule and an sos-body", "sublevel primitive"]),
+        (&["measure", &ring, &limb, "--json"], ["limb.json", "fit --group"]),
+        (&["measure", &limb, &ball, "--time"], ["--time", "leave it out"]),
+        (&["measure", &ring, &ball, "--accuracy", "0"], ["--accuracy", "above 0"]),
+        (&["measure", &ring, &path("ring.off")], ["ring.off", "body"]),
+    ] {
+        let refused = refusal(args);
+        assert!(words.iter().all(|word| refused.contains(word)) && refused.lines().count() == 1, "{args:?}: {refused}");
+    }
 }

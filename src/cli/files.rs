@@ -1,6 +1,7 @@
 //! Files that commands read and write, named in the errors.
 
 use crate::body::{Obstacle, Shape};
+use crate::scene::{Geometry, GeometryFileError};
 use std::error::Error;
 use std::path::Path;
 
@@ -20,6 +21,17 @@ pub(super) fn read_obstacle(path: &Path) -> Result<Obstacle, Box<dyn Error>> {
 /// Reads and re-proves the file of a body or a compound, naming it in the error.
 pub(super) fn read_shape(path: &Path) -> Result<Shape, Box<dyn Error>> {
     Shape::from_json(&read(path)?).map_err(|error| format!("{}: {error}", path.display()).into())
+}
+
+/// Reads and re-proves the file of anything that a scene can hold, naming it in the error.
+pub(super) fn read_geometry(path: &Path) -> Result<Geometry, Box<dyn Error>> {
+    Geometry::from_json(&read(path)?).map_err(|error| {
+        let remedy = match error {
+            GeometryFileError::Json(_) => "; write it with 'sublevel fit' or 'sublevel primitive'",
+            _ => "",
+        };
+        format!("{}: {error}{remedy}", path.display()).into()
+    })
 }
 
 /// Writes a file whole or not at all: under a temporary name beside it, then renamed.

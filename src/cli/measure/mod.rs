@@ -1,18 +1,22 @@
 //! `sublevel measure`.
 
 mod query;
+mod scene_pair;
 mod timing;
+mod undefined;
 
-use super::files::read_shape;
+use super::files::read_geometry;
 use super::poses::PoseArgs;
-use crate::measure::{Distance, LevelDistance, Options, Status, WarmStart};
+use crate::measure::{DEFAULT_ACCURACY, Distance, LevelDistance, Options, Pose, Status, WarmStart};
 use query::Query;
+use scene_pair::ScenePair;
 use serde::Serialize;
 use std::error::Error;
 use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
+use undefined::Undefined;
 
-/// Measure distances between two bodies or compounds, without a server
+/// Measure distances between two objects, without a server
 ///
 /// Prints the Euclidean distance and both level distances d(A‖B) = min p_A on B and d(B‖A), each
 /// with its proven bracket, for one relative pose or for each pose of a file. Successive poses of a
@@ -25,18 +29,28 @@ use std::path::PathBuf;
 /// are above 1 apart, 1 touching, below 1 overlapping, and use the polynomials as they are stored:
 /// 'show' prints their minimum.
 ///
-/// Example: sublevel measure a.json b.json --pose 0.5,0,0,0,0,0,1
+/// Of ladders the finest rung is measured. Sos-bodies, which need not be convex, are measured by
+/// dividing boxes, in milliseconds: the bracket of the distance, whether the two overlap, and both
+/// level distances. Capsules and half-spaces have a distance and an overlap, and no level distances
+/// (-). Of a half-space the distance is 0 wherever the other object reaches into it.
+///
+/// Examples:
+///
+/// sublevel measure a.json b.json --pose 0.5,0,0,0,0,0,1
+///
+/// sublevel measure ring-d4-c10.json mug.json --pose 0.5,0,0 --accuracy 1e-4
 #[derive(Debug, clap::Args)]
 pub(super) struct MeasureArgs {
-    /// File of A, a body or a compound
+    /// File of A: a body, compound, ladder, sos-body, capsule or half-space
     a: PathBuf,
     /// File of B
     b: PathBuf,
     #[command(flatten)]
     at: PoseArgs,
     /// Width asked of the brackets: relative to the smaller body's circumradius, and to max(1, |d|)
-    #[arg(long, value_name = "WIDTH", default_value = "1e-9")]
-    accuracy: f64,
+    /// [default: 1e-9, with an sos-body 1e-3]
+    #[arg(long, value_name = "WIDTH")]
+    accuracy: Option<f64>,
     /// Print one JSON object a line instead of a table
     #[arg(long)]
     json: bool,
@@ -96,14 +110,34 @@ impl Line {
 
 /// Measures and prints.
 pub(super) fn run(args: &MeasureArgs) -> Result<(), Box<dyn Error>> {
-    let options = Options::default().with_accuracy(args.accuracy).map_err(|error| format!("--accuracy: {error}"))?;
     let trajectories = args.at.trajectories()?;
-    let query = Query { a: read_shape(&args.a)?, b: read_shape(&args.b)?, options };
+    let sides = [read_geometry(&args.a)?, read_geometry(&args.b)?];
     let mut out = BufWriter::new(io::stdout().lock());
+    if let [Some(a), Some(b)] = sides.each_ref().map(|side| side.rungs().last().cloned()) {
+        let accuracy = args.accuracy.unwrap_or(DEFAULT_ACCURACY);
+        let options = Options::default().with_accuracy(accuracy).map_err(|error| format!("--accuracy: {error}"))?;
+        solids(args, &Query { a, b, options }, &trajectories, &mut out)?;
+    } else {
+        let named = |error: Box<dyn Error>| format!("{}, {}: {error}", args.a.display(), args.b.display());
+        if args.time {
+            return Err(named(Undefined::Time.into()).into());
+        }
+        let pair = ScenePair::new(&sides, args.accuracy).map_err(named)?;
+        objects(args, &pair, &trajectories, &mut out)?;
+    }
+    Ok(out.flush()?)
+}
+
+/// Two bodies or compounds.
+fn solids(
+    args: &MeasureArgs,
+    query: &Query,
+    trajectories: &[Vec<Pose>],
+    out: &mut impl Write,
+) -> Result<(), Box<dyn Error>> {
     if args.time {
-        serde_json::to_writer(&mut out, &timing::time(&query, &trajectories))?;
-        writeln!(out)?;
-        return Ok(out.flush()?);
+        serde_json::to_writer(&mut *out, &timing::time(query, trajectories))?;
+        return Ok(writeln!(out)?);
     }
     if !args.json {
         writeln!(
@@ -113,14 +147,14 @@ pub(super) fn run(args: &MeasureArgs) -> Result<(), Box<dyn Error>> {
         )?;
     }
     let mut number = 0;
-    for trajectory in &trajectories {
+    for trajectory in trajectories {
         let mut warm = [WarmStart::default(); 3];
         for pose in trajectory {
             let distance = query.distance(pose, &mut warm[0]);
             let (ab, ba) = (query.level_ab(pose, &mut warm[1]), query.level_ba(pose, &mut warm[2]));
-            let line = Line::new(&distance, &ab, &ba, distance.hulls_upper(&query.a, &query.b));
+            let line = Line::new(&distance, &ab, &ba, distance.hulls_upper(&*query.a, &*query.b));
             if args.json {
-                serde_json::to_writer(&mut out, &line)?;
+                serde_json::to_writer(&mut *out, &line)?;
                 writeln!(out)?;
             } else {
                 number += 1;
@@ -138,5 +172,27 @@ pub(super) fn run(args: &MeasureArgs) -> Result<(), Box<dyn Error>> {
             }
         }
     }
-    Ok(out.flush()?)
+    Ok(())
+}
+
+/// Two objects of which one is no body or compound.
+fn objects(
+    args: &MeasureArgs,
+    pair: &ScenePair,
+    trajectories: &[Vec<Pose>],
+    out: &mut impl Write,
+) -> Result<(), Box<dyn Error>> {
+    if !args.json {
+        writeln!(out, "{}", scene_pair::head())?;
+    }
+    for (index, pose) in trajectories.iter().flatten().enumerate() {
+        let line = pair.measure(pose)?;
+        if args.json {
+            serde_json::to_writer(&mut *out, &line)?;
+            writeln!(out)?;
+        } else {
+            writeln!(out, "{}", line.row(index + 1))?;
+        }
+    }
+    Ok(())
 }

@@ -49,7 +49,7 @@ fn batch(query: &Query, trajectories: &[Vec<Pose>]) -> f64 {
         let start = Instant::now();
         for poses in poses.chunks(BATCH) {
             let answers = &mut answers[..poses.len()];
-            distance_batch(&query.a, &Pose::identity(), &query.b, black_box(poses), &query.options, answers)
+            distance_batch(&*query.a, &Pose::identity(), &*query.b, black_box(poses), &query.options, answers)
                 .expect("a chunk has poses, and a place for each answer");
             black_box(answers);
         }
