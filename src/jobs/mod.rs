@@ -9,10 +9,12 @@
 //! `request` checks what fits are asked for, `execute` executes them, for jobs and the command
 //! line; `hierarchy` does both for solves, `derive` for pairs of links; `link_body` makes bodies of
 //! the links of robots; `obstacle` says which stored bodies can be used; `worker` does one job
-//! after the other; `board` is where it says how far it is, and where everybody waits for news.
+//! after the other; `board` is where it says how far it is, and where everybody waits for news;
+//! `ended_job` tells who counts them of jobs that have ended.
 
 mod board;
 mod derive;
+mod ended_job;
 mod execute;
 mod hierarchy;
 mod link_body;
@@ -30,16 +32,27 @@ pub use obstacle::{NotASet, obstacle};
 pub use request::{MESH_FORMATS, RequestError, body_name, check, read_mesh};
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use tokio::sync::watch;
 
 use crate::store::{Catalogue, CatalogueError, Job, JobState, NewJob};
+use ended_job::Listener;
 
 /// The jobs of one server. Clones are the same jobs.
 #[derive(Clone, Debug, Default)]
-pub struct Jobs(Arc<watch::Sender<Board>>);
+pub struct Jobs {
+    board: Arc<watch::Sender<Board>>,
+    listener: Listener,
+}
 
 impl Jobs {
+    /// Jobs of which somebody hears once they have ended, with how long the last attempt took if
+    /// it came to its end.
+    pub fn heard_by(listener: impl Fn(&Job, Option<Duration>) + Send + Sync + 'static) -> Self {
+        Self { listener: Listener::new(listener), ..Self::default() }
+    }
+
     /// Queues a job, see [`Catalogue::create_job`]. Blocks on the disk, as all changes do.
     ///
     /// # Errors
@@ -56,15 +69,21 @@ impl Jobs {
     /// # Errors
     /// When there is no such job, or when the disk fails.
     pub fn cancel(&self, catalogue: &Catalogue, id: u64) -> Result<Arc<Job>, CatalogueError> {
-        let job = catalogue
-            .change_job(id, Vec::new(), |job| (!job.state.is_final()).then_some((JobState::Cancelled, job.attempts)))?;
+        let mut had_ended = false;
+        let job = catalogue.change_job(id, Vec::new(), |job| {
+            had_ended = job.state.is_final();
+            (!had_ended).then_some((JobState::Cancelled, job.attempts))
+        })?;
+        if !had_ended {
+            self.listener.hear(&job, None);
+        }
         self.tell(|board| board.stop(id));
         Ok(job)
     }
 
     /// Wakes up whenever a job may have changed.
     pub fn news(&self) -> watch::Receiver<Board> {
-        self.0.subscribe()
+        self.board.subscribe()
     }
 
     /// Makes the worker put its job back into the queue and end.
@@ -73,7 +92,7 @@ impl Jobs {
     }
 
     fn tell(&self, change: impl FnOnce(&mut Board)) {
-        self.0.send_modify(change);
+        self.board.send_modify(change);
     }
 }
 

@@ -40,6 +40,27 @@ fn a_job_that_is_cancelled_before_it_is_on_the_board_makes_nothing() {
     assert_eq!(state, JobState::Cancelled);
 }
 
+/// Every end is heard of once, whoever causes it.
+#[test]
+fn who_counts_jobs_hears_of_each_once() {
+    let (_dir, catalogue, id) = claimed();
+    let heard = Arc::new(std::sync::Mutex::new(Vec::new()));
+    let jobs = {
+        let heard = heard.clone();
+        Jobs::heard_by(move |job, took| heard.lock().expect("no panic").push((job.state.clone(), took)))
+    };
+    for _ in 0..2 {
+        jobs.cancel(&catalogue, id).expect("cancelled");
+    }
+    assert_eq!(*heard.lock().expect("no panic"), [(JobState::Cancelled, None)]);
+    // One that kills the server is given up, and returned to be heard of.
+    let (_dir, catalogue, id) = claimed();
+    assert!(recover(&catalogue).expect("begun again").is_empty());
+    claim(&catalogue).expect("the disk works").expect("the job");
+    let given_up = recover(&catalogue).expect("given up");
+    assert_eq!(given_up.iter().map(|job| job.id).collect::<Vec<_>>(), [id]);
+}
+
 /// The result comes after the cancel was acknowledged.
 #[test]
 fn a_result_that_comes_too_late_is_dropped_with_its_bodies() {

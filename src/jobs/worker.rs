@@ -4,7 +4,7 @@
 use std::any::Any;
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 use tokio::task::{JoinError, spawn_blocking};
@@ -43,7 +43,9 @@ impl Jobs {
             else => None,
         };
         let Some(catalogue) = catalogue else { return };
-        self.retry_until_committed(&catalogue, recover).await;
+        for job in self.retry_until_committed(&catalogue, recover).await.into_iter().flatten() {
+            self.listener.hear(&job, None);
+        }
         self.tell(|_| {});
         while !news.borrow_and_update().is_stopping() {
             match self.retry_until_committed(&catalogue, claim).await.flatten() {
@@ -58,6 +60,7 @@ impl Jobs {
         let id = job.id;
         tracing::info!(id, task = %job.task, attempt = job.attempts, "job begun");
         self.tell(|board| board.begin(id));
+        let begun = Instant::now();
         let work = {
             let (jobs, catalogue, job) = (self.clone(), catalogue.clone(), job.clone());
             spawn_blocking(move || jobs.execute(&catalogue, &job))
@@ -74,11 +77,16 @@ impl Jobs {
                 self.retry_until_committed(catalogue, move |catalogue| put_back(catalogue, id)).await;
             }
             Some(done) => {
-                let ended = ended(done);
+                let (ended, took) = (Arc::new(ended(done)), begun.elapsed());
+                let left = ended.clone();
                 if let Some(job) =
-                    self.retry_until_committed(catalogue, move |catalogue| finish(catalogue, id, &ended)).await
+                    self.retry_until_committed(catalogue, move |catalogue| finish(catalogue, id, &left)).await
                 {
                     tracing::info!(id, state = %job.state, "job ended");
+                    // Of one that was cancelled meanwhile was heard then.
+                    if job.state == ended.0 {
+                        self.listener.hear(&job, Some(took));
+                    }
                 }
             }
         }
@@ -163,8 +171,10 @@ fn fit(
     made.map_err(|error| error.to_string())
 }
 
-/// Jobs that were running when the server was killed: back into the queue, or given up.
-pub(super) fn recover(catalogue: &Catalogue) -> Result<(), CatalogueError> {
+/// Jobs that were running when the server was killed: back into the queue, or given up. Returns
+/// the latter.
+pub(super) fn recover(catalogue: &Catalogue) -> Result<Vec<Arc<Job>>, CatalogueError> {
+    let mut given_up = Vec::new();
     while let Some(job) = catalogue.first_job(&JobState::Running) {
         let job = catalogue.change_job(job.id, Vec::new(), |job| {
             let state = if job.attempts < MAX_ATTEMPTS {
@@ -183,8 +193,11 @@ pub(super) fn recover(catalogue: &Catalogue) -> Result<(), CatalogueError> {
             Some((state, job.attempts))
         })?;
         tracing::warn!(id = job.id, attempts = job.attempts, state = %job.state, "a job was running when the server was killed");
+        if job.state.is_final() {
+            given_up.push(job);
+        }
     }
-    Ok(())
+    Ok(given_up)
 }
 
 /// The oldest job that waits is running now.

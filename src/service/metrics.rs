@@ -10,9 +10,13 @@ use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::registry::{Registry, Unit};
 
+#[cfg(feature = "fit")]
+use super::job_metrics::JobMetrics;
 use crate::scene::WarmStartUse;
 use crate::scene::query::{Answer, AnswerStatus, StateAnswer, StateVerdict};
 use crate::store::Counts;
+#[cfg(feature = "fit")]
+use crate::store::Job;
 
 /// All that is counted. Clones share it.
 #[derive(Clone, Debug)]
@@ -42,6 +46,8 @@ struct Counted {
     unproven_bodies: Gauge,
     damaged_bodies: Gauge,
     scenes: Gauge,
+    #[cfg(feature = "fit")]
+    jobs: JobMetrics,
 }
 
 #[derive(Clone, Debug, Hash, PartialEq, Eq, EncodeLabelSet)]
@@ -130,6 +136,8 @@ impl Default for Metrics {
         let about = "Stored bodies that are damaged and not used";
         registry.register("damaged_bodies", about, damaged_bodies.clone());
         registry.register("scenes", "Scenes and forks", scenes.clone());
+        #[cfg(feature = "fit")]
+        let jobs = JobMetrics::new(&mut registry);
         Self(Arc::new(Counted {
             taking_over: Mutex::default(),
             registry,
@@ -152,6 +160,8 @@ impl Default for Metrics {
             unproven_bodies,
             damaged_bodies,
             scenes,
+            #[cfg(feature = "fit")]
+            jobs,
         }))
     }
 }
@@ -245,11 +255,20 @@ impl Metrics {
         self.0.pose_wait_seconds.observe(waited.as_secs_f64());
     }
 
+    /// A job that has ended, and how long its last attempt took, if that came to its end.
+    #[cfg(feature = "fit")]
+    pub(super) fn job_ended(&self, job: &Job, took: Option<Duration>) {
+        self.0.jobs.ended(job, took);
+    }
+
     /// All of it, in the text format of Prometheus; counts are those of the catalogue, if it is
     /// loaded.
     pub(super) fn text(&self, counts: Option<Counts>) -> String {
         self.0.ready.set(i64::from(counts.is_some()));
-        let Counts { bodies, unproven_bodies, damaged_bodies, scenes } = counts.unwrap_or_default();
+        let counts = counts.unwrap_or_default();
+        #[cfg(feature = "fit")]
+        self.0.jobs.set_open(counts.jobs);
+        let Counts { bodies, unproven_bodies, damaged_bodies, scenes, .. } = counts;
         let sizes = [
             (&self.0.bodies, bodies),
             (&self.0.unproven_bodies, unproven_bodies),

@@ -39,6 +39,8 @@ pub mod fuzzing;
 pub(crate) mod hierarchy;
 mod incoming;
 #[cfg(feature = "fit")]
+mod job_metrics;
+#[cfg(feature = "fit")]
 mod job_wire;
 #[cfg(feature = "fit")]
 mod jobs;

@@ -156,7 +156,10 @@ impl Server {
         let app = AppState::new(catalogue.clone(), stopping.clone(), (limits.clone(), metrics.clone()))?;
         let calls = CallLayer::new(Authorization(self.tokens), metrics.clone());
         #[cfg(feature = "fit")]
-        let jobs = Jobs::default();
+        let jobs = {
+            let metrics = metrics.clone();
+            Jobs::heard_by(move |job, took| metrics.job_ended(job, took))
+        };
         let robots = Robots {
             app: app.clone(),
             #[cfg(feature = "fit")]

@@ -12,7 +12,7 @@ mod stored_body;
 mod stored_robot;
 mod stored_scene;
 
-pub use counts::Counts;
+pub use counts::{Counts, JobCounts};
 pub use error::CatalogueError;
 pub use live_scene::{FORK_IDLE, LiveScene, MAX_FORKS, Origin};
 pub use scene_entry::SceneEntry;

@@ -63,6 +63,42 @@ pub enum JobTask {
     Derive(DeriveRequest),
 }
 
+/// Kinds of jobs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JobKind {
+    /// A fit.
+    Fit,
+    /// A solve of the hierarchy.
+    Hierarchy,
+    /// Pairs of links of a robot.
+    Derive,
+}
+
+impl JobKind {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Fit, Self::Hierarchy, Self::Derive];
+
+    /// Its name, as operators read it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fit => "fit",
+            Self::Hierarchy => "hierarchy",
+            Self::Derive => "derive",
+        }
+    }
+}
+
+impl JobTask {
+    /// What kind of job it is.
+    pub fn kind(&self) -> JobKind {
+        match self {
+            Self::Fit(_) => JobKind::Fit,
+            Self::Hierarchy(_) => JobKind::Hierarchy,
+            Self::Derive(_) => JobKind::Derive,
+        }
+    }
+}
+
 /// A fit that is a job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -54,14 +54,16 @@ mod robot;
 mod robot_row;
 mod rows;
 
-pub use catalogue::{Catalogue, CatalogueError, Counts, FORK_IDLE, LiveScene, MAX_FORKS, Origin, SceneEntry};
+pub use catalogue::{
+    Catalogue, CatalogueError, Counts, FORK_IDLE, JobCounts, LiveScene, MAX_FORKS, Origin, SceneEntry,
+};
 pub use derive::{DeriveOutcome, DeriveRequest, DerivedLinkPair};
 pub use disk::{BACKUP_PREFIX, JobMesh, Store};
 pub use error::StoreError;
 pub use hierarchy::{HierarchyMeasure, HierarchyOutcome, HierarchyRequest, HierarchySet};
 pub use job::{
-    FitOptimum, FitOutcome, FitTask, FittedBody, FittedKind, Job, JobOutcome, JobState, JobTask, MAX_ENDED_JOBS,
-    MAX_QUEUED_JOBS, MAX_REQUEST_ID_BYTES, NewJob,
+    FitOptimum, FitOutcome, FitTask, FittedBody, FittedKind, Job, JobKind, JobOutcome, JobState, JobTask,
+    MAX_ENDED_JOBS, MAX_QUEUED_JOBS, MAX_REQUEST_ID_BYTES, NewJob,
 };
 pub use request::{
     FitBody, FitCompound, FitGroup, FitLadder, FitMode, FitPolynomial, FitPreparation, FitRequest, FitSosBody,

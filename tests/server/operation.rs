@@ -63,7 +63,7 @@ fn https(server: &Running) -> String {
 }
 
 /// Tries until it works, or until it does not any more.
-async fn eventually(mut works: impl AsyncFnMut() -> bool) {
+pub(crate) async fn eventually(mut works: impl AsyncFnMut() -> bool) {
     let start = Instant::now();
     while !works().await {
         assert!(start.elapsed() < PATIENCE, "it never came");
@@ -182,8 +182,13 @@ async fn tokens_allow_what_their_role_says_and_can_be_changed() {
     assert_eq!((ended.code(), ended.reason().as_deref()), (Some(Code::Unauthenticated), Some("TOKEN_UNKNOWN")));
 }
 
+/// A port that was free a moment ago.
+pub(crate) fn free_port() -> SocketAddr {
+    std::net::TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("a port")
+}
+
 /// A page of the admin listener: status and text.
-fn page(addr: SocketAddr, path: &str) -> (u16, String) {
+pub(crate) fn page(addr: SocketAddr, path: &str) -> (u16, String) {
     let mut stream = TcpStream::connect(addr).expect("connected");
     write!(stream, "GET {path} HTTP/1.1\r\nhost: probe\r\nconnection: close\r\n\r\n").expect("sent");
     let mut text = String::new();
@@ -195,8 +200,7 @@ fn page(addr: SocketAddr, path: &str) -> (u16, String) {
 #[tokio::test(flavor = "multi_thread")]
 async fn probes_and_metrics_say_what_was_asked() {
     let dir = tempfile::tempdir().expect("a directory");
-    // A port that was free a moment ago.
-    let admin = std::net::TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("a port");
+    let admin = free_port();
     let mut serve = command(dir.path());
     serve.args(["--admin", &admin.to_string()]);
     let server = Running::spawn(serve);

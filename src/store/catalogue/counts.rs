@@ -1,5 +1,7 @@
 //! How much a catalogue holds.
 
+use crate::store::job::JobKind;
+
 /// Sizes of a catalogue.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
@@ -11,4 +13,15 @@ pub struct Counts {
     pub damaged_bodies: usize,
     /// Scenes and forks.
     pub scenes: usize,
+    /// Jobs that have not ended, by kind, in the order of [`JobKind::ALL`].
+    pub jobs: [JobCounts; JobKind::ALL.len()],
+}
+
+/// Jobs of one kind that have not ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct JobCounts {
+    /// Those that wait for their turn.
+    pub queued: usize,
+    /// Those that are worked on.
+    pub running: usize,
 }

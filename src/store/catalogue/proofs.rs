@@ -8,8 +8,9 @@ use std::thread;
 
 use crate::body::BodyId;
 use crate::scene::Geometry;
+use crate::store::job::{JobKind, JobState};
 
-use super::counts::Counts;
+use super::counts::{Counts, JobCounts};
 use super::live_scene::LiveScene;
 use super::stored_body::{StoredBody, prove_each};
 use super::stored_scene::StoredScene;
@@ -23,6 +24,12 @@ impl Catalogue {
             unproven_bodies: state.bodies.values().filter(|body| !body.is_examined()).count(),
             damaged_bodies: state.bodies.values().filter(|body| body.is_damaged()).count(),
             scenes: state.scenes.len() + state.stored_scenes.len(),
+            jobs: JobKind::ALL.map(|kind| {
+                let of_kind = |wanted: &JobState| {
+                    state.jobs.values().filter(|job| job.task.kind() == kind && job.state == *wanted).count()
+                };
+                JobCounts { queued: of_kind(&JobState::Queued), running: of_kind(&JobState::Running) }
+            }),
         })
     }
 

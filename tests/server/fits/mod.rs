@@ -1,6 +1,7 @@
 //! Fit jobs as their users meet them: uploads, progress, cancelling, restarts, refusals.
 
 mod command;
+mod counted;
 mod groups;
 mod jobs;
 mod options;
