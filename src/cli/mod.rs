@@ -33,6 +33,7 @@ mod remote;
 #[cfg(feature = "fit")]
 mod robot;
 mod scene;
+mod scene_picture;
 mod serve;
 mod show;
 mod sos_body;

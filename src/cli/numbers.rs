@@ -6,6 +6,18 @@ use nalgebra::Vector3;
 
 use crate::measure::Pose;
 
+/// Any number of numbers with commas between them.
+#[derive(Clone, Debug)]
+pub(super) struct Numbers(pub(super) Vec<f64>);
+
+impl FromStr for Numbers {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        numbers(text).map(Self)
+    }
+}
+
 /// Three numbers with commas between them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Triple(pub(super) Vector3<f64>);

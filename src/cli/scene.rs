@@ -2,12 +2,15 @@
 
 use std::error::Error;
 use std::io::{self, Write};
+use std::path::PathBuf;
 
-use super::numbers::PoseNumbers;
+use super::files::write_atomically;
+use super::numbers::{Numbers, PoseNumbers};
+use super::scene_picture::{RobotState, picture};
 use crate::body::BodyId;
-use crate::client::{Client, ClientOptions, SceneState, SceneSummary};
+use crate::client::{Client, ClientOptions, RobotPlacement, SceneState, SceneSummary};
 use crate::measure::Pose;
-use crate::scene::{Placement, Subject, Update};
+use crate::scene::{NamedJointValues, Placement, RobotId, Subject, Update};
 
 /// Make, show and edit the scenes of a running server
 ///
@@ -18,7 +21,9 @@ use crate::scene::{Placement, Subject, Update};
 ///   sublevel scene create cell
 ///   sublevel scene put cell table --body 3f2a...  --pose 0,0,0.7
 ///   sublevel scene move cell table --pose 0.1,0,0.7
+///   sublevel scene place cell arm --robot 9c41... --base 0,0,0.7
 ///   sublevel scene show cell
+///   sublevel scene show cell --svg cell.svg --state arm=0,-0.8,0,-2.4,0,1.6,0.8
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct SceneArgs {
@@ -38,8 +43,33 @@ enum SceneCommand {
     List,
     /// Create an empty scene
     Create { scene: String },
-    /// Show the objects of a scene
-    Show { scene: String },
+    /// Show the objects of a scene, as a table and as a picture
+    Show {
+        scene: String,
+        /// Write its silhouettes, seen along the three axes
+        #[arg(long, value_name = "OUT.svg")]
+        svg: Option<PathBuf>,
+        /// Draw a robot of the scene at these values of all its joints, radians or metres, and mark
+        /// where it is nearest to what is not of it; up to four times, each in a colour of its own.
+        /// The scene stays as it is
+        #[arg(long = "state", value_name = "ROBOT=V,V,...", requires = "svg")]
+        states: Vec<RobotState>,
+    },
+    /// Place a robot, or replace it
+    Place {
+        scene: String,
+        /// Name of the robot in the scene; its links are objects NAME/LINK
+        name: String,
+        /// Id of a stored robot, as `sublevel robot --server` prints it
+        #[arg(long, value_name = "ID")]
+        robot: RobotId,
+        /// Where its root link stands
+        #[arg(long, value_name = "POSE", allow_hyphen_values = true, default_value = "0,0,0")]
+        base: PoseNumbers,
+        /// Values of all its joints, radians or metres [default: 0, or the limit nearest to it]
+        #[arg(long, value_name = "V,V,...", allow_hyphen_values = true)]
+        joints: Option<Numbers>,
+    },
     /// Add an object, or replace it
     Put {
         scene: String,
@@ -98,7 +128,18 @@ async fn execute(args: &SceneArgs) -> Result<String, Box<dyn Error>> {
     let client = Client::connect_with(&args.server, &ClientOptions::from_environment()).await?;
     let revision = match &args.command {
         SceneCommand::List => return Ok(list(&client.list_scenes().await?, args.json)?),
-        SceneCommand::Show { scene } => return Ok(show(&client.scene(scene).await?, args.json)?),
+        SceneCommand::Show { scene, svg, states } => {
+            if let Some(path) = svg {
+                write_atomically(path, &picture(&client, scene, states).await?)?;
+            }
+            return Ok(show(&client.scene(scene).await?, args.json)?);
+        }
+        SceneCommand::Place { scene, name, robot, base, joints } => {
+            let values = joints.clone().map(|Numbers(values)| values).unwrap_or_default();
+            let joints = NamedJointValues { joints: Vec::new(), values };
+            let placement = RobotPlacement { name: name.as_str().into(), robot: *robot, base: base.0, joints };
+            client.place_robot(scene, &placement).await?
+        }
         SceneCommand::Create { scene } => client.create_scene(scene).await?,
         SceneCommand::Fork { scene, fork } => client.fork_scene(scene, fork).await?,
         SceneCommand::Commit { fork } => client.commit_fork(fork).await?,

@@ -221,6 +221,7 @@ fn silhouettes(shape: &Shape) -> String {
     let panel = |view: View| Panel {
         caption: view.name().into(),
         outlines: points.iter().map(|points| Outline::body(Ink::Blue, outline(points, view))).collect(),
+        spans: Vec::new(),
     };
     let rows = vec![[View::Side, View::Front, View::Top].map(panel).into()];
     let (name, what) = match shape {

@@ -58,6 +58,7 @@ pub(super) fn silhouettes(sweep: &Sweep, posed: [(&Shape, &Body); 2]) -> String 
             Panel {
                 caption: format!("{state}, x = {x:.2} m, {}", view.name()),
                 outlines: surfaces.chain(outlines).collect(),
+                spans: Vec::new(),
             }
         };
         stages.map(panel).into()

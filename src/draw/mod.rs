@@ -27,5 +27,5 @@ pub use curve::{LineChart, Mark, Series};
 pub use ink::Ink;
 pub use scatter::{Group, Marker, Point, Scatter, Stairs};
 pub use shadow::shadow;
-pub use silhouette::{Outline, Panel, Silhouettes, View, boundary_points, outline};
+pub use silhouette::{Outline, Panel, Silhouettes, Span, View, boundary_points, outline, silhouette};
 pub use stack::stacked;

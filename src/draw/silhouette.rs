@@ -74,6 +74,20 @@ pub fn outline(points: &[Vector3<f64>], view: View) -> Vec<[f64; 2]> {
     convex_outline(&mut flat)
 }
 
+/// The silhouette of a convex set by its support points along `count` even directions of the
+/// picture: its corners in picture coordinates, metres, counter-clockwise.
+///
+/// `support` gives the point of the set that lies farthest along a unit direction, such as
+/// `Body::support`: corners are met exactly.
+pub fn silhouette(support: impl Fn(&Vector3<f64>) -> Vector3<f64>, view: View, count: usize) -> Vec<[f64; 2]> {
+    let direction = |k: usize| {
+        let (sin, cos) = (std::f64::consts::TAU * (k as f64 + 0.5) / count as f64).sin_cos();
+        view.lift([cos, sin], 0.0)
+    };
+    let points: Vec<_> = (0..count).map(|k| support(&direction(k))).collect();
+    outline(&points, view)
+}
+
 /// One drawn thing: the outline of a body, or the triangles of an object.
 #[derive(Clone, Debug)]
 pub struct Outline {
@@ -102,6 +116,16 @@ impl Outline {
     }
 }
 
+/// Two points that belong together, such as the nearest ones of two bodies, drawn as a line with a
+/// dot at each end.
+#[derive(Clone, Copy, Debug)]
+pub struct Span {
+    /// Colour.
+    pub ink: Ink,
+    /// Picture coordinates, metres.
+    pub ends: [[f64; 2]; 2],
+}
+
 /// One picture with its caption.
 #[derive(Clone, Debug)]
 pub struct Panel {
@@ -109,6 +133,8 @@ pub struct Panel {
     pub caption: String,
     /// What is drawn, from back to front.
     pub outlines: Vec<Outline>,
+    /// Pairs of points, in front of all of it.
+    pub spans: Vec<Span>,
 }
 
 /// Panels in rows, all at one scale, with a scale bar and a legend.
@@ -128,6 +154,8 @@ const GAP: f64 = 18.0;
 const CAPTION: f64 = 22.0;
 const HEADER: f64 = 58.0;
 const FOOTER: f64 = 34.0;
+/// From one line of the legend to the next, pixels.
+const LEGEND_LINE: f64 = 20.0;
 /// How far an outline may move for the sake of fewer vertices, pixels.
 const TOLERANCE: f64 = 0.2;
 
@@ -146,7 +174,9 @@ impl Silhouettes {
         let cell = (span * scale).max(150.0);
         let width = (GAP + columns as f64 * (cell + GAP)).max(420.0);
         let row_heights: Vec<f64> = boxes.iter().map(|row| row.first().map_or(0.0, |b| b.height() * scale)).collect();
-        let height = HEADER + row_heights.iter().map(|h| h + CAPTION + GAP).sum::<f64>() + FOOTER;
+        let legend = self.legend_places(width);
+        let header = HEADER + legend.last().map_or(0.0, |place| place[1]);
+        let height = header + row_heights.iter().map(|h| h + CAPTION + GAP).sum::<f64>() + FOOTER;
 
         let mut svg = String::new();
         let grey = Ink::Grey.hex();
@@ -157,8 +187,8 @@ impl Silhouettes {
              height=\"{height:.0}\" font-family=\"sans-serif\" font-size=\"13\" fill=\"{grey}\">"
         );
         let _ = writeln!(svg, "<text x=\"{GAP}\" y=\"24\" font-size=\"17\">{}</text>", escaped(&self.title));
-        self.write_legend(&mut svg);
-        let mut top = HEADER;
+        self.write_legend(&mut svg, &legend);
+        let mut top = header;
         for ((row, boxes), tall) in self.rows.iter().zip(&boxes).zip(&row_heights) {
             for (column, (panel, range)) in row.iter().zip(boxes).enumerate() {
                 let left = GAP + column as f64 * (cell + GAP);
@@ -169,6 +199,9 @@ impl Silhouettes {
                 for outline in &panel.outlines {
                     write_outline(&mut svg, outline, origin, scale);
                 }
+                for span in &panel.spans {
+                    write_span(&mut svg, span, origin, scale);
+                }
             }
             top += CAPTION + tall + GAP;
         }
@@ -177,18 +210,34 @@ impl Silhouettes {
         svg
     }
 
-    fn write_legend(&self, svg: &mut String) {
-        let mut left = GAP;
-        for (ink, label) in &self.legend {
+    /// Where the entries of the legend begin, pixels from the left and from the first line: one after
+    /// the other, on a further line where the picture ends.
+    fn legend_places(&self, width: f64) -> Vec<[f64; 2]> {
+        let (mut left, mut line) = (GAP, 0.0);
+        let mut places = Vec::with_capacity(self.legend.len());
+        for (_, label) in &self.legend {
+            let wide = 7.5 * label.chars().count() as f64;
+            if left > GAP && left + 21.0 + wide > width {
+                (left, line) = (GAP, line + LEGEND_LINE);
+            }
+            places.push([left, line]);
+            left += 46.0 + wide;
+        }
+        places
+    }
+
+    fn write_legend(&self, svg: &mut String, places: &[[f64; 2]]) {
+        for ((ink, label), [left, line]) in self.legend.iter().zip(places) {
             let color = ink.hex();
             let _ = writeln!(
                 svg,
-                "<rect x=\"{left}\" y=\"35\" width=\"14\" height=\"12\" fill=\"{color}\" fill-opacity=\"0.35\" \
-                 stroke=\"{color}\" stroke-width=\"2\"/><text x=\"{}\" y=\"46\">{}</text>",
+                "<rect x=\"{left}\" y=\"{}\" width=\"14\" height=\"12\" fill=\"{color}\" fill-opacity=\"0.35\" \
+                 stroke=\"{color}\" stroke-width=\"2\"/><text x=\"{}\" y=\"{}\">{}</text>",
+                35.0 + line,
                 left + 21.0,
+                46.0 + line,
                 escaped(label)
             );
-            left += 46.0 + 7.5 * label.chars().count() as f64;
         }
     }
 }
@@ -253,6 +302,17 @@ fn write_outline(svg: &mut String, outline: &Outline, origin: [f64; 2], scale: f
     let _ = writeln!(svg, "<path{style} stroke-linejoin=\"round\" d=\"{d}\"/>");
 }
 
+fn write_span(svg: &mut String, span: &Span, origin: [f64; 2], scale: f64) {
+    let color = span.ink.hex();
+    let [[x, y], [u, v]] = span.ends.map(|[a, b]| [origin[0] + a * scale, origin[1] - b * scale]);
+    // Writing to a string cannot fail.
+    let _ = writeln!(
+        svg,
+        "<path d=\"M{x:.1} {y:.1}L{u:.1} {v:.1}\" stroke=\"{color}\" stroke-width=\"2.5\"/><circle cx=\"{x:.1}\" \
+         cy=\"{y:.1}\" r=\"4\" fill=\"{color}\"/><circle cx=\"{u:.1}\" cy=\"{v:.1}\" r=\"4\" fill=\"{color}\"/>"
+    );
+}
+
 /// A bar of a round length, about a quarter of a panel.
 fn write_scale_bar(svg: &mut String, top: f64, scale: f64, cell: f64) {
     let target = cell / 4.0 / scale;
@@ -298,6 +358,53 @@ mod tests {
     }
 
     #[test]
+    fn support_points_draw_boxes_with_their_corners_and_balls_round() {
+        let half = Vector3::<f64>::new(0.3, 0.2, 0.1);
+        let corner = |n: &Vector3<f64>| Vector3::from_fn(|axis, _| f64::copysign(half[axis], n[axis]));
+        assert_eq!(silhouette(corner, View::Front, 90), [[-0.2, -0.1], [0.2, -0.1], [0.2, 0.1], [-0.2, 0.1]]);
+        let ball = silhouette(|n| n * 2.0 + Vector3::x(), View::Top, 90);
+        assert_eq!(ball.len(), 90);
+        assert!(ball.iter().all(|[x, y]| ((x - 1.0).hypot(*y) - 2.0).abs() < 1e-12));
+    }
+
+    #[test]
+    fn a_long_legend_takes_several_lines_and_all_of_it_is_in_the_picture() {
+        let square = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let panel = |_| Panel {
+            caption: "it".into(),
+            outlines: vec![Outline::body(Ink::Blue, square.clone())],
+            spans: Vec::new(),
+        };
+        let svg = |labels: &[&str]| {
+            let legend = labels.iter().map(|&label| (Ink::Blue, label.to_owned())).collect();
+            Silhouettes { title: "legend".into(), legend, rows: vec![(0..2).map(panel).collect()] }.to_svg()
+        };
+        let lines = |svg: &str| -> Vec<f64> {
+            let rows = svg.split("<rect x=\"18\" y=\"").skip(1).map(|rest| rest.split('"').next().expect("a number"));
+            rows.map(|line| line.parse().expect("a number")).collect()
+        };
+        let height = |svg: &str| -> f64 {
+            let text = svg.split("height=\"").nth(1).expect("a height");
+            text.split('"').next().expect("a number").parse().expect("a number")
+        };
+        let (short, long) = (svg(&["one", "two"]), svg(&["a label of forty letters, more or less so"; 3]));
+        assert_eq!((lines(&short), lines(&long)), (vec![35.0], vec![35.0, 55.0, 75.0]));
+        assert_eq!(height(&long) - height(&short), 40.0);
+    }
+
+    #[test]
+    fn spans_are_drawn_in_front() {
+        let panel = Panel {
+            caption: "two".into(),
+            outlines: vec![Outline::body(Ink::Blue, vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])],
+            spans: vec![Span { ink: Ink::Green, ends: [[0.0, 0.0], [1.0, 1.0]] }],
+        };
+        let svg = Silhouettes { title: "spans".into(), legend: vec![], rows: vec![vec![panel]] }.to_svg();
+        let (body, span) = (svg.find("fill-opacity").expect("a body"), svg.find("<circle").expect("a dot"));
+        assert!(body < span && svg.matches("<circle").count() == 2 && svg.contains(&Ink::Green.hex()), "{svg}");
+    }
+
+    #[test]
     fn the_outline_of_a_square_has_four_corners() {
         let corner = |x: f64, z: f64| Vector3::new(x, 0.3, z);
         let points = [
@@ -316,6 +423,7 @@ mod tests {
         let panel = |polygon: Vec<[f64; 2]>| Panel {
             caption: "a < b".into(),
             outlines: vec![Outline::body(Ink::Blue, polygon)],
+            spans: Vec::new(),
         };
         for rows in [vec![], vec![vec![]], vec![vec![panel(vec![])]], vec![vec![panel(vec![[1.0, 1.0]])]]] {
             let svg = Silhouettes { title: "R&D".into(), legend: vec![], rows }.to_svg();

@@ -5,6 +5,7 @@ mod explained;
 mod kept;
 mod meshes;
 mod motions;
+mod pictures;
 mod questions;
 mod refused;
 

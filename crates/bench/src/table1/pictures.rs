@@ -98,7 +98,7 @@ impl Table1 {
                 solid: false,
             });
             let outlines = std::iter::once(subject.picture(View::Front)).chain(sets).collect();
-            Some(Panel { caption: format!("{name}, degree {}", body.degree()), outlines })
+            Some(Panel { caption: format!("{name}, degree {}", body.degree()), outlines, spans: Vec::new() })
         };
         let rows = vec![MESHES[..3].iter().filter_map(panel).collect()];
         let legend = vec![
@@ -125,7 +125,7 @@ impl Table1 {
                 }
             });
         }
-        Some(Panel { caption: caption.into(), outlines })
+        Some(Panel { caption: caption.into(), outlines, spans: Vec::new() })
     }
 
     fn subject(&self, name: &str) -> Option<&Subject> {
