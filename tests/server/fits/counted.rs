@@ -1,13 +1,18 @@
 //! Jobs in the metrics.
 
+use std::fmt::Write;
 use std::net::SocketAddr;
 
+use serde_json::Value;
 use sublevel::measure::Pose;
-use sublevel::service::proto::JobState;
+use sublevel::service::proto::fit_options::Mode;
+use sublevel::service::proto::{FitSolver, JobState};
 use sublevel::store::{HierarchyMeasure, HierarchyRequest, HierarchySet};
+use sublevel_testkit::Seeded;
+use sublevel_testkit::catalogue::clouds::{DRAWN_KINDS, drawn};
 
-use super::{cloud, header, long, quick};
-use crate::harness::{Running, ball, command};
+use super::{asked, body, cloud, header, long, quick};
+use crate::harness::{Running, ball, command, run};
 use crate::operation::{eventually, free_port, page};
 
 /// The value of a metric with these labels.
@@ -77,4 +82,58 @@ async fn jobs_are_counted_by_task_and_outcome() {
         let sum = value(admin, &format!("sublevel_job_duration_seconds_sum{{task=\"{task}\"}}"));
         assert!(sum < 60.0 && (sum > 0.0) == (count > 0.0), "{task}: {sum}");
     }
+}
+
+/// Clouds at degree 6 that clarabel leaves too far from the optimum; see `tests/fallback.rs` of the
+/// crate of fits.
+const HARD: [u64; 4] = [549, 575, 736, 1126];
+
+/// Who has fits made hears of it where the first solver fails: in the job, in the metrics, on the
+/// command line.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_solver_that_takes_over_is_told() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let admin = free_port();
+    let mut serve = command(&dir.path().join("data"));
+    serve.args(["--admin", &admin.to_string()]);
+    let server = Running::spawn(serve);
+    let mut clients = server.connect().await;
+    let mut told = Vec::new();
+    for seed in HARD {
+        let (_, points, _) = drawn(seed % DRAWN_KINDS, &mut Seeded(seed));
+        let id = clients.queue(header("hard", asked(Mode::Body(body(6)))), &points).await.id;
+        let ended = clients.ended(&id).await;
+        let bodies = ended.result.unwrap_or_else(|| panic!("seed {seed}: {}", ended.failure)).bodies;
+        let optimum = bodies[0].optimum.clone().expect("an optimum");
+        if optimum.fallback.is_empty() {
+            assert_eq!(optimum.solver(), FitSolver::Clarabel, "seed {seed}");
+        } else {
+            assert_eq!(optimum.solver(), FitSolver::Structured, "seed {seed}");
+            assert!(optimum.fallback.starts_with("clarabel failed: "), "seed {seed}: {}", optimum.fallback);
+            told.push((points, optimum.fallback));
+        }
+    }
+    let programs = |solver: &str, fallback: &str| {
+        value(admin, &format!("sublevel_fit_programs_total{{solver=\"{solver}\",fallback=\"{fallback}\"}}"))
+    };
+    let count = told.len() as f64;
+    eventually(async || programs("clarabel", "no") + programs("structured", "yes") == HARD.len() as f64).await;
+    assert_eq!(
+        [programs("structured", "yes"), programs("structured", "no"), programs("clarabel", "yes")],
+        [count, 0.0, 0.0]
+    );
+
+    let (points, why) = told.pop().expect("clarabel solves all of them now: choose others for the test");
+    let text = points.iter().fold(String::new(), |mut text, point| {
+        writeln!(text, "{} {} {}", point.x, point.y, point.z).expect("a string");
+        text
+    });
+    let (file, out) = (dir.path().join("hard.xyz"), dir.path().join("out"));
+    std::fs::write(&file, text).expect("written");
+    let (file, out) = (file.to_str().expect("text"), out.to_str().expect("text"));
+    let done = run(&["fit", file, "--degree", "6", "--out", out, "--json"]);
+    let stderr = String::from_utf8_lossy(&done.stderr);
+    let rows: Vec<Value> = serde_json::from_slice(&done.stdout).expect("JSON");
+    assert_eq!((&rows[0]["solver"], &rows[0]["fallback"]), (&"structured".into(), &why.as_str().into()), "{stderr}");
+    assert!(stderr.contains(&format!("solved by structured, since {why}")), "{stderr}");
 }
