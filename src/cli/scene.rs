@@ -50,8 +50,11 @@ enum SceneCommand {
         #[arg(long, value_name = "OUT.svg")]
         svg: Option<PathBuf>,
         /// Draw a robot of the scene at these values of all its joints, radians or metres, and mark
-        /// where it is nearest to what is not of it; up to four times, each in a colour of its own.
-        /// The scene stays as it is
+        /// where it is nearest to what is not of it
+        ///
+        /// Up to four times, each in a colour of its own: several states of a robot, or of several,
+        /// which keep a state until their next one. The states are set in a fork of the scene, which
+        /// is removed again. Half-spaces have no end and are not drawn.
         #[arg(long = "state", value_name = "ROBOT=V,V,...", requires = "svg")]
         states: Vec<RobotState>,
     },

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::error::Error;
 use std::str::FromStr;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use nalgebra::Vector3;
 
@@ -66,7 +67,9 @@ pub(super) async fn picture(client: &Client, scene: &str, states: &[RobotState])
         drawn.add(client, object, Ink::Grey, true).await?;
     }
     if !states.is_empty() {
-        let fork = format!("{scene}-picture-{}", std::process::id());
+        // Nobody else draws at this nanosecond; the name of the scene might be too long already.
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
+        let fork = format!("picture-{}-{now}", std::process::id());
         client.fork_scene(scene, &fork).await?;
         let looked = look(client, &fork, states, &mut drawn).await;
         // What went wrong before says more.
