@@ -2,12 +2,12 @@
 //! change.
 //!
 //! `.ci/instructions` runs it: each row in a process of its own, on the AVX2 path (valgrind knows
-//! no AVX-512), on two fitted bodies that are kept beside this file, in poses that depend on
-//! nothing. The counts are compared with those recorded in `benches/instructions.json`; they belong
+//! no AVX-512), on two fitted bodies that are kept beside this file and on shapes, in poses that
+//! depend on nothing. The counts are compared with those recorded in `benches/instructions.json`; they belong
 //! to one version of the compiler, which is recorded with them.
 
 use clap::Parser;
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -20,7 +20,9 @@ use std::process::{Command, ExitCode};
 use sublevel::body::Body;
 use sublevel::fit::shapes;
 use sublevel::fit::{FitOptions, fit};
-use sublevel::measure::{Options, Pose, Status, WarmStart, distance, level_distance};
+use sublevel::measure::{
+    Capsule, Decision, Options, Pose, Status, WarmStart, distance, distance_to_capsule, level_distance, overlap,
+};
 
 /// Solves per row.
 const SOLVES: usize = 1000;
@@ -28,15 +30,23 @@ const SOLVES: usize = 1000;
 /// Part by which a count may exceed the recorded one.
 const TOLERANCE: f64 = 0.03;
 
+/// The middle of the human, metres: its origin is between its feet.
+const MIDDLE: Vector3<f64> = Vector3::new(0.0, 0.0, 0.9);
+
 /// A counted solve: what it returns is whether it converged, and its iterations.
 type Solve = fn(&Bodies, &Pose, &mut WarmStart) -> (Status, u32);
 
 /// The rows; those that are not warm forget the pose before.
-const ROWS: [(&str, bool, Solve); 4] = [
+const ROWS: [(&str, bool, Solve); 9] = [
     ("distance_warm", true, solve_distance),
     ("distance_cold", false, solve_distance),
     ("level_distance_warm", true, solve_level_distance),
     ("level_distance_cold", false, solve_level_distance),
+    ("box_warm", true, solve_box),
+    ("box_cold", false, solve_box),
+    ("two_boxes_cold", false, solve_boxes),
+    ("capsule_warm", true, solve_capsule),
+    ("overlap_apart", false, decide_overlap),
 ];
 
 /// Count the instructions of solves and compare them with the recorded counts
@@ -60,6 +70,9 @@ struct Args {
 struct Bodies {
     chair: Body,
     human: Body,
+    /// About as large as the human, and as the chair.
+    boxes: [Body; 2],
+    capsule: Capsule,
 }
 
 /// What is recorded.
@@ -168,7 +181,12 @@ fn count(row: &str) -> Result<Count, Box<dyn Error>> {
 fn run(row: &str) -> Result<(), Box<dyn Error>> {
     let (_, warm, solve) = ROWS.into_iter().find(|(known, ..)| *known == row).ok_or("--run: no such row")?;
     let load = |name: &str| -> Result<Body, Box<dyn Error>> { Ok(Body::from_json(&read(&body_file(name))?)?) };
-    let bodies = Bodies { chair: load("chair")?, human: load("human")? };
+    let capsule = Capsule::new(0.25, 0.65)?;
+    let boxes = [
+        Body::cuboid("locker", Vector3::new(0.25, 0.2, 0.9))?.moved(&UnitQuaternion::identity(), &MIDDLE)?,
+        Body::cuboid("crate", Vector3::new(0.4, 0.4, 0.5))?,
+    ];
+    let bodies = Bodies { chair: load("chair")?, human: load("human")?, boxes, capsule };
     let poses = poses()?;
     // Once uncounted, to see that each is what it is meant to be: bodies apart, and converged.
     for pose in &poses {
@@ -206,10 +224,33 @@ fn solve_level_distance(bodies: &Bodies, pose: &Pose, warm: &mut WarmStart) -> (
     (answer.status, answer.iterations)
 }
 
+fn solve_box(bodies: &Bodies, pose: &Pose, warm: &mut WarmStart) -> (Status, u32) {
+    let answer = distance(&bodies.chair, &Pose::identity(), &bodies.boxes[0], pose, &Options::default(), warm);
+    (answer.status, answer.iterations)
+}
+
+fn solve_boxes(bodies: &Bodies, pose: &Pose, warm: &mut WarmStart) -> (Status, u32) {
+    let [locker, crate_] = &bodies.boxes;
+    let answer = distance(crate_, &Pose::identity(), locker, pose, &Options::default(), warm);
+    (answer.status, answer.iterations)
+}
+
+fn solve_capsule(bodies: &Bodies, pose: &Pose, warm: &mut WarmStart) -> (Status, u32) {
+    let about = pose.with_translation(pose.transform_point(&MIDDLE));
+    let options = Options::default();
+    let answer = distance_to_capsule(&bodies.chair, &Pose::identity(), &bodies.capsule, &about, &options, warm);
+    (answer.status, answer.iterations)
+}
+
+fn decide_overlap(bodies: &Bodies, pose: &Pose, warm: &mut WarmStart) -> (Status, u32) {
+    let answer = overlap(&bodies.chair, &Pose::identity(), &bodies.human, pose, &Options::default(), warm);
+    (if answer == Decision::No { Status::Converged } else { Status::BracketWide }, 0)
+}
+
 /// The human about the chair: round it at a varying distance, a centimetre a step, turning by a
 /// degree a step about an axis that moves.
 fn poses() -> Result<Vec<Pose>, Box<dyn Error>> {
-    let mut rotation = nalgebra::UnitQuaternion::identity();
+    let mut rotation = UnitQuaternion::identity();
     (0..SOLVES)
         .map(|step| {
             let s = step as f64;
@@ -217,9 +258,8 @@ fn poses() -> Result<Vec<Pose>, Box<dyn Error>> {
             let (sin, cos) = (0.01 * s / 1.9).sin_cos();
             let middle = Vector3::new(radius * cos, radius * sin, 0.5 + 0.2 * (TAU * s / 230.0).sin());
             let axis = Vector3::new((TAU * s / 410.0).cos(), (TAU * s / 290.0).sin(), 0.7);
-            rotation = nalgebra::UnitQuaternion::new(axis.normalize() * (TAU / 360.0)) * rotation;
-            // The human's origin is between its feet, its middle 0.9 m above.
-            let translation = middle - rotation * Vector3::new(0.0, 0.0, 0.9);
+            rotation = UnitQuaternion::new(axis.normalize() * (TAU / 360.0)) * rotation;
+            let translation = middle - rotation * MIDDLE;
             Ok(Pose::from_quaternion(translation, rotation.coords.into())?)
         })
         .collect()

@@ -7,6 +7,7 @@ use crate::detail::detail;
 use crate::fits::fits;
 use crate::messages::messages;
 use crate::numbers;
+use crate::pairs::pairs;
 use crate::panda::panda;
 use crate::scenes::scenes;
 use crate::sets::sets;
@@ -49,6 +50,7 @@ enum Figure {
     Accuracy(AccuracyArgs),
     Cost(CostArgs),
     Fits(FitsArgs),
+    Pairs(PairsArgs),
     Panda(PandaArgs),
     Scenes(ScenesArgs),
     Sets(SetsArgs),
@@ -230,6 +232,18 @@ struct ScenesArgs {
     common: Common,
 }
 
+/// Pairs by type: ball, ellipsoid, degree 4, 6 and 8, slab-cut, box, cylinder and capsule, each
+/// against each: distances cold and warm, and decisions, beside coal and parry
+///
+/// Shapes about the chair and the human of the Princeton benchmark. Writes pairs.md, pairs.csv and
+/// pairs-*.svg. Takes about a minute on one core, once the fits are kept; a second with --quick.
+/// Coal takes part when SUBLEVEL_COAL names the program that times it.
+#[derive(Debug, Args)]
+struct PairsArgs {
+    #[command(flatten)]
+    common: Common,
+}
+
 /// A planner's workload: states and motions of a Franka Emika Panda among boxes and cylinders, µs
 /// per state and per radian against the free states that are kept
 ///
@@ -331,6 +345,8 @@ fn run(figure: &Figure) -> Result<(), Box<dyn Error>> {
         Figure::Cost(args) => run_cost(&args.common),
         Figure::Fits(args) if args.common.redraw => redraw(&args.common.out, "fits"),
         Figure::Fits(args) => run_fits(&args.common),
+        Figure::Pairs(args) if args.common.redraw => redraw(&args.common.out, "pairs"),
+        Figure::Pairs(args) => run_pairs(&args.common),
         Figure::Panda(args) if args.common.redraw => redraw(&args.common.out, "panda"),
         Figure::Panda(args) => run_panda(&args.common, args.problems.as_deref(), args.json),
         Figure::Scenes(args) if args.common.redraw => redraw(&args.common.out, "scenes"),
@@ -347,12 +363,13 @@ fn run(figure: &Figure) -> Result<(), Box<dyn Error>> {
 fn run_all(args: &Common) -> Result<(), Box<dyn Error>> {
     if args.redraw {
         // Table I takes the meshes, and a command of its own.
-        return ["speed", "accuracy", "cost", "fits", "sets", "panda", "scenes", "warm", "detail"]
+        return ["speed", "pairs", "accuracy", "cost", "fits", "sets", "panda", "scenes", "warm", "detail"]
             .into_iter()
             .try_for_each(|name| redraw(&args.out, name).map(drop));
     }
-    let figures: [(&str, &str, Run); 10] = [
+    let figures: [(&str, &str, Run); 11] = [
         ("speed", "Speed against accuracy", run_speed),
+        ("pairs", "Pairs by type", run_pairs),
         ("accuracy", "Solver accuracy against time", run_accuracy),
         ("cost", "Cost growth", run_cost),
         ("fits", "Fits", run_fits),
@@ -433,6 +450,14 @@ fn run_cost(args: &Common) -> Drawn {
         let found = cost(args.data(), cache, args.quick, parts, &mut |at| tell(bar, at))?;
         write_report(&args.out, "cost", &found.markdown(), &found.csv())?;
         redraw(&args.out, "cost")
+    })
+}
+
+fn run_pairs(args: &Common) -> Drawn {
+    with_fit_cache(args, |cache, bar| {
+        let found = pairs(args.data(), cache, args.quick, &mut |at| tell(bar, at))?;
+        write_report(&args.out, "pairs", &found.markdown(), &found.csv())?;
+        redraw(&args.out, "pairs")
     })
 }
 

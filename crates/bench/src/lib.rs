@@ -15,6 +15,7 @@ mod machine;
 mod measures;
 mod messages;
 pub mod numbers;
+pub mod pairs;
 pub mod panda;
 pub mod scenes;
 pub mod sets;

@@ -5,7 +5,7 @@ use crate::blocks::refreshed;
 use crate::csv::CsvError;
 use crate::measures;
 use crate::table1::Table1;
-use crate::{accuracy, cost, detail, fits, panda, scenes, sets, speed, warm};
+use crate::{accuracy, cost, detail, fits, pairs, panda, scenes, sets, speed, warm};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use sublevel::cli;
@@ -17,6 +17,7 @@ enum Shown {
     Accuracy(accuracy::Shown),
     Cost(cost::Shown),
     Fits(fits::Shown),
+    Pairs(pairs::Shown),
     Panda(panda::Shown),
     Scenes(scenes::Shown),
     Sets(sets::Shown),
@@ -37,6 +38,7 @@ impl Shown {
             "accuracy.csv" => accuracy::Shown::read(&text).map(Self::Accuracy),
             "cost.csv" => cost::Shown::read(&text).map(Self::Cost),
             "fits.csv" => fits::Shown::read(&text).map(Self::Fits),
+            "pairs.csv" => pairs::Shown::read(&text).map(Self::Pairs),
             "panda.csv" => panda::Shown::read(&text).map(Self::Panda),
             "scenes.csv" => scenes::Shown::read(&text).map(Self::Scenes),
             "sets.csv" => sets::Shown::read(&text).map(Self::Sets),
@@ -59,6 +61,7 @@ impl Shown {
             Self::Accuracy(shown) => shown.block(name),
             Self::Cost(shown) => shown.block(name),
             Self::Fits(shown) => shown.block(name),
+            Self::Pairs(shown) => shown.block(name),
             Self::Panda(shown) => shown.block(name),
             Self::Scenes(shown) => shown.block(name),
             Self::Sets(shown) => shown.block(name),
@@ -113,6 +116,7 @@ pub(crate) fn pictures(csv: &str, folder: &Path) -> Result<Vec<(String, String)>
         Shown::Accuracy(shown) => shown.pictures(),
         Shown::Cost(shown) => shown.pictures(),
         Shown::Fits(shown) => shown.pictures(),
+        Shown::Pairs(shown) => shown.pictures(),
         Shown::Panda(shown) => shown.pictures(),
         Shown::Scenes(shown) => shown.pictures(),
         Shown::Sets(shown) => shown.pictures(),

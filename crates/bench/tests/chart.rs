@@ -103,7 +103,7 @@ fn made_in(out: &Path, figure: &str) -> (String, String) {
 fn charts_are_redrawn_from_their_numbers() {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
     let out = tempfile::tempdir().expect("a folder can be made");
-    for figure in ["speed", "warm", "accuracy", "cost", "detail", "panda"] {
+    for figure in ["speed", "pairs", "warm", "accuracy", "cost", "detail", "panda"] {
         let names = [format!("{figure}.csv"), format!("{figure}.md"), "detail-parts.csv".to_owned()];
         for name in names {
             std::fs::copy(docs.join(&name), out.path().join(&name)).expect("a file of docs/");
@@ -191,6 +191,29 @@ fn the_quick_chart_of_speed_holds_what_is_known() {
     }
     let judged = ["hold everywhere", "Where the figures are missed"];
     assert!(judged.iter().any(|words| report.contains(words)), "no verdict");
+}
+
+#[test]
+#[ignore = "needs SUBLEVEL_DATA"]
+fn the_quick_chart_of_pairs_has_every_pair_once() {
+    let (report, csv) = made("pairs");
+    let kinds = ["ball", "degree 4", "box", "capsule"];
+    for (i, a) in kinds.iter().enumerate() {
+        for b in &kinds[i..] {
+            for (who, questions) in
+                [("sublevel", &["cold", "warm", "near", "apart"][..]), ("parry", &["cold", "near", "apart"])]
+            {
+                for question in questions {
+                    let [times, queries, failed] = ["ns", "queries", "failed"]
+                        .map(|head| column(&csv, &format!("{a},{b},{who},{question},"), head));
+                    assert!(times.len() == 1 && times[0] > 0.0, "{a}, {b}, {who}, {question}: {times:?}");
+                    assert_eq!((queries[0], failed[0]), (64.0, 0.0), "{a}, {b}, {who}, {question}");
+                }
+            }
+        }
+    }
+    assert!(report.contains("coal did not take part"), "no word of coal");
+    assert!(report.contains("Of 2560 of our answers 0 are wider"), "answers are counted");
 }
 
 #[test]

@@ -4,7 +4,7 @@ use crate::objects::folder;
 use crate::rows::{DEGREE, Scene};
 use std::error::Error;
 use sublevel::measure::{Options, Pose, WarmStart, distance};
-use sublevel_bench::comparison::{Coal, CoalRun, PeerError, parry_pose};
+use sublevel_bench::comparison::{Coal, CoalRun, PeerError, PeerShape, parry_pose};
 
 /// Answers that contradict each other by more, metres, are reported: ten times the tolerance coal
 /// has by default.
@@ -14,7 +14,7 @@ const AGREEMENT: f64 = 1e-5;
 pub(crate) fn start<'a>(coal: &'a Coal, scene: &Scene<'_>) -> Result<CoalRun<'a>, Box<dyn Error>> {
     let name = format!("{}-{}", scene.pair.name, scene.kind.name());
     let hulls = [&scene.pair.a, &scene.pair.b].map(|object| object.hull.as_slice());
-    Ok(coal.start(&folder()?, &name, hulls, scene.poses(DEGREE))?)
+    Ok(coal.start(&folder()?, &name, hulls.map(PeerShape::Hull), scene.poses(DEGREE))?)
 }
 
 /// Tells where coal, parry and our bodies, which contain the hulls, contradict each other.

@@ -4,7 +4,7 @@ use super::cases::{Case, Query};
 use super::effort::Effort;
 use crate::baselines::{Clarabel, ConicProgram, Posed, between, newton, slsqp};
 use crate::comparison::sweep::{Answer, Row, median};
-use crate::comparison::{Coal, ComparisonError, FitCache, Hulls, parry_pose};
+use crate::comparison::{Coal, ComparisonError, FitCache, Hulls, PeerShape, parry_pose};
 use nalgebra::Vector3;
 use std::hint::black_box;
 use sublevel::body::{Body, fibonacci_lattice};
@@ -166,7 +166,8 @@ pub(super) fn measure(
             announce(&format!("{}: coal, {points} points", case.name))?;
             let name = format!("accuracy-{}-{points}", case.name);
             let poses: Vec<Vec<Pose>> = some.iter().map(|chunk| chunk.iter().map(|q| q.pose).collect()).collect();
-            let mut run = coal.start(cache.folder(), &name, [points_a, points_b], &poses)?;
+            let mut run =
+                coal.start(cache.folder(), &name, [PeerShape::Hull(points_a), PeerShape::Hull(points_b)], &poses)?;
             // A process takes the median of nine walks by itself.
             run.pass()?;
             let found = run.distances()?.concat();

@@ -1,18 +1,19 @@
-//! GJK of coal on convex hulls, by a program that times it in a process of its own.
+//! GJK of coal on convex hulls and primitives, by a program that times it in a process of its own.
 
 use super::motion::{self, Trajectory};
 use super::peer::{PeerError, named, printed};
+use super::peer_shape::PeerShape;
 use super::sweep::median;
 use nalgebra::Vector3;
 use serde::Deserialize;
-use std::ffi::OsStr;
+use std::ffi::{OsStr, OsString};
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The program that times coal: `program A.xyz B.xyz POSES OUT` walks the poses, prints its times
-/// as JSON and writes the distances.
+/// The program that times coal: `program A B POSES OUT`, A and B files of points or primitives such
+/// as `ball:0.5`, walks the poses, prints its times as JSON and writes the distances.
 #[derive(Clone, Debug)]
 pub struct Coal {
     program: PathBuf,
@@ -42,7 +43,7 @@ impl Coal {
     }
 
     /// Writes what the program reads into `folder`, under names that begin with `name`: the points
-    /// whose hulls meet, and a file of poses for each trajectory.
+    /// of hulls, and a file of poses for each trajectory.
     ///
     /// # Errors
     /// [`PeerError::Io`].
@@ -50,7 +51,7 @@ impl Coal {
         &self,
         folder: &Path,
         name: &str,
-        [a, b]: [&[Vector3<f64>]; 2],
+        [a, b]: [PeerShape<'_>; 2],
         trajectories: &[Trajectory],
     ) -> Result<CoalRun<'_>, PeerError> {
         let write = |ending: String, text: String| {
@@ -62,10 +63,13 @@ impl Coal {
             .iter()
             .enumerate()
             .map(|(i, trajectory)| write(format!("{i}.poses"), motion::to_text(std::slice::from_ref(trajectory))));
+        let argument = |ending: &str, shape: PeerShape<'_>| {
+            shape.coal_argument(|points| write(ending.to_owned(), points_text(points)))
+        };
         Ok(CoalRun {
             program: &self.program,
-            a: write("a.xyz".to_owned(), points_text(a))?,
-            b: write("b.xyz".to_owned(), points_text(b))?,
+            a: argument("a.xyz", a)?,
+            b: argument("b.xyz", b)?,
             poses: poses.collect::<Result<_, _>>()?,
             runs: Vec::new(),
         })
@@ -98,12 +102,12 @@ fn entries(folder: &Path) -> Vec<PathBuf> {
     fs::read_dir(folder).map_or(Vec::new(), |found| found.filter_map(|entry| Some(entry.ok()?.path())).collect())
 }
 
-/// Coal on one pair of hulls, run several times.
+/// Coal on one pair of shapes, run several times.
 #[derive(Debug)]
 pub struct CoalRun<'a> {
     program: &'a Path,
-    a: PathBuf,
-    b: PathBuf,
+    a: OsString,
+    b: OsString,
     /// A file for each trajectory.
     poses: Vec<PathBuf>,
     /// Of each pass over the trajectories.
@@ -121,7 +125,8 @@ impl CoalRun<'_> {
     pub fn pass(&mut self) -> Result<(), PeerError> {
         let run = self.poses.iter().map(|poses| {
             let mut command = Command::new(self.program);
-            let output = printed(self.program, command.args([&self.a, &self.b, poses, &poses.with_extension("coal")]))?;
+            command.args([&self.a, &self.b]).args([poses, &poses.with_extension("coal")]);
+            let output = printed(self.program, &mut command)?;
             serde_json::from_slice(&output)
                 .map_err(|error| PeerError::program(self.program, format!("prints no times: {error}")))
         });

@@ -7,7 +7,7 @@ use super::peers::{HullPair, Simple, hulls, judged};
 use crate::comparison::ComparisonError;
 use crate::comparison::Subject;
 use crate::comparison::sweep::{Answer, Row};
-use crate::comparison::{Coal, FitCache, motion, parry_pose};
+use crate::comparison::{Coal, FitCache, PeerShape, motion, parry_pose};
 use parry3d_f64::math::Pose as ParryPose;
 use sublevel::body::Shape;
 use sublevel::measure::{Distance, Options, Pose, WarmStart, distance, distance_batch, signed_distance};
@@ -149,7 +149,7 @@ pub(super) fn race(
     let mut runs = Vec::new();
     for pair in hulls.iter().filter(|_| coal.is_some()) {
         let of = pair.count.map_or("exact".to_owned(), |count| count.to_string());
-        let vertices = pair.vertices.each_ref().map(Vec::as_slice);
+        let vertices = pair.vertices.each_ref().map(|vertices| PeerShape::Hull(vertices));
         let run =
             coal.map(|coal| coal.start(cache.folder(), &format!("speed-{name}-{of}"), vertices, &poses)).transpose()?;
         runs.extend(run.map(|run| (Who::CoalHull(pair.count), run)));

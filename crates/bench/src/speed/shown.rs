@@ -70,8 +70,6 @@ impl Shown {
             "verdicts" => self.verdicts(),
             "notes" => NOTES.to_owned(),
             "times as fast" => self.times_as_fast(),
-            "edges" => self.edges(),
-            "edges in short" => self.edges_in_short(),
             "cold" => self.cold()?,
             "small errors" => self.small_errors(),
             "errors of degree 6" => self.errors_of_degree_6()?,
@@ -168,46 +166,6 @@ impl Shown {
     fn span(&self, who: Who, of: impl Fn(&Line) -> f64) -> Option<Span> {
         let lines = self.races.iter().flat_map(|race| &race.lines).filter(|line| line.who == who);
         Span::of(lines.map(of).filter(|value| value.is_finite()))
-    }
-
-    fn edges(&self) -> String {
-        let mut text = String::from("| | warm | cold |\n|---|---|---|\n");
-        let body = |degree| Who::Ours(Method::Body { degree, refine: false });
-        let slabs = |degree, slabs| Who::Ours(Method::Slabs { degree, slabs });
-        for (name, who) in [
-            ("degree 6, smooth", body(6)),
-            ("oriented box", Who::Ours(Method::OrientedBox)),
-            ("degree 2, 3 slabs", slabs(2, 3)),
-            ("degree 6, 6 slabs", slabs(6, 6)),
-            ("oriented box, parry", Who::ParryBox),
-            ("ball", Who::Ours(Method::Ball)),
-            ("ball, parry (a formula)", Who::ParryBall),
-        ] {
-            let cell = |time: fn(&Line) -> f64| self.span(who, time).map_or("-".into(), Span::microseconds);
-            let _ = writeln!(text, "| {name} | {} | {} |", cell(|line| line.warm), cell(|line| line.cold));
-        }
-        text
-    }
-
-    /// The limits of edges as a list item.
-    fn edges_in_short(&self) -> String {
-        let edged = |who| matches!(who, Who::Ours(Method::OrientedBox | Method::AxisBox | Method::Slabs { .. }));
-        let smooth = |who| matches!(who, Who::Ours(Method::Ball | Method::Body { .. }));
-        let span = |of: &dyn Fn(Who) -> bool, time: fn(&Line) -> f64| {
-            let lines = self.races.iter().flat_map(|race| &race.lines).filter(|line| of(line.who));
-            Span::of(lines.map(|line| 1e-3 * time(line)).filter(|time| time.is_finite()))
-        };
-        let text = |of: &dyn Fn(Who) -> bool, digits, time: fn(&Line) -> f64| {
-            span(of, time).map_or("-".to_owned(), |span| span.text(digits))
-        };
-        format!(
-            "- Bodies with edges (boxes, bodies cut by slabs) take {} µs with a hint and {} µs cold, where bodies of one\n  \
-             polynomial take {} and {} µs ([speed.csv](docs/speed.csv)).\n",
-            text(&edged, 0, |line| line.warm),
-            text(&edged, 0, |line| line.cold),
-            text(&smooth, 1, |line| line.warm),
-            text(&smooth, 1, |line| line.cold)
-        )
     }
 
     /// Where ours are slower than their peers without a hint.

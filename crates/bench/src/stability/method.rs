@@ -3,7 +3,7 @@
 use super::arbiter::{Proposal, Truth, judge};
 use super::question::{CaseError, Question, Verdict};
 use crate::baselines::{Clarabel, ConicProgram, Posed, between, newton, slsqp};
-use crate::comparison::{Coal, Hulls, PeerError, motion::Trajectory, parry_pose};
+use crate::comparison::{Coal, Hulls, PeerError, PeerShape, motion::Trajectory, parry_pose};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::path::Path;
 use std::str::FromStr;
@@ -400,7 +400,7 @@ fn coal_distance(
     relative: Pose,
 ) -> Result<Option<f64>, PeerError> {
     let trajectory: Trajectory = vec![relative];
-    let mut run = coal.start(folder, "case", points, &[trajectory])?;
+    let mut run = coal.start(folder, "case", points.map(PeerShape::Hull), &[trajectory])?;
     run.pass()?;
     Ok(run.distances()?.first().and_then(|distances| distances.first()).copied())
 }

@@ -2,7 +2,7 @@
 
 use super::effort::Effort;
 use crate::comparison::sweep::{Answer, Row};
-use crate::comparison::{Coal, ComparisonError, FitCache, Hulls, Subject, motion, parry_pose};
+use crate::comparison::{Coal, ComparisonError, FitCache, Hulls, PeerShape, Subject, motion, parry_pose};
 use sublevel::body::Body;
 use sublevel::fit::FitOptions;
 use sublevel::measure::{Distance, Options, Pose, WarmStart, distance};
@@ -78,7 +78,9 @@ pub(super) fn steps(
         ];
         rows.push((Who::Parry, parry));
         let name = format!("warm-{pair}-{}", step.map_or("teleport".to_owned(), |step| format!("{step:e}")));
-        let mut run = coal.map(|coal| coal.start(cache.folder(), &name, [&a.hull, &b.hull], &poses)).transpose()?;
+        let mut run = coal
+            .map(|coal| coal.start(cache.folder(), &name, [a, b].map(|of| PeerShape::Hull(&of.hull)), &poses))
+            .transpose()?;
         for _ in 0..effort.passes {
             if let Some(run) = &mut run {
                 run.pass()?;
