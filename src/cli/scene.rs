@@ -53,8 +53,8 @@ enum SceneCommand {
         /// where it is nearest to what is not of it
         ///
         /// Up to four times, each in a colour of its own: several states of a robot, or of several,
-        /// which keep a state until their next one. The states are set in a fork of the scene, which
-        /// is removed again. Half-spaces have no end and are not drawn.
+        /// which keep a state until their next one. The states are set in a fork of the scene,
+        /// which is removed again. Half-spaces have no end and are not drawn.
         #[arg(long = "state", value_name = "ROBOT=V,V,...", requires = "svg")]
         states: Vec<RobotState>,
     },

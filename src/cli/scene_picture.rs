@@ -108,7 +108,7 @@ async fn look(client: &Client, fork: &str, states: &[RobotState], drawn: &mut Dr
 /// Whether an object is a link of a robot, or held by one.
 fn is_moved(scene: &SceneState, name: &str, robot: &str) -> bool {
     let mut at = name;
-    // Whoever holds is an object of the scene; more steps than objects are none.
+    // Each step leads to an object of the scene, so there are at most as many steps as objects.
     for _ in 0..=scene.objects.len() {
         let Some(object) = scene.objects.get(at) else { return false };
         if at.strip_prefix(robot).is_some_and(|rest| rest.starts_with('/')) {

@@ -210,8 +210,8 @@ impl Silhouettes {
         svg
     }
 
-    /// Where the entries of the legend begin, pixels from the left and from the first line: one after
-    /// the other, on a further line where the picture ends.
+    /// Where the entries of the legend begin, pixels from the left and from the first line: one
+    /// after the other, on a further line where the picture ends.
     fn legend_places(&self, width: f64) -> Vec<[f64; 2]> {
         let (mut left, mut line) = (GAP, 0.0);
         let mut places = Vec::with_capacity(self.legend.len());

@@ -1,4 +1,4 @@
-//! Jobs that have ended, told to who counts them.
+//! Reports of jobs that have ended, for metrics.
 
 use std::fmt;
 use std::sync::Arc;
@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use crate::store::Job;
 
-/// Hears of every job once when it has ended, with how long its last attempt took, if there was one
-/// and it came to its end.
+/// Called once for each job that has ended, with the time of its last attempt, if there was one and
+/// it came to its end.
 #[derive(Clone)]
 pub(super) struct Listener(Arc<Hear>);
 

@@ -10,7 +10,7 @@
 //! line; `hierarchy` does both for solves, `derive` for pairs of links; `link_body` makes bodies of
 //! the links of robots; `obstacle` says which stored bodies can be used; `worker` does one job
 //! after the other; `board` is where it says how far it is, and where everybody waits for news;
-//! `ended_job` tells who counts them of jobs that have ended.
+//! `ended_job` reports jobs that have ended, for metrics.
 
 mod board;
 mod derive;

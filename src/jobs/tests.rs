@@ -40,7 +40,7 @@ fn a_job_that_is_cancelled_before_it_is_on_the_board_makes_nothing() {
     assert_eq!(state, JobState::Cancelled);
 }
 
-/// Every end is heard of once, whoever causes it.
+/// The end of a job is reported once, whatever caused it.
 #[test]
 fn who_counts_jobs_hears_of_each_once() {
     let (_dir, catalogue, id) = claimed();

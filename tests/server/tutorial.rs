@@ -1,5 +1,5 @@
-//! The planner of the tutorial, `docs/planning.md`: what the page shows is what the example does, and
-//! it plans.
+//! The planner of the tutorial, `docs/planning.md`: what the page shows is what the example does,
+//! and it plans.
 
 use std::path::Path;
 
@@ -12,8 +12,8 @@ use crate::robots::CUBE;
 #[path = "../../examples/robot.rs"]
 mod robot;
 
-/// An arm of seven joints that turn about z and y in turns, with the reach of a Panda: capsules, and
-/// a cube for a hand, whose mesh is a file.
+/// An arm of seven joints that turn about z and y in turns, with the reach of a Panda: capsules,
+/// and a cube for a hand, whose mesh is a file.
 fn arm() -> String {
     let links = [0.2, 0.06, 0.2, 0.08, 0.25, 0.05, 0.08].iter().enumerate().map(|(index, length)| {
         format!(

@@ -3,8 +3,8 @@
 //!
 //! `.ci/instructions` runs it: each row in a process of its own, on the AVX2 path (valgrind knows
 //! no AVX-512), on two fitted bodies that are kept beside this file and on shapes, in poses that
-//! depend on nothing. The counts are compared with those recorded in `benches/instructions.json`; they belong
-//! to one version of the compiler, which is recorded with them.
+//! depend on nothing. The counts are compared with those recorded in `benches/instructions.json`;
+//! they belong to one version of the compiler, which is recorded with them.
 
 use clap::Parser;
 use nalgebra::{UnitQuaternion, Vector3};

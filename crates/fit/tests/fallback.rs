@@ -1,5 +1,5 @@
-//! Fits on which the solver that is tried first fails: the other one makes them, and the report says
-//! so.
+//! Fits on which the solver that is tried first fails: the other one makes them, and the report
+//! says so.
 
 use std::ops::ControlFlow;
 

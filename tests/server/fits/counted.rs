@@ -68,7 +68,7 @@ async fn jobs_are_counted_by_task_and_outcome() {
     let request = HierarchyRequest { measure: HierarchyMeasure::Distance, sets, level: 0 };
     client.solve_hierarchy(&request, |_| {}, std::future::pending()).await.expect("solved");
 
-    // The end of a job is told to its watchers first.
+    // Watchers of a job get its end before it is counted.
     eventually(async || ended("hierarchy", "succeeded") == 1.0).await;
     assert_eq!(["succeeded", "failed", "cancelled"].map(|outcome| ended("fit", outcome)), [1.0, 1.0, 2.0]);
     assert_eq!(["succeeded", "failed", "cancelled"].map(|outcome| ended("derive", outcome)), [0.0; 3]);
@@ -91,14 +91,14 @@ const HARD: [u64; 4] = [549, 575, 736, 1126];
 /// Who has fits made hears of it where the first solver fails: in the job, in the metrics, on the
 /// command line.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_solver_that_takes_over_is_told() {
+async fn a_solver_that_takes_over_is_reported() {
     let dir = tempfile::tempdir().expect("a directory");
     let admin = free_port();
     let mut serve = command(&dir.path().join("data"));
     serve.args(["--admin", &admin.to_string()]);
     let server = Running::spawn(serve);
     let mut clients = server.connect().await;
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     for seed in HARD {
         let (_, points, _) = drawn(seed % DRAWN_KINDS, &mut Seeded(seed));
         let id = clients.queue(header("hard", asked(Mode::Body(body(6)))), &points).await.id;
@@ -110,20 +110,20 @@ async fn a_solver_that_takes_over_is_told() {
         } else {
             assert_eq!(optimum.solver(), FitSolver::Structured, "seed {seed}");
             assert!(optimum.fallback.starts_with("clarabel failed: "), "seed {seed}: {}", optimum.fallback);
-            told.push((points, optimum.fallback));
+            reported.push((points, optimum.fallback));
         }
     }
     let programs = |solver: &str, fallback: &str| {
         value(admin, &format!("sublevel_fit_programs_total{{solver=\"{solver}\",fallback=\"{fallback}\"}}"))
     };
-    let count = told.len() as f64;
+    let count = reported.len() as f64;
     eventually(async || programs("clarabel", "no") + programs("structured", "yes") == HARD.len() as f64).await;
     assert_eq!(
         [programs("structured", "yes"), programs("structured", "no"), programs("clarabel", "yes")],
         [count, 0.0, 0.0]
     );
 
-    let (points, why) = told.pop().expect("clarabel solves all of them now: choose others for the test");
+    let (points, why) = reported.pop().expect("clarabel solves all of them now: choose others for the test");
     let text = points.iter().fold(String::new(), |mut text, point| {
         writeln!(text, "{} {} {}", point.x, point.y, point.z).expect("a string");
         text

@@ -2,9 +2,10 @@
 //! margin.
 //!
 //! Two balls have a formula. Else balls inside and around come first, then planes across a few
-//! directions, whose heights are looked up. What touches a box or a cylinder, or does not, the least
-//! value of the other body's polynomial over that shape decides; of two such shapes, a point of
-//! both or a plane between them. The search for the distance, which stops as soon as its bracket decides, comes last.
+//! directions, whose heights are looked up. What touches a box or a cylinder, or does not, the
+//! least value of the other body's polynomial over that shape decides; of two such shapes, a point
+//! of both or a plane between them. The search for the distance, which stops as soon as its bracket
+//! decides, comes last.
 
 use crate::body::Solid;
 use crate::measure::distance::{Distance, distance_until};
@@ -145,12 +146,17 @@ pub(super) fn check(threshold: f64) -> Result<(), ThresholdError> {
 }
 
 fn decide(found: &Distance, at_most: f64) -> Decision {
-    if found.upper <= at_most {
+    decision([found.lower, found.upper], at_most)
+}
+
+/// Whether a distance in a bracket, negative in overlap, is at most this, metres.
+pub(super) fn decision([lower, upper]: [f64; 2], at_most: f64) -> Decision {
+    if upper <= at_most {
         Decision::Yes
-    } else if found.lower > at_most {
+    } else if lower > at_most {
         Decision::No
     } else {
-        Decision::Undecided { lower: found.lower, upper: found.upper }
+        Decision::Undecided { lower: lower.max(0.0), upper: upper.max(0.0) }
     }
 }
 

@@ -1,5 +1,6 @@
-//! Families 1, 2, 7, 9 to 13, 18 and 19 with capsules, segments and points against boxes, cylinders,
-//! balls and each other: the distance of a point has closed forms, and along an axis it is convex.
+//! Families 1, 2, 7, 9 to 13, 18 and 19 with capsules, segments and points against boxes,
+//! cylinders, balls and each other: the distance of a point has closed forms, and along an axis it
+//! is convex.
 
 use nalgebra::Vector3;
 use sublevel_core::body::Body;

@@ -7,7 +7,7 @@ use super::solid::distance_until;
 use crate::body::Solid;
 use crate::measure::frames::pose::Pose;
 use crate::measure::options::Options;
-use crate::measure::overlap::{Decision, ThresholdError, check};
+use crate::measure::overlap::{Decision, ThresholdError, check, decision};
 use crate::measure::pairwise_minimum::At;
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::warm::WarmStart;
@@ -24,7 +24,8 @@ use crate::measure::warm::WarmStart;
 /// let forearm = Capsule::new(0.1, 0.3)?;
 /// let at = |x| Pose::from_quaternion(Vector3::new(x, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0]);
 /// let test = |x| Ok::<_, Box<dyn std::error::Error>>(overlap_with_capsule(
-///     &crate_, &Pose::identity(), &forearm, &at(x)?, &Options::default(), &mut WarmStart::default(),
+///     &crate_, &Pose::identity(), &forearm, &at(x)?, &Options::default(),
+///     &mut WarmStart::default(),
 /// ));
 /// assert_eq!(test(0.59)?, Decision::Yes);
 /// assert_eq!(test(0.61)?, Decision::No);
@@ -50,13 +51,17 @@ pub fn overlap_with_capsule(
 /// ```
 /// use nalgebra::Vector3;
 /// use sublevel_core::body::Body;
-/// use sublevel_core::measure::{Capsule, Decision, Options, Pose, WarmStart, nearer_to_capsule_than};
+/// use sublevel_core::measure::{Capsule, Decision, Options, Pose, WarmStart};
+/// use sublevel_core::measure::nearer_to_capsule_than;
 ///
 /// let crate_ = Body::cuboid("crate", Vector3::new(0.5, 0.5, 0.5))?;
 /// let forearm = Capsule::new(0.1, 0.3)?;
 /// let beside = Pose::from_quaternion(Vector3::new(1.0, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0])?;
 /// let (origin, options) = (Pose::identity(), Options::default());
-/// let test = |t| nearer_to_capsule_than(&crate_, &origin, &forearm, &beside, t, &options, &mut WarmStart::default());
+/// let test = |t| {
+///     let mut warm = WarmStart::default();
+///     nearer_to_capsule_than(&crate_, &origin, &forearm, &beside, t, &options, &mut warm)
+/// };
 /// assert_eq!(test(0.41)?, Decision::Yes);
 /// assert_eq!(test(0.39)?, Decision::No);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -88,13 +93,7 @@ fn decide(
     warm: &mut WarmStart,
 ) -> Decision {
     let found = distance_until(of_solid, of_capsule, StopCriterion::compare(at_most), options, warm);
-    if found.upper <= at_most {
-        Decision::Yes
-    } else if found.lower > at_most {
-        Decision::No
-    } else {
-        Decision::Undecided { lower: found.lower.max(0.0), upper: found.upper.max(0.0) }
-    }
+    decision([found.lower, found.upper], at_most)
 }
 
 #[cfg(test)]

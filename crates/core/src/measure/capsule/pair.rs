@@ -144,7 +144,7 @@ impl Problem<'_> {
             upper,
             witness,
             witness_of_capsule,
-            // None where the axis is nearer than any double tells.
+            // None where the distance of the axis is below rounding.
             normal: Some(normal).filter(|normal| *normal != Vector3::zeros()),
             tied: false,
             iterations,
