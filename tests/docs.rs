@@ -4,12 +4,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Folders that ARCHITECTURE.md names in short, and where they lie.
-const SHORT: [(&str, &str); 13] = [
+const SHORT: [(&str, &str); 15] = [
     ("polynomial/", "crates/core/src/polynomial/"),
     ("optimize/", "crates/core/src/optimize/"),
     ("body/", "crates/core/src/body/"),
     ("measure/", "crates/core/src/measure/"),
+    ("branch_and_bound/", "crates/core/src/branch_and_bound/"),
     ("fit/", "crates/fit/src/"),
+    ("robot/", "crates/robot/src/"),
     ("scene/", "crates/scene/src/"),
     ("bench/", "crates/bench/src/"),
     ("store/", "src/store/"),
@@ -89,6 +91,15 @@ fn paths_name_what_is_there() {
     }
     assert!(missing.is_empty(), "\n{}", missing.join("\n"));
     assert!(found > 100, "{found} paths were looked at");
+}
+
+/// Lines of README.md, which is for first readers.
+const MOST_LINES_OF_README: usize = 200;
+
+#[test]
+fn the_readme_stays_short() {
+    let lines = fs::read_to_string(root().join("README.md")).expect("a page is text").lines().count();
+    assert!(lines <= MOST_LINES_OF_README, "README.md has {lines} lines");
 }
 
 /// Bytes of all files in docs/, and of one picture.

@@ -10,8 +10,15 @@ use std::fs;
 use std::path::Path;
 
 /// Sources of each crate.
-const CRATES: [&str; 6] =
-    ["crates/core/src", "crates/fit/src", "crates/scene/src", "crates/bench/src", "crates/testkit/src", "src"];
+const CRATES: [&str; 7] = [
+    "crates/core/src",
+    "crates/fit/src",
+    "crates/robot/src",
+    "crates/scene/src",
+    "crates/bench/src",
+    "crates/testkit/src",
+    "src",
+];
 
 #[test]
 fn no_files_import_each_other() {

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::certificate::Certificate;
-use super::problem::MotionItem;
+use super::geometry::MotionItem;
 
 /// What a motion is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

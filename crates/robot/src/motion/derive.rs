@@ -14,9 +14,10 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use sublevel_core::measure::{Options, WarmStart};
 
+use super::geometry::MotionItem;
 use super::placing::Placing;
 use super::planes::{Height, gap};
-use super::problem::{MotionItem, MotionProblem, PiecePair};
+use super::problem::{MotionProblem, PiecePair};
 use super::solve::solve;
 use crate::description::JointKind;
 use crate::kinematics::{Kinematics, LIMIT_SLACK};

@@ -15,6 +15,15 @@ pub enum MotionShape {
     Capsule(Capsule),
 }
 
+/// A body or an obstacle, by its position in the list of these.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
+pub enum MotionItem {
+    /// A body that is fixed to a link.
+    Body(usize),
+    /// An obstacle.
+    Obstacle(usize),
+}
+
 /// A body that is fixed to a link.
 #[derive(Clone, Debug)]
 pub struct MotionBody {

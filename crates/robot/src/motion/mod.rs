@@ -12,7 +12,9 @@
 mod answer;
 mod bound;
 mod certificate;
+mod certificate_error;
 mod claim;
+mod claim_of_problem;
 mod derive;
 mod geometry;
 mod interval;
@@ -25,12 +27,15 @@ mod solve;
 #[cfg(test)]
 mod tests;
 mod verify;
+mod verify_options;
 
 pub use answer::{MotionAnswer, MotionContact, MotionVerdict};
-pub use certificate::{Certificate, CertificateError};
+pub use certificate::Certificate;
+pub use certificate_error::CertificateError;
 pub use derive::{DEFAULT_DERIVE_RESOLUTION_M, DEFAULT_MAX_BOXES, DeriveOptions, DerivedPair, PairClass};
-pub use geometry::{MotionBody, MotionObstacle, MotionShape, PlacedObstacle};
+pub use geometry::{MotionBody, MotionItem, MotionObstacle, MotionShape, PlacedObstacle};
 pub use path::{MAX_CONTROL_POINTS, MAX_PATH_POINTS, Path, PathError};
-pub use problem::{MAX_PIECE_PAIRS, MotionItem, MotionProblem, MotionProblemError};
+pub use problem::{MAX_PIECE_PAIRS, MotionProblem, MotionProblemError};
 pub use prove::{DEFAULT_MAX_CONFIGURATIONS, DEFAULT_RESOLUTION_M, MotionOptions, MotionWorkspace};
-pub use verify::{KnownBodies, VerifiedMotion, VerifyOptions};
+pub use verify::VerifiedMotion;
+pub use verify_options::{KnownBodies, VerifyOptions};

@@ -4,10 +4,10 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use sublevel_core::measure::Pose;
 
 use super::bound::{MovedBall, Moves};
-use super::geometry::PlacedObstacle;
+use super::geometry::{MotionItem, PlacedObstacle};
 use super::interval::Interval;
 use super::path::Path;
-use super::problem::{MotionItem, MotionProblem, PiecePair, motion, motion_bound_m, world};
+use super::problem::{MotionProblem, PiecePair, motion, motion_bound_m, world};
 
 /// Bound of the rounding of the pose of a body on its link, relative to the lengths.
 const PLACING_ROUNDING: f64 = 64.0 * f64::EPSILON;

@@ -5,8 +5,8 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::{Isometry3, Point3, Vector3};
 use sublevel_core::measure::{Motion, Pose};
 
-use super::claim::{Claim, DigestedClaim};
-use super::geometry::{MotionBody, MotionObstacle, Piece, PlacedObstacle};
+use super::claim::DigestedClaim;
+use super::geometry::{MotionBody, MotionItem, MotionObstacle, Piece, PlacedObstacle};
 use crate::kinematics::Kinematics;
 
 /// A robot with what is fixed to its links, among obstacles. Made once, it serves many paths.
@@ -24,15 +24,6 @@ pub struct MotionProblem {
     pub(crate) pairs: Vec<PiecePair>,
     /// What certificates say of all this; made when first asked for.
     pub(crate) claim: OnceLock<Arc<DigestedClaim>>,
-}
-
-/// A body or an obstacle, by its position in the list of these.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
-pub enum MotionItem {
-    /// A body that is fixed to a link.
-    Body(usize),
-    /// An obstacle.
-    Obstacle(usize),
 }
 
 /// Why bodies and obstacles are no problem.
@@ -230,11 +221,6 @@ impl MotionProblem {
             steps[side] += 1;
         }
         steps
-    }
-
-    /// What certificates say of it.
-    pub(crate) fn claim(&self) -> &Arc<DigestedClaim> {
-        self.claim.get_or_init(|| Arc::new(DigestedClaim::new(Claim::of(self))))
     }
 
     /// The robot.

@@ -1,7 +1,7 @@
 //! Sizes beyond which a text is not parsed. The parser compares each attribute with the others of
 //! its element, and each prefix with all that are declared.
 
-use super::at;
+use super::text_error::at;
 use crate::error::DescriptionError;
 
 /// Most bytes of a text.

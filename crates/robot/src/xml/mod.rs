@@ -4,6 +4,7 @@ mod attribute;
 mod element;
 mod limits;
 mod text;
+mod text_error;
 mod vocabulary;
 mod xacro;
 
@@ -13,10 +14,8 @@ use crate::error::DescriptionError;
 
 pub(crate) use element::{Element, check_unique};
 pub(crate) use text::{quoted, quoted_list};
+use text_error::{FILE, at};
 pub(crate) use vocabulary::Vocabulary;
-
-/// Path of errors where there is no element yet.
-const FILE: &str = "file";
 
 /// Parses a text of limited size.
 pub(crate) fn parse(text: &str) -> Result<Document<'_>, DescriptionError> {
@@ -71,10 +70,4 @@ fn explained(text: &str, error: &Error) -> DescriptionError {
             remedy: "correct it, or export the file again".into(),
         },
     }
-}
-
-/// An error of the text as a whole, at a byte of it.
-fn at(text: &str, offset: usize, problem: String, remedy: &str) -> DescriptionError {
-    let (line, column) = text::position(text, offset);
-    DescriptionError { line, column, path: FILE.into(), problem, remedy: remedy.into() }
 }
