@@ -2,14 +2,15 @@
 //!
 //! # Inside
 //!
-//! A warm start is corrected by Newton's method on the optimality system of its active constraints
+//! Boxes, cylinders, balls and capsules have closed forms (`solver/exact_shape`). Otherwise a warm
+//! start is corrected by Newton's method on the optimality system of its active constraints
 //! (`solver/kkt_newton`, and `solver/continuation` where one constraint of each body is active);
 //! where that does not apply or does not converge, an interior-point method ([`crate::optimize`])
-//! does. Neither is trusted: an answer is accepted when its bracket (`bounds`) is narrow enough. As
-//! that holds a normal to about the root of its width only, the equations have to hold there, too.
-//! Solids of several parts are solved pair by pair (`pairwise_minimum`). Imports go one way:
-//! measures on `solver`, that on `bounds`, these on `frames`. Neither clock nor allocator nor
-//! threads are used.
+//! takes over. No method's result is accepted by itself: an answer is accepted when its bracket
+//! (`bounds`) is narrow enough. A bracket determines the normal to about the root of its width
+//! only, so the optimality equations are checked as well. Solids of several parts are solved pair
+//! by pair (`pairwise_minimum`). Imports go one way: measures on `solver`, that on `bounds`, these
+//! on `frames`. Neither clock nor allocator nor threads are used.
 
 mod batch;
 mod bounds;

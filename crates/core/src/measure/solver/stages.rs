@@ -1,6 +1,6 @@
 //! The stages of a search. A stage that fails hands on to the next, so that a broken one would be
 //! replaced without a trace: tests switch the others off and have each solve a catalogue alone
-//! (`tests/stages.rs`).
+//! (`tests/stages/`).
 
 /// A method that finds an answer, or a part of one, which another one would find as well.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
