@@ -1,8 +1,8 @@
 //! The mathematics of Sublevel: polynomials with their proofs, certified convex bodies, and what is
 //! measured between them.
 //!
-//! Nothing here knows of files of meshes, of scenes or of a network; [`body`] reads and writes body
-//! files as text. The package `sublevel` re-exports these modules.
+//! Nothing here depends on files of meshes, of scenes or of a network; [`body`] reads and writes
+//! body files as text. The package `sublevel` re-exports these modules.
 
 pub mod body;
 pub mod branch_and_bound;

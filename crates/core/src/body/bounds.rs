@@ -1,4 +1,4 @@
-//! Simple sets that hold a body.
+//! Simple sets that contain a body.
 
 use nalgebra::Vector3;
 

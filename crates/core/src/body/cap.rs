@@ -169,7 +169,7 @@ impl Section {
             let to = polygon[place];
             let (before, after) =
                 (polygon[(place + polygon.len() - 1) % polygon.len()], polygon[(place + 1) % polygon.len()]);
-            // Where a corner is passed twice, only one of the two angles holds the bridge.
+            // Where a corner is passed twice, only one of the two angles contains the bridge.
             let (left, right) = (self.turn(before, to, corner) > 0.0, self.turn(to, after, corner) > 0.0);
             let within = if self.turn(before, to, after) >= 0.0 { left && right } else { left || right };
             let all = [&polygon[..], hole].into_iter().chain(others.iter().map(Vec::as_slice));

@@ -116,8 +116,8 @@ impl Compound {
 
     /// Upper bound of the distance of any point of the compound from the union of the convex hulls
     /// of the pieces that its parts were fitted to, metres: the largest [`Body::gap_m`] of the
-    /// parts, if all have one. The hull of the whole object holds that union, so the bound is good
-    /// for it, too.
+    /// parts, if all have one. The hull of the whole object contains that union, so the bound is
+    /// good for it, too.
     pub fn gap_m(&self) -> Option<f64> {
         self.parts.iter().map(Body::gap_m).try_fold(0.0, |most: f64, gap| Some(most.max(gap?)))
     }

@@ -274,7 +274,7 @@ impl Body {
         self.points.as_ref()
     }
 
-    /// Sets that it was fitted around, with proofs that hold whenever the set is at hand.
+    /// Sets that it was fitted around, with proofs that can be checked when the set is given.
     pub fn sets(&self) -> &[ContainedSet] {
         &self.sets
     }

@@ -24,7 +24,7 @@ pub(super) fn middle(face: usize, i: usize, j: usize) -> Vector3<f64> {
     on_face(face, 2 * i + 1, 2 * j + 1)
 }
 
-/// The point of a face after so many halves of cells.
+/// The point of a face at these multiples of half a cell.
 fn on_face(face: usize, i: usize, j: usize) -> Vector3<f64> {
     let across = |halves: usize| halves as f64 / CELLS as f64 - 1.0;
     let mut point = Vector3::zeros();

@@ -18,9 +18,9 @@ pub struct Cut {
     pub height_m: f64,
 }
 
-/// How a mesh is divided into pieces, and which part of a compound holds which of them.
+/// How a mesh is divided into pieces, and which part of a compound contains which of them.
 ///
-/// As chains the pieces add up to the mesh (see [`Piece`]), also when several are held by one part.
+/// As chains the pieces add up to the mesh (see [`Piece`]), also when one part contains several.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Division {
     /// Whether the first pieces are the components of the mesh ([`Piece::components`]) and are cut
@@ -29,7 +29,7 @@ pub struct Division {
     pub separated: bool,
     /// Planes that divide pieces, one after the other.
     pub cuts: Vec<Cut>,
-    /// For each piece the part that holds it; empty if these are the same numbers.
+    /// For each piece the part that contains it; empty if these are the same numbers.
     pub parts: Vec<usize>,
 }
 
@@ -66,7 +66,7 @@ pub enum DivisionError {
 }
 
 impl Division {
-    /// The division by planes alone, each piece held by the part of its number.
+    /// The division by planes alone, each piece contained in the part of its number.
     pub fn by_cuts(cuts: Vec<Cut>) -> Self {
         Self { separated: false, cuts, parts: Vec::new() }
     }
@@ -76,7 +76,7 @@ impl Division {
         if self.parts.is_empty() { parts } else { self.parts.len() }
     }
 
-    /// The part that holds a piece.
+    /// The part that contains a piece.
     pub fn part(&self, piece: usize) -> usize {
         self.parts.get(piece).copied().unwrap_or(piece)
     }
@@ -106,8 +106,8 @@ impl Division {
         held.iter().position(|held| !held).map_or(Ok(()), |part| Err(DivisionError::NoPiece(part)))
     }
 
-    /// For each of this many parts the pieces of a mesh that it holds (see [`Piece`] for what they
-    /// say of the mesh).
+    /// For each of this many parts the pieces of a mesh that it contains (see [`Piece`] for what
+    /// they say of the mesh).
     ///
     /// # Errors
     /// [`DivisionError`], also of a mesh that has other components.

@@ -80,7 +80,7 @@ pub(super) fn check_format(format: &str, kind: &str, expected: &'static str) -> 
     Ok(())
 }
 
-/// JSON text of a file, a line per key of its objects down to so many levels.
+/// JSON text of a file, a line per key of its objects down to a given depth.
 pub(super) fn write(file: &impl Serialize, levels: usize) -> String {
     let mut text = Vec::new();
     let mut serializer = serde_json::Serializer::with_formatter(&mut text, LinePerKey { levels, depth: 0 });
@@ -166,7 +166,7 @@ impl Provenance {
     }
 }
 
-/// Holds a stored value that follows from others against the recomputed one, at the accuracy of
+/// Compares a stored value that follows from others with the recomputed one, at the accuracy of
 /// `scale`.
 pub(super) fn check_scalar(field: &'static str, stored: f64, recomputed: f64, scale: f64) -> Result<(), BodyFileError> {
     // Not `>`: a NaN is wrong too.

@@ -18,7 +18,7 @@ pub enum NotCovered {
     /// The division does not match mesh and parts.
     #[error(transparent)]
     Division(#[from] DivisionError),
-    /// A part does not hold its piece.
+    /// A part does not contain its piece.
     #[error("part {part} does not hold its piece of the mesh: {source}")]
     Part {
         /// Which part, from 0.
@@ -41,8 +41,8 @@ impl Body {
 
 impl Compound {
     /// Proves that this compound covers a mesh: every triangle, and what it encloses if it is
-    /// closed. Each part must hold its pieces of those that the mesh is divided into. Returns how
-    /// much is covered, and a rigorous upper bound of the constraints over the pieces.
+    /// closed. Each part must contain its pieces of those that the mesh is divided into. Returns
+    /// how much is covered, and a rigorous upper bound of the constraints over the pieces.
     ///
     /// # Errors
     /// [`NotCovered`]: the part that fails, and where.

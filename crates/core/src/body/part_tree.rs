@@ -12,7 +12,7 @@ pub struct PartNode {
     pub content: NodeContent,
 }
 
-/// What a node of a tree holds.
+/// The content of a node of a tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NodeContent {
     /// One part, by its position in [`Solid::parts`](super::Solid::parts).

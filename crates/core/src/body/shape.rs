@@ -1,4 +1,4 @@
-//! Whatever a file holds: a body or a compound.
+//! The content of a file: a body or a compound.
 
 use super::bounds::{Aabb, Ball};
 use super::compound::Compound;

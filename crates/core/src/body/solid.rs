@@ -1,11 +1,11 @@
-//! What bodies, compounds and what a file holds of either have in common.
+//! What bodies, compounds and the shapes of files have in common.
 
 use super::bounds::{Aabb, Ball};
 use super::convex_body::Body;
 use super::part_tree::PartTree;
 
-/// What measures ask of a solid: the convex bodies it is the union of, all in one frame, and a ball
-/// around them.
+/// What measures need of a solid: the convex bodies it is the union of, all in one frame, and a
+/// ball around them.
 ///
 /// A [`Body`] is the union of itself; a measure of a single body takes no longer for this.
 pub trait Solid: Sealed {

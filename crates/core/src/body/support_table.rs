@@ -1,4 +1,4 @@
-//! What a body looks like from outside, roughly, for any direction: where a cold start begins.
+//! Support points of a body for a grid of directions, approximately: where a cold start begins.
 //! Nothing is proven by it.
 //!
 //! The point of a convex set farthest along a unit vector e, as a function of e, is the gradient of

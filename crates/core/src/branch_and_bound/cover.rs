@@ -19,7 +19,7 @@ const NOTHING: CellIndex = CellIndex::MAX;
 /// are as small as their rounding.
 const SMALLEST: f64 = 1e-14;
 
-/// A box that may hold points of the set.
+/// A box that may contain points of the set.
 #[derive(Clone, Debug)]
 pub(super) struct Cell {
     pub(super) center: Vector3<f64>,
@@ -43,7 +43,7 @@ pub(super) struct Cover {
 }
 
 impl Cover {
-    /// Of one cell around the bounding box; none if it holds nothing.
+    /// Of one cell around the bounding box; none if it contains no points.
     pub(super) fn new(of: &BoundedSet<'_>) -> Result<Option<Self>, PlacedSetError> {
         let normalization = of.set.normalization;
         let inverse: Matrix3<f64> = normalization.linear.try_inverse().ok_or(PlacedSetError::Normalization)?;
@@ -65,12 +65,12 @@ impl Cover {
         &self.cells[index as usize]
     }
 
-    /// Half-spaces that hold the points of the set in a cell, about its centre.
+    /// Half-spaces that contain the points of the set in a cell, about its centre.
     pub(super) fn cuts(&self, cell: &Cell) -> &[Cut] {
         &self.cuts[cell.cuts.start as usize..cell.cuts.end as usize]
     }
 
-    /// Memory that it holds, bytes.
+    /// Memory that it takes, bytes.
     pub(super) fn bytes(&self) -> usize {
         self.cells.capacity() * size_of::<Cell>() + self.cuts.capacity() * size_of::<Cut>()
     }
@@ -91,7 +91,7 @@ impl Cover {
         self.cell(index).half.amax() > self.smallest
     }
 
-    /// The halves of a cell that may hold points of the set, across its longest edge in space.
+    /// The halves of a cell that may contain points of the set, across its longest edge in space.
     pub(super) fn halves(&mut self, of: &BoundedSet<'_>, index: CellIndex) -> impl Iterator<Item = CellIndex> + use<> {
         let cell = &self.cells[index as usize];
         if cell.halves == UNDIVIDED {

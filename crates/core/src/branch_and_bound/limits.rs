@@ -9,7 +9,7 @@ pub const DEFAULT_STEPS: usize = 100_000;
 /// Steps that a comparison may take although the bracket is narrow: some milliseconds.
 const STEPS_TO_DECIDE: usize = 4096;
 
-/// Steps between two looks at the clock.
+/// Steps between two readings of the clock.
 const STEPS_PER_LOOK: usize = 32;
 
 /// When a bracket is narrow enough, and when to end before. Whatever ends it, the bracket is true.
@@ -47,7 +47,7 @@ impl Default for Limits<'_> {
 }
 
 impl Limits<'_> {
-    /// Whether to end after so many steps, whatever is known.
+    /// Whether to end after this number of steps, whatever is known.
     pub(super) fn exhausted(&self, steps: usize) -> bool {
         steps >= self.max_steps
             || self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
@@ -64,8 +64,8 @@ impl Limits<'_> {
         if self.threshold.is_some() { upper } else { upper - self.tolerance(upper, scale) }
     }
 
-    /// Whether a bracket is narrow enough after so many steps. What is compared with a threshold
-    /// has to be decided, unless that takes too long.
+    /// Whether a bracket is narrow enough after this number of steps. What is compared with a
+    /// threshold has to be decided, unless that takes too long.
     pub(super) fn narrow(&self, lower: f64, upper: f64, scale: f64, steps: usize) -> bool {
         let is_open = self.threshold.is_some() && steps < STEPS_TO_DECIDE;
         upper - lower <= self.tolerance(upper, scale) && !is_open

@@ -26,7 +26,7 @@ impl Minimum {
         Self { status: Status::Converged, lower: f64::INFINITY, upper: f64::INFINITY, point: None, steps: 0 };
 }
 
-/// Divides until the limits say that it is enough. With `known`, a lower bound that holds anyway.
+/// Divides until the limits are reached. With `known`, a lower bound that is valid anyway.
 pub(super) fn minimise(
     set: &PlacedSet<'_>,
     cover: &mut Cover,

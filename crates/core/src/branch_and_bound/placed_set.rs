@@ -12,12 +12,12 @@ const POSE_ROUNDING: f64 = 128.0 * f64::EPSILON;
 /// Steps that pull a point into its set.
 const MAX_PULLS: usize = 60;
 
-/// A basic set in its own frame, with a box that holds it.
+/// A basic set in its own frame, with a box that contains it.
 #[derive(Clone, Debug)]
 pub struct BoundedSet<'a> {
     /// The set.
     pub set: BasicSet<'a>,
-    /// A box that holds it, metres; where it does not, the set is what is in both.
+    /// A box around it, metres; where the set reaches outside, only the part in the box counts.
     pub bounding_box: Aabb,
     /// Names the set, so that what is known of it is kept from query to query; none if it has no
     /// name.

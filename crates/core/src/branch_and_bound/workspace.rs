@@ -15,7 +15,7 @@ use std::collections::HashMap;
 /// Most memory of the covers that are kept, bytes.
 const MAX_BYTES: usize = 32 << 20;
 
-/// Brackets by branch and bound, with the covers of the sets that it was asked about. One for each
+/// Brackets by branch and bound, with the covers of the sets of earlier questions. One for each
 /// thread.
 #[derive(Debug, Default)]
 pub struct BranchAndBound {

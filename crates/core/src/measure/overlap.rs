@@ -21,7 +21,7 @@ pub enum Decision {
     Yes,
     /// No: proven.
     No,
-    /// The distance is too close to the threshold to tell; its proven bracket in metres.
+    /// The distance is too close to the threshold to decide; its proven bracket in metres.
     Undecided {
         /// Lower bound.
         lower: f64,

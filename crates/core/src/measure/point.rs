@@ -1,7 +1,7 @@
 //! Distance from a body to a point: the projection of the point on the body.
 //!
 //! For the unit vector n along `Σ λ_i ∇g_i(y)`, every point y' of the body has
-//! `n·(q - y') >= n·(q - y) - fall`, with the fall of
+//! `n·(q - y') >= n·(q - y) - deficit`, with the support deficit of
 //! [`crate::measure::bounds::duality_bounds::descent`]; so the plane through y with the normal n
 //! separates q from the body by as much. The program stays regular through contact: its Hessian is
 //! the identity plus what the body's curvature adds.

@@ -213,7 +213,7 @@ fn random_pairs_converge_and_agree_in_all_ways() {
             assert!(low_a - high_b >= answer.lower - 1e-6 * s, "{label}: support gap {}", low_a - high_b);
         }
 
-        // Level distances tell the same side of contact.
+        // Level distances are on the same side of contact.
         for (p, pose_p, q, pose_q) in [(a, &pose_a, b, &pose_b), (b, &pose_b, a, &pose_a)] {
             let level = cold_level(p, pose_p, q, pose_q);
             let label = format!("seed {seed} level {}-{}: {level:?}", p.name(), q.name());
@@ -446,8 +446,8 @@ fn flats_of_different_orders_take_few_iterations() {
     }
 }
 
-/// A bad hint finds that they touch all over, which says nothing of how deep: hand on hand, 1.3e-12
-/// m aside, had stayed at contact for 53 iterations.
+/// A bad hint finds contact everywhere, which does not determine the depth: hand on hand, 1.3e-12 m
+/// aside, had stayed at contact for 53 iterations.
 #[test]
 fn bodies_on_top_of_their_like_overlap_whatever_the_hint() {
     for seed in 0..90 {

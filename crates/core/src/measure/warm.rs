@@ -12,8 +12,8 @@ use nalgebra::Vector3;
 /// the same order; [`WarmStart::default`] is a cold start.
 ///
 /// It may change the time a query takes, never its answer beyond the bracket: a hint of another
-/// pair, of a pose far away, or of nonsense is found out by the bracket and the solve starts cold.
-/// Copying it forks a trajectory.
+/// pair, of a pose far away, or of nonsense does not prove a narrow bracket, and the solve starts
+/// cold. Copying it forks a trajectory.
 ///
 /// ```
 /// use nalgebra::Vector3;

@@ -41,7 +41,7 @@ impl Simplex {
         (0..self.len).map(|k| of(&self.corners[k]) * self.weights[k]).sum()
     }
 
-    /// The part of the simplex with one more corner that holds its point nearest to 0; the new
+    /// The part of the simplex with one more corner that contains its point nearest to 0; the new
     /// corner belongs to it.
     fn with(&self, corner: Corner) -> Self {
         let alone = Self { corners: [corner; 4], weights: [1.0, 0.0, 0.0, 0.0], len: 1 };
@@ -110,7 +110,7 @@ pub fn gjk(none: f64, n: &Vector3<f64>, support: impl Fn(&Vector3<f64>) -> Corne
         }
         last = support(&nearest);
         found = Approach { x, y, n: nearest / square.sqrt(), corners: (last.x, last.y), common: None };
-        // Four corners around 0 have no distance; if they do, rounding has the word.
+        // Four corners around 0 have no distance; a distance above 0 is rounding.
         let nearer = square - nearest.dot(&last.difference) > LEAST_APPROACH * square;
         if !nearer || simplex.len == 4 || step == MAX_STEPS {
             break;

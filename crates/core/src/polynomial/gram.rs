@@ -3,7 +3,7 @@
 //! A polynomial is sos-convex when `yᵀ ∇²p(z) y = wᵀ H w` for a positive semidefinite `H` and a
 //! basis `w` of monomials `y_i z^e`. A matrix in floating point matches the form only up to a
 //! residual; Peyrl and Parrilo (Theoret. Comput. Sci. 409, 2008) show how much positive
-//! definiteness pays for it.
+//! definiteness absorbs it.
 
 use super::certificate_error::CertificateError;
 use super::monomial::{Exponents, monomials};

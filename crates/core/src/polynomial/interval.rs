@@ -1,4 +1,4 @@
-//! Intervals of real numbers that are sure to hold the exact result of every operation.
+//! Intervals of real numbers that contain the exact result of every operation.
 //!
 //! The bounds of a result are rounded to nearest and then moved one floating-point number outwards,
 //! which covers that rounding, underflow included. A NaN, as from infinite bounds, spreads to

@@ -15,7 +15,7 @@ pub trait Vector<S: Simd>: Number<S> {
     fn load(simd: S, values: &[f64]) -> Self;
     /// Writes the lanes to the front of a slice of at least [`Vector::COUNT`].
     fn store(self, target: &mut [f64]);
-    /// The lanes where the mask holds, as bits.
+    /// The lanes where the mask is set, as bits.
     fn bits(simd: S, mask: Self::Mask) -> u32;
 }
 
@@ -147,7 +147,7 @@ numbers!(Singles of f32, single, as m32s, at most MAX_SINGLES, from 1e-18 on:
     splat_f32s neg_f32s mul_add_e_f32s less_than_or_equal_f32s and_m32s select_f32s,
     sqrt sqrt_f32s, abs abs_f32s, min min_f32s other, max max_f32s other);
 
-/// A bit of its own for each lane: of those where a mask holds the sum is exact.
+/// A bit of its own for each lane: of those where a mask is set the sum is exact.
 #[inline(always)]
 fn powers<const LANES: usize>() -> [f64; LANES] {
     let mut powers = [0.0; LANES];

@@ -64,7 +64,7 @@ struct Line<'a> {
     level: f64,
 }
 
-/// About the first t in [-1, 1] at which f, if convex, falls to `level`; where f is lowest, of
+/// About the first t in [-1, 1] at which f, if convex, decreases to `level`; where f is lowest, of
 /// equidistant t, if at none of these it lies below. A guess: nothing is proven of it.
 pub(super) fn first_below(nested: &Nested, middle: &Vector3<f64>, half: &Vector3<f64>, level: f64) -> f64 {
     dispatch(Line { nested, middle, half, level })

@@ -19,7 +19,7 @@ impl From<f64> for Constant {
 }
 
 /// Real numbers that are computed with: one double, or several doubles or singles side by side that
-/// know nothing of each other.
+/// are independent of each other.
 pub trait Number<S: Simd>:
     Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
@@ -57,9 +57,9 @@ pub trait Number<S: Simd>:
     fn le(self, other: Self) -> Self::Mask;
     /// Both masks.
     fn and(simd: S, a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    /// Whether the mask holds in every lane.
+    /// Whether the mask is set in every lane.
     fn all(simd: S, mask: Self::Mask) -> bool;
-    /// `self` where the mask holds, else `other`.
+    /// `self` where the mask is set, else `other`.
     fn select(self, mask: Self::Mask, other: Self) -> Self;
     /// Value, gradient and Hessian of a polynomial at points z, by the scheme that suits as many of
     /// them.

@@ -1,5 +1,5 @@
-//! Polynomials in three variables, held as lists of terms and as the tables that they are evaluated
-//! by.
+//! Polynomials in three variables, stored as lists of terms and as the tables that they are
+//! evaluated by.
 
 use super::hessian_form::HessianForm;
 use super::horner::Nested;
@@ -16,7 +16,7 @@ pub const MAX_DEGREE: usize = 8;
 
 /// A polynomial `p(z) = Σ c_e z^e` of even degree 2, 4, 6 or 8 in three variables.
 ///
-/// Terms are held in lexicographic order of their exponents, without zeros, so that equal
+/// Terms are stored in lexicographic order of their exponents, without zeros, so that equal
 /// polynomials compare equal.
 #[derive(Clone, Debug)]
 pub struct Polynomial {
@@ -107,7 +107,7 @@ impl Polynomial {
         N::jet(simd, self, z)
     }
 
-    /// About the first t in [-1, 1] at which the polynomial, if convex along the line, falls to
+    /// About the first t in [-1, 1] at which the polynomial, if convex along the line, decreases to
     /// `level` at `middle + t half`; a t where it is low if it hardly does. A guess: nothing is
     /// proven of it.
     #[inline]

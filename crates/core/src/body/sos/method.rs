@@ -16,8 +16,8 @@ pub enum SosMethod {
         /// What is minimised: `logdet-p` or `trace-p`.
         objective: Objective,
     },
-    /// `m(x)ᵀ M⁻¹ m(x)` with the moment matrix M of the points, below the smallest level that holds
-    /// all of them (Lasserre and Pauwels, NIPS 2016): a single matrix to invert.
+    /// `m(x)ᵀ M⁻¹ m(x)` with the moment matrix M of the points, below the smallest level that
+    /// contains all of them (Lasserre and Pauwels, NIPS 2016): a single matrix to invert.
     InverseMoment,
 }
 

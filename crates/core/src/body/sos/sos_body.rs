@@ -158,8 +158,8 @@ impl SosBody {
         self.provenance.as_ref()
     }
 
-    /// Where so many rays from the centre of the circumscribed ball run through the set: both ends
-    /// of each piece, metres. Thin parts may lie between them.
+    /// Where this number of rays from the centre of the circumscribed ball run through the set:
+    /// both ends of each piece, metres. Thin parts may lie between them.
     pub fn chords(&self, rays: usize) -> Vec<(Vector3<f64>, Vector3<f64>)> {
         let Normalization { center, linear } = &self.normalization;
         let ball = self.circumscribed;

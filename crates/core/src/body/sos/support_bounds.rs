@@ -74,8 +74,8 @@ fn unit(axis: usize) -> Vector3<f64> {
     Vector3::from_fn(|i, _| f64::from(u8::from(i == axis)))
 }
 
-/// Half the edges of a box about 0 that holds the set: `1 >= p >= ρ z_i^2j` for every power of z_i
-/// in the basis.
+/// Half the edges of a box about 0 that contains the set: `1 >= p >= ρ z_i^2j` for every power of
+/// z_i in the basis.
 fn first_box(polynomial: &Polynomial, gram: &SosGram) -> Result<Vector3<f64>, SosBodyError> {
     let mut half = Vector3::repeat(f64::INFINITY);
     for (axis, half) in half.iter_mut().enumerate() {
@@ -122,8 +122,8 @@ impl Ord for BoundedBox {
 }
 
 /// Upper bound of `height` over the points of the box `|z_i| <= first_i` with p <= 1: the highest
-/// boxes are divided until one that may hold points of the set is hardly higher than a point that
-/// is in it. An empty set has the bound minus infinity.
+/// boxes are divided until one that may contain points of the set is hardly higher than a point
+/// that is in it. An empty set has the bound minus infinity.
 fn highest(
     polynomial: &Polynomial,
     first: &Vector3<f64>,

@@ -9,7 +9,8 @@ use std::f64::consts::PI;
 const VOLUME_RAYS: usize = 20_000;
 
 /// The volume, `⅓ ∫ Σ (to³ - from³) du / |det L|` over the chords of rays from the centre of
-/// `ball`, which holds the set; and the middle of the longest chord, metres, if there is a chord.
+/// `ball`, which contains the set; and the middle of the longest chord, metres, if there is a
+/// chord.
 ///
 /// Where rays graze the set the integrand is not smooth, so that rules which rest on smoothness are
 /// no better than any other, and worse where many rays of a ring graze it at once: the rays follow

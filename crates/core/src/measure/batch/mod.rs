@@ -3,7 +3,7 @@
 //! All poses are solved cold: the start of [`crate::measure::start`], then rounds of evaluation and
 //! step until the bracket is narrow. The first rounds, which are far off in any precision, are of
 //! single precision, for more poses at a time. Those that bracket are of double; the poses that
-//! need more than one wait until there is a group of them, so that the slowest does not hold up the
+//! need more than one wait until there is a group of them, so that the slowest does not delay the
 //! others. A lane computes from its own pose only and selects where a single query would branch, so
 //! that no answer depends on the other poses of the batch.
 

@@ -54,8 +54,7 @@ impl Waiting {
         self.len += 1;
     }
 
-    /// At most so many of the last entries as a group; lanes to spare hold some that no longer
-    /// wait.
+    /// At most `lanes` of the last entries as a group; spare lanes carry some that no longer wait.
     #[inline(always)]
     pub(super) fn take<const LANES: usize>(&mut self, lanes: usize) -> Group<LANES> {
         let count = lanes.min(self.len);

@@ -35,7 +35,7 @@ impl<'a> Separation<'a> {
     /// frame, of any length. Negative where they do not separate.
     pub(in crate::measure) fn along(&self, n: &Vector3<f64>) -> f64 {
         let ((a, pose_a), (b, pose_b)) = (self.of_a, self.of_b);
-        // Hints hold normals that are not quite of length 1.
+        // Normals of hints have length 1 up to rounding only.
         let Some(n) = n.try_normalize(0.0).filter(|n| n.norm() < 2.0) else { return f64::NEG_INFINITY };
         let height_a = a.height(&-pose_a.rotation().inverse_transform_vector(&n));
         let height_b = b.height(&pose_b.rotation().inverse_transform_vector(&n));

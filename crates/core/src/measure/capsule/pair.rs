@@ -179,17 +179,17 @@ impl Problem<'_> {
         }
     }
 
-    /// By the distances of points of the axis, after so many steps.
+    /// By the distances of points of the axis, after this number of steps.
     fn along_axis(&self, (body, pose): At<'_, Body>, spent: u32, warm: &mut WarmStart) -> CapsuleDistance {
         let (axis, half) = (self.capsule_pose.transform_direction(&Vector3::z()), self.capsule.half_height_m());
         let place = |at: f64| self.capsule_pose.translation() + axis * at;
         let projection = Projection::new(body, pose);
-        // Places where the distance falls towards the other one, with tangents that bound it.
+        // Places where the distance decreases towards the other one, with tangents that bound it.
         let mut ends: [Option<Tangent>; 2] = [None, None];
         let (mut lower, mut iterations) = (f64::NEG_INFINITY, spent);
         let center = pose.transform_point(body.interior_point()) - self.capsule_pose.translation();
         let mut at = axis.dot(&center).clamp(-half, half);
-        // A ball's centre is where its pose says.
+        // The centre of a ball has no error of a rotation.
         let turned = (ROTATION_ERROR + CULLING_SLACK) * (self.capsule_pose.translation().norm() + half);
         let error = if half == 0.0 { 0.0 } else { turned };
         let mut best = self.to_interior_point((body, pose), at, spent);
@@ -242,8 +242,8 @@ impl Tangent {
         self.lower + self.slope * (at - self.at)
     }
 
-    /// The least value of a convex function above a line that falls and one that rises, or above
-    /// the one there is, between minus and plus `half`; and where that is.
+    /// The least value of a convex function above a decreasing and an increasing line, or above the
+    /// one there is, between minus and plus `half`; and where that is.
     fn least([falling, rising]: &[Option<Self>; 2], half: f64) -> (f64, f64) {
         match (falling, rising) {
             (Some(low), Some(high)) => {

@@ -37,7 +37,7 @@ pub(super) fn distance_until(
     let found =
         least((parts.len(), 1), bound, goal.near, warm, |(i, _), _, hint| problem.solve((&parts[i], pose), hint));
     let Least { best, lower, tied, iterations, .. } = found;
-    // How deep something is in a union no single part knows.
+    // The depth of something in a union does not follow from single parts.
     let lower = if lower < 0.0 { f64::NEG_INFINITY } else { lower };
     CapsuleDistance { status: Status::of(best.upper - lower <= tolerance), lower, tied, iterations, ..best }
 }

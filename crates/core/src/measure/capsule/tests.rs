@@ -5,7 +5,7 @@ use crate::measure::{Twist, distance_to_point};
 use nalgebra::Vector3;
 use sublevel_testkit::Seeded;
 
-/// The distance of a body from the axis by golden sections, which know nothing of derivatives.
+/// The distance of a body from the axis by golden sections, which use no derivatives.
 fn brute_force(body: &Body, pose: &Pose, capsule: &Capsule, capsule_pose: &Pose) -> f64 {
     let axis = capsule_pose.transform_direction(&Vector3::z());
     let mut warm = WarmStart::default();

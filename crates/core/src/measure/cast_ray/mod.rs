@@ -100,7 +100,7 @@ fn cast_at(body: &Body, pose: &Pose, ray: &Ray, tolerance: f64, options: &Option
     let beyond = 0.25 * tolerance;
     let mut s = along.first(&entry, beyond);
     let mut normal = Vector3::zeros();
-    // The last two steps, and how many looks in a row have changed nothing.
+    // The last two steps, and how many evaluations in a row have changed nothing.
     let (mut steps, mut idle) = ([f64::INFINITY; 2], 0);
     let mut iterations = 0;
     while iterations < MAX_STEPS && !options.exhausted(iterations) {

@@ -23,7 +23,7 @@ pub(super) struct NormalizedRay<'a> {
     errors: [(f64, f64); MAX_CONSTRAINTS],
 }
 
-/// What one evaluation says.
+/// The result of one evaluation.
 pub(super) struct Look {
     pub(super) inside: bool,
     /// Where the entry is expected.
@@ -88,7 +88,7 @@ impl<'a> NormalizedRay<'a> {
         Some((Self { body, base, start, velocity, start_error, velocity_error, errors }, entry))
     }
 
-    /// Where to look first: the start of a ray that may start inside, else where the last
+    /// The first trial parameter: the start of a ray that may start inside, else where the last
     /// constraint is entered, as values along the ray have it.
     pub(super) fn first(&self, entry: &Entry, beyond: f64) -> f64 {
         if entry.from <= -self.base || !runs(Stage::Interpolation) {

@@ -128,9 +128,9 @@ pub(in crate::measure) fn between(
     }
 }
 
-/// What is asked. Each way to the answer hands on to the next where it fails, and none hands back:
-/// an answer is written where the caller wants it, and not copied, for loads of what was just
-/// stored in other pieces have to wait.
+/// The question. Each method hands on to the next where it fails, and none hands back: an answer is
+/// written where the caller wants it, and not copied, for loads of what was just stored in other
+/// pieces have to wait.
 #[derive(Clone, Copy)]
 struct Query<'a> {
     of_a: (&'a Body, &'a Pose),

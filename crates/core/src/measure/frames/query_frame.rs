@@ -242,7 +242,7 @@ impl Posed<'_> {
 
 impl<'a> Posed<'a> {
     /// A body in its own frame, moved to the centre of its circumscribed ball and scaled to units
-    /// of so many metres, a power of two.
+    /// of this number of metres, a power of two.
     pub(in crate::measure) fn own(body: &'a Body, unit: f64) -> Self {
         let (origin, center) = (body.circumscribed().center, body.normalization().center);
         let placement = Placement::new(

@@ -17,11 +17,10 @@ pub struct GrowthDistance {
     /// A point of both bodies grown by `upper`, metres: where they touch.
     pub witness: Vector3<f64>,
     /// Unit normal of the contact, from the second body to the first; none if the centres coincide
-    /// as far as doubles can tell.
+    /// up to rounding.
     pub normal: Option<Vector3<f64>>,
     /// Derivatives with respect to the twists of the first and of the second body (1/m and 1/rad),
-    /// one of them where they are not unique; none if the centres coincide as far as doubles can
-    /// tell.
+    /// one of them where they are not unique; none if the centres coincide up to rounding.
     pub gradients: Option<[Twist; 2]>,
     /// Whether another pair of parts may be as soon to touch, their brackets meeting: normal,
     /// witness and gradients may then jump. Never for single bodies.

@@ -35,7 +35,7 @@ pub(super) fn crossing(u: &Vector3<f64>, support: impl Fn(&Vector3<f64>) -> Corn
     if n.dot(u) < 0.0 {
         (a, b, n) = (b, a, -n);
     }
-    // The cone of a, b and c is to hold u; a and b have it on the side where c lies.
+    // The cone of a, b and c must contain u; a and b have it on the side where c lies.
     let mut c = support(&n);
     for _ in 0..MAX_STEPS {
         if b.difference.cross(&c.difference).dot(u) < 0.0 {

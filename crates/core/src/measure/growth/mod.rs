@@ -4,7 +4,7 @@
 //!
 //! With `Δ = c_B - c_A` between the centres, `c_A + s (A - c_A)` and `c_B + s (B - c_B)` meet if
 //! and only if `Δ / s` lies in `K = (A - c_A) - (B - c_B)`. So s is the gauge of K at Δ: along the
-//! unit vector `u = Δ/|Δ|` one looks for the longest
+//! unit vector `u = Δ/|Δ|` the program asks for the longest
 //!
 //! ```text
 //! ρ u = (x - c_A) - (y - c_B),   x in A, y in B,   and s = |Δ| / ρ.
@@ -50,8 +50,8 @@ use pair::between;
 /// its own centre: the smallest s at which a grown part of `a` touches a grown part of `b`. About
 /// one common centre it would not be a measure of proximity: a union is not star-shaped about any
 /// point in general, so it does not grow in place, may leave what it touched before, and would not
-/// tell overlap by s < 1. Parts that contain their centres only ever grow, so that here, too, s > 1
-/// if and only if the solids are apart. It depends on how a solid is cut into parts.
+/// overlap if s < 1. Parts that contain their centres only ever grow, so that here, too, s > 1 if
+/// and only if the solids are apart. It depends on how a solid is cut into parts.
 ///
 /// ```
 /// use nalgebra::Vector3;

@@ -17,11 +17,11 @@ pub struct LevelDistance {
     /// A point of the second body where the first one's polynomial is at most `upper`; world frame,
     /// metres.
     pub witness: Vector3<f64>,
-    /// How fast d falls as the level of the second body rises from 1: the sum of the multipliers of
-    /// its constraints.
+    /// How fast d decreases as the level of the second body rises from 1: the sum of the
+    /// multipliers of its constraints.
     pub multiplier: f64,
-    /// Whether the second body holds the minimiser of the first one's polynomial: d is its minimum,
-    /// the multiplier and all derivatives are 0, and d says no more about depth.
+    /// Whether the second body contains the minimiser of the first one's polynomial: d is its
+    /// minimum, the multiplier and all derivatives are 0, and d says no more about depth.
     pub saturated: bool,
     /// Derivative of d with respect to the pose of the first body, 1/m and 1/rad: a twist (v, ω)
     /// changes d by `-g·v - ((x - t) × g)·ω`, g the gradient of the first body's polynomial at the

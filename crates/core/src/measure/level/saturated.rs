@@ -35,8 +35,8 @@ pub(super) fn saturated(
     })
 }
 
-/// Whether the interior point of A is proven to lie in B: then B does not hold the minimiser of A's
-/// polynomial back.
+/// Whether the interior point of A is proven to lie in B: then B's constraint is inactive at the
+/// minimiser of A's polynomial.
 struct Saturated<'a> {
     a: &'a Body,
     pose_a: &'a Pose,

@@ -47,7 +47,7 @@ pub(super) struct Search<'a> {
     /// Where that bound was found.
     proven: Vector3<f64>,
     /// Whether its multipliers are those of Newton's method, balanced or in double-double: a
-    /// bracket holds others to its root only.
+    /// bracket determines others to its root only.
     refined: bool,
     /// Where Newton's method ended last.
     ended: Option<LevelNewton>,
@@ -57,7 +57,7 @@ pub(super) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// A search that knows nothing but a point of B yet, after that many iterations.
+    /// A search that has only a point of B yet, after that many iterations.
     pub(super) fn new(pair: &'a Pair<'a>, options: &'a Options<'a>, iterations: u32) -> Self {
         let mut search = Self {
             pair,
@@ -218,8 +218,8 @@ impl<'a> Search<'a> {
     }
 
     /// Interior-point method from a point of B on the side of A, with Newton's method tried as soon
-    /// as it shows the active constraints. Values of A fall by orders of magnitude on the way in:
-    /// each round scales them again.
+    /// as it shows the active constraints. Values of A decrease by orders of magnitude on the way
+    /// in: each round scales them again.
     fn interior_point(&mut self) {
         if !runs(Stage::InteriorLevel) {
             return;
@@ -227,7 +227,7 @@ impl<'a> Search<'a> {
         let pair = self.pair;
         self.attain(&pair.a.interior);
         if pair.b.contains(&pair.a.interior) {
-            // Saturated: B does not hold the minimiser back.
+            // Saturated: B's constraints are inactive.
             let mut first = [0.0; MAX_CONSTRAINTS];
             first[0] = 1.0;
             self.newton(pair.a.interior, Active::from_multipliers(&first), Active::default());
@@ -288,7 +288,7 @@ impl<'a> Search<'a> {
         if !self.done() {
             self.newton(*x, Active::from_multipliers(&of_a), Active::from_multipliers(&of_b));
         }
-        // A vanishing multiplier means that B does not hold the minimiser back.
+        // A vanishing multiplier means that B's constraints are inactive.
         if !self.done() && self.pair.b.contains(x) {
             self.newton(*x, Active::from_multipliers(&of_a), Active::default());
         }
@@ -318,7 +318,7 @@ impl<'a> Search<'a> {
         (self.ended, self.settled) = (Some(newton), ended.settled);
     }
 
-    /// Takes all of an iterate at which forces are balanced, if what it proves by itself is narrow;
+    /// Takes all of an iterate at which forces are balanced, if the bracket it proves is narrow;
     /// whether it is.
     fn adopt(&mut self, at: &LevelNewton) -> bool {
         let pair = self.pair;
@@ -364,8 +364,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Whether B does not hold the minimiser of A's polynomial back: it holds the minimiser, or the
-    /// bracket needed no multiplier of B.
+    /// Whether B's constraints are inactive at the minimiser of A's polynomial: B contains the
+    /// minimiser, or the bracket needed no multiplier of B.
     fn saturated(&self) -> bool {
         let free = self.multipliers.1.iter().all(|multiplier| *multiplier == 0.0);
         self.done() && (free || self.pair.b.contains(&self.pair.a.interior))

@@ -10,7 +10,7 @@ fn cold(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose) -> Penetration {
     penetration(a, pose_a, b, pose_b, &Options::default(), &mut WarmStart::default())
 }
 
-/// That the bracket holds the truth and is as narrow as asked for.
+/// That the bracket contains the truth and is as narrow as asked for.
 fn check(answer: &Penetration, truth: f64, accuracy: f64, size: f64, label: &str) {
     let floor = 1e-14 * size;
     let label = format!("{label}, depth {truth:e}: {answer:?}");
@@ -185,7 +185,7 @@ fn moving_out_by_the_depth_separates_and_by_less_does_not() {
 fn ties_are_flagged_and_limits_admitted() {
     let ball = Body::ball("ball", Vector3::zeros(), 1.0).unwrap();
     let concentric = cold(&ball, &Pose::identity(), &ball, &Pose::identity());
-    // More than the table of directions holds: the bracket says so and is true.
+    // More directions than the table has: the bracket is wide and true.
     assert!(concentric.lower > 1.99 && concentric.lower <= 2.0 && concentric.upper >= 2.0, "{concentric:?}");
     assert!(concentric.tied && concentric.status == Status::BracketWide, "{concentric:?}");
     let options = Options::default().with_depth_accuracy(1e-2).unwrap();

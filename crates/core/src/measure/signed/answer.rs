@@ -24,7 +24,7 @@ pub struct SignedDistance {
     /// Derivatives with respect to the twists of the first and of the second body; none without a
     /// normal.
     pub gradients: Option<[Twist; 2]>,
-    /// Whether the bracket holds 0: the bodies may just touch. Smooth bodies have the same
+    /// Whether the bracket contains 0: the bodies may just touch. Smooth bodies have the same
     /// derivative on both sides; where edges or corners touch, the derivative in overlap may be
     /// another one.
     pub at_contact: bool,

@@ -35,7 +35,7 @@ use separating_translation::{Contact, SeparatingTranslation, Start, Starts, narr
 ///
 /// Of solids with several parts it is their distance, or minus the depth of their overlap
 /// ([`crate::measure::penetration`]), which is known from a local search: in overlap the bracket
-/// may stay wide. There the gradients are those of all the pairs of parts that hold the solids
+/// may stay wide. There the gradients are those of all the pairs of parts that keep the solids
 /// back, and the witnesses belong to the one that does so most.
 ///
 /// ```

@@ -51,7 +51,7 @@ pub(super) fn between(
     }
     let mut known = Known::of(&best);
     if best.depth.is_infinite() {
-        // Nothing to follow: the distance says on which side the bodies are.
+        // No answer to continue from: the distance decides whether the bodies are apart.
         let apart = distance(a, pose_a, b, pose_b, options, warm);
         best.iterations += apart.iterations;
         if apart.lower > 0.0 {

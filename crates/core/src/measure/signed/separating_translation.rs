@@ -31,7 +31,7 @@ const FOLLOWED: usize = 3;
 /// Most translations tried from one start.
 const MAX_ROUNDS: u32 = 40;
 
-/// How many times the last gain is hoped for at most.
+/// Largest gain that the next rounds together are taken to make, in units of the last one.
 const HOPE: f64 = 4.0;
 
 /// Most planes kept at a time: those with the smallest gaps.
@@ -281,7 +281,7 @@ impl Search<'_> {
             }
             let gained = translation.norm() - next.norm();
             translation = next;
-            // What is gained falls from round to round.
+            // The gain decreases from round to round.
             if translation.norm() - HOPE * gained > wanted {
                 break;
             }

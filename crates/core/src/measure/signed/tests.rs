@@ -64,7 +64,7 @@ fn slides_from_touching_to_concentric_are_continuous_and_monotone() {
             assert!(one.lower <= answer.upper && answer.lower <= one.upper, "{label} cold {one:?}");
             if let Some((before, previous)) = last {
                 // It changes by at most what was moved; and for bodies about their centres the way
-                // in only falls.
+                // in only decreases.
                 let moved = before - offset;
                 assert!(answer.lower <= previous.upper + moved + 1e-9 * s, "{label} after {previous:?}");
                 assert!(answer.upper >= previous.lower - moved - 1e-9 * s, "{label} after {previous:?}");

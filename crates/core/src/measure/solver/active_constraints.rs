@@ -1,6 +1,6 @@
 //! Which constraints an answer rests on.
 
-/// Constraints of one body that hold with equality, as a bit set.
+/// Active constraints of one body (those met with equality), as a bit set.
 pub(in crate::measure) type ActiveSet = u16;
 
 /// Most constraints of one body that can be active at once in general position in space.

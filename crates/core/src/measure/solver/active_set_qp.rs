@@ -192,7 +192,7 @@ impl Quadratic {
             if least <= LONGEST_PROGRAM_STEP {
                 if i == 0 && least < SHORT {
                     // Along what does not bend a step is as long as the damping is little: of faces
-                    // tilted by next to nothing only such a step shows the edges.
+                    // nearly parallel only such a step finds the edges.
                     self.hessian = hessian + stiffness * (damping * (least / SHORT).max(LEAST));
                     let longer = self.solve(a, b);
                     return if length(&longer) <= LONGEST_PROGRAM_STEP { longer } else { found };
@@ -350,7 +350,7 @@ mod tests {
     use sublevel_testkit::Seeded;
 
     /// Planes around a point, `-t` as well as they: for every seed some that are the same as others
-    /// but for a hair.
+    /// but for rounding.
     fn random_rows(random: &mut Seeded, slope: f64, others: &[(Vector4<f64>, f64)]) -> Rows {
         let mut rows = Rows { rows: [(Vector4::zeros(), 0.0); MAX_CONSTRAINTS], len: 4, scale: 1.0 };
         for k in 0..4 {

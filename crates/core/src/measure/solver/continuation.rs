@@ -73,7 +73,7 @@ impl Trace {
         self.of_b.point = apply_transposed::<S, f64>(&relative.rotation, from_b);
         self.of_b.normal = apply_transposed::<S, f64>(&relative.rotation, n);
         // The last step has turned the normal: along the old tangents the way between the points
-        // would not look like none.
+        // would not be taken for none.
         let across = |tangent: V3<f64>| add_scaled::<S, f64>(tangent, -dot::<S, f64>(tangent, n), n);
         self.tangents = [across(frame[0]), across(frame[1])];
         self.response = response;
@@ -167,8 +167,8 @@ pub(in crate::measure) const SEEK_ROUNDS: u32 = 16;
 /// after which a common point should be.
 const PATIENCE: u32 = 6;
 
-/// Evaluations from where the outlines are nearest after which Newton's method should be near: a
-/// closer look at bodies that are thin, and take their turns.
+/// Evaluations from where the outlines are nearest after which Newton's method should be near: thin
+/// bodies need more of them.
 const PATIENCE_OUTLINED: u32 = 12;
 
 /// Length of a step relative to a body's size that counts as near.
@@ -427,7 +427,7 @@ impl<R: Relation> Correct<'_, R> {
             if !near && rounds >= self.patience && !(length * late <= NEARLY) {
                 return Err(Lost::after(rounds));
             }
-            // The linearization means nothing farther away.
+            // The linearization is not valid farther away.
             let part = part.min(LONGEST_MOVE / length);
             if part < 1.0 {
                 step.shorten(part);

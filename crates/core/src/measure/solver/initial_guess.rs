@@ -10,8 +10,8 @@
 //! ```
 //!
 //! with K the derivative of the farthest point, so that such turns find about where the ellipsoids
-//! face each other. There the outlines of the bodies know about where these are farthest themselves
-//! and how that changes, for another such turn.
+//! face each other. There the support tables of the bodies have about where these are farthest
+//! themselves and how that changes, for another such turn.
 
 use crate::body::Body;
 use crate::measure::frames::vector::{

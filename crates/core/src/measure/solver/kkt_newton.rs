@@ -124,7 +124,7 @@ impl Active {
         reported
     }
 
-    /// With multipliers so many times as large.
+    /// With multipliers `factor` times as large.
     pub(in crate::measure) fn scaled(mut self, factor: f64) -> Self {
         self.multiplier.iter_mut().for_each(|multiplier| *multiplier *= factor);
         self
@@ -372,10 +372,10 @@ impl DistanceNewton {
     }
 
     /// Whether the normal is that of the solution, to [`ALIGNED`] or to what rounding leaves of so
-    /// short a distance. The narrowest of brackets holds it to about the root of its width relative
-    /// to the distance; the equations tell it as it is: n is along x - y and what the constraints
-    /// of each body carry, none of them is violated, and those that carry anything hold with
-    /// equality.
+    /// short a distance. The narrowest of brackets determines it to about the root of its width
+    /// relative to the distance; the equations determine it fully: n is along x - y and what the
+    /// constraints of each body carry, none of them is violated, and those with a multiplier above
+    /// 0 are met with equality.
     pub(in crate::measure) fn is_aligned(&self, pair: &Pair<'_>) -> bool {
         let (n, apart) = (self.n.normalize(), self.x - self.y);
         let (turned_a, gap_a) = self.a.misfit(&pair.a, &self.x, &-n);

@@ -5,7 +5,7 @@
 //! Σ ν_i ∇g_i + Σ μ_j ∇h_j = 0,   Σ ν_i = 1,   g_i(x) = s,   h_j(x) = 1.
 //! ```
 //!
-//! From afar values fall by orders of magnitude, and towards the least of a power d steps are a
+//! From afar values decrease by orders of magnitude, and towards the least of a power d steps are a
 //! (d - 1)-th part of the way. There the Hessians are those of `g_i^(2/d)`, about a square whatever
 //! d is.
 
@@ -23,9 +23,9 @@ use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 const MAX_STEPS: u32 = 24;
 
 /// Length of a step, relative to the bodies and to the distance from A's interior point, after
-/// which values may still fall by orders of magnitude, as a power of the distance. Larger, Newton's
-/// steps are a (d - 1)-th part of the way: `stages_of_level_distances_solve_alone` counts what is
-/// solved.
+/// which values may still decrease by orders of magnitude, as a power of the distance. Larger,
+/// Newton's steps are a (d - 1)-th part of the way: `stages_of_level_distances_solve_alone` counts
+/// what is solved.
 const POWER_LAW_STEP: f64 = 0.1;
 
 /// Newton iterates of the level-distance system.
@@ -81,7 +81,7 @@ impl LevelNewton {
     }
 
     /// Whether the forces of the bodies are opposite, to [`ALIGNED`] or to what rounding leaves of
-    /// them: brackets hold them to about the root of their width.
+    /// them: brackets determine them to about the root of their width.
     pub(in crate::measure) fn is_balanced(&self, pair: &Pair<'_>) -> bool {
         let force = |body: &Posed<'_>, active: &Active| {
             let (mut sum, mut rounding) = (Vector3::zeros(), 0.0);
@@ -93,7 +93,7 @@ impl LevelNewton {
             (sum, rounding)
         };
         let ((of_a, error_a), (of_b, error_b)) = (force(&pair.a, &self.a), force(&pair.b, &self.b));
-        // B that holds nothing back leaves all of A's to vanish.
+        // If B's constraints are inactive, A's gradient has to vanish.
         self.b.len == 0 || (of_a + of_b).norm() <= ALIGNED * of_a.norm() + error_a + error_b
     }
 
@@ -130,7 +130,7 @@ impl LevelNewton {
         let found = program.step(self.a, self.b, length, &of_point(stiffness / scale))?;
         let dx = found.v.xyz();
         let same = self.a.bits() == found.a.bits() && self.b.bits() == found.b.bits();
-        // Of several constraints of A only the differences are held.
+        // Of several constraints of A only the differences are kept at 0.
         let free = tangents(&of_b.gradients(&self.b)[..self.b.len], &of_a.gradients(&self.a)[..self.a.len]);
         let free = free.filter(|_| same && self.a.len == 1);
         let force = -of_a.gradient(&self.a);

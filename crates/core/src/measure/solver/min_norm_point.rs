@@ -19,7 +19,7 @@ pub(in crate::measure) struct Shortest {
 }
 
 impl Shortest {
-    /// The bounds that hold with equality, and their weights.
+    /// The active bounds, and their weights.
     pub(in crate::measure) fn support(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         self.index[..self.len].iter().copied().zip(self.weight[..self.len].iter().copied())
     }
@@ -30,9 +30,9 @@ const MAX_EXCHANGES: usize = 64;
 
 /// The shortest vector within all bounds; none if there is no such vector, or rounding hides it.
 ///
-/// Starting from no bounds, the one that is missed most joins those that hold v back, of which at
-/// most three stay: the problem is of the kind of linear programs (Sharir and Welzl, A
-/// combinatorial bound for linear programming and related problems, STACS 1992).
+/// Starting from no bounds, the most violated one joins the active ones, of which at most three
+/// stay: the problem is of the kind of linear programs (Sharir and Welzl, A combinatorial bound for
+/// linear programming and related problems, STACS 1992).
 pub(in crate::measure) fn shortest(bounds: &[Bound]) -> Option<Shortest> {
     let scale = bounds.iter().map(|bound| bound.floor.abs()).fold(0.0, f64::max);
     let tolerance = 1e-13 * scale;
@@ -67,7 +67,7 @@ pub(in crate::measure) fn shortest(bounds: &[Bound]) -> Option<Shortest> {
 }
 
 impl Shortest {
-    /// The shortest vector on the planes of the chosen bounds, if all of them hold it back.
+    /// The shortest vector on the planes of the chosen bounds, if all of them are active.
     fn on_planes(mut self, bounds: &[Bound]) -> Option<Self> {
         let chosen = |i: usize| (i < self.len).then(|| &bounds[self.index[i]]);
         let gram = Matrix3::from_fn(|i, j| match (chosen(i), chosen(j)) {

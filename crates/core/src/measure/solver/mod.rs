@@ -1,4 +1,4 @@
-//! Methods that find answers; none is believed, brackets decide.
+//! Methods that find answers; what a method finds counts only if a bracket proves it.
 //!
 //! Continuation from the answer before (`continuation`, with `predictor`, `tangent_newton`,
 //! `step_acceleration` on a `two_point_problem`), guesses (`initial_guess`, `support_table_gjk`),

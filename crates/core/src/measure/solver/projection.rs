@@ -8,9 +8,8 @@
 //! min over d of ½ dᵀ(κ I + Σ λ_i ∇²g_i) d + (κ y - r)·d   subject to   g_i(y) + ∇g_i(y)·d <= 1
 //! ```
 //!
-//! with the constraints that hold with equality found by exchange, one at a time, without new
-//! evaluations. Where the steps do not settle, an interior-point method does. Brackets are the
-//! caller's.
+//! with the active constraints found by exchange, one at a time, without new evaluations. Where the
+//! steps do not settle, an interior-point method does. Brackets are the caller's.
 
 use crate::body::{Body, MAX_CONSTRAINTS};
 use crate::measure::bounds::duality_bounds::Multipliers;
@@ -118,7 +117,7 @@ const MAX_STEPS: u32 = 12;
 const WORTH_A_BRACKET: f64 = 1e-3;
 
 /// Minimises from a start until `accept` takes a trial point; returns the iterations and the
-/// constraints that held with equality last.
+/// constraints that were active last.
 pub(in crate::measure) fn solve_single(
     body: &Posed<'_>,
     objective: &Objective,
@@ -205,7 +204,7 @@ impl Steps<'_> {
             }
             let Some((d, found)) = self.step(jets, &y, &multipliers) else { return false };
             let length = d.norm();
-            // Rounding has the word once steps stop shrinking.
+            // Steps that no longer shrink are rounding.
             if !length.is_finite() || length < 1e-12 && length >= last {
                 return false;
             }

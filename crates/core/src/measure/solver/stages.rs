@@ -35,7 +35,7 @@ pub(in crate::measure) enum Stage {
     Balls,
     /// Bounds by planes across a few directions.
     Planes,
-    /// A first look around all directions for the least depth.
+    /// A first sampling of all directions for the least depth.
     DirectionSampling,
     /// Search around a direction for a better one, where edges stop Newton's method.
     CompassSearch,

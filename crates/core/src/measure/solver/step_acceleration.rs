@@ -49,8 +49,8 @@ const BACK: f64 = -0.9;
 /// Length of one relative to the last step, if it leads back about as far.
 const AS_FAR: std::ops::Range<f64> = 0.5..2.0;
 
-/// Length of steps relative to the bodies, beyond which they may lead to and fro: twice that of a
-/// series. `steps_to_and_fro_meet_between` pins that such steps are cut.
+/// Length of steps relative to the bodies, beyond which they may oscillate: twice that of a series.
+/// `steps_to_and_fro_meet_between` pins that such steps are cut.
 const RETURNING_STEP: f64 = 0.1;
 
 /// A vector along the tangents.
@@ -75,8 +75,7 @@ pub(in crate::measure) struct Series {
     last: Last,
     /// The tangents along which it was made.
     tangents: [V3<f64>; 2],
-    /// The last step that [`Series::take`] has said how much of to take, whether of the series or
-    /// not.
+    /// The last step that [`Series::take`] has scaled, whether of the series or not.
     way: V3<f64>,
 }
 
@@ -222,7 +221,7 @@ pub(in crate::measure) fn tangents(of_a: &[Vector3<f64>], of_b: &[Vector3<f64>])
 
 /// The part to take of a step after this way: all of it, but where it leads back about as far. What
 /// is looked for then lies between, and where steps would vanish that change evenly is as good a
-/// guess as any: Newton's method alone may go to and fro for ever.
+/// guess as any: Newton's method alone may oscillate for ever.
 #[inline(always)]
 fn part(way: V3<f64>, step: V3<f64>) -> f64 {
     let (way, step) = (Vector3::from(way), Vector3::from(step));
@@ -246,7 +245,7 @@ pub(in crate::measure) fn across<S: Simd>(_: S, [t0, t1]: [V3<f64>; 2], v: V2) -
 /// What to add to Newton's step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in crate::measure) struct Correction {
-    /// Where it is too short: what surfaces change by over that falls off with a power.
+    /// Where it is too short: the change of surfaces over it decreases with a power.
     pub(in crate::measure) longer: V2,
     /// Where it is too long: what surfaces change by over that is as the step has it.
     pub(in crate::measure) shorter: V2,
@@ -279,7 +278,7 @@ pub(in crate::measure) fn correction(newton: V2, slope: V2, compliance: Symmetri
     correction
 }
 
-/// Whether slopes fall about as a power of what is left of the way does.
+/// Whether slopes decrease about as a power of the remaining way.
 fn is_power(fall: f64, left: f64, power: f64) -> bool {
     let expected = power * left.abs().ln();
     (fall.ln() - expected).abs() < TOLERATED * expected.abs()
@@ -381,8 +380,8 @@ mod tests {
         assert!(sum * 3 < plain, "seed 31: {sum} steps, {plain} of Newton's");
     }
 
-    /// Newton's method for the root of the arc tangent goes to and fro for ever from 1.3917, and
-    /// ever farther from beyond.
+    /// Newton's method for the root of the arc tangent oscillates for ever from 1.3917, and ever
+    /// farther from beyond.
     #[test]
     fn steps_to_and_fro_meet_between() {
         for start in [1.38, 1.391_745_2, 1.4, 1.5] {

@@ -23,7 +23,7 @@ impl StopCriterion {
         Self { far, ..Self::NARROW }
     }
 
-    /// The same with lengths in units of so many metres, a power of two.
+    /// The same with lengths in units of this number of metres, a power of two.
     pub(in crate::measure) fn in_units_of(&self, unit: f64) -> Self {
         Self { near: self.near / unit, far: self.far / unit }
     }

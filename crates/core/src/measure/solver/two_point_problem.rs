@@ -1,5 +1,5 @@
-//! What holds between the points of two bodies at the solution of a measure, and what proves it:
-//! the part of continuation in which the measures of pairs differ.
+//! What relates the points of two bodies at the solution of a measure, and what proves it: the part
+//! of continuation in which the measures of pairs differ.
 
 use crate::body::Body;
 use crate::measure::frames::pose::Pose;
@@ -20,7 +20,7 @@ pub(in crate::measure) trait Relation: Copy {
     /// Where to start from nothing but the poses, and where the outlines of A and of B keep that.
     fn start<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> (Start<f64>, [f64; 2]);
 
-    /// Whether a common point is an answer, so that there is nothing to look for in an overlap.
+    /// Whether a common point is an answer, so that an overlap ends the search.
     #[inline(always)]
     fn ends_at_contact(&self) -> bool {
         false
@@ -42,7 +42,7 @@ pub(in crate::measure) trait Relation: Copy {
         newton(simd, a, b, difference, smallest)
     }
 
-    /// How far points with `difference = x - y` in the frame are from what the relation asks for,
+    /// How far points with `difference = x - y` in the frame are from what the relation requires,
     /// along the tangents.
     #[inline(always)]
     fn aside<S: Simd>(&self, _: S, _frame: &M3<f64>, difference: V3<f64>) -> [f64; 2] {
@@ -65,7 +65,7 @@ pub(in crate::measure) enum Verdict {
     },
     /// Not yet.
     Wide,
-    /// In an overlap by the look of it, or too close to one to tell.
+    /// Probably an overlap, or too close to one to decide.
     Overlap,
 }
 

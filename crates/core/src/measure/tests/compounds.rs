@@ -299,7 +299,7 @@ fn parts_that_are_about_as_near_are_told() {
             let n = Vector3::new(x, off - 0.8 * off.signum(), 0.0).normalize();
             assert!(off == 0.0 || (signed.normal.unwrap() + n).norm() < 1e-4, "{signed:?}");
         } else {
-            // The ball leaves between the others or past them: both hold it, and it has but one
+            // The ball leaves between the others or past them: both contain it, and it has but one
             // shortest way.
             assert!(signed.upper < 0.0, "{signed:?}");
         }

@@ -41,7 +41,7 @@ fn at_gap(a: &Body, pose_a: &Pose, b: &Body, gap: f64, random: &mut Seeded) -> P
     pose
 }
 
-/// How many of so many pairs the closed forms alone solve, each of them rightly.
+/// How many of `count` pairs the closed forms alone solve, each of them correctly.
 fn share(what: &str, count: u64, pair: impl Fn(&mut Seeded) -> (Body, Body)) -> f64 {
     let gaps = [-0.1, -1e-3, -1e-6, 1e-9, 1e-6, 1e-3, 1e-2, 0.1, 1.0];
     let mut solved = 0;

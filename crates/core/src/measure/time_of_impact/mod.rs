@@ -14,8 +14,7 @@
 //! closest points at t_0 and t_1 where Newton's method expects contact, the bound and the distance
 //! agree to first order at t_0, and the advance closes on the contact quadratically, where bounds
 //! by the greatest speed close on it by a constant factor (Mirtich 1996). A plane that turns with a
-//! body rests on the same face of it all the time; which body it should turn with shows in the
-//! trying.
+//! body rests on the same face of it all the time; both are tried where one does not get far.
 
 mod advance;
 mod answer;

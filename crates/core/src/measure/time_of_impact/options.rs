@@ -8,7 +8,7 @@ pub const DEFAULT_CONTACT: f64 = 1e-6;
 /// Default and largest limit of distance queries for one pair of bodies.
 pub const MAX_QUERIES: u32 = 1000;
 
-/// How long, how close and how hard to look for an impact; checked when made.
+/// Duration, contact distance and limit of a search for an impact; checked when made.
 ///
 /// ```
 /// use sublevel_core::measure::ImpactOptions;

@@ -143,7 +143,7 @@ impl Search<'_> {
         self.options.stop.map_or(Options::default(), |stop| Options::default().with_stop(stop))
     }
 
-    /// Distance at time t, accurate enough to tell contact from half of it.
+    /// Distance at time t, accurate enough to distinguish the contact distance from half of it.
     fn distance(&mut self, t: f64, warm: &mut WarmStart) -> Distance {
         self.queries += 1;
         let (a, b) = (self.a.body, self.b.body);
@@ -185,8 +185,8 @@ impl Search<'_> {
     }
 
     /// The time at which the closest points, going on as they do, come within three quarters of the
-    /// contact distance; no later than where the bound of the acceleration spoils what a plane can
-    /// prove.
+    /// contact distance; no later than where the bound of the acceleration outweighs what a plane
+    /// can prove.
     fn aim(&self, now: &Gap<'_>, duration: f64) -> f64 {
         let Gap { t, ref n, found, width: gap } = *now;
         let towards = self.b.motion.velocity_at(t, &found.witness_b) - self.a.motion.velocity_at(t, &found.witness_a);

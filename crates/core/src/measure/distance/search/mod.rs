@@ -83,7 +83,7 @@ const UNSURE: u32 = 8;
 const DEEPER: f64 = 1e-6;
 
 impl<'a> Search<'a> {
-    /// A search that knows nothing yet, after that many iterations.
+    /// A search without a bracket yet, after that many iterations.
     pub(in crate::measure::distance) fn new(
         pair: &'a Pair<'a>,
         goal: &'a StopCriterion,
@@ -172,7 +172,7 @@ impl<'a> Search<'a> {
             for (k, (x, y)) in [(x, y), (x, corners.1), (corners.0, y)].into_iter().enumerate() {
                 let (a, b) = (Active::near(&pair.a, &x, &-n), Active::near(&pair.b, &y, &n));
                 self.newton(x, y, n, a, b);
-                // The later attempts are from corners, which it finds by itself.
+                // The later attempts start from corners, which the ray program finds as well.
                 if k == 0 && !self.ended() {
                     self.along(x, y, n, a, b);
                 }
@@ -189,7 +189,7 @@ impl<'a> Search<'a> {
 
     /// Newton's method for how far apart the bodies are along a normal that is about the right one.
     /// Its steps are those of quadratic programs, which go all the way to the edges of sides that
-    /// are tilted by next to nothing.
+    /// are nearly parallel.
     fn along(&mut self, x: Vector3<f64>, y: Vector3<f64>, n: Vector3<f64>, a: Active, b: Active) {
         if !runs(Stage::Ray) {
             return;
@@ -261,7 +261,7 @@ impl<'a> Search<'a> {
     /// Double-double arithmetic, for the bracket and for the side of contact, and Newton's method
     /// until the normal is that of the solution.
     fn refinement(&mut self, _: &Hint) {
-        // A bracket that holds 0 but is not sure of contact is as wide as rounding left it.
+        // A bracket that contains 0 but is not sure of contact is as wide as rounding left it.
         let unsure = self.narrow() && !self.decided();
         if unsure && !self.pair.smooth() && runs(Stage::UnsureDeepest) {
             // Edges that reach into a body have brought the points together where the surfaces
@@ -275,8 +275,8 @@ impl<'a> Search<'a> {
         self.align();
     }
 
-    /// Goes on to the normal of the solution: a bracket that is narrow holds it to about the root
-    /// of its width relative to the distance, and near contact to nothing.
+    /// Goes on to the normal of the solution: a bracket that is narrow determines it to about the
+    /// root of its width relative to the distance, and near contact to nothing.
     fn align(&mut self) {
         if !runs(Stage::Alignment) || !self.has_to_be_aligned() || self.options.exhausted(self.iterations) {
             return;

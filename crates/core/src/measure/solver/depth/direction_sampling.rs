@@ -1,4 +1,4 @@
-//! A first look around all directions for the shortest translation out of an overlap, by the
+//! A first sampling of all directions for the shortest translation out of an overlap, by the
 //! outlines of the bodies. It proves nothing: it only spares the proof from being about one that is
 //! not the shortest.
 
@@ -7,7 +7,7 @@ use crate::measure::frames::vector::{apply_transposed, dot, rows};
 use crate::polynomial::{Lanes, MAX_LANES, Number, Simd, Vector, WithSimd};
 use nalgebra::Vector3;
 
-/// The look, as vectorized work.
+/// The sampling, as vectorized work.
 pub(super) struct Scout<'a> {
     pub(super) pair: &'a Pair<'a>,
 }

@@ -9,10 +9,10 @@
 //! n·w = Σ a_j v_j·w >= r Σ a_j |v_j| >= r |n| = r.
 //! ```
 //!
-//! Nothing is asked of the w, nor of where a cone is cut: better choices only give better bounds. A
+//! The w are arbitrary, and so is where a cone is cut: better choices only give better bounds. A
 //! triangle with corners n_i whose support points w_i are known is cut into three parts, one for
 //! each w_i, that meet where two or three of the bounds are equal; for a smooth body what they lose
-//! falls with the square of the triangle's size.
+//! decreases with the square of the triangle's size.
 //!
 //! A triangle is split at the edge over which the support point turns most, where the bounds of its
 //! ends are equal. So triangles become narrow across the great circles where a flat face or a long
@@ -75,7 +75,7 @@ impl<const N: usize> Covering<N> {
         &self.directions[..self.len]
     }
 
-    /// Whether so many of the open triangles, or all if there are fewer, can be split.
+    /// Whether `splits` of the open triangles, or all if there are fewer, can be split.
     pub(super) fn has_room(&self, splits: usize) -> bool {
         let splits = splits.min(self.open);
         self.len + splits <= N && self.open + splits <= 2 * N
@@ -314,7 +314,7 @@ mod tests {
                     least = least.min(w.iter().map(|w| v.dot(w)).fold(f64::MIN, f64::max));
                 }
             }
-            // Whatever is asked for, what is promised holds.
+            // The bound is valid for every accuracy.
             for factor in [1e-9, 0.5, 0.9, 0.999, 1.0, 1.0 + 1e-12, 1.1] {
                 let enough = factor * least.max(1e-3);
                 if let Ok(bound) = lower_bound(n, w, enough) {

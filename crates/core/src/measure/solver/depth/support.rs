@@ -14,8 +14,8 @@ use crate::polynomial::Jet;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::ControlFlow;
 
-/// A point within whose displacement a point of the body lies, with the constraints that hold it
-/// back.
+/// A point within whose displacement a point of the body lies, with the constraints that are active
+/// at it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SupportPoint {
     pub(super) x: Vector3<f64>,

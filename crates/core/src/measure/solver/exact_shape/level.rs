@@ -8,9 +8,9 @@
 //! (g(y) - 1 - ∇g·y - h(-∇g)) / |∇g|
 //! ```
 //!
-//! from there, h its support function. From afar values fall as powers of the distance, and steps
-//! are those for the logarithm of g, whose Hessian is `H / g - ∇g ∇gᵀ / g²`; near the level they
-//! are Newton's own.
+//! from there, h its support function. From afar values decrease as powers of the distance, and
+//! steps are those for the logarithm of g, whose Hessian is `H / g - ∇g ∇gᵀ / g²`; near the level
+//! they are Newton's own.
 
 use super::projectable::Projectable;
 use crate::measure::frames::vector::{V3, add, dot, scaled, subtract};

@@ -112,7 +112,7 @@ impl<A: Projectable, B: Projectable> ShapePair<A, B> {
             if best.upper - best.lower <= tolerance {
                 let way = subtract::<Scalar, f64>(best.x, best.y);
                 let off = subtract::<Scalar, f64>(way, scaled::<Scalar, f64>(best.n, seen.distance));
-                // Of shorter distances no double knows the direction any better.
+                // At shorter distances rounding allows no better direction.
                 let enough =
                     (FINELY_ALIGNED * seen.distance).max(2.0 * f64::EPSILON * (self.a.reach() + self.b.reach()));
                 let inward =

@@ -100,7 +100,7 @@ impl Sides<'_> {
         let norm = |v: V3<f64>| dot::<S, f64>(v, v).sqrt();
         let sum = |v: V3<f64>| v[0].abs() + v[1].abs() + v[2].abs();
 
-        // A at the end of the step, with errors that hold as far again.
+        // A at the end of the step, with errors that are valid as far again.
         let dz = apply::<S, f64>(&map.both, step.delta);
         let bent = apply_symmetric::<S, f64>(&at.jet_a.hessian, dz);
         let value_a = at.jet_a.value + dot::<S, f64>(dz, add_scaled::<S, f64>(at.jet_a.gradient, 0.5, bent));
@@ -160,14 +160,14 @@ impl Sides<'_> {
         let kept = if multiplier < step.multiplier { multiplier / step.multiplier } else { 1.0 };
         let curvature = kept * (metric.curvature - entries) - (bending_a * step_a + bending_b * step_b);
         let reach = (room_b / of_b).min(room / of_a);
-        // Second derivatives fall by at most `bending` per length.
+        // Second derivatives decrease by at most `bending` per length.
         let slope_there =
             0.25 * curvature * if 1.5 * curvature < bending * reach { 1.5 * curvature / bending } else { reach };
         let span_b = trust_b.radius * (1.0 + ROOM) + self.b.z_extent().norm() * (1.0 + 1e-14);
         let slack =
             TAYLOR_ROUNDING * (value_a.abs() + multiplier * (1.0 + value_b.abs()) + error_a) + slope * displaced;
 
-        // Upper bound: into B along b, as far as its curvature may ask.
+        // Upper bound: into B along b, as far as its curvature may require.
         let excess = value_b - 1.0 + error_b;
         let ceiling = trace_b + third.ceiling * (step_b + room_b) + 2.0 * self.trust.curvature_error;
         let q = ceiling * excess.abs() * inverse * inverse * (1.0 + 1e-9);
@@ -182,7 +182,7 @@ impl Sides<'_> {
             + TAYLOR_ROUNDING * moved * sum(gradient_a);
 
         // Only the minimiser counts, where A's polynomial is at most `upper`: by convexity A,
-        // scaled about its interior point by this, holds all such points.
+        // scaled about its interior point by this, contains all such points.
         let scale = ((upper - self.a.min_value()) / (1.0 - self.a.min_value())).max(1.0);
         let extent = self.a.z_extent().norm() * (1.0 + 1e-9);
         let span_a = (spread * span_b).min(length + step_a + (1.0 + 2.0 * scale) * extent);

@@ -37,13 +37,13 @@
 //!   the square. Lengths are those of w, and where that is not good enough those of the metric
 //!   `|d|² + |C d|²`: across a thin A a short step of w is a long one of z. Without any curvature
 //!   the loss is at most |ρ| times the distance of the minimiser, of which the errors of `∇p` see
-//!   only that in z: p is at most the upper bound there, so A, scaled, holds it.
+//!   only that in z: p is at most the upper bound there, so A, scaled, contains it.
 //! - From above by a point of B, moved there along b (see
 //!   [`crate::measure::solver::tangent_newton::taylor_bounds`]), and p there by its slope and
 //!   curvature.
 //!
 //! The values of p range over orders of magnitude, and z lies outside A, where what
-//! [`crate::body::Trust`] knows of A does not hold: bounds for p are made at each point
+//! [`crate::body::Trust`] has of A is not valid here: bounds for p are made at each point
 //! ([`crate::polynomial::Growth`]).
 
 mod bracket;
@@ -286,7 +286,7 @@ impl Sides<'_> {
                 }
                 if length <= SETTLED {
                     if step.multiplier == 0.0 {
-                        // On the side of B that p falls off from.
+                        // On the side of B from which p decreases.
                         return Err(LevelLost::after(rounds));
                     }
                     let body = self.b;

@@ -250,7 +250,7 @@ impl<'a> Sides<'a> {
     #[inline(always)]
     pub(super) fn balance<S: Simd>(&self, _: S, a: &NumberJet<f64>, b: &NumberJet<f64>) -> (V3<f64>, f64) {
         let gradient_a = apply_transposed::<S, f64>(&self.map.both, a.gradient);
-        // Where p falls inward B's constraint holds nothing back.
+        // Where p decreases inward B's constraint is inactive.
         let multiplier = (-dot::<S, f64>(gradient_a, b.gradient) / dot::<S, f64>(b.gradient, b.gradient)).max(0.0);
         (gradient_a, multiplier)
     }

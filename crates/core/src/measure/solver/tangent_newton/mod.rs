@@ -171,8 +171,8 @@ pub(in crate::measure) fn newton_along<S: Simd>(
     let height = difference[2] + straight_a.shift - straight_b.shift;
     let off = [difference[0] - height * slope[0], difference[1] - height * slope[1]];
     let (Turn { mut alpha, beta, theta }, response) = turn(simd, &straight_a, &straight_b, 0.0, off, smallest);
-    // What the surfaces fall below their tangent planes, of second order, changes where on the ray
-    // they meet.
+    // How far the surfaces lie below their tangent planes, of second order, changes where on the
+    // ray they meet.
     let fallen = |plane: &Plane<f64>, straight: &Straight<f64>, along: [f64; 2]| {
         let bent = apply2::<S, f64>(&straight.curvature, along);
         let sloped = (plane.gradient[0] * along[0] + plane.gradient[1] * along[1]) * straight.multiplier;

@@ -12,7 +12,7 @@ pub(in crate::measure) struct Plane<N> {
 }
 
 impl Plane<f64> {
-    /// How much it falls along the normal per length along the tangents.
+    /// How much it descends along the normal per length along the tangents.
     #[inline(always)]
     pub(in crate::measure) fn slope(&self) -> [f64; 2] {
         let inverse = 1.0 / self.gradient[2];

@@ -51,8 +51,8 @@ impl<N: Copy> Side<'_, N> {
         let third = third.select(near, N::splat(simd, f64::NAN));
         let plane =
             Plane { value, gradient: [dot(gradient, local[0]), dot(gradient, local[1]), dot(gradient, local[2])] };
-        // Second derivatives fall by at most T per length. Within 3 μ / (2 T) a rise of ½ μ |δ|²
-        // keeps half of it, and being convex it only steepens after that.
+        // Second derivatives decrease by at most T per length. Within 3 μ / (2 T) a rise of ½ μ
+        // |δ|² keeps half of it, and being convex it only steepens after that.
         let ceiling = N::splat(simd, self.trust().third.ceiling);
         let length = square.sqrt();
         let error = N::splat(simd, self.trust().curvature_error);

@@ -2,7 +2,7 @@
 //! in use the next one would take its place.
 //!
 //! What a stage alone has to solve is what it is there for: smooth bodies for continuation, bodies
-//! with edges for active sets, overlaps for the deepest points. The shares asked for are a little
+//! with edges for active sets, overlaps for the deepest points. The shares required are a little
 //! below those reached, which each failure prints.
 
 mod batches;
@@ -309,8 +309,8 @@ fn refinement_of_levels_goes_on_alone() {
     assert!(cases >= 20 && 10 * narrower >= 9 * cases, "{narrower} of {cases}");
 }
 
-/// A narrow bracket holds the normal to the root of its width only: the last stage turns it into
-/// that of the solution.
+/// A narrow bracket determines the normal to the root of its width only: the last stage turns it
+/// into that of the solution.
 #[test]
 fn alignment_turns_normals() {
     let exact = Options::default().with_accuracy(1e-13).unwrap();
