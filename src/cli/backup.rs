@@ -66,7 +66,7 @@ pub(super) fn backup(args: &BackupArgs) -> Result<(), Box<dyn Error>> {
 /// Makes the catalogue.
 ///
 /// # Errors
-/// A directory that has one, and a file that is no backup or does not hold up.
+/// A directory that has one, and a file that is no backup or is not valid.
 pub(super) fn restore(args: &RestoreArgs) -> Result<(), Box<dyn Error>> {
     let Counts { bodies, scenes, .. } = store::restore(&args.file, &args.data)?;
     writeln!(io::stdout().lock(), "{}: {bodies} bodies, {scenes} scenes", args.data.display())?;

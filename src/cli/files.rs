@@ -23,7 +23,7 @@ pub(super) fn read_shape(path: &Path) -> Result<Shape, Box<dyn Error>> {
     Shape::from_json(&read(path)?).map_err(|error| format!("{}: {error}", path.display()).into())
 }
 
-/// Reads and re-proves the file of anything that a scene can hold, naming it in the error.
+/// Reads and re-proves the file of anything that a scene can contain, naming it in the error.
 pub(super) fn read_geometry(path: &Path) -> Result<Geometry, Box<dyn Error>> {
     Geometry::from_json(&read(path)?).map_err(|error| {
         let remedy = match error {

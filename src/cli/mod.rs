@@ -1,6 +1,6 @@
 //! The commands: arguments in, tables or JSON out, errors as one line.
 //!
-//! Standard output holds results only; progress and logs go to standard error.
+//! Standard output has results only; progress and logs go to standard error.
 
 mod backup;
 #[cfg(feature = "fit")]
@@ -49,7 +49,8 @@ use std::process::ExitCode;
 /// Real-time collision and proximity queries on certified convex polynomial bodies
 ///
 /// Objects are stored as sets {x : p(x) <= 1} of sos-convex polynomials, fitted offline around
-/// meshes and proven to contain them. Every answer is a bracket that is proven to hold the truth.
+/// meshes and proven to contain them. Every answer is a bracket that is proven to contain the
+/// truth.
 ///
 #[cfg_attr(
     feature = "fit",
@@ -90,7 +91,7 @@ enum Command {
 }
 
 /// Runs the command line of this process. Exit code 0: done; 1: failed, with one line on standard
-/// error, or a checked claim does not hold; 2: the arguments are wrong.
+/// error, or a checked claim is not proven; 2: the arguments are wrong.
 pub fn main() -> ExitCode {
     let done = |()| true;
     let outcome: Outcome = match Command::parse() {

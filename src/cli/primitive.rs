@@ -14,7 +14,7 @@ use crate::scene::{Geometry, NamedCapsule, NamedHalfSpace};
 
 /// Write an exact body from its sizes
 ///
-/// The file holds the shape itself, not a fit of it: contact with it is certain. `sublevel push`
+/// The file contains the shape itself, not a fit of it: contact with it is certain. `sublevel push`
 /// stores it in a server, `sublevel measure` measures with it. The shape is centred at the origin
 /// of its frame; lengths are metres.
 ///

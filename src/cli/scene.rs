@@ -110,7 +110,7 @@ enum SceneCommand {
     Detach { scene: String, object: String },
     /// Copy a scene in constant time
     Fork { scene: String, fork: String },
-    /// Make what a fork holds the next revision of its parent
+    /// Make the content of a fork the next revision of its parent
     Commit { fork: String },
     /// Delete a scene or fork
     Delete { scene: String },

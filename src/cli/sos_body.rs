@@ -110,7 +110,7 @@ struct Report {
     degree: Option<usize>,
 }
 
-/// Proves, prints, and returns whether every claim holds.
+/// Proves, prints, and returns whether every claim is proven.
 pub(super) fn verify(args: &VerifyArgs, text: &str) -> Outcome {
     let mut report = Report { kind: "sos-body", points_only: true, ..Report::default() };
     let mut sentences = Vec::new();

@@ -7,7 +7,7 @@ use crate::service::{Role, tokens};
 
 /// Make a token for the clients of a server
 ///
-/// Prints the entry for the file that 'sublevel serve --tokens FILE' reads, which holds a hash
+/// Prints the entry for the file that 'sublevel serve --tokens FILE' reads, which contains a hash
 /// only, and on standard error the token itself, which is shown once. A client sends it as the
 /// metadata 'authorization: Bearer TOKEN'; the commands of sublevel take it from SUBLEVEL_TOKEN.
 ///

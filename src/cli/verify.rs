@@ -35,7 +35,7 @@ struct Report {
     covers: Option<&'static str>,
 }
 
-/// Proves, prints, and returns whether every claim holds.
+/// Proves, prints, and returns whether every claim is proven.
 pub(super) fn run(args: &VerifyArgs) -> Outcome {
     #[cfg(feature = "fit")]
     if args.points.is_none() && args.mesh.are_given() {

@@ -12,10 +12,11 @@ use std::path::PathBuf;
 /// convex hull. With --contains it proves that whole bodies are inside. Of a compound every part is
 /// re-proven, and with --points that it covers all triangles of the mesh, and what they enclose if
 /// they are closed: the mesh is cut again as the file says, and each part must hold its piece. Exit
-/// code 0 only if every claim holds.
+/// code 0 only if every claim is proven.
 ///
 /// An sos-body, which need not be convex, is proven to be of a sum of squares and as near to convex
-/// as it says; with --points, to hold the points, and no fewer triangles between them than it says.
+/// as it says; with --points, to contain the points, and no fewer triangles between them than it
+/// says.
 ///
 /// A certificate of a motion, as CheckMotions sends it, is checked without a solver: every body is
 /// re-proven, and the motion of the robot is proven to be free once more.

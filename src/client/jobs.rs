@@ -59,7 +59,7 @@ impl Client {
         }
     }
 
-    /// Watches a job until it has succeeded. `tell` learns of it whenever it has changed; when
+    /// Watches a job until it has succeeded. `tell` is called whenever it has changed; when
     /// `cancel` resolves, it is cancelled.
     ///
     /// # Errors

@@ -165,7 +165,7 @@ impl Client {
         Ok(response.into_inner().fork.map_or(0, |fork| fork.revision))
     }
 
-    /// Makes what a fork holds the next revision of its parent; returns that.
+    /// Makes the content of a fork the next revision of its parent; returns that.
     ///
     /// # Errors
     /// When the parent has changed since.

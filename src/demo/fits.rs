@@ -15,7 +15,7 @@ pub(super) struct Fitted {
     pub(super) name: String,
     /// Its body file.
     pub(super) file: PathBuf,
-    /// What the file holds.
+    /// The content of the file.
     pub(super) body: Body,
     report: FitReport,
 }

@@ -8,7 +8,7 @@ use plotters::prelude::*;
 /// Why a chart could not be drawn.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum ChartError {
-    /// No series holds a finite point.
+    /// No series has a finite point.
     #[error("a chart needs at least one finite point; none of its series has any")]
     Empty,
     /// The drawing library gave up.

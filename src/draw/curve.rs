@@ -60,7 +60,7 @@ impl LineChart {
         svg(SIZE, |root| self.draw(root, &frame))
     }
 
-    /// Ranges that hold all finite points and the mark, the vertical one in whole decades.
+    /// Ranges that contain all finite points and the mark, the vertical one in whole decades.
     fn frame(&self) -> Option<Frame> {
         let finite = || self.series.iter().flat_map(|s| &s.points).filter(|(x, y)| x.is_finite() && y.is_finite());
         finite().next()?;

@@ -32,7 +32,7 @@ pub(super) fn covered(polygons: &[Vec<[f64; 2]>]) -> Vec<Vec<[f64; 2]>> {
     contours(&values, width).into_iter().map(|outline| outline.into_iter().map(back).collect()).collect()
 }
 
-/// Marks the nodes of the raster that a convex polygon holds, row by row.
+/// Marks the nodes of the raster that a convex polygon contains, row by row.
 fn fill(polygon: &[[f64; 2]], values: &mut [f64], width: usize) {
     let rows = polygon.iter().map(|p| p[1]);
     let (first, last) = (rows.clone().fold(f64::INFINITY, f64::min), rows.fold(0.0, f64::max));

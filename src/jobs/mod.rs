@@ -1,10 +1,10 @@
 //! Jobs, which are fits, solves of the hierarchy and pairs of links: queue, progress, cancel,
 //! restart.
 //!
-//! The catalogue holds the jobs; what is decided there is final, and the worker only follows. A job
-//! that is cancelled is CANCELLED on disk first and stopped then; a result counts only if its job
-//! is still running when it comes. So nothing depends on when the work learns of it, and a kill at
-//! any time leaves a state that was acknowledged.
+//! The catalogue stores the jobs; what is decided there is final, and the worker only follows. A
+//! job that is cancelled is CANCELLED on disk first and stopped then; a result counts only if its
+//! job is still running when it comes. So nothing depends on when the work learns of it, and a kill
+//! at any time leaves a state that was acknowledged.
 //!
 //! `request` checks what fits are asked for, `execute` executes them, for jobs and the command
 //! line; `hierarchy` does both for solves, `derive` for pairs of links; `link_body` makes bodies of
@@ -47,7 +47,7 @@ pub struct Jobs {
 }
 
 impl Jobs {
-    /// Jobs of which somebody hears once they have ended, with how long the last attempt took if
+    /// Jobs that are reported once they have ended, with how long the last attempt took if
     /// it came to its end.
     pub fn heard_by(listener: impl Fn(&Job, Option<Duration>) + Send + Sync + 'static) -> Self {
         Self { listener: Listener::new(listener), ..Self::default() }

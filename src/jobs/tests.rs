@@ -53,7 +53,7 @@ fn who_counts_jobs_hears_of_each_once() {
         jobs.cancel(&catalogue, id).expect("cancelled");
     }
     assert_eq!(*heard.lock().expect("no panic"), [(JobState::Cancelled, None)]);
-    // One that kills the server is given up, and returned to be heard of.
+    // One that kills the server is given up, and returned to be reported.
     let (_dir, catalogue, id) = claimed();
     assert!(recover(&catalogue).expect("begun again").is_empty());
     claim(&catalogue).expect("the disk works").expect("the job");

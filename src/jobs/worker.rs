@@ -83,7 +83,7 @@ impl Jobs {
                     self.retry_until_committed(catalogue, move |catalogue| finish(catalogue, id, &left)).await
                 {
                     tracing::info!(id, state = %job.state, "job ended");
-                    // Of one that was cancelled meanwhile was heard then.
+                    // One that was cancelled meanwhile was reported then.
                     if job.state == ended.0 {
                         self.listener.hear(&job, Some(took));
                     }

@@ -10,7 +10,7 @@ const TICKS_PER_S: f64 = 100.0;
 pub(super) fn cpu_s(pid: Option<u32>) -> Option<f64> {
     let who = pid.map_or_else(|| "self".to_owned(), |pid| pid.to_string());
     let stat = fs::read_to_string(format!("/proc/{who}/stat")).ok()?;
-    // After the name, which may hold anything: user and system time are the 12th and 13th.
+    // After the name, which may contain anything: user and system time are the 12th and 13th.
     let mut fields = stat.rsplit(')').next()?.split_whitespace().skip(11);
     let user: f64 = fields.next()?.parse().ok()?;
     let system: f64 = fields.next()?.parse().ok()?;

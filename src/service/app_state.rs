@@ -1,4 +1,4 @@
-//! What every handler holds: the catalogue once it is loaded, and the gates to the threads that
+//! What every handler has: the catalogue once it is loaded, and the gates to the threads that
 //! work.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};

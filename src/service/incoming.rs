@@ -1,7 +1,7 @@
 //! Connections as they come in: so many at once, and only from clients that say something.
 //!
 //! A socket costs a file descriptor whether or not its client ever speaks. Each waits in a task of
-//! its own for the first bytes of HTTP/2, so that a mute client does not hold up the others, and is
+//! its own for the first bytes of HTTP/2, so that a mute client is not valid the others, and is
 //! dropped when they do not come.
 
 use std::io;

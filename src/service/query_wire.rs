@@ -250,7 +250,7 @@ fn pair_rows(rows: &[proto::ObjectPair], scene: &Scene) -> Result<(Vec<Operand>,
     Ok((operands, pairs))
 }
 
-/// Names of the objects that answers speak of, each once.
+/// Names of the objects that answers name, each once.
 #[derive(Debug, Default)]
 pub(super) struct NameTable {
     places: BTreeMap<Slot, u32>,

@@ -1,5 +1,5 @@
-//! The messages of a stream while they are received: they end when the token of the call is revoked,
-//! also where its client reads no answers.
+//! The messages of a stream while they are received: they end when the token of the call is
+//! revoked, also where its client reads no answers.
 
 use std::pin::Pin;
 use std::task::{Context, Poll};

@@ -129,7 +129,7 @@ pub(super) fn placement(
     })
 }
 
-/// A robot as a scene holds it.
+/// A robot as it is in a scene.
 pub(super) fn instance(instance: &RobotInstance<'_>) -> proto::RobotInstance {
     let values = numbers(instance.configuration());
     let joints = proto::JointValues { joints: Vec::new(), values, rows: Vec::new() };

@@ -1,4 +1,4 @@
-//! WatchScene: what a scene holds, then what changes, conflated.
+//! WatchScene: the content of a scene, then what changes, conflated.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -103,7 +103,8 @@ async fn send_whole(scene: &Scene, messages: &Messages) -> Option<()> {
     messages.send(Ok(piece)).await.ok()
 }
 
-/// Poses that were set after a revision, in pieces, with the robots that moved in the last one; none when the client is gone.
+/// Poses that were set after a revision, in pieces, with the robots that moved in the last one;
+/// none when the client is gone.
 async fn send_moved(scene: &Scene, from: u64, messages: &Messages) -> Option<()> {
     let moved: Vec<Slot> = scene.moved_since(from).collect();
     let mut pieces = moved.chunks(PIECE_POSES).peekable();

@@ -1,4 +1,4 @@
-//! Tokens that clients show, and what they may do with them. The file holds hashes only, and is
+//! Tokens that clients show, and what they may do with them. The file contains hashes only, and is
 //! read again when it changes.
 
 use std::path::{Path, PathBuf};
@@ -129,7 +129,7 @@ impl Tokens {
     }
 }
 
-/// What is wrong with a file, and in which line, without the line: it may hold what is secret.
+/// What is wrong with a file, and in which line, without the line: it may contain what is secret.
 fn toml_error(text: &str, error: &toml::de::Error) -> String {
     let message = Some(error.message()).filter(|message| !message.is_empty()).unwrap_or("something is missing");
     match error.span().and_then(|span| text.get(..span.start)) {

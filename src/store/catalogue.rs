@@ -70,7 +70,7 @@ impl Catalogue {
     /// [`Catalogue::prove_all`].
     ///
     /// # Errors
-    /// When the file cannot be read, or holds a row, pose or name that does not hold up.
+    /// When the file cannot be read, or holds a row, pose or name that is not valid.
     pub fn load(store: Store) -> Result<Self, StoreError> {
         let state = State::read(&store, &BTreeMap::new())?;
         let proven = AtomicBool::new(state.is_proven());

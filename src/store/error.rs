@@ -46,7 +46,7 @@ pub enum StoreError {
         /// The catalogue's file.
         file: PathBuf,
     },
-    /// The file is there and holds nothing: it was cut, or the first start did not get far.
+    /// The file is there and is empty: it was cut, or the first start did not get far.
     #[error(
         "{} is empty; restore it from a backup, or remove it to start with an empty catalogue",
         .file.display()
@@ -55,7 +55,7 @@ pub enum StoreError {
         /// The catalogue's file.
         file: PathBuf,
     },
-    /// The file holds something this program did not write.
+    /// The file contains something this program did not write.
     #[error(
         "the catalogue in {} is damaged: {what}; restore catalogue.redb from a backup or use another directory",
         .dir.display()

@@ -1,7 +1,7 @@
 //! The durable catalogue of bodies, robots, scenes and jobs, embedded in the server.
 //!
 //! [`Store`] is the file: one redb database, `catalogue.redb`, in the data directory. [`Catalogue`]
-//! holds everything of it in memory for reading and writes every change through. Only this layer
+//! keeps everything of it in memory for reading and writes every change through. Only this layer
 //! knows bytes on disk.
 //!
 //! # What is durable, and why

@@ -1,4 +1,4 @@
-//! A pose as rows hold it.
+//! A pose as rows store it.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 

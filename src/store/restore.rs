@@ -13,7 +13,7 @@ use super::{Catalogue, Counts, Store, StoreError};
 /// are.
 ///
 /// # Errors
-/// A directory that has a catalogue, a file that is no backup or does not hold up, and a disk that
+/// A directory that has a catalogue, a file that is no backup or is not valid, and a disk that
 /// fails.
 pub fn restore(backup: &Path, dir: &Path) -> Result<Counts, StoreError> {
     let unusable = |source: io::Error| StoreError::Directory { dir: dir.into(), source };

@@ -1,5 +1,5 @@
-//! Tables of the catalogue and what their rows hold. JSON: a few hundred bytes each, readable with
-//! any redb viewer, and numbers survive the round trip exactly.
+//! Tables of the catalogue and the content of their rows. JSON: a few hundred bytes each, readable
+//! with any redb viewer, and numbers survive the round trip exactly.
 
 use redb::TableDefinition;
 use serde::{Deserialize, Serialize};

@@ -4,7 +4,7 @@
 //! Cargo keeps the directions between crates; this test keeps those between the folders of
 //! `sublevel-core` and of `sublevel`. The sources are read as text, with comments, literals and
 //! test modules blanked out, and every path that starts at `crate::` or at one of the crates (or
-//! climbs out of a layer with `super::`) is held against the table of allowed directions.
+//! climbs out of a layer with `super::`) is compared with the table of allowed directions.
 
 use crate::source::{identifier, is_test_file, rust_files, without_comments_and_literals, without_tests};
 use std::fs;

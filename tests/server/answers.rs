@@ -1,4 +1,4 @@
-//! What answers hold besides their bracket, held against closed forms of balls.
+//! What answers contain besides their bracket, compared with closed forms of balls.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use sublevel::body::Body;

@@ -69,7 +69,7 @@ impl Running {
         std::fs::read_to_string(dir.join("log")).expect("a log")
     }
 
-    /// Most memory it ever held.
+    /// Most memory it ever took.
     pub(crate) fn peak_memory_mib(&self) -> u64 {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).expect("it runs");
         let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).expect("a peak");

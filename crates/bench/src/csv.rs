@@ -82,7 +82,7 @@ impl<'a> Row<'a> {
     }
 }
 
-/// The cells of a line; those between quotes may hold commas.
+/// The cells of a line; those between quotes may contain commas.
 fn cells(line: &str) -> Vec<String> {
     let mut cells = vec![String::new()];
     let mut quoted = false;

@@ -1,5 +1,5 @@
 //! Measurements of Sublevel beside other libraries and solvers, as reports with pictures and raw
-//! numbers; and what its benches share. Not published: whoever uses Sublevel compiles none of it.
+//! numbers; and what its benches share. Not published: users of Sublevel compile none of it.
 
 pub mod accuracy;
 mod baselines;

@@ -1,4 +1,4 @@
-//! Numbers of pages out of the CSV files beside them: one command writes them, and a test holds
+//! Numbers of pages out of the CSV files beside them: one command writes them, and a test checks
 //! the pages against it.
 
 use crate::blocks::refreshed;

@@ -152,7 +152,7 @@ fn what_cannot_be_redrawn_is_refused() {
 fn column(csv: &str, first: &str, name: &str) -> Vec<f64> {
     let heads: Vec<&str> = csv.lines().next().expect("a head").split(',').collect();
     let from_the_end = heads.len() - heads.iter().position(|head| *head == name).expect("a column of that name");
-    // Names in front may hold commas.
+    // Names in front may contain commas.
     let cell = |line: &str| line.rsplit(',').nth(from_the_end - 1)?.parse().ok();
     csv.lines().filter(|line| line.starts_with(first)).map(|line| cell(line).unwrap_or(f64::NAN)).collect()
 }

@@ -55,7 +55,7 @@ fn tables_of_numbers_stand_in_blocks() {
     }
 }
 
-/// The table of stability is held against its CSV: cases, failures, and how far off.
+/// The table of stability is compared with its CSV: cases, failures, and how far off.
 #[test]
 fn the_stability_table_is_that_of_its_csv() {
     let read = |name: &str| fs::read_to_string(root().join("docs").join(name)).expect("a file of docs/");
@@ -64,7 +64,7 @@ fn the_stability_table_is_that_of_its_csv() {
     let columns = ["cold", "warm", "batch", "newton", "slsqp", "clarabel", "parry", "coal"];
     let mut compared = 0;
     for line in csv.lines().skip(1) {
-        // Names hold commas.
+        // Names contain commas.
         let (number, rest) = line.split_once(",\"").expect("a name between quotes");
         let (name, rest) = rest.split_once("\",").expect("the end of the name");
         let values: Vec<&str> = rest.split(',').collect();

@@ -25,7 +25,7 @@ fn check_optimality(answer: &Distance, (a, pose_a): (&Body, &Pose), (b, pose_b):
     let (value_a, g_a) = gradient(a, pose_a, &answer.witness_a);
     let (value_b, g_b) = gradient(b, pose_b, &answer.witness_b);
     assert!((value_a - 1.0).abs() < 1e-7 && (value_b - 1.0).abs() < 1e-7, "{label}: {value_a} {value_b}");
-    // A bracket of 1e-9 holds the angles to its square root.
+    // A bracket of 1e-9 determines the angles to its square root.
     for (name, error) in [("A", g_a.normalize() + n), ("B", g_b.normalize() - n)] {
         assert!(error.norm() < 1e-4, "{label}: normal of {name} is off by {:e}", error.norm());
     }

@@ -1,4 +1,4 @@
-//! The points that a program knows, out of all that it has to hold.
+//! The points that a program knows, out of all that it has to contain.
 
 use super::farthest_points::farthest_points;
 use super::program::Problem;

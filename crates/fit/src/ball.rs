@@ -80,7 +80,7 @@ mod tests {
     use nalgebra::{Matrix3, Vector3};
     use sublevel_testkit::Seeded;
 
-    /// The smallest ball through two, three or four points that holds all, by trying them all.
+    /// The smallest ball through two, three or four points that contains all, by trying them all.
     fn brute_force(points: &[Vector3<f64>]) -> f64 {
         let n = points.len();
         let mut best = f64::INFINITY;

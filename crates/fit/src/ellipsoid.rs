@@ -34,7 +34,7 @@ impl Ellipsoid {
     }
 }
 
-/// The smallest ellipsoid by volume around `points`, to a relative 1e-6, scaled so that it holds
+/// The smallest ellipsoid by volume around `points`, to a relative 1e-6, scaled so that it contains
 /// all of them.
 ///
 /// Khachiyan's coordinate ascent on the dual with the away steps of Todd and Yıldırım (Discrete

@@ -41,7 +41,7 @@ impl Facing {
     }
 }
 
-/// A spherical cap that holds the directions of a cell: those within an angle of an axis.
+/// A spherical cap that contains the directions of a cell: those within an angle of an axis.
 struct DirectionCap {
     axis: Vector3<f64>,
     angle: f64,

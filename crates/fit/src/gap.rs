@@ -1,4 +1,4 @@
-//! How far a body reaches beyond the convex hull of the points it holds.
+//! How far a body reaches beyond the convex hull of the points it contains.
 //!
 //! The gap is the one-sided Hausdorff distance, the largest distance of a point of the body from
 //! the hull. It is bounded by a search over cells of rays from the interior point, which is 0 here
@@ -38,7 +38,7 @@ const GAP_ACCURACY: f64 = 0.02;
 /// uses up [`MAX_CELLS`]. Pinned by `the_coarsest_body_within_a_gap_is_on_the_lowest_rung_that_is`.
 pub(super) const RESOLVED_GAP: f64 = 1e-5;
 
-/// Most cells looked at; the bound holds after fewer, too.
+/// Most cells looked at; the bound is valid after fewer, too.
 const MAX_CELLS: usize = 30_000;
 
 /// Rings of the rule for the mean.
@@ -210,7 +210,7 @@ impl<'a> GapSearch<'a> {
         self.rays.len() - 1
     }
 
-    /// The normal a of a half-space `a·y <= 1` that holds the body, by the constraint's tangent
+    /// The normal a of a half-space `a·y <= 1` that contains the body, by the constraint's tangent
     /// plane at x.
     fn plane(&self, constraint: &Constraint, x: &Vector3<f64>) -> Vector3<f64> {
         let (placement, interior) = (self.body.placement(), self.body.interior_point());

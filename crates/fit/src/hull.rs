@@ -209,7 +209,7 @@ fn volume(points: &[Vector3<f64>], facets: &[[usize; 3]]) -> f64 {
 /// How far the farthest point lies outside the plane of a facet that it faces; the points have
 /// extents near 1. Infinite if the facets enclose nothing.
 fn excess(points: &[Vector3<f64>], facets: &[[usize; 3]]) -> f64 {
-    // Slivers have no direction to speak of.
+    // Slivers have no usable direction.
     let planes = facets.iter().filter_map(|&[a, b, c]| {
         let normal = (points[b] - points[a]).cross(&(points[c] - points[a])).try_normalize(1e-9)?;
         Some((normal, normal.dot(&points[a])))

@@ -258,8 +258,8 @@ impl<'a> MomentProgram<'a> {
     /// Solves it.
     ///
     /// # Errors
-    /// [`FitError::Cancelled`]; [`ProgramError`] where the solver has no answer, or one that gives no
-    /// dual point.
+    /// [`FitError::Cancelled`]; [`ProgramError`] where the solver has no answer, or one that gives
+    /// no dual point.
     pub(super) fn solve(&self, watch: &mut Watch) -> Result<MomentOptimum, FitError> {
         let structure = self.problem.structure;
         let solution = solve(&self.program, TOLERANCE, self.problem.pattern().size as f64, watch)?;

@@ -49,7 +49,7 @@ pub(super) struct Object<'a> {
     whitened: Vec<Vector3<f64>>,
     /// Indices of vertices that are likely to bound the next fit, the likeliest first.
     likely: RefCell<Vec<usize>>,
-    /// The points are known up to this distance, metres: bodies hold the balls around them.
+    /// The points are known up to this distance, metres: bodies contain the balls around them.
     clearance: f64,
     /// What all this took.
     seconds: f64,

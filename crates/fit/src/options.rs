@@ -30,7 +30,7 @@ pub struct FitOptions {
     /// Smallest eigenvalue asked of the Gram matrix of the Hessian form in the whitened frame; in
     /// (0, 1e-2].
     ///
-    /// It pays for the rounding of the certificate. Volumes grow by about a part in 10⁴ at 1e-4.
+    /// It absorbs the rounding of the certificate. Volumes grow by about a part in 10⁴ at 1e-4.
     /// The objectives of that very matrix keep it definite by themselves.
     pub margin: f64,
     /// What solves the program; none takes the faster one, and the other if that fails. The
@@ -60,8 +60,8 @@ impl FitOptions {
     /// Checks the options and the name of a body to be fitted, before any work.
     ///
     /// # Errors
-    /// [`FitError::Degree`], [`FitError::Objective`], [`FitError::Cone`], [`FitError::Solver`], [`FitError::Slabs`],
-    /// [`FitError::Margin`] or [`FitError::Name`].
+    /// [`FitError::Degree`], [`FitError::Objective`], [`FitError::Cone`], [`FitError::Solver`],
+    /// [`FitError::Slabs`], [`FitError::Margin`] or [`FitError::Name`].
     pub fn check(&self, name: &str) -> Result<(), FitError> {
         if ![2, 4, 6, 8].contains(&self.degree) {
             return Err(FitError::Degree(self.degree));

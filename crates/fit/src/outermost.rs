@@ -87,7 +87,7 @@ fn polytope(points: &[Vector3<f64>], chosen: &[usize]) -> Option<Facing> {
         let normal = (corners[b] - corners[a]).cross(&(corners[c] - corners[a])).try_normalize(1e-12)?;
         Some((normal, normal.dot(&corners[a])))
     });
-    // A sliver has no plane to speak of, and without it the polytope would be larger than it is.
+    // A sliver has no usable plane, and without it the polytope would be larger than it is.
     let planes: Option<Vec<_>> = planes.collect();
     Facing::new(corners.iter().sum::<Vector3<f64>>() / corners.len() as f64, planes?.into_iter())
 }

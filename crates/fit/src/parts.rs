@@ -111,7 +111,7 @@ pub(super) struct CompoundSearch<'a> {
     tried: HashMap<Key, Tried>,
 }
 
-/// All coordinates of what a part holds: parts that hold the same are fitted alike.
+/// All coordinates of the content of a part: parts of equal content are fitted alike.
 type Key = Vec<[u64; 3]>;
 
 /// What was tried of a part.
@@ -198,7 +198,7 @@ fn part_name(index: usize) -> String {
     format!("part {index}")
 }
 
-/// Does something with the object that a part holds.
+/// Does something with the object in a part.
 fn on_part<T>(
     index: usize,
     points: &PartPoints,

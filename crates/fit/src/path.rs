@@ -9,7 +9,7 @@
 //! costs one small dense factorization per Newton step (Nesterov and Nemirovskii, Interior-Point
 //! Polynomial Algorithms, 1994). A centre is within (points + rows of S)/τ of the optimum, and a
 //! Newton step near it yields a polynomial that satisfies all constraints strictly, with its Gram
-//! matrices: an upper bound to hold against the lower bound of the dual.
+//! matrices: an upper bound to compare with the lower bound of the dual.
 
 use super::FitError;
 use super::barrier::Barrier;

@@ -73,7 +73,7 @@ fn reflex_edges(piece: &Piece) -> Vec<Edge> {
         .map(|&[a, b, c]| {
             let cross = (at(b) - at(a)).cross(&(at(c) - at(a))) * inward;
             let longest = (at(b) - at(a)).norm().max((at(c) - at(a)).norm());
-            // Slivers have no direction to speak of.
+            // Slivers have no usable direction.
             (cross.norm() > 1e-9 * longest * longest).then(|| cross.normalize())
         })
         .collect();

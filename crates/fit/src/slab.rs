@@ -40,7 +40,7 @@ pub enum CutError {
     Points(#[from] NotContained),
 }
 
-/// The body cut by the slab across the unit vector n that holds the balls of radius `clearance`
+/// The body cut by the slab across the unit vector n that contains the balls of radius `clearance`
 /// about the points; what is noted of the body stays but for the gap.
 pub(super) fn cut(body: &Body, points: &[Vector3<f64>], clearance: f64, n: &Vector3<f64>) -> Result<Body, CutError> {
     let mut constraints = body.constraints().to_vec();

@@ -6,7 +6,7 @@ use std::borrow::Cow;
 
 /// Points that are at least so thick, metres: in each principal direction in which they extend by
 /// less, every point gives way to two copies, half of that to either side. Bodies around the copies
-/// hold the points.
+/// contain the points.
 pub fn thicken(points: &[Vector3<f64>], least_m: f64) -> Cow<'_, [Vector3<f64>]> {
     let mut thick = Cow::Borrowed(points);
     let (_, axes, extents) = principal_axes(points);

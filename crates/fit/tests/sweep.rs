@@ -28,7 +28,7 @@ fn fitted(points: &[Vector3<f64>], degree: usize) -> Result<Fit, FitError> {
     fit("cloud", points, &options, &mut patient())
 }
 
-/// What its file says alone proves that a body holds the points.
+/// What its file says alone proves that a body contains the points.
 fn prove(fit: &Fit, points: &[Vector3<f64>], what: &str) {
     let again = Body::from_json(&fit.body.to_json()).unwrap_or_else(|error| panic!("{what}: {error}"));
     again.prove_contains(points).unwrap_or_else(|error| panic!("{what}: {error}"));

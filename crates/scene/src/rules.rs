@@ -132,7 +132,7 @@ impl RuleTable {
         set.unwrap_or_else(|| self.sides[a as usize].1 + self.sides[b as usize].1)
     }
 
-    /// The pairs of numbers that speak of two slots, the most specific first.
+    /// The pairs of numbers that apply to two slots, the most specific first.
     fn keys(&self, a: Slot, b: Slot) -> impl Iterator<Item = (Key, Key)> {
         let (group_a, group_b) = (self.sides[a as usize].0, self.sides[b as usize].0);
         let (a, b) = (Key::from(a), Key::from(b));

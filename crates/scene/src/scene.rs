@@ -59,7 +59,7 @@ impl Scene {
         Ok(Self { name: name.into(), ..self.clone() })
     }
 
-    /// What this fork holds, as the next revision of its parent: one above both.
+    /// The content of this fork, as the next revision of its parent: one above both.
     pub fn committed_to(&self, parent: &Self) -> Self {
         let revision = self.revision.max(parent.revision) + 1;
         Self { name: parent.name.clone(), revision, structure_revision: revision, ..self.clone() }

@@ -21,8 +21,8 @@ use std::path::PathBuf;
 /// --trim leaves, as --min-thickness thickens them.
 ///
 /// With --relax-convexity, and with the objective inverse-moment, the set need not be convex:
-/// tighter, but no distances are measured from it. It is proven to hold the points; which triangles
-/// of the mesh it does not hold is reported.
+/// tighter, but no distances are measured from it. It is proven to contain the points; which
+/// triangles of the mesh it does not contain is reported.
 ///
 /// Meshes that are not convex can become compounds of several bodies: by --parts, or by --max-gap
 /// where that is cheaper to query. Connected closed components are parts of their own, and the mesh
@@ -62,7 +62,7 @@ pub(in crate::cli) struct FitArgs {
     ///   for curvature everywhere: bodies that bulge at flat sides. Degrees 2 to 6.
     /// trace-h: trace of the inverse of H, in the frame of trace-p. Degrees 2 to 6.
     /// inverse-moment: nothing; the inverse moment matrix of the points makes a set that
-    ///   need not be convex (<stem>-d6-im.json), below the least level that holds them.
+    ///   need not be convex (<stem>-d6-im.json), below the least level that contains them.
     #[arg(long, value_name = "NAME", default_value_t, verbatim_doc_comment)]
     pub(in crate::cli) objective: Choice,
     /// Let the set bend inwards: ask only that p + C |u|^degree be sos-convex, u being points with

@@ -101,7 +101,7 @@ fn explained(error: &figment::Error, file: Option<&Path>) -> ConfigError {
     ConfigError::Source(format!("{place}{key}{}; --print-config shows all keys", in_one_line(&error.kind.to_string())))
 }
 
-/// Without the picture of the place that TOML's errors hold.
+/// Without the picture of the place that is in errors of TOML.
 fn in_one_line(text: &str) -> String {
     let is_picture = |line: &&str| {
         line.contains('|')

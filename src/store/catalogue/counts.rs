@@ -1,4 +1,4 @@
-//! How much a catalogue holds.
+//! The amount of data of a catalogue.
 
 use crate::store::job::JobKind;
 

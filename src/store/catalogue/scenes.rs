@@ -246,7 +246,7 @@ impl Catalogue {
         })
     }
 
-    /// Makes what a fork holds the next revision of its parent, and removes the fork.
+    /// Makes the content of a fork the next revision of its parent, and removes the fork.
     ///
     /// # Errors
     /// When it is no fork, when the parent is gone or has changed since, or when the disk fails.

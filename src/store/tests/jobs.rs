@@ -173,7 +173,7 @@ fn a_ladder_is_stored_with_its_rungs_and_keeps_them() {
     assert_eq!(super::sizes(&disk.load().expect("loads")), (1, 0));
 }
 
-/// The body that came first stays, and a ladder is made of what is stored: it has to hold up when
+/// The body that came first stays, and a ladder is made of what is stored: it has to be valid when
 /// it is loaded.
 #[test]
 fn a_ladder_of_rungs_that_are_stored_without_their_points_is_refused() {

@@ -1,4 +1,4 @@
-//! What is sent comes back as bodies that hold it.
+//! What is sent comes back as bodies that contain it.
 
 use std::time::Instant;
 

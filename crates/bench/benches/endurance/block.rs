@@ -95,7 +95,7 @@ impl Round<'_> {
             }
             let answer = (MEASURES[measure].solve)((a, &pose_a), (b, &pose_b), &options, &mut warm);
             self.count(&site, start, &answer);
-            // Every hinted answer off a trajectory, and every tenth on one, is held against a cold
+            // Every hinted answer off a trajectory, and every tenth on one, is compared with a cold
             // one.
             if hinted && (!continues || self.query.is_multiple_of(10)) {
                 self.meet(&site, &answer);

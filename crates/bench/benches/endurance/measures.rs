@@ -103,7 +103,7 @@ impl Answer {
         }
     }
 
-    /// Holds the bracket against 200 bits; none where there is nothing to hold it against.
+    /// Compares the bracket with 200 bits; none where there is nothing to compare it with.
     pub(crate) fn verdict(&self, a: Placed<'_>, b: Placed<'_>) -> Option<Verdict> {
         Some(match self {
             Answer::Distance(answer) => {
@@ -127,7 +127,7 @@ impl Answer {
     }
 
     /// The answer's value and the size that an arbiter's 1e-6 is relative to. None where a
-    /// semidefinite program in doubles can not tell: sizes or values that are too far apart.
+    /// semidefinite program in doubles cannot resolve: sizes or values that are too far apart.
     pub(crate) fn comparable(&self, a: &Body, b: &Body) -> Option<(f64, f64)> {
         let (small, large) = (a.circumscribed().radius, b.circumscribed().radius);
         let (small, large) = (small.min(large), small.max(large));

@@ -60,7 +60,7 @@ impl Iterations {
     }
 }
 
-/// What is held against an answer.
+/// What is compared with an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(crate) enum Check {
     InOrder,

@@ -1,4 +1,4 @@
-//! A row: one query over all poses, timed pass by pass, and what its time is held against.
+//! A row: one query over all poses, timed pass by pass, and what its time is compared with.
 
 use sublevel_bench::comparison::sweep;
 pub(crate) use sublevel_bench::comparison::sweep::Answer;
@@ -33,7 +33,7 @@ impl<'a> From<sweep::Row<'a>> for Row<'a> {
 }
 
 impl<'a> Row<'a> {
-    /// A row of `query`, which keeps between the poses of a trajectory whatever `T` holds.
+    /// A row of `query`, which keeps between the poses of a trajectory the content of `T`.
     pub(crate) fn warm<P, T: Default>(
         label: impl Into<String>,
         trajectories: &'a [Vec<P>],

@@ -22,7 +22,7 @@ const WANDER: f64 = 0.05;
 /// strength, metres.
 const MIDDLE: f64 = 0.4;
 const HALF_RANGE: f64 = 0.35;
-/// Below this gap of any pair a separated motion is thrown away, metres.
+/// Below this gap of any pair a separated motion is discarded, metres.
 const CLEAR: f64 = 0.01;
 
 /// Ranges of the gap of grazing motions and of those through contact, metres, and the poses in

@@ -73,7 +73,7 @@ pub struct Row<'a> {
 }
 
 impl<'a> Row<'a> {
-    /// A row of `query`, which keeps between the poses of a trajectory whatever `T` holds.
+    /// A row of `query`, which keeps between the poses of a trajectory the content of `T`.
     pub fn warm<P, T: Default>(
         label: impl Into<String>,
         trajectories: &'a [Vec<P>],

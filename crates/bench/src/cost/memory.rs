@@ -46,7 +46,7 @@ pub(super) fn bytes_of<T: Clone>(thing: &T, parts: usize) -> Option<f64> {
     None
 }
 
-/// The most memory that a process held, bytes, if it ends well.
+/// The most memory that a process took, bytes, if it ends well.
 pub(super) fn peak(program: &Path, arguments: &[&str]) -> Option<f64> {
     let quiet = Command::new(program).args(arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
     let mut child = quiet.ok()?;

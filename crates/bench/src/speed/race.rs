@@ -69,7 +69,7 @@ pub(super) struct Race {
     pub(super) lines: Vec<Line>,
 }
 
-/// What the CSV does not hold of a pair.
+/// What the CSV does not have of a pair.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct About {
     pub(super) hull_vertices: [usize; 2],
@@ -211,7 +211,7 @@ impl Line {
 }
 
 impl Ours {
-    /// All but the times: what it answers in each form, held against the truth.
+    /// All but the times: what it answers in each form, compared with the truth.
     fn line(&self, poses: &[Vec<Pose>], truth: &[Vec<f64>; 2], diameter_m: f64) -> Line {
         let (origin, options) = (Pose::identity(), Options::default());
         let (mut values, mut wrong, mut seen) = (Vec::new(), 0, 0);

@@ -83,7 +83,7 @@ impl Shown {
         })
     }
 
-    /// Whether the figures hold, pair by pair.
+    /// Whether the figures are met, pair by pair.
     fn verdicts(&self) -> String {
         let mut text = String::new();
         let _ = writeln!(

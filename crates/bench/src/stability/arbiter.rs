@@ -1,6 +1,6 @@
 //! The truth about a distance, from bounds that do not depend on the solver which is judged.
 //!
-//! Whoever proposes them, two points inside the bodies are at least as far apart as the bodies, and
+//! Two points inside the bodies are at least as far apart as the bodies, and
 //! the gap between the bodies' heights along a direction ([`Body::support`]) is at most the
 //! distance. The arbiter takes the best of all proposals and of directions all around: an answer
 //! that is too long is refuted by somebody's points, one that is too short by somebody's direction.

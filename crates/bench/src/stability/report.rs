@@ -38,7 +38,7 @@ impl FromStr for Earlier {
     /// Reads the CSV of a run.
     fn from_str(text: &str) -> Result<Self, GuardError> {
         let cell = |line: &str| {
-            // Names hold commas.
+            // Names contain commas.
             let (number, rest) = line.split_once(",\"")?;
             let (_, rest) = rest.split_once("\",")?;
             let (method, seeds) = (rest.split(',').next()?, rest.rsplit(',').next()?);

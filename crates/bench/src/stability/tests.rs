@@ -78,7 +78,7 @@ fn answers_that_are_wrong_are_found_out() {
 #[test]
 fn others_are_held_to_their_own_problem() {
     let case = balls();
-    // Hulls inside of balls are farther apart, which is not held against GJK.
+    // Hulls inside of balls are farther apart, which is no failure of GJK.
     for method in [Method::Newton, Method::Slsqp, Method::Parry] {
         assert_eq!(case.put(method).unwrap(), Some(Verdict::Pass), "{method:?}");
     }

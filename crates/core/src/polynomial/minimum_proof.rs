@@ -187,9 +187,9 @@ mod tests {
     use super::*;
     use nalgebra::{Matrix3, Vector3};
 
-    /// On the unit ball about 0 and that about (c, 0, 0) in coordinates of their own, with `f = |u
-    /// - v
-    /// - c|²`: level 0 is exact, with multiplier `c - 2` of both constraints and squares of the rest.
+    /// On the unit ball about 0 and that about (c, 0, 0) in coordinates of their own, with
+    /// `f = |u - v - c|²`: level 0 is exact, with multiplier `c - 2` of both constraints and squares
+    /// of the rest.
     #[test]
     fn two_balls_are_as_far_apart_as_they_are() {
         let one = Polynomial::new(vec![([2, 0, 0], 1.0), ([0, 2, 0], 1.0), ([0, 0, 2], 1.0)]).unwrap();

@@ -76,7 +76,7 @@ fn truth(known: &Known, capsule: &Capsule, at: &Pose) -> (f64, bool) {
     (least - capsule.radius_m(), least > 0.0 || matches!(known, Known::Ball(_)))
 }
 
-/// What every answer has to be: a bracket around the truth with an honest status and finite
+/// What every answer has to be: a bracket around the truth with a true status and finite
 /// numbers, from a hint or none; a decision that the truth allows.
 fn judged(known: &Known, capsule: &Capsule, at: &Pose, warm: &mut WarmStart, label: &str) -> CapsuleDistance {
     let (body, origin, options) = (known.body(), Pose::identity(), Options::default());

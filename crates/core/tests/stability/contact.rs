@@ -37,7 +37,7 @@ fn family_01_kissing_contact() {
     }
 }
 
-/// Endless loops: parallel Q8 faces, gap 1e-3..1e-12, tilt 1e-9..1e-3 rad: caps hold.
+/// Endless loops: parallel Q8 faces, gap 1e-3..1e-12, tilt 1e-9..1e-3 rad: caps are kept.
 #[test]
 fn family_03_endless_loops() {
     for index in 0..PARALLEL_FACES {

@@ -64,7 +64,7 @@ fn signed(a: Placed<'_>, b: Placed<'_>, options: &Options<'_>, warm: &mut WarmSt
     answer
 }
 
-/// Holds a signed distance of overlapping bodies against the closed supports: no direction is
+/// Compares a signed distance of overlapping bodies with the closed supports: no direction is
 /// better than its upper bound, and its own direction is as good as its lower one. Untied, it is no
 /// worse than any other by more than its accuracy.
 fn hold(a: Placed<'_>, b: Placed<'_>, answer: &SignedDistance, label: &str) {
@@ -108,7 +108,7 @@ fn family_16_deep_penetration() {
                 if answer.upper < 0.0 {
                     hold(p, q, answer, &label);
                 }
-                // Mirrored, the way out is as long on the other side.
+                // Mirrored, the translation out is as long on the other side.
                 if offset < 1e-6 * reach {
                     assert!(answer.tied, "{label}: {answer:?} is not flagged as tied");
                 }

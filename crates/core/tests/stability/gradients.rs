@@ -26,8 +26,8 @@ fn deviation(found: &[Twist; 2], truth: &[f64; 12], (a, b): (&Body, &Body)) -> f
     (sum(&|k| parts[k / 3][k % 3] - truth[k]) / sum(&|k| truth[k])).sqrt()
 }
 
-/// Steps to look around a kink by, and how far from it a pose may be that brackets do not tell from
-/// it; relative to the smaller body.
+/// Steps to look around a kink by, and how far from it a pose may be that brackets do not
+/// distinguish from it; relative to the smaller body.
 const AROUND: f64 = 1e-7;
 const ROUNDED: f64 = 1e-11;
 
@@ -168,7 +168,7 @@ fn family_20_distance_gradients() {
 
 /// The same where the answer is that of one of several parts, whose bracket was narrowed while
 /// another one's was known, and where it was asked for within a margin: bodies with edges, whose
-/// brackets do not tell the normal.
+/// brackets do not determine the normal.
 #[test]
 fn family_20_gradients_of_parts_and_within_margins() {
     let zoo = zoo();
@@ -325,13 +325,13 @@ fn family_21_ties_and_switching_gradients() {
             let deep = penetration(a, &moved, host, &still, &options, &mut WarmStart::default());
             let label = format!("{label}: {answer:?} {deep:?}");
             assert!(answer.upper < 0.0, "{label}");
-            // The same bracketed depth, and untied the same way out.
+            // The same bracketed depth, and untied the same translation out.
             assert!(deep.lower <= -answer.lower && -answer.upper <= deep.upper, "{label}");
             let (n, m) = (answer.normal.expect("a way out"), deep.direction.expect("a way out"));
             assert!(answer.tied || deep.tied || (n - m).norm() < 1e-3, "{label}");
             (answer.tied || deep.tied, n)
         };
-        // At the common centre every way out has its mirror image.
+        // At the common centre every translation out has its mirror image.
         let (tied, _) = solve(Vector3::zeros(), &mut WarmStart::default(), &format!("seed {seed} concentric"));
         assert!(tied, "seed {seed} {}-{}: concentric and not flagged", a.name(), host.name());
         // Mirror planes of the pair between two of its ways out: through the centre, and across a

@@ -1,4 +1,4 @@
-//! What every answer is held against, whatever the family.
+//! What every answer is compared with, whatever the family.
 
 use sublevel_core::body::Body;
 use sublevel_core::measure::{
@@ -36,7 +36,7 @@ pub(crate) fn large(a: &Body, b: &Body) -> f64 {
 }
 
 /// A cold distance, checked without a reference: the status is what the bracket says, the numbers
-/// are numbers, the caps hold.
+/// are numbers, the caps are kept.
 pub(crate) fn plain((a, pose_a): Placed<'_>, (b, pose_b): Placed<'_>, options: &Options<'_>, label: &str) -> Distance {
     warm((a, pose_a), (b, pose_b), options, &mut WarmStart::default(), label)
 }
@@ -62,7 +62,7 @@ pub(crate) fn warm(
     answer
 }
 
-/// A cold distance held against 200 bits.
+/// A cold distance compared with 200 bits.
 pub(crate) fn judged(
     a: Placed<'_>,
     b: Placed<'_>,
@@ -74,7 +74,7 @@ pub(crate) fn judged(
     (answer, truth)
 }
 
-/// Holds an answer against 200 bits.
+/// Compares an answer with 200 bits.
 pub(crate) fn verdict(
     (a, pose_a): Placed<'_>,
     (b, pose_b): Placed<'_>,
@@ -88,7 +88,7 @@ pub(crate) fn verdict(
     truth
 }
 
-/// A cold level distance held against 200 bits.
+/// A cold level distance compared with 200 bits.
 pub(crate) fn judged_level(
     (a, pose_a): Placed<'_>,
     (b, pose_b): Placed<'_>,

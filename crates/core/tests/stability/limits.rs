@@ -25,7 +25,7 @@ fn family_02_iteration_limit() {
             let label = format!("seed {seed} {}", case.what);
             let full = plain((a, pose_a), (b, pose_b), &Options::default(), &label);
             let full_level = level_distance(a, pose_a, b, pose_b, &Options::default(), &mut WarmStart::default());
-            // The limit and the honest status are part of every verdict.
+            // The limit and a true status are part of every verdict.
             let options = options_of(&case);
             let answer = plain((a, pose_a), (b, pose_b), &options, &label);
             // The reference needs a start near the solution, which is what the limit denies.

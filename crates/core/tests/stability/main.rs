@@ -1,7 +1,7 @@
 //! The stability catalogue: families of queries that broke collision libraries, one function per
 //! family.
 //!
-//! Every answer is held against the truth with 200 bits (`sublevel_testkit::reference`) or in
+//! Every answer is compared with the truth with 200 bits (`sublevel_testkit::reference`) or in
 //! closed form. Sizes are small here; the same draws in their billions are the endurance bench.
 
 mod exact;

@@ -106,7 +106,7 @@ fn family_22_grazing() {
     }
 }
 
-/// Turning past each other with nothing in closed form: held against dense sampling only.
+/// Turning past each other with nothing in closed form: compared with dense sampling only.
 #[test]
 fn family_22_tumbling() {
     let (mut hits, mut misses) = (0, 0);

@@ -119,7 +119,7 @@ fn family_19_argument_order() {
             assert!(other.lower <= first.upper + floor && first.lower <= other.upper + floor, "{label}");
             assert!((other.value() - first.value()).abs() <= width + floor, "{label}");
             if let (Some(n), Some(m)) = (first.normal, normal) {
-                // The bracket holds the angle to its square root.
+                // The bracket determines the angle to its square root.
                 assert!((n - m).norm() <= 1e-3 || truth.value() < 1e-6 * sum, "{label}");
             }
         }

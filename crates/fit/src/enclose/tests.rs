@@ -228,7 +228,7 @@ fn files_keep_the_proofs() {
         let error = Body::from_json(&text.replacen(what, with, 1)).unwrap_err().to_string();
         assert!(error.contains(field), "{error}");
     }
-    // What is moved is not known to hold what stays.
+    // What is moved is not known to contain what stays.
     assert!(again.moved(&UnitQuaternion::identity(), &Vector3::x()).unwrap().sets().is_empty());
 }
 

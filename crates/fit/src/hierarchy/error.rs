@@ -15,7 +15,7 @@ pub enum HierarchyError {
     /// A set without polynomials.
     #[error("sets[{0}] has no polynomial; it is the whole space")]
     NoPolynomial(usize),
-    /// Numbers that are not finite, a map that cannot be inverted, or bounds that hold nothing.
+    /// Numbers that are not finite, a map that cannot be inverted, or bounds that contain nothing.
     #[error("sets[{index}]: {why}")]
     Set {
         /// Which set.

@@ -12,7 +12,8 @@ use sublevel_core::polynomial::{Polynomial, Substitution};
 pub struct PlacedSet<'a> {
     /// The set in its own frame.
     pub set: BasicSet<'a>,
-    /// A box that holds it, metres in its own frame; where it does not, the set is what is in both.
+    /// A box that contains it, metres in its own frame; where the set reaches outside, only the
+    /// part in the box counts.
     pub bounding_box: Aabb,
     /// From its own frame to a common one, metres.
     pub pose: Isometry3<f64>,

@@ -109,8 +109,8 @@ fn the_counterexample_is_closed_by_a_higher_level() {
     }
 }
 
-/// Random quartics that bend inwards: brackets hold distances of points that are in the sets, those
-/// that are sampled and those that local searches from many starts find; 10 000 pairs where
+/// Random quartics that bend inwards: brackets contain distances of points that are in the sets,
+/// those that are sampled and those that local searches from many starts find; 10 000 pairs where
 /// `SUBLEVEL_LONG` is set.
 #[test]
 fn brackets_of_random_quartics_hold_what_is_found() {

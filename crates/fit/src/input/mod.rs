@@ -1,6 +1,6 @@
 //! Meshes and point clouds from files.
 //!
-//! Whatever a file holds is read or refused: what a reader does not consume is an error, and
+//! The content of a file is read or refused: what a reader does not consume is an error, and
 //! counts, terminators and sizes that a format has are checked. Numbers that stand there as text
 //! are read in double precision; binary ones have the precision of the format. One convex body that
 //! holds the vertices holds every triangle; what several bodies hold together, or one that is not
@@ -35,7 +35,7 @@ use surface::SurfaceError;
 /// Endings of the formats that can be read.
 pub const FORMATS: [&str; 6] = ["off", "obj", "ply", "stl", "dae", "xyz"];
 
-/// What a file holds.
+/// The content of a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reading {
     /// The mesh.

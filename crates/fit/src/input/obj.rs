@@ -6,7 +6,7 @@ use super::text::{Line, lines, quoted};
 use nalgebra::Vector3;
 use std::borrow::Cow;
 
-/// Keywords whose lines hold nothing that a body needs: texture coordinates, normals, lines and
+/// Keywords whose lines contain nothing that a body needs: texture coordinates, normals, lines and
 /// points between vertices, groups, materials, and how programs draw it all.
 const IGNORED: [&[u8]; 18] = [
     b"vt",

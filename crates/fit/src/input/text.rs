@@ -57,7 +57,7 @@ impl<'a> Line<'a> {
         self.text.split(|byte| is_blank(*byte)).filter(|field| !field.is_empty())
     }
 
-    /// Whether it holds nothing but blanks.
+    /// Whether it contains nothing but blanks.
     pub(super) fn is_blank(self) -> bool {
         self.text.iter().all(|byte| is_blank(*byte))
     }
@@ -139,7 +139,7 @@ pub(super) fn integer<T: std::str::FromStr>(field: &[u8]) -> Option<T> {
     str::from_utf8(field).ok()?.parse().ok()
 }
 
-/// The beginning of a message that may quote what a file holds, in one line.
+/// The beginning of a message that may quote the content of a file, in one line.
 pub(super) fn shortened(text: &str) -> String {
     const MAX_MESSAGE_CHARS: usize = 120;
     let shown: String = text.chars().take(MAX_MESSAGE_CHARS).flat_map(char::escape_debug).collect();

@@ -81,7 +81,7 @@ fn axes_named(names: &[&[u8]]) -> Option<[usize; 3]> {
     Some([place(0)?, place(1)?, place(2)?])
 }
 
-/// The same of a comment, if it holds nothing but names.
+/// The same of a comment, if it contains nothing but names.
 fn axes_of_comment(line: Line<'_>) -> Option<[usize; 3]> {
     let text = line.text.trim_ascii();
     let marks = text.iter().take_while(|byte| matches!(byte, b'#' | b'/')).count();

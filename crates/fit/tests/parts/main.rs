@@ -32,7 +32,7 @@ fn degree(degree: usize) -> FitOptions {
     FitOptions { degree, ..FitOptions::default() }
 }
 
-/// Total volume of the hulls of what the parts of a compound hold, m³.
+/// Total volume of the hulls of the content of the parts of a compound, m³.
 fn hulls(mesh: &Mesh, compound: &Compound) -> f64 {
     let whole = Piece::of_mesh(&mesh.points, &mesh.triangles).unwrap();
     let held = compound.covering().unwrap().division.pieces(whole, compound.parts().len()).unwrap();

@@ -21,7 +21,7 @@ pub struct Kinematics {
     width: usize,
 }
 
-/// A joint that follows no other one: what a configuration holds values of.
+/// A joint that follows no other one: what a configuration has values of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variable {
     /// Name of the joint.

@@ -1,6 +1,6 @@
 //! Certificates of free motions: what is claimed, and what proves it.
 //!
-//! A certificate holds the robot, its path, all bodies and obstacles with their polynomials, the
+//! A certificate contains the robot, its path, all bodies and obstacles with their polynomials, the
 //! pairs that do not count, and for each pair that does a list of intervals that cover the path. On
 //! each, planes across a unit vector keep the pieces apart by more than these can move. A reader
 //! needs neither the scene nor a solver.

@@ -37,7 +37,7 @@ pub enum CertificateError {
         /// Position of the segment of the path.
         segment: usize,
     },
-    /// Another robot, scene or body than what it is held against.
+    /// Another robot, scene or body than what it is compared with.
     #[error("the certificate is of another {0}")]
     Other(&'static str),
     /// The check was ended before it was complete.

@@ -3,7 +3,7 @@
 //! With the values of the joints between two bodies in a box, no point moves farther than the bound
 //! of [`super::bound`] from where it is at the centre. A box in which a pair keeps apart is done; a
 //! contact at a centre is a witness; otherwise the box is cut across the joint that moves the pair
-//! most. Boxes that may hold the deepest contact come first, so that a witness is found early.
+//! most. Boxes that may contain the deepest contact come first, so that a witness is found early.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -275,7 +275,7 @@ impl<'a> Derivation<'a> {
         DerivedPair { items: self.items, class, witness: witness.filter(|_| is_shown), upper_m, boxes: self.boxes }
     }
 
-    /// Whether a joint between two pieces takes values that no box holds: those that move in a
+    /// Whether a joint between two pieces takes values that no box contains: those that move in a
     /// plane or freely, that turn or slide without limits, or that follow one that turns without
     /// end.
     fn is_endless(&self, pair: &PiecePair) -> bool {

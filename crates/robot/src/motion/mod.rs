@@ -6,7 +6,7 @@
 //! environments, IEEE Trans. Robotics 21, 2005). A pair whose distance at q is more than Δ and its
 //! threshold is free on the whole interval; one that is nearer than its threshold at q is in
 //! contact; otherwise the interval is halved, and the halves inherit only the pairs that are open.
-//! Every number is rounded so that the proof holds. What proves a motion can be written down
+//! Every number is rounded so that the proof is valid. What proves a motion can be written down
 //! ([`Certificate`]) and checked without a solver.
 
 mod answer;

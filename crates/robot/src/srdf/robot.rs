@@ -1,4 +1,4 @@
-//! The robot that an SRDF speaks of: names, and ways through its tree.
+//! The robot that an SRDF is about: names, and ways through its tree.
 
 use std::collections::HashMap;
 

@@ -1,4 +1,4 @@
-//! Damaged texts: whatever they hold, the readers return.
+//! Damaged texts: whatever their content, the readers return.
 
 use sublevel_testkit::Seeded;
 

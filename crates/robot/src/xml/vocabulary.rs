@@ -1,5 +1,5 @@
 //! Words of the format at one place, and words that look like misspelt ones. What the format does
-//! not have is passed over, as other readers do: files hold parts for simulators and drivers. A
+//! not have is passed over, as other readers do: files contain parts for simulators and drivers. A
 //! misspelt word, or an element with collision geometry inside, is refused: without it a part of
 //! the robot would be left out.
 

@@ -1,4 +1,4 @@
-//! Random scenes of everything a scene can hold.
+//! Random scenes of everything a scene can contain.
 
 use std::sync::Arc;
 

@@ -1,5 +1,5 @@
-//! Degenerate point clouds: 26. Fits of them are a certified body that holds the points, or a clear
-//! error that names the reason.
+//! Degenerate point clouds: 26. Fits of them are a certified body that contains the points, or a
+//! clear error that names the reason.
 
 use super::Draws;
 use nalgebra::Vector3;
@@ -13,7 +13,7 @@ const MILLION: usize = 1_000_000;
 /// What is to become of a cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fate {
-    /// A body that holds it.
+    /// A body that contains it.
     Fits,
     /// Refused as flat, in this shape.
     Flat(&'static str),

@@ -59,7 +59,7 @@ pub fn attempts(kind: u64) -> Vec<Attempt> {
                 attempt([coefficient, constant], square([coefficient, 1.0, 1.0], constant), Some("NotFinite"))
             })
             .into(),
-        // The smallest eigenvalue pays for a small residual, never for a gross one.
+        // The smallest eigenvalue absorbs a small residual, never for a gross one.
         4 => vec![ball("Gram matrix off by 1e-3", 0.0, 1e-3, None)],
         5 => vec![ball("a ball", 0.0, 0.0, None)],
         6 => [f64::NAN, 0.0].map(|radius| radii(radius, any)).into(),
@@ -88,7 +88,7 @@ pub fn attempts(kind: u64) -> Vec<Attempt> {
             vec![attempt(place, Pose::from_quaternion(place, [0.0, 0.0, 0.0, 1.0]), Some("NotFinite"))]
         }
         20 => matrices(vec![Matrix3::repeat(f64::NAN), unit * 1.01], any),
-        // A Gram matrix that is off by no more than its least eigenvalue pays for.
+        // A Gram matrix that is off by no more than its least eigenvalue absorbs.
         _ => vec![ball("Gram matrix off by 1", 0.0, 1.0, None)],
     }
 }

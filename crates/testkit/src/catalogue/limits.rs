@@ -11,8 +11,8 @@ use sublevel_core::measure::Pose;
 /// Iteration limits of family 2.
 pub const LIMITS: std::ops::RangeInclusive<u32> = 1..=3;
 
-/// Family 2. Not enough iterations: the bracket holds the truth all the same, and the status says
-/// that it is wide.
+/// Family 2. Not enough iterations: the bracket contains the truth all the same, and the status
+/// says that it is wide.
 pub fn few_iterations(limit: u32, zoo: &[Body], random: &mut dyn Draws) -> Case {
     let (a, b, sum) = any_two(random, zoo);
     let reach = sum * random.between(0.2, 4.0);

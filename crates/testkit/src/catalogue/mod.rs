@@ -1,7 +1,7 @@
 //! The stability catalogue: families of queries that broke collision libraries, as plain data.
 //!
 //! A family's functions give bodies, poses and what is known of the answer; they judge nothing.
-//! Tests hold the answers to these cases against 200 bits, the chart `sublevel-bench stability`
+//! Tests compare the answers to these cases with 200 bits, the chart `sublevel-bench stability`
 //! against an arbiter that knows no solver, for other libraries too.
 //!
 //! Whatever is random comes from [`Draws`], so that a seed of either side replays its case.

@@ -1,4 +1,4 @@
-//! Which constraints may hold with equality, read off the values and gradients at a trial point.
+//! Which constraints may be active, read off the values and gradients at a trial point.
 
 use super::big::{Vector, double, doubles};
 use super::solid::Solid;

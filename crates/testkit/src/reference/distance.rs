@@ -100,7 +100,7 @@ pub fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer: &Dista
     });
     let scale = big(unit);
     let done = |best: &Best| &best.upper - &best.lower <= big(TARGET);
-    // As much as is asked: the bracket of the answer holds all that the distance may be.
+    // As much as is asked: the bracket of the answer contains all that the distance may be.
     let decided = |best: &Best| big(answer.lower) <= &best.lower * &scale && &best.upper * &scale <= big(answer.upper);
     for (pass, close) in CLOSE.into_iter().enumerate() {
         if done(&best) || pass > 0 && decided(&best) {

@@ -1,8 +1,8 @@
 //! The signed distance of two bodies with 200 bits, along the branch of an answer.
 //!
-//! In overlap the shortest way out is the least of many: what an answer's normal leads to is a
-//! stationary one, and the optimality system of the distance with a negative D says which. Whether
-//! another way is shorter is not decided here.
+//! In overlap the shortest translation out is the least of many: what an answer's normal leads to
+//! is a stationary one, and the optimality system of the distance with a negative D says which.
+//! Whether another way is shorter is not decided here.
 
 use super::active::{CLOSE, for_direction};
 use super::big::{Big, Vector, big, double, scaled, sub, vector};

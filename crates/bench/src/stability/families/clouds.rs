@@ -31,7 +31,7 @@ pub(super) fn clouds(seed: u64, method: Method) -> Result<Option<Verdict>, CaseE
     }))
 }
 
-/// Whether the body holds the points, and proves to be one when it is read back.
+/// Whether the body contains the points, and proves to be one when it is read back.
 fn certified(made: &Fit, points: &[Vector3<f64>]) -> Verdict {
     if made.body.prove_contains(points).is_err() {
         return Verdict::WrongStatus("a point is outside".into());

@@ -10,8 +10,8 @@ use sublevel_testkit::bodies::chart_zoo;
 use sublevel_testkit::catalogue::Case;
 use sublevel_testkit::catalogue::depth::{self, Saturation, Slide};
 
-/// Offset from the common centre, relative to the whole slide, up to which the mirrored way out is
-/// as short, and reported.
+/// Offset from the common centre, relative to the whole slide, up to which the mirrored translation
+/// out is as short, and reported.
 const MIRRORED: f64 = 1e-6;
 
 /// Deviation that others may have from what a signed distance does, relative to the smaller body.
@@ -29,7 +29,7 @@ struct Step {
 
 /// A slide from touching to concentric. About their centres the bodies are their own mirror images:
 /// the signed distance falls all the way, by no more than the motion; ours says how well it is
-/// known, that the way out is tied where it is, and has a way out everywhere.
+/// known, that the translation out is tied where it is, and exists everywhere.
 pub(super) fn slide(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
     if !matches!(method, Method::Cold | Method::Warm | Method::Parry) {
         return Ok(None);
@@ -82,8 +82,8 @@ pub(super) fn slide(seed: u64, method: Method) -> Result<Option<Verdict>, CaseEr
             if share < MIRRORED && !tied {
                 return what("the mirrored way out is not reported");
             }
-            // Concentric balls have no way out that is better than others: wide is right there, and
-            // reported as a tie.
+            // Concentric balls have no translation out that is better than others: wide is right
+            // there, and reported as a tie.
             if status != Status::Converged && !(tied && upper - lower <= 1e-2 * lower.abs()) {
                 return what("still wide");
             }

@@ -154,7 +154,7 @@ pub(super) fn both_sides(case: &Question, method: Method) -> Result<Verdict, Cas
     if found.tied {
         return Ok(Verdict::WrongStatus("tied at contact".into()));
     }
-    // From where they touch, without the proof that no way out far away is shorter.
+    // From where they touch, without the proof that no translation out far away is shorter.
     let options = Options::default().with_accuracy(TIGHT)?.with_depth_accuracy(1.0)?;
     let bodies = (&case.a, &case.b);
     let mut touching = WarmStart::default();
@@ -188,7 +188,7 @@ struct Differences<'a> {
 }
 
 impl Differences<'_> {
-    /// Holds gradients against differences of the first step that leaves little open.
+    /// Compares gradients with differences of the first step that leaves little open.
     fn verdict(&self, found: &[Twist; 2], usual: f64, side: Side) -> Verdict {
         let sizes = [self.case.a.circumscribed().radius, self.case.b.circumscribed().radius];
         let mut parts = [0.0; 12];

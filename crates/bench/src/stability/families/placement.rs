@@ -90,12 +90,12 @@ pub(super) fn concentric(seed: u64) -> Vec<Case> {
 }
 
 /// How far centres of symmetric bodies may be from each other, relative to the smaller body, for
-/// the way out to be flagged as tied: less than the accuracy of a depth.
+/// the translation out to be flagged as tied: less than the accuracy of a depth.
 const CENTRED: f64 = 1e-5;
 
 /// All measures of bodies in each other have values, and say what is not unique: the normal of a
-/// distance, the way out of mirror images, the normal of centres that coincide, and a level that is
-/// the least there is.
+/// distance, the translation out of mirror images, the normal of centres that coincide, and a level
+/// that is the least there is.
 pub(super) fn defined(answers: &[(Question, Answer)], method: Method) -> Result<Verdict, CaseError> {
     let [(case, answer)] = answers else { return Ok(Verdict::Pass) };
     let Some(ours) = &answer.ours else { return Ok(Verdict::Pass) };
@@ -153,7 +153,7 @@ pub(super) fn swapped(seed: u64) -> Vec<Case> {
     placement::swapped(chart_zoo(), &mut random(19, seed)).into()
 }
 
-/// How far normals may turn: the bracket holds them to its square root.
+/// How far normals may turn: the bracket determines them to its square root.
 const NORMAL: f64 = 1e-3;
 
 /// The same values; of ours also the same normals, the other way round or carried along, where the

@@ -75,7 +75,7 @@ fn coaxial_powers_come_out_along_the_axis_or_shorter() {
         let mut random = Seeded(seed);
         let degrees = [2_u8, 4, 6, 8];
         let (ka, kb) = (degrees[(seed % 4) as usize], degrees[(seed / 4 % 4) as usize]);
-        // Thin along the axis, so that no other way out is shorter.
+        // Thin along the axis, so that no other translation out is shorter.
         let mut half =
             |_| Vector3::new(1.0, 3.0 + random.signed(), 3.0 + random.signed()) * 2_f64.powf(random.signed());
         let (ha, hb) = (half(0), half(1));

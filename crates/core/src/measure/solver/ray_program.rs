@@ -120,8 +120,8 @@ pub(in crate::measure) struct ReachNewton {
 }
 
 /// Length of a step relative to the bodies, after which Newton's method for the distance converges
-/// from where the ray's has led. Larger, its iterations are in vain; smaller, it is not tried:
-/// `support_tables_start_quadratic_programs` counts what is solved.
+/// from where the ray's has led. Larger, its iterations are without success; smaller, it is not
+/// tried: `support_tables_start_quadratic_programs` counts what is solved.
 const HANDOVER_STEP: f64 = 0.15;
 
 impl ReachNewton {

@@ -64,7 +64,7 @@ fn convex_bodies_are_exact_at_level_zero() {
     assert!(overlapping > 10 && several > 10 && saturated > 5 && exact >= 62);
 }
 
-/// Random quartics that bend inwards: brackets hold what is sampled, and rise with the level.
+/// Random quartics that bend inwards: brackets contain what is sampled, and rise with the level.
 #[test]
 fn brackets_of_random_quartics_hold_what_is_sampled() {
     let (mut exact, mut widest) = (0, 0.0_f64);

@@ -65,7 +65,7 @@ impl<'a, 'i> Document<'a, 'i> {
         })
     }
 
-    /// The scene that is shown; none of files that hold geometries alone.
+    /// The scene that is shown; none of files with geometries alone.
     pub(super) fn scene(&self) -> Result<Option<Xml<'a, 'i>>, Defect> {
         let instance = child(self.root, "scene").and_then(|scene| child(scene, "instance_visual_scene"));
         if let Some(instance) = instance {

@@ -148,7 +148,7 @@ fn broken_collada() {
     let many: String = (0..100).map(|i| format!(" xmlns:a{i}=\"b\"")).collect();
     assert_fails("dae", format!("<COLLADA{many}/>"), &["namespaces"]);
     assert_fails("dae", format!("<COLLADA {}/>", "a=\"b\" ".repeat(2000)), &["4096 bytes"]);
-    // What a file holds is quoted in part.
+    // The content of a file is quoted in part.
     let long = format!("<COLLADA><{0}></{0}b></COLLADA>", "x".repeat(3000));
     assert!(read("dae", long).unwrap_err().len() < 400);
     // Nodes that instance nodes, twice each, twenty levels deep.
