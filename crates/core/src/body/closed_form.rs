@@ -15,8 +15,12 @@ use nalgebra::{Matrix3, Vector3};
 /// `bodies_know_their_closed_forms`.
 const ORTHOGONAL: f64 = 64.0 * f64::EPSILON;
 
-/// Relative rounding of a height: eight operations, and with axes that are not those of the body as
-/// many again.
+/// Rounding of a height, relative to the sizes that it is the sum of; dimensionless. Eight
+/// operations of half an epsilon each, and with axes that are not those of the body as many again.
+///
+/// A smaller value gives bounds that a height may leave, so that a plane could prove shapes apart
+/// that touch; a larger one leaves more contacts undecided. Pinned by
+/// `support_points_attain_the_heights`.
 const HEIGHT_ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 /// A shape about the origin of its own frame, with the constraints of its body that bound it.

@@ -15,8 +15,11 @@ const UNDIVIDED: [CellIndex; 2] = [0; 2];
 /// A half without points of the set.
 const NOTHING: CellIndex = CellIndex::MAX;
 
-/// Smallest half edge of a cell, relative to the largest coordinate of the cover: below it boxes
-/// are as small as their rounding.
+/// Smallest half edge of a cell, relative to the largest coordinate of the cover; dimensionless.
+///
+/// Coordinates round at 1e-16: a smaller value divides cells without end whose halves are the same
+/// up to rounding; a larger one ends brackets before they are narrow. Accuracies asked for are far
+/// above it, and no test reaches it.
 const SMALLEST: f64 = 1e-14;
 
 /// A box that may contain points of the set.

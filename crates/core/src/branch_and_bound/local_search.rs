@@ -6,16 +6,30 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 /// Newton steps at most.
 const MAX_STEPS: usize = 40;
 
-/// Largest step, relative to the radius of the smaller set: the model is good near by only.
+/// Longest step of Newton's method, relative to the radius of the smaller set; dimensionless.
+///
+/// The quadratic model is good near by only: a larger value lets steps leave the part of the set
+/// where they began, a smaller one takes more steps. It changes upper bounds, never their truth:
+/// every point found is proven in its set. Pinned by
+/// `convex_bodies_have_the_distances_of_the_solver`, which counts boxes.
 const LARGEST_STEP: f64 = 0.3;
 
-/// Distance of two points that are as good as one, relative to the largest step.
+/// Distance of two points that are tried as one common point, relative to the longest step;
+/// dimensionless.
+///
+/// Whether the point lies in both sets is proven afterwards. A larger value tries points in vain, a
+/// smaller one misses contacts that rounding blurs. Pinned by
+/// `common_points_are_found_where_bodies_overlap`.
 const COINCIDENT: f64 = 1e-6;
 
 /// Steps that look for a common point from there: the last are as long as a tenth of a level.
 const MAX_PUSHES: usize = 44;
 
-/// Length of a step at which the method has converged, relative to the largest.
+/// Length of a step at which Newton's method has converged, relative to the longest step;
+/// dimensionless.
+///
+/// Steps round at 1e-16 of the coordinates. A larger value leaves upper bounds wider, a smaller one
+/// spends [`MAX_STEPS`] on rounding. It changes time only; no test pins it.
 const CONVERGED: f64 = 1e-14;
 
 /// Near points of two sets, proven to lie in them, and their distances, metres, the nearest first;

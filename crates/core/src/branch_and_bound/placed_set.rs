@@ -5,8 +5,13 @@ use crate::measure::Pose;
 use crate::polynomial::{Polynomial, Substitution};
 use nalgebra::{Matrix3, Vector3};
 
-/// Bound of the rounding of a point moved by a pose, relative to point and translation: a
-/// quaternion of unit length to a few units in the last place, applied in some thirty operations.
+/// Rounding of a point moved by a pose, relative to the sum of the lengths of point and
+/// translation; dimensionless. A quaternion of unit length to a few units in the last place,
+/// applied in some thirty operations.
+///
+/// A smaller value could leave out points of the set and make a lower bound false; a larger one
+/// makes brackets of far poses wider. Pinned by
+/// `two_of_the_same_share_their_cover_and_far_ones_lose_what_poses_round`.
 const POSE_ROUNDING: f64 = 128.0 * f64::EPSILON;
 
 /// Steps that pull a point into its set.

@@ -19,10 +19,12 @@ use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::gamma;
 use nalgebra::Vector3;
 
-/// Deviation of a normal from length 1 up to which it counts as normalised: five roundings, each of
-/// 2^-53, make its length and this measure of it. A smaller value would normalise again what is
-/// read from a file and move its last bits, and with them its id; pinned by `normals_settle` of
-/// scenes.
+/// Deviation of a normal from length 1, dimensionless, up to which it counts as normalised: five
+/// roundings, each of 2^-53, make its length and this measure of it.
+///
+/// A smaller value would normalise again what is read from a file and change its last bits, and
+/// with them its id; a larger one keeps normals whose length falsifies distances. Pinned by
+/// `normals_settle` of scenes.
 const NORMALISED: f64 = 3.0 * f64::EPSILON;
 
 /// The half-space `{x : normal·x <= offset}` of the world frame; checked when made.

@@ -7,6 +7,7 @@ mod ablation;
 mod compounds;
 mod exact_shapes;
 mod stages;
+mod tolerances;
 
 use crate::body::{Body, Sphere};
 use crate::measure::*;

@@ -117,14 +117,19 @@ const COARSE: u32 = 2;
 /// Most of them.
 const MOST_COARSE: u32 = 6;
 
-/// Square of the last step relative to the longest one allowed, below which the next one, of
-/// double precision, is likely to end with a narrow bracket: a hundredth of a move leaves about
-/// its square. It changes time only; no test pins it.
+/// Square of the last step relative to the longest one allowed, dimensionless, below which the next
+/// step, in double precision, is likely to end with a narrow bracket: a hundredth of a move leaves
+/// about its square.
+///
+/// A larger value makes brackets before they are narrow, a smaller one takes a round more in single
+/// precision. It changes time only; no test pins it.
 const NEARLY_CONVERGED: f64 = 1e-4;
 
-/// The same above which Newton's method has diverged after [`MOST_COARSE`] rounds: a fifth of the
-/// longest move, as long as in a search from a cold start then. Smaller, poses that would have
-/// converged are solved alone: `lanes_answer_alike_in_any_unit` counts them.
+/// The same, dimensionless, above which Newton's method has diverged after [`MOST_COARSE`] rounds:
+/// a fifth of the longest move, as long as in a search from a cold start then.
+///
+/// A smaller value solves poses alone that would have converged, a larger one keeps poses in lanes
+/// that never do: `lanes_answer_alike_in_any_unit` counts them.
 const DIVERGED: f64 = 0.04;
 
 /// Most rounds of a pose before it is solved alone.

@@ -53,7 +53,11 @@ pub(in crate::measure) fn balls((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body
 }
 
 /// Relative slack of cheap bounds, dimensionless: many times their rounding, which is a few units
-/// of 2^-52. Below 1e-15 a bound could exceed what it bounds.
+/// of 2^-52.
+///
+/// Below 1e-15 a bound could exceed what it bounds; a larger value decides fewer questions without
+/// a solve. Pinned by `early_bounds_are_bounds` and `cheap_bounds_are_bounds`, with poses far from
+/// the origin.
 pub(in crate::measure) const CULLING_SLACK: f64 = 1e-14;
 
 #[cfg(test)]

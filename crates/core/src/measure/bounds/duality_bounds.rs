@@ -28,9 +28,13 @@ use crate::body::MAX_CONSTRAINTS;
 use crate::measure::frames::query_frame::{Pair, Posed};
 use nalgebra::Vector3;
 
-/// Rounding of a duality bound's own arithmetic, relative to the sum of magnitudes: fewer than 128
-/// operations of half an epsilon each. Smaller, a bound could exceed what it bounds: exact re-
-/// checks (`tests/stability/recheck.rs`) compare it with rational arithmetic.
+/// Rounding of a duality bound's own arithmetic, relative to the sum of magnitudes; dimensionless.
+/// Fewer than 128 operations of half an epsilon each.
+///
+/// A smaller value could give a bound above what it bounds; a larger one keeps brackets wider than
+/// asked for near the rounding floor. Pinned by the exact re-checks (`tests/stability/recheck.rs`),
+/// which compare both ends with rational arithmetic, and by
+/// `bodies_on_lines_are_bracketed_to_the_last_bits`.
 pub(in crate::measure) const DUALITY_ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// Multipliers of the constraints of one body; zero where inactive.

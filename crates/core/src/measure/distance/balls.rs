@@ -8,8 +8,11 @@ use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveConstraints;
 use crate::measure::status::Status;
 
-/// Relative rounding of sums of lengths: eight operations of half an epsilon each, and as much to
-/// spare.
+/// Rounding of sums of lengths, relative to their magnitudes; dimensionless. Eight operations of
+/// half an epsilon each, and as much to spare.
+///
+/// A smaller value could make the bracket of two balls miss their distance; a larger one leaves
+/// more pairs to the general search. Pinned by `two_balls_have_a_formula`.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// The distance of two shapes that are balls; none of others, at contact within rounding, and where

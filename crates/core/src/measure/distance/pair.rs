@@ -294,9 +294,10 @@ pub(in crate::measure) fn nearest(
     search.nearest()
 }
 
-/// Distance of the bodies' middles relative to the sum of their sizes, above which a single query
-/// does other than lanes that have diverged, and so is worth its time. It changes time only; no
-/// test pins it.
+/// Distance of the bodies' middles relative to the sum of their circumradii, dimensionless, above
+/// which a single query differs from lanes that have diverged, and so is worth its time.
+///
+/// It changes time only; no test pins it.
 const FAR_APART: f64 = 2.0;
 
 fn far_apart((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose)) -> bool {

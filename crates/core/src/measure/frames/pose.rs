@@ -3,26 +3,41 @@
 use crate::polynomial::gamma;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-/// Largest deviation from a rigid motion that is normalised away; worse is refused.
+/// Largest deviation of a quaternion's length from 1, or of a matrix from the nearest rotation
+/// (Frobenius norm), dimensionless, that is normalised away; worse is refused.
+///
+/// Single precision rounds at 1e-7. A smaller value refuses poses that were stored in it; a larger
+/// one accepts maps that scale or shear. Pinned by `poses_are_normalised_or_refused`.
 const TOLERANCE: f64 = 1e-6;
 
-/// Computed length minus 1 of a quaternion that normalising would not improve: dividing by a
-/// computed length leaves at most 1.5 epsilon.
+/// Computed length minus 1 of a quaternion that normalising would not improve, dimensionless:
+/// dividing by a computed length leaves at most 1.5 epsilon.
+///
+/// A smaller value normalises again what a pose has returned, and changes its last bits; a larger
+/// one keeps quaternions that [`ROTATION_ERROR`] does not cover. Pinned by
+/// `the_quaternion_of_a_pose_makes_the_same_pose`.
 const NORMALISED: f64 = 2.0 * f64::EPSILON;
 
-/// Bound of the distance (operator norm) between the rotation matrix of a pose, as computed, and
-/// the rotation of its quaternion normalised exactly, which is what the pose stands for. The length
-/// of the quaternion is 1 within [`NORMALISED`] = 4 u and the 3 u of computing it, hence 14 u of
-/// the matrix, and each entry costs 8 u more: below 30 u in operator norm.
+/// Bound of the distance in operator norm, dimensionless, between the rotation matrix of a pose, as
+/// computed, and the rotation of its quaternion normalised exactly, which is what the pose stands
+/// for. The length of the quaternion is 1 within [`NORMALISED`] = 4 u and the 3 u of computing it,
+/// hence 14 u of the matrix, and each entry costs 8 u more: below 30 u in operator norm.
+///
+/// A smaller value could make brackets miss the truth; a larger one widens brackets of bodies far
+/// from their origins. Pinned by `rotation_matrices_are_off_by_less_than_the_bound`.
 pub(in crate::measure) const ROTATION_ERROR: f64 = 16.0 * f64::EPSILON;
 
-/// Bound of the error of a relative rotation in operator norm that is the product of two rotation
-/// matrices: each is off by at most [`ROTATION_ERROR`]; their product and sums with it round a few
-/// times more, fewer than 16. Smaller, brackets of poses far from the axes would miss the truth.
+/// Bound of the error in operator norm, dimensionless, of a relative rotation that is the product
+/// of two rotation matrices: each is off by at most [`ROTATION_ERROR`]; their product and sums with
+/// it round a few times more, fewer than 16.
+///
+/// A smaller value could make brackets of poses far from the axes miss the truth; a larger one
+/// widens them. Pinned by `relative_rotations_are_off_by_less_than_the_bounds`.
 pub(in crate::measure) const RELATIVE_ERROR: f64 = 2.0 * ROTATION_ERROR + gamma(16);
 
 /// The same of one that is the matrix of a product of two quaternions, as vectors compute it, with
-/// fewer than 40 roundings: a bound of its own, for the other would widen with it.
+/// fewer than 40 roundings: a bound of its own, for the other would widen with it. Pinned by
+/// `relative_rotations_are_off_by_less_than_the_bounds`.
 pub(in crate::measure) const RELATIVE_QUATERNION_ERROR: f64 = 2.0 * ROTATION_ERROR + gamma(40);
 
 /// A rigid motion `x_world = R x_body + t`, lengths in metres; R is the rotation of the stored

@@ -22,9 +22,11 @@ pub(in crate::measure) struct Posed<'a> {
     last: Cell<Option<Evaluated>>,
 }
 
-/// Value of a constraint below which it is met at a point and at those about as far from it as
-/// rounding leads. Above 1 it would be violated; lower, more constraints are sampled for nothing:
-/// it changes time only, and no test pins it.
+/// Value of a constraint, dimensionless, below which it is met at a point and at those about as far
+/// from it as rounding leads.
+///
+/// Above 1 it would be violated; lower, more constraints are evaluated without need: it changes
+/// time only, and no test pins it.
 const WELL_INSIDE: f64 = 0.9;
 
 /// A constraint of more than degree 2 where it was evaluated, by normalized coordinates.

@@ -8,7 +8,11 @@ use nalgebra::Vector3;
 /// Most support points asked for to find a portal, and as many to refine it.
 const MAX_STEPS: usize = 12;
 
-/// How much farther a support point must lie, relative to the plane of the portal.
+/// How much farther a support point must lie than the plane of the portal, relative to that plane's
+/// height; dimensionless.
+///
+/// The portal gives a first guess: a larger value ends at worse guesses, a smaller one refines
+/// beyond what Newton's method needs. Pinned by `rays_leave_ellipsoids_where_they_do`.
 const WORTH: f64 = 1e-3;
 
 /// Where the ray passes through the last portal.

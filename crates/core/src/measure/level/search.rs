@@ -25,11 +25,18 @@ use std::ops::ControlFlow;
 /// Most changes of scale; each is by a thousand, and values reach about 1e12 at degree 8.
 const MAX_ROUNDS: u32 = 6;
 
-/// Starts of values above this, relative to the least known, are too steep.
+/// Largest value at a start relative to the least value known, dimensionless; starts above it are
+/// moved inward.
+///
+/// Values grow with the power of the degree: a larger value takes more iterations on the way in, a
+/// smaller one gives up good starts. It changes time only; no test pins it.
 const STEEP: f64 = 1e3;
 
-/// How much narrower a bracket has to be that multipliers are taken from which Newton's method did
-/// not find.
+/// How much narrower a bracket has to be, dimensionless, that multipliers are taken from which
+/// Newton's method did not find: they are known to the root of its width.
+///
+/// A larger value returns multipliers and gradients that are off by more; a smaller one asks for
+/// brackets below rounding. Pinned by `gradients_are_the_derivatives_of_the_value`.
 const REFINED: f64 = 1e-3;
 
 /// A solve in progress: the best bracket so far and where it was attained, in query units.

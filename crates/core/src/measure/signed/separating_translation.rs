@@ -31,14 +31,21 @@ const FOLLOWED: usize = 3;
 /// Most translations tried from one start.
 const MAX_ROUNDS: u32 = 40;
 
-/// Largest gain that the next rounds together are taken to make, in units of the last one.
+/// Largest gain that the next rounds together are taken to make, in units of the last one;
+/// dimensionless.
+///
+/// Gains about halve from round to round. A larger value runs rounds in vain, a smaller one ends at
+/// longer translations. Pinned by `translations_separate_and_few_are_shorter`.
 const HOPE: f64 = 4.0;
 
 /// Most planes kept at a time: those with the smallest gaps.
 const PLANES: usize = 24;
 
-/// Gap left between parts, in units of the accuracy of a distance: enough to prove that they are
-/// apart.
+/// Gap left between parts, in units of the accuracy of a distance times the smaller circumradius:
+/// enough to prove that they are apart.
+///
+/// At most 1, parts could not be proven apart; a larger value returns translations longer by as
+/// much. Pinned by `translations_separate_and_few_are_shorter`.
 const MARGIN: f64 = 4.0;
 
 /// A direction that separates one pair of parts.

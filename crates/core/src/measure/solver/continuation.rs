@@ -171,20 +171,39 @@ const PATIENCE: u32 = 6;
 /// bodies need more of them.
 const PATIENCE_OUTLINED: u32 = 12;
 
-/// Length of a step relative to a body's size that counts as near.
+/// Length of a step relative to a body's size, dimensionless, that counts as near: the next is
+/// about its square.
+///
+/// A larger value keeps searches that diverge, a smaller one gives up some that converge.
+/// `continuation_seeks_alone` counts what is solved.
 const NEARLY: f64 = 0.05;
 
-/// Curvature times size that counts as none.
+/// Curvature times size, dimensionless, that is added where there is none, so that flat sides have
+/// a system of full rank.
+///
+/// It must vanish beside every curvature that matters (1e-16 of rounding); zero leaves parallel
+/// sides without a step. Pinned by `boxes_meet_face_edge_and_corner`.
 const FLATTEST: f64 = 1e-20;
 
-/// Length of a step relative to the longest, beyond which no extrapolation is close enough for a
-/// bracket.
+/// Length of a step relative to the longest one allowed, dimensionless, beyond which no
+/// extrapolation is close enough for a bracket: its remainder is of third order.
+///
+/// A larger value computes brackets that stay wide, a smaller one takes an evaluation more. It
+/// changes time only: `.ci/instructions` pins it.
 const WORTH_A_BRACKET: f64 = 1e-2;
 
-/// How much narrower a step has to make the bracket of bodies that touch to be worth it.
+/// Factor by which a step has to narrow the bracket of bodies that touch to be followed by another;
+/// dimensionless.
+///
+/// Larger, steps go on that gain nothing; smaller, contacts are left to double-double arithmetic
+/// too early. It changes time only; no test pins it.
 const NARROWER: f64 = 0.5;
 
-/// Length of a step relative to the longest, after which none is left but rounding.
+/// Length of a step relative to the longest one allowed, dimensionless, after which only rounding
+/// is left: the next one is about its square.
+///
+/// A larger value ends brackets too wide, a smaller one spends rounds on rounding. Pinned by
+/// `impossible_accuracy_is_admitted`.
 const SETTLED: f64 = 1e-9;
 
 /// Moves, for the longest ones, beyond which no bracket is worth its evaluation; that is relative
@@ -194,10 +213,11 @@ pub(in crate::measure) fn worth_a_bracket([of_x, of_y]: [f64; 2]) -> [f64; 2] {
     [WORTH_A_BRACKET * of_x.min(of_y); 2]
 }
 
-/// Longest move relative to a body's size, be that in metres or in normalized coordinates, that a
-/// linearization in the tangent plane may mean anything for. Longer, Newton's method diverges from
-/// cold starts; shorter, it needs more rounds: `continuation_seeks_alone` counts what it solves
-/// within its limit.
+/// Longest move for which a linearization in the tangent plane is valid, relative to a body's size,
+/// be that in metres or in normalized coordinates; dimensionless.
+///
+/// Longer, Newton's method diverges from cold starts; shorter, it needs more rounds:
+/// `continuation_seeks_alone` counts what it solves within its limit.
 pub(in crate::measure) const LONGEST_MOVE: f64 = 0.25;
 
 /// The longest moves of a point of A and of a point of B, metres.

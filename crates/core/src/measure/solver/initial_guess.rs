@@ -24,10 +24,17 @@ use crate::polynomial::{Number, Simd};
 /// Turns of the normal by ellipsoids.
 const TURNS: usize = 2;
 
-/// Least distance that n is turned for, relative to the widths of the ellipsoids.
+/// Least distance that the normal is turned for, relative to the widths of the ellipsoids;
+/// dimensionless. Turns are in proportion to width over distance.
+///
+/// Smaller, near contact they are too large; larger, normals stay that are off. It changes time
+/// only: `continuation_seeks_alone` counts what is solved.
 const LEAST: f64 = 1e-3;
 
-/// Largest turn, as the largest component of the tangent.
+/// Largest turn of the normal, as the largest component of its tangent; dimensionless, 17 degrees.
+///
+/// Larger, turns leave where ellipsoids stand for the bodies; smaller, starts stay farther off. It
+/// changes time only: `continuation_seeks_alone` counts what is solved.
 const MOST: f64 = 0.3;
 
 /// The unit vector from B to A across the gap of the ellipsoids that stand for them, in A's frame.

@@ -248,20 +248,35 @@ impl At {
     }
 }
 
-/// How far below the highest the value of a constraint may be that counts as active, relative to
-/// that or to 1.
+/// How far below the highest value of a constraint another one may be that counts as active at a
+/// start, relative to that or to 1; dimensionless.
+///
+/// Larger, systems have constraints that they drop again, each for a step; smaller, edges are
+/// missed at first. `support_tables_start_newton` counts what is solved.
 pub(in crate::measure) const AT: f64 = 0.1;
 
-/// By how much a constraint may be violated, relative to its level, that is not active.
+/// By how much an inactive constraint may be violated, relative to its level; dimensionless. Values
+/// round at 1e-15.
+///
+/// Larger, witnesses lie outside by more than brackets allow; smaller, rounding exchanges
+/// constraints without end. Pinned by `active_sets_follow_alone`.
 pub(in crate::measure) const VIOLATED: f64 = 1e-10;
 
-/// What a value rounds by at most, about.
+/// Rounding of a value of a constraint, relative to 1; dimensionless: some ten roundings.
+///
+/// Smaller, refinement never accepts an answer near contact; larger, normals near contact are
+/// accepted that are off. Pinned by `alignment_turns_normals`.
 const ROUNDED: f64 = 8.0 * f64::EPSILON;
 
-/// Moves relative to the distance between points that are about where they stay.
+/// Moves of both points relative to their distance, dimensionless, below which they have about
+/// arrived, so that only the normal has to turn.
+///
+/// It changes time only: `active_sets_follow_alone` counts what is solved.
 const ARRIVED: f64 = 0.1;
 
-/// Cosine of the angle between a normal and one that is about where it points.
+/// Cosine of the angle between a normal and one that is about where it points: 84 degrees.
+///
+/// It only chooses the start of multipliers, and changes time only; no test pins it.
 const ABOUT: f64 = 0.1;
 
 /// Largest number of Newton steps and of changes of the active set.
@@ -270,12 +285,18 @@ pub(in crate::measure) const MAX_STEPS: u32 = 16;
 /// Steps after which they should no longer be cut, whatever was active before.
 const PATIENCE: u32 = 6;
 
-/// Longest Newton step, relative to the bodies, after which a bracket may be narrow: what remains
-/// is about its square.
+/// Longest Newton step, relative to the bodies, dimensionless, after which a bracket may be narrow:
+/// what remains is about its square.
+///
+/// Larger, brackets are computed that stay wide; smaller, a step more is taken. It changes time
+/// only; no test pins it.
 pub(in crate::measure) const WORTH_A_BRACKET: f64 = 1e-3;
 
-/// How far residuals lead where there is no curvature, relative to the bodies and before the step
-/// is cut.
+/// Length of a step along which there is no curvature, relative to the bodies and before it is cut,
+/// dimensionless: the regularization is the residual divided by this.
+///
+/// Larger, systems of flat sides are singular to rounding; smaller, the regularization slows steps
+/// where there is curvature. Pinned by `boxes_meet_face_edge_and_corner`.
 const FARTHEST: f64 = 1e3;
 
 /// Whether Newton's steps still shrink: fast near a solution, and those that do not are not near

@@ -22,10 +22,12 @@ use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 /// Largest number of steps.
 const MAX_STEPS: u32 = 24;
 
-/// Length of a step, relative to the bodies and to the distance from A's interior point, after
-/// which values may still decrease by orders of magnitude, as a power of the distance. Larger,
-/// Newton's steps are a (d - 1)-th part of the way: `stages_of_level_distances_solve_alone` counts
-/// what is solved.
+/// Length of a step, relative to the bodies and to the distance from A's interior point,
+/// dimensionless, after which values may still decrease by orders of magnitude, as a power of the
+/// distance.
+///
+/// Larger, Newton's steps are a (d - 1)-th part of the way; smaller, steps for the power go on
+/// where Newton's own converge: `stages_of_level_distances_solve_alone` counts what is solved.
 const POWER_LAW_STEP: f64 = 0.1;
 
 /// Newton iterates of the level-distance system.

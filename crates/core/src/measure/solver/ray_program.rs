@@ -119,9 +119,11 @@ pub(in crate::measure) struct ReachNewton {
     length: f64,
 }
 
-/// Length of a step relative to the bodies, after which Newton's method for the distance converges
-/// from where the ray's has led. Larger, its iterations are without success; smaller, it is not
-/// tried: `support_tables_start_quadratic_programs` counts what is solved.
+/// Length of a step relative to the bodies, dimensionless, after which Newton's method for the
+/// distance converges from where the ray's has led.
+///
+/// Larger, its iterations are in vain; smaller, it is not tried:
+/// `support_tables_start_quadratic_programs` counts what is solved.
 const HANDOVER_STEP: f64 = 0.15;
 
 impl ReachNewton {

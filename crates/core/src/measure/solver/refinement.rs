@@ -25,14 +25,23 @@ const MAX_STEPS: u32 = 48;
 /// Most changes of the active constraints: a start with more wrong ones is near no solution.
 const MAX_REVISED: u32 = 4;
 
-/// By how much a constraint may be violated that is not active, however near the bodies are.
+/// By how much an inactive constraint may be violated, dimensionless, however near the bodies are:
+/// values round at 1e-28 there.
+///
+/// Larger, normals near contact are off by constraints that are left out; smaller, rounding
+/// exchanges constraints. Pinned by `alignment_turns_normals`.
 const NEGLIGIBLE: f64 = 1e-26;
 
 /// Steps of the level distance after which one that is still cut leads nowhere.
 const PATIENCE: u32 = 8;
 
-/// Share of the evaluation's bound in doubles that bounds one in double-double: both count a
-/// few hundred roundings.
+/// Bound of an evaluation's error in double-double arithmetic as a share of that in doubles;
+/// dimensionless. Both count a few hundred roundings, of 2⁻¹⁰³ and of 2⁻⁵³; the share leaves a
+/// factor of 100.
+///
+/// Smaller, a refined bracket could miss the truth; larger, it is no narrower than one of doubles.
+/// Pinned by `refinement_goes_on_alone` from above and by the exact re-checks
+/// (`tests/stability/recheck.rs`).
 const SHARE: f64 = 1e-13;
 
 /// A body in the query frame, `z = linear v + offset`.

@@ -16,41 +16,78 @@ use crate::measure::solver::tangent_newton::Symmetric2;
 use crate::polynomial::{MAX_DEGREE, Scalar, Simd};
 use nalgebra::{Matrix3, Vector3};
 
-/// Share of a step in the one before it, below which Newton's method is as fast as it can be.
+/// Length of a step relative to the one before, dimensionless, below which Newton's method
+/// converges as it should and is left alone.
+///
+/// At a root of multiplicity m steps shrink by 1 - 1/m, that is by a half or more. Larger, series
+/// are not recognised; smaller, steps of plain roots are lengthened. Pinned by
+/// `steps_that_converge_fast_are_newtons`.
 const FAST: f64 = 0.55;
 
-/// Length of a step relative to the bodies, beyond which steps are not of a series: surfaces are a
-/// power of the way near the solution only. `steps_that_converge_fast_are_newtons` pins that far
-/// steps are left alone.
+/// Length of a step relative to the bodies, dimensionless, beyond which steps are not of a series:
+/// surfaces are a power of the way near the solution only.
+///
+/// Larger, steps far away are lengthened by chance; smaller, flat sides take more steps. Pinned by
+/// `steps_that_converge_fast_are_newtons`.
 const SERIES_STEP: f64 = 0.05;
 
-/// Change of the step along the way, relative to that, of slopes that vanish with a power.
+/// Change of the step along the way, relative to that, dimensionless, of slopes that vanish with a
+/// power: 1/m of a root of multiplicity m, from 7 at most to 2 at least, with room for rounding.
+///
+/// Wider, other steps are taken for a series; narrower, roots are missed. Pinned by
+/// `flat_sides_take_few_steps_however_flat_and_however_tilted`.
 const SLOW: std::ops::Range<f64> = 0.06..0.6;
 
-/// Relative deviation of logarithms from those of a power.
+/// Deviation of the logarithm of a slope from that of a power, relative to it; dimensionless.
+///
+/// Larger, steps are lengthened that are of no power; smaller, powers with a rest of higher order
+/// are missed. Pinned by `flat_sides_take_few_steps_however_flat_and_however_tilted`.
 const TOLERATED: f64 = 0.05;
 
-/// Highest power of slopes.
+/// Highest power of slopes: degree 8 has slopes of power 7.
+///
+/// Larger, steps may lead past the root; smaller, the flattest sides take more steps. Pinned by
+/// `flat_sides_take_few_steps_however_flat_and_however_tilted`.
 const FLATTEST: f64 = (MAX_DEGREE - 1) as f64;
 
-/// How many times as long as Newton's step one is that leads to where surfaces are flat.
+/// Length of a step relative to Newton's step before it, dimensionless, from which one leads to
+/// where surfaces are flat.
+///
+/// Smaller, usual steps are cut; larger, steps across flat sides are not. Pinned by
+/// `flat_sides_take_few_steps_however_flat_and_however_tilted`.
 const LEAP: f64 = 1.5;
 
-/// Length of a step relative to the way taken before it, beyond which it is made of next to no
-/// curvature.
+/// Length of a step relative to the way taken before it, dimensionless, beyond which next to no
+/// curvature has made it.
+///
+/// Smaller, usual steps are cut; larger, steps to nowhere are taken. Pinned by
+/// `flat_sides_take_few_steps_however_flat_and_however_tilted`.
 const WILD: f64 = 0.3;
 
-/// How many times as long as a corrected step the next one may be.
+/// Length of a step relative to the corrected step before it, dimensionless, beyond which it is
+/// cut.
+///
+/// Larger, a wrong correction is followed by another; smaller, series are cut that converge. Pinned
+/// by `flat_sides_take_few_steps_however_flat_and_however_tilted`.
 const FARTHER: f64 = 2.0;
 
-/// Cosine of the angle to a step that leads back.
+/// Cosine of the angle to the last step below which a step leads back: 154 degrees.
+///
+/// Nearer to -1, oscillations that drift are not cut; nearer to 0, turns are. Pinned by
+/// `steps_to_and_fro_meet_between`.
 const BACK: f64 = -0.9;
 
-/// Length of one relative to the last step, if it leads back about as far.
+/// Length of a step that leads back, relative to the last step, dimensionless, of an oscillation.
+///
+/// Outside of it the steps converge or diverge by themselves. Pinned by
+/// `steps_to_and_fro_meet_between`.
 const AS_FAR: std::ops::Range<f64> = 0.5..2.0;
 
-/// Length of steps relative to the bodies, beyond which they may oscillate: twice that of a series.
-/// `steps_to_and_fro_meet_between` pins that such steps are cut.
+/// Length of steps relative to the bodies, dimensionless, beyond which they may oscillate: twice
+/// that of a series.
+///
+/// Smaller, steps that converge are cut; larger, oscillations are found late. Pinned by
+/// `steps_to_and_fro_meet_between`.
 const RETURNING_STEP: f64 = 0.1;
 
 /// A vector along the tangents.

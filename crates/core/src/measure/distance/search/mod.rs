@@ -62,24 +62,38 @@ pub(in crate::measure::distance) struct Search<'a> {
     iterations: u32,
 }
 
-/// Distance relative to the larger body, below which ½|x - y|² has little curvature to aim by. The
-/// interior-point method then goes for the deepest point first; larger, it does for bodies that
-/// are well apart, which takes time. No test pins it.
+/// Distance relative to the larger body, dimensionless, below which ½
+///
+/// x - y|² has too little curvature for the interior-point method, which then computes the deepest
+/// point first. | A larger value does so for bodies that are well apart, which takes time; a
+/// smaller one leaves near contacts to an ill-conditioned program. No test pins it: the answer
+/// comes from another method then.
 const SHORT_DISTANCE: f64 = 1e-3;
 
-/// Distance of the outlines, relative to the larger body, above which the bodies have no point in
-/// common to look for.
+/// Distance of the nearest points of the support tables, relative to the larger body,
+/// dimensionless, above which no common point is searched for.
+///
+/// Support tables are off by a few percent of a body. A larger value searches in vain, a smaller
+/// one leaves overlaps to slower methods. It changes time only; no test pins it.
 const FACING: f64 = 0.1;
 
-/// Distance relative to the larger body, below which rounding leaves the interior-point method on
-/// ½|x - y|² nothing to aim by, and refinement takes over. No test pins it.
+/// Distance relative to the larger body, dimensionless, below which rounding determines the
+/// gradient of ½
+///
+/// x - y|², and refinement takes over from the interior-point method. | A larger value refines what
+/// doubles can solve, a smaller one iterates on rounding. It changes time only; no test pins it.
 const SHORTEST_DISTANCE: f64 = 1e-7;
 
 /// Steps in double-double arithmetic for which side of contact a narrow bracket is on: those that
 /// find out take half as many.
 const UNSURE: u32 = 8;
 
-/// Share of the way to an interior point that leaves a surface behind.
+/// Share of the way to an interior point, dimensionless, that moves a point off a surface into the
+/// body.
+///
+/// Values on a surface round at 1e-16: a smaller share does not leave the rounding of thin bodies,
+/// a larger one leaves the other body where the overlap is slim. Pinned by
+/// `bodies_on_top_of_their_like_overlap_whatever_the_hint`.
 const DEEPER: f64 = 1e-6;
 
 impl<'a> Search<'a> {

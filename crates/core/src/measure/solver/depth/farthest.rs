@@ -153,8 +153,10 @@ fn step<S: Simd, N: Number<S>>(simd: S, jet: &NumberJet<N>, e: V3<N>) -> (V3<N>,
     (dz, N::and(simd, short, N::and(simd, positive.le(along), positive.le(next))))
 }
 
-/// Longest step, in normalized coordinates, where a body has size about 1, that the linearization
-/// of a support point may mean anything for. Longer, the point may leave the body's side; what is
+/// Longest step, in normalized coordinates, where a body has size about 1, for which the
+/// linearization of a support point is valid; dimensionless.
+///
+/// Longer, the point may leave the body's side; shorter, fewer points are found in lanes. What is
 /// not found is left to other methods: `support_points_are_found_alone` counts how many are.
 const LONGEST_SUPPORT_STEP: f64 = 0.5;
 

@@ -342,5 +342,9 @@ impl<const N: usize> Sweep<'_, N> {
     }
 }
 
-/// Relative to the best, depth of a direction elsewhere that may lead down to one as good.
+/// Depth of a direction elsewhere, relative to the best, up to which a search from it may find one
+/// as good; dimensionless.
+///
+/// A larger value searches in vain, a smaller one misses ties. Pinned by
+/// `ties_are_flagged_and_limits_admitted`.
 const WORTH_A_LOOK: f64 = 1.1;

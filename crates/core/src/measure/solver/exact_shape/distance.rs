@@ -28,20 +28,35 @@ use nalgebra::Vector3;
 /// Most evaluations of Newton's method from one start.
 const MAX_ROUNDS: u32 = 16;
 
-/// Square of a step in normalized coordinates, relative to the body's size there, up to which the
-/// bracket where it leads is looked at. Larger, more brackets are too wide to end on.
+/// Square of a step in normalized coordinates, relative to the body's size there, dimensionless, up
+/// to which the bracket where it leads is computed.
+///
+/// Larger, more brackets are too wide to end on; smaller, an evaluation more is taken. It changes
+/// time only: `.ci/instructions` pins it.
 const WORTH_A_BRACKET: f64 = 1e-6;
 
-/// Square of a step, as above, after which none is left but rounding.
+/// Square of a step, as above, dimensionless, after which only rounding is left: 1e-11 of the body.
+///
+/// A larger value ends brackets too wide, a smaller one spends rounds on rounding. Pinned by
+/// `smooth_bodies_against_shapes`.
 const SETTLED: f64 = 1e-22;
 
-/// Longest step in normalized coordinates relative to the body's size there.
+/// Longest step in normalized coordinates for which the linearization is valid, relative to the
+/// body's size there; dimensionless.
+///
+/// Longer, Newton's method diverges from cold starts; shorter, it needs more rounds:
+/// `smooth_bodies_against_shapes` counts what is solved.
 const LONGEST: f64 = 0.5;
 
-/// Longest first step from the last answer, as above.
+/// Longest first step from the last answer, as above, dimensionless; a longer one is no
+/// continuation, and the support table starts it.
+///
+/// Longer, bad hints take more rounds than a cold start; shorter, good ones are dropped:
+/// `smooth_bodies_against_shapes` counts what is solved.
 const LONGEST_FOLLOWED: f64 = 0.25;
 
-/// Curvature times size that counts as none.
+/// Curvature times size, dimensionless, that is added where there is none, as in `continuation`.
+/// Pinned by `boxes_side_by_side`.
 const FLATTEST: f64 = 1e-20;
 
 /// Evaluations after which long steps that no series has corrected are shortened, so that they do

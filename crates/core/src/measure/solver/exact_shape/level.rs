@@ -24,13 +24,17 @@ const MAX_ROUNDS: u32 = 24;
 /// Evaluations after which steps are Newton's own wherever they are.
 const FROM_AFAR: u32 = 8;
 
-/// Length of a step, relative to the set, after which the least value is found well enough to start
-/// from.
+/// Length of a step, relative to the set, dimensionless, after which the least value is near enough
+/// for Newton's method on the distance to start from.
+///
+/// A larger value starts it too far away, a smaller one takes evaluations without need. It changes
+/// time only; no test pins it.
 const SETTLED: f64 = 1e-4;
 
 /// Share of the logarithm's curvature that is taken off, dimensionless: of all of it steps may be
-/// too long, of none they are a (d - 1)-th part of the way for a polynomial of degree d. It changes
-/// time only; no test pins it.
+/// too long, of none they are a (d - 1)-th part of the way for a polynomial of degree d.
+///
+/// It changes time only; no test pins it.
 const POWER: f64 = 0.75;
 
 /// What has been proven.

@@ -10,7 +10,11 @@ use crate::measure::frames::vector::{M3, V3, dot};
 use crate::measure::solver::tangent_newton::Symmetric2;
 use crate::polynomial::Simd;
 
-/// How near to the boundary, relative to the size, counts as on it.
+/// Coordinate relative to a half-size, dimensionless, from which a point counts as on the boundary:
+/// projections leave it off by 1e-16.
+///
+/// Lower, points inside count as on a face and take its normal; nearer to 1, rounding takes points
+/// off their face. Pinned by `shapes_against_shapes`.
 pub(super) const ON: f64 = 1.0 - 1e-12;
 
 /// Where a point is as seen from a set.

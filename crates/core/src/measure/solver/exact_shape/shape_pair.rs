@@ -17,20 +17,28 @@ use crate::polynomial::Scalar;
 /// Most steps; boxes take fewer than ten.
 const MAX_STEPS: u32 = 32;
 
-/// Curvature, relative to that towards B, that is given to directions along which the distance is
-/// flat, so that steps have an end. Smaller, rounding would choose them; larger, sides tilted by
-/// less take many steps: `distances_of_sides_tilted_by_next_to_nothing`.
+/// Curvature, relative to that towards B, dimensionless, that is given to directions along which
+/// the distance is flat, so that steps have an end.
+///
+/// Smaller, rounding would choose them; larger, sides tilted by less take many steps:
+/// `distances_of_sides_tilted_by_next_to_nothing`.
 const FLAT: f64 = 1e-12;
 
 /// Most halvings of a step that leads farther away.
 const HALVINGS: u32 = 8;
 
-/// Largest angle between the normals of both sets that an answer is taken at. Witnesses move by it,
-/// and gradients by that times their arms: a step more costs little here.
+/// Largest angle between the normals of both sets, radians, that an answer is taken at.
+///
+/// Witnesses are off by it, and gradients by that times their arms: a step more costs little here.
+/// Larger, gradients of long bodies are off by more than 1e-6; smaller, rounding keeps answers from
+/// being taken. Pinned by `shapes_against_shapes`.
 const FINELY_ALIGNED: f64 = ALIGNED / 8.0;
 
-/// Margin, relative to the sizes, by which sets that overlap for sure do: some times what rounding
-/// adds to an upper bound.
+/// Margin, relative to the sizes, dimensionless, by which sets have to overlap to be reported as
+/// overlapping: some times what rounding adds to an upper bound.
+///
+/// Smaller, an overlap could be claimed of sets that touch; larger, slim overlaps are left to the
+/// general search. Pinned by `contacts_of_shapes_are_decided`.
 const MARGIN: f64 = 1e-12;
 
 /// Two sets, A where it stands as seen from B.

@@ -8,10 +8,18 @@ use crate::measure::solver::tangent_newton::{ALIGNED, NUDGE, TAYLOR_ROUNDING};
 use crate::polynomial::{NEAR_LEVEL, Scalar, Simd, gamma};
 use nalgebra::Vector3;
 
-/// Slope of p per length of A that an answer's gradient need not be better than relative to.
+/// Slope of p per length of A, dimensionless, below which the gradient of an answer is compared
+/// with this slope instead of its own norm.
+///
+/// Smaller, nothing is accepted near the minimum of p, where gradients vanish; larger, gradients
+/// are accepted that are off by more. Pinned by `gradients_are_the_derivatives_of_the_value`.
 const LEAST_GRADIENT: f64 = 1e-3;
 
-/// Longest step that bounds are made for: relative to the distance from A's centre, or to B.
+/// Longest step that bounds are made for: relative to the distance from A's centre, or to B;
+/// dimensionless.
+///
+/// Larger, bounds of third derivatives grow with the ball they are for; smaller, brackets wait for
+/// shorter steps. `stages_of_level_distances_solve_alone` counts what is solved.
 pub(super) const ROOM: f64 = 1.0 / 16.0;
 
 /// How steps of w are measured: by a norm that bounds their lengths in both bodies' normalized

@@ -170,17 +170,27 @@ pub(in crate::measure) struct Bracket<N> {
 }
 
 /// Rounding of a Taylor bracket's own arithmetic, basis included, relative to the sum of
-/// magnitudes: fewer than 256 operations of half an epsilon each. Smaller, a bracket could miss
-/// the distance: exact re-checks (`tests/stability/recheck.rs`) compare it with rational
-/// arithmetic.
+/// magnitudes; dimensionless. Fewer than 256 operations of half an epsilon each.
+///
+/// A smaller value could make a bracket miss the distance; a larger one keeps brackets of far poses
+/// wider than asked for. Pinned by the exact re-checks (`tests/stability/recheck.rs`), which
+/// compare both ends with rational arithmetic, and by
+/// `bodies_on_lines_are_bracketed_to_the_last_bits`.
 pub(in crate::measure) const TAYLOR_ROUNDING: f64 = 128.0 * f64::EPSILON;
 
-/// Largest angle between the bodies' normals that an answer is taken at: its gradients are off by
-/// about as much.
+/// Largest angle between the bodies' normals, radians, that an answer is taken at: its gradients
+/// are off by about as much, and 1e-6 is promised.
+///
+/// Larger, gradients are off by more; smaller, more answers are refined. Pinned by
+/// `family_20_distance_gradients` of the stability tests.
 pub(in crate::measure) const ALIGNED: f64 = 2.5e-7;
 
-/// How much farther a point is moved than its constraint's linearization asks, for the rounding of
-/// its gradient.
+/// How much farther a point is moved than its constraint's linearization requires, dimensionless,
+/// for the rounding of its gradient.
+///
+/// Smaller, gradients have to be known better than doubles do near flat spots, and no witness is
+/// proven; larger, upper bounds are wider by as much of the move. Pinned by
+/// `continuation_follows_alone`.
 pub(in crate::measure) const NUDGE: f64 = 1e-4;
 
 /// The bracket from the constraints at x and y with `difference = x - y` in the basis. NaN where it
