@@ -133,7 +133,7 @@ impl Round<'_> {
         self.solved(site, start, answer);
         if self.query.is_multiple_of(16) {
             let feasible = answer.feasible((site.a, site.pose_a), (site.b, site.pose_b));
-            self.tally.check(Check::Feasible, feasible, site.block, site.query, || site.tell(answer));
+            self.tally.check(Check::Feasible, feasible, (site.block, site.query), || site.tell(answer));
         }
         if self.examine.is_some_and(|after| self.tally.solves > after) {
             *self.examine = None;
@@ -151,7 +151,7 @@ impl Round<'_> {
         let cold = (MEASURES[site.measure].solve)(p, q, &Options::default(), &mut WarmStart::default());
         self.solved(site, Start::Cold, &cold);
         let ((l, u), (m, v)) = (answer.bracket(), cold.bracket());
-        self.tally.check(Check::Meet, l <= v && m <= u, site.block, site.query, || site.tell(&cold));
+        self.tally.check(Check::Meet, l <= v && m <= u, (site.block, site.query), || site.tell(&cold));
     }
 
     fn solved(&mut self, site: &Site<'_>, start: Start, answer: &Answer) {
@@ -196,7 +196,7 @@ impl Site<'_> {
         let (width, accuracy) = (upper - lower, Options::default().accuracy());
         let narrow = width <= answer.tolerance(self.a, self.b, accuracy);
         let mut check = |check: Check, passed: bool| {
-            tally.check(check, passed, self.block, self.query, || self.tell(answer));
+            tally.check(check, passed, (self.block, self.query), || self.tell(answer));
         };
         check(Check::InOrder, lower <= upper);
         check(Check::Converged, answer.converged());
@@ -207,20 +207,20 @@ impl Site<'_> {
     fn thorough(&self, tally: &mut Tally, answer: &Answer) {
         let Some(verdict) = answer.verdict((self.a, self.pose_a), (self.b, self.pose_b)) else { return };
         let tell = || format!("truth {:e}: {}", verdict.truth, self.tell(answer));
-        tally.check(Check::Truth, verdict.inside, self.block, self.query, tell);
-        tally.check(Check::Decided, verdict.decided, self.block, self.query, tell);
+        tally.check(Check::Truth, verdict.inside, (self.block, self.query), tell);
+        tally.check(Check::Decided, verdict.decided, (self.block, self.query), tell);
     }
 
     fn program(&self, tally: &mut Tally, answer: &Answer) {
         let Some(program) = MEASURES[self.measure].program else { return };
         let Some((value, size)) = answer.comparable(self.a, self.b) else { return };
         let arbiter = program((self.a, self.pose_a), (self.b, self.pose_b));
-        tally.check(Check::Solved, arbiter.is_some(), self.block, self.query, || self.tell(answer));
+        tally.check(Check::Solved, arbiter.is_some(), (self.block, self.query), || self.tell(answer));
         if let Some(arbiter) = arbiter {
             let deviation = (value - arbiter).abs() / size;
             tally.deviation = tally.deviation.max(deviation);
             let tell = || format!("arbiter {arbiter:e}: {}", self.tell(answer));
-            tally.check(Check::Agrees, deviation <= 1e-6, self.block, self.query, tell);
+            tally.check(Check::Agrees, deviation <= 1e-6, (self.block, self.query), tell);
         }
     }
 }

@@ -139,8 +139,7 @@ impl Tally {
         &mut self,
         check: Check,
         passed: bool,
-        block: u64,
-        query: u64,
+        (block, query): (u64, u64),
         detail: impl FnOnce() -> String,
     ) {
         *self.checks.entry(check).or_default() += 1;

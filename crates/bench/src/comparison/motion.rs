@@ -167,7 +167,7 @@ pub fn stepping<S: Solid>(
 /// # Errors
 /// None that could be met: a pose that is no pose.
 pub fn grazing(a: &Body, b: &Body, trajectories: usize, poses: usize) -> Result<Vec<Trajectory>, PoseError> {
-    along(a, b, trajectories, poses, GRAZE, settle)
+    along((a, b), trajectories, poses, GRAZE, settle)
 }
 
 /// Motions of one body along the other with the gap going up and down from a centimetre apart to
@@ -176,19 +176,18 @@ pub fn grazing(a: &Body, b: &Body, trajectories: usize, poses: usize) -> Result<
 /// # Errors
 /// None that could be met: a pose that is no pose.
 pub fn through_contact(a: &Body, b: &Body, trajectories: usize, poses: usize) -> Result<Vec<Trajectory>, PoseError> {
-    along(a, b, trajectories, poses, CONTACT, settle_signed)
+    along((a, b), trajectories, poses, CONTACT, settle_signed)
 }
 
 /// Moves a body until its gap to another is as wanted, from the normal of the pose before and with
 /// its hint; returns the new normal.
-type Settle = fn(&mut Walk, &Body, &Body, f64, Vector3<f64>, &mut WarmStart) -> Result<Vector3<f64>, PoseError>;
+type Settle = fn(&mut Walk, (&Body, &Body), f64, Vector3<f64>, &mut WarmStart) -> Result<Vector3<f64>, PoseError>;
 
 /// Motions of one body along the other with the gap going up and down through a range.
 ///
 /// The step along the surface is a centimetre; turning adds what brings the gap back.
 fn along(
-    a: &Body,
-    b: &Body,
+    (a, b): (&Body, &Body),
     trajectories: usize,
     poses: usize,
     (least, most): (f64, f64),
@@ -203,7 +202,7 @@ fn along(
             for pose in 0..poses {
                 let phase = TAU * pose as f64 / PERIOD;
                 let wanted = least + (most - least) * 0.5 * (1.0 - phase.cos());
-                normal = settle(&mut walk, a, b, wanted, normal, &mut warm)?;
+                normal = settle(&mut walk, (a, b), wanted, normal, &mut warm)?;
                 trajectory.push(walk.pose()?);
                 walk.step(|heading| heading - normal * normal.dot(&heading));
             }
@@ -213,11 +212,10 @@ fn along(
 }
 
 /// Moves the body along the normal until the gap is as wanted. One move is exact: the distance is
-/// convex in the translation and falls along the normal with slope 1.
+/// convex in the translation and decreases along the normal with slope 1.
 fn settle(
     walk: &mut Walk,
-    a: &Body,
-    b: &Body,
+    (a, b): (&Body, &Body),
     wanted: f64,
     mut normal: Vector3<f64>,
     warm: &mut WarmStart,
@@ -242,8 +240,7 @@ fn settle(
 /// moves come close.
 fn settle_signed(
     walk: &mut Walk,
-    a: &Body,
-    b: &Body,
+    (a, b): (&Body, &Body),
     wanted: f64,
     mut normal: Vector3<f64>,
     warm: &mut WarmStart,

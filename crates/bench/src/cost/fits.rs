@@ -41,7 +41,7 @@ pub(super) fn degrees(
     let mut lines = [Line::new("fit", Unit::Nanoseconds), Line::new("peak of the process", Unit::Bytes)];
     for &degree in effort.degrees {
         announce(&format!("fit of degree {degree}"))?;
-        fitting.measure(&subject.mesh.points, degree, effort.passes, degree as f64, &mut lines)?;
+        fitting.measure((&subject.mesh.points, degree), effort.passes, degree as f64, &mut lines)?;
     }
     let lines = lines.into_iter().filter(|line| !line.points.is_empty()).collect();
     Ok(Growth {
@@ -75,7 +75,7 @@ pub(super) fn points(
             let mut random = Random(count as u64);
             let points: Vec<Vector3<f64>> = (0..count).map(|_| sample(&mut random)).collect();
             let repeats = if count > REPEATED { 1 } else { effort.passes };
-            fitting.measure(&points, DEGREE, repeats, count as f64, &mut both)?;
+            fitting.measure((&points, DEGREE), repeats, count as f64, &mut both)?;
         }
         lines.extend(both.into_iter().filter(|line| !line.points.is_empty()));
     }
@@ -93,8 +93,7 @@ impl Fitting<'_> {
     /// Adds time and peak of a fit to both lines.
     fn measure(
         &self,
-        points: &[Vector3<f64>],
-        degree: usize,
+        (points, degree): (&[Vector3<f64>], usize),
         repeats: usize,
         size: f64,
         [time, memory]: &mut [Line; 2],

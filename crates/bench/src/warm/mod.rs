@@ -65,7 +65,7 @@ pub fn warm(
     }
     let mut measured = Vec::new();
     for [a, b] in &pairs {
-        measured.push(steps([a, b], (degrees, sizes), &effort, cache, coal.as_ref(), &mut announce)?);
+        measured.push(steps([a, b], (degrees, sizes), &effort, (cache, coal.as_ref()), &mut announce)?);
     }
     announce("the chair passes the human")?;
     let [chair, human] = &pairs[0];

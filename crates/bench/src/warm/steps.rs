@@ -50,8 +50,7 @@ pub(super) fn steps(
     [a, b]: [&Subject; 2],
     (degrees, sizes): (&[usize], &[Option<f64>]),
     effort: &Effort,
-    cache: &FitCache,
-    coal: Option<&Coal>,
+    (cache, coal): (&FitCache, Option<&Coal>),
     announce: &mut dyn FnMut(&str) -> Result<(), ComparisonError>,
 ) -> Result<Steps, ComparisonError> {
     let pair = format!("{}-{}", a.name, b.name);

@@ -13,7 +13,7 @@ use super::placement::Placement;
 use super::provenance::Provenance;
 use super::radial::{self, Volume};
 use super::support_bounds::{self, Extent, SupportProblem, TangentBound};
-use super::support_heights::{SupportGuess, SupportHeights};
+use super::support_heights::{CornerBound, SupportGuess, SupportHeights};
 use super::support_table::Outline;
 use crate::polynomial::NotContaining;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -115,7 +115,9 @@ impl Body {
         let closed_form = ClosedForm::of(&normalization, &constraints);
         let heights = closed_form.is_none().then(|| {
             let guesses = corners.iter().map(|(point, active)| SupportGuess { point: *point, active });
-            SupportHeights::new(&constraints, &inverse, &interior_z, &trust, &z_extent, guesses)
+            let (constraints, interior) = (&constraints[..], &interior_z);
+            let bound = CornerBound { constraints, interior, trust: &trust, extent: &z_extent };
+            SupportHeights::new(&bound, &inverse, guesses)
         });
         Ok(Self {
             name: name.to_owned(),

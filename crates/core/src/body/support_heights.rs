@@ -53,14 +53,11 @@ pub(super) struct SupportHeights {
 impl SupportHeights {
     /// The table, from guesses of the support points along the corners of the grid, in its order.
     pub(super) fn new<'a>(
-        constraints: &[Constraint],
+        bound: &CornerBound<'_>,
         inverse: &Matrix3<f64>,
-        interior: &Vector3<f64>,
-        trust: &Trust,
-        extent: &Vector3<f64>,
         guesses: impl Iterator<Item = SupportGuess<'a>>,
     ) -> Self {
-        let bound = CornerBound { constraints, interior, trust, extent };
+        let trust = bound.trust;
         let corners: Vec<f64> = corners().zip(guesses).map(|(corner, guess)| bound.of(&corner, &guess)).collect();
         let highest = corners.iter().fold(0.0, |most: f64, height| most.max(*height));
         // The inverse of the map and its products with directions are rounded, as is the interior
@@ -87,12 +84,13 @@ impl SupportHeights {
 }
 
 /// What the bound along a corner is computed from; normalized coordinates.
-struct CornerBound<'a> {
-    constraints: &'a [Constraint],
-    interior: &'a Vector3<f64>,
-    trust: &'a Trust,
+pub(super) struct CornerBound<'a> {
+    pub(super) constraints: &'a [Constraint],
+    /// Interior point in normalized coordinates.
+    pub(super) interior: &'a Vector3<f64>,
+    pub(super) trust: &'a Trust,
     /// Bounds of the coordinates' magnitudes over the body.
-    extent: &'a Vector3<f64>,
+    pub(super) extent: &'a Vector3<f64>,
 }
 
 impl CornerBound<'_> {

@@ -37,8 +37,19 @@ pub(super) struct PairDivision<'a, 'b> {
     pub(super) of: [usize; 2],
 }
 
+/// Planes that keep two cells apart: across a few directions, until one proves enough.
+struct Planes<'a> {
+    placings: &'a [Placing; 2],
+    /// Rounding of the heights of both, metres.
+    slack_m: f64,
+    /// Unit vector from the nearest points found so far, from the first set to the second.
+    towards: Option<Vector3<f64>>,
+    /// Distance beyond which no better bound is needed, metres.
+    enough_m: f64,
+}
+
 impl PairDivision<'_, '_> {
-    /// Divides until the limits say that it is enough.
+    /// Divides until the limits are reached.
     pub(super) fn distance(self, limits: &Limits<'_>) -> Result<SetDistance, (usize, PlacedSetError)> {
         let placing =
             |side: usize| Placing::new(self.sets[side], &self.covers[self.of[side]]).map_err(|error| (side, error));
@@ -79,10 +90,11 @@ impl PairDivision<'_, '_> {
             let upper = best.map_or(f64::INFINITY, |best| best.0);
             let enough = limits.enough(upper, 0.0);
             let towards = best.and_then(|(_, [x, y])| (y - x).try_normalize(0.0));
+            let planes = Planes { placings: &placings, slack_m: slack, towards, enough_m: enough };
             for half in self.covers[self.of[side]].halves(&self.sets[side].of, cells[side]) {
                 let mut cells = cells;
                 cells[side] = half;
-                let lower = self.lower_bound(&placings, cells, slack, known, enough, towards.as_ref());
+                let lower = self.lower_bound(&planes, cells, known);
                 if lower >= enough {
                     settled = settled.min(lower);
                 } else {
@@ -94,17 +106,9 @@ impl PairDivision<'_, '_> {
         Ok(SetDistance { status, lower_m: lower.max(0.0), upper_m, points: best.map(|best| best.1), steps })
     }
 
-    /// Lower bound of the distance of what is in two cells, at least `known`: planes across a few
-    /// directions, until one is beyond `enough`.
-    fn lower_bound(
-        &self,
-        placings: &[Placing; 2],
-        cells: [CellIndex; 2],
-        slack: f64,
-        known: f64,
-        enough: f64,
-        towards: Option<&Vector3<f64>>,
-    ) -> f64 {
+    /// Lower bound of the distance of what is in two cells, at least `known`, metres.
+    fn lower_bound(&self, planes: &Planes<'_>, cells: [CellIndex; 2], known: f64) -> f64 {
+        let placings = planes.placings;
         let covers = self.of.map(|of| &self.covers[of]);
         let [a, b] = [0, 1].map(|side| covers[side].cell(cells[side]));
         let between = (placings[1].center(b) - placings[0].center(a)).try_normalize(0.0);
@@ -116,12 +120,12 @@ impl PairDivision<'_, '_> {
         let mut across = |n: Option<Vector3<f64>>| {
             if let Some(n) = n {
                 let gap = placings[1].least_along(&n, covers[1], b) + placings[0].least_along(&-n, covers[0], a);
-                lower = lower.max((gap - slack) * (1.0 - 4.0 * f64::EPSILON));
+                lower = lower.max((gap - planes.slack_m) * (1.0 - 4.0 * f64::EPSILON));
             }
-            lower >= enough
+            lower >= planes.enough_m
         };
         let _ =
-            across(between) || across(towards.copied()) || across(outwards(0, a)) || across(outwards(1, b).map(|n| -n));
+            across(between) || across(planes.towards) || across(outwards(0, a)) || across(outwards(1, b).map(|n| -n));
         lower
     }
 }

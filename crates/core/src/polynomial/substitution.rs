@@ -36,7 +36,7 @@ impl Substitution {
     ) -> Option<Self> {
         let inverse = enclosed_inverse(linear)?;
         let rotation: [[Interval; 3]; 3] =
-            std::array::from_fn(|i| std::array::from_fn(|j| Interval::around(rotation[(i, j)], ROTATION_ERROR)));
+            std::array::from_fn(|i| std::array::from_fn(|j| Interval::around(rotation[(i, j)], ROTATION_ENTRY_ERROR)));
         let sum = |i: usize, of: &dyn Fn(usize) -> Interval| {
             (0..3).fold(Interval::ZERO, |sum, k| sum + rotation[i][k] * of(k))
         };
@@ -56,7 +56,7 @@ impl Substitution {
         translation: &Vector3<f64>,
     ) -> Self {
         let transposed: [[Interval; 3]; 3] =
-            std::array::from_fn(|i| std::array::from_fn(|j| Interval::around(rotation[(j, i)], ROTATION_ERROR)));
+            std::array::from_fn(|i| std::array::from_fn(|j| Interval::around(rotation[(j, i)], ROTATION_ENTRY_ERROR)));
         let sum = |of: &dyn Fn(usize) -> Interval| (0..3).fold(Interval::ZERO, |sum, k| sum + of(k));
         let turned = |i: usize, column: &dyn Fn(usize) -> Interval| sum(&|k| transposed[i][k] * column(k));
         let mapped = |i: usize, column: &dyn Fn(usize) -> Interval| sum(&|k| Interval::of(linear[(i, k)]) * column(k));
@@ -154,7 +154,7 @@ impl Substitution {
 ///
 /// A smaller value could leave the exact map outside of the intervals, and proofs of containment
 /// false; a larger one widens them. Pinned by `maps_through_a_space_hold_exact_images`.
-const ROTATION_ERROR: f64 = 16.0 * f64::EPSILON;
+const ROTATION_ENTRY_ERROR: f64 = 16.0 * f64::EPSILON;
 
 /// The inverse, enclosed: with `E = I - LX` small, `L⁻¹ = X + X E (I - E)⁻¹`.
 fn enclosed_inverse(linear: &Matrix3<f64>) -> Option<[[Interval; 3]; 3]> {

@@ -81,7 +81,7 @@ impl SharpBody<'_> {
         let rounded = doubles(&z);
         let jet = polynomial.evaluate(&rounded);
         let none = Vector3::zeros();
-        // z is off by a few units of the twofold arithmetic.
+        // z is off by a few units of double-double arithmetic.
         let dz = Vector3::repeat(16.0 * UNIT * self.z_size(v));
         SharpJet {
             value,
