@@ -25,7 +25,7 @@ use nalgebra::Vector3;
 /// A smaller value would normalise again what is read from a file and change its last bits, and
 /// with them its id; a larger one keeps normals whose length falsifies distances. Pinned by
 /// `normals_settle` of scenes.
-const NORMALISED: f64 = 3.0 * f64::EPSILON;
+const NORMALISED_NORMAL: f64 = 3.0 * f64::EPSILON;
 
 /// The half-space `{x : normal·x <= offset}` of the world frame; checked when made.
 ///
@@ -76,7 +76,7 @@ impl HalfSpace {
         if deviation > 1e-6 {
             return Err(HalfSpaceError::NotUnit(deviation));
         }
-        let normal = if deviation <= NORMALISED { normal } else { normal.normalize() };
+        let normal = if deviation <= NORMALISED_NORMAL { normal } else { normal.normalize() };
         Ok(Self { normal, offset })
     }
 

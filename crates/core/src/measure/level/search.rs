@@ -30,7 +30,7 @@ const MAX_ROUNDS: u32 = 6;
 ///
 /// Values grow with the power of the degree: a larger value takes more iterations on the way in, a
 /// smaller one gives up good starts. It changes time only; no test pins it.
-const STEEP: f64 = 1e3;
+const STEEP_START: f64 = 1e3;
 
 /// How much narrower a bracket has to be, dimensionless, that multipliers are taken from which
 /// Newton's method did not find: they are known to the root of its width.
@@ -178,7 +178,7 @@ impl<'a> Search<'a> {
             self.newton(x, a, b);
         }
         if !self.done() && !self.exhausted() {
-            let (pair, bound) = (self.pair, STEEP * self.upper.abs().max(1.0));
+            let (pair, bound) = (self.pair, STEEP_START * self.upper.abs().max(1.0));
             let mut inset = 0.1;
             while inset > 1e-12 && !(value(pair, &inner(pair, &self.x, inset)) < bound) {
                 inset *= 0.1;

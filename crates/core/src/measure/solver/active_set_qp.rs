@@ -31,7 +31,7 @@ const MAX_CHANGES: usize = 8;
 ///
 /// Right sides round at 1e-16. A larger value returns points outside, a smaller one exchanges
 /// constraints for rounding without end. Pinned by `solutions_are_optimal`.
-const VIOLATED: f64 = 1e-12;
+const PROGRAM_VIOLATION: f64 = 1e-12;
 
 /// Sine of the angle between a gradient and a combination of others, dimensionless, up to which it
 /// is taken for their combination where the equations do not decide.
@@ -64,14 +64,14 @@ pub(in crate::measure) const LONGEST_PROGRAM_STEP: f64 = 0.5;
 ///
 /// Shorter steps may be lengthened by less damping; of longer ones none is. Pinned with
 /// [`LONGEST_PROGRAM_STEP`].
-pub(in crate::measure) const SHORT: f64 = 0.5 * LONGEST_PROGRAM_STEP;
+pub(in crate::measure) const SHORT_PROGRAM_STEP: f64 = 0.5 * LONGEST_PROGRAM_STEP;
 
 /// Least damping, relative to the first; dimensionless. Rounding tilts faces by about as much.
 ///
 /// A larger value makes steps along nearly parallel faces too short to find an edge; a smaller one
 /// lets rounding choose their direction. Pinned by
 /// `sides_tilted_by_next_to_nothing_show_their_edges`.
-pub(in crate::measure) const LEAST: f64 = 1e-9;
+pub(in crate::measure) const LEAST_DAMPING: f64 = 1e-9;
 
 /// Weight of a step's length relative to the distance from such a centre, if it leads there;
 /// dimensionless. The root of values that rise from a centre with a power is about a square, whose
@@ -147,7 +147,7 @@ impl Rows {
         (0..self.len)
             .filter(|&i| counts(i))
             .map(|i| (i, self.rows[i].0.dot(v) - self.rows[i].1))
-            .filter(|(i, excess)| *excess > VIOLATED * self.scale.max(self.rows[*i].1.abs()))
+            .filter(|(i, excess)| *excess > PROGRAM_VIOLATION * self.scale.max(self.rows[*i].1.abs()))
             .max_by(|p, q| p.1.total_cmp(&q.1))
             .map(|(i, _)| i)
     }
@@ -218,10 +218,10 @@ impl Quadratic {
             found = self.solve(a, b).or(found);
             let least = length(&found);
             if least <= LONGEST_PROGRAM_STEP {
-                if i == 0 && least < SHORT {
+                if i == 0 && least < SHORT_PROGRAM_STEP {
                     // Along what does not bend a step is as long as the damping is little: of faces
                     // nearly parallel only such a step finds the edges.
-                    self.hessian = hessian + stiffness * (damping * (least / SHORT).max(LEAST));
+                    self.hessian = hessian + stiffness * (damping * (least / SHORT_PROGRAM_STEP).max(LEAST_DAMPING));
                     let longer = self.solve(a, b);
                     return if length(&longer) <= LONGEST_PROGRAM_STEP { longer } else { found };
                 }

@@ -29,13 +29,13 @@ const TURNS: usize = 2;
 ///
 /// Smaller, near contact they are too large; larger, normals stay that are off. It changes time
 /// only: `continuation_seeks_alone` counts what is solved.
-const LEAST: f64 = 1e-3;
+const LEAST_DISTANCE: f64 = 1e-3;
 
 /// Largest turn of the normal, as the largest component of its tangent; dimensionless, 17 degrees.
 ///
 /// Larger, turns leave where ellipsoids stand for the bodies; smaller, starts stay farther off. It
 /// changes time only: `continuation_seeks_alone` counts what is solved.
-const MOST: f64 = 0.3;
+const LARGEST_TURN: f64 = 0.3;
 
 /// The unit vector from B to A across the gap of the ellipsoids that stand for them, in A's frame.
 #[inline(always)]
@@ -57,7 +57,7 @@ pub(in crate::measure) fn facing<S: Simd, N: Number<S>>(simd: S, a: &Body, b: &B
             w[i] = -(relative.origin[i] + of_b.mul_add(v[i], of_a * u[i]));
         }
         let distance = dot(n, w);
-        let least = distance.max((wide_a + wide_b) * N::splat(simd, LEAST));
+        let least = distance.max((wide_a + wide_b) * N::splat(simd, LEAST_DISTANCE));
         let (scaled_a, scaled_b) = (scaled(u, of_a * of_a * of_a), scaled(v, of_b * of_b * of_b));
         let mut matrix = [least; 6];
         for (entry, (i, j)) in matrix.iter_mut().zip([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]) {
@@ -146,7 +146,7 @@ pub(in crate::measure) fn meeting<S: Simd, N: Number<S>>(
     ray: Option<V3<N>>,
 ) -> (Start<N>, [N; 2]) {
     let size = a.trust().reach + b.trust().reach;
-    let least = N::splat(simd, LEAST * size);
+    let least = N::splat(simd, LEAST_DISTANCE * size);
     let own = apply_transposed(&relative.rotation, n);
     let (cell_a, cell_b) = (a.outline().cell(simd, scaled(n, -N::splat(simd, 1.0))), b.outline().cell(simd, own));
     // Points for n, and how they turn with it.
@@ -190,7 +190,7 @@ fn turned<S: Simd, N: Number<S>>(simd: S, n: V3<N>, matrix: [N; 6], r: V3<N>, si
     let unit = N::splat(simd, inverse_cube(size));
     let turn = scaled(apply_symmetric(&cofactors, r), unit);
     let longest = turn[0].abs().max(turn[1].abs()).max(turn[2].abs());
-    let weight = (determinant * unit).max(longest * N::splat(simd, 1.0 / MOST));
+    let weight = (determinant * unit).max(longest * N::splat(simd, 1.0 / LARGEST_TURN));
     normalized(simd, add_scaled(turn, weight, n))
 }
 

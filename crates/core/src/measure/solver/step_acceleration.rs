@@ -48,7 +48,7 @@ const TOLERATED: f64 = 0.05;
 ///
 /// Larger, steps may lead past the root; smaller, the flattest sides take more steps. Pinned by
 /// `flat_sides_take_few_steps_however_flat_and_however_tilted`.
-const FLATTEST: f64 = (MAX_DEGREE - 1) as f64;
+const HIGHEST_POWER: f64 = (MAX_DEGREE - 1) as f64;
 
 /// Length of a step relative to Newton's step before it, dimensionless, from which one leads to
 /// where surfaces are flat.
@@ -300,7 +300,7 @@ pub(in crate::measure) fn correction(newton: V2, slope: V2, compliance: Symmetri
         let fall = (dot(slope, direction) / dot(last.slope, direction)).abs();
         let power = way / last_step;
         let length = if SLOW.contains(&change) && is_power(fall, step / last_step, 1.0 / change) {
-            step * (1.0 / change).min(FLATTEST)
+            step * (1.0 / change).min(HIGHEST_POWER)
         } else if power > LEAP && fall > 0.0 && step.abs() > WILD * way.abs() {
             (way * (1.0 + 1.0 / fall).powf(-1.0 / power)).copysign(step)
         } else if step.abs() > most {

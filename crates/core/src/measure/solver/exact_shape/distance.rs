@@ -33,27 +33,27 @@ const MAX_ROUNDS: u32 = 16;
 ///
 /// Larger, more brackets are too wide to end on; smaller, an evaluation more is taken. It changes
 /// time only: `.ci/instructions` pins it.
-const WORTH_A_BRACKET: f64 = 1e-6;
+const WORTH_A_BRACKET_SQUARED: f64 = 1e-6;
 
 /// Square of a step, as above, dimensionless, after which only rounding is left: 1e-11 of the body.
 ///
 /// A larger value ends brackets too wide, a smaller one spends rounds on rounding. Pinned by
 /// `smooth_bodies_against_shapes`.
-const SETTLED: f64 = 1e-22;
+const SETTLED_SQUARED: f64 = 1e-22;
 
 /// Longest step in normalized coordinates for which the linearization is valid, relative to the
 /// body's size there; dimensionless.
 ///
 /// Longer, Newton's method diverges from cold starts; shorter, it needs more rounds:
 /// `smooth_bodies_against_shapes` counts what is solved.
-const LONGEST: f64 = 0.5;
+const LONGEST_STEP: f64 = 0.5;
 
 /// Longest first step from the last answer, as above, dimensionless; a longer one is no
 /// continuation, and the support table starts it.
 ///
 /// Longer, bad hints take more rounds than a cold start; shorter, good ones are dropped:
 /// `smooth_bodies_against_shapes` counts what is solved.
-const LONGEST_FOLLOWED: f64 = 0.25;
+const LONGEST_FOLLOWED_STEP: f64 = 0.25;
 
 /// Curvature times size, dimensionless, that is added where there is none, as in `continuation`.
 /// Pinned by `boxes_side_by_side`.
@@ -233,7 +233,7 @@ impl<P: Projectable> ExactPair<'_, P> {
         let plane = Plane::new(simd, &trace.jet, &local);
         let bend = SurfaceCurvature::new(simd, &trace.jet, &local);
         let found = newton(simd, &self.set, x, &seen, (&plane, &bend), self.smallest())?;
-        if !(side.relative_square(simd, &local, found.step) < LONGEST_FOLLOWED * LONGEST_FOLLOWED) {
+        if !(side.relative_square(simd, &local, found.step) < LONGEST_FOLLOWED_STEP * LONGEST_FOLLOWED_STEP) {
             return None;
         }
         let predicted = add::<S, f64>(trace.point, apply_transposed::<S, f64>(&local, found.step));
@@ -308,7 +308,7 @@ impl<P: Projectable> ExactPair<'_, P> {
             // Where sides are flat the point at hand may do long before its step is short enough.
             let may_be_flat = series.may_have_to_be_corrected(along, square.sqrt());
             let is_flat = may_be_flat && series.is_slow(along);
-            if square < WORTH_A_BRACKET || is_flat {
+            if square < WORTH_A_BRACKET_SQUARED || is_flat {
                 // There the normal is that of the face: on to the surface.
                 let step = if is_flat { [0.0, 0.0, found.shift] } else { found.step };
                 let at = side.extrapolate(simd, &jet, &local, step);
@@ -319,7 +319,7 @@ impl<P: Projectable> ExactPair<'_, P> {
                     let trace = trace_of(simd, &jet, (side.normalized(simd, x), delta), predicted);
                     return Ended::Proven(ExactProven { rounds: *rounds, trace: Some(trace), ..proven });
                 }
-                if square < SETTLED {
+                if square < SETTLED_SQUARED {
                     return Ended::Wide(self.about(simd, to, &seen));
                 }
             }
@@ -345,8 +345,8 @@ impl<P: Projectable> ExactPair<'_, P> {
                 }
             }
             series.push(tangents, Last { newton: along, taken: [step[0], step[1]], slope, corrected });
-            let mut share = part.min(LONGEST / length);
-            if round > PATIENCE && !corrected && square > WORTH_A_BRACKET {
+            let mut share = part.min(LONGEST_STEP / length);
+            if round > PATIENCE && !corrected && square > WORTH_A_BRACKET_SQUARED {
                 share *= if round & 1 == 0 { 0.5 } else { 0.8 };
             }
             before = Some(x);

@@ -29,7 +29,7 @@ const FROM_AFAR: u32 = 8;
 ///
 /// A larger value starts it too far away, a smaller one takes evaluations without need. It changes
 /// time only; no test pins it.
-const SETTLED: f64 = 1e-4;
+const SETTLED_MINIMUM: f64 = 1e-4;
 
 /// Share of the logarithm's curvature that is taken off, dimensionless: of all of it steps may be
 /// too long, of none they are a (d - 1)-th part of the way for a polynomial of degree d.
@@ -103,7 +103,7 @@ impl<P: Projectable> WithSimd for LevelProblem<'_, P> {
                 next = set.least(simd, y, gradient, &hessian);
             }
             let step = subtract::<S, f64>(next, y);
-            if dot::<S, f64>(step, step) <= SETTLED * SETTLED * set.reach() * set.reach() {
+            if dot::<S, f64>(step, step) <= SETTLED_MINIMUM * SETTLED_MINIMUM * set.reach() * set.reach() {
                 break;
             }
             y = next;

@@ -165,7 +165,7 @@ pub(in crate::measure) const SEEK_ROUNDS: u32 = 20;
 /// it leaves wide is worth a second one in a better metric.
 ///
 /// It changes time only; no test pins it.
-const SHORT: f64 = 1e-3;
+const NEGLIGIBLE_STEP: f64 = 1e-3;
 
 /// Longest step, relative to the bodies, dimensionless, after which only rounding is left.
 ///
@@ -268,7 +268,7 @@ impl Sides<'_> {
                 let end = add::<S, f64>(w, step.delta);
                 let mut found = self.bracket(simd, &at, &step, &Metric::of_b(self, step.curvature));
                 let mut proven = found.proves(options.accuracy());
-                if !proven && length <= SHORT {
+                if !proven && length <= NEGLIGIBLE_STEP {
                     found = self.bracket(simd, &at, &step, &self.joint(&at));
                     proven = found.proves(options.accuracy());
                 }

@@ -7,7 +7,9 @@ use crate::measure::frames::pose::RELATIVE_QUATERNION_ERROR;
 use crate::measure::frames::vector::{
     M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, rows, scaled, times_transposed,
 };
-use crate::measure::solver::active_set_qp::{CENTER, DAMPINGS, LEAST, LONGEST_PROGRAM_STEP, MOST_BENT, SHORT};
+use crate::measure::solver::active_set_qp::{
+    CENTER, DAMPINGS, LEAST_DAMPING, LONGEST_PROGRAM_STEP, MOST_BENT, SHORT_PROGRAM_STEP,
+};
 use crate::measure::solver::tangent_newton::Relative;
 use crate::polynomial::{Number, NumberJet, Polynomial, Simd, gamma};
 
@@ -200,9 +202,9 @@ impl<'a> Sides<'a> {
             }
             (delta, next) = self.damped(simd, at, &gradient_a, &hessian, damping);
             length = self.length(simd, at.z, delta);
-            if i == 0 && length < SHORT {
+            if i == 0 && length < SHORT_PROGRAM_STEP {
                 // Along flat sides a step is as long as the damping is little.
-                let damping = damping * (length / SHORT).max(LEAST);
+                let damping = damping * (length / SHORT_PROGRAM_STEP).max(LEAST_DAMPING);
                 let longer = self.damped(simd, at, &gradient_a, &hessian, damping);
                 if self.length(simd, at.z, longer.0) <= LONGEST_PROGRAM_STEP {
                     return longer;
