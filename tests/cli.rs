@@ -513,7 +513,7 @@ fn ring() -> String {
 }
 
 #[test]
-fn sets_that_need_not_be_convex_are_told_from_bodies_everywhere() {
+fn sets_that_need_not_be_convex_are_distinguished_from_bodies() {
     let folder = tempfile::tempdir().unwrap();
     let mesh = folder.path().join("ring.off");
     std::fs::write(&mesh, ring()).unwrap();
@@ -611,7 +611,7 @@ fn sets_that_need_not_be_convex_are_told_from_bodies_everywhere() {
 }
 
 #[test]
-fn bodies_are_grouped_into_one_that_is_proven_to_hold_them() {
+fn bodies_are_grouped_into_one_that_is_proven_to_contain_them() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     // Balls of radius 1/2 about (0, 0, 0), (1.2, 0, 0) and (9, 0, 0).

@@ -419,7 +419,7 @@ mod tests {
     }
 
     #[test]
-    fn degenerate_drawings_hold_no_nan() {
+    fn degenerate_drawings_contain_no_nan() {
         let panel = |polygon: Vec<[f64; 2]>| Panel {
             caption: "a < b".into(),
             outlines: vec![Outline::body(Ink::Blue, polygon)],

@@ -42,7 +42,7 @@ fn a_job_that_is_cancelled_before_it_is_on_the_board_makes_nothing() {
 
 /// The end of a job is reported once, whatever caused it.
 #[test]
-fn who_counts_jobs_hears_of_each_once() {
+fn each_job_is_counted_once() {
     let (_dir, catalogue, id) = claimed();
     let heard = Arc::new(std::sync::Mutex::new(Vec::new()));
     let jobs = {

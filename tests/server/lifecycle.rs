@@ -84,7 +84,7 @@ async fn health_follows_loading_and_stopping() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn idle_connections_do_not_hold_up_the_stop() {
+async fn idle_connections_do_not_delay_the_stop() {
     // A client that has nothing to say is asked to go; one that never said anything is cut after
     // the drain at the latest, which the log reports, or when a second signal says so.
     for (silent, twice) in [(false, false), (true, false), (true, true)] {
@@ -116,7 +116,7 @@ fn the_first_line_promises_an_orderly_stop() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_log_tells_what_was_loaded_changed_and_refused() {
+async fn the_log_states_what_was_loaded_changed_and_refused() {
     let dir = tempfile::tempdir().expect("a directory");
     let server = Running::start_limited(dir.path(), 256);
     let mut clients = server.connect().await;

@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn tables_hold_times_and_parts_of_one_run() {
+    fn tables_have_times_and_parts_of_one_run() {
         let rows = [
             ("separated", COAL_CACHED, 1000.0),
             ("separated", COAL_COLD, 2000.0),

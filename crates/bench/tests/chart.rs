@@ -47,7 +47,7 @@ fn the_quick_table_holds_the_known_volumes() {
 }
 
 #[test]
-fn missing_meshes_are_told() {
+fn missing_meshes_are_reported() {
     let out = tempfile::tempdir().expect("a folder can be made");
     let folder = out.path().to_str().expect("a plain name");
     let output = Command::new(env!("CARGO_BIN_EXE_sublevel-bench"))
@@ -325,7 +325,7 @@ fn the_quick_chart_of_accuracy_ends_at_the_floor() {
 
 #[test]
 #[ignore = "needs SUBLEVEL_DATA"]
-fn the_quick_chart_of_cost_tells_exponents() {
+fn the_quick_chart_of_cost_states_exponents() {
     let (report, csv) = made("cost");
     let of = |curve: &str, head: &str| column(&csv, curve, head);
     for (curve, points) in [

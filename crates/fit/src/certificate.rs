@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn the_edge_of_convexity_is_told_from_both_sides() {
+    fn the_edge_of_convexity_is_found_from_both_sides() {
         // x² + y² + z² + 2 c xy is convex up to c = 1, its only Gram matrix has the eigenvalues 2
         // (1 ± c) and 2.
         let leaning =

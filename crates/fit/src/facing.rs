@@ -104,7 +104,7 @@ mod tests {
     use sublevel_testkit::Seeded;
 
     #[test]
-    fn the_faced_planes_tell_what_all_planes_tell() {
+    fn the_faced_planes_bound_what_all_planes_bound() {
         for seed in 0..60 {
             let mut random = Seeded(seed);
             let mut vector = || Vector3::from_fn(|_, _| random.signed());

@@ -19,7 +19,7 @@ use nalgebra::{DMatrix, DVector};
 /// Tolerance asked of the solver, which stops where rounding stands in its way; dimensionless.
 ///
 /// Near the edge the answer is as small as its error. A larger value leaves more polynomials
-/// undecided. Pinned by `the_edge_of_convexity_is_told_from_both_sides`.
+/// undecided. Pinned by `the_edge_of_convexity_is_found_from_both_sides`.
 const TOLERANCE: f64 = 1e-12;
 
 /// What the program says about an identity.

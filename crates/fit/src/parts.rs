@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn slabs_hold_the_rounding_of_cuts_too() {
+    fn slabs_contain_the_rounding_of_cuts_too() {
         let mesh = letter();
         let far = Mesh { points: mesh.points.iter().map(|x| x + Vector3::repeat(1e4)).collect(), ..mesh.clone() };
         for mesh in [mesh, far] {

@@ -111,7 +111,7 @@ async fn pages(clients: &mut Clients, page_size: u32) -> Vec<String> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn unknown_jobs_are_told_by_name() {
+async fn unknown_jobs_are_named() {
     let dir = tempfile::tempdir().expect("a directory");
     let server = Running::start(dir.path());
     let mut clients = server.connect().await;

@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn crashes_are_told_from_refusals() {
+    fn crashes_are_distinguished_from_refusals() {
         let shell = Path::new("/bin/sh");
         let run = |script: &str| printed(shell, Command::new(shell).args(["-c", script]));
         assert_eq!(run("echo fine").unwrap(), b"fine\n");

@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn peaks_are_seen_and_failures_told() {
+    fn peaks_are_measured_and_failures_reported() {
         let found =
             peak(Path::new("sh"), &["-c", "x=$(head -c 20000000 /dev/zero | tr '\\0' a); sleep 0.1; test -n \"$x\""]);
         assert!(found.is_some_and(|bytes| bytes > 15e6), "{found:?}");

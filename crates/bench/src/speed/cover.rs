@@ -102,7 +102,7 @@ mod tests {
     use crate::comparison::Random;
 
     #[test]
-    fn the_balls_hold_every_triangle_and_shrink_as_they_grow_more() {
+    fn the_balls_contain_every_triangle_and_shrink_as_they_grow_more() {
         let corners: Vec<Vector3<f64>> =
             (0..8_u8).map(|i| Vector3::from_fn(|k, _| f64::from(i >> k & 1) * [1.0, 0.5, 0.1][k])).collect();
         let triangles = vec![[0, 1, 3], [0, 3, 2], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4]];

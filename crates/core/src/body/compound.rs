@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_of_a_compound_hold_all_parts() {
+    fn bounds_of_a_compound_contain_all_parts() {
         for seed in 0..40 {
             let mut random = Seeded(seed);
             let parts: Vec<Body> = (0..1 + seed % 5)

@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_that_hold_their_pieces_cover_the_mesh() {
+    fn parts_that_contain_their_pieces_cover_the_mesh() {
         let (points, triangles) = unit();
         let compound = Compound::new("two", vec![slice(-1.0 - 1e-12, 0.25 + 1e-12), slice(0.25 - 1e-12, 1.1)]).unwrap();
         let (covered, most) = compound.prove_covers(&points, &triangles, &by(&[CUT])).unwrap();
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_hold_components_and_several_pieces() {
+    fn parts_contain_components_and_several_pieces() {
         let far = mesh(&Aabb { min: Vector3::repeat(5.0), max: Vector3::repeat(6.0) });
         let (mut points, mut triangles) = unit();
         triangles.extend(far.1.iter().map(|triangle| triangle.map(|corner| corner + points.len())));

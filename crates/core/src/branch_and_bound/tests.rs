@@ -94,7 +94,7 @@ fn boundary(set: &PlacedSet<'_>, rays: usize, random: &mut Seeded) -> Vec<Vector
 }
 
 #[test]
-fn brackets_hold_what_is_sampled_and_shrink_with_every_step() {
+fn brackets_contain_what_is_sampled_and_shrink_with_every_step() {
     for seed in 0..40 {
         let mut random = Seeded(seed);
         let polynomials = [lumpy(&mut random, [4, 6][seed as usize % 2]), lumpy(&mut random, 4)];

@@ -399,7 +399,7 @@ fn poses_are_normalised_or_refused() {
 }
 
 #[test]
-fn distances_of_sides_tilted_by_next_to_nothing() {
+fn distances_of_nearly_parallel_sides() {
     let cuboid = |x, y, z| Body::cuboid("box", Vector3::new(x, y, z)).unwrap();
     let needle = Body::cylinder("needle", 0.01, 1.0).unwrap();
     let pairs = [
@@ -468,7 +468,7 @@ fn bodies_on_top_of_their_like_overlap_whatever_the_hint() {
 /// The answer is where the slope of a tip makes up for the tilt of the face over it: on the way
 /// there is no curvature at all.
 #[test]
-fn flat_tips_meet_faces_tilted_by_next_to_nothing() {
+fn flat_tips_meet_nearly_parallel_faces() {
     let needle = Body::superellipsoid("needle", Vector3::zeros(), Vector3::new(0.05, 0.05, 1.0), 8).unwrap();
     let block = Body::cuboid("block", Vector3::new(0.02, 0.03, 0.01)).unwrap();
     let (mut longest, mut sum) = (0, 0);

@@ -153,7 +153,7 @@ impl Substitution {
 /// a quaternion of unit length but for rounding.
 ///
 /// A smaller value could leave the exact map outside of the intervals, and proofs of containment
-/// false; a larger one widens them. Pinned by `maps_through_a_space_hold_exact_images`.
+/// false; a larger one widens them. Pinned by `maps_through_a_space_contain_exact_images`.
 const ROTATION_ENTRY_ERROR: f64 = 16.0 * f64::EPSILON;
 
 /// The inverse, enclosed: with `E = I - LX` small, `L⁻¹ = X + X E (I - E)⁻¹`.
@@ -234,7 +234,7 @@ mod tests {
     /// To a space and on to other normalized coordinates: exact images of points lie between those
     /// of the bounds, and both maps of one frame and pose undo each other.
     #[test]
-    fn maps_through_a_space_hold_exact_images() {
+    fn maps_through_a_space_contain_exact_images() {
         for seed in 0..40 {
             let mut random = Seeded(seed);
             let mut frame = || {

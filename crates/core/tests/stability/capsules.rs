@@ -154,7 +154,7 @@ fn family_01_kissing_contact() {
 }
 
 #[test]
-fn family_02_limits_are_told() {
+fn family_02_limits_are_reported() {
     for seed in 0..draws(300) {
         let mut random = Seeded(520_000 + seed);
         let known = Known::about(1.0, &mut random);

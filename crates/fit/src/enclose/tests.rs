@@ -336,7 +336,7 @@ fn sos_bodies_are_convexified_alone_and_among_bodies() {
 }
 
 #[test]
-fn bad_input_is_told_before_any_work() {
+fn bad_input_is_reported_before_any_work() {
     let bodies = three_ellipsoids(1.0, Vector3::zeros());
     let regions: Vec<Region> = bodies.iter().map(Into::into).collect();
     let ask = |name: &str, regions: &[Region], degree, multiplier_degree| {

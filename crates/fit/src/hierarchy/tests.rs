@@ -113,7 +113,7 @@ fn the_counterexample_is_closed_by_a_higher_level() {
 /// those that are sampled and those that local searches from many starts find; 10 000 pairs where
 /// `SUBLEVEL_LONG` is set.
 #[test]
-fn brackets_of_random_quartics_hold_what_is_found() {
+fn brackets_of_random_quartics_contain_what_is_found() {
     let (mut exact, mut widest, mut all, mut seconds, mut overlapping) = (0, (1.0, 0), 0, 0.0, 0);
     let pairs = few_or(60, 10_000);
     for seed in 0..pairs {

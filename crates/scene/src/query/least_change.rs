@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_hold_already_change_nothing() {
+    fn rows_that_are_met_already_change_nothing() {
         assert_eq!(least_change(&[(vec![1.0, 0.0], -1.0)], &[FREE; 2]), Some(vec![0.0; 2]));
     }
 

@@ -218,7 +218,7 @@ fn planes_through_corners_and_along_faces_do_no_harm() {
 }
 
 #[test]
-fn open_meshes_are_told_from_closed_ones() {
+fn open_meshes_are_distinguished_from_closed_ones() {
     let (points, triangles) = cube();
     assert!(piece(&(points.clone(), triangles.clone())).is_closed());
     // Each triangle with corners of its own, as STL has them.

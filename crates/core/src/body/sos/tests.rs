@@ -127,7 +127,7 @@ fn volumes_and_bounds_agree_with_a_grid() {
 }
 
 #[test]
-fn triangles_are_told_apart_although_all_points_are_inside() {
+fn triangles_are_distinguished_although_all_points_are_inside() {
     let body = torus(0.5);
     let center = body.normalization().center;
     // Corners on the circle of the torus: a short triangle within the tube, and one across the

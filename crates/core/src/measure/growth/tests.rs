@@ -271,7 +271,7 @@ fn limits_are_kept_and_admitted() {
 }
 
 #[test]
-fn sides_tilted_by_next_to_nothing_show_their_edges() {
+fn nearly_parallel_sides_show_their_edges() {
     let cuboid = |x, y, z| Body::cuboid("box", Vector3::new(x, y, z)).unwrap();
     let plate = || cuboid(1.0, 1.0, 1e-3);
     let flat = |degree| Body::superellipsoid("flat", Vector3::zeros(), Vector3::new(1.0, 1.0, 0.02), degree).unwrap();

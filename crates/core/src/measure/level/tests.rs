@@ -261,7 +261,7 @@ fn hints_of_other_pairs_change_nothing() {
 }
 
 #[test]
-fn sides_tilted_by_next_to_nothing_show_their_edges() {
+fn nearly_parallel_sides_show_their_edges() {
     let cuboid = |x, y, z| Body::cuboid("box", Vector3::new(x, y, z)).unwrap();
     let needle = || Body::cylinder("needle", 0.01, 1.0).unwrap();
     let pairs = [(cuboid(1.0, 1.0, 1e-3), needle()), (cuboid(1.0, 1.0, 1e-3), cuboid(0.6, 0.9, 0.3))];

@@ -70,7 +70,7 @@ pub(in crate::measure) const SHORT_PROGRAM_STEP: f64 = 0.5 * LONGEST_PROGRAM_STE
 ///
 /// A larger value makes steps along nearly parallel faces too short to find an edge; a smaller one
 /// lets rounding choose their direction. Pinned by
-/// `sides_tilted_by_next_to_nothing_show_their_edges`.
+/// `nearly_parallel_sides_show_their_edges`.
 pub(in crate::measure) const LEAST_DAMPING: f64 = 1e-9;
 
 /// Weight of a step's length relative to the distance from such a centre, if it leads there;

@@ -74,20 +74,20 @@ const FARTHER: f64 = 2.0;
 /// Cosine of the angle to the last step below which a step leads back: 154 degrees.
 ///
 /// Nearer to -1, oscillations that drift are not cut; nearer to 0, turns are. Pinned by
-/// `steps_to_and_fro_meet_between`.
+/// `oscillating_steps_meet_between`.
 const BACK: f64 = -0.9;
 
 /// Length of a step that leads back, relative to the last step, dimensionless, of an oscillation.
 ///
 /// Outside of it the steps converge or diverge by themselves. Pinned by
-/// `steps_to_and_fro_meet_between`.
+/// `oscillating_steps_meet_between`.
 const AS_FAR: std::ops::Range<f64> = 0.5..2.0;
 
 /// Length of steps relative to the bodies, dimensionless, beyond which they may oscillate: twice
 /// that of a series.
 ///
 /// Smaller, steps that converge are cut; larger, oscillations are found late. Pinned by
-/// `steps_to_and_fro_meet_between`.
+/// `oscillating_steps_meet_between`.
 const RETURNING_STEP: f64 = 0.1;
 
 /// A vector along the tangents.
@@ -420,7 +420,7 @@ mod tests {
     /// Newton's method for the root of the arc tangent oscillates for ever from 1.3917, and ever
     /// farther from beyond.
     #[test]
-    fn steps_to_and_fro_meet_between() {
+    fn oscillating_steps_meet_between() {
         for start in [1.38, 1.391_745_2, 1.4, 1.5] {
             let (mut x, mut series) = (start, Series::default());
             for _ in 0..8 {

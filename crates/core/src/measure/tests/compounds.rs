@@ -276,7 +276,7 @@ fn gradients_of_untied_answers_are_the_derivatives() {
 }
 
 #[test]
-fn parts_that_are_about_as_near_are_told() {
+fn parts_that_are_about_as_near_are_reported() {
     let ball = |y: f64| Body::ball("ball", Vector3::new(0.0, y, 0.0), 0.5).unwrap();
     let (two, one) = (Compound::new("two", vec![ball(0.8), ball(-0.8)]).unwrap(), ball(0.0));
     let options = Options::default();
@@ -317,7 +317,7 @@ fn parts_that_are_about_as_near_are_told() {
 }
 
 #[test]
-fn answers_tell_the_parts_they_are_about() {
+fn answers_name_the_parts_they_are_about() {
     let options = Options::default();
     let mut curved = 0;
     for seed in 0..40 {
@@ -339,7 +339,7 @@ fn answers_tell_the_parts_they_are_about() {
 /// Where the closest pair of parts changes on a path, the normal jumps; there, and hardly anywhere
 /// else, the flag is set.
 #[test]
-fn normals_jump_only_where_ties_are_told() {
+fn normals_jump_only_where_ties_are_reported() {
     let options = Options::default();
     let (mut changes, mut tied, mut queries) = (0, 0, 0);
     for seed in 0..40 {
@@ -373,7 +373,7 @@ fn normals_jump_only_where_ties_are_told() {
 }
 
 #[test]
-fn ways_out_that_are_about_as_short_are_told() {
+fn translations_that_are_about_as_short_are_reported() {
     let ball = |x: f64| Body::ball("ball", Vector3::new(x, 0.0, 0.0), 0.5).unwrap();
     let (two, one) = (Compound::new("two", vec![ball(0.3), ball(-0.3)]).unwrap(), ball(0.0));
     let options = Options::default();

@@ -66,7 +66,7 @@ fn convex_bodies_are_exact_at_level_zero() {
 
 /// Random quartics that bend inwards: brackets contain what is sampled, and rise with the level.
 #[test]
-fn brackets_of_random_quartics_hold_what_is_sampled() {
+fn brackets_of_random_quartics_contain_what_is_sampled() {
     let (mut exact, mut widest) = (0, 0.0_f64);
     for seed in 0..60 {
         let mut random = Seeded(seed);

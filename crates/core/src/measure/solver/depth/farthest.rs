@@ -169,7 +169,7 @@ mod tests {
     use sublevel_testkit::Seeded;
 
     #[test]
-    fn points_are_as_far_as_they_can_be_whoever_their_neighbours_are() {
+    fn points_are_as_far_as_they_can_be_whatever_their_neighbours() {
         let half = Vector3::new(0.9, 0.4, 0.6);
         let mut missing = 0;
         for seed in 0..200 {

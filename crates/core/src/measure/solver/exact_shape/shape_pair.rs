@@ -21,7 +21,7 @@ const MAX_STEPS: u32 = 32;
 /// the distance is flat, so that steps have an end.
 ///
 /// Smaller, rounding would choose them; larger, sides tilted by less take many steps:
-/// `distances_of_sides_tilted_by_next_to_nothing`.
+/// `distances_of_nearly_parallel_sides`.
 const FLAT: f64 = 1e-12;
 
 /// Most halvings of a step that leads farther away.
