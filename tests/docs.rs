@@ -93,6 +93,32 @@ fn paths_name_what_is_there() {
     assert!(found > 100, "{found} paths were looked at");
 }
 
+/// "`NAME` in `FILE`": the file names it.
+#[test]
+fn names_are_in_the_files_that_pages_give() {
+    let (mut found, mut missing) = (0, Vec::new());
+    for page in ["docs/ARCHITECTURE.md", "CONTRIBUTING.md"] {
+        let text =
+            fs::read_to_string(root().join(page)).expect("a page is text").replace("\n   ", " ").replace('\n', " ");
+        for (before, after) in text.match_indices("` in `").map(|(at, mark)| (&text[..at], &text[at + mark.len()..])) {
+            let name = before.rsplit('`').next().unwrap_or_default().rsplit("::").next().unwrap_or_default();
+            let file = after.split('`').next().unwrap_or_default();
+            let short = SHORT.iter().find(|(short, _)| file.starts_with(short));
+            let path = root().join(short.map_or(file.to_owned(), |(short, long)| file.replacen(short, long, 1)));
+            let is_name = !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '_');
+            if is_name && path.is_file() {
+                found += 1;
+                let text = fs::read_to_string(&path).expect("text");
+                let words = text.split(|c: char| !c.is_alphanumeric() && c != '_');
+                if !words.into_iter().any(|word| word == name) {
+                    missing.push(format!("{page}: {name} in {file}"));
+                }
+            }
+        }
+    }
+    assert!(missing.is_empty() && found > 10, "{found} found\n{}", missing.join("\n"));
+}
+
 /// Lines of README.md, which is for first readers.
 const MOST_LINES_OF_README: usize = 200;
 
