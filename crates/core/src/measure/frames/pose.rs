@@ -36,7 +36,8 @@ pub(in crate::measure) const ROTATION_ERROR: f64 = 16.0 * f64::EPSILON;
 pub(in crate::measure) const RELATIVE_ERROR: f64 = 2.0 * ROTATION_ERROR + gamma(16);
 
 /// The same of one that is the matrix of a product of two quaternions, as vectors compute it, with
-/// fewer than 40 roundings: a bound of its own, for the other would widen with it. Pinned by
+/// fewer than 40 roundings: a bound of its own, for the other would widen with it. A smaller value
+/// could make brackets of continuation miss the truth. Pinned by
 /// `relative_rotations_are_off_by_less_than_the_bounds`.
 pub(in crate::measure) const RELATIVE_QUATERNION_ERROR: f64 = 2.0 * ROTATION_ERROR + gamma(40);
 
