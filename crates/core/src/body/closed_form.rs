@@ -19,7 +19,7 @@ const ORTHOGONAL: f64 = 64.0 * f64::EPSILON;
 /// operations of half an epsilon each, and with axes that are not those of the body as many again.
 ///
 /// A smaller value gives bounds that a height may leave, so that a plane could prove shapes apart
-/// that touch; a larger one leaves more contacts undecided. Pinned by
+/// that touch; a larger one leaves more contacts undecided. Exercised by
 /// `support_points_attain_the_heights`.
 const HEIGHT_ROUNDING: f64 = 16.0 * f64::EPSILON;
 

@@ -24,14 +24,14 @@ use nalgebra::{Matrix3, Vector3};
 ///
 /// A height is too large by the residual times the size of the body. A larger value makes heights
 /// too large by more, so that planes decide fewer questions; a smaller one only takes more time
-/// when a body is made. Pinned by `heights_are_bounds_and_close`.
+/// when a body is made. Exercised by `heights_are_bounds_and_close`.
 const COARSE: f64 = 1e-6;
 
 /// Rounding of the interpolation between heights, relative to the largest of them; dimensionless. A
 /// dozen operations of half an epsilon each, with a factor to spare.
 ///
 /// A smaller value could give a height below that of a point of the body, and a plane that proves
-/// nothing; a larger one gives larger heights. Pinned by `heights_are_bounds_and_close`.
+/// nothing; a larger one gives larger heights. Exercised by `heights_are_bounds_and_close`.
 const INTERPOLATION: f64 = 64.0 * f64::EPSILON;
 
 /// A point near the support point along a direction, and the constraints that are active there.

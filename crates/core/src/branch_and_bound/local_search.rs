@@ -10,7 +10,7 @@ const MAX_STEPS: usize = 40;
 ///
 /// The quadratic model is good near by only: a larger value lets steps leave the part of the set
 /// where they began, a smaller one takes more steps. It changes upper bounds, never their truth:
-/// every point found is proven in its set. Pinned by
+/// every point found is proven in its set. Exercised by
 /// `convex_bodies_have_the_distances_of_the_solver`, which counts boxes.
 const LARGEST_STEP: f64 = 0.3;
 
@@ -18,7 +18,7 @@ const LARGEST_STEP: f64 = 0.3;
 /// dimensionless.
 ///
 /// Whether the point lies in both sets is proven afterwards. A larger value tries points in vain, a
-/// smaller one misses contacts that rounding blurs. Pinned by
+/// smaller one misses contacts that rounding blurs. Exercised by
 /// `common_points_are_found_where_bodies_overlap`.
 const COINCIDENT: f64 = 1e-6;
 

@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 /// applied in some thirty operations.
 ///
 /// A smaller value could leave out points of the set and make a lower bound false; a larger one
-/// makes brackets of far poses wider. Pinned by
+/// makes brackets of far poses wider. Exercised by
 /// `two_of_the_same_share_their_cover_and_far_ones_lose_what_poses_round`.
 const POSE_ROUNDING: f64 = 128.0 * f64::EPSILON;
 

@@ -6,13 +6,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Default width of brackets: relative to the circumradius of the smaller body for lengths, to
 /// `max(1,
 ///
-/// d|)` for level distances; dimensionless. | Newton's method reaches it in the step after that of 1e-5. A larger value saves a step at most; a smaller one meets the rounding floor of far poses. Pinned by `random_pairs_converge_and_agree_in_all_ways`.
+/// d|)` for level distances; dimensionless. | Newton's method reaches it in the step after that of 1e-5. A larger value saves a step at most; a smaller one meets the rounding floor of far poses. Exercised by `random_pairs_converge_and_agree_in_all_ways`.
 pub const DEFAULT_ACCURACY: f64 = 1e-9;
 
 /// Default width of brackets of penetration depths, relative to the depth; dimensionless.
 ///
 /// Depths are found by branch and bound, whose time grows as this shrinks; a larger value returns
-/// directions that are visibly not the shortest. Pinned by `ellipsoid_pairs_against_brute_force`.
+/// directions that are visibly not the shortest. Exercised by
+/// `ellipsoid_pairs_against_brute_force`.
 pub const DEFAULT_DEPTH_ACCURACY: f64 = 1e-3;
 
 /// Default and largest iteration limit: several times what the worst pairs of flat bodies met so

@@ -153,7 +153,7 @@ impl Substitution {
 /// a quaternion of unit length but for rounding.
 ///
 /// A smaller value could leave the exact map outside of the intervals, and proofs of containment
-/// false; a larger one widens them. Pinned by `maps_through_a_space_contain_exact_images`.
+/// false; a larger one widens them. Exercised by `maps_through_a_space_contain_exact_images`.
 const ROTATION_ENTRY_ERROR: f64 = 16.0 * f64::EPSILON;
 
 /// The inverse, enclosed: with `E = I - LX` small, `L⁻¹ = X + X E (I - E)⁻¹`.

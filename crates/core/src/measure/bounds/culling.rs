@@ -56,8 +56,8 @@ pub(in crate::measure) fn balls((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body
 /// of 2^-52.
 ///
 /// Below 1e-15 a bound could exceed what it bounds; a larger value decides fewer questions without
-/// a solve. Pinned by `early_bounds_are_bounds` and `cheap_bounds_are_bounds`, with poses far from
-/// the origin.
+/// a solve. Pinned by `slacks_cover_the_roundings_they_are_counted_for` and
+/// `centres_are_as_far_apart_as_their_slack_allows`.
 pub(in crate::measure) const CULLING_SLACK: f64 = 1e-14;
 
 #[cfg(test)]

@@ -32,9 +32,11 @@ use nalgebra::Vector3;
 /// Fewer than 128 operations of half an epsilon each.
 ///
 /// A smaller value could give a bound above what it bounds; a larger one keeps brackets wider than
-/// asked for near the rounding floor. Pinned by the exact re-checks (`tests/stability/recheck.rs`),
-/// which compare both ends with rational arithmetic, and by
-/// `bodies_on_lines_are_bracketed_to_the_last_bits`.
+/// asked for near the rounding floor. Pinned from below by
+/// `slacks_cover_the_roundings_they_are_counted_for`, from above by
+/// `bodies_on_lines_are_bracketed_to_the_last_bits`; the exact re-checks
+/// (`tests/stability/recheck.rs`) compare both ends of brackets with rational arithmetic, but meet
+/// a small part of the bound only.
 pub(in crate::measure) const DUALITY_ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// Multipliers of the constraints of one body; zero where inactive.

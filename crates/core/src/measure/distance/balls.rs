@@ -12,7 +12,7 @@ use crate::measure::status::Status;
 /// half an epsilon each, and as much to spare.
 ///
 /// A smaller value could make the bracket of two balls miss their distance; a larger one leaves
-/// more pairs to the general search. Pinned by `two_balls_have_a_formula`.
+/// more pairs to the general search. Exercised by `two_balls_have_a_formula`.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// The distance of two shapes that are balls; none of others, at contact within rounding, and where

@@ -12,7 +12,7 @@ const MAX_STEPS: usize = 12;
 /// height; dimensionless.
 ///
 /// The portal gives a first guess: a larger value ends at worse guesses, a smaller one refines
-/// beyond what Newton's method needs. Pinned by `rays_leave_ellipsoids_where_they_do`.
+/// beyond what Newton's method needs. Exercised by `rays_leave_ellipsoids_where_they_do`.
 const WORTH: f64 = 1e-3;
 
 /// Where the ray passes through the last portal.

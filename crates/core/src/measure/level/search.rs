@@ -36,7 +36,7 @@ const STEEP_START: f64 = 1e3;
 /// Newton's method did not find: they are known to the root of its width.
 ///
 /// A larger value returns multipliers and gradients that are off by more; a smaller one asks for
-/// brackets below rounding. Pinned by `gradients_are_the_derivatives_of_the_value`.
+/// brackets below rounding. Exercised by `gradients_are_the_derivatives_of_the_value`.
 const REFINED: f64 = 1e-3;
 
 /// A solve in progress: the best bracket so far and where it was attained, in query units.

@@ -35,7 +35,7 @@ const MAX_ROUNDS: u32 = 40;
 /// dimensionless.
 ///
 /// Gains about halve from round to round. A larger value runs rounds in vain, a smaller one ends at
-/// longer translations. Pinned by `translations_separate_and_few_are_shorter`.
+/// longer translations. Exercised by `translations_separate_and_few_are_shorter`.
 const HOPE: f64 = 4.0;
 
 /// Most planes kept at a time: those with the smallest gaps.
@@ -45,7 +45,7 @@ const PLANES: usize = 24;
 /// enough to prove that they are apart.
 ///
 /// At most 1, parts could not be proven apart; a larger value returns translations longer by as
-/// much. Pinned by `translations_separate_and_few_are_shorter`.
+/// much. Exercised by `translations_separate_and_few_are_shorter`.
 const MARGIN: f64 = 4.0;
 
 /// A direction that separates one pair of parts.

@@ -30,14 +30,14 @@ const MAX_CHANGES: usize = 8;
 /// dimensionless, that counts as none.
 ///
 /// Right sides round at 1e-16. A larger value returns points outside, a smaller one exchanges
-/// constraints for rounding without end. Pinned by `solutions_are_optimal`.
+/// constraints for rounding without end. Exercised by `solutions_are_optimal`.
 const PROGRAM_VIOLATION: f64 = 1e-12;
 
 /// Sine of the angle between a gradient and a combination of others, dimensionless, up to which it
 /// is taken for their combination where the equations do not decide.
 ///
 /// A larger value drops constraints of blunt edges, a smaller one keeps systems that are singular
-/// to rounding. Pinned by `solutions_are_optimal`, whose gradients differ by 1 to 1e-15.
+/// to rounding. Exercised by `solutions_are_optimal`, whose gradients differ by 1 to 1e-15.
 const APART: f64 = 1e-4;
 
 /// How much of a stiffness, what the Hessian is of such values over such lengths, is added to it
@@ -49,7 +49,7 @@ pub(in crate::measure) const DAMPINGS: [f64; 6] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1,
 /// that the root of a power is stepped to.
 ///
 /// At 1 the rest is singular; lower, steps towards the minimum of a power of degree d are a (d -
-/// 1)-th part of the way. Pinned by `flats_of_different_orders_take_few_iterations`.
+/// 1)-th part of the way. Exercised by `flats_of_different_orders_take_few_iterations`.
 pub(in crate::measure) const MOST_BENT: f64 = 0.9;
 
 /// Longest step of a quadratic program for which its linearizations are valid, relative to the
@@ -62,30 +62,29 @@ pub(in crate::measure) const LONGEST_PROGRAM_STEP: f64 = 0.5;
 
 /// Length of a step, in the same measure, that is well within that: half of it.
 ///
-/// Shorter steps may be lengthened by less damping; of longer ones none is. Pinned with
+/// Shorter steps may be lengthened by less damping; of longer ones none is. Exercised with
 /// [`LONGEST_PROGRAM_STEP`].
 pub(in crate::measure) const SHORT_PROGRAM_STEP: f64 = 0.5 * LONGEST_PROGRAM_STEP;
 
 /// Least damping, relative to the first; dimensionless. Rounding tilts faces by about as much.
 ///
 /// A larger value makes steps along nearly parallel faces too short to find an edge; a smaller one
-/// lets rounding choose their direction. Pinned by
-/// `nearly_parallel_sides_show_their_edges`.
+/// lets rounding choose their direction. Exercised by `nearly_parallel_sides_show_their_edges`.
 pub(in crate::measure) const LEAST_DAMPING: f64 = 1e-9;
 
 /// Weight of a step's length relative to the distance from such a centre, if it leads there;
 /// dimensionless. The root of values that rise from a centre with a power is about a square, whose
 /// minimum one step finds.
 ///
-/// Larger, steps to the centre are cut; smaller, steps across it are not. Pinned by
+/// Larger, steps to the centre are cut; smaller, steps across it are not. Exercised by
 /// `stages_of_level_distances_solve_alone`.
 pub(in crate::measure) const TO_CENTER: f64 = 0.5;
 
 /// Distance from such a centre, relative to its body, dimensionless, below which lengths are
 /// measured relative to this distance instead.
 ///
-/// Smaller, steps near the centre are cut to nothing; larger, steps past it are not cut. Pinned by
-/// `stages_of_level_distances_solve_alone`.
+/// Smaller, steps near the centre are cut to nothing; larger, steps past it are not cut. Exercised
+/// by `stages_of_level_distances_solve_alone`.
 pub(in crate::measure) const CENTER: f64 = 0.02;
 
 /// All constraints of one body at one point.

@@ -182,7 +182,7 @@ const NEARLY: f64 = 0.05;
 /// a system of full rank.
 ///
 /// It must vanish beside every curvature that matters (1e-16 of rounding); zero leaves parallel
-/// sides without a step. Pinned by `boxes_meet_face_edge_and_corner`.
+/// sides without a step. Exercised by `boxes_meet_face_edge_and_corner`.
 const FLATTEST: f64 = 1e-20;
 
 /// Length of a step relative to the longest one allowed, dimensionless, beyond which no
@@ -202,7 +202,7 @@ const NARROWER: f64 = 0.5;
 /// Length of a step relative to the longest one allowed, dimensionless, after which only rounding
 /// is left: the next one is about its square.
 ///
-/// A larger value ends brackets too wide, a smaller one spends rounds on rounding. Pinned by
+/// A larger value ends brackets too wide, a smaller one spends rounds on rounding. Exercised by
 /// `impossible_accuracy_is_admitted`.
 const SETTLED: f64 = 1e-9;
 

@@ -259,13 +259,13 @@ pub(in crate::measure) const AT: f64 = 0.1;
 /// round at 1e-15.
 ///
 /// Larger, witnesses lie outside by more than brackets allow; smaller, rounding exchanges
-/// constraints without end. Pinned by `active_sets_follow_alone`.
+/// constraints without end. Exercised by `active_sets_follow_alone`.
 pub(in crate::measure) const VIOLATED: f64 = 1e-10;
 
 /// Rounding of a value of a constraint, relative to 1; dimensionless: some ten roundings.
 ///
 /// Smaller, refinement never accepts an answer near contact; larger, normals near contact are
-/// accepted that are off. Pinned by `alignment_turns_normals`.
+/// accepted that are off. Exercised by `alignment_turns_normals`.
 const ROUNDED: f64 = 8.0 * f64::EPSILON;
 
 /// Moves of both points relative to their distance, dimensionless, below which they have about
@@ -296,7 +296,7 @@ pub(in crate::measure) const WORTH_A_BRACKET: f64 = 1e-3;
 /// dimensionless: the regularization is the residual divided by this.
 ///
 /// Larger, systems of flat sides are singular to rounding; smaller, the regularization slows steps
-/// where there is curvature. Pinned by `boxes_meet_face_edge_and_corner`.
+/// where there is curvature. Exercised by `boxes_meet_face_edge_and_corner`.
 const FARTHEST: f64 = 1e3;
 
 /// Whether Newton's steps still shrink: fast near a solution, and those that do not are not near

@@ -29,7 +29,7 @@ const MAX_REVISED: u32 = 4;
 /// values round at 1e-28 there.
 ///
 /// Larger, normals near contact are off by constraints that are left out; smaller, rounding
-/// exchanges constraints. Pinned by `alignment_turns_normals`.
+/// exchanges constraints. Exercised by `alignment_turns_normals`.
 const NEGLIGIBLE: f64 = 1e-26;
 
 /// Steps of the level distance after which one that is still cut leads nowhere.
@@ -40,7 +40,7 @@ const PATIENCE: u32 = 8;
 /// factor of 100.
 ///
 /// Smaller, a refined bracket could miss the truth; larger, it is no narrower than one of doubles.
-/// Pinned by `refinement_goes_on_alone` from above and by the exact re-checks
+/// Exercised by `refinement_goes_on_alone` from above and by the exact re-checks
 /// (`tests/stability/recheck.rs`).
 const SHARE: f64 = 1e-13;
 

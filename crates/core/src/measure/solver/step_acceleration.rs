@@ -20,7 +20,7 @@ use nalgebra::{Matrix3, Vector3};
 /// converges as it should and is left alone.
 ///
 /// At a root of multiplicity m steps shrink by 1 - 1/m, that is by a half or more. Larger, series
-/// are not recognised; smaller, steps of plain roots are lengthened. Pinned by
+/// are not recognised; smaller, steps of plain roots are lengthened. Exercised by
 /// `steps_that_converge_fast_are_newtons`.
 const FAST: f64 = 0.55;
 
@@ -34,52 +34,52 @@ const SERIES_STEP: f64 = 0.05;
 /// Change of the step along the way, relative to that, dimensionless, of slopes that vanish with a
 /// power: 1/m of a root of multiplicity m, from 7 at most to 2 at least, with room for rounding.
 ///
-/// Wider, other steps are taken for a series; narrower, roots are missed. Pinned by
+/// Wider, other steps are taken for a series; narrower, roots are missed. Exercised by
 /// `flat_sides_take_few_steps_however_flat_and_however_tilted`.
 const SLOW: std::ops::Range<f64> = 0.06..0.6;
 
 /// Deviation of the logarithm of a slope from that of a power, relative to it; dimensionless.
 ///
 /// Larger, steps are lengthened that are of no power; smaller, powers with a rest of higher order
-/// are missed. Pinned by `flat_sides_take_few_steps_however_flat_and_however_tilted`.
+/// are missed. Exercised by `flat_sides_take_few_steps_however_flat_and_however_tilted`.
 const TOLERATED: f64 = 0.05;
 
 /// Highest power of slopes: degree 8 has slopes of power 7.
 ///
-/// Larger, steps may lead past the root; smaller, the flattest sides take more steps. Pinned by
+/// Larger, steps may lead past the root; smaller, the flattest sides take more steps. Exercised by
 /// `flat_sides_take_few_steps_however_flat_and_however_tilted`.
 const HIGHEST_POWER: f64 = (MAX_DEGREE - 1) as f64;
 
 /// Length of a step relative to Newton's step before it, dimensionless, from which one leads to
 /// where surfaces are flat.
 ///
-/// Smaller, usual steps are cut; larger, steps across flat sides are not. Pinned by
+/// Smaller, usual steps are cut; larger, steps across flat sides are not. Exercised by
 /// `flat_sides_take_few_steps_however_flat_and_however_tilted`.
 const LEAP: f64 = 1.5;
 
 /// Length of a step relative to the way taken before it, dimensionless, beyond which next to no
 /// curvature has made it.
 ///
-/// Smaller, usual steps are cut; larger, steps to nowhere are taken. Pinned by
+/// Smaller, usual steps are cut; larger, steps to nowhere are taken. Exercised by
 /// `flat_sides_take_few_steps_however_flat_and_however_tilted`.
 const WILD: f64 = 0.3;
 
 /// Length of a step relative to the corrected step before it, dimensionless, beyond which it is
 /// cut.
 ///
-/// Larger, a wrong correction is followed by another; smaller, series are cut that converge. Pinned
-/// by `flat_sides_take_few_steps_however_flat_and_however_tilted`.
+/// Larger, a wrong correction is followed by another; smaller, series are cut that converge.
+/// Exercised by `flat_sides_take_few_steps_however_flat_and_however_tilted`.
 const FARTHER: f64 = 2.0;
 
 /// Cosine of the angle to the last step below which a step leads back: 154 degrees.
 ///
-/// Nearer to -1, oscillations that drift are not cut; nearer to 0, turns are. Pinned by
+/// Nearer to -1, oscillations that drift are not cut; nearer to 0, turns are. Exercised by
 /// `oscillating_steps_meet_between`.
 const BACK: f64 = -0.9;
 
 /// Length of a step that leads back, relative to the last step, dimensionless, of an oscillation.
 ///
-/// Outside of it the steps converge or diverge by themselves. Pinned by
+/// Outside of it the steps converge or diverge by themselves. Exercised by
 /// `oscillating_steps_meet_between`.
 const AS_FAR: std::ops::Range<f64> = 0.5..2.0;
 

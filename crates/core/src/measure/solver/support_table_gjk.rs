@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 /// thousandth of its size, where support tables are off by percents.
 ///
 /// Larger, near misses are taken for contacts; smaller, GJK iterates on the error of the tables.
-/// Pinned by `a_common_point_shows_an_overlap`.
+/// Exercised by `a_common_point_shows_an_overlap`.
 const NONE: f64 = 1e-6;
 
 /// Points of the outlines of A farthest along -n and of B farthest along n, query frame.

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 /// dimensionless.
 ///
 /// Larger, impacts are reported earlier by the time this distance takes; smaller, more queries are
-/// needed and rounding of far motions stops them. Pinned by `random_motions_are_never_late`.
+/// needed and rounding of far motions stops them. Exercised by `random_motions_are_never_late`.
 pub const DEFAULT_CONTACT: f64 = 1e-6;
 
 /// Default and largest limit of distance queries for one pair of bodies.

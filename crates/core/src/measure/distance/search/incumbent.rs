@@ -12,7 +12,8 @@ use nalgebra::Vector3;
 /// are rounded: positions round at 1e-16 of it.
 ///
 /// A larger value reports near misses without the normal of their solution; a smaller one refines
-/// distances that no pose can resolve. Pinned by `near_contact_distances_shrink_by_what_is_moved`.
+/// distances that no pose can resolve. Exercised by
+/// `near_contact_distances_shrink_by_what_is_moved`.
 const CONTACT: f64 = 1e-18;
 
 impl Search<'_> {

@@ -92,7 +92,7 @@ const UNSURE: u32 = 8;
 /// body.
 ///
 /// Values on a surface round at 1e-16: a smaller share does not leave the rounding of thin bodies,
-/// a larger one leaves the other body where the overlap is slim. Pinned by
+/// a larger one leaves the other body where the overlap is slim. Exercised by
 /// `bodies_on_top_of_their_like_overlap_whatever_the_hint`.
 const DEEPER: f64 = 1e-6;
 

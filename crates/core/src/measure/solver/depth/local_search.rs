@@ -63,13 +63,13 @@ fn surrounding(
 /// Newton's method ends within about its square of an optimum on one side.
 ///
 /// A larger value takes more rounds, a smaller one does not cross the edges that stopped Newton's
-/// method. Pinned by `searches_end_at_the_best_direction_alone`.
+/// method. Exercised by `searches_end_at_the_best_direction_alone`.
 const FIRST_STEP: f64 = 1e-4;
 
 /// Last step of that search, as the tangent of its angle: depths are then stationary to its square,
 /// which is rounding.
 ///
-/// A larger value ends before the best direction, a smaller one compares rounding. Pinned by
+/// A larger value ends before the best direction, a smaller one compares rounding. Exercised by
 /// `searches_end_at_the_best_direction_alone`.
 const LAST_STEP: f64 = 1e-8;
 
@@ -77,7 +77,7 @@ const LAST_STEP: f64 = 1e-8;
 /// aligned, relative to the accuracy asked for; dimensionless.
 ///
 /// A larger value returns a depth that is less tight, a smaller one prefers directions whose
-/// normals are not those of the surfaces. Pinned by `one_normal_and_one_slope_through_contact`.
+/// normals are not those of the surfaces. Exercised by `one_normal_and_one_slope_through_contact`.
 const ROUGHLY: f64 = 0.01;
 
 /// Most rounds of that search.
@@ -360,7 +360,7 @@ impl<'a> Best<'a> {
 /// Cosine of the angle between two directions below which they count as different ones: 8 degrees.
 ///
 /// Closer to 1, neighbours of the best are reported as ties; smaller, mirror images of slim bodies
-/// are missed. Pinned by `ties_are_flagged_and_limits_admitted`.
+/// are missed. Exercised by `ties_are_flagged_and_limits_admitted`.
 pub(super) const ELSEWHERE: f64 = 0.99;
 
 #[cfg(test)]

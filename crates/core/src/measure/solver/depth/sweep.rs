@@ -345,6 +345,6 @@ impl<const N: usize> Sweep<'_, N> {
 /// Depth of a direction elsewhere, relative to the best, up to which a search from it may find one
 /// as good; dimensionless.
 ///
-/// A larger value searches in vain, a smaller one misses ties. Pinned by
+/// A larger value searches in vain, a smaller one misses ties. Exercised by
 /// `ties_are_flagged_and_limits_admitted`.
 const WORTH_A_LOOK: f64 = 1.1;

@@ -37,7 +37,7 @@ const WORTH_A_BRACKET_SQUARED: f64 = 1e-6;
 
 /// Square of a step, as above, dimensionless, after which only rounding is left: 1e-11 of the body.
 ///
-/// A larger value ends brackets too wide, a smaller one spends rounds on rounding. Pinned by
+/// A larger value ends brackets too wide, a smaller one spends rounds on rounding. Exercised by
 /// `smooth_bodies_against_shapes`.
 const SETTLED_SQUARED: f64 = 1e-22;
 
@@ -56,7 +56,7 @@ const LONGEST_STEP: f64 = 0.5;
 const LONGEST_FOLLOWED_STEP: f64 = 0.25;
 
 /// Curvature times size, dimensionless, that is added where there is none, as in `continuation`.
-/// Pinned by `boxes_side_by_side`.
+/// Exercised by `boxes_side_by_side`.
 const FLATTEST: f64 = 1e-20;
 
 /// Evaluations after which long steps that no series has corrected are shortened, so that they do

@@ -14,7 +14,7 @@ use crate::polynomial::Simd;
 /// projections leave it off by 1e-16.
 ///
 /// Lower, points inside count as on a face and take its normal; nearer to 1, rounding takes points
-/// off their face. Pinned by `shapes_against_shapes`.
+/// off their face. Exercised by `shapes_against_shapes`.
 pub(super) const ON: f64 = 1.0 - 1e-12;
 
 /// Where a point is as seen from a set.

@@ -31,14 +31,14 @@ const HALVINGS: u32 = 8;
 ///
 /// Witnesses are off by it, and gradients by that times their arms: a step more costs little here.
 /// Larger, gradients of long bodies are off by more than 1e-6; smaller, rounding keeps answers from
-/// being taken. Pinned by `shapes_against_shapes`.
+/// being taken. Exercised by `shapes_against_shapes`.
 const FINELY_ALIGNED: f64 = ALIGNED / 8.0;
 
 /// Margin, relative to the sizes, dimensionless, by which sets have to overlap to be reported as
 /// overlapping: some times what rounding adds to an upper bound.
 ///
 /// Smaller, an overlap could be claimed of sets that touch; larger, slim overlaps are left to the
-/// general search. Pinned by `contacts_of_shapes_are_decided`.
+/// general search. Exercised by `contacts_of_shapes_are_decided`.
 const MARGIN: f64 = 1e-12;
 
 /// Two sets, A where it stands as seen from B.

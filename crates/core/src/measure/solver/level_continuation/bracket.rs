@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 /// with this slope instead of its own norm.
 ///
 /// Smaller, nothing is accepted near the minimum of p, where gradients vanish; larger, gradients
-/// are accepted that are off by more. Pinned by `gradients_are_the_derivatives_of_the_value`.
+/// are accepted that are off by more. Exercised by `gradients_are_the_derivatives_of_the_value`.
 const LEAST_GRADIENT: f64 = 1e-3;
 
 /// Longest step that bounds are made for: relative to the distance from A's centre, or to B;

@@ -169,7 +169,7 @@ const NEGLIGIBLE_STEP: f64 = 1e-3;
 
 /// Longest step, relative to the bodies, dimensionless, after which only rounding is left.
 ///
-/// A larger value ends brackets too wide, a smaller one spends rounds on rounding. Pinned by
+/// A larger value ends brackets too wide, a smaller one spends rounds on rounding. Exercised by
 /// `continuation_agrees_with_cold_answers_and_is_short`.
 const SETTLED: f64 = 1e-9;
 

@@ -173,9 +173,9 @@ pub(in crate::measure) struct Bracket<N> {
 /// magnitudes; dimensionless. Fewer than 256 operations of half an epsilon each.
 ///
 /// A smaller value could make a bracket miss the distance; a larger one keeps brackets of far poses
-/// wider than asked for. Pinned by the exact re-checks (`tests/stability/recheck.rs`), which
-/// compare both ends with rational arithmetic, and by
-/// `bodies_on_lines_are_bracketed_to_the_last_bits`.
+/// wider than asked for. Pinned from below by `slacks_cover_the_roundings_they_are_counted_for`,
+/// from above by `bodies_on_lines_are_bracketed_to_the_last_bits`; the exact re-checks
+/// (`tests/stability/recheck.rs`) meet a small part of the bound only.
 pub(in crate::measure) const TAYLOR_ROUNDING: f64 = 128.0 * f64::EPSILON;
 
 /// Largest angle between the bodies' normals, radians, that an answer is taken at: its gradients
@@ -189,7 +189,7 @@ pub(in crate::measure) const ALIGNED: f64 = 2.5e-7;
 /// for the rounding of its gradient.
 ///
 /// Smaller, gradients have to be known better than doubles do near flat spots, and no witness is
-/// proven; larger, upper bounds are wider by as much of the move. Pinned by
+/// proven; larger, upper bounds are wider by as much of the move. Exercised by
 /// `continuation_follows_alone`.
 pub(in crate::measure) const NUDGE: f64 = 1e-4;
 
