@@ -194,7 +194,6 @@ fn motions_error(error: &RobotMotionsError) -> Invalid {
         RobotMotionsError::NoRobot(_) => "robot".to_owned(),
         RobotMotionsError::Held(_)
         | RobotMotionsError::Twice(_)
-        | RobotMotionsError::Holds(_)
         | RobotMotionsError::HalfSpace(_) => "moving.names".to_owned(),
         RobotMotionsError::TooFar(_) | RobotMotionsError::Far(_) => "robot".to_owned(),
         RobotMotionsError::NoShape(_) => "scene".to_owned(),

@@ -1,7 +1,7 @@
 //! Motions and their certificates, over the wire.
 
 use sublevel::client::MotionsQuestion;
-use sublevel::scene::Update;
+use sublevel::scene::{Attach, Update};
 use sublevel::service::proto::{CheckMotionsRequest, MovingObjects, Verdict, VerifyMotionRequest};
 
 use super::questions::packed;
@@ -90,6 +90,17 @@ async fn obstacles_may_move_meanwhile() {
     let found = clients.queries.check_motions(request.clone()).await.expect("answered").into_inner();
     assert_eq!(&found.verdicts[..], [Verdict::Contact as u8]);
     assert!(found.objects.contains(&"post".to_owned()));
+    // High above, it carries what hangs where it was before.
+    let thing = client.create_ball("thing", 0.05).await.expect("a ball");
+    client.put_objects("cell", [("load", &thing, at(0.0, 0.0, 9.0))]).await.expect("placed");
+    let hangs = Attach { name: "load".into(), to: "post".into(), pose: Some(at(0.0, 0.0, -3.7)), touch: vec![] };
+    client.update_scene("cell", &Update { attach: vec![hangs], ..Update::default() }).await.expect("held");
+    let poses = |x: f64| packed(&[x, 0.0, 5.0, 0.0, 0.0, 0.0, 1.0]);
+    let above = MovingObjects { start_poses: poses(2.0), end_poses: poses(-1.0), ..moving.clone() };
+    let carries = CheckMotionsRequest { moving: Some(above), ..request.clone() };
+    let found = clients.queries.check_motions(carries).await.expect("answered").into_inner();
+    assert_eq!(&found.verdicts[..], [Verdict::Contact as u8]);
+    assert!(found.objects.contains(&"load".to_owned()), "{:?}", found.objects);
     let held = MovingObjects { names: vec!["held".into()], ..moving };
     let status = clients.queries.check_motions(CheckMotionsRequest { moving: Some(held), ..request }).await;
     refused(status, "moving.names");

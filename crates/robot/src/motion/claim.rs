@@ -77,7 +77,10 @@ pub(super) struct ObstacleRecord {
 #[serde(rename_all = "snake_case")]
 pub(super) enum PlacedRecord {
     Still(ShapeRecord, PoseRecord),
+    /// The moving frame at the start and at the end.
     Moving(ShapeRecord, PoseRecord, PoseRecord),
+    /// The same of what is held there, and its place in the moving frame.
+    Carried(ShapeRecord, PoseRecord, PoseRecord, PoseRecord),
     /// Unit normal, offset and bound of its error, metres.
     HalfSpace([f64; 3], f64, f64),
 }

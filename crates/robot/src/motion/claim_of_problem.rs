@@ -38,8 +38,13 @@ impl Claim {
         let obstacles = problem.obstacles.iter().map(|obstacle| {
             let placed = match &obstacle.placed {
                 PlacedObstacle::Still(shape, pose) => PlacedRecord::Still(solids.record(shape), numbers(pose)),
-                PlacedObstacle::Moving(shape, from, to) => {
-                    PlacedRecord::Moving(solids.record(shape), numbers(from), numbers(to))
+                PlacedObstacle::Moving { shape, from, to, place } => {
+                    let (shape, from, to) = (solids.record(shape), numbers(from), numbers(to));
+                    if *place == Pose::identity() {
+                        PlacedRecord::Moving(shape, from, to)
+                    } else {
+                        PlacedRecord::Carried(shape, from, to, numbers(place))
+                    }
                 }
                 PlacedObstacle::HalfSpace(half_space, error_m) => {
                     PlacedRecord::HalfSpace((*half_space.normal()).into(), half_space.offset(), *error_m)
@@ -90,7 +95,12 @@ impl Claim {
             let placed = match &obstacle.placed {
                 PlacedRecord::Still(of, at) => PlacedObstacle::Still(shape(&part, of)?, pose(&part, at)?),
                 PlacedRecord::Moving(of, from, to) => {
-                    PlacedObstacle::Moving(shape(&part, of)?, pose(&part, from)?, pose(&part, to)?)
+                    let (shape, from, to) = (shape(&part, of)?, pose(&part, from)?, pose(&part, to)?);
+                    PlacedObstacle::Moving { shape, from, to, place: Pose::identity() }
+                }
+                PlacedRecord::Carried(of, from, to, place) => {
+                    let (shape, from, to) = (shape(&part, of)?, pose(&part, from)?, pose(&part, to)?);
+                    PlacedObstacle::Moving { shape, from, to, place: pose(&part, place)? }
                 }
                 PlacedRecord::HalfSpace(normal, offset, error_m) => {
                     let half_space = HalfSpace::new((*normal).into(), *offset);

@@ -51,9 +51,19 @@ pub struct MotionObstacle {
 pub enum PlacedObstacle {
     /// At a pose: its frame to the world.
     Still(MotionShape, Pose),
-    /// From a pose at the start of the path to one at its end: the origin of its frame moves along
-    /// a line at a constant velocity, while it turns at a constant rate by the smaller angle.
-    Moving(MotionShape, Pose, Pose),
+    /// In a frame that moves: its origin along a line at a constant velocity, while it turns at a
+    /// constant rate by the smaller angle.
+    Moving {
+        /// What it is.
+        shape: MotionShape,
+        /// The moving frame at the start of the path, to the world.
+        from: Pose,
+        /// The moving frame at the end of the path, to the world.
+        to: Pose,
+        /// Frame of the shape to the moving frame: the identity of what moves by itself, else the
+        /// place of what is held there.
+        place: Pose,
+    },
     /// A half-space of the world frame, with a bound of the error of its offset, metres.
     HalfSpace(HalfSpace, f64),
 }
@@ -90,14 +100,14 @@ impl MotionShape {
 impl PlacedObstacle {
     pub(crate) fn pieces(&self) -> usize {
         match self {
-            Self::Still(shape, _) | Self::Moving(shape, _, _) => shape.pieces(),
+            Self::Still(shape, _) | Self::Moving { shape, .. } => shape.pieces(),
             Self::HalfSpace(..) => 1,
         }
     }
 
     pub(crate) fn piece(&self, index: usize) -> Piece<'_> {
         match self {
-            Self::Still(shape, _) | Self::Moving(shape, _, _) => shape.piece(index),
+            Self::Still(shape, _) | Self::Moving { shape, .. } => shape.piece(index),
             Self::HalfSpace(half_space, error_m) => Piece::HalfSpace(half_space, *error_m),
         }
     }

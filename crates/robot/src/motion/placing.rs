@@ -140,11 +140,15 @@ impl Placing {
     fn obstacle(&self, placed: &PlacedObstacle, center: &Vector3<f64>, radius: f64) -> Option<PlacedPiece> {
         let (pose, drift_m, error_m) = match placed {
             PlacedObstacle::Still(_, pose) => (*pose, 0.0, 0.0),
-            PlacedObstacle::Moving(_, from, to) => {
-                let pose = motion(from, to)?.pose(self.s);
-                let rounding =
-                    PLACING_ROUNDING * (from.translation().norm() + to.translation().norm() + center.norm() + radius);
-                (pose, motion_bound_m(from, to, center, radius, 0.5 * self.width), rounding)
+            PlacedObstacle::Moving { from, to, place, .. } => {
+                let frame = motion(from, to)?.pose(self.s);
+                let rotation = (frame.rotation() * place.rotation()).into_inner().normalize();
+                let translation = frame.transform_point(place.translation());
+                let pose = Pose::from_quaternion(translation, rotation.coords.into()).ok()?;
+                let way = from.translation().norm() + to.translation().norm() + place.translation().norm();
+                let rounding = PLACING_ROUNDING * (way + center.norm() + radius);
+                let held = place.transform_point(center);
+                (pose, motion_bound_m(from, to, &held, radius, 0.5 * self.width), rounding)
             }
             PlacedObstacle::HalfSpace(..) => (Pose::identity(), 0.0, 0.0),
         };

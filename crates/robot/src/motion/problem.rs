@@ -141,7 +141,7 @@ impl MotionProblem {
             return Err(MotionProblemError::Threshold(wrong));
         }
         for obstacle in &self.obstacles {
-            if let PlacedObstacle::Moving(_, from, to) = &obstacle.placed
+            if let PlacedObstacle::Moving { from, to, .. } = &obstacle.placed
                 && motion(from, to).is_none()
             {
                 return Err(MotionProblemError::Obstacle(obstacle.name.clone()));

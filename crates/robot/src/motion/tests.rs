@@ -131,7 +131,8 @@ fn slides_half_spaces_capsules_and_moving_obstacles() {
     assert!((contact.normal.expect("a normal") - Vector3::z()).norm() < 1e-12);
     // A wall comes towards the robot, which stands still: it has 1.7 m to go and does 2 m.
     let wall = Body::cuboid("wall", Vector3::new(0.1, 3.0, 3.0)).expect("a box");
-    let placed = PlacedObstacle::Moving(solid(wall), at(4.0, 0.0, 0.0), at(2.0, 0.0, 0.0));
+    let (from, to) = (at(4.0, 0.0, 0.0), at(2.0, 0.0, 0.0));
+    let placed = PlacedObstacle::Moving { shape: solid(wall), from, to, place: Pose::identity() };
     let coming = vec![MotionObstacle { name: "wall".into(), placed }];
     let stands = problem(hand(capsule), coming, 0.0);
     let path = edge(&stands, &[0.0, 0.0, 0.0], &[0.0, 0.0, 0.0]);
@@ -139,6 +140,24 @@ fn slides_half_spaces_capsules_and_moving_obstacles() {
     let contact = found.contact.expect("a contact");
     let expected = (4.0 - 0.1 - 2.1) / 2.0;
     assert!(found.alpha <= expected && contact.s >= expected && contact.s - found.alpha < 1e-5);
+    // A ball is held 2.9 m from the origin of a cart at (0, 2.4) that turns by a right angle: it
+    // sweeps over the hand.
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let turned = Pose::from_quaternion(Vector3::new(0.0, 2.4, 0.0), [0.0, 0.0, -half, half]).expect("a pose");
+    let (from, place) = (at(0.0, 2.4, 0.0), at(2.9, 0.0, 0.0));
+    let placed = PlacedObstacle::Moving { shape: ball(0.2), from, to: turned, place };
+    let carried = vec![MotionObstacle { name: "load".into(), placed }];
+    let stands = problem(hand(ball(0.1)), carried, 0.0);
+    let path = edge(&stands, &[0.0, 0.0, 0.0], &[0.0, 0.0, 0.0]);
+    let found = prove(&stands, &path, &FIRST);
+    // The hand's ball is 2 m along x from the origin; the load's centre is at (2.9 cos t, 2.4 - 2.9
+    // sin t), t in [0, π/2].
+    let gap = |s: f64| {
+        let t = s * std::f64::consts::FRAC_PI_2;
+        (2.9 * t.cos() - 2.0).hypot(2.4 - 2.9 * t.sin()) - 0.3
+    };
+    let contact = found.contact.expect("a contact");
+    assert!(gap(found.alpha) >= -1e-9 && gap(contact.s) <= 1e-9 && contact.s - found.alpha < 1e-5, "{} {}", found.alpha, contact.s);
     // Two balls on one link never move against each other.
     let two = |x: f64| MotionBody { name: format!("{x}").into(), link: 2, place: at(x, 0.0, 0.0), shape: ball(0.1) };
     let rigid = problem(vec![two(0.0), two(0.5)], Vec::new(), 0.0);
@@ -228,8 +247,10 @@ fn random_problem(seeded: &mut Seeded, margin_m: f64) -> MotionProblem {
     let mut obstacles: Vec<_> =
         (0..4).map(|k| still(&format!("obstacle{k}"), shape(seeded), seeded.pose(2.0))).collect();
     let (from, to) = (seeded.pose(4.0), seeded.pose(4.0));
-    let moving = PlacedObstacle::Moving(shape(seeded), from, to);
+    let moving = PlacedObstacle::Moving { shape: shape(seeded), from, to, place: Pose::identity() };
     obstacles.push(MotionObstacle { name: "moving".into(), placed: moving });
+    let carried = PlacedObstacle::Moving { shape: shape(seeded), from, to, place: seeded.pose(0.5) };
+    obstacles.push(MotionObstacle { name: "carried".into(), placed: carried });
     let ground = HalfSpace::new(seeded.unit(), -5.0).expect("a half-space");
     obstacles.push(MotionObstacle { name: "ground".into(), placed: PlacedObstacle::HalfSpace(ground, 0.0) });
     MotionProblem::new(kinematics, &seeded.pose(1.0), bodies, obstacles, margin_m, |a, b| match (a, b) {

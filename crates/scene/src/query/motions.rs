@@ -41,9 +41,6 @@ pub enum RobotMotionsError {
     /// An object that moves by itself and is part of the robot, or held by something else.
     #[error("object \"{0}\" moves with what holds it; name objects that nothing holds")]
     Held(Arc<str>),
-    /// An object that moves by itself and holds others.
-    #[error("object \"{0}\" holds others, which cannot move along yet; detach them, or give the motion of each")]
-    Holds(Arc<str>),
     /// An object of which nothing is known that could be checked.
     #[error("object \"{0}\" is a set without a box around it, which no motion can be checked against")]
     NoShape(Arc<str>),
@@ -103,8 +100,8 @@ pub enum PathKind {
     Bezier,
 }
 
-/// An object that moves by itself while the robot does: from one pose to another over the path
-/// parameter; body frame to world frame, metres.
+/// An object that moves by itself while the robot does, with everything that it holds: from one
+/// pose to another over the path parameter; body frame to world frame, metres.
 #[derive(Clone, Copy, Debug)]
 pub struct MovingObject {
     /// Its slot.
@@ -394,12 +391,25 @@ fn problem(
         if matches!(named.geometry, Geometry::HalfSpace(_)) {
             return Err(RobotMotionsError::HalfSpace(named.name.clone()));
         }
-        if scene.held_by(&[object.slot]).iter().any(|slot| !places.contains_key(slot)) {
-            return Err(RobotMotionsError::Holds(named.name.clone()));
-        }
-        if motions.insert(object.slot, (object.from, object.to)).is_some() {
+        let motion = Carried { from: object.from, to: object.to, place: Pose::identity() };
+        if motions.insert(object.slot, motion).is_some() {
             return Err(RobotMotionsError::Twice(named.name.clone()));
         }
+    }
+    // What they hold, each after its holder.
+    let holders: Vec<Slot> = moving.iter().map(|object| object.slot).collect();
+    for slot in scene.held_by(&holders) {
+        let Some((object, attachment)) = scene.object(slot).and_then(|object| Some((object, object.attachment.as_ref()?)))
+        else {
+            continue;
+        };
+        let holder = scene.slot(&attachment.to).and_then(|holder| motions.get(&holder));
+        let Some(&Carried { from, to, place }) = holder else { continue };
+        if matches!(object.geometry, Geometry::HalfSpace(_)) {
+            return Err(RobotMotionsError::HalfSpace(object.name.clone()));
+        }
+        let place = compose(&place, &attachment.pose).map_err(|_| RobotMotionsError::TooFar(object.name.clone()))?;
+        motions.insert(slot, Carried { from, to, place });
     }
     let mut obstacles = Vec::new();
     for (slot, object, pose) in scene.objects().filter(|(slot, _, _)| !places.contains_key(slot)) {
@@ -456,14 +466,22 @@ fn shape(object: &Object) -> Option<MotionShape> {
     }
 }
 
+/// How an obstacle moves: a frame from one pose to another, and its place there.
+#[derive(Clone, Copy)]
+struct Carried {
+    from: Pose,
+    to: Pose,
+    place: Pose,
+}
+
 /// An obstacle where it stands, or as it moves.
-fn placed(object: &Object, pose: &Pose, motion: Option<&(Pose, Pose)>) -> Option<PlacedObstacle> {
+fn placed(object: &Object, pose: &Pose, motion: Option<&Carried>) -> Option<PlacedObstacle> {
     if let Thing::HalfSpace(half_space) = Thing::object(object, pose) {
         return Some(PlacedObstacle::HalfSpace(half_space.half_space, half_space.slack_m(REACH_M)));
     }
     let shape = shape(object)?;
     Some(match motion {
-        Some((from, to)) => PlacedObstacle::Moving(shape, *from, *to),
+        Some(&Carried { from, to, place }) => PlacedObstacle::Moving { shape, from, to, place },
         None => PlacedObstacle::Still(shape, *pose),
     })
 }
