@@ -5,6 +5,7 @@
 
 mod ablation;
 mod compounds;
+mod edges;
 mod exact_shapes;
 mod stages;
 mod tolerances;

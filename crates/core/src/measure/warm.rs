@@ -3,6 +3,7 @@
 use crate::measure::frames::query_frame::Pair;
 use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::continuation::Trace;
+use crate::measure::solver::edge_newton::EdgeTrace;
 use crate::measure::solver::exact_shape::ExactTrace;
 use crate::measure::solver::kkt_newton::Active;
 use crate::measure::solver::level_continuation::LevelTrace;
@@ -47,6 +48,8 @@ pub(super) enum Hint {
     Apart { x_a: Vector3<f64>, y_b: Vector3<f64>, normal_a: Vector3<f64>, active_a: ActiveSet, active_b: ActiveSet },
     /// Witnesses on smooth parts of both surfaces, with how they answer motions.
     Smooth(Trace),
+    /// Witnesses of bodies of several constraints, with what is active there.
+    Edges(EdgeTrace),
     /// Nearest point of a smooth body to one with a closed form.
     Exact(ExactTrace),
     /// Of two bodies with closed forms, the point of A that is nearest to B or in it, in A's frame.
@@ -82,6 +85,7 @@ impl Hint {
         match self {
             Self::Apart { normal_a, .. } => Some(*normal_a),
             Self::Smooth(trace) => Some(trace.normal_a()),
+            Self::Edges(trace) => Some(trace.normal_a()),
             _ => None,
         }
     }

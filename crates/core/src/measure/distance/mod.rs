@@ -3,6 +3,7 @@
 mod answer;
 mod balls;
 mod deepest;
+mod edges;
 mod exact;
 mod pair;
 mod planes;

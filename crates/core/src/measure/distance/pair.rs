@@ -3,6 +3,7 @@
 
 use super::answer::Distance;
 use super::balls::of_balls;
+use super::edges::of_edges;
 use super::exact::{Exact, of_shapes};
 use super::planes::Planes;
 use super::search::Search;
@@ -119,6 +120,15 @@ pub(in crate::measure) fn between(
                 *warm = hint;
                 query.search(&Lost::after(rounds), warm)
             }
+        };
+    }
+    if runs(Stage::Edges)
+        && !(of_a.0.is_smooth() && of_b.0.is_smooth())
+        && !matches!(warm.hint, Hint::Overlap { .. })
+    {
+        return match of_edges(of_a, of_b, goal, options, warm) {
+            Ok(found) => found,
+            Err(rounds) => query.search(&Lost::after(rounds), warm),
         };
     }
     match warm.hint {

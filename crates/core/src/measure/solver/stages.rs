@@ -11,6 +11,8 @@ pub(in crate::measure) enum Stage {
     Follow,
     /// Continuation from the poses alone, or from GJK's points.
     Seek,
+    /// Newton's method with an active set for each body.
+    Edges,
     /// Newton's method on the optimality conditions with active sets.
     Newton,
     /// Sequential quadratic programming along a ray, which finds active sets.

@@ -27,12 +27,13 @@ use sublevel_testkit::random::draws;
 
 /// The stages of distances, level and growth distances, and decisions, in the order in which they
 /// are tried.
-const STAGES: [Stage; 16] = [
+const STAGES: [Stage; 17] = [
     Stage::Balls,
     Stage::Planes,
     Stage::ClosedForm,
     Stage::Follow,
     Stage::Seek,
+    Stage::Edges,
     Stage::Newton,
     Stage::SupportTables,
     Stage::Ray,

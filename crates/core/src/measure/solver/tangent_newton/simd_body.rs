@@ -78,6 +78,8 @@ pub(in crate::measure) struct Side<'a, N> {
     pub(super) body: &'a Body,
     /// Which of the constraints is active.
     pub(in crate::measure) active: usize,
+    /// What is known of it near the body.
+    trust: &'a ConstraintTrust,
     linear: M3<N>,
     origin: V3<N>,
     pub(in crate::measure) displacement: N,
@@ -94,6 +96,7 @@ impl<'a, N: Copy> Side<'a, N> {
         Self {
             body,
             active,
+            trust: &body.trust().constraints[active],
             linear: rows(simd, &body.normalization().linear),
             origin: [zero; 3],
             displacement: N::splat(simd, body.trust().rounding * body.trust().reach),
@@ -104,7 +107,22 @@ impl<'a, N: Copy> Side<'a, N> {
     #[inline(always)]
     pub(in crate::measure) fn away(body: &'a Body, active: usize, relative: &Relative<N>) -> Self {
         let Relative { linear, origin, displacement, .. } = *relative;
-        Self { body, active, linear, origin, displacement }
+        Self { body, active, trust: &body.trust().constraints[active], linear, origin, displacement }
+    }
+
+    /// The body with another of its constraints as the active one.
+    #[inline(always)]
+    pub(in crate::measure) fn with_active(&self, active: usize) -> Self {
+        Self { active, trust: &self.body.trust().constraints[active], ..*self }
+    }
+
+    /// The body with a constraint of which this is known, in place of the active one.
+    #[inline(always)]
+    pub(in crate::measure) fn with_trust<'b>(&self, trust: &'b ConstraintTrust) -> Side<'b, N>
+    where
+        'a: 'b,
+    {
+        Side { trust, ..*self }
     }
 
     #[inline(always)]
@@ -114,7 +132,7 @@ impl<'a, N: Copy> Side<'a, N> {
 
     #[inline(always)]
     pub(super) fn trust(&self) -> &'a ConstraintTrust {
-        &self.body.trust().constraints[self.active]
+        self.trust
     }
 
     /// The active constraint at a point in its normalized coordinates, and whether the point lies
@@ -217,7 +235,7 @@ impl Side<'_, f64> {
         let mut hold = true;
         if self.body.constraints().len() > 1 {
             for i in (0..self.body.constraints().len()).filter(|&i| i != self.active) {
-                let (jet, inside) = Self { active: i, ..*self }.jet(simd, v);
+                let (jet, inside) = self.with_active(i).jet(simd, v);
                 hold &= inside && jet.value + self.body.trust().constraints[i].value_error <= 1.0;
             }
         }

@@ -103,10 +103,12 @@ fn cold_distance(case: &Case, stages: &[Stage]) -> Found {
     (found.status, [found.lower, found.upper], [case.distance.lower, case.distance.upper])
 }
 
-/// From the hint of all stages at the pose before, but for closed forms, whose hints are their own.
+/// From the hint of all stages at the pose before, but for closed forms and Newton's method with
+/// active sets, whose hints are their own.
 fn warm_distance(case: &Case, stages: &[Stage]) -> Found {
     let (pose_a, options, mut warm) = (&case.poses[0], Options::default(), WarmStart::default());
-    except(&[Stage::ClosedForm], || distance(case.a, pose_a, case.b, &case.poses[1], &options, &mut warm));
+    let general = [Stage::ClosedForm, Stage::Edges];
+    except(&general, || distance(case.a, pose_a, case.b, &case.poses[1], &options, &mut warm));
     let found = only(stages, || distance(case.a, pose_a, case.b, &case.next, &options, &mut warm));
     (found.status, [found.lower, found.upper], [case.next_distance.lower, case.next_distance.upper])
 }
@@ -133,6 +135,13 @@ fn continuation_seeks_alone() {
 fn active_sets_follow_alone() {
     let domain = |case: &Case| !case.is_smooth() && case.is_apart();
     at_least("Newton", 77.0, solved("Newton", domain, |case| warm_distance(case, &[Stage::Newton])));
+}
+
+/// Boxes and cylinders as bodies of several constraints.
+#[test]
+fn edges_solve_alone() {
+    let domain = |case: &Case| !case.is_smooth() && case.is_apart();
+    at_least("edges", 90.0, solved("edges", domain, |case| cold_distance(case, &[Stage::Edges])));
 }
 
 #[test]

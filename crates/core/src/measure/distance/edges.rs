@@ -1,0 +1,61 @@
+//! The distance of two bodies of which at least one has several constraints.
+
+use super::answer::Distance;
+use crate::body::Body;
+use crate::measure::frames::pose::Pose;
+use crate::measure::options::Options;
+use crate::measure::solver::edge_newton::{EdgeProven, EdgeQuery};
+use crate::measure::solver::initial_guess::Start;
+use crate::measure::solver::stop_criterion::StopCriterion;
+use crate::measure::status::Status;
+use crate::measure::warm::{Hint, WarmStart};
+use crate::polynomial::dispatch;
+use nalgebra::{Matrix3, Vector3};
+
+/// The distance by Newton's method with active sets, from the last answer or from where the
+/// outlines are nearest; the hint is replaced where it is proven.
+///
+/// # Errors
+/// After how many evaluations the general search has to go on.
+pub(super) fn of_edges(
+    (a, pose_a): (&Body, &Pose),
+    (b, pose_b): (&Body, &Pose),
+    goal: &StopCriterion,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> Result<Distance, u32> {
+    let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
+    let trace = if let Hint::Edges(trace) = &warm.hint { Some(trace) } else { None };
+    let start = start((a, pose_a), pose_b, &warm.hint);
+    let found = dispatch(EdgeQuery { a, pose_a, b, pose_b, goal, tolerance, options, trace, start })?;
+    *warm = Hint::Edges(found.trace).into();
+    Ok(answer((a, pose_a), &found, tolerance))
+}
+
+/// What the general search has found.
+#[inline(always)]
+fn start((a, pose_a): (&Body, &Pose), pose_b: &Pose, hint: &Hint) -> Option<Start<f64>> {
+    let Hint::Apart { x_a, y_b, normal_a, .. } = hint else { return None };
+    let center = a.normalization().center;
+    let y = pose_a.rotation().inverse_transform_vector(&(pose_b.transform_point(y_b) - pose_a.translation()));
+    Some(Start { x: (x_a - center).into(), y: (y - center).into(), n: (*normal_a).into() })
+}
+
+fn answer((a, pose_a): (&Body, &Pose), found: &EdgeProven, tolerance: f64) -> Distance {
+    let rotation: Matrix3<f64> = *pose_a.rotation().to_rotation_matrix().matrix();
+    let center = a.normalization().center;
+    let to_world = |v: [f64; 3]| rotation * (Vector3::from(v) + center) + pose_a.translation();
+    Distance {
+        status: Status::of(found.upper - found.lower <= tolerance),
+        lower: found.lower,
+        upper: found.upper,
+        witness_a: to_world(found.x),
+        witness_b: to_world(found.y),
+        normal: Some(rotation * Vector3::from(found.n)),
+        active_a: found.active_a,
+        active_b: found.active_b,
+        parts: [0, 0],
+        tied: false,
+        iterations: found.rounds,
+    }
+}

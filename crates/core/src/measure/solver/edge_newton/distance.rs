@@ -1,0 +1,513 @@
+//! The distance of two bodies of several constraints, inside a proven bracket; see [`super`].
+
+use super::aggregate::{Evaluated, NOTHING, Weighted};
+use super::quadratic_program::{ActiveRows, MOST_ACTIVE, OnActive, Row, feasible_multipliers, minimize};
+use crate::body::{Body, MAX_CONSTRAINTS};
+use crate::measure::frames::pose::Pose;
+use crate::measure::frames::vector::{
+    M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, basis, dot, scaled, subtract,
+};
+use crate::measure::options::Options;
+use crate::measure::solver::active_constraints::ActiveConstraints;
+use crate::measure::solver::continuation::{LONGEST_MOVE, limits, worth_a_bracket};
+use crate::measure::solver::initial_guess::Start;
+use crate::measure::solver::predictor::Drift;
+use crate::measure::solver::stop_criterion::StopCriterion;
+use crate::measure::solver::tangent_newton::{
+    Bracket, Plane, Relative, Side, Step, TAYLOR_ROUNDING, bracket, moved,
+};
+use crate::measure::solver::two_point_problem::{Apart, Relation, Verdict};
+use crate::polynomial::{NEAR_LEVEL, NumberJet, Simd, WithSimd};
+use nalgebra::Vector3;
+
+/// Most evaluations of both bodies from one start. It changes time only; no test pins it.
+const MAX_ROUNDS: u32 = 16;
+
+/// Most changes of B's active set within a step. It changes time only; no test pins it.
+const MOST_EXCHANGES: usize = 4;
+
+/// Constraints of a smaller value are left out of a step: it is no longer than a quarter of the
+/// body's size, along which values of the edge of a slab do not grow fivefold. It changes time
+/// only: what is left out is looked at again where the step leads.
+const FAR_INSIDE: f64 = 0.04;
+
+/// How much a linearized constraint may be violated, relative to the body's size. Larger, points
+/// have to be moved farther into their body, which widens brackets; smaller, rounding changes the
+/// active set. `cut_bodies_agree_with_the_general_search` counts what is solved.
+const VIOLATED: f64 = 1e-13;
+
+/// Curvature times size that counts as none.
+const FLATTEST: f64 = 1e-20;
+
+/// Least distance of the points that a step is made for, relative to the smaller body: nearer, the
+/// turn of their difference is lost in rounding. Double-double arithmetic goes on from there.
+const LEAST_DISTANCE: f64 = 1e-8;
+
+/// A witness with the constraints that are active there, for the next query of the pair.
+#[derive(Clone, Copy, Debug)]
+struct Spot {
+    /// From the centre of the normalization on, body frame, metres.
+    point: V3<f64>,
+    /// With multipliers, metres.
+    active: Weighted,
+    /// The active constraints there, in normalized coordinates.
+    jets: [NumberJet<f64>; MOST_ACTIVE],
+}
+
+/// What is kept of an answer for the next query of the pair.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::measure) struct EdgeTrace {
+    of_a: Spot,
+    of_b: Spot,
+    /// Unit normal from B to A, A's frame.
+    n: V3<f64>,
+    /// What the last prediction missed of the witnesses, each in its body's frame, and of n.
+    drift: Drift<3>,
+}
+
+impl EdgeTrace {
+    /// Unit normal from B to A, in A's frame.
+    pub(in crate::measure) fn normal_a(&self) -> Vector3<f64> {
+        self.n.into()
+    }
+}
+
+/// A proven bracket, metres, and where it is attained.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::measure) struct EdgeProven {
+    pub(in crate::measure) lower: f64,
+    pub(in crate::measure) upper: f64,
+    /// Point of A from the centre of its normalization on, A's frame, metres.
+    pub(in crate::measure) x: V3<f64>,
+    /// Point of B, from there on, A's frame.
+    pub(in crate::measure) y: V3<f64>,
+    /// Unit normal from B to A, A's frame.
+    pub(in crate::measure) n: V3<f64>,
+    pub(in crate::measure) active_a: ActiveConstraints,
+    pub(in crate::measure) active_b: ActiveConstraints,
+    /// Evaluations of both bodies.
+    pub(in crate::measure) rounds: u32,
+    pub(in crate::measure) trace: EdgeTrace,
+}
+
+/// The distance of two bodies that are apart.
+pub(in crate::measure) struct EdgeQuery<'a> {
+    pub(in crate::measure) a: &'a Body,
+    pub(in crate::measure) pose_a: &'a Pose,
+    pub(in crate::measure) b: &'a Body,
+    pub(in crate::measure) pose_b: &'a Pose,
+    pub(in crate::measure) goal: &'a StopCriterion,
+    /// Width of the bracket that is narrow enough, metres.
+    pub(in crate::measure) tolerance: f64,
+    pub(in crate::measure) options: &'a Options<'a>,
+    /// Of the answer before.
+    pub(in crate::measure) trace: Option<&'a EdgeTrace>,
+    /// Where to start without one; else where the outlines are nearest.
+    pub(in crate::measure) start: Option<Start<f64>>,
+}
+
+/// Trial points in the query frame, the basis whose third vector is the trial normal, and the
+/// multipliers of the active constraints of A and of B, metres.
+struct Iterate {
+    x: V3<f64>,
+    y: V3<f64>,
+    frame: M3<f64>,
+    active: [Weighted; 2],
+}
+
+/// A step and the multipliers of where it leads.
+struct Found {
+    step: Step<f64>,
+    active: [Weighted; 2],
+}
+
+/// One body's constraints around a trial point, in the basis.
+struct Linearized {
+    rows: [Row; MAX_CONSTRAINTS],
+    /// Lengths of the gradients, per metre.
+    lengths: [f64; MAX_CONSTRAINTS],
+    /// Which constraint of the body each row is.
+    index: [u8; MAX_CONSTRAINTS],
+    count: usize,
+    active: ActiveRows,
+    /// Sum of the Hessians of the active ones with their multipliers, per metre.
+    hessian: [f64; 6],
+}
+
+impl Linearized {
+    /// By constraints that are given with their positions in the body.
+    #[inline(always)]
+    fn new<'j, S: Simd>(
+        simd: S,
+        jets: impl Iterator<Item = (usize, &'j NumberJet<f64>)>,
+        active: &Weighted,
+        local: &M3<f64>,
+    ) -> Self {
+        let mut all = Self {
+            rows: [Row::default(); MAX_CONSTRAINTS],
+            lengths: [0.0; MAX_CONSTRAINTS],
+            index: [0; MAX_CONSTRAINTS],
+            count: 0,
+            active: ActiveRows::default(),
+            hessian: [0.0; 6],
+        };
+        let mut bent = [0.0; 6];
+        for (i, jet) in jets {
+            let weight = active.iter().find_map(|(j, weight)| (j == i).then_some(weight));
+            if weight.is_none() && jet.value <= FAR_INSIDE {
+                continue;
+            }
+            let plane = Plane::new(simd, jet, local);
+            let length = dot::<S, f64>(plane.gradient, plane.gradient).sqrt();
+            let inverse = 1.0 / length;
+            let mean = (0.5 * plane.value + 0.5).max(0.25);
+            let normal = scaled::<S, f64>(plane.gradient, inverse);
+            all.rows[all.count] = Row { normal, excess: (plane.value - 1.0) * mean * inverse };
+            all.lengths[all.count] = length;
+            all.index[all.count] = i as u8;
+            if let Some(weight) = weight {
+                all.active.push(all.count);
+                bent.iter_mut().zip(jet.hessian).for_each(|(sum, entry)| *sum += weight * entry);
+            }
+            all.count += 1;
+        }
+        let [b0, b1, b2] = local.map(|row| apply_symmetric::<S, f64>(&bent, row));
+        all.hessian = [
+            dot::<S, f64>(b0, local[0]),
+            dot::<S, f64>(b0, local[1]),
+            dot::<S, f64>(b0, local[2]),
+            dot::<S, f64>(b1, local[1]),
+            dot::<S, f64>(b1, local[2]),
+            dot::<S, f64>(b2, local[2]),
+        ];
+        all
+    }
+
+    #[inline(always)]
+    fn rows(&self) -> &[Row] {
+        &self.rows[..self.count]
+    }
+
+    /// How far along the normal the first active constraint is, metres.
+    #[inline(always)]
+    fn shift(&self) -> f64 {
+        let row = &self.rows[usize::from(self.active.index[0])];
+        -row.excess * row.normal[2]
+    }
+
+    /// The constraints of active rows with their multipliers, metres, by those of unit rows.
+    #[inline(always)]
+    fn weighted(&self, active: &ActiveRows, multipliers: [f64; MOST_ACTIVE]) -> Weighted {
+        let mut weighted = Weighted { len: active.len, ..Weighted::default() };
+        for (k, i) in active.iter().enumerate() {
+            weighted.index[k] = self.index[i];
+            weighted.weight[k] = multipliers[k] / self.lengths[i];
+        }
+        weighted
+    }
+}
+
+impl WithSimd for EdgeQuery<'_> {
+    /// The proven answer, or after how many evaluations there is none.
+    type Output = Result<EdgeProven, u32>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let Self { a, pose_a, b, pose_b, goal, tolerance, options, trace, start } = self;
+        let relation = Apart { pose_a, pose_b, goal, tolerance };
+        let relative = relation.relative(simd, a, b);
+        let sides = (Side::at_home(simd, a, 0), Side::away(b, 0, &relative));
+        let solver = Solver { sides, relation, options, limits: limits(a, b) };
+        let mut rounds = 0;
+        if let Some(trace) = trace
+            && let Some((at, predicted)) = solver.follow(simd, &relative, trace)
+            && let Ok(mut proven) = solver.run(simd, &relative, at, &mut rounds)
+        {
+            let y = apply_transposed::<S, f64>(&relative.rotation, subtract::<S, f64>(proven.y, relative.origin));
+            let missed = [
+                subtract::<S, f64>(proven.x, predicted[0]),
+                subtract::<S, f64>(y, predicted[1]),
+                subtract::<S, f64>(proven.n, predicted[2]),
+            ];
+            proven.trace.drift = trace.drift;
+            proven.trace.drift.update(simd, missed);
+            return Ok(proven);
+        }
+        let start = match start {
+            Some(start) => start,
+            None => relation.start(simd, a, b, &relative).0,
+        };
+        let active = [Weighted::default(); 2];
+        let at = Iterate { x: start.x, y: start.y, frame: basis(simd, start.n), active };
+        solver.run(simd, &relative, at, &mut rounds).map_err(|()| rounds)
+    }
+}
+
+struct Solver<'a> {
+    sides: (Side<'a, f64>, Side<'a, f64>),
+    relation: Apart<'a>,
+    options: &'a Options<'a>,
+    /// Longest moves of x and of y, metres.
+    limits: [f64; 2],
+}
+
+impl Solver<'_> {
+    /// From the last answer: the step for the poses as they are now, without an evaluation, and
+    /// what it missed last time on top. Also what it led to, without that: x, y in B's frame, n.
+    #[inline(always)]
+    fn follow<S: Simd>(&self, simd: S, relative: &Relative<f64>, trace: &EdgeTrace) -> Option<(Iterate, [V3<f64>; 3])> {
+        let (side_a, side_b) = &self.sides;
+        let EdgeTrace { of_a, of_b, n, drift } = trace;
+        let y = add::<S, f64>(apply::<S, f64>(&relative.rotation, of_b.point), relative.origin);
+        let frame = basis(simd, *n);
+        let (local_a, local_b) = (side_a.localize(simd, &frame), side_b.localize(simd, &frame));
+        let linearized = |spot: &Spot, local: &M3<f64>| {
+            let jets = (0..spot.active.len).map(|k| (usize::from(spot.active.index[k]), &spot.jets[k]));
+            Linearized::new(simd, jets, &spot.active, local)
+        };
+        let (linear_a, linear_b) = (linearized(of_a, &local_a), linearized(of_b, &local_b));
+        let difference = apply::<S, f64>(&frame, subtract::<S, f64>(of_a.point, y));
+        let Found { step, active } = self.step(simd, &linear_a, &linear_b, difference)?;
+        if !step.within(simd, self.limits) {
+            return None;
+        }
+        let x = moved::<S, f64>(of_a.point, step.dx, &frame);
+        let y = moved::<S, f64>(y, step.dy, &frame);
+        let n = moved::<S, f64>(*n, [step.dn[0], step.dn[1], 0.0], &frame);
+        let own_y = apply_transposed::<S, f64>(&relative.rotation, subtract::<S, f64>(y, relative.origin));
+        let [of_x, of_y, of_n] = drift.expected();
+        let at = Iterate {
+            x: add::<S, f64>(x, of_x),
+            y: add::<S, f64>(y, apply::<S, f64>(&relative.rotation, of_y)),
+            frame: basis(simd, add::<S, f64>(n, of_n)),
+            active,
+        };
+        Some((at, [x, own_y, n]))
+    }
+
+    /// Newton's method until the bracket is narrow.
+    // There is no allocation in a solve.
+    #[allow(clippy::result_large_err)]
+    #[inline(always)]
+    fn run<S: Simd>(
+        &self,
+        simd: S,
+        relative: &Relative<f64>,
+        mut at: Iterate,
+        rounds: &mut u32,
+    ) -> Result<EdgeProven, ()> {
+        let (side_a, side_b) = &self.sides;
+        for _ in 0..MAX_ROUNDS {
+            if self.options.exhausted(*rounds) {
+                return Err(());
+            }
+            *rounds += 1;
+            let (of_a, inside_a) = Evaluated::new(simd, side_a, at.x);
+            let (of_b, inside_b) = Evaluated::new(simd, side_b, at.y);
+            if !(inside_a && inside_b) {
+                // A step has led too far.
+                let (highest_a, highest_b) = (of_a.highest(), of_b.highest());
+                at.x = side_a.with_active(highest_a).brought_near(simd, at.x, of_a.jets[highest_a].value);
+                at.y = side_b.with_active(highest_b).brought_near(simd, at.y, of_b.jets[highest_b].value);
+                if !at.x.iter().chain(&at.y).all(|entry| entry.is_finite()) {
+                    return Err(());
+                }
+                continue;
+            }
+            let (local_a, local_b) = (side_a.localize(simd, &at.frame), side_b.localize(simd, &at.frame));
+            let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
+            for (active, (evaluated, local)) in at.active.iter_mut().zip([(&of_a, &local_a), (&of_b, &local_b)]) {
+                if active.len == 0 {
+                    let highest = evaluated.highest();
+                    let plane = Plane::new(simd, &evaluated.jets[highest], local);
+                    active.index[0] = highest as u8;
+                    active.weight[0] = 1.0 / dot::<S, f64>(plane.gradient, plane.gradient).sqrt();
+                    active.len = 1;
+                }
+            }
+            let linear_a = Linearized::new(simd, of_a.iter(), &at.active[0], &local_a);
+            let linear_b = Linearized::new(simd, of_b.iter(), &at.active[1], &local_b);
+            let Some(mut found) = self.step(simd, &linear_a, &linear_b, difference) else { return Err(()) };
+            if found.step.within(simd, worth_a_bracket(self.limits)) {
+                match self.prove(simd, relative, &at, &found, ((&of_a, &local_a), (&of_b, &local_b)), difference) {
+                    Ok(proven) => return Ok(EdgeProven { rounds: *rounds, ..proven }),
+                    Err(touching) if touching => return Err(()),
+                    Err(_) => {}
+                }
+            }
+            let step = &mut found.step;
+            let of_x = side_a.relative_square(simd, &local_a, step.dx);
+            let length = of_x.max(side_b.relative_square(simd, &local_b, step.dy)).sqrt();
+            if !length.is_finite() {
+                return Err(());
+            }
+            if length > LONGEST_MOVE {
+                step.shorten(LONGEST_MOVE / length);
+            }
+            at.x = moved::<S, f64>(at.x, step.dx, &at.frame);
+            at.y = moved::<S, f64>(at.y, step.dy, &at.frame);
+            at.frame = basis(simd, moved::<S, f64>(at.frame[2], [step.dn[0], step.dn[1], 0.0], &at.frame));
+            at.active = found.active;
+        }
+        Err(())
+    }
+
+    /// Newton's step from points with `difference = x - y` in the basis; none if the quadratic
+    /// programs have no minimiser.
+    #[inline(always)]
+    fn step<S: Simd>(&self, simd: S, a: &Linearized, b: &Linearized, difference: V3<f64>) -> Option<Found> {
+        let [size_a, size_b] = self.limits;
+        let distance = (difference[2] + a.shift() - b.shift()).max(LEAST_DISTANCE * size_a.min(size_b));
+        let inverse = 1.0 / distance;
+        let tau = [difference[0], difference[1]];
+        let (mut active_a, mut active_b) = (a.active, b.active);
+        // B's program times D: min ½ |τ + α - β|² - D n·dy + ½ D dyᵀ H dy.
+        let mut hessian_b = scaled_six(&b.hessian, distance);
+        hessian_b[0] += 1.0;
+        hessian_b[3] += 1.0;
+        let of_b = (VIOLATED * size_b, FLATTEST / size_b * distance);
+        for _ in 0..MOST_EXCHANGES {
+            let follows = OnActive::new(simd, &hessian_b, b.rows(), &active_b, of_b.1)?;
+            let y_at_rest = follows.minimizer(simd, &hessian_b, [-tau[0], -tau[1], -distance]);
+            let s = &follows.compliance;
+            let k = [(1.0 - s[0]) * inverse, -s[1] * inverse, (1.0 - s[3]) * inverse];
+            let mut hessian_a = a.hessian;
+            hessian_a[0] += k[0];
+            hessian_a[1] += k[1];
+            hessian_a[3] += k[2];
+            let pull = [(tau[0] - y_at_rest[0]) * inverse, (tau[1] - y_at_rest[1]) * inverse, 1.0];
+            let of_a = (VIOLATED * size_a, FLATTEST / size_a);
+            let found = minimize(simd, (&hessian_a, pull), a.rows(), active_a, of_a)?;
+            let dx = found.step;
+            active_a = found.active;
+            let moved = [dx[0], dx[1], 0.0];
+            let dy = add::<S, f64>(y_at_rest, apply_symmetric::<S, f64>(s, moved));
+            let apart = [tau[0] + dx[0], tau[1] + dx[1]];
+            let of_dy = (&hessian_b, [-apart[0], -apart[1], -distance]);
+            if let Some(multipliers) = feasible_multipliers(simd, of_dy, b.rows(), (&active_b, dy), of_b.0) {
+                let dn = [(apart[0] - dy[0]) * inverse, (apart[1] - dy[1]) * inverse];
+                let of_b = multipliers.map(|multiplier| multiplier * inverse);
+                let active = [a.weighted(&active_a, found.multipliers), b.weighted(&active_b, of_b)];
+                return Some(Found { step: Step { dx, dy, dn }, active });
+            }
+            active_b = minimize(simd, of_dy, b.rows(), active_b, of_b)?.active;
+        }
+        None
+    }
+
+    /// The answer where the step leads.
+    ///
+    /// # Errors
+    /// There is none; whether that is because the bodies seem to touch.
+    // There is no allocation in a solve.
+    #[allow(clippy::result_large_err)]
+    #[inline(always)]
+    fn prove<S: Simd>(
+        &self,
+        simd: S,
+        relative: &Relative<f64>,
+        at: &Iterate,
+        found: &Found,
+        ((of_a, local_a), (of_b, local_b)): ((&Evaluated, &M3<f64>), (&Evaluated, &M3<f64>)),
+        difference: V3<f64>,
+    ) -> Result<EdgeProven, bool> {
+        let (side_a, side_b) = &self.sides;
+        let (a, b) = (side_a.body(), side_b.body());
+        let Step { dx, dy, .. } = found.step;
+        let (Some(weighted_a), Some(weighted_b)) = (found.active[0].normalized(), found.active[1].normalized()) else {
+            return Err(false);
+        };
+        let (Some(trust_a), Some(trust_b)) = (weighted_a.trust(simd, a, of_a), weighted_b.trust(simd, b, of_b)) else {
+            return Err(false);
+        };
+        let (sum_a, sum_b) = (side_a.with_trust(&trust_a), side_b.with_trust(&trust_b));
+        let next_a = sum_a.extrapolate(simd, &weighted_a.sum(simd, of_a), local_a, dx);
+        let next_b = sum_b.extrapolate(simd, &weighted_b.sum(simd, of_b), local_b, dy);
+        let next = subtract::<S, f64>(add::<S, f64>(difference, dx), dy);
+        let proven = bracket(simd, (&sum_a, &next_a), (&sum_b, &next_b), next);
+        let (delta_a, delta_b) = (apply_transposed::<S, f64>(local_a, dx), apply_transposed::<S, f64>(local_b, dy));
+        let shares = (share_inside(simd, a, of_a, (delta_a, dx)), share_inside(simd, b, of_b, (delta_b, dy)));
+        let (Some(share_a), Some(share_b)) = shares else { return Err(false) };
+        let x = moved::<S, f64>(at.x, dx, &at.frame);
+        let y = moved::<S, f64>(at.y, dy, &at.frame);
+        let home = |body: &Body| (body.interior_point() - body.normalization().center).into();
+        let interior_b = add::<S, f64>(apply::<S, f64>(&relative.rotation, home(b)), relative.origin);
+        let inward_a = scaled::<S, f64>(subtract::<S, f64>(home(a), x), share_a);
+        let inward_b = scaled::<S, f64>(subtract::<S, f64>(interior_b, y), share_b);
+        let inward = apply::<S, f64>(&at.frame, subtract::<S, f64>(inward_a, inward_b));
+        let between = add::<S, f64>(next, inward);
+        let displaced = (side_a.displacement + side_b.displacement) * (1.0 + 1e-14);
+        let size = difference[0].abs() + difference[1].abs() + difference[2].abs();
+        let rounding = TAYLOR_ROUNDING * (size + a.trust().span * share_a + b.trust().span * share_b);
+        let upper = dot::<S, f64>(between, between).sqrt() * (1.0 + TAYLOR_ROUNDING) + displaced + rounding;
+        let (lower, upper) = match self.relation.judge(simd, &Bracket { upper, ..proven }, &at.frame, next) {
+            Verdict::Proven { lower, upper } => (lower, upper),
+            Verdict::Wide => return Err(false),
+            Verdict::Overlap => return Err(true),
+        };
+        let (x, y) = (add::<S, f64>(x, inward_a), add::<S, f64>(y, inward_b));
+        let n = apply_transposed::<S, f64>(&at.frame, proven.normal);
+        let own_y = apply_transposed::<S, f64>(&relative.rotation, subtract::<S, f64>(y, relative.origin));
+        let [of_a, of_b] = [
+            (x, weighted_a, of_a, proven.multipliers[0], delta_a),
+            (own_y, weighted_b, of_b, proven.multipliers[1], delta_b),
+        ]
+        .map(|(point, weighted, evaluated, multiplier, delta)| {
+            let active = Weighted { weight: weighted.weight.map(|weight| weight * multiplier), ..weighted };
+            let mut jets = [NOTHING; MOST_ACTIVE];
+            for (jet, (i, _)) in jets.iter_mut().zip(active.iter()) {
+                *jet = extrapolated(simd, &evaluated.jets[i], delta);
+            }
+            Spot { point, active, jets }
+        });
+        let (active_a, active_b) = (of_a.active.reported(), of_b.active.reported());
+        let trace = EdgeTrace { of_a, of_b, n, drift: Drift::default() };
+        Ok(EdgeProven { lower, upper, x, y, n, active_a, active_b, rounds: 0, trace })
+    }
+}
+
+/// The entries of a matrix, all times a factor.
+#[inline(always)]
+fn scaled_six(m: &[f64; 6], factor: f64) -> [f64; 6] {
+    m.map(|entry| entry * factor)
+}
+
+/// The part of the way from the end of a step to the interior point along which all constraints are
+/// proven to come to hold, by their jets where it starts; none if they seem far from that. The step
+/// is given by normalized coordinates and in metres.
+///
+/// For a convex g with `g(x) <= v` and `g(c) <= v_0 < 1`, `g(x + s (c - x)) <= 1` from `s = (v - 1)
+/// / (v - v_0)` on.
+#[inline(always)]
+fn share_inside<S: Simd>(_: S, body: &Body, of_a: &Evaluated, (delta, step): (V3<f64>, V3<f64>)) -> Option<f64> {
+    let (square, metres_square) = (dot::<S, f64>(delta, delta), dot::<S, f64>(step, step));
+    let length = square.sqrt();
+    let least = body.min_value();
+    let mut share = 0.0_f64;
+    for (jet, trust) in of_a.jets.iter().zip(&body.trust().constraints) {
+        let sloped = dot::<S, f64>(jet.gradient, delta);
+        let third = &trust.third;
+        let value = if third.ceiling == 0.0 || (jet.value - 1.0).abs() <= NEAR_LEVEL && length <= 0.5 * third.leeway {
+            let bent = apply_symmetric::<S, f64>(&jet.hessian, delta);
+            jet.value + sloped + 0.5 * dot::<S, f64>(delta, bent) + third.ceiling * square * length * (1.0 / 6.0)
+        } else {
+            jet.value + sloped + 0.5 * trust.curvature_ceiling * metres_square
+        };
+        let bound = value + 2.0 * trust.value_error + TAYLOR_ROUNDING * (jet.value.abs() + sloped.abs());
+        if bound > 1.0 {
+            share = share.max((bound - 1.0) / (bound - least));
+        }
+    }
+    (share < 1e-3).then_some(share * (1.0 + 1e-9))
+}
+
+/// The jet at the end of a step by normalized coordinates, to second order.
+#[inline(always)]
+fn extrapolated<S: Simd>(_: S, jet: &NumberJet<f64>, delta: V3<f64>) -> NumberJet<f64> {
+    let bent = apply_symmetric::<S, f64>(&jet.hessian, delta);
+    NumberJet {
+        value: jet.value + dot::<S, f64>(delta, add_scaled::<S, f64>(jet.gradient, 0.5, bent)),
+        gradient: add::<S, f64>(jet.gradient, bent),
+        hessian: jet.hessian,
+    }
+}

@@ -1,0 +1,128 @@
+//! Bodies that slabs cut by Newton's method with active sets, against the general search, which
+//! shares nothing with it but the bodies' polynomials.
+
+use super::{random_pose, zoo};
+use crate::body::{Body, Constraint};
+use crate::measure::solver::stages::{Stage, except, only};
+use crate::measure::*;
+use crate::polynomial::{Exponents, HessianGram, HessianMonomial, Polynomial};
+use nalgebra::{DMatrix, Matrix3, UnitQuaternion, Vector3};
+use sublevel_testkit::Seeded;
+
+/// The constraint `(1 - ε) (a·z - b)² + ε |z|² <= 1`: a slab that bulges by so little that its
+/// Hessian is just positive definite.
+fn slab(a: &Vector3<f64>, b: f64) -> Constraint {
+    let (share, round) = (1.0 - 1e-6, 1e-6);
+    let hessian = (a * a.transpose() * share + Matrix3::identity() * round) * 2.0;
+    let exponents = |v: Vector3<u8>| -> Exponents { v.into() };
+    let unit = |i: usize| Vector3::<u8>::ith(i, 1);
+    let mut terms = vec![(exponents(Vector3::zeros()), share * b * b)];
+    for i in 0..3 {
+        terms.push((exponents(unit(i)), -2.0 * share * b * a[i]));
+        for j in i..3 {
+            let part = if i == j { 0.5 } else { 1.0 };
+            terms.push((exponents(unit(i) + unit(j)), part * hessian[(i, j)]));
+        }
+    }
+    let polynomial = Polynomial::new(terms).unwrap();
+    let basis = (0..3).map(|i| HessianMonomial { direction: i, exponents: [0, 0, 0] }).collect();
+    let gram = HessianGram::nearest(&polynomial, basis, DMatrix::from_fn(3, 3, |i, j| hessian[(i, j)])).unwrap();
+    Constraint { polynomial, gram }
+}
+
+/// A body of degree 4 to 8 cut by up to six slabs across random directions, turned within its
+/// frame.
+fn cut(random: &mut Seeded) -> Body {
+    let degree = 4 + 2 * (random.next() % 3) as u8;
+    let half = Vector3::from_fn(|_, _| 2_f64.powf(random.signed()));
+    let round = Body::superellipsoid("cut", Vector3::zeros(), half, degree).unwrap();
+    let mut constraints = round.constraints().to_vec();
+    for _ in 0..1 + random.next() % 6 {
+        // Between 0.5 and 0.9 of the way out, and off the middle.
+        let half_width = 0.7 + 0.2 * random.signed();
+        constraints.push(slab(&(random.unit() / half_width), 0.2 * random.signed()));
+    }
+    let body = Body::new("cut", *round.normalization(), constraints).unwrap();
+    let rotation = UnitQuaternion::from_scaled_axis(random.unit() * 2.0);
+    body.moved(&rotation, &(random.unit() * 0.7)).unwrap()
+}
+
+/// `Σ λ_i ∇g_i` is the outward normal.
+fn assert_normals((body, pose): (&Body, &Pose), witness: &Vector3<f64>, n: &Vector3<f64>, active: &ActiveConstraints, label: &str) {
+    let own = pose.rotation().inverse_transform_vector(&(witness - pose.translation()));
+    let gradient = |i: usize| body.placement().jet(&body.constraints()[i], &own).gradient;
+    let sum: Vector3<f64> = active.iter().map(|(i, multiplier)| gradient(i) * multiplier).sum();
+    assert!((pose.transform_direction(&sum) - n).norm() < 1e-6, "{label}: {sum:?} {n:?}");
+}
+
+#[test]
+fn cut_bodies_agree_with_the_general_search() {
+    let smooth: Vec<Body> = (0..6).flat_map(|seed| zoo(&mut Seeded(seed))).filter(Body::is_smooth).collect();
+    let gaps = [-0.1, -1e-6, 1e-9, 1e-6, 1e-3, 1e-2, 0.1, 1.0];
+    let (mut apart, mut cold_alone, mut warm_alone) = (0, 0, 0);
+    let mut of_active = [0; 4];
+    for seed in 0..600 {
+        let mut random = Seeded(72_000 + seed);
+        let a = cut(&mut random);
+        let b = if seed / 8 % 2 == 0 { smooth[random.next() as usize % smooth.len()].clone() } else { cut(&mut random) };
+        let size = a.circumscribed().radius.min(b.circumscribed().radius);
+        let gap = gaps[(seed % 8) as usize] * size;
+        let pose_a = random_pose(&mut random, 1.0);
+        let far = 2.0 * (a.circumscribed().radius + b.circumscribed().radius) + b.circumscribed().center.norm();
+        let turned = random_pose(&mut random, 0.0);
+        let start = pose_a.transform_point(&a.circumscribed().center) + random.unit() * far;
+        let mut pose_b = turned.with_translation(start - turned.transform_direction(&b.circumscribed().center));
+        for _ in 0..6 {
+            let found = except(&[Stage::Edges], || {
+                distance(&a, &pose_a, &b, &pose_b, &Options::default(), &mut WarmStart::default())
+            });
+            let Some(n) = found.normal else { break };
+            pose_b = pose_b.with_translation(pose_b.translation() + n * (found.value() - gap));
+        }
+        for swapped in [false, true] {
+            let (mut first, mut second) = ((&a, pose_a), (&b, pose_b));
+            if swapped {
+                (first, second) = (second, first);
+            }
+            let (mut warm, mut alone) = (WarmStart::default(), WarmStart::default());
+            for step in 0..4 {
+                let ask = |warm: &mut WarmStart| {
+                    distance(first.0, &first.1, second.0, &second.1, &Options::default(), warm)
+                };
+                let truth = except(&[Stage::Edges], || ask(&mut WarmStart::default()));
+                let all = ask(&mut warm);
+                let found = only(&[Stage::Edges], || ask(&mut alone));
+                let label = format!("seed {seed} step {step} swapped {swapped}: {found:?} against {truth:?}");
+                assert!(all.lower <= truth.upper && truth.lower <= all.upper, "{label}: {all:?}");
+                assert!(found.lower <= truth.upper && truth.lower <= found.upper, "{label}");
+                assert_eq!(all.status, truth.status, "{label}: {all:?}");
+                if truth.lower > 1e-8 * size {
+                    apart += 1;
+                    let done = found.status == Status::Converged;
+                    *(if step == 0 { &mut cold_alone } else { &mut warm_alone }) += usize::from(done);
+                    if done {
+                        let (n, m) = (found.normal.expect("apart"), truth.normal.expect("apart"));
+                        if truth.lower > 1e-4 * size {
+                            assert!((n - m).norm() < 1e-5, "{label}");
+                        }
+                        let along = (found.witness_a - found.witness_b).norm();
+                        assert!((along - found.upper).abs() < 1e-9 * (size + found.upper), "{label}");
+                        assert_normals((first.0, &first.1), &found.witness_a, &-n, &found.active_a, &label);
+                        assert_normals((second.0, &second.1), &found.witness_b, &n, &found.active_b, &label);
+                        let of_cut = if swapped { &found.active_b } else { &found.active_a };
+                        of_active[of_cut.iter().filter(|(_, multiplier)| *multiplier > 1e-9).count()] += 1;
+                    }
+                }
+                // A little on.
+                let moved = second.1.translation() + random.unit() * (0.003 * size);
+                let turn = UnitQuaternion::from_scaled_axis(random.unit() * 0.003) * second.1.rotation();
+                second.1 = Pose::from_quaternion(moved, turn.coords.into()).unwrap();
+            }
+        }
+    }
+    let (cold, warm) = (400.0 * cold_alone as f64 / apart as f64, 400.0 / 3.0 * warm_alone as f64 / apart as f64);
+    println!("{apart} apart: {cold:.1} % cold, {warm:.1} % warm solved alone; of active constraints {of_active:?}");
+    // A single side, edges and corners.
+    assert!(of_active[1..].iter().all(|&count| count > 100), "{of_active:?}");
+    assert!(cold > 90.0 && warm > 95.0, "{cold} {warm}");
+}
