@@ -13,7 +13,7 @@ use super::limits::MAX_MESSAGE_BYTES;
 use super::proto::{Crossing, WatchRequest, WatchResponse};
 use super::{error, query_wire};
 use crate::scene::query::{Ask, Measure, Within, combined};
-use crate::scene::{MAX_NAME_BYTES, Scene};
+use crate::scene::{MAX_NAME_BYTES, OwnStarts, Scene};
 use crate::store::LiveScene;
 
 /// Crossings in one message: two names and two numbers each.
@@ -40,9 +40,9 @@ pub(super) async fn run(
     let resumed = request.from_revision == Some(scene.revision()) && live.knows(scene.revision());
     // The watcher must not keep a scene alive that was deleted.
     drop(live);
-    let mut known: Option<Near> = None;
+    let (mut known, mut starts): (Option<Near>, _) = (None, OwnStarts::default());
     loop {
-        let now = match near(&app, &scene, &request).await {
+        let now = match near(&app, &starts.lend(&scene), &request).await {
             Ok(now) => now,
             Err(status) => return drop(messages.send(Err(status)).await),
         };

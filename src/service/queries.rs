@@ -28,7 +28,7 @@ use crate::scene::query::{
     Answer, AnswerStatus, Ask, Clearance, Found, Pairs, RayAnswer, Rays, StateAnswer, StateVerdict, States, Within,
     closest_pair, combined,
 };
-use crate::scene::{Scene, Stop};
+use crate::scene::{OwnStarts, Scene, Stop};
 
 #[derive(Debug)]
 pub(super) struct Queries(pub(super) AppState);
@@ -37,7 +37,7 @@ pub(super) struct Queries(pub(super) AppState);
 impl QueryService for Queries {
     async fn evaluate(&self, request: Request<EvaluateRequest>) -> Result<Response<EvaluateResponse>, Status> {
         let time = CallTime::of(&request, request.get_ref().budget_ms)?;
-        evaluate(&self.0, request.get_ref(), time).await.map(Response::new)
+        evaluate(&self.0, None, request.get_ref(), time).await.map(Response::new)
     }
 
     type EvaluateStreamStream = ReceiverStream<Result<EvaluateStreamResponse, Status>>;
@@ -50,7 +50,7 @@ impl QueryService for Queries {
         let (app, mut messages) = (self.0.clone(), request.into_inner());
         // One question after the other: a client that reads slowly is not read on.
         tokio::spawn(async move {
-            let mut stopping = app.stopping();
+            let (mut stopping, mut starts) = (app.stopping(), OwnStarts::default());
             loop {
                 let message = tokio::select! {
                     message = messages.message() => message,
@@ -68,7 +68,7 @@ impl QueryService for Queries {
                     }
                 };
                 let answered = tokio::select! {
-                    answered = answer(&app, message) => answered,
+                    answered = answer(&app, &mut starts, message) => answered,
                     () = sender.closed() => return,
                 };
                 if sender.send(Ok(answered)).await.is_err() {
@@ -221,13 +221,13 @@ impl QueryService for Queries {
 }
 
 /// Answers one message of a stream.
-async fn answer(app: &AppState, message: EvaluateStreamRequest) -> EvaluateStreamResponse {
+async fn answer(app: &AppState, starts: &mut OwnStarts, message: EvaluateStreamRequest) -> EvaluateStreamResponse {
     use proto::evaluate_stream_response::Result as Answered;
     let EvaluateStreamRequest { sequence, evaluate: question } = message;
     let answered = async {
         let question = question.ok_or_else(|| Invalid::new("evaluate", "is missing; send the question"))?;
         let time = CallTime::new(question.budget_ms)?;
-        evaluate(app, &question, time).await
+        evaluate(app, Some(starts), &question, time).await
     };
     let result = match answered.await {
         Ok(answer) => Answered::Answer(answer),
@@ -239,11 +239,21 @@ async fn answer(app: &AppState, message: EvaluateStreamRequest) -> EvaluateStrea
     EvaluateStreamResponse { sequence, result: Some(result) }
 }
 
-async fn evaluate(app: &AppState, request: &EvaluateRequest, time: CallTime) -> Result<EvaluateResponse, Status> {
+/// Answers a question, from the warm starts of the caller where it has its own.
+async fn evaluate(
+    app: &AppState,
+    starts: Option<&mut OwnStarts>,
+    request: &EvaluateRequest,
+    time: CallTime,
+) -> Result<EvaluateResponse, Status> {
     let Some(question) = &request.question else {
         return Err(Invalid::new("question", "is missing; send pairs, within, closest or first_contact").into());
     };
     let scene = snapshot(app, &request.scene, request.at_least_revision).await?;
+    let scene = match starts {
+        Some(starts) => starts.lend(&scene),
+        None => scene,
+    };
     let outputs = query_wire::outputs(request)?;
     let ask = query_wire::ask(request, &outputs, &scene)?;
     let scene = match &request.pose_overrides {

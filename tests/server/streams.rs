@@ -4,16 +4,17 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use nalgebra::Vector3;
+use sublevel::body::Body;
 use sublevel::client::Question;
 use sublevel::measure::Pose;
 use sublevel::scene::query::Measure;
 use sublevel::service::proto::{
-    self, EvaluateStreamRequest, StreamPosesRequest, UpdateSceneRequest, WatchRequest, WatchSceneRequest,
-    evaluate_stream_response,
+    self, EvaluateRequest, EvaluateStreamRequest, StreamPosesRequest, UpdateSceneRequest, WatchRequest,
+    WatchSceneRequest, evaluate_stream_response,
 };
 use tonic::Code;
 
-use crate::harness::{Clients, PATIENCE, Running, at, ball, object, pair, question};
+use crate::harness::{Clients, PATIENCE, Running, at, ball, moved, object, pair, pose, question, rows};
 
 fn along(x: f64) -> Pose {
     Pose::from_quaternion(Vector3::new(x, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0]).expect("a pose")
@@ -250,6 +251,49 @@ async fn questions_of_a_stream_are_answered_in_order_and_a_bad_one_does_not_end_
     }
     let expected = [(7, ""), (8, "pairs.rows[0].b"), (9, "evaluate"), (10, "")];
     assert_eq!(seen, expected.map(|(sequence, field)| (sequence, field.to_owned())));
+}
+
+/// Two clients ask about the same pair, each with a pose of its own. The second message of the
+/// stream starts where the first has ended; the other client has to come back from where the stream
+/// was.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_stream_starts_from_its_own_answers_whatever_others_ask() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(dir.path());
+    let mut clients = server.connect().await;
+    let brick = Body::superellipsoid("brick", Vector3::zeros(), Vector3::new(0.5, 0.3, 0.2), 6).expect("a body");
+    let id = clients.put(&brick).await;
+    clients.make_scene("room").await;
+    let upsert_objects = (0..2).map(|i| object(&format!("o{i}"), &id, at(2.0 * f64::from(i)))).collect();
+    clients.update(UpdateSceneRequest { scene: "room".into(), upsert_objects, ..Default::default() }).await;
+    let ask = |translation, rotation| EvaluateRequest {
+        pose_overrides: rows(vec![moved("o1", pose(translation, rotation))]),
+        ..question(vec![pair("o0", "o1")], &[proto::Measure::Distance])
+    };
+    let (sender, messages) = tokio::sync::mpsc::channel(1);
+    let stream = clients.queries.evaluate_stream(tokio_stream::wrappers::ReceiverStream::new(messages)).await;
+    let mut answers = stream.expect("a stream").into_inner();
+    let (mut of_stream, mut of_other) = (Vec::new(), Vec::new());
+    for step in 0..20_u32 {
+        let near = ask([1.5, 0.4 + 1e-3 * f64::from(step), 0.3], [0.1, 0.2, 0.3, 0.9273618495495704]);
+        let evaluate = Some(near.clone());
+        sender.send(EvaluateStreamRequest { sequence: step.into(), evaluate }).await.expect("sent");
+        let answer = answers.message().await.expect("no error").expect("an answer");
+        let Some(evaluate_stream_response::Result::Answer(found)) = answer.result else { panic!("{answer:?}") };
+        let cold = EvaluateRequest { cold: true, ..near };
+        let cold = clients.queries.evaluate(cold).await.expect("an answer").into_inner();
+        let (warm, cold) = (&found.answers[0], &cold.answers[0]);
+        assert!(warm.lower <= cold.upper && cold.lower <= warm.upper, "{warm:?} {cold:?}");
+        of_stream.push(warm.iterations);
+        // Elsewhere in two ways: the scene's own start is of the other side each time.
+        let side = if step % 2 == 0 { -1.5 } else { 1.5 };
+        let far = ask([side, -0.6, side], [0.5, -0.5, 0.5, 0.5]);
+        let other = clients.queries.evaluate(far).await.expect("an answer").into_inner();
+        of_other.push(other.answers[0].iterations);
+    }
+    let sum = |iterations: &[u32]| iterations[1..].iter().sum::<u32>();
+    assert!(of_stream[1] < of_stream[0] && of_stream[1..].iter().all(|&count| count <= 2), "{of_stream:?}");
+    assert!(sum(&of_other) > 2 * sum(&of_stream), "{of_other:?} {of_stream:?}");
 }
 
 /// A client that sends and never reads: others go on, and so does the scene.

@@ -13,6 +13,7 @@ mod geometry;
 mod limits;
 mod name;
 mod object;
+mod own_starts;
 mod pair_cache;
 mod poses;
 pub mod query;
@@ -28,6 +29,7 @@ pub use geometry::{Geometry, GeometryFileError, Ladder, LadderError, MAX_RUNGS, 
 pub use limits::{MAX_NAME_BYTES, MAX_OBJECTS, MAX_PADDING_M, MAX_PAIR_RULES, MAX_ROBOTS};
 pub use name::{NameError, check_name};
 pub use object::{Attachment, LinkOf, Object, Slot, Subject};
+pub use own_starts::OwnStarts;
 pub use pair_cache::WarmStartUse;
 pub use robot::{
     DeriveProgress, DerivedLinks, JointsError, NamedJointValues, ParseRobotIdError, PlaceRobot, PrimitiveError, Robot,

@@ -2,7 +2,7 @@
 //! the answer beyond its bracket, so a wrong entry is harmless and the table may forget.
 
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, OnceLock, TryLockError};
+use std::sync::{Arc, Mutex, OnceLock, TryLockError};
 
 use sublevel_core::measure::WarmStart;
 
@@ -47,6 +47,8 @@ static USES: [Uses; 64] = [const { Uses { hits: AtomicU64::new(0), misses: Atomi
 #[derive(Debug)]
 pub(crate) struct PairCache {
     blocks: Box<[OnceLock<Block>]>,
+    /// Where a pair that is new here starts from; it is not written.
+    origin: Option<Arc<PairCache>>,
 }
 
 /// Entries side by side, each with a lock of its own.
@@ -90,12 +92,33 @@ impl PairCache {
     /// A table of so many entries, rounded up to a power of two.
     pub(crate) fn with_entries(entries: usize) -> Self {
         let blocks = entries.next_power_of_two().div_ceil(BLOCK);
-        Self { blocks: (0..blocks).map(|_| OnceLock::new()).collect() }
+        Self { blocks: (0..blocks).map(|_| OnceLock::new()).collect(), origin: None }
+    }
+
+    /// A table of so many entries whose new pairs start as they would in another one.
+    pub(crate) fn beside(origin: Arc<Self>, entries: usize) -> Self {
+        Self { origin: Some(origin), ..Self::with_entries(entries) }
+    }
+
+    /// Whether it was made beside this table.
+    pub(crate) fn is_beside(&self, origin: &Arc<Self>) -> bool {
+        self.origin.as_ref().is_some_and(|own| Arc::ptr_eq(own, origin))
+    }
+
+    fn index(&self, key: PairKey) -> usize {
+        key.mixed() as usize % (self.blocks.len() * BLOCK)
+    }
+
+    /// The warm start of a pair, if it is known and not in use.
+    fn copied(&self, key: PairKey) -> Option<WarmStart> {
+        let index = self.index(key);
+        let entry = self.blocks[index / BLOCK].get()?[index % BLOCK].try_lock().ok()?;
+        (entry.key == key).then_some(entry.warm)
     }
 
     /// Lends the warm start of a pair; a cold one where it is not known or in use elsewhere.
     pub(crate) fn with<T>(&self, key: PairKey, solve: impl FnOnce(&mut WarmStart) -> T) -> T {
-        let index = key.mixed() as usize % (self.blocks.len() * BLOCK);
+        let index = self.index(key);
         let block = self.blocks[index / BLOCK].get_or_init(|| (0..BLOCK).map(|_| Mutex::default()).collect());
         let uses = &USES[index % USES.len()];
         let mut entry = match block[index % BLOCK].try_lock() {
@@ -107,12 +130,14 @@ impl PairCache {
                 return solve(&mut WarmStart::default());
             }
         };
-        if entry.key == key {
-            uses.hits.fetch_add(1, Ordering::Relaxed);
-        } else {
-            uses.misses.fetch_add(1, Ordering::Relaxed);
-            *entry = Entry { key, warm: WarmStart::default() };
+        let mut is_known = entry.key == key;
+        if !is_known {
+            let start = self.origin.as_ref().and_then(|origin| origin.copied(key));
+            is_known = start.is_some();
+            *entry = Entry { key, warm: start.unwrap_or_default() };
         }
+        let count = if is_known { &uses.hits } else { &uses.misses };
+        count.fetch_add(1, Ordering::Relaxed);
         solve(&mut entry.warm)
     }
 }

@@ -178,6 +178,11 @@ impl Scene {
         self.broad_phase.tree(&self.structure, &self.poses)
     }
 
+    /// The same snapshot with another table of warm starts.
+    pub(crate) fn with_cache(&self, cache: Arc<PairCache>) -> Self {
+        Self { cache, ..self.clone() }
+    }
+
     /// A snapshot one revision on that still holds the same.
     pub(crate) fn next(&self) -> Self {
         Self { revision: self.revision + 1, ..self.clone() }

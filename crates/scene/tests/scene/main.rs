@@ -4,6 +4,7 @@
 mod brute_force;
 mod capsules;
 mod model;
+mod own_starts;
 mod robots;
 mod sets;
 mod worlds;
