@@ -13,6 +13,9 @@ pub(super) struct EchoArgs {
     /// Bytes of an answer
     #[arg(long, value_name = "BYTES")]
     answer_bytes: usize,
+    /// Encrypt, with a new key; its certificate is printed after the address
+    #[arg(long)]
+    encrypted: bool,
     /// Core to run on
     #[arg(long, value_name = "CORE")]
     core: Option<usize>,
@@ -34,9 +37,9 @@ pub(super) fn run(args: &EchoArgs) -> Result<(), Box<dyn Error>> {
     }
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
     runtime.block_on(async {
-        let echo = echo(args.answer_bytes).await?;
-        let addr = echo.url().replace("http://", "");
-        writeln!(io::stdout(), "listening on {addr}")?;
+        let echo = echo(args.answer_bytes, args.encrypted).await?;
+        writeln!(io::stdout(), "listening on {}", echo.addr())?;
+        write!(io::stdout(), "{}", echo.certificate().unwrap_or_default())?;
         tokio::task::spawn_blocking(|| io::copy(&mut io::stdin(), &mut io::sink())).await??;
         Ok(())
     })

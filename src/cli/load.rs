@@ -10,13 +10,14 @@ use tokio::signal::unix::{SignalKind, signal};
 
 use super::write_atomically;
 use crate::client::{Client, ClientOptions};
-use crate::load::{Arrivals, EchoProcess, LoadOptions, LoadReport, Scenario, connect, measure, prepare};
+use crate::load::{Arrivals, EchoProcess, LoadOptions, LoadReport, Scenario, Watched, connect, measure, prepare};
 
 /// Load a running server, and report how long its answers take
 ///
 /// In an open loop: calls are begun when they are due, however long earlier ones take, and their
 /// time counts from then on. Beside it runs an echo server of equal message sizes, which shows what
-/// the transport alone takes. What it makes in the server is removed at the end, also by Ctrl-C.
+/// the transport alone takes; it is encrypted if the server is. What it makes in the server is
+/// removed at the end, also by Ctrl-C.
 ///
 /// A scenario is one of pair, pairs, within, states, mixed, a recording (.jsonl) of
 /// 'sublevel record', or a TOML file:
@@ -65,7 +66,7 @@ pub(super) struct LoadArgs {
     /// Core that the echo server runs on; 'taskset' gives the server and this command theirs
     #[arg(long, value_name = "CORE")]
     echo_core: Option<usize>,
-    /// Process id of the server, on this machine: reports how busy it keeps the cores
+    /// Process id of the server, on this machine: reports how busy it keeps the cores, and its memory
     #[arg(long, value_name = "PID")]
     server_pid: Option<u32>,
     /// File for all numbers
@@ -154,21 +155,23 @@ async fn measured(
     let answer_bytes = prepared.answer_bytes(&clients[0]).await?;
     let stream = (scenario.pose_rate_hz > 0.0)
         .then(|| tokio::spawn(prepared.clone().stream(clients[0].clone(), scenario.pose_rate_hz)));
-    let mut server = Vec::new();
+    let probe = Some(Client::connect_with(&args.server, &ClientOptions::from_environment()).await?);
+    let (mut server, watched) = (Vec::new(), Watched { pid: args.server_pid, probe });
     for &rate in &args.rate {
-        server.push(measure(prepared, clients, (rate, args.server_pid), options, &mut shown("server", rate)).await?);
+        server.push(measure(prepared, clients, (rate, &watched), options, &mut shown("server", rate)).await?);
     }
     if let Some(stream) = stream {
         stream.abort();
     }
     let mut of_echo = Vec::new();
     if !args.no_echo {
-        let echo = EchoProcess::start(answer_bytes, args.echo_core)
+        let echo = std::env::current_exe()
+            .and_then(|own| EchoProcess::start(&own, answer_bytes, is_encrypted(&args.server), args.echo_core))
             .map_err(|error| format!("cannot start the echo server: {error}; leave it out with --no-echo"))?;
-        let clients = connect(echo.url(), &ClientOptions::default(), options.connections).await?;
+        let clients = connect(echo.url(), &echo.options(), options.connections).await?;
+        let watched = Watched { pid: Some(echo.pid()), probe: None };
         for &rate in &args.rate {
-            of_echo
-                .push(measure(prepared, &clients, (rate, Some(echo.pid())), options, &mut shown("echo", rate)).await?);
+            of_echo.push(measure(prepared, &clients, (rate, &watched), options, &mut shown("echo", rate)).await?);
         }
     }
     Ok(LoadReport {
@@ -178,10 +181,16 @@ async fn measured(
             Arrivals::Poisson => "poisson",
         },
         connections: options.connections,
+        encrypted: is_encrypted(&args.server),
         seconds: options.duration.as_secs_f64(),
         server,
         echo: of_echo,
     })
+}
+
+/// Whether calls to an address are encrypted. A scheme may have letters of either case.
+fn is_encrypted(url: &str) -> bool {
+    url.split_once(':').is_some_and(|(scheme, _)| scheme.eq_ignore_ascii_case("https"))
 }
 
 /// One line on a terminal, written again and again.

@@ -1,8 +1,9 @@
 //! A server that answers each call at once with as many bytes as were recorded: what remains of the
-//! time of a call is the transport's.
+//! time of a call is the transport's. Encrypted, it takes a key and a certificate of its own.
 
 use std::collections::VecDeque;
 use std::convert::Infallible;
+use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::pin::Pin;
 use std::task::{Context, Poll};
@@ -16,18 +17,28 @@ use tonic::Status;
 use tonic::body::Body;
 use tonic::codegen::{BoxFuture, Service, http};
 use tonic::server::NamedService;
+use tonic::transport::{Identity, ServerTlsConfig};
+
+/// What a client may send before it is read, bytes: as much as to the server.
+const WINDOW_BYTES: u32 = 1 << 20;
 
 /// An echo server that runs until it is dropped.
 #[derive(Debug)]
 pub struct Echo {
     addr: SocketAddr,
+    certificate: Option<String>,
     serving: JoinHandle<()>,
 }
 
 impl Echo {
     /// Where it is.
-    pub fn url(&self) -> String {
-        format!("http://{}", self.addr)
+    pub fn addr(&self) -> SocketAddr {
+        self.addr
+    }
+
+    /// Its certificate, PEM, where it is encrypted.
+    pub fn certificate(&self) -> Option<&str> {
+        self.certificate.as_deref()
     }
 }
 
@@ -38,11 +49,12 @@ impl Drop for Echo {
 }
 
 /// Starts a server on loopback that answers every call of QueryService with a message of so many
-/// bytes, when it has read the call.
+/// bytes, when it has read the call. Encrypted like a server with certificates: TLS by the same
+/// library, with a new key.
 ///
 /// # Errors
-/// When there is no port for it.
-pub async fn echo(answer_bytes: usize) -> std::io::Result<Echo> {
+/// When there is no port for it, or no key.
+pub async fn echo(answer_bytes: usize, encrypted: bool) -> io::Result<Echo> {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await?;
     let addr = listener.local_addr()?;
     let mut answer = BytesMut::with_capacity(answer_bytes + 16);
@@ -54,16 +66,22 @@ pub async fn echo(answer_bytes: usize) -> std::io::Result<Echo> {
     answer.put_u32(u32::try_from(message.len()).unwrap_or(u32::MAX));
     answer.extend_from_slice(&message);
     let service = EchoService { answer: answer.freeze() };
+    let mut server = tonic::transport::Server::builder()
+        .initial_stream_window_size(WINDOW_BYTES)
+        .initial_connection_window_size(2 * WINDOW_BYTES);
+    let mut certificate = None;
+    if encrypted {
+        let own = rcgen::generate_simple_self_signed([addr.ip().to_string()]).map_err(io::Error::other)?;
+        let identity = Identity::from_pem(own.cert.pem(), own.signing_key.serialize_pem());
+        server = server.tls_config(ServerTlsConfig::new().identity(identity)).map_err(io::Error::other)?;
+        certificate = Some(own.cert.pem());
+    }
     let serving = tokio::spawn(async move {
-        let served = tonic::transport::Server::builder()
-            .initial_stream_window_size(1 << 20)
-            .initial_connection_window_size(1 << 20)
-            .add_service(service)
-            .serve_with_incoming(TcpListenerStream::new(listener));
+        let served = server.add_service(service).serve_with_incoming(TcpListenerStream::new(listener));
         // Ended by dropping it.
         let _ = served.await;
     });
-    Ok(Echo { addr, serving })
+    Ok(Echo { addr, certificate, serving })
 }
 
 #[derive(Clone, Debug)]

@@ -2,15 +2,16 @@
 //! take, and their time counts from then on. A server that stands still is seen, as its clients
 //! would see it.
 
-mod cpu;
 mod echo;
 mod echo_process;
+mod process;
 mod recorder;
 mod recording;
 mod report;
 mod run;
 mod scenario;
 mod schedule;
+mod watched;
 
 pub use echo::{Echo, echo};
 pub use echo_process::EchoProcess;
@@ -20,3 +21,4 @@ pub use report::{Latency, LoadReport, RateReport};
 pub use run::{LoadError, LoadOptions, Prepared, connect, measure, prepare};
 pub use scenario::{Scenario, ScenarioError, Share};
 pub use schedule::Arrivals;
+pub use watched::{Health, Watched};

@@ -6,6 +6,7 @@ use std::fmt::Write;
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
+use super::watched::Health;
 use crate::draw::{ChartError, Group, Ink, Marker, Point, Scatter};
 
 /// What came of all rates.
@@ -17,6 +18,8 @@ pub struct LoadReport {
     pub arrivals: &'static str,
     /// Connections that the calls were spread over.
     pub connections: usize,
+    /// Whether these were encrypted, those to the echo server, too.
+    pub encrypted: bool,
     /// Seconds that were counted, of each rate.
     pub seconds: f64,
     /// Of the server.
@@ -42,6 +45,11 @@ pub struct RateReport {
     pub client_cores: Option<f64>,
     /// Cores that the server kept busy, where its process is known.
     pub server_cores: Option<f64>,
+    /// Memory of the server at the end, MiB, where its process is known.
+    pub server_mib: Option<f64>,
+    /// What the server said of itself, asked 50 times a second on a connection of its own; none of
+    /// an echo server.
+    pub health: Option<Health>,
 }
 
 /// Percentiles, milliseconds; 0 where nothing was answered.
@@ -71,23 +79,28 @@ impl LoadReport {
     /// A table for people.
     pub fn table(&self) -> String {
         let mut text = String::from(
-            "target  offered/s  answered/s  p50 ms  p90 ms  p99 ms  p99.9 ms  max ms  cores of server, client  errors\n",
+            "target  offered/s  answered/s  p50 ms  p90 ms  p99 ms  p99.9 ms  max ms  cores of server, client  \
+             server MiB  health ms  errors\n",
         );
+        let or_dash = |number: Option<f64>, digits: usize| number.map_or("-".into(), |it| format!("{it:.digits$}"));
         for (target, rates) in [("server", &self.server), ("echo", &self.echo)] {
-            for RateReport { offered_per_s, answered_per_s, errors, latency_ms, client_cores, server_cores, .. } in
-                rates
-            {
-                let cores =
-                    [server_cores, client_cores].map(|cores| cores.map_or("-".into(), |cores| format!("{cores:.2}")));
-                let Latency { p50, p90, p99, p99_9, max } = latency_ms;
-                let errors: Vec<String> = errors.iter().map(|(code, count)| format!("{count} {code}")).collect();
+            for rate in rates {
+                let Latency { p50, p90, p99, p99_9, max } = rate.latency_ms;
+                let errors: Vec<String> = rate.errors.iter().map(|(code, count)| format!("{count} {code}")).collect();
                 // Writing to a string cannot fail.
                 let _ = writeln!(
                     text,
-                    "{target:<6}  {offered_per_s:>9.0}  {answered_per_s:>10.0}  {p50:>6.2}  {p90:>6.2}  {p99:>6.2}  \
-                     {p99_9:>8.2}  {max:>6.1}  {:>15}, {:>6}  {}",
-                    cores[0],
-                    cores[1],
+                    "{target:<6}  {:>9.0}  {:>10.0}  {p50:>6.2}  {p90:>6.2}  {p99:>6.2}  {p99_9:>8.2}  {max:>6.1}  \
+                     {:>15}, {:>6}  {:>10}  {:>9}  {}",
+                    rate.offered_per_s,
+                    rate.answered_per_s,
+                    or_dash(rate.server_cores, 2),
+                    or_dash(rate.client_cores, 2),
+                    or_dash(rate.server_mib, 0),
+                    match rate.health {
+                        Some(Health { failed: 1.., .. }) => "failed".to_owned(),
+                        health => or_dash(health.map(|health| health.longest_ms), 1),
+                    },
                     if errors.is_empty() { "-".to_owned() } else { errors.join(", ") }
                 );
             }

@@ -8,11 +8,11 @@ use std::time::{Duration, Instant};
 use hdrhistogram::Histogram;
 use nalgebra::{Quaternion, Vector3};
 
-use super::cpu::cpu_s;
 use super::recording::{RecordedCall, RecordingError};
 use super::report::{Latency, RateReport};
 use super::scenario::{Scenario, Share};
 use super::schedule::{Arrivals, Schedule};
+use super::watched::{Probes, Watched};
 use crate::body::{Body, BodyId};
 use crate::client::{Client, ClientError, ClientOptions, Question, StatesQuestion};
 use crate::measure::Pose;
@@ -258,20 +258,19 @@ impl Counted {
 }
 
 /// Makes calls at a rate over some connections, and counts from when each was due. `progress` gets
-/// the seconds that are over and the answers so far; `server` is the server's process, if it runs
-/// on this machine.
+/// the seconds that are over and the answers so far; the server is looked at meanwhile.
 ///
 /// # Errors
 /// When the system has no thread to keep time.
 pub async fn measure(
     prepared: &Arc<Prepared>,
     clients: &[Client],
-    (rate_per_s, server): (f64, Option<u32>),
+    (rate_per_s, server): (f64, &Watched),
     options: &LoadOptions,
     progress: &mut dyn FnMut(f64, u64),
 ) -> Result<RateReport, LoadError> {
-    let worked = || [server.map(Some), Some(None)].map(|pid| pid.and_then(cpu_s));
-    let before = (Instant::now(), worked());
+    let before = (Instant::now(), server.worked());
+    let probes = server.probe.clone().map(Probes::start);
     // Three digits, up to an hour.
     let latency_ns = Histogram::new_with_bounds(1000, 3_600_000_000_000, 3);
     let latency_ns = latency_ns.unwrap_or_else(|_| unreachable!("the bounds are in order"));
@@ -310,7 +309,7 @@ pub async fn measure(
             unanswered;
     }
     let took = before.0.elapsed().as_secs_f64();
-    let now = worked();
+    let now = server.worked();
     let cores = |index: usize| Some((now[index]? - before.1[index]?) / took);
     let latency = counted.latency_ns.lock().unwrap_or_else(PoisonError::into_inner);
     let seconds = options.duration.as_secs_f64();
@@ -322,6 +321,8 @@ pub async fn measure(
         latency_ms: Latency::of(&latency),
         client_cores: cores(1),
         server_cores: cores(0),
+        server_mib: server.memory_mib(),
+        health: probes.map(|probes| probes.health()),
     })
 }
 

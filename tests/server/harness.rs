@@ -69,6 +69,10 @@ impl Running {
         std::fs::read_to_string(dir.join("log")).expect("a log")
     }
 
+    pub(crate) fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
     /// Most memory it ever took.
     pub(crate) fn peak_memory_mib(&self) -> u64 {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).expect("it runs");

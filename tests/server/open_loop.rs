@@ -4,11 +4,13 @@ use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
 use serde_json::Value;
-use sublevel::client::{Question, StatesQuestion};
+use sublevel::client::{Client, ClientOptions, Question, StatesQuestion};
+use sublevel::load::EchoProcess;
 use sublevel::measure::Pose;
 use sublevel::scene::query::Measure;
 
-use crate::harness::Running;
+use crate::harness::{Running, command};
+use crate::operation::{Issuer, https};
 
 fn load(server: &str, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_sublevel"));
@@ -40,6 +42,8 @@ async fn every_scenario_is_measured_beside_an_echo_and_leaves_nothing_behind() {
                 assert!(of["errors"].as_object().expect("codes").is_empty(), "{scenario}: {of}");
                 let latency = |key: &str| of["latency_ms"][key].as_f64().expect("a number");
                 assert!(latency("p50") > 0.0 && latency("p50") <= latency("p99") && latency("p99") <= latency("max"));
+                assert_eq!(of["health"].is_object(), target == "server", "{of}");
+                assert!(of["server_mib"].as_f64().is_some_and(|mib| mib > 1.0) == (target == "echo"), "{of}");
             }
         }
         let table = String::from_utf8(output.stdout).expect("text");
@@ -47,6 +51,63 @@ async fn every_scenario_is_measured_beside_an_echo_and_leaves_nothing_behind() {
         assert!(std::fs::read_to_string(&svg).expect("written").contains("server, 99 %"));
     }
     assert!(server.client().await.list_scenes().await.expect("a list").is_empty());
+}
+
+/// Far more than a server bears, with a short wait: some calls are answered, the others are told to
+/// come again; the server says all the while that it is well, and holds as little as before.
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_too_much_is_shed_while_the_server_stays_well() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (settings, scenario) = (dir.path().join("server.toml"), dir.path().join("what-if.toml"));
+    std::fs::write(&settings, "[limits]\ncalls = 2\nqueue_ms = 5\n").expect("written");
+    let states = "objects = 200\n[[calls]]\nkind = \"states\"\nstates = 2000\nmoving = 4\n";
+    std::fs::write(&scenario, states).expect("written");
+    let mut serve = command(&dir.path().join("data"));
+    serve.arg("--config").arg(&settings);
+    let server = Running::spawn(serve);
+    let json = dir.path().join("load.json");
+    let name = scenario.to_str().expect("text");
+    let mut command = load(&server.url(), &[name, "--rate", "20,2000", "--duration", "1", "--no-echo"]);
+    let output = command.args(["--server-pid", &server.pid().to_string(), "--json"]).arg(&json).output();
+    let report = read(&output.expect("it runs"), &json);
+    let [calm, flooded] = [0, 1].map(|index| &report["server"][index]);
+    let errors = flooded["errors"].as_object().expect("codes");
+    assert_eq!(errors.keys().collect::<Vec<_>>(), ["ResourceExhausted"], "{flooded}");
+    assert!(flooded["answered_per_s"].as_f64() > Some(0.0), "{flooded}");
+    assert_eq!(flooded["health"]["failed"].as_u64(), Some(0), "{flooded}");
+    assert!(flooded["health"]["longest_ms"].as_f64() > Some(0.0), "{flooded}");
+    let [before, after] = [calm, flooded].map(|of| of["server_mib"].as_f64().expect("MiB"));
+    // Windows of the connections, of which each holds messages that were not read.
+    assert!(after < before + 100.0, "{before} MiB before, {after} after");
+}
+
+/// The transport of a server with certificates is compared with one that is encrypted alike.
+#[tokio::test(flavor = "multi_thread")]
+async fn the_echo_of_an_encrypted_server_is_encrypted() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let issuer = Issuer::new();
+    let [certificate, key] = issuer.write(dir.path(), "server", false);
+    let (ca, json) = (dir.path().join("ca.pem"), dir.path().join("load.json"));
+    issuer.write_root(&ca);
+    let mut serve = command(&dir.path().join("data"));
+    serve.arg("--tls-certificate").arg(&certificate).arg("--tls-key").arg(&key);
+    let server = Running::spawn(serve);
+    let url = https(&server);
+    let mut command = load(&url, &["pair", "--rate", "50", "--duration", "0.5", "--warmup", "0.1"]);
+    let report = read(&command.env("SUBLEVEL_CA", &ca).arg("--json").arg(&json).output().expect("it runs"), &json);
+    assert_eq!(report["encrypted"].as_bool(), Some(true));
+    for target in ["server", "echo"] {
+        let of = &report[target][0];
+        assert!(of["errors"].as_object().expect("codes").is_empty() && of["due"].as_u64() > Some(0), "{of}");
+    }
+
+    let echo = EchoProcess::start(env!("CARGO_BIN_EXE_sublevel").as_ref(), 100, true, None).expect("an echo server");
+    Client::connect_with(echo.url(), &echo.options()).await.expect("encrypted");
+    let stranger = ClientOptions { ca: Some(ca), ..ClientOptions::default() };
+    Client::connect_with(echo.url(), &stranger).await.expect_err("another root");
+    if let Ok(client) = Client::connect(&echo.url().replace("https", "http")).await {
+        client.list_scenes().await.expect_err("not encrypted");
+    }
 }
 
 /// A tenth of the calls comes due while the server stands still; a closed loop would see one.

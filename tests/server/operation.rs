@@ -16,21 +16,21 @@ use tonic::Code;
 use crate::harness::{PATIENCE, Running, ball, command};
 
 /// Certificates of a test: a root, and what it has signed.
-struct Issuer(CertifiedIssuer<'static, KeyPair>);
+pub(crate) struct Issuer(CertifiedIssuer<'static, KeyPair>);
 
 impl Issuer {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let mut params = CertificateParams::new(Vec::new()).expect("parameters");
         params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
         Self(CertifiedIssuer::self_signed(params, KeyPair::generate().expect("a key")).expect("a root"))
     }
 
-    fn write_root(&self, path: &Path) {
+    pub(crate) fn write_root(&self, path: &Path) {
         std::fs::write(path, self.0.pem()).expect("written");
     }
 
     /// A certificate for 127.0.0.1 and its key, written as NAME.pem and NAME.key.
-    fn write(&self, dir: &Path, name: &str, expired: bool) -> [PathBuf; 2] {
+    pub(crate) fn write(&self, dir: &Path, name: &str, expired: bool) -> [PathBuf; 2] {
         let mut params = CertificateParams::new(vec!["127.0.0.1".to_owned()]).expect("parameters");
         if expired {
             params.not_after = rcgen::date_time_ymd(2001, 1, 1);
@@ -58,7 +58,7 @@ fn token(file: &Path, name: &str, role: &str) -> String {
     String::from_utf8(made.stderr).expect("a token").trim().rsplit(' ').next().expect("a token").to_owned()
 }
 
-fn https(server: &Running) -> String {
+pub(crate) fn https(server: &Running) -> String {
     format!("https://{}", server.addr)
 }
 

@@ -1,4 +1,4 @@
-//! What processes have worked.
+//! What processes have worked, and what memory they hold.
 
 use std::fs;
 
@@ -17,6 +17,14 @@ pub(super) fn cpu_s(pid: Option<u32>) -> Option<f64> {
     Some((user + system) / TICKS_PER_S)
 }
 
+/// Memory of a process that is in use, MiB. None where the system does not say.
+pub(super) fn memory_mib(pid: u32) -> Option<f64> {
+    let status = fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    let kib: f64 = line.split_whitespace().next()?.parse().ok()?;
+    Some(kib / 1024.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -31,5 +39,14 @@ mod tests {
         let worked = cpu_s(Some(std::process::id())).expect("the same") - before;
         assert!(worked > 0.02, "{worked}");
         assert!(cpu_s(Some(u32::MAX)).is_none());
+    }
+
+    #[test]
+    fn memory_is_seen() {
+        let before = memory_mib(std::process::id()).expect("this process");
+        let held = std::hint::black_box(vec![1_u8; 64 << 20]);
+        let now = memory_mib(std::process::id()).expect("this process");
+        assert!(now > before + 32.0, "{before} {now} with {} bytes", held.len());
+        assert!(memory_mib(u32::MAX).is_none());
     }
 }
