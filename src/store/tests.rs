@@ -1,6 +1,7 @@
 //! The catalogue on a disk that fails, fills up, or holds something else.
 
 mod crashes;
+mod files;
 mod formats;
 mod jobs;
 pub(crate) mod requests;

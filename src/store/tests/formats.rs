@@ -26,6 +26,9 @@ const FORMAT_4: &str = include_str!("format_4.json");
 /// Rows of format 5.
 const FORMAT_5: &str = include_str!("format_5.json");
 
+/// All formats that are read, with their rows.
+pub(super) const FORMATS: [(u64, &str); 3] = [(3, FORMAT_3), (4, FORMAT_4), (5, FORMAT_5)];
+
 /// A robot of two links of primitives, one of which a body replaces.
 const URDF: &str = r#"<robot name="arm">
   <link name="base"><collision><geometry><sphere radius="0.5"/></geometry></collision></link>
@@ -33,7 +36,7 @@ const URDF: &str = r#"<robot name="arm">
   <joint name="turn" type="continuous"><parent link="base"/><child link="tool"/><origin xyz="0 0 2"/></joint>
 </robot>"#;
 
-type Rows = BTreeMap<String, BTreeMap<String, String>>;
+pub(super) type Rows = BTreeMap<String, BTreeMap<String, String>>;
 
 /// A robot in two scenes.
 fn fill_robots(catalogue: &Catalogue) {
@@ -130,7 +133,7 @@ fn text_rows(transaction: &WriteTransaction) -> Rows {
     rows
 }
 
-fn write_rows(transaction: &WriteTransaction, rows: &Rows) {
+pub(super) fn write_rows(transaction: &WriteTransaction, rows: &Rows) {
     let put = |definition: TableDefinition<&str, &[u8]>, name: &str| {
         let mut table = transaction.open_table(definition).expect("a table");
         for (key, value) in rows.get(name).into_iter().flatten() {
@@ -200,10 +203,16 @@ fn holding(rows: &Rows) -> Disk {
 #[test]
 fn rows_of_format_5_are_read() {
     let read = holding(&rows_in(FORMAT_5)).load().expect("loads");
+    holds_what_was_filled_in(&read);
+    holds_robots(&read);
+}
+
+/// All that [`fill_robots`] makes, and the jobs of [`fill`].
+pub(super) fn holds_robots(read: &Catalogue) {
     let whole = Disk::default().load().expect("a new catalogue");
     fill(&whole);
     fill_robots(&whole);
-    let [found, made] = [&read, &whole].map(|catalogue| catalogue.scene("hall").expect("there"));
+    let [found, made] = [read, &whole].map(|catalogue| catalogue.scene("hall").expect("there"));
     assert_eq!((found.revision(), found.len()), (made.revision(), 3));
     for (slot, object, pose) in made.objects() {
         let other = found.slot(&object.name).expect("there");
@@ -287,7 +296,7 @@ fn jobs_of_format_3_are_read_in_every_state() {
 }
 
 /// All that [`fill`] makes, but for jobs that earlier formats do not have.
-fn holds_what_was_filled_in(read: &Catalogue) {
+pub(super) fn holds_what_was_filled_in(read: &Catalogue) {
     let whole = Disk::default().load().expect("a new catalogue");
     fill(&whole);
     let ids = |catalogue: &Catalogue| catalogue.bodies(None, 99).0.iter().map(|body| *body.id()).collect::<Vec<_>>();
