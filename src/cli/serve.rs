@@ -55,6 +55,9 @@ pub(super) struct ServeArgs {
     /// Roots of the certificates that clients have to show, PEM [default: clients need none]
     #[arg(long, value_name = "FILE", requires = "tls_certificate")]
     tls_client_ca: Option<PathBuf>,
+    /// Lists of those that are revoked (CRL), PEM [default: none is]
+    #[arg(long, value_name = "FILE", requires = "tls_client_ca")]
+    tls_client_crl: Option<PathBuf>,
     /// Listen where others can reach it without certificates or tokens: everybody may do everything
     #[arg(long)]
     insecure: bool,
@@ -66,6 +69,7 @@ impl ServeArgs {
             certificate: self.tls_certificate.clone(),
             key: self.tls_key.clone(),
             client_ca: self.tls_client_ca.clone(),
+            client_crl: self.tls_client_crl.clone(),
         };
         Flags {
             listen: self.listen,

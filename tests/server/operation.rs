@@ -6,7 +6,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, IsCa, KeyPair};
+use rcgen::{
+    BasicConstraints, CertificateParams, CertificateRevocationListParams, CertifiedIssuer, IsCa, KeyIdMethod, KeyPair,
+    RevokedCertParams,
+};
 use sublevel::body::Body;
 use sublevel::client::{Client, ClientError, ClientOptions, Question, StatesQuestion};
 use sublevel::measure::Pose;
@@ -31,10 +34,41 @@ impl Issuer {
 
     /// A certificate for 127.0.0.1 and its key, written as NAME.pem and NAME.key.
     pub(crate) fn write(&self, dir: &Path, name: &str, expired: bool) -> [PathBuf; 2] {
+        self.write_with(dir, name, |params| {
+            if expired {
+                params.not_after = rcgen::date_time_ymd(2001, 1, 1);
+            }
+        })
+    }
+
+    /// The same with a number.
+    fn write_numbered(&self, dir: &Path, name: &str, number: u64) -> [PathBuf; 2] {
+        self.write_with(dir, name, |params| params.serial_number = Some(number.into()))
+    }
+
+    /// A list of numbers that are revoked.
+    fn write_revoked(&self, path: &Path, numbers: &[u64]) {
+        let revoked = |&number: &u64| RevokedCertParams {
+            serial_number: number.into(),
+            revocation_time: rcgen::date_time_ymd(2020, 1, 1),
+            reason_code: None,
+            invalidity_date: None,
+        };
+        let list = CertificateRevocationListParams {
+            this_update: rcgen::date_time_ymd(2020, 1, 1),
+            next_update: rcgen::date_time_ymd(4000, 1, 1),
+            crl_number: 1.into(),
+            issuing_distribution_point: None,
+            revoked_certs: numbers.iter().map(revoked).collect(),
+            key_identifier_method: KeyIdMethod::Sha256,
+        };
+        let signed = list.signed_by(&self.0).expect("signed");
+        std::fs::write(path, signed.pem().expect("PEM")).expect("written");
+    }
+
+    fn write_with(&self, dir: &Path, name: &str, change: impl FnOnce(&mut CertificateParams)) -> [PathBuf; 2] {
         let mut params = CertificateParams::new(vec!["127.0.0.1".to_owned()]).expect("parameters");
-        if expired {
-            params.not_after = rcgen::date_time_ymd(2001, 1, 1);
-        }
+        change(&mut params);
         let key = KeyPair::generate().expect("a key");
         let certificate = params.signed_by(&key, &self.0).expect("signed");
         let files = [dir.join(format!("{name}.pem")), dir.join(format!("{name}.key"))];
@@ -92,6 +126,13 @@ async fn a_client_needs_the_root_and_sees_a_new_certificate() {
     if let Ok(client) = Client::connect(&server.url()).await {
         client.list_scenes().await.expect_err("not encrypted");
     }
+    // A server whose own certificate has expired is not believed.
+    let [certificate_2, key_2] = issuer.write(dir.path(), "expired", true);
+    let mut serve = command(&dir.path().join("data-2"));
+    serve.arg("--tls-certificate").arg(&certificate_2).arg("--tls-key").arg(&key_2);
+    let late = Running::spawn(serve);
+    let expired = Client::connect_with(&https(&late), &with(&ca)).await.expect_err("expired");
+    assert!(matches!(expired, ClientError::Unreachable { .. }), "{expired}");
     let rootless = Client::connect_with(&https(&server), &ClientOptions::default()).await.expect_err("no root");
     assert!(rootless.to_string().contains("SUBLEVEL_CA"), "{rootless}");
 
@@ -115,9 +156,12 @@ async fn a_server_can_ask_clients_for_certificates() {
     clients.write_root(&client_ca);
     let mut serve = command(&dir.path().join("data"));
     serve.arg("--tls-certificate").arg(&certificate).arg("--tls-key").arg(&key);
-    serve.arg("--tls-client-ca").arg(&client_ca);
+    let crl = dir.path().join("revoked.pem");
+    clients.write_revoked(&crl, &[]);
+    serve.arg("--tls-client-ca").arg(&client_ca).arg("--tls-client-crl").arg(&crl);
     let server = Running::spawn(serve);
     let known = clients.write(dir.path(), "known", false);
+    let lost = clients.write_numbered(dir.path(), "lost", 77);
     let expired = clients.write(dir.path(), "expired", true);
     let foreign = issuer.write(dir.path(), "foreign", false);
     let reach = async |identity: Option<[PathBuf; 2]>| {
@@ -128,10 +172,23 @@ async fn a_server_can_ask_clients_for_certificates() {
             Err(_) => false,
         }
     };
-    assert!(reach(Some(known)).await);
+    assert!(reach(Some(known.clone())).await);
+    assert!(reach(Some(lost.clone())).await);
     assert!(!reach(None).await, "no certificate");
     assert!(!reach(Some(expired)).await, "expired");
     assert!(!reach(Some(foreign)).await, "of another root");
+    let torn = dir.path().join("torn.pem");
+    let text = std::fs::read_to_string(&known[0]).expect("read");
+    std::fs::write(&torn, &text[..text.len() / 2]).expect("written");
+    assert!(!reach(Some([torn, known[1].clone()])).await, "malformed");
+
+    clients.write_revoked(&crl, &[77]);
+    eventually(async || !reach(Some(lost.clone())).await).await;
+    assert!(reach(Some(known.clone())).await, "the others go on");
+    // What is no list changes nothing.
+    std::fs::write(&crl, "nonsense").expect("written");
+    tokio::time::sleep(Duration::from_millis(2500)).await;
+    assert!(!reach(Some(lost)).await && reach(Some(known)).await, "the earlier list stays");
 }
 
 #[tokio::test(flavor = "multi_thread")]

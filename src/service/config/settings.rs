@@ -47,6 +47,9 @@ pub struct TlsConfig {
     /// Roots of the certificates that clients have to show; none: clients need none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub client_ca: Option<PathBuf>,
+    /// Lists of those that are revoked (CRL), one of each root and issuer; none: none is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub client_crl: Option<PathBuf>,
 }
 
 /// Widest instructions that queries use.
@@ -135,6 +138,10 @@ impl Config {
         if self.admin.is_some_and(|admin| admin == self.listen && admin.port() != 0) {
             return refuse("admin", format!("is {}, which is the address of listen; choose another port", self.listen));
         }
+        if self.tls.as_ref().is_some_and(|tls| tls.client_crl.is_some() && tls.client_ca.is_none()) {
+            let why = "is set, and tls.client_ca is not: no client is asked for a certificate; name the roots";
+            return refuse("tls.client_crl", why.into());
+        }
         if self.data.as_os_str().is_empty() {
             return refuse("data", "is empty; name a directory".into());
         }
@@ -157,7 +164,12 @@ mod tests {
         let all = Config {
             admin: Some(([127, 0, 0, 1], 9000).into()),
             tokens: Some("tokens.toml".into()),
-            tls: Some(TlsConfig { certificate: "a.pem".into(), key: "b.pem".into(), client_ca: Some("c.pem".into()) }),
+            tls: Some(TlsConfig {
+                certificate: "a.pem".into(),
+                key: "b.pem".into(),
+                client_ca: Some("c.pem".into()),
+                client_crl: Some("d.pem".into()),
+            }),
             ..Config::default()
         };
         for config in [Config::default(), all] {
@@ -171,10 +183,13 @@ mod tests {
         let why = public.check().expect_err("public").to_string();
         assert!(why.contains("listen is 0.0.0.0:1") && why.contains("[tls]") && why.contains("--insecure"), "{why}");
         assert!(Config { insecure: true, ..public.clone() }.check().is_ok());
-        let tls = Some(TlsConfig { certificate: "a".into(), key: "b".into(), client_ca: None });
-        let encrypted = Config { tls, ..public };
+        let files = TlsConfig { certificate: "a".into(), key: "b".into(), client_ca: None, client_crl: None };
+        let revoking = Some(TlsConfig { client_crl: Some("d".into()), ..files.clone() });
+        let encrypted = Config { tls: Some(files), ..public };
         assert!(encrypted.check().expect_err("no tokens").to_string().contains("tokens is not set"));
         assert!(Config { tokens: Some("t".into()), ..encrypted }.check().is_ok());
+        let why = Config { tls: revoking, ..Config::default() }.check().expect_err("no roots").to_string();
+        assert!(why.contains("tls.client_crl") && why.contains("tls.client_ca"), "{why}");
         let twice = Config { admin: Some(Config::default().listen), ..Config::default() };
         assert!(twice.check().expect_err("one address").to_string().starts_with("admin is"));
     }

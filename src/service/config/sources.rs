@@ -49,11 +49,14 @@ pub struct TlsFlags {
     /// See [`TlsConfig::client_ca`](super::settings::TlsConfig::client_ca).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub client_ca: Option<PathBuf>,
+    /// See [`TlsConfig::client_crl`](super::settings::TlsConfig::client_crl).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub client_crl: Option<PathBuf>,
 }
 
 impl TlsFlags {
     fn is_empty(&self) -> bool {
-        self.certificate.is_none() && self.key.is_none() && self.client_ca.is_none()
+        [&self.certificate, &self.key, &self.client_ca, &self.client_crl].into_iter().all(Option::is_none)
     }
 }
 
