@@ -13,10 +13,13 @@ use super::error::{self, Invalid};
 use super::proto::{StreamPosesRequest, StreamPosesResponse};
 use super::{packed, wire};
 use crate::measure::Pose;
-use crate::scene::{MAX_OBJECTS, Scene, SceneError};
+use crate::scene::{MAX_OBJECTS, Scene, SceneError, Slot};
 use crate::store::{CatalogueError, LiveScene};
 
 type Replies = mpsc::Sender<Result<StreamPosesResponse, Status>>;
+
+/// Poses that are applied by the thread that reads them: tens of microseconds.
+const FEW_POSES: usize = 512;
 
 /// What messages refer to.
 #[derive(Debug)]
@@ -45,14 +48,7 @@ pub(super) async fn run(app: AppState, mut messages: Streaming<StreamPosesReques
     let mut reply: Option<StreamPosesResponse> = None;
     let mut stopped_before_end = false;
     loop {
-        if applying.is_none()
-            && pending.messages > 0
-            && let Some(table) = &table
-        {
-            let poses = std::mem::take(&mut pending);
-            applying = Some(tokio::spawn(apply(app.clone(), table.scene.clone(), table.live.clone(), poses)));
-        }
-        if ended && applying.is_none() && reply.is_none() {
+        if ended && pending.messages == 0 && applying.is_none() && reply.is_none() {
             if stopped_before_end {
                 let why = "the server stops; stream again when it is back";
                 let _ = replies.send(Err(error::unavailable("STOPPING", why))).await;
@@ -90,6 +86,15 @@ pub(super) async fn run(app: AppState, mut messages: Streaming<StreamPosesReques
             () = stopped(&mut stopping), if !ended => {
                 ended = true;
                 stopped_before_end = true;
+            }
+            // In no order: what has come already may be merged first, and all others have their turn.
+            () = std::future::ready(()), if applying.is_none() && pending.messages > 0 => {
+                let (Some(table), poses) = (&table, std::mem::take(&mut pending)) else { continue };
+                match apply_at_once(&app, table, &poses).await {
+                    Some(Ok(done)) => reply = Some(merged(reply.take(), done)),
+                    Some(Err(status)) => { let _ = replies.send(Err(status)).await; return; }
+                    None => applying = Some(tokio::spawn(apply(app.clone(), table.live.clone(), poses))),
+                }
             }
             applied = async { match &mut applying { Some(task) => task.await, None => std::future::pending().await } } => {
                 applying = None;
@@ -198,30 +203,55 @@ fn no_object(name: &str, field: &str, scene: &str) -> Status {
     error::not_found("object", name, field, why)
 }
 
-async fn apply(
-    app: AppState,
-    scene: String,
-    live: Arc<LiveScene>,
-    pending: Pending,
-) -> Result<StreamPosesResponse, Status> {
-    let catalogue = app.catalogue().await?;
-    let is_there = catalogue.live_scene(&scene).is_ok_and(|now| Arc::ptr_eq(&now, &live));
+/// Applies poses here, if they are few, nothing has to be written, and nobody else changes the
+/// scene.
+async fn apply_at_once(
+    app: &AppState,
+    table: &Table,
+    pending: &Pending,
+) -> Option<Result<StreamPosesResponse, Status>> {
+    let catalogue = match app.catalogue().await {
+        Ok(catalogue) => catalogue,
+        Err(status) => return Some(Err(status)),
+    };
+    let is_there = catalogue.live_scene(&table.scene).is_ok_and(|now| Arc::ptr_eq(&now, &table.live));
     if !is_there {
-        return Err(error::catalogue(&CatalogueError::NoScene(scene), "scene"));
+        return Some(Err(error::catalogue(&CatalogueError::NoScene(table.scene.clone()), "scene")));
     }
-    let Pending { poses, sequence, messages, merged, since } = pending;
-    let count = poses.len() as u64 + u64::from(merged);
+    if pending.poses.len() > FEW_POSES {
+        return None;
+    }
+    let next = catalogue.stream_poses_at_once(&table.live, |scene| Ok(pending.placed(scene)))?;
+    Some(acknowledged(app, pending, next))
+}
+
+async fn apply(app: AppState, live: Arc<LiveScene>, pending: Pending) -> Result<StreamPosesResponse, Status> {
+    let catalogue = app.catalogue().await?;
     let moved = tokio::task::spawn_blocking(move || {
-        catalogue.stream_poses::<CatalogueError>(&live, |scene| {
-            // An object that was removed meanwhile, or is a link now, needs no pose.
-            let slot = |name: &str| {
-                let slot = scene.slot(name)?;
-                scene.object(slot).is_some_and(|object| object.link.is_none()).then_some(slot)
-            };
-            Ok(poses.into_iter().filter_map(|(name, pose)| Some((slot(&name)?, pose))).collect())
-        })
+        let next = catalogue.stream_poses::<CatalogueError>(&live, |scene| Ok(pending.placed(scene)));
+        (pending, next)
     });
-    let next = match moved.await.map_err(|error| error::internal_panic(&error))? {
+    let (pending, next) = moved.await.map_err(|error| error::internal_panic(&error))?;
+    acknowledged(&app, &pending, next)
+}
+
+impl Pending {
+    /// Slots with their poses. An object that was removed meanwhile, or is a link now, needs none.
+    fn placed(&self, scene: &Scene) -> Vec<(Slot, Pose)> {
+        let slot = |name: &str| {
+            let slot = scene.slot(name)?;
+            scene.object(slot).is_some_and(|object| object.link.is_none()).then_some(slot)
+        };
+        self.poses.iter().filter_map(|(name, pose)| Some((slot(name)?, *pose))).collect()
+    }
+}
+
+fn acknowledged(
+    app: &AppState,
+    &Pending { ref poses, sequence, messages, merged, since }: &Pending,
+    next: Result<Scene, CatalogueError>,
+) -> Result<StreamPosesResponse, Status> {
+    let next = match next {
         Ok(next) => next,
         Err(CatalogueError::Scene(SceneError::Pose { name, error })) => {
             let why = format!("object \"{name}\" would be held at no usable pose: {error}");
@@ -231,6 +261,7 @@ async fn apply(
         }
         Err(error) => return Err(error::catalogue(&error, "scene")),
     };
+    let count = poses.len() as u64 + u64::from(merged);
     app.metrics().streamed(count, merged.into(), since.map(|since| since.elapsed()).unwrap_or_default());
     Ok(StreamPosesResponse {
         revision: next.revision(),

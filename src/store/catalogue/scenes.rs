@@ -321,6 +321,27 @@ impl Catalogue {
         Ok(next)
     }
 
+    /// The same where nothing has to be written and nobody else changes the scene: then it takes no
+    /// longer than to set the poses, and need not run on a thread that may block. None elsewhere.
+    pub fn stream_poses_at_once<E: From<CatalogueError>>(
+        &self,
+        live: &LiveScene,
+        place: impl FnOnce(&Scene) -> Result<Vec<(Slot, Pose)>, E>,
+    ) -> Option<Result<Scene, E>> {
+        let _changing = live.try_change()?;
+        let scene = live.snapshot();
+        if live.origin.is_some() {
+            live.touch();
+        } else if scene.revision() + RESERVE / 2 > live.reserved.load(Ordering::Relaxed) {
+            return None;
+        }
+        let next = place(&scene).and_then(|poses| Ok(scene.with_poses(&poses).map_err(CatalogueError::from)?));
+        if let Ok(next) = &next {
+            live.publish(next.clone());
+        }
+        Some(next)
+    }
+
     fn reserve(&self, live: &LiveScene) -> Result<(), StoreError> {
         let mut store = self.writer()?;
         let scene = live.snapshot();
