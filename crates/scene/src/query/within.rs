@@ -18,6 +18,11 @@ use crate::scene::Scene;
 /// Objects of a chunk.
 const CHUNK: usize = 16;
 
+/// Most objects that are asked about, and pairs that may be near, of a question that is answered
+/// where it is asked.
+const BRIEF_OBJECTS: usize = 2;
+const BRIEF_PAIRS: usize = 16;
+
 /// A pair that is not proven to be beyond the margin.
 #[derive(Clone, Debug)]
 pub struct Found {
@@ -92,6 +97,20 @@ impl Question for Within {
 
     fn chunks(&self) -> usize {
         self.candidates.len().div_ceil(CHUNK)
+    }
+
+    fn is_brief(&self) -> bool {
+        if self.candidates.len() > BRIEF_OBJECTS || self.ask.measures() != [Measure::Distance] {
+            return false;
+        }
+        let (scene, mut pairs) = (self.candidates.scene(), 0);
+        let is_single = |slot: Slot| scene.object(slot).is_some_and(|object| object.geometry.is_single());
+        for index in 0..self.candidates.len() {
+            self.candidates.visit(index, self.margin_m, |a, b| {
+                pairs += if is_single(a) && is_single(b) { 1 } else { BRIEF_PAIRS };
+            });
+        }
+        pairs <= BRIEF_PAIRS
     }
 
     fn solve(&self, chunk: usize, stop: &Stop) -> Self::Part {
