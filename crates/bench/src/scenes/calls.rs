@@ -10,7 +10,7 @@ use sublevel::service::proto::evaluate_request::Question;
 use sublevel::service::proto::query_service_client::QueryServiceClient;
 use sublevel::service::proto::{EvaluateRequest, Layout, Measure, PairList, UploadBlobRequest};
 
-use super::bricks::{brick, bricks, seconds};
+use super::bricks::{RUNS, brick, bricks, seconds};
 use crate::loopback::Loopback;
 use crate::panda::{Arm, LoadedArm, Problem, RobotServer, Site, StatesCall};
 
@@ -125,7 +125,7 @@ pub(super) fn check_states(
     let mut calls = Vec::new();
     for problem in problems {
         let StatesCall { states, free, call_us, inside_us } =
-            server.check_states((arm, loaded, robot), &Site::new(problem)?, (crew, 11))?;
+            server.check_states((arm, loaded, robot), &Site::new(problem)?, (crew, RUNS))?;
         calls.push(Call {
             method: "CheckStates".into(),
             about: format!("{} bodies, {}", loaded.pieces, problem.family),

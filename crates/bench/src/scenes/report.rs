@@ -3,8 +3,9 @@
 use std::fmt::Write;
 
 use super::Scenes;
+use super::bricks::RUNS;
 use super::calls::Call;
-use super::ticks::Tick;
+use super::ticks::{TICKS, Tick};
 use crate::blocks::block;
 
 impl Scenes {
@@ -15,11 +16,12 @@ impl Scenes {
         let command = format!("sublevel-bench scenes --data DIR{flags}");
         // Writing to a string cannot fail.
         let _ = writeln!(text, "{}\n", self.machine.head_with(&command, "all of which are used"));
+        let _ = writeln!(text, "Medians of {RUNS} runs, ticks of {TICKS}; server and client share the cores.\n");
         text.push_str(
-            "Medians of eleven runs; server and client share the cores.\n\n\
-             ## Calls\n\n\
+            "## Calls\n\n\
              The same question over gRPC and in process, on all cores. `Evaluate` is compared with a loop over the \
-             library's distances, without scene, names or threads that wait, and less the transport of as many bytes. \
+             library's distances, each with its warm start, without scene, names or threads that wait, and less the \
+             transport of as many bytes. \
              `CheckStates` are 1 000 states of a Franka Emika Panda (links of degree 6) by their joint values, among the \
              boxes and cylinders of a planning problem: half of the states on the straight path of the joints, half anywhere.\n\n",
         );

@@ -20,7 +20,7 @@ const MOVED: u32 = 10;
 /// Farthest from where it was at first along each axis, metres.
 const STEP_M: f64 = 0.01;
 /// Ticks of a scene.
-const TICKS: usize = 15;
+pub(super) const TICKS: usize = 15;
 
 /// Ticks of a scene: medians.
 #[derive(Clone, Debug)]
