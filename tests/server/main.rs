@@ -1,6 +1,7 @@
 //! The server as its users meet it: a real process, gRPC, signals, and a disk.
 
 mod answers;
+mod data;
 mod deadlines;
 mod families;
 #[cfg(feature = "fit")]
@@ -8,6 +9,7 @@ mod fits;
 mod harness;
 #[cfg(feature = "fit")]
 mod hierarchy;
+mod hostile;
 mod keeping;
 mod kills;
 mod lifecycle;

@@ -8,9 +8,9 @@ use nalgebra::Vector3;
 use sublevel::body::Body;
 use sublevel::service::proto::evaluate_request::Question;
 use sublevel::service::proto::{
-    CastRaysRequest, CheckStatesRequest, CreateSceneRequest, DeleteBodyRequest, DeleteSceneRequest, EvaluateRequest,
-    GetBodyRequest, GetSceneRequest, Layout, ListBodiesRequest, Measure, MeasureAccuracy, Object, ObjectPair,
-    ObjectPose, PairList, Pose, Selection, UpdateSceneRequest, WithinMargin,
+    Attach, Attachment, CastRaysRequest, CheckStatesRequest, CreateSceneRequest, DeleteBodyRequest, DeleteSceneRequest,
+    EvaluateRequest, GetBodyRequest, GetSceneRequest, Layout, ListBodiesRequest, Measure, MeasureAccuracy, Object,
+    ObjectPair, ObjectPose, PairList, Pose, Selection, UpdateSceneRequest, WithinMargin,
 };
 use tonic::{Code, Status};
 
@@ -41,6 +41,14 @@ async fn scene_updates() {
     let (invalid, missing) = (Code::InvalidArgument, Code::NotFound);
     let unit = [0.0, 0.0, 0.0, 1.0];
     let unknown = "0".repeat(64);
+    let twice = object("c", &id, at(9.0));
+    let attach = |pairs: &[(&str, &str)]| {
+        let attach = |(object, to): &(&str, &str)| {
+            let attachment = Some(Attachment { to: (*to).into(), ..Attachment::default() });
+            Attach { object: (*object).into(), attachment }
+        };
+        UpdateSceneRequest { attach: pairs.iter().map(attach).collect(), ..update() }
+    };
     let cases = [
         (UpdateSceneRequest { scene: "elsewhere".into(), ..update() }, missing, "scene"),
         (UpdateSceneRequest { scene: String::new(), ..update() }, invalid, "scene"),
@@ -64,6 +72,16 @@ async fn scene_updates() {
         (UpdateSceneRequest { remove_objects: vec!["a".into(), "a".into()], ..update() }, invalid, "remove_objects[1]"),
         (UpdateSceneRequest { allow_pairs: vec![subjects("a", "z")], ..update() }, missing, "allow_pairs[0]"),
         (UpdateSceneRequest { forbid_pairs: vec![subjects("a", "a")], ..update() }, invalid, "forbid_pairs[0]"),
+        (attach(&[("z", "a")]), missing, "attach[0].object"),
+        (attach(&[("a", "z")]), missing, "attach[0].object"),
+        (attach(&[("a", "a")]), invalid, "attach[0].object"),
+        (attach(&[("a", "b"), ("b", "a")]), invalid, "attach"),
+        (UpdateSceneRequest { detach: vec!["z".into()], ..update() }, missing, "detach[0]"),
+        (
+            UpdateSceneRequest { upsert_objects: vec![twice.clone(), twice], ..update() },
+            invalid,
+            "upsert_objects[1].name",
+        ),
     ];
     for (request, code, at) in cases {
         // A refused update changes nothing, so the good half of it must not be seen either.
@@ -201,6 +219,9 @@ async fn queries() {
         let status = clients.queries.evaluate(request).await.expect_err(at);
         check(&status, code, at);
     }
+    // As far as numbers go is no reason to refuse: everything is near.
+    let all = clients.queries.evaluate(within(f64::MAX)).await.expect("answers").into_inner();
+    assert_eq!((all.objects.len(), all.answers.len()), (2, 1));
     let later = EvaluateRequest { at_least_revision: Some(1 << 40), ..distance() };
     let status = clients.queries.evaluate(later).await.expect_err("not reached");
     assert_eq!((status.code(), reason(&status).as_str()), (Code::Unavailable, "REVISION_NOT_REACHED"));
@@ -246,6 +267,11 @@ async fn states_and_rays() {
         let status = clients.queries.check_states(request).await.expect_err(at);
         check(&status, code, at);
     }
+    let many = (1 << 16) + 1;
+    let status = clients.queries.check_states(CheckStatesRequest { poses: still.repeat(many).into(), ..states() });
+    let status = status.await.expect_err("too many");
+    check(&status, Code::ResourceExhausted, "poses");
+    assert!(status.message().contains("max_states"), "{}", status.message());
     // A pose that is none makes its state INVALID, and the others are answered.
     let mut poses = still.clone();
     poses.extend(numbers(&[f64::NAN, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
@@ -277,6 +303,15 @@ async fn states_and_rays() {
         let status = clients.queries.cast_rays(request).await.expect_err(at);
         check(&status, code, at);
     }
+    let many = (1 << 15) + 1;
+    let bundle = CastRaysRequest {
+        origins_m: numbers(&[-5.0, 0.0, 0.0]).repeat(many).into(),
+        directions: numbers(&[1.0, 0.0, 0.0]).repeat(many).into(),
+        ..rays()
+    };
+    let status = clients.queries.cast_rays(bundle).await.expect_err("too many");
+    check(&status, Code::ResourceExhausted, "origins_m");
+    assert!(status.message().contains("max_rays"), "{}", status.message());
     let hit = clients.queries.cast_rays(rays()).await.expect("answers").into_inner();
     let lower = f64::from_le_bytes(hit.lower_m[..8].try_into().expect("a number"));
     assert_eq!((hit.objects, &hit.hits[..]), (vec!["a".to_owned()], &[0, 0, 0, 0][..]));
