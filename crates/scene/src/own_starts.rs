@@ -17,7 +17,7 @@ const MOST: usize = 64;
 static GIVEN: AtomicUsize = AtomicUsize::new(0);
 
 /// Warm starts of one caller that asks again and again about the same pairs, such as a stream: how
-/// another caller moves these pairs does not lead it astray. It keeps one table; questions about
+/// another caller moves these pairs changes nothing here. It keeps one table; questions about
 /// another scene, which is not a fork, begin a new one.
 #[derive(Debug, Default)]
 pub struct OwnStarts(Option<Table>);

@@ -58,7 +58,7 @@ fn iterations(answers: &[Answer]) -> u32 {
 /// Two callers move the same objects, one of them without any order. The other one, which has
 /// starts of its own, needs as little as if it were alone, and its answers hold.
 #[test]
-fn a_caller_with_starts_of_its_own_is_not_led_astray() {
+fn a_caller_with_starts_of_its_own_does_not_depend_on_others() {
     let (crew, scene, mut random) = (Crew::new(1).expect("a thread"), row(), Seeded(11));
     let (mut own, mut state, mut alone) = (OwnStarts::default(), scene.clone(), row());
     ask(&crew, alone.clone(), false);
