@@ -192,9 +192,9 @@ fn settings(request: &CheckMotionsRequest) -> Result<MotionSettings, Invalid> {
 fn motions_error(error: &RobotMotionsError) -> Invalid {
     let field = match error {
         RobotMotionsError::NoRobot(_) => "robot".to_owned(),
-        RobotMotionsError::Held(_)
-        | RobotMotionsError::Twice(_)
-        | RobotMotionsError::HalfSpace(_) => "moving.names".to_owned(),
+        RobotMotionsError::Held(_) | RobotMotionsError::Twice(_) | RobotMotionsError::HalfSpace(_) => {
+            "moving.names".to_owned()
+        }
         RobotMotionsError::TooFar(_) | RobotMotionsError::Far(_) => "robot".to_owned(),
         RobotMotionsError::NoShape(_) => "scene".to_owned(),
         RobotMotionsError::Problem(MotionProblemError::Obstacle(_)) => "moving.end_poses".to_owned(),

@@ -157,7 +157,12 @@ fn slides_half_spaces_capsules_and_moving_obstacles() {
         (2.9 * t.cos() - 2.0).hypot(2.4 - 2.9 * t.sin()) - 0.3
     };
     let contact = found.contact.expect("a contact");
-    assert!(gap(found.alpha) >= -1e-9 && gap(contact.s) <= 1e-9 && contact.s - found.alpha < 1e-5, "{} {}", found.alpha, contact.s);
+    assert!(
+        gap(found.alpha) >= -1e-9 && gap(contact.s) <= 1e-9 && contact.s - found.alpha < 1e-5,
+        "{} {}",
+        found.alpha,
+        contact.s
+    );
     // Two balls on one link never move against each other.
     let two = |x: f64| MotionBody { name: format!("{x}").into(), link: 2, place: at(x, 0.0, 0.0), shape: ball(0.1) };
     let rigid = problem(vec![two(0.0), two(0.5)], Vec::new(), 0.0);

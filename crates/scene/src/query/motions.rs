@@ -399,7 +399,8 @@ fn problem(
     // What they hold, each after its holder.
     let holders: Vec<Slot> = moving.iter().map(|object| object.slot).collect();
     for slot in scene.held_by(&holders) {
-        let Some((object, attachment)) = scene.object(slot).and_then(|object| Some((object, object.attachment.as_ref()?)))
+        let Some((object, attachment)) =
+            scene.object(slot).and_then(|object| Some((object, object.attachment.as_ref()?)))
         else {
             continue;
         };

@@ -122,10 +122,7 @@ pub(in crate::measure) fn between(
             }
         };
     }
-    if runs(Stage::Edges)
-        && !(of_a.0.is_smooth() && of_b.0.is_smooth())
-        && !matches!(warm.hint, Hint::Overlap { .. })
-    {
+    if runs(Stage::Edges) && !(of_a.0.is_smooth() && of_b.0.is_smooth()) && !matches!(warm.hint, Hint::Overlap { .. }) {
         return match of_edges(of_a, of_b, goal, options, warm) {
             Ok(found) => found,
             Err(rounds) => query.search(&Lost::after(rounds), warm),

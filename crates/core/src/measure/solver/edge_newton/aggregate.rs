@@ -11,7 +11,7 @@ use crate::polynomial::{NEAR_LEVEL, NumberJet, Simd, ThirdCeiling};
 const SUM_ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// No value, gradient or Hessian.
-pub(super) const NOTHING: NumberJet<f64> = NumberJet { value: 0.0, gradient: [0.0; 3], hessian: [0.0; 6] };
+const NOTHING: NumberJet<f64> = NumberJet { value: 0.0, gradient: [0.0; 3], hessian: [0.0; 6] };
 
 /// All constraints of a body at a point, in its normalized coordinates.
 pub(super) struct Evaluated {
@@ -33,10 +33,10 @@ impl Evaluated {
         (Self { jets, count: constraints.len() }, dot::<S, f64>(z, z) <= radius * radius)
     }
 
-    /// With their positions.
+    /// Positions, values and gradients.
     #[inline(always)]
-    pub(super) fn iter(&self) -> impl Iterator<Item = (usize, &NumberJet<f64>)> {
-        self.jets[..self.count].iter().enumerate()
+    pub(super) fn iter(&self) -> impl Iterator<Item = (usize, f64, V3<f64>)> {
+        self.jets[..self.count].iter().enumerate().map(|(i, jet)| (i, jet.value, jet.gradient))
     }
 
     /// The constraint with the largest value.
@@ -64,7 +64,14 @@ impl Weighted {
     #[inline(always)]
     pub(super) fn normalized(&self) -> Option<Self> {
         let sum = self.weight[0] + self.weight[1] + self.weight[2];
-        (sum > 0.0 && sum.is_finite()).then(|| Self { weight: self.weight.map(|weight| weight / sum), ..*self })
+        if sum > 0.0 && sum.is_finite() { Some(self.times(1.0 / sum)) } else { None }
+    }
+
+    /// All weights times a factor.
+    #[inline(always)]
+    pub(super) fn times(&self, factor: f64) -> Self {
+        let [a, b, c] = self.weight;
+        Self { weight: [a * factor, b * factor, c * factor], ..*self }
     }
 
     /// The weighted sum of constraints.
@@ -75,7 +82,9 @@ impl Weighted {
             let jet = &all.jets[i];
             sum.value += weight * jet.value;
             sum.gradient = add_scaled::<S, f64>(sum.gradient, weight, jet.gradient);
-            sum.hessian.iter_mut().zip(jet.hessian).for_each(|(entry, more)| *entry += weight * more);
+            for k in 0..6 {
+                sum.hessian[k] += weight * jet.hessian[k];
+            }
         }
         sum
     }

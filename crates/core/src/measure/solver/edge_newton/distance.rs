@@ -1,6 +1,6 @@
 //! The distance of two bodies of several constraints, inside a proven bracket; see [`super`].
 
-use super::aggregate::{Evaluated, NOTHING, Weighted};
+use super::aggregate::{Evaluated, Weighted};
 use super::quadratic_program::{ActiveRows, MOST_ACTIVE, OnActive, Row, feasible_multipliers, minimize};
 use crate::body::{Body, MAX_CONSTRAINTS};
 use crate::measure::frames::pose::Pose;
@@ -13,9 +13,7 @@ use crate::measure::solver::continuation::{LONGEST_MOVE, limits, worth_a_bracket
 use crate::measure::solver::initial_guess::Start;
 use crate::measure::solver::predictor::Drift;
 use crate::measure::solver::stop_criterion::StopCriterion;
-use crate::measure::solver::tangent_newton::{
-    Bracket, Plane, Relative, Side, Step, TAYLOR_ROUNDING, bracket, moved,
-};
+use crate::measure::solver::tangent_newton::{Bracket, Plane, Relative, Side, Step, TAYLOR_ROUNDING, bracket, moved};
 use crate::measure::solver::two_point_problem::{Apart, Relation, Verdict};
 use crate::polynomial::{NEAR_LEVEL, NumberJet, Simd, WithSimd};
 use nalgebra::Vector3;
@@ -23,8 +21,17 @@ use nalgebra::Vector3;
 /// Most evaluations of both bodies from one start. It changes time only; no test pins it.
 const MAX_ROUNDS: u32 = 16;
 
-/// Most changes of B's active set within a step. It changes time only; no test pins it.
-const MOST_EXCHANGES: usize = 4;
+/// Short steps to points that have passed each other after which the bodies seem to overlap. It
+/// changes time only: their deepest point is found by the general search.
+const MOST_CONTACTS: u32 = 3;
+
+/// Most changes of B's active set, or of the distance, within a step. It changes time only; no test
+/// pins it.
+const MOST_EXCHANGES: usize = 6;
+
+/// Relative error of the distance that a step is made for, beyond which it is made again: what the
+/// normal turns is in proportion to its inverse. It changes time only; no test pins it.
+const UNLIKE: f64 = 0.1;
 
 /// Constraints of a smaller value are left out of a step: it is no longer than a quarter of the
 /// body's size, along which values of the edge of a slab do not grow fivefold. It changes time
@@ -50,8 +57,29 @@ struct Spot {
     point: V3<f64>,
     /// With multipliers, metres.
     active: Weighted,
-    /// The active constraints there, in normalized coordinates.
-    jets: [NumberJet<f64>; MOST_ACTIVE],
+    /// Values and gradients of the active constraints there, in normalized coordinates.
+    tangents: [(f64, V3<f64>); MOST_ACTIVE],
+    /// Sum of their Hessians with their multipliers: xx, xy, xz, yy, yz, zz.
+    hessian: [f64; 6],
+}
+
+impl Spot {
+    /// At the end of a step by normalized coordinates from where the constraints are evaluated.
+    #[inline(always)]
+    fn new<S: Simd>(simd: S, point: V3<f64>, active: Weighted, (evaluated, delta): (&Evaluated, V3<f64>)) -> Self {
+        let mut tangents = [(0.0, [0.0; 3]); MOST_ACTIVE];
+        for k in 0..active.len {
+            tangents[k] = extrapolated(simd, &evaluated.jets[usize::from(active.index[k])], delta);
+        }
+        Self { point, active, tangents, hessian: active.sum(simd, evaluated).hessian }
+    }
+
+    /// The active constraints with their positions.
+    #[inline(always)]
+    fn iter(&self) -> impl Iterator<Item = (usize, f64, V3<f64>)> {
+        let tangent = |k: usize| (usize::from(self.active.index[k]), self.tangents[k].0, self.tangents[k].1);
+        (0..self.active.len).map(tangent)
+    }
 }
 
 /// What is kept of an answer for the next query of the pair.
@@ -135,12 +163,13 @@ struct Linearized {
 }
 
 impl Linearized {
-    /// By constraints that are given with their positions in the body.
+    /// By constraints that are given by their positions in the body, values and gradients, and the
+    /// sum of the Hessians of the active ones, in normalized coordinates.
     #[inline(always)]
-    fn new<'j, S: Simd>(
-        simd: S,
-        jets: impl Iterator<Item = (usize, &'j NumberJet<f64>)>,
-        active: &Weighted,
+    fn new<S: Simd>(
+        _: S,
+        tangents: impl Iterator<Item = (usize, f64, V3<f64>)>,
+        (active, bent): (&Weighted, &[f64; 6]),
         local: &M3<f64>,
     ) -> Self {
         let mut all = Self {
@@ -151,27 +180,28 @@ impl Linearized {
             active: ActiveRows::default(),
             hessian: [0.0; 6],
         };
-        let mut bent = [0.0; 6];
-        for (i, jet) in jets {
-            let weight = active.iter().find_map(|(j, weight)| (j == i).then_some(weight));
-            if weight.is_none() && jet.value <= FAR_INSIDE {
+        for (i, value, gradient) in tangents {
+            let is_active = active.iter().any(|(j, _)| j == i);
+            if !is_active && value <= FAR_INSIDE {
                 continue;
             }
-            let plane = Plane::new(simd, jet, local);
-            let length = dot::<S, f64>(plane.gradient, plane.gradient).sqrt();
+            let gradient = apply::<S, f64>(local, gradient);
+            let length = dot::<S, f64>(gradient, gradient).sqrt();
             let inverse = 1.0 / length;
-            let mean = (0.5 * plane.value + 0.5).max(0.25);
-            let normal = scaled::<S, f64>(plane.gradient, inverse);
-            all.rows[all.count] = Row { normal, excess: (plane.value - 1.0) * mean * inverse };
+            let mean = (0.5 * value + 0.5).max(0.25);
+            all.rows[all.count] =
+                Row { normal: scaled::<S, f64>(gradient, inverse), excess: (value - 1.0) * mean * inverse };
             all.lengths[all.count] = length;
             all.index[all.count] = i as u8;
-            if let Some(weight) = weight {
+            if is_active {
                 all.active.push(all.count);
-                bent.iter_mut().zip(jet.hessian).for_each(|(sum, entry)| *sum += weight * entry);
             }
             all.count += 1;
         }
-        let [b0, b1, b2] = local.map(|row| apply_symmetric::<S, f64>(&bent, row));
+        // No closures: what is inlined into one is not compiled for the vectors at hand.
+        let b0 = apply_symmetric::<S, f64>(bent, local[0]);
+        let b1 = apply_symmetric::<S, f64>(bent, local[1]);
+        let b2 = apply_symmetric::<S, f64>(bent, local[2]);
         all.hessian = [
             dot::<S, f64>(b0, local[0]),
             dot::<S, f64>(b0, local[1]),
@@ -261,11 +291,8 @@ impl Solver<'_> {
         let y = add::<S, f64>(apply::<S, f64>(&relative.rotation, of_b.point), relative.origin);
         let frame = basis(simd, *n);
         let (local_a, local_b) = (side_a.localize(simd, &frame), side_b.localize(simd, &frame));
-        let linearized = |spot: &Spot, local: &M3<f64>| {
-            let jets = (0..spot.active.len).map(|k| (usize::from(spot.active.index[k]), &spot.jets[k]));
-            Linearized::new(simd, jets, &spot.active, local)
-        };
-        let (linear_a, linear_b) = (linearized(of_a, &local_a), linearized(of_b, &local_b));
+        let linear_a = Linearized::new(simd, of_a.iter(), (&of_a.active, &of_a.hessian), &local_a);
+        let linear_b = Linearized::new(simd, of_b.iter(), (&of_b.active, &of_b.hessian), &local_b);
         let difference = apply::<S, f64>(&frame, subtract::<S, f64>(of_a.point, y));
         let Found { step, active } = self.step(simd, &linear_a, &linear_b, difference)?;
         if !step.within(simd, self.limits) {
@@ -297,6 +324,7 @@ impl Solver<'_> {
         rounds: &mut u32,
     ) -> Result<EdgeProven, ()> {
         let (side_a, side_b) = &self.sides;
+        let mut contacts = 0;
         for _ in 0..MAX_ROUNDS {
             if self.options.exhausted(*rounds) {
                 return Err(());
@@ -325,14 +353,18 @@ impl Solver<'_> {
                     active.len = 1;
                 }
             }
-            let linear_a = Linearized::new(simd, of_a.iter(), &at.active[0], &local_a);
-            let linear_b = Linearized::new(simd, of_b.iter(), &at.active[1], &local_b);
+            let [active_a, active_b] = &at.active;
+            let (bent_a, bent_b) = (active_a.sum(simd, &of_a).hessian, active_b.sum(simd, &of_b).hessian);
+            let linear_a = Linearized::new(simd, of_a.iter(), (active_a, &bent_a), &local_a);
+            let linear_b = Linearized::new(simd, of_b.iter(), (active_b, &bent_b), &local_b);
             let Some(mut found) = self.step(simd, &linear_a, &linear_b, difference) else { return Err(()) };
             if found.step.within(simd, worth_a_bracket(self.limits)) {
-                match self.prove(simd, relative, &at, &found, ((&of_a, &local_a), (&of_b, &local_b)), difference) {
+                match self.prove(simd, relative, &at, &found, [(&of_a, &local_a), (&of_b, &local_b)], difference) {
                     Ok(proven) => return Ok(EdgeProven { rounds: *rounds, ..proven }),
-                    Err(touching) if touching => return Err(()),
-                    Err(_) => {}
+                    Err(touching) => contacts += u32::from(touching),
+                }
+                if contacts >= MOST_CONTACTS {
+                    return Err(());
                 }
             }
             let step = &mut found.step;
@@ -357,16 +389,17 @@ impl Solver<'_> {
     #[inline(always)]
     fn step<S: Simd>(&self, simd: S, a: &Linearized, b: &Linearized, difference: V3<f64>) -> Option<Found> {
         let [size_a, size_b] = self.limits;
-        let distance = (difference[2] + a.shift() - b.shift()).max(LEAST_DISTANCE * size_a.min(size_b));
-        let inverse = 1.0 / distance;
+        let least = LEAST_DISTANCE * size_a.min(size_b);
+        let mut distance = (difference[2] + a.shift() - b.shift()).max(least);
         let tau = [difference[0], difference[1]];
         let (mut active_a, mut active_b) = (a.active, b.active);
-        // B's program times D: min ½ |τ + α - β|² - D n·dy + ½ D dyᵀ H dy.
-        let mut hessian_b = scaled_six(&b.hessian, distance);
-        hessian_b[0] += 1.0;
-        hessian_b[3] += 1.0;
-        let of_b = (VIOLATED * size_b, FLATTEST / size_b * distance);
-        for _ in 0..MOST_EXCHANGES {
+        for exchange in 1..=MOST_EXCHANGES {
+            let inverse = 1.0 / distance;
+            // B's program times D: min ½ |τ + α - β|² - D n·dy + ½ D dyᵀ H dy.
+            let mut hessian_b = scaled_six(&b.hessian, distance);
+            hessian_b[0] += 1.0;
+            hessian_b[3] += 1.0;
+            let of_b = (VIOLATED * size_b, FLATTEST / size_b * distance);
             let follows = OnActive::new(simd, &hessian_b, b.rows(), &active_b, of_b.1)?;
             let y_at_rest = follows.minimizer(simd, &hessian_b, [-tau[0], -tau[1], -distance]);
             let s = &follows.compliance;
@@ -384,6 +417,13 @@ impl Solver<'_> {
             let dy = add::<S, f64>(y_at_rest, apply_symmetric::<S, f64>(s, moved));
             let apart = [tau[0] + dx[0], tau[1] + dx[1]];
             let of_dy = (&hessian_b, [-apart[0], -apart[1], -distance]);
+            // How far apart they are then.
+            let next = (difference[2] + dx[2] - dy[2]).max(least);
+            let unlike = (next - distance).abs() > UNLIKE * next.max(distance);
+            if unlike && next > least && 2 * exchange <= MOST_EXCHANGES {
+                distance = next;
+                continue;
+            }
             if let Some(multipliers) = feasible_multipliers(simd, of_dy, b.rows(), (&active_b, dy), of_b.0) {
                 let dn = [(apart[0] - dy[0]) * inverse, (apart[1] - dy[1]) * inverse];
                 let of_b = multipliers.map(|multiplier| multiplier * inverse);
@@ -408,7 +448,7 @@ impl Solver<'_> {
         relative: &Relative<f64>,
         at: &Iterate,
         found: &Found,
-        ((of_a, local_a), (of_b, local_b)): ((&Evaluated, &M3<f64>), (&Evaluated, &M3<f64>)),
+        [(of_a, local_a), (of_b, local_b)]: [(&Evaluated, &M3<f64>); 2],
         difference: V3<f64>,
     ) -> Result<EdgeProven, bool> {
         let (side_a, side_b) = &self.sides;
@@ -448,18 +488,9 @@ impl Solver<'_> {
         let (x, y) = (add::<S, f64>(x, inward_a), add::<S, f64>(y, inward_b));
         let n = apply_transposed::<S, f64>(&at.frame, proven.normal);
         let own_y = apply_transposed::<S, f64>(&relative.rotation, subtract::<S, f64>(y, relative.origin));
-        let [of_a, of_b] = [
-            (x, weighted_a, of_a, proven.multipliers[0], delta_a),
-            (own_y, weighted_b, of_b, proven.multipliers[1], delta_b),
-        ]
-        .map(|(point, weighted, evaluated, multiplier, delta)| {
-            let active = Weighted { weight: weighted.weight.map(|weight| weight * multiplier), ..weighted };
-            let mut jets = [NOTHING; MOST_ACTIVE];
-            for (jet, (i, _)) in jets.iter_mut().zip(active.iter()) {
-                *jet = extrapolated(simd, &evaluated.jets[i], delta);
-            }
-            Spot { point, active, jets }
-        });
+        let [multiplier_a, multiplier_b] = proven.multipliers;
+        let of_a = Spot::new(simd, x, weighted_a.times(multiplier_a), (of_a, delta_a));
+        let of_b = Spot::new(simd, own_y, weighted_b.times(multiplier_b), (of_b, delta_b));
         let (active_a, active_b) = (of_a.active.reported(), of_b.active.reported());
         let trace = EdgeTrace { of_a, of_b, n, drift: Drift::default() };
         Ok(EdgeProven { lower, upper, x, y, n, active_a, active_b, rounds: 0, trace })
@@ -501,13 +532,10 @@ fn share_inside<S: Simd>(_: S, body: &Body, of_a: &Evaluated, (delta, step): (V3
     (share < 1e-3).then_some(share * (1.0 + 1e-9))
 }
 
-/// The jet at the end of a step by normalized coordinates, to second order.
+/// Value and gradient at the end of a step by normalized coordinates, to second order.
 #[inline(always)]
-fn extrapolated<S: Simd>(_: S, jet: &NumberJet<f64>, delta: V3<f64>) -> NumberJet<f64> {
+fn extrapolated<S: Simd>(_: S, jet: &NumberJet<f64>, delta: V3<f64>) -> (f64, V3<f64>) {
     let bent = apply_symmetric::<S, f64>(&jet.hessian, delta);
-    NumberJet {
-        value: jet.value + dot::<S, f64>(delta, add_scaled::<S, f64>(jet.gradient, 0.5, bent)),
-        gradient: add::<S, f64>(jet.gradient, bent),
-        hessian: jet.hessian,
-    }
+    let value = jet.value + dot::<S, f64>(delta, add_scaled::<S, f64>(jet.gradient, 0.5, bent));
+    (value, add::<S, f64>(jet.gradient, bent))
 }

@@ -133,12 +133,16 @@ pub(super) fn feasible_multipliers<S: Simd>(
     slack: f64,
 ) -> Option<[f64; MOST_ACTIVE]> {
     let slope = add_scaled::<S, f64>(apply_symmetric::<S, f64>(hessian, step), 1.0, gradient);
-    let multipliers = multipliers_of(simd, rows, active, scaled::<S, f64>(slope, -1.0))?;
-    let violated = |(i, row): (usize, &Row)| {
-        dot::<S, f64>(row.normal, step) + row.excess > slack && !active.contains(i)
-    };
-    let fine = multipliers[..active.len].iter().all(|multiplier| *multiplier >= NEGATIVE);
-    (fine && !rows.iter().enumerate().any(violated)).then_some(multipliers.map(|multiplier| multiplier.max(0.0)))
+    let mut multipliers = multipliers_of(simd, rows, active, scaled::<S, f64>(slope, -1.0))?;
+    let mut fine = true;
+    for (i, row) in rows.iter().enumerate() {
+        fine &= dot::<S, f64>(row.normal, step) + row.excess <= slack || active.contains(i);
+    }
+    for multiplier in &mut multipliers[..active.len] {
+        fine &= *multiplier >= NEGATIVE;
+        *multiplier = multiplier.max(0.0);
+    }
+    fine.then_some(multipliers)
 }
 
 /// Steps along which active constraints hold with equality.
@@ -178,13 +182,12 @@ impl OnActive {
                 let a = scaled::<S, f64>(add_scaled::<S, f64>(scaled::<S, f64>(u, vv), -uv, v), inverse);
                 let b = scaled::<S, f64>(add_scaled::<S, f64>(scaled::<S, f64>(v, uu), -uv, u), inverse);
                 let entry = |i: usize, j: usize| a[i] * u[j] + b[i] * v[j];
-                let compliance =
-                    [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)];
+                let compliance = [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)];
                 Some(Self { to: scaled::<S, f64>(normal, -excess), compliance })
             }
             2 => {
                 let (p, q) = (row(0), row(1));
-                let along = cross::<S>(p.normal, q.normal);
+                let along = cross(p.normal, q.normal);
                 let sine_square = dot::<S, f64>(along, along);
                 if !(sine_square > DEPENDENT) {
                     return None;
@@ -196,8 +199,7 @@ impl OnActive {
                     return None;
                 }
                 let entry = |i: usize, j: usize| along[i] * along[j] * inverse;
-                let compliance =
-                    [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)];
+                let compliance = [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)];
                 Some(Self { to: add_scaled::<S, f64>(scaled::<S, f64>(p.normal, a), b, q.normal), compliance })
             }
             MOST_ACTIVE => {
@@ -219,12 +221,7 @@ impl OnActive {
 
 /// The multipliers μ of active constraints with `Σ μ_i n_i = pull`, as far as they span that.
 #[inline(always)]
-fn multipliers_of<S: Simd>(
-    simd: S,
-    rows: &[Row],
-    active: &ActiveRows,
-    pull: V3<f64>,
-) -> Option<[f64; MOST_ACTIVE]> {
+fn multipliers_of<S: Simd>(simd: S, rows: &[Row], active: &ActiveRows, pull: V3<f64>) -> Option<[f64; MOST_ACTIVE]> {
     let row = |k: usize| &rows[usize::from(active.index[k])];
     match active.len {
         1 => Some([dot::<S, f64>(row(0).normal, pull), 0.0, 0.0]),
@@ -251,13 +248,17 @@ fn shares_of_two<S: Simd>(_: S, p: &Row, q: &Row, [a, b]: [f64; 2]) -> [f64; 2] 
 fn dual_basis<S: Simd>(_: S, rows: &[Row], active: &ActiveRows) -> Option<[V3<f64>; 3]> {
     let normal = |k: usize| rows[usize::from(active.index[k])].normal;
     let (p, q, r) = (normal(0), normal(1), normal(2));
-    let crossed = cross::<S>(q, r);
+    let crossed = cross(q, r);
     let determinant = dot::<S, f64>(p, crossed);
     if !(determinant.abs() > DEPENDENT) {
         return None;
     }
     let inverse = 1.0 / determinant;
-    Some([crossed, cross::<S>(r, p), cross::<S>(p, q)].map(|v| scaled::<S, f64>(v, inverse)))
+    Some([
+        scaled::<S, f64>(crossed, inverse),
+        scaled::<S, f64>(cross(r, p), inverse),
+        scaled::<S, f64>(cross(p, q), inverse),
+    ])
 }
 
 /// The numbers a with `v = Σ a_k n_k`.
@@ -268,7 +269,7 @@ fn in_terms_of_three<S: Simd>(simd: S, rows: &[Row], active: &ActiveRows, v: V3<
 }
 
 #[inline(always)]
-fn cross<S: Simd>(a: V3<f64>, b: V3<f64>) -> V3<f64> {
+fn cross(a: V3<f64>, b: V3<f64>) -> V3<f64> {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
