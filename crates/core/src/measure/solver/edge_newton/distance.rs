@@ -480,7 +480,11 @@ impl Solver<'_> {
         let size = difference[0].abs() + difference[1].abs() + difference[2].abs();
         let rounding = TAYLOR_ROUNDING * (size + a.trust().span * share_a + b.trust().span * share_b);
         let upper = dot::<S, f64>(between, between).sqrt() * (1.0 + TAYLOR_ROUNDING) + displaced + rounding;
-        let (lower, upper) = match self.relation.judge(simd, &Bracket { upper, ..proven }, &at.frame, next) {
+        // Normals that agree may yet be off the way between the points: at edges and corners many do.
+        let attained = dot::<S, f64>(proven.normal, between);
+        let sideways = add_scaled::<S, f64>(between, -attained, proven.normal);
+        let off = proven.off.max(dot::<S, f64>(sideways, sideways).sqrt() / attained);
+        let (lower, upper) = match self.relation.judge(simd, &Bracket { upper, off, ..proven }, &at.frame, next) {
             Verdict::Proven { lower, upper } => (lower, upper),
             Verdict::Wide => return Err(false),
             Verdict::Overlap => return Err(true),
