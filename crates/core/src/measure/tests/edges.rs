@@ -134,6 +134,6 @@ fn cut_bodies_agree_with_the_general_search() {
     println!("solved alone by gap: {by_gap:?}; of active constraints {of_active:?}");
     // A single side, edges and corners.
     assert!(of_active[1..].iter().all(|&count| count > 100), "{of_active:?}");
-    // Near contact the general search goes on.
-    assert!(gaps_of(6) > 80.0 && gaps_of(0) > 55.0, "{} {}", gaps_of(6), gaps_of(0));
+    // From contact up to gaps of 1e-9 doubles do not show the normal: the general search goes on.
+    assert!(gaps_of(6) > 80.0 && gaps_of(3) > 55.0, "{} {}", gaps_of(6), gaps_of(3));
 }
