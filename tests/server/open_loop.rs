@@ -53,8 +53,8 @@ async fn every_scenario_is_measured_beside_an_echo_and_leaves_nothing_behind() {
     assert!(server.client().await.list_scenes().await.expect("a list").is_empty());
 }
 
-/// Far more than a server bears, with a short wait: some calls are answered, the others are told to
-/// come again; the server says all the while that it is well, and holds as little as before.
+/// Far more than a server can answer, with a short queue: some calls are answered, the others
+/// are refused with a time to retry after; probes succeed meanwhile, and memory does not grow.
 #[tokio::test(flavor = "multi_thread")]
 async fn what_is_too_much_is_shed_while_the_server_stays_well() {
     let dir = tempfile::tempdir().expect("a directory");

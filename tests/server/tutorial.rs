@@ -94,7 +94,7 @@ async fn the_planner_of_the_tutorial_plans_with_a_panda() {
     plans(&server.url(), &data("panda/panda.urdf"), &data("panda/panda.srdf")).await;
 }
 
-/// The example runs, and its planner tells a path over the wall from the straight one through it.
+/// The example runs, and its planner takes a path over the wall and refuses the one through it.
 async fn plans(url: &str, urdf: &Path, srdf: &Path) {
     robot::run(url, urdf, srdf).await.expect("it runs");
     let over = robot::plan(url, (urdf, srdf), "over", &robot::PATH).await.expect("planned");

@@ -4,9 +4,11 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Default width of brackets: relative to the circumradius of the smaller body for lengths, to
-/// `max(1,
+/// `max(1, |d|)` for level distances; dimensionless.
 ///
-/// d|)` for level distances; dimensionless. | Newton's method reaches it in the step after that of 1e-5. A larger value saves a step at most; a smaller one meets the rounding floor of far poses. Exercised by `random_pairs_converge_and_agree_in_all_ways`.
+/// Newton's method reaches it in the step after that of 1e-5. A larger value saves a step at most;
+/// a smaller one meets the rounding floor of far poses. Exercised by
+/// `random_pairs_converge_and_agree_in_all_ways`.
 pub const DEFAULT_ACCURACY: f64 = 1e-9;
 
 /// Default width of brackets of penetration depths, relative to the depth; dimensionless.

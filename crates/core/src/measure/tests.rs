@@ -50,6 +50,21 @@ fn cold_level(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose) -> LevelDistance
     level_distance(a, pose_a, b, pose_b, &Options::default(), &mut WarmStart::default())
 }
 
+/// `Σ λ_i ∇g_i` is the outward normal n at a witness, to within `off`; world frame.
+fn assert_normals_of_active(
+    off: f64,
+    (body, pose): (&Body, &Pose),
+    witness: &Vector3<f64>,
+    n: &Vector3<f64>,
+    active: &ActiveConstraints,
+    label: &str,
+) {
+    let own = pose.rotation().inverse_transform_vector(&(witness - pose.translation()));
+    let gradient = |i: usize| body.placement().jet(&body.constraints()[i], &own).gradient;
+    let sum: Vector3<f64> = active.iter().map(|(i, multiplier)| gradient(i) * multiplier).sum();
+    assert!((pose.transform_direction(&sum) - n).norm() < off, "{label}: {sum:?} {n:?}");
+}
+
 /// Body-frame support point of `body` in direction `n`, by brute force over rays then projected
 /// ascent.
 pub(super) fn largest_along(body: &Body, n: &Vector3<f64>) -> f64 {

@@ -21,11 +21,11 @@ pub const fn gamma(m: usize) -> f64 {
 }
 
 /// Slack for products that underflow, in the unit of the polynomial's values: fewer than 2¹⁰
-/// operations lose at most 2⁻¹⁰⁷⁵ each, and what follows multiplies that loss by at most `56 (1 +
-/// max
+/// operations lose at most 2⁻¹⁰⁷⁵ each, and what follows multiplies that loss by at most
+/// `56 (1 + max |c|) max(1, r)^k`.
 ///
-/// c|) max(1, r)^k`. | A smaller value could leave a bound of exactly 0 where products underflowed;
-/// a larger one has no effect up to 1e-30. No test pins it.
+/// A smaller value could leave a bound of exactly 0 where products underflowed; a larger one has no
+/// effect up to 1e-30. No test pins it.
 const UNDERFLOW: f64 = 1e-300;
 
 /// How large a polynomial and its derivatives may be near a point, and how wrong when computed.

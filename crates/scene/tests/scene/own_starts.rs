@@ -90,7 +90,7 @@ fn what_is_new_to_a_caller_starts_where_others_ended() {
     assert!(warm < cold);
     let mut own = OwnStarts::default();
     assert_eq!(iterations(&ask(&crew, own.lend(&scene), false)), warm);
-    // A fork is of the same scene; another scene begins anew, and so does the way back.
+    // A fork is of the same scene; another scene starts cold, and so does the first one after it.
     let fork = scene.fork("fork").expect("a name");
     assert_eq!(iterations(&ask(&crew, own.lend(&fork), false)), warm);
     let other = row();

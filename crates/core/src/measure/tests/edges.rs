@@ -1,7 +1,7 @@
 //! Bodies that slabs cut by Newton's method with active sets, against the general search, which
 //! shares nothing with it but the bodies' polynomials.
 
-use super::{random_pose, zoo};
+use super::{assert_normals_of_active, random_pose, zoo};
 use crate::body::{Body, Constraint};
 use crate::measure::solver::stages::{Stage, except, only};
 use crate::measure::*;
@@ -38,27 +38,13 @@ fn cut(random: &mut Seeded) -> Body {
     let round = Body::superellipsoid("cut", Vector3::zeros(), half, degree).unwrap();
     let mut constraints = round.constraints().to_vec();
     for _ in 0..1 + random.next() % 6 {
-        // Between 0.5 and 0.9 of the way out, and off the middle.
+        // Half widths of 0.5 to 0.9 of the body's, about a plane that is off its middle.
         let half_width = 0.7 + 0.2 * random.signed();
         constraints.push(slab(&(random.unit() / half_width), 0.2 * random.signed()));
     }
     let body = Body::new("cut", *round.normalization(), constraints).unwrap();
     let rotation = UnitQuaternion::from_scaled_axis(random.unit() * 2.0);
     body.moved(&rotation, &(random.unit() * 0.7)).unwrap()
-}
-
-/// `Σ λ_i ∇g_i` is the outward normal.
-fn assert_normals(
-    (body, pose): (&Body, &Pose),
-    witness: &Vector3<f64>,
-    n: &Vector3<f64>,
-    active: &ActiveConstraints,
-    label: &str,
-) {
-    let own = pose.rotation().inverse_transform_vector(&(witness - pose.translation()));
-    let gradient = |i: usize| body.placement().jet(&body.constraints()[i], &own).gradient;
-    let sum: Vector3<f64> = active.iter().map(|(i, multiplier)| gradient(i) * multiplier).sum();
-    assert!((pose.transform_direction(&sum) - n).norm() < 1e-6, "{label}: {sum:?} {n:?}");
 }
 
 #[test]
@@ -113,8 +99,22 @@ fn cut_bodies_agree_with_the_general_search() {
                         }
                         let along = (found.witness_a - found.witness_b).norm();
                         assert!((along - found.upper).abs() < 1e-9 * (size + found.upper), "{label}");
-                        assert_normals((first.0, &first.1), &found.witness_a, &-n, &found.active_a, &label);
-                        assert_normals((second.0, &second.1), &found.witness_b, &n, &found.active_b, &label);
+                        assert_normals_of_active(
+                            1e-6,
+                            (first.0, &first.1),
+                            &found.witness_a,
+                            &-n,
+                            &found.active_a,
+                            &label,
+                        );
+                        assert_normals_of_active(
+                            1e-6,
+                            (second.0, &second.1),
+                            &found.witness_b,
+                            &n,
+                            &found.active_b,
+                            &label,
+                        );
                         let of_cut = if swapped { &found.active_b } else { &found.active_a };
                         of_active[of_cut.iter().filter(|(_, multiplier)| *multiplier > 1e-9).count()] += 1;
                     }

@@ -1,7 +1,7 @@
 //! Boxes, cylinders and balls by their closed forms, against the general search, which shares
 //! nothing with them but the bodies' polynomials.
 
-use super::{random_pose, zoo};
+use super::{assert_normals_of_active, random_pose, zoo};
 use crate::body::Body;
 use crate::measure::solver::stages::{Stage, except, only};
 use crate::measure::*;
@@ -68,8 +68,8 @@ fn share(what: &str, count: u64, pair: impl Fn(&mut Seeded) -> (Body, Body)) -> 
                     assert!((n - m).norm() < 1e-5, "{label}");
                     let along = (found.witness_a - found.witness_b).dot(&n);
                     assert!((along - found.upper).abs() < 1e-9 * (size + found.upper), "{label}");
-                    normals_are_those_of_active_constraints(first, &found.witness_a, &-n, &found.active_a, &label);
-                    normals_are_those_of_active_constraints(second, &found.witness_b, &n, &found.active_b, &label);
+                    assert_normals_of_active(1e-5, first, &found.witness_a, &-n, &found.active_a, &label);
+                    assert_normals_of_active(1e-5, second, &found.witness_b, &n, &found.active_b, &label);
                 }
             }
         }
@@ -77,20 +77,6 @@ fn share(what: &str, count: u64, pair: impl Fn(&mut Seeded) -> (Body, Body)) -> 
     let share = 50.0 * f64::from(solved) / count as f64;
     println!("{what}: {share:.1} % solved alone");
     share
-}
-
-/// `Σ λ_i ∇g_i` is the outward normal.
-fn normals_are_those_of_active_constraints(
-    (body, pose): (&Body, &Pose),
-    witness: &Vector3<f64>,
-    n: &Vector3<f64>,
-    active: &ActiveConstraints,
-    label: &str,
-) {
-    let own = pose.rotation().inverse_transform_vector(&(witness - pose.translation()));
-    let gradient = |i: usize| body.placement().jet(&body.constraints()[i], &own).gradient;
-    let sum: Vector3<f64> = active.iter().map(|(i, multiplier)| gradient(i) * multiplier).sum();
-    assert!((pose.transform_direction(&sum) - n).norm() < 1e-5, "{label}");
 }
 
 #[test]

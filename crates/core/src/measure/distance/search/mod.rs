@@ -62,12 +62,12 @@ pub(in crate::measure::distance) struct Search<'a> {
     iterations: u32,
 }
 
-/// Distance relative to the larger body, dimensionless, below which ½
+/// Distance relative to the larger body, dimensionless, below which `½ |x - y|²` has too little
+/// curvature for the interior-point method, which then computes the deepest point first.
 ///
-/// x - y|² has too little curvature for the interior-point method, which then computes the deepest
-/// point first. | A larger value does so for bodies that are well apart, which takes time; a
-/// smaller one leaves near contacts to an ill-conditioned program. No test pins it: the answer
-/// comes from another method then.
+/// A larger value does so for bodies that are well apart, which takes time; a smaller one leaves
+/// near contacts to an ill-conditioned program. No test pins it: the answer comes from another
+/// method then.
 const SHORT_DISTANCE: f64 = 1e-3;
 
 /// Distance of the nearest points of the support tables, relative to the larger body,
@@ -78,10 +78,10 @@ const SHORT_DISTANCE: f64 = 1e-3;
 const FACING: f64 = 0.1;
 
 /// Distance relative to the larger body, dimensionless, below which rounding determines the
-/// gradient of ½
+/// gradient of `½ |x - y|²`, and refinement takes over from the interior-point method.
 ///
-/// x - y|², and refinement takes over from the interior-point method. | A larger value refines what
-/// doubles can solve, a smaller one iterates on rounding. It changes time only; no test pins it.
+/// A larger value refines what doubles can solve, a smaller one iterates on rounding. It changes
+/// time only; no test pins it.
 const SHORTEST_DISTANCE: f64 = 1e-7;
 
 /// Steps in double-double arithmetic for which side of contact a narrow bracket is on: those that

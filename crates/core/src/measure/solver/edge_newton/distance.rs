@@ -43,11 +43,13 @@ const FAR_INSIDE: f64 = 0.04;
 /// active set. `cut_bodies_agree_with_the_general_search` counts what is solved.
 const VIOLATED: f64 = 1e-13;
 
-/// Curvature times size that counts as none.
+/// Curvature times size, dimensionless, that counts as none: far below what any body has, it only
+/// bounds steps between two flat sides. It changes time only; no test pins it.
 const FLATTEST: f64 = 1e-20;
 
 /// Least distance of the points that a step is made for, relative to the smaller body: nearer, the
-/// turn of their difference is lost in rounding. Double-double arithmetic goes on from there.
+/// turn of their difference is lost in rounding. Double-double arithmetic goes on from there, so
+/// that it changes time only; no test pins it.
 const LEAST_DISTANCE: f64 = 1e-8;
 
 /// A witness with the constraints that are active there, for the next query of the pair.
@@ -396,7 +398,7 @@ impl Solver<'_> {
         for exchange in 1..=MOST_EXCHANGES {
             let inverse = 1.0 / distance;
             // B's program times D: min ½ |τ + α - β|² - D n·dy + ½ D dyᵀ H dy.
-            let mut hessian_b = scaled_six(&b.hessian, distance);
+            let mut hessian_b = b.hessian.map(|entry| entry * distance);
             hessian_b[0] += 1.0;
             hessian_b[3] += 1.0;
             let of_b = (VIOLATED * size_b, FLATTEST / size_b * distance);
@@ -480,7 +482,8 @@ impl Solver<'_> {
         let size = difference[0].abs() + difference[1].abs() + difference[2].abs();
         let rounding = TAYLOR_ROUNDING * (size + a.trust().span * share_a + b.trust().span * share_b);
         let upper = dot::<S, f64>(between, between).sqrt() * (1.0 + TAYLOR_ROUNDING) + displaced + rounding;
-        // Normals that agree may yet be off the way between the points: at edges and corners many do.
+        // Normals that agree may yet be off the way between the points: at edges and corners many
+        // do.
         let attained = dot::<S, f64>(proven.normal, between);
         let sideways = add_scaled::<S, f64>(between, -attained, proven.normal);
         let off = proven.off.max(dot::<S, f64>(sideways, sideways).sqrt() / attained);
@@ -499,12 +502,6 @@ impl Solver<'_> {
         let trace = EdgeTrace { of_a, of_b, n, drift: Drift::default() };
         Ok(EdgeProven { lower, upper, x, y, n, active_a, active_b, rounds: 0, trace })
     }
-}
-
-/// The entries of a matrix, all times a factor.
-#[inline(always)]
-fn scaled_six(m: &[f64; 6], factor: f64) -> [f64; 6] {
-    m.map(|entry| entry * factor)
 }
 
 /// The part of the way from the end of a step to the interior point along which all constraints are
