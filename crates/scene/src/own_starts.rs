@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::pair_cache::PairCache;
 use super::scene::Scene;
 
-/// Entries of a table: some 1.8 MB when all are used.
+/// Entries of a table: some 2.6 MB when all are used.
 const ENTRIES: usize = 4096;
 
 /// Tables of all callers together, so that their number does not matter to memory; who comes when

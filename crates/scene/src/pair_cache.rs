@@ -8,7 +8,7 @@ use sublevel_core::measure::WarmStart;
 
 use super::object::Slot;
 
-/// Entries of a table: a pair has one place only, so memory is bounded by about 28 MB, and by what
+/// Entries of a table: a pair has one place only, so memory is bounded by about 41 MB, and by what
 /// is used, block by block.
 const ENTRIES: usize = 1 << 16;
 
