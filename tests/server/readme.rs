@@ -72,6 +72,20 @@ async fn the_queries_of_the_documents_are_answered() {
     }
 }
 
+/// Lines without what they are indented by.
+fn lines(text: &str) -> Vec<&str> {
+    text.lines().map(str::trim).filter(|line| !line.is_empty()).collect()
+}
+
+#[test]
+fn the_readme_shows_the_example_of_a_planner() {
+    let read = |path: &str| std::fs::read_to_string(format!("{}/{path}", env!("CARGO_MANIFEST_DIR"))).expect("a text");
+    let (page, example) = (read("README.md"), read("examples/planner.rs"));
+    let shown = page.split("```rust,ignore\n").nth(1).and_then(|rest| rest.split("```").next()).expect("a block");
+    let (shown, example) = (lines(shown), lines(&example));
+    assert!(shown.len() > 20 && example.windows(shown.len()).any(|window| window == shown), "{shown:#?}");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn the_example_of_a_planner_runs() {
     let dir = tempfile::tempdir().expect("a directory");
