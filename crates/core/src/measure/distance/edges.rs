@@ -3,7 +3,9 @@
 use super::answer::Distance;
 use crate::body::Body;
 use crate::measure::frames::pose::Pose;
+use crate::measure::frames::vector::V3;
 use crate::measure::options::Options;
+use crate::measure::solver::continuation::Lost;
 use crate::measure::solver::edge_newton::{EdgeProven, EdgeQuery};
 use crate::measure::solver::initial_guess::Start;
 use crate::measure::solver::stop_criterion::StopCriterion;
@@ -16,18 +18,19 @@ use nalgebra::{Matrix3, Vector3};
 /// outlines are nearest; the hint is replaced where it is proven.
 ///
 /// # Errors
-/// After how many evaluations the general search has to go on.
+/// What the general search has to go on from.
 pub(super) fn of_edges(
     (a, pose_a): (&Body, &Pose),
     (b, pose_b): (&Body, &Pose),
     goal: &StopCriterion,
     options: &Options<'_>,
+    facing: Option<V3<f64>>,
     warm: &mut WarmStart,
-) -> Result<Distance, u32> {
+) -> Result<Distance, Lost> {
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
     let trace = if let Hint::Edges(trace) = &warm.hint { Some(trace) } else { None };
     let start = start((a, pose_a), pose_b, &warm.hint);
-    let found = dispatch(EdgeQuery { a, pose_a, b, pose_b, goal, tolerance, options, trace, start })?;
+    let found = dispatch(EdgeQuery { a, pose_a, b, pose_b, goal, tolerance, options, trace, start, facing })?;
     *warm = Hint::Edges(found.trace).into();
     Ok(answer((a, pose_a), &found, tolerance))
 }

@@ -11,14 +11,17 @@ use crate::body::Body;
 use crate::measure::bounds::culling::{BallBounds, balls};
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::query_frame::Pair;
+use crate::measure::frames::vector::V3;
 use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveConstraints;
+use crate::measure::solver::common_point::CommonPoint;
 use crate::measure::solver::continuation::{Follow, Lost, Proven, SEEK_ROUNDS, Seek};
 use crate::measure::solver::exact_shape::{ShapeContact, contact_of_shapes};
 use crate::measure::solver::kkt_newton::Active;
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
-use crate::measure::solver::two_point_problem::Apart;
+use crate::measure::solver::tangent_newton::Side;
+use crate::measure::solver::two_point_problem::{Apart, Relation};
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::{Simd, WithSimd, dispatch};
@@ -51,8 +54,14 @@ pub(in crate::measure) fn settle(
     if goal.met(bound.lower, bound.upper) {
         return bound;
     }
+    let mut query = Query { of_a, of_b, goal, options, facing: None };
+    if let Some(found) = query.still_overlapping(warm) {
+        return found;
+    }
     if runs(Stage::Planes) {
-        bound.lower = bound.lower.max(Planes::new(of_a, of_b, &warm.hint).lower(goal));
+        let lower;
+        (lower, query.facing) = Planes::new(of_a, of_b, &warm.hint).lower(goal);
+        bound.lower = bound.lower.max(lower);
         if goal.met(bound.lower, bound.upper) {
             return bound;
         }
@@ -83,7 +92,7 @@ pub(in crate::measure) fn settle(
             Err(rounds) => spent = rounds,
         }
     }
-    let found = between(of_a, of_b, goal, &options.after(spent), warm);
+    let found = Query { options: &options.after(spent), ..query }.solve(warm);
     let found = Distance { iterations: found.iterations + spent, ..found };
     // A search that stopped early may know less than the bounds it came after.
     let upper = if found.upper <= bound.upper { found } else { bound };
@@ -98,41 +107,7 @@ pub(in crate::measure) fn between(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> Distance {
-    let query = Query { of_a, of_b, goal, options };
-    if runs(Stage::ClosedForm)
-        && let Some(found) = of_shapes(of_a, of_b, options, warm)
-    {
-        return match found {
-            Ok(found) => found,
-            Err(steps) => query.search(&Lost::after(steps), warm),
-        };
-    }
-    if runs(Stage::ClosedForm)
-        && let Some(exact) = Exact::new(of_a, of_b)
-        && !matches!(warm.hint, Hint::Overlap { .. })
-    {
-        return match exact.distance(goal, options, &warm.hint) {
-            Ok((found, hint)) => {
-                *warm = hint;
-                found
-            }
-            Err((rounds, hint)) => {
-                *warm = hint;
-                query.search(&Lost::after(rounds), warm)
-            }
-        };
-    }
-    if runs(Stage::Edges) && !(of_a.0.is_smooth() && of_b.0.is_smooth()) && !matches!(warm.hint, Hint::Overlap { .. }) {
-        return match of_edges(of_a, of_b, goal, options, warm) {
-            Ok(found) => found,
-            Err(rounds) => query.search(&Lost::after(rounds), warm),
-        };
-    }
-    match warm.hint {
-        Hint::Smooth(_) if runs(Stage::Follow) => dispatch(Warm { query, warm }),
-        Hint::Overlap { point_a } => query.overlapping(&point_a, warm),
-        _ => query.afresh(&Lost::after(0), warm),
-    }
+    Query { of_a, of_b, goal, options, facing: None }.solve(warm)
 }
 
 /// The question. Each method hands on to the next where it fails, and none hands back: an answer is
@@ -144,14 +119,56 @@ struct Query<'a> {
     of_b: (&'a Body, &'a Pose),
     goal: &'a StopCriterion,
     options: &'a Options<'a>,
+    /// About the normal from B to A, A's frame, if it is known.
+    facing: Option<V3<f64>>,
 }
 
 impl<'a> Query<'a> {
+    #[inline]
+    fn solve(&self, warm: &mut WarmStart) -> Distance {
+        let Self { of_a, of_b, goal, options, facing } = *self;
+        if runs(Stage::ClosedForm)
+            && let Some(found) = of_shapes(of_a, of_b, options, warm)
+        {
+            return match found {
+                Ok(found) => found,
+                Err(steps) => self.search(&Lost::after(steps), warm),
+            };
+        }
+        if let Some(found) = self.still_overlapping(warm) {
+            return found;
+        }
+        if runs(Stage::ClosedForm)
+            && let Some(exact) = Exact::new(of_a, of_b)
+        {
+            return match exact.distance(goal, options, &warm.hint) {
+                Ok((found, hint)) => {
+                    *warm = hint;
+                    found
+                }
+                Err((rounds, hint)) => {
+                    *warm = hint;
+                    self.search(&Lost::after(rounds), warm)
+                }
+            };
+        }
+        if runs(Stage::Edges) && !(of_a.0.is_smooth() && of_b.0.is_smooth()) {
+            return match of_edges(of_a, of_b, goal, options, facing, warm) {
+                Ok(found) => found,
+                Err(lost) => self.search(&lost, warm),
+            };
+        }
+        match warm.hint {
+            Hint::Smooth(_) if runs(Stage::Follow) => dispatch(Warm { query: *self, warm }),
+            _ => self.afresh(&Lost::after(0), warm),
+        }
+    }
+
     #[inline(always)]
     fn relation(&self) -> Apart<'a> {
         let ((a, pose_a), (b, pose_b)) = (self.of_a, self.of_b);
         let tolerance = self.options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
-        Apart { pose_a, pose_b, goal: self.goal, tolerance }
+        Apart { pose_a, pose_b, goal: self.goal, tolerance, facing: self.facing }
     }
 
     fn pair(&self) -> Pair<'a> {
@@ -159,15 +176,35 @@ impl<'a> Query<'a> {
         Pair::new(a, pose_a, b, pose_b)
     }
 
-    /// From a point of A in its frame that both bodies had in common.
-    #[inline(never)]
-    fn overlapping(&self, point_a: &Vector3<f64>, warm: &mut WarmStart) -> Distance {
-        let pair = self.pair();
-        let mut search = Search::new(&pair, self.goal, self.options, 0);
-        if search.common(&pair.a_to_query(point_a)) {
-            return search.answer();
+    /// The answer if the bodies have the point of their last overlap still in common, which is
+    /// forgotten if not.
+    fn still_overlapping(&self, warm: &mut WarmStart) -> Option<Distance> {
+        let Hint::Overlap { point_a } = warm.hint else { return None };
+        let v = (point_a - self.of_a.0.normalization().center).into();
+        if let Some(common) = dispatch(StillCommon { query: *self, v })
+            && common.proven
+        {
+            return Some(self.overlapping(&common, 0, warm));
         }
-        self.afresh(&Lost::after(0), warm)
+        *warm = WarmStart::default();
+        None
+    }
+
+    /// The answer that a proven point of both bodies is.
+    fn overlapping(&self, common: &CommonPoint, iterations: u32, warm: &mut WarmStart) -> Distance {
+        let (a, pose_a) = self.of_a;
+        let point_a = a.normalization().center + Vector3::from(common.v);
+        *warm = Hint::Overlap { point_a }.into();
+        let witness = pose_a.transform_point(&point_a);
+        Distance {
+            status: Status::Converged,
+            lower: 0.0,
+            upper: 0.0,
+            witness_a: witness,
+            witness_b: witness,
+            iterations,
+            ..Distance::default()
+        }
     }
 
     /// From nothing but the poses, after what continuation has left.
@@ -187,6 +224,9 @@ impl<'a> Query<'a> {
     /// By all that there is.
     #[inline(never)]
     fn search(&self, lost: &Lost, warm: &mut WarmStart) -> Distance {
+        if let Some(common) = lost.common.filter(|common| common.proven) {
+            return self.overlapping(&common, lost.rounds, warm);
+        }
         let pair = self.pair();
         let mut search = Search::new(&pair, self.goal, self.options, lost.rounds);
         search.take_over(lost);
@@ -197,12 +237,12 @@ impl<'a> Query<'a> {
         search.answer()
     }
 
-    /// The answer that a proof gives, sharpened if rounding keeps it wide.
+    /// The answer that a proof gives, refined if rounding keeps it wide.
     #[inline(always)]
     fn answer<S: Simd>(&self, simd: S, proven: &Proven, tolerance: f64) -> Distance {
         let narrow = proven.upper - proven.lower <= tolerance;
         if !narrow && !self.goal.met(proven.lower, proven.upper) {
-            return self.sharpened(proven);
+            return self.refined(proven);
         }
         let (a, pose_a) = self.of_a;
         let [witness_a, witness_b, normal] = proven.world(simd, a, pose_a);
@@ -223,11 +263,11 @@ impl<'a> Query<'a> {
 
     /// A proven answer that rounding keeps wide, refined in double-double arithmetic.
     #[cold]
-    fn sharpened(&self, proven: &Proven) -> Distance {
+    fn refined(&self, proven: &Proven) -> Distance {
         let pair = self.pair();
         let mut search = Search::new(&pair, self.goal, self.options, proven.rounds);
         search.resume(proven);
-        search.sharpen();
+        search.refine();
         search.attain_any();
         search.answer()
     }
@@ -258,6 +298,24 @@ impl WithSimd for Warm<'_> {
             _ => Lost::after(0),
         };
         query.afresh(&lost, warm)
+    }
+}
+
+/// Whether a point lies in both bodies, as vectorized work.
+struct StillCommon<'a> {
+    query: Query<'a>,
+    /// From the centre of A's normalization on, in A's frame, metres.
+    v: V3<f64>,
+}
+
+impl WithSimd for StillCommon<'_> {
+    type Output = Option<CommonPoint>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Option<CommonPoint> {
+        let (a, b) = (self.query.of_a.0, self.query.of_b.0);
+        let relative = self.query.relation().relative(simd, a, b);
+        CommonPoint::at((&Side::at_home(simd, a, 0), &Side::away(b, 0, &relative)), self.v)
     }
 }
 

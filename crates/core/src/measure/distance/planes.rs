@@ -3,6 +3,7 @@
 use crate::body::Body;
 use crate::measure::bounds::separation::Separation;
 use crate::measure::frames::pose::Pose;
+use crate::measure::frames::vector::V3;
 use crate::measure::solver::exact_shape::normals_towards;
 use crate::measure::solver::initial_guess::facing;
 use crate::measure::solver::stop_criterion::StopCriterion;
@@ -25,10 +26,10 @@ impl<'a> Planes<'a> {
     }
 
     /// The best lower bound of the distance, metres, or the first beyond which a goal asks for no
-    /// more: across the normal of the last answer, along the line of the centres, across the sides
+    /// more, and the last of the directions, in A's frame: across the normal of the last answer, along the line of the centres, across the sides
     /// of a shape that the other body's centre lies beyond, and across the gap of the ellipsoids
     /// that stand for the bodies.
-    pub(super) fn lower(&self, goal: &StopCriterion) -> f64 {
+    pub(super) fn lower(&self, goal: &StopCriterion) -> (f64, Option<V3<f64>>) {
         let mut best = f64::NEG_INFINITY;
         let mut meets = |n: &Vector3<f64>| {
             best = best.max(self.separation.along(n));
@@ -37,7 +38,7 @@ impl<'a> Planes<'a> {
         let (a, pose_a) = self.of_a;
         let (b, pose_b) = self.of_b;
         if self.hint.normal_a().is_some_and(|normal| meets(&pose_a.transform_direction(&normal))) {
-            return best;
+            return (best, None);
         }
         let between = self.separation.between();
         let mut shapes = false;
@@ -47,16 +48,18 @@ impl<'a> Planes<'a> {
             let point = of_other.1.transform_point(of_other.0.interior_point());
             let (normals, count) = normals_towards(form, of_form.1, &point);
             if normals[..count].iter().any(|n| meets(&(n * side))) {
-                return best;
+                return (best, None);
             }
         }
         if !shapes {
             if between.try_normalize(0.0).is_some_and(|n| meets(&n)) {
-                return best;
+                return (best, None);
             }
-            meets(&pose_a.transform_direction(&dispatch(Facing { a, pose_a, b, pose_b })));
+            let facing = dispatch(Facing { a, pose_a, b, pose_b });
+            meets(&pose_a.transform_direction(&facing.into()));
+            return (best, Some(facing));
         }
-        best
+        (best, None)
     }
 }
 
@@ -70,11 +73,11 @@ struct Facing<'a> {
 }
 
 impl WithSimd for Facing<'_> {
-    type Output = Vector3<f64>;
+    type Output = V3<f64>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Vector3<f64> {
+    fn with_simd<S: Simd>(self, simd: S) -> V3<f64> {
         let Self { a, pose_a, b, pose_b } = self;
-        facing(simd, a, b, &Relative::new(simd, a, pose_a, b, pose_b)).into()
+        facing(simd, a, b, &Relative::new(simd, a, pose_a, b, pose_b))
     }
 }

@@ -14,7 +14,7 @@ use crate::measure::solver::barrier_programs::split;
 use crate::measure::solver::kkt_newton::Active;
 use crate::measure::solver::level_continuation::{LevelTrace, Settled};
 use crate::measure::solver::level_newton::LevelNewton;
-use crate::measure::solver::refinement::SharpPair;
+use crate::measure::solver::refinement::RefinedPair;
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::status::Status;
 use crate::measure::warm::Hint;
@@ -102,7 +102,7 @@ impl<'a> Search<'a> {
         });
         (a.multiplier[0], b.multiplier[0]) = (1.0, settled.multiplier);
         self.ended = Some(LevelNewton { x: self.pair.b_to_query(&settled.point), a, b });
-        self.sharpen(self.accuracy);
+        self.refine(self.accuracy);
     }
 
     /// From a hint, or from what the outlines show.
@@ -125,25 +125,25 @@ impl<'a> Search<'a> {
             self.outlined(start);
         }
         if self.settled && !self.done() && !self.exhausted() {
-            self.sharpen(self.accuracy);
+            self.refine(self.accuracy);
         }
         if !self.done() && !self.exhausted() {
             self.interior_point();
         }
         if !self.done() && !self.exhausted() {
-            self.sharpen(self.accuracy);
+            self.refine(self.accuracy);
         }
         if !self.done() && !self.exhausted() {
             self.start_nearest();
         }
         if !self.done() && !self.exhausted() {
-            self.sharpen(self.accuracy);
+            self.refine(self.accuracy);
         }
         if !self.refined && !self.saturated() && !self.exhausted() {
             // Constraints whose slacks are as small as the bracket is wide may carry multipliers
             // that are not theirs.
             self.accuracy = REFINED * self.options.accuracy();
-            self.sharpen(self.accuracy);
+            self.refine(self.accuracy);
             if !self.done() && !self.exhausted() {
                 self.descend(REFINED);
             }
@@ -188,12 +188,12 @@ impl<'a> Search<'a> {
     }
 
     /// Goes on in double-double arithmetic where rounding keeps the bracket wide.
-    fn sharpen(&mut self, accuracy: f64) {
+    fn refine(&mut self, accuracy: f64) {
         if !runs(Stage::Refinement) {
             return;
         }
         let pair = self.pair;
-        let sharp = SharpPair::new(pair);
+        let refined = RefinedPair::new(pair);
         let (of_a, of_b) = &self.multipliers;
         let (a, b) = (
             Active::from_weighted_multipliers(&pair.a, &self.proven, of_a),
@@ -202,7 +202,7 @@ impl<'a> Search<'a> {
         let proven = LevelNewton { x: self.proven, a, b };
         for start in [Some(proven), self.ended].into_iter().flatten().filter(|start| start.a.len > 0) {
             let left = self.options.max_iterations() - self.iterations.min(self.options.max_iterations());
-            let steps = sharp.level(&start, left, |found| {
+            let steps = refined.level(&start, left, |found| {
                 if found.lower > self.lower {
                     let (a, b) = &found.active;
                     (self.lower, self.multipliers) = (found.lower, normalized(&a.multipliers(), &b.multipliers()));

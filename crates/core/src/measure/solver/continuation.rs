@@ -11,7 +11,8 @@ use crate::body::Body;
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::vector::{M3, V3, add, add_scaled, apply, apply_transposed, basis, dot, rows, subtract};
 use crate::measure::options::Options;
-use crate::measure::solver::initial_guess::{Start, middle};
+use crate::measure::solver::common_point::CommonPoint;
+use crate::measure::solver::initial_guess::Start;
 use crate::measure::solver::predictor::Drift;
 use crate::measure::solver::step_acceleration::{Correction, Last, Series};
 use crate::measure::solver::tangent_newton::{
@@ -137,9 +138,8 @@ impl Proven {
 pub(in crate::measure) struct Lost {
     /// Evaluations of both bodies.
     pub(in crate::measure) rounds: u32,
-    /// A point that seems to lie in both, from the centre of A's normalization on, in A's frame,
-    /// metres.
-    pub(in crate::measure) middle: Option<V3<f64>>,
+    /// A point that lies in both bodies, or seems to.
+    pub(in crate::measure) common: Option<CommonPoint>,
     /// Where Newton's method ended without a narrow bracket, which only double-double arithmetic
     /// may prove: near contact, where doubles do not show on which side, or where the normals do
     /// not agree well enough.
@@ -148,12 +148,12 @@ pub(in crate::measure) struct Lost {
 
 impl Lost {
     pub(in crate::measure) fn after(rounds: u32) -> Self {
-        Self { rounds, middle: None, grazing: None }
+        Self { rounds, common: None, grazing: None }
     }
 
     /// Whether the bodies seem to touch or overlap.
     pub(in crate::measure) fn touching(&self) -> bool {
-        self.middle.is_some() || self.grazing.is_some()
+        self.common.is_some() || self.grazing.is_some()
     }
 }
 
@@ -192,6 +192,10 @@ const FLATTEST: f64 = 1e-20;
 /// changes time only: `.ci/instructions` pins it.
 const WORTH_A_BRACKET: f64 = 1e-2;
 
+/// Length of a step relative to the longest one allowed, dimensionless, beyond which no bracket is
+/// expected to decide. It changes time only: `sublevel-bench pairs` shows it.
+const DECISIVE: f64 = 0.5;
+
 /// Factor by which a step has to narrow the bracket of bodies that touch to be followed by another;
 /// dimensionless.
 ///
@@ -211,6 +215,42 @@ const SETTLED: f64 = 1e-9;
 #[inline(always)]
 pub(in crate::measure) fn worth_a_bracket([of_x, of_y]: [f64; 2]) -> [f64; 2] {
     [WORTH_A_BRACKET * of_x.min(of_y); 2]
+}
+
+/// What is to be expected where a step leads that is too long for a narrow bracket.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::measure) enum Prospect {
+    Open,
+    /// The bracket probably decides what is asked.
+    Decided,
+    /// The bodies probably have a point between the trial points in common.
+    Common,
+}
+
+impl Prospect {
+    /// Of a step from points that are `height` apart along the normal, metres: that is off by about
+    /// the cube of the step.
+    #[inline(always)]
+    pub(in crate::measure) fn new<S: Simd>(
+        simd: S,
+        relation: &impl Relation,
+        step: &Step<f64>,
+        height: f64,
+        limits: [f64; 2],
+    ) -> Self {
+        let square = step.square(simd, limits);
+        let width = square * square.sqrt() * limits[0].min(limits[1]);
+        let height = height + step.dx[2] - step.dy[2];
+        if !(square <= DECISIVE * DECISIVE) {
+            Self::Open
+        } else if height < -width && relation.ends_at_contact() {
+            Self::Common
+        } else if relation.decided_by(height, width) {
+            Self::Decided
+        } else {
+            Self::Open
+        }
+    }
 }
 
 /// Longest move for which a linearization in the tangent plane is valid, relative to a body's size,
@@ -319,9 +359,9 @@ impl<R: Relation> WithSimd for Seek<'_, R> {
         let sides = (Side::at_home(simd, a, active[0].into()), Side::away(b, active[1].into(), &relative));
         let correct = Correct { sides, relation, patience, most, options, limits: limits(a, b) };
         if relation.ends_at_contact() && dot::<S, f64>(start.n, subtract::<S, f64>(start.x, start.y)) < 0.0 {
-            let middle = correct.middle(simd, start.x, start.y);
-            if middle.is_some() {
-                return Err(Lost { middle, ..Lost::after(1) });
+            let common = CommonPoint::between(simd, (&correct.sides.0, &correct.sides.1), start.x, start.y);
+            if common.is_some() {
+                return Err(Lost { common, ..Lost::after(1) });
             }
         }
         let at = Iterate { x: start.x, y: start.y, frame: basis(simd, start.n) };
@@ -345,16 +385,6 @@ struct Correct<'a, R> {
 }
 
 impl<R: Relation> Correct<'_, R> {
-    /// A point between x and y if it seems to lie in both bodies.
-    #[inline(always)]
-    fn middle<S: Simd>(&self, simd: S, x: V3<f64>, y: V3<f64>) -> Option<V3<f64>> {
-        let (side_a, side_b) = &self.sides;
-        let middle = middle(simd, side_a.body(), side_b.body(), x, y);
-        let ((in_a, _), (in_b, _)) = (side_a.jet(simd, middle), side_b.jet(simd, middle));
-        let inside = in_a.value < 1.0 && in_b.value < 1.0;
-        (inside && side_a.others_hold(simd, middle) && side_b.others_hold(simd, middle)).then_some(middle)
-    }
-
     // What is lost is about as large as what is proven, and there is no allocation in a solve.
     #[allow(clippy::result_large_err)]
     #[inline(always)]
@@ -392,14 +422,24 @@ impl<R: Relation> Correct<'_, R> {
             let (mut step, response) =
                 self.relation.newton(simd, of_a, of_b, &at.frame, difference, flattest(self.limits));
             let near = step.within(simd, worth_a_bracket(self.limits));
+            let prospect = Prospect::new(simd, &self.relation, &step, difference[2], self.limits);
+            if prospect == Prospect::Common {
+                let x = moved::<S, f64>(at.x, step.dx, &at.frame);
+                let y = moved::<S, f64>(at.y, step.dy, &at.frame);
+                let common = CommonPoint::between(simd, (side_a, side_b), x, y);
+                if matches!(common, Some(CommonPoint { proven: true, .. })) {
+                    return Err(Lost { common, ..Lost::after(rounds) });
+                }
+            }
+            let decisive = prospect == Prospect::Decided;
             // Where sides are flat the point at hand may do long before its step is short enough.
             let local = (&local_a, &local_b);
             let flat = series.is_slow(step.along())
                 && series.may_have_to_be_corrected(step.along(), self.relative_length(simd, &step, local));
-            if near || flat {
+            if near || flat || decisive {
                 // The bracket there, or where Newton's step leads, by extrapolation: mostly no
                 // other evaluation is needed.
-                let (dx, dy) = if flat { ([0.0; 3], [0.0; 3]) } else { (step.dx, step.dy) };
+                let (dx, dy) = if flat && !decisive { ([0.0; 3], [0.0; 3]) } else { (step.dx, step.dy) };
                 let next_a = side_a.extrapolate(simd, &jet_a, &local_a, dx);
                 let next_b = side_b.extrapolate(simd, &jet_b, &local_b, dy);
                 let next = subtract::<S, f64>(add::<S, f64>(difference, dx), dy);
@@ -423,14 +463,14 @@ impl<R: Relation> Correct<'_, R> {
                         return Ok(Proven { lower, upper, x, y, n, active, multipliers, rounds });
                     }
                     Verdict::Overlap if near => {
-                        let middle = self.middle(simd, at.x, at.y);
+                        let common = CommonPoint::between(simd, (side_a, side_b), at.x, at.y);
                         let deep = -next[2] > NEARLY * self.limits[0].min(self.limits[1]);
                         // Bodies that touch are left to double-double arithmetic when the bracket
                         // gets no narrower.
                         let touching = settled || found.upper > NARROWER * overlap;
-                        if middle.is_some() || touching || deep && rounds >= PATIENCE {
+                        if common.is_some() || touching || deep && rounds >= PATIENCE {
                             let grazing = (!deep).then(|| at.grazing(simd, &step, &found, trace.active, rounds));
-                            return Err(Lost { rounds, middle, grazing });
+                            return Err(Lost { rounds, common, grazing });
                         }
                         overlap = found.upper;
                     }

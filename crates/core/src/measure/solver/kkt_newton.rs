@@ -301,15 +301,15 @@ const FARTHEST: f64 = 1e3;
 
 /// Whether Newton's steps still shrink: fast near a solution, and those that do not are not near
 /// one.
-pub(in crate::measure) struct Pace {
+pub(in crate::measure) struct StepMonitor {
     last: f64,
     /// How often a short step was hardly shorter than the one before.
     stuck: u32,
 }
 
-impl Pace {
+impl StepMonitor {
     /// Of steps towards a system that none has been taken towards yet.
-    pub(in crate::measure) const FIRST: Self = Self { last: f64::INFINITY, stuck: 0 };
+    pub(in crate::measure) const START: Self = Self { last: f64::INFINITY, stuck: 0 };
 
     /// Whether the steps, this one of this length the last, are still cut to the longest when they
     /// should no longer be: two in a row, or the first towards a new system. A single long one is
@@ -353,7 +353,7 @@ impl DistanceNewton {
             return 0;
         }
         let mut at = self.evaluate(pair);
-        let (mut pace, mut series, mut turned) = (Pace::FIRST, Series::default(), false);
+        let (mut monitor, mut series, mut turned) = (StepMonitor::START, Series::default(), false);
         for step in 1..=MAX_STEPS.min(limit) {
             let before = (self.x, self.y);
             let Some(length) = self.step(pair, &at, &mut series) else {
@@ -381,11 +381,11 @@ impl DistanceNewton {
                     | self.a.violated_by(excess, &pair.a, &self.x, 1.0).is_some_and(|i| self.a.push(i))
                     | self.b.violated_by(excess, &pair.b, &self.y, 1.0).is_some_and(|i| self.b.push(i));
                 if changed {
-                    (at, pace, series, turned) = (self.evaluate(pair), Pace::FIRST, Series::default(), false);
+                    (at, monitor, series, turned) = (self.evaluate(pair), StepMonitor::START, Series::default(), false);
                     continue;
                 }
             }
-            if pace.has_diverged(step, length, LONGEST_MOVE) || pace.ends_with(length) {
+            if monitor.has_diverged(step, length, LONGEST_MOVE) || monitor.ends_with(length) {
                 return step;
             }
         }

@@ -14,7 +14,7 @@ use crate::measure::solver::active_constraints::MAX_ACTIVE;
 use crate::measure::solver::active_set_qp::{
     CENTER, DAMPINGS, Jets, LONGEST_PROGRAM_STEP, MOST_BENT, Quadratic, TO_CENTER,
 };
-use crate::measure::solver::kkt_newton::{Active, At, Pace, WORTH_A_BRACKET};
+use crate::measure::solver::kkt_newton::{Active, At, StepMonitor, WORTH_A_BRACKET};
 use crate::measure::solver::step_acceleration::{Series, Taken, tangents};
 use crate::measure::solver::tangent_newton::ALIGNED;
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
@@ -60,7 +60,7 @@ impl LevelNewton {
             return Ended { steps: 0, settled: false };
         }
         let mut s = self.start(pair);
-        let (mut pace, mut last, mut series) = (Pace::FIRST, f64::INFINITY, Series::default());
+        let (mut monitor, mut last, mut series) = (StepMonitor::START, f64::INFINITY, Series::default());
         for step in 1..=MAX_STEPS {
             if stop(step - 1) {
                 return Ended { steps: step - 1, settled: false };
@@ -74,7 +74,7 @@ impl LevelNewton {
             if (length < WORTH_A_BRACKET || step % 4 == 0) && accept(self) {
                 return Ended { steps: step, settled: false };
             }
-            if pace.ends_with(length) {
+            if monitor.ends_with(length) {
                 return Ended { steps: step, settled: true };
             }
             last = length;

@@ -9,6 +9,7 @@
 pub(super) mod active_constraints;
 pub(super) mod active_set_qp;
 pub(super) mod barrier_programs;
+pub(super) mod common_point;
 pub(super) mod continuation;
 pub(super) mod convex_root_bracket;
 pub(super) mod depth;

@@ -15,7 +15,7 @@ use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::options::Options;
 use crate::measure::solver::active_set_qp::{Jets, LONGEST_PROGRAM_STEP, Quadratic};
 use crate::measure::solver::barrier_programs::near_boundary;
-use crate::measure::solver::kkt_newton::{Active, MAX_STEPS, Pace, WORTH_A_BRACKET};
+use crate::measure::solver::kkt_newton::{Active, MAX_STEPS, StepMonitor, WORTH_A_BRACKET};
 use crate::measure::solver::step_acceleration::{Series, Taken, tangents};
 use crate::optimize::{Program, Row, Rows};
 use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, Vector3, Vector4};
@@ -151,7 +151,7 @@ impl ReachNewton {
         before: u32,
         mut accept: impl FnMut(&Self) -> bool,
     ) -> u32 {
-        let (mut pace, mut series) = (Pace::FIRST, Series::default());
+        let (mut monitor, mut series) = (StepMonitor::START, Series::default());
         for step in 1..=MAX_STEPS {
             if options.exhausted(before + step - 1) {
                 return step - 1;
@@ -168,7 +168,7 @@ impl ReachNewton {
             if (length < WORTH_A_BRACKET || step % 4 == 0) && accept(self) {
                 return step;
             }
-            if pace.has_diverged(step, length, LONGEST_PROGRAM_STEP) || pace.ends_with(length) {
+            if monitor.has_diverged(step, length, LONGEST_PROGRAM_STEP) || monitor.ends_with(length) {
                 return step;
             }
         }

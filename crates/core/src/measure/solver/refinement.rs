@@ -45,7 +45,7 @@ const PATIENCE: u32 = 8;
 const SHARE: f64 = 1e-13;
 
 /// A body in the query frame, `z = linear v + offset`.
-struct SharpBody<'a> {
+struct RefinedBody<'a> {
     posed: &'a Posed<'a>,
     linear: [Twos; 3],
     offset: Twos,
@@ -54,7 +54,7 @@ struct SharpBody<'a> {
 }
 
 /// A constraint at a point.
-struct SharpJet {
+struct RefinedJet {
     value: Two,
     /// With respect to points of the query frame.
     gradient: Twos,
@@ -66,7 +66,7 @@ struct SharpJet {
     hessian: Matrix3<f64>,
 }
 
-impl SharpBody<'_> {
+impl RefinedBody<'_> {
     fn z(&self, v: &Twos) -> Twos {
         plus(&apply(&self.linear, v), &self.offset)
     }
@@ -75,7 +75,7 @@ impl SharpBody<'_> {
         &self.posed.body.constraints()[i].polynomial
     }
 
-    fn jet(&self, i: usize, v: &Twos) -> SharpJet {
+    fn jet(&self, i: usize, v: &Twos) -> RefinedJet {
         let (z, polynomial) = (self.z(v), self.polynomial(i));
         let (value, gradient) = expand(polynomial, &z);
         let rounded = doubles(&z);
@@ -83,7 +83,7 @@ impl SharpBody<'_> {
         let none = Vector3::zeros();
         // z is off by a few units of double-double arithmetic.
         let dz = Vector3::repeat(16.0 * UNIT * self.z_size(v));
-        SharpJet {
+        RefinedJet {
             value,
             gradient: apply(&transposed(&self.linear), &gradient),
             value_error: SHARE * polynomial.value_error(&rounded, &jet.gradient, &none)
@@ -103,7 +103,7 @@ impl SharpBody<'_> {
 
     /// Rigorous upper bound of `-min r·(x' - v)` over the points x' of the body:
     /// [`crate::measure::bounds::duality_bounds::descent`].
-    fn descent(&self, v: &Twos, r: &Twos, active: &SharpActive) -> Two {
+    fn descent(&self, v: &Twos, r: &Twos, active: &RefinedActive) -> Two {
         let (mut slack, mut rest, mut error) = (Two::ZERO, *r, 0.0);
         let reach = self.posed.reach(&doubles(v));
         let z = doubles(&self.z(v)).abs();
@@ -155,7 +155,7 @@ impl SharpBody<'_> {
 
     /// For Newton's matrices, the nearest doubles; and for its residuals the sum of gradients and
     /// the values.
-    fn at(&self, active: &SharpActive, v: &Twos) -> (At, Twos, [Two; 3]) {
+    fn at(&self, active: &RefinedActive, v: &Twos) -> (At, Twos, [Two; 3]) {
         let mut at = At::default();
         let (mut sum, mut values) = ([Two::ZERO; 3], [Two::ZERO; 3]);
         for k in 0..active.set.len {
@@ -172,12 +172,12 @@ impl SharpBody<'_> {
 }
 
 /// Active constraints with multipliers in double-double.
-struct SharpActive {
+struct RefinedActive {
     set: Active,
     multiplier: [Two; 3],
 }
 
-impl SharpActive {
+impl RefinedActive {
     fn new(set: &Active) -> Self {
         Self { set: *set, multiplier: set.multiplier.map(Two::from) }
     }
@@ -196,7 +196,7 @@ impl SharpActive {
 
     /// Drops constraints as [`DistanceNewton`] does and takes one that is violated by more than
     /// `excess`; whether any.
-    fn revise(&mut self, body: &SharpBody<'_>, v: &Twos, level: f64, excess: f64) -> bool {
+    fn revise(&mut self, body: &RefinedBody<'_>, v: &Twos, level: f64, excess: f64) -> bool {
         let mut set = self.set;
         let over = |i: usize| (body.jet(i, v).value - Two::from(level)).double();
         let rest = (0..body.posed.len()).filter(|i| set.bits() >> i & 1 == 0).map(|i| (i, over(i)));
@@ -210,16 +210,16 @@ impl SharpActive {
 }
 
 /// Both bodies of a pair.
-pub(in crate::measure) struct SharpPair<'a> {
-    a: SharpBody<'a>,
-    b: SharpBody<'a>,
+pub(in crate::measure) struct RefinedPair<'a> {
+    a: RefinedBody<'a>,
+    b: RefinedBody<'a>,
     /// Circumradius of the smaller body, query units.
     small: f64,
 }
 
 /// What an iterate proves, query units.
 #[derive(Clone, Copy)]
-pub(in crate::measure) struct SharpDistance {
+pub(in crate::measure) struct RefinedDistance {
     pub(in crate::measure) lower: f64,
     pub(in crate::measure) upper: f64,
     pub(in crate::measure) x: Vector3<f64>,
@@ -232,14 +232,14 @@ pub(in crate::measure) struct SharpDistance {
 
 /// The same for a level distance.
 #[derive(Clone, Copy)]
-pub(in crate::measure) struct SharpLevel {
+pub(in crate::measure) struct RefinedLevel {
     pub(in crate::measure) lower: f64,
     pub(in crate::measure) upper: f64,
     pub(in crate::measure) x: Vector3<f64>,
     pub(in crate::measure) active: (Active, Active),
 }
 
-impl<'a> SharpPair<'a> {
+impl<'a> RefinedPair<'a> {
     pub(in crate::measure) fn new(pair: &'a Pair<'a>) -> Self {
         let (pose_a, pose_b) = pair.poses();
         let (turn_a, turn_b) = (rotation(pose_a), rotation(pose_b));
@@ -254,7 +254,7 @@ impl<'a> SharpPair<'a> {
             let linear = product(&rows, turn).map(|row| times(&row, unit));
             let offset = apply(&rows, &minus(shift, &twos(&normalization.center)));
             let rounded = Matrix3::from_fn(|i, j| linear[i][j].double());
-            SharpBody { posed, linear, offset, rounded }
+            RefinedBody { posed, linear, offset, rounded }
         };
         let radius = |posed: &Posed<'_>| posed.body.circumscribed().radius / pair.unit();
         Self {
@@ -271,10 +271,10 @@ impl<'a> SharpPair<'a> {
         &self,
         start: &DistanceNewton,
         limit: u32,
-        mut accept: impl FnMut(&SharpDistance) -> bool,
+        mut accept: impl FnMut(&RefinedDistance) -> bool,
     ) -> u32 {
         let (mut x, mut y, mut d) = (twos(&start.x), twos(&start.y), Two::from(start.distance));
-        let (mut of_a, mut of_b) = (SharpActive::new(&start.a), SharpActive::new(&start.b));
+        let (mut of_a, mut of_b) = (RefinedActive::new(&start.a), RefinedActive::new(&start.b));
         let mut revised = 0;
         for step in 1..=MAX_STEPS.min(limit) {
             let (a, sum_a, values_a) = self.a.at(&of_a, &x);
@@ -322,15 +322,15 @@ impl<'a> SharpPair<'a> {
     }
 
     /// The answer 0 if halfway between the points lies in both bodies.
-    fn common(&self, x: &Twos, y: &Twos, of_a: &SharpActive, of_b: &SharpActive) -> Option<SharpDistance> {
+    fn common(&self, x: &Twos, y: &Twos, of_a: &RefinedActive, of_b: &RefinedActive) -> Option<RefinedDistance> {
         let middle = times(&plus(x, y), Two::from(0.5));
         let both = self.a.value_upper(&middle) <= 1.0 && self.b.value_upper(&middle) <= 1.0;
         let v = doubles(&middle);
         let active = (of_a.set, of_b.set);
-        both.then_some(SharpDistance { lower: 0.0, upper: 0.0, x: v, y: v, n: Vector3::x(), aligned: false, active })
+        both.then_some(RefinedDistance { lower: 0.0, upper: 0.0, x: v, y: v, n: Vector3::x(), aligned: false, active })
     }
 
-    fn distance_bracket(&self, x: &Twos, y: &Twos, of_a: &SharpActive, of_b: &SharpActive) -> SharpDistance {
+    fn distance_bracket(&self, x: &Twos, y: &Twos, of_a: &RefinedActive, of_b: &RefinedActive) -> RefinedDistance {
         let (a, sum_a, values_a) = self.a.at(of_a, x);
         let (b, sum_b, values_b) = self.b.at(of_b, y);
         let n = times(&minus(&sum_b, &sum_a), Two::from(0.5));
@@ -349,14 +349,14 @@ impl<'a> SharpPair<'a> {
         // As for doubles: opposite forces, the points along them, and no slack of what carries any.
         let apart = minus(&p, &q);
         let across = minus(&times(&apart, length), &times(&n, dot(&n, &apart) / length));
-        let slack = |of: &SharpActive, at: &At, values: &[Two; 3]| {
+        let slack = |of: &RefinedActive, at: &At, values: &[Two; 3]| {
             let carrying = (0..of.set.len).filter(|&k| of.multiplier[k].is_positive());
             let gaps = carrying.map(|k| (Two::from(1.0) - values[k]).double().abs() / at.gradient[k].norm());
             gaps.fold(0.0, f64::max)
         };
         let missed = doubles(&across).norm() + slack(of_a, &a, &values_a) + slack(of_b, &b, &values_b);
         let opposite = doubles(&plus(&sum_a, &sum_b)).norm() <= ALIGNED;
-        SharpDistance {
+        RefinedDistance {
             // Not `max`: a NaN bounds nothing.
             lower: if lower > 0.0 { lower } else { 0.0 },
             upper,
@@ -373,10 +373,10 @@ impl<'a> SharpPair<'a> {
         &self,
         start: &LevelNewton,
         limit: u32,
-        mut accept: impl FnMut(&SharpLevel) -> bool,
+        mut accept: impl FnMut(&RefinedLevel) -> bool,
     ) -> u32 {
         let mut x = twos(&start.x);
-        let (mut of_a, mut of_b) = (SharpActive::new(&start.a), SharpActive::new(&start.b));
+        let (mut of_a, mut of_b) = (RefinedActive::new(&start.a), RefinedActive::new(&start.b));
         let mut s = Two::from(self.a.value_upper(&x));
         let mut revised = 0;
         for step in 1..=MAX_STEPS.min(limit) {
@@ -430,7 +430,7 @@ impl<'a> SharpPair<'a> {
         MAX_STEPS.min(limit)
     }
 
-    fn level_bracket(&self, x: &Twos, of_a: &SharpActive, of_b: &SharpActive) -> SharpLevel {
+    fn level_bracket(&self, x: &Twos, of_a: &RefinedActive, of_b: &RefinedActive) -> RefinedLevel {
         let (mut value, mut dual_gradient, mut total) = (Two::ZERO, [Two::ZERO; 3], Two::ZERO);
         let (mut error, mut slope_error) = (0.0, 0.0);
         for (i, weight) in of_a.positive() {
@@ -446,7 +446,7 @@ impl<'a> SharpPair<'a> {
         let lower = ((value - fall - Two::from(error * (1.0 + 1e-12))) / total).double();
         let upper = self.b.move_inside(x).map(|x| (self.a.value_upper(&x), x));
         let (upper, point) = upper.unwrap_or((f64::INFINITY, *x));
-        SharpLevel {
+        RefinedLevel {
             lower: if lower.is_finite() { lower.next_down() } else { f64::NEG_INFINITY },
             upper: if upper.is_nan() { f64::INFINITY } else { upper.next_up() },
             x: doubles(&point),

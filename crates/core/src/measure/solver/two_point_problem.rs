@@ -26,6 +26,13 @@ pub(in crate::measure) trait Relation: Copy {
         false
     }
 
+    /// Whether a bracket is likely to suffice though it is only about as narrow as `width`, around
+    /// a distance of the points along the normal; metres.
+    #[inline(always)]
+    fn decided_by(&self, _distance: f64, _width: f64) -> bool {
+        false
+    }
+
     /// Newton's step from points with `difference = x - y` in the frame, whose third vector is the
     /// normal from B to A: towards points with their difference along the normal; and how the
     /// solution answers motions. `smallest`: see [`newton`].
@@ -78,6 +85,9 @@ pub(in crate::measure) struct Apart<'a> {
     pub(in crate::measure) goal: &'a StopCriterion,
     /// Width of the bracket that is narrow enough, metres.
     pub(in crate::measure) tolerance: f64,
+    /// From B to A, in A's frame, to start from; without one, across the gap of the ellipsoids that
+    /// stand for the bodies.
+    pub(in crate::measure) facing: Option<V3<f64>>,
 }
 
 impl Relation for Apart<'_> {
@@ -88,12 +98,18 @@ impl Relation for Apart<'_> {
 
     #[inline(always)]
     fn start<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> (Start<f64>, [f64; 2]) {
-        meeting(simd, a, b, relative, facing(simd, a, b, relative), None)
+        let n = self.facing.unwrap_or_else(|| facing(simd, a, b, relative));
+        meeting(simd, a, b, relative, n, None)
     }
 
     #[inline(always)]
     fn ends_at_contact(&self) -> bool {
         true
+    }
+
+    #[inline(always)]
+    fn decided_by(&self, distance: f64, width: f64) -> bool {
+        self.goal.met(distance - width, distance + width)
     }
 
     #[inline(always)]

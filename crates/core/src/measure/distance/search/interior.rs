@@ -4,7 +4,7 @@ use super::Search;
 use crate::measure::bounds::duality_bounds::Multipliers;
 use crate::measure::distance::deepest::Deepest;
 use crate::measure::solver::barrier_programs::{Closest, Level, points, split};
-use crate::measure::solver::kkt_newton::{Active, Pace, WORTH_A_BRACKET};
+use crate::measure::solver::kkt_newton::{Active, StepMonitor, WORTH_A_BRACKET};
 use crate::measure::solver::stages::{Stage, runs};
 use crate::optimize::minimise;
 use nalgebra::{SVector, Vector3};
@@ -86,7 +86,7 @@ impl Search<'_> {
         let pair = self.pair;
         let (a, b) = (Active::near(&pair.a, v, &-n), Active::near(&pair.b, v, n));
         let mut deepest = Deepest::new(*v, self.depth(v), a, b);
-        let mut pace = Pace::FIRST;
+        let mut monitor = StepMonitor::START;
         for _ in 0..MAX_DEEPEST {
             if self.options.exhausted(self.iterations) {
                 return;
@@ -96,7 +96,7 @@ impl Search<'_> {
             if deepest.s < 1.0 && self.common(&deepest.x) {
                 return;
             }
-            if pace.ends_with(length) || length < WORTH_A_BRACKET && deepest.s > 1.0 {
+            if monitor.ends_with(length) || length < WORTH_A_BRACKET && deepest.s > 1.0 {
                 self.part(&deepest.x, &deepest.a.multipliers(), &deepest.b.multipliers());
                 return;
             }

@@ -16,7 +16,7 @@ use crate::measure::solver::continuation::{Lost, SEEK_ROUNDS, Seek, Trace};
 use crate::measure::solver::initial_guess::Start;
 use crate::measure::solver::kkt_newton::{Active, DistanceNewton};
 use crate::measure::solver::ray_program::{RayStart, ReachNewton};
-use crate::measure::solver::refinement::SharpPair;
+use crate::measure::solver::refinement::RefinedPair;
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::solver::support_table_gjk::approach;
@@ -284,7 +284,7 @@ impl<'a> Search<'a> {
             self.deepest(&v, &n);
         }
         if !self.ended() || unsure && !self.decided() {
-            self.sharpen();
+            self.refine();
         }
         self.align();
     }
@@ -301,7 +301,7 @@ impl<'a> Search<'a> {
         self.newton(x, y, n, a, b);
         // So near to each other doubles may not show the normal.
         if self.has_to_be_aligned() && self.lower < SHORTEST_DISTANCE * self.pair.size() {
-            self.sharpen();
+            self.refine();
         }
     }
 
@@ -312,7 +312,8 @@ impl<'a> Search<'a> {
             return;
         }
         let (pose_a, pose_b) = pair.poses();
-        let relation = Apart { pose_a, pose_b, goal: self.goals.0, tolerance: self.tolerance * pair.unit() };
+        let relation =
+            Apart { pose_a, pose_b, goal: self.goals.0, tolerance: self.tolerance * pair.unit(), facing: None };
         let from = Some(Start { x: self.centered(x), y: self.centered(y), n: (*n).into() });
         let most = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
         match dispatch(Seek { a: pair.a.body, b: pair.b.body, relation, from, most, options }) {
@@ -323,7 +324,7 @@ impl<'a> Search<'a> {
                 self.aligned = true;
                 self.trace = Some(trace);
                 if !self.done() {
-                    self.sharpen();
+                    self.refine();
                 }
             }
             Err(lost) => {
@@ -338,7 +339,7 @@ impl<'a> Search<'a> {
         let pair = self.pair;
         let center = pair.a.body.normalization().center;
         let to_query = |v: V3<f64>| pair.a_to_query(&(center + Vector3::from(v)));
-        if lost.middle.is_some_and(|middle| self.common(&to_query(middle))) {
+        if lost.common.is_some_and(|common| self.common(&to_query(common.v))) {
             return;
         }
         // Bodies of one shape on top of each other touch all over: a bad hint finds that, and not
@@ -348,7 +349,7 @@ impl<'a> Search<'a> {
         }
         if let Some(grazing) = &lost.grazing {
             self.resume(grazing);
-            self.sharpen();
+            self.refine();
         }
     }
 
@@ -366,17 +367,17 @@ impl<'a> Search<'a> {
     }
 
     /// Goes on in double-double arithmetic where rounding keeps the bracket wide.
-    pub(in crate::measure::distance) fn sharpen(&mut self) {
+    pub(in crate::measure::distance) fn refine(&mut self) {
         if !runs(Stage::Refinement) {
             return;
         }
         let pair = self.pair;
-        let sharp = SharpPair::new(pair);
+        let refined = RefinedPair::new(pair);
         // Once each: from the same start it would end the same.
         while let Some(start) = self.tried.iter_mut().find_map(Option::take) {
             let left = self.options.max_iterations() - self.iterations.min(self.options.max_iterations());
             let left = if self.narrow() && self.goals.0.is_narrow() { left.min(UNSURE) } else { left };
-            let steps = sharp.distance(&start, left, |found| {
+            let steps = refined.distance(&start, left, |found| {
                 if self.raise(found.lower, &found.n) {
                     self.active = found.active;
                 }

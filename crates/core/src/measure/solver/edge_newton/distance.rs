@@ -1,7 +1,7 @@
 //! The distance of two bodies of several constraints, inside a proven bracket; see [`super`].
 
 use super::aggregate::{Evaluated, Weighted};
-use super::quadratic_program::{ActiveRows, MOST_ACTIVE, OnActive, Row, feasible_multipliers, minimize};
+use super::quadratic_program::{ActiveRows, Checked, MOST_ACTIVE, OnActive, Row, check, minimize};
 use crate::body::{Body, MAX_CONSTRAINTS};
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::vector::{
@@ -9,7 +9,8 @@ use crate::measure::frames::vector::{
 };
 use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveConstraints;
-use crate::measure::solver::continuation::{LONGEST_MOVE, limits, worth_a_bracket};
+use crate::measure::solver::common_point::CommonPoint;
+use crate::measure::solver::continuation::{LONGEST_MOVE, Lost, Prospect, limits, worth_a_bracket};
 use crate::measure::solver::initial_guess::Start;
 use crate::measure::solver::predictor::Drift;
 use crate::measure::solver::stop_criterion::StopCriterion;
@@ -25,9 +26,13 @@ const MAX_ROUNDS: u32 = 16;
 /// changes time only: their deepest point is found by the general search.
 const MOST_CONTACTS: u32 = 3;
 
+/// Length of a step whose end is proven, relative to those of smooth bodies: with the weights of
+/// several constraints a proof costs more than an evaluation. It changes time only; no test pins it.
+const WORTH_A_PROOF: f64 = 0.1;
+
 /// Most changes of B's active set, or of the distance, within a step. It changes time only; no test
 /// pins it.
-const MOST_EXCHANGES: usize = 6;
+const MOST_EXCHANGES: usize = 12;
 
 /// Relative error of the distance that a step is made for, beyond which it is made again: what the
 /// normal turns is in proportion to its inverse. It changes time only; no test pins it.
@@ -134,6 +139,8 @@ pub(in crate::measure) struct EdgeQuery<'a> {
     pub(in crate::measure) trace: Option<&'a EdgeTrace>,
     /// Where to start without one; else where the outlines are nearest.
     pub(in crate::measure) start: Option<Start<f64>>,
+    /// About the normal from B to A there, A's frame, if it is known.
+    pub(in crate::measure) facing: Option<V3<f64>>,
 }
 
 /// Trial points in the query frame, the basis whose third vector is the trial normal, and the
@@ -240,38 +247,60 @@ impl Linearized {
 }
 
 impl WithSimd for EdgeQuery<'_> {
-    /// The proven answer, or after how many evaluations there is none.
-    type Output = Result<EdgeProven, u32>;
+    /// The proven answer, or what is left.
+    type Output = Result<EdgeProven, Lost>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let Self { a, pose_a, b, pose_b, goal, tolerance, options, trace, start } = self;
-        let relation = Apart { pose_a, pose_b, goal, tolerance };
+        let Self { a, pose_a, b, pose_b, goal, tolerance, options, trace, start, facing } = self;
+        let relation = Apart { pose_a, pose_b, goal, tolerance, facing };
         let relative = relation.relative(simd, a, b);
         let sides = (Side::at_home(simd, a, 0), Side::away(b, 0, &relative));
         let solver = Solver { sides, relation, options, limits: limits(a, b) };
         let mut rounds = 0;
-        if let Some(trace) = trace
-            && let Some((at, predicted)) = solver.follow(simd, &relative, trace)
-            && let Ok(mut proven) = solver.run(simd, &relative, at, &mut rounds)
-        {
-            let y = apply_transposed::<S, f64>(&relative.rotation, subtract::<S, f64>(proven.y, relative.origin));
-            let missed = [
-                subtract::<S, f64>(proven.x, predicted[0]),
-                subtract::<S, f64>(y, predicted[1]),
-                subtract::<S, f64>(proven.n, predicted[2]),
-            ];
-            proven.trace.drift = trace.drift;
-            proven.trace.drift.update(simd, missed);
-            return Ok(proven);
-        }
-        let start = match start {
-            Some(start) => start,
-            None => relation.start(simd, a, b, &relative).0,
+        let mut following = match trace {
+            Some(trace) => solver.follow(simd, &relative, trace),
+            None => None,
         };
-        let active = [Weighted::default(); 2];
-        let at = Iterate { x: start.x, y: start.y, frame: basis(simd, start.n), active };
-        solver.run(simd, &relative, at, &mut rounds).map_err(|()| rounds)
+        // From the last answer, and if that fails from the poses alone.
+        loop {
+            let (at, predicted) = match following.take() {
+                Some((at, predicted)) => (at, Some(predicted)),
+                None => {
+                    let start = match start {
+                        Some(start) => start,
+                        None => relation.start(simd, a, b, &relative).0,
+                    };
+                    if dot::<S, f64>(start.n, subtract::<S, f64>(start.x, start.y)) < 0.0 {
+                        let common = CommonPoint::between(simd, (&solver.sides.0, &solver.sides.1), start.x, start.y);
+                        if common.is_some() {
+                            return Err(Lost { common, ..Lost::after(rounds + 1) });
+                        }
+                    }
+                    let active = [Weighted::default(); 2];
+                    (Iterate { x: start.x, y: start.y, frame: basis(simd, start.n), active }, None)
+                }
+            };
+            match solver.run(simd, &relative, at, &mut rounds) {
+                Ok(mut proven) => {
+                    if let (Some(predicted), Some(trace)) = (predicted, trace) {
+                        let from_b = subtract::<S, f64>(proven.y, relative.origin);
+                        let missed = [
+                            subtract::<S, f64>(proven.x, predicted[0]),
+                            subtract::<S, f64>(apply_transposed::<S, f64>(&relative.rotation, from_b), predicted[1]),
+                            subtract::<S, f64>(proven.n, predicted[2]),
+                        ];
+                        proven.trace.drift = trace.drift;
+                        proven.trace.drift.update(simd, missed);
+                    }
+                    return Ok(proven);
+                }
+                Err(common) if common.is_some() || predicted.is_none() => {
+                    return Err(Lost { common, ..Lost::after(rounds) });
+                }
+                Err(_) => {}
+            }
+        }
     }
 }
 
@@ -315,6 +344,9 @@ impl Solver<'_> {
     }
 
     /// Newton's method until the bracket is narrow.
+    ///
+    /// # Errors
+    /// There is no answer; a point that lies in both bodies, or seems to, if one was found.
     // There is no allocation in a solve.
     #[allow(clippy::result_large_err)]
     #[inline(always)]
@@ -324,12 +356,12 @@ impl Solver<'_> {
         relative: &Relative<f64>,
         mut at: Iterate,
         rounds: &mut u32,
-    ) -> Result<EdgeProven, ()> {
+    ) -> Result<EdgeProven, Option<CommonPoint>> {
         let (side_a, side_b) = &self.sides;
         let mut contacts = 0;
         for _ in 0..MAX_ROUNDS {
             if self.options.exhausted(*rounds) {
-                return Err(());
+                return Err(None);
             }
             *rounds += 1;
             let (of_a, inside_a) = Evaluated::new(simd, side_a, at.x);
@@ -340,7 +372,7 @@ impl Solver<'_> {
                 at.x = side_a.with_active(highest_a).brought_near(simd, at.x, of_a.jets[highest_a].value);
                 at.y = side_b.with_active(highest_b).brought_near(simd, at.y, of_b.jets[highest_b].value);
                 if !at.x.iter().chain(&at.y).all(|entry| entry.is_finite()) {
-                    return Err(());
+                    return Err(None);
                 }
                 continue;
             }
@@ -359,21 +391,31 @@ impl Solver<'_> {
             let (bent_a, bent_b) = (active_a.sum(simd, &of_a).hessian, active_b.sum(simd, &of_b).hessian);
             let linear_a = Linearized::new(simd, of_a.iter(), (active_a, &bent_a), &local_a);
             let linear_b = Linearized::new(simd, of_b.iter(), (active_b, &bent_b), &local_b);
-            let Some(mut found) = self.step(simd, &linear_a, &linear_b, difference) else { return Err(()) };
-            if found.step.within(simd, worth_a_bracket(self.limits)) {
+            let Some(mut found) = self.step(simd, &linear_a, &linear_b, difference) else { return Err(None) };
+            let prospect = Prospect::new(simd, &self.relation, &found.step, difference[2], self.limits);
+            if prospect == Prospect::Common {
+                let x = moved::<S, f64>(at.x, found.step.dx, &at.frame);
+                let y = moved::<S, f64>(at.y, found.step.dy, &at.frame);
+                let common = CommonPoint::between(simd, (side_a, side_b), x, y);
+                if matches!(common, Some(CommonPoint { proven: true, .. })) {
+                    return Err(common);
+                }
+            }
+            let longest = worth_a_bracket(self.limits).map(|limit| WORTH_A_PROOF * limit);
+            if prospect == Prospect::Decided || found.step.within(simd, longest) {
                 match self.prove(simd, relative, &at, &found, [(&of_a, &local_a), (&of_b, &local_b)], difference) {
                     Ok(proven) => return Ok(EdgeProven { rounds: *rounds, ..proven }),
                     Err(touching) => contacts += u32::from(touching),
                 }
                 if contacts >= MOST_CONTACTS {
-                    return Err(());
+                    return Err(None);
                 }
             }
             let step = &mut found.step;
             let of_x = side_a.relative_square(simd, &local_a, step.dx);
             let length = of_x.max(side_b.relative_square(simd, &local_b, step.dy)).sqrt();
             if !length.is_finite() {
-                return Err(());
+                return Err(None);
             }
             if length > LONGEST_MOVE {
                 step.shorten(LONGEST_MOVE / length);
@@ -383,7 +425,7 @@ impl Solver<'_> {
             at.frame = basis(simd, moved::<S, f64>(at.frame[2], [step.dn[0], step.dn[1], 0.0], &at.frame));
             at.active = found.active;
         }
-        Err(())
+        Err(None)
     }
 
     /// Newton's step from points with `difference = x - y` in the basis; none if the quadratic
@@ -422,17 +464,16 @@ impl Solver<'_> {
             // How far apart they are then.
             let next = (difference[2] + dx[2] - dy[2]).max(least);
             let unlike = (next - distance).abs() > UNLIKE * next.max(distance);
-            if unlike && next > least && 2 * exchange <= MOST_EXCHANGES {
+            if unlike && next > least && 4 * exchange <= MOST_EXCHANGES {
                 distance = next;
                 continue;
             }
-            if let Some(multipliers) = feasible_multipliers(simd, of_dy, b.rows(), (&active_b, dy), of_b.0) {
+            if let Checked::Minimum(multipliers) = check(simd, of_dy, b.rows(), &mut active_b, dy, of_b.0)? {
                 let dn = [(apart[0] - dy[0]) * inverse, (apart[1] - dy[1]) * inverse];
                 let of_b = multipliers.map(|multiplier| multiplier * inverse);
                 let active = [a.weighted(&active_a, found.multipliers), b.weighted(&active_b, of_b)];
                 return Some(Found { step: Step { dx, dy, dn }, active });
             }
-            active_b = minimize(simd, of_dy, b.rows(), active_b, of_b)?.active;
         }
         None
     }

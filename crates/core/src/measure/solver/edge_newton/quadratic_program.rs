@@ -17,7 +17,7 @@ use crate::polynomial::Simd;
 pub(super) const MOST_ACTIVE: usize = 3;
 
 /// Most changes of the active set.
-const MOST_CHANGES: usize = 16;
+const MOST_CHANGES: usize = 10;
 
 /// Square of the sine between the normals of two active constraints, or determinant of those of
 /// three, below which they count as dependent. Larger, edges between sides that are tilted by
@@ -89,60 +89,122 @@ pub(super) fn minimize<S: Simd>(
 ) -> Option<Minimum> {
     for _ in 0..MOST_CHANGES {
         let step = OnActive::new(simd, hessian, rows, &active, smallest)?.minimizer(simd, hessian, gradient);
-        let slope = add_scaled::<S, f64>(apply_symmetric::<S, f64>(hessian, step), 1.0, gradient);
-        let mut multipliers = multipliers_of(simd, rows, &active, scaled::<S, f64>(slope, -1.0))?;
-        let least = (0..active.len).min_by(|&i, &j| multipliers[i].total_cmp(&multipliers[j]))?;
-        if multipliers[least] < NEGATIVE {
-            if active.len == 1 {
-                return None;
-            }
-            active.remove(least);
-            continue;
-        }
-        let mut worst = (slack, None);
-        for (i, row) in rows.iter().enumerate() {
-            let violated = dot::<S, f64>(row.normal, step) + row.excess;
-            if violated > worst.0 && !active.contains(i) {
-                worst = (violated, Some(i));
-            }
-        }
-        let Some(next) = worst.1 else {
-            multipliers.iter_mut().for_each(|multiplier| *multiplier = multiplier.max(0.0));
+        if let Checked::Minimum(multipliers) = check(simd, (hessian, gradient), rows, &mut active, step, slack)? {
             return Some(Minimum { step, active, multipliers });
-        };
-        if active.len == MOST_ACTIVE {
-            let shares = in_terms_of_three(simd, rows, &active, rows[next].normal)?;
-            let ratio = |k: usize| if shares[k] > 0.0 { multipliers[k] / shares[k] } else { f64::INFINITY };
-            let leaves = (0..MOST_ACTIVE).min_by(|&i, &j| ratio(i).total_cmp(&ratio(j)))?;
-            active.remove(leaves);
         }
-        active.push(next);
+    }
+    enumerate(simd, (hessian, gradient), rows, (slack, smallest))
+}
+
+/// The minimiser by trying all active sets, where changing one by one goes round in circles.
+// Rare, and so compiled once.
+#[cold]
+#[inline(never)]
+fn enumerate<S: Simd>(
+    simd: S,
+    (hessian, gradient): (&[f64; 6], V3<f64>),
+    rows: &[Row],
+    (slack, smallest): (f64, f64),
+) -> Option<Minimum> {
+    let count = rows.len();
+    let mut sets = ActiveRows::default();
+    let mut visit = |indices: &[usize]| {
+        sets.len = 0;
+        indices.iter().for_each(|&i| sets.push(i));
+        let step = OnActive::new(simd, hessian, rows, &sets, smallest)?.minimizer(simd, hessian, gradient);
+        match check(simd, (hessian, gradient), rows, &mut sets.clone(), step, slack)? {
+            Checked::Minimum(multipliers) => Some(Minimum { step, active: sets, multipliers }),
+            Checked::Exchanged => None,
+        }
+    };
+    for i in 0..count {
+        if let Some(found) = visit(&[i]) {
+            return Some(found);
+        }
+        for j in 0..i {
+            if let Some(found) = visit(&[i, j]) {
+                return Some(found);
+            }
+            for k in 0..j {
+                if let Some(found) = visit(&[i, j, k]) {
+                    return Some(found);
+                }
+            }
+        }
     }
     None
 }
 
-/// The multipliers of active constraints at a step along which they hold with equality, if it is
-/// the minimiser over all constraints: they are at least 0, and no other is violated by more than
-/// `slack`.
+/// What is said of a step along which the active constraints hold with equality.
+pub(super) enum Checked {
+    /// It is the minimiser, with these multipliers.
+    Minimum([f64; MOST_ACTIVE]),
+    /// It is not; the active set has been changed by one constraint.
+    Exchanged,
+}
+
+/// Whether a step that is stationary on its active constraints is the minimiser over all: their
+/// multipliers are at least 0, and no other constraint is violated by more than `slack`. If not,
+/// changes the active set; none if that is not possible.
 #[inline(always)]
-pub(super) fn feasible_multipliers<S: Simd>(
+pub(super) fn check<S: Simd>(
     simd: S,
     (hessian, gradient): (&[f64; 6], V3<f64>),
     rows: &[Row],
-    (active, step): (&ActiveRows, V3<f64>),
+    active: &mut ActiveRows,
+    step: V3<f64>,
     slack: f64,
-) -> Option<[f64; MOST_ACTIVE]> {
+) -> Option<Checked> {
     let slope = add_scaled::<S, f64>(apply_symmetric::<S, f64>(hessian, step), 1.0, gradient);
     let mut multipliers = multipliers_of(simd, rows, active, scaled::<S, f64>(slope, -1.0))?;
-    let mut fine = true;
+    let mut least = 0;
+    for k in 1..active.len {
+        if multipliers[k] < multipliers[least] {
+            least = k;
+        }
+    }
+    if multipliers[least] < NEGATIVE {
+        if active.len > 1 {
+            active.remove(least);
+            return Some(Checked::Exchanged);
+        }
+        // What faces away from where the minimum pulls gives way to what faces it most.
+        let mut facing = (0.0, None);
+        for (i, row) in rows.iter().enumerate() {
+            let along = -dot::<S, f64>(row.normal, slope);
+            if along > facing.0 {
+                facing = (along, Some(i));
+            }
+        }
+        active.index[0] = facing.1? as u8;
+        return Some(Checked::Exchanged);
+    }
+    let mut worst = (slack, None);
     for (i, row) in rows.iter().enumerate() {
-        fine &= dot::<S, f64>(row.normal, step) + row.excess <= slack || active.contains(i);
+        let violated = dot::<S, f64>(row.normal, step) + row.excess;
+        if violated > worst.0 && !active.contains(i) {
+            worst = (violated, Some(i));
+        }
     }
-    for multiplier in &mut multipliers[..active.len] {
-        fine &= *multiplier >= NEGATIVE;
-        *multiplier = multiplier.max(0.0);
+    let Some(next) = worst.1 else {
+        for multiplier in &mut multipliers[..active.len] {
+            *multiplier = multiplier.max(0.0);
+        }
+        return Some(Checked::Minimum(multipliers));
+    };
+    if active.len == MOST_ACTIVE {
+        let shares = in_terms_of_three(simd, rows, active, rows[next].normal)?;
+        let mut first = (f64::INFINITY, None);
+        for k in 0..MOST_ACTIVE {
+            let ratio = multipliers[k] / shares[k];
+            if shares[k] > 0.0 && ratio < first.0 {
+                first = (ratio, Some(k));
+            }
+        }
+        active.remove(first.1?);
     }
-    fine.then_some(multipliers)
+    active.push(next);
+    Some(Checked::Exchanged)
 }
 
 /// Steps along which active constraints hold with equality.

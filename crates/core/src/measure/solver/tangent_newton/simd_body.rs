@@ -228,6 +228,26 @@ impl Side<'_, f64> {
         dot::<S, f64>(delta, delta) / self.body.trust().radius.powi(2)
     }
 
+    /// The largest of the constraints at v, as computed, and a bound of it for v itself: of what
+    /// the rounding of the body's map displaces points by it rises no more than its slope allows.
+    /// Not numbers outside of the ball of the body's [`crate::body::Trust`].
+    #[inline(always)]
+    pub(in crate::measure) fn highest<S: Simd>(&self, simd: S, v: V3<f64>) -> [f64; 2] {
+        let displaced = self.displacement * (1.0 + 1e-14);
+        let mut highest = [f64::NEG_INFINITY; 2];
+        for (i, trust) in self.body.trust().constraints.iter().enumerate() {
+            let (jet, inside) = self.with_active(i).jet(simd, v);
+            if !inside {
+                return [f64::NAN; 2];
+            }
+            let gradient = self.gradient(simd, &jet);
+            let slope = dot::<S, f64>(gradient, gradient).sqrt() * (1.0 + self.turn()) + trust.gradient_error;
+            let raised = displaced * (slope + trust.curvature_ceiling * displaced) * (1.0 + 1e-13);
+            highest = [highest[0].max(jet.value), highest[1].max(jet.value + trust.value_error + raised)];
+        }
+        highest
+    }
+
     /// Whether all constraints but the active one are proven to hold at (a point within the
     /// displacement of) v.
     #[inline(always)]
