@@ -1,5 +1,5 @@
 # Everything a fresh Debian or Ubuntu machine needs beyond Rust (rustup), make and a C compiler.
-.PHONY: help setup demo test check charts docs-numbers image acceptance endurance fuzz draws measures kills
+.PHONY: help setup demo test check charts docs-numbers image acceptance endurance fuzz draws measures kills solvers
 
 help:
 	@echo 'make demo          fit two shapes, serve them, sweep one through the other, draw the curves'
@@ -8,12 +8,13 @@ help:
 	@echo 'make charts        measure beside other libraries, and draw: SUBLEVEL_DATA=DIR with the meshes'
 	@echo 'make docs-numbers  write the numbers of README.md and docs/ again from the CSV files in docs/'
 	@echo 'make image         build the container image of the server: BUILD= and RUNTIME= name other base images'
-	@echo 'make acceptance    what is too long for every change, all five of these: SUBLEVEL_DATA=DIR'
+	@echo 'make acceptance    what is too long for every change, all six of these: SUBLEVEL_DATA=DIR'
 	@echo '  make endurance     1e8 checked queries; interrupted, it continues where it was (QUERIES=1e9 for more)'
 	@echo '  make fuzz          1e6 damaged inputs for each reader of files and calls (RUNS=10000000 for more)'
 	@echo '  make draws         1e5 draws of each family of the stability tests (DRAWS=1000 for fewer)'
 	@echo '  make measures      time every measure beside coal and parry, and fail where a target is missed'
 	@echo '  make kills         kill a server under load 1e3 times, with a ledger of its answers (KILLS=100 for fewer)'
+	@echo '  make solvers       all tests of fits with each of the two solvers alone'
 	@echo 'make setup         install missing system packages (demo and test do this first)'
 
 setup:
@@ -42,7 +43,7 @@ image:
 	docker build -f deploy/container/Containerfile --target server $(if $(BUILD),--build-arg BUILD=$(BUILD)) \
 	    $(if $(RUNTIME),--build-arg RUNTIME=$(RUNTIME)) -t sublevel .
 
-acceptance: endurance fuzz draws measures kills
+acceptance: endurance fuzz draws measures kills solvers
 
 QUERIES ?= 1e8
 RUNS ?= 1000000
@@ -67,3 +68,8 @@ measures:
 
 kills: setup
 	SUBLEVEL_LONG=$(KILLS) cargo test --release --test server kills:: -- --nocapture
+
+solvers: setup
+	for solver in clarabel structured; do \
+	    SUBLEVEL_TEST_SOLVER=$$solver cargo test --release -p sublevel-fit --lib -- --include-ignored || exit 1; \
+	done
