@@ -1,6 +1,7 @@
 //! Sets that need not be convex: brackets against time, by branch and bound and by the hierarchy;
 //! and what a set that need not be convex buys beside compounds and convex bodies.
 
+mod counterexample;
 mod models;
 mod pairs;
 mod report;
@@ -8,6 +9,7 @@ mod shown;
 
 use super::Machine;
 use super::comparison::{ComparisonError, FitCache};
+use counterexample::{Level, counterexample};
 use models::{Model, models};
 use pairs::{Bracket, brackets};
 pub(crate) use shown::Shown;
@@ -19,6 +21,7 @@ pub struct Sets {
     machine: Machine,
     quick: bool,
     brackets: Vec<Bracket>,
+    counterexample: Vec<Level>,
     models: Vec<Model>,
 }
 
@@ -36,6 +39,8 @@ pub fn sets(
 ) -> Result<Sets, ComparisonError> {
     let mut announce = |at: &str| if progress(at).is_break() { Err(ComparisonError::Cancelled) } else { Ok(()) };
     let brackets = brackets(quick, &mut announce)?;
+    announce("the counterexample")?;
+    let counterexample = counterexample()?;
     let models = models(data, cache, quick, &mut announce)?;
-    Ok(Sets { machine: Machine::this(), quick, brackets, models })
+    Ok(Sets { machine: Machine::this(), quick, brackets, counterexample, models })
 }

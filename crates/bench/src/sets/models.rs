@@ -5,12 +5,13 @@ use crate::comparison::{ComparisonError, FitCache, Random, Subject};
 use nalgebra::Vector3;
 use parry3d_f64::math::{Pose as ParryPose, Vector};
 use parry3d_f64::query::PointQuery;
-use parry3d_f64::shape::TriMesh;
+use parry3d_f64::shape::{ConvexPolyhedron, TriMesh};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 use sublevel::body::{Body, Shape, SosBody, SosMethod};
 use sublevel::branch_and_bound::{BranchAndBound, Limits, PlacedSet};
+use sublevel::fit::hull::convex_hull;
 use sublevel::fit::{Coordinates, FitOptions, Objective, SosOptions, fit_parts, fit_sos};
 use sublevel::measure::{Options, Pose, WarmStart, distance};
 
@@ -32,7 +33,7 @@ const PARTS: [usize; 4] = [2, 4, 8, 16];
 const ACCURACY: f64 = 1e-2;
 
 /// Kinds of models as rows name them.
-pub(super) const KINDS: [&str; 3] = ["convex body", "compound", "sos-body"];
+pub(super) const KINDS: [&str; 4] = ["convex body", "compound", "sos-body", "hull"];
 
 /// A model of an object, measured.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,6 +54,8 @@ pub(super) struct Model {
 enum Answering {
     Solid(Shape),
     Set(Box<SosBody>),
+    /// The convex hull, whose distances parry computes.
+    Hull(ConvexPolyhedron),
 }
 
 /// Measures all models of all objects.
@@ -83,7 +86,7 @@ fn made(
     cache: &FitCache,
     announce: &mut dyn FnMut(&str) -> Result<(), ComparisonError>,
 ) -> Result<Vec<(&'static str, String, Answering)>, ComparisonError> {
-    let mut models = Vec::new();
+    let mut models = vec![(KINDS[3], "parry".to_owned(), Answering::Hull(hull(subject)?))];
     for degree in [4, 6] {
         announce(&format!("{}: degree {degree}", subject.name))?;
         let options = FitOptions { degree, ..FitOptions::default() };
@@ -118,6 +121,16 @@ fn made(
         }
     }
     Ok(models)
+}
+
+/// The hull of an object's points.
+fn hull(subject: &Subject) -> Result<ConvexPolyhedron, ComparisonError> {
+    let points = &subject.mesh.points;
+    let hull = convex_hull(points).map_err(|source| ComparisonError::Hull { mesh: subject.name, source })?;
+    let corners: Vec<Vector> =
+        hull.vertices.iter().map(|&i| Vector::new(points[i].x, points[i].y, points[i].z)).collect();
+    ConvexPolyhedron::from_convex_hull(&corners)
+        .ok_or_else(|| ComparisonError::ParryMesh { mesh: subject.name, what: "no hull".into() })
 }
 
 /// Centres of balls near the object with their distances from it, metres.
@@ -169,6 +182,10 @@ fn measured(
                 let sets = [PlacedSet::new(&**body, Pose::identity()), PlacedSet::new(&ball, pose)];
                 let found = branches.distance(&sets[0], &sets[1], &limits);
                 found.map_err(|(_, error)| failed(error.to_string()))?.upper_m
+            }
+            Answering::Hull(hull) => {
+                let center = Vector::new(center.x, center.y, center.z);
+                (hull.distance_to_point(&ParryPose::IDENTITY, center, true) - radius).max(0.0)
             }
         };
         times.push(start.elapsed().as_secs_f64());

@@ -47,7 +47,8 @@ pub(super) struct Bracket {
     pub(super) exact: bool,
 }
 
-const UNIT: Normalization = Normalization {
+/// Coordinates as they are.
+pub(super) const UNIT: Normalization = Normalization {
     center: Vector3::new(0.0, 0.0, 0.0),
     linear: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
 };
@@ -147,7 +148,7 @@ fn lumpy(random: &mut Random, degree: usize) -> Result<Polynomial, ComparisonErr
 }
 
 /// Points of the set at which p is nearly 1.
-fn near_boundary(polynomial: &Polynomial, random: &mut Random) -> Vec<Vector3<f64>> {
+pub(super) fn near_boundary(polynomial: &Polynomial, random: &mut Random) -> Vec<Vector3<f64>> {
     let mut points = Vec::new();
     for _ in 0..200 {
         let u = random.direction();

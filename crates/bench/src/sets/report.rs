@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::Sets;
+use super::counterexample::Level;
 use super::models::Model;
 use super::pairs::Bracket;
 use crate::blocks::block;
@@ -12,7 +13,8 @@ impl Sets {
     pub fn markdown(&self) -> String {
         let flags = if self.quick { " --quick" } else { "" };
         let head = self.machine.head(&format!("sublevel-bench sets --data DIR{flags}"));
-        let [widths, hierarchy, models] = ["widths", "hierarchy", "models"].map(|name| block("sets.csv", name, ""));
+        let [widths, hierarchy, counterexample, models] =
+            ["widths", "hierarchy", "counterexample", "models"].map(|name| block("sets.csv", name, ""));
         format!(
             "# Sets that need not be convex\n\n{head}\n\n\
              ## Brackets against time\n\n\
@@ -22,11 +24,13 @@ impl Sets {
              ## The hierarchy\n\n\
              The experiment of section IV-A of the paper: how often level 0 is exact for sets that are not convex. A bound is called exact \
              where it meets the distance of two points that are proven to be in the sets.\n\n{hierarchy}\n\
+             All examples of the paper are exact at level 0. This pair is not: the set `(x^2 - 1)^2 + x/2 + y^2 + z^2 + 0.9 <= 1`, two wells of which \
+             only the farther one is deep enough, and a ball of radius 0.1 m about (2, 0, 0) m.\n\n{counterexample}\n\
              ## Models of objects\n\n\
              Balls of 2 % of the diameter of an object, at random places 1 to 30 % of it away from the object's surface, some of them inside \
              of what it encloses. The error of a model is the mean difference of its distance from that of the mesh; a false contact is a \
              ball that touches the model and not the mesh. All queries cold, one thread, accuracy 1 % of the ball. Sets that could not be \
-             proven are left out.\n\n{models}"
+             proven are left out. The convex hull is exact, its distances are those of parry without proof.\n\n{models}"
         )
     }
 
@@ -38,6 +42,10 @@ impl Sets {
             let exact = u8::from(*exact);
             // Writing to a string cannot fail.
             let _ = writeln!(text, "pair,{pair},{method},{degree},{steps},{seconds},{lower},{upper},{exact},,");
+        }
+        for Level { level, seconds, lower, upper, exact } in &self.counterexample {
+            let exact = u8::from(*exact);
+            let _ = writeln!(text, "counterexample,{level},,,,{seconds},{lower},{upper},{exact},,");
         }
         for Model { object, kind, name, error, false_contacts, seconds } in &self.models {
             let _ = writeln!(text, "{kind},{object},{name},,,{seconds},,,,{error},{false_contacts}");

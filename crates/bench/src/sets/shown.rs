@@ -5,6 +5,7 @@ use std::fmt::Write;
 
 use sublevel::draw::{ChartError, Group, Ink, Marker, Point, Scatter};
 
+use super::counterexample::Level;
 use super::models::{KINDS, Model};
 use super::pairs::{BRANCH, Bracket, level_name};
 use crate::csv::{CsvError, Row, Table};
@@ -15,20 +16,22 @@ const NARROW: f64 = 1e-2;
 /// The rows of a CSV.
 pub(crate) struct Shown {
     brackets: Vec<Bracket>,
+    counterexample: Vec<Level>,
     models: Vec<Model>,
 }
 
 impl Shown {
     /// Reads what [`Sets::csv`](super::Sets::csv) wrote.
     pub(crate) fn read(csv: &str) -> Result<Self, CsvError> {
-        let (mut brackets, mut models) = (Vec::new(), Vec::new());
+        let (mut brackets, mut counterexample, mut models) = (Vec::new(), Vec::new(), Vec::new());
         for row in Table::read(csv)?.rows() {
             match row.text("row")? {
                 "pair" => brackets.push(bracket(row)?),
+                "counterexample" => counterexample.push(level(row)?),
                 kind => models.push(model(kind, row)?),
             }
         }
-        Ok(Self { brackets, models })
+        Ok(Self { brackets, counterexample, models })
     }
 
     /// The pictures.
@@ -45,6 +48,7 @@ impl Shown {
         match name {
             "widths" => Some(self.widths() + "\n![sets.svg](sets.svg)\n"),
             "hierarchy" => Some(self.hierarchy() + "\n![sets-hierarchy.svg](sets-hierarchy.svg)\n"),
+            "counterexample" => Some(self.levels()),
             "models" => Some(self.table_of_models() + "\n![sets-models.svg](sets-models.svg)\n"),
             "sentence" => self.sentence(),
             _ => None,
@@ -140,6 +144,15 @@ impl Shown {
         text + "\nLevel 1 is asked at degree 4 where level 0 is not exact.\n"
     }
 
+    fn levels(&self) -> String {
+        let mut text = String::from("| level | lower bound m | upper bound m | exact | s |\n|---|---|---|---|---|\n");
+        for Level { level, seconds, lower, upper, exact } in &self.counterexample {
+            let exact = if *exact { "yes" } else { "no" };
+            let _ = writeln!(text, "| {level} | {lower:.6} | {upper:.6} | {exact} | {seconds:.3} |");
+        }
+        text
+    }
+
     fn table_of_models(&self) -> String {
         let mut text = String::from(
             "| object | model | | mean error, % of the diameter | false contacts, % | median µs of a query |\n|---|---|---|---|---|---|\n",
@@ -224,7 +237,12 @@ impl Shown {
 
     /// Means of the objects.
     fn chart_of_models(&self) -> Result<String, ChartError> {
-        let looks = [(Ink::Blue, Marker::Disc), (Ink::Green, Marker::Triangle), (Ink::Orange, Marker::Ring)];
+        let looks = [
+            (Ink::Blue, Marker::Disc),
+            (Ink::Green, Marker::Triangle),
+            (Ink::Orange, Marker::Ring),
+            (Ink::Purple, Marker::Cross),
+        ];
         let groups = KINDS.iter().zip(looks).map(|(kind, (ink, marker))| {
             let mut names: Vec<&str> = Vec::new();
             for model in self.models.iter().filter(|model| model.kind == *kind) {
@@ -260,6 +278,16 @@ fn bracket(row: Row<'_>) -> Result<Bracket, CsvError> {
         pair: row.get("of")?,
         method: row.text("name")?.to_owned(),
         steps: row.get("steps")?,
+        seconds: row.number("seconds")?,
+        lower: row.number("lower")?,
+        upper: row.number("upper")?,
+        exact: row.text("exact")? == "1",
+    })
+}
+
+fn level(row: Row<'_>) -> Result<Level, CsvError> {
+    Ok(Level {
+        level: row.get("of")?,
         seconds: row.number("seconds")?,
         lower: row.number("lower")?,
         upper: row.number("upper")?,
