@@ -22,6 +22,9 @@ use crate::store::Job;
 #[derive(Clone, Debug)]
 pub(super) struct Metrics(Arc<Counted>);
 
+/// Most iterations of an answer by continuation, from a cold start, too.
+const CONTINUATION_ITERATIONS: u32 = 16;
+
 #[derive(Debug)]
 struct Counted {
     /// Held while what others count is taken over.
@@ -35,6 +38,7 @@ struct Counted {
     connections: Gauge,
     answers: Family<Ended, Counter>,
     iterations: Counter,
+    fallbacks: Counter,
     rungs: Family<Rung, Counter>,
     warm_starts: Family<Found, Counter>,
     states: Family<Verdict, Counter>,
@@ -111,6 +115,10 @@ impl Default for Metrics {
         registry.register("answers", "Measures of pairs, by how they came about", answers.clone());
         let iterations = Counter::default();
         registry.register("solver_iterations", "Iterations of the solver for all answers", iterations.clone());
+        let fallbacks = Counter::default();
+        let about =
+            "Measures of pairs that took more iterations than continuation does, and so fell back to slower methods";
+        registry.register("fallbacks", about, fallbacks.clone());
         let rungs = Family::default();
         let about = "Measures of pairs, by the finer of the two rungs that were used; 0 without ladders";
         registry.register("answer_rungs", about, rungs.clone());
@@ -149,6 +157,7 @@ impl Default for Metrics {
             connections,
             answers,
             iterations,
+            fallbacks,
             rungs,
             warm_starts,
             states,
@@ -205,13 +214,15 @@ impl Metrics {
 
     /// Answers of a call.
     pub(super) fn answered<'a>(&self, answers: impl IntoIterator<Item = &'a Answer>) {
-        let (mut by_status, mut by_rung, mut iterations) = ([0_u64; 5], [0_u64; 256], 0);
+        let (mut by_status, mut by_rung, mut iterations, mut fallbacks) = ([0_u64; 5], [0_u64; 256], 0, 0);
         for answer in answers {
             by_status[answer.status as usize] += 1;
             by_rung[usize::from(answer.rungs[0].max(answer.rungs[1]))] += 1;
             iterations += u64::from(answer.iterations);
+            fallbacks += u64::from(answer.iterations > CONTINUATION_ITERATIONS);
         }
         self.0.iterations.inc_by(iterations);
+        self.0.fallbacks.inc_by(fallbacks);
         for (rung, &count) in (0..).zip(&by_rung).filter(|(_, count)| **count > 0) {
             self.0.rungs.get_or_create(&Rung { rung }).inc_by(count);
         }
