@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use sublevel::service::Reason;
+
 /// Folders that ARCHITECTURE.md names in short, and where they lie.
 const SHORT: [(&str, &str); 15] = [
     ("polynomial/", "crates/core/src/polynomial/"),
@@ -161,30 +163,19 @@ fn docs_have_no_picture_that_no_page_shows() {
     }
 }
 
-/// Sources of a folder, its folders included.
-fn sources(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).expect("readable").map(|entry| entry.expect("an entry").path());
-    entries
-        .flat_map(|path| if path.is_dir() { sources(&path) } else { vec![path] })
-        .filter(|path| path.extension().is_some_and(|extension| extension == "rs"))
-        .collect()
-}
-
 #[test]
-fn every_reason_of_an_error_is_explained() {
-    let page = fs::read_to_string(root().join("docs/operations.md")).expect("a page");
-    let makers = ["details(\"", "details_with(\"", "failed_precondition(\"", "aborted(\"", "unavailable(\""];
-    let (mut found, mut missing) = (0, Vec::new());
-    for source in sources(&root().join("src/service")) {
-        let text = fs::read_to_string(&source).expect("text");
-        for reason in makers.iter().flat_map(|maker| between(&text, maker, '"')) {
-            found += 1;
-            if !page.contains(&format!("`{reason}`")) {
-                missing.push(reason.to_owned());
-            }
-        }
+fn every_reason_of_an_error_has_a_section_and_a_link_to_it() {
+    let page = fs::read_to_string(root().join("docs/errors.md")).expect("a page");
+    let sections: Vec<&str> = page.lines().filter_map(|line| line.strip_prefix("## ")).collect();
+    let reasons: Vec<&str> = Reason::ALL.iter().map(|reason| reason.name()).collect();
+    for reason in &reasons {
+        let count = sections.iter().filter(|section| *section == reason).count();
+        assert_eq!(count, 1, "sections about {reason}");
+        let link = format!("[`{reason}`](#{})", reason.to_lowercase());
+        assert!(page.contains(&link), "the table has no {link}");
     }
-    assert!(found > 20 && missing.is_empty(), "{found} found, and not in docs/operations.md: {missing:?}");
+    let others = sections.iter().filter(|section| !reasons.contains(section) && **section != "Without a reason");
+    assert_eq!(others.collect::<Vec<_>>(), Vec::<&&str>::new(), "nobody sends these");
 }
 
 #[test]

@@ -19,6 +19,7 @@ use super::config::LimitsConfig;
 use super::error;
 use super::limits::{LOADING_PATIENCE, MAX_EXAMINING, SMALL_SCENE};
 use super::metrics::Metrics;
+use super::reason::Reason;
 use super::wire;
 
 /// Shared by all handlers. Work that blocks passes a limit first, so that one kind of it cannot
@@ -163,7 +164,7 @@ impl AppState {
             Ok(Ok(catalogue)) => catalogue.clone(),
             _ => None,
         }
-        .ok_or_else(|| error::unavailable("LOADING", "the catalogue is loading; try again in a moment"))
+        .ok_or_else(|| error::unavailable(Reason::Loading, "the catalogue is loading; try again in a moment"))
     }
 
     /// What the catalogue says; who asks for something that is not proven yet waits a little.
@@ -205,7 +206,7 @@ impl AppState {
             Err(_) => {
                 let Counts { bodies, unproven_bodies, .. } = catalogue.counts();
                 let why = format!("{unproven_bodies} of {bodies} bodies are still to be proven; try again in a moment");
-                Err(error::unavailable("LOADING", &why))
+                Err(error::unavailable(Reason::Loading, &why))
             }
         }
     }

@@ -9,6 +9,7 @@ use tonic::Status;
 
 use super::app_state::{AppState, stopped};
 use super::proto::BackupResponse;
+use super::reason::Reason;
 use super::{error, tokens};
 use crate::store::BACKUP_PREFIX;
 
@@ -76,7 +77,7 @@ fn send(
                 Ok(_) => Ok(()),
                 Err(_) => Err(error::not_read(PIECE_PATIENCE)),
             },
-            () = stopped(&mut stopping) => Err(error::unavailable("STOPPING", "the server is stopping; ask again")),
+            () = stopped(&mut stopping) => Err(error::unavailable(Reason::Stopping, "the server is stopping; ask again")),
         }
     };
     tokio::runtime::Handle::current().block_on(sending)

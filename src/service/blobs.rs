@@ -10,6 +10,7 @@ use tonic::Status;
 use super::error::{self, Invalid};
 use super::limits::{BLOB_IDLE, MAX_BLOB_BYTES, MAX_BLOBS_BYTES};
 use super::proto::{UploadBlobRequest, UploadBlobResponse};
+use super::reason::Reason;
 
 /// All blobs of a server.
 #[derive(Debug, Default)]
@@ -55,7 +56,7 @@ impl Blobs {
             return Ok(bytes.clone());
         }
         let why = format!("no complete blob {id}; upload it with UploadBlob, or again if it was idle for ten minutes");
-        Err(error::not_found("blob", id, field, why))
+        Err(error::not_found(Reason::BlobNotFound, id, field, why))
     }
 
     /// Keeps a file of the server's own for download; returns its name.

@@ -11,6 +11,7 @@ use super::app_state::{AppState, stopped};
 use super::call_time::CallTime;
 use super::limits::MAX_MESSAGE_BYTES;
 use super::proto::{Crossing, WatchRequest, WatchResponse};
+use super::reason::Reason;
 use super::{error, query_wire};
 use crate::scene::query::{Ask, Measure, Within, combined};
 use crate::scene::{MAX_NAME_BYTES, OwnStarts, Scene};
@@ -63,11 +64,11 @@ pub(super) async fn run(
         tokio::select! {
             changed = changes.changed() => if changed.is_err() {
                 let why = "the scene was deleted; list the scenes";
-                return drop(messages.send(Err(error::not_found("scene", scene.name(), "scene", why))).await);
+                return drop(messages.send(Err(error::not_found(Reason::SceneNotFound, scene.name(), "scene", why))).await);
             },
             () = stopped(&mut stopping) => {
                 let why = "the server stops; watch again when it is back";
-                return drop(messages.send(Err(error::unavailable("STOPPING", why))).await);
+                return drop(messages.send(Err(error::unavailable(Reason::Stopping, why))).await);
             }
             () = messages.closed() => return,
         }

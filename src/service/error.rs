@@ -14,6 +14,7 @@ use crate::store::{CatalogueError, MAX_FORKS, StoreError};
 
 use super::limits::MAX_MESSAGE_BYTES;
 use super::proto::StreamError;
+use super::reason::Reason;
 use super::tokens::Role;
 
 /// A field of a request that cannot be used.
@@ -34,23 +35,24 @@ impl Invalid {
 impl From<Invalid> for Status {
     fn from(Invalid { field, why }: Invalid) -> Self {
         let message = short(format!("{field}: {why}"));
-        let mut details = details("INVALID_FIELD");
+        let mut details = details(Reason::InvalidField);
         details.add_bad_request_violation(field, short(why));
         Self::with_error_details(Code::InvalidArgument, message, details)
     }
 }
 
 /// NOT_FOUND for a named thing; `field` is where the request named it.
-pub(super) fn not_found(kind: &str, name: &str, field: &str, why: impl fmt::Display) -> Status {
-    let mut details = details(&format!("{}_NOT_FOUND", kind.to_uppercase()));
+pub(super) fn not_found(reason: Reason, name: &str, field: &str, why: impl fmt::Display) -> Status {
+    let mut details = details(reason);
     let why = short(why.to_string());
+    let kind = reason.name().trim_end_matches("_NOT_FOUND").to_lowercase();
     details.set_resource_info(kind, name, "", why.clone());
     details.add_bad_request_violation(field, why.clone());
     Status::with_error_details(Code::NotFound, format!("{field}: {why}"), details)
 }
 
 /// ABORTED: somebody else was first; `revision` is where the scene is now.
-pub(super) fn aborted(reason: &str, field: &str, why: impl fmt::Display, revision: u64) -> Status {
+pub(super) fn aborted(reason: Reason, field: &str, why: impl fmt::Display, revision: u64) -> Status {
     let mut details = details_with(reason, [("revision", revision.to_string())]);
     let why = short(why.to_string());
     details.add_bad_request_violation(field, why.clone());
@@ -63,7 +65,7 @@ pub(super) fn at_most(field: &str, count: usize, (name, limit): (&str, usize)) -
         return Ok(());
     }
     let why = format!("asks for {count}, and a call takes at most {limit} ({name}); split it into several calls");
-    let mut details = details_with("LIMIT_EXCEEDED", [("limit", name.to_owned()), ("value", limit.to_string())]);
+    let mut details = details_with(Reason::LimitExceeded, [("limit", name.to_owned()), ("value", limit.to_string())]);
     details.add_bad_request_violation(field, why.clone());
     Err(Status::with_error_details(Code::ResourceExhausted, format!("{field}: {why}"), details))
 }
@@ -79,7 +81,7 @@ pub(super) fn message_fits(bytes: usize) -> Result<(), Status> {
          UploadBlob"
     );
     let limits = [("limit", "max_message_bytes".to_owned()), ("value", limit.to_string())];
-    Err(Status::with_error_details(Code::ResourceExhausted, message, details_with("LIMIT_EXCEEDED", limits)))
+    Err(Status::with_error_details(Code::ResourceExhausted, message, details_with(Reason::LimitExceeded, limits)))
 }
 
 /// RESOURCE_EXHAUSTED where an answer does not fit in a message.
@@ -93,28 +95,28 @@ pub(super) fn fits(response: &impl prost::Message) -> Result<(), Status> {
          or outputs, or for LAYOUT_COLUMNS"
     );
     let limits = [("limit", "max_message_bytes".to_owned()), ("value", limit.to_string())];
-    Err(Status::with_error_details(Code::ResourceExhausted, message, details_with("LIMIT_EXCEEDED", limits)))
+    Err(Status::with_error_details(Code::ResourceExhausted, message, details_with(Reason::LimitExceeded, limits)))
 }
 
 /// FAILED_PRECONDITION: a body without a bounded surface.
 pub(super) fn no_surface(id: &str) -> Status {
     let message = format!("body {id} is a half-space, which has no bounded surface; draw its plane");
-    failed_precondition("NO_SURFACE", &format!("body/{id}"), message)
+    failed_precondition(Reason::NoSurface, &format!("body/{id}"), message)
 }
 
 /// DEADLINE_EXCEEDED: the client's own time is over.
 pub(super) fn deadline() -> Status {
     let message = "the deadline of the call has passed; ask for less, allow more time, or send budget_ms for what is \
                    known by then";
-    Status::with_error_details(Code::DeadlineExceeded, message, details("DEADLINE"))
+    Status::with_error_details(Code::DeadlineExceeded, message, details(Reason::Deadline))
 }
 
 /// UNAUTHENTICATED: no token, or one that is not known.
 pub(super) fn unauthenticated(shown: bool) -> Status {
     let (reason, message) = if shown {
-        ("TOKEN_UNKNOWN", "the token is not known; send the one you were given as authorization: Bearer TOKEN")
+        (Reason::TokenUnknown, "the token is not known; send the one you were given as authorization: Bearer TOKEN")
     } else {
-        ("TOKEN_MISSING", "the call needs a token; send it in the metadata as authorization: Bearer TOKEN")
+        (Reason::TokenMissing, "the call needs a token; send it in the metadata as authorization: Bearer TOKEN")
     };
     Status::with_error_details(Code::Unauthenticated, message, details(reason))
 }
@@ -128,7 +130,7 @@ pub(super) fn permission_denied(path: &str, name: &str, needed: Role) -> Status 
     };
     let message =
         format!("{path} needs the role {needed}, which the token \"{name}\" does not have; ask for one that has");
-    let details = details_with("ROLE_NEEDED", [("role", needed.to_owned())]);
+    let details = details_with(Reason::RoleNeeded, [("role", needed.to_owned())]);
     Status::with_error_details(Code::PermissionDenied, short(message), details)
 }
 
@@ -136,7 +138,7 @@ pub(super) fn permission_denied(path: &str, name: &str, needed: Role) -> Status 
 pub(super) fn shed(waited: Duration) -> Status {
     let message =
         format!("the server is busy: the call waited {waited:?} for its turn; try again later, or ask less often");
-    let mut details = details("OVERLOADED");
+    let mut details = details(Reason::Overloaded);
     details.set_retry_info(Some(waited));
     Status::with_error_details(Code::ResourceExhausted, message, details)
 }
@@ -145,13 +147,13 @@ pub(super) fn shed(waited: Duration) -> Status {
 pub(super) fn abandoned() -> Status {
     tracing::error!("a question was ended by a panic");
     let message = "the question was ended by a panic in the server; its log says more, please report it";
-    Status::with_error_details(Code::Internal, message, details("INTERNAL_PANIC"))
+    Status::with_error_details(Code::Internal, message, details(Reason::InternalPanic))
 }
 
 /// INTERNAL for what cannot happen.
 pub(super) fn internal(error: &dyn fmt::Display) -> Status {
     tracing::error!(%error, "a defect");
-    Status::with_error_details(Code::Internal, "a defect of the server; please report it", details("INTERNAL"))
+    Status::with_error_details(Code::Internal, "a defect of the server; please report it", details(Reason::Internal))
 }
 
 /// A status inside a stream that goes on.
@@ -167,7 +169,7 @@ pub(super) fn in_stream(status: &Status) -> StreamError {
 }
 
 /// UNAVAILABLE: the client may try again.
-pub(super) fn unavailable(reason: &str, message: &str) -> Status {
+pub(super) fn unavailable(reason: Reason, message: &str) -> Status {
     Status::with_error_details(Code::Unavailable, message, details(reason))
 }
 
@@ -182,23 +184,23 @@ pub(super) fn not_read(limit: Duration) -> Status {
 }
 
 fn too_long(message: String) -> Status {
-    Status::with_error_details(Code::DeadlineExceeded, message, details("CALL_TOO_LONG"))
+    Status::with_error_details(Code::DeadlineExceeded, message, details(Reason::CallTooLong))
 }
 
 /// INTERNAL for a task that panicked.
 pub(super) fn internal_panic(error: &tokio::task::JoinError) -> Status {
     tracing::error!(%error, "a call was ended by a panic");
     let message = "the call was ended by a panic in the server; its log says more, please report it";
-    Status::with_error_details(Code::Internal, message, details("INTERNAL_PANIC"))
+    Status::with_error_details(Code::Internal, message, details(Reason::InternalPanic))
 }
 
-fn failed_precondition(reason: &str, subject: &str, message: String) -> Status {
+fn failed_precondition(reason: Reason, subject: &str, message: String) -> Status {
     let mut details = details(reason);
-    details.add_precondition_failure_violation(reason, subject, message.clone());
+    details.add_precondition_failure_violation(reason.name(), subject, message.clone());
     Status::with_error_details(Code::FailedPrecondition, message, details)
 }
 
-fn damaged(reason: &str, kind: &str, name: &str, message: String) -> Status {
+fn damaged(reason: Reason, kind: &str, name: &str, message: String) -> Status {
     let mut details = details(reason);
     details.set_resource_info(kind, name, "", message.clone());
     Status::with_error_details(Code::DataLoss, message, details)
@@ -209,48 +211,52 @@ fn damaged(reason: &str, kind: &str, name: &str, message: String) -> Status {
 pub(super) fn catalogue(error: &CatalogueError, field: &str) -> Status {
     let message = error.to_string();
     match error {
-        CatalogueError::NoBody(id) => not_found("body", &id.to_string(), field, message),
-        CatalogueError::DamagedBody { id, .. } => damaged("DAMAGED_BODY", "body", &id.to_string(), message),
-        CatalogueError::DamagedScene { scene, .. } => damaged("DAMAGED_SCENE", "scene", scene, message),
-        CatalogueError::NoScene(name) => not_found("scene", name, field, message),
-        CatalogueError::BodyUsed { id, .. } => failed_precondition("BODY_IN_USE", &format!("body/{id}"), message),
-        CatalogueError::NoRobot(id) => not_found("robot", &id.to_string(), field, message),
+        CatalogueError::NoBody(id) => not_found(Reason::BodyNotFound, &id.to_string(), field, message),
+        CatalogueError::DamagedBody { id, .. } => damaged(Reason::DamagedBody, "body", &id.to_string(), message),
+        CatalogueError::DamagedScene { scene, .. } => damaged(Reason::DamagedScene, "scene", scene, message),
+        CatalogueError::NoScene(name) => not_found(Reason::SceneNotFound, name, field, message),
+        CatalogueError::BodyUsed { id, .. } => failed_precondition(Reason::BodyInUse, &format!("body/{id}"), message),
+        CatalogueError::NoRobot(id) => not_found(Reason::RobotNotFound, &id.to_string(), field, message),
         CatalogueError::NoPlacedRobot { index, id } => {
-            not_found("robot", &id.to_string(), &format!("place_robots[{index}].robot_id"), message)
+            not_found(Reason::RobotNotFound, &id.to_string(), &format!("place_robots[{index}].robot_id"), message)
         }
-        CatalogueError::RobotUsed { id, .. } => failed_precondition("ROBOT_IN_USE", &format!("robot/{id}"), message),
-        CatalogueError::BodyOfRobot { id, .. } => failed_precondition("BODY_IN_USE", &format!("body/{id}"), message),
-        CatalogueError::DamagedRobot { id, .. } => damaged("DAMAGED_ROBOT", "robot", &id.to_string(), message),
+        CatalogueError::RobotUsed { id, .. } => {
+            failed_precondition(Reason::RobotInUse, &format!("robot/{id}"), message)
+        }
+        CatalogueError::BodyOfRobot { id, .. } => {
+            failed_precondition(Reason::BodyInUse, &format!("body/{id}"), message)
+        }
+        CatalogueError::DamagedRobot { id, .. } => damaged(Reason::DamagedRobot, "robot", &id.to_string(), message),
         CatalogueError::Load(_) => Invalid::new(field, message).into(),
         CatalogueError::SceneExists(name) => {
-            let mut details = details("SCENE_EXISTS");
+            let mut details = details(Reason::SceneExists);
             details.set_resource_info("scene", name, "", message.clone());
             Status::with_error_details(Code::AlreadyExists, message, details)
         }
         CatalogueError::NoMember { index, id } => {
-            not_found("body", &id.to_string(), &format!("options.group.body_ids[{index}]"), message)
+            not_found(Reason::BodyNotFound, &id.to_string(), &format!("options.group.body_ids[{index}]"), message)
         }
         CatalogueError::NoSet { index, id } => {
             let field = if *index == 0 { "a.body_id" } else { "b.body_id" };
-            not_found("body", &id.to_string(), field, message)
+            not_found(Reason::BodyNotFound, &id.to_string(), field, message)
         }
-        CatalogueError::RungUsed { id, .. } => failed_precondition("BODY_IN_USE", &format!("body/{id}"), message),
-        CatalogueError::NoJob(id) => not_found("job", id, field, message),
+        CatalogueError::RungUsed { id, .. } => failed_precondition(Reason::BodyInUse, &format!("body/{id}"), message),
+        CatalogueError::NoJob(id) => not_found(Reason::JobNotFound, id, field, message),
         CatalogueError::RequestUsed { request_id, .. } => {
-            let mut details = details("REQUEST_ID_USED");
+            let mut details = details(Reason::RequestIdUsed);
             details.set_resource_info("job", request_id, "", message.clone());
             Status::with_error_details(Code::AlreadyExists, message, details)
         }
         CatalogueError::QueueFull => {
-            Status::with_error_details(Code::ResourceExhausted, message, details("QUEUE_FULL"))
+            Status::with_error_details(Code::ResourceExhausted, message, details(Reason::QueueFull))
         }
-        CatalogueError::Ladder(_) => failed_precondition("RUNG_WITHOUT_POINTS", field, message),
-        CatalogueError::NoFork(_) => failed_precondition("NOT_A_FORK", "fork", message),
-        CatalogueError::NoParent { .. } => failed_precondition("PARENT_GONE", "fork", message),
-        CatalogueError::ParentChanged { current, .. } => aborted("PARENT_CHANGED", field, message, *current),
+        CatalogueError::Ladder(_) => failed_precondition(Reason::RungWithoutPoints, field, message),
+        CatalogueError::NoFork(_) => failed_precondition(Reason::NotAFork, "fork", message),
+        CatalogueError::NoParent { .. } => failed_precondition(Reason::ParentGone, "fork", message),
+        CatalogueError::ParentChanged { current, .. } => aborted(Reason::ParentChanged, field, message, *current),
         CatalogueError::TooManyForks => {
             let limits = [("limit", "max_forks".to_owned()), ("value", MAX_FORKS.to_string())];
-            Status::with_error_details(Code::ResourceExhausted, message, details_with("LIMIT_EXCEEDED", limits))
+            Status::with_error_details(Code::ResourceExhausted, message, details_with(Reason::LimitExceeded, limits))
         }
         CatalogueError::SceneName(error) => Invalid::new(field, error).into(),
         CatalogueError::Scene(error) => scene(error),
@@ -261,10 +267,10 @@ pub(super) fn catalogue(error: &CatalogueError, field: &str) -> Status {
 fn scene(error: &SceneError) -> Status {
     let invalid = |at: &Entry, leaf| Invalid::new(path(at, leaf), error).into();
     match error {
-        SceneError::Revision { current, .. } => aborted("REVISION_MISMATCH", "expected_revision", error, *current),
-        SceneError::Full { .. } => failed_precondition("SCENE_FULL", "scene", error.to_string()),
-        SceneError::NoObject { at, name } => not_found("object", name, &path(at, Leaf::Name), error),
-        SceneError::NoBody { at, id } => not_found("body", &id.to_string(), &path(at, Leaf::Body), error),
+        SceneError::Revision { current, .. } => aborted(Reason::RevisionMismatch, "expected_revision", error, *current),
+        SceneError::Full { .. } => failed_precondition(Reason::SceneFull, "scene", error.to_string()),
+        SceneError::NoObject { at, name } => not_found(Reason::ObjectNotFound, name, &path(at, Leaf::Name), error),
+        SceneError::NoBody { at, id } => not_found(Reason::BodyNotFound, &id.to_string(), &path(at, Leaf::Body), error),
         SceneError::Group { at } => invalid(at, Leaf::Group),
         SceneError::Padding { at, .. } => invalid(at, Leaf::Padding),
         SceneError::NoPose { at, .. } => invalid(at, Leaf::Pose),
@@ -276,7 +282,7 @@ fn scene(error: &SceneError) -> Status {
         | SceneError::OfRobot { at, .. }
         | SceneError::NameTaken { at, .. }
         | SceneError::LinkName { at, .. } => invalid(at, Leaf::Name),
-        SceneError::NoRobot { at, name } => not_found("robot", name, &path(at, Leaf::Name), error),
+        SceneError::NoRobot { at, name } => not_found(Reason::RobotNotFound, name, &path(at, Leaf::Name), error),
         SceneError::Joints { at, error } => {
             let leaf = match error {
                 JointsError::NoJoint { index, .. } | JointsError::Twice { index, .. } => format!("joints[{index}]"),
@@ -286,7 +292,7 @@ fn scene(error: &SceneError) -> Status {
         }
         SceneError::Pose { .. } => Invalid::new("set_poses", error).into(),
         SceneError::Circle { .. } => Invalid::new("attach", error).into(),
-        SceneError::Holds { .. } => failed_precondition("OBJECT_HOLDS", "remove_objects", error.to_string()),
+        SceneError::Holds { .. } => failed_precondition(Reason::ObjectHolds, "remove_objects", error.to_string()),
     }
 }
 
@@ -336,28 +342,36 @@ fn path(at: &Entry, leaf: Leaf) -> String {
     format!("{list}[{}]{leaf}", at.index)
 }
 
+/// The log says where on the disk; clients hear what to do.
 fn store(error: &StoreError) -> Status {
-    tracing::error!(%error, "the catalogue could not be written");
-    let (code, reason) = match error {
-        StoreError::Full { .. } => (Code::ResourceExhausted, "DISK_FULL"),
+    tracing::error!(%error, "the catalogue could not be read or written");
+    let (code, reason, message) = match error {
+        StoreError::Full { .. } => {
+            let message = "no space is left for the catalogue; free some on the server, and repeat the call";
+            (Code::ResourceExhausted, Reason::DiskFull, message)
+        }
         StoreError::Damaged { .. } | StoreError::Empty { .. } | StoreError::Format { .. } => {
-            (Code::DataLoss, "CATALOGUE_DAMAGED")
+            let message = "the catalogue is damaged; the server's log says where; restore a backup";
+            (Code::DataLoss, Reason::CatalogueDamaged, message)
         }
         StoreError::InUse { .. }
         | StoreError::Occupied { .. }
         | StoreError::Directory { .. }
-        | StoreError::Disk { .. } => (Code::Internal, "DISK_FAILED"),
+        | StoreError::Disk { .. } => {
+            let message = "the catalogue cannot be read or written; the server's log says why; check its disk";
+            (Code::Internal, Reason::DiskFailed, message)
+        }
     };
-    Status::with_error_details(code, error.to_string(), details(reason))
+    Status::with_error_details(code, message, details(reason))
 }
 
-fn details(reason: &str) -> ErrorDetails {
+fn details(reason: Reason) -> ErrorDetails {
     details_with(reason, [])
 }
 
-fn details_with<const N: usize>(reason: &str, about: [(&str, String); N]) -> ErrorDetails {
+fn details_with<const N: usize>(reason: Reason, about: [(&str, String); N]) -> ErrorDetails {
     let about: HashMap<String, String> = about.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
-    ErrorDetails::with_error_info(reason, "sublevel", about)
+    ErrorDetails::with_error_info(reason.name(), "sublevel", about)
 }
 
 /// Statuses travel in headers, which clients limit; a reason that quotes the input is cut.
@@ -370,3 +384,6 @@ fn short(mut text: String) -> String {
     }
     text
 }
+
+#[cfg(test)]
+mod tests;

@@ -14,6 +14,7 @@ use super::proto::{
     self, CancelJobRequest, CancelJobResponse, GetJobRequest, GetJobResponse, ListJobsRequest, ListJobsResponse,
     WatchJobRequest, WatchJobResponse,
 };
+use super::reason::Reason;
 use super::{error, job_wire, wire};
 use crate::jobs::{Board, Jobs};
 use crate::store::{Catalogue, CatalogueError, Job};
@@ -105,7 +106,7 @@ async fn watch(app: AppState, jobs: Jobs, id: u64, sender: mpsc::Sender<Result<W
             space.send(Ok(WatchJobResponse { job: Some(message) }));
         } else if stopping {
             let why = "the server stops; watch the job again when it is back, it goes on then";
-            return space.send(Err(error::unavailable("STOPPING", why)));
+            return space.send(Err(error::unavailable(Reason::Stopping, why)));
         }
         if job.state.is_final() {
             return;

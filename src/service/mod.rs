@@ -56,6 +56,7 @@ mod pose_stream;
 pub mod proto;
 mod queries;
 pub(crate) mod query_wire;
+mod reason;
 mod request_body;
 pub(crate) mod robot_wire;
 mod robots;
@@ -71,6 +72,7 @@ mod watched_files;
 pub(crate) mod wire;
 
 pub use config::Config;
+pub use reason::Reason;
 pub use server::{ServeError, Server, serve};
 pub use tls::TlsError;
 pub use tokens::{Role, TokensError};

@@ -13,6 +13,7 @@ use super::proto::{
     self, CheckMotionsRequest, CheckMotionsResponse, MovingObjects, VerifyMotionRequest, VerifyMotionResponse,
 };
 use super::query_wire::{self, NOTHING, NameTable};
+use super::reason::Reason;
 use super::snapshot::snapshot;
 use crate::robot::motion::{Certificate, MotionAnswer, MotionProblemError, MotionVerdict, PathError, VerifyOptions};
 use crate::scene::query::{MotionSettings, MovingObject, PathKind, RobotMotionAnswer, RobotMotions, RobotMotionsError};
@@ -125,7 +126,7 @@ fn motions(
     }
     if scene.robot(robot).is_none() {
         let why = format!("no robot \"{robot}\" in scene \"{}\"; place it first", scene.name());
-        return Err(error::not_found("robot", robot, "robot", why));
+        return Err(error::not_found(Reason::RobotNotFound, robot, "robot", why));
     }
     if !margin_m.is_finite() {
         return Err(Invalid::new("margin_m", format!("is {margin_m} m; give a finite number")).into());

@@ -6,6 +6,7 @@ use tonic::Status;
 
 use super::error::{self, Invalid};
 use super::limits::{MAX_STATE_POSES, MAX_STATES};
+use super::reason::Reason;
 use super::{packed, query_wire};
 use crate::scene::{Scene, Slot};
 
@@ -44,7 +45,7 @@ impl PlacedStates {
         }
         let Some(instance) = scene.robot(robot) else {
             let why = format!("no robot \"{robot}\" in scene \"{}\"; place it first", scene.name());
-            return Err(error::not_found("robot", robot, "robot", why));
+            return Err(error::not_found(Reason::RobotNotFound, robot, "robot", why));
         };
         let numbers = packed::numbers(values, "joint_values")?;
         let per_state = if joints.is_empty() { instance.configuration().len() } else { joints.len() };

@@ -11,6 +11,7 @@ use tonic::{Status, Streaming};
 use super::app_state::{AppState, stopped};
 use super::error::{self, Invalid};
 use super::proto::{StreamPosesRequest, StreamPosesResponse};
+use super::reason::Reason;
 use super::{packed, wire};
 use crate::measure::Pose;
 use crate::scene::{MAX_OBJECTS, Scene, SceneError, Slot};
@@ -51,7 +52,7 @@ pub(super) async fn run(app: AppState, mut messages: Streaming<StreamPosesReques
         if ended && pending.messages == 0 && applying.is_none() && reply.is_none() {
             if stopped_before_end {
                 let why = "the server stops; stream again when it is back";
-                let _ = replies.send(Err(error::unavailable("STOPPING", why))).await;
+                let _ = replies.send(Err(error::unavailable(Reason::Stopping, why))).await;
             }
             return;
         }
@@ -200,7 +201,7 @@ fn checked(names: &[String], scene: &Scene, of: &str) -> Result<Vec<Arc<str>>, S
 
 fn no_object(name: &str, field: &str, scene: &str) -> Status {
     let why = format!("no object \"{name}\" in scene \"{scene}\"; add it first");
-    error::not_found("object", name, field, why)
+    error::not_found(Reason::ObjectNotFound, name, field, why)
 }
 
 /// Applies poses here, if they are few, nothing has to be written, and nobody else changes the

@@ -22,6 +22,7 @@ use super::proto::{
     WatchRequest, WatchResponse,
 };
 use super::query_wire::{NOTHING, NameTable, Outputs};
+use super::reason::Reason;
 use super::snapshot::snapshot;
 use super::{contact_watch, explain, motions, query_wire, wire};
 use crate::scene::query::{
@@ -56,7 +57,7 @@ impl QueryService for Queries {
                     message = messages.message() => message,
                     () = stopped(&mut stopping) => {
                         let why = "the server stops; ask again when it is back";
-                        Err(error::unavailable("STOPPING", why))
+                        Err(error::unavailable(Reason::Stopping, why))
                     }
                 };
                 let message = match message {

@@ -16,6 +16,7 @@ use crate::scene::{JointsError, Scene, Slot};
 use super::error::{self, Invalid};
 use super::packed::{self, Packed};
 use super::proto::{self, Layout, Output};
+use super::reason::Reason;
 use super::wire;
 
 /// What of an answer is sent, and how.
@@ -140,7 +141,7 @@ pub(super) fn slot(scene: &Scene, name: &str, field: impl Fn() -> String) -> Res
     }
     wire::name(name, &field())?;
     let why = format!("no object \"{name}\" in scene \"{}\"; add it first", scene.name());
-    Err(error::not_found("object", name, &field(), why))
+    Err(error::not_found(Reason::ObjectNotFound, name, &field(), why))
 }
 
 pub(super) fn slots(scene: &Scene, names: &[String], field: &str) -> Result<Vec<Slot>, Status> {

@@ -15,6 +15,7 @@ use super::proto::{
     DeleteRobotRequest, DeleteRobotResponse, DeriveAllowedPairsRequest, DeriveAllowedPairsResponse, GetRobotRequest,
     GetRobotResponse, ListRobotsRequest, ListRobotsResponse, LoadRobotRequest, LoadRobotResponse,
 };
+use super::reason::Reason;
 use super::{robot_wire, wire};
 #[cfg(feature = "fit")]
 use crate::jobs::Jobs;
@@ -147,7 +148,9 @@ fn load_error(error: &CatalogueError, links: &[String]) -> Status {
     match why {
         LoadError::Urdf(_) => Invalid::new("urdf", why).into(),
         LoadError::Srdf(_) => Invalid::new("srdf", why).into(),
-        LoadError::NoBody { link, id } => error::not_found("body", &id.to_string(), &at(link, ".body_id"), why),
+        LoadError::NoBody { link, id } => {
+            error::not_found(Reason::BodyNotFound, &id.to_string(), &at(link, ".body_id"), why)
+        }
         LoadError::Robot(RobotError::NoLink { link, .. }) => Invalid::new(at(link, ".link"), why).into(),
         LoadError::Robot(RobotError::HalfSpace { link }) => Invalid::new(at(link, ".body_id"), why).into(),
         LoadError::Robot(RobotError::Mesh { .. }) => Invalid::new("link_bodies", why).into(),

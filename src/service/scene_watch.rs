@@ -11,6 +11,7 @@ use super::error;
 use super::limits::MAX_MESSAGE_BYTES;
 use super::packed::Packed;
 use super::proto::{WatchSceneResponse, WatchedObject};
+use super::reason::Reason;
 use super::robot_wire;
 use super::scene_wire::object_message;
 use crate::scene::{Scene, Slot};
@@ -49,12 +50,12 @@ pub(super) async fn run(
         tokio::select! {
             changed = changes.changed() => if changed.is_err() {
                 let why = "the scene was deleted; list the scenes";
-                let _ = messages.send(Err(error::not_found("scene", before.name(), "scene", why))).await;
+                let _ = messages.send(Err(error::not_found(Reason::SceneNotFound, before.name(), "scene", why))).await;
                 return;
             },
             () = stopped(&mut stopping) => {
                 let why = "the server stops; watch again when it is back";
-                let _ = messages.send(Err(error::unavailable("STOPPING", why))).await;
+                let _ = messages.send(Err(error::unavailable(Reason::Stopping, why))).await;
                 return;
             }
             () = messages.closed() => return,

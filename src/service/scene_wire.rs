@@ -15,6 +15,7 @@ use super::error::{self, Invalid};
 use super::limits::MAX_MESSAGE_BYTES;
 use super::packed::Packed;
 use super::proto::{self, subject};
+use super::reason::Reason;
 use super::{packed, robot_wire, wire};
 
 /// An update as it is asked for, without the robots that it places, which [`placed_robots`] adds.
@@ -266,7 +267,7 @@ pub(super) fn page_token(token: &str, scene: &Scene) -> Result<Option<String>, S
     let revision: u64 = revision.parse().map_err(|_| malformed())?;
     if revision != scene.structure_revision() {
         let why = "objects came or went since the page before; begin again with an empty page_token";
-        return Err(error::aborted("SCENE_CHANGED", "page_token", why, scene.revision()));
+        return Err(error::aborted(Reason::SceneChanged, "page_token", why, scene.revision()));
     }
     Ok(Some(name.to_owned()))
 }

@@ -5,6 +5,7 @@ use tonic::Status;
 use super::app_state::AppState;
 use super::error;
 use super::limits::REVISION_PATIENCE;
+use super::reason::Reason;
 use crate::scene::Scene;
 use crate::store::CatalogueError;
 
@@ -26,7 +27,7 @@ pub(super) async fn snapshot(app: &AppState, name: &str, at_least_revision: Opti
                 "scene \"{name}\" is at revision {}, not yet at {least} (at_least_revision); try again",
                 live.snapshot().revision()
             );
-            Err(error::unavailable("REVISION_NOT_REACHED", &why))
+            Err(error::unavailable(Reason::RevisionNotReached, &why))
         }
     }
 }
