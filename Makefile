@@ -7,7 +7,7 @@ help:
 	@echo 'make check         everything a change must pass, as continuous integration runs it: SUBLEVEL_DATA=DIR'
 	@echo 'make charts        measure beside other libraries, and draw: SUBLEVEL_DATA=DIR with the meshes'
 	@echo 'make docs-numbers  write the numbers of README.md and docs/ again from the CSV files in docs/'
-	@echo 'make image         build the container image of the server: BUILD= and RUNTIME= name other base images'
+	@echo 'make image         build the container image of the server: BUILD= names another base image'
 	@echo 'make acceptance    what is too long for every change, all six of these: SUBLEVEL_DATA=DIR'
 	@echo '  make endurance     1e8 checked queries; interrupted, it continues where it was (QUERIES=1e9 for more)'
 	@echo '  make fuzz          1e6 damaged inputs for each reader of files and calls (RUNS=10000000 for more)'
@@ -40,8 +40,7 @@ docs-numbers:
 	cargo run --release -p sublevel-bench -- tables --out docs README.md
 
 image:
-	docker build -f deploy/container/Containerfile --target server $(if $(BUILD),--build-arg BUILD=$(BUILD)) \
-	    $(if $(RUNTIME),--build-arg RUNTIME=$(RUNTIME)) -t sublevel .
+	docker build -f deploy/container/Containerfile --target server $(if $(BUILD),--build-arg BUILD=$(BUILD)) -t sublevel .
 
 acceptance: endurance fuzz draws measures kills solvers
 

@@ -5,6 +5,11 @@ use std::io::{self, Write};
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
+use tracing_subscriber::Layer;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
+
 use crate::service::config::{Config, Flags, LogConfig, LogFormat, TlsFlags};
 use crate::service::{self, ServeError};
 
@@ -101,13 +106,15 @@ pub(super) fn run(args: &ServeArgs) -> Result<(), Box<dyn Error>> {
 }
 
 fn begin_log(log: &LogConfig) -> Result<(), Box<dyn Error>> {
-    let filter = tracing_subscriber::EnvFilter::try_new(&log.filter)
+    let filter = log
+        .filter
+        .parse::<Targets>()
         .map_err(|error| format!("log.filter is \"{}\": {error}; write error, warn, info or debug", log.filter))?;
-    let to_stderr = tracing_subscriber::fmt().with_env_filter(filter).with_writer(io::stderr).with_ansi(false);
+    let to_stderr = tracing_subscriber::fmt::layer().with_writer(io::stderr).with_ansi(false);
     // A second subscriber in one process is no reason not to serve.
     let _ = match log.format {
-        LogFormat::Text => to_stderr.try_init(),
-        LogFormat::Json => to_stderr.json().try_init(),
+        LogFormat::Text => tracing_subscriber::registry().with(to_stderr.with_filter(filter)).try_init(),
+        LogFormat::Json => tracing_subscriber::registry().with(to_stderr.json().with_filter(filter)).try_init(),
     };
     Ok(())
 }
