@@ -68,7 +68,9 @@ measures:
 kills: setup
 	SUBLEVEL_LONG=$(KILLS) cargo test --release --test server kills:: -- --nocapture
 
+# Left out: the choice of the solver itself, and a sphere as a set of degree 4, which clarabel alone refuses.
 solvers: setup
 	for solver in clarabel structured; do \
-	    SUBLEVEL_TEST_SOLVER=$$solver cargo test --release -p sublevel-fit --lib -- --include-ignored || exit 1; \
+	    SUBLEVEL_TEST_SOLVER=$$solver cargo test --release -p sublevel-fit --lib -- --include-ignored \
+	        --skip both_solvers_are_tried --skip bad_input_is_refused_by_field || exit 1; \
 	done
