@@ -22,8 +22,8 @@ use crate::store::Job;
 #[derive(Clone, Debug)]
 pub(super) struct Metrics(Arc<Counted>);
 
-/// Most iterations of an answer by continuation, from a cold start, too.
-const CONTINUATION_ITERATIONS: u32 = 16;
+/// Most iterations of any measure by continuation alone, cold starts included: of level distances.
+const CONTINUATION_ITERATIONS: u32 = 20;
 
 #[derive(Debug)]
 struct Counted {
@@ -117,7 +117,7 @@ impl Default for Metrics {
         registry.register("solver_iterations", "Iterations of the solver for all answers", iterations.clone());
         let fallbacks = Counter::default();
         let about =
-            "Measures of pairs that took more iterations than continuation does, and so fell back to slower methods";
+            "Measures of pairs that took more iterations than continuation alone does: slower methods took over";
         registry.register("fallbacks", about, fallbacks.clone());
         let rungs = Family::default();
         let about = "Measures of pairs, by the finer of the two rungs that were used; 0 without ladders";
@@ -299,5 +299,38 @@ impl Metrics {
         // Writing to a string cannot fail.
         let _ = text::encode(&mut text, &self.0.registry);
         text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn answers_beyond_continuation_are_counted_as_fallbacks() {
+        let answer = |iterations| Answer {
+            status: AnswerStatus::Converged,
+            lower: 0.0,
+            upper: 0.0,
+            value: 0.0,
+            verdict: None,
+            witnesses: None,
+            normal: None,
+            gradients: None,
+            not_unique: false,
+            saturated: false,
+            one_sided: false,
+            parts: [0; 2],
+            rungs: [0; 2],
+            iterations,
+            multiplier: f64::NAN,
+            objects_upper: f64::NAN,
+        };
+        let metrics = Metrics::default();
+        metrics.answered(&[answer(1), answer(20), answer(21), answer(60)]);
+        let text = metrics.text(None);
+        for line in ["sublevel_fallbacks_total 2", "sublevel_solver_iterations_total 102"] {
+            assert!(text.lines().any(|found| found == line), "{line}: {text}");
+        }
     }
 }

@@ -310,7 +310,7 @@ fn a_scene_that_many_ask_for_is_made_once() {
 /// Were a new file made, the scenes would be gone from memory too and their revisions given out
 /// again.
 #[test]
-fn a_file_that_went_away_is_not_made_anew() {
+fn a_file_that_went_away_is_not_made_again() {
     let dir = tempfile::tempdir().expect("a directory");
     let (file, aside) = (dir.path().join("catalogue.redb"), dir.path().join("aside.redb"));
     let mut store = Store::open(dir.path()).expect("a new catalogue");

@@ -1,17 +1,16 @@
 //! Models of objects that are not convex: how far their distances from probes are off, against the
 //! time of a query.
 
-use crate::comparison::{ComparisonError, FitCache, Random, Subject};
+use crate::comparison::{ComparisonError, FitCache, PeerShape, Random, Subject};
 use nalgebra::Vector3;
 use parry3d_f64::math::{Pose as ParryPose, Vector};
 use parry3d_f64::query::PointQuery;
-use parry3d_f64::shape::{ConvexPolyhedron, TriMesh};
+use parry3d_f64::shape::{SharedShape, TriMesh};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 use sublevel::body::{Body, Shape, SosBody, SosMethod};
 use sublevel::branch_and_bound::{BranchAndBound, Limits, PlacedSet};
-use sublevel::fit::hull::convex_hull;
 use sublevel::fit::{Coordinates, FitOptions, Objective, SosOptions, fit_parts, fit_sos};
 use sublevel::measure::{Options, Pose, WarmStart, distance};
 
@@ -55,7 +54,7 @@ enum Answering {
     Solid(Shape),
     Set(Box<SosBody>),
     /// The convex hull, whose distances parry computes.
-    Hull(ConvexPolyhedron),
+    Hull(SharedShape),
 }
 
 /// Measures all models of all objects.
@@ -86,7 +85,8 @@ fn made(
     cache: &FitCache,
     announce: &mut dyn FnMut(&str) -> Result<(), ComparisonError>,
 ) -> Result<Vec<(&'static str, String, Answering)>, ComparisonError> {
-    let mut models = vec![(KINDS[3], "parry".to_owned(), Answering::Hull(hull(subject)?))];
+    let (hull, _) = PeerShape::Hull(&subject.mesh.points).parry()?;
+    let mut models = vec![(KINDS[3], "parry".to_owned(), Answering::Hull(hull))];
     for degree in [4, 6] {
         announce(&format!("{}: degree {degree}", subject.name))?;
         let options = FitOptions { degree, ..FitOptions::default() };
@@ -121,16 +121,6 @@ fn made(
         }
     }
     Ok(models)
-}
-
-/// The hull of an object's points.
-fn hull(subject: &Subject) -> Result<ConvexPolyhedron, ComparisonError> {
-    let points = &subject.mesh.points;
-    let hull = convex_hull(points).map_err(|source| ComparisonError::Hull { mesh: subject.name, source })?;
-    let corners: Vec<Vector> =
-        hull.vertices.iter().map(|&i| Vector::new(points[i].x, points[i].y, points[i].z)).collect();
-    ConvexPolyhedron::from_convex_hull(&corners)
-        .ok_or_else(|| ComparisonError::ParryMesh { mesh: subject.name, what: "no hull".into() })
 }
 
 /// Centres of balls near the object with their distances from it, metres.

@@ -18,3 +18,4 @@ mod solid;
 
 pub use distance::distance;
 pub use level::level_distance;
+pub use solid::Solid;

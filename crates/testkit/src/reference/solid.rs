@@ -80,7 +80,7 @@ impl<'a> Solid<'a> {
         scaled(&world, &(big(1.0) / &self.unit))
     }
 
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.body.constraints().len()
     }
 

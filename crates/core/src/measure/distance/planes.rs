@@ -26,9 +26,9 @@ impl<'a> Planes<'a> {
     }
 
     /// The best lower bound of the distance, metres, or the first beyond which a goal asks for no
-    /// more, and the last of the directions, in A's frame: across the normal of the last answer, along the line of the centres, across the sides
+    /// more: across the normal of the last answer, along the line of the centres, across the sides
     /// of a shape that the other body's centre lies beyond, and across the gap of the ellipsoids
-    /// that stand for the bodies.
+    /// that stand for the bodies. Also the normal there, in A's frame, if it came to that.
     pub(super) fn lower(&self, goal: &StopCriterion) -> (f64, Option<V3<f64>>) {
         let mut best = f64::NEG_INFINITY;
         let mut meets = |n: &Vector3<f64>| {

@@ -14,6 +14,7 @@ use crate::measure::options::Options;
 use crate::measure::solver::common_point::CommonPoint;
 use crate::measure::solver::initial_guess::Start;
 use crate::measure::solver::predictor::Drift;
+use crate::measure::solver::prospect::Prospect;
 use crate::measure::solver::step_acceleration::{Correction, Last, Series};
 use crate::measure::solver::tangent_newton::{
     ALIGNED, Bracket, Plane, Relative, Response, Side, Step, SurfaceCurvature, bracket, moved, newton,
@@ -192,10 +193,6 @@ const FLATTEST: f64 = 1e-20;
 /// changes time only: `.ci/instructions` pins it.
 const WORTH_A_BRACKET: f64 = 1e-2;
 
-/// Length of a step relative to the longest one allowed, dimensionless, beyond which no bracket is
-/// expected to decide. It changes time only: `sublevel-bench pairs` shows it.
-const DECISIVE: f64 = 0.5;
-
 /// Factor by which a step has to narrow the bracket of bodies that touch to be followed by another;
 /// dimensionless.
 ///
@@ -215,42 +212,6 @@ const SETTLED: f64 = 1e-9;
 #[inline(always)]
 pub(in crate::measure) fn worth_a_bracket([of_x, of_y]: [f64; 2]) -> [f64; 2] {
     [WORTH_A_BRACKET * of_x.min(of_y); 2]
-}
-
-/// What is to be expected where a step leads that is too long for a narrow bracket.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::measure) enum Prospect {
-    Open,
-    /// The bracket probably decides what is asked.
-    Decided,
-    /// The bodies probably have a point between the trial points in common.
-    Common,
-}
-
-impl Prospect {
-    /// Of a step from points that are `height` apart along the normal, metres: that is off by about
-    /// the cube of the step.
-    #[inline(always)]
-    pub(in crate::measure) fn new<S: Simd>(
-        simd: S,
-        relation: &impl Relation,
-        step: &Step<f64>,
-        height: f64,
-        limits: [f64; 2],
-    ) -> Self {
-        let square = step.square(simd, limits);
-        let width = square * square.sqrt() * limits[0].min(limits[1]);
-        let height = height + step.dx[2] - step.dy[2];
-        if !(square <= DECISIVE * DECISIVE) {
-            Self::Open
-        } else if height < -width && relation.ends_at_contact() {
-            Self::Common
-        } else if relation.decided_by(height, width) {
-            Self::Decided
-        } else {
-            Self::Open
-        }
-    }
 }
 
 /// Longest move for which a linearization in the tangent plane is valid, relative to a body's size,
@@ -426,8 +387,8 @@ impl<R: Relation> Correct<'_, R> {
             if prospect == Prospect::Common {
                 let x = moved::<S, f64>(at.x, step.dx, &at.frame);
                 let y = moved::<S, f64>(at.y, step.dy, &at.frame);
-                let common = CommonPoint::between(simd, (side_a, side_b), x, y);
-                if matches!(common, Some(CommonPoint { proven: true, .. })) {
+                let common = CommonPoint::proven_between(simd, (side_a, side_b), x, y);
+                if common.is_some() {
                     return Err(Lost { common, ..Lost::after(rounds) });
                 }
             }

@@ -24,6 +24,7 @@ pub(super) mod linear_systems;
 pub(super) mod min_norm_point;
 pub(super) mod predictor;
 pub(super) mod projection;
+pub(super) mod prospect;
 pub(super) mod ray_program;
 pub(super) mod refinement;
 pub(super) mod stages;

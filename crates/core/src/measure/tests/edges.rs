@@ -135,5 +135,5 @@ fn cut_bodies_agree_with_the_general_search() {
     // A single side, edges and corners.
     assert!(of_active[1..].iter().all(|&count| count > 100), "{of_active:?}");
     // From contact up to gaps of 1e-9 doubles do not show the normal: the general search goes on.
-    assert!(gaps_of(6) > 80.0 && gaps_of(3) > 55.0, "{} {}", gaps_of(6), gaps_of(3));
+    assert!(gaps_of(4) > 91.0 && gaps_of(3) > 83.0, "{} {}", gaps_of(4), gaps_of(3));
 }

@@ -1,8 +1,9 @@
 //! The distance of two bodies of several constraints, inside a proven bracket; see [`super`].
 
 use super::aggregate::{Evaluated, Weighted};
-use super::quadratic_program::{ActiveRows, Checked, MOST_ACTIVE, OnActive, Row, check, minimize};
-use crate::body::{Body, MAX_CONSTRAINTS};
+use super::linearized::Linearized;
+use super::quadratic_program::{Checked, MOST_ACTIVE, OnActive, check, minimize};
+use crate::body::Body;
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::vector::{
     M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, basis, dot, scaled, subtract,
@@ -10,9 +11,10 @@ use crate::measure::frames::vector::{
 use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveConstraints;
 use crate::measure::solver::common_point::CommonPoint;
-use crate::measure::solver::continuation::{LONGEST_MOVE, Lost, Prospect, limits, worth_a_bracket};
+use crate::measure::solver::continuation::{LONGEST_MOVE, Lost, limits, worth_a_bracket};
 use crate::measure::solver::initial_guess::Start;
 use crate::measure::solver::predictor::Drift;
+use crate::measure::solver::prospect::Prospect;
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::solver::tangent_newton::{Bracket, Plane, Relative, Side, Step, TAYLOR_ROUNDING, bracket, moved};
 use crate::measure::solver::two_point_problem::{Apart, Relation, Verdict};
@@ -37,11 +39,6 @@ const MOST_EXCHANGES: usize = 12;
 /// Relative error of the distance that a step is made for, beyond which it is made again: what the
 /// normal turns is in proportion to its inverse. It changes time only; no test pins it.
 const UNLIKE: f64 = 0.1;
-
-/// Constraints of a smaller value are left out of a step: it is no longer than a quarter of the
-/// body's size, along which values of the edge of a slab do not grow fivefold. It changes time
-/// only: what is left out is looked at again where the step leads.
-const FAR_INSIDE: f64 = 0.04;
 
 /// How much a linearized constraint may be violated, relative to the body's size. Larger, points
 /// have to be moved farther into their body, which widens brackets; smaller, rounding changes the
@@ -156,94 +153,6 @@ struct Iterate {
 struct Found {
     step: Step<f64>,
     active: [Weighted; 2],
-}
-
-/// One body's constraints around a trial point, in the basis.
-struct Linearized {
-    rows: [Row; MAX_CONSTRAINTS],
-    /// Lengths of the gradients, per metre.
-    lengths: [f64; MAX_CONSTRAINTS],
-    /// Which constraint of the body each row is.
-    index: [u8; MAX_CONSTRAINTS],
-    count: usize,
-    active: ActiveRows,
-    /// Sum of the Hessians of the active ones with their multipliers, per metre.
-    hessian: [f64; 6],
-}
-
-impl Linearized {
-    /// By constraints that are given by their positions in the body, values and gradients, and the
-    /// sum of the Hessians of the active ones, in normalized coordinates.
-    #[inline(always)]
-    fn new<S: Simd>(
-        _: S,
-        tangents: impl Iterator<Item = (usize, f64, V3<f64>)>,
-        (active, bent): (&Weighted, &[f64; 6]),
-        local: &M3<f64>,
-    ) -> Self {
-        let mut all = Self {
-            rows: [Row::default(); MAX_CONSTRAINTS],
-            lengths: [0.0; MAX_CONSTRAINTS],
-            index: [0; MAX_CONSTRAINTS],
-            count: 0,
-            active: ActiveRows::default(),
-            hessian: [0.0; 6],
-        };
-        for (i, value, gradient) in tangents {
-            let is_active = active.iter().any(|(j, _)| j == i);
-            if !is_active && value <= FAR_INSIDE {
-                continue;
-            }
-            let gradient = apply::<S, f64>(local, gradient);
-            let length = dot::<S, f64>(gradient, gradient).sqrt();
-            let inverse = 1.0 / length;
-            let mean = (0.5 * value + 0.5).max(0.25);
-            all.rows[all.count] =
-                Row { normal: scaled::<S, f64>(gradient, inverse), excess: (value - 1.0) * mean * inverse };
-            all.lengths[all.count] = length;
-            all.index[all.count] = i as u8;
-            if is_active {
-                all.active.push(all.count);
-            }
-            all.count += 1;
-        }
-        // No closures: what is inlined into one is not compiled for the vectors at hand.
-        let b0 = apply_symmetric::<S, f64>(bent, local[0]);
-        let b1 = apply_symmetric::<S, f64>(bent, local[1]);
-        let b2 = apply_symmetric::<S, f64>(bent, local[2]);
-        all.hessian = [
-            dot::<S, f64>(b0, local[0]),
-            dot::<S, f64>(b0, local[1]),
-            dot::<S, f64>(b0, local[2]),
-            dot::<S, f64>(b1, local[1]),
-            dot::<S, f64>(b1, local[2]),
-            dot::<S, f64>(b2, local[2]),
-        ];
-        all
-    }
-
-    #[inline(always)]
-    fn rows(&self) -> &[Row] {
-        &self.rows[..self.count]
-    }
-
-    /// How far along the normal the first active constraint is, metres.
-    #[inline(always)]
-    fn shift(&self) -> f64 {
-        let row = &self.rows[usize::from(self.active.index[0])];
-        -row.excess * row.normal[2]
-    }
-
-    /// The constraints of active rows with their multipliers, metres, by those of unit rows.
-    #[inline(always)]
-    fn weighted(&self, active: &ActiveRows, multipliers: [f64; MOST_ACTIVE]) -> Weighted {
-        let mut weighted = Weighted { len: active.len, ..Weighted::default() };
-        for (k, i) in active.iter().enumerate() {
-            weighted.index[k] = self.index[i];
-            weighted.weight[k] = multipliers[k] / self.lengths[i];
-        }
-        weighted
-    }
 }
 
 impl WithSimd for EdgeQuery<'_> {
@@ -396,8 +305,8 @@ impl Solver<'_> {
             if prospect == Prospect::Common {
                 let x = moved::<S, f64>(at.x, found.step.dx, &at.frame);
                 let y = moved::<S, f64>(at.y, found.step.dy, &at.frame);
-                let common = CommonPoint::between(simd, (side_a, side_b), x, y);
-                if matches!(common, Some(CommonPoint { proven: true, .. })) {
+                let common = CommonPoint::proven_between(simd, (side_a, side_b), x, y);
+                if common.is_some() {
                     return Err(common);
                 }
             }

@@ -24,6 +24,7 @@
 
 mod aggregate;
 mod distance;
+mod linearized;
 mod quadratic_program;
 
 pub(in crate::measure) use distance::{EdgeProven, EdgeQuery, EdgeTrace};

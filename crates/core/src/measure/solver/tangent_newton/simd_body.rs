@@ -237,13 +237,15 @@ impl Side<'_, f64> {
         let mut highest = [f64::NEG_INFINITY; 2];
         for (i, trust) in self.body.trust().constraints.iter().enumerate() {
             let (jet, inside) = self.with_active(i).jet(simd, v);
-            if !inside {
-                return [f64::NAN; 2];
-            }
             let gradient = self.gradient(simd, &jet);
             let slope = dot::<S, f64>(gradient, gradient).sqrt() * (1.0 + self.turn()) + trust.gradient_error;
             let raised = displaced * (slope + trust.curvature_ceiling * displaced) * (1.0 + 1e-13);
-            highest = [highest[0].max(jet.value), highest[1].max(jet.value + trust.value_error + raised)];
+            let bound = jet.value + trust.value_error + raised;
+            // The larger of a number and none would be the number.
+            if !inside || bound.is_nan() {
+                return [f64::NAN; 2];
+            }
+            highest = [highest[0].max(jet.value), highest[1].max(bound)];
         }
         highest
     }

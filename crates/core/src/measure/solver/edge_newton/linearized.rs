@@ -1,0 +1,100 @@
+//! The constraints of one body around a trial point, as rows of quadratic programs.
+
+use super::aggregate::Weighted;
+use super::quadratic_program::{ActiveRows, MOST_ACTIVE, Row};
+use crate::body::MAX_CONSTRAINTS;
+use crate::measure::frames::vector::{M3, V3, apply, apply_symmetric, dot, scaled};
+use crate::polynomial::Simd;
+
+/// Constraints of a smaller value are left out of a step: it is no longer than a quarter of the
+/// body's size, along which values of the edge of a slab do not grow fivefold. It changes time
+/// only: what is left out is looked at again where the step leads.
+const FAR_INSIDE: f64 = 0.04;
+
+/// One body's constraints around a trial point, in the basis.
+pub(super) struct Linearized {
+    rows: [Row; MAX_CONSTRAINTS],
+    /// Lengths of the gradients, per metre.
+    lengths: [f64; MAX_CONSTRAINTS],
+    /// Which constraint of the body each row is.
+    index: [u8; MAX_CONSTRAINTS],
+    pub(super) count: usize,
+    pub(super) active: ActiveRows,
+    /// Sum of the Hessians of the active ones with their multipliers, per metre.
+    pub(super) hessian: [f64; 6],
+}
+
+impl Linearized {
+    /// By constraints that are given by their positions in the body, values and gradients, and the
+    /// sum of the Hessians of the active ones, in normalized coordinates.
+    #[inline(always)]
+    pub(super) fn new<S: Simd>(
+        _: S,
+        tangents: impl Iterator<Item = (usize, f64, V3<f64>)>,
+        (active, bent): (&Weighted, &[f64; 6]),
+        local: &M3<f64>,
+    ) -> Self {
+        let mut all = Self {
+            rows: [Row::default(); MAX_CONSTRAINTS],
+            lengths: [0.0; MAX_CONSTRAINTS],
+            index: [0; MAX_CONSTRAINTS],
+            count: 0,
+            active: ActiveRows::default(),
+            hessian: [0.0; 6],
+        };
+        for (i, value, gradient) in tangents {
+            let is_active = active.iter().any(|(j, _)| j == i);
+            if !is_active && value <= FAR_INSIDE {
+                continue;
+            }
+            let gradient = apply::<S, f64>(local, gradient);
+            let length = dot::<S, f64>(gradient, gradient).sqrt();
+            let inverse = 1.0 / length;
+            let mean = (0.5 * value + 0.5).max(0.25);
+            all.rows[all.count] =
+                Row { normal: scaled::<S, f64>(gradient, inverse), excess: (value - 1.0) * mean * inverse };
+            all.lengths[all.count] = length;
+            all.index[all.count] = i as u8;
+            if is_active {
+                all.active.push(all.count);
+            }
+            all.count += 1;
+        }
+        // No closures: what is inlined into one is not compiled for the vectors at hand.
+        let b0 = apply_symmetric::<S, f64>(bent, local[0]);
+        let b1 = apply_symmetric::<S, f64>(bent, local[1]);
+        let b2 = apply_symmetric::<S, f64>(bent, local[2]);
+        all.hessian = [
+            dot::<S, f64>(b0, local[0]),
+            dot::<S, f64>(b0, local[1]),
+            dot::<S, f64>(b0, local[2]),
+            dot::<S, f64>(b1, local[1]),
+            dot::<S, f64>(b1, local[2]),
+            dot::<S, f64>(b2, local[2]),
+        ];
+        all
+    }
+
+    #[inline(always)]
+    pub(super) fn rows(&self) -> &[Row] {
+        &self.rows[..self.count]
+    }
+
+    /// How far along the normal the first active constraint is, metres.
+    #[inline(always)]
+    pub(super) fn shift(&self) -> f64 {
+        let row = &self.rows[usize::from(self.active.index[0])];
+        -row.excess * row.normal[2]
+    }
+
+    /// The constraints of active rows with their multipliers, metres, by those of unit rows.
+    #[inline(always)]
+    pub(super) fn weighted(&self, active: &ActiveRows, multipliers: [f64; MOST_ACTIVE]) -> Weighted {
+        let mut weighted = Weighted { len: active.len, ..Weighted::default() };
+        for (k, i) in active.iter().enumerate() {
+            weighted.index[k] = self.index[i];
+            weighted.weight[k] = multipliers[k] / self.lengths[i];
+        }
+        weighted
+    }
+}
