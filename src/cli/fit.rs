@@ -19,7 +19,7 @@ use args::FitArgs;
 use indicatif::ProgressBar;
 use reading_row::ReadingRow;
 use remote::execute as execute_on;
-use report::Row;
+use report::{InputMesh, Row};
 use request::checked;
 use std::error::Error;
 use std::io::{self, Write};
@@ -80,7 +80,7 @@ fn one(args: &FitArgs, input: &Path, request: &FitRequest) -> Result<Vec<Row>, B
     bar.set_message("reading");
     let reading = args.mesh.read(input)?;
     bar.suspend(|| note(input, &reading));
-    let (used, odd) = (reading.mesh.used_points(), ReadingRow::from(&reading));
+    let (used_points, row) = (reading.mesh.used_points(), ReadingRow::from(&reading));
     let mesh = reading.mesh;
     let made = match &args.server {
         Some(url) => execute_on(url, request, &mesh.points, &mesh.triangles, &bar),
@@ -88,7 +88,7 @@ fn one(args: &FitArgs, input: &Path, request: &FitRequest) -> Result<Vec<Row>, B
     }
     .map_err(|error| format!("{}: {error}", input.display()))?;
     bar.finish_and_clear();
-    report::write(&args.out, input, used, &odd, request, &made)
+    report::write(&args.out, &InputMesh { path: input, used_points, reading: row }, request, &made)
 }
 
 /// Says on a bar how far a fit has come.

@@ -289,7 +289,8 @@ pub async fn measure(
         std::thread::Builder::new().name("load".into()).spawn(move || {
             keep_time(start, whole, rate_per_s, &options, |due, index, random| {
                 let counts = due >= start + options.warmup;
-                begin(&runtime, (&prepared, &clients[index % clients.len()]), due, random, counted.clone(), counts);
+                let arrival = Arrival { due, random, counts };
+                begin(&runtime, (&prepared, &clients[index % clients.len()]), arrival, counted.clone());
                 counts
             })
         })?
@@ -348,13 +349,20 @@ fn keep_time(
     counted
 }
 
+/// A call that is due.
+struct Arrival {
+    due: Instant,
+    /// Chooses the call, in (0, 1].
+    random: f64,
+    /// Whether its answer counts; not during the warm-up.
+    counts: bool,
+}
+
 fn begin(
     runtime: &tokio::runtime::Handle,
     (prepared, client): (&Arc<Prepared>, &Client),
-    due: Instant,
-    random: f64,
+    Arrival { due, random, counts }: Arrival,
     counted: Arc<Counted>,
-    counts: bool,
 ) {
     if counted.open.load(Ordering::Relaxed) >= MOST_OPEN {
         if counts {

@@ -14,7 +14,7 @@ use super::robot_wire::numbers;
 use super::snapshot::snapshot;
 use super::wire::vector;
 use crate::scene::Scene;
-use crate::scene::query::{ExplainedPair, ExplainedState, Explanation};
+use crate::scene::query::{ExplainedPair, ExplainedState, Explanation, JointValues};
 
 /// Answers Explain.
 pub(super) async fn explain(
@@ -29,9 +29,12 @@ pub(super) async fn explain(
     let allowed = request.include_allowed;
     let explanation = match PlacedStates::of(&scene, given, of_robot)? {
         PlacedStates::Poses(slots, poses) => Explanation::new(scene.clone(), &slots, poses, margin, allowed),
-        PlacedStates::Joints(joints, values) => {
-            Explanation::of_joints(scene.clone(), &request.robot, &joints, &values, margin, allowed)
-        }
+        PlacedStates::Joints(joints, values) => Explanation::of_joints(
+            scene.clone(),
+            JointValues { robot: &request.robot, joints: &joints, values },
+            margin,
+            allowed,
+        ),
     };
     let explanation = explanation.map_err(|error| query_wire::states_error(&error))?;
     let states = app.ask(Arc::new(explanation), time).await?;

@@ -26,8 +26,8 @@ use super::reason::Reason;
 use super::snapshot::snapshot;
 use super::{contact_watch, explain, motions, query_wire, wire};
 use crate::scene::query::{
-    Answer, AnswerStatus, Ask, Clearance, Found, Pairs, RayAnswer, Rays, StateAnswer, StateVerdict, States, Within,
-    closest_pair, combined,
+    Answer, AnswerStatus, Ask, Clearance, Found, JointValues, Pairs, RayAnswer, Rays, StateAnswer, StateVerdict,
+    States, Within, closest_pair, combined,
 };
 use crate::scene::{OwnStarts, Scene, Stop};
 
@@ -95,9 +95,12 @@ impl QueryService for Queries {
         let include_allowed = request.include_allowed;
         let states = match placed {
             PlacedStates::Poses(slots, poses) => States::new(scene.clone(), &slots, poses, margin, include_allowed),
-            PlacedStates::Joints(joints, values) => {
-                States::of_joints(scene.clone(), &request.robot, &joints, values, margin, include_allowed)
-            }
+            PlacedStates::Joints(joints, values) => States::of_joints(
+                scene.clone(),
+                JointValues { robot: &request.robot, joints: &joints, values },
+                margin,
+                include_allowed,
+            ),
         };
         let mut states = states.map_err(|error| query_wire::states_error(&error))?;
         match proto::Detail::try_from(request.detail) {
@@ -148,9 +151,12 @@ impl QueryService for Queries {
             PlacedStates::Poses(slots, poses) => {
                 Clearance::new(scene.clone(), &slots, poses, influence, include_allowed)
             }
-            PlacedStates::Joints(joints, values) => {
-                Clearance::of_joints(scene.clone(), &request.robot, &joints, values, influence, include_allowed)
-            }
+            PlacedStates::Joints(joints, values) => Clearance::of_joints(
+                scene.clone(),
+                JointValues { robot: &request.robot, joints: &joints, values },
+                influence,
+                include_allowed,
+            ),
         };
         let mut clearance = clearance.map_err(|error| query_wire::states_error(&error))?;
         if let Some(accuracy) = request.accuracy {

@@ -75,12 +75,18 @@ struct Solve {
     fallback: Option<String>,
 }
 
-/// Writes what was made of an input, of whose vertices the triangles use so many, and describes it.
+/// A mesh that was read.
+pub(super) struct InputMesh<'a> {
+    pub(super) path: &'a Path,
+    /// Vertices that its triangles use.
+    pub(super) used_points: usize,
+    pub(super) reading: ReadingRow,
+}
+
+/// Writes what was made of a mesh, and describes it.
 pub(super) fn write(
     folder: &Path,
-    input: &Path,
-    used: usize,
-    reading: &ReadingRow,
+    &InputMesh { path: input, used_points: used, ref reading }: &InputMesh<'_>,
     request: &FitRequest,
     made: &FitOutput,
 ) -> Result<Vec<Row>, Box<dyn Error>> {

@@ -7,7 +7,7 @@ use sublevel::body::{Body, BodyId};
 use sublevel::client::{ClearanceQuestion, Clearances, ClientError};
 use sublevel::measure::Pose;
 use sublevel::robot::{read_srdf, read_urdf};
-use sublevel::scene::query::{AnswerStatus, Clearance, StateClearance};
+use sublevel::scene::query::{AnswerStatus, Clearance, JointValues, StateClearance};
 use sublevel::scene::{
     Attach, Geometry, NamedJointValues, PlaceRobot, Placement, Question, Robot, RobotId, Scene, Stop, Subject, Update,
 };
@@ -107,7 +107,13 @@ async fn clearances_of_the_client_are_those_of_the_library() {
         cold.request_mut().cold = true;
         let found = client.clearance("cell", cold).await.expect("answered");
         let names: Vec<Arc<str>> = joints.iter().map(|&name| name.into()).collect();
-        let own = Clearance::of_joints(scene.clone(), "one", &names, values.to_vec(), 4.0, false).expect("a question");
+        let own = Clearance::of_joints(
+            scene.clone(),
+            JointValues { robot: "one", joints: &names, values: values.to_vec() },
+            4.0,
+            false,
+        )
+        .expect("a question");
         let own = in_process(&scene, own.cold());
         let width = if joints.is_empty() { 2 } else { 1 };
         same(&scene, width, &own, &found);

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use sublevel::client::{Client, RobotPlacement, StatesQuestion};
 use sublevel::measure::Pose;
-use sublevel::scene::query::{StateVerdict, States};
+use sublevel::scene::query::{JointValues, StateVerdict, States};
 use sublevel::scene::{Crew, NamedJointValues, RobotId};
 use sublevel::service::proto::Verdict;
 
@@ -92,7 +92,12 @@ impl RobotServer {
             let verdicts = self.server.clients().block_on(self.client.check_states(SCENE, question))?.verdicts;
             let call = start.elapsed().as_secs_f64();
             let start = Instant::now();
-            let question = States::of_joints(own.clone(), ARM, &[], states.clone(), 0.0, false)?;
+            let question = States::of_joints(
+                own.clone(),
+                JointValues { robot: ARM, joints: &[], values: states.clone() },
+                0.0,
+                false,
+            )?;
             let answers = crew.ask(Arc::new(question), Arc::default())?.concat();
             if turn > 0 {
                 insides.push(1e6 * start.elapsed().as_secs_f64());

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
-use sublevel::scene::query::{Clearance, StateVerdict, States};
+use sublevel::scene::query::{Clearance, JointValues, StateVerdict, States};
 use sublevel::scene::{Question, Scene, Stop};
 
 use super::arm::Arm;
@@ -99,7 +99,7 @@ pub(super) fn alone<Q: Question>(question: &Q) -> Vec<Q::Part> {
 
 /// The question about packed states of the arm.
 pub(super) fn question(scene: &Scene, states: &[f64]) -> Result<States, Box<dyn Error>> {
-    Ok(States::of_joints(scene.clone(), ARM, &[], states.to_vec(), 0.0, false)?)
+    Ok(States::of_joints(scene.clone(), JointValues { robot: ARM, joints: &[], values: states.to_vec() }, 0.0, false)?)
 }
 
 /// Which of these states are proven free.
@@ -135,7 +135,12 @@ impl Entry<'_> {
         }
         let start = Instant::now();
         for (task, scenes) in tasks.iter().zip(&self.scenes).filter(|(task, _)| !task.states.free.is_empty()) {
-            let question = Clearance::of_joints(scenes[0].clone(), ARM, &[], task.states.free.clone(), FAR_M, false)?;
+            let question = Clearance::of_joints(
+                scenes[0].clone(),
+                JointValues { robot: ARM, joints: &[], values: task.states.free.clone() },
+                FAR_M,
+                false,
+            )?;
             std::hint::black_box(alone(&question.without_gradients().with_accuracy(ACCURACY)?));
         }
         self.times[3].push(1e6 * start.elapsed().as_secs_f64() / count(|states| &states.free));

@@ -12,7 +12,7 @@ use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::{At, Least, bracketed, least};
-use crate::measure::solver::projection::{Objective, Single, solve_single};
+use crate::measure::solver::projection::{Objective, Single, SingleProblem, solve_single};
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
@@ -257,8 +257,9 @@ impl<'a> Support<'a> {
             point: body.interior,
             iterations: 0,
         };
+        let problem = SingleProblem { body, objective: &objective, start, active };
         let stop = |count| options.exhausted(count);
-        let (iterations, active) = solve_single(body, &objective, start, active, stop, |trial| {
+        let (iterations, active) = solve_single(&problem, stop, |trial| {
             let multipliers = trial.multipliers.map(|m| m.max(0.0));
             let rise = descent(body, &trial.y, &-r, &multipliers);
             let slack = DUALITY_ROUNDING * (trial.y.norm() + rise.abs());

@@ -13,7 +13,7 @@ use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::{At, Least, bracketed, least};
 use crate::measure::solver::active_constraints::ActiveSet;
-use crate::measure::solver::projection::{Objective, Single, Trial, solve_single};
+use crate::measure::solver::projection::{Objective, Single, SingleProblem, Trial, solve_single};
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
 use nalgebra::Vector3;
@@ -181,8 +181,9 @@ impl<'a> Projection<'a> {
         let (mut lower, mut upper) = (0.0_f64, f64::INFINITY);
         let (mut normal, mut witness) = (Vector3::zeros(), body.interior);
         let narrow = tolerance / unit;
+        let problem = SingleProblem { body, objective: &objective, start, active };
         let stop = |count| options.exhausted(count);
-        let (iterations, active) = solve_single(body, &objective, start, active, stop, |trial| {
+        let (iterations, active) = solve_single(&problem, stop, |trial| {
             let (bound, n) = self.separation(&q, error, trial);
             if bound > lower || normal == Vector3::zeros() {
                 (lower, normal) = (bound.max(0.0), n);

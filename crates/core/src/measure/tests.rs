@@ -54,8 +54,7 @@ fn cold_level(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose) -> LevelDistance
 fn assert_normals_of_active(
     off: f64,
     (body, pose): (&Body, &Pose),
-    witness: &Vector3<f64>,
-    n: &Vector3<f64>,
+    (witness, n): (&Vector3<f64>, &Vector3<f64>),
     active: &ActiveConstraints,
     label: &str,
 ) {

@@ -1,8 +1,8 @@
 //! The arithmetic of the processor at hand, chosen when the program runs.
 //!
-//! Work for [`dispatch`] and [`dispatch_lanes`] is compiled up to three times by `pulp`: for any
-//! processor, for AVX2 with fused multiply-add, and for AVX-512. Everything it calls has to be
-//! inlined into it to profit. Results differ between the versions only within the rounding bounds,
+//! Work is compiled by `pulp` for any processor, for AVX2 with fused multiply-add and, where it is
+//! lanes throughout ([`dispatch_lanes`]), for AVX-512. Everything it calls has to be inlined into it
+//! to profit. Results differ between the versions only within the rounding bounds,
 //! which count the roundings of the plain one.
 
 use std::sync::{LazyLock, OnceLock};
@@ -31,7 +31,11 @@ static WIDEST: LazyLock<Arch> = LazyLock::new(|| {
     });
     match limit {
         None => Arch::new(),
-        Some(SimdLimit::Avx2) => at_most_avx2(Arch::new()),
+        Some(SimdLimit::Avx2) => match Arch::new() {
+            #[cfg(target_arch = "x86_64")]
+            Arch::V4(_) => pulp::x86::V3::try_new().map_or(Arch::Scalar, Arch::V3),
+            arch => arch,
+        },
         Some(SimdLimit::Baseline) => Arch::Scalar,
     }
 });
@@ -41,17 +45,11 @@ pub fn limit_simd(limit: SimdLimit) {
     let _ = LIMIT.set(limit);
 }
 
-/// What [`dispatch`] uses.
-static SUITED: LazyLock<Arch> = LazyLock::new(|| at_most_avx2(*WIDEST));
-
-/// This arithmetic, or AVX2 in place of wider vectors.
-fn at_most_avx2(arch: Arch) -> Arch {
-    match arch {
-        #[cfg(target_arch = "x86_64")]
-        Arch::V4(_) => pulp::x86::V3::try_new().map_or(arch, Arch::V3),
-        _ => arch,
-    }
-}
+/// What [`dispatch`] uses: AVX2 in place of wider vectors, or nothing beyond the baseline. A type
+/// without AVX-512, so that no work is compiled for arithmetic that it never runs on.
+#[cfg(target_arch = "x86_64")]
+static SUITED: LazyLock<Option<pulp::x86::V3>> =
+    LazyLock::new(|| if matches!(*WIDEST, Arch::Scalar) { None } else { pulp::x86::V3::try_new() });
 
 /// The widest arithmetic in use: "AVX-512", "AVX2" or "baseline".
 pub fn widest() -> &'static str {
@@ -74,9 +72,20 @@ pub fn dispatch_lanes<T: WithSimd>(work: T) -> T::Output {
 /// among scalar instructions those of AVX-512 cost more than they save, for while one of them is
 /// under way a port less takes all others. The searches of penetration depths, lanes between scalar
 /// work, are 4 % faster so.
+#[cfg(target_arch = "x86_64")]
 #[inline(always)]
 pub fn dispatch<T: WithSimd>(work: T) -> T::Output {
-    SUITED.dispatch(work)
+    match *SUITED {
+        Some(avx2) => Simd::vectorize(avx2, work),
+        None => Simd::vectorize(Scalar, work),
+    }
+}
+
+/// Does work with the widest arithmetic in use.
+#[cfg(not(target_arch = "x86_64"))]
+#[inline(always)]
+pub fn dispatch<T: WithSimd>(work: T) -> T::Output {
+    WIDEST.dispatch(work)
 }
 
 /// Every arithmetic of this processor.

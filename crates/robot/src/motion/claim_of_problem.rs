@@ -12,7 +12,7 @@ use super::claim::{
     BodyRecord, Claim, DigestedClaim, JointRecord, ObstacleRecord, PlacedRecord, PoseRecord, RobotRecord, ShapeRecord,
 };
 use super::geometry::{MotionBody, MotionItem, MotionObstacle, MotionShape, PlacedObstacle};
-use super::problem::MotionProblem;
+use super::problem::{MotionProblem, MotionRobot};
 use super::verify_options::VerifyOptions;
 use crate::description::{Description, Joint, Limits, Link, Mimic};
 use crate::kinematics::Kinematics;
@@ -115,7 +115,8 @@ impl Claim {
         }
         let rules = self.rules(most)?;
         let base = pose(&|| "claim.base".to_owned(), &self.base)?;
-        MotionProblem::of_rules(Arc::new(kinematics), &base, bodies, obstacles, self.margin_m, rules)
+        let robot = MotionRobot { kinematics: Arc::new(kinematics), base, bodies };
+        MotionProblem::of_rules(robot, obstacles, self.margin_m, rules)
             .map_err(|error| wrong("claim".to_owned(), &error.to_string()))
     }
 

@@ -35,7 +35,7 @@ pub use certificate_error::CertificateError;
 pub use derive::{DEFAULT_DERIVE_RESOLUTION_M, DEFAULT_MAX_BOXES, DeriveOptions, DerivedPair, PairClass};
 pub use geometry::{MotionBody, MotionItem, MotionObstacle, MotionShape, PlacedObstacle};
 pub use path::{MAX_CONTROL_POINTS, MAX_PATH_POINTS, Path, PathError};
-pub use problem::{MAX_PIECE_PAIRS, MotionProblem, MotionProblemError};
+pub use problem::{MAX_PIECE_PAIRS, MotionProblem, MotionProblemError, MotionRobot};
 pub use prove::{DEFAULT_MAX_CONFIGURATIONS, DEFAULT_RESOLUTION_M, MotionOptions, MotionWorkspace};
 pub use verify::VerifiedMotion;
 pub use verify_options::{KnownBodies, VerifyOptions};

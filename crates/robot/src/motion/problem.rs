@@ -26,6 +26,17 @@ pub struct MotionProblem {
     pub(crate) claim: OnceLock<Arc<DigestedClaim>>,
 }
 
+/// A robot with what is fixed to its links.
+#[derive(Clone, Debug)]
+pub struct MotionRobot {
+    /// Its kinematic tree.
+    pub kinematics: Arc<Kinematics>,
+    /// Root link to world.
+    pub base: Pose,
+    /// Bodies that are fixed to links.
+    pub bodies: Vec<MotionBody>,
+}
+
 /// Why bodies and obstacles are no problem.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MotionProblemError {
@@ -71,7 +82,7 @@ pub(crate) struct PiecePair {
 }
 
 impl MotionProblem {
-    /// A robot whose root link is at `base`, with bodies among obstacles. Two items are in contact
+    /// A robot among obstacles. Two items are in contact
     /// when their signed distance is below `margin_m` plus their padding; `padding_m` gives that of
     /// two items in metres, or none for a pair that does not count. Pairs of obstacles never do.
     ///
@@ -79,32 +90,30 @@ impl MotionProblem {
     /// A body on a link that is not there, a margin or padding that is not finite, and more pairs
     /// than [`MAX_PIECE_PAIRS`].
     pub fn new(
-        kinematics: Arc<Kinematics>,
-        base: &Pose,
-        bodies: Vec<MotionBody>,
+        robot: MotionRobot,
         obstacles: Vec<MotionObstacle>,
         margin_m: f64,
         mut padding_m: impl FnMut(MotionItem, MotionItem) -> Option<f64>,
     ) -> Result<Self, MotionProblemError> {
         let mut rules = Vec::new();
-        for a in 0..bodies.len() {
-            let others = (a + 1..bodies.len()).map(MotionItem::Body);
+        let count = robot.bodies.len();
+        for a in 0..count {
+            let others = (a + 1..count).map(MotionItem::Body);
             for b in others.chain((0..obstacles.len()).map(MotionItem::Obstacle)) {
                 rules.extend(padding_m(MotionItem::Body(a), b).map(|padding_m| (MotionItem::Body(a), b, padding_m)));
             }
         }
-        Self::of_rules(kinematics, base, bodies, obstacles, margin_m, rules)
+        Self::of_rules(robot, obstacles, margin_m, rules)
     }
 
     /// The same with the pairs that count as a list.
     pub(crate) fn of_rules(
-        kinematics: Arc<Kinematics>,
-        base: &Pose,
-        bodies: Vec<MotionBody>,
+        robot: MotionRobot,
         obstacles: Vec<MotionObstacle>,
         margin_m: f64,
         rules: Vec<(MotionItem, MotionItem, f64)>,
     ) -> Result<Self, MotionProblemError> {
+        let MotionRobot { kinematics, base, bodies } = robot;
         let base = Isometry3::from_parts((*base.translation()).into(), *base.rotation());
         let mut problem = Self {
             kinematics,

@@ -55,8 +55,12 @@ fn still(name: &str, shape: MotionShape, pose: Pose) -> MotionObstacle {
     MotionObstacle { name: name.into(), placed: PlacedObstacle::Still(shape, pose) }
 }
 
+fn of_arm(bodies: Vec<MotionBody>) -> MotionRobot {
+    MotionRobot { kinematics: arm(), base: Pose::identity(), bodies }
+}
+
 fn problem(bodies: Vec<MotionBody>, obstacles: Vec<MotionObstacle>, margin_m: f64) -> MotionProblem {
-    MotionProblem::new(arm(), &Pose::identity(), bodies, obstacles, margin_m, |_, _| Some(0.0)).expect("a problem")
+    MotionProblem::new(of_arm(bodies), obstacles, margin_m, |_, _| Some(0.0)).expect("a problem")
 }
 
 fn edge(problem: &MotionProblem, from: &[f64], to: &[f64]) -> Path {
@@ -258,7 +262,8 @@ fn random_problem(seeded: &mut Seeded, margin_m: f64) -> MotionProblem {
     obstacles.push(MotionObstacle { name: "carried".into(), placed: carried });
     let ground = HalfSpace::new(seeded.unit(), -5.0).expect("a half-space");
     obstacles.push(MotionObstacle { name: "ground".into(), placed: PlacedObstacle::HalfSpace(ground, 0.0) });
-    MotionProblem::new(kinematics, &seeded.pose(1.0), bodies, obstacles, margin_m, |a, b| match (a, b) {
+    let robot = MotionRobot { kinematics, base: seeded.pose(1.0), bodies };
+    MotionProblem::new(robot, obstacles, margin_m, |a, b| match (a, b) {
         (MotionItem::Body(a), MotionItem::Body(b)) => (a + 1 < b).then_some(0.01),
         _ => Some(0.0),
     })
@@ -497,7 +502,7 @@ fn pairs_that_touch_never_always_or_sometimes_are_classified() {
     let items = [MotionItem::Body(0), MotionItem::Body(1)];
     assert_eq!(derive(&two, items).class, PairClass::Adjacent);
     let bodies = vec![slide(0.2), body("upper", 2, 0.5, 0.1), body("hand", 3, 1.0, 0.1)];
-    let none = MotionProblem::new(arm(), &Pose::identity(), bodies, Vec::new(), 0.0, |_, _| None).expect("a problem");
+    let none = MotionProblem::new(of_arm(bodies), Vec::new(), 0.0, |_, _| None).expect("a problem");
     let items = [MotionItem::Body(0), MotionItem::Body(2)];
     assert_eq!(derive(&none, items).class, PairClass::Undecided);
     let stopped = problem.derive(items, &DeriveOptions::default(), &mut |_| ControlFlow::Break(()));

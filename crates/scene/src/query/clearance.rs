@@ -1,7 +1,6 @@
 //! Pairs within an influence distance, state by state, with gradients.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use sublevel_core::body::Shape;
 use sublevel_core::measure::{
@@ -12,7 +11,7 @@ use super::answer::{Answer, Verdict};
 use super::ask::{Ask, AskError, Measure, options};
 use super::decide::decide;
 use super::packed::State;
-use super::placed::{Candidate, Other, Placed, with_starts};
+use super::placed::{Candidate, JointValues, Other, Placed, with_starts};
 use super::solver::{Pair, Solids, Solver};
 use super::states_error::StatesError;
 use super::thing::{PairSlots, Thing};
@@ -80,13 +79,11 @@ impl Clearance {
     /// A robot or a joint that is not there, a joint twice, and numbers that are not whole states.
     pub fn of_joints(
         scene: Scene,
-        robot: &str,
-        joints: &[Arc<str>],
-        values: Vec<f64>,
+        asked: JointValues<'_>,
         influence_m: f64,
         include_allowed: bool,
     ) -> Result<Self, StatesError> {
-        Self::of(Placed::of_joints(scene, robot, joints, values, include_allowed)?, influence_m)
+        Self::of(Placed::of_joints(scene, asked, include_allowed)?, influence_m)
     }
 
     fn of(placed: Placed, influence_m: f64) -> Result<Self, StatesError> {

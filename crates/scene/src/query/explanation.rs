@@ -9,6 +9,7 @@ use super::answer::{Answer, Verdict};
 use super::clearance::{Clearance, ClearanceRow, StateClearance};
 use super::decide::compare;
 use super::least_change::least_change;
+use super::placed::JointValues;
 use super::states::{Certainty, StateVerdict, is_exact};
 use super::states_error::StatesError;
 use crate::crew::{Question, Stop};
@@ -120,12 +121,11 @@ impl Explanation {
     /// A robot or a joint that is not there, a joint twice, and numbers that are not one state.
     pub fn of_joints(
         scene: Scene,
-        robot: &str,
-        joints: &[Arc<str>],
-        values: &[f64],
+        asked: JointValues<'_>,
         margin_m: f64,
         include_allowed: bool,
     ) -> Result<Self, StatesError> {
+        let JointValues { robot, joints, values } = asked;
         let instance = scene.robot(robot).ok_or_else(|| StatesError::NoRobot(robot.into()))?;
         let named = places(instance.robot().kinematics(), joints).map_err(StatesError::Joints)?;
         if named.is_empty() {
@@ -136,9 +136,14 @@ impl Explanation {
             if values.len() != named.len() {
                 return Err(StatesError::OneState { numbers: values.len(), per_state: named.len() });
             }
-            named.iter().zip(values).for_each(|(&place, &value)| all[place] = value);
+            named.iter().zip(values).for_each(|(&place, value)| all[place] = value);
         }
-        Clearance::of_joints(scene.clone(), robot, &[], all.clone(), margin_m, include_allowed)?;
+        Clearance::of_joints(
+            scene.clone(),
+            JointValues { robot, joints: &[], values: all.clone() },
+            margin_m,
+            include_allowed,
+        )?;
         let state = ExplainedPlacement::Joints { robot: robot.into(), values: all, named };
         Ok(Self { scene, margin_m, include_allowed, state })
     }
@@ -153,7 +158,7 @@ impl Explanation {
             }
             ExplainedPlacement::Joints { robot, values: asked, .. } => {
                 let values = values.unwrap_or(asked).to_vec();
-                Clearance::of_joints(scene, robot, &[], values, influence_m, allowed)
+                Clearance::of_joints(scene, JointValues { robot, joints: &[], values }, influence_m, allowed)
             }
         };
         clearance.ok()?.solve(0, stop).pop()

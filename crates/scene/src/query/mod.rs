@@ -38,6 +38,7 @@ pub use closest::{Closest, closest_pair};
 pub use explanation::{ExplainedPair, ExplainedState, Explanation};
 pub use motions::{MotionSettings, MovingObject, PathKind, RobotMotionAnswer, RobotMotions, RobotMotionsError};
 pub use pairs::{Operand, Pairs, PairsError};
+pub use placed::JointValues;
 pub use rays::{RayAnswer, Rays, RaysError};
 pub use selection::Selection;
 pub use states::{Certainty, StateAnswer, StateVerdict, States};

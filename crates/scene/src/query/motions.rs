@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use sublevel_core::measure::Pose;
 use sublevel_robot::motion::{
     Certificate, CertificateError, MotionAnswer, MotionBody, MotionItem, MotionObstacle, MotionOptions, MotionProblem,
-    MotionProblemError, MotionShape, MotionVerdict, MotionWorkspace, Path, PathError, PlacedObstacle, VerifiedMotion,
-    VerifyOptions,
+    MotionProblemError, MotionRobot, MotionShape, MotionVerdict, MotionWorkspace, Path, PathError, PlacedObstacle,
+    VerifiedMotion, VerifyOptions,
 };
 use sublevel_robot::{ConfigurationError, Kinematics};
 
@@ -430,15 +430,15 @@ fn problem(
         let (a, b) = (slot(a), slot(b));
         (include_allowed || !scene.is_allowed(a, b)).then(|| scene.padding_m(a, b))
     };
-    let kinematics = instance.robot().kinematics().clone();
+    let moving = MotionRobot { kinematics: instance.robot().kinematics().clone(), base: *instance.base(), bodies };
     // The normal of a half-space that was turned is off by a rounding that grows with the distance.
-    let is_far = !(kinematics.reach_m() + instance.base().translation().norm() <= 0.5 * REACH_M);
+    let is_far = !(moving.kinematics.reach_m() + instance.base().translation().norm() <= 0.5 * REACH_M);
     let is_turned = |half_space: &WorldHalfSpace| half_space.slack_m(REACH_M) > half_space.slack_m(0.0);
     let mut things = scene.objects().map(|(_, object, pose)| Thing::object(object, pose));
     if is_far && things.any(|thing| matches!(&thing, Thing::HalfSpace(half_space) if is_turned(half_space))) {
         return Err(RobotMotionsError::Far(robot.into()));
     }
-    let problem = MotionProblem::new(kinematics, instance.base(), bodies, obstacles, margin_m, padding)?;
+    let problem = MotionProblem::new(moving, obstacles, margin_m, padding)?;
     Ok((problem, slots))
 }
 

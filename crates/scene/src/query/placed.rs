@@ -27,6 +27,17 @@ pub(crate) fn with_starts<T>(work: impl FnOnce(&PairCache) -> T) -> T {
     STARTS.with(work)
 }
 
+/// States of a robot as packed values of its joints.
+#[derive(Clone, Debug)]
+pub struct JointValues<'a> {
+    /// Name of the robot in the scene.
+    pub robot: &'a str,
+    /// Joints whose values are given, in that order; empty for all that follow no other one.
+    pub joints: &'a [Arc<str>],
+    /// Their values, state after state, in radians or metres.
+    pub values: Vec<f64>,
+}
+
 /// Objects that every state places, and all others.
 #[derive(Debug)]
 pub(crate) struct Placed {
@@ -70,13 +81,8 @@ impl Placed {
     }
 
     /// States of a robot as packed joint values.
-    pub(crate) fn of_joints(
-        scene: Scene,
-        robot: &str,
-        joints: &[Arc<str>],
-        values: Vec<f64>,
-        include_allowed: bool,
-    ) -> Result<Self, StatesError> {
+    pub(crate) fn of_joints(scene: Scene, asked: JointValues<'_>, include_allowed: bool) -> Result<Self, StatesError> {
+        let JointValues { robot, joints, values } = asked;
         let instance = scene.robot(robot).ok_or_else(|| StatesError::NoRobot(robot.into()))?;
         let slots: Vec<Slot> = instance.link_slots().iter().flatten().copied().collect();
         if slots.is_empty() {

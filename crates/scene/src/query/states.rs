@@ -1,6 +1,5 @@
 //! Contact in many states.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use sublevel_core::measure::DEFAULT_DEPTH_ACCURACY;
@@ -10,7 +9,7 @@ use super::ask::{Ask, AskError, Measure, check_accuracy, options};
 use super::certain::decide_within;
 use super::decide::{Bracket, decide};
 use super::packed::State;
-use super::placed::{Candidate, Other, Placed, with_starts};
+use super::placed::{Candidate, JointValues, Other, Placed, with_starts};
 use super::solver::{Pair, Solver};
 use super::states_error::StatesError;
 use super::thing::{PairSlots, Thing};
@@ -111,13 +110,11 @@ impl States {
     /// A robot or a joint that is not there, a joint twice, and numbers that are not whole states.
     pub fn of_joints(
         scene: Scene,
-        robot: &str,
-        joints: &[Arc<str>],
-        values: Vec<f64>,
+        asked: JointValues<'_>,
         margin_m: f64,
         include_allowed: bool,
     ) -> Result<Self, StatesError> {
-        Self::of(Placed::of_joints(scene, robot, joints, values, include_allowed)?, margin_m)
+        Self::of(Placed::of_joints(scene, asked, include_allowed)?, margin_m)
     }
 
     fn of(placed: Placed, margin_m: f64) -> Result<Self, StatesError> {

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use sublevel_core::measure::Pose;
 use sublevel_robot::motion::{
-    DeriveOptions, DerivedPair, MotionBody, MotionItem, MotionProblem, MotionProblemError, MotionShape, PairClass,
+    DeriveOptions, DerivedPair, MotionBody, MotionItem, MotionProblem, MotionProblemError, MotionRobot, MotionShape,
+    PairClass,
 };
 
 use super::Robot;
@@ -59,9 +60,8 @@ impl Robot {
             }
         }
         let links: Vec<usize> = bodies.iter().map(|body| body.link).collect();
-        let kinematics = self.kinematics().clone();
-        let problem =
-            MotionProblem::new(kinematics, &Pose::identity(), bodies, Vec::new(), margin_m, |_, _| Some(0.0))?;
+        let robot = MotionRobot { kinematics: self.kinematics().clone(), base: Pose::identity(), bodies };
+        let problem = MotionProblem::new(robot, Vec::new(), margin_m, |_, _| Some(0.0))?;
         let pairs: Vec<_> = problem.body_pairs().collect();
         let derived = pairs.iter().enumerate().map(|(done, &items)| {
             let mut said = |boxes| progress(DeriveProgress { done, pairs: pairs.len(), boxes });

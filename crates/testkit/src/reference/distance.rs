@@ -110,7 +110,7 @@ pub fn distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer: &Dista
         'search: for rank in 0..of_a.len() + of_b.len() {
             for (i, j) in (0..=rank).map(|i| (i, rank - i)) {
                 if let (Some(p), Some(q)) = (of_a.get(i), of_b.get(j)) {
-                    newton(&one, &two, p, q, (&x, &y, &vector(&normal)), small, &mut best);
+                    newton((&one, p), (&two, q), (&x, &y, &vector(&normal)), small, &mut best);
                     if done(&best) {
                         break 'search;
                     }
@@ -150,10 +150,8 @@ fn at(body: &Solid<'_>, index: &[usize], multiplier: &[Big], v: &Vector) -> At {
 
 /// Newton's method until an iterate is taken, or nothing is gained any more.
 fn newton(
-    one: &Solid<'_>,
-    two: &Solid<'_>,
-    p: &Trial,
-    q: &Trial,
+    (one, p): (&Solid<'_>, &Trial),
+    (two, q): (&Solid<'_>, &Trial),
     (x, y, n): (&Vector, &Vector, &Vector),
     small: f64,
     best: &mut Best,
@@ -168,7 +166,7 @@ fn newton(
         if length < 1e-12 || step % 8 == 0 {
             let before = &best.upper - &best.lower;
             let Iterate { x, y, n, l, m, .. } = &iterate;
-            bracket(one, two, (p, l), (q, m), (x, y, n), best);
+            bracket((one, p, l), (two, q, m), (x, y, n), best);
             let width = &best.upper - &best.lower;
             stalled = if width < before || length >= 1e-12 { 0 } else { stalled + 1 };
             if width <= big(TARGET) || stalled > 3 || length < 1e-57 {
@@ -269,10 +267,8 @@ pub(super) fn twists(x: &Vector, y: &Vector, n: &Vector, pose_a: &Pose, pose_b: 
 
 /// Takes the bounds that an iterate proves: numerics section 3.
 fn bracket(
-    one: &Solid<'_>,
-    two: &Solid<'_>,
-    (p, l): (&Trial, &[Big]),
-    (q, m): (&Trial, &[Big]),
+    (one, p, l): (&Solid<'_>, &Trial, &[Big]),
+    (two, q, m): (&Solid<'_>, &Trial, &[Big]),
     (x, y, n): (&Vector, &Vector, &Vector),
     best: &mut Best,
 ) {

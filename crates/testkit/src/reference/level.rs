@@ -86,7 +86,7 @@ pub fn level_distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer: 
                 if best.width().is_some_and(|width| width <= big(target)) {
                     break 'search;
                 }
-                newton(&one, &two, p, q, (&start, ridge), &mut best);
+                newton((&one, p), (&two, q), (&start, ridge), &mut best);
             }
         }
         if best.width().is_some_and(|width| width <= big(SHARP)) {
@@ -135,7 +135,12 @@ fn trials(one: &Solid<'_>, two: &Solid<'_>, v: &Vector, close: f64) -> Vec<(Tria
 }
 
 /// Newton's method on `Σ ν ∇g + Σ μ ∇h = 0`, `Σ ν = 1`, `g = s`, `h = 1`.
-fn newton(one: &Solid<'_>, two: &Solid<'_>, p: &Trial, q: &Trial, (start, ridge): (&Vector, f64), best: &mut Best) {
+fn newton(
+    (one, p): (&Solid<'_>, &Trial),
+    (two, q): (&Solid<'_>, &Trial),
+    (start, ridge): (&Vector, f64),
+    best: &mut Best,
+) {
     let mut x = start.clone();
     let mut nu: Vec<Big> = p.multiplier.iter().map(|&m| big(m)).collect();
     let mut s = one.largest(&x);
@@ -187,7 +192,7 @@ fn newton(one: &Solid<'_>, two: &Solid<'_>, p: &Trial, q: &Trial, (start, ridge)
         if length < 1e-12 || step % 8 == 0 {
             let before = best.width();
             let unscaled: Vec<Big> = mu.iter().map(|m| m * &scale).collect();
-            bracket(one, two, (p, &nu), (q, &unscaled), &x, best);
+            bracket((one, p, &nu), (two, q, &unscaled), &x, best);
             let width = best.width();
             let better = before.is_none() || width < before;
             stalled = if better || length >= 1e-12 { 0 } else { stalled + 1 };
@@ -200,10 +205,8 @@ fn newton(one: &Solid<'_>, two: &Solid<'_>, p: &Trial, q: &Trial, (start, ridge)
 
 /// Takes the bounds that an iterate proves: numerics section 3.
 fn bracket(
-    one: &Solid<'_>,
-    two: &Solid<'_>,
-    (p, nu): (&Trial, &[Big]),
-    (q, mu): (&Trial, &[Big]),
+    (one, p, nu): (&Solid<'_>, &Trial, &[Big]),
+    (two, q, mu): (&Solid<'_>, &Trial, &[Big]),
     x: &Vector,
     best: &mut Best,
 ) {

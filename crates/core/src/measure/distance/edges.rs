@@ -1,14 +1,12 @@
 //! The distance of two bodies of which at least one has several constraints.
 
 use super::answer::Distance;
+use super::query::Query;
 use crate::body::Body;
 use crate::measure::frames::pose::Pose;
-use crate::measure::frames::vector::V3;
-use crate::measure::options::Options;
 use crate::measure::solver::continuation::Lost;
 use crate::measure::solver::edge_newton::{EdgeProven, EdgeQuery};
 use crate::measure::solver::initial_guess::Start;
-use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::dispatch;
@@ -21,14 +19,8 @@ use nalgebra::{Matrix3, Vector3};
 /// What the general search has to go on from.
 // What is lost is about as large as what is proven, and there is no allocation in a solve.
 #[allow(clippy::result_large_err)]
-pub(super) fn of_edges(
-    (a, pose_a): (&Body, &Pose),
-    (b, pose_b): (&Body, &Pose),
-    goal: &StopCriterion,
-    options: &Options<'_>,
-    facing: Option<V3<f64>>,
-    warm: &mut WarmStart,
-) -> Result<Distance, Lost> {
+pub(super) fn of_edges(query: &Query<'_>, warm: &mut WarmStart) -> Result<Distance, Lost> {
+    let Query { of_a: (a, pose_a), of_b: (b, pose_b), goal, options, facing } = *query;
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
     let trace = if let Hint::Edges(trace) = &warm.hint { Some(trace) } else { None };
     let start = start((a, pose_a), pose_b, &warm.hint);

@@ -7,6 +7,7 @@ mod edges;
 mod exact;
 mod pair;
 mod planes;
+mod query;
 mod search;
 
 use crate::body::{Ball, Body, NodeContent, PartNode, PartTree, Solid};

@@ -6,6 +6,7 @@ use super::balls::of_balls;
 use super::edges::of_edges;
 use super::exact::{Exact, of_shapes};
 use super::planes::Planes;
+use super::query::Query;
 use super::search::Search;
 use crate::body::Body;
 use crate::measure::bounds::culling::{BallBounds, balls};
@@ -110,23 +111,13 @@ pub(in crate::measure) fn between(
     Query { of_a, of_b, goal, options, facing: None }.solve(warm)
 }
 
-/// The question. Each method hands on to the next where it fails, and none hands back: an answer is
-/// written where the caller wants it, and not copied, for loads of what was just stored in other
-/// pieces have to wait.
-#[derive(Clone, Copy)]
-struct Query<'a> {
-    of_a: (&'a Body, &'a Pose),
-    of_b: (&'a Body, &'a Pose),
-    goal: &'a StopCriterion,
-    options: &'a Options<'a>,
-    /// About the normal from B to A, A's frame, if it is known.
-    facing: Option<V3<f64>>,
-}
-
+// Each method hands on to the next where it fails, and none hands back: an answer is written where
+// the caller wants it, and not copied, for loads of what was just stored in other pieces have to
+// wait.
 impl<'a> Query<'a> {
     #[inline]
     fn solve(&self, warm: &mut WarmStart) -> Distance {
-        let Self { of_a, of_b, goal, options, facing } = *self;
+        let Self { of_a, of_b, goal, options, .. } = *self;
         if runs(Stage::ClosedForm)
             && let Some(found) = of_shapes(of_a, of_b, options, warm)
         {
@@ -153,7 +144,7 @@ impl<'a> Query<'a> {
             };
         }
         if runs(Stage::Edges) && !(of_a.0.is_smooth() && of_b.0.is_smooth()) {
-            return match of_edges(of_a, of_b, goal, options, facing, warm) {
+            return match of_edges(self, warm) {
                 Ok(found) => found,
                 Err(lost) => self.search(&lost, warm),
             };

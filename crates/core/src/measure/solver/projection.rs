@@ -120,13 +120,20 @@ const MAX_STEPS: u32 = 12;
 /// only; no test pins it.
 const WORTH_A_BRACKET: f64 = 1e-3;
 
-/// Minimises from a start until `accept` takes a trial point; returns the iterations and the
-/// constraints that were active last.
+/// A minimisation over one body from a start, with the constraints that may be active there.
+#[derive(Clone, Copy)]
+pub(in crate::measure) struct SingleProblem<'a> {
+    pub(in crate::measure) body: &'a Posed<'a>,
+    pub(in crate::measure) objective: &'a Objective,
+    pub(in crate::measure) start: Vector3<f64>,
+    /// None, if nothing is known.
+    pub(in crate::measure) active: ActiveSet,
+}
+
+/// Minimises until `accept` takes a trial point; returns the iterations and the constraints that
+/// were active last.
 pub(in crate::measure) fn solve_single(
-    body: &Posed<'_>,
-    objective: &Objective,
-    start: Vector3<f64>,
-    active: ActiveSet,
+    &SingleProblem { body, objective, start, active }: &SingleProblem<'_>,
     mut exhausted: impl FnMut(u32) -> bool,
     mut accept: impl FnMut(&Trial) -> bool,
 ) -> (u32, ActiveSet) {

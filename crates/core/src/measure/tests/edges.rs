@@ -102,16 +102,14 @@ fn cut_bodies_agree_with_the_general_search() {
                         assert_normals_of_active(
                             1e-6,
                             (first.0, &first.1),
-                            &found.witness_a,
-                            &-n,
+                            (&found.witness_a, &-n),
                             &found.active_a,
                             &label,
                         );
                         assert_normals_of_active(
                             1e-6,
                             (second.0, &second.1),
-                            &found.witness_b,
-                            &n,
+                            (&found.witness_b, &n),
                             &found.active_b,
                             &label,
                         );

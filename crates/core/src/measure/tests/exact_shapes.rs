@@ -68,8 +68,8 @@ fn share(what: &str, count: u64, pair: impl Fn(&mut Seeded) -> (Body, Body)) -> 
                     assert!((n - m).norm() < 1e-5, "{label}");
                     let along = (found.witness_a - found.witness_b).dot(&n);
                     assert!((along - found.upper).abs() < 1e-9 * (size + found.upper), "{label}");
-                    assert_normals_of_active(1e-5, first, &found.witness_a, &-n, &found.active_a, &label);
-                    assert_normals_of_active(1e-5, second, &found.witness_b, &n, &found.active_b, &label);
+                    assert_normals_of_active(1e-5, first, (&found.witness_a, &-n), &found.active_a, &label);
+                    assert_normals_of_active(1e-5, second, (&found.witness_b, &n), &found.active_b, &label);
                 }
             }
         }

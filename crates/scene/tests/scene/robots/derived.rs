@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use sublevel_core::measure::Pose;
 use sublevel_robot::motion::{DeriveOptions, PairClass};
-use sublevel_scene::query::{StateVerdict, States};
+use sublevel_scene::query::{JointValues, StateVerdict, States};
 use sublevel_scene::{Crew, DerivedLinks, Scene, Update};
 use sublevel_testkit::Seeded;
 
@@ -49,7 +49,8 @@ fn classes_of_links_agree_with_random_states() {
     for pair in derived.iter().filter(collides) {
         values.extend(pair.pair.witness.as_ref().expect("a witness"));
     }
-    let states = States::of_joints(scene.clone(), "arm", &[], values, 0.0, false).expect("states");
+    let states = States::of_joints(scene.clone(), JointValues { robot: "arm", joints: &[], values }, 0.0, false)
+        .expect("states");
     let answers = Crew::new(2).expect("threads").ask(std::sync::Arc::new(states), Default::default());
     let answers = answers.expect("answered").concat();
     let witnessed = derived.iter().filter(collides).count();

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use sublevel_core::measure::Pose;
-use sublevel_scene::query::{ExplainedState, Explanation, StateVerdict, States, StatesError};
+use sublevel_scene::query::{ExplainedState, Explanation, JointValues, StateVerdict, States, StatesError};
 use sublevel_scene::{Crew, Scene, Slot, Update};
 use sublevel_testkit::Seeded;
 use sublevel_testkit::random::at;
@@ -13,13 +13,25 @@ use crate::worlds::placement;
 
 fn explained(scene: &Scene, joints: &[&str], values: &[f64], margin_m: f64) -> ExplainedState {
     let joints: Vec<Arc<str>> = joints.iter().map(|&name| name.into()).collect();
-    let question = Explanation::of_joints(scene.clone(), "arm", &joints, values, margin_m, false).expect("a state");
+    let question = Explanation::of_joints(
+        scene.clone(),
+        JointValues { robot: "arm", joints: &joints, values: values.to_vec() },
+        margin_m,
+        false,
+    )
+    .expect("a state");
     Crew::new(1).expect("threads").ask(Arc::new(question), Arc::default()).expect("answered").remove(0)
 }
 
 fn verdict(scene: &Scene, joints: &[&str], values: &[f64], margin_m: f64) -> StateVerdict {
     let joints: Vec<Arc<str>> = joints.iter().map(|&name| name.into()).collect();
-    let states = States::of_joints(scene.clone(), "arm", &joints, values.to_vec(), margin_m, false).expect("states");
+    let states = States::of_joints(
+        scene.clone(),
+        JointValues { robot: "arm", joints: &joints, values: values.to_vec() },
+        margin_m,
+        false,
+    )
+    .expect("states");
     Crew::new(1).expect("threads").ask(Arc::new(states), Arc::default()).expect("answered").concat()[0].verdict
 }
 
@@ -119,7 +131,14 @@ fn what_is_no_single_state_is_refused() {
     let ball: [Slot; 1] = [slot(&scene, "ball")];
     let joints = |joints: &[&str], values: &[f64]| {
         let joints: Vec<Arc<str>> = joints.iter().map(|&name| name.into()).collect();
-        Explanation::of_joints(scene.clone(), "arm", &joints, values, 0.0, false).map(drop).expect_err("refused")
+        Explanation::of_joints(
+            scene.clone(),
+            JointValues { robot: "arm", joints: &joints, values: values.to_vec() },
+            0.0,
+            false,
+        )
+        .map(drop)
+        .expect_err("refused")
     };
     let wide = StatesError::OneState { numbers: 2, per_state: 1 };
     assert_eq!(joints(&["bend"], &[0.0, 0.1]), wide);
@@ -128,7 +147,13 @@ fn what_is_no_single_state_is_refused() {
     let row: Vec<f64> = pose.translation().iter().chain(pose.rotation().coords.iter()).copied().collect();
     let two = Explanation::new(scene.clone(), &ball, [row.clone(), row].concat(), 0.0, false).map(drop);
     assert_eq!(two.expect_err("refused"), StatesError::Several(2));
-    let nobody = Explanation::of_joints(scene.clone(), "nobody", &[], &[], 0.0, false).map(drop);
+    let nobody = Explanation::of_joints(
+        scene.clone(),
+        JointValues { robot: "nobody", joints: &[], values: Vec::new() },
+        0.0,
+        false,
+    )
+    .map(drop);
     assert!(matches!(nobody, Err(StatesError::NoRobot(_))));
     assert_eq!(explained(&scene, &["bend"], &[f64::NAN], 0.0).verdict, StateVerdict::Invalid);
     assert_eq!(explained(&scene, &["bend"], &[9.0], 0.0).verdict, StateVerdict::Invalid);

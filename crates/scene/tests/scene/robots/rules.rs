@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use sublevel_scene::query::{StateVerdict, States};
+use sublevel_scene::query::{JointValues, StateVerdict, States};
 use sublevel_scene::{Crew, Scene, Subject, Update};
 use sublevel_testkit::random::at;
 
@@ -17,7 +17,13 @@ fn allowed(scene: &Scene, a: &str, b: &str) -> bool {
 /// The verdict of the scene's own joint values, with the pair.
 pub(super) fn verdict(scene: &Scene, margin_m: f64) -> (StateVerdict, Option<[String; 2]>) {
     let configuration = scene.robot("arm").expect("there").configuration().to_vec();
-    let question = States::of_joints(scene.clone(), "arm", &[], configuration, margin_m, false).expect("states");
+    let question = States::of_joints(
+        scene.clone(),
+        JointValues { robot: "arm", joints: &[], values: configuration },
+        margin_m,
+        false,
+    )
+    .expect("states");
     let crew = Crew::new(1).expect("threads");
     let answer = crew.ask(Arc::new(question), Arc::default()).expect("answered").concat()[0];
     let name = |slot| scene.object(slot).expect("there").name.to_string();

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use sublevel_scene::query::{Clearance, StateAnswer, StateClearance, StateVerdict, States, StatesError};
+use sublevel_scene::query::{Clearance, JointValues, StateAnswer, StateClearance, StateVerdict, States, StatesError};
 use sublevel_scene::{Crew, Question, Scene, Slot, Update};
 use sublevel_testkit::Seeded;
 use sublevel_testkit::random::at;
@@ -17,12 +17,24 @@ fn ask<Q: Question<Part = Vec<T>>, T: Clone>(question: Q) -> Vec<T> {
 
 fn states(scene: &Scene, joints: &[&str], values: &[f64]) -> Vec<StateAnswer> {
     let joints: Vec<Arc<str>> = joints.iter().map(|&name| name.into()).collect();
-    ask(States::of_joints(scene.clone(), "arm", &joints, values.to_vec(), 0.0, false).expect("states"))
+    ask(States::of_joints(
+        scene.clone(),
+        JointValues { robot: "arm", joints: &joints, values: values.to_vec() },
+        0.0,
+        false,
+    )
+    .expect("states"))
 }
 
 fn clearance(scene: &Scene, joints: &[&str], values: &[f64]) -> Vec<StateClearance> {
     let joints: Vec<Arc<str>> = joints.iter().map(|&name| name.into()).collect();
-    ask(Clearance::of_joints(scene.clone(), "arm", &joints, values.to_vec(), 0.3, false).expect("states"))
+    ask(Clearance::of_joints(
+        scene.clone(),
+        JointValues { robot: "arm", joints: &joints, values: values.to_vec() },
+        0.3,
+        false,
+    )
+    .expect("states"))
 }
 
 /// The arm among boxes and balls.
@@ -64,7 +76,13 @@ fn joint_values_are_what_the_poses_of_links_are() {
             assert_eq!(joints.pair, poses.pair, "seed {seed} {state}");
             tally[usize::from(joints.verdict == StateVerdict::Free)] += 1;
         }
-        let worst = States::of_joints(scene.clone(), "arm", &[], packed.clone(), 0.0, false).expect("states");
+        let worst = States::of_joints(
+            scene.clone(),
+            JointValues { robot: "arm", joints: &[], values: packed.clone() },
+            0.0,
+            false,
+        )
+        .expect("states");
         let worst = ask(worst.with_worst_pair(None).expect("an accuracy"));
         for (state, (found, worst)) in by_joints.iter().zip(&worst).enumerate() {
             assert_eq!(found.verdict, worst.verdict, "seed {seed} {state}: {found:?} {worst:?}");
@@ -109,7 +127,12 @@ fn questions_that_are_none_are_refused() {
     let scene = cell(&[]);
     let refused = |robot: &str, joints: &[&str], values: &[f64]| {
         let joints: Vec<Arc<str>> = joints.iter().map(|&name| name.into()).collect();
-        let question = States::of_joints(scene.clone(), robot, &joints, values.to_vec(), 0.0, false);
+        let question = States::of_joints(
+            scene.clone(),
+            JointValues { robot, joints: &joints, values: values.to_vec() },
+            0.0,
+            false,
+        );
         question.expect_err("refused").to_string()
     };
     assert!(refused("leg", &[], &[0.0; 4]).starts_with("no robot \"leg\""));
@@ -118,7 +141,8 @@ fn questions_that_are_none_are_refused() {
     assert!(refused("arm", &["knee"], &[0.0]).contains("\"shoulder\", \"bend\", \"spin\", \"slide\""));
     assert!(refused("arm", &["follow"], &[0.0]).contains("no joint \"follow\""), "a mimic joint");
     assert!(refused("arm", &["bend", "bend"], &[0.0; 2]).contains("named twice"));
-    let question = Clearance::of_joints(scene.clone(), "leg", &[], vec![0.0], 0.1, false);
+    let question =
+        Clearance::of_joints(scene.clone(), JointValues { robot: "leg", joints: &[], values: vec![0.0] }, 0.1, false);
     assert_eq!(question.expect_err("refused"), StatesError::NoRobot("leg".into()));
 }
 
