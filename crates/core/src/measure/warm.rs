@@ -1,5 +1,6 @@
 //! Warm starts: what one answer gives the next query of the same pair.
 
+use crate::body::Body;
 use crate::measure::frames::query_frame::Pair;
 use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::continuation::Trace;
@@ -80,6 +81,17 @@ impl WarmStart {
 }
 
 impl Hint {
+    /// Witnesses of the last answer, each in its body's frame, metres.
+    pub(super) fn witnesses(&self, a: &Body, b: &Body) -> Option<[Vector3<f64>; 2]> {
+        let [x, y] = match self {
+            Self::Apart { x_a, y_b, .. } => return Some([*x_a, *y_b]),
+            Self::Smooth(trace) => trace.points(),
+            Self::Edges(trace) => trace.points(),
+            _ => return None,
+        };
+        Some([a.normalization().center + Vector3::from(x), b.normalization().center + Vector3::from(y)])
+    }
+
     /// Unit normal of the last answer, from B to A, in A's frame.
     pub(super) fn normal_a(&self) -> Option<Vector3<f64>> {
         match self {

@@ -1,4 +1,4 @@
-//! Whether a pair is nearer than a threshold, from the coarsest rungs on.
+//! Whether a pair is nearer than a threshold, by the rungs that prove it.
 
 use std::sync::Arc;
 
@@ -106,12 +106,13 @@ fn solids(solver: &Solver<'_>, pair: &Pair<'_>, threshold: f64, options: Options
         return Bracket::of(Verdict::Undecided, f64::NEG_INFINITY, f64::INFINITY);
     };
     let finest = [rungs_a.len() - 1, rungs_b.len() - 1];
-    for step in 0..=finest[0].max(finest[1]) {
+    let last = finest[0].max(finest[1]);
+    let mut found = Bracket::of(Verdict::Undecided, f64::NEG_INFINITY, f64::INFINITY);
+    for step in steps(last, is_single(rungs_a) && is_single(rungs_b)) {
         let rungs = [step.min(finest[0]), step.min(finest[1])];
         let (a, b) = (&*rungs_a[rungs[0]], &*rungs_b[rungs[1]]);
-        let is_finest = rungs == finest;
-        let mut found = if threshold < 0.0 {
-            if !is_finest {
+        found = if threshold < 0.0 {
+            if step != last {
                 continue;
             }
             let found = solver
@@ -129,15 +130,28 @@ fn solids(solver: &Solver<'_>, pair: &Pair<'_>, threshold: f64, options: Options
             Bracket::decided(decision, threshold)
         };
         found.rungs = rungs.map(|rung| u8::try_from(rung).unwrap_or(u8::MAX));
-        if is_finest || found.verdict == Verdict::No {
-            return found;
+        if found.verdict == Verdict::No {
+            break;
         }
     }
-    Bracket::of(Verdict::Undecided, f64::NEG_INFINITY, f64::INFINITY)
+    found
 }
 
-/// Compares the distance of a solid from a capsule with a threshold that is not negative, from the
-/// coarsest rung on; rungs in this order.
+/// The steps up to the finest rungs that are asked, in their order. Each rung contains the object,
+/// so any may prove that it is apart. The table of heights decides about one body of any degree as
+/// fast as about an ellipsoid, and a coarser one would be asked in vain; before several parts the
+/// coarser rungs save most of the time.
+fn steps(last: usize, is_single: bool) -> impl Iterator<Item = usize> {
+    if is_single { last..=last } else { 0..=last }
+}
+
+/// Whether the finest rung is one body.
+fn is_single(rungs: &[Arc<Shape>]) -> bool {
+    rungs.last().is_none_or(|solid| solid.parts().len() == 1)
+}
+
+/// Compares the distance of a solid from a capsule with a threshold that is not negative; rungs in
+/// this order.
 fn solid_and_capsule(
     solver: &Solver<'_>,
     (rungs, pose): (&[Arc<Shape>], &Pose),
@@ -145,14 +159,16 @@ fn solid_and_capsule(
     threshold: f64,
     (slots, options): (Option<PairSlots>, Options<'_>),
 ) -> Bracket {
+    let last = rungs.len() - 1;
     let mut found = Bracket::of(Verdict::Undecided, f64::NEG_INFINITY, f64::INFINITY);
-    for (rung, solid) in rungs.iter().enumerate() {
+    for rung in steps(last, is_single(rungs)) {
+        let solid = &*rungs[rung];
         let decision = solver.warm(slots, [rung, 0], Measure::Signed, |warm| {
             if threshold == 0.0 {
-                return overlap_with_capsule(&**solid, pose, capsule, capsule_pose, &options, warm);
+                return overlap_with_capsule(solid, pose, capsule, capsule_pose, &options, warm);
             }
             // Only thresholds that are no lengths are refused.
-            nearer_to_capsule_than(&**solid, pose, capsule, capsule_pose, threshold, &options, warm)
+            nearer_to_capsule_than(solid, pose, capsule, capsule_pose, threshold, &options, warm)
                 .unwrap_or(Decision::Undecided { lower: 0.0, upper: f64::INFINITY })
         });
         found = Bracket::decided(decision, threshold);

@@ -22,7 +22,8 @@ impl Selection {
     /// These objects and the members of these groups.
     pub fn of(scene: &Scene, slots: impl IntoIterator<Item = Slot>, groups: &HashSet<Arc<str>>) -> Self {
         let mut selected = vec![false; scene.structure.slots.len()];
-        let members = scene.structure.objects().filter(|(_, object)| groups.contains(&object.group));
+        let all = if groups.is_empty() { None } else { Some(scene.structure.objects()) };
+        let members = all.into_iter().flatten().filter(|(_, object)| groups.contains(&object.group));
         for slot in slots.into_iter().chain(members.map(|(slot, _)| slot)) {
             if let Some(selected) = selected.get_mut(slot as usize) {
                 *selected = true;

@@ -12,6 +12,12 @@ use crate::measure::warm::Hint;
 use crate::polynomial::{Simd, WithSimd, dispatch};
 use nalgebra::Vector3;
 
+/// Most that a plane loses to the rounding up of heights in tables, of the radii of both bodies.
+///
+/// Larger, planes that would decide are left out; smaller, more are tried in vain. It changes time
+/// only; no test pins it.
+const SETTLED: f64 = 0.02;
+
 /// Planes between two bodies.
 pub(super) struct Planes<'a> {
     separation: Separation<'a>,
@@ -29,17 +35,29 @@ impl<'a> Planes<'a> {
     /// more: across the normal of the last answer, along the line of the centres, across the sides
     /// of a shape that the other body's centre lies beyond, and across the gap of the ellipsoids
     /// that stand for the bodies. Also the normal there, in A's frame, if it came to that.
+    ///
+    /// The last witnesses where they stand now bound what any plane can show: none is tried where
+    /// they are too near for the goal, and none after that of the last normal where it is within
+    /// [`SETTLED`] of them.
     pub(super) fn lower(&self, goal: &StopCriterion) -> (f64, Option<V3<f64>>) {
+        let (a, pose_a) = self.of_a;
+        let (b, pose_b) = self.of_b;
         let mut best = f64::NEG_INFINITY;
+        if let (Some([x, y]), Some(normal)) = (self.hint.witnesses(a, b), self.hint.normal_a()) {
+            let apart = (pose_a.transform_point(&x) - pose_b.transform_point(&y)).norm();
+            if apart <= goal.far {
+                return (best, None);
+            }
+            best = self.separation.along(&pose_a.transform_direction(&normal));
+            let settled = SETTLED * (a.circumscribed().radius + b.circumscribed().radius);
+            if best > goal.far || apart - best <= settled {
+                return (best, None);
+            }
+        }
         let mut meets = |n: &Vector3<f64>| {
             best = best.max(self.separation.along(n));
             best > goal.far
         };
-        let (a, pose_a) = self.of_a;
-        let (b, pose_b) = self.of_b;
-        if self.hint.normal_a().is_some_and(|normal| meets(&pose_a.transform_direction(&normal))) {
-            return (best, None);
-        }
         let between = self.separation.between();
         let mut shapes = false;
         for (of_form, of_other, side) in [(self.of_b, self.of_a, 1.0), (self.of_a, self.of_b, -1.0)] {

@@ -55,6 +55,12 @@ impl Trace {
         Self { active, of_a: nowhere, of_b: nowhere, tangents: [[0.0; 3]; 2], response, drift: Drift::default() }
     }
 
+    /// Witnesses of A and of B, each in its body's frame, from the centre of its normalization on,
+    /// metres.
+    pub(in crate::measure) fn points(&self) -> [V3<f64>; 2] {
+        [self.of_a.point, self.of_b.point]
+    }
+
     /// Unit normal from B to A, in A's frame.
     pub(in crate::measure) fn normal_a(&self) -> Vector3<f64> {
         self.of_a.normal.into()

@@ -98,6 +98,12 @@ pub(in crate::measure) struct EdgeTrace {
 }
 
 impl EdgeTrace {
+    /// Witnesses of A and of B, each in its body's frame, from the centre of its normalization on,
+    /// metres.
+    pub(in crate::measure) fn points(&self) -> [V3<f64>; 2] {
+        [self.of_a.point, self.of_b.point]
+    }
+
     /// Unit normal from B to A, in A's frame.
     pub(in crate::measure) fn normal_a(&self) -> Vector3<f64> {
         self.n.into()
