@@ -1,5 +1,5 @@
 # Everything a fresh Debian or Ubuntu machine needs beyond Rust (rustup), make and a C compiler.
-.PHONY: help setup demo test check charts docs-numbers image acceptance endurance fuzz draws measures kills solvers
+.PHONY: help setup demo test check charts docs-numbers image acceptance endurance fuzz draws measures kills soak solvers
 
 help:
 	@echo 'make demo          fit two shapes, serve them, sweep one through the other, draw the curves'
@@ -8,12 +8,13 @@ help:
 	@echo 'make charts        measure beside other libraries, and draw: SUBLEVEL_DATA=DIR with the meshes'
 	@echo 'make docs-numbers  write the numbers of README.md and docs/ again from the CSV files in docs/'
 	@echo 'make image         build the container image of the server: BUILD= names another base image'
-	@echo 'make acceptance    what is too long for every change, all six of these: SUBLEVEL_DATA=DIR'
+	@echo 'make acceptance    what is too long for every change, all seven of these: SUBLEVEL_DATA=DIR'
 	@echo '  make endurance     1e8 checked queries; interrupted, it continues where it was (QUERIES=1e9 for more)'
 	@echo '  make fuzz          1e6 damaged inputs for each reader of files and calls (RUNS=10000000 for more)'
 	@echo '  make draws         1e5 draws of each family of the stability tests (DRAWS=1000 for fewer)'
 	@echo '  make measures      time every measure beside coal and parry, and fail where a target is missed'
 	@echo '  make kills         kill a server under load 1e3 times, with a ledger of its answers (KILLS=100 for fewer)'
+	@echo '  make soak          load a server for half an hour, and see its memory and descriptors (SOAK=60 for a minute)'
 	@echo '  make solvers       all tests of fits with each of the two solvers alone'
 	@echo 'make setup         install missing system packages (demo and test do this first)'
 
@@ -42,12 +43,13 @@ docs-numbers:
 image:
 	docker build -f deploy/container/Containerfile --target server $(if $(BUILD),--build-arg BUILD=$(BUILD)) -t sublevel .
 
-acceptance: endurance fuzz draws measures kills solvers
+acceptance: endurance fuzz draws measures kills soak solvers
 
 QUERIES ?= 1e8
 RUNS ?= 1000000
 DRAWS ?= 100000
 KILLS ?= 1000
+SOAK ?= 1800
 
 # Runs of different lengths keep states of their own.
 endurance: setup
@@ -67,6 +69,9 @@ measures:
 
 kills: setup
 	SUBLEVEL_LONG=$(KILLS) cargo test --release --test server kills:: -- --nocapture
+
+soak: setup
+	SUBLEVEL_LONG=$(SOAK) cargo test --release --test server soak:: -- --nocapture
 
 # Left out: the choice of the solver itself, and a sphere as a set of degree 4, which clarabel alone refuses.
 solvers: setup

@@ -20,6 +20,7 @@ mod operations_page;
 mod readme;
 mod refusals;
 mod robots;
+mod soak;
 mod streams;
 #[cfg(feature = "fit")]
 mod tutorial;

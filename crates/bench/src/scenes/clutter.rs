@@ -24,10 +24,8 @@ const STATES: usize = 500;
 /// Times of the same decisions.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Clutter {
-    /// States that are free for the finest rungs alone.
+    /// States that are free.
     pub(super) free: usize,
-    /// Of the others, those that are free for ladders: a coarser rung does not reach as far there.
-    pub(super) freed: usize,
     pub(super) finest_ms: f64,
     pub(super) ladder_ms: f64,
 }
@@ -44,13 +42,11 @@ pub(super) fn clutter(crew: &Crew) -> Result<Clutter, Box<dyn Error>> {
     let ladder = Geometry::Ladder(Arc::new(Ladder::new("object", rungs)?));
     let (finest_ms, of_finest) = decide(&finest, crew)?;
     let (ladder_ms, of_ladder) = decide(&ladder, crew)?;
-    let is_free = |verdict: &StateVerdict| *verdict == StateVerdict::Free;
-    if of_finest.iter().zip(&of_ladder).any(|(finest, ladder)| is_free(finest) && !is_free(ladder)) {
-        return Err("a state that is free for the finest rungs is not for ladders".into());
+    if of_finest != of_ladder {
+        return Err("ladders and their finest rungs decide differently".into());
     }
-    let free = of_finest.iter().filter(|verdict| is_free(verdict)).count();
-    let freed = of_ladder.iter().filter(|verdict| is_free(verdict)).count() - free;
-    Ok(Clutter { free, freed, finest_ms, ladder_ms })
+    let free = of_finest.iter().filter(|verdict| **verdict == StateVerdict::Free).count();
+    Ok(Clutter { free, finest_ms, ladder_ms })
 }
 
 fn decide(geometry: &Geometry, crew: &Crew) -> Result<(f64, Vec<StateVerdict>), Box<dyn Error>> {

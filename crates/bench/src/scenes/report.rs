@@ -52,8 +52,8 @@ impl Scenes {
         let (ages, clutter) = (&self.ages, &self.clutter);
         let _ = write!(
             text,
-            "\ncapacity_per_s,asked_per_s,sent_per_s,median_ms,p99_ms,fork_us,free,freed,finest_ms,ladder_ms\n\
-             {},{},{},{},{},{},{},{},{},{}\n",
+            "\ncapacity_per_s,asked_per_s,sent_per_s,median_ms,p99_ms,fork_us,free,finest_ms,ladder_ms\n\
+             {},{},{},{},{},{},{},{},{}\n",
             ages.capacity_per_s,
             ages.asked_per_s,
             ages.sent_per_s,
@@ -61,7 +61,6 @@ impl Scenes {
             ages.p99_ms,
             self.fork_us,
             clutter.free,
-            clutter.freed,
             clutter.finest_ms,
             clutter.ladder_ms
         );

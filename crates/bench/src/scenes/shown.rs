@@ -59,7 +59,6 @@ impl Shown {
         };
         let clutter = Clutter {
             free: row.get("free")?,
-            freed: row.get("freed")?,
             finest_ms: row.number("finest_ms")?,
             ladder_ms: row.number("ladder_ms")?,
         };
@@ -117,15 +116,15 @@ impl Shown {
 
     fn others(&self) -> String {
         let Ages { capacity_per_s, asked_per_s, sent_per_s, median_ms, p99_ms } = self.ages;
-        let Clutter { free, freed, finest_ms, ladder_ms } = self.clutter;
+        let Clutter { free, finest_ms, ladder_ms } = self.clutter;
         format!(
             "- Poses of 100 objects of 1 000 are streamed {sent_per_s:.0} times a second, beside four clients that ask what is near\n  \
              {asked_per_s:.0} times a second (alone they get {capacity_per_s:.0} answers). The poses that an answer is true of were sent\n  \
              {median_ms:.2} ms before it in the median, {p99_ms:.2} ms at the 99th percentile.\n\
              - A fork of a scene of 10 000 objects takes {:.2} µs.\n\
              - 500 states of 11 among 400 objects: {ladder_ms:.2} ms with ladders, {finest_ms:.2} ms with their bodies of degree 6 alone\n  \
-             ({:.1} times). {free} states are free for those bodies, and {freed} more for the ladders: where a coarser body does not\n  \
-             touch, the object inside does not either.\n",
+             ({:.1} times), with the same decisions; {free} states are free. The finest rung decides alone where it is one body, for its\n  \
+             table of heights is as fast as that of a coarser one.\n",
             self.fork_us,
             finest_ms / ladder_ms
         )
