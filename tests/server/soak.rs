@@ -9,12 +9,12 @@ use sublevel_testkit::random::draws;
 
 use crate::harness::Running;
 
-/// Calls a second of the mixed scenario: about half of what two cores answer that the client and
-/// the tests beside it use, too.
-const CALLS_PER_S: u64 = 400;
+/// Calls a second of the mixed scenario: about half of what two cores answer that the client
+/// uses, too.
+const CALLS_PER_S: u64 = 4000;
 
 /// Most memory that a server may gain after a third of the time, MiB: what the allocator keeps
-/// changes by some. A kilobyte a call that was never freed would be 23 MiB a minute.
+/// changes by some. A hundred bytes a call that were never freed would be 23 MiB a minute.
 const MOST_GAINED_MIB: i64 = 8;
 
 /// Memory in use, MiB, and open file descriptors.
