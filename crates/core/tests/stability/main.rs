@@ -14,6 +14,7 @@ mod depth;
 mod gradients;
 mod limits;
 mod motion;
+mod over_shapes;
 mod placement;
 mod recheck;
 mod scale;

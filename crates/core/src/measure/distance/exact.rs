@@ -3,13 +3,13 @@
 
 use super::answer::Distance;
 use super::balls::of_balls;
-use crate::body::{Body, ClosedForm, ExactShape};
+use crate::body::{Body, ClosedForm};
 use crate::measure::frames::pose::Pose;
 use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveConstraints;
 use crate::measure::solver::exact_shape::{
-    ExactContact, ExactLost, ExactProven, ExactQuery, ExactTrace, ShapeDistance, between_shapes, direction_to_world,
-    to_world,
+    ExactContact, ExactLost, ExactProven, ExactQuery, ExactTrace, ShapeDistance, active, between_shapes,
+    direction_to_world, to_world,
 };
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::status::Status;
@@ -191,24 +191,4 @@ pub(super) fn of_shapes(
     }
     let (active_a, active_b) = (active(form_a.shape(), of_a), active(form_b.shape(), of_b));
     Some(Ok(Distance { normal: Some(normal), active_a, active_b, ..answer }))
-}
-
-/// The constraints of a shape whose gradients span an outward unit normal of it, in its frame:
-/// those are `2 y_i / h_i²` on a face, `2 / r` on a wall.
-fn active(shape: &ExactShape, n: [f64; 3]) -> ActiveConstraints {
-    let mut active = ActiveConstraints::default();
-    let mut push = |index: u8, part: f64, half: f64| {
-        if part != 0.0 {
-            active.push(index.into(), 0.5 * part.abs() * half);
-        }
-    };
-    match *shape {
-        ExactShape::Cuboid { half_extents_m, faces } => (0..3).for_each(|i| push(faces[i], n[i], half_extents_m[i])),
-        ExactShape::Cylinder { radius_m, half_height_m, wall_and_caps: [wall, caps] } => {
-            push(wall, n[0].hypot(n[1]), radius_m);
-            push(caps, n[2], half_height_m);
-        }
-        ExactShape::Capsule { radius_m, .. } => push(0, 1.0, radius_m),
-    }
-    active
 }

@@ -1,6 +1,7 @@
 //! Level distance `d(A‖B) = min p_A(x)` over x in B, p the largest constraint.
 
 mod answer;
+mod over_shape;
 mod pair;
 mod saturated;
 mod search;

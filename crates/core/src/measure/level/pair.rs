@@ -1,6 +1,7 @@
 //! Level distance of two bodies: continuation first, then the general search.
 
 use super::answer::LevelDistance;
+use super::over_shape::OverShape;
 use super::saturated::saturated;
 use super::search::Search;
 use crate::body::Body;
@@ -39,6 +40,17 @@ pub(super) fn between(
             }
         }
         _ => {}
+    }
+    if runs(Stage::ClosedForm)
+        && let Some(over) = OverShape::new((a, pose_a), (b, pose_b))
+    {
+        match over.solve(&warm.hint, options, spent) {
+            Ok((answer, hint)) => {
+                *warm = hint;
+                return answer;
+            }
+            Err(rounds) => spent += rounds,
+        }
     }
     let pair = Pair::new(a, pose_a, b, pose_b);
     let followed = matches!(warm.hint, Hint::Level { .. }) || settled.is_some();

@@ -18,6 +18,35 @@ const WALL: u8 = 1;
 /// Above or below a cap.
 const CAP: u8 = 2;
 
+impl Cylinder {
+    /// The same from a point of the wall with this outward normal, along the wall. It bends towards
+    /// the gradient, which adds to the curvature around it.
+    #[inline(always)]
+    fn least_on_wall<S: Simd>(&self, _: S, y: V3<f64>, u: V3<f64>, gradient: V3<f64>, hessian: &[f64; 6]) -> V3<f64> {
+        let (r, h) = (self.radius, self.half_height);
+        let around = [-u[1], u[0], 0.0];
+        let outwards = dot::<S, f64>(gradient, u);
+        let bent = apply_symmetric::<S, f64>(hessian, around);
+        let (slope, stiff) = (dot::<S, f64>(gradient, around), dot::<S, f64>(bent, around) - outwards / r);
+        let (mut turn, mut rise) = (-slope / stiff, 0.0);
+        let on_cap = y[2].abs() >= h * ON && gradient[2] * y[2] < 0.0;
+        if !on_cap {
+            let (mixed, along) = (bent[2], hessian[5]);
+            let inverse = 1.0 / (stiff * along - mixed * mixed);
+            rise = (mixed * slope - stiff * gradient[2]) * inverse;
+            turn = (mixed * gradient[2] - along * slope) * inverse;
+            let to = y[2] + rise;
+            if to.abs() > h {
+                rise = h.copysign(to) - y[2];
+                turn = -(slope + mixed * rise) / stiff;
+            }
+        }
+        let v = add_scaled::<S, f64>(u, (turn / r).clamp(-1.0, 1.0), around);
+        let length = r / dot::<S, f64>(v, v).sqrt();
+        [v[0] * length, v[1] * length, (y[2] + rise).max(-h).min(h)]
+    }
+}
+
 impl Projectable for Cylinder {
     #[inline(always)]
     fn project<S: Simd>(&self, _: S, x: V3<f64>) -> V3<f64> {
@@ -109,35 +138,16 @@ impl Projectable for Cylinder {
         (normals, count)
     }
 
-    /// On the wall the surface bends towards the gradient, which adds to the curvature around it.
+    /// A point from which the quadratic's minimiser leads beyond the wall is moved there first.
     #[inline(always)]
     fn least<S: Simd>(&self, simd: S, y: V3<f64>, gradient: V3<f64>, hessian: &[f64; 6]) -> V3<f64> {
         let (r, h) = (self.radius, self.half_height);
         let rho = (y[0] * y[0] + y[1] * y[1]).sqrt();
         let u = if rho > 0.0 { [y[0] / rho, y[1] / rho, 0.0] } else { [1.0, 0.0, 0.0] };
-        let around = [-u[1], u[0], 0.0];
-        let outwards = dot::<S, f64>(gradient, u);
-        let on_wall = rho >= r * ON && outwards < 0.0;
-        let on_cap = y[2].abs() >= h * ON && gradient[2] * y[2] < 0.0;
-        if on_wall {
-            let bent = apply_symmetric::<S, f64>(hessian, around);
-            let (slope, stiff) = (dot::<S, f64>(gradient, around), dot::<S, f64>(bent, around) - outwards / r);
-            let (mut turn, mut rise) = (-slope / stiff, 0.0);
-            if !on_cap {
-                let (mixed, along) = (bent[2], hessian[5]);
-                let inverse = 1.0 / (stiff * along - mixed * mixed);
-                rise = (mixed * slope - stiff * gradient[2]) * inverse;
-                turn = (mixed * gradient[2] - along * slope) * inverse;
-                let to = y[2] + rise;
-                if to.abs() > h {
-                    rise = h.copysign(to) - y[2];
-                    turn = -(slope + mixed * rise) / stiff;
-                }
-            }
-            let v = add_scaled::<S, f64>(u, (turn / r).clamp(-1.0, 1.0), around);
-            let length = r / dot::<S, f64>(v, v).sqrt();
-            return [v[0] * length, v[1] * length, (y[2] + rise).max(-h).min(h)];
+        if rho >= r * ON && dot::<S, f64>(gradient, u) < 0.0 {
+            return self.least_on_wall(simd, y, u, gradient, hessian);
         }
+        let on_cap = y[2].abs() >= h * ON && gradient[2] * y[2] < 0.0;
         let [xx, xy, xz, yy, yz, zz] = *hessian;
         let step = if on_cap {
             let inverse = 1.0 / (xx * yy - xy * xy);
@@ -145,7 +155,14 @@ impl Projectable for Cylinder {
         } else {
             solve(simd, &[[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], scaled::<S, f64>(gradient, -1.0))
         };
-        self.project(simd, add::<S, f64>(y, step))
+        let to = add::<S, f64>(y, step);
+        if to[0] * to[0] + to[1] * to[1] > r * r {
+            let bent = add::<S, f64>(gradient, scaled::<S, f64>(apply_symmetric::<S, f64>(hessian, u), r - rho));
+            if dot::<S, f64>(bent, u) < 0.0 {
+                return self.least_on_wall(simd, [u[0] * r, u[1] * r, y[2]], u, bent, hessian);
+            }
+        }
+        self.project(simd, to)
     }
 
     #[inline(always)]

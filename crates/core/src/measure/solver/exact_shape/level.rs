@@ -91,17 +91,7 @@ impl<P: Projectable> WithSimd for LevelProblem<'_, P> {
                 continue;
             }
             (last, least) = (y, jet.value);
-            let hessian = side.hessian(simd, &jet);
-            let value = jet.value.max(1.0);
-            let power = if round > FROM_AFAR { 0.0 } else { POWER / value * (1.0 - 1.0 / value) };
-            let mut straight = hessian;
-            for (entry, (i, j)) in straight.iter_mut().zip([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]) {
-                *entry -= power * gradient[i] * gradient[j];
-            }
-            let mut next = set.least(simd, y, gradient, &straight);
-            if !(dot::<S, f64>(gradient, subtract::<S, f64>(next, y)) < 0.0) {
-                next = set.least(simd, y, gradient, &hessian);
-            }
+            let next = Descent { set, side }.next(simd, y, &jet, gradient, round);
             let step = subtract::<S, f64>(next, y);
             if dot::<S, f64>(step, step) <= SETTLED_MINIMUM * SETTLED_MINIMUM * set.reach() * set.reach() {
                 break;
@@ -109,6 +99,39 @@ impl<P: Projectable> WithSimd for LevelProblem<'_, P> {
             y = next;
         }
         (apart.unwrap_or(Level::Open), rounds)
+    }
+}
+
+/// Newton's method for the least value of a body's polynomial over a set.
+pub(super) struct Descent<'a, P> {
+    pub(super) set: P,
+    pub(super) side: &'a Side<'a, f64>,
+}
+
+impl<P: Projectable> Descent<'_, P> {
+    /// The next point of the set after y with this jet and gradient, in this round.
+    #[inline(always)]
+    pub(super) fn next<S: Simd>(
+        &self,
+        simd: S,
+        y: V3<f64>,
+        jet: &NumberJet<f64>,
+        gradient: V3<f64>,
+        round: u32,
+    ) -> V3<f64> {
+        let hessian = self.side.hessian(simd, jet);
+        let value = jet.value.max(1.0);
+        let power = if round > FROM_AFAR { 0.0 } else { POWER / value * (1.0 - 1.0 / value) };
+        let mut straight = hessian;
+        for (entry, (i, j)) in straight.iter_mut().zip([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]) {
+            *entry -= power * gradient[i] * gradient[j];
+        }
+        let next = self.set.least(simd, y, gradient, &straight);
+        if dot::<S, f64>(gradient, subtract::<S, f64>(next, y)) < 0.0 {
+            next
+        } else {
+            self.set.least(simd, y, gradient, &hessian)
+        }
     }
 }
 
@@ -145,15 +168,15 @@ impl<P: Projectable> LevelProblem<'_, P> {
 }
 
 /// Bounds of the errors at a point; lengths in metres.
-struct Errors {
+pub(super) struct Errors {
     /// Of the value.
-    value: f64,
+    pub(super) value: f64,
     /// Of the gradient, per metre.
-    gradient: f64,
+    pub(super) gradient: f64,
     /// Of the gradient, relative to it, by the rounding of the body's map.
-    turn: f64,
+    pub(super) turn: f64,
     /// Of the point, whose image is that of another as near as this.
-    displacement: f64,
+    pub(super) displacement: f64,
     /// Of the distance from any point of the body.
     span: f64,
 }
@@ -161,7 +184,7 @@ struct Errors {
 impl Errors {
     /// In the ball of the body's [`crate::body::Trust`].
     #[inline(always)]
-    fn near(side: &Side<'_, f64>) -> Self {
+    pub(super) fn near(side: &Side<'_, f64>) -> Self {
         let trust = side.body().trust();
         let constraint = &trust.constraints[side.active];
         let (value, gradient) = (constraint.value_error, constraint.gradient_error);
@@ -170,7 +193,7 @@ impl Errors {
 
     /// Anywhere else, by the normalized coordinates of the point.
     #[cold]
-    fn at(side: &Side<'_, f64>, z: V3<f64>) -> Self {
+    pub(super) fn at(side: &Side<'_, f64>, z: V3<f64>) -> Self {
         let (body, z) = (side.body(), Vector3::from(z));
         let (trust, polynomial) = (body.trust(), &body.constraints()[side.active].polynomial);
         let (none, farther) = (Vector3::zeros(), z.norm() / trust.radius * (1.0 + 1e-12));
@@ -182,5 +205,14 @@ impl Errors {
             displacement: side.displacement * farther,
             span: trust.span * farther,
         }
+    }
+
+    /// By how much the gradient changes within a distance in metres of normalized coordinates, per
+    /// metre.
+    #[cold]
+    pub(super) fn bend(&self, side: &Side<'_, f64>, z: V3<f64>, within: f64) -> f64 {
+        let (body, z) = (side.body(), Vector3::from(z));
+        let norm = body.trust().linear_norm;
+        1.8 * body.constraints()[side.active].polynomial.gradient_error(&z, &Vector3::repeat(norm * within)) * norm
     }
 }

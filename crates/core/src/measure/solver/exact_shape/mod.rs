@@ -5,6 +5,7 @@ mod cuboid;
 mod cylinder;
 mod distance;
 mod level;
+mod minimum;
 mod newton;
 mod placed;
 mod projectable;
@@ -14,5 +15,6 @@ mod shapes;
 mod start;
 
 pub(in crate::measure) use distance::{ExactLost, ExactProven, ExactTrace};
-pub(in crate::measure) use placed::{ExactContact, ExactQuery, direction_to_world, normals_towards, to_world};
+pub(in crate::measure) use minimum::{LevelMinimum, LevelQuery};
+pub(in crate::measure) use placed::{ExactContact, ExactQuery, active, direction_to_world, normals_towards, to_world};
 pub(in crate::measure) use shapes::{ShapeContact, ShapeDistance, between_shapes, contact_of_shapes};

@@ -10,6 +10,7 @@ use crate::body::{Body, ClosedForm, ExactShape};
 use crate::measure::frames::pose::{Pose, RELATIVE_QUATERNION_ERROR};
 use crate::measure::frames::vector::{V3, rows};
 use crate::measure::options::Options;
+use crate::measure::solver::active_constraints::ActiveConstraints;
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::solver::tangent_newton::{Relative, Side};
 use crate::polynomial::{Scalar, Simd, WithSimd, gamma};
@@ -193,4 +194,24 @@ fn normals<P: Projectable>(form: &ClosedForm, pose: &Pose, set: P, point: V3<f64
         *normal = direction_to_world(form, pose, *face);
     }
     (found, count + 1)
+}
+
+/// The constraints of a shape whose gradients span an outward unit normal of it, in its frame:
+/// those are `2 y_i / h_i²` on a face, `2 / r` on a wall.
+pub(in crate::measure) fn active(shape: &ExactShape, n: [f64; 3]) -> ActiveConstraints {
+    let mut active = ActiveConstraints::default();
+    let mut push = |index: u8, part: f64, half: f64| {
+        if part != 0.0 {
+            active.push(index.into(), 0.5 * part.abs() * half);
+        }
+    };
+    match *shape {
+        ExactShape::Cuboid { half_extents_m, faces } => (0..3).for_each(|i| push(faces[i], n[i], half_extents_m[i])),
+        ExactShape::Cylinder { radius_m, half_height_m, wall_and_caps: [wall, caps] } => {
+            push(wall, n[0].hypot(n[1]), radius_m);
+            push(caps, n[2], half_height_m);
+        }
+        ExactShape::Capsule { radius_m, .. } => push(0, 1.0, radius_m),
+    }
+    active
 }
