@@ -27,10 +27,17 @@ use crate::measure::solver::tangent_newton::{ALIGNED, Relative, Side, TAYLOR_ROU
 use crate::polynomial::{NumberJet, Simd, WithSimd};
 use nalgebra::Vector3;
 
-/// Most evaluations. Exercised by `smooth_bodies_over_shapes_are_settled_alone`.
+/// Most evaluations: 13 are the most that random pairs apart take.
+///
+/// Larger, pairs that are not settled start the general search later; smaller, more are left to it.
+/// Exercised by `smooth_bodies_over_shapes_are_settled_alone`.
 const MAX_ROUNDS: u32 = 16;
 
-/// Share of a length or a value that coordinates on a face may be off by: [`super::projectable::ON`].
+/// Largest share of a set's reach, dimensionless, that a point which counts as on a face is off it,
+/// for [`super::projectable::ON`], twice for rounding.
+///
+/// Smaller, the second bound would be too high by what is off; larger, it is lower than need be.
+/// `levels_over_shapes` compares both bounds with 200 bits.
 const OFF_FACE: f64 = 2e-12;
 
 /// A smooth body over one with a closed form; as vectorized work.
