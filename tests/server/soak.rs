@@ -48,10 +48,15 @@ fn memory_and_descriptors_do_not_grow_under_load() {
     }
     let report = load.wait_with_output().expect("its report");
     let report = String::from_utf8(report.stdout).expect("text");
-    let ((first_mib, first_open), (last_mib, last_open)) = (seen[0], seen[seen.len() - 1]);
-    let most = seen.iter().map(|(_, open)| *open).max().expect("it was seen");
-    println!("{seconds} s: {first_mib} to {last_mib} MiB, {first_open} to {last_open} descriptors, at most {most}");
+    // The most of either half of that time: at its beginning a slow client may still prepare.
+    let most = |of: &[(i64, usize)]| {
+        let (memory, open): (Vec<i64>, Vec<usize>) = of.iter().copied().unzip();
+        (memory.into_iter().max().expect("it was seen"), open.into_iter().max().expect("it was seen"))
+    };
+    let (early, late) = seen.split_at(seen.len() / 2);
+    let ((early_mib, early_open), (late_mib, late_open)) = (most(early), most(late));
+    println!("{seconds} s: {early_mib} to {late_mib} MiB, {early_open} to {late_open} descriptors");
     println!("{report}");
-    assert!(last_mib - first_mib <= MOST_GAINED_MIB, "{seen:?}");
-    assert!(last_open <= first_open + 1 && most <= first_open + 4, "{seen:?}");
+    assert!(late_mib - early_mib <= MOST_GAINED_MIB, "{seen:?}");
+    assert!(late_open <= early_open + 1, "{seen:?}");
 }
