@@ -1,5 +1,5 @@
-//! The least value of a smooth body's polynomial g over a set with a closed form, which is the level
-//! distance of the body over the set, inside a proven bracket.
+//! The least value of a smooth body's polynomial g over a set with a closed form, which is the
+//! level distance of the body over the set, inside a proven bracket.
 //!
 //! Newton's method ([`super::level::Descent`]) keeps to the set. At a point y of it split the
 //! gradient as `∇g = τ - ν`, ν a normal of the set at y, so that `ν·(x - y) <= 0` for its points x
