@@ -15,8 +15,8 @@ const ENTRIES: usize = 1 << 16;
 /// Entries that are allocated together.
 const BLOCK: usize = 64;
 
-/// Cells in which a pair may stand, side by side in one cache line. In one only, an eighth of the
-/// pairs of a scene of 10 000 objects would put each other out again and again.
+/// Cells in which a pair may stand. In one only, an eighth of the pairs of a scene of 10 000 objects
+/// would put each other out again and again.
 const WAYS: usize = 4;
 
 /// How often questions found a warm start, in all scenes of this process.
@@ -55,7 +55,7 @@ static USES: [Uses; 64] = [const { Uses { hits: AtomicU64::new(0), misses: Atomi
 #[derive(Debug)]
 pub(crate) struct PairCache {
     /// Where the entries of pairs are, by the hash of a pair; allocated when first used.
-    cells: OnceLock<Box<[Cell]>>,
+    sets: OnceLock<Box<[Set]>>,
     /// Entries that are given to a cell.
     used: AtomicU32,
     blocks: Box<[OnceLock<Block>]>,
@@ -63,8 +63,13 @@ pub(crate) struct PairCache {
     origin: Option<Arc<PairCache>>,
 }
 
-/// The position of an entry plus one in the lower half, 0 where there is none yet, and a part of the
-/// hash of the pair that stands there in the upper one. The entry says for sure.
+/// The cells of a pair, in one cache line.
+#[derive(Debug, Default)]
+#[repr(align(32))]
+struct Set([Cell; WAYS]);
+
+/// The position of an entry plus one in the lower half, 0 where there is none yet, and a part of
+/// the hash of the pair that stands there in the upper one. The entry says for sure.
 #[derive(Debug, Default)]
 struct Cell(AtomicU64);
 
@@ -122,7 +127,7 @@ impl PairCache {
     pub(crate) fn with_entries(entries: usize) -> Self {
         let blocks = entries.next_power_of_two().div_ceil(BLOCK);
         let blocks = (0..blocks).map(|_| OnceLock::new()).collect();
-        Self { cells: OnceLock::new(), used: AtomicU32::new(0), blocks, origin: None }
+        Self { sets: OnceLock::new(), used: AtomicU32::new(0), blocks, origin: None }
     }
 
     /// A table of so many entries whose new pairs start as they would in another one.
@@ -135,35 +140,44 @@ impl PairCache {
         self.origin.as_ref().is_some_and(|own| Arc::ptr_eq(own, origin))
     }
 
-    /// The cells in which a pair may stand, and its tag.
-    fn cells(&self, key: PairKey) -> (&[Cell], u64) {
-        let entries = self.blocks.len() * BLOCK;
-        let cells = self.cells.get_or_init(|| (0..entries).map(|_| Cell::default()).collect());
+    fn entries(&self) -> usize {
+        self.blocks.len() * BLOCK
+    }
+
+    /// Where among so many sets a pair may stand, and its tag.
+    fn place(key: PairKey, sets: &[Set]) -> (&[Cell], u64) {
         let hash = key.mixed();
-        let first = hash as usize % entries / WAYS * WAYS;
-        (&cells[first..first + WAYS], hash >> 32)
+        (&sets[hash as usize % sets.len()].0, hash >> 32)
     }
 
     /// The position of the entry of a pair, if it has one.
     fn position(cells: &[Cell], tag: u64) -> Option<usize> {
-        cells.iter().map(Cell::read).find(|(_, of)| *of == tag)?.0
+        cells.iter().find_map(|cell| {
+            let (position, of) = cell.read();
+            position.filter(|_| of == tag)
+        })
     }
 
     /// Gives a new pair an entry: the next one, or that of another pair.
     fn claim(&self, cells: &[Cell], tag: u64) -> Option<usize> {
-        if let Some(cell) = cells.iter().find(|cell| cell.read().0.is_none()) {
-            // Threads that claim one cell at once lose an entry, so cells may remain without.
-            let next = |used| (used < self.blocks.len() as u32 * BLOCK as u32).then_some(used + 1);
-            let position = self.used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, next).ok()? as usize;
+        let next = |used| ((used as usize) < self.entries()).then_some(used + 1);
+        if let Some(cell) = cells.iter().find(|cell| cell.read().0.is_none())
+            && let Ok(position) = self.used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, next)
+        {
+            let position = position as usize;
             let claimed = Cell::of(tag, position);
+            // Threads that claim one cell at once lose an entry.
             return cell
                 .0
                 .compare_exchange(0, claimed, Ordering::Relaxed, Ordering::Relaxed)
                 .is_ok()
                 .then_some(position);
         }
-        let cell = &cells[tag as usize % WAYS];
-        let position = cell.read().0?;
+        let from = tag as usize % WAYS;
+        let (cell, position) = (0..WAYS).find_map(|k| {
+            let cell = &cells[(from + k) % WAYS];
+            cell.read().0.map(|position| (cell, position))
+        })?;
         cell.0.store(Cell::of(tag, position), Ordering::Relaxed);
         Some(position)
     }
@@ -175,15 +189,17 @@ impl PairCache {
 
     /// The warm start of a pair, if it is known and not in use.
     fn copied(&self, key: PairKey) -> Option<WarmStart> {
-        let (cells, tag) = self.cells(key);
+        let (cells, tag) = Self::place(key, self.sets.get()?);
         let entry = self.entry(Self::position(cells, tag)?).try_lock().ok()?;
         (entry.key == key).then_some(entry.warm)
     }
 
     /// Lends the warm start of a pair; a cold one where it is not known or in use elsewhere.
     pub(crate) fn with<T>(&self, key: PairKey, solve: impl FnOnce(&mut WarmStart) -> T) -> T {
-        let (cells, tag) = self.cells(key);
+        let sets = self.sets.get_or_init(|| (0..self.entries() / WAYS).map(|_| Set::default()).collect());
+        let (cells, tag) = Self::place(key, sets);
         let Some(position) = Self::position(cells, tag).or_else(|| self.claim(cells, tag)) else {
+            USES[0].misses.fetch_add(1, Ordering::Relaxed);
             return solve(&mut WarmStart::default());
         };
         let uses = &USES[position % USES.len()];
@@ -241,7 +257,7 @@ mod tests {
     fn entries_are_given_in_order_and_few_pairs_put_others_out() {
         let cache = PairCache::with_entries(4096);
         let position = |a| {
-            let (cells, tag) = cache.cells(key(a));
+            let (cells, tag) = PairCache::place(key(a), cache.sets.get()?);
             let position = PairCache::position(cells, tag)?;
             (cache.entry(position).lock().expect("nobody panics").key == key(a)).then_some(position)
         };
@@ -249,7 +265,7 @@ mod tests {
         (0..512).for_each(|a| cache.with(key(a), |_| ()));
         let kept: Vec<usize> = (0..512).filter_map(position).collect();
         assert!(kept.is_sorted() && kept.len() > 505, "{}", kept.len());
-        // Twice as many as there are places: all of these are in use, by different pairs.
+        // Twice as many as there are places: nearly all of these are in use, by different pairs.
         (0..8192).for_each(|a| cache.with(key(a), |_| ()));
         let mut kept: Vec<usize> = (0..8192).filter_map(position).collect();
         let count = kept.len();
@@ -267,5 +283,12 @@ mod tests {
             threads.into_iter().map(|thread| thread.join().expect("nobody panics")).sum()
         });
         assert_eq!(answered, 80_000);
+        // No entry stands in two cells.
+        let cells = cache.sets.get().expect("used").iter().flat_map(|set| &set.0);
+        let mut positions: Vec<usize> = cells.filter_map(|cell| cell.read().0).collect();
+        let count = positions.len();
+        positions.sort_unstable();
+        positions.dedup();
+        assert!(positions.len() == count && count > 200, "{count}");
     }
 }

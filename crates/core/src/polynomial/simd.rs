@@ -1,8 +1,8 @@
 //! The arithmetic of the processor at hand, chosen when the program runs.
 //!
 //! Work is compiled by `pulp` for any processor, for AVX2 with fused multiply-add and, where it is
-//! lanes throughout ([`dispatch_lanes`]), for AVX-512. Everything it calls has to be inlined into it
-//! to profit. Results differ between the versions only within the rounding bounds,
+//! lanes throughout ([`dispatch_lanes`]), for AVX-512. Everything it calls has to be inlined into
+//! it to profit. Results differ between the versions only within the rounding bounds,
 //! which count the roundings of the plain one.
 
 use std::sync::{LazyLock, OnceLock};
@@ -31,14 +31,20 @@ static WIDEST: LazyLock<Arch> = LazyLock::new(|| {
     });
     match limit {
         None => Arch::new(),
-        Some(SimdLimit::Avx2) => match Arch::new() {
-            #[cfg(target_arch = "x86_64")]
-            Arch::V4(_) => pulp::x86::V3::try_new().map_or(Arch::Scalar, Arch::V3),
-            arch => arch,
-        },
+        Some(SimdLimit::Avx2) => at_most_avx2(),
         Some(SimdLimit::Baseline) => Arch::Scalar,
     }
 });
+
+#[cfg(target_arch = "x86_64")]
+fn at_most_avx2() -> Arch {
+    pulp::x86::V3::try_new().map_or(Arch::Scalar, Arch::V3)
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn at_most_avx2() -> Arch {
+    Arch::new()
+}
 
 /// Bounds the arithmetic of this process; without effect once anything was computed.
 pub fn limit_simd(limit: SimdLimit) {

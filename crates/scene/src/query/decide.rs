@@ -1,4 +1,5 @@
-//! Whether a pair is nearer than a threshold, by the rungs that prove it.
+//! Whether a pair is nearer than a threshold, by the finest rungs of ladders: the table of heights
+//! decides about a body of any degree as fast as about an ellipsoid.
 
 use std::sync::Arc;
 
@@ -105,49 +106,26 @@ fn solids(solver: &Solver<'_>, pair: &Pair<'_>, threshold: f64, options: Options
     else {
         return Bracket::of(Verdict::Undecided, f64::NEG_INFINITY, f64::INFINITY);
     };
-    let finest = [rungs_a.len() - 1, rungs_b.len() - 1];
-    let last = finest[0].max(finest[1]);
-    let mut found = Bracket::of(Verdict::Undecided, f64::NEG_INFINITY, f64::INFINITY);
-    for step in steps(last, is_single(rungs_a) && is_single(rungs_b)) {
-        let rungs = [step.min(finest[0]), step.min(finest[1])];
-        let (a, b) = (&*rungs_a[rungs[0]], &*rungs_b[rungs[1]]);
-        found = if threshold < 0.0 {
-            if step != last {
-                continue;
+    let (Some(a), Some(b)) = (rungs_a.last(), rungs_b.last()) else {
+        return Bracket::of(Verdict::Undecided, f64::NEG_INFINITY, f64::INFINITY);
+    };
+    let (a, b, rungs) = (&**a, &**b, [rungs_a.len() - 1, rungs_b.len() - 1]);
+    let found = if threshold < 0.0 {
+        let found = solver
+            .warm(pair.slots, rungs, Measure::Signed, |warm| signed_distance(a, pose_a, b, pose_b, &options, warm));
+        Bracket::of(compare::below(found.lower, found.upper, threshold), found.lower, found.upper)
+    } else {
+        let decision = solver.warm(pair.slots, rungs, Measure::Distance, |warm| {
+            if threshold == 0.0 {
+                return overlap(a, pose_a, b, pose_b, &options, warm);
             }
-            let found = solver
-                .warm(pair.slots, rungs, Measure::Signed, |warm| signed_distance(a, pose_a, b, pose_b, &options, warm));
-            Bracket::of(compare::below(found.lower, found.upper, threshold), found.lower, found.upper)
-        } else {
-            let decision = solver.warm(pair.slots, rungs, Measure::Distance, |warm| {
-                if threshold == 0.0 {
-                    return overlap(a, pose_a, b, pose_b, &options, warm);
-                }
-                // Only thresholds that are no lengths are refused.
-                nearer_than(a, pose_a, b, pose_b, threshold, &options, warm)
-                    .unwrap_or(Decision::Undecided { lower: 0.0, upper: f64::INFINITY })
-            });
-            Bracket::decided(decision, threshold)
-        };
-        found.rungs = rungs.map(|rung| u8::try_from(rung).unwrap_or(u8::MAX));
-        if found.verdict == Verdict::No {
-            break;
-        }
-    }
-    found
-}
-
-/// The steps up to the finest rungs that are asked, in their order. Each rung contains the object,
-/// so any may prove that it is apart. The table of heights decides about one body of any degree as
-/// fast as about an ellipsoid, and a coarser one would be asked in vain; before several parts the
-/// coarser rungs save most of the time.
-fn steps(last: usize, is_single: bool) -> impl Iterator<Item = usize> {
-    if is_single { last..=last } else { 0..=last }
-}
-
-/// Whether the finest rung is one body.
-fn is_single(rungs: &[Arc<Shape>]) -> bool {
-    rungs.last().is_none_or(|solid| solid.parts().len() == 1)
+            // Only thresholds that are no lengths are refused.
+            nearer_than(a, pose_a, b, pose_b, threshold, &options, warm)
+                .unwrap_or(Decision::Undecided { lower: 0.0, upper: f64::INFINITY })
+        });
+        Bracket::decided(decision, threshold)
+    };
+    Bracket { rungs: pair.finest_rungs(), ..found }
 }
 
 /// Compares the distance of a solid from a capsule with a threshold that is not negative; rungs in
@@ -159,25 +137,19 @@ fn solid_and_capsule(
     threshold: f64,
     (slots, options): (Option<PairSlots>, Options<'_>),
 ) -> Bracket {
-    let last = rungs.len() - 1;
-    let mut found = Bracket::of(Verdict::Undecided, f64::NEG_INFINITY, f64::INFINITY);
-    for rung in steps(last, is_single(rungs)) {
-        let solid = &*rungs[rung];
-        let decision = solver.warm(slots, [rung, 0], Measure::Signed, |warm| {
-            if threshold == 0.0 {
-                return overlap_with_capsule(solid, pose, capsule, capsule_pose, &options, warm);
-            }
-            // Only thresholds that are no lengths are refused.
-            nearer_to_capsule_than(solid, pose, capsule, capsule_pose, threshold, &options, warm)
-                .unwrap_or(Decision::Undecided { lower: 0.0, upper: f64::INFINITY })
-        });
-        found = Bracket::decided(decision, threshold);
-        found.rungs = [u8::try_from(rung).unwrap_or(u8::MAX), 0];
-        if found.verdict == Verdict::No {
-            break;
+    let Some((finest, coarser)) = rungs.split_last() else {
+        return Bracket::of(Verdict::Undecided, f64::NEG_INFINITY, f64::INFINITY);
+    };
+    let solid = &**finest;
+    let decision = solver.warm(slots, [coarser.len(), 0], Measure::Signed, |warm| {
+        if threshold == 0.0 {
+            return overlap_with_capsule(solid, pose, capsule, capsule_pose, &options, warm);
         }
-    }
-    found
+        // Only thresholds that are no lengths are refused.
+        nearer_to_capsule_than(solid, pose, capsule, capsule_pose, threshold, &options, warm)
+            .unwrap_or(Decision::Undecided { lower: 0.0, upper: f64::INFINITY })
+    });
+    Bracket { rungs: [u8::try_from(coarser.len()).unwrap_or(u8::MAX), 0], ..Bracket::decided(decision, threshold) }
 }
 
 /// Brackets against thresholds.

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use sublevel_core::body::{Body, Compound, Shape};
 use sublevel_core::measure::{
     HalfSpace, Options, Pose, Ray, RayCast, WarmStart, cast_ray, distance_to_half_space, signed_distance,
 };
@@ -11,8 +12,9 @@ use sublevel_scene::query::{
     AnswerStatus, Ask, Clearance, Measure, RayAnswer, Rays, Selection, StateVerdict, States, Within, closest_pair,
     combined,
 };
-use sublevel_scene::{Crew, Geometry, Scene, Slot, Stop, Update};
+use sublevel_scene::{Crew, Geometry, Ladder, Scene, Slot, Stop, Update};
 use sublevel_testkit::Seeded;
+use sublevel_testkit::random::at;
 
 use crate::worlds::{crowd, floor, lookup, placement};
 
@@ -358,6 +360,38 @@ fn a_stopped_question_ends_with_what_balls_say() {
         if let Some([lower, upper]) = signed(&scene, pair).filter(|_| !scene.is_allowed(pair[0], pair[1])) {
             assert!(answer.lower <= upper && lower <= answer.upper, "{answer:?}");
             assert_eq!(answer.status, sublevel_scene::query::AnswerStatus::Deadline);
+        }
+    }
+}
+
+/// A coarser rung need not contain a finer one: it may be apart where that touches, and the finest
+/// decides.
+#[test]
+fn the_finest_rung_of_a_ladder_decides() {
+    let points = [Vector3::new(0.05, 0.05, 0.05), Vector3::new(-0.05, 0.0, 0.0)];
+    let rung = |half: Vector3<f64>| {
+        let body = Body::ellipsoid("rung", Vector3::zeros(), half).expect("an ellipsoid");
+        Arc::new(Shape::Body(Box::new(body.with_points(&points).expect("contained"))))
+    };
+    let rungs = vec![rung(Vector3::new(0.5, 0.2, 0.2)), rung(Vector3::new(0.2, 0.3, 0.2))];
+    let ladder = Geometry::Ladder(Arc::new(Ladder::new("ladder", rungs).expect("a ladder")));
+    let ball: Geometry = Body::ball("ball", Vector3::zeros(), 0.1).expect("a ball").into();
+    let part = Body::ball("part", Vector3::new(0.0, 9.0, 0.0), 0.1).expect("a ball");
+    let first = Body::ball("first", Vector3::zeros(), 0.1).expect("a ball");
+    let two: Geometry = Compound::new("two", vec![first, part]).expect("a compound").into();
+    for other in [ball, two] {
+        // 0.05 m into the finest rung along y and as far from the coarser one; and along x.
+        for (x, y, expected) in [(0.0, 0.35, StateVerdict::Contact), (0.35, 0.0, StateVerdict::Free)] {
+            let upserts =
+                vec![placement("ladder", &ladder, at(0.0, 0.0, 0.0)), placement("other", &other, at(x, y, 0.0))];
+            let update = Update { upserts, ..Update::default() };
+            let scene = Scene::new("two", 0).expect("a name");
+            let scene = scene.updated(&update, lookup(&[ladder.clone(), other.clone()])).expect("placed");
+            let (slot, pose) = (scene.slot("other").expect("there"), at(x, y, 0.0));
+            let row = pose.translation().iter().chain(pose.rotation().coords.iter()).copied().collect();
+            let question = States::new(scene, &[slot], row, 0.0, false).expect("a state");
+            let answers = Crew::new(1).expect("threads").ask(Arc::new(question), Arc::default()).expect("answered");
+            assert_eq!(answers.concat()[0].verdict, expected, "{x} {y}");
         }
     }
 }

@@ -49,7 +49,7 @@ impl<'a> OverShape<'a> {
         let Self { of_a: (_, pose), of_b: (_, form_pose), form } = *self;
         let witness = to_world(form, form_pose, found.y);
         let gradient = direction_to_world(form, form_pose, found.gradient);
-        let of_form = active(form.shape(), found.gradient.map(|component| -component));
+        let of_form = active(form.shape(), found.held);
         let x_b: Vector3<f64> = form_pose.rotation().inverse_transform_vector(&(witness - form_pose.translation()));
         let active_b = of_form.iter().fold(0, |bits, (index, _)| bits | 1 << index);
         let answer = LevelDistance {

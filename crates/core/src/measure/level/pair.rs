@@ -51,6 +51,12 @@ pub(super) fn between(
             }
             Err(rounds) => spent += rounds,
         }
+        if runs(Stage::Saturation)
+            && let Some(answer) = saturated(a, pose_a, b, pose_b, options)
+        {
+            *warm = Hint::Saturated.into();
+            return LevelDistance { iterations: spent, ..answer };
+        }
     }
     let pair = Pair::new(a, pose_a, b, pose_b);
     let followed = matches!(warm.hint, Hint::Level { .. }) || settled.is_some();

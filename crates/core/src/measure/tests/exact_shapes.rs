@@ -243,9 +243,52 @@ fn smooth_bodies_over_shapes_are_settled_alone() {
             assert!((found.gradient_b.linear - truth.gradient_b.linear).norm() < 1e-5 * slope, "{label}");
             let steep = 1e-5 * (truth.multiplier + slope * b.circumscribed().radius);
             assert!((found.multiplier - truth.multiplier).abs() < steep, "{label}");
+            for (pose, one, other) in [(&pose_a, one, other), (pose, found.gradient_b, truth.gradient_b)] {
+                let arm = (found.witness - pose.translation()).norm() + a.circumscribed().radius;
+                assert!((one.angular - other.angular).norm() < 1e-5 * slope * arm, "{label}");
+            }
         }
     }
     let share = 50.0 * f64::from(solved) / count as f64;
     println!("smooth bodies over shapes: {share:.1} % solved alone");
     assert!(share > 94.0, "{share}");
+}
+
+/// As they stand on a table: turned about the vertical alone, centres at about one height, so that
+/// curvatures there are exactly 0.
+#[test]
+fn bricks_and_cans_on_a_table_are_settled_alone() {
+    let (mut solved, count) = (0, 480);
+    for seed in 0..count {
+        let mut random = Seeded(77_000 + seed);
+        let mut size = || 0.2 * 4_f64.powf(random.signed());
+        let half = Vector3::new(size(), size(), size());
+        let a = match seed % 4 {
+            0 => Body::ellipsoid("a", Vector3::zeros(), half).unwrap(),
+            degree => Body::superellipsoid("a", Vector3::zeros(), half, 2 + 2 * degree as u8).unwrap(),
+        };
+        let half = Vector3::new(size(), size(), size());
+        let b = if seed / 4 % 2 == 0 {
+            Body::cuboid("box", half).unwrap()
+        } else {
+            Body::cylinder("can", half.x, half.z).unwrap()
+        };
+        let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 3.0 * random.signed());
+        let far = (a.circumscribed().radius + b.circumscribed().radius) * 2_f64.powf(random.signed());
+        let height = if seed / 8 % 2 == 0 { 0.0 } else { 0.05 };
+        let direction = 3.0 * random.signed();
+        let place = Vector3::new(far * direction.cos(), far * direction.sin(), height);
+        let pose_b = Pose::from_quaternion(place, yaw.coords.into()).unwrap();
+        let ask = || {
+            let warm = &mut WarmStart::default();
+            level_distance(&a, &Pose::identity(), &b, &pose_b, &Options::default(), warm)
+        };
+        let (truth, found) = (except(&[Stage::ClosedForm], ask), only(&[Stage::ClosedForm], ask));
+        let label = format!("seed {seed}: {found:?} against {truth:?}");
+        assert!(found.lower <= truth.upper && truth.lower <= found.upper, "{label}");
+        solved += u32::from(found.status == Status::Converged);
+    }
+    let share = 100.0 * f64::from(solved) / count as f64;
+    println!("bricks and cans on a table: {share:.1} % solved alone");
+    assert!(share > 95.0, "{share}");
 }

@@ -13,6 +13,10 @@ pub(in crate::measure) struct Cuboid {
 /// Most coordinates of a quadratic's minimiser that are found one after the other to lie on faces.
 const ROUNDS: usize = 4;
 
+/// Least pivot that a vector is divided by: small enough that a step along what is flat but not
+/// level leaves every body, and large enough that its square is finite.
+const FLATTEST: f64 = 1e-100;
+
 impl Projectable for Cuboid {
     #[inline(always)]
     fn project<S: Simd>(&self, _: S, x: V3<f64>) -> V3<f64> {
@@ -152,15 +156,17 @@ impl Projectable for Cuboid {
 }
 
 /// `M⁻¹ v` of a symmetric matrix by its rows: by its factors `L D Lᵀ`, which lose no more than
-/// rounding where M is nearly singular along some directions.
+/// rounding where M is nearly singular along some directions. Pivots count by their amount, and at
+/// least [`FLATTEST`]: M is semidefinite up to rounding, and so the solution descends.
 #[inline(always)]
 pub(super) fn solve<S: Simd>(_: S, m: &[V3<f64>; 3], v: V3<f64>) -> V3<f64> {
-    let first = 1.0 / m[0][0];
+    let inverse = |pivot: f64| 1.0 / pivot.abs().max(FLATTEST);
+    let first = inverse(m[0][0]);
     let (l10, l20) = (m[1][0] * first, m[2][0] * first);
-    let second = 1.0 / (m[1][1] - l10 * m[1][0]);
+    let second = inverse(m[1][1] - l10 * m[1][0]);
     let below = m[2][1] - l20 * m[1][0];
     let l21 = below * second;
-    let third = 1.0 / (m[2][2] - l20 * m[2][0] - l21 * below);
+    let third = inverse(m[2][2] - l20 * m[2][0] - l21 * below);
     let y1 = v[1] - l10 * v[0];
     let z = (v[2] - l20 * v[0] - l21 * y1) * third;
     let y = y1 * second - l21 * z;

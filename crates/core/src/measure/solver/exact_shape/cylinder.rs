@@ -22,7 +22,14 @@ impl Cylinder {
     /// The same from a point of the wall with this outward normal, along the wall. It bends towards
     /// the gradient, which adds to the curvature around it.
     #[inline(always)]
-    fn least_on_wall<S: Simd>(&self, _: S, y: V3<f64>, u: V3<f64>, gradient: V3<f64>, hessian: &[f64; 6]) -> V3<f64> {
+    fn least_on_wall<S: Simd>(
+        &self,
+        simd: S,
+        y: V3<f64>,
+        u: V3<f64>,
+        gradient: V3<f64>,
+        hessian: &[f64; 6],
+    ) -> V3<f64> {
         let (r, h) = (self.radius, self.half_height);
         let around = [-u[1], u[0], 0.0];
         let outwards = dot::<S, f64>(gradient, u);
@@ -31,10 +38,9 @@ impl Cylinder {
         let (mut turn, mut rise) = (-slope / stiff, 0.0);
         let on_cap = y[2].abs() >= h * ON && gradient[2] * y[2] < 0.0;
         if !on_cap {
-            let (mixed, along) = (bent[2], hessian[5]);
-            let inverse = 1.0 / (stiff * along - mixed * mixed);
-            rise = (mixed * slope - stiff * gradient[2]) * inverse;
-            turn = (mixed * gradient[2] - along * slope) * inverse;
+            let mixed = bent[2];
+            let matrix = [[stiff, mixed, 0.0], [mixed, hessian[5], 0.0], [0.0; 3]];
+            [turn, rise, _] = solve(simd, &matrix, [-slope, -gradient[2], 0.0]);
             let to = y[2] + rise;
             if to.abs() > h {
                 rise = h.copysign(to) - y[2];
@@ -149,12 +155,9 @@ impl Projectable for Cylinder {
         }
         let on_cap = y[2].abs() >= h * ON && gradient[2] * y[2] < 0.0;
         let [xx, xy, xz, yy, yz, zz] = *hessian;
-        let step = if on_cap {
-            let inverse = 1.0 / (xx * yy - xy * xy);
-            [(xy * gradient[1] - yy * gradient[0]) * inverse, (xy * gradient[0] - xx * gradient[1]) * inverse, 0.0]
-        } else {
-            solve(simd, &[[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], scaled::<S, f64>(gradient, -1.0))
-        };
+        let matrix =
+            if on_cap { [[xx, xy, 0.0], [xy, yy, 0.0], [0.0; 3]] } else { [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]] };
+        let step = solve(simd, &matrix, scaled::<S, f64>(gradient, -1.0));
         let to = add::<S, f64>(y, step);
         if to[0] * to[0] + to[1] * to[1] > r * r {
             let bent = add::<S, f64>(gradient, scaled::<S, f64>(apply_symmetric::<S, f64>(hessian, u), r - rho));

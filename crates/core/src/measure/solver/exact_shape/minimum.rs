@@ -24,7 +24,7 @@ use crate::measure::frames::pose::Pose;
 use crate::measure::frames::vector::{V3, add, dot, scaled, subtract};
 use crate::measure::options::Options;
 use crate::measure::solver::tangent_newton::{ALIGNED, Relative, Side, TAYLOR_ROUNDING};
-use crate::polynomial::{NumberJet, Simd, WithSimd};
+use crate::polynomial::{NumberJet, Simd, WithSimd, gamma};
 use nalgebra::Vector3;
 
 /// Most evaluations: 13 are the most that random pairs apart take.
@@ -62,6 +62,8 @@ pub(in crate::measure) struct LevelMinimum {
     pub(in crate::measure) y: V3<f64>,
     /// Gradient of the polynomial there, 1/m.
     pub(in crate::measure) gradient: V3<f64>,
+    /// The part of its opposite that is a normal of the shape there, 1/m.
+    pub(in crate::measure) held: V3<f64>,
     /// Evaluations.
     pub(in crate::measure) rounds: u32,
 }
@@ -111,7 +113,9 @@ impl LevelQuery<'_> {
             let pull = scaled::<S, f64>(gradient, -1.0 / dot::<S, f64>(gradient, gradient).sqrt());
             let is_aligned = set.slide(simd, y, pull) <= ALIGNED;
             if upper - lower <= self.options.accuracy() * upper.abs().max(1.0) && is_aligned {
-                return Ok(LevelMinimum { lower, upper, y, gradient, rounds: round });
+                let normal = set.in_normal_cone(simd, set.feature_at(simd, y), pull);
+                let held = scaled::<S, f64>(normal, -dot::<S, f64>(normal, gradient));
+                return Ok(LevelMinimum { lower, upper, y, gradient, held, rounds: round });
             }
             if !(jet.value <= least) {
                 y = scaled::<S, f64>(add::<S, f64>(y, last), 0.5);
@@ -122,7 +126,7 @@ impl LevelQuery<'_> {
             // The set contains the minimiser of the polynomial, which is known of the body.
             let is_interior = set.feature_at(simd, y) == 0 && set.feature_at(simd, next) == 0;
             let step = subtract::<S, f64>(next, y);
-            if is_interior && round > 2 || step == [0.0; 3] {
+            if is_interior && round > 2 || !(dot::<S, f64>(step, step) > 0.0) {
                 return Err(round);
             }
             y = next;
@@ -143,7 +147,8 @@ impl LevelQuery<'_> {
         let constraint = &trust.constraints[side.active];
         let errors = if inside { Errors::near(side) } else { Errors::at(side, side.normalized(simd, y)) };
         let displacement = self.form.displacement_m();
-        let off = displacement + errors.displacement;
+        // Points of the set are off it by a rounding or two.
+        let off = displacement + errors.displacement + gamma(8) * set.reach();
         let length = dot::<S, f64>(gradient, gradient).sqrt();
         let gradient_error = errors.gradient + errors.turn * length;
 
@@ -154,7 +159,7 @@ impl LevelQuery<'_> {
             errors.bend(side, side.normalized(simd, y), off)
         };
         let rise = (length + gradient_error + bend) * off * (1.0 + TAYLOR_ROUNDING);
-        let upper = jet.value + errors.value + rise;
+        let upper = jet.value + errors.value + rise + TAYLOR_ROUNDING * jet.value.abs();
 
         let across = 2.0 * set.reach() + off;
         let beyond = -dot::<S, f64>(gradient, y) - set.height(simd, scaled::<S, f64>(gradient, -1.0));
