@@ -58,7 +58,8 @@ struct Extent {
     samples: usize,
 }
 
-const FULL: Extent = Extent { problems: usize::MAX, effort: Effort { rounds: 3, random: 143 }, turns: 5, samples: 1000 };
+const FULL: Extent =
+    Extent { problems: usize::MAX, effort: Effort { rounds: 3, random: 143 }, turns: 5, samples: 1000 };
 const QUICK: Extent = Extent { problems: 4, effort: Effort { rounds: 2, random: 20 }, turns: 1, samples: 100 };
 
 /// Measures states and motions of the arm of `data`, for its own problems or those of another file.
