@@ -73,10 +73,13 @@ kills: setup
 soak: setup
 	SUBLEVEL_LONG=$(SOAK) cargo test --release --test server soak:: -- --nocapture
 
-# Left out: the choice of the solver itself, and a sphere as a set of degree 4, which clarabel alone refuses.
+# Left out: the choice of the solver itself, and a sphere as a set of degree 4, which clarabel alone refuses. Tests in
+# other files of crates/fit/tests/ name their solver, or have programs that clarabel alone solves.
 solvers: setup
+	@[ -d '$(SUBLEVEL_DATA)' ] || { echo 'solvers: the meshes are missing; name their folder: SUBLEVEL_DATA=DIR make solvers' >&2; exit 1; }
 	for solver in clarabel structured; do \
-	    SUBLEVEL_TEST_SOLVER=$$solver cargo test --release -p sublevel-fit --lib -- --include-ignored \
+	    SUBLEVEL_TEST_SOLVER=$$solver cargo test --release -p sublevel-fit --lib --test meshes --test parts --test sweep \
+	        -- --include-ignored \
 	        --skip tests::both_solvers_are_tried_unless_one_is_asked_for \
 	        --skip tests::sos::bad_input_is_refused_by_field || exit 1; \
 	done

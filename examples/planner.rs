@@ -9,8 +9,7 @@
 use nalgebra::Vector3;
 use sublevel::client::{Client, Question, StatesQuestion};
 use sublevel::measure::Pose;
-use sublevel::scene::query::Measure;
-use sublevel::service::proto::Verdict;
+use sublevel::scene::query::{Measure, StateVerdict};
 
 #[tokio::main]
 async fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -36,7 +35,7 @@ pub async fn run(url: &str) -> Result<(), Box<dyn std::error::Error>> {
     let states: Vec<_> = (0..1000).flat_map(|step| fingers(0.9 - 0.0002 * f64::from(step))).collect();
     let question = StatesQuestion::new(["left", "right"]).with_states(&states).with_margin(0.005);
     let checked = client.check_states("cell", question).await?;
-    let free = checked.verdicts.iter().take_while(|&&verdict| verdict == Verdict::Free).count();
+    let free = checked.verdicts.iter().take_while(|&&verdict| verdict == StateVerdict::Free).count();
     println!("{free} states are free, then {:?} are nearer than 5 mm", checked.pairs[free]);
     // What is near at the last of them.
     let near = Question::within(0.2).with_poses([("left", states[2 * free - 2]), ("right", states[2 * free - 1])]);

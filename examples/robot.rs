@@ -11,9 +11,11 @@ use std::error::Error;
 use std::path::Path;
 
 use nalgebra::Vector3;
-use sublevel::client::{ClearanceQuestion, Client, MotionsQuestion, RobotFiles, RobotPlacement, StatesQuestion};
+use sublevel::client::{
+    CertificateQuestion, ClearanceQuestion, Client, ExplainQuestion, MotionsQuestion, RobotFiles, RobotPlacement,
+    StatesQuestion,
+};
 use sublevel::measure::Pose;
-use sublevel::service::proto::VerifyMotionRequest;
 
 /// From one side of a wall over it to the other, radians.
 pub const PATH: [[f64; 7]; 4] = [
@@ -76,10 +78,11 @@ async fn keep(client: &Client, scene: &str, path: &[[f64; 7]]) -> Result<(), Box
     let question = MotionsQuestion::of_robot("arm", []).with_path(path.iter().map(|state| &state[..]));
     let checked = client.check_motions(scene, question.with_certificates()).await?;
     if let Some(certificate) = checked.motions[0].certificate.clone() {
-        let (scene, robot) = (scene.to_owned(), "arm".to_owned());
-        let request = VerifyMotionRequest { certificate, scene, robot, ..Default::default() };
-        let verified = client.verify_motion(request).await?;
-        println!("the certificate holds: {}, with {:.4} m to spare", verified.holds, verified.clearance_lower_m);
+        let question = CertificateQuestion::new(certificate).of_robot(scene, "arm");
+        match client.verify_motion(question).await?.proof {
+            Ok(proven) => println!("the certificate holds, with {:.4} m to spare", proven.clearance_lower_m),
+            Err(reason) => println!("the certificate does not hold: {reason}"),
+        }
     }
     Ok(())
 }
@@ -94,9 +97,9 @@ async fn explain(client: &Client, scene: &str, path: &[[f64; 7]]) -> Result<(), 
     println!("straight on: {:?}, free up to {:.4} of the way", straight.verdict, straight.alpha);
 
     let halfway: Vec<f64> = start.iter().zip(goal).map(|(start, goal)| 0.5 * (start + goal)).collect();
-    let found = client.explain(scene, "arm", [], &halfway, 0.0).await?;
-    for pair in found.pairs.iter().filter(|pair| pair.in_contact) {
-        println!("halfway {} and {} overlap by {:.1} mm", pair.a, pair.b, -1e3 * pair.upper_m);
+    let found = client.explain(scene, ExplainQuestion::of_robot("arm", []).with_joint_values(&halfway)).await?;
+    for pair in found.pairs.iter().filter(|pair| pair.is_contact) {
+        println!("halfway {} and {} overlap by {:.1} mm", pair.pair[0], pair.pair[1], -1e3 * pair.upper_m);
     }
     Ok(())
 }

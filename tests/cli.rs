@@ -751,7 +751,8 @@ fn hierarchy_brackets_sets_that_need_not_be_convex() {
     let octic = Body::superellipsoid("octic", Vector3::zeros(), Vector3::repeat(1.0), 8).unwrap();
     std::fs::write(path("octic.json"), octic.to_json()).unwrap();
     let octic = path("octic.json");
-    let refused = refusal(&["hierarchy", text(&octic), text(&octic), "--level", "2"]);
+    let turned = "3,0,0,0.2,0.4,0.4,0.8";
+    let refused = refusal(&["hierarchy", text(&octic), text(&octic), "--pose", turned, "--level", "2"]);
     assert!(refused.contains("octic.json") && refused.contains("10820 entries"), "{refused}");
     assert!(refusal(&["hierarchy", ball, ball, "--pose", "1,2"]).contains("2 numbers"));
 }

@@ -9,7 +9,6 @@ use crate::body::Obstacle;
 use crate::client::{Client, JobProgress};
 use crate::jobs::solve;
 use crate::measure::Pose;
-use crate::service::proto::HierarchyProgress;
 use crate::store::{HierarchyMeasure, HierarchyOutcome, HierarchyRequest, HierarchySet};
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -137,14 +136,14 @@ impl Solver {
                 ControlFlow::Continue(())
             })?),
             Self::There(runtime, client) => {
-                let tell = |job: &JobProgress<HierarchyProgress>| bar.set_message(describe(number, job));
+                let tell = |job: &JobProgress| bar.set_message(describe(number, job));
                 Ok(runtime.block_on(client.solve_hierarchy(request, tell, interrupted()))?)
             }
         }
     }
 }
 
-fn describe(number: usize, JobProgress { id, progress }: &JobProgress<HierarchyProgress>) -> String {
+fn describe(number: usize, JobProgress { id, progress }: &JobProgress) -> String {
     match progress {
         None => format!("pose {number}, job {id} waits for its turn"),
         Some(progress) => format!("pose {number}, job {id}, step {}", progress.iterations),

@@ -8,7 +8,7 @@ use super::files::write_atomically;
 use super::numbers::{Numbers, PoseNumbers};
 use super::scene_picture::{RobotState, picture};
 use crate::body::BodyId;
-use crate::client::{Client, ClientOptions, RobotPlacement, SceneState, SceneSummary};
+use crate::client::{Client, ClientOptions, ListedScene, RobotPlacement, SceneState};
 use crate::measure::Pose;
 use crate::scene::{NamedJointValues, Placement, RobotId, Subject, Update};
 
@@ -183,14 +183,15 @@ fn objects(a: &str, b: &str) -> (Subject, Subject) {
     (Subject::Object(a.into()), Subject::Object(b.into()))
 }
 
-fn list(scenes: &[SceneSummary], json: bool) -> Result<String, serde_json::Error> {
+fn list(scenes: &[ListedScene], json: bool) -> Result<String, serde_json::Error> {
+    let parent = |scene: &ListedScene| scene.parent.as_ref().map(|(name, _)| name.clone()).unwrap_or_default();
     if json {
         let rows: Vec<_> = scenes
             .iter()
             .map(|scene| {
                 serde_json::json!({
-                    "name": scene.name, "revision": scene.revision, "objects": scene.object_count,
-                    "parent": scene.parent,
+                    "name": scene.name, "revision": scene.revision, "objects": scene.objects,
+                    "parent": parent(scene),
                 })
             })
             .collect();
@@ -198,8 +199,9 @@ fn list(scenes: &[SceneSummary], json: bool) -> Result<String, serde_json::Error
     }
     let width = scenes.iter().map(|scene| scene.name.chars().count()).max().unwrap_or(0).max(5);
     let mut text = format!("{:width$}  objects  revision  fork of\n", "scene");
-    for SceneSummary { name, revision, object_count, parent, .. } in scenes {
-        text += format!("{name:width$}  {object_count:>7}  {revision:>8}  {parent}").trim_end();
+    for scene in scenes {
+        let ListedScene { name, revision, objects, .. } = scene;
+        text += format!("{name:width$}  {objects:>7}  {revision:>8}  {}", parent(scene)).trim_end();
         text.push('\n');
     }
     Ok(text)

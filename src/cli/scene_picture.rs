@@ -14,7 +14,6 @@ use crate::draw::{Ink, Outline, Panel, Silhouettes, Span, View, shadow, silhouet
 use crate::measure::Pose;
 use crate::scene::query::Measure;
 use crate::scene::{Geometry, NamedJointValues, Placement};
-use crate::service::proto;
 
 /// Directions in which the outline of a body is looked for.
 const DIRECTIONS: usize = 180;
@@ -133,11 +132,9 @@ async fn nearest(
     for pairs in pairs.chunks(PAIRS) {
         let answers = client.evaluate(scene, Question::pairs(pairs.iter().copied()), &[Measure::Signed]).await?;
         for row in answers.rows {
-            let point = |point: Option<proto::Vector3>| point.map(|p| Vector3::new(p.x, p.y, p.z));
-            let points = point(row.answer.witness_a_m).zip(point(row.answer.witness_b_m));
-            let (Some(distance_m), Some((a, b))) = (row.value, points) else { continue };
+            let (Some(distance_m), Some(points)) = (row.value, row.answer.witnesses) else { continue };
             if nearest.as_ref().is_none_or(|nearest| distance_m < nearest.distance_m) {
-                nearest = Some(Nearest { names: [row.a, row.b], distance_m, points: [a, b] });
+                nearest = Some(Nearest { names: [row.a, row.b], distance_m, points });
             }
         }
     }

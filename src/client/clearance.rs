@@ -1,4 +1,4 @@
-//! Pairs within an influence distance, state by state, with gradients.
+//! Pairs within an influence distance, state by state, with gradients and nearest points.
 
 use nalgebra::Vector3;
 
@@ -7,7 +7,9 @@ use super::connection::Client;
 use super::error::ClientError;
 use super::states::PlacedStates;
 use crate::measure::{Pose, Twist};
-use crate::service::proto::{ClearanceRequest, ClearanceResponse, SolveStatus};
+use crate::scene::query::AnswerStatus;
+use crate::service::answer_wire;
+use crate::service::proto::{ClearanceRequest, ClearanceResponse};
 
 /// Many states of some objects, or of a robot, and up to which distance pairs are of interest.
 #[derive(Clone, Debug, Default)]
@@ -73,6 +75,13 @@ impl ClearanceQuestion {
         self
     }
 
+    /// With the points of both objects that attain the distances, 48 bytes a pair more.
+    #[must_use]
+    pub fn with_witnesses(mut self) -> Self {
+        self.request.with_witnesses = true;
+        self
+    }
+
     fn asked(self, scene: &str) -> ClearanceRequest {
         let PlacedStates { objects, robot, joints, poses, joint_values } = self.placed;
         let (poses, joint_values) = (poses.into_bytes(), joint_values.into_bytes());
@@ -91,7 +100,7 @@ pub struct NearPair {
     /// An object that the states place, then the other one.
     pub pair: [String; 2],
     /// How the answer came about. The bracket is true whatever it is.
-    pub status: SolveStatus,
+    pub status: AnswerStatus,
     /// The signed distance is at least this, metres.
     pub lower_m: f64,
     /// The signed distance is at most this, metres.
@@ -100,6 +109,10 @@ pub struct NearPair {
     pub padding_m: f64,
     /// Unit vector from the second to the first object, world frame.
     pub normal: Option<Vector3<f64>>,
+    /// Points of the first and of the second object that attain the distance, metres, world frame:
+    /// each nearest to the other object, or deepest in it where the two overlap. They are points of
+    /// the bodies, which padding does not move. None unless asked for, and where none were computed.
+    pub witnesses_m: Option<[Vector3<f64>; 2]>,
     /// Derivatives of the signed distance with respect to the twists of the two.
     pub gradients: Option<[Twist; 2]>,
     /// Of states of a robot: derivatives of the signed distance with respect to the values of the
@@ -161,18 +174,23 @@ impl Client {
 /// The rows of all states.
 fn read(response: &ClearanceResponse) -> Result<Vec<StateClearance>, ClientError> {
     let rows = response.status.len();
-    of_rows(&response.pairs, rows, 8)?;
-    of_rows(&response.lower_m, rows, 8)?;
-    of_rows(&response.upper_m, rows, 8)?;
+    of_rows("pairs", &response.pairs, rows, 8)?;
+    of_rows("lower_m", &response.lower_m, rows, 8)?;
+    of_rows("upper_m", &response.upper_m, rows, 8)?;
     let width = response.joint_gradients.len() / 8 / rows.max(1);
-    of_rows(&response.joint_gradients, rows, 8 * width)?;
+    of_rows("joint_gradients", &response.joint_gradients, rows, 8 * width)?;
+    for (field, column) in [("witness_a_m", &response.witness_a_m), ("witness_b_m", &response.witness_b_m)] {
+        if !column.is_empty() {
+            of_rows(field, column, rows, 24)?;
+        }
+    }
     let mut near = Vec::with_capacity(rows);
     for (row, pair) in index_pairs(&response.pairs).enumerate() {
-        near.push(near_pair(response, row, pair, width).ok_or(ClientError::Unexpected("a pair without names"))?);
+        near.push(near_pair(response, row, pair, width)?);
     }
     let (mut near, mut states) = (near.into_iter(), Vec::with_capacity(response.checked.len()));
     let offsets: Vec<u32> = indices(&response.offsets).collect();
-    of_rows(&response.offsets, response.checked.len() + 1, 4)?;
+    of_rows("offsets", &response.offsets, response.checked.len() + 1, 4)?;
     for (bounds, &checked) in offsets.windows(2).zip(&response.checked[..]) {
         let count = bounds[1].checked_sub(bounds[0]).ok_or(ClientError::Unexpected("rows in no order"))?;
         states.push(StateClearance { near: near.by_ref().take(count as usize).collect(), checked: checked == 1 });
@@ -181,18 +199,29 @@ fn read(response: &ClearanceResponse) -> Result<Vec<StateClearance>, ClientError
     if said != Some(rows) { Err(ClientError::Unexpected("rows of no state")) } else { Ok(states) }
 }
 
-fn near_pair(response: &ClearanceResponse, row: usize, [a, b]: [u32; 2], width: usize) -> Option<NearPair> {
+fn near_pair(
+    response: &ClearanceResponse,
+    row: usize,
+    [a, b]: [u32; 2],
+    width: usize,
+) -> Result<NearPair, ClientError> {
     let gradient: Vec<f64> =
         (row * width..(row + 1) * width).map(|entry| number(&response.joint_gradients, entry)).collect();
     let known = width > 0 && !gradient.iter().any(|value| value.is_nan());
     let flag = |bit: u8| response.flags.get(row).is_some_and(|flags| flags & bit != 0);
-    Some(NearPair {
-        pair: [name(&response.objects, a)?, name(&response.objects, b)?],
-        status: SolveStatus::try_from(i32::from(response.status[row])).unwrap_or_default(),
+    let named = |index| {
+        name(&response.objects, index)
+            .ok_or_else(|| ClientError::unreadable(format!("pairs[{row}]"), "names an object that is not listed"))
+    };
+    let points = [&response.witness_a_m, &response.witness_b_m].map(|column| vector(column, row));
+    Ok(NearPair {
+        pair: [named(a)?, named(b)?],
+        status: answer_wire::status(response.status[row].into(), || format!("status[{row}]"))?,
         lower_m: number(&response.lower_m, row),
         upper_m: number(&response.upper_m, row),
         padding_m: number(&response.padding_m, row),
         normal: vector(&response.normal, row),
+        witnesses_m: points[0].zip(points[1]).map(|(a, b)| [a, b]),
         gradients: twist(&response.gradient_a, row).zip(twist(&response.gradient_b, row)).map(|(a, b)| [a, b]),
         joint_gradient: known.then_some(gradient),
         not_unique: flag(1),

@@ -38,9 +38,18 @@ pub(super) fn name(table: &[String], index: u32) -> Option<String> {
 }
 
 /// Refuses a column that has not `width` bytes for each of the rows.
-pub(super) fn of_rows(column: &[u8], rows: usize, width: usize) -> Result<(), ClientError> {
+pub(super) fn of_rows(field: &str, column: &[u8], rows: usize, width: usize) -> Result<(), ClientError> {
     if column.len() == rows * width {
         return Ok(());
     }
-    Err(ClientError::Unexpected("a column with another number of rows"))
+    Err(ClientError::unreadable(field, format!("has {} bytes for {rows} rows of {width}", column.len())))
+}
+
+/// All numbers of a column.
+pub(super) fn numbers(field: &str, column: &[u8]) -> Result<Vec<f64>, ClientError> {
+    let (numbers, rest) = column.as_chunks::<8>();
+    if rest.is_empty() {
+        return Ok(numbers.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect());
+    }
+    Err(ClientError::unreadable(field, format!("has {} bytes; a number has 8", column.len())))
 }

@@ -5,9 +5,9 @@ use std::future::Future;
 use super::connection::Client;
 use super::jobs::{JobProgress, SubmitError};
 use crate::service::derive_wire;
+use crate::service::proto::Job;
 use crate::service::proto::job::Task;
 use crate::service::proto::robot_service_client::RobotServiceClient;
-use crate::service::proto::{AllowedPairsProgress, Job};
 use crate::store::{DeriveOutcome, DeriveRequest};
 
 impl Client {
@@ -19,17 +19,13 @@ impl Client {
     pub async fn derive_allowed_pairs(
         &self,
         asked: &DeriveRequest,
-        mut tell: impl FnMut(&JobProgress<AllowedPairsProgress>),
+        mut tell: impl FnMut(&JobProgress),
         cancel: impl Future<Output = ()>,
     ) -> Result<DeriveOutcome, SubmitError> {
         tokio::pin!(cancel);
         let created = RobotServiceClient::new(self.channel()).derive_allowed_pairs(derive_wire::message(asked)).await;
         let id = created.map_err(|status| self.not_queued(status))?.into_inner().job_id;
-        let progress = |job: &Job| match &job.task {
-            Some(Task::AllowedPairs(task)) => task.progress,
-            _ => None,
-        };
-        let tell = |job: &Job| tell(&JobProgress { id: id.clone(), progress: progress(job) });
+        let tell = |job: &Job| tell(&JobProgress::of(&id, job));
         let job = self.follow(&id, tell, cancel).await?;
         match job.task {
             Some(Task::AllowedPairs(task)) => task.result.as_ref().and_then(derive_wire::outcome),

@@ -3,6 +3,8 @@
 use tonic::{Code, Status};
 use tonic_types::StatusExt;
 
+use crate::service::error::Invalid;
+
 /// Why a call has no answer.
 #[derive(Debug, thiserror::Error)]
 pub enum ClientError {
@@ -43,9 +45,29 @@ pub enum ClientError {
     /// The server answered something else.
     #[error("the server answered what this program does not understand: {0}; are the versions the same?")]
     Unexpected(&'static str),
+    /// A field of the answer that is none of what it can be.
+    #[error("the server answered what this program does not understand: {field} {why}; are the versions the same?")]
+    Unreadable {
+        /// Path in the answer, such as `verdicts[3]`.
+        field: String,
+        /// What it is.
+        why: String,
+    },
+}
+
+impl From<Invalid> for ClientError {
+    /// What the reader of a message refuses. What it advises after a semicolon is for the sender.
+    fn from(Invalid { field, why }: Invalid) -> Self {
+        Self::unreadable(field, why.split("; ").next().unwrap_or_default())
+    }
 }
 
 impl ClientError {
+    /// A field of an answer that cannot be read.
+    pub(super) fn unreadable(field: impl Into<String>, why: impl Into<String>) -> Self {
+        Self::Unreadable { field: field.into(), why: why.into() }
+    }
+
     pub(super) fn of(url: &str, status: Status) -> Self {
         match status.code() {
             // What tonic makes of its own timeout; the server cancels nothing.
@@ -70,9 +92,11 @@ impl ClientError {
         }
     }
 
-    /// Path of the field that is to blame.
+    /// Path of the field that is to blame: of the request that was refused, or of the answer that
+    /// cannot be read.
     pub fn field(&self) -> Option<String> {
         match self {
+            Self::Unreadable { field, .. } => Some(field.clone()),
             Self::Refused(status) => {
                 let details = status.get_error_details();
                 let violation = details.bad_request().and_then(|bad| bad.field_violations.first());

@@ -16,7 +16,7 @@ use crate::service::proto::create_fit_request::Source;
 use crate::service::proto::fit_points::{Coordinates, Corners};
 use crate::service::proto::fit_service_client::FitServiceClient;
 use crate::service::proto::job::Task;
-use crate::service::proto::{FitPoints, FitProgress, Job};
+use crate::service::proto::{FitPoints, Job};
 use crate::store::FitRequest;
 
 /// What does not fit in one message with what is around it.
@@ -33,7 +33,7 @@ impl Client {
         &self,
         asked: &FitRequest,
         (points, triangles): (&[Vector3<f64>], &[[usize; 3]]),
-        mut tell: impl FnMut(&JobProgress<FitProgress>),
+        mut tell: impl FnMut(&JobProgress),
         cancel: impl Future<Output = ()>,
     ) -> Result<FitOutput, SubmitError> {
         tokio::pin!(cancel);
@@ -48,11 +48,7 @@ impl Client {
             () = &mut cancel => return Err(SubmitError::Cancelled),
         };
         let id = created.map_err(|status| self.not_queued(status))?.into_inner().job_id;
-        let progress = |job: &Job| match &job.task {
-            Some(Task::Fit(fit)) => fit.progress,
-            _ => None,
-        };
-        let tell = |job: &Job| tell(&JobProgress { id: id.clone(), progress: progress(job) });
+        let tell = |job: &Job| tell(&JobProgress::of(&id, job));
         let job = self.follow(&id, tell, cancel).await?;
         self.fetch(asked, job).await
     }

@@ -5,9 +5,9 @@ use std::future::Future;
 use super::connection::Client;
 use super::jobs::{JobProgress, SubmitError};
 use crate::service::hierarchy::wire;
+use crate::service::proto::Job;
 use crate::service::proto::hierarchy_service_client::HierarchyServiceClient;
 use crate::service::proto::job::Task;
-use crate::service::proto::{HierarchyProgress, Job};
 use crate::store::{HierarchyOutcome, HierarchyRequest};
 
 impl Client {
@@ -19,17 +19,13 @@ impl Client {
     pub async fn solve_hierarchy(
         &self,
         asked: &HierarchyRequest,
-        mut tell: impl FnMut(&JobProgress<HierarchyProgress>),
+        mut tell: impl FnMut(&JobProgress),
         cancel: impl Future<Output = ()>,
     ) -> Result<HierarchyOutcome, SubmitError> {
         tokio::pin!(cancel);
         let created = HierarchyServiceClient::new(self.channel()).create_hierarchy_solve(wire::message(asked)).await;
         let id = created.map_err(|status| self.not_queued(status))?.into_inner().job_id;
-        let progress = |job: &Job| match &job.task {
-            Some(Task::Hierarchy(solve)) => solve.progress,
-            _ => None,
-        };
-        let tell = |job: &Job| tell(&JobProgress { id: id.clone(), progress: progress(job) });
+        let tell = |job: &Job| tell(&JobProgress::of(&id, job));
         let job = self.follow(&id, tell, cancel).await?;
         match job.task {
             Some(Task::Hierarchy(solve)) => solve.result.as_ref().map(wire::outcome),

@@ -6,16 +6,24 @@ use tonic::{Code, Status};
 
 use super::connection::Client;
 use super::error::ClientError;
+use crate::jobs::Progress;
+use crate::service::job_wire;
 use crate::service::proto::job_service_client::JobServiceClient;
 use crate::service::proto::{CancelJobRequest, Job, JobState, WatchJobRequest};
 
 /// How far a job is.
 #[derive(Clone, Debug)]
-pub struct JobProgress<P> {
+pub struct JobProgress {
     /// Id of the job.
     pub id: String,
     /// What it is doing; none while it waits.
-    pub progress: Option<P>,
+    pub progress: Option<Progress>,
+}
+
+impl JobProgress {
+    pub(super) fn of(id: &str, job: &Job) -> Self {
+        Self { id: id.into(), progress: job_wire::progress(job) }
+    }
 }
 
 /// Why a job of a server made nothing.

@@ -20,6 +20,7 @@
 
 mod backup;
 mod bodies;
+mod certificates;
 mod clearance;
 mod columns;
 mod connection;
@@ -42,17 +43,18 @@ mod robots;
 mod scenes;
 mod states;
 
-pub use crate::service::proto::{RobotGroup, RobotSummary, SceneSummary};
 pub use bodies::{BodySource, StoredBody};
+pub use certificates::{CertificateQuestion, CheckedCertificate, ProvenMotion};
 pub use clearance::{ClearanceQuestion, Clearances, NearPair, StateClearance};
 pub use connection::{Client, ClientOptions, Connection, Credentials, ServerInfo, endpoint};
 pub use error::ClientError;
+pub use explain::{ExplainQuestion, ExplainedPair, ExplainedState};
 #[cfg(feature = "fit")]
 pub use jobs::{JobProgress, SubmitError};
 pub use motions::{CheckedMotion, CheckedMotions, MotionsQuestion};
 pub use pose_stream::{PoseStream, StreamedPoses};
 pub use queries::{Answers, PairRow, Question};
 pub use robot_files::{RobotFiles, RobotFilesError};
-pub use robots::{RobotPlacement, StoredLink, StoredRobot};
-pub use scenes::SceneState;
+pub use robots::{ListedRobot, RobotPlacement, StoredGroup, StoredLink, StoredRobot};
+pub use scenes::{ListedScene, SceneState};
 pub use states::{CheckedStates, StatesQuestion};

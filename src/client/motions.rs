@@ -1,10 +1,13 @@
-//! Motions of robots, and their certificates.
+//! Motions of robots: whole paths.
 
 use super::columns::{index_pairs, name, number};
 use super::connection::Client;
 use super::error::ClientError;
+use crate::measure::Pose;
+use crate::scene::query::StateVerdict;
+use crate::service::answer_wire;
 use crate::service::packed::Packed;
-use crate::service::proto::{self, CheckMotionsRequest, VerifyMotionRequest, VerifyMotionResponse};
+use crate::service::proto::{CheckMotionsRequest, MovingObjects};
 
 /// Many motions of one robot.
 #[derive(Clone, Debug, Default)]
@@ -49,6 +52,15 @@ impl MotionsQuestion {
         self
     }
 
+    /// While objects that nothing holds move by themselves, each from the first pose to the second:
+    /// along a line at a constant velocity, turning at a constant rate by the smaller angle. What
+    /// they hold moves along.
+    #[must_use]
+    pub fn with_moving<'a>(mut self, moving: impl IntoIterator<Item = (&'a str, [Pose; 2])>) -> Self {
+        self.request.moving = Some(moving_objects(moving));
+        self
+    }
+
     /// With certificates of the paths that are free.
     #[must_use]
     pub fn with_certificates(mut self) -> Self {
@@ -71,7 +83,7 @@ impl MotionsQuestion {
 #[derive(Clone, Debug, PartialEq)]
 pub struct CheckedMotion {
     /// Whether it is free.
-    pub verdict: proto::Verdict,
+    pub verdict: StateVerdict,
     /// It is proven free up to this path parameter.
     pub alpha: f64,
     /// All pairs keep at least this signed distance less their padding as far as that, metres; NaN
@@ -98,11 +110,11 @@ pub struct CheckedMotions {
 impl CheckedMotions {
     /// Whether every path is proven free.
     pub fn are_free(&self) -> bool {
-        self.verdicts().iter().all(|verdict| *verdict == proto::Verdict::Free)
+        self.verdicts().iter().all(|verdict| *verdict == StateVerdict::Free)
     }
 
     /// The verdicts, one per path.
-    pub fn verdicts(&self) -> Vec<proto::Verdict> {
+    pub fn verdicts(&self) -> Vec<StateVerdict> {
         self.motions.iter().map(|motion| motion.verdict).collect()
     }
 }
@@ -114,11 +126,11 @@ impl Client {
     /// When the question cannot be answered.
     pub async fn check_motions(&self, scene: &str, question: MotionsQuestion) -> Result<CheckedMotions, ClientError> {
         let response = self.queries().check_motions(question.asked(scene)).await.map_err(self.refused())?.into_inner();
-        let verdict = |byte: u8| proto::Verdict::try_from(i32::from(byte)).unwrap_or_default();
+        let verdicts = answer_wire::verdicts(&response.verdicts)?;
         let table = &response.objects;
         let pairs = index_pairs(&response.pairs).map(|[a, b]| Some([name(table, a)?, name(table, b)?]));
-        let rows = response.verdicts.iter().zip(pairs).enumerate().map(|(row, (&byte, pair))| CheckedMotion {
-            verdict: verdict(byte),
+        let rows = verdicts.into_iter().zip(pairs).enumerate().map(|(row, (verdict, pair))| CheckedMotion {
+            verdict,
             alpha: number(&response.alpha, row),
             clearance_lower_m: number(&response.clearance_lower_m, row),
             contact: pair.map(|pair| (pair, number(&response.contact_s, row))),
@@ -130,12 +142,15 @@ impl Client {
         }
         Ok(CheckedMotions { revision: response.scene_revision, motions, complete: response.complete })
     }
+}
 
-    /// Has a certificate of a motion checked.
-    ///
-    /// # Errors
-    /// A text that is no certificate, and a scene or robot that is not there.
-    pub async fn verify_motion(&self, request: VerifyMotionRequest) -> Result<VerifyMotionResponse, ClientError> {
-        Ok(self.queries().verify_motion(request).await.map_err(self.refused())?.into_inner())
+/// Objects, each with where it begins and ends.
+pub(super) fn moving_objects<'a>(moving: impl IntoIterator<Item = (&'a str, [Pose; 2])>) -> MovingObjects {
+    let (mut names, mut starts, mut ends) = (Vec::new(), Packed::default(), Packed::default());
+    for (name, [start, end]) in moving {
+        names.push(name.into());
+        starts.pose(&start);
+        ends.pose(&end);
     }
+    MovingObjects { names, start_poses: starts.into_bytes(), end_poses: ends.into_bytes() }
 }

@@ -6,7 +6,8 @@ use super::columns::{index_pairs, name};
 use super::connection::{Client, Connection};
 use super::error::ClientError;
 use crate::measure::Pose;
-use crate::scene::query::Measure;
+use crate::scene::query::{Answer, Measure};
+use crate::service::answer_wire;
 use crate::service::limits::MAX_MESSAGE_BYTES;
 use crate::service::proto::evaluate_request;
 use crate::service::proto::query_service_client::QueryServiceClient;
@@ -28,8 +29,8 @@ pub struct PairRow {
     pub b: String,
     /// What was measured.
     pub measure: Measure,
-    /// The answer in the words of the protocol.
-    pub answer: proto::Answer,
+    /// The answer; outputs that were not asked for are missing in it.
+    pub answer: Answer,
     /// The value, unit of the measure; none where no upper bound was found.
     pub value: Option<f64>,
 }
@@ -142,11 +143,13 @@ impl Client {
         if response.answers.len() != pairs.len() * measures.len() {
             return Err(ClientError::Unexpected("another number of answers"));
         }
-        let rows = response.answers.into_iter().enumerate().map(|(index, answer)| {
+        let rows = response.answers.iter().enumerate().map(|(index, message)| {
             let ObjectPair { a, b } = pairs[index / measures.len()].clone();
-            PairRow { a, b, measure: measures[index % measures.len()], value: answer.value, answer }
+            let answer = answer_wire::answer(message, index)?;
+            Ok(PairRow { a, b, measure: measures[index % measures.len()], value: message.value, answer })
         });
-        Ok(Answers { revision: response.scene_revision, rows: rows.collect(), complete: response.complete })
+        let rows = rows.collect::<Result<_, ClientError>>()?;
+        Ok(Answers { revision: response.scene_revision, rows, complete: response.complete })
     }
 
     /// Asks about pairs of a scene, and returns how many bytes the answer has: for those who

@@ -10,9 +10,7 @@ use crate::robot::{JointKind, Limits, Variable};
 use crate::scene::{NamedJointValues, RobotId, Update};
 use crate::service::limits::MAX_MESSAGE_BYTES;
 use crate::service::proto::robot_service_client::RobotServiceClient;
-use crate::service::proto::{
-    self, DeleteRobotRequest, GetRobotRequest, LinkBody, ListRobotsRequest, LoadRobotRequest, RobotGroup, RobotSummary,
-};
+use crate::service::proto::{self, DeleteRobotRequest, GetRobotRequest, LinkBody, ListRobotsRequest, LoadRobotRequest};
 use crate::service::{robot_wire, scene_wire, wire};
 use crate::store::RobotSource;
 
@@ -28,7 +26,7 @@ pub struct StoredRobot {
     /// Joints with values of their own, in the order of joint vectors.
     pub joints: Vec<Variable>,
     /// Groups of the SRDF, with the names of joints and links.
-    pub groups: Vec<RobotGroup>,
+    pub groups: Vec<StoredGroup>,
     /// What is odd in the SRDF.
     pub warnings: Vec<String>,
     /// Whether the call made it; false when the server had it before.
@@ -46,6 +44,30 @@ pub struct StoredLink {
     pub body: Option<BodyId>,
     /// How far the body reaches beyond the convex hull of its object at most, metres, where known.
     pub gap_m: Option<f64>,
+}
+
+/// A group of the SRDF of a robot that a server has.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StoredGroup {
+    /// Its name.
+    pub name: String,
+    /// Names of its joints.
+    pub joints: Vec<String>,
+    /// Names of its links.
+    pub links: Vec<String>,
+}
+
+/// A robot in a list.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ListedRobot {
+    /// Its id.
+    pub id: RobotId,
+    /// Name that its URDF gives it; not unique.
+    pub name: String,
+    /// Number of its links.
+    pub links: u32,
+    /// Number of values of all joints: the length of its joint vectors.
+    pub width: u32,
 }
 
 /// A robot to place in a scene.
@@ -80,15 +102,13 @@ impl RobotPlacement {
         Self { joints, ..self }
     }
 
-    /// The robot of a message.
-    pub(super) fn of(instance: &proto::RobotInstance) -> Result<Self, ClientError> {
-        let unreadable = |_| ClientError::Unexpected("a robot of a scene that cannot be read");
-        let field = |leaf: &str| format!("joints{leaf}");
+    /// The robot of a message that is at a field of another.
+    pub(super) fn of(instance: &proto::RobotInstance, field: &str) -> Result<Self, ClientError> {
         Ok(Self {
             name: instance.name.as_str().into(),
-            robot: robot_wire::robot_id(&instance.robot_id, "robot_id").map_err(unreadable)?,
-            base: wire::pose(instance.base.as_ref(), "base").map_err(unreadable)?,
-            joints: robot_wire::joint_values(instance.joints.as_ref(), field).map_err(unreadable)?,
+            robot: robot_wire::robot_id(&instance.robot_id, &format!("{field}.robot_id"))?,
+            base: wire::pose(instance.base.as_ref(), &format!("{field}.base"))?,
+            joints: robot_wire::joint_values(instance.joints.as_ref(), |leaf| format!("{field}.joints{leaf}"))?,
         })
     }
 }
@@ -108,11 +128,15 @@ impl StoredRobot {
             name: summary.name,
             links: links.into_iter().map(link).collect::<Option<_>>().ok_or_else(unreadable)?,
             joints: joints.iter().map(variable).collect::<Option<_>>().ok_or_else(unreadable)?,
-            groups,
+            groups: groups.into_iter().map(group).collect(),
             warnings,
             created,
         })
     }
+}
+
+fn group(proto::RobotGroup { name, joints, links }: proto::RobotGroup) -> StoredGroup {
+    StoredGroup { name, joints, links }
 }
 
 fn variable(joint: &proto::RobotJoint) -> Option<Variable> {
@@ -168,12 +192,15 @@ impl Client {
     ///
     /// # Errors
     /// When the server does not answer.
-    pub async fn list_robots(&self) -> Result<Vec<RobotSummary>, ClientError> {
+    pub async fn list_robots(&self) -> Result<Vec<ListedRobot>, ClientError> {
         let (mut client, mut robots, mut page_token) = (self.robots(), Vec::new(), String::new());
         loop {
             let request = ListRobotsRequest { page_size: 1000, page_token };
             let page = client.list_robots(request).await.map_err(self.refused())?.into_inner();
-            robots.extend(page.robots);
+            for (index, robot) in page.robots.into_iter().enumerate() {
+                let id = robot_wire::robot_id(&robot.id, &format!("robots[{index}].id"))?;
+                robots.push(ListedRobot { id, name: robot.name, links: robot.link_count, width: robot.width });
+            }
             page_token = page.next_page_token;
             if page_token.is_empty() {
                 return Ok(robots);

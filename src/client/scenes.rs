@@ -13,7 +13,7 @@ use crate::service::limits::MAX_MESSAGE_BYTES;
 use crate::service::proto::scene_service_client::SceneServiceClient;
 use crate::service::proto::{
     CommitForkRequest, CreateSceneRequest, DeleteSceneRequest, ForkSceneRequest, GetSceneRequest, ListScenesRequest,
-    SceneSummary, UpdateSceneRequest,
+    UpdateSceneRequest,
 };
 use crate::service::scene_wire;
 
@@ -28,6 +28,19 @@ pub struct SceneState {
     pub allowed_pairs: Vec<SubjectPair>,
     /// Robots by name, with the values of all joints; their links are among the objects.
     pub robots: BTreeMap<Arc<str>, RobotPlacement>,
+}
+
+/// A scene or fork in a list.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ListedScene {
+    /// Its name.
+    pub name: String,
+    /// Grows with every change.
+    pub revision: u64,
+    /// Number of its objects.
+    pub objects: u32,
+    /// Of a fork: the scene that it was made of, and the revision of that at the time.
+    pub parent: Option<(String, u64)>,
 }
 
 impl Client {
@@ -45,16 +58,21 @@ impl Client {
         Ok(response.into_inner().scene.map_or(0, |scene| scene.revision))
     }
 
-    /// Names and revisions of all scenes and forks.
+    /// All scenes and forks.
     ///
     /// # Errors
     /// When the server does not answer.
-    pub async fn list_scenes(&self) -> Result<Vec<SceneSummary>, ClientError> {
+    pub async fn list_scenes(&self) -> Result<Vec<ListedScene>, ClientError> {
         let (mut client, mut scenes, mut page_token) = (self.scenes(), Vec::new(), String::new());
         loop {
             let request = ListScenesRequest { page_size: 1000, page_token };
             let page = client.list_scenes(request).await.map_err(self.refused())?.into_inner();
-            scenes.extend(page.scenes);
+            scenes.extend(page.scenes.into_iter().map(|scene| ListedScene {
+                name: scene.name,
+                revision: scene.revision,
+                objects: scene.object_count,
+                parent: Some((scene.parent, scene.parent_revision)).filter(|(parent, _)| !parent.is_empty()),
+            }));
             page_token = page.next_page_token;
             if page_token.is_empty() {
                 return Ok(scenes);
@@ -72,15 +90,13 @@ impl Client {
             let request = GetSceneRequest { name: name.into(), page_size: 10_000, page_token };
             let page = client.get_scene(request).await.map_err(self.refused())?.into_inner();
             state.revision = page.scene.map_or(0, |scene| scene.revision);
-            let unreadable = |_| ClientError::Unexpected("an object or pair of a scene that cannot be read");
-            for object in &page.objects {
-                let placement = scene_wire::placement(object, || "objects".into()).map_err(unreadable)?;
+            for (index, object) in page.objects.iter().enumerate() {
+                let placement = scene_wire::placement(object, || format!("objects[{index}]"))?;
                 state.objects.insert(placement.name.clone(), placement);
             }
-            let pairs = scene_wire::subject_pairs(&page.allowed_pairs, "allowed_pairs");
-            state.allowed_pairs.extend(pairs.map_err(unreadable)?);
-            for robot in &page.robots {
-                let placement = RobotPlacement::of(robot)?;
+            state.allowed_pairs.extend(scene_wire::subject_pairs(&page.allowed_pairs, "allowed_pairs")?);
+            for (index, robot) in page.robots.iter().enumerate() {
+                let placement = RobotPlacement::of(robot, &format!("robots[{index}]"))?;
                 state.robots.insert(placement.name.clone(), placement);
             }
             page_token = page.next_page_token;

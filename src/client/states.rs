@@ -6,8 +6,10 @@ use super::columns::{index_pairs, name};
 use super::connection::Client;
 use super::error::ClientError;
 use crate::measure::Pose;
+use crate::scene::query::StateVerdict;
+use crate::service::answer_wire;
 use crate::service::packed::{POSE_NUMBERS, Packed};
-use crate::service::proto::{self, CheckStatesRequest};
+use crate::service::proto::CheckStatesRequest;
 
 /// Many states of some objects, or of a robot.
 #[derive(Clone, Debug, Default)]
@@ -113,7 +115,7 @@ pub struct CheckedStates {
     /// Revision all of them are true of.
     pub revision: u64,
     /// One per state.
-    pub verdicts: Vec<proto::Verdict>,
+    pub verdicts: Vec<StateVerdict>,
     /// The pair that decided, where one did.
     pub pairs: Vec<Option<[String; 2]>>,
 }
@@ -125,11 +127,10 @@ impl Client {
     /// When the question cannot be answered.
     pub async fn check_states(&self, scene: &str, question: StatesQuestion) -> Result<CheckedStates, ClientError> {
         let response = self.queries().check_states(question.asked(scene)).await.map_err(self.refused())?.into_inner();
-        let verdict = |&byte: &u8| proto::Verdict::try_from(i32::from(byte)).unwrap_or_default();
         let pair = |[a, b]: [u32; 2]| Some([name(&response.objects, a)?, name(&response.objects, b)?]);
         Ok(CheckedStates {
             revision: response.scene_revision,
-            verdicts: response.verdicts.iter().map(verdict).collect(),
+            verdicts: answer_wire::verdicts(&response.verdicts)?,
             pairs: index_pairs(&response.pairs).map(pair).collect(),
         })
     }

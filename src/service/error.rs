@@ -21,9 +21,9 @@ use super::tokens::Role;
 #[derive(Debug)]
 pub(crate) struct Invalid {
     /// Path in the request, such as `pairs[3].a`.
-    field: String,
+    pub(crate) field: String,
     /// The reason and the remedy.
-    why: String,
+    pub(crate) why: String,
 }
 
 impl Invalid {

@@ -3,7 +3,7 @@
 use super::error::Invalid;
 use super::proto::job::Task;
 use super::{derive_wire, fits, hierarchy, proto};
-use crate::jobs::Progress;
+use crate::jobs::{Phase, Progress};
 use crate::store::{Job, JobOutcome, JobState, JobTask};
 
 pub(super) fn id(id: &str, field: &str) -> Result<u64, Invalid> {
@@ -53,5 +53,52 @@ pub(super) fn job(job: &Job, progress: Option<Progress>) -> proto::Job {
         attempts: *attempts,
         failure: failure.to_owned(),
         task: Some(task),
+    }
+}
+
+/// How far a job of a message is; none while it waits.
+pub(crate) fn progress(job: &proto::Job) -> Option<Progress> {
+    let solving = Progress { phase: Phase::Solving, ..Progress::default() };
+    match job.task.as_ref()? {
+        Task::Fit(task) => task.progress.as_ref().map(fits::wire::progress),
+        Task::Hierarchy(task) => task.progress.as_ref().map(|said| Progress { iterations: said.iterations, ..solving }),
+        Task::AllowedPairs(task) => {
+            task.progress.as_ref().map(|said| Progress { rounds: said.pairs_begun, iterations: said.boxes, ..solving })
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::DeriveRequest;
+
+    #[test]
+    fn progress_that_is_written_is_read() {
+        let robot = "0".repeat(64).parse().expect("an id");
+        let request = DeriveRequest { robot, margin_m: 0.0, max_boxes: 1, resolution_m: 0.1 };
+        let with = |task| proto::Job { task: Some(task), ..proto::Job::default() };
+        let said = Progress { phase: Phase::Solving, rounds: 3, iterations: 17, ..Progress::default() };
+        let of_pairs = |said| with(Task::AllowedPairs(derive_wire::task(&request, said, None)));
+        assert_eq!(progress(&of_pairs(Some(said))), Some(said));
+        assert_eq!(progress(&of_pairs(None)), None);
+        for (phase, message) in [
+            (Phase::Preparing, proto::FitPhase::Preparing),
+            (Phase::Trimming, proto::FitPhase::Trimming),
+            (Phase::Solving, proto::FitPhase::Fitting),
+        ] {
+            let message =
+                proto::FitProgress { phase: message.into(), rounds: 2, iterations: 9, gap: 0.5, active_points: 40 };
+            let fit = proto::FitTask { progress: Some(message), ..proto::FitTask::default() };
+            let said = Progress { phase, rounds: 2, iterations: 9, gap: 0.5, active_points: 40 };
+            assert_eq!(progress(&with(Task::Fit(fit))), Some(said));
+        }
+        let solve = proto::HierarchyTask {
+            progress: Some(proto::HierarchyProgress { iterations: 4 }),
+            ..proto::HierarchyTask::default()
+        };
+        let said = Progress { phase: Phase::Solving, iterations: 4, ..Progress::default() };
+        assert_eq!(progress(&with(Task::Hierarchy(solve))), Some(said));
+        assert_eq!(progress(&proto::Job::default()), None);
     }
 }

@@ -12,6 +12,7 @@
 mod admin;
 mod admin_listener;
 mod answer_body;
+pub(crate) mod answer_wire;
 mod app_state;
 mod authorization;
 mod backups;
@@ -29,7 +30,7 @@ pub mod config;
 mod contact_watch;
 #[cfg(feature = "fit")]
 pub(crate) mod derive_wire;
-mod error;
+pub(crate) mod error;
 mod explain;
 #[cfg(feature = "fit")]
 pub(crate) mod fits;
@@ -41,7 +42,7 @@ mod incoming;
 #[cfg(feature = "fit")]
 mod job_metrics;
 #[cfg(feature = "fit")]
-mod job_wire;
+pub(crate) mod job_wire;
 #[cfg(feature = "fit")]
 mod jobs;
 pub mod limits;

@@ -172,8 +172,8 @@ impl QueryService for Queries {
             clearance = clearance.cold();
         }
         let parts = self.0.ask(Arc::new(clearance), time).await?;
-        let gradients = !request.without_gradients;
-        let response = query_wire::clearance(parts.into_iter().flatten(), &scene, gradients);
+        let outputs = query_wire::clearance_outputs(&request);
+        let response = query_wire::clearance(parts.into_iter().flatten(), &scene, &outputs);
         error::fits(&response)?;
         Ok(Response::new(response))
     }

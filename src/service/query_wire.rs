@@ -59,6 +59,11 @@ pub(super) fn outputs(request: &proto::EvaluateRequest) -> Result<Outputs, Inval
     Ok(outputs)
 }
 
+/// What of the rows of a clearance is sent by choice; the rest always is.
+pub(super) fn clearance_outputs(request: &proto::ClearanceRequest) -> Outputs {
+    Outputs { witnesses: request.with_witnesses, gradients: !request.without_gradients, ..Outputs::default() }
+}
+
 /// What is asked of every pair.
 pub(super) fn ask(request: &proto::EvaluateRequest, outputs: &Outputs, scene: &Scene) -> Result<Ask, Status> {
     let mut measures = Vec::new();
@@ -346,12 +351,13 @@ fn decision(verdict: Verdict) -> proto::Decision {
 pub(super) fn clearance(
     states: impl Iterator<Item = StateClearance>,
     scene: &Scene,
-    gradients: bool,
+    outputs: &Outputs,
 ) -> proto::ClearanceResponse {
     let mut names = NameTable::default();
     let [mut offsets, mut pairs, mut status_bytes, mut lower, mut upper] = [(); 5].map(|()| Packed::default());
     let [mut padding, mut gradient_a, mut gradient_b, mut normal] = [(); 4].map(|()| Packed::default());
     let [mut flag_bytes, mut checked, mut joint_gradients] = [(); 3].map(|()| Packed::default());
+    let [mut witness_a, mut witness_b] = [(); 2].map(|()| Packed::default());
     let mut rows = 0;
     offsets.index(0);
     for state in states {
@@ -362,9 +368,13 @@ pub(super) fn clearance(
             lower.number(answer.lower);
             upper.number(answer.upper);
             padding.number(*padding_m);
-            if gradients {
+            if outputs.gradients {
                 gradient_a.twist(answer.gradients.as_ref().map(|[a, _]| a));
                 gradient_b.twist(answer.gradients.as_ref().map(|[_, b]| b));
+            }
+            if outputs.witnesses {
+                witness_a.vector(answer.witnesses.as_ref().map(|[a, _]| a));
+                witness_b.vector(answer.witnesses.as_ref().map(|[_, b]| b));
             }
             normal.vector(answer.normal.as_ref());
             flag_bytes.byte(flags(answer));
@@ -388,6 +398,8 @@ pub(super) fn clearance(
         flags: flag_bytes.into_bytes(),
         checked: checked.into_bytes(),
         joint_gradients: joint_gradients.into_bytes(),
+        witness_a_m: witness_a.into_bytes(),
+        witness_b_m: witness_b.into_bytes(),
     }
 }
 

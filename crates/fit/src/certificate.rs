@@ -9,10 +9,10 @@
 //! A square that only one product of the basis gives and that is missing in f rules that element of
 //! the basis out, as those of sparse forms: of `z^4` only `y z` is left.
 
-use super::FitError;
 use super::localizing::LocalizingMatrix;
 use super::margin_program::{Margin, largest_margin};
 use super::structure::{Pattern, Structure};
+use super::unsolved::ProgramError;
 use nalgebra::{DVector, Vector3};
 use sublevel_core::body::sphere_rule;
 use sublevel_core::polynomial::{CertificateError, Exponents, HessianGram, HessianMonomial, Polynomial};
@@ -53,8 +53,15 @@ pub enum NoCertificate {
         bound: f64,
     },
     /// The search failed.
-    #[error("a certificate could not be looked for: {0}")]
-    Unsolved(FitError),
+    #[error(
+        "clarabel did not solve the program of a certificate of degree {degree}: {why}; fit a body to points of the set instead"
+    )]
+    Unsolved {
+        /// Degree of the polynomial.
+        degree: usize,
+        /// What happened.
+        why: ProgramError,
+    },
     /// What was found is not proven.
     #[error(transparent)]
     Unproven(#[from] CertificateError),
@@ -75,7 +82,8 @@ pub fn certificate(polynomial: &Polynomial) -> Result<HessianGram, NoCertificate
     let basis: Vec<_> = rows.iter().map(|&row| structure.hessian_basis[row]).collect();
     let inside = start(&pattern, &basis);
     let cones = [LocalizingMatrix::of(pattern)];
-    let Margin { bound, mut grams } = largest_margin(&form, &cones, &inside).map_err(NoCertificate::Unsolved)?;
+    let Margin { bound, mut grams } = largest_margin(&form, &cones, &inside)
+        .map_err(|why| NoCertificate::Unsolved { degree: polynomial.degree(), why })?;
     if bound < -LEAST_PROVABLE_EIGENVALUE {
         return Err(NoCertificate::NotSosConvex { bound });
     }

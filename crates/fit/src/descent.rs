@@ -15,8 +15,9 @@ use super::progress::Watch;
 use super::refine::{Refined, RefinementEnd, normalise, step_model};
 use super::spaced_points::spaced_points;
 use super::structure::Structure;
+use super::unsolved::{Failure, Fault, ProgramError, Unsolved};
 use super::volume::{expansion, polynomial, volume};
-use super::{FitError, ProgramError};
+use super::{FitError, Solver};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 /// Steps at most; 5 to 10 are usual.
@@ -76,10 +77,18 @@ pub(super) fn descend(
         let columns = values.select_columns(&known.indices);
         let program = ModelProgram { dominance: &dominance, structure, values: &columns, margin, model: &model };
         watch.round(columns.ncols(), known.worst);
-        let target = program.minimise(here, watch)?;
-        let Some(target) = target else {
-            end = RefinementEnd::Unsolved;
-            break;
+        let target = match program.minimise(here, watch)? {
+            Ok(target) => target,
+            // Nothing has a Gram matrix yet.
+            Err(why) if volumes.is_empty() => {
+                let failure = Failure { solver: Solver::Clarabel, points: columns.ncols(), why };
+                let (degree, failures) = (structure.degree, vec![failure]);
+                return Err(FitError::Unsolved(Unsolved { degree, failures, is_solver_fixed: false }));
+            }
+            Err(_) => {
+                end = RefinementEnd::Unsolved;
+                break;
+            }
         };
         known.learn(points, &values, &target.coefficients);
         // The ball has no Gram matrix of its own: the first step is taken whole, whatever its
@@ -121,12 +130,12 @@ pub(super) struct ModelProgram<'a> {
 }
 
 impl ModelProgram<'_> {
-    /// The minimiser, progress in units of `unit`; none where the solver has none
-    /// that matches the Hessian form.
+    /// The minimiser, progress in units of `unit`; why not where the solver has none that matches
+    /// the Hessian form.
     ///
     /// # Errors
     /// [`FitError::Cancelled`].
-    pub(super) fn minimise(&self, unit: f64, watch: &mut Watch) -> Result<Option<Interior>, FitError> {
+    pub(super) fn minimise(&self, unit: f64, watch: &mut Watch) -> Result<Result<Interior, ProgramError>, FitError> {
         let Self { dominance, structure, values, margin, model } = *self;
         let pattern = &structure.hessian;
         let mut program = ConicProgram::default();
@@ -145,14 +154,17 @@ impl ModelProgram<'_> {
         let blocks = dominance.constrain(&mut program, form);
         let solution = match solve(&program, TOLERANCE, unit, watch) {
             Ok(solution) => solution,
-            Err(FitError::Cancelled) => return Err(FitError::Cancelled),
-            Err(_) => return Ok(None),
+            Err(FitError::Program(why)) => return Ok(Err(why)),
+            Err(error) => return Err(error),
         };
         let coefficients = solution.values(coefficients);
         let hessian = dominance.gram(&blocks, &solution) + DMatrix::identity(pattern.size, pattern.size) * margin;
-        let residual = structure.derivative_matrix() * &coefficients - pattern.collapse(&hessian);
-        let feasible = residual.amax() <= FORM_RESIDUAL * hessian.amax().max(1.0);
-        Ok(feasible.then_some(Interior { coefficients, hessian }))
+        let residual = (structure.derivative_matrix() * &coefficients - pattern.collapse(&hessian)).amax();
+        if !(residual <= FORM_RESIDUAL * hessian.amax().max(1.0)) {
+            let (stop, fault) = (solution.stop, Fault::Residual(residual));
+            return Ok(Err(ProgramError::Unusable { stop, fault }));
+        }
+        Ok(Ok(Interior { coefficients, hessian }))
     }
 }
 

@@ -2,9 +2,9 @@
 
 use super::hull::HullError;
 use super::margin::DEFAULT_MARGIN;
-use super::program::ProgramError;
 use super::shortfall::MAX_PIECES;
 use super::slab::{CutError, MAX_SLABS};
+use super::unsolved::{ProgramError, Unsolved};
 use sublevel_core::body::Cone;
 use sublevel_core::body::Objective;
 use sublevel_core::body::{BodyError, CompoundError, MeshError, NotContained, NotCovered, SosBodyError, TriangleError};
@@ -108,21 +108,12 @@ pub enum FitError {
     /// The progress callback asked to stop.
     #[error("the fit was cancelled")]
     Cancelled,
-    /// The program has no usable start, or was lost in rounding.
-    #[error(transparent)]
+    /// What leads to the program of a fit was lost in rounding.
+    #[error("{0}; lower the degree, or add points")]
     Program(#[from] ProgramError),
-    /// Points were left outside again and again.
-    #[error("points were still left outside after {rounds} rounds of adding them; lower the degree")]
-    NoConvergence {
-        /// Rounds done.
-        rounds: usize,
-    },
-    /// The answer could not be verified optimal.
-    #[error("the fit is only known to be within {gap:.1e} of the optimal objective; lower the degree, or add points")]
-    NotOptimal {
-        /// Objective minus its lower bound from the dual.
-        gap: f64,
-    },
+    /// No solver has an optimum of the program of a fit that is verified.
+    #[error("{0}")]
+    Unsolved(Unsolved),
     /// What another objective might have reached.
     #[error("{0}, or take the objective logdet-p, which no frame makes worse")]
     OtherObjective(Box<FitError>),
@@ -160,7 +151,7 @@ impl FitError {
     /// help.
     pub(super) fn of_objective(self, objective: Objective) -> Self {
         match self {
-            Self::Program(_) | Self::NotOptimal { .. } if objective != Objective::default() => {
+            Self::Program(_) | Self::Unsolved(_) if objective != Objective::default() => {
                 Self::OtherObjective(Box::new(self))
             }
             other => other,

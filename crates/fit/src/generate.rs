@@ -6,9 +6,10 @@ use super::active_points::ActivePoints;
 use super::moment_program::{MomentOptimum, MomentProgram};
 use super::objective::Matrix;
 use super::path::{Interior, Path, PathOptions};
-use super::program::{Problem, ProgramError};
+use super::program::Problem;
 use super::progress::Watch;
 use super::structure::Structure;
+use super::unsolved::{Failure, Fault, ProgramError, Stop, Unsolved};
 use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
 use sublevel_core::body::Solver;
 
@@ -83,6 +84,8 @@ struct Candidate {
     interior: Interior,
     gram: Option<DMatrix<f64>>,
     lower_bound: f64,
+    /// How clarabel ended, if short of its tolerance.
+    stop: Option<Stop>,
 }
 
 /// Minimises the objective over p, sos-convex as far as the problem asks for it, with `p <= 1` at
@@ -96,36 +99,34 @@ pub(super) fn generate(
     likely: &[usize],
     watch: &mut Watch,
 ) -> Result<Optimum, FitError> {
-    let mut failed: Option<(Solver, FitError)> = None;
+    let mut failures: Vec<Failure> = Vec::new();
     let solvers = problem.solvers();
     for &solver in &solvers {
         let found = match solver {
             Solver::Clarabel => by_conic_solver(problem, points, likely, watch),
             Solver::Structured => by_path(problem, points, likely, watch),
         };
-        match found.and_then(|candidate| verified(problem, candidate, solver)) {
-            Ok(optimum) if !is_certifiable(problem, &optimum) && solvers.last() != Some(&solver) => {
-                let why = "its Gram matrix of the Hessian form is not definite";
-                failed = Some((solver, ProgramError::Solver(why.to_owned()).into()));
-            }
+        let is_last = solvers.last() == Some(&solver);
+        let why = match found.and_then(|candidate| verified(problem, candidate, solver, is_last)) {
             Ok(optimum) => {
-                let fallback = failed.map(|(solver, error)| format!("{solver} failed: {error}"));
+                let fallback = failures.pop().map(|Failure { solver, why, .. }| format!("{solver} failed: {why}"));
                 return Ok(Optimum { fallback, ..optimum });
             }
-            Err(FitError::Cancelled) => return Err(FitError::Cancelled),
-            // The first error is about the solver that suits the program best.
-            Err(error) => failed = Some(failed.unwrap_or((solver, error))),
-        }
+            Err(FitError::Program(why)) => why,
+            Err(error) => return Err(error),
+        };
+        failures.push(Failure { solver, points: watch.progress().active_points, why });
     }
-    Err(failed.map_or(ProgramError::Singular.into(), |(_, error)| error))
+    let (degree, is_solver_fixed) = (problem.structure.degree, problem.is_solver_fixed());
+    Err(FitError::Unsolved(Unsolved { degree, failures, is_solver_fixed }))
 }
 
 /// Whether H is definite by half of the margin: of what the certificate has to prove, rounding
 /// takes its part. A larger margin may help where no other solver does.
-fn is_certifiable(problem: &Problem, optimum: &Optimum) -> bool {
-    let rows = optimum.hessian.nrows();
+fn is_certifiable(problem: &Problem, hessian: &DMatrix<f64>) -> bool {
+    let rows = hessian.nrows();
     let margin = DMatrix::identity(rows, rows) * (0.5 * problem.margin);
-    rows == 0 || Cholesky::new(&optimum.hessian - margin).is_some()
+    rows == 0 || Cholesky::new(hessian - margin).is_some()
 }
 
 /// The optimum by clarabel.
@@ -143,15 +144,15 @@ fn by_conic_solver(
         let outside = violations(problem.structure, points, &optimum.interior.coefficients);
         worst = outside.first().map_or(0.0, |&(excess, _)| excess);
         if worst <= VIOLATION {
-            let MomentOptimum { interior, gram, lower_bound, .. } = optimum;
-            return Ok(Candidate { interior, gram: Some(gram), lower_bound });
+            let MomentOptimum { interior, gram, lower_bound, stop, .. } = optimum;
+            return Ok(Candidate { interior, gram: Some(gram), lower_bound, stop });
         }
         if points.len() <= ALL_POINTS {
-            return Err(ProgramError::Solver(format!("it leaves points outside by {worst:.1e}")).into());
+            return Err(ProgramError::Unusable { stop: optimum.stop, fault: Fault::Outside(worst) }.into());
         }
         active.add(problem.structure, points, &outside);
     }
-    Err(FitError::NoConvergence { rounds: MAX_POINT_ROUNDS })
+    Err(ProgramError::Rounds(MAX_POINT_ROUNDS).into())
 }
 
 /// The optimum by the central path of the dual.
@@ -181,30 +182,34 @@ fn by_path(
         worst = outside.first().map_or(0.0, |&(excess, _)| excess);
         if worst <= VIOLATION {
             let lower_bound = problem.lower_bound(&last.point.dual)?;
-            return Ok(Candidate { interior: last.interior, gram: last.gram, lower_bound });
+            return Ok(Candidate { interior: last.interior, gram: last.gram, lower_bound, stop: None });
         }
         active.add(structure, points, &outside);
     }
-    Err(FitError::NoConvergence { rounds: MAX_POINT_ROUNDS })
+    Err(ProgramError::Rounds(MAX_POINT_ROUNDS).into())
 }
 
 fn path_options(gap: f64) -> PathOptions {
     PathOptions { gap, growth: GROWTH, steps: MAX_PATH_STEPS }
 }
 
-/// The optimum if the dual point proves it one.
-fn verified(problem: &Problem, candidate: Candidate, solver: Solver) -> Result<Optimum, FitError> {
-    let Candidate { interior, gram, lower_bound } = candidate;
+/// The optimum if the dual point proves it one, and unless it is the last solver's if a certificate
+/// can be made of it.
+fn verified(problem: &Problem, candidate: Candidate, solver: Solver, is_last: bool) -> Result<Optimum, FitError> {
+    let Candidate { interior, gram, lower_bound, stop } = candidate;
     let measured = match problem.matrix {
         Matrix::Polynomial => gram.as_ref(),
         Matrix::Hessian => Some(&interior.hessian),
     };
-    let objective = measured.and_then(|gram| problem.spectral.measure(gram)).ok_or(ProgramError::Singular)?;
+    let objective = measured.and_then(|gram| problem.spectral.measure(gram)).ok_or(ProgramError::singular(stop))?;
     let gap = objective - lower_bound;
     if !(gap.abs() <= OPTIMALITY_GAP * objective.abs().max(1.0)) {
-        return Err(FitError::NotOptimal { gap });
+        return Err(ProgramError::Unusable { stop, fault: Fault::Gap(gap) }.into());
     }
     let Interior { coefficients, hessian } = interior;
+    if !is_last && !is_certifiable(problem, &hessian) {
+        return Err(ProgramError::Unusable { stop, fault: Fault::Indefinite }.into());
+    }
     Ok(Optimum { gap: Some(gap), objective, coefficients, hessian, gram, solver, fallback: None })
 }
 

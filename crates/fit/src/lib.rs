@@ -65,6 +65,7 @@ mod structure;
 mod support;
 mod thicken;
 mod trim;
+mod unsolved;
 mod volume;
 
 pub use ball::{EnclosingBall, smallest_ball};
@@ -91,7 +92,6 @@ pub use ladder::{Representation, ball, cheapest_within, coarsest_within, ladder}
 pub use margin::DEFAULT_MARGIN;
 pub use options::FitOptions;
 pub use parts::{CompoundFit, fit_parts};
-pub use program::ProgramError;
 pub use progress::Progress;
 pub use refine::RefinementEnd;
 pub use shortfall::{MAX_PIECES, Shortfall};
@@ -102,6 +102,7 @@ pub use sublevel_core::body::{
 };
 pub use thicken::thicken;
 pub use trim::{Trimmed, trim};
+pub use unsolved::{Failure, Fault, ProgramError, Stop, Unsolved};
 
 use nalgebra::Vector3;
 use object::Object;

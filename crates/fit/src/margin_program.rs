@@ -14,6 +14,7 @@ use super::FitError;
 use super::conic_program::{ConicProgram, Expression, solve};
 use super::localizing::LocalizingMatrix;
 use super::progress::Watch;
+use super::unsolved::ProgramError;
 use nalgebra::{DMatrix, DVector};
 
 /// Tolerance asked of the solver, which stops where rounding stands in its way; dimensionless.
@@ -35,12 +36,12 @@ pub(super) struct Margin {
 /// with definite moment matrices.
 ///
 /// # Errors
-/// Those of the solver.
+/// What the solver says.
 pub(super) fn largest_margin(
     target: &DVector<f64>,
     cones: &[LocalizingMatrix],
     inside: &DVector<f64>,
-) -> Result<Margin, FitError> {
+) -> Result<Margin, ProgramError> {
     let mut program = ConicProgram::default();
     let functional = program.variables(target.len());
     functional.clone().zip(target.iter()).for_each(|(variable, &cost)| program.add_cost(variable, cost));
@@ -48,7 +49,10 @@ pub(super) fn largest_margin(
     let trace = program.zero([Expression { terms: cones.iter().flat_map(trace).collect(), constant: 1.0 }]).start;
     let rows: Vec<_> = cones.iter().map(|cone| cone.constrain(&mut program, functional.start)).collect();
     let mut ignored = |_| std::ops::ControlFlow::Continue(());
-    let solution = solve(&program, TOLERANCE, 1.0, &mut Watch::new(&mut ignored))?;
+    let solution = solve(&program, TOLERANCE, 1.0, &mut Watch::new(&mut ignored)).map_err(|error| match error {
+        FitError::Program(why) => why,
+        _ => ProgramError::Solver("it was cancelled"),
+    })?;
     // f = Σ collapse(D (Z + t I) D), t the negative multiplier of `1 - trace`
     let margin = -solution.multipliers[trace];
     let grams = cones.iter().zip(rows).map(|(cone, rows)| cone.gram(&solution, rows, 1.0, margin)).collect();

@@ -25,9 +25,10 @@ use super::conic_program::{ConicProgram, ConicSolution, Expression, geometric_me
 use super::localizing::{LocalizingMatrix, scales};
 use super::objective::{Function, Matrix};
 use super::path::Interior;
-use super::program::{Problem, ProgramError};
+use super::program::Problem;
 use super::progress::Watch;
 use super::structure::{Pattern, interior_form, isotropic_form};
+use super::unsolved::{ProgramError, Stop};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use std::ops::Range;
 use sublevel_core::polynomial::degree_of;
@@ -62,6 +63,8 @@ pub(super) struct MomentOptimum {
     pub(super) grams: Vec<Vec<DMatrix<f64>>>,
     /// No polynomial has a smaller objective: the dual objective of a feasible point.
     pub(super) lower_bound: f64,
+    /// How the solver ended, if short of its tolerance.
+    pub(super) stop: Option<Stop>,
 }
 
 /// The program of some sources.
@@ -263,9 +266,10 @@ impl<'a> MomentProgram<'a> {
     pub(super) fn solve(&self, watch: &mut Watch) -> Result<MomentOptimum, FitError> {
         let structure = self.problem.structure;
         let solution = solve(&self.program, TOLERANCE, self.problem.pattern().size as f64, watch)?;
+        let stop = solution.stop;
         let factor = solution.multipliers[self.normalisation];
         if !(factor > 0.0) {
-            return Err(ProgramError::Singular.into());
+            return Err(ProgramError::singular(stop).into());
         }
         let coefficients = solution.multipliers(self.definition.clone()) / factor;
         let sum = |constraints: &[Part], size| gram(&solution, constraints, size) / factor;
@@ -277,15 +281,15 @@ impl<'a> MomentProgram<'a> {
         let size = structure.hessian.size;
         let hessian = sum(&self.of_form, size) + DMatrix::identity(size, size) * self.problem.margin;
         let hessian = structure.hessian.nearest(&hessian, &form);
-        let lower_bound = self.lower_bound(&solution)?;
+        let lower_bound = self.lower_bound(&solution).ok_or_else(|| ProgramError::singular(stop))?;
         let of_source = |(source, rows): (&Source, &Vec<Range<usize>>)| source.grams(&solution, rows, factor);
         let grams = self.sources.iter().zip(&self.of_cones).map(of_source).collect();
-        Ok(MomentOptimum { interior: Interior { coefficients, hessian }, gram, grams, lower_bound })
+        Ok(MomentOptimum { interior: Interior { coefficients, hessian }, gram, grams, lower_bound, stop })
     }
 
     /// The dual objective of the solver's dual point made feasible: as much of a point inside added
     /// as makes all matrices definite, and the best multiple of that.
-    fn lower_bound(&self, solution: &ConicSolution) -> Result<f64, ProgramError> {
+    fn lower_bound(&self, solution: &ConicSolution) -> Option<f64> {
         let Self { problem, sources, .. } = self;
         let (gram, hessian) = (&problem.structure.gram, &problem.structure.hessian);
         let moments = |of_sources: &[DVector<f64>], form: &DVector<f64>| {
@@ -306,11 +310,10 @@ impl<'a> MomentProgram<'a> {
             Cholesky::new(gram.spread(&moments))?;
             Some((of_sources, form, moments))
         };
-        let (of_sources, form, moments) = shares().find_map(feasible).ok_or(ProgramError::Singular)?;
+        let (of_sources, form, moments) = shares().find_map(feasible)?;
         let cost: f64 = sources.iter().zip(&of_sources).map(|(source, y)| source.cost_with_margin().dot(y)).sum();
         let cost = cost + problem.form_cost().dot(&form);
-        let bound = problem.spectral.best_multiple(&problem.measured(&moments, &form), cost);
-        bound.ok_or(ProgramError::Singular)
+        problem.spectral.best_multiple(&problem.measured(&moments, &form), cost)
     }
 }
 

@@ -34,31 +34,13 @@ use super::basis::{Affine, change};
 use super::objective::{Function, Matrix, Measure};
 use super::spectral::Spectral;
 use super::structure::{Pattern, Structure};
+use super::unsolved::ProgramError;
 use nalgebra::{DMatrix, DVector};
 use sublevel_core::body::Solver;
 use sublevel_core::polynomial::NormPower;
 
 /// Degree from which the structured solver is more than twice as fast as clarabel.
 const STRUCTURED_DEGREE: usize = 8;
-
-/// Why a program could not be solved.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ProgramError {
-    /// A moment matrix lost its definiteness.
-    #[error("the points do not span the polynomials of this degree numerically; lower the degree, or add points")]
-    Singular,
-    /// The solver has proven to its accuracy that the constraints contradict each other.
-    #[error("the program has no solution; leave the choice of the solver open, lower the degree, or add points")]
-    Infeasible,
-    /// The solver has proven to its accuracy that nothing bounds the objective.
-    #[error(
-        "nothing bounds the objective of the program; leave the choice of the solver open, lower the degree, or add points"
-    )]
-    Unbounded,
-    /// The solver has no answer.
-    #[error("the solver has no solution ({0}); leave the choice of the solver open, lower the degree, or add points")]
-    Solver(String),
-}
 
 /// A dual point: weights, functional on the Hessian form, and the moments they give.
 #[derive(Clone, Debug)]
@@ -122,13 +104,22 @@ impl<'a> Problem<'a> {
 
     /// The solvers to try, in this order.
     pub(super) fn solvers(&self) -> Vec<Solver> {
-        let is_log_det_p = self.matrix == Matrix::Polynomial && self.spectral.function() == Function::LogDet;
+        let is_log_det_p = self.is_log_det_p();
         match self.solver.or_else(|| under_test().filter(|_| is_log_det_p)) {
             Some(solver) => vec![solver],
             None if !is_log_det_p => vec![Solver::Clarabel],
             None if self.structure.degree >= STRUCTURED_DEGREE => vec![Solver::Structured, Solver::Clarabel],
             None => vec![Solver::Clarabel, Solver::Structured],
         }
+    }
+
+    /// Whether one solver was asked for where there are two.
+    pub(super) fn is_solver_fixed(&self) -> bool {
+        self.solver.is_some() && self.is_log_det_p()
+    }
+
+    fn is_log_det_p(&self) -> bool {
+        self.matrix == Matrix::Polynomial && self.spectral.function() == Function::LogDet
     }
 
     /// Whether every mixture of points satisfies what the points do, as p is convex.
@@ -170,8 +161,7 @@ impl<'a> Problem<'a> {
 /// (`make solvers`).
 #[cfg(test)]
 fn under_test() -> Option<Solver> {
-    let name = std::env::var("SUBLEVEL_TEST_SOLVER").ok()?;
-    Some(name.parse().expect("SUBLEVEL_TEST_SOLVER names a solver"))
+    sublevel_testkit::solver_under_test()
 }
 
 #[cfg(not(test))]

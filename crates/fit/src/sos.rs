@@ -192,7 +192,7 @@ impl RelaxedProgram<'_> {
                 Problem::new(&structure, objective, &map, margin).relaxed(power.as_ref()).solved_by(options.solver);
             // Where convexity bounds too little the points have to: then they are what is missing.
             let spanned = |error| match error {
-                FitError::Program(_) | FitError::NotOptimal { .. } => {
+                FitError::Program(_) | FitError::Unsolved(_) => {
                     let all = Structure::without_convexity(options.degree);
                     moments(&all, whitened).err().unwrap_or(error)
                 }

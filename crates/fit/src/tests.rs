@@ -313,7 +313,17 @@ fn both_solvers_are_tried_unless_one_is_asked_for() {
     // A margin of no meaning: H cannot be definite by it while p is at most 1 at the points.
     let problem = Problem::new(&structure, Objective::LogDetP, &unit, 1e3);
     let failed = generate(&problem, &points, &[], &mut Watch::new(&mut unwatched)).unwrap_err();
-    assert!(matches!(failed, FitError::Program(_) | FitError::NotOptimal { .. }), "{failed}");
+    let FitError::Unsolved(Unsolved { degree: 4, failures, is_solver_fixed: false }) = &failed else {
+        panic!("{failed}")
+    };
+    assert_eq!(
+        failures.iter().map(|failure| failure.solver).collect::<Vec<_>>(),
+        [Solver::Clarabel, Solver::Structured]
+    );
+    let text = failed.to_string();
+    println!("{text}");
+    assert!(text.starts_with("clarabel did not solve the program of degree 4 on 60 points: "), "{text}");
+    assert!(text.contains("; structured did not on ") && text.contains("; lower the degree, or "), "{text}");
     let problem = Problem::new(&structure, Objective::LogDetP, &unit, 1e-5);
     assert_eq!(problem.solvers(), [Solver::Clarabel, Solver::Structured]);
     assert_eq!(Problem { solver: Some(Solver::Structured), ..problem.clone() }.solvers(), [Solver::Structured]);

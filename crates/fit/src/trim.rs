@@ -4,8 +4,8 @@ use super::FitError;
 use super::gap::nearest;
 use super::hull::convex_hull;
 use super::object::Object;
-use super::program::ProgramError;
 use super::progress::{Progress, Watch};
+use super::unsolved::ProgramError;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::ControlFlow;
 

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use sublevel_core::body::Body;
 use sublevel_fit::{FitOptions, ReadOptions, RefinementEnd, fit, read_mesh};
-use sublevel_testkit::data;
+use sublevel_testkit::{data, solver_under_test};
 
 /// Mesh number, volume of the convex hull and vertices of it, volumes of the -log det P fits at
 /// degrees 2, 4, 6.
@@ -20,7 +20,7 @@ fn check(row: usize) {
     let path = data(&format!("psb/{number}.off"));
     let points = read_mesh(&path, &ReadOptions::default()).expect("the mesh is readable").mesh.points;
     for (degree, expected) in [2, 4, 6].into_iter().zip(volumes) {
-        let options = FitOptions { degree, ..FitOptions::default() };
+        let options = FitOptions { degree, solver: solver_under_test(), ..FitOptions::default() };
         let fit = fit("mesh", &points, &options, &mut |_| ControlFlow::Continue(())).expect("the mesh is fitted");
         let report = &fit.report;
         println!(
@@ -55,7 +55,7 @@ fn refined_volumes() {
         let path = data(&format!("psb/{number}.off"));
         let points = read_mesh(&path, &ReadOptions::default()).expect("the mesh is readable").mesh.points;
         for (degree, expected) in [4, 6].into_iter().zip(volumes) {
-            let options = FitOptions { degree, refine: true, ..FitOptions::default() };
+            let options = FitOptions { degree, refine: true, solver: solver_under_test(), ..FitOptions::default() };
             let fit = fit("mesh", &points, &options, &mut |_| ControlFlow::Continue(())).expect("the mesh is fitted");
             let report = &fit.report;
             println!(
@@ -110,7 +110,7 @@ fn octopus() {
 fn chair_at_degree_eight() {
     let path = data("psb/101.off");
     let points = read_mesh(&path, &ReadOptions::default()).expect("the mesh is readable").mesh.points;
-    let options = FitOptions { degree: 8, ..FitOptions::default() };
+    let options = FitOptions { degree: 8, solver: solver_under_test(), ..FitOptions::default() };
     let fit = fit("chair", &points, &options, &mut |_| ControlFlow::Continue(())).expect("the mesh is fitted");
     println!("chair: degree 8, volume {:.4} m³, {:.1} s", fit.report.volume_m3, fit.report.seconds);
     // no independent value is known; starts near and far agree on this one

@@ -87,7 +87,7 @@ fn degenerate_clouds_are_certified_or_refused_by_name() {
                     refused += 1;
                 }
                 // One of them alone need not solve every program.
-                Err(FitError::Program(_) | FitError::NotOptimal { .. } | FitError::Unproven(_)) if solver.is_some() => {
+                Err(FitError::Unsolved(_) | FitError::Unproven(_)) if solver.is_some() => {
                     println!("seed {seed}, {name}, degree {degree}: not by {solver:?}");
                 }
                 Err(error) => assert_eq!(must, Must::Decide, "seed {seed}, {name}, {solver:?}: {error}"),

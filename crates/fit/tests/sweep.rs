@@ -9,7 +9,7 @@ use sublevel_fit::{
     Fit, FitError, FitOptions, HullError, Progress, ReadOptions, fit, fit_parts, read_mesh, thicken, trim,
 };
 use sublevel_testkit::catalogue::clouds::{DRAWN_KINDS, Must, drawn, rounded_box};
-use sublevel_testkit::{Seeded, data};
+use sublevel_testkit::{Seeded, data, solver_under_test};
 
 /// A fit of a few hundred points that takes more steps goes on for ever.
 const MOST_STEPS: u32 = 100_000;
@@ -24,7 +24,7 @@ fn patient() -> impl FnMut(Progress) -> ControlFlow<()> {
 }
 
 fn fitted(points: &[Vector3<f64>], degree: usize) -> Result<Fit, FitError> {
-    let options = FitOptions { degree, ..FitOptions::default() };
+    let options = FitOptions { degree, solver: solver_under_test(), ..FitOptions::default() };
     fit("cloud", points, &options, &mut patient())
 }
 
@@ -82,7 +82,7 @@ fn every_mesh_becomes_a_compound() {
     for path in meshes() {
         let what = path.display();
         let mesh = read_mesh(&path, &ReadOptions::default()).unwrap().mesh;
-        let options = FitOptions { degree: 4, ..FitOptions::default() };
+        let options = FitOptions { degree: 4, solver: solver_under_test(), ..FitOptions::default() };
         let compound = fit_parts("mesh", &mesh, 4, &options, &mut patient())
             .unwrap_or_else(|error| panic!("{what}: {error}"))
             .compound;

@@ -8,7 +8,9 @@ pub mod catalogue;
 mod data;
 pub mod random;
 pub mod reference;
+mod solver;
 pub mod sos_bodies;
 
 pub use data::data;
 pub use random::Seeded;
+pub use solver::solver_under_test;

@@ -45,6 +45,22 @@ fn progress_message(progress: Progress) -> FitProgress {
     }
 }
 
+/// How far a fit of a message is.
+pub(in crate::service) fn progress(message: &FitProgress) -> Progress {
+    let phase = match message.phase() {
+        FitPhase::Preparing | FitPhase::Unspecified => Phase::Preparing,
+        FitPhase::Trimming => Phase::Trimming,
+        FitPhase::Fitting => Phase::Solving,
+    };
+    Progress {
+        phase,
+        rounds: message.rounds,
+        iterations: message.iterations,
+        gap: message.gap,
+        active_points: usize::try_from(message.active_points).unwrap_or(usize::MAX),
+    }
+}
+
 fn result(outcome: &FitOutcome) -> FitResult {
     FitResult {
         bodies: outcome.bodies.iter().map(fitted).collect(),

@@ -7,11 +7,10 @@ use sublevel::body::{Body, BodyId};
 use sublevel::client::{ClearanceQuestion, Clearances, ClientError};
 use sublevel::measure::Pose;
 use sublevel::robot::{read_srdf, read_urdf};
-use sublevel::scene::query::{AnswerStatus, Clearance, JointValues, StateClearance};
+use sublevel::scene::query::{Clearance, JointValues, StateClearance};
 use sublevel::scene::{
     Attach, Geometry, NamedJointValues, PlaceRobot, Placement, Question, Robot, RobotId, Scene, Stop, Subject, Update,
 };
-use sublevel::service::proto::SolveStatus;
 
 use super::{SRDF, URDF, at, cell, served};
 use crate::harness::ball;
@@ -81,10 +80,11 @@ fn same(scene: &Scene, width: usize, ours: &[StateClearance], theirs: &Clearance
         for (index, (row, near)) in ours.rows.iter().zip(&theirs.near).enumerate() {
             let names = row.pair.map(|slot| scene.object(slot).expect("an object").name.to_string());
             assert_eq!((&names, row.padding_m), (&near.pair, near.padding_m));
-            assert_eq!(row.answer.status == AnswerStatus::Converged, near.status == SolveStatus::Converged);
+            assert_eq!(row.answer.status, near.status);
             let numbers = [row.answer.lower, row.answer.upper];
             assert_eq!(numbers.map(f64::to_bits), [near.lower_m, near.upper_m].map(f64::to_bits), "{names:?}");
             assert_eq!((row.answer.normal, row.answer.gradients), (near.normal, near.gradients), "{names:?}");
+            assert_eq!(row.answer.witnesses, near.witnesses_m, "{names:?}");
             assert_eq!((row.answer.not_unique, row.answer.one_sided), (near.not_unique, near.one_sided));
             let gradient = ours.joint_gradients.get(index * width..(index + 1) * width);
             let gradient = gradient.filter(|values| width > 0 && !values.iter().any(|value| value.is_nan()));
@@ -103,7 +103,7 @@ async fn clearances_of_the_client_are_those_of_the_library() {
     // A robot, all its joints and one of them.
     for (joints, values) in [(vec![], &VALUES[..]), (vec!["lift"], &[0.3, 1.2][..])] {
         let ask = ClearanceQuestion::of_robot("one", joints.iter().copied(), 4.0).with_joint_values(values);
-        let mut cold = ask.clone();
+        let mut cold = ask.clone().with_witnesses();
         cold.request_mut().cold = true;
         let found = client.clearance("cell", cold).await.expect("answered");
         let names: Vec<Arc<str>> = joints.iter().map(|&name| name.into()).collect();
@@ -128,7 +128,7 @@ async fn clearances_of_the_client_are_those_of_the_library() {
         let nearest = client.clearance("cell", ask.with_max_pairs(1).without_gradients()).await.expect("answered");
         let [near] = &nearest.states[0].near[..] else { panic!("{nearest:?}") };
         assert_eq!(near.pair, found.states[0].closest().expect("a pair").pair);
-        assert!(near.gradients.is_none() && near.joint_gradient.is_none());
+        assert!(near.gradients.is_none() && near.joint_gradient.is_none() && near.witnesses_m.is_none());
         // The nearest with an object, whichever side it is on.
         let state = &found.states[0];
         for name in ["post", "one/arm", "two/finger"] {
@@ -142,7 +142,7 @@ async fn clearances_of_the_client_are_those_of_the_library() {
     }
     // Objects by their poses, pushed and set.
     let poses = [at(3.0, 0.0, 1.8), at(1.0, 0.2, 1.9)];
-    let mut pushed = ClearanceQuestion::new(["post"], 1.5);
+    let mut pushed = ClearanceQuestion::new(["post"], 1.5).with_witnesses();
     poses.iter().for_each(|pose| pushed.push(std::slice::from_ref(pose)));
     pushed.request_mut().cold = true;
     let found = client.clearance("cell", pushed).await.expect("answered");

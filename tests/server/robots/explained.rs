@@ -2,12 +2,11 @@
 
 use std::future::pending;
 
-use sublevel::client::SubmitError;
+use sublevel::client::{ExplainQuestion, ExplainedState, SubmitError};
 use sublevel::robot::motion::PairClass;
-use sublevel::service::proto::{ExplainRequest, Verdict};
+use sublevel::scene::query::{Certainty, StateVerdict};
 use sublevel::store::DeriveRequest;
 
-use super::questions::packed;
 use super::{at, cell, served};
 
 #[tokio::test(flavor = "multi_thread")]
@@ -19,46 +18,48 @@ async fn contacts_are_explained_and_freed() {
     let update = sublevel::scene::Update { poses: vec![("post".into(), at(1.28, 0.0, 0.3))], ..Default::default() };
     client.update_scene("cell", &update).await.expect("moved");
     let quarter = std::f64::consts::FRAC_PI_2;
-    let found = client.explain("cell", "one", [], &[quarter, 0.0], 0.0).await.expect("answered");
-    assert_eq!(found.verdict(), Verdict::Contact);
-    let pair = found.pairs.iter().find(|pair| [&pair.a, &pair.b].contains(&&"post".to_owned())).expect("the ball");
-    assert!(pair.in_contact && pair.upper_m < 0.0 && pair.normal.is_some(), "{pair:?}");
+    let ask = |values: &[f64]| ExplainQuestion::of_robot("one", []).with_joint_values(values);
+    let found = client.explain("cell", ask(&[quarter, 0.0])).await.expect("answered");
+    assert_eq!(found.verdict, StateVerdict::Contact);
+    let pair = found.pairs.iter().find(|pair| pair.pair.contains(&"post".to_owned())).expect("the ball");
+    assert!(pair.is_contact && pair.upper_m < 0.0 && pair.normal.is_some(), "{pair:?}");
+    assert_eq!(pair.certainty, Certainty::Certain, "balls are exact");
     assert!(pair.separation_m.expect("a length") >= -pair.upper_m);
-    assert_eq!(pair.joint_gradient.len(), 16);
-    let freed: Vec<f64> = found.freed_joint_values.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
+    // What overlaps reaches into the other along the normal by the depth.
+    let [deepest, other] = pair.witnesses_m.expect("points");
+    let depth = (other - deepest).dot(&pair.normal.expect("a normal"));
+    assert!(-depth >= pair.lower_m - 1e-9 && -depth <= pair.upper_m + 1e-9, "{pair:?}");
+    assert_eq!(pair.joint_gradient.as_ref().map(Vec::len), Some(2));
+    let freed = found.freed.expect("values");
     assert_eq!(freed.len(), 2);
-    let after = client.explain("cell", "one", [], &freed, 0.0).await.expect("answered");
-    assert_eq!((after.verdict(), after.pairs.len()), (Verdict::Free, 0));
+    let after = client.explain("cell", ask(&freed)).await.expect("answered");
+    assert_eq!((after.verdict, after.pairs.len(), after.freed), (StateVerdict::Free, 0, None));
     // The joints of the scene, and the same as a state of objects.
-    assert_eq!(client.explain("cell", "one", [], &[], 0.0).await.expect("answered").verdict(), Verdict::Free);
-    let pose = [1.28, 0.0, 0.35, 0.0, 0.0, 0.0, 1.0];
-    let request = ExplainRequest {
-        scene: "cell".into(),
-        objects: vec!["held".into()],
-        poses: packed(&pose),
-        ..ExplainRequest::default()
-    };
-    let found = client.explain_state(request.clone()).await.expect("answered");
-    assert_eq!((found.verdict(), found.freed_joint_values.is_empty()), (Verdict::Contact, true));
+    let standing = client.explain("cell", ask(&[])).await.expect("answered");
+    assert_eq!((standing.verdict, standing.revision), (StateVerdict::Free, after.revision));
+    let pose = at(1.28, 0.0, 0.35);
+    let held = || ExplainQuestion::new(["held"]);
+    let found = client.explain("cell", held().with_poses(&[pose])).await.expect("answered");
+    assert_eq!((found.verdict, &found.freed), (StateVerdict::Contact, &None));
+    assert!(found.pairs.iter().all(|pair| pair.joint_gradient.is_none() && pair.pair[0] == "held"), "{found:?}");
+    // A margin that reaches the other ball, 0.1 m away.
+    let beside = held().with_poses(&[at(1.28, 0.0, 0.5)]);
+    let verdict = |found: Result<ExplainedState, _>| found.expect("answered").verdict;
+    assert_eq!(verdict(client.explain("cell", beside.clone()).await), StateVerdict::Free);
+    assert_eq!(verdict(client.explain("cell", beside.with_margin(0.11)).await), StateVerdict::Contact);
     // What is no single state.
-    for (request, field) in [
-        (ExplainRequest { poses: packed(&[pose, pose].concat()), ..request.clone() }, "poses"),
-        (ExplainRequest { margin_m: f64::NAN, ..request.clone() }, "margin_m"),
-        (ExplainRequest { robot: "one".into(), ..request.clone() }, "robot"),
-        (ExplainRequest { scene: "cell".into(), robot: "nobody".into(), ..Default::default() }, "robot"),
-        (
-            ExplainRequest {
-                scene: "cell".into(),
-                robot: "one".into(),
-                joints: vec!["lift".into()],
-                joint_values: packed(&[0.0, 0.1]),
-                ..Default::default()
-            },
-            "joint_values",
-        ),
+    let mut both = held().with_poses(&[pose]);
+    both.request_mut().include_allowed = true;
+    client.explain("cell", both).await.expect("answered");
+    for (question, field) in [
+        (held().with_poses(&[pose; 2]), "poses"),
+        (held().with_poses(&[pose]).with_margin(f64::NAN), "margin_m"),
+        (ExplainQuestion::of_robot("nobody", []), "robot"),
+        (ExplainQuestion::of_robot("one", ["lift"]).with_joint_values(&[0.0, 0.1]), "joint_values"),
+        (ask(&[0.0, 0.0]).with_poses(&[pose]), "robot"),
     ] {
-        let error = client.explain_state(request).await.expect_err("refused").to_string();
-        assert!(error.contains(field), "{field}: {error}");
+        let error = client.explain("cell", question).await.expect_err(field);
+        assert_eq!(error.field().as_deref(), Some(field), "{error}");
     }
 }
 

@@ -2,8 +2,9 @@
 
 use sublevel::client::{RobotPlacement, StatesQuestion};
 use sublevel::scene::NamedJointValues;
+use sublevel::scene::query::StateVerdict;
 use sublevel::service::proto::fit_mesh::Content;
-use sublevel::service::proto::{FitMesh, LinkMesh, LoadRobotRequest, MeshFormat, Verdict};
+use sublevel::service::proto::{FitMesh, LinkMesh, LoadRobotRequest, MeshFormat};
 
 use super::{CUBE, SRDF, URDF, at, served};
 
@@ -168,9 +169,9 @@ async fn robots_of_many_kinds_are_loaded_placed_and_checked() {
         client.place_robot(&scene, &placement).await.expect("placed");
         let ask = || StatesQuestion::of_robot("robot", []).with_joint_values(&configuration);
         let alone = client.check_states(&scene, ask()).await.expect("answered");
-        assert_eq!(alone.verdicts, [Verdict::Free], "{}: {:?}", robot.name, alone.pairs);
+        assert_eq!(alone.verdicts, [StateVerdict::Free], "{}: {:?}", robot.name, alone.pairs);
         client.put_objects(&scene, [("ball", &ball, place)]).await.expect("placed");
         let met = client.check_states(&scene, ask()).await.expect("answered");
-        assert_eq!(met.verdicts, [Verdict::Contact], "{}", robot.name);
+        assert_eq!(met.verdicts, [StateVerdict::Contact], "{}", robot.name);
     }
 }

@@ -8,6 +8,7 @@ mod motions;
 mod pictures;
 mod questions;
 mod refused;
+mod witnesses;
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,6 +1,7 @@
 //! Motions and their certificates, over the wire.
 
-use sublevel::client::MotionsQuestion;
+use sublevel::client::{CertificateQuestion, MotionsQuestion};
+use sublevel::scene::query::StateVerdict;
 use sublevel::scene::{Attach, Update};
 use sublevel::service::proto::{CheckMotionsRequest, MovingObjects, Verdict, VerifyMotionRequest};
 
@@ -36,7 +37,7 @@ async fn whole_motions_are_proven_or_their_first_contact_is_bracketed() {
     first.request_mut().first_contact = true;
     let found = client.check_motions("cell", first).await.expect("answered");
     let verdicts: Vec<_> = found.motions.iter().map(|motion| motion.verdict).collect();
-    assert_eq!(verdicts, [Verdict::Contact, Verdict::Free, Verdict::Invalid]);
+    assert_eq!(verdicts, [StateVerdict::Contact, StateVerdict::Free, StateVerdict::Invalid]);
     let (pair, s) = found.motions[0].contact.clone().expect("a contact");
     assert!(pair.contains(&"post".to_owned()), "{pair:?}");
     let alpha = found.motions[0].alpha;
@@ -46,29 +47,29 @@ async fn whole_motions_are_proven_or_their_first_contact_is_bracketed() {
     let states = sublevel::client::StatesQuestion::of_robot("one", ["lift"]);
     let states = states.with_joint_values(&[QUARTER * (alpha - 1e-6), QUARTER * (s + 1e-6)]);
     let states = client.check_states("cell", states).await.expect("answered");
-    assert_eq!(states.verdicts, [Verdict::Free, Verdict::Contact]);
+    assert_eq!(states.verdicts, [StateVerdict::Free, StateVerdict::Contact]);
     let mut stopping = ask();
     stopping.request_mut().stop_at_first = true;
     let found = client.check_motions("cell", stopping).await.expect("answered");
-    assert!(found.motions[1..].iter().all(|motion| motion.verdict != Verdict::Contact));
+    assert!(found.motions[1..].iter().all(|motion| motion.verdict != StateVerdict::Contact));
     // A certificate holds by itself and against the scene, until that changes.
     let free = MotionsQuestion::of_robot("one", ["lift"]).with_path([&[0.0][..], &[-QUARTER]]).with_certificates();
     let found = client.check_motions("cell", free).await.expect("answered");
     let certificate = found.motions[0].certificate.clone().expect("a certificate");
-    let alone = VerifyMotionRequest { certificate: certificate.clone(), ..Default::default() };
-    assert!(client.verify_motion(alone).await.expect("answered").holds);
-    let of_scene = || VerifyMotionRequest {
-        certificate: certificate.clone(),
-        scene: "cell".into(),
-        robot: "one".into(),
-        ..Default::default()
-    };
+    let alone = client.verify_motion(CertificateQuestion::new(certificate.clone())).await.expect("answered");
+    assert!(alone.holds() && alone.revision.is_none(), "{alone:?}");
+    let of_scene = || CertificateQuestion::new(certificate.clone()).of_robot("cell", "one");
     let verified = client.verify_motion(of_scene()).await.expect("answered");
-    assert!(verified.holds && verified.clearance_lower_m > 0.0 && verified.scene_revision > 0, "{verified:?}");
+    assert_eq!((verified.revision, &verified.proof), (Some(found.revision), &alone.proof));
+    let proven = verified.proof.expect("it holds");
+    assert!(proven.clearance_lower_m > 0.0 && proven.configurations > 0, "{proven:?}");
+    let wider = client.verify_motion(of_scene().with_margin(0.01)).await.expect("answered");
+    assert!(wider.proof.expect_err("another margin").contains("margin"));
     let moved = Update { poses: vec![("post".into(), at(-1.3, 0.0, 0.3))], ..Update::default() };
     client.update_scene("cell", &moved).await.expect("moved");
     let refused = client.verify_motion(of_scene()).await.expect("answered");
-    assert!(!refused.holds && refused.reason.contains("obstacles"), "{refused:?}");
+    assert!(!refused.holds() && refused.revision > Some(found.revision), "{refused:?}");
+    assert!(refused.proof.expect_err("it does not hold").contains("obstacles"));
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -90,6 +91,23 @@ async fn obstacles_may_move_meanwhile() {
     let found = clients.queries.check_motions(request.clone()).await.expect("answered").into_inner();
     assert_eq!(&found.verdicts[..], [Verdict::Contact as u8]);
     assert!(found.objects.contains(&"post".to_owned()));
+    // The typed client asks the same; a certificate is about what moves, too.
+    let ask = |x: [f64; 2], z: f64| {
+        let path = MotionsQuestion::of_robot("one", ["lift"]).with_path([&[0.0][..], &[0.0]]);
+        path.with_moving([("post", x.map(|x| at(x, 0.0, z)))])
+    };
+    let mut first = ask([2.0, -1.0], 1.3);
+    first.request_mut().first_contact = true;
+    let typed = client.check_motions("cell", first).await.expect("answered");
+    assert_eq!(typed.verdicts(), [StateVerdict::Contact]);
+    assert_eq!(typed.motions[0].alpha.to_le_bytes()[..], found.alpha[..]);
+    let free = client.check_motions("cell", ask([2.0, 1.5], 1.3).with_certificates()).await.expect("answered");
+    let certificate = free.motions[0].certificate.clone().expect("a certificate");
+    let still = CertificateQuestion::new(certificate).of_robot("cell", "one");
+    let with_post = still.clone().with_moving([("post", [at(2.0, 0.0, 1.3), at(1.5, 0.0, 1.3)])]);
+    assert!(client.verify_motion(with_post).await.expect("answered").holds());
+    let still = client.verify_motion(still).await.expect("answered").proof;
+    assert!(still.expect_err("nothing moves").contains("obstacles"));
     // High above, it carries what hangs where it was before.
     let thing = client.create_ball("thing", 0.05).await.expect("a ball");
     client.put_objects("cell", [("load", &thing, at(0.0, 0.0, 9.0))]).await.expect("placed");

@@ -1,8 +1,9 @@
 //! States and clearances by joint values, over the wire.
 
 use sublevel::client::StatesQuestion;
+use sublevel::scene::query::StateVerdict;
 use sublevel::scene::{Subject, Update};
-use sublevel::service::proto::{ClearanceRequest, EvaluateRequest, Measure, Verdict};
+use sublevel::service::proto::{ClearanceRequest, EvaluateRequest, Measure};
 
 use super::{at, cell, joints, served};
 use crate::harness::{pair, question};
@@ -27,7 +28,7 @@ async fn states_by_joint_values_with_what_is_held() {
     let values = [0.0, 0.0, quarter, 0.0, f64::NAN, 0.0, 2.1, 0.0, -quarter, 0.2];
     let ask = || StatesQuestion::of_robot("one", []).with_joint_values(&values);
     let found = client.check_states("cell", ask()).await.expect("answered");
-    let (free, contact, invalid) = (Verdict::Free, Verdict::Contact, Verdict::Invalid);
+    let (free, contact, invalid) = (StateVerdict::Free, StateVerdict::Contact, StateVerdict::Invalid);
     assert_eq!(found.verdicts, [free, contact, invalid, invalid, free]);
     let pair = found.pairs[1].clone().expect("a pair");
     assert!(pair.contains(&"post".to_owned()), "{pair:?}");

@@ -8,7 +8,6 @@ use sublevel::client::{Client, RobotPlacement, StatesQuestion};
 use sublevel::measure::Pose;
 use sublevel::scene::query::{JointValues, StateVerdict, States};
 use sublevel::scene::{Crew, NamedJointValues, RobotId};
-use sublevel::service::proto::Verdict;
 
 use super::arm::Arm;
 use super::place::{ARM, Site, rules};
@@ -103,7 +102,7 @@ impl RobotServer {
                 insides.push(1e6 * start.elapsed().as_secs_f64());
                 calls.push(1e6 * call);
             }
-            free_there = verdicts.iter().filter(|&&verdict| verdict == Verdict::Free).count();
+            free_there = verdicts.iter().filter(|&&verdict| verdict == StateVerdict::Free).count();
             free = answers.iter().filter(|answer| answer.verdict == StateVerdict::Free).count();
         }
         self.server.clients().block_on(self.client.delete_scene(SCENE))?;

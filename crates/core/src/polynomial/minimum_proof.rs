@@ -113,6 +113,12 @@ impl PairPolynomial {
         self.0.iter().map(|(exponents, coefficient)| (*exponents, coefficient.middle()))
     }
 
+    /// Its monomials but those whose coefficients may be zero, as far as they are known.
+    pub fn support(&self) -> impl Iterator<Item = PairExponents> {
+        let may_be_zero = |coefficient: &Interval| !coefficient.magnitude().is_nan() && !coefficient.is_nonzero();
+        self.0.iter().filter(move |(_, coefficient)| !may_be_zero(coefficient)).map(|(exponents, _)| *exponents)
+    }
+
     fn add(&mut self, exponents: PairExponents, value: Interval) {
         let sum = self.0.entry(exponents).or_insert(Interval::ZERO);
         *sum = *sum + value;

@@ -2,8 +2,8 @@
 
 use super::program::ConicProgram;
 use crate::FitError;
-use crate::program::ProgramError;
 use crate::progress::Watch;
+use crate::unsolved::{ProgramError, Stop};
 use clarabel::solver::{DefaultInfo, DefaultSettings, DefaultSolver, IPSolver, SolverStatus};
 use nalgebra::{DMatrix, DVector};
 // Links the BLAS that clarabel's semidefinite cones call.
@@ -32,6 +32,8 @@ pub(crate) struct ConicSolution {
     pub(crate) variables: Vec<f64>,
     /// Multiplier of each row.
     pub(crate) multipliers: Vec<f64>,
+    /// How it ended, if short of the tolerance asked for.
+    pub(crate) stop: Option<Stop>,
 }
 
 impl ConicSolution {
@@ -70,7 +72,7 @@ pub(crate) fn solve(
     watch: &mut Watch,
 ) -> Result<ConicSolution, FitError> {
     if !program.is_finite() {
-        return Err(ProgramError::Solver("a number of the program is not finite".to_owned()).into());
+        return Err(ProgramError::Solver("a number of the program is not finite").into());
     }
     let _alone = lock(watch)?;
     // The solver's callback must not borrow `watch`: the solver runs on a thread of its own, and
@@ -112,7 +114,7 @@ pub(crate) fn solve(
         return Err(FitError::Cancelled);
     }
     // A panic is one of the solver or of its BLAS about the numbers it met.
-    solved.unwrap_or_else(|_| Err(ProgramError::Solver("it panicked".to_owned()))).map_err(FitError::from)
+    solved.unwrap_or(Err(ProgramError::Solver("it panicked"))).map_err(FitError::from)
 }
 
 /// Waits for the solver, and meanwhile asks whether to continue.
@@ -155,7 +157,7 @@ fn run(
     };
     let (quadratic, linear, constraints, constants, cones) = program.standard();
     let mut solver = DefaultSolver::new(&quadratic, linear, &constraints, constants, cones, settings)
-        .map_err(|error| ProgramError::Solver(error.to_string()))?;
+        .map_err(|error| ProgramError::Refused(error.to_string()))?;
     solver.set_termination_callback(callback);
     solver.solve();
     let solution = solver.solution;
@@ -168,7 +170,21 @@ fn run(
     }
     let finite = solution.x.iter().chain(&solution.z).all(|value| value.is_finite());
     if !finite {
-        return Err(ProgramError::Solver("its numbers are not finite".to_owned()));
+        return Err(ProgramError::Solver(match stop(status) {
+            Some(Stop::NumericalError) => "it met numerical errors, and its numbers are not finite",
+            _ => "its numbers are not finite",
+        }));
     }
-    Ok(ConicSolution { variables: solution.x, multipliers: solution.z })
+    Ok(ConicSolution { variables: solution.x, multipliers: solution.z, stop: stop(status) })
+}
+
+/// How the solver ended, if short of its tolerance.
+fn stop(status: SolverStatus) -> Option<Stop> {
+    match status {
+        SolverStatus::AlmostSolved => Some(Stop::Almost),
+        SolverStatus::InsufficientProgress => Some(Stop::Stalled),
+        SolverStatus::NumericalError => Some(Stop::NumericalError),
+        SolverStatus::MaxIterations => Some(Stop::Iterations),
+        _ => None,
+    }
 }

@@ -1,7 +1,7 @@
 use super::{ConicProgram, ConicSolution, Expression, geometric_mean, solve};
 use crate::FitError;
-use crate::program::ProgramError;
 use crate::progress::Watch;
+use crate::unsolved::ProgramError;
 use nalgebra::DMatrix;
 use std::ops::ControlFlow;
 use sublevel_testkit::Seeded;
@@ -79,6 +79,22 @@ fn what_has_no_optimum_is_an_error() {
     let x = broken.variable(f64::NAN);
     broken.nonnegative([Expression::of(x)]);
     assert!(matches!(solved(&broken), Err(FitError::Program(ProgramError::Solver(_)))));
+}
+
+/// Short of a tolerance that rounding does not leave, the answer says so, and is one all the same.
+#[test]
+fn answers_say_where_the_solver_stopped_short() {
+    let mut unwatched = |_| ControlFlow::Continue(());
+    for seed in 0..10 {
+        let program = random_program(seed);
+        let plain = solved(&program).unwrap();
+        assert_eq!(plain.stop, None, "seed {seed}");
+        let fine = solve(&program, 1e-30, 1.0, &mut Watch::new(&mut unwatched)).unwrap();
+        println!("seed {seed}: {:?}", fine.stop);
+        assert!(fine.stop.is_some(), "seed {seed}");
+        let apart = plain.variables.iter().zip(&fine.variables).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(apart < 1e-3, "seed {seed}: {apart}");
+    }
 }
 
 /// A random program: `max log det`-like trace over an interval of matrices.

@@ -11,9 +11,10 @@ use crate::margin::{DEFAULT_MARGIN, MARGIN_ATTEMPTS};
 use crate::moment_program::MomentProgram;
 use crate::object::Object;
 use crate::path::Interior;
-use crate::program::{Problem, ProgramError};
+use crate::program::Problem;
 use crate::progress::{Progress, Watch};
 use crate::structure::Structure;
+use crate::unsolved::{Fault, ProgramError};
 use nalgebra::{DMatrix, Vector3};
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -83,16 +84,18 @@ pub fn enclose(
         let problem = Problem::new(&structure, Objective::LogDetP, &coordinates, margin);
         let sources = sources(&structure, &prepared, &maps, multiplier_margin(factor));
         watch.round(regions.len(), 0.0);
+        let EncloseOptions { degree, multiplier_degree } = *options;
+        let unsolved = |source| EncloseError::Unsolved { degree, multiplier_degree, sets: regions.len(), source };
         let optimum = MomentProgram::new(&problem, sources).solve(&mut watch).map_err(|error| match error {
-            FitError::Program(source) => {
-                EncloseError::Unsolved { multiplier_degree: options.multiplier_degree, source }
-            }
+            FitError::Program(source) => unsolved(source),
             error => error.into(),
         })?;
-        let objective_value = problem.spectral.measure(&optimum.gram).ok_or(FitError::from(ProgramError::Singular))?;
+        let stop = optimum.stop;
+        let objective_value =
+            problem.spectral.measure(&optimum.gram).ok_or_else(|| unsolved(ProgramError::singular(stop)))?;
         let optimality_gap = objective_value - optimum.lower_bound;
         if !(optimality_gap.abs() <= ENCLOSURE_OPTIMALITY_GAP * objective_value.abs().max(1.0)) {
-            return Err(FitError::NotOptimal { gap: optimality_gap }.into());
+            return Err(unsolved(ProgramError::Unusable { stop, fault: Fault::Gap(optimality_gap) }));
         }
         let Interior { coefficients, hessian } = optimum.interior;
         let terms = structure.monomials.iter().copied().zip(coefficients.iter().copied()).collect();

@@ -1,7 +1,7 @@
 //! Why there is no body around sets.
 
 use crate::error::FitError;
-use crate::program::ProgramError;
+use crate::unsolved::ProgramError;
 use sublevel_core::polynomial::NotContaining;
 
 /// Most sets in one body.
@@ -43,13 +43,17 @@ pub enum EncloseError {
     Fit(#[from] FitError),
     /// No multipliers were found.
     #[error(
-        "no body with multipliers of degree {multiplier_degree} was found around the sets ({source}); raise the degree of the multipliers, \
-         or that of the body"
+        "clarabel found no body of degree {degree} with multipliers of degree {multiplier_degree} around {sets} set(s): {source}; {}",
+        remedy(.source)
     )]
     Unsolved {
+        /// Degree of the body.
+        degree: usize,
         /// Least degree of the multipliers.
         multiplier_degree: usize,
-        /// What the solver said.
+        /// How many sets.
+        sets: usize,
+        /// What happened.
         source: ProgramError,
     },
     /// A containment could not be proven.
@@ -60,6 +64,16 @@ pub enum EncloseError {
         /// Why the proof fails.
         source: NotContaining,
     },
+}
+
+/// What to do about a program that was not solved: of degrees that are too low there is no body.
+fn remedy(why: &ProgramError) -> &'static str {
+    match why {
+        ProgramError::Infeasible | ProgramError::Unbounded => {
+            "raise the degree of the multipliers, or that of the body"
+        }
+        _ => "lower the degree of the body or of the multipliers, or enclose fewer sets",
+    }
 }
 
 impl EncloseError {

@@ -8,8 +8,8 @@ use super::error::EncloseError;
 use super::options::EncloseOptions;
 use super::program::prepare;
 use super::region::{Prepared, Region};
-use crate::FitError;
 use crate::margin_program::{Margin, largest_margin};
+use crate::unsolved::ProgramError;
 use nalgebra::DVector;
 use sublevel_core::body::{BasicSet, Body, Containment};
 use sublevel_core::polynomial::{ContainmentProof, NotContaining, Substituted};
@@ -46,8 +46,18 @@ pub enum NoContainment {
         bound: f64,
     },
     /// The search failed.
-    #[error("a proof could not be looked for: {0}")]
-    Unsolved(FitError),
+    #[error(
+        "clarabel did not solve the program of a proof of degree {degree} with multipliers of degree {multiplier_degree}: {why}; \
+         take multipliers of another degree"
+    )]
+    Unsolved {
+        /// Degree of the body.
+        degree: usize,
+        /// Least degree of the multipliers.
+        multiplier_degree: usize,
+        /// What happened.
+        why: ProgramError,
+    },
     /// What was found is not proven.
     #[error(transparent)]
     Unproven(#[from] NotContaining),
@@ -69,9 +79,10 @@ pub fn containment(body: &Body, region: &Region, multiplier_degree: usize) -> Re
     let map = prepared.frame.to(outer.normalization);
     let set_map = prepared.frame.to(region.set.normalization);
     let set = Substituted { polynomials: &region.set.polynomials, map: &set_map };
+    let unsolved = |why| NoContainment::Unsolved { degree: body.degree(), multiplier_degree, why };
     let proof = |(constraint, &polynomial)| {
         let slack = -prepared.see(polynomial, outer.normalization);
-        let Margin { bound, mut grams } = margin(&prepared, slack).map_err(NoContainment::Unsolved)?;
+        let Margin { bound, mut grams } = margin(&prepared, slack).map_err(unsolved)?;
         if bound < -LEAST_PROVABLE_BOUND {
             return Err(NoContainment::None { constraint, multiplier_degree, bound });
         }
@@ -85,7 +96,7 @@ pub fn containment(body: &Body, region: &Region, multiplier_degree: usize) -> Re
 }
 
 /// The Gram matrices with the largest margin for `1 + minus_p`.
-fn margin(prepared: &Prepared, minus_p: DVector<f64>) -> Result<Margin, FitError> {
+fn margin(prepared: &Prepared, minus_p: DVector<f64>) -> Result<Margin, ProgramError> {
     let mut target = minus_p;
     target[0] += 1.0;
     largest_margin(&target, &prepared.cones, &prepared.mean)

@@ -5,7 +5,7 @@ use crate::FitError;
 use crate::basis::{Affine, of_monomials};
 use crate::localizing::LocalizingMatrix;
 use crate::object::Object;
-use crate::program::ProgramError;
+use crate::unsolved::ProgramError;
 use nalgebra::{DVector, Matrix3, Vector3};
 use sublevel_core::body::{BasicSet, Body, Normalization, Obstacle, ProofFrame, SosBody};
 use sublevel_core::polynomial::{Polynomial, degree_of, monomials, position};

@@ -1,6 +1,7 @@
 //! Why there is no bracket.
 
 use crate::error::FitError;
+use crate::unsolved::ProgramError;
 
 /// Highest level that can be asked for: the next one has a matrix of 210 rows for both points
 /// alone.
@@ -40,7 +41,28 @@ pub enum HierarchyError {
     /// No functional is what points of the sets would be.
     #[error("sets: at least one is empty: no point of it satisfies all constraints; send sets that have points")]
     Empty,
-    /// The program could not be solved, or was cancelled.
+    /// The program was not solved.
+    #[error(
+        "level: clarabel did not solve the program of level {level}, whose matrices have {rows} entries: {why}; {}",
+        remedy(*.level)
+    )]
+    Unsolved {
+        /// The level.
+        level: usize,
+        /// Entries of the triangles of all matrices.
+        rows: usize,
+        /// What happened.
+        why: ProgramError,
+    },
+    /// The solve was cancelled.
     #[error(transparent)]
     Fit(#[from] FitError),
+}
+
+fn remedy(level: usize) -> &'static str {
+    if level > 0 {
+        "lower the level, or the degree of the sets"
+    } else {
+        "lower the degree of the sets, or raise the level"
+    }
 }

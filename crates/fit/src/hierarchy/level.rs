@@ -6,9 +6,8 @@ use super::minimisers::{are_all, attaining};
 use super::moments::MomentRelaxation;
 use super::placed_set::PlacedSet;
 use super::solve::{EXACT, check, check_size, solved};
-use crate::error::FitError;
-use crate::program::ProgramError;
 use crate::progress::{Progress, Watch};
+use crate::unsolved::ProgramError;
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -94,12 +93,12 @@ pub fn hierarchy_level_distance(
         let relaxation = MomentRelaxation::of_one(&objectives, degree, second, level).with_expected(unit);
         let (solution, rows) = match solved(&relaxation, level, &mut watch) {
             // Constraints that do not bound the set: the box does.
-            Err(HierarchyError::Fit(FitError::Program(ProgramError::Unbounded))) => {
+            Err(HierarchyError::Unsolved { why: ProgramError::Unbounded, .. }) => {
                 is_solved = true;
                 break;
             }
             // The other unit may do.
-            Err(error @ HierarchyError::Fit(FitError::Program(_))) => {
+            Err(error @ HierarchyError::Unsolved { .. }) => {
                 failed = Some(error);
                 continue;
             }

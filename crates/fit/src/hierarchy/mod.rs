@@ -9,9 +9,10 @@
 //! (Lasserre, SIAM J. Optim. 11, 2001). f couples the sets by the products of their coordinates
 //! alone, so the squares are of three groups of monomials: those of u, those of v, and of both up
 //! to degree 1 + level (Waki, Kim, Kojima and Muramatsu, SIAM J. Optim. 17, 2006): matrices of 10,
-//! 10 and 7 rows at degree 4 and level 0, where all monomials of both would make one of 28. Level 0
-//! is exact for sos-convex sets; for others it is a lower bound, which rises with the level. Of one
-//! point alone, the level distance has one group (`level.rs`).
+//! 10 and 7 rows at degree 4 and level 0, where all monomials of both would make one of 28. Where
+//! changes of signs of coordinates leave f and all g as they are, each falls apart into blocks
+//! (`sign_symmetry.rs`). Level 0 is exact for sos-convex sets; for others it is a lower bound,
+//! which rises with the level. Of one point alone, the level distance has one group (`level.rs`).
 //!
 //! The program is solved in its dual, over moments; what comes out is proven from the numbers alone
 //! ([`PairPolynomial::lower_bound`]), in the normalized coordinates of the sets, where the
@@ -28,6 +29,7 @@ mod local_search;
 mod minimisers;
 mod moments;
 mod placed_set;
+mod sign_symmetry;
 mod solve;
 
 pub use error::{HierarchyError, MAX_LEVEL};

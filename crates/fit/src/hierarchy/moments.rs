@@ -2,6 +2,7 @@
 
 use super::atoms::{Atoms, atoms, rank};
 use super::placed_set::PlacedSet;
+use super::sign_symmetry::SignSymmetry;
 use crate::conic_program::{ConicProgram, ConicSolution, Expression};
 use nalgebra::{DMatrix, Vector3};
 use std::collections::BTreeMap;
@@ -17,15 +18,18 @@ struct Localized<'a> {
 }
 
 /// `minimise max_i f_i(y)` over functionals y on polynomials of one or two points that are
-/// nonnegative on squares of groups of monomials and on squares times each `1 - g`.
+/// nonnegative on squares of groups of monomials and on squares times each `1 - g`, and that no
+/// sign symmetry changes.
 pub(super) struct MomentRelaxation<'a> {
     objectives: Vec<Vec<(PairExponents, f64)>>,
     /// What the objectives are divided by.
     unit: f64,
     /// Powers of two near the bounds of the coordinates, by which these are divided.
     scales: [f64; 6],
+    /// Those of a group are blocks of its matrix.
     matrices: Vec<Localized<'a>>,
-    /// Variable of each moment of the divided coordinates.
+    /// Variable of each moment of the divided coordinates; the moments of all other monomials are
+    /// zero.
     moments: BTreeMap<PairExponents, usize>,
     points: Vec<SetPoint<'a>>,
 }
@@ -63,20 +67,49 @@ impl<'a> MomentRelaxation<'a> {
     /// For `f(u, v)` of points of two sets that couples them by products of their coordinates
     /// alone.
     pub(super) fn of_two(objective: &PairPolynomial, sets: [&'a PlacedSet<'a>; 2], level: usize) -> Self {
+        let objectives = std::slice::from_ref(objective);
+        let symmetry = SignSymmetry::new(objectives, &[(sets[0], Point::First), (sets[1], Point::Second)]);
+        Self::of_two_with(objective, sets, level, &symmetry)
+    }
+
+    /// The same in the blocks of a symmetry.
+    pub(super) fn of_two_with(
+        objective: &PairPolynomial,
+        sets: [&'a PlacedSet<'a>; 2],
+        level: usize,
+        symmetry: &SignSymmetry,
+    ) -> Self {
         let both = Localized { basis: pairs_up_to(1 + level), constraint: None };
         let points = [(sets[0], Point::First), (sets[1], Point::Second)];
         let points = points.map(|(set, point)| SetPoint { set, point, half_degree: highest_degree(set) / 2 + level });
-        Self::new(std::slice::from_ref(objective), vec![both], points.into())
+        Self::new(std::slice::from_ref(objective), vec![both], points.into(), symmetry)
     }
 
     /// For the largest of the polynomials `f_i(u)` of the point of a set, of degrees up to
     /// `degree`.
     pub(super) fn of_one(objectives: &[PairPolynomial], degree: usize, set: &'a PlacedSet<'a>, level: usize) -> Self {
-        let half_degree = degree.max(highest_degree(set)) / 2 + level;
-        Self::new(objectives, Vec::new(), vec![SetPoint { set, point: Point::First, half_degree }])
+        let symmetry = SignSymmetry::new(objectives, &[(set, Point::First)]);
+        Self::of_one_with(objectives, degree, set, level, &symmetry)
     }
 
-    fn new(objectives: &[PairPolynomial], mut matrices: Vec<Localized<'a>>, points: Vec<SetPoint<'a>>) -> Self {
+    /// The same in the blocks of a symmetry.
+    pub(super) fn of_one_with(
+        objectives: &[PairPolynomial],
+        degree: usize,
+        set: &'a PlacedSet<'a>,
+        level: usize,
+        symmetry: &SignSymmetry,
+    ) -> Self {
+        let half_degree = degree.max(highest_degree(set)) / 2 + level;
+        Self::new(objectives, Vec::new(), vec![SetPoint { set, point: Point::First, half_degree }], symmetry)
+    }
+
+    fn new(
+        objectives: &[PairPolynomial],
+        mut matrices: Vec<Localized<'a>>,
+        points: Vec<SetPoint<'a>>,
+        symmetry: &SignSymmetry,
+    ) -> Self {
         for &SetPoint { set, point, half_degree } in &points {
             let basis = |degree: usize| monomials(degree).into_iter().map(|e| point.exponents(e)).collect();
             matrices.push(Localized { basis: basis(half_degree), constraint: None });
@@ -88,6 +121,10 @@ impl<'a> MomentRelaxation<'a> {
                     .map(|&g| Localized { basis: basis(half_degree - g.degree() / 2), constraint: Some((g, point)) }),
             );
         }
+        let blocks = |Localized { basis, constraint }: Localized<'a>| {
+            symmetry.blocks(basis).into_iter().map(move |basis| Localized { basis, constraint })
+        };
+        let matrices: Vec<_> = matrices.into_iter().flat_map(blocks).collect();
         let mut moments = BTreeMap::new();
         let pure = matrices.iter().filter(|matrix| matrix.constraint.is_none());
         for Localized { basis, .. } in pure {
@@ -105,7 +142,8 @@ impl<'a> MomentRelaxation<'a> {
         }
         let scales = PairPolynomial::scales(&most);
         let divided = |(exponents, coefficient)| (exponents, coefficient * power(&scales, &exponents));
-        let objectives: Vec<Vec<_>> = objectives.iter().map(|f| f.terms().map(divided).collect()).collect();
+        let kept = |f: &PairPolynomial| f.terms().filter(|term| symmetry.keeps(&term.0)).map(divided).collect();
+        let objectives: Vec<Vec<_>> = objectives.iter().map(kept).collect();
         let coefficients = objectives.iter().flatten().map(|term| term.1.abs());
         let unit = coefficients.fold(f64::MIN_POSITIVE, f64::max);
         Self { objectives, unit, scales, matrices, moments, points }
@@ -194,13 +232,18 @@ impl<'a> MomentRelaxation<'a> {
         squares
     }
 
+    /// The moment of a monomial of the divided coordinates.
+    fn moment(&self, solution: &ConicSolution, exponents: &PairExponents) -> f64 {
+        self.moments.get(exponents).map_or(0.0, |&variable| solution.variables[variable])
+    }
+
     /// The mean of each point, in the common frame: the minimiser where it is unique and the level
     /// is exact.
     pub(super) fn first_moments(&self, solution: &ConicSolution) -> Vec<Vector3<f64>> {
         let mean = |SetPoint { set, point, .. }: &SetPoint| {
             let moment = |k: usize| {
                 let unit = point.exponents(std::array::from_fn(|i| u8::from(i == k)));
-                solution.variables[self.moments[&unit]] * power(&self.scales, &unit)
+                self.moment(solution, &unit) * power(&self.scales, &unit)
             };
             set.in_common_frame(&Vector3::from_fn(|k, _| moment(k)))
         };
@@ -209,7 +252,7 @@ impl<'a> MomentRelaxation<'a> {
 
     /// The points that each point's moments are those of, in the common frame.
     pub(super) fn atoms(&self, solution: &ConicSolution) -> Vec<Atoms> {
-        let value = |exponents: &PairExponents| solution.variables[self.moments[exponents]];
+        let value = |exponents: &PairExponents| self.moment(solution, exponents);
         let rank_of = |basis: &[PairExponents]| {
             rank(DMatrix::from_fn(basis.len(), basis.len(), |i, j| value(&product(&basis[i], &basis[j]))))
         };

@@ -5,8 +5,8 @@ use super::moments::{MomentRelaxation, Rows};
 use super::placed_set::PlacedSet;
 use crate::conic_program::{ConicSolution, solve};
 use crate::error::FitError;
-use crate::program::ProgramError;
 use crate::progress::Watch;
+use crate::unsolved::ProgramError;
 
 /// Width of a bracket, relative to the size of the sets or to a level, at which its lower bound is
 /// called exact.
@@ -40,6 +40,7 @@ pub(super) fn solved(
     let (program, rows) = relaxation.program();
     let solution = solve(&program, TOLERANCE, relaxation.unit(), watch).map_err(|error| match error {
         FitError::Program(ProgramError::Infeasible) => HierarchyError::Empty,
+        FitError::Program(why) => HierarchyError::Unsolved { level, rows: relaxation.rows(), why },
         error => error.into(),
     })?;
     Ok((solution, rows))

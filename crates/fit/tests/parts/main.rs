@@ -12,7 +12,7 @@ use sublevel_fit::{
     CompoundFit, FitOptions, Mesh, PartSearch, Progress, ReadOptions, Representation, Shortfall, cheapest_within,
     convex_parts, fit_parts, read_mesh,
 };
-use sublevel_testkit::data;
+use sublevel_testkit::{data, solver_under_test};
 
 fn unwatched(_: Progress) -> ControlFlow<()> {
     ControlFlow::Continue(())
@@ -29,7 +29,7 @@ fn parts(mesh: &Mesh, parts: usize, options: &FitOptions) -> CompoundFit {
 }
 
 fn degree(degree: usize) -> FitOptions {
-    FitOptions { degree, ..FitOptions::default() }
+    FitOptions { degree, solver: solver_under_test(), ..FitOptions::default() }
 }
 
 /// Total volume of the hulls of the content of the parts of a compound, m³.

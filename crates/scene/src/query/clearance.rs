@@ -1,4 +1,4 @@
-//! Pairs within an influence distance, state by state, with gradients.
+//! Pairs within an influence distance, state by state, with nearest points and gradients.
 
 use std::collections::BTreeMap;
 
@@ -27,7 +27,7 @@ const CHUNK: usize = 16;
 pub struct ClearanceRow {
     /// A moving object, then the other one.
     pub pair: [Slot; 2],
-    /// Signed distance with its gradients.
+    /// Signed distance with its witnesses and gradients.
     pub answer: Answer,
     /// Padding of the pair, metres.
     pub padding_m: f64,

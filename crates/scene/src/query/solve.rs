@@ -153,7 +153,8 @@ impl Solver<'_> {
         let value = found.value();
         Answer {
             value: if value.is_finite() { value } else { f64::NAN },
-            witnesses: Some([found.witness_a, found.witness_b]),
+            // Without an upper bound the points are none of the two.
+            witnesses: (found.upper < f64::INFINITY).then_some([found.witness_a, found.witness_b]),
             normal: found.normal,
             gradients: found.gradients.filter(|_| self.ask.gradients),
             not_unique: found.tied,
