@@ -105,7 +105,7 @@ impl ProgramError {
 pub struct Failure {
     /// Which one.
     pub solver: Solver,
-    /// Points in its last program.
+    /// Points in its last program, some of its own inside of the hull among them.
     pub points: usize,
     /// What happened.
     pub why: ProgramError,
