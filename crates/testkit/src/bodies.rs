@@ -114,6 +114,23 @@ fn octahedral_prism(degree: u8) -> Constraint {
     certified(coefficients.into_iter().collect(), basis, gram)
 }
 
+/// Q6 that slabs across x and z cut, at 0.8 and 0.6 of its half-axes: three constraints.
+pub fn cut(x: f64, y: f64, z: f64) -> Body {
+    kept("cut Q6", [x, y, z], || {
+        let whole = q(6, x, y, z);
+        let slab = |axis: u8, half: f64| {
+            known(&format!("slab {axis} {half}"), || {
+                let exponents = std::array::from_fn(|k| if k == usize::from(axis) { 2 } else { 0 });
+                let basis = vec![HessianMonomial { direction: axis, exponents: [0; 3] }];
+                let coefficient = 1.0 / (half * half);
+                certified(vec![(exponents, coefficient)], basis, DMatrix::from_element(1, 1, 2.0 * coefficient))
+            })
+        };
+        let constraints = vec![whole.constraints()[0].clone(), slab(0, 0.8), slab(2, 0.6)];
+        Body::new("cut Q6", *whole.normalization(), constraints)
+    })
+}
+
 /// B: box with these half-extents.
 pub fn b(x: f64, y: f64, z: f64) -> Body {
     kept("B", [x, y, z], || Body::cuboid("B", Vector3::new(x, y, z)))

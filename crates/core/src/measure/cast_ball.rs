@@ -66,7 +66,7 @@ fn cast_at(body: &Body, pose: &Pose, sweep: &Sweep, tolerance: f64, options: &Op
         Some(found) => found,
         None => return RayCast::Miss,
     };
-    let projection = Projection::new(body, pose);
+    let projection = Projection::rough(body, pose);
     let mut warm = WarmStart::default();
     let mut s = entry.from;
     let (mut steps, mut idle, mut last) = ([f64::INFINITY; 2], 0, None::<(f64, f64)>);
@@ -79,10 +79,10 @@ fn cast_at(body: &Body, pose: &Pose, sweep: &Sweep, tolerance: f64, options: &Op
         let off = gamma(4) * (ray.origin().norm() + (base + s).abs());
         let found = projection.to(&center, 0.05 * tolerance, options, &mut warm);
         iterations += found.iterations + 1;
-        let slope = found.normal.dot(ray.direction());
+        let slope = found.plane.dot(ray.direction());
         let error = ROTATION_ERROR + gamma(16);
         let excess = found.lower - radius - off - 4.0 * f64::EPSILON * radius;
-        if found.normal != Vector3::zeros() && found.lower > 0.0 {
+        if found.plane != Vector3::zeros() && found.lower > 0.0 {
             entry.cut(s, excess, slope - error, slope + error);
         }
         if entry.missed() {

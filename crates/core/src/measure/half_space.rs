@@ -12,7 +12,7 @@ use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::{At, Least, bracketed, least};
-use crate::measure::solver::projection::{Objective, Single, SingleProblem, solve_single};
+use crate::measure::solver::projection::{Objective, Single, SingleProblem, Worth, solve_single};
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
@@ -111,9 +111,9 @@ pub struct HalfSpaceDistance {
 }
 
 impl HalfSpaceDistance {
-    /// The answer inside the bracket: the upper bound, which the witness attains.
+    /// The answer: the middle of the bracket.
     pub fn value(&self) -> f64 {
-        self.upper
+        0.5 * (self.lower + self.upper)
     }
 
     /// Gradient with respect to the pose the distance was asked for: `n` and `(x - t) × n`, x the
@@ -274,7 +274,7 @@ impl<'a> Support<'a> {
                     (found.lower, found.point) = (lower, y);
                 }
             }
-            found.upper - found.lower <= narrow
+            if found.upper - found.lower <= narrow { Worth::Done } else { Worth::Wide }
         });
         if found.lower == f64::NEG_INFINITY {
             found.lower = r.dot(&found.point) - body.displacement(&found.point) - turned;

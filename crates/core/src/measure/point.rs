@@ -6,17 +6,25 @@
 //! separates q from the body by as much. The program stays regular through contact: its Hessian is
 //! the identity plus what the body's curvature adds.
 
-use crate::body::{Body, Solid};
+use crate::body::{Body, ClosedForm, Solid};
 use crate::measure::bounds::duality_bounds::{DUALITY_ROUNDING, descent};
-use crate::measure::frames::pose::Pose;
+use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
+use crate::measure::frames::query_frame::Posed;
 use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::{At, Least, bracketed, least};
 use crate::measure::solver::active_constraints::ActiveSet;
-use crate::measure::solver::projection::{Objective, Single, SingleProblem, Trial, solve_single};
+use crate::measure::solver::exact_shape::{
+    ExactQuery, PointOffset, PointSide, direction_to_world, offset_of_point, to_world,
+};
+use crate::measure::solver::projection::{Objective, Single, SingleProblem, Trial, Worth, solve_single};
+use crate::measure::solver::stages::{Stage, runs};
+use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
+use crate::polynomial::{dispatch, gamma};
 use nalgebra::Vector3;
+use std::cell::OnceCell;
 
 /// Distance of a body from a point with its proof; lengths in metres, vectors in the world frame.
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +33,8 @@ pub struct PointDistance {
     pub status: Status,
     /// Proven lower bound; 0 when the point is not proven outside.
     pub lower: f64,
-    /// Proven upper bound, attained by the witness; 0 when the point is proven inside.
+    /// Proven upper bound, which the witness attains within the accuracy asked for; 0 when the point
+    /// is proven inside.
     pub upper: f64,
     /// Whether the point is proven to lie in the body; the distance is then 0, and depth is not
     /// measured.
@@ -42,16 +51,16 @@ pub struct PointDistance {
 }
 
 impl PointDistance {
-    /// The answer inside the bracket: the upper bound, which the witness attains.
+    /// The answer: the middle of the bracket.
     pub fn value(&self) -> f64 {
-        self.upper
+        0.5 * (self.lower + self.upper)
     }
 
     /// Gradient with respect to the pose the distance was asked for; that with respect to the point
     /// is `normal`. By the envelope theorem the witness counts as fixed to the body: `-n` and
-    /// `-(y - t) × n`. None inside.
+    /// `-(y - t) × n`. None unless the point is proven outside.
     pub fn pose_gradient(&self, pose: &Pose) -> Option<Twist> {
-        self.normal.map(|n| Twist::of_gradient(-n, &self.witness, pose.translation()))
+        self.normal.filter(|_| self.lower > 0.0).map(|n| Twist::of_gradient(-n, &self.witness, pose.translation()))
     }
 }
 
@@ -123,8 +132,23 @@ fn nearest(
 
 /// A body to project points on.
 pub(super) struct Projection<'a> {
-    single: Single<'a>,
+    body: &'a Body,
+    pose: Pose,
+    /// Where no closed form has the answer.
+    single: OnceCell<Single<'a>>,
+    /// Whether a narrow bracket is all that is asked for.
+    is_rough: bool,
+    /// Whether the method for smooth bodies is tried first.
+    has_newton: bool,
 }
+
+/// Angle between the normal of the surface at the witness and the way to the point, radians, up to
+/// which both count as those of the solution: Newton's method ends far below it.
+///
+/// A larger value lets gradients be off by more than 1e-6, most of all those of flat bodies far
+/// away, whose witness is off by this times the radius of curvature; a smaller one spends steps on
+/// rounding. Exercised by `family_20_gradients_of_primitives`.
+const FACING: f64 = 1e-8;
 
 /// What a projection found; metres, world frame.
 #[derive(Clone, Copy, Debug)]
@@ -133,12 +157,20 @@ pub(super) struct Projected {
     pub(super) upper: f64,
     /// Unit vector along which the lower bound separates the point from the body; zero if there is
     /// none.
+    pub(super) plane: Vector3<f64>,
+    /// About the normal of the surface at the witness, of length 1.
     pub(super) normal: Vector3<f64>,
+    /// Attains the upper bound, or one that is as near to the lower bound as asked for.
     pub(super) witness: Vector3<f64>,
     pub(super) iterations: u32,
 }
 
 impl Projected {
+    fn inside(point: &Vector3<f64>, iterations: u32) -> Self {
+        let (plane, normal) = (Vector3::zeros(), Vector3::zeros());
+        Self { lower: 0.0, upper: 0.0, plane, normal, witness: *point, iterations }
+    }
+
     fn into_distance(self, tolerance: f64) -> PointDistance {
         let inside = self.upper == 0.0;
         PointDistance {
@@ -156,7 +188,17 @@ impl Projected {
 
 impl<'a> Projection<'a> {
     pub(super) fn new(body: &'a Body, pose: &Pose) -> Self {
-        Self { single: Single::new(body, pose) }
+        Self { body, pose: *pose, single: OnceCell::new(), is_rough: false, has_newton: true }
+    }
+
+    /// The same for those who need the bracket alone: a step or two less.
+    pub(super) fn rough(body: &'a Body, pose: &Pose) -> Self {
+        Self { is_rough: true, ..Self::new(body, pose) }
+    }
+
+    /// The same without the method for smooth bodies, where it has failed.
+    pub(super) fn without_newton(self) -> Self {
+        Self { has_newton: false, ..self }
     }
 
     pub(super) fn to(
@@ -166,65 +208,137 @@ impl<'a> Projection<'a> {
         options: &Options<'_>,
         warm: &mut WarmStart,
     ) -> Projected {
-        let Single { body, unit, .. } = &self.single;
-        let (q, error) = self.single.to_query(point);
+        if let Some(form) = self.body.closed_form().filter(|_| runs(Stage::ClosedForm)) {
+            *warm = WarmStart::default();
+            match offset_of_point((form, &self.pose), point) {
+                PointSide::Inside => return Projected::inside(point, 0),
+                PointSide::Outside(PointOffset { lower, upper, normal, witness }) => {
+                    return Projected { lower, upper, plane: normal, normal, witness, iterations: 0 };
+                }
+                PointSide::Open => {}
+            }
+        }
+        let spent = match self.by_newton(point, tolerance, options, warm) {
+            Ok(found) => return found,
+            Err(spent) => spent,
+        };
+        let single = self.single.get_or_init(|| Single::new(self.body, &self.pose));
+        let Single { body, unit, .. } = single;
+        let (q, error) = single.to_query(point);
         if body.value_upper(&q, error) <= 1.0 {
-            return Projected { lower: 0.0, upper: 0.0, normal: Vector3::zeros(), witness: *point, iterations: 0 };
+            return Projected::inside(point, spent);
         }
         let objective = Objective::nearest(&q);
         let (start, active): (_, ActiveSet) = match warm.hint {
-            Hint::Single { y, active } if y.iter().all(|value| value.is_finite()) => {
-                (self.single.body_to_query(&y), active)
-            }
-            _ => (self.single.table(&objective), 0),
+            Hint::Single { y, active } if y.iter().all(|value| value.is_finite()) => (single.body_to_query(&y), active),
+            _ => (single.table(&objective), 0),
         };
-        let (mut lower, mut upper) = (0.0_f64, f64::INFINITY);
-        let (mut normal, mut witness) = (Vector3::zeros(), body.interior);
+        let (mut lower, mut upper, mut plane, mut witness) = (0.0_f64, f64::INFINITY, Vector3::zeros(), body.interior);
+        let mut facing: Option<(f64, Vector3<f64>)> = None;
         let narrow = tolerance / unit;
         let problem = SingleProblem { body, objective: &objective, start, active };
-        let stop = |count| options.exhausted(count);
+        let stop = |count| options.exhausted(spent + count);
         let (iterations, active) = solve_single(&problem, stop, |trial| {
-            let (bound, n) = self.separation(&q, error, trial);
-            if bound > lower || normal == Vector3::zeros() {
-                (lower, normal) = (bound.max(0.0), n);
+            let (bound, n) = separation(body, &q, error, trial);
+            if bound > lower || plane == Vector3::zeros() {
+                (lower, plane) = (bound.max(0.0), n);
             }
-            if let Some(y) = body.move_inside(&trial.y) {
-                let apart = (q - y).norm() + body.displacement(&y) + error;
-                if apart < upper {
-                    (upper, witness) = (apart, y);
+            let Some(y) = body.move_inside(&trial.y) else { return Worth::Wide };
+            let apart = (q - y).norm() + body.displacement(&y) + error;
+            // The bracket says of normal and witness no more than its root: the solution is where
+            // the surface's normal leads to the point.
+            if !self.is_rough && n != Vector3::zeros() && apart - lower <= narrow {
+                let off = (n - (q - y) / (q - y).norm()).norm();
+                if facing.is_none_or(|(least, _)| off < least) {
+                    (facing, witness) = (Some((off, n)), y);
                 }
             }
-            upper - lower <= narrow
+            if apart < upper {
+                upper = apart;
+                witness = if facing.is_none() { y } else { witness };
+            }
+            match upper - lower <= narrow {
+                true if self.is_rough || facing.is_some_and(|(off, _)| off <= FACING) => Worth::Done,
+                true => Worth::Narrow,
+                false => Worth::Wide,
+            }
         });
+        let normal = facing.map_or(plane, |(_, n)| n);
         if upper == f64::INFINITY {
             // Stopped before the first trial point: the interior point is a point of the body.
             upper = (q - witness).norm() + body.displacement(&witness) + error;
         }
-        *warm = Hint::Single { y: self.single.to_body(&witness), active }.into();
+        *warm = Hint::Single { y: single.to_body(&witness), active }.into();
         Projected {
             lower: lower * unit * (1.0 - 4.0 * f64::EPSILON),
             upper: upper * unit * (1.0 + 4.0 * f64::EPSILON),
-            normal: self.single.direction_to_world(&normal),
-            witness: self.single.to_world(&witness),
-            iterations,
+            plane: single.direction_to_world(&plane),
+            normal: single.direction_to_world(&normal),
+            witness: single.to_world(&witness),
+            iterations: spent + iterations,
         }
     }
 
-    /// Lower bound of the distance in query units from the plane normal to the trial's pull, and
-    /// that normal.
-    fn separation(&self, q: &Vector3<f64>, error: f64, trial: &Trial) -> (f64, Vector3<f64>) {
-        let body = &self.single.body;
-        let length = trial.dual_gradient.norm();
-        if !(length > 0.0 && length.is_finite()) {
-            return (0.0, Vector3::zeros());
-        }
-        let n = trial.dual_gradient / length;
-        let fall = descent(body, &trial.y, &-n, &trial.multipliers.map(|m| (m / length).max(0.0)));
-        let slack = DUALITY_ROUNDING * (q.norm() + trial.y.norm() + fall.abs());
-        let bound = n.dot(&(q - trial.y)) - fall - body.displacement(&trial.y) - error - slack;
-        // Not `max`: a NaN bounds nothing.
-        (if bound > 0.0 { bound } else { 0.0 }, n)
+    /// Whether a point is in the body's inscribed ball.
+    fn is_near_interior_point(&self, point: &Vector3<f64>) -> bool {
+        let (interior, offset) = (self.body.interior_point(), point - self.pose.translation());
+        let apart = (self.pose.rotation().inverse_transform_vector(&offset) - interior).norm();
+        apart + (ROTATION_ERROR + gamma(16)) * (offset.norm() + interior.norm()) < self.body.in_radius()
     }
+
+    /// Of a smooth body, as that of a capsule of no size.
+    ///
+    /// # Errors
+    /// After how many evaluations nothing is proven.
+    fn by_newton(
+        &self,
+        point: &Vector3<f64>,
+        tolerance: f64,
+        options: &Options<'_>,
+        warm: &mut WarmStart,
+    ) -> Result<Projected, u32> {
+        if !self.has_newton || !self.body.is_smooth() || !runs(Stage::ClosedForm) {
+            return Err(0);
+        }
+        if self.is_near_interior_point(point) {
+            return Ok(Projected::inside(point, 0));
+        }
+        let (form, form_pose) = (ClosedForm::capsule(0.0, 0.0), Pose::identity().with_translation(*point));
+        let trace = if let Hint::Exact(trace) = &warm.hint { Some(trace) } else { None };
+        let (body, pose) = (self.body, &self.pose);
+        let goal = &StopCriterion::NARROW;
+        let query = ExactQuery { body, pose, form: &form, form_pose: &form_pose, goal, tolerance, options, trace };
+        let found = dispatch(query).map_err(|lost| lost.rounds)?;
+        if found.upper == 0.0 {
+            *warm = WarmStart::default();
+            return Ok(Projected::inside(point, found.rounds));
+        }
+        *warm = found.trace.map_or_else(WarmStart::default, |trace| Hint::Exact(trace).into());
+        let normal = -direction_to_world(&form, &form_pose, found.n);
+        Ok(Projected {
+            lower: found.lower,
+            upper: found.upper,
+            plane: normal,
+            normal,
+            witness: to_world(&form, &form_pose, found.x),
+            iterations: found.rounds,
+        })
+    }
+}
+
+/// Lower bound of the distance in query units from the plane normal to the trial's pull, and
+/// that normal.
+fn separation(body: &Posed<'_>, q: &Vector3<f64>, error: f64, trial: &Trial) -> (f64, Vector3<f64>) {
+    let length = trial.dual_gradient.norm();
+    if !(length > 0.0 && length.is_finite()) {
+        return (0.0, Vector3::zeros());
+    }
+    let n = trial.dual_gradient / length;
+    let fall = descent(body, &trial.y, &-n, &trial.multipliers.map(|m| (m / length).max(0.0)));
+    let slack = DUALITY_ROUNDING * (q.norm() + trial.y.norm() + fall.abs());
+    let bound = n.dot(&(q - trial.y)) - fall - body.displacement(&trial.y) - error - slack;
+    // Not `max`: a NaN bounds nothing.
+    (if bound > 0.0 { bound } else { 0.0 }, n)
 }
 
 bracketed!(Projected);
@@ -262,6 +376,8 @@ mod tests {
             assert_eq!(found.status, Status::Converged, "{label}");
             assert!(found.lower <= truth + floor && truth - floor <= found.upper, "{label}");
             assert!(!found.inside || truth <= floor, "{label}");
+            let is_well_inside = if seed % 2 == 0 { (x.abs() - half).max() < -1e-9 } else { x.norm() < 1.5 - 1e-9 };
+            assert!(found.inside || !is_well_inside, "{label}");
             let reached = (pose.transform_point(&x) - found.witness).norm();
             assert!((reached - found.upper).abs() <= 1e-12 * (1.0 + x.norm()), "{label}");
         }

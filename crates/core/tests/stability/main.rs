@@ -8,6 +8,7 @@ mod exact;
 mod judge;
 mod truth;
 
+mod axes;
 mod capsules;
 mod contact;
 mod depth;
@@ -16,5 +17,6 @@ mod limits;
 mod motion;
 mod over_shapes;
 mod placement;
+mod primitives;
 mod recheck;
 mod scale;

@@ -59,7 +59,7 @@ pub(crate) fn solve(
         (Piece::Capsule(a), Piece::Capsule(b)) => of_capsule(&distance_of_capsules(a, pose_a, b, pose_b, options)),
         (Piece::Body(a), Piece::HalfSpace(b, error_m)) => {
             let found = distance_to_half_space(*a, pose_a, b, options, warm);
-            let below = found.witness - b.normal() * found.value();
+            let below = found.witness - b.normal() * found.upper;
             Solved {
                 lower: found.lower - error_m,
                 upper: found.upper + error_m,

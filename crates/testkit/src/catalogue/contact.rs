@@ -41,7 +41,7 @@ pub fn kissing(index: u64, mut stretch: Option<&mut dyn Draws>) -> Vec<Case> {
 }
 
 /// Both signs of the gaps 0, 1 ulp of the offset, and 1e-15 to 1e-2 m, in increasing order.
-fn gaps(offset: f64) -> Vec<f64> {
+pub(super) fn gaps(offset: f64) -> Vec<f64> {
     let ulp = offset.next_up() - offset;
     let mut gaps: Vec<f64> = (2..=15).map(|k| 10_f64.powi(-k)).chain([ulp]).flat_map(|gap| [-gap, gap]).collect();
     gaps.push(0.0);

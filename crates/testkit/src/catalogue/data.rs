@@ -34,7 +34,7 @@ impl Attempt {
 }
 
 /// `expected` is empty where any reason will do.
-fn attempt<T, E: Debug>(what: impl Debug, made: Result<T, E>, expected: Option<&'static str>) -> Attempt {
+pub(super) fn attempt<T, E: Debug>(what: impl Debug, made: Result<T, E>, expected: Option<&'static str>) -> Attempt {
     Attempt { what: format!("{what:?}"), refused: made.err().map(|error| format!("{error:?}")), expected }
 }
 

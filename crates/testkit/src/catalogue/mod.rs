@@ -16,6 +16,7 @@ pub mod derivatives;
 pub mod limits;
 pub mod motion;
 pub mod placement;
+pub mod primitives;
 pub mod scale;
 pub mod ties;
 
@@ -64,6 +65,33 @@ pub const FAMILIES: [Family; 24] = [
     family(25, "ill-conditioned data"),
     family(26, "fits of degenerate clouds"),
     family(27, "level distance saturates"),
+];
+
+/// The families between primitives: 100 more than the family has. Of impacts (22) and fits (26)
+/// there are none: a capsule has no time of impact, and boxes, cylinders and balls are in 22.
+pub const PRIMITIVES: [Family; 22] = [
+    family(101, "primitives: kissing contact, gap of an ulp"),
+    family(102, "primitives: iteration limit of 1 to 3"),
+    family(103, "primitives: all but parallel sides"),
+    family(104, "primitives: far apart"),
+    family(105, "primitives: a common point inside"),
+    family(106, "primitives: shifted along an axis"),
+    family(107, "primitives: coincident centres"),
+    family(108, "primitives: normal and derivatives at contact"),
+    family(109, "primitives: size ratio of up to a million"),
+    family(110, "primitives: up to 1e9 m from the origin"),
+    family(111, "primitives: units of 1e-9 to 1e9 m"),
+    family(112, "primitives: needles and plates"),
+    family(113, "primitives: parallel flats, accuracy 1e-4 to 1e-14"),
+    family(114, "primitives: tips, rims and corners against flats"),
+    family(115, "primitives: of 20 cm, gap ±2 mm"),
+    family(116, "primitives: deep penetration, on the way in"),
+    family(118, "primitives: bad warm start"),
+    family(119, "primitives: arguments swapped, frame moved"),
+    family(120, "primitives: gradients against 200 bits"),
+    family(121, "primitives: ties are flagged, jumps too"),
+    family(125, "primitives: ill-conditioned data"),
+    family(127, "primitives: level distance saturates"),
 ];
 
 const fn family(number: u8, name: &'static str) -> Family {

@@ -26,7 +26,7 @@ pub fn far_apart(zoo: &[Body], random: &mut dyn Draws) -> (Case, [Pose; POSES]) 
 pub const INNER: f64 = 0.9;
 
 /// A point of the body frame where the largest constraint is below [`INNER`].
-fn inner(body: &Body, random: &mut dyn Draws) -> Vector3<f64> {
+pub(super) fn inner(body: &Body, random: &mut dyn Draws) -> Vector3<f64> {
     loop {
         let x = body.boundary_along(&random.unit());
         let point = body.interior_point() + (x - body.interior_point()) * random.positive();

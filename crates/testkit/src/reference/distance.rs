@@ -273,17 +273,8 @@ fn bracket(
     best: &mut Best,
 ) {
     let n = scaled(n, &(big(1.0) / norm(n)));
-    let fall = |body: &Solid<'_>, trial: &Trial, multiplier: &[Big], v: &Vector, r: &Vector| {
-        let (mut slack, mut rest) = (big(0.0), r.clone());
-        for (&i, m) in trial.index.iter().zip(multiplier).filter(|(_, m)| **m > Big::ZERO) {
-            let jet = body.jet(i, v);
-            slack += m * (big(1.0) - jet.value);
-            rest = add(&rest, &scaled(&jet.gradient, m));
-        }
-        slack + norm(&rest) * body.reach(v)
-    };
     let minus: Vector = n.clone().map(|c| -c);
-    let lower = dot(&n, &sub(x, y)) - fall(one, p, l, x, &n) - fall(two, q, m, y, &minus);
+    let lower = dot(&n, &sub(x, y)) - one.fall(&p.index, l, x, &n) - two.fall(&q.index, m, y, &minus);
     if lower > best.lower {
         best.lower = lower;
         best.n = n.clone();

@@ -9,10 +9,13 @@
 
 mod active;
 pub mod big;
+pub mod capsule;
 pub mod distance;
 pub mod dual;
 pub mod growth;
+pub mod half_space;
 pub mod level;
+mod segment;
 pub mod signed;
 mod solid;
 

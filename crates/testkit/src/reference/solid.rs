@@ -122,6 +122,18 @@ impl<'a> Solid<'a> {
         super::big::norm(&sub(v, &self.center)) + &self.radius
     }
 
+    /// How much lower than at v a direction r gets in the body at most, by the tangent planes at v
+    /// with positive multipliers: `Σ λ (1 - g) + |r + Σ λ ∇g| · reach`.
+    pub(super) fn fall(&self, index: &[usize], multipliers: &[Big], v: &Vector, r: &Vector) -> Big {
+        let (mut slack, mut rest) = (big(0.0), r.clone());
+        for (&i, m) in index.iter().zip(multipliers).filter(|(_, m)| **m > Big::ZERO) {
+            let jet = self.jet(i, v);
+            slack += m * (big(1.0) - jet.value);
+            rest = add(&rest, &scaled(&jet.gradient, m));
+        }
+        slack + super::big::norm(&rest) * self.reach(v)
+    }
+
     /// The point of the body where the segment from the interior point to v leaves it, or a little
     /// before; v if inside.
     pub fn pull_in(&self, v: &Vector) -> Option<Vector> {
@@ -143,7 +155,7 @@ impl<'a> Solid<'a> {
 }
 
 /// The exact rotation of the stored quaternion: `R(q) / |q|²`.
-fn rotation(pose: &Pose) -> [Vector; 3] {
+pub(super) fn rotation(pose: &Pose) -> [Vector; 3] {
     let q = pose.rotation().coords;
     let [x, y, z, w] = [q.x, q.y, q.z, q.w].map(big);
     let square = |a: &Big| a * a;

@@ -32,9 +32,9 @@ pub struct CapsuleDistance {
 }
 
 impl CapsuleDistance {
-    /// The answer inside the bracket: the upper bound, which the witnesses attain.
+    /// The answer: the middle of the bracket, and where no depth is measured the upper bound.
     pub fn value(&self) -> f64 {
-        self.upper
+        if self.lower.is_finite() { 0.5 * (self.lower + self.upper) } else { self.upper }
     }
 
     /// Gradients with respect to the poses of the body and of the capsule that the distance was

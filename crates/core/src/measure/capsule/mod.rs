@@ -3,27 +3,27 @@
 //! Where the segment lies outside of the body at the distance d, the signed distance of the capsule
 //! is `d - radius`: no translation shorter than the difference takes them apart, or brings them
 //! into contact, for a ball adds its radius to the support function along every direction. Of a
-//! smooth body it is found by Newton's method ([`super::solver::exact_shape`]), of a box, a
-//! cylinder or a ball in closed form. Of others the distance of the segment's points, a convex
-//! function of the place along it, has its least value between the last two places where it fell
-//! and where it rose; the planes that prove the distances there bound it from below.
+//! smooth body it is found by Newton's method ([`super::solver::exact_shape`]), of a box or a
+//! cylinder in the same way with their closed forms, of a ball or another capsule in closed form.
+//! Of others the distance of the segment's points, a convex function of the place along it, has its
+//! least value between the last two places where it fell and where it rose; the planes that prove
+//! the distances there bound it from below.
 
 mod answer;
+mod axes;
 mod bounds;
 mod decision;
 mod pair;
 mod shape;
 mod solid;
 
-use crate::body::{ClosedForm, Solid};
-use crate::measure::bounds::culling::CULLING_SLACK;
-use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
+use crate::body::Solid;
+use crate::measure::frames::pose::Pose;
 use crate::measure::options::Options;
-use crate::measure::solver::exact_shape::{ShapeDistance, between_shapes};
 use crate::measure::solver::stop_criterion::StopCriterion;
-use crate::measure::status::Status;
 use crate::measure::warm::WarmStart;
 pub use answer::CapsuleDistance;
+use axes::{Axis, of_axes};
 pub use decision::{nearer_to_capsule_than, overlap_with_capsule};
 pub use shape::{Capsule, CapsuleError};
 use solid::distance_until;
@@ -61,8 +61,8 @@ pub fn distance_to_capsule(
 }
 
 /// Signed distance of two capsules where they stand: positive apart, minus the penetration depth in
-/// overlap as long as their axes do not meet. The witnesses are those of the first and of the
-/// second, the normal leads from the second to the first.
+/// overlap, which is the sum of the radii where their axes meet. The witnesses are those of the
+/// first and of the second, the normal leads from the second to the first.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -85,34 +85,7 @@ pub fn distance_of_capsules(
     let between = (pose_a.translation() - pose_b.translation()).norm();
     // Two points have no size but their distance.
     let tolerance = options.accuracy() * if size.is_finite() { size } else { between };
-    let (form_a, form_b) =
-        (ClosedForm::capsule(a.radius_m(), a.half_height_m()), ClosedForm::capsule(b.radius_m(), b.half_height_m()));
-    let radii = a.radius_m() + b.radius_m();
-    let Ok(found) = between_shapes((&form_a, pose_a), (&form_b, pose_b), None, (tolerance, options)) else {
-        let slack = (CULLING_SLACK + ROTATION_ERROR) * (between + a.reach_m() + b.reach_m());
-        let (witness, other) = (*pose_a.translation(), *pose_b.translation());
-        return CapsuleDistance {
-            status: Status::BracketWide,
-            lower: (between - a.reach_m() - b.reach_m() - slack).max(-radii),
-            upper: between - radii + slack,
-            witness,
-            witness_of_capsule: other,
-            normal: None,
-            tied: true,
-            iterations: options.max_iterations(),
-        };
-    };
-    let ShapeDistance { lower, upper, witness_a, witness_b, normal, steps, .. } = found;
-    CapsuleDistance {
-        status: Status::of(upper - lower <= tolerance),
-        lower,
-        upper,
-        witness: witness_a,
-        witness_of_capsule: witness_b,
-        normal: normal.try_normalize(0.0),
-        tied: false,
-        iterations: steps,
-    }
+    of_axes(&Axis::of_capsule(a, pose_a), &Axis::of_capsule(b, pose_b), tolerance)
 }
 
 #[cfg(test)]

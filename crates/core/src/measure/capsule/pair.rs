@@ -1,6 +1,7 @@
 //! The signed distance of one body from a capsule: by closed forms, else along its axis.
 
 use super::answer::CapsuleDistance;
+use super::axes::{Axis, of_axes};
 use super::bounds::ball_and_plane;
 use super::shape::Capsule;
 use crate::body::{Body, ClosedForm};
@@ -21,6 +22,23 @@ use nalgebra::Vector3;
 
 /// Most places along a segment at which the distance is taken.
 const MAX_PLACES: u32 = 64;
+
+/// Width of a bracket, relative to the larger of both and their distance, dimensionless, that
+/// rounding may leave: as `Options::with_accuracy` states it of flat surfaces.
+///
+/// Smaller, pairs that rounding keeps wide take hundreds of iterations more and end no narrower;
+/// larger, they end wider than need be. Exercised by `family_13_parallel_flats_of_primitives`.
+const ROUNDING_FLOOR: f64 = 1e-12;
+
+/// Largest derivative of the distance along the axis, dimensionless, at a place that counts as the
+/// nearest one in its middle: gradients are off by about as much, and 1e-6 is promised.
+///
+/// Larger, they are off by more; smaller, rounding keeps places from being taken. Exercised by
+/// `family_08_primitives_at_contact`.
+const LEVEL: f64 = 1e-7;
+
+/// Most places that are tried after the bracket was narrow first, for the sake of the gradients.
+const MORE_PLACES: u32 = 12;
 
 /// A capsule where it stands, and how its distance is to be solved.
 pub(super) struct Problem<'a> {
@@ -49,16 +67,52 @@ impl Problem<'_> {
     }
 
     fn search(&self, of_body: At<'_, Body>, warm: &mut WarmStart) -> CapsuleDistance {
-        let found = if !runs(Stage::ClosedForm) {
+        let form = of_body.0.closed_form().filter(|_| runs(Stage::ClosedForm));
+        if let Some(ball) = form.and_then(|form| Axis::of_ball(form, of_body.1)) {
+            *warm = WarmStart::default();
+            return of_axes(&ball, &Axis::of_capsule(self.capsule, self.capsule_pose), self.tolerance);
+        }
+        let floor = ROUNDING_FLOOR * self.size(of_body);
+        let mut spent = match self.by_newton(of_body, self.tolerance, self.options, warm) {
+            Ok(found) => return found,
+            Err(spent) => spent,
+        };
+        if floor > self.tolerance && self.goal.is_narrow() && !self.options.exhausted(spent) {
+            match self.by_newton(of_body, floor, &self.options.after(spent), warm) {
+                Ok(found) => return CapsuleDistance { iterations: found.iterations + spent, ..found },
+                Err(more) => spent += more,
+            }
+        }
+        self.along_axis(of_body, spent, warm)
+    }
+
+    /// What rounding of coordinates grows with, metres: the larger of both and how far they are
+    /// apart.
+    fn size(&self, (body, pose): At<'_, Body>) -> f64 {
+        let between = pose.translation() - self.capsule_pose.translation();
+        self.capsule.reach_m().max(body.circumscribed().radius) + between.norm()
+    }
+
+    /// In a bracket of this width, metres.
+    ///
+    /// # Errors
+    /// After how many iterations nothing is proven, or nothing as narrow.
+    fn by_newton(
+        &self,
+        of_body: At<'_, Body>,
+        width: f64,
+        options: &Options<'_>,
+        warm: &mut WarmStart,
+    ) -> Result<CapsuleDistance, u32> {
+        if !runs(Stage::ClosedForm) {
             Err(0)
         } else if let Some(form) = of_body.0.closed_form() {
-            self.of_shape((form, of_body.1), warm)
+            self.of_shape((form, of_body.1), (width, options), warm)
         } else if of_body.0.is_smooth() {
-            self.of_smooth(of_body, warm)
+            self.of_smooth(of_body, (width, options), warm)
         } else {
             Err(0)
-        };
-        found.unwrap_or_else(|spent| self.along_axis(of_body, spent, warm))
+        }
     }
 
     fn form(&self) -> ClosedForm {
@@ -79,8 +133,13 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// After how many evaluations nothing is proven.
-    fn of_smooth(&self, (body, pose): At<'_, Body>, warm: &mut WarmStart) -> Result<CapsuleDistance, u32> {
-        let Self { capsule_pose: form_pose, tolerance, options, .. } = *self;
+    fn of_smooth(
+        &self,
+        (body, pose): At<'_, Body>,
+        (tolerance, options): (f64, &Options<'_>),
+        warm: &mut WarmStart,
+    ) -> Result<CapsuleDistance, u32> {
+        let form_pose = self.capsule_pose;
         let (form, goal) = (self.form(), self.goal_of_axis());
         let trace = if let Hint::Exact(trace) = &warm.hint { Some(trace) } else { None };
         let query = ExactQuery { body, pose, form: &form, form_pose, goal: &goal, tolerance, options, trace };
@@ -100,12 +159,16 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// After how many steps nothing is proven.
-    fn of_shape(&self, of_body: (&ClosedForm, &Pose), warm: &mut WarmStart) -> Result<CapsuleDistance, u32> {
+    fn of_shape(
+        &self,
+        of_body: (&ClosedForm, &Pose),
+        (width, options): (f64, &Options<'_>),
+        warm: &mut WarmStart,
+    ) -> Result<CapsuleDistance, u32> {
         let (_, pose) = of_body;
         let form = self.form();
         let start = if let Hint::Shapes { x_a } = &warm.hint { Some(pose.transform_point(x_a)) } else { None };
-        let found =
-            between_shapes(of_body, (&form, self.capsule_pose), start.as_ref(), (self.tolerance, self.options))?;
+        let found = between_shapes(of_body, (&form, self.capsule_pose), start.as_ref(), (width, options))?;
         let ShapeDistance { lower, upper, witness_a, witness_b, normal, steps, .. } = found;
         let x_a = pose.rotation().inverse_transform_vector(&(witness_a - pose.translation()));
         *warm = Hint::Shapes { x_a }.into();
@@ -165,14 +228,22 @@ impl Problem<'_> {
         }
     }
 
-    /// What is known by the way from a place on the axis to the body's interior point.
-    fn to_interior_point(&self, (body, pose): At<'_, Body>, at: f64, iterations: u32) -> CapsuleDistance {
+    /// What is known by the way from a place on the axis, whose middle is at `center`, to the body's
+    /// interior point.
+    fn to_interior_point(
+        &self,
+        (body, pose): At<'_, Body>,
+        (center, at): (&Vector3<f64>, f64),
+        iterations: u32,
+    ) -> CapsuleDistance {
         let (place, interior) = (Vector3::new(0.0, 0.0, at), body.interior_point());
-        let (way, apart, error) = across((pose, interior), (self.capsule_pose, &place));
+        let capsule_pose = self.capsule_pose.with_translation(*center);
+        let (way, apart, error) = across((pose, interior), (&capsule_pose, &place));
         let (radius, normal) = (self.capsule.radius_m(), way.try_normalize(0.0));
-        let on_axis = self.capsule_pose.transform_point(&place);
+        let on_axis = capsule_pose.transform_point(&place);
+        let rounding = f64::EPSILON * (center.norm() + apart);
         CapsuleDistance {
-            upper: (apart + error) * (1.0 + f64::EPSILON) - radius,
+            upper: (apart + error + rounding) * (1.0 + f64::EPSILON) - radius,
             witness_of_capsule: on_axis + normal.unwrap_or_default() * radius,
             normal,
             ..self.met(&pose.transform_point(interior), iterations)
@@ -181,52 +252,74 @@ impl Problem<'_> {
 
     /// By the distances of points of the axis, after this number of steps.
     fn along_axis(&self, (body, pose): At<'_, Body>, spent: u32, warm: &mut WarmStart) -> CapsuleDistance {
+        // As seen from the translation of the body, for the sake of digits.
+        let origin = pose.translation();
+        let center = self.capsule_pose.translation() - origin;
+        let pose = pose.with_translation(Vector3::zeros());
         let (axis, half) = (self.capsule_pose.transform_direction(&Vector3::z()), self.capsule.half_height_m());
-        let place = |at: f64| self.capsule_pose.translation() + axis * at;
-        let projection = Projection::new(body, pose);
+        let radius = self.capsule.radius_m();
+        let wants_normal = self.goal.wants_answer();
+        let projection = if wants_normal { Projection::new(body, &pose) } else { Projection::rough(body, &pose) };
+        let projection = projection.without_newton();
         // Places where the distance decreases towards the other one, with tangents that bound it.
         let mut ends: [Option<Tangent>; 2] = [None, None];
         let (mut lower, mut iterations) = (f64::NEG_INFINITY, spent);
-        let center = pose.transform_point(body.interior_point()) - self.capsule_pose.translation();
-        let mut at = axis.dot(&center).clamp(-half, half);
-        // The centre of a ball has no error of a rotation.
-        let turned = (ROTATION_ERROR + CULLING_SLACK) * (self.capsule_pose.translation().norm() + half);
-        let error = if half == 0.0 { 0.0 } else { turned };
-        let mut best = self.to_interior_point((body, pose), at, spent);
+        let mut at = axis.dot(&(pose.transform_point(body.interior_point()) - center)).clamp(-half, half);
+        let error = f64::EPSILON * center.norm() + (ROTATION_ERROR + CULLING_SLACK) * half;
+        let mut best = self.to_interior_point((body, &pose), (&center, at), spent);
+        // How much the distance falls along the axis where it is the best.
+        let (mut slant, mut more) = (f64::INFINITY, 0);
         for _ in 0..MAX_PLACES {
             if self.options.exhausted(iterations) {
                 break;
             }
-            let point = place(at);
+            let point = center + axis * at;
             let found = projection.to(&point, self.tolerance * 0.25, &self.options.after(iterations), warm);
             iterations += found.iterations;
             if found.upper <= 0.0 {
-                return CapsuleDistance { upper: error - self.capsule.radius_m(), ..self.met(&point, iterations) };
+                best = CapsuleDistance { upper: error - radius, ..self.met(&point, iterations) };
+                lower = f64::NEG_INFINITY;
+                break;
             }
-            if found.upper < best.upper + self.capsule.radius_m() {
-                let bracket = [0.0, found.upper + error];
-                best = self.apart(bracket, [found.witness, point], -found.normal, iterations);
+            let here = self.apart([0.0, found.upper + error], [found.witness, point], -found.normal, iterations);
+            let fall = fall_within(found.normal.dot(&axis), at, half);
+            let is_better = if more == 0 {
+                here.upper < best.upper
+            } else {
+                here.upper + radius - lower <= self.tolerance && fall < slant
+            };
+            if is_better {
+                (best, slant) = (here, fall);
             }
-            let tangent = Tangent { at, lower: found.lower - error, slope: found.normal.dot(&axis) };
             // One that does not separate is no bound.
             if found.lower > 0.0 {
+                let tangent = Tangent { at, lower: found.lower - error, slope: found.plane.dot(&axis) };
                 ends[usize::from(tangent.slope > 0.0)] = Some(tangent);
             }
             let (bound, next) = Tangent::least(&ends, half);
             lower = bound.max(lower);
-            let radius = self.capsule.radius_m();
             let narrow = best.upper + radius - lower <= self.tolerance;
             let met = self.goal_of_axis().met(lower, best.upper + radius);
-            if narrow || met || next == at {
+            if narrow && (!wants_normal || slant <= LEVEL || more == MORE_PLACES) || met || next == at {
                 break;
             }
-            at = next;
+            more += u32::from(narrow);
+            // Where the derivative vanishes by the last two, and by turns where the tangents meet.
+            at = Tangent::level(&ends).filter(|_| more % 2 == 1).unwrap_or(next);
         }
         // How deep an axis is that is not proven outside is not known.
-        let radius = self.capsule.radius_m() * (1.0 + f64::EPSILON);
-        lower = if lower > 0.0 { lower - radius } else { f64::NEG_INFINITY };
-        CapsuleDistance { status: Status::of(best.upper - lower <= self.tolerance), lower, iterations, ..best }
+        let lower = if lower > 0.0 { lower - radius * (1.0 + f64::EPSILON) } else { f64::NEG_INFINITY };
+        let status = Status::of(best.upper - lower <= self.tolerance);
+        let (witness, witness_of_capsule) = (best.witness + origin, best.witness_of_capsule + origin);
+        CapsuleDistance { status, lower, witness, witness_of_capsule, iterations, ..best }
     }
+}
+
+/// How much a distance of this slope falls towards another place of an axis, whose half length is
+/// `half`: 0 at an end that is the nearest place.
+fn fall_within(slope: f64, at: f64, half: f64) -> f64 {
+    let is_end = slope > 0.0 && at <= -half || slope < 0.0 && at >= half;
+    if is_end { 0.0 } else { slope.abs() }
 }
 
 /// A line below the distance along an axis.
@@ -240,6 +333,13 @@ struct Tangent {
 impl Tangent {
     fn value(&self, at: f64) -> f64 {
         self.lower + self.slope * (at - self.at)
+    }
+
+    /// About where the derivative vanishes between two places: as if it were linear.
+    fn level(ends: &[Option<Self>; 2]) -> Option<f64> {
+        let [Some(low), Some(high)] = ends else { return None };
+        let at = low.at - low.slope * (high.at - low.at) / (high.slope - low.slope);
+        at.is_finite().then_some(at)
     }
 
     /// The least value of a convex function above a decreasing and an increasing line, or above the

@@ -1,7 +1,7 @@
 use super::*;
 use crate::body::Body;
 use crate::measure::tests::{random_pose, twisted, zoo};
-use crate::measure::{Twist, distance_to_point};
+use crate::measure::{Status, Twist, distance_to_point};
 use nalgebra::Vector3;
 use sublevel_testkit::Seeded;
 
