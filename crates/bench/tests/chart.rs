@@ -369,7 +369,7 @@ fn no_family_of_the_stability_table_is_lost() {
     let csv = std::fs::read_to_string(out.path().join("stability.csv")).expect("the table is written");
     let families: std::collections::BTreeSet<&str> =
         csv.lines().skip(1).filter_map(|line| line.split(',').next()).collect();
-    assert_eq!(families.len(), 24, "{csv}");
+    assert_eq!(families.len(), 46, "{csv}");
     let cases: f64 = column(&csv, "", "cases").into_iter().filter(|cases| cases.is_finite()).sum();
     assert!(cases > 2000.0, "{cases} cases");
     let report = std::fs::read_to_string(out.path().join("stability.md")).expect("the report is written");

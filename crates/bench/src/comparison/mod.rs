@@ -20,6 +20,7 @@ pub use coal::{Coal, CoalRun};
 pub(crate) use coal::{points_text, version_beside};
 pub use error::ComparisonError;
 pub use fit_cache::{FitCache, FitCacheError};
+pub(crate) use parry::ParryShape;
 pub use parry::{Hulls, NoHull, parry_impact, parry_pose, parry_version};
 pub use peer::PeerError;
 pub use peer_shape::PeerShape;

@@ -20,7 +20,7 @@ use sublevel_testkit::random::pose;
 const SAMPLES: usize = 1000;
 
 /// Error that others may have, relative to the smaller body.
-const PEER_ERROR: f64 = 1e-5;
+pub(super) const PEER_ERROR: f64 = 1e-5;
 
 /// Steps of plain Newton, and evaluations of SLSQP: both are done long before, or not at all.
 const NEWTON_STEPS: u32 = 100;
@@ -365,7 +365,8 @@ impl Question {
             Method::Coal => {
                 let Some(coal) = Coal::from_environment()? else { return Ok(None) };
                 let (a, b, relative) = (sampled(&self.a), sampled(&self.b), self.relative());
-                let value = in_folder(|folder| coal_distance(&coal, folder, [&a, &b], relative))?;
+                let value =
+                    in_folder(|folder| coal_distance(&coal, folder, [&a[..], &b[..]].map(PeerShape::Hull), relative))?;
                 Some(Reply { value, own: Some(polytopes(&a, &b, &relative, self.small())), ..plain(None) })
             }
         })
@@ -393,20 +394,20 @@ impl Reply {
     }
 }
 
-fn coal_distance(
+pub(super) fn coal_distance(
     coal: &Coal,
     folder: &Path,
-    points: [&[Vector3<f64>]; 2],
+    shapes: [PeerShape<'_>; 2],
     relative: Pose,
 ) -> Result<Option<f64>, PeerError> {
     let trajectory: Trajectory = vec![relative];
-    let mut run = coal.start(folder, "case", points.map(PeerShape::Hull), &[trajectory])?;
+    let mut run = coal.start(folder, "case", shapes, &[trajectory])?;
     run.pass()?;
     Ok(run.distances()?.first().and_then(|distances| distances.first()).copied())
 }
 
 /// Does something with a folder of this process alone, which is removed afterwards.
-fn in_folder<T>(work: impl FnOnce(&Path) -> Result<T, PeerError>) -> Result<T, CaseError> {
+pub(super) fn in_folder<T>(work: impl FnOnce(&Path) -> Result<T, PeerError>) -> Result<T, CaseError> {
     let folder = std::env::temp_dir().join(format!("sublevel-stability-{}", std::process::id()));
     std::fs::create_dir_all(&folder).map_err(PeerError::io(&folder))?;
     let done = work(&folder);
@@ -418,28 +419,37 @@ fn in_folder<T>(work: impl FnOnce(&Path) -> Result<T, PeerError>) -> Result<T, C
 /// Most times that the search for the distance of hulls goes on from the direction it found.
 const RESTARTS: usize = 50;
 
-/// The distance of the hulls of points, the second ones posed in the frame of the first: between
-/// points of theirs, and along the line between these; bounds that do not meet are all that is
-/// known.
+/// The distance of the hulls of points, the second ones posed in the frame of the first.
 fn polytopes(a: &[Vector3<f64>], b: &[Vector3<f64>], relative: &Pose, small: f64) -> Truth {
     let b: Vec<_> = b.iter().map(|y| relative.transform_point(y)).collect();
-    let farthest = |points: &[Vector3<f64>], n: &Vector3<f64>| {
-        points.iter().copied().max_by(|x, y| n.dot(x).total_cmp(&n.dot(y))).unwrap_or_default()
-    };
+    let size = a.iter().chain(&b).map(Vector3::norm).fold(0.0, f64::max);
+    supported([&|n| farthest(a, n), &|n| farthest(&b, n)], a[0] - b[0], (size, small))
+}
+
+/// The point that is farthest along a direction.
+pub(super) fn farthest(points: &[Vector3<f64>], n: &Vector3<f64>) -> Vector3<f64> {
+    points.iter().copied().max_by(|x, y| n.dot(x).total_cmp(&n.dot(y))).unwrap_or_default()
+}
+
+/// A convex set as its point that is farthest along a direction.
+pub(super) type Farthest<'a> = &'a dyn Fn(&Vector3<f64>) -> Vector3<f64>;
+
+/// The distance of two convex sets, from a direction on: between points of theirs, and along the
+/// line between these; bounds that do not meet are all that is known. Rounding is relative to
+/// `size`, and what others may be wrong by to `small`, metres.
+pub(super) fn supported(sets: [Farthest<'_>; 2], mut n: Vector3<f64>, (size, small): (f64, f64)) -> Truth {
     let support = |n: &Vector3<f64>| {
-        let (x, y) = (farthest(a, &-n), farthest(&b, n));
+        let (x, y) = (sets[0](&-n), sets[1](n));
         Corner { x, y, difference: x - y }
     };
-    let size = a.iter().chain(&b).map(Vector3::norm).fold(0.0, f64::max);
     let mut truth = Truth { lower: 0.0, upper: f64::INFINITY, floor: 16.0 * f64::EPSILON * size };
-    let mut n = a[0] - b[0];
     for _ in 0..RESTARTS {
         let found = gjk(0.0, &n, support);
         if found.common.is_some() {
             return Truth { upper: 0.0, ..truth };
         }
         n = found.n;
-        truth.lower = truth.lower.max(n.dot(&(farthest(a, &-n) - farthest(&b, &n))));
+        truth.lower = truth.lower.max(n.dot(&support(&n).difference));
         truth.upper = truth.upper.min((found.x - found.y).norm());
         if truth.upper - truth.lower <= 0.1 * PEER_ERROR * small {
             break;

@@ -8,6 +8,7 @@
 mod arbiter;
 mod families;
 mod method;
+mod pair;
 mod question;
 mod report;
 mod runner;

@@ -146,6 +146,11 @@ impl Stability {
              The hulls lie inside of the bodies: where these touch, those are about a thousandth apart, so that the rows about contact ask less of GJK. \
              Cases of 1, 7, 10, 11, 15 and 19 are of several answers, which must also go together; of those of 4 others than ours get the first pair. \
              Of signed, level and growth distances, impacts and fits only ours and those of parry's that are named here are asked. \
+             Rows from 101 on are the family of the last two digits between primitives: boxes, cylinders, balls, ellipsoids, capsules, segments, points and \
+             half-spaces, each with most others and beside smooth bodies; ours are judged by 200 bits, and gradients compared with those. There GJK gets the \
+             primitives themselves, parry all and coal all but points and half-spaces, which its program does not take, and hulls of ellipsoids and smooth bodies. \
+             No polynomial has a capsule, a point or a half-space for its set: of those rows Newton, SLSQP and clarabel get the pairs of bodies. \
+             Batches are of bodies, and pairs of capsules take no hint. There is no 122 and no 126: of capsules no time of impact is measured, and fits are of points. \
              The tests of the families ask ours the same against references of 200 bits.\n\n\
              ## Failures\n\nThe first of each cell, by the command that replays it.\n\n",
         );

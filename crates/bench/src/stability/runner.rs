@@ -53,7 +53,9 @@ pub struct Share {
 
 /// No family, method or seed of that name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0} is not FAMILY/METHOD/SEED, such as 13/cold/5; families: 1 to 16, 18 to 22, 25 to 27; methods: {1}")]
+#[error(
+    "{0} is not FAMILY/METHOD/SEED, such as 13/cold/5; families: 1 to 16, 18 to 22, 25 to 27, and 100 more between primitives; methods: {1}"
+)]
 pub struct NoShare(String, String);
 
 impl std::str::FromStr for Share {

@@ -3,8 +3,9 @@
 use super::super::method::{Method, sampled};
 use super::super::question::{CaseError, Question, Verdict};
 use super::draws::random;
-use crate::comparison::{Hulls, parry_pose};
+use crate::comparison::{Hulls, Random, parry_pose};
 use nalgebra::Vector3;
+use sublevel::body::Body;
 use sublevel::measure::{Options, SignedDistance, Status, WarmStart, growth_distance, level_distance, signed_distance};
 use sublevel_testkit::bodies::chart_zoo;
 use sublevel_testkit::catalogue::Case;
@@ -107,10 +108,15 @@ pub(super) fn slide(seed: u64, method: Method) -> Result<Option<Verdict>, CaseEr
 /// The seed of the level distance inside the other body: flagged, while the growth distance goes on
 /// in proportion to the offset.
 pub(super) fn saturation(seed: u64, method: Method) -> Result<Option<Verdict>, CaseError> {
+    saturation_of(chart_zoo(), &mut random(27, seed), method)
+}
+
+/// The same of a pair of these bodies.
+pub(super) fn saturation_of(zoo: &[Body], random: &mut Random, method: Method) -> Result<Option<Verdict>, CaseError> {
     if !matches!(method, Method::Cold | Method::Warm) {
         return Ok(None);
     }
-    let pair = depth::saturation(chart_zoo(), &mut random(27, seed));
+    let pair = depth::saturation(zoo, random);
     let Saturation { a, pose_a, b, meet, .. } = &pair;
     let options = Options::default();
     let (mut growth_warm, mut level_warm) = (WarmStart::default(), WarmStart::default());
