@@ -297,7 +297,9 @@ impl<'a> Projection<'a> {
         options: &Options<'_>,
         warm: &mut WarmStart,
     ) -> Result<Projected, u32> {
-        if !self.has_newton || !self.body.is_smooth() || !runs(Stage::ClosedForm) {
+        // A hint of the general search says that this method has failed before.
+        let has_failed = matches!(warm.hint, Hint::Single { .. });
+        if has_failed || !self.has_newton || !self.body.is_smooth() || !runs(Stage::ClosedForm) {
             return Err(0);
         }
         if self.is_near_interior_point(point) {
