@@ -365,11 +365,11 @@ fn mirrored(
                 (found.tied, found.normal.unwrap_or_default())
             }
             _ => {
-                // The lower part is the witness's, whose place stands for the normal.
+                // The side of the lower part, whose witness it is, stands for the normal.
                 let n = turn * Vector3::new(aside, 0.0, 1.0).normalize();
                 let Ok(plane) = HalfSpace::new(n, -3.0) else { return (false, Vector3::repeat(f64::NAN)) };
                 let found = distance_to_half_space(both, &still, &plane, &options, warm);
-                (found.tied, found.witness)
+                (found.tied, Vector3::x() * turn.inverse_transform_vector(&found.witness).x.signum())
             }
         }
     };

@@ -282,7 +282,9 @@ impl Problem<'_> {
                 break;
             }
             let here = self.apart([0.0, found.upper + error], [found.witness, point], -found.normal, iterations);
-            let fall = fall_within(found.normal.dot(&axis), at, half);
+            // Far away the place counts, not the angle.
+            let far = if half > 0.0 { (found.upper / half).max(1.0) } else { 1.0 };
+            let fall = fall_within(found.normal.dot(&axis), at, half) * far;
             let is_better = if more == 0 {
                 here.upper < best.upper
             } else {

@@ -210,7 +210,9 @@ pub struct Slide {
 
 /// Family 16. From apart to concentric.
 pub fn slide(index: u64, random: &mut dyn Draws) -> Option<Slide> {
-    let start = apart(shapes(index, [1.0, 1.0], random), random, "sliding");
+    // About their origins, which lie inside of them.
+    let shapes = PAIRS[(index % COUNT) as usize].map(|kind| Shape::centred(kind, 1.0, random));
+    let start = apart(shapes, random, "sliding");
     let way = start.pose_a.translation() - start.pose_b.translation();
     Some(Slide { start, way }).filter(|slide| slide.start.bodies().is_none())
 }

@@ -127,11 +127,11 @@ impl Pair {
     /// depth of an axis.
     pub fn slope_flaw(&self, found: &Solved, truth: &Reference) -> Option<Flaw> {
         let (Some(gradients), Some(_)) = (found.gradients, truth.normal) else {
-            // A signed distance goes on through contact, as long as the axis is outside.
+            // At distances below the accuracy nothing is promised. A signed distance goes on through
+            // contact, as long as the axis is outside.
             let is_signed = matches!((&self.a, &self.b), (Shape::Capsule(_), _) | (_, Shape::Capsule(_)));
-            let of_axis = truth.value() + self.radius();
-            let is_due =
-                found.lower > 0.0 || is_signed && truth.normal.is_some() && of_axis > self.accuracy * self.size();
+            let is_apart = found.lower > 0.0 || is_signed && truth.normal.is_some();
+            let is_due = is_apart && truth.value() + self.radius() > self.accuracy * self.size();
             return is_due.then(|| Flaw::Status(format!("no gradient at {:e} m", found.upper)));
         };
         let size = |shape: &Shape| if shape.reach_m() > 0.0 { shape.reach_m() } else { self.size() };

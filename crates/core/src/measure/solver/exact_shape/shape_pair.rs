@@ -29,7 +29,8 @@ const HALVINGS: u32 = 8;
 
 /// Largest angle between the normals of both sets, radians, that an answer is taken at.
 ///
-/// Witnesses are off by it, and gradients by that times their arms: a step more costs little here.
+/// Witnesses are off by it times the distance, or the sizes where those are smaller, and gradients
+/// by their arms: a step more costs little here.
 /// Larger, gradients of long bodies are off by more than 1e-6; smaller, rounding keeps answers from
 /// being taken. Exercised by `shapes_against_shapes`.
 const FINELY_ALIGNED: f64 = ALIGNED / 8.0;
@@ -120,9 +121,11 @@ impl<A: Projectable, B: Projectable> ShapePair<A, B> {
             if best.upper - best.lower <= tolerance {
                 let way = subtract::<Scalar, f64>(best.x, best.y);
                 let off = subtract::<Scalar, f64>(way, scaled::<Scalar, f64>(best.n, seen.distance));
-                // At shorter distances rounding allows no better direction.
+                // Far away the places count, not the angle; at short distances rounding allows no
+                // better direction.
+                let reach = self.a.reach() + self.b.reach();
                 let enough =
-                    (FINELY_ALIGNED * seen.distance).max(2.0 * f64::EPSILON * (self.a.reach() + self.b.reach()));
+                    (FINELY_ALIGNED * seen.distance.min(reach)).max(2.0 * f64::EPSILON * (reach + seen.distance));
                 let inward =
                     apply_transposed::<Scalar, f64>(&self.rotation, scaled::<Scalar, f64>(seen.frame[2], -1.0));
                 let slides = self.a.slide(Scalar, own, inward) * seen.distance;
