@@ -67,16 +67,17 @@ impl Problem<'_> {
     }
 
     fn search(&self, of_body: At<'_, Body>, warm: &mut WarmStart) -> CapsuleDistance {
-        let form = of_body.0.closed_form().filter(|_| runs(Stage::ClosedForm));
-        if let Some(ball) = form.and_then(|form| Axis::of_ball(form, of_body.1)) {
-            *warm = WarmStart::default();
-            return of_axes(&ball, &Axis::of_capsule(self.capsule, self.capsule_pose), self.tolerance);
+        match self.by_newton(of_body, self.tolerance, self.options, warm) {
+            Ok(found) => found,
+            Err(spent) => self.beyond_newton(of_body, spent, warm),
         }
+    }
+
+    /// Where Newton's method has not found a bracket as narrow as asked for: one as narrow as
+    /// rounding leaves, or along the axis.
+    #[cold]
+    fn beyond_newton(&self, of_body: At<'_, Body>, mut spent: u32, warm: &mut WarmStart) -> CapsuleDistance {
         let floor = ROUNDING_FLOOR * self.size(of_body);
-        let mut spent = match self.by_newton(of_body, self.tolerance, self.options, warm) {
-            Ok(found) => return found,
-            Err(spent) => spent,
-        };
         if floor > self.tolerance && self.goal.is_narrow() && !self.options.exhausted(spent) {
             match self.by_newton(of_body, floor, &self.options.after(spent), warm) {
                 Ok(found) => return CapsuleDistance { iterations: found.iterations + spent, ..found },
@@ -107,7 +108,13 @@ impl Problem<'_> {
         if !runs(Stage::ClosedForm) {
             Err(0)
         } else if let Some(form) = of_body.0.closed_form() {
-            self.of_shape((form, of_body.1), (width, options), warm)
+            match Axis::of_ball(form, of_body.1) {
+                Some(ball) => {
+                    *warm = WarmStart::default();
+                    Ok(of_axes(&ball, &Axis::of_capsule(self.capsule, self.capsule_pose), self.tolerance))
+                }
+                None => self.of_shape((form, of_body.1), (width, options), warm),
+            }
         } else if of_body.0.is_smooth() {
             self.of_smooth(of_body, (width, options), warm)
         } else {
