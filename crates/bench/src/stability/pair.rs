@@ -46,8 +46,10 @@ fn of_ours(pair: &Pair, method: Method) -> Result<Option<PairAnswer>, CaseError>
     if let Some(case) = pair.bodies() {
         let (pose_a, pose_b) = (case.pose_a, case.pose_b);
         let Some(answer) = Question(case).run(method)? else { return Ok(None) };
+        // Judged by 200 bits, as all pairs here.
         let ours = answer.ours.map(|found| of_bodies(&found, &pose_a, &pose_b));
-        return Ok(Some(PairAnswer { verdict: answer.verdict, value: answer.value, ours }));
+        let verdict = ours.map_or(answer.verdict, |found| verdict(pair, &found, &pair.truth()));
+        return Ok(Some(PairAnswer { verdict, value: answer.value, ours }));
     }
     let Some(found) = solved(pair, method) else { return Ok(None) };
     let verdict = verdict(pair, &found, &pair.truth());

@@ -93,7 +93,7 @@ const JUMP: f64 = 0.3;
 /// narrowed down without a flag.
 const STEPS: u32 = 20;
 /// See [`STEPS`].
-const NARROW: f64 = 1e-12;
+const NARROW: f64 = 1e-15;
 
 /// Whether an answer flags a tie, and its normal.
 pub type Flagged = (bool, Vector3<f64>);

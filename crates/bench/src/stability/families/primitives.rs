@@ -90,8 +90,8 @@ pub(super) fn common_point(seed: u64, method: Method) -> Put {
     let pair = placement::common_point(seed, &mut random(105, seed));
     put_all(vec![pair], method, |answers, method| {
         let [(pair, PairAnswer { value: Some(value), .. })] = answers else { return Verdict::NoAnswer };
-        let allowed = if method.is_ours() { pair.rounding() } else { slack(pair, method) };
-        if *value <= allowed { Verdict::Pass } else { Verdict::Off(value / pair.size()) }
+        // What has no inside meets others in points, and is nowhere deep in them.
+        if *value <= slack(pair, method) { Verdict::Pass } else { Verdict::Off(value / pair.size()) }
     })
 }
 
@@ -108,8 +108,7 @@ pub(super) fn concentric(seed: u64, method: Method) -> Put {
         let Some(value) = answer.value else { return Verdict::NoAnswer };
         // Half-spaces are concentric with what they halve, two segments with an offset between them
         // are not.
-        let allowed = offset + if method.is_ours() { pair.rounding() } else { slack(pair, method) };
-        if !(value <= allowed) {
+        if !(value <= offset + slack(pair, method)) {
             return Verdict::Off(value / pair.size());
         }
         let Some(ours) = answer.ours else { return Verdict::Pass };

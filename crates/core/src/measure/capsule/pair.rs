@@ -23,12 +23,12 @@ use nalgebra::Vector3;
 /// Most places along a segment at which the distance is taken.
 const MAX_PLACES: u32 = 64;
 
-/// Width of a bracket, relative to the larger of both and their distance, dimensionless, that
-/// rounding may leave: as `Options::with_accuracy` states it of flat surfaces.
+/// Widths of brackets, relative to the larger of both and their distance, dimensionless, that
+/// rounding may leave: as `Options::with_accuracy` states them in general and of flat surfaces.
 ///
 /// Smaller, pairs that rounding keeps wide take hundreds of iterations more and end no narrower;
 /// larger, they end wider than need be. Exercised by `family_13_parallel_flats_of_primitives`.
-const ROUNDING_FLOOR: f64 = 1e-12;
+const ROUNDING_FLOORS: [f64; 2] = [1e-13, 1e-12];
 
 /// Largest derivative of the distance along the axis, dimensionless, at a place that counts as the
 /// nearest one in its middle: gradients are off by about as much, and 1e-6 is promised.
@@ -77,11 +77,13 @@ impl Problem<'_> {
     /// rounding leaves, or along the axis.
     #[cold]
     fn beyond_newton(&self, of_body: At<'_, Body>, mut spent: u32, warm: &mut WarmStart) -> CapsuleDistance {
-        let floor = ROUNDING_FLOOR * self.size(of_body);
-        if floor > self.tolerance && self.goal.is_narrow() && !self.options.exhausted(spent) {
-            match self.by_newton(of_body, floor, &self.options.after(spent), warm) {
-                Ok(found) => return CapsuleDistance { iterations: found.iterations + spent, ..found },
-                Err(more) => spent += more,
+        let size = self.size(of_body);
+        for floor in ROUNDING_FLOORS.map(|floor| floor * size) {
+            if floor > self.tolerance && self.goal.is_narrow() && !self.options.exhausted(spent) {
+                match self.by_newton(of_body, floor, &self.options.after(spent), warm) {
+                    Ok(found) => return CapsuleDistance { iterations: found.iterations + spent, ..found },
+                    Err(more) => spent += more,
+                }
             }
         }
         self.along_axis(of_body, spent, warm)
