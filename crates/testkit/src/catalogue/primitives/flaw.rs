@@ -1,6 +1,8 @@
 //! What an answer to a pair must be, by 200 bits.
 
-use super::{Pair, Reference, Shape, Solved};
+use super::pair::Pair;
+use super::shape::Shape;
+use super::solved::{Reference, Solved};
 use nalgebra::Vector3;
 use sublevel_core::measure::{MAX_ITERATIONS, Pose, Status, Twist, WarmStart};
 

@@ -1,6 +1,7 @@
 //! The answer of our measure for a pair, and what 200 bits say.
 
-use super::{Pair, Shape};
+use super::pair::Pair;
+use super::shape::Shape;
 use crate::reference::big::{Big, big, double};
 use crate::reference::{self, capsule, half_space};
 use nalgebra::Vector3;
