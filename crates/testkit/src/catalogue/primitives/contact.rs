@@ -137,7 +137,7 @@ pub fn parallel_flats(index: u64) -> Pair {
     Pair { accuracy, floor: wide, bound: Some(wanted.max(floor)), what, ..pair }
 }
 
-/// Gaps of [`touching`], relative to the size of the pair.
+/// Gaps of family 8, relative to the size of the pair.
 pub const TOUCHING: [f64; 4] = [1e-3, 1e-6, 1e-8, 0.0];
 
 /// Families 8 and 20. Apart, then moved to a gap, relative to the size of the pair.
