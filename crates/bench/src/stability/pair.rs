@@ -7,7 +7,7 @@ use super::question::{CaseError, Question, Verdict};
 use crate::comparison::{Coal, ParryShape, PeerShape};
 use nalgebra::{UnitQuaternion, Vector3};
 use sublevel::body::{Body, ExactShape};
-use sublevel::measure::{Distance, Pose, WarmStart};
+use sublevel::measure::{Pose, WarmStart};
 use sublevel_testkit::catalogue::primitives::{Flaw, Pair, Reference, Shape, Solved};
 use sublevel_testkit::random::pose;
 
@@ -47,7 +47,7 @@ fn of_ours(pair: &Pair, method: Method) -> Result<Option<PairAnswer>, CaseError>
         let (pose_a, pose_b) = (case.pose_a, case.pose_b);
         let Some(answer) = Question(case).run(method)? else { return Ok(None) };
         // Judged by 200 bits, as all pairs here.
-        let ours = answer.ours.map(|found| of_bodies(&found, &pose_a, &pose_b));
+        let ours = answer.ours.map(|found| Solved::of_bodies(&found, &pose_a, &pose_b));
         let verdict = ours.map_or(answer.verdict, |found| verdict(pair, &found, &pair.truth()));
         return Ok(Some(PairAnswer { verdict, value: answer.value, ours }));
     }
@@ -76,21 +76,6 @@ fn nearby(pair: &Pair) -> Pair {
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.005, 0.005, -0.005));
     let turned = UnitQuaternion::new_normalize(*(turn * pair.pose_b.rotation()));
     Pair { pose_b: pose(pair.pose_b.translation() + step, &turned), ..pair.clone() }
-}
-
-fn of_bodies(found: &Distance, pose_a: &Pose, pose_b: &Pose) -> Solved {
-    Solved {
-        status: found.status,
-        lower: found.lower,
-        upper: found.upper,
-        value: found.value(),
-        witness_a: found.witness_a,
-        witness_b: found.witness_b,
-        normal: found.normal,
-        tied: found.tied,
-        iterations: found.iterations,
-        gradients: found.gradients(pose_a, pose_b),
-    }
 }
 
 /// Judges an answer of ours: its bracket, its status, its witnesses, its error.

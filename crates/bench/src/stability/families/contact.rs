@@ -25,10 +25,7 @@ pub(super) fn rising(answers: &[(Question, Answer)], method: Method) -> Result<V
     for (case, answer) in answers {
         let Some(value) = answer.value else { return Ok(Verdict::NoAnswer) };
         let offset = case.pose_b.translation();
-        // The middle of a bracket is off by half of the accuracy asked for.
-        let half = 0.5 * case.accuracy * case.small();
-        let rounding = 4.0 * f64::EPSILON * offset.norm();
-        let slack = if method.is_ours() { half + rounding } else { 2.0 * case.slack(method) };
+        let slack = if method.is_ours() { 4.0 * f64::EPSILON * offset.norm() } else { 2.0 * case.slack(method) };
         if !(value >= last - slack) {
             return Ok(Verdict::Off((last - value) / case.small()));
         }

@@ -45,6 +45,12 @@ fn slack(pair: &Pair, method: Method) -> f64 {
         + pair.size() * if method.is_ours() { pair.accuracy.max(pair.floor / pair.size()) } else { PEER_ERROR }
 }
 
+/// Largest distance of shapes that overlap, metres: of ours the rounding floor that
+/// `Options::with_accuracy` states.
+fn contact_slack(pair: &Pair, method: Method) -> f64 {
+    if method.is_ours() { pair.rounding().max(1e-13 * pair.sum()) } else { slack(pair, method) }
+}
+
 /// How far normals may turn.
 const NORMAL: f64 = 1e-6;
 
@@ -90,8 +96,7 @@ pub(super) fn common_point(seed: u64, method: Method) -> Put {
     let pair = placement::common_point(seed, &mut random(105, seed));
     put_all(vec![pair], method, |answers, method| {
         let [(pair, PairAnswer { value: Some(value), .. })] = answers else { return Verdict::NoAnswer };
-        // What has no inside meets others in points, and is nowhere deep in them.
-        if *value <= slack(pair, method) { Verdict::Pass } else { Verdict::Off(value / pair.size()) }
+        if *value <= contact_slack(pair, method) { Verdict::Pass } else { Verdict::Off(value / pair.size()) }
     })
 }
 
@@ -108,7 +113,7 @@ pub(super) fn concentric(seed: u64, method: Method) -> Put {
         let Some(value) = answer.value else { return Verdict::NoAnswer };
         // Half-spaces are concentric with what they halve, two segments with an offset between them
         // are not.
-        if !(value <= offset + slack(pair, method)) {
+        if !(value <= offset + contact_slack(pair, method)) {
             return Verdict::Off(value / pair.size());
         }
         let Some(ours) = answer.ours else { return Verdict::Pass };

@@ -11,8 +11,8 @@
 //! signed distance of two capsules is the distance of their axes less the radii, whatever that is.
 //! The least square over the rectangle of places is at the stationary point, where that is in it,
 //! or on a side; the normal that proves it is across the axes on which it is not at an end. Both
-//! are computed for all cases, and the best bounds count: each is valid, so that no case has to be
-//! told from another.
+//! are computed for all cases, and the best bounds count: each is valid, so that the cases need
+//! not be distinguished.
 
 use super::answer::CapsuleDistance;
 use super::shape::Capsule;

@@ -7,7 +7,7 @@ use crate::reference::{self, capsule, half_space};
 use nalgebra::Vector3;
 use sublevel_core::body::Body;
 use sublevel_core::measure::{
-    Capsule, CapsuleDistance, Options, Pose, Status, Twist, WarmStart, distance, distance_of_capsules,
+    Capsule, CapsuleDistance, Distance, Options, Pose, Status, Twist, WarmStart, distance, distance_of_capsules,
     distance_to_capsule, distance_to_half_space, distance_to_point,
 };
 
@@ -40,6 +40,13 @@ impl Solved {
             gradients: self.gradients.map(|[a, b]| [b, a]),
             ..self
         }
+    }
+
+    /// Of two bodies at these poses.
+    pub fn of_bodies(found: &Distance, pose_a: &Pose, pose_b: &Pose) -> Self {
+        let Distance { status, lower, upper, witness_a, witness_b, normal, tied, iterations, .. } = *found;
+        let (value, gradients) = (found.value(), found.gradients(pose_a, pose_b));
+        Self { status, lower, upper, value, witness_a, witness_b, normal, tied, iterations, gradients }
     }
 
     fn of_capsules(found: &CapsuleDistance, pose_a: &Pose, pose_b: &Pose) -> Self {
@@ -120,18 +127,7 @@ impl Pair {
         match (a, b) {
             (Shape::Body(a), Shape::Body(b)) => {
                 let found = distance(&**a, pose_a, &**b, pose_b, options, warm);
-                Solved {
-                    status: found.status,
-                    lower: found.lower,
-                    upper: found.upper,
-                    value: found.value(),
-                    witness_a: found.witness_a,
-                    witness_b: found.witness_b,
-                    normal: found.normal,
-                    tied: found.tied,
-                    iterations: found.iterations,
-                    gradients: found.gradients(pose_a, pose_b),
-                }
+                Solved::of_bodies(&found, pose_a, pose_b)
             }
             (Shape::Body(body), Shape::Capsule(capsule)) => {
                 let found = distance_to_capsule(&**body, pose_a, capsule, pose_b, options, warm);
