@@ -82,6 +82,12 @@ impl<'a> Row<'a> {
     }
 }
 
+/// `value` rounded to that many decimal digits, so that a file holds no more than was measured.
+pub(crate) fn significant(value: f64, digits: usize) -> f64 {
+    let rounded = format!("{value:.*e}", digits.saturating_sub(1));
+    rounded.parse().expect("what is printed of a number reads back as one")
+}
+
 /// The cells of a line; those between quotes may contain commas.
 fn cells(line: &str) -> Vec<String> {
     let mut cells = vec![String::new()];
@@ -114,6 +120,15 @@ mod tests {
         assert_eq!(rows[0].get::<usize>("count"), Ok(7));
         assert!(rows[1].number("ns").unwrap().is_nan());
         assert_eq!(rows[1].maybe::<f64>("ns"), Ok(None));
+    }
+
+    #[test]
+    fn numbers_are_rounded_to_digits() {
+        assert_eq!(significant(0.012345678, 4), 0.01235);
+        assert_eq!(significant(-2.0 / 3.0, 13), -0.6666666666667);
+        assert_eq!(significant(0.0, 4), 0.0);
+        assert_eq!(significant(f64::INFINITY, 4), f64::INFINITY);
+        assert!(significant(f64::NAN, 4).is_nan());
     }
 
     #[test]

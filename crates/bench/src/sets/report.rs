@@ -7,6 +7,11 @@ use super::counterexample::Level;
 use super::models::Model;
 use super::pairs::Bracket;
 use crate::blocks::block;
+use crate::csv::significant;
+
+/// Decimal digits of times and errors, and of bounds, whose differences are drawn down to 1e-12.
+const MEASURED: usize = 4;
+const BOUNDS: usize = 13;
 
 impl Sets {
     /// The report, but for what `Shown` writes into its blocks.
@@ -40,14 +45,20 @@ impl Sets {
         for bracket in &self.brackets {
             let Bracket { degree, pair, method, steps, seconds, lower, upper, exact } = bracket;
             let exact = u8::from(*exact);
+            let seconds = significant(*seconds, MEASURED);
+            let [lower, upper] = [lower, upper].map(|bound| significant(*bound, BOUNDS));
             // Writing to a string cannot fail.
             let _ = writeln!(text, "pair,{pair},{method},{degree},{steps},{seconds},{lower},{upper},{exact},,");
         }
         for Level { level, seconds, lower, upper, exact } in &self.counterexample {
             let exact = u8::from(*exact);
+            let seconds = significant(*seconds, MEASURED);
+            let [lower, upper] = [lower, upper].map(|bound| significant(*bound, BOUNDS));
             let _ = writeln!(text, "counterexample,{level},,,,{seconds},{lower},{upper},{exact},,");
         }
         for Model { object, kind, name, error, false_contacts, seconds } in &self.models {
+            let [seconds, error, false_contacts] =
+                [seconds, error, false_contacts].map(|value| significant(*value, MEASURED));
             let _ = writeln!(text, "{kind},{object},{name},,,{seconds},,,,{error},{false_contacts}");
         }
         text
