@@ -1,8 +1,9 @@
 //! What is minimised over one set.
 
+use super::active_set::{Derivatives, Objective};
 use super::cover::{Cell, Cover};
 use super::cut::support;
-use super::local_search::distance_up;
+use super::local_search::{Level, distance_up};
 use super::placed_set::{Membership, PlacedSet, PlacedSetError};
 use super::placing::Placing;
 use crate::polynomial::Polynomial;
@@ -15,7 +16,7 @@ pub(super) enum Goal<'a> {
         /// The polynomials in the normalized coordinates of the first set, with what they are off
         /// by.
         composed: Vec<(Polynomial, f64)>,
-        other: &'a PlacedSet<'a>,
+        level: Level<'a>,
         values: Box<Membership<'a>>,
     },
     /// `normal·x - offset`, metres, for a vector of length 1 up to rounding.
@@ -33,7 +34,7 @@ impl<'a> Goal<'a> {
         let composed = other.of.set.polynomials.iter().map(|g| map.compose(g, &most));
         let composed: Vec<_> = composed.collect::<Result<_, _>>().map_err(|_| PlacedSetError::Normalization)?;
         let values = Box::new(other.membership().ok_or(PlacedSetError::Normalization)?);
-        Ok(Self::Level { composed, other, values })
+        Ok(Self::Level { composed, level: Level::of(other), values })
     }
 
     /// Lower bound over the points of the set in a cell.
@@ -70,30 +71,39 @@ impl<'a> Goal<'a> {
         }
     }
 
-    /// Gradient and Hessian at a point of the common frame, up to rounding: of the largest
-    /// polynomial, of the height, or of half the squared distance.
-    pub(super) fn derivatives(&self, x: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
-        match self {
-            Self::Level { other, .. } => {
-                let (g, z) = other.largest_at(x);
-                let (jet, linear) = (g.evaluate(&z), other.linear());
-                (linear.tr_mul(&jet.gradient), linear.tr_mul(&(jet.hessian * linear)))
-            }
-            Self::Height { normal, .. } => (*normal, Matrix3::zeros()),
-            Self::From(point) => (x - point, Matrix3::identity()),
-        }
-    }
-
-    /// Whether the least value may be where no constraint is active.
-    pub(super) fn may_be_inside(&self) -> bool {
-        matches!(self, Self::Level { .. })
-    }
-
     /// What widths are relative to where the value is small.
     pub(super) fn scale(&self) -> f64 {
         match self {
             Self::Level { .. } => 1.0,
             Self::Height { .. } | Self::From(_) => 0.0,
         }
+    }
+}
+
+impl Objective<1> for Goal<'_> {
+    fn count(&self) -> usize {
+        match self {
+            Self::Level { level, .. } => level.count(),
+            Self::Height { .. } | Self::From(_) => 1,
+        }
+    }
+
+    /// A polynomial of the other set, the height, or half the squared distance.
+    fn function(&self, index: usize, points: &[Vector3<f64>; 1]) -> Derivatives {
+        let [x] = points;
+        match self {
+            Self::Level { level, .. } => level.function(index, points),
+            Self::Height { normal, offset } => {
+                Derivatives::of_point(0, normal.dot(x) - offset, normal, &Matrix3::zeros())
+            }
+            Self::From(point) => {
+                let gap = x - point;
+                Derivatives::of_point(0, 0.5 * gap.norm_squared(), &gap, &Matrix3::identity())
+            }
+        }
+    }
+
+    fn may_be_inside(&self) -> bool {
+        matches!(self, Self::Level { .. })
     }
 }

@@ -1,9 +1,9 @@
 //! The least value of a function over one set: cells, the lowest first.
 
+use super::active_set::{ActiveSet, Objective};
 use super::cover::Cover;
 use super::goal::Goal;
 use super::limits::Limits;
-use super::local_search::refined_on;
 use super::placed_set::{PlacedSet, PlacedSetError};
 use super::placing::Placing;
 use super::waiting::Waiting;
@@ -36,12 +36,12 @@ pub(super) fn minimise(
 ) -> Result<Minimum, PlacedSetError> {
     let placing = Placing::new(set, cover)?;
     let member = set.membership().ok_or(PlacedSetError::Normalization)?;
-    let linear = set.linear();
+    let search = ActiveSet::new([set]);
     let mut best: Option<(f64, Vector3<f64>)> = None;
     let improve = |start: Vector3<f64>, best: &mut Option<(f64, Vector3<f64>)>| {
-        let on_boundary = refined_on(set, &linear, start, true, |x| goal.derivatives(x));
-        let inside = goal.may_be_inside().then(|| refined_on(set, &linear, start, false, |x| goal.derivatives(x)));
-        for point in [Some(start), on_boundary, inside.flatten()].into_iter().flatten() {
+        let on_boundary = search.minimiser(goal, [start], true);
+        let inside = goal.may_be_inside().then(|| search.minimiser(goal, [start], false));
+        for [point] in [Some([start]), on_boundary, inside.flatten()].into_iter().flatten() {
             let Some(point) = member.pulled(point) else { continue };
             let value = goal.value_up(&point);
             if value.is_nan() {

@@ -13,6 +13,7 @@
 //! A cover depends on the set alone, so it is kept from query to query ([`BranchAndBound`]).
 //! Lengths are metres of the common frame of the poses.
 
+mod active_set;
 mod cover;
 mod cut;
 mod distance;
@@ -28,7 +29,7 @@ mod workspace;
 
 pub use distance::SetDistance;
 pub use limits::{DEFAULT_STEPS, Limits};
-pub use local_search::{NearPoints, nearest_points};
+pub use local_search::{LowPoint, NearPoints, lowest_points, nearest_points};
 pub use placed_set::{BoundedSet, Membership, PlacedSet, PlacedSetError};
 pub use single::{SetHeight, SetLevelDistance, SetPointDistance};
 pub use workspace::BranchAndBound;
