@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use sublevel_core::body::Shape;
 use sublevel_core::measure::{
-    DEFAULT_ACCURACY, DEFAULT_DEPTH_ACCURACY, Distance, Options, Pose, WithinMargin, distance_batch, within_margin,
+    DEFAULT_ACCURACY, DEFAULT_DEPTH_ACCURACY, Distance, Options, Pose, WithinMargin, distance_batch,
+    is_solved_in_lanes, within_margin,
 };
 
 use super::answer::{Answer, Verdict};
@@ -153,7 +154,8 @@ impl Clearance {
             };
             let Some((other_slot, b)) = thing else { return true };
             // Distances say nothing below 0.
-            if let (Other::Standing(_), Some(_), Some(_)) = (other, smooth(&a), smooth(&b))
+            if let (Other::Standing(_), Some((of_a, _)), Some((of_b, _))) = (other, single(&a), single(&b))
+                && is_solved_in_lanes(of_a, of_b)
                 && threshold >= 0.0
             {
                 if a.box_gap_m(&b) <= threshold + slack_m {
@@ -207,7 +209,7 @@ impl Clearance {
         let poses: Vec<Pose> = near.iter().map(|near| near.pose).collect();
         let (Some(standing), Some(first)) = (self.placed.standing(other), poses.first()) else { return };
         let ((slot, moving), mut found) = (self.placed.moving_at(index, first), vec![Distance::default(); poses.len()]);
-        let (Some((a, _)), Some((b, pose_b))) = (smooth(&moving), smooth(&standing)) else { return };
+        let (Some((a, _)), Some((b, pose_b))) = (single(&moving), single(&standing)) else { return };
         if distance_batch(b, pose_b, a, &poses, &self.options(solver), &mut found).is_err() {
             return;
         }
@@ -300,8 +302,8 @@ impl Question for Clearance {
     }
 }
 
-/// Pairs of a moving body, by its position, and one that stands still, both smooth, with the states
-/// of a chunk in which they may be near.
+/// Pairs of a moving body, by its position, and one that stands still, with the states of a chunk in
+/// which they may be near: pairs of which [`distance_batch`] measures several at a time.
 #[derive(Debug, Default)]
 struct Batches(BTreeMap<(usize, Slot), Vec<Near>>);
 
@@ -322,12 +324,12 @@ impl Batches {
     }
 }
 
-/// A thing that is one smooth body, which [`distance_batch`] measures several at a time.
-fn smooth<'a>(thing: &Thing<'a>) -> Option<(&'a Shape, &'a Pose)> {
+/// A thing that is one body.
+fn single<'a>(thing: &Thing<'a>) -> Option<(&'a Shape, &'a Pose)> {
     match thing {
         Thing::Solid { rungs: [solid], pose, set: None } => match &**solid {
-            Shape::Body(body) if body.is_smooth() => Some((solid, pose)),
-            Shape::Body(_) | Shape::Compound(_) => None,
+            Shape::Body(_) => Some((solid, pose)),
+            Shape::Compound(_) => None,
         },
         _ => None,
     }

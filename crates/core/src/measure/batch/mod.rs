@@ -8,15 +8,18 @@
 //! that no answer depends on the other poses of the batch.
 
 mod iterate;
+mod shapes;
 mod waiting;
 
-use crate::body::{Body, Solid};
+use crate::body::{Body, ClosedForm, ExactShape, Solid};
 use crate::measure::distance::{Distance, distance};
 use crate::measure::frames::pose::Pose;
+use crate::measure::frames::quaternion::{conjugate_times, rotation_by, splat_quaternion};
 use crate::measure::frames::vector::{V3, add, apply, apply_transposed, dot, rows, subtract};
 use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveConstraints;
 use crate::measure::solver::continuation::{limits, worth_a_bracket};
+use crate::measure::solver::exact_shape::{Cuboid, Cylinder};
 use crate::measure::solver::initial_guess::{Start, facing, meeting, middle};
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::tangent_newton::{ALIGNED, Relative, Side, bracket, moved};
@@ -25,6 +28,7 @@ use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::{Aligned, Lanes, MAX_LANES, Number, Simd, Singles, Twice, Vector, WithSimd, dispatch_lanes};
 use iterate::Iterate;
 use nalgebra::Vector3;
+use shapes::ShapeBatch;
 use waiting::{Group, MAX_COARSE, Waiting};
 
 /// Why a batch is refused.
@@ -47,9 +51,10 @@ pub enum BatchError {
 /// world), written to `answers` in the order of the poses.
 ///
 /// Each answer is one of [`distance`] from a cold start in all that is proven of it, and depends on
-/// its own pose only, to the last bit. Single bodies of one constraint are solved several poses at
-/// a time, which takes a fraction of the time of as many queries; all others, and poses that do not
-/// converge at once such as those in contact, are solved one by one.
+/// its own pose only, to the last bit. Single bodies of one constraint, and such a body beside a box
+/// or a cylinder, are solved several poses at a time, which takes a fraction of the time of as many
+/// queries; all others, and poses that do not converge at once such as those in contact, are solved
+/// one by one.
 ///
 /// # Errors
 /// No poses, or a number of places that is not the number of poses; nothing is computed then.
@@ -85,12 +90,11 @@ pub fn distance_batch(
         return Err(BatchError::Empty);
     }
     if let ([a], [b]) = (a.parts(), b.parts())
-        && a.is_smooth()
-        && b.is_smooth()
+        && let Some(method) = LaneMethod::of(a, b)
         && options.max_iterations() >= MOST_ROUNDS
         && runs(Stage::Lanes)
     {
-        in_lanes((a, pose_a), (b, poses_b), options, answers);
+        in_lanes(method, (a, pose_a), (b, poses_b), options, answers);
     } else {
         for (answer, pose_b) in answers.iter_mut().zip(poses_b) {
             *answer = distance(a, pose_a, b, pose_b, options, &mut WarmStart::default());
@@ -99,16 +103,75 @@ pub fn distance_batch(
     Ok(())
 }
 
-/// The answers of single bodies of one constraint. Not generic, so that it is compiled with this
-/// crate, whatever its callers are compiled for.
+/// Whether [`distance_batch`] solves several poses of these solids at a time.
+pub fn is_solved_in_lanes(a: &impl Solid, b: &impl Solid) -> bool {
+    matches!((a.parts(), b.parts()), ([a], [b]) if LaneMethod::of(a, b).is_some())
+}
+
+/// How several poses of two bodies are solved at a time.
+#[derive(Clone, Copy)]
+enum LaneMethod<'a> {
+    /// Both have one constraint.
+    Smooth,
+    /// One of them has one constraint, the other is a box or a cylinder along its own axes.
+    Cuboid(&'a ClosedForm, Cuboid),
+    Cylinder(&'a ClosedForm, Cylinder),
+}
+
+impl<'a> LaneMethod<'a> {
+    fn of(a: &'a Body, b: &'a Body) -> Option<Self> {
+        let other = match (a.is_smooth(), b.is_smooth()) {
+            (true, true) => return Some(Self::Smooth),
+            (true, false) => b,
+            (false, true) => a,
+            (false, false) => return None,
+        };
+        let form = other.closed_form().filter(|form| form.axes().is_none())?;
+        match *form.shape() {
+            ExactShape::Cuboid { half_extents_m, .. } => {
+                Some(Self::Cuboid(form, Cuboid { half_extents: half_extents_m }))
+            }
+            ExactShape::Cylinder { radius_m, half_height_m, .. } => {
+                Some(Self::Cylinder(form, Cylinder { radius: radius_m, half_height: half_height_m }))
+            }
+            ExactShape::Capsule { .. } => None,
+        }
+    }
+}
+
+/// The answers of single bodies. Not generic, so that it is compiled with this crate, whatever its
+/// callers are compiled for.
 fn in_lanes(
+    method: LaneMethod<'_>,
     (a, pose_a): (&Body, &Pose),
     (b, poses_b): (&Body, &[Pose]),
     options: &Options<'_>,
     answers: &mut [Distance],
 ) {
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
-    dispatch_lanes(Batch { a, pose_a, b, poses_b, options, tolerance, answers });
+    let of_shape = ((a, pose_a), (b, poses_b));
+    match method {
+        LaneMethod::Smooth => dispatch_lanes(Batch { a, pose_a, b, poses_b, options, tolerance, answers }),
+        LaneMethod::Cuboid(form, set) => {
+            let (a, b) = of_shape;
+            dispatch_lanes(ShapeBatch { a, b, form, set, options, tolerance, answers });
+        }
+        LaneMethod::Cylinder(form, set) => {
+            let (a, b) = of_shape;
+            dispatch_lanes(ShapeBatch { a, b, form, set, options, tolerance, answers });
+        }
+    }
+}
+
+/// The answer to a pose by a query for it alone, after rounds that it has gone through in lanes.
+fn solve_alone(
+    (a, pose_a): (&Body, &Pose),
+    (b, pose_b): (&Body, &Pose),
+    (options, rounds): (&Options<'_>, u32),
+    mut warm: WarmStart,
+) -> Distance {
+    let found = distance(a, pose_a, b, pose_b, &options.after(rounds), &mut warm);
+    Distance { iterations: found.iterations + rounds, ..found }
 }
 
 /// Rounds in single precision that every pose goes through.
@@ -300,10 +363,9 @@ impl Batch<'_> {
 
     /// Answers a pose by a query for it alone, after the rounds that it has gone through in lanes.
     #[inline(never)]
-    fn solve_alone(&mut self, pose: usize, rounds: u32, mut warm: WarmStart) {
-        let options = self.options.after(rounds);
-        let found = distance(self.a, self.pose_a, self.b, &self.poses_b[pose], &options, &mut warm);
-        self.answers[pose] = Distance { iterations: found.iterations + rounds, ..found };
+    fn solve_alone(&mut self, pose: usize, rounds: u32, warm: WarmStart) {
+        let b = (self.b, &self.poses_b[pose]);
+        self.answers[pose] = solve_alone((self.a, self.pose_a), b, (self.options, rounds), warm);
     }
 
     /// The lanes in which the middle between the points seems to lie in both bodies: single queries
@@ -339,25 +401,10 @@ impl Batch<'_> {
                 column[lane] = entry;
             }
         }
-        let splat = |value: f64| N::splat(simd, value);
         let column = |i: usize| N::load(simd, &columns.0[i]);
-        let own = &self.pose_a.rotation().coords;
-        let (u, v) = ([splat(-own.x), splat(-own.y), splat(-own.z)], [column(0), column(1), column(2)]);
-        let (u_w, v_w) = (splat(own.w), column(3));
-        // The product of the conjugate of A's quaternion with B's.
-        let w = u_w * v_w - dot(u, v);
-        let i = u_w.mul_add(v[0], v_w * u[0]) + (u[1] * v[2] - u[2] * v[1]);
-        let j = u_w.mul_add(v[1], v_w * u[1]) + (u[2] * v[0] - u[0] * v[2]);
-        let k = u_w.mul_add(v[2], v_w * u[2]) + (u[0] * v[1] - u[1] * v[0]);
-        let (ww, ii, jj, kk) = (w * w, i * i, j * j, k * k);
-        let two = splat(2.0);
-        let (ij, ik, jk) = (two * i * j, two * i * k, two * j * k);
-        let (wi, wj, wk) = (two * w * i, two * w * j, two * w * k);
-        let rotation = [
-            [ww + ii - jj - kk, ij - wk, wj + ik],
-            [wk + ij, ww - ii + jj - kk, jk - wi],
-            [ik - wj, wi + jk, ww - ii - jj + kk],
-        ];
+        let own = splat_quaternion(simd, self.pose_a.rotation());
+        let other = [column(0), column(1), column(2), column(3)];
+        let rotation = rotation_by(simd, conjugate_times(own, other));
         let frame = rows(simd, self.pose_a.rotation().to_rotation_matrix().matrix());
         let translation = apply_transposed(&frame, [column(4), column(5), column(6)]);
         let home = (&self.a.normalization().center, self.a.trust().center);

@@ -19,7 +19,7 @@ use nalgebra::Vector3;
 
 /// A pair of bodies, one of them smooth, the other with a closed form.
 #[derive(Clone, Copy)]
-pub(super) struct Exact<'a> {
+pub(in crate::measure) struct Exact<'a> {
     smooth: (&'a Body, &'a Pose),
     other: (&'a Body, &'a Pose),
     form: &'a ClosedForm,
@@ -30,7 +30,7 @@ pub(super) struct Exact<'a> {
 impl<'a> Exact<'a> {
     /// The pair, if it is one. Balls are left to continuation, which is as fast.
     #[inline(always)]
-    pub(super) fn new(of_a: (&'a Body, &'a Pose), of_b: (&'a Body, &'a Pose)) -> Option<Self> {
+    pub(in crate::measure) fn new(of_a: (&'a Body, &'a Pose), of_b: (&'a Body, &'a Pose)) -> Option<Self> {
         let (swapped, smooth, other) = match (of_a.0.is_smooth(), of_b.0.is_smooth()) {
             (true, false) => (false, of_a, of_b),
             (false, true) => (true, of_b, of_a),
@@ -88,7 +88,7 @@ impl<'a> Exact<'a> {
         Ok(self.answer(&found, 0.0))
     }
 
-    fn answer(&self, found: &ExactProven, tolerance: f64) -> Distance {
+    pub(in crate::measure) fn answer(&self, found: &ExactProven, tolerance: f64) -> Distance {
         let Self { other: (_, pose), form, swapped, .. } = *self;
         let (x, y) = (to_world(form, pose, found.x), to_world(form, pose, found.nearest));
         let status = Status::of(found.upper - found.lower <= tolerance);

@@ -18,6 +18,7 @@ use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::status::Status;
 use crate::measure::warm::WarmStart;
 pub use answer::Distance;
+pub(super) use exact::Exact;
 pub(super) use pair::{between, nearest, settle};
 
 /// Euclidean distance between solid `a` at `pose_a` and solid `b` at `pose_b` (body to world), 0

@@ -2,6 +2,7 @@
 
 pub(super) mod motion;
 pub(super) mod pose;
+pub(super) mod quaternion;
 pub(super) mod query_frame;
 pub(super) mod twist;
 pub(super) mod vector;

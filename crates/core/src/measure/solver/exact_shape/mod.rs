@@ -4,6 +4,7 @@
 mod cuboid;
 mod cylinder;
 mod distance;
+mod lanes;
 mod level;
 mod minimum;
 mod newton;
@@ -15,7 +16,10 @@ mod shape_pair;
 mod shapes;
 mod start;
 
+pub(in crate::measure) use cuboid::Cuboid;
+pub(in crate::measure) use cylinder::Cylinder;
 pub(in crate::measure) use distance::{ExactLost, ExactProven, ExactTrace};
+pub(in crate::measure) use lanes::{LaneBracket, LaneMove, LaneOffset, LaneSet, bracket, newton, start};
 pub(in crate::measure) use minimum::{LevelMinimum, LevelQuery};
 pub(in crate::measure) use placed::{ExactContact, ExactQuery, active, direction_to_world, normals_towards, to_world};
 pub(in crate::measure) use point::{PointOffset, PointSide, offset_of_point};

@@ -1,0 +1,282 @@
+//! A smooth body and a box or a cylinder at several poses at once: starts from support tables and
+//! first rounds in single precision, then rounds that bracket.
+
+use super::waiting::{Group, MAX_COARSE, Waiting};
+use super::{COARSE, Coarse, MOST_COARSE, MOST_ROUNDS, NEARLY_CONVERGED, solve_alone};
+use crate::body::{Body, ClosedForm};
+use crate::measure::distance::{Distance, Exact};
+use crate::measure::frames::pose::Pose;
+use crate::measure::frames::quaternion::{conjugate_times, rotation_by, splat_quaternion};
+use crate::measure::frames::vector::{M3, V3, add, apply, apply_transposed, dot, scaled};
+use crate::measure::options::Options;
+use crate::measure::solver::exact_shape::{
+    ExactProven, LaneBracket, LaneMove, LaneOffset, LaneSet, bracket, newton, start,
+};
+use crate::measure::solver::tangent_newton::{Plane, Relative, Side, SurfaceCurvature, moved};
+use crate::measure::warm::WarmStart;
+use crate::polynomial::{Aligned, Lanes, MAX_LANES, Number, NumberJet, Simd, Singles, Vector, WithSimd};
+
+/// Square of a step in normalized coordinates, relative to the body's size there, dimensionless, up
+/// to which the bracket where it leads is computed; as in a single query.
+const WORTH_A_BRACKET_SQUARED: f64 = 1e-6;
+
+/// Longest step in normalized coordinates, relative to the body's size there, dimensionless; as in
+/// a single query.
+const LONGEST_STEP: f64 = 0.5;
+
+/// Curvature times size, dimensionless, that is added where there is none; as in a single query.
+const FLATTEST: f64 = 1e-20;
+
+/// A batch as work for the widest arithmetic. Each answer is written once: by the lanes, or by a
+/// query for the pose alone.
+pub(super) struct ShapeBatch<'a, P> {
+    pub(super) a: (&'a Body, &'a Pose),
+    pub(super) b: (&'a Body, &'a [Pose]),
+    pub(super) form: &'a ClosedForm,
+    pub(super) set: P,
+    pub(super) options: &'a Options<'a>,
+    /// Width of the bracket that is narrow enough, metres.
+    pub(super) tolerance: f64,
+    pub(super) answers: &'a mut [Distance],
+}
+
+impl<P: LaneSet> WithSimd for ShapeBatch<'_, P> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let (lanes, singles) = (Lanes::<S>::COUNT, Coarse::<S>::COUNT);
+        let (mut far, mut near) = (Waiting::none(), Waiting::none());
+        let mut next = 0;
+        while !self.options.stopped() {
+            let left = self.b.1.len() - next;
+            if near.len >= lanes || near.len > 0 && far.len + left == 0 {
+                let group = near.take(lanes);
+                self.prove(simd, group, &mut near);
+            } else if far.len + left > 0 {
+                let fresh = far.len < singles && left > 0;
+                let group = if fresh { Group::fresh(next..next + left.min(singles)) } else { far.take(singles) };
+                next += if fresh { group.count } else { 0 };
+                if group.count > Singles::<S>::COUNT {
+                    self.approach::<S, Coarse<S>>(simd, group, fresh, &mut far, &mut near);
+                } else {
+                    self.approach::<S, Singles<S>>(simd, group, fresh, &mut far, &mut near);
+                }
+            } else {
+                return;
+            }
+        }
+        // Stopped: what is known by now of the poses that are left is the answer.
+        for waiting in [&far, &near] {
+            for (pose, rounds) in waiting.pose.iter().zip(&waiting.rounds).take(waiting.len) {
+                self.solve_alone(*pose, *rounds);
+            }
+        }
+        for pose in next..self.b.1.len() {
+            self.solve_alone(pose, 0);
+        }
+    }
+}
+
+/// A step of Newton's method in lanes, from points in the frame of the set.
+struct Linearized<S: Simd, N: Number<S>> {
+    seen: LaneOffset<N>,
+    jet: NumberJet<N>,
+    local: M3<N>,
+    found: LaneMove<N>,
+    /// Square of the step in normalized coordinates, relative to the body's size there.
+    square: N,
+    /// The lanes in which it leads on.
+    open: N::Mask,
+}
+
+impl<S: Simd, N: Number<S>> Linearized<S, N> {
+    /// Where it leads, within its limits.
+    #[inline(always)]
+    fn advanced(&self, simd: S, x: V3<N>) -> V3<N> {
+        let one = N::splat(simd, 1.0);
+        let excess = self.square * N::splat(simd, 1.0 / (LONGEST_STEP * LONGEST_STEP));
+        moved(x, scaled(self.found.step, one / excess.max(one).sqrt()), &self.seen.frame)
+    }
+}
+
+impl<P: LaneSet> ShapeBatch<'_, P> {
+    /// Rounds in single precision, after which the poses wait for what is next; fresh ones are
+    /// started first.
+    #[inline(always)]
+    fn approach<S: Simd, N: Vector<S>>(
+        &mut self,
+        simd: S,
+        mut group: Group<MAX_COARSE>,
+        fresh: bool,
+        far: &mut Waiting,
+        near: &mut Waiting,
+    ) {
+        let body = self.smooth();
+        let relative: Relative<N> = self.relative(simd, &group.pose);
+        let side = Side::away(body, 0, &relative);
+        let (mut x, mut open) = if fresh { self.begin(simd, body, &relative) } else { resumed(simd, &group) };
+        let rounds = if fresh { COARSE } else { 1 };
+        let mut square = N::splat(simd, f64::NAN);
+        for _ in 0..rounds {
+            let here = self.linearize(simd, &side, x);
+            open = N::and(simd, open, here.open);
+            (x, square) = (here.advanced(simd, x), here.square);
+        }
+        store(x, &mut group);
+        let (close, open) = (N::bits(simd, square.le(N::splat(simd, NEARLY_CONVERGED))), N::bits(simd, open));
+        for lane in 0..group.count {
+            group.rounds[lane] += rounds;
+            if open >> lane & 1 == 0 {
+                self.solve_alone(group.pose[lane], group.rounds[lane]);
+            } else if group.rounds[lane] >= MOST_COARSE || close >> lane & 1 == 1 {
+                near.push(&group, lane);
+            } else {
+                far.push(&group, lane);
+            }
+        }
+    }
+
+    /// Where fresh poses begin, and the lanes that can.
+    #[inline(always)]
+    fn begin<S: Simd, N: Vector<S>>(&self, simd: S, body: &Body, relative: &Relative<N>) -> (V3<N>, N::Mask) {
+        let own = body.interior_point() - body.normalization().center;
+        let own = [N::splat(simd, own.x), N::splat(simd, own.y), N::splat(simd, own.z)];
+        let seen = self.set.offset(simd, add(relative.origin, apply(&relative.rotation, own)));
+        let beside = N::splat(simd, N::TINY).le(seen.distance);
+        let (x, outside) = start(simd, &self.set, body, relative, seen.frame[2]);
+        (x, N::and(simd, beside, outside))
+    }
+
+    /// One round of a group that proves: writes the answers and lets the other poses wait.
+    #[inline(always)]
+    fn prove<S: Simd>(&mut self, simd: S, mut group: Group<MAX_LANES>, waiting: &mut Waiting) {
+        let body = self.smooth();
+        let relative: Relative<Lanes<S>> = self.relative(simd, &group.pose);
+        let side = Side::away(body, 0, &relative);
+        let (x, _) = resumed(simd, &group);
+        let here = self.linearize(simd, &side, x);
+        let worth = here.square.le(Lanes::<S>::splat(simd, WORTH_A_BRACKET_SQUARED));
+        let short = Lanes::<S>::and(simd, here.open, worth);
+        let mut answered = 0;
+        if Lanes::<S>::bits(simd, short) != 0 {
+            let Linearized { seen, jet, local, found, .. } = &here;
+            let at = side.extrapolate(simd, jet, local, found.step);
+            let set = (&self.set, self.form.displacement_m());
+            let of_body = (body, &relative, &side);
+            let (brackets, proven) = bracket(simd, set, of_body, &at, (found, &seen.frame), self.tolerance);
+            answered = Lanes::<S>::bits(simd, Lanes::<S>::and(simd, short, proven));
+            self.write(&group, answered, &brackets);
+        }
+        store(here.advanced(simd, x), &mut group);
+        let open = Lanes::<S>::bits(simd, here.open);
+        for lane in (0..group.count).filter(|lane| answered >> lane & 1 == 0) {
+            group.rounds[lane] += 1;
+            if open >> lane & 1 == 1 && group.rounds[lane] < MOST_ROUNDS {
+                waiting.push(&group, lane);
+            } else {
+                self.solve_alone(group.pose[lane], group.rounds[lane]);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn linearize<S: Simd, N: Vector<S>>(&self, simd: S, side: &Side<'_, N>, x: V3<N>) -> Linearized<S, N> {
+        let body = side.body();
+        let seen = self.set.offset(simd, x);
+        let (jet, inside) = side.jet(simd, x);
+        let local = side.localize(simd, &seen.frame);
+        let (plane, bend) = (Plane::new(simd, &jet, &local), SurfaceCurvature::new(simd, &jet, &local));
+        let (found, facing) = newton(simd, &self.set, x, &seen, (&plane, &bend), FLATTEST / body.trust().reach);
+        let delta = apply_transposed(&local, found.step);
+        let square = dot(delta, delta) * N::splat(simd, body.trust().radius.powi(-2));
+        let beside = N::splat(simd, N::TINY).le(seen.distance);
+        let open = N::and(simd, N::and(simd, inside, facing), beside);
+        Linearized { seen, jet, local, found, square, open }
+    }
+
+    /// The body that is smooth.
+    #[inline(always)]
+    fn smooth(&self) -> &Body {
+        if self.a.0.is_smooth() { self.a.0 } else { self.b.0 }
+    }
+
+    /// The smooth body at the poses as seen from the other one.
+    #[inline(always)]
+    fn relative<S: Simd, N: Vector<S>, const LANES: usize>(&self, simd: S, poses: &[usize; LANES]) -> Relative<N> {
+        let (standing, moving) = (self.a.1, self.b.1);
+        let is_smooth_moving = self.b.0.is_smooth();
+        let mut columns = Aligned([[0.0; LANES]; 7]);
+        for lane in 0..N::COUNT {
+            let pose = &moving[poses[lane]];
+            let q = &pose.rotation().coords;
+            // Differences of translations are exact to one rounding, however far from the world
+            // origin.
+            let t = pose.translation() - standing.translation();
+            let t = if is_smooth_moving { t } else { -t };
+            for (column, entry) in columns.0.iter_mut().zip([q.x, q.y, q.z, q.w, t.x, t.y, t.z]) {
+                column[lane] = entry;
+            }
+        }
+        let column = |i: usize| N::load(simd, &columns.0[i]);
+        let (q, t) = ([column(0), column(1), column(2), column(3)], [column(4), column(5), column(6)]);
+        let still = splat_quaternion(simd, standing.rotation());
+        let (home, away) = if is_smooth_moving { (still, q) } else { (q, still) };
+        let rotation = rotation_by(simd, conjugate_times(home, away));
+        let translation = apply_transposed(&rotation_by(simd, home), t);
+        let center = self.form.center();
+        Relative::from_parts(simd, (center, center.norm()), rotation, translation, self.smooth())
+    }
+
+    /// Answers a pose by a query for it alone, after the rounds that it has gone through in lanes.
+    #[inline(never)]
+    fn solve_alone(&mut self, pose: usize, rounds: u32) {
+        let b = (self.b.0, &self.b.1[pose]);
+        self.answers[pose] = solve_alone(self.a, b, (self.options, rounds), WarmStart::default());
+    }
+
+    /// Writes the answers of the lanes that are set in `proven`.
+    #[inline(always)]
+    fn write<S: Simd>(&mut self, group: &Group<MAX_LANES>, proven: u32, brackets: &LaneBracket<Lanes<S>>) {
+        let LaneBracket { lower, upper, x, nearest, n, multiplier } = *brackets;
+        let mut columns = Aligned([[0.0; MAX_LANES]; 12]);
+        let numbers = [&[lower, upper, multiplier][..], &x, &nearest, &n];
+        for (number, column) in numbers.into_iter().flatten().zip(&mut columns.0) {
+            number.store(column);
+        }
+        for lane in (0..group.count).filter(|lane| proven >> lane & 1 == 1) {
+            let entry = |i: usize| columns.0[i][lane];
+            let vector = |i: usize| [entry(i), entry(i + 1), entry(i + 2)];
+            let found = ExactProven {
+                lower: entry(0),
+                upper: entry(1),
+                x: vector(3),
+                nearest: vector(6),
+                n: vector(9),
+                multiplier: entry(2),
+                rounds: group.rounds[lane] + 1,
+                trace: None,
+            };
+            let pose = group.pose[lane];
+            let exact =
+                Exact::new(self.a, (self.b.0, &self.b.1[pose])).expect("one is smooth, the other has a closed form");
+            self.answers[pose] = exact.answer(&found, self.tolerance);
+        }
+    }
+}
+
+/// Points that a group was left with; any lane can go on.
+#[inline(always)]
+fn resumed<S: Simd, N: Vector<S>, const LANES: usize>(simd: S, group: &Group<LANES>) -> (V3<N>, N::Mask) {
+    let column = |i: usize| N::load(simd, &group.at.0[i]);
+    let one = N::splat(simd, 1.0);
+    ([column(0), column(1), column(2)], one.le(one))
+}
+
+/// Leaves points to a group.
+#[inline(always)]
+fn store<S: Simd, N: Vector<S>, const LANES: usize>(x: V3<N>, group: &mut Group<LANES>) {
+    for (coordinate, column) in x.into_iter().zip(&mut group.at.0) {
+        coordinate.store(column);
+    }
+}
