@@ -129,6 +129,11 @@ impl ConicProgram {
         self.constants.push(scale * expression.constant);
     }
 
+    /// Whether there is a semidefinite cone.
+    pub(super) fn has_semidefinite(&self) -> bool {
+        self.cones.iter().any(|cone| matches!(cone, SupportedConeT::PSDTriangleConeT(_)))
+    }
+
     /// Whether all its numbers are finite.
     pub(super) fn is_finite(&self) -> bool {
         let entries = self.entries.iter().chain(&self.quadratic).map(|entry| &entry.2);

@@ -8,6 +8,7 @@
 //! that no answer depends on the other poses of the batch.
 
 mod iterate;
+mod rounds;
 mod shapes;
 mod waiting;
 
@@ -25,9 +26,10 @@ use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::tangent_newton::{ALIGNED, Relative, Side, bracket, moved};
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
-use crate::polynomial::{Aligned, Lanes, MAX_LANES, Number, Simd, Singles, Twice, Vector, WithSimd, dispatch_lanes};
+use crate::polynomial::{Aligned, Lanes, MAX_LANES, Number, Simd, Singles, Vector, WithSimd, dispatch_lanes};
 use iterate::Iterate;
 use nalgebra::Vector3;
+use rounds::{COARSE, Coarse, DIVERGED, MOST_COARSE, MOST_ROUNDS, NEARLY_CONVERGED, solve_alone};
 use shapes::ShapeBatch;
 use waiting::{Group, MAX_COARSE, Waiting};
 
@@ -163,41 +165,6 @@ fn in_lanes(
     }
 }
 
-/// The answer to a pose by a query for it alone, after rounds that it has gone through in lanes.
-fn solve_alone(
-    (a, pose_a): (&Body, &Pose),
-    (b, pose_b): (&Body, &Pose),
-    (options, rounds): (&Options<'_>, u32),
-    mut warm: WarmStart,
-) -> Distance {
-    let found = distance(a, pose_a, b, pose_b, &options.after(rounds), &mut warm);
-    Distance { iterations: found.iterations + rounds, ..found }
-}
-
-/// Rounds in single precision that every pose goes through.
-const COARSE: u32 = 2;
-
-/// Most of them.
-const MOST_COARSE: u32 = 6;
-
-/// Square of the last step relative to the longest one allowed, dimensionless, below which the next
-/// step, in double precision, is likely to end with a narrow bracket: a hundredth of a move leaves
-/// about its square.
-///
-/// A larger value makes brackets before they are narrow, a smaller one takes a round more in single
-/// precision. It changes time only; no test pins it.
-const NEARLY_CONVERGED: f64 = 1e-4;
-
-/// The same, dimensionless, above which Newton's method has diverged after [`MOST_COARSE`] rounds:
-/// a fifth of the longest move, as long as in a search from a cold start then.
-///
-/// A smaller value solves poses alone that would have converged, a larger one keeps poses in lanes
-/// that never do: `lanes_answer_alike_in_any_unit` counts them.
-const DIVERGED: f64 = 0.04;
-
-/// Most rounds of a pose before it is solved alone.
-const MOST_ROUNDS: u32 = 8;
-
 /// A batch as work for the widest arithmetic. Each answer is written once: by the lanes, or by a
 /// query for the pose alone.
 struct Batch<'a> {
@@ -247,10 +214,6 @@ impl WithSimd for Batch<'_> {
         }
     }
 }
-
-/// The numbers of the first rounds, unless there are few poses: while one vector waits for its
-/// operands the other is computed with.
-type Coarse<S> = Twice<Singles<S>>;
 
 /// A start that says whether Newton's method in lanes has diverged, as it would from there again.
 fn cold_start(diverged: bool) -> WarmStart {

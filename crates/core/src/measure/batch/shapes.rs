@@ -1,8 +1,8 @@
 //! A smooth body and a box or a cylinder at several poses at once: starts from support tables and
 //! first rounds in single precision, then rounds that bracket.
 
+use super::rounds::{COARSE, Coarse, MOST_COARSE, MOST_ROUNDS, NEARLY_CONVERGED, solve_alone};
 use super::waiting::{Group, MAX_COARSE, Waiting};
-use super::{COARSE, Coarse, MOST_COARSE, MOST_ROUNDS, NEARLY_CONVERGED, solve_alone};
 use crate::body::{Body, ClosedForm};
 use crate::measure::distance::{Distance, Exact};
 use crate::measure::frames::pose::Pose;
@@ -143,9 +143,7 @@ impl<P: LaneSet> ShapeBatch<'_, P> {
         let own = body.interior_point() - body.normalization().center;
         let own = [N::splat(simd, own.x), N::splat(simd, own.y), N::splat(simd, own.z)];
         let seen = self.set.offset(simd, add(relative.origin, apply(&relative.rotation, own)));
-        let beside = N::splat(simd, N::TINY).le(seen.distance);
-        let (x, outside) = start(simd, &self.set, body, relative, seen.frame[2]);
-        (x, N::and(simd, beside, outside))
+        start(simd, &self.set, body, relative, seen.frame[2])
     }
 
     /// One round of a group that proves: writes the answers and lets the other poses wait.
@@ -190,8 +188,7 @@ impl<P: LaneSet> ShapeBatch<'_, P> {
         let (found, facing) = newton(simd, &self.set, x, &seen, (&plane, &bend), FLATTEST / body.trust().reach);
         let delta = apply_transposed(&local, found.step);
         let square = dot(delta, delta) * N::splat(simd, body.trust().radius.powi(-2));
-        let beside = N::splat(simd, N::TINY).le(seen.distance);
-        let open = N::and(simd, N::and(simd, inside, facing), beside);
+        let open = N::and(simd, inside, facing);
         Linearized { seen, jet, local, found, square, open }
     }
 

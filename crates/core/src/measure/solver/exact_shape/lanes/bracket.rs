@@ -34,7 +34,7 @@ pub(in crate::measure) fn bracket<S: Simd, N: Number<S>>(
     (found, frame): (&LaneMove<N>, &M3<N>),
     tolerance: f64,
 ) -> (LaneBracket<N>, N::Mask) {
-    let (one, tiny) = (N::splat(simd, 1.0), N::splat(simd, N::TINY));
+    let one = N::splat(simd, 1.0);
     let taylor = N::splat(simd, TAYLOR_ROUNDING);
     let LaneMove { to, next, .. } = found;
     let gradient = apply_transposed(frame, at.plane.gradient);
@@ -58,7 +58,7 @@ pub(in crate::measure) fn bracket<S: Simd, N: Number<S>>(
     let off = subtract(outward, next.frame[2]);
     let is_aligned = dot(off, off).le(N::splat(simd, ALIGNED * ALIGNED));
     let is_narrow = N::and(simd, lower.le(upper), (upper - lower).le(N::splat(simd, tolerance)));
-    let is_apart = N::and(simd, tiny.le(next.distance), N::splat(simd, f64::MIN_POSITIVE).le(lower));
+    let is_apart = N::splat(simd, f64::MIN_POSITIVE).le(lower);
     let is_proven = N::and(simd, N::and(simd, fine, is_aligned), N::and(simd, is_narrow, is_apart));
     (LaneBracket { lower, upper, x, nearest, n, multiplier }, is_proven)
 }

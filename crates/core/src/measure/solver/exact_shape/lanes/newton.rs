@@ -31,7 +31,7 @@ pub(in crate::measure) fn newton<S: Simd, N: Vector<S>>(
     smallest: f64,
 ) -> (LaneMove<N>, N::Mask) {
     let (zero, one) = (N::splat(simd, 0.0), N::splat(simd, 1.0));
-    let (half, tiny, smallest) = (N::splat(simd, 0.5), N::splat(simd, N::TINY), N::splat(simd, smallest));
+    let (half, smallest) = (N::splat(simd, 0.5), N::splat(simd, smallest));
     let g = plane.gradient;
     let mean = half.mul_add(plane.value, half).max(N::splat(simd, 0.25));
     let [inverse_slope, inverse_mean] = N::reciprocals(simd, [g[2], mean]);
@@ -45,9 +45,12 @@ pub(in crate::measure) fn newton<S: Simd, N: Vector<S>>(
     let w = scaled(bend.curvature, multiplier);
     let k = from.curvature;
     let (k00, k01, k11) = (w[0] + k[0] + smallest, w[1] + k[1], w[2] + k[2] + smallest);
-    let inverse = one / (k00 * k11 - k01 * k01);
+    let determinant = k00 * k11 - k01 * k01;
+    let inverse = one / determinant;
     let mut alpha = [(k11 * r[0] - k01 * r[1]) * inverse, (k00 * r[1] - k01 * r[0]) * inverse];
-    let facing = N::and(simd, tiny.le(multiplier), N::and(simd, tiny.le(inverse), inverse.le(one / tiny)));
+    // No number with a unit is compared with but 0, so that units change nothing.
+    let is_definite = N::and(simd, zero.le(determinant), inverse.le(N::splat(simd, f32::MAX.into())));
+    let facing = N::and(simd, g[2].le(zero), is_definite);
     let mut to = moved(x, along(alpha, g, multiplier, shift), &from.frame);
     let mut next = set.offset(simd, to);
     let mut seen = *from;
@@ -71,7 +74,7 @@ pub(in crate::measure) fn newton<S: Simd, N: Vector<S>>(
         let j10 = height.mul_add(w[1], q[1].mul_add(n0, dot(b0, t1)));
         let j11 = height.mul_add(w[2], q[1].mul_add(n1, dot(b1, t1)));
         let determinant = j00 * j11 - j01 * j10;
-        open = N::and(simd, open, N::and(simd, tiny.le(height), tiny.le(determinant)));
+        open = N::and(simd, open, N::and(simd, zero.le(height), N::splat(simd, N::TINY).le(determinant)));
         let inverse = one / determinant;
         let change =
             [(j11 * residual[0] - j01 * residual[1]) * inverse, (j00 * residual[1] - j10 * residual[0]) * inverse];

@@ -9,7 +9,7 @@ use crate::polynomial::{Number, Simd};
 /// Where a point is as seen from a set; see [`super::super::projectable::Offset`].
 #[derive(Clone, Copy, Debug)]
 pub(in crate::measure) struct LaneOffset<N> {
-    /// Distance, metres; 0 inside, where the rest means nothing.
+    /// Distance, metres; 0 inside, where the rest is not a number.
     pub(in crate::measure) distance: N,
     /// Tangents and outward unit normal, by rows.
     pub(in crate::measure) frame: M3<N>,
@@ -28,7 +28,7 @@ impl<N: Copy> LaneOffset<N> {
     {
         let [a, b, c] = subtract(self.cone, other.cone);
         let differs = N::splat(simd, 0.5).le(a.abs() + b.abs() + c.abs());
-        N::and(simd, differs, N::splat(simd, N::TINY).le(self.distance))
+        N::and(simd, differs, N::splat(simd, 0.0).le(self.distance))
     }
 }
 
@@ -108,7 +108,7 @@ impl LaneSet for Cylinder {
     fn offset<S: Simd, N: Number<S>>(&self, simd: S, x: V3<N>) -> LaneOffset<N> {
         let (zero, one) = (N::splat(simd, 0.0), N::splat(simd, 1.0));
         let rho = x[1].mul_add(x[1], x[0] * x[0]).sqrt();
-        let on_axis = rho.le(N::splat(simd, N::TINY));
+        let on_axis = rho.le(zero);
         let inverse_rho = zero.select(on_axis, one / rho);
         let u = [one.select(on_axis, x[0] * inverse_rho), zero.select(on_axis, x[1] * inverse_rho)];
         let beside = (rho - N::splat(simd, self.radius)).max(zero);

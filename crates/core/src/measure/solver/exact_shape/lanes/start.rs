@@ -29,10 +29,10 @@ pub(in crate::measure) fn start<S: Simd, N: Vector<S>>(
     relative: &Relative<N>,
     mut n: V3<N>,
 ) -> (V3<N>, N::Mask) {
-    let (one, tiny) = (N::splat(simd, 1.0), N::splat(simd, N::TINY));
+    let (zero, one) = (N::splat(simd, 0.0), N::splat(simd, 1.0));
     let shape = rows(simd, body.outline().shape());
     let shape = times_transposed(&times_transposed(&relative.rotation, &shape), &relative.rotation);
-    let mut open = tiny.le(one);
+    let mut open = zero.le(one);
     for _ in 0..ELLIPSOID_TURNS {
         let u = apply(&shape, n);
         let inverse = one / dot(n, u).sqrt();
@@ -49,7 +49,7 @@ pub(in crate::measure) fn start<S: Simd, N: Vector<S>>(
             [(dot(s0, t0) - q0 * q0) * inverse, (dot(s0, t1) - q0 * q1) * inverse, (dot(s1, t1) - q1 * q1) * inverse];
         n = selected(simd, open, turn(simd, n, off, &seen, bend), n);
     }
-    open = tiny.le(one);
+    open = zero.le(one);
     let mut look = 1;
     loop {
         let own = scaled(apply_transposed(&relative.rotation, n), -one);
@@ -61,8 +61,7 @@ pub(in crate::measure) fn start<S: Simd, N: Vector<S>>(
         open = N::and(simd, open, is_off(simd, &seen, off));
         if look == TABLE_LOOKS || N::bits(simd, open) == 0 {
             // Tables overshoot flat tips, into the set or beyond.
-            let outside = N::and(simd, tiny.le(seen.distance), tiny.le(dot(seen.frame[2], n)));
-            return (x, outside);
+            return (x, zero.le(dot(seen.frame[2], n)));
         }
         look += 1;
         let [t0, t1, _] = seen.frame;
@@ -75,7 +74,7 @@ pub(in crate::measure) fn start<S: Simd, N: Vector<S>>(
 /// The lanes whose point is outside of the set and sees it along another direction.
 #[inline(always)]
 fn is_off<S: Simd, N: Number<S>>(simd: S, seen: &LaneOffset<N>, off: V3<N>) -> N::Mask {
-    let is_outside = N::splat(simd, N::TINY).le(seen.distance);
+    let is_outside = N::splat(simd, 0.0).le(seen.distance);
     N::and(simd, is_outside, N::splat(simd, SMALL_TURN).le(dot(off, off)))
 }
 
