@@ -88,6 +88,21 @@ pub(crate) fn significant(value: f64, digits: usize) -> f64 {
     rounded.parse().expect("what is printed of a number reads back as one")
 }
 
+/// `value` rounded down to that many decimal digits: of a proven lower bound one that holds.
+pub(crate) fn rounded_down(value: f64, digits: usize) -> f64 {
+    let nearest = significant(value, digits);
+    if !(nearest > value) {
+        return nearest;
+    }
+    let last_digit = 10_f64.powf(value.abs().log10().floor() + 1.0 - digits as f64);
+    significant(nearest - last_digit, digits)
+}
+
+/// `value` rounded up to that many decimal digits: of a proven upper bound one that holds.
+pub(crate) fn rounded_up(value: f64, digits: usize) -> f64 {
+    -rounded_down(-value, digits)
+}
+
 /// The cells of a line; those between quotes may contain commas.
 fn cells(line: &str) -> Vec<String> {
     let mut cells = vec![String::new()];
@@ -129,6 +144,15 @@ mod tests {
         assert_eq!(significant(0.0, 4), 0.0);
         assert_eq!(significant(f64::INFINITY, 4), f64::INFINITY);
         assert!(significant(f64::NAN, 4).is_nan());
+        assert_eq!([rounded_down(0.12346, 4), rounded_up(0.12344, 4)], [0.1234, 0.1235]);
+        assert_eq!([rounded_down(-0.12344, 4), rounded_up(-0.12346, 4)], [-0.1235, -0.1234]);
+        assert_eq!([rounded_down(0.5, 4), rounded_up(0.5, 4)], [0.5, 0.5]);
+        assert_eq!([rounded_down(0.0, 4), rounded_up(f64::INFINITY, 4)], [0.0, f64::INFINITY]);
+        for k in 1..2000 {
+            let value = 1.0 / f64::from(k);
+            let [low, high] = [rounded_down(value, 13), rounded_up(value, 13)];
+            assert!(low <= value && value <= high && high - low < 2e-13, "{value}: {low} {high}");
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Batches of a smooth body beside a box or a cylinder, against single queries.
 
-use nalgebra::{Vector3, Vector4};
+use nalgebra::{UnitQuaternion, Vector3, Vector4};
 use std::sync::atomic::AtomicBool;
 use sublevel_core::body::Body;
 use sublevel_core::measure::{Distance, Options, Pose, WarmStart, distance, distance_batch};
@@ -21,20 +21,23 @@ fn smooth(random: &mut Seeded, degree: u8) -> Body {
     }
 }
 
+/// A box or a rod off the origin of its frame.
 fn shape(random: &mut Seeded, kind: usize) -> Body {
     let mut size = || 2_f64.powf(random.signed());
-    if kind == 0 {
+    let shape = if kind == 0 {
         Body::cuboid("box", Vector3::new(size(), size(), size())).unwrap()
     } else {
         Body::cylinder("rod", size(), size()).unwrap()
-    }
+    };
+    let shift = Vector3::from_fn(|_, _| 0.7 * random.signed());
+    shape.moved(&UnitQuaternion::identity(), &shift).unwrap()
 }
 
 /// A smooth body and a shape, either first.
 fn pair(random: &mut Seeded, seed: usize) -> [Body; 2] {
     let bodies = [smooth(random, [2, 4, 6, 8][seed / 4 % 4]), shape(random, seed % 2)];
     let [a, b] = bodies;
-    if seed / 2 % 2 == 0 { [a, b] } else { [b, a] }
+    if (seed / 2).is_multiple_of(2) { [a, b] } else { [b, a] }
 }
 
 fn batch(a: &Body, pose_a: &Pose, b: &Body, poses: &[Pose], options: &Options<'_>) -> Vec<Distance> {
@@ -114,6 +117,81 @@ fn an_answer_does_not_depend_on_its_neighbours() {
     }
 }
 
+/// Far from the origin of the world brackets are as wide as what the coordinates lose.
+#[test]
+fn far_from_the_origin_answers_are_those_of_single_queries() {
+    let options = Options::default();
+    for seed in 0..16 {
+        let mut random = Seeded(100 + seed as u64);
+        let [a, b] = pair(&mut random, seed);
+        let far = Vector3::new(1e6, -2e6, 5e5);
+        let mut there = |reach: f64| {
+            let near = pose(&mut random, reach);
+            Pose::from_quaternion(far + near.translation(), near.rotation().coords.into()).unwrap()
+        };
+        let pose_a = there(1.0);
+        let poses: Vec<Pose> = (0..40).map(|_| there(5.0)).collect();
+        for (answer, pose_b) in batch(&a, &pose_a, &b, &poses, &options).iter().zip(&poses) {
+            let single = distance(&a, &pose_a, &b, pose_b, &options, &mut WarmStart::default());
+            assert_eq!(answer.status, single.status, "seed {seed}: {answer:?} against {single:?}");
+            assert!(answer.lower <= single.upper && single.lower <= answer.upper, "seed {seed}: {answer:?} {single:?}");
+            assert!((answer.witness_a - single.witness_a).norm() < 1e-4, "seed {seed}: {answer:?} {single:?}");
+        }
+    }
+}
+
+/// Powers of two change no bit, whatever the unit; along the axes as well, above flat tips.
+#[test]
+fn units_change_nothing() {
+    let options = Options::default();
+    for degree in [2, 4, 6, 8] {
+        for kind in 0..2 {
+            let solved = |unit: f64| {
+                let half = Vector3::new(0.7, 0.5, 0.4) * unit;
+                let egg = if degree == 2 {
+                    Body::ellipsoid("egg", Vector3::zeros(), half).unwrap()
+                } else {
+                    Body::superellipsoid("q", Vector3::zeros(), half, degree).unwrap()
+                };
+                let other = if kind == 0 {
+                    Body::cuboid("box", Vector3::new(0.5, 0.4, 0.6) * unit).unwrap()
+                } else {
+                    Body::cylinder("rod", 0.4 * unit, 0.6 * unit).unwrap()
+                };
+                let mut random = Seeded(11);
+                let mut poses: Vec<Pose> = (0..100)
+                    .map(|_| {
+                        let near = pose(&mut random, 2.5);
+                        let place = near.translation() * unit;
+                        Pose::from_quaternion(place, near.rotation().coords.into()).unwrap()
+                    })
+                    .collect();
+                for axis in 0..6 {
+                    let way = Vector3::ith(axis % 3, if axis < 3 { 2.0 } else { -2.0 });
+                    poses.push(Pose::from_quaternion(way * unit, [0.0, 0.0, 0.0, 1.0]).unwrap());
+                }
+                let answers = batch(&other, &Pose::identity(), &egg, &poses, &options);
+                let numbers = |answer: &Distance| {
+                    let lengths = [answer.lower, answer.upper].into_iter();
+                    let lengths = lengths.chain(answer.witness_a.iter().chain(answer.witness_b.iter()).copied());
+                    lengths.map(|length| (length / unit).to_bits()).chain([u64::from(answer.iterations)]).collect()
+                };
+                answers.iter().map(numbers).collect::<Vec<Vec<u64>>>()
+            };
+            let metres = solved(1.0);
+            for exponent in [-30, -20, -10, 10, 20, 30] {
+                let found = solved(2_f64.powi(exponent));
+                for (i, (found, metres)) in found.iter().zip(&metres).enumerate() {
+                    assert_eq!(found, metres, "degree {degree}, kind {kind}, unit 2^{exponent}, pose {i}");
+                }
+            }
+        }
+    }
+}
+
+/// Distance of a point, metres.
+type Truth<'a> = &'a dyn Fn(&Vector3<f64>) -> f64;
+
 /// Poses whose nearest points are on faces, edges and corners, and straight above them, in units
 /// from micrometres to kilometres.
 #[test]
@@ -138,7 +216,7 @@ fn balls_beside_shapes_have_their_closed_forms() {
             let (beside, above) = ((x.xy().norm() - 0.4 * unit).max(0.0), (x.z.abs() - 0.6 * unit).max(0.0));
             beside.hypot(above)
         };
-        let truths: [&dyn Fn(&Vector3<f64>) -> f64; 2] = [&of_box, &of_rod];
+        let truths: [Truth<'_>; 2] = [&of_box, &of_rod];
         for (shape, truth) in [&cuboid, &rod].into_iter().zip(truths) {
             let options = Options::default();
             for (x, answer) in points.iter().zip(batch(shape, &Pose::identity(), &ball, &poses, &options)) {

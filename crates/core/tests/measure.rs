@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 use sublevel_core::body::Body;
-use sublevel_core::measure::{Distance, Options, Pose, Status, WarmStart, distance, level_distance};
+use sublevel_core::measure::{Distance, Options, Pose, Status, WarmStart, distance, distance_batch, level_distance};
 use sublevel_testkit::Seeded;
 
 /// Chair and human at degrees 2, 4 and 6.
@@ -122,5 +122,11 @@ fn a_solve_allocates_nothing() {
             }
         });
         assert_eq!(counted.count_total, 0, "seed {seed}");
+        let poses: Vec<Pose> = (0..40).map(|k| random.pose(0.1 * f64::from(k))).collect();
+        let mut answers = vec![Distance::default(); poses.len()];
+        let counted = allocation_counter::measure(|| {
+            distance_batch(chair, &pose_a, other, &poses, &Options::default(), &mut answers).expect("as many places");
+        });
+        assert_eq!(counted.count_total, 0, "batch, seed {seed}");
     }
 }

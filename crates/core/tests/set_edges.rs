@@ -18,8 +18,8 @@ fn bodies(random: &mut Seeded) -> [Body; 2] {
     [Body::cuboid("box", Vector3::new(size(), size(), size())).unwrap(), Body::cylinder("rod", size(), size()).unwrap()]
 }
 
-/// Points 0.3 m from the middles, towards each other: at the middles themselves polynomials of boxes
-/// have no slope.
+/// Points 0.3 m from the middles, towards each other: at the middles themselves polynomials of
+/// boxes have no slope.
 fn towards(poses: &[Pose; 2]) -> [Vector3<f64>; 2] {
     let [a, b] = [0, 1].map(|side| *poses[side].translation());
     let way = (b - a).normalize() * 0.3;

@@ -31,12 +31,22 @@ pub(crate) enum Representation {
     Ladder,
     /// Two bodies of degree 6 per link, with refined volumes.
     Compound,
+    /// One or two of those per link, whichever has the smaller volume.
+    AtMostTwo,
 }
 
 impl Representation {
     /// All of them.
-    pub(super) const ALL: [Self; 7] =
-        [Self::Spheres, Self::Ellipsoids, Self::Degree4, Self::Degree6, Self::Refined, Self::Ladder, Self::Compound];
+    pub(super) const ALL: [Self; 8] = [
+        Self::Spheres,
+        Self::Ellipsoids,
+        Self::Degree4,
+        Self::Degree6,
+        Self::Refined,
+        Self::Ladder,
+        Self::Compound,
+        Self::AtMostTwo,
+    ];
 
     /// Its name in tables.
     pub(super) fn name(self) -> &'static str {
@@ -48,13 +58,14 @@ impl Representation {
             Self::Refined => "degree 6 refined",
             Self::Ladder => "ladder 2-4-6",
             Self::Compound => "two parts of degree 6 refined",
+            Self::AtMostTwo => "one or two parts, by volume",
         }
     }
 
     /// Whether motions are measured of it: they are proven for the finest rung of a ladder, which
-    /// is there without the ladder.
+    /// is there without the ladder, and those of one or two parts are between those of either.
     pub(super) fn has_motions(self) -> bool {
-        self != Self::Ladder
+        !matches!(self, Self::Ladder | Self::AtMostTwo)
     }
 }
 
@@ -136,14 +147,25 @@ fn geometry(link: &ArmLink, links: Representation, cache: &FitCache) -> Result<G
             let rungs = [2, 4, 6].into_iter().map(rung).collect::<Result<Vec<_>, _>>()?;
             Geometry::Ladder(Arc::new(Ladder::new(&name, rungs)?))
         }
-        Representation::Spheres | Representation::Compound => {
-            let options = FitOptions { degree: 6, refine: true, ..FitOptions::default() };
-            let shape =
-                cache.take(&format!("{name}-d6-refined-p2"), &link.mesh, &format!("{options:?} 2 parts"), || {
-                    let fitted = fit_parts(&name, &link.mesh, 2, &options, &mut |_| ControlFlow::Continue(()))?;
-                    Ok(Shape::Compound(Box::new(fitted.compound)))
-                })?;
-            Geometry::Solid(Arc::new(shape))
+        Representation::Spheres | Representation::Compound => Geometry::Solid(Arc::new(two_parts(link, &name, cache)?)),
+        Representation::AtMostTwo => {
+            let (one, two) = (of_degree(6, true)?, two_parts(link, &name, cache)?);
+            let volume_of_two = match &two {
+                Shape::Body(body) => body.volume(),
+                Shape::Compound(compound) => compound.volume(),
+            };
+            let is_one = one.volume().volume_m3 <= volume_of_two.volume_m3;
+            if is_one { one.into() } else { Geometry::Solid(Arc::new(two)) }
         }
     })
+}
+
+/// A link as two bodies of degree 6 with refined volumes.
+fn two_parts(link: &ArmLink, name: &str, cache: &FitCache) -> Result<Shape, Box<dyn Error>> {
+    let options = FitOptions { degree: 6, refine: true, ..FitOptions::default() };
+    let fit = || {
+        let fitted = fit_parts(name, &link.mesh, 2, &options, &mut |_| ControlFlow::Continue(()))?;
+        Ok(Shape::Compound(Box::new(fitted.compound)))
+    };
+    Ok(cache.take(&format!("{name}-d6-refined-p2"), &link.mesh, &format!("{options:?} 2 parts"), fit)?)
 }

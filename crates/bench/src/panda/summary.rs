@@ -53,7 +53,7 @@ pub(super) fn summary(states: &[StateRow], motions: &[MotionRow]) -> Vec<Figure>
     let mut add = |what: String, value: f64, unit: Unit| {
         all.push(Figure { what, value, unit });
     };
-    for links in [MAIN, Representation::Refined, Representation::Compound] {
+    for links in [MAIN, Representation::Refined, Representation::Compound, Representation::AtMostTwo] {
         let what = format!("known-free states kept, {}", links.name());
         add(what, of(links.name(), StateRow::kept_share), Unit::Share);
     }

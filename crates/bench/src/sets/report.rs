@@ -7,7 +7,7 @@ use super::counterexample::Level;
 use super::models::Model;
 use super::pairs::Bracket;
 use crate::blocks::block;
-use crate::csv::significant;
+use crate::csv::{rounded_down, rounded_up, significant};
 
 /// Decimal digits of times and errors, and of bounds, whose differences are drawn down to 1e-12.
 const MEASURED: usize = 4;
@@ -46,14 +46,14 @@ impl Sets {
             let Bracket { degree, pair, method, steps, seconds, lower, upper, exact } = bracket;
             let exact = u8::from(*exact);
             let seconds = significant(*seconds, MEASURED);
-            let [lower, upper] = [lower, upper].map(|bound| significant(*bound, BOUNDS));
+            let (lower, upper) = (rounded_down(*lower, BOUNDS), rounded_up(*upper, BOUNDS));
             // Writing to a string cannot fail.
             let _ = writeln!(text, "pair,{pair},{method},{degree},{steps},{seconds},{lower},{upper},{exact},,");
         }
         for Level { level, seconds, lower, upper, exact } in &self.counterexample {
             let exact = u8::from(*exact);
             let seconds = significant(*seconds, MEASURED);
-            let [lower, upper] = [lower, upper].map(|bound| significant(*bound, BOUNDS));
+            let (lower, upper) = (rounded_down(*lower, BOUNDS), rounded_up(*upper, BOUNDS));
             let _ = writeln!(text, "counterexample,{level},,,,{seconds},{lower},{upper},{exact},,");
         }
         for Model { object, kind, name, error, false_contacts, seconds } in &self.models {

@@ -302,8 +302,8 @@ impl Question for Clearance {
     }
 }
 
-/// Pairs of a moving body, by its position, and one that stands still, with the states of a chunk in
-/// which they may be near: pairs of which [`distance_batch`] measures several at a time.
+/// Pairs of a moving body, by its position, and one that stands still, with the states of a chunk
+/// in which they may be near: pairs of which [`distance_batch`] measures several at a time.
 #[derive(Debug, Default)]
 struct Batches(BTreeMap<(usize, Slot), Vec<Near>>);
 

@@ -53,10 +53,10 @@ pub enum BatchError {
 /// world), written to `answers` in the order of the poses.
 ///
 /// Each answer is one of [`distance`] from a cold start in all that is proven of it, and depends on
-/// its own pose only, to the last bit. Single bodies of one constraint, and such a body beside a box
-/// or a cylinder, are solved several poses at a time, which takes a fraction of the time of as many
-/// queries; all others, and poses that do not converge at once such as those in contact, are solved
-/// one by one.
+/// its own pose only, to the last bit. Single bodies of one constraint, and such a body beside a
+/// box or a cylinder, are solved several poses at a time, which takes a fraction of the time of as
+/// many queries; all others, and poses that do not converge at once such as those in contact, are
+/// solved one by one.
 ///
 /// # Errors
 /// No poses, or a number of places that is not the number of poses; nothing is computed then.
@@ -115,8 +115,9 @@ pub fn is_solved_in_lanes(a: &impl Solid, b: &impl Solid) -> bool {
 enum LaneMethod<'a> {
     /// Both have one constraint.
     Smooth,
-    /// One of them has one constraint, the other is a box or a cylinder along its own axes.
+    /// One has one constraint, the other is a box.
     Cuboid(&'a ClosedForm, Cuboid),
+    /// One has one constraint, the other is a cylinder.
     Cylinder(&'a ClosedForm, Cylinder),
 }
 
@@ -145,22 +146,20 @@ impl<'a> LaneMethod<'a> {
 /// callers are compiled for.
 fn in_lanes(
     method: LaneMethod<'_>,
-    (a, pose_a): (&Body, &Pose),
-    (b, poses_b): (&Body, &[Pose]),
+    of_a: (&Body, &Pose),
+    of_b: (&Body, &[Pose]),
     options: &Options<'_>,
     answers: &mut [Distance],
 ) {
+    let ((a, pose_a), (b, poses_b)) = (of_a, of_b);
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
-    let of_shape = ((a, pose_a), (b, poses_b));
     match method {
         LaneMethod::Smooth => dispatch_lanes(Batch { a, pose_a, b, poses_b, options, tolerance, answers }),
         LaneMethod::Cuboid(form, set) => {
-            let (a, b) = of_shape;
-            dispatch_lanes(ShapeBatch { a, b, form, set, options, tolerance, answers });
+            dispatch_lanes(ShapeBatch { a: of_a, b: of_b, form, set, options, tolerance, answers });
         }
         LaneMethod::Cylinder(form, set) => {
-            let (a, b) = of_shape;
-            dispatch_lanes(ShapeBatch { a, b, form, set, options, tolerance, answers });
+            dispatch_lanes(ShapeBatch { a: of_a, b: of_b, form, set, options, tolerance, answers });
         }
     }
 }

@@ -1,7 +1,7 @@
 //! A smooth body and a box or a cylinder at several poses at once: starts from support tables and
 //! first rounds in single precision, then rounds that bracket.
 
-use super::rounds::{COARSE, Coarse, MOST_COARSE, MOST_ROUNDS, NEARLY_CONVERGED, solve_alone};
+use super::rounds::{COARSE, Coarse, MOST_COARSE, MOST_ROUNDS, solve_alone};
 use super::waiting::{Group, MAX_COARSE, Waiting};
 use crate::body::{Body, ClosedForm};
 use crate::measure::distance::{Distance, Exact};
@@ -10,22 +10,20 @@ use crate::measure::frames::quaternion::{conjugate_times, rotation_by, splat_qua
 use crate::measure::frames::vector::{M3, V3, add, apply, apply_transposed, dot, scaled};
 use crate::measure::options::Options;
 use crate::measure::solver::exact_shape::{
-    ExactProven, LaneBracket, LaneMove, LaneOffset, LaneSet, bracket, newton, start,
+    ExactProven, FLATTEST, LONGEST_STEP, LaneBracket, LaneMove, LaneOffset, LaneSet, WORTH_A_BRACKET_SQUARED, bracket,
+    newton, start,
 };
 use crate::measure::solver::tangent_newton::{Plane, Relative, Side, SurfaceCurvature, moved};
 use crate::measure::warm::WarmStart;
 use crate::polynomial::{Aligned, Lanes, MAX_LANES, Number, NumberJet, Simd, Singles, Vector, WithSimd};
 
-/// Square of a step in normalized coordinates, relative to the body's size there, dimensionless, up
-/// to which the bracket where it leads is computed; as in a single query.
-const WORTH_A_BRACKET_SQUARED: f64 = 1e-6;
-
-/// Longest step in normalized coordinates, relative to the body's size there, dimensionless; as in
-/// a single query.
-const LONGEST_STEP: f64 = 0.5;
-
-/// Curvature times size, dimensionless, that is added where there is none; as in a single query.
-const FLATTEST: f64 = 1e-20;
+/// Square of the last step in normalized coordinates, relative to the body's size there,
+/// dimensionless, below which the next step, in double precision, is likely to end with a narrow
+/// bracket.
+///
+/// A larger value makes brackets before they are narrow, a smaller one takes a round more in single
+/// precision. It changes time only; no test pins it.
+const NEARLY_CONVERGED: f64 = 1e-4;
 
 /// A batch as work for the widest arithmetic. Each answer is written once: by the lanes, or by a
 /// query for the pose alone.
@@ -188,7 +186,8 @@ impl<P: LaneSet> ShapeBatch<'_, P> {
         let (found, facing) = newton(simd, &self.set, x, &seen, (&plane, &bend), FLATTEST / body.trust().reach);
         let delta = apply_transposed(&local, found.step);
         let square = dot(delta, delta) * N::splat(simd, body.trust().radius.powi(-2));
-        let open = N::and(simd, inside, facing);
+        let is_finite = square.le(N::splat(simd, f32::MAX.into()));
+        let open = N::and(simd, N::and(simd, inside, facing), is_finite);
         Linearized { seen, jet, local, found, square, open }
     }
 

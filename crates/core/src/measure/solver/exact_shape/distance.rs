@@ -33,7 +33,7 @@ const MAX_ROUNDS: u32 = 16;
 ///
 /// Larger, more brackets are too wide to end on; smaller, an evaluation more is taken. It changes
 /// time only: `.ci/instructions` pins it.
-const WORTH_A_BRACKET_SQUARED: f64 = 1e-6;
+pub(in crate::measure) const WORTH_A_BRACKET_SQUARED: f64 = 1e-6;
 
 /// Square of a step, as above, dimensionless, after which only rounding is left: 1e-11 of the body.
 ///
@@ -46,7 +46,7 @@ const SETTLED_SQUARED: f64 = 1e-22;
 ///
 /// Longer, Newton's method diverges from cold starts; shorter, it needs more rounds:
 /// `smooth_bodies_against_shapes` counts what is solved.
-const LONGEST_STEP: f64 = 0.5;
+pub(in crate::measure) const LONGEST_STEP: f64 = 0.5;
 
 /// Longest first step from the last answer, as above, dimensionless; a longer one is no
 /// continuation, and the support table starts it.
@@ -57,7 +57,7 @@ const LONGEST_FOLLOWED_STEP: f64 = 0.25;
 
 /// Curvature times size, dimensionless, that is added where there is none, as in `continuation`.
 /// Exercised by `boxes_side_by_side`.
-const FLATTEST: f64 = 1e-20;
+pub(in crate::measure) const FLATTEST: f64 = 1e-20;
 
 /// Evaluations after which long steps that no series has corrected are shortened, so that they do
 /// not go around in circles.

@@ -18,7 +18,9 @@ mod start;
 
 pub(in crate::measure) use cuboid::Cuboid;
 pub(in crate::measure) use cylinder::Cylinder;
-pub(in crate::measure) use distance::{ExactLost, ExactProven, ExactTrace};
+pub(in crate::measure) use distance::{
+    ExactLost, ExactProven, ExactTrace, FLATTEST, LONGEST_STEP, WORTH_A_BRACKET_SQUARED,
+};
 pub(in crate::measure) use lanes::{LaneBracket, LaneMove, LaneOffset, LaneSet, bracket, newton, start};
 pub(in crate::measure) use minimum::{LevelMinimum, LevelQuery};
 pub(in crate::measure) use placed::{ExactContact, ExactQuery, active, direction_to_world, normals_towards, to_world};

@@ -21,7 +21,7 @@ use crate::measure::solver::tangent_newton::{Plane, SurfaceCurvature, Symmetric2
 use crate::polynomial::Simd;
 
 /// Most corrections of a step for features of the set that it leads to.
-const FEATURES: usize = 5;
+pub(super) const FEATURES: usize = 5;
 
 /// A step and where it leads.
 #[derive(Clone, Copy, Debug)]

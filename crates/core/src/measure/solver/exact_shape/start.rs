@@ -16,17 +16,17 @@ use crate::measure::solver::tangent_newton::Relative;
 use crate::polynomial::Simd;
 
 /// Most turns on the ellipsoid.
-const ELLIPSOID_TURNS: usize = 4;
+pub(super) const ELLIPSOID_TURNS: usize = 4;
 
 /// Most looks at the support table.
-const TABLE_LOOKS: usize = 3;
+pub(super) const TABLE_LOOKS: usize = 3;
 
 /// Square of a turn of the normal, radians squared, that is left to Newton's method on the body
 /// itself.
 ///
 /// Larger, it starts too far away; smaller, support tables are read once more than needed. It
 /// changes time only; no test pins it.
-const SMALL_TURN: f64 = 1e-2;
+pub(super) const SMALL_TURN: f64 = 1e-2;
 
 /// A point of the body and the direction against which it is about the farthest one; from the
 /// set's normal n at the body's centre on.

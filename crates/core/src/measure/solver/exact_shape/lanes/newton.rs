@@ -1,12 +1,10 @@
 //! Newton's step in lanes; derived in [`super::super::newton`].
 
+use super::super::newton::FEATURES;
 use super::set::{LaneOffset, LaneSet};
 use crate::measure::frames::vector::{V3, add, add_scaled, dot, scaled};
 use crate::measure::solver::tangent_newton::{Plane, SurfaceCurvature, moved};
 use crate::polynomial::{Simd, Vector};
-
-/// Most corrections of a step for faces, edges and corners of the set that it leads to.
-const FEATURES: usize = 5;
 
 /// A step and where it leads.
 #[derive(Clone, Copy, Debug)]
@@ -48,9 +46,9 @@ pub(in crate::measure) fn newton<S: Simd, N: Vector<S>>(
     let determinant = k00 * k11 - k01 * k01;
     let inverse = one / determinant;
     let mut alpha = [(k11 * r[0] - k01 * r[1]) * inverse, (k00 * r[1] - k01 * r[0]) * inverse];
-    // No number with a unit is compared with but 0, so that units change nothing.
-    let is_definite = N::and(simd, zero.le(determinant), inverse.le(N::splat(simd, f32::MAX.into())));
-    let facing = N::and(simd, g[2].le(zero), is_definite);
+    // Numbers with units are compared with 0 alone, so that units change nothing; a determinant of 0
+    // gives a step that is no number.
+    let facing = N::and(simd, g[2].le(zero), zero.le(determinant));
     let mut to = moved(x, along(alpha, g, multiplier, shift), &from.frame);
     let mut next = set.offset(simd, to);
     let mut seen = *from;
@@ -74,6 +72,7 @@ pub(in crate::measure) fn newton<S: Simd, N: Vector<S>>(
         let j10 = height.mul_add(w[1], q[1].mul_add(n0, dot(b0, t1)));
         let j11 = height.mul_add(w[2], q[1].mul_add(n1, dot(b1, t1)));
         let determinant = j00 * j11 - j01 * j10;
+        // Inside the set the height is no number.
         open = N::and(simd, open, N::and(simd, zero.le(height), N::splat(simd, N::TINY).le(determinant)));
         let inverse = one / determinant;
         let change =

@@ -20,15 +20,14 @@ pub(in crate::measure) struct LaneOffset<N> {
 }
 
 impl<N: Copy> LaneOffset<N> {
-    /// The lanes in which both are outside of the set and see another face, edge or corner.
+    /// The lanes in which both see another face, edge or corner.
     #[inline(always)]
     pub(super) fn sees_another<S: Simd>(&self, simd: S, other: &Self) -> N::Mask
     where
         N: Number<S>,
     {
         let [a, b, c] = subtract(self.cone, other.cone);
-        let differs = N::splat(simd, 0.5).le(a.abs() + b.abs() + c.abs());
-        N::and(simd, differs, N::splat(simd, 0.0).le(self.distance))
+        N::splat(simd, 0.5).le(a.abs() + b.abs() + c.abs())
     }
 }
 

@@ -1,5 +1,6 @@
 //! Where cold starts begin, in lanes; derived in [`super::super::start`].
 
+use super::super::start::{ELLIPSOID_TURNS, SMALL_TURN, TABLE_LOOKS};
 use super::set::{LaneOffset, LaneSet};
 use crate::body::Body;
 use crate::measure::frames::vector::{
@@ -8,16 +9,6 @@ use crate::measure::frames::vector::{
 };
 use crate::measure::solver::tangent_newton::Relative;
 use crate::polynomial::{Number, Simd, Vector};
-
-/// Most turns on the ellipsoid.
-const ELLIPSOID_TURNS: usize = 4;
-
-/// Most looks at the support table.
-const TABLE_LOOKS: usize = 3;
-
-/// Square of a turn of the normal, radians squared, that is left to Newton's method on the body
-/// itself; as in a single query.
-const SMALL_TURN: f64 = 1e-2;
 
 /// Points of the body about where it is nearest to the set, from the set's normals n at the body's
 /// centre on, and the lanes in which they lie outside of the set and face it.
@@ -38,7 +29,7 @@ pub(in crate::measure) fn start<S: Simd, N: Vector<S>>(
         let inverse = one / dot(n, u).sqrt();
         let seen = set.offset(simd, add_scaled(relative.origin, -inverse, u));
         let off = subtract(seen.frame[2], n);
-        open = N::and(simd, open, is_off(simd, &seen, off));
+        open = N::and(simd, open, is_off(simd, off));
         if N::bits(simd, open) == 0 {
             break;
         }
@@ -58,7 +49,7 @@ pub(in crate::measure) fn start<S: Simd, N: Vector<S>>(
         let x = add(relative.origin, apply(&relative.rotation, point));
         let seen = set.offset(simd, x);
         let off = subtract(seen.frame[2], n);
-        open = N::and(simd, open, is_off(simd, &seen, off));
+        open = N::and(simd, open, is_off(simd, off));
         if look == TABLE_LOOKS || N::bits(simd, open) == 0 {
             // Tables overshoot flat tips, into the set or beyond.
             return (x, zero.le(dot(seen.frame[2], n)));
@@ -71,11 +62,11 @@ pub(in crate::measure) fn start<S: Simd, N: Vector<S>>(
     }
 }
 
-/// The lanes whose point is outside of the set and sees it along another direction.
+/// The lanes in which the set is seen along another direction; not those of points inside, whose
+/// directions are no numbers.
 #[inline(always)]
-fn is_off<S: Simd, N: Number<S>>(simd: S, seen: &LaneOffset<N>, off: V3<N>) -> N::Mask {
-    let is_outside = N::splat(simd, 0.0).le(seen.distance);
-    N::and(simd, is_outside, N::splat(simd, SMALL_TURN).le(dot(off, off)))
+fn is_off<S: Simd, N: Number<S>>(simd: S, off: V3<N>) -> N::Mask {
+    N::splat(simd, SMALL_TURN).le(dot(off, off))
 }
 
 /// One vector where the mask is set, else the other.
