@@ -31,7 +31,7 @@ pub(crate) enum Representation {
     Ladder,
     /// Two bodies of degree 6 per link, with refined volumes.
     Compound,
-    /// One or two of those per link, whichever has the smaller volume.
+    /// One or two of those per link, whichever has the smaller gap.
     AtMostTwo,
 }
 
@@ -58,7 +58,7 @@ impl Representation {
             Self::Refined => "degree 6 refined",
             Self::Ladder => "ladder 2-4-6",
             Self::Compound => "two parts of degree 6 refined",
-            Self::AtMostTwo => "one or two parts, by volume",
+            Self::AtMostTwo => "one or two parts, the smaller gap",
         }
     }
 
@@ -150,12 +150,13 @@ fn geometry(link: &ArmLink, links: Representation, cache: &FitCache) -> Result<G
         Representation::Spheres | Representation::Compound => Geometry::Solid(Arc::new(two_parts(link, &name, cache)?)),
         Representation::AtMostTwo => {
             let (one, two) = (of_degree(6, true)?, two_parts(link, &name, cache)?);
-            let volume_of_two = match &two {
-                Shape::Body(body) => body.volume(),
-                Shape::Compound(compound) => compound.volume(),
+            let gap_of_two = match &two {
+                Shape::Body(body) => body.gap_m(),
+                Shape::Compound(compound) => compound.gap_m(),
             };
-            let is_one = one.volume().volume_m3 <= volume_of_two.volume_m3;
-            if is_one { one.into() } else { Geometry::Solid(Arc::new(two)) }
+            // Without a gap it is not known to be near.
+            let [gap_of_one, gap_of_two] = [one.gap_m(), gap_of_two].map(|gap| gap.unwrap_or(f64::INFINITY));
+            if gap_of_one <= gap_of_two { one.into() } else { Geometry::Solid(Arc::new(two)) }
         }
     })
 }
