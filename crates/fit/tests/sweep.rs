@@ -120,7 +120,15 @@ fn clouds(seeds: std::ops::Range<u64>) {
             Err(error) => {
                 println!("{what}: {error}");
                 assert_ne!(error, FitError::Cancelled, "{what} hangs");
-                assert!(!matches!(must, Must::Fit), "{what}: {error}");
+                if matches!(must, Must::Fit) {
+                    // One solver alone may say that it fails, where the other one takes over.
+                    let says_so = matches!(&error, FitError::Unsolved(why) if why.is_solver_fixed);
+                    assert!(says_so, "{what}: {error}");
+                    let options = FitOptions { degree, ..FitOptions::default() };
+                    let fit = fit("cloud", &points, &options, &mut patient());
+                    prove(&fit.unwrap_or_else(|error| panic!("{what}: {error}")), &points, &what);
+                    bodies += 1;
+                }
                 if matches!(must, Must::Refuse) {
                     let reason = matches!(error, FitError::TooFewPoints(_) | FitError::Hull(HullError::Flat { .. }));
                     assert!(reason, "{what}: {error}");
