@@ -18,6 +18,14 @@ fn bodies(random: &mut Seeded) -> [Body; 2] {
     [Body::cuboid("box", Vector3::new(size(), size(), size())).unwrap(), Body::cylinder("rod", size(), size()).unwrap()]
 }
 
+/// Boxes and rods in every combination, and where they are.
+fn pair(seed: u64) -> ([Body; 2], [Pose; 2]) {
+    let mut random = Seeded(seed);
+    let bodies = bodies(&mut random);
+    let poses = [pose(&mut random, 0.5), pose(&mut random, 3.0)];
+    ([seed as usize % 2, seed as usize / 2 % 2].map(|kind| bodies[kind].clone()), poses)
+}
+
 /// Points 0.3 m from the middles, towards each other: at the middles themselves polynomials of
 /// boxes have no slope.
 fn towards(poses: &[Pose; 2]) -> [Vector3<f64>; 2] {
@@ -32,13 +40,10 @@ fn towards(poses: &[Pose; 2]) -> [Vector3<f64>; 2] {
 fn points_on_edges_and_corners_are_exact() {
     let (mut apart, mut missed) = (0, Vec::new());
     for seed in 0..400 {
-        let mut random = Seeded(seed);
-        let bodies = bodies(&mut random);
-        let poses = [pose(&mut random, 0.5), pose(&mut random, 3.0)];
-        let of = [seed as usize % 2, seed as usize / 2 % 2].map(|kind| &bodies[kind]);
-        let sets = [0, 1].map(|k| PlacedSet::new(of[k], poses[k]));
+        let (bodies, poses) = pair(seed);
+        let sets = [0, 1].map(|k| PlacedSet::new(&bodies[k], poses[k]));
         let (options, mut warm) = (Options::default(), WarmStart::default());
-        let truth = measure::distance(of[0], &poses[0], of[1], &poses[1], &options, &mut warm);
+        let truth = measure::distance(&bodies[0], &poses[0], &bodies[1], &poses[1], &options, &mut warm);
         if truth.lower < 0.05 {
             continue;
         }
@@ -60,13 +65,11 @@ fn points_on_edges_and_corners_are_exact() {
 fn lowest_points_between_polynomials_are_exact() {
     let (mut cases, mut missed) = (0, Vec::new());
     for seed in 0..400 {
-        let mut random = Seeded(seed);
-        let bodies = bodies(&mut random);
-        let poses = [pose(&mut random, 0.5), pose(&mut random, 3.0)];
-        let of = [seed as usize % 2, seed as usize / 2 % 2].map(|kind| &bodies[kind]);
-        let sets = [0, 1].map(|k| PlacedSet::new(of[k], poses[k]));
+        let (bodies, poses) = pair(seed);
+        let sets = [0, 1].map(|k| PlacedSet::new(&bodies[k], poses[k]));
         let options = Options::default();
-        let truth = measure::level_distance(of[0], &poses[0], of[1], &poses[1], &options, &mut WarmStart::default());
+        let truth =
+            measure::level_distance(&bodies[0], &poses[0], &bodies[1], &poses[1], &options, &mut WarmStart::default());
         cases += 1;
         let found = lowest_points([&sets[0], &sets[1]], towards(&poses))[0].0;
         assert!(found >= truth.lower, "seed {seed}: {found} {truth:?}");

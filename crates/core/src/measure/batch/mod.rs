@@ -8,6 +8,7 @@
 //! that no answer depends on the other poses of the batch.
 
 mod iterate;
+mod lane_poses;
 mod rounds;
 mod shapes;
 mod waiting;
@@ -26,10 +27,11 @@ use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::tangent_newton::{ALIGNED, Relative, Side, bracket, moved};
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
-use crate::polynomial::{Aligned, Lanes, MAX_LANES, Number, Simd, Singles, Vector, WithSimd, dispatch_lanes};
+use crate::polynomial::{Aligned, Lanes, MAX_LANES, Number, Simd, Vector, WithSimd, dispatch_lanes};
 use iterate::Iterate;
+use lane_poses::lane_poses;
 use nalgebra::Vector3;
-use rounds::{COARSE, Coarse, DIVERGED, MOST_COARSE, MOST_ROUNDS, NEARLY_CONVERGED, solve_alone};
+use rounds::{COARSE, DIVERGED, MOST_COARSE, MOST_ROUNDS, NEARLY_CONVERGED, Rounds, run, solve_alone};
 use shapes::ShapeBatch;
 use waiting::{Group, MAX_COARSE, Waiting};
 
@@ -164,8 +166,7 @@ fn in_lanes(
     }
 }
 
-/// A batch as work for the widest arithmetic. Each answer is written once: by the lanes, or by a
-/// query for the pose alone.
+/// A batch of two smooth bodies as work for the widest arithmetic.
 struct Batch<'a> {
     a: &'a Body,
     pose_a: &'a Pose,
@@ -181,36 +182,7 @@ impl WithSimd for Batch<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        let (lanes, singles) = (Lanes::<S>::COUNT, Coarse::<S>::COUNT);
-        let (mut far, mut near) = (Waiting::none(), Waiting::none());
-        let mut next = 0;
-        while !self.options.stopped() {
-            let left = self.poses_b.len() - next;
-            if near.len >= lanes || near.len > 0 && far.len + left == 0 {
-                let group = near.take(lanes);
-                self.prove(simd, group, &mut near);
-            } else if far.len + left > 0 {
-                let fresh = far.len < singles && left > 0;
-                let group = if fresh { Group::fresh(next..next + left.min(singles)) } else { far.take(singles) };
-                next += if fresh { group.count } else { 0 };
-                if group.count > Singles::<S>::COUNT {
-                    self.approach::<S, Coarse<S>>(simd, group, fresh, &mut far, &mut near);
-                } else {
-                    self.approach::<S, Singles<S>>(simd, group, fresh, &mut far, &mut near);
-                }
-            } else {
-                return;
-            }
-        }
-        // Stopped: what is known by now of the poses that are left is the answer.
-        for waiting in [&far, &near] {
-            for (pose, rounds) in waiting.pose.iter().zip(&waiting.rounds).take(waiting.len) {
-                self.solve_alone(*pose, *rounds, WarmStart::default());
-            }
-        }
-        for pose in next..self.poses_b.len() {
-            self.solve_alone(pose, 0, WarmStart::default());
-        }
+        run(simd, &mut self);
     }
 }
 
@@ -219,7 +191,15 @@ fn cold_start(diverged: bool) -> WarmStart {
     if diverged { Hint::Diverged.into() } else { WarmStart::default() }
 }
 
-impl Batch<'_> {
+impl Rounds for Batch<'_> {
+    fn poses(&self) -> usize {
+        self.poses_b.len()
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.options.stopped()
+    }
+
     /// Rounds in single precision, after which the poses wait for what is next; fresh ones are
     /// started first, and left out where they seem to overlap.
     #[inline(always)]
@@ -329,7 +309,9 @@ impl Batch<'_> {
         let b = (self.b, &self.poses_b[pose]);
         self.answers[pose] = solve_alone((self.a, self.pose_a), b, (self.options, rounds), warm);
     }
+}
 
+impl Batch<'_> {
     /// The lanes in which the middle between the points seems to lie in both bodies: single queries
     /// prove that fast.
     #[inline(always)]
@@ -352,23 +334,11 @@ impl Batch<'_> {
     /// B at the poses as seen from A.
     #[inline(always)]
     fn relative<S: Simd, N: Vector<S>, const LANES: usize>(&self, simd: S, poses: &[usize; LANES]) -> Relative<N> {
-        let mut columns = Aligned([[0.0; LANES]; 7]);
-        for lane in 0..N::COUNT {
-            let pose = &self.poses_b[poses[lane]];
-            let q = &pose.rotation().coords;
-            // Differences of translations are exact to one rounding, however far from the world
-            // origin.
-            let t = pose.translation() - self.pose_a.translation();
-            for (column, entry) in columns.0.iter_mut().zip([q.x, q.y, q.z, q.w, t.x, t.y, t.z]) {
-                column[lane] = entry;
-            }
-        }
-        let column = |i: usize| N::load(simd, &columns.0[i]);
+        let (other, translation) = lane_poses::<S, N, LANES>(simd, self.poses_b, poses, self.pose_a);
         let own = splat_quaternion(simd, self.pose_a.rotation());
-        let other = [column(0), column(1), column(2), column(3)];
         let rotation = rotation_by(simd, conjugate_times(own, other));
         let frame = rows(simd, self.pose_a.rotation().to_rotation_matrix().matrix());
-        let translation = apply_transposed(&frame, [column(4), column(5), column(6)]);
+        let translation = apply_transposed(&frame, translation);
         let home = (&self.a.normalization().center, self.a.trust().center);
         Relative::from_parts(simd, home, rotation, translation, self.b)
     }

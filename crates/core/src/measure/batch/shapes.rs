@@ -1,7 +1,8 @@
 //! A smooth body and a box or a cylinder at several poses at once: starts from support tables and
 //! first rounds in single precision, then rounds that bracket.
 
-use super::rounds::{COARSE, Coarse, MOST_COARSE, MOST_ROUNDS, solve_alone};
+use super::lane_poses::lane_poses;
+use super::rounds::{COARSE, MOST_COARSE, MOST_ROUNDS, Rounds, run, solve_alone};
 use super::waiting::{Group, MAX_COARSE, Waiting};
 use crate::body::{Body, ClosedForm};
 use crate::measure::distance::{Distance, Exact};
@@ -15,7 +16,7 @@ use crate::measure::solver::exact_shape::{
 };
 use crate::measure::solver::tangent_newton::{Plane, Relative, Side, SurfaceCurvature, moved};
 use crate::measure::warm::WarmStart;
-use crate::polynomial::{Aligned, Lanes, MAX_LANES, Number, NumberJet, Simd, Singles, Vector, WithSimd};
+use crate::polynomial::{Aligned, Lanes, MAX_LANES, Number, NumberJet, Simd, Vector, WithSimd};
 
 /// Square of the last step in normalized coordinates, relative to the body's size there,
 /// dimensionless, below which the next step, in double precision, is likely to end with a narrow
@@ -25,8 +26,7 @@ use crate::polynomial::{Aligned, Lanes, MAX_LANES, Number, NumberJet, Simd, Sing
 /// precision. It changes time only; no test pins it.
 const NEARLY_CONVERGED: f64 = 1e-4;
 
-/// A batch as work for the widest arithmetic. Each answer is written once: by the lanes, or by a
-/// query for the pose alone.
+/// A batch of a smooth body and a shape as work for the widest arithmetic.
 pub(super) struct ShapeBatch<'a, P> {
     pub(super) a: (&'a Body, &'a Pose),
     pub(super) b: (&'a Body, &'a [Pose]),
@@ -43,36 +43,7 @@ impl<P: LaneSet> WithSimd for ShapeBatch<'_, P> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        let (lanes, singles) = (Lanes::<S>::COUNT, Coarse::<S>::COUNT);
-        let (mut far, mut near) = (Waiting::none(), Waiting::none());
-        let mut next = 0;
-        while !self.options.stopped() {
-            let left = self.b.1.len() - next;
-            if near.len >= lanes || near.len > 0 && far.len + left == 0 {
-                let group = near.take(lanes);
-                self.prove(simd, group, &mut near);
-            } else if far.len + left > 0 {
-                let fresh = far.len < singles && left > 0;
-                let group = if fresh { Group::fresh(next..next + left.min(singles)) } else { far.take(singles) };
-                next += if fresh { group.count } else { 0 };
-                if group.count > Singles::<S>::COUNT {
-                    self.approach::<S, Coarse<S>>(simd, group, fresh, &mut far, &mut near);
-                } else {
-                    self.approach::<S, Singles<S>>(simd, group, fresh, &mut far, &mut near);
-                }
-            } else {
-                return;
-            }
-        }
-        // Stopped: what is known by now of the poses that are left is the answer.
-        for waiting in [&far, &near] {
-            for (pose, rounds) in waiting.pose.iter().zip(&waiting.rounds).take(waiting.len) {
-                self.solve_alone(*pose, *rounds);
-            }
-        }
-        for pose in next..self.b.1.len() {
-            self.solve_alone(pose, 0);
-        }
+        run(simd, &mut self);
     }
 }
 
@@ -98,9 +69,15 @@ impl<S: Simd, N: Number<S>> Linearized<S, N> {
     }
 }
 
-impl<P: LaneSet> ShapeBatch<'_, P> {
-    /// Rounds in single precision, after which the poses wait for what is next; fresh ones are
-    /// started first.
+impl<P: LaneSet> Rounds for ShapeBatch<'_, P> {
+    fn poses(&self) -> usize {
+        self.b.1.len()
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.options.stopped()
+    }
+
     #[inline(always)]
     fn approach<S: Simd, N: Vector<S>>(
         &mut self,
@@ -126,7 +103,7 @@ impl<P: LaneSet> ShapeBatch<'_, P> {
         for lane in 0..group.count {
             group.rounds[lane] += rounds;
             if open >> lane & 1 == 0 {
-                self.solve_alone(group.pose[lane], group.rounds[lane]);
+                self.solve_alone(group.pose[lane], group.rounds[lane], WarmStart::default());
             } else if group.rounds[lane] >= MOST_COARSE || close >> lane & 1 == 1 {
                 near.push(&group, lane);
             } else {
@@ -135,16 +112,6 @@ impl<P: LaneSet> ShapeBatch<'_, P> {
         }
     }
 
-    /// Where fresh poses begin, and the lanes that can.
-    #[inline(always)]
-    fn begin<S: Simd, N: Vector<S>>(&self, simd: S, body: &Body, relative: &Relative<N>) -> (V3<N>, N::Mask) {
-        let own = body.interior_point() - body.normalization().center;
-        let own = [N::splat(simd, own.x), N::splat(simd, own.y), N::splat(simd, own.z)];
-        let seen = self.set.offset(simd, add(relative.origin, apply(&relative.rotation, own)));
-        start(simd, &self.set, body, relative, seen.frame[2])
-    }
-
-    /// One round of a group that proves: writes the answers and lets the other poses wait.
     #[inline(always)]
     fn prove<S: Simd>(&mut self, simd: S, mut group: Group<MAX_LANES>, waiting: &mut Waiting) {
         let body = self.smooth();
@@ -171,9 +138,26 @@ impl<P: LaneSet> ShapeBatch<'_, P> {
             if open >> lane & 1 == 1 && group.rounds[lane] < MOST_ROUNDS {
                 waiting.push(&group, lane);
             } else {
-                self.solve_alone(group.pose[lane], group.rounds[lane]);
+                self.solve_alone(group.pose[lane], group.rounds[lane], WarmStart::default());
             }
         }
+    }
+
+    #[inline(never)]
+    fn solve_alone(&mut self, pose: usize, rounds: u32, warm: WarmStart) {
+        let b = (self.b.0, &self.b.1[pose]);
+        self.answers[pose] = solve_alone(self.a, b, (self.options, rounds), warm);
+    }
+}
+
+impl<P: LaneSet> ShapeBatch<'_, P> {
+    /// Where fresh poses begin, and the lanes that can.
+    #[inline(always)]
+    fn begin<S: Simd, N: Vector<S>>(&self, simd: S, body: &Body, relative: &Relative<N>) -> (V3<N>, N::Mask) {
+        let own = body.interior_point() - body.normalization().center;
+        let own = [N::splat(simd, own.x), N::splat(simd, own.y), N::splat(simd, own.z)];
+        let seen = self.set.offset(simd, add(relative.origin, apply(&relative.rotation, own)));
+        start(simd, &self.set, body, relative, seen.frame[2])
     }
 
     #[inline(always)]
@@ -200,35 +184,14 @@ impl<P: LaneSet> ShapeBatch<'_, P> {
     /// The smooth body at the poses as seen from the other one.
     #[inline(always)]
     fn relative<S: Simd, N: Vector<S>, const LANES: usize>(&self, simd: S, poses: &[usize; LANES]) -> Relative<N> {
-        let (standing, moving) = (self.a.1, self.b.1);
-        let is_smooth_moving = self.b.0.is_smooth();
-        let mut columns = Aligned([[0.0; LANES]; 7]);
-        for lane in 0..N::COUNT {
-            let pose = &moving[poses[lane]];
-            let q = &pose.rotation().coords;
-            // Differences of translations are exact to one rounding, however far from the world
-            // origin.
-            let t = pose.translation() - standing.translation();
-            let t = if is_smooth_moving { t } else { -t };
-            for (column, entry) in columns.0.iter_mut().zip([q.x, q.y, q.z, q.w, t.x, t.y, t.z]) {
-                column[lane] = entry;
-            }
-        }
-        let column = |i: usize| N::load(simd, &columns.0[i]);
-        let (q, t) = ([column(0), column(1), column(2), column(3)], [column(4), column(5), column(6)]);
+        let standing = self.a.1;
+        let (q, t) = lane_poses::<S, N, LANES>(simd, self.b.1, poses, standing);
         let still = splat_quaternion(simd, standing.rotation());
-        let (home, away) = if is_smooth_moving { (still, q) } else { (q, still) };
+        let (home, away, t) = if self.b.0.is_smooth() { (still, q, t) } else { (q, still, [-t[0], -t[1], -t[2]]) };
         let rotation = rotation_by(simd, conjugate_times(home, away));
         let translation = apply_transposed(&rotation_by(simd, home), t);
         let center = self.form.center();
         Relative::from_parts(simd, (center, center.norm()), rotation, translation, self.smooth())
-    }
-
-    /// Answers a pose by a query for it alone, after the rounds that it has gone through in lanes.
-    #[inline(never)]
-    fn solve_alone(&mut self, pose: usize, rounds: u32) {
-        let b = (self.b.0, &self.b.1[pose]);
-        self.answers[pose] = solve_alone(self.a, b, (self.options, rounds), WarmStart::default());
     }
 
     /// Writes the answers of the lanes that are set in `proven`.
