@@ -296,16 +296,23 @@ impl<'a> MomentProgram<'a> {
             let of_sources: DVector<f64> = sources.iter().zip(of_sources).map(|(source, y)| source.map * y).sum();
             of_sources - problem.structure.pull_back(form)
         };
+        let y: Vec<_> = self.of_sources.iter().map(|y| solution.values(y.clone())).collect();
+        let s = solution.values(self.form.clone());
         let inside: Vec<_> = sources.iter().map(|source| source.inside.clone()).collect();
         let rows = gram.size as f64;
-        let mean = moments(&inside, &DVector::zeros(hessian.keys)) / rows;
-        // Where none is found, the solver's point has to be feasible as it is.
-        let inside_form = interior_form(problem.structure, &mean, rows).unwrap_or_else(|| DVector::zeros(hessian.keys));
+        let nothing = DVector::zeros(hessian.keys);
+        // Points on a surface of low degree, as those of a torus, have a singular moment matrix
+        // whatever their weights: it is the functional s that makes that of the solution definite.
+        // Where rounding or the optimum itself leaves that one singular, there are the points.
+        let inside_form = interior_form(problem.structure, &moments(&y, &s), 1.0)
+            .or_else(|| interior_form(problem.structure, &(moments(&inside, &nothing) / rows), rows))
+            // The solver's point has to be feasible as it is.
+            .unwrap_or(nothing);
         let feasible = |share: f64| {
-            let form = solution.values(self.form.clone()) + &inside_form * share;
+            let form = &s + &inside_form * share;
             Cholesky::new(hessian.spread(&form))?;
-            let of_source = |(source, y): (&Source, &Range<usize>)| source.feasible(&solution.values(y.clone()), share);
-            let of_sources = sources.iter().zip(&self.of_sources).map(of_source).collect::<Option<Vec<_>>>()?;
+            let of_source = |(source, y): (&Source, &DVector<f64>)| source.feasible(y, share);
+            let of_sources = sources.iter().zip(&y).map(of_source).collect::<Option<Vec<_>>>()?;
             let moments = moments(&of_sources, &form);
             Cholesky::new(gram.spread(&moments))?;
             Some((of_sources, form, moments))
