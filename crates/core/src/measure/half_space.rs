@@ -244,7 +244,7 @@ impl<'a> Support<'a> {
         let (body, r) = (&self.single.body, &self.direction);
         // Points of the body have length at most 2 here: so much the error of the direction may do.
         let turned = 2.0 * ROTATION_ERROR * body.body.circumscribed().radius / self.single.unit + 8.0 * f64::EPSILON;
-        let objective = Objective::farthest(r);
+        let objective = Objective::Farthest(*r);
         let (start, active) = match warm.hint {
             Hint::Single { y, active } if y.iter().all(|value| value.is_finite()) => {
                 (self.single.body_to_query(&y), active)

@@ -17,7 +17,7 @@ use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::exact_shape::{
     ExactQuery, PointOffset, PointSide, direction_to_world, offset_of_point, to_world,
 };
-use crate::measure::solver::projection::{Objective, Single, SingleProblem, Trial, Worth, solve_single};
+use crate::measure::solver::projection::{Objective, Segment, Single, SingleProblem, Trial, Worth, solve_single};
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::status::Status;
@@ -162,13 +162,16 @@ pub(super) struct Projected {
     pub(super) normal: Vector3<f64>,
     /// Attains the upper bound, or one that is as near to the lower bound as asked for.
     pub(super) witness: Vector3<f64>,
+    /// The point itself, or that of the segment nearest to the witness; one that lies in the body
+    /// where the upper bound is 0.
+    pub(super) nearest: Vector3<f64>,
     pub(super) iterations: u32,
 }
 
 impl Projected {
     fn inside(point: &Vector3<f64>, iterations: u32) -> Self {
         let (plane, normal) = (Vector3::zeros(), Vector3::zeros());
-        Self { lower: 0.0, upper: 0.0, plane, normal, witness: *point, iterations }
+        Self { lower: 0.0, upper: 0.0, plane, normal, witness: *point, nearest: *point, iterations }
     }
 
     fn into_distance(self, tolerance: f64) -> PointDistance {
@@ -213,7 +216,8 @@ impl<'a> Projection<'a> {
             match offset_of_point((form, &self.pose), point) {
                 PointSide::Inside => return Projected::inside(point, 0),
                 PointSide::Outside(PointOffset { lower, upper, normal, witness }) => {
-                    return Projected { lower, upper, plane: normal, normal, witness, iterations: 0 };
+                    let nearest = *point;
+                    return Projected { lower, upper, plane: normal, normal, witness, nearest, iterations: 0 };
                 }
                 PointSide::Open => {}
             }
@@ -222,13 +226,31 @@ impl<'a> Projection<'a> {
             Ok(found) => return found,
             Err(spent) => spent,
         };
+        let segment = Segment { center: *point, half_axis: Vector3::zeros() };
+        self.to_segment(&segment, tolerance, (spent, options), warm)
+    }
+
+    /// Of a segment of the world frame, without closed forms and the method for smooth bodies, after
+    /// so many evaluations.
+    pub(super) fn to_segment(
+        &self,
+        segment: &Segment,
+        tolerance: f64,
+        (spent, options): (u32, &Options<'_>),
+        warm: &mut WarmStart,
+    ) -> Projected {
         let single = self.single.get_or_init(|| Single::new(self.body, &self.pose));
         let Single { body, unit, .. } = single;
-        let (q, error) = single.to_query(point);
-        if body.value_upper(&q, error) <= 1.0 {
-            return Projected::inside(point, spent);
+        let (center, error) = single.to_query(&segment.center);
+        let q = Segment { center, half_axis: single.direction_to_query(&segment.half_axis) / *unit };
+        let error = error + (ROTATION_ERROR + gamma(16)) * q.half_axis.norm();
+        let first = q.nearest(&body.interior);
+        if body.value_upper(&first, error) <= 1.0 {
+            return Projected::inside(&segment.nearest(&single.to_world(&first)), spent);
         }
-        let objective = Objective::nearest(&q);
+        let objective = Objective::Nearest(q);
+        let is_point = q.half_axis == Vector3::zeros();
+        let mut common = None;
         let (start, active): (_, ActiveSet) = match warm.hint {
             Hint::Single { y, active } if y.iter().all(|value| value.is_finite()) => (single.body_to_query(&y), active),
             _ => (single.table(&objective), 0),
@@ -240,15 +262,24 @@ impl<'a> Projection<'a> {
         let stop = |count| options.exhausted(spent + count);
         let (iterations, active) = solve_single(&problem, stop, |trial| {
             let (bound, n) = separation(body, &q, error, trial);
+            if bound == 0.0 && !is_point {
+                // It may lead through the body.
+                let nearest = q.nearest(&trial.y);
+                if body.value_upper(&nearest, error) <= 1.0 {
+                    common = Some(nearest);
+                    return Worth::Done;
+                }
+            }
             if bound > lower || plane == Vector3::zeros() {
                 (lower, plane) = (bound.max(0.0), n);
             }
             let Some(y) = body.move_inside(&trial.y) else { return Worth::Wide };
-            let apart = (q - y).norm() + body.displacement(&y) + error;
+            let nearest = q.nearest(&y);
+            let apart = (nearest - y).norm() + body.displacement(&y) + error;
             // The bracket says of normal and witness no more than its root: the solution is where
             // the surface's normal leads to the point.
             if !self.is_rough && n != Vector3::zeros() && apart - lower <= narrow {
-                let off = (n - (q - y) / (q - y).norm()).norm();
+                let off = (n - (nearest - y) / (nearest - y).norm()).norm();
                 if facing.is_none_or(|(least, _)| off < least) {
                     (facing, witness) = (Some((off, n)), y);
                 }
@@ -263,10 +294,13 @@ impl<'a> Projection<'a> {
                 false => Worth::Wide,
             }
         });
+        if let Some(common) = common {
+            return Projected::inside(&segment.nearest(&single.to_world(&common)), spent + iterations);
+        }
         let normal = facing.map_or(plane, |(_, n)| n);
         if upper == f64::INFINITY {
             // Stopped before the first trial point: the interior point is a point of the body.
-            upper = (q - witness).norm() + body.displacement(&witness) + error;
+            upper = (q.nearest(&witness) - witness).norm() + body.displacement(&witness) + error;
         }
         *warm = Hint::Single { y: single.to_body(&witness), active }.into();
         Projected {
@@ -275,6 +309,7 @@ impl<'a> Projection<'a> {
             plane: single.direction_to_world(&plane),
             normal: single.direction_to_world(&normal),
             witness: single.to_world(&witness),
+            nearest: segment.nearest(&single.to_world(&witness)),
             iterations: spent + iterations,
         }
     }
@@ -323,6 +358,7 @@ impl<'a> Projection<'a> {
             plane: normal,
             normal,
             witness: to_world(&form, &form_pose, found.x),
+            nearest: *point,
             iterations: found.rounds,
         })
     }
@@ -330,15 +366,17 @@ impl<'a> Projection<'a> {
 
 /// Lower bound of the distance in query units from the plane normal to the trial's pull, and
 /// that normal.
-fn separation(body: &Posed<'_>, q: &Vector3<f64>, error: f64, trial: &Trial) -> (f64, Vector3<f64>) {
+fn separation(body: &Posed<'_>, q: &Segment, error: f64, trial: &Trial) -> (f64, Vector3<f64>) {
     let length = trial.dual_gradient.norm();
     if !(length > 0.0 && length.is_finite()) {
         return (0.0, Vector3::zeros());
     }
     let n = trial.dual_gradient / length;
     let fall = descent(body, &trial.y, &-n, &trial.multipliers.map(|m| (m / length).max(0.0)));
-    let slack = DUALITY_ROUNDING * (q.norm() + trial.y.norm() + fall.abs());
-    let bound = n.dot(&(q - trial.y)) - fall - body.displacement(&trial.y) - error - slack;
+    let size = q.center.norm() + q.half_axis.norm();
+    let slack = DUALITY_ROUNDING * (size + trial.y.norm() + fall.abs());
+    let bound =
+        n.dot(&(q.center - trial.y)) - n.dot(&q.half_axis).abs() - fall - body.displacement(&trial.y) - error - slack;
     // Not `max`: a NaN bounds nothing.
     (if bound > 0.0 { bound } else { 0.0 }, n)
 }

@@ -2,44 +2,54 @@
 //! `n·(a - b) - h_A(-n) - h_B(n)`, a and b their interior points and h their heights above these.
 //! No polynomial is evaluated.
 
-use super::culling::{CULLING_SLACK, across};
+use super::culling::CULLING_SLACK;
 use crate::body::Body;
-use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
+use crate::measure::frames::pose::Pose;
+use crate::measure::frames::vector::{M3, V3, add, apply, apply_transposed};
+use crate::measure::solver::tangent_newton::Relative;
+use crate::polynomial::Scalar;
 use nalgebra::Vector3;
 
-/// Two bodies as planes between them are tried.
+/// Two bodies as planes between them are tried; A's frame.
 pub(in crate::measure) struct Separation<'a> {
-    of_a: (&'a Body, &'a Pose),
-    of_b: (&'a Body, &'a Pose),
-    /// From B's interior point to A's, world frame, metres.
+    a: &'a Body,
+    b: &'a Body,
+    /// Rotation from B's frame to A's.
+    rotation: M3<f64>,
+    /// From B's interior point to A's, metres.
     between: Vector3<f64>,
     /// Bound of its error, and of what the directions' rotations are off by, metres.
     error: f64,
 }
 
 impl<'a> Separation<'a> {
-    pub(in crate::measure) fn new(of_a: (&'a Body, &'a Pose), of_b: (&'a Body, &'a Pose)) -> Self {
-        let ((a, pose_a), (b, pose_b)) = (of_a, of_b);
-        let (between, apart, error) = across((pose_a, a.interior_point()), (pose_b, b.interior_point()));
-        // Every point of a body is within its diameter of its interior point.
-        let reach = 2.0 * (a.circumscribed().radius + b.circumscribed().radius);
-        Self { of_a, of_b, between, error: error + ROTATION_ERROR * reach + CULLING_SLACK * (apart + reach) }
+    pub(in crate::measure) fn new((a, pose_a): (&'a Body, &Pose), (b, pose_b): (&'a Body, &Pose)) -> Self {
+        Self::seen(a, b, &Relative::new(Scalar, a, pose_a, b, pose_b))
     }
 
-    /// From B's interior point to A's, world frame, metres.
+    /// Of B where it stands as seen from A.
+    pub(in crate::measure) fn seen(a: &'a Body, b: &'a Body, relative: &Relative<f64>) -> Self {
+        let interior = |body: &Body| V3::from(body.interior_point() - body.normalization().center);
+        let of_b = add::<Scalar, f64>(apply::<Scalar, f64>(&relative.rotation, interior(b)), relative.origin);
+        let between = Vector3::from(interior(a)) - Vector3::from(of_b);
+        // Every point of a body is within its diameter of its interior point.
+        let reach = 2.0 * (a.circumscribed().radius + b.circumscribed().radius);
+        let error = relative.displacement + CULLING_SLACK * (between.norm() + reach);
+        Self { a, b, rotation: relative.rotation, between, error }
+    }
+
+    /// From B's interior point to A's, metres.
     pub(in crate::measure) fn between(&self) -> &Vector3<f64> {
         &self.between
     }
 
-    /// Lower bound of the distance, metres, by planes across n, which points from B to A; world
-    /// frame, of any length. Negative where they do not separate.
+    /// Lower bound of the distance, metres, by planes across n, which points from B to A; of any
+    /// length. Negative where they do not separate.
     pub(in crate::measure) fn along(&self, n: &Vector3<f64>) -> f64 {
-        let ((a, pose_a), (b, pose_b)) = (self.of_a, self.of_b);
         // Normals of hints have length 1 up to rounding only.
         let Some(n) = n.try_normalize(0.0).filter(|n| n.norm() < 2.0) else { return f64::NEG_INFINITY };
-        let height_a = a.height(&-pose_a.rotation().inverse_transform_vector(&n));
-        let height_b = b.height(&pose_b.rotation().inverse_transform_vector(&n));
-        n.dot(&self.between) - height_a - height_b - self.error
+        let own_b = apply_transposed::<Scalar, f64>(&self.rotation, n.into()).into();
+        n.dot(&self.between) - self.a.height(&-n) - self.b.height(&own_b) - self.error
     }
 }
 
@@ -64,14 +74,15 @@ mod tests {
             let (pose_a, pose_b) = (random_pose(&mut random, 0.1), random_pose(&mut random, far));
             let truth = distance(a, &pose_a, b, &pose_b, &Options::default(), &mut WarmStart::default());
             let planes = Separation::new((a, &pose_a), (b, &pose_b));
+            let own = |n| pose_a.rotation().inverse_transform_vector(&n);
             for _ in 0..20 {
                 let n = random.unit() * (1.0 + random.signed());
-                assert!(planes.along(&n) <= truth.upper, "seed {seed}");
+                assert!(planes.along(&own(n)) <= truth.upper, "seed {seed}");
             }
             if let Some(n) = truth.normal.filter(|_| truth.lower > 0.0) {
-                let bound = planes.along(&n);
+                let bound = planes.along(&own(n));
                 assert!(bound <= truth.upper, "seed {seed}");
-                assert!(planes.along(&(n * 1.5)) <= truth.upper, "seed {seed}");
+                assert!(planes.along(&own(n * 1.5)) <= truth.upper, "seed {seed}");
                 count += 1;
                 near += u32::from(truth.upper - bound < 0.02 * reach);
             }

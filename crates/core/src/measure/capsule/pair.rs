@@ -13,6 +13,7 @@ use crate::measure::point::Projection;
 use crate::measure::solver::exact_shape::{
     ExactProven, ExactQuery, ShapeDistance, between_shapes, direction_to_world, to_world,
 };
+use crate::measure::solver::projection::Segment;
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::status::Status;
@@ -49,6 +50,17 @@ pub(super) struct Problem<'a> {
     pub(super) options: &'a Options<'a>,
     /// What the signed distance is asked for.
     pub(super) goal: StopCriterion,
+}
+
+/// The axis of the capsule as seen from a place in the world.
+struct SeenAxis {
+    /// The place.
+    origin: Vector3<f64>,
+    /// The middle of the axis, from there on.
+    center: Vector3<f64>,
+    half_axis: Vector3<f64>,
+    /// Bound of what is wrong with that, metres.
+    error: f64,
 }
 
 impl Problem<'_> {
@@ -120,7 +132,7 @@ impl Problem<'_> {
         } else if of_body.0.is_smooth() {
             self.of_smooth(of_body, (width, options), warm)
         } else {
-            Err(0)
+            self.of_edged(of_body, (width, options), warm)
         }
     }
 
@@ -162,6 +174,44 @@ impl Problem<'_> {
         *warm = trace.map_or_else(WarmStart::default, |trace| Hint::Exact(trace).into());
         let normal = direction_to_world(&form, form_pose, n);
         Ok(self.apart([lower, upper], [witness, on_axis], normal, rounds))
+    }
+
+    /// Of a body with several constraints.
+    ///
+    /// # Errors
+    /// After how many steps nothing is proven.
+    fn of_edged(
+        &self,
+        (body, pose): At<'_, Body>,
+        (width, options): (f64, &Options<'_>),
+        warm: &mut WarmStart,
+    ) -> Result<CapsuleDistance, u32> {
+        let SeenAxis { origin, center, half_axis, error } = self.axis(pose);
+        let pose = pose.with_translation(Vector3::zeros());
+        let wants_normal = self.goal.wants_answer();
+        let projection = if wants_normal { Projection::new(body, &pose) } else { Projection::rough(body, &pose) };
+        let segment = Segment { center, half_axis };
+        let found = projection.to_segment(&segment, 0.5 * width, (0, options), warm);
+        if found.upper == 0.0 {
+            let met = self.met(&(found.nearest + origin), found.iterations);
+            return Ok(CapsuleDistance { upper: error - self.capsule.radius_m(), ..met });
+        }
+        let (lower, upper) = (found.lower - error, found.upper + error);
+        if !(lower > 0.0 && upper - lower <= width) {
+            return Err(found.iterations);
+        }
+        let witnesses = [found.witness + origin, found.nearest + origin];
+        Ok(self.apart([lower, upper], witnesses, -found.normal, found.iterations))
+    }
+
+    /// The axis as seen from the translation of a pose, for the sake of digits.
+    fn axis(&self, pose: &Pose) -> SeenAxis {
+        let origin = *pose.translation();
+        let center = self.capsule_pose.translation() - origin;
+        let half = self.capsule.half_height_m();
+        let half_axis = self.capsule_pose.transform_direction(&Vector3::z()) * half;
+        let error = f64::EPSILON * center.norm() + (ROTATION_ERROR + CULLING_SLACK) * half;
+        SeenAxis { origin, center, half_axis, error }
     }
 
     /// Of a closed form where its body stands.
@@ -261,9 +311,7 @@ impl Problem<'_> {
 
     /// By the distances of points of the axis, after this number of steps.
     fn along_axis(&self, (body, pose): At<'_, Body>, spent: u32, warm: &mut WarmStart) -> CapsuleDistance {
-        // As seen from the translation of the body, for the sake of digits.
-        let origin = pose.translation();
-        let center = self.capsule_pose.translation() - origin;
+        let SeenAxis { origin, center, error, .. } = self.axis(pose);
         let pose = pose.with_translation(Vector3::zeros());
         let (axis, half) = (self.capsule_pose.transform_direction(&Vector3::z()), self.capsule.half_height_m());
         let radius = self.capsule.radius_m();
@@ -274,7 +322,6 @@ impl Problem<'_> {
         let mut ends: [Option<Tangent>; 2] = [None, None];
         let (mut lower, mut iterations) = (f64::NEG_INFINITY, spent);
         let mut at = axis.dot(&(pose.transform_point(body.interior_point()) - center)).clamp(-half, half);
-        let error = f64::EPSILON * center.norm() + (ROTATION_ERROR + CULLING_SLACK) * half;
         let mut best = self.to_interior_point((body, &pose), (&center, at), spent);
         // How much the distance falls along the axis where it is the best.
         let (mut slant, mut more) = (f64::INFINITY, 0);

@@ -5,7 +5,7 @@ use super::answer::Distance;
 use super::balls::of_balls;
 use super::edges::of_edges;
 use super::exact::{Exact, of_shapes};
-use super::planes::Planes;
+use super::planes::lower_by_planes;
 use super::query::Query;
 use super::search::Search;
 use crate::body::Body;
@@ -55,14 +55,12 @@ pub(in crate::measure) fn settle(
     if goal.met(bound.lower, bound.upper) {
         return bound;
     }
-    let mut query = Query { of_a, of_b, goal, options, facing: None };
+    let query = Query { of_a, of_b, goal, options };
     if let Some(found) = query.still_overlapping(warm) {
         return found;
     }
     if runs(Stage::Planes) {
-        let lower;
-        (lower, query.facing) = Planes::new(of_a, of_b, &warm.hint).lower(goal);
-        bound.lower = bound.lower.max(lower);
+        bound.lower = bound.lower.max(lower_by_planes(of_a, of_b, &warm.hint, goal));
         if goal.met(bound.lower, bound.upper) {
             return bound;
         }
@@ -108,7 +106,7 @@ pub(in crate::measure) fn between(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> Distance {
-    Query { of_a, of_b, goal, options, facing: None }.solve(warm)
+    Query { of_a, of_b, goal, options }.solve(warm)
 }
 
 // Each method hands on to the next where it fails, and none hands back: an answer is written where
@@ -159,7 +157,7 @@ impl<'a> Query<'a> {
     fn relation(&self) -> Apart<'a> {
         let ((a, pose_a), (b, pose_b)) = (self.of_a, self.of_b);
         let tolerance = self.options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
-        Apart { pose_a, pose_b, goal: self.goal, tolerance, facing: self.facing }
+        Apart { pose_a, pose_b, goal: self.goal, tolerance }
     }
 
     fn pair(&self) -> Pair<'a> {
@@ -206,7 +204,8 @@ impl<'a> Query<'a> {
         // From far away it does other than lanes, which bring no points back that have come too far
         // from the bodies.
         let diverged = matches!(warm.hint, Hint::Diverged) && !far_apart(self.of_a, self.of_b);
-        if runs(Stage::Seek) && smooth && !diverged && !lost.touching() && !self.options.exhausted(lost.rounds) {
+        let open = !lost.touching() && lost.parted.is_none();
+        if runs(Stage::Seek) && smooth && !diverged && open && !self.options.exhausted(lost.rounds) {
             return dispatch(Cold { query: *self, before: lost.rounds, warm });
         }
         self.search(lost, warm)
@@ -217,6 +216,9 @@ impl<'a> Query<'a> {
     fn search(&self, lost: &Lost, warm: &mut WarmStart) -> Distance {
         if let Some(common) = lost.common.filter(|common| common.proven) {
             return self.overlapping(&common, lost.rounds, warm);
+        }
+        if let Some(lower) = lost.parted {
+            return Distance { lower, upper: f64::INFINITY, iterations: lost.rounds, ..Distance::default() };
         }
         let pair = self.pair();
         let mut search = Search::new(&pair, self.goal, self.options, lost.rounds);

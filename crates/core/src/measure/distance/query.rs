@@ -2,7 +2,6 @@
 
 use crate::body::Body;
 use crate::measure::frames::pose::Pose;
-use crate::measure::frames::vector::V3;
 use crate::measure::options::Options;
 use crate::measure::solver::stop_criterion::StopCriterion;
 
@@ -13,6 +12,4 @@ pub(super) struct Query<'a> {
     pub(super) of_b: (&'a Body, &'a Pose),
     pub(super) goal: &'a StopCriterion,
     pub(super) options: &'a Options<'a>,
-    /// About the normal from B to A, A's frame, if it is known.
-    pub(super) facing: Option<V3<f64>>,
 }

@@ -151,11 +151,13 @@ pub(in crate::measure) struct Lost {
     /// may prove: near contact, where doubles do not show on which side, or where the normals do
     /// not agree well enough.
     pub(in crate::measure) grazing: Option<Proven>,
+    /// A lower bound by planes that is all that was asked for.
+    pub(in crate::measure) parted: Option<f64>,
 }
 
 impl Lost {
     pub(in crate::measure) fn after(rounds: u32) -> Self {
-        Self { rounds, common: None, grazing: None }
+        Self { rounds, common: None, grazing: None, parted: None }
     }
 
     /// Whether the bodies seem to touch or overlap.
@@ -315,6 +317,10 @@ impl<R: Relation> WithSimd for Seek<'_, R> {
     fn with_simd<S: Simd>(self, simd: S) -> Result<(Proven, Trace), Lost> {
         let Self { a, b, relation, from, most, options } = self;
         let relative = relation.relative(simd, a, b);
+        let parted = relation.parted((a, b), &relative, None);
+        if parted.is_some() {
+            return Err(Lost { parted, ..Lost::after(0) });
+        }
         let (start, active) = match from {
             Some(start) => (start, [0; 2]),
             None => {
@@ -325,7 +331,12 @@ impl<R: Relation> WithSimd for Seek<'_, R> {
         let patience = if from.is_some() { PATIENCE_OUTLINED } else { PATIENCE };
         let sides = (Side::at_home(simd, a, active[0].into()), Side::away(b, active[1].into(), &relative));
         let correct = Correct { sides, relation, patience, most, options, limits: limits(a, b) };
-        if relation.ends_at_contact() && dot::<S, f64>(start.n, subtract::<S, f64>(start.x, start.y)) < 0.0 {
+        let height = dot::<S, f64>(start.n, subtract::<S, f64>(start.x, start.y));
+        let parted = relation.parted((a, b), &relative, Some((start.n, height)));
+        if parted.is_some() {
+            return Err(Lost { parted, ..Lost::after(0) });
+        }
+        if relation.ends_at_contact() && height < 0.0 {
             let common = CommonPoint::between(simd, (&correct.sides.0, &correct.sides.1), start.x, start.y);
             if common.is_some() {
                 return Err(Lost { common, ..Lost::after(1) });
@@ -399,6 +410,15 @@ impl<R: Relation> Correct<'_, R> {
                 }
             }
             let decisive = prospect == Prospect::Decided;
+            if decisive && !near {
+                // Mostly too far for an extrapolation.
+                let n = moved::<S, f64>(at.frame[2], [step.dn[0], step.dn[1], 0.0], &at.frame);
+                let height = difference[2] + step.dx[2] - step.dy[2];
+                let parted = self.relation.parted((side_a.body(), side_b.body()), relative, Some((n, height)));
+                if parted.is_some() {
+                    return Err(Lost { parted, ..Lost::after(rounds) });
+                }
+            }
             // Where sides are flat the point at hand may do long before its step is short enough.
             let local = (&local_a, &local_b);
             let flat = series.is_slow(step.along())
@@ -437,7 +457,7 @@ impl<R: Relation> Correct<'_, R> {
                         let touching = settled || found.upper > NARROWER * overlap;
                         if common.is_some() || touching || deep && rounds >= PATIENCE {
                             let grazing = (!deep).then(|| at.grazing(simd, &step, &found, trace.active, rounds));
-                            return Err(Lost { rounds, common, grazing });
+                            return Err(Lost { common, grazing, ..Lost::after(rounds) });
                         }
                         overlap = found.upper;
                     }

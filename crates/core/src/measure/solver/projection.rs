@@ -1,11 +1,18 @@
-//! Convex programs over one body: the point nearest to a given one, and the point farthest along a
-//! direction.
+//! Convex programs over one body: the point nearest to a segment or a point, and the point farthest
+//! along a direction.
 //!
-//! Both are `min κ/2 |y|² - r·y` over the points y of the body: κ = 1 projects the point r, κ = 0
-//! supports the direction r. The steps are those of sequential quadratic programming,
+//! They are `min f` over the points y of the body, f half the squared distance from the segment or
+//! `-r·y` for the direction r. From the segment with the middle c and the half axis h, its nearest
+//! point being `c + s h` with `s = h·(y - c) / |h|²` cut to [-1, 1],
 //!
 //! ```text
-//! min over d of ½ dᵀ(κ I + Σ λ_i ∇²g_i) d + (κ y - r)·d   subject to   g_i(y) + ∇g_i(y)·d <= 1
+//! ∇f = y - c - s h,   ∇²f = I - h hᵀ / |h|² beside it, I beyond its ends
+//! ```
+//!
+//! The steps are those of sequential quadratic programming,
+//!
+//! ```text
+//! min over d of ½ dᵀ(∇²f + Σ λ_i ∇²g_i) d + ∇f·d   subject to   g_i(y) + ∇g_i(y)·d <= 1
 //! ```
 //!
 //! with the active constraints found by exchange, one at a time, without new evaluations. Where the
@@ -74,34 +81,69 @@ impl<'a> Single<'a> {
     /// Boundary point of the stored table that is best for the objective.
     pub(in crate::measure) fn table(&self, objective: &Objective) -> Vector3<f64> {
         let points = self.body.body.boundary().iter().map(|x| self.body_to_query(x));
-        let score = |y: &Vector3<f64>| (y * (0.5 * objective.curvature) - objective.linear).dot(y);
-        let best = points.map(|y| (score(&y), y)).min_by(|p, q| p.0.total_cmp(&q.0));
+        let best = points.map(|y| (objective.value(&y), y)).min_by(|p, q| p.0.total_cmp(&q.0));
         best.map_or(self.body.interior, |(_, y)| y)
     }
 }
 
-/// `κ/2 |y|² - r·y`.
+/// A segment; a point where its half axis is 0.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::measure) struct Objective {
-    /// κ.
-    curvature: f64,
-    /// r.
-    linear: Vector3<f64>,
+pub(in crate::measure) struct Segment {
+    pub(in crate::measure) center: Vector3<f64>,
+    pub(in crate::measure) half_axis: Vector3<f64>,
+}
+
+impl Segment {
+    /// Where its point nearest to another one is, in half axes from its centre on.
+    fn place(&self, y: &Vector3<f64>) -> f64 {
+        let square = self.half_axis.norm_squared();
+        if square > 0.0 { (self.half_axis.dot(&(y - self.center)) / square).clamp(-1.0, 1.0) } else { 0.0 }
+    }
+
+    /// Its point nearest to another one.
+    pub(in crate::measure) fn nearest(&self, y: &Vector3<f64>) -> Vector3<f64> {
+        self.center + self.half_axis * self.place(y)
+    }
+}
+
+/// What is minimised.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::measure) enum Objective {
+    /// Half the squared distance from a segment.
+    Nearest(Segment),
+    /// The negative height along a direction.
+    Farthest(Vector3<f64>),
 }
 
 impl Objective {
-    /// Nearest to a point.
-    pub(in crate::measure) fn nearest(point: &Vector3<f64>) -> Self {
-        Self { curvature: 1.0, linear: *point }
+    fn value(&self, y: &Vector3<f64>) -> f64 {
+        match self {
+            Self::Nearest(segment) => 0.5 * (y - segment.nearest(y)).norm_squared(),
+            Self::Farthest(direction) => -direction.dot(y),
+        }
     }
 
-    /// Farthest along a direction.
-    pub(in crate::measure) fn farthest(direction: &Vector3<f64>) -> Self {
-        Self { curvature: 0.0, linear: *direction }
+    /// The negative gradient.
+    fn pull(&self, y: &Vector3<f64>) -> Vector3<f64> {
+        match self {
+            Self::Nearest(segment) => segment.nearest(y) - y,
+            Self::Farthest(direction) => *direction,
+        }
+    }
+
+    fn hessian(&self, y: &Vector3<f64>) -> Matrix3<f64> {
+        match self {
+            Self::Nearest(segment) if segment.place(y).abs() < 1.0 && segment.half_axis != Vector3::zeros() => {
+                let axis = segment.half_axis / segment.half_axis.norm();
+                Matrix3::identity() - axis * axis.transpose()
+            }
+            Self::Nearest(_) => Matrix3::identity(),
+            Self::Farthest(_) => Matrix3::zeros(),
+        }
     }
 }
 
-/// A trial point with multipliers of all constraints: `Σ λ_i ∇g_i = r - κ y` at the solution.
+/// A trial point with multipliers of all constraints: `Σ λ_i ∇g_i = -∇f` at the solution.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::measure) struct Trial {
     pub(in crate::measure) y: Vector3<f64>,
@@ -165,7 +207,7 @@ pub(in crate::measure) fn solve_single(
         return (count, steps.active);
     }
     let mut y = body.interior;
-    let gap = (objective.linear - y * objective.curvature).norm();
+    let gap = objective.pull(&y).norm();
     let mut attempt = 1e-1;
     minimise(&Inner { body, objective }, &mut y, gap.max(1e-6), |iterate| {
         count += 1;
@@ -255,7 +297,7 @@ impl Steps<'_> {
     /// against the objective.
     fn first_multipliers(&mut self, jets: &[Jet], y: &Vector3<f64>) -> Multipliers {
         let mut multipliers = [0.0; MAX_CONSTRAINTS];
-        let aim = self.objective.linear - y * self.objective.curvature;
+        let aim = self.objective.pull(y);
         let most = (0..jets.len()).max_by(|&i, &j| jets[i].value.total_cmp(&jets[j].value)).unwrap_or(0);
         if self.active == 0 || self.active >> jets.len() != 0 || self.active.count_ones() > MAX_ACTIVE as u32 {
             self.active = 1 << most;
@@ -275,9 +317,9 @@ impl Steps<'_> {
         y: &Vector3<f64>,
         multipliers: &Multipliers,
     ) -> Option<(Vector3<f64>, Multipliers)> {
-        let aim = self.objective.linear - y * self.objective.curvature;
+        let aim = self.objective.pull(y);
         let mut hessian: Matrix3<f64> = jets.iter().zip(multipliers).map(|(jet, m)| jet.hessian * m.max(0.0)).sum();
-        hessian += Matrix3::identity() * self.objective.curvature;
+        hessian += self.objective.hessian(y);
         // Enough for flat directions to have an answer, too little to slow the others.
         let regularization = 1e-10 * hessian.diagonal().amax().max(1e-3 * aim.norm());
         hessian += Matrix3::identity() * regularization;
@@ -340,8 +382,7 @@ struct Inner<'a> {
 
 impl Program<3> for Inner<'_> {
     fn objective(&self, y: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
-        let Objective { curvature, linear } = self.objective;
-        (y * *curvature - linear, Matrix3::identity() * *curvature)
+        (-self.objective.pull(y), self.objective.hessian(y))
     }
 
     fn constraints(&self, y: &Vector3<f64>, rows: &mut Rows<3>) {

@@ -2,14 +2,17 @@
 //! of continuation in which the measures of pairs differ.
 
 use crate::body::Body;
+use crate::measure::bounds::separation::Separation;
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::vector::{M3, V3, add, add_scaled, dot, subtract};
 use crate::measure::solver::initial_guess::{Start, facing, meeting};
+use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::solver::tangent_newton::{
     ALIGNED, Bracket, Plane, Relative, Response, Step, SurfaceCurvature, newton,
 };
 use crate::polynomial::Simd;
+use nalgebra::Vector3;
 
 /// A measure of two bodies that is attained by a point x of A and a point y of B with opposite
 /// normals.
@@ -31,6 +34,14 @@ pub(in crate::measure) trait Relation: Copy {
     #[inline(always)]
     fn decided_by(&self, _distance: f64, _width: f64) -> bool {
         false
+    }
+
+    /// A lower bound of the measure, where that is all that is asked for, by planes across n, a unit
+    /// vector from B to A in A's frame, along which the bodies seem to be so many metres apart; else
+    /// across the line between their interior points.
+    #[inline(always)]
+    fn parted(&self, _: (&Body, &Body), _: &Relative<f64>, _n: Option<(V3<f64>, f64)>) -> Option<f64> {
+        None
     }
 
     /// Newton's step from points with `difference = x - y` in the frame, whose third vector is the
@@ -85,9 +96,6 @@ pub(in crate::measure) struct Apart<'a> {
     pub(in crate::measure) goal: &'a StopCriterion,
     /// Width of the bracket that is narrow enough, metres.
     pub(in crate::measure) tolerance: f64,
-    /// From B to A, in A's frame, to start from; without one, across the gap of the ellipsoids that
-    /// stand for the bodies.
-    pub(in crate::measure) facing: Option<V3<f64>>,
 }
 
 impl Relation for Apart<'_> {
@@ -98,8 +106,7 @@ impl Relation for Apart<'_> {
 
     #[inline(always)]
     fn start<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> (Start<f64>, [f64; 2]) {
-        let n = self.facing.unwrap_or_else(|| facing(simd, a, b, relative));
-        meeting(simd, a, b, relative, n, None)
+        meeting(simd, a, b, relative, facing(simd, a, b, relative), None)
     }
 
     #[inline(always)]
@@ -110,6 +117,13 @@ impl Relation for Apart<'_> {
     #[inline(always)]
     fn decided_by(&self, distance: f64, width: f64) -> bool {
         self.goal.met(distance - width, distance + width)
+    }
+
+    #[inline(always)]
+    fn parted(&self, bodies: (&Body, &Body), relative: &Relative<f64>, n: Option<(V3<f64>, f64)>) -> Option<f64> {
+        let far = self.goal.far;
+        let seems = n.map_or(f64::MAX, |(_, apart)| apart) > far;
+        if seems { parted_beyond(far, bodies, relative, n.map(|(n, _)| n)) } else { None }
     }
 
     #[inline(always)]
@@ -126,6 +140,19 @@ impl Relation for Apart<'_> {
             Verdict::Wide
         }
     }
+}
+
+/// A lower bound of the distance by planes across n, or across the line between the interior
+/// points, if it is above `far` metres.
+// Compiled once, and not with each search that asks.
+#[inline(never)]
+fn parted_beyond(far: f64, (a, b): (&Body, &Body), relative: &Relative<f64>, n: Option<V3<f64>>) -> Option<f64> {
+    if !runs(Stage::Planes) {
+        return None;
+    }
+    let separation = Separation::seen(a, b, relative);
+    let lower = separation.along(&n.map_or(*separation.between(), Vector3::from));
+    (lower > far).then_some(lower)
 }
 
 /// The signed distance near a direction: x - y along the normal, one way or the other, so that

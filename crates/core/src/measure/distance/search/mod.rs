@@ -312,8 +312,7 @@ impl<'a> Search<'a> {
             return;
         }
         let (pose_a, pose_b) = pair.poses();
-        let relation =
-            Apart { pose_a, pose_b, goal: self.goals.0, tolerance: self.tolerance * pair.unit(), facing: None };
+        let relation = Apart { pose_a, pose_b, goal: self.goals.0, tolerance: self.tolerance * pair.unit() };
         let from = Some(Start { x: self.centered(x), y: self.centered(y), n: (*n).into() });
         let most = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
         match dispatch(Seek { a: pair.a.body, b: pair.b.body, relation, from, most, options }) {

@@ -142,8 +142,6 @@ pub(in crate::measure) struct EdgeQuery<'a> {
     pub(in crate::measure) trace: Option<&'a EdgeTrace>,
     /// Where to start without one; else where the outlines are nearest.
     pub(in crate::measure) start: Option<Start<f64>>,
-    /// About the normal from B to A there, A's frame, if it is known.
-    pub(in crate::measure) facing: Option<V3<f64>>,
 }
 
 /// Trial points in the query frame, the basis whose third vector is the trial normal, and the
@@ -167,11 +165,15 @@ impl WithSimd for EdgeQuery<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let Self { a, pose_a, b, pose_b, goal, tolerance, options, trace, start, facing } = self;
-        let relation = Apart { pose_a, pose_b, goal, tolerance, facing };
+        let Self { a, pose_a, b, pose_b, goal, tolerance, options, trace, start } = self;
+        let relation = Apart { pose_a, pose_b, goal, tolerance };
         let relative = relation.relative(simd, a, b);
         let sides = (Side::at_home(simd, a, 0), Side::away(b, 0, &relative));
         let solver = Solver { sides, relation, options, limits: limits(a, b) };
+        let parted = if trace.is_none() { relation.parted((a, b), &relative, None) } else { None };
+        if parted.is_some() {
+            return Err(Lost { parted, ..Lost::after(0) });
+        }
         let mut rounds = 0;
         let mut following = match trace {
             Some(trace) => solver.follow(simd, &relative, trace),
@@ -186,7 +188,12 @@ impl WithSimd for EdgeQuery<'_> {
                         Some(start) => start,
                         None => relation.start(simd, a, b, &relative).0,
                     };
-                    if dot::<S, f64>(start.n, subtract::<S, f64>(start.x, start.y)) < 0.0 {
+                    let height = dot::<S, f64>(start.n, subtract::<S, f64>(start.x, start.y));
+                    let parted = relation.parted((a, b), &relative, Some((start.n, height)));
+                    if parted.is_some() {
+                        return Err(Lost { parted, ..Lost::after(rounds) });
+                    }
+                    if height < 0.0 {
                         let common = CommonPoint::between(simd, (&solver.sides.0, &solver.sides.1), start.x, start.y);
                         if common.is_some() {
                             return Err(Lost { common, ..Lost::after(rounds + 1) });
@@ -210,9 +217,7 @@ impl WithSimd for EdgeQuery<'_> {
                     }
                     return Ok(proven);
                 }
-                Err(common) if common.is_some() || predicted.is_none() => {
-                    return Err(Lost { common, ..Lost::after(rounds) });
-                }
+                Err(lost) if lost.common.is_some() || lost.parted.is_some() || predicted.is_none() => return Err(lost),
                 Err(_) => {}
             }
         }
@@ -261,7 +266,7 @@ impl Solver<'_> {
     /// Newton's method until the bracket is narrow.
     ///
     /// # Errors
-    /// There is no answer; a point that lies in both bodies, or seems to, if one was found.
+    /// What is left.
     // There is no allocation in a solve.
     #[allow(clippy::result_large_err)]
     #[inline(always)]
@@ -271,12 +276,12 @@ impl Solver<'_> {
         relative: &Relative<f64>,
         mut at: Iterate,
         rounds: &mut u32,
-    ) -> Result<EdgeProven, Option<CommonPoint>> {
+    ) -> Result<EdgeProven, Lost> {
         let (side_a, side_b) = &self.sides;
         let mut contacts = 0;
         for _ in 0..MAX_ROUNDS {
             if self.options.exhausted(*rounds) {
-                return Err(None);
+                return Err(Lost::after(*rounds));
             }
             *rounds += 1;
             let (of_a, inside_a) = Evaluated::new(simd, side_a, at.x);
@@ -287,7 +292,7 @@ impl Solver<'_> {
                 at.x = side_a.with_active(highest_a).brought_near(simd, at.x, of_a.jets[highest_a].value);
                 at.y = side_b.with_active(highest_b).brought_near(simd, at.y, of_b.jets[highest_b].value);
                 if !at.x.iter().chain(&at.y).all(|entry| entry.is_finite()) {
-                    return Err(None);
+                    return Err(Lost::after(*rounds));
                 }
                 continue;
             }
@@ -306,31 +311,43 @@ impl Solver<'_> {
             let (bent_a, bent_b) = (active_a.sum(simd, &of_a).hessian, active_b.sum(simd, &of_b).hessian);
             let linear_a = Linearized::new(simd, of_a.iter(), (active_a, &bent_a), &local_a);
             let linear_b = Linearized::new(simd, of_b.iter(), (active_b, &bent_b), &local_b);
-            let Some(mut found) = self.step(simd, &linear_a, &linear_b, difference) else { return Err(None) };
+            let Some(mut found) = self.step(simd, &linear_a, &linear_b, difference) else {
+                return Err(Lost::after(*rounds));
+            };
             let prospect = Prospect::new(simd, &self.relation, &found.step, difference[2], self.limits);
             if prospect == Prospect::Common {
                 let x = moved::<S, f64>(at.x, found.step.dx, &at.frame);
                 let y = moved::<S, f64>(at.y, found.step.dy, &at.frame);
                 let common = CommonPoint::proven_between(simd, (side_a, side_b), x, y);
                 if common.is_some() {
-                    return Err(common);
+                    return Err(Lost { common, ..Lost::after(*rounds) });
                 }
             }
             let longest = worth_a_bracket(self.limits).map(|limit| WORTH_A_PROOF * limit);
-            if prospect == Prospect::Decided || found.step.within(simd, longest) {
+            let near = found.step.within(simd, longest);
+            if prospect == Prospect::Decided && !near {
+                let Step { dx, dy, dn } = found.step;
+                let n = moved::<S, f64>(at.frame[2], [dn[0], dn[1], 0.0], &at.frame);
+                let height = difference[2] + dx[2] - dy[2];
+                let parted = self.relation.parted((side_a.body(), side_b.body()), relative, Some((n, height)));
+                if parted.is_some() {
+                    return Err(Lost { parted, ..Lost::after(*rounds) });
+                }
+            }
+            if prospect == Prospect::Decided || near {
                 match self.prove(simd, relative, &at, &found, [(&of_a, &local_a), (&of_b, &local_b)], difference) {
                     Ok(proven) => return Ok(EdgeProven { rounds: *rounds, ..proven }),
                     Err(touching) => contacts += u32::from(touching),
                 }
                 if contacts >= MOST_CONTACTS {
-                    return Err(None);
+                    return Err(Lost::after(*rounds));
                 }
             }
             let step = &mut found.step;
             let of_x = side_a.relative_square(simd, &local_a, step.dx);
             let length = of_x.max(side_b.relative_square(simd, &local_b, step.dy)).sqrt();
             if !length.is_finite() {
-                return Err(None);
+                return Err(Lost::after(*rounds));
             }
             if length > LONGEST_MOVE {
                 step.shorten(LONGEST_MOVE / length);
@@ -340,7 +357,7 @@ impl Solver<'_> {
             at.frame = basis(simd, moved::<S, f64>(at.frame[2], [step.dn[0], step.dn[1], 0.0], &at.frame));
             at.active = found.active;
         }
-        Err(None)
+        Err(Lost::after(*rounds))
     }
 
     /// Newton's step from points with `difference = x - y` in the basis; none if the quadratic

@@ -83,6 +83,11 @@ impl<A: Projectable, B: Projectable> ShapePair<A, B> {
     /// From a point of A in its frame on until the bracket is as narrow as this, metres, or no step
     /// is left.
     pub(super) fn solve(&self, start: V3<f64>, tolerance: f64, options: &Options<'_>) -> ShapeProven {
+        self.solve_until(start, [tolerance, f64::INFINITY], options)
+    }
+
+    /// The same, or until they are known to be farther apart than `far` metres.
+    fn solve_until(&self, start: V3<f64>, [tolerance, far]: [f64; 2], options: &Options<'_>) -> ShapeProven {
         let mut own = self.a.project(Scalar, start);
         let mut best = ShapeProven {
             lower: 0.0,
@@ -117,6 +122,9 @@ impl<A: Projectable, B: Projectable> ShapePair<A, B> {
                 if lower > best.lower || best.n == [0.0; 3] && !lower.is_nan() {
                     (best.lower, best.n) = (lower.max(0.0), n);
                 }
+            }
+            if best.lower > far {
+                break;
             }
             if best.upper - best.lower <= tolerance {
                 let way = subtract::<Scalar, f64>(best.x, best.y);
@@ -164,7 +172,8 @@ impl<A: Projectable, B: Projectable> ShapePair<A, B> {
         let size = self.a.reach() + self.b.reach();
         let by = 4.0 * self.displacement + MARGIN * size;
         let smaller = ShapePair { a: self.a.shrunk(by), b: self.b.shrunk(by), ..*self };
-        let found = smaller.solve(start, 0.5 * by, options);
+        // What they were made smaller by takes less than this of their distance.
+        let found = smaller.solve_until(start, [0.5 * by, 8.0 * by], options);
         // Points and segments have no inside: what is near them has to be in the other set.
         let (of_a, of_b) = (self.a.thinnest(), self.b.thinnest());
         let fits = |thinnest: f64| thinnest > 2.0 * by || thinnest == 0.0;
