@@ -4,7 +4,9 @@ use crate::draw::{Draw, Style};
 use crate::measures::{Answer, MEASURES};
 use crate::tally::{Check, Iterations, Tally, Worst};
 use sublevel::body::Body;
-use sublevel::measure::{Distance, MAX_ITERATIONS, Options, Pose, WarmStart, distance_batch};
+use sublevel::measure::{
+    Decision, Distance, MAX_ITERATIONS, Options, Pose, WarmStart, distance_batch, nearer_than, overlap,
+};
 use sublevel_testkit::random::{Seeded, pose};
 
 /// Solves of one block.
@@ -12,6 +14,9 @@ pub(crate) const SOLVES: u64 = 10_000;
 
 /// Solves of one pair before the next is drawn.
 const ROUND: u64 = 250;
+
+/// Thresholds of decisions, in parts of the distance.
+const THRESHOLDS: [f64; 5] = [0.5, 0.999, 1.0, 1.001, 2.0];
 
 /// Poses of one batch.
 const BATCH: usize = 64;
@@ -95,6 +100,9 @@ impl Round<'_> {
             }
             let answer = (MEASURES[measure].solve)((a, &pose_a), (b, &pose_b), &options, &mut warm);
             self.count(&site, start, &answer);
+            if let Answer::Distance(found) = &answer {
+                self.decide(&site, found, &warm);
+            }
             // Every hinted answer off a trajectory, and every tenth on one, is compared with a cold
             // one.
             if hinted && (!continues || self.query.is_multiple_of(10)) {
@@ -152,6 +160,37 @@ impl Round<'_> {
         self.solved(site, Start::Cold, &cold);
         let ((l, u), (m, v)) = (answer.bracket(), cold.bracket());
         self.tally.check(Check::Meet, l <= v && m <= u, (site.block, site.query), || site.tell(&cold));
+    }
+
+    /// Asks which side of contact, and of a distance near the one that was found, from the hint of
+    /// that and from nothing but the poses.
+    fn decide(&mut self, site: &Site<'_>, found: &Distance, warm: &WarmStart) {
+        let (p, q) = ((site.a, site.pose_a), (site.b, site.pose_b));
+        let (options, mut hint) = (Options::default(), *warm);
+        let cold = self.query.is_multiple_of(2);
+        if cold {
+            hint = WarmStart::default();
+        }
+        let contact = overlap(p.0, p.1, q.0, q.1, &options, &mut hint);
+        if cold {
+            hint = WarmStart::default();
+        }
+        let threshold = found.upper * THRESHOLDS[(*self.query / 2) as usize % THRESHOLDS.len()];
+        let nearer = nearer_than(p.0, p.1, q.0, q.1, threshold, &options, &mut hint).expect("a distance");
+        let width = Options::default().accuracy() * site.a.circumscribed().radius.min(site.b.circumscribed().radius);
+        let open = |lower: f64, upper: f64| upper - lower <= width * (1.0 + 1e-12);
+        let agree = match contact {
+            Decision::Yes => found.lower <= 0.0,
+            Decision::No => found.upper > 0.0,
+            Decision::Undecided { lower, upper } => lower <= 0.0 && open(lower, upper),
+        } && match nearer {
+            Decision::Yes => found.lower < threshold,
+            Decision::No => found.upper >= threshold,
+            Decision::Undecided { lower, upper } => lower < threshold && threshold <= upper && open(lower, upper),
+        };
+        let told =
+            || format!("{contact:?}, below {threshold:e} m {nearer:?}: {}", site.tell(&Answer::Distance(*found)));
+        self.tally.check(Check::Decision, agree, (site.block, site.query), told);
     }
 
     fn solved(&mut self, site: &Site<'_>, start: Start, answer: &Answer) {

@@ -90,12 +90,26 @@ impl Problem<'_> {
     #[cold]
     fn beyond_newton(&self, of_body: At<'_, Body>, mut spent: u32, warm: &mut WarmStart) -> CapsuleDistance {
         let size = self.size(of_body);
+        // From nothing but the poses, too: where rounding ends a search depends on its start.
+        let starts = [*warm, WarmStart::default()];
+        let count = if matches!(warm.hint, Hint::Cold) { 1 } else { 2 };
         for floor in ROUNDING_FLOORS.map(|floor| floor * size) {
-            if floor > self.tolerance && self.goal.is_narrow() && !self.options.exhausted(spent) {
-                match self.by_newton(of_body, floor, &self.options.after(spent), warm) {
-                    Ok(found) => return CapsuleDistance { iterations: found.iterations + spent, ..found },
-                    Err(more) => spent += more,
+            let mut best: Option<CapsuleDistance> = None;
+            for mut start in starts.into_iter().take(count) {
+                if floor > self.tolerance && self.goal.is_narrow() && !self.options.exhausted(spent) {
+                    match self.by_newton(of_body, floor, &self.options.after(spent), &mut start) {
+                        Ok(found) => {
+                            spent += found.iterations;
+                            if best.is_none_or(|best| found.upper - found.lower < best.upper - best.lower) {
+                                (best, *warm) = (Some(found), start);
+                            }
+                        }
+                        Err(more) => spent += more,
+                    }
                 }
+            }
+            if let Some(found) = best {
+                return CapsuleDistance { iterations: spent, ..found };
             }
         }
         self.along_axis(of_body, spent, warm)

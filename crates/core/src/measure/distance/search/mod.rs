@@ -283,10 +283,24 @@ impl<'a> Search<'a> {
             let (v, n) = ((self.x + self.y) * 0.5, self.n);
             self.deepest(&v, &n);
         }
+        if unsure && !self.decided() && self.tried[0].is_none() {
+            // No lower bound was found anywhere: at the deepest point there may be one.
+            self.tried[0] = self.at_witnesses();
+        }
         if !self.ended() || unsure && !self.decided() {
             self.refine();
         }
         self.align();
+    }
+
+    /// The best points so far as an iterate, each on the surface of its body as far as doubles show
+    /// that; none where the active constraints do not push along the normal.
+    fn at_witnesses(&self) -> Option<DistanceNewton> {
+        let Self { pair, x, y, n, .. } = *self;
+        let (mut a, mut b) = (Active::near(&pair.a, &x, &-n), Active::near(&pair.b, &y, &n));
+        let (x, y) = (on_surface(&pair.a, &a, x), on_surface(&pair.b, &b, y));
+        let fits = a.fit(&pair.a, &x, &-n) && b.fit(&pair.b, &y, &n);
+        fits.then(|| DistanceNewton { x, y, distance: n.dot(&(x - y)), n, a, b })
     }
 
     /// Goes on to the normal of the solution: a bracket that is narrow determines it to about the
@@ -393,4 +407,13 @@ impl<'a> Search<'a> {
             }
         }
     }
+}
+
+/// Where the only active constraint of a body is 1, one Newton step along its gradient from a point
+/// near that; the point itself where there are several.
+fn on_surface(body: &Posed<'_>, active: &Active, v: Vector3<f64>) -> Vector3<f64> {
+    let Some(i) = active.single() else { return v };
+    let sample = body.sample(i.into(), &v);
+    let gradient = sample.gradient();
+    v + gradient * ((1.0 - sample.value()) / gradient.norm_squared())
 }
