@@ -64,6 +64,23 @@ fn both_solvers_agree_at_degree_eight() {
     both_agree(&meshes()[..if all { 19 } else { 1 }], 8);
 }
 
+/// The points of a torus lie on a quartic, so that their moment matrix is singular at degree 8
+/// whatever their weights.
+#[test]
+fn points_on_a_quartic_are_fitted_by_both() {
+    let turn = |k: usize, of: usize| std::f64::consts::TAU * k as f64 / of as f64;
+    let at = |u: f64, v: f64| Vector3::new((2.0 + v.cos()) * u.cos(), (2.0 + v.cos()) * u.sin(), v.sin());
+    let points: Vec<_> = (0..20).flat_map(|i| (0..12).map(move |j| at(turn(i, 20), turn(j, 12)))).collect();
+    let [structured, clarabel] = [Solver::Structured, Solver::Clarabel].map(|solver| {
+        let made = by(solver, 8, &points).unwrap_or_else(|error| panic!("{solver}: {error}"));
+        made.body.prove_contains(&points).expect("proven");
+        made.report
+    });
+    let (objective, volume) =
+        (clarabel.objective_value - structured.objective_value, clarabel.volume_m3 / structured.volume_m3 - 1.0);
+    assert!(objective.abs() < 1e-4 && volume.abs() < 1e-4, "{objective:e} {volume:e}");
+}
+
 /// The catalogue's kinds of degenerate clouds: a body, or an error that names what is wrong.
 #[test]
 fn degenerate_clouds_are_certified_or_refused_by_name() {

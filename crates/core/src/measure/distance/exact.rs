@@ -174,7 +174,7 @@ pub(super) fn of_shapes(
     let point_a = pose_a.rotation().inverse_transform_vector(&(witness_a - pose_a.translation()));
     *warm = Hint::Shapes { x_a: point_a }.into();
     let answer = Distance {
-        status: Status::Converged,
+        status: Status::of(upper.max(0.0) - lower.max(0.0) <= tolerance),
         lower: lower.max(0.0),
         upper: upper.max(0.0),
         witness_a,

@@ -292,3 +292,24 @@ fn bricks_and_cans_on_a_table_are_settled_alone() {
     println!("bricks and cans on a table: {share:.1} % solved alone");
     assert!(share > 95.0, "{share}");
 }
+
+/// Thousands of sizes apart, where rounding is about as wide as the accuracy: the status says
+/// whether the bracket is as narrow as asked for.
+#[test]
+fn shapes_far_apart_say_whether_they_are_narrow() {
+    let (mut narrow, mut wide) = (0, 0);
+    for seed in 0..4000 {
+        let mut random = Seeded(63_000 + seed);
+        let (a, b) = (shape(&mut random), shape(&mut random));
+        let small = a.circumscribed().radius.min(b.circumscribed().radius);
+        let far = small * 10_f64.powf(4.0 + 1.5 * random.signed());
+        let (pose_a, pose_b) = (random_pose(&mut random, small), random_pose(&mut random, far));
+        let options = Options::default();
+        let found = distance(&a, &pose_a, &b, &pose_b, &options, &mut WarmStart::default());
+        let is_narrow = found.upper - found.lower <= options.accuracy() * small;
+        assert_eq!(found.status == Status::Converged, is_narrow, "seed {seed}: {found:?}");
+        *(if is_narrow { &mut narrow } else { &mut wide }) += 1;
+    }
+    println!("{narrow} narrow, {wide} wide");
+    assert!(narrow > 1000, "{narrow}");
+}

@@ -299,6 +299,8 @@ impl<'a> Search<'a> {
         let Self { pair, x, y, n, .. } = *self;
         let (mut a, mut b) = (Active::near(&pair.a, &x, &-n), Active::near(&pair.b, &y, &n));
         let (x, y) = (on_surface(&pair.a, &a, x), on_surface(&pair.b, &b, y));
+        // Points of surfaces that cross may both be outside of the other body.
+        let (x, y) = if n.dot(&(x - y)) < 0.0 { ((x + y) * 0.5, (x + y) * 0.5) } else { (x, y) };
         let fits = a.fit(&pair.a, &x, &-n) && b.fit(&pair.b, &y, &n);
         fits.then(|| DistanceNewton { x, y, distance: n.dot(&(x - y)), n, a, b })
     }

@@ -241,7 +241,8 @@ impl Problem<'_> {
     fn apart(&self, found: &ShapeProven, rotation: &Matrix3<f64>, (radius_a, radius_b): (f64, f64)) -> ShapeDistance {
         let (form_b, pose_b) = self.of_b;
         let radius = radius_a + radius_b;
-        let rounding = f64::EPSILON * (radius + found.upper);
+        // Without radii nothing is subtracted that rounds.
+        let rounding = if radius > 0.0 { f64::EPSILON * (radius + found.upper) } else { 0.0 };
         let way = subtract::<Scalar, f64>(found.x, found.y);
         let share = if found.upper > 0.0 { (radius_b / found.upper).min(1.0) } else { 0.0 };
         let x = add_scaled::<Scalar, f64>(found.x, -radius_a, found.n);
