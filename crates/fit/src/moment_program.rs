@@ -303,13 +303,16 @@ impl<'a> MomentProgram<'a> {
         let nothing = DVector::zeros(hessian.keys);
         // Points on a surface of low degree, as those of a torus, have a singular moment matrix
         // whatever their weights: it is the functional s that makes that of the solution definite.
-        // Where rounding or the optimum itself leaves that one singular, there are the points.
-        let inside_form = interior_form(problem.structure, &moments(&y, &s), 1.0)
-            .or_else(|| interior_form(problem.structure, &(moments(&inside, &nothing) / rows), rows))
+        // Where rounding or the optimum itself leaves that one singular or nearly so, there are the
+        // points.
+        let inside_forms = [
+            interior_form(problem.structure, &moments(&y, &s), 1.0),
+            interior_form(problem.structure, &(moments(&inside, &nothing) / rows), rows),
             // The solver's point has to be feasible as it is.
-            .unwrap_or(nothing);
-        let feasible = |share: f64| {
-            let form = &s + &inside_form * share;
+            Some(nothing),
+        ];
+        let feasible = |inside_form: &DVector<f64>, share: f64| {
+            let form = &s + inside_form * share;
             Cholesky::new(hessian.spread(&form))?;
             let of_source = |(source, y): (&Source, &DVector<f64>)| source.feasible(y, share);
             let of_sources = sources.iter().zip(&y).map(of_source).collect::<Option<Vec<_>>>()?;
@@ -317,7 +320,8 @@ impl<'a> MomentProgram<'a> {
             Cholesky::new(gram.spread(&moments))?;
             Some((of_sources, form, moments))
         };
-        let (of_sources, form, moments) = shares().find_map(feasible)?;
+        let of_form = |form: &DVector<f64>| shares().find_map(|share| feasible(form, share));
+        let (of_sources, form, moments) = inside_forms.iter().flatten().find_map(of_form)?;
         let cost: f64 = sources.iter().zip(&of_sources).map(|(source, y)| source.cost_with_margin().dot(y)).sum();
         let cost = cost + problem.form_cost().dot(&form);
         problem.spectral.best_multiple(&problem.measured(&moments, &form), cost)

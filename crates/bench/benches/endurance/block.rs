@@ -190,7 +190,7 @@ impl Round<'_> {
         };
         let told =
             || format!("{contact:?}, below {threshold:e} m {nearer:?}: {}", site.tell(&Answer::Distance(*found)));
-        self.tally.check(Check::Decision, agree, (site.block, site.query), told);
+        self.tally.check(Check::Decision, agree, (site.block, site.query), detail);
     }
 
     fn solved(&mut self, site: &Site<'_>, start: Start, answer: &Answer) {

@@ -233,6 +233,34 @@ mod tests {
         assert!(met[0] > 3000 && met[1] > 3000 && met[2] < 3000, "{met:?}");
     }
 
+    /// Close to contact planes across the gap that a search has found spare it evaluations.
+    #[test]
+    fn decisions_near_contact_take_fewer_evaluations_than_distances() {
+        let (mut of_distances, mut of_decisions, mut count) = (0, 0, 0);
+        for seed in 0..1500 {
+            let mut random = Seeded(33_000 + seed);
+            let bodies = zoo(&mut Seeded(seed % 6));
+            let smooth: Vec<_> = bodies.iter().filter(|body| body.is_smooth()).collect();
+            let [a, b] = [(); 2].map(|()| smooth[random.next() as usize % smooth.len()]);
+            let reach = a.circumscribed().radius + b.circumscribed().radius;
+            let (pose_a, apart) = (random_pose(&mut random, 0.1), random_pose(&mut random, 2.5 * reach));
+            let options = Options::default();
+            let measured = |pose_b: &Pose| distance(a, &pose_a, b, pose_b, &options, &mut WarmStart::default());
+            let found = measured(&apart);
+            let Some(n) = found.normal else { continue };
+            let gap = 0.01 * reach * (0.1 + random.positive());
+            let near = apart.with_translation(apart.translation() + n * (found.upper - gap));
+            let goal = StopCriterion::compare(0.0);
+            let decided = distance_until((a, &pose_a), (b, &near), &goal, &options, &mut WarmStart::default());
+            assert!(decided.lower > 0.0, "seed {seed}: {decided:?}");
+            of_distances += measured(&near).iterations;
+            of_decisions += decided.iterations;
+            count += 1;
+        }
+        println!("{of_decisions} evaluations of decisions, {of_distances} of distances, {count} pairs");
+        assert!(count > 1000 && 4 * of_decisions < 3 * of_distances, "{of_decisions} of {of_distances}");
+    }
+
     #[test]
     fn thresholds_are_checked() {
         let ball = Body::ball("ball", Vector3::zeros(), 1.0).unwrap();

@@ -5,7 +5,7 @@
 
 mod ablation;
 mod compounds;
-mod edges;
+pub(super) mod edges;
 mod exact_shapes;
 mod stages;
 mod tolerances;

@@ -212,7 +212,7 @@ impl Rounds for Batch<'_> {
         near: &mut Waiting,
     ) {
         let relative: Relative<N> = self.relative(simd, &group.pose);
-        let (side_a, side_b) = (Side::at_home(simd, self.a, 0), Side::away(self.b, 0, &relative));
+        let (side_a, side_b) = (Side::at_home(simd, self.a, 0), Side::away(simd, self.b, 0, &relative));
         let limits = limits(self.a, self.b);
         let (mut at, overlapping) = if fresh {
             let n = facing(simd, self.a, self.b, &relative);
@@ -254,7 +254,7 @@ impl Rounds for Batch<'_> {
     fn prove<S: Simd>(&mut self, simd: S, mut group: Group<MAX_LANES>, waiting: &mut Waiting) {
         let splat = |value: f64| Lanes::<S>::splat(simd, value);
         let relative: Relative<Lanes<S>> = self.relative(simd, &group.pose);
-        let (side_a, side_b) = (Side::at_home(simd, self.a, 0), Side::away(self.b, 0, &relative));
+        let (side_a, side_b) = (Side::at_home(simd, self.a, 0), Side::away(simd, self.b, 0, &relative));
         let limits = limits(self.a, self.b);
         let worth = worth_a_bracket(limits);
         let mut at = Iterate::load(simd, &group);

@@ -89,7 +89,7 @@ impl<P: LaneSet> Rounds for ShapeBatch<'_, P> {
     ) {
         let body = self.smooth();
         let relative: Relative<N> = self.relative(simd, &group.pose);
-        let side = Side::away(body, 0, &relative);
+        let side = Side::away(simd, body, 0, &relative);
         let (mut x, mut open) = if fresh { self.begin(simd, body, &relative) } else { resumed(simd, &group) };
         let rounds = if fresh { COARSE } else { 1 };
         let mut square = N::splat(simd, f64::NAN);
@@ -116,7 +116,7 @@ impl<P: LaneSet> Rounds for ShapeBatch<'_, P> {
     fn prove<S: Simd>(&mut self, simd: S, mut group: Group<MAX_LANES>, waiting: &mut Waiting) {
         let body = self.smooth();
         let relative: Relative<Lanes<S>> = self.relative(simd, &group.pose);
-        let side = Side::away(body, 0, &relative);
+        let side = Side::away(simd, body, 0, &relative);
         let (x, _) = resumed(simd, &group);
         let here = self.linearize(simd, &side, x);
         let worth = here.square.le(Lanes::<S>::splat(simd, WORTH_A_BRACKET_SQUARED));

@@ -56,8 +56,10 @@ impl<'a> Separation<'a> {
 #[cfg(test)]
 mod tests {
     use super::Separation;
+    use crate::body::Body;
     use crate::measure::tests::{random_pose, zoo};
-    use crate::measure::{Options, WarmStart, distance};
+    use crate::measure::{Options, Pose, WarmStart, distance};
+    use nalgebra::{UnitQuaternion, Vector3};
     use sublevel_testkit::Seeded;
 
     #[test]
@@ -72,21 +74,58 @@ mod tests {
             let reach = a.circumscribed().radius + b.circumscribed().radius;
             let far = reach * 3_f64.powf(random.signed());
             let (pose_a, pose_b) = (random_pose(&mut random, 0.1), random_pose(&mut random, far));
-            let truth = distance(a, &pose_a, b, &pose_b, &Options::default(), &mut WarmStart::default());
-            let planes = Separation::new((a, &pose_a), (b, &pose_b));
-            let own = |n| pose_a.rotation().inverse_transform_vector(&n);
-            for _ in 0..20 {
-                let n = random.unit() * (1.0 + random.signed());
-                assert!(planes.along(&own(n)) <= truth.upper, "seed {seed}");
-            }
-            if let Some(n) = truth.normal.filter(|_| truth.lower > 0.0) {
-                let bound = planes.along(&own(n));
-                assert!(bound <= truth.upper, "seed {seed}");
-                assert!(planes.along(&own(n * 1.5)) <= truth.upper, "seed {seed}");
-                count += 1;
-                near += u32::from(truth.upper - bound < 0.02 * reach);
-            }
+            let Some((bound, upper)) = bounded((a, &pose_a), (b, &pose_b), &mut random, seed) else { continue };
+            count += 1;
+            near += u32::from(upper - bound < 0.02 * reach);
         }
         assert!(count > 800 && f64::from(near) > 0.95 * f64::from(count), "{near} of {count}");
+    }
+
+    /// Bodies far from the origins of their frames, poses far from that of the world, and both, so
+    /// that the rounding of all of these is larger than what a table of heights adds.
+    #[test]
+    fn planes_bound_the_distance_far_from_the_origins() {
+        let zoos: Vec<_> = (0..6).map(|seed| zoo(&mut Seeded(seed))).collect();
+        let mut count = 0;
+        for seed in 0..1200 {
+            let mut random = Seeded(59_000 + seed);
+            let bodies = &zoos[(seed % 6) as usize];
+            let (a, b) =
+                (&bodies[random.next() as usize % bodies.len()], &bodies[random.next() as usize % bodies.len()]);
+            let reach = a.circumscribed().radius + b.circumscribed().radius;
+            let mut away = |is_far: bool| random.unit() * if is_far { 10_f64.powf(5.0 + random.signed()) } else { 0.0 };
+            let (of_a, of_b, of_both) = (away(seed % 2 == 0), away(seed / 2 % 2 == 0), away(seed / 4 % 2 == 0));
+            let moved = |body: &Body, by| body.moved(&UnitQuaternion::identity(), &by).expect("a body");
+            let (a, b) = (moved(a, of_a), moved(b, of_b));
+            // Where the bodies are a few reaches from each other.
+            let turned = [random_pose(&mut random, 0.0), random_pose(&mut random, 0.0)];
+            let centers = [of_both, of_both + random.unit() * (reach * 3_f64.powf(random.signed()))];
+            let place = |turned: &Pose, of_body: Vector3<f64>, center: Vector3<f64>| {
+                turned.with_translation(center - turned.transform_direction(&of_body))
+            };
+            let (pose_a, pose_b) = (place(&turned[0], of_a, centers[0]), place(&turned[1], of_b, centers[1]));
+            count += u32::from(bounded((&a, &pose_a), (&b, &pose_b), &mut random, seed).is_some());
+        }
+        assert!(count > 400, "{count}");
+    }
+
+    /// No plane shows more than the distance; what that across its normal shows, and the distance.
+    fn bounded(
+        (a, pose_a): (&Body, &Pose),
+        (b, pose_b): (&Body, &Pose),
+        random: &mut Seeded,
+        seed: u64,
+    ) -> Option<(f64, f64)> {
+        let truth = distance(a, pose_a, b, pose_b, &Options::default(), &mut WarmStart::default());
+        let planes = Separation::new((a, pose_a), (b, pose_b));
+        let along = |n: Vector3<f64>| planes.along(&pose_a.rotation().inverse_transform_vector(&n));
+        for _ in 0..20 {
+            let n = random.unit() * (1.0 + random.signed());
+            assert!(along(n) <= truth.upper, "seed {seed}");
+        }
+        let n = truth.normal.filter(|_| truth.lower > 0.0)?;
+        let bound = along(n);
+        assert!(bound <= truth.upper && along(n * 1.5) <= truth.upper, "seed {seed}");
+        Some((bound, truth.upper))
     }
 }

@@ -4,10 +4,11 @@
 //! is `d - radius`: no translation shorter than the difference takes them apart, or brings them
 //! into contact, for a ball adds its radius to the support function along every direction. Of a
 //! smooth body it is found by Newton's method ([`super::solver::exact_shape`]), of a box or a
-//! cylinder in the same way with their closed forms, of a ball or another capsule in closed form.
-//! Of others the distance of the segment's points, a convex function of the place along it, has its
-//! least value between the last two places where it fell and where it rose; the planes that prove
-//! the distances there bound it from below.
+//! cylinder in the same way with their closed forms, of a ball or another capsule in closed form,
+//! of a body with several constraints by the projection of the segment on it
+//! ([`super::solver::projection`]). Where none of these proves it, the distance of the segment's
+//! points, a convex function of the place along it, has its least value between the last two places
+//! where it fell and where it rose; the planes that prove the distances there bound it from below.
 
 mod answer;
 mod axes;

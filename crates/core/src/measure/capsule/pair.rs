@@ -1,4 +1,5 @@
-//! The signed distance of one body from a capsule: by closed forms, else along its axis.
+//! The signed distance of one body from a capsule: by closed forms, else by the projection of its
+//! axis on the body, and where rounding ends that along the axis.
 
 use super::answer::CapsuleDistance;
 use super::axes::{Axis, of_axes};
@@ -92,24 +93,16 @@ impl Problem<'_> {
         let size = self.size(of_body);
         // From nothing but the poses, too: where rounding ends a search depends on its start.
         let starts = [*warm, WarmStart::default()];
-        let count = if matches!(warm.hint, Hint::Cold) { 1 } else { 2 };
+        let starts = if matches!(warm.hint, Hint::Cold) { &starts[..1] } else { &starts };
         for floor in ROUNDING_FLOORS.map(|floor| floor * size) {
-            let mut best: Option<CapsuleDistance> = None;
-            for mut start in starts.into_iter().take(count) {
+            for start in starts {
                 if floor > self.tolerance && self.goal.is_narrow() && !self.options.exhausted(spent) {
-                    match self.by_newton(of_body, floor, &self.options.after(spent), &mut start) {
-                        Ok(found) => {
-                            spent += found.iterations;
-                            if best.is_none_or(|best| found.upper - found.lower < best.upper - best.lower) {
-                                (best, *warm) = (Some(found), start);
-                            }
-                        }
+                    *warm = *start;
+                    match self.by_newton(of_body, floor, &self.options.after(spent), warm) {
+                        Ok(found) => return CapsuleDistance { iterations: found.iterations + spent, ..found },
                         Err(more) => spent += more,
                     }
                 }
-            }
-            if let Some(found) = best {
-                return CapsuleDistance { iterations: spent, ..found };
             }
         }
         self.along_axis(of_body, spent, warm)
@@ -204,18 +197,21 @@ impl Problem<'_> {
         let pose = pose.with_translation(Vector3::zeros());
         let wants_normal = self.goal.wants_answer();
         let projection = if wants_normal { Projection::new(body, &pose) } else { Projection::rough(body, &pose) };
-        let segment = Segment { center, half_axis };
-        let found = projection.to_segment(&segment, 0.5 * width, (0, options), warm);
+        let (segment, goal) = (Segment { center, half_axis }, self.goal_of_axis());
+        // The radius is subtracted with rounding.
+        let found = projection.to_segment((&segment, error), (0.5 * width, &goal), (0, options), warm);
         if found.upper == 0.0 {
-            let met = self.met(&(found.nearest + origin), found.iterations);
-            return Ok(CapsuleDistance { upper: error - self.capsule.radius_m(), ..met });
+            return Ok(self.met(&(found.nearest + origin), found.iterations));
         }
-        let (lower, upper) = (found.lower - error, found.upper + error);
-        if !(lower > 0.0 && upper - lower <= width) {
+        let is_outside = found.lower > 0.0;
+        if !(goal.met(found.lower, found.upper) || is_outside && found.upper - found.lower <= width) {
             return Err(found.iterations);
         }
         let witnesses = [found.witness + origin, found.nearest + origin];
-        Ok(self.apart([lower, upper], witnesses, -found.normal, found.iterations))
+        let answer = self.apart([found.lower, found.upper], witnesses, -found.normal, found.iterations);
+        // How deep an axis is that is not proven outside is not known.
+        let unknown = CapsuleDistance { lower: f64::NEG_INFINITY, status: Status::BracketWide, ..answer };
+        Ok(if is_outside { answer } else { unknown })
     }
 
     /// The axis as seen from the translation of a pose, for the sake of digits.
@@ -339,7 +335,7 @@ impl Problem<'_> {
         let mut best = self.to_interior_point((body, &pose), (&center, at), spent);
         // How much the distance falls along the axis where it is the best.
         let (mut slant, mut more) = (f64::INFINITY, 0);
-        for _ in 0..MAX_PLACES {
+        for _ in 0..if runs(Stage::AlongAxis) { MAX_PLACES } else { 0 } {
             if self.options.exhausted(iterations) {
                 break;
             }

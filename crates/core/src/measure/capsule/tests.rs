@@ -1,7 +1,9 @@
 use super::*;
 use crate::body::Body;
+use crate::measure::solver::stages::{Stage, asked};
+use crate::measure::tests::edges::cut;
 use crate::measure::tests::{random_pose, twisted, zoo};
-use crate::measure::{Status, Twist, distance_to_point};
+use crate::measure::{Decision, Status, Twist, distance_to_point};
 use nalgebra::Vector3;
 use sublevel_testkit::Seeded;
 
@@ -128,4 +130,69 @@ fn sizes_of_capsules_are_checked() {
         );
         assert!(found.lower <= 2.0 && 2.0 <= found.upper, "{radius} {half}: {found:?}");
     }
+}
+
+/// Beside bodies with several constraints the projection of the axis has the answer, and hardly
+/// ever the distances of single points of it.
+#[test]
+fn capsules_beside_edged_bodies_are_solved_at_once() {
+    let bodies: Vec<_> = (0..30).map(|seed| cut(&mut Seeded(seed))).collect();
+    let (mut along_axis, mut undecided, mut count) = (0, 0, 0);
+    for seed in 0..1500 {
+        let mut random = Seeded(95_000 + seed);
+        let body = &bodies[random.next() as usize % bodies.len()];
+        let size = body.circumscribed().radius;
+        let capsule = random_capsule(&mut random, size);
+        let far = (size + capsule.reach_m()) * 2_f64.powf(random.signed());
+        let (pose, capsule_pose) = (random_pose(&mut random, 0.1 * size), random_pose(&mut random, far));
+        let options = Options::default();
+        let (found, stages) = asked(&[Stage::AlongAxis], || {
+            distance_to_capsule(body, &pose, &capsule, &capsule_pose, &options, &mut WarmStart::default())
+        });
+        along_axis += u32::from(!stages.is_empty());
+        let (contact, stages) = asked(&[Stage::AlongAxis], || {
+            overlap_with_capsule(body, &pose, &capsule, &capsule_pose, &options, &mut WarmStart::default())
+        });
+        undecided += u32::from(!stages.is_empty());
+        match contact {
+            Decision::Yes => assert!(found.lower <= 0.0, "seed {seed}: {found:?}"),
+            Decision::No => assert!(found.upper > 0.0, "seed {seed}: {found:?}"),
+            Decision::Undecided { .. } => assert!(found.lower <= 0.0 && found.upper > 0.0, "seed {seed}: {found:?}"),
+        }
+        count += 1;
+    }
+    println!("along the axis {along_axis} distances and {undecided} decisions of {count}");
+    assert!(along_axis < count / 50 && undecided < count / 100, "{along_axis}, {undecided} of {count}");
+}
+
+/// A segment without a radius that leads through a body overlaps it, far from its inscribed ball,
+/// too; and axes too short for their square to be a number are points.
+#[test]
+fn segments_through_edges_overlap_and_the_shortest_are_points() {
+    let body = cut(&mut Seeded(3));
+    let segment = Capsule::new(0.0, 5.0).unwrap();
+    let (mut overlaps, mut count) = (0, 0);
+    for seed in 0..400 {
+        let mut random = Seeded(96_000 + seed);
+        // Through a point of the body near its surface.
+        let support = body.support(&random.unit()).point;
+        let inside = body.interior_point().lerp(&support, 0.99);
+        let turned = random_pose(&mut random, 0.0);
+        let pose = turned.with_translation(inside);
+        let options = Options::default();
+        let found =
+            overlap_with_capsule(&body, &Pose::identity(), &segment, &pose, &options, &mut WarmStart::default());
+        count += 1;
+        overlaps += u32::from(found == Decision::Yes);
+        assert_ne!(found, Decision::No, "seed {seed}");
+
+        let (tiny, ball) = (Capsule::new(0.1, 1e-170).unwrap(), Capsule::new(0.1, 0.0).unwrap());
+        let pose = turned.with_translation(inside + random.unit() * 4.0);
+        let [one, other] = [tiny, ball].map(|capsule| {
+            distance_to_capsule(&body, &Pose::identity(), &capsule, &pose, &options, &mut WarmStart::default())
+        });
+        assert_eq!(one.status, Status::Converged, "seed {seed}");
+        assert!((one.upper - other.upper).abs() < 1e-9 && one.iterations <= other.iterations + 2, "seed {seed}");
+    }
+    assert!(overlaps > count * 9 / 10, "{overlaps} of {count}");
 }

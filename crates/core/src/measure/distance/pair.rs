@@ -218,7 +218,7 @@ impl<'a> Query<'a> {
             return self.overlapping(&common, lost.rounds, warm);
         }
         if let Some(lower) = lost.parted {
-            return Distance { lower, upper: f64::INFINITY, iterations: lost.rounds, ..Distance::default() };
+            return parted(lower, lost.rounds);
         }
         let pair = self.pair();
         let mut search = Search::new(&pair, self.goal, self.options, lost.rounds);
@@ -308,8 +308,14 @@ impl WithSimd for StillCommon<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> Option<CommonPoint> {
         let (a, b) = (self.query.of_a.0, self.query.of_b.0);
         let relative = self.query.relation().relative(simd, a, b);
-        CommonPoint::at((&Side::at_home(simd, a, 0), &Side::away(b, 0, &relative)), self.v)
+        CommonPoint::at((&Side::at_home(simd, a, 0), &Side::away(simd, b, 0, &relative)), self.v)
     }
+}
+
+/// All that a plane between two bodies says, after so many evaluations.
+#[inline(always)]
+fn parted(lower: f64, iterations: u32) -> Distance {
+    Distance { lower, iterations, ..Distance::default() }
 }
 
 /// A start from nothing but the poses, as vectorized work.
@@ -334,6 +340,7 @@ impl WithSimd for Cold<'_> {
                 let proven = Proven { rounds: before + proven.rounds, ..proven };
                 query.answer(simd, &proven, relation.tolerance)
             }
+            Err(Lost { parted: Some(lower), rounds, .. }) => parted(lower, before + rounds),
             Err(lost) => query.search(&Lost { rounds: before + lost.rounds, ..lost }, warm),
         }
     }

@@ -47,15 +47,16 @@ pub(super) fn lower_by_planes(of_a: (&Body, &Pose), of_b: (&Body, &Pose), hint: 
         best = best.max(separation.along(n));
         best > goal.far
     };
-    // The search between two shapes finds other sides itself.
-    let sides = forms.contains(&None);
+    let both = !forms.contains(&None);
     for (form, of_form, of_other, sign) in [(forms[0], of_b, of_a, 1.0), (forms[1], of_a, of_b, -1.0)] {
         let Some(form) = form else { continue };
         let point = of_other.1.transform_point(of_other.0.interior_point());
-        let (normals, count) = normals_towards(form, of_form.1, &point, sides);
+        let (normals, count) = normals_towards(form, of_form.1, &point);
         let own = |n: &Vector3<f64>| pose_a.rotation().inverse_transform_vector(n) * sign;
-        if normals[..count].iter().any(|n| meets(&own(n))) || !sides {
-            return best;
+        // The search between two shapes finds their other sides itself.
+        let count = if both { count.min(1) } else { count };
+        if normals[..count].iter().any(|n| meets(&own(n))) || both {
+            break;
         }
     }
     best

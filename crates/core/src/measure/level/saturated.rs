@@ -58,7 +58,7 @@ impl WithSimd for Saturated<'_> {
         let dz = trust.linear_norm * displaced;
         let mut hold = displaced <= trust.leeway;
         for (i, constraint) in trust.constraints.iter().enumerate() {
-            let (jet, inside) = Side::away(b, i, &relative).jet(simd, x.into());
+            let (jet, inside) = Side::away(simd, b, i, &relative).jet(simd, x.into());
             let slope =
                 dot::<S, f64>(jet.gradient, jet.gradient).sqrt() + constraint.gradient_error / trust.linear_norm;
             let rise = slope * dz + constraint.curvature_ceiling * displaced * displaced;

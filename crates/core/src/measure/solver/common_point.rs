@@ -99,7 +99,7 @@ mod tests {
                 Pose::from_quaternion(*pose.translation(), pose.rotation().coords.into()).expect("the same pose")
             });
             let relative = Relative::<f64>::new(Scalar, &home, &poses[0], &bodies[k], &poses[1]);
-            let side = Side::away(&bodies[k], 0, &relative);
+            let side = Side::away(Scalar, &bodies[k], 0, &relative);
             let exact = Solid::new(&zoo[k], &placed[1], &Vector3::zeros(), 1.0);
             let seen_from = Solid::new(&frame, &placed[0], &Vector3::zeros(), 1.0);
             let inner = poses[1].transform_point(bodies[k].interior_point()) - poses[0].translation();

@@ -102,7 +102,7 @@ impl Trace {
             (Plane::new(simd, &jet, &local), SurfaceCurvature::new(simd, &jet, &local))
         };
         let of_a = linearized(&Side::at_home(simd, a, active[0].into()), x);
-        let of_b = linearized(&Side::away(b, active[1].into(), &relative), y);
+        let of_b = linearized(&Side::away(simd, b, active[1].into(), &relative), y);
         let difference = apply::<Scalar, f64>(&frame, subtract::<Scalar, f64>(x, y));
         let (_, response) = newton(simd, (&of_a.0, &of_a.1), (&of_b.0, &of_b.1), difference, flattest(limits(a, b)));
         let mut trace = Self::blank(active);
@@ -158,6 +158,11 @@ pub(in crate::measure) struct Lost {
 impl Lost {
     pub(in crate::measure) fn after(rounds: u32) -> Self {
         Self { rounds, common: None, grazing: None, parted: None }
+    }
+
+    /// By a plane that proves all that was asked for.
+    pub(in crate::measure) fn parted(lower: f64, rounds: u32) -> Self {
+        Self { parted: Some(lower), ..Self::after(rounds) }
     }
 
     /// Whether the bodies seem to touch or overlap.
@@ -265,7 +270,7 @@ impl<R: Relation> WithSimd for Follow<'_, R> {
         }
         let relative = relation.relative(simd, a, b);
         let most = MAX_ROUNDS.min(options.max_iterations());
-        let sides = (Side::at_home(simd, a, active[0]), Side::away(b, active[1], &relative));
+        let sides = (Side::at_home(simd, a, active[0]), Side::away(simd, b, active[1], &relative));
         let correct = Correct { sides, relation, patience: most, most, options, limits: limits(a, b) };
 
         let Trace { of_a, of_b, tangents, response, .. } = trace;
@@ -317,9 +322,8 @@ impl<R: Relation> WithSimd for Seek<'_, R> {
     fn with_simd<S: Simd>(self, simd: S) -> Result<(Proven, Trace), Lost> {
         let Self { a, b, relation, from, most, options } = self;
         let relative = relation.relative(simd, a, b);
-        let parted = relation.parted((a, b), &relative, None);
-        if parted.is_some() {
-            return Err(Lost { parted, ..Lost::after(0) });
+        if let Some(lower) = relation.parted((a, b), &relative, None) {
+            return Err(Lost::parted(lower, 0));
         }
         let (start, active) = match from {
             Some(start) => (start, [0; 2]),
@@ -329,12 +333,11 @@ impl<R: Relation> WithSimd for Seek<'_, R> {
             }
         };
         let patience = if from.is_some() { PATIENCE_OUTLINED } else { PATIENCE };
-        let sides = (Side::at_home(simd, a, active[0].into()), Side::away(b, active[1].into(), &relative));
+        let sides = (Side::at_home(simd, a, active[0].into()), Side::away(simd, b, active[1].into(), &relative));
         let correct = Correct { sides, relation, patience, most, options, limits: limits(a, b) };
         let height = dot::<S, f64>(start.n, subtract::<S, f64>(start.x, start.y));
-        let parted = relation.parted((a, b), &relative, Some((start.n, height)));
-        if parted.is_some() {
-            return Err(Lost { parted, ..Lost::after(0) });
+        if let Some(lower) = relation.parted((a, b), &relative, Some((start.n, height))) {
+            return Err(Lost::parted(lower, 0));
         }
         if relation.ends_at_contact() && height < 0.0 {
             let common = CommonPoint::between(simd, (&correct.sides.0, &correct.sides.1), start.x, start.y);
@@ -411,12 +414,12 @@ impl<R: Relation> Correct<'_, R> {
             }
             let decisive = prospect == Prospect::Decided;
             if decisive && !near {
-                // Mostly too far for an extrapolation.
+                // The step is mostly too long for a bracket by extrapolation.
                 let n = moved::<S, f64>(at.frame[2], [step.dn[0], step.dn[1], 0.0], &at.frame);
                 let height = difference[2] + step.dx[2] - step.dy[2];
-                let parted = self.relation.parted((side_a.body(), side_b.body()), relative, Some((n, height)));
-                if parted.is_some() {
-                    return Err(Lost { parted, ..Lost::after(rounds) });
+                let bodies = (side_a.body(), side_b.body());
+                if let Some(lower) = self.relation.parted(bodies, relative, Some((n, height))) {
+                    return Err(Lost::parted(lower, rounds));
                 }
             }
             // Where sides are flat the point at hand may do long before its step is short enough.

@@ -133,8 +133,9 @@ impl Objective {
 
     fn hessian(&self, y: &Vector3<f64>) -> Matrix3<f64> {
         match self {
-            Self::Nearest(segment) if segment.place(y).abs() < 1.0 && segment.half_axis != Vector3::zeros() => {
-                let axis = segment.half_axis / segment.half_axis.norm();
+            Self::Nearest(segment) if segment.place(y).abs() < 1.0 => {
+                // Of a point, or what is as short as one, there is no axis.
+                let axis = segment.half_axis.try_normalize(0.0).unwrap_or_default();
                 Matrix3::identity() - axis * axis.transpose()
             }
             Self::Nearest(_) => Matrix3::identity(),

@@ -47,6 +47,8 @@ pub(in crate::measure) enum Stage {
     SupportNewton,
     /// Support points by an interior-point method.
     SupportInterior,
+    /// The distances of single points of a capsule's axis.
+    AlongAxis,
     /// Sequential quadratic programming over one body.
     ProjectionSteps,
     /// An interior-point method over one body.

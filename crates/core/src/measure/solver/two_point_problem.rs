@@ -36,9 +36,9 @@ pub(in crate::measure) trait Relation: Copy {
         false
     }
 
-    /// A lower bound of the measure, where that is all that is asked for, by planes across n, a unit
-    /// vector from B to A in A's frame, along which the bodies seem to be so many metres apart; else
-    /// across the line between their interior points.
+    /// A lower bound of the measure by planes across n, where that is all that is asked for. n
+    /// points from B to A in A's frame; along it the bodies seem to be so many metres apart.
+    /// Without n, across the line between the interior points.
     #[inline(always)]
     fn parted(&self, _: (&Body, &Body), _: &Relative<f64>, _n: Option<(V3<f64>, f64)>) -> Option<f64> {
         None

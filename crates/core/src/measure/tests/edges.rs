@@ -32,7 +32,7 @@ fn slab(a: &Vector3<f64>, b: f64) -> Constraint {
 
 /// A body of degree 4 to 8 cut by up to six slabs across random directions, turned within its
 /// frame.
-fn cut(random: &mut Seeded) -> Body {
+pub(in crate::measure) fn cut(random: &mut Seeded) -> Body {
     let degree = 4 + 2 * (random.next() % 3) as u8;
     let half = Vector3::from_fn(|_, _| 2_f64.powf(random.signed()));
     let round = Body::superellipsoid("cut", Vector3::zeros(), half, degree).unwrap();

@@ -299,7 +299,8 @@ impl<'a> Search<'a> {
         let Self { pair, x, y, n, .. } = *self;
         let (mut a, mut b) = (Active::near(&pair.a, &x, &-n), Active::near(&pair.b, &y, &n));
         let (x, y) = (on_surface(&pair.a, &a, x), on_surface(&pair.b, &b, y));
-        // Points of surfaces that cross may both be outside of the other body.
+        // Points of surfaces that cross may both be outside of the other body: their middle stands
+        // for both.
         let (x, y) = if n.dot(&(x - y)) < 0.0 { ((x + y) * 0.5, (x + y) * 0.5) } else { (x, y) };
         let fits = a.fit(&pair.a, &x, &-n) && b.fit(&pair.b, &y, &n);
         fits.then(|| DistanceNewton { x, y, distance: n.dot(&(x - y)), n, a, b })
@@ -355,6 +356,11 @@ impl<'a> Search<'a> {
         let center = pair.a.body.normalization().center;
         let to_query = |v: V3<f64>| pair.a_to_query(&(center + Vector3::from(v)));
         if lost.common.is_some_and(|common| self.common(&to_query(common.v))) {
+            return;
+        }
+        if let Some(lower) = lost.parted {
+            let n = self.n;
+            self.raise(lower / pair.unit(), &n);
             return;
         }
         // Bodies of one shape on top of each other touch all over: a bad hint finds that, and not

@@ -168,11 +168,12 @@ impl WithSimd for EdgeQuery<'_> {
         let Self { a, pose_a, b, pose_b, goal, tolerance, options, trace, start } = self;
         let relation = Apart { pose_a, pose_b, goal, tolerance };
         let relative = relation.relative(simd, a, b);
-        let sides = (Side::at_home(simd, a, 0), Side::away(b, 0, &relative));
+        let sides = (Side::at_home(simd, a, 0), Side::away(simd, b, 0, &relative));
         let solver = Solver { sides, relation, options, limits: limits(a, b) };
-        let parted = if trace.is_none() { relation.parted((a, b), &relative, None) } else { None };
-        if parted.is_some() {
-            return Err(Lost { parted, ..Lost::after(0) });
+        if trace.is_none()
+            && let Some(lower) = relation.parted((a, b), &relative, None)
+        {
+            return Err(Lost::parted(lower, 0));
         }
         let mut rounds = 0;
         let mut following = match trace {
@@ -189,9 +190,8 @@ impl WithSimd for EdgeQuery<'_> {
                         None => relation.start(simd, a, b, &relative).0,
                     };
                     let height = dot::<S, f64>(start.n, subtract::<S, f64>(start.x, start.y));
-                    let parted = relation.parted((a, b), &relative, Some((start.n, height)));
-                    if parted.is_some() {
-                        return Err(Lost { parted, ..Lost::after(rounds) });
+                    if let Some(lower) = relation.parted((a, b), &relative, Some((start.n, height))) {
+                        return Err(Lost::parted(lower, rounds));
                     }
                     if height < 0.0 {
                         let common = CommonPoint::between(simd, (&solver.sides.0, &solver.sides.1), start.x, start.y);
@@ -329,9 +329,9 @@ impl Solver<'_> {
                 let Step { dx, dy, dn } = found.step;
                 let n = moved::<S, f64>(at.frame[2], [dn[0], dn[1], 0.0], &at.frame);
                 let height = difference[2] + dx[2] - dy[2];
-                let parted = self.relation.parted((side_a.body(), side_b.body()), relative, Some((n, height)));
-                if parted.is_some() {
-                    return Err(Lost { parted, ..Lost::after(*rounds) });
+                let bodies = (side_a.body(), side_b.body());
+                if let Some(lower) = self.relation.parted(bodies, relative, Some((n, height))) {
+                    return Err(Lost::parted(lower, *rounds));
                 }
             }
             if prospect == Prospect::Decided || near {

@@ -149,7 +149,7 @@ impl<P: Projectable> WithSimd for ExactPair<'_, P> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let side = Side::away(self.body, 0, &self.relative);
+        let side = Side::away(simd, self.body, 0, &self.relative);
         let center = interior(simd, self.body, &self.relative);
         let (mut rounds, mut from_level) = (0, false);
         let followed = self.trace.and_then(|trace| self.follow(simd, &side, trace));

@@ -91,7 +91,7 @@ impl WithSimd for LevelQuery<'_> {
 impl LevelQuery<'_> {
     #[inline(always)]
     fn solve<S: Simd, P: Projectable>(&self, simd: S, relative: &Relative<f64>, set: P) -> Result<LevelMinimum, u32> {
-        let side = Side::away(self.body, 0, relative);
+        let side = Side::away(simd, self.body, 0, relative);
         let from = match self.from {
             Some(own) => {
                 let own = own - self.form.center();

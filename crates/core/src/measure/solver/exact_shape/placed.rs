@@ -108,7 +108,7 @@ fn contact<S: Simd, P: Projectable>(
     set: P,
     (displacement, options): (f64, &Options<'_>),
 ) -> Result<ExactProven, u32> {
-    let side = Side::away(body, 0, relative);
+    let side = Side::away(simd, body, 0, relative);
     let start = set.project(simd, interior(simd, body, relative));
     let problem = LevelProblem { start, set, side: &side, displacement, settle: false, most: options.max_iterations() };
     match problem.with_simd(simd) {
@@ -159,45 +159,32 @@ pub(in crate::measure) fn direction_to_world(form: &ClosedForm, pose: &Pose, dir
 }
 
 /// Unit normals of planes that may separate a shape from what is about a point of the world frame:
-/// from its projection to the point, and where `sides` are asked for those of the faces that the
-/// point lies beyond; and how many they are. World frame, from the shape outwards.
+/// from its projection to the point, and those of the faces that the point lies beyond; and how
+/// many they are. World frame, from the shape outwards.
 pub(in crate::measure) fn normals_towards(
     form: &ClosedForm,
     pose: &Pose,
     point: &Vector3<f64>,
-    sides: bool,
 ) -> ([Vector3<f64>; 4], usize) {
     let own = pose.rotation().inverse_transform_vector(&(point - pose.translation())) - form.center();
     let own = form.axes().map_or(own, |axes| axes.tr_mul(&own)).into();
     match *form.shape() {
-        ExactShape::Cuboid { half_extents_m, .. } => {
-            normals((form, pose), Cuboid { half_extents: half_extents_m }, own, sides)
-        }
+        ExactShape::Cuboid { half_extents_m, .. } => normals(form, pose, Cuboid { half_extents: half_extents_m }, own),
         ExactShape::Cylinder { radius_m, half_height_m, .. } => {
-            normals((form, pose), Cylinder { radius: radius_m, half_height: half_height_m }, own, sides)
+            normals(form, pose, Cylinder { radius: radius_m, half_height: half_height_m }, own)
         }
-        ExactShape::Capsule { half_length_m, .. } => {
-            normals((form, pose), Segment { half_length: half_length_m }, own, sides)
-        }
+        ExactShape::Capsule { half_length_m, .. } => normals(form, pose, Segment { half_length: half_length_m }, own),
     }
 }
 
 #[inline(always)]
-fn normals<P: Projectable>(
-    (form, pose): (&ClosedForm, &Pose),
-    set: P,
-    point: V3<f64>,
-    sides: bool,
-) -> ([Vector3<f64>; 4], usize) {
+fn normals<P: Projectable>(form: &ClosedForm, pose: &Pose, set: P, point: V3<f64>) -> ([Vector3<f64>; 4], usize) {
     let mut found = [Vector3::zeros(); 4];
     let seen = set.offset(Scalar, point);
     if !(seen.distance > 0.0) {
         return (found, 0);
     }
     found[0] = direction_to_world(form, pose, seen.frame[2]);
-    if !sides {
-        return (found, 1);
-    }
     let (faces, count) = set.faces_towards(Scalar, point);
     if count < 2 {
         // The normal is that of the face.

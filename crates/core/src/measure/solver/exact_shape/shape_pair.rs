@@ -172,7 +172,7 @@ impl<A: Projectable, B: Projectable> ShapePair<A, B> {
         let size = self.a.reach() + self.b.reach();
         let by = 4.0 * self.displacement + MARGIN * size;
         let smaller = ShapePair { a: self.a.shrunk(by), b: self.b.shrunk(by), ..*self };
-        // What they were made smaller by takes less than this of their distance.
+        // Making both smaller adds at most 2 √3 `by` to their distance.
         let found = smaller.solve_until(start, [0.5 * by, 8.0 * by], options);
         // Points and segments have no inside: what is near them has to be in the other set.
         let (of_a, of_b) = (self.a.thinnest(), self.b.thinnest());

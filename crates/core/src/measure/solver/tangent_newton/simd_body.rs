@@ -16,8 +16,6 @@ pub(in crate::measure) struct Relative<N> {
     pub(in crate::measure) rotation: M3<N>,
     /// Centre of B's normalization in the query frame.
     pub(in crate::measure) origin: V3<N>,
-    /// `M` of B: `z = M (y - origin)`.
-    pub(in crate::measure) linear: M3<N>,
     /// Bound of the displacement of a computed z of B within its ball, metres.
     pub(in crate::measure) displacement: N,
 }
@@ -56,7 +54,6 @@ impl<N: Copy> Relative<N> {
         for i in 0..3 {
             origin[i] = turned[i] + (translation[i] - from[i]);
         }
-        let linear = rows(simd, &b.normalization().linear);
         let trust = b.trust();
         let fixed = (RELATIVE_QUATERNION_ERROR + trust.rounding) * trust.reach
             + RELATIVE_QUATERNION_ERROR * trust.center
@@ -65,7 +62,6 @@ impl<N: Copy> Relative<N> {
         Self {
             rotation,
             origin,
-            linear: times_transposed(&linear, &rotation),
             displacement: N::splat(simd, RELATIVE_QUATERNION_ERROR + gamma(8))
                 .mul_add(far, N::splat(simd, fixed * (1.0 + 1e-13))),
         }
@@ -105,8 +101,12 @@ impl<'a, N: Copy> Side<'a, N> {
 
     /// The other body.
     #[inline(always)]
-    pub(in crate::measure) fn away(body: &'a Body, active: usize, relative: &Relative<N>) -> Self {
-        let Relative { linear, origin, displacement, .. } = *relative;
+    pub(in crate::measure) fn away<S: Simd>(simd: S, body: &'a Body, active: usize, relative: &Relative<N>) -> Self
+    where
+        N: Number<S>,
+    {
+        let Relative { rotation, origin, displacement } = *relative;
+        let linear = times_transposed(&rows(simd, &body.normalization().linear), &rotation);
         Self { body, active, trust: &body.trust().constraints[active], linear, origin, displacement }
     }
 
