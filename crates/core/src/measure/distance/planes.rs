@@ -15,9 +15,9 @@ use nalgebra::Vector3;
 const SETTLED: f64 = 0.02;
 
 /// The best lower bound of the distance, metres, or the first beyond which a goal asks for no more:
-/// across the normal of the last answer, and across the sides of a shape that the other body's
-/// centre lies beyond. Without a shape, searches from nothing but the poses look along the line of
-/// the centres and, as soon as they know where it is, across the gap.
+/// across the normal of the last answer, along the line of the centres, or across the sides of a
+/// shape that the other body's centre lies beyond. Searches look across the gap as soon as they
+/// know where it is.
 ///
 /// The last witnesses where they stand now bound what any plane can show: none is tried where they
 /// are too near for the goal, and none after that of the last normal where it is within
@@ -27,9 +27,6 @@ pub(super) fn lower_by_planes(of_a: (&Body, &Pose), of_b: (&Body, &Pose), hint: 
     let mut best = f64::NEG_INFINITY;
     let forms = [b.closed_form(), a.closed_form()];
     let last = hint.witnesses(a, b).zip(hint.normal_a());
-    if last.is_none() && forms == [None, None] {
-        return best;
-    }
     let apart = |[x, y]: [Vector3<f64>; 2]| (pose_a.transform_point(&x) - pose_b.transform_point(&y)).norm();
     let last = last.map(|(witnesses, normal)| (apart(witnesses), normal));
     if last.is_some_and(|(apart, _)| apart <= goal.far) {
@@ -47,7 +44,11 @@ pub(super) fn lower_by_planes(of_a: (&Body, &Pose), of_b: (&Body, &Pose), hint: 
         best = best.max(separation.along(n));
         best > goal.far
     };
-    let both = !forms.contains(&None);
+    if forms.iter().all(Option::is_none) {
+        meets(separation.between());
+        return best;
+    }
+    let both = forms.iter().all(Option::is_some);
     for (form, of_form, of_other, sign) in [(forms[0], of_b, of_a, 1.0), (forms[1], of_a, of_b, -1.0)] {
         let Some(form) = form else { continue };
         let point = of_other.1.transform_point(of_other.0.interior_point());

@@ -322,9 +322,6 @@ impl<R: Relation> WithSimd for Seek<'_, R> {
     fn with_simd<S: Simd>(self, simd: S) -> Result<(Proven, Trace), Lost> {
         let Self { a, b, relation, from, most, options } = self;
         let relative = relation.relative(simd, a, b);
-        if let Some(lower) = relation.parted((a, b), &relative, None) {
-            return Err(Lost::parted(lower, 0));
-        }
         let (start, active) = match from {
             Some(start) => (start, [0; 2]),
             None => {
@@ -336,7 +333,7 @@ impl<R: Relation> WithSimd for Seek<'_, R> {
         let sides = (Side::at_home(simd, a, active[0].into()), Side::away(simd, b, active[1].into(), &relative));
         let correct = Correct { sides, relation, patience, most, options, limits: limits(a, b) };
         let height = dot::<S, f64>(start.n, subtract::<S, f64>(start.x, start.y));
-        if let Some(lower) = relation.parted((a, b), &relative, Some((start.n, height))) {
+        if let Some(lower) = relation.parted((a, b), &relative, start.n, height) {
             return Err(Lost::parted(lower, 0));
         }
         if relation.ends_at_contact() && height < 0.0 {
@@ -418,7 +415,7 @@ impl<R: Relation> Correct<'_, R> {
                 let n = moved::<S, f64>(at.frame[2], [step.dn[0], step.dn[1], 0.0], &at.frame);
                 let height = difference[2] + step.dx[2] - step.dy[2];
                 let bodies = (side_a.body(), side_b.body());
-                if let Some(lower) = self.relation.parted(bodies, relative, Some((n, height))) {
+                if let Some(lower) = self.relation.parted(bodies, relative, n, height) {
                     return Err(Lost::parted(lower, rounds));
                 }
             }

@@ -12,7 +12,6 @@ use crate::measure::solver::tangent_newton::{
     ALIGNED, Bracket, Plane, Relative, Response, Step, SurfaceCurvature, newton,
 };
 use crate::polynomial::Simd;
-use nalgebra::Vector3;
 
 /// A measure of two bodies that is attained by a point x of A and a point y of B with opposite
 /// normals.
@@ -37,10 +36,9 @@ pub(in crate::measure) trait Relation: Copy {
     }
 
     /// A lower bound of the measure by planes across n, where that is all that is asked for. n
-    /// points from B to A in A's frame; along it the bodies seem to be so many metres apart.
-    /// Without n, across the line between the interior points.
+    /// points from B to A in A's frame; along it the bodies seem to be `height` metres apart.
     #[inline(always)]
-    fn parted(&self, _: (&Body, &Body), _: &Relative<f64>, _n: Option<(V3<f64>, f64)>) -> Option<f64> {
+    fn parted(&self, _: (&Body, &Body), _: &Relative<f64>, _n: V3<f64>, _height: f64) -> Option<f64> {
         None
     }
 
@@ -120,10 +118,9 @@ impl Relation for Apart<'_> {
     }
 
     #[inline(always)]
-    fn parted(&self, bodies: (&Body, &Body), relative: &Relative<f64>, n: Option<(V3<f64>, f64)>) -> Option<f64> {
+    fn parted(&self, bodies: (&Body, &Body), relative: &Relative<f64>, n: V3<f64>, height: f64) -> Option<f64> {
         let far = self.goal.far;
-        let seems = n.map_or(f64::MAX, |(_, apart)| apart) > far;
-        if seems { parted_beyond(far, bodies, relative, n.map(|(n, _)| n)) } else { None }
+        if height > far { parted_beyond(far, bodies, relative, n) } else { None }
     }
 
     #[inline(always)]
@@ -142,16 +139,14 @@ impl Relation for Apart<'_> {
     }
 }
 
-/// A lower bound of the distance by planes across n, or across the line between the interior
-/// points, if it is above `far` metres.
+/// A lower bound of the distance by planes across n, if it is above `far` metres.
 // Compiled once, and not with each search that asks.
 #[inline(never)]
-fn parted_beyond(far: f64, (a, b): (&Body, &Body), relative: &Relative<f64>, n: Option<V3<f64>>) -> Option<f64> {
+fn parted_beyond(far: f64, (a, b): (&Body, &Body), relative: &Relative<f64>, n: V3<f64>) -> Option<f64> {
     if !runs(Stage::Planes) {
         return None;
     }
-    let separation = Separation::seen(a, b, relative);
-    let lower = separation.along(&n.map_or(*separation.between(), Vector3::from));
+    let lower = Separation::seen(a, b, relative).along(&n.into());
     (lower > far).then_some(lower)
 }
 

@@ -170,11 +170,6 @@ impl WithSimd for EdgeQuery<'_> {
         let relative = relation.relative(simd, a, b);
         let sides = (Side::at_home(simd, a, 0), Side::away(simd, b, 0, &relative));
         let solver = Solver { sides, relation, options, limits: limits(a, b) };
-        if trace.is_none()
-            && let Some(lower) = relation.parted((a, b), &relative, None)
-        {
-            return Err(Lost::parted(lower, 0));
-        }
         let mut rounds = 0;
         let mut following = match trace {
             Some(trace) => solver.follow(simd, &relative, trace),
@@ -190,7 +185,7 @@ impl WithSimd for EdgeQuery<'_> {
                         None => relation.start(simd, a, b, &relative).0,
                     };
                     let height = dot::<S, f64>(start.n, subtract::<S, f64>(start.x, start.y));
-                    if let Some(lower) = relation.parted((a, b), &relative, Some((start.n, height))) {
+                    if let Some(lower) = relation.parted((a, b), &relative, start.n, height) {
                         return Err(Lost::parted(lower, rounds));
                     }
                     if height < 0.0 {
@@ -330,7 +325,7 @@ impl Solver<'_> {
                 let n = moved::<S, f64>(at.frame[2], [dn[0], dn[1], 0.0], &at.frame);
                 let height = difference[2] + dx[2] - dy[2];
                 let bodies = (side_a.body(), side_b.body());
-                if let Some(lower) = self.relation.parted(bodies, relative, Some((n, height))) {
+                if let Some(lower) = self.relation.parted(bodies, relative, n, height) {
                     return Err(Lost::parted(lower, *rounds));
                 }
             }
