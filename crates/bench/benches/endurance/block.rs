@@ -188,7 +188,7 @@ impl Round<'_> {
             Decision::No => found.upper >= threshold,
             Decision::Undecided { lower, upper } => lower < threshold && threshold <= upper && open(lower, upper),
         };
-        let told =
+        let detail =
             || format!("{contact:?}, below {threshold:e} m {nearer:?}: {}", site.tell(&Answer::Distance(*found)));
         self.tally.check(Check::Decision, agree, (site.block, site.query), detail);
     }
