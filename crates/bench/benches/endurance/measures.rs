@@ -92,12 +92,15 @@ impl Answer {
         accuracy * scale * (1.0 + 1e-12)
     }
 
-    /// Whether the witnesses lie in their bodies, up to what rounding them to world coordinates
-    /// moves them.
+    /// Whether the witnesses lie in their bodies, up to what rounding them to world coordinates and
+    /// in each other's frame moves them.
     pub(crate) fn feasible(&self, a: Placed<'_>, b: Placed<'_>) -> bool {
         match self {
-            Answer::Distance(answer) => within(a, &answer.witness_a) && within(b, &answer.witness_b),
-            Answer::Level(answer) => within(b, &answer.witness),
+            Answer::Distance(answer) => {
+                let apart = (answer.witness_a - answer.witness_b).norm();
+                within(a, &answer.witness_a, apart) && within(b, &answer.witness_b, apart)
+            }
+            Answer::Level(answer) => within(b, &answer.witness, 0.0),
             // In the bodies as they have grown, which is theirs to check.
             Answer::Growth(_) => true,
         }
@@ -140,9 +143,9 @@ impl Answer {
     }
 }
 
-fn within((body, pose): (&Body, &Pose), witness: &nalgebra::Vector3<f64>) -> bool {
+fn within((body, pose): (&Body, &Pose), witness: &nalgebra::Vector3<f64>, apart: f64) -> bool {
     let local = pose.rotation().inverse_transform_vector(&(witness - pose.translation()));
-    let moved = 16.0 * f64::EPSILON * (witness.norm() + pose.translation().norm() + local.norm());
+    let moved = 16.0 * f64::EPSILON * (witness.norm() + pose.translation().norm() + local.norm() + apart);
     body.constraints().iter().all(|constraint| {
         let jet = body.placement().jet(constraint, &local);
         jet.value <= 1.0 + jet.gradient.norm() * moved * (1.0 + 1e-3) + 1e-12

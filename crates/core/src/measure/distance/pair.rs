@@ -3,7 +3,7 @@
 
 use super::answer::Distance;
 use super::balls::of_balls;
-use super::edges::of_edges;
+use super::edges::{self, of_edges};
 use super::exact::{Exact, of_shapes};
 use super::planes::lower_by_planes;
 use super::query::Query;
@@ -17,6 +17,7 @@ use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveConstraints;
 use crate::measure::solver::common_point::CommonPoint;
 use crate::measure::solver::continuation::{Follow, Lost, Proven, SEEK_ROUNDS, Seek};
+use crate::measure::solver::edge_newton::EdgeProven;
 use crate::measure::solver::exact_shape::{ShapeContact, contact_of_shapes};
 use crate::measure::solver::kkt_newton::Active;
 use crate::measure::solver::stages::{Stage, runs};
@@ -143,7 +144,7 @@ impl<'a> Query<'a> {
         }
         if runs(Stage::Edges) && !(of_a.0.is_smooth() && of_b.0.is_smooth()) {
             return match of_edges(self, warm) {
-                Ok(found) => found,
+                Ok(found) => self.of_edges(&found),
                 Err(lost) => self.search(&lost, warm),
             };
         }
@@ -235,7 +236,7 @@ impl<'a> Query<'a> {
     fn answer<S: Simd>(&self, simd: S, proven: &Proven, tolerance: f64) -> Distance {
         let narrow = proven.upper - proven.lower <= tolerance;
         if !narrow && !self.goal.met(proven.lower, proven.upper) {
-            return self.refined(proven);
+            return self.refined(proven.rounds, |search| search.resume(proven));
         }
         let (a, pose_a) = self.of_a;
         let [witness_a, witness_b, normal] = proven.world(simd, a, pose_a);
@@ -254,12 +255,23 @@ impl<'a> Query<'a> {
         }
     }
 
+    /// The same of bodies with several constraints.
+    #[inline]
+    fn of_edges(&self, proven: &EdgeProven) -> Distance {
+        let narrow = proven.upper - proven.lower <= self.relation().tolerance;
+        if narrow || self.goal.met(proven.lower, proven.upper) {
+            edges::answer(self.of_a, proven, narrow)
+        } else {
+            self.refined(proven.rounds, |search| search.resume_edges(proven))
+        }
+    }
+
     /// A proven answer that rounding keeps wide, refined in double-double arithmetic.
     #[cold]
-    fn refined(&self, proven: &Proven) -> Distance {
+    fn refined(&self, rounds: u32, resume: impl FnOnce(&mut Search<'_>)) -> Distance {
         let pair = self.pair();
-        let mut search = Search::new(&pair, self.goal, self.options, proven.rounds);
-        search.resume(proven);
+        let mut search = Search::new(&pair, self.goal, self.options, rounds);
+        resume(&mut search);
         search.refine();
         search.attain_any();
         search.answer()

@@ -3,7 +3,9 @@
 use super::Search;
 use crate::measure::bounds::duality_bounds::{DualTrial, Multipliers, distance_lower, distance_upper};
 use crate::measure::frames::vector::V3;
+use crate::measure::solver::active_constraints::ActiveConstraints;
 use crate::measure::solver::continuation::Proven;
+use crate::measure::solver::edge_newton::EdgeProven;
 use crate::measure::solver::kkt_newton::{Active, DistanceNewton};
 use crate::measure::solver::stages::{Stage, runs};
 use nalgebra::Vector3;
@@ -157,18 +159,32 @@ impl Search<'_> {
 
     /// Takes what is better in the bracket of continuation, and where that ended as a start.
     pub(in crate::measure::distance) fn resume(&mut self, proven: &Proven) {
+        let active = [0, 1].map(|i| ActiveConstraints::single(proven.active[i], proven.multipliers[i]));
+        self.resume_at((proven.lower, proven.upper), [proven.x, proven.y, proven.n], active);
+    }
+
+    /// The same of bodies with several constraints.
+    pub(in crate::measure::distance) fn resume_edges(&mut self, proven: &EdgeProven) {
+        let active = [proven.active_a, proven.active_b];
+        self.resume_at((proven.lower, proven.upper), [proven.x, proven.y, proven.n], active);
+    }
+
+    /// Bounds, points from the centre of A's normalization on, and multipliers in metres.
+    fn resume_at(&mut self, (lower, upper): (f64, f64), [x, y, n]: [V3<f64>; 3], active: [ActiveConstraints; 2]) {
         let pair = self.pair;
         let (unit, center) = (pair.unit(), pair.a.body.normalization().center);
         let to_query = |v: V3<f64>| pair.a_to_query(&(center + Vector3::from(v)));
-        let [a, b] = [0, 1].map(|i| {
+        let [a, b] = active.map(|constraints| {
             let mut active = Active::default();
-            active.push(usize::from(proven.active[i]));
-            active.multiplier[0] = proven.multipliers[i] / unit;
+            for (k, (index, multiplier)) in constraints.iter().enumerate() {
+                active.push(index);
+                active.multiplier[k] = multiplier / unit;
+            }
             active
         });
-        let (x, y, n) = (to_query(proven.x), to_query(proven.y), Vector3::from(proven.n));
-        let raised = self.raise(proven.lower / unit, &n);
-        if raised | self.take(proven.upper / unit, x, y) {
+        let (x, y, n) = (to_query(x), to_query(y), Vector3::from(n));
+        let raised = self.raise(lower / unit, &n);
+        if raised | self.take(upper / unit, x, y) {
             self.active = (a, b);
         }
         self.tried[0] = Some(DistanceNewton { x, y, distance: n.dot(&(x - y)), n, a, b });
