@@ -34,7 +34,7 @@ mod time_of_impact;
 mod translation_hessian;
 mod warm;
 
-pub use batch::{BatchError, distance_batch, is_solved_in_lanes};
+pub use batch::{BatchError, distance_batch, distance_to_capsule_batch, is_solved_in_lanes};
 pub use capsule::{
     Capsule, CapsuleDistance, CapsuleError, distance_of_capsules, distance_to_capsule, nearer_to_capsule_than,
     overlap_with_capsule,

@@ -70,8 +70,23 @@ impl Solver<'_> {
             _ => {}
         }
         let found = self.capsule_distance(pair, &options);
+        let answer = from_signed(measure, self.of_capsule(pair, &found), self.ask.threshold_m);
+        // A distance is known where the depth is not.
+        let settled = measure == Measure::Distance && answer.upper == 0.0;
+        if settled { Answer { status: AnswerStatus::Converged, ..answer } } else { answer }
+    }
+
+    /// The signed distance that was found of a body and a capsule, which is the first of the pair or
+    /// not.
+    pub(crate) fn signed_capsule(&self, pair: &Pair<'_>, (found, is_first): (&CapsuleDistance, bool)) -> Answer {
+        let (capsule, body) = if is_first { (&pair.a, &pair.b) } else { (&pair.b, &pair.a) };
+        let found = SignedCapsule::of(found, body.pose().zip(capsule.pose()));
+        self.of_capsule(pair, &if is_first { found.swapped() } else { found })
+    }
+
+    fn of_capsule(&self, pair: &Pair<'_>, found: &SignedCapsule) -> Answer {
         let stopped = self.stop.is_set();
-        let signed = Answer {
+        Answer {
             witnesses: (found.upper < f64::INFINITY).then_some(found.witnesses),
             normal: found.normal,
             gradients: found.gradients.filter(|_| self.ask.gradients),
@@ -79,11 +94,7 @@ impl Solver<'_> {
             iterations: found.iterations,
             rungs: pair.finest_rungs(),
             ..Answer::bracket(found.status, found.lower, found.upper, stopped)
-        };
-        let answer = from_signed(measure, signed, self.ask.threshold_m);
-        // A distance is known where the depth is not.
-        let settled = measure == Measure::Distance && answer.upper == 0.0;
-        if settled { Answer { status: AnswerStatus::Converged, ..answer } } else { answer }
+        }
     }
 
     /// The signed distance of a pair with a capsule in it.

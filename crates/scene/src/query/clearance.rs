@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use sublevel_core::body::Shape;
+use sublevel_core::body::{Shape, Solid};
 use sublevel_core::measure::{
-    DEFAULT_ACCURACY, DEFAULT_DEPTH_ACCURACY, Distance, Options, Pose, WithinMargin, distance_batch,
-    is_solved_in_lanes, within_margin,
+    Capsule, CapsuleDistance, DEFAULT_ACCURACY, DEFAULT_DEPTH_ACCURACY, Distance, Options, Pose, WithinMargin,
+    distance_batch, distance_to_capsule_batch, is_solved_in_lanes, within_margin,
 };
 
 use super::answer::{Answer, Verdict};
@@ -154,10 +154,8 @@ impl Clearance {
             };
             let Some((other_slot, b)) = thing else { return true };
             // Distances say nothing below 0.
-            if let (Other::Standing(_), Some((of_a, _)), Some((of_b, _))) = (other, single(&a), single(&b))
-                && is_solved_in_lanes(of_a, of_b)
-                && threshold >= 0.0
-            {
+            let stands = matches!(other, Other::Standing(_));
+            if stands && threshold >= 0.0 && LanePair::of(&a, &b).is_some() {
                 if a.box_gap_m(&b) <= threshold + slack_m {
                     batches.push((index, other_slot), Near { place, pose: at.poses[index], threshold, slack_m });
                 }
@@ -208,21 +206,27 @@ impl Clearance {
     ) {
         let poses: Vec<Pose> = near.iter().map(|near| near.pose).collect();
         let (Some(standing), Some(first)) = (self.placed.standing(other), poses.first()) else { return };
-        let ((slot, moving), mut found) = (self.placed.moving_at(index, first), vec![Distance::default(); poses.len()]);
-        let (Some((a, _)), Some((b, pose_b))) = (single(&moving), single(&standing)) else { return };
-        if distance_batch(b, pose_b, a, &poses, &self.options(solver), &mut found).is_err() {
-            return;
-        }
-        for (Near { place, pose, threshold, slack_m }, found) in near.iter().zip(&found) {
+        let (slot, moving) = self.placed.moving_at(index, first);
+        let (Some(lanes), Some(pose_b)) = (LanePair::of(&moving, &standing), standing.pose()) else { return };
+        let Some(found) = lanes.measure(&poses, pose_b, &self.options(solver)) else { return };
+        for (i, Near { place, pose, threshold, slack_m }) in near.iter().enumerate() {
             let state = &mut states[*place];
-            if found.lower > threshold + slack_m {
+            if found.lower(i) > threshold + slack_m {
                 continue;
             }
-            let answer = if found.lower > 0.0 {
-                solver.distance(found, &Solids { a: b, pose_a: pose_b, b: a, pose_b: pose }).swapped()
-            } else {
-                let (_, moving) = self.placed.moving_at(index, pose);
-                solver.measure(0, &Pair { a: moving, b: standing, slots: Some(PairSlots { a: slot, b: other }) })
+            let answer = match &found {
+                LaneAnswers::Solids { of: [a, b], found } if found[i].lower > 0.0 => {
+                    solver.distance(&found[i], &Solids { a: b, pose_a: pose_b, b: a, pose_b: pose }).swapped()
+                }
+                LaneAnswers::Solids { .. } => {
+                    let (_, moving) = self.placed.moving_at(index, pose);
+                    solver.measure(0, &Pair { a: moving, b: standing, slots: Some(PairSlots { a: slot, b: other }) })
+                }
+                LaneAnswers::Capsules { moves, found } => {
+                    let (_, moving) = self.placed.moving_at(index, pose);
+                    let pair = Pair { a: moving, b: standing, slots: None };
+                    solver.signed_capsule(&pair, (&found[i], *moves))
+                }
             };
             state.checked &= !solver.stop.is_set();
             state.rows.push(self.row([slot, other], answer, (*threshold, *slack_m)));
@@ -303,7 +307,7 @@ impl Question for Clearance {
 }
 
 /// Pairs of a moving body, by its position, and one that stands still, with the states of a chunk
-/// in which they may be near: pairs of which [`distance_batch`] measures several at a time.
+/// in which they may be near: pairs of which several poses are measured at a time.
 #[derive(Debug, Default)]
 struct Batches(BTreeMap<(usize, Slot), Vec<Near>>);
 
@@ -324,11 +328,72 @@ impl Batches {
     }
 }
 
-/// A thing that is one body.
-fn single<'a>(thing: &Thing<'a>) -> Option<(&'a Shape, &'a Pose)> {
+/// A moving thing and one that stands still, of which several poses are measured at a time.
+enum LanePair<'a> {
+    /// Two bodies.
+    Solids([&'a Shape; 2]),
+    /// A body and a capsule, and whether that is the one that moves.
+    Capsule { body: &'a Shape, capsule: &'a Capsule, moves: bool },
+}
+
+impl<'a> LanePair<'a> {
+    fn of(moving: &Thing<'a>, standing: &Thing<'a>) -> Option<Self> {
+        match (single(moving), single(standing)) {
+            (Some(a), Some(b)) => is_solved_in_lanes(a, b).then_some(Self::Solids([a, b])),
+            (Some(body), None) => Self::of_capsule(body, standing, false),
+            (None, Some(body)) => Self::of_capsule(body, moving, true),
+            (None, None) => None,
+        }
+    }
+
+    fn of_capsule(body: &'a Shape, other: &Thing<'a>, moves: bool) -> Option<Self> {
+        let Thing::Capsule { capsule, .. } = other else { return None };
+        let is_smooth = matches!(body.parts(), [body] if body.is_smooth());
+        is_smooth.then_some(Self::Capsule { body, capsule, moves })
+    }
+
+    /// Measured with the moving one at these poses and the other one at this.
+    fn measure(self, moving: &[Pose], standing: &Pose, options: &Options<'_>) -> Option<LaneAnswers<'a>> {
+        match self {
+            Self::Solids([a, b]) => {
+                let mut found = vec![Distance::default(); moving.len()];
+                distance_batch(b, standing, a, moving, options, &mut found).ok()?;
+                Some(LaneAnswers::Solids { of: [a, b], found })
+            }
+            Self::Capsule { body, capsule, moves } => {
+                let mut found = vec![CapsuleDistance::default(); moving.len()];
+                let standing = std::slice::from_ref(standing);
+                let (of_body, of_capsule) = if moves { (standing, moving) } else { (moving, standing) };
+                distance_to_capsule_batch(body, of_body, capsule, of_capsule, options, &mut found).ok()?;
+                Some(LaneAnswers::Capsules { moves, found })
+            }
+        }
+    }
+}
+
+/// What is found of such a pair, pose by pose.
+enum LaneAnswers<'a> {
+    /// Distances of the standing body from the moving one.
+    Solids { of: [&'a Shape; 2], found: Vec<Distance> },
+    /// Signed distances of a body from a capsule, and whether that is the one that moves.
+    Capsules { moves: bool, found: Vec<CapsuleDistance> },
+}
+
+impl LaneAnswers<'_> {
+    /// Lower bound at a pose, metres.
+    fn lower(&self, pose: usize) -> f64 {
+        match self {
+            Self::Solids { found, .. } => found[pose].lower,
+            Self::Capsules { found, .. } => found[pose].lower,
+        }
+    }
+}
+
+/// The body of a thing that is a single one.
+fn single<'a>(thing: &Thing<'a>) -> Option<&'a Shape> {
     match thing {
-        Thing::Solid { rungs: [solid], pose, set: None } => match &**solid {
-            Shape::Body(_) => Some((solid, pose)),
+        Thing::Solid { rungs: [solid], set: None, .. } => match &**solid {
+            Shape::Body(_) => Some(solid),
             Shape::Compound(_) => None,
         },
         _ => None,

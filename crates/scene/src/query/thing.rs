@@ -80,6 +80,14 @@ impl<'a> Thing<'a> {
         }
     }
 
+    /// Where it stands; none of half-spaces and points.
+    pub(crate) fn pose(&self) -> Option<&'a Pose> {
+        match self {
+            Self::Solid { pose, .. } | Self::Capsule { pose, .. } => Some(pose),
+            Self::HalfSpace(_) | Self::Point(_) => None,
+        }
+    }
+
     /// A ball around it in the world frame: centre and radius, metres; none around a half-space.
     pub(crate) fn ball(&self) -> Option<WorldBall> {
         match self {

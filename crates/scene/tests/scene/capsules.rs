@@ -7,8 +7,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 use sublevel_core::body::{Body, Compound};
 use sublevel_core::measure::{Capsule, HalfSpace, Pose};
 use sublevel_scene::query::{
-    Answer, AnswerStatus, Ask, Measure, Operand, Pairs, Rays, Selection, StateVerdict, States, Verdict, Within,
-    combined,
+    Answer, AnswerStatus, Ask, Clearance, Measure, Operand, Pairs, Rays, Selection, StateVerdict, States, Verdict,
+    Within, combined,
 };
 use sublevel_scene::{Crew, Geometry, NamedCapsule, Scene, Update};
 use sublevel_testkit::Seeded;
@@ -192,6 +192,69 @@ fn states_rays_and_neighbours_of_capsules() {
     assert!((touching[1].upper_m - truth).abs() < 1e-9, "{:?}", touching[1]);
     let normal = touching[1].normal.expect("a normal");
     assert!((touching[1].point.expect("a point") - Vector3::new(0.0, 0.0, -0.45) - normal * 0.1).norm() < 1e-9);
+}
+
+/// A capsule that moves among bodies, and a body that moves about a capsule: state by state the rows
+/// are those of single queries.
+#[test]
+fn clearances_of_capsules_are_those_of_single_queries() {
+    let crew = Crew::new(2).expect("threads");
+    let scene = room();
+    let ask = Ask::new(vec![Measure::Signed]).expect("measures");
+    for (seed, (mover, middle)) in [("limb", [-1.0, 0.0, 0.2]), ("egg", [0.0, 0.0, 0.0])].into_iter().enumerate() {
+        let mut random = Seeded(seed as u64);
+        let moving = slot(&scene, mover);
+        let places: Vec<Pose> = (0..60)
+            .map(|i| random.pose(if i % 4 == 0 { 0.2 } else { 1.2 }))
+            .map(|pose| pose.with_translation(pose.translation() + Vector3::from(middle)))
+            .collect();
+        let packed = places.iter().flat_map(|pose| {
+            let (t, q) = (pose.translation(), pose.rotation().coords);
+            [t.x, t.y, t.z, q.x, q.y, q.z, q.w]
+        });
+        let influence = 0.6;
+        let question = Clearance::new(scene.clone(), &[moving], packed.collect(), influence, false).expect("states");
+        let states = crew.ask(Arc::new(question), Arc::default()).expect("answered").concat();
+        let (mut beside_capsule, mut met) = (0, 0);
+        for (state, (found, place)) in states.iter().zip(&places).enumerate() {
+            let posed = scene.posed(&[(moving, *place)]).expect("a pose");
+            for other in ["limb", "lying", "crate", "egg", "pair"].into_iter().filter(|name| *name != mover) {
+                let pair = [moving, slot(&scene, other)];
+                let pairs = Pairs::new(posed.clone(), ask.clone(), pair.map(Operand::Object).to_vec(), vec![[0, 1]]);
+                let single = crew.ask(Arc::new(pairs.expect("a pair")), Arc::default()).expect("answered").concat();
+                let (single, row) = (&single[0], found.rows.iter().find(|row| row.pair == pair));
+                let label = format!("{mover} {state} {other}: {row:?} {single:?}");
+                let Some(row) = row else {
+                    assert!(single.upper > influence, "{label}");
+                    continue;
+                };
+                let answer = &row.answer;
+                let with_capsule = mover != "egg" || ["limb", "lying"].contains(&other);
+                assert!(single.lower <= influence, "{label}");
+                assert!(answer.lower <= single.upper && single.lower <= answer.upper, "{label}");
+                assert_eq!(answer.status, single.status, "{label}");
+                assert_eq!(answer.witnesses.is_some(), single.witnesses.is_some(), "{label}");
+                match (answer.normal, single.normal) {
+                    // Depths of bodies have wider brackets.
+                    _ if !with_capsule => continue,
+                    (Some(n), Some(m)) => {
+                        assert!((n - m).norm() < 1e-6, "{label}");
+                        let [on_mover, on_other] = answer.witnesses.expect("witnesses");
+                        assert!((on_mover - on_other - n * answer.upper).norm() < 1e-6, "{label}");
+                        let [of_mover, of_other] = answer.gradients.expect("gradients").map(|twist| twist.linear);
+                        assert!((of_mover - n).norm() < 1e-12 && (of_other + n).norm() < 1e-12, "{label}");
+                    }
+                    (n, m) => {
+                        assert_eq!(n.is_some(), m.is_some(), "{label}");
+                        met += 1;
+                    }
+                }
+                beside_capsule += 1;
+            }
+        }
+        println!("{mover}: {beside_capsule} rows with a capsule, {met} without a normal");
+        assert!(beside_capsule > 20 && met > 0, "{mover}: {beside_capsule} {met}");
+    }
 }
 
 #[test]

@@ -7,6 +7,7 @@
 //! others. A lane computes from its own pose only and selects where a single query would branch, so
 //! that no answer depends on the other poses of the batch.
 
+mod capsules;
 mod iterate;
 mod lane_poses;
 mod rounds;
@@ -28,11 +29,12 @@ use crate::measure::solver::tangent_newton::{ALIGNED, Relative, Side, bracket, m
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::{Aligned, Lanes, MAX_LANES, Number, Simd, Vector, WithSimd, dispatch_lanes};
+pub use capsules::distance_to_capsule_batch;
 use iterate::Iterate;
-use lane_poses::lane_poses;
+use lane_poses::{lane_rotations, lane_translations};
 use nalgebra::Vector3;
 use rounds::{COARSE, DIVERGED, MOST_COARSE, MOST_ROUNDS, NEARLY_CONVERGED, Rounds, run, solve_alone};
-use shapes::ShapeBatch;
+use shapes::{OfBodies, ShapeBatch};
 use waiting::{Group, MAX_COARSE, Waiting};
 
 /// Why a batch is refused.
@@ -48,6 +50,16 @@ pub enum BatchError {
         poses: usize,
         /// Number of places for answers.
         answers: usize,
+    },
+    /// As many poses of neither side as of the other.
+    #[error(
+        "{solid} poses of the solid but {capsule} of the capsule; give as many of both, or one that stands for all"
+    )]
+    Sides {
+        /// Number of poses of the solid.
+        solid: usize,
+        /// Number of poses of the capsule.
+        capsule: usize,
     },
 }
 
@@ -155,13 +167,17 @@ fn in_lanes(
 ) {
     let ((a, pose_a), (b, poses_b)) = (of_a, of_b);
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
+    let standing = std::slice::from_ref(pose_a);
+    let (smooth, of_form) = if a.is_smooth() { ((a, standing), poses_b) } else { ((b, poses_b), standing) };
     match method {
         LaneMethod::Smooth => dispatch_lanes(Batch { a, pose_a, b, poses_b, options, tolerance, answers }),
         LaneMethod::Cuboid(form, set) => {
-            dispatch_lanes(ShapeBatch { a: of_a, b: of_b, form, set, options, tolerance, answers });
+            let answers = OfBodies { a: of_a, b: of_b, options, tolerance, answers };
+            dispatch_lanes(ShapeBatch { smooth, form: (form, of_form), set, tolerance, answers });
         }
         LaneMethod::Cylinder(form, set) => {
-            dispatch_lanes(ShapeBatch { a: of_a, b: of_b, form, set, options, tolerance, answers });
+            let answers = OfBodies { a: of_a, b: of_b, options, tolerance, answers };
+            dispatch_lanes(ShapeBatch { smooth, form: (form, of_form), set, tolerance, answers });
         }
     }
 }
@@ -334,7 +350,9 @@ impl Batch<'_> {
     /// B at the poses as seen from A.
     #[inline(always)]
     fn relative<S: Simd, N: Vector<S>, const LANES: usize>(&self, simd: S, poses: &[usize; LANES]) -> Relative<N> {
-        let (other, translation) = lane_poses::<S, N, LANES>(simd, self.poses_b, poses, self.pose_a);
+        let (standing, moving) = (std::slice::from_ref(self.pose_a), self.poses_b);
+        let other = lane_rotations::<S, N, LANES>(simd, moving, poses);
+        let translation = lane_translations::<S, N, LANES>(simd, moving, standing, poses);
         let own = splat_quaternion(simd, self.pose_a.rotation());
         let rotation = rotation_by(simd, conjugate_times(own, other));
         let frame = rows(simd, self.pose_a.rotation().to_rotation_matrix().matrix());

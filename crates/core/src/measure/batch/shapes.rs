@@ -1,13 +1,13 @@
-//! A smooth body and a box or a cylinder at several poses at once: starts from support tables and
+//! A smooth body and a box, a cylinder or a segment at several poses at once: starts from support tables and
 //! first rounds in single precision, then rounds that bracket.
 
-use super::lane_poses::lane_poses;
+use super::lane_poses::{lane_rotations, lane_translations};
 use super::rounds::{COARSE, MOST_COARSE, MOST_ROUNDS, Rounds, run, solve_alone};
 use super::waiting::{Group, MAX_COARSE, Waiting};
 use crate::body::{Body, ClosedForm};
 use crate::measure::distance::{Distance, Exact};
 use crate::measure::frames::pose::Pose;
-use crate::measure::frames::quaternion::{conjugate_times, rotation_by, splat_quaternion};
+use crate::measure::frames::quaternion::{conjugate_times, rotation_by};
 use crate::measure::frames::vector::{M3, V3, add, apply, apply_transposed, dot, scaled};
 use crate::measure::options::Options;
 use crate::measure::solver::exact_shape::{
@@ -26,19 +26,63 @@ use crate::polynomial::{Aligned, Lanes, MAX_LANES, Number, NumberJet, Simd, Vect
 /// precision. It changes time only; no test pins it.
 const NEARLY_CONVERGED: f64 = 1e-4;
 
-/// A batch of a smooth body and a shape as work for the widest arithmetic.
-pub(super) struct ShapeBatch<'a, P> {
+/// A batch of a smooth body and a shape as work for the widest arithmetic. Either stands at a pose
+/// for each answer, or at a single one for all.
+pub(super) struct ShapeBatch<'a, P, A> {
+    pub(super) smooth: (&'a Body, &'a [Pose]),
+    pub(super) form: (&'a ClosedForm, &'a [Pose]),
+    pub(super) set: P,
+    /// Width of the bracket that is narrow enough, metres.
+    pub(super) tolerance: f64,
+    pub(super) answers: A,
+}
+
+/// Places for what such a batch finds.
+pub(super) trait ShapeAnswers {
+    /// How many they are.
+    fn count(&self) -> usize;
+
+    /// Whether to end with what is known.
+    fn is_stopped(&self) -> bool;
+
+    /// Writes what is proven.
+    fn write(&mut self, answer: usize, found: &ExactProven);
+
+    /// Answers by a query for it alone, after the rounds that it has gone through in lanes.
+    fn solve_alone(&mut self, answer: usize, rounds: u32);
+}
+
+/// Distances of two bodies.
+pub(super) struct OfBodies<'a> {
     pub(super) a: (&'a Body, &'a Pose),
     pub(super) b: (&'a Body, &'a [Pose]),
-    pub(super) form: &'a ClosedForm,
-    pub(super) set: P,
     pub(super) options: &'a Options<'a>,
-    /// Width of the bracket that is narrow enough, metres.
     pub(super) tolerance: f64,
     pub(super) answers: &'a mut [Distance],
 }
 
-impl<P: LaneSet> WithSimd for ShapeBatch<'_, P> {
+impl ShapeAnswers for OfBodies<'_> {
+    fn count(&self) -> usize {
+        self.answers.len()
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.options.stopped()
+    }
+
+    fn write(&mut self, answer: usize, found: &ExactProven) {
+        let b = (self.b.0, &self.b.1[answer]);
+        let exact = Exact::new(self.a, b).expect("one is smooth, the other has a closed form");
+        self.answers[answer] = exact.answer(found, self.tolerance);
+    }
+
+    fn solve_alone(&mut self, answer: usize, rounds: u32) {
+        let b = (self.b.0, &self.b.1[answer]);
+        self.answers[answer] = solve_alone(self.a, b, (self.options, rounds), WarmStart::default());
+    }
+}
+
+impl<P: LaneSet, A: ShapeAnswers> WithSimd for ShapeBatch<'_, P, A> {
     type Output = ();
 
     #[inline(always)]
@@ -69,13 +113,13 @@ impl<S: Simd, N: Number<S>> Linearized<S, N> {
     }
 }
 
-impl<P: LaneSet> Rounds for ShapeBatch<'_, P> {
+impl<P: LaneSet, A: ShapeAnswers> Rounds for ShapeBatch<'_, P, A> {
     fn poses(&self) -> usize {
-        self.b.1.len()
+        self.answers.count()
     }
 
     fn is_stopped(&self) -> bool {
-        self.options.stopped()
+        self.answers.is_stopped()
     }
 
     #[inline(always)]
@@ -87,7 +131,7 @@ impl<P: LaneSet> Rounds for ShapeBatch<'_, P> {
         far: &mut Waiting,
         near: &mut Waiting,
     ) {
-        let body = self.smooth();
+        let body = self.smooth.0;
         let relative: Relative<N> = self.relative(simd, &group.pose);
         let side = Side::away(simd, body, 0, &relative);
         let (mut x, mut open) = if fresh { self.begin(simd, body, &relative) } else { resumed(simd, &group) };
@@ -114,7 +158,7 @@ impl<P: LaneSet> Rounds for ShapeBatch<'_, P> {
 
     #[inline(always)]
     fn prove<S: Simd>(&mut self, simd: S, mut group: Group<MAX_LANES>, waiting: &mut Waiting) {
-        let body = self.smooth();
+        let body = self.smooth.0;
         let relative: Relative<Lanes<S>> = self.relative(simd, &group.pose);
         let side = Side::away(simd, body, 0, &relative);
         let (x, _) = resumed(simd, &group);
@@ -125,7 +169,7 @@ impl<P: LaneSet> Rounds for ShapeBatch<'_, P> {
         if Lanes::<S>::bits(simd, short) != 0 {
             let Linearized { seen, jet, local, found, .. } = &here;
             let at = side.extrapolate(simd, jet, local, found.step);
-            let set = (&self.set, self.form.displacement_m());
+            let set = (&self.set, self.form.0.displacement_m());
             let of_body = (body, &relative, &side);
             let (brackets, proven) = bracket(simd, set, of_body, &at, (found, &seen.frame), self.tolerance);
             answered = Lanes::<S>::bits(simd, Lanes::<S>::and(simd, short, proven));
@@ -144,13 +188,12 @@ impl<P: LaneSet> Rounds for ShapeBatch<'_, P> {
     }
 
     #[inline(never)]
-    fn solve_alone(&mut self, pose: usize, rounds: u32, warm: WarmStart) {
-        let b = (self.b.0, &self.b.1[pose]);
-        self.answers[pose] = solve_alone(self.a, b, (self.options, rounds), warm);
+    fn solve_alone(&mut self, pose: usize, rounds: u32, _: WarmStart) {
+        self.answers.solve_alone(pose, rounds);
     }
 }
 
-impl<P: LaneSet> ShapeBatch<'_, P> {
+impl<P: LaneSet, A: ShapeAnswers> ShapeBatch<'_, P, A> {
     /// Where fresh poses begin, and the lanes that can.
     #[inline(always)]
     fn begin<S: Simd, N: Vector<S>>(&self, simd: S, body: &Body, relative: &Relative<N>) -> (V3<N>, N::Mask) {
@@ -175,23 +218,17 @@ impl<P: LaneSet> ShapeBatch<'_, P> {
         Linearized { seen, jet, local, found, square, open }
     }
 
-    /// The body that is smooth.
-    #[inline(always)]
-    fn smooth(&self) -> &Body {
-        if self.a.0.is_smooth() { self.a.0 } else { self.b.0 }
-    }
-
-    /// The smooth body at the poses as seen from the other one.
+    /// The smooth body as seen from the shape.
     #[inline(always)]
     fn relative<S: Simd, N: Vector<S>, const LANES: usize>(&self, simd: S, poses: &[usize; LANES]) -> Relative<N> {
-        let standing = self.a.1;
-        let (q, t) = lane_poses::<S, N, LANES>(simd, self.b.1, poses, standing);
-        let still = splat_quaternion(simd, standing.rotation());
-        let (home, away, t) = if self.b.0.is_smooth() { (still, q, t) } else { (q, still, [-t[0], -t[1], -t[2]]) };
+        let ((body, of_body), (form, of_form)) = (self.smooth, self.form);
+        let home = lane_rotations::<S, N, LANES>(simd, of_form, poses);
+        let away = lane_rotations::<S, N, LANES>(simd, of_body, poses);
+        let t = lane_translations::<S, N, LANES>(simd, of_body, of_form, poses);
         let rotation = rotation_by(simd, conjugate_times(home, away));
         let translation = apply_transposed(&rotation_by(simd, home), t);
-        let center = self.form.center();
-        Relative::from_parts(simd, (center, center.norm()), rotation, translation, self.smooth())
+        let center = form.center();
+        Relative::from_parts(simd, (center, center.norm()), rotation, translation, body)
     }
 
     /// Writes the answers of the lanes that are set in `proven`.
@@ -216,10 +253,7 @@ impl<P: LaneSet> ShapeBatch<'_, P> {
                 rounds: group.rounds[lane] + 1,
                 trace: None,
             };
-            let pose = group.pose[lane];
-            let exact =
-                Exact::new(self.a, (self.b.0, &self.b.1[pose])).expect("one is smooth, the other has a closed form");
-            self.answers[pose] = exact.answer(&found, self.tolerance);
+            self.answers.write(group.pose[lane], &found);
         }
     }
 }

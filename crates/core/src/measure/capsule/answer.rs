@@ -31,6 +31,22 @@ pub struct CapsuleDistance {
     pub iterations: u32,
 }
 
+impl Default for CapsuleDistance {
+    /// What is known of any solid and capsule: a place for an answer.
+    fn default() -> Self {
+        Self {
+            status: Status::BracketWide,
+            lower: f64::NEG_INFINITY,
+            upper: f64::INFINITY,
+            witness: Vector3::zeros(),
+            witness_of_capsule: Vector3::zeros(),
+            normal: None,
+            tied: false,
+            iterations: 0,
+        }
+    }
+}
+
 impl CapsuleDistance {
     /// The answer: the middle of the bracket, and where no depth is measured the upper bound.
     pub fn value(&self) -> f64 {

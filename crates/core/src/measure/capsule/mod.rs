@@ -26,6 +26,7 @@ use crate::measure::warm::WarmStart;
 pub use answer::CapsuleDistance;
 use axes::{Axis, of_axes};
 pub use decision::{nearer_to_capsule_than, overlap_with_capsule};
+pub(in crate::measure) use pair::Problem;
 pub use shape::{Capsule, CapsuleError};
 use solid::distance_until;
 

@@ -43,14 +43,14 @@ const LEVEL: f64 = 1e-7;
 const MORE_PLACES: u32 = 12;
 
 /// A capsule where it stands, and how its distance is to be solved.
-pub(super) struct Problem<'a> {
-    pub(super) capsule: &'a Capsule,
-    pub(super) capsule_pose: &'a Pose,
+pub(in crate::measure) struct Problem<'a> {
+    pub(in crate::measure) capsule: &'a Capsule,
+    pub(in crate::measure) capsule_pose: &'a Pose,
     /// Width of the bracket that is narrow enough, metres.
-    pub(super) tolerance: f64,
-    pub(super) options: &'a Options<'a>,
+    pub(in crate::measure) tolerance: f64,
+    pub(in crate::measure) options: &'a Options<'a>,
     /// What the signed distance is asked for.
-    pub(super) goal: StopCriterion,
+    pub(in crate::measure) goal: StopCriterion,
 }
 
 /// The axis of the capsule as seen from a place in the world.
@@ -143,10 +143,6 @@ impl Problem<'_> {
         }
     }
 
-    fn form(&self) -> ClosedForm {
-        ClosedForm::capsule(self.capsule.radius_m(), self.capsule.half_height_m())
-    }
-
     /// What the distance from the axis is asked for, with as much to spare as rounding may take.
     fn goal_of_axis(&self) -> StopCriterion {
         let (radius, StopCriterion { near, far }) = (self.capsule.radius_m(), self.goal);
@@ -168,19 +164,25 @@ impl Problem<'_> {
         warm: &mut WarmStart,
     ) -> Result<CapsuleDistance, u32> {
         let form_pose = self.capsule_pose;
-        let (form, goal) = (self.form(), self.goal_of_axis());
+        let (form, goal) = (self.capsule.closed_form(), self.goal_of_axis());
         let trace = if let Hint::Exact(trace) = &warm.hint { Some(trace) } else { None };
         let query = ExactQuery { body, pose, form: &form, form_pose, goal: &goal, tolerance, options, trace };
         let found = dispatch(query).map_err(|lost| lost.rounds)?;
-        let ExactProven { lower, upper, x, nearest, n, rounds, trace, .. } = found;
-        let [witness, on_axis] = [x, nearest].map(|point| to_world(&form, form_pose, point));
-        if upper == 0.0 {
+        if found.upper == 0.0 {
             *warm = WarmStart::default();
-            return Ok(self.met(&witness, rounds));
+            return Ok(self.met(&to_world(&form, form_pose, found.x), found.rounds));
         }
-        *warm = trace.map_or_else(WarmStart::default, |trace| Hint::Exact(trace).into());
-        let normal = direction_to_world(&form, form_pose, n);
-        Ok(self.apart([lower, upper], [witness, on_axis], normal, rounds))
+        *warm = found.trace.map_or_else(WarmStart::default, |trace| Hint::Exact(trace).into());
+        Ok(self.outside(&found))
+    }
+
+    /// The answer where the axis is outside of the body at the distance that is proven, in the frame
+    /// of the capsule.
+    pub(in crate::measure) fn outside(&self, found: &ExactProven) -> CapsuleDistance {
+        let (form, form_pose) = (self.capsule.closed_form(), self.capsule_pose);
+        let ExactProven { lower, upper, x, nearest, n, rounds, .. } = *found;
+        let witnesses = [x, nearest].map(|point| to_world(&form, form_pose, point));
+        self.apart([lower, upper], witnesses, direction_to_world(&form, form_pose, n), rounds)
     }
 
     /// Of a body with several constraints.
@@ -235,7 +237,7 @@ impl Problem<'_> {
         warm: &mut WarmStart,
     ) -> Result<CapsuleDistance, u32> {
         let (_, pose) = of_body;
-        let form = self.form();
+        let form = self.capsule.closed_form();
         let start = if let Hint::Shapes { x_a } = &warm.hint { Some(pose.transform_point(x_a)) } else { None };
         let found = between_shapes(of_body, (&form, self.capsule_pose), start.as_ref(), (width, options))?;
         let ShapeDistance { lower, upper, witness_a, witness_b, normal, steps, .. } = found;

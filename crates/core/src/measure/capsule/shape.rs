@@ -1,5 +1,7 @@
 //! Capsules as their sizes.
 
+use crate::body::ClosedForm;
+
 /// All points within a radius of the segment of the z axis from minus to plus a half height, in
 /// their own frame; checked when made. A segment of a radius of 0, a ball of a half height of 0, a
 /// point of both.
@@ -58,5 +60,16 @@ impl Capsule {
     /// Radius of the ball about its centre that contains it, metres.
     pub fn reach_m(&self) -> f64 {
         self.radius_m + self.half_height_m
+    }
+
+    /// The smaller one of the circumradii of a solid and of the capsule, metres: that of the solid
+    /// for a point, which has no size.
+    pub(in crate::measure) fn smaller_size_m(&self, of_solid: f64) -> f64 {
+        if self.reach_m() > 0.0 { of_solid.min(self.reach_m()) } else { of_solid }
+    }
+
+    /// Itself as shapes are measured.
+    pub(in crate::measure) fn closed_form(&self) -> ClosedForm {
+        ClosedForm::capsule(self.radius_m, self.half_height_m)
     }
 }

@@ -20,8 +20,7 @@ pub(super) fn distance_until(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> CapsuleDistance {
-    let size = if capsule.reach_m() > 0.0 { capsule.reach_m() } else { f64::INFINITY };
-    let tolerance = options.accuracy() * solid.circumscribed().radius.min(size);
+    let tolerance = options.accuracy() * capsule.smaller_size_m(solid.circumscribed().radius);
     let problem = Problem { capsule, capsule_pose, tolerance, options, goal };
     let parts = solid.parts();
     if let [body] = parts {

@@ -47,6 +47,29 @@ pub(in crate::measure) fn cut(random: &mut Seeded) -> Body {
     body.moved(&rotation, &(random.unit() * 0.7)).unwrap()
 }
 
+/// Ten thousand sizes apart the roundings of positions are a part of what is asked for.
+#[test]
+fn cut_bodies_far_apart_converge() {
+    for seed in 0..400 {
+        let mut random = Seeded(75_000 + seed);
+        let large = cut(&mut random);
+        let small = Body::superellipsoid("small", Vector3::zeros(), Vector3::repeat(0.02), 6).unwrap();
+        let far = 100.0 + 300.0 * random.positive();
+        let pose_a = random_pose(&mut random, 1.0);
+        let turned = random_pose(&mut random, 0.0);
+        let pose_b = turned.with_translation(pose_a.translation() + random.unit() * far);
+        for (of_a, of_b) in [((&large, &pose_a), (&small, &pose_b)), ((&small, &pose_b), (&large, &pose_a))] {
+            let mut warm = WarmStart::default();
+            for start in ["cold", "warm"] {
+                let found = distance(of_a.0, of_a.1, of_b.0, of_b.1, &Options::default(), &mut warm);
+                let label = format!("seed {seed}, {start}: {found:?}");
+                assert_eq!(found.status, Status::Converged, "{label}");
+                assert!(found.upper - found.lower <= 1e-9 * small.circumscribed().radius, "{label}");
+            }
+        }
+    }
+}
+
 #[test]
 fn cut_bodies_agree_with_the_general_search() {
     let smooth: Vec<Body> = (0..6).flat_map(|seed| zoo(&mut Seeded(seed))).filter(Body::is_smooth).collect();

@@ -25,4 +25,5 @@ pub(in crate::measure) use lanes::{LaneBracket, LaneMove, LaneOffset, LaneSet, b
 pub(in crate::measure) use minimum::{LevelMinimum, LevelQuery};
 pub(in crate::measure) use placed::{ExactContact, ExactQuery, active, direction_to_world, normals_towards, to_world};
 pub(in crate::measure) use point::{PointOffset, PointSide, offset_of_point};
+pub(in crate::measure) use segment::Segment;
 pub(in crate::measure) use shapes::{ShapeContact, ShapeDistance, between_shapes, contact_of_shapes};

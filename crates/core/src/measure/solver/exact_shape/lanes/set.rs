@@ -1,8 +1,9 @@
-//! Boxes and cylinders as several points see them at once.
+//! Boxes, cylinders and segments as several points see them at once.
 
 use crate::measure::frames::vector::{M3, V3, basis, dot, normalized, subtract};
 use crate::measure::solver::exact_shape::cuboid::Cuboid;
 use crate::measure::solver::exact_shape::cylinder::Cylinder;
+use crate::measure::solver::exact_shape::segment::Segment;
 use crate::measure::solver::tangent_newton::Symmetric2;
 use crate::polynomial::{Number, Simd};
 
@@ -132,5 +133,37 @@ impl LaneSet for Cylinder {
 
     fn reach(&self) -> f64 {
         self.radius.hypot(self.half_height)
+    }
+}
+
+impl LaneSet for Segment {
+    #[inline(always)]
+    fn project<S: Simd, N: Number<S>>(&self, simd: S, x: V3<N>) -> V3<N> {
+        let (zero, half) = (N::splat(simd, 0.0), N::splat(simd, self.half_length));
+        [zero, zero, x[2].max(-half).min(half)]
+    }
+
+    #[inline(always)]
+    fn offset<S: Simd, N: Number<S>>(&self, simd: S, x: V3<N>) -> LaneOffset<N> {
+        let (zero, one) = (N::splat(simd, 0.0), N::splat(simd, 1.0));
+        let v = subtract(x, LaneSet::project(self, simd, x));
+        let distance = dot(v, v).sqrt();
+        let frame = basis(simd, v);
+        let inverse = one / distance;
+        // Across the axis alone where the segment is beside.
+        let beside = if self.half_length == 0.0 { zero } else { one.select(v[2].abs().le(zero), zero) };
+        let bent = beside * inverse;
+        let [t0, t1, _] = frame;
+        let curvature = [inverse - bent * t0[2] * t0[2], -(bent * t0[2] * t1[2]), inverse - bent * t1[2] * t1[2]];
+        LaneOffset { distance, frame, curvature, cone: [one, one, one - beside] }
+    }
+
+    #[inline(always)]
+    fn height<S: Simd, N: Number<S>>(&self, simd: S, n: V3<N>) -> N {
+        N::splat(simd, self.half_length) * n[2].abs()
+    }
+
+    fn reach(&self) -> f64 {
+        self.half_length
     }
 }
