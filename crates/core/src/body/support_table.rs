@@ -26,6 +26,12 @@ const FIELDS: usize = 9;
 /// cold starts slower. Pinned by `the_ellipsoid_of_a_ball_is_a_smaller_ball`.
 const FULLNESS: f64 = 0.75;
 
+/// Square of the ratio of the longest to the shortest half axis of the ellipsoid, from which the
+/// body counts as thin; dimensionless, about 1 to 5.
+///
+/// It changes time only: below, a start of the other kind takes as long.
+const THIN_SQUARED: f64 = 36.0;
+
 /// An ellipsoid about as large as the body, and for each cell of directions about where the body is
 /// farthest along them, with the constraint that is active along its middle.
 ///
@@ -35,6 +41,7 @@ pub struct Outline {
     inverse: Matrix3<f64>,
     reach: f64,
     shape: Matrix3<f64>,
+    is_thin: bool,
     cells: Vec<[f64; FIELDS]>,
     active: Vec<u8>,
 }
@@ -86,7 +93,9 @@ impl Outline {
         }
         let reach = support.reach;
         let shape = inverse * inverse.transpose() * (FULLNESS * reach).powi(2);
-        (Self { inverse: *inverse, reach, shape, cells, active }, traced)
+        let singular = inverse.singular_values();
+        let is_thin = singular.max().powi(2) > THIN_SQUARED * singular.min().powi(2);
+        (Self { inverse: *inverse, reach, shape, is_thin, cells, active }, traced)
     }
 
     /// Largest norm of the normalized coordinates of all support points: what lies between them
@@ -105,6 +114,18 @@ impl Outline {
     /// The ellipsoid, as the matrix Σ of its support function `√(nᵀ Σ n)`, m².
     pub fn shape(&self) -> &Matrix3<f64> {
         &self.shape
+    }
+
+    /// Radius of the ellipsoid in normalized coordinates, where it is a ball.
+    #[inline(always)]
+    pub fn radius(&self) -> f64 {
+        FULLNESS * self.reach
+    }
+
+    /// Whether the ellipsoid is several times longer than thick.
+    #[inline(always)]
+    pub fn is_thin(&self) -> bool {
+        self.is_thin
     }
 
     /// Where the cell of a direction is kept; body frame, any length.

@@ -14,14 +14,22 @@
 //! leads to another feature of the set, K is that of the wrong one. No evaluation of g is needed to
 //! find that out: with `v = x - P x` at the point that was stepped to and `q = W α - r`, the
 //! residual is `Tᵀv + (n·v) q`, and Newton's method for that goes on with the features as they are.
+//!
+//! The tangents are those of the offset surface near the solution, where they are those of the body
+//! as well. While the normals differ they are those of the body, n the direction of -∇g: across a
+//! thin body W along the others would be that of its edge, for which steps along its sides are as
+//! short as it is thin. The residual holds for any tangents; the first step starts from `α = 0`.
 
 use super::projectable::{Offset, Projectable};
-use crate::measure::frames::vector::{V3, add, add_scaled, dot, scaled};
+use crate::measure::frames::vector::{M3, V3, add, add_scaled, dot, scaled};
 use crate::measure::solver::tangent_newton::{Plane, SurfaceCurvature, Symmetric2, moved};
 use crate::polynomial::Simd;
 
 /// Most corrections of a step for features of the set that it leads to.
 pub(super) const FEATURES: usize = 5;
+
+/// Not the number of a feature.
+const NO_FEATURE: u8 = u8::MAX;
 
 /// A step and where it leads.
 #[derive(Clone, Copy, Debug)]
@@ -36,16 +44,16 @@ pub(super) struct Move {
     pub(super) compliance: Symmetric2<f64>,
 }
 
-/// Newton's step from x, which is outside of the set; none where the body does not face it.
-/// `smallest` (per metre) is added to the curvature that is divided by: where both are flat it
-/// bounds the step.
+/// Newton's step from x, which is outside of the set; none where the body does not face it. The
+/// third vector of the frame is the normal of the offset surface there or of the body. `smallest`
+/// (per metre) is added to the curvature that is divided by: where both are flat it bounds the step.
 #[inline(always)]
 pub(super) fn newton<S: Simd, P: Projectable>(
     simd: S,
     set: &P,
     x: V3<f64>,
     from: &Offset,
-    (plane, bend): (&Plane<f64>, &SurfaceCurvature<f64>),
+    (frame, plane, bend): (&M3<f64>, &Plane<f64>, &SurfaceCurvature<f64>),
     smallest: f64,
 ) -> Option<Move> {
     let g = plane.gradient;
@@ -58,23 +66,27 @@ pub(super) fn newton<S: Simd, P: Projectable>(
         -multiplier * (g[1] * straight + shift * bend.tilt[1]),
     ];
     let w = scaled::<S, f64>(bend.curvature, multiplier);
-    let k = from.curvature;
-    let (k00, k01, k11) = (w[0] + k[0] + smallest, w[1] + k[1], w[2] + k[2] + smallest);
-    let inverse = 1.0 / (k00 * k11 - k01 * k01);
-    let mut alpha = [(k11 * r[0] - k01 * r[1]) * inverse, (k00 * r[1] - k01 * r[0]) * inverse];
-    if !(g[2] < 0.0 && inverse > 0.0 && inverse.is_finite()) {
-        return None;
-    }
-    let compliance = scaled::<S, f64>([k11, -k01, k00], inverse);
     // Along the normal the tangential part of the gradient, of second order, counts as well.
     let step = |alpha: [f64; 2]| [alpha[0], alpha[1], shift + multiplier * (g[0] * alpha[0] + g[1] * alpha[1])];
-    let mut next = set.offset(simd, moved::<S, f64>(x, step(alpha), &from.frame));
-    let mut feature = from.feature;
-    let [t0, t1, n] = from.frame;
+    let [t0, t1, n] = *frame;
+    let (mut alpha, mut compliance, mut feature) = ([0.0; 2], [0.0; 3], NO_FEATURE);
+    if n == from.frame[2] {
+        let k = from.curvature;
+        let (k00, k01, k11) = (w[0] + k[0] + smallest, w[1] + k[1], w[2] + k[2] + smallest);
+        let inverse = 1.0 / (k00 * k11 - k01 * k01);
+        alpha = [(k11 * r[0] - k01 * r[1]) * inverse, (k00 * r[1] - k01 * r[0]) * inverse];
+        if !(g[2] < 0.0 && inverse > 0.0 && inverse.is_finite()) {
+            return None;
+        }
+        compliance = scaled::<S, f64>([k11, -k01, k00], inverse);
+        feature = from.feature;
+    }
+    let mut next = set.offset(simd, moved::<S, f64>(x, step(alpha), frame));
     for _ in 0..FEATURES {
         if next.feature == feature || !(next.distance > 0.0) {
             break;
         }
+        let is_first = feature == NO_FEATURE;
         feature = next.feature;
         let [u0, u1, m] = next.frame;
         let along = next.distance * dot::<S, f64>(m, n);
@@ -94,18 +106,23 @@ pub(super) fn newton<S: Simd, P: Projectable>(
         };
         let (b0, b1) = (bent(t0), bent(t1));
         let (n0, n1) = (dot::<S, f64>(b0, n), dot::<S, f64>(b1, n));
-        let j = [
-            [dot::<S, f64>(b0, t0) + along * w[0] + q[0] * n0, dot::<S, f64>(b1, t0) + along * w[1] + q[0] * n1],
-            [dot::<S, f64>(b0, t1) + along * w[1] + q[1] * n0, dot::<S, f64>(b1, t1) + along * w[2] + q[1] * n1],
-        ];
+        let least = if is_first { along * smallest } else { 0.0 };
+        let (j00, j01) =
+            (dot::<S, f64>(b0, t0) + along * w[0] + q[0] * n0, dot::<S, f64>(b1, t0) + along * w[1] + q[0] * n1);
+        let (j10, j11) =
+            (dot::<S, f64>(b0, t1) + along * w[1] + q[1] * n0, dot::<S, f64>(b1, t1) + along * w[2] + q[1] * n1);
+        let j = [[j00 + least, j01], [j10, j11 + least]];
         let determinant = j[0][0] * j[1][1] - j[0][1] * j[1][0];
         if !(determinant > 0.0) {
             break;
         }
         let inverse = 1.0 / determinant;
+        if is_first {
+            compliance = scaled::<S, f64>([j[1][1], -j[0][1], j[0][0]], along * inverse);
+        }
         alpha[0] -= (j[1][1] * residual[0] - j[0][1] * residual[1]) * inverse;
         alpha[1] -= (j[0][0] * residual[1] - j[1][0] * residual[0]) * inverse;
-        next = set.offset(simd, moved::<S, f64>(x, step(alpha), &from.frame));
+        next = set.offset(simd, moved::<S, f64>(x, step(alpha), frame));
     }
     Some(Move { step: step(alpha), next, shift, compliance })
 }

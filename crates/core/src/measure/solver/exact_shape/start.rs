@@ -5,18 +5,38 @@
 //! derivative of -x by n and K that of n(x), Newton's method for it turns n by δ along the
 //! tangents, `(I + K U) δ = n(x(n)) - n`: on the ellipsoid that stands for the body first, then on
 //! its support table.
+//!
+//! Of a thin body x(n) crosses the whole side while n turns by no more than the thickness, so that
+//! such turns overshoot. There the point of the ellipsoid is looked for and not its normal: with
+//! `x = c + A z`, |z| = 1, `v = x - P x` and J the derivative of v, Newton's method on the sphere for
+//! the least `|v|² / 2` has the step s across z with
+//!
+//! ```text
+//! (AᵀJA + μ I) s = -Aᵀv + ν z,    μ = -z·Aᵀv,
+//! ```
+//!
+//! which starts where the way from the centre to the set leaves the ellipsoid: μ is above 0 there.
 
 use super::projectable::{Offset, Projectable};
 use crate::body::Body;
 use crate::measure::frames::vector::{
-    M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, dot, normalized, rows, scaled, subtract,
-    times_transposed,
+    M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, normalized, rows, scaled,
+    subtract, times_transposed,
 };
 use crate::measure::solver::tangent_newton::Relative;
 use crate::polynomial::Simd;
 
 /// Most turns on the ellipsoid.
 pub(super) const ELLIPSOID_TURNS: usize = 4;
+
+/// Most steps on the ellipsoid of a thin body.
+const THIN_STEPS: usize = 6;
+
+/// Square of a step on the ellipsoid, radians squared in normalized coordinates, that is left to
+/// Newton's method on the body itself.
+///
+/// Larger, it starts too far away; smaller, more steps are taken than pay. It changes time only.
+const SMALL_STEP: f64 = 3e-2;
 
 /// Most looks at the support table.
 pub(super) const TABLE_LOOKS: usize = 3;
@@ -38,6 +58,10 @@ pub(super) fn start<S: Simd, P: Projectable>(
     relative: &Relative<f64>,
     mut n: V3<f64>,
 ) -> (V3<f64>, V3<f64>) {
+    if body.outline().is_thin() {
+        let n = on_the_ellipsoid(simd, set, body, relative, n);
+        return (farthest(simd, body, relative, n).0, n);
+    }
     let shape: M3<f64> = rows(simd, body.outline().shape());
     let turned = times_transposed::<S, f64>(&relative.rotation, &shape);
     let shape = times_transposed::<S, f64>(&turned, &relative.rotation);
@@ -73,6 +97,60 @@ pub(super) fn start<S: Simd, P: Projectable>(
         n = turn(simd, n, off, &seen, [dot::<S, f64>(b0, a0), dot::<S, f64>(b0, a1), dot::<S, f64>(b1, a1)]);
     }
     unreachable!("the last look returns")
+}
+
+/// The inward normal where the ellipsoid that stands for a thin body is nearest to the set, from the
+/// set's normal n at the body's centre on.
+#[inline(always)]
+fn on_the_ellipsoid<S: Simd, P: Projectable>(
+    simd: S,
+    set: &P,
+    body: &Body,
+    relative: &Relative<f64>,
+    n: V3<f64>,
+) -> V3<f64> {
+    let linear: M3<f64> = rows(simd, &body.normalization().linear);
+    let inverse: M3<f64> = rows(simd, body.inverse());
+    let radius = body.outline().radius();
+    let mut z = normalized(simd, apply::<S, f64>(&linear, apply_transposed::<S, f64>(&relative.rotation, n)));
+    z = scaled::<S, f64>(z, -1.0);
+    for _ in 0..THIN_STEPS {
+        let out = scaled::<S, f64>(apply::<S, f64>(&inverse, z), radius);
+        let out = apply::<S, f64>(&relative.rotation, out);
+        let seen = set.offset(simd, add::<S, f64>(relative.origin, out));
+        if !(seen.distance > 0.0) {
+            break;
+        }
+        // The set's tangents and normal in normalized coordinates.
+        let [t0, t1, m] = seen.frame.map(|t| {
+            let own = apply_transposed::<S, f64>(&relative.rotation, t);
+            scaled::<S, f64>(apply_transposed::<S, f64>(&inverse, own), radius)
+        });
+        let pull = (-dot::<S, f64>(z, m)).max(0.0);
+        let [k00, k01, k11] = seen.curvature;
+        let (b0, b1) = (
+            add_scaled::<S, f64>(scaled::<S, f64>(t0, k00), k01, t1),
+            add_scaled::<S, f64>(scaled::<S, f64>(t1, k11), k01, t0),
+        );
+        // Everything over the distance.
+        let entry = |i: usize, j: usize| b0[i] * t0[j] + b1[i] * t1[j] + m[i] * m[j] / seen.distance;
+        let hessian =
+            [entry(0, 0) + pull, entry(0, 1), entry(0, 2), entry(1, 1) + pull, entry(1, 2), entry(2, 2) + pull];
+        let (cofactors, determinant) = cofactors(simd, hessian);
+        let (of_m, of_z) = (apply_symmetric::<S, f64>(&cofactors, m), apply_symmetric::<S, f64>(&cofactors, z));
+        let across = dot::<S, f64>(z, of_m) / dot::<S, f64>(z, of_z);
+        let step = scaled::<S, f64>(add_scaled::<S, f64>(of_m, -across, of_z), -1.0 / determinant);
+        let square = dot::<S, f64>(step, step);
+        if !square.is_finite() {
+            break;
+        }
+        z = normalized(simd, add::<S, f64>(z, step));
+        if square < SMALL_STEP {
+            break;
+        }
+    }
+    let outward = apply::<S, f64>(&relative.rotation, apply_transposed::<S, f64>(&linear, z));
+    scaled::<S, f64>(normalized(simd, outward), -1.0)
 }
 
 /// About the point of the body farthest along -n, and its derivative by that direction in the
