@@ -124,7 +124,8 @@ impl ShapeAnswers for OfCapsules<'_> {
     fn write(&mut self, answer: usize, found: &ExactProven) {
         let (capsule, (_, capsule_pose)) = (self.of_capsule.0, self.poses(answer));
         let (tolerance, options, goal) = (self.tolerance, self.options, StopCriterion::NARROW);
-        self.answers[answer] = Problem { capsule, capsule_pose, tolerance, options, goal }.outside(found);
+        self.answers[answer] =
+            Problem { capsule, capsule_pose, tolerance, options, goal }.outside(&capsule.closed_form(), found);
     }
 
     fn solve_alone(&mut self, answer: usize, rounds: u32) {

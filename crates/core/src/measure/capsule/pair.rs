@@ -173,16 +173,17 @@ impl Problem<'_> {
             return Ok(self.met(&to_world(&form, form_pose, found.x), found.rounds));
         }
         *warm = found.trace.map_or_else(WarmStart::default, |trace| Hint::Exact(trace).into());
-        Ok(self.outside(&found))
+        Ok(self.outside(&form, &found))
     }
 
     /// The answer where the axis is outside of the body at the distance that is proven, in the frame
     /// of the capsule.
-    pub(in crate::measure) fn outside(&self, found: &ExactProven) -> CapsuleDistance {
-        let (form, form_pose) = (self.capsule.closed_form(), self.capsule_pose);
+    #[inline(always)]
+    pub(in crate::measure) fn outside(&self, form: &ClosedForm, found: &ExactProven) -> CapsuleDistance {
+        let form_pose = self.capsule_pose;
         let ExactProven { lower, upper, x, nearest, n, rounds, .. } = *found;
-        let witnesses = [x, nearest].map(|point| to_world(&form, form_pose, point));
-        self.apart([lower, upper], witnesses, direction_to_world(&form, form_pose, n), rounds)
+        let witnesses = [x, nearest].map(|point| to_world(form, form_pose, point));
+        self.apart([lower, upper], witnesses, direction_to_world(form, form_pose, n), rounds)
     }
 
     /// Of a body with several constraints.

@@ -7,13 +7,14 @@
 //! body, and its projection attain an upper bound. Where the body seems to reach the set, the least
 //! value of its polynomial there decides ([`super::level`]).
 
+use super::along_body::AlongBody;
 use super::level::{Level, LevelProblem};
 use super::newton::newton;
 use super::projectable::{Offset, Projectable};
 use super::start::start;
 use crate::body::Body;
 use crate::measure::frames::vector::{
-    M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, basis, dot, rows, scaled, subtract,
+    M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, scaled, subtract,
 };
 use crate::measure::options::Options;
 use crate::measure::solver::stages::{Stage, runs};
@@ -31,12 +32,13 @@ const MAX_ROUNDS: u32 = 20;
 /// How often a point that a step led too far from the body is brought back.
 const MOST_BROUGHT: u32 = 3;
 
-/// Square of the tangent of the angle between the normals of the body and of the set's offset
-/// surface, dimensionless, above which Newton's method takes the tangents of the body: 3 degrees.
+/// Squares of the tangent of the angle between the normals of the body and of the set's offset
+/// surface, dimensionless, above which Newton's method takes the tangents of the body: 27 degrees,
+/// and 3 of a thin body.
 ///
 /// Larger, steps along thin bodies are short; smaller, tangents are taken twice where that changes
 /// nothing. It changes time only.
-const TILTED_SQUARED: f64 = 3e-3;
+const TILTED_SQUARED: [f64; 2] = [0.25, 3e-3];
 
 /// Square of a step in normalized coordinates, relative to the body's size there, dimensionless, up
 /// to which the bracket where it leads is computed.
@@ -242,7 +244,7 @@ impl<P: Projectable> ExactPair<'_, P> {
         let local = side.localize(simd, &seen.frame);
         let plane = Plane::new(simd, &trace.jet, &local);
         let bend = SurfaceCurvature::new(simd, &trace.jet, &local);
-        let found = newton(simd, &self.set, x, &seen, (&seen.frame, &plane, &bend), self.smallest())?;
+        let found = newton(simd, &self.set, x, &seen, (&plane, &bend), self.smallest())?;
         if !(side.relative_square(simd, &local, found.step) < LONGEST_FOLLOWED_STEP * LONGEST_FOLLOWED_STEP) {
             return None;
         }
@@ -301,20 +303,21 @@ impl<P: Projectable> ExactPair<'_, P> {
                 (seen, before, series) = (self.set.offset(simd, x), None, Series::default());
                 continue;
             }
-            let mut frame = seen.frame;
-            let mut local = side.localize(simd, &frame);
-            let mut plane = Plane::new(simd, &jet, &local);
+            let local = side.localize(simd, &seen.frame);
+            let plane = Plane::new(simd, &jet, &local);
             let [across_0, across_1, along] = plane.gradient;
-            let tilted = across_0 * across_0 + across_1 * across_1 > TILTED_SQUARED * along * along;
-            if along < 0.0 && tilted {
-                let outward = apply_transposed::<S, f64>(&frame, plane.gradient);
-                frame = basis(simd, scaled::<S, f64>(outward, -1.0));
-                local = side.localize(simd, &frame);
-                plane = Plane::new(simd, &jet, &local);
+            let across = across_0 * across_0 + across_1 * across_1;
+            if across > TILTED_SQUARED[1] * along * along && along < 0.0 && self.is_tilted(across, along) {
+                let inward = scaled::<S, f64>(apply_transposed::<S, f64>(&seen.frame, plane.gradient), -1.0);
+                let (set, smallest, share) = (&self.set, self.smallest(), damping(round));
+                before = Some(x);
+                (x, seen) =
+                    dispatch(AlongBody { set, side, x, jet: &jet, inward, smallest, longest: LONGEST_STEP, share });
+                series = Series::default();
+                continue;
             }
             let bend = SurfaceCurvature::new(simd, &jet, &local);
-            let found = newton(simd, &self.set, x, &seen, (&frame, &plane, &bend), self.smallest());
-            let Some(found) = found else {
+            let Some(found) = newton(simd, &self.set, x, &seen, (&plane, &bend), self.smallest()) else {
                 // The step before has led behind the body.
                 let Some(old) = before.filter(|_| halved < HALVINGS) else { return Ended::Lost };
                 halved += 1;
@@ -332,9 +335,9 @@ impl<P: Projectable> ExactPair<'_, P> {
                 // There the normal is that of the face: on to the surface.
                 let step = if is_flat { [0.0, 0.0, found.shift] } else { found.step };
                 let at = side.extrapolate(simd, &jet, &local, step);
-                let to = moved::<S, f64>(x, step, &frame);
+                let to = moved::<S, f64>(x, step, &seen.frame);
                 let there = if is_flat { &self.set.offset(simd, to) } else { &found.next };
-                if let Some(proven) = self.bracket(simd, side, &at, (to, there), &frame) {
+                if let Some(proven) = self.bracket(simd, side, &at, (to, there), &seen.frame) {
                     let delta = apply_transposed::<S, f64>(&local, step);
                     let trace = trace_of(simd, &jet, (side.normalized(simd, x), delta), predicted);
                     return Ended::Proven(ExactProven { rounds: *rounds, trace: Some(trace), ..proven });
@@ -343,7 +346,7 @@ impl<P: Projectable> ExactPair<'_, P> {
                     return Ended::Wide(self.about(simd, to, &seen));
                 }
             }
-            let tangents = [frame[0], frame[1]];
+            let tangents = [seen.frame[0], seen.frame[1]];
             let part = series.part(simd, tangents, along, square.sqrt());
             let (mut step, mut length, slope) = (found.step, square.sqrt(), plane.slope());
             let (mut corrected, mut next) = (false, found.next);
@@ -355,7 +358,7 @@ impl<P: Projectable> ExactPair<'_, P> {
                         tried[i] += more.longer[i] + more.shorter[i];
                         tried[2] -= slope[i] * more.shorter[i];
                     }
-                    let there = self.set.offset(simd, moved::<S, f64>(x, tried, &frame));
+                    let there = self.set.offset(simd, moved::<S, f64>(x, tried, &seen.frame));
                     // Newton's own step may lead anywhere from where there is no curvature.
                     corrected = found.next.feature == seen.feature || there.feature == seen.feature;
                     if corrected {
@@ -366,19 +369,26 @@ impl<P: Projectable> ExactPair<'_, P> {
             }
             series.push(tangents, Last { newton: along, taken: [step[0], step[1]], slope, corrected });
             let mut share = part.min(LONGEST_STEP / length);
-            if round > PATIENCE && !corrected && square > WORTH_A_BRACKET_SQUARED {
-                share *= if round & 1 == 0 { 0.5 } else { 0.8 };
+            if !corrected && square > WORTH_A_BRACKET_SQUARED {
+                share *= damping(round);
             }
             before = Some(x);
             if share < 1.0 {
                 step = scaled::<S, f64>(step, share);
                 series.took([step[0], step[1]]);
             }
-            x = moved::<S, f64>(x, step, &frame);
+            x = moved::<S, f64>(x, step, &seen.frame);
             seen = if share < 1.0 { self.set.offset(simd, x) } else { next };
         }
         // Flat sides take more steps than this; others lead in circles.
         if series.is_corrected() { Ended::Wide(self.about(simd, x, &seen)) } else { Ended::Lost }
+    }
+
+    /// Whether the gradient with these parts across the normal, squared, and along it is so far from
+    /// opposite that steps are taken along the body.
+    #[inline(always)]
+    fn is_tilted(&self, across: f64, along: f64) -> bool {
+        across > TILTED_SQUARED[usize::from(self.body.outline().is_thin())] * along * along
     }
 
     /// What is known about a point that nothing proves.
@@ -434,6 +444,18 @@ impl<P: Projectable> ExactPair<'_, P> {
         let enough = narrow && is_aligned || self.goal.met(lower, upper);
         let proven = ExactProven { lower, upper, x, nearest, n, multiplier, rounds: 0, trace: None };
         (enough && lower > 0.0).then_some(proven)
+    }
+}
+
+/// The share of a long step that is taken in a round.
+#[inline(always)]
+fn damping(round: u32) -> f64 {
+    if round <= PATIENCE {
+        1.0
+    } else if round & 1 == 0 {
+        0.5
+    } else {
+        0.8
     }
 }
 

@@ -1,6 +1,7 @@
 //! Bodies against sets with closed forms: boxes, cylinders, segments, points, and all points within
 //! a radius of one. One smooth body is left to linearize; the other side costs no evaluation.
 
+mod along_body;
 mod cuboid;
 mod cylinder;
 mod distance;
