@@ -76,8 +76,8 @@ impl Solver<'_> {
         if settled { Answer { status: AnswerStatus::Converged, ..answer } } else { answer }
     }
 
-    /// The signed distance that was found of a body and a capsule, which is the first of the pair or
-    /// not.
+    /// The signed distance that was found of a body and a capsule, which is the first of the pair
+    /// or not.
     pub(crate) fn signed_capsule(&self, pair: &Pair<'_>, (found, is_first): (&CapsuleDistance, bool)) -> Answer {
         let (capsule, body) = if is_first { (&pair.a, &pair.b) } else { (&pair.b, &pair.a) };
         let found = SignedCapsule::of(found, body.pose().zip(capsule.pose()));

@@ -153,7 +153,7 @@ impl Clearance {
                 Other::Standing(other) => self.placed.standing(other).map(|thing| (other, thing)),
             };
             let Some((other_slot, b)) = thing else { return true };
-            // Distances say nothing below 0.
+            // Distances say nothing below 0, and of capsules only that is asked for then.
             let stands = matches!(other, Other::Standing(_));
             if stands && threshold >= 0.0 && LanePair::of(&a, &b).is_some() {
                 if a.box_gap_m(&b) <= threshold + slack_m {

@@ -194,8 +194,8 @@ fn states_rays_and_neighbours_of_capsules() {
     assert!((touching[1].point.expect("a point") - Vector3::new(0.0, 0.0, -0.45) - normal * 0.1).norm() < 1e-9);
 }
 
-/// A capsule that moves among bodies, and a body that moves about a capsule: state by state the rows
-/// are those of single queries.
+/// A capsule that moves among bodies, and a body that moves about a capsule: state by state the
+/// rows are those of single queries.
 #[test]
 fn clearances_of_capsules_are_those_of_single_queries() {
     let crew = Crew::new(2).expect("threads");

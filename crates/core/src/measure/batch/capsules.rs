@@ -1,6 +1,6 @@
 //! Signed distances of a solid and a capsule at many poses at once.
 
-use super::BatchError;
+use super::error::BatchError;
 use super::lane_poses::pose_of;
 use super::rounds::MOST_ROUNDS;
 use super::shapes::{ShapeAnswers, ShapeBatch};
@@ -20,9 +20,10 @@ use crate::polynomial::dispatch_lanes;
 /// distances of points.
 ///
 /// Each answer is one of [`distance_to_capsule`] from a cold start in all that is proven of it, and
-/// depends on its own poses only, to the last bit. Bodies of one constraint are solved several poses
-/// at a time, which takes a fraction of the time of as many queries; all others, and poses that do
-/// not converge at once such as those in which the axis meets the body, are solved one by one.
+/// depends on its own poses only, to the last bit. Bodies of one constraint but balls are solved
+/// several poses at a time, which takes a fraction of the time of as many queries; all others, and
+/// poses that do not converge at once such as those in which the axis meets the body, are solved one
+/// by one.
 ///
 /// # Errors
 /// No poses, different numbers of poses, or a number of places that is not the number of poses;
@@ -67,9 +68,10 @@ pub fn distance_to_capsule_batch(
     }
     if let [body] = solid.parts()
         && body.is_smooth()
+        // That of balls is a formula.
+        && body.closed_form().is_none()
         && options.max_iterations() >= MOST_ROUNDS
         && runs(Stage::Lanes)
-        && runs(Stage::ClosedForm)
     {
         in_lanes((body, poses), (capsule, capsule_poses), options, answers);
     } else {

@@ -8,6 +8,7 @@
 //! that no answer depends on the other poses of the batch.
 
 mod capsules;
+mod error;
 mod iterate;
 mod lane_poses;
 mod rounds;
@@ -30,38 +31,13 @@ use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::{Aligned, Lanes, MAX_LANES, Number, Simd, Vector, WithSimd, dispatch_lanes};
 pub use capsules::distance_to_capsule_batch;
+pub use error::BatchError;
 use iterate::Iterate;
 use lane_poses::{lane_rotations, lane_translations};
 use nalgebra::Vector3;
 use rounds::{COARSE, DIVERGED, MOST_COARSE, MOST_ROUNDS, NEARLY_CONVERGED, Rounds, run, solve_alone};
 use shapes::{OfBodies, ShapeBatch};
 use waiting::{Group, MAX_COARSE, Waiting};
-
-/// Why a batch is refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum BatchError {
-    /// No poses.
-    #[error("the batch is empty; give at least one pose")]
-    Empty,
-    /// Not a place for every answer.
-    #[error("{poses} poses but places for {answers} answers; give one place for each pose")]
-    Lengths {
-        /// Number of poses.
-        poses: usize,
-        /// Number of places for answers.
-        answers: usize,
-    },
-    /// As many poses of neither side as of the other.
-    #[error(
-        "{solid} poses of the solid but {capsule} of the capsule; give as many of both, or one that stands for all"
-    )]
-    Sides {
-        /// Number of poses of the solid.
-        solid: usize,
-        /// Number of poses of the capsule.
-        capsule: usize,
-    },
-}
 
 /// Euclidean distances between solid `a` at `pose_a` and solid `b` at each of `poses_b` (body to
 /// world), written to `answers` in the order of the poses.

@@ -1,5 +1,5 @@
-//! A smooth body and a box, a cylinder or a segment at several poses at once: starts from support tables and
-//! first rounds in single precision, then rounds that bracket.
+//! A smooth body and a box, a cylinder or a segment at several poses at once: starts from support
+//! tables and first rounds in single precision, then rounds that bracket.
 
 use super::lane_poses::{lane_rotations, lane_translations};
 use super::rounds::{COARSE, MOST_COARSE, MOST_ROUNDS, Rounds, run, solve_alone};

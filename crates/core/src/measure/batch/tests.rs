@@ -1,9 +1,9 @@
 //! Batches against single queries.
 
-use super::{BatchError, distance_batch};
+use super::{BatchError, distance_batch, distance_to_capsule_batch};
 use crate::body::{Body, Compound};
 use crate::measure::solver::stages::{Stage, only};
-use crate::measure::{Distance, Options, Pose, Status, WarmStart, distance};
+use crate::measure::{Capsule, CapsuleDistance, Distance, Options, Pose, Status, WarmStart, distance};
 use nalgebra::{Vector3, Vector4};
 use std::sync::atomic::AtomicBool;
 use sublevel_testkit::Seeded;
@@ -254,6 +254,47 @@ fn boxes_and_cylinders_are_answered_in_lanes() {
                     let count = answered(a, b, &poses);
                     println!("degree {degree}, {kind}, unit {unit:e}: {count} of 400");
                     assert!(count >= 360, "degree {degree}, {kind}, unit {unit:e}: {count} of 400");
+                }
+            }
+        }
+    }
+}
+
+/// The same beside capsules, segments and points, whichever side moves.
+#[test]
+fn capsules_are_answered_in_lanes() {
+    for degree in [2, 4, 6, 8] {
+        for (radius, half) in [(0.2, 0.6), (0.3, 0.0), (0.0, 0.6), (0.0, 0.0)] {
+            for exponent in [-20, 0, 20] {
+                let mut random = Seeded(5);
+                let unit = 2_f64.powi(exponent);
+                let half_axes = Vector3::new(0.7, 0.5, 0.4) * unit;
+                let egg = if degree == 2 {
+                    Body::ellipsoid("egg", Vector3::zeros(), half_axes).unwrap()
+                } else {
+                    Body::superellipsoid("q", Vector3::zeros(), half_axes, degree).unwrap()
+                };
+                let capsule = Capsule::new(radius * unit, half * unit).unwrap();
+                let poses: Vec<Pose> = (0..400)
+                    .map(|_| {
+                        let q = Vector4::from_fn(|_, _| random.signed()).normalize();
+                        let t =
+                            Vector3::from_fn(|_, _| random.signed()).normalize() * ((2.0 + random.positive()) * unit);
+                        Pose::from_quaternion(t, q.into()).unwrap()
+                    })
+                    .collect();
+                let here = [Pose::identity()];
+                for (of_egg, of_capsule) in [(&here[..], &poses[..]), (&poses[..], &here[..])] {
+                    let mut answers = [CapsuleDistance::default(); 400];
+                    let options = Options::default();
+                    only(&[Stage::Lanes], || {
+                        distance_to_capsule_batch(&egg, of_egg, &capsule, of_capsule, &options, &mut answers)
+                    })
+                    .unwrap();
+                    // Alone no method is left but the way to the interior point.
+                    let count = answers.iter().filter(|answer| answer.lower.is_finite()).count();
+                    println!("degree {degree}, radius {radius}, half {half}, unit {unit:e}: {count} of 400");
+                    assert!(count >= 360, "degree {degree}, radius {radius}, half {half}, unit {unit:e}: {count}");
                 }
             }
         }

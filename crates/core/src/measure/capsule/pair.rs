@@ -176,8 +176,8 @@ impl Problem<'_> {
         Ok(self.outside(&form, &found))
     }
 
-    /// The answer where the axis is outside of the body at the distance that is proven, in the frame
-    /// of the capsule.
+    /// The answer where the axis is outside of the body at the distance that is proven, in the
+    /// frame of the capsule.
     #[inline(always)]
     pub(in crate::measure) fn outside(&self, form: &ClosedForm, found: &ExactProven) -> CapsuleDistance {
         let form_pose = self.capsule_pose;

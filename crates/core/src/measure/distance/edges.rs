@@ -13,21 +13,25 @@ use crate::polynomial::dispatch;
 use nalgebra::{Matrix3, Vector3};
 
 /// The distance by Newton's method with active sets, from the last answer or from where the
-/// outlines are nearest; the hint is replaced where it is proven. Rounding may keep its bracket
-/// wider than asked for.
+/// outlines are nearest; the hint is replaced where it is proven.
 ///
 /// # Errors
 /// What the general search has to go on from.
 // What is lost is about as large as what is proven, and there is no allocation in a solve.
 #[allow(clippy::result_large_err)]
-pub(super) fn of_edges(query: &Query<'_>, warm: &mut WarmStart) -> Result<EdgeProven, Lost> {
+pub(super) fn of_edges(query: &Query<'_>, warm: &mut WarmStart) -> Result<Distance, Lost> {
     let Query { of_a: (a, pose_a), of_b: (b, pose_b), goal, options } = *query;
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
     let trace = if let Hint::Edges(trace) = &warm.hint { Some(trace) } else { None };
     let start = start((a, pose_a), pose_b, &warm.hint);
     let found = dispatch(EdgeQuery { a, pose_a, b, pose_b, goal, tolerance, options, trace, start })?;
     *warm = Hint::Edges(found.trace).into();
-    Ok(found)
+    let narrow = found.upper - found.lower <= tolerance;
+    if narrow || goal.met(found.lower, found.upper) {
+        Ok(answer((a, pose_a), &found, narrow))
+    } else {
+        Ok(query.refined(found.rounds, |search| search.resume_edges(&found)))
+    }
 }
 
 /// What the general search has found.
@@ -40,7 +44,7 @@ fn start((a, pose_a): (&Body, &Pose), pose_b: &Pose, hint: &Hint) -> Option<Star
 }
 
 /// What is proven as an answer, converged if `narrow`.
-pub(super) fn answer((a, pose_a): (&Body, &Pose), found: &EdgeProven, narrow: bool) -> Distance {
+fn answer((a, pose_a): (&Body, &Pose), found: &EdgeProven, narrow: bool) -> Distance {
     let rotation: Matrix3<f64> = *pose_a.rotation().to_rotation_matrix().matrix();
     let center = a.normalization().center;
     let to_world = |v: [f64; 3]| rotation * (Vector3::from(v) + center) + pose_a.translation();

@@ -3,7 +3,7 @@
 
 use super::answer::Distance;
 use super::balls::of_balls;
-use super::edges::{self, of_edges};
+use super::edges::of_edges;
 use super::exact::{Exact, of_shapes};
 use super::planes::lower_by_planes;
 use super::query::Query;
@@ -17,7 +17,6 @@ use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveConstraints;
 use crate::measure::solver::common_point::CommonPoint;
 use crate::measure::solver::continuation::{Follow, Lost, Proven, SEEK_ROUNDS, Seek};
-use crate::measure::solver::edge_newton::EdgeProven;
 use crate::measure::solver::exact_shape::{ShapeContact, contact_of_shapes};
 use crate::measure::solver::kkt_newton::Active;
 use crate::measure::solver::stages::{Stage, runs};
@@ -144,7 +143,7 @@ impl<'a> Query<'a> {
         }
         if runs(Stage::Edges) && !(of_a.0.is_smooth() && of_b.0.is_smooth()) {
             return match of_edges(self, warm) {
-                Ok(found) => self.of_edges(&found),
+                Ok(found) => found,
                 Err(lost) => self.search(&lost, warm),
             };
         }
@@ -255,20 +254,9 @@ impl<'a> Query<'a> {
         }
     }
 
-    /// The same of bodies with several constraints.
-    #[inline]
-    fn of_edges(&self, proven: &EdgeProven) -> Distance {
-        let narrow = proven.upper - proven.lower <= self.relation().tolerance;
-        if narrow || self.goal.met(proven.lower, proven.upper) {
-            edges::answer(self.of_a, proven, narrow)
-        } else {
-            self.refined(proven.rounds, |search| search.resume_edges(proven))
-        }
-    }
-
     /// A proven answer that rounding keeps wide, refined in double-double arithmetic.
     #[cold]
-    fn refined(&self, rounds: u32, resume: impl FnOnce(&mut Search<'_>)) -> Distance {
+    pub(super) fn refined(&self, rounds: u32, resume: impl FnOnce(&mut Search<'_>)) -> Distance {
         let pair = self.pair();
         let mut search = Search::new(&pair, self.goal, self.options, rounds);
         resume(&mut search);

@@ -65,6 +65,14 @@ fn cut_bodies_far_apart_converge() {
                 let label = format!("seed {seed}, {start}: {found:?}");
                 assert_eq!(found.status, Status::Converged, "{label}");
                 assert!(found.upper - found.lower <= 1e-9 * small.circumscribed().radius, "{label}");
+                let truth = except(&[Stage::Edges], || {
+                    distance(of_a.0, of_a.1, of_b.0, of_b.1, &Options::default(), &mut WarmStart::default())
+                });
+                assert!(found.lower <= truth.upper && truth.lower <= found.upper, "{label}: {truth:?}");
+                let (n, m) = (found.normal.expect("apart"), truth.normal.expect("apart"));
+                assert!((n - m).norm() < 1e-9, "{label}: {truth:?}");
+                assert_normals_of_active(1e-6, of_a, (&found.witness_a, &-n), &found.active_a, &label);
+                assert_normals_of_active(1e-6, of_b, (&found.witness_b, &n), &found.active_b, &label);
             }
         }
     }

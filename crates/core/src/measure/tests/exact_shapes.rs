@@ -88,6 +88,29 @@ fn smooth_bodies_against_shapes() {
     assert!(share > 90.0, "{share}");
 }
 
+/// Needles and plates of aspects from 10 to 100, whose nearest point crosses a whole side while the
+/// normal hardly turns.
+#[test]
+fn thin_bodies_against_shapes() {
+    let share = share("thin bodies against shapes", 900, |random| {
+        let thick = 10_f64.powf(-1.5 + 0.5 * random.signed());
+        let long = 2_f64.powf(random.signed());
+        let half = if random.next().is_multiple_of(2) {
+            [long, long, long * thick]
+        } else {
+            [long * thick, long * thick, long]
+        };
+        let degree = [2, 4, 6, 8][random.next() as usize % 4];
+        let thin = if degree == 2 {
+            Body::ellipsoid("thin", random.unit() * 0.3, half.into()).unwrap()
+        } else {
+            Body::superellipsoid("thin", random.unit() * 0.3, half.into(), degree).unwrap()
+        };
+        (thin, shape(random))
+    });
+    assert!(share > 85.0, "{share}");
+}
+
 #[test]
 fn shapes_against_shapes() {
     let share = share("shapes against shapes", 900, |random| (shape(random), shape(random)));

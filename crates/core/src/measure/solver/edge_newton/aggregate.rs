@@ -20,17 +20,23 @@ pub(super) struct Evaluated {
 }
 
 impl Evaluated {
-    /// At a point, and whether it lies in the ball of the body's [`crate::body::Trust`].
+    /// A place for them: it is large, and so it is filled where it is.
     #[inline(always)]
-    pub(super) fn new<S: Simd>(simd: S, side: &Side<'_, f64>, v: V3<f64>) -> (Self, bool) {
+    pub(super) fn none() -> Self {
+        Self { jets: [NOTHING; MAX_CONSTRAINTS], count: 0 }
+    }
+
+    /// Evaluates them at a point; whether it lies in the ball of the body's [`crate::body::Trust`].
+    #[inline(always)]
+    pub(super) fn fill<S: Simd>(&mut self, simd: S, side: &Side<'_, f64>, v: V3<f64>) -> bool {
         let z = side.normalized(simd, v);
         let radius = side.body().trust().radius;
         let constraints = side.body().constraints();
-        let mut jets = [NOTHING; MAX_CONSTRAINTS];
-        for (jet, constraint) in jets.iter_mut().zip(constraints) {
+        for (jet, constraint) in self.jets.iter_mut().zip(constraints) {
             *jet = constraint.polynomial.jet(simd, z);
         }
-        (Self { jets, count: constraints.len() }, dot::<S, f64>(z, z) <= radius * radius)
+        self.count = constraints.len();
+        dot::<S, f64>(z, z) <= radius * radius
     }
 
     /// Positions, values and gradients.

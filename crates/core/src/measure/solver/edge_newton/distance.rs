@@ -237,8 +237,9 @@ impl Solver<'_> {
         let y = add::<S, f64>(apply::<S, f64>(&relative.rotation, of_b.point), relative.origin);
         let frame = basis(simd, *n);
         let (local_a, local_b) = (side_a.localize(simd, &frame), side_b.localize(simd, &frame));
-        let linear_a = Linearized::new(simd, of_a.iter(), (&of_a.active, &of_a.hessian), &local_a);
-        let linear_b = Linearized::new(simd, of_b.iter(), (&of_b.active, &of_b.hessian), &local_b);
+        let (mut linear_a, mut linear_b) = (Linearized::none(), Linearized::none());
+        linear_a.fill(simd, of_a.iter(), (&of_a.active, &of_a.hessian), &local_a);
+        linear_b.fill(simd, of_b.iter(), (&of_b.active, &of_b.hessian), &local_b);
         let difference = apply::<S, f64>(&frame, subtract::<S, f64>(of_a.point, y));
         let Found { step, active } = self.step(simd, &linear_a, &linear_b, difference)?;
         if !step.within(simd, self.limits) {
@@ -274,13 +275,15 @@ impl Solver<'_> {
     ) -> Result<EdgeProven, Lost> {
         let (side_a, side_b) = &self.sides;
         let mut contacts = 0;
+        let (mut of_a, mut of_b) = (Evaluated::none(), Evaluated::none());
+        let (mut linear_a, mut linear_b) = (Linearized::none(), Linearized::none());
         for _ in 0..MAX_ROUNDS {
             if self.options.exhausted(*rounds) {
                 return Err(Lost::after(*rounds));
             }
             *rounds += 1;
-            let (of_a, inside_a) = Evaluated::new(simd, side_a, at.x);
-            let (of_b, inside_b) = Evaluated::new(simd, side_b, at.y);
+            let inside_a = of_a.fill(simd, side_a, at.x);
+            let inside_b = of_b.fill(simd, side_b, at.y);
             if !(inside_a && inside_b) {
                 // A step has led too far.
                 let (highest_a, highest_b) = (of_a.highest(), of_b.highest());
@@ -304,8 +307,8 @@ impl Solver<'_> {
             }
             let [active_a, active_b] = &at.active;
             let (bent_a, bent_b) = (active_a.sum(simd, &of_a).hessian, active_b.sum(simd, &of_b).hessian);
-            let linear_a = Linearized::new(simd, of_a.iter(), (active_a, &bent_a), &local_a);
-            let linear_b = Linearized::new(simd, of_b.iter(), (active_b, &bent_b), &local_b);
+            linear_a.fill(simd, of_a.iter(), (active_a, &bent_a), &local_a);
+            linear_b.fill(simd, of_b.iter(), (active_b, &bent_b), &local_b);
             let Some(mut found) = self.step(simd, &linear_a, &linear_b, difference) else {
                 return Err(Lost::after(*rounds));
             };

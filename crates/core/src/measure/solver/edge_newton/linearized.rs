@@ -25,23 +25,30 @@ pub(super) struct Linearized {
 }
 
 impl Linearized {
-    /// By constraints that are given by their positions in the body, values and gradients, and the
-    /// sum of the Hessians of the active ones, in normalized coordinates.
+    /// A place for them: it is large, and so it is filled where it is.
     #[inline(always)]
-    pub(super) fn new<S: Simd>(
-        _: S,
-        tangents: impl Iterator<Item = (usize, f64, V3<f64>)>,
-        (active, bent): (&Weighted, &[f64; 6]),
-        local: &M3<f64>,
-    ) -> Self {
-        let mut all = Self {
+    pub(super) fn none() -> Self {
+        Self {
             rows: [Row::default(); MAX_CONSTRAINTS],
             lengths: [0.0; MAX_CONSTRAINTS],
             index: [0; MAX_CONSTRAINTS],
             count: 0,
             active: ActiveRows::default(),
             hessian: [0.0; 6],
-        };
+        }
+    }
+
+    /// Takes constraints that are given by their positions in the body, values and gradients, and
+    /// the sum of the Hessians of the active ones, in normalized coordinates.
+    #[inline(always)]
+    pub(super) fn fill<S: Simd>(
+        &mut self,
+        _: S,
+        tangents: impl Iterator<Item = (usize, f64, V3<f64>)>,
+        (active, bent): (&Weighted, &[f64; 6]),
+        local: &M3<f64>,
+    ) {
+        (self.count, self.active) = (0, ActiveRows::default());
         for (i, value, gradient) in tangents {
             let is_active = active.iter().any(|(j, _)| j == i);
             if !is_active && value <= FAR_INSIDE {
@@ -51,20 +58,20 @@ impl Linearized {
             let length = dot::<S, f64>(gradient, gradient).sqrt();
             let inverse = 1.0 / length;
             let mean = (0.5 * value + 0.5).max(0.25);
-            all.rows[all.count] =
+            self.rows[self.count] =
                 Row { normal: scaled::<S, f64>(gradient, inverse), excess: (value - 1.0) * mean * inverse };
-            all.lengths[all.count] = length;
-            all.index[all.count] = i as u8;
+            self.lengths[self.count] = length;
+            self.index[self.count] = i as u8;
             if is_active {
-                all.active.push(all.count);
+                self.active.push(self.count);
             }
-            all.count += 1;
+            self.count += 1;
         }
         // No closures: what is inlined into one is not compiled for the vectors at hand.
         let b0 = apply_symmetric::<S, f64>(bent, local[0]);
         let b1 = apply_symmetric::<S, f64>(bent, local[1]);
         let b2 = apply_symmetric::<S, f64>(bent, local[2]);
-        all.hessian = [
+        self.hessian = [
             dot::<S, f64>(b0, local[0]),
             dot::<S, f64>(b0, local[1]),
             dot::<S, f64>(b0, local[2]),
@@ -72,7 +79,6 @@ impl Linearized {
             dot::<S, f64>(b1, local[2]),
             dot::<S, f64>(b2, local[2]),
         ];
-        all
     }
 
     #[inline(always)]

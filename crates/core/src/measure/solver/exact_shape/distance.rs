@@ -26,19 +26,19 @@ use crate::measure::solver::tangent_newton::{
 use crate::polynomial::{NumberJet, Scalar, Simd, WithSimd, dispatch};
 use nalgebra::Vector3;
 
-/// Most evaluations of Newton's method from one start.
-const MAX_ROUNDS: u32 = 20;
+/// Most evaluations of Newton's method from one start: of a body that is not thin, and of a thin
+/// one.
+const MAX_ROUNDS: [u32; 2] = [16, 20];
 
-/// How often a point that a step led too far from the body is brought back.
-const MOST_BROUGHT: u32 = 3;
+/// How often a point that a step led too far from the body is brought back; as above.
+const MOST_BROUGHT: [u32; 2] = [1, 3];
 
-/// Squares of the tangent of the angle between the normals of the body and of the set's offset
-/// surface, dimensionless, above which Newton's method takes the tangents of the body: 27 degrees,
-/// and 3 of a thin body.
+/// Square of the tangent of the angle between the normals of a thin body and of the set's offset
+/// surface, dimensionless, above which Newton's method takes the tangents of the body: 3 degrees.
 ///
-/// Larger, steps along thin bodies are short; smaller, tangents are taken twice where that changes
+/// Larger, steps along its sides are short; smaller, tangents are taken twice where that changes
 /// nothing. It changes time only.
-const TILTED_SQUARED: [f64; 2] = [0.25, 3e-3];
+const TILTED_SQUARED: f64 = 3e-3;
 
 /// Square of a step in normalized coordinates, relative to the body's size there, dimensionless, up
 /// to which the bracket where it leads is computed.
@@ -279,9 +279,11 @@ impl<P: Projectable> ExactPair<'_, P> {
         apart: bool,
         rounds: &mut u32,
     ) -> Ended {
+        let is_thin = self.body.outline().is_thin();
+        let [most_rounds, most_brought] = [MAX_ROUNDS, MOST_BROUGHT].map(|most| most[usize::from(is_thin)]);
         let (mut before, mut halved) = (None, 0);
         let (mut brought, mut series) = (0, Series::default());
-        for round in 1..=MAX_ROUNDS {
+        for round in 1..=most_rounds {
             while !(seen.distance > 0.0) {
                 let Some(old) = before.filter(|_| apart && halved < HALVINGS) else { return Ended::Lost };
                 halved += 1;
@@ -295,7 +297,7 @@ impl<P: Projectable> ExactPair<'_, P> {
             let (jet, inside) = side.jet(simd, x);
             if !inside {
                 // A step has led too far.
-                if brought == MOST_BROUGHT || !(jet.value < f64::INFINITY) {
+                if brought == most_brought || !(jet.value < f64::INFINITY) {
                     return Ended::Lost;
                 }
                 brought += 1;
@@ -307,10 +309,10 @@ impl<P: Projectable> ExactPair<'_, P> {
             let plane = Plane::new(simd, &jet, &local);
             let [across_0, across_1, along] = plane.gradient;
             let across = across_0 * across_0 + across_1 * across_1;
-            if across > TILTED_SQUARED[1] * along * along && along < 0.0 && self.is_tilted(across, along) {
+            if is_thin && across > TILTED_SQUARED * along * along && along < 0.0 {
                 let inward = scaled::<S, f64>(apply_transposed::<S, f64>(&seen.frame, plane.gradient), -1.0);
                 let (set, smallest, share) = (&self.set, self.smallest(), damping(round));
-                before = Some(x);
+                (before, halved) = (Some(x), 0);
                 (x, seen) =
                     dispatch(AlongBody { set, side, x, jet: &jet, inward, smallest, longest: LONGEST_STEP, share });
                 series = Series::default();
@@ -384,13 +386,6 @@ impl<P: Projectable> ExactPair<'_, P> {
         if series.is_corrected() { Ended::Wide(self.about(simd, x, &seen)) } else { Ended::Lost }
     }
 
-    /// Whether the gradient with these parts across the normal, squared, and along it is so far from
-    /// opposite that steps are taken along the body.
-    #[inline(always)]
-    fn is_tilted(&self, across: f64, along: f64) -> bool {
-        across > TILTED_SQUARED[usize::from(self.body.outline().is_thin())] * along * along
-    }
-
     /// What is known about a point that nothing proves.
     #[inline(always)]
     fn about<S: Simd>(&self, simd: S, x: V3<f64>, seen: &Offset) -> ExactProven {
@@ -439,7 +434,9 @@ impl<P: Projectable> ExactPair<'_, P> {
             return None;
         }
         let off = subtract::<S, f64>(outward, seen.frame[2]);
-        let is_aligned = dot::<S, f64>(off, off) <= ALIGNED * ALIGNED;
+        // Across a thin body the gradient turns with the error of its extrapolation.
+        let is_known = !self.body.outline().is_thin() || at.gradient_error * multiplier <= ALIGNED;
+        let is_aligned = is_known && dot::<S, f64>(off, off) <= ALIGNED * ALIGNED;
         let narrow = upper - lower <= self.tolerance;
         let enough = narrow && is_aligned || self.goal.met(lower, upper);
         let proven = ExactProven { lower, upper, x, nearest, n, multiplier, rounds: 0, trace: None };
@@ -447,7 +444,7 @@ impl<P: Projectable> ExactPair<'_, P> {
     }
 }
 
-/// The share of a long step that is taken in a round.
+/// The share of a step that is taken in a round.
 #[inline(always)]
 fn damping(round: u32) -> f64 {
     if round <= PATIENCE {

@@ -8,8 +8,8 @@
 //!
 //! Of a thin body x(n) crosses the whole side while n turns by no more than the thickness, so that
 //! such turns overshoot. There the point of the ellipsoid is looked for and not its normal: with
-//! `x = c + A z`, |z| = 1, `v = x - P x` and J the derivative of v, Newton's method on the sphere for
-//! the least `|v|² / 2` has the step s across z with
+//! `x = c + A z`, |z| = 1, `v = x - P x` and J the derivative of v, Newton's method on the sphere
+//! for the least `|v|² / 2` has the step s across z with
 //!
 //! ```text
 //! (AᵀJA + μ I) s = -Aᵀv + ν z,    μ = -z·Aᵀv,
@@ -60,7 +60,7 @@ pub(super) fn start<S: Simd, P: Projectable>(
 ) -> (V3<f64>, V3<f64>) {
     if body.outline().is_thin() {
         let n = on_the_ellipsoid(simd, set, body, relative, n);
-        return (farthest(simd, body, relative, n).0, n);
+        return on_the_table(simd, set, body, relative, n);
     }
     let shape: M3<f64> = rows(simd, body.outline().shape());
     let turned = times_transposed::<S, f64>(&relative.rotation, &shape);
@@ -83,12 +83,34 @@ pub(super) fn start<S: Simd, P: Projectable>(
         ];
         n = turn(simd, n, off, &seen, bend);
     }
+    on_the_table(simd, set, body, relative, n)
+}
+
+/// The same on the support table, from a direction on; of a thin body the nearest point that was
+/// seen.
+#[inline(always)]
+fn on_the_table<S: Simd, P: Projectable>(
+    simd: S,
+    set: &P,
+    body: &Body,
+    relative: &Relative<f64>,
+    mut n: V3<f64>,
+) -> (V3<f64>, V3<f64>) {
+    let mut best: Option<(f64, (V3<f64>, V3<f64>))> = None;
     for look in 1.. {
         let (x, bend) = farthest(simd, body, relative, n);
         let seen = set.offset(simd, x);
+        if let Some((distance, start)) = best
+            && !(0.0 < seen.distance && seen.distance < distance)
+        {
+            return start;
+        }
         let off = subtract::<S, f64>(seen.frame[2], n);
         if look == TABLE_LOOKS || !(seen.distance > 0.0) || dot::<S, f64>(off, off) < SMALL_TURN {
             return (x, n);
+        }
+        if body.outline().is_thin() {
+            best = Some((seen.distance, (x, n)));
         }
         let [t0, t1, _] = seen.frame;
         let (a0, a1) =
@@ -99,8 +121,8 @@ pub(super) fn start<S: Simd, P: Projectable>(
     unreachable!("the last look returns")
 }
 
-/// The inward normal where the ellipsoid that stands for a thin body is nearest to the set, from the
-/// set's normal n at the body's centre on.
+/// The inward normal where the ellipsoid that stands for a thin body is nearest to the set, from
+/// the set's normal n at the body's centre on.
 #[inline(always)]
 fn on_the_ellipsoid<S: Simd, P: Projectable>(
     simd: S,
@@ -126,7 +148,11 @@ fn on_the_ellipsoid<S: Simd, P: Projectable>(
             let own = apply_transposed::<S, f64>(&relative.rotation, t);
             scaled::<S, f64>(apply_transposed::<S, f64>(&inverse, own), radius)
         });
-        let pull = (-dot::<S, f64>(z, m)).max(0.0);
+        // Where the ellipsoid reaches through the set there is no nearest point.
+        let pull = -dot::<S, f64>(z, m);
+        if !(pull > 0.0) {
+            break;
+        }
         let [k00, k01, k11] = seen.curvature;
         let (b0, b1) = (
             add_scaled::<S, f64>(scaled::<S, f64>(t0, k00), k01, t1),

@@ -14,7 +14,7 @@ pub(in crate::measure) struct Extrapolated<N> {
     /// The gradient by z.
     normalized_gradient: V3<N>,
     value_error: N,
-    gradient_error: N,
+    pub(in crate::measure) gradient_error: N,
     /// Curvature μ, by z: the constraint rises from its tangent plane by at least `¼ μ |δ|²` within
     /// `radius`.
     curvature: N,

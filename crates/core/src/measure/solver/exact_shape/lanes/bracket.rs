@@ -56,7 +56,10 @@ pub(in crate::measure) fn bracket<S: Simd, N: Number<S>>(
     let between = subtract(x, nearest);
     let upper = dot(between, between).sqrt() + rounding;
     let off = subtract(outward, next.frame[2]);
-    let is_aligned = dot(off, off).le(N::splat(simd, ALIGNED * ALIGNED));
+    // Across a thin body the gradient turns with the error of its extrapolation.
+    let turned = if body.outline().is_thin() { at.gradient_error * multiplier } else { N::splat(simd, 0.0) };
+    let is_known = turned.le(N::splat(simd, ALIGNED));
+    let is_aligned = N::and(simd, is_known, dot(off, off).le(N::splat(simd, ALIGNED * ALIGNED)));
     let is_narrow = N::and(simd, lower.le(upper), (upper - lower).le(N::splat(simd, tolerance)));
     let is_apart = N::splat(simd, f64::MIN_POSITIVE).le(lower);
     let is_proven = N::and(simd, N::and(simd, fine, is_aligned), N::and(simd, is_narrow, is_apart));
