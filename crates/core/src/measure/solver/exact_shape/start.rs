@@ -96,12 +96,12 @@ fn on_the_table<S: Simd, P: Projectable>(
     relative: &Relative<f64>,
     mut n: V3<f64>,
 ) -> (V3<f64>, V3<f64>) {
-    let mut best: Option<(f64, (V3<f64>, V3<f64>))> = None;
+    let (mut best, mut nearest) = (None, f64::INFINITY);
     for look in 1.. {
         let (x, bend) = farthest(simd, body, relative, n);
         let seen = set.offset(simd, x);
-        if let Some((distance, start)) = best
-            && !(0.0 < seen.distance && seen.distance < distance)
+        if let Some(start) = best
+            && !(0.0 < seen.distance && seen.distance < nearest)
         {
             return start;
         }
@@ -110,7 +110,7 @@ fn on_the_table<S: Simd, P: Projectable>(
             return (x, n);
         }
         if body.outline().is_thin() {
-            best = Some((seen.distance, (x, n)));
+            (best, nearest) = (Some((x, n)), seen.distance);
         }
         let [t0, t1, _] = seen.frame;
         let (a0, a1) =
