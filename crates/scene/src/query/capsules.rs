@@ -76,9 +76,9 @@ impl Solver<'_> {
         if settled { Answer { status: AnswerStatus::Converged, ..answer } } else { answer }
     }
 
-    /// The signed distance that was found of a body and a capsule, which is the first of the pair
-    /// or not.
-    pub(crate) fn signed_capsule(&self, pair: &Pair<'_>, (found, is_first): (&CapsuleDistance, bool)) -> Answer {
+    /// The signed distance that was found of a body and a capsule, whichever comes first.
+    pub(crate) fn signed_capsule(&self, pair: &Pair<'_>, found: &CapsuleDistance) -> Answer {
+        let is_first = matches!(pair.a, Thing::Capsule { .. });
         let (capsule, body) = if is_first { (&pair.a, &pair.b) } else { (&pair.b, &pair.a) };
         let found = SignedCapsule::of(found, body.pose().zip(capsule.pose()));
         self.of_capsule(pair, &if is_first { found.swapped() } else { found })

@@ -153,7 +153,7 @@ impl Clearance {
                 Other::Standing(other) => self.placed.standing(other).map(|thing| (other, thing)),
             };
             let Some((other_slot, b)) = thing else { return true };
-            // Distances say nothing below 0, and of capsules only that is asked for then.
+            // Distances say nothing below 0; signed ones of capsules are asked for one by one there.
             let stands = matches!(other, Other::Standing(_));
             if stands && threshold >= 0.0 && LanePair::of(&a, &b).is_some() {
                 if a.box_gap_m(&b) <= threshold + slack_m {
@@ -222,10 +222,10 @@ impl Clearance {
                     let (_, moving) = self.placed.moving_at(index, pose);
                     solver.measure(0, &Pair { a: moving, b: standing, slots: Some(PairSlots { a: slot, b: other }) })
                 }
-                LaneAnswers::Capsules { moves, found } => {
+                LaneAnswers::Capsules(found) => {
                     let (_, moving) = self.placed.moving_at(index, pose);
                     let pair = Pair { a: moving, b: standing, slots: None };
-                    solver.signed_capsule(&pair, (&found[i], *moves))
+                    solver.signed_capsule(&pair, &found[i])
                 }
             };
             state.checked &= !solver.stop.is_set();
@@ -365,7 +365,7 @@ impl<'a> LanePair<'a> {
                 let standing = std::slice::from_ref(standing);
                 let (of_body, of_capsule) = if moves { (standing, moving) } else { (moving, standing) };
                 distance_to_capsule_batch(body, of_body, capsule, of_capsule, options, &mut found).ok()?;
-                Some(LaneAnswers::Capsules { moves, found })
+                Some(LaneAnswers::Capsules(found))
             }
         }
     }
@@ -375,8 +375,8 @@ impl<'a> LanePair<'a> {
 enum LaneAnswers<'a> {
     /// Distances of the standing body from the moving one.
     Solids { of: [&'a Shape; 2], found: Vec<Distance> },
-    /// Signed distances of a body from a capsule, and whether that is the one that moves.
-    Capsules { moves: bool, found: Vec<CapsuleDistance> },
+    /// Signed distances of a body from a capsule.
+    Capsules(Vec<CapsuleDistance>),
 }
 
 impl LaneAnswers<'_> {
@@ -384,7 +384,7 @@ impl LaneAnswers<'_> {
     fn lower(&self, pose: usize) -> f64 {
         match self {
             Self::Solids { found, .. } => found[pose].lower,
-            Self::Capsules { found, .. } => found[pose].lower,
+            Self::Capsules(found) => found[pose].lower,
         }
     }
 }

@@ -22,8 +22,8 @@ use crate::polynomial::dispatch_lanes;
 /// Each answer is one of [`distance_to_capsule`] from a cold start in all that is proven of it, and
 /// depends on its own poses only, to the last bit. Bodies of one constraint but balls are solved
 /// several poses at a time, which takes a fraction of the time of as many queries; all others, and
-/// poses that do not converge at once such as those in which the axis meets the body, are solved one
-/// by one.
+/// poses that do not converge at once such as those in which the axis meets the body, are solved
+/// one by one.
 ///
 /// # Errors
 /// No poses, different numbers of poses, or a number of places that is not the number of poses;

@@ -1,9 +1,9 @@
 //! Newton's method of [`super::newton`] along the tangents of the body.
 //!
 //! At the solution the tangents of the set's offset surface are those of the body, too. Where the
-//! normals still differ, W along the former is large for a thin body, as at its rim, and steps become
-//! as short as the body is thick. With n the direction of -∇g the residual `Tᵀv + (n·v) q` is the
-//! same, and the step starts from `α = 0`.
+//! normals still differ, W along the former is large for a thin body, as at its rim, and steps
+//! become as short as the body is thick. With n the direction of -∇g the residual `Tᵀv + (n·v) q`
+//! is the same, and the step starts from `α = 0`.
 
 use super::newton::{FEATURES, Linearized, corrected};
 use super::projectable::{Offset, Projectable};

@@ -1,25 +1,11 @@
 //! Batches of a smooth body beside a box or a cylinder, against single queries.
 
-use nalgebra::{UnitQuaternion, Vector3, Vector4};
+use crate::{pose, smooth};
+use nalgebra::{UnitQuaternion, Vector3};
 use std::sync::atomic::AtomicBool;
 use sublevel_core::body::Body;
 use sublevel_core::measure::{Distance, Options, Pose, WarmStart, distance, distance_batch};
 use sublevel_testkit::Seeded;
-
-fn pose(random: &mut Seeded, far: f64) -> Pose {
-    let q = Vector4::from_fn(|_, _| random.signed()).normalize();
-    Pose::from_quaternion(Vector3::from_fn(|_, _| far * random.signed()), q.into()).unwrap()
-}
-
-fn smooth(random: &mut Seeded, degree: u8) -> Body {
-    let center = Vector3::from_fn(|_, _| random.signed());
-    let half = Vector3::from_fn(|_, _| 2_f64.powf(random.signed()));
-    if degree == 2 {
-        Body::ellipsoid("egg", center, half).unwrap()
-    } else {
-        Body::superellipsoid("q", center, half, degree).unwrap()
-    }
-}
 
 /// A box or a rod off the origin of its frame.
 fn shape(random: &mut Seeded, kind: usize) -> Body {

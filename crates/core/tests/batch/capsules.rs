@@ -1,6 +1,7 @@
 //! Batches of a body and a capsule, against single queries.
 
-use nalgebra::{Vector3, Vector4};
+use crate::{pose, smooth};
+use nalgebra::Vector3;
 use std::sync::atomic::AtomicBool;
 use sublevel_core::body::{Body, Compound};
 use sublevel_core::measure::{
@@ -8,21 +9,6 @@ use sublevel_core::measure::{
     distance_to_point,
 };
 use sublevel_testkit::Seeded;
-
-fn pose(random: &mut Seeded, far: f64) -> Pose {
-    let q = Vector4::from_fn(|_, _| random.signed()).normalize();
-    Pose::from_quaternion(Vector3::from_fn(|_, _| far * random.signed()), q.into()).unwrap()
-}
-
-fn smooth(random: &mut Seeded, degree: u8) -> Body {
-    let center = Vector3::from_fn(|_, _| random.signed());
-    let half = Vector3::from_fn(|_, _| 2_f64.powf(random.signed()));
-    if degree == 2 {
-        Body::ellipsoid("egg", center, half).unwrap()
-    } else {
-        Body::superellipsoid("q", center, half, degree).unwrap()
-    }
-}
 
 /// A capsule, a ball, a segment or a point.
 fn capsule(random: &mut Seeded, seed: usize) -> Capsule {
