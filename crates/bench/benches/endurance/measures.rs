@@ -1,5 +1,6 @@
 //! The measures under test: a table to extend when one is added.
 
+use nalgebra::Vector3;
 use sublevel::body::Body;
 use sublevel::measure::{
     Distance, GrowthDistance, LevelDistance, Options, Pose, Status, WarmStart, distance, growth_distance,
@@ -97,8 +98,11 @@ impl Answer {
     pub(crate) fn feasible(&self, a: Placed<'_>, b: Placed<'_>) -> bool {
         match self {
             Answer::Distance(answer) => {
-                let apart = (answer.witness_a - answer.witness_b).norm();
-                within(a, &answer.witness_a, apart) && within(b, &answer.witness_b, apart)
+                let seen_from = |(body, pose): Placed<'_>, x: &Vector3<f64>| {
+                    (x - pose.translation()).norm() + body.circumscribed().center.norm()
+                };
+                let (x, y) = (&answer.witness_a, &answer.witness_b);
+                within(a, x, seen_from(b, x)) && within(b, y, seen_from(a, y))
             }
             Answer::Level(answer) => within(b, &answer.witness, 0.0),
             // In the bodies as they have grown, which is theirs to check.
@@ -143,9 +147,11 @@ impl Answer {
     }
 }
 
-fn within((body, pose): (&Body, &Pose), witness: &nalgebra::Vector3<f64>, apart: f64) -> bool {
+/// Whether a point of the world lies in a body, up to the rounding of its coordinates in the world,
+/// in the body's frame, and in another one from whose origin it is `away`, metres.
+fn within((body, pose): (&Body, &Pose), witness: &Vector3<f64>, away: f64) -> bool {
     let local = pose.rotation().inverse_transform_vector(&(witness - pose.translation()));
-    let moved = 16.0 * f64::EPSILON * (witness.norm() + pose.translation().norm() + local.norm() + apart);
+    let moved = 16.0 * f64::EPSILON * (witness.norm() + pose.translation().norm() + local.norm() + away);
     body.constraints().iter().all(|constraint| {
         let jet = body.placement().jet(constraint, &local);
         jet.value <= 1.0 + jet.gradient.norm() * moved * (1.0 + 1e-3) + 1e-12
