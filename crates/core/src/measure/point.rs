@@ -16,6 +16,7 @@ use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::{At, Least, bracketed, least};
 use crate::measure::solver::active_constraints::ActiveSet;
+use crate::measure::solver::edge_newton::{EdgedProven, EdgedQuery, EdgedStart};
 use crate::measure::solver::exact_shape::{
     ExactQuery, PointOffset, PointSide, direction_to_world, offset_of_point, to_world,
 };
@@ -140,7 +141,7 @@ pub(super) struct Projection<'a> {
     single: OnceCell<Single<'a>>,
     /// Whether a narrow bracket is all that is asked for.
     is_rough: bool,
-    /// Whether the method for smooth bodies is tried first.
+    /// Whether Newton's method against shapes is tried first.
     has_newton: bool,
 }
 
@@ -201,7 +202,7 @@ impl<'a> Projection<'a> {
         Self { is_rough: true, ..Self::new(body, pose) }
     }
 
-    /// The same without the method for smooth bodies, where it has failed.
+    /// The same without Newton's method against shapes, where it has failed.
     pub(super) fn without_newton(self) -> Self {
         Self { has_newton: false, ..self }
     }
@@ -233,7 +234,7 @@ impl<'a> Projection<'a> {
     }
 
     /// Of a segment of the world frame that is known up to an error, metres, without closed forms
-    /// and the method for smooth bodies, after so many evaluations: until the bracket is as narrow
+    /// and Newton's method against shapes, after so many evaluations: until the bracket is as narrow
     /// as the tolerance, metres, or says what is asked.
     pub(super) fn to_segment(
         &self,
@@ -327,7 +328,7 @@ impl<'a> Projection<'a> {
         apart + (ROTATION_ERROR + gamma(16)) * (offset.norm() + interior.norm()) < self.body.in_radius()
     }
 
-    /// Of a smooth body, as that of a capsule of no size.
+    /// As that of a capsule of no size.
     ///
     /// # Errors
     /// After how many evaluations nothing is proven.
@@ -340,16 +341,28 @@ impl<'a> Projection<'a> {
     ) -> Result<Projected, u32> {
         // A hint of the general search says that this method has failed before.
         let has_failed = matches!(warm.hint, Hint::Single { .. });
-        if has_failed || !self.has_newton || !self.body.is_smooth() || !runs(Stage::ClosedForm) {
+        if has_failed || !self.has_newton || !runs(Stage::ClosedForm) {
             return Err(0);
         }
         if self.is_near_interior_point(point) {
             return Ok(Projected::inside(point, 0));
         }
         let (form, form_pose) = (ClosedForm::capsule(0.0, 0.0), Pose::identity().with_translation(*point));
+        let (body, pose, goal) = (self.body, &self.pose, &StopCriterion::NARROW);
+        if !body.is_smooth() {
+            let start = if let Hint::Edged(trace) = &warm.hint { EdgedStart::Last(trace) } else { EdgedStart::Cold };
+            let (form, form_pose) = (&form, &form_pose);
+            let query = EdgedQuery { body, pose, form, form_pose, goal, tolerance, options, start };
+            let found = dispatch(query)?;
+            let EdgedProven { lower, upper, x, n, rounds, trace, .. } = found;
+            *warm = trace.map_or_else(WarmStart::default, |trace| Hint::Edged(trace).into());
+            if upper == 0.0 {
+                return Ok(Projected::inside(point, rounds));
+            }
+            let (normal, witness) = (-direction_to_world(form, form_pose, n), to_world(form, form_pose, x));
+            return Ok(Projected { lower, upper, plane: normal, normal, witness, nearest: *point, iterations: rounds });
+        }
         let trace = if let Hint::Exact(trace) = &warm.hint { Some(trace) } else { None };
-        let (body, pose) = (self.body, &self.pose);
-        let goal = &StopCriterion::NARROW;
         let query = ExactQuery { body, pose, form: &form, form_pose: &form_pose, goal, tolerance, options, trace };
         let found = dispatch(query).map_err(|lost| lost.rounds)?;
         if found.upper == 0.0 {

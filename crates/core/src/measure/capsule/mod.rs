@@ -5,7 +5,8 @@
 //! into contact, for a ball adds its radius to the support function along every direction. Of a
 //! smooth body it is found by Newton's method ([`super::solver::exact_shape`]), of a box or a
 //! cylinder in the same way with their closed forms, of a ball or another capsule in closed form,
-//! of a body with several constraints by the projection of the segment on it
+//! of a body with several constraints by Newton's method with an active set
+//! ([`super::solver::edge_newton`]), or else by the projection of the segment on it
 //! ([`super::solver::projection`]). Where none of these proves it, the distance of the segment's
 //! points, a convex function of the place along it, has its least value between the last two places
 //! where it fell and where it rose; the planes that prove the distances there bound it from below.

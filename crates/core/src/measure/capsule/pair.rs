@@ -11,6 +11,7 @@ use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::At;
 use crate::measure::point::Projection;
+use crate::measure::solver::edge_newton::{EdgedProven, EdgedQuery, EdgedStart};
 use crate::measure::solver::exact_shape::{
     ExactProven, ExactQuery, ShapeDistance, between_shapes, direction_to_world, to_world,
 };
@@ -196,13 +197,32 @@ impl Problem<'_> {
         (width, options): (f64, &Options<'_>),
         warm: &mut WarmStart,
     ) -> Result<CapsuleDistance, u32> {
+        let (form_pose, form, goal) = (self.capsule_pose, self.capsule.closed_form(), self.goal_of_axis());
+        let start = match &warm.hint {
+            Hint::Edged(trace) => EdgedStart::Last(trace),
+            Hint::Single { y, .. } => EdgedStart::Witness(*y),
+            _ => EdgedStart::Cold,
+        };
+        let query = EdgedQuery { body, pose, form: &form, form_pose, goal: &goal, tolerance: width, options, start };
+        let spent = match dispatch(query) {
+            Ok(found) => {
+                let EdgedProven { lower, upper, x, nearest, n, rounds, trace, .. } = found;
+                *warm = trace.map_or_else(WarmStart::default, |trace| Hint::Edged(trace).into());
+                if upper == 0.0 {
+                    return Ok(self.met(&to_world(&form, form_pose, x), rounds));
+                }
+                let witnesses = [x, nearest].map(|point| to_world(&form, form_pose, point));
+                return Ok(self.apart([lower, upper], witnesses, direction_to_world(&form, form_pose, n), rounds));
+            }
+            Err(rounds) => rounds,
+        };
         let SeenAxis { origin, center, half_axis, error } = self.axis(pose);
         let pose = pose.with_translation(Vector3::zeros());
         let wants_normal = self.goal.wants_answer();
         let projection = if wants_normal { Projection::new(body, &pose) } else { Projection::rough(body, &pose) };
-        let (segment, goal) = (Segment { center, half_axis }, self.goal_of_axis());
+        let segment = Segment { center, half_axis };
         // The radius is subtracted with rounding.
-        let found = projection.to_segment((&segment, error), (0.5 * width, &goal), (0, options), warm);
+        let found = projection.to_segment((&segment, error), (0.5 * width, &goal), (spent, options), warm);
         if found.upper == 0.0 {
             return Ok(self.met(&(found.nearest + origin), found.iterations));
         }

@@ -1,14 +1,16 @@
-//! The distance of a body with a closed form from a smooth one, whichever comes first, or from
+//! The distance of a body with a closed form from one without, whichever comes first, or from
 //! another with a closed form.
 
 use super::answer::Distance;
 use super::balls::of_balls;
 use crate::body::{Body, ClosedForm};
 use crate::measure::frames::pose::Pose;
+use crate::measure::frames::vector::V3;
 use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveConstraints;
+use crate::measure::solver::edge_newton::{EdgedProven, EdgedQuery, EdgedStart};
 use crate::measure::solver::exact_shape::{
-    ExactContact, ExactLost, ExactProven, ExactQuery, ExactTrace, ShapeDistance, active, between_shapes,
+    ExactContact, ExactLost, ExactProven, ExactQuery, ExactTrace, ShapeDistance, active, between_shapes, common,
     direction_to_world, to_world,
 };
 use crate::measure::solver::stop_criterion::StopCriterion;
@@ -17,30 +19,45 @@ use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::dispatch;
 use nalgebra::Vector3;
 
-/// A pair of bodies, one of them smooth, the other with a closed form.
+/// A pair of bodies, one of them with a closed form, the other without.
 #[derive(Clone, Copy)]
 pub(in crate::measure) struct Exact<'a> {
-    smooth: (&'a Body, &'a Pose),
-    other: (&'a Body, &'a Pose),
+    /// Without one.
+    free: (&'a Body, &'a Pose),
+    /// With one.
+    shape: (&'a Body, &'a Pose),
     form: &'a ClosedForm,
-    /// Whether the smooth body is the second one.
+    /// Whether the shape is the first one.
     swapped: bool,
 }
 
 impl<'a> Exact<'a> {
-    /// The pair, if it is one. Balls are left to continuation, which is as fast.
+    /// The pair, if it is one and the body without a closed form is smooth. Balls are left to
+    /// continuation, which is as fast.
     #[inline(always)]
     pub(in crate::measure) fn new(of_a: (&'a Body, &'a Pose), of_b: (&'a Body, &'a Pose)) -> Option<Self> {
-        let (swapped, smooth, other) = match (of_a.0.is_smooth(), of_b.0.is_smooth()) {
+        let (swapped, free, shape) = match (of_a.0.is_smooth(), of_b.0.is_smooth()) {
             (true, false) => (false, of_a, of_b),
             (false, true) => (true, of_b, of_a),
             _ => return None,
         };
-        let form = other.0.closed_form()?;
-        Some(Self { smooth, other, form, swapped })
+        let form = shape.0.closed_form()?;
+        Some(Self { free, shape, form, swapped })
     }
 
-    /// The answer with its hint.
+    /// The pair, if it is one and both have edges.
+    pub(super) fn edged(of_a: (&'a Body, &'a Pose), of_b: (&'a Body, &'a Pose)) -> Option<Self> {
+        if of_a.0.is_smooth() || of_b.0.is_smooth() {
+            return None;
+        }
+        match (of_a.0.closed_form(), of_b.0.closed_form()) {
+            (None, Some(form)) => Some(Self { free: of_a, shape: of_b, form, swapped: false }),
+            (Some(form), None) => Some(Self { free: of_b, shape: of_a, form, swapped: true }),
+            _ => None,
+        }
+    }
+
+    /// The answer with its hint, for a smooth body.
     ///
     /// # Errors
     /// After how many evaluations the general search has to go on, with a hint where to.
@@ -52,8 +69,8 @@ impl<'a> Exact<'a> {
         options: &Options<'_>,
         hint: &Hint,
     ) -> Result<(Distance, WarmStart), (u32, WarmStart)> {
-        let Self { smooth: (body, pose), other: (other, form_pose), form, swapped } = *self;
-        let tolerance = options.accuracy() * body.circumscribed().radius.min(other.circumscribed().radius);
+        let Self { free: (body, pose), shape: (_, form_pose), form, swapped } = *self;
+        let tolerance = self.tolerance(options);
         let witness;
         let trace = match hint {
             Hint::Exact(trace) => Some(trace),
@@ -72,12 +89,50 @@ impl<'a> Exact<'a> {
         }
     }
 
-    /// Whether the bodies overlap, decided without their distance.
+    /// The answer with its hint, for a body with edges.
+    ///
+    /// # Errors
+    /// After how many evaluations the general search has to go on.
+    pub(super) fn distance_of_edges(
+        &self,
+        goal: &StopCriterion,
+        options: &Options<'_>,
+        warm: &mut WarmStart,
+    ) -> Result<Distance, u32> {
+        let Self { free: (body, pose), shape: (other, form_pose), form, swapped } = *self;
+        let tolerance = self.tolerance(options);
+        let (a, b) = if swapped { (other, body) } else { (body, other) };
+        let start = match (&warm.hint, warm.hint.witnesses(a, b)) {
+            (Hint::Edged(trace), _) => EdgedStart::Last(trace),
+            // What other methods have found.
+            (_, Some([x_a, y_b])) => EdgedStart::Witness(if swapped { y_b } else { x_a }),
+            _ => EdgedStart::Cold,
+        };
+        let found = dispatch(EdgedQuery { body, pose, form, form_pose, goal, tolerance, options, start })?;
+        let EdgedProven { lower, upper, x, nearest, n, active, rounds, trace } = found;
+        let Some(trace) = trace else {
+            let found = common(x, rounds);
+            *warm = self.hint(&found);
+            return Ok(self.answer(&found, tolerance));
+        };
+        *warm = Hint::Edged(trace).into();
+        let bracket = Distance { lower, upper, iterations: rounds, ..Distance::default() };
+        Ok(self.attained(bracket, tolerance, ([x, nearest, n], active)))
+    }
+
+    /// Width of the bracket that is narrow enough, metres.
+    #[inline(always)]
+    fn tolerance(&self, options: &Options<'_>) -> f64 {
+        let [free, shape] = [self.free, self.shape].map(|(body, _)| body.circumscribed().radius);
+        options.accuracy() * free.min(shape)
+    }
+
+    /// Whether the bodies overlap, decided without their distance, for a smooth body.
     ///
     /// # Errors
     /// After how many evaluations it cannot.
     pub(super) fn contact(&self, options: &Options<'_>, warm: &mut WarmStart) -> Result<Distance, u32> {
-        let Self { smooth: (body, pose), other: (_, form_pose), form, .. } = *self;
+        let Self { free: (body, pose), shape: (_, form_pose), form, .. } = *self;
         if options.exhausted(0) {
             return Err(0);
         }
@@ -89,27 +144,35 @@ impl<'a> Exact<'a> {
     }
 
     pub(in crate::measure) fn answer(&self, found: &ExactProven, tolerance: f64) -> Distance {
-        let Self { other: (_, pose), form, swapped, .. } = *self;
-        let (x, y) = (to_world(form, pose, found.x), to_world(form, pose, found.nearest));
-        let status = Status::of(found.upper - found.lower <= tolerance);
-        let answer = Distance {
-            status,
-            lower: found.lower,
-            upper: found.upper,
-            iterations: found.rounds,
-            ..Distance::default()
-        };
-        if found.upper == 0.0 {
-            return Distance { witness_a: x, witness_b: x, ..answer };
+        let ExactProven { lower, upper, x, nearest, n, multiplier, rounds, .. } = *found;
+        let bracket = Distance { lower, upper, iterations: rounds, ..Distance::default() };
+        if upper == 0.0 {
+            let witness = to_world(self.form, self.shape.1, x);
+            let status = Status::of(upper - lower <= tolerance);
+            return Distance { status, witness_a: witness, witness_b: witness, ..bracket };
         }
-        let normal = direction_to_world(form, pose, found.n);
-        let of_smooth = ActiveConstraints::single(0, found.multiplier);
-        let of_form = active(form.shape(), found.n);
+        self.attained(bracket, tolerance, ([x, nearest, n], ActiveConstraints::single(0, multiplier)))
+    }
+
+    /// A bracket as an answer, with the points of the body and of the shape and the normal from the
+    /// one to the other, in the frame of the shape, and the body's constraints.
+    #[inline(always)]
+    fn attained(
+        &self,
+        bracket: Distance,
+        tolerance: f64,
+        ([x, nearest, n], of_free): ([V3<f64>; 3], ActiveConstraints),
+    ) -> Distance {
+        let Self { shape: (_, pose), form, swapped, .. } = *self;
+        let (x, y) = (to_world(form, pose, x), to_world(form, pose, nearest));
+        let answer = Distance { status: Status::of(bracket.upper - bracket.lower <= tolerance), ..bracket };
+        let normal = direction_to_world(form, pose, n);
+        let of_form = active(form.shape(), n);
         if swapped {
-            let (active_a, active_b) = (of_form, of_smooth);
+            let (active_a, active_b) = (of_form, of_free);
             Distance { witness_a: y, witness_b: x, normal: Some(-normal), active_a, active_b, ..answer }
         } else {
-            let (active_a, active_b) = (of_smooth, of_form);
+            let (active_a, active_b) = (of_free, of_form);
             Distance { witness_a: x, witness_b: y, normal: Some(normal), active_a, active_b, ..answer }
         }
     }
@@ -117,19 +180,19 @@ impl<'a> Exact<'a> {
     /// A hint for the general search.
     #[cold]
     fn general_hint(&self, about: &ExactProven) -> WarmStart {
-        let Self { smooth, other, form, swapped } = *self;
+        let Self { free, shape, form, swapped } = *self;
         let own = |pose: &Pose, point: [f64; 3]| {
-            pose.rotation().inverse_transform_vector(&(to_world(form, other.1, point) - pose.translation()))
+            pose.rotation().inverse_transform_vector(&(to_world(form, shape.1, point) - pose.translation()))
         };
-        let (x, y) = (own(smooth.1, about.x), own(other.1, about.nearest));
+        let (x, y) = (own(free.1, about.x), own(shape.1, about.nearest));
         let of_form = active(form.shape(), about.n).iter().fold(0, |bits, (index, _)| bits | 1 << index);
-        let normal = direction_to_world(form, other.1, about.n);
+        let normal = direction_to_world(form, shape.1, about.n);
         let into_a = |pose: &Pose, n: Vector3<f64>| pose.rotation().inverse_transform_vector(&n);
         if swapped {
-            let normal_a = into_a(other.1, -normal);
+            let normal_a = into_a(shape.1, -normal);
             Hint::Apart { x_a: y, y_b: x, normal_a, active_a: of_form, active_b: 1 }.into()
         } else {
-            Hint::Apart { x_a: x, y_b: y, normal_a: into_a(smooth.1, normal), active_a: 1, active_b: of_form }.into()
+            Hint::Apart { x_a: x, y_b: y, normal_a: into_a(free.1, normal), active_a: 1, active_b: of_form }.into()
         }
     }
 
@@ -138,9 +201,9 @@ impl<'a> Exact<'a> {
             Some(trace) => Hint::Exact(trace).into(),
             None => {
                 // A common point, in the frame of the first body.
-                let Self { smooth, other, form, swapped } = *self;
-                let world: Vector3<f64> = to_world(form, other.1, found.x);
-                let (_, pose_a) = if swapped { other } else { smooth };
+                let Self { free, shape, form, swapped } = *self;
+                let world: Vector3<f64> = to_world(form, shape.1, found.x);
+                let (_, pose_a) = if swapped { shape } else { free };
                 let point_a = pose_a.rotation().inverse_transform_vector(&(world - pose_a.translation()));
                 Hint::Overlap { point_a }.into()
             }

@@ -141,15 +141,33 @@ impl<'a> Query<'a> {
                 }
             };
         }
-        if runs(Stage::Edges) && !(of_a.0.is_smooth() && of_b.0.is_smooth()) {
-            return match of_edges(self, warm) {
-                Ok(found) => found,
-                Err(lost) => self.search(&lost, warm),
-            };
+        if !(of_a.0.is_smooth() && of_b.0.is_smooth()) {
+            return self.of_edges(warm);
         }
         match warm.hint {
             Hint::Smooth(_) if runs(Stage::Follow) => dispatch(Warm { query: *self, warm }),
             _ => self.afresh(&Lost::after(0), warm),
+        }
+    }
+
+    /// Of bodies of which at least one has several constraints, and at most one a closed form.
+    fn of_edges(&self, warm: &mut WarmStart) -> Distance {
+        let Self { of_a, of_b, goal, options } = *self;
+        let mut spent = 0;
+        if runs(Stage::ClosedForm)
+            && let Some(exact) = Exact::edged(of_a, of_b)
+        {
+            match exact.distance_of_edges(goal, options, warm) {
+                Ok(found) => return found,
+                Err(rounds) => spent = rounds,
+            }
+        }
+        if !runs(Stage::Edges) || spent > 0 && options.exhausted(spent) {
+            return self.search(&Lost::after(spent), warm);
+        }
+        match of_edges(&Query { options: &options.after(spent), ..*self }, warm) {
+            Ok(found) => Distance { iterations: found.iterations + spent, ..found },
+            Err(lost) => self.search(&Lost { rounds: lost.rounds + spent, ..lost }, warm),
         }
     }
 

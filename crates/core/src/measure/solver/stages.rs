@@ -5,7 +5,7 @@
 /// A method that finds an answer, or a part of one, which another one would find as well.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::measure) enum Stage {
-    /// Newton's method on one body against a shape with a closed form.
+    /// Newton's method on one body, smooth or with edges, against a shape with a closed form.
     ClosedForm,
     /// Continuation from the answer before.
     Follow,

@@ -1,6 +1,7 @@
 //! Boxes, cylinders and balls by their closed forms, against the general search, which shares
 //! nothing with them but the bodies' polynomials.
 
+use super::edges::cut;
 use super::{assert_normals_of_active, random_pose, zoo};
 use crate::body::Body;
 use crate::measure::solver::stages::{Stage, except, only};
@@ -109,6 +110,57 @@ fn thin_bodies_against_shapes() {
         (thin, shape(random))
     });
     assert!(share > 85.0, "{share}");
+}
+
+/// Faces, edges and corners of both against each other: of bodies of degree 4 to 8 that up to six
+/// slabs cut, and of boxes and cylinders.
+#[test]
+fn cut_bodies_against_shapes() {
+    let share = share("cut bodies against shapes", 450, |random| (cut(random), shape(random)));
+    // A third of them overlaps, which the general search proves.
+    assert!(share > 55.0, "{share}");
+}
+
+/// Capsules, balls, segments and points beside the same bodies, by Newton's method alone and by the
+/// general search: along a way of four steps, each with the hint of the one before.
+#[test]
+fn cut_bodies_against_capsules() {
+    let (mut solved, mut apart) = (0, 0);
+    for seed in 0..300 {
+        let mut random = Seeded(76_000 + seed);
+        let body = cut(&mut random);
+        let size = body.circumscribed().radius;
+        let of = |index: u64, length: f64| if index == 0 { 0.0 } else { size * length };
+        let (radius, half) = (of(seed % 2, 0.3), of(seed / 2 % 2, 3_f64.powf(random.signed())));
+        let capsule = Capsule::new(radius, half).unwrap();
+        let (pose, turned) = (random_pose(&mut random, 1.0), random_pose(&mut random, 0.0));
+        let middle = pose.transform_point(&body.circumscribed().center);
+        let far = (size + capsule.reach_m()) * (0.6 + 0.8 * random.positive());
+        let (mut place, step) = (middle + random.unit() * far, random.unit() * (0.01 * size));
+        let (mut alone, mut general) = (WarmStart::default(), WarmStart::default());
+        for round in 0..4 {
+            let at = turned.with_translation(place);
+            let ask =
+                |warm: &mut WarmStart| distance_to_capsule(&body, &pose, &capsule, &at, &Options::default(), warm);
+            let truth = except(&[Stage::ClosedForm], || ask(&mut general));
+            let found = only(&[Stage::ClosedForm], || ask(&mut alone));
+            let label = format!("seed {seed}, round {round}: {found:?} against {truth:?}");
+            assert!(found.lower <= truth.upper && truth.lower <= found.upper, "{label}");
+            place += step;
+            if truth.lower < -0.999 * radius {
+                continue;
+            }
+            apart += 1;
+            if found.status == Status::Converged {
+                solved += 1;
+                let (n, m) = (found.normal.expect("apart"), truth.normal.expect("apart"));
+                let near = truth.lower + radius < 1e-6 * size;
+                assert!(near || (n - m).norm() < 1e-5, "{label}");
+            }
+        }
+    }
+    println!("{solved} of {apart}");
+    assert!(f64::from(solved) > 0.98 * f64::from(apart), "{solved} of {apart}");
 }
 
 #[test]

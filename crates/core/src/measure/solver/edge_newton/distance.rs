@@ -2,7 +2,9 @@
 
 use super::aggregate::{Evaluated, Weighted};
 use super::linearized::Linearized;
-use super::quadratic_program::{Checked, MOST_ACTIVE, OnActive, check, minimize};
+use super::quadratic_program::{Checked, OnActive, check, minimize};
+use super::share_inside::share_inside;
+use super::spot::Spot;
 use crate::body::Body;
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::vector::{
@@ -18,7 +20,7 @@ use crate::measure::solver::prospect::Prospect;
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::solver::tangent_newton::{Bracket, Plane, Relative, Side, Step, TAYLOR_ROUNDING, bracket, moved};
 use crate::measure::solver::two_point_problem::{Apart, Relation, Verdict};
-use crate::polynomial::{NEAR_LEVEL, NumberJet, Simd, WithSimd};
+use crate::polynomial::{Simd, WithSimd};
 use nalgebra::Vector3;
 
 /// Most evaluations of both bodies from one start. It changes time only; no test pins it.
@@ -43,7 +45,7 @@ const UNLIKE: f64 = 0.1;
 /// How much a linearized constraint may be violated, relative to the body's size. Larger, points
 /// have to be moved farther into their body, which widens brackets; smaller, rounding changes the
 /// active set. `cut_bodies_agree_with_the_general_search` counts what is solved.
-const VIOLATED: f64 = 1e-13;
+pub(super) const VIOLATED: f64 = 1e-13;
 
 /// Curvature times size, dimensionless, that counts as none: far below what any body has, it only
 /// bounds steps between two flat sides. It changes time only; no test pins it.
@@ -53,38 +55,6 @@ const FLATTEST: f64 = 1e-20;
 /// turn of their difference is lost in rounding. Double-double arithmetic goes on from there, so
 /// that it changes time only; no test pins it.
 const LEAST_DISTANCE: f64 = 1e-8;
-
-/// A witness with the constraints that are active there, for the next query of the pair.
-#[derive(Clone, Copy, Debug)]
-struct Spot {
-    /// From the centre of the normalization on, body frame, metres.
-    point: V3<f64>,
-    /// With multipliers, metres.
-    active: Weighted,
-    /// Values and gradients of the active constraints there, in normalized coordinates.
-    tangents: [(f64, V3<f64>); MOST_ACTIVE],
-    /// Sum of their Hessians with their multipliers: xx, xy, xz, yy, yz, zz.
-    hessian: [f64; 6],
-}
-
-impl Spot {
-    /// At the end of a step by normalized coordinates from where the constraints are evaluated.
-    #[inline(always)]
-    fn new<S: Simd>(simd: S, point: V3<f64>, active: Weighted, (evaluated, delta): (&Evaluated, V3<f64>)) -> Self {
-        let mut tangents = [(0.0, [0.0; 3]); MOST_ACTIVE];
-        for k in 0..active.len {
-            tangents[k] = extrapolated(simd, &evaluated.jets[usize::from(active.index[k])], delta);
-        }
-        Self { point, active, tangents, hessian: active.sum(simd, evaluated).hessian }
-    }
-
-    /// The active constraints with their positions.
-    #[inline(always)]
-    fn iter(&self) -> impl Iterator<Item = (usize, f64, V3<f64>)> {
-        let tangent = |k: usize| (usize::from(self.active.index[k]), self.tangents[k].0, self.tangents[k].1);
-        (0..self.active.len).map(tangent)
-    }
-}
 
 /// What is kept of an answer for the next query of the pair.
 #[derive(Clone, Copy, Debug)]
@@ -473,41 +443,4 @@ impl Solver<'_> {
         let trace = EdgeTrace { of_a, of_b, n, drift: Drift::default() };
         Ok(EdgeProven { lower, upper, x, y, n, active_a, active_b, rounds: 0, trace })
     }
-}
-
-/// The part of the way from the end of a step to the interior point along which all constraints are
-/// proven to come to hold, by their jets where it starts; none if they seem far from that. The step
-/// is given by normalized coordinates and in metres.
-///
-/// For a convex g with `g(x) <= v` and `g(c) <= v_0 < 1`, `g(x + s (c - x)) <= 1` from `s = (v - 1)
-/// / (v - v_0)` on.
-#[inline(always)]
-fn share_inside<S: Simd>(_: S, body: &Body, of_a: &Evaluated, (delta, step): (V3<f64>, V3<f64>)) -> Option<f64> {
-    let (square, metres_square) = (dot::<S, f64>(delta, delta), dot::<S, f64>(step, step));
-    let length = square.sqrt();
-    let least = body.min_value();
-    let mut share = 0.0_f64;
-    for (jet, trust) in of_a.jets.iter().zip(&body.trust().constraints) {
-        let sloped = dot::<S, f64>(jet.gradient, delta);
-        let third = &trust.third;
-        let value = if third.ceiling == 0.0 || (jet.value - 1.0).abs() <= NEAR_LEVEL && length <= 0.5 * third.leeway {
-            let bent = apply_symmetric::<S, f64>(&jet.hessian, delta);
-            jet.value + sloped + 0.5 * dot::<S, f64>(delta, bent) + third.ceiling * square * length * (1.0 / 6.0)
-        } else {
-            jet.value + sloped + 0.5 * trust.curvature_ceiling * metres_square
-        };
-        let bound = value + 2.0 * trust.value_error + TAYLOR_ROUNDING * (jet.value.abs() + sloped.abs());
-        if bound > 1.0 {
-            share = share.max((bound - 1.0) / (bound - least));
-        }
-    }
-    (share < 1e-3).then_some(share * (1.0 + 1e-9))
-}
-
-/// Value and gradient at the end of a step by normalized coordinates, to second order.
-#[inline(always)]
-fn extrapolated<S: Simd>(_: S, jet: &NumberJet<f64>, delta: V3<f64>) -> (f64, V3<f64>) {
-    let bent = apply_symmetric::<S, f64>(&jet.hessian, delta);
-    let value = jet.value + dot::<S, f64>(delta, add_scaled::<S, f64>(jet.gradient, 0.5, bent));
-    (value, add::<S, f64>(jet.gradient, bent))
 }

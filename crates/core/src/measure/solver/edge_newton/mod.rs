@@ -21,10 +21,16 @@
 //! has the same nearest point (`aggregate`). Its tangent plane gives the lower bound; the upper one
 //! is attained by points that are moved towards the bodies' interior points until all constraints
 //! are proven to hold.
+//!
+//! Beside a set with a closed form one body alone is linearized (`set_distance`).
 
 mod aggregate;
 mod distance;
 mod linearized;
 mod quadratic_program;
+mod set_distance;
+mod share_inside;
+mod spot;
 
 pub(in crate::measure) use distance::{EdgeProven, EdgeQuery, EdgeTrace};
+pub(in crate::measure) use set_distance::{EdgedProven, EdgedQuery, EdgedStart, EdgedTrace};

@@ -11,6 +11,7 @@ use super::along_body::AlongBody;
 use super::level::{Level, LevelProblem};
 use super::newton::newton;
 use super::projectable::{Offset, Projectable};
+use super::separating_plane::{SeparatingPlane, separating_plane};
 use super::start::start;
 use crate::body::Body;
 use crate::measure::frames::vector::{
@@ -20,9 +21,7 @@ use crate::measure::options::Options;
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::step_acceleration::{Correction, Last, Series};
 use crate::measure::solver::stop_criterion::StopCriterion;
-use crate::measure::solver::tangent_newton::{
-    ALIGNED, Extrapolated, Plane, Relative, Side, SurfaceCurvature, TAYLOR_ROUNDING, moved,
-};
+use crate::measure::solver::tangent_newton::{ALIGNED, Extrapolated, Plane, Relative, Side, SurfaceCurvature, moved};
 use crate::polynomial::{NumberJet, Scalar, Simd, WithSimd, dispatch};
 use nalgebra::Vector3;
 
@@ -412,19 +411,9 @@ impl<P: Projectable> ExactPair<'_, P> {
         if !(seen.distance > 0.0) {
             return None;
         }
-        let gradient = apply_transposed::<S, f64>(frame, at.plane.gradient);
-        let length = dot::<S, f64>(gradient, gradient).sqrt();
-        let multiplier = 1.0 / length;
-        let outward = scaled::<S, f64>(gradient, -multiplier);
-        let n = self.set.in_normal_cone(simd, seen.feature, outward);
-        let facing = scaled::<S, f64>(apply::<S, f64>(frame, n), -1.0);
-        let own = scaled::<S, f64>(apply_transposed::<S, f64>(&self.relative.rotation, n), -1.0);
-        let inverse: M3<f64> = rows(simd, self.body.inverse());
-        let deficit = side.support_deficit(simd, at, facing, apply_transposed::<S, f64>(&inverse, own));
-        let size = to[0].abs() + to[1].abs() + to[2].abs() + self.set.reach();
-        let rounding = TAYLOR_ROUNDING * size + (self.displacement + side.displacement) * (1.0 + TAYLOR_ROUNDING);
-        let charged = deficit + TAYLOR_ROUNDING * (deficit.abs() + multiplier);
-        let lower = self.set.separation(simd, n, (to, charged)) - rounding;
+        let place = (&self.set, self.displacement);
+        let SeparatingPlane { lower, n, outward, multiplier, rounding } =
+            separating_plane(simd, place, (side, &self.relative), at, (to, seen.feature), frame);
         let (inward, fine) = side.inward(simd, at);
         let x = moved::<S, f64>(to, inward, frame);
         let nearest = self.set.project(simd, x);
@@ -481,6 +470,6 @@ pub(super) fn interior<S: Simd>(_: S, body: &Body, relative: &Relative<f64>) -> 
 }
 
 /// A common point.
-pub(super) fn common(y: V3<f64>, rounds: u32) -> ExactProven {
+pub(in crate::measure) fn common(y: V3<f64>, rounds: u32) -> ExactProven {
     ExactProven { lower: 0.0, upper: 0.0, x: y, nearest: y, n: [0.0; 3], multiplier: 0.0, rounds, trace: None }
 }

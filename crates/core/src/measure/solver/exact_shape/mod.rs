@@ -13,6 +13,7 @@ mod placed;
 mod point;
 mod projectable;
 mod segment;
+mod separating_plane;
 mod shape_pair;
 mod shapes;
 mod start;
@@ -20,11 +21,16 @@ mod start;
 pub(in crate::measure) use cuboid::Cuboid;
 pub(in crate::measure) use cylinder::Cylinder;
 pub(in crate::measure) use distance::{
-    ExactLost, ExactProven, ExactTrace, FLATTEST, LONGEST_STEP, WORTH_A_BRACKET_SQUARED,
+    ExactLost, ExactProven, ExactTrace, FLATTEST, LONGEST_STEP, WORTH_A_BRACKET_SQUARED, common,
 };
 pub(in crate::measure) use lanes::{LaneBracket, LaneMove, LaneOffset, LaneSet, bracket, newton, start};
 pub(in crate::measure) use minimum::{LevelMinimum, LevelQuery};
-pub(in crate::measure) use placed::{ExactContact, ExactQuery, active, direction_to_world, normals_towards, to_world};
+pub(in crate::measure) use placed::{
+    ExactContact, ExactQuery, active, direction_to_world, normals_towards, seen_from, to_world,
+};
 pub(in crate::measure) use point::{PointOffset, PointSide, offset_of_point};
+pub(in crate::measure) use projectable::{Offset, Projectable};
 pub(in crate::measure) use segment::Segment;
+pub(in crate::measure) use separating_plane::{SeparatingPlane, separating_plane};
 pub(in crate::measure) use shapes::{ShapeContact, ShapeDistance, between_shapes, contact_of_shapes};
+pub(in crate::measure) use start::start as cold_start;

@@ -1,4 +1,4 @@
-//! A body with a closed form where it stands, and a smooth body as seen from there.
+//! A body with a closed form where it stands, and another body as seen from there.
 
 use super::cuboid::Cuboid;
 use super::cylinder::Cylinder;

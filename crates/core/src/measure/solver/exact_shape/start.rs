@@ -51,7 +51,7 @@ pub(super) const SMALL_TURN: f64 = 1e-2;
 /// A point of the body and the direction against which it is about the farthest one; from the
 /// set's normal n at the body's centre on.
 #[inline(always)]
-pub(super) fn start<S: Simd, P: Projectable>(
+pub(in crate::measure) fn start<S: Simd, P: Projectable>(
     simd: S,
     set: &P,
     body: &Body,
