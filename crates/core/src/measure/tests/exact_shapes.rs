@@ -117,8 +117,9 @@ fn thin_bodies_against_shapes() {
 #[test]
 fn cut_bodies_against_shapes() {
     let share = share("cut bodies against shapes", 450, |random| (cut(random), shape(random)));
-    // A third of them overlaps, which the general search proves.
-    assert!(share > 55.0, "{share}");
+    // A third of them overlaps, and a ninth is too near for a normal in doubles: both are left to
+    // the general search.
+    assert!(share > 50.0, "{share}");
 }
 
 /// Capsules, balls, segments and points beside the same bodies, by Newton's method alone and by the
