@@ -162,7 +162,7 @@ impl Shown {
             });
             // Of a quick run there is nothing to say.
             (most > 0.0)
-                .then(|| if cut { format!("{least:.0} to {most:.0}") } else { format!("{least:.2} to {most:.1}") })
+                .then(|| if cut { format!("{least:.1} to {most:.1}") } else { format!("{least:.2} to {most:.1}") })
         };
         Some(format!(
             "- Bodies that slabs cut take {} µs with a hint and {} µs cold, where pairs of all other shapes take {} and {} µs\n  \
