@@ -16,7 +16,7 @@ use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::{At, Least, bracketed, least};
 use crate::measure::solver::active_constraints::ActiveSet;
-use crate::measure::solver::edge_newton::{EdgedProven, EdgedQuery, EdgedStart};
+use crate::measure::solver::edge_newton::{EdgeShapeProven, EdgeShapeQuery, EdgeShapeStart};
 use crate::measure::solver::exact_shape::{
     ExactQuery, PointOffset, PointSide, direction_to_world, offset_of_point, to_world,
 };
@@ -234,8 +234,8 @@ impl<'a> Projection<'a> {
     }
 
     /// Of a segment of the world frame that is known up to an error, metres, without closed forms
-    /// and Newton's method against shapes, after so many evaluations: until the bracket is as narrow
-    /// as the tolerance, metres, or says what is asked.
+    /// and Newton's method against shapes, after so many evaluations: until the bracket is as
+    /// narrow as the tolerance, metres, or says what is asked.
     pub(super) fn to_segment(
         &self,
         (segment, off): (&Segment, f64),
@@ -350,15 +350,16 @@ impl<'a> Projection<'a> {
         let (form, form_pose) = (ClosedForm::capsule(0.0, 0.0), Pose::identity().with_translation(*point));
         let (body, pose, goal) = (self.body, &self.pose, &StopCriterion::NARROW);
         if !body.is_smooth() {
-            let start = if let Hint::Edged(trace) = &warm.hint { EdgedStart::Last(trace) } else { EdgedStart::Cold };
+            let start = if let Hint::EdgeShape(trace) = &warm.hint {
+                EdgeShapeStart::Last(trace)
+            } else {
+                EdgeShapeStart::Cold
+            };
             let (form, form_pose) = (&form, &form_pose);
-            let query = EdgedQuery { body, pose, form, form_pose, goal, tolerance, options, start };
+            let query = EdgeShapeQuery { body, pose, form, form_pose, goal, tolerance, options, start };
             let found = dispatch(query)?;
-            let EdgedProven { lower, upper, x, n, rounds, trace, .. } = found;
-            *warm = trace.map_or_else(WarmStart::default, |trace| Hint::Edged(trace).into());
-            if upper == 0.0 {
-                return Ok(Projected::inside(point, rounds));
-            }
+            let EdgeShapeProven { lower, upper, x, n, rounds, trace, .. } = found;
+            *warm = Hint::EdgeShape(trace).into();
             let (normal, witness) = (-direction_to_world(form, form_pose, n), to_world(form, form_pose, x));
             return Ok(Projected { lower, upper, plane: normal, normal, witness, nearest: *point, iterations: rounds });
         }

@@ -4,7 +4,7 @@ use crate::body::Body;
 use crate::measure::frames::query_frame::Pair;
 use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::continuation::Trace;
-use crate::measure::solver::edge_newton::{EdgeTrace, EdgedTrace};
+use crate::measure::solver::edge_newton::{EdgeShapeTrace, EdgeTrace};
 use crate::measure::solver::exact_shape::ExactTrace;
 use crate::measure::solver::kkt_newton::Active;
 use crate::measure::solver::level_continuation::LevelTrace;
@@ -51,9 +51,9 @@ pub(super) enum Hint {
     Smooth(Trace),
     /// Witnesses of bodies of several constraints, with what is active there.
     Edges(EdgeTrace),
-    /// Nearest point of a body of several constraints to one with a closed form, with what is active
-    /// there.
-    Edged(EdgedTrace),
+    /// Nearest point of a body of several constraints to one with a closed form, with what is
+    /// active there.
+    EdgeShape(EdgeShapeTrace),
     /// Nearest point of a smooth body to one with a closed form.
     Exact(ExactTrace),
     /// Of two bodies with closed forms, the point of A that is nearest to B or in it, in A's frame.

@@ -11,7 +11,7 @@ use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::At;
 use crate::measure::point::Projection;
-use crate::measure::solver::edge_newton::{EdgedProven, EdgedQuery, EdgedStart};
+use crate::measure::solver::edge_newton::{EdgeShapeProven, EdgeShapeQuery, EdgeShapeStart};
 use crate::measure::solver::exact_shape::{
     ExactProven, ExactQuery, ShapeDistance, between_shapes, direction_to_world, to_world,
 };
@@ -199,18 +199,16 @@ impl Problem<'_> {
     ) -> Result<CapsuleDistance, u32> {
         let (form_pose, form, goal) = (self.capsule_pose, self.capsule.closed_form(), self.goal_of_axis());
         let start = match &warm.hint {
-            Hint::Edged(trace) => EdgedStart::Last(trace),
-            Hint::Single { y, .. } => EdgedStart::Witness(*y),
-            _ => EdgedStart::Cold,
+            Hint::EdgeShape(trace) => EdgeShapeStart::Last(trace),
+            Hint::Single { y, .. } => EdgeShapeStart::Witness(*y),
+            _ => EdgeShapeStart::Cold,
         };
-        let query = EdgedQuery { body, pose, form: &form, form_pose, goal: &goal, tolerance: width, options, start };
+        let query =
+            EdgeShapeQuery { body, pose, form: &form, form_pose, goal: &goal, tolerance: width, options, start };
         let spent = match dispatch(query) {
             Ok(found) => {
-                let EdgedProven { lower, upper, x, nearest, n, rounds, trace, .. } = found;
-                *warm = trace.map_or_else(WarmStart::default, |trace| Hint::Edged(trace).into());
-                if upper == 0.0 {
-                    return Ok(self.met(&to_world(&form, form_pose, x), rounds));
-                }
+                let EdgeShapeProven { lower, upper, x, nearest, n, rounds, trace, .. } = found;
+                *warm = Hint::EdgeShape(trace).into();
                 let witnesses = [x, nearest].map(|point| to_world(&form, form_pose, point));
                 return Ok(self.apart([lower, upper], witnesses, direction_to_world(&form, form_pose, n), rounds));
             }

@@ -8,9 +8,9 @@ use crate::measure::frames::pose::Pose;
 use crate::measure::frames::vector::V3;
 use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveConstraints;
-use crate::measure::solver::edge_newton::{EdgedProven, EdgedQuery, EdgedStart};
+use crate::measure::solver::edge_newton::{EdgeShapeProven, EdgeShapeQuery, EdgeShapeStart};
 use crate::measure::solver::exact_shape::{
-    ExactContact, ExactLost, ExactProven, ExactQuery, ExactTrace, ShapeDistance, active, between_shapes, common,
+    ExactContact, ExactLost, ExactProven, ExactQuery, ExactTrace, ShapeDistance, active, between_shapes,
     direction_to_world, to_world,
 };
 use crate::measure::solver::stop_criterion::StopCriterion;
@@ -103,19 +103,14 @@ impl<'a> Exact<'a> {
         let tolerance = self.tolerance(options);
         let (a, b) = if swapped { (other, body) } else { (body, other) };
         let start = match (&warm.hint, warm.hint.witnesses(a, b)) {
-            (Hint::Edged(trace), _) => EdgedStart::Last(trace),
+            (Hint::EdgeShape(trace), _) => EdgeShapeStart::Last(trace),
             // What other methods have found.
-            (_, Some([x_a, y_b])) => EdgedStart::Witness(if swapped { y_b } else { x_a }),
-            _ => EdgedStart::Cold,
+            (_, Some([x_a, y_b])) => EdgeShapeStart::Witness(if swapped { y_b } else { x_a }),
+            _ => EdgeShapeStart::Cold,
         };
-        let found = dispatch(EdgedQuery { body, pose, form, form_pose, goal, tolerance, options, start })?;
-        let EdgedProven { lower, upper, x, nearest, n, active, rounds, trace } = found;
-        let Some(trace) = trace else {
-            let found = common(x, rounds);
-            *warm = self.hint(&found);
-            return Ok(self.answer(&found, tolerance));
-        };
-        *warm = Hint::Edged(trace).into();
+        let found = dispatch(EdgeShapeQuery { body, pose, form, form_pose, goal, tolerance, options, start })?;
+        let EdgeShapeProven { lower, upper, x, nearest, n, active, rounds, trace } = found;
+        *warm = Hint::EdgeShape(trace).into();
         let bracket = Distance { lower, upper, iterations: rounds, ..Distance::default() };
         Ok(self.attained(bracket, tolerance, ([x, nearest, n], active)))
     }

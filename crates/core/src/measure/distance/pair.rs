@@ -164,7 +164,7 @@ impl<'a> Query<'a> {
                 Err(rounds) => spent = rounds,
             }
         }
-        if !runs(Stage::Edges) || spent > 0 && options.exhausted(spent) {
+        if !runs(Stage::Edges) || options.exhausted(spent) {
             return self.search(&Lost::after(spent), warm);
         }
         match of_edges(&Query { options: &options.after(spent), ..*self }, warm) {

@@ -33,4 +33,4 @@ mod share_inside;
 mod spot;
 
 pub(in crate::measure) use distance::{EdgeProven, EdgeQuery, EdgeTrace};
-pub(in crate::measure) use set_distance::{EdgedProven, EdgedQuery, EdgedStart, EdgedTrace};
+pub(in crate::measure) use set_distance::{EdgeShapeProven, EdgeShapeQuery, EdgeShapeStart, EdgeShapeTrace};

@@ -50,10 +50,6 @@ const LONGEST_FOLLOWED_STEP: f64 = 0.25;
 /// How often a step that led into the set is halved. It changes time only; no test pins it.
 const HALVINGS: u32 = 2;
 
-/// How often a point that may be a common one is tried where steps find no minimum outside of the
-/// set. It changes time only; no test pins it.
-const MOST_CONTACTS: u32 = 1;
-
 /// Length of a step, as above, beyond which no bracket is expected to decide. No larger than a
 /// quarter: bounds of curvature hold as far from the body as that.
 const DECISIVE: f64 = 0.25;
@@ -62,13 +58,8 @@ const DECISIVE: f64 = 0.25;
 /// It changes time only; no test pins it.
 const SETTLED_SQUARED: f64 = 1e-22;
 
-/// How much farther towards the interior point a common point is looked for than values ask for,
-/// dimensionless: they are convex along the way, and rounding counts. It changes time only; no test
-/// pins it.
-const INWARD: f64 = 1e-6;
-
-/// Evaluations after which steps are shortened, so that they do not go around in circles. It changes
-/// time only; no test pins it.
+/// Evaluations after which steps are shortened, so that they do not go around in circles. It
+/// changes time only; no test pins it.
 const PATIENCE: u32 = 8;
 
 /// Curvature times size, dimensionless, that is added where there is none: far more than rounding
@@ -78,7 +69,7 @@ const FLATTEST: f64 = 1e-10;
 
 /// What is kept of an answer for the next query of the pair.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::measure) struct EdgedTrace {
+pub(in crate::measure) struct EdgeShapeTrace {
     spot: Spot,
     /// What the first step from there missed last time, body frame, metres.
     missed: V3<f64>,
@@ -86,18 +77,18 @@ pub(in crate::measure) struct EdgedTrace {
 
 /// Where Newton's method starts.
 #[derive(Clone, Copy)]
-pub(in crate::measure) enum EdgedStart<'a> {
+pub(in crate::measure) enum EdgeShapeStart<'a> {
     /// From the poses alone.
     Cold,
     /// From the answer before.
-    Last(&'a EdgedTrace),
+    Last(&'a EdgeShapeTrace),
     /// From about the nearest point of the body, body frame, metres.
     Witness(Vector3<f64>),
 }
 
 /// A body of several constraints against one with a closed form, of capsules against their axes; as
 /// vectorized work.
-pub(in crate::measure) struct EdgedQuery<'a> {
+pub(in crate::measure) struct EdgeShapeQuery<'a> {
     pub(in crate::measure) body: &'a Body,
     pub(in crate::measure) pose: &'a Pose,
     pub(in crate::measure) form: &'a ClosedForm,
@@ -107,14 +98,13 @@ pub(in crate::measure) struct EdgedQuery<'a> {
     /// Width of the bracket that is narrow enough, metres.
     pub(in crate::measure) tolerance: f64,
     pub(in crate::measure) options: &'a Options<'a>,
-    pub(in crate::measure) start: EdgedStart<'a>,
+    pub(in crate::measure) start: EdgeShapeStart<'a>,
 }
 
 /// A proven bracket, metres, and where it is attained, in the frame of the shape.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::measure) struct EdgedProven {
+pub(in crate::measure) struct EdgeShapeProven {
     pub(in crate::measure) lower: f64,
-    /// 0 where a common point is known.
     pub(in crate::measure) upper: f64,
     /// Point of the body.
     pub(in crate::measure) x: V3<f64>,
@@ -126,13 +116,12 @@ pub(in crate::measure) struct EdgedProven {
     pub(in crate::measure) active: ActiveConstraints,
     /// Evaluations of the body.
     pub(in crate::measure) rounds: u32,
-    /// None of a common point.
-    pub(in crate::measure) trace: Option<EdgedTrace>,
+    pub(in crate::measure) trace: EdgeShapeTrace,
 }
 
-impl WithSimd for EdgedQuery<'_> {
+impl WithSimd for EdgeShapeQuery<'_> {
     /// The answer, or after how many evaluations there is none.
-    type Output = Result<EdgedProven, u32>;
+    type Output = Result<EdgeShapeProven, u32>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
@@ -146,20 +135,20 @@ impl WithSimd for EdgedQuery<'_> {
     }
 }
 
-impl EdgedQuery<'_> {
+impl EdgeShapeQuery<'_> {
     #[inline(always)]
-    fn against<S: Simd, P: Projectable>(self, simd: S, set: P) -> Result<EdgedProven, u32> {
+    fn against<S: Simd, P: Projectable>(self, simd: S, set: P) -> Result<EdgeShapeProven, u32> {
         let Self { body, pose, form, form_pose, goal, tolerance, options, start } = self;
         let relative = seen_from(simd, form, form_pose, body, pose);
         let side = Side::away(simd, body, 0, &relative);
         let displacement = form.displacement_m();
-        let pair = EdgedPair { side, relative: &relative, set, displacement, goal, tolerance, options };
+        let pair = EdgeShapePair { side, relative: &relative, set, displacement, goal, tolerance, options };
         pair.solve(simd, start)
     }
 }
 
 /// A body and a set, in the frame of the set.
-struct EdgedPair<'a, P> {
+struct EdgeShapePair<'a, P> {
     side: Side<'a, f64>,
     relative: &'a Relative<f64>,
     set: P,
@@ -169,7 +158,8 @@ struct EdgedPair<'a, P> {
     options: &'a Options<'a>,
 }
 
-/// A trial point, the set as seen from there, and the multipliers of the active constraints, metres.
+/// A trial point, the set as seen from there, and the multipliers of the active constraints,
+/// metres.
 struct Iterate {
     x: V3<f64>,
     seen: Offset,
@@ -191,18 +181,16 @@ struct Found {
     active: Weighted,
 }
 
-impl<P: Projectable> EdgedPair<'_, P> {
+impl<P: Projectable> EdgeShapePair<'_, P> {
     #[inline(always)]
-    fn solve<S: Simd>(&self, simd: S, start: EdgedStart<'_>) -> Result<EdgedProven, u32> {
+    fn solve<S: Simd>(&self, simd: S, start: EdgeShapeStart<'_>) -> Result<EdgeShapeProven, u32> {
         let mut rounds = 0;
-        if let EdgedStart::Last(trace) = start
+        if let EdgeShapeStart::Last(trace) = start
             && let Some((at, predicted)) = self.follow(simd, trace)
         {
             match self.run(simd, at, &mut rounds) {
                 Ok(mut proven) => {
-                    if let Some(trace) = &mut proven.trace {
-                        trace.missed = subtract::<S, f64>(trace.spot.point, predicted);
-                    }
+                    proven.trace.missed = subtract::<S, f64>(proven.trace.spot.point, predicted);
                     return Ok(proven);
                 }
                 Err(Lost::Wide) => return Err(rounds),
@@ -211,7 +199,7 @@ impl<P: Projectable> EdgedPair<'_, P> {
         }
         let center = self.interior(simd);
         let first = match start {
-            EdgedStart::Witness(witness) => {
+            EdgeShapeStart::Witness(witness) => {
                 let x = self.placed(simd, (witness - self.side.body().normalization().center).into());
                 Some(self.untried(simd, x))
             }
@@ -227,20 +215,18 @@ impl<P: Projectable> EdgedPair<'_, P> {
         if self.options.exhausted(rounds) {
             return Err(rounds);
         }
-        // Where the body's surface is about between the set and the centre, or else a common point.
+        // Where the body's surface is about, between the set and the centre: tables overshoot flat
+        // tips.
         rounds += 1;
         let y = self.set.project(simd, center);
         let mut evaluated = Evaluated::none();
         evaluated.fill(simd, &self.side, y);
         let highest = evaluated.highest();
         let x = self.side.with_active(highest).on_the_surface(simd, y, evaluated.jets[highest].value);
-        match self.run(simd, self.untried(simd, x), &mut rounds) {
-            Ok(proven) => Ok(proven),
-            Err(_) => Err(rounds),
-        }
+        self.run(simd, self.untried(simd, x), &mut rounds).map_err(|_| rounds)
     }
 
-    /// From the poses alone; none where tables overshoot the set, as where the body reaches it.
+    /// From the poses and the interior point alone; none where the start overshoots the set.
     #[inline(always)]
     fn seek<S: Simd>(&self, simd: S, center: V3<f64>) -> Option<Iterate> {
         let seen = self.set.offset(simd, center);
@@ -271,11 +257,11 @@ impl<P: Projectable> EdgedPair<'_, P> {
         add::<S, f64>(self.relative.origin, apply::<S, f64>(&self.relative.rotation, own))
     }
 
-    /// From the last answer: the step for the poses as they are now, without an evaluation, and what
-    /// it missed last time on top. Also what it led to, without that, in the body's frame.
+    /// From the last answer: the step for the poses as they are now, without an evaluation, and
+    /// what it missed last time on top. Also what it led to, without that, in the body's frame.
     #[inline(always)]
-    fn follow<S: Simd>(&self, simd: S, trace: &EdgedTrace) -> Option<(Iterate, V3<f64>)> {
-        let EdgedTrace { spot, missed } = trace;
+    fn follow<S: Simd>(&self, simd: S, trace: &EdgeShapeTrace) -> Option<(Iterate, V3<f64>)> {
+        let EdgeShapeTrace { spot, missed } = trace;
         let x = self.placed(simd, spot.point);
         let seen = self.set.offset(simd, x);
         if !(seen.distance > 0.0) {
@@ -302,11 +288,18 @@ impl<P: Projectable> EdgedPair<'_, P> {
     // There is no allocation in a solve.
     #[allow(clippy::result_large_err)]
     #[inline(always)]
-    fn run<S: Simd>(&self, simd: S, mut at: Iterate, rounds: &mut u32) -> Result<EdgedProven, Lost> {
+    fn run<S: Simd>(&self, simd: S, mut at: Iterate, rounds: &mut u32) -> Result<EdgeShapeProven, Lost> {
         let side = &self.side;
-        let (mut before, mut halved, mut contacts) = (None, 0, 0);
+        let mut before = None;
         let (mut evaluated, mut linear) = (Evaluated::none(), Linearized::none());
         for round in 1..=MAX_ROUNDS {
+            let mut halved = 0;
+            while !(at.seen.distance > 0.0) {
+                let old = before.filter(|_| halved < HALVINGS).ok_or(Lost::Elsewhere)?;
+                halved += 1;
+                at.x = scaled::<S, f64>(add::<S, f64>(at.x, old), 0.5);
+                at.seen = self.set.offset(simd, at.x);
+            }
             if self.options.exhausted(*rounds) {
                 return Err(Lost::Elsewhere);
             }
@@ -321,18 +314,6 @@ impl<P: Projectable> EdgedPair<'_, P> {
                 (at.seen, before) = (self.set.offset(simd, at.x), None);
                 continue;
             }
-            if !(at.seen.distance > 0.0) {
-                if let Some(common) = self.common(simd, at.x, &evaluated) {
-                    return Ok(EdgedProven { rounds: *rounds, ..common });
-                }
-                at.x = scaled::<S, f64>(
-                    add::<S, f64>(at.x, before.filter(|_| halved < HALVINGS).ok_or(Lost::Elsewhere)?),
-                    0.5,
-                );
-                at.seen = self.set.offset(simd, at.x);
-                halved += 1;
-                continue;
-            }
             let local = side.localize(simd, &at.seen.frame);
             if at.active.len == 0 {
                 let highest = evaluated.highest();
@@ -343,24 +324,14 @@ impl<P: Projectable> EdgedPair<'_, P> {
             }
             let bent = at.active.sum(simd, &evaluated).hessian;
             linear.fill(simd, evaluated.iter(), (&at.active, &bent), &local);
-            let Some(found) = self.step(simd, &linear, at.x, &at.seen) else {
-                // The distance decreases all the way to the set without leaving the body.
-                if contacts == MOST_CONTACTS {
-                    return Err(Lost::Elsewhere);
-                }
-                contacts += 1;
-                let nearest = self.inner().ok_or(Lost::Elsewhere)?.project(simd, at.x);
-                before = Some(at.x);
-                at = self.untried(simd, nearest);
-                continue;
-            };
+            let found = self.step(simd, &linear, at.x, &at.seen).ok_or(Lost::Elsewhere)?;
             let square = side.relative_square(simd, &local, found.step);
             if !square.is_finite() {
                 return Err(Lost::Elsewhere);
             }
             if square < WORTH_A_BRACKET_SQUARED || self.is_decided(square, found.next.distance) {
                 if let Some(proven) = self.prove(simd, &at, &found, (&evaluated, &local)) {
-                    return Ok(EdgedProven { rounds: *rounds, ..proven });
+                    return Ok(EdgeShapeProven { rounds: *rounds, ..proven });
                 }
                 if square < SETTLED_SQUARED {
                     return Err(Lost::Wide);
@@ -382,35 +353,6 @@ impl<P: Projectable> EdgedPair<'_, P> {
     fn is_decided(&self, square: f64, distance: f64) -> bool {
         let width = square * square.sqrt() * self.side.body().trust().reach;
         square < DECISIVE * DECISIVE && self.goal.met(distance - width, distance + width)
-    }
-
-    /// A set that lies in what the set stands for, if there is one.
-    #[inline(always)]
-    fn inner(&self) -> Option<P> {
-        let is_inside = self.displacement == 0.0 || self.set.thinnest() > self.displacement;
-        is_inside.then(|| self.set.shrunk(self.displacement))
-    }
-
-    /// A point of the set that is proven to lie in the body: near the one at which all constraints
-    /// were evaluated, as far towards the body's interior point as they ask for.
-    #[inline(always)]
-    fn common<S: Simd>(&self, simd: S, x: V3<f64>, evaluated: &Evaluated) -> Option<EdgedProven> {
-        let inner = self.inner()?;
-        let (highest, least) = (evaluated.jets[evaluated.highest()].value, self.side.body().min_value());
-        let share = ((highest - 1.0) / (highest - least)).max(0.0) * (1.0 + INWARD);
-        let x = add_scaled::<S, f64>(x, share, subtract::<S, f64>(self.interior(simd), x));
-        let x = inner.project(simd, x);
-        let [_, bound] = self.side.highest(simd, x);
-        (bound <= 1.0).then_some(EdgedProven {
-            lower: 0.0,
-            upper: 0.0,
-            x,
-            nearest: x,
-            n: [0.0; 3],
-            active: ActiveConstraints::default(),
-            rounds: 0,
-            trace: None,
-        })
     }
 
     /// Newton's step from a point; none if the quadratic programs have no minimiser.
@@ -469,7 +411,7 @@ impl<P: Projectable> EdgedPair<'_, P> {
         at: &Iterate,
         found: &Found,
         (evaluated, local): (&Evaluated, &M3<f64>),
-    ) -> Option<EdgedProven> {
+    ) -> Option<EdgeShapeProven> {
         if !(found.next.distance > 0.0) {
             return None;
         }
@@ -503,8 +445,8 @@ impl<P: Projectable> EdgedPair<'_, P> {
         let own = apply_transposed::<S, f64>(&self.relative.rotation, subtract::<S, f64>(x, self.relative.origin));
         let spot = Spot::new(simd, own, weighted.times(multiplier), (evaluated, delta));
         let active = spot.active.reported();
-        let trace = Some(EdgedTrace { spot, missed: [0.0; 3] });
-        Some(EdgedProven { lower, upper, x, nearest, n, active, rounds: 0, trace })
+        let trace = EdgeShapeTrace { spot, missed: [0.0; 3] };
+        Some(EdgeShapeProven { lower, upper, x, nearest, n, active, rounds: 0, trace })
     }
 }
 

@@ -19,8 +19,8 @@ pub(in crate::measure) struct SeparatingPlane {
     pub(in crate::measure) rounding: f64,
 }
 
-/// The plane across a body's gradient at a point that was stepped to from a frame, made to touch all
-/// of the set's feature there. The set is known up to a displacement.
+/// The plane across a body's gradient at a point that was stepped to from a frame, made to touch
+/// all of the set's feature there. The set is known up to a displacement.
 #[inline(always)]
 pub(in crate::measure) fn separating_plane<S: Simd, P: Projectable>(
     simd: S,
