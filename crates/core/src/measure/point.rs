@@ -359,7 +359,10 @@ impl<'a> Projection<'a> {
             let query = EdgeShapeQuery { body, pose, form, form_pose, goal, tolerance, options, start };
             let found = dispatch(query)?;
             let EdgeShapeProven { lower, upper, x, n, rounds, trace, .. } = found;
-            *warm = Hint::EdgeShape(trace).into();
+            *warm = trace.map_or_else(WarmStart::default, |trace| Hint::EdgeShape(trace).into());
+            if upper == 0.0 {
+                return Ok(Projected::inside(point, rounds));
+            }
             let (normal, witness) = (-direction_to_world(form, form_pose, n), to_world(form, form_pose, x));
             return Ok(Projected { lower, upper, plane: normal, normal, witness, nearest: *point, iterations: rounds });
         }

@@ -208,7 +208,10 @@ impl Problem<'_> {
         let spent = match dispatch(query) {
             Ok(found) => {
                 let EdgeShapeProven { lower, upper, x, nearest, n, rounds, trace, .. } = found;
-                *warm = Hint::EdgeShape(trace).into();
+                *warm = trace.map_or_else(WarmStart::default, |trace| Hint::EdgeShape(trace).into());
+                if upper == 0.0 {
+                    return Ok(self.met(&to_world(&form, form_pose, x), rounds));
+                }
                 let witnesses = [x, nearest].map(|point| to_world(&form, form_pose, point));
                 return Ok(self.apart([lower, upper], witnesses, direction_to_world(&form, form_pose, n), rounds));
             }

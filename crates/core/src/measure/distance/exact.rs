@@ -10,7 +10,7 @@ use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveConstraints;
 use crate::measure::solver::edge_newton::{EdgeShapeProven, EdgeShapeQuery, EdgeShapeStart};
 use crate::measure::solver::exact_shape::{
-    ExactContact, ExactLost, ExactProven, ExactQuery, ExactTrace, ShapeDistance, active, between_shapes,
+    ExactContact, ExactLost, ExactProven, ExactQuery, ExactTrace, ShapeDistance, active, between_shapes, common,
     direction_to_world, to_world,
 };
 use crate::measure::solver::stop_criterion::StopCriterion;
@@ -110,6 +110,11 @@ impl<'a> Exact<'a> {
         };
         let found = dispatch(EdgeShapeQuery { body, pose, form, form_pose, goal, tolerance, options, start })?;
         let EdgeShapeProven { lower, upper, x, nearest, n, active, rounds, trace } = found;
+        let Some(trace) = trace else {
+            let found = common(x, rounds);
+            *warm = self.hint(&found);
+            return Ok(self.answer(&found, tolerance));
+        };
         *warm = Hint::EdgeShape(trace).into();
         let bracket = Distance { lower, upper, iterations: rounds, ..Distance::default() };
         Ok(self.attained(bracket, tolerance, ([x, nearest, n], active)))

@@ -50,6 +50,10 @@ const LONGEST_FOLLOWED_STEP: f64 = 0.25;
 /// How often a step that led into the set is halved. It changes time only; no test pins it.
 const HALVINGS: u32 = 2;
 
+/// How often a point that may be a common one is tried where steps find no minimum outside of the
+/// set. It changes time only; no test pins it.
+const MOST_CONTACTS: u32 = 1;
+
 /// Length of a step, as above, beyond which no bracket is expected to decide. No larger than a
 /// quarter: bounds of curvature hold as far from the body as that.
 const DECISIVE: f64 = 0.25;
@@ -57,6 +61,11 @@ const DECISIVE: f64 = 0.25;
 /// Square of a step, as above, dimensionless, after which only rounding is left: 1e-11 of the body.
 /// It changes time only; no test pins it.
 const SETTLED_SQUARED: f64 = 1e-22;
+
+/// How much farther towards the interior point a common point is looked for than values ask for,
+/// dimensionless: they are convex along the way, and rounding counts. It changes time only; no test
+/// pins it.
+const INWARD: f64 = 1e-6;
 
 /// Evaluations after which steps are shortened, so that they do not go around in circles. It
 /// changes time only; no test pins it.
@@ -105,6 +114,7 @@ pub(in crate::measure) struct EdgeShapeQuery<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(in crate::measure) struct EdgeShapeProven {
     pub(in crate::measure) lower: f64,
+    /// 0 where a common point is known.
     pub(in crate::measure) upper: f64,
     /// Point of the body.
     pub(in crate::measure) x: V3<f64>,
@@ -116,7 +126,8 @@ pub(in crate::measure) struct EdgeShapeProven {
     pub(in crate::measure) active: ActiveConstraints,
     /// Evaluations of the body.
     pub(in crate::measure) rounds: u32,
-    pub(in crate::measure) trace: EdgeShapeTrace,
+    /// None of a common point.
+    pub(in crate::measure) trace: Option<EdgeShapeTrace>,
 }
 
 impl WithSimd for EdgeShapeQuery<'_> {
@@ -190,7 +201,9 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
         {
             match self.run(simd, at, &mut rounds) {
                 Ok(mut proven) => {
-                    proven.trace.missed = subtract::<S, f64>(proven.trace.spot.point, predicted);
+                    if let Some(trace) = &mut proven.trace {
+                        trace.missed = subtract::<S, f64>(trace.spot.point, predicted);
+                    }
                     return Ok(proven);
                 }
                 Err(Lost::Wide) => return Err(rounds),
@@ -215,8 +228,7 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
         if self.options.exhausted(rounds) {
             return Err(rounds);
         }
-        // Where the body's surface is about, between the set and the centre: tables overshoot flat
-        // tips.
+        // Where the body's surface is about between the set and the centre, or else a common point.
         rounds += 1;
         let y = self.set.project(simd, center);
         let mut evaluated = Evaluated::none();
@@ -226,7 +238,7 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
         self.run(simd, self.untried(simd, x), &mut rounds).map_err(|_| rounds)
     }
 
-    /// From the poses and the interior point alone; none where the start overshoots the set.
+    /// From the poses alone; none where tables overshoot the set, as where the body reaches it.
     #[inline(always)]
     fn seek<S: Simd>(&self, simd: S, center: V3<f64>) -> Option<Iterate> {
         let seen = self.set.offset(simd, center);
@@ -290,16 +302,9 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
     #[inline(always)]
     fn run<S: Simd>(&self, simd: S, mut at: Iterate, rounds: &mut u32) -> Result<EdgeShapeProven, Lost> {
         let side = &self.side;
-        let mut before = None;
+        let (mut before, mut halved, mut contacts) = (None, 0, 0);
         let (mut evaluated, mut linear) = (Evaluated::none(), Linearized::none());
         for round in 1..=MAX_ROUNDS {
-            let mut halved = 0;
-            while !(at.seen.distance > 0.0) {
-                let old = before.filter(|_| halved < HALVINGS).ok_or(Lost::Elsewhere)?;
-                halved += 1;
-                at.x = scaled::<S, f64>(add::<S, f64>(at.x, old), 0.5);
-                at.seen = self.set.offset(simd, at.x);
-            }
             if self.options.exhausted(*rounds) {
                 return Err(Lost::Elsewhere);
             }
@@ -314,6 +319,18 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
                 (at.seen, before) = (self.set.offset(simd, at.x), None);
                 continue;
             }
+            if !(at.seen.distance > 0.0) {
+                if let Some(common) = self.common(simd, at.x, &evaluated) {
+                    return Ok(EdgeShapeProven { rounds: *rounds, ..common });
+                }
+                at.x = scaled::<S, f64>(
+                    add::<S, f64>(at.x, before.filter(|_| halved < HALVINGS).ok_or(Lost::Elsewhere)?),
+                    0.5,
+                );
+                at.seen = self.set.offset(simd, at.x);
+                halved += 1;
+                continue;
+            }
             let local = side.localize(simd, &at.seen.frame);
             if at.active.len == 0 {
                 let highest = evaluated.highest();
@@ -324,7 +341,17 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
             }
             let bent = at.active.sum(simd, &evaluated).hessian;
             linear.fill(simd, evaluated.iter(), (&at.active, &bent), &local);
-            let found = self.step(simd, &linear, at.x, &at.seen).ok_or(Lost::Elsewhere)?;
+            let Some(found) = self.step(simd, &linear, at.x, &at.seen) else {
+                // The distance decreases all the way to the set without leaving the body.
+                if contacts == MOST_CONTACTS {
+                    return Err(Lost::Elsewhere);
+                }
+                contacts += 1;
+                let nearest = self.inner().ok_or(Lost::Elsewhere)?.project(simd, at.x);
+                before = Some(at.x);
+                at = self.untried(simd, nearest);
+                continue;
+            };
             let square = side.relative_square(simd, &local, found.step);
             if !square.is_finite() {
                 return Err(Lost::Elsewhere);
@@ -353,6 +380,35 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
     fn is_decided(&self, square: f64, distance: f64) -> bool {
         let width = square * square.sqrt() * self.side.body().trust().reach;
         square < DECISIVE * DECISIVE && self.goal.met(distance - width, distance + width)
+    }
+
+    /// A set that lies in what the set stands for, if there is one.
+    #[inline(always)]
+    fn inner(&self) -> Option<P> {
+        let is_inside = self.displacement == 0.0 || self.set.thinnest() > self.displacement;
+        is_inside.then(|| self.set.shrunk(self.displacement))
+    }
+
+    /// A point of the set that is proven to lie in the body: near the one at which all constraints
+    /// were evaluated, as far towards the body's interior point as they ask for.
+    #[inline(always)]
+    fn common<S: Simd>(&self, simd: S, x: V3<f64>, evaluated: &Evaluated) -> Option<EdgeShapeProven> {
+        let inner = self.inner()?;
+        let (highest, least) = (evaluated.jets[evaluated.highest()].value, self.side.body().min_value());
+        let share = ((highest - 1.0) / (highest - least)).max(0.0) * (1.0 + INWARD);
+        let x = add_scaled::<S, f64>(x, share, subtract::<S, f64>(self.interior(simd), x));
+        let x = inner.project(simd, x);
+        let [_, bound] = self.side.highest(simd, x);
+        (bound <= 1.0).then_some(EdgeShapeProven {
+            lower: 0.0,
+            upper: 0.0,
+            x,
+            nearest: x,
+            n: [0.0; 3],
+            active: ActiveConstraints::default(),
+            rounds: 0,
+            trace: None,
+        })
     }
 
     /// Newton's step from a point; none if the quadratic programs have no minimiser.
@@ -445,7 +501,7 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
         let own = apply_transposed::<S, f64>(&self.relative.rotation, subtract::<S, f64>(x, self.relative.origin));
         let spot = Spot::new(simd, own, weighted.times(multiplier), (evaluated, delta));
         let active = spot.active.reported();
-        let trace = EdgeShapeTrace { spot, missed: [0.0; 3] };
+        let trace = Some(EdgeShapeTrace { spot, missed: [0.0; 3] });
         Some(EdgeShapeProven { lower, upper, x, nearest, n, active, rounds: 0, trace })
     }
 }

@@ -470,6 +470,6 @@ pub(super) fn interior<S: Simd>(_: S, body: &Body, relative: &Relative<f64>) -> 
 }
 
 /// A common point.
-pub(super) fn common(y: V3<f64>, rounds: u32) -> ExactProven {
+pub(in crate::measure) fn common(y: V3<f64>, rounds: u32) -> ExactProven {
     ExactProven { lower: 0.0, upper: 0.0, x: y, nearest: y, n: [0.0; 3], multiplier: 0.0, rounds, trace: None }
 }

@@ -21,7 +21,7 @@ mod start;
 pub(in crate::measure) use cuboid::Cuboid;
 pub(in crate::measure) use cylinder::Cylinder;
 pub(in crate::measure) use distance::{
-    ExactLost, ExactProven, ExactTrace, FLATTEST, LONGEST_STEP, WORTH_A_BRACKET_SQUARED,
+    ExactLost, ExactProven, ExactTrace, FLATTEST, LONGEST_STEP, WORTH_A_BRACKET_SQUARED, common,
 };
 pub(in crate::measure) use lanes::{LaneBracket, LaneMove, LaneOffset, LaneSet, bracket, newton, start};
 pub(in crate::measure) use minimum::{LevelMinimum, LevelQuery};
