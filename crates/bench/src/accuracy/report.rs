@@ -4,6 +4,7 @@ use super::methods::Cell;
 use super::{Accuracy, Measured};
 use crate::blocks::block;
 use crate::comparison::parry_version;
+use crate::csv::{MEASURED, significant};
 use crate::machine::locked;
 use std::fmt::Write;
 
@@ -53,15 +54,16 @@ impl Accuracy {
             for cell in &case.cells {
                 let Cell { method, setting, queries, nanoseconds, iterations, error, width, off, short } = cell;
                 let name = method.name();
-                let announce = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:e}"));
+                let announce = |value: Option<f64>| {
+                    value.map_or(String::new(), |value| format!("{:e}", significant(value, MEASURED)))
+                };
                 let widths = width.map_or([None; 2], |width| width.map(Some)).map(announce).join(",");
+                let errors = error.map(|error| announce(Some(error))).join(",");
                 let _ = writeln!(
                     text,
-                    "{},{name},{setting},{queries},{nanoseconds:.1},{},{:e},{:e},{widths},{off},{}",
+                    "{},{name},{setting},{queries},{nanoseconds:.1},{},{errors},{widths},{off},{}",
                     case.name,
                     announce(*iterations),
-                    error[0],
-                    error[1],
                     short.map_or(String::new(), |short| short.to_string())
                 );
             }

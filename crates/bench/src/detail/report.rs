@@ -4,6 +4,7 @@ use super::questions::THRESHOLDS;
 use super::rungs::{Ladder, Rung};
 use super::{Detail, parts_report};
 use crate::blocks::block;
+use crate::csv::{MEASURED, significant};
 use std::fmt::Write;
 
 impl Detail {
@@ -37,7 +38,10 @@ impl Detail {
         );
         for Ladder { pair, rungs, .. } in &self.ladders {
             for rung in rungs {
-                let Rung { name, error, gap, iterations, nanoseconds, batch, failed, wrong, settled } = rung;
+                let Rung { name, failed, wrong, settled, .. } = rung;
+                let short = |value: f64| significant(value, MEASURED);
+                let (error, gap, batch) = (rung.error.map(short), short(rung.gap), short(rung.batch));
+                let (iterations, nanoseconds) = (rung.iterations.map(short), rung.nanoseconds.map(short));
                 for (threshold, settled) in THRESHOLDS.iter().zip(settled) {
                     let _ = writeln!(
                         text,
