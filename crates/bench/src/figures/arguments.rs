@@ -211,8 +211,8 @@ pub(super) struct ScenesArgs {
     pub(super) common: Common,
 }
 
-/// Pairs by type: ball, ellipsoid, degree 4, 6 and 8, slab-cut, box, cylinder and capsule, each
-/// against each: distances cold and warm, and decisions, beside coal and parry
+/// Pairs by type: ball, ellipsoid, degree 4, 6 and 8, slab-cut, box, cylinder, capsule and
+/// half-space, each against each: distances cold and warm, and decisions, beside coal and parry
 ///
 /// Shapes about the chair and the human of the Princeton benchmark. Writes pairs.md, pairs.csv and
 /// pairs-*.svg. Takes about a minute on one core, once the fits are kept; a second with --quick.

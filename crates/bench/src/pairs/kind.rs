@@ -15,11 +15,13 @@ pub(super) enum Kind {
     Cylinder,
     /// A capsule of about its size.
     Capsule,
+    /// All on one side of a plane; second of a pair only.
+    HalfSpace,
 }
 
 impl Kind {
     /// All of them, those of one smooth polynomial first.
-    pub(super) const ALL: [Self; 9] = [
+    pub(super) const ALL: [Self; 10] = [
         Self::Ball,
         Self::Degree(2),
         Self::Degree(4),
@@ -29,10 +31,11 @@ impl Kind {
         Self::Cuboid,
         Self::Cylinder,
         Self::Capsule,
+        Self::HalfSpace,
     ];
 
     /// Those of a quick run.
-    pub(super) const QUICK: [Self; 4] = [Self::Ball, Self::Degree(4), Self::Cuboid, Self::Capsule];
+    pub(super) const QUICK: [Self; 5] = [Self::Ball, Self::Degree(4), Self::Cuboid, Self::Capsule, Self::HalfSpace];
 
     /// Its name for people, by which [`Kind::named`] finds it.
     pub(super) fn name(self) -> &'static str {
@@ -46,6 +49,7 @@ impl Kind {
             Self::Cuboid => "box",
             Self::Cylinder => "cylinder",
             Self::Capsule => "capsule",
+            Self::HalfSpace => "half-space",
         }
     }
 
@@ -58,5 +62,15 @@ impl Kind {
     /// object.
     pub(super) fn is_exact(self) -> bool {
         matches!(self, Self::Ball | Self::Cuboid | Self::Cylinder | Self::Capsule)
+    }
+
+    /// Whether it is the first of some pair.
+    pub(super) fn is_first(self) -> bool {
+        self != Self::HalfSpace
+    }
+
+    /// Whether there is a measure of it beside this kind: of half-spaces there is one of bodies.
+    pub(super) fn pairs_with(self, other: Self) -> bool {
+        self.is_first() && (other != Self::HalfSpace || self != Self::Capsule)
     }
 }

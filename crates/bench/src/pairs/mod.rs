@@ -30,7 +30,7 @@ pub struct Pairs {
     times: Vec<Time>,
 }
 
-/// Times every pair of kinds, or of four kinds at fewer poses if `quick`, about two meshes of
+/// Times every pair of kinds, or of five kinds at fewer poses if `quick`, about two meshes of
 /// `data`. Fits are kept in the `cache`; coal takes part where `SUBLEVEL_COAL` names the program
 /// that times it. `progress` receives what is going on and can stop it.
 ///
@@ -58,7 +58,7 @@ pub fn pairs(
     }
     let mut times = Vec::new();
     for (i, (kind_a, [a, _])) in models.iter().enumerate() {
-        for (kind_b, [_, b]) in &models[i..] {
+        for (kind_b, [_, b]) in models[i..].iter().filter(|(kind_b, _)| kind_a.pairs_with(*kind_b)) {
             announce(&format!("{} against {}", kind_a.name(), kind_b.name()))?;
             times.extend(race([*kind_a, *kind_b], [a, b], unit_m, &effort, (cache, coal.as_ref()))?);
         }

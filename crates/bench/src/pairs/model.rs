@@ -1,16 +1,18 @@
 //! A shape of some kind about an object, as this library and others take it.
 
 use nalgebra::Vector3;
+use parry3d_f64::math::{Pose as ParryPose, Vector};
+use parry3d_f64::shape::{HalfSpace as ParryHalfSpace, SharedShape};
 use sublevel::body::{Body, BodyError};
 use sublevel::fit::{FitOptions, ball};
 use sublevel::measure::{
-    Capsule, CapsuleDistance, Decision, Options, Pose, Status, WarmStart, distance, distance_of_capsules,
-    distance_to_capsule, overlap, overlap_with_capsule,
+    Capsule, CapsuleDistance, Decision, HalfSpace, Options, Pose, Status, WarmStart, distance, distance_of_capsules,
+    distance_to_capsule, distance_to_half_space, overlap, overlap_with_capsule,
 };
 
 use super::kind::Kind;
 use crate::comparison::sweep::Answer;
-use crate::comparison::{ComparisonError, FitCache, PeerShape, Subject};
+use crate::comparison::{ComparisonError, FitCache, NoHull, PeerShape, Subject};
 
 /// Slabs of a body that slabs cut.
 const SLABS: usize = 6;
@@ -28,11 +30,14 @@ enum Form {
     Body(Box<Body>),
     /// With a body that contains it, for motions.
     Capsule(Capsule, Box<Body>),
+    /// The points with z at most 0, with the ball whose motions it takes.
+    HalfSpace(HalfSpace, Box<Body>),
 }
 
 /// What is known of the distance of a pair.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Found {
+    lower_m: f64,
     pub(super) upper_m: f64,
     /// From the second to the first.
     pub(super) normal: Option<Vector3<f64>>,
@@ -41,14 +46,33 @@ pub(super) struct Found {
 }
 
 impl Found {
+    /// Of a body from a half-space; there is no measure of capsules and half-spaces.
+    fn above(half_space: &HalfSpace, body: &Body, pose: &Pose, warm: &mut WarmStart) -> Self {
+        let found = distance_to_half_space(body, pose, half_space, &Options::default(), warm);
+        Self {
+            lower_m: found.lower,
+            upper_m: found.upper,
+            normal: Some(*half_space.normal()),
+            converged: found.status == Status::Converged,
+            iterations: found.iterations,
+        }
+    }
+
     fn signed(found: &CapsuleDistance) -> Self {
         // How deep an axis is in a body is not measured; that they overlap is known.
         let settled = found.status == Status::Converged || found.upper <= 0.0;
-        Self { upper_m: found.upper, normal: found.normal, converged: settled, iterations: found.iterations }
+        let (lower_m, upper_m) = (found.lower, found.upper);
+        Self { lower_m, upper_m, normal: found.normal, converged: settled, iterations: found.iterations }
     }
 
     pub(super) fn answer(&self) -> Answer {
         Answer { iterations: Some(self.iterations), failed: !self.converged, overlap: self.upper_m <= 0.0 }
+    }
+
+    /// The decision that a signed distance is.
+    fn decision(&self) -> Answer {
+        let failed = self.lower_m <= 0.0 && self.upper_m > 0.0;
+        Answer { iterations: None, failed, overlap: self.upper_m <= 0.0 }
     }
 }
 
@@ -68,12 +92,19 @@ impl Model {
         half.sort_by(f64::total_cmp);
         let radius_m = 0.5 * (half[0] + half[1]);
         let body = |made: Result<Body, BodyError>| made.map(Box::new).map_err(|error| failed(error.to_string()));
+        let smallest_ball = || {
+            let around = ball(subject.name, &subject.hull).map_err(|error| failed(error.to_string()))?;
+            let radius_m = around.body.circumscribed().radius;
+            Ok::<_, ComparisonError>((body(Body::ball(subject.name, Vector3::zeros(), radius_m))?, radius_m))
+        };
         let (form, primitive) = match kind {
             Kind::Ball => {
-                let around = ball(subject.name, &subject.hull).map_err(|error| failed(error.to_string()))?;
-                let radius_m = around.body.circumscribed().radius;
-                let made = body(Body::ball(subject.name, Vector3::zeros(), radius_m))?;
+                let (made, radius_m) = smallest_ball()?;
                 (Form::Body(made), Some(PeerShape::Ball { radius_m }))
+            }
+            Kind::HalfSpace => {
+                let half_space = HalfSpace::new(Vector3::z(), 0.0).map_err(|error| failed(error.to_string()))?;
+                (Form::HalfSpace(half_space, smallest_ball()?.0), None)
             }
             Kind::Degree(degree) => (Form::Body(Box::new(fitted(degree, 0)?)), None),
             Kind::SlabCut => (Form::Body(Box::new(fitted(6, SLABS)?)), None),
@@ -99,19 +130,33 @@ impl Model {
         Ok(Self { form, primitive, hull: subject.hull.clone() })
     }
 
-    /// A body that is the shape or contains it.
+    /// A body that is the shape or contains it; of a half-space a ball.
     pub(super) fn body(&self) -> &Body {
         match &self.form {
-            Form::Body(body) | Form::Capsule(_, body) => body,
+            Form::Body(body) | Form::Capsule(_, body) | Form::HalfSpace(_, body) => body,
         }
     }
 
-    /// The shape as other libraries take it: itself, or the convex hull of its object.
-    pub(super) fn peer_shape(&self) -> PeerShape<'_> {
-        self.primitive.unwrap_or(PeerShape::Hull(&self.hull))
+    pub(super) fn is_half_space(&self) -> bool {
+        matches!(self.form, Form::HalfSpace(..))
     }
 
-    /// Distance of this shape where it is from another at `pose`, signed with a capsule.
+    /// The shape as coal's program takes it: itself, or the convex hull of its object; it knows no
+    /// half-spaces.
+    pub(super) fn coal(&self) -> Option<PeerShape<'_>> {
+        (!self.is_half_space()).then(|| self.primitive.unwrap_or(PeerShape::Hull(&self.hull)))
+    }
+
+    /// The shape as parry takes it, with its frame in ours.
+    pub(super) fn parry(&self) -> Result<(SharedShape, ParryPose), NoHull> {
+        match self.coal() {
+            Some(shape) => shape.parry(),
+            None => Ok((SharedShape::new(ParryHalfSpace::new(Vector::new(0.0, 0.0, 1.0))), ParryPose::IDENTITY)),
+        }
+    }
+
+    /// Distance of this shape where it is from another at `pose`, signed with a capsule. A
+    /// half-space stays where it is, and this shape is at `pose`; the distance is signed.
     #[inline]
     pub(super) fn distance(&self, other: &Self, pose: &Pose, warm: &mut WarmStart) -> Found {
         let (origin, options) = (Pose::identity(), Options::default());
@@ -119,11 +164,17 @@ impl Model {
             (Form::Body(a), Form::Body(b)) => {
                 let found = distance(&**a, &origin, &**b, pose, &options, warm);
                 Found {
+                    lower_m: found.lower,
                     upper_m: found.upper,
                     normal: found.normal,
                     converged: found.status == Status::Converged,
                     iterations: found.iterations,
                 }
+            }
+            (_, Form::HalfSpace(half_space, _)) => Found::above(half_space, self.body(), pose, warm),
+            (Form::HalfSpace(half_space, _), _) => {
+                let found = Found::above(half_space, other.body(), pose, warm);
+                Found { normal: found.normal.map(|n| -n), ..found }
             }
             (Form::Body(a), Form::Capsule(b, _)) => {
                 Found::signed(&distance_to_capsule(&**a, &origin, b, pose, &options, warm))
@@ -138,7 +189,8 @@ impl Model {
         }
     }
 
-    /// Whether both overlap, from nothing but the pose.
+    /// Whether both overlap, from nothing but the pose; beside a half-space the sign of the
+    /// distance.
     #[inline]
     pub(super) fn overlap(&self, other: &Self, pose: &Pose) -> Answer {
         let (origin, options, warm) = (Pose::identity(), Options::default(), &mut WarmStart::default());
@@ -146,11 +198,7 @@ impl Model {
             (Form::Body(a), Form::Body(b)) => overlap(&**a, &origin, &**b, pose, &options, warm),
             (Form::Body(a), Form::Capsule(b, _)) => overlap_with_capsule(&**a, &origin, b, pose, &options, warm),
             (Form::Capsule(a, _), Form::Body(b)) => overlap_with_capsule(&**b, pose, a, &origin, &options, warm),
-            (Form::Capsule(a, _), Form::Capsule(b, _)) => {
-                let found = distance_of_capsules(a, &origin, b, pose, &options);
-                let (failed, overlap) = (found.lower <= 0.0 && found.upper > 0.0, found.upper <= 0.0);
-                return Answer { iterations: None, failed, overlap };
-            }
+            _ => return self.distance(other, pose, warm).decision(),
         };
         Answer {
             iterations: None,

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use parry3d_f64::math::Pose as ParryPose;
 use parry3d_f64::query;
 use parry3d_f64::shape::SharedShape;
-use sublevel::measure::{Pose, PoseError, WarmStart};
+use sublevel::measure::{Options, Pose, PoseError, WarmStart, distance};
 
 use super::kind::Kind;
 use super::model::Model;
@@ -21,12 +21,14 @@ pub(super) enum Question {
     Warm,
     /// Whether they overlap, a centimetre or less from contact, from nothing but the poses.
     Near,
-    /// The same where they are apart.
+    /// The distance at the poses of that decision, from nothing but them.
+    NearDistance,
+    /// The decision where they are apart.
     Apart,
 }
 
 impl Question {
-    pub(super) const ALL: [Self; 4] = [Self::Cold, Self::Warm, Self::Near, Self::Apart];
+    pub(super) const ALL: [Self; 5] = [Self::Cold, Self::Warm, Self::Near, Self::NearDistance, Self::Apart];
 
     /// Its name in the CSV.
     pub(super) fn name(self) -> &'static str {
@@ -34,6 +36,7 @@ impl Question {
             Self::Cold => "cold",
             Self::Warm => "warm",
             Self::Near => "near",
+            Self::NearDistance => "near-distance",
             Self::Apart => "apart",
         }
     }
@@ -101,7 +104,10 @@ pub(super) fn race(
     effort: &Effort,
     (cache, coal): (&FitCache, Option<&Coal>),
 ) -> Result<Vec<Time>, ComparisonError> {
-    let far = motion::separated(&[(a.body(), b.body())], unit_m, effort.trajectories, effort.poses)?;
+    let mut far = motion::separated(&[(a.body(), b.body())], unit_m, effort.trajectories, effort.poses)?;
+    if b.is_half_space() {
+        far = far.iter().map(|trajectory| above((a, b), trajectory)).collect::<Result<_, _>>()?;
+    }
     let near = far.iter().map(|trajectory| brought_near((a, b), unit_m, trajectory)).collect::<Result<Vec<_>, _>>()?;
     let parry = Parry::new([a, b], [&far, &near])?;
     let mut rows = [
@@ -112,14 +118,19 @@ pub(super) fn race(
         ),
         (Who::Ours, Question::Warm, Row::warm("", &far, |pose, warm| a.distance(b, pose, warm).answer())),
         (Who::Ours, Question::Near, Row::cold("", &near, |pose| a.overlap(b, pose))),
+        (
+            Who::Ours,
+            Question::NearDistance,
+            Row::cold("", &near, |pose| a.distance(b, pose, &mut WarmStart::default()).answer()),
+        ),
         (Who::Ours, Question::Apart, Row::cold("", &far, |pose| a.overlap(b, pose))),
         (Who::Parry, Question::Cold, Row::cold("", &parry.far, |pose| parry.distance(pose))),
         (Who::Parry, Question::Near, Row::cold("", &parry.near, |pose| parry.overlap(pose))),
         (Who::Parry, Question::Apart, Row::cold("", &parry.far, |pose| parry.overlap(pose))),
     ];
     let name = format!("pairs-{}-{}", kinds[0].name(), kinds[1].name()).replace(' ', "-");
-    let shapes = [a.peer_shape(), b.peer_shape()];
-    let mut run = coal.map(|coal| coal.start(cache.folder(), &name, shapes, &far)).transpose()?;
+    let asked = coal.and_then(|coal| Some((coal, [a.coal()?, b.coal()?])));
+    let mut run = asked.map(|(coal, shapes)| coal.start(cache.folder(), &name, shapes, &far)).transpose()?;
     for _ in 0..effort.turns {
         run.as_mut().map_or(Ok(()), CoalRun::pass)?;
         rows.iter_mut().for_each(|(.., row)| row.turn());
@@ -147,16 +158,39 @@ pub(super) fn race(
     Ok(times)
 }
 
+/// Poses of a shape above a half-space, turning and with gaps as about the ball that stands for it.
+fn above((a, half_space): (&Model, &Model), poses: &[Pose]) -> Result<Trajectory, PoseError> {
+    let moved = |pose: &Pose| {
+        let gap_m = distance(
+            a.body(),
+            &Pose::identity(),
+            half_space.body(),
+            pose,
+            &Options::default(),
+            &mut WarmStart::default(),
+        );
+        let turned = Pose::from_quaternion(Vector3::zeros(), pose.rotation().inverse().coords.into())?;
+        at_gap((a, half_space), &turned, gap_m.lower)
+    };
+    poses.iter().map(moved).collect()
+}
+
 /// The poses moved along the normal to gaps and depths up to [`NEAR`], in turn.
 fn brought_near((a, b): (&Model, &Model), unit_m: f64, poses: &[Pose]) -> Result<Trajectory, PoseError> {
     let moved = |(index, pose): (usize, &Pose)| {
-        let found = a.distance(b, pose, &mut WarmStart::default());
-        let normal = found.normal.unwrap_or_else(Vector3::zeros);
         // Nine of them, none of which is 0.
-        let wanted = unit_m * NEAR * (((index * 5) % 9) as f64 - 3.5) / 4.5;
-        Pose::from_quaternion(pose.translation() + normal * (found.upper_m - wanted), pose.rotation().coords.into())
+        at_gap((a, b), pose, unit_m * NEAR * (((index * 5) % 9) as f64 - 3.5) / 4.5)
     };
     poses.iter().enumerate().map(moved).collect()
+}
+
+/// The pose moved along the normal to this gap or depth.
+fn at_gap((a, b): (&Model, &Model), pose: &Pose, wanted_m: f64) -> Result<Pose, PoseError> {
+    let found = a.distance(b, pose, &mut WarmStart::default());
+    // The normal leads from the second to the first, and beside a half-space the first is moved.
+    let way_m = if b.is_half_space() { wanted_m - found.upper_m } else { found.upper_m - wanted_m };
+    let moved = pose.translation() + found.normal.unwrap_or_else(Vector3::zeros) * way_m;
+    Pose::from_quaternion(moved, pose.rotation().coords.into())
 }
 
 /// The largest difference of our distances from others.
@@ -168,9 +202,13 @@ fn difference([a, b]: [&Model; 2], poses: &[Trajectory], found: &[Vec<f64>]) -> 
 
 impl Parry {
     fn new([a, b]: [&Model; 2], [far, near]: [&[Trajectory]; 2]) -> Result<Self, ComparisonError> {
-        let [(shape_a, frame_a), (shape_b, frame_b)] = [a.peer_shape().parry()?, b.peer_shape().parry()?];
+        let [(shape_a, frame_a), (shape_b, frame_b)] = [a.parry()?, b.parry()?];
         let relative = |poses: &[Trajectory]| {
-            let pose = |pose: &Pose| frame_a.inv_mul(&(parry_pose(pose) * frame_b));
+            // Poses beside a half-space are those of the first.
+            let pose = |pose: &Pose| match b.is_half_space() {
+                true => (parry_pose(pose) * frame_a).inv_mul(&frame_b),
+                false => frame_a.inv_mul(&(parry_pose(pose) * frame_b)),
+            };
             poses.iter().map(|trajectory| trajectory.iter().map(pose).collect()).collect()
         };
         Ok(Self { shapes: [shape_a, shape_b], far: relative(far), near: relative(near) })

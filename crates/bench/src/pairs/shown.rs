@@ -7,6 +7,7 @@ use sublevel::draw::{ChartError, HeatMap};
 use super::kind::Kind;
 use super::race::{Question, Time, Who};
 use crate::csv::{CsvError, Row, Table};
+use crate::words::listed;
 
 /// The rows of a CSV.
 pub(crate) struct Shown {
@@ -15,6 +16,9 @@ pub(crate) struct Shown {
 
 /// The pair that others are compared with.
 const SMOOTH: [Kind; 2] = [Kind::Degree(6), Kind::Degree(6)];
+
+/// By so much two times of the same work may differ from turn to turn.
+const NOISE: f64 = 0.03;
 
 /// The file of the picture of a question.
 fn picture_of(question: Question) -> String {
@@ -55,6 +59,7 @@ impl Shown {
             (Question::Warm, "Distance with a hint from the pose before (ns)"),
             (Question::Cold, "Distance from nothing but the poses (ns)"),
             (Question::Near, "Overlap or not near contact (ns)"),
+            (Question::NearDistance, "Distance at the poses near contact (ns)"),
             (Question::Apart, "Overlap or not apart (ns)"),
         ];
         let kinds = self.kinds();
@@ -63,18 +68,27 @@ impl Shown {
             let map = HeatMap {
                 title: title.into(),
                 labels: kinds.iter().map(|kind| kind.name().to_owned()).collect(),
-                cells: kinds.iter().map(row).collect(),
+                cells: kinds.iter().filter(|kind| kind.is_first()).map(row).collect(),
             };
             Ok((picture_of(question), map.to_svg()?))
         };
-        titles.into_iter().map(picture).collect()
+        let is_there = |(question, _): &(Question, &str)| self.times.iter().any(|time| time.question == *question);
+        titles.into_iter().filter(is_there).map(picture).collect()
     }
 
     /// What a block of a page holds.
     pub(crate) fn block(&self, name: &str) -> Option<String> {
         if let Some(question) = Question::ALL.into_iter().find(|question| question.name() == name) {
-            let table = self.matrix(|kinds| self.ours(kinds, question).map(|ns| format!("{ns:.0}")));
-            return Some(format!("{table}\n![{0}]({0})\n", picture_of(question)));
+            let cell = |kinds| {
+                let ns = self.ours(kinds, question)?;
+                let decided = if question == Question::NearDistance { self.decision_share(kinds) } else { None };
+                Some(format!("{ns:.0}{}", decided.map_or(String::new(), |share| format!(" ({share:.2})"))))
+            };
+            let mut text = format!("{}\n![{1}]({1})\n", self.matrix(cell), picture_of(question));
+            if question == Question::NearDistance {
+                text += &format!("\n{}", self.slower_decisions());
+            }
+            return Some(text);
         }
         match name {
             "coal" => Some(self.matrix(|kinds| {
@@ -113,6 +127,34 @@ impl Shown {
         Some(self.ours(kinds, question)? / self.time(kinds, who, question)?)
     }
 
+    /// Time of a decision near contact in parts of that of the distance at the same poses.
+    fn decision_share(&self, kinds: [Kind; 2]) -> Option<f64> {
+        Some(self.ours(kinds, Question::Near)? / self.ours(kinds, Question::NearDistance)?)
+    }
+
+    /// For how many pairs a decision takes longer than the distance.
+    fn slower_decisions(&self) -> String {
+        let kinds = self.kinds();
+        let pairs = kinds.iter().flat_map(|a| kinds.iter().map(|b| [*a, *b]));
+        let shares: Vec<_> = pairs.filter_map(|kinds| Some((kinds, self.decision_share(kinds)?))).collect();
+        let mut slower: Vec<_> = shares.iter().filter(|(_, share)| *share > 1.0 + NOISE).collect();
+        slower.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let named = slower.iter().map(|([a, b], share)| format!("{} and {} ({share:.2})", a.name(), b.name()));
+        match slower.len() {
+            0 => format!(
+                "No decision of {} pairs takes longer than the distance by more than {:.0} %.\n",
+                shares.len(),
+                100.0 * NOISE
+            ),
+            count => format!(
+                "The decision takes longer than the distance by more than {:.0} % for {count} of {} pairs: {}.\n",
+                100.0 * NOISE,
+                shares.len(),
+                listed(named)
+            ),
+        }
+    }
+
     /// A row for each kind of the first shape, a column for each of the second.
     fn matrix(&self, cell: impl Fn([Kind; 2]) -> Option<String>) -> String {
         let kinds = self.kinds();
@@ -121,7 +163,7 @@ impl Shown {
         text += "\n|---|";
         kinds.iter().for_each(|_| text += "---|");
         text.push('\n');
-        for a in &kinds {
+        for a in kinds.iter().filter(|kind| kind.is_first()) {
             text += &format!("| {} |", a.name());
             kinds.iter().for_each(|b| text += &format!(" {} |", cell([*a, *b]).unwrap_or_default()));
             text.push('\n');
