@@ -140,6 +140,8 @@ fn what_cannot_be_redrawn_is_refused() {
         (&["warm", "--redraw", "--out", "."], 1, "no column"),
         (&["speed", "--redraw", "--quick"], 2, "cannot be used"),
         (&["speed", "--redraw", "--data", "."], 2, "cannot be used"),
+        (&["panda", "--redraw", "--json"], 2, "cannot be used"),
+        (&["panda", "--redraw", "--problems", "own.json"], 2, "cannot be used"),
         (&["tables", "--out", ".", "absent.md"], 1, "absent.md"),
     ] {
         let (found, error) = run(arguments);
@@ -223,18 +225,66 @@ fn the_quick_chart_of_pairs_has_every_pair_once() {
 #[ignore = "needs SUBLEVEL_DATA"]
 fn the_quick_chart_of_the_panda_keeps_what_is_free() {
     let (report, csv) = made("panda");
-    let [states, motions] = &csv.split("\n\n").collect::<Vec<_>>()[..] else { panic!("two tables") };
+    let [states, motions, links] = &csv.split("\n\n").collect::<Vec<_>>()[..] else { panic!("three tables") };
     let of = |table: &str, name: &str, head: &str| column(table, &format!("all,\"{name}\","), head);
     let kept = |name: &str| of(states, name, "kept")[0] / of(states, name, "known")[0];
     assert!(kept("ellipsoids") < kept("degree 4") && kept("degree 6") > 0.95, "{csv}");
     assert_eq!(of(states, "ladder 2-4-6", "kept"), of(states, "degree 6", "kept"));
-    for name in ["degree 4", "degree 6", "two parts of degree 6 refined"] {
+    let gaps = column(links, "\"within 2 cm, as by default\",", "gap_m");
+    assert!(gaps.len() == 11 && gaps.iter().all(|gap| (0.0..=0.02).contains(gap)), "{links}");
+    for name in ["degree 4", "degree 6", "two parts of degree 6 refined", "within 2 cm, as by default"] {
         let [free, samples, contacts] = ["free", "samples", "contacts"].map(|head| of(motions, name, head));
         assert_eq!((free.len(), samples.len()), (3, 3), "{name}");
         assert!(free.iter().zip(&samples).all(|(free, samples)| *free > 0.0 && *samples == 100.0 * free), "{name}");
         assert_eq!(contacts, [0.0; 3], "{name}");
     }
     assert!(report.contains("Coal took no part"), "no word of coal");
+}
+
+/// Two problems of the data, under a name of their own, are all that is measured.
+#[test]
+#[ignore = "needs SUBLEVEL_DATA"]
+fn the_panda_takes_other_problems_and_prints_json() {
+    let out = tempfile::tempdir().expect("a folder can be made");
+    let text = std::fs::read_to_string(data("panda/panda_problems.json")).expect("problems");
+    let mut file: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let problems = file["problems"].as_array_mut().expect("a list");
+    problems.truncate(2);
+    problems.iter_mut().for_each(|problem| problem["set"] = "mine".into());
+    let own = out.path().join("own.json");
+    std::fs::write(&own, file.to_string()).expect("a file can be written");
+    let run = |problems: &Path| {
+        let fits = Path::new(env!("CARGO_TARGET_TMPDIR")).join("chart-fits");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_sublevel-bench"));
+        command.args(["panda", "--quick", "--json", "--data"]).arg(data("")).arg("--problems").arg(problems);
+        command.arg("--fits").arg(fits).arg("--out").arg(out.path()).env_remove("SUBLEVEL_COAL_PANDA");
+        command.output().expect("the program starts")
+    };
+    let output = run(&own);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let found: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    assert_eq!(found["quick"], true);
+    for table in ["states", "motions"] {
+        let rows = found[table].as_array().expect("rows");
+        let of = |family: &str| rows.iter().filter(|row| row["family"] == family).count();
+        assert!(of("mine") > 8 && of("mine") == of("all") && 2 * of("all") == rows.len(), "{table}: {}", rows.len());
+    }
+    let states = found["states"].as_array().expect("rows");
+    assert!(states.iter().all(|row| row["known"] == 4 && row["contacts"].is_null()), "coal took no part");
+    let summary = found["summary"].as_array().expect("figures");
+    let is_of_coal = |figure: &&serde_json::Value| figure["what"].as_str().is_some_and(|what| what.contains("of coal"));
+    assert!(summary.iter().filter(is_of_coal).all(|figure| figure["value"].is_null()), "{summary:?}");
+    assert!(summary.iter().filter(|figure| figure["value"].is_number()).count() > 10, "{summary:?}");
+    assert!(found["links"].as_array().expect("rows").len() > 80 && found["machine"]["cores"].is_number());
+    assert!(out.path().join("panda-families.svg").is_file(), "the report is written, too");
+
+    std::fs::write(&own, r#"{"problems": []}"#).expect("a file can be written");
+    for (problems, words) in [(own, "holds no problems"), (out.path().join("absent.json"), "absent.json")] {
+        let output = run(&problems);
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(1) && error.contains(words), "{error}");
+        assert!(output.stdout.is_empty(), "nothing but JSON is printed");
+    }
 }
 
 #[test]

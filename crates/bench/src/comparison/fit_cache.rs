@@ -6,6 +6,8 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use sublevel::body::{Body, Shape};
 use sublevel::fit::{FitError, FitOptions, Mesh, fit};
+use sublevel::jobs::{LinkBodyError, LinkFit, fit_link};
+use sublevel::robot::Link;
 
 /// Goes into every key. To be raised when a change of the fit makes other bodies of the same input:
 /// nothing else says.
@@ -39,6 +41,14 @@ pub enum FitCacheError {
         /// Why it cannot be.
         source: FitError,
     },
+    /// The body of a link was not made.
+    #[error("link {name}: {source}")]
+    Link {
+        /// The link.
+        name: String,
+        /// Why it has no body.
+        source: LinkBodyError,
+    },
 }
 
 impl FitCache {
@@ -69,11 +79,35 @@ impl FitCache {
         options: &str,
         make: impl FnOnce() -> Result<Shape, FitError>,
     ) -> Result<Shape, FitCacheError> {
+        let failed = |source| FitCacheError::Fit { name: what.to_owned(), source };
+        self.keep(what, mesh, options, || make().map_err(failed))
+    }
+
+    /// The body that `sublevel robot` fits to the mesh of a link, in its frame, which reaches at
+    /// most so far beyond it, metres.
+    ///
+    /// # Errors
+    /// [`FitCacheError`].
+    pub fn link(&self, link: &Link, mesh: &Mesh, max_gap_m: f64) -> Result<Shape, FitCacheError> {
+        let what = format!("{}-gap-{max_gap_m}", link.name.replace('_', "-"));
+        self.keep(&what, mesh, &format!("within {max_gap_m} m"), || {
+            let made = fit_link(link, mesh.clone(), LinkFit::WithinGap(max_gap_m), || ControlFlow::Continue(()));
+            made.map_err(|source| FitCacheError::Link { name: link.name.to_string(), source })
+        })
+    }
+
+    fn keep(
+        &self,
+        what: &str,
+        mesh: &Mesh,
+        options: &str,
+        make: impl FnOnce() -> Result<Shape, FitCacheError>,
+    ) -> Result<Shape, FitCacheError> {
         let path = self.folder.join(format!("{what}-{}.json", key(mesh, options)));
         if let Some(kept) = fs::read_to_string(&path).ok().and_then(|text| Shape::from_json(&text).ok()) {
             return Ok(kept);
         }
-        let made = make().map_err(|source| FitCacheError::Fit { name: what.to_owned(), source })?;
+        let made = make()?;
         let text = match &made {
             Shape::Body(body) => body.to_json(),
             Shape::Compound(compound) => compound.to_json(),

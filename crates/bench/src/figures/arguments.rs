@@ -226,11 +226,12 @@ pub(super) struct PairsArgs {
 /// A planner's workload: states and motions of a Franka Emika Panda among boxes and cylinders, µs
 /// per state and per radian against the free states that are kept
 ///
-/// Links as spheres, ellipsoids, bodies of degree 4 and 6, ladders and compounds, in process and
-/// over gRPC in batches of 1 000; motions proven and sampled. The robot and problems are those of
-/// DIR/panda. Writes panda.md, panda.csv and panda-*.svg. Fits are made once and kept, which takes
-/// some minutes on one core; measuring takes about ten minutes, one with --quick. Coal takes
-/// part when SUBLEVEL_COAL_PANDA names the program that times it on states of this robot.
+/// Links as spheres, ellipsoids, bodies of degree 4 and 6, ladders, compounds, and what `sublevel
+/// robot` fits, in process and over gRPC in batches of 1 000; motions proven and sampled. The robot
+/// and problems are those of DIR/panda. Writes panda.md, panda.csv and panda-*.svg. Fits are made
+/// once and kept, which takes some minutes on one core; measuring takes about ten minutes, one with
+/// --quick. Coal takes part when SUBLEVEL_COAL_PANDA names the program that times it on states of
+/// this robot.
 #[derive(Debug, Args)]
 pub(super) struct PandaArgs {
     #[command(flatten)]

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::rows::{MotionRow, StateRow};
+use super::rows::{LinkRow, MotionRow, StateRow};
 use crate::csv::{CsvError, Row, Table};
 
 /// Columns of the table of states.
@@ -12,8 +12,11 @@ const STATES: &str = "family,representation,pieces,known,kept,kept_self,random,r
 const MOTIONS: &str = "family,representation,from,length_rad,problems,free,mean_us,median_us,p99_us,configurations,\
                        sampled_us,coal_us,certified_us,verify_us,verify_part,samples,contacts,coal_samples,coal_contacts";
 
-/// Two tables, an empty line between them.
-pub(super) fn written(states: &[StateRow], motions: &[MotionRow]) -> String {
+/// Columns of the table of links.
+const LINKS: &str = "representation,link,parts,degree,gap_m";
+
+/// Three tables, an empty line between them.
+pub(super) fn written(states: &[StateRow], motions: &[MotionRow], links: &[LinkRow]) -> String {
     let mut text = format!("{STATES}\n");
     // Writing to a string cannot fail.
     for row in states {
@@ -45,15 +48,38 @@ pub(super) fn written(states: &[StateRow], motions: &[MotionRow]) -> String {
             maybe(row.coal_contacts)
         );
     }
+    let _ = write!(text, "\n{LINKS}\n");
+    for LinkRow { representation, link, parts, degree, gap_m } in links {
+        let _ = writeln!(text, "\"{representation}\",{link},{parts},{degree},{}", number(*gap_m));
+    }
     text
 }
 
-/// Reads what [`written`] wrote.
-pub(super) fn read(csv: &str) -> Result<(Vec<StateRow>, Vec<MotionRow>), CsvError> {
+/// What a CSV holds.
+pub(super) type Tables = (Vec<StateRow>, Vec<MotionRow>, Vec<LinkRow>);
+
+/// Reads what [`written`] wrote; the table of links may be missing.
+pub(super) fn read(csv: &str) -> Result<Tables, CsvError> {
     let mut parts = csv.split("\n\n");
     let mut table = || Table::read(parts.next().unwrap_or_default());
     let (states, motions) = (table()?, table()?);
-    Ok((states.rows().map(state).collect::<Result<_, _>>()?, motions.rows().map(motion).collect::<Result<_, _>>()?))
+    let links = parts.next().map(Table::read).transpose()?;
+    let links = links.iter().flat_map(Table::rows).map(link).collect::<Result<_, _>>()?;
+    Ok((
+        states.rows().map(state).collect::<Result<_, _>>()?,
+        motions.rows().map(motion).collect::<Result<_, _>>()?,
+        links,
+    ))
+}
+
+fn link(row: Row<'_>) -> Result<LinkRow, CsvError> {
+    Ok(LinkRow {
+        representation: row.text("representation")?.to_owned(),
+        link: row.text("link")?.to_owned(),
+        parts: row.get("parts")?,
+        degree: row.get("degree")?,
+        gap_m: row.number("gap_m")?,
+    })
 }
 
 fn state(row: Row<'_>) -> Result<StateRow, CsvError> {
@@ -153,8 +179,18 @@ mod tests {
             coal_samples: Some(1530),
             coal_contacts: None,
         };
-        let text = written(std::slice::from_ref(&state), std::slice::from_ref(&motion));
-        assert_eq!(read(&text), Ok((vec![state], vec![motion])));
+        let link = LinkRow {
+            representation: "degree 6".into(),
+            link: "panda_link1".into(),
+            parts: 2,
+            degree: 6,
+            gap_m: 0.0125,
+        };
+        let text = written(std::slice::from_ref(&state), std::slice::from_ref(&motion), std::slice::from_ref(&link));
+        // Earlier runs wrote no links.
+        let before = text.rsplit_once("\n\n").expect("three tables").0;
+        assert_eq!(read(before), Ok((vec![state.clone()], vec![motion.clone()], Vec::new())));
+        assert_eq!(read(&text), Ok((vec![state], vec![motion], vec![link])));
         assert!(read("family\nbox\n").is_err());
     }
 }

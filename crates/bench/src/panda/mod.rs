@@ -34,7 +34,7 @@ use motions::Measured;
 pub(crate) use place::Site;
 pub(crate) use problems::{Problem, families, read_problems};
 pub(crate) use representation::{LoadedArm, Representation};
-use rows::{ALL, MotionRow, StateRow};
+use rows::{ALL, LinkRow, MotionRow, StateRow};
 pub(crate) use shown::Shown;
 
 /// What was measured.
@@ -45,6 +45,7 @@ pub struct Panda {
     coal: Option<String>,
     states: Vec<StateRow>,
     motions: Vec<MotionRow>,
+    links: Vec<LinkRow>,
 }
 
 /// How much is measured.
@@ -118,7 +119,8 @@ pub fn panda(
         let of_all: Vec<&Measured> = measured.iter().filter(|measured| measured.links == links).collect();
         motions.extend(motions::rows(ALL, &of_all));
     }
-    Ok(Panda { machine, quick, coal: coal.map(|coal| coal.version()), states, motions })
+    let links = arms.iter().flat_map(|(_, loaded)| loaded.links.iter().cloned()).collect();
+    Ok(Panda { machine, quick, coal: coal.map(|coal| coal.version()), states, motions, links })
 }
 
 /// Says what is going on, and fails when it is to stop.

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use super::rows::{MotionRow, StateRow};
+use super::rows::{LinkRow, MotionRow, StateRow};
 use super::summary::{Figure, summary};
-use super::{Machine, Panda, csv};
+use super::{Machine, Panda, Representation, csv};
 use crate::blocks::block;
 
 const CSV: &str = "panda.csv";
@@ -22,7 +22,7 @@ impl Panda {
             None => "Coal took no part: `SUBLEVEL_COAL_PANDA` did not name the program that times it.".into(),
         };
         let block = |name: &str| block(CSV, name, "");
-        let [summary, states, families] = ["summary", "states", "families"].map(block);
+        let [summary, states, families, links] = ["summary", "states", "families", "links"].map(block);
         let [motions, proofs, of_families] = ["motions", "proofs", "motions of families"].map(block);
         format!(
             "# A planner's workload\n\n{head}\n\n\
@@ -42,6 +42,10 @@ impl Panda {
              cores, of the first problem of each family.\n\n{states}\n\
              ![time of a state against states kept](panda-states.svg)\n\n\
              ### By family\n\nKnown-free states kept, and µs per state among the obstacles.\n\n{families}\n\
+             ![time of a state against states kept, family by family](panda-families.svg)\n\n\
+             ### Links\n\nConvex parts, their largest degree, and how far they reach at most beyond the hull of the link, or of the \
+             part of it that they are fitted to. *{}* is what `sublevel robot` makes where no other gap and no degree are asked \
+             for.\n\n{links}\n\
              ## Motions\n\n\
              Straight edges in joint space towards configurations anywhere, with self-collision; of each problem the first \
              candidate that a representation proves free. A proof holds for the whole edge. Beside it the states that a \
@@ -53,13 +57,14 @@ impl Panda {
              representation, as in the first table, where many states are in contact; a check of a sample is one of a state \
              on the same edges, which is free. Afterwards the edges are sampled densely: a proof that is right leaves no sample in contact.\n\n\
              {proofs}\n\
-             ### By family\n\nµs per radian that is proven.\n\n{of_families}"
+             ### By family\n\nµs per radian that is proven.\n\n{of_families}",
+            Representation::Default.name()
         )
     }
 
-    /// Two tables, an empty line between them.
+    /// Three tables, an empty line between them.
     pub fn csv(&self) -> String {
-        csv::written(&self.states, &self.motions)
+        csv::written(&self.states, &self.motions, &self.links)
     }
 
     /// One JSON object with everything; null where something is not measured.
@@ -74,9 +79,10 @@ impl Panda {
             summary: Vec<Figure>,
             states: &'a [StateRow],
             motions: &'a [MotionRow],
+            links: &'a [LinkRow],
         }
-        let (states, motions) = (&self.states[..], &self.motions[..]);
+        let (states, motions, links) = (&self.states[..], &self.motions[..], &self.links[..]);
         let summary = summary(states, motions);
-        serde_json::to_string(&All { machine: &self.machine, quick: self.quick, summary, states, motions })
+        serde_json::to_string(&All { machine: &self.machine, quick: self.quick, summary, states, motions, links })
     }
 }

@@ -12,7 +12,12 @@ use sublevel::scene::{Geometry, Ladder, Robot, RobotId};
 use sublevel::store::RobotSource;
 
 use super::arm::{Arm, ArmLink};
+use super::rows::LinkRow;
 use crate::comparison::FitCache;
+
+/// How far a body of [`Representation::Default`] may reach beyond its link, metres: the default of
+/// `sublevel robot`.
+const MAX_GAP_M: f64 = 0.02;
 
 /// How links are represented.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,11 +38,13 @@ pub(crate) enum Representation {
     Compound,
     /// One or two of those per link, whichever has the smaller gap.
     AtMostTwo,
+    /// What `sublevel robot` fits where nothing else is asked for.
+    Default,
 }
 
 impl Representation {
     /// All of them.
-    pub(super) const ALL: [Self; 8] = [
+    pub(super) const ALL: [Self; 9] = [
         Self::Spheres,
         Self::Ellipsoids,
         Self::Degree4,
@@ -46,6 +53,7 @@ impl Representation {
         Self::Ladder,
         Self::Compound,
         Self::AtMostTwo,
+        Self::Default,
     ];
 
     /// Its name in tables.
@@ -59,6 +67,7 @@ impl Representation {
             Self::Ladder => "ladder 2-4-6",
             Self::Compound => "two parts of degree 6 refined",
             Self::AtMostTwo => "one or two parts, the smaller gap",
+            Self::Default => "within 2 cm, as by default",
         }
     }
 
@@ -78,6 +87,8 @@ pub(crate) struct LoadedArm {
     pub(super) geometries: Vec<Geometry>,
     /// Convex pieces of all links.
     pub(crate) pieces: usize,
+    /// What stands for each link; none of spheres.
+    pub(super) links: Vec<LinkRow>,
 }
 
 impl Arm {
@@ -92,9 +103,55 @@ impl Arm {
         }
         let mut bodies = BTreeMap::new();
         for link in &self.links {
-            bodies.insert(link.name.clone(), geometry(link, links, cache)?);
+            bodies.insert(link.name.clone(), self.geometry(link, links, cache)?);
         }
-        self.robot(&self.urdf, &self.description, bodies)
+        let mut loaded = self.robot(&self.urdf, &self.description, bodies.clone())?;
+        for link in &self.links {
+            let finest = bodies.get(&link.name).and_then(|geometry| geometry.rungs().last());
+            loaded.links.extend(finest.map(|shape| LinkRow {
+                representation: links.name().into(),
+                link: link.name.to_string(),
+                parts: parts(shape).len(),
+                degree: parts(shape).iter().map(Body::degree).max().unwrap_or(0),
+                gap_m: shape.gap_m().unwrap_or(f64::NAN),
+            }));
+        }
+        Ok(loaded)
+    }
+
+    /// The geometry of a link.
+    fn geometry(&self, link: &ArmLink, links: Representation, cache: &FitCache) -> Result<Geometry, Box<dyn Error>> {
+        let name = link.name.replace('_', "-");
+        let of_degree = |degree: usize, refine: bool| {
+            let options = FitOptions { degree, refine, ..FitOptions::default() };
+            cache.body(&name, &link.mesh, &options)
+        };
+        Ok(match links {
+            Representation::Ellipsoids => of_degree(2, false)?.into(),
+            Representation::Degree4 => of_degree(4, false)?.into(),
+            Representation::Degree6 => of_degree(6, false)?.into(),
+            Representation::Refined => of_degree(6, true)?.into(),
+            Representation::Ladder => {
+                let rung =
+                    |degree: usize| Ok::<_, Box<dyn Error>>(Arc::new(Shape::Body(Box::new(of_degree(degree, false)?))));
+                let rungs = [2, 4, 6].into_iter().map(rung).collect::<Result<Vec<_>, _>>()?;
+                Geometry::Ladder(Arc::new(Ladder::new(&name, rungs)?))
+            }
+            Representation::Default => {
+                let described = self.description.links.iter().find(|described| described.name == link.name);
+                let described = described.ok_or("a link that is not in the description")?;
+                Geometry::Solid(Arc::new(cache.link(described, &link.mesh, MAX_GAP_M)?))
+            }
+            Representation::Spheres | Representation::Compound => {
+                Geometry::Solid(Arc::new(two_parts(link, &name, cache)?))
+            }
+            Representation::AtMostTwo => {
+                let (one, two) = (of_degree(6, true)?, two_parts(link, &name, cache)?);
+                // Without a gap it is not known to be near.
+                let [gap_of_one, gap_of_two] = [one.gap_m(), two.gap_m()].map(|gap| gap.unwrap_or(f64::INFINITY));
+                if gap_of_one <= gap_of_two { one.into() } else { Geometry::Solid(Arc::new(two)) }
+            }
+        })
     }
 
     fn robot(
@@ -118,7 +175,13 @@ impl Arm {
             srdf: self.srdf.clone(),
             bodies: bodies.iter().map(|(link, geometry)| (link.clone(), *geometry.id())).collect(),
         };
-        Ok(LoadedArm { robot: Arc::new(robot), source, geometries: bodies.into_values().collect(), pieces })
+        Ok(LoadedArm {
+            robot: Arc::new(robot),
+            source,
+            geometries: bodies.into_values().collect(),
+            pieces,
+            links: Vec::new(),
+        })
     }
 }
 
@@ -127,38 +190,6 @@ fn parts(shape: &Shape) -> &[Body] {
         Shape::Body(body) => std::slice::from_ref(body),
         Shape::Compound(compound) => compound.parts(),
     }
-}
-
-/// The geometry of a link.
-fn geometry(link: &ArmLink, links: Representation, cache: &FitCache) -> Result<Geometry, Box<dyn Error>> {
-    let name = link.name.replace('_', "-");
-    let of_degree = |degree: usize, refine: bool| {
-        let options = FitOptions { degree, refine, ..FitOptions::default() };
-        cache.body(&name, &link.mesh, &options)
-    };
-    Ok(match links {
-        Representation::Ellipsoids => of_degree(2, false)?.into(),
-        Representation::Degree4 => of_degree(4, false)?.into(),
-        Representation::Degree6 => of_degree(6, false)?.into(),
-        Representation::Refined => of_degree(6, true)?.into(),
-        Representation::Ladder => {
-            let rung =
-                |degree: usize| Ok::<_, Box<dyn Error>>(Arc::new(Shape::Body(Box::new(of_degree(degree, false)?))));
-            let rungs = [2, 4, 6].into_iter().map(rung).collect::<Result<Vec<_>, _>>()?;
-            Geometry::Ladder(Arc::new(Ladder::new(&name, rungs)?))
-        }
-        Representation::Spheres | Representation::Compound => Geometry::Solid(Arc::new(two_parts(link, &name, cache)?)),
-        Representation::AtMostTwo => {
-            let (one, two) = (of_degree(6, true)?, two_parts(link, &name, cache)?);
-            let gap_of_two = match &two {
-                Shape::Body(body) => body.gap_m(),
-                Shape::Compound(compound) => compound.gap_m(),
-            };
-            // Without a gap it is not known to be near.
-            let [gap_of_one, gap_of_two] = [one.gap_m(), gap_of_two].map(|gap| gap.unwrap_or(f64::INFINITY));
-            if gap_of_one <= gap_of_two { one.into() } else { Geometry::Solid(Arc::new(two)) }
-        }
-    })
 }
 
 /// A link as two bodies of degree 6 with refined volumes.

@@ -10,6 +10,20 @@ pub(super) const ALL: &str = "all";
 /// The representation of rows of coal.
 pub(super) const COAL: &str = "hulls, coal";
 
+/// What stands for a link.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct LinkRow {
+    pub(super) representation: String,
+    pub(super) link: String,
+    /// Convex parts.
+    pub(super) parts: usize,
+    /// The largest of the parts.
+    pub(super) degree: usize,
+    /// How far a part reaches beyond the hull of what it is fitted to, metres; NaN where that is
+    /// not known.
+    pub(super) gap_m: f64,
+}
+
 /// States of the problems of a family. Times are microseconds per state on one thread, medians of
 /// the rounds; NaN where something is not measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -5,8 +5,8 @@ use std::fmt::Write;
 use sublevel::draw::ChartError;
 
 use super::csv::read;
-use super::pictures::{chart_of_motions, chart_of_states};
-use super::rows::{ALL, COAL, MotionRow, StateRow};
+use super::pictures::{chart_of_families, chart_of_motions, chart_of_states};
+use super::rows::{ALL, COAL, LinkRow, MotionRow, StateRow};
 use super::summary::{Figure, summary};
 use crate::csv::CsvError;
 
@@ -14,19 +14,21 @@ use crate::csv::CsvError;
 pub(crate) struct Shown {
     states: Vec<StateRow>,
     motions: Vec<MotionRow>,
+    links: Vec<LinkRow>,
 }
 
 impl Shown {
     /// Reads what [`Panda::csv`](super::Panda::csv) wrote.
     pub(crate) fn read(csv: &str) -> Result<Self, CsvError> {
-        let (states, motions) = read(csv)?;
-        Ok(Self { states, motions })
+        let (states, motions, links) = read(csv)?;
+        Ok(Self { states, motions, links })
     }
 
     /// The pictures by name.
     pub(crate) fn pictures(&self) -> Result<Vec<(String, String)>, ChartError> {
         Ok(vec![
             ("panda-states.svg".into(), chart_of_states(&self.states)?),
+            ("panda-families.svg".into(), chart_of_families(&self.states, &self.families())?),
             ("panda-motions.svg".into(), chart_of_motions(&self.states, &self.motions)?),
         ])
     }
@@ -37,6 +39,7 @@ impl Shown {
             "summary" => Some(self.summary()),
             "states" => Some(self.table_of_states()),
             "families" => Some(self.table_of_families()),
+            "links" => Some(self.table_of_links()),
             "motions" => Some(self.table_of_motions()),
             "proofs" => Some(self.table_of_proofs()),
             "motions of families" => Some(self.table_of_motion_families()),
@@ -104,6 +107,32 @@ impl Shown {
             };
             let cells: Vec<String> = families.iter().map(cell).collect();
             let _ = writeln!(text, "| {} | {} |", row.representation, cells.join(" | "));
+        }
+        text
+    }
+
+    /// Parts, degree and gap of each link, a column for each representation.
+    fn table_of_links(&self) -> String {
+        let (mut representations, mut links): (Vec<&str>, Vec<&str>) = (Vec::new(), Vec::new());
+        for row in &self.links {
+            for (known, name) in [(&mut representations, &row.representation), (&mut links, &row.link)] {
+                if !known.contains(&name.as_str()) {
+                    known.push(name);
+                }
+            }
+        }
+        let heads = representations.join(" | ");
+        let mut text = format!("| link | {heads} |\n|---|{}\n", "---|".repeat(representations.len()));
+        for link in links {
+            let cell = |name: &&str| {
+                let found = self.links.iter().find(|row| row.representation == **name && row.link == link);
+                let Some(LinkRow { parts, degree, gap_m, .. }) = found else { return "-".into() };
+                let parts = if *parts == 1 { String::new() } else { format!("{parts} of ") };
+                let gap = if gap_m.is_nan() { "unknown".into() } else { format!("{:.1} mm", 1e3 * gap_m) };
+                format!("{parts}degree {degree}, {gap}")
+            };
+            let cells: Vec<String> = representations.iter().map(cell).collect();
+            let _ = writeln!(text, "| {link} | {} |", cells.join(" | "));
         }
         text
     }

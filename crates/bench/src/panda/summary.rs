@@ -57,6 +57,16 @@ pub(super) fn summary(states: &[StateRow], motions: &[MotionRow]) -> Vec<Figure>
         let what = format!("known-free states kept, {}", links.name());
         add(what, of(links.name(), StateRow::kept_share), Unit::Share);
     }
+    // Earlier runs did not have it.
+    if let Some(default) = row(Representation::Default.name()) {
+        let name = Representation::Default.name();
+        add(format!("known-free states kept, links {name}"), default.kept_share(), Unit::Share);
+        add(
+            format!("state among obstacles, links {name}, of coal with cached guesses"),
+            default.scene_us / of_coal(|row| row.scene_us),
+            Unit::Ratio,
+        );
+    }
     add(format!("states anywhere that {main} calls free and coal's hulls in contact"), contacts, Unit::Count);
     add(
         format!("state among obstacles, {main}, kinematics included, of coal with cached guesses"),
