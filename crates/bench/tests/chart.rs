@@ -178,6 +178,8 @@ fn the_quick_chart_of_speed_holds_what_is_known() {
         for name in names.into_iter().chain([
             "axis-aligned box",
             "oriented box",
+            "cylinder",
+            "capsule",
             "degree 4, 4 slabs",
             "hull, 32 vertices, parry",
         ]) {
@@ -193,6 +195,9 @@ fn the_quick_chart_of_speed_holds_what_is_known() {
     }
     let judged = ["hold everywhere", "Where the figures are missed"];
     assert!(judged.iter().any(|words| report.contains(words)), "no verdict");
+    for words in ["Pareto front of the means over all pairs", "Pareto front against hulls: with a hint hull, "] {
+        assert!(report.contains(words), "{words}: {report}");
+    }
 }
 
 #[test]

@@ -11,6 +11,7 @@ mod peers;
 mod pictures;
 mod race;
 mod report;
+mod round;
 mod shown;
 
 use super::Machine;

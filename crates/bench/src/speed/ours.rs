@@ -1,6 +1,7 @@
 //! Our representations of an object: all contain it, and this is proven when they are made.
 
 use super::cover::cover;
+use super::round::{smallest_capsule, smallest_cylinder};
 use crate::comparison::ComparisonError;
 use crate::comparison::FitCache;
 use crate::comparison::Subject;
@@ -8,6 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use std::ops::ControlFlow;
 use sublevel::body::{Body, BodyError, Normalization, Shape};
 use sublevel::fit::{FitOptions, OrientedBox, ball, fit_parts, smallest_box};
+use sublevel::measure::{Capsule, Pose};
 
 /// How an object is represented.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,6 +20,10 @@ pub(super) enum Method {
     AxisBox,
     /// The smallest box at any orientation.
     OrientedBox,
+    /// The smallest cylinder about an axis of that box.
+    Cylinder,
+    /// The smallest capsule about an axis of that box.
+    Capsule,
     /// A body of a degree with the least log det, its volume refined or not.
     Body { degree: usize, refine: bool },
     /// A body of a degree, cut by slabs.
@@ -26,6 +32,23 @@ pub(super) enum Method {
     Parts { parts: usize, degree: usize },
     /// So many balls over the surface.
     Balls(usize),
+}
+
+/// Two objects as they are represented.
+pub(super) enum Models {
+    Shapes([Shape; 2]),
+    /// With their frames in those of the objects.
+    Capsules([(Capsule, Pose); 2]),
+}
+
+impl Models {
+    /// The shapes; none of capsules.
+    pub(super) fn shapes(&self) -> Option<(&Shape, &Shape)> {
+        match self {
+            Self::Shapes([a, b]) => Some((a, b)),
+            Self::Capsules(_) => None,
+        }
+    }
 }
 
 /// A box is made larger by this part: rounding leaves no point outside.
@@ -37,7 +60,7 @@ impl Method {
         let plain = |degree| Self::Body { degree, refine: false };
         let refined = |degree| Self::Body { degree, refine: true };
         let parts = |parts, degree| Self::Parts { parts, degree };
-        let mut all = vec![Self::Ball, Self::AxisBox, Self::OrientedBox];
+        let mut all = vec![Self::Ball, Self::AxisBox, Self::OrientedBox, Self::Cylinder, Self::Capsule];
         all.extend([2, 4, 6].map(plain));
         all.extend([4, 6].map(refined));
         all.push(Self::Slabs { degree: 4, slabs: 4 });
@@ -56,6 +79,8 @@ impl Method {
             Self::Ball => "ball".into(),
             Self::AxisBox => "axis-aligned box".into(),
             Self::OrientedBox => "oriented box".into(),
+            Self::Cylinder => "cylinder".into(),
+            Self::Capsule => "capsule".into(),
             Self::Body { degree: 2, .. } => "ellipsoid".into(),
             Self::Body { degree, refine: false } => format!("degree {degree}"),
             Self::Body { degree, refine: true } => format!("degree {degree}, refined"),
@@ -71,6 +96,8 @@ impl Method {
             Self::Ball => "ball".into(),
             Self::AxisBox => "axis box".into(),
             Self::OrientedBox => "box".into(),
+            Self::Cylinder => "cylinder".into(),
+            Self::Capsule => "capsule".into(),
             Self::Body { degree: 2, .. } => "ellipsoid".into(),
             Self::Body { degree, .. } => degree.to_string(),
             Self::Slabs { degree, slabs } => format!("{degree}+{slabs}"),
@@ -84,8 +111,23 @@ impl Method {
         !matches!(self, Self::Parts { .. } | Self::Balls(_))
     }
 
-    /// The representation of an object.
-    pub(super) fn build(self, subject: &Subject, cache: &FitCache) -> Result<Shape, ComparisonError> {
+    /// The representation of two objects.
+    pub(super) fn build(self, [a, b]: [&Subject; 2], cache: &FitCache) -> Result<Models, ComparisonError> {
+        Ok(match self {
+            Self::Capsule => Models::Capsules([self.capsule(a)?, self.capsule(b)?]),
+            _ => Models::Shapes([self.shape(a, cache)?, self.shape(b, cache)?]),
+        })
+    }
+
+    fn capsule(self, Subject { name, hull, .. }: &Subject) -> Result<(Capsule, Pose), ComparisonError> {
+        let failed = |what: String| ComparisonError::Representation { mesh: name, method: self.name(), what };
+        let found = smallest_capsule(hull).ok_or_else(|| failed("a mesh without points".into()))?;
+        let capsule = Capsule::new(found.radius, found.half_height).map_err(|error| failed(error.to_string()))?;
+        let frame = Pose::from_matrix(&found.axes, found.center).map_err(|error| failed(error.to_string()))?;
+        Ok((capsule, frame))
+    }
+
+    fn shape(self, subject: &Subject, cache: &FitCache) -> Result<Shape, ComparisonError> {
         let Subject { name, mesh, hull, .. } = subject;
         let failed = |what: String| ComparisonError::Representation { mesh: name, method: self.name(), what };
         let boxed = |found: OrientedBox| {
@@ -100,6 +142,12 @@ impl Method {
             }
             Self::AxisBox => boxed(OrientedBox::along(Matrix3::identity(), hull)),
             Self::OrientedBox => boxed(smallest_box(hull)),
+            Self::Cylinder | Self::Capsule => {
+                let found = smallest_cylinder(hull).ok_or_else(|| failed("a mesh without points".into()))?;
+                let body = found.cylinder(name).map_err(|error| failed(error.to_string()))?;
+                let body = body.with_points(&mesh.points).map_err(|error| failed(error.to_string()))?;
+                Ok(Shape::Body(Box::new(body)))
+            }
             Self::Body { degree, refine } => {
                 let options = FitOptions { degree, refine, ..FitOptions::default() };
                 Ok(Shape::Body(Box::new(cache.body(name, mesh, &options)?)))

@@ -85,7 +85,10 @@ impl Who {
     fn is_of_a_series(self) -> bool {
         !matches!(
             self,
-            Self::ParryBall | Self::ParryBox | Self::ParryMesh | Self::Ours(Method::AxisBox | Method::OrientedBox)
+            Self::ParryBall
+                | Self::ParryBox
+                | Self::ParryMesh
+                | Self::Ours(Method::AxisBox | Method::OrientedBox | Method::Cylinder | Method::Capsule)
         )
     }
 
@@ -96,6 +99,7 @@ impl Who {
             }
             Self::Ours(Method::Body { .. }) => ("ours: degree, refined", Ink::Green, Marker::Disc),
             Self::Ours(Method::AxisBox | Method::OrientedBox) => ("ours: box", Ink::Green, Marker::Triangle),
+            Self::Ours(Method::Cylinder | Method::Capsule) => ("ours: cylinder, capsule", Ink::Green, Marker::Ring),
             Self::Ours(Method::Slabs { .. }) => ("ours: degree + slabs", Ink::Blue, Marker::Triangle),
             Self::Ours(Method::Parts { .. }) => ("ours: compound of parts", Ink::Purple, Marker::Disc),
             Self::Ours(Method::Balls(_)) => ("ours: cover of balls", Ink::Purple, Marker::Triangle),
@@ -105,6 +109,15 @@ impl Who {
             Self::ParryMesh => ("parry: mesh", Ink::Orange, Marker::Triangle),
         }
     }
+}
+
+/// Representations with their errors and times as what is judged.
+pub(super) fn as_entries(lines: &[(Who, f64, f64)]) -> Vec<Entry> {
+    let entry = |&(who, error, nanoseconds): &(Who, f64, f64)| {
+        let ours = matches!(who, Who::Ours(_));
+        Entry { name: who.name(), ours, error, nanoseconds }
+    };
+    lines.iter().map(entry).collect()
 }
 
 /// What is drawn or judged of a pair.
@@ -149,11 +162,11 @@ pub(super) fn picture(race: &Race) -> String {
     format!("speed-{}.svg", race.name)
 }
 
-/// Means over all pairs: of errors the mean, of times the geometric one.
-fn overall(races: &[Race]) -> Result<String, ChartError> {
-    let Some(first) = races.first() else { return Err(ChartError::Empty) };
-    let whos = first.lines.iter().map(|line| line.who);
-    let lines = whos.filter_map(|who| {
+/// Means over all pairs, with a hint and against hulls: of errors the mean, of times the geometric
+/// one.
+pub(super) fn means(races: &[Race]) -> Vec<(Who, f64, f64)> {
+    let whos = races.iter().take(1).flat_map(|race| &race.lines).map(|line| line.who);
+    let means = whos.filter_map(|who| {
         let same = races.iter().map(|race| race.lines.iter().find(|line| line.who == who));
         let same: Vec<&Line> = same.collect::<Option<_>>()?;
         let count = same.len() as f64;
@@ -161,8 +174,15 @@ fn overall(races: &[Race]) -> Result<String, ChartError> {
         let logs = same.iter().map(|line| line.nanoseconds(Timing::Warm).ln()).sum::<f64>();
         Some((who, errors.iter().sum::<f64>() / count, (logs / count).exp()))
     });
+    means.collect()
+}
+
+fn overall(races: &[Race]) -> Result<String, ChartError> {
+    if races.is_empty() {
+        return Err(ChartError::Empty);
+    }
     let title = format!("Distance queries with a hint, means over {} pairs", races.len());
-    draw(lines.collect(), title, Truth::Hulls)
+    draw(means(races), title, Truth::Hulls)
 }
 
 fn chart(race: &Race, truth: Truth, timing: Timing) -> Result<String, ChartError> {
@@ -195,15 +215,7 @@ fn draw(lines: Vec<(Who, f64, f64)>, title: String, truth: Truth) -> Result<Stri
     for group in &mut groups {
         group.points.sort_by(|a, b| a.x.total_cmp(&b.x));
     }
-    let entries: Vec<Entry> = lines
-        .iter()
-        .map(|&(who, error, nanoseconds)| Entry {
-            name: who.name(),
-            ours: matches!(who, Who::Ours(_)),
-            error,
-            nanoseconds,
-        })
-        .collect();
+    let entries = as_entries(&lines);
     let stairs = |label: &str, ink, dashed, ours: bool| {
         let points =
             front(entries.iter().filter(|e| e.ours == ours)).iter().map(|e| (e.error, 1e-3 * e.nanoseconds)).collect();

@@ -2,7 +2,7 @@
 
 use super::effort::Effort;
 use super::meshes::Meshes;
-use super::ours::Method;
+use super::ours::{Method, Models};
 use super::peers::{HullPair, Simple, hulls, judged};
 use crate::comparison::ComparisonError;
 use crate::comparison::Subject;
@@ -10,7 +10,10 @@ use crate::comparison::sweep::{Answer, Row};
 use crate::comparison::{Coal, FitCache, PeerShape, motion, parry_pose};
 use parry3d_f64::math::Pose as ParryPose;
 use sublevel::body::Shape;
-use sublevel::measure::{Distance, Options, Pose, WarmStart, distance, distance_batch, signed_distance};
+use sublevel::measure::{
+    Capsule, Distance, Options, Pose, PoseError, WarmStart, distance, distance_batch, distance_of_capsules,
+    signed_distance,
+};
 
 /// What is raced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,8 +90,18 @@ const BATCH: usize = 1024;
 /// One of ours with its two shapes.
 struct Ours {
     method: Method,
-    a: Shape,
-    b: Shape,
+    forms: Forms,
+}
+
+/// Two shapes of a kind.
+enum Forms {
+    Shapes([Shape; 2]),
+    /// With the frame of the first and the poses of the second in that of its object.
+    Capsules {
+        capsules: [Capsule; 2],
+        frame: Pose,
+        poses: Vec<Vec<Pose>>,
+    },
 }
 
 /// Races a pair.
@@ -101,15 +114,17 @@ pub(super) fn race(
 ) -> Result<(Race, About), ComparisonError> {
     let name = format!("{}-{}", a.name, b.name);
     let diameter_m = a.diameter_m.max(b.diameter_m);
-    let mut ours = Vec::new();
+    let mut models = Vec::new();
     for method in Method::all(effort.quick) {
         announce(&format!("{name}: {}", method.name()))?;
-        ours.push(Ours { method, a: method.build(a, cache)?, b: method.build(b, cache)? });
+        models.push((method, method.build([a, b], cache)?));
     }
     announce(&format!("{name}: poses"))?;
-    let apart = ours.iter().filter(|o| matches!(o.method, Method::Body { refine: false, .. }));
-    let apart: Vec<(&Shape, &Shape)> = apart.map(|o| (&o.a, &o.b)).collect();
+    let apart = models.iter().filter(|(method, _)| matches!(method, Method::Body { refine: false, .. }));
+    let apart: Vec<(&Shape, &Shape)> = apart.filter_map(|(_, models)| models.shapes()).collect();
     let poses = motion::separated(&apart, 0.5 * diameter_m, effort.trajectories, effort.poses)?;
+    let ours = models.into_iter().map(|(method, models)| Ok(Ours { method, forms: Forms::new(models, &poses)? }));
+    let ours = ours.collect::<Result<Vec<Ours>, ComparisonError>>()?;
     let parry_poses: Vec<Vec<ParryPose>> = poses.iter().map(|t| t.iter().map(parry_pose).collect()).collect();
     announce(&format!("{name}: exact distances"))?;
     let hulls = hulls(a, b, effort.quick)?;
@@ -213,33 +228,66 @@ impl Line {
 impl Ours {
     /// All but the times: what it answers in each form, compared with the truth.
     fn line(&self, poses: &[Vec<Pose>], truth: &[Vec<f64>; 2], diameter_m: f64) -> Line {
-        let (origin, options) = (Pose::identity(), Options::default());
-        let (mut values, mut wrong, mut seen) = (Vec::new(), 0, 0);
-        for trajectory in poses {
-            let mut hint = WarmStart::default();
-            let mut batch = vec![Distance::default(); trajectory.len()];
-            // There are poses, and as many places.
-            let _ = distance_batch(&self.a, &origin, &self.b, trajectory, &options, &mut batch);
-            for (pose, batched) in trajectory.iter().zip(batch) {
-                let cold = distance(&self.a, &origin, &self.b, pose, &options, &mut WarmStart::default());
-                let warm = distance(&self.a, &origin, &self.b, pose, &options, &mut hint);
-                // In overlap the depth says how far off it is.
-                let overlapping = cold.upper <= 0.0;
-                values.push(if overlapping {
-                    signed_distance(&self.a, &origin, &self.b, pose, &options, &mut WarmStart::default()).value()
-                } else {
-                    cold.value()
-                });
-                let all = [cold, warm, batched];
-                let lower = all.iter().map(|d| d.lower).fold(0.0, f64::max);
-                let upper = all.iter().map(|d| d.upper).fold(f64::INFINITY, f64::min);
-                let truth = truth[usize::from(!self.method.holds_hull())][seen];
-                seen += 1;
-                wrong += usize::from(lower > upper || lower > truth + AGREEMENT * diameter_m);
+        let answers = match &self.forms {
+            Forms::Shapes(shapes) => answers_of_shapes(shapes, poses),
+            Forms::Capsules { capsules: [a, b], frame, poses } => {
+                let of = |pose| distance_of_capsules(a, frame, b, pose, &Options::default());
+                let answers = poses.iter().flatten().map(of);
+                // Brackets of signed distances, all the same in each form.
+                answers.map(|found| (found.value(), [found.lower, found.upper.max(0.0)])).collect()
             }
-        }
+        };
+        let of = &truth[usize::from(!self.method.holds_hull())];
+        let is_wrong =
+            |([lower, upper], truth): ([f64; 2], &f64)| lower > upper || lower > truth + AGREEMENT * diameter_m;
+        let wrong = answers.iter().map(|answer| answer.1).zip(of).filter(|found| is_wrong(*found)).count();
+        let values: Vec<f64> = answers.iter().map(|answer| answer.0).collect();
         let errors = [0, 1].map(|k| ModelError::new(&truth[k], &values, diameter_m));
         Line { contradictions: wrong, ..Line::of(Who::Ours(self.method), errors) }
+    }
+}
+
+/// The distance of each pose, minus its depth in overlap, and what all forms of the query prove of
+/// it.
+fn answers_of_shapes([a, b]: &[Shape; 2], poses: &[Vec<Pose>]) -> Vec<(f64, [f64; 2])> {
+    let (origin, options) = (Pose::identity(), Options::default());
+    let mut answers = Vec::new();
+    for trajectory in poses {
+        let mut hint = WarmStart::default();
+        let mut batch = vec![Distance::default(); trajectory.len()];
+        // There are poses, and as many places.
+        let _ = distance_batch(a, &origin, b, trajectory, &options, &mut batch);
+        for (pose, batched) in trajectory.iter().zip(batch) {
+            let cold = distance(a, &origin, b, pose, &options, &mut WarmStart::default());
+            let warm = distance(a, &origin, b, pose, &options, &mut hint);
+            // In overlap the depth says how far off it is.
+            let value = if cold.upper <= 0.0 {
+                signed_distance(a, &origin, b, pose, &options, &mut WarmStart::default()).value()
+            } else {
+                cold.value()
+            };
+            let all = [cold, warm, batched];
+            let lower = all.iter().map(|d| d.lower).fold(0.0, f64::max);
+            let upper = all.iter().map(|d| d.upper).fold(f64::INFINITY, f64::min);
+            answers.push((value, [lower, upper]));
+        }
+    }
+    answers
+}
+
+impl Forms {
+    fn new(models: Models, poses: &[Vec<Pose>]) -> Result<Self, PoseError> {
+        match models {
+            Models::Shapes(shapes) => Ok(Self::Shapes(shapes)),
+            Models::Capsules([(a, frame), (b, frame_b)]) => {
+                let placed = |pose: &Pose| {
+                    let rotation = pose.rotation() * frame_b.rotation();
+                    Pose::from_quaternion(pose.transform_point(frame_b.translation()), rotation.coords.into())
+                };
+                let poses = poses.iter().map(|trajectory| trajectory.iter().map(placed).collect());
+                Ok(Self::Capsules { capsules: [a, b], frame, poses: poses.collect::<Result<_, _>>()? })
+            }
+        }
     }
 }
 
@@ -258,7 +306,22 @@ struct Rows<'a> {
 
 impl<'a> Rows<'a> {
     fn ours(&mut self, one: &'a Ours, poses: &'a [Vec<Pose>]) {
-        let Ours { method, a, b } = one;
+        match &one.forms {
+            Forms::Shapes(shapes) => self.shapes(one.method, shapes, poses),
+            Forms::Capsules { capsules: [a, b], frame, poses } => {
+                let query = move |pose: &Pose| {
+                    let found = distance_of_capsules(a, frame, b, pose, &Options::default());
+                    Answer::new(found.iterations, found.status, found.upper <= 0.0)
+                };
+                // A formula, which takes no hint.
+                for form in [Form::Cold, Form::Warm] {
+                    self.rows.push((Who::Ours(one.method), form, Row::cold(one.method.name(), poses, query)));
+                }
+            }
+        }
+    }
+
+    fn shapes(&mut self, method: Method, [a, b]: &'a [Shape; 2], poses: &'a [Vec<Pose>]) {
         let judge = |found: &Distance| Answer::new(found.iterations, found.status, found.upper <= 0.0);
         let cold = Row::cold(method.name(), poses, move |pose| {
             judge(&distance(a, &Pose::identity(), b, pose, &Options::default(), &mut WarmStart::default()))
@@ -266,7 +329,7 @@ impl<'a> Rows<'a> {
         let warm = Row::warm(method.name(), poses, move |pose, hint| {
             judge(&distance(a, &Pose::identity(), b, pose, &Options::default(), hint))
         });
-        self.rows.extend([(Who::Ours(*method), Form::Cold, cold), (Who::Ours(*method), Form::Warm, warm)]);
+        self.rows.extend([(Who::Ours(method), Form::Cold, cold), (Who::Ours(method), Form::Warm, warm)]);
         // All others are solved one by one.
         if matches!(method, Method::Ball | Method::Body { .. }) {
             let options = Options::default();
@@ -275,7 +338,7 @@ impl<'a> Rows<'a> {
                 let _ = distance_batch(a, &Pose::identity(), b, poses, &options, answers);
             };
             let row = Row::batches(method.name(), poses, BATCH, batch, judge);
-            self.rows.push((Who::Ours(*method), Form::Batch, row));
+            self.rows.push((Who::Ours(method), Form::Batch, row));
         }
     }
 

@@ -4,6 +4,7 @@ use super::Speed;
 use super::race::{About, Line, Race, Who};
 use crate::blocks::block;
 use crate::comparison::parry_version;
+use crate::csv::{MEASURED, significant};
 use std::fmt::Write;
 use sublevel::measure::DEFAULT_ACCURACY;
 
@@ -56,7 +57,8 @@ impl Speed {
         );
         for (race, _) in &self.races {
             for Line { who, hull, mesh, cold, warm, batch, failed, overlaps, contradictions } in &race.lines {
-                let number = |v: f64| if v.is_finite() { format!("{v:e}") } else { String::new() };
+                let number =
+                    |v: f64| if v.is_finite() { format!("{:e}", significant(v, MEASURED)) } else { String::new() };
                 let errors = [hull, mesh].map(|e| [e.mean, e.most, e.least].map(number).join(","));
                 let times = [*warm, *cold, *batch].map(number).join(",");
                 let Race { name, queries, diameter_m, .. } = race;

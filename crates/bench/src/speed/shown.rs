@@ -1,8 +1,8 @@
 //! What pages show of `speed.csv`: verdicts, tables, pictures, and sentences with numbers.
 
-use super::front::standing;
+use super::front::{Entry, front, standing};
 use super::ours::Method;
-use super::pictures::{Timing, Truth, entries, picture, pictures};
+use super::pictures::{Timing, Truth, as_entries, entries, means, picture, pictures};
 use super::race::{Line, ModelError, Race, Who};
 use crate::csv::{CsvError, Row, Table};
 use crate::words::{Span, listed};
@@ -28,6 +28,11 @@ the hull like our bodies do. An object whose hull has no more vertices keeps it.
 they overlap they answer 0, so that the coarsest look a little better than they are.
 - wrong: queries in which brackets of ours exclude each other or the truth, or in which coal and parry differ by more than 1e-5 of the \
 diameter.
+";
+
+/// Of runs that have them.
+const ROUND_NOTE: &str = "\
+- Cylinders and capsules are the smallest about one of the axes of the oriented box. Capsules are a formula, which takes no hint.
 ";
 
 /// The figures: mean model errors, and how many times as fast as the fastest peer of equal or
@@ -68,7 +73,7 @@ impl Shown {
     pub(crate) fn block(&self, name: &str) -> Option<String> {
         Some(match name {
             "verdicts" => self.verdicts(),
-            "notes" => NOTES.to_owned(),
+            "notes" => self.notes(),
             "times as fast" => self.times_as_fast(),
             "cold" => self.cold()?,
             "small errors" => self.small_errors(),
@@ -81,6 +86,12 @@ impl Shown {
                 text
             }
         })
+    }
+
+    fn notes(&self) -> String {
+        let mut lines = self.races.iter().flat_map(|race| &race.lines);
+        let is_round = |line: &Line| matches!(line.who, Who::Ours(Method::Cylinder | Method::Capsule));
+        format!("{NOTES}{}", if lines.any(is_round) { ROUND_NOTE } else { "" })
     }
 
     /// Whether the figures are met, pair by pair.
@@ -140,6 +151,8 @@ impl Shown {
         let verdict =
             if missed.is_empty() { holds } else { format!("Where the figures are missed: {}.", missed.join("; ")) };
         let _ = writeln!(text, "\n{verdict}");
+        let pareto = pareto(&as_entries(&means(&self.races)));
+        let _ = writeln!(text, "\nPareto front of the means over all pairs, with a hint, against hulls: {pareto}.");
         text
     }
 
@@ -266,6 +279,12 @@ fn percent(part: f64) -> String {
     format!("{:.2} %", 100.0 * part)
 }
 
+/// Representations that nothing as accurate is faster than, with their errors and times.
+fn pareto(entries: &[Entry]) -> String {
+    let named = |entry: &&Entry| format!("{} ({}, {:.0} ns)", entry.name, percent(entry.error), entry.nanoseconds);
+    front(entries.iter()).iter().map(named).collect::<Vec<_>>().join("; ")
+}
+
 impl Race {
     fn write(&self, text: &mut String) {
         let _ = writeln!(
@@ -292,5 +311,8 @@ impl Race {
                 line.contradictions
             );
         }
+        let fronts = [(Timing::Warm, "with a hint"), (Timing::Cold, "without")]
+            .map(|(timing, how)| format!("{how} {}", pareto(&entries(self, Truth::Hulls, timing))));
+        let _ = writeln!(text, "\nPareto front against hulls: {}.", fronts.join(". The same "));
     }
 }
