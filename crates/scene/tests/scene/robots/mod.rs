@@ -2,6 +2,7 @@
 
 mod derived;
 mod explanations;
+mod motions;
 mod refusals;
 mod rules;
 mod states;

@@ -29,12 +29,14 @@ fn links_are_not_changed_one_by_one() {
     let link = || Arc::<str>::from("arm/fore");
     let [ball, _] = things();
     let pose = at(0.0, 0.0, 0.0);
-    let attach = Attach { name: link(), to: "ball".into(), pose: None, touch: Vec::new() };
+    let attach = |to: &str| Attach { name: link(), to: to.into(), pose: None, touch: Vec::new() };
     for (list, update) in [
         (List::Upserts, Update { upserts: vec![placement("arm/fore", &ball, pose)], ..Update::default() }),
         (List::Poses, Update { poses: vec![(link(), pose)], ..Update::default() }),
         (List::Removals, Update { removals: vec![link()], ..Update::default() }),
-        (List::Attach, Update { attach: vec![attach], ..Update::default() }),
+        (List::Attach, Update { attach: vec![attach("ball")], ..Update::default() }),
+        (List::Attach, Update { attach: vec![attach("arm/fore")], ..Update::default() }),
+        (List::Attach, Update { attach: vec![attach("arm/upper")], ..Update::default() }),
         (List::Detach, Update { detach: vec![link()], ..Update::default() }),
         (List::Poses, Update { poses: vec![(link(), pose)], removals: vec!["tool".into()], ..Update::default() }),
     ] {
@@ -46,6 +48,23 @@ fn links_are_not_changed_one_by_one() {
     let scene = cell(&[]);
     assert!(scene.with_poses(&[(slot(&scene, "ball"), pose), (slot(&scene, "arm/fore"), pose)]).is_err());
     assert!(scene.posed(&[(slot(&scene, "arm/fore"), pose)]).is_ok(), "a question may ask what if");
+}
+
+#[test]
+fn nothing_is_held_by_itself() {
+    let attach = |name: &str, to: &str| {
+        let attach = Attach { name: name.into(), to: to.into(), pose: Some(at(0.0, 0.0, 1.0)), touch: Vec::new() };
+        Update { attach: vec![attach], ..Update::default() }
+    };
+    for name in ["ball", "tool"] {
+        let itself = SceneError::Itself { at: entry(List::Attach), name: name.into() };
+        assert_eq!(refused(attach(name, name)), itself);
+    }
+    let mut both = attach("ball", "tool");
+    both.attach.extend(attach("tool", "ball").attach);
+    assert!(matches!(refused(both), SceneError::Circle { .. }));
+    let missing = refused(attach("ball", "arm/knee"));
+    assert_eq!(missing, SceneError::NoObject { at: entry(List::Attach), name: "arm/knee".into() });
 }
 
 #[test]

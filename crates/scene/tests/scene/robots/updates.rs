@@ -2,11 +2,11 @@
 
 use nalgebra::{Isometry3, Translation3, Vector3};
 use sublevel_core::measure::{Options, WarmStart, signed_distance};
-use sublevel_scene::{Geometry, Scene, Update};
+use sublevel_scene::{Attach, Geometry, Scene, Update};
 use sublevel_testkit::Seeded;
 use sublevel_testkit::random::at;
 
-use super::{apart, applied, cell, place, pose, robot, robot_with, set, slot, things, values};
+use super::{apart, applied, apply, cell, place, pose, robot, robot_with, set, slot, things, values};
 
 /// The same by hand: turns about y, about y, about z, and a shift along x.
 fn by_hand(configuration: &[f64]) -> [(&'static str, Isometry3<f64>); 5] {
@@ -63,6 +63,40 @@ fn joints_that_are_not_named_keep_their_values_and_a_new_base_moves_everything()
     assert!(apart(&pose(&next, "arm/base"), &base) == 0.0);
     let moved = pose(&next, "tool").translation() - pose(&scene, "tool").translation();
     assert!((moved - Vector3::new(-3.0, 1.0, 0.5)).norm() < 1e-14, "the tool is on the axis of the wrist: {moved}");
+}
+
+#[test]
+fn what_a_link_lets_go_stays_where_it_is() {
+    let bent = applied(&cell(&[]), &set("arm", values(&[], &[0.3, -0.4, 1.0, 0.02])));
+    let there = pose(&bent, "tool");
+    let wrist = |scene: &Scene| slot(scene, "arm/wrist");
+    assert!(bent.is_allowed(slot(&bent, "tool"), wrist(&bent)));
+    let detach = Update { detach: vec!["tool".into()], ..Update::default() };
+    let free = applied(&bent, &detach);
+    assert!(apart(&pose(&free, "tool"), &there) < 1e-15);
+    assert!(free.object(slot(&free, "tool")).expect("there").attachment.is_none());
+    assert!(!free.is_allowed(slot(&free, "tool"), wrist(&free)), "it may touch what has held it no more");
+    assert_eq!(free.revision(), bent.revision() + 1);
+    // The arm moves without it, and can be removed, which it cannot while it holds something.
+    let home = applied(&free, &set("arm", values(&[], &[0.0; 4])));
+    assert!(
+        apart(&pose(&home, "tool"), &there) < 1e-15
+            && apart(&pose(&home, "arm/wrist"), &pose(&free, "arm/wrist")) > 0.1
+    );
+    let remove = Update { robot_removals: vec!["arm".into()], ..Update::default() };
+    assert!(apply(&bent, &remove).is_err());
+    assert_eq!(applied(&free, &remove).len(), 2);
+    // All in one update: it lets go, and the arm moves; the tool stays where it was before.
+    let both = Update { detach: vec!["tool".into()], ..set("arm", values(&["shoulder"], &[-1.0])) };
+    let both = applied(&bent, &both);
+    assert_eq!(both.robot("arm").expect("there").configuration()[0], -1.0);
+    assert!(apart(&pose(&both, "tool"), &there) < 1e-14);
+    // Held again where it is, it follows.
+    let again = Attach { name: "tool".into(), to: "arm/wrist".into(), pose: None, touch: Vec::new() };
+    let again = applied(&free, &Update { attach: vec![again], ..Update::default() });
+    assert!(apart(&pose(&again, "tool"), &there) < 1e-14);
+    let moved = applied(&again, &set("arm", values(&["shoulder"], &[-1.0])));
+    assert!(apart(&pose(&moved, "tool"), &there) > 0.1);
 }
 
 #[test]
