@@ -32,6 +32,7 @@ const fn axis(key: &'static str, title: &'static str, size: &'static str) -> Axi
 }
 
 pub(super) const DEGREE: Axis = axis("degree", "A distance query against the degree", "degree of both bodies");
+pub(super) const BODY: Axis = axis("body", "A body against its degree", "degree of the body");
 pub(super) const CONSTRAINTS: Axis =
     axis("constraints", "A distance query against the number of constraints", "constraints of one body");
 pub(super) const PARTS: Axis = axis("parts", "A distance query against the parts of a compound", "parts of one solid");
@@ -41,7 +42,7 @@ pub(super) const FIT_DEGREE: Axis = axis("fit-degree", "A fit against the degree
 pub(super) const FIT_POINTS: Axis = axis("fit-points", "A fit against the number of points", "points");
 
 /// All of them.
-pub(super) const AXES: [Axis; 7] = [DEGREE, CONSTRAINTS, PARTS, BATCH, MESSAGE, FIT_DEGREE, FIT_POINTS];
+pub(super) const AXES: [Axis; 8] = [DEGREE, BODY, CONSTRAINTS, PARTS, BATCH, MESSAGE, FIT_DEGREE, FIT_POINTS];
 
 /// Costs against one size.
 #[derive(Clone, Debug)]

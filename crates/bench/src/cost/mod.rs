@@ -1,6 +1,7 @@
 //! Cost: how time and memory grow with degree, constraints, parts, poses of a batch, pairs of a
-//! message, and points of a fit.
+//! message, and points of a fit; and what a body takes before the first query.
 
+mod bodies;
 mod effort;
 mod fits;
 mod growth;
@@ -73,6 +74,7 @@ pub fn cost(
     let pair = [&chair, &human];
     let mut growths = vec![
         queries::degrees(pair, &effort, cache, &mut announce)?,
+        bodies::bodies(&chair, &effort, cache, &mut announce)?,
         queries::constraints(pair, &effort, cache, &mut announce)?,
         queries::parts(pair, &effort, cache, &mut announce)?,
         queries::batches(pair, &effort, cache, &mut announce)?,

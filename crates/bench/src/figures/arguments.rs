@@ -188,8 +188,8 @@ pub(super) struct AccuracyArgs {
     pub(super) common: Common,
 }
 
-/// How time and memory grow: queries with degree, constraints, parts and poses of a batch, messages
-/// with their pairs, fits with degree and points
+/// How time and memory grow: queries with degree, constraints, parts and poses of a batch, bodies
+/// with their degree, messages with their pairs, fits with degree and points
 ///
 /// Chair and human of the Princeton benchmark; a server on loopback in this process; fits of up to
 /// a million random points. Exponents stand beside the curves. Writes cost.md, cost.csv and the

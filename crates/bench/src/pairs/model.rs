@@ -70,9 +70,9 @@ impl Found {
     }
 
     /// The decision that a signed distance is.
-    fn decision(&self) -> Answer {
-        let failed = self.lower_m <= 0.0 && self.upper_m > 0.0;
-        Answer { iterations: None, failed, overlap: self.upper_m <= 0.0 }
+    #[inline]
+    fn decision(lower_m: f64, upper_m: f64) -> Answer {
+        Answer { iterations: None, failed: lower_m <= 0.0 && upper_m > 0.0, overlap: upper_m <= 0.0 }
     }
 }
 
@@ -198,7 +198,14 @@ impl Model {
             (Form::Body(a), Form::Body(b)) => overlap(&**a, &origin, &**b, pose, &options, warm),
             (Form::Body(a), Form::Capsule(b, _)) => overlap_with_capsule(&**a, &origin, b, pose, &options, warm),
             (Form::Capsule(a, _), Form::Body(b)) => overlap_with_capsule(&**b, pose, a, &origin, &options, warm),
-            _ => return self.distance(other, pose, warm).decision(),
+            (Form::Capsule(a, _), Form::Capsule(b, _)) => {
+                let found = distance_of_capsules(a, &origin, b, pose, &options);
+                return Found::decision(found.lower, found.upper);
+            }
+            (_, Form::HalfSpace(..)) | (Form::HalfSpace(..), _) => {
+                let found = self.distance(other, pose, warm);
+                return Found::decision(found.lower_m, found.upper_m);
+            }
         };
         Answer {
             iterations: None,

@@ -97,9 +97,9 @@ impl Shown {
                 Some(format!("{:.2} / {:.2}", cold?, warm?))
             })),
             "parry" => Some(self.matrix(|kinds| {
-                let [cold, apart] =
-                    [Question::Cold, Question::Apart].map(|question| self.share(kinds, Who::Parry, question));
-                Some(format!("{:.2} / {:.2}", cold?, apart?))
+                let [cold, apart] = [Question::Cold, Question::Apart]
+                    .map(|question| self.share(kinds, Who::Parry, question).map(|share| format!("{share:.2}")));
+                Some(format!("{} / {}", cold?, apart.unwrap_or("-".into())))
             })),
             "agreement" => Some(self.agreement()),
             "summary" => self.summary(),
