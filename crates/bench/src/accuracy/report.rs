@@ -4,9 +4,12 @@ use super::methods::Cell;
 use super::{Accuracy, Measured};
 use crate::blocks::block;
 use crate::comparison::parry_version;
-use crate::csv::{MEASURED, significant};
+use crate::csv::significant;
 use crate::machine::locked;
 use std::fmt::Write;
+
+/// Decimal digits of errors and widths, which are drawn over many powers of ten.
+const DIGITS: usize = 4;
 
 impl Accuracy {
     /// The report, but for what `Shown` writes into its blocks.
@@ -55,7 +58,7 @@ impl Accuracy {
                 let Cell { method, setting, queries, nanoseconds, iterations, error, width, off, short } = cell;
                 let name = method.name();
                 let announce = |value: Option<f64>| {
-                    value.map_or(String::new(), |value| format!("{:e}", significant(value, MEASURED)))
+                    value.map_or(String::new(), |value| format!("{:e}", significant(value, DIGITS)))
                 };
                 let widths = width.map_or([None; 2], |width| width.map(Some)).map(announce).join(",");
                 let errors = error.map(|error| announce(Some(error))).join(",");

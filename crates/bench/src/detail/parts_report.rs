@@ -3,7 +3,7 @@
 use super::parts::{Divided, Divider, OBJECTS};
 use crate::blocks::block;
 use crate::comparison::parry_version;
-use crate::csv::{CsvError, Row, Table};
+use crate::csv::{CsvError, MEASURED, Row, Table, significant};
 use std::fmt::Write;
 use sublevel::draw::{ChartError, Group, Ink, Marker, Point, Scatter, Stairs};
 
@@ -153,7 +153,8 @@ pub(super) fn csv(divided: &[Divided]) -> String {
             let _ = writeln!(text, "{},{},{},0,,,,,,,", row.object, row.asked, row.divider.name());
             continue;
         }
-        let of_object = row.of_object.map_or(String::new(), |of| format!("{of:e}"));
+        let short = |value: f64| significant(value, MEASURED);
+        let of_object = row.of_object.map_or(String::new(), |of| format!("{:e}", short(of)));
         let _ = writeln!(
             text,
             "{},{},{},{},{:e},{of_object},{:e},{:e},{:e},{:e},{:e}",
@@ -161,12 +162,12 @@ pub(super) fn csv(divided: &[Divided]) -> String {
             row.asked,
             row.divider.name(),
             row.parts,
-            row.volume_m3,
-            row.of_hull,
-            row.concavity_m,
-            row.concavity,
-            row.left_out_m,
-            row.seconds
+            short(row.volume_m3),
+            short(row.of_hull),
+            short(row.concavity_m),
+            short(row.concavity),
+            short(row.left_out_m),
+            short(row.seconds)
         );
     }
     text

@@ -61,7 +61,8 @@ impl Speed {
                     |v: f64| if v.is_finite() { format!("{:e}", significant(v, MEASURED)) } else { String::new() };
                 let errors = [hull, mesh].map(|e| [e.mean, e.most, e.least].map(number).join(","));
                 let times = [*warm, *cold, *batch].map(number).join(",");
-                let Race { name, queries, diameter_m, .. } = race;
+                let Race { name, queries, .. } = race;
+                let diameter_m = significant(race.diameter_m, MEASURED);
                 let ours = matches!(who, Who::Ours(_));
                 let _ = writeln!(
                     text,

@@ -4,6 +4,7 @@ use super::Warm;
 use super::steps::{Cell, Steps};
 use crate::blocks::block;
 use crate::comparison::parry_version;
+use crate::csv::{MEASURED, significant};
 use std::fmt::Write;
 
 impl Warm {
@@ -44,12 +45,14 @@ impl Warm {
         let mut text = String::from(
             "pair,who,step,cold_ns,warm_ns,cold_iterations,cold_most,warm_iterations,warm_most,failed,contradictions\n",
         );
+        let short = |value: f64| significant(value, MEASURED);
         for Steps { pair, cells, .. } in &self.steps {
             for Cell { who, step, cold, warm, cold_iterations, warm_iterations, failed, contradictions } in cells {
                 let step = step.map_or("teleport".into(), |step| step.to_string());
-                let counts = |of: &Option<(f64, u32)>| of.map_or(",".into(), |(mean, most)| format!("{mean},{most}"));
+                let counts =
+                    |of: &Option<(f64, u32)>| of.map_or(",".into(), |(mean, most)| format!("{},{most}", short(mean)));
                 let (cold_count, warm_count) = (counts(cold_iterations), counts(warm_iterations));
-                let name = who.name();
+                let (name, cold, warm) = (who.name(), short(*cold), short(*warm));
                 let _ = writeln!(
                     text,
                     "{pair},\"{name}\",{step},{cold},{warm},{cold_count},{warm_count},{failed},{contradictions}"
@@ -61,12 +64,12 @@ impl Warm {
             let _ = writeln!(
                 text,
                 "{},{},{},{:e},{},{},{},{},{}",
-                stop.position_m,
-                stop.levels[0],
-                stop.levels[1],
-                stop.width,
-                stop.cold,
-                stop.warm,
+                short(stop.position_m),
+                short(stop.levels[0]),
+                short(stop.levels[1]),
+                short(stop.width),
+                short(stop.cold),
+                short(stop.warm),
                 stop.cold_iterations,
                 stop.warm_iterations,
                 stop.wrong
