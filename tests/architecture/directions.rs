@@ -184,7 +184,7 @@ fn check(layer: &str, text: &str, siblings: &[String]) -> Vec<String> {
 }
 
 /// First path segments after each `prefix`, those of a braced group one by one.
-fn names_after(code: &str, prefix: &str) -> Vec<String> {
+pub(crate) fn names_after(code: &str, prefix: &str) -> Vec<String> {
     let mut names = Vec::new();
     for (at, _) in code.match_indices(prefix) {
         if code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_') {

@@ -3,3 +3,4 @@
 mod circles;
 mod directions;
 mod source;
+mod verifier;
